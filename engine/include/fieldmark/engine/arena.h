@@ -1,0 +1,39 @@
+#pragma once
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+namespace fieldmark {
+
+/// Bump allocator. Blocks are 64-byte aligned (a cache line, and enough for AVX-512), at least double in
+/// size, and are kept by reset() so that the second training step allocates nothing.
+/// No destructor of anything placed here is ever run: Tape enforces that at compile time.
+class Arena {
+ public:
+  static constexpr std::size_t kAlign = 64;
+  explicit Arena(std::size_t first_block = std::size_t{1} << 16) : first_block_(first_block) {}
+  /// Uninitialised room, valid until reset(). @throws std::bad_alloc
+  void* allocate(std::size_t bytes);
+  /// Makes sure that `bytes` can follow without a call to the system.
+  void reserve(std::size_t bytes);
+  void reset() noexcept {
+    block_ = 0;
+    used_ = 0;
+  }
+  std::size_t reserved() const;                           ///< bytes held from the system
+  std::size_t system_calls() const { return grown_; }  ///< times a block was taken from the system
+
+ private:
+  struct Free {
+    void operator()(std::byte* p) const;
+  };
+  struct Block {
+    std::unique_ptr<std::byte[], Free> data;
+    std::size_t size = 0;
+  };
+  void grow(std::size_t bytes);
+  std::vector<Block> blocks_;
+  std::size_t first_block_, block_ = 0, used_ = 0, grown_ = 0;
+};
+
+}  // namespace fieldmark

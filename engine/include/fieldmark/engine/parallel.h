@@ -1,0 +1,34 @@
+#pragma once
+#include <fieldmark/engine/shape.h>
+
+#include <type_traits>
+
+namespace fieldmark {
+
+/// Threads the library uses outside of an existing parallel region; at first all that the machine offers.
+/// @param n  at least 1   @throws ValueError otherwise
+void set_threads(int n);
+int threads();
+
+namespace detail {
+void parallel_chunks(Index chunks, void* context, void (*run)(void*, Index chunk));
+}  // namespace detail
+
+/// Calls f(begin, end) over [0, n) in pieces of `grain`, on several threads; serial when called from inside another
+/// parallel loop or where there is only one piece. The pieces do not depend on the thread count, so a result that
+/// depends only on the piece has the same bits for any number of threads. An exception thrown by f is rethrown here.
+template <class F>
+void parallel_for(Index n, Index grain, F&& f) {
+  if (n <= 0) return;
+  struct Context {
+    std::remove_reference_t<F>* f;
+    Index n, grain;
+  } context{&f, n, grain < 1 ? 1 : grain};
+  detail::parallel_chunks((n + context.grain - 1) / context.grain, &context, [](void* p, Index chunk) {
+    auto& c = *static_cast<Context*>(p);
+    const Index begin = chunk * c.grain;
+    (*c.f)(begin, begin + c.grain < c.n ? begin + c.grain : c.n);
+  });
+}
+
+}  // namespace fieldmark

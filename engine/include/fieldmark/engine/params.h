@@ -1,0 +1,70 @@
+#pragma once
+#include <fieldmark/engine/tape.h>
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace fieldmark {
+
+/// Names one tensor of a ParamStore. Modules keep ids, never pointers: add() may move the buffers.
+struct ParamId {
+  int index = -1;
+};
+
+/// All trainable numbers of a model in one flat buffer, gradients in a second one of equal length,
+/// so that an optimiser step, a checkpoint and zero_grad() are each one loop.
+template <class T>
+class ParamStore {
+ public:
+  struct Entry {
+    std::string name;  ///< unique, slash separated: "field/density/weight"
+    Shape shape;
+    Index offset;  ///< of the first element in values()
+  };
+  /// Appends a tensor of zeros. @throws ValueError if the name is taken
+  ParamId add(std::string_view name, Shape shape);
+  /// @throws ValueError if there is no such name
+  ParamId find(std::string_view name) const;
+  std::span<T> values(ParamId id);
+  std::span<const T> values(ParamId id) const;
+  std::span<T> grads(ParamId id);
+  std::span<T> values() { return values_; }
+  std::span<const T> values() const { return values_; }
+  std::span<T> grads() { return grads_; }
+  std::span<const Entry> entries() const { return entries_; }
+  const Entry& entry(ParamId id) const { return entries_[static_cast<std::size_t>(id.index)]; }
+  Index size() const { return static_cast<Index>(values_.size()); }
+  void zero_grad();
+
+ private:
+  std::vector<Entry> entries_;
+  std::vector<T> values_, grads_;
+};
+
+/// Where a pass reads parameters and where it adds their gradients: the store itself, a shard's private buffer, or
+/// nowhere (inference). Cheap to copy; the store must outlive it.
+template <class T>
+class Params {
+ public:
+  /// Reads the store, adds gradients to the store.
+  explicit Params(ParamStore<T>& store) : Params(store, store.values().data(), store.grads().data()) {}
+  /// Reads the store; gradients, laid out as the store's, go to `grads`, or are not computed if it is null.
+  Params(const ParamStore<T>& store, T* grads) : Params(store, store.values().data(), grads) {}
+  /// Reads `values` laid out as the store's: how gradcheck treats a module's parameters as an input.
+  Params(const ParamStore<T>& layout, const T* values, T* grads) : layout_(&layout), values_(values), grads_(grads) {}
+
+  Var<T> leaf(Tape<T>& tape, ParamId id) const {
+    const auto& e = layout_->entry(id);
+    return grads_ ? tape.leaf(values_ + e.offset, grads_ + e.offset, e.shape)
+                  : tape.constant(values_ + e.offset, e.shape);
+  }
+
+ private:
+  const ParamStore<T>* layout_;
+  const T* values_;
+  T* grads_;
+};
+
+}  // namespace fieldmark

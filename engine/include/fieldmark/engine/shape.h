@@ -1,0 +1,42 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <initializer_list>
+#include <string>
+
+namespace fieldmark {
+
+using Index = std::int64_t;
+
+/// Extents of a dense row-major tensor, rank 0 to 5. Trivially copyable, so that a backward
+/// closure can hold one by value.
+class Shape {
+ public:
+  static constexpr int kMaxRank = 5;
+  Shape() = default;
+  Shape(std::initializer_list<Index> dims) : rank_(static_cast<int>(dims.size())) {
+    int k = 0;
+    for (Index d : dims) dims_[static_cast<std::size_t>(k++)] = d;
+  }
+  int rank() const { return rank_; }
+  /// Extent of an axis; negative axes count from the last.
+  Index operator[](int axis) const { return dims_[static_cast<std::size_t>(axis < 0 ? axis + rank_ : axis)]; }
+  /// Number of elements; 1 for rank 0.
+  Index size() const {
+    Index n = 1;
+    for (int k = 0; k < rank_; ++k) n *= (*this)[k];
+    return n;
+  }
+  friend bool operator==(const Shape&, const Shape&) = default;
+  std::string str() const {
+    std::string s = "[";
+    for (int k = 0; k < rank_; ++k) s += (k ? ", " : "") + std::to_string((*this)[k]);
+    return s + "]";
+  }
+
+ private:
+  std::array<Index, kMaxRank> dims_{};
+  int rank_ = 0;
+};
+
+}  // namespace fieldmark

@@ -1,0 +1,171 @@
+#pragma once
+#include <fieldmark/engine/arena.h>
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/shape.h>
+#include <fieldmark/engine/tensor.h>
+
+#include <algorithm>
+#include <new>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+namespace fieldmark {
+
+template <class T>
+class Tape;
+
+/// Handle to a value on a tape: two pointers, trivially copyable, valid until Tape::reset().
+template <class T>
+class Var {
+ public:
+  const Shape& shape() const { return slot_->shape; }
+  /// Row-major values, shape().size() of them.
+  const T* value() const { return slot_->value; }
+  Tape<T>& tape() const { return *tape_; }
+  bool needs_grad() const { return slot_->needs_grad; }
+  /// dL/d(this) as written so far; nullptr where no gradient has arrived.
+  const T* grad() const { return slot_->grad; }
+  /// Where a backward adds its share; nullptr if this input needs none.
+  /// The buffer is made, zeroed, on the first call.
+  T* grad_acc() const;
+  /// As grad_acc(), but a buffer made by this call is left uninitialised and *fresh is set: the caller then assigns
+  /// every element instead of adding. Saves a pass over memory in ops that write all of their input's gradient.
+  T* grad_acc(bool* fresh) const;
+
+ private:
+  friend class Tape<T>;
+  struct Slot {
+    const T* value;
+    T* grad;
+    Shape shape;
+    bool needs_grad;
+  };
+  Var(Tape<T>* t, Slot* s) : tape_(t), slot_(s) {}
+  Tape<T>* tape_;
+  Slot* slot_;
+};
+
+/// Records operations in the order they run, and replays their backwards in reverse.
+/// Creation order is already a topological order, so backward() is one loop: no sort, no
+/// recursion. One Tape per thread; there is no global tape.
+template <class T>
+class Tape {
+ public:
+  Tape() = default;
+  Tape(const Tape&) = delete;
+  Tape& operator=(const Tape&) = delete;
+
+  /// A value that needs no gradient. The data must outlive the pass.
+  Var<T> constant(const Tensor<T>& t) { return make(t.data.data(), nullptr, t.shape, false); }
+  Var<T> constant(const T* value, Shape shape) { return make(value, nullptr, shape, false); }
+  /// A parameter or another input to differentiate in: the gradient is added to what `grad` already holds.
+  Var<T> leaf(const T* value, T* grad, Shape shape) { return make(value, grad, shape, true); }
+  Var<T> leaf(const Tensor<T>& t, Tensor<T>& grad) { return leaf(t.data.data(), grad.data.data(), t.shape); }
+  /// Output of an op; *data points at the uninitialised values for the op to fill.
+  Var<T> output(Shape shape, T** data, std::initializer_list<Var<T>> inputs) {
+    *data = scratch(shape.size());
+    return make(*data, nullptr, shape,
+                std::any_of(inputs.begin(), inputs.end(), [](const Var<T>& v) { return v.needs_grad(); }));
+  }
+  /// Output of an op that takes any number of inputs.
+  Var<T> output(Shape shape, T** data, bool needs_grad) {
+    *data = scratch(shape.size());
+    return make(*data, nullptr, shape, needs_grad);
+  }
+  /// The same numbers under another shape of equal size; gradients flow through unchanged.
+  Var<T> reshape(Var<T> x, Shape shape);
+  /// Uninitialised room for what a backward wants to keep.
+  template <class U = T>
+  U* scratch(Index n) {
+    static_assert(std::is_trivially_destructible_v<U>);
+    return static_cast<U*>(arena_.allocate(static_cast<std::size_t>(n) * sizeof(U)));
+  }
+
+  /// Registers `fn(const T* dout)`, called only if a gradient reached `out`.
+  template <class F>
+  void on_backward(Var<T> out, F fn) {
+    static_assert(std::is_trivially_destructible_v<F> && std::is_trivially_copyable_v<F>,
+                  "a backward lives in the arena: capture Var, Shape, numbers and raw pointers only");
+    if (!out.needs_grad()) return;
+    auto* f = new (arena_.allocate(sizeof(F))) F(fn);
+    nodes_.push_back({out, f, [](void* p, const T* dout) { (*static_cast<F*>(p))(dout); }});
+  }
+
+  /// Seeds dL/dloss = 1 and replays. @throws ShapeError unless `loss` has exactly one element
+  void backward(Var<T> loss) {
+    if (loss.shape().size() != 1)
+      throw ShapeError("[backward] loss must have one element, got shape " + loss.shape().str());
+    const T one = 1;
+    backward(loss, std::span<const T>(&one, 1));
+  }
+  /// Seeds dL/dout = seed (row-major, as many as out has) and replays.
+  /// @throws ShapeError if the sizes differ   @throws ValueError if no input of `out` needs a gradient
+  void backward(Var<T> out, std::span<const T> seed) {
+    if (static_cast<Index>(seed.size()) != out.shape().size())
+      throw ShapeError("[backward] seed must have one number for each of out, whose shape is " + out.shape().str() +
+                       ", got " + std::to_string(seed.size()));
+    T* g = out.grad_acc();
+    if (!g) throw ValueError("[backward] nothing to differentiate: no input of this value needs a gradient");
+    for (std::size_t i = 0; i < seed.size(); ++i) g[i] += seed[i];
+    replay();
+  }
+  /// Replays with the gradients that Var::grad_acc() holds already: several outputs may have been seeded by hand.
+  void replay() {
+    for (auto n = nodes_.rbegin(); n != nodes_.rend(); ++n)
+      if (const T* dout = n->out.grad()) n->run(n->closure, dout);
+  }
+  void reset() {
+    nodes_.clear();
+    arena_.reset();
+  }
+  Arena& arena() { return arena_; }
+
+ private:
+  struct Node {
+    Var<T> out;
+    void* closure;
+    void (*run)(void*, const T*);
+  };
+  Var<T> make(const T* value, T* grad, Shape shape, bool needs) {
+    using Slot = typename Var<T>::Slot;
+    return Var<T>(this, new (arena_.allocate(sizeof(Slot))) Slot{value, grad, shape, needs});
+  }
+  Arena arena_;
+  std::vector<Node> nodes_;
+};
+
+template <class T>
+T* Var<T>::grad_acc() const {
+  bool fresh = false;
+  T* g = grad_acc(&fresh);
+  if (fresh) std::fill_n(g, slot_->shape.size(), T(0));
+  return g;
+}
+
+template <class T>
+T* Var<T>::grad_acc(bool* fresh) const {
+  *fresh = false;
+  if (!slot_->needs_grad) return nullptr;
+  if (!slot_->grad) {
+    slot_->grad = tape_->scratch(slot_->shape.size());
+    *fresh = true;
+  }
+  return slot_->grad;
+}
+
+template <class T>
+Var<T> Tape<T>::reshape(Var<T> x, Shape shape) {
+  if (shape.size() != x.shape().size())
+    throw ShapeError("[reshape] shape must have the " + std::to_string(x.shape().size()) + " elements of x, got shape " +
+                     shape.str());
+  Var<T> out = make(x.value(), nullptr, shape, x.needs_grad());
+  const Index n = shape.size();
+  on_backward(out, [x, n](const T* dy) {
+    T* dx = x.grad_acc();
+    for (Index i = 0; i < n; ++i) dx[i] += dy[i];
+  });
+  return out;
+}
+
+}  // namespace fieldmark

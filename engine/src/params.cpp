@@ -1,0 +1,49 @@
+#include <fieldmark/engine/params.h>
+
+namespace fieldmark {
+
+template <class T>
+ParamId ParamStore<T>::add(std::string_view name, Shape shape) {
+  for (const Entry& e : entries_)
+    if (e.name == name) throw ValueError("[params] name '" + e.name + "' is already used");
+  entries_.push_back({std::string(name), shape, size()});
+  values_.resize(values_.size() + static_cast<std::size_t>(shape.size()));
+  grads_.resize(values_.size());
+  return {static_cast<int>(entries_.size()) - 1};
+}
+
+template <class T>
+ParamId ParamStore<T>::find(std::string_view name) const {
+  for (std::size_t i = 0; i < entries_.size(); ++i)
+    if (entries_[i].name == name) return {static_cast<int>(i)};
+  throw ValueError("[params] there is no parameter '" + std::string(name) + "'");
+}
+
+template <class T>
+std::span<T> ParamStore<T>::values(ParamId id) {
+  const Entry& e = entry(id);
+  return std::span<T>(values_).subspan(static_cast<std::size_t>(e.offset), static_cast<std::size_t>(e.shape.size()));
+}
+
+template <class T>
+std::span<const T> ParamStore<T>::values(ParamId id) const {
+  const Entry& e = entry(id);
+  return std::span<const T>(values_).subspan(static_cast<std::size_t>(e.offset),
+                                             static_cast<std::size_t>(e.shape.size()));
+}
+
+template <class T>
+std::span<T> ParamStore<T>::grads(ParamId id) {
+  const Entry& e = entry(id);
+  return std::span<T>(grads_).subspan(static_cast<std::size_t>(e.offset), static_cast<std::size_t>(e.shape.size()));
+}
+
+template <class T>
+void ParamStore<T>::zero_grad() {
+  std::fill(grads_.begin(), grads_.end(), T(0));
+}
+
+template class ParamStore<float>;
+template class ParamStore<double>;
+
+}  // namespace fieldmark

@@ -1,0 +1,35 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/parallel.h>
+
+#include <numeric>
+#include <vector>
+
+#include "support/catch.h"
+
+using namespace fieldmark;
+
+TEST_CASE("parallel: every index once, in pieces that do not depend on the thread count") {
+  const int before = threads();
+  for (int n_threads : {1, 2, 3}) {
+    set_threads(n_threads);
+    for (Index n : {0, 1, 7, 8, 9, 1000}) {
+      std::vector<int> seen(static_cast<std::size_t>(n));
+      parallel_for(n, 8, [&](Index begin, Index end) {
+        CHECK(begin % 8 == 0);
+        for (Index i = begin; i < end; ++i) ++seen[static_cast<std::size_t>(i)];
+      });
+      CHECK(std::accumulate(seen.begin(), seen.end(), 0) == n);
+    }
+  }
+  set_threads(before);
+}
+
+TEST_CASE("parallel: an exception of a piece reaches the caller; nested loops are serial") {
+  CHECK_THROWS_WITH(parallel_for(100, 1, [](Index b, Index) { if (b == 50) throw ValueError("fifty"); }), "fifty");
+  std::vector<int> seen(64);
+  parallel_for(8, 1, [&](Index b, Index) {
+    parallel_for(8, 1, [&](Index c, Index) { ++seen[static_cast<std::size_t>(8 * b + c)]; });
+  });
+  CHECK(seen == std::vector<int>(64, 1));
+  CHECK_THROWS_WITH(set_threads(0), "[set_threads] n must be at least 1, got 0");
+}
