@@ -24,7 +24,7 @@ TEST_CASE("parallel: every index once, in pieces that do not depend on the threa
   set_threads(before);
 }
 
-TEST_CASE("parallel: an exception of a piece reaches the caller; nested loops are serial") {
+TEST_CASE("parallel: an exception of a piece reaches the caller, nested loops are serial") {
   CHECK_THROWS_WITH(parallel_for(100, 1, [](Index b, Index) { if (b == 50) throw ValueError("fifty"); }), "fifty");
   std::vector<int> seen(64);
   parallel_for(8, 1, [&](Index b, Index) {

@@ -25,7 +25,7 @@ std::vector<float> run(int n_threads, Index chunks) {
 }
 }  // namespace
 
-TEST_CASE("sharded_loop: same bits for 1, 2 and 3 threads; adds onto what was there") {
+TEST_CASE("sharded_loop: same bits for 1, 2 and 3 threads and adds onto what was there") {
   const int before = threads();
   for (Index chunks : {0, 1, 5, 16, 1001}) {
     const auto one = run(1, chunks);
