@@ -1,0 +1,61 @@
+#pragma once
+#include <fieldmark/engine/shape.h>
+
+#include <array>
+#include <span>
+
+namespace fieldmark::nerf {
+
+using Vec3 = std::array<double, 3>;
+/// Camera-to-world matrix [3, 4], row-major: the columns are the camera's right, up and backward axes and its
+/// position.
+using Pose = std::array<double, 12>;
+
+/// Half of a line: origin + t * direction, t >= 0, with a unit direction.
+struct Ray {
+  Vec3 origin, direction;
+};
+
+/// Pinhole camera with OpenGL (Blender) axes: x right, y up, looking along -z. Pixel (0, 0) is at the top
+/// left, and whole numbers are the centres of pixels; cx and cy are measured from the picture's corner.
+struct Camera {
+  Pose pose{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+  double fx = 1, fy = 1;  ///< focal lengths, pixels, > 0
+  double cx = 0,
+         cy = 0;  ///< principal point, pixels from the top left corner: width / 2, height / 2 when centred
+  Index width = 0, height = 0;
+
+  Vec3 position() const { return {pose[3], pose[7], pose[11]}; }
+  /// The viewing direction, the pose's third column negated; unit if the pose is a rotation.
+  Vec3 forward() const { return {-pose[2], -pose[6], -pose[10]}; }
+  /// The same view with another number of pixels. @throws ValueError unless both are at least 1
+  Camera scaled(Index new_width, Index new_height) const;
+  /// The same view with the longer side `size` pixels, the other in proportion and at least 1; 0 leaves it as
+  /// is.
+  Camera scaled(Index size) const;
+  /// Pose, then fx, fy, cx, cy: what rays() takes.
+  std::array<double, 16> parameters() const;
+};
+
+/// A centred camera with square pixels.
+/// @param angle_x  horizontal field of view, radians, in (0, pi)   @throws ValueError outside, or if a side
+/// is below 1
+Camera make_camera(const Pose& pose, double angle_x, Index width, Index height);
+
+/// The pose at `eye` that looks at `target` with `up` upwards in the picture. Where the view is along `up`,
+/// the coordinate axis furthest from the view replaces it.
+/// @throws ValueError if eye and target coincide or a number is not finite
+Pose look_at(const Vec3& eye, const Vec3& target, const Vec3& up);
+
+/// The ray through the centre of pixel (x, y):
+///   d = R ((x + 1/2 - cx) / fx, -(y + 1/2 - cy) / fy, -1), normalised.
+/// @param x, y  pixels, need not be whole
+Ray pixel_ray(const Camera& camera, double x, double y);
+
+/// pixel_ray() for many pixels, in float.
+/// @param pixels      [N, 2] x and y in pixels
+/// @param origins     [N, 3] written   @param directions  [N, 3] written, unit
+/// @throws ValueError  if the count of numbers in pixels is odd
+void camera_rays(const Camera& camera, std::span<const float> pixels, float* origins, float* directions);
+
+}  // namespace fieldmark::nerf
