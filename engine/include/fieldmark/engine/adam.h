@@ -1,0 +1,69 @@
+#pragma once
+#include <fieldmark/engine/shape.h>
+
+#include <span>
+#include <vector>
+
+namespace fieldmark {
+
+struct AdamOptions {
+  double lr = 1e-3;         ///< > 0; step size before a schedule's factor
+  double beta1 = 0.9;       ///< in [0, 1), decay of the gradient's mean
+  double beta2 = 0.99;      ///< in [0, 1), decay of the squared gradient's mean
+  double eps = 1e-15;       ///< > 0, added to the root; small because a table's gradients are
+  bool skip_zero = false;   ///< leave alone, moments too, what has a gradient of exactly 0: tables need it
+  double weight_decay = 0;  ///< >= 0, decoupled: x -= lr weight_decay x
+  bool zero_grads = false;  ///< also set the gradients read to 0, in the same pass over memory
+};
+
+/// A part of the parameters with a step size and rules of its own.
+struct AdamRange {
+  Index begin = 0, end = 0;  ///< of the numbers
+  double lr_factor = 1;      ///< multiplies AdamOptions::lr
+  bool skip_zero = false;
+  double weight_decay = 0;
+};
+
+/// Adam on a flat array of parameters.
+///   m = b1 m + (1 - b1) g,   v = b2 v + (1 - b2) g^2,
+///   x -= lr (m / (1 - b1^t) / (sqrt(v / (1 - b2^t)) + eps) + weight_decay x)
+/// Source: Kingma and Ba 2015, algorithm 1; the decay as Loshchilov and Hutter 2019, algorithm 2. Departure:
+/// entries that skip_zero leaves alone still share t, so that a rarely touched one has no bias correction
+/// left (as in Mueller et al. 2022, section 4). A gradient that is not finite makes its own entry not finite
+/// and no other.
+template <class T>
+class Adam {
+ public:
+  /// @throws ValueError if n is negative or an option is out of range
+  explicit Adam(Index n, AdamOptions options = {});
+
+  /// One step over everything, with the options' skip_zero and weight_decay.
+  /// @param values, grads  [n]   @param lr_factor  multiplies the options' lr, see exponential_decay()
+  /// @throws ShapeError unless both have n numbers
+  void step(std::span<T> values, std::span<T> grads, double lr_factor = 1);
+  /// One step over the given ranges, which must not overlap; what is in none of them stays, gradients too.
+  /// @throws ShapeError unless both have n numbers   @throws ValueError if a range is not within [0, n]
+  void step(std::span<T> values, std::span<T> grads, std::span<const AdamRange> ranges);
+
+  /// Steps taken: with the two moments, all that a checkpoint must hold.
+  Index steps() const { return steps_; }
+  /// @throws ValueError if negative
+  void set_steps(Index steps);
+  std::span<T> mean() { return mean_; }
+  std::span<const T> mean() const { return mean_; }
+  std::span<T> mean_square() { return mean_square_; }
+  std::span<const T> mean_square() const { return mean_square_; }
+  const AdamOptions& options() const { return options_; }
+
+ private:
+  AdamOptions options_;
+  std::vector<T> mean_, mean_square_;
+  Index steps_ = 0;
+};
+
+/// lr0 (lr1 / lr0)^fraction: falls from lr0 to lr1, both > 0, while the fraction goes from 0 to 1; constant
+/// outside.
+/// @throws ValueError unless both are positive
+double exponential_decay(double lr0, double lr1, double fraction);
+
+}  // namespace fieldmark

@@ -1,0 +1,110 @@
+#include <fieldmark/engine/adam.h>
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/parallel.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "kernels/adam.h"
+
+namespace fieldmark {
+namespace kernels {
+namespace {
+void adam(float* x, float* g, float* m, float* v, Index n, const AdamScalars<float>& s) {
+  FIELDMARK_KERNEL(adam_f32)(x, g, m, v, n, s);
+}
+void adam(double* x, double* g, double* m, double* v, Index n, const AdamScalars<double>& s) {
+  FIELDMARK_KERNEL(adam_f64)(x, g, m, v, n, s);
+}
+}  // namespace
+}  // namespace kernels
+
+namespace {
+
+// 16k floats of four arrays are 256 KiB: a piece that fits a core's second level of cache.
+constexpr Index kGrain = 16384;
+
+void check_option(const char* name, double value, bool ok, const char* want) {
+  if (!ok)
+    throw ValueError("[Adam] " + std::string(name) + " must be " + want + ", got " + std::to_string(value));
+}
+
+void check_size(const char* name, std::size_t got, std::size_t want) {
+  if (got != want)
+    throw ShapeError("[Adam::step] " + std::string(name) + " must have " + std::to_string(want) +
+                     " numbers (the optimiser was made for them), got " + std::to_string(got));
+}
+
+}  // namespace
+
+template <class T>
+Adam<T>::Adam(Index n, AdamOptions o) : options_(o) {
+  check_option("n", static_cast<double>(n), n >= 0, "at least 0");
+  check_option("lr", o.lr, o.lr > 0, "positive");
+  check_option("beta1", o.beta1, o.beta1 >= 0 && o.beta1 < 1, "in [0, 1)");
+  check_option("beta2", o.beta2, o.beta2 >= 0 && o.beta2 < 1, "in [0, 1)");
+  check_option("eps", o.eps, o.eps > 0, "positive");
+  check_option("weight_decay", o.weight_decay, o.weight_decay >= 0, "at least 0");
+  mean_.resize(static_cast<std::size_t>(n));
+  mean_square_.resize(static_cast<std::size_t>(n));
+}
+
+template <class T>
+void Adam<T>::step(std::span<T> values, std::span<T> grads, double lr_factor) {
+  const AdamRange all{.begin = 0,
+                      .end = static_cast<Index>(mean_.size()),
+                      .lr_factor = lr_factor,
+                      .skip_zero = options_.skip_zero,
+                      .weight_decay = options_.weight_decay};
+  step(values, grads, std::span(&all, 1));
+}
+
+template <class T>
+void Adam<T>::step(std::span<T> values, std::span<T> grads, std::span<const AdamRange> ranges) {
+  check_size("values", values.size(), mean_.size());
+  check_size("grads", grads.size(), mean_.size());
+  const Index n = static_cast<Index>(mean_.size());
+  for (const AdamRange& r : ranges)
+    if (r.begin < 0 || r.end < r.begin || r.end > n)
+      throw ValueError("[Adam::step] ranges: each must lie within [0, " + std::to_string(n) + "], got [" +
+                       std::to_string(r.begin) + ", " + std::to_string(r.end) + "]");
+  ++steps_;
+  const double t = static_cast<double>(steps_);
+  for (const AdamRange& r : ranges) {
+    const double lr = options_.lr * r.lr_factor;
+    const kernels::AdamScalars<T> scalars{
+        .beta1 = static_cast<T>(options_.beta1),
+        .beta2 = static_cast<T>(options_.beta2),
+        .eps = static_cast<T>(options_.eps),
+        .step = static_cast<T>(lr / (1 - std::pow(options_.beta1, t))),
+        .root = static_cast<T>(1 / std::sqrt(1 - std::pow(options_.beta2, t))),
+        .shrink = static_cast<T>(1 - lr * r.weight_decay),
+        .skip_zero = r.skip_zero,
+        .zero_grads = options_.zero_grads,
+    };
+    parallel_for(r.end - r.begin, kGrain, [&](Index begin, Index end) {
+      const Index at = r.begin + begin;
+      kernels::adam(values.data() + at, grads.data() + at, mean_.data() + at, mean_square_.data() + at,
+                    end - begin, scalars);
+    });
+  }
+}
+
+template <class T>
+void Adam<T>::set_steps(Index steps) {
+  if (steps < 0) throw ValueError("[Adam::set_steps] steps must be at least 0, got " + std::to_string(steps));
+  steps_ = steps;
+}
+
+template class Adam<float>;
+template class Adam<double>;
+
+double exponential_decay(double lr0, double lr1, double fraction) {
+  if (!(lr0 > 0) || !(lr1 > 0))
+    throw ValueError("[exponential_decay] lr0 and lr1 must be positive, got " + std::to_string(lr0) +
+                     " and " + std::to_string(lr1));
+  return lr0 * std::pow(lr1 / lr0, std::clamp(fraction, 0.0, 1.0));
+}
+
+}  // namespace fieldmark

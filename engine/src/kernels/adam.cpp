@@ -1,0 +1,49 @@
+#include "kernels/adam.h"
+
+namespace fieldmark::kernels {
+namespace {
+
+[[gnu::always_inline]] inline float root(float x) { return __builtin_sqrtf(x); }
+[[gnu::always_inline]] inline double root(double x) { return __builtin_sqrt(x); }
+
+// Plain loop, vectorised by the compiler: all is loaded and stored, so that skipping is a blend and not a
+// branch.
+template <bool kSkip, bool kClear, class T>
+[[gnu::always_inline]] inline void run(T* __restrict x, T* __restrict g, T* __restrict m, T* __restrict v,
+                                       std::int64_t n, const AdamScalars<T>& scalars) {
+  const AdamScalars<T> s = scalars;
+  const T one_less1 = 1 - s.beta1, one_less2 = 1 - s.beta2;
+  for (std::int64_t i = 0; i < n; ++i) {
+    const T grad = g[i], m0 = m[i], v0 = v[i], x0 = x[i];
+    const T m1 = s.beta1 * m0 + one_less1 * grad;
+    const T v1 = s.beta2 * v0 + one_less2 * (grad * grad);
+    const T x1 = s.shrink * x0 - s.step * m1 / (root(v1) * s.root + s.eps);
+    const bool keep = kSkip && grad == 0;
+    m[i] = keep ? m0 : m1;
+    v[i] = keep ? v0 : v1;
+    x[i] = keep ? x0 : x1;
+    if constexpr (kClear) g[i] = 0;
+  }
+}
+
+template <class T>
+[[gnu::always_inline]] inline void choose(T* x, T* g, T* m, T* v, std::int64_t n, const AdamScalars<T>& s) {
+  if (s.skip_zero && s.zero_grads) return run<true, true>(x, g, m, v, n, s);
+  if (s.skip_zero) return run<true, false>(x, g, m, v, n, s);
+  if (s.zero_grads) return run<false, true>(x, g, m, v, n, s);
+  run<false, false>(x, g, m, v, n, s);
+}
+
+}  // namespace
+
+namespace FIELDMARK_ISA_NS {
+
+void adam_f32(float* x, float* g, float* m, float* v, std::int64_t n, const AdamScalars<float>& s) {
+  choose(x, g, m, v, n, s);
+}
+void adam_f64(double* x, double* g, double* m, double* v, std::int64_t n, const AdamScalars<double>& s) {
+  choose(x, g, m, v, n, s);
+}
+
+}  // namespace FIELDMARK_ISA_NS
+}  // namespace fieldmark::kernels

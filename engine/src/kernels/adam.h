@@ -1,0 +1,26 @@
+#pragma once
+#include <fieldmark/engine/isa.h>
+
+#include <cstdint>
+
+namespace fieldmark::kernels {
+
+/// Numbers of one step that are the same for every entry.
+template <class T>
+struct AdamScalars {
+  T beta1, beta2, eps;
+  T step;    ///< lr / (1 - beta1^t)
+  T root;    ///< 1 / sqrt(1 - beta2^t)
+  T shrink;  ///< 1 - lr weight_decay
+  bool skip_zero, zero_grads;
+};
+
+/// One pass over n entries: reads and writes x, m and v, reads g and clears it if zero_grads.
+FIELDMARK_DECLARE_KERNEL(void, adam_f32,
+                         (float* x, float* g, float* m, float* v, std::int64_t n,
+                          const AdamScalars<float>& s))
+FIELDMARK_DECLARE_KERNEL(void, adam_f64,
+                         (double* x, double* g, double* m, double* v, std::int64_t n,
+                          const AdamScalars<double>& s))
+
+}  // namespace fieldmark::kernels

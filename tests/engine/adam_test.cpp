@@ -1,0 +1,140 @@
+#include <fieldmark/engine/adam.h>
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/parallel.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "support/catch.h"
+#include "support/random.h"
+
+using namespace fieldmark;
+
+TEST_CASE("adam: the first step is lr times the gradient's sign, whatever its size") {
+  Adam<double> adam(4, {.lr = 0.5});
+  std::vector<double> x{1, 1, 1, 1}, g{1e-6, -3, 1e20, 0};
+  adam.step(x, g);
+  // eps is 1e-15: a gradient of 1e-6 moves by lr / (1 + 1e-9).
+  CHECK(std::abs(x[0] - 0.5) < 1e-9);
+  CHECK(std::abs(x[1] - 1.5) < 1e-14);
+  CHECK(std::abs(x[2] - 0.5) < 1e-14);
+  CHECK(x[3] == 1);
+  CHECK(g == std::vector<double>{1e-6, -3, 1e20, 0});
+  CHECK(adam.steps() == 1);
+}
+
+TEST_CASE("adam: several steps with betas and decay of their own follow the paper's algorithm") {
+  const AdamOptions o{.lr = 0.03, .beta1 = 0.8, .beta2 = 0.999, .eps = 1e-3, .weight_decay = 0.2};
+  Adam<double> adam(1, o);
+  std::vector<double> x{2};
+  double want = 2, m = 0, v = 0;
+  for (int t = 1; t <= 50; ++t) {
+    std::vector<double> g{std::sin(t)};
+    adam.step(x, g, 1.0 / t);
+    m = 0.8 * m + 0.2 * g[0];
+    v = 0.999 * v + 0.001 * g[0] * g[0];
+    const double lr = 0.03 / t;
+    want -= lr * (m / (1 - std::pow(0.8, t)) / (std::sqrt(v / (1 - std::pow(0.999, t))) + 1e-3) + 0.2 * want);
+  }
+  // Rounding of 50 steps.
+  CHECK(std::abs(x[0] - want) < 1e-14);
+}
+
+TEST_CASE("adam: zero and tiny gradients keep everything finite; a bad one spoils only its own entry") {
+  Adam<float> adam(4);
+  std::vector<float> x{1, 1, 1, 1};
+  for (int t = 0; t < 20; ++t) {
+    std::vector<float> g{0, 1e-30f, std::numeric_limits<float>::quiet_NaN(), 1e18f};
+    adam.step(x, g);
+  }
+  CHECK(x[0] == 1);
+  // 1e-30 squared is 0 in float: the step is lr 1e-30 / eps.
+  CHECK(x[1] == 1);
+  CHECK(std::isnan(x[2]));
+  CHECK(std::abs(x[3] - 0.98f) < 1e-5f);
+}
+
+TEST_CASE("adam: skip_zero leaves value and moments, otherwise momentum moves on") {
+  std::vector<float> still{1}, moves{1};
+  Adam<float> skip(1, {.skip_zero = true, .weight_decay = 0.1}), plain(1);
+  for (float first : {1.0f, 0.0f}) {
+    std::vector<float> g{first};
+    skip.step(still, g);
+    plain.step(moves, g);
+    if (first == 1.0f) CHECK(moves[0] > 0.9985f);
+  }
+  CHECK(skip.mean()[0] == 1.0f - 0.9f);
+  CHECK(skip.mean_square()[0] == 1.0f - 0.99f);
+  CHECK(std::abs(still[0] - (1 - 1e-3f - 1e-4f)) < 2e-7f);
+  CHECK(moves[0] < 0.9985f);
+}
+
+TEST_CASE("adam: ranges have step sizes and rules of their own, what is in none stays") {
+  Adam<double> adam(4, {.lr = 1, .zero_grads = true});
+  std::vector<double> x{0, 0, 0, 5}, g{1, 1, 1, 0};
+  const std::vector<AdamRange> ranges{{.begin = 0, .end = 1, .lr_factor = 0.25},
+                                      {.begin = 2, .end = 2},
+                                      {.begin = 2, .end = 4, .lr_factor = 0.5, .weight_decay = 0.1}};
+  adam.step(x, g, ranges);
+  CHECK(std::abs(x[0] + 0.25) < 1e-14);
+  CHECK(x[1] == 0);
+  CHECK(std::abs(x[2] + 0.5) < 1e-14);
+  CHECK(std::abs(x[3] - 4.75) < 1e-14);
+  CHECK(g == std::vector<double>{0, 1, 0, 0});
+}
+
+TEST_CASE("adam: a resumed optimiser continues with the same bits, on any number of threads") {
+  const Index n = 50001;
+  const int before = threads();
+  auto grads = [&](int t) { return uniform<float>({n}, -1, 1, static_cast<unsigned>(t)).data; };
+  auto run = [&](int n_threads, int stop) {
+    set_threads(n_threads);
+    std::vector<float> x(static_cast<std::size_t>(n), 1.0f);
+    Adam<float> adam(n, {.skip_zero = true, .zero_grads = true});
+    for (int t = 0; t < 6; ++t) {
+      if (t == stop) {
+        Adam<float> resumed(n, {.skip_zero = true, .zero_grads = true});
+        std::copy(adam.mean().begin(), adam.mean().end(), resumed.mean().begin());
+        std::copy(adam.mean_square().begin(), adam.mean_square().end(), resumed.mean_square().begin());
+        resumed.set_steps(adam.steps());
+        adam = resumed;
+      }
+      auto g = grads(t);
+      adam.step(x, g, exponential_decay(1, 0.1, t / 6.0));
+    }
+    return x;
+  };
+  const auto want = run(1, -1);
+  CHECK(run(2, -1) == want);
+  CHECK(run(2, 3) == want);
+  set_threads(before);
+}
+
+TEST_CASE("adam: empty, and errors") {
+  Adam<float> empty(0);
+  CHECK_NOTHROW(empty.step({}, {}));
+  CHECK(empty.steps() == 1);
+  Adam<float> adam(2);
+  std::vector<float> two(2), three(3);
+  CHECK_THROWS_WITH(adam.step(two, three),
+                    "[Adam::step] grads must have 2 numbers (the optimiser was made for them), got 3");
+  CHECK_THROWS_AS(adam.step(three, two), ShapeError);
+  const std::vector<AdamRange> outside{{.begin = 1, .end = 3}};
+  CHECK_THROWS_WITH(adam.step(two, two, outside),
+                    "[Adam::step] ranges: each must lie within [0, 2], got [1, 3]");
+  CHECK(adam.steps() == 0);
+  CHECK_THROWS_WITH(Adam<float>(1, {.beta2 = 1}), "[Adam] beta2 must be in [0, 1), got 1.000000");
+  CHECK_THROWS_WITH(Adam<float>(-1), Contains("n must be at least 0"));
+  CHECK_THROWS_WITH(Adam<double>(1, {.lr = std::nan("")}), Contains("lr must be positive"));
+  CHECK_THROWS_WITH(adam.set_steps(-1), Contains("steps must be at least 0, got -1"));
+}
+
+TEST_CASE("adam: exponential decay") {
+  CHECK(exponential_decay(2e-2, 2e-4, 0) == 2e-2);
+  CHECK(std::abs(exponential_decay(2e-2, 2e-4, 0.5) - 2e-3) < 1e-17);
+  CHECK(std::abs(exponential_decay(2e-2, 2e-4, 1) - 2e-4) < 1e-18);
+  CHECK(exponential_decay(2e-2, 2e-4, 7) == exponential_decay(2e-2, 2e-4, 1));
+  CHECK(exponential_decay(2e-2, 2e-4, -1) == 2e-2);
+  CHECK_THROWS_WITH(exponential_decay(1, 0, 0.5), Contains("must be positive, got 1.000000 and 0.000000"));
+}
