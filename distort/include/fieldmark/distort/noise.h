@@ -1,0 +1,26 @@
+#pragma once
+#include <fieldmark/engine/tape.h>
+
+#include <span>
+#include <type_traits>
+
+namespace fieldmark::distort {
+
+/// Additive Gaussian noise of a given field of standard normal numbers; nothing is clamped.
+///   y_i = x_i + mu + sigma n_i
+/// Source: Luo et al. 2023 (CopyRNeRF), distortion-resistant rendering; sigma is the true standard deviation
+/// on the scale of x (the released code squares it).
+/// @param x       [any] image, in [0, 1]
+/// @param mu      [1] mean
+/// @param sigma   [1] standard deviation, 0 to 1e6
+/// @param normal  one standard normal number for each of x; read again by the backward: must outlive the pass
+/// @return [x's shape]
+/// @throws ShapeError if mu or sigma is not [1] or `normal` has another size than x   @throws ValueError on
+/// sigma Differentiable in: x, mu, sigma.
+template <class T>
+Var<T> noise(Var<T> x, Var<T> mu, Var<T> sigma, std::span<const std::type_identity_t<T>> normal);
+/// The same with mean 0.
+template <class T>
+Var<T> noise(Var<T> x, Var<T> sigma, std::span<const std::type_identity_t<T>> normal);
+
+}  // namespace fieldmark::distort

@@ -1,0 +1,25 @@
+#pragma once
+#include <fieldmark/engine/tape.h>
+#include <fieldmark/engine/tensor.h>
+
+#include <cstdint>
+
+namespace fieldmark::distort {
+
+/// Resizes a picture with an area (box) filter: every output pixel is the mean of x over its own rectangle.
+///   y(i, j) = sum_rs a_ir b_js x(r, s),   a_ir = |[i, i+1] H/h  cut with  [r, r+1]| h/H, b alike
+/// The weights are exact ratios of integers; the same size is the exact identity, and the picture's mean is
+/// kept.
+/// @param x  [height, width, channels], height and width at least 1
+/// @param height, width  of the result, at least 1; any ratio, larger too
+/// @return [height, width, channels]
+/// @throws ShapeError if x is not an image of at least one pixel   @throws ValueError on height or width
+/// Differentiable in: x.
+template <class T>
+Var<T> resize_area(Var<T> x, Index height, Index width);
+
+/// Moves labels [height, width] as resize_area moves colours: the label under each new pixel's centre.
+/// @throws as above
+Tensor<std::int32_t> resize_labels(const Tensor<std::int32_t>& labels, Index height, Index width);
+
+}  // namespace fieldmark::distort

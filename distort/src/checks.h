@@ -1,0 +1,34 @@
+#pragma once
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/shape.h>
+
+#include <cstdio>
+#include <string>
+#include <string_view>
+
+namespace fieldmark::distort {
+
+inline void check_image(std::string_view op, const Shape& x) {
+  check_rank(op, "x", x, 3, "[height, width, channels]");
+}
+
+// A distortion's parameter is a tensor of `count` numbers, so that gradients reach it.
+inline void check_parameter(std::string_view op, std::string_view name, const Shape& got, Index count) {
+  const std::string layout = "[" + std::to_string(count) + "]";
+  check_rank(op, name, got, 1, layout);
+  check_extent(op, name, got, 0, count, "its layout is " + layout);
+}
+
+// "[op] arg: must be in 0 to 1 (why), got 2". NaN fails.
+inline void check_range(std::string_view op, std::string_view arg, double value, double low, double high,
+                        std::string_view why) {
+  if (value >= low && value <= high) return;
+  char numbers[3][32];
+  std::snprintf(numbers[0], sizeof numbers[0], "%g", low);
+  std::snprintf(numbers[1], sizeof numbers[1], "%g", high);
+  std::snprintf(numbers[2], sizeof numbers[2], "%g", value);
+  throw ValueError("[" + std::string(op) + "] " + std::string(arg) + ": must be in " + numbers[0] + " to " +
+                   numbers[1] + " (" + std::string(why) + "), got " + numbers[2]);
+}
+
+}  // namespace fieldmark::distort
