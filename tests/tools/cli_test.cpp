@@ -1,0 +1,81 @@
+#include "cli/cli.h"
+
+#include <algorithm>
+#include <sstream>
+
+#include "support/catch.h"
+#include "tools/run_command.h"
+
+using namespace fieldmark;
+
+TEST_CASE("fieldmark without a command is a usage error", "[cli]") {
+  const auto r = run_command({});
+  CHECK(r.code == cli::kUsage);
+  CHECK(r.out.empty());
+  CHECK_THAT(r.err, Contains("subcommand is required") && Contains("fieldmark --help"));
+}
+
+TEST_CASE("fieldmark --help lists the commands, --version the version", "[cli]") {
+  const auto help = run_command({"--help"});
+  CHECK(help.code == cli::kOk);
+  CHECK_THAT(help.out, Contains("gradcheck"));
+  CHECK(help.err.empty());
+  const auto version = run_command({"--version"});
+  CHECK(version.code == cli::kOk);
+  CHECK_THAT(version.out, Contains("0."));
+}
+
+TEST_CASE("A wrong command or option is answered with the nearest one", "[cli]") {
+  const auto command = run_command({"gradchek"});
+  CHECK(command.code == cli::kUsage);
+  CHECK(command.err ==
+        "fieldmark: no command is called 'gradchek'; did you mean gradcheck? (see fieldmark --help)\n");
+  const auto option = run_command({"gradcheck", "--sed", "3"});
+  CHECK(option.code == cli::kUsage);
+  CHECK_THAT(option.err, Contains("gradcheck has no option --sed; did you mean --seed?"));
+  const auto with_value = run_command({"gradcheck", "--thread=2"});
+  CHECK(with_value.code == cli::kUsage);
+  CHECK_THAT(with_value.err, Contains("--thread; did you mean --threads?"));
+  const auto far = run_command({"zzzzzz"});
+  CHECK(far.code == cli::kUsage);
+  CHECK(far.err.find("did you mean") == std::string::npos);
+}
+
+TEST_CASE("An option's value out of range or of another kind is a usage error in one line", "[cli]") {
+  for (const char* value : {"0", "1025", "two", "-1"}) {
+    const auto r = run_command({"gradcheck", "--threads", value});
+    INFO(value << ": " << r.err);
+    CHECK(r.code == cli::kUsage);
+    CHECK(r.out.empty());
+    CHECK_THAT(r.err, Contains("--threads") && Contains(value));
+    CHECK(std::count(r.err.begin(), r.err.end(), '\n') == 1);
+  }
+}
+
+TEST_CASE("Every command has help that names the common options", "[cli]") {
+  const auto list = run_command({"--help"}).out;
+  std::istringstream lines(list.substr(list.find("Subcommands:")));
+  std::string line;
+  std::getline(lines, line);
+  int commands = 0;
+  while (std::getline(lines, line) && !line.empty()) {
+    std::string name;
+    if (!line.starts_with("  ") || line[2] == ' ' || !(std::istringstream(line) >> name)) continue;
+    const auto r = run_command({name, "--help"});
+    INFO(name);
+    CHECK(r.code == cli::kOk);
+    CHECK(r.err.empty());
+    for (const char* option : {"--help", "--seed", "--threads", "--json", "--report"})
+      CHECK_THAT(r.out, Contains(option));
+    ++commands;
+  }
+  CHECK(commands >= 1);
+}
+
+TEST_CASE("Standard output that cannot be written is a failure", "[cli]") {
+  std::ostringstream out, err;
+  out.setstate(std::ios::badbit);
+  const char* argv[] = {"fieldmark", "--help"};
+  CHECK(cli::run(2, argv, out, err) == cli::kFailed);
+  CHECK(err.str() == "fieldmark: standard output: cannot be written\n");
+}

@@ -1,0 +1,49 @@
+#include <fieldmark/engine/files.h>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/cli.h"
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+#include "tools/run_command.h"
+
+using namespace fieldmark;
+using Json = nlohmann::json;
+
+TEST_CASE("gradcheck passes for every registered op and says which is the worst", "[gradcheck]") {
+  const auto r = run_command({"gradcheck", "--json", "-"});
+  INFO(r.err);
+  CHECK(r.code == cli::kOk);
+  const Json json = Json::parse(r.out);
+  CHECK(json["ok"] == true);
+  CHECK(json["worst"].get<double>() <= 1e-7);
+  CHECK_THAT(r.err, Contains("worst relative error") && Contains(json["worst_case"].get<std::string>()));
+  long entries = 0;
+  double worst = 0;
+  for (const auto& row : json["cases"]) {
+    CHECK(row["ok"] == true);
+    CHECK_THAT(r.err, Contains(row["name"].get<std::string>()));
+    entries += row["entries"].get<long>();
+    worst = std::max(worst, row["worst"].get<double>());
+  }
+  CHECK(entries == json["entries"].get<long>());
+  CHECK(worst == json["worst"].get<double>());
+}
+
+TEST_CASE("gradcheck --only runs what has the text in its name", "[gradcheck]") {
+  const TemporaryFolder folder;
+  const std::string path = folder / "g.json";
+  const auto r = run_command({"gradcheck", "--only", "rays", "--json", path});
+  CHECK(r.code == cli::kOk);
+  const Json json = Json::parse(read_text(path));
+  CHECK(json["cases"].size() >= 1);
+  for (const auto& row : json["cases"]) CHECK_THAT(row["name"].get<std::string>(), Contains("rays"));
+}
+
+TEST_CASE("gradcheck --only with an unknown text is a usage error", "[gradcheck]") {
+  const auto r = run_command({"gradcheck", "--only", "no such op"});
+  CHECK(r.code == cli::kUsage);
+  CHECK(r.err ==
+        "fieldmark: gradcheck: --only: no check has 'no such op' in its name (see fieldmark gradcheck "
+        "--help)\n");
+}

@@ -1,0 +1,140 @@
+#include "cli/cli.h"
+
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/parallel.h>
+
+#include <CLI/CLI.hpp>
+#include <new>
+#include <ostream>
+
+#include "cli/commands.h"
+#include "cli/context.h"
+#include "cli/suggest.h"
+
+namespace fieldmark::cli {
+namespace {
+
+struct Entry {
+  const char* name;
+  const char* help;
+  Command (*add)(CLI::App&);
+};
+constexpr Entry kCommands[] = {
+    {"gradcheck", "Check every hand-derived gradient against finite differences", add_gradcheck},
+};
+
+struct Subcommand {
+  CLI::App* app;
+  Command command;
+};
+
+class Program {
+ public:
+  Program(std::ostream& out, std::ostream& err) : out_(out), err_(err) {
+    app_.name("fieldmark");
+    app_.require_subcommand(1);
+    app_.set_version_flag("--version", FIELDMARK_VERSION);
+    app_.get_formatter()->column_width(34);
+    for (const auto& entry : kCommands) {
+      CLI::App* sub = app_.add_subcommand(entry.name, entry.help);
+      sub->option_defaults()->always_capture_default();
+      Command command = entry.add(*sub);
+      add_common(*sub, common_);
+      subcommands_.push_back({sub, std::move(command)});
+    }
+  }
+
+  int run(const std::vector<std::string>& line) {
+    if (const std::string text = unknown_word(line); !text.empty()) return usage(text);
+    try {
+      std::vector<std::string> reversed(line.rbegin(), line.rend() - (line.empty() ? 0 : 1));
+      app_.parse(std::move(reversed));
+    } catch (const CLI::Success& e) {
+      app_.exit(e, out_, err_);
+      return kOk;
+    } catch (const CLI::ParseError& e) {
+      return usage(e.what());
+    }
+    if (common_.threads > 0) set_threads(common_.threads);
+    for (auto& [sub, command] : subcommands_) {
+      if (!sub->parsed()) continue;
+      Context context(common_, line, out_, err_);
+      return command(context);
+    }
+    return kUsage;
+  }
+
+  int usage(const std::string& what) {
+    std::string name;
+    for (auto& [sub, command] : subcommands_)
+      if (sub->parsed()) name = " " + sub->get_name();
+    err_ << "fieldmark:" << (name.empty() ? "" : name + ":") << " " << what << " (see fieldmark" << name
+         << " --help)\n";
+    return kUsage;
+  }
+
+ private:
+  // A word that is no command or an option that this command does not have, with what was probably meant.
+  std::string unknown_word(const std::vector<std::string>& line) {
+    if (line.size() < 2 || line[1].starts_with("-")) return "";
+    std::vector<std::string> names;
+    const CLI::App* sub = nullptr;
+    for (const auto& known : subcommands_) {
+      names.push_back(known.app->get_name());
+      if (names.back() == line[1]) sub = known.app;
+    }
+    if (!sub) return "no command is called '" + line[1] + "'" + did_you_mean(line[1], names);
+    names.clear();
+    for (const CLI::Option* option : sub->get_options())
+      for (const auto& name : option->get_lnames()) names.push_back("--" + name);
+    for (std::size_t i = 2; i < line.size() && line[i] != "--"; ++i) {
+      const std::string word = line[i].substr(0, line[i].find('='));
+      if (!word.starts_with("--") || std::find(names.begin(), names.end(), word) != names.end()) continue;
+      return line[1] + " has no option " + word + did_you_mean(word, names);
+    }
+    return "";
+  }
+
+  static std::string did_you_mean(const std::string& word, const std::vector<std::string>& names) {
+    const std::string near = nearest_word(word, names);
+    return near.empty() ? "" : "; did you mean " + near + "?";
+  }
+
+  std::ostream &out_, &err_;
+  CommonOptions common_;
+  CLI::App app_{
+      "Marks a radiance field so that its owner can prove from any rendered picture that it is theirs."};
+  std::vector<Subcommand> subcommands_;
+};
+
+int run_guarded(const std::vector<std::string>& line, std::ostream& out, std::ostream& err) {
+  Program program(out, err);
+  const auto failed = [&](const std::string& what) {
+    err << "fieldmark: " << what << "\n";
+    return kFailed;
+  };
+  try {
+    const int code = program.run(line);
+    if (!out.flush()) return failed("standard output: cannot be written");
+    return code;
+  } catch (const UsageError& e) {
+    return program.usage(e.what());
+  } catch (const Interrupted& e) {
+    err << "fieldmark: interrupted" << (*e.what() ? std::string(": ") + e.what() : "") << "\n";
+    return kInterrupted;
+  } catch (const std::bad_alloc&) {
+    return failed("not enough memory");
+  } catch (const std::exception& e) {
+    return failed(e.what());
+  }
+}
+
+}  // namespace
+
+int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err) noexcept try {
+  return run_guarded({argv, argv + argc}, out, err);
+} catch (...) {
+  return kFailed;
+}
+
+}  // namespace fieldmark::cli

@@ -1,0 +1,19 @@
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace CLI {
+class App;
+}
+
+namespace fieldmark::cli {
+
+class Context;
+
+/// A subcommand after its options were added: to be called once they are parsed; returns the exit code.
+using Command = std::function<int(Context&)>;
+
+Command add_gradcheck(CLI::App& app);
+
+}  // namespace fieldmark::cli

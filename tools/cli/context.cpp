@@ -1,0 +1,50 @@
+#include "cli/context.h"
+
+#include <fieldmark/engine/files.h>
+
+#include <CLI/CLI.hpp>
+#include <ostream>
+
+#include "cli/report.h"
+
+namespace fieldmark::cli {
+
+void add_common(CLI::App& app, CommonOptions& options) {
+  app.add_option("--seed", options.seed, "Seed of every random choice except keys, 0 to 2^64 - 1")
+      ->group("Common")
+      ->type_name("N");
+  app.add_option("--threads", options.threads, "Threads, 1 to 1024 (all that the machine offers)")
+      ->check(CLI::Range(1, 1024).description(""))
+      ->group("Common")
+      ->type_name("N")
+      ->default_str("");
+  app.add_option("--json", options.json, "Results as JSON into FILE, - for standard output")
+      ->group("Common")
+      ->type_name("FILE");
+  app.add_option("--report", options.report, "Results with command, commit and machine as Markdown into FILE")
+      ->group("Common")
+      ->type_name("FILE");
+}
+
+Context::Context(const CommonOptions& options, std::vector<std::string> command_line, std::ostream& out,
+                 std::ostream& err)
+    : options_(options),
+      command_line_(std::move(command_line)),
+      out_(out),
+      err_(err),
+      text_(options.json == "-" ? err : out) {
+  for (const auto& path : {options.json, options.report})
+    if (!path.empty() && path != "-") AtomicFile{path};
+}
+
+void Context::result(const Json& json) {
+  if (options_.json == "-") {
+    out_ << json.dump(2) << "\n";
+  } else if (!options_.json.empty()) {
+    write_file_atomically(options_.json, json.dump(2) + "\n");
+  }
+  if (!options_.report.empty())
+    write_file_atomically(options_.report, markdown_report(command_line_, machine(), json));
+}
+
+}  // namespace fieldmark::cli

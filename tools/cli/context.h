@@ -1,0 +1,50 @@
+#pragma once
+#include <cstdint>
+#include <iosfwd>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "cli/progress.h"
+
+namespace CLI {
+class App;
+}
+
+namespace fieldmark::cli {
+
+using Json = nlohmann::ordered_json;
+
+/// Options that every command has.
+struct CommonOptions {
+  std::uint64_t seed = 1;  ///< of every random choice, except keys
+  int threads = 0;         ///< 0: all that the machine offers
+  std::string json{};      ///< file for the results, "-" for standard output, empty for none
+  std::string report{};    ///< Markdown file for the results with their protocol, empty for none
+};
+void add_common(CLI::App& app, CommonOptions& options);
+
+/// What a command gets besides its own options: where to write and how to report.
+class Context {
+ public:
+  /// Checks at once that the files for results can be written, so that hours of work are not lost for a wrong
+  /// name.
+  /// @throws IoError if they cannot
+  Context(const CommonOptions& options, std::vector<std::string> command_line, std::ostream& out,
+          std::ostream& err);
+
+  const CommonOptions& options() const { return options_; }
+  std::uint64_t seed() const { return options_.seed; }
+  /// For people: standard output, or standard error when the results take standard output.
+  std::ostream& text() { return text_; }
+  Progress progress(std::string what) { return Progress(err_, std::move(what)); }
+  /// Writes the results to --json and --report. @throws IoError if a file cannot be written
+  void result(const Json& json);
+
+ private:
+  CommonOptions options_;
+  std::vector<std::string> command_line_;
+  std::ostream &out_, &err_, &text_;
+};
+
+}  // namespace fieldmark::cli

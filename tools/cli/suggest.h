@@ -1,0 +1,16 @@
+#pragma once
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace fieldmark::cli {
+
+/// Least number of insertions, deletions and replacements that turn one word into the other.
+/// Source: Wagner and Fischer 1974 (Levenshtein's distance).
+std::size_t edit_distance(std::string_view a, std::string_view b);
+
+/// The word among `known` that was probably meant, or "" if none is near: at most a third of its letters
+/// differ.
+std::string nearest_word(std::string_view typed, const std::vector<std::string>& known);
+
+}  // namespace fieldmark::cli
