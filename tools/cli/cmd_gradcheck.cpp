@@ -1,3 +1,4 @@
+#include <fieldmark/distort/gradcheck_cases.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/nerf/gradcheck_cases.h>
 
@@ -29,6 +30,7 @@ std::vector<Row> collect(const std::string& only) {
     for (auto& check : cases)
       if (check.name.find(only) != std::string::npos) rows.push_back({module, std::move(check), {}});
   };
+  add("distort", distort::gradcheck_cases());
   add("nerf", nerf::gradcheck_cases());
   return rows;
 }
