@@ -1,0 +1,63 @@
+#pragma once
+#include <fieldmark/engine/tensor.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace fieldmark {
+
+/// A safetensors file: named arrays and string metadata, for every model, checkpoint and weight file.
+/// Source: huggingface/safetensors, format description: 8 bytes of header length N (little endian), N bytes
+/// of JSON from '{', then the arrays without gaps. Arrays have at most rank 5 here.
+struct SafetensorsFile {
+  struct Entry {
+    std::string name;
+    std::string dtype;  ///< "F32", "U8", ... as the file spells it
+    Shape shape;
+    std::vector<std::byte> data;  ///< row-major, little endian
+  };
+  std::map<std::string, std::string> metadata;
+  std::vector<Entry> tensors;
+  std::string path;  ///< where it was read, for error texts
+
+  /// Reads and checks a whole file.
+  /// @throws IoError if it cannot be read or is not valid: the text names the place, what was expected and
+  /// found
+  static SafetensorsFile read(const std::filesystem::path& path);
+  /// As read(), from memory. @param name  stands for the path in error texts
+  static SafetensorsFile parse(std::span<const std::byte> bytes, std::string_view name);
+  /// Replaces the file when it is complete (see AtomicFile). Equal contents give equal bytes: header keys are
+  /// sorted; arrays follow each other in the order added, those of wider elements first, so that each is
+  /// aligned.
+  /// @throws IoError if writing fails   @throws ValueError if a name or metadata is not UTF-8
+  void write(const std::filesystem::path& path) const;
+
+  /// Appends an array. @throws ValueError if the name is taken or "__metadata__"
+  /// @throws ShapeError unless data has shape.size() numbers
+  void add(std::string_view name, Shape shape, std::span<const float> data);
+  void add(std::string_view name, Shape shape, std::span<const double> data);
+  void add(std::string_view name, Shape shape, std::span<const std::uint8_t> data);
+  void add(std::string_view name, Shape shape, std::span<const std::int32_t> data);
+  void add(std::string_view name, Shape shape, std::span<const std::int64_t> data);
+  void add(std::string_view name, Shape shape, std::span<const std::uint64_t> data);
+
+  bool has(std::string_view name) const;
+  /// @throws IoError if there is no such array: the text lists those there are
+  const Entry& at(std::string_view name) const;
+  /// F32, or F16 and BF16 widened, which is exact. @throws IoError if missing or of another dtype, as all
+  /// below
+  Tensor<float> f32(std::string_view name) const;
+  Tensor<double> f64(std::string_view name) const;
+  std::vector<std::uint8_t> u8(std::string_view name) const;
+  std::vector<std::int32_t> i32(std::string_view name) const;
+  std::vector<std::int64_t> i64(std::string_view name) const;
+  std::vector<std::uint64_t> u64(std::string_view name) const;
+};
+
+}  // namespace fieldmark
