@@ -1,0 +1,28 @@
+#pragma once
+#include <fieldmark/engine/tape.h>
+
+#include <cstdint>
+#include <span>
+
+namespace fieldmark {
+
+/// Softmax over the last axis, shifted by the row's maximum so that nothing overflows.
+///   y_c = exp(x_c - m) / sum_k exp(x_k - m),   m = max_k x_k
+/// @param x [.., C], C >= 1   @return [.., C]; each row sums to 1
+/// @throws ShapeError if x has no columns
+/// Differentiable in: x.
+template <class T>
+Var<T> softmax(Var<T> x);
+
+/// Cross-entropy of logits against class numbers, a weighted mean over rows:
+///   L = sum_r w_r (log sum_k exp x[r, k] - x[r, label_r]) / sum_r w_r   over the rows whose label is not -1
+/// @param logits [.., C], C >= 1   @param labels  one in [-1, C) for each row, -1 = ignored
+/// @param weights  empty (all 1) or one >= 0 for each row; labels and weights must outlive the pass
+/// @return [1]; 0 where no row counts
+/// @throws ShapeError if sizes differ   @throws ValueError if a label or a weight is outside its range
+/// Differentiable in: logits.
+template <class T>
+Var<T> softmax_cross_entropy(Var<T> logits, std::span<const std::int32_t> labels,
+                             std::span<const T> weights = {});
+
+}  // namespace fieldmark

@@ -1,0 +1,89 @@
+#include <fieldmark/engine/ops/rows.h>
+
+#include "ops/pieces.h"
+
+namespace fieldmark {
+namespace {
+
+// One column sum per piece of rows, pieces added in order: the same bits for any thread count.
+template <class T>
+void add_column_sums(Tape<T>& tape, const T* dy, Index rows, Index cols, T* dx) {
+  const Index grain = detail::row_grain(cols), pieces = (rows + grain - 1) / grain;
+  auto* partial = tape.template scratch<double>(pieces * cols);
+  parallel_for(rows, grain, [&](Index r0, Index r1) {
+    double* sum = partial + r0 / grain * cols;
+    std::fill_n(sum, cols, 0.0);
+    for (Index r = r0; r < r1; ++r)
+      for (Index c = 0; c < cols; ++c) sum[c] += static_cast<double>(dy[r * cols + c]);
+  });
+  for (Index c = 0; c < cols; ++c) {
+    double sum = 0;
+    for (Index p = 0; p < pieces; ++p) sum += partial[p * cols + c];
+    dx[c] += static_cast<T>(sum);
+  }
+}
+
+}  // namespace
+
+template <class T>
+Var<T> broadcast_rows(Var<T> x, Index rows) {
+  const Shape s = x.shape();
+  if (!(s.rank() == 1 || (s.rank() == 2 && s[0] == 1)))
+    throw ShapeError("[broadcast_rows] x must be one row, [1, C] or [C], got shape " + s.str());
+  if (rows < 0) throw ShapeError("[broadcast_rows] rows must be 0 or more, got " + std::to_string(rows));
+  const Index cols = s[-1];
+  T* y = nullptr;
+  const Var<T> out = x.tape().output({rows, cols}, &y, {x});
+  parallel_for(rows, detail::row_grain(cols), [&](Index r0, Index r1) {
+    for (Index r = r0; r < r1; ++r) std::copy_n(x.value(), cols, y + r * cols);
+  });
+
+  // dx[c] = sum_r dy[r, c].
+  x.tape().on_backward(
+      out, [x, rows, cols](const T* dy) { add_column_sums(x.tape(), dy, rows, cols, x.grad_acc()); });
+  return out;
+}
+
+template <class T>
+Var<T> gather_rows(Var<T> x, std::span<const std::int32_t> index) {
+  check_rank("gather_rows", "x", x.shape(), 2, "[rows, cols]");
+  const Index rows = x.shape()[0], cols = x.shape()[1], n = static_cast<Index>(index.size());
+  for (std::size_t i = 0; i < index.size(); ++i)
+    if (index[i] < 0 || index[i] >= rows)
+      throw ValueError("[gather_rows] index: entry " + std::to_string(i) + " must be in [0, " +
+                       std::to_string(rows) + ") (the rows of x), got " + std::to_string(index[i]));
+  T* y = nullptr;
+  const Var<T> out = x.tape().output({n, cols}, &y, {x});
+  const std::int32_t* at = index.data();
+  parallel_for(n, detail::row_grain(cols), [&](Index i0, Index i1) {
+    for (Index i = i0; i < i1; ++i) std::copy_n(x.value() + at[i] * cols, cols, y + i * cols);
+  });
+
+  // dx[r] = sum of dy[i] over the i with index[i] = r. Those are listed by a counting sort, in order;
+  // then each row of dx is owned by one piece.
+  x.tape().on_backward(out, [x, at, n, rows, cols](const T* dy) {
+    T* dx = x.grad_acc();
+    auto* start = x.tape().template scratch<Index>(rows + 1);
+    auto* taker = x.tape().template scratch<Index>(n);
+    std::fill_n(start, rows + 1, Index{0});
+    for (Index i = 0; i < n; ++i) ++start[at[i] + 1];
+    for (Index r = 0; r < rows; ++r) start[r + 1] += start[r];
+    // Filling from the back leaves start[r + 1] at the first taker of row r.
+    for (Index i = n; i-- > 0;) taker[--start[at[i] + 1]] = i;
+    parallel_for(rows, detail::row_grain(cols), [&](Index r0, Index r1) {
+      for (Index r = r0; r < r1; ++r) {
+        const Index end = r + 1 < rows ? start[r + 2] : n;
+        for (Index k = start[r + 1]; k < end; ++k)
+          for (Index c = 0; c < cols; ++c) dx[r * cols + c] += dy[taker[k] * cols + c];
+      }
+    });
+  });
+  return out;
+}
+
+template Var<float> broadcast_rows(Var<float>, Index);
+template Var<double> broadcast_rows(Var<double>, Index);
+template Var<float> gather_rows(Var<float>, std::span<const std::int32_t>);
+template Var<double> gather_rows(Var<double>, std::span<const std::int32_t>);
+
+}  // namespace fieldmark

@@ -1,0 +1,119 @@
+#include <fieldmark/engine/ops/softmax.h>
+
+#include <cmath>
+
+#include "kernels/elementwise.h"
+#include "ops/weights.h"
+
+namespace fieldmark {
+namespace kernels {
+namespace {
+
+// p = softmax of each row. log_sum(r, z) receives log sum_k exp x[r, k] by way of the row's maximum m and z.
+template <class T, class F>
+void softmax_rows(const T* x, T* p, Index rows, Index cols, F log_sum) {
+  const auto exp_row = FIELDMARK_KERNEL(exp_sum<T>);
+  parallel_for(rows, detail::row_grain(cols), [&](Index r0, Index r1) {
+    for (Index r = r0; r < r1; ++r) {
+      const T* xr = x + r * cols;
+      T* pr = p + r * cols;
+      const T m = *std::max_element(xr, xr + cols);
+      const T z = exp_row(xr, m, pr, cols);
+      for (Index c = 0; c < cols; ++c) pr[c] /= z;
+      log_sum(r, m, z);
+    }
+  });
+}
+
+}  // namespace
+}  // namespace kernels
+
+namespace {
+
+Index check_columns(const char* op, const char* arg, const Shape& s) {
+  if (s.rank() == 0 || s[-1] == 0)
+    throw ShapeError(std::string("[") + op + "] " + arg +
+                     " must have at least one column [.., C], got shape " + s.str());
+  return s.size() / s[-1];
+}
+
+void check_labels(Index rows, Index cols, std::span<const std::int32_t> labels) {
+  if (static_cast<Index>(labels.size()) != rows)
+    throw ShapeError("[softmax_cross_entropy] labels must have one number for each of the " +
+                     std::to_string(rows) + " rows of logits, got " + std::to_string(labels.size()));
+  for (std::size_t r = 0; r < labels.size(); ++r)
+    if (labels[r] < -1 || labels[r] >= cols)
+      throw ValueError("[softmax_cross_entropy] labels: entry " + std::to_string(r) + " must be in [-1, " +
+                       std::to_string(cols) + ") (-1 or a column of logits), got " +
+                       std::to_string(labels[r]));
+}
+
+}  // namespace
+
+template <class T>
+Var<T> softmax(Var<T> x) {
+  const Index rows = check_columns("softmax", "x", x.shape()), cols = x.shape()[-1];
+  T* y = nullptr;
+  const Var<T> out = x.tape().output(x.shape(), &y, {x});
+  kernels::softmax_rows(x.value(), y, rows, cols, [](Index, T, T) {});
+
+  // dy_i / dx_j = y_i (delta_ij - y_j), so dx = y (dy - <dy, y>). A row is owned by one piece.
+  x.tape().on_backward(out, [x, y, rows, cols](const T* dy) {
+    T* dx = x.grad_acc();
+    parallel_for(rows, detail::row_grain(cols), [&](Index r0, Index r1) {
+      for (Index r = r0; r < r1; ++r) {
+        T dot = 0;
+        for (Index i = r * cols; i < (r + 1) * cols; ++i) dot += dy[i] * y[i];
+        for (Index i = r * cols; i < (r + 1) * cols; ++i) dx[i] += y[i] * (dy[i] - dot);
+      }
+    });
+  });
+  return out;
+}
+
+template <class T>
+Var<T> softmax_cross_entropy(Var<T> logits, std::span<const std::int32_t> labels,
+                             std::span<const T> weights) {
+  const Index rows = check_columns("softmax_cross_entropy", "logits", logits.shape()),
+              cols = logits.shape()[-1];
+  check_labels(rows, cols, labels);
+  Tape<T>& tape = logits.tape();
+  detail::inverse_total(tape, "softmax_cross_entropy", rows, weights);  // checks them
+  T* w = tape.scratch(rows);                                            // 0 where a row is ignored
+  for (std::size_t r = 0; r < labels.size(); ++r)
+    w[r] = labels[r] < 0 ? T(0) : weights.empty() ? T(1) : weights[r];
+  const double inverse = detail::inverse_total(tape, "softmax_cross_entropy", rows,
+                                               std::span<const T>(w, static_cast<std::size_t>(rows)));
+
+  T *y = nullptr, *p = tape.scratch(rows * cols), *row_loss = tape.scratch(rows);
+  const Var<T> out = tape.output({1}, &y, {logits});
+  const std::int32_t* label = labels.data();
+  kernels::softmax_rows(logits.value(), p, rows, cols, [&](Index r, T m, T z) {
+    row_loss[r] = label[r] < 0 ? T(0) : std::log(z) + (m - logits.value()[r * cols + label[r]]);
+  });
+  *y = static_cast<T>(inverse * detail::piece_sum(tape, rows, [=](Index r) {
+                        return w[r] > 0 ? static_cast<double>(w[r]) * static_cast<double>(row_loss[r]) : 0.0;
+                      }));
+
+  // dL/dx[r, c] = w_r / sum w (p[r, c] - [c = label_r]). A row is owned by one piece.
+  tape.on_backward(out, [logits, p, w, label, rows, cols, inverse](const T* dy) {
+    T* dx = logits.grad_acc();
+    const T g = static_cast<T>(inverse * static_cast<double>(*dy));
+    parallel_for(rows, detail::row_grain(cols), [&](Index r0, Index r1) {
+      for (Index r = r0; r < r1; ++r) {
+        if (!(w[r] > 0)) continue;
+        for (Index c = 0; c < cols; ++c)
+          dx[r * cols + c] += g * w[r] * (p[r * cols + c] - (c == label[r] ? T(1) : T(0)));
+      }
+    });
+  });
+  return out;
+}
+
+template Var<float> softmax(Var<float>);
+template Var<double> softmax(Var<double>);
+template Var<float> softmax_cross_entropy(Var<float>, std::span<const std::int32_t>, std::span<const float>);
+template Var<double> softmax_cross_entropy(Var<double>, std::span<const std::int32_t>,
+                                           std::span<const double>);
+
+}  // namespace fieldmark

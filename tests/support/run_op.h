@@ -1,0 +1,76 @@
+#pragma once
+#include <fieldmark/engine/isa.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/tape.h>
+
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "support/catch.h"
+#include "support/random.h"
+
+/// An op under test is a generic callable f(tape, std::span<const Var<T>>) -> Var<T>.
+/// Returns its values, then the gradient of <u, f> in each input for a fixed random cotangent u.
+template <class T, class F>
+std::vector<std::vector<T>> run_op(const F& f, const std::vector<fieldmark::Tensor<T>>& inputs) {
+  fieldmark::Tape<T> tape;
+  std::vector<fieldmark::Tensor<T>> grads;
+  for (const auto& x : inputs) grads.emplace_back(x.shape);
+  std::vector<fieldmark::Var<T>> vars;
+  for (std::size_t k = 0; k < inputs.size(); ++k) vars.push_back(tape.leaf(inputs[k], grads[k]));
+  const fieldmark::Var<T> y = f(tape, std::span<const fieldmark::Var<T>>(vars));
+  tape.backward(y, uniform<T>(y.shape(), -1, 1, 99).data);
+  std::vector<std::vector<T>> result{{y.value(), y.value() + y.shape().size()}};
+  for (auto& g : grads) result.push_back(g.data);
+  return result;
+}
+
+/// The values alone, with inputs as constants.
+template <class T, class F>
+std::vector<T> op_values(const F& f, const std::vector<fieldmark::Tensor<T>>& inputs) {
+  fieldmark::Tape<T> tape;
+  std::vector<fieldmark::Var<T>> vars;
+  for (const auto& x : inputs) vars.push_back(tape.constant(x));
+  const fieldmark::Var<T> y = f(tape, std::span<const fieldmark::Var<T>>(vars));
+  return {y.value(), y.value() + y.shape().size()};
+}
+
+/// Fails unless values and gradients in float have the same bits on one and on two threads.
+template <class F>
+void expect_same_bits(const F& f, const std::vector<fieldmark::Tensor<float>>& inputs) {
+  const int before = fieldmark::threads();
+  fieldmark::set_threads(1);
+  const auto one = run_op(f, inputs);
+  fieldmark::set_threads(2);
+  const auto two = run_op(f, inputs);
+  fieldmark::set_threads(before);
+  CHECK(one == two);
+}
+
+/// Largest |float - double| over the values and each gradient, relative to the largest number among them; the
+/// worst of all instruction sets that this CPU has.
+template <class F>
+double float_error(const F& f, const std::vector<fieldmark::Tensor<float>>& inputs) {
+  std::vector<fieldmark::Tensor<double>> exact;
+  for (const auto& x : inputs) exact.emplace_back(x.shape, std::vector<double>(x.data.begin(), x.data.end()));
+  const auto want = run_op(f, exact);
+  const fieldmark::Isa before = fieldmark::isa();
+  double worst = 0;
+  for (auto level : {fieldmark::Isa::v2, fieldmark::Isa::v3, fieldmark::Isa::v4}) {
+    if (level > fieldmark::isa_supported()) continue;
+    fieldmark::force_isa(level);
+    const auto got = run_op(f, inputs);
+    for (std::size_t k = 0; k < want.size(); ++k) {
+      double largest = 1e-30, off = 0;
+      for (std::size_t i = 0; i < want[k].size(); ++i) {
+        largest = std::max(largest, std::abs(want[k][i]));
+        const double d = std::abs(static_cast<double>(got[k][i]) - want[k][i]);
+        off = d <= off ? off : d;  // a NaN stays
+      }
+      worst = off / largest <= worst ? worst : off / largest;
+    }
+  }
+  fieldmark::force_isa(before);
+  return worst;
+}
