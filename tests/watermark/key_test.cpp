@@ -1,0 +1,40 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/watermark/key.h>
+
+#include <set>
+#include <vector>
+
+#include "support/catch.h"
+#include "test_key.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+TEST_CASE("key: random keys differ and use every bit") {
+  std::set<std::string> seen;
+  std::array<std::uint8_t, 32> any{}, all;
+  all.fill(0xff);
+  for (int i = 0; i < 100; ++i) {
+    const Key key = random_key();
+    seen.insert(to_hex(key));
+    for (std::size_t k = 0; k < any.size(); ++k) {
+      any[k] = static_cast<std::uint8_t>(any[k] | key.bytes[k]);
+      all[k] = static_cast<std::uint8_t>(all[k] & key.bytes[k]);
+    }
+  }
+  CHECK(seen.size() == 100);
+  for (std::size_t k = 0; k < any.size(); ++k) {  // a fair bit stays put with probability 2^-99
+    CHECK(any[k] == 0xff);
+    CHECK(all[k] == 0);
+  }
+}
+
+TEST_CASE("key: from bytes and to hex") {
+  const Key key = test_key(0);
+  CHECK(to_hex(key) == "000102030405060708090a0b0c0d0e0f101112131415161718191a1b1c1d1e1f");
+  std::vector<std::uint8_t> bytes(key.bytes.begin(), key.bytes.end());
+  CHECK(key_from_bytes(bytes) == key);
+  bytes.pop_back();
+  CHECK_THROWS_AS(key_from_bytes(bytes), ValueError);
+  CHECK_THROWS_WITH(key_from_bytes(bytes), "[key_from_bytes] bytes: must have 32 entries, got 31");
+}

@@ -1,0 +1,26 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+
+namespace fieldmark::watermark {
+
+/// The owner's secret, 256 bits: who does not hold it cannot say what a picture's cells should show.
+struct Key {
+  std::array<std::uint8_t, 32> bytes{};
+  friend bool operator==(const Key&, const Key&) = default;
+};
+
+/// 256 bits from the operating system's random source; never from a seed.
+/// @throws Error if the system has none
+Key random_key();
+
+/// A key from known bytes, for tests and for keys kept elsewhere.
+/// @param bytes  32 of them   @throws ValueError otherwise
+Key key_from_bytes(std::span<const std::uint8_t> bytes);
+
+/// 64 lower-case hexadecimal digits.
+std::string to_hex(const Key& key);
+
+}  // namespace fieldmark::watermark

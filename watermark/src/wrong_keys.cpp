@@ -1,0 +1,99 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/watermark/cell_code.h>
+#include <fieldmark/watermark/evidence.h>
+#include <fieldmark/watermark/keyed_hash.h>
+#include <fieldmark/watermark/wrong_keys.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+namespace fieldmark::watermark {
+namespace {
+constexpr Index kKeysPerPiece = 128;
+
+Key root_key(std::uint64_t seed) {
+  Key root;
+  for (std::size_t k = 0; k < sizeof(seed); ++k) root.bytes[k] = static_cast<std::uint8_t>(seed >> (8 * k));
+  return root;
+}
+
+constexpr std::array<double, WrongKeyCounts::kThresholds> kThresholdValues{1e-1, 1e-2, 1e-3, 1e-4,
+                                                                           1e-5, 1e-6, 1e-7, 1e-8};
+using Counts = decltype(WrongKeyCounts::counts);
+
+void add_p(double p, Counts& counts) {
+  for (std::size_t i = 0; i < counts.size(); ++i) counts[i] += p <= kThresholdValues[i];
+}
+
+// P(X = k + 1) / P(X = k) of a binomial with odds p / (1 - p).
+long double rise(Index k, Index n, long double odds) {
+  return static_cast<long double>(n - k) / static_cast<long double>(k + 1) * odds;
+}
+
+void check_binomial(Index n, double p, double level) {
+  if (n < 0) throw ValueError("[binomial_upper] n must be at least 0, got " + std::to_string(n));
+  if (!(p >= 0 && p <= 1)) throw ValueError("[binomial_upper] p must be in [0, 1], got " + std::to_string(p));
+  if (!(level > 0 && level < 1)) {
+    throw ValueError("[binomial_upper] level must be in (0, 1), got " + std::to_string(level));
+  }
+}
+}  // namespace
+
+WrongKeyCounts count_wrong_keys(std::span<const double> evidence, std::span<const double> area,
+                                const Message& message, Index n, std::uint64_t seed) {
+  if (n < 0) throw ValueError("[count_wrong_keys] n must be at least 0, got " + std::to_string(n));
+  const CellDealer dealer(area, message.size());
+  const Key root = root_key(seed);
+  std::vector<Counts> pieces(static_cast<std::size_t>((n + kKeysPerPiece - 1) / kKeysPerPiece));
+  parallel_for(n, kKeysPerPiece, [&](Index begin, Index end) {
+    CellCode code;
+    Counts& counts = pieces[static_cast<std::size_t>(begin / kKeysPerPiece)];
+    for (Index i = begin; i < end; ++i) {
+      dealer.deal(derive_key(root, "fieldmark wrong key", static_cast<std::uint64_t>(i)), code);
+      add_p(keyed_p_value(keyed_statistic(evidence, code, message)), counts);
+    }
+  });
+  WrongKeyCounts total;
+  total.n = n;
+  for (const Counts& counts : pieces) {
+    for (std::size_t i = 0; i < counts.size(); ++i) total.counts[i] += counts[i];
+  }
+  return total;
+}
+
+Index binomial_upper(Index n, double p, double level) {
+  check_binomial(n, p, level);
+  if (p == 0 || n == 0) return 0;
+  if (p == 1) return n;
+  // Weights relative to the mode's, as far as they count on both sides: no factorials, no underflow for any
+  // n.
+  const long double odds = static_cast<long double>(p) / (1 - static_cast<long double>(p));
+  const auto mode = std::min(n, static_cast<Index>(static_cast<double>(n + 1) * p));
+  constexpr long double kNegligible = 1e-25L;
+  std::vector<long double> below, above{1};
+  for (Index k = mode; k > 0; --k) {
+    below.push_back((below.empty() ? 1 : below.back()) / rise(k - 1, n, odds));
+    if (below.back() < kNegligible) break;
+  }
+  for (Index k = mode; k < n && above.back() >= kNegligible; ++k)
+    above.push_back(above.back() * rise(k, n, odds));
+  long double total = 0;
+  for (long double weight : below) total += weight;
+  for (long double weight : above) total += weight;
+
+  long double cumulated = 0;
+  for (std::size_t i = below.size(); i-- > 0;) {
+    cumulated += below[i];
+    if (cumulated >= level * total) return mode - 1 - static_cast<Index>(i);
+  }
+  for (std::size_t i = 0; i < above.size(); ++i) {
+    cumulated += above[i];
+    if (cumulated >= level * total) return mode + static_cast<Index>(i);
+  }
+  return mode + static_cast<Index>(above.size()) - 1;
+}
+
+}  // namespace fieldmark::watermark
