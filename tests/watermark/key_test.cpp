@@ -1,10 +1,13 @@
 #include <fieldmark/engine/error.h>
+#include <fieldmark/engine/files.h>
+#include <fieldmark/engine/model_file.h>
 #include <fieldmark/watermark/key.h>
 
 #include <set>
 #include <vector>
 
 #include "support/catch.h"
+#include "support/temporary_folder.h"
 #include "test_key.h"
 
 using namespace fieldmark;
@@ -37,4 +40,33 @@ TEST_CASE("key: from bytes and to hex") {
   bytes.pop_back();
   CHECK_THROWS_AS(key_from_bytes(bytes), ValueError);
   CHECK_THROWS_WITH(key_from_bytes(bytes), "[key_from_bytes] bytes: must have 32 entries, got 31");
+}
+
+TEST_CASE("key: a saved key is loaded again, equal keys give equal files that only their owner can read") {
+  const TemporaryFolder folder;
+  const auto path = folder / "my.key", twin = folder / "twin.key";
+  save_key(path, test_key(200));
+  save_key(twin, test_key(200));
+  CHECK(load_key(path) == test_key(200));
+  CHECK(read_bytes(path) == read_bytes(twin));
+  using std::filesystem::perms;
+  CHECK(std::filesystem::status(path).permissions() == (perms::owner_read | perms::owner_write));
+  CHECK(SafetensorsFile::read(path).metadata.at("fieldmark") == R"({"format":1,"kind":"key"})");
+}
+
+TEST_CASE("key: another kind of file and a key of another length are refused") {
+  const TemporaryFolder folder;
+  const auto path = folder / "x.safetensors";
+  const auto write = [&](const char* kind, Index bytes) {
+    SafetensorsFile file;
+    set_model_info(file, {.kind = kind});
+    file.add("key", {bytes}, std::vector<std::uint8_t>(static_cast<std::size_t>(bytes)));
+    file.write(path);
+  };
+  write("owner", 32);
+  CHECK_THROWS_AS(load_key(path), IoError);
+  CHECK_THROWS_WITH(load_key(path), path.string() + ": expected a KEY file (kind 'key'), found kind 'owner'");
+  write("key", 31);
+  CHECK_THROWS_WITH(load_key(path), path.string() + ": tensor \"key\": expected 32 bytes, found 31");
+  CHECK_THROWS_AS(load_key(folder / "none"), IoError);
 }

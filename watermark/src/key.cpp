@@ -1,11 +1,17 @@
 #include <fieldmark/engine/error.h>
+#include <fieldmark/engine/model_file.h>
 #include <fieldmark/watermark/key.h>
 
 #include <algorithm>
+#include <system_error>
 
 #include "sodium_init.h"
 
 namespace fieldmark::watermark {
+namespace {
+constexpr char kKind[] = "key";
+constexpr char kArray[] = "key";
+}  // namespace
 
 Key random_key() {
   ensure_sodium();
@@ -29,6 +35,30 @@ std::string to_hex(const Key& key) {
   sodium_bin2hex(text.data(), text.size(), key.bytes.data(), key.bytes.size());
   text.pop_back();
   return text;
+}
+
+void save_key(const std::filesystem::path& path, const Key& key) {
+  namespace fs = std::filesystem;
+  SafetensorsFile file;
+  set_model_info(file, {.kind = kKind});
+  file.add(kArray, {static_cast<Index>(key.bytes.size())}, std::span<const std::uint8_t>(key.bytes));
+  file.write(path);
+  if (!fs::is_regular_file(path)) return;  // a pipe or device
+  std::error_code error;
+  fs::permissions(path, fs::perms::owner_read | fs::perms::owner_write, error);
+  if (error)
+    throw IoError(path.string() + ": cannot be made readable by its owner alone: " + error.message());
+}
+
+Key load_key(const std::filesystem::path& path) {
+  const SafetensorsFile file = SafetensorsFile::read(path);
+  require_kind(file, kKind);
+  const std::vector<std::uint8_t> bytes = file.u8(kArray);
+  if (bytes.size() != Key{}.bytes.size()) {
+    throw IoError(path.string() + ": tensor \"" + kArray + "\": expected " +
+                  std::to_string(Key{}.bytes.size()) + " bytes, found " + std::to_string(bytes.size()));
+  }
+  return key_from_bytes(bytes);
 }
 
 }  // namespace fieldmark::watermark

@@ -70,8 +70,8 @@ BitMatch match_bits(const BitReading& reading, const Message& message);
 /// @param matching  0 to n   @throws ValueError otherwise
 double p_value_bits(Index matching, Index n);
 
-/// P(|X - n/2| >= |matching - n/2|): as surprising in either direction.   @throws ValueError unless 0 <=
-/// matching <= n
+/// P(|X - n/2| >= |matching - n/2|): as surprising in either direction.
+/// @param matching  0 to n   @throws ValueError otherwise
 double p_value_bits_two_sided(Index matching, Index n);
 
 /// Least number of matching bits with p_value_bits <= rate; n + 1 if all n bits do not suffice.

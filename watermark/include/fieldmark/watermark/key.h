@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <span>
 #include <string>
 
@@ -22,5 +23,12 @@ Key key_from_bytes(std::span<const std::uint8_t> bytes);
 
 /// 64 lower-case hexadecimal digits.
 std::string to_hex(const Key& key);
+
+/// Writes a KEY file: safetensors with an array "key" of 32 bytes and the kind "key" (see ModelInfo). A file
+/// is made readable by its owner alone.   @throws IoError if writing fails
+void save_key(const std::filesystem::path& path, const Key& key);
+
+/// @throws IoError if the file cannot be read, is of another kind, or its array is not 32 bytes
+Key load_key(const std::filesystem::path& path);
 
 }  // namespace fieldmark::watermark

@@ -1,0 +1,29 @@
+#pragma once
+#include <fieldmark/engine/safetensors.h>
+
+#include <string>
+#include <string_view>
+
+namespace fieldmark {
+
+/// What the metadata entry `fieldmark` says of a file: JSON {"format": 1, "kind": KIND, "config": {...}}. It
+/// holds no times, host names or paths, so that equal runs give equal bytes.
+struct ModelInfo {
+  std::string kind;           ///< "field", "owner", "key", ...
+  std::string config = "{}";  ///< a JSON object
+};
+
+/// Sets the entry; an empty config is left out. Equal objects give equal text, whatever their spaces and
+/// order of keys.
+/// @throws ValueError if the kind is empty or the config is not a JSON object
+void set_model_info(SafetensorsFile& file, const ModelInfo& info);
+
+/// Reads the entry.
+/// @throws IoError if there is none ("not a Fieldmark file"), it is malformed, or its format is not 1
+ModelInfo model_info(const SafetensorsFile& file);
+
+/// Reads the entry of a file that must be of one kind.
+/// @throws IoError as model_info, or "PATH: expected an OWNER file (kind 'owner'), found kind 'field'"
+ModelInfo require_kind(const SafetensorsFile& file, std::string_view kind);
+
+}  // namespace fieldmark
