@@ -1,0 +1,134 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/nerf/camera_set.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "support/catch.h"
+#include "support/random.h"
+
+using namespace fieldmark;
+using namespace fieldmark::nerf;
+
+namespace {
+const Vec3 kCentre{0.3, -0.2, 0.1};
+double dot3(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+double length(const Vec3& a) { return std::sqrt(dot3(a, a)); }
+
+// Cameras on the cap above 20 degrees around kCentre, between 3 and 5 away.
+std::vector<Camera> cap(Index count) {
+  const auto r = uniform({count, 3}, 0, 1, 4);
+  std::vector<Camera> cameras;
+  for (Index i = 0; i < count; ++i) {
+    const double z = 0.342 + 0.65 * r[3 * i], a = 6.28 * r[3 * i + 1], d = 3 + 2 * r[3 * i + 2],
+                 w = std::sqrt(1 - z * z);
+    const Vec3 eye{kCentre[0] + d * w * std::cos(a), kCentre[1] + d * w * std::sin(a), kCentre[2] + d * z};
+    cameras.push_back(make_camera(look_at(eye, kCentre, {0, 0, 1}), 0.7, 80, 60));
+  }
+  return cameras;
+}
+// Distance of the point from the camera's axis.
+double off_axis(const Camera& c, const Vec3& p) {
+  const Vec3 to = minus(p, c.position());
+  return std::sqrt(std::max(0.0, dot3(to, to) - std::pow(dot3(to, c.forward()), 2)));
+}
+}  // namespace
+
+TEST_CASE("camera_set: the span finds centre, up and distances of the cameras it is given") {
+  const auto cameras = cap(30);
+  const CameraSpan s = camera_span(cameras, Background::black);
+  CHECK(length(minus(s.centre, kCentre)) < 1e-7);
+  CHECK(length(minus(s.up, {0, 0, 1})) < 1e-7);
+  REQUIRE(s.directions.size() == 30);
+  for (std::size_t i = 0; i < 30; ++i) {
+    CHECK(std::abs(s.distances[i] - length(minus(cameras[i].position(), kCentre))) < 1e-7);
+    CHECK(dot3(s.directions[i], cameras[i].forward()) < -0.999999);
+  }
+  const double far = *std::max_element(s.distances.begin(), s.distances.end());
+  CHECK(std::abs(s.half_size - 1.05 * far * std::tan(0.35)) < 1e-9);
+  CHECK((s.width == 80 && s.height == 60 && std::abs(s.cy - 0.375) < 1e-15));
+}
+
+TEST_CASE("camera_set: one camera spans itself") {
+  const CameraSpan s = camera_span(cap(1), Background::white);
+  CHECK(length(s.centre) < length(cap(1)[0].position()));
+  for (const Camera& c : make_cameras(s, CameraSet::near, 5, 0, 1))
+    CHECK(dot3(minus(c.position(), s.centre), s.directions[0]) > 0.79 * s.distances[0]);
+}
+
+TEST_CASE("camera_set: near stays inside directions, distances and look-at of training") {
+  const CameraSpan s = camera_span(cap(60), Background::white);
+  const auto cameras = make_cameras(s, CameraSet::near, 300, 40, 9);
+  REQUIRE(cameras.size() == 300);
+  const auto [low, high] = std::minmax_element(s.distances.begin(), s.distances.end());
+  double nearest = 1e9, farthest = 0, aside = 0;
+  for (const Camera& c : cameras) {
+    const Vec3 from = minus(c.position(), s.centre);
+    CHECK(from[2] / length(from) > 0.34);  // a cap is convex
+    nearest = std::min(nearest, length(from)), farthest = std::max(farthest, length(from));
+    aside = std::max(aside, off_axis(c, s.centre));
+    CHECK((c.width == 40 && c.height == 30));
+    CHECK(c.pose[9] > 0);  // up is upwards
+  }
+  CHECK(nearest >= 0.8 * *low - 1e-9);
+  CHECK(nearest < 1.1 * *low);
+  CHECK(farthest <= 1.5 * *high + 1e-9);
+  CHECK(farthest > 1.2 * *high);
+  CHECK(aside <= 0.1 * s.half_size);
+  CHECK(aside > 0.06 * s.half_size);
+}
+
+TEST_CASE("camera_set: ring and sphere") {
+  const CameraSpan s = camera_span(cap(20), Background::white);
+  Vec3 mean{}, sphere_mean{};
+  for (const Camera& c : make_cameras(s, CameraSet::ring, 400, 0, 3)) {
+    const Vec3 from = minus(c.position(), s.centre);
+    CHECK(std::abs(length(from) - 4.0311) < 1e-12);
+    CHECK(std::abs(from[2] / 4.0311 - 0.5) < 1e-6);
+    CHECK(off_axis(c, s.centre) < 1e-6);
+    for (std::size_t k = 0; k < 3; ++k) mean[k] += from[k] / 4.0311 / 400;
+  }
+  for (const Camera& c : make_cameras(s, CameraSet::sphere, 400, 0, 3)) {
+    const Vec3 from = minus(c.position(), s.centre);
+    for (std::size_t k = 0; k < 3; ++k) sphere_mean[k] += from[k] / length(from) / 400;
+  }
+  CHECK(std::hypot(mean[0], mean[1]) < 0.13);  // 3 deviations of 400 azimuths
+  CHECK(length(sphere_mean) < 0.15);           // 3 deviations of 400 directions
+}
+
+TEST_CASE("camera_set: camera i depends on the seed and i only") {
+  const CameraSpan s = camera_span(cap(20), Background::white);
+  for (const CameraSet kind : {CameraSet::near, CameraSet::ring, CameraSet::sphere}) {
+    const auto few = make_cameras(s, kind, 3, 0, 5), many = make_cameras(s, kind, 10, 0, 5);
+    for (std::size_t i = 0; i < 3; ++i) CHECK(few[i].pose == many[i].pose);
+    CHECK(few[0].pose != few[1].pose);
+    CHECK(make_cameras(s, kind, 1, 0, 6)[0].pose != few[0].pose);
+  }
+}
+
+TEST_CASE("camera_set: the span survives its JSON text bit for bit") {
+  const CameraSpan s = camera_span(cap(7), Background::black);
+  const CameraSpan b = parse_camera_span(format_camera_span(s), "x");
+  CHECK((b.centre == s.centre && b.up == s.up && b.half_size == s.half_size && b.directions == s.directions));
+  CHECK((b.distances == s.distances && b.fx == s.fx && b.fy == s.fy && b.cx == s.cx && b.cy == s.cy));
+  CHECK((b.width == s.width && b.height == s.height && b.background == s.background));
+}
+
+TEST_CASE("camera_set: errors") {
+  CHECK_THROWS_WITH(camera_span(std::vector<Camera>{}, Background::white),
+                    Contains("at least one camera, got none"));
+  CHECK_THROWS_WITH(parse_camera_set("far"), "[cameras] set must be near, ring, sphere or test, got \"far\"");
+  CHECK(parse_camera_set("test") == CameraSet::test);
+  const CameraSpan s = camera_span(cap(2), Background::white);
+  CHECK_THROWS_WITH(make_cameras(s, CameraSet::test, 1, 0, 0), Contains("test views are in the data set"));
+  CHECK_THROWS_WITH(make_cameras(s, CameraSet::near, -1, 0, 0),
+                    Contains("must not be negative, got -1 and 0"));
+  CHECK_THROWS_WITH(make_cameras(CameraSpan{}, CameraSet::near, 1, 0, 0), Contains("got 0 and 0"));
+  CHECK_THROWS_WITH(parse_camera_span("{}", "f.safetensors: cameras"),
+                    "f.safetensors: cameras: expected the key \"centre\", got none");
+  std::string text = format_camera_span(s);
+  text.replace(text.find("\"white\""), 7, "\"green\"");
+  CHECK_THROWS_WITH(parse_camera_span(text, "f"), "f: background: expected white or black, got green");
+  CHECK_THROWS_AS(parse_camera_span("{\"centre\": [1, 2]}", "f"), IoError);
+}

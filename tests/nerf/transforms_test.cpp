@@ -1,0 +1,131 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/nerf/transforms.h>
+
+#include <random>
+#include <string>
+
+#include "support/catch.h"
+
+using namespace fieldmark;
+using namespace fieldmark::nerf;
+
+namespace {
+const std::string kGood =
+    "{\"camera_angle_x\": 0.7,\n \"frames\": [\n"
+    "  {\"file_path\": \"./train/r_0\", \"rotation\": 0.1, \"transform_matrix\":\n"
+    "   [[1, 0, 0, 0.5], [0, 0, -1, 2], [0, 1, 0, 3], [0, 0, 0, 1]]},\n"
+    "  {\"file_path\": \"b.png\", \"transform_matrix\": [[0.6, -0.8, 0, 1], [0.8, 0.6, 0, 2], [0, 0, 1, 4], "
+    "[0, 0, 0, 1]]}]}";
+
+// kGood with one piece replaced.
+std::string with(const std::string& piece, const std::string& by) {
+  std::string text = kGood;
+  const auto at = text.find(piece);
+  REQUIRE(at != std::string::npos);
+  return text.replace(at, piece.size(), by);
+}
+void expect_error(const std::string& text, const std::string& message) {
+  CHECK_THROWS_WITH(parse_transforms(text, "lego/t.json"), Contains("lego/t.json: " + message));
+  CHECK_THROWS_AS(parse_transforms(text, "lego/t.json"), IoError);
+}
+}  // namespace
+
+TEST_CASE("transforms: reads angle, names and poses") {
+  const Transforms t = parse_transforms(kGood, "t.json");
+  CHECK(t.camera_angle_x == 0.7);
+  REQUIRE(t.frames.size() == 2);
+  CHECK(t.frames[0].file_path == "./train/r_0");
+  CHECK(t.frames[0].pose == Pose{1, 0, 0, 0.5, 0, 0, -1, 2, 0, 1, 0, 3});
+  CHECK(t.frames[1].file_path == "b.png");
+}
+
+TEST_CASE("transforms: what is written reads back to the same numbers") {
+  Transforms t = parse_transforms(kGood, "t.json");
+  t.camera_angle_x = 0.6911112070083618;
+  t.frames[1].pose[3] = 1.0 / 3;
+  const Transforms back = parse_transforms(format_transforms(t), "t.json");
+  CHECK(back.camera_angle_x == t.camera_angle_x);
+  REQUIRE(back.frames.size() == 2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    CHECK(back.frames[i].file_path == t.frames[i].file_path);
+    CHECK(back.frames[i].pose == t.frames[i].pose);
+  }
+}
+
+TEST_CASE("transforms: errors of content name place, expectation and find") {
+  expect_error("[]", "expected an object, got array");
+  expect_error(with("\"camera_angle_x\"", "\"angle\""), "expected the key \"camera_angle_x\", got none");
+  expect_error(with("0.7", "\"wide\""), "camera_angle_x: expected a number, got string");
+  for (const char* bad : {"0", "-1", "3.2"})
+    expect_error(with("0.7", bad), "camera_angle_x: expected a number in (0, pi) radians, got ");
+  expect_error("{\"camera_angle_x\": 1, \"frames\": []}", "frames: expected at least one view, got none");
+  expect_error("{\"camera_angle_x\": 1, \"frames\": {}}", "frames: expected an array, got object");
+  expect_error("{\"camera_angle_x\": 1, \"frames\": [3]}", "frames[0]: expected an object, got number");
+  expect_error(with("\"b.png\"", "7"), "frames[1].file_path: expected text, got number");
+  expect_error(with("\"b.png\"", "\"\""),
+               "frames[1].file_path: expected the name of a picture, got an empty text");
+  expect_error(with("\"file_path\": \"b.png\", ", ""), "frames[1]: expected the key \"file_path\", got none");
+}
+
+TEST_CASE("transforms: errors of matrices name row and column") {
+  const std::string at = "frames[1].transform_matrix";
+  const std::string last = ", [0, 0, 1, 4], [0, 0, 0, 1]";
+  expect_error(with(last, ", [0, 0, 0, 1]"), at + ": expected 4x4 numbers, got 3 rows");
+  expect_error(with(last, ", [0, 0, 1], [0, 0, 0, 1]"), at + "[2]: expected 4 numbers, got 3");
+  expect_error(with(last, ", 5, [0, 0, 0, 1]"), at + "[2]: expected an array, got number");
+  expect_error(with(last, ", [0, null, 1, 4], [0, 0, 0, 1]"), at + "[2][1]: expected a number, got null");
+  expect_error(
+      with(last, ", [0, 0, 1.01, 4], [0, 0, 0, 1]"),
+      at + ": expected a rotation in the upper left 3x3, got columns that are off orthonormal by 0.0201");
+  expect_error(with(last, ", [0, 0, -1, 4], [0, 0, 0, 1]"), at + ": expected a rotation");  // a mirror
+  expect_error(with(last, ", [0, 0, 1, 4], [0, 0, 0, 2]"),
+               at + "[3]: expected the row 0 0 0 1, got 2 in column 3");
+}
+
+TEST_CASE("transforms: errors of syntax name line and byte") {
+  expect_error("", "line 1, byte 0: expected JSON, got the end of the text");
+  expect_error("{\n\"camera_angle_x\": x}", "line 2, byte 20: expected JSON, got 'x'");
+  expect_error(kGood.substr(0, kGood.size() - 1), "line 5, byte " + std::to_string(kGood.size() - 1));
+  expect_error("{\"a\": \"\x01\"}", "line 1, byte 7: expected JSON, got byte value 1");
+  const std::string large = with("0.5", "\n1e999");
+  expect_error(large, "line 5, byte " + std::to_string(large.find("1e999")) +
+                          ": expected JSON, got the number 1e999, too large");
+}
+
+TEST_CASE("transforms: 20000 mutations of a file either read or throw IoError") {
+  std::mt19937_64 rng(1);
+  const std::string pieces[] = {"[",    "]", "{",   "}",       ",",    "\"",    "1e999",
+                                "null", "-", "NaN", "\\u0000", "\xFF", "1e308", ":"};
+  int read = 0, thrown = 0;
+  for (int round = 0; round < 20000; ++round) {
+    std::string text = kGood;
+    for (auto edits = 1 + rng() % 4; edits > 0 && !text.empty(); --edits) {
+      const auto at = rng() % text.size();
+      switch (rng() % 5) {
+        case 0:
+          text[at] = static_cast<char>(rng());
+          break;
+        case 1:
+          text.erase(at, 1 + rng() % 8);
+          break;
+        case 2:
+          text.insert(at, pieces[rng() % std::size(pieces)]);
+          break;
+        case 3:
+          text.insert(at, text.substr(rng() % text.size(), rng() % 40));
+          break;
+        default:
+          text.resize(at);
+      }
+    }
+    try {
+      const Transforms t = parse_transforms(text, "t");
+      ++read;
+      if (t.frames.empty() || !(t.camera_angle_x > 0)) FAIL("accepted " << text);
+    } catch (const IoError&) {
+      ++thrown;
+    }
+  }
+  CHECK(read > 100);
+  CHECK(thrown > 10000);
+}
