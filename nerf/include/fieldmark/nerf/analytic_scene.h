@@ -1,0 +1,47 @@
+#pragma once
+#include <fieldmark/nerf/dataset.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+
+namespace fieldmark::nerf {
+
+enum class SceneKind {
+  objects,  ///< textured solids of every kind on a round slab, with soft shadows
+  sphere    ///< one sphere of one colour, shaded
+};
+
+/// A built-in scene, within 1.2 of the origin, and cameras around it like those of the Blender scenes: on the
+/// upper half of a sphere of radius 4.0311, looking at the origin, camera_angle_x 0.6911.
+struct SceneOptions {
+  SceneKind kind = SceneKind::objects;
+  Index size = 200;   ///< pixels of both sides, 1 to 8192
+  Index views = 100;  ///< of the training split, 1 to 100000; val has a tenth and test a quarter, at least 1
+  std::uint64_t seed = 0;  ///< of placement, colours and cameras
+};
+
+/// Ray-traces one view with 4 x 4 samples a pixel; alpha is the covered share of a pixel. Surfaces are
+/// diffuse under a sky and a sun with soft edges, both approximated by spheres inside the solids (shadow: the
+/// angle between sun and sphere; sky: (r / d)^2), so a point has one colour from every side.
+/// @return  [height, width, 4] straight alpha, rounded to 8 bits   @throws ValueError if an option is outside
+/// its range
+Tensor<float> render_scene(const SceneOptions& options, const Camera& camera);
+
+/// One split in memory: the same pictures and cameras that write_scene() writes.
+/// @throws ValueError  if an option is outside its range or split is not "train", "val" or "test"
+Dataset make_scene(const SceneOptions& options, const std::string& split = "train",
+                   Background background = Background::white);
+
+/// Called with the pictures done and their total, from the calling thread; may throw to stop.
+using SceneProgress = std::function<void(Index done, Index total)>;
+
+/// Writes all splits as a data set that load_dataset() reads: train, val and test folders of RGBA PNG files,
+/// and, when their pictures are complete, transforms_{train,val,test}.json. Equal options give equal bytes.
+/// @throws ValueError  if an option is outside its range   @throws IoError if folder or files cannot be
+/// written
+void write_scene(const SceneOptions& options, const std::filesystem::path& folder,
+                 const SceneProgress& progress = {});
+
+}  // namespace fieldmark::nerf
