@@ -1,0 +1,52 @@
+#pragma once
+#include <fieldmark/engine/random.h>
+#include <fieldmark/engine/tensor.h>
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace fieldmark::distort {
+
+enum class AttackKind { noise, rotation, scale, blur, crop, jpeg, gamma, brightness, hue };
+
+/// What somebody does to a picture to remove its mark, from a name such as "rotation_30" or
+/// "noise_0.1,jpeg_50".
+struct Attack {
+  struct Step {
+    AttackKind kind;
+    double amount;
+  };
+  std::string name;         ///< as it was given
+  std::vector<Step> steps;  ///< from left to right
+};
+
+/// Reads a name, or names separated by commas. Severities are true: deviations on the scale of [0, 1], sigma
+/// in pixels of the picture at hand.
+///   noise_A       Gaussian of standard deviation A, 0 to 1
+///   rotation_A    uniform in +-A degrees about the centre, bilinear, same size, 0 to 180
+///   scale_A       to A times the size with an area filter and left so, 0.01 to 4
+///   blur_A        Gaussian of sigma A pixels, 0 to 100
+///   crop_A        a random window of the picture's aspect that keeps the fraction A of the area, 0.0001 to 1
+///   jpeg_A        quality A, 4:2:0 chroma, a whole number 1 to 90 (see encode_jpeg)
+///   gamma_A       value to the power A, 0.01 to 10
+///   brightness_A  value times A, 0 to 10
+///   hue_A         hue (of hue, saturation, value) turned by A degrees, -360 to 360
+///   combined      noise_0.10,crop_0.40,jpeg_50
+/// @throws ValueError, which lists all of these, on any other name and on amounts outside the ranges
+Attack parse_attack(std::string_view name);
+
+/// Applies the steps in order. Each result is clamped to [0, 1] and rounded to 8 bits, so that a chain does
+/// what the same attacks do one after another on saved pictures.
+/// @param image       [height, width, 3] in [0, 1], at least one pixel
+/// @param rng         where noise, angles and windows come from
+/// @param index       number of the picture: the counter rng is read at, so results depend on nothing else
+/// @param background  3 numbers, shown where a rotation opens corners
+/// @return [height', width', 3], multiples of 1/255
+/// @throws ShapeError if the image or the background has another shape
+Tensor<float> apply_attack(const Attack& attack, const Tensor<float>& image, const CounterRng& rng,
+                           std::uint64_t index, std::span<const float> background);
+
+}  // namespace fieldmark::distort

@@ -1,0 +1,210 @@
+#include "fieldmark/distort/attack.h"
+
+#include <fieldmark/engine/image.h>
+#include <fieldmark/engine/tape.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "checks.h"
+#include "fieldmark/distort/blur.h"
+#include "fieldmark/distort/noise.h"
+#include "fieldmark/distort/quantize8.h"
+#include "fieldmark/distort/resize_area.h"
+#include "fieldmark/distort/rotate.h"
+
+namespace fieldmark::distort {
+namespace {
+
+struct Kind {
+  std::string_view name;
+  AttackKind kind;
+  double low, high;
+};
+constexpr std::array<Kind, 9> kKinds{{{"noise", AttackKind::noise, 0, 1},
+                                      {"rotation", AttackKind::rotation, 0, 180},
+                                      {"scale", AttackKind::scale, 0.01, 4},
+                                      {"blur", AttackKind::blur, 0, 100},
+                                      {"crop", AttackKind::crop, 0.0001, 1},
+                                      {"jpeg", AttackKind::jpeg, 1, 90},
+                                      {"gamma", AttackKind::gamma, 0.01, 10},
+                                      {"brightness", AttackKind::brightness, 0, 10},
+                                      {"hue", AttackKind::hue, -360, 360}}};
+constexpr std::string_view kCombined = "noise_0.10,crop_0.40,jpeg_50";
+
+[[noreturn]] void fail(std::string_view name) {
+  std::string text = "[attack] name: must be a chain, separated by commas, of";
+  for (const Kind& k : kKinds) {
+    char range[64];
+    std::snprintf(range, sizeof range, "_A (%g to %g%s), ", k.low, k.high,
+                  k.kind == AttackKind::jpeg ? ", whole" : "");
+    text += " " + std::string(k.name) + range;
+    text.pop_back();
+  }
+  throw ValueError(text + " combined, got '" + std::string(name) + "'");
+}
+
+Attack::Step parse_step(std::string_view name) {
+  const std::size_t line = name.find('_');
+  const auto kind = std::find_if(kKinds.begin(), kKinds.end(),
+                                 [&](const Kind& k) { return k.name == name.substr(0, line); });
+  if (line == std::string_view::npos || kind == kKinds.end()) fail(name);
+  const char *begin = name.data() + line + 1, *end = name.data() + name.size();
+  double amount = 0;
+  const auto [stop, error] = std::from_chars(begin, end, amount);
+  // Written so that nan fails.
+  if (error != std::errc() || stop != end || !(amount >= kind->low && amount <= kind->high)) fail(name);
+  if (kind->kind == AttackKind::jpeg && amount != std::floor(amount)) fail(name);
+  return {kind->kind, amount};
+}
+
+// Counters of one step for one picture: (index, step << 40 | i).
+struct Draws {
+  const CounterRng& rng;
+  std::uint64_t index, base;
+  std::uint64_t at(Index i) const { return base + static_cast<std::uint64_t>(i); }
+  std::vector<float> normal(Index n) const {
+    std::vector<float> field(static_cast<std::size_t>(n));
+    for (Index i = 0; i < n; i += 4) {
+      const auto four = rng.normal4(index, at(i / 4));
+      std::copy_n(four.begin(), std::min<Index>(4, n - i), field.begin() + i);
+    }
+    return field;
+  }
+};
+
+template <class F>
+Tensor<float> map_values(const Tensor<float>& x, const F& f) {
+  Tensor<float> y(x.shape);
+  std::transform(x.data.begin(), x.data.end(), y.data.begin(), f);
+  return y;
+}
+
+Index scaled(Index extent, double factor) {
+  return std::max<Index>(1, std::llround(static_cast<double>(extent) * factor));
+}
+
+Tensor<float> crop(const Tensor<float>& x, double fraction, const Draws& draws) {
+  const Index h = x.shape[0], w = x.shape[1];
+  const Index height = scaled(h, std::sqrt(fraction));
+  // The width makes up for the height's rounding: the area is what was asked for.
+  const Index width = std::min(w, scaled(w, fraction * static_cast<double>(h) / static_cast<double>(height)));
+  const Index top = draws.rng.below(h - height + 1, draws.index, draws.at(0));
+  const Index left = draws.rng.below(w - width + 1, draws.index, draws.at(1));
+  Tensor<float> y({height, width, 3});
+  for (Index i = 0; i < height; ++i)
+    std::copy_n(x.data.begin() + ((top + i) * w + left) * 3, width * 3, y.data.begin() + i * width * 3);
+  return y;
+}
+
+// Hue, saturation and value of Smith 1978, hue turned: channel n = v - v s max(0, min(k, 4 - k, 1)), k = n +
+// hue/60.
+Tensor<float> turn_hue(const Tensor<float>& x, double degrees) {
+  Tensor<float> y(x.shape);
+  const double turn = degrees / 60 + 12;
+  for (Index i = 0; i < x.size(); i += 3) {
+    const double r = static_cast<double>(x[i]), g = static_cast<double>(x[i + 1]),
+                 b = static_cast<double>(x[i + 2]);
+    const double value = std::max({r, g, b}), chroma = value - std::min({r, g, b});
+    if (chroma <= 0) {
+      std::copy_n(x.data.begin() + i, 3, y.data.begin() + i);
+      continue;
+    }
+    const double sector = value == r   ? (g - b) / chroma
+                          : value == g ? 2 + (b - r) / chroma
+                                       : 4 + (r - g) / chroma;
+    for (Index c = 0; c < 3; ++c) {
+      const double k = std::fmod(static_cast<double>(5 - 2 * c) + sector + turn, 6.0);
+      y[i + c] = static_cast<float>(value - chroma * std::max(0.0, std::min({k, 4 - k, 1.0})));
+    }
+  }
+  return y;
+}
+
+// Runs one of this module's ops on a picture; what the tape holds goes with it.
+template <class F>
+Tensor<float> run(const Tensor<float>& x, const F& op) {
+  Tape<float> tape;
+  const Var<float> y = op(tape.constant(x), tape);
+  return {y.shape(), std::vector<float>(y.value(), y.value() + y.shape().size())};
+}
+
+Tensor<float> apply(const Attack::Step& step, const Tensor<float>& x, const Draws& draws,
+                    std::span<const float> background) {
+  const auto a = static_cast<float>(step.amount);
+  float parameter = a;
+  switch (step.kind) {
+    case AttackKind::noise: {
+      const auto field = draws.normal(x.size());
+      return run(x, [&](auto v, auto& tape) { return noise(v, tape.constant(&parameter, {1}), field); });
+    }
+    case AttackKind::rotation: {
+      const double degrees = step.amount * (2 * draws.rng.uniform_double(draws.index, draws.base) - 1);
+      parameter = static_cast<float>(degrees * std::numbers::pi / 180);
+      return run(x,
+                 [&](auto v, auto& tape) { return rotate(v, tape.constant(&parameter, {1}), background); });
+    }
+    case AttackKind::scale:
+      return run(x, [&](auto v, auto&) {
+        return resize_area(v, scaled(x.shape[0], step.amount), scaled(x.shape[1], step.amount));
+      });
+    case AttackKind::blur:
+      return run(x, [&](auto v, auto& tape) { return blur(v, tape.constant(&parameter, {1})); });
+    case AttackKind::crop:
+      return crop(x, step.amount, draws);
+    case AttackKind::jpeg:
+      return jpeg_round_trip(x, static_cast<int>(step.amount));
+    case AttackKind::gamma:
+      return map_values(x, [a](float v) { return std::pow(std::max(v, 0.f), a); });
+    case AttackKind::brightness:
+      return map_values(x, [a](float v) { return v * a; });
+    case AttackKind::hue:
+      return turn_hue(x, step.amount);
+  }
+  return x;
+}
+
+}  // namespace
+
+Attack parse_attack(std::string_view name) {
+  Attack attack{std::string(name), {}};
+  std::string_view rest = name;
+  for (bool more = true; more;) {
+    const std::size_t comma = rest.find(',');
+    const std::string_view step = rest.substr(0, comma);
+    if (step == "combined") {
+      for (const auto& s : parse_attack(kCombined).steps) attack.steps.push_back(s);
+    } else {
+      attack.steps.push_back(parse_step(step));
+    }
+    more = comma != std::string_view::npos;
+    if (more) rest.remove_prefix(comma + 1);
+  }
+  return attack;
+}
+
+Tensor<float> apply_attack(const Attack& attack, const Tensor<float>& image, const CounterRng& rng,
+                           std::uint64_t index, std::span<const float> background) {
+  check_rank("attack", "image", image.shape, 3, "[height, width, 3]");
+  check_extent("attack", "image", image.shape, 2, 3, "red, green and blue");
+  if (image.size() == 0)
+    throw ShapeError("[attack] image: must have at least one pixel, got shape " + image.shape.str());
+  if (background.size() != 3)
+    throw ShapeError("[attack] background: must have 3 numbers, got " + std::to_string(background.size()));
+  const auto round = [](const Tensor<float>& x) {
+    return run(x, [](auto v, auto&) { return quantize8(v); });
+  };
+  Tensor<float> x = image;
+  std::uint64_t base = 0;
+  for (const auto& step : attack.steps) {
+    x = round(apply(step, x, Draws{rng, index, base}, background));
+    base += std::uint64_t{1} << 40;
+  }
+  return x;
+}
+
+}  // namespace fieldmark::distort
