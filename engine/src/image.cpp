@@ -118,7 +118,7 @@ std::vector<std::byte> encode_jpeg(const Tensor<float>& image, int quality) {
                      image.shape.str());
   if (quality < 1 || quality > 90)
     throw ValueError(
-        "[encode_jpeg] quality must be from 1 to 90 (the encoder halves chroma no further), got " +
+        "[encode_jpeg] quality must be from 1 to 90 (above 90 the encoder does not halve chroma), got " +
         std::to_string(quality));
   const auto pixels = bytes_of(image);
   std::vector<std::byte> out;
