@@ -1,0 +1,40 @@
+#pragma once
+#include <fieldmark/engine/tape.h>
+
+#include <span>
+#include <vector>
+
+namespace fieldmark {
+
+struct BatchNormOptions {
+  double eps = 1e-5;  ///< added to the variance, > 0
+  bool relu = false;  ///< max(y, 0) in the same pass over memory
+};
+
+/// What a batch was normalised by, one number a channel.
+struct BatchStatistics {
+  std::vector<double> mean;
+  std::vector<double> variance;  ///< E[(x - mean)^2], divided by the count
+};
+
+/// Batch normalisation with the statistics of the batch itself, over images, height and width.
+///   y = gamma (x - mean) / sqrt(var + eps) + beta
+/// Source: Ioffe and Szegedy 2015, algorithm 1. A constant channel, or a batch of one pixel, gives beta
+/// exactly.
+/// @param x [N, H, W, C]   @param gamma [C]   @param beta [C]
+/// @param statistics  where not null, receives what was used (for running averages)
+/// @return [N, H, W, C]
+/// @throws ShapeError if the shapes do not fit   @throws ValueError if eps is not above 0
+/// Differentiable in: x (also through the statistics), gamma, beta; with relu, except where y = 0.
+template <class T>
+Var<T> batch_norm(Var<T> x, Var<T> gamma, Var<T> beta, const BatchNormOptions& options = {},
+                  BatchStatistics* statistics = nullptr);
+
+/// As batch_norm, with given statistics: how a trained network is evaluated.
+/// @param mean, variance  C numbers each, copied   @throws as batch_norm; ValueError if a variance is
+/// negative Differentiable in: x, gamma, beta; with relu, except where y = 0.
+template <class T>
+Var<T> batch_norm_fixed(Var<T> x, Var<T> gamma, Var<T> beta, std::span<const T> mean,
+                        std::span<const T> variance, const BatchNormOptions& options = {});
+
+}  // namespace fieldmark

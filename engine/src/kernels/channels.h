@@ -1,0 +1,47 @@
+#pragma once
+#include <fieldmark/engine/simd.h>
+
+// For kernel files only, hence the anonymous namespace (fieldmark/engine/simd.h).
+namespace {
+
+// Pixels whose sums are kept in T before they join a double: 64 channels of float then fill 8 KiB of the L1
+// cache.
+constexpr std::int64_t kSegment = 32;
+
+// Calls f(V{}, c) for vectors V = Vec<T> of channels, then f(T{}, c) for each that is left over.
+template <class T, class F>
+[[gnu::always_inline]] inline void for_channels(std::int64_t channels, F f) {
+  constexpr std::int64_t lanes = simd::kLanes<T>;
+  std::int64_t c = 0;
+  for (; c + lanes <= channels; c += lanes) f(simd::Vec<T>{}, c);
+  for (; c < channels; ++c) f(T{}, c);
+}
+
+// A vector, or one number, at p.
+template <class V, class T>
+[[gnu::always_inline]] inline V load_as(const T* p) {
+  V v;
+  std::memcpy(&v, p, sizeof v);
+  return v;
+}
+template <class V, class T>
+[[gnu::always_inline]] inline void store_as(T* p, V v) {
+  std::memcpy(p, &v, sizeof v);
+}
+
+// sums[k] += v[k].
+template <class T, class V>
+[[gnu::always_inline]] inline void add_lanes(double* sums, V v) {
+  constexpr std::size_t lanes = sizeof(V) / sizeof(T);
+  T lane[lanes];
+  std::memcpy(lane, &v, sizeof v);
+  for (std::size_t k = 0; k < lanes; ++k) sums[k] += static_cast<double>(lane[k]);
+}
+
+// Calls f(first, count) for segments of pixels.
+template <class F>
+[[gnu::always_inline]] inline void for_segments(std::int64_t pixels, F f) {
+  for (std::int64_t p = 0; p < pixels; p += kSegment) f(p, pixels - p < kSegment ? pixels - p : kSegment);
+}
+
+}  // namespace

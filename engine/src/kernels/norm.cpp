@@ -1,0 +1,141 @@
+#include "kernels/norm.h"
+
+#include "kernels/channels.h"
+
+namespace fieldmark::kernels {
+namespace {
+
+// Joins a segment of n pixels with the given mean and squared deviations to the `count` before it (Chan et
+// al. 1983).
+template <class T, class V>
+inline void join(double count, double n, V centre, V residual, V squares, double* mean, double* m2) {
+  constexpr std::size_t lanes = sizeof(V) / sizeof(T);
+  T c[lanes], r[lanes], s[lanes];
+  std::memcpy(c, &centre, sizeof centre);
+  std::memcpy(r, &residual, sizeof residual);
+  std::memcpy(s, &squares, sizeof squares);
+  for (std::size_t k = 0; k < lanes; ++k) {
+    // The centre is the mean only up to rounding; the sum of deviations from it tells by how much.
+    const double off = static_cast<double>(r[k]) / n, delta = static_cast<double>(c[k]) + off - mean[k];
+    const double own = static_cast<double>(s[k]) - off * off * n;
+    mean[k] += delta * n / (count + n);
+    m2[k] += (own > 0 ? own : 0) + delta * delta * count * n / (count + n);
+  }
+}
+
+// Sum of `count` pixels, one channel vector each, in four chains: one would wait for its own additions.
+template <class V, class T, class F>
+[[gnu::always_inline]] inline V sum_pixels(const T* x, std::int64_t count, std::int64_t channels, F f) {
+  V s[4] = {};
+  std::int64_t p = 0;
+  for (; p + 4 <= count; p += 4)
+    for (int k = 0; k < 4; ++k) s[k] += f(load_as<V>(x + (p + k) * channels));
+  for (; p < count; ++p) s[0] += f(load_as<V>(x + p * channels));
+  return (s[0] + s[1]) + (s[2] + s[3]);
+}
+
+// (x - mean) gain + shift > 0 ? dy : 0.
+template <class V, class T>
+[[gnu::always_inline]] inline V gate(V centred, V dy, const Affine<T>& a, std::int64_t c) {
+  if (!a.relu) return dy;
+  return centred * load_as<V>(a.gain + c) + load_as<V>(a.shift + c) > 0 ? dy : V{};
+}
+
+template <class T>
+void moments(const T* x, std::int64_t pixels, std::int64_t channels, double* mean, double* m2) {
+  for (std::int64_t c = 0; c < channels; ++c) mean[c] = m2[c] = 0;
+  for_segments(pixels, [=](std::int64_t first, std::int64_t n) {
+    for_channels<T>(channels, [=](auto zero, std::int64_t c) {
+      using V = decltype(zero);
+      const T* p = x + first * channels + c;
+      // The second pass finds the segment in the L1 cache.
+      const V centre = sum_pixels<V>(p, n, channels, [](V v) { return v; }) / static_cast<T>(n);
+      const V residual = sum_pixels<V>(p, n, channels, [=](V v) { return v - centre; });
+      const V squares = sum_pixels<V>(p, n, channels, [=](V v) { return (v - centre) * (v - centre); });
+      join<T>(static_cast<double>(first), static_cast<double>(n), centre, residual, squares, mean + c,
+              m2 + c);
+    });
+  });
+}
+
+template <class T>
+void affine(const T* x, T* y, std::int64_t pixels, std::int64_t channels, const Affine<T>& a) {
+  for (std::int64_t p = 0; p < pixels; ++p, x += channels, y += channels)
+    for_channels<T>(channels, [=](auto zero, std::int64_t c) {
+      using V = decltype(zero);
+      const V v =
+          (load_as<V>(x + c) - load_as<V>(a.mean + c)) * load_as<V>(a.gain + c) + load_as<V>(a.shift + c);
+      store_as(y + c, a.relu ? (v < 0 ? V{} : v) : v);
+    });
+}
+
+template <class T>
+void gradient_sums(const T* x, const T* dy, std::int64_t pixels, std::int64_t channels, const Affine<T>& a,
+                   double* sums, double* mixed) {
+  for (std::int64_t c = 0; c < channels; ++c) sums[c] = mixed[c] = 0;
+  for_segments(pixels, [=](std::int64_t first, std::int64_t n) {
+    for_channels<T>(channels, [=](auto zero, std::int64_t c) {
+      using V = decltype(zero);
+      V s[2] = {}, m[2] = {};
+      const V mean = load_as<V>(a.mean + c);
+      for (std::int64_t p = 0; p < n; ++p) {
+        const std::int64_t at = (first + p) * channels + c;
+        const V centred = load_as<V>(x + at) - mean, g = gate(centred, load_as<V>(dy + at), a, c);
+        s[p & 1] += g;
+        m[p & 1] += g * centred;
+      }
+      add_lanes<T>(sums + c, s[0] + s[1]);
+      add_lanes<T>(mixed + c, m[0] + m[1]);
+    });
+  });
+}
+
+template <class T>
+void gradient(const T* x, const T* dy, T* dx, std::int64_t pixels, std::int64_t channels, const Affine<T>& a,
+              const T* offset, const T* slope, bool add) {
+  for (std::int64_t p = 0; p < pixels; ++p, x += channels, dy += channels, dx += channels)
+    for_channels<T>(channels, [=](auto zero, std::int64_t c) {
+      using V = decltype(zero);
+      const V centred = load_as<V>(x + c) - load_as<V>(a.mean + c),
+              g = gate(centred, load_as<V>(dy + c), a, c);
+      const V d = g * load_as<V>(a.gain + c) - load_as<V>(offset + c) - centred * load_as<V>(slope + c);
+      store_as(dx + c, add ? load_as<V>(dx + c) + d : d);
+    });
+}
+
+}  // namespace
+
+namespace FIELDMARK_ISA_NS {
+
+template <class T>
+void channel_moments(const T* x, std::int64_t pixels, std::int64_t channels, double* mean, double* m2) {
+  moments(x, pixels, channels, mean, m2);
+}
+template <class T>
+void normalise(const T* x, T* y, std::int64_t pixels, std::int64_t channels, const Affine<T>& a) {
+  affine(x, y, pixels, channels, a);
+}
+template <class T>
+void norm_sums(const T* x, const T* dy, std::int64_t pixels, std::int64_t channels, const Affine<T>& a,
+               double* sums, double* mixed) {
+  gradient_sums(x, dy, pixels, channels, a, sums, mixed);
+}
+template <class T>
+void norm_gradient(const T* x, const T* dy, T* dx, std::int64_t pixels, std::int64_t channels,
+                   const Affine<T>& a, const T* offset, const T* slope, bool add) {
+  gradient(x, dy, dx, pixels, channels, a, offset, slope, add);
+}
+
+#define FIELDMARK_INSTANTIATE(T)                                                                     \
+  template void channel_moments(const T*, std::int64_t, std::int64_t, double*, double*);             \
+  template void normalise(const T*, T*, std::int64_t, std::int64_t, const Affine<T>&);               \
+  template void norm_sums(const T*, const T*, std::int64_t, std::int64_t, const Affine<T>&, double*, \
+                          double*);                                                                  \
+  template void norm_gradient(const T*, const T*, T*, std::int64_t, std::int64_t, const Affine<T>&,  \
+                              const T*, const T*, bool);
+FIELDMARK_INSTANTIATE(float)
+FIELDMARK_INSTANTIATE(double)
+#undef FIELDMARK_INSTANTIATE
+
+}  // namespace FIELDMARK_ISA_NS
+}  // namespace fieldmark::kernels

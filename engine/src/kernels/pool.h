@@ -1,0 +1,25 @@
+#pragma once
+#include <fieldmark/engine/isa.h>
+
+#include <cstdint>
+
+namespace fieldmark::kernels {
+
+// A row of windows of size x size pixels: x has size rows of `row` numbers each, y has `windows` pixels.
+struct PoolRow {
+  std::int64_t windows, size, channels, row;
+};
+
+// T is float or double.
+FIELDMARK_DECLARE_KERNEL(template <class T> void, pool_row, (const PoolRow& p, const T* x, T* y))
+// dx = or += dy / size^2; pixels that fill no window become 0, or stay.
+FIELDMARK_DECLARE_KERNEL(template <class T> void, pool_row_backward,
+                         (const PoolRow& p, const T* dy, T* dx, bool add))
+// sums[c] = sum over pixels of x[pixel, c].
+FIELDMARK_DECLARE_KERNEL(template <class T> void, channel_sums,
+                         (const T* x, std::int64_t pixels, std::int64_t channels, double* sums))
+// y[pixel, c] = or += row[c].
+FIELDMARK_DECLARE_KERNEL(template <class T> void, fill_pixels,
+                         (const T* row, std::int64_t pixels, std::int64_t channels, T* y, bool add))
+
+}  // namespace fieldmark::kernels

@@ -1,0 +1,154 @@
+#pragma once
+#include <cmath>
+#include <cstdint>
+
+#include "kernels/norm.h"
+#include "ops/pieces.h"
+
+// What group and batch normalisation share: x is [images, pixels, channels], and statistics belong to an
+// image's group of channels. Batch normalisation is one image of all pixels with as many groups as channels.
+namespace fieldmark::kernels {
+
+struct NormLayout {
+  Index images, pixels, channels, groups;
+  Index block() const { return detail::row_grain(channels); }             // pixels in one piece
+  Index blocks() const { return (pixels + block() - 1) / block(); }       // pieces of one image
+  Index width() const { return channels / groups; }                       // channels of one group
+  double count() const { return static_cast<double>(pixels * width()); }  // numbers of one group
+};
+
+// Calls f(image, piece, first pixel's offset into x, pixels of the piece).
+template <class F>
+void for_blocks(const NormLayout& l, F f) {
+  parallel_for(l.images * l.blocks(), 1, [&](Index piece, Index) {
+    const Index image = piece / l.blocks(), first = piece % l.blocks() * l.block();
+    f(image, piece, (image * l.pixels + first) * l.channels, std::min(l.block(), l.pixels - first));
+  });
+}
+
+// mean and variance of each image's group, [images, groups]. Pieces are joined in order (Chan et al. 1983),
+// so that nothing cancels for a nearly constant image, and a constant one has variance 0.
+template <class T>
+void group_statistics(Tape<T>& tape, const NormLayout& l, const T* x, double* mean, double* variance) {
+  const Index n = l.images * l.blocks() * l.channels;
+  auto *piece_mean = tape.template scratch<double>(n), *piece_m2 = tape.template scratch<double>(n);
+  const auto moments = FIELDMARK_KERNEL(channel_moments<T>);
+  for_blocks(l, [&](Index, Index piece, Index at, Index pixels) {
+    moments(x + at, pixels, l.channels, piece_mean + piece * l.channels, piece_m2 + piece * l.channels);
+  });
+  for (Index image = 0; image < l.images; ++image)
+    for (Index g = 0; g < l.groups; ++g) {
+      double m = 0, m2 = 0, count = 0;
+      for (Index b = 0; b < l.blocks(); ++b)
+        for (Index c = g * l.width(); c < (g + 1) * l.width(); ++c) {
+          const Index at = (image * l.blocks() + b) * l.channels + c;
+          const double add = static_cast<double>(std::min(l.block(), l.pixels - b * l.block()));
+          const double delta = piece_mean[at] - m;
+          m += delta * add / (count + add);
+          m2 += piece_m2[at] + delta * delta * count * add / (count + add);
+          count += add;
+        }
+      mean[image * l.groups + g] = m;
+      variance[image * l.groups + g] = count > 0 ? m2 / count : 0;
+    }
+}
+
+// With xh = (x - mean) rstd, y = gamma xh + beta and g = dy where the ReLU lets it through:
+//   dbeta = sum g,   dgamma = sum g xh,   and with n numbers to a group, d = gamma g
+//   dx = rstd (d - sum(d) / n - xh sum(d xh) / n)      (sums over the group; the last two only if not fixed)
+// Pieces own their pixels of dx; sums are stored per piece and added in order.
+template <class T>
+void norm_backward(const NormLayout& l, Var<T> x, Var<T> gamma, Var<T> beta, const Affine<T>& a,
+                   const double* rstd, const double* off, bool fixed, const T* dy) {
+  Tape<T>& tape = x.tape();
+  const Index rows = l.images * l.channels, n = l.blocks() * rows;
+  auto *sums = tape.template scratch<double>(n), *mixed = tape.template scratch<double>(n);
+  const auto part = [&](Index image) {
+    const Index k = image * l.channels;
+    return Affine<T>{a.mean + k, a.gain + k, a.shift + k, a.relu};
+  };
+  const auto sum = FIELDMARK_KERNEL(norm_sums<T>);
+  for_blocks(l, [&](Index image, Index piece, Index at, Index pixels) {
+    const Index k = piece * l.channels;
+    sum(x.value() + at, dy + at, pixels, l.channels, part(image), sums + k, mixed + k);
+  });
+  T *offset = tape.scratch(rows), *slope = tape.scratch(rows), *dgamma = gamma.grad_acc(),
+    *dbeta = beta.grad_acc();
+  for (Index image = 0; image < l.images; ++image)
+    for (Index g = 0; g < l.groups; ++g) {
+      const double r = rstd[image * l.groups + g];
+      double all = 0, all_xh = 0;
+      for (Index c = g * l.width(); c < (g + 1) * l.width(); ++c) {
+        double s = 0, s_xh = 0;
+        for (Index b = 0; b < l.blocks(); ++b) {
+          s += sums[(image * l.blocks() + b) * l.channels + c];
+          s_xh += mixed[(image * l.blocks() + b) * l.channels + c];
+        }
+        s_xh = r * (s_xh + off[image * l.channels + c] * s);
+        if (dgamma) dgamma[c] += static_cast<T>(s_xh);
+        if (dbeta) dbeta[c] += static_cast<T>(s);
+        all += static_cast<double>(gamma.value()[c]) * s;
+        all_xh += static_cast<double>(gamma.value()[c]) * s_xh;
+      }
+      for (Index c = g * l.width(); c < (g + 1) * l.width(); ++c) {
+        const Index k = image * l.channels + c;
+        const double steep = fixed ? 0 : r * r * all_xh / l.count();
+        slope[k] = static_cast<T>(steep);
+        offset[k] = static_cast<T>(fixed ? 0 : r * all / l.count() + off[k] * steep);
+      }
+    }
+  bool fresh = false;
+  T* dx = x.grad_acc(&fresh);
+  if (!dx) return;
+  const auto backward = FIELDMARK_KERNEL(norm_gradient<T>);
+  for_blocks(l, [&](Index image, Index, Index at, Index pixels) {
+    const Index k = image * l.channels;
+    backward(x.value() + at, dy + at, dx + at, pixels, l.channels, part(image), offset + k, slope + k,
+             !fresh);
+  });
+}
+
+// Forward from given statistics, and the backward. `fixed`: the statistics do not depend on x.
+template <class T>
+Var<T> apply_norm(const NormLayout& l, Var<T> x, Var<T> gamma, Var<T> beta, const double* mean,
+                  const double* variance, double eps, bool relu, bool fixed) {
+  Tape<T>& tape = x.tape();
+  const Index rows = l.images * l.channels;
+  T *m = tape.scratch(rows), *gain = tape.scratch(rows), *shift = tape.scratch(rows);
+  auto *rstd = tape.template scratch<double>(l.images * l.groups), *off = tape.template scratch<double>(rows);
+  for (Index i = 0; i < l.images * l.groups; ++i) rstd[i] = 1 / std::sqrt(variance[i] + eps);
+  for (Index i = 0; i < rows; ++i) {
+    const Index c = i % l.channels, g = i / l.channels * l.groups + c / l.width();
+    const double a = rstd[g] * static_cast<double>(gamma.value()[c]);
+    m[i] = static_cast<T>(mean[g]);
+    // What rounding the mean to T has lost goes into the shift.
+    off[i] = static_cast<double>(m[i]) - mean[g];
+    gain[i] = static_cast<T>(a);
+    shift[i] = static_cast<T>(static_cast<double>(beta.value()[c]) + off[i] * a);
+  }
+  T* y = nullptr;
+  const Var<T> out = tape.output(x.shape(), &y, {x, gamma, beta});
+  const auto forward = FIELDMARK_KERNEL(normalise<T>);
+  for_blocks(l, [&](Index image, Index, Index at, Index pixels) {
+    const Index k = image * l.channels;
+    forward(x.value() + at, y + at, pixels, l.channels, Affine<T>{m + k, gain + k, shift + k, relu});
+  });
+  tape.on_backward(out, [=](const T* dy) {
+    norm_backward(l, x, gamma, beta, Affine<T>{m, gain, shift, relu}, rstd, off, fixed, dy);
+  });
+  return out;
+}
+
+// Shapes of gamma and beta, rank of x, and eps.
+template <class T>
+void check_norm(const char* op, Var<T> x, Var<T> gamma, Var<T> beta, double eps) {
+  check_rank(op, "x", x.shape(), 4, "[images, height, width, channels]");
+  check_rank(op, "gamma", gamma.shape(), 1, "[channels]");
+  check_extent(op, "gamma", gamma.shape(), 0, x.shape()[3], "channels of x");
+  check_rank(op, "beta", beta.shape(), 1, "[channels]");
+  check_extent(op, "beta", beta.shape(), 0, x.shape()[3], "channels of x");
+  if (!(eps > 0))
+    throw ValueError(std::string("[") + op + "] eps must be above 0, got " + std::to_string(eps));
+}
+
+}  // namespace fieldmark::kernels

@@ -1,0 +1,100 @@
+#include <fieldmark/engine/ops/pool.h>
+
+#include "kernels/pool.h"
+#include "ops/pieces.h"
+
+namespace fieldmark {
+namespace kernels {
+namespace {
+
+template <class T>
+Var<T> avg_pool(Var<T> x, Index size) {
+  const Shape s = x.shape();
+  const Index height = s[1] / size, width = s[2] / size, row = s[2] * s[3];
+  const PoolRow p{width, size, s[3], row};
+  T* y = nullptr;
+  const Var<T> out = x.tape().output({s[0], height, width, s[3]}, &y, {x});
+  const Index grain = detail::row_grain(size * row);
+  const auto forward = FIELDMARK_KERNEL(pool_row<T>);
+  parallel_for(s[0] * height, grain, [&](Index r0, Index r1) {
+    for (Index r = r0; r < r1; ++r)
+      forward(p, x.value() + (r / height * s[1] + r % height * size) * row, y + r * width * s[3]);
+  });
+
+  // Each pixel of a window receives dy / size^2. A piece owns its rows of windows; what fills no window gets
+  // 0.
+  x.tape().on_backward(out, [=](const T* dy) {
+    bool fresh = false;
+    T* dx = x.grad_acc(&fresh);
+    const auto backward = FIELDMARK_KERNEL(pool_row_backward<T>);
+    parallel_for(s[0] * height, grain, [&](Index r0, Index r1) {
+      for (Index r = r0; r < r1; ++r)
+        backward(p, dy + r * width * s[3], dx + (r / height * s[1] + r % height * size) * row, !fresh);
+    });
+    if (!fresh) return;
+    for (Index n = 0; n < s[0]; ++n)
+      std::fill(dx + (n * s[1] + height * size) * row, dx + (n + 1) * s[1] * row, T(0));
+  });
+  return out;
+}
+
+template <class T>
+Var<T> global_avg_pool(Var<T> x) {
+  const Shape s = x.shape();
+  const Index pixels = s[1] * s[2], channels = s[3];
+  const Index block = detail::row_grain(channels), blocks = (pixels + block - 1) / block;
+  T* y = nullptr;
+  Tape<T>& tape = x.tape();
+  const Var<T> out = tape.output({s[0], channels}, &y, {x});
+  auto* sums = tape.template scratch<double>(s[0] * blocks * channels);
+  const auto add = FIELDMARK_KERNEL(channel_sums<T>);
+  parallel_for(s[0] * blocks, 1, [&](Index piece, Index) {
+    const Index first = piece % blocks * block;
+    add(x.value() + (piece / blocks * pixels + first) * channels, std::min(block, pixels - first), channels,
+        sums + piece * channels);
+  });
+  for (Index i = 0; i < s[0] * channels; ++i) {
+    double total = 0;
+    for (Index b = 0; b < blocks; ++b) total += sums[(i / channels * blocks + b) * channels + i % channels];
+    y[i] = static_cast<T>(total / static_cast<double>(pixels));
+  }
+
+  // Every pixel receives dy / pixels. A piece owns its pixels.
+  tape.on_backward(out, [=](const T* dy) {
+    bool fresh = false;
+    T *dx = x.grad_acc(&fresh), *share = x.tape().scratch(s[0] * channels);
+    for (Index i = 0; i < s[0] * channels; ++i) share[i] = dy[i] / static_cast<T>(pixels);
+    const auto fill = FIELDMARK_KERNEL(fill_pixels<T>);
+    parallel_for(s[0] * blocks, 1, [&](Index piece, Index) {
+      const Index n = piece / blocks, first = piece % blocks * block;
+      fill(share + n * channels, std::min(block, pixels - first), channels,
+           dx + (n * pixels + first) * channels, !fresh);
+    });
+  });
+  return out;
+}
+
+}  // namespace
+}  // namespace kernels
+
+template <class T>
+Var<T> avg_pool(Var<T> x, Index size) {
+  check_rank("avg_pool", "x", x.shape(), 4, "[images, height, width, channels]");
+  if (size < 1) throw ValueError("[avg_pool] size must be at least 1, got " + std::to_string(size));
+  return kernels::avg_pool(x, size);
+}
+
+template <class T>
+Var<T> global_avg_pool(Var<T> x) {
+  check_rank("global_avg_pool", "x", x.shape(), 4, "[images, height, width, channels]");
+  if (x.shape()[1] < 1 || x.shape()[2] < 1)
+    throw ShapeError("[global_avg_pool] x must have at least one pixel, got shape " + x.shape().str());
+  return kernels::global_avg_pool(x);
+}
+
+template Var<float> avg_pool(Var<float>, Index);
+template Var<double> avg_pool(Var<double>, Index);
+template Var<float> global_avg_pool(Var<float>);
+template Var<double> global_avg_pool(Var<double>);
+
+}  // namespace fieldmark

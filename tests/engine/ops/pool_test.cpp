@@ -1,0 +1,74 @@
+#include <fieldmark/engine/ops/pool.h>
+
+#include "support/expect_grad.h"
+#include "support/run_op.h"
+
+using namespace fieldmark;
+
+static const auto f_pool2 = [](auto&, auto v) { return avg_pool(v[0], 2); };
+static const auto f_global = [](auto&, auto v) { return global_avg_pool(v[0]); };
+
+TEST_CASE("pool: values") {
+  // Two channels, 3 x 5 pixels: the last row and column fill no window.
+  Tensor<double> x({2, 3, 5, 2});
+  for (Index i = 0; i < x.size(); ++i) x[i] = static_cast<double>(i * i % 23);
+  const auto y = op_values(f_pool2, std::vector{x}), all = op_values(f_global, std::vector{x});
+  REQUIRE(y.size() == 2 * 1 * 2 * 2);
+  for (std::size_t n = 0; n < 2; ++n)
+    for (std::size_t c = 0; c < 2; ++c) {
+      const auto at = [&](std::size_t i, std::size_t j) { return x.data[((n * 3 + i) * 5 + j) * 2 + c]; };
+      for (std::size_t j = 0; j < 2; ++j)
+        CHECK(y[(n * 2 + j) * 2 + c] ==
+              (at(0, 2 * j) + at(0, 2 * j + 1) + at(1, 2 * j) + at(1, 2 * j + 1)) / 4);
+      double sum = 0;
+      for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t j = 0; j < 5; ++j) sum += at(i, j);
+      CHECK(all[n * 2 + c] == sum / 15);
+    }
+}
+
+TEST_CASE("pool: gradient") {
+  for (Shape s : {Shape{0, 4, 4, 2}, Shape{1, 1, 1, 1}, Shape{2, 3, 5, 2}, Shape{1, 4, 6, 3}}) {
+    CAPTURE(s.str());
+    expect_grad(f_pool2, {uniform(s, -1, 1, 1)});
+    expect_grad([](auto&, auto v) { return avg_pool(v[0], 1); }, {uniform(s, -1, 1, 1)});
+    expect_grad(f_global, {uniform(s, -1, 1, 1)});
+  }
+}
+
+TEST_CASE("pool: the gradient of dropped pixels is 0 in a buffer that the backward makes itself") {
+  Tape<float> tape;
+  Tensor<float> x({2, 3, 5, 2}, 1.f), g(x.shape);
+  const auto v = tape.leaf(x, g);
+  const auto inner = avg_pool(v, 1);  // its gradient buffer is made, not given
+  const auto y = avg_pool(inner, 2);
+  tape.backward(y, std::vector<float>(8, 1.f));
+  for (Index i = 0; i < g.size(); ++i) {
+    const Index row = i / 10 % 3, column = i / 2 % 5;
+    CHECK(g[i] == (row < 2 && column < 4 ? 0.25f : 0.f));
+  }
+}
+
+TEST_CASE("pool: mean of a million equal float pixels") {
+  // Every addition rounds to the same side, and sums in float are 16 long: measured 1.2e-7.
+  const Tensor<float> x({1, 1000, 1000, 1}, 0.1f);
+  CHECK(std::abs(op_values(f_global, std::vector{x})[0] / 0.1f - 1) < 3e-7f);
+}
+
+TEST_CASE("pool: errors") {
+  Tape<double> tape;
+  const Tensor<double> x({1, 2, 2, 3}), flat({4, 3}), none({1, 0, 2, 3});
+  CHECK_THROWS_WITH(avg_pool(tape.constant(flat), 2), Contains("[avg_pool] x must have rank 4"));
+  CHECK_THROWS_WITH(avg_pool(tape.constant(x), 0), "[avg_pool] size must be at least 1, got 0");
+  CHECK_THROWS_WITH(global_avg_pool(tape.constant(flat)), Contains("[global_avg_pool] x must have rank 4"));
+  CHECK_THROWS_WITH(global_avg_pool(tape.constant(none)),
+                    Contains("at least one pixel, got shape [1, 0, 2, 3]"));
+}
+
+TEST_CASE("pool: float against double, and the same bits for any thread count") {
+  const auto x = uniform<float>({3, 50, 51, 17}, -1, 1, 1);
+  expect_same_bits(f_pool2, {x});
+  expect_same_bits(f_global, {x});
+  CHECK(float_error(f_pool2, {x}) < 2e-7);
+  CHECK(float_error(f_global, {x}) < 2e-7);
+}
