@@ -20,6 +20,7 @@ struct Entry {
   Command (*add)(CLI::App&);
 };
 constexpr Entry kCommands[] = {
+    {"data", "Public data sets by manifest: list, verify", add_data},
     {"gradcheck", "Check every hand-derived gradient against finite differences", add_gradcheck},
 };
 

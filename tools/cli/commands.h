@@ -14,6 +14,7 @@ class Context;
 /// A subcommand after its options were added: to be called once they are parsed; returns the exit code.
 using Command = std::function<int(Context&)>;
 
+Command add_data(CLI::App& app);
 Command add_gradcheck(CLI::App& app);
 
 }  // namespace fieldmark::cli

@@ -1,0 +1,103 @@
+#include <fieldmark/engine/error.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <memory>
+#include <ostream>
+
+#include "cli/cli.h"
+#include "cli/commands.h"
+#include "cli/context.h"
+#include "cli/manifest.h"
+#include "cli/suggest.h"
+
+namespace fieldmark::cli {
+namespace {
+
+struct Options {
+  std::string name, folder;
+  bool list = false;
+};
+
+std::vector<Manifest> manifests() {
+  std::vector<Manifest> all;
+  for (const auto text : embedded_manifests()) all.push_back(parse_manifest(text, "data_manifests"));
+  return all;
+}
+
+int list(Context& context) {
+  Json sets = Json::array();
+  for (const auto& m : manifests()) {
+    char size[64];
+    std::snprintf(size, sizeof size, "%4zu files %7.1f MB", m.files.size(),
+                  static_cast<double>(m.bytes()) / 1e6);
+    context.text() << m.name << "\n    " << m.title << "\n   " << size << "   licence: " << m.licence
+                   << "\n    " << m.url << "\n";
+    sets.push_back({{"name", m.name},
+                    {"kind", m.kind},
+                    {"title", m.title},
+                    {"files", m.files.size()},
+                    {"bytes", m.bytes()},
+                    {"licence", m.licence},
+                    {"source", m.citation},
+                    {"url", m.url}});
+  }
+  context.result({{"data_sets", sets}});
+  return kOk;
+}
+
+Manifest find(const std::string& name) {
+  std::vector<std::string> names;
+  for (auto& m : manifests()) {
+    if (m.name == name) return m;
+    names.push_back(m.name);
+  }
+  const std::string near = nearest_word(name, names);
+  throw UsageError("no data set is called '" + name + "'" +
+                   (near.empty() ? "" : "; did you mean " + near + "?") + " (fieldmark data list names all)");
+}
+
+int verify(const Options& options, Context& context) {
+  const Manifest m = find(options.name);
+  if (!std::filesystem::is_directory(options.folder)) throw IoError(options.folder + ": expected a folder");
+  const InterruptGuard guard;
+  std::vector<ManifestFault> faults;
+  {
+    Progress progress = context.progress("verify " + m.name);
+    faults = verify_manifest(m, options.folder, [&](double fraction) {
+      progress.update(fraction);
+      return !guard.interrupted();
+    });
+  }
+  if (guard.interrupted()) throw Interrupted("nothing was decided");
+  Json list = Json::array();
+  for (const auto& fault : faults) {
+    context.text() << options.folder << "/" << fault.path << ": " << fault.what << "\n";
+    list.push_back({{"file", fault.path}, {"what", fault.what}});
+  }
+  context.text() << m.name << ": " << m.files.size() - faults.size() << " of " << m.files.size()
+                 << " files are right\n";
+  context.result({{"name", m.name}, {"ok", faults.empty()}, {"files", m.files.size()}, {"faults", list}});
+  return faults.empty() ? kOk : kFailed;
+}
+
+}  // namespace
+
+Command add_data(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.require_subcommand(1);
+  app.fallthrough();
+  CLI::App* lists =
+      app.add_subcommand("list", "Name every data set with its size, licence and source")->fallthrough();
+  CLI::App* verifies =
+      app.add_subcommand("verify", "Compare each file's size and SHA-256 with the manifest")->fallthrough();
+  verifies->add_option("name", options->name, "Data set, a name from the list")
+      ->required()
+      ->type_name("NAME");
+  verifies->add_option("dir", options->folder, "Folder that holds its files")->required()->type_name("DIR");
+  return [options, lists](Context& context) {
+    return lists->parsed() ? list(context) : verify(*options, context);
+  };
+}
+
+}  // namespace fieldmark::cli

@@ -1,0 +1,40 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace fieldmark::cli {
+
+/// A public data set as data_manifests/NAME.json describes it.
+struct Manifest {
+  struct File {
+    std::string path;  ///< below the data set's folder
+    std::uintmax_t bytes = 0;
+    std::string sha256;  ///< 64 hexadecimal digits
+  };
+  std::string name, kind, title, licence, citation, url;
+  std::vector<File> files;
+  std::uintmax_t bytes() const;
+};
+
+/// The contents of data_manifests/, from when this program was built.
+std::vector<std::string_view> embedded_manifests();
+
+/// @param origin  named in errors   @throws IoError if the text is not JSON or not a manifest of format 1
+Manifest parse_manifest(std::string_view text, const std::string& origin);
+
+/// @throws IoError if the file cannot be read
+std::string sha256_of_file(const std::filesystem::path& path);
+
+struct ManifestFault {
+  std::string path, what;
+};
+/// Compares a folder with a manifest: each file's presence, size and SHA-256. Other files are not looked at.
+/// @param keep_going  asked before every file with the part of the bytes seen; on false the check ends early
+std::vector<ManifestFault> verify_manifest(const Manifest& manifest, const std::filesystem::path& folder,
+                                           const std::function<bool(double)>& keep_going);
+
+}  // namespace fieldmark::cli
