@@ -22,6 +22,7 @@ struct Entry {
 constexpr Entry kCommands[] = {
     {"data", "Public data sets by manifest: list, verify", add_data},
     {"gradcheck", "Check every hand-derived gradient against finite differences", add_gradcheck},
+    {"info", "What a field, owner, key or other safetensors file holds", add_info},
 };
 
 struct Subcommand {

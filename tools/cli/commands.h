@@ -16,5 +16,6 @@ using Command = std::function<int(Context&)>;
 
 Command add_data(CLI::App& app);
 Command add_gradcheck(CLI::App& app);
+Command add_info(CLI::App& app);
 
 }  // namespace fieldmark::cli

@@ -1,0 +1,71 @@
+#include <fieldmark/engine/safetensors.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <ostream>
+
+#include "cli/cli.h"
+#include "cli/commands.h"
+#include "cli/context.h"
+#include "cli/manifest.h"
+
+namespace fieldmark::cli {
+namespace {
+
+struct Options {
+  std::string file;
+};
+
+// Fieldmark's own entry is JSON; what other programs write is shown as the text it is.
+Json metadata_json(const SafetensorsFile& file) {
+  Json json = Json::object();
+  for (const auto& [key, value] : file.metadata) {
+    Json parsed = Json::parse(value, nullptr, false);
+    json[key] = parsed.is_discarded() ? Json(value) : std::move(parsed);
+  }
+  return json;
+}
+
+int run(const Options& options, Context& context) {
+  const auto file = SafetensorsFile::read(options.file);
+  const std::string sha256 = sha256_of_file(options.file);
+  const Json metadata = metadata_json(file);
+  Json tensors = Json::array();
+  Index numbers = 0;
+  auto& text = context.text();
+  text << options.file << "\nsha256 " << sha256 << "\n";
+  for (const auto& [key, value] : metadata.items()) text << key << ": " << value.dump(2) << "\n";
+  for (const auto& tensor : file.tensors) {
+    char line[200];
+    std::snprintf(line, sizeof line, "%-40s %-5s %-24s %10zu bytes\n", tensor.name.c_str(),
+                  tensor.dtype.c_str(), tensor.shape.str().c_str(), tensor.data.size());
+    text << line;
+    Json shape = Json::array();
+    for (int axis = 0; axis < tensor.shape.rank(); ++axis) shape.push_back(tensor.shape[axis]);
+    tensors.push_back(
+        {{"name", tensor.name}, {"dtype", tensor.dtype}, {"shape", shape}, {"bytes", tensor.data.size()}});
+    numbers += tensor.shape.size();
+  }
+  const auto bytes = std::filesystem::file_size(options.file);
+  text << file.tensors.size() << " tensors, " << numbers << " numbers, " << bytes << " bytes\n";
+  context.result({{"file_bytes", bytes},
+                  {"sha256", sha256},
+                  {"numbers", numbers},
+                  {"metadata", metadata},
+                  {"tensors", tensors}});
+  return kOk;
+}
+
+}  // namespace
+
+Command add_info(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("file", options->file, "A field, owner, key or any other safetensors file")
+      ->required()
+      ->type_name("FILE");
+  return [options](Context& context) { return run(*options, context); };
+}
+
+}  // namespace fieldmark::cli
