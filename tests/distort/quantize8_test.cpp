@@ -19,7 +19,7 @@ TEST_CASE("quantize8: clamps and rounds as llround does") {
   CHECK(again.data == y.data);
 }
 
-TEST_CASE("quantize8: straight-through inside [0, 1], nothing outside") {
+TEST_CASE("quantize8: straight-through inside the range and nothing outside") {
   const Tensor<float> x({5}, {-0.1f, 0.f, 0.3f, 1.f, 1.1f});
   Tensor<float> dx({5}, 0.5f);
   Tape<float> tape;

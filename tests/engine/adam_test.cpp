@@ -41,7 +41,7 @@ TEST_CASE("adam: several steps with betas and decay of their own follow the pape
   CHECK(std::abs(x[0] - want) < 1e-14);
 }
 
-TEST_CASE("adam: zero and tiny gradients keep everything finite; a bad one spoils only its own entry") {
+TEST_CASE("adam: zero and tiny gradients keep everything finite, and a bad one spoils only its own entry") {
   Adam<float> adam(4);
   std::vector<float> x{1, 1, 1, 1};
   for (int t = 0; t < 20; ++t) {

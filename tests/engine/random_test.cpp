@@ -45,7 +45,7 @@ TEST_CASE("random: stream 0 is Philox4x32-10 with the seed as key") {
         Words{0xd16cfe09, 0x94fdcceb, 0x5001e420, 0x24126ea1});
 }
 
-TEST_CASE("random: uniform numbers stay in [0, 1) and have uniform moments in every word") {
+TEST_CASE("random: uniform numbers stay from 0 to below 1 and have uniform moments in every word") {
   const CounterRng rng(7, 3);
   for (std::size_t word = 0; word < 4; ++word) {
     std::vector<double> x;

@@ -45,7 +45,7 @@ TEST_CASE("cell_code: each bit gets cells and nearly equal area, no cell without
   for (double t : total) CHECK(std::abs(t - mean) < 0.12 * mean);
 }
 
-TEST_CASE("cell_code: as many cells as bits is a permutation; the unit of area does not matter") {
+TEST_CASE("cell_code: as many cells as bits is a permutation, and the unit of area does not matter") {
   const std::vector<double> area{0.5, 0, 2, 1, 1, 0, 4};
   const CellCode code = deal_cells(test_key(1), area, 5);
   std::vector<std::int32_t> bits;

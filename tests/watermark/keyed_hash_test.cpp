@@ -68,7 +68,7 @@ TEST_CASE("keyed_hash: signs are fair and independent, orders are uniform permut
   for (int count : first) CHECK(std::abs(count - 400) < 4 * 18);  // sqrt(2000 * 0.2 * 0.8) = 17.9
 }
 
-TEST_CASE("keyed_hash: an order sorts by word; none of nothing; no negative n") {
+TEST_CASE("keyed_hash: an order sorts by word, none of nothing, no negative n") {
   const Key key = test_key(4);
   const auto order = keyed_order(key, "o", 100);
   const auto word = [&](Index i) { return keyed_u64(key, "o", static_cast<std::uint64_t>(i)); };
