@@ -5,6 +5,8 @@
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/loss.h>
 #include <fieldmark/nerf/gradcheck_cases.h>
+#include <fieldmark/watermark/key.h>
+#include <fieldmark/watermark/message.h>
 
 #include <cmath>
 #include <cstdio>
@@ -41,6 +43,9 @@ int main() {
   const double scale = fitted_scale();
   std::printf("%s kernels, scale %.12f\n", fieldmark::isa_name(), scale);
   if (std::abs(scale - 25.0 / 14.0) > 1e-12) return 1;
+  const auto message = fieldmark::watermark::message_from_hex("a0", 8);
+  if (fieldmark::watermark::to_bits(message) != "10100000") return 3;
+  if (fieldmark::watermark::random_key() == fieldmark::watermark::random_key()) return 4;
   return all_right(fieldmark::distort::gradcheck_cases()) && all_right(fieldmark::nerf::gradcheck_cases())
              ? 0
              : 2;

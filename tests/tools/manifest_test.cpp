@@ -23,13 +23,6 @@ std::string manifest_text(const std::string& path, const std::string& sha256,
 
 }  // namespace
 
-TEST_CASE("sha256_of_file agrees with the standard's example", "[manifest]") {
-  const TemporaryFolder folder;
-  write_file_atomically(folder / "abc", "abc");
-  CHECK(sha256_of_file(folder / "abc") == kSha256OfAbc);
-  CHECK_THROWS_AS(sha256_of_file(folder / "none"), IoError);
-}
-
 TEST_CASE("verify_manifest tells what is wrong with each file", "[manifest]") {
   const TemporaryFolder folder;
   const auto manifest = parse_manifest(manifest_text("abc", kSha256OfAbc), "m");

@@ -1,4 +1,5 @@
 #include <fieldmark/distort/gradcheck_cases.h>
+#include <fieldmark/engine/gradcheck_cases.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/nerf/gradcheck_cases.h>
 
@@ -30,6 +31,7 @@ std::vector<Row> collect(const std::string& only) {
     for (auto& check : cases)
       if (check.name.find(only) != std::string::npos) rows.push_back({module, std::move(check), {}});
   };
+  add("engine", gradcheck_cases());
   add("distort", distort::gradcheck_cases());
   add("nerf", nerf::gradcheck_cases());
   return rows;

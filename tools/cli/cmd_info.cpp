@@ -1,4 +1,5 @@
 #include <fieldmark/engine/safetensors.h>
+#include <fieldmark/watermark/digest.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -9,7 +10,6 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
-#include "cli/manifest.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -30,7 +30,7 @@ Json metadata_json(const SafetensorsFile& file) {
 
 int run(const Options& options, Context& context) {
   const auto file = SafetensorsFile::read(options.file);
-  const std::string sha256 = sha256_of_file(options.file);
+  const std::string sha256 = watermark::sha256_file_hex(options.file);
   const Json metadata = metadata_json(file);
   Json tensors = Json::array();
   Index numbers = 0;

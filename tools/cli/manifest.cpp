@@ -1,11 +1,9 @@
 #include "cli/manifest.h"
 
 #include <fieldmark/engine/error.h>
-#include <sodium.h>
+#include <fieldmark/watermark/digest.h>
 
 #include <algorithm>
-#include <array>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 namespace fieldmark::cli {
@@ -46,7 +44,7 @@ std::string fault_of(const Manifest::File& file, const std::filesystem::path& pa
   if (error) return "missing";
   if (bytes != file.bytes)
     return "expected " + std::to_string(file.bytes) + " bytes, found " + std::to_string(bytes);
-  const std::string found = sha256_of_file(path);
+  const std::string found = watermark::sha256_file_hex(path);
   return found == file.sha256 ? "" : "expected sha256 " + file.sha256 + ", found " + found;
 }
 
@@ -64,22 +62,6 @@ Manifest parse_manifest(std::string_view text, const std::string& origin) {
   } catch (const std::exception& e) {
     throw IoError(origin + ": not a manifest of a data set: " + e.what());
   }
-}
-
-std::string sha256_of_file(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw IoError(path.string() + ": cannot be read");
-  crypto_hash_sha256_state state;
-  crypto_hash_sha256_init(&state);
-  std::array<char, 1 << 16> buffer;
-  while (in.read(buffer.data(), buffer.size()) || in.gcount() > 0)
-    crypto_hash_sha256_update(&state, reinterpret_cast<const unsigned char*>(buffer.data()),
-                              static_cast<unsigned long long>(in.gcount()));
-  if (in.bad()) throw IoError(path.string() + ": cannot be read to its end");
-  std::array<unsigned char, crypto_hash_sha256_BYTES> digest;
-  crypto_hash_sha256_final(&state, digest.data());
-  std::array<char, 2 * crypto_hash_sha256_BYTES + 1> hex;
-  return sodium_bin2hex(hex.data(), hex.size(), digest.data(), digest.size());
 }
 
 std::vector<ManifestFault> verify_manifest(const Manifest& manifest, const std::filesystem::path& folder,

@@ -26,9 +26,6 @@ std::vector<std::string_view> embedded_manifests();
 /// @param origin  named in errors   @throws IoError if the text is not JSON or not a manifest of format 1
 Manifest parse_manifest(std::string_view text, const std::string& origin);
 
-/// @throws IoError if the file cannot be read
-std::string sha256_of_file(const std::filesystem::path& path);
-
 struct ManifestFault {
   std::string path, what;
 };
