@@ -20,7 +20,10 @@ struct Entry {
   Command (*add)(CLI::App&);
 };
 constexpr Entry kCommands[] = {
+    {"scene", "Make a data set of a built-in scene", add_scene},
     {"data", "Public data sets by manifest: list, verify", add_data},
+    {"key", "Make a secret key from the operating system's random numbers", add_key},
+    {"attack", "Do to pictures what may remove a mark", add_attack},
     {"gradcheck", "Check every hand-derived gradient against finite differences", add_gradcheck},
     {"info", "What a field, owner, key or other safetensors file holds", add_info},
 };

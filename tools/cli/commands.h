@@ -14,8 +14,11 @@ class Context;
 /// A subcommand after its options were added: to be called once they are parsed; returns the exit code.
 using Command = std::function<int(Context&)>;
 
+Command add_attack(CLI::App& app);
 Command add_data(CLI::App& app);
 Command add_gradcheck(CLI::App& app);
 Command add_info(CLI::App& app);
+Command add_key(CLI::App& app);
+Command add_scene(CLI::App& app);
 
 }  // namespace fieldmark::cli

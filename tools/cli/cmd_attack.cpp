@@ -1,0 +1,91 @@
+#include <fieldmark/distort/attack.h>
+#include <fieldmark/engine/image.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
+#include <ostream>
+#include <set>
+
+#include "cli/cli.h"
+#include "cli/commands.h"
+#include "cli/context.h"
+#include "cli/pictures.h"
+
+namespace fieldmark::cli {
+namespace {
+
+struct Options {
+  std::vector<std::string> inputs;
+  std::string out, under;
+  std::string background = "white";
+};
+
+// Every output has its picture's name; two inputs of one name would overwrite each other.
+std::vector<std::filesystem::path> outputs_of(const std::vector<std::filesystem::path>& pictures,
+                                              const std::filesystem::path& out) {
+  std::vector<std::filesystem::path> outputs;
+  std::set<std::filesystem::path> taken;
+  for (const auto& picture : pictures) {
+    outputs.push_back(out / picture.stem().concat(".png"));
+    if (!taken.insert(outputs.back()).second)
+      throw UsageError("two pictures would be written to " + outputs.back().string());
+    if (std::filesystem::exists(outputs.back()) && std::filesystem::equivalent(outputs.back(), picture))
+      throw UsageError("--out: " + picture.string() + " would be overwritten by its own result");
+  }
+  return outputs;
+}
+
+int run(const Options& options, Context& context) {
+  const auto attack = read_option("--under", [&] { return distort::parse_attack(options.under); });
+  const auto pictures = list_pictures(options.inputs);
+  const auto outputs = outputs_of(pictures, options.out);
+  std::filesystem::create_directories(options.out);
+  const float value = options.background == "white" ? 1.f : 0.f;
+  const float background[3] = {value, value, value};
+  const CounterRng rng(context.seed());
+
+  const InterruptGuard guard;
+  Json list = Json::array();
+  {
+    Progress progress = context.progress("attack");
+    for (std::size_t i = 0; i < pictures.size(); ++i) {
+      if (guard.interrupted()) throw Interrupted(std::to_string(i) + " pictures were written");
+      write_png(outputs[i], distort::apply_attack(attack, read_rgb(pictures[i], value), rng, i, background));
+      list.push_back({{"image", pictures[i].string()}, {"out", outputs[i].string()}});
+      progress.update(static_cast<double>(i + 1) / static_cast<double>(pictures.size()));
+    }
+  }
+  context.text() << options.out << ": " << pictures.size() << " pictures after " << options.under << "\n";
+  context.result({{"under", options.under}, {"images", list}});
+  return kOk;
+}
+
+}  // namespace
+
+Command add_attack(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("images", options->inputs, "Pictures, or folders of them (PNG, JPEG)")
+      ->required()
+      ->type_name("IMAGE|DIR");
+  app.add_option("--out", options->out, "Folder for the results, one PNG for each picture")
+      ->required()
+      ->type_name("DIR");
+  app.add_option(
+         "--under", options->under,
+         "Names separated by commas, run left to right: noise_A (deviation, 0 to 1), rotation_A (degrees, 0 "
+         "to "
+         "180), scale_A (0.01 to 4), blur_A (pixels, 0 to 100), crop_A (share of the area, 0.0001 to 1), "
+         "jpeg_A "
+         "(quality, 1 to 90), gamma_A (0.01 to 10), brightness_A (0 to 10), hue_A (degrees, -360 to 360), "
+         "combined")
+      ->required()
+      ->type_name("NAME[,NAME...]");
+  app.add_option("--background", options->background,
+                 "What shows behind transparency and in opened corners: white, black")
+      ->check(CLI::IsMember({"white", "black"}).description(""))
+      ->type_name("COLOUR");
+  return [options](Context& context) { return run(*options, context); };
+}
+
+}  // namespace fieldmark::cli

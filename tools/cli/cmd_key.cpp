@@ -1,0 +1,42 @@
+#include <fieldmark/watermark/digest.h>
+#include <fieldmark/watermark/key.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
+#include <ostream>
+
+#include "cli/cli.h"
+#include "cli/commands.h"
+#include "cli/context.h"
+
+namespace fieldmark::cli {
+namespace {
+
+struct Options {
+  std::string out;
+  bool force = false;
+};
+
+int run(const Options& options, Context& context) {
+  // A lost key is a lost proof: it is replaced only on demand.
+  if (std::filesystem::exists(options.out) && !options.force)
+    throw IoError(options.out + ": exists already; --force replaces it, and what was marked with it is lost");
+  watermark::save_key(options.out, watermark::random_key());
+  const std::string sha256 = watermark::sha256_file_hex(options.out);
+  context.text() << options.out << ": 256 bits from the operating system, keep them secret\nsha256 " << sha256
+                 << "\n";
+  context.result({{"file", options.out}, {"bits", 256}, {"sha256", sha256}});
+  return kOk;
+}
+
+}  // namespace
+
+Command add_key(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("--out", options->out, "File for the key")->required()->type_name("KEY");
+  app.add_flag("--force", options->force, "Replace a key that exists");
+  return [options](Context& context) { return run(*options, context); };
+}
+
+}  // namespace fieldmark::cli

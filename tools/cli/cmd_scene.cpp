@@ -1,0 +1,67 @@
+#include <fieldmark/nerf/analytic_scene.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <ostream>
+
+#include "cli/cli.h"
+#include "cli/commands.h"
+#include "cli/context.h"
+
+namespace fieldmark::cli {
+namespace {
+
+struct Options {
+  std::string out;
+  std::string kind = "objects";
+  Index size = 200;
+  Index views = 100;
+};
+
+int run(const Options& options, Context& context) {
+  const nerf::SceneOptions scene{
+      .kind = options.kind == "sphere" ? nerf::SceneKind::sphere : nerf::SceneKind::objects,
+      .size = options.size,
+      .views = options.views,
+      .seed = context.seed()};
+  const InterruptGuard guard;
+  Index pictures = 0;
+  {
+    Progress progress = context.progress("scene");
+    nerf::write_scene(scene, options.out, [&](Index done, Index total) {
+      progress.update(static_cast<double>(done) / static_cast<double>(total));
+      pictures = total;
+      if (guard.interrupted()) throw Interrupted(options.out + " has some pictures, but no transforms yet");
+    });
+  }
+  context.text() << options.out << ": " << pictures << " views of " << options.size << "x" << options.size
+                 << "\n";
+  context.result({{"out", options.out},
+                  {"kind", options.kind},
+                  {"size", options.size},
+                  {"views", options.views},
+                  {"pictures", pictures}});
+  return kOk;
+}
+
+}  // namespace
+
+Command add_scene(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("--out", options->out, "Folder for the data set, Blender layout")
+      ->required()
+      ->type_name("DIR");
+  app.add_option("--kind", options->kind, "objects: textured solids on a slab; sphere: one shaded sphere")
+      ->check(CLI::IsMember({"objects", "sphere"}).description(""))
+      ->type_name("KIND");
+  app.add_option("--size", options->size, "Pixels of both sides, 1 to 8192")
+      ->check(CLI::Range(1, 8192).description(""))
+      ->type_name("N");
+  app.add_option("--views", options->views,
+                 "Views to train on, 1 to 100000; val gets a tenth, test a quarter")
+      ->check(CLI::Range(1, 100000).description(""))
+      ->type_name("N");
+  return [options](Context& context) { return run(*options, context); };
+}
+
+}  // namespace fieldmark::cli
