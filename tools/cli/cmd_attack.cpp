@@ -67,18 +67,23 @@ Command add_attack(CLI::App& app) {
   auto options = std::make_shared<Options>();
   app.add_option("images", options->inputs, "Pictures, or folders of them (PNG, JPEG)")
       ->required()
-      ->type_name("IMAGE|DIR");
+      ->type_name("IMAGE|DIR")
+      ->default_str("");
   app.add_option("--out", options->out, "Folder for the results, one PNG for each picture")
       ->required()
       ->type_name("DIR");
-  app.add_option(
-         "--under", options->under,
-         "Names separated by commas, run left to right: noise_A (deviation, 0 to 1), rotation_A (degrees, 0 "
-         "to "
-         "180), scale_A (0.01 to 4), blur_A (pixels, 0 to 100), crop_A (share of the area, 0.0001 to 1), "
-         "jpeg_A "
-         "(quality, 1 to 90), gamma_A (0.01 to 10), brightness_A (0 to 10), hue_A (degrees, -360 to 360), "
-         "combined")
+  app.add_option("--under", options->under,
+                 "Names separated by commas, run left to right:\n"
+                 "noise_A       Gaussian, standard deviation 0 to 1\n"
+                 "rotation_A    by up to A degrees either way, 0 to 180\n"
+                 "scale_A       to A times the size, 0.01 to 4\n"
+                 "blur_A        Gaussian, sigma 0 to 100 pixels\n"
+                 "crop_A        keeps this share of the area, 0.0001 to 1\n"
+                 "jpeg_A        quality 1 to 90\n"
+                 "gamma_A       0.01 to 10\n"
+                 "brightness_A  factor 0 to 10\n"
+                 "hue_A         -360 to 360 degrees\n"
+                 "combined      noise_0.10,crop_0.40,jpeg_50")
       ->required()
       ->type_name("NAME[,NAME...]");
   app.add_option("--background", options->background,
