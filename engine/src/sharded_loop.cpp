@@ -27,7 +27,7 @@ double ShardedLoop<T>::run(Index chunks, const Body& body, std::span<T> into) {
     Tape<T>& tape = *tapes_[static_cast<std::size_t>(s)];
     for (Index c = s * chunks / shards_; c < (s + 1) * chunks / shards_; ++c) {
       tape.reset();
-      losses_[static_cast<std::size_t>(c)] = body(c, tape, grads.data());
+      losses_[static_cast<std::size_t>(c)] = body(c, s, tape, grads.data());
     }
   });
   // Each number is summed over the shards by one thread, in shard order.

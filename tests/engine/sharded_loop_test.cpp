@@ -15,7 +15,8 @@ std::vector<float> run(int n_threads, Index chunks) {
   std::vector<float> into(3, 1.f);
   const double loss = loop.run(
       chunks,
-      [](Index c, Tape<float>&, float* g) {
+      [](Index c, Index shard, Tape<float>&, float* g) {
+        CHECK((shard >= 0 && shard < 16));
         for (int k = 0; k < 3; ++k) g[k] += std::sin(static_cast<float>(c * 3 + k)) * 1e3f;
         return static_cast<double>(c);
       },
@@ -42,9 +43,9 @@ TEST_CASE("sharded_loop: errors") {
   CHECK_THROWS_WITH(ShardedLoop<float>(0, 1), "[sharded_loop] shards must be 1 to 256, got 0");
   ShardedLoop<float> loop(2, 1);
   std::vector<float> into(2);
-  CHECK_THROWS_WITH(loop.run(1, [](Index, Tape<float>&, float*) { return 0.0; }, into),
+  CHECK_THROWS_WITH(loop.run(1, [](Index, Index, Tape<float>&, float*) { return 0.0; }, into),
                     "[sharded_loop] into must have at most 1 numbers, got 2");
-  CHECK_THROWS_AS(loop.run(3, [](Index, Tape<float>&, float*) -> double { throw ValueError("x"); },
+  CHECK_THROWS_AS(loop.run(3, [](Index, Index, Tape<float>&, float*) -> double { throw ValueError("x"); },
                            std::span<float>(into).first(1)),
                   ValueError);
 }

@@ -1,13 +1,13 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-# Warnings are private to this project and never exported. Tests are spared the conversion warnings.
-add_library(fieldmark_test_warnings INTERFACE)
-target_compile_options(fieldmark_test_warnings INTERFACE
+# Warnings are private to this project and never exported. Tests and kernels are spared the conversion warnings.
+add_library(fieldmark_common_warnings INTERFACE)
+target_compile_options(fieldmark_common_warnings INTERFACE
   $<$<CXX_COMPILER_ID:GNU,Clang>:-Wall -Wextra -Wpedantic -Wshadow -Wold-style-cast -Wnon-virtual-dtor
      $<$<BOOL:${FIELDMARK_WERROR}>:-Werror>>)
 add_library(fieldmark_warnings INTERFACE)
-target_link_libraries(fieldmark_warnings INTERFACE fieldmark_test_warnings)
+target_link_libraries(fieldmark_warnings INTERFACE fieldmark_common_warnings)
 target_compile_options(fieldmark_warnings INTERFACE $<$<CXX_COMPILER_ID:GNU,Clang>:-Wconversion -Wsign-conversion>)
 
 # fieldmark_module(<name> [DEPENDS <module>...] UNITS <unit>... [HEADER_ONLY <unit>...] [KERNELS <unit>...]
@@ -50,10 +50,10 @@ function(fieldmark_module name)
       add_library(${object} OBJECT src/kernels/${kernel}.cpp)
       target_compile_definitions(${object} PRIVATE FIELDMARK_ISA_NS=isa_${level})
       target_compile_options(${object} PRIVATE -march=x86-64-${level} -mtune=generic -O3 -ffp-contract=fast
-                             -fno-math-errno -fno-trapping-math)
+                             -fno-math-errno -fno-trapping-math -Wno-psabi)
       target_compile_features(${object} PRIVATE cxx_std_20)
       target_include_directories(${object} PRIVATE src include ${PROJECT_SOURCE_DIR}/engine/include)
-      target_link_libraries(${object} PRIVATE fieldmark_warnings)
+      target_link_libraries(${object} PRIVATE fieldmark_common_warnings)
       set_target_properties(${object} PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_EXTENSIONS OFF)
       list(APPEND sources $<TARGET_OBJECTS:${object}>)
     endforeach()

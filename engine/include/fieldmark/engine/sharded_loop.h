@@ -21,12 +21,13 @@ class ShardedLoop {
   /// @param shards  fixed number of gradient buffers, 1 to 256   @param grads  numbers in each
   ShardedLoop(int shards, Index grads);
 
-  /// What a chunk does: record on the (reset) tape, call backward, add its parameter gradients to `grads`.
-  /// Returns its share of the loss.
-  using Body = std::function<double(Index chunk, Tape<T>& tape, T* grads)>;
+  /// What a chunk does: record on the (reset) tape, call backward, add its parameter gradients to `grads`. A shard's chunks
+  /// never run at the same time, so `shard` may index scratch of the caller's. Returns its share of the loss.
+  using Body = std::function<double(Index chunk, Index shard, Tape<T>& tape, T* grads)>;
   /// Runs all chunks and adds the summed gradients to `into`, whose length is at most that given at construction.
   /// @return the losses summed in chunk order
   double run(Index chunks, const Body& body, std::span<T> into);
+  int shards() const { return shards_; }
 
  private:
   int shards_;

@@ -1,0 +1,34 @@
+#pragma once
+#include <fieldmark/engine/ops/conv2d.h>
+#include <fieldmark/engine/params.h>
+
+#include <string_view>
+
+namespace fieldmark {
+
+struct Conv2dOptions {
+  Index in = 0;      ///< channels of the input, >= 1
+  Index out = 0;     ///< channels of the output, >= 1
+  Index kernel = 3;  ///< side of the window, odd
+  Activation activation = Activation::none;
+};
+
+/// Convolution layer, see conv2d(). Weights start uniform in +-sqrt(6 / (kernel^2 in)) (He et al. 2015), the
+/// bias at 0. Holds no numbers: they are "<name>/weight" [K, K, in, out] and "<name>/bias" [out] in the
+/// store.
+template <class T>
+class Conv2d {
+ public:
+  /// @throws ValueError  if an option is out of range, or the names are taken in the store
+  Conv2d(ParamStore<T>& store, std::string_view name, const Conv2dOptions& options, std::uint64_t seed);
+
+  /// @param x  [N, H, W, in]    @return  [N, H, W, out]    @throws ShapeError  if x does not fit
+  /// Differentiable in: x and the parameters.
+  Var<T> operator()(const Params<T>& params, Var<T> x) const;
+
+ private:
+  Conv2dOptions options_;
+  ParamId weight_, bias_;
+};
+
+}  // namespace fieldmark

@@ -1,0 +1,32 @@
+#pragma once
+#include <fieldmark/engine/ops/dense.h>
+#include <fieldmark/engine/params.h>
+
+#include <string_view>
+
+namespace fieldmark {
+
+struct DenseOptions {
+  Index in = 0;   ///< features of an input row, >= 1
+  Index out = 0;  ///< features of an output row, >= 1
+  Activation activation = Activation::none;
+};
+
+/// Affine layer y = act(x W + b). W starts uniform in +-sqrt(6 / in) (He et al. 2015, eq. 10, uniform form),
+/// b at 0. Holds no numbers: they are "<name>/weight" [in, out] and "<name>/bias" [out] in the store.
+template <class T>
+class Dense {
+ public:
+  /// @throws ValueError  if in or out is below 1, or the names are taken in the store
+  Dense(ParamStore<T>& store, std::string_view name, const DenseOptions& options, std::uint64_t seed);
+
+  /// @param x  [N, in]    @return  [N, out]    @throws ShapeError  if x does not fit
+  /// Differentiable in: x and the parameters.
+  Var<T> operator()(const Params<T>& params, Var<T> x) const;
+
+ private:
+  DenseOptions options_;
+  ParamId weight_, bias_;
+};
+
+}  // namespace fieldmark

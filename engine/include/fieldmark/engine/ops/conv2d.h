@@ -1,0 +1,14 @@
+#pragma once
+#include <fieldmark/engine/ops/dense.h>
+
+namespace fieldmark {
+
+/// Two-dimensional convolution (cross-correlation) of pictures, stride 1, zeros around, same size.
+///   y[n, i, j, o] = act(b[o] + sum_{u, v, c} x[n, i + u - r, j + v - r, c] w[u, v, c, o]),   r = (K - 1) / 2
+/// @param x  [N, H, W, C]   @param w  [K, K, C, O], K odd   @param b  [O]   @return [N, H, W, O]
+/// @throws ShapeError if they do not fit or K is even
+/// Differentiable in: x, w, b. With relu: a kink where the sum is 0, gradient 0 there.
+template <class T>
+Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, Activation activation = Activation::none);
+
+}  // namespace fieldmark

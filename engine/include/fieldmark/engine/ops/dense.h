@@ -1,0 +1,16 @@
+#pragma once
+#include <fieldmark/engine/tape.h>
+
+namespace fieldmark {
+
+/// What follows an affine map within the same op.
+enum class Activation { none, relu };
+
+/// Affine map of rows, with its activation.
+///   y = act(x W + b)
+/// @param x  [N, in]   @param w  [in, out]   @param b  [out]   @return [N, out]   @throws ShapeError if they
+/// do not fit Differentiable in: x, w, b. With relu: a kink where x W + b = 0, gradient 0 there.
+template <class T>
+Var<T> dense(Var<T> x, Var<T> w, Var<T> b, Activation activation = Activation::none);
+
+}  // namespace fieldmark

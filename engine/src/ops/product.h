@@ -1,0 +1,64 @@
+#pragma once
+// Products of row-major matrices on the gemm kernel, shared by matmul, dense and conv2d. Private.
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/tape.h>
+
+#include "kernels/gemm.h"
+
+namespace fieldmark::detail {
+
+constexpr Index kProductRows = 1024;  // rows a piece, where a product runs on several threads
+constexpr Index kProductShards = 16;  // partial sums over rows, added in order
+
+inline Index round_up(Index n, Index to) { return (n + to - 1) / to * to; }
+
+template <class T>
+Index panel_width() {
+  using namespace kernels;
+  return FIELDMARK_KERNEL(gemm_panel<T>)();
+}
+
+/// B [rows, columns] at b[i row + j column] in panels; room comes from the tape.
+template <class T>
+T* packed(Tape<T>& tape, const T* b, Index rows, Index columns, Index row, Index column,
+          const T* mask = nullptr) {
+  using namespace kernels;
+  T* out = tape.scratch(rows * round_up(columns, panel_width<T>()));
+  FIELDMARK_KERNEL(pack_panels<T>)(b, rows, columns, row, column, mask, out);
+  return out;
+}
+
+/// Runs a product in pieces of rows; a row of C has one owner.
+template <class T>
+void product(const kernels::Gemm<T>& g) {
+  using namespace kernels;
+  const auto run = FIELDMARK_KERNEL(gemm<T>);
+  parallel_for(g.m, kProductRows, [&](Index begin, Index end) {
+    Gemm<T> piece = g;
+    piece.m = end - begin;
+    piece.a += begin * g.a_row;
+    piece.c += begin * g.ldc;
+    run(piece);
+  });
+}
+
+/// into [size] += sum over `items` of what f(begin, end, to) adds to `to`: directly where there are at most
+/// `grain` items, else in up to 16 fixed parts, each with a buffer from the tape, added in order.
+template <class T, class F>
+void sharded_sum(Tape<T>& tape, Index items, Index grain, T* into, Index size, F&& f) {
+  const Index shards = std::min(kProductShards, (items + grain - 1) / grain);
+  if (shards <= 1) {
+    f(Index{0}, items, into);
+    return;
+  }
+  T* buffers = tape.scratch(shards * size);
+  parallel_for(shards, 1, [&](Index s, Index) {
+    T* to = buffers + s * size;
+    std::fill_n(to, size, T(0));
+    f(s * items / shards, (s + 1) * items / shards, to);
+  });
+  for (Index s = 0; s < shards; ++s)
+    for (Index i = 0; i < size; ++i) into[i] += buffers[s * size + i];
+}
+
+}  // namespace fieldmark::detail

@@ -1,0 +1,87 @@
+#include "kernels/gemm.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "support/catch.h"
+#include "support/each_isa.h"
+#include "support/random.h"
+
+using namespace fieldmark;
+
+namespace {
+// Worst difference from a plain loop in double, relative to the sum of absolute products.
+template <class T>
+double worst_error(Index m, Index n, Index k, Index segments, bool transposed, bool accumulate, bool bias,
+                   bool relu) {
+  using namespace kernels;
+  const Index depth = segments * k, gap = 3, a_row = transposed ? 1 : depth + gap,
+              a_col = transposed ? m + gap : 1;
+  const Index a_segment = k * a_col, ldc = n + 5, panel = FIELDMARK_KERNEL(gemm_panel<T>)();
+  const auto a = uniform<T>({(m + gap) * (depth + gap)}, -1, 1, 1), b = uniform<T>({depth * n}, -1, 1, 2),
+             start = uniform<T>({m * ldc}, -1, 1, 3), row = uniform<T>({n}, -1, 1, 4);
+  std::vector<T> packed(static_cast<std::size_t>(depth * (n + panel))), c(start.data);
+  FIELDMARK_KERNEL(pack_panels<T>)(b.data.data(), depth, n, n, 1, nullptr, packed.data());
+  FIELDMARK_KERNEL(gemm<T>)
+  ({.m = m,
+    .n = n,
+    .k = k,
+    .segments = segments,
+    .a = a.data.data(),
+    .a_row = a_row,
+    .a_col = a_col,
+    .a_segment = a_segment,
+    .b = packed.data(),
+    .c = c.data(),
+    .ldc = ldc,
+    .bias = bias ? row.data.data() : nullptr,
+    .accumulate = accumulate,
+    .relu = relu});
+  double worst = 0;
+  for (Index i = 0; i < m; ++i)
+    for (Index j = 0; j < ldc; ++j) {
+      const double got = c[static_cast<std::size_t>(i * ldc + j)];
+      if (j >= n) {
+        if (got != start[i * ldc + j]) return 1;  // wrote outside
+        continue;
+      }
+      double sum = accumulate ? start[i * ldc + j] : bias ? row[j] : 0, size = 1;
+      for (Index d = 0; d < depth; ++d) {
+        const double product = double(a[i * a_row + d * a_col]) * double(b[d * n + j]);
+        sum += product;
+        size += std::abs(product);
+      }
+      if (relu) sum = std::max(sum, 0.0);
+      worst = std::max(worst, std::abs(got - sum) / size);
+    }
+  return worst;
+}
+}  // namespace
+
+TEST_CASE("gemm: every extent, stride and option on every instruction set against a plain loop") {
+  each_isa([] {
+    for (Index e = 1; e <= 130; ++e) {
+      CAPTURE(e);
+      CHECK(worst_error<float>(e, 37, 29, 1, false, false, true, true) < 1e-6);
+      CHECK(worst_error<float>(23, e, 17, 1, true, true, false, false) < 1e-6);
+      CHECK(worst_error<float>(13, 21, e, 3, false, false, false, false) < 1e-6);
+      CHECK(worst_error<double>(e, 9, 5, 2, true, true, false, true) < 1e-15);
+      CHECK(worst_error<double>(7, e, 5, 1, false, false, true, false) < 1e-15);
+    }
+  });
+}
+
+TEST_CASE("gemm: packing masks where a ReLU was shut and fills the last panel with zeros") {
+  each_isa([] {
+    using namespace kernels;
+    const Index panel = FIELDMARK_KERNEL(gemm_panel<float>)();
+    const std::vector<float> b{1, 2, 3, 4, 5, 6}, mask{0, 1, -1, 2, 3, 0};
+    std::vector<float> out(static_cast<std::size_t>(2 * panel), 9.f);
+    FIELDMARK_KERNEL(pack_panels<float>)(b.data(), 2, 3, 3, 1, mask.data(), out.data());
+    std::vector<float> want(out.size(), 0.f);
+    want[1] = 2;
+    want[static_cast<std::size_t>(panel)] = 4;
+    want[static_cast<std::size_t>(panel) + 1] = 5;
+    CHECK(out == want);
+  });
+}

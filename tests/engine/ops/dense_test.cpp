@@ -1,0 +1,105 @@
+#include <fieldmark/engine/ops/dense.h>
+#include <fieldmark/engine/parallel.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "support/each_isa.h"
+#include "support/expect_grad.h"
+
+using namespace fieldmark;
+
+namespace {
+struct Result {
+  std::vector<float> y, dx, dw, db;
+  bool operator==(const Result&) const = default;
+};
+
+Result run(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, Activation act) {
+  Tape<float> tape;
+  Tensor<float> dx(x.shape), dw(w.shape), db(b.shape);
+  const auto y = dense(tape.leaf(x, dx), tape.leaf(w, dw), tape.leaf(b, db), act);
+  const std::vector<float> values(y.value(), y.value() + y.shape().size());
+  tape.backward(y, values);
+  return {values, dx.data, dw.data, db.data};
+}
+
+// The same in double, by loops.
+Result plain(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, Activation act) {
+  const Index n = x.shape[0], in = x.shape[1], out = w.shape[1];
+  std::vector<double> y(n * out), dx(n * in), dw(in * out), db(out);
+  for (Index i = 0; i < n; ++i)
+    for (Index j = 0; j < out; ++j) {
+      double s = b[j];
+      for (Index k = 0; k < in; ++k) s += double(x[i * in + k]) * w[k * out + j];
+      if (act == Activation::relu) s = std::max(s, 0.0);
+      y[i * out + j] = s;  // also the cotangent: 0 where the ReLU is shut
+      db[j] += s;
+      for (Index k = 0; k < in; ++k) {
+        dx[i * in + k] += s * w[k * out + j];
+        dw[k * out + j] += s * x[i * in + k];
+      }
+    }
+  const auto f = [](const std::vector<double>& v) { return std::vector<float>(v.begin(), v.end()); };
+  return {f(y), f(dx), f(dw), f(db)};
+}
+
+double error(const std::vector<float>& a, const std::vector<float>& b) {
+  double worst = 0, size = 1e-30;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    worst = std::max(worst, std::abs(double(a[i]) - b[i]));
+    size = std::max(size, std::abs(double(b[i])));
+  }
+  return worst / size;
+}
+}  // namespace
+
+TEST_CASE("dense: the float path, forward and all gradients, against double loops to 1e-6 of the largest") {
+  each_isa([] {
+    for (Index e : {1, 2, 3, 5, 7, 8, 15, 16, 17, 31, 33, 64, 65, 100, 130})
+      for (Activation act : {Activation::none, Activation::relu}) {
+        CAPTURE(e);
+        const auto x = uniform<float>({e, 67}, -1, 1, 1), w = uniform<float>({67, 19}, -1, 1, 2),
+                   b = uniform<float>({19}, -1, 1, 3);
+        const auto x2 = uniform<float>({41, e}, -1, 1, 1), w2 = uniform<float>({e, 131 - e}, -1, 1, 2),
+                   b2 = uniform<float>({131 - e}, -1, 1, 3);
+        for (const auto& [got, want] : {std::pair{run(x, w, b, act), plain(x, w, b, act)},
+                                        std::pair{run(x2, w2, b2, act), plain(x2, w2, b2, act)}}) {
+          CHECK(error(got.y, want.y) < 1e-6);
+          CHECK(error(got.dx, want.dx) < 1e-6);
+          CHECK(error(got.dw, want.dw) < 1e-6);
+          CHECK(error(got.db, want.db) < 1e-6);
+        }
+      }
+  });
+}
+
+TEST_CASE("dense: gradient") {
+  for (Activation act : {Activation::none, Activation::relu}) {
+    const GradcheckFn f = [act](Tape<double>&, auto v) { return dense(v[0], v[1], v[2], act); };
+    expect_grad(f, {uniform({4, 3}, 0.1, 1, 1), uniform({3, 5}, 0.1, 1, 2), uniform({5}, -0.1, 0.1, 3)});
+    expect_grad(f, {uniform({1, 1}, 0.2, 1, 1), uniform({1, 1}, 0.2, 1, 2), uniform({1}, 0, 0.1, 3)});
+    expect_grad(f, {uniform({0, 3}, -1, 1, 1), uniform({3, 5}, -1, 1, 2), uniform({5}, -1, 1, 3)});
+  }
+}
+
+TEST_CASE("dense: errors") {
+  Tape<float> tape;
+  const Tensor<float> x({2, 3}), w({3, 4}), b({4}), short_b({3}), tall({2, 4});
+  CHECK_THROWS_WITH(
+      dense(tape.constant(x), tape.constant(tall), tape.constant(b)),
+      "[dense] w: axis 0 must be 3 (the columns of x, whose shape is [2, 3]), got shape [2, 4]");
+  CHECK_THROWS_WITH(dense(tape.constant(x), tape.constant(w), tape.constant(short_b)),
+                    Contains("[dense] b: axis 0 must be 4"));
+}
+
+TEST_CASE("dense: same bits for 1 and 2 threads, also where the rows are split") {
+  const auto x = uniform<float>({20000, 16}, -1, 1, 1), w = uniform<float>({16, 24}, -1, 1, 2),
+             b = uniform<float>({24}, -1, 1, 3);
+  const int before = threads();
+  set_threads(1);
+  const Result one = run(x, w, b, Activation::relu);
+  set_threads(2);
+  CHECK(one == run(x, w, b, Activation::relu));
+  set_threads(before);
+}
