@@ -158,11 +158,13 @@ float sum_of_exp(const float* x, float shift, float* y, std::int64_t n) {
     simd::store(y + i, e);
     acc += e;
   }
-  V last{};
   const std::int64_t rest = n - i;
-  std::memcpy(&last, x + i, static_cast<std::size_t>(rest) * sizeof(float));
-  last = Exp::value(last - shift);
-  std::memcpy(y + i, &last, static_cast<std::size_t>(rest) * sizeof(float));
+  V last{};
+  if (rest > 0) {
+    std::memcpy(&last, x + i, static_cast<std::size_t>(rest) * sizeof(float));
+    last = Exp::value(last - shift);
+    std::memcpy(y + i, &last, static_cast<std::size_t>(rest) * sizeof(float));
+  }
   float sum = 0;
   for (int k = 0; k < lanes; ++k) sum += k < rest ? acc[k] + last[k] : acc[k];
   return sum;
