@@ -9,7 +9,9 @@ namespace fieldmark {
 namespace {
 constexpr std::size_t kHugePage = std::size_t{2} << 20;
 
-std::size_t round_up(std::size_t bytes, std::size_t to) { return (std::max<std::size_t>(bytes, 1) + to - 1) / to * to; }
+std::size_t round_up(std::size_t bytes, std::size_t to) {
+  return (std::max<std::size_t>(bytes, 1) + to - 1) / to * to;
+}
 // Huge pages want blocks that start and end on one; below 4 MiB they would waste more than they save.
 std::size_t alignment(std::size_t size) { return size >= 2 * kHugePage ? kHugePage : Arena::kAlign; }
 }  // namespace

@@ -36,7 +36,8 @@ struct Checker {
     report.table += line + "\n";
   }
 
-  std::vector<Tensor<double>> analytic(std::span<const Tensor<double>> inputs, const std::vector<double>& plain) {
+  std::vector<Tensor<double>> analytic(std::span<const Tensor<double>> inputs,
+                                       const std::vector<double>& plain) {
     Tape<double> tape;
     std::vector<Tensor<double>> grads;
     for (const auto& t : inputs) grads.emplace_back(t.shape, kHeld);
@@ -48,7 +49,8 @@ struct Checker {
       return grads;
     }
     for (std::size_t i = 0; i < plain.size(); ++i)
-      if (!(y.value()[i] == plain[i])) fail("value " + std::to_string(i) + " changes when gradients are recorded");
+      if (!(y.value()[i] == plain[i]))
+        fail("value " + std::to_string(i) + " changes when gradients are recorded");
     if (y.needs_grad()) tape.backward(y, cotangent);
     return grads;
   }
@@ -60,16 +62,18 @@ struct Checker {
       x[k].data[i] = x0 + d;
       return dot(cotangent, run_plain(f, x));
     };
-    const double n = (45 * (at(h) - at(-h)) - 9 * (at(2 * h) - at(-2 * h)) + (at(3 * h) - at(-3 * h))) / (60 * h);
+    const double n =
+        (45 * (at(h) - at(-h)) - 9 * (at(2 * h) - at(-2 * h)) + (at(3 * h) - at(-3 * h))) / (60 * h);
     x[k].data[i] = x0;
     return n;
   }
 
-  void compare(const Tensor<double>& x, std::size_t k, const std::vector<double>& a, const std::vector<double>& n,
-               double step) {
+  void compare(const Tensor<double>& x, std::size_t k, const std::vector<double>& a,
+               const std::vector<double>& n, double step) {
     double largest = std::numeric_limits<double>::min();
     for (std::size_t i = 0; i < a.size(); ++i) largest = std::max({largest, std::abs(a[i]), std::abs(n[i])});
-    const double floor = 64 * std::numeric_limits<double>::epsilon() * (kHeld + rounding) / (step * options.rtol);
+    const double floor =
+        64 * std::numeric_limits<double>::epsilon() * (kHeld + rounding) / (step * options.rtol);
     for (std::size_t i = 0; i < a.size(); ++i) {
       const double scale = std::max({std::abs(a[i]), std::abs(n[i]), 1e-3 * largest, floor});
       const double err = std::abs(a[i] - n[i]) / scale;
@@ -77,8 +81,8 @@ struct Checker {
       ++report.entries;
       if (err <= options.rtol) continue;  // written so that NaN fails
       char line[200];
-      std::snprintf(line, sizeof line, "input %zu [%zu]  x=%.6g  analytic=%.10g  numeric=%.10g  err=%.2e", k, i,
-                    x.data[i], a[i], n[i], err);
+      std::snprintf(line, sizeof line, "input %zu [%zu]  x=%.6g  analytic=%.10g  numeric=%.10g  err=%.2e", k,
+                    i, x.data[i], a[i], n[i], err);
       fail(line);
     }
   }
@@ -117,7 +121,8 @@ GradcheckReport gradcheck_module(const ModuleGradcheckFn& f, const ParamStore<do
   all.emplace_back(Shape{store.size()}, std::vector<double>(store.values().begin(), store.values().end()));
   const GradcheckFn with_params = [&](Tape<double>& tape, std::span<const Var<double>> v) {
     const Var<double>& p = v.back();
-    return f(tape, Params<double>(store, p.value(), p.needs_grad() ? p.grad_acc() : nullptr), v.first(v.size() - 1));
+    return f(tape, Params<double>(store, p.value(), p.needs_grad() ? p.grad_acc() : nullptr),
+             v.first(v.size() - 1));
   };
   return gradcheck(with_params, all, options);
 }

@@ -22,7 +22,8 @@ ParamId ParamStore<T>::find(std::string_view name) const {
 template <class T>
 std::span<T> ParamStore<T>::values(ParamId id) {
   const Entry& e = entry(id);
-  return std::span<T>(values_).subspan(static_cast<std::size_t>(e.offset), static_cast<std::size_t>(e.shape.size()));
+  return std::span<T>(values_).subspan(static_cast<std::size_t>(e.offset),
+                                       static_cast<std::size_t>(e.shape.size()));
 }
 
 template <class T>
@@ -35,7 +36,8 @@ std::span<const T> ParamStore<T>::values(ParamId id) const {
 template <class T>
 std::span<T> ParamStore<T>::grads(ParamId id) {
   const Entry& e = entry(id);
-  return std::span<T>(grads_).subspan(static_cast<std::size_t>(e.offset), static_cast<std::size_t>(e.shape.size()));
+  return std::span<T>(grads_).subspan(static_cast<std::size_t>(e.offset),
+                                      static_cast<std::size_t>(e.shape.size()));
 }
 
 template <class T>

@@ -33,7 +33,8 @@ double ShardedLoop<T>::run(Index chunks, const Body& body, std::span<T> into) {
   // Each number is summed over the shards by one thread, in shard order.
   parallel_for(static_cast<Index>(into.size()), 8192, [&](Index begin, Index end) {
     for (const auto& grads : buffers_)
-      for (Index i = begin; i < end; ++i) into[static_cast<std::size_t>(i)] += grads[static_cast<std::size_t>(i)];
+      for (Index i = begin; i < end; ++i)
+        into[static_cast<std::size_t>(i)] += grads[static_cast<std::size_t>(i)];
   });
   double loss = 0;
   for (double l : losses_) loss += l;

@@ -7,8 +7,10 @@ using namespace fieldmark;
 TEST_CASE("error: messages name op, argument, expectation and what came") {
   CHECK_THROWS_WITH(check_extent("op", "x", Shape{2, 3}, 1, 4, "the rows of w"),
                     "[op] x: axis 1 must be 4 (the rows of w), got shape [2, 3]");
-  CHECK_THROWS_WITH(check_rank("op", "x", Shape{2, 3}, 1, "[n]"), "[op] x must have rank 1 [n], got shape [2, 3]");
-  CHECK_THROWS_WITH(check_same("op", "a", Shape{2}, "b", Shape{3}), "[op] b must have the shape of a, [2], got shape [3]");
+  CHECK_THROWS_WITH(check_rank("op", "x", Shape{2, 3}, 1, "[n]"),
+                    "[op] x must have rank 1 [n], got shape [2, 3]");
+  CHECK_THROWS_WITH(check_same("op", "a", Shape{2}, "b", Shape{3}),
+                    "[op] b must have the shape of a, [2], got shape [3]");
   CHECK_NOTHROW(check_extent("op", "x", Shape{2, 3}, -1, 3, ""));
 }
 

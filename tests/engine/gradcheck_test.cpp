@@ -64,7 +64,8 @@ TEST_CASE("gradcheck: a module's parameters are an input too") {
   for (double& v : store.values()) v = 0.3;
   for (Wrong w : {Wrong::none, Wrong::factor}) {
     const auto r = gradcheck_module(
-        [&](Tape<double>& tape, const Params<double>& p, auto) { return exp_with(p.leaf(tape, id), w); }, store, {});
+        [&](Tape<double>& tape, const Params<double>& p, auto) { return exp_with(p.leaf(tape, id), w); },
+        store, {});
     CHECK(r.ok == (w == Wrong::none));
     CHECK(r.entries == 3);
   }

@@ -25,7 +25,11 @@ TEST_CASE("parallel: every index once, in pieces that do not depend on the threa
 }
 
 TEST_CASE("parallel: an exception of a piece reaches the caller, nested loops are serial") {
-  CHECK_THROWS_WITH(parallel_for(100, 1, [](Index b, Index) { if (b == 50) throw ValueError("fifty"); }), "fifty");
+  CHECK_THROWS_WITH(parallel_for(100, 1,
+                                 [](Index b, Index) {
+                                   if (b == 50) throw ValueError("fifty");
+                                 }),
+                    "fifty");
   std::vector<int> seen(64);
   parallel_for(8, 1, [&](Index b, Index) {
     parallel_for(8, 1, [&](Index c, Index) { ++seen[static_cast<std::size_t>(8 * b + c)]; });

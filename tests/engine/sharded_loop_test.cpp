@@ -43,9 +43,11 @@ TEST_CASE("sharded_loop: errors") {
   CHECK_THROWS_WITH(ShardedLoop<float>(0, 1), "[sharded_loop] shards must be 1 to 256, got 0");
   ShardedLoop<float> loop(2, 1);
   std::vector<float> into(2);
-  CHECK_THROWS_WITH(loop.run(1, [](Index, Index, Tape<float>&, float*) { return 0.0; }, into),
+  CHECK_THROWS_WITH(loop.run(
+                        1, [](Index, Index, Tape<float>&, float*) { return 0.0; }, into),
                     "[sharded_loop] into must have at most 1 numbers, got 2");
-  CHECK_THROWS_AS(loop.run(3, [](Index, Index, Tape<float>&, float*) -> double { throw ValueError("x"); },
-                           std::span<float>(into).first(1)),
+  CHECK_THROWS_AS(loop.run(
+                      3, [](Index, Index, Tape<float>&, float*) -> double { throw ValueError("x"); },
+                      std::span<float>(into).first(1)),
                   ValueError);
 }

@@ -71,10 +71,12 @@ TEST_CASE("tape: errors") {
   Tape<double> tape;
   const Tensor<double> x({2}, 3.0);
   Tensor<double> g({2});
-  CHECK_THROWS_WITH(tape.backward(square(tape.leaf(x, g))), "[backward] loss must have one element, got shape [2]");
+  CHECK_THROWS_WITH(tape.backward(square(tape.leaf(x, g))),
+                    "[backward] loss must have one element, got shape [2]");
   const double seed[] = {1, 1};
   CHECK_THROWS_WITH(tape.backward(square(tape.constant(x)), seed), Contains("nothing to differentiate"));
-  CHECK_THROWS_WITH(tape.backward(square(tape.leaf(x, g)), std::span<const double>(seed, 1)), Contains("got 1"));
+  CHECK_THROWS_WITH(tape.backward(square(tape.leaf(x, g)), std::span<const double>(seed, 1)),
+                    Contains("got 1"));
 }
 
 TEST_CASE("tape: a repeated step takes nothing from the system") {

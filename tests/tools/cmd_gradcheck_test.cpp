@@ -48,14 +48,16 @@ TEST_CASE("gradcheck --only with an unknown text is a usage error", "[gradcheck]
         "--help)\n");
 }
 
-TEST_CASE("Every unit that is documented as differentiable has a check that begins with its stem", "[gradcheck]") {
+TEST_CASE("Every unit that is documented as differentiable has a check that begins with its stem",
+          "[gradcheck]") {
   const Json cases = Json::parse(run_command({"gradcheck", "--json", "-"}).out)["cases"];
   int units = 0;
   for (const char* module : {"engine", "nerf", "distort", "extractor", "watermark"}) {
     const std::filesystem::path headers = std::string(FIELDMARK_SOURCE_DIR "/") + module + "/include";
     if (!std::filesystem::exists(headers)) continue;
     for (const auto& file : std::filesystem::recursive_directory_iterator(headers)) {
-      if (!file.is_regular_file() || read_text(file.path()).find("Differentiable in:") == std::string::npos) continue;
+      if (!file.is_regular_file() || read_text(file.path()).find("Differentiable in:") == std::string::npos)
+        continue;
       const std::string stem = file.path().stem().string();
       INFO(module << "/" << stem << " has no entry in gradcheck_cases()");
       CHECK(std::any_of(cases.begin(), cases.end(), [&](const Json& row) {

@@ -20,7 +20,7 @@ class Arena {
     block_ = 0;
     used_ = 0;
   }
-  std::size_t reserved() const;                           ///< bytes held from the system
+  std::size_t reserved() const;                        ///< bytes held from the system
   std::size_t system_calls() const { return grown_; }  ///< times a block was taken from the system
 
  private:

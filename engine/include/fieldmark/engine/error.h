@@ -19,8 +19,8 @@ struct ShapeError : Error {
 struct ValueError : Error {
   using Error::Error;
 };
-/// A file or folder is missing, unreadable, malformed or cannot be written. The text names the path, the place in
-/// it, what was expected and what was found.
+/// A file or folder is missing, unreadable, malformed or cannot be written. The text names the path, the
+/// place in it, what was expected and what was found.
 struct IoError : Error {
   using Error::Error;
 };
@@ -29,8 +29,11 @@ struct IoError : Error {
 void check_extent(std::string_view op, std::string_view arg, const Shape& got, int axis, Index want,
                   std::string_view why);
 /// Checks the rank. Message form: "[op] arg must have rank 2 [rows, cols], got shape [..]".
-void check_rank(std::string_view op, std::string_view arg, const Shape& got, int rank, std::string_view layout);
-/// Checks that two arguments have one shape. Message form: "[op] b must have the shape of a, [..], got shape [..]".
-void check_same(std::string_view op, std::string_view arg_a, const Shape& a, std::string_view arg_b, const Shape& b);
+void check_rank(std::string_view op, std::string_view arg, const Shape& got, int rank,
+                std::string_view layout);
+/// Checks that two arguments have one shape. Message form: "[op] b must have the shape of a, [..], got shape
+/// [..]".
+void check_same(std::string_view op, std::string_view arg_a, const Shape& a, std::string_view arg_b,
+                const Shape& b);
 
 }  // namespace fieldmark

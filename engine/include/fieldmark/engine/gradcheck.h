@@ -24,19 +24,21 @@ using GradcheckFn = std::function<Var<double>(Tape<double>&, std::span<const Var
 /// Compares the tape's gradient of <u, f(x)>, u a fixed random cotangent, with 6-point central
 /// differences (R. de Levie 2009, J. Chem. Sci. 121(5)), entry by entry, in double.
 ///
-/// An entry is judged against the largest of: its own size, a thousandth of the largest gradient of its input, and
-/// what rounding of f alone puts into the difference. Against 1, a wrong gradient of 1e-8 would pass.
-/// It also fails where: f gives other values when gradients are off; the gradient overwrites
-/// instead of adding to what the caller's buffer held (0.5); or any compared number is not finite.
+/// An entry is judged against the largest of: its own size, a thousandth of the largest gradient of its
+/// input, and what rounding of f alone puts into the difference. Against 1, a wrong gradient of 1e-8 would
+/// pass. It also fails where: f gives other values when gradients are off; the gradient overwrites instead of
+/// adding to what the caller's buffer held (0.5); or any compared number is not finite.
 /// @throws whatever f throws
 GradcheckReport gradcheck(const GradcheckFn& f, std::span<const Tensor<double>> inputs,
                           const GradcheckOptions& options = {});
 
-/// As gradcheck(), with a module's parameters as one more input: f receives a Params that reads and differentiates them.
+/// As gradcheck(), with a module's parameters as one more input: f receives a Params that reads and
+/// differentiates them.
 using ModuleGradcheckFn =
     std::function<Var<double>(Tape<double>&, const Params<double>&, std::span<const Var<double>>)>;
 GradcheckReport gradcheck_module(const ModuleGradcheckFn& f, const ParamStore<double>& store,
-                                 std::span<const Tensor<double>> inputs, const GradcheckOptions& options = {});
+                                 std::span<const Tensor<double>> inputs,
+                                 const GradcheckOptions& options = {});
 
 /// One registered check, for `fieldmark gradcheck` and the tests. The name begins with the unit's stem.
 struct GradcheckCase {

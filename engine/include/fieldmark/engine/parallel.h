@@ -14,9 +14,10 @@ namespace detail {
 void parallel_chunks(Index chunks, void* context, void (*run)(void*, Index chunk));
 }  // namespace detail
 
-/// Calls f(begin, end) over [0, n) in pieces of `grain`, on several threads; serial when called from inside another
-/// parallel loop or where there is only one piece. The pieces do not depend on the thread count, so a result that
-/// depends only on the piece has the same bits for any number of threads. An exception thrown by f is rethrown here.
+/// Calls f(begin, end) over [0, n) in pieces of `grain`, on several threads; serial when called from inside
+/// another parallel loop or where there is only one piece. The pieces do not depend on the thread count, so a
+/// result that depends only on the piece has the same bits for any number of threads. An exception thrown by
+/// f is rethrown here.
 template <class F>
 void parallel_for(Index n, Index grain, F&& f) {
   if (n <= 0) return;

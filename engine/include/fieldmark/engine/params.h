@@ -43,8 +43,8 @@ class ParamStore {
   std::vector<T> values_, grads_;
 };
 
-/// Where a pass reads parameters and where it adds their gradients: the store itself, a shard's private buffer, or
-/// nowhere (inference). Cheap to copy; the store must outlive it.
+/// Where a pass reads parameters and where it adds their gradients: the store itself, a shard's private
+/// buffer, or nowhere (inference). Cheap to copy; the store must outlive it.
 template <class T>
 class Params {
  public:
@@ -53,7 +53,8 @@ class Params {
   /// Reads the store; gradients, laid out as the store's, go to `grads`, or are not computed if it is null.
   Params(const ParamStore<T>& store, T* grads) : Params(store, store.values().data(), grads) {}
   /// Reads `values` laid out as the store's: how gradcheck treats a module's parameters as an input.
-  Params(const ParamStore<T>& layout, const T* values, T* grads) : layout_(&layout), values_(values), grads_(grads) {}
+  Params(const ParamStore<T>& layout, const T* values, T* grads)
+      : layout_(&layout), values_(values), grads_(grads) {}
 
   Var<T> leaf(Tape<T>& tape, ParamId id) const {
     const auto& e = layout_->entry(id);

@@ -2,9 +2,9 @@
 #include <cstdint>
 #include <cstring>
 
-// Vectors for kernel files only: a kernel is compiled once per instruction set, so everything here has internal
-// linkage (two levels must never share an inline function). GCC and Clang vector extensions, no intrinsics: one
-// source serves SSE4, AVX2 and AVX-512.
+// Vectors for kernel files only: a kernel is compiled once per instruction set, so everything here has
+// internal linkage (two levels must never share an inline function). GCC and Clang vector extensions, no
+// intrinsics: one source serves SSE4, AVX2 and AVX-512.
 namespace {
 namespace simd {
 
@@ -52,8 +52,8 @@ template <class V>
   return a < b ? a : b;
 }
 
-/// e^x with a relative error below 2e-7 for x in [-87.3, 88]; saturates outside (0 below, the value at 88 above).
-/// Cody and Waite 1980: x = n log 2 + r, |r| <= log(2) / 2, and a polynomial of degree 6 for e^r.
+/// e^x with a relative error below 2e-7 for x in [-87.3, 88]; saturates outside (0 below, the value at 88
+/// above). Cody and Waite 1980: x = n log 2 + r, |r| <= log(2) / 2, and a polynomial of degree 6 for e^r.
 [[maybe_unused, gnu::always_inline]] inline Vec<float> exp(Vec<float> x) {
   const Vec<float> below = broadcast(-87.33f);
   const Vec<float> c = min(max(x, below), broadcast(88.0f));

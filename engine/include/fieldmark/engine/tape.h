@@ -29,8 +29,9 @@ class Var {
   /// Where a backward adds its share; nullptr if this input needs none.
   /// The buffer is made, zeroed, on the first call.
   T* grad_acc() const;
-  /// As grad_acc(), but a buffer made by this call is left uninitialised and *fresh is set: the caller then assigns
-  /// every element instead of adding. Saves a pass over memory in ops that write all of their input's gradient.
+  /// As grad_acc(), but a buffer made by this call is left uninitialised and *fresh is set: the caller then
+  /// assigns every element instead of adding. Saves a pass over memory in ops that write all of their input's
+  /// gradient.
   T* grad_acc(bool* fresh) const;
 
  private:
@@ -103,14 +104,15 @@ class Tape {
   /// @throws ShapeError if the sizes differ   @throws ValueError if no input of `out` needs a gradient
   void backward(Var<T> out, std::span<const T> seed) {
     if (static_cast<Index>(seed.size()) != out.shape().size())
-      throw ShapeError("[backward] seed must have one number for each of out, whose shape is " + out.shape().str() +
-                       ", got " + std::to_string(seed.size()));
+      throw ShapeError("[backward] seed must have one number for each of out, whose shape is " +
+                       out.shape().str() + ", got " + std::to_string(seed.size()));
     T* g = out.grad_acc();
     if (!g) throw ValueError("[backward] nothing to differentiate: no input of this value needs a gradient");
     for (std::size_t i = 0; i < seed.size(); ++i) g[i] += seed[i];
     replay();
   }
-  /// Replays with the gradients that Var::grad_acc() holds already: several outputs may have been seeded by hand.
+  /// Replays with the gradients that Var::grad_acc() holds already: several outputs may have been seeded by
+  /// hand.
   void replay() {
     for (auto n = nodes_.rbegin(); n != nodes_.rend(); ++n)
       if (const T* dout = n->out.grad()) n->run(n->closure, dout);
@@ -157,8 +159,8 @@ T* Var<T>::grad_acc(bool* fresh) const {
 template <class T>
 Var<T> Tape<T>::reshape(Var<T> x, Shape shape) {
   if (shape.size() != x.shape().size())
-    throw ShapeError("[reshape] shape must have the " + std::to_string(x.shape().size()) + " elements of x, got shape " +
-                     shape.str());
+    throw ShapeError("[reshape] shape must have the " + std::to_string(x.shape().size()) +
+                     " elements of x, got shape " + shape.str());
   Var<T> out = make(x.value(), nullptr, shape, x.needs_grad());
   const Index n = shape.size();
   on_backward(out, [x, n](const T* dy) {
