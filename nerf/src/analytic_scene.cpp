@@ -146,12 +146,13 @@ std::array<double, 2> light_left(const std::vector<Object>& objects, const Objec
 }
 
 // Colour of what the ray meets first; false if nothing.
-bool trace(const std::vector<Object>& objects, const Ray& ray, Vec3* colour) {
+bool trace(const std::vector<Object>& objects, const std::vector<const Object*>& candidates, const Ray& ray,
+           Vec3* colour) {
   const Object* object = nullptr;
   SolidHit nearest;
-  for (const Object& o : objects)
-    if (const auto hit = intersect(o.solid, ray); hit && (!object || hit->t < nearest.t)) {
-      object = &o;
+  for (const Object* o : candidates)
+    if (const auto hit = intersect(o->solid, ray); hit && (!object || hit->t < nearest.t)) {
+      object = o;
       nearest = *hit;
     }
   if (!object) return false;
@@ -163,17 +164,29 @@ bool trace(const std::vector<Object>& objects, const Ray& ray, Vec3* colour) {
   return true;
 }
 
-void render_pixel(const std::vector<Object>& objects, const Camera& camera, Index x, Index y, float* rgba) {
+// Objects whose bounding spheres a sample of the pixel may meet. Its samples are within 0.75 / focal of its
+// middle in angle, so within that times the distance of the sphere's centre.
+void find_candidates(const std::vector<Object>& objects, const Camera& camera, const Ray& middle,
+                     std::vector<const Object*>* candidates) {
+  candidates->clear();
+  const double spread = 0.75 / std::min(camera.fx, camera.fy);
+  for (const Object& o : objects) {
+    const Vec3 to = o.solid.centre - middle.origin;
+    const double square = dot(to, to), along = dot(to, middle.direction);
+    const double reach = bounding_radius(o.solid) + spread * std::sqrt(square);
+    if (square - along * along <= reach * reach) candidates->push_back(&o);
+  }
+}
+
+void render_pixel(const std::vector<Object>& objects, const Camera& camera, double x, double y,
+                  std::vector<const Object*>* candidates, float* rgba) {
   Vec3 sum{};
   int covered = 0;
-  for (int s = 0; s < kSide * kSide; ++s) {
+  find_candidates(objects, camera, pixel_ray(camera, x, y), candidates);
+  for (int s = 0; s < kSide * kSide && !candidates->empty(); ++s) {
     const double dx = (s % kSide + 0.5) / kSide - 0.5, dy = (s / kSide + 0.5) / kSide - 0.5;
-    const Ray ray = pixel_ray(camera, static_cast<double>(x) + dx, static_cast<double>(y) + dy);
-    // Everything is within 1.2 of the origin.
-    const double b = dot(ray.origin, ray.direction);
-    if (b * b - dot(ray.origin, ray.origin) + 1.44 < 0) continue;
     Vec3 colour;
-    if (!trace(objects, ray, &colour)) continue;
+    if (!trace(objects, *candidates, pixel_ray(camera, x + dx, y + dy), &colour)) continue;
     sum = sum + colour;
     ++covered;
   }
@@ -187,9 +200,11 @@ void render_pixel(const std::vector<Object>& objects, const Camera& camera, Inde
 Tensor<float> render(const std::vector<Object>& objects, const Camera& camera) {
   Tensor<float> image(Shape{camera.height, camera.width, 4});
   parallel_for(camera.height, 8, [&](Index begin, Index end) {
+    std::vector<const Object*> candidates;
     for (Index y = begin; y < end; ++y)
       for (Index x = 0; x < camera.width; ++x)
-        render_pixel(objects, camera, x, y, image.data.data() + 4 * (y * camera.width + x));
+        render_pixel(objects, camera, static_cast<double>(x), static_cast<double>(y), &candidates,
+                     image.data.data() + 4 * (y * camera.width + x));
   });
   return image;
 }

@@ -129,7 +129,7 @@ double bounding_radius(const Solid& s) {
       return norm(s.size);
     case SolidKind::cylinder:
     case SolidKind::cone:
-      return std::hypot(s.size[0], s.size[1]);
+      return length2(s.size[0], s.size[1]);
     case SolidKind::torus:
       return s.size[0] + s.size[1];
   }
