@@ -1,0 +1,58 @@
+#pragma once
+#include <fieldmark/engine/nn/conv2d.h>
+#include <fieldmark/engine/nn/dense.h>
+#include <fieldmark/engine/nn/group_norm.h>
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+namespace fieldmark::extractor {
+
+struct DenseExtractorOptions {
+  Index classes = 0;  ///< cells + 1 for the background, at least 2
+  Index base = 32;    ///< channels at half resolution, a multiple of 8
+};
+
+/// Reads the mark place by place: which cell of the scene each 4 x 4 pixels show, and the sign of the mark
+/// there. A U-shaped network: 2 x 2 pixels into channels, then 3 x 3 convolutions at 1/2 (base channels), 1/4
+/// (2 base), 1/8 (3 base) and 1/16 (3 base) of the picture, back up to 1/4 by bilinear interpolation with the
+/// skipped features joined on, and two heads of 1 x 1 convolutions. Each 3 x 3 convolution is followed by
+/// group normalisation and ReLU, so that a picture is read the same in training and test, alone and among
+/// others. Source: Ronneberger et al. 2015 (U-Net), figure 1; Wu and He 2018 (group normalisation).
+/// Departures: four levels instead of five, zeros around instead of valid convolutions, output at 1/4: a
+/// place needs no finer label, and full resolution would cost 16 times as much.
+template <class T>
+class DenseExtractor {
+ public:
+  struct Output {
+    Var<T> sign;          ///< [P] logit that the mark is positive at each place, row by row
+    Var<T> index;         ///< [P, classes] logits of the cell each place shows, the last class the background
+    Index height, width;  ///< in places, H / 4 and W / 4 rounded down; P = height * width
+  };
+
+  /// Parameters are "<name>/down0/conv/weight" and the like, about 2,100 base^2.
+  /// @throws ValueError if an option is out of range, or the names are taken in the store
+  DenseExtractor(ParamStore<T>& store, std::string_view name, const DenseExtractorOptions& options,
+                 std::uint64_t seed);
+
+  /// Place (i, j) shows pixels 4 i .. 4 i + 3, 4 j .. 4 j + 3; up to 3 last rows and columns belong to no
+  /// place (an odd last row or column is not looked at).
+  /// @param image [1, H, W, 3] in [0, 1], H and W at least 16   @throws ShapeError if it is not
+  /// Differentiable in: image and the parameters; kinks of the ReLUs.
+  Output operator()(const Params<T>& params, Var<T> image) const;
+
+ private:
+  struct Block {
+    Conv2d<T> conv;
+    GroupNorm<T> norm;
+    Var<T> operator()(const Params<T>& params, Var<T> x) const { return norm(params, conv(params, x)); }
+  };
+  Var<T> up(const Params<T>& params, Var<T> coarse, Var<T> skip, const Block& block) const;
+
+  std::vector<Block> down_;      // two for each of the four levels
+  std::vector<Block> up_;        // to 1/8, to 1/4
+  std::vector<Dense<T>> heads_;  // sign, hidden layer of index, index
+};
+
+}  // namespace fieldmark::extractor

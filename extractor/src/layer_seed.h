@@ -1,0 +1,20 @@
+#pragma once
+#include <fieldmark/engine/random.h>
+
+namespace fieldmark::extractor {
+
+// One seed for each layer of a network. Networks of neighbouring seeds share none, as seed + layer would.
+class LayerSeeds {
+ public:
+  explicit LayerSeeds(std::uint64_t seed) : rng_(seed) {}
+  std::uint64_t next() {
+    const auto words = rng_.bits(layer_++);
+    return std::uint64_t{words[0]} << 32 | words[1];
+  }
+
+ private:
+  CounterRng rng_;
+  std::uint64_t layer_ = 0;
+};
+
+}  // namespace fieldmark::extractor
