@@ -1,6 +1,7 @@
 #include <fieldmark/distort/gradcheck_cases.h>
 #include <fieldmark/engine/gradcheck_cases.h>
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/extractor/gradcheck_cases.h>
 #include <fieldmark/nerf/gradcheck_cases.h>
 
 #include <CLI/CLI.hpp>
@@ -33,6 +34,7 @@ std::vector<Row> collect(const std::string& only) {
   };
   add("engine", gradcheck_cases());
   add("distort", distort::gradcheck_cases());
+  add("extractor", extractor::gradcheck_cases());
   add("nerf", nerf::gradcheck_cases());
   return rows;
 }
