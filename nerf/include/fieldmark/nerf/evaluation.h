@@ -1,0 +1,33 @@
+#pragma once
+#include <fieldmark/nerf/renderer.h>
+
+#include <functional>
+#include <vector>
+
+namespace fieldmark::nerf {
+
+/// How close one rendering is to its photograph, see psnr(), psnr_masked() and ssim().
+struct ViewScore {
+  double psnr;         ///< over the whole picture, dB
+  double psnr_object;  ///< over the object's pixels, dB; NaN where the object is not in the picture
+  double ssim;         ///< in [-1, 1]; NaN for a picture smaller than the window of ssim()
+};
+
+/// Means over the views of a data set. A view whose number is NaN is left out of that number's mean.
+struct Evaluation {
+  double psnr = 0, psnr_object = 0, ssim = 0;
+  Index views = 0;
+  double seconds_per_view = 0;  ///< of rendering alone
+  std::vector<ViewScore> per_view;
+};
+
+/// Renders every view of a data set and compares it with the photograph in front of the data set's
+/// background. The object is where the photograph's alpha exceeds 0.5; where a photograph has no alpha (1
+/// everywhere), it is where the rendering's opacity does.
+/// @param progress  called after each view with how many are done and how many there are; false ends the
+///                  evaluation with the views so far. May be empty
+/// @throws ValueError if there are no views
+Evaluation evaluate(Renderer& renderer, const Dataset& dataset,
+                    const std::function<bool(Index done, Index total)>& progress = {});
+
+}  // namespace fieldmark::nerf

@@ -1,0 +1,17 @@
+#pragma once
+#include <fieldmark/engine/tape.h>
+
+namespace fieldmark::nerf {
+
+/// Frequency encoding of positions or directions.
+///   y = (sin(2^0 pi x), cos(2^0 pi x), ..., sin(2^(B-1) pi x), cos(2^(B-1) pi x)), each for all dimensions
+///   of x
+/// Source: Mildenhall et al. 2020 (NeRF), eq. 4. The argument is reduced exactly (2^b x modulo 2), so the
+/// error does not grow with the band or with the distance from the origin; the rounding of x itself does.
+/// @param x  [N, D], D at most 4   @param bands  B, 1 to 20   @return [N, 2 B D]
+/// @throws ShapeError if x is not [N, D]   @throws ValueError if bands is out of range
+/// Differentiable in: x.
+template <class T>
+Var<T> frequency_encoding(Var<T> x, int bands);
+
+}  // namespace fieldmark::nerf

@@ -1,0 +1,70 @@
+#pragma once
+#include <fieldmark/engine/params.h>
+
+#include <string_view>
+
+namespace fieldmark::nerf {
+
+struct HashEncodingOptions {
+  int levels = 8;            ///< L, 1 to 32
+  int features = 4;          ///< F of each part at a level, 2 or 4
+  int log2_table = 17;       ///< at most T = 2^log2_table entries a level, 4 to 24
+  int base_resolution = 16;  ///< N_min, cells per axis of the coarsest level, at least 1
+  double finest_resolution =
+      512;  ///< N_max, cells per axis of the finest level, at least N_min, at most 2^16
+};
+
+/// Multiresolution hash encoding (Mueller et al. 2022, Instant Neural Graphics Primitives, sec. 3) whose
+/// entries hold F features for the density network and F for the colour network: one look-up serves both, and
+/// the colours of a trained field can be changed while every number that density depends on keeps its bytes.
+///
+///   N_l = floor(N_min b^l), b = (N_max / N_min)^(1 / (L - 1))          eq. 2, 3
+///   h(x) = (x_0 XOR x_1 p_1 XOR x_2 p_2) mod T                         eq. 4, p_1 = 2654435761, p_2 =
+///   805459861
+///
+/// One look-up of 4 + 4 features at 8 levels costs half of 2 + 2 at 16.
+/// A level whose (N_l + 1)^3 corners fit in T is indexed directly, without hashing.
+/// Trilinear, so the gradient in x is piecewise constant along an axis and jumps on cell faces, where the
+/// cell above is taken. Outside [0, 1] the outermost cell's form is continued; NaN is treated as cell 0.
+template <class T>
+class HashEncoding {
+ public:
+  enum class Part { density, colour };
+  /// Registers "<name>/table" [rows, 2 F], uniform in +-1e-4 (the paper's choice); an entry holds density's
+  /// features, then colour's. @throws ValueError if an option is out of range
+  HashEncoding(ParamStore<T>& store, std::string_view name, const HashEncodingOptions& options,
+               std::uint64_t seed);
+
+  /// One part of the features as an op.
+  /// @param x  [N, 3], each coordinate in [0, 1]   @return [N, F L]   @throws ShapeError if x is not [N, 3]
+  /// Differentiable in: x and the table. The encoding must outlive the pass.
+  Var<T> operator()(const Params<T>& params, Var<T> x, Part part) const;
+
+  /// Both parts at the price of one look-up, not recorded. @param x [n, 3]  @param density, colour [n, F L]
+  /// are written
+  void encode(std::span<const T> table, const T* x, Index n, T* density, T* colour) const;
+  /// Adds to `grad` [rows, 2 F] what `encode` of x would pass back from ddensity, dcolour [n, F L] for one
+  /// level. Levels own disjoint rows, so they may run on different threads; points are added in order.
+  void backward_level(int level, const T* x, Index n, const T* ddensity, const T* dcolour,
+                      std::span<T> grad) const;
+
+  Index width() const { return Index{features_} * levels(); }  ///< F L, features of a part
+  int features() const { return features_; }
+  int levels() const { return static_cast<int>(levels_.size()); }
+  Index rows() const { return rows_; }
+  ParamId table() const { return table_; }
+  /// Cells per axis of a level.
+  Index resolution(int level) const { return levels_[static_cast<std::size_t>(level)].resolution; }
+
+ private:
+  struct Level {
+    std::uint32_t resolution, mask;  // layout of kernels::HashLevel
+    std::int64_t first;
+  };
+  int features_;
+  std::vector<Level> levels_;
+  Index rows_ = 0;
+  ParamId table_;
+};
+
+}  // namespace fieldmark::nerf

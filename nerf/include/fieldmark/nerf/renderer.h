@@ -1,0 +1,53 @@
+#pragma once
+#include <fieldmark/nerf/radiance_field.h>
+#include <fieldmark/nerf/sampler.h>
+
+#include <functional>
+#include <memory>
+
+namespace fieldmark::nerf {
+
+struct RenderOptions {
+  float stop = 1e-3f;          ///< a ray ends where its transmittance falls below this
+  float least_weight = 1e-4f;  ///< samples of less weight get no colour
+};
+
+/// A picture of a field.
+struct Rendering {
+  Tensor<float> rgb;      ///< [height, width, 3] over the field's background, in [0, 1]
+  Tensor<float> opacity;  ///< [height, width] in [0, 1]
+};
+
+/// Renders views of one field; keeps its buffers from view to view. The field must outlive it and may change
+/// between views.
+class Renderer {
+ public:
+  explicit Renderer(const RadianceField& field, const RenderOptions& options = {});
+  ~Renderer();
+  /// One ray through the centre of every pixel, samples in the middle of their intervals.
+  Rendering render(const Camera& camera);
+  /// Replaces colours before they are composited: receives positions x [n, 3] in the unit cube and colours
+  /// rgb [n, 3]. Called from several threads at once. An empty function draws the field as it is.
+  using Recolour = std::function<void(const float* x, Index n, float* rgb)>;
+  void set_recolour(Recolour recolour) { recolour_ = std::move(recolour); }
+  /// Colour and opacity of given rays, background not added.
+  /// @param rays  in cube coordinates   @param lane  0 to kLanes - 1: calls with different lanes may run at
+  /// the same time
+  /// @param out  [R, 4] written   @param position  [R, 3] written unless null: the mean position of what the
+  /// ray sees, by weight, in the unit cube; 0 where it sees nothing
+  static constexpr Index kLanes = 16;
+  void trace(const RayBatch& rays, Index lane, float* out, float* position = nullptr);
+
+ private:
+  struct Lane;
+  static void accumulate(const Lane& lane, Index rays, float* out, float* position);
+  const RadianceField& field_;
+  RenderOptions options_;
+  Recolour recolour_;
+  std::vector<std::unique_ptr<Lane>> lanes_;
+};
+
+/// Weights w_i of the samples of each ray, see composite(). @param weights [S] written
+void sample_weights(const RaySamples& samples, float step, float* weights);
+
+}  // namespace fieldmark::nerf

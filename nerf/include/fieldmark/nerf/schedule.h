@@ -1,0 +1,40 @@
+#pragma once
+#include <fieldmark/engine/shape.h>
+
+namespace fieldmark::nerf {
+
+struct ScheduleOptions {
+  Index steps = 0;           ///< length of the run in steps; 0: by time
+  double seconds = 60;       ///< length of the run in seconds, where steps is 0, > 0
+  double lr = 2e-2;          ///< step size at the start, > 0
+  double half_after = 4000;  ///< steps after which 1 / (1 + n / half_after) has halved the step size, > 0
+  double cooldown =
+      0.4;  ///< the last part of the run, in (0, 1), over which the step size falls exponentially ...
+  double last = 0.03;  ///< ... to this fraction of what it was, in (0, 1]
+};
+
+/// The step size of a run whose length is given in steps or in seconds, so that both give the same bytes: a
+/// timed run looks at the clock only to decide at which step the last part begins, and that step fixes the
+/// total.
+///   lr(n) = lr / (1 + n / half_after) * last^max(0, (n - n_c) / (N - n_c)),   n_c = floor((1 - cooldown) N)
+class Schedule {
+ public:
+  /// @throws ValueError if an option is out of range
+  explicit Schedule(const ScheduleOptions& options);
+  /// Called before step n with the time since the start: a timed run fixes its total here, when what is left
+  /// of the time is what the last part takes at the pace of the steps since the previous calls.
+  void observe(Index n, double seconds);
+  double lr(Index n) const;
+  /// N; 0 while a timed run has not fixed it.
+  Index total() const { return total_; }
+  bool done(Index n) const { return total_ > 0 && n >= total_; }
+  /// Continues a run whose total was fixed already. @param total  0: not fixed
+  void resume(Index total);
+
+ private:
+  ScheduleOptions options_;
+  Index total_ = 0, last_step_ = -1;
+  double last_seconds_ = 0, pace_ = 0;
+};
+
+}  // namespace fieldmark::nerf

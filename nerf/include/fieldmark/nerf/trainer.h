@@ -1,0 +1,70 @@
+#pragma once
+#include <fieldmark/engine/adam.h>
+#include <fieldmark/engine/sharded_loop.h>
+#include <fieldmark/nerf/radiance_field.h>
+#include <fieldmark/nerf/sampler.h>
+#include <fieldmark/nerf/schedule.h>
+
+namespace fieldmark::nerf {
+
+struct TrainOptions {
+  ScheduleOptions schedule{};
+  Index samples_per_step = 1 << 15;  ///< rays a step are chosen to have about this many samples, >= 1024
+  double huber = 0.1;                ///< see PhotometricLossOptions
+  Index warm_up = 64;                ///< steps before cells may be declared empty
+  std::uint64_t seed = 0;
+};
+
+/// Trains a radiance field on photographs (Mildenhall et al. 2020, sec. 5; Mueller et al. 2022): random rays
+/// of all photographs, random backgrounds behind alpha, Adam, occupancy refreshed as densities form.
+///
+/// A step is a parallel loop over chunks of 64 rays (ShardedLoop); the gradient at the encoding's output is
+/// kept for the whole batch, and one pass over the levels, each owned by one thread, adds it to the table.
+/// Same seed and number of steps: same bytes, for any thread count and across save() and restore().
+class Trainer {
+ public:
+  /// Where photographs have alpha, sets the field's bounds to their visual hull and rules out the cells
+  /// outside it. Field and data must outlive the trainer. @throws ValueError if an option is out of range
+  Trainer(RadianceField& field, const Dataset& data, const TrainOptions& options);
+  ~Trainer();
+
+  /// Takes one step. @param seconds  since the start of the run, for a schedule that ends at a time
+  void step(double seconds);
+  bool done() const { return schedule_.done(steps_); }
+  Index steps() const { return steps_; }
+  /// Steps that the run will have in all; 0 until a timed run knows.
+  Index planned() const { return schedule_.total(); }
+  /// Mean loss of the last steps, as the PSNR of the same mean square.
+  double train_psnr() const;
+  /// Samples that passed through the networks so far.
+  double samples() const { return samples_; }
+
+  /// All that the next step depends on, into a file (a checkpoint). @throws IoError
+  void save(const std::filesystem::path& path) const;
+  /// @throws IoError if the file is not a checkpoint of the same configuration and data
+  void restore(const std::filesystem::path& path);
+
+ private:
+  struct Chunk;
+  void carve();
+  void choose_rays(Index first, Index count, Chunk& chunk) const;
+  double run_chunk(Index chunk, Index shard, Tape<float>& tape, float* grads);
+  void backward_table();
+  void refresh_occupancy();
+  std::string fingerprint() const;
+
+  RadianceField& field_;
+  const Dataset& data_;
+  TrainOptions options_;
+  Schedule schedule_;
+  CounterRng pixel_rng_, background_rng_, occupancy_rng_;
+  ShardedLoop<float> loop_;
+  Adam<float> adam_;
+  std::vector<Chunk> chunks_;
+  std::vector<RaySampler> samplers_;  // one a shard
+  std::vector<RaySamples> samples_of_shard_;
+  Index steps_ = 0, rays_per_step_;
+  double samples_ = 0, smoothed_loss_ = -1;
+};
+
+}  // namespace fieldmark::nerf

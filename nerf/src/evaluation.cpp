@@ -1,0 +1,62 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/metrics.h>
+#include <fieldmark/nerf/evaluation.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+namespace fieldmark::nerf {
+namespace {
+
+constexpr Index kSsimWindow = 11;
+
+// [H, W], above 0.5 on the object.
+Tensor<float> object_mask(const View& view, const Rendering& rendering) {
+  Tensor<float> alpha({view.rgba.shape[0], view.rgba.shape[1]});
+  for (Index i = 0; i < alpha.size(); ++i) alpha[i] = view.rgba[4 * i + 3];
+  const bool opaque = std::all_of(alpha.data.begin(), alpha.data.end(), [](float a) { return a >= 1; });
+  return opaque ? rendering.opacity : alpha;
+}
+
+double mean(const std::vector<ViewScore>& scores, double ViewScore::*number) {
+  double sum = 0;
+  Index count = 0;
+  for (const ViewScore& s : scores)
+    if (!std::isnan(s.*number)) {
+      sum += s.*number;
+      ++count;
+    }
+  return count > 0 ? sum / static_cast<double>(count) : std::numeric_limits<double>::quiet_NaN();
+}
+
+}  // namespace
+
+Evaluation evaluate(Renderer& renderer, const Dataset& dataset,
+                    const std::function<bool(Index done, Index total)>& progress) {
+  using Clock = std::chrono::steady_clock;
+  if (dataset.views.empty()) throw ValueError("[evaluate] dataset must have at least one view, got 0");
+  Evaluation result;
+  double seconds = 0;
+  for (const View& view : dataset.views) {
+    const auto start = Clock::now();
+    const Rendering rendering = renderer.render(view.camera);
+    seconds += std::chrono::duration<double>(Clock::now() - start).count();
+    const Tensor<float> photograph = composited(view, dataset.background);
+    const bool large = std::min(view.camera.width, view.camera.height) >= kSsimWindow;
+    result.per_view.push_back(
+        {.psnr = psnr(rendering.rgb, photograph),
+         .psnr_object = psnr_masked(rendering.rgb, photograph, object_mask(view, rendering)),
+         .ssim = large ? ssim(rendering.rgb, photograph) : std::numeric_limits<double>::quiet_NaN()});
+    ++result.views;
+    if (progress && !progress(result.views, static_cast<Index>(dataset.views.size()))) break;
+  }
+  result.psnr = mean(result.per_view, &ViewScore::psnr);
+  result.psnr_object = mean(result.per_view, &ViewScore::psnr_object);
+  result.ssim = mean(result.per_view, &ViewScore::ssim);
+  result.seconds_per_view = seconds / static_cast<double>(result.views);
+  return result;
+}
+
+}  // namespace fieldmark::nerf

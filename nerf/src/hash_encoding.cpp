@@ -1,0 +1,113 @@
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/nerf/hash_encoding.h>
+
+#include <cmath>
+#include <random>
+
+#include "kernels/hash_grid.h"
+
+namespace fieldmark::nerf {
+namespace {
+
+constexpr Index kGrain = 1024;  // points a piece
+
+void check(const HashEncodingOptions& o) {
+  if (o.levels < 1 || o.levels > 32)
+    throw ValueError("[hash_encoding] levels must be 1 to 32, got " + std::to_string(o.levels));
+  if (o.features != 2 && o.features != 4)
+    throw ValueError("[hash_encoding] features must be 2 or 4, got " + std::to_string(o.features));
+  if (o.log2_table < 4 || o.log2_table > 24)
+    throw ValueError("[hash_encoding] log2_table must be 4 to 24, got " + std::to_string(o.log2_table));
+  if (o.base_resolution < 1 || !(o.finest_resolution >= o.base_resolution) || o.finest_resolution > 65536)
+    throw ValueError("[hash_encoding] resolutions must satisfy 1 <= base <= finest <= 65536, got base " +
+                     std::to_string(o.base_resolution) + " and finest " +
+                     std::to_string(o.finest_resolution));
+}
+
+template <class Level>
+const kernels::HashLevel* raw(const std::vector<Level>& levels) {
+  static_assert(sizeof(Level) == sizeof(kernels::HashLevel));
+  return reinterpret_cast<const kernels::HashLevel*>(levels.data());
+}
+
+}  // namespace
+
+template <class T>
+HashEncoding<T>::HashEncoding(ParamStore<T>& store, std::string_view name, const HashEncodingOptions& o,
+                              std::uint64_t seed)
+    : features_(o.features) {
+  check(o);
+  const double growth =
+      o.levels > 1 ? std::pow(o.finest_resolution / o.base_resolution, 1.0 / (o.levels - 1)) : 1.0;
+  for (int l = 0; l < o.levels; ++l) {
+    // The small excess keeps the finest level at N_max where rounding would fall just below it.
+    const auto n = static_cast<Index>(std::floor(o.base_resolution * std::pow(growth, l) + 1e-6));
+    const Index corners = (n + 1) * (n + 1) * (n + 1), cap = Index{1} << o.log2_table;
+    const bool hashed = corners > cap;
+    levels_.push_back(
+        {static_cast<std::uint32_t>(n), hashed ? static_cast<std::uint32_t>(cap - 1) : 0u, rows_});
+    rows_ += hashed ? cap : corners;
+  }
+  table_ = store.add(std::string(name) + "/table", {rows_, Index{2} * features_});
+  std::mt19937_64 rng(seed);
+  for (T& v : store.values(table_))
+    v = static_cast<T>(1e-4 * (2 * static_cast<double>(rng() >> 11) * 0x1.0p-53 - 1));
+}
+
+template <class T>
+void HashEncoding<T>::encode(std::span<const T> table, const T* x, Index n, T* density, T* colour) const {
+  using namespace kernels;
+  const auto forward = FIELDMARK_KERNEL(hash_forward<T>);
+  parallel_for(n, kGrain, [&](Index begin, Index end) {
+    forward(raw(levels_), levels(), features_, x + 3 * begin, end - begin, table.data(),
+            density + begin * width(), colour + begin * width());
+  });
+}
+
+template <class T>
+void HashEncoding<T>::backward_level(int level, const T* x, Index n, const T* ddensity, const T* dcolour,
+                                     std::span<T> grad) const {
+  using namespace kernels;
+  FIELDMARK_KERNEL(hash_backward_level<T>)
+  (raw(levels_)[level], level, levels(), features_, x, n, ddensity, dcolour, grad.data());
+}
+
+template <class T>
+Var<T> HashEncoding<T>::operator()(const Params<T>& params, Var<T> x, Part part) const {
+  check_rank("hash_encoding", "x", x.shape(), 2, "[N, 3]");
+  check_extent("hash_encoding", "x", x.shape(), 1, 3, "x, y, z");
+  Tape<T>& tape = x.tape();
+  const Index n = x.shape()[0];
+  const Var<T> table = params.leaf(tape, table_);
+  T* y = nullptr;
+  const Var<T> out = tape.output({n, width()}, &y, {x, table});
+  T* unused = tape.scratch(n * width());
+  const bool density = part == Part::density;
+  encode({table.value(), static_cast<std::size_t>(table.shape().size())}, x.value(), n, density ? y : unused,
+         density ? unused : y);
+
+  // Positions write only their own row of dx, so pieces of them run in parallel; many positions share a table
+  // entry, so there the levels run in parallel, each owning its rows of the table.
+  tape.on_backward(out, [this, x, table, n, density](const T* dy) {
+    using namespace kernels;
+    const T *dd = density ? dy : nullptr, *dc = density ? nullptr : dy;
+    if (T* dx = x.grad_acc()) {
+      const auto backward = FIELDMARK_KERNEL(hash_backward_x<T>);
+      parallel_for(n, kGrain, [&](Index b, Index e) {
+        backward(raw(levels_), levels(), features_, x.value() + 3 * b, e - b, table.value(),
+                 dd ? dd + b * width() : dd, dc ? dc + b * width() : dc, dx + 3 * b);
+      });
+    }
+    if (T* dt = table.grad_acc())
+      parallel_for(levels(), 1, [&](Index l, Index) {
+        backward_level(static_cast<int>(l), x.value(), n, dd, dc,
+                       {dt, static_cast<std::size_t>(table.shape().size())});
+      });
+  });
+  return out;
+}
+
+template class HashEncoding<float>;
+template class HashEncoding<double>;
+
+}  // namespace fieldmark::nerf

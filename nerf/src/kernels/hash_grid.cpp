@@ -1,0 +1,183 @@
+#include "kernels/hash_grid.h"
+
+#include <cstring>
+
+namespace fieldmark::kernels::FIELDMARK_ISA_NS {
+namespace {
+
+constexpr int kBlock = 16;  // points whose corners are found together: the loops over it vectorise
+
+// The features of one entry, density's in the lower half and colour's in the upper.
+template <class T, int P>
+struct EntryOf {
+  typedef T type __attribute__((vector_size(2 * P * sizeof(T))));
+};
+template <class T, int P>
+using Entry = typename EntryOf<T, P>::type;
+
+template <class T, int P>
+[[gnu::always_inline]] inline Entry<T, P> load(const T* p) {
+  Entry<T, P> e;
+  std::memcpy(&e, p, sizeof e);
+  return e;
+}
+
+// The eight corners of the cells around a block of points: table row and fraction along each axis.
+template <class T>
+struct Corners {
+  std::uint32_t row[8][kBlock];
+  T f[3][kBlock];
+
+  // Mueller et al. 2022, eq. 4: h = x XOR y * 2654435761 XOR z * 805459861, modulo a power of two.
+  [[gnu::always_inline]] void find(const HashLevel& level, const T* x, int count) {
+    std::uint32_t cell[3][kBlock];
+    const T scale = static_cast<T>(level.resolution), top = scale - 1;
+    for (int a = 0; a < 3; ++a)
+      for (int i = 0; i < kBlock; ++i) {
+        const T p = x[3 * (i < count ? i : 0) + a] * scale;
+        // Clamped before the cast: a NaN or huge position would be undefined as an integer.
+        const T inside = p > 0 ? (p < top ? p : top) : T(0);
+        const auto c = static_cast<std::int32_t>(inside);
+        cell[a][i] = static_cast<std::uint32_t>(c);
+        f[a][i] = p - static_cast<T>(c);
+      }
+    const std::uint32_t side = level.resolution + 1;
+    const bool hashed = level.mask != 0;
+    const std::uint32_t py = hashed ? 2654435761u : side, pz = hashed ? 805459861u : side * side;
+    for (int k = 0; k < 8; ++k) {
+      const std::uint32_t bx = k & 1, by = (k >> 1) & 1, bz = (k >> 2) & 1;
+      if (hashed)
+        for (int i = 0; i < kBlock; ++i)
+          row[k][i] = ((cell[0][i] + bx) ^ ((cell[1][i] + by) * py) ^ ((cell[2][i] + bz) * pz)) & level.mask;
+      else
+        for (int i = 0; i < kBlock; ++i)
+          row[k][i] = (cell[0][i] + bx) + (cell[1][i] + by) * py + (cell[2][i] + bz) * pz;
+    }
+  }
+
+  [[gnu::always_inline]] void weights(T (*w)[kBlock]) const {
+    for (int i = 0; i < kBlock; ++i) {
+      const T x1 = f[0][i], y1 = f[1][i], z1 = f[2][i], x0 = 1 - x1, y0 = 1 - y1, z0 = 1 - z1;
+      const T a = y0 * z0, b = y1 * z0, c = y0 * z1, d = y1 * z1;
+      w[0][i] = x0 * a, w[1][i] = x1 * a, w[2][i] = x0 * b, w[3][i] = x1 * b;
+      w[4][i] = x0 * c, w[5][i] = x1 * c, w[6][i] = x0 * d, w[7][i] = x1 * d;
+    }
+  }
+};
+
+template <class T, int P>
+void forward(const HashLevel* level, int levels, const T* x, std::int64_t n, const T* table, T* density,
+             T* colour) {
+  Corners<T> corners;
+  alignas(64) T w[8][kBlock];
+  const std::int64_t width = P * levels;
+  for (int l = 0; l < levels; ++l) {
+    const T* entries = table + level[l].first * 2 * P;
+    for (std::int64_t begin = 0; begin < n; begin += kBlock) {
+      const int count = static_cast<int>(n - begin < kBlock ? n - begin : kBlock);
+      corners.find(level[l], x + 3 * begin, count);
+      corners.weights(w);
+      for (int i = 0; i < count; ++i) {
+        Entry<T, P> sum{};
+        for (int k = 0; k < 8; ++k)
+          sum += w[k][i] * load<T, P>(entries + std::size_t{corners.row[k][i]} * 2 * P);
+        T parts[2 * P];
+        std::memcpy(parts, &sum, sizeof sum);
+        std::memcpy(density + (begin + i) * width + P * l, parts, P * sizeof(T));
+        std::memcpy(colour + (begin + i) * width + P * l, parts + P, P * sizeof(T));
+      }
+    }
+  }
+}
+
+// dL/d(entry) at one point and level; either part may be absent.
+template <class T, int P>
+[[gnu::always_inline]] inline Entry<T, P> cotangent(const T* ddensity, const T* dcolour, std::int64_t at) {
+  T parts[2 * P] = {};
+  if (ddensity) std::memcpy(parts, ddensity + at, P * sizeof(T));
+  if (dcolour) std::memcpy(parts + P, dcolour + at, P * sizeof(T));
+  return load<T, P>(parts);
+}
+
+template <class T, int P>
+void backward_level(const HashLevel& level, int index, int levels, const T* x, std::int64_t n,
+                    const T* ddensity, const T* dcolour, T* grad) {
+  Corners<T> corners;
+  alignas(64) T w[8][kBlock];
+  T* entries = grad + level.first * 2 * P;
+  for (std::int64_t begin = 0; begin < n; begin += kBlock) {
+    const int count = static_cast<int>(n - begin < kBlock ? n - begin : kBlock);
+    corners.find(level, x + 3 * begin, count);
+    corners.weights(w);
+    for (int i = 0; i < count; ++i) {
+      const Entry<T, P> g = cotangent<T, P>(ddensity, dcolour, ((begin + i) * levels + index) * P);
+      for (int k = 0; k < 8; ++k) {
+        T* at = entries + std::size_t{corners.row[k][i]} * 2 * P;
+        const Entry<T, P> sum = load<T, P>(at) + w[k][i] * g;
+        std::memcpy(at, &sum, sizeof sum);
+      }
+    }
+  }
+}
+
+// y = sum_k w_k(f) e_k with f = x * resolution - cell, so dy/dx_a = resolution * sum_k dw_k/df_a e_k.
+template <class T, int P>
+void backward_x(const HashLevel* level, int levels, const T* x, std::int64_t n, const T* table,
+                const T* ddensity, const T* dcolour, T* dx) {
+  Corners<T> corners;
+  for (int l = 0; l < levels; ++l) {
+    const T* entries = table + level[l].first * 2 * P;
+    const T scale = static_cast<T>(level[l].resolution);
+    for (std::int64_t begin = 0; begin < n; begin += kBlock) {
+      const int count = static_cast<int>(n - begin < kBlock ? n - begin : kBlock);
+      corners.find(level[l], x + 3 * begin, count);
+      for (int i = 0; i < count; ++i) {
+        const Entry<T, P> g = cotangent<T, P>(ddensity, dcolour, ((begin + i) * levels + l) * P);
+        for (int k = 0; k < 8; ++k) {
+          const Entry<T, P> e = g * load<T, P>(entries + std::size_t{corners.row[k][i]} * 2 * P);
+          T dot = 0, weight[3], sign[3];
+          for (int j = 0; j < 2 * P; ++j) dot += e[j];
+          for (int a = 0; a < 3; ++a) {
+            const bool up = (k >> a) & 1;
+            weight[a] = up ? corners.f[a][i] : 1 - corners.f[a][i];
+            sign[a] = up ? T(1) : T(-1);
+          }
+          for (int a = 0; a < 3; ++a)
+            dx[3 * (begin + i) + a] += scale * dot * sign[a] * weight[(a + 1) % 3] * weight[(a + 2) % 3];
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+
+template <class T>
+void hash_forward(const HashLevel* level, int levels, int part, const T* x, std::int64_t n, const T* table,
+                  T* density, T* colour) {
+  (part == 2 ? forward<T, 2> : forward<T, 4>)(level, levels, x, n, table, density, colour);
+}
+
+template <class T>
+void hash_backward_level(const HashLevel& level, int index, int levels, int part, const T* x, std::int64_t n,
+                         const T* ddensity, const T* dcolour, T* grad) {
+  (part == 2 ? backward_level<T, 2> : backward_level<T, 4>)(level, index, levels, x, n, ddensity, dcolour,
+                                                            grad);
+}
+
+template <class T>
+void hash_backward_x(const HashLevel* level, int levels, int part, const T* x, std::int64_t n, const T* table,
+                     const T* ddensity, const T* dcolour, T* dx) {
+  (part == 2 ? backward_x<T, 2> : backward_x<T, 4>)(level, levels, x, n, table, ddensity, dcolour, dx);
+}
+
+#define FIELDMARK_INSTANTIATE(T)                                                                        \
+  template void hash_forward(const HashLevel*, int, int, const T*, std::int64_t, const T*, T*, T*);     \
+  template void hash_backward_level(const HashLevel&, int, int, int, const T*, std::int64_t, const T*,  \
+                                    const T*, T*);                                                      \
+  template void hash_backward_x(const HashLevel*, int, int, const T*, std::int64_t, const T*, const T*, \
+                                const T*, T*);
+FIELDMARK_INSTANTIATE(float)
+FIELDMARK_INSTANTIATE(double)
+
+}  // namespace fieldmark::kernels::FIELDMARK_ISA_NS

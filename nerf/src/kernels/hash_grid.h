@@ -1,0 +1,31 @@
+#pragma once
+#include <fieldmark/engine/isa.h>
+
+#include <cstdint>
+
+namespace fieldmark::kernels {
+
+/// One level of a multiresolution hash grid.
+struct HashLevel {
+  std::uint32_t resolution;  ///< cells per axis, at least 1
+  std::uint32_t mask;  ///< table size - 1 of a hashed level (a power of two), 0 for a level indexed directly
+  std::int64_t first;  ///< row of the level's first entry in the table
+};
+
+// An entry holds `part` (2 or 4) features that only density reads, then as many that only colour reads.
+// x [n, 3] positions in [0, 1]; table [rows, 2 part]; density and colour [n, part * levels], features of
+// level l at part * l. Values outside [0, 1] are taken from the nearest cell's trilinear form; NaN goes to
+// cell 0.
+FIELDMARK_DECLARE_KERNEL(template <class T> void, hash_forward,
+                         (const HashLevel* level, int levels, int part, const T* x, std::int64_t n,
+                          const T* table, T* density, T* colour))
+// Adds the gradient of ONE level to grad [rows, 2 part], point after point.
+FIELDMARK_DECLARE_KERNEL(template <class T> void, hash_backward_level,
+                         (const HashLevel& level, int index, int levels, int part, const T* x, std::int64_t n,
+                          const T* ddensity, const T* dcolour, T* grad))
+// Adds the gradient in the positions to dx [n, 3].
+FIELDMARK_DECLARE_KERNEL(template <class T> void, hash_backward_x,
+                         (const HashLevel* level, int levels, int part, const T* x, std::int64_t n,
+                          const T* table, const T* ddensity, const T* dcolour, T* dx))
+
+}  // namespace fieldmark::kernels

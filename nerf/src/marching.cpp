@@ -1,0 +1,67 @@
+#include <fieldmark/nerf/marching.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace fieldmark::nerf {
+
+CubeSpan intersect_unit_cube(const float o[3], const float d[3]) {
+  CubeSpan span{0, std::numeric_limits<float>::infinity()};
+  for (int a = 0; a < 3; ++a) {
+    if (d[a] == 0) {
+      if (!(o[a] >= 0 && o[a] <= 1)) return {};
+      continue;
+    }
+    const float t0 = (0 - o[a]) / d[a], t1 = (1 - o[a]) / d[a];
+    span.near = std::max(span.near, std::min(t0, t1));
+    span.far = std::min(span.far, std::max(t0, t1));
+  }
+  // Also false for NaN and for a direction of zeros, which never leaves.
+  return span.near < span.far && std::isfinite(span.far) ? span : CubeSpan{};
+}
+
+RayWalk::RayWalk(const float o[3], const float d[3], float step, float jitter)
+    : step_(step), jitter_(jitter) {
+  const CubeSpan span = intersect_unit_cube(o, d);
+  near_ = span.near;
+  far_ = span.far;
+  for (int a = 0; a < 3; ++a) {
+    o_[a] = o[a];
+    d_[a] = d[a];
+    inverse_[a] = 1 / d[a];  // infinite where parallel: min() below then never picks it
+  }
+}
+
+Index RayWalk::next(const OccupancyGrid& grid, Index max, float* t_out) {
+  const auto n = static_cast<float>(grid.resolution());
+  const int last = static_cast<int>(grid.resolution()) - 1;
+  Index count = 0;
+  while (count < max) {
+    const float t = near_ + (static_cast<float>(k_) + jitter_) * step_;
+    if (!(t < far_)) break;
+    int c[3];
+    float p[3];
+    for (int a = 0; a < 3; ++a) {
+      p[a] = (o_[a] + t * d_[a]) * n;
+      c[a] = std::clamp(static_cast<int>(p[a]), 0, last);
+    }
+    const std::uint64_t block = grid.block(c[0] / 4, c[1] / 4, c[2] / 4);
+    if (block >> (c[0] % 4 + 4 * (c[1] % 4) + 16 * (c[2] % 4)) & 1) {
+      t_out[count++] = t;
+      ++k_;
+      continue;
+    }
+    // Leave the empty cell, or the empty block of 4 x 4 x 4, in whole steps.
+    float leave = std::numeric_limits<float>::infinity();
+    for (int a = 0; a < 3; ++a) {
+      if (d_[a] == 0) continue;
+      const int low = block ? c[a] : c[a] / 4 * 4, high = low + (block ? 1 : 4);
+      leave = std::min(leave, (static_cast<float>(d_[a] > 0 ? high : low) - p[a]) * inverse_[a]);
+    }
+    k_ += std::max<Index>(1, static_cast<Index>(std::ceil(leave / n / step_)));
+  }
+  return count;
+}
+
+}  // namespace fieldmark::nerf

@@ -1,0 +1,104 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/nerf/occupancy_grid.h>
+
+#include <algorithm>
+
+namespace fieldmark::nerf {
+namespace {
+
+constexpr Index kGrain = 4096;  // cells a piece
+constexpr float kExcluded = -1.f;
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+OccupancyGrid::OccupancyGrid(Index resolution) : resolution_(resolution) {
+  if (resolution < 4 || resolution > 512 || resolution % 4 != 0)
+    throw ValueError("[occupancy_grid] resolution must be a multiple of 4 from 4 to 512, got " +
+                     std::to_string(resolution));
+  density_.assign(at(cells()), 0.f);
+  bits_.assign(at(cells()), 1);
+  blocks_.assign(at(cells() / 64), ~std::uint64_t{0});
+  candidates_.resize(at(cells()));
+  for (Index c = 0; c < cells(); ++c) candidates_[at(c)] = c;
+}
+
+Index OccupancyGrid::occupied_cells() const {
+  return static_cast<Index>(std::count_if(bits_.begin(), bits_.end(), [](std::uint8_t b) { return b != 0; }));
+}
+
+void OccupancyGrid::restrict_to(std::span<const std::uint8_t> keep) {
+  if (static_cast<Index>(keep.size()) != cells())
+    throw ShapeError("[occupancy_grid] keep must have " + std::to_string(cells()) + " entries, got " +
+                     std::to_string(keep.size()));
+  for (std::size_t c = 0; c < keep.size(); ++c)
+    if (!keep[c]) {
+      density_[c] = kExcluded;
+      bits_[c] = 0;
+    }
+  std::erase_if(candidates_, [&](Index c) { return !keep[at(c)]; });
+  rebuild_blocks();
+}
+
+void OccupancyGrid::update(const Density& density, const CounterRng& rng, const Update& u) {
+  const Index n = static_cast<Index>(candidates_.size());
+  const Index fraction = std::max<Index>(1, u.fraction), offset = static_cast<Index>(u.round) % fraction;
+  const Index looked = n > offset ? (n - offset + fraction - 1) / fraction : 0;
+  const float side = 1.f / static_cast<float>(resolution_);
+  std::vector<float> x(at(3 * looked)), sigma(at(looked));
+  parallel_for(looked, kGrain, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) {
+      const Index c = candidates_[at(offset + i * fraction)];
+      const auto jitter = rng.uniform4(u.round, static_cast<std::uint64_t>(c));
+      const Index xyz[3] = {c % resolution_, c / resolution_ % resolution_, c / (resolution_ * resolution_)};
+      for (std::size_t a = 0; a < 3; ++a) x[at(3 * i) + a] = (static_cast<float>(xyz[a]) + jitter[a]) * side;
+    }
+    density(x.data() + 3 * begin, end - begin, sigma.data() + begin);
+  });
+  parallel_for(n, kGrain, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) {
+      float& d = density_[at(candidates_[at(i)])];
+      d *= u.decay;
+      if (i % fraction == offset) d = std::max(d, sigma[at((i - offset) / fraction)]);
+      bits_[at(candidates_[at(i)])] = d * u.step > u.threshold;
+    }
+  });
+  rebuild_blocks();
+}
+
+void OccupancyGrid::restore(std::span<const float> densities, std::span<const std::uint8_t> bits) {
+  if (static_cast<Index>(densities.size()) != cells())
+    throw ShapeError("[occupancy_grid] densities must have " + std::to_string(cells()) + " entries, got " +
+                     std::to_string(densities.size()));
+  set_bits(bits);
+  density_.assign(densities.begin(), densities.end());
+  candidates_.clear();
+  for (Index c = 0; c < cells(); ++c)
+    if (density_[at(c)] >= 0) candidates_.push_back(c);
+}
+
+void OccupancyGrid::set_bits(std::span<const std::uint8_t> bits) {
+  if (static_cast<Index>(bits.size()) != cells())
+    throw ShapeError("[occupancy_grid] bits must have " + std::to_string(cells()) + " entries, got " +
+                     std::to_string(bits.size()));
+  bits_.assign(bits.begin(), bits.end());
+  rebuild_blocks();
+}
+
+void OccupancyGrid::rebuild_blocks() {
+  const Index n = resolution_ / 4;
+  parallel_for(n, 1, [&](Index bz, Index) {
+    for (Index by = 0; by < n; ++by)
+      for (Index bx = 0; bx < n; ++bx) {
+        std::uint64_t word = 0;
+        for (Index i = 0; i < 64; ++i)
+          if (bits_[at(cell(4 * bx + i % 4, 4 * by + i / 4 % 4, 4 * bz + i / 16))])
+            word |= std::uint64_t{1} << i;
+        blocks_[at(bx + n * (by + n * bz))] = word;
+      }
+  });
+}
+
+}  // namespace fieldmark::nerf

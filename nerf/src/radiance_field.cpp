@@ -1,0 +1,161 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/model_file.h>
+#include <fieldmark/nerf/radiance_field.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+namespace fieldmark::nerf {
+namespace {
+
+using Json = nlohmann::json;
+constexpr const char* kOccupancy = "density/occupancy";
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+// The interleaved table as two tensors: columns [begin, begin + F) of the rows.
+std::vector<float> table_part(std::span<const float> table, std::size_t row, std::size_t begin) {
+  std::vector<float> part;
+  part.reserve(table.size() / 2);
+  for (std::size_t r = 0; r < table.size(); r += row)
+    part.insert(part.end(), table.begin() + static_cast<std::ptrdiff_t>(r + begin),
+                table.begin() + static_cast<std::ptrdiff_t>(r + begin + row / 2));
+  return part;
+}
+
+void set_table_part(std::span<float> table, std::size_t row, std::size_t begin,
+                    const std::vector<float>& part) {
+  for (std::size_t r = 0, k = 0; r < table.size(); r += row)
+    for (std::size_t f = 0; f < row / 2; ++f) table[r + begin + f] = part[k++];
+}
+
+Tensor<float> read_tensor(const SafetensorsFile& file, const std::string& name, const Shape& shape) {
+  Tensor<float> t = file.f32(name);
+  if (t.shape != shape)
+    throw IoError(file.path + ": tensor '" + name + "': expected shape " + shape.str() +
+                  " from the file's configuration, found " + t.shape.str());
+  return t;
+}
+
+struct TablePart {
+  const char* name;
+  std::size_t begin;
+};
+
+std::array<TablePart, 2> table_parts(const FieldOptions& o) {
+  return {TablePart{"hash/density_features", 0}, TablePart{"hash/colour_features", at(o.encoding.features)}};
+}
+
+}  // namespace
+
+RadianceField::RadianceField(const RadianceFieldOptions& options)
+    : field(params, options.field, options.seed), grid(options.occupancy), options_(options) {
+  if (!(options.step > 0 && options.step <= 1))
+    throw ValueError("[radiance_field] step must be above 0 and at most 1, got " +
+                     std::to_string(options.step));
+}
+
+void RadianceField::to_cube(const float* origin, float* cube_origin) const {
+  for (std::size_t a = 0; a < 3; ++a)
+    cube_origin[a] = static_cast<float>((static_cast<double>(origin[a]) - bounds.corner[a]) / bounds.side);
+}
+
+std::string RadianceField::configuration() const {
+  const FieldOptions& f = options_.field;
+  const Json json{{"levels", f.encoding.levels},
+                  {"features", f.encoding.features},
+                  {"log2_table", f.encoding.log2_table},
+                  {"base_resolution", f.encoding.base_resolution},
+                  {"finest_resolution", f.encoding.finest_resolution},
+                  {"width", f.width},
+                  {"geometry", f.geometry},
+                  {"occupancy", options_.occupancy},
+                  {"step", options_.step},
+                  {"corner", bounds.corner},
+                  {"side", bounds.side},
+                  {"background", background == Background::white ? "white" : "black"},
+                  {"cameras", Json::parse(format_camera_span(cameras))}};
+  return json.dump();
+}
+
+RadianceField RadianceField::from_configuration(std::string_view text, std::string_view place) {
+  try {
+    const Json j = Json::parse(text);
+    RadianceFieldOptions o;
+    o.field = {.encoding = {.levels = j.at("levels"),
+                            .features = j.at("features"),
+                            .log2_table = j.at("log2_table"),
+                            .base_resolution = j.at("base_resolution"),
+                            .finest_resolution = j.at("finest_resolution")},
+               .width = j.at("width"),
+               .geometry = j.at("geometry")};
+    o.occupancy = j.at("occupancy");
+    o.step = j.at("step");
+    RadianceField field(o);
+    field.bounds.corner = j.at("corner");
+    field.bounds.side = j.at("side");
+    field.background = j.at("background") == "white" ? Background::white : Background::black;
+    field.cameras = parse_camera_span(j.at("cameras").dump(), std::string(place) + ": cameras");
+    if (!(field.bounds.side > 0))
+      throw ValueError("side must be positive, got " + std::to_string(field.bounds.side));
+    return field;
+  } catch (const Json::exception& e) {
+    throw IoError(std::string(place) + ": expected a field's configuration, found " + e.what());
+  } catch (const ValueError& e) {
+    throw IoError(std::string(place) + ": expected a field's configuration within its ranges, found " +
+                  e.what());
+  }
+}
+
+void RadianceField::store(SafetensorsFile& file, const std::string& prefix) const {
+  for (const auto& e : params.entries()) {
+    if (e.name == "hash/table") continue;
+    file.add(prefix + e.name, e.shape, params.values(params.find(e.name)));
+  }
+  const auto table = params.values(field.encoding().table());
+  const auto row = at(2 * field.encoding().features());
+  for (const TablePart& part : table_parts(options_.field))
+    file.add(prefix + part.name, {field.encoding().rows(), field.encoding().features()},
+             table_part(table, row, part.begin));
+  std::vector<std::uint8_t> packed(at(grid.cells() / 8));
+  for (Index c = 0; c < grid.cells(); ++c)
+    if (grid.occupied(c)) packed[at(c / 8)] = static_cast<std::uint8_t>(packed[at(c / 8)] | (1u << (c % 8)));
+  file.add(prefix + kOccupancy, {grid.cells() / 8}, packed);
+}
+
+void RadianceField::restore(const SafetensorsFile& file, const std::string& prefix) {
+  for (const auto& e : params.entries()) {
+    if (e.name == "hash/table") continue;
+    const Tensor<float> t = read_tensor(file, prefix + e.name, e.shape);
+    std::copy(t.data.begin(), t.data.end(), params.values(params.find(e.name)).begin());
+  }
+  const auto row = at(2 * field.encoding().features());
+  for (const TablePart& part : table_parts(options_.field))
+    set_table_part(
+        params.values(field.encoding().table()), row, part.begin,
+        read_tensor(file, prefix + part.name, {field.encoding().rows(), field.encoding().features()}).data);
+  const std::vector<std::uint8_t> packed = file.u8(prefix + kOccupancy);
+  if (static_cast<Index>(packed.size()) != grid.cells() / 8)
+    throw IoError(file.path + ": tensor '" + prefix + kOccupancy + "': expected " +
+                  std::to_string(grid.cells() / 8) + " bytes, found " + std::to_string(packed.size()));
+  std::vector<std::uint8_t> bits(at(grid.cells()));
+  for (std::size_t c = 0; c < bits.size(); ++c) bits[c] = (packed[c / 8] >> (c % 8)) & 1;
+  grid.set_bits(bits);
+}
+
+void RadianceField::save(const std::filesystem::path& path) const {
+  SafetensorsFile file;
+  set_model_info(file, {.kind = "field", .config = configuration()});
+  store(file, "");
+  file.write(path);
+}
+
+RadianceField RadianceField::load(const std::filesystem::path& path) {
+  const SafetensorsFile file = SafetensorsFile::read(path);
+  const ModelInfo info = require_kind(file, "field");
+  RadianceField field = from_configuration(info.config, path.string() + ": metadata 'fieldmark': config");
+  field.restore(file, "");
+  return field;
+}
+
+}  // namespace fieldmark::nerf

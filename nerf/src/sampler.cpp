@@ -1,0 +1,122 @@
+#include <fieldmark/nerf/sampler.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace fieldmark::nerf {
+namespace {
+
+constexpr Index kWave = 8;
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+void check(const RayBatch& rays, std::span<const float> jitter, const SamplingOptions& options) {
+  if (!(options.step > 0))
+    throw ValueError("[sampler] step must be positive, got " + std::to_string(options.step));
+  if (rays.origins.size() != rays.directions.size() || rays.origins.size() % 3 != 0)
+    throw ShapeError("[sampler] origins and directions must both be [R, 3], got " +
+                     std::to_string(rays.origins.size()) + " and " + std::to_string(rays.directions.size()) +
+                     " numbers");
+  if (!jitter.empty() && static_cast<Index>(jitter.size()) != rays.size())
+    throw ShapeError("[sampler] jitter must have one number a ray (" + std::to_string(rays.size()) +
+                     "), got " + std::to_string(jitter.size()));
+}
+
+}  // namespace
+
+void RaySampler::sample(const Field<float>& field, const ParamStore<float>& params, const OccupancyGrid& grid,
+                        const RayBatch& rays, std::span<const float> jitter, const SamplingOptions& options,
+                        RaySamples& out) {
+  check(rays, jitter, options);
+  walks_.clear();
+  alive_.clear();
+  segments_.clear();
+  for (auto* buffer : {&t_, &x_, &density_features_, &colour_features_, &sigma_}) buffer->clear();
+  for (Index r = 0; r < rays.size(); ++r) {
+    walks_.emplace_back(&rays.origins[at(3 * r)], &rays.directions[at(3 * r)], options.step,
+                        jitter.empty() ? 0.5f : jitter[at(r)]);
+    alive_.push_back(r);
+  }
+  transmittance_.assign(at(rays.size()), 1.f);
+  while (!alive_.empty()) {
+    const auto first_row = static_cast<Index>(t_.size());
+    const std::size_t first_segment = segments_.size();
+    march_wave(grid, rays);
+    evaluate(field, params, first_row);
+    stop_rays(options, first_segment);
+  }
+  pack(rays.size(), field.encoding().width(), out);
+}
+
+// One segment for each ray that is still alive; rays that end here leave the list.
+void RaySampler::march_wave(const OccupancyGrid& grid, const RayBatch& rays) {
+  std::size_t kept = 0;
+  for (Index r : alive_) {
+    float t[kWave];
+    const Index count = walks_[at(r)].next(grid, kWave, t);
+    if (count > 0) segments_.push_back({r, static_cast<Index>(t_.size()), count});
+    for (Index i = 0; i < count; ++i) {
+      t_.push_back(t[i]);
+      for (Index a = 0; a < 3; ++a)
+        x_.push_back(rays.origins[at(3 * r + a)] + t[i] * rays.directions[at(3 * r + a)]);
+    }
+    if (count == kWave) alive_[kept++] = r;
+  }
+  alive_.resize(kept);
+}
+
+void RaySampler::evaluate(const Field<float>& field, const ParamStore<float>& params, Index first) {
+  const Index n = static_cast<Index>(t_.size()) - first, width = field.encoding().width();
+  if (n == 0) return;
+  density_features_.resize(at((first + n) * width));
+  colour_features_.resize(at((first + n) * width));
+  sigma_.resize(at(first + n));
+  float* features = density_features_.data() + first * width;
+  field.encoding().encode(params.values(field.encoding().table()), x_.data() + 3 * first, n, features,
+                          colour_features_.data() + first * width);
+  tape_.reset();
+  const Var<float> z = field.geometry(Params<float>(params, nullptr), tape_.constant(features, {n, width}));
+  std::copy_n(field.density(z).value(), n, sigma_.data() + first);
+}
+
+// Cuts segments where the transmittance falls below the threshold. The sample that crosses it is kept: it is
+// what stops the light.
+void RaySampler::stop_rays(const SamplingOptions& options, std::size_t first_segment) {
+  for (std::size_t s = first_segment; s < segments_.size(); ++s) {
+    Segment& segment = segments_[s];
+    float& transmittance = transmittance_[at(segment.ray)];
+    for (Index i = 0; i < segment.count; ++i) {
+      transmittance *= std::exp(-sigma_[at(segment.row + i)] * options.step);
+      if (transmittance < options.stop) segment.count = i + 1;
+    }
+  }
+  std::erase_if(alive_, [&](Index r) { return transmittance_[at(r)] < options.stop; });
+}
+
+// Waves hold segments of many rays; the packed form holds rays one after another. A stable count per ray
+// gives every segment its place, in the order of the waves.
+void RaySampler::pack(Index rays, Index width, RaySamples& out) {
+  out.ray_begin.assign(at(rays + 1), 0);
+  for (const Segment& s : segments_) out.ray_begin[at(s.ray + 1)] += s.count;
+  for (std::size_t r = 1; r < out.ray_begin.size(); ++r) out.ray_begin[r] += out.ray_begin[r - 1];
+  const Index total = out.ray_begin.back();
+  out.t.resize(at(total));
+  out.sigma.resize(at(total));
+  out.position.resize(at(3 * total));
+  out.density_features.resize(at(total * width));
+  out.colour_features.resize(at(total * width));
+  place_.assign(out.ray_begin.begin(), out.ray_begin.end() - 1);
+  for (const Segment& s : segments_) {
+    const Index to = place_[at(s.ray)];
+    place_[at(s.ray)] += s.count;
+    std::copy_n(t_.data() + s.row, s.count, out.t.data() + to);
+    std::copy_n(sigma_.data() + s.row, s.count, out.sigma.data() + to);
+    std::copy_n(x_.data() + 3 * s.row, 3 * s.count, out.position.data() + 3 * to);
+    std::copy_n(density_features_.data() + s.row * width, s.count * width,
+                out.density_features.data() + to * width);
+    std::copy_n(colour_features_.data() + s.row * width, s.count * width,
+                out.colour_features.data() + to * width);
+  }
+}
+
+}  // namespace fieldmark::nerf

@@ -1,0 +1,50 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/nerf/schedule.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace fieldmark::nerf {
+namespace {
+constexpr Index kLook = 16;         // steps between looks at the clock
+constexpr double kReserve = 0.985;  // of the time: the last part may turn out slower than the pace before it
+}  // namespace
+
+Schedule::Schedule(const ScheduleOptions& o) : options_(o), total_(o.steps) {
+  const auto require = [](bool ok, const char* what, double got) {
+    if (!ok) throw ValueError("[schedule] " + std::string(what) + ", got " + std::to_string(got));
+  };
+  require(o.steps >= 0, "steps must not be negative", static_cast<double>(o.steps));
+  require(o.steps > 0 || (o.seconds > 0 && std::isfinite(o.seconds)), "seconds must be positive", o.seconds);
+  require(o.lr > 0, "lr must be positive", o.lr);
+  require(o.half_after > 0, "half_after must be positive", o.half_after);
+  require(o.cooldown > 0 && o.cooldown < 1, "cooldown must be between 0 and 1", o.cooldown);
+  require(o.last > 0 && o.last <= 1, "last must be above 0 and at most 1", o.last);
+}
+
+void Schedule::observe(Index n, double seconds) {
+  if (total_ > 0 || n % kLook != 0 || n == 0) return;
+  if (last_step_ >= 0 && n > last_step_) {
+    const double pace = (seconds - last_seconds_) / static_cast<double>(n - last_step_);
+    pace_ = pace_ == 0 ? pace : 0.8 * pace_ + 0.2 * pace;
+  }
+  last_step_ = n;
+  last_seconds_ = seconds;
+  const auto total = static_cast<Index>(std::ceil(static_cast<double>(n) / (1 - options_.cooldown)));
+  if (seconds + pace_ * static_cast<double>(total - n) >= kReserve * options_.seconds) total_ = total;
+}
+
+double Schedule::lr(Index n) const {
+  const double steady = options_.lr / (1 + static_cast<double>(n) / options_.half_after);
+  if (total_ == 0) return steady;
+  const double begin = std::floor((1 - options_.cooldown) * static_cast<double>(total_));
+  const double fraction =
+      (static_cast<double>(n) - begin) / std::max(1.0, static_cast<double>(total_) - begin);
+  return steady * std::pow(options_.last, std::clamp(fraction, 0.0, 1.0));
+}
+
+void Schedule::resume(Index total) {
+  if (options_.steps == 0) total_ = total;
+}
+
+}  // namespace fieldmark::nerf

@@ -1,0 +1,249 @@
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/nerf/composite.h>
+#include <fieldmark/nerf/photometric_loss.h>
+#include <fieldmark/nerf/spherical_harmonics.h>
+#include <fieldmark/nerf/trainer.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace fieldmark::nerf {
+namespace {
+
+constexpr int kShards = 16;
+constexpr Index kRays = 64;             // of a chunk
+constexpr Index kOccupancyPeriod = 16;  // steps
+constexpr Index kFirstRays = 1024;      // of a step, until the samples of a ray are known
+constexpr Index kMostRays = 1 << 16;
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+bool has_alpha(const Dataset& data) {
+  return std::any_of(data.views.begin(), data.views.end(), [](const View& v) {
+    for (Index i = 3; i < v.rgba.size(); i += 4)
+      if (v.rgba[i] < 1) return true;
+    return false;
+  });
+}
+
+}  // namespace
+
+// The rays of a chunk, and what its samples pass back to the table.
+struct Trainer::Chunk {
+  std::vector<float> origins, directions, jitter, photograph, background;
+  std::vector<float> position, ddensity, dcolour;
+  Index samples = 0;
+};
+
+Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& options)
+    : field_(field),
+      data_(data),
+      options_(options),
+      schedule_(options.schedule),
+      pixel_rng_(options.seed, 1),
+      background_rng_(options.seed, 2),
+      occupancy_rng_(options.seed, 3),
+      loop_(kShards, field.field.network_size()),
+      adam_(field.params.size(), {.lr = 1, .zero_grads = true}),
+      samplers_(kShards),
+      samples_of_shard_(kShards),
+      rays_per_step_(kFirstRays) {
+  if (options.samples_per_step < 1024)
+    throw ValueError("[trainer] samples_per_step must be at least 1024, got " +
+                     std::to_string(options.samples_per_step));
+  if (data.views.empty()) throw ValueError("[trainer] data must have at least one view");
+  field_.background = data.background;
+  field_.cameras = camera_span(data);
+  if (has_alpha(data)) carve();
+}
+
+Trainer::~Trainer() = default;
+
+void Trainer::carve() {
+  std::vector<Silhouette> silhouettes;
+  for (const View& v : data_.views) silhouettes.push_back({v.camera, &v.rgba});
+  const Index n = field_.grid.resolution();
+  field_.bounds = tighten(field_.bounds, visual_hull(silhouettes, field_.bounds, n), n);
+  field_.grid.restrict_to(visual_hull(silhouettes, field_.bounds, n));
+}
+
+void Trainer::choose_rays(Index first, Index count, Chunk& c) const {
+  const auto step = static_cast<std::uint64_t>(steps_);
+  for (auto [buffer, columns] :
+       {std::pair{&c.origins, 3}, {&c.directions, 3}, {&c.jitter, 1}, {&c.photograph, 4}, {&c.background, 3}})
+    buffer->resize(at(count * columns));
+  for (Index i = 0; i < count; ++i) {
+    const auto ray = static_cast<std::uint64_t>(first + i);
+    const auto u = pixel_rng_.uniform4(step, ray);
+    const auto pick = [](float x, Index n) {
+      return std::min(static_cast<Index>(x * static_cast<float>(n)), n - 1);
+    };
+    const View& view = data_.views[at(pick(u[0], static_cast<Index>(data_.views.size())))];
+    const Index x = pick(u[1], view.camera.width), y = pick(u[2], view.camera.height);
+    const float pixel[2] = {static_cast<float>(x), static_cast<float>(y)};
+    float* origin = &c.origins[at(3 * i)];
+    camera_rays(view.camera, pixel, origin, &c.directions[at(3 * i)]);
+    field_.to_cube(origin, origin);
+    c.jitter[at(i)] = u[3];
+    std::copy_n(view.rgba.data.data() + 4 * (y * view.camera.width + x), 4, &c.photograph[at(4 * i)]);
+    const auto b = background_rng_.uniform4(step, ray);
+    std::copy_n(b.data(), 3, &c.background[at(3 * i)]);
+  }
+}
+
+double Trainer::run_chunk(Index index, Index shard, Tape<float>& tape, float* grads) {
+  Chunk& chunk = chunks_[at(index)];
+  choose_rays(index * kRays, kRays, chunk);
+  RaySamples& s = samples_of_shard_[at(shard)];
+  samplers_[at(shard)].sample(field_.field, field_.params, field_.grid, {chunk.origins, chunk.directions},
+                              chunk.jitter, {.step = field_.step()}, s);
+  const Index n = chunk.samples = s.size(), width = field_.field.encoding().width();
+  chunk.position.assign(s.position.begin(), s.position.end());
+  chunk.ddensity.assign(at(n * width), 0.f);
+  chunk.dcolour.assign(at(n * width), 0.f);
+
+  // The features were looked up by the sampler; as leaves they collect what the table is owed.
+  const Params<float> params(field_.params, grads);
+  const Var<float> density_features = tape.leaf(s.density_features.data(), chunk.ddensity.data(), {n, width});
+  const Var<float> colour_features = tape.leaf(s.colour_features.data(), chunk.dcolour.data(), {n, width});
+  const Var<float> of_ray = spherical_harmonics(tape.constant(chunk.directions.data(), {kRays, 3}));
+  float* harmonics = tape.scratch(n * kSphericalHarmonics);
+  for (Index r = 0; r < kRays; ++r)
+    for (Index i = s.ray_begin[at(r)]; i < s.ray_begin[at(r + 1)]; ++i)
+      std::copy_n(of_ray.value() + r * kSphericalHarmonics, kSphericalHarmonics,
+                  harmonics + i * kSphericalHarmonics);
+  float* delta = tape.scratch(n);
+  std::fill_n(delta, n, field_.step());
+
+  const Var<float> z = field_.field.geometry(params, density_features);
+  const Var<float> rgb =
+      field_.field.colour(params, z, colour_features, tape.constant(harmonics, {n, kSphericalHarmonics}));
+  const Var<float> rays = composite(field_.field.density(z), rgb, tape.constant(delta, {n}), s.ray_begin);
+  const double share = static_cast<double>(kRays) / static_cast<double>(rays_per_step_);
+  const Var<float> loss = photometric_loss<float>(rays, chunk.photograph, chunk.background,
+                                                  {.huber = options_.huber, .scale = share});
+  const double value = static_cast<double>(loss.value()[0]);
+  tape.backward(loss);
+  return value;
+}
+
+// A level owns its rows of the table; chunks are added in order.
+void Trainer::backward_table() {
+  const HashEncoding<float>& encoding = field_.field.encoding();
+  const std::span<float> grad = field_.params.grads(encoding.table());
+  const Index chunks = rays_per_step_ / kRays;
+  parallel_for(encoding.levels(), 1, [&](Index l, Index) {
+    const int level = static_cast<int>(encoding.levels() - 1 - l);  // the finest, slowest level first
+    for (Index c = 0; c < chunks; ++c) {
+      const Chunk& k = chunks_[at(c)];
+      encoding.backward_level(level, k.position.data(), k.samples, k.ddensity.data(), k.dcolour.data(), grad);
+    }
+  });
+}
+
+void Trainer::step(double seconds) {
+  schedule_.observe(steps_, seconds);
+  if (steps_ % kOccupancyPeriod == 0) refresh_occupancy();
+  const Index chunks = rays_per_step_ / kRays;
+  if (static_cast<Index>(chunks_.size()) < chunks) chunks_.resize(at(chunks));
+  const Index network = field_.field.network_size();
+  const double loss = loop_.run(
+      chunks,
+      [&](Index c, Index shard, Tape<float>& tape, float* grads) { return run_chunk(c, shard, tape, grads); },
+      field_.params.grads().first(at(network)));
+  backward_table();
+  const AdamRange ranges[] = {
+      {.begin = 0, .end = network, .lr_factor = schedule_.lr(steps_)},
+      {.begin = network, .end = field_.params.size(), .lr_factor = schedule_.lr(steps_), .skip_zero = true}};
+  adam_.step(field_.params.values(), field_.params.grads(), ranges);
+
+  // The next step's rays: as many as have the wanted number of samples, changing by at most a half.
+  Index samples = 0;
+  for (Index c = 0; c < chunks; ++c) samples += chunks_[at(c)].samples;
+  const double wanted = static_cast<double>(rays_per_step_) * static_cast<double>(options_.samples_per_step) /
+                        static_cast<double>(std::max<Index>(samples, 1));
+  const Index next = static_cast<Index>(std::clamp(wanted, static_cast<double>(rays_per_step_) / 1.5,
+                                                   static_cast<double>(rays_per_step_) * 1.5));
+  rays_per_step_ = std::clamp(next / kRays * kRays, kRays * kShards, kMostRays);
+  samples_ += static_cast<double>(samples);
+  smoothed_loss_ = smoothed_loss_ < 0 ? loss : 0.98 * smoothed_loss_ + 0.02 * loss;
+  ++steps_;
+}
+
+double Trainer::train_psnr() const { return -10 * std::log10(std::max(2 * smoothed_loss_, 1e-10)); }
+
+void Trainer::refresh_occupancy() {
+  const OccupancyGrid::Density density = [&](const float* x, Index n, float* sigma) {
+    const HashEncoding<float>& encoding = field_.field.encoding();
+    Tape<float> tape;
+    float* features = tape.scratch(n * encoding.width());
+    float* unused = tape.scratch(n * encoding.width());
+    encoding.encode(field_.params.values(encoding.table()), x, n, features, unused);
+    const Var<float> z = field_.field.geometry(Params<float>(field_.params, nullptr),
+                                               tape.constant(features, {n, encoding.width()}));
+    std::copy_n(field_.field.density(z).value(), n, sigma);
+  };
+  const bool warm = steps_ >= options_.warm_up;
+  field_.grid.update(density, occupancy_rng_,
+                     {.step = field_.step(),
+                      .threshold = warm ? 0.01f : -1.f,  // below zero: every candidate stays
+                      .fraction = steps_ < 2 * options_.warm_up ? 1 : 4,
+                      .round = static_cast<std::uint64_t>(steps_ / kOccupancyPeriod)});
+}
+
+std::string Trainer::fingerprint() const {
+  return field_.configuration() + " data " + data_.name + " " + std::to_string(data_.views.size()) +
+         " views " + std::to_string(data_.views.front().camera.width) + "x" +
+         std::to_string(data_.views.front().camera.height) + " seed " + std::to_string(options_.seed) +
+         " steps " + std::to_string(options_.schedule.steps) + " samples " +
+         std::to_string(options_.samples_per_step);
+}
+
+void Trainer::save(const std::filesystem::path& path) const {
+  SafetensorsFile file;
+  file.metadata["fieldmark"] = R"({"format":1,"kind":"checkpoint"})";
+  file.metadata["of"] = fingerprint();
+  const Index n = field_.params.size();
+  file.add("values", {n}, field_.params.values());
+  file.add("mean", {n}, adam_.mean());
+  file.add("mean_square", {n}, adam_.mean_square());
+  file.add("densities", {field_.grid.cells()}, field_.grid.densities());
+  file.add("bits", {field_.grid.cells()}, field_.grid.bits());
+  const std::int64_t counts[] = {steps_, rays_per_step_, schedule_.total()};
+  const double sums[] = {samples_, smoothed_loss_};
+  file.add("counts", {3}, counts);
+  file.add("sums", {2}, sums);
+  file.write(path);
+}
+
+void Trainer::restore(const std::filesystem::path& path) {
+  const SafetensorsFile file = SafetensorsFile::read(path);
+  const auto of = file.metadata.find("of");
+  if (of == file.metadata.end() || of->second != fingerprint())
+    throw IoError(path.string() + ": expected a checkpoint of this run (" + fingerprint() + "), found " +
+                  (of == file.metadata.end() ? std::string("another kind of file") : of->second));
+  const auto copy = [&](const char* name, std::span<float> to) {
+    const Tensor<float> t = file.f32(name);
+    if (t.data.size() != to.size())
+      throw IoError(path.string() + ": tensor '" + name + "': expected " + std::to_string(to.size()) +
+                    " numbers, found " + std::to_string(t.data.size()));
+    std::copy(t.data.begin(), t.data.end(), to.begin());
+  };
+  copy("values", field_.params.values());
+  copy("mean", adam_.mean());
+  copy("mean_square", adam_.mean_square());
+  field_.grid.restore(file.f32("densities").data, file.u8("bits"));
+  const auto counts = file.i64("counts");
+  const auto sums = file.f64("sums").data;
+  if (counts.size() != 3 || sums.size() != 2)
+    throw IoError(path.string() + ": expected 3 counts and 2 sums, found " + std::to_string(counts.size()) +
+                  " and " + std::to_string(sums.size()));
+  steps_ = counts[0];
+  rays_per_step_ = counts[1];
+  schedule_.resume(counts[2]);
+  samples_ = sums[0];
+  smoothed_loss_ = sums[1];
+  adam_.set_steps(steps_);
+}
+
+}  // namespace fieldmark::nerf

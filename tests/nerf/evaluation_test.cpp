@@ -1,0 +1,117 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/metrics.h>
+#include <fieldmark/nerf/evaluation.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "small_field.h"
+#include "support/catch.h"
+
+using namespace fieldmark;
+using namespace fieldmark::nerf;
+
+namespace {
+// Photographs of the field itself, with its opacity as alpha, brightened by `error`.
+Dataset photographs(const RadianceField& field, int views, float error) {
+  Dataset data{.name = "self", .split = "test", .background = field.background, .views = {}};
+  Renderer renderer(field);
+  for (int v = 0; v < views; ++v) {
+    const Camera camera = make_camera(look_at({3.0 - v, -3, 1.5}, {0, 0, 0}, {0, 0, 1}), 0.9, 20, 16);
+    const Rendering r = renderer.render(camera);
+    View view{.camera = camera, .rgba = Tensor<float>(Shape{16, 20, 4}, 1.f), .name = "v"};
+    for (Index i = 0; i < 320; ++i) {
+      const float a = r.opacity[i];
+      for (Index k = 0; k < 3; ++k) {
+        const float straight = a > 0 ? (r.rgb[3 * i + k] - (1 - a)) / a : 0.f;
+        view.rgba[4 * i + k] = std::min(std::max(straight + error, 0.f), 1.f);
+      }
+      view.rgba[4 * i + 3] = a;
+    }
+    data.views.push_back(view);
+  }
+  return data;
+}
+}  // namespace
+
+TEST_CASE("evaluation: photographs of the field itself are nearly perfect") {
+  const RadianceField field = small_field();
+  Renderer renderer(field);
+  const Evaluation e = evaluate(renderer, photographs(field, 3, 0));
+  CHECK(e.views == 3);
+  CHECK(e.per_view.size() == 3);
+  CHECK(e.psnr > 48);  // at most a rounding step of 1/255 apart
+  CHECK(e.ssim > 0.999);
+  CHECK(e.seconds_per_view > 0);
+}
+
+TEST_CASE("evaluation: scores are those of the metrics, and means are over the views") {
+  const RadianceField field = small_field();
+  Renderer renderer(field);
+  const Dataset data = photographs(field, 3, 0.1f);
+  const Evaluation e = evaluate(renderer, data);
+  double sum[3] = {0, 0, 0};
+  for (std::size_t v = 0; v < 3; ++v) {
+    const Rendering r = renderer.render(data.views[v].camera);
+    const Tensor<float> photo = composited(data.views[v], data.background);
+    Tensor<float> mask(Shape{16, 20});
+    for (Index i = 0; i < 320; ++i) mask[i] = data.views[v].rgba[4 * i + 3];
+    CHECK(e.per_view[v].psnr == psnr(r.rgb, photo));
+    CHECK(e.per_view[v].psnr_object == psnr_masked(r.rgb, photo, mask));
+    CHECK(e.per_view[v].ssim == ssim(r.rgb, photo));
+    sum[0] += e.per_view[v].psnr, sum[1] += e.per_view[v].psnr_object, sum[2] += e.per_view[v].ssim;
+  }
+  CHECK(std::abs(e.psnr - sum[0] / 3) < 1e-12);
+  CHECK(std::abs(e.psnr_object - sum[1] / 3) < 1e-12);
+  CHECK(std::abs(e.ssim - sum[2] / 3) < 1e-12);
+  CHECK(e.psnr_object < e.psnr);
+}
+
+TEST_CASE("evaluation: without alpha the object is where the rendering is opaque") {
+  const RadianceField field = small_field();
+  Renderer renderer(field);
+  Dataset data = photographs(field, 1, 0);
+  const Tensor<float> before = composited(data.views[0], data.background);
+  for (Index i = 0; i < 320; ++i) {
+    for (Index k = 0; k < 3; ++k) data.views[0].rgba[4 * i + k] = 0.9f * before[3 * i + k];
+    data.views[0].rgba[4 * i + 3] = 1;
+  }
+  const Rendering r = renderer.render(data.views[0].camera);
+  const Evaluation e = evaluate(renderer, data);
+  CHECK(e.psnr_object == psnr_masked(r.rgb, composited(data.views[0], data.background), r.opacity));
+}
+
+TEST_CASE("evaluation: a view without the object and a tiny picture are left out of their means") {
+  const RadianceField field = small_field();
+  Renderer renderer(field);
+  Dataset data = photographs(field, 2, 0.1f);
+  for (Index i = 0; i < 320; ++i) data.views[1].rgba[4 * i + 3] = 0;
+  const Evaluation e = evaluate(renderer, data);
+  CHECK(std::isnan(e.per_view[1].psnr_object));
+  CHECK(e.psnr_object == e.per_view[0].psnr_object);
+  data.views.resize(1);
+  data.views[0].camera = data.views[0].camera.scaled(4, 4);
+  data.views[0].rgba = Tensor<float>(Shape{4, 4, 4}, 0.5f);
+  CHECK(std::isnan(evaluate(renderer, data).ssim));
+}
+
+TEST_CASE("evaluation: progress counts views and can end it") {
+  const RadianceField field = small_field();
+  Renderer renderer(field);
+  const Dataset data = photographs(field, 3, 0);
+  std::vector<Index> seen;
+  const Evaluation e = evaluate(renderer, data, [&](Index done, Index total) {
+    CHECK(total == 3);
+    seen.push_back(done);
+    return done < 2;
+  });
+  CHECK(seen == std::vector<Index>{1, 2});
+  CHECK(e.views == 2);
+  CHECK(e.per_view.size() == 2);
+}
+
+TEST_CASE("evaluation: no views are an error") {
+  const RadianceField field = small_field();
+  Renderer renderer(field);
+  CHECK_THROWS_WITH(evaluate(renderer, Dataset{}), "[evaluate] dataset must have at least one view, got 0");
+}

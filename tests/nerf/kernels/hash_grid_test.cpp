@@ -1,0 +1,101 @@
+#include "kernels/hash_grid.h"
+
+#include <cmath>
+#include <vector>
+
+#include "nerf/hash_reference.h"
+#include "support/each_isa.h"
+#include "support/random.h"
+
+using namespace fieldmark;
+using namespace fieldmark::kernels;
+
+namespace {
+// A level indexed directly and a hashed one.
+constexpr HashLevel kLevels[] = {{3, 0, 0}, {16, 63, 64}};
+constexpr Index kRows = 128;
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+// What the three kernels compute, in long double from the definition. Entry = 2 part features.
+struct Reference {
+  std::vector<long double> density, colour, table_gradient, dx;
+};
+
+Reference reference(int part, const Tensor<float>& x, const Tensor<float>& table, const Tensor<float>& dd,
+                    const Tensor<float>& dc) {
+  const Index n = x.shape[0], width = 2 * part;
+  Reference r{std::vector<long double>(at(n * width)), std::vector<long double>(at(n * width)),
+              std::vector<long double>(at(kRows * width)), std::vector<long double>(at(3 * n))};
+  for (Index i = 0; i < n; ++i)
+    for (Index l = 0; l < 2; ++l) {
+      const HashLevel& level = kLevels[l];
+      const auto corners = hash_corners(level.resolution, level.mask ? level.mask + 1 : 0,
+                                        {x[3 * i], x[3 * i + 1], x[3 * i + 2]});
+      for (const auto& c : corners)
+        for (Index f = 0; f < part; ++f) {
+          const Index out = i * width + l * part + f, entry = (level.first + c.row) * width + f;
+          r.density[at(out)] += c.weight * static_cast<long double>(table[entry]);
+          r.colour[at(out)] += c.weight * static_cast<long double>(table[entry + part]);
+          r.table_gradient[at(entry)] += c.weight * static_cast<long double>(dd[out]);
+          r.table_gradient[at(entry + part)] += c.weight * static_cast<long double>(dc[out]);
+          for (std::size_t a = 0; a < 3; ++a)
+            r.dx[at(3 * i) + a] += c.gradient[a] * (static_cast<long double>(dd[out]) * table[entry] +
+                                                    static_cast<long double>(dc[out]) * table[entry + part]);
+        }
+    }
+  return r;
+}
+
+template <class A>
+double worst(const A& got, const std::vector<long double>& want) {
+  double w = 0;
+  for (std::size_t i = 0; i < want.size(); ++i) {
+    const auto d = static_cast<double>(std::abs(static_cast<long double>(got[i]) - want[i]));
+    w = d <= w ? w : d;
+  }
+  return w;
+}
+
+template <class T>
+void check_all(int part, Index n, double tolerance) {
+  const auto xf = uniform<float>({n, 3}, 0, 1, 1), tf = uniform<float>({kRows, 2 * part}, -1, 1, 2),
+             ddf = uniform<float>({n, 2 * part}, -1, 1, 3), dcf = uniform<float>({n, 2 * part}, -1, 1, 4);
+  const auto as = [](const Tensor<float>& t) { return std::vector<T>(t.data.begin(), t.data.end()); };
+  const auto x = as(xf), table = as(tf), dd = as(ddf), dc = as(dcf);
+  const Reference want = reference(part, xf, tf, ddf, dcf);
+  std::vector<T> density(dd.size()), colour(dd.size()), dx(x.size()), grad(table.size());
+  FIELDMARK_KERNEL(hash_forward<T>)
+  (kLevels, 2, part, x.data(), n, table.data(), density.data(), colour.data());
+  for (int l = 0; l < 2; ++l) FIELDMARK_KERNEL(hash_backward_level<T>)
+  (kLevels[l], l, 2, part, x.data(), n, dd.data(), dc.data(), grad.data());
+  FIELDMARK_KERNEL(hash_backward_x<T>)
+  (kLevels, 2, part, x.data(), n, table.data(), dd.data(), dc.data(), dx.data());
+  CAPTURE(n, part);
+  CHECK(worst(density, want.density) < tolerance);
+  CHECK(worst(colour, want.colour) < tolerance);
+  CHECK(worst(grad, want.table_gradient) < 10 * tolerance);  // sums of up to 70 points
+  CHECK(worst(dx, want.dx) < 100 * tolerance);               // slopes of up to 16 cells, 16 terms each
+}
+}  // namespace
+
+TEST_CASE("kernels/hash_grid: values and gradients of every count from 1 to 70, each instruction set") {
+  each_isa([] {
+    for (const int part : {2, 4})
+      for (Index n = 1; n <= 70; ++n) {
+        check_all<float>(part, n, 5e-6);  // 16 cells: fractions are off by up to 16 * 2^-24 = 1e-6 an axis
+        check_all<double>(part, n, 1e-14);
+      }
+  });
+}
+
+TEST_CASE("kernels/hash_grid: a missing cotangent counts as zero") {
+  const auto x = uniform({20, 3}, 0, 1, 1), dd = uniform({20, 4}, -1, 1, 2), zero = uniform({20, 4}, 0, 0, 3);
+  each_isa([&] {
+    std::vector<double> with_zero(kRows * 4), with_null(kRows * 4);
+    const auto backward = FIELDMARK_KERNEL(hash_backward_level<double>);
+    backward(kLevels[1], 1, 2, 2, x.data.data(), 20, dd.data.data(), zero.data.data(), with_zero.data());
+    backward(kLevels[1], 1, 2, 2, x.data.data(), 20, dd.data.data(), nullptr, with_null.data());
+    CHECK(with_zero == with_null);
+  });
+}

@@ -1,0 +1,156 @@
+#include <fieldmark/nerf/marching.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "support/catch.h"
+#include "support/random.h"
+
+using namespace fieldmark;
+using namespace fieldmark::nerf;
+
+namespace {
+struct Line {
+  float o[3], d[3];
+};
+
+OccupancyGrid random_grid(Index resolution, double filled, unsigned seed) {
+  OccupancyGrid grid(resolution);
+  const auto u = uniform({grid.cells()}, 0, 1, seed);
+  std::vector<std::uint8_t> bits(static_cast<std::size_t>(grid.cells()));
+  for (Index c = 0; c < grid.cells(); ++c) bits[static_cast<std::size_t>(c)] = u[c] < filled;
+  grid.set_bits(bits);
+  return grid;
+}
+
+std::vector<float> walk(const OccupancyGrid& grid, const Line& line, float step, float jitter,
+                        Index max = 1000) {
+  RayWalk ray(line.o, line.d, step, jitter);
+  std::vector<float> all, t(static_cast<std::size_t>(max));
+  for (Index count = max; count == max;) {
+    count = ray.next(grid, max, t.data());
+    all.insert(all.end(), t.begin(), t.begin() + count);
+  }
+  return all;
+}
+
+// Every sample of the ray, judged cell by cell in double. `doubtful` are those within 1e-4 of a cell's face
+// or of the ray's ends, which rounding may put on either side.
+struct Dense {
+  std::vector<float> certain, doubtful;
+};
+Dense dense(const OccupancyGrid& grid, const Line& line, float step, float jitter) {
+  Dense result;
+  const CubeSpan span = intersect_unit_cube(line.o, line.d);
+  const auto n = static_cast<double>(grid.resolution());
+  for (Index k = 0; span.near < span.far; ++k) {
+    const float t = span.near + (static_cast<float>(k) + jitter) * step;
+    if (!(t < span.far)) break;
+    bool near_face = t > span.far - 1e-5f;
+    Index cell[3];
+    for (int a = 0; a < 3; ++a) {
+      const double p =
+          n * (static_cast<double>(line.o[a]) + static_cast<double>(t) * static_cast<double>(line.d[a]));
+      near_face |= line.d[a] != 0 && std::abs(p - std::round(p)) < 1e-4;
+      cell[a] = std::min(std::max(static_cast<Index>(std::floor(p)), Index{0}), grid.resolution() - 1);
+    }
+    if (near_face)
+      result.doubtful.push_back(t);
+    else if (grid.occupied(grid.cell(cell[0], cell[1], cell[2])))
+      result.certain.push_back(t);
+  }
+  return result;
+}
+
+// The walk takes exactly the dense samples, up to the doubtful ones.
+void check_against_dense(const OccupancyGrid& grid, const Line& line, float step, float jitter) {
+  const Dense want = dense(grid, line, step, jitter);
+  const auto got = walk(grid, line, step, jitter);
+  CAPTURE(line.o[0], line.o[1], line.o[2], line.d[0], line.d[1], line.d[2]);
+  CHECK(std::is_sorted(got.begin(), got.end()));
+  CHECK(std::includes(got.begin(), got.end(), want.certain.begin(), want.certain.end()));
+  for (const float t : got)
+    CHECK((std::binary_search(want.certain.begin(), want.certain.end(), t) ||
+           std::binary_search(want.doubtful.begin(), want.doubtful.end(), t)));
+}
+
+Line towards(const Tensor<double>& u, Index i) {
+  Line line;
+  double norm = 0;
+  for (int a = 0; a < 3; ++a) norm += u[6 * i + 3 + a] * u[6 * i + 3 + a];
+  for (int a = 0; a < 3; ++a) {
+    line.o[a] = static_cast<float>(0.5 + 2 * u[6 * i + a]);
+    line.d[a] = static_cast<float>(u[6 * i + 3 + a] / std::sqrt(norm));
+  }
+  return line;
+}
+}  // namespace
+
+TEST_CASE("marching: span of a ray through the cube") {
+  const auto span = [](Line l) { return intersect_unit_cube(l.o, l.d); };
+  const CubeSpan across = span({{-1, 0.5f, 0.5f}, {1, 0, 0}});
+  CHECK((across.near == 1 && across.far == 2));
+  const CubeSpan inside = span({{0.25f, 0.5f, 0.5f}, {-1, 0, 0}});
+  CHECK((inside.near == 0 && inside.far == 0.25f));
+  const CubeSpan diagonal = span({{-1, -1, -1}, {0.57735027f, 0.57735027f, 0.57735027f}});
+  CHECK(std::abs(diagonal.near - std::sqrt(3.f)) < 1e-6f);
+  CHECK(std::abs(diagonal.far - 2 * std::sqrt(3.f)) < 1e-6f);
+}
+
+TEST_CASE("marching: rays that miss, point away, have no direction or are not numbers are empty") {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const Line empty[] = {{{-1, 2, 0.5f}, {1, 0, 0}},      {{-1, 0.5f, 0.5f}, {-1, 0, 0}},
+                        {{0.5f, 0.5f, 0.5f}, {0, 0, 0}}, {{2, 2, 2}, {0, 0, 0}},
+                        {{nan, 0.5f, 0.5f}, {0, 0, 0}},  {{0.5f, 0.5f, -1}, {0, 0, nan}}};
+  const OccupancyGrid grid(4);
+  for (const Line& line : empty) {
+    const CubeSpan span = intersect_unit_cube(line.o, line.d);
+    CHECK_FALSE(span.near < span.far);
+    CHECK(walk(grid, line, 0.01f, 0.5f).empty());
+  }
+}
+
+TEST_CASE("marching: a ray in a face is inside, one beside it is not") {
+  for (const float face : {0.f, 1.f}) {
+    const Line in{{-1, face, 0.5f}, {1, 0, 0}};
+    CHECK(intersect_unit_cube(in.o, in.d).far == 2);
+    CHECK(walk(OccupancyGrid(8), in, 0.125f, 0.5f).size() == 8);
+  }
+  const Line out{{-1, std::nextafter(1.f, 2.f), 0.5f}, {1, 0, 0}};
+  CHECK(intersect_unit_cube(out.o, out.d).far == 0);
+}
+
+TEST_CASE("marching: equal to dense stepping on random grids") {
+  const auto u = uniform({150, 6}, -1, 1, 3);
+  for (const double filled : {0.005, 0.1, 0.9}) {
+    const OccupancyGrid grid = random_grid(16, filled, 2);
+    for (Index i = 0; i < 150; ++i)
+      check_against_dense(grid, towards(u, i), i % 2 == 0 ? 0.004f : 0.11f,
+                          0.1f * static_cast<float>(i % 10));
+  }
+}
+
+TEST_CASE("marching: equal to dense stepping along the axes and from inside") {
+  const OccupancyGrid grid = random_grid(16, 0.05, 4);
+  for (int axis = 0; axis < 3; ++axis)
+    for (const float sign : {-1.f, 1.f})
+      for (const float start : {-0.3f, 0.41f, 1.3f}) {
+        Line line{{0.33f, 0.71f, 0.52f}, {0, 0, 0}};
+        line.o[axis] = start;
+        line.d[axis] = sign;
+        check_against_dense(grid, line, 0.003f, 0.37f);
+      }
+}
+
+TEST_CASE("marching: pieces of any length are the whole walk") {
+  const OccupancyGrid grid = random_grid(16, 0.2, 5);
+  const Line line = towards(uniform({1, 6}, -0.2, 0.2, 6), 0);
+  const auto whole = walk(grid, line, 0.002f, 0.25f);
+  CHECK(whole.size() > 10);
+  for (const Index piece : {1, 3, 16}) CHECK(walk(grid, line, 0.002f, 0.25f, piece) == whole);
+}
+
+TEST_CASE("marching: nothing is sampled in an empty grid") {
+  CHECK(walk(random_grid(16, 0, 1), {{-1, 0.4f, 0.6f}, {1, 0, 0}}, 1e-3f, 0.5f).empty());
+}

@@ -1,0 +1,154 @@
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/nerf/renderer.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "small_field.h"
+#include "support/catch.h"
+#include "support/each_isa.h"
+
+using namespace fieldmark;
+using namespace fieldmark::nerf;
+
+namespace {
+Camera test_camera(Index width = 23, Index height = 18) {
+  return make_camera(look_at({2.2, -3.1, 1.7}, {0.1, 0.2, 0}, {0, 0, 1}), 0.9, width, height);
+}
+
+// Every pixel's samples one after another through the Field op, all in double, nothing skipped or stopped.
+struct Reference {
+  ParamStore<double> store;
+  Field<double> field;
+  const RadianceField& f;
+  explicit Reference(const RadianceField& rf) : field(store, rf.options().field, 0), f(rf) {
+    std::copy(rf.params.values().begin(), rf.params.values().end(), store.values().begin());
+  }
+
+  // Red, green, blue and opacity of a ray, background not added.
+  std::array<double, 4> trace(const Ray& ray) const {
+    double o[3], near = 0, far = 1e9;
+    for (std::size_t a = 0; a < 3; ++a) {
+      o[a] = (ray.origin[a] - f.bounds.corner[a]) / f.bounds.side;
+      const double t0 = -o[a] / ray.direction[a], t1 = (1 - o[a]) / ray.direction[a];
+      near = std::max(near, std::min(t0, t1));
+      far = std::min(far, std::max(t0, t1));
+    }
+    std::array<double, 4> out{};
+    const auto step = static_cast<double>(f.step());
+    double depth = 0;
+    for (double t = near + step / 2; t < far; t += step) {
+      const Tensor<double> x(Shape{1, 3}, {o[0] + t * ray.direction[0], o[1] + t * ray.direction[1],
+                                           o[2] + t * ray.direction[2]});
+      const Tensor<double> d(Shape{1, 3}, {ray.direction.begin(), ray.direction.end()});
+      Tape<double> tape;
+      const auto y = field(Params<double>(store, nullptr), tape.constant(x), tape.constant(d));
+      const double w = -std::exp(-depth) * std::expm1(-y.sigma.value()[0] * step);
+      for (std::size_t k = 0; k < 3; ++k) out[k] += w * y.rgb.value()[k];
+      out[3] += w;
+      depth += y.sigma.value()[0] * step;
+    }
+    return out;
+  }
+};
+
+// Largest difference of a rendering from the reference, over colour and opacity.
+double worst_error(const RadianceField& f, const Rendering& view, const Camera& camera) {
+  const Reference reference(f);
+  const auto background = static_cast<double>(background_value(f.background));
+  double worst = 0;
+  for (Index y = 0; y < camera.height; ++y)
+    for (Index x = 0; x < camera.width; ++x) {
+      const auto want = reference.trace(pixel_ray(camera, static_cast<double>(x), static_cast<double>(y)));
+      const Index pixel = y * camera.width + x;
+      worst = std::max(worst, std::abs(static_cast<double>(view.opacity[pixel]) - want[3]));
+      for (Index k = 0; k < 3; ++k)
+        worst = std::max(worst, std::abs(static_cast<double>(view.rgb[3 * pixel + k]) -
+                                         (want[static_cast<std::size_t>(k)] + (1 - want[3]) * background)));
+    }
+  return worst;
+}
+}  // namespace
+
+TEST_CASE(
+    "renderer: equal to dense sampling through the Field op in double, within 1e-4, each instruction set") {
+  RadianceField f = small_field();
+  const Camera camera = test_camera();
+  for (const Background background : {Background::white, Background::black}) {
+    f.background = background;
+    each_isa([&] {
+      Renderer renderer(f, {.stop = 0, .least_weight = 0});
+      CHECK(worst_error(f, renderer.render(camera), camera) < 1e-4);
+    });
+  }
+}
+
+TEST_CASE("renderer: what stopping and leaving out costs is below 0.01") {
+  RadianceField f = small_field();
+  f.params.values(f.params.find("density/1/bias"))[0] += 3;
+  const Camera camera = test_camera();
+  Renderer renderer(f);
+  CHECK(worst_error(f, renderer.render(camera), camera) < 0.01);
+}
+
+TEST_CASE("renderer: an empty field is the background") {
+  RadianceField f = small_field();
+  f.grid.set_bits(std::vector<std::uint8_t>(static_cast<std::size_t>(f.grid.cells()), 0));
+  Renderer renderer(f);
+  const Rendering view = renderer.render(test_camera());
+  CHECK(std::all_of(view.rgb.data.begin(), view.rgb.data.end(), [](float v) { return v == 1; }));
+  CHECK(std::all_of(view.opacity.data.begin(), view.opacity.data.end(), [](float v) { return v == 0; }));
+}
+
+TEST_CASE("renderer: trace gives what render shows") {
+  const RadianceField f = small_field();
+  const Camera camera = test_camera(3, 2);
+  Renderer renderer(f);
+  const Rendering view = renderer.render(camera);
+  const std::vector<float> pixels{0, 0, 1, 0, 2, 0, 0, 1, 1, 1, 2, 1};
+  std::vector<float> origins(18), directions(18), out(24);
+  camera_rays(camera, pixels, origins.data(), directions.data());
+  for (std::size_t i = 0; i < 18; i += 3) f.to_cube(&origins[i], &origins[i]);
+  renderer.trace({origins, directions}, 5, out.data());
+  for (std::size_t i = 0; i < 6; ++i) {
+    CHECK(out[4 * i + 3] == view.opacity.data[i]);
+    CHECK(out[4 * i] + (1 - out[4 * i + 3]) == view.rgb.data[3 * i]);
+  }
+}
+
+TEST_CASE("renderer: follows changes of the field between views") {
+  RadianceField f = small_field();
+  Renderer renderer(f);
+  const Camera camera = test_camera();
+  const Rendering before = renderer.render(camera);
+  for (float& v : f.params.values(f.params.find("colour/2/bias"))) v += 1;
+  const Rendering after = renderer.render(camera);
+  CHECK(before.opacity.data == after.opacity.data);
+  CHECK(before.rgb.data != after.rgb.data);
+}
+
+TEST_CASE("renderer: sample weights are the composite's") {
+  RaySamples samples;
+  samples.ray_begin = {0, 0, 3, 4};
+  samples.sigma = {1, 50, 2, 0.5f};
+  samples.t.resize(4);
+  float w[4];
+  sample_weights(samples, 0.1f, w);
+  const double want[] = {-std::expm1(-0.1), -std::exp(-0.1) * std::expm1(-5.0),
+                         -std::exp(-5.1) * std::expm1(-0.2), -std::expm1(-0.05)};
+  for (int i = 0; i < 4; ++i) CHECK(std::abs(static_cast<double>(w[i]) - want[i]) < 1e-7);
+}
+
+TEST_CASE("renderer: the same bits for one and two threads") {
+  const RadianceField f = small_field();
+  Renderer renderer(f);
+  const Camera camera = test_camera(50, 37);
+  const int before = threads();
+  set_threads(1);
+  const Rendering one = renderer.render(camera);
+  set_threads(2);
+  const Rendering two = renderer.render(camera);
+  set_threads(before);
+  CHECK(one.rgb.data == two.rgb.data);
+  CHECK(one.opacity.data == two.opacity.data);
+}

@@ -1,0 +1,32 @@
+#pragma once
+#include <fieldmark/nerf/radiance_field.h>
+
+#include <algorithm>
+
+#include "support/random.h"
+
+/// A field small enough for a test to render by brute force.
+inline fieldmark::nerf::RadianceFieldOptions small_field_options() {
+  return {.field = {.encoding = {.levels = 2,
+                                 .features = 2,
+                                 .log2_table = 8,
+                                 .base_resolution = 4,
+                                 .finest_resolution = 8},
+                    .width = 8,
+                    .geometry = 4},
+          .occupancy = 16,
+          .step = 1.f / 64};
+}
+
+/// Smooth random matter: table and networks with numbers large enough to matter, cameras around the origin.
+inline fieldmark::nerf::RadianceField small_field(unsigned seed = 1) {
+  using namespace fieldmark;
+  nerf::RadianceField field(small_field_options());
+  const auto numbers = uniform<float>({field.params.size()}, -1, 1, seed);
+  std::copy(numbers.data.begin(), numbers.data.end(), field.params.values().begin());
+  std::vector<nerf::Camera> cameras;
+  for (const double x : {-3.0, 0.5, 3.0})
+    cameras.push_back(nerf::make_camera(nerf::look_at({x, -2.5, 1}, {0, 0, 0}, {0, 0, 1}), 0.7, 24, 18));
+  field.cameras = nerf::camera_span(cameras, nerf::Background::white);
+  return field;
+}

@@ -1,0 +1,168 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/nerf/analytic_scene.h>
+#include <fieldmark/nerf/trainer.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "support/catch.h"
+#include "support/each_isa.h"
+#include "support/temporary_folder.h"
+
+using namespace fieldmark;
+using namespace fieldmark::nerf;
+
+namespace {
+const Dataset& scene() {
+  static const Dataset data = make_scene({.size = 48, .views = 12});
+  return data;
+}
+
+RadianceFieldOptions field_options() {
+  return {.field = {.encoding = {.levels = 4,
+                                 .features = 2,
+                                 .log2_table = 12,
+                                 .base_resolution = 8,
+                                 .finest_resolution = 64},
+                    .width = 16,
+                    .geometry = 8},
+          .occupancy = 32,
+          .step = 1.f / 128};
+}
+
+// Cells may be declared empty after 16 steps: short runs pass through everything a long one does.
+TrainOptions train_options(Index steps) {
+  return {.schedule = {.steps = steps}, .samples_per_step = 8192, .warm_up = 16};
+}
+
+// All that training left behind.
+struct Outcome {
+  std::vector<float> values;
+  std::vector<std::uint8_t> bits;
+  double psnr = 0, samples = 0;
+  friend bool operator==(const Outcome&, const Outcome&) = default;
+};
+Outcome outcome(const RadianceField& f, const Trainer& t) {
+  return {{f.params.values().begin(), f.params.values().end()},
+          {f.grid.bits().begin(), f.grid.bits().end()},
+          t.train_psnr(),
+          t.samples()};
+}
+
+Outcome run(Index steps) {
+  RadianceField field(field_options());
+  Trainer trainer(field, scene(), train_options(steps));
+  while (!trainer.done()) trainer.step(0);
+  return outcome(field, trainer);
+}
+}  // namespace
+
+TEST_CASE("trainer: 100 steps on the built-in scene reach 19 dB") {
+  RadianceField field(field_options());
+  Trainer trainer(field, scene(), train_options(100));
+  trainer.step(0);
+  const double start = trainer.train_psnr();
+  while (!trainer.done()) trainer.step(0);
+  CAPTURE(start, trainer.train_psnr());
+  CHECK(trainer.steps() == 100);
+  CHECK(trainer.planned() == 100);
+  CHECK(trainer.train_psnr() > 19);
+  CHECK(trainer.train_psnr() > start + 5);
+  CHECK(field.grid.occupied_cells() < field.grid.cells() / 2);
+  CHECK(field.grid.occupied_cells() > 0);
+}
+
+TEST_CASE("trainer: sets bounds, background and cameras of the field from the data") {
+  RadianceFieldOptions options = field_options();
+  options.occupancy = 64;
+  RadianceField field(options);
+  // Many cameras, for a hull well inside the first cube on all sides.
+  const Dataset sphere = make_scene({.kind = SceneKind::sphere, .size = 48, .views = 40});
+  const Trainer trainer(field, sphere, train_options(10));
+  CHECK(field.bounds.side < 2.9);
+  CHECK(field.background == Background::white);
+  CHECK(field.cameras.directions.size() == 40);
+  CHECK(field.grid.occupied_cells() < field.grid.cells());
+}
+
+TEST_CASE("trainer: opaque photographs leave bounds and cells alone") {
+  Dataset opaque = scene();
+  for (View& v : opaque.views)
+    for (Index i = 3; i < v.rgba.size(); i += 4) v.rgba[i] = 1;
+  RadianceField field(field_options());
+  Trainer trainer(field, opaque, train_options(2));
+  CHECK(field.bounds.side == 3);
+  CHECK(field.grid.occupied_cells() == field.grid.cells());
+  trainer.step(0);
+  CHECK(std::isfinite(trainer.train_psnr()));
+}
+
+TEST_CASE("trainer: the same bytes for one and two threads, on each instruction set") {
+  const int before = threads();
+  each_isa([] {
+    set_threads(1);
+    const Outcome one = run(20);
+    set_threads(2);
+    const Outcome two = run(20);
+    CHECK(one == two);
+  });
+  set_threads(before);
+}
+
+TEST_CASE("trainer: a run that is interrupted and restored gives the bytes of one that is not") {
+  const TemporaryFolder folder;
+  const Index at = 23,
+              steps = 45;  // between two looks at the occupancy, after the first cells are declared empty
+  {
+    RadianceField field(field_options());
+    Trainer trainer(field, scene(), train_options(steps));
+    while (trainer.steps() < at) trainer.step(0);
+    trainer.save(folder / "checkpoint");
+  }
+  RadianceField field(field_options());
+  Trainer trainer(field, scene(), train_options(steps));
+  trainer.restore(folder / "checkpoint");
+  CHECK(trainer.steps() == at);
+  while (!trainer.done()) trainer.step(0);
+  CHECK(outcome(field, trainer) == run(steps));
+}
+
+TEST_CASE("trainer: a timed run's steps, given as a number, give the same bytes") {
+  RadianceField field(field_options());
+  TrainOptions options = train_options(0);
+  options.schedule.seconds = 1;
+  Trainer trainer(field, scene(), options);
+  double now = 0;
+  for (; !trainer.done(); now += 0.025) trainer.step(now);
+  CHECK(trainer.steps() == trainer.planned());
+  CHECK(std::abs(now - 1) < 0.35);  // it looks at the clock every 16 steps
+  CHECK(outcome(field, trainer) == run(trainer.planned()));
+}
+
+TEST_CASE("trainer: a checkpoint of another run is refused, with both runs named") {
+  const TemporaryFolder folder;
+  RadianceField field(field_options());
+  Trainer trainer(field, scene(), train_options(10));
+  trainer.step(0);
+  trainer.save(folder / "checkpoint");
+  RadianceField other(field_options());
+  TrainOptions options = train_options(10);
+  options.seed = 7;
+  Trainer different(other, scene(), options);
+  CHECK_THROWS_WITH(different.restore(folder / "checkpoint"), Contains("seed 7") && Contains("seed 0"));
+  field.save(folder / "field");
+  CHECK_THROWS_WITH(trainer.restore(folder / "field"),
+                    Contains("expected a checkpoint of this run") && Contains("another kind of file"));
+  CHECK_THROWS_AS(trainer.restore(folder / "missing"), IoError);
+}
+
+TEST_CASE("trainer: errors name option and value") {
+  RadianceField field(field_options());
+  TrainOptions options = train_options(1);
+  options.samples_per_step = 10;
+  CHECK_THROWS_WITH(Trainer(field, scene(), options),
+                    "[trainer] samples_per_step must be at least 1024, got 10");
+  CHECK_THROWS_WITH(Trainer(field, Dataset{}, train_options(1)),
+                    "[trainer] data must have at least one view");
+}
