@@ -101,7 +101,8 @@ template <class T>
 void gemm(const Gemm<T>& g) {
   constexpr int L = kLanes<T>;
   const T* b = g.b;
-  for (std::int64_t j = 0; j < g.n; j += kPanel<T>, b += g.segments * g.k * kPanel<T>) {
+  const std::int64_t step = g.b_panel ? g.b_panel : g.segments * g.k * kPanel<T>;
+  for (std::int64_t j = 0; j < g.n; j += kPanel<T>, b += step) {
     const int columns = static_cast<int>(g.n - j < kPanel<T> ? g.n - j : kPanel<T>);
     const T* bias = g.bias ? g.bias + j : nullptr;
     if (columns == kPanel<T>)

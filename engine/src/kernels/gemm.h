@@ -15,7 +15,8 @@ struct Gemm {
   const T* a = nullptr;
   std::int64_t a_row = 0, a_col = 1, a_segment = 0;
   const T* b = nullptr;
-  T* c = nullptr;  ///< row-major, rows ldc apart
+  std::int64_t b_panel = 0;  ///< distance between panels; 0: they follow each other
+  T* c = nullptr;            ///< row-major, rows ldc apart
   std::int64_t ldc = 0;
   const T* bias = nullptr;  ///< [n]; not with accumulate
   bool accumulate = false, relu = false;

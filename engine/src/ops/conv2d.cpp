@@ -5,7 +5,7 @@
 namespace fieldmark {
 namespace {
 
-constexpr Index kDepth = 512;  // pixels whose dY is packed at once: as deep a product as stays in L2
+constexpr Index kDepth = 512;  // pixels that a product for dW sums over: as deep as stays in L2
 
 struct Geometry {
   Index n, h, w, c, o, k;
@@ -73,15 +73,13 @@ void convolve(const T* padded, const T* weights, const Geometry& g, Index in, In
 template <class T>
 void weight_gradient(Tape<T>& tape, const T* padded, const T* dy, const T* mask, const Geometry& g, T* dw) {
   const Index size = g.k * g.k * g.c * g.o, together = std::max<Index>(1, kDepth / std::max<Index>(g.w, 1));
+  const Index pixels = g.rows() * g.w, panel = detail::panel_width<T>();
+  const T* d = detail::packed(tape, dy, pixels, g.o, g.o, Index{1}, mask);
   detail::sharded_sum(tape, g.rows(), 64, dw, size, [&](Index begin, Index end, T* to) {
     using namespace kernels;
     const auto run = FIELDMARK_KERNEL(gemm<T>);
-    Tape<T> own;  // room that several threads may want at once
     for (Index row = begin; row < end;) {
       const Index image = row / g.h, i = row % g.h, rows = std::min({together, end - row, g.h - i});
-      own.reset();
-      const Index at = row * g.w * g.o;
-      const T* d = detail::packed(own, dy + at, rows * g.w, g.o, g.o, Index{1}, mask ? mask + at : nullptr);
       for (Index u = 0; u < g.k; ++u)
         run({.m = g.k * g.c,
              .n = g.o,
@@ -91,7 +89,8 @@ void weight_gradient(Tape<T>& tape, const T* padded, const T* dy, const T* mask,
              .a_row = 1,
              .a_col = g.c,
              .a_segment = g.padded_w() * g.c,
-             .b = d,
+             .b = d + row * g.w * panel,
+             .b_panel = pixels * panel,
              .c = to + u * g.k * g.c * g.o,
              .ldc = g.o,
              .accumulate = true});

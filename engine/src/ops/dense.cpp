@@ -14,13 +14,10 @@ void backward(Var<T> x, Var<T> w, Var<T> b, const T* y, const T* dy, Index n, bo
   Tape<T>& tape = x.tape();
   const Index in = w.shape()[0], out = w.shape()[1], panel = detail::panel_width<T>();
   const Index panels = detail::round_up(out, panel) / panel;
-  const T* mask = relu ? y : nullptr;
+  const T* d = detail::packed(tape, dy, n, out, out, Index{1}, relu ? y : nullptr);
   if (T* dw = w.grad_acc())
     detail::sharded_sum(tape, n, kShardRows, dw, in * out, [&](Index begin, Index end, T* to) {
       using namespace kernels;
-      Tape<T> own;  // room that several threads may want at once
-      const T* d = detail::packed(own, dy + begin * out, end - begin, out, out, Index{1},
-                                  mask ? mask + begin * out : mask);
       FIELDMARK_KERNEL(gemm<T>)
       ({.m = in,
         .n = out,
@@ -28,7 +25,8 @@ void backward(Var<T> x, Var<T> w, Var<T> b, const T* y, const T* dy, Index n, bo
         .a = x.value() + begin * in,
         .a_row = 1,
         .a_col = in,
-        .b = d,
+        .b = d + begin * panel,
+        .b_panel = n * panel,
         .c = to,
         .ldc = out,
         .accumulate = true});
@@ -38,7 +36,6 @@ void backward(Var<T> x, Var<T> w, Var<T> b, const T* y, const T* dy, Index n, bo
       for (Index j = 0; j < out; ++j) db[j] += !relu || y[i * out + j] > 0 ? dy[i * out + j] : T(0);
   bool fresh = false;
   if (T* dx = x.grad_acc(&fresh)) {
-    const T* d = detail::packed(tape, dy, n, out, out, Index{1}, mask);
     // W^T with rows of zeros for the columns that fill up the last panel.
     T* wt = tape.scratch(panels * panel * in);
     std::fill_n(wt, panels * panel * in, T(0));
