@@ -1,0 +1,59 @@
+#pragma once
+#include <fieldmark/engine/adam.h>
+#include <fieldmark/engine/sharded_loop.h>
+#include <fieldmark/nerf/sampler.h>
+#include <fieldmark/nerf/schedule.h>
+#include <fieldmark/watermark/owner.h>
+
+namespace fieldmark::watermark {
+
+struct BakeOptions {
+  nerf::ScheduleOptions schedule{
+      .seconds = 45, .lr = 1e-2, .half_after = 4000, .cooldown = 0.6, .last = 0.02};
+  Index cameras = 400;  ///< near cameras whose rays are used, >= 1
+  std::uint64_t seed = 0;
+};
+
+/// Distils the marked colours of one message into the colour side of a plain field:
+///   minimise sum_i w_i |c(x_i, d_i) - c_m(x_i, d_i)|^2 over samples of rays of near cameras, w_i their
+///   weights.
+/// Only the colour network and the colour features of the table move; whatever density depends on keeps its
+/// bytes. The result has the tensor names, shapes and metadata of the unmarked field, and holds neither
+/// network, extractor, key nor message.
+class Baker {
+ public:
+  /// The owner must outlive it. @throws ValueError if the message has another length than the owner's, or an
+  /// option is out of range
+  Baker(const Owner& owner, const Message& message, const BakeOptions& options);
+  ~Baker();
+  void step(double seconds);
+  bool done() const { return schedule_.done(steps_); }
+  Index steps() const { return steps_; }
+  Index planned() const { return schedule_.total(); }
+  /// Running mean of the distance between baked and marked colours, as a PSNR over the samples by weight.
+  double psnr() const;
+  const nerf::RadianceField& field() const { return field_; }
+
+ private:
+  struct Chunk;
+  void choose_rays(Index chunk, Chunk& c) const;
+  void select(const nerf::RaySamples& samples, Chunk& c) const;
+  double run_chunk(Index chunk, Index shard, Tape<float>& tape, float* grads);
+
+  const Owner& owner_;
+  BakeOptions options_;
+  nerf::Schedule schedule_;
+  CounterRng rng_;
+  nerf::RadianceField field_;
+  std::vector<nerf::Camera> cameras_;
+  nerf::Renderer::Recolour marking_;
+  ShardedLoop<float> loop_;
+  Adam<float> adam_;
+  std::vector<Chunk> chunks_;
+  std::vector<nerf::RaySampler> samplers_;
+  std::vector<nerf::RaySamples> samples_;
+  Index steps_ = 0;
+  double smoothed_ = -1;
+};
+
+}  // namespace fieldmark::watermark

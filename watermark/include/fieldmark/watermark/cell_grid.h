@@ -1,0 +1,49 @@
+#pragma once
+#include <fieldmark/engine/shape.h>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace fieldmark::watermark {
+
+/// The cells of a scene that can carry a bit: a regular grid over the field's cube, of which those count that
+/// views show. Cells are geometry, not secret: which bit a cell carries, and with which sign, is the key's
+/// (see CellCode).
+class CellGrid {
+ public:
+  /// @param side  cells per axis, 2 to 64   @param area  [side^3] visible area of every cell, x fastest, >=
+  /// 0; those above `least` of the total become cells, numbered in the order of the grid
+  /// @throws ValueError if side is out of range or no cell is visible   @throws ShapeError if the area has
+  /// another size
+  CellGrid(Index side, std::span<const double> area, double least = 1e-5);
+
+  Index side() const { return side_; }
+  Index count() const { return static_cast<Index>(area_.size()); }
+  /// [count] visible area of the cells, as a part of all.
+  std::span<const double> area() const { return area_; }
+  /// [side^3] number of the cell at a place of the grid, -1 where there is none.
+  std::span<const std::int32_t> numbers() const { return numbers_; }
+  /// From stored numbers and areas. @throws ValueError if they do not fit each other
+  static CellGrid from_numbers(Index side, std::span<const std::int32_t> numbers,
+                               std::span<const double> area);
+
+  /// Place in the grid of a position in the unit cube, clamped to it.
+  static Index place(Index side, const float x[3]);
+  /// Cell that contains a position, -1 if none.
+  std::int32_t at(const float x[3]) const { return numbers_[static_cast<std::size_t>(place(side_, x))]; }
+
+  /// The signs of cells as a continuous field: trilinear between the cells' centres over those neighbours
+  /// that are cells, steepened by 3 and clamped to [-1, 1], so that it is +-1 inside a cell and crosses 0 at
+  /// a face only where the sign changes there. @param signs [count]  @param x [n, 3]  @param s [n] written; 0
+  /// where no cell is near
+  void blend(std::span<const std::int8_t> signs, const float* x, Index n, float* s) const;
+
+ private:
+  CellGrid() = default;
+  Index side_ = 0;
+  std::vector<std::int32_t> numbers_;
+  std::vector<double> area_;
+};
+
+}  // namespace fieldmark::watermark

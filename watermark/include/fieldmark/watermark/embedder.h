@@ -1,0 +1,90 @@
+#pragma once
+#include <fieldmark/engine/adam.h>
+#include <fieldmark/engine/sharded_loop.h>
+#include <fieldmark/nerf/schedule.h>
+#include <fieldmark/watermark/owner.h>
+#include <fieldmark/watermark/view_cache.h>
+
+#include <functional>
+
+namespace fieldmark::watermark {
+
+/// What a training picture goes through, each drawn anew for every picture: a batch mixes them, so that no
+/// layer's statistics belong to one of them.
+struct EmbedDistortions {
+  double noise = 0.08;         ///< largest standard deviation, on two pictures of three
+  double rotation = 35;        ///< largest angle, degrees, on two of three
+  double zoom_out = 0.75;      ///< least scale of the window, on two of three ...
+  double zoom_in = 1.25;       ///< ... and largest: above 1 the picture is a window at a random place
+  double blur = 1.3;           ///< largest sigma, pixels of the reader, on one of three
+  double sample_shift = 1e-3;  ///< beta of x + z, z ~ N(0, beta^2), cube sides
+};
+
+struct EmbedOptions {
+  nerf::ScheduleOptions schedule{
+      .seconds = 900, .lr = 2e-3, .half_after = 8000, .cooldown = 0.5, .last = 0.05};
+  Index views = 200;           ///< near cameras whose geometry is cached, >= 8
+  Index batch = 4;             ///< pictures a step, 1 to 64
+  double first_strength = 28;  ///< dB at the first step; falls towards the owner's strength ...
+  double anneal = 200;         ///< ... with this time constant, steps
+  double index_weight = 0.5;   ///< of the cross-entropy of the cell index
+  double bits_weight = 0.5;    ///< of the pooled bits' loss
+  EmbedDistortions distortions;
+  std::uint64_t seed = 0;
+};
+
+/// Trains mark and extractor together on a frozen field (Luo et al. 2023, sec. 3.3 and 3.4, with dense local
+/// supervision):
+///   L = BCE(sign, s) on the object + 0.5 CE(index, cell) + 0.5 BCE(pooled bits, M)
+/// under a budget of power that takes the place of the content loss. Each picture draws a message, a view,
+/// distortions. Same seed and number of steps: same bytes, for any thread count and across save() and
+/// restore().
+class Embedder {
+ public:
+  /// Owner and views must outlive the embedder. @throws ValueError if an option is out of range
+  Embedder(Owner& owner, std::span<const CachedView> views, const EmbedOptions& options);
+  void step(double seconds);
+  bool done() const { return schedule_.done(steps_); }
+  Index steps() const { return steps_; }
+  Index planned() const { return schedule_.total(); }
+  /// Running means over the last pictures: share of places on the object whose sign is right, whose index is
+  /// right, and of bits right, all under training distortions.
+  struct Figures {
+    double sign = 0, index = 0, bits = 0, loss = 0;
+  };
+  const Figures& figures() const { return figures_; }
+  /// Sets the owner's gain so that the mean PSNR on the object over `views` new near views is the owner's
+  /// strength.
+  void calibrate(Index views = 16);
+
+  /// @throws IoError
+  void save(const std::filesystem::path& path) const;
+  /// @throws IoError if the file is not a checkpoint of the same configuration
+  void restore(const std::filesystem::path& path);
+  /// The key of a checkpoint's owner, which a run that goes on must use. @throws IoError
+  static Key checkpoint_key(const std::filesystem::path& path);
+
+ private:
+  struct Picture;
+  Picture draw(Index image) const;
+  Var<float> render(Tape<float>& tape, const Params<float>& params, const Picture& p) const;
+  Var<float> distort(Tape<float>& tape, Var<float> image, const Picture& p) const;
+  double run_picture(Index image, Tape<float>& tape, float* grads, Figures& figures) const;
+  std::string fingerprint() const;
+
+  Owner& owner_;
+  std::span<const CachedView> views_;
+  EmbedOptions options_;
+  nerf::Schedule schedule_;
+  CounterRng choice_rng_, message_rng_, noise_rng_, shift_rng_;
+  CellCode code_;
+  std::vector<float> code_matrix_;            // [cells, bits]
+  std::vector<Tensor<std::int32_t>> labels_;  // cell of every pixel of every view; count() is background
+  std::vector<std::vector<float>> object_;    // 1 where a view's opacity exceeds 0.5
+  ShardedLoop<float> loop_;
+  Adam<float> adam_;
+  Figures figures_;
+  Index steps_ = 0;
+};
+
+}  // namespace fieldmark::watermark

@@ -1,0 +1,43 @@
+#pragma once
+#include <fieldmark/distort/attack.h>
+#include <fieldmark/watermark/picture_reader.h>
+
+#include <functional>
+#include <map>
+#include <string>
+
+namespace fieldmark::watermark {
+
+/// Accuracies of the two readings; a reading that was not made is NaN.
+struct ReadingAccuracy {
+  double blind = 0;
+};
+
+struct MeasureOptions {
+  std::vector<nerf::Camera> cameras;  ///< of the views, at their full resolution
+  std::vector<std::string> under;     ///< distortions besides none, names of parse_attack()
+  std::uint64_t seed = 0;             ///< of messages and distortions
+  std::function<bool(Index done, Index total)> progress;  ///< returns false to stop, which throws Error
+};
+
+/// What a mark does to pictures and how well it is read from one view at a time.
+struct Measurement {
+  Index bits = 0, views = 0;
+  bool baked = false;
+  ReadingAccuracy
+      accuracy;            ///< share of bits right in one view, mean over views; an undecided bit counts 0.5
+  double accuracy_p5 = 0;  ///< 5th percentile over views of the blind accuracy
+  double psnr_base = 0;    ///< marked against unmarked, dB, both rounded to 8 bits, mean over views
+  double psnr_base_object = 0;  ///< the same over pixels whose unmarked opacity exceeds 0.5
+  double ssim_base = 0;
+  std::map<std::string, ReadingAccuracy> under;  ///< for each distortion
+};
+
+/// Measures an owner's mark: each view with its own random message or, given a baked field, with the message
+/// baked in.
+/// @param baked, message  both or neither   @throws ValueError if only one is given, or an attack's name is
+/// wrong
+Measurement measure(const Owner& owner, const nerf::RadianceField* baked, const Message* message,
+                    const MeasureOptions& options);
+
+}  // namespace fieldmark::watermark

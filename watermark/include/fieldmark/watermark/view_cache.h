@@ -1,0 +1,21 @@
+#pragma once
+#include <fieldmark/nerf/renderer.h>
+
+namespace fieldmark::watermark {
+
+/// What embedding needs of one view of the frozen field, computed once: geometry and base colours do not
+/// change while the mark is learnt. A pixel that sees something has one sample, at the mean position of what
+/// its ray sees.
+struct CachedView {
+  Index height = 0, width = 0;
+  Tensor<float> base;                      ///< [height, width, 3] over the background
+  Tensor<float> opacity;                   ///< [height, width]
+  std::vector<std::int32_t> sample_begin;  ///< [height width + 1]
+  std::vector<float> position;             ///< [S, 3] unit cube
+  std::vector<float> colour;               ///< [S, 3] of the base field
+  std::vector<float> weight;  ///< [S] share of the sample in its pixel; a pixel's sum is about its opacity
+};
+
+CachedView cache_view(nerf::Renderer& renderer, const nerf::RadianceField& field, const nerf::Camera& camera);
+
+}  // namespace fieldmark::watermark

@@ -1,0 +1,62 @@
+#include <fieldmark/engine/ops/activation.h>
+#include <fieldmark/engine/ops/columns.h>
+#include <fieldmark/engine/ops/matmul.h>
+#include <fieldmark/nerf/frequency_encoding.h>
+#include <fieldmark/watermark/mark_network.h>
+
+#include <array>
+#include <cmath>
+
+namespace fieldmark::watermark {
+namespace {
+
+MarkNetworkOptions checked(const MarkNetworkOptions& o) {
+  if (o.bands < 1 || o.bands > 12)
+    throw ValueError("[mark_network] bands must be 1 to 12, got " + std::to_string(o.bands));
+  if (o.features < 1)
+    throw ValueError("[mark_network] features must be at least 1, got " + std::to_string(o.features));
+  if (!(o.luminance >= 0 && o.luminance <= 1 && o.red_green >= 0 && o.red_green <= 1))
+    throw ValueError("[mark_network] red_green and luminance must be 0 to 1, got " +
+                     std::to_string(o.red_green) + " and " + std::to_string(o.luminance));
+  return o;
+}
+
+// Unit rows: blue against yellow, red against green, grey; the last two scaled.
+std::array<double, 9> colour_axes(const MarkNetworkOptions& o) {
+  const double by = 1 / std::sqrt(6.0), rg = o.red_green / std::sqrt(2.0),
+               grey = o.luminance / std::sqrt(3.0);
+  return {-by, -by, 2 * by, rg, -rg, 0, grey, grey, grey};
+}
+
+}  // namespace
+
+template <class T>
+MarkNetwork<T>::MarkNetwork(ParamStore<T>& store, std::string_view name, const MarkNetworkOptions& options,
+                            std::uint64_t seed)
+    : options_(checked(options)),
+      encode_0_(store, std::string(name) + "/encode/0",
+                {.in = 6 * options.bands + 3, .out = options.features, .activation = Activation::relu},
+                seed + 1),
+      encode_1_(store, std::string(name) + "/encode/1",
+                {.in = options.features, .out = options.features, .activation = Activation::relu}, seed + 2),
+      fuse_0_(store, std::string(name) + "/fuse/0",
+              {.in = options.features + 3, .out = options.features, .activation = Activation::relu},
+              seed + 3),
+      fuse_1_(store, std::string(name) + "/fuse/1", {.in = options.features, .out = 3}, seed + 4) {}
+
+template <class T>
+Var<T> MarkNetwork<T>::carrier(const Params<T>& params, Var<T> x, Var<T> c) const {
+  Tape<T>& tape = x.tape();
+  T* axes = tape.scratch(9);
+  const auto table = colour_axes(options_);
+  for (std::size_t i = 0; i < 9; ++i) axes[i] = static_cast<T>(table[i]);
+  const Var<T> features = encode_1_(
+      params, encode_0_(params, concat_columns<T>({nerf::frequency_encoding(x, options_.bands), c})));
+  const Var<T> fused = fuse_1_(params, fuse_0_(params, concat_columns<T>({features, c})));
+  return matmul(tanh(fused), tape.constant(axes, {3, 3}));
+}
+
+template class MarkNetwork<float>;
+template class MarkNetwork<double>;
+
+}  // namespace fieldmark::watermark

@@ -1,0 +1,95 @@
+#include <fieldmark/engine/image.h>
+#include <fieldmark/engine/metrics.h>
+#include <fieldmark/watermark/measurement.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace fieldmark::watermark {
+namespace {
+
+// Mean of the finite numbers: identical pictures have no PSNR, and a view of the background alone has no
+// object.
+double finite_mean(const std::vector<double>& values) {
+  double sum = 0, count = 0;
+  for (double v : values)
+    if (std::isfinite(v)) {
+      sum += v;
+      count += 1;
+    }
+  return count > 0 ? sum / count : std::nan("");
+}
+
+double percentile_5(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(0.05 * static_cast<double>(values.size()))];
+}
+
+struct Pictures {
+  nerf::Rendering plain;
+  Tensor<float> marked;  // 8 bits
+};
+
+class Views {
+ public:
+  Views(const Owner& owner, const nerf::RadianceField* baked)
+      : owner_(owner), baked_(baked != nullptr), plain_(owner.field), marked_(baked ? *baked : owner.field) {}
+  Pictures render(const nerf::Camera& camera, const CellCode& code, const Message& message) {
+    if (!baked_) marked_.set_recolour(owner_.marking(cell_signs(code, message)));
+    return {plain_.render(camera), quantize8(marked_.render(camera).rgb)};
+  }
+
+ private:
+  const Owner& owner_;
+  bool baked_;
+  nerf::Renderer plain_, marked_;
+};
+
+}  // namespace
+
+Measurement measure(const Owner& owner, const nerf::RadianceField* baked, const Message* message,
+                    const MeasureOptions& options) {
+  if ((baked == nullptr) != (message == nullptr))
+    throw ValueError("[measure] baked and message must be given both or neither");
+  if (options.cameras.empty()) throw ValueError("[measure] cameras must not be empty");
+  std::vector<distort::Attack> attacks;
+  for (const std::string& name : options.under) attacks.push_back(distort::parse_attack(name));
+  const CounterRng messages(options.seed, 41), distortions(options.seed, 42);
+  const float level = nerf::background_value(owner.field.background);
+  const float background[3] = {level, level, level};
+  const CellCode code = owner.code();
+  const PictureReader reader(owner);
+  Views views(owner, baked);
+  std::vector<double> accuracy, psnr_whole, psnr_object, similarity;
+  std::vector<std::vector<double>> under(attacks.size());
+  const auto total = static_cast<Index>(options.cameras.size());
+  for (std::size_t i = 0; i < options.cameras.size(); ++i) {
+    const Message sent = message ? *message : random_message(owner.options().bits, messages, i);
+    const Pictures p = views.render(options.cameras[i], code, sent);
+    const auto read = [&](const Tensor<float>& picture) {
+      return match_bits(read_bits(reader.evidence(picture), code, owner.options().bits), sent).accuracy();
+    };
+    accuracy.push_back(read(p.marked));
+    for (std::size_t a = 0; a < attacks.size(); ++a)
+      under[a].push_back(
+          read(distort::apply_attack(attacks[a], p.marked, distortions, i * attacks.size() + a, background)));
+    psnr_whole.push_back(psnr(p.marked, p.plain.rgb));
+    psnr_object.push_back(psnr_masked(p.marked, p.plain.rgb, p.plain.opacity));
+    similarity.push_back(ssim(p.marked, quantize8(p.plain.rgb)));
+    if (options.progress && !options.progress(static_cast<Index>(i) + 1, total))
+      throw Error("stopped while measuring");
+  }
+  Measurement m{.bits = owner.options().bits,
+                .views = total,
+                .baked = baked != nullptr,
+                .accuracy = {finite_mean(accuracy)},
+                .accuracy_p5 = percentile_5(accuracy),
+                .psnr_base = finite_mean(psnr_whole),
+                .psnr_base_object = finite_mean(psnr_object),
+                .ssim_base = finite_mean(similarity),
+                .under = {}};
+  for (std::size_t a = 0; a < attacks.size(); ++a) m.under[options.under[a]] = {finite_mean(under[a])};
+  return m;
+}
+
+}  // namespace fieldmark::watermark

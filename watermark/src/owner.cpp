@@ -1,0 +1,120 @@
+#include <fieldmark/engine/model_file.h>
+#include <fieldmark/watermark/owner.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+namespace fieldmark::watermark {
+namespace {
+
+using Json = nlohmann::json;
+
+OwnerOptions checked(const OwnerOptions& o) {
+  if (o.bits < 1 || o.bits > 256)
+    throw ValueError("[owner] bits must be 1 to 256, got " + std::to_string(o.bits));
+  if (!(o.strength >= 20 && o.strength <= 60))
+    throw ValueError("[owner] strength must be 20 to 60 dB, got " + std::to_string(o.strength));
+  if (o.reader_size < 32)
+    throw ValueError("[owner] reader_size must be at least 32 pixels, got " + std::to_string(o.reader_size));
+  return o;
+}
+
+std::string configuration(const OwnerOptions& o, double gain, const nerf::RadianceField& field) {
+  return Json{{"bits", o.bits},
+              {"strength", o.strength},
+              {"cells", o.cells},
+              {"reader_size", o.reader_size},
+              {"bands", o.mark.bands},
+              {"features", o.mark.features},
+              {"red_green", o.mark.red_green},
+              {"luminance", o.mark.luminance},
+              {"base_channels", o.base_channels},
+              {"seed", o.seed},
+              {"gain", gain},
+              {"field", Json::parse(field.configuration())}}
+      .dump();
+}
+
+OwnerOptions parse_options(const Json& j) {
+  OwnerOptions o;
+  o.bits = j.at("bits");
+  o.strength = j.at("strength");
+  o.cells = j.at("cells");
+  o.reader_size = j.at("reader_size");
+  o.mark = {.bands = j.at("bands"),
+            .features = j.at("features"),
+            .red_green = j.at("red_green"),
+            .luminance = j.at("luminance")};
+  o.base_channels = j.at("base_channels");
+  o.seed = j.at("seed");
+  return o;
+}
+
+}  // namespace
+
+Owner::Owner(nerf::RadianceField base, const OwnerOptions& options, const Key& owner_key, CellGrid grid)
+    : field(std::move(base)),
+      key(owner_key),
+      cells(std::move(grid)),
+      mark(params, "mark", checked(options).mark, options.seed + 100),
+      reader(params, "extractor", {.classes = cells.count() + 1, .base = options.base_channels},
+             options.seed + 200),
+      options_(options) {}
+
+CellCode Owner::code(const Key& other) const { return deal_cells(other, cells.area(), options_.bits); }
+
+nerf::Renderer::Recolour Owner::marking(std::vector<std::int8_t> signs) const {
+  return [this, signs = std::move(signs)](const float* x, Index n, float* rgb) {
+    Tape<float> tape;
+    std::vector<float> s(static_cast<std::size_t>(n));
+    cells.blend(signs, x, n, s.data());
+    const Var<float> carrier =
+        mark.carrier(Params<float>(params, nullptr), tape.constant(x, {n, 3}), tape.constant(rgb, {n, 3}));
+    for (Index i = 0; i < 3 * n; ++i)
+      rgb[i] = std::clamp(
+          rgb[i] + static_cast<float>(gain) * s[static_cast<std::size_t>(i / 3)] * carrier.value()[i], 0.f,
+          1.f);
+  };
+}
+
+void Owner::save(const std::filesystem::path& path) const {
+  SafetensorsFile file;
+  set_model_info(file, {"owner", configuration(options_, gain, field)});
+  field.store(file, "field/");
+  for (const auto& e : params.entries()) file.add(e.name, e.shape, params.values(params.find(e.name)));
+  file.add("cells/numbers", {static_cast<Index>(cells.numbers().size())}, cells.numbers());
+  file.add("cells/area", {cells.count()}, cells.area());
+  file.add("key", {32}, std::span<const std::uint8_t>(key.bytes));
+  file.write(path);
+}
+
+Owner Owner::load(const std::filesystem::path& path) {
+  const SafetensorsFile file = SafetensorsFile::read(path);
+  const ModelInfo info = require_kind(file, "owner");
+  const std::string place = path.string() + ": metadata 'fieldmark': config";
+  try {
+    const Json j = Json::parse(info.config);
+    const OwnerOptions options = parse_options(j);
+    nerf::RadianceField field =
+        nerf::RadianceField::from_configuration(j.at("field").dump(), place + ": field");
+    field.restore(file, "field/");
+    Owner owner(
+        std::move(field), options, key_from_bytes(file.u8("key")),
+        CellGrid::from_numbers(options.cells, file.i32("cells/numbers"), file.f64("cells/area").data));
+    owner.gain = j.at("gain");
+    for (const auto& e : owner.params.entries()) {
+      const Tensor<float> t = file.f32(e.name);
+      if (t.shape != e.shape)
+        throw IoError(path.string() + ": tensor '" + e.name + "': expected shape " + e.shape.str() +
+                      " from the file's configuration, found " + t.shape.str());
+      std::copy(t.data.begin(), t.data.end(), owner.params.values(owner.params.find(e.name)).begin());
+    }
+    return owner;
+  } catch (const Json::exception& e) {
+    throw IoError(place + ": expected an owner's configuration, found " + e.what());
+  } catch (const ValueError& e) {
+    throw IoError(place + ": expected an owner's configuration within its ranges, found " + e.what());
+  }
+}
+
+}  // namespace fieldmark::watermark
