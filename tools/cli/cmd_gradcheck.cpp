@@ -3,6 +3,7 @@
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/extractor/gradcheck_cases.h>
 #include <fieldmark/nerf/gradcheck_cases.h>
+#include <fieldmark/watermark/gradcheck_cases.h>
 
 #include <CLI/CLI.hpp>
 #include <cmath>
@@ -36,6 +37,7 @@ std::vector<Row> collect(const std::string& only) {
   add("distort", distort::gradcheck_cases());
   add("extractor", extractor::gradcheck_cases());
   add("nerf", nerf::gradcheck_cases());
+  add("watermark", watermark::gradcheck_cases());
   return rows;
 }
 

@@ -24,7 +24,9 @@ Var<T> power_budget(Var<T> x, std::span<const T> mask, double target) {
       sum += m * v * v;
     }
   }
-  const double square = (count > 0 ? sum / count : 0) + 1e-12, scale = target / std::sqrt(square);
+  // Without a masked pixel there is no power to bring to the target: nothing is let through.
+  const double square = (count > 0 ? sum / count : 0) + 1e-12,
+               scale = count > 0 ? target / std::sqrt(square) : 0;
   for (Index i = 0; i < pixels * channels; ++i) y[i] = static_cast<T>(scale) * x.value()[i];
 
   // dy/dx = scale (I - x (m x)^T / (count rms^2)): the part along x itself changes nothing.

@@ -29,7 +29,7 @@ struct EmbedOptions {
   double anneal = 200;         ///< ... with this time constant, steps
   double index_weight = 0.5;   ///< of the cross-entropy of the cell index
   double bits_weight = 0.5;    ///< of the pooled bits' loss
-  EmbedDistortions distortions;
+  EmbedDistortions distortions = {};
   std::uint64_t seed = 0;
 };
 

@@ -14,10 +14,10 @@ struct ReadingAccuracy {
 };
 
 struct MeasureOptions {
-  std::vector<nerf::Camera> cameras;  ///< of the views, at their full resolution
-  std::vector<std::string> under;     ///< distortions besides none, names of parse_attack()
-  std::uint64_t seed = 0;             ///< of messages and distortions
-  std::function<bool(Index done, Index total)> progress;  ///< returns false to stop, which throws Error
+  std::vector<nerf::Camera> cameras = {};  ///< of the views, at their full resolution
+  std::vector<std::string> under = {};     ///< distortions besides none, names of parse_attack()
+  std::uint64_t seed = 0;                  ///< of messages and distortions
+  std::function<bool(Index done, Index total)> progress = {};  ///< returns false to stop, which throws Error
 };
 
 /// What a mark does to pictures and how well it is read from one view at a time.

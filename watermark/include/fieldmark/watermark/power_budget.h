@@ -10,8 +10,8 @@ namespace fieldmark::watermark {
 /// @param x  [P, C] residual of the pixels   @param mask  [P] weights m, >= 0 (1 on the object); must outlive
 /// the pass
 /// @param target  root mean square wanted, > 0: 10^(-dB / 20) for a strength in dB
-/// @return [P, C]   @throws ShapeError if mask has another size   @throws ValueError if target is not
-/// positive Differentiable in: x.
+/// @return [P, C], 0 where the mask is empty   @throws ShapeError if mask has another size   @throws
+/// ValueError if target is not positive Differentiable in: x.
 template <class T>
 Var<T> power_budget(Var<T> x, std::span<const T> mask, double target);
 

@@ -1,0 +1,114 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/metrics.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/watermark/baker.h>
+
+#include <algorithm>
+
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+#include "tiny_owner.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+namespace {
+const Message kMessage{{1, 0, 1, 1}}, kOther{{0, 1, 1, 0}};
+
+Owner owner_with_gain() {
+  Owner owner = tiny_owner();
+  owner.gain = 0.15;
+  return owner;
+}
+
+BakeOptions options(Index steps) { return {.schedule = {.steps = steps, .lr = 1e-2}, .cameras = 20}; }
+
+nerf::RadianceField bake(const Owner& owner, const Message& message, Index steps) {
+  Baker baker(owner, message, options(steps));
+  while (!baker.done()) baker.step(0);
+  return baker.field();
+}
+
+SafetensorsFile file_of(const nerf::RadianceField& field) {
+  const TemporaryFolder folder;
+  field.save(folder / "field");
+  return SafetensorsFile::read(folder / "field");
+}
+
+double mean_psnr(nerf::Renderer& a, nerf::Renderer& b, const Owner& owner) {
+  double sum = 0;
+  for (const auto& camera : nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, 3, 0, 99))
+    sum += psnr(a.render(camera).rgb, b.render(camera).rgb);
+  return sum / 3;
+}
+}  // namespace
+
+TEST_CASE("baker: baked colours approach the marked ones, by its own figure and in pictures") {
+  const Owner owner = owner_with_gain();
+  Baker baker(owner, kMessage, options(60));
+  baker.step(0);
+  const double first = baker.psnr();
+  while (!baker.done()) baker.step(0);
+  CHECK(baker.steps() == 60);
+  CHECK(baker.planned() == 60);
+  nerf::Renderer plain(owner.field), marked(owner.field), baked(baker.field());
+  marked.set_recolour(owner.marking(cell_signs(owner.code(), kMessage)));
+  const double before = mean_psnr(plain, marked, owner), after = mean_psnr(baked, marked, owner);
+  CAPTURE(first, baker.psnr(), before, after);
+  CHECK(baker.psnr() > first + 1);
+  CHECK(after > before + 2);
+}
+
+TEST_CASE("baker: a baked file is an unmarked one with other colours, density to the byte the same") {
+  const Owner owner = owner_with_gain();
+  const SafetensorsFile plain = file_of(owner.field), baked = file_of(bake(owner, kMessage, 5));
+  CHECK(baked.metadata == plain.metadata);
+  REQUIRE(baked.tensors.size() == plain.tensors.size());
+  int density = 0, colour = 0;
+  for (std::size_t i = 0; i < plain.tensors.size(); ++i) {
+    const auto &a = plain.tensors[i], &b = baked.tensors[i];
+    CAPTURE(a.name);
+    CHECK(b.name == a.name);
+    CHECK(b.dtype == a.dtype);
+    CHECK(b.shape == a.shape);
+    const bool of_density = a.name.find("density") != std::string::npos;
+    CHECK((b.data == a.data) == of_density);
+    ++(of_density ? density : colour);
+  }
+  CHECK(density == 6);  // two layers, the features, the occupancy
+  CHECK(colour == 7);   // three layers, the features
+}
+
+TEST_CASE("baker: two messages give different colours, the same one the same") {
+  const Owner owner = owner_with_gain();
+  const auto a = file_of(bake(owner, kMessage, 3)), b = file_of(bake(owner, kOther, 3)),
+             again = file_of(bake(owner, kMessage, 3));
+  for (const char* name : {"hash/colour_features", "colour/0/weight", "colour/2/bias"}) {
+    CAPTURE(name);
+    CHECK(a.at(name).data != b.at(name).data);
+    CHECK(a.at(name).data == again.at(name).data);
+  }
+  CHECK(a.at("hash/density_features").data == b.at("hash/density_features").data);
+}
+
+TEST_CASE("baker: one and two threads give the same bits") {
+  const Owner owner = owner_with_gain();
+  const int before = threads();
+  set_threads(1);
+  const auto one = bake(owner, kMessage, 3);
+  set_threads(2);
+  const auto two = bake(owner, kMessage, 3);
+  set_threads(before);
+  CHECK(std::equal(one.params.values().begin(), one.params.values().end(), two.params.values().begin()));
+}
+
+TEST_CASE("baker: options outside their ranges are refused") {
+  const Owner owner = owner_with_gain();
+  const Message brief{{1, 0, 1}};
+  CHECK_THROWS_AS(Baker(owner, brief, options(1)), ValueError);
+  CHECK_THROWS_WITH(Baker(owner, brief, options(1)), "[baker] message must have the owner's 4 bits, got 3");
+  BakeOptions none = options(1);
+  none.cameras = 0;
+  CHECK_THROWS_AS(Baker(owner, kMessage, none), ValueError);
+  CHECK_THROWS_WITH(Baker(owner, kMessage, none), "[baker] cameras must be at least 1, got 0");
+}

@@ -1,0 +1,61 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/watermark/embed_views.h>
+#include <fieldmark/watermark/object_window.h>
+
+#include <numeric>
+
+#include "nerf/small_field.h"
+#include "support/catch.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+TEST_CASE("embed_views: the views are near cameras, each looking through the object's window") {
+  const nerf::RadianceField field = small_field();
+  const auto views = cache_near_views(field, 20, 3, 5);
+  const auto cameras = nerf::make_cameras(field.cameras, nerf::CameraSet::near, 3, 160, 5);
+  REQUIRE(views.size() == 3);
+  nerf::Renderer renderer(field);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Window window = object_window(renderer.render(cameras[i]).rgb, 1);
+    const Tensor<float> want = renderer.render(window_camera(cameras[i], window, 20)).rgb;
+    REQUIRE(views[i].base.shape == Shape{20, 20, 3});
+    double worst = 0;
+    for (Index k = 0; k < want.size(); ++k)
+      worst = std::max(worst, static_cast<double>(std::abs(views[i].base[k] - want[k])));
+    CHECK(worst < 1e-5);
+  }
+  CHECK(views[0].base.data != views[1].base.data);
+  CHECK(cache_near_views(field, 20, 1, 5)[0].base.data == views[0].base.data);
+  CHECK(cache_near_views(field, 20, 1, 6)[0].base.data != views[0].base.data);
+}
+
+TEST_CASE("embed_views: progress is told after each view and may stop") {
+  const nerf::RadianceField field = small_field();
+  std::vector<std::pair<Index, Index>> calls;
+  cache_near_views(field, 16, 2, 5, [&](Index done, Index total) {
+    calls.emplace_back(done, total);
+    return true;
+  });
+  CHECK(calls == std::vector<std::pair<Index, Index>>{{1, 2}, {2, 2}});
+  const auto stop = [](Index, Index) { return false; };
+  CHECK_THROWS_AS(cache_near_views(field, 16, 2, 5, stop), Error);
+  CHECK_THROWS_WITH(cache_near_views(field, 16, 2, 5, stop), "stopped while views were cached");
+}
+
+TEST_CASE("embed_views: visible area adds the weights of the samples in each cell") {
+  CachedView a, b;
+  a.position = {0.1f, 0.1f, 0.1f, 0.9f, 0.1f, 0.1f};
+  a.weight = {1, 0.5f};
+  b.position = {0.6f, 0.4f, 0.2f, 0.9f, 0.9f, 0.9f};
+  b.weight = {0.25f, 0.75f};
+  CHECK(visible_area(std::vector{a, b}, 2) == std::vector<double>{1, 0.75, 0, 0, 0, 0, 0, 0.75});
+  CHECK(visible_area({}, 2) == std::vector<double>(8, 0.0));
+  const auto views = cache_near_views(small_field(), 16, 2, 5);
+  double want = 0;
+  for (const CachedView& v : views) want = std::accumulate(v.weight.begin(), v.weight.end(), want);
+  const auto area = visible_area(views, 6);
+  CHECK(area.size() == 216);
+  CHECK(want > 10);
+  CHECK(std::accumulate(area.begin(), area.end(), 0.0) == Approx(want).epsilon(1e-9));
+}

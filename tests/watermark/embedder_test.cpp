@@ -1,0 +1,150 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/files.h>
+#include <fieldmark/engine/metrics.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/watermark/embedder.h>
+
+#include <cmath>
+
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+#include "tiny_owner.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+namespace {
+EmbedOptions options(Index steps) {
+  return {.schedule = {.steps = steps, .lr = 4e-3}, .batch = 3, .anneal = 20, .seed = 4};
+}
+
+// All that some steps leave behind.
+struct Outcome {
+  std::vector<float> values;
+  std::vector<double> figures;
+  friend bool operator==(const Outcome&, const Outcome&) = default;
+};
+Outcome outcome(const Owner& owner, const Embedder& e) {
+  const auto& f = e.figures();
+  return {{owner.params.values().begin(), owner.params.values().end()}, {f.sign, f.index, f.bits, f.loss}};
+}
+
+Outcome run(Index steps) {
+  Owner owner = tiny_owner();
+  Embedder embedder(owner, tiny_views(), options(steps));
+  while (!embedder.done()) embedder.step(0);
+  return outcome(owner, embedder);
+}
+}  // namespace
+
+TEST_CASE("embedder: in 300 steps the losses fall and places are told apart") {
+  Owner owner = tiny_owner();
+  const std::vector<float> field(owner.field.params.values().begin(), owner.field.params.values().end());
+  Embedder embedder(owner, tiny_views(), options(300));
+  embedder.step(0);
+  const Embedder::Figures first = embedder.figures();
+  while (!embedder.done()) {
+    embedder.step(0);
+    REQUIRE(std::isfinite(embedder.figures().loss));
+  }
+  CHECK(embedder.steps() == 300);
+  CHECK(embedder.planned() == 300);
+  const Embedder::Figures last = embedder.figures();
+  CAPTURE(first.loss, last.loss, first.sign, last.sign, first.index, last.index, last.bits);
+  CHECK(last.loss < 0.8 * first.loss);
+  CHECK(last.index > first.index + 0.05);
+  CHECK(last.sign > 0.5);
+  CHECK(last.bits >= 0);
+  CHECK(last.bits <= 1);
+  for (float v : owner.params.values()) REQUIRE(std::isfinite(v));
+  CHECK(field == std::vector<float>(owner.field.params.values().begin(), owner.field.params.values().end()));
+}
+
+TEST_CASE("embedder: one and two threads give the same bits") {
+  const int before = threads();
+  set_threads(1);
+  const Outcome one = run(4);
+  set_threads(2);
+  const Outcome two = run(4);
+  set_threads(before);
+  CHECK(one == two);
+}
+
+TEST_CASE("embedder: a run that is saved and restored ends as an uninterrupted one") {
+  const TemporaryFolder folder;
+  const Outcome whole = run(6);
+  {
+    Owner owner = tiny_owner();
+    Embedder embedder(owner, tiny_views(), options(6));
+    for (int i = 0; i < 3; ++i) embedder.step(0);
+    embedder.save(folder / "checkpoint");
+  }
+  Owner owner = tiny_owner();
+  Embedder embedder(owner, tiny_views(), options(6));
+  embedder.restore(folder / "checkpoint");
+  CHECK(embedder.steps() == 3);
+  while (!embedder.done()) embedder.step(0);
+  CHECK(outcome(owner, embedder) == whole);
+}
+
+TEST_CASE("embedder: a checkpoint of another run is refused") {
+  const TemporaryFolder folder;
+  const auto path = folder / "checkpoint";
+  Owner owner = tiny_owner();
+  Embedder embedder(owner, tiny_views(), options(6));
+  embedder.save(path);
+  CHECK(Embedder::checkpoint_key(path) == owner.key);
+  const auto refused = [&](Owner& o, const EmbedOptions& with, const std::string& text) {
+    Embedder e(o, tiny_views(), with);
+    CHECK_THROWS_AS(e.restore(path), IoError);
+    CHECK_THROWS_WITH(e.restore(path), Contains(path.string()) && Contains(text));
+  };
+  refused(owner, options(7), "expected a checkpoint of this run");
+  Owner other_key = tiny_owner();
+  other_key.key = test_key(6);
+  refused(other_key, options(6), "found one under another");
+  const auto bytes = read_bytes(path);
+  write_file_atomically(path, std::span(bytes).first(bytes.size() - 1));
+  refused(owner, options(6), "");
+  owner.save(path);
+  refused(owner, options(6), "another kind of file");
+  owner.field.save(path);
+  CHECK_THROWS_AS(Embedder::checkpoint_key(path), IoError);
+  CHECK_THROWS_WITH(Embedder::checkpoint_key(path),
+                    path.string() + ": expected a checkpoint of embed, found no tensor 'key'");
+}
+
+TEST_CASE("embedder: calibration gives views the owner's strength") {
+  for (double strength : {28.0, 34.5}) {
+    Owner owner = tiny_owner(strength);
+    Embedder(owner, tiny_views(), options(1)).calibrate();
+    nerf::Renderer plain(owner.field), marked(owner.field);
+    const auto measured = [&](std::uint64_t view_seed, const CounterRng& messages) {
+      double sum = 0;
+      const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, 16, 0, view_seed);
+      for (std::size_t i = 0; i < cameras.size(); ++i) {
+        const Message sent = random_message(4, messages, ~std::uint64_t{i});
+        marked.set_recolour(owner.marking(cell_signs(owner.code(), sent)));
+        const nerf::Rendering base = plain.render(cameras[i]);
+        sum += psnr_masked(marked.render(cameras[i]).rgb, base.rgb, base.opacity);
+      }
+      return sum / 16;
+    };
+    // Exactly on the views and messages it looked at; others are so few and small that they differ.
+    CHECK(measured(options(1).seed + 77, CounterRng(options(1).seed, 12)) == Approx(strength).margin(0.03));
+    CHECK(measured(1234, CounterRng(5)) == Approx(strength).margin(0.5));
+  }
+}
+
+TEST_CASE("embedder: options outside their ranges are refused") {
+  Owner owner = tiny_owner();
+  for (Index batch : {0, 65}) {
+    EmbedOptions bad = options(1);
+    bad.batch = batch;
+    CHECK_THROWS_AS(Embedder(owner, tiny_views(), bad), ValueError);
+    CHECK_THROWS_WITH(Embedder(owner, tiny_views(), bad),
+                      "[embedder] batch must be 1 to 64, got " + std::to_string(batch));
+  }
+  CHECK_THROWS_AS(Embedder(owner, {}, options(1)), ValueError);
+  CHECK_THROWS_WITH(Embedder(owner, {}, options(1)), "[embedder] views must not be empty");
+}

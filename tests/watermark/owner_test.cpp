@@ -1,0 +1,154 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/files.h>
+#include <fieldmark/engine/model_file.h>
+#include <fieldmark/watermark/owner.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "small_owner.h"
+#include "support/catch.h"
+#include "support/random.h"
+#include "support/temporary_folder.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+namespace {
+std::vector<float> marked(const Owner& owner, const std::vector<std::int8_t>& signs, const Tensor<float>& x,
+                          std::vector<float> rgb) {
+  owner.marking(signs)(x.data.data(), x.shape[0], rgb.data());
+  return rgb;
+}
+}  // namespace
+
+TEST_CASE("owner: marking adds g s P to colours, which stay in their range") {
+  const Owner owner = small_owner();
+  const Tensor<float> x = uniform<float>({200, 3}, 0, 1, 1), rgb = uniform<float>({200, 3}, 0, 1, 2);
+  const auto signs = cell_signs(owner.code(), Message{{1, 0, 1}});
+  const auto got = marked(owner, signs, x, rgb.data);
+  std::vector<float> s(200);
+  owner.cells.blend(signs, x.data.data(), 200, s.data());
+  Tape<float> tape;
+  const auto p =
+      owner.mark.carrier(Params<float>(owner.params, nullptr), tape.constant(x), tape.constant(rgb));
+  double worst = 0, most = 0;
+  for (Index i = 0; i < 600; ++i) {
+    const float want =
+        std::clamp(rgb[i] + 0.05f * s[static_cast<std::size_t>(i / 3)] * p.value()[i], 0.f, 1.f);
+    worst = std::max(worst, std::abs(static_cast<double>(want - got[static_cast<std::size_t>(i)])));
+    most = std::max(most, std::abs(static_cast<double>(rgb[i] - got[static_cast<std::size_t>(i)])));
+  }
+  CHECK(worst < 1e-6);
+  CHECK(most > 1e-3);
+}
+
+TEST_CASE("owner: opposite signs mark oppositely, no gain marks nothing") {
+  Owner owner = small_owner();
+  const Tensor<float> x = uniform<float>({100, 3}, 0, 1, 1), rgb = uniform<float>({100, 3}, 0.2, 0.8, 2);
+  auto signs = cell_signs(owner.code(), Message{{1, 0, 1}});
+  const auto up = marked(owner, signs, x, rgb.data);
+  for (std::int8_t& s : signs) s = static_cast<std::int8_t>(-s);
+  const auto down = marked(owner, signs, x, rgb.data);
+  for (std::size_t i = 0; i < up.size(); ++i) CHECK(up[i] + down[i] == Approx(2 * rgb.data[i]).margin(1e-6));
+  owner.gain = 0;
+  CHECK(marked(owner, signs, x, rgb.data) == rgb.data);
+}
+
+TEST_CASE("owner: the code deals the cells under the key asked for") {
+  const Owner owner = small_owner();
+  const CellCode want = deal_cells(test_key(1), owner.cells.area(), 3);
+  CHECK(owner.code().bit == want.bit);
+  CHECK(owner.code().sign == want.sign);
+  CHECK(owner.code(test_key(1)).bit == want.bit);
+  CHECK(owner.code(test_key(2)).sign != want.sign);
+}
+
+TEST_CASE("owner: saved and loaded it is the same to the byte, and marks the same") {
+  const TemporaryFolder folder;
+  Owner owner = small_owner();
+  owner.gain = 0.1 + 0.2;  // no short decimal
+  owner.save(folder / "a");
+  const Owner again = Owner::load(folder / "a");
+  again.save(folder / "b");
+  CHECK(read_bytes(folder / "a") == read_bytes(folder / "b"));
+  CHECK(again.gain == owner.gain);
+  CHECK(again.key == owner.key);
+  CHECK(again.options().strength == 30);
+  CHECK(again.options().seed == 9);
+  const Tensor<float> x = uniform<float>({50, 3}, 0, 1, 1), rgb = uniform<float>({50, 3}, 0, 1, 2);
+  const auto signs = cell_signs(owner.code(), Message{{0, 1, 1}});
+  CHECK(marked(again, signs, x, rgb.data) == marked(owner, signs, x, rgb.data));
+  CHECK(std::equal(again.field.params.values().begin(), again.field.params.values().end(),
+                   owner.field.params.values().begin()));
+  CHECK(std::equal(again.field.grid.bits().begin(), again.field.grid.bits().end(),
+                   owner.field.grid.bits().begin()));
+}
+
+TEST_CASE("owner: files that are no owner's are refused with their path") {
+  const TemporaryFolder folder;
+  const auto path = folder / "x";
+  CHECK_THROWS_AS(Owner::load(path), IoError);
+  small_field().save(path);
+  CHECK_THROWS_AS(Owner::load(path), IoError);
+  CHECK_THROWS_WITH(Owner::load(path),
+                    path.string() + ": expected an OWNER file (kind 'owner'), found kind 'field'");
+  SafetensorsFile foreign;
+  foreign.add("weights", {1}, std::vector<float>{1});
+  foreign.write(path);
+  CHECK_THROWS_AS(Owner::load(path), IoError);
+  CHECK_THROWS_WITH(Owner::load(path), Contains(path.string()) && Contains("not a Fieldmark file"));
+  small_owner().save(path);
+  const auto bytes = read_bytes(path);
+  for (std::size_t keep : {std::size_t{0}, std::size_t{5}, std::size_t{200}, bytes.size() - 1}) {
+    write_file_atomically(path, std::span(bytes).first(keep));
+    CHECK_THROWS_AS(Owner::load(path), IoError);
+    CHECK_THROWS_WITH(Owner::load(path), Contains(path.string()));
+  }
+}
+
+TEST_CASE("owner: an owner whose parts do not fit its configuration is refused") {
+  const TemporaryFolder folder;
+  const auto path = folder / "x";
+  small_owner().save(path);
+  const SafetensorsFile good = SafetensorsFile::read(path);
+  const auto refused = [&](const SafetensorsFile& file, const std::string& text) {
+    file.write(path);
+    CHECK_THROWS_AS(Owner::load(path), IoError);
+    CHECK_THROWS_WITH(Owner::load(path), Contains(path.string()) && Contains(text));
+  };
+  const auto configured = [&](const std::string& from, const std::string& to) {
+    SafetensorsFile file = good;
+    std::string& text = file.metadata.at("fieldmark");
+    REQUIRE(text.find(from) != std::string::npos);
+    text.replace(text.find(from), from.size(), to);
+    return file;
+  };
+  refused(configured("\"bits\":3", "\"bits\":0"), "bits must be 1 to 256, got 0");
+  refused(configured("\"bits\":3", "\"bits\":\"three\""), "expected an owner's configuration, found");
+  refused(configured("\"bits\":3,", ""), "expected an owner's configuration, found");
+  refused(configured("\"features\":4,\"field\"", "\"features\":5,\"field\""),
+          "tensor 'mark/encode/0/weight': expected shape [15, 5]");
+  refused(configured("\"cells\":4", "\"cells\":5"), "[cell_grid] numbers must count");
+  for (const char* name : {"key", "cells/area", "mark/fuse/1/bias", "field/colour/0/weight"}) {
+    SafetensorsFile file = good;
+    std::erase_if(file.tensors, [&](const auto& t) { return t.name == name; });
+    REQUIRE(file.tensors.size() + 1 == good.tensors.size());
+    refused(file, name);
+  }
+}
+
+TEST_CASE("owner: options outside their ranges are refused") {
+  const auto with = [](auto change) {
+    OwnerOptions o = small_owner_options();
+    change(o);
+    small_owner(o);
+  };
+  CHECK_THROWS_AS(with([](OwnerOptions& o) { o.bits = 0; }), ValueError);
+  CHECK_THROWS_WITH(with([](OwnerOptions& o) { o.bits = 257; }), "[owner] bits must be 1 to 256, got 257");
+  CHECK_THROWS_WITH(with([](OwnerOptions& o) { o.strength = 19; }),
+                    "[owner] strength must be 20 to 60 dB, got 19.000000");
+  CHECK_THROWS_AS(with([](OwnerOptions& o) { o.strength = std::nan(""); }), ValueError);
+  CHECK_THROWS_WITH(with([](OwnerOptions& o) { o.reader_size = 31; }),
+                    "[owner] reader_size must be at least 32 pixels, got 31");
+}

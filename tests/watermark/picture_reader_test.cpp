@@ -1,0 +1,115 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/watermark/object_window.h>
+#include <fieldmark/watermark/picture_reader.h>
+
+#include <cmath>
+
+#include "small_owner.h"
+#include "support/catch.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+namespace {
+// A coloured block on white, so that there is something to cut out.
+Tensor<float> block(Index channels) {
+  Tensor<float> picture({40, 50, channels}, 1);
+  const auto noise = uniform<float>({40, 50, channels}, 0, 0.8, 8);
+  for (Index y = 8; y < 30; ++y)
+    for (Index x = 20; x < 44; ++x)
+      for (Index c = 0; c < channels; ++c)
+        picture[(y * 50 + x) * channels + c] = noise[(y * 50 + x) * channels + c];
+  return picture;
+}
+
+// [H, W, 1 or 2] as [H, W, 3 or 4].
+Tensor<float> coloured(const Tensor<float>& grey) {
+  const Index in = grey.shape[2], out = in + 2;
+  Tensor<float> picture({grey.shape[0], grey.shape[1], out});
+  for (Index p = 0; p < grey.shape[0] * grey.shape[1]; ++p) {
+    for (Index c = 0; c < 3; ++c) picture[p * out + c] = grey[p * in];
+    if (in == 2) picture[p * out + 3] = grey[p * in + 1];
+  }
+  return picture;
+}
+}  // namespace
+
+TEST_CASE("picture_reader: evidence is the window's sign evidence, summed by loops") {
+  const Owner owner = small_owner();
+  const Tensor<float> picture = block(3);
+  const auto got = PictureReader(owner).evidence(picture);
+  const Index cells = owner.cells.count(), classes = cells + 1;
+  REQUIRE(static_cast<Index>(got.size()) == cells);
+  const Tensor<float> cut = cut_window(picture, object_window(picture, 1), 32, 1);
+  Tape<float> tape;
+  const auto out =
+      owner.reader(Params<float>(owner.params, nullptr), tape.constant(cut.data.data(), {1, 32, 32, 3}));
+  std::vector<double> want(static_cast<std::size_t>(cells));
+  for (Index p = 0; p < out.height * out.width; ++p) {
+    const float* logit = out.index.value() + p * classes;
+    double sum = 0;
+    for (Index c = 0; c < classes; ++c) sum += std::exp(static_cast<double>(logit[c]));
+    for (Index c = 0; c < cells; ++c)
+      want[static_cast<std::size_t>(c)] += std::exp(static_cast<double>(logit[c])) / sum *
+                                           std::tanh(static_cast<double>(out.sign.value()[p]) / 2);
+  }
+  double most = 0;
+  for (std::size_t c = 0; c < want.size(); ++c) {
+    CHECK(got[c] == Approx(want[c]).epsilon(1e-5).margin(1e-9));
+    most = std::max(most, std::abs(got[c]));
+  }
+  CHECK(most > 1e-4);
+}
+
+TEST_CASE("picture_reader: grey is repeated and alpha is laid over the field's background") {
+  Owner owner = small_owner();
+  const PictureReader reader(owner);
+  const Tensor<float> grey = block(1), grey_alpha = block(2), alpha = block(4);
+  CHECK(reader.evidence(grey) == reader.evidence(coloured(grey)));
+  CHECK(reader.evidence(grey_alpha) == reader.evidence(coloured(grey_alpha)));
+  for (float background : {1.f, 0.f}) {
+    owner.field.background = background > 0 ? nerf::Background::white : nerf::Background::black;
+    Tensor<float> over({40, 50, 3});
+    for (Index p = 0; p < 40 * 50; ++p)
+      for (Index c = 0; c < 3; ++c)
+        over[3 * p + c] = alpha[4 * p + 3] * alpha[4 * p + c] + (1 - alpha[4 * p + 3]) * background;
+    CHECK(reader.evidence(alpha) == reader.evidence(over));
+  }
+  CHECK(reader.evidence(grey) != reader.evidence(block(3)));
+}
+
+TEST_CASE("picture_reader: what surrounds the object does not matter") {
+  const Owner owner = small_owner();
+  const PictureReader reader(owner);
+  const Tensor<float> picture = block(3);
+  CHECK(reader.evidence(picture) == reader.evidence(cut_window(picture, {-6, -10, 70}, 70, 1)));
+}
+
+TEST_CASE("picture_reader: one and two threads give the same bits") {
+  const Owner owner = small_owner();
+  const PictureReader reader(owner);
+  const int before = threads();
+  set_threads(1);
+  const auto one = reader.evidence(block(3));
+  set_threads(2);
+  const auto two = reader.evidence(block(3));
+  set_threads(before);
+  CHECK(one == two);
+}
+
+TEST_CASE("picture_reader: errors name what is no picture") {
+  const Owner owner = small_owner();
+  const PictureReader reader(owner);
+  CHECK(reader.evidence(Tensor<float>({16, 16, 3}, 0.5f)).size() > 0);
+  CHECK_THROWS_AS(reader.evidence(Tensor<float>({40, 50})), ShapeError);
+  CHECK_THROWS_WITH(reader.evidence(Tensor<float>({40, 50})),
+                    "[picture_reader] picture must have rank 3 [H, W, C], got shape [40, 50]");
+  for (const Shape& shape : {Shape{15, 50, 3}, Shape{40, 15, 3}, Shape{40, 50, 5}, Shape{40, 50, 0}}) {
+    CHECK_THROWS_AS(reader.evidence(Tensor<float>(shape)), ShapeError);
+    CHECK_THROWS_WITH(
+        reader.evidence(Tensor<float>(shape)),
+        "[picture_reader] picture must be [H, W, 1 to 4] with sides of at least 16, got shape " +
+            shape.str());
+  }
+}

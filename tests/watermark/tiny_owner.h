@@ -1,0 +1,48 @@
+#pragma once
+#include <fieldmark/nerf/analytic_scene.h>
+#include <fieldmark/nerf/trainer.h>
+#include <fieldmark/watermark/embed_views.h>
+#include <fieldmark/watermark/owner.h>
+
+#include "test_key.h"
+
+/// The built-in scene at 48 x 48 pixels, learnt for 150 steps by a field of small tables; once a program.
+inline const fieldmark::nerf::RadianceField& tiny_field() {
+  using namespace fieldmark;
+  static const nerf::RadianceField field = [] {
+    const nerf::Dataset data = nerf::make_scene({.size = 48, .views = 20});
+    nerf::RadianceField f({.field = {.encoding = {.levels = 4,
+                                                  .features = 2,
+                                                  .log2_table = 12,
+                                                  .base_resolution = 8,
+                                                  .finest_resolution = 64},
+                                     .width = 16,
+                                     .geometry = 8},
+                           .occupancy = 32,
+                           .step = 1.f / 128});
+    nerf::Trainer trainer(f, data, {.schedule = {.steps = 150}, .samples_per_step = 8192, .warm_up = 16});
+    while (!trainer.done()) trainer.step(0);
+    return f;
+  }();
+  return field;
+}
+
+/// Eight near views of it at 48 x 48 pixels.
+inline const std::vector<fieldmark::watermark::CachedView>& tiny_views() {
+  static const auto views = fieldmark::watermark::cache_near_views(tiny_field(), 48, 8, 3);
+  return views;
+}
+
+/// An owner of it whose networks have not learnt anything yet.
+inline fieldmark::watermark::Owner tiny_owner(double strength = 30) {
+  using namespace fieldmark::watermark;
+  return {tiny_field(),
+          {.bits = 4,
+           .strength = strength,
+           .cells = 6,
+           .reader_size = 48,
+           .mark = {.bands = 4, .features = 8},
+           .base_channels = 8},
+          test_key(5),
+          CellGrid(6, visible_area(tiny_views(), 6), 1e-3)};
+}

@@ -1,0 +1,64 @@
+#include <fieldmark/watermark/gradcheck_cases.h>
+#include <fieldmark/watermark/mark_network.h>
+#include <fieldmark/watermark/power_budget.h>
+#include <fieldmark/watermark/weighted_segments.h>
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+namespace fieldmark::watermark {
+namespace {
+
+// Fixed numbers in (0, 1) without a pattern.
+Tensor<double> numbers(Shape shape, double phase) {
+  Tensor<double> t(shape);
+  for (Index i = 0; i < t.size(); ++i)
+    t[i] = 0.5 + 0.5 * std::sin(phase + 1.7 * static_cast<double>(i * i + i));
+  return t;
+}
+
+GradcheckReport check_mark_network() {
+  ParamStore<double> store;
+  const MarkNetwork<double> net(store, "mark", {.bands = 2, .features = 4}, 3);
+  // Every ReLU well open or well shut, in turns: differences must not step over its kink. Small weights
+  // behind the first layer keep the last tanh where it bends.
+  const std::pair<const char*, double> layers[] = {
+      {"mark/encode/0", 20}, {"mark/encode/1", 4}, {"mark/fuse/0", 2}};
+  for (const auto& [name, open] : layers) {
+    const std::span<double> bias = store.values(store.find(std::string(name) + "/bias"));
+    for (std::size_t i = 0; i < bias.size(); ++i) bias[i] = i % 2 == 0 ? open : -2 * open;
+  }
+  for (const char* name : {"mark/encode/1/weight", "mark/fuse/0/weight"})
+    for (double& w : store.values(store.find(name))) w *= 0.02;
+  const std::vector<Tensor<double>> in{numbers({3, 3}, 1), numbers({3, 3}, 2)};
+  return gradcheck_module(
+      [&](Tape<double>&, const Params<double>& params, auto v) { return net.carrier(params, v[0], v[1]); },
+      store, in);
+}
+
+GradcheckReport check_power_budget() {
+  const std::vector<double> mask{1, 0, 0.5, 2};
+  const std::vector<Tensor<double>> in{numbers({4, 3}, 1)};
+  return gradcheck(
+      [&](Tape<double>&, auto v) { return power_budget(v[0], std::span<const double>(mask), 0.3); }, in);
+}
+
+GradcheckReport check_weighted_segments() {
+  const std::vector<std::int32_t> begin{0, 2, 2, 3, 6};
+  const std::vector<double> weights{0.5, -1, 2, 0, 0.25, 1};
+  const std::vector<Tensor<double>> in{numbers({6, 2}, 1)};
+  return gradcheck(
+      [&](Tape<double>&, auto v) { return weighted_segments(v[0], begin, std::span<const double>(weights)); },
+      in);
+}
+
+}  // namespace
+
+std::vector<GradcheckCase> gradcheck_cases() {
+  return {{"mark_network", check_mark_network},
+          {"power_budget", check_power_budget},
+          {"weighted_segments", check_weighted_segments}};
+}
+
+}  // namespace fieldmark::watermark
