@@ -4,6 +4,7 @@
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/watermark/embedder.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "support/catch.h"
@@ -37,7 +38,7 @@ Outcome run(Index steps) {
 }
 }  // namespace
 
-TEST_CASE("embedder: in 300 steps the losses fall and places are told apart") {
+TEST_CASE("embedder: in 300 steps the losses fall, places are told apart and bits begin to be read") {
   Owner owner = tiny_owner();
   const std::vector<float> field(owner.field.params.values().begin(), owner.field.params.values().end());
   Embedder embedder(owner, tiny_views(), options(300));
@@ -51,12 +52,11 @@ TEST_CASE("embedder: in 300 steps the losses fall and places are told apart") {
   CHECK(embedder.planned() == 300);
   const Embedder::Figures last = embedder.figures();
   CAPTURE(first.loss, last.loss, first.sign, last.sign, first.index, last.index, last.bits);
-  CHECK(last.loss < 0.8 * first.loss);
-  CHECK(last.index > first.index + 0.05);
-  CHECK(last.sign > 0.5);
-  CHECK(last.bits >= 0);
-  CHECK(last.bits <= 1);
-  for (float v : owner.params.values()) REQUIRE(std::isfinite(v));
+  CHECK(last.loss < 0.7 * first.loss);
+  CHECK(last.index > first.index + 0.03);
+  CHECK(last.sign > 0.65);
+  CHECK(last.bits > 0.6);
+  CHECK(std::ranges::all_of(owner.params.values(), [](float v) { return std::isfinite(v); }));
   CHECK(field == std::vector<float>(owner.field.params.values().begin(), owner.field.params.values().end()));
 }
 
