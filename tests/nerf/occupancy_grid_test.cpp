@@ -101,6 +101,18 @@ TEST_CASE("occupancy_grid: a cell that was ruled out stays out") {
   CHECK(std::equal(keep.begin(), keep.end(), grid.bits().begin()));
 }
 
+TEST_CASE("occupancy_grid: a block holds the bits of its cells") {
+  OccupancyGrid grid(12);
+  grid.set_bits(ball(12));
+  for (Index c = 0; c < grid.cells(); ++c) {
+    const Index x = c % 12, y = c / 12 % 12, z = c / 144;
+    const auto bit = (grid.block(x / 4, y / 4, z / 4) >> (x % 4 + 4 * (y % 4) + 16 * (z % 4))) & 1;
+    REQUIRE((bit != 0) == grid.occupied(c));
+  }
+  CHECK(grid.occupied_cells() > 0);
+  CHECK(grid.occupied_cells() < grid.cells());
+}
+
 TEST_CASE("occupancy_grid: restore continues as the original would") {
   OccupancyGrid a(8), b(8);
   a.restrict_to(ball(8));

@@ -127,6 +127,49 @@ TEST_CASE("renderer: follows changes of the field between views") {
   CHECK(before.rgb.data != after.rgb.data);
 }
 
+TEST_CASE("renderer: recolouring replaces colours and leaves opacity alone") {
+  const RadianceField f = small_field();
+  const Camera camera = test_camera();
+  Renderer renderer(f);
+  const Rendering plain = renderer.render(camera);
+  renderer.set_recolour([](const float*, Index n, float* rgb) {
+    for (Index i = 0; i < n; ++i) rgb[3 * i] = 0.25f, rgb[3 * i + 1] = 1, rgb[3 * i + 2] = 0;
+  });
+  const Rendering painted = renderer.render(camera);
+  CHECK(painted.opacity.data == plain.opacity.data);
+  for (Index i = 0; i < plain.opacity.size(); ++i) {
+    const float a = plain.opacity[i];
+    CHECK(std::abs(painted.rgb[3 * i] - (1 - 0.75f * a)) < 1e-5f);
+    CHECK(std::abs(painted.rgb[3 * i + 1] - 1) < 1e-5f);
+    CHECK(std::abs(painted.rgb[3 * i + 2] - (1 - a)) < 1e-5f);
+  }
+  renderer.set_recolour({});
+  CHECK(renderer.render(camera).rgb.data == plain.rgb.data);
+}
+
+TEST_CASE("renderer: the position of a ray is the mean of its samples by weight") {
+  const RadianceField f = small_field();
+  const Camera camera = test_camera(4, 1);
+  Renderer renderer(f, {.stop = 0, .least_weight = 0});
+  const std::vector<float> pixels{0, 0, 1, 0, 2, 0, 3, 0};
+  std::vector<float> origins(15), directions(15), out(20), position(15, 7.f);
+  camera_rays(camera, pixels, origins.data(), directions.data());
+  for (std::size_t i = 0; i < 12; i += 3) f.to_cube(&origins[i], &origins[i]);
+  origins[12] = 9, directions[12] = 1;  // sees nothing
+  renderer.trace({origins, directions}, 0, out.data(), position.data());
+
+  // Colours that are positions: composited, they are the mean position times opacity.
+  renderer.set_recolour([](const float* x, Index n, float* rgb) { std::copy_n(x, 3 * n, rgb); });
+  renderer.trace({origins, directions}, 0, out.data());
+  for (std::size_t r = 0; r < 4; ++r)
+    for (std::size_t a = 0; a < 3; ++a) {
+      const float mean = position[3 * r + a];
+      CHECK(std::abs(mean * out[4 * r + 3] - out[4 * r + a]) < 1e-6f);
+      CHECK((mean > 0 && mean < 1));
+    }
+  for (std::size_t a = 0; a < 3; ++a) CHECK(position[12 + a] == 0);
+}
+
 TEST_CASE("renderer: sample weights are the composite's") {
   RaySamples samples;
   samples.ray_begin = {0, 0, 3, 4};
