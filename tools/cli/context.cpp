@@ -26,6 +26,8 @@ void add_common(CLI::App& app, CommonOptions& options) {
       ->type_name("FILE");
 }
 
+void check_writable(const std::string& path) { AtomicFile{path}; }
+
 Context::Context(const CommonOptions& options, std::vector<std::string> command_line, std::ostream& out,
                  std::ostream& err)
     : options_(options),
@@ -34,7 +36,7 @@ Context::Context(const CommonOptions& options, std::vector<std::string> command_
       err_(err),
       text_(options.json == "-" ? err : out) {
   for (const auto& path : {options.json, options.report})
-    if (!path.empty() && path != "-") AtomicFile{path};
+    if (!path.empty() && path != "-") check_writable(path);
 }
 
 void Context::result(const Json& json) {

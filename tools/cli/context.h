@@ -1,4 +1,5 @@
 #pragma once
+#include <chrono>
 #include <cstdint>
 #include <iosfwd>
 #include <nlohmann/json.hpp>
@@ -24,6 +25,9 @@ struct CommonOptions {
 };
 void add_common(CLI::App& app, CommonOptions& options);
 
+/// @throws IoError if no file can be made under this name; what is there stays
+void check_writable(const std::string& path);
+
 /// What a command gets besides its own options: where to write and how to report.
 class Context {
  public:
@@ -38,10 +42,14 @@ class Context {
   /// For people: standard output, or standard error when the results take standard output.
   std::ostream& text() { return text_; }
   Progress progress(std::string what) { return Progress(err_, std::move(what)); }
+  /// Since the command was called.
+  double seconds() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
   /// Writes the results to --json and --report. @throws IoError if a file cannot be written
   void result(const Json& json);
 
  private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point begin_ = Clock::now();
   CommonOptions options_;
   std::vector<std::string> command_line_;
   std::ostream &out_, &err_, &text_;

@@ -36,8 +36,9 @@ bool is_list_of_rows(const Json& value) { return value.is_array() && !value.empt
 // One row for each number; nested names are joined with a dot.
 void flatten(const std::string& prefix, const Json& value, std::vector<std::vector<std::string>>& rows) {
   if (value.is_object()) {
+    const std::string before = prefix.empty() ? "" : prefix + ".";
     for (const auto& [key, inner] : value.items())
-      if (!is_list_of_rows(inner)) flatten(prefix.empty() ? key : prefix + "." + key, inner, rows);
+      if (!is_list_of_rows(inner)) flatten(before + key, inner, rows);
   } else {
     rows.push_back({prefix, cell(value)});
   }

@@ -1,0 +1,47 @@
+#include <fieldmark/engine/image.h>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/cli.h"
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+#include "tools/run_command.h"
+#include "tools/tiny_scene.h"
+
+using namespace fieldmark;
+using Json = nlohmann::json;
+
+TEST_CASE("render draws cameras from the field alone, or takes a data set's", "[render]") {
+  const TemporaryFolder folder;
+  const std::string scene = tiny_scene(folder), field = tiny_field(folder, scene);
+  for (const char* cameras : {"near", "ring", "sphere"}) {
+    const auto r = run_command({"render", "--field", field, "--out", folder / cameras, "--cameras", cameras,
+                                "--count", "2", "--size", "12", "--json", "-"});
+    INFO(r.err);
+    REQUIRE(r.code == cli::kOk);
+    const Json json = Json::parse(r.out);
+    CHECK(json["views"] == 2);
+    REQUIRE(json["images"].size() == 2);
+    CHECK(read_image(json["images"][1].get<std::string>()).shape == Shape{12, 12, 3});
+  }
+  CHECK(read_image(folder / "near/view_000.png").data != read_image(folder / "sphere/view_000.png").data);
+  const auto data = run_command({"render", "--field", field, "--out", folder / "data", "--data", scene,
+                                 "--against", field, "--sheet", folder / "sheet.png"});
+  REQUIRE(data.code == cli::kOk);
+  CHECK(read_image(folder / "data/r_0.png").shape == Shape{16, 16, 3});
+  CHECK(read_image(folder / "sheet.png").shape[1] == 3 * 16 + 2 * 4);
+}
+
+TEST_CASE("render refuses options that contradict each other", "[render]") {
+  const auto with = [](std::vector<std::string> more) {
+    std::vector<std::string> words{"render", "--field", "f", "--out", "o"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_command(words).code;
+  };
+  CHECK(with({"--count", "2", "--data", "d"}) == cli::kUsage);
+  CHECK(with({"--sheet", "s.png"}) == cli::kUsage);
+  CHECK(with({"--split", "val"}) == cli::kUsage);
+  CHECK(with({"--cameras", "circle"}) == cli::kUsage);
+  CHECK(with({"--count", "0"}) == cli::kUsage);
+  CHECK(with({}) == cli::kFailed);
+}

@@ -1,0 +1,53 @@
+#include <fieldmark/engine/files.h>
+
+#include <csignal>
+#include <nlohmann/json.hpp>
+
+#include "cli/cli.h"
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+#include "tools/run_command.h"
+#include "tools/tiny_scene.h"
+
+using namespace fieldmark;
+using Json = nlohmann::json;
+
+TEST_CASE("train writes a field, its figures, and the same bytes for one and two threads", "[train]") {
+  const TemporaryFolder folder;
+  const std::string scene = tiny_scene(folder);
+  const auto train = [&](const std::string& out, const char* threads) {
+    return run_command({"train", "--data", scene, "--out", folder / out, "--steps", "6", "--threads", threads,
+                        "--json", "-"});
+  };
+  const auto r = train("a.fm", "1");
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  const Json json = Json::parse(r.out);
+  for (const char* key :
+       {"test_psnr", "train_seconds", "steps", "samples_per_second", "parameters", "file_bytes"})
+    CHECK(json.at(key).is_number());
+  CHECK(json["steps"] == 6);
+  CHECK(json["file_bytes"] == std::filesystem::file_size(folder / "a.fm"));
+  CHECK(!std::filesystem::exists(folder / "a.fm.checkpoint"));
+  REQUIRE(train("b.fm", "2").code == cli::kOk);
+  CHECK(read_bytes(folder / "a.fm") == read_bytes(folder / "b.fm"));
+}
+
+TEST_CASE("train says what is wrong with its data and its options, and leaves no file", "[train]") {
+  const TemporaryFolder folder;
+  const std::string out = folder / "f.fm";
+  const auto missing = run_command({"train", "--data", "/no/such/scene", "--out", out, "--steps", "1"});
+  CHECK(missing.code == cli::kFailed);
+  CHECK_THAT(missing.err, Contains("/no/such/scene"));
+  CHECK(run_command({"train", "--data", "x", "--out", out, "--steps", "1", "--seconds", "2"}).code ==
+        cli::kUsage);
+  CHECK(run_command({"train", "--data", "x", "--out", out, "--steps", "0"}).code == cli::kUsage);
+  CHECK(run_command({"train", "--data", "x"}).code == cli::kUsage);
+  const std::string scene = tiny_scene(folder);
+  const auto nothing = run_command({"train", "--data", scene, "--out", out, "--steps", "2", "--resume"});
+  CHECK(nothing.code == cli::kFailed);
+  CHECK_THAT(nothing.err, Contains("f.fm.checkpoint"));
+  CHECK(run_command({"train", "--data", scene, "--out", "/no/folder/f", "--steps", "1"}).code ==
+        cli::kFailed);
+  CHECK(!std::filesystem::exists(out));
+}

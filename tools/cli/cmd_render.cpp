@@ -1,0 +1,129 @@
+#include <fieldmark/engine/image.h>
+#include <fieldmark/nerf/renderer.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <ostream>
+
+#include "cli/cli.h"
+#include "cli/commands.h"
+#include "cli/context.h"
+#include "cli/sheet.h"
+
+namespace fieldmark::cli {
+namespace {
+
+struct Options {
+  std::string field, out, data;
+  std::string split = "test", cameras = "near";
+  std::string against, sheet;
+  Index count = 10, size = 0;
+};
+
+struct NamedCamera {
+  std::string name;
+  nerf::Camera camera;
+};
+
+std::vector<NamedCamera> cameras_of(const Options& options, const nerf::RadianceField& field,
+                                    std::uint64_t seed) {
+  std::vector<NamedCamera> cameras;
+  if (!options.data.empty() || options.cameras == "test") {
+    if (options.data.empty()) throw UsageError("--cameras test: needs --data DIR, whose views they are");
+    const auto data = nerf::load_dataset(options.data, {.split = options.split});
+    for (const auto& view : data.views) cameras.push_back({view.name, view.camera.scaled(options.size)});
+    return cameras;
+  }
+  for (const auto& camera : nerf::make_cameras(field.cameras, nerf::parse_camera_set(options.cameras),
+                                               options.count, options.size, seed)) {
+    char name[32];
+    std::snprintf(name, sizeof name, "view_%03zu", cameras.size());
+    cameras.push_back({name, camera});
+  }
+  return cameras;
+}
+
+// The views of both fields side by side, for the first few cameras.
+void write_sheet(const Options& options, nerf::Renderer& renderer, const std::vector<NamedCamera>& cameras) {
+  const auto other = nerf::RadianceField::load(options.against);
+  nerf::Renderer against(other);
+  std::vector<PicturePair> pairs;
+  for (std::size_t i = 0; i < std::min<std::size_t>(cameras.size(), 4); ++i)
+    pairs.push_back({against.render(cameras[i].camera).rgb, renderer.render(cameras[i].camera).rgb});
+  write_png(options.sheet, comparison_sheet(pairs));
+}
+
+int run(const Options& options, Context& context) {
+  const auto field = nerf::RadianceField::load(options.field);
+  const auto cameras = cameras_of(options, field, context.seed());
+  std::filesystem::create_directories(options.out);
+  nerf::Renderer renderer(field);
+  const InterruptGuard guard;
+  Json images = Json::array();
+  double seconds = 0;
+  {
+    Progress progress = context.progress("render");
+    for (const auto& [name, camera] : cameras) {
+      if (guard.interrupted()) throw Interrupted(std::to_string(images.size()) + " views were written");
+      const double begin = context.seconds();
+      const auto rendering = renderer.render(camera);
+      seconds += context.seconds() - begin;
+      const auto path = std::filesystem::path(options.out) / (name + ".png");
+      write_png(path, rendering.rgb);
+      images.push_back(path.string());
+      progress.update(static_cast<double>(images.size()) / static_cast<double>(cameras.size()));
+    }
+  }
+  if (!options.sheet.empty()) write_sheet(options, renderer, cameras);
+  const double each = seconds / static_cast<double>(cameras.size());
+  char line[80];
+  std::snprintf(line, sizeof line, "%zu views, %.3f s each", cameras.size(), each);
+  context.text() << options.out << ": " << line << "\n";
+  context.result({{"views", cameras.size()},
+                  {"width", cameras.front().camera.width},
+                  {"height", cameras.front().camera.height},
+                  {"seconds_per_view", each},
+                  {"images", images}});
+  return kOk;
+}
+
+}  // namespace
+
+Command add_render(CLI::App& app) {
+  auto o = std::make_shared<Options>();
+  app.add_option("--field", o->field, "Trained or baked field")->required()->type_name("FIELD");
+  app.add_option("--out", o->out, "Folder for the pictures, PNG")->required()->type_name("DIR");
+  CLI::Option* data = app.add_option("--data", o->data, "Take the cameras of a data set")->type_name("DIR");
+  app.add_option("--split", o->split, "Views of the data set: train, val, test")
+      ->check(CLI::IsMember({"train", "val", "test"}).description(""))
+      ->needs(data)
+      ->type_name("SPLIT");
+  app.add_option("--cameras", o->cameras,
+                 "Without --data: near (drawn from the span of the training cameras),\n"
+                 "ring (30 degrees above, radius 4.0311), sphere (all directions)")
+      ->check(CLI::IsMember({"near", "ring", "sphere", "test"}).description(""))
+      ->type_name("SET");
+  app.add_option("--count", o->count, "Cameras to draw, 1 to 100000")
+      ->check(CLI::Range(1, 100000).description(""))
+      ->excludes(data)
+      ->type_name("N");
+  app.add_option("--size", o->size, "Pixels of the pictures' longer side, 1 to 8192 (as trained)")
+      ->check(CLI::Range(1, 8192).description(""))
+      ->type_name("N")
+      ->default_str("");
+  CLI::Option* against =
+      app.add_option("--against", o->against, "Another field, for --sheet")->type_name("FIELD");
+  CLI::Option* sheet = app.add_option("--sheet", o->sheet,
+                                      "PNG with four views of the other field, of this one, and ten times\n"
+                                      "their difference")
+                           ->type_name("FILE");
+  against->needs(sheet);
+  sheet->needs(against);
+  return [o](Context& context) { return run(*o, context); };
+}
+
+}  // namespace fieldmark::cli
