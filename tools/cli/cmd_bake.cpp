@@ -3,57 +3,60 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <ostream>
 
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
-#include "cli/measured.h"
+#include "cli/long_run.h"
 
 namespace fieldmark::cli {
 namespace {
 
-namespace wm = watermark;
-
 struct Options {
   std::string owner, message, out;
-  wm::BakeOptions bake;
+  RunLength length{.seconds = watermark::BakeOptions{}.schedule.seconds};
 };
 
-int run(Options options, Context& context) {
+int run(const Options& options, Context& context) {
+  if (std::filesystem::exists(options.out) && std::filesystem::equivalent(options.out, options.owner))
+    throw UsageError("--out: " + options.out + " is the owner's file");
   check_writable(options.out);
-  const auto owner = wm::Owner::load(options.owner);
-  const wm::Message message = read_message(options.message, owner);
-  options.bake.seed = context.seed();
-  wm::Baker baker(owner, message, options.bake);
-  {
-    const InterruptGuard guard;
-    Progress progress = context.progress("bake");
-    while (!baker.done()) {
-      if (guard.interrupted()) throw Interrupted("nothing was written yet");
-      const double now = context.seconds();
-      baker.step(now);
-      char note[64];
-      std::snprintf(note, sizeof note, "step %lld, %.2f dB from the mark",
-                    static_cast<long long>(baker.steps()), baker.psnr());
-      const Index planned = baker.planned();
-      progress.update(planned > 0 ? static_cast<double>(baker.steps()) / static_cast<double>(planned)
-                                  : now / options.bake.schedule.seconds,
-                      note);
-    }
-  }
-  const double seconds = context.seconds();
+  const auto owner = watermark::Owner::load(options.owner);
+  const auto message = read_option(
+      "--message", [&] { return watermark::message_from_hex(options.message, owner.options().bits); });
+  watermark::BakeOptions bake_options{.seed = context.seed()};
+  bake_options.schedule.steps = options.length.steps;
+  bake_options.schedule.seconds = options.length.seconds;
+  watermark::Baker baker(owner, message, bake_options);
+  const double seconds =
+      run_long({.what = "bake",
+                .done = [&] { return baker.done(); },
+                .step = [&](double now) { baker.step(now); },
+                .steps = [&] { return baker.steps(); },
+                .note =
+                    [&] {
+                      char note[64];
+                      std::snprintf(note, sizeof note, "%.2f dB to the marked colours", baker.psnr());
+                      return std::string(note);
+                    },
+                .save = {},
+                .checkpoint = {}},
+               options.length, context);
   baker.field().save(options.out);
-  const std::string claim = wm::claim_digest(wm::sha256_file_hex(options.owner), owner.key, message);
-  context.text()
-      << options.out << ": message " << wm::to_hex(message) << " baked in " << format_duration(seconds)
-      << "\nclaim to be time-stamped before the field is published (SHA-256 of owner, key and message):\n"
-      << claim << "\n";
-  context.result({{"message", wm::to_hex(message)},
-                  {"steps", baker.steps()},
+
+  const auto claim = watermark::claim_digest(watermark::sha256_file_hex(options.owner), owner.key, message);
+  const auto bytes = std::filesystem::file_size(options.out);
+  context.text() << options.out << ": " << baker.steps() << " steps in " << format_duration(seconds)
+                 << "\nclaim " << claim << ", to be time-stamped before the field is published\n";
+  context.result({{"message", to_hex(message)},
+                  {"bits", message.size()},
                   {"seconds", seconds},
-                  {"psnr_mark", baker.psnr()},
+                  {"steps", baker.steps()},
+                  {"psnr_colours", number(baker.psnr())},
+                  {"file_bytes", bytes},
                   {"claim", claim}});
   return kOk;
 }
@@ -62,20 +65,13 @@ int run(Options options, Context& context) {
 
 Command add_bake(CLI::App& app) {
   auto o = std::make_shared<Options>();
-  app.add_option("--owner", o->owner, "The owner's secret file")->required()->type_name("OWNER");
-  app.add_option("--message", o->message, "The message, hexadecimal, most significant bit first")
+  app.add_option("--owner", o->owner, "What `fieldmark embed` wrote")->required()->type_name("OWNER");
+  app.add_option("--message", o->message,
+                 "Message, hexadecimal, most significant bit first, as long as the owner's bits")
       ->required()
       ->type_name("HEX");
-  app.add_option("--out", o->out, "File for the field to ship")->required()->type_name("FIELD");
-  CLI::Option* steps =
-      app.add_option("--steps", o->bake.schedule.steps, "Length of the run in steps, 1 to 10000000")
-          ->check(CLI::Range(1, 10000000).description(""))
-          ->type_name("N")
-          ->default_str("");
-  app.add_option("--seconds", o->bake.schedule.seconds, "Length of the run from its start, 1 to 1000000")
-      ->check(CLI::Range(1.0, 1e6).description(""))
-      ->excludes(steps)
-      ->type_name("S");
+  app.add_option("--out", o->out, "File for the field to publish")->required()->type_name("FIELD");
+  add_run_length(app, o->length, false);
   return [o](Context& context) { return run(*o, context); };
 }
 

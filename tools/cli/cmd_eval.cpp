@@ -18,44 +18,45 @@ struct Options {
   Index size = 0;
 };
 
-// JSON knows no infinity: equal pictures, like views without an object, are null.
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 int run(const Options& options, Context& context) {
   const auto field = nerf::RadianceField::load(options.field);
   const auto data = nerf::load_dataset(
       options.data, {.split = options.split, .size = options.size, .background = field.background});
+  nerf::Renderer renderer(field);
   const InterruptGuard guard;
   nerf::Evaluation evaluation;
   {
     Progress progress = context.progress("eval");
-    evaluation = nerf::evaluate(field, data, [&](Index done, Index total) {
-      if (guard.interrupted()) throw Interrupted("");
+    evaluation = nerf::evaluate(renderer, data, [&](Index done, Index total) {
       progress.update(static_cast<double>(done) / static_cast<double>(total));
+      return !guard.interrupted();
     });
   }
+  if (guard.interrupted()) throw Interrupted("nothing was written");
   Json views = Json::array();
-  const auto add = [&](const std::string& name, const nerf::Quality& q) {
+  const auto add = [&](const std::string& name, double psnr, double object, double ssim) {
     char line[160];
-    std::snprintf(line, sizeof line, "%-16s %6.2f dB  object %6.2f dB  ssim %.4f\n", name.c_str(), q.psnr,
-                  q.psnr_object, q.ssim);
+    std::snprintf(line, sizeof line, "%-16s %6.2f dB  object %6.2f dB  ssim %.4f\n", name.c_str(), psnr,
+                  object, ssim);
     context.text() << line;
   };
-  for (const auto& view : evaluation.views) {
-    add(view.name, view.quality);
-    views.push_back({{"image", view.name},
-                     {"psnr", number(view.quality.psnr)},
-                     {"psnr_object", number(view.quality.psnr_object)},
-                     {"ssim", view.quality.ssim}});
+  for (std::size_t i = 0; i < evaluation.per_view.size(); ++i) {
+    const nerf::ViewScore& score = evaluation.per_view[i];
+    add(data.views[i].name, score.psnr, score.psnr_object, score.ssim);
+    views.push_back({{"image", data.views[i].name},
+                     {"psnr", number(score.psnr)},
+                     {"psnr_object", number(score.psnr_object)},
+                     {"ssim", number(score.ssim)}});
   }
-  add("mean", evaluation.mean);
-  context.result({{"psnr", number(evaluation.mean.psnr)},
-                  {"psnr_object", number(evaluation.mean.psnr_object)},
-                  {"ssim", evaluation.mean.ssim},
+  add("mean", evaluation.psnr, evaluation.psnr_object, evaluation.ssim);
+  context.result({{"psnr", number(evaluation.psnr)},
+                  {"psnr_object", number(evaluation.psnr_object)},
+                  {"ssim", number(evaluation.ssim)},
                   {"lpips_alex", nullptr},
-                  {"views", evaluation.views.size()},
+                  {"views", evaluation.views},
                   {"scene", data.name},
                   {"split", data.split},
+                  {"seconds_per_view", evaluation.seconds_per_view},
                   {"per_view", views}});
   return kOk;
 }

@@ -10,31 +10,29 @@
 namespace fieldmark::cli {
 namespace {
 
-namespace wm = watermark;
-
 struct Options {
   std::string owner;
-  std::vector<std::string> pictures;
+  std::vector<std::string> images;
 };
 
 int run(const Options& options, Context& context) {
-  const auto owner = wm::Owner::load(options.owner);
-  const auto readings = read_pictures(owner, options.pictures, context);
+  const auto owner = watermark::Owner::load(options.owner);
+  const auto pictures = read_pictures(owner, options.images, context);
   const auto code = owner.code();
+  const Index bits = owner.options().bits;
   Json views = Json::array();
-  for (std::size_t i = 0; i < readings.each.size(); ++i) {
-    const auto bits = wm::read_bits(readings.each[i], code, owner.options().bits);
-    const std::string name = readings.pictures[i].string();
-    context.text() << wm::to_bits(bits.message) << "  " << name << "\n";
-    views.push_back({{"image", name}, {"bits", wm::to_bits(bits.message)}, {"logits", bits.logit}});
+  for (const auto& picture : pictures) {
+    const auto reading = watermark::read_bits(picture.cells, code, bits);
+    context.text() << to_bits(reading.message) << "  " << picture.image << "\n";
+    views.push_back(
+        {{"image", picture.image}, {"bits", to_bits(reading.message)}, {"logits", reading.logit}});
   }
-  const auto all = wm::read_bits(readings.sum, code, owner.options().bits);
-  context.text() << wm::to_bits(all.message) << "  all " << readings.each.size() << " together: message "
-                 << wm::to_hex(all.message) << "\n";
-  context.result({{"message", wm::to_hex(all.message)},
-                  {"bits", wm::to_bits(all.message)},
-                  {"logits", all.logit},
+  const auto reading = watermark::read_bits(total_evidence(pictures), code, bits);
+  context.text() << to_bits(reading.message) << "  all together: " << to_hex(reading.message) << "\n";
+  context.result({{"message", to_hex(reading.message)},
+                  {"bits", to_bits(reading.message)},
                   {"reading", "blind"},
+                  {"logits", reading.logit},
                   {"views", views}});
   return kOk;
 }
@@ -43,8 +41,11 @@ int run(const Options& options, Context& context) {
 
 Command add_extract(CLI::App& app) {
   auto o = std::make_shared<Options>();
-  app.add_option("--owner", o->owner, "The owner's secret file")->required()->type_name("OWNER");
-  app.add_option("pictures", o->pictures, "Pictures, or folders of them")->required()->type_name("IMAGE|DIR");
+  app.add_option("--owner", o->owner, "What `fieldmark embed` wrote")->required()->type_name("OWNER");
+  app.add_option("images", o->images, "Pictures, or folders of them (PNG, JPEG)")
+      ->required()
+      ->type_name("IMAGE|DIR")
+      ->default_str("");
   return [o](Context& context) { return run(*o, context); };
 }
 

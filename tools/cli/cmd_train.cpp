@@ -5,51 +5,64 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <ostream>
 
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/long_run.h"
 
 namespace fieldmark::cli {
 namespace {
 
+constexpr double kHeaderBytes = 32e3;  // names and metadata, cameras included
+
 struct Options {
   std::string data, out;
-  std::string background = "white";
-  Index size = 0, steps = 0;
-  double seconds = 60, target_psnr = 0, checkpoint_seconds = 60;
+  std::string preset = "hash", background = "white";
+  Index size = 0;
+  RunLength length;
+  double target_psnr = 0, max_megabytes = 0;
   bool resume = false;
-  nerf::RadianceFieldOptions field;
 };
 
 nerf::Background background_of(const std::string& name) {
   return name == "white" ? nerf::Background::white : nerf::Background::black;
 }
 
-void train(const Options& options, nerf::Trainer& trainer, const std::string& checkpoint, Context& context) {
-  const InterruptGuard guard;
-  Progress progress = context.progress("train");
-  double saved = context.seconds();
-  while (!trainer.done()) {
-    const double now = context.seconds();
-    if (guard.interrupted() || now - saved > options.checkpoint_seconds) {
-      trainer.save(checkpoint);
-      saved = context.seconds();
-    }
-    if (guard.interrupted())
-      throw Interrupted("after " + std::to_string(trainer.steps()) + " steps, --resume goes on from " +
-                        checkpoint);
-    trainer.step(now);
-    if (options.target_psnr > 0 && trainer.train_psnr() >= options.target_psnr) break;
-    char note[64];
-    std::snprintf(note, sizeof note, "step %lld, %.2f dB on rays trained",
-                  static_cast<long long>(trainer.steps()), trainer.train_psnr());
-    const double steps = static_cast<double>(trainer.steps());
-    progress.update(options.steps > 0 ? steps / static_cast<double>(options.steps) : now / options.seconds,
-                    note);
+// The largest table whose field's numbers fit; the rest of the file is small.
+nerf::RadianceFieldOptions field_options(const Options& options, std::uint64_t seed) {
+  nerf::RadianceFieldOptions field;
+  field.seed = seed;
+  if (options.max_megabytes <= 0) return field;
+  for (int log2 = field.field.encoding.log2_table; log2 >= 4; --log2) {
+    field.field.encoding.log2_table = log2;
+    const nerf::RadianceField made(field);
+    const double bytes =
+        4.0 * static_cast<double>(made.params.size()) + static_cast<double>(made.grid.cells()) / 8;
+    if (bytes + kHeaderBytes <= options.max_megabytes * 1e6) return field;
   }
+  throw UsageError("--max-megabytes: no field is as small as " + std::to_string(options.max_megabytes) +
+                   " MB");
+}
+
+double train(const Options& options, nerf::Trainer& trainer, const std::string& checkpoint,
+             Context& context) {
+  const bool has_target = options.target_psnr > 0;
+  return run_long(
+      {.what = "train",
+       .done = [&] { return trainer.done() || (has_target && trainer.train_psnr() >= options.target_psnr); },
+       .step = [&](double seconds) { trainer.step(seconds); },
+       .steps = [&] { return trainer.steps(); },
+       .note =
+           [&] {
+             char note[64];
+             std::snprintf(note, sizeof note, "%.2f dB on the rays trained", trainer.train_psnr());
+             return std::string(note);
+           },
+       .save = [&] { trainer.save(checkpoint); },
+       .checkpoint = checkpoint},
+      options.length, context);
 }
 
 // Of the data set's test views, after everything is saved; null where there are none.
@@ -57,12 +70,15 @@ Json test_psnr(const Options& options, const nerf::RadianceField& field, Context
   if (!std::filesystem::exists(std::filesystem::path(options.data) / "transforms_test.json")) return nullptr;
   const auto data = nerf::load_dataset(
       options.data, {.split = "test", .size = options.size, .background = background_of(options.background)});
+  nerf::Renderer renderer(field);
+  const InterruptGuard guard;
   Progress progress = context.progress("test views");
-  return nerf::evaluate(field, data,
-                        [&](Index done, Index total) {
-                          progress.update(static_cast<double>(done) / static_cast<double>(total));
-                        })
-      .mean.psnr;
+  const auto evaluation = nerf::evaluate(renderer, data, [&](Index done, Index total) {
+    progress.update(static_cast<double>(done) / static_cast<double>(total));
+    return !guard.interrupted();
+  });
+  if (guard.interrupted()) throw Interrupted("the field is complete, its test views are not");
+  return evaluation.psnr;
 }
 
 int run(const Options& options, Context& context) {
@@ -71,17 +87,14 @@ int run(const Options& options, Context& context) {
   const auto data = nerf::load_dataset(
       options.data,
       {.split = "train", .size = options.size, .background = background_of(options.background)});
-  auto field_options = options.field;
-  field_options.seed = context.seed();
-  nerf::RadianceField field(field_options);
-  const nerf::TrainOptions train_options{.schedule = {.steps = options.steps, .seconds = options.seconds},
-                                         .seed = context.seed()};
+  nerf::RadianceField field(field_options(options, context.seed()));
+  const nerf::TrainOptions train_options{
+      .schedule = {.steps = options.length.steps, .seconds = options.length.seconds}, .seed = context.seed()};
   nerf::Trainer trainer(field, data, train_options);
   if (options.resume) trainer.restore(checkpoint);
 
   const double begun = context.seconds(), samples_before = trainer.samples();
-  train(options, trainer, checkpoint, context);
-  const double seconds = context.seconds();
+  const double seconds = train(options, trainer, checkpoint, context);
   field.save(options.out);
   std::filesystem::remove(checkpoint);
 
@@ -117,14 +130,10 @@ Command add_train(CLI::App& app) {
       ->check(CLI::Range(16, 8192).description(""))
       ->type_name("N")
       ->default_str("");
-  CLI::Option* steps = app.add_option("--steps", o->steps, "Length of the run in steps, 1 to 10000000")
-                           ->check(CLI::Range(1, 10000000).description(""))
-                           ->type_name("N")
-                           ->default_str("");
-  app.add_option("--seconds", o->seconds, "Length of the run from its start, loading included, 1 to 1000000")
-      ->check(CLI::Range(1.0, 1e6).description(""))
-      ->excludes(steps)
-      ->type_name("S");
+  app.add_option("--preset", o->preset, "hash: multiresolution hash table with small networks")
+      ->check(CLI::IsMember({"hash"}).description(""))
+      ->type_name("NAME");
+  add_run_length(app, o->length, true);
   app.add_option("--target-psnr", o->target_psnr,
                  "End when the rays trained on reach this, dB, 1 to 100 (off)")
       ->check(CLI::Range(1.0, 100.0).description(""))
@@ -133,9 +142,11 @@ Command add_train(CLI::App& app) {
   app.add_option("--background", o->background, "Behind transparent photographs: white, black")
       ->check(CLI::IsMember({"white", "black"}).description(""))
       ->type_name("COLOUR");
-  app.add_option("--checkpoint-seconds", o->checkpoint_seconds, "Time between checkpoints, 1 to 1000000")
-      ->check(CLI::Range(1.0, 1e6).description(""))
-      ->type_name("S");
+  app.add_option("--max-megabytes", o->max_megabytes,
+                 "Largest file for the field, MB, 0.1 to 100000 (no limit)")
+      ->check(CLI::Range(0.1, 1e5).description(""))
+      ->type_name("M")
+      ->default_str("");
   app.add_flag("--resume", o->resume,
                "Go on from FIELD.checkpoint, with the options of the run that left it");
   return [o](Context& context) { return run(*o, context); };

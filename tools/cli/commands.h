@@ -15,10 +15,18 @@ class Context;
 using Command = std::function<int(Context&)>;
 
 Command add_attack(CLI::App& app);
+Command add_bake(CLI::App& app);
 Command add_data(CLI::App& app);
+Command add_embed(CLI::App& app);
+Command add_eval(CLI::App& app);
+Command add_extract(CLI::App& app);
 Command add_gradcheck(CLI::App& app);
 Command add_info(CLI::App& app);
 Command add_key(CLI::App& app);
+Command add_measure(CLI::App& app);
+Command add_render(CLI::App& app);
 Command add_scene(CLI::App& app);
+Command add_train(CLI::App& app);
+Command add_verify(CLI::App& app);
 
 }  // namespace fieldmark::cli

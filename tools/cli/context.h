@@ -1,5 +1,6 @@
 #pragma once
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <iosfwd>
 #include <nlohmann/json.hpp>
@@ -15,6 +16,10 @@ class App;
 namespace fieldmark::cli {
 
 using Json = nlohmann::ordered_json;
+
+/// JSON knows neither infinity nor NaN: the PSNR of equal pictures, or of an object that is not there, is
+/// null.
+inline Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 /// Options that every command has.
 struct CommonOptions {

@@ -1,25 +1,22 @@
 #pragma once
 #include <fieldmark/watermark/measurement.h>
 
+#include <iosfwd>
+#include <string>
+
 #include "cli/context.h"
 
 namespace fieldmark::cli {
 
-/// What to measure a mark on; the baked field and its message go together.
-struct MarkMeasure {
-  std::string cameras = "near";  ///< near, ring, sphere or test (then data is needed)
-  Index count = 200;             ///< of cameras that are drawn
-  Index size = 0;                ///< pixels of the longer side; 0: as in training
-  std::string data{};            ///< data set: its test views for `test` cameras and for psnr_photo
-  std::vector<std::string> under{};
-  const nerf::RadianceField* baked = nullptr;
-  const watermark::Message* message = nullptr;
-};
+/// The figures that `measure` and `embed` report. @param cameras  name of their set
+Json measurement_json(const watermark::Measurement& measured, const std::string& cameras);
 
-/// Measures with progress, prints a table and returns the JSON of `measure`.
-Json measure_mark(const watermark::Owner& owner, const MarkMeasure& what, Context& context);
+/// The same for people: a line a figure.
+void print_measurement(std::ostream& out, const watermark::Measurement& measured, const std::string& cameras);
 
-/// Where to find a message of the owner's length in an option. @throws UsageError if it does not fit
-watermark::Message read_message(const std::string& hex, const watermark::Owner& owner);
+/// watermark::measure() with progress. @throws Interrupted on Ctrl-C
+watermark::Measurement run_measure(const watermark::Owner& owner, const nerf::RadianceField* baked,
+                                   const watermark::Message* message, watermark::MeasureOptions options,
+                                   Context& context);
 
 }  // namespace fieldmark::cli

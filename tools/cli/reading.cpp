@@ -3,30 +3,43 @@
 #include <fieldmark/engine/image.h>
 
 #include "cli/cli.h"
+#include "cli/context.h"
 #include "cli/pictures.h"
 
 namespace fieldmark::cli {
+namespace {
 
-Readings read_pictures(const watermark::Owner& owner, const std::vector<std::string>& paths,
-                       Context& context) {
-  Readings readings;
-  readings.pictures = list_pictures(paths);
-  readings.sum.assign(static_cast<std::size_t>(owner.cells.count()), 0.0);
+std::vector<double> evidence_of(const watermark::PictureReader& reader, const std::filesystem::path& path) {
+  const Tensor<float> picture = read_image(path);
+  try {
+    return reader.evidence(picture);
+  } catch (const ShapeError& e) {
+    throw IoError(path.string() + ": " + e.what());
+  }
+}
+
+}  // namespace
+
+std::vector<PictureEvidence> read_pictures(const watermark::Owner& owner,
+                                           const std::vector<std::string>& paths, Context& context) {
+  const auto pictures = list_pictures(paths);
   const watermark::PictureReader reader(owner);
   const InterruptGuard guard;
   Progress progress = context.progress("read");
-  for (const auto& path : readings.pictures) {
-    if (guard.interrupted()) throw Interrupted("while pictures were read");
-    try {
-      readings.each.push_back(reader.evidence(read_image(path)));
-    } catch (const ShapeError& e) {
-      throw IoError(path.string() + ": " + e.what());
-    }
-    for (std::size_t c = 0; c < readings.sum.size(); ++c) readings.sum[c] += readings.each.back()[c];
-    progress.update(static_cast<double>(readings.each.size()) /
-                    static_cast<double>(readings.pictures.size()));
+  std::vector<PictureEvidence> read;
+  for (const auto& path : pictures) {
+    if (guard.interrupted()) throw Interrupted("nothing was decided");
+    read.push_back({path.string(), evidence_of(reader, path)});
+    progress.update(static_cast<double>(read.size()) / static_cast<double>(pictures.size()));
   }
-  return readings;
+  return read;
+}
+
+std::vector<double> total_evidence(const std::vector<PictureEvidence>& pictures) {
+  std::vector<double> sum(pictures.front().cells.size(), 0.0);
+  for (const auto& picture : pictures)
+    for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += picture.cells[c];
+  return sum;
 }
 
 }  // namespace fieldmark::cli

@@ -1,23 +1,24 @@
 #pragma once
 #include <fieldmark/watermark/picture_reader.h>
 
-#include <filesystem>
+#include <string>
 #include <vector>
-
-#include "cli/context.h"
 
 namespace fieldmark::cli {
 
-/// The evidence of some pictures, one by one and added up.
-struct Readings {
-  std::vector<std::filesystem::path> pictures;
-  std::vector<std::vector<double>> each;  ///< [pictures][cells]
-  std::vector<double> sum;                ///< [cells]
+class Context;
+
+/// What the extractor sees in one picture.
+struct PictureEvidence {
+  std::string image;
+  std::vector<double> cells;  ///< sign evidence S_c
 };
 
-/// Reads IMAGE|DIR... with the owner's extractor, with progress. @throws IoError as list_pictures() and
-/// read_image()
-Readings read_pictures(const watermark::Owner& owner, const std::vector<std::string>& paths,
-                       Context& context);
+/// Reads the pictures that IMAGE|DIR... names. @throws IoError naming the picture that cannot be read
+std::vector<PictureEvidence> read_pictures(const watermark::Owner& owner,
+                                           const std::vector<std::string>& paths, Context& context);
+
+/// Of all pictures together: views of one field are not independent trials, so their evidence is added.
+std::vector<double> total_evidence(const std::vector<PictureEvidence>& pictures);
 
 }  // namespace fieldmark::cli
