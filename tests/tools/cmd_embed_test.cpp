@@ -1,0 +1,51 @@
+#include <fieldmark/engine/files.h>
+
+#include "cli/cli.h"
+#include "tools/tiny_job.h"
+
+using namespace fieldmark;
+
+TEST_CASE("embed writes an owner, a picture and the figures that scripts read", "[embed]") {
+  const TinyJob& job = TinyJob::get();
+  for (const char* key :
+       {"bits", "views", "cameras", "baked", "accuracy", "accuracy_p5", "psnr_base", "psnr_base_object",
+        "ssim_base", "lpips_base", "psnr_photo", "under", "seconds", "steps"})
+    CHECK(job.embedded.contains(key));
+  CHECK(job.embedded["bits"] == 4);
+  CHECK(job.embedded["views"] == 2);
+  CHECK(job.embedded["steps"] == 2);
+  CHECK(job.embedded["cameras"] == "near");
+  CHECK(job.embedded["accuracy"]["geometry"].is_null());
+  CHECK(job.embedded["under"]["blur_1"]["blind"].is_number());
+  CHECK(std::filesystem::exists(job.owner + ".png"));
+  CHECK(!std::filesystem::exists(job.owner + ".checkpoint"));
+}
+
+TEST_CASE("embed gives the same bytes for the same seed and key", "[embed]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string key = job.folder / "repeat.key";
+  REQUIRE(run_command({"key", "--out", key}).code == 0);
+  for (const char* threads : {"1", "2"})
+    REQUIRE(run_command({"embed", "--field", job.field, "--out",
+                         job.folder / (std::string("again") + threads), "--key", key, "--bits", "4",
+                         "--steps", "2", "--views", "8", "--measured-views", "1", "--threads", threads})
+                .code == 0);
+  CHECK(read_bytes(job.folder / "again1") == read_bytes(job.folder / "again2"));
+}
+
+TEST_CASE("embed says what is wrong, and leaves no file", "[embed]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string out = job.folder / "bad.fm";
+  const auto wrong_kind = run_command({"embed", "--field", job.owner, "--out", out, "--steps", "1"});
+  CHECK(wrong_kind.code == cli::kFailed);
+  CHECK_THAT(wrong_kind.err, Contains("expected a FIELD file (kind 'field'), found kind 'owner'"));
+  CHECK(run_command({"embed", "--field", job.field, "--out", out, "--bits", "0"}).code == cli::kUsage);
+  CHECK(run_command({"embed", "--field", job.field, "--out", out, "--strength", "5"}).code == cli::kUsage);
+  CHECK(run_command({"embed", "--field", job.field, "--out", out, "--preset", "other"}).code == cli::kUsage);
+  CHECK(
+      run_command({"embed", "--field", job.field, "--out", out, "--steps", "1", "--under", "melt_3"}).code ==
+      cli::kUsage);
+  CHECK(run_command({"embed", "--field", job.field, "--out", out, "--steps", "1", "--resume"}).code ==
+        cli::kFailed);
+  CHECK(!std::filesystem::exists(out));
+}

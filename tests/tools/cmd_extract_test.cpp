@@ -1,0 +1,31 @@
+#include <fieldmark/engine/files.h>
+
+#include "cli/cli.h"
+#include "tools/tiny_job.h"
+
+using namespace fieldmark;
+
+TEST_CASE("extract reads every picture and all together", "[extract]") {
+  const TinyJob& job = TinyJob::get();
+  const auto r = run_command({"extract", "--owner", job.owner, job.pictures(), "--json", "-"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  const auto json = nlohmann::json::parse(r.out);
+  CHECK(json["message"].get<std::string>().size() == 1);
+  CHECK(json["bits"].get<std::string>().size() == 4);
+  CHECK(json["reading"] == "blind");
+  REQUIRE(json["views"].size() == 2);
+  CHECK(json["views"][0]["bits"].get<std::string>().size() == 4);
+  CHECK(json["views"][0]["logits"].size() == 4);
+}
+
+TEST_CASE("extract names the picture that cannot be read", "[extract]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string broken = job.folder / "broken.png";
+  write_file_atomically(broken, std::string_view("no picture"));
+  const auto r = run_command({"extract", "--owner", job.owner, broken});
+  CHECK(r.code == cli::kFailed);
+  CHECK_THAT(r.err, Contains("broken.png"));
+  CHECK(run_command({"extract", "--owner", job.owner, "/no/such.png"}).code == cli::kFailed);
+  CHECK(run_command({"extract", "--owner", job.owner}).code == cli::kUsage);
+}

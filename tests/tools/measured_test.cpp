@@ -1,0 +1,34 @@
+#include "cli/measured.h"
+
+#include <cmath>
+#include <sstream>
+
+#include "support/catch.h"
+
+using namespace fieldmark;
+
+TEST_CASE("measured: JSON has the contract's keys, and null where there is no number", "[measured]") {
+  watermark::Measurement m;
+  m.bits = 16;
+  m.views = 3;
+  m.accuracy.blind = 0.75;
+  m.psnr_base = std::nan("");
+  m.under["noise_0.05"].blind = 0.5;
+  const auto json = cli::measurement_json(m, "ring");
+  CHECK(json["bits"] == 16);
+  CHECK(json["cameras"] == "ring");
+  CHECK(json["accuracy"]["blind"] == 0.75);
+  CHECK(json["accuracy"]["geometry"].is_null());
+  CHECK(json["psnr_base"].is_null());
+  CHECK(json["under"]["noise_0.05"]["blind"] == 0.5);
+}
+
+TEST_CASE("measured: people see the accuracies in percent", "[measured]") {
+  watermark::Measurement m;
+  m.accuracy.blind = 0.7512;
+  m.under["blur_1"].blind = 0.5;
+  std::ostringstream out;
+  cli::print_measurement(out, m, "near");
+  CHECK_THAT(out.str(), Contains("75.12%"));
+  CHECK_THAT(out.str(), Contains("blur_1"));
+}

@@ -1,0 +1,11 @@
+#include "cli/reading.h"
+
+#include "support/catch.h"
+
+using namespace fieldmark;
+
+TEST_CASE("reading: evidence of several pictures is added cell by cell", "[reading]") {
+  CHECK(cli::total_evidence({{"a.png", {1, -2, 0}}, {"b.png", {0.5, 1, 3}}}) ==
+        std::vector<double>{1.5, -1, 3});
+  CHECK(cli::total_evidence({{"a.png", {4}}}) == std::vector<double>{4});
+}
