@@ -8,7 +8,8 @@
 /// too little training to read anything, enough to run every path.
 struct TinyJob {
   TemporaryFolder folder;
-  std::string scene = tiny_scene(folder), field = tiny_field(folder, scene), owner = folder / "owner.fm";
+  std::string scene = tiny_scene(folder), field = tiny_field(folder, scene, "100"),
+              owner = folder / "owner.fm";
   nlohmann::json embedded;
 
   static const TinyJob& get() {
@@ -26,8 +27,10 @@ struct TinyJob {
 
  private:
   TinyJob() {
-    const auto r = run_command({"embed", "--field", field, "--out", owner, "--bits", "4", "--steps", "2",
-                                "--views", "8", "--measured-views", "2", "--under", "blur_1", "--json", "-"});
+    const auto r =
+        run_command({"embed", "--field",       field,    "--out",   owner, "--bits",  "4", "--cells",
+                     "6",     "--reader-size", "32",     "--steps", "2",   "--views", "8", "--measured-views",
+                     "2",     "--under",       "blur_1", "--json",  "-"});
     INFO(r.err);
     REQUIRE(r.code == 0);
     embedded = nlohmann::json::parse(r.out);

@@ -14,9 +14,10 @@ inline std::string tiny_scene(const TemporaryFolder& folder) {
 }
 
 /// A field trained on it for some steps; returns its path.
-inline std::string tiny_field(const TemporaryFolder& folder, const std::string& scene) {
+inline std::string tiny_field(const TemporaryFolder& folder, const std::string& scene,
+                              const char* steps = "4") {
   const std::string path = folder / "field.fm";
-  const auto r = run_command({"train", "--data", scene, "--out", path, "--steps", "4"});
+  const auto r = run_command({"train", "--data", scene, "--out", path, "--steps", steps});
   INFO(r.err);
   REQUIRE(r.code == 0);
   return path;

@@ -152,6 +152,10 @@ Command add_embed(CLI::App& app) {
   app.add_option("--cells", o->owner.cells, "Cells an axis of the scene's cube, 2 to 64")
       ->check(CLI::Range(2, 64).description(""))
       ->type_name("N");
+  app.add_option("--reader-size", o->owner.reader_size,
+                 "Side of the square in which the extractor sees the object, pixels, 32 to 1024")
+      ->check(CLI::Range(32, 1024).description(""))
+      ->type_name("N");
   app.add_option("--views", o->views, "Views to learn from, 8 to 10000")
       ->check(CLI::Range(8, 10000).description(""))
       ->type_name("N");
