@@ -6,8 +6,10 @@ template <class T>
 ParamId ParamStore<T>::add(std::string_view name, Shape shape) {
   for (const Entry& e : entries_)
     if (e.name == name) throw ValueError("[params] name '" + e.name + "' is already used");
-  entries_.push_back({std::string(name), shape, size()});
-  values_.resize(values_.size() + static_cast<std::size_t>(shape.size()));
+  constexpr Index kLine = 64 / static_cast<Index>(sizeof(T));
+  const Index offset = (size() + kLine - 1) / kLine * kLine;
+  entries_.push_back({std::string(name), shape, offset});
+  values_.resize(static_cast<std::size_t>(offset + shape.size()));
   grads_.resize(values_.size());
   return {static_cast<int>(entries_.size()) - 1};
 }
@@ -38,6 +40,13 @@ std::span<T> ParamStore<T>::grads(ParamId id) {
   const Entry& e = entry(id);
   return std::span<T>(grads_).subspan(static_cast<std::size_t>(e.offset),
                                       static_cast<std::size_t>(e.shape.size()));
+}
+
+template <class T>
+Index ParamStore<T>::parameters() const {
+  Index sum = 0;
+  for (const Entry& e : entries_) sum += e.shape.size();
+  return sum;
 }
 
 template <class T>

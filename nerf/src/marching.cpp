@@ -29,12 +29,14 @@ RayWalk::RayWalk(const float o[3], const float d[3], float step, float jitter)
   for (int a = 0; a < 3; ++a) {
     o_[a] = o[a];
     d_[a] = d[a];
-    inverse_[a] = 1 / d[a];  // infinite where parallel: min() below then never picks it
+    // Steps per unit along the axis; where the ray is parallel to it so many that the axis is never left first.
+    steps_[a] = 1 / ((d[a] == 0 ? 1e-20f : d[a]) * step);
   }
 }
 
 Index RayWalk::next(const OccupancyGrid& grid, Index max, float* t_out) {
   const auto n = static_cast<float>(grid.resolution());
+  const float cell_side = 1 / n;
   const int last = static_cast<int>(grid.resolution()) - 1;
   Index count = 0;
   while (count < max) {
@@ -47,19 +49,23 @@ Index RayWalk::next(const OccupancyGrid& grid, Index max, float* t_out) {
       c[a] = std::clamp(static_cast<int>(p[a]), 0, last);
     }
     const std::uint64_t block = grid.block(c[0] / 4, c[1] / 4, c[2] / 4);
-    if (block >> (c[0] % 4 + 4 * (c[1] % 4) + 16 * (c[2] % 4)) & 1) {
-      t_out[count++] = t;
-      ++k_;
-      continue;
-    }
-    // Leave the empty cell, or the empty block of 4 x 4 x 4, in whole steps.
+    // Whole steps to where the cell ends, or an empty block of 4 x 4 x 4 of them: those samples share its answer.
+    const int mask = block ? ~0 : ~3, side = block ? 1 : 4;
     float leave = std::numeric_limits<float>::infinity();
     for (int a = 0; a < 3; ++a) {
-      if (d_[a] == 0) continue;
-      const int low = block ? c[a] : c[a] / 4 * 4, high = low + (block ? 1 : 4);
-      leave = std::min(leave, (static_cast<float>(d_[a] > 0 ? high : low) - p[a]) * inverse_[a]);
+      const int low = c[a] & mask;
+      leave = std::min(leave, (static_cast<float>(steps_[a] > 0 ? low + side : low) - p[a]) * cell_side * steps_[a]);
     }
-    k_ += std::max<Index>(1, static_cast<Index>(std::ceil(leave / n / step_)));
+    const auto steps = std::max<Index>(1, static_cast<Index>(std::ceil(std::min(leave, 1e9f))));
+    if (!(block >> (c[0] % 4 + 4 * (c[1] % 4) + 16 * (c[2] % 4)) & 1)) {
+      k_ += steps;
+      continue;
+    }
+    for (const Index end = k_ + std::min(steps, max - count); k_ < end; ++k_) {
+      const float in_cell = near_ + (static_cast<float>(k_) + jitter_) * step_;
+      if (!(in_cell < far_)) return count;
+      t_out[count++] = in_cell;
+    }
   }
   return count;
 }

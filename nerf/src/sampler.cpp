@@ -6,7 +6,7 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kWave = 8;
+constexpr Index kWave = 4;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 

@@ -3,6 +3,7 @@
 #include <fieldmark/nerf/photometric_loss.h>
 #include <fieldmark/nerf/spherical_harmonics.h>
 #include <fieldmark/nerf/trainer.h>
+#include <fieldmark/nerf/training_pixels.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,6 +13,7 @@ namespace {
 
 constexpr int kShards = 16;
 constexpr Index kRays = 64;             // of a chunk
+constexpr Index kTile = 1;  // pixels a side: rays of a step come in tiles of this size
 constexpr Index kOccupancyPeriod = 16;  // steps
 constexpr Index kFirstRays = 1024;      // of a step, until the samples of a ray are known
 constexpr Index kMostRays = 1 << 16;
@@ -24,6 +26,14 @@ bool has_alpha(const Dataset& data) {
       if (v.rgba[i] < 1) return true;
     return false;
   });
+}
+
+// One of the listed places, or of all `count` if none are listed. Two uniform numbers, since one has 24 bits only.
+Index pick_place(float u, float v, const std::vector<std::uint32_t>& listed, Index count) {
+  const Index n = listed.empty() ? count : static_cast<Index>(listed.size());
+  const double x = (static_cast<double>(u) + static_cast<double>(v) * 0x1.0p-24) * static_cast<double>(n);
+  const Index i = std::min(static_cast<Index>(x), n - 1);
+  return listed.empty() ? i : Index{listed[at(i)]};
 }
 
 }  // namespace
@@ -41,7 +51,7 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
       options_(options),
       schedule_(options.schedule),
       pixel_rng_(options.seed, 1),
-      background_rng_(options.seed, 2),
+      ray_rng_(options.seed, 2),
       occupancy_rng_(options.seed, 3),
       loop_(kShards, field.field.network_size()),
       adam_(field.params.size(), {.lr = 1, .zero_grads = true}),
@@ -65,6 +75,7 @@ void Trainer::carve() {
   const Index n = field_.grid.resolution();
   field_.bounds = tighten(field_.bounds, visual_hull(silhouettes, field_.bounds, n), n);
   field_.grid.restrict_to(visual_hull(silhouettes, field_.bounds, n));
+  pixels_ = training_pixels(data_.views, hull_margin(data_.views, field_.bounds, n));
 }
 
 void Trainer::choose_rays(Index first, Index count, Chunk& c) const {
@@ -72,22 +83,27 @@ void Trainer::choose_rays(Index first, Index count, Chunk& c) const {
   for (auto [buffer, columns] :
        {std::pair{&c.origins, 3}, {&c.directions, 3}, {&c.jitter, 1}, {&c.photograph, 4}, {&c.background, 3}})
     buffer->resize(at(count * columns));
+  const Index width = data_.views[0].camera.width, height = data_.views[0].camera.height;
   for (Index i = 0; i < count; ++i) {
-    const auto ray = static_cast<std::uint64_t>(first + i);
-    const auto u = pixel_rng_.uniform4(step, ray);
-    const auto pick = [](float x, Index n) {
-      return std::min(static_cast<Index>(x * static_cast<float>(n)), n - 1);
+    // Rays of a tile of neighbouring pixels meet the same cells: what one has brought into the cache the others find.
+    const Index tile = (first + i) / (kTile * kTile), in_tile = (first + i) % (kTile * kTile);
+    const auto t = pixel_rng_.uniform4(step, static_cast<std::uint64_t>(tile));
+    const Index place = pick_place(t[0], t[1], pixels_, width * height * static_cast<Index>(data_.views.size()));
+    const View& view = data_.views[at(place / (width * height))];
+    const auto shifted = [](Index pixel, Index by, Index size) {
+      return std::clamp<Index>(pixel - kTile / 2, 0, std::max<Index>(size - kTile, 0)) + std::min(by, size - 1);
     };
-    const View& view = data_.views[at(pick(u[0], static_cast<Index>(data_.views.size())))];
-    const Index x = pick(u[1], view.camera.width), y = pick(u[2], view.camera.height);
+    const Index x = shifted(place % width, in_tile % kTile, width),
+                y = shifted(place % (width * height) / width, in_tile / kTile, height);
+    const auto ray = static_cast<std::uint64_t>(first + i);
+    const auto u = ray_rng_.uniform4(step, ray);
     const float pixel[2] = {static_cast<float>(x), static_cast<float>(y)};
     float* origin = &c.origins[at(3 * i)];
     camera_rays(view.camera, pixel, origin, &c.directions[at(3 * i)]);
     field_.to_cube(origin, origin);
     c.jitter[at(i)] = u[3];
     std::copy_n(view.rgba.data.data() + 4 * (y * view.camera.width + x), 4, &c.photograph[at(4 * i)]);
-    const auto b = background_rng_.uniform4(step, ray);
-    std::copy_n(b.data(), 3, &c.background[at(3 * i)]);
+    std::copy_n(u.data(), 3, &c.background[at(3 * i)]);
   }
 }
 
@@ -166,11 +182,17 @@ void Trainer::step(double seconds) {
                                                    static_cast<double>(rays_per_step_) * 1.5));
   rays_per_step_ = std::clamp(next / kRays * kRays, kRays * kShards, kMostRays);
   samples_ += static_cast<double>(samples);
+  if (steps_ % 50 == 0) fprintf(stderr, "DBG %ld t %.2f rays %ld samples %ld occ %ld psnr %.2f\n", (long)steps_, seconds, (long)rays_per_step_, (long)samples, (long)field_.grid.occupied_cells(), train_psnr());
   smoothed_loss_ = smoothed_loss_ < 0 ? loss : 0.98 * smoothed_loss_ + 0.02 * loss;
   ++steps_;
 }
 
-double Trainer::train_psnr() const { return -10 * std::log10(std::max(2 * smoothed_loss_, 1e-10)); }
+double Trainer::train_psnr() const {
+  const Camera& camera = data_.views.front().camera;
+  const double pixels = static_cast<double>(data_.views.size()) * static_cast<double>(camera.width * camera.height);
+  const double share = pixels_.empty() ? 1 : static_cast<double>(pixels_.size()) / pixels;
+  return -10 * std::log10(std::max(2 * share * smoothed_loss_, 1e-10));
+}
 
 void Trainer::refresh_occupancy() {
   const OccupancyGrid::Density density = [&](const float* x, Index n, float* sigma) {
@@ -185,7 +207,7 @@ void Trainer::refresh_occupancy() {
   };
   const bool warm = steps_ >= options_.warm_up;
   field_.grid.update(density, occupancy_rng_,
-                     {.step = field_.step(),
+                     {.decay = 0.4f, .step = field_.step(),
                       .threshold = warm ? 0.01f : -1.f,  // below zero: every candidate stays
                       .fraction = steps_ < 2 * options_.warm_up ? 1 : 4,
                       .round = static_cast<std::uint64_t>(steps_ / kOccupancyPeriod)});

@@ -113,7 +113,7 @@ int run(const Options& options, Context& context) {
                   {"train_seconds", seconds},
                   {"steps", trainer.steps()},
                   {"samples_per_second", (trainer.samples() - samples_before) / (seconds - begun)},
-                  {"parameters", field.params.size()},
+                  {"parameters", field.params.parameters()},
                   {"file_bytes", bytes}});
   return kOk;
 }

@@ -8,16 +8,20 @@ namespace {
 using simd::kLanes;
 using simd::Vec;
 
-// Rows x vectors of the register block: 12 accumulators of 16 registers, or 24 of AVX-512's 32.
-constexpr int kRows = 6;
+// Vectors of a full panel, and rows of a register block V vectors wide: at most 12 accumulators of 16 registers, or 24
+// of AVX-512's 32, and at least 8 where there are rows enough, which hides the latency of a multiply-add.
 constexpr int kVectors = simd::kBytes == 64 ? 4 : 2;
+constexpr int rows_of(int vectors) {
+  const int most = simd::kBytes == 64 ? 24 : 12;
+  return most / vectors < 12 ? most / vectors : 12;
+}
 template <class T>
 constexpr int kPanel = kVectors* kLanes<T>;
 
-// One block of C in registers; B's rows are a panel's width apart.
+// One block of C in registers; B's rows are `stride` apart.
 template <class T, int R, int V>
-[[gnu::always_inline]] inline void block(const Gemm<T>& g, const T* a, const T* b, T* c, std::int64_t ldc,
-                                         const T* bias) {
+[[gnu::always_inline]] inline void block(const Gemm<T>& g, const T* a, const T* b, std::int64_t stride, T* c,
+                                         std::int64_t ldc, const T* bias) {
   constexpr int L = kLanes<T>;
   Vec<T> acc[R][V];
   for (int i = 0; i < R; ++i)
@@ -25,7 +29,7 @@ template <class T, int R, int V>
       acc[i][j] = g.accumulate ? simd::load(c + i * ldc + j * L) : bias ? simd::load(bias + j * L) : Vec<T>{};
   for (std::int64_t s = 0; s < g.segments; ++s, a += g.a_segment) {
     const T* p = a;
-    for (std::int64_t k = 0; k < g.k; ++k, p += g.a_col, b += kPanel<T>) {
+    for (std::int64_t k = 0; k < g.k; ++k, p += g.a_col, b += stride) {
       Vec<T> row[V];
       for (int j = 0; j < V; ++j) row[j] = simd::load(b + j * L);
       for (int i = 0; i < R; ++i) {
@@ -34,65 +38,75 @@ template <class T, int R, int V>
       }
     }
   }
+  // A comparison with NaN is false, so the sum must be what is taken then: NaN stays NaN.
   for (int i = 0; i < R; ++i)
     for (int j = 0; j < V; ++j)
-      simd::store(c + i * ldc + j * L, g.relu ? simd::max(acc[i][j], Vec<T>{}) : acc[i][j]);
+      simd::store(c + i * ldc + j * L, g.relu ? simd::max(Vec<T>{}, acc[i][j]) : acc[i][j]);
 }
 
-// All rows of V vectors of columns.
-template <class T, int V>
-void panel(const Gemm<T>& g, const T* b, T* c, const T* bias) {
-  std::int64_t i = 0;
-  for (; i + kRows <= g.m; i += kRows)
-    block<T, kRows, V>(g, g.a + i * g.a_row, b, c + i * g.ldc, g.ldc, bias);
-  for (; i + 2 <= g.m; i += 2) block<T, 2, V>(g, g.a + i * g.a_row, b, c + i * g.ldc, g.ldc, bias);
-  for (; i < g.m; ++i) block<T, 1, V>(g, g.a + i * g.a_row, b, c + i * g.ldc, g.ldc, bias);
+// All rows of V vectors of columns: blocks of R rows, what is left in ever smaller ones.
+template <class T, int V, int R = rows_of(V)>
+void panel(const Gemm<T>& g, const T* b, std::int64_t stride, T* c, const T* bias, std::int64_t i = 0) {
+  for (; i + R <= g.m; i += R)
+    block<T, R, V>(g, g.a + i * g.a_row, b, stride, c + i * g.ldc, g.ldc, bias);
+  if constexpr (R > 1)
+    if (i < g.m) panel<T, V, (R > 8 ? 8 : R > 4 ? 4 : R / 2)>(g, b, stride, c, bias, i);
 }
 
-// Columns that do not fill their vectors: C passes through a block of its own.
-template <class T, int V>
-void narrow(const Gemm<T>& g, const T* b, std::int64_t j, int columns) {
-  constexpr int W = V * kLanes<T>;
-  T bias[W] = {}, c[kRows * W] = {};
+// Columns that do not fill a vector: C passes through a block of its own.
+template <class T>
+void narrow(const Gemm<T>& g, const T* b, std::int64_t stride, std::int64_t j, int columns) {
+  constexpr int W = kLanes<T>, R = rows_of(1);
+  T bias[W] = {}, c[R * W] = {};
   if (g.bias)
     for (int x = 0; x < columns; ++x) bias[x] = g.bias[j + x];
-  for (std::int64_t i = 0; i < g.m; i += kRows) {
-    const int count = static_cast<int>(g.m - i < kRows ? g.m - i : kRows);
+  for (std::int64_t i = 0; i < g.m; i += R) {
+    const int count = static_cast<int>(g.m - i < R ? g.m - i : R);
     if (g.accumulate)
       for (int r = 0; r < count; ++r)
         for (int x = 0; x < columns; ++x) c[r * W + x] = g.c[(i + r) * g.ldc + j + x];
-    if (count == kRows)
-      block<T, kRows, V>(g, g.a + i * g.a_row, b, c, W, bias);
+    if (count == R)
+      block<T, R, 1>(g, g.a + i * g.a_row, b, stride, c, W, bias);
     else
-      for (int r = 0; r < count; ++r) block<T, 1, V>(g, g.a + (i + r) * g.a_row, b, c + r * W, W, bias);
+      for (int r = 0; r < count; ++r)
+        block<T, 1, 1>(g, g.a + (i + r) * g.a_row, b, stride, c + r * W, W, bias);
     for (int r = 0; r < count; ++r)
       for (int x = 0; x < columns; ++x) g.c[(i + r) * g.ldc + j + x] = c[r * W + x];
   }
 }
 
+// Row i of a panel: `width` numbers, the rest of it zeros.
+template <class T>
+[[gnu::always_inline]] inline void pack_row(const T* from, const T* mask, std::int64_t column, int width,
+                                            std::int64_t panel, T* out) {
+  if (mask)
+    for (int x = 0; x < width; ++x) out[x] = mask[x * column] > 0 ? from[x * column] : T(0);
+  else
+    for (int x = 0; x < width; ++x) out[x] = from[x * column];
+  for (std::int64_t x = width; x < panel; ++x) out[x] = 0;
+}
+
 }  // namespace
 
 template <class T>
-std::int64_t gemm_panel() {
-  return kPanel<T>;
+std::int64_t gemm_panel(std::int64_t columns) {
+  constexpr int L = kLanes<T>;
+  return columns >= kPanel<T> ? kPanel<T> : (columns + L - 1) / L * L;
 }
 
 template <class T>
 void pack_panels(const T* b, std::int64_t rows, std::int64_t columns, std::int64_t row, std::int64_t column,
                  const T* mask, T* out) {
-  for (std::int64_t j = 0; j < columns; j += kPanel<T>) {
-    const int width = static_cast<int>(columns - j < kPanel<T> ? columns - j : kPanel<T>);
-    for (std::int64_t i = 0; i < rows; ++i, out += kPanel<T>) {
-      const T* from = b + i * row + j * column;
-      if (mask) {
-        const T* m = mask + i * row + j * column;
-        for (int x = 0; x < width; ++x) out[x] = m[x * column] > 0 ? from[x * column] : T(0);
-      } else if (column == 1 && width == kPanel<T>) {
-        for (int v = 0; v < kVectors; ++v) simd::store(out + v * kLanes<T>, simd::load(from + v * kLanes<T>));
-      } else {
-        for (int x = 0; x < width; ++x) out[x] = from[x * column];
-      }
-      for (int x = width; x < kPanel<T>; ++x) out[x] = 0;
+  const std::int64_t panel = gemm_panel<T>(columns);
+  for (std::int64_t j = 0; j < columns; j += panel) {
+    const int width = static_cast<int>(columns - j < panel ? columns - j : panel);
+    for (std::int64_t i = 0; i < rows; ++i, out += panel) {
+      const std::int64_t at = i * row + j * column;
+      const T* m = mask ? mask + at : nullptr;
+      if (column == 1)
+        pack_row(b + at, m, 1, width, panel, out);
+      else
+        pack_row(b + at, m, column, width, panel, out);
     }
   }
 }
@@ -101,23 +115,23 @@ template <class T>
 void gemm(const Gemm<T>& g) {
   constexpr int L = kLanes<T>;
   const T* b = g.b;
-  const std::int64_t step = g.b_panel ? g.b_panel : g.segments * g.k * kPanel<T>;
-  for (std::int64_t j = 0; j < g.n; j += kPanel<T>, b += step) {
-    const int columns = static_cast<int>(g.n - j < kPanel<T> ? g.n - j : kPanel<T>);
+  const std::int64_t stride = gemm_panel<T>(g.n), step = g.b_panel ? g.b_panel : g.segments * g.k * stride;
+  for (std::int64_t j = 0; j < g.n; j += stride, b += step) {
+    const int columns = static_cast<int>(g.n - j < stride ? g.n - j : stride), full = columns / L * L;
     const T* bias = g.bias ? g.bias + j : nullptr;
-    if (columns == kPanel<T>)
-      panel<T, kVectors>(g, b, g.c + j, bias);
-    else if (columns == L)
-      panel<T, 1>(g, b, g.c + j, bias);
-    else if (columns < L)
-      narrow<T, 1>(g, b, j, columns);
-    else
-      narrow<T, kVectors>(g, b, j, columns);
+    switch (columns / L) {
+      case 1: panel<T, 1>(g, b, stride, g.c + j, bias); break;
+      case 2: panel<T, 2>(g, b, stride, g.c + j, bias); break;
+      case 3: panel<T, kVectors == 4 ? 3 : 1>(g, b, stride, g.c + j, bias); break;
+      case 4: panel<T, kVectors == 4 ? 4 : 1>(g, b, stride, g.c + j, bias); break;
+      default: break;
+    }
+    if (full < columns) narrow<T>(g, b + full, stride, j + full, columns - full);
   }
 }
 
 #define FIELDMARK_INSTANTIATE(T)                                                                             \
-  template std::int64_t gemm_panel<T>();                                                                     \
+  template std::int64_t gemm_panel<T>(std::int64_t);                                                                   \
   template void pack_panels(const T*, std::int64_t, std::int64_t, std::int64_t, std::int64_t, const T*, T*); \
   template void gemm(const Gemm<T>&);
 FIELDMARK_INSTANTIATE(float)

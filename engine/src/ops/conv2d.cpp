@@ -73,7 +73,7 @@ void convolve(const T* padded, const T* weights, const Geometry& g, Index in, In
 template <class T>
 void weight_gradient(Tape<T>& tape, const T* padded, const T* dy, const T* mask, const Geometry& g, T* dw) {
   const Index size = g.k * g.k * g.c * g.o, together = std::max<Index>(1, kDepth / std::max<Index>(g.w, 1));
-  const Index pixels = g.rows() * g.w, panel = detail::panel_width<T>();
+  const Index pixels = g.rows() * g.w, panel = detail::panel_width<T>(g.o);
   const T* d = detail::packed(tape, dy, pixels, g.o, g.o, Index{1}, mask);
   detail::sharded_sum(tape, g.rows(), 64, dw, size, [&](Index begin, Index end, T* to) {
     using namespace kernels;

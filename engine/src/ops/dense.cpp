@@ -12,7 +12,7 @@ constexpr Index kShardRows = 4096;  // rows of a partial sum of the weights' gra
 template <class T>
 void backward(Var<T> x, Var<T> w, Var<T> b, const T* y, const T* dy, Index n, bool relu) {
   Tape<T>& tape = x.tape();
-  const Index in = w.shape()[0], out = w.shape()[1], panel = detail::panel_width<T>();
+  const Index in = w.shape()[0], out = w.shape()[1], panel = detail::panel_width<T>(out);
   const Index panels = detail::round_up(out, panel) / panel;
   const T* d = detail::packed(tape, dy, n, out, out, Index{1}, relu ? y : nullptr);
   if (T* dw = w.grad_acc())
@@ -31,25 +31,24 @@ void backward(Var<T> x, Var<T> w, Var<T> b, const T* y, const T* dy, Index n, bo
         .ldc = out,
         .accumulate = true});
     });
-  if (T* db = b.grad_acc())
-    for (Index i = 0; i < n; ++i)
-      for (Index j = 0; j < out; ++j) db[j] += !relu || y[i * out + j] > 0 ? dy[i * out + j] : T(0);
+  if (T* db = b.grad_acc()) detail::add_column_sums(d, n, out, db);
   bool fresh = false;
   if (T* dx = x.grad_acc(&fresh)) {
-    // W^T with rows of zeros for the columns that fill up the last panel.
-    T* wt = tape.scratch(panels * panel * in);
-    std::fill_n(wt, panels * panel * in, T(0));
+    // W^T, with rows of zeros for the columns that fill up the last of several panels.
+    const Index depth = panels > 1 ? panel : out;
+    T* wt = tape.scratch(panels * depth * in);
+    std::fill_n(wt + out * in, (panels * depth - out) * in, T(0));
     for (Index i = 0; i < in; ++i)
       for (Index j = 0; j < out; ++j) wt[j * in + i] = w.value()[i * out + j];
     detail::product<T>(
         {.m = n,
          .n = in,
-         .k = panel,
+         .k = depth,
          .segments = panels,
          .a = d,
          .a_row = panel,
          .a_segment = n * panel,
-         .b = detail::packed(tape, static_cast<const T*>(wt), panels * panel, in, in, Index{1}),
+         .b = detail::packed(tape, static_cast<const T*>(wt), panels * depth, in, in, Index{1}),
          .c = dx,
          .ldc = in,
          .accumulate = !fresh});

@@ -13,9 +13,9 @@ constexpr Index kProductShards = 16;  // partial sums over rows, added in order
 inline Index round_up(Index n, Index to) { return (n + to - 1) / to * to; }
 
 template <class T>
-Index panel_width() {
+Index panel_width(Index columns) {
   using namespace kernels;
-  return FIELDMARK_KERNEL(gemm_panel<T>)();
+  return FIELDMARK_KERNEL(gemm_panel<T>)(columns);
 }
 
 /// B [rows, columns] at b[i row + j column] in panels; room comes from the tape.
@@ -23,7 +23,7 @@ template <class T>
 T* packed(Tape<T>& tape, const T* b, Index rows, Index columns, Index row, Index column,
           const T* mask = nullptr) {
   using namespace kernels;
-  T* out = tape.scratch(rows * round_up(columns, panel_width<T>()));
+  T* out = tape.scratch(rows * round_up(columns, panel_width<T>(columns)));
   FIELDMARK_KERNEL(pack_panels<T>)(b, rows, columns, row, column, mask, out);
   return out;
 }
@@ -59,6 +59,17 @@ void sharded_sum(Tape<T>& tape, Index items, Index grain, T* into, Index size, F
   });
   for (Index s = 0; s < shards; ++s)
     for (Index i = 0; i < size; ++i) into[i] += buffers[s * size + i];
+}
+
+/// into [columns] += the sums of the columns of d, which packed() laid out from [rows, columns].
+template <class T>
+void add_column_sums(const T* d, Index rows, Index columns, T* into) {
+  const Index panel = panel_width<T>(columns);
+  for (Index j = 0; j < columns; j += panel, d += rows * panel) {
+    const Index width = std::min(panel, columns - j);
+    for (Index i = 0; i < rows; ++i)
+      for (Index x = 0; x < width; ++x) into[j + x] += d[i * panel + x];
+  }
 }
 
 }  // namespace fieldmark::detail

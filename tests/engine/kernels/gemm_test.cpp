@@ -1,6 +1,7 @@
 #include "kernels/gemm.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "support/catch.h"
@@ -17,7 +18,7 @@ double worst_error(Index m, Index n, Index k, Index segments, bool transposed, b
   using namespace kernels;
   const Index depth = segments * k, gap = 3, a_row = transposed ? 1 : depth + gap,
               a_col = transposed ? m + gap : 1;
-  const Index a_segment = k * a_col, ldc = n + 5, panel = FIELDMARK_KERNEL(gemm_panel<T>)();
+  const Index a_segment = k * a_col, ldc = n + 5, panel = FIELDMARK_KERNEL(gemm_panel<T>)(n);
   const auto a = uniform<T>({(m + gap) * (depth + gap)}, -1, 1, 1), b = uniform<T>({depth * n}, -1, 1, 2),
              start = uniform<T>({m * ldc}, -1, 1, 3), row = uniform<T>({n}, -1, 1, 4);
   std::vector<T> packed(static_cast<std::size_t>(depth * (n + panel))), c(start.data);
@@ -74,7 +75,7 @@ TEST_CASE("gemm: every extent, stride and option on every instruction set agains
 TEST_CASE("gemm: packing masks where a ReLU was shut and fills the last panel with zeros") {
   each_isa([] {
     using namespace kernels;
-    const Index panel = FIELDMARK_KERNEL(gemm_panel<float>)();
+    const Index panel = FIELDMARK_KERNEL(gemm_panel<float>)(3);
     const std::vector<float> b{1, 2, 3, 4, 5, 6}, mask{0, 1, -1, 2, 3, 0};
     std::vector<float> out(static_cast<std::size_t>(2 * panel), 9.f);
     FIELDMARK_KERNEL(pack_panels<float>)(b.data(), 2, 3, 3, 1, mask.data(), out.data());
@@ -83,5 +84,23 @@ TEST_CASE("gemm: packing masks where a ReLU was shut and fills the last panel wi
     want[static_cast<std::size_t>(panel)] = 4;
     want[static_cast<std::size_t>(panel) + 1] = 5;
     CHECK(out == want);
+  });
+}
+
+TEST_CASE("gemm: what is not a number stays so through the ReLU") {
+  each_isa([] {
+    using namespace kernels;
+    const float nan = std::nanf("");
+    for (Index n : {3, 16, 64}) {
+      const std::vector<float> a{nan, 1}, b(static_cast<std::size_t>(n), -1.f);
+      std::vector<float> packed(64), c(static_cast<std::size_t>(2 * n));
+      FIELDMARK_KERNEL(pack_panels<float>)(b.data(), 1, n, n, 1, nullptr, packed.data());
+      FIELDMARK_KERNEL(gemm<float>)
+      ({.m = 2, .n = n, .k = 1, .a = a.data(), .a_row = 1, .b = packed.data(), .c = c.data(), .ldc = n, .relu = true});
+      for (Index j = 0; j < n; ++j) {
+        CHECK(std::isnan(c[static_cast<std::size_t>(j)]));
+        CHECK(c[static_cast<std::size_t>(n + j)] == 0);
+      }
+    }
   });
 }

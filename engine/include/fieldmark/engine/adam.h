@@ -1,8 +1,8 @@
 #pragma once
+#include <fieldmark/engine/aligned.h>
 #include <fieldmark/engine/shape.h>
 
 #include <span>
-#include <vector>
 
 namespace fieldmark {
 
@@ -57,7 +57,7 @@ class Adam {
 
  private:
   AdamOptions options_;
-  std::vector<T> mean_, mean_square_;
+  AlignedVector<T> mean_, mean_square_;
   Index steps_ = 0;
 };
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <fieldmark/engine/aligned.h>
 #include <fieldmark/engine/tape.h>
 
 #include <span>
@@ -14,7 +15,8 @@ struct ParamId {
 };
 
 /// All trainable numbers of a model in one flat buffer, gradients in a second one of equal length,
-/// so that an optimiser step, a checkpoint and zero_grad() are each one loop.
+/// so that an optimiser step, a checkpoint and zero_grad() are each one loop. Tensors start on a cache line; the zeros
+/// between them get no gradient and stay.
 template <class T>
 class ParamStore {
  public:
@@ -35,12 +37,15 @@ class ParamStore {
   std::span<T> grads() { return grads_; }
   std::span<const Entry> entries() const { return entries_; }
   const Entry& entry(ParamId id) const { return entries_[static_cast<std::size_t>(id.index)]; }
+  /// Length of the buffers, with the gaps between tensors.
   Index size() const { return static_cast<Index>(values_.size()); }
+  /// Numbers in all tensors.
+  Index parameters() const;
   void zero_grad();
 
  private:
   std::vector<Entry> entries_;
-  std::vector<T> values_, grads_;
+  AlignedVector<T> values_, grads_;
 };
 
 /// Where a pass reads parameters and where it adds their gradients: the store itself, a shard's private

@@ -22,7 +22,7 @@ class RayWalk {
   Index next(const OccupancyGrid& grid, Index max, float* t);
 
  private:
-  float o_[3], d_[3], inverse_[3];
+  float o_[3], d_[3], steps_[3];
   float near_, far_, step_, jitter_;
   Index k_ = 0;
 };

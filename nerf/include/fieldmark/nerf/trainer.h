@@ -16,7 +16,7 @@ struct TrainOptions {
 };
 
 /// Trains a radiance field on photographs (Mildenhall et al. 2020, sec. 5; Mueller et al. 2022): random rays
-/// of all photographs, random backgrounds behind alpha, Adam, occupancy refreshed as densities form.
+/// of all photographs (where they have alpha: of the silhouettes and a margin), random backgrounds behind alpha, Adam, occupancy refreshed as densities form.
 ///
 /// A step is a parallel loop over chunks of 64 rays (ShardedLoop); the gradient at the encoding's output is
 /// kept for the whole batch, and one pass over the levels, each owned by one thread, adds it to the table.
@@ -34,7 +34,7 @@ class Trainer {
   Index steps() const { return steps_; }
   /// Steps that the run will have in all; 0 until a timed run knows.
   Index planned() const { return schedule_.total(); }
-  /// Mean loss of the last steps, as the PSNR of the same mean square.
+  /// Mean loss of the last steps over whole photographs, as the PSNR of the same mean square.
   double train_psnr() const;
   /// Samples that passed through the networks so far.
   double samples() const { return samples_; }
@@ -57,9 +57,10 @@ class Trainer {
   const Dataset& data_;
   TrainOptions options_;
   Schedule schedule_;
-  CounterRng pixel_rng_, background_rng_, occupancy_rng_;
+  CounterRng pixel_rng_, ray_rng_, occupancy_rng_;
   ShardedLoop<float> loop_;
   Adam<float> adam_;
+  std::vector<std::uint32_t> pixels_;  // worth a ray; empty: all are
   std::vector<Chunk> chunks_;
   std::vector<RaySampler> samplers_;  // one a shard
   std::vector<RaySamples> samples_of_shard_;
