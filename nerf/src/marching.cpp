@@ -48,9 +48,10 @@ Index RayWalk::next(const OccupancyGrid& grid, Index max, float* t_out) {
       p[a] = (o_[a] + t * d_[a]) * n;
       c[a] = std::clamp(static_cast<int>(p[a]), 0, last);
     }
-    const std::uint64_t block = grid.block(c[0] / 4, c[1] / 4, c[2] / 4);
-    // Whole steps to where the cell ends, or an empty block of 4 x 4 x 4 of them: those samples share its answer.
-    const int mask = block ? ~0 : ~3, side = block ? 1 : 4;
+    const bool nearby = grid.occupied_nearby(c[0], c[1], c[2]);
+    const std::uint64_t block = nearby ? grid.block(c[0] / 4, c[1] / 4, c[2] / 4) : 0;
+    // Whole steps to where the cell ends, or an empty block of 4^3 or 8^3 of them: those samples share its answer.
+    const int side = block ? 1 : nearby ? 4 : 8, mask = -side;
     float leave = std::numeric_limits<float>::infinity();
     for (int a = 0; a < 3; ++a) {
       const int low = c[a] & mask;

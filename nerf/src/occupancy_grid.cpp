@@ -20,9 +20,13 @@ OccupancyGrid::OccupancyGrid(Index resolution) : resolution_(resolution) {
                      std::to_string(resolution));
   density_.assign(at(cells()), 0.f);
   bits_.assign(at(cells()), 1);
-  blocks_.assign(at(cells() / 64), ~std::uint64_t{0});
+  coarse_side_ = (resolution / 4 + 1) / 2;
+  const Index coarse = coarse_side_ * coarse_side_ * coarse_side_;
+  blocks_.assign(at(8 * coarse), 0);
+  coarse_.assign(at(coarse), 0);
   candidates_.resize(at(cells()));
   for (Index c = 0; c < cells(); ++c) candidates_[at(c)] = c;
+  rebuild_blocks();
 }
 
 Index OccupancyGrid::occupied_cells() const {
@@ -57,12 +61,11 @@ void OccupancyGrid::update(const Density& density, const CounterRng& rng, const 
     }
     density(x.data() + 3 * begin, end - begin, sigma.data() + begin);
   });
-  parallel_for(n, kGrain, [&](Index begin, Index end) {
+  parallel_for(looked, kGrain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
-      float& d = density_[at(candidates_[at(i)])];
-      d *= u.decay;
-      if (i % fraction == offset) d = std::max(d, sigma[at((i - offset) / fraction)]);
-      bits_[at(candidates_[at(i)])] = d * u.step > u.threshold;
+      const std::size_t c = at(candidates_[at(offset + i * fraction)]);
+      density_[c] = std::max(u.decay * density_[c], sigma[at(i)]);
+      bits_[c] = density_[c] * u.step > u.threshold;
     }
   });
   rebuild_blocks();
@@ -89,15 +92,18 @@ void OccupancyGrid::set_bits(std::span<const std::uint8_t> bits) {
 
 void OccupancyGrid::rebuild_blocks() {
   const Index n = resolution_ / 4;
-  parallel_for(n, 1, [&](Index bz, Index) {
-    for (Index by = 0; by < n; ++by)
-      for (Index bx = 0; bx < n; ++bx) {
-        std::uint64_t word = 0;
-        for (Index i = 0; i < 64; ++i)
-          if (bits_[at(cell(4 * bx + i % 4, 4 * by + i / 4 % 4, 4 * bz + i / 16))])
-            word |= std::uint64_t{1} << i;
-        blocks_[at(bx + n * (by + n * bz))] = word;
-      }
+  parallel_for(coarse_side_, 1, [&](Index z, Index) {
+    std::fill_n(&coarse_[at(z * coarse_side_ * coarse_side_)], coarse_side_ * coarse_side_, std::uint8_t{0});
+    for (Index bz = 2 * z; bz < std::min(2 * z + 2, n); ++bz)
+      for (Index by = 0; by < n; ++by)
+        for (Index bx = 0; bx < n; ++bx) {
+          std::uint64_t word = 0;
+          for (Index i = 0; i < 64; ++i)
+            if (bits_[at(cell(4 * bx + i % 4, 4 * by + i / 4 % 4, 4 * bz + i / 16))])
+              word |= std::uint64_t{1} << i;
+          blocks_[block_place(bx, by, bz)] = word;
+          if (word) coarse_[at(bx / 2 + coarse_side_ * (by / 2 + coarse_side_ * (bz / 2)))] = 1;
+        }
   });
 }
 

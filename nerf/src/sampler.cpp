@@ -6,7 +6,9 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kWave = 4;
+// Samples of a ray in a wave: few, so that little lies behind the surface; more once few rays are left, since a wave
+// has a price of its own.
+constexpr Index kLeastWave = 4, kMostWave = 16, kWaveSamples = 192;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
@@ -51,16 +53,17 @@ void RaySampler::sample(const Field<float>& field, const ParamStore<float>& para
 // One segment for each ray that is still alive; rays that end here leave the list.
 void RaySampler::march_wave(const OccupancyGrid& grid, const RayBatch& rays) {
   std::size_t kept = 0;
+  const Index wave = std::clamp(kWaveSamples / static_cast<Index>(alive_.size()), kLeastWave, kMostWave);
   for (Index r : alive_) {
-    float t[kWave];
-    const Index count = walks_[at(r)].next(grid, kWave, t);
+    float t[kMostWave];
+    const Index count = walks_[at(r)].next(grid, wave, t);
     if (count > 0) segments_.push_back({r, static_cast<Index>(t_.size()), count});
     for (Index i = 0; i < count; ++i) {
       t_.push_back(t[i]);
       for (Index a = 0; a < 3; ++a)
         x_.push_back(rays.origins[at(3 * r + a)] + t[i] * rays.directions[at(3 * r + a)]);
     }
-    if (count == kWave) alive_[kept++] = r;
+    if (count == wave) alive_[kept++] = r;
   }
   alive_.resize(kept);
 }

@@ -7,7 +7,7 @@
 namespace fieldmark::nerf {
 namespace {
 constexpr Index kLook = 16;         // steps between looks at the clock
-constexpr double kReserve = 0.985;  // of the time: the last part may turn out slower than the pace before it
+constexpr double kReserve = 0.965;  // of the time: the last part may turn out slower than the pace before it
 }  // namespace
 
 Schedule::Schedule(const ScheduleOptions& o) : options_(o), total_(o.steps) {

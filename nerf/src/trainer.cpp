@@ -6,6 +6,7 @@
 #include <fieldmark/nerf/training_pixels.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace fieldmark::nerf {
@@ -13,9 +14,8 @@ namespace {
 
 constexpr int kShards = 16;
 constexpr Index kRays = 64;             // of a chunk
-constexpr Index kTile = 1;  // pixels a side: rays of a step come in tiles of this size
 constexpr Index kOccupancyPeriod = 16;  // steps
-constexpr Index kFirstRays = 1024;      // of a step, until the samples of a ray are known
+constexpr Index kFirstRays = 512;       // of a step, until the samples of a ray are known; never fewer
 constexpr Index kMostRays = 1 << 16;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
@@ -51,7 +51,7 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
       options_(options),
       schedule_(options.schedule),
       pixel_rng_(options.seed, 1),
-      ray_rng_(options.seed, 2),
+      background_rng_(options.seed, 2),
       occupancy_rng_(options.seed, 3),
       loop_(kShards, field.field.network_size()),
       adam_(field.params.size(), {.lr = 1, .zero_grads = true}),
@@ -83,27 +83,25 @@ void Trainer::choose_rays(Index first, Index count, Chunk& c) const {
   for (auto [buffer, columns] :
        {std::pair{&c.origins, 3}, {&c.directions, 3}, {&c.jitter, 1}, {&c.photograph, 4}, {&c.background, 3}})
     buffer->resize(at(count * columns));
-  const Index width = data_.views[0].camera.width, height = data_.views[0].camera.height;
+  const Index width = data_.views[0].camera.width, size = width * data_.views[0].camera.height;
+  // Where a pixel lies in memory is random: all are asked for before the first is used.
+  std::array<Index, kRays> place;
   for (Index i = 0; i < count; ++i) {
-    // Rays of a tile of neighbouring pixels meet the same cells: what one has brought into the cache the others find.
-    const Index tile = (first + i) / (kTile * kTile), in_tile = (first + i) % (kTile * kTile);
-    const auto t = pixel_rng_.uniform4(step, static_cast<std::uint64_t>(tile));
-    const Index place = pick_place(t[0], t[1], pixels_, width * height * static_cast<Index>(data_.views.size()));
-    const View& view = data_.views[at(place / (width * height))];
-    const auto shifted = [](Index pixel, Index by, Index size) {
-      return std::clamp<Index>(pixel - kTile / 2, 0, std::max<Index>(size - kTile, 0)) + std::min(by, size - 1);
-    };
-    const Index x = shifted(place % width, in_tile % kTile, width),
-                y = shifted(place % (width * height) / width, in_tile / kTile, height);
-    const auto ray = static_cast<std::uint64_t>(first + i);
-    const auto u = ray_rng_.uniform4(step, ray);
-    const float pixel[2] = {static_cast<float>(x), static_cast<float>(y)};
+    const auto u = pixel_rng_.uniform4(step, static_cast<std::uint64_t>(first + i));
+    c.jitter[at(i)] = u[2];
+    place[at(i)] = pick_place(u[0], u[1], pixels_, size * static_cast<Index>(data_.views.size()));
+    __builtin_prefetch(data_.views[at(place[at(i)] / size)].rgba.data.data() + 4 * (place[at(i)] % size));
+  }
+  for (Index i = 0; i < count; ++i) {
+    const View& view = data_.views[at(place[at(i)] / size)];
+    const Index pixel = place[at(i)] % size;
+    const float xy[2] = {static_cast<float>(pixel % width), static_cast<float>(pixel / width)};
     float* origin = &c.origins[at(3 * i)];
-    camera_rays(view.camera, pixel, origin, &c.directions[at(3 * i)]);
+    camera_rays(view.camera, xy, origin, &c.directions[at(3 * i)]);
     field_.to_cube(origin, origin);
-    c.jitter[at(i)] = u[3];
-    std::copy_n(view.rgba.data.data() + 4 * (y * view.camera.width + x), 4, &c.photograph[at(4 * i)]);
-    std::copy_n(u.data(), 3, &c.background[at(3 * i)]);
+    std::copy_n(view.rgba.data.data() + 4 * pixel, 4, &c.photograph[at(4 * i)]);
+    const auto b = background_rng_.uniform4(step, static_cast<std::uint64_t>(first + i));
+    std::copy_n(b.data(), 3, &c.background[at(3 * i)]);
   }
 }
 
@@ -180,9 +178,8 @@ void Trainer::step(double seconds) {
                         static_cast<double>(std::max<Index>(samples, 1));
   const Index next = static_cast<Index>(std::clamp(wanted, static_cast<double>(rays_per_step_) / 1.5,
                                                    static_cast<double>(rays_per_step_) * 1.5));
-  rays_per_step_ = std::clamp(next / kRays * kRays, kRays * kShards, kMostRays);
+  rays_per_step_ = std::clamp(next / kRays * kRays, kFirstRays, kMostRays);
   samples_ += static_cast<double>(samples);
-  if (steps_ % 50 == 0) fprintf(stderr, "DBG %ld t %.2f rays %ld samples %ld occ %ld psnr %.2f\n", (long)steps_, seconds, (long)rays_per_step_, (long)samples, (long)field_.grid.occupied_cells(), train_psnr());
   smoothed_loss_ = smoothed_loss_ < 0 ? loss : 0.98 * smoothed_loss_ + 0.02 * loss;
   ++steps_;
 }
@@ -207,7 +204,8 @@ void Trainer::refresh_occupancy() {
   };
   const bool warm = steps_ >= options_.warm_up;
   field_.grid.update(density, occupancy_rng_,
-                     {.decay = 0.4f, .step = field_.step(),
+                     {.decay = 0.5f,  // half of it is forgotten at a look: 0.95 kept fog for a thousand steps (21 samples a ray, not 7)
+                      .step = field_.step(),
                       .threshold = warm ? 0.01f : -1.f,  // below zero: every candidate stays
                       .fraction = steps_ < 2 * options_.warm_up ? 1 : 4,
                       .round = static_cast<std::uint64_t>(steps_ / kOccupancyPeriod)});

@@ -29,7 +29,7 @@ struct RaySamples {
 
 /// Marches rays through the occupied cells of a field and drops what lies behind opaque matter.
 ///
-/// Works in waves of 8 samples a ray: march, look features up, evaluate the density, stop rays that are
+/// Works in waves of 4 to 16 samples a ray: march, look features up, evaluate the density, stop rays that are
 /// opaque. In a scene of surfaces most samples lie behind one, and are never looked up. Reuses its buffers:
 /// after the first calls nothing is allocated. One object per thread.
 class RaySampler {

@@ -9,9 +9,9 @@ namespace fieldmark::nerf {
 
 struct TrainOptions {
   ScheduleOptions schedule{};
-  Index samples_per_step = 1 << 15;  ///< rays a step are chosen to have about this many samples, >= 1024
+  Index samples_per_step = 24576;  ///< rays a step are chosen to have about this many samples, >= 1024
   double huber = 0.1;                ///< see PhotometricLossOptions
-  Index warm_up = 64;                ///< steps before cells may be declared empty
+  Index warm_up = 32;                ///< steps before cells may be declared empty
   std::uint64_t seed = 0;
 };
 
@@ -57,7 +57,7 @@ class Trainer {
   const Dataset& data_;
   TrainOptions options_;
   Schedule schedule_;
-  CounterRng pixel_rng_, ray_rng_, occupancy_rng_;
+  CounterRng pixel_rng_, background_rng_, occupancy_rng_;
   ShardedLoop<float> loop_;
   Adam<float> adam_;
   std::vector<std::uint32_t> pixels_;  // worth a ray; empty: all are
