@@ -36,9 +36,10 @@ Row by_loops(const ParamStore<double>& store, const MarkNetworkOptions& o, const
   Row f = layer(store, "mark/encode/1", layer(store, "mark/encode/0", in, true), true);
   f.insert(f.end(), c.begin(), c.end());
   const Row g = layer(store, "mark/fuse/1", layer(store, "mark/fuse/0", f, true), false);
+  const double blue = std::sqrt(1 + 2 * std::pow(114.0 / 886, 2)), red_green = std::hypot(587.0, 299.0);
   const double axes[3][3] = {
-      {-1 / std::sqrt(6), -1 / std::sqrt(6), 2 / std::sqrt(6)},
-      {o.red_green / std::sqrt(2), -o.red_green / std::sqrt(2), 0},
+      {-114.0 / 886 / blue, -114.0 / 886 / blue, 1 / blue},
+      {o.red_green * 587 / red_green, -o.red_green * 299 / red_green, 0},
       {o.luminance / std::sqrt(3), o.luminance / std::sqrt(3), o.luminance / std::sqrt(3)}};
   Row p(3);
   for (int k = 0; k < 3; ++k)
@@ -69,7 +70,7 @@ TEST_CASE("mark_network: the carrier is what its formula says") {
 }
 
 TEST_CASE(
-    "mark_network: without luminance the carrier has no brightness, and it is never longer than its axes") {
+    "mark_network: without luminance the carrier has no luma, and it is never longer than its axes") {
   ParamStore<double> store;
   const MarkNetwork<double> net(store, "mark", {.red_green = 1, .luminance = 0}, 7);
   for (double& v : store.values()) v *= 5;
@@ -77,7 +78,7 @@ TEST_CASE(
       op_values(carrier(net, store), std::vector{uniform({50, 3}, 0, 1, 1), uniform({50, 3}, 0, 1, 2)});
   double largest = 0;
   for (std::size_t i = 0; i < y.size(); i += 3) {
-    CHECK(std::abs(y[i] + y[i + 1] + y[i + 2]) < 1e-12);
+    CHECK(std::abs(0.299 * y[i] + 0.587 * y[i + 1] + 0.114 * y[i + 2]) < 1e-12);
     largest = std::max(largest, std::hypot(y[i], y[i + 1], y[i + 2]));
   }
   CHECK(largest <= std::sqrt(2) + 1e-12);
@@ -126,7 +127,7 @@ TEST_CASE("mark_network: errors name what is wrong") {
   CHECK_THROWS_WITH(make({.bands = 13}), "[mark_network] bands must be 1 to 12, got 13");
   CHECK_THROWS_WITH(make({.features = 0}), "[mark_network] features must be at least 1, got 0");
   CHECK_THROWS_WITH(make({.luminance = 1.5}),
-                    "[mark_network] red_green and luminance must be 0 to 1, got 0.400000 and 1.500000");
+                    "[mark_network] red_green and luminance must be 0 to 1, got 0.000000 and 1.500000");
   CHECK_THROWS_AS(make({.red_green = -0.1}), ValueError);
   CHECK_THROWS_AS(make({.luminance = std::nan("")}), ValueError);
 }

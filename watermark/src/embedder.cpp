@@ -7,6 +7,7 @@
 #include <fieldmark/engine/metrics.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/loss.h>
+#include <fieldmark/engine/ops/pool.h>
 #include <fieldmark/engine/ops/softmax.h>
 #include <fieldmark/extractor/evidence_pool.h>
 #include <fieldmark/watermark/embedder.h>
@@ -19,9 +20,33 @@
 namespace fieldmark::watermark {
 namespace {
 
+constexpr Index kCoarse = 8;    // pixels a side that eyes average at a glance
+constexpr double kReadable = 0.8, kSafe = 0.95;  // shares of right signs between which the mark learns to hide
 constexpr float kBitScale = 6;  // pooled evidence lies in [-1, 1]: this makes it a logit
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+// How flat the base picture is around each pixel of the object: exp(-(s / 0.03)^2), s the standard deviation of the
+// green channel in 5 x 5 pixels; the same for the three channels.
+std::vector<float> flatness(const CachedView& v, const std::vector<float>& object) {
+  std::vector<float> flat(3 * object.size(), 0.f);
+  for (Index y = 0; y < v.height; ++y)
+    for (Index x = 0; x < v.width; ++x) {
+      const Index p = y * v.width + x;
+      if (object[at(p)] == 0) continue;
+      float sum = 0, squares = 0, n = 0;
+      for (Index j = std::max<Index>(y - 2, 0); j <= std::min(y + 2, v.height - 1); ++j)
+        for (Index i = std::max<Index>(x - 2, 0); i <= std::min(x + 2, v.width - 1); ++i) {
+          const float g = v.base[3 * (j * v.width + i) + 1];
+          sum += g;
+          squares += g * g;
+          n += 1;
+        }
+      const float variance = std::max(squares / n - (sum / n) * (sum / n), 0.f);
+      std::fill_n(&flat[at(3 * p)], 3, std::exp(-variance / (0.03f * 0.03f)));
+    }
+  return flat;
+}
 
 double blend(double from, double to, double fraction) { return from + (to - from) * fraction; }
 
@@ -69,6 +94,7 @@ Embedder::Embedder(Owner& owner, std::span<const CachedView> views, const EmbedO
       if (cell >= 0) label[p] = cell;
     }
     labels_.push_back(std::move(label));
+    flat_.push_back(flatness(v, object));
     object_.push_back(std::move(object));
   }
 }
@@ -107,10 +133,10 @@ Embedder::Picture Embedder::draw(Index image) const {
   return p;
 }
 
-// The marked picture [H, W, 3]: base plus the residual of the cached samples, at the step's power.
-Var<float> Embedder::render(Tape<float>& tape, const Params<float>& params, const Picture& p) const {
+// What the mark adds to the picture [pixels, 3]: the residual of the cached samples, at the step's power.
+Var<float> Embedder::residual(Tape<float>& tape, const Params<float>& params, const Picture& p) const {
   const CachedView& v = views_[at(p.view)];
-  const Index samples = static_cast<Index>(v.weight.size()), pixels = v.height * v.width;
+  const Index samples = static_cast<Index>(v.weight.size());
   float* x = tape.scratch(3 * samples);
   const auto beta = static_cast<float>(options_.distortions.sample_shift);
   const std::uint64_t place = p.step * static_cast<std::uint64_t>(options_.batch) + p.image;
@@ -125,11 +151,33 @@ Var<float> Embedder::render(Tape<float>& tape, const Params<float>& params, cons
   for (Index k = 0; k < samples; ++k) weight[k] *= v.weight[at(k)];
   const Var<float> carrier = owner_.mark.carrier(params, tape.constant(x, {samples, 3}),
                                                  tape.constant(v.colour.data(), {samples, 3}));
-  const Var<float> residual = power_budget<float>(
+  return power_budget<float>(
       weighted_segments<float>(carrier, v.sample_begin, std::span<const float>(weight, at(samples))),
       object_[at(p.view)], p.target);
-  const Var<float> picture = add(tape.constant(v.base.data.data(), {pixels, 3}), residual);
-  return tape.reshape(picture, {v.height, v.width, 3});
+}
+
+// The shares of the residual's power that eyes would see: what is left of it after averaging, and how strong it is on
+// flat areas. Both are about 1 for a mark that takes no care.
+Var<float> Embedder::visibility(Var<float> residual, const Picture& p) const {
+  Tape<float>& tape = residual.tape();
+  const CachedView& v = views_[at(p.view)];
+  const auto power = [&](Var<float> x, std::span<const float> weights) {
+    float* zeros = tape.scratch(x.shape().size());
+    std::fill_n(zeros, x.shape().size(), 0.f);
+    return scale(mse_loss<float>(x, tape.constant(zeros, x.shape()), weights), 1 / (p.target * p.target));
+  };
+  const Var<float> coarse = avg_pool(tape.reshape(residual, {1, v.height, v.width, 3}), kCoarse);
+  const Index places = coarse.shape().size() / 3, columns = coarse.shape()[2];
+  float* on_object = tape.scratch(3 * places);
+  for (Index i = 0; i < places; ++i) {
+    float sum = 0;
+    for (Index j = 0; j < kCoarse * kCoarse; ++j)
+      sum += object_[at(p.view)][at((i / columns * kCoarse + j / kCoarse) * v.width + i % columns * kCoarse + j % kCoarse)];
+    std::fill_n(on_object + 3 * i, 3, sum);
+  }
+  const double ramp = std::clamp((figures_.sign - kReadable) / (kSafe - kReadable), 0.0, 1.0);
+  return add(scale(power(coarse, {on_object, at(3 * places)}), ramp * options_.smooth_weight),
+             scale(power(residual, flat_[at(p.view)]), ramp * options_.flat_weight));
 }
 
 Var<float> Embedder::distort(Tape<float>& tape, Var<float> image, const Picture& p) const {
@@ -162,7 +210,10 @@ Var<float> Embedder::distort(Tape<float>& tape, Var<float> image, const Picture&
 double Embedder::run_picture(Index image, Tape<float>& tape, float* grads, Figures& figures) const {
   const Picture p = draw(image);
   const Params<float> params(owner_.params, grads);
-  const Var<float> picture = distort(tape, render(tape, params, p), p);
+  const Var<float> added = residual(tape, params, p);
+  const CachedView& view = views_[at(p.view)];
+  const Var<float> marked = add(tape.constant(view.base.data.data(), {view.height * view.width, 3}), added);
+  const Var<float> picture = distort(tape, tape.reshape(marked, {view.height, view.width, 3}), p);
   const Index h = picture.shape()[0], w = picture.shape()[1];
   const auto out = owner_.reader(params, tape.reshape(picture, {1, h, w, 3}));
 
@@ -187,7 +238,8 @@ double Embedder::run_picture(Index image, Tape<float>& tape, float* grads, Figur
   const Var<float> index_loss = softmax_cross_entropy<float>(out.index, labels.data);
   const Var<float> bits_loss = bce_with_logits<float>(pooled, bits);
   const Var<float> loss = scale(
-      add(sign_loss, add(scale(index_loss, options_.index_weight), scale(bits_loss, options_.bits_weight))),
+      add(add(sign_loss, visibility(added, p)),
+          add(scale(index_loss, options_.index_weight), scale(bits_loss, options_.bits_weight))),
       1.0 / static_cast<double>(options_.batch));
   const double value = static_cast<double>(loss.value()[0]);
   tape.backward(loss);

@@ -21,11 +21,12 @@ MarkNetworkOptions checked(const MarkNetworkOptions& o) {
   return o;
 }
 
-// Unit rows: blue against yellow, red against green, grey; the last two scaled.
+// Unit rows: blue and red-green, both of no luma (0.299, 0.587, 0.114: ITU-R BT.601), and grey; the last two scaled.
 std::array<double, 9> colour_axes(const MarkNetworkOptions& o) {
-  const double by = 1 / std::sqrt(6.0), rg = o.red_green / std::sqrt(2.0),
-               grey = o.luminance / std::sqrt(3.0);
-  return {-by, -by, 2 * by, rg, -rg, 0, grey, grey, grey};
+  constexpr double kRed = 0.299, kGreen = 0.587, kBlue = 0.114;
+  const double yellow = kBlue / (kRed + kGreen), blue = 1 / std::sqrt(1 + 2 * yellow * yellow);
+  const double rg = o.red_green / std::hypot(kRed, kGreen), grey = o.luminance / std::sqrt(3.0);
+  return {-yellow * blue, -yellow * blue, blue, rg * kGreen, -rg * kRed, 0, grey, grey, grey};
 }
 
 }  // namespace
