@@ -6,8 +6,8 @@ template <class T>
 ParamId ParamStore<T>::add(std::string_view name, Shape shape) {
   for (const Entry& e : entries_)
     if (e.name == name) throw ValueError("[params] name '" + e.name + "' is already used");
-  constexpr Index kLine = 64 / static_cast<Index>(sizeof(T));
-  const Index offset = (size() + kLine - 1) / kLine * kLine;
+  constexpr Index kLine = 64 / static_cast<Index>(sizeof(T)), kLarge = 4096;
+  const Index offset = shape.size() >= kLarge ? (size() + kLine - 1) / kLine * kLine : size();
   entries_.push_back({std::string(name), shape, offset});
   values_.resize(static_cast<std::size_t>(offset + shape.size()));
   grads_.resize(values_.size());

@@ -29,7 +29,8 @@ RayWalk::RayWalk(const float o[3], const float d[3], float step, float jitter)
   for (int a = 0; a < 3; ++a) {
     o_[a] = o[a];
     d_[a] = d[a];
-    // Steps per unit along the axis; where the ray is parallel to it so many that the axis is never left first.
+    // Steps per unit along the axis; where the ray is parallel to it so many that the axis is never left
+    // first.
     steps_[a] = 1 / ((d[a] == 0 ? 1e-20f : d[a]) * step);
   }
 }
@@ -50,12 +51,14 @@ Index RayWalk::next(const OccupancyGrid& grid, Index max, float* t_out) {
     }
     const bool nearby = grid.occupied_nearby(c[0], c[1], c[2]);
     const std::uint64_t block = nearby ? grid.block(c[0] / 4, c[1] / 4, c[2] / 4) : 0;
-    // Whole steps to where the cell ends, or an empty block of 4^3 or 8^3 of them: those samples share its answer.
+    // Whole steps to where the cell ends, or an empty block of 4^3 or 8^3 of them: those samples share its
+    // answer.
     const int side = block ? 1 : nearby ? 4 : 8, mask = -side;
     float leave = std::numeric_limits<float>::infinity();
     for (int a = 0; a < 3; ++a) {
       const int low = c[a] & mask;
-      leave = std::min(leave, (static_cast<float>(steps_[a] > 0 ? low + side : low) - p[a]) * cell_side * steps_[a]);
+      leave = std::min(leave,
+                       (static_cast<float>(steps_[a] > 0 ? low + side : low) - p[a]) * cell_side * steps_[a]);
     }
     const auto steps = std::max<Index>(1, static_cast<Index>(std::ceil(std::min(leave, 1e9f))));
     if (!(block >> (c[0] % 4 + 4 * (c[1] % 4) + 16 * (c[2] % 4)) & 1)) {

@@ -6,8 +6,8 @@
 namespace fieldmark::nerf {
 namespace {
 
-// Samples of a ray in a wave: few, so that little lies behind the surface; more once few rays are left, since a wave
-// has a price of its own.
+// Samples of a ray in a wave: few, so that little lies behind the surface; more once few rays are left, since
+// a wave has a price of its own.
 constexpr Index kLeastWave = 4, kMostWave = 16, kWaveSamples = 192;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }

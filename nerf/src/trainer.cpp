@@ -28,7 +28,8 @@ bool has_alpha(const Dataset& data) {
   });
 }
 
-// One of the listed places, or of all `count` if none are listed. Two uniform numbers, since one has 24 bits only.
+// One of the listed places, or of all `count` if none are listed. Two uniform numbers, since one has 24 bits
+// only.
 Index pick_place(float u, float v, const std::vector<std::uint32_t>& listed, Index count) {
   const Index n = listed.empty() ? count : static_cast<Index>(listed.size());
   const double x = (static_cast<double>(u) + static_cast<double>(v) * 0x1.0p-24) * static_cast<double>(n);
@@ -186,7 +187,8 @@ void Trainer::step(double seconds) {
 
 double Trainer::train_psnr() const {
   const Camera& camera = data_.views.front().camera;
-  const double pixels = static_cast<double>(data_.views.size()) * static_cast<double>(camera.width * camera.height);
+  const double pixels =
+      static_cast<double>(data_.views.size()) * static_cast<double>(camera.width * camera.height);
   const double share = pixels_.empty() ? 1 : static_cast<double>(pixels_.size()) / pixels;
   return -10 * std::log10(std::max(2 * share * smoothed_loss_, 1e-10));
 }
@@ -204,7 +206,8 @@ void Trainer::refresh_occupancy() {
   };
   const bool warm = steps_ >= options_.warm_up;
   field_.grid.update(density, occupancy_rng_,
-                     {.decay = 0.5f,  // half of it is forgotten at a look: 0.95 kept fog for a thousand steps (21 samples a ray, not 7)
+                     {.decay = 0.5f,  // half of it is forgotten at a look: 0.95 kept fog for a thousand steps
+                                      // (21 samples a ray, not 7)
                       .step = field_.step(),
                       .threshold = warm ? 0.01f : -1.f,  // below zero: every candidate stays
                       .fraction = steps_ < 2 * options_.warm_up ? 1 : 4,

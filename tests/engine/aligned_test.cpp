@@ -25,6 +25,7 @@ TEST_CASE("aligned: a vector keeps its numbers while it grows") {
   for (int i = 0; i < 3000000; ++i) v.push_back(static_cast<float>(i % 1000));
   CHECK(reinterpret_cast<std::uintptr_t>(v.data()) % 64 == 0);
   bool kept = true;
-  for (int i = 0; i < 3000000; ++i) kept = kept && v[static_cast<std::size_t>(i)] == static_cast<float>(i % 1000);
+  for (int i = 0; i < 3000000; ++i)
+    kept = kept && v[static_cast<std::size_t>(i)] == static_cast<float>(i % 1000);
   CHECK(kept);
 }

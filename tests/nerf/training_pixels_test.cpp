@@ -42,10 +42,11 @@ TEST_CASE("training_pixels: no ray outside the margin meets a cell of the hull")
   for (int k = 0; k < 5; ++k) {
     View view;
     const double angle = 1.3 * k;
-    view.camera = make_camera(look_at({3 * std::cos(angle), 3 * std::sin(angle), 1.0}, {0, 0, 0}, {0, 0, 1}), 0.7, 64, 64);
+    view.camera = make_camera(look_at({3 * std::cos(angle), 3 * std::sin(angle), 1.0}, {0, 0, 0}, {0, 0, 1}),
+                              1.5, 64, 64);  // sees all of the cube
     view.rgba = Tensor<float>({64, 64, 4});
-    for (Index y = 24; y < 40; ++y)
-      for (Index x = 20; x < 44; ++x) view.rgba[4 * (64 * y + x) + 3] = 1;
+    for (Index y = 28; y < 36; ++y)
+      for (Index x = 27; x < 38; ++x) view.rgba[4 * (64 * y + x) + 3] = 1;
     views.push_back(view);
   }
   const Bounds bounds{{-1, -1, -1}, 2};

@@ -93,6 +93,8 @@ TEST_CASE("embedder: a checkpoint of another run is refused") {
   Owner owner = tiny_owner();
   Embedder embedder(owner, tiny_views(), options(6));
   embedder.save(path);
+  using std::filesystem::perms;
+  CHECK(std::filesystem::status(path).permissions() == (perms::owner_read | perms::owner_write));
   CHECK(Embedder::checkpoint_key(path) == owner.key);
   const auto refused = [&](Owner& o, const EmbedOptions& with, const std::string& text) {
     Embedder e(o, tiny_views(), with);

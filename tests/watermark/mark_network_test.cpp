@@ -69,8 +69,7 @@ TEST_CASE("mark_network: the carrier is what its formula says") {
   }
 }
 
-TEST_CASE(
-    "mark_network: without luminance the carrier has no luma, and it is never longer than its axes") {
+TEST_CASE("mark_network: without luminance the carrier has no luma, and it is never longer than its axes") {
   ParamStore<double> store;
   const MarkNetwork<double> net(store, "mark", {.red_green = 1, .luminance = 0}, 7);
   for (double& v : store.values()) v *= 5;
@@ -81,7 +80,8 @@ TEST_CASE(
     CHECK(std::abs(0.299 * y[i] + 0.587 * y[i + 1] + 0.114 * y[i + 2]) < 1e-12);
     largest = std::max(largest, std::hypot(y[i], y[i + 1], y[i + 2]));
   }
-  CHECK(largest <= std::sqrt(2) + 1e-12);
+  CHECK(largest <=
+        std::sqrt(2 + 2 * 0.05535));  // the two axes are not quite at right angles: their product is -0.0553
   CHECK(largest > 0.5);
 }
 

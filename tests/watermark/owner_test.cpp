@@ -69,6 +69,8 @@ TEST_CASE("owner: saved and loaded it is the same to the byte, and marks the sam
   Owner owner = small_owner();
   owner.gain = 0.1 + 0.2;  // no short decimal
   owner.save(folder / "a");
+  using std::filesystem::perms;
+  CHECK(std::filesystem::status(folder / "a").permissions() == (perms::owner_read | perms::owner_write));
   const Owner again = Owner::load(folder / "a");
   again.save(folder / "b");
   CHECK(read_bytes(folder / "a") == read_bytes(folder / "b"));

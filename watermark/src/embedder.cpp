@@ -20,14 +20,15 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr Index kCoarse = 8;    // pixels a side that eyes average at a glance
-constexpr double kReadable = 0.8, kSafe = 0.95;  // shares of right signs between which the mark learns to hide
+constexpr Index kCoarse = 8;  // pixels a side that eyes average at a glance
+constexpr double kReadable = 0.8,
+                 kSafe = 0.95;  // shares of right signs between which the mark learns to hide
 constexpr float kBitScale = 6;  // pooled evidence lies in [-1, 1]: this makes it a logit
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-// How flat the base picture is around each pixel of the object: exp(-(s / 0.03)^2), s the standard deviation of the
-// green channel in 5 x 5 pixels; the same for the three channels.
+// How flat the base picture is around each pixel of the object: exp(-(s / 0.03)^2), s the standard deviation
+// of the green channel in 5 x 5 pixels; the same for the three channels.
 std::vector<float> flatness(const CachedView& v, const std::vector<float>& object) {
   std::vector<float> flat(3 * object.size(), 0.f);
   for (Index y = 0; y < v.height; ++y)
@@ -156,8 +157,8 @@ Var<float> Embedder::residual(Tape<float>& tape, const Params<float>& params, co
       object_[at(p.view)], p.target);
 }
 
-// The shares of the residual's power that eyes would see: what is left of it after averaging, and how strong it is on
-// flat areas. Both are about 1 for a mark that takes no care.
+// The shares of the residual's power that eyes would see: what is left of it after averaging, and how strong
+// it is on flat areas. Both are about 1 for a mark that takes no care.
 Var<float> Embedder::visibility(Var<float> residual, const Picture& p) const {
   Tape<float>& tape = residual.tape();
   const CachedView& v = views_[at(p.view)];
@@ -172,7 +173,9 @@ Var<float> Embedder::visibility(Var<float> residual, const Picture& p) const {
   for (Index i = 0; i < places; ++i) {
     float sum = 0;
     for (Index j = 0; j < kCoarse * kCoarse; ++j)
-      sum += object_[at(p.view)][at((i / columns * kCoarse + j / kCoarse) * v.width + i % columns * kCoarse + j % kCoarse)];
+      sum +=
+          object_[at(p.view)]
+                 [at((i / columns * kCoarse + j / kCoarse) * v.width + i % columns * kCoarse + j % kCoarse)];
     std::fill_n(on_object + 3 * i, 3, sum);
   }
   const double ramp = std::clamp((figures_.sign - kReadable) / (kSafe - kReadable), 0.0, 1.0);
@@ -237,10 +240,10 @@ double Embedder::run_picture(Index image, Tape<float>& tape, float* grads, Figur
       bce_with_logits<float>(out.sign, std::span<const float>(target, at(places)), on);
   const Var<float> index_loss = softmax_cross_entropy<float>(out.index, labels.data);
   const Var<float> bits_loss = bce_with_logits<float>(pooled, bits);
-  const Var<float> loss = scale(
-      add(add(sign_loss, visibility(added, p)),
-          add(scale(index_loss, options_.index_weight), scale(bits_loss, options_.bits_weight))),
-      1.0 / static_cast<double>(options_.batch));
+  const Var<float> loss =
+      scale(add(add(sign_loss, visibility(added, p)),
+                add(scale(index_loss, options_.index_weight), scale(bits_loss, options_.bits_weight))),
+            1.0 / static_cast<double>(options_.batch));
   const double value = static_cast<double>(loss.value()[0]);
   tape.backward(loss);
 
@@ -327,6 +330,7 @@ void Embedder::save(const std::filesystem::path& path) const {
   file.add("figures", {4}, figures);
   file.add("key", {32}, std::span<const std::uint8_t>(owner_.key.bytes));
   file.write(path);
+  make_private(path);
 }
 
 void Embedder::restore(const std::filesystem::path& path) {

@@ -21,7 +21,8 @@ MarkNetworkOptions checked(const MarkNetworkOptions& o) {
   return o;
 }
 
-// Unit rows: blue and red-green, both of no luma (0.299, 0.587, 0.114: ITU-R BT.601), and grey; the last two scaled.
+// Unit rows: blue and red-green, both of no luma (0.299, 0.587, 0.114: ITU-R BT.601), and grey; the last two
+// scaled.
 std::array<double, 9> colour_axes(const MarkNetworkOptions& o) {
   constexpr double kRed = 0.299, kGreen = 0.587, kBlue = 0.114;
   const double yellow = kBlue / (kRed + kGreen), blue = 1 / std::sqrt(1 + 2 * yellow * yellow);

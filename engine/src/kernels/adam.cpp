@@ -28,10 +28,11 @@ template <bool kSkip, bool kClear, class T>
 
 constexpr std::int64_t kLine = 16;  // numbers skipped together: a cache line of floats
 
-// Where zeros are skipped, a line of them costs the reading of its gradients alone, not of three more arrays: in a hash
-// table most lines are not met in a step.
+// Where zeros are skipped, a line of them costs the reading of its gradients alone, not of three more arrays:
+// in a hash table most lines are not met in a step.
 template <bool kClear, class T>
-[[gnu::always_inline]] inline void run_sparse(T* x, T* g, T* m, T* v, std::int64_t n, const AdamScalars<T>& s) {
+[[gnu::always_inline]] inline void run_sparse(T* x, T* g, T* m, T* v, std::int64_t n,
+                                              const AdamScalars<T>& s) {
   const auto any = [g](std::int64_t at) {
     bool found = false;
     for (int k = 0; k < kLine; ++k) found |= g[at + k] != 0;
@@ -39,7 +40,8 @@ template <bool kClear, class T>
   };
   std::int64_t i = 0;
   for (; i + kLine <= n; i += kLine) {
-    // The other arrays are asked for some lines ahead: where lines are left out, the hardware does not see a stream.
+    // The other arrays are asked for some lines ahead: where lines are left out, the hardware does not see a
+    // stream.
     const std::int64_t ahead = i + 12 * kLine;
     if (ahead + kLine <= n && any(ahead)) {
       __builtin_prefetch(x + ahead, 1);

@@ -8,8 +8,9 @@ namespace {
 using simd::kLanes;
 using simd::Vec;
 
-// Vectors of a full panel, and rows of a register block V vectors wide: at most 12 accumulators of 16 registers, or 24
-// of AVX-512's 32, and at least 8 where there are rows enough, which hides the latency of a multiply-add.
+// Vectors of a full panel, and rows of a register block V vectors wide: at most 12 accumulators of 16
+// registers, or 24 of AVX-512's 32, and at least 8 where there are rows enough, which hides the latency of a
+// multiply-add.
 constexpr int kVectors = simd::kBytes == 64 ? 4 : 2;
 constexpr int rows_of(int vectors) {
   const int most = simd::kBytes == 64 ? 24 : 12;
@@ -47,8 +48,7 @@ template <class T, int R, int V>
 // All rows of V vectors of columns: blocks of R rows, what is left in ever smaller ones.
 template <class T, int V, int R = rows_of(V)>
 void panel(const Gemm<T>& g, const T* b, std::int64_t stride, T* c, const T* bias, std::int64_t i = 0) {
-  for (; i + R <= g.m; i += R)
-    block<T, R, V>(g, g.a + i * g.a_row, b, stride, c + i * g.ldc, g.ldc, bias);
+  for (; i + R <= g.m; i += R) block<T, R, V>(g, g.a + i * g.a_row, b, stride, c + i * g.ldc, g.ldc, bias);
   if constexpr (R > 1)
     if (i < g.m) panel<T, V, (R > 8 ? 8 : R > 4 ? 4 : R / 2)>(g, b, stride, c, bias, i);
 }
@@ -91,7 +91,7 @@ template <class T>
 template <class T>
 std::int64_t gemm_panel(std::int64_t columns) {
   constexpr int L = kLanes<T>;
-  return columns >= kPanel<T> ? kPanel<T> : (columns + L - 1) / L * L;
+  return columns >= kPanel<T> ? kPanel<T> : columns > L ? (columns + L - 1) / L * L : L;
 }
 
 template <class T>
@@ -111,27 +111,55 @@ void pack_panels(const T* b, std::int64_t rows, std::int64_t columns, std::int64
   }
 }
 
+// Where a segment's rows of B would not stay in L1 beside those of the others, C passes over them one segment
+// at a time: every block of C's rows then finds them there. The sums are taken in the same order.
+template <class T>
+void by_segments(const Gemm<T>& g, std::int64_t stride) {
+  for (std::int64_t s = 0; s < g.segments; ++s) {
+    Gemm<T> part = g;
+    part.segments = 1;
+    part.a += s * g.a_segment;
+    part.b += s * g.k * stride;
+    part.b_panel = g.b_panel ? g.b_panel : g.segments * g.k * stride;
+    part.accumulate = g.accumulate || s > 0;
+    part.relu = g.relu && s + 1 == g.segments;
+    gemm(part);
+  }
+}
+
 template <class T>
 void gemm(const Gemm<T>& g) {
   constexpr int L = kLanes<T>;
+  constexpr std::int64_t kSegmentBytes = 8192;  // below it storing C in between costs more
+  if (g.segments > 1 && g.k * gemm_panel<T>(g.n) * static_cast<std::int64_t>(sizeof(T)) >= kSegmentBytes)
+    return by_segments(g, gemm_panel<T>(g.n));
   const T* b = g.b;
   const std::int64_t stride = gemm_panel<T>(g.n), step = g.b_panel ? g.b_panel : g.segments * g.k * stride;
   for (std::int64_t j = 0; j < g.n; j += stride, b += step) {
     const int columns = static_cast<int>(g.n - j < stride ? g.n - j : stride), full = columns / L * L;
     const T* bias = g.bias ? g.bias + j : nullptr;
     switch (columns / L) {
-      case 1: panel<T, 1>(g, b, stride, g.c + j, bias); break;
-      case 2: panel<T, 2>(g, b, stride, g.c + j, bias); break;
-      case 3: panel<T, kVectors == 4 ? 3 : 1>(g, b, stride, g.c + j, bias); break;
-      case 4: panel<T, kVectors == 4 ? 4 : 1>(g, b, stride, g.c + j, bias); break;
-      default: break;
+      case 1:
+        panel<T, 1>(g, b, stride, g.c + j, bias);
+        break;
+      case 2:
+        panel<T, 2>(g, b, stride, g.c + j, bias);
+        break;
+      case 3:
+        panel<T, kVectors == 4 ? 3 : 1>(g, b, stride, g.c + j, bias);
+        break;
+      case 4:
+        panel<T, kVectors == 4 ? 4 : 1>(g, b, stride, g.c + j, bias);
+        break;
+      default:
+        break;
     }
     if (full < columns) narrow<T>(g, b + full, stride, j + full, columns - full);
   }
 }
 
 #define FIELDMARK_INSTANTIATE(T)                                                                             \
-  template std::int64_t gemm_panel<T>(std::int64_t);                                                                   \
+  template std::int64_t gemm_panel<T>(std::int64_t);                                                         \
   template void pack_panels(const T*, std::int64_t, std::int64_t, std::int64_t, std::int64_t, const T*, T*); \
   template void gemm(const Gemm<T>&);
 FIELDMARK_INSTANTIATE(float)

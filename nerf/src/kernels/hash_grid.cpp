@@ -55,8 +55,8 @@ struct Corners {
     }
   }
 
-  // Asks for the entries ahead of their use: they are spread over megabytes, and a core waits longer for one of them
-  // than it computes on a block.
+  // Asks for the entries ahead of their use: they are spread over megabytes, and a core waits longer for one
+  // of them than it computes on a block.
   template <int P>
   [[gnu::always_inline]] void prefetch(const T* entries, int count) const {
     for (int i = 0; i < count; ++i)
@@ -73,12 +73,15 @@ struct Corners {
   }
 };
 
-// Calls use(corners, first point, count) for blocks of points in order, each block's entries asked for one block ahead.
+// Calls use(corners, first point, count) for blocks of points in order, each block's entries asked for one
+// block ahead.
 template <class T, int P, class F>
-[[gnu::always_inline]] inline void for_blocks(const HashLevel& level, const T* x, std::int64_t n, const T* entries,
-                                              F use) {
+[[gnu::always_inline]] inline void for_blocks(const HashLevel& level, const T* x, std::int64_t n,
+                                              const T* entries, F use) {
   Corners<T> corners[2];
-  const auto count = [n](std::int64_t begin) { return static_cast<int>(n - begin < kBlock ? n - begin : kBlock); };
+  const auto count = [n](std::int64_t begin) {
+    return static_cast<int>(n - begin < kBlock ? n - begin : kBlock);
+  };
   if (n > 0) corners[0].find(level, x, count(0));
   for (std::int64_t begin = 0, b = 0; begin < n; begin += kBlock, ++b) {
     const std::int64_t next = begin + kBlock;

@@ -96,7 +96,15 @@ TEST_CASE("gemm: what is not a number stays so through the ReLU") {
       std::vector<float> packed(64), c(static_cast<std::size_t>(2 * n));
       FIELDMARK_KERNEL(pack_panels<float>)(b.data(), 1, n, n, 1, nullptr, packed.data());
       FIELDMARK_KERNEL(gemm<float>)
-      ({.m = 2, .n = n, .k = 1, .a = a.data(), .a_row = 1, .b = packed.data(), .c = c.data(), .ldc = n, .relu = true});
+      ({.m = 2,
+        .n = n,
+        .k = 1,
+        .a = a.data(),
+        .a_row = 1,
+        .b = packed.data(),
+        .c = c.data(),
+        .ldc = n,
+        .relu = true});
       for (Index j = 0; j < n; ++j) {
         CHECK(std::isnan(c[static_cast<std::size_t>(j)]));
         CHECK(c[static_cast<std::size_t>(n + j)] == 0);

@@ -4,9 +4,9 @@
 
 namespace fieldmark {
 
-/// Memory that starts on a cache line (64 bytes, enough for AVX-512); from 4 MiB on it starts on a huge page of 2 MiB,
-/// which the system is asked to use: random reads of a 32 MB table otherwise wait for page tables as long as for data.
-/// Uninitialised. @throws std::bad_alloc
+/// Memory that starts on a cache line (64 bytes, enough for AVX-512); from 4 MiB on it starts on a huge page
+/// of 2 MiB, which the system is asked to use: random reads of a 32 MB table otherwise wait for page tables
+/// as long as for data. Uninitialised. @throws std::bad_alloc
 void* allocate_aligned(std::size_t bytes);
 void free_aligned(void* p) noexcept;
 

@@ -15,8 +15,8 @@ struct ParamId {
 };
 
 /// All trainable numbers of a model in one flat buffer, gradients in a second one of equal length,
-/// so that an optimiser step, a checkpoint and zero_grad() are each one loop. Tensors start on a cache line; the zeros
-/// between them get no gradient and stay.
+/// so that an optimiser step, a checkpoint and zero_grad() are each one loop. Tensors of 4096 numbers or more
+/// start on a cache line; the zeros before them get no gradient and stay.
 template <class T>
 class ParamStore {
  public:

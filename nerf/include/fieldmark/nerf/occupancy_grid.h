@@ -27,10 +27,11 @@ class OccupancyGrid {
   Index cell(Index x, Index y, Index z) const { return x + resolution_ * (y + resolution_ * z); }
   bool occupied(Index cell) const { return bits_[static_cast<std::size_t>(cell)] != 0; }
   /// The 4 x 4 x 4 block of cells at block coordinates as 64 bits, cell (x, y, z) of it at bit x + 4 y + 16
-  /// z: one look-up tells a ray about the cell and about the block. Eight neighbouring blocks share a cache line.
+  /// z: one look-up tells a ray about the cell and about the block. Eight neighbouring blocks share a cache
+  /// line.
   std::uint64_t block(Index bx, Index by, Index bz) const { return blocks_[block_place(bx, by, bz)]; }
-  /// Whether any of the 8 x 8 x 8 cells around a cell is occupied, which a ray asks first: at a resolution of 128 the
-  /// answers are 4 KiB, where the blocks are 256 KiB and fall out of a core's caches between rays.
+  /// Whether any of the 8 x 8 x 8 cells around a cell is occupied, which a ray asks first: at a resolution of
+  /// 128 the answers are 4 KiB, where the blocks are 256 KiB and fall out of a core's caches between rays.
   bool occupied_nearby(Index x, Index y, Index z) const {
     return coarse_[static_cast<std::size_t>(x / 8 + coarse_side_ * (y / 8 + coarse_side_ * (z / 8)))] != 0;
   }
@@ -41,9 +42,10 @@ class OccupancyGrid {
 
   /// Densities at n positions [n, 3] in the unit cube.
   using Density = std::function<void(const float* x, Index n, float* sigma)>;
-  /// Looks at one random position in each of a fraction of the candidates, in turn, replaces their densities d by
-  /// max(decay d, what it found), and marks occupied the cells whose density times `step` exceeds `threshold` (opacity of one
-  /// sample, about). Depends only on the arguments and the state, not on the thread count.
+  /// Looks at one random position in each of a fraction of the candidates, in turn, replaces their densities
+  /// d by max(decay d, what it found), and marks occupied the cells whose density times `step` exceeds
+  /// `threshold` (opacity of one sample, about). Depends only on the arguments and the state, not on the
+  /// thread count.
   struct Update {
     float decay = 0.95f;      ///< of a candidate's density at each look, in [0, 1]
     float step = 1.f / 512;   ///< length of a sample, cube sides
@@ -74,7 +76,7 @@ class OccupancyGrid {
   }
   Index coarse_side_;
   AlignedVector<std::uint64_t> blocks_;  // [coarse^3, 8]
-  std::vector<std::uint8_t> coarse_;   // [coarse^3]
+  std::vector<std::uint8_t> coarse_;     // [coarse^3]
   std::vector<Index> candidates_;
 };
 

@@ -10,13 +10,14 @@ namespace fieldmark::nerf {
 struct TrainOptions {
   ScheduleOptions schedule{};
   Index samples_per_step = 24576;  ///< rays a step are chosen to have about this many samples, >= 1024
-  double huber = 0.1;                ///< see PhotometricLossOptions
-  Index warm_up = 32;                ///< steps before cells may be declared empty
+  double huber = 0.1;              ///< see PhotometricLossOptions
+  Index warm_up = 32;              ///< steps before cells may be declared empty
   std::uint64_t seed = 0;
 };
 
 /// Trains a radiance field on photographs (Mildenhall et al. 2020, sec. 5; Mueller et al. 2022): random rays
-/// of all photographs (where they have alpha: of the silhouettes and a margin), random backgrounds behind alpha, Adam, occupancy refreshed as densities form.
+/// of all photographs (where they have alpha: of the silhouettes and a margin), random backgrounds behind
+/// alpha, Adam, occupancy refreshed as densities form.
 ///
 /// A step is a parallel loop over chunks of 64 rays (ShardedLoop); the gradient at the encoding's output is
 /// kept for the whole batch, and one pass over the levels, each owned by one thread, adds it to the table.

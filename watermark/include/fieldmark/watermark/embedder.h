@@ -30,7 +30,8 @@ struct EmbedOptions {
   double index_weight = 0.5;   ///< of the cross-entropy of the cell index
   double bits_weight = 0.5;    ///< of the pooled bits' loss
   double smooth_weight = 0.4;  ///< of the share of the residual's power left after averaging 8 x 8 pixels
-  double flat_weight = 0.2;    ///< of the residual's power where the base picture is flat, relative to all of it
+  double flat_weight =
+      0.2;  ///< of the residual's power where the base picture is flat, relative to all of it
   EmbedDistortions distortions = {};
   std::uint64_t seed = 0;
 };
@@ -39,11 +40,11 @@ struct EmbedOptions {
 /// supervision):
 ///   L = BCE(sign, s) on the object + 0.5 CE(index, cell) + 0.5 BCE(pooled bits, M)
 ///     + u (0.4 |mean of 8 x 8 pixels of r|^2 / |r|^2 + 0.2 |r on flat areas|^2 / |r|^2)
-/// with the residual r under a budget of power that takes the place of the content loss: the budget says how much is
-/// changed, the last two terms keep it where eyes do not look, in fine detail and on texture. u rises from 0 to 1 while
-/// the share of right signs goes from 0.8 to 0.95: a mark must be readable before it can hide (with u = 1 from the
-/// first step on, signs stayed at 50% for 500 steps). Each picture draws a message, a view,
-/// distortions. Same seed and number of steps: same bytes, for any thread count and across save() and
+/// with the residual r under a budget of power that takes the place of the content loss: the budget says how
+/// much is changed, the last two terms keep it where eyes do not look, in fine detail and on texture. u rises
+/// from 0 to 1 while the share of right signs goes from 0.8 to 0.95: a mark must be readable before it can
+/// hide (with u = 1 from the first step on, signs stayed at 50% for 500 steps). Each picture draws a message,
+/// a view, distortions. Same seed and number of steps: same bytes, for any thread count and across save() and
 /// restore().
 class Embedder {
  public:
@@ -88,7 +89,8 @@ class Embedder {
   std::vector<float> code_matrix_;            // [cells, bits]
   std::vector<Tensor<std::int32_t>> labels_;  // cell of every pixel of every view; count() is background
   std::vector<std::vector<float>> object_;    // 1 where a view's opacity exceeds 0.5
-  std::vector<std::vector<float>> flat_;      // [pixels, 3]: 1 on flat parts of the object, falling to 0 on texture
+  std::vector<std::vector<float>>
+      flat_;  // [pixels, 3]: 1 on flat parts of the object, falling to 0 on texture
   ShardedLoop<float> loop_;
   Adam<float> adam_;
   Figures figures_;

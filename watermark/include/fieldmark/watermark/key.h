@@ -28,6 +28,11 @@ std::string to_hex(const Key& key);
 /// is made readable by its owner alone.   @throws IoError if writing fails
 void save_key(const std::filesystem::path& path, const Key& key);
 
+/// Lets only its owner read and write a file: done to whatever holds a key. Pipes and devices stay as they
+/// are.
+/// @throws IoError if the system refuses
+void make_private(const std::filesystem::path& path);
+
 /// @throws IoError if the file cannot be read, is of another kind, or its array is not 32 bytes
 Key load_key(const std::filesystem::path& path);
 

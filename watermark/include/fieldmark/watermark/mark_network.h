@@ -6,10 +6,11 @@ namespace fieldmark::watermark {
 struct MarkNetworkOptions {
   int bands = 7;  ///< of the frequency encoding of the position, 1 to 12: the finest period is 2^(2 - bands)
                   ///< cube sides
-  Index features = 32;     ///< N_c, of the colour feature field, >= 1
+  Index features = 32;   ///< N_c, of the colour feature field, >= 1
   double red_green = 0;  ///< length of the red-green axis beside the blue one, in [0, 1] ...
-  double luminance = 0;  ///< ... and of the grey one: eyes see brightness best and blue worst,
-                         ///< and the budget is of power, so that a short axis is used as much as a long one: both are off
+  double luminance =
+      0;  ///< ... and of the grey one: eyes see brightness best and blue worst,
+          ///< and the budget is of power, so that a short axis is used as much as a long one: both are off
 };
 
 /// The watermarked colour c_m = c + g s(x) P(x, c) of CopyRNeRF (Luo et al. 2023, sec. 3), with a local
@@ -17,11 +18,11 @@ struct MarkNetworkOptions {
 ///   f_c = E(c, gamma(x)),   f_M(x) = s(x) = (2 M[b] - 1) w of the cell x lies in,   G(f_c, f_M, c) = f_M
 ///   tanh(g(f_c, c)) B
 /// E and g are networks with one hidden ReLU layer each; the rows of B are a blue, a red-green and
-/// a grey axis, the first two without luma, the last two shortened. Departures: D is the keyed code of cells instead of a network, so
-/// that any message can be chosen after training and every place teaches the extractor (a message fused
-/// globally stayed at 60% bit accuracy in 3,000 steps, a local one passed 90% in 1,500); G is odd in f_M, so
-/// flipping a bit flips its carrier; the direction enters through c alone, which makes the mark easier to
-/// bake.
+/// a grey axis, the first two without luma, the last two shortened. Departures: D is the keyed code of cells
+/// instead of a network, so that any message can be chosen after training and every place teaches the
+/// extractor (a message fused globally stayed at 60% bit accuracy in 3,000 steps, a local one passed 90% in
+/// 1,500); G is odd in f_M, so flipping a bit flips its carrier; the direction enters through c alone, which
+/// makes the mark easier to bake.
 template <class T>
 class MarkNetwork {
  public:
