@@ -6,7 +6,9 @@ template <class T>
 ParamId ParamStore<T>::add(std::string_view name, Shape shape) {
   for (const Entry& e : entries_)
     if (e.name == name) throw ValueError("[params] name '" + e.name + "' is already used");
-  constexpr Index kLine = 64 / static_cast<Index>(sizeof(T)), kLarge = 4096;
+  // The same places for float and double, so that numbers can be copied between stores: 16 floats are a cache
+  // line.
+  constexpr Index kLine = 16, kLarge = 4096;
   const Index offset = shape.size() >= kLarge ? (size() + kLine - 1) / kLine * kLine : size();
   entries_.push_back({std::string(name), shape, offset});
   values_.resize(static_cast<std::size_t>(offset + shape.size()));

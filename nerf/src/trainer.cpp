@@ -215,11 +215,14 @@ void Trainer::refresh_occupancy() {
 }
 
 std::string Trainer::fingerprint() const {
+  const ScheduleOptions& schedule = options_.schedule;
   return field_.configuration() + " data " + data_.name + " " + std::to_string(data_.views.size()) +
          " views " + std::to_string(data_.views.front().camera.width) + "x" +
          std::to_string(data_.views.front().camera.height) + " seed " + std::to_string(options_.seed) +
-         " steps " + std::to_string(options_.schedule.steps) + " samples " +
-         std::to_string(options_.samples_per_step);
+         " steps " + std::to_string(schedule.steps) + " samples " +
+         std::to_string(options_.samples_per_step) + " huber " + std::to_string(options_.huber) + " lr " +
+         std::to_string(schedule.lr) + " half after " + std::to_string(schedule.half_after) + " cooldown " +
+         std::to_string(schedule.cooldown) + " last " + std::to_string(schedule.last);
 }
 
 void Trainer::save(const std::filesystem::path& path) const {

@@ -151,6 +151,10 @@ TEST_CASE("trainer: a checkpoint of another run is refused, with both runs named
   options.seed = 7;
   Trainer different(other, scene(), options);
   CHECK_THROWS_WITH(different.restore(folder / "checkpoint"), Contains("seed 7") && Contains("seed 0"));
+  options = train_options(10);
+  options.schedule.lr = 0.5;
+  Trainer faster(other, scene(), options);
+  CHECK_THROWS_WITH(faster.restore(folder / "checkpoint"), Contains("lr 0.5"));
   field.save(folder / "field");
   CHECK_THROWS_WITH(trainer.restore(folder / "field"),
                     Contains("expected a checkpoint of this run") && Contains("another kind of file"));

@@ -123,3 +123,16 @@ TEST_CASE("cell_grid: errors name what is wrong") {
   CHECK_THROWS_AS(CellGrid::from_numbers(2, good, five), ValueError);
   CHECK_THROWS_WITH(CellGrid::from_numbers(1, good, four), "[cell_grid] side must be 2 to 64 cells, got 1");
 }
+
+TEST_CASE("cell_grid: positions outside or not numbers are blended as the nearest place, cell 0 for NaN") {
+  const std::vector<double> area(8, 1.0);
+  const CellGrid grid(2, area);
+  const std::vector<std::int8_t> signs{1, -1, 1, -1, 1, -1, 1, -1};
+  const float nan = std::nanf(""), inf = std::numeric_limits<float>::infinity();
+  const float x[] = {nan, nan, nan, 0, 0, 0, inf, 0, 0, 1, 0, 0, -inf, 5, -5, 0, 1, 0};
+  float s[6];
+  grid.blend(signs, x, 6, s);
+  CHECK(s[0] == s[1]);
+  CHECK(s[2] == s[3]);
+  CHECK(s[4] == s[5]);
+}

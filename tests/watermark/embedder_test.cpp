@@ -114,6 +114,12 @@ TEST_CASE("embedder: a checkpoint of another run is refused") {
   CHECK_THROWS_AS(Embedder::checkpoint_key(path), IoError);
   CHECK_THROWS_WITH(Embedder::checkpoint_key(path),
                     path.string() + ": expected a checkpoint of embed, found no tensor 'key'");
+  SafetensorsFile short_key;
+  const std::uint8_t bytes_of_key[] = {1, 2, 3};
+  short_key.add("key", {3}, std::span<const std::uint8_t>(bytes_of_key));
+  short_key.write(path);
+  CHECK_THROWS_WITH(Embedder::checkpoint_key(path),
+                    path.string() + ": tensor 'key': expected 32 bytes, found 3");
 }
 
 TEST_CASE("embedder: calibration gives views the owner's strength") {

@@ -62,7 +62,9 @@ void CellGrid::blend(std::span<const std::int8_t> signs, const float* x, Index n
     Index base[3];
     float f[3];
     for (int a = 0; a < 3; ++a) {
-      const float p = std::clamp(x[3 * i + a], 0.f, 1.f) * static_cast<float>(side_) - 0.5f;
+      // As place() does, NaN goes to cell 0: the cast of NaN to an integer would be undefined.
+      const float inside = x[3 * i + a] > 0 ? std::min(x[3 * i + a], 1.f) : 0.f;
+      const float p = inside * static_cast<float>(side_) - 0.5f;
       base[a] = static_cast<Index>(std::floor(p));
       f[a] = p - static_cast<float>(base[a]);
     }

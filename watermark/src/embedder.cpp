@@ -366,7 +366,11 @@ Key Embedder::checkpoint_key(const std::filesystem::path& path) {
   const SafetensorsFile file = SafetensorsFile::read(path);
   if (!file.has("key"))
     throw IoError(path.string() + ": expected a checkpoint of embed, found no tensor 'key'");
-  return key_from_bytes(file.u8("key"));
+  const std::vector<std::uint8_t> bytes = file.u8("key");
+  if (bytes.size() != Key{}.bytes.size())
+    throw IoError(path.string() + ": tensor 'key': expected " + std::to_string(Key{}.bytes.size()) +
+                  " bytes, found " + std::to_string(bytes.size()));
+  return key_from_bytes(bytes);
 }
 
 }  // namespace fieldmark::watermark
