@@ -34,7 +34,7 @@ struct Options {
 // A run that was begun without --key made one, and its checkpoint has it.
 watermark::Key key_of(const Options& options, const std::string& checkpoint) {
   if (!options.key.empty()) return watermark::load_key(options.key);
-  if (options.resume) return watermark::key_from_bytes(SafetensorsFile::read(checkpoint).u8("key"));
+  if (options.resume) return watermark::Embedder::checkpoint_key(checkpoint);
   return watermark::random_key();
 }
 
