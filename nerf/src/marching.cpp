@@ -49,19 +49,20 @@ Index RayWalk::next(const OccupancyGrid& grid, Index max, float* t_out) {
       p[a] = (o_[a] + t * d_[a]) * n;
       c[a] = std::clamp(static_cast<int>(p[a]), 0, last);
     }
-    const bool nearby = grid.occupied_nearby(c[0], c[1], c[2]);
-    const std::uint64_t block = nearby ? grid.block(c[0] / 4, c[1] / 4, c[2] / 4) : 0;
-    // Whole steps to where the cell ends, or an empty block of 4^3 or 8^3 of them: those samples share its
-    // answer.
-    const int side = block ? 1 : nearby ? 4 : 8, mask = -side;
-    float leave = std::numeric_limits<float>::infinity();
+    // Whole steps to where the cell ends, or the empty blocks around it: those samples share its answer.
+    const auto clearance = static_cast<int>(grid.clearance(c[0] / 4, c[1] / 4, c[2] / 4));
+    int low[3], high[3];
     for (int a = 0; a < 3; ++a) {
-      const int low = c[a] & mask;
-      leave = std::min(leave,
-                       (static_cast<float>(steps_[a] > 0 ? low + side : low) - p[a]) * cell_side * steps_[a]);
+      low[a] = clearance ? 4 * (c[a] / 4 - clearance + 1) : c[a];
+      high[a] = clearance ? 4 * (c[a] / 4 + clearance) : c[a] + 1;
     }
+    float leave = std::numeric_limits<float>::infinity();
+    for (int a = 0; a < 3; ++a)
+      leave = std::min(leave,
+                       (static_cast<float>(steps_[a] > 0 ? high[a] : low[a]) - p[a]) * cell_side * steps_[a]);
     const auto steps = std::max<Index>(1, static_cast<Index>(std::ceil(std::min(leave, 1e9f))));
-    if (!(block >> (c[0] % 4 + 4 * (c[1] % 4) + 16 * (c[2] % 4)) & 1)) {
+    if (clearance ||
+        !(grid.block(c[0] / 4, c[1] / 4, c[2] / 4) >> (c[0] % 4 + 4 * (c[1] % 4) + 16 * (c[2] % 4)) & 1)) {
       k_ += steps;
       continue;
     }

@@ -9,21 +9,21 @@ namespace {
 
 constexpr Index kGrain = 4096;  // cells a piece
 constexpr float kExcluded = -1.f;
+constexpr std::uint8_t kFarthest = 16;  // blocks
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 
-OccupancyGrid::OccupancyGrid(Index resolution) : resolution_(resolution) {
+OccupancyGrid::OccupancyGrid(Index resolution) : resolution_(resolution), block_side_(resolution / 4) {
   if (resolution < 4 || resolution > 512 || resolution % 4 != 0)
     throw ValueError("[occupancy_grid] resolution must be a multiple of 4 from 4 to 512, got " +
                      std::to_string(resolution));
   density_.assign(at(cells()), 0.f);
   bits_.assign(at(cells()), 1);
-  coarse_side_ = (resolution / 4 + 1) / 2;
-  const Index coarse = coarse_side_ * coarse_side_ * coarse_side_;
-  blocks_.assign(at(8 * coarse), 0);
-  coarse_.assign(at(coarse), 0);
+  coarse_side_ = (block_side_ + 1) / 2;
+  blocks_.assign(at(8 * coarse_side_ * coarse_side_ * coarse_side_), 0);
+  clearance_.assign(at(block_side_ * block_side_ * block_side_), 0);
   candidates_.resize(at(cells()));
   for (Index c = 0; c < cells(); ++c) candidates_[at(c)] = c;
   rebuild_blocks();
@@ -91,20 +91,43 @@ void OccupancyGrid::set_bits(std::span<const std::uint8_t> bits) {
 }
 
 void OccupancyGrid::rebuild_blocks() {
-  const Index n = resolution_ / 4;
-  parallel_for(coarse_side_, 1, [&](Index z, Index) {
-    std::fill_n(&coarse_[at(z * coarse_side_ * coarse_side_)], coarse_side_ * coarse_side_, std::uint8_t{0});
-    for (Index bz = 2 * z; bz < std::min(2 * z + 2, n); ++bz)
-      for (Index by = 0; by < n; ++by)
-        for (Index bx = 0; bx < n; ++bx) {
-          std::uint64_t word = 0;
-          for (Index i = 0; i < 64; ++i)
-            if (bits_[at(cell(4 * bx + i % 4, 4 * by + i / 4 % 4, 4 * bz + i / 16))])
-              word |= std::uint64_t{1} << i;
-          blocks_[block_place(bx, by, bz)] = word;
-          if (word) coarse_[at(bx / 2 + coarse_side_ * (by / 2 + coarse_side_ * (bz / 2)))] = 1;
-        }
+  const Index n = block_side_;
+  parallel_for(n, 1, [&](Index bz, Index) {
+    for (Index by = 0; by < n; ++by)
+      for (Index bx = 0; bx < n; ++bx) {
+        std::uint64_t word = 0;
+        for (Index i = 0; i < 64; ++i)
+          if (bits_[at(cell(4 * bx + i % 4, 4 * by + i / 4 % 4, 4 * bz + i / 16))])
+            word |= std::uint64_t{1} << i;
+        blocks_[block_place(bx, by, bz)] = word;
+        clearance_[at(bx + n * (by + n * bz))] = word ? 0 : kFarthest;
+      }
   });
+  measure_clearance();
+}
+
+// The distance is the largest of those along the axes, so the axes can be taken one after another:
+//   d'(i) = min over j of max(d(j), |i - j|)
+// No block further away than the best so far can better it.
+void OccupancyGrid::measure_clearance() {
+  const Index n = block_side_;
+  for (Index stride : {Index{1}, n, n * n})
+    parallel_for(n * n, 64, [&](Index begin, Index end) {
+      std::uint8_t line[128];
+      for (Index k = begin; k < end; ++k) {
+        std::uint8_t* d = &clearance_[at(k / stride * stride * n + k % stride)];
+        for (Index i = 0; i < n; ++i) line[i] = d[i * stride];
+        for (Index i = 0; i < n; ++i) {
+          Index best = line[i];
+          for (Index away = 1; away < best; ++away) {
+            const Index below = i >= away ? line[i - away] : kFarthest;
+            const Index above = i + away < n ? line[i + away] : kFarthest;
+            best = std::min(best, std::max(std::min(below, above), away));
+          }
+          d[i * stride] = static_cast<std::uint8_t>(best);
+        }
+      }
+    });
 }
 
 }  // namespace fieldmark::nerf

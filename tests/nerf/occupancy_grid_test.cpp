@@ -113,6 +113,29 @@ TEST_CASE("occupancy_grid: a block holds the bits of its cells") {
   CHECK(grid.occupied_cells() < grid.cells());
 }
 
+TEST_CASE("occupancy_grid: clearance is the Chebyshev distance to the nearest block with an occupied cell") {
+  const auto side = GENERATE(Index{8}, Index{20});
+  OccupancyGrid grid(4 * side);
+  std::vector<std::uint8_t> bits(static_cast<std::size_t>(grid.cells()));
+  const Index places[3][3] = {{0, 1, 2}, {2, 0, 3}, {1, 3, 3}};  // blocks, in one corner: the other is far
+  for (const auto& p : places)
+    bits[static_cast<std::size_t>(grid.cell(4 * p[0] + 1, 4 * p[1] + 3, 4 * p[2]))] = 1;
+  grid.set_bits(bits);
+  Index most = 0;
+  for (Index z = 0; z < side; ++z)
+    for (Index y = 0; y < side; ++y)
+      for (Index x = 0; x < side; ++x) {
+        Index nearest = 16;
+        for (const auto& p : places)
+          nearest = std::min(nearest, std::max({std::abs(x - p[0]), std::abs(y - p[1]), std::abs(z - p[2])}));
+        REQUIRE(grid.clearance(x, y, z) == nearest);
+        most = std::max(most, nearest);
+      }
+  CHECK(most == (side == 8 ? 6 : 16));
+  grid.set_bits(std::vector<std::uint8_t>(bits.size()));
+  CHECK(grid.clearance(0, 0, 0) == 16);
+}
+
 TEST_CASE("occupancy_grid: restore continues as the original would") {
   OccupancyGrid a(8), b(8);
   a.restrict_to(ball(8));
