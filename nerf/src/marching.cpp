@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "kernels/march.h"
+
 namespace fieldmark::nerf {
 
 CubeSpan intersect_unit_cube(const float o[3], const float d[3]) {
@@ -35,43 +37,24 @@ RayWalk::RayWalk(const float o[3], const float d[3], float step, float jitter)
   }
 }
 
-Index RayWalk::next(const OccupancyGrid& grid, Index max, float* t_out) {
-  const auto n = static_cast<float>(grid.resolution());
-  const float cell_side = 1 / n;
-  const int last = static_cast<int>(grid.resolution()) - 1;
-  Index count = 0;
-  while (count < max) {
-    const float t = near_ + (static_cast<float>(k_) + jitter_) * step_;
-    if (!(t < far_)) break;
-    int c[3];
-    float p[3];
-    for (int a = 0; a < 3; ++a) {
-      p[a] = (o_[a] + t * d_[a]) * n;
-      c[a] = std::clamp(static_cast<int>(p[a]), 0, last);
-    }
-    // Whole steps to where the cell ends, or the empty blocks around it: those samples share its answer.
-    const auto clearance = static_cast<int>(grid.clearance(c[0] / 4, c[1] / 4, c[2] / 4));
-    int low[3], high[3];
-    for (int a = 0; a < 3; ++a) {
-      low[a] = clearance ? 4 * (c[a] / 4 - clearance + 1) : c[a];
-      high[a] = clearance ? 4 * (c[a] / 4 + clearance) : c[a] + 1;
-    }
-    float leave = std::numeric_limits<float>::infinity();
-    for (int a = 0; a < 3; ++a)
-      leave = std::min(leave,
-                       (static_cast<float>(steps_[a] > 0 ? high[a] : low[a]) - p[a]) * cell_side * steps_[a]);
-    const auto steps = std::max<Index>(1, static_cast<Index>(std::ceil(std::min(leave, 1e9f))));
-    if (clearance ||
-        !(grid.block(c[0] / 4, c[1] / 4, c[2] / 4) >> (c[0] % 4 + 4 * (c[1] % 4) + 16 * (c[2] % 4)) & 1)) {
-      k_ += steps;
-      continue;
-    }
-    for (const Index end = k_ + std::min(steps, max - count); k_ < end; ++k_) {
-      const float in_cell = near_ + (static_cast<float>(k_) + jitter_) * step_;
-      if (!(in_cell < far_)) return count;
-      t_out[count++] = in_cell;
-    }
-  }
+Index RayWalk::next(const OccupancyGrid& grid, Index max, float* t) {
+  using namespace kernels;
+  const Index blocks = grid.resolution() / 4;
+  MarchRay ray{.o = {o_[0], o_[1], o_[2]},
+               .d = {d_[0], d_[1], d_[2]},
+               .steps = {steps_[0], steps_[1], steps_[2]},
+               .near = near_,
+               .far = far_,
+               .step = step_,
+               .jitter = jitter_,
+               .k = static_cast<std::int32_t>(k_)};
+  const Index count = FIELDMARK_KERNEL(march)({.resolution = static_cast<std::int32_t>(grid.resolution()),
+                                               .block_side = static_cast<std::int32_t>(blocks),
+                                               .coarse_side = static_cast<std::int32_t>((blocks + 1) / 2),
+                                               .clearance = grid.clearances().data(),
+                                               .words = grid.block_halves().data()},
+                                              ray, max, t);
+  k_ = ray.k;
   return count;
 }
 

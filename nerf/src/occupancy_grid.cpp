@@ -22,7 +22,7 @@ OccupancyGrid::OccupancyGrid(Index resolution) : resolution_(resolution), block_
   density_.assign(at(cells()), 0.f);
   bits_.assign(at(cells()), 1);
   coarse_side_ = (block_side_ + 1) / 2;
-  blocks_.assign(at(8 * coarse_side_ * coarse_side_ * coarse_side_), 0);
+  halves_.assign(at(16 * coarse_side_ * coarse_side_ * coarse_side_), 0);
   clearance_.assign(at(block_side_ * block_side_ * block_side_), 0);
   candidates_.resize(at(cells()));
   for (Index c = 0; c < cells(); ++c) candidates_[at(c)] = c;
@@ -99,7 +99,8 @@ void OccupancyGrid::rebuild_blocks() {
         for (Index i = 0; i < 64; ++i)
           if (bits_[at(cell(4 * bx + i % 4, 4 * by + i / 4 % 4, 4 * bz + i / 16))])
             word |= std::uint64_t{1} << i;
-        blocks_[block_place(bx, by, bz)] = word;
+        halves_[block_place(bx, by, bz)] = static_cast<std::uint32_t>(word);
+        halves_[block_place(bx, by, bz) + 1] = static_cast<std::uint32_t>(word >> 32);
         clearance_[at(bx + n * (by + n * bz))] = word ? 0 : kFarthest;
       }
   });

@@ -12,7 +12,7 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr int kShards = 16;
+constexpr int kShards = 32;             // the last one to finish keeps a thread waiting: a few chunks each
 constexpr Index kRays = 64;             // of a chunk
 constexpr Index kOccupancyPeriod = 16;  // steps
 constexpr Index kFirstRays = 512;       // of a step, until the samples of a ray are known; never fewer
@@ -28,13 +28,10 @@ bool has_alpha(const Dataset& data) {
   });
 }
 
-// One of the listed places, or of all `count` if none are listed. Two uniform numbers, since one has 24 bits
-// only.
-Index pick_place(float u, float v, const std::vector<std::uint32_t>& listed, Index count) {
-  const Index n = listed.empty() ? count : static_cast<Index>(listed.size());
+// One of n things, from two uniform numbers: one has 24 bits only.
+Index pick(float u, float v, Index n) {
   const double x = (static_cast<double>(u) + static_cast<double>(v) * 0x1.0p-24) * static_cast<double>(n);
-  const Index i = std::min(static_cast<Index>(x), n - 1);
-  return listed.empty() ? i : Index{listed[at(i)]};
+  return std::min(static_cast<Index>(x), n - 1);
 }
 
 }  // namespace
@@ -85,12 +82,19 @@ void Trainer::choose_rays(Index first, Index count, Chunk& c) const {
        {std::pair{&c.origins, 3}, {&c.directions, 3}, {&c.jitter, 1}, {&c.photograph, 4}, {&c.background, 3}})
     buffer->resize(at(count * columns));
   const Index width = data_.views[0].camera.width, size = width * data_.views[0].camera.height;
-  // Where a pixel lies in memory is random: all are asked for before the first is used.
+  // Where a pixel lies in memory is random: all are asked for before the first is used, and so are the places
+  // of those that are listed.
+  const Index choices =
+      pixels_.empty() ? size * static_cast<Index>(data_.views.size()) : static_cast<Index>(pixels_.size());
   std::array<Index, kRays> place;
   for (Index i = 0; i < count; ++i) {
     const auto u = pixel_rng_.uniform4(step, static_cast<std::uint64_t>(first + i));
     c.jitter[at(i)] = u[2];
-    place[at(i)] = pick_place(u[0], u[1], pixels_, size * static_cast<Index>(data_.views.size()));
+    place[at(i)] = pick(u[0], u[1], choices);
+    if (!pixels_.empty()) __builtin_prefetch(&pixels_[at(place[at(i)])]);
+  }
+  for (Index i = 0; i < count; ++i) {
+    if (!pixels_.empty()) place[at(i)] = pixels_[at(place[at(i)])];
     __builtin_prefetch(data_.views[at(place[at(i)] / size)].rgba.data.data() + 4 * (place[at(i)] % size));
   }
   for (Index i = 0; i < count; ++i) {
@@ -111,7 +115,7 @@ double Trainer::run_chunk(Index index, Index shard, Tape<float>& tape, float* gr
   choose_rays(index * kRays, kRays, chunk);
   RaySamples& s = samples_of_shard_[at(shard)];
   samplers_[at(shard)].sample(field_.field, field_.params, field_.grid, {chunk.origins, chunk.directions},
-                              chunk.jitter, {.step = field_.step()}, s);
+                              chunk.jitter, {.step = field_.step(), .stop = options_.stop}, s);
   const Index n = chunk.samples = s.size(), width = field_.field.encoding().width();
   chunk.position.assign(s.position.begin(), s.position.end());
   chunk.ddensity.assign(at(n * width), 0.f);

@@ -15,6 +15,7 @@ template <bool kSkip, bool kClear, class T>
                                        std::int64_t n, const AdamScalars<T>& scalars) {
   const AdamScalars<T> s = scalars;
   const T one_less1 = 1 - s.beta1, one_less2 = 1 - s.beta2;
+#pragma GCC ivdep  // a line at a time, checks of overlap would cost as much as the work
   for (std::int64_t i = 0; i < n; ++i) {
     const T grad = g[i], m0 = m[i], v0 = v[i], x0 = x[i];
     const T m1 = s.beta1 * m0 + one_less1 * grad;
@@ -38,9 +39,11 @@ template <bool kClear, class T>
   // By bits: comparisons of floats became a scalar loop that took longer than the updates. A line of -0
   // counts as work and changes nothing.
   const auto any = [g](std::int64_t at) {
-    std::uint64_t words[kLine * sizeof(T) / 8], found = 0;
-    std::memcpy(words, g + at, sizeof words);
-    for (std::uint64_t w : words) found |= w;
+    std::uint64_t found = 0, word;
+    for (int k = 0; k < kLine; k += 8 / static_cast<int>(sizeof(T))) {
+      std::memcpy(&word, g + at + k, sizeof word);
+      found |= word;
+    }
     return found != 0;
   };
   std::int64_t i = 0;

@@ -22,19 +22,37 @@ template <class T, int P>
   return e;
 }
 
-// The eight corners of the cells around a block of points: table row and fraction along each axis.
-template <class T>
+// Two parts side by side. A copy of each into one array, read back as a whole, would wait for both stores to
+// reach the cache: 14 cycles a point.
+template <class T, int P>
+[[gnu::always_inline]] inline Entry<T, P> joined(const T* density, const T* colour) {
+  typedef T Part __attribute__((vector_size(P * sizeof(T))));
+  Part d, c;
+  std::memcpy(&d, density, sizeof d);
+  std::memcpy(&c, colour, sizeof c);
+  if constexpr (P == 2)
+    return __builtin_shufflevector(d, c, 0, 1, 2, 3);
+  else
+    return __builtin_shufflevector(d, c, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+
+// The eight corners of the cells around a block of points: place of the entry in its level and fraction along
+// each axis.
+template <class T, int P>
 struct Corners {
-  std::uint32_t row[8][kBlock];
+  std::uint32_t place[8][kBlock];
   T f[3][kBlock];
 
   // Mueller et al. 2022, eq. 4: h = x XOR y * 2654435761 XOR z * 805459861, modulo a power of two.
   [[gnu::always_inline]] void find(const HashLevel& level, const T* x, int count) {
     std::uint32_t cell[3][kBlock];
+    T position[3][kBlock] = {};
+    for (int i = 0; i < count; ++i)
+      for (int a = 0; a < 3; ++a) position[a][i] = x[3 * i + a];
     const T scale = static_cast<T>(level.resolution), top = scale - 1;
     for (int a = 0; a < 3; ++a)
       for (int i = 0; i < kBlock; ++i) {
-        const T p = x[3 * (i < count ? i : 0) + a] * scale;
+        const T p = position[a][i] * scale;
         // Clamped before the cast: a NaN or huge position would be undefined as an integer.
         const T inside = p > 0 ? (p < top ? p : top) : T(0);
         const auto c = static_cast<std::int32_t>(inside);
@@ -44,23 +62,20 @@ struct Corners {
     const std::uint32_t side = level.resolution + 1;
     const bool hashed = level.mask != 0;
     const std::uint32_t py = hashed ? 2654435761u : side, pz = hashed ? 805459861u : side * side;
-    for (int k = 0; k < 8; ++k) {
-      const std::uint32_t bx = k & 1, by = (k >> 1) & 1, bz = (k >> 2) & 1;
-      if (hashed)
-        for (int i = 0; i < kBlock; ++i)
-          row[k][i] = ((cell[0][i] + bx) ^ ((cell[1][i] + by) * py) ^ ((cell[2][i] + bz) * pz)) & level.mask;
-      else
-        for (int i = 0; i < kBlock; ++i)
-          row[k][i] = (cell[0][i] + bx) + (cell[1][i] + by) * py + (cell[2][i] + bz) * pz;
+    for (int i = 0; i < kBlock; ++i) {
+      const std::uint32_t x0 = cell[0][i], y0 = cell[1][i] * py, z0 = cell[2][i] * pz;
+      for (int k = 0; k < 8; ++k) {
+        const std::uint32_t x1 = x0 + (k & 1), y1 = y0 + ((k >> 1) & 1) * py, z1 = z0 + ((k >> 2) & 1) * pz;
+        place[k][i] = 2 * P * (hashed ? (x1 ^ y1 ^ z1) & level.mask : x1 + y1 + z1);
+      }
     }
   }
 
   // Asks for the entries ahead of their use: they are spread over megabytes, and a core waits longer for one
   // of them than it computes on a block.
-  template <int P>
   [[gnu::always_inline]] void prefetch(const T* entries, int count) const {
     for (int i = 0; i < count; ++i)
-      for (int k = 0; k < 8; ++k) __builtin_prefetch(entries + std::size_t{row[k][i]} * 2 * P);
+      for (int k = 0; k < 8; ++k) __builtin_prefetch(entries + place[k][i]);
   }
 
   [[gnu::always_inline]] void weights(T (*w)[kBlock]) const {
@@ -78,7 +93,7 @@ struct Corners {
 template <class T, int P, class F>
 [[gnu::always_inline]] inline void for_blocks(const HashLevel& level, const T* x, std::int64_t n,
                                               const T* entries, F use) {
-  Corners<T> corners[2];
+  Corners<T, P> corners[2];
   const auto count = [n](std::int64_t begin) {
     return static_cast<int>(n - begin < kBlock ? n - begin : kBlock);
   };
@@ -87,7 +102,7 @@ template <class T, int P, class F>
     const std::int64_t next = begin + kBlock;
     if (next < n) {
       corners[(b + 1) & 1].find(level, x + 3 * next, count(next));
-      corners[(b + 1) & 1].template prefetch<P>(entries, count(next));
+      if (level.mask) corners[(b + 1) & 1].prefetch(entries, count(next));
     }
     use(corners[b & 1], begin, count(begin));
   }
@@ -99,42 +114,41 @@ void forward(const HashLevel* level, int levels, const T* x, std::int64_t n, con
   const std::int64_t width = P * levels;
   for (int l = 0; l < levels; ++l) {
     const T* entries = table + level[l].first * 2 * P;
-    for_blocks<T, P>(level[l], x, n, entries, [&](const Corners<T>& corners, std::int64_t begin, int count) {
-      alignas(64) T w[8][kBlock];
-      corners.weights(w);
-      for (int i = 0; i < count; ++i) {
-        Entry<T, P> sum{};
-        for (int k = 0; k < 8; ++k)
-          sum += w[k][i] * load<T, P>(entries + std::size_t{corners.row[k][i]} * 2 * P);
-        T parts[2 * P];
-        std::memcpy(parts, &sum, sizeof sum);
-        std::memcpy(density + (begin + i) * width + P * l, parts, P * sizeof(T));
-        std::memcpy(colour + (begin + i) * width + P * l, parts + P, P * sizeof(T));
-      }
-    });
+    for_blocks<T, P>(level[l], x, n, entries,
+                     [&](const Corners<T, P>& corners, std::int64_t begin, int count) {
+                       alignas(64) T w[8][kBlock];
+                       corners.weights(w);
+                       for (int i = 0; i < count; ++i) {
+                         Entry<T, P> sum{};
+                         for (int k = 0; k < 8; ++k)
+                           sum += w[k][i] * load<T, P>(entries + corners.place[k][i]);
+                         T parts[2 * P];
+                         std::memcpy(parts, &sum, sizeof sum);
+                         std::memcpy(density + (begin + i) * width + P * l, parts, P * sizeof(T));
+                         std::memcpy(colour + (begin + i) * width + P * l, parts + P, P * sizeof(T));
+                       }
+                     });
   }
 }
 
 // dL/d(entry) at one point and level; either part may be absent.
 template <class T, int P>
 [[gnu::always_inline]] inline Entry<T, P> cotangent(const T* ddensity, const T* dcolour, std::int64_t at) {
-  T parts[2 * P] = {};
-  if (ddensity) std::memcpy(parts, ddensity + at, P * sizeof(T));
-  if (dcolour) std::memcpy(parts + P, dcolour + at, P * sizeof(T));
-  return load<T, P>(parts);
+  const T none[P] = {};
+  return joined<T, P>(ddensity ? ddensity + at : none, dcolour ? dcolour + at : none);
 }
 
 template <class T, int P>
 void backward_level(const HashLevel& level, int index, int levels, const T* x, std::int64_t n,
                     const T* ddensity, const T* dcolour, T* grad) {
   T* entries = grad + level.first * 2 * P;
-  for_blocks<T, P>(level, x, n, entries, [&](const Corners<T>& corners, std::int64_t begin, int count) {
+  for_blocks<T, P>(level, x, n, entries, [&](const Corners<T, P>& corners, std::int64_t begin, int count) {
     alignas(64) T w[8][kBlock];
     corners.weights(w);
     for (int i = 0; i < count; ++i) {
       const Entry<T, P> g = cotangent<T, P>(ddensity, dcolour, ((begin + i) * levels + index) * P);
       for (int k = 0; k < 8; ++k) {
-        T* at = entries + std::size_t{corners.row[k][i]} * 2 * P;
+        T* at = entries + corners.place[k][i];
         const Entry<T, P> sum = load<T, P>(at) + w[k][i] * g;
         std::memcpy(at, &sum, sizeof sum);
       }
@@ -146,7 +160,7 @@ void backward_level(const HashLevel& level, int index, int levels, const T* x, s
 template <class T, int P>
 void backward_x(const HashLevel* level, int levels, const T* x, std::int64_t n, const T* table,
                 const T* ddensity, const T* dcolour, T* dx) {
-  Corners<T> corners;
+  Corners<T, P> corners;
   for (int l = 0; l < levels; ++l) {
     const T* entries = table + level[l].first * 2 * P;
     const T scale = static_cast<T>(level[l].resolution);
@@ -156,7 +170,7 @@ void backward_x(const HashLevel* level, int levels, const T* x, std::int64_t n, 
       for (int i = 0; i < count; ++i) {
         const Entry<T, P> g = cotangent<T, P>(ddensity, dcolour, ((begin + i) * levels + l) * P);
         for (int k = 0; k < 8; ++k) {
-          const Entry<T, P> e = g * load<T, P>(entries + std::size_t{corners.row[k][i]} * 2 * P);
+          const Entry<T, P> e = g * load<T, P>(entries + corners.place[k][i]);
           T dot = 0, weight[3], sign[3];
           for (int j = 0; j < 2 * P; ++j) dot += e[j];
           for (int a = 0; a < 3; ++a) {

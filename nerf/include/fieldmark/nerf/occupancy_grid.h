@@ -28,7 +28,10 @@ class OccupancyGrid {
   bool occupied(Index cell) const { return bits_[static_cast<std::size_t>(cell)] != 0; }
   /// The 4 x 4 x 4 block of cells at block coordinates as 64 bits, cell (x, y, z) of it at bit x + 4 y + 16
   /// z. Eight neighbouring blocks share a cache line.
-  std::uint64_t block(Index bx, Index by, Index bz) const { return blocks_[block_place(bx, by, bz)]; }
+  std::uint64_t block(Index bx, Index by, Index bz) const {
+    const std::size_t at = block_place(bx, by, bz);
+    return halves_[at] | std::uint64_t{halves_[at + 1]} << 32;
+  }
   /// Distance to the nearest block with an occupied cell, in blocks along the axis that is furthest
   /// (Chebyshev), at most 16; 0 for such a block. All blocks nearer than that are empty, so a ray leaves
   /// them in one step; at a resolution of 128 the distances are 32 KiB, where the blocks are 256 KiB.
@@ -36,6 +39,9 @@ class OccupancyGrid {
     return clearance_[static_cast<std::size_t>(bx + block_side_ * (by + block_side_ * bz))];
   }
   Index occupied_cells() const;
+  /// Blocks and clearances as rows of numbers, for the kernel that walks rays (kernels/march.h).
+  std::span<const std::uint32_t> block_halves() const { return halves_; }
+  std::span<const std::uint8_t> clearances() const { return clearance_; }
 
   /// Rules out every cell for which `keep` (one entry a cell) is 0. @throws ShapeError if the sizes differ
   void restrict_to(std::span<const std::uint8_t> keep);
@@ -73,10 +79,10 @@ class OccupancyGrid {
   std::vector<std::uint8_t> bits_;
   std::size_t block_place(Index bx, Index by, Index bz) const {
     const Index coarse = bx / 2 + coarse_side_ * (by / 2 + coarse_side_ * (bz / 2));
-    return static_cast<std::size_t>(8 * coarse + bx % 2 + 2 * (by % 2) + 4 * (bz % 2));
+    return static_cast<std::size_t>(16 * coarse + 2 * (bx % 2 + 2 * (by % 2) + 4 * (bz % 2)));
   }
   Index coarse_side_;                    // pairs of blocks per axis
-  AlignedVector<std::uint64_t> blocks_;  // [coarse_side^3, 8]
+  AlignedVector<std::uint32_t> halves_;  // [coarse_side^3, 2 x 2 x 2 blocks, 2 halves]
   std::vector<std::uint8_t> clearance_;  // [block_side^3]
   std::vector<Index> candidates_;
 };

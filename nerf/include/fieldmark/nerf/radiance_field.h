@@ -13,7 +13,7 @@ namespace fieldmark::nerf {
 struct RadianceFieldOptions {
   FieldOptions field{};
   Index occupancy = 128;   ///< cells per axis of the occupancy grid, see OccupancyGrid
-  float step = 1.f / 320;  ///< spacing of samples along a ray, in diagonals of the cube
+  float step = 1.f / 420;  ///< spacing of samples along a ray, in diagonals of the cube
   std::uint64_t seed = 0;  ///< of the initial numbers
 };
 

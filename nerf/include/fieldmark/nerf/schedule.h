@@ -9,7 +9,7 @@ struct ScheduleOptions {
   double lr = 2e-2;          ///< step size at the start, > 0
   double half_after = 4000;  ///< steps after which 1 / (1 + n / half_after) has halved the step size, > 0
   double cooldown =
-      0.4;  ///< the last part of the run, in (0, 1), over which the step size falls exponentially ...
+      0.3;  ///< the last part of the run, in (0, 1), over which the step size falls exponentially ...
   double last = 0.03;  ///< ... to this fraction of what it was, in (0, 1]
 };
 

@@ -11,7 +11,9 @@ struct TrainOptions {
   ScheduleOptions schedule{};
   Index samples_per_step = 24576;  ///< rays a step are chosen to have about this many samples, >= 1024
   double huber = 0.1;              ///< see PhotometricLossOptions
-  Index warm_up = 32;              ///< steps before cells may be declared empty
+  float stop = 1e-2f;  ///< a ray ends where its transmittance falls below this, in [0, 1): what lies deeper
+                       ///< than 1e-2 is worth less than the rays that its samples would cost
+  Index warm_up = 32;  ///< steps before cells may be declared empty
   std::uint64_t seed = 0;
 };
 

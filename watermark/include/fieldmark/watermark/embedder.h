@@ -31,7 +31,7 @@ struct EmbedOptions {
   double bits_weight = 0.5;    ///< of the pooled bits' loss
   double smooth_weight = 0.4;  ///< of the share of the residual's power left after averaging 8 x 8 pixels
   double flat_weight =
-      0.2;  ///< of the residual's power where the base picture is flat, relative to all of it
+      0.4;  ///< of the residual's power where the base picture is flat, relative to all of it
   EmbedDistortions distortions = {};
   std::uint64_t seed = 0;
 };
@@ -39,7 +39,7 @@ struct EmbedOptions {
 /// Trains mark and extractor together on a frozen field (Luo et al. 2023, sec. 3.3 and 3.4, with dense local
 /// supervision):
 ///   L = BCE(sign, s) on the object + 0.5 CE(index, cell) + 0.5 BCE(pooled bits, M)
-///     + u (0.4 |mean of 8 x 8 pixels of r|^2 / |r|^2 + 0.2 |r on flat areas|^2 / |r|^2)
+///     + u (0.4 |mean of 8 x 8 pixels of r|^2 / |r|^2 + 0.4 |r on flat areas|^2 / |r|^2)
 /// with the residual r under a budget of power that takes the place of the content loss: the budget says how
 /// much is changed, the last two terms keep it where eyes do not look, in fine detail and on texture. u rises
 /// from 0 to 1 while the share of right signs goes from 0.8 to 0.95: a mark must be readable before it can

@@ -10,7 +10,7 @@ namespace fieldmark::watermark {
 struct OwnerOptions {
   Index bits = 16;  ///< length of a message, 1 to 256
   double strength =
-      34.5;          ///< PSNR of marked against unmarked on the object, dB, mean over near views, 20 to 60
+      36.5;          ///< PSNR of marked against unmarked on the object, dB, mean over near views, 20 to 60
   Index cells = 16;  ///< per axis of the field's cube, see CellGrid
   Index reader_size = 200;  ///< side of the square in which the extractor sees the object, pixels, >= 32
   MarkNetworkOptions mark;

@@ -1,0 +1,28 @@
+#pragma once
+#include <fieldmark/engine/isa.h>
+
+#include <cstdint>
+
+namespace fieldmark::kernels {
+
+/// An occupancy grid as rays see it.
+struct MarchGrid {
+  std::int32_t resolution, block_side, coarse_side;  ///< cells, blocks and pairs of blocks per axis
+  const std::uint8_t*
+      clearance;               ///< [block_side^3] distance to the nearest block with an occupied cell, blocks
+  const std::uint32_t* words;  ///< [coarse_side^3, 2^3 blocks, 2 halves] bits of a block's 4^3 cells
+};
+
+/// A ray o + t d and how far it has been walked: the next sample is at near + (k + jitter) step.
+struct MarchRay {
+  float o[3], d[3];
+  float steps[3];  ///< steps per unit along each axis, signed
+  float near, far, step, jitter;
+  std::int32_t k;
+};
+
+// Writes the next samples in occupied cells to t, at most `max`, and moves k past them. Returns their number.
+FIELDMARK_DECLARE_KERNEL(std::int64_t, march,
+                         (const MarchGrid& grid, MarchRay& ray, std::int64_t max, float* t))
+
+}  // namespace fieldmark::kernels

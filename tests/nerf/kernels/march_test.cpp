@@ -1,0 +1,110 @@
+#include "kernels/march.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "support/each_isa.h"
+#include "support/random.h"
+
+using namespace fieldmark;
+using namespace fieldmark::kernels;
+
+namespace {
+constexpr int kSide = 12, kBlocks = 3, kCoarse = 2;  // an odd number of blocks: the last pair is half empty
+
+struct Grid {
+  std::vector<bool> cells = std::vector<bool>(kSide * kSide * kSide);
+  std::vector<std::uint8_t> clearance = std::vector<std::uint8_t>(kBlocks * kBlocks * kBlocks, 16);
+  std::vector<std::uint32_t> words = std::vector<std::uint32_t>(kCoarse * kCoarse * kCoarse * 16);
+
+  void fill(int x, int y, int z) {
+    cells[static_cast<std::size_t>(x + kSide * (y + kSide * z))] = true;
+    const int b[3] = {x / 4, y / 4, z / 4}, bit = x % 4 + 4 * (y % 4) + 16 * (z % 4);
+    const int block = 8 * (b[0] / 2 + kCoarse * (b[1] / 2 + kCoarse * (b[2] / 2))) + b[0] % 2 +
+                      2 * (b[1] % 2) + 4 * (b[2] % 2);
+    words[static_cast<std::size_t>(2 * block + bit / 32)] |= 1u << (bit % 32);
+    for (int k = 0; k < kBlocks * kBlocks * kBlocks; ++k) {
+      const int away = std::max({std::abs(k % kBlocks - b[0]), std::abs(k / kBlocks % kBlocks - b[1]),
+                                 std::abs(k / kBlocks / kBlocks - b[2])});
+      auto& c = clearance[static_cast<std::size_t>(k)];
+      c = static_cast<std::uint8_t>(std::min<int>(c, away));
+    }
+  }
+  MarchGrid view() const { return {kSide, kBlocks, kCoarse, clearance.data(), words.data()}; }
+};
+
+MarchRay ray_through(const double* from, const double* to, float step, float jitter) {
+  double d[3], norm = 0;
+  for (int a = 0; a < 3; ++a) d[a] = to[a] - from[a], norm += d[a] * d[a];
+  norm = std::sqrt(norm);
+  MarchRay r{.near = 0, .far = static_cast<float>(norm), .step = step, .jitter = jitter, .k = 0};
+  for (int a = 0; a < 3; ++a) {
+    r.o[a] = static_cast<float>(from[a]);
+    r.d[a] = static_cast<float>(d[a] / norm);
+    r.steps[a] = 1 / (r.d[a] * step);
+  }
+  return r;
+}
+
+std::vector<float> walked(const Grid& grid, MarchRay ray, std::int64_t piece) {
+  std::vector<float> all, t(static_cast<std::size_t>(piece) + 1, -7.f);
+  for (std::int64_t count = piece; count == piece;) {
+    count = FIELDMARK_KERNEL(march)(grid.view(), ray, piece, t.data());
+    REQUIRE(t.back() == -7.f);  // nothing is written behind the samples asked for
+    all.insert(all.end(), t.begin(), t.begin() + count);
+  }
+  return all;
+}
+}  // namespace
+
+TEST_CASE("kernels/march: the samples of dense stepping in double, in pieces of any length") {
+  each_isa([] {
+    for (const double filled : {0.002, 0.05, 0.6}) {
+      const auto u = uniform({kSide, kSide, kSide}, 0, 1, 1);
+      Grid grid;
+      for (int c = 0; c < kSide * kSide * kSide; ++c)
+        if (u[c] < filled) grid.fill(c % kSide, c / kSide % kSide, c / kSide / kSide);
+      const auto ends = uniform({100, 6}, 0, 1, 2);
+      int samples = 0;
+      for (int i = 0; i < 100; ++i) {
+        const double* from = &ends.data[static_cast<std::size_t>(6 * i)];
+        const MarchRay ray =
+            ray_through(from, from + 3, i % 2 ? 0.004f : 0.07f, 0.01f * static_cast<float>(i));
+        const auto got = walked(grid, ray, 1000);
+        for (const std::int64_t piece : {1, 5, 16}) REQUIRE(walked(grid, ray, piece) == got);
+        CAPTURE(filled, i);
+        for (int k = 0;; ++k) {
+          const float t = ray.near + (static_cast<float>(k) + ray.jitter) * ray.step;
+          if (!(t < ray.far)) break;
+          int cell[3];
+          bool doubtful = false;  // within rounding of a face
+          for (int a = 0; a < 3; ++a) {
+            const double p = kSide * (static_cast<double>(ray.o[a]) +
+                                      static_cast<double>(t) * static_cast<double>(ray.d[a]));
+            doubtful |= std::abs(p - std::round(p)) < 1e-4;
+            cell[a] = static_cast<int>(p);
+          }
+          if (doubtful) continue;
+          const auto c = static_cast<std::size_t>(cell[0] + kSide * (cell[1] + kSide * cell[2]));
+          REQUIRE(std::binary_search(got.begin(), got.end(), t) == grid.cells[c]);
+          samples += grid.cells[c];
+        }
+      }
+      CHECK(samples > 0);
+    }
+  });
+}
+
+TEST_CASE("kernels/march: an empty grid is left at once, a full one in steps") {
+  each_isa([] {
+    Grid empty, full;
+    for (int c = 0; c < kSide * kSide * kSide; ++c)
+      full.fill(c % kSide, c / kSide % kSide, c / kSide / kSide);
+    const double from[] = {0.1, 0.2, 0.3}, to[] = {0.9, 0.7, 0.8};
+    const MarchRay ray = ray_through(from, to, 1.f / 64, 0.5f);
+    CHECK(walked(empty, ray, 4).empty());
+    CHECK(walked(full, ray, 4).size() == static_cast<std::size_t>(ray.far * 64 + 0.5f));
+  });
+}
