@@ -1,3 +1,4 @@
+#include <fieldmark/engine/packed_weights.h>
 #include <fieldmark/engine/params.h>
 
 namespace fieldmark {
@@ -56,6 +57,15 @@ void ParamStore<T>::zero_grad() {
   std::fill(grads_.begin(), grads_.end(), T(0));
 }
 
+template <class T>
+Var<T> Params<T>::leaf(Tape<T>& tape, ParamId id) const {
+  const auto& e = layout_->entry(id);
+  return tape.matrix(values_ + e.offset, grads_ ? grads_ + e.offset : nullptr, e.shape,
+                     packed_ ? packed_->find(id) : nullptr);
+}
+
+template class Params<float>;
+template class Params<double>;
 template class ParamStore<float>;
 template class ParamStore<double>;
 

@@ -19,7 +19,7 @@ struct Renderer::Lane {
   RaySampler sampler;
   RaySamples samples;
   Tape<float> tape;
-  std::vector<float> pixels, origins, directions, out, weights, positions, colours;
+  std::vector<float> pixels, origins, directions, out, weights, positions, seen_from, colours;
   std::vector<std::int32_t> sample_ray, kept;
 };
 
@@ -73,7 +73,14 @@ void Renderer::trace(const RayBatch& rays, Index lane_index, float* out, float* 
   for (std::int32_t i : lane.kept)
     lane.positions.insert(lane.positions.end(), &s.position[3 * static_cast<std::size_t>(i)],
                           &s.position[3 * static_cast<std::size_t>(i)] + 3);
-  if (recolour_) recolour_(lane.positions.data(), static_cast<Index>(lane.kept.size()), lane.colours.data());
+  if (recolour_) {
+    lane.seen_from.clear();
+    for (std::int32_t r : lane.sample_ray)
+      lane.seen_from.insert(lane.seen_from.end(), &rays.directions[3 * static_cast<std::size_t>(r)],
+                            &rays.directions[3 * static_cast<std::size_t>(r)] + 3);
+    recolour_(lane.positions.data(), lane.seen_from.data(), static_cast<Index>(lane.kept.size()),
+              lane.colours.data());
+  }
   accumulate(lane, rays.size(), out, position);
 }
 

@@ -28,7 +28,7 @@ void check(const RayBatch& rays, std::span<const float> jitter, const SamplingOp
 
 void RaySampler::sample(const Field<float>& field, const ParamStore<float>& params, const OccupancyGrid& grid,
                         const RayBatch& rays, std::span<const float> jitter, const SamplingOptions& options,
-                        RaySamples& out) {
+                        RaySamples& out, const PackedWeights<float>* packed) {
   check(rays, jitter, options);
   walks_.clear();
   alive_.clear();
@@ -44,7 +44,7 @@ void RaySampler::sample(const Field<float>& field, const ParamStore<float>& para
     const auto first_row = static_cast<Index>(t_.size());
     const std::size_t first_segment = segments_.size();
     march_wave(grid, rays);
-    evaluate(field, params, first_row);
+    evaluate(field, params, packed, first_row);
     stop_rays(options, first_segment);
   }
   pack(rays.size(), field.encoding().width(), out);
@@ -68,7 +68,8 @@ void RaySampler::march_wave(const OccupancyGrid& grid, const RayBatch& rays) {
   alive_.resize(kept);
 }
 
-void RaySampler::evaluate(const Field<float>& field, const ParamStore<float>& params, Index first) {
+void RaySampler::evaluate(const Field<float>& field, const ParamStore<float>& params,
+                          const PackedWeights<float>* packed, Index first) {
   const Index n = static_cast<Index>(t_.size()) - first, width = field.encoding().width();
   if (n == 0) return;
   density_features_.resize(at((first + n) * width));
@@ -78,7 +79,9 @@ void RaySampler::evaluate(const Field<float>& field, const ParamStore<float>& pa
   field.encoding().encode(params.values(field.encoding().table()), x_.data() + 3 * first, n, features,
                           colour_features_.data() + first * width);
   tape_.reset();
-  const Var<float> z = field.geometry(Params<float>(params, nullptr), tape_.constant(features, {n, width}));
+  const Params<float> weights =
+      packed ? Params<float>(params, nullptr, *packed) : Params<float>(params, nullptr);
+  const Var<float> z = field.geometry(weights, tape_.constant(features, {n, width}));
   std::copy_n(field.density(z).value(), n, sigma_.data() + first);
 }
 

@@ -51,6 +51,7 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
       pixel_rng_(options.seed, 1),
       background_rng_(options.seed, 2),
       occupancy_rng_(options.seed, 3),
+      packed_(field.params),
       loop_(kShards, field.field.network_size()),
       adam_(field.params.size(), {.lr = 1, .zero_grads = true}),
       samplers_(kShards),
@@ -115,14 +116,14 @@ double Trainer::run_chunk(Index index, Index shard, Tape<float>& tape, float* gr
   choose_rays(index * kRays, kRays, chunk);
   RaySamples& s = samples_of_shard_[at(shard)];
   samplers_[at(shard)].sample(field_.field, field_.params, field_.grid, {chunk.origins, chunk.directions},
-                              chunk.jitter, {.step = field_.step(), .stop = options_.stop}, s);
+                              chunk.jitter, {.step = field_.step(), .stop = options_.stop}, s, &packed_);
   const Index n = chunk.samples = s.size(), width = field_.field.encoding().width();
   chunk.position.assign(s.position.begin(), s.position.end());
   chunk.ddensity.assign(at(n * width), 0.f);
   chunk.dcolour.assign(at(n * width), 0.f);
 
   // The features were looked up by the sampler; as leaves they collect what the table is owed.
-  const Params<float> params(field_.params, grads);
+  const Params<float> params(field_.params, grads, packed_);
   const Var<float> density_features = tape.leaf(s.density_features.data(), chunk.ddensity.data(), {n, width});
   const Var<float> colour_features = tape.leaf(s.colour_features.data(), chunk.dcolour.data(), {n, width});
   const Var<float> of_ray = spherical_harmonics(tape.constant(chunk.directions.data(), {kRays, 3}));
@@ -162,6 +163,7 @@ void Trainer::backward_table() {
 
 void Trainer::step(double seconds) {
   schedule_.observe(steps_, seconds);
+  packed_.update();
   if (steps_ % kOccupancyPeriod == 0) refresh_occupancy();
   const Index chunks = rays_per_step_ / kRays;
   if (static_cast<Index>(chunks_.size()) < chunks) chunks_.resize(at(chunks));
@@ -204,7 +206,7 @@ void Trainer::refresh_occupancy() {
     float* features = tape.scratch(n * encoding.width());
     float* unused = tape.scratch(n * encoding.width());
     encoding.encode(field_.params.values(encoding.table()), x, n, features, unused);
-    const Var<float> z = field_.field.geometry(Params<float>(field_.params, nullptr),
+    const Var<float> z = field_.field.geometry(Params<float>(field_.params, nullptr, packed_),
                                                tape.constant(features, {n, encoding.width()}));
     std::copy_n(field_.field.density(z).value(), n, sigma);
   };

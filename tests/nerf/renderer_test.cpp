@@ -132,7 +132,7 @@ TEST_CASE("renderer: recolouring replaces colours and leaves opacity alone") {
   const Camera camera = test_camera();
   Renderer renderer(f);
   const Rendering plain = renderer.render(camera);
-  renderer.set_recolour([](const float*, Index n, float* rgb) {
+  renderer.set_recolour([](const float*, const float*, Index n, float* rgb) {
     for (Index i = 0; i < n; ++i) rgb[3 * i] = 0.25f, rgb[3 * i + 1] = 1, rgb[3 * i + 2] = 0;
   });
   const Rendering painted = renderer.render(camera);
@@ -159,7 +159,8 @@ TEST_CASE("renderer: the position of a ray is the mean of its samples by weight"
   renderer.trace({origins, directions}, 0, out.data(), position.data());
 
   // Colours that are positions: composited, they are the mean position times opacity.
-  renderer.set_recolour([](const float* x, Index n, float* rgb) { std::copy_n(x, 3 * n, rgb); });
+  renderer.set_recolour(
+      [](const float* x, const float*, Index n, float* rgb) { std::copy_n(x, 3 * n, rgb); });
   renderer.trace({origins, directions}, 0, out.data());
   for (std::size_t r = 0; r < 4; ++r)
     for (std::size_t a = 0; a < 3; ++a) {

@@ -30,8 +30,7 @@ Outcome outcome(const Owner& owner, const Embedder& e) {
   return {{owner.params.values().begin(), owner.params.values().end()}, {f.sign, f.index, f.bits, f.loss}};
 }
 
-Outcome run(Index steps) {
-  Owner owner = tiny_owner();
+Outcome run(Index steps, Owner owner = tiny_owner()) {
   Embedder embedder(owner, tiny_views(), options(steps));
   while (!embedder.done()) embedder.step(0);
   return outcome(owner, embedder);
@@ -60,14 +59,45 @@ TEST_CASE("embedder: in 300 steps the losses fall, places are told apart and bit
   CHECK(field == std::vector<float>(owner.field.params.values().begin(), owner.field.params.values().end()));
 }
 
+TEST_CASE("embedder: preset paper learns the colours of the field, then its content loss is small") {
+  Owner owner = tiny_paper_owner();
+  EmbedOptions o = options(150);
+  o.message_weight = 0;  // of 5 the message would be most of the loss
+  Embedder embedder(owner, tiny_views(), o);
+  embedder.step(0);
+  const double first = embedder.figures().loss;
+  while (!embedder.done()) {
+    embedder.step(0);
+    REQUIRE(std::isfinite(embedder.figures().loss));
+  }
+  CAPTURE(first, embedder.figures().loss);
+  CHECK(embedder.figures().loss < 0.3 * first);
+  embedder.calibrate();
+  CHECK(owner.gain == 0);
+}
+
+TEST_CASE("embedder: preset paper's message loss begins at that of guessing, five times") {
+  Owner owner = tiny_paper_owner();
+  EmbedOptions o = options(10);
+  o.content_weight = 0;
+  Embedder embedder(owner, tiny_views(), o);
+  embedder.step(0);
+  CHECK(embedder.figures().loss == Approx(5 * std::log(2.0)).epsilon(0.25));
+  CHECK(embed_options(Preset::paper).schedule.lr == 5e-4);
+  CHECK(embed_options(Preset::fast).schedule.lr == EmbedOptions{}.schedule.lr);
+}
+
 TEST_CASE("embedder: one and two threads give the same bits") {
   const int before = threads();
-  set_threads(1);
-  const Outcome one = run(4);
-  set_threads(2);
-  const Outcome two = run(4);
+  for (const bool paper : {false, true}) {
+    const auto owner = [&] { return paper ? tiny_paper_owner() : tiny_owner(); };
+    set_threads(1);
+    const Outcome one = run(4, owner());
+    set_threads(2);
+    const Outcome two = run(4, owner());
+    CHECK(one == two);
+  }
   set_threads(before);
-  CHECK(one == two);
 }
 
 TEST_CASE("embedder: a run that is saved and restored ends as an uninterrupted one") {

@@ -17,7 +17,7 @@ using namespace fieldmark::watermark;
 namespace {
 std::vector<float> marked(const Owner& owner, const std::vector<std::int8_t>& signs, const Tensor<float>& x,
                           std::vector<float> rgb) {
-  owner.marking(signs)(x.data.data(), x.shape[0], rgb.data());
+  owner.marking(signs)(x.data.data(), x.data.data(), x.shape[0], rgb.data());
   return rgb;
 }
 }  // namespace
@@ -31,7 +31,7 @@ TEST_CASE("owner: marking adds g s P to colours, which stay in their range") {
   owner.cells.blend(signs, x.data.data(), 200, s.data());
   Tape<float> tape;
   const auto p =
-      owner.mark.carrier(Params<float>(owner.params, nullptr), tape.constant(x), tape.constant(rgb));
+      owner.mark->carrier(Params<float>(owner.params, nullptr), tape.constant(x), tape.constant(rgb));
   double worst = 0, most = 0;
   for (Index i = 0; i < 600; ++i) {
     const float want =
@@ -85,6 +85,44 @@ TEST_CASE("owner: saved and loaded it is the same to the byte, and marks the sam
                    owner.field.params.values().begin()));
   CHECK(std::equal(again.field.grid.bits().begin(), again.field.grid.bits().end(),
                    owner.field.grid.bits().begin()));
+}
+
+TEST_CASE("owner: preset paper marks by its network of position, direction, colour and message") {
+  const TemporaryFolder folder;
+  const Owner owner = small_paper_owner();
+  CHECK_FALSE(owner.mark.has_value());
+  CHECK_FALSE(owner.reader.has_value());
+  CHECK(owner.code().carriers() == 3);
+  owner.save(folder / "a");
+  const Owner again = Owner::load(folder / "a");
+  CHECK(again.options().preset == Preset::paper);
+  again.save(folder / "b");
+  CHECK(read_bytes(folder / "a") == read_bytes(folder / "b"));
+  const Tensor<float> x = uniform<float>({50, 3}, 0, 1, 1), rgb = uniform<float>({50, 3}, 0, 1, 2);
+  const auto signs = cell_signs(owner.code(), Message{{0, 1, 1}});
+  const Tensor<float> message({1, 3}, std::vector<float>(signs.begin(), signs.end()));
+  Tape<float> tape;
+  const auto want = (*owner.global_mark)(Params<float>(owner.params, nullptr), tape.constant(x),
+                                         tape.constant(x), tape.constant(rgb), tape.constant(message));
+  CHECK(marked(again, signs, x, rgb.data) == std::vector<float>(want.value(), want.value() + 150));
+  CHECK(marked(again, cell_signs(owner.code(), Message{{1, 0, 0}}), x, rgb.data) !=
+        marked(again, signs, x, rgb.data));
+}
+
+TEST_CASE("owner: slots are one for each bit, of equal area, and presets have names") {
+  for (Index bits : {1, 8, 9, 16, 48, 256}) {
+    const CellGrid slots = message_slots(bits);
+    REQUIRE(slots.count() == bits);
+    for (double a : slots.area()) CHECK(a == Approx(1.0 / static_cast<double>(bits)));
+  }
+  CHECK_THROWS_WITH(message_slots(0), "[message_slots] bits must be at least 1, got 0");
+  for (Preset p : {Preset::fast, Preset::paper}) CHECK(parse_preset(preset_name(p)) == p);
+  CHECK_THROWS_AS(parse_preset("slow"), ValueError);
+  CHECK_THROWS_WITH(parse_preset("slow"), "[owner] preset must be fast or paper, got slow");
+  OwnerOptions o = small_owner_options();
+  o.preset = Preset::paper;
+  CHECK_THROWS_WITH(Owner(small_field(), o, test_key(1), message_slots(4)),
+                    "[owner] cells must be message_slots(bits) for preset paper: 3, got 4");
 }
 
 TEST_CASE("owner: files that are no owner's are refused with their path") {

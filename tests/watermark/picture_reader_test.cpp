@@ -44,7 +44,7 @@ TEST_CASE("picture_reader: evidence is the window's sign evidence, summed by loo
   const Tensor<float> cut = cut_window(picture, object_window(picture, 1), 32, 1);
   Tape<float> tape;
   const auto out =
-      owner.reader(Params<float>(owner.params, nullptr), tape.constant(cut.data.data(), {1, 32, 32, 3}));
+      (*owner.reader)(Params<float>(owner.params, nullptr), tape.constant(cut.data.data(), {1, 32, 32, 3}));
   std::vector<double> want(static_cast<std::size_t>(cells));
   for (Index p = 0; p < out.height * out.width; ++p) {
     const float* logit = out.index.value() + p * classes;
@@ -60,6 +60,15 @@ TEST_CASE("picture_reader: evidence is the window's sign evidence, summed by loo
     most = std::max(most, std::abs(got[c]));
   }
   CHECK(most > 1e-4);
+}
+
+TEST_CASE("picture_reader: for preset paper the evidence is the window's logits") {
+  const Owner owner = small_paper_owner();
+  const Tensor<float> picture = block(3), cut = cut_window(picture, object_window(picture, 1), 32, 1);
+  Tape<float> tape;
+  const auto logits = (*owner.pooled_reader)(Params<float>(owner.params, nullptr),
+                                             tape.constant(cut.data.data(), {1, 32, 32, 3}));
+  CHECK(PictureReader(owner).evidence(picture) == std::vector<double>(logits.value(), logits.value() + 3));
 }
 
 TEST_CASE("picture_reader: grey is repeated and alpha is laid over the field's background") {

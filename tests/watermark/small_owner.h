@@ -25,3 +25,13 @@ inline fieldmark::watermark::Owner small_owner(
   owner.gain = 0.05;
   return owner;
 }
+
+/// The same under preset paper, with small networks.
+inline fieldmark::watermark::Owner small_paper_owner() {
+  using namespace fieldmark::watermark;
+  OwnerOptions o = small_owner_options();
+  o.preset = Preset::paper;
+  o.width = 8;
+  o.channels = 4;
+  return {small_field(), o, test_key(1), message_slots(o.bits)};
+}

@@ -46,3 +46,12 @@ inline fieldmark::watermark::Owner tiny_owner(double strength = 30) {
           test_key(5),
           CellGrid(6, visible_area(tiny_views(), 6), 1e-3)};
 }
+
+/// The same under preset paper, with small networks.
+inline fieldmark::watermark::Owner tiny_paper_owner() {
+  using namespace fieldmark::watermark;
+  return {tiny_field(),
+          {.preset = Preset::paper, .bits = 4, .reader_size = 48, .width = 16, .channels = 8},
+          test_key(5),
+          message_slots(4)};
+}

@@ -28,8 +28,10 @@ struct Options {
   RunLength length{.seconds = watermark::EmbedOptions{}.schedule.seconds};
   Index views = watermark::EmbedOptions{}.views, measured_views = 200;
   std::vector<std::string> under;
-  bool resume = false;
+  bool resume = false, reader_size_given = false;
 };
+
+constexpr Index kPaperPatch = 150;  // pixels, Luo et al. 2023, section 4.1
 
 // A run that was begun without --key made one, and its checkpoint has it.
 watermark::Key key_of(const Options& options, const std::string& checkpoint) {
@@ -39,11 +41,11 @@ watermark::Key key_of(const Options& options, const std::string& checkpoint) {
 }
 
 std::vector<watermark::CachedView> cached_views(const Options& options, const nerf::RadianceField& field,
-                                                Context& context) {
+                                                Index reader_size, Context& context) {
   const InterruptGuard guard;
   Progress progress = context.progress("views");
   return watermark::cache_near_views(
-      field, options.owner.reader_size, options.views, context.seed(), [&](Index done, Index total) {
+      field, reader_size, options.views, context.seed(), [&](Index done, Index total) {
         if (guard.interrupted()) throw Interrupted("nothing was written");
         progress.update(static_cast<double>(done) / static_cast<double>(total));
         return true;
@@ -60,8 +62,12 @@ double embed(const Options& options, watermark::Embedder& embedder, const std::s
                        [&] {
                          const auto& f = embedder.figures();
                          char note[96];
-                         std::snprintf(note, sizeof note, "right: sign %.1f%%  cell %.1f%%  bits %.1f%%",
-                                       100 * f.sign, 100 * f.index, 100 * f.bits);
+                         if (options.preset == "paper")
+                           std::snprintf(note, sizeof note, "right: bits %.1f%%  loss %.4f", 100 * f.bits,
+                                         f.loss);
+                         else
+                           std::snprintf(note, sizeof note, "right: sign %.1f%%  cell %.1f%%  bits %.1f%%",
+                                         100 * f.sign, 100 * f.index, 100 * f.bits);
                          return std::string(note);
                        },
                    .save = [&] { embedder.save(checkpoint); },
@@ -91,12 +97,18 @@ int run(const Options& options, Context& context) {
   for (const auto& name : options.under) read_option("--under", [&] { return distort::parse_attack(name); });
   const auto field = nerf::RadianceField::load(options.field);
   const auto key = key_of(options, checkpoint);
-  const auto views = cached_views(options, field, context);
   auto owner_options = options.owner;
+  owner_options.preset = watermark::parse_preset(options.preset);
   owner_options.seed = context.seed();
-  watermark::CellGrid cells(owner_options.cells, watermark::visible_area(views, owner_options.cells));
+  const bool fast = owner_options.preset == watermark::Preset::fast;
+  if (!fast && !options.reader_size_given) owner_options.reader_size = kPaperPatch;
+  const auto views = cached_views(options, field, owner_options.reader_size, context);
+  auto cells =
+      fast ? watermark::CellGrid(owner_options.cells, watermark::visible_area(views, owner_options.cells))
+           : watermark::message_slots(owner_options.bits);
+  owner_options.cells = cells.side();
   watermark::Owner owner(field, owner_options, key, std::move(cells));
-  watermark::EmbedOptions embed_options;
+  auto embed_options = watermark::embed_options(owner_options.preset);
   embed_options.views = options.views;
   embed_options.seed = context.seed();
   embed_options.schedule.steps = options.length.steps;
@@ -142,8 +154,11 @@ Command add_embed(CLI::App& app) {
   app.add_option("--bits", o->owner.bits, "Length of a message, 1 to 256")
       ->check(CLI::Range(1, 256).description(""))
       ->type_name("N");
-  app.add_option("--preset", o->preset, "fast: local message with dense supervision, trains in minutes")
-      ->check(CLI::IsMember({"fast"}).description(""))
+  app.add_option("--preset", o->preset,
+                 "fast: local message with dense supervision, trains in minutes; paper: one message "
+                 "everywhere, pooled "
+                 "reading, --strength and --cells unused")
+      ->check(CLI::IsMember({"fast", "paper"}).description(""))
       ->type_name("NAME");
   app.add_option("--strength", o->owner.strength,
                  "PSNR of the mark on the object, dB, 20 to 60; higher is fainter")
@@ -152,10 +167,11 @@ Command add_embed(CLI::App& app) {
   app.add_option("--cells", o->owner.cells, "Cells an axis of the scene's cube, 2 to 64")
       ->check(CLI::Range(2, 64).description(""))
       ->type_name("N");
-  app.add_option("--reader-size", o->owner.reader_size,
-                 "Side of the square in which the extractor sees the object, pixels, 32 to 1024")
-      ->check(CLI::Range(32, 1024).description(""))
-      ->type_name("N");
+  auto* reader_size = app.add_option("--reader-size", o->owner.reader_size,
+                                     "Side of the square in which the extractor sees the object, pixels, 32 "
+                                     "to 1024 (200; paper: 150)")
+                          ->check(CLI::Range(32, 1024).description(""))
+                          ->type_name("N");
   app.add_option("--views", o->views, "Views to learn from, 8 to 10000")
       ->check(CLI::Range(8, 10000).description(""))
       ->type_name("N");
@@ -172,7 +188,10 @@ Command add_embed(CLI::App& app) {
       ->default_str("");
   app.add_flag("--resume", o->resume,
                "Go on from OWNER.checkpoint, with the options of the run that left it");
-  return [o](Context& context) { return run(*o, context); };
+  return [o, reader_size](Context& context) {
+    o->reader_size_given = reader_size->count() > 0;
+    return run(*o, context);
+  };
 }
 
 }  // namespace fieldmark::cli

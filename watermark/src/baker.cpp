@@ -26,8 +26,8 @@ Index colour_begin(const ParamStore<float>& params) {
 // table.
 struct Baker::Chunk {
   std::vector<float> origins, directions, jitter;
-  std::vector<float> position, weight, geometry_features, base_features, harmonics, target, features,
-      dfeatures, unused;
+  std::vector<float> position, direction, weight, geometry_features, base_features, harmonics, target,
+      features, dfeatures, unused;
   Index samples = 0;
 };
 
@@ -78,7 +78,8 @@ void Baker::select(const nerf::RaySamples& s, Chunk& c) const {
   nerf::sample_weights(s, field_.step(), weights.data());
   Tape<float> tape;
   const Var<float> of_ray = nerf::spherical_harmonics(tape.constant(c.directions.data(), {kRays, 3}));
-  for (auto* v : {&c.position, &c.weight, &c.geometry_features, &c.base_features, &c.harmonics}) v->clear();
+  for (auto* v : {&c.position, &c.direction, &c.weight, &c.geometry_features, &c.base_features, &c.harmonics})
+    v->clear();
   const auto append = [](std::vector<float>& to, const float* from, Index n) {
     to.insert(to.end(), from, from + n);
   };
@@ -86,6 +87,7 @@ void Baker::select(const nerf::RaySamples& s, Chunk& c) const {
     for (Index i = s.ray_begin[at(r)]; i < s.ray_begin[at(r + 1)]; ++i) {
       if (weights[at(i)] < kLeastWeight) continue;
       append(c.position, &s.position[at(3 * i)], 3);
+      append(c.direction, &c.directions[at(3 * r)], 3);
       append(c.weight, &weights[at(i)], 1);
       append(c.geometry_features, &s.density_features[at(i * width)], width);
       append(c.base_features, &s.colour_features[at(i * width)], width);
@@ -112,7 +114,7 @@ double Baker::run_chunk(Index index, Index shard, Tape<float>& tape, float* grad
   const Var<float> z = net.geometry(frozen, tape.constant(c.geometry_features.data(), {n, width}));
   const Var<float> base = net.colour(frozen, z, tape.constant(c.base_features.data(), {n, width}), harmonics);
   c.target.assign(base.value(), base.value() + 3 * n);
-  marking_(c.position.data(), n, c.target.data());
+  marking_(c.position.data(), c.direction.data(), n, c.target.data());
 
   net.encoding().encode(field_.params.values(net.encoding().table()), c.position.data(), n, c.unused.data(),
                         c.features.data());

@@ -1,3 +1,4 @@
+#include <fieldmark/watermark/global_mark.h>
 #include <fieldmark/watermark/gradcheck_cases.h>
 #include <fieldmark/watermark/mark_network.h>
 #include <fieldmark/watermark/power_budget.h>
@@ -18,23 +19,49 @@ Tensor<double> numbers(Shape shape, double phase) {
   return t;
 }
 
+// Every ReLU of a layer well open or well shut, in turns: differences must not step over its kink.
+void open_and_shut(ParamStore<double>& store, const std::string& layer, double open) {
+  const std::span<double> bias = store.values(store.find(layer + "/bias"));
+  for (std::size_t i = 0; i < bias.size(); ++i) bias[i] = i % 2 == 0 ? open : -2 * open;
+}
+
 GradcheckReport check_mark_network() {
   ParamStore<double> store;
   const MarkNetwork<double> net(store, "mark", {.bands = 2, .features = 4}, 3);
-  // Every ReLU well open or well shut, in turns: differences must not step over its kink. Small weights
-  // behind the first layer keep the last tanh where it bends.
-  const std::pair<const char*, double> layers[] = {
-      {"mark/encode/0", 20}, {"mark/encode/1", 4}, {"mark/fuse/0", 2}};
-  for (const auto& [name, open] : layers) {
-    const std::span<double> bias = store.values(store.find(std::string(name) + "/bias"));
-    for (std::size_t i = 0; i < bias.size(); ++i) bias[i] = i % 2 == 0 ? open : -2 * open;
-  }
-  for (const char* name : {"mark/encode/1/weight", "mark/fuse/0/weight"})
+  open_and_shut(store, "mark/encode/0", 20);
+  open_and_shut(store, "mark/encode/1", 4);
+  open_and_shut(store, "mark/fuse/0", 2);
+  for (const char* name : {"mark/encode/1/weight", "mark/fuse/0/weight"})  // the tanh stays where it bends
     for (double& w : store.values(store.find(name))) w *= 0.02;
   const std::vector<Tensor<double>> in{numbers({3, 3}, 1), numbers({3, 3}, 2)};
   return gradcheck_module(
       [&](Tape<double>&, const Params<double>& params, auto v) { return net.carrier(params, v[0], v[1]); },
       store, in);
+}
+
+GradcheckReport check_global_mark() {
+  ParamStore<double> store;
+  const GlobalMark<double> net(store, "mark",
+                               {.bits = 2,
+                                .message_features = 3,
+                                .colour_features = 3,
+                                .position_bands = 2,
+                                .direction_bands = 1,
+                                .width = 4},
+                               3);
+  // Layers with a ReLU get weights so small that no sum of theirs reaches the bias.
+  const std::pair<const char*, double> layers[] = {
+      {"encode/0", 0.05},  {"encode/1", 0.2}, {"encode/2", 0.15}, {"message/0", 0.2},
+      {"message/1", 0.15}, {"fuse/0", 0.06},  {"fuse/1", 0.15}};
+  for (const auto& [layer, weights] : layers) {
+    open_and_shut(store, std::string("mark/") + layer, 1);
+    for (double& w : store.values(store.find(std::string("mark/") + layer + "/weight"))) w *= weights;
+  }
+  const std::vector<Tensor<double>> in{numbers({2, 3}, 1), numbers({2, 3}, 2), numbers({2, 3}, 3),
+                                       numbers({1, 2}, 4)};
+  return gradcheck_module([&](Tape<double>&, const Params<double>& params,
+                              auto v) { return net(params, v[0], v[1], v[2], v[3]); },
+                          store, in);
 }
 
 GradcheckReport check_power_budget() {
@@ -56,7 +83,8 @@ GradcheckReport check_weighted_segments() {
 }  // namespace
 
 std::vector<GradcheckCase> gradcheck_cases() {
-  return {{"mark_network", check_mark_network},
+  return {{"global_mark", check_global_mark},
+          {"mark_network", check_mark_network},
           {"power_budget", check_power_budget},
           {"weighted_segments", check_weighted_segments}};
 }

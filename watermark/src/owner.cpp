@@ -20,7 +20,10 @@ OwnerOptions checked(const OwnerOptions& o) {
 }
 
 std::string configuration(const OwnerOptions& o, double gain, const nerf::RadianceField& field) {
-  return Json{{"bits", o.bits},
+  return Json{{"preset", preset_name(o.preset)},
+              {"width", o.width},
+              {"channels", o.channels},
+              {"bits", o.bits},
               {"strength", o.strength},
               {"cells", o.cells},
               {"reader_size", o.reader_size},
@@ -37,6 +40,10 @@ std::string configuration(const OwnerOptions& o, double gain, const nerf::Radian
 
 OwnerOptions parse_options(const Json& j) {
   OwnerOptions o;
+  // Owners of before there were presets have none of the three.
+  o.preset = parse_preset(j.value("preset", preset_name(o.preset)));
+  o.width = j.value("width", o.width);
+  o.channels = j.value("channels", o.channels);
   o.bits = j.at("bits");
   o.strength = j.at("strength");
   o.cells = j.at("cells");
@@ -52,24 +59,68 @@ OwnerOptions parse_options(const Json& j) {
 
 }  // namespace
 
+const char* preset_name(Preset preset) { return preset == Preset::paper ? "paper" : "fast"; }
+
+Preset parse_preset(std::string_view name) {
+  for (Preset p : {Preset::fast, Preset::paper})
+    if (name == preset_name(p)) return p;
+  throw ValueError("[owner] preset must be fast or paper, got " + std::string(name));
+}
+
+CellGrid message_slots(Index bits) {
+  if (bits < 1) throw ValueError("[message_slots] bits must be at least 1, got " + std::to_string(bits));
+  Index side = 2;
+  while (side * side * side < bits) ++side;
+  std::vector<double> area(static_cast<std::size_t>(side * side * side));
+  std::fill_n(area.begin(), bits, 1.0);
+  return CellGrid(side, area);
+}
+
 Owner::Owner(nerf::RadianceField base, const OwnerOptions& options, const Key& owner_key, CellGrid grid)
-    : field(std::move(base)),
-      key(owner_key),
-      cells(std::move(grid)),
-      mark(params, "mark", checked(options).mark, options.seed + 100),
-      reader(params, "extractor", {.classes = cells.count() + 1, .base = options.base_channels},
-             options.seed + 200),
-      options_(options) {}
+    : field(std::move(base)), key(owner_key), cells(std::move(grid)), options_(checked(options)) {
+  options_.cells = cells.side();
+  if (options.preset == Preset::fast) {
+    mark.emplace(params, "mark", options.mark, options.seed + 100);
+    reader.emplace(
+        params, "extractor",
+        extractor::DenseExtractorOptions{.classes = cells.count() + 1, .base = options.base_channels},
+        options.seed + 200);
+    return;
+  }
+  if (cells.count() != options.bits)
+    throw ValueError("[owner] cells must be message_slots(bits) for preset paper: " +
+                     std::to_string(options.bits) + ", got " + std::to_string(cells.count()));
+  global_mark.emplace(params, "mark",
+                      GlobalMarkOptions{.bits = options.bits,
+                                        .message_features = options.width,
+                                        .colour_features = options.width,
+                                        .width = options.width},
+                      options.seed + 100);
+  pooled_reader.emplace(
+      params, "extractor",
+      extractor::PooledExtractorOptions{.n_bits = options.bits, .channels = options.channels},
+      options.seed + 200);
+}
 
 CellCode Owner::code(const Key& other) const { return deal_cells(other, cells.area(), options_.bits); }
 
 nerf::Renderer::Recolour Owner::marking(std::vector<std::int8_t> signs) const {
-  return [this, signs = std::move(signs)](const float* x, Index n, float* rgb) {
+  if (global_mark) {
+    std::vector<float> message(signs.begin(), signs.end());
+    return [this, message = std::move(message)](const float* x, const float* d, Index n, float* rgb) {
+      Tape<float> tape;
+      const Var<float> colour = (*global_mark)(
+          Params<float>(params, nullptr), tape.constant(x, {n, 3}), tape.constant(d, {n, 3}),
+          tape.constant(rgb, {n, 3}), tape.constant(message.data(), {1, static_cast<Index>(message.size())}));
+      std::copy_n(colour.value(), 3 * n, rgb);
+    };
+  }
+  return [this, signs = std::move(signs)](const float* x, const float*, Index n, float* rgb) {
     Tape<float> tape;
     std::vector<float> s(static_cast<std::size_t>(n));
     cells.blend(signs, x, n, s.data());
     const Var<float> carrier =
-        mark.carrier(Params<float>(params, nullptr), tape.constant(x, {n, 3}), tape.constant(rgb, {n, 3}));
+        mark->carrier(Params<float>(params, nullptr), tape.constant(x, {n, 3}), tape.constant(rgb, {n, 3}));
     for (Index i = 0; i < 3 * n; ++i)
       rgb[i] = std::clamp(
           rgb[i] + static_cast<float>(gain) * s[static_cast<std::size_t>(i / 3)] * carrier.value()[i], 0.f,

@@ -33,8 +33,13 @@ std::vector<double> PictureReader::evidence(const Tensor<float>& picture) const 
   const Index size = owner_.options().reader_size;
   const Tensor<float> image = cut_window(whole, object_window(whole, background), size, background);
   Tape<float> tape;
-  const auto out = owner_.reader(Params<float>(owner_.params, nullptr),
-                                 tape.constant(image.data.data(), {1, size, size, 3}));
+  const Params<float> params(owner_.params, nullptr);
+  const Var<float> input = tape.constant(image.data.data(), {1, size, size, 3});
+  if (owner_.pooled_reader) {
+    const Var<float> logits = (*owner_.pooled_reader)(params, input);
+    return {logits.value(), logits.value() + logits.shape().size()};
+  }
+  const auto out = (*owner_.reader)(params, input);
   std::vector<double> evidence(static_cast<std::size_t>(owner_.cells.count()));
   extractor::cell_evidence(out.sign.value(), out.index.value(), out.height * out.width, owner_.cells.count(),
                            evidence.data());

@@ -158,9 +158,55 @@ void gemm(const Gemm<T>& g) {
   }
 }
 
+// One panel of V vectors; two sums each hide the latency of an addition.
+template <class T, int V>
+void panel_sums(const T* panel, std::int64_t rows, T* out) {
+  constexpr int L = kLanes<T>;
+  Vec<T> even[V] = {}, odd[V] = {};
+  std::int64_t i = 0;
+  for (; i + 2 <= rows; i += 2, panel += 2 * V * L)
+    for (int v = 0; v < V; ++v) {
+      even[v] += simd::load(panel + v * L);
+      odd[v] += simd::load(panel + (V + v) * L);
+    }
+  if (i < rows)
+    for (int v = 0; v < V; ++v) even[v] += simd::load(panel + v * L);
+  for (int v = 0; v < V; ++v) simd::store(out + v * L, even[v] + odd[v]);
+}
+
+template <class T>
+void sums_of_panel(const T* panel, std::int64_t rows, std::int64_t vectors, T* out) {
+  switch (vectors) {
+    case 1:
+      return panel_sums<T, 1>(panel, rows, out);
+    case 2:
+      return panel_sums<T, 2>(panel, rows, out);
+    case 3:
+      return panel_sums < T, kVectors == 4 ? 3 : 1 > (panel, rows, out);
+    default:
+      return panel_sums<T, kVectors>(panel, rows, out);
+  }
+}
+
+template <class T>
+void column_sums(const T* panels, std::int64_t rows, std::int64_t columns, T* sums) {
+  constexpr std::int64_t kRows = 512;  // summed in T; blocks of them in double, so that long sums stay exact
+  const std::int64_t width = gemm_panel<T>(columns);
+  T block[kPanel<T>];
+  for (std::int64_t j = 0; j < columns; j += width, panels += rows * width) {
+    double total[kPanel<T>] = {};
+    for (std::int64_t i = 0; i < rows; i += kRows) {
+      sums_of_panel(panels + i * width, rows - i < kRows ? rows - i : kRows, width / kLanes<T>, block);
+      for (std::int64_t x = 0; x < width; ++x) total[x] += static_cast<double>(block[x]);
+    }
+    for (std::int64_t x = 0; x < width && j + x < columns; ++x) sums[j + x] += static_cast<T>(total[x]);
+  }
+}
+
 #define FIELDMARK_INSTANTIATE(T)                                                                             \
   template std::int64_t gemm_panel<T>(std::int64_t);                                                         \
   template void pack_panels(const T*, std::int64_t, std::int64_t, std::int64_t, std::int64_t, const T*, T*); \
+  template void column_sums(const T*, std::int64_t, std::int64_t, T*);                                       \
   template void gemm(const Gemm<T>&);
 FIELDMARK_INSTANTIATE(float)
 FIELDMARK_INSTANTIATE(double)

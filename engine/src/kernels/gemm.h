@@ -22,18 +22,22 @@ struct Gemm {
   bool accumulate = false, relu = false;
 };
 
-/// Width of the panels of a matrix of so many columns on this instruction set: a few vectors, and no more than the
-/// columns fill.
+/// Width of the panels of a matrix of so many columns on this instruction set: a few vectors, and no more
+/// than the columns fill.
 FIELDMARK_DECLARE_KERNEL(template <class T> std::int64_t, gemm_panel, (std::int64_t columns))
 
 /// Packs B [rows, columns], read at b[i row + j column], into panels of gemm_panel(columns)
-/// columns: panel after panel, each row-major and contiguous, the last filled up with zeros. Without it the rows of one panel
-/// fall into few sets of the cache. Where `mask` (laid out as b) is given, entries at which it is not
-/// positive become 0: the backward of a ReLU.
+/// columns: panel after panel, each row-major and contiguous, the last filled up with zeros. Without it the
+/// rows of one panel fall into few sets of the cache. Where `mask` (laid out as b) is given, entries at which
+/// it is not positive become 0: the backward of a ReLU.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, pack_panels,
                          (const T* b, std::int64_t rows, std::int64_t columns, std::int64_t row,
                           std::int64_t column, const T* mask, T* out))
 
 FIELDMARK_DECLARE_KERNEL(template <class T> void, gemm, (const Gemm<T>& g))
+
+/// Adds to sums [columns] the sums of the columns of a matrix [rows, columns] that pack_panels() laid out.
+FIELDMARK_DECLARE_KERNEL(template <class T> void, column_sums,
+                         (const T* panels, std::int64_t rows, std::int64_t columns, T* sums))
 
 }  // namespace fieldmark::kernels

@@ -34,24 +34,23 @@ void backward(Var<T> x, Var<T> w, Var<T> b, const T* y, const T* dy, Index n, bo
   if (T* db = b.grad_acc()) detail::add_column_sums(d, n, out, db);
   bool fresh = false;
   if (T* dx = x.grad_acc(&fresh)) {
-    // W^T, with rows of zeros for the columns that fill up the last of several panels.
-    const Index depth = panels > 1 ? panel : out;
-    T* wt = tape.scratch(panels * depth * in);
-    std::fill_n(wt + out * in, (panels * depth - out) * in, T(0));
-    for (Index i = 0; i < in; ++i)
-      for (Index j = 0; j < out; ++j) wt[j * in + i] = w.value()[i * out + j];
-    detail::product<T>(
-        {.m = n,
-         .n = in,
-         .k = depth,
-         .segments = panels,
-         .a = d,
-         .a_row = panel,
-         .a_segment = n * panel,
-         .b = detail::packed(tape, static_cast<const T*>(wt), panels * depth, in, in, Index{1}),
-         .c = dx,
-         .ldc = in,
-         .accumulate = !fresh});
+    const T* transposed = w.packed() ? w.packed()->transposed : nullptr;
+    if (!transposed) {
+      T* to = tape.scratch(detail::transposed_size<T>(in, out));
+      detail::pack_transposed(w.value(), in, out, to);
+      transposed = to;
+    }
+    detail::product<T>({.m = n,
+                        .n = in,
+                        .k = detail::transposed_rows<T>(out) / panels,
+                        .segments = panels,
+                        .a = d,
+                        .a_row = panel,
+                        .a_segment = n * panel,
+                        .b = transposed,
+                        .c = dx,
+                        .ldc = in,
+                        .accumulate = !fresh});
   }
 }
 
@@ -69,16 +68,17 @@ Var<T> dense(Var<T> x, Var<T> w, Var<T> b, Activation activation) {
   Tape<T>& tape = x.tape();
   T* y = nullptr;
   const Var<T> result = tape.output({n, out}, &y, {x, w, b});
-  detail::product<T>({.m = n,
-                      .n = out,
-                      .k = in,
-                      .a = x.value(),
-                      .a_row = in,
-                      .b = detail::packed(tape, w.value(), in, out, out, Index{1}),
-                      .c = y,
-                      .ldc = out,
-                      .bias = b.value(),
-                      .relu = relu});
+  detail::product<T>(
+      {.m = n,
+       .n = out,
+       .k = in,
+       .a = x.value(),
+       .a_row = in,
+       .b = w.packed() ? w.packed()->forward : detail::packed(tape, w.value(), in, out, out, Index{1}),
+       .c = y,
+       .ldc = out,
+       .bias = b.value(),
+       .relu = relu});
 
   // dZ = dY where y > 0 (all of it without a ReLU); dX = dZ W^T, dW = X^T dZ, db = column sums of dZ.
   tape.on_backward(result, [=](const T* dy) { backward(x, w, b, y, dy, n, relu); });

@@ -18,14 +18,49 @@ Index panel_width(Index columns) {
   return FIELDMARK_KERNEL(gemm_panel<T>)(columns);
 }
 
+/// Numbers in the panels of a matrix [rows, columns].
+template <class T>
+Index panels_size(Index rows, Index columns) {
+  return rows * round_up(columns, panel_width<T>(columns));
+}
+
+template <class T>
+void pack(const T* b, Index rows, Index columns, Index row, Index column, const T* mask, T* out) {
+  using namespace kernels;
+  FIELDMARK_KERNEL(pack_panels<T>)(b, rows, columns, row, column, mask, out);
+}
+
 /// B [rows, columns] at b[i row + j column] in panels; room comes from the tape.
 template <class T>
 T* packed(Tape<T>& tape, const T* b, Index rows, Index columns, Index row, Index column,
           const T* mask = nullptr) {
-  using namespace kernels;
-  T* out = tape.scratch(rows * round_up(columns, panel_width<T>(columns)));
-  FIELDMARK_KERNEL(pack_panels<T>)(b, rows, columns, row, column, mask, out);
+  T* out = tape.scratch(panels_size<T>(rows, columns));
+  pack(b, rows, columns, row, column, mask, out);
   return out;
+}
+
+/// Rows of W^T, W [in, out], with which dX = dY W^T reads dY in panels: those of a last panel that `out` does
+/// not fill are zeros, unless it is the only one.
+template <class T>
+Index transposed_rows(Index out) {
+  const Index panel = panel_width<T>(out);
+  return out > panel ? round_up(out, panel) : out;
+}
+template <class T>
+Index transposed_size(Index in, Index out) {
+  return panels_size<T>(transposed_rows<T>(out), in);
+}
+/// W^T [transposed_rows(out), in] in panels.
+template <class T>
+void pack_transposed(const T* w, Index in, Index out, T* to) {
+  const Index rows = transposed_rows<T>(out), panel = panel_width<T>(in);
+  pack(w, out, in, Index{1}, out, static_cast<const T*>(nullptr), to);
+  if (rows == out) return;
+  // Panels of `out` rows become panels of `rows`, from the last on: none is written before it was moved.
+  for (Index p = round_up(in, panel) / panel - 1; p >= 0; --p) {
+    std::copy_backward(to + p * out * panel, to + (p + 1) * out * panel, to + (p * rows + out) * panel);
+    std::fill_n(to + (p * rows + out) * panel, (rows - out) * panel, T(0));
+  }
 }
 
 /// Runs a product in pieces of rows; a row of C has one owner.
@@ -64,12 +99,8 @@ void sharded_sum(Tape<T>& tape, Index items, Index grain, T* into, Index size, F
 /// into [columns] += the sums of the columns of d, which packed() laid out from [rows, columns].
 template <class T>
 void add_column_sums(const T* d, Index rows, Index columns, T* into) {
-  const Index panel = panel_width<T>(columns);
-  for (Index j = 0; j < columns; j += panel, d += rows * panel) {
-    const Index width = std::min(panel, columns - j);
-    for (Index i = 0; i < rows; ++i)
-      for (Index x = 0; x < width; ++x) into[j + x] += d[i * panel + x];
-  }
+  using namespace kernels;
+  FIELDMARK_KERNEL(column_sums<T>)(d, rows, columns, into);
 }
 
 }  // namespace fieldmark::detail

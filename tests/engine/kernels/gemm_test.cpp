@@ -87,6 +87,38 @@ TEST_CASE("gemm: packing masks where a ReLU was shut and fills the last panel wi
   });
 }
 
+TEST_CASE("gemm: column sums are added to what is there, of every extent, and long ones stay exact") {
+  each_isa([] {
+    using namespace kernels;
+    const auto worst = [](Index rows, Index columns) {
+      const auto b = uniform<float>({rows, columns}, -1, 1, 5);
+      const Index panel = FIELDMARK_KERNEL(gemm_panel<float>)(columns),
+                  padded = (columns + panel - 1) / panel * panel;
+      std::vector<float> packed(static_cast<std::size_t>(rows * padded)),
+          sums(static_cast<std::size_t>(columns), 3.f);
+      FIELDMARK_KERNEL(pack_panels<float>)(b.data.data(), rows, columns, columns, 1, nullptr, packed.data());
+      FIELDMARK_KERNEL(column_sums<float>)(packed.data(), rows, columns, sums.data());
+      double error = 0;
+      for (Index j = 0; j < columns; ++j) {
+        double want = 3, size = 3;
+        for (Index i = 0; i < rows; ++i) {
+          want += static_cast<double>(b[i * columns + j]);
+          size += std::abs(static_cast<double>(b[i * columns + j]));
+        }
+        error =
+            std::max(error, std::abs(static_cast<double>(sums[static_cast<std::size_t>(j)]) - want) / size);
+      }
+      return error;
+    };
+    for (Index e = 1; e <= 130; ++e) {
+      CAPTURE(e);
+      CHECK(worst(e, 3) < 2e-7);
+      CHECK(worst(5, e) < 2e-7);
+    }
+    CHECK(worst(300000, 17) < 2e-7);
+  });
+}
+
 TEST_CASE("gemm: what is not a number stays so through the ReLU") {
   each_isa([] {
     using namespace kernels;

@@ -39,7 +39,10 @@ MarchRay ray_through(const double* from, const double* to, float step, float jit
   double d[3], norm = 0;
   for (int a = 0; a < 3; ++a) d[a] = to[a] - from[a], norm += d[a] * d[a];
   norm = std::sqrt(norm);
-  MarchRay r{.near = 0, .far = static_cast<float>(norm), .step = step, .jitter = jitter, .k = 0};
+  MarchRay r{};
+  r.far = static_cast<float>(norm);
+  r.step = step;
+  r.jitter = jitter;
   for (int a = 0; a < 3; ++a) {
     r.o[a] = static_cast<float>(from[a]);
     r.d[a] = static_cast<float>(d[a] / norm);

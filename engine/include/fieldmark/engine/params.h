@@ -48,6 +48,9 @@ class ParamStore {
   AlignedVector<T> values_, grads_;
 };
 
+template <class T>
+class PackedWeights;
+
 /// Where a pass reads parameters and where it adds their gradients: the store itself, a shard's private
 /// buffer, or nowhere (inference). Cheap to copy; the store must outlive it.
 template <class T>
@@ -57,20 +60,21 @@ class Params {
   explicit Params(ParamStore<T>& store) : Params(store, store.values().data(), store.grads().data()) {}
   /// Reads the store; gradients, laid out as the store's, go to `grads`, or are not computed if it is null.
   Params(const ParamStore<T>& store, T* grads) : Params(store, store.values().data(), grads) {}
+  /// The same with the store's matrices packed: `packed` holds its present values and outlives the pass.
+  Params(const ParamStore<T>& store, T* grads, const PackedWeights<T>& packed) : Params(store, grads) {
+    packed_ = &packed;
+  }
   /// Reads `values` laid out as the store's: how gradcheck treats a module's parameters as an input.
   Params(const ParamStore<T>& layout, const T* values, T* grads)
       : layout_(&layout), values_(values), grads_(grads) {}
 
-  Var<T> leaf(Tape<T>& tape, ParamId id) const {
-    const auto& e = layout_->entry(id);
-    return grads_ ? tape.leaf(values_ + e.offset, grads_ + e.offset, e.shape)
-                  : tape.constant(values_ + e.offset, e.shape);
-  }
+  Var<T> leaf(Tape<T>& tape, ParamId id) const;
 
  private:
   const ParamStore<T>* layout_;
   const T* values_;
   T* grads_;
+  const PackedWeights<T>* packed_ = nullptr;
 };
 
 }  // namespace fieldmark

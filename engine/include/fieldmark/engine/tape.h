@@ -15,6 +15,13 @@ namespace fieldmark {
 template <class T>
 class Tape;
 
+/// A matrix W [in, out] as products read it: W in panels of columns, and W^T. See PackedWeights.
+template <class T>
+struct PackedMatrix {
+  const T* forward = nullptr;
+  const T* transposed = nullptr;
+};
+
 /// Handle to a value on a tape: two pointers, trivially copyable, valid until Tape::reset().
 template <class T>
 class Var {
@@ -24,6 +31,8 @@ class Var {
   const T* value() const { return slot_->value; }
   Tape<T>& tape() const { return *tape_; }
   bool needs_grad() const { return slot_->needs_grad; }
+  /// The same matrix packed, where the loop that uses it has done so; else null.
+  const PackedMatrix<T>* packed() const { return slot_->packed; }
   /// dL/d(this) as written so far; nullptr where no gradient has arrived.
   const T* grad() const { return slot_->grad; }
   /// Where a backward adds its share; nullptr if this input needs none.
@@ -41,6 +50,7 @@ class Var {
     T* grad;
     Shape shape;
     bool needs_grad;
+    const PackedMatrix<T>* packed;
   };
   Var(Tape<T>* t, Slot* s) : tape_(t), slot_(s) {}
   Tape<T>* tape_;
@@ -63,6 +73,10 @@ class Tape {
   /// A parameter or another input to differentiate in: the gradient is added to what `grad` already holds.
   Var<T> leaf(const T* value, T* grad, Shape shape) { return make(value, grad, shape, true); }
   Var<T> leaf(const Tensor<T>& t, Tensor<T>& grad) { return leaf(t.data.data(), grad.data.data(), t.shape); }
+  /// A matrix, with its packed form beside it. @param grad  null: a constant
+  Var<T> matrix(const T* value, T* grad, Shape shape, const PackedMatrix<T>* packed) {
+    return make(value, grad, shape, grad != nullptr, packed);
+  }
   /// Output of an op; *data points at the uninitialised values for the op to fill.
   Var<T> output(Shape shape, T** data, std::initializer_list<Var<T>> inputs) {
     *data = scratch(shape.size());
@@ -129,9 +143,9 @@ class Tape {
     void* closure;
     void (*run)(void*, const T*);
   };
-  Var<T> make(const T* value, T* grad, Shape shape, bool needs) {
+  Var<T> make(const T* value, T* grad, Shape shape, bool needs, const PackedMatrix<T>* packed = nullptr) {
     using Slot = typename Var<T>::Slot;
-    return Var<T>(this, new (arena_.allocate(sizeof(Slot))) Slot{value, grad, shape, needs});
+    return Var<T>(this, new (arena_.allocate(sizeof(Slot))) Slot{value, grad, shape, needs, packed});
   }
   Arena arena_;
   std::vector<Node> nodes_;

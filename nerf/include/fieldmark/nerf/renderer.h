@@ -26,9 +26,10 @@ class Renderer {
   ~Renderer();
   /// One ray through the centre of every pixel, samples in the middle of their intervals.
   Rendering render(const Camera& camera);
-  /// Replaces colours before they are composited: receives positions x [n, 3] in the unit cube and colours
-  /// rgb [n, 3]. Called from several threads at once. An empty function draws the field as it is.
-  using Recolour = std::function<void(const float* x, Index n, float* rgb)>;
+  /// Replaces colours before they are composited: receives positions x [n, 3] in the unit cube, the unit
+  /// directions d [n, 3] they are seen from, and colours rgb [n, 3]. Called from several threads at once. An
+  /// empty function draws the field as it is.
+  using Recolour = std::function<void(const float* x, const float* d, Index n, float* rgb)>;
   void set_recolour(Recolour recolour) { recolour_ = std::move(recolour); }
   /// Colour and opacity of given rays, background not added.
   /// @param rays  in cube coordinates   @param lane  0 to kLanes - 1: calls with different lanes may run at

@@ -1,4 +1,5 @@
 #pragma once
+#include <fieldmark/engine/packed_weights.h>
 #include <fieldmark/nerf/field.h>
 #include <fieldmark/nerf/marching.h>
 
@@ -34,18 +35,20 @@ struct RaySamples {
 /// after the first calls nothing is allocated. One object per thread.
 class RaySampler {
  public:
+  /// @param packed  the matrices of params as they are now, or null: packed in every wave
   /// @param jitter  [R] offsets of the sample positions in [0, 1), or empty for 1/2 everywhere
   /// @throws ValueError if the step is not positive   @throws ShapeError if sizes do not fit
   void sample(const Field<float>& field, const ParamStore<float>& params, const OccupancyGrid& grid,
               const RayBatch& rays, std::span<const float> jitter, const SamplingOptions& options,
-              RaySamples& out);
+              RaySamples& out, const PackedWeights<float>* packed = nullptr);
 
  private:
   struct Segment {
     Index ray, row, count;
   };
   void march_wave(const OccupancyGrid& grid, const RayBatch& rays);
-  void evaluate(const Field<float>& field, const ParamStore<float>& params, Index first);
+  void evaluate(const Field<float>& field, const ParamStore<float>& params,
+                const PackedWeights<float>* packed, Index first);
   void stop_rays(const SamplingOptions& options, std::size_t first_segment);
   void pack(Index rays, Index width, RaySamples& out);
 

@@ -61,6 +61,7 @@ class Trainer {
   TrainOptions options_;
   Schedule schedule_;
   CounterRng pixel_rng_, background_rng_, occupancy_rng_;
+  PackedWeights<float> packed_;
   ShardedLoop<float> loop_;
   Adam<float> adam_;
   std::vector<std::uint32_t> pixels_;  // worth a ray; empty: all are

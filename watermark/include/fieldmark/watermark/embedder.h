@@ -32,9 +32,15 @@ struct EmbedOptions {
   double smooth_weight = 0.4;  ///< of the share of the residual's power left after averaging 8 x 8 pixels
   double flat_weight =
       0.4;  ///< of the residual's power where the base picture is flat, relative to all of it
+  double content_weight = 1;  ///< preset paper: gamma_1, of the content loss ...
+  double message_weight = 5;  ///< ... and gamma_2, of the message loss
   EmbedDistortions distortions = {};
   std::uint64_t seed = 0;
 };
+
+/// The options of a preset: the defaults for fast; for paper a step size of 5e-4 and its distortions at most
+/// (noise 0.1, 30 degrees, scale 0.75, blur 0.1).   Source: Luo et al. 2023, section 4.1.
+EmbedOptions embed_options(Preset preset);
 
 /// Trains mark and extractor together on a frozen field (Luo et al. 2023, sec. 3.3 and 3.4, with dense local
 /// supervision):
@@ -42,10 +48,12 @@ struct EmbedOptions {
 ///     + u (0.4 |mean of 8 x 8 pixels of r|^2 / |r|^2 + 0.4 |r on flat areas|^2 / |r|^2)
 /// with the residual r under a budget of power that takes the place of the content loss: the budget says how
 /// much is changed, the last two terms keep it where eyes do not look, in fine detail and on texture. u rises
-/// from 0 to 1 while the share of right signs goes from 0.8 to 0.95: a mark must be readable before it can
-/// hide (with u = 1 from the first step on, signs stayed at 50% for 500 steps). Each picture draws a message,
-/// a view, distortions. Same seed and number of steps: same bytes, for any thread count and across save() and
-/// restore().
+/// from 0 to 1 while the share of right signs goes from 0.7 to 0.8: a mark must be readable before it can
+/// hide (with u = 1 from the first step on, signs stayed at 50% for 500 steps). An owner of preset paper has
+/// the paper's loss in its place:
+///   L = gamma_1 mean |P~ - P^|^2 + gamma_2 BCE(pooled bits, M)
+/// without the perceptual term. Each picture draws a message, a view, distortions. Same seed and number of
+/// steps: same bytes, for any thread count and across save() and restore().
 class Embedder {
  public:
   /// Owner and views must outlive the embedder. @throws ValueError if an option is out of range
@@ -55,13 +63,13 @@ class Embedder {
   Index steps() const { return steps_; }
   Index planned() const { return schedule_.total(); }
   /// Running means over the last pictures: share of places on the object whose sign is right, whose index is
-  /// right, and of bits right, all under training distortions.
+  /// right (both 0 for preset paper), and of bits right, all under training distortions.
   struct Figures {
     double sign = 0, index = 0, bits = 0, loss = 0;
   };
   const Figures& figures() const { return figures_; }
   /// Sets the owner's gain so that the mean PSNR on the object over `views` new near views is the owner's
-  /// strength.
+  /// strength; nothing for preset paper, which has no gain.
   void calibrate(Index views = 16);
 
   /// @throws IoError
@@ -73,10 +81,16 @@ class Embedder {
 
  private:
   struct Picture;
+  void label_views();
   Picture draw(Index image) const;
+  float* shifted_positions(Tape<float>& tape, const Picture& p) const;
   Var<float> residual(Tape<float>& tape, const Params<float>& params, const Picture& p) const;
   Var<float> visibility(Var<float> residual, const Picture& p) const;
   Var<float> distort(Tape<float>& tape, Var<float> image, const Picture& p) const;
+  Var<float> fused_picture(Tape<float>& tape, const Params<float>& params, const Picture& p,
+                           Var<float> message) const;
+  double run_dense(const Picture& p, Tape<float>& tape, const Params<float>& params, Figures& figures) const;
+  double run_pooled(const Picture& p, Tape<float>& tape, const Params<float>& params, Figures& figures) const;
   double run_picture(Index image, Tape<float>& tape, float* grads, Figures& figures) const;
   std::string fingerprint() const;
 

@@ -1,35 +1,58 @@
 #pragma once
 #include <fieldmark/extractor/dense_extractor.h>
+#include <fieldmark/extractor/pooled_extractor.h>
 #include <fieldmark/nerf/renderer.h>
 #include <fieldmark/watermark/cell_code.h>
 #include <fieldmark/watermark/cell_grid.h>
+#include <fieldmark/watermark/global_mark.h>
 #include <fieldmark/watermark/mark_network.h>
+
+#include <optional>
+#include <string_view>
 
 namespace fieldmark::watermark {
 
+/// How a mark is made and read.
+enum class Preset {
+  fast,  ///< every cell of the scene carries a bit (MarkNetwork, DenseExtractor): trains in minutes
+  paper  ///< one message fused into every colour, one pooled reading (GlobalMark, PooledExtractor)
+};
+const char* preset_name(Preset preset);
+/// @throws ValueError if the name is neither "fast" nor "paper"
+Preset parse_preset(std::string_view name);
+
 struct OwnerOptions {
+  Preset preset = Preset::fast;
   Index bits = 16;  ///< length of a message, 1 to 256
   double strength =
       36.5;          ///< PSNR of marked against unmarked on the object, dB, mean over near views, 20 to 60
   Index cells = 16;  ///< per axis of the field's cube, see CellGrid
   Index reader_size = 200;  ///< side of the square in which the extractor sees the object, pixels, >= 32
-  MarkNetworkOptions mark;
+  MarkNetworkOptions mark{};
   Index base_channels = 32;  ///< of the extractor, see DenseExtractorOptions
+  Index width = 256;         ///< preset paper: units of D, E and G, and N_m and N_c, see GlobalMarkOptions
+  Index channels = 64;       ///< preset paper: of the extractor, see PooledExtractorOptions
   std::uint64_t seed = 0;
 };
+
+/// For preset paper: slots without a place take the part of cells, one for each bit and all of the same area,
+/// so that order and signs of the bits are the key's there too.   @param bits  at least 1
+CellGrid message_slots(Index bits);
 
 /// Everything the owner keeps secret: the unmarked field, the mark's networks, the extractor, the cells and
 /// the key.
 class Owner {
  public:
+  /// @param cells  those of the scene, or message_slots() for preset paper   @throws ValueError if an option
+  /// is out of range, or preset paper has another number of slots than bits
   Owner(nerf::RadianceField field, const OwnerOptions& options, const Key& key, CellGrid cells);
 
   /// Which bits and signs the cells carry under the owner's key, or under another.
   CellCode code() const { return code(key); }
   CellCode code(const Key& other) const;
 
-  /// Adds the residual g s(x) P(x, c) to colours, which stay in [0, 1]: the marked field of one message, not
-  /// yet baked.
+  /// Colours of the marked field of one message, not yet baked. Preset fast adds the residual g s(x) P(x, c)
+  /// to them and keeps them in [0, 1]; preset paper puts c_m in their place.
   /// @param signs  of the cells, see cell_signs()   @return a function for Renderer::set_recolour; this must
   /// outlive it
   nerf::Renderer::Recolour marking(std::vector<std::int8_t> signs) const;
@@ -46,9 +69,13 @@ class Owner {
   Key key;
   CellGrid cells;
   ParamStore<float> params;  ///< mark network and extractor
-  MarkNetwork<float> mark;
-  extractor::DenseExtractor<float> reader;
+  /// Preset fast.
+  std::optional<MarkNetwork<float>> mark;
+  std::optional<extractor::DenseExtractor<float>> reader;
   double gain = 0;  ///< g
+  /// Preset paper.
+  std::optional<GlobalMark<float>> global_mark;
+  std::optional<extractor::PooledExtractor<float>> pooled_reader;
 
  private:
   OwnerOptions options_;

@@ -9,8 +9,8 @@ namespace fieldmark::watermark {
 class PictureReader {
  public:
   explicit PictureReader(const Owner& owner) : owner_(owner) {}
-  /// Sign evidence S_c of every cell, see evidence.h. The object's window is cut out and brought to the
-  /// reader's size first (see object_window.h).
+  /// Sign evidence S_c of every cell (for preset paper the logit of every slot), see evidence.h. The object's
+  /// window is cut out and brought to the reader's size first (see object_window.h).
   /// @param picture  [H, W, 1 to 4]; grey is repeated, alpha is laid over the field's background; sides of at
   /// least 16
   /// @return [cells]   @throws ShapeError if it is no picture or too small

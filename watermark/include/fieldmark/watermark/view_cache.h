@@ -12,6 +12,7 @@ struct CachedView {
   Tensor<float> opacity;                   ///< [height, width]
   std::vector<std::int32_t> sample_begin;  ///< [height width + 1]
   std::vector<float> position;             ///< [S, 3] unit cube
+  std::vector<float> direction;            ///< [S, 3] unit, seen from the camera
   std::vector<float> colour;               ///< [S, 3] of the base field
   std::vector<float> weight;  ///< [S] share of the sample in its pixel; a pixel's sum is about its opacity
 };

@@ -1,0 +1,51 @@
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace fieldmark::bench {
+
+/// One line of the engine's benchmark.
+struct EngineRow {
+  std::string name;          ///< as in scripts: "mlp_4x64_fb_f32"
+  std::string what;          ///< for people
+  double seconds = 0;        ///< median of a call
+  double spread = 0;         ///< (slowest - fastest) / median over the runs
+  double gflops = 0;         ///< useful operations, forward and backward; 0 for look-ups
+  double ratio_to_peak = 0;  ///< gflops over the peak measured in the same run; 0 for look-ups
+  double rate = 0;           ///< samples, points or pictures a second
+  double speedup = 0;        ///< over the plain scalar loop in the same run; 0 where there is none
+  double error =
+      0;  ///< worst |float - double| over values and all gradients, in parts of the largest of each
+  double megabytes = 0;  ///< most memory of the process so far
+};
+
+struct EngineBenchOptions {
+  int runs = 5;        ///< of each row, whose median counts
+  double scale = 1;    ///< of the numbers of samples, in (0, 1]: for tests
+  std::string only{};  ///< rows with this text in their name
+};
+
+struct EngineBench {
+  double peak_gflops = 0;
+  std::vector<EngineRow> rows;
+};
+
+/// Measures the peak first, then each row. The shapes are fixed, so that rows of different machines can be
+/// compared by their ratios:
+///   mlp_4x64_fb_f32       4 dense layers of 64 with bias and ReLU, 262,144 samples, forward and backward
+///   with dX and
+///                         summed weight gradients, in the loop over chunks that training uses; _tape: over
+///                         the whole batch through one tape
+///   mlp_8x256_fb_f32      8 of 256, 32,768 samples
+///   conv3x3_64_fb_f32     3 x 3, 64 to 64 channels, 4 pictures of 128 x 128
+///   hidden_decoder_fb_f32 3 to 64, 7 x 64, batch norm, ReLU, average, linear, 4 pictures of 128 x 128
+///   hash_2e17_*           16 levels of 2 + 2 features, 2^17 entries, 16 to 512 cells; points at random and
+///   along rays in
+///                         the order of image tiles
+///   nerf_step             a training step of the default field on the built-in scene, everything included
+/// @param progress  called before each row with its name   @throws ValueError if an option is out of range
+EngineBench run_engine_bench(const EngineBenchOptions& options,
+                             const std::function<void(const std::string&)>& progress = {});
+
+}  // namespace fieldmark::bench

@@ -1,0 +1,40 @@
+#include <fieldmark/nerf/analytic_scene.h>
+#include <fieldmark/nerf/trainer.h>
+
+#include <chrono>
+
+#include "rows.h"
+
+namespace fieldmark::bench {
+namespace {
+
+// Samples a second once the field has taken shape. Steps differ, so the rows' runs are stretches of steps.
+EngineRow training_step(const EngineBenchOptions& o) {
+  const auto scaled = [&](Index n) {
+    return std::max<Index>(8, static_cast<Index>(static_cast<double>(n) * o.scale));
+  };
+  const nerf::Dataset data = nerf::make_scene({.size = scaled(200), .views = scaled(50)});
+  nerf::RadianceField field(nerf::RadianceFieldOptions{});
+  const Index warm = scaled(300), stretch = scaled(40);
+  nerf::Trainer trainer(field, data, {.schedule = {.steps = warm + stretch * (o.runs + 1)}});
+  while (trainer.steps() < warm) trainer.step(0);
+  const double before = trainer.samples();
+  const Index steps = trainer.steps();
+  const Timing t = time_calls(
+      [&] {
+        for (Index i = 0; i < stretch; ++i) trainer.step(0);
+      },
+      o.runs, 0);
+  const double samples = (trainer.samples() - before) / static_cast<double>(trainer.steps() - steps);
+  Timing step{t.seconds / static_cast<double>(stretch), t.least / static_cast<double>(stretch),
+              t.most / static_cast<double>(stretch)};
+  return row_of(step, 0, samples);
+}
+
+}  // namespace
+
+std::vector<RowSpec> nerf_rows() {
+  return {{"nerf_step", "training step of the default field, built-in scene, all included", training_step}};
+}
+
+}  // namespace fieldmark::bench

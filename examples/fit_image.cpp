@@ -1,0 +1,64 @@
+// Fits a picture with a small network: colour as a function of place. Public headers only.
+//   fit_image [PICTURE.png [RESULT.png]]      without a picture: a pattern of its own
+#include <fieldmark/engine/adam.h>
+#include <fieldmark/engine/image.h>
+#include <fieldmark/engine/metrics.h>
+#include <fieldmark/engine/nn/dense.h>
+#include <fieldmark/engine/ops/activation.h>
+#include <fieldmark/engine/ops/loss.h>
+#include <fieldmark/nerf/frequency_encoding.h>
+
+#include <cmath>
+#include <cstdio>
+
+using namespace fieldmark;
+
+namespace {
+
+Tensor<float> pattern() {
+  Tensor<float> image({48, 64, 3});
+  for (Index i = 0; i < image.size(); ++i) {
+    const double x = static_cast<double>(i / 3 % 64) / 64, y = static_cast<double>(i / 192) / 48;
+    image[i] = static_cast<float>(0.5 + 0.5 * std::sin(6 * x + 9 * y * y + 2 * static_cast<double>(i % 3)));
+  }
+  return image;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const Tensor<float> image = argc > 1 ? read_image(argv[1]) : pattern();
+  const Index height = image.shape[0], width = image.shape[1], channels = image.shape[2],
+              pixels = height * width;
+  Tensor<float> place({pixels, 2});
+  for (Index p = 0; p < pixels; ++p) {
+    place[2 * p] = static_cast<float>(p % width) / static_cast<float>(width);
+    place[2 * p + 1] = static_cast<float>(p / width) / static_cast<float>(height);
+  }
+
+  // Layers register their numbers in a store; the optimiser sees one flat array.
+  constexpr int kBands = 5;
+  ParamStore<float> store;
+  const Dense<float> first(store, "first", {.in = 4 * kBands, .out = 48, .activation = Activation::relu}, 1);
+  const Dense<float> second(store, "second", {.in = 48, .out = 48, .activation = Activation::relu}, 2);
+  const Dense<float> last(store, "last", {.in = 48, .out = channels}, 3);
+  Adam<float> adam(store.size(), {.lr = 5e-3, .zero_grads = true});
+  const Params<float> params(store);
+
+  Tape<float> tape;
+  Tensor<float> result(image.shape);
+  for (int step = 0; step < 400; ++step) {
+    tape.reset();
+    const Var<float> encoded = nerf::frequency_encoding(tape.constant(place), kBands);
+    const Var<float> colour = sigmoid(last(params, second(params, first(params, encoded))));
+    const Var<float> loss = mse_loss(colour, tape.constant(image.data.data(), {pixels, channels}));
+    if (step % 100 == 0) std::printf("step %3d  loss %.5f\n", step, static_cast<double>(loss.value()[0]));
+    tape.backward(loss);
+    adam.step(store.values(), store.grads(), exponential_decay(1, 0.1, step / 400.0));
+    result.data.assign(colour.value(), colour.value() + colour.shape().size());
+  }
+  const double reached = psnr(result, image);
+  std::printf("PSNR %.1f dB\n", reached);
+  if (argc > 2) write_png(argv[2], result);
+  return argc > 1 || reached > 25 ? 0 : 1;
+}

@@ -1,0 +1,40 @@
+#include <fieldmark/bench/engine_bench.h>
+#include <fieldmark/engine/error.h>
+
+#include <algorithm>
+
+#include "support/catch.h"
+
+using namespace fieldmark;
+using namespace fieldmark::bench;
+
+TEST_CASE("engine_bench: every row of the contract runs, and float is near double") {
+  std::vector<std::string> begun;
+  const EngineBench bench =
+      run_engine_bench({.runs = 1, .scale = 0.01}, [&](const std::string& name) { begun.push_back(name); });
+  CHECK(bench.peak_gflops > 1);
+  REQUIRE(begun.size() == bench.rows.size());
+  for (const char* name : {"mlp_4x64_fb_f32", "mlp_8x256_fb_f32", "conv3x3_64_fb_f32",
+                           "hidden_decoder_fb_f32", "hash_2e17_forward", "hash_2e17_backward", "nerf_step"})
+    CHECK(std::count(begun.begin(), begun.end(), name) == 1);
+  for (const EngineRow& row : bench.rows) {
+    CAPTURE(row.name, row.error);
+    CHECK(row.seconds > 0);
+    CHECK(row.rate > 0);
+    CHECK(row.megabytes > 0);
+    CHECK((row.gflops > 0) == (row.ratio_to_peak > 0));
+    if (row.name == "nerf_step") continue;
+    CHECK(row.error >
+          0);  // float cannot agree with double to the last bit: 0 would mean nothing was compared
+    // A look-up multiplies a position by 512 cells, and so the rounding of the product: 512 * 2^-24.
+    CHECK(row.error < (row.name.starts_with("hash") ? 1e-4 : 1e-5));
+  }
+}
+
+TEST_CASE("engine_bench: options outside their ranges are refused") {
+  CHECK_THROWS_AS(run_engine_bench({.runs = 0}), ValueError);
+  CHECK_THROWS_WITH(run_engine_bench({.scale = 0}),
+                    "[engine_bench] runs must be at least 1 and scale in (0, 1], got 5 and 0.000000");
+  CHECK_THROWS_WITH(run_engine_bench({.only = "nothing"}),
+                    "[engine_bench] only: no row has 'nothing' in its name");
+}

@@ -1,0 +1,69 @@
+#include <fieldmark/engine/nn/dense.h>
+#include <fieldmark/engine/packed_weights.h>
+
+#include <algorithm>
+
+#include "support/catch.h"
+#include "support/each_isa.h"
+#include "support/random.h"
+
+using namespace fieldmark;
+
+namespace {
+// Values, dX and gradients of the parameters of one layer, with and without packed weights.
+template <class T>
+std::vector<T> pass(const Dense<T>& layer, const ParamStore<T>& store, const PackedWeights<T>* packed,
+                    const Tensor<T>& x) {
+  std::vector<T> grads(static_cast<std::size_t>(store.size()));
+  Tensor<T> dx(x.shape);
+  Tape<T> tape;
+  const Params<T> params = packed ? Params<T>(store, grads.data(), *packed) : Params<T>(store, grads.data());
+  const Var<T> y = layer(params, tape.leaf(x, dx));
+  tape.backward(y, uniform<T>(y.shape(), -1, 1, 9).data);
+  std::vector<T> all(y.value(), y.value() + y.shape().size());
+  all.insert(all.end(), dx.data.begin(), dx.data.end());
+  all.insert(all.end(), grads.begin(), grads.end());
+  return all;
+}
+
+template <class T>
+void same_for_all_widths() {
+  for (Index width : {1, 3, 4, 15, 16, 17, 31, 33, 48, 63, 64, 65, 80, 127, 130}) {
+    for (Index out : {width, Index{7}}) {
+      ParamStore<T> store;
+      const Dense<T> layer(store, "layer", {.in = width, .out = out, .activation = Activation::relu}, 3);
+      PackedWeights<T> packed(store);
+      packed.update();
+      const auto x = uniform<T>({9, width}, -1, 1, 4);
+      CAPTURE(width, out);
+      REQUIRE(pass(layer, store, &packed, x) ==
+              pass(layer, store, static_cast<PackedWeights<T>*>(nullptr), x));
+    }
+  }
+}
+}  // namespace
+
+TEST_CASE("packed_weights: a layer gives the same bits with them as without") {
+  each_isa([] {
+    same_for_all_widths<float>();
+    same_for_all_widths<double>();
+  });
+}
+
+TEST_CASE("packed_weights: update takes the present values, for matrices of layers only") {
+  ParamStore<float> store;
+  const Dense<float> layer(store, "layer", {.in = 5, .out = 6}, 3);
+  const ParamId table = store.add("table", {8, 4});
+  PackedWeights<float> packed(store);
+  packed.update();
+  CHECK(packed.find(table) == nullptr);
+  CHECK(packed.find(store.find("layer/bias")) == nullptr);
+  REQUIRE(packed.find(store.find("layer/weight")) != nullptr);
+  const auto x = uniform<float>({3, 5}, -1, 1, 4);
+  const auto before = pass(layer, store, &packed, x);
+  for (float& v : store.values()) v *= 2;
+  CHECK(pass(layer, store, &packed, x) != pass<float>(layer, store, nullptr, x));
+  packed.update();
+  CHECK(pass(layer, store, &packed, x) == pass<float>(layer, store, nullptr, x));
+  CHECK(pass(layer, store, &packed, x) != before);
+}

@@ -1,0 +1,33 @@
+#include <fieldmark/engine/shape.h>
+
+#include <type_traits>
+
+#include "support/catch.h"
+
+using namespace fieldmark;
+
+TEST_CASE("shape: extents, rank and size, negative axes count from the last") {
+  const Shape s{2, 3, 5};
+  CHECK(s.rank() == 3);
+  CHECK(s.size() == 30);
+  CHECK(s[0] == 2);
+  CHECK(s[-1] == 5);
+  CHECK(s[-3] == 2);
+  CHECK(s.str() == "[2, 3, 5]");
+}
+
+TEST_CASE("shape: a scalar has rank 0 and one element, an extent of 0 none") {
+  CHECK(Shape{}.rank() == 0);
+  CHECK(Shape{}.size() == 1);
+  CHECK(Shape{}.str() == "[]");
+  CHECK(Shape{4, 0, 7}.size() == 0);
+  CHECK(Shape{1 << 20, 1 << 20}.size() == Index{1} << 40);
+}
+
+TEST_CASE("shape: equal only in rank and every extent") {
+  CHECK(Shape{2, 3} == Shape{2, 3});
+  CHECK_FALSE(Shape{2, 3} == Shape{3, 2});
+  CHECK_FALSE(Shape{2, 3} == Shape{2, 3, 1});
+  CHECK_FALSE(Shape{} == Shape{1});
+  STATIC_REQUIRE(std::is_trivially_copyable_v<Shape>);
+}
