@@ -21,8 +21,8 @@ namespace fieldmark::watermark {
 namespace {
 
 constexpr Index kCoarse = 8;  // pixels a side that eyes average at a glance
-constexpr double kReadable = 0.8,
-                 kSafe = 0.95;  // shares of right signs between which the mark learns to hide
+constexpr double kReadable = 0.7,
+                 kSafe = 0.8;  // shares of right signs between which the mark learns to hide
 constexpr float kBitScale = 6;  // pooled evidence lies in [-1, 1]: this makes it a logit
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }

@@ -42,7 +42,7 @@ struct EmbedOptions {
 ///     + u (0.4 |mean of 8 x 8 pixels of r|^2 / |r|^2 + 0.4 |r on flat areas|^2 / |r|^2)
 /// with the residual r under a budget of power that takes the place of the content loss: the budget says how
 /// much is changed, the last two terms keep it where eyes do not look, in fine detail and on texture. u rises
-/// from 0 to 1 while the share of right signs goes from 0.8 to 0.95: a mark must be readable before it can
+/// from 0 to 1 while the share of right signs goes from 0.7 to 0.8: a mark must be readable before it can
 /// hide (with u = 1 from the first step on, signs stayed at 50% for 500 steps). Each picture draws a message,
 /// a view, distortions. Same seed and number of steps: same bytes, for any thread count and across save() and
 /// restore().
