@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "dense_by_loops.h"
 #include "support/catch.h"
 #include "support/run_op.h"
 
@@ -13,19 +14,6 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
-using Row = std::vector<double>;
-
-// One dense layer by loops.
-Row layer(const ParamStore<double>& store, const std::string& name, const Row& x, bool relu) {
-  const auto w = store.values(store.find(name + "/weight")), b = store.values(store.find(name + "/bias"));
-  Row y(b.begin(), b.end());
-  for (std::size_t j = 0; j < y.size(); ++j) {
-    for (std::size_t i = 0; i < x.size(); ++i) y[j] += x[i] * w[i * y.size() + j];
-    if (relu) y[j] = std::max(0.0, y[j]);
-  }
-  return y;
-}
-
 Row by_loops(const ParamStore<double>& store, const MarkNetworkOptions& o, const Row& x, const Row& c) {
   Row in;
   for (int b = 0; b < o.bands; ++b) {

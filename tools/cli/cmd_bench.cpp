@@ -35,32 +35,29 @@ Json row_json(const bench::EngineRow& r) {
           {"peer_ratio", nullptr}};
 }
 
-void print_row(std::ostream& out, const bench::EngineRow& r) {
-  char line[200], speed[80];
+// How fast a row is, in the unit of its kind.
+std::string speed_of(const bench::EngineRow& r) {
+  char text[80];
   if (r.gflops > 0)
-    std::snprintf(speed, sizeof speed, "%7.1f GFLOP/s  %4.2f of peak", r.gflops, r.ratio_to_peak);
+    std::snprintf(text, sizeof text, "%.2f of peak, %.1f GFLOP/s", r.ratio_to_peak, r.gflops);
   else if (r.speedup > 0)
-    std::snprintf(speed, sizeof speed, "%7.1f ns a point  %4.2f x scalar", 1e9 / r.rate, r.speedup);
+    std::snprintf(text, sizeof text, "%.1f ns a point, %.2f x scalar", 1e9 / r.rate, r.speedup);
   else
-    std::snprintf(speed, sizeof speed, "%7.3f million samples/s", r.rate * 1e-6);
-  std::snprintf(line, sizeof line, "%-26s %-36s spread %2.0f%%  error %.1e  %5.0f MB\n", r.name.c_str(),
-                speed, 100 * r.spread, r.error, r.megabytes);
+    std::snprintf(text, sizeof text, "%.3f million samples/s", r.rate * 1e-6);
+  return text;
+}
+
+void print_row(std::ostream& out, const bench::EngineRow& r) {
+  char line[200];
+  std::snprintf(line, sizeof line, "%-26s %-32s spread %2.0f%%  error %.1e  %5.0f MB\n", r.name.c_str(),
+                speed_of(r).c_str(), 100 * r.spread, r.error, r.megabytes);
   out << line;
 }
 
-// Parts of the peak; for look-ups and steps, which have none, the notes alone.
+// Bars are parts of the peak; look-ups and steps, which have none, show their notes alone.
 void write_plot(const std::string& path, const bench::EngineBench& result) {
   std::vector<bench::Bar> bars;
-  for (const auto& r : result.rows) {
-    char note[64];
-    if (r.gflops > 0)
-      std::snprintf(note, sizeof note, "%.2f, %.0f GFLOP/s", r.ratio_to_peak, r.gflops);
-    else if (r.speedup > 0)
-      std::snprintf(note, sizeof note, "%.1f ns a point, %.1f x scalar", 1e9 / r.rate, r.speedup);
-    else
-      std::snprintf(note, sizeof note, "%.2f million samples/s", r.rate * 1e-6);
-    bars.push_back({r.name, r.ratio_to_peak, note});
-  }
+  for (const auto& r : result.rows) bars.push_back({r.name, r.ratio_to_peak, speed_of(r)});
   char title[80];
   std::snprintf(title, sizeof title, "Part of the peak of %.0f GFLOP/s, kernels %s", result.peak_gflops,
                 isa_name());
