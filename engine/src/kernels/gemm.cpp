@@ -75,6 +75,16 @@ void narrow(const Gemm<T>& g, const T* b, std::int64_t stride, std::int64_t j, i
   }
 }
 
+// Row i of a full panel, read where it lies: whole vectors, without the checks that a loop over any width
+// needs.
+template <class T>
+[[gnu::always_inline]] inline void pack_full_row(const T* from, const T* mask, std::int64_t panel, T* out) {
+  for (std::int64_t x = 0; x < panel; x += kLanes<T>) {
+    const Vec<T> v = simd::load(from + x);
+    simd::store(out + x, !mask ? v : simd::load(mask + x) > Vec<T>{} ? v : Vec<T>{});
+  }
+}
+
 // Row i of a panel: `width` numbers, the rest of it zeros.
 template <class T>
 [[gnu::always_inline]] inline void pack_row(const T* from, const T* mask, std::int64_t column, int width,
@@ -103,7 +113,9 @@ void pack_panels(const T* b, std::int64_t rows, std::int64_t columns, std::int64
     for (std::int64_t i = 0; i < rows; ++i, out += panel) {
       const std::int64_t at = i * row + j * column;
       const T* m = mask ? mask + at : nullptr;
-      if (column == 1)
+      if (column == 1 && width == panel)
+        pack_full_row(b + at, m, panel, out);
+      else if (column == 1)
         pack_row(b + at, m, 1, width, panel, out);
       else
         pack_row(b + at, m, column, width, panel, out);
