@@ -21,8 +21,8 @@ std::vector<float> along_rays(Index points) {
   std::vector<float> x;
   for (Index p = 0; p < points; ++p) {
     const Index ray = p / 64, tile = ray / 256, in_tile = ray % 256;
-    const double u = static_cast<double>(tile % 4 * 16 + in_tile % 16) / 64 - 0.5,
-                 v = static_cast<double>(tile / 4 % 4 * 16 + in_tile / 16) / 64 - 0.5;
+    const Index column = tile % 4 * 16 + in_tile % 16, row = tile / 4 % 4 * 16 + in_tile / 16;
+    const double u = static_cast<double>(column) / 64 - 0.5, v = static_cast<double>(row) / 64 - 0.5;
     const double near = 0.5 - 0.4 * std::sqrt(std::max(0.0, 1 - 2 * (u * u + v * v)));
     const double t = near + static_cast<double>(p % 64) * std::sqrt(3.0) / 512;
     x.push_back(static_cast<float>(0.5 + 0.8 * u + 0.1 * t));

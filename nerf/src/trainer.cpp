@@ -100,8 +100,8 @@ void Trainer::choose_rays(Index first, Index count, Chunk& c) const {
   }
   for (Index i = 0; i < count; ++i) {
     const View& view = data_.views[at(place[at(i)] / size)];
-    const Index pixel = place[at(i)] % size;
-    const float xy[2] = {static_cast<float>(pixel % width), static_cast<float>(pixel / width)};
+    const Index pixel = place[at(i)] % size, column = pixel % width, row = pixel / width;
+    const float xy[2] = {static_cast<float>(column), static_cast<float>(row)};
     float* origin = &c.origins[at(3 * i)];
     camera_rays(view.camera, xy, origin, &c.directions[at(3 * i)]);
     field_.to_cube(origin, origin);

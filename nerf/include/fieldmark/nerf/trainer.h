@@ -51,7 +51,7 @@ class Trainer {
   struct Chunk;
   void carve();
   void choose_rays(Index first, Index count, Chunk& chunk) const;
-  double run_chunk(Index chunk, Index shard, Tape<float>& tape, float* grads);
+  double run_chunk(Index index, Index shard, Tape<float>& tape, float* grads);
   void backward_table();
   void refresh_occupancy();
   std::string fingerprint() const;

@@ -38,7 +38,7 @@ class Baker {
   struct Chunk;
   void choose_rays(Index chunk, Chunk& c) const;
   void select(const nerf::RaySamples& samples, Chunk& c) const;
-  double run_chunk(Index chunk, Index shard, Tape<float>& tape, float* grads);
+  double run_chunk(Index index, Index shard, Tape<float>& tape, float* grads);
 
   const Owner& owner_;
   BakeOptions options_;

@@ -43,9 +43,9 @@ CellGrid message_slots(Index bits);
 /// the key.
 class Owner {
  public:
-  /// @param cells  those of the scene, or message_slots() for preset paper   @throws ValueError if an option
-  /// is out of range, or preset paper has another number of slots than bits
-  Owner(nerf::RadianceField field, const OwnerOptions& options, const Key& key, CellGrid cells);
+  /// @param grid  the cells of the scene, or message_slots() for preset paper   @throws ValueError if an
+  /// option is out of range, or preset paper has another number of slots than bits
+  Owner(nerf::RadianceField base, const OwnerOptions& options, const Key& owner_key, CellGrid grid);
 
   /// Which bits and signs the cells carry under the owner's key, or under another.
   CellCode code() const { return code(key); }
