@@ -5,7 +5,7 @@
 namespace fieldmark::bench {
 
 EngineBench run_engine_bench(const EngineBenchOptions& options,
-                             const std::function<void(const std::string&)>& progress) {
+                             const std::function<void(const std::string&, double)>& progress) {
   if (options.runs < 1 || !(options.scale > 0 && options.scale <= 1))
     throw ValueError("[engine_bench] runs must be at least 1 and scale in (0, 1], got " +
                      std::to_string(options.runs) + " and " + std::to_string(options.scale));
@@ -17,7 +17,8 @@ EngineBench run_engine_bench(const EngineBenchOptions& options,
   EngineBench result;
   result.peak_gflops = peak_gflops();
   for (const RowSpec& spec : specs) {
-    if (progress) progress(spec.name);
+    if (progress)
+      progress(spec.name, static_cast<double>(result.rows.size()) / static_cast<double>(specs.size()));
     EngineRow row = spec.run(options);
     row.name = spec.name;
     row.what = spec.what;

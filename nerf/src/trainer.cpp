@@ -60,6 +60,8 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
   if (options.samples_per_step < 1024)
     throw ValueError("[trainer] samples_per_step must be at least 1024, got " +
                      std::to_string(options.samples_per_step));
+  if (!(options.stop >= 0 && options.stop < 1))
+    throw ValueError("[trainer] stop must be in [0, 1), got " + std::to_string(options.stop));
   if (data.views.empty()) throw ValueError("[trainer] data must have at least one view");
   field_.background = data.background;
   field_.cameras = camera_span(data);
@@ -226,7 +228,8 @@ std::string Trainer::fingerprint() const {
          " views " + std::to_string(data_.views.front().camera.width) + "x" +
          std::to_string(data_.views.front().camera.height) + " seed " + std::to_string(options_.seed) +
          " steps " + std::to_string(schedule.steps) + " samples " +
-         std::to_string(options_.samples_per_step) + " huber " + std::to_string(options_.huber) + " lr " +
+         std::to_string(options_.samples_per_step) + " huber " + std::to_string(options_.huber) + " stop " +
+         std::to_string(options_.stop) + " warm-up " + std::to_string(options_.warm_up) + " lr " +
          std::to_string(schedule.lr) + " half after " + std::to_string(schedule.half_after) + " cooldown " +
          std::to_string(schedule.cooldown) + " last " + std::to_string(schedule.last);
 }

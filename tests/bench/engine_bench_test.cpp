@@ -10,8 +10,8 @@ using namespace fieldmark::bench;
 
 TEST_CASE("engine_bench: every row of the contract runs, and float is near double") {
   std::vector<std::string> begun;
-  const EngineBench bench =
-      run_engine_bench({.runs = 1, .scale = 0.01}, [&](const std::string& name) { begun.push_back(name); });
+  const EngineBench bench = run_engine_bench({.runs = 1, .scale = 0.01},
+                                             [&](const std::string& name, double) { begun.push_back(name); });
   CHECK(bench.peak_gflops > 1);
   REQUIRE(begun.size() == bench.rows.size());
   for (const char* name : {"mlp_4x64_fb_f32", "mlp_8x256_fb_f32", "conv3x3_64_fb_f32",

@@ -167,6 +167,7 @@ TEST_CASE("trainer: errors name option and value") {
   options.samples_per_step = 10;
   CHECK_THROWS_WITH(Trainer(field, scene(), options),
                     "[trainer] samples_per_step must be at least 1024, got 10");
+  CHECK_THROWS_WITH(Trainer(field, scene(), {.stop = 1}), "[trainer] stop must be in [0, 1), got 1.000000");
   CHECK_THROWS_WITH(Trainer(field, Dataset{}, train_options(1)),
                     "[trainer] data must have at least one view");
 }

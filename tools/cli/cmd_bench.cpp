@@ -67,10 +67,9 @@ void write_plot(const std::string& path, const bench::EngineBench& result) {
 int run(const Options& options, Context& context) {
   if (!options.plot.empty()) check_writable(options.plot);
   Progress progress = context.progress("bench");
-  int begun = 0;
   const auto result = read_option("bench engine", [&] {
-    return bench::run_engine_bench(options.engine,
-                                   [&](const std::string& name) { progress.update(begun++ / 10.0, name); });
+    return bench::run_engine_bench(
+        options.engine, [&](const std::string& name, double part) { progress.update(part, name); });
   });
   char line[80];
   std::snprintf(line, sizeof line, "peak %.1f GFLOP/s (fp32 multiply-add, kernels %s)\n", result.peak_gflops,

@@ -22,7 +22,7 @@ constexpr int kChains = 12;  // two units of latency 4 want 8, and of 16 registe
 
 double fma_peak_f32(std::int64_t rounds) {
   const simd::Vec<float> x = simd::broadcast(0.5f), y = simd::broadcast(1e-3f);
-  // Twelve names and no array: the elements of one stayed in memory, and the rate fell to 0.4.
+  // Twelve names and no array: the elements of one stayed in memory, and the rate fell to a third.
   simd::Vec<float> a = x, b = x, c = x, d = x, e = x, f = x, g = x, h = x, i = x, j = x, k = x, l = x;
   for (std::int64_t r = 0; r < rounds; ++r) {
     multiply_add(a, x, y), multiply_add(b, x, y), multiply_add(c, x, y), multiply_add(d, x, y);

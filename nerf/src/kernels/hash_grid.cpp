@@ -23,7 +23,7 @@ template <class T, int P>
 }
 
 // Two parts side by side. A copy of each into one array, read back as a whole, would wait for both stores to
-// reach the cache: 14 cycles a point.
+// reach the cache.
 template <class T, int P>
 [[gnu::always_inline]] inline Entry<T, P> joined(const T* density, const T* colour) {
   typedef T Part __attribute__((vector_size(P * sizeof(T))));

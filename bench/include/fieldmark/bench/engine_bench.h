@@ -33,19 +33,17 @@ struct EngineBench {
 
 /// Measures the peak first, then each row. The shapes are fixed, so that rows of different machines can be
 /// compared by their ratios:
-///   mlp_4x64_fb_f32       4 dense layers of 64 with bias and ReLU, 262,144 samples, forward and backward
-///   with dX and
-///                         summed weight gradients, in the loop over chunks that training uses; _tape: over
-///                         the whole batch through one tape
-///   mlp_8x256_fb_f32      8 of 256, 32,768 samples
-///   conv3x3_64_fb_f32     3 x 3, 64 to 64 channels, 4 pictures of 128 x 128
-///   hidden_decoder_fb_f32 3 to 64, 7 x 64, batch norm, ReLU, average, linear, 4 pictures of 128 x 128
-///   hash_2e17_*           16 levels of 2 + 2 features, 2^17 entries, 16 to 512 cells; points at random and
-///   along rays in
-///                         the order of image tiles
-///   nerf_step             a training step of the default field on the built-in scene, everything included
-/// @param progress  called before each row with its name   @throws ValueError if an option is out of range
+/// - mlp_4x64_fb_f32: 4 dense layers of 64 with bias and ReLU, 262,144 samples, forward and backward with dX
+///   and summed weight gradients, in the loop over chunks that training uses; _tape: the whole batch at once
+/// - mlp_8x256_fb_f32: 8 of 256, 32,768 samples
+/// - conv3x3_64_fb_f32: 3 x 3, 64 to 64 channels, 4 pictures of 128 x 128
+/// - hidden_decoder_fb_f32: 3 to 64, 7 x 64, batch norm, ReLU, average, linear, 4 pictures of 128 x 128
+/// - hash_2e17_*: 16 levels of 2 + 2 features, 2^17 entries, 16 to 512 cells; points along rays in the order
+///   of image tiles, and at random
+/// - nerf_step: a training step of the default field on the built-in scene, everything included
+/// @param progress  called before each row with its name and the part of the rows that is done
+/// @throws ValueError if an option is out of range
 EngineBench run_engine_bench(const EngineBenchOptions& options,
-                             const std::function<void(const std::string&)>& progress = {});
+                             const std::function<void(const std::string&, double)>& progress = {});
 
 }  // namespace fieldmark::bench

@@ -4,9 +4,8 @@
 namespace fieldmark {
 
 /// The matrices of a store's dense layers in the order in which products read them, as they are and
-/// transposed: a training step packs each once, where its chunks would pack them anew in every op (12% of the
-/// time of 512 rows through layers of 64). Hand it to Params, and to those only that read the values of the
-/// last update().
+/// transposed: a training step packs each once, where its chunks would pack them anew in every op. Hand it to
+/// Params, and to those only that read the values of the last update().
 template <class T>
 class PackedWeights {
  public:
