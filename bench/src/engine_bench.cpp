@@ -22,7 +22,6 @@ EngineBench run_engine_bench(const EngineBenchOptions& options,
     EngineRow row = spec.run(options);
     row.name = spec.name;
     row.what = spec.what;
-    row.ratio_to_peak = row.gflops / result.peak_gflops;
     row.megabytes = peak_megabytes();
     result.rows.push_back(std::move(row));
   }

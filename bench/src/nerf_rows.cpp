@@ -27,7 +27,7 @@ EngineRow training_step(const EngineBenchOptions& o) {
       o.runs, 0);
   const double samples = (trainer.samples() - before) / static_cast<double>(trainer.steps() - steps);
   Timing step{t.seconds / static_cast<double>(stretch), t.least / static_cast<double>(stretch),
-              t.most / static_cast<double>(stretch)};
+              t.most / static_cast<double>(stretch), t.peak_operations / static_cast<double>(stretch)};
   return row_of(step, 0, samples);
 }
 

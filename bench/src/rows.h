@@ -6,9 +6,10 @@
 
 namespace fieldmark::bench {
 
+using RowRun = std::function<EngineRow(const EngineBenchOptions&)>;
 struct RowSpec {
   std::string name, what;
-  std::function<EngineRow(const EngineBenchOptions&)> run;  // all but name, what, ratio_to_peak and megabytes
+  RowRun run;  // all but name, what and megabytes
 };
 
 std::vector<RowSpec> mlp_rows();
@@ -21,6 +22,7 @@ inline EngineRow row_of(const Timing& t, double operations, double items) {
   row.seconds = t.seconds;
   row.spread = (t.most - t.least) / t.seconds;
   row.gflops = operations / t.seconds * 1e-9;
+  row.ratio_to_peak = operations / t.peak_operations;
   row.rate = items / t.seconds;
   return row;
 }

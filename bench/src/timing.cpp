@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,14 @@ double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+constexpr double kBurst = 3e-4;  // seconds; the clock keeps still for longer than that
+
+double median(std::vector<double> v) {
+  std::sort(v.begin(), v.end());
+  const std::size_t middle = v.size() / 2;
+  return v.size() % 2 ? v[middle] : (v[middle - 1] + v[middle]) / 2;
+}
+
 }  // namespace
 
 Timing time_calls(const std::function<void()>& body, int runs, double least_seconds) {
@@ -27,33 +36,37 @@ Timing time_calls(const std::function<void()>& body, int runs, double least_seco
   body();
   const double first = std::max(now() - begin, 1e-9);
   const auto calls = static_cast<int>(std::clamp(least_seconds / first, 1.0, 1e6));
-  std::vector<double> seconds;
+  std::vector<double> seconds, operations;
+  double before = peak_gflops(1, kBurst);
   for (int r = 0; r < runs; ++r) {
     begin = now();
     for (int i = 0; i < calls; ++i) body();
     seconds.push_back((now() - begin) / calls);
+    const double after = peak_gflops(1, kBurst);
+    operations.push_back(seconds.back() * (before + after) / 2 * 1e9);
+    before = after;
   }
-  std::sort(seconds.begin(), seconds.end());
-  const std::size_t middle = seconds.size() / 2;
-  const double median = seconds.size() % 2 ? seconds[middle] : (seconds[middle - 1] + seconds[middle]) / 2;
-  return {median, seconds.front(), seconds.back()};
+  const auto [least, most] = std::minmax_element(seconds.begin(), seconds.end());
+  return {median(seconds), *least, *most, median(operations)};
 }
 
-double peak_gflops() {
+double peak_gflops(int bursts, double least) {
   using namespace kernels;
-  constexpr std::int64_t kRounds = 1 << 20;
+  constexpr std::int64_t kRounds = 1 << 9;
   const auto run = FIELDMARK_KERNEL(fma_peak_f32);
   const int n = threads();
-  double operations = 0;
-  const Timing t = time_calls(
-      [&] {
-        std::vector<double> each(static_cast<std::size_t>(n));
-        parallel_for(n, 1, [&](Index i, Index) { each[static_cast<std::size_t>(i)] = run(kRounds); });
-        operations = 0;
-        for (double o : each) operations += o;
-      },
-      9, 0.02);
-  return operations / t.least * 1e-9;
+  std::vector<double> rates;
+  for (int b = 0; b < bursts; ++b) {
+    std::vector<double> rate(static_cast<std::size_t>(n));
+    parallel_for(n, 1, [&](Index i, Index) {
+      const double begin = now();
+      double operations = 0, seconds = 0;
+      while ((seconds = now() - begin) < least) operations += run(kRounds);
+      rate[static_cast<std::size_t>(i)] = operations / seconds;
+    });
+    rates.push_back(std::accumulate(rate.begin(), rate.end(), 0.0) * 1e-9);
+  }
+  return median(rates);
 }
 
 double peak_megabytes() {

@@ -14,8 +14,7 @@ void PackedWeights<T>::update() {
   Index size = 0;
   for (const auto& e : store_->entries())
     if (is_matrix(e))
-      size +=
-          detail::panels_size<T>(e.shape[0], e.shape[1]) + detail::transposed_size<T>(e.shape[0], e.shape[1]);
+      size += detail::panels_size<T>(e.shape[0], e.shape[1]) + detail::panels_size<T>(e.shape[1], e.shape[0]);
   panels_.resize(static_cast<std::size_t>(size));
   T* to = panels_.data();
   for (std::size_t i = 0; i < matrices_.size(); ++i) {
@@ -27,8 +26,8 @@ void PackedWeights<T>::update() {
     detail::pack<T>(w, in, out, out, Index{1}, nullptr, to);
     to += detail::panels_size<T>(in, out);
     matrices_[i].transposed = to;
-    detail::pack_transposed(w, in, out, to);
-    to += detail::transposed_size<T>(in, out);
+    detail::pack<T>(w, out, in, Index{1}, out, nullptr, to);
+    to += detail::panels_size<T>(out, in);
   }
 }
 

@@ -67,6 +67,32 @@ TEST_CASE("tape: several outputs seeded by hand are replayed at once") {
   CHECK(g[0] == 66);
 }
 
+TEST_CASE("tape: the gradient of a fresh leaf replaces what was there, and stays where none arrives") {
+  Tape<double> tape;
+  const Tensor<double> x({1}, 3.0);
+  Tensor<double> g({1}, 100.0), untouched({1}, 7.0);
+  const auto v = tape.fresh_leaf(x.data.data(), g.data.data(), {1});
+  const auto unused = tape.fresh_leaf(x.data.data(), untouched.data.data(), {1});
+  tape.backward(square(square(v)));
+  CHECK(g[0] == 4 * 27);
+  CHECK(unused.grad() == nullptr);
+  CHECK(untouched[0] == 7);
+}
+
+TEST_CASE("tape: the seed of a rectified output is masked, and what was added unmasked is known") {
+  Tape<double> tape;
+  const Tensor<double> x({3}, std::vector<double>{-1, 0, 2});
+  Tensor<double> g({3});
+  const auto v = tape.reshape(tape.leaf(x, g), {3});
+  tape.mark_rectified(v);
+  const std::vector<double> seed{5, 6, 7};
+  tape.backward(v, seed);
+  CHECK(v.grad_masked());
+  CHECK(g.data == std::vector<double>{0, 0, 7});
+  v.grad_acc()[0] += 1;
+  CHECK_FALSE(v.grad_masked());
+}
+
 TEST_CASE("tape: errors") {
   Tape<double> tape;
   const Tensor<double> x({2}, 3.0);

@@ -8,17 +8,21 @@ namespace fieldmark::kernels {
 /// C[i, j] = start + sum_{s, k} A[i, s, k] B[s K + k, j], where start is C's old value, the bias or 0, and
 /// the result may pass through a ReLU. A is read at a[i a_row + s a_segment + k a_col], so that it can be a
 /// matrix, its transpose, or the windows of a picture (a convolution's rows are the segments). B comes from
-/// pack_panels().
+/// pack_panels(), or is a row-major matrix of whole vectors of columns where it lies: b_row = its row's
+/// length, b_panel = gemm_panel(n).
 template <class T>
 struct Gemm {
   std::int64_t m = 0, n = 0, k = 0, segments = 1;
   const T* a = nullptr;
   std::int64_t a_row = 0, a_col = 1, a_segment = 0;
   const T* b = nullptr;
+  std::int64_t b_row = 0;    ///< distance between rows; 0: gemm_panel(n)
   std::int64_t b_panel = 0;  ///< distance between panels; 0: they follow each other
   T* c = nullptr;            ///< row-major, rows ldc apart
   std::int64_t ldc = 0;
   const T* bias = nullptr;  ///< [n]; not with accumulate
+  const T* mask =
+      nullptr;  ///< laid out as C, which becomes 0 where it is not positive: through a ReLU's backward
   bool accumulate = false, relu = false;
 };
 
@@ -34,10 +38,17 @@ FIELDMARK_DECLARE_KERNEL(template <class T> void, pack_panels,
                          (const T* b, std::int64_t rows, std::int64_t columns, std::int64_t row,
                           std::int64_t column, const T* mask, T* out))
 
+/// Copies D [rows, columns] to rows of `row` >= columns numbers, filled up with zeros; entries at which
+/// `mask` (laid out as D; null: none) is not positive become 0 too.
+FIELDMARK_DECLARE_KERNEL(template <class T> void, pad_rows,
+                         (const T* d, std::int64_t rows, std::int64_t columns, const T* mask,
+                          std::int64_t row, T* out))
+
 FIELDMARK_DECLARE_KERNEL(template <class T> void, gemm, (const Gemm<T>& g))
 
-/// Adds to sums [columns] the sums of the columns of a matrix [rows, columns] that pack_panels() laid out.
+/// Adds to sums [columns] the sums of the columns of B [rows, columns], laid out as in Gemm.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, column_sums,
-                         (const T* panels, std::int64_t rows, std::int64_t columns, T* sums))
+                         (const T* b, std::int64_t rows, std::int64_t columns, std::int64_t b_row,
+                          std::int64_t b_panel, T* sums))
 
 }  // namespace fieldmark::kernels

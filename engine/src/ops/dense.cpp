@@ -6,51 +6,87 @@ namespace fieldmark {
 namespace {
 
 constexpr Index kShardRows = 4096;  // rows of a partial sum of the weights' gradient
+constexpr Index kPieceRows = 512;   // rows that pass through the backward together: they stay in L2
 
-// dY (through the ReLU) in panels serves twice: as B of dW = X^T dY, and as A of dX = dY W^T, whose segments
-// are the panels.
 template <class T>
-void backward(Var<T> x, Var<T> w, Var<T> b, const T* y, const T* dy, Index n, bool relu) {
+struct Backward {
+  Index in, out;
+  const T *x, *transposed, *mask;  // the ReLU's output, where dY has not passed through it
+  T* dx;                           // null: not wanted
+  bool mask_dx, fresh;
+};
+
+// Rows [begin, end): their share of dW and db, and their dX. `room`: for dZ, rows of whole vectors, where dY
+// is not that already.
+template <class T>
+void backward_rows(const Backward<T>& p, const T* dy, Index begin, Index end, T* room, T* dw, T* db) {
+  using namespace kernels;
+  const auto product = FIELDMARK_KERNEL(gemm<T>);
+  const Index rows = end - begin, at = begin * p.out, row = detail::whole_row<T>(p.out);
+  const T *d = dy + at, *x = p.x + begin * p.in;
+  if (room) {
+    FIELDMARK_KERNEL(pad_rows<T>)(d, rows, p.out, p.mask ? p.mask + at : nullptr, row, room);
+    d = room;
+  }
+  if (dw)
+    product({.m = p.in,
+             .n = p.out,
+             .k = rows,
+             .a = x,
+             .a_row = 1,
+             .a_col = p.in,
+             .b = d,
+             .b_row = row,
+             .b_panel = detail::panel_width<T>(p.out),
+             .c = dw,
+             .ldc = p.out,
+             .accumulate = true});
+  if (db) detail::add_column_sums(d, rows, p.out, db);
+  if (p.dx)
+    product({.m = rows,
+             .n = p.in,
+             .k = p.out,
+             .a = d,
+             .a_row = row,
+             .b = p.transposed,
+             .c = p.dx + begin * p.in,
+             .ldc = p.in,
+             .mask = p.mask_dx ? x : nullptr,
+             .accumulate = !p.fresh});
+}
+
+// Pieces of rows own their rows of dX; the sums for dW and db are kept per shard of whole pieces and added in
+// order.
+template <class T>
+void backward(Var<T> x, Var<T> w, Var<T> b, Var<T> y, const T* dy) {
   Tape<T>& tape = x.tape();
-  const Index in = w.shape()[0], out = w.shape()[1], panel = detail::panel_width<T>(out);
-  const Index panels = detail::round_up(out, panel) / panel;
-  const T* d = detail::packed(tape, dy, n, out, out, Index{1}, relu ? y : nullptr);
-  if (T* dw = w.grad_acc())
-    detail::sharded_sum(tape, n, kShardRows, dw, in * out, [&](Index begin, Index end, T* to) {
-      using namespace kernels;
-      FIELDMARK_KERNEL(gemm<T>)
-      ({.m = in,
-        .n = out,
-        .k = end - begin,
-        .a = x.value() + begin * in,
-        .a_row = 1,
-        .a_col = in,
-        .b = d + begin * panel,
-        .b_panel = n * panel,
-        .c = to,
-        .ldc = out,
-        .accumulate = true});
-    });
-  if (T* db = b.grad_acc()) detail::add_column_sums(d, n, out, db);
-  bool fresh = false;
-  if (T* dx = x.grad_acc(&fresh)) {
-    const T* transposed = w.packed() ? w.packed()->transposed : nullptr;
-    if (!transposed) {
-      T* to = tape.scratch(detail::transposed_size<T>(in, out));
-      detail::pack_transposed(w.value(), in, out, to);
-      transposed = to;
+  const Index n = x.shape()[0], in = w.shape()[0], out = w.shape()[1], row = detail::whole_row<T>(out);
+  const T* mask = y.rectified() && !y.grad_masked() ? y.value() : nullptr;
+  Backward<T> p{in, out, x.value(), nullptr, mask, nullptr, x.rectified(), false};
+  p.dx = x.grad_acc(&p.fresh, p.mask_dx);
+  if (p.dx)
+    p.transposed =
+        w.packed() ? w.packed()->transposed : detail::packed(tape, w.value(), out, in, Index{1}, out);
+  T *dw = w.grad_acc(), *db = b.grad_acc();
+  const Index pieces = (n + kPieceRows - 1) / kPieceRows, own = (dw ? in * out : 0) + (db ? out : 0);
+  const Index shards = std::min(detail::kProductShards, (n + kShardRows - 1) / kShardRows);
+  const Index room = mask || row != out ? std::min(n, kPieceRows) * row : 0;
+  T *rooms = tape.scratch(shards * room), *sums = shards > 1 ? tape.scratch(shards * own) : nullptr;
+  parallel_for(shards, 1, [&](Index s, Index) {
+    T *to_w = dw, *to_b = db;
+    if (sums) {
+      to_w = dw ? sums + s * own : nullptr;
+      to_b = db ? sums + (s + 1) * own - out : nullptr;
+      std::fill_n(sums + s * own, own, T(0));
     }
-    detail::product<T>({.m = n,
-                        .n = in,
-                        .k = detail::transposed_rows<T>(out) / panels,
-                        .segments = panels,
-                        .a = d,
-                        .a_row = panel,
-                        .a_segment = n * panel,
-                        .b = transposed,
-                        .c = dx,
-                        .ldc = in,
-                        .accumulate = !fresh});
+    for (Index i = s * pieces / shards; i < (s + 1) * pieces / shards; ++i)
+      backward_rows(p, dy, i * kPieceRows, std::min(n, (i + 1) * kPieceRows),
+                    room ? rooms + s * room : nullptr, to_w, to_b);
+  });
+  for (Index s = 0; sums && s < shards; ++s) {
+    const T* from = sums + s * own;
+    for (Index i = 0; dw && i < in * out; ++i) dw[i] += from[i];
+    for (Index i = 0; db && i < out; ++i) db[i] += from[own - out + i];
   }
 }
 
@@ -80,8 +116,11 @@ Var<T> dense(Var<T> x, Var<T> w, Var<T> b, Activation activation) {
        .bias = b.value(),
        .relu = relu});
 
-  // dZ = dY where y > 0 (all of it without a ReLU); dX = dZ W^T, dW = X^T dZ, db = column sums of dZ.
-  tape.on_backward(result, [=](const T* dy) { backward(x, w, b, y, dy, n, relu); });
+  if (relu) tape.mark_rectified(result);
+
+  // dZ = dY where y > 0 (all of it without a ReLU); dX = dZ W^T, dW = X^T dZ, db = column sums of dZ. Where x
+  // itself came through a ReLU its mask is laid on dX here, where x is at hand.
+  tape.on_backward(result, [=](const T* dy) { backward(x, w, b, result, dy); });
   return result;
 }
 

@@ -39,30 +39,6 @@ T* packed(Tape<T>& tape, const T* b, Index rows, Index columns, Index row, Index
   return out;
 }
 
-/// Rows of W^T, W [in, out], with which dX = dY W^T reads dY in panels: those of a last panel that `out` does
-/// not fill are zeros, unless it is the only one.
-template <class T>
-Index transposed_rows(Index out) {
-  const Index panel = panel_width<T>(out);
-  return out > panel ? round_up(out, panel) : out;
-}
-template <class T>
-Index transposed_size(Index in, Index out) {
-  return panels_size<T>(transposed_rows<T>(out), in);
-}
-/// W^T [transposed_rows(out), in] in panels.
-template <class T>
-void pack_transposed(const T* w, Index in, Index out, T* to) {
-  const Index rows = transposed_rows<T>(out), panel = panel_width<T>(in);
-  pack(w, out, in, Index{1}, out, static_cast<const T*>(nullptr), to);
-  if (rows == out) return;
-  // Panels of `out` rows become panels of `rows`, from the last on: none is written before it was moved.
-  for (Index p = round_up(in, panel) / panel - 1; p >= 0; --p) {
-    std::copy_backward(to + p * out * panel, to + (p + 1) * out * panel, to + (p * rows + out) * panel);
-    std::fill_n(to + (p * rows + out) * panel, (rows - out) * panel, T(0));
-  }
-}
-
 /// Runs a product in pieces of rows; a row of C has one owner.
 template <class T>
 void product(const kernels::Gemm<T>& g) {
@@ -96,11 +72,19 @@ void sharded_sum(Tape<T>& tape, Index items, Index grain, T* into, Index size, F
     for (Index i = 0; i < size; ++i) into[i] += buffers[s * size + i];
 }
 
-/// into [columns] += the sums of the columns of d, which packed() laid out from [rows, columns].
+/// Numbers in a row of `columns` that whole vectors fill: so long must the rows of a matrix be that products
+/// read where it lies.
+template <class T>
+Index whole_row(Index columns) {
+  return round_up(columns, panel_width<T>(1));
+}
+
+/// into [columns] += the sums of the columns of d, whose rows are whole_row(columns) apart.
 template <class T>
 void add_column_sums(const T* d, Index rows, Index columns, T* into) {
   using namespace kernels;
-  FIELDMARK_KERNEL(column_sums<T>)(d, rows, columns, into);
+  FIELDMARK_KERNEL(column_sums<T>)
+  (d, rows, columns, whole_row<T>(columns), panel_width<T>(columns), into);
 }
 
 }  // namespace fieldmark::detail

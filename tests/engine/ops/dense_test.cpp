@@ -1,3 +1,5 @@
+#include <fieldmark/engine/ops/arithmetic.h>
+#include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/engine/ops/dense.h>
 #include <fieldmark/engine/parallel.h>
 
@@ -81,6 +83,24 @@ TEST_CASE("dense: gradient") {
     expect_grad(f, {uniform({1, 1}, 0.2, 1, 1), uniform({1, 1}, 0.2, 1, 2), uniform({1}, 0, 0.1, 3)});
     expect_grad(f, {uniform({0, 3}, -1, 1, 1), uniform({3, 5}, -1, 1, 2), uniform({5}, -1, 1, 3)});
   }
+}
+
+TEST_CASE("dense: gradient through layers that mask for each other, with another op between") {
+  // Every other unit is shut, and all are far from their kink.
+  const auto alternating = [](Shape shape, std::uint64_t seed) {
+    Tensor<double> w = uniform(shape, 0.2, 1, seed);
+    for (Index i = 1; i < shape.size(); i += 2) w[i] = -w[i];
+    return w;
+  };
+  for (bool branch : {false, true})
+    expect_grad(
+        [branch](Tape<double>&, auto v) {
+          const auto first = dense(v[0], v[1], v[2], Activation::relu);
+          const auto last = dense(first, v[3], v[4], Activation::relu);
+          return branch ? concat_columns({last, mul(first, first)}) : last;
+        },
+        {uniform({5, 4}, 0.2, 1, 1), alternating({4, 8}, 2), alternating({8}, 3), alternating({8, 6}, 4),
+         alternating({6}, 5)});
 }
 
 TEST_CASE("dense: errors") {

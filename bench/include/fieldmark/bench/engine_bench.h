@@ -12,7 +12,7 @@ struct EngineRow {
   double seconds = 0;        ///< median of a call
   double spread = 0;         ///< (slowest - fastest) / median over the runs
   double gflops = 0;         ///< useful operations, forward and backward; 0 for look-ups
-  double ratio_to_peak = 0;  ///< gflops over the peak measured in the same run; 0 for look-ups
+  double ratio_to_peak = 0;  ///< over the peak measured around each run, median; 0 for look-ups
   double rate = 0;           ///< samples, points or pictures a second
   double speedup = 0;        ///< over the plain scalar loop in the same run; 0 where there is none
   double error =

@@ -7,16 +7,21 @@ namespace fieldmark::bench {
 struct Timing {
   double seconds = 0;  ///< median over the runs
   double least = 0, most = 0;
+  double peak_operations = 0;  ///< that the machine's peak would have done meanwhile, median over the runs
 };
 
 /// Calls `body` once to warm up, then `runs` times; where a call is shorter than `least_seconds`, a run is as
-/// many calls as take that long, and counts as their mean.
+/// many calls as take that long, and counts as their mean. The peak is measured in bursts of 0.3 ms right
+/// before and after each run, because a shared machine's speed drifts by a third within minutes, and the
+/// clock also depends on what was just run: 2.2 or 2.45 GHz after products of matrices, and some milliseconds
+/// to change.
 /// @param runs  at least 1   @param least_seconds  >= 0   @throws ValueError otherwise
 Timing time_calls(const std::function<void()>& body, int runs = 5, double least_seconds = 0.1);
 
 /// Fused multiply-adds that this machine does in a second with the threads and the instruction set in use, in
-/// GFLOP/s: the best of several runs on registers alone, on all threads at once.
-double peak_gflops();
+/// GFLOP/s: on registers alone, on all threads at once; median of several bursts.
+/// @param bursts  at least 1   @param seconds  of each, > 0
+double peak_gflops(int bursts = 9, double seconds = 0.02);
 
 /// Most memory this process has had so far, megabytes; 0 where the system does not say.
 double peak_megabytes();

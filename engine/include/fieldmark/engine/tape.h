@@ -15,6 +15,12 @@ namespace fieldmark {
 template <class T>
 class Tape;
 
+namespace detail {
+// g[i] = or += seed[i], or 0 where mask (null: none) is not positive.
+template <class T>
+void seed_gradient(const T* seed, const T* mask, bool fresh, T* g, Index n);
+}  // namespace detail
+
 /// A matrix W [in, out] as products read it: W in panels of columns, and W^T. See PackedWeights.
 template <class T>
 struct PackedMatrix {
@@ -41,7 +47,14 @@ class Var {
   /// As grad_acc(), but a buffer made by this call is left uninitialised and *fresh is set: the caller then
   /// assigns every element instead of adding. Saves a pass over memory in ops that write all of their input's
   /// gradient.
-  T* grad_acc(bool* fresh) const;
+  /// @param masked  the caller leaves 0 where a rectified() value is not positive
+  T* grad_acc(bool* fresh, bool masked = false) const;
+  /// True for what a ReLU has put out (Tape::mark_rectified): its gradient matters only where the value is
+  /// positive, and an op that has the value at hand anyway may mask what it adds, which spares the ReLU's own
+  /// backward a pass over memory.
+  bool rectified() const { return slot_->rectified; }
+  /// True if all that was added to grad() so far was masked.
+  bool grad_masked() const { return slot_->masked; }
 
  private:
   friend class Tape<T>;
@@ -50,6 +63,9 @@ class Var {
     T* grad;
     Shape shape;
     bool needs_grad;
+    bool rectified;  // a ReLU's output
+    bool masked;     // no gradient came unmasked
+    T* target;       // where the gradient goes once one arrives; null: to the arena
     const PackedMatrix<T>* packed;
   };
   Var(Tape<T>* t, Slot* s) : tape_(t), slot_(s) {}
@@ -73,6 +89,13 @@ class Tape {
   /// A parameter or another input to differentiate in: the gradient is added to what `grad` already holds.
   Var<T> leaf(const T* value, T* grad, Shape shape) { return make(value, grad, shape, true); }
   Var<T> leaf(const Tensor<T>& t, Tensor<T>& grad) { return leaf(t.data.data(), grad.data.data(), t.shape); }
+  /// As leaf(), but the gradient is written over what `grad` holds, which need not be zeroed before; where
+  /// none arrives it stays as it was.
+  Var<T> fresh_leaf(const T* value, T* grad, Shape shape) {
+    const Var<T> v = make(value, nullptr, shape, true);
+    v.slot_->target = grad;
+    return v;
+  }
   /// A matrix, with its packed form beside it. @param grad  null: a constant
   Var<T> matrix(const T* value, T* grad, Shape shape, const PackedMatrix<T>* packed) {
     return make(value, grad, shape, grad != nullptr, packed);
@@ -88,6 +111,8 @@ class Tape {
     *data = scratch(shape.size());
     return make(*data, nullptr, shape, needs_grad);
   }
+  /// Says that `out` came through a ReLU, see Var::rectified().
+  void mark_rectified(Var<T> out) { out.slot_->rectified = true; }
   /// The same numbers under another shape of equal size; gradients flow through unchanged.
   Var<T> reshape(Var<T> x, Shape shape);
   /// Uninitialised room for what a backward wants to keep.
@@ -120,9 +145,10 @@ class Tape {
     if (static_cast<Index>(seed.size()) != out.shape().size())
       throw ShapeError("[backward] seed must have one number for each of out, whose shape is " +
                        out.shape().str() + ", got " + std::to_string(seed.size()));
-    T* g = out.grad_acc();
+    bool fresh = false;
+    T* g = out.grad() ? out.grad_acc() : out.grad_acc(&fresh, true);
     if (!g) throw ValueError("[backward] nothing to differentiate: no input of this value needs a gradient");
-    for (std::size_t i = 0; i < seed.size(); ++i) g[i] += seed[i];
+    detail::seed_gradient(seed.data(), out.rectified() ? out.value() : nullptr, fresh, g, out.shape().size());
     replay();
   }
   /// Replays with the gradients that Var::grad_acc() holds already: several outputs may have been seeded by
@@ -145,7 +171,8 @@ class Tape {
   };
   Var<T> make(const T* value, T* grad, Shape shape, bool needs, const PackedMatrix<T>* packed = nullptr) {
     using Slot = typename Var<T>::Slot;
-    return Var<T>(this, new (arena_.allocate(sizeof(Slot))) Slot{value, grad, shape, needs, packed});
+    return Var<T>(this, new (arena_.allocate(sizeof(Slot)))
+                            Slot{value, grad, shape, needs, false, true, nullptr, packed});
   }
   Arena arena_;
   std::vector<Node> nodes_;
@@ -160,13 +187,14 @@ T* Var<T>::grad_acc() const {
 }
 
 template <class T>
-T* Var<T>::grad_acc(bool* fresh) const {
+T* Var<T>::grad_acc(bool* fresh, bool masked) const {
   *fresh = false;
   if (!slot_->needs_grad) return nullptr;
   if (!slot_->grad) {
-    slot_->grad = tape_->scratch(slot_->shape.size());
+    slot_->grad = slot_->target ? slot_->target : tape_->scratch(slot_->shape.size());
     *fresh = true;
   }
+  if (!masked) slot_->masked = false;
   return slot_->grad;
 }
 
