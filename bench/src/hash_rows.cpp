@@ -91,15 +91,17 @@ struct Scalar {
       }
   }
   template <class T>
-  void backward(int l, const T* x, Index n, const T* ddensity, const T* dcolour, T* grad) const {
+  void backward(int first_level, int every, const T* x, Index n, const T* ddensity, const T* dcolour,
+                T* grad) const {
     const Index width = encoding.width();
     for (Index i = 0; i < n; ++i)
-      corners(l, x + 3 * i, [&](std::int64_t row, T w) {
-        for (int j = 0; j < kFeatures; ++j) {
-          grad[row * kEntry + j] += w * ddensity[i * width + kFeatures * l + j];
-          grad[row * kEntry + kFeatures + j] += w * dcolour[i * width + kFeatures * l + j];
-        }
-      });
+      for (int l = first_level; l < encoding.levels(); l += every)
+        corners(l, x + 3 * i, [&](std::int64_t row, T w) {
+          for (int j = 0; j < kFeatures; ++j) {
+            grad[row * kEntry + j] += w * ddensity[i * width + kFeatures * l + j];
+            grad[row * kEntry + kFeatures + j] += w * dcolour[i * width + kFeatures * l + j];
+          }
+        });
   }
   const HashEncoding<float>& encoding;
   std::vector<bool> hashed;
@@ -112,6 +114,7 @@ struct Hash {
     std::copy(start.begin(), start.end(), store.values().begin());
     density.resize(static_cast<std::size_t>(n * encoding.width()));
     colour.resize(density.size());
+    scratch.resize(2 * density.size());
     for (auto* g : {&ddensity, &dcolour}) *g = numbers<float>(n * encoding.width(), 7);
   }
   void forward() { encoding.encode(store.values(), x.data(), n, density.data(), colour.data()); }
@@ -122,19 +125,18 @@ struct Hash {
     });
   }
   void backward() {
-    parallel_for(encoding.levels(), 1, [&](Index l, Index) {
-      encoding.backward_level(static_cast<int>(encoding.levels() - 1 - l), x.data(), n, ddensity.data(),
-                              dcolour.data(), store.grads());
-    });
+    encoding.backward(x.data(), n, ddensity.data(), dcolour.data(), store.grads(), scratch.data());
   }
+  // Threads own levels, for no two may add to one row.
   void backward_scalar() {
-    parallel_for(encoding.levels(), 1, [&](Index l, Index) {
-      scalar.backward(static_cast<int>(encoding.levels() - 1 - l), x.data(), n, ddensity.data(),
-                      dcolour.data(), store.grads().data());
+    const int parts = threads();
+    parallel_for(parts, 1, [&](Index part, Index) {
+      scalar.backward(static_cast<int>(part), parts, x.data(), n, ddensity.data(), dcolour.data(),
+                      store.grads().data());
     });
   }
 
-  std::vector<float> x, density, colour, ddensity, dcolour;
+  std::vector<float> x, density, colour, ddensity, dcolour, scratch;
   Index n;
   ParamStore<float> store;
   HashEncoding<float> encoding{store, "hash", kOptions, 1};
@@ -157,10 +159,8 @@ double error_of(Hash& h, bool forward) {
   }
   std::vector<double> grad(table.size());
   std::fill(h.store.grads().begin(), h.store.grads().end(), 0.f);
-  for (int l = 0; l < h.encoding.levels(); ++l) {
-    h.scalar.backward(l, x.data(), n, dd.data(), dc.data(), grad.data());
-    h.encoding.backward_level(l, h.x.data(), n, h.ddensity.data(), h.dcolour.data(), h.store.grads());
-  }
+  h.scalar.backward(0, 1, x.data(), n, dd.data(), dc.data(), grad.data());
+  h.encoding.backward(h.x.data(), n, h.ddensity.data(), h.dcolour.data(), h.store.grads(), h.scratch.data());
   return relative_error(h.store.grads(), grad);
 }
 

@@ -65,11 +65,27 @@ void HashEncoding<T>::encode(std::span<const T> table, const T* x, Index n, T* d
 }
 
 template <class T>
-void HashEncoding<T>::backward_level(int level, const T* x, Index n, const T* ddensity, const T* dcolour,
-                                     std::span<T> grad) const {
+void HashEncoding<T>::deal_to_levels(Index n, const T* ddensity, const T* dcolour, T* out) const {
   using namespace kernels;
-  FIELDMARK_KERNEL(hash_backward_level<T>)
-  (raw(levels_)[level], level, levels(), features_, x, n, ddensity, dcolour, grad.data());
+  const auto deal = FIELDMARK_KERNEL(hash_by_level<T>);
+  parallel_for(n, kGrain,
+               [&](Index b, Index e) { deal(levels(), features_, ddensity, dcolour, b, e, n, out); });
+}
+
+template <class T>
+void HashEncoding<T>::backward_level(int level, const T* x, Index n, const T* d, std::span<T> grad) const {
+  using namespace kernels;
+  FIELDMARK_KERNEL(hash_backward_level<T>)(raw(levels_)[level], features_, x, n, d, grad.data());
+}
+
+template <class T>
+void HashEncoding<T>::backward(const T* x, Index n, const T* ddensity, const T* dcolour, std::span<T> grad,
+                               T* scratch) const {
+  deal_to_levels(n, ddensity, dcolour, scratch);
+  parallel_for(levels(), 1, [&](Index i, Index) {
+    const Index l = levels() - 1 - i;  // the finest, slowest level first
+    backward_level(static_cast<int>(l), x, n, scratch + l * n * 2 * features_, grad);
+  });
 }
 
 template <class T>
@@ -99,10 +115,8 @@ Var<T> HashEncoding<T>::operator()(const Params<T>& params, Var<T> x, Part part)
       });
     }
     if (T* dt = table.grad_acc())
-      parallel_for(levels(), 1, [&](Index l, Index) {
-        backward_level(static_cast<int>(l), x.value(), n, dd, dc,
-                       {dt, static_cast<std::size_t>(table.shape().size())});
-      });
+      backward(x.value(), n, dd, dc, {dt, static_cast<std::size_t>(table.shape().size())},
+               x.tape().scratch(2 * n * width()));
   });
   return out;
 }

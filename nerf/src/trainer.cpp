@@ -39,7 +39,7 @@ Index pick(float u, float v, Index n) {
 // The rays of a chunk, and what its samples pass back to the table.
 struct Trainer::Chunk {
   std::vector<float> origins, directions, jitter, photograph, background;
-  std::vector<float> position, ddensity, dcolour;
+  std::vector<float> position, dfeatures;  // the latter level by level
   Index samples = 0;
 };
 
@@ -121,13 +121,12 @@ double Trainer::run_chunk(Index index, Index shard, Tape<float>& tape, float* gr
                               chunk.jitter, {.step = field_.step(), .stop = options_.stop}, s, &packed_);
   const Index n = chunk.samples = s.size(), width = field_.field.encoding().width();
   chunk.position.assign(s.position.begin(), s.position.end());
-  chunk.ddensity.assign(at(n * width), 0.f);
-  chunk.dcolour.assign(at(n * width), 0.f);
+  chunk.dfeatures.resize(at(2 * n * width));
 
   // The features were looked up by the sampler; as leaves they collect what the table is owed.
   const Params<float> params(field_.params, grads, packed_);
-  const Var<float> density_features = tape.leaf(s.density_features.data(), chunk.ddensity.data(), {n, width});
-  const Var<float> colour_features = tape.leaf(s.colour_features.data(), chunk.dcolour.data(), {n, width});
+  const Var<float> density_features = tape.fresh_leaf(s.density_features.data(), nullptr, {n, width});
+  const Var<float> colour_features = tape.fresh_leaf(s.colour_features.data(), nullptr, {n, width});
   const Var<float> of_ray = spherical_harmonics(tape.constant(chunk.directions.data(), {kRays, 3}));
   float* harmonics = tape.scratch(n * kSphericalHarmonics);
   for (Index r = 0; r < kRays; ++r)
@@ -146,6 +145,8 @@ double Trainer::run_chunk(Index index, Index shard, Tape<float>& tape, float* gr
                                                   {.huber = options_.huber, .scale = share});
   const double value = static_cast<double>(loss.value()[0]);
   tape.backward(loss);
+  field_.field.encoding().deal_to_levels(n, density_features.grad(), colour_features.grad(),
+                                         chunk.dfeatures.data());
   return value;
 }
 
@@ -153,12 +154,13 @@ double Trainer::run_chunk(Index index, Index shard, Tape<float>& tape, float* gr
 void Trainer::backward_table() {
   const HashEncoding<float>& encoding = field_.field.encoding();
   const std::span<float> grad = field_.params.grads(encoding.table());
-  const Index chunks = rays_per_step_ / kRays;
+  const Index chunks = rays_per_step_ / kRays, entry = 2 * encoding.features();
   parallel_for(encoding.levels(), 1, [&](Index l, Index) {
     const int level = static_cast<int>(encoding.levels() - 1 - l);  // the finest, slowest level first
     for (Index c = 0; c < chunks; ++c) {
       const Chunk& k = chunks_[at(c)];
-      encoding.backward_level(level, k.position.data(), k.samples, k.ddensity.data(), k.dcolour.data(), grad);
+      encoding.backward_level(level, k.position.data(), k.samples,
+                              k.dfeatures.data() + level * k.samples * entry, grad);
     }
   });
 }

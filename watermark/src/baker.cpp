@@ -106,7 +106,7 @@ double Baker::run_chunk(Index index, Index shard, Tape<float>& tape, float* grad
   const Index n = c.samples, width = field_.field.encoding().width();
   c.features.resize(at(n * width));
   c.unused.resize(at(n * width));
-  c.dfeatures.assign(at(n * width), 0.f);
+  c.dfeatures.resize(at(2 * n * width));
   if (n == 0) return 0;
   const nerf::Field<float>& net = field_.field;
   const Params<float> frozen(owner_.field.params, nullptr), learnt(field_.params, grads);
@@ -118,14 +118,15 @@ double Baker::run_chunk(Index index, Index shard, Tape<float>& tape, float* grad
 
   net.encoding().encode(field_.params.values(net.encoding().table()), c.position.data(), n, c.unused.data(),
                         c.features.data());
-  const Var<float> rgb =
-      net.colour(learnt, z, tape.leaf(c.features.data(), c.dfeatures.data(), {n, width}), harmonics);
+  const Var<float> features = tape.fresh_leaf(c.features.data(), nullptr, {n, width});
+  const Var<float> rgb = net.colour(learnt, z, features, harmonics);
   float* weights = tape.scratch(3 * n);
   for (Index i = 0; i < 3 * n; ++i) weights[i] = c.weight[at(i / 3)];
   const Var<float> loss = mse_loss<float>(rgb, tape.constant(c.target.data(), {n, 3}),
                                           std::span<const float>(weights, at(3 * n)));
   const double value = static_cast<double>(loss.value()[0]);
   tape.backward(loss);
+  net.encoding().deal_to_levels(n, nullptr, features.grad(), c.dfeatures.data());
   return value;
 }
 
@@ -139,8 +140,9 @@ void Baker::step(double seconds) {
       field_.params.grads().first(at(network)));
   parallel_for(encoding.levels(), 1, [&](Index level, Index) {
     for (const Chunk& c : chunks_)
-      encoding.backward_level(static_cast<int>(level), c.position.data(), c.samples, nullptr,
-                              c.dfeatures.data(), field_.params.grads(encoding.table()));
+      encoding.backward_level(static_cast<int>(level), c.position.data(), c.samples,
+                              c.dfeatures.data() + level * c.samples * 2 * encoding.features(),
+                              field_.params.grads(encoding.table()));
   });
   // Density's numbers get no gradient: its networks are outside the range, its features are left alone where
   // it is 0.

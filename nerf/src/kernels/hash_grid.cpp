@@ -139,14 +139,24 @@ template <class T, int P>
 }
 
 template <class T, int P>
-void backward_level(const HashLevel& level, int index, int levels, const T* x, std::int64_t n,
-                    const T* ddensity, const T* dcolour, T* grad) {
+void by_level(int levels, const T* ddensity, const T* dcolour, std::int64_t begin, std::int64_t end,
+              std::int64_t n, T* out) {
+  for (std::int64_t b = begin; b < end; b += kBlock)  // so that whole lines are written at a time
+    for (int l = 0; l < levels; ++l)
+      for (std::int64_t i = b; i < end && i < b + kBlock; ++i) {
+        const Entry<T, P> g = cotangent<T, P>(ddensity, dcolour, (i * levels + l) * P);
+        std::memcpy(out + (l * n + i) * 2 * P, &g, sizeof g);
+      }
+}
+
+template <class T, int P>
+void backward_level(const HashLevel& level, const T* x, std::int64_t n, const T* d, T* grad) {
   T* entries = grad + level.first * 2 * P;
   for_blocks<T, P>(level, x, n, entries, [&](const Corners<T, P>& corners, std::int64_t begin, int count) {
     alignas(64) T w[8][kBlock];
     corners.weights(w);
     for (int i = 0; i < count; ++i) {
-      const Entry<T, P> g = cotangent<T, P>(ddensity, dcolour, ((begin + i) * levels + index) * P);
+      const Entry<T, P> g = load<T, P>(d + (begin + i) * 2 * P);
       for (int k = 0; k < 8; ++k) {
         T* at = entries + corners.place[k][i];
         const Entry<T, P> sum = load<T, P>(at) + w[k][i] * g;
@@ -195,10 +205,14 @@ void hash_forward(const HashLevel* level, int levels, int part, const T* x, std:
 }
 
 template <class T>
-void hash_backward_level(const HashLevel& level, int index, int levels, int part, const T* x, std::int64_t n,
-                         const T* ddensity, const T* dcolour, T* grad) {
-  (part == 2 ? backward_level<T, 2> : backward_level<T, 4>)(level, index, levels, x, n, ddensity, dcolour,
-                                                            grad);
+void hash_by_level(int levels, int part, const T* ddensity, const T* dcolour, std::int64_t begin,
+                   std::int64_t end, std::int64_t n, T* out) {
+  (part == 2 ? by_level<T, 2> : by_level<T, 4>)(levels, ddensity, dcolour, begin, end, n, out);
+}
+
+template <class T>
+void hash_backward_level(const HashLevel& level, int part, const T* x, std::int64_t n, const T* d, T* grad) {
+  (part == 2 ? backward_level<T, 2> : backward_level<T, 4>)(level, x, n, d, grad);
 }
 
 template <class T>
@@ -207,11 +221,11 @@ void hash_backward_x(const HashLevel* level, int levels, int part, const T* x, s
   (part == 2 ? backward_x<T, 2> : backward_x<T, 4>)(level, levels, x, n, table, ddensity, dcolour, dx);
 }
 
-#define FIELDMARK_INSTANTIATE(T)                                                                        \
-  template void hash_forward(const HashLevel*, int, int, const T*, std::int64_t, const T*, T*, T*);     \
-  template void hash_backward_level(const HashLevel&, int, int, int, const T*, std::int64_t, const T*,  \
-                                    const T*, T*);                                                      \
-  template void hash_backward_x(const HashLevel*, int, int, const T*, std::int64_t, const T*, const T*, \
+#define FIELDMARK_INSTANTIATE(T)                                                                           \
+  template void hash_forward(const HashLevel*, int, int, const T*, std::int64_t, const T*, T*, T*);        \
+  template void hash_by_level(int, int, const T*, const T*, std::int64_t, std::int64_t, std::int64_t, T*); \
+  template void hash_backward_level(const HashLevel&, int, const T*, std::int64_t, const T*, T*);          \
+  template void hash_backward_x(const HashLevel*, int, int, const T*, std::int64_t, const T*, const T*,    \
                                 const T*, T*);
 FIELDMARK_INSTANTIATE(float)
 FIELDMARK_INSTANTIATE(double)

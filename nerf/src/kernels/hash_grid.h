@@ -19,10 +19,15 @@ struct HashLevel {
 FIELDMARK_DECLARE_KERNEL(template <class T> void, hash_forward,
                          (const HashLevel* level, int levels, int part, const T* x, std::int64_t n,
                           const T* table, T* density, T* colour))
-// Adds the gradient of ONE level to grad [rows, 2 part], point after point.
+// The gradients at density and colour (null: zeros) of points [begin, end) of n, entry by entry and level by
+// level: out [levels, n, 2 part]. A level then reads its own without skipping over the others'.
+FIELDMARK_DECLARE_KERNEL(template <class T> void, hash_by_level,
+                         (int levels, int part, const T* ddensity, const T* dcolour, std::int64_t begin,
+                          std::int64_t end, std::int64_t n, T* out))
+// Adds the gradient of ONE level, whose part of hash_by_level() is d [n, 2 part], to grad [rows, 2 part],
+// point after point.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, hash_backward_level,
-                         (const HashLevel& level, int index, int levels, int part, const T* x, std::int64_t n,
-                          const T* ddensity, const T* dcolour, T* grad))
+                         (const HashLevel& level, int part, const T* x, std::int64_t n, const T* d, T* grad))
 // Adds the gradient in the positions to dx [n, 3].
 FIELDMARK_DECLARE_KERNEL(template <class T> void, hash_backward_x,
                          (const HashLevel* level, int levels, int part, const T* x, std::int64_t n,

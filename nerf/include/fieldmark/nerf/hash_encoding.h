@@ -44,10 +44,16 @@ class HashEncoding {
   /// Both parts at the price of one look-up, not recorded. @param x [n, 3]  @param density, colour [n, F L]
   /// are written
   void encode(std::span<const T> table, const T* x, Index n, T* density, T* colour) const;
-  /// Adds to `grad` [rows, 2 F] what `encode` of x would pass back from ddensity, dcolour [n, F L] for one
-  /// level. Levels own disjoint rows, so they may run on different threads; points are added in order.
-  void backward_level(int level, const T* x, Index n, const T* ddensity, const T* dcolour,
-                      std::span<T> grad) const;
+  /// Adds to `grad` [rows, 2 F] what `encode` of x would pass back from ddensity, dcolour [n, F L] (null:
+  /// zeros).
+  /// @param scratch  [n, 2 F L], overwritten
+  void backward(const T* x, Index n, const T* ddensity, const T* dcolour, std::span<T> grad,
+                T* scratch) const;
+  /// The two halves of backward(), for callers that keep several lists of points: gradients dealt to `out`
+  /// [L, n, 2 F], and those of one level, out's [n, 2 F], added to the table's. Levels own disjoint rows, so
+  /// they may run on different threads; points are added in order.
+  void deal_to_levels(Index n, const T* ddensity, const T* dcolour, T* out) const;
+  void backward_level(int level, const T* x, Index n, const T* d, std::span<T> grad) const;
 
   Index width() const { return Index{features_} * levels(); }  ///< F L, features of a part
   int features() const { return features_; }
