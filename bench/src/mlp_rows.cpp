@@ -19,7 +19,8 @@ constexpr int kShards = 16;
 // from u.
 template <class T>
 struct Mlp {
-  Mlp(Index depth, Index units, Index rows) : width(units), samples(rows) {
+  Mlp(Index depth, Index units, Index rows, Precision precision = Precision::fp32)
+      : width(units), samples(rows) {
     for (Index l = 0; l < depth; ++l)
       layers.emplace_back(store, std::to_string(l),
                           DenseOptions{.in = width, .out = width, .activation = Activation::relu},
@@ -28,7 +29,7 @@ struct Mlp {
     u = numbers<T>(samples * width, 2);
     dx.assign(x.size(), T(0));
     y.resize(x.size());
-    packed = std::make_unique<PackedWeights<T>>(store);
+    packed = std::make_unique<PackedWeights<T>>(store, PackOptions{.precision = precision});
   }
 
   // Rows [begin, begin + n) through a tape; parameters' gradients go to `grads`.
@@ -68,8 +69,8 @@ void in_chunks(Mlp<T>& mlp, ShardedLoop<T>& loop) {
 }
 
 // Values, dX and weight gradients of float against double on a part of the samples.
-double error_of(Index depth, Index width) {
-  Mlp<float> f(depth, width, 4 * kChunk);
+double error_of(Index depth, Index width, Precision precision = Precision::fp32) {
+  Mlp<float> f(depth, width, 4 * kChunk, precision);
   Mlp<double> d(depth, width, 4 * kChunk);
   f.keep = d.keep = true;
   std::copy(f.store.values().begin(), f.store.values().end(), d.store.values().begin());
@@ -87,12 +88,13 @@ Index scaled(Index samples, double scale) {
   return std::max(kChunk, static_cast<Index>(static_cast<double>(samples) * scale));
 }
 
-EngineRow chunked(Index depth, Index width, Index samples, const EngineBenchOptions& o) {
-  Mlp<float> mlp(depth, width, scaled(samples, o.scale));
+EngineRow chunked(Index depth, Index width, Index samples, const EngineBenchOptions& o,
+                  Precision precision = Precision::fp32) {
+  Mlp<float> mlp(depth, width, scaled(samples, o.scale), precision);
   ShardedLoop<float> loop(kShards, mlp.store.size());
   EngineRow row = row_of(time_calls([&] { in_chunks(mlp, loop); }, o.runs), mlp.operations(),
                          static_cast<double>(mlp.samples));
-  row.error = error_of(depth, width);
+  row.error = error_of(depth, width, precision);
   return row;
 }
 
@@ -128,6 +130,9 @@ std::vector<RowSpec> mlp_rows() {
                             {"mlp_4x64_tape_fb_f32", "the same through one tape over the whole batch",
                              [](const EngineBenchOptions& o) { return whole_batch(4, 64, 262144, o); }},
                             {"mlp_8x256_fb_f32", "8 dense layers of 256, 32,768 samples, in chunks", wide}};
+  if (bf16_units() != Bf16Units::none)
+    rows.push_back({"mlp_4x64_fb_bf16", "forward and dX in bf16, dW in float",
+                    [](const EngineBenchOptions& o) { return chunked(4, 64, 262144, o, Precision::bf16); }});
   if (isa() > Isa::v3)
     for (const auto& [name, row] : {std::pair{"mlp_4x64_fb_f32_avx2", RowRun(narrow)},
                                     std::pair{"mlp_8x256_fb_f32_avx2", RowRun(wide)}})

@@ -1,21 +1,50 @@
 #include <fieldmark/engine/packed_weights.h>
 
+#include "kernels/gemm_bf16.h"
 #include "ops/product.h"
 
 namespace fieldmark {
+namespace {
+
+bool ends(const std::string& name, std::string_view end) {
+  return name.size() >= end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0;
+}
+template <class Entry>
+bool is_matrix(const Entry& e) {
+  return e.shape.rank() == 2 && ends(e.name, "/weight");
+}
+template <class Entry>
+bool is_table(const Entry& e) {
+  return e.shape.rank() == 2 && ends(e.name, "/table");
+}
+
+}  // namespace
 
 template <class T>
-PackedWeights<T>::PackedWeights(const ParamStore<T>& store)
-    : store_(&store), matrices_(store.entries().size()) {}
+PackedWeights<T>::PackedWeights(const ParamStore<T>& store, const PackOptions& options)
+    : store_(&store), options_(options), matrices_(store.entries().size()), tables_(matrices_.size()) {
+  if (options.precision == Precision::fp32) return;
+  if (std::is_same_v<T, double>)
+    throw ValueError("[packed_weights] precision: bf16 stands in for float, not for double");
+  if (bf16_units() == Bf16Units::none)
+    throw ValueError(
+        std::string("[packed_weights] precision: no bf16 products on this CPU with the kernels ") +
+        isa_name());
+}
 
 template <class T>
 void PackedWeights<T>::update() {
-  const auto is_matrix = [](const auto& e) { return e.shape.rank() == 2 && e.name.ends_with("/weight"); };
-  Index size = 0;
-  for (const auto& e : store_->entries())
-    if (is_matrix(e))
+  const bool bf16 = options_.precision == Precision::bf16;
+  Index size = 0, rounded = 0;
+  for (const auto& e : store_->entries()) {
+    if (is_matrix(e)) {
       size += detail::panels_size<T>(e.shape[0], e.shape[1]) + detail::panels_size<T>(e.shape[1], e.shape[0]);
+      rounded += kernels::bf16_size(e.shape[0], e.shape[1]) + kernels::bf16_size(e.shape[1], e.shape[0]);
+    }
+    if (options_.tables && is_table(e)) rounded += e.shape.size();
+  }
   panels_.resize(static_cast<std::size_t>(size));
+  if (bf16) rounded_.resize(static_cast<std::size_t>(rounded));
   T* to = panels_.data();
   for (std::size_t i = 0; i < matrices_.size(); ++i) {
     const auto& e = store_->entries()[i];
@@ -28,6 +57,34 @@ void PackedWeights<T>::update() {
     matrices_[i].transposed = to;
     detail::pack<T>(w, out, in, Index{1}, out, nullptr, to);
     to += detail::panels_size<T>(out, in);
+  }
+  if constexpr (std::is_same_v<T, float>)
+    if (bf16) update_rounded();
+}
+
+template <class T>
+void PackedWeights<T>::update_rounded() {
+  using namespace kernels;
+  const auto pack = FIELDMARK_KERNEL(pack_bf16);
+  std::uint16_t* to = rounded_.data();
+  for (std::size_t i = 0; i < matrices_.size(); ++i) {
+    const auto& e = store_->entries()[i];
+    const auto* w = reinterpret_cast<const float*>(store_->values().data() + e.offset);
+    if (is_matrix(e)) {
+      const Index in = e.shape[0], out = e.shape[1];
+      matrices_[i].forward_bf16 = to;
+      pack(w, in, out, out, 1, to);
+      to += bf16_size(in, out);
+      matrices_[i].transposed_bf16 = to;
+      pack(w, out, in, 1, out, to);
+      to += bf16_size(out, in);
+    } else if (options_.tables && is_table(e)) {
+      tables_[i] = to;
+      parallel_for(e.shape.size(), Index{1} << 16, [&](Index b, Index n) {
+        FIELDMARK_KERNEL(round_bf16)(w + b, n - b, to + b);
+      });
+      to += e.shape.size();
+    }
   }
 }
 

@@ -65,6 +65,17 @@ void HashEncoding<T>::encode(std::span<const T> table, const T* x, Index n, T* d
 }
 
 template <class T>
+void HashEncoding<T>::encode(const std::uint16_t* table, const T* x, Index n, T* density,
+                             T* colour) const requires std::is_same_v<T, float> {
+  using namespace kernels;
+  const auto forward = FIELDMARK_KERNEL(hash_forward_bf16);
+  parallel_for(n, kGrain, [&](Index begin, Index end) {
+    forward(raw(levels_), levels(), features_, x + 3 * begin, end - begin, table, density + begin * width(),
+            colour + begin * width());
+  });
+}
+
+template <class T>
 void HashEncoding<T>::deal_to_levels(Index n, const T* ddensity, const T* dcolour, T* out) const {
   using namespace kernels;
   const auto deal = FIELDMARK_KERNEL(hash_by_level<T>);

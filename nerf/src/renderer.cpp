@@ -24,7 +24,11 @@ struct Renderer::Lane {
 };
 
 Renderer::Renderer(const RadianceField& field, const RenderOptions& options)
-    : field_(field), options_(options) {
+    : field_(field),
+      options_(options),
+      packed_(field.params,
+              {.precision = options.precision, .tables = options.precision == Precision::bf16}) {
+  refresh();
   for (Index i = 0; i < kLanes; ++i) lanes_.push_back(std::make_unique<Lane>());
 }
 Renderer::~Renderer() = default;
@@ -42,7 +46,7 @@ void sample_weights(const RaySamples& samples, float step, float* weights) {
 void Renderer::trace(const RayBatch& rays, Index lane_index, float* out, float* position) {
   Lane& lane = *lanes_[at(lane_index)];
   lane.sampler.sample(field_.field, field_.params, field_.grid, rays, {},
-                      {.step = field_.step(), .stop = options_.stop}, lane.samples);
+                      {.step = field_.step(), .stop = options_.stop}, lane.samples, &packed_);
   const RaySamples& s = lane.samples;
   lane.weights.resize(at(s.size()));
   sample_weights(s, field_.step(), lane.weights.data());
@@ -58,7 +62,7 @@ void Renderer::trace(const RayBatch& rays, Index lane_index, float* out, float* 
       }
   lane.tape.reset();
   Tape<float>& tape = lane.tape;
-  const Params<float> params(field_.params, nullptr);
+  const Params<float> params(field_.params, nullptr, packed_);
   const Index width = field_.field.encoding().width();
   const auto rows = [&](const std::vector<float>& all, Index columns) {
     return gather_rows(tape.constant(all.data(), {static_cast<Index>(all.size()) / columns, columns}),
@@ -103,6 +107,7 @@ void Renderer::accumulate(const Lane& lane, Index rays, float* out, float* posit
 }
 
 Rendering Renderer::render(const Camera& camera) {
+  refresh();
   Rendering view{Tensor<float>({camera.height, camera.width, 3}),
                  Tensor<float>({camera.height, camera.width})};
   const Index columns = (camera.width + kTile - 1) / kTile,

@@ -75,9 +75,13 @@ void RaySampler::evaluate(const Field<float>& field, const ParamStore<float>& pa
   density_features_.resize(at((first + n) * width));
   colour_features_.resize(at((first + n) * width));
   sigma_.resize(at(first + n));
-  float* features = density_features_.data() + first * width;
-  field.encoding().encode(params.values(field.encoding().table()), x_.data() + 3 * first, n, features,
-                          colour_features_.data() + first * width);
+  float *features = density_features_.data() + first * width,
+        *colour = colour_features_.data() + first * width;
+  const ParamId table = field.encoding().table();
+  if (const std::uint16_t* rounded = packed ? packed->table(table) : nullptr)
+    field.encoding().encode(rounded, x_.data() + 3 * first, n, features, colour);
+  else
+    field.encoding().encode(params.values(table), x_.data() + 3 * first, n, features, colour);
   tape_.reset();
   const Params<float> weights =
       packed ? Params<float>(params, nullptr, *packed) : Params<float>(params, nullptr);

@@ -51,7 +51,7 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
       pixel_rng_(options.seed, 1),
       background_rng_(options.seed, 2),
       occupancy_rng_(options.seed, 3),
-      packed_(field.params),
+      packed_(field.params, {.precision = options.precision}),
       loop_(kShards, field.field.network_size()),
       adam_(field.params.size(), {.lr = 1, .zero_grads = true}),
       samplers_(kShards),
@@ -233,7 +233,8 @@ std::string Trainer::fingerprint() const {
          std::to_string(options_.samples_per_step) + " huber " + std::to_string(options_.huber) + " stop " +
          std::to_string(options_.stop) + " warm-up " + std::to_string(options_.warm_up) + " lr " +
          std::to_string(schedule.lr) + " half after " + std::to_string(schedule.half_after) + " cooldown " +
-         std::to_string(schedule.cooldown) + " last " + std::to_string(schedule.last);
+         std::to_string(schedule.cooldown) + " last " + std::to_string(schedule.last) +
+         (options_.precision == Precision::bf16 ? " bf16" : "");
 }
 
 void Trainer::save(const std::filesystem::path& path) const {

@@ -67,3 +67,49 @@ TEST_CASE("packed_weights: update takes the present values, for matrices of laye
   CHECK(pass(layer, store, &packed, x) == pass<float>(layer, store, nullptr, x));
   CHECK(pass(layer, store, &packed, x) != before);
 }
+
+TEST_CASE("packed_weights: in bf16 a layer's values and gradients are off by the rounding, dW by less") {
+  ParamStore<float> store;
+  const Dense<float> layer(store, "layer", {.in = 33, .out = 40}, 3);
+  if (bf16_units() == Bf16Units::none) {
+    CHECK_THROWS_WITH((PackedWeights<float>(store, {.precision = Precision::bf16})),
+                      Contains("no bf16 products"));
+    return;
+  }
+  PackedWeights<float> packed(store, {.precision = Precision::bf16});
+  packed.update();
+  const auto x = uniform<float>({70, 33}, -1, 1, 4);
+  const auto got = pass(layer, store, &packed, x),
+             want = pass(layer, store, static_cast<PackedWeights<float>*>(nullptr), x);
+  const std::size_t y = 70 * 40, dx = y + 70 * 33;
+  const auto worst = [&](std::size_t begin, std::size_t end) {
+    float error = 0, largest = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      error = std::max(error, std::abs(got[i] - want[i]));
+      largest = std::max(largest, std::abs(want[i]));
+    }
+    return error / largest;
+  };
+  CHECK(worst(0, y) > 1e-5f);  // it was rounded at all
+  CHECK(worst(0, y) < 4e-3f);
+  CHECK(worst(y, dx) < 4e-3f);
+  CHECK(worst(dx, want.size()) == 0);  // dW comes from float numbers
+}
+
+TEST_CASE("packed_weights: tables are rounded on request") {
+  ParamStore<float> store;
+  const ParamId table = store.add("hash/table", {3, 4});
+  store.values(table)[5] = 1.00390625f;
+  PackedWeights<float> plain(store);
+  plain.update();
+  CHECK(plain.table(table) == nullptr);
+  if (bf16_units() == Bf16Units::none) return;
+  PackedWeights<float> packed(store, {.precision = Precision::bf16, .tables = true});
+  packed.update();
+  REQUIRE(packed.table(table));
+  CHECK(packed.table(table)[5] == 0x3f80);
+  CHECK(packed.table(table)[4] == 0);
+  ParamStore<double> exact;
+  CHECK_THROWS_WITH((PackedWeights<double>(exact, {.precision = Precision::bf16})),
+                    Contains("not for double"));
+}

@@ -91,6 +91,22 @@ TEST_CASE("renderer: what stopping and leaving out costs is below 0.01") {
   CHECK(worst_error(f, renderer.render(camera), camera) < 0.01);
 }
 
+TEST_CASE("renderer: bf16 shows the same picture within its rounding") {
+  const RadianceField f = small_field();
+  const Camera camera = test_camera();
+  Renderer plain(f);
+  if (bf16_units() == Bf16Units::none) {
+    CHECK_THROWS_AS(Renderer(f, {.precision = Precision::bf16}), ValueError);
+    return;
+  }
+  Renderer rounded(f, {.precision = Precision::bf16});
+  const auto a = plain.render(camera).rgb.data, b = rounded.render(camera).rgb.data;
+  float worst = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) worst = std::max(worst, std::abs(a[i] - b[i]));
+  CHECK(worst > 0);
+  CHECK(worst < 0.01f);
+}
+
 TEST_CASE("renderer: an empty field is the background") {
   RadianceField f = small_field();
   f.grid.set_bits(std::vector<std::uint8_t>(static_cast<std::size_t>(f.grid.cells()), 0));

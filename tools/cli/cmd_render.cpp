@@ -12,6 +12,7 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/precision.h"
 #include "cli/sheet.h"
 
 namespace fieldmark::cli {
@@ -19,7 +20,7 @@ namespace {
 
 struct Options {
   std::string field, out, data;
-  std::string split = "test", cameras = "near";
+  std::string split = "test", cameras = "near", precision = "fp32";
   std::string against, sheet;
   Index count = 10, size = 0;
 };
@@ -61,7 +62,7 @@ int run(const Options& options, Context& context) {
   const auto field = nerf::RadianceField::load(options.field);
   const auto cameras = cameras_of(options, field, context.seed());
   std::filesystem::create_directories(options.out);
-  nerf::Renderer renderer(field);
+  nerf::Renderer renderer(field, {.precision = precision_of(options.precision)});
   const InterruptGuard guard;
   Json images = Json::array();
   double seconds = 0;
@@ -107,6 +108,7 @@ Command add_render(CLI::App& app) {
                  "ring (30 degrees above, radius 4.0311), sphere (all directions)")
       ->check(CLI::IsMember({"near", "ring", "sphere", "test"}).description(""))
       ->type_name("SET");
+  add_precision(app, o->precision);
   app.add_option("--count", o->count, "Cameras to draw, 1 to 100000")
       ->check(CLI::Range(1, 100000).description(""))
       ->excludes(data)

@@ -11,6 +11,7 @@
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/long_run.h"
+#include "cli/precision.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -19,7 +20,7 @@ constexpr double kHeaderBytes = 32e3;  // names and metadata, cameras included
 
 struct Options {
   std::string data, out;
-  std::string preset = "hash", background = "white";
+  std::string preset = "hash", background = "white", precision = "fp32";
   Index size = 0;
   RunLength length;
   double target_psnr = 0, max_megabytes = 0;
@@ -89,7 +90,9 @@ int run(const Options& options, Context& context) {
       {.split = "train", .size = options.size, .background = background_of(options.background)});
   nerf::RadianceField field(field_options(options, context.seed()));
   const nerf::TrainOptions train_options{
-      .schedule = {.steps = options.length.steps, .seconds = options.length.seconds}, .seed = context.seed()};
+      .schedule = {.steps = options.length.steps, .seconds = options.length.seconds},
+      .seed = context.seed(),
+      .precision = precision_of(options.precision)};
   nerf::Trainer trainer(field, data, train_options);
   if (options.resume) trainer.restore(checkpoint);
 
@@ -134,6 +137,7 @@ Command add_train(CLI::App& app) {
       ->check(CLI::IsMember({"hash"}).description(""))
       ->type_name("NAME");
   add_run_length(app, o->length, true);
+  add_precision(app, o->precision);
   app.add_option("--target-psnr", o->target_psnr,
                  "End when the rays trained on reach this, dB, 1 to 100 (off)")
       ->check(CLI::Range(1.0, 100.0).description(""))

@@ -9,10 +9,39 @@ constexpr Index kShardRows = 4096;  // rows of a partial sum of the weights' gra
 constexpr Index kPieceRows = 512;   // rows that pass through the backward together: they stay in L2
 
 template <class T>
+void forward(Var<T> x, Var<T> w, Var<T> b, bool relu, T* y) {
+  const Index n = x.shape()[0], in = w.shape()[0], out = w.shape()[1];
+  if constexpr (std::is_same_v<T, float>)
+    if (w.packed() && w.packed()->forward_bf16)
+      return detail::product(kernels::GemmBf16{.m = n,
+                                               .n = out,
+                                               .k = in,
+                                               .a = x.value(),
+                                               .a_row = in,
+                                               .b = w.packed()->forward_bf16,
+                                               .c = y,
+                                               .ldc = out,
+                                               .bias = b.value(),
+                                               .relu = relu});
+  detail::product<T>(
+      {.m = n,
+       .n = out,
+       .k = in,
+       .a = x.value(),
+       .a_row = in,
+       .b = w.packed() ? w.packed()->forward : detail::packed(x.tape(), w.value(), in, out, out, Index{1}),
+       .c = y,
+       .ldc = out,
+       .bias = b.value(),
+       .relu = relu});
+}
+
+template <class T>
 struct Backward {
   Index in, out;
   const T *x, *transposed, *mask;  // the ReLU's output, where dY has not passed through it
-  T* dx;                           // null: not wanted
+  const std::uint16_t* transposed_bf16;
+  T* dx;  // null: not wanted
   bool mask_dx, fresh;
 };
 
@@ -42,6 +71,18 @@ void backward_rows(const Backward<T>& p, const T* dy, Index begin, Index end, T*
              .ldc = p.out,
              .accumulate = true});
   if (db) detail::add_column_sums(d, rows, p.out, db);
+  if constexpr (std::is_same_v<T, float>)
+    if (p.dx && p.transposed_bf16)
+      return detail::product(kernels::GemmBf16{.m = rows,
+                                               .n = p.in,
+                                               .k = p.out,
+                                               .a = d,
+                                               .a_row = row,
+                                               .b = p.transposed_bf16,
+                                               .c = p.dx + begin * p.in,
+                                               .ldc = p.in,
+                                               .mask = p.mask_dx ? x : nullptr,
+                                               .accumulate = !p.fresh});
   if (p.dx)
     product({.m = rows,
              .n = p.in,
@@ -62,7 +103,8 @@ void backward(Var<T> x, Var<T> w, Var<T> b, Var<T> y, const T* dy) {
   Tape<T>& tape = x.tape();
   const Index n = x.shape()[0], in = w.shape()[0], out = w.shape()[1], row = detail::whole_row<T>(out);
   const T* mask = y.rectified() && !y.grad_masked() ? y.value() : nullptr;
-  Backward<T> p{in, out, x.value(), nullptr, mask, nullptr, x.rectified(), false};
+  Backward<T> p{in, out, x.value(), nullptr, mask, nullptr, nullptr, x.rectified(), false};
+  if (w.packed()) p.transposed_bf16 = w.packed()->transposed_bf16;
   p.dx = x.grad_acc(&p.fresh, p.mask_dx);
   if (p.dx)
     p.transposed =
@@ -104,18 +146,7 @@ Var<T> dense(Var<T> x, Var<T> w, Var<T> b, Activation activation) {
   Tape<T>& tape = x.tape();
   T* y = nullptr;
   const Var<T> result = tape.output({n, out}, &y, {x, w, b});
-  detail::product<T>(
-      {.m = n,
-       .n = out,
-       .k = in,
-       .a = x.value(),
-       .a_row = in,
-       .b = w.packed() ? w.packed()->forward : detail::packed(tape, w.value(), in, out, out, Index{1}),
-       .c = y,
-       .ldc = out,
-       .bias = b.value(),
-       .relu = relu});
-
+  forward(x, w, b, relu, y);
   if (relu) tape.mark_rectified(result);
 
   // dZ = dY where y > 0 (all of it without a ReLU); dX = dZ W^T, dW = X^T dZ, db = column sums of dZ. Where x

@@ -4,6 +4,7 @@
 #include <fieldmark/engine/tape.h>
 
 #include "kernels/gemm.h"
+#include "kernels/gemm_bf16.h"
 
 namespace fieldmark::detail {
 
@@ -49,6 +50,20 @@ void product(const kernels::Gemm<T>& g) {
     piece.m = end - begin;
     piece.a += begin * g.a_row;
     piece.c += begin * g.ldc;
+    run(piece);
+  });
+}
+
+/// The same with inputs rounded to bf16.
+inline void product(const kernels::GemmBf16& g) {
+  using namespace kernels;
+  const auto run = FIELDMARK_KERNEL(gemm_bf16);
+  parallel_for(g.m, kProductRows, [&](Index begin, Index end) {
+    GemmBf16 piece = g;
+    piece.m = end - begin;
+    piece.a += begin * g.a_row;
+    piece.c += begin * g.ldc;
+    piece.tiles = bf16_units() == Bf16Units::tiles;
     run(piece);
   });
 }

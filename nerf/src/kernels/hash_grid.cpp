@@ -22,6 +22,17 @@ template <class T, int P>
   return e;
 }
 
+// bf16 is the upper half of a float.
+template <class T, int P>
+[[gnu::always_inline]] inline Entry<T, P> load(const std::uint16_t* p) {
+  Entry<std::uint16_t, P> half;
+  std::memcpy(&half, p, sizeof half);
+  const Entry<std::uint32_t, P> bits = __builtin_convertvector(half, Entry<std::uint32_t, P>) << 16;
+  Entry<T, P> e;
+  std::memcpy(&e, &bits, sizeof e);
+  return e;
+}
+
 // Two parts side by side. A copy of each into one array, read back as a whole, would wait for both stores to
 // reach the cache.
 template <class T, int P>
@@ -73,7 +84,8 @@ struct Corners {
 
   // Asks for the entries ahead of their use: they are spread over megabytes, and a core waits longer for one
   // of them than it computes on a block.
-  [[gnu::always_inline]] void prefetch(const T* entries, int count) const {
+  template <class S>
+  [[gnu::always_inline]] void prefetch(const S* entries, int count) const {
     for (int i = 0; i < count; ++i)
       for (int k = 0; k < 8; ++k) __builtin_prefetch(entries + place[k][i]);
   }
@@ -90,9 +102,9 @@ struct Corners {
 
 // Calls use(corners, first point, count) for blocks of points in order, each block's entries asked for one
 // block ahead.
-template <class T, int P, class F>
+template <class T, int P, class S, class F>
 [[gnu::always_inline]] inline void for_blocks(const HashLevel& level, const T* x, std::int64_t n,
-                                              const T* entries, F use) {
+                                              const S* entries, F use) {
   Corners<T, P> corners[2];
   const auto count = [n](std::int64_t begin) {
     return static_cast<int>(n - begin < kBlock ? n - begin : kBlock);
@@ -108,12 +120,12 @@ template <class T, int P, class F>
   }
 }
 
-template <class T, int P>
-void forward(const HashLevel* level, int levels, const T* x, std::int64_t n, const T* table, T* density,
+template <class T, int P, class S>
+void forward(const HashLevel* level, int levels, const T* x, std::int64_t n, const S* table, T* density,
              T* colour) {
   const std::int64_t width = P * levels;
   for (int l = 0; l < levels; ++l) {
-    const T* entries = table + level[l].first * 2 * P;
+    const S* entries = table + level[l].first * 2 * P;
     for_blocks<T, P>(level[l], x, n, entries,
                      [&](const Corners<T, P>& corners, std::int64_t begin, int count) {
                        alignas(64) T w[8][kBlock];
@@ -201,7 +213,13 @@ void backward_x(const HashLevel* level, int levels, const T* x, std::int64_t n, 
 template <class T>
 void hash_forward(const HashLevel* level, int levels, int part, const T* x, std::int64_t n, const T* table,
                   T* density, T* colour) {
-  (part == 2 ? forward<T, 2> : forward<T, 4>)(level, levels, x, n, table, density, colour);
+  (part == 2 ? forward<T, 2, T> : forward<T, 4, T>)(level, levels, x, n, table, density, colour);
+}
+
+void hash_forward_bf16(const HashLevel* level, int levels, int part, const float* x, std::int64_t n,
+                       const std::uint16_t* table, float* density, float* colour) {
+  (part == 2 ? forward<float, 2, std::uint16_t> : forward<float, 4, std::uint16_t>)(level, levels, x, n,
+                                                                                    table, density, colour);
 }
 
 template <class T>

@@ -19,6 +19,10 @@ struct HashLevel {
 FIELDMARK_DECLARE_KERNEL(template <class T> void, hash_forward,
                          (const HashLevel* level, int levels, int part, const T* x, std::int64_t n,
                           const T* table, T* density, T* colour))
+// The same from a table rounded to bf16.
+FIELDMARK_DECLARE_KERNEL(void, hash_forward_bf16,
+                         (const HashLevel* level, int levels, int part, const float* x, std::int64_t n,
+                          const std::uint16_t* table, float* density, float* colour))
 // The gradients at density and colour (null: zeros) of points [begin, end) of n, entry by entry and level by
 // level: out [levels, n, 2 part]. A level then reads its own without skipping over the others'.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, hash_by_level,

@@ -1,6 +1,7 @@
 #include "kernels/hash_grid.h"
 
 #include <cmath>
+#include <cstring>
 #include <vector>
 
 #include "nerf/hash_reference.h"
@@ -108,6 +109,31 @@ TEST_CASE("kernels/hash_grid: gradients are dealt to levels, a missing one count
               REQUIRE(out[entry] == (first ? dd[i * 4 + 2 * l + j] : 0));
               REQUIRE(out[entry + 2] == (second ? dc[i * 4 + 2 * l + j] : 0));
             }
+      }
+  });
+}
+
+TEST_CASE("kernels/hash_grid: a table in bf16 gives what the rounded table gives") {
+  each_isa([] {
+    for (const int part : {2, 4})
+      for (Index n = 1; n <= 40; n += 3) {
+        const auto x = uniform<float>({n, 3}, 0, 1, 1);
+        auto table = uniform<float>({kRows, 2 * part}, -1, 1, 2);
+        std::vector<std::uint16_t> half;
+        for (float& v : table.data) {  // numbers that bf16 holds exactly
+          v = std::round(v * 128) / 128;
+          std::uint32_t bits;
+          std::memcpy(&bits, &v, sizeof bits);
+          half.push_back(static_cast<std::uint16_t>(bits >> 16));
+        }
+        std::vector<float> density(static_cast<std::size_t>(2 * part * n)), colour(density), d(density),
+            c(density);
+        FIELDMARK_KERNEL(hash_forward<float>)
+        (kLevels, 2, part, x.data.data(), n, table.data.data(), density.data(), colour.data());
+        FIELDMARK_KERNEL(hash_forward_bf16)
+        (kLevels, 2, part, x.data.data(), n, half.data(), d.data(), c.data());
+        REQUIRE(d == density);
+        REQUIRE(c == colour);
       }
   });
 }

@@ -34,4 +34,10 @@ Isa isa_supported();
 /// lacks it
 void force_isa(Isa level);
 
+/// What can multiply bf16 numbers: AVX-512's dot products (vdpbf16ps), or AMX's tiles.
+enum class Bf16Units { none, dot, tiles };
+/// The best that this CPU and its system offer; none where isa() is below v4. The first call asks the system
+/// for the tiles' registers.
+Bf16Units bf16_units();
+
 }  // namespace fieldmark

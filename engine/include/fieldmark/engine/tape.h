@@ -5,6 +5,7 @@
 #include <fieldmark/engine/tensor.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <new>
 #include <span>
 #include <type_traits>
@@ -21,11 +22,14 @@ template <class T>
 void seed_gradient(const T* seed, const T* mask, bool fresh, T* g, Index n);
 }  // namespace detail
 
-/// A matrix W [in, out] as products read it: W in panels of columns, and W^T. See PackedWeights.
+/// A matrix W [in, out] as products read it: W in panels of columns, and W^T; rounded to bf16 as well where
+/// products are to be computed so. See PackedWeights.
 template <class T>
 struct PackedMatrix {
   const T* forward = nullptr;
   const T* transposed = nullptr;
+  const std::uint16_t* forward_bf16 = nullptr;
+  const std::uint16_t* transposed_bf16 = nullptr;
 };
 
 /// Handle to a value on a tape: two pointers, trivially copyable, valid until Tape::reset().

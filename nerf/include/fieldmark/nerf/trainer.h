@@ -15,6 +15,9 @@ struct TrainOptions {
                        ///< than 1e-2 is worth less than the rays that its samples would cost
   Index warm_up = 32;  ///< steps before cells may be declared empty
   std::uint64_t seed = 0;
+  /// bf16 rounds what the networks multiply, forward and in dX; weights, their gradients and the table stay
+  /// float. Needs bf16_units(). No faster for networks as narrow as these.
+  Precision precision = Precision::fp32;
 };
 
 /// Trains a radiance field on photographs (Mildenhall et al. 2020, sec. 5; Mueller et al. 2022): random rays

@@ -1,0 +1,26 @@
+#include "cli/precision.h"
+
+#include <fieldmark/engine/isa.h>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/cli.h"
+
+namespace fieldmark::cli {
+
+void add_precision(CLI::App& app, std::string& name) {
+  app.add_option("--precision", name, "Of what the networks multiply: fp32, bf16 (where the CPU has it)")
+      ->check(CLI::IsMember({"fp32", "bf16"}).description(""))
+      ->type_name("NAME")
+      ->capture_default_str();
+}
+
+Precision precision_of(const std::string& name) {
+  if (name == "fp32") return Precision::fp32;
+  if (bf16_units() == Bf16Units::none)
+    throw UsageError(std::string("--precision bf16: this CPU has no bf16 products with the kernels ") +
+                     isa_name());
+  return Precision::bf16;
+}
+
+}  // namespace fieldmark::cli

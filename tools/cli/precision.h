@@ -1,0 +1,17 @@
+#pragma once
+#include <fieldmark/engine/packed_weights.h>
+
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace fieldmark::cli {
+
+/// --precision fp32|bf16, stored by name.
+void add_precision(CLI::App& app, std::string& name);
+/// @throws UsageError for bf16 where the CPU has no such products
+Precision precision_of(const std::string& name);
+
+}  // namespace fieldmark::cli
