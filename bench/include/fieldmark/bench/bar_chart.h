@@ -4,6 +4,7 @@
 
 namespace fieldmark::bench {
 
+/// One bar of bar_chart().
 struct Bar {
   std::string label;  ///< left of the bar
   double value = 0;   ///< >= 0; what is not finite is drawn as 0

@@ -20,15 +20,17 @@ struct EngineRow {
   double megabytes = 0;  ///< most memory of the process so far
 };
 
+/// Settings of run_engine_bench().
 struct EngineBenchOptions {
   int runs = 5;        ///< of each row, whose median counts
   double scale = 1;    ///< of the numbers of samples, in (0, 1]: for tests
   std::string only{};  ///< rows with this text in their name
 };
 
+/// What run_engine_bench() measured.
 struct EngineBench {
-  double peak_gflops = 0;
-  std::vector<EngineRow> rows;
+  double peak_gflops = 0;       ///< of this machine, see peak_gflops()
+  std::vector<EngineRow> rows;  ///< in the order they ran
 };
 
 /// Measures the peak first, then each row. The shapes are fixed, so that rows of different machines can be

@@ -5,8 +5,9 @@ namespace fieldmark::bench {
 
 /// Wall-clock time of one call.
 struct Timing {
-  double seconds = 0;  ///< median over the runs
-  double least = 0, most = 0;
+  double seconds = 0;          ///< median over the runs
+  double least = 0;            ///< fastest run, seconds
+  double most = 0;             ///< slowest run, seconds
   double peak_operations = 0;  ///< that the machine's peak would have done meanwhile, median over the runs
 };
 

@@ -10,14 +10,16 @@
 
 namespace fieldmark::distort {
 
+/// One kind of damage; parse_attack() lists what each does.
 enum class AttackKind { noise, rotation, scale, blur, crop, jpeg, gamma, brightness, hue };
 
 /// What somebody does to a picture to remove its mark, from a name such as "rotation_30" or
 /// "noise_0.1,jpeg_50".
 struct Attack {
+  /// One damage and how much of it.
   struct Step {
-    AttackKind kind;
-    double amount;
+    AttackKind kind;  ///< what is done
+    double amount;    ///< severity, in the unit that parse_attack() gives for the kind
   };
   std::string name;         ///< as it was given
   std::vector<Step> steps;  ///< from left to right

@@ -6,6 +6,7 @@
 
 namespace fieldmark {
 
+/// Settings of Adam.
 struct AdamOptions {
   double lr = 1e-3;         ///< > 0; step size before a schedule's factor
   double beta1 = 0.9;       ///< in [0, 1), decay of the gradient's mean
@@ -18,10 +19,11 @@ struct AdamOptions {
 
 /// A part of the parameters with a step size and rules of its own.
 struct AdamRange {
-  Index begin = 0, end = 0;  ///< of the numbers
-  double lr_factor = 1;      ///< multiplies AdamOptions::lr
-  bool skip_zero = false;
-  double weight_decay = 0;
+  Index begin = 0;          ///< first of its numbers
+  Index end = 0;            ///< one past its last
+  double lr_factor = 1;     ///< multiplies AdamOptions::lr
+  bool skip_zero = false;   ///< in place of AdamOptions::skip_zero
+  double weight_decay = 0;  ///< in place of AdamOptions::weight_decay
 };
 
 /// Adam on a flat array of parameters.
@@ -49,10 +51,17 @@ class Adam {
   Index steps() const { return steps_; }
   /// @throws ValueError if negative
   void set_steps(Index steps);
+  /// @{
+  /// m [n], for checkpoints.
   std::span<T> mean() { return mean_; }
   std::span<const T> mean() const { return mean_; }
+  /// @}
+  /// @{
+  /// v [n], for checkpoints.
   std::span<T> mean_square() { return mean_square_; }
   std::span<const T> mean_square() const { return mean_square_; }
+  /// @}
+  /// As constructed.
   const AdamOptions& options() const { return options_; }
 
  private:

@@ -10,12 +10,14 @@ namespace fieldmark {
 /// No destructor of anything placed here is ever run: Tape enforces that at compile time.
 class Arena {
  public:
-  static constexpr std::size_t kAlign = 64;
+  static constexpr std::size_t kAlign = 64;  ///< alignment of every allocation, bytes
+  /// @param first_block  bytes of the first block, taken when it is first needed
   explicit Arena(std::size_t first_block = std::size_t{1} << 16) : first_block_(first_block) {}
   /// Uninitialised room, valid until reset(). @throws std::bad_alloc
   void* allocate(std::size_t bytes);
   /// Makes sure that `bytes` can follow without a call to the system.
   void reserve(std::size_t bytes);
+  /// Makes all room free again; the blocks stay.
   void reset() noexcept {
     block_ = 0;
     used_ = 0;

@@ -32,12 +32,16 @@ class AtomicFile {
   int fd_ = -1;
 };
 
+/// @{
 /// Writes a whole file, see AtomicFile. @throws IoError
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void write_file_atomically(const std::filesystem::path& path, std::string_view text);
+/// @}
 
+/// @{
 /// The contents of a file, to the end. @throws IoError if it is missing, a folder or unreadable
 std::vector<std::byte> read_bytes(const std::filesystem::path& path);
 std::string read_text(const std::filesystem::path& path);
+/// @}
 
 }  // namespace fieldmark

@@ -20,6 +20,7 @@
 
 namespace fieldmark {
 
+/// Levels of the x86-64 instruction set: v3 has AVX2, v4 AVX-512.
 enum class Isa { v2 = 2, v3 = 3, v4 = 4 };
 
 /// The level in use: the best this CPU has, or what the environment variable FIELDMARK_ISA (v2, v3 or v4)

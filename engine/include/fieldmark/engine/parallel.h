@@ -8,6 +8,7 @@ namespace fieldmark {
 /// Threads the library uses outside of an existing parallel region; at first all that the machine offers.
 /// @param n  at least 1   @throws ValueError otherwise
 void set_threads(int n);
+/// What set_threads() was last given, or the number the machine offers.
 int threads();
 
 namespace detail {

@@ -11,7 +11,7 @@ namespace fieldmark {
 
 /// Names one tensor of a ParamStore. Modules keep ids, never pointers: add() may move the buffers.
 struct ParamId {
-  int index = -1;
+  int index = -1;  ///< of its entry in the order added; -1 names none
 };
 
 /// All trainable numbers of a model in one flat buffer, gradients in a second one of equal length,
@@ -20,27 +20,39 @@ struct ParamId {
 template <class T>
 class ParamStore {
  public:
+  /// Where a tensor lies in the flat buffers.
   struct Entry {
     std::string name;  ///< unique, slash separated: "field/density/weight"
-    Shape shape;
-    Index offset;  ///< of the first element in values()
+    Shape shape;       ///< row-major
+    Index offset;      ///< of the first element in values()
   };
   /// Appends a tensor of zeros. @throws ValueError if the name is taken
   ParamId add(std::string_view name, Shape shape);
   /// @throws ValueError if there is no such name
   ParamId find(std::string_view name) const;
+  /// @{
+  /// The numbers of one tensor; valid until the next add().
   std::span<T> values(ParamId id);
   std::span<const T> values(ParamId id) const;
+  /// @}
+  /// The gradients of one tensor; valid until the next add().
   std::span<T> grads(ParamId id);
+  /// @{
+  /// The whole buffer of values [size()]; valid until the next add().
   std::span<T> values() { return values_; }
   std::span<const T> values() const { return values_; }
+  /// @}
+  /// The whole buffer of gradients [size()], laid out as values().
   std::span<T> grads() { return grads_; }
+  /// All tensors in the order added.
   std::span<const Entry> entries() const { return entries_; }
+  /// The entry of an id of this store; other ids are not checked.
   const Entry& entry(ParamId id) const { return entries_[static_cast<std::size_t>(id.index)]; }
   /// Length of the buffers, with the gaps between tensors.
   Index size() const { return static_cast<Index>(values_.size()); }
   /// Numbers in all tensors.
   Index parameters() const;
+  /// Sets all gradients to 0.
   void zero_grad();
 
  private:
@@ -68,6 +80,7 @@ class Params {
   Params(const ParamStore<T>& layout, const T* values, T* grads)
       : layout_(&layout), values_(values), grads_(grads) {}
 
+  /// A parameter on the tape: a leaf, or a constant where gradients are not computed; packed where it was.
   Var<T> leaf(Tape<T>& tape, ParamId id) const;
 
  private:

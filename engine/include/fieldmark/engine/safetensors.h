@@ -16,15 +16,16 @@ namespace fieldmark {
 /// Source: huggingface/safetensors, format description: 8 bytes of header length N (little endian), N bytes
 /// of JSON from '{', then the arrays without gaps. Arrays have at most rank 5 here.
 struct SafetensorsFile {
+  /// One array of a file.
   struct Entry {
-    std::string name;
-    std::string dtype;  ///< "F32", "U8", ... as the file spells it
-    Shape shape;
+    std::string name;             ///< unique in the file
+    std::string dtype;            ///< "F32", "U8", ... as the file spells it
+    Shape shape;                  ///< at most rank 5
     std::vector<std::byte> data;  ///< row-major, little endian
   };
-  std::map<std::string, std::string> metadata;
-  std::vector<Entry> tensors;
-  std::string path;  ///< where it was read, for error texts
+  std::map<std::string, std::string> metadata;  ///< strings by key, both UTF-8
+  std::vector<Entry> tensors;                   ///< in the order of the file, or as added
+  std::string path;                             ///< where it was read, for error texts
 
   /// Reads and checks a whole file.
   /// @throws IoError if it cannot be read or is not valid: the text names the place, what was expected and
@@ -38,6 +39,7 @@ struct SafetensorsFile {
   /// @throws IoError if writing fails   @throws ValueError if a name or metadata is not UTF-8
   void write(const std::filesystem::path& path) const;
 
+  /// @{
   /// Appends an array. @throws ValueError if the name is taken or "__metadata__"
   /// @throws ShapeError unless data has shape.size() numbers
   void add(std::string_view name, Shape shape, std::span<const float> data);
@@ -46,17 +48,24 @@ struct SafetensorsFile {
   void add(std::string_view name, Shape shape, std::span<const std::int32_t> data);
   void add(std::string_view name, Shape shape, std::span<const std::int64_t> data);
   void add(std::string_view name, Shape shape, std::span<const std::uint64_t> data);
+  /// @}
 
+  /// Whether there is an array of this name.
   bool has(std::string_view name) const;
   /// @throws IoError if there is no such array: the text lists those there are
   const Entry& at(std::string_view name) const;
   /// F32, or F16 and BF16 widened, which is exact. @throws IoError if missing or of another dtype, as all
   /// below
   Tensor<float> f32(std::string_view name) const;
+  /// The numbers of an F64 array.
   Tensor<double> f64(std::string_view name) const;
+  /// The numbers of a U8 array, row-major.
   std::vector<std::uint8_t> u8(std::string_view name) const;
+  /// The numbers of an I32 array, row-major.
   std::vector<std::int32_t> i32(std::string_view name) const;
+  /// The numbers of an I64 array, row-major.
   std::vector<std::int64_t> i64(std::string_view name) const;
+  /// The numbers of a U64 array, row-major.
   std::vector<std::uint64_t> u64(std::string_view name) const;
 };
 

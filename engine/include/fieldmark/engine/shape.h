@@ -6,18 +6,21 @@
 
 namespace fieldmark {
 
+/// Counts and places of elements.
 using Index = std::int64_t;
 
 /// Extents of a dense row-major tensor, rank 0 to 5. Trivially copyable, so that a backward
 /// closure can hold one by value.
 class Shape {
  public:
-  static constexpr int kMaxRank = 5;
+  static constexpr int kMaxRank = 5;  ///< most axes a shape can have
   Shape() = default;
+  /// @param dims  extents, the slowest axis first, at most kMaxRank of them (not checked)
   Shape(std::initializer_list<Index> dims) : rank_(static_cast<int>(dims.size())) {
     int k = 0;
     for (Index d : dims) dims_[static_cast<std::size_t>(k++)] = d;
   }
+  /// Number of axes, 0 to kMaxRank.
   int rank() const { return rank_; }
   /// Extent of an axis; negative axes count from the last.
   Index operator[](int axis) const { return dims_[static_cast<std::size_t>(axis < 0 ? axis + rank_ : axis)]; }
@@ -27,7 +30,9 @@ class Shape {
     for (int k = 0; k < rank_; ++k) n *= (*this)[k];
     return n;
   }
+  /// Equal in rank and every extent.
   friend bool operator==(const Shape&, const Shape&) = default;
+  /// As in error texts: "[2, 3]".
   std::string str() const {
     std::string s = "[";
     for (int k = 0; k < rank_; ++k) s += (k ? ", " : "") + std::to_string((*this)[k]);

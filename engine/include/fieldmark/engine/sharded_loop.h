@@ -29,6 +29,7 @@ class ShardedLoop {
   /// construction.
   /// @return the losses summed in chunk order
   double run(Index chunks, const Body& body, std::span<T> into);
+  /// Number of gradient buffers, as constructed.
   int shards() const { return shards_; }
 
  private:

@@ -9,6 +9,7 @@
 
 namespace fieldmark::extractor {
 
+/// Size of a DenseExtractor.
 struct DenseExtractorOptions {
   Index classes = 0;  ///< cells + 1 for the background, at least 2
   Index base = 32;    ///< channels at half resolution, a multiple of 8
@@ -25,10 +26,12 @@ struct DenseExtractorOptions {
 template <class T>
 class DenseExtractor {
  public:
+  /// What the network says about every place of a picture.
   struct Output {
-    Var<T> sign;          ///< [P] logit that the mark is positive at each place, row by row
-    Var<T> index;         ///< [P, classes] logits of the cell each place shows, the last class the background
-    Index height, width;  ///< in places, H / 4 and W / 4 rounded down; P = height * width
+    Var<T> sign;   ///< [P] logit that the mark is positive at each place, row by row
+    Var<T> index;  ///< [P, classes] logits of the cell each place shows, the last class the background
+    Index height;  ///< in places, H / 4 rounded down
+    Index width;   ///< in places, W / 4 rounded down; P = height * width
   };
 
   /// Parameters are "<name>/down0/conv/weight" and the like, 620 base^2 + 2 base classes and some.

@@ -10,6 +10,7 @@
 
 namespace fieldmark::extractor {
 
+/// Size of a PooledExtractor.
 struct PooledExtractorOptions {
   Index n_bits = 0;     ///< N_b, at least 1
   Index channels = 64;  ///< of all convolutions but the last, which has n_bits; at least 1

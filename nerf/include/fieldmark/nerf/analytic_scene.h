@@ -8,6 +8,7 @@
 
 namespace fieldmark::nerf {
 
+/// Which of the built-in scenes.
 enum class SceneKind {
   objects,  ///< textured solids of every kind on a round slab, with soft shadows
   sphere    ///< one sphere of one colour, shaded
@@ -16,8 +17,8 @@ enum class SceneKind {
 /// A built-in scene, within 1.2 of the origin, and cameras around it like those of the Blender scenes: on the
 /// upper half of a sphere of radius 4.0311, looking at the origin, camera_angle_x 0.6911.
 struct SceneOptions {
-  SceneKind kind = SceneKind::objects;
-  Index size = 200;   ///< pixels of both sides, 1 to 8192
+  SceneKind kind = SceneKind::objects;  ///< what stands in it
+  Index size = 200;                     ///< pixels of both sides, 1 to 8192
   Index views = 100;  ///< of the training split, 1 to 100000; val has a tenth and test a quarter, at least 1
   std::uint64_t seed = 0;  ///< of placement, colours and cameras
 };

@@ -6,6 +6,7 @@
 
 namespace fieldmark::nerf {
 
+/// A point or direction in the world: x, y, z.
 using Vec3 = std::array<double, 3>;
 /// Camera-to-world matrix [3, 4], row-major: the columns are the camera's right, up and backward axes and its
 /// position.
@@ -13,18 +14,22 @@ using Pose = std::array<double, 12>;
 
 /// Half of a line: origin + t * direction, t >= 0, with a unit direction.
 struct Ray {
-  Vec3 origin, direction;
+  Vec3 origin;     ///< length
+  Vec3 direction;  ///< unit
 };
 
 /// Pinhole camera with OpenGL (Blender) axes: x right, y up, looking along -z. Pixel (0, 0) is at the top
 /// left, and whole numbers are the centres of pixels; cx and cy are measured from the picture's corner.
 struct Camera {
-  Pose pose{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-  double fx = 1, fy = 1;  ///< focal lengths, pixels, > 0
-  double cx = 0,
-         cy = 0;  ///< principal point, pixels from the top left corner: width / 2, height / 2 when centred
-  Index width = 0, height = 0;
+  Pose pose{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};  ///< from the camera to the world
+  double fx = 1;                                  ///< focal length across, pixels, > 0
+  double fy = 1;                                  ///< focal length down, pixels, > 0
+  double cx = 0;     ///< principal point, pixels from the left edge: width / 2 when centred
+  double cy = 0;     ///< principal point, pixels from the upper edge: height / 2 when centred
+  Index width = 0;   ///< pixels
+  Index height = 0;  ///< pixels
 
+  /// Where the camera stands, the last column of the pose.
   Vec3 position() const { return {pose[3], pose[7], pose[11]}; }
   /// The viewing direction, the pose's third column negated; unit if the pose is a rotation.
   Vec3 forward() const { return {-pose[2], -pose[6], -pose[10]}; }

@@ -12,14 +12,18 @@ namespace fieldmark::nerf {
 /// What new cameras for a field can be drawn from without its data set: where the training cameras stood
 /// around a centre, their intrinsics, and the bounds of the scene.
 struct CameraSpan {
-  Vec3 centre{};                              ///< the point nearest to all viewing axes, length
-  Vec3 up{0, 0, 1};                           ///< unit
-  double half_size = 1;                       ///< of the cube about centre that holds the scene, length, > 0
-  std::vector<Vec3> directions;               ///< [N] unit, from centre to each training camera; at least one
-  std::vector<double> distances;              ///< [N] from centre to each training camera, length, > 0
-  double fx = 1, fy = 1, cx = 0.5, cy = 0.5;  ///< intrinsics in widths of the picture; fx, fy > 0
-  Index width = 1, height = 1;                ///< pixels
-  Background background = Background::white;
+  Vec3 centre{};                  ///< the point nearest to all viewing axes, length
+  Vec3 up{0, 0, 1};               ///< unit
+  double half_size = 1;           ///< of the cube about centre that holds the scene, length, > 0
+  std::vector<Vec3> directions;   ///< [N] unit, from centre to each training camera; at least one
+  std::vector<double> distances;  ///< [N] from centre to each training camera, length, > 0
+  double fx = 1;                  ///< focal length across, in widths of the picture, > 0
+  double fy = 1;                  ///< focal length down, in widths of the picture, > 0
+  double cx = 0.5;                ///< principal point from the left edge, in widths of the picture
+  double cy = 0.5;                ///< principal point from the upper edge, in widths of the picture
+  Index width = 1;                ///< of the training pictures, pixels
+  Index height = 1;               ///< of the training pictures, pixels
+  Background background = Background::white;  ///< of the data set
 };
 
 /// The span of cameras that look at a scene from around it. `up` is the direction most at right angles to the

@@ -13,22 +13,24 @@ enum class Background { white, black };
 
 /// A photograph and the camera that took it.
 struct View {
-  Camera camera;
+  Camera camera;       ///< of the size of the picture
   Tensor<float> rgba;  ///< [height, width, 4] in [0, 1], straight (not premultiplied) alpha
   std::string name;    ///< as in the data set, without folder and extension: "r_12"
 };
 
+/// One split of a data set in memory.
 struct Dataset {
-  std::string name;   ///< of the folder: "lego"
-  std::string split;  ///< "train", "val" or "test"
-  Background background = Background::white;
-  std::vector<View> views;  ///< at least one; all of one size
+  std::string name;                           ///< of the folder: "lego"
+  std::string split;                          ///< "train", "val" or "test"
+  Background background = Background::white;  ///< in front of which its views are shown
+  std::vector<View> views;                    ///< at least one; all of one size
 };
 
+/// What load_dataset() reads, and at what size.
 struct DatasetOptions {
   std::string split = "train";  ///< "train", "val" or "test"
   Index size = 0;  ///< pixels of the longer side after an area filter on premultiplied colour; 0: as it is
-  Background background = Background::white;
+  Background background = Background::white;  ///< of the Dataset that is made
 };
 
 /// Reads one split of a data set in the layout of the Blender scenes of Mildenhall et al. 2020 (NeRF): a

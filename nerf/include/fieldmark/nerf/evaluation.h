@@ -15,10 +15,12 @@ struct ViewScore {
 
 /// Means over the views of a data set. A view whose number is NaN is left out of that number's mean.
 struct Evaluation {
-  double psnr = 0, psnr_object = 0, ssim = 0;
-  Index views = 0;
-  double seconds_per_view = 0;  ///< of rendering alone
-  std::vector<ViewScore> per_view;
+  double psnr = 0;                  ///< mean of ViewScore::psnr
+  double psnr_object = 0;           ///< mean of ViewScore::psnr_object
+  double ssim = 0;                  ///< mean of ViewScore::ssim
+  Index views = 0;                  ///< rendered
+  double seconds_per_view = 0;      ///< of rendering alone
+  std::vector<ViewScore> per_view;  ///< [views] in the order of the data set
 };
 
 /// Renders every view of a data set and compares it with the photograph in front of the data set's

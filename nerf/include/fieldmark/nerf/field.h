@@ -6,9 +6,10 @@
 
 namespace fieldmark::nerf {
 
+/// Sizes of a Field.
 struct FieldOptions {
-  HashEncodingOptions encoding{};
-  Index width = 32;  ///< units of a hidden layer, 1 to 256
+  HashEncodingOptions encoding{};  ///< of positions
+  Index width = 32;                ///< units of a hidden layer, 1 to 256
   Index geometry =
       16;  ///< N_z, numbers the density network hands to the colour network; the first is log density
 };
@@ -27,6 +28,7 @@ class Field {
   /// @throws ValueError if an option is out of range or a name is taken
   Field(ParamStore<T>& store, const FieldOptions& options, std::uint64_t seed);
 
+  /// What the field says about positions seen from directions.
   struct Output {
     Var<T> sigma;  ///< [N], 1 / cube side
     Var<T> rgb;    ///< [N, 3] in (0, 1)
@@ -44,7 +46,9 @@ class Field {
   /// rgb [N, 3]
   Var<T> colour(const Params<T>& params, Var<T> z, Var<T> features, Var<T> direction) const;
 
+  /// As constructed.
   const FieldOptions& options() const { return options_; }
+  /// The encoding whose two parts feed the networks.
   const HashEncoding<T>& encoding() const { return encoding_; }
   /// How many numbers at the front of the store belong to the networks; the table follows.
   Index network_size() const { return network_size_; }

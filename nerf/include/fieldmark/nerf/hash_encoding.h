@@ -5,6 +5,7 @@
 
 namespace fieldmark::nerf {
 
+/// Sizes of a HashEncoding.
 struct HashEncodingOptions {
   int levels = 8;            ///< L, 1 to 32
   int features = 2;          ///< F of each part at a level, 2 or 4
@@ -30,6 +31,7 @@ struct HashEncodingOptions {
 template <class T>
 class HashEncoding {
  public:
+  /// Whose features: those of the density network or of the colour network.
   enum class Part { density, colour };
   /// Registers "<name>/table" [rows, 2 F], uniform in +-1e-4 (the paper's choice); an entry holds density's
   /// features, then colour's. @throws ValueError if an option is out of range
@@ -59,9 +61,13 @@ class HashEncoding {
   void backward_level(int level, const T* x, Index n, const T* d, std::span<T> grad) const;
 
   Index width() const { return Index{features_} * levels(); }  ///< F L, features of a part
+  /// F, features of a part at a level.
   int features() const { return features_; }
+  /// L, the number of levels.
   int levels() const { return static_cast<int>(levels_.size()); }
+  /// Entries of all levels, the rows of the table.
   Index rows() const { return rows_; }
+  /// The table in the store.
   ParamId table() const { return table_; }
   /// Cells per axis of a level.
   Index resolution(int level) const { return levels_[static_cast<std::size_t>(level)].resolution; }

@@ -7,8 +7,10 @@ namespace fieldmark::nerf {
 /// parallel to a face counts as inside where it lies on or between the two faces; an origin inside gives near
 /// = 0.
 struct CubeSpan {
-  float near = 0, far = 0;
+  float near = 0;  ///< distance at which the ray enters
+  float far = 0;   ///< distance at which it leaves
 };
+/// @param o, d  origin and direction; near and far count in lengths of d
 CubeSpan intersect_unit_cube(const float o[3], const float d[3]);
 
 /// A walk along one ray, resumable: the samples are at t_k = near + (k + jitter) step, k = 0, 1, ..., those
@@ -16,6 +18,7 @@ CubeSpan intersect_unit_cube(const float o[3], const float d[3]);
 /// [0, 1)
 class RayWalk {
  public:
+  /// @param step  distance of samples, cube sides, > 0
   RayWalk(const float o[3], const float d[3], float step, float jitter);
   /// Writes the next samples, at most `max`. @return their number; fewer than `max` only at the end of the
   /// ray

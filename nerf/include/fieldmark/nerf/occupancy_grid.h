@@ -21,10 +21,13 @@ class OccupancyGrid {
   /// occupied
   explicit OccupancyGrid(Index resolution = 128);
 
+  /// Cells per axis.
   Index resolution() const { return resolution_; }
+  /// Cells of the cube, resolution^3.
   Index cells() const { return resolution_ * resolution_ * resolution_; }
   /// Index of the cell at integer coordinates: x fastest.
   Index cell(Index x, Index y, Index z) const { return x + resolution_ * (y + resolution_ * z); }
+  /// Whether a cell, see cell(), can hold matter.
   bool occupied(Index cell) const { return bits_[static_cast<std::size_t>(cell)] != 0; }
   /// The 4 x 4 x 4 block of cells at block coordinates as 64 bits, cell (x, y, z) of it at bit x + 4 y + 16
   /// z. Eight neighbouring blocks share a cache line.
@@ -38,9 +41,11 @@ class OccupancyGrid {
   Index clearance(Index bx, Index by, Index bz) const {
     return clearance_[static_cast<std::size_t>(bx + block_side_ * (by + block_side_ * bz))];
   }
+  /// How many cells are occupied.
   Index occupied_cells() const;
   /// Blocks and clearances as rows of numbers, for the kernel that walks rays (kernels/march.h).
   std::span<const std::uint32_t> block_halves() const { return halves_; }
+  /// [(resolution / 4)^3] what clearance() says of each block, x fastest.
   std::span<const std::uint8_t> clearances() const { return clearance_; }
 
   /// Rules out every cell for which `keep` (one entry a cell) is 0. @throws ShapeError if the sizes differ
@@ -59,11 +64,13 @@ class OccupancyGrid {
     Index fraction = 1;       ///< look at one of this many candidates
     std::uint64_t round = 0;  ///< number of this update: which candidates, and the random positions
   };
+  /// See Update. @throws whatever density throws
   void update(const Density& density, const CounterRng& rng, const Update& update);
 
   /// The state, for files: densities [cells] (negative: not a candidate), from which `bits` follow with a
   /// threshold.
   std::span<const float> densities() const { return density_; }
+  /// [cells] 1 where a cell is occupied.
   std::span<const std::uint8_t> bits() const { return bits_; }
   /// @throws ShapeError if a size is not cells()
   void restore(std::span<const float> densities, std::span<const std::uint8_t> bits);

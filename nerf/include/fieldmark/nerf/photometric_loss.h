@@ -5,6 +5,7 @@
 
 namespace fieldmark::nerf {
 
+/// Form of photometric_loss().
 struct PhotometricLossOptions {
   double huber = 0.1;  ///< residual at which the square becomes linear, > 0; infinity for the plain square
   double scale = 1;    ///< multiplies the loss

@@ -10,8 +10,9 @@
 
 namespace fieldmark::nerf {
 
+/// Sizes of a RadianceField.
 struct RadianceFieldOptions {
-  FieldOptions field{};
+  FieldOptions field{};    ///< of the networks and the encoding
   Index occupancy = 128;   ///< cells per axis of the occupancy grid, see OccupancyGrid
   float step = 1.f / 420;  ///< spacing of samples along a ray, in diagonals of the cube
   std::uint64_t seed = 0;  ///< of the initial numbers
@@ -21,6 +22,7 @@ struct RadianceFieldOptions {
 /// span of the cameras it was trained from and its background. This is what a FIELD file holds.
 class RadianceField {
  public:
+  /// A field with initial numbers, all cells occupied. @throws ValueError if an option is out of range
   explicit RadianceField(const RadianceFieldOptions& options);
 
   /// Spacing of samples, cube sides.
@@ -36,20 +38,23 @@ class RadianceField {
   static RadianceField load(const std::filesystem::path& path);
   /// The same inside a larger file (an OWNER, a checkpoint), tensor names after `prefix`.
   void store(SafetensorsFile& file, const std::string& prefix) const;
+  /// Reads what store() wrote. @throws IoError if a tensor is missing or does not fit
   void restore(const SafetensorsFile& file, const std::string& prefix);
   /// Options, bounds, cameras and background as JSON text, and the field they describe with its initial
   /// numbers.
   std::string configuration() const;
+  /// @param place  named in errors   @throws IoError if the text is not what configuration() writes
   static RadianceField from_configuration(std::string_view json, std::string_view place);
 
+  /// As constructed.
   const RadianceFieldOptions& options() const { return options_; }
 
-  ParamStore<float> params;
-  Field<float> field;
-  OccupancyGrid grid;
-  Bounds bounds;
-  CameraSpan cameras;
-  Background background = Background::white;
+  ParamStore<float> params;                   ///< all numbers of the networks and the table
+  Field<float> field;                         ///< how they are read
+  OccupancyGrid grid;                         ///< which cells of the cube are not empty
+  Bounds bounds;                              ///< where the cube lies in the world
+  CameraSpan cameras;                         ///< where the training cameras stood
+  Background background = Background::white;  ///< what its pictures are composited over
 
  private:
   RadianceFieldOptions options_;

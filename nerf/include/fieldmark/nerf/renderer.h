@@ -7,6 +7,7 @@
 
 namespace fieldmark::nerf {
 
+/// How exactly a Renderer works.
 struct RenderOptions {
   float stop = 1e-3f;          ///< a ray ends where its transmittance falls below this
   float least_weight = 1e-4f;  ///< samples of less weight get no colour
@@ -25,6 +26,7 @@ struct Rendering {
 /// between views; callers of trace() say so with refresh().
 class Renderer {
  public:
+  /// @param options  not checked; weights and transmittances are in [0, 1]
   /// @throws ValueError for bf16 where the CPU has none
   explicit Renderer(const RadianceField& field, const RenderOptions& options = {});
   ~Renderer();
@@ -36,13 +38,14 @@ class Renderer {
   /// directions d [n, 3] they are seen from, and colours rgb [n, 3]. Called from several threads at once. An
   /// empty function draws the field as it is.
   using Recolour = std::function<void(const float* x, const float* d, Index n, float* rgb)>;
+  /// Used from the next picture on.
   void set_recolour(Recolour recolour) { recolour_ = std::move(recolour); }
+  static constexpr Index kLanes = 16;  ///< calls of trace() that may run at the same time
   /// Colour and opacity of given rays, background not added.
   /// @param rays  in cube coordinates   @param lane  0 to kLanes - 1: calls with different lanes may run at
   /// the same time
   /// @param out  [R, 4] written   @param position  [R, 3] written unless null: the mean position of what the
   /// ray sees, by weight, in the unit cube; 0 where it sees nothing
-  static constexpr Index kLanes = 16;
   void trace(const RayBatch& rays, Index lane, float* out, float* position = nullptr);
 
  private:

@@ -7,10 +7,13 @@ namespace fieldmark::nerf {
 
 /// Rays in cube coordinates. @param origins, directions [R, 3], directions of unit length
 struct RayBatch {
-  std::span<const float> origins, directions;
+  std::span<const float> origins;     ///< must outlive the batch
+  std::span<const float> directions;  ///< must outlive the batch
+  /// R, the number of rays.
   Index size() const { return static_cast<Index>(origins.size()) / 3; }
 };
 
+/// How rays are marched.
 struct SamplingOptions {
   float step = 1.f / 512;  ///< spacing of samples along a ray, cube sides, > 0
   float stop = 1e-4f;      ///< a ray ends where its transmittance falls below this; 0 never stops early
@@ -25,6 +28,7 @@ struct RaySamples {
   std::vector<float> density_features;  ///< [S, F L]
   std::vector<float> colour_features;   ///< [S, F L]
   std::vector<float> sigma;             ///< [S] 1 / cube side
+  /// S, the number of samples.
   Index size() const { return static_cast<Index>(t.size()); }
 };
 

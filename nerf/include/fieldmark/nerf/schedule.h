@@ -3,6 +3,7 @@
 
 namespace fieldmark::nerf {
 
+/// Length of a run and its step sizes.
 struct ScheduleOptions {
   Index steps = 0;           ///< length of the run in steps; 0: by time
   double seconds = 60;       ///< length of the run in seconds, where steps is 0, > 0
@@ -24,9 +25,11 @@ class Schedule {
   /// Called before step n with the time since the start: a timed run fixes its total here, when what is left
   /// of the time is what the last part takes at the pace of the steps since the previous calls.
   void observe(Index n, double seconds);
+  /// Step size of step n, counted from 0.
   double lr(Index n) const;
   /// N; 0 while a timed run has not fixed it.
   Index total() const { return total_; }
+  /// Whether the run ends before step n.
   bool done(Index n) const { return total_ > 0 && n >= total_; }
   /// Continues a run whose total was fixed already. @param total  0: not fixed
   void resume(Index total);

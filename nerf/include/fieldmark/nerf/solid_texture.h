@@ -5,14 +5,16 @@
 
 namespace fieldmark::nerf {
 
+/// The patterns that texture_colour() lists.
 enum class TextureKind { flat, checker, stripes, rings, noise, marble };
 
 /// Colour as a function of the place in a solid: nothing to unwrap, the same from every side.
 struct SolidTexture {
-  TextureKind kind = TextureKind::flat;
-  Vec3 a{0.7, 0.7, 0.7}, b{0.3, 0.3, 0.3};  ///< the two colours it varies between, each in [0, 1]
-  double scale = 0.2;                       ///< period of the pattern, length, > 0
-  std::uint32_t seed = 0;                   ///< of the noise
+  TextureKind kind = TextureKind::flat;  ///< the pattern
+  Vec3 a{0.7, 0.7, 0.7};                 ///< one of the two colours it varies between, in [0, 1]
+  Vec3 b{0.3, 0.3, 0.3};                 ///< the other
+  double scale = 0.2;                    ///< period of the pattern, length, > 0
+  std::uint32_t seed = 0;                ///< of the noise
 };
 
 /// The colour [3] at a point; on the segment between a and b.

@@ -5,13 +5,14 @@
 
 namespace fieldmark::nerf {
 
+/// The forms that a Solid can have.
 enum class SolidKind { sphere, box, cylinder, cone, torus };
 
 /// A solid of the analytic scenes. Cylinder, cone and torus have z as axis.
 struct Solid {
-  SolidKind kind = SolidKind::sphere;
-  Vec3 centre{};
-  std::array<double, 2> turn{1, 0};  ///< cosine and sine of its rotation about z
+  SolidKind kind = SolidKind::sphere;  ///< its form
+  Vec3 centre{};                       ///< of its extent, in the world
+  std::array<double, 2> turn{1, 0};    ///< cosine and sine of its rotation about z
   /// sphere: radius, -, -; box: half extents; cylinder: radius, half height, -; cone: radius of the base,
   /// half height,
   /// - (apex up); torus: radius of the ring, radius of the tube, -. All lengths > 0.

@@ -7,14 +7,15 @@
 
 namespace fieldmark::nerf {
 
+/// How a field is trained.
 struct TrainOptions {
-  ScheduleOptions schedule{};
+  ScheduleOptions schedule{};      ///< length of the run and step sizes
   Index samples_per_step = 24576;  ///< rays a step are chosen to have about this many samples, >= 1024
   double huber = 0.1;              ///< see PhotometricLossOptions
   float stop = 1e-2f;  ///< a ray ends where its transmittance falls below this, in [0, 1): what lies deeper
                        ///< than 1e-2 is worth less than the rays that its samples would cost
   Index warm_up = 32;  ///< steps before cells may be declared empty
-  std::uint64_t seed = 0;
+  std::uint64_t seed = 0;  ///< of the choice of rays, backgrounds and occupancy samples
   /// bf16 rounds what the networks multiply, forward and in dX; weights, their gradients and the table stay
   /// float. Needs bf16_units(). No faster for networks as narrow as these.
   Precision precision = Precision::fp32;
@@ -36,7 +37,9 @@ class Trainer {
 
   /// Takes one step. @param seconds  since the start of the run, for a schedule that ends at a time
   void step(double seconds);
+  /// Whether the run has all its steps.
   bool done() const { return schedule_.done(steps_); }
+  /// Steps taken, those before a restore() included.
   Index steps() const { return steps_; }
   /// Steps that the run will have in all; 0 until a timed run knows.
   Index planned() const { return schedule_.total(); }

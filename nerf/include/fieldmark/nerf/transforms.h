@@ -9,9 +9,10 @@ namespace fieldmark::nerf {
 
 /// The contents of a transforms_*.json.
 struct Transforms {
+  /// One picture and where it was taken from.
   struct Frame {
     std::string file_path;  ///< relative to the folder of the JSON, with or without ".png"
-    Pose pose{};
+    Pose pose{};            ///< from the camera to the world, OpenGL axes
   };
   double camera_angle_x = 0;  ///< horizontal field of view, radians, in (0, pi)
   std::vector<Frame> frames;  ///< at least one

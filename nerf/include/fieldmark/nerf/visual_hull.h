@@ -10,13 +10,13 @@ namespace fieldmark::nerf {
 
 /// A cube in world coordinates: positions x map to (x - corner) / side in [0, 1]^3.
 struct Bounds {
-  std::array<double, 3> corner{-1.5, -1.5, -1.5};
-  double side = 3;
+  std::array<double, 3> corner{-1.5, -1.5, -1.5};  ///< the least x, y and z
+  double side = 3;                                 ///< length of an edge, > 0
 };
 
 /// A photograph's silhouette with the camera that took it.
 struct Silhouette {
-  Camera camera;
+  Camera camera;               ///< of the size of the image
   const Tensor<float>* image;  ///< [H, W, 4], alpha last
 };
 

@@ -7,11 +7,13 @@
 
 namespace fieldmark::watermark {
 
+/// How a message is baked.
 struct BakeOptions {
+  /// Length of the run and step sizes.
   nerf::ScheduleOptions schedule{
       .seconds = 45, .lr = 1e-2, .half_after = 4000, .cooldown = 0.6, .last = 0.02};
-  Index cameras = 400;  ///< near cameras whose rays are used, >= 1
-  std::uint64_t seed = 0;
+  Index cameras = 400;     ///< near cameras whose rays are used, >= 1
+  std::uint64_t seed = 0;  ///< of cameras and rays
 };
 
 /// Distils the marked colours of one message into the colour side of a plain field:
@@ -26,12 +28,17 @@ class Baker {
   /// option is out of range
   Baker(const Owner& owner, const Message& message, const BakeOptions& options);
   ~Baker();
+  /// Takes one step. @param seconds  since the start of the run, for a schedule that ends at a time
   void step(double seconds);
+  /// Whether the run has all its steps.
   bool done() const { return schedule_.done(steps_); }
+  /// Steps taken.
   Index steps() const { return steps_; }
+  /// Steps that the run will have in all; 0 until a timed run knows.
   Index planned() const { return schedule_.total(); }
   /// Running mean of the distance between baked and marked colours, as a PSNR over the samples by weight.
   double psnr() const;
+  /// The baked field as far as it is.
   const nerf::RadianceField& field() const { return field_; }
 
  private:

@@ -18,7 +18,9 @@ class CellGrid {
   /// another size
   CellGrid(Index side, std::span<const double> area, double least = 1e-5);
 
+  /// Places of the grid per axis.
   Index side() const { return side_; }
+  /// Number of cells.
   Index count() const { return static_cast<Index>(area_.size()); }
   /// [count] visible area of the cells, as a part of all.
   std::span<const double> area() const { return area_; }

@@ -20,7 +20,9 @@ struct EmbedDistortions {
   double sample_shift = 1e-3;  ///< beta of x + z, z ~ N(0, beta^2), cube sides
 };
 
+/// How mark and extractor are trained.
 struct EmbedOptions {
+  /// Length of the run and step sizes.
   nerf::ScheduleOptions schedule{
       .seconds = 900, .lr = 2e-3, .half_after = 8000, .cooldown = 0.5, .last = 0.05};
   Index views = 200;           ///< near cameras whose geometry is cached, >= 8
@@ -32,10 +34,10 @@ struct EmbedOptions {
   double smooth_weight = 0.4;  ///< of the share of the residual's power left after averaging 8 x 8 pixels
   double flat_weight =
       0.4;  ///< of the residual's power where the base picture is flat, relative to all of it
-  double content_weight = 1;  ///< preset paper: gamma_1, of the content loss ...
-  double message_weight = 5;  ///< ... and gamma_2, of the message loss
-  EmbedDistortions distortions = {};
-  std::uint64_t seed = 0;
+  double content_weight = 1;          ///< preset paper: gamma_1, of the content loss ...
+  double message_weight = 5;          ///< ... and gamma_2, of the message loss
+  EmbedDistortions distortions = {};  ///< what training pictures go through
+  std::uint64_t seed = 0;             ///< of messages, views and distortions
 };
 
 /// The options of a preset: the defaults for fast; for paper a step size of 5e-4 and its distortions at most
@@ -58,15 +60,23 @@ class Embedder {
  public:
   /// Owner and views must outlive the embedder. @throws ValueError if an option is out of range
   Embedder(Owner& owner, std::span<const CachedView> views, const EmbedOptions& options);
+  /// Takes one step. @param seconds  since the start of the run, for a schedule that ends at a time
   void step(double seconds);
+  /// Whether the run has all its steps.
   bool done() const { return schedule_.done(steps_); }
+  /// Steps taken, those before a restore() included.
   Index steps() const { return steps_; }
+  /// Steps that the run will have in all; 0 until a timed run knows.
   Index planned() const { return schedule_.total(); }
   /// Running means over the last pictures: share of places on the object whose sign is right, whose index is
   /// right (both 0 for preset paper), and of bits right, all under training distortions.
   struct Figures {
-    double sign = 0, index = 0, bits = 0, loss = 0;
+    double sign = 0;   ///< share of places
+    double index = 0;  ///< share of places
+    double bits = 0;   ///< share of bits
+    double loss = 0;   ///< mean of a picture
   };
+  /// As of the last step.
   const Figures& figures() const { return figures_; }
   /// Sets the owner's gain so that the mean PSNR on the object over `views` new near views is the owner's
   /// strength; nothing for preset paper, which has no gain.

@@ -54,8 +54,8 @@ BitReading read_bits(std::span<const double> evidence, const CellCode& code, Ind
 /// How many bits of a reading agree with a message.
 struct BitMatch {
   Index matching = 0;  ///< among the decided bits
-  Index decided = 0;
-  Index bits = 0;
+  Index decided = 0;   ///< bits whose logit is not 0
+  Index bits = 0;      ///< length of the message
   /// (matching + undecided / 2) / bits
   double accuracy() const;
 };

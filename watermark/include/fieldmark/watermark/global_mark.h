@@ -5,11 +5,13 @@
 
 namespace fieldmark::watermark {
 
+/// Sizes of a GlobalMark.
 struct GlobalMarkOptions {
-  Index bits = 16;                               ///< N_b, at least 1
-  Index message_features = 256;                  ///< N_m, at least 1
-  Index colour_features = 256;                   ///< N_c, at least 1
-  int position_bands = 10, direction_bands = 4;  ///< of gamma, 1 to 20
+  Index bits = 16;               ///< N_b, at least 1
+  Index message_features = 256;  ///< N_m, at least 1
+  Index colour_features = 256;   ///< N_c, at least 1
+  int position_bands = 10;       ///< of gamma for positions, 1 to 20
+  int direction_bands = 4;       ///< of gamma for directions, 1 to 20
   Index width = 256;  ///< units of the hidden layers of D and E, at least 2; G has width and width / 2
 };
 
@@ -31,6 +33,7 @@ class GlobalMark {
   /// @param message  [1, N_b], -1 or 1   @return c_m [N, 3] in (0, 1)   @throws ShapeError if they do not fit
   /// Differentiable in: x, d, c, message and the parameters; kinks of the ReLUs.
   Var<T> operator()(const Params<T>& params, Var<T> x, Var<T> d, Var<T> c, Var<T> message) const;
+  /// As constructed.
   const GlobalMarkOptions& options() const { return options_; }
 
  private:

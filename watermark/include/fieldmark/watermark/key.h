@@ -9,7 +9,8 @@ namespace fieldmark::watermark {
 
 /// The owner's secret, 256 bits: who does not hold it cannot say what a picture's cells should show.
 struct Key {
-  std::array<std::uint8_t, 32> bytes{};
+  std::array<std::uint8_t, 32> bytes{};  ///< to be kept from logs and reports
+  /// Compares in a time that may depend on the bytes.
   friend bool operator==(const Key&, const Key&) = default;
 };
 

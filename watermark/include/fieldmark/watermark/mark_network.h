@@ -3,6 +3,7 @@
 
 namespace fieldmark::watermark {
 
+/// Sizes of a MarkNetwork and the colours it may use.
 struct MarkNetworkOptions {
   int bands = 7;  ///< of the frequency encoding of the position, 1 to 12: the finest period is 2^(2 - bands)
                   ///< cube sides
@@ -26,11 +27,13 @@ struct MarkNetworkOptions {
 template <class T>
 class MarkNetwork {
  public:
+  /// @throws ValueError if an option is out of range or a name is taken
   MarkNetwork(ParamStore<T>& store, std::string_view name, const MarkNetworkOptions& options,
               std::uint64_t seed);
   /// P at positions. @param x [N, 3] unit cube   @param c [N, 3] colour of the base field   @return [N, 3]
   /// Differentiable in: x, c and the parameters.
   Var<T> carrier(const Params<T>& params, Var<T> x, Var<T> c) const;
+  /// As constructed.
   const MarkNetworkOptions& options() const { return options_; }
 
  private:

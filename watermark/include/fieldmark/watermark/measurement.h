@@ -10,9 +10,10 @@ namespace fieldmark::watermark {
 
 /// Accuracies of the two readings; a reading that was not made is NaN.
 struct ReadingAccuracy {
-  double blind = 0;
+  double blind = 0;  ///< of the reading from the picture alone
 };
 
+/// What measure() looks at.
 struct MeasureOptions {
   std::vector<nerf::Camera> cameras = {};  ///< of the views, at their full resolution
   std::vector<std::string> under = {};     ///< distortions besides none, names of parse_attack()
@@ -22,14 +23,15 @@ struct MeasureOptions {
 
 /// What a mark does to pictures and how well it is read from one view at a time.
 struct Measurement {
-  Index bits = 0, views = 0;
-  bool baked = false;
+  Index bits = 0;      ///< length of the message
+  Index views = 0;     ///< that were read
+  bool baked = false;  ///< whether a baked field was measured
   ReadingAccuracy
       accuracy;            ///< share of bits right in one view, mean over views; an undecided bit counts 0.5
   double accuracy_p5 = 0;  ///< 5th percentile over views of the blind accuracy
   double psnr_base = 0;    ///< marked against unmarked, dB, both rounded to 8 bits, mean over views
-  double psnr_base_object = 0;  ///< the same over pixels whose unmarked opacity exceeds 0.5
-  double ssim_base = 0;
+  double psnr_base_object = 0;                   ///< the same over pixels whose unmarked opacity exceeds 0.5
+  double ssim_base = 0;                          ///< marked against unmarked, mean over views
   std::map<std::string, ReadingAccuracy> under;  ///< for each distortion
 };
 

@@ -11,8 +11,10 @@ namespace fieldmark::watermark {
 
 /// The bits that a mark carries, first bit first, each 0 or 1.
 struct Message {
-  std::vector<std::uint8_t> bits;
+  std::vector<std::uint8_t> bits;  ///< [n]
+  /// Number of bits.
   Index size() const { return static_cast<Index>(bits.size()); }
+  /// Equal in length and every bit.
   friend bool operator==(const Message&, const Message&) = default;
 };
 

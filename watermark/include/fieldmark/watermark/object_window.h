@@ -6,7 +6,9 @@ namespace fieldmark::watermark {
 
 /// A square part of a picture, pixels; it may reach beyond the picture.
 struct Window {
-  double x = 0, y = 0, side = 0;  ///< left, top, side
+  double x = 0;     ///< left edge
+  double y = 0;     ///< upper edge
+  double side = 0;  ///< of both sides
 };
 
 /// The square around what stands out from a plain background, with a margin: places of the object then look

@@ -17,22 +17,24 @@ enum class Preset {
   fast,  ///< every cell of the scene carries a bit (MarkNetwork, DenseExtractor): trains in minutes
   paper  ///< one message fused into every colour, one pooled reading (GlobalMark, PooledExtractor)
 };
+/// "fast" or "paper".
 const char* preset_name(Preset preset);
 /// @throws ValueError if the name is neither "fast" nor "paper"
 Preset parse_preset(std::string_view name);
 
+/// How a mark is made: fixed when it is, and kept in the OWNER.
 struct OwnerOptions {
-  Preset preset = Preset::fast;
-  Index bits = 16;  ///< length of a message, 1 to 256
+  Preset preset = Preset::fast;  ///< which networks
+  Index bits = 16;               ///< length of a message, 1 to 256
   double strength =
       36.5;          ///< PSNR of marked against unmarked on the object, dB, mean over near views, 20 to 60
   Index cells = 16;  ///< per axis of the field's cube, see CellGrid
-  Index reader_size = 200;  ///< side of the square in which the extractor sees the object, pixels, >= 32
-  MarkNetworkOptions mark{};
-  Index base_channels = 32;  ///< of the extractor, see DenseExtractorOptions
-  Index width = 256;         ///< preset paper: units of D, E and G, and N_m and N_c, see GlobalMarkOptions
-  Index channels = 64;       ///< preset paper: of the extractor, see PooledExtractorOptions
-  std::uint64_t seed = 0;
+  Index reader_size = 200;    ///< side of the square in which the extractor sees the object, pixels, >= 32
+  MarkNetworkOptions mark{};  ///< preset fast
+  Index base_channels = 32;   ///< of the extractor, see DenseExtractorOptions
+  Index width = 256;          ///< preset paper: units of D, E and G, and N_m and N_c, see GlobalMarkOptions
+  Index channels = 64;        ///< preset paper: of the extractor, see PooledExtractorOptions
+  std::uint64_t seed = 0;     ///< of the initial numbers of the networks
 };
 
 /// For preset paper: slots without a place take the part of cells, one for each bit and all of the same area,
@@ -49,6 +51,7 @@ class Owner {
 
   /// Which bits and signs the cells carry under the owner's key, or under another.
   CellCode code() const { return code(key); }
+  /// The same under another key.
   CellCode code(const Key& other) const;
 
   /// Colours of the marked field of one message, not yet baked. Preset fast adds the residual g s(x) P(x, c)
@@ -63,19 +66,18 @@ class Owner {
   /// configuration
   static Owner load(const std::filesystem::path& path);
 
+  /// As constructed.
   const OwnerOptions& options() const { return options_; }
 
-  nerf::RadianceField field;
-  Key key;
-  CellGrid cells;
-  ParamStore<float> params;  ///< mark network and extractor
-  /// Preset fast.
-  std::optional<MarkNetwork<float>> mark;
-  std::optional<extractor::DenseExtractor<float>> reader;
-  double gain = 0;  ///< g
-  /// Preset paper.
-  std::optional<GlobalMark<float>> global_mark;
-  std::optional<extractor::PooledExtractor<float>> pooled_reader;
+  nerf::RadianceField field;                                       ///< unmarked
+  Key key;                                                         ///< which deals the cells
+  CellGrid cells;                                                  ///< or slots, see message_slots()
+  ParamStore<float> params;                                        ///< mark network and extractor
+  std::optional<MarkNetwork<float>> mark;                          ///< preset fast
+  std::optional<extractor::DenseExtractor<float>> reader;          ///< preset fast
+  double gain = 0;                                                 ///< g; preset fast
+  std::optional<GlobalMark<float>> global_mark;                    ///< preset paper
+  std::optional<extractor::PooledExtractor<float>> pooled_reader;  ///< preset paper
 
  private:
   OwnerOptions options_;

@@ -8,6 +8,7 @@ namespace fieldmark::watermark {
 /// The owner must outlive it. Calls may run at the same time.
 class PictureReader {
  public:
+  /// @param owner  must outlive the reader
   explicit PictureReader(const Owner& owner) : owner_(owner) {}
   /// Sign evidence S_c of every cell (for preset paper the logit of every slot), see evidence.h. The object's
   /// window is cut out and brought to the reader's size first (see object_window.h).

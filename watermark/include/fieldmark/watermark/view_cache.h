@@ -7,7 +7,8 @@ namespace fieldmark::watermark {
 /// change while the mark is learnt. A pixel that sees something has one sample, at the mean position of what
 /// its ray sees.
 struct CachedView {
-  Index height = 0, width = 0;
+  Index height = 0;                        ///< pixels
+  Index width = 0;                         ///< pixels
   Tensor<float> base;                      ///< [height, width, 3] over the background
   Tensor<float> opacity;                   ///< [height, width]
   std::vector<std::int32_t> sample_begin;  ///< [height width + 1]
@@ -17,6 +18,7 @@ struct CachedView {
   std::vector<float> weight;  ///< [S] share of the sample in its pixel; a pixel's sum is about its opacity
 };
 
+/// Marches the rays of one view and keeps what they see.
 CachedView cache_view(nerf::Renderer& renderer, const nerf::RadianceField& field, const nerf::Camera& camera);
 
 }  // namespace fieldmark::watermark

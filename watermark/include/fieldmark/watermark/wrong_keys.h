@@ -9,8 +9,8 @@ namespace fieldmark::watermark {
 
 /// How often keys that have nothing to do with a picture reach a p-value.
 struct WrongKeyCounts {
-  static constexpr int kThresholds = 8;
-  Index n = 0;
+  static constexpr int kThresholds = 8;  ///< least p-value counted is 10^-kThresholds
+  Index n = 0;                           ///< keys tried
   /// counts[i] keys reached p <= 10^-(i + 1).
   std::array<Index, kThresholds> counts{};
 };

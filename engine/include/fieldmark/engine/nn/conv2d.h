@@ -6,11 +6,12 @@
 
 namespace fieldmark {
 
+/// Extents of a Conv2d layer and what follows its sums.
 struct Conv2dOptions {
-  Index in = 0;      ///< channels of the input, >= 1
-  Index out = 0;     ///< channels of the output, >= 1
-  Index kernel = 3;  ///< side of the window, odd
-  Activation activation = Activation::none;
+  Index in = 0;                              ///< channels of the input, >= 1
+  Index out = 0;                             ///< channels of the output, >= 1
+  Index kernel = 3;                          ///< side of the window, odd
+  Activation activation = Activation::none;  ///< applied to the sums, in the same pass
 };
 
 /// Convolution layer, see conv2d(). Weights start uniform in +-sqrt(6 / (kernel^2 in)) (He et al. 2015), the

@@ -6,6 +6,7 @@
 
 namespace fieldmark {
 
+/// Settings of batch_norm() and batch_norm_fixed().
 struct BatchNormOptions {
   double eps = 1e-5;  ///< added to the variance, > 0
   bool relu = false;  ///< max(y, 0) in the same pass over memory
@@ -13,7 +14,7 @@ struct BatchNormOptions {
 
 /// What a batch was normalised by, one number a channel.
 struct BatchStatistics {
-  std::vector<double> mean;
+  std::vector<double> mean;      ///< over images, height and width
   std::vector<double> variance;  ///< E[(x - mean)^2], divided by the count
 };
 

@@ -13,6 +13,7 @@ namespace fieldmark {
 /// Differentiable in: every x.
 template <class T>
 Var<T> concat_columns(std::span<const Var<T>> xs);
+/// The same for tensors listed at the call.
 template <class T>
 Var<T> concat_columns(std::initializer_list<Var<T>> xs) {
   return concat_columns(std::span<const Var<T>>(xs.begin(), xs.size()));

@@ -3,6 +3,7 @@
 
 namespace fieldmark {
 
+/// Settings of group_norm().
 struct GroupNormOptions {
   Index groups = 8;   ///< divides the channels
   double eps = 1e-5;  ///< added to the variance, > 0

@@ -3,6 +3,7 @@
 
 namespace fieldmark {
 
+/// How upsample_to() fills a pixel: from the nearest one, or linearly between the four around it.
 enum class Interpolation { nearest, bilinear };
 
 /// Repeats every pixel factor x factor times.
