@@ -35,6 +35,13 @@ Outcome run(Index steps, Owner owner = tiny_owner()) {
   while (!embedder.done()) embedder.step(0);
   return outcome(owner, embedder);
 }
+
+void refused(const std::filesystem::path& path, Owner& owner, const EmbedOptions& with,
+             const std::string& text) {
+  Embedder embedder(owner, tiny_views(), with);
+  CHECK_THROWS_AS(embedder.restore(path), IoError);
+  CHECK_THROWS_WITH(embedder.restore(path), Contains(path.string()) && Contains(text));
+}
 }  // namespace
 
 TEST_CASE("embedder: in 300 steps the losses fall, places are told apart and bits begin to be read") {
@@ -126,20 +133,15 @@ TEST_CASE("embedder: a checkpoint of another run is refused") {
   using std::filesystem::perms;
   CHECK(std::filesystem::status(path).permissions() == (perms::owner_read | perms::owner_write));
   CHECK(Embedder::checkpoint_key(path) == owner.key);
-  const auto refused = [&](Owner& o, const EmbedOptions& with, const std::string& text) {
-    Embedder e(o, tiny_views(), with);
-    CHECK_THROWS_AS(e.restore(path), IoError);
-    CHECK_THROWS_WITH(e.restore(path), Contains(path.string()) && Contains(text));
-  };
-  refused(owner, options(7), "expected a checkpoint of this run");
+  refused(path, owner, options(7), "expected a checkpoint of this run");
   Owner other_key = tiny_owner();
   other_key.key = test_key(6);
-  refused(other_key, options(6), "found one under another");
+  refused(path, other_key, options(6), "found one under another");
   const auto bytes = read_bytes(path);
   write_file_atomically(path, std::span(bytes).first(bytes.size() - 1));
-  refused(owner, options(6), "");
+  refused(path, owner, options(6), "");
   owner.save(path);
-  refused(owner, options(6), "another kind of file");
+  refused(path, owner, options(6), "another kind of file");
   owner.field.save(path);
   CHECK_THROWS_AS(Embedder::checkpoint_key(path), IoError);
   CHECK_THROWS_WITH(Embedder::checkpoint_key(path),
@@ -150,6 +152,47 @@ TEST_CASE("embedder: a checkpoint of another run is refused") {
   short_key.write(path);
   CHECK_THROWS_WITH(Embedder::checkpoint_key(path),
                     path.string() + ": tensor 'key': expected 32 bytes, found 3");
+}
+
+TEST_CASE("embedder: a checkpoint of other weights, distortions or step sizes is refused") {
+  struct Change {
+    void (*make)(EmbedOptions&);
+    const char* text;  // how the run that was asked for names it
+  };
+  const Change both[] = {{[](EmbedOptions& o) { o.schedule.lr = 0.125; }, "lr 0.125"},
+                         {[](EmbedOptions& o) { o.schedule.half_after = 5; }, "half after 5.0"},
+                         {[](EmbedOptions& o) { o.schedule.cooldown = 0.25; }, "cooldown 0.25"},
+                         {[](EmbedOptions& o) { o.schedule.last = 0.75; }, "last 0.75"},
+                         {[](EmbedOptions& o) { o.distortions.noise = 0.125; }, "noise 0.125"},
+                         {[](EmbedOptions& o) { o.distortions.rotation = 7; }, "rotation 7.0"},
+                         {[](EmbedOptions& o) { o.distortions.zoom_out = 0.5; }, "zoom out 0.5"},
+                         {[](EmbedOptions& o) { o.distortions.zoom_in = 1.5; }, "zoom in 1.5"},
+                         {[](EmbedOptions& o) { o.distortions.blur = 0.5; }, "blur 0.5"},
+                         {[](EmbedOptions& o) { o.distortions.sample_shift = 0.5; }, "sample shift 0.5"}};
+  const std::vector<Change> fast = {{[](EmbedOptions& o) { o.first_strength = 25; }, "first strength 25.0"},
+                                    {[](EmbedOptions& o) { o.anneal = 21; }, "anneal 21.0"},
+                                    {[](EmbedOptions& o) { o.index_weight = 2; }, "index 2.0"},
+                                    {[](EmbedOptions& o) { o.bits_weight = 2; }, "bits 2.0"},
+                                    {[](EmbedOptions& o) { o.smooth_weight = 2; }, "smooth 2.0"},
+                                    {[](EmbedOptions& o) { o.flat_weight = 2; }, "flat 2.0"}};
+  const std::vector<Change> paper = {{[](EmbedOptions& o) { o.content_weight = 2; }, "content 2.0"},
+                                     {[](EmbedOptions& o) { o.message_weight = 2; }, "message 2.0"}};
+  const TemporaryFolder folder;
+  const auto path = folder / "checkpoint";
+  for (const bool is_paper : {false, true}) {
+    Owner owner = is_paper ? tiny_paper_owner() : tiny_owner();
+    Embedder(owner, tiny_views(), options(6)).save(path);
+    const auto asked = [](const Change& change) {
+      EmbedOptions o = options(6);
+      change.make(o);
+      return o;
+    };
+    const std::vector<Change>& read = is_paper ? paper : fast;
+    const std::vector<Change>& unread = is_paper ? fast : paper;
+    for (const Change& c : both) refused(path, owner, asked(c), c.text);
+    for (const Change& c : read) refused(path, owner, asked(c), c.text);
+    for (const Change& c : unread) CHECK_NOTHROW(Embedder(owner, tiny_views(), asked(c)).restore(path));
+  }
 }
 
 TEST_CASE("embedder: calibration gives views the owner's strength") {

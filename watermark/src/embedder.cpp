@@ -179,11 +179,39 @@ void Embedder::calibrate(Index views) {
 
 std::string Embedder::fingerprint() const {
   const OwnerOptions& o = owner_.options();
-  return std::string(preset_name(o.preset)) + ", " + std::to_string(o.bits) + " bits, " +
-         std::to_string(o.strength) + " dB, " + std::to_string(owner_.cells.count()) + " cells, seed " +
-         std::to_string(options_.seed) + ", steps " + std::to_string(options_.schedule.steps) + ", batch " +
-         std::to_string(options_.batch) + ", views " + std::to_string(views_.size()) + ", parameters " +
-         std::to_string(owner_.params.size());
+  std::string text = std::string(preset_name(o.preset)) + ", " + std::to_string(o.bits) + " bits, " +
+                     std::to_string(o.strength) + " dB, " + std::to_string(owner_.cells.count()) +
+                     " cells, seed " + std::to_string(options_.seed) + ", steps " +
+                     std::to_string(options_.schedule.steps) + ", batch " + std::to_string(options_.batch) +
+                     ", views " + std::to_string(views_.size()) + ", parameters " +
+                     std::to_string(owner_.params.size());
+  const auto add = [&](const char* name, double value) {
+    text += ", " + std::string(name) + " " + std::to_string(value);
+  };
+  const nerf::ScheduleOptions& s = options_.schedule;
+  add("lr", s.lr);
+  add("half after", s.half_after);
+  add("cooldown", s.cooldown);
+  add("last", s.last);
+  if (o.preset == Preset::paper) {
+    add("content", options_.content_weight);
+    add("message", options_.message_weight);
+  } else {
+    add("first strength", options_.first_strength);
+    add("anneal", options_.anneal);
+    add("index", options_.index_weight);
+    add("bits", options_.bits_weight);
+    add("smooth", options_.smooth_weight);
+    add("flat", options_.flat_weight);
+  }
+  const EmbedDistortions& d = options_.distortions;
+  add("noise", d.noise);
+  add("rotation", d.rotation);
+  add("zoom out", d.zoom_out);
+  add("zoom in", d.zoom_in);
+  add("blur", d.blur);
+  add("sample shift", d.sample_shift);
+  return text;
 }
 
 void Embedder::save(const std::filesystem::path& path) const {
