@@ -45,7 +45,7 @@ double decibels(std::uint64_t squares, Index count) {
 }
 
 std::uint64_t square_of_difference(std::uint8_t a, std::uint8_t b) {
-  const int d = a - b;
+  const std::int64_t d = std::int64_t{a} - b;
   return static_cast<std::uint64_t>(d * d);
 }
 
@@ -54,8 +54,9 @@ constexpr double kC1 = 0.01 * 0.01, kC2 = 0.03 * 0.03;
 
 std::array<double, kWindow> gaussian() {
   std::array<double, kWindow> w{};
+  constexpr int kMiddle = kWindow / 2;
   for (int k = 0; k < kWindow; ++k) {
-    const double x = (k - kWindow / 2) / 1.5;
+    const double x = (k - kMiddle) / 1.5;
     w[static_cast<std::size_t>(k)] = std::exp(-0.5 * x * x);
   }
   const double sum = std::accumulate(w.begin(), w.end(), 0.0);

@@ -5,6 +5,7 @@
 #include <fieldmark/engine/ops/matmul.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "fieldmark/extractor/centred_image.h"
@@ -63,6 +64,7 @@ Params<double> along_directions(const ParamStore<double>& store, const Tensor<do
   double* dall = all.grad_acc();
   tape.on_backward(all, [t, layout, d](const double* dtheta) {
     double* dt = t.grad_acc();
+    assert(dt);  // a backward runs only where its one input needs a gradient
     for (const auto& e : layout->entries()) {
       for (Index i = e.offset; trained(e) && i < e.offset + e.shape.size(); ++i) *dt += d[i] * dtheta[i];
       ++dt;

@@ -184,7 +184,8 @@ void render_pixel(const std::vector<Object>& objects, const Camera& camera, doub
   int covered = 0;
   find_candidates(objects, camera, pixel_ray(camera, x, y), candidates);
   for (int s = 0; s < kSide * kSide && !candidates->empty(); ++s) {
-    const double dx = (s % kSide + 0.5) / kSide - 0.5, dy = (s / kSide + 0.5) / kSide - 0.5;
+    const int column = s % kSide, row = s / kSide;
+    const double dx = (column + 0.5) / kSide - 0.5, dy = (row + 0.5) / kSide - 0.5;
     Vec3 colour;
     if (!trace(objects, *candidates, pixel_ray(camera, x + dx, y + dy), &colour)) continue;
     sum = sum + colour;

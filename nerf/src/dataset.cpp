@@ -39,10 +39,10 @@ Tensor<float> resize_rgba(Tensor<float> image, Index height, Index width) {
 }
 
 fs::path picture_path(const fs::path& folder, const std::string& file, const std::string& place) {
-  const fs::path named = folder / file;
+  fs::path named = folder / file;
   std::error_code ignored;
   if (fs::is_regular_file(named, ignored)) return named;
-  const fs::path png = named.string() + ".png";
+  fs::path png = named.string() + ".png";
   if (fs::is_regular_file(png, ignored)) return png;
   throw IoError(place + ": expected a picture, got no file " + png.lexically_normal().string());
 }

@@ -9,7 +9,7 @@ namespace {
 // al. 1983).
 template <class T, class V>
 inline void join(double count, double n, V centre, V residual, V squares, double* mean, double* m2) {
-  constexpr std::size_t lanes = sizeof(V) / sizeof(T);
+  constexpr std::size_t number = sizeof(T), lanes = sizeof(V) / number;
   T c[lanes], r[lanes], s[lanes];
   std::memcpy(c, &centre, sizeof centre);
   std::memcpy(r, &residual, sizeof residual);

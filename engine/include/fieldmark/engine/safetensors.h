@@ -37,7 +37,7 @@ struct SafetensorsFile {
   /// sorted; arrays follow each other in the order added, those of wider elements first, so that each is
   /// aligned.
   /// @throws IoError if writing fails   @throws ValueError if a name or metadata is not UTF-8
-  void write(const std::filesystem::path& path) const;
+  void write(const std::filesystem::path& to) const;
 
   /// @{
   /// Appends an array. @throws ValueError if the name is taken or "__metadata__"

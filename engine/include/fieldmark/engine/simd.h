@@ -9,11 +9,11 @@ namespace {
 namespace simd {
 
 #if defined(__AVX512F__)
-constexpr int kBytes = 64;
+inline constexpr int kBytes = 64;
 #elif defined(__AVX2__)
-constexpr int kBytes = 32;
+inline constexpr int kBytes = 32;
 #else
-constexpr int kBytes = 16;
+inline constexpr int kBytes = 16;
 #endif
 
 /// Numbers of type T in one register.

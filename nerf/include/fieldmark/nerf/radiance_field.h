@@ -44,7 +44,7 @@ class RadianceField {
   /// numbers.
   std::string configuration() const;
   /// @param place  named in errors   @throws IoError if the text is not what configuration() writes
-  static RadianceField from_configuration(std::string_view json, std::string_view place);
+  static RadianceField from_configuration(std::string_view text, std::string_view place);
 
   /// As constructed.
   const RadianceFieldOptions& options() const { return options_; }
