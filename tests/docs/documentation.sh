@@ -4,6 +4,7 @@
 #   documentation.sh DOXYGEN DOXYFILE
 set -euo pipefail
 doxygen=$1 doxyfile=$2
+cd "$(dirname "$doxyfile")"  # Doxygen looks for what links name from the folder it runs in, too
 
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
