@@ -2,6 +2,7 @@
 #include <fieldmark/extractor/pooled_extractor.h>
 
 #include <algorithm>
+#include <array>
 
 #include "rows.h"
 
@@ -9,13 +10,14 @@ namespace fieldmark::bench {
 namespace {
 
 constexpr Index kPictures = 4, kSide = 128, kChannels = 64;
-constexpr Index kErrorSide = 24;  // pixels, where float is compared with double
+constexpr int kErrorPictures = 5;  // sets of pictures for which float is compared with double
 
 // A network of pictures; the loss is <u, y> with a fixed u.
 template <class T, class Net>
 struct Pass {
-  Pass(Index side, Index channels) : shape{kPictures, side, side, channels} {
-    x = numbers<T>(shape.size(), 3);
+  Pass(Index side, Index channels, std::uint64_t seed_ = 3)
+      : shape{kPictures, side, side, channels}, seed(seed_) {
+    x = numbers<T>(shape.size(), seed);
     for (T& v : x) v = (v + 1) / 2;
     dx.assign(x.size(), T(0));
   }
@@ -24,11 +26,12 @@ struct Pass {
     std::fill(store.grads().begin(), store.grads().end(), T(0));
     std::fill(dx.begin(), dx.end(), T(0));
     const Var<T> y = net(Params<T>(store), tape.leaf(x.data(), dx.data(), shape));
-    if (u.empty()) u = numbers<T>(y.shape().size(), 4);
+    if (u.empty()) u = numbers<T>(y.shape().size(), seed + 1);
     values.assign(y.value(), y.value() + (keep ? y.shape().size() : 0));
     tape.backward(y, u);
   }
   Shape shape;
+  std::uint64_t seed;
   ParamStore<T> store;
   Net net = Net::make(store);
   Tape<T> tape;
@@ -57,9 +60,9 @@ struct Decoder {
 
 // Copies the numbers of a float pass into a double one, and compares what both give.
 template <template <class> class Net>
-double error_of(Index channels) {
-  Pass<float, Net<float>> f(kErrorSide, channels);
-  Pass<double, Net<double>> d(kErrorSide, channels);
+double error_of(Index side, Index channels, std::uint64_t seed) {
+  Pass<float, Net<float>> f(side, channels, seed);
+  Pass<double, Net<double>> d(side, channels, seed);
   f.keep = d.keep = true;
   std::copy(f.store.values().begin(), f.store.values().end(), d.store.values().begin());
   std::copy(f.x.begin(), f.x.end(), d.x.begin());
@@ -70,16 +73,27 @@ double error_of(Index channels) {
                    relative_error(f.store.grads(), d.store.grads())});
 }
 
+// Where the argument of one ReLU in a million falls on different sides of 0 in float and double, gradients
+// differ by 1e-3 to 1e-2 however small the rounding: at 12 x 12 pixels that is one set of pictures in 16 for
+// the decoder, and the median does not see it.
+template <template <class> class Net>
+double typical_error(Index side, Index channels) {
+  std::array<double, kErrorPictures> errors{};
+  for (std::size_t k = 0; k < errors.size(); ++k) errors[k] = error_of<Net>(side, channels, 3 + 2 * k);
+  std::nth_element(errors.begin(), errors.begin() + kErrorPictures / 2, errors.end());
+  return errors[kErrorPictures / 2];
+}
+
 // Multiplications and additions of 3 x 3 convolutions over all pictures, forward, dX and dW.
 double operations(Index side, Index in, Index out) {
   return 3.0 * 2.0 * static_cast<double>(kPictures * side * side) * 9.0 * static_cast<double>(in * out);
 }
 
 template <template <class> class Net>
-EngineRow timed(Index channels, double per_pass, Index side, const EngineBenchOptions& o) {
+EngineRow timed(Index channels, double per_pass, Index side, Index error_side, const EngineBenchOptions& o) {
   Pass<float, Net<float>> pass(side, channels);
   EngineRow row = row_of(time_calls([&] { pass.run(); }, o.runs), per_pass, static_cast<double>(kPictures));
-  row.error = error_of<Net>(channels);
+  row.error = typical_error<Net>(error_side, channels);
   return row;
 }
 
@@ -93,13 +107,13 @@ std::vector<RowSpec> conv_rows() {
   return {{"conv3x3_64_fb_f32", "convolution 3 x 3, 64 to 64, 4 pictures of 128 x 128",
            [](const EngineBenchOptions& o) {
              const Index side = scaled_side(o.scale);
-             return timed<OneConv>(kChannels, operations(side, kChannels, kChannels), side, o);
+             return timed<OneConv>(kChannels, operations(side, kChannels, kChannels), side, 24, o);
            }},
           {"hidden_decoder_fb_f32", "decoder 3-64, 7 x 64, batch norm, ReLU, average, linear, 4 of 128 x 128",
            [](const EngineBenchOptions& o) {
              const Index side = scaled_side(o.scale);
              return timed<Decoder>(
-                 3, operations(side, 3, kChannels) + 7 * operations(side, kChannels, kChannels), side, o);
+                 3, operations(side, 3, kChannels) + 7 * operations(side, kChannels, kChannels), side, 12, o);
            }}};
 }
 
