@@ -20,7 +20,7 @@ Tensor<double> numbers(Shape shape, double phase) {
 Tensor<double> biases(Index n, Activation activation) {
   Tensor<double> b = numbers({n}, 3);
   if (activation == Activation::relu)
-    for (Index i = 0; i < n; ++i) b[i] += i % 2 == 0 ? 20 : -20;
+    for (Index i = 0; i < n; ++i) b[i] += i % 2 == 0 ? 100 : -100;
   return b;
 }
 
@@ -34,9 +34,8 @@ GradcheckReport check_dense(Activation activation) {
   return gradcheck([=](Tape<double>&, auto v) { return dense(v[0], v[1], v[2], activation); }, in);
 }
 
-GradcheckReport check_conv2d(Activation activation) {
-  const std::vector<Tensor<double>> in{numbers({2, 3, 4, 2}, 1), numbers({3, 3, 2, 3}, 2),
-                                       biases(3, activation)};
+GradcheckReport check_conv2d(Activation activation, Shape x = {2, 3, 4, 2}, Index out = 3) {
+  const std::vector<Tensor<double>> in{numbers(x, 1), numbers({3, 3, x[3], out}, 2), biases(out, activation)};
   return gradcheck([=](Tape<double>&, auto v) { return conv2d(v[0], v[1], v[2], activation); }, in);
 }
 
@@ -61,6 +60,10 @@ std::vector<GradcheckCase> gradcheck_cases_linear() {
        }},
       {"conv2d", [] { return check_conv2d(Activation::none); }},
       {"conv2d with relu", [] { return check_conv2d(Activation::relu); }},
+      {"conv2d with relu of wide layers",  // Winograd's way
+       [] {
+         return check_conv2d(Activation::relu, {2, 5, 7, 8}, 16);
+       }},
       {"conv2d layer",
        [] {
          return check_layer<Conv2d<double>>(Conv2dOptions{.in = 2, .out = 3}, {1, 3, 4, 2});

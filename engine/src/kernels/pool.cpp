@@ -36,14 +36,14 @@ void backward(const PoolRow& p, const T* dy, T* dx, bool add) {
     for (std::int64_t k = p.windows * p.size * p.channels; k < p.row; ++k) dx[i * p.row + k] = 0;
 }
 
-template <class T>
-void add_pixels(const T* x, std::int64_t pixels, std::int64_t channels, double* sums) {
+template <class T, class Load>
+void add_pixels(std::int64_t pixels, std::int64_t channels, double* sums, Load load) {
   for (std::int64_t c = 0; c < channels; ++c) sums[c] = 0;
   for_segments(pixels, [=](std::int64_t first, std::int64_t n) {
     for_channels<T>(channels, [=](auto zero, std::int64_t c) {
       using V = decltype(zero);
       V s[2] = {};
-      for (std::int64_t p = 0; p < n; ++p) s[p & 1] += load_as<V>(x + (first + p) * channels + c);
+      for (std::int64_t p = 0; p < n; ++p) s[p & 1] += load(zero, (first + p) * channels + c);
       add_lanes<T>(sums + c, s[0] + s[1]);
     });
   });
@@ -72,18 +72,25 @@ void pool_row_backward(const PoolRow& p, const T* dy, T* dx, bool add) {
   backward(p, dy, dx, add);
 }
 template <class T>
-void channel_sums(const T* x, std::int64_t pixels, std::int64_t channels, double* sums) {
-  add_pixels(x, pixels, channels, sums);
+void channel_sums(const T* x, const T* mask, std::int64_t pixels, std::int64_t channels, double* sums) {
+  if (mask)
+    add_pixels<T>(pixels, channels, sums, [=](auto zero, std::int64_t i) {
+      using V = decltype(zero);
+      return load_as<V>(mask + i) > zero ? load_as<V>(x + i) : zero;
+    });
+  else
+    add_pixels<T>(pixels, channels, sums,
+                  [=](auto zero, std::int64_t i) { return load_as<decltype(zero)>(x + i); });
 }
 template <class T>
 void fill_pixels(const T* row, std::int64_t pixels, std::int64_t channels, T* y, bool add) {
   fill(row, pixels, channels, y, add);
 }
 
-#define FIELDMARK_INSTANTIATE(T)                                             \
-  template void pool_row(const PoolRow&, const T*, T*);                      \
-  template void pool_row_backward(const PoolRow&, const T*, T*, bool);       \
-  template void channel_sums(const T*, std::int64_t, std::int64_t, double*); \
+#define FIELDMARK_INSTANTIATE(T)                                                       \
+  template void pool_row(const PoolRow&, const T*, T*);                                \
+  template void pool_row_backward(const PoolRow&, const T*, T*, bool);                 \
+  template void channel_sums(const T*, const T*, std::int64_t, std::int64_t, double*); \
   template void fill_pixels(const T*, std::int64_t, std::int64_t, T*, bool);
 FIELDMARK_INSTANTIATE(float)
 FIELDMARK_INSTANTIATE(double)

@@ -15,9 +15,10 @@ FIELDMARK_DECLARE_KERNEL(template <class T> void, pool_row, (const PoolRow& p, c
 // dx = or += dy / size^2; pixels that fill no window become 0, or stay.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, pool_row_backward,
                          (const PoolRow& p, const T* dy, T* dx, bool add))
-// sums[c] = sum over pixels of x[pixel, c].
+// sums[c] = sum over pixels of x[pixel, c], of those at which `mask` is positive where it is given.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, channel_sums,
-                         (const T* x, std::int64_t pixels, std::int64_t channels, double* sums))
+                         (const T* x, const T* mask, std::int64_t pixels, std::int64_t channels,
+                          double* sums))
 // y[pixel, c] = or += row[c].
 FIELDMARK_DECLARE_KERNEL(template <class T> void, fill_pixels,
                          (const T* row, std::int64_t pixels, std::int64_t channels, T* y, bool add))

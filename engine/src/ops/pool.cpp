@@ -50,8 +50,8 @@ Var<T> global_avg_pool(Var<T> x) {
   const auto add = FIELDMARK_KERNEL(channel_sums<T>);
   parallel_for(s[0] * blocks, 1, [&](Index piece, Index) {
     const Index first = piece % blocks * block;
-    add(x.value() + (piece / blocks * pixels + first) * channels, std::min(block, pixels - first), channels,
-        sums + piece * channels);
+    add(x.value() + (piece / blocks * pixels + first) * channels, nullptr, std::min(block, pixels - first),
+        channels, sums + piece * channels);
   });
   for (Index i = 0; i < s[0] * channels; ++i) {
     double total = 0;

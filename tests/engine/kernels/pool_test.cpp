@@ -66,8 +66,12 @@ TEST_CASE("kernels/pool: sums over pixels and their transpose, for every number 
     for (std::int64_t channels = 1; channels <= 130; ++channels) {
       const std::int64_t pixels = 71;
       const auto x = uniform<float>({pixels * channels}, -1, 1, 1);
-      std::vector<double> sums(static_cast<std::size_t>(channels)), want = sums;
-      FIELDMARK_KERNEL(channel_sums<float>)(x.data.data(), pixels, channels, sums.data());
+      const auto mask = uniform<float>({pixels * channels}, -1, 1, 2);
+      std::vector<double> sums(static_cast<std::size_t>(channels)), want = sums, part = sums,
+                                                                    want_part = sums;
+      FIELDMARK_KERNEL(channel_sums<float>)(x.data.data(), nullptr, pixels, channels, sums.data());
+      FIELDMARK_KERNEL(channel_sums<float>)
+      (x.data.data(), mask.data.data(), pixels, channels, part.data());
       Tensor<float> fresh({pixels * channels}), held = x;
       FIELDMARK_KERNEL(fill_pixels<float>)(x.data.data(), pixels, channels, fresh.data.data(), false);
       FIELDMARK_KERNEL(fill_pixels<float>)(x.data.data(), pixels, channels, held.data.data(), true);
@@ -75,11 +79,15 @@ TEST_CASE("kernels/pool: sums over pixels and their transpose, for every number 
       for (std::int64_t i = 0; i < x.size(); ++i) {
         const float row = x[i % channels];
         want[static_cast<std::size_t>(i % channels)] += x[i];
+        want_part[static_cast<std::size_t>(i % channels)] += mask[i] > 0 ? x[i] : 0;
         worst = std::max<double>({worst, std::abs(fresh[i] - row), std::abs(held[i] - (x[i] + row))});
       }
       CAPTURE(channels);
       CHECK(worst == 0);
-      for (std::size_t c = 0; c < want.size(); ++c) CHECK(std::abs(sums[c] - want[c]) < 1e-5);
+      for (std::size_t c = 0; c < want.size(); ++c) {
+        CHECK(std::abs(sums[c] - want[c]) < 1e-5);
+        CHECK(std::abs(part[c] - want_part[c]) < 1e-5);
+      }
     }
   });
 }

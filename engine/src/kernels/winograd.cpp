@@ -1,0 +1,265 @@
+#include "kernels/winograd.h"
+
+#include "kernels/channels.h"
+
+namespace fieldmark::kernels {
+namespace {
+
+// Points of evaluation p = 1 / sqrt 2 and q = sqrt 2: p^2, q^2, p^2 q^2 and p^2 + q^2 are exact in binary.
+template <class T>
+constexpr T kP = T(0.70710678118654752440);
+template <class T>
+constexpr T kQ = T(1.41421356237309504880);
+
+// Each transform along one axis: `to` numbers from `from` numbers, rows in the order of the points 0, p, -p,
+// q, -q, infinity. V is a vector or a number of T.
+
+// B^T: row i holds the coefficients of prod_{j != i} (z - a_j), the last those of the product over all
+// points.
+struct WindowLine {
+  static constexpr int from = 6, to = 6;
+  template <class T, class V>
+  [[gnu::always_inline]] static void run(const V* d, V* t) {
+    const V even1 = d[4] - T(2) * d[2], odd1 = kP<T> * (d[3] - T(2) * d[1]);
+    const V even2 = d[4] - T(0.5) * d[2], odd2 = kQ<T> * (d[3] - T(0.5) * d[1]);
+    t[0] = d[0] - T(2.5) * d[2] + d[4];
+    t[1] = even1 + odd1;
+    t[2] = even1 - odd1;
+    t[3] = even2 + odd2;
+    t[4] = even2 - odd2;
+    t[5] = d[1] - T(2.5) * d[3] + d[5];
+  }
+};
+
+// A: row i holds 1, a_i, a_i^2, a_i^3.
+struct TileLine {
+  static constexpr int from = 4, to = 6;
+  template <class T, class V>
+  [[gnu::always_inline]] static void run(const V* d, V* t) {
+    const V even1 = d[0] + T(0.5) * d[2], odd1 = kP<T> * (d[1] + T(0.5) * d[3]);
+    const V even2 = d[0] + T(2) * d[2], odd2 = kQ<T> * (d[1] + T(2) * d[3]);
+    t[0] = d[0];
+    t[1] = even1 + odd1;
+    t[2] = even1 - odd1;
+    t[3] = even2 + odd2;
+    t[4] = even2 - odd2;
+    t[5] = d[3];
+  }
+};
+
+// A^T.
+struct OutputLine {
+  static constexpr int from = 6, to = 4;
+  template <class T, class V>
+  [[gnu::always_inline]] static void run(const V* m, V* y) {
+    const V even1 = m[1] + m[2], odd1 = kP<T> * (m[1] - m[2]);
+    const V even2 = m[3] + m[4], odd2 = kQ<T> * (m[3] - m[4]);
+    y[0] = m[0] + even1 + even2;
+    y[1] = odd1 + odd2;
+    y[2] = T(0.5) * even1 + T(2) * even2;
+    y[3] = T(0.5) * odd1 + T(2) * odd2 + m[5];
+  }
+};
+
+// G: row i holds 1, a_i, a_i^2 over prod_{j != i} (a_i - a_j), which is 1, -3/2, -3/2, 6, 6, 1.
+struct WeightLine {
+  static constexpr int from = 3, to = 6;
+  template <class T, class V>
+  [[gnu::always_inline]] static void run(const V* g, V* t) {
+    const V even1 = T(-2.0 / 3) * (g[0] + T(0.5) * g[2]), odd1 = T(-2.0 / 3) * kP<T> * g[1];
+    const V even2 = T(1.0 / 6) * (g[0] + T(2) * g[2]), odd2 = T(1.0 / 6) * kQ<T> * g[1];
+    t[0] = g[0];
+    t[1] = even1 + odd1;
+    t[2] = even1 - odd1;
+    t[3] = even2 + odd2;
+    t[4] = even2 - odd2;
+    t[5] = g[2];
+  }
+};
+
+// G^T.
+struct GradientLine {
+  static constexpr int from = 6, to = 3;
+  template <class T, class V>
+  [[gnu::always_inline]] static void run(const V* m, V* g) {
+    const V even1 = T(-2.0 / 3) * (m[1] + m[2]), odd1 = T(-2.0 / 3) * kP<T> * (m[1] - m[2]);
+    const V even2 = T(1.0 / 6) * (m[3] + m[4]), odd2 = T(1.0 / 6) * kQ<T> * (m[3] - m[4]);
+    g[0] = m[0] + even1 + even2;
+    g[1] = odd1 + odd2;
+    g[2] = T(0.5) * even1 + T(2) * even2 + m[5];
+  }
+};
+
+// store(i, j, (L X L^T)[i, j]) of X[i, j] = load(i, j).
+template <class Line, class T, class V, class Load, class Store>
+[[gnu::always_inline]] inline void both_axes(Load load, Store store) {
+  V half[Line::to][Line::from];
+#pragma GCC unroll 6
+  for (int j = 0; j < Line::from; ++j) {
+    V in[Line::from], out[Line::to];
+#pragma GCC unroll 6
+    for (int i = 0; i < Line::from; ++i) in[i] = load(i, j);
+    Line::template run<T>(in, out);
+#pragma GCC unroll 6
+    for (int i = 0; i < Line::to; ++i) half[i][j] = out[i];
+  }
+#pragma GCC unroll 6
+  for (int i = 0; i < Line::to; ++i) {
+    V out[Line::to];
+    Line::template run<T>(half[i], out);
+#pragma GCC unroll 6
+    for (int j = 0; j < Line::to; ++j) store(i, j, out[j]);
+  }
+}
+
+// As for_channels(), with vectors of 16 bytes before single numbers: a transform of 36 numbers is dear
+// enough.
+template <class T, class F>
+[[gnu::always_inline]] inline void for_vectors(std::int64_t channels, F f) {
+  typedef T Short __attribute__((vector_size(16)));
+  constexpr std::int64_t lanes = simd::kLanes<T>, few = 16 / static_cast<std::int64_t>(sizeof(T));
+  std::int64_t c = 0;
+  for (; c + lanes <= channels; c += lanes) f(simd::Vec<T>{}, c);
+  for (; c + few <= channels; c += few) f(Short{}, c);
+  for (; c < channels; ++c) f(T{}, c);
+}
+
+constexpr std::int64_t smaller(std::int64_t a, std::int64_t b) { return a < b ? a : b; }
+
+// Calls f(number within `count`, offset of the tile's first pixel from the picture's, its row, its column,
+// and the picture's first pixel).
+template <class T, class F>
+[[gnu::always_inline]] inline void for_tiles(const WinogradTiles<T>& x, F f) {
+  const std::int64_t down = (x.h + kWinogradTile - 1) / kWinogradTile,
+                     across = (x.w + kWinogradTile - 1) / kWinogradTile;
+  for (std::int64_t t = 0; t < x.count; ++t) {
+    const std::int64_t tile = x.first + t, line = tile / across;
+    f(t, line / down * x.h * x.w, line % down * kWinogradTile, tile % across * kWinogradTile);
+  }
+}
+
+// Calls f(V{}, c, where number [row, c] of the first matrix lies) for the channels of a row of matrices in
+// panels; what the last panel has beyond them becomes 0.
+template <class T, class F>
+[[gnu::always_inline]] inline void for_row(const WinogradMatrices<T>& to, std::int64_t row,
+                                           std::int64_t channels, F f) {
+  T* at = to.data + row * to.panel;
+  for (std::int64_t first = 0; first < channels; first += to.panel, at += to.distance) {
+    const std::int64_t width = smaller(to.panel, channels - first);
+    for_vectors<T>(width, [=](auto zero, std::int64_t c) { f(zero, first + c, at + c); });
+    for (std::int64_t c = width; c < to.panel; ++c)
+      for (std::int64_t k = 0; k < kWinogradProducts; ++k) at[k * to.stride + c] = 0;
+  }
+}
+
+// Transforms each tile's square of Line::from pixels a side, whose first lies `border` before the tile's.
+template <class Line, std::int64_t border, class T>
+void transform(const WinogradTiles<T>& x, const WinogradMatrices<T>& to) {
+  const std::int64_t pixel = x.channels, line = x.w * pixel;
+  for_tiles(x, [=](std::int64_t t, std::int64_t picture, std::int64_t row, std::int64_t column) {
+    const std::int64_t top = row - border, left = column - border;
+    const std::int64_t begin = (picture + top * x.w + left) * pixel;
+    const bool inside = top >= 0 && left >= 0 && top + Line::from <= x.h && left + Line::from <= x.w;
+    for_row(to, t, x.channels, [=](auto zero, std::int64_t c, T* at) {
+      using V = decltype(zero);
+      const auto store = [=](int i, int j, V v) { store_as(at + (i * 6 + j) * to.stride, v); };
+      const std::int64_t from = begin + c;
+      if (inside && !x.mask)
+        both_axes<Line, T, V>([=](int i, int j) { return load_as<V>(x.data + from + i * line + j * pixel); },
+                              store);
+      else
+        both_axes<Line, T, V>(
+            [=](int i, int j) {
+              if (top + i < 0 || top + i >= x.h || left + j < 0 || left + j >= x.w) return V{};
+              const V v = load_as<V>(x.data + from + i * line + j * pixel);
+              if (!x.mask) return v;
+              return load_as<V>(x.mask + from + i * line + j * pixel) > V{} ? v : V{};
+            },
+            store);
+    });
+  });
+}
+
+template <class T>
+void outputs(const WinogradTiles<T>& x, const WinogradMatrices<const T>& m, const WinogradOutput<T>& out) {
+  const std::int64_t pixel = x.channels, line = x.w * pixel;
+  for_tiles(x, [=](std::int64_t t, std::int64_t picture, std::int64_t row, std::int64_t column) {
+    const std::int64_t rows = x.h - row, columns = x.w - column;
+    T* y = out.y + (picture + row * x.w + column) * pixel;
+    for_vectors<T>(pixel, [=](auto zero, std::int64_t c) {
+      using V = decltype(zero);
+      const T* from = m.data + t * pixel + c;
+      const V bias = out.bias ? load_as<V>(out.bias + c) : V{};
+      both_axes<OutputLine, T, V>([=](int i, int j) { return load_as<V>(from + (i * 6 + j) * m.stride); },
+                                  [=](int i, int j, V v) {
+                                    if (i >= rows || j >= columns) return;
+                                    T* to = y + i * line + j * pixel + c;
+                                    v += out.accumulate ? load_as<V>(to) : bias;
+                                    // Zero comes first: NaN stays NaN.
+                                    store_as(to, out.relu ? simd::max(V{}, v) : v);
+                                  });
+    });
+  });
+}
+
+}  // namespace
+
+namespace FIELDMARK_ISA_NS {
+
+template <class T>
+void winograd_windows(const WinogradTiles<T>& x, const WinogradMatrices<T>& to) {
+  transform<WindowLine, 1>(x, to);
+}
+
+template <class T>
+void winograd_tiles(const WinogradTiles<T>& dy, const WinogradMatrices<T>& to) {
+  transform<TileLine, 0>(dy, to);
+}
+
+template <class T>
+void winograd_weights(const T* w, std::int64_t c_in, std::int64_t c_out, std::int64_t first,
+                      std::int64_t count, const WinogradMatrices<T>& to) {
+  for (std::int64_t row = first; row < first + count; ++row)
+    for_row(to, row, c_out, [=](auto zero, std::int64_t c, T* at) {
+      using V = decltype(zero);
+      const T* from = w + row * c_out + c;
+      both_axes<WeightLine, T, V>([=](int i, int j) { return load_as<V>(from + (i * 3 + j) * c_in * c_out); },
+                                  [=](int i, int j, V v) { store_as(at + (i * 6 + j) * to.stride, v); });
+    });
+}
+
+template <class T>
+void winograd_outputs(const WinogradTiles<T>& tiles, const WinogradMatrices<const T>& m,
+                      const WinogradOutput<T>& out) {
+  outputs(tiles, m, out);
+}
+
+template <class T>
+void winograd_weight_gradient(const WinogradMatrices<const T>& m, std::int64_t c_in, std::int64_t c_out,
+                              T* dw) {
+  const std::int64_t plane = c_in * c_out;
+  for_vectors<T>(plane, [=](auto zero, std::int64_t at) {
+    using V = decltype(zero);
+    both_axes<GradientLine, T, V>(
+        [=](int i, int j) { return load_as<V>(m.data + (i * 6 + j) * m.stride + at); },
+        [=](int i, int j, V v) {
+          T* to = dw + (i * 3 + j) * plane + at;
+          store_as(to, load_as<V>(to) + v);
+        });
+  });
+}
+
+#define FIELDMARK_INSTANTIATE(T)                                                                   \
+  template void winograd_windows(const WinogradTiles<T>&, const WinogradMatrices<T>&);             \
+  template void winograd_tiles(const WinogradTiles<T>&, const WinogradMatrices<T>&);               \
+  template void winograd_weights(const T*, std::int64_t, std::int64_t, std::int64_t, std::int64_t, \
+                                 const WinogradMatrices<T>&);                                      \
+  template void winograd_outputs(const WinogradTiles<T>&, const WinogradMatrices<const T>&,        \
+                                 const WinogradOutput<T>&);                                        \
+  template void winograd_weight_gradient(const WinogradMatrices<const T>&, std::int64_t, std::int64_t, T*);
+FIELDMARK_INSTANTIATE(float)
+FIELDMARK_INSTANTIATE(double)
+#undef FIELDMARK_INSTANTIATE
+
+}  // namespace FIELDMARK_ISA_NS
+}  // namespace fieldmark::kernels

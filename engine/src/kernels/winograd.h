@@ -1,0 +1,60 @@
+#pragma once
+#include <fieldmark/engine/isa.h>
+
+#include <cstdint>
+
+// The transforms of Winograd's convolution F(4 x 4, 3 x 3) and of its weight gradient F(3 x 3, 4 x 4): a
+// window of 6 x 6 pixels and a tile of 4 x 4 outputs meet in 36 products for each pair of channels, where the
+// definition takes 144. Source: Lavin & Gray 2016, section 4, at the points 0, +-1/sqrt 2, +-sqrt 2
+// and infinity instead of their 0, +-1, +-2 and infinity (ops/conv2d_winograd.cpp has the errors of both).
+namespace fieldmark::kernels {
+
+constexpr std::int64_t kWinogradTile = 4;       // outputs of a tile along an axis
+constexpr std::int64_t kWinogradProducts = 36;  // numbers of a transformed tile
+
+/// 36 matrices, `stride` numbers apart, in panels as pack_panels() lays them out: number [row, column] is at
+/// (column / panel) distance + row panel + column % panel. One panel as wide as the matrix is row-major.
+template <class T>
+struct WinogradMatrices {
+  T* data = nullptr;
+  std::int64_t stride = 0, panel = 0, distance = 0;
+};
+
+/// Tiles first .. first + count of the pictures [n, h, w, channels], numbered picture by picture and row by
+/// row; there are ceil(h / 4) ceil(w / 4) in a picture. Where `mask` (laid out as the pictures) is not
+/// positive, a number counts as 0.
+template <class T>
+struct WinogradTiles {
+  const T* data = nullptr;
+  const T* mask = nullptr;
+  std::int64_t h = 0, w = 0, channels = 0;
+  std::int64_t first = 0, count = 0;
+};
+
+/// What becomes of the outputs: y's old value or the bias is added, then they may pass through a ReLU.
+template <class T>
+struct WinogradOutput {
+  T* y = nullptr;           ///< laid out as WinogradTiles says
+  const T* bias = nullptr;  ///< [channels] or null; not with accumulate
+  bool accumulate = false, relu = false;
+};
+
+/// to[:, tile, c] = B^T X B of the window x[4 i - 1 .. 4 i + 4, 4 j - 1 .. 4 j + 4, c] (zeros outside).
+FIELDMARK_DECLARE_KERNEL(template <class T> void, winograd_windows,
+                         (const WinogradTiles<T>& x, const WinogradMatrices<T>& to))
+/// to[:, tile, o] = A D A^T of the tile dy[4 i .. 4 i + 3, 4 j .. 4 j + 3, o] (zeros outside).
+FIELDMARK_DECLARE_KERNEL(template <class T> void, winograd_tiles,
+                         (const WinogradTiles<T>& dy, const WinogradMatrices<T>& to))
+/// to[:, c, o] = G w[:, :, c, o] G^T for c in [first, first + count) of w [3, 3, c_in, c_out].
+FIELDMARK_DECLARE_KERNEL(template <class T> void, winograd_weights,
+                         (const T* w, std::int64_t c_in, std::int64_t c_out, std::int64_t first,
+                          std::int64_t count, const WinogradMatrices<T>& to))
+/// y's tile = A^T m[:, tile, o] A; tiles.data is not read.
+FIELDMARK_DECLARE_KERNEL(template <class T> void, winograd_outputs,
+                         (const WinogradTiles<T>& tiles, const WinogradMatrices<const T>& m,
+                          const WinogradOutput<T>& out))
+/// dw[:, :, c, o] += G^T m[:, c, o] G for dw [3, 3, c_in, c_out]; m is row-major.
+FIELDMARK_DECLARE_KERNEL(template <class T> void, winograd_weight_gradient,
+                         (const WinogradMatrices<const T>& m, std::int64_t c_in, std::int64_t c_out, T* dw))
+
+}  // namespace fieldmark::kernels
