@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 
+#include "peer_work.h"
 #include "rows.h"
 
 namespace fieldmark::bench {
@@ -11,6 +12,7 @@ namespace {
 
 constexpr Index kPictures = 4, kSide = 128, kChannels = 64;
 constexpr int kErrorPictures = 5;  // sets of pictures for which float is compared with double
+constexpr Index kDrawSide = 16;    // pixels, where gradients are compared with a peer's
 
 // A network of pictures; the loss is <u, y> with a fixed u.
 template <class T, class Net>
@@ -27,10 +29,11 @@ struct Pass {
     std::fill(dx.begin(), dx.end(), T(0));
     const Var<T> y = net(Params<T>(store), tape.leaf(x.data(), dx.data(), shape));
     if (u.empty()) u = numbers<T>(y.shape().size(), seed + 1);
+    y_shape = y.shape();
     values.assign(y.value(), y.value() + (keep ? y.shape().size() : 0));
     tape.backward(y, u);
   }
-  Shape shape;
+  Shape shape, y_shape;
   std::uint64_t seed;
   ParamStore<T> store;
   Net net = Net::make(store);
@@ -90,11 +93,31 @@ double operations(Index side, Index in, Index out) {
 }
 
 template <template <class> class Net>
-EngineRow timed(Index channels, double per_pass, Index side, Index error_side, const EngineBenchOptions& o) {
+EngineRow timed(Index channels, double per_pass, Index side, Index error_side, const RowOptions& o) {
   Pass<float, Net<float>> pass(side, channels);
-  EngineRow row = row_of(time_calls([&] { pass.run(); }, o.runs), per_pass, static_cast<double>(kPictures));
+  EngineRow row = row_of(time_calls([&] { pass.run(); }, o.runs, 0.1, o.between), per_pass,
+                         static_cast<double>(kPictures));
   row.error = typical_error<Net>(error_side, channels);
   return row;
+}
+
+template <class Net>
+PeerPass finished(Pass<float, Net>& pass) {
+  pass.keep = true;
+  pass.run();
+  return {pass.shape, pass.y_shape, pass.x, pass.u, pass.values, pass.dx};
+}
+
+// One pass of timed(), for a peer to do the same, and `draws` on small pictures.
+template <template <class> class Net>
+SafetensorsFile work(const char* network, Index channels, Index side, std::uint64_t draws) {
+  Pass<float, Net<float>> pass(side, channels);
+  SafetensorsFile file = peer_work(network, pass.store, finished(pass));
+  for (std::uint64_t d = 0; d < draws; ++d) {
+    Pass<float, Net<float>> small(kDrawSide, channels, 100 + d);
+    add_draw(file, small.store, finished(small));
+  }
+  return file;
 }
 
 Index scaled_side(double scale) {
@@ -105,16 +128,18 @@ Index scaled_side(double scale) {
 
 std::vector<RowSpec> conv_rows() {
   return {{"conv3x3_64_fb_f32", "convolution 3 x 3, 64 to 64, 4 pictures of 128 x 128",
-           [](const EngineBenchOptions& o) {
+           [](const RowOptions& o) {
              const Index side = scaled_side(o.scale);
              return timed<OneConv>(kChannels, operations(side, kChannels, kChannels), side, 24, o);
-           }},
+           },
+           [](const RowOptions& o) { return work<OneConv>("conv", kChannels, scaled_side(o.scale), 0); }},
           {"hidden_decoder_fb_f32", "decoder 3-64, 7 x 64, batch norm, ReLU, average, linear, 4 of 128 x 128",
-           [](const EngineBenchOptions& o) {
+           [](const RowOptions& o) {
              const Index side = scaled_side(o.scale);
              return timed<Decoder>(
                  3, operations(side, 3, kChannels) + 7 * operations(side, kChannels, kChannels), side, 12, o);
-           }}};
+           },
+           [](const RowOptions& o) { return work<Decoder>("decoder", 3, scaled_side(o.scale), 4); }}};
 }
 
 }  // namespace fieldmark::bench

@@ -1,8 +1,33 @@
 #include <fieldmark/engine/error.h>
 
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
 #include "rows.h"
 
 namespace fieldmark::bench {
+namespace {
+
+EngineRow run_row(const RowSpec& spec, const EngineBenchOptions& options) {
+  RowOptions o{options};
+  if (!options.peer || !spec.work) return spec.run(o);
+  Peer peer(spec.name, spec.work(o), *options.peer);
+  std::vector<double> seconds;
+  // Threads of either side spin for a while after their work, and would take the other's time.
+  const auto rest = [] { std::this_thread::sleep_for(std::chrono::milliseconds(20)); };
+  o.between = [&] {
+    rest();
+    seconds.push_back(peer.run());
+    rest();
+  };
+  EngineRow row = spec.run(o);
+  const double theirs = median(seconds);
+  row.peer = PeerRow{theirs, theirs / row.seconds, peer.found()};
+  return row;
+}
+
+}  // namespace
 
 EngineBench run_engine_bench(const EngineBenchOptions& options,
                              const std::function<void(const std::string&, double)>& progress) {
@@ -14,12 +39,14 @@ EngineBench run_engine_bench(const EngineBenchOptions& options,
     for (RowSpec& spec : list)
       if (spec.name.find(options.only) != std::string::npos) specs.push_back(std::move(spec));
   if (specs.empty()) throw ValueError("[engine_bench] only: no row has '" + options.only + "' in its name");
+  if (options.peer && std::none_of(specs.begin(), specs.end(), [](const auto& s) { return bool(s.work); }))
+    throw ValueError("[engine_bench] peer: no row with '" + options.only + "' in its name has one");
   EngineBench result;
   result.peak_gflops = peak_gflops();
   for (const RowSpec& spec : specs) {
     if (progress)
       progress(spec.name, static_cast<double>(result.rows.size()) / static_cast<double>(specs.size()));
-    EngineRow row = spec.run(options);
+    EngineRow row = run_row(spec, options);
     row.name = spec.name;
     row.what = spec.what;
     row.megabytes = peak_megabytes();

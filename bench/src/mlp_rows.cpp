@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "peer_work.h"
 #include "rows.h"
 
 namespace fieldmark::bench {
@@ -88,17 +89,28 @@ Index scaled(Index samples, double scale) {
   return std::max(kChunk, static_cast<Index>(static_cast<double>(samples) * scale));
 }
 
-EngineRow chunked(Index depth, Index width, Index samples, const EngineBenchOptions& o,
+EngineRow chunked(Index depth, Index width, Index samples, const RowOptions& o,
                   Precision precision = Precision::fp32) {
   Mlp<float> mlp(depth, width, scaled(samples, o.scale), precision);
   ShardedLoop<float> loop(kShards, mlp.store.size());
-  EngineRow row = row_of(time_calls([&] { in_chunks(mlp, loop); }, o.runs), mlp.operations(),
+  EngineRow row = row_of(time_calls([&] { in_chunks(mlp, loop); }, o.runs, 0.1, o.between), mlp.operations(),
                          static_cast<double>(mlp.samples));
   row.error = error_of(depth, width, precision);
   return row;
 }
 
-EngineRow whole_batch(Index depth, Index width, Index samples, const EngineBenchOptions& o) {
+// One pass of chunked(), for a peer to do the same.
+SafetensorsFile work(Index depth, Index width, Index samples, const RowOptions& o) {
+  Mlp<float> mlp(depth, width, scaled(samples, o.scale));
+  const Shape shape{mlp.samples, width};
+  leave_out_kinks(mlp.store, shape, mlp.x, mlp.u);
+  mlp.keep = true;
+  ShardedLoop<float> loop(kShards, mlp.store.size());
+  in_chunks(mlp, loop);
+  return peer_work("dense", mlp.store, {shape, shape, mlp.x, mlp.u, mlp.y, mlp.dx});
+}
+
+EngineRow whole_batch(Index depth, Index width, Index samples, const RowOptions& o) {
   Mlp<float> mlp(depth, width, scaled(samples, o.scale));
   Tape<float> tape;
   const auto step = [&] {
@@ -124,21 +136,22 @@ EngineRow with_avx2(const std::function<EngineRow()>& row) {
 }  // namespace
 
 std::vector<RowSpec> mlp_rows() {
-  const auto narrow = [](const EngineBenchOptions& o) { return chunked(4, 64, 262144, o); };
-  const auto wide = [](const EngineBenchOptions& o) { return chunked(8, 256, 32768, o); };
-  std::vector<RowSpec> rows{{"mlp_4x64_fb_f32", "4 dense layers of 64, 262,144 samples, in chunks", narrow},
+  const auto narrow = [](const RowOptions& o) { return chunked(4, 64, 262144, o); };
+  const auto wide = [](const RowOptions& o) { return chunked(8, 256, 32768, o); };
+  std::vector<RowSpec> rows{{"mlp_4x64_fb_f32", "4 dense layers of 64, 262,144 samples, in chunks", narrow,
+                             [](const RowOptions& o) { return work(4, 64, 262144, o); }},
                             {"mlp_4x64_tape_fb_f32", "the same through one tape over the whole batch",
-                             [](const EngineBenchOptions& o) { return whole_batch(4, 64, 262144, o); }},
-                            {"mlp_8x256_fb_f32", "8 dense layers of 256, 32,768 samples, in chunks", wide}};
+                             [](const RowOptions& o) { return whole_batch(4, 64, 262144, o); }},
+                            {"mlp_8x256_fb_f32", "8 dense layers of 256, 32,768 samples, in chunks", wide,
+                             [](const RowOptions& o) { return work(8, 256, 32768, o); }}};
   if (bf16_units() != Bf16Units::none)
     rows.push_back({"mlp_4x64_fb_bf16", "forward and dX in bf16, dW in float",
-                    [](const EngineBenchOptions& o) { return chunked(4, 64, 262144, o, Precision::bf16); }});
+                    [](const RowOptions& o) { return chunked(4, 64, 262144, o, Precision::bf16); }});
   if (isa() > Isa::v3)
     for (const auto& [name, row] : {std::pair{"mlp_4x64_fb_f32_avx2", RowRun(narrow)},
                                     std::pair{"mlp_8x256_fb_f32_avx2", RowRun(wide)}})
-      rows.push_back({name, "with AVX2, against AVX2's peak", [row = row](const EngineBenchOptions& o) {
-                        return with_avx2([&] { return row(o); });
-                      }});
+      rows.push_back({name, "with AVX2, against AVX2's peak",
+                      [row = row](const RowOptions& o) { return with_avx2([&] { return row(o); }); }});
   return rows;
 }
 

@@ -2,14 +2,20 @@
 // The rows of the engine's benchmark, a file for each kind. Private.
 #include <fieldmark/bench/engine_bench.h>
 #include <fieldmark/bench/timing.h>
+#include <fieldmark/engine/safetensors.h>
 #include <fieldmark/engine/shape.h>
 
 namespace fieldmark::bench {
 
-using RowRun = std::function<EngineRow(const EngineBenchOptions&)>;
+struct RowOptions : EngineBenchOptions {
+  std::function<void()> between{};  // for time_calls(), in rows with a peer
+};
+
+using RowRun = std::function<EngineRow(const RowOptions&)>;
 struct RowSpec {
   std::string name, what;
-  RowRun run;  // all but name, what and megabytes
+  RowRun run;                                                // all but name, what, megabytes and peer
+  std::function<SafetensorsFile(const RowOptions&)> work{};  // for a peer, see peer_work(); none: no peer
 };
 
 std::vector<RowSpec> mlp_rows();

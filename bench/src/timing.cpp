@@ -20,15 +20,17 @@ double now() {
 
 constexpr double kBurst = 3e-4;  // seconds; the clock keeps still for longer than that
 
-double median(std::vector<double> v) {
-  std::sort(v.begin(), v.end());
-  const std::size_t middle = v.size() / 2;
-  return v.size() % 2 ? v[middle] : (v[middle - 1] + v[middle]) / 2;
-}
-
 }  // namespace
 
-Timing time_calls(const std::function<void()>& body, int runs, double least_seconds) {
+double median(std::vector<double> numbers) {
+  if (numbers.empty()) throw ValueError("[median] numbers must not be empty");
+  std::sort(numbers.begin(), numbers.end());
+  const std::size_t middle = numbers.size() / 2;
+  return numbers.size() % 2 ? numbers[middle] : (numbers[middle - 1] + numbers[middle]) / 2;
+}
+
+Timing time_calls(const std::function<void()>& body, int runs, double least_seconds,
+                  const std::function<void()>& between) {
   if (runs < 1 || !(least_seconds >= 0))
     throw ValueError("[time_calls] runs must be at least 1 and least_seconds at least 0, got " +
                      std::to_string(runs) + " and " + std::to_string(least_seconds));
@@ -43,8 +45,9 @@ Timing time_calls(const std::function<void()>& body, int runs, double least_seco
     for (int i = 0; i < calls; ++i) body();
     seconds.push_back((now() - begin) / calls);
     const double after = peak_gflops(1, kBurst);
-    operations.push_back(seconds.back() * (before + after) / 2 * 1e9);
+    operations.push_back(seconds.back() * ((between ? after : before) + after) / 2 * 1e9);
     before = after;
+    if (between) between();
   }
   const auto [least, most] = std::minmax_element(seconds.begin(), seconds.end());
   return {median(seconds), *least, *most, median(operations)};

@@ -18,6 +18,12 @@ TEST_CASE("timing: the median of calls that take what they say") {
   int calls = 0;
   time_calls([&] { ++calls; }, 3, 0);
   CHECK(calls == 4);
+  std::string turns;
+  time_calls([&] { turns += 'a'; }, 2, 0, [&] { turns += 'b'; });
+  CHECK(turns == "aabab");  // the first is the warm-up
+  CHECK(median({3, 1, 2}) == 2);
+  CHECK(median({4, 1}) == 2.5);
+  CHECK_THROWS_WITH(median({}), "[median] numbers must not be empty");
   CHECK_THROWS_AS(time_calls([] {}, 0), ValueError);
   CHECK_THROWS_WITH(time_calls([] {}, 1, -1),
                     "[time_calls] runs must be at least 1 and least_seconds at least 0, got 1 and -1.000000");

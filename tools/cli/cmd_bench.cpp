@@ -16,23 +16,53 @@ namespace fieldmark::cli {
 namespace {
 
 struct Options {
-  std::string what, plot;
+  std::string what, plot, peer;
+  bench::PeerOptions python;
   bench::EngineBenchOptions engine;
 };
 
-Json row_json(const bench::EngineRow& r) {
+Json row_json(const bench::EngineRow& r, bool with_peer) {
   const auto where = [](double value) { return value > 0 ? Json(value) : Json(nullptr); };
-  return {{"name", r.name},
-          {"what", r.what},
-          {"seconds", r.seconds},
-          {"spread", r.spread},
-          {"gflops", where(r.gflops)},
-          {"ratio_to_peak", where(r.ratio_to_peak)},
-          {"items_per_second", r.rate},
-          {"ratio_to_scalar", where(r.speedup)},
-          {"error", where(r.error)},
-          {"peak_megabytes", r.megabytes},
-          {"peer_ratio", nullptr}};
+  Json row{{"name", r.name},
+           {"what", r.what},
+           {"seconds", r.seconds},
+           {"spread", r.spread},
+           {"gflops", where(r.gflops)},
+           {"ratio_to_peak", where(r.ratio_to_peak)},
+           {"items_per_second", r.rate},
+           {"ratio_to_scalar", where(r.speedup)},
+           {"error", where(r.error)},
+           {"peak_megabytes", r.megabytes},
+           {"peer_ratio", r.peer ? Json(r.peer->ratio) : Json(nullptr)}};
+  if (!with_peer) return row;
+  const bench::PeerRow peer = r.peer.value_or(bench::PeerRow{});
+  const bench::Peer::Found& found = peer.found;
+  const auto of_peer = [&](const auto& value) { return r.peer ? Json(value) : Json(nullptr); };
+  row["peer_seconds"] = of_peer(peer.seconds);
+  row["peer_untuned_seconds"] = of_peer(found.untuned_seconds);
+  row["peer_variant"] = of_peer(found.variant);
+  row["peer_environment"] = of_peer(found.tuned ? "tuned" : "as it is");
+  row["value_difference"] = of_peer(found.value_difference);
+  row["gradient_difference"] = of_peer(found.gradient_difference);
+  row["kink_difference"] = r.peer ? where(found.kink_difference) : Json(nullptr);
+  return row;
+}
+
+// What the peers' figures depend on; the same for all rows.
+Json peer_json(const bench::EngineBench& result, const Options& options) {
+  for (const auto& row : result.rows)
+    if (row.peer) {
+      const bench::Peer::Found& found = row.peer->found;
+      return {{"name", options.peer},
+              {"version", found.version},
+              {"python", options.python.python},
+              {"threads", found.threads},
+              {"blas", found.blas},
+              {"cpu_capability", found.cpu_capability},
+              {"tuned_environment", bench::Peer::tuned_environment()},
+              {"ratio", "seconds of its fastest variant over ours, median of runs by turns"}};
+    }
+  return nullptr;
 }
 
 // How fast a row is, in the unit of its kind.
@@ -52,25 +82,54 @@ void print_row(std::ostream& out, const bench::EngineRow& r) {
   std::snprintf(line, sizeof line, "%-26s %-32s spread %2.0f%%  error %.1e  %5.0f MB\n", r.name.c_str(),
                 speed_of(r).c_str(), 100 * r.spread, r.error, r.megabytes);
   out << line;
+  if (!r.peer) return;
+  std::snprintf(line, sizeof line,
+                "  PyTorch %.4g s (%s), ours %.4g s: ratio %.2f; values differ %.1e, gradients %.1e\n",
+                r.peer->seconds, r.peer->found.variant.c_str(), r.seconds, r.peer->ratio,
+                r.peer->found.value_difference, r.peer->found.gradient_difference);
+  out << line;
 }
 
 // Bars are parts of the peak; look-ups and steps, which have none, show their notes alone.
 void write_plot(const std::string& path, const bench::EngineBench& result) {
   std::vector<bench::Bar> bars;
-  for (const auto& r : result.rows) bars.push_back({r.name, r.ratio_to_peak, speed_of(r)});
+  for (const auto& r : result.rows) {
+    bars.push_back({r.name, r.ratio_to_peak, speed_of(r)});
+    if (!r.peer) continue;
+    char note[40];
+    std::snprintf(note, sizeof note, "PyTorch, %.2f x our time", r.peer->ratio);
+    bars.push_back({"PyTorch", r.ratio_to_peak / r.peer->ratio, note});
+  }
   char title[80];
   std::snprintf(title, sizeof title, "Part of the peak of %.0f GFLOP/s, kernels %s", result.peak_gflops,
                 isa_name());
   write_file_atomically(path, bench::bar_chart(title, bars, 1));
 }
 
+bench::EngineBench measured(const Options& options, Context& context) {
+  const InterruptGuard guard;
+  Progress progress = context.progress("bench");
+  const auto stop_if_asked = [&] {
+    if (guard.interrupted()) throw Interrupted("nothing was written");
+  };
+  bench::EngineBenchOptions engine = options.engine;
+  if (!options.peer.empty()) engine.peer = options.python;
+  try {
+    return read_option("bench engine", [&] {
+      return bench::run_engine_bench(engine, [&](const std::string& name, double part) {
+        stop_if_asked();
+        progress.update(part, name);
+      });
+    });
+  } catch (const Error&) {  // Ctrl-C ends a peer too
+    stop_if_asked();
+    throw;
+  }
+}
+
 int run(const Options& options, Context& context) {
   if (!options.plot.empty()) check_writable(options.plot);
-  Progress progress = context.progress("bench");
-  const auto result = read_option("bench engine", [&] {
-    return bench::run_engine_bench(
-        options.engine, [&](const std::string& name, double part) { progress.update(part, name); });
-  });
+  const bench::EngineBench result = measured(options, context);
   char line[80];
   std::snprintf(line, sizeof line, "peak %.1f GFLOP/s (fp32 multiply-add, kernels %s)\n", result.peak_gflops,
                 isa_name());
@@ -78,10 +137,13 @@ int run(const Options& options, Context& context) {
   Json rows = Json::array();
   for (const auto& row : result.rows) {
     print_row(context.text(), row);
-    rows.push_back(row_json(row));
+    rows.push_back(row_json(row, !options.peer.empty()));
   }
   if (!options.plot.empty()) write_plot(options.plot, result);
-  context.result({{"peak_gflops", result.peak_gflops}, {"isa", isa_name()}, {"rows", rows}});
+  Json json{{"peak_gflops", result.peak_gflops}, {"isa", isa_name()}};
+  if (!options.peer.empty()) json["peer"] = peer_json(result, options);
+  json["rows"] = rows;
+  context.result(json);
   return kOk;
 }
 
@@ -104,6 +166,20 @@ Command add_bench(CLI::App& app) {
       ->type_name("TEXT")
       ->default_str("all");
   app.add_option("--plot", o->plot, "SVG picture of the rows (none)")->type_name("FILE")->default_str("");
+  auto* peer =
+      app.add_option(
+             "--peer", o->peer,
+             "pytorch: ratio to PyTorch on the rows it can do, timed by turns, gradients compared (none)")
+          ->check(CLI::IsMember({"pytorch"}).description(""))
+          ->type_name("NAME")
+          ->default_str("");
+  app.add_option("--python", o->python.python, "Interpreter with torch, for --peer")
+      ->type_name("FILE")
+      ->needs(peer);
+  app.add_option("--peer-limit", o->python.limit_seconds, "Of each answer of the peer, seconds, 0.1 to 86400")
+      ->check(CLI::Range(0.1, 86400.0).description(""))
+      ->type_name("S")
+      ->needs(peer);
   return [o](Context& context) { return run(*o, context); };
 }
 

@@ -1,9 +1,19 @@
 #pragma once
+#include <fieldmark/bench/peer.h>
+
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace fieldmark::bench {
+
+/// A peer's side of a row, timed by turns with ours.
+struct PeerRow {
+  double seconds = 0;  ///< median of its runs
+  double ratio = 0;    ///< seconds over ours: above 1, ours is the faster
+  Peer::Found found;
+};
 
 /// One line of the engine's benchmark.
 struct EngineRow {
@@ -19,13 +29,15 @@ struct EngineRow {
   /// the median of five pictures.
   double error = 0;
   double megabytes = 0;  ///< most memory of the process so far
+  std::optional<PeerRow> peer{};
 };
 
 /// Settings of run_engine_bench().
 struct EngineBenchOptions {
-  int runs = 5;        ///< of each row, whose median counts
-  double scale = 1;    ///< of the numbers of samples, in (0, 1]: for tests
-  std::string only{};  ///< rows with this text in their name
+  int runs = 5;                       ///< of each row, whose median counts
+  double scale = 1;                   ///< of the numbers of samples, in (0, 1]: for tests
+  std::string only{};                 ///< rows with this text in their name
+  std::optional<PeerOptions> peer{};  ///< PyTorch beside the rows it can do
 };
 
 /// What run_engine_bench() measured.
@@ -45,7 +57,11 @@ struct EngineBench {
 ///   of image tiles, and at random
 /// - nerf_step: a training step of the default field on the built-in scene, everything included
 /// @param progress  called before each row with its name and the part of the rows that is done
-/// @throws ValueError if an option is out of range
+/// With a peer, the rows mlp_4x64_fb_f32, mlp_8x256_fb_f32, conv3x3_64_fb_f32 and hidden_decoder_fb_f32 are
+/// done by PyTorch too, a run of ours and a run of its by turns; first its results are compared with ours, on
+/// the same shapes and with numbers that keep ReLUs away from their kinks.
+/// @throws ValueError if an option is out of range, or a peer is asked for and no row has one
+/// @throws IoError, Error  as Peer
 EngineBench run_engine_bench(const EngineBenchOptions& options,
                              const std::function<void(const std::string&, double)>& progress = {});
 

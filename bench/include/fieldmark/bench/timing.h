@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <vector>
 
 namespace fieldmark::bench {
 
@@ -17,7 +18,13 @@ struct Timing {
 /// clock also depends on what was just run: 2.2 or 2.45 GHz after products of matrices, and some milliseconds
 /// to change.
 /// @param runs  at least 1   @param least_seconds  >= 0   @throws ValueError otherwise
-Timing time_calls(const std::function<void()>& body, int runs = 5, double least_seconds = 0.1);
+/// @param between  called after every run, outside of its time: for something else to be timed
+///                 by turns. Only the peak after a run counts then
+Timing time_calls(const std::function<void()>& body, int runs = 5, double least_seconds = 0.1,
+                  const std::function<void()>& between = {});
+
+/// Half of the sorted numbers are on either side of it. @throws ValueError if there are none
+double median(std::vector<double> numbers);
 
 /// Fused multiply-adds that this machine does in a second with the threads and the instruction set in use, in
 /// GFLOP/s: on registers alone, on all threads at once; median of several bursts.
