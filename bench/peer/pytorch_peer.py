@@ -1,9 +1,9 @@
 """PyTorch's side of `fieldmark bench engine --peer pytorch`: pytorch_peer.py CASE.safetensors
 
-CASE holds a network, its inputs and fieldmark's results. Every variant of the same work is tried once, the fastest is
+CASE holds a network, its inputs and fieldmark's results. Every variant of the same work is tried, the fastest is
 compared with those results and then timed. Standard output gets a line of JSON at once, and one for every line on
 standard input:
-  {"version", "threads", "blas", "cpu_capability", "variant", "seconds", "tried": {VARIANT: SECONDS},
+  {"version", "threads", "blas", "cpu_capability", "variant", "seconds",
    "differences": {TENSOR: PART OF ITS LARGEST}, "kink_differences": {TENSOR: PART OF ITS NORM}}
   {"seconds"}  of a run: as many calls as take 0.1 s, or one
 or only {"missing": REASON} where PyTorch cannot be loaded.
@@ -211,8 +211,8 @@ def seconds(step):
 
 
 def fastest(metadata, case):
-    """The variant with the least time of two calls after a warm-up, that time and those of all."""
-    best, least, tried = None, float("inf"), {}
+    """The variant with the least time of two calls after a warm-up, and that time."""
+    best, least = None, float("inf")
     for make in variants(metadata, case):
         variant = make()
         variant.probe()
@@ -221,11 +221,10 @@ def fastest(metadata, case):
             expected = seconds(variant.step)
         if expected <= SLOW * least:
             expected = min(seconds(variant.step) for _ in range(2))
-        tried[variant.name] = expected
         if expected < least:
             best, least = variant, expected
         del variant
-    return best, least, tried
+    return best, least
 
 
 def differences(found, case, size):
@@ -284,7 +283,7 @@ def main(path):
     torch.set_num_threads(threads)
     torch.manual_seed(0)
     metadata, case = read_case(path)
-    best, least, tried = fastest(metadata, case)
+    best, least = fastest(metadata, case)
     strict, at_kinks = compared(best, metadata, case)
     config = torch.__config__.show()
     answer({
@@ -294,7 +293,6 @@ def main(path):
         "cpu_capability": config.split("CPU capability usage: ")[-1].split("\n")[0],
         "variant": best.name,
         "seconds": least,
-        "tried": tried,
         "differences": strict,
         "kink_differences": at_kinks,
     })
