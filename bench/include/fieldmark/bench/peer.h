@@ -20,10 +20,10 @@ struct PeerOptions {
 class Peer {
  public:
   struct Found {
-    std::string version;         ///< of PyTorch
-    std::string blas;            ///< library that serves its matrix products
-    std::string cpu_capability;  ///< instruction set of its own loops
-    std::string variant;         ///< the fastest
+    std::string version{};         ///< of PyTorch
+    std::string blas{};            ///< library that serves its matrix products
+    std::string cpu_capability{};  ///< instruction set of its own loops
+    std::string variant{};         ///< the fastest
     int threads = 0;
     bool tuned = false;          ///< the fastest ran in tuned_environment(), else in the environment as it is
     double seconds = 0;          ///< of the fastest, when it was tried
