@@ -1,6 +1,8 @@
 #include <fieldmark/engine/files.h>
+#include <fieldmark/engine/isa.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "cli/cli.h"
 #include "support/catch.h"
@@ -67,4 +69,25 @@ TEST_CASE("Every unit that is documented as differentiable has a check that begi
     }
   }
   CHECK(units > 0);
+}
+
+TEST_CASE("gradcheck --numerics: every hard case within its limit, on each instruction set, also as a report",
+          "[gradcheck]") {
+  const TemporaryFolder folder;
+  const auto r = run_command({"gradcheck", "--numerics", "--json", "-", "--report", folder / "numerics.md"});
+  INFO(r.err);
+  CHECK(r.code == cli::kOk);
+  const Json json = Json::parse(r.out);
+  CHECK(json["ok"] == true);
+  std::set<std::string> modules;
+  for (const auto& row : json["cases"]) {
+    modules.insert(row["module"].get<std::string>());
+    CHECK(row["ok"] == true);
+    CHECK(row["v2"].get<double>() <= row["limit"].get<double>());
+    CHECK(row["numbers"].get<long>() > 0);
+    CHECK(row.contains("v3") == (isa_supported() >= Isa::v3));
+  }
+  CHECK(modules == std::set<std::string>{"distort", "engine", "extractor", "nerf", "watermark"});
+  CHECK_THAT(read_text(folder / "numerics.md"), Contains("composite: a last interval of 1e10"));
+  CHECK(run_command({"gradcheck", "--numerics", "--only", "no such case"}).code == cli::kUsage);
 }

@@ -1,11 +1,18 @@
 #include <fieldmark/distort/gradcheck_cases.h>
+#include <fieldmark/distort/numerics_cases.h>
 #include <fieldmark/engine/gradcheck_cases.h>
+#include <fieldmark/engine/isa.h>
+#include <fieldmark/engine/numerics_cases.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/extractor/gradcheck_cases.h>
+#include <fieldmark/extractor/numerics_cases.h>
 #include <fieldmark/nerf/gradcheck_cases.h>
+#include <fieldmark/nerf/numerics_cases.h>
 #include <fieldmark/watermark/gradcheck_cases.h>
+#include <fieldmark/watermark/numerics_cases.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <ostream>
@@ -19,6 +26,7 @@ namespace {
 
 struct Options {
   std::string only;
+  bool numerics = false;
 };
 
 struct Row {
@@ -27,17 +35,15 @@ struct Row {
   GradcheckReport report;
 };
 
-std::vector<Row> collect(const std::string& only) {
-  std::vector<Row> rows;
-  const auto add = [&](const char* module, std::vector<GradcheckCase> cases) {
-    for (auto& check : cases)
-      if (check.name.find(only) != std::string::npos) rows.push_back({module, std::move(check), {}});
-  };
-  add("engine", gradcheck_cases());
-  add("distort", distort::gradcheck_cases());
-  add("extractor", extractor::gradcheck_cases());
-  add("nerf", nerf::gradcheck_cases());
-  add("watermark", watermark::gradcheck_cases());
+// The cases of all modules that have the text in their name. @throws UsageError if there are none
+template <class R, class Case>
+std::vector<R> collect(const Options& options,
+                       std::initializer_list<std::pair<const char*, std::vector<Case>>> modules) {
+  std::vector<R> rows;
+  for (const auto& [module, cases] : modules)
+    for (const Case& check : cases)
+      if (check.name.find(options.only) != std::string::npos) rows.push_back({module, check, {}});
+  if (rows.empty()) throw UsageError("--only: no check has '" + options.only + "' in its name");
   return rows;
 }
 
@@ -64,9 +70,12 @@ Json to_json(const std::vector<Row>& rows, const Row& worst, Index entries, bool
   return json;
 }
 
-int run(const Options& options, Context& context) {
-  std::vector<Row> rows = collect(options.only);
-  if (rows.empty()) throw UsageError("--only: no check has '" + options.only + "' in its name");
+int run_gradients(const Options& options, Context& context) {
+  auto rows = collect<Row, GradcheckCase>(options, {{"engine", gradcheck_cases()},
+                                                    {"distort", distort::gradcheck_cases()},
+                                                    {"extractor", extractor::gradcheck_cases()},
+                                                    {"nerf", nerf::gradcheck_cases()},
+                                                    {"watermark", watermark::gradcheck_cases()}});
   parallel_for(static_cast<Index>(rows.size()), 1, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) run_case(rows[static_cast<std::size_t>(i)]);
   });
@@ -93,6 +102,78 @@ int run(const Options& options, Context& context) {
   return ok ? kOk : kFailed;
 }
 
+struct NumericsRow {
+  std::string module;
+  NumericsCase check;
+  std::vector<WorstError> errors;  // one for each instruction set
+
+  bool ok() const {
+    return std::all_of(errors.begin(), errors.end(), [&](const WorstError& e) { return check.ok(e); });
+  }
+  double worst() const {
+    double worst = 0;
+    for (const auto& e : errors)
+      if (!(e.worst <= worst)) worst = std::isnan(worst) ? worst : e.worst;
+    return worst;
+  }
+};
+
+// Every case on every instruction set of this CPU; returns their names.
+std::vector<std::string> run_on_each_isa(std::vector<NumericsRow>& rows) {
+  std::vector<std::string> levels;
+  const Isa before = isa();
+  for (const Isa level : {Isa::v2, Isa::v3, Isa::v4}) {
+    if (level > isa_supported()) break;
+    force_isa(level);
+    levels.emplace_back(isa_name());
+    parallel_for(static_cast<Index>(rows.size()), 1, [&](Index i, Index) {
+      NumericsRow& row = rows[static_cast<std::size_t>(i)];
+      row.errors.push_back(row.check.run());
+    });
+  }
+  force_isa(before);
+  return levels;
+}
+
+Json numerics_json(const std::vector<NumericsRow>& rows, const std::vector<std::string>& levels, bool ok) {
+  Json json{{"ok", ok}, {"cases", Json::array()}};
+  for (const auto& row : rows) {
+    Json entry{{"module", row.module},
+               {"name", row.check.name},
+               {"type", row.check.type},
+               {"relative_to", row.check.relative_to}};
+    for (std::size_t k = 0; k < levels.size(); ++k) entry[levels[k]] = number(row.errors[k].worst);
+    entry["limit"] = row.check.limit;
+    entry["numbers"] = row.errors[0].numbers;
+    entry["ok"] = row.ok();
+    json["cases"].push_back(std::move(entry));
+  }
+  return json;
+}
+
+int run_numerics(const Options& options, Context& context) {
+  auto rows = collect<NumericsRow, NumericsCase>(options, {{"engine", numerics_cases()},
+                                                           {"distort", distort::numerics_cases()},
+                                                           {"extractor", extractor::numerics_cases()},
+                                                           {"nerf", nerf::numerics_cases()},
+                                                           {"watermark", watermark::numerics_cases()}});
+  const auto levels = run_on_each_isa(rows);
+  bool ok = true;
+  for (const auto& row : rows) {
+    char line[240];
+    std::snprintf(line, sizeof line, "%-10s %-62s %-6s worst %.1e, limit %.1e of %s  %s\n",
+                  row.module.c_str(), row.check.name.c_str(), row.check.type.c_str(), row.worst(),
+                  row.check.limit, row.check.relative_to.c_str(), row.ok() ? "ok" : "FAILED");
+    context.text() << line;
+    ok = ok && row.ok();
+  }
+  context.text() << rows.size() << " hard cases on " << levels.size() << " instruction sets (";
+  for (std::size_t k = 0; k < levels.size(); ++k) context.text() << (k > 0 ? ", " : "") << levels[k];
+  context.text() << "), against long double: " << (ok ? "ok" : "FAILED") << "\n";
+  context.result(numerics_json(rows, levels, ok));
+  return ok ? kOk : kFailed;
+}
+
 }  // namespace
 
 Command add_gradcheck(CLI::App& app) {
@@ -100,7 +181,12 @@ Command add_gradcheck(CLI::App& app) {
   app.add_option("--only", options->only, "Only checks with TEXT in their name")
       ->type_name("TEXT")
       ->default_str("all");
-  return [options](Context& context) { return run(*options, context); };
+  app.add_flag("--numerics", options->numerics,
+               "Cases hard on rounding and range against long double, on every instruction set, in place of "
+               "gradients");
+  return [options](Context& context) {
+    return options->numerics ? run_numerics(*options, context) : run_gradients(*options, context);
+  };
 }
 
 }  // namespace fieldmark::cli

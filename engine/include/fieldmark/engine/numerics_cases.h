@@ -1,0 +1,11 @@
+#pragma once
+#include <fieldmark/engine/numerics.h>
+
+#include <vector>
+
+namespace fieldmark {
+
+/// The hard cases of the engine's ops, norms, sums and optimiser, each with the error that it may have.
+std::vector<NumericsCase> numerics_cases();
+
+}  // namespace fieldmark

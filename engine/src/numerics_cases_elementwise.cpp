@@ -1,0 +1,165 @@
+#include <fieldmark/engine/ops/activation.h>
+#include <fieldmark/engine/ops/loss.h>
+#include <fieldmark/engine/ops/softmax.h>
+
+#include <algorithm>
+
+#include "numerics_cases_parts.h"
+
+namespace fieldmark {
+namespace {
+
+using Real = long double;
+
+// From lo to hi, densely, and the same numbers near 0.
+template <class T>
+Tensor<T> sweep(double lo, double hi) {
+  Tensor<T> x(Shape{20001});
+  for (Index i = 0; i < x.size(); ++i) {
+    const double u = lo + (hi - lo) * static_cast<double>(i) / 20000;
+    x[i] = static_cast<T>(i % 4 == 0 ? u * 1e-4 : u);
+  }
+  return x;
+}
+
+// An activation against its definition y = f(x), and its slope against f'(x), each relative to itself or to
+// the scale that is given, if that is larger.
+struct Definition {
+  Real (*value)(Real), (*slope)(Real);
+  Real slope_scale;
+};
+
+template <class T, class F>
+void compare_activation(const Tensor<T>& x, const F& op, const Definition& exact, WorstError& error) {
+  const auto got = values_and_gradients<T>([&](auto&, const auto& v) { return op(v[0]); }, {x}, ones<T>);
+  for (std::size_t i = 0; i < x.data.size(); ++i) {
+    const Real at = x.data[i], y = exact.value(at), slope = exact.slope(at);
+    error.compare(got[0][i], y, size_of<T>(y));
+    error.compare(got[1][i], slope, std::max(size_of<T>(slope), exact.slope_scale));
+  }
+}
+
+Real logistic(Real x) { return 1 / (1 + std::exp(-x)); }
+constexpr Real kNone = 0;
+
+// Over the range in which float has normal results.
+void add_sweeps(std::vector<NumericsCase>& cases) {
+  const Definition exp_of{[](Real x) { return std::exp(x); }, [](Real x) { return std::exp(x); }, kNone};
+  add_numerics(cases, "activation: exp from -87.3 to 88", "value, slope", 3e-7, 3e-16,
+               [=](auto t, WorstError& e) {
+                 compare_activation(
+                     sweep<decltype(t)>(-87.3, 88), [](auto v) { return exp(v); }, exp_of, e);
+               });
+  const Definition density{[](Real x) { return std::exp(std::min<Real>(x, 15)); },
+                           [](Real x) { return std::exp(std::min<Real>(x, 15)); }, kNone};
+  add_numerics(cases, "activation: truncated_exp from -87.3 to 100", "value, slope", 3e-7, 3e-16,
+               [=](auto t, WorstError& e) {
+                 compare_activation(
+                     sweep<decltype(t)>(-87.3, 100), [](auto v) { return truncated_exp(v); }, density, e);
+               });
+  const Definition sigmoid_of{logistic, [](Real x) { return logistic(x) * logistic(-x); }, 0.25L};
+  add_numerics(cases, "activation: sigmoid from -87.3 to 100", "value, largest slope", 4e-7, 1e-15,
+               [=](auto t, WorstError& e) {
+                 compare_activation(
+                     sweep<decltype(t)>(-87.3, 100), [](auto v) { return sigmoid(v); }, sigmoid_of, e);
+               });
+  const Definition tanh_of{[](Real x) { return std::tanh(x); },
+                           [](Real x) { return 1 / (std::cosh(x) * std::cosh(x)); }, 1};
+  add_numerics(cases, "activation: tanh from -30 to 30", "value, largest slope", 4e-7, 4e-16,
+               [=](auto t, WorstError& e) {
+                 compare_activation(
+                     sweep<decltype(t)>(-30, 30), [](auto v) { return tanh(v); }, tanh_of, e);
+               });
+  const Definition softplus_of{[](Real x) { return x > 60 ? x : std::log1p(std::exp(x)); }, logistic, kNone};
+  add_numerics(cases, "activation: softplus from -87.3 to 100", "value, slope", 4e-7, 4e-16,
+               [=](auto t, WorstError& e) {
+                 compare_activation(
+                     sweep<decltype(t)>(-87.3, 100), [](auto v) { return softplus(v); }, softplus_of, e);
+               });
+}
+
+// At the ends of the numbers each has the value that its header states.
+template <class T>
+void compare_limits(WorstError& error) {
+  using Limits = std::numeric_limits<T>;
+  constexpr T top = Limits::max(), inf = Limits::infinity(), nan = Limits::quiet_NaN(),
+              tiny = Limits::denorm_min();
+  const Tensor<T> x(Shape{7}, {-inf, -top, -tiny, tiny, top, inf, nan});
+  const T e15 = static_cast<T>(std::exp(Real{15})), one = 1, half = 0.5;
+  const T most = sizeof(T) == 4 ? static_cast<T>(std::exp(Real{88})) : inf;
+  const auto check = [&](auto op, const std::vector<T>& want) {
+    const auto got = values_and_gradients<T>([&](auto&, const auto& v) { return op(v[0]); }, {x}, ones<T>);
+    for (std::size_t i = 0; i < want.size(); ++i) {
+      error.compare(got[0][i], want[i], size_of<T>(want[i]));
+      if (std::isfinite(static_cast<double>(want[i]))) error.equal(std::isfinite(got[1][i]), true);
+    }
+    error.equal(got[0][6], nan);
+  };
+  check([](auto v) { return exp(v); }, {0, 0, one, one, most, most});
+  check([](auto v) { return truncated_exp(v); }, {0, 0, one, one, e15, e15});
+  check([](auto v) { return sigmoid(v); }, {0, 0, half, half, one, one});
+  check([](auto v) { return tanh(v); }, {-one, -one, -tiny, tiny, one, one});
+  const T log2 = static_cast<T>(std::log(Real{2}));
+  check([](auto v) { return softplus(v); }, {0, 0, log2, log2, top, inf});
+  check([](auto v) { return relu(v); }, {0, 0, 0, tiny, top, inf});
+}
+
+// Logits one by one: a mean would hide the small losses behind the large ones.
+template <class T>
+void compare_bce(T target, bool relative, WorstError& error) {
+  for (const double x :
+       {-1e4, -100.0, -88.0, -50.0, -17.0, -1.0, -1e-3, 0.0, 1e-3, 1.0, 17.0, 50.0, 88.0, 100.0, 1e4}) {
+    const std::vector<T> t{target};
+    const Tensor<T> logit(Shape{1}, static_cast<T>(x));
+    const auto got = values_and_gradients<T>(
+        [&](auto&, const auto& v) { return bce_with_logits<T>(v[0], t); }, {logit}, ones<T>);
+    const Real z = logit[0], p = target, e = std::exp(-std::abs(z));
+    const Real value = (z > 0 ? z * (1 - p) : -z * p) + std::log1p(e);
+    const Real slope = z > 0 ? (1 - p) - e / (1 + e) : e / (1 + e) - p;
+    error.compare(got[0][0], value, size_of<T>(value));
+    error.compare(got[1][0], slope, relative ? size_of<T>(slope) : 1);
+  }
+}
+
+// The label is as certain as the difference of the logits says; the others share what is left.
+template <class T>
+void compare_entropy(WorstError& error) {
+  for (const double sure : {-1e4, -85.0, -20.0, 0.0, 1.0, 10.0, 16.0, 20.0, 40.0, 85.0, 1e4}) {
+    const std::vector<std::int32_t> label{1};
+    Tensor<T> x(Shape{1, 4}, static_cast<T>(-3));
+    x[1] = static_cast<T>(sure - 3);
+    const auto got = values_and_gradients<T>(
+        [&](auto&, const auto& v) { return softmax_cross_entropy<T>(v[0], label); }, {x}, ones<T>);
+    const Real d = static_cast<Real>(x[1]) + 3, others = 3 * std::exp(-std::abs(d)) / (d < 0 ? 9 : 1);
+    const Real value = d < 0 ? -d + std::log(Real{3}) + std::log1p(others) : std::log1p(others);
+    const Real right = d < 0 ? others / (1 + others) : 1 / (1 + others),
+               wrong = d < 0 ? 1 / (1 + others) : others / (1 + others);
+    error.compare(got[0][0], value, size_of<T>(value));
+    for (std::size_t c = 0; c < 4; ++c) {
+      const Real slope = c == 1 ? -wrong : wrong / 3;
+      error.compare(got[1][c], slope, size_of<T>(slope));
+    }
+    const auto p = values_and_gradients<T>([](auto&, const auto& v) { return softmax(v[0]); }, {x}, ones<T>);
+    error.compare(p[0][1], right, size_of<T>(right));
+    error.compare(p[0][2], wrong / 3, size_of<T>(wrong / 3));
+  }
+}
+
+}  // namespace
+
+void add_elementwise_numerics(std::vector<NumericsCase>& cases) {
+  add_sweeps(cases);
+  add_numerics(cases, "activation: infinities, largest and least numbers, NaN", "value", 3e-7, 3e-16,
+               [](auto t, WorstError& e) { compare_limits<decltype(t)>(e); });
+  add_numerics(cases, "loss: bce_with_logits to +-1e4, certain targets", "value, slope", 2e-7, 3e-16,
+               [](auto t, WorstError& e) {
+                 compare_bce<decltype(t)>(0, true, e);
+                 compare_bce<decltype(t)>(1, true, e);
+               });
+  add_numerics(cases, "loss: bce_with_logits to +-1e4, target 0.3", "value, 1", 2e-7, 3e-16,
+               [](auto t, WorstError& e) { compare_bce(static_cast<decltype(t)>(0.3), false, e); });
+  add_numerics(cases, "softmax: cross-entropy of labels certain to 1e4", "value, slope", 5e-7, 5e-16,
+               [](auto t, WorstError& e) { compare_entropy<decltype(t)>(e); });
+}
+
+}  // namespace fieldmark

@@ -1,0 +1,17 @@
+#pragma once
+#include <fieldmark/engine/numerics.h>
+
+namespace fieldmark {
+
+// The parts that numerics_cases() is assembled from.
+void add_elementwise_numerics(std::vector<NumericsCase>& cases);
+void add_norm_numerics(std::vector<NumericsCase>& cases);
+void add_sum_numerics(std::vector<NumericsCase>& cases);
+
+// Magnitudes below the least normal number count as one of them: rounding there is absolute.
+template <class T>
+long double size_of(long double exact) {
+  return std::max(std::abs(exact), static_cast<long double>(std::numeric_limits<T>::min()));
+}
+
+}  // namespace fieldmark

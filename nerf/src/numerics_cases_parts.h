@@ -1,0 +1,9 @@
+#pragma once
+#include <fieldmark/engine/numerics.h>
+
+namespace fieldmark::nerf {
+
+// The parts that numerics_cases() is assembled from.
+void add_composite_numerics(std::vector<NumericsCase>& cases);
+
+}  // namespace fieldmark::nerf

@@ -1,0 +1,7 @@
+#include <fieldmark/nerf/numerics_cases.h>
+
+#include "support/expect_numerics.h"
+
+TEST_CASE("numerics_cases: every hard case of fields is within its limit on each instruction set") {
+  expect_numerics(fieldmark::nerf::numerics_cases());
+}
