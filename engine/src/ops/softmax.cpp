@@ -48,6 +48,17 @@ void check_labels(Index rows, Index cols, std::span<const std::int32_t> labels) 
                        std::to_string(labels[r]));
 }
 
+// Sum of a row but for column c, in eight sums so that the loop vectorises.
+template <class T>
+T others(const T* row, Index cols, Index c) {
+  T acc[8] = {};
+  Index i = 0;
+  for (; i + 8 <= cols; i += 8)
+    for (Index k = 0; k < 8; ++k) acc[k] += i + k == c ? T(0) : row[i + k];
+  for (; i < cols; ++i) acc[0] += i == c ? T(0) : row[i];
+  return ((acc[0] + acc[1]) + (acc[2] + acc[3])) + ((acc[4] + acc[5]) + (acc[6] + acc[7]));
+}
+
 }  // namespace
 
 template <class T>
@@ -89,21 +100,30 @@ Var<T> softmax_cross_entropy(Var<T> logits, std::span<const std::int32_t> labels
   const Var<T> out = tape.output({1}, &y, {logits});
   const std::int32_t* label = labels.data();
   kernels::softmax_rows(logits.value(), p, rows, cols, [&](Index r, T m, T z) {
-    row_loss[r] = label[r] < 0 ? T(0) : std::log(z) + (m - logits.value()[r * cols + label[r]]);
+    const Index c = label[r];
+    const T* row = logits.value() + r * cols;
+    if (c < 0)
+      row_loss[r] = 0;
+    else if (row[c] < m)
+      row_loss[r] = std::log(z) + (m - row[c]);  // at least log 2
+    else
+      row_loss[r] = std::log1p(others(p + r * cols, cols, c) * z);  // log z loses what a certain label lacks
   });
   *y = static_cast<T>(inverse * detail::piece_sum(tape, rows, [=](Index r) {
                         return w[r] > 0 ? static_cast<double>(w[r]) * static_cast<double>(row_loss[r]) : 0.0;
                       }));
 
-  // dL/dx[r, c] = w_r / sum w (p[r, c] - [c = label_r]). A row is owned by one piece.
+  // dL/dx[r, c] = w_r / sum w (p[r, c] - [c = label_r]), where p - 1 is minus the sum of the other p: so a
+  // certain label keeps its tiny slope. A row is owned by one piece.
   tape.on_backward(out, [logits, p, w, label, rows, cols, inverse](const T* dy) {
     T* dx = logits.grad_acc();
     const T g = static_cast<T>(inverse * static_cast<double>(*dy));
     parallel_for(rows, detail::row_grain(cols), [&](Index r0, Index r1) {
       for (Index r = r0; r < r1; ++r) {
         if (!(w[r] > 0)) continue;
+        const T missing = others(p + r * cols, cols, label[r]);
         for (Index c = 0; c < cols; ++c)
-          dx[r * cols + c] += g * w[r] * (p[r * cols + c] - (c == label[r] ? T(1) : T(0)));
+          dx[r * cols + c] += g * w[r] * (c == label[r] ? -missing : p[r * cols + c]);
       }
     });
   });

@@ -55,6 +55,16 @@ TEST_CASE("softmax: cross-entropy of logits that overflow exp") {
   for (float g : r[1]) CHECK(std::isfinite(g));
 }
 
+TEST_CASE("softmax: a certain label keeps its tiny loss and slope") {
+  // exp(-20) = 2e-9 is lost in 1 + 2e-9, and so it was in log(sum) and in p - 1.
+  const std::vector<std::int32_t> label{1};
+  const std::vector<Tensor<float>> x{{{1, 3}, {-20, 0, -20}}};
+  const auto r = run_op([&](auto&, auto v) { return softmax_cross_entropy(v[0], label); }, x);
+  const double e = std::exp(-20.0), u = static_cast<double>(uniform<float>({1}, -1, 1, 99)[0]);
+  CHECK(std::abs(static_cast<double>(r[0][0]) / std::log1p(2 * e) - 1) < 3e-7);
+  CHECK(std::abs(static_cast<double>(r[1][1]) / (-2 * e / (1 + 2 * e) * u) - 1) < 3e-7);
+}
+
 TEST_CASE("softmax: rows that are ignored give nothing, even where they are not finite") {
   const std::vector<std::int32_t> label{-1, 1};
   const std::vector<Tensor<float>> x{{{2, 2}, {INFINITY, NAN, 0, 0}}};
@@ -91,5 +101,9 @@ TEST_CASE("softmax: float against double, and the same bits for any thread count
   expect_same_bits(f_softmax, {x});
   expect_same_bits(f, {x});
   CHECK(float_error(f_softmax, {x}) < 4e-7);  // measured 1.4e-7
+  const auto rows = [](Index e) { return std::vector{uniform<float>({3, e}, -6, 6, 2)}; };
+  const std::vector<std::int32_t> first{0, -1, 0};
+  CHECK(float_error_to_130(f_softmax, rows) < 1e-6);
+  CHECK(float_error_to_130([&](auto&, auto v) { return softmax_cross_entropy(v[0], first); }, rows) < 1e-6);
   CHECK(float_error(f, {x}) < 4e-7);
 }
