@@ -1,6 +1,7 @@
 #include <fieldmark/distort/blur.h>
 
 #include "distort/support.h"
+#include "support/each_isa.h"
 #include "support/expect_grad.h"
 
 using namespace fieldmark;
@@ -64,6 +65,15 @@ TEST_CASE("blur: gradient in image and sigma") {
   expect_grad(soften, {uniform({2, 3, 2}, 0, 1, 1), number<double>(1.87)});
   expect_grad(soften, {uniform({1, 1, 1}, 0, 1, 1), number<double>(0.9)});
   expect_grad(soften, {Tensor<double>({0, 3, 1}), number<double>(0.9)});
+}
+
+TEST_CASE("blur: float against double, result and gradients, for widths of 1 to 130") {
+  each_isa([] {
+    for (Index w = 1; w <= 130; ++w) {
+      CAPTURE(w);
+      CHECK(float_error(soften, {uniform<float>({3, w, 1 + w % 3}, 0, 1, 1), number<float>(0.8)}) < 1e-6);
+    }
+  });
 }
 
 TEST_CASE("blur: errors") {

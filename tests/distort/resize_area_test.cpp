@@ -1,6 +1,7 @@
 #include <fieldmark/distort/resize_area.h>
 
 #include "distort/support.h"
+#include "support/each_isa.h"
 #include "support/expect_grad.h"
 
 using namespace fieldmark;
@@ -54,6 +55,16 @@ TEST_CASE("resize_area: labels under the new pixels' centres") {
   CHECK(resize_labels(labels, 2, 3).data == std::vector<std::int32_t>{1, 3, 4, 5, 7, 8});
   CHECK(resize_labels(labels, 2, 8).data ==
         std::vector<std::int32_t>{1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8, 8});
+}
+
+TEST_CASE("resize_area: float against double, result and gradient, for widths of 1 to 130") {
+  each_isa([] {
+    for (Index w = 1; w <= 130; ++w) {
+      CAPTURE(w);
+      const auto x = uniform<float>({5, w, 1 + w % 3}, 0, 1, 1);
+      CHECK(float_error([](auto&, auto v) { return resize_area(v[0], 3, 17); }, {x}) < 1e-6);
+    }
+  });
 }
 
 TEST_CASE("resize_area: errors") {

@@ -37,6 +37,22 @@ std::vector<T> run_with_grads(const F& f, const std::vector<fieldmark::Tensor<T>
   return all;
 }
 
+/// Largest |float - double| over the result and all gradients, relative to the largest of them.
+template <class F>
+double float_error(const F& f, const std::vector<fieldmark::Tensor<float>>& inputs) {
+  std::vector<fieldmark::Tensor<double>> exact;
+  for (const auto& x : inputs) exact.emplace_back(x.shape, std::vector<double>(x.data.begin(), x.data.end()));
+  const auto got = run_with_grads<float>(f, inputs, fieldmark::threads());
+  const auto want = run_with_grads<double>(f, exact, fieldmark::threads());
+  double worst = 0, largest = 1e-30;
+  for (std::size_t i = 0; i < want.size(); ++i) {
+    const double error = std::abs(static_cast<double>(got[i]) - want[i]);
+    worst = error <= worst ? worst : error;
+    largest = std::max(largest, std::abs(want[i]));
+  }
+  return worst / largest;
+}
+
 template <class T>
 double largest_difference(const fieldmark::Tensor<T>& a, const fieldmark::Tensor<T>& b) {
   if (!(a.shape == b.shape)) return HUGE_VAL;

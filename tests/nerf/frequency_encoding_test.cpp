@@ -38,6 +38,9 @@ TEST_CASE("frequency_encoding: gradient") {
 TEST_CASE("frequency_encoding: float within 3e-7 of double, gradients relative to the largest") {
   CHECK(float_error(op(10), {uniform<float>({300, 3}, -1, 1, 4)}) < 3e-7);
   CHECK(float_error(op(16), {uniform<float>({300, 3}, 1000, 1001, 5)}) < 3e-7);
+  CHECK(float_error_to_130(op(5), [](Index e) {
+          return std::vector{uniform<float>({e, 3}, -1, 1, 6)};
+        }) < 3e-7);
 }
 
 TEST_CASE("frequency_encoding: errors name argument and value") {

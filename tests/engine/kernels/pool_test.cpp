@@ -64,11 +64,11 @@ TEST_CASE("kernels/pool: windows, for every number of channels") {
 TEST_CASE("kernels/pool: sums over pixels and their transpose, for every number of channels") {
   for_levels([] {
     for (std::int64_t channels = 1; channels <= 130; ++channels) {
-      const std::int64_t pixels = 71;
+      const std::int64_t pixels = 131 - channels;
       const auto x = uniform<float>({pixels * channels}, -1, 1, 1);
       const auto mask = uniform<float>({pixels * channels}, -1, 1, 2);
-      std::vector<double> sums(static_cast<std::size_t>(channels)), want = sums, part = sums,
-                                                                    want_part = sums;
+      std::vector<double> want(static_cast<std::size_t>(channels)), want_part = want, sums(want.size() + 1, 7.),
+          part = sums;
       FIELDMARK_KERNEL(channel_sums<float>)(x.data.data(), nullptr, pixels, channels, sums.data());
       FIELDMARK_KERNEL(channel_sums<float>)
       (x.data.data(), mask.data.data(), pixels, channels, part.data());
@@ -84,6 +84,8 @@ TEST_CASE("kernels/pool: sums over pixels and their transpose, for every number 
       }
       CAPTURE(channels);
       CHECK(worst == 0);
+      CHECK(sums.back() == 7);
+      CHECK(part.back() == 7);
       for (std::size_t c = 0; c < want.size(); ++c) {
         CHECK(std::abs(sums[c] - want[c]) < 1e-5);
         CHECK(std::abs(part[c] - want_part[c]) < 1e-5);

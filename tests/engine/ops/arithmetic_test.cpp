@@ -33,6 +33,16 @@ TEST_CASE("arithmetic: gradient where both sides are one value") {
               {uniform({7}, -1, 1, 3)});
 }
 
+TEST_CASE("arithmetic: float against double for extents of 1 to 130") {
+  const auto pairs = [](Index e) {
+    return std::vector{uniform<float>({e}, -1, 1, 1), uniform<float>({e}, -1, 1, 2)};
+  };
+  CHECK(float_error_to_130(f_add, pairs) < 1.2e-7);
+  CHECK(float_error_to_130(f_sub, pairs) < 1.2e-7);
+  CHECK(float_error_to_130(f_mul, pairs) < 1.2e-7);
+  CHECK(float_error_to_130(f_scale, [&](Index e) { return std::vector{pairs(e)[0]}; }) < 1.2e-7);
+}
+
 TEST_CASE("arithmetic: errors") {
   Tape<double> tape;
   const Tensor<double> a({2, 3}), b({3, 2});

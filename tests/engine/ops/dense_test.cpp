@@ -58,7 +58,7 @@ double error(const std::vector<float>& a, const std::vector<float>& b) {
 
 TEST_CASE("dense: the float path, forward and all gradients, against double loops to 1e-6 of the largest") {
   each_isa([] {
-    for (Index e : {1, 2, 3, 5, 7, 8, 15, 16, 17, 31, 33, 64, 65, 100, 130})
+    for (Index e = 1; e <= 130; ++e)
       for (Activation act : {Activation::none, Activation::relu}) {
         CAPTURE(e);
         const auto x = uniform<float>({e, 67}, -1, 1, 1), w = uniform<float>({67, 19}, -1, 1, 2),

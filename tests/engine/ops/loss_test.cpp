@@ -116,6 +116,11 @@ TEST_CASE("loss: float against double, and the same bits for any thread count") 
   expect_same_bits(f_mse, {a, b});
   expect_same_bits(f_huber, {a, b});
   expect_same_bits(f, {a});
+  const auto pairs = [](Index e) {
+    return std::vector{uniform<float>({e}, -1, 1, 3), uniform<float>({e}, 0, 1, 4)};
+  };
+  CHECK(float_error_to_130(f_mse, pairs) < 3e-7);
+  CHECK(float_error_to_130(f_huber, pairs) < 3e-7);
   CHECK(float_error(f_mse, {a, b}) < 2e-7);  // measured 8.5e-8
   CHECK(float_error(f_huber, {a, b}) < 2e-7);
   CHECK(float_error(f, {a}) < 3e-7);  // measured 1.6e-7

@@ -1,6 +1,10 @@
 #include <fieldmark/engine/ops/matmul.h>
 #include <fieldmark/engine/parallel.h>
 
+#include <algorithm>
+#include <cmath>
+
+#include "support/each_isa.h"
 #include "support/expect_grad.h"
 
 using namespace fieldmark;
@@ -18,6 +22,51 @@ TEST_CASE("matmul: gradient, also of empty and single extents") {
   expect_grad(f, {uniform({1, 1}, -1, 1, 1), uniform({1, 1}, -1, 1, 2)});
   expect_grad(f, {uniform({0, 5}, -1, 1, 1), uniform({5, 4}, -1, 1, 2)});
   expect_grad(f, {uniform({2, 0}, -1, 1, 1), uniform({0, 4}, -1, 1, 2)});
+}
+
+namespace {
+// Largest error of the float product and of its gradients, relative to the largest of their kind, against
+// loops in double.
+double worst_error(Index m, Index k, Index n) {
+  const auto a = uniform<float>({m, k}, -1, 1, 1), b = uniform<float>({k, n}, -1, 1, 2),
+             g = uniform<float>({m, n}, -1, 1, 3);
+  Tape<float> tape;
+  Tensor<float> da(a.shape), db(b.shape);
+  const auto y = matmul(tape.leaf(a, da), tape.leaf(b, db));
+  tape.backward(y, g.data);
+  std::vector<double> want(static_cast<std::size_t>(m * n)), want_a(a.data.size()), want_b(b.data.size());
+  for (Index i = 0; i < m; ++i)
+    for (Index j = 0; j < n; ++j)
+      for (Index s = 0; s < k; ++s) {
+        const auto to = static_cast<std::size_t>(i * n + j), of_a = static_cast<std::size_t>(i * k + s),
+                   of_b = static_cast<std::size_t>(s * n + j);
+        want[to] += static_cast<double>(a.data[of_a]) * static_cast<double>(b.data[of_b]);
+        want_a[of_a] += static_cast<double>(g.data[to]) * static_cast<double>(b.data[of_b]);
+        want_b[of_b] += static_cast<double>(g.data[to]) * static_cast<double>(a.data[of_a]);
+      }
+  const auto error = [](const float* got, const std::vector<double>& exact) {
+    double worst = 0, largest = 1e-30;
+    for (std::size_t i = 0; i < exact.size(); ++i) {
+      const double d = std::abs(static_cast<double>(got[i]) - exact[i]);
+      worst = d <= worst ? worst : d;
+      largest = std::max(largest, std::abs(exact[i]));
+    }
+    return worst / largest;
+  };
+  return std::max({error(y.value(), want), error(da.data.data(), want_a), error(db.data.data(), want_b)});
+}
+}  // namespace
+
+TEST_CASE(
+    "matmul: the float path, forward and both gradients, against double loops for extents of 1 to 130") {
+  each_isa([] {
+    for (Index e = 1; e <= 130; ++e) {
+      CAPTURE(e);
+      CHECK(worst_error(e, 37, 19) < 1e-6);
+      CHECK(worst_error(23, e, 17) < 1e-6);
+      CHECK(worst_error(13, 29, e) < 1e-6);
+    }
+  });
 }
 
 TEST_CASE("matmul: errors") {

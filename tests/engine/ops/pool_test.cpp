@@ -70,5 +70,8 @@ TEST_CASE("pool: float against double, and the same bits for any thread count") 
   expect_same_bits(f_pool2, {x});
   expect_same_bits(f_global, {x});
   CHECK(float_error(f_pool2, {x}) < 2e-7);
+  const auto of_channels = [](Index e) { return std::vector{uniform<float>({2, 5, 3, e}, -1, 1, 1)}; };
+  CHECK(float_error_to_130(f_pool2, of_channels) < 2e-7);
+  CHECK(float_error_to_130(f_global, of_channels) < 2e-7);
   CHECK(float_error(f_global, {x}) < 2e-7);
 }

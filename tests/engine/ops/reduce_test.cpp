@@ -51,6 +51,12 @@ TEST_CASE("reduce: three million pixels in float") {
   CHECK(op_values(f_sum, std::vector{x})[0] == 0.0625f * 1500000);
 }
 
+TEST_CASE("reduce: float against double for extents of 1 to 130") {
+  const auto numbers = [](Index e) { return std::vector{uniform<float>({e}, -1, 1, 3)}; };
+  CHECK(float_error_to_130(f_sum, numbers) < 2e-7);
+  CHECK(float_error_to_130(f_mean, numbers) < 2e-7);
+}
+
 TEST_CASE("reduce: errors") {
   Tape<double> tape;
   const Tensor<double> x({2, 3});

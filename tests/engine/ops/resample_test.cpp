@@ -86,4 +86,8 @@ TEST_CASE("resample: float against double, and the same bits for any thread coun
   expect_same_bits(f_double, {x});
   expect_same_bits(f_depth, {x});
   CHECK(float_error(to(77, 91), {x}) < 5e-7);  // measured 2.1e-7
+  const auto of_channels = [](Index e) { return std::vector{uniform<float>({1, 2, 4, e}, -1, 1, 2)}; };
+  CHECK(float_error_to_130(to(3, 5), of_channels) < 5e-7);
+  CHECK(float_error_to_130(f_double, of_channels) < 5e-7);
+  CHECK(float_error_to_130(f_depth, of_channels) < 5e-7);
 }
