@@ -1,0 +1,60 @@
+#!/usr/bin/env bash
+# Kernels, ops and the command on CPUs that the machine at hand is not, emulated: one without AVX, which must find the
+# kernels of x86-64-v2 and never meet an instruction beyond them, and one with AVX2 and without AVX-512.
+#   emulated_cpu.sh FIELDMARK TEST_ENGINE TEST_NERF TEST_DISTORT
+set -euo pipefail
+if ! command -v qemu-x86_64 >/dev/null; then
+  echo "SKIPPED: an emulated CPU needs qemu-x86_64 (package qemu-user)"
+  exit 0
+fi
+fieldmark=$(realpath "$1") engine=$(realpath "$2") nerf=$(realpath "$3") distort=$(realpath "$4")
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+export OMP_NUM_THREADS=1 # emulated threads wait for each other longer than they work
+
+fail() {
+  echo "FAILED: $*" >&2
+  cat ./*.log >&2
+  exit 1
+}
+
+# on CPU PROGRAM ARGUMENTS...: its output goes to PROGRAM.log
+on() {
+  local cpu=$1 program=$2
+  shift 2
+  qemu-x86_64 -cpu "$cpu" "$program" "$@" >"$(basename "$program").log" 2>&1
+}
+
+# level CPU: the instruction set whose kernels the command uses there
+level() {
+  on "$1" "$fieldmark" gradcheck --only arithmetic --report "$1.md" || fail "gradcheck on $1"
+  sed -n 's/^| kernels | x86-64-\(v[234]\) |$/\1/p' "$1.md"
+}
+
+old=Nehalem new=Haswell-noTSX
+[ "$(level $old)" = v2 ] || fail "a CPU without AVX uses kernels of level '$(level $old)', not v2"
+if FIELDMARK_ISA=v3 on $old "$fieldmark" gradcheck --only arithmetic; then fail "FIELDMARK_ISA=v3 on a CPU without AVX2"; fi
+grep -qxF 'fieldmark: [isa] FIELDMARK_ISA asks for v3, this CPU has at most v2' fieldmark.log ||
+  fail "FIELDMARK_ISA=v3 on a CPU without AVX2: another message"
+
+# Every kernel by loops, and the ops whose float paths have code of their own.
+kernels='kernels/*,gemm*,adam kernel*,weighted_taps*,isa*,simd*,softmax*,group_norm: float*,pool: float*'
+on $old "$engine" "$kernels,dense: *,matmul: *,activation: float*" || fail "the engine's tests on $old"
+on $old "$nerf" "$kernels,composite: *,sampler: densities*" || fail "the tests of fields on $old"
+on $old "$distort" "$kernels,blur: *,rotate: *" || fail "the tests of distortions on $old"
+on $old "$fieldmark" gradcheck || fail "gradcheck on $old"
+
+small=(--size 16 --views 4)
+on $old "$fieldmark" scene --out scene --kind sphere "${small[@]}" || fail "scene on $old"
+on $old "$fieldmark" train --data scene --out field.fm --steps 20 || fail "train on $old"
+on $old "$fieldmark" render --field field.fm --out views --count 1 --size 16 || fail "render on $old"
+
+newest=$(level $new)
+if [ "$newest" = v3 ]; then
+  on $new "$engine" "kernels/elementwise*,gemm*,adam kernel*" || fail "the engine's tests on $new"
+  on $new "$nerf" "kernels/hash_grid*" || fail "the tests of fields on $new"
+else
+  echo "SKIPPED: kernels of v3 on an emulated CPU needs a qemu-x86_64 with AVX2 (7.2 or newer)"
+fi
+echo "$old: v2, kernels, gradients, training and rendering; v3 refused; $new: $newest"
