@@ -14,6 +14,12 @@ void check_extent(std::string_view op, std::string_view arg, const Shape& got, i
                    " (" + std::string(why) + "), got shape " + got.str());
 }
 
+void check_extent(std::string_view op, std::string_view arg, const Shape& got, int axis, Index want,
+                  std::string_view why, const Shape& of) {
+  if (got[axis] != want)
+    check_extent(op, arg, got, axis, want, std::string(why) + ", whose shape is " + of.str());
+}
+
 void check_rank(std::string_view op, std::string_view arg, const Shape& got, int rank,
                 std::string_view layout) {
   if (got.rank() == rank) return;

@@ -16,18 +16,20 @@ ShardedLoop<T>::ShardedLoop(int shards, Index grads) : shards_(shards), grads_(g
 }
 
 template <class T>
-double ShardedLoop<T>::run(Index chunks, const Body& body, std::span<T> into) {
+double ShardedLoop<T>::run_chunks(Index chunks, void* context, Body body, std::span<T> into) {
   if (static_cast<Index>(into.size()) > grads_)
     throw ShapeError("[sharded_loop] into must have at most " + std::to_string(grads_) + " numbers, got " +
                      std::to_string(into.size()));
-  losses_.assign(static_cast<std::size_t>(chunks), 0.0);
+  const auto n = static_cast<std::size_t>(chunks);
+  if (losses_.capacity() < n) losses_.reserve(2 * n);  // a step with a few more chunks does not allocate
+  losses_.assign(n, 0.0);
   parallel_for(shards_, 1, [&](Index s, Index) {
     auto& grads = buffers_[static_cast<std::size_t>(s)];
     std::fill(grads.begin(), grads.end(), T(0));
     Tape<T>& tape = *tapes_[static_cast<std::size_t>(s)];
     for (Index c = s * chunks / shards_; c < (s + 1) * chunks / shards_; ++c) {
       tape.reset();
-      losses_[static_cast<std::size_t>(c)] = body(c, s, tape, grads.data());
+      losses_[static_cast<std::size_t>(c)] = body(context, c, s, tape, grads.data());
     }
   });
   // Each number is summed over the shards by one thread, in shard order.

@@ -7,7 +7,7 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kGrain = 4096;  // cells a piece
+constexpr Index kPiece = 1024;  // cells looked at together
 constexpr float kExcluded = -1.f;
 constexpr std::uint8_t kFarthest = 16;  // blocks
 
@@ -51,22 +51,26 @@ void OccupancyGrid::update(const Density& density, const CounterRng& rng, const 
   const Index fraction = std::max<Index>(1, u.fraction), offset = static_cast<Index>(u.round) % fraction;
   const Index looked = n > offset ? (n - offset + fraction - 1) / fraction : 0;
   const float side = 1.f / static_cast<float>(resolution_);
-  std::vector<float> x(at(3 * looked)), sigma(at(looked));
-  parallel_for(looked, kGrain, [&](Index begin, Index end) {
+  const auto look = [&](Index lane, Index begin, Index end) {
+    float x[3 * kPiece], sigma[kPiece];
     for (Index i = begin; i < end; ++i) {
       const Index c = candidates_[at(offset + i * fraction)];
       const auto jitter = rng.uniform4(u.round, static_cast<std::uint64_t>(c));
       const Index xyz[3] = {c % resolution_, c / resolution_ % resolution_, c / (resolution_ * resolution_)};
-      for (std::size_t a = 0; a < 3; ++a) x[at(3 * i) + a] = (static_cast<float>(xyz[a]) + jitter[a]) * side;
+      for (std::size_t a = 0; a < 3; ++a)
+        x[at(3 * (i - begin)) + a] = (static_cast<float>(xyz[a]) + jitter[a]) * side;
     }
-    density(x.data() + 3 * begin, end - begin, sigma.data() + begin);
-  });
-  parallel_for(looked, kGrain, [&](Index begin, Index end) {
+    density(lane, x, end - begin, sigma);
     for (Index i = begin; i < end; ++i) {
       const std::size_t c = at(candidates_[at(offset + i * fraction)]);
-      density_[c] = std::max(u.decay * density_[c], sigma[at(i)]);
+      density_[c] = std::max(u.decay * density_[c], sigma[i - begin]);
       bits_[c] = density_[c] * u.step > u.threshold;
     }
+  };
+  // Pieces are dealt to the lanes in turn; a cell has one owner.
+  parallel_for(kLanes, 1, [&](Index lane, Index) {
+    for (Index begin = lane * kPiece; begin < looked; begin += kLanes * kPiece)
+      look(lane, begin, std::min(begin + kPiece, looked));
   });
   rebuild_blocks();
 }

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 namespace fieldmark::nerf {
 namespace {
@@ -36,11 +37,30 @@ Index pick(float u, float v, Index n) {
 
 }  // namespace
 
-// The rays of a chunk, and what its samples pass back to the table.
-struct Trainer::Chunk {
-  std::vector<float> origins, directions, jitter, photograph, background;
-  std::vector<float> position, dfeatures;  // the latter level by level
-  Index samples = 0;
+// What the chunks of a shard use one after another, and what their samples pass back to the table.
+struct Trainer::Shard {
+  // Grows to twice what it must hold, so that steps with a few more samples than any before do not allocate.
+  struct Buffer {
+    std::vector<float> numbers;
+    std::size_t used = 0;
+    float* append(Index n) {
+      const std::size_t begin = used;
+      used += at(n);
+      if (numbers.size() < used) numbers.resize(2 * used);
+      return numbers.data() + begin;
+    }
+  };
+  std::vector<float> origins, directions, jitter, photograph, background;  // the rays of a chunk
+  RaySampler sampler;
+  RaySamples found;
+  // Of all chunks of a step, in their order; gradients of the features level by level in each.
+  std::vector<Index> samples;
+  Buffer position, dfeatures;
+
+  void begin_step() {
+    samples.clear();
+    position.used = dfeatures.used = 0;
+  }
 };
 
 Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& options)
@@ -54,8 +74,7 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
       packed_(field.params, {.precision = options.precision}),
       loop_(kShards, field.field.network_size()),
       adam_(field.params.size(), {.lr = 1, .zero_grads = true}),
-      samplers_(kShards),
-      samples_of_shard_(kShards),
+      shards_(kShards),
       rays_per_step_(kFirstRays) {
   if (options.samples_per_step < 1024)
     throw ValueError("[trainer] samples_per_step must be at least 1024, got " +
@@ -79,7 +98,7 @@ void Trainer::carve() {
   pixels_ = training_pixels(data_.views, hull_margin(data_.views, field_.bounds, n));
 }
 
-void Trainer::choose_rays(Index first, Index count, Chunk& c) const {
+void Trainer::choose_rays(Index first, Index count, Shard& c) const {
   const auto step = static_cast<std::uint64_t>(steps_);
   for (auto [buffer, columns] :
        {std::pair{&c.origins, 3}, {&c.directions, 3}, {&c.jitter, 1}, {&c.photograph, 4}, {&c.background, 3}})
@@ -113,21 +132,20 @@ void Trainer::choose_rays(Index first, Index count, Chunk& c) const {
   }
 }
 
-double Trainer::run_chunk(Index index, Index shard, Tape<float>& tape, float* grads) {
-  Chunk& chunk = chunks_[at(index)];
-  choose_rays(index * kRays, kRays, chunk);
-  RaySamples& s = samples_of_shard_[at(shard)];
-  samplers_[at(shard)].sample(field_.field, field_.params, field_.grid, {chunk.origins, chunk.directions},
-                              chunk.jitter, {.step = field_.step(), .stop = options_.stop}, s, &packed_);
-  const Index n = chunk.samples = s.size(), width = field_.field.encoding().width();
-  chunk.position.assign(s.position.begin(), s.position.end());
-  chunk.dfeatures.resize(at(2 * n * width));
+double Trainer::run_chunk(Index index, Shard& shard, Tape<float>& tape, float* grads) {
+  choose_rays(index * kRays, kRays, shard);
+  RaySamples& s = shard.found;
+  shard.sampler.sample(field_.field, field_.params, field_.grid, {shard.origins, shard.directions},
+                       shard.jitter, {.step = field_.step(), .stop = options_.stop}, s, &packed_);
+  const Index n = s.size(), width = field_.field.encoding().width();
+  shard.samples.push_back(n);
+  std::copy(s.position.begin(), s.position.end(), shard.position.append(3 * n));
 
   // The features were looked up by the sampler; as leaves they collect what the table is owed.
   const Params<float> params(field_.params, grads, packed_);
   const Var<float> density_features = tape.fresh_leaf(s.density_features.data(), nullptr, {n, width});
   const Var<float> colour_features = tape.fresh_leaf(s.colour_features.data(), nullptr, {n, width});
-  const Var<float> of_ray = spherical_harmonics(tape.constant(chunk.directions.data(), {kRays, 3}));
+  const Var<float> of_ray = spherical_harmonics(tape.constant(shard.directions.data(), {kRays, 3}));
   float* harmonics = tape.scratch(n * kSphericalHarmonics);
   for (Index r = 0; r < kRays; ++r)
     for (Index i = s.ray_begin[at(r)]; i < s.ray_begin[at(r + 1)]; ++i)
@@ -141,26 +159,29 @@ double Trainer::run_chunk(Index index, Index shard, Tape<float>& tape, float* gr
       field_.field.colour(params, z, colour_features, tape.constant(harmonics, {n, kSphericalHarmonics}));
   const Var<float> rays = composite(field_.field.density(z), rgb, tape.constant(delta, {n}), s.ray_begin);
   const double share = static_cast<double>(kRays) / static_cast<double>(rays_per_step_);
-  const Var<float> loss = photometric_loss<float>(rays, chunk.photograph, chunk.background,
+  const Var<float> loss = photometric_loss<float>(rays, shard.photograph, shard.background,
                                                   {.huber = options_.huber, .scale = share});
   const double value = static_cast<double>(loss.value()[0]);
   tape.backward(loss);
   field_.field.encoding().deal_to_levels(n, density_features.grad(), colour_features.grad(),
-                                         chunk.dfeatures.data());
+                                         shard.dfeatures.append(2 * n * width));
   return value;
 }
 
-// A level owns its rows of the table; chunks are added in order.
+// A level owns its rows of the table; shards, and in them chunks, are added in order.
 void Trainer::backward_table() {
   const HashEncoding<float>& encoding = field_.field.encoding();
   const std::span<float> grad = field_.params.grads(encoding.table());
-  const Index chunks = rays_per_step_ / kRays, entry = 2 * encoding.features();
+  const Index entry = 2 * encoding.features();
   parallel_for(encoding.levels(), 1, [&](Index l, Index) {
     const int level = static_cast<int>(encoding.levels() - 1 - l);  // the finest, slowest level first
-    for (Index c = 0; c < chunks; ++c) {
-      const Chunk& k = chunks_[at(c)];
-      encoding.backward_level(level, k.position.data(), k.samples,
-                              k.dfeatures.data() + level * k.samples * entry, grad);
+    for (const Shard& shard : shards_) {
+      const float *x = shard.position.numbers.data(), *d = shard.dfeatures.numbers.data();
+      for (const Index n : shard.samples) {
+        encoding.backward_level(level, x, n, d + level * n * entry, grad);
+        x += 3 * n;
+        d += encoding.levels() * n * entry;
+      }
     }
   });
 }
@@ -169,12 +190,13 @@ void Trainer::step(double seconds) {
   schedule_.observe(steps_, seconds);
   packed_.update();
   if (steps_ % kOccupancyPeriod == 0) refresh_occupancy();
-  const Index chunks = rays_per_step_ / kRays;
-  if (static_cast<Index>(chunks_.size()) < chunks) chunks_.resize(at(chunks));
+  for (Shard& s : shards_) s.begin_step();
   const Index network = field_.field.network_size();
   const double loss = loop_.run(
-      chunks,
-      [&](Index c, Index shard, Tape<float>& tape, float* grads) { return run_chunk(c, shard, tape, grads); },
+      rays_per_step_ / kRays,
+      [this](Index c, Index shard, Tape<float>& tape, float* grads) {
+        return run_chunk(c, shards_[at(shard)], tape, grads);
+      },
       field_.params.grads().first(at(network)));
   backward_table();
   const AdamRange ranges[] = {
@@ -184,7 +206,7 @@ void Trainer::step(double seconds) {
 
   // The next step's rays: as many as have the wanted number of samples, changing by at most a half.
   Index samples = 0;
-  for (Index c = 0; c < chunks; ++c) samples += chunks_[at(c)].samples;
+  for (const Shard& s : shards_) samples = std::accumulate(s.samples.begin(), s.samples.end(), samples);
   const double wanted = static_cast<double>(rays_per_step_) * static_cast<double>(options_.samples_per_step) /
                         static_cast<double>(std::max<Index>(samples, 1));
   const Index next = static_cast<Index>(std::clamp(wanted, static_cast<double>(rays_per_step_) / 1.5,
@@ -204,9 +226,11 @@ double Trainer::train_psnr() const {
 }
 
 void Trainer::refresh_occupancy() {
-  const OccupancyGrid::Density density = [&](const float* x, Index n, float* sigma) {
+  static_assert(OccupancyGrid::kLanes <= kShards);
+  const OccupancyGrid::Density density = [this](Index lane, const float* x, Index n, float* sigma) {
     const HashEncoding<float>& encoding = field_.field.encoding();
-    Tape<float> tape;
+    Tape<float>& tape = loop_.tape(lane);
+    tape.reset();
     float* features = tape.scratch(n * encoding.width());
     float* unused = tape.scratch(n * encoding.width());
     encoding.encode(field_.params.values(encoding.table()), x, n, features, unused);

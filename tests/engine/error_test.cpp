@@ -7,6 +7,9 @@ using namespace fieldmark;
 TEST_CASE("error: messages name op, argument, expectation and what came") {
   CHECK_THROWS_WITH(check_extent("op", "x", Shape{2, 3}, 1, 4, "the rows of w"),
                     "[op] x: axis 1 must be 4 (the rows of w), got shape [2, 3]");
+  CHECK_THROWS_WITH(check_extent("op", "w", Shape{2, 3}, 0, 4, "the columns of x", Shape{5, 4}),
+                    "[op] w: axis 0 must be 4 (the columns of x, whose shape is [5, 4]), got shape [2, 3]");
+  CHECK_NOTHROW(check_extent("op", "w", Shape{4, 3}, 0, 4, "the columns of x", Shape{5, 4}));
   CHECK_THROWS_WITH(check_rank("op", "x", Shape{2, 3}, 1, "[n]"),
                     "[op] x must have rank 1 [n], got shape [2, 3]");
   CHECK_THROWS_WITH(check_same("op", "a", Shape{2}, "b", Shape{3}),

@@ -12,10 +12,10 @@ using namespace fieldmark::nerf;
 
 namespace {
 // Matter of density 100 where x < 0.5, nothing elsewhere.
-void half(const float* x, Index n, float* sigma) {
+void half(Index, const float* x, Index n, float* sigma) {
   for (Index i = 0; i < n; ++i) sigma[i] = x[3 * i] < 0.5f ? 100.f : 0.f;
 }
-void nothing(const float*, Index n, float* sigma) { std::fill_n(sigma, n, 0.f); }
+void nothing(Index, const float*, Index n, float* sigma) { std::fill_n(sigma, n, 0.f); }
 
 std::vector<std::uint8_t> ball(Index n) {
   std::vector<std::uint8_t> keep;
@@ -47,7 +47,7 @@ TEST_CASE("occupancy_grid: positions are inside their cells, and drawn anew each
   OccupancyGrid grid(4);
   std::vector<float> first, second;
   const auto record = [](std::vector<float>& to) {
-    return [&to](const float* x, Index n, float* sigma) {
+    return [&to](Index, const float* x, Index n, float* sigma) {
       to.assign(x, x + 3 * n);
       std::fill_n(sigma, n, 1.f);
     };
@@ -83,7 +83,7 @@ TEST_CASE("occupancy_grid: a fraction looks at all candidates in as many rounds"
   grid.restrict_to(ball(8));
   const Index candidates = grid.occupied_cells();
   Index looked = 0;
-  const auto count = [&](const float*, Index n, float* sigma) {
+  const auto count = [&](Index, const float*, Index n, float* sigma) {
     looked += n;
     std::fill_n(sigma, n, 7.f);
   };
@@ -97,7 +97,7 @@ TEST_CASE("occupancy_grid: a cell that was ruled out stays out") {
   OccupancyGrid grid(8);
   const auto keep = ball(8);
   grid.restrict_to(keep);
-  grid.update([](const float*, Index n, float* s) { std::fill_n(s, n, 1e6f); }, CounterRng(1), {});
+  grid.update([](Index, const float*, Index n, float* s) { std::fill_n(s, n, 1e6f); }, CounterRng(1), {});
   CHECK(std::equal(keep.begin(), keep.end(), grid.bits().begin()));
 }
 
@@ -167,7 +167,7 @@ TEST_CASE("occupancy_grid: the same bits for one and two threads") {
   for (int n = 1; n <= 2; ++n) {
     set_threads(n);
     OccupancyGrid grid(32);
-    const auto smooth = [](const float* x, Index count, float* sigma) {
+    const auto smooth = [](Index, const float* x, Index count, float* sigma) {
       for (Index i = 0; i < count; ++i) sigma[i] = x[3 * i] * x[3 * i + 1] + x[3 * i + 2];
     };
     grid.update(smooth, CounterRng(5), {.fraction = 3, .round = 2});

@@ -140,8 +140,8 @@ Var<T> dense(Var<T> x, Var<T> w, Var<T> b, Activation activation) {
   check_rank("dense", "w", w.shape(), 2, "[in, out]");
   check_rank("dense", "b", b.shape(), 1, "[out]");
   const Index n = x.shape()[0], in = x.shape()[1], out = w.shape()[1];
-  check_extent("dense", "w", w.shape(), 0, in, "the columns of x, whose shape is " + x.shape().str());
-  check_extent("dense", "b", b.shape(), 0, out, "the columns of w, whose shape is " + w.shape().str());
+  check_extent("dense", "w", w.shape(), 0, in, "the columns of x", x.shape());
+  check_extent("dense", "b", b.shape(), 0, out, "the columns of w", w.shape());
   const bool relu = activation == Activation::relu;
   Tape<T>& tape = x.tape();
   T* y = nullptr;

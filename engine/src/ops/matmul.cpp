@@ -9,7 +9,7 @@ Var<T> matmul(Var<T> a, Var<T> b) {
   check_rank("matmul", "a", a.shape(), 2, "[m, k]");
   check_rank("matmul", "b", b.shape(), 2, "[k, n]");
   const Index m = a.shape()[0], k = a.shape()[1], n = b.shape()[1];
-  check_extent("matmul", "b", b.shape(), 0, k, "the columns of a, whose shape is " + a.shape().str());
+  check_extent("matmul", "b", b.shape(), 0, k, "the columns of a", a.shape());
   Tape<T>& tape = a.tape();
   T* y = nullptr;
   const Var<T> out = tape.output({m, n}, &y, {a, b});

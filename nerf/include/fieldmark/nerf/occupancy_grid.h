@@ -51,12 +51,14 @@ class OccupancyGrid {
   /// Rules out every cell for which `keep` (one entry a cell) is 0. @throws ShapeError if the sizes differ
   void restrict_to(std::span<const std::uint8_t> keep);
 
-  /// Densities at n positions [n, 3] in the unit cube.
-  using Density = std::function<void(const float* x, Index n, float* sigma)>;
+  /// Densities at n positions [n, 3] in the unit cube. Calls with one lane, from 0 to kLanes - 1, never
+  /// overlap: a lane may own scratch.
+  using Density = std::function<void(Index lane, const float* x, Index n, float* sigma)>;
+  static constexpr Index kLanes = 32;
   /// Looks at one random position in each of a fraction of the candidates, in turn, replaces their densities
   /// d by max(decay d, what it found), and marks occupied the cells whose density times `step` exceeds
   /// `threshold` (opacity of one sample, about). Depends only on the arguments and the state, not on the
-  /// thread count.
+  /// thread count, and allocates nothing.
   struct Update {
     float decay = 0.95f;      ///< of a candidate's density at each look, in [0, 1]
     float step = 1.f / 512;   ///< length of a sample, cube sides

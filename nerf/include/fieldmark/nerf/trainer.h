@@ -27,7 +27,8 @@ struct TrainOptions {
 ///
 /// A step is a parallel loop over chunks of 64 rays (ShardedLoop); the gradient at the encoding's output is
 /// kept for the whole batch, and one pass over the levels, each owned by one thread, adds it to the table.
-/// Same seed and number of steps: same bytes, for any thread count and across save() and restore().
+/// Same seed and number of steps: same bytes, for any thread count and across save() and restore(). Once the
+/// buffers have grown, a step allocates nothing.
 class Trainer {
  public:
   /// Where photographs have alpha, sets the field's bounds to their visual hull and rules out the cells
@@ -54,10 +55,10 @@ class Trainer {
   void restore(const std::filesystem::path& path);
 
  private:
-  struct Chunk;
+  struct Shard;
   void carve();
-  void choose_rays(Index first, Index count, Chunk& chunk) const;
-  double run_chunk(Index index, Index shard, Tape<float>& tape, float* grads);
+  void choose_rays(Index first, Index count, Shard& shard) const;
+  double run_chunk(Index index, Shard& shard, Tape<float>& tape, float* grads);
   void backward_table();
   void refresh_occupancy();
   std::string fingerprint() const;
@@ -71,9 +72,7 @@ class Trainer {
   ShardedLoop<float> loop_;
   Adam<float> adam_;
   std::vector<std::uint32_t> pixels_;  // worth a ray; empty: all are
-  std::vector<Chunk> chunks_;
-  std::vector<RaySampler> samplers_;  // one a shard
-  std::vector<RaySamples> samples_of_shard_;
+  std::vector<Shard> shards_;
   Index steps_ = 0, rays_per_step_;
   double samples_ = 0, smoothed_loss_ = -1;
 };

@@ -1,0 +1,167 @@
+#include <fieldmark/engine/adam.h>
+#include <fieldmark/engine/nn/dense.h>
+#include <fieldmark/engine/ops/loss.h>
+#include <fieldmark/engine/packed_weights.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/sharded_loop.h>
+#include <fieldmark/nerf/analytic_scene.h>
+#include <fieldmark/nerf/trainer.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstdlib>
+#include <iostream>
+#include <memory>
+
+#include "support/catch.h"
+#include "support/random.h"
+
+// A training step allocates nothing once its buffers have grown. What is counted: every call of malloc,
+// calloc, realloc, memalign, aligned_alloc and posix_memalign by any thread of this program, hence of
+// operator new, of arenas and of OpenMP too. The C library's own functions are replaced by ones that count,
+// then call it.
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
+#define FIELDMARK_COUNTS_ALLOCATIONS 1
+#else
+#define FIELDMARK_COUNTS_ALLOCATIONS 0  // a sanitizer replaces them itself
+#endif
+
+namespace {
+std::atomic<long> allocations{0};
+}
+
+#if FIELDMARK_COUNTS_ALLOCATIONS
+extern "C" {
+void* __libc_malloc(std::size_t);
+void* __libc_calloc(std::size_t, std::size_t);
+void* __libc_realloc(void*, std::size_t);
+void* __libc_memalign(std::size_t, std::size_t);
+
+void* malloc(std::size_t n) noexcept {
+  ++allocations;
+  return __libc_malloc(n);
+}
+void* calloc(std::size_t n, std::size_t size) noexcept {
+  ++allocations;
+  return __libc_calloc(n, size);
+}
+void* realloc(void* p, std::size_t n) noexcept {
+  ++allocations;
+  return __libc_realloc(p, n);
+}
+void* memalign(std::size_t align, std::size_t n) noexcept {
+  ++allocations;
+  return __libc_memalign(align, n);
+}
+void* aligned_alloc(std::size_t align, std::size_t n) noexcept { return memalign(align, n); }
+int posix_memalign(void** p, std::size_t align, std::size_t n) noexcept {
+  *p = memalign(align, n);
+  return *p || n == 0 ? 0 : ENOMEM;
+}
+}
+#endif
+
+using namespace fieldmark;
+
+namespace {
+
+bool counts() {
+  if (!FIELDMARK_COUNTS_ALLOCATIONS) std::cout << "SKIPPED: counting allocations needs glibc, no sanitizer\n";
+  return FIELDMARK_COUNTS_ALLOCATIONS;
+}
+
+// Allocations while `step` is called so many times.
+template <class F>
+long allocations_in(int steps, F step) {
+  const long before = allocations;
+  for (int i = 0; i < steps; ++i) step();
+  return allocations - before;
+}
+
+template <class F>
+void for_threads(F check) {
+  const int before = threads();
+  for (const int n : {1, 2}) {
+    set_threads(n);
+    INFO(n << " threads");
+    check();
+  }
+  set_threads(before);
+}
+
+}  // namespace
+
+TEST_CASE("allocations: what allocates is counted") {
+  if (!counts()) return;
+  static void* volatile seen;  // what is seen cannot be optimised away
+  CHECK(allocations_in(3, [] {
+          const auto number = std::make_unique<int>(1);
+          seen = number.get();
+        }) == 3);
+  CHECK(allocations_in(1, [] {
+          Arena arena;
+          seen = arena.allocate(1 << 20);
+        }) == 2);  // the list of blocks and the block
+  CHECK(allocations_in(2, [] {
+          AlignedVector<float> numbers(100);
+          seen = numbers.data();
+        }) == 2);
+  CHECK(allocations_in(1, [] { free(seen = calloc(3, 5)); }) == 1);
+}
+
+TEST_CASE("allocations: a step of a network, its loop and Adam allocates nothing after the first") {
+  if (!counts()) return;
+  for_threads([] {
+    ParamStore<float> store;
+    const Dense<float> first(store, "first", {.in = 5, .out = 64, .activation = Activation::relu}, 1),
+        second(store, "second", {.in = 64, .out = 3}, 2);
+    PackedWeights<float> packed(store);
+    ShardedLoop<float> loop(16, store.size());
+    Adam<float> adam(store.size(), {.zero_grads = true});
+    const auto x = uniform<float>({40 * 128, 5}, -1, 1, 1), y = uniform<float>({40 * 128, 3}, -1, 1, 2);
+    double loss = 0;
+    const auto step = [&] {
+      packed.update();
+      loss = loop.run(
+          40,
+          [&](Index c, Index, Tape<float>& tape, float* grads) {
+            const Params<float> params(store, grads, packed);
+            const Var<float> in = tape.constant(x.data.data() + c * 128 * 5, {128, 5});
+            const Var<float> want = tape.constant(y.data.data() + c * 128 * 3, {128, 3});
+            const Var<float> error = mse_loss(second(params, first(params, in)), want);
+            tape.backward(error);
+            return static_cast<double>(error.value()[0]);
+          },
+          store.grads());
+      adam.step(store.values(), store.grads());
+    };
+    step();
+    const double before = loss;
+    CHECK(allocations_in(20, step) == 0);
+    CHECK(loss < before);
+  });
+}
+
+TEST_CASE(
+    "allocations: a step of a radiance field allocates nothing after the first few, occupancy included") {
+  if (!counts()) return;
+  using namespace nerf;
+  const Dataset data = make_scene({.size = 48, .views = 12});
+  for_threads([&] {
+    RadianceField field({.field = {.encoding = {.levels = 4,
+                                                .features = 2,
+                                                .log2_table = 12,
+                                                .base_resolution = 8,
+                                                .finest_resolution = 64},
+                                   .width = 16,
+                                   .geometry = 8},
+                         .occupancy = 32,
+                         .step = 1.f / 128});
+    Trainer trainer(field, data, {.schedule = {.steps = 100}, .samples_per_step = 8192, .warm_up = 16});
+    // The number of rays settles, and cells are found empty at steps 16 and 32.
+    for (int i = 0; i < 40; ++i) trainer.step(0);
+    CHECK(allocations_in(60, [&] { trainer.step(0); }) == 0);
+    CHECK(trainer.done());
+    CHECK(trainer.train_psnr() > 15);
+  });
+}
