@@ -164,18 +164,26 @@ void transform(const WinogradTiles<T>& x, const WinogradMatrices<T>& to) {
       using V = decltype(zero);
       const auto store = [=](int i, int j, V v) { store_as(at + (i * 6 + j) * to.stride, v); };
       const std::int64_t from = begin + c;
-      if (inside && !x.mask)
+      if (inside && !x.mask) {
         both_axes<Line, T, V>([=](int i, int j) { return load_as<V>(x.data + from + i * line + j * pixel); },
                               store);
-      else
-        both_axes<Line, T, V>(
-            [=](int i, int j) {
-              if (top + i < 0 || top + i >= x.h || left + j < 0 || left + j >= x.w) return V{};
-              const V v = load_as<V>(x.data + from + i * line + j * pixel);
-              if (!x.mask) return v;
-              return load_as<V>(x.mask + from + i * line + j * pixel) > V{} ? v : V{};
-            },
-            store);
+        return;
+      }
+      // Rolled loops: 36 branches in line take sanitizers minutes to compile.
+      V square[Line::from][Line::from];
+#pragma GCC unroll 1
+      for (int i = 0; i < Line::from; ++i)
+#pragma GCC unroll 1
+        for (int j = 0; j < Line::from; ++j) {
+          const std::int64_t k = from + i * line + j * pixel;
+          if (top + i < 0 || top + i >= x.h || left + j < 0 || left + j >= x.w)
+            square[i][j] = V{};
+          else if (x.mask)
+            square[i][j] = load_as<V>(x.mask + k) > V{} ? load_as<V>(x.data + k) : V{};
+          else
+            square[i][j] = load_as<V>(x.data + k);
+        }
+      both_axes<Line, T, V>([&](int i, int j) { return square[i][j]; }, store);
     });
   });
 }
