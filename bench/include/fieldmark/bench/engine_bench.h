@@ -12,7 +12,7 @@ namespace fieldmark::bench {
 struct PeerRow {
   double seconds = 0;  ///< median of its runs
   double ratio = 0;    ///< seconds over ours: above 1, ours is the faster
-  Peer::Found found;
+  Peer::Found found;   ///< which of its variants ran, and how close it is
 };
 
 /// One line of the engine's benchmark.
@@ -28,8 +28,8 @@ struct EngineRow {
   /// Worst |float - double| over values and all gradients, in parts of the largest of each. For convolutions
   /// the median of five pictures.
   double error = 0;
-  double megabytes = 0;  ///< most memory of the process so far
-  std::optional<PeerRow> peer{};
+  double megabytes = 0;           ///< most memory of the process so far
+  std::optional<PeerRow> peer{};  ///< where a peer did the row too
 };
 
 /// Settings of run_engine_bench().

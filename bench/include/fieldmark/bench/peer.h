@@ -10,6 +10,7 @@
 
 namespace fieldmark::bench {
 
+/// How PyTorch is started.
 struct PeerOptions {
   std::string python = "/usr/bin/python3";  ///< interpreter with torch and numpy
   double limit_seconds = 600;               ///< of each of its answers, > 0
@@ -19,12 +20,13 @@ struct PeerOptions {
 /// micro-batches, layouts) in two environments, and the fastest of all is the one that run() times.
 class Peer {
  public:
+  /// What the peer said of itself, and how far its results are from ours.
   struct Found {
     std::string version{};         ///< of PyTorch
     std::string blas{};            ///< library that serves its matrix products
     std::string cpu_capability{};  ///< instruction set of its own loops
     std::string variant{};         ///< the fastest
-    int threads = 0;
+    int threads = 0;               ///< of the fastest
     bool tuned = false;          ///< the fastest ran in tuned_environment(), else in the environment as it is
     double seconds = 0;          ///< of the fastest, when it was tried
     double untuned_seconds = 0;  ///< of the fastest in the environment as it is
@@ -52,6 +54,7 @@ class Peer {
   /// spaces.
   static std::string tuned_environment();
 
+  /// As of construction.
   const Found& found() const { return found_; }
   /// Seconds of a call, mean over a run. @throws IoError as the constructor
   double run();

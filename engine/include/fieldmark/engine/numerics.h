@@ -33,12 +33,13 @@ struct WorstError {
 /// A case that is hard on rounding or range, for `fieldmark gradcheck --numerics` and the tests. It compares
 /// what the library computes, on the instruction set in use, with the same formula in long double.
 struct NumericsCase {
-  std::string name;         ///< begins with the unit's stem
-  std::string type;         ///< "float" or "double"
-  std::string relative_to;  ///< what the errors are relative to
-  double limit;             ///< largest error allowed; 0: every bit
-  std::function<WorstError()> run;
+  std::string name;                 ///< begins with the unit's stem
+  std::string type;                 ///< "float" or "double"
+  std::string relative_to;          ///< what the errors are relative to
+  double limit;                     ///< largest error allowed; 0: every bit
+  std::function<WorstError()> run;  ///< computes both and compares
 
+  /// Whether run() compared anything and no error exceeds the limit; NaN does.
   bool ok(const WorstError& error) const { return error.numbers > 0 && error.worst <= limit; }
 };
 

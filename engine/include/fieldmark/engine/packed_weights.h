@@ -7,8 +7,9 @@ namespace fieldmark {
 /// well, and summed in float; the parameters themselves stay float.
 enum class Precision { fp32, bf16 };
 
+/// What PackedWeights packs, and how.
 struct PackOptions {
-  Precision precision = Precision::fp32;
+  Precision precision = Precision::fp32;  ///< of the packed matrices
   bool tables = false;  ///< with bf16: also parameters of rank 2 whose name ends in "/table"
 };
 

@@ -54,11 +54,13 @@ class HashEncoding {
   /// @param scratch  [n, 2 F L], overwritten
   void backward(const T* x, Index n, const T* ddensity, const T* dcolour, std::span<T> grad,
                 T* scratch) const;
+  /// @{
   /// The two halves of backward(), for callers that keep several lists of points: gradients dealt to `out`
   /// [L, n, 2 F], and those of one level, out's [n, 2 F], added to the table's. Levels own disjoint rows, so
   /// they may run on different threads; points are added in order.
   void deal_to_levels(Index n, const T* ddensity, const T* dcolour, T* out) const;
   void backward_level(int level, const T* x, Index n, const T* d, std::span<T> grad) const;
+  /// @}
 
   Index width() const { return Index{features_} * levels(); }  ///< F L, features of a part
   /// F, features of a part at a level.

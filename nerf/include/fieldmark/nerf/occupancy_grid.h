@@ -54,7 +54,7 @@ class OccupancyGrid {
   /// Densities at n positions [n, 3] in the unit cube. Calls with one lane, from 0 to kLanes - 1, never
   /// overlap: a lane may own scratch.
   using Density = std::function<void(Index lane, const float* x, Index n, float* sigma)>;
-  static constexpr Index kLanes = 32;
+  static constexpr Index kLanes = 32;  ///< calls of a Density that may run at the same time
   /// Looks at one random position in each of a fraction of the candidates, in turn, replaces their densities
   /// d by max(decay d, what it found), and marks occupied the cells whose density times `step` exceeds
   /// `threshold` (opacity of one sample, about). Depends only on the arguments and the state, not on the
