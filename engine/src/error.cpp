@@ -3,7 +3,9 @@
 namespace fieldmark {
 namespace {
 std::string head(std::string_view op, std::string_view arg) {
-  return "[" + std::string(op) + "] " + std::string(arg);
+  std::string text = "[";  // not as one sum: GCC 12 warns of an overlap there that cannot be
+  text.append(op).append("] ").append(arg);
+  return text;
 }
 }  // namespace
 
