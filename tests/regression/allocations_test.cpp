@@ -94,6 +94,7 @@ void for_threads(F check) {
 TEST_CASE("allocations: what allocates is counted") {
   if (!counts()) return;
   static void* volatile seen;  // what is seen cannot be optimised away
+  (void)seen;
   CHECK(allocations_in(3, [] {
           const auto number = std::make_unique<int>(1);
           seen = number.get();
@@ -106,7 +107,11 @@ TEST_CASE("allocations: what allocates is counted") {
           AlignedVector<float> numbers(100);
           seen = numbers.data();
         }) == 2);
-  CHECK(allocations_in(1, [] { free(seen = calloc(3, 5)); }) == 1);
+  CHECK(allocations_in(1, [] {
+          void* room = calloc(3, 5);
+          seen = room;
+          free(room);
+        }) == 1);
 }
 
 TEST_CASE("allocations: a step of a network, its loop and Adam allocates nothing after the first") {
