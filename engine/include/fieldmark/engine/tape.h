@@ -26,20 +26,23 @@ void seed_gradient(const T* seed, const T* mask, bool fresh, T* g, Index n);
 /// products are to be computed so. See PackedWeights.
 template <class T>
 struct PackedMatrix {
-  const T* forward = nullptr;
-  const T* transposed = nullptr;
-  const std::uint16_t* forward_bf16 = nullptr;
-  const std::uint16_t* transposed_bf16 = nullptr;
+  const T* forward = nullptr;                      ///< panels of W
+  const T* transposed = nullptr;                   ///< panels of W^T
+  const std::uint16_t* forward_bf16 = nullptr;     ///< W rounded; null where not asked for
+  const std::uint16_t* transposed_bf16 = nullptr;  ///< W^T rounded; null where not asked for
 };
 
 /// Handle to a value on a tape: two pointers, trivially copyable, valid until Tape::reset().
 template <class T>
 class Var {
  public:
+  /// Extents of the value.
   const Shape& shape() const { return slot_->shape; }
   /// Row-major values, shape().size() of them.
   const T* value() const { return slot_->value; }
+  /// The tape it was recorded on.
   Tape<T>& tape() const { return *tape_; }
+  /// Whether a leaf is among what it was made from, so that gradients reach it.
   bool needs_grad() const { return slot_->needs_grad; }
   /// The same matrix packed, where the loop that uses it has done so; else null.
   const PackedMatrix<T>* packed() const { return slot_->packed; }
@@ -87,12 +90,16 @@ class Tape {
   Tape(const Tape&) = delete;
   Tape& operator=(const Tape&) = delete;
 
+  /// @{
   /// A value that needs no gradient. The data must outlive the pass.
   Var<T> constant(const Tensor<T>& t) { return make(t.data.data(), nullptr, t.shape, false); }
   Var<T> constant(const T* value, Shape shape) { return make(value, nullptr, shape, false); }
+  /// @}
+  /// @{
   /// A parameter or another input to differentiate in: the gradient is added to what `grad` already holds.
   Var<T> leaf(const T* value, T* grad, Shape shape) { return make(value, grad, shape, true); }
   Var<T> leaf(const Tensor<T>& t, Tensor<T>& grad) { return leaf(t.data.data(), grad.data.data(), t.shape); }
+  /// @}
   /// As leaf(), but the gradient is written over what `grad` holds, which need not be zeroed before; where
   /// none arrives it stays as it was.
   Var<T> fresh_leaf(const T* value, T* grad, Shape shape) {
@@ -161,10 +168,12 @@ class Tape {
     for (auto n = nodes_.rbegin(); n != nodes_.rend(); ++n)
       if (const T* dout = n->out.grad()) n->run(n->closure, dout);
   }
+  /// Forgets what was recorded and frees its memory for the next pass; every Var of it becomes invalid.
   void reset() {
     nodes_.clear();
     arena_.reset();
   }
+  /// Where values, gradients and closures lie, to reserve room or to count.
   Arena& arena() { return arena_; }
 
  private:
