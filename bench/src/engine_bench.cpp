@@ -48,7 +48,7 @@ EngineBench run_engine_bench(const EngineBenchOptions& options,
       progress(spec.name, static_cast<double>(result.rows.size()) / static_cast<double>(specs.size()));
     EngineRow row = run_row(spec, options);
     row.name = spec.name;
-    row.what = spec.what;
+    if (row.what.empty()) row.what = spec.what;
     row.megabytes = peak_megabytes();
     result.rows.push_back(std::move(row));
   }

@@ -14,7 +14,7 @@ struct RowOptions : EngineBenchOptions {
 using RowRun = std::function<EngineRow(const RowOptions&)>;
 struct RowSpec {
   std::string name, what;
-  RowRun run;                                                // all but name, what, megabytes and peer
+  RowRun run;  // all but name, megabytes and peer; what: the spec's if empty
   std::function<SafetensorsFile(const RowOptions&)> work{};  // for a peer, see peer_work(); none: no peer
 };
 

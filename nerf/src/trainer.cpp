@@ -57,6 +57,7 @@ struct Trainer::Shard {
   std::vector<Index> samples;
   Buffer position, dfeatures;
 
+  Shard() { samples.reserve(at(kMostRays / kRays / kShards + 1)); }
   void begin_step() {
     samples.clear();
     position.used = dfeatures.used = 0;

@@ -12,19 +12,38 @@ using namespace fieldmark;
 
 TEST_CASE("bench engine prints a row each, and the figures that scripts read", "[bench]") {
   const TemporaryFolder folder;
-  const auto r = run_command({"bench", "engine", "--runs", "1", "--scale", "0.01", "--only", "mlp_4x64",
+  const auto r = run_command({"bench", "engine", "--runs", "1", "--scale", "0.01", "--only", "mlp_4x64_t",
                               "--json", "-", "--plot", folder / "plot.svg"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
   const auto json = nlohmann::json::parse(r.out);
   CHECK(json["peak_gflops"].get<double>() > 1);
   CHECK(json["isa"].get<std::string>().size() == 2);
-  REQUIRE(json["rows"].size() == 2);
+  REQUIRE(json["rows"].size() == 1);
+  CHECK_FALSE(json.contains("precision"));
   for (const char* key : {"name", "gflops", "ratio_to_peak", "error", "peer_ratio"})
     CHECK(json["rows"][0].contains(key));
-  CHECK(json["rows"][0]["name"] == "mlp_4x64_fb_f32");
+  CHECK(json["rows"][0]["name"] == "mlp_4x64_tape_fb_f32");
   CHECK_THAT(r.err, Contains("of peak"));
   CHECK(std::filesystem::file_size(folder / "plot.svg") > 500);
+}
+
+TEST_CASE("bench engine --precision adds speed against error, on a scene that is named", "[bench]") {
+  const TemporaryFolder folder;
+  REQUIRE(run_command({"scene", "--out", folder / "ball", "--kind", "sphere", "--size", "16", "--views", "4"})
+              .code == cli::kOk);
+  const auto r =
+      run_command({"bench", "engine", "--runs", "1", "--scale", "0.01", "--only", "nerf_step", "--precision",
+                   "--scene", folder / "ball", "--json", "-", "--report", folder / "engine.md"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  const auto json = nlohmann::json::parse(r.out);
+  CHECK(json["rows"][0]["what"] == "training step of the default field on ball");
+  REQUIRE(json["precision"].size() > 8);
+  for (const char* key : {"work", "variant", "seconds", "speedup", "error", "measure"})
+    CHECK(json["precision"][0].contains(key));
+  CHECK(std::filesystem::file_size(folder / "engine.md") > 500);
+  CHECK_THAT(run_command({"bench", "engine", "--scene", "/nowhere/scene"}).err, Contains("/nowhere/scene"));
 }
 
 TEST_CASE("bench engine --peer pytorch adds its figures to every row, and fails where it cannot", "[bench]") {

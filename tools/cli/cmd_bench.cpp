@@ -1,11 +1,16 @@
 #include <fieldmark/bench/bar_chart.h>
 #include <fieldmark/bench/engine_bench.h>
+#include <fieldmark/bench/precision_bench.h>
 #include <fieldmark/engine/files.h>
 #include <fieldmark/engine/isa.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <ostream>
 
 #include "cli/cli.h"
@@ -16,7 +21,8 @@ namespace fieldmark::cli {
 namespace {
 
 struct Options {
-  std::string what, plot, peer;
+  std::string what, plot, peer, scene;
+  bool precision = false;
   bench::PeerOptions python;
   bench::EngineBenchOptions engine;
 };
@@ -106,6 +112,26 @@ void write_plot(const std::string& path, const bench::EngineBench& result) {
   write_file_atomically(path, bench::bar_chart(title, bars, 1));
 }
 
+struct Scene {
+  std::optional<nerf::Dataset> train, test;  // none: the built-in scene
+};
+
+// The data set of --scene, or else lego where FIELDMARK_DATA has it.
+Scene scene_of(const Options& options) {
+  std::filesystem::path folder = options.scene;
+  const char* data = std::getenv("FIELDMARK_DATA");
+  if (folder.empty() && data) {
+    folder = std::filesystem::path(data) / "nerf_synthetic" / "lego";
+    if (!std::filesystem::exists(folder)) folder.clear();
+  }
+  Scene scene;
+  const bool step = std::string("nerf_step").find(options.engine.only) != std::string::npos;
+  if (folder.empty() || !(step || options.precision)) return scene;
+  scene.train = nerf::load_dataset(folder);
+  if (options.precision) scene.test = nerf::load_dataset(folder, {.split = "test"});
+  return scene;
+}
+
 bench::EngineBench measured(const Options& options, Context& context) {
   const InterruptGuard guard;
   Progress progress = context.progress("bench");
@@ -127,8 +153,42 @@ bench::EngineBench measured(const Options& options, Context& context) {
   }
 }
 
-int run(const Options& options, Context& context) {
+// One digit more than is sure; "inf" is no JSON.
+Json precision_json(const bench::PrecisionRow& r) {
+  return {{"work", r.work},
+          {"variant", r.variant},
+          {"seconds", r.seconds},
+          {"speedup", r.speedup},
+          {"error", std::isfinite(r.error) ? Json(r.error) : Json(nullptr)},
+          {"measure", r.measure}};
+}
+
+Json precision(const Options& options, const Scene& scene, Context& context) {
+  Progress progress = context.progress("precision");
+  double part = 0;
+  const auto rows = bench::run_precision_bench({.runs = options.engine.runs,
+                                                .scale = options.engine.scale,
+                                                .train = scene.train ? &*scene.train : nullptr,
+                                                .test = scene.test ? &*scene.test : nullptr},
+                                               [&](const std::string& name) {
+                                                 progress.update(part, name);
+                                                 part += 0.25;
+                                               });
+  Json json = Json::array();
+  for (const auto& r : rows) {
+    char line[240];
+    std::snprintf(line, sizeof line, "%-48s %-40s %10.4f s  %6.2f x  %10.3g %s\n", r.work.c_str(),
+                  r.variant.c_str(), r.seconds, r.speedup, r.error, r.measure.c_str());
+    context.text() << line;
+    json.push_back(precision_json(r));
+  }
+  return json;
+}
+
+int run(Options options, Context& context) {
   if (!options.plot.empty()) check_writable(options.plot);
+  const Scene scene = scene_of(options);
+  if (scene.train) options.engine.scene = &*scene.train;
   const bench::EngineBench result = measured(options, context);
   char line[80];
   std::snprintf(line, sizeof line, "peak %.1f GFLOP/s (fp32 multiply-add, kernels %s)\n", result.peak_gflops,
@@ -143,6 +203,7 @@ int run(const Options& options, Context& context) {
   Json json{{"peak_gflops", result.peak_gflops}, {"isa", isa_name()}};
   if (!options.peer.empty()) json["peer"] = peer_json(result, options);
   json["rows"] = rows;
+  if (options.precision) json["precision"] = precision(options, scene, context);
   context.result(json);
   return kOk;
 }
@@ -165,6 +226,11 @@ Command add_bench(CLI::App& app) {
   app.add_option("--only", o->engine.only, "Only rows with TEXT in their name")
       ->type_name("TEXT")
       ->default_str("all");
+  app.add_option("--scene", o->scene, "Data set that nerf_step and --precision train on, Blender layout")
+      ->type_name("DIR")
+      ->default_str("lego of FIELDMARK_DATA, else the built-in scene");
+  app.add_flag("--precision", o->precision,
+               "Also a table of speed against error: double, float, bf16, and every approximation in use");
   app.add_option("--plot", o->plot, "SVG picture of the rows (none)")->type_name("FILE")->default_str("");
   auto* peer =
       app.add_option(

@@ -54,13 +54,13 @@ ConvGeometry geometry(const Shape& x, const Shape& w, const Shape& b) {
 }  // namespace
 
 template <class T>
-Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, Activation activation) {
+Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, Activation activation, ConvMethod method) {
   const ConvGeometry g = geometry(x.shape(), w.shape(), b.shape());
   const bool relu = activation == Activation::relu;
   Tape<T>& tape = x.tape();
   T* y = nullptr;
   const Var<T> out = tape.output({g.n, g.h, g.w, g.o}, &y, {x, w, b});
-  const bool winograd = detail::winograd_pays(g);
+  const bool winograd = method == ConvMethod::fastest && detail::winograd_pays(g);
   const detail::Convolution<T> forward{
       .x = x.value(), .w = w.value(), .bias = b.value(), .relu = relu, .y = y};
   const T* bordered = nullptr;
@@ -93,7 +93,7 @@ Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, Activation activation) {
   return out;
 }
 
-template Var<float> conv2d(Var<float>, Var<float>, Var<float>, Activation);
-template Var<double> conv2d(Var<double>, Var<double>, Var<double>, Activation);
+template Var<float> conv2d(Var<float>, Var<float>, Var<float>, Activation, ConvMethod);
+template Var<double> conv2d(Var<double>, Var<double>, Var<double>, Activation, ConvMethod);
 
 }  // namespace fieldmark

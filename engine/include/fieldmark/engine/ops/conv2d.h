@@ -3,15 +3,20 @@
 
 namespace fieldmark {
 
+/// How conv2d() computes: Winograd's way where it is faster, or always the sums as they are written.
+enum class ConvMethod { fastest, direct };
+
 /// Two-dimensional convolution (cross-correlation) of pictures, stride 1, zeros around, same size.
 ///   y[n, i, j, o] = act(b[o] + sum_{u, v, c} x[n, i + u - r, j + v - r, c] w[u, v, c, o]),   r = (K - 1) / 2
 /// Wide layers with K = 3 take Winograd's way (Lavin & Gray 2016), which computes tiles of 4 x 4 outputs. In
 /// float its errors are parts of the largest number of a tile, below 5e-6 of it up to 512 channels, and a NaN
 /// or an infinity in x makes NaN of such tiles, though of no output more than 4 pixels away.
 /// @param x  [N, H, W, C]   @param w  [K, K, C, O], K odd   @param b  [O]   @return [N, H, W, O]
+/// @param method  direct costs up to three times as much, and keeps a NaN to the outputs that see it
 /// @throws ShapeError if they do not fit or K is even
 /// Differentiable in: x, w, b. With relu: a kink where the sum is 0, gradient 0 there.
 template <class T>
-Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, Activation activation = Activation::none);
+Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, Activation activation = Activation::none,
+              ConvMethod method = ConvMethod::fastest);
 
 }  // namespace fieldmark
