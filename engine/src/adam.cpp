@@ -61,7 +61,7 @@ void Adam<T>::step(std::span<T> values, std::span<T> grads, double lr_factor) {
 }
 
 template <class T>
-void Adam<T>::step(std::span<T> values, std::span<T> grads, std::span<const AdamRange> ranges) {
+void Adam<T>::check(std::span<T> values, std::span<T> grads, std::span<const AdamRange> ranges) const {
   check_size("values", values.size(), mean_.size());
   check_size("grads", grads.size(), mean_.size());
   const Index n = static_cast<Index>(mean_.size());
@@ -69,26 +69,40 @@ void Adam<T>::step(std::span<T> values, std::span<T> grads, std::span<const Adam
     if (r.begin < 0 || r.end < r.begin || r.end > n)
       throw ValueError("[Adam::step] ranges: each must lie within [0, " + std::to_string(n) + "], got [" +
                        std::to_string(r.begin) + ", " + std::to_string(r.end) + "]");
+}
+
+template <class T>
+void Adam<T>::step(std::span<T> values, std::span<T> grads, std::span<const AdamRange> ranges) {
+  check(values, grads, ranges);
   ++steps_;
-  const double t = static_cast<double>(steps_);
-  for (const AdamRange& r : ranges) {
-    const double lr = options_.lr * r.lr_factor;
-    const kernels::AdamScalars<T> scalars{
-        .beta1 = static_cast<T>(options_.beta1),
-        .beta2 = static_cast<T>(options_.beta2),
-        .eps = static_cast<T>(options_.eps),
-        .step = static_cast<T>(lr / (1 - std::pow(options_.beta1, t))),
-        .root = static_cast<T>(1 / std::sqrt(1 - std::pow(options_.beta2, t))),
-        .shrink = static_cast<T>(1 - lr * r.weight_decay),
-        .skip_zero = r.skip_zero,
-        .zero_grads = options_.zero_grads,
-    };
-    parallel_for(r.end - r.begin, kGrain, [&](Index begin, Index end) {
-      const Index at = r.begin + begin;
-      kernels::adam(values.data() + at, grads.data() + at, mean_.data() + at, mean_square_.data() + at,
-                    end - begin, scalars);
-    });
-  }
+  for (const AdamRange& r : ranges) update(values, grads, r);
+}
+
+template <class T>
+void Adam<T>::extend_step(std::span<T> values, std::span<T> grads, const AdamRange& range) {
+  check(values, grads, std::span(&range, 1));
+  if (steps_ == 0) throw ValueError("[Adam::extend_step] no step was taken before");
+  update(values, grads, range);
+}
+
+template <class T>
+void Adam<T>::update(std::span<T> values, std::span<T> grads, const AdamRange& r) {
+  const double t = static_cast<double>(steps_), lr = options_.lr * r.lr_factor;
+  const kernels::AdamScalars<T> scalars{
+      .beta1 = static_cast<T>(options_.beta1),
+      .beta2 = static_cast<T>(options_.beta2),
+      .eps = static_cast<T>(options_.eps),
+      .step = static_cast<T>(lr / (1 - std::pow(options_.beta1, t))),
+      .root = static_cast<T>(1 / std::sqrt(1 - std::pow(options_.beta2, t))),
+      .shrink = static_cast<T>(1 - lr * r.weight_decay),
+      .skip_zero = r.skip_zero,
+      .zero_grads = options_.zero_grads,
+  };
+  parallel_for(r.end - r.begin, kGrain, [&](Index begin, Index end) {
+    const Index at = r.begin + begin;
+    kernels::adam(values.data() + at, grads.data() + at, mean_.data() + at, mean_square_.data() + at,
+                  end - begin, scalars);
+  });
 }
 
 template <class T>

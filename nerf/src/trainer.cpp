@@ -169,11 +169,12 @@ double Trainer::run_chunk(Index index, Shard& shard, Tape<float>& tape, float* g
   return value;
 }
 
-// A level owns its rows of the table; shards, and in them chunks, are added in order.
+// A level owns its rows of the table; shards, and in them chunks, are added in order. Its rows take their
+// step at once, while their gradients are still in cache.
 void Trainer::backward_table() {
   const HashEncoding<float>& encoding = field_.field.encoding();
   const std::span<float> grad = field_.params.grads(encoding.table());
-  const Index entry = 2 * encoding.features();
+  const Index entry = 2 * encoding.features(), table = grad.data() - field_.params.grads().data();
   parallel_for(encoding.levels(), 1, [&](Index l, Index) {
     const int level = static_cast<int>(encoding.levels() - 1 - l);  // the finest, slowest level first
     for (const Shard& shard : shards_) {
@@ -184,6 +185,12 @@ void Trainer::backward_table() {
         d += encoding.levels() * n * entry;
       }
     }
+    const Index begin = table;
+    adam_.extend_step(field_.params.values(), field_.params.grads(),
+                      {.begin = begin + encoding.first_row(level) * entry,
+                       .end = begin + encoding.first_row(level + 1) * entry,
+                       .lr_factor = schedule_.lr(steps_),
+                       .skip_zero = true});
   });
 }
 
@@ -199,11 +206,9 @@ void Trainer::step(double seconds) {
         return run_chunk(c, shards_[at(shard)], tape, grads);
       },
       field_.params.grads().first(at(network)));
+  const AdamRange networks{.begin = 0, .end = network, .lr_factor = schedule_.lr(steps_)};
+  adam_.step(field_.params.values(), field_.params.grads(), std::span(&networks, 1));
   backward_table();
-  const AdamRange ranges[] = {
-      {.begin = 0, .end = network, .lr_factor = schedule_.lr(steps_)},
-      {.begin = network, .end = field_.params.size(), .lr_factor = schedule_.lr(steps_), .skip_zero = true}};
-  adam_.step(field_.params.values(), field_.params.grads(), ranges);
 
   // The next step's rays: as many as have the wanted number of samples, changing by at most a half.
   Index samples = 0;

@@ -84,6 +84,23 @@ TEST_CASE("adam: ranges have step sizes and rules of their own, what is in none 
   CHECK(g == std::vector<double>{0, 1, 0, 0});
 }
 
+TEST_CASE("adam: a step taken range by range is the step taken at once") {
+  const auto start = uniform<float>({200}, -1, 1, 1), g = uniform<float>({200}, -1, 1, 2);
+  std::vector<float> x(start.data), y(start.data), dx(g.data), dy(g.data);
+  Adam<float> whole(200, {.lr = 0.1}), parts(200, {.lr = 0.1});
+  const AdamRange all{.begin = 0, .end = 200, .lr_factor = 0.5},
+      first{.begin = 0, .end = 33, .lr_factor = 0.5}, rest{.begin = 33, .end = 200, .lr_factor = 0.5};
+  CHECK_THROWS_WITH(parts.extend_step(y, dy, rest), "[Adam::extend_step] no step was taken before");
+  for (int step = 0; step < 3; ++step) {
+    whole.step(x, dx, std::span(&all, 1));
+    parts.step(y, dy, std::span(&first, 1));
+    parts.extend_step(y, dy, rest);
+  }
+  CHECK(x == y);
+  CHECK(parts.steps() == 3);
+  CHECK_THROWS_WITH(parts.extend_step(y, dy, {.begin = 3, .end = 201}), Contains("within [0, 200]"));
+}
+
 TEST_CASE("adam: a resumed optimiser continues with the same bits, on any number of threads") {
   const Index n = 50001;
   const int before = threads();

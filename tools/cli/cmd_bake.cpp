@@ -31,6 +31,7 @@ int run(const Options& options, Context& context) {
   bake_options.schedule.steps = options.length.steps;
   bake_options.schedule.seconds = options.length.seconds;
   watermark::Baker baker(owner, message, bake_options);
+  const InterruptGuard until_saved;  // between the last step and the file, Ctrl-C waits
   const double seconds =
       run_long({.what = "bake",
                 .done = [&] { return baker.done(); },

@@ -116,6 +116,7 @@ int run(const Options& options, Context& context) {
   watermark::Embedder embedder(owner, views, embed_options);
   if (options.resume) embedder.restore(checkpoint);
 
+  const InterruptGuard until_saved;  // between the last step and the file, Ctrl-C waits
   const double seconds = embed(options, embedder, checkpoint, context);
   embedder.calibrate();
   owner.save(options.out);

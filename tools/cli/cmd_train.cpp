@@ -97,6 +97,7 @@ int run(const Options& options, Context& context) {
   if (options.resume) trainer.restore(checkpoint);
 
   const double begun = context.seconds(), samples_before = trainer.samples();
+  const InterruptGuard until_saved;  // between the last step and the file, Ctrl-C waits
   const double seconds = train(options, trainer, checkpoint, context);
   field.save(options.out);
   std::filesystem::remove(checkpoint);

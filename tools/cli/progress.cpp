@@ -12,6 +12,7 @@ namespace fieldmark::cli {
 namespace {
 
 volatile std::sig_atomic_t interrupt_flag = 0;
+int guards = 0;
 
 void on_interrupt(int) {
   interrupt_flag = 1;
@@ -80,11 +81,14 @@ void Progress::show(double fraction, std::string_view note) {
 }
 
 InterruptGuard::InterruptGuard() {
+  if (guards++ > 0) return;
   interrupt_flag = 0;
   std::signal(SIGINT, on_interrupt);
 }
 
-InterruptGuard::~InterruptGuard() { std::signal(SIGINT, SIG_DFL); }
+InterruptGuard::~InterruptGuard() {
+  if (--guards == 0) std::signal(SIGINT, SIG_DFL);
+}
 
 bool InterruptGuard::interrupted() const { return interrupt_flag != 0; }
 

@@ -38,7 +38,7 @@ class Progress {
 };
 
 /// While one is alive, the first Ctrl-C only sets a flag, which work in progress is to ask for; the second
-/// one kills.
+/// one kills. Guards nest: an inner one sees what an outer one was told.
 class InterruptGuard {
  public:
   InterruptGuard();

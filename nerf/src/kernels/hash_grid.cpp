@@ -100,47 +100,50 @@ struct Corners {
   }
 };
 
-// Calls use(corners, first point, count) for blocks of points in order, each block's entries asked for one
-// block ahead.
+// Calls use(level, corners, first point, count) for blocks of points in order, level by level; each block's
+// entries are asked for one block ahead, also across levels.
 template <class T, int P, class S, class F>
-[[gnu::always_inline]] inline void for_blocks(const HashLevel& level, const T* x, std::int64_t n,
-                                              const S* entries, F use) {
+[[gnu::always_inline]] inline void for_blocks(const HashLevel* level, int levels, const T* x, std::int64_t n,
+                                              const S* table, F use) {
+  if (n <= 0) return;
   Corners<T, P> corners[2];
   const auto count = [n](std::int64_t begin) {
     return static_cast<int>(n - begin < kBlock ? n - begin : kBlock);
   };
-  if (n > 0) corners[0].find(level, x, count(0));
-  for (std::int64_t begin = 0, b = 0; begin < n; begin += kBlock, ++b) {
-    const std::int64_t next = begin + kBlock;
-    if (next < n) {
-      corners[(b + 1) & 1].find(level, x + 3 * next, count(next));
-      if (level.mask) corners[(b + 1) & 1].prefetch(entries, count(next));
+  const auto ask = [&](int l, std::int64_t begin, Corners<T, P>& to) {
+    to.find(level[l], x + 3 * begin, count(begin));
+    if (level[l].mask) to.prefetch(table + level[l].first * 2 * P, count(begin));
+  };
+  int now = 0;
+  ask(0, 0, corners[now]);
+  for (int l = 0; l < levels; ++l)
+    for (std::int64_t begin = 0; begin < n; begin += kBlock, now ^= 1) {
+      if (begin + kBlock < n)
+        ask(l, begin + kBlock, corners[now ^ 1]);
+      else if (l + 1 < levels)
+        ask(l + 1, 0, corners[now ^ 1]);
+      use(l, corners[now], begin, count(begin));
     }
-    use(corners[b & 1], begin, count(begin));
-  }
 }
 
 template <class T, int P, class S>
 void forward(const HashLevel* level, int levels, const T* x, std::int64_t n, const S* table, T* density,
              T* colour) {
   const std::int64_t width = P * levels;
-  for (int l = 0; l < levels; ++l) {
-    const S* entries = table + level[l].first * 2 * P;
-    for_blocks<T, P>(level[l], x, n, entries,
-                     [&](const Corners<T, P>& corners, std::int64_t begin, int count) {
-                       alignas(64) T w[8][kBlock];
-                       corners.weights(w);
-                       for (int i = 0; i < count; ++i) {
-                         Entry<T, P> sum{};
-                         for (int k = 0; k < 8; ++k)
-                           sum += w[k][i] * load<T, P>(entries + corners.place[k][i]);
-                         T parts[2 * P];
-                         std::memcpy(parts, &sum, sizeof sum);
-                         std::memcpy(density + (begin + i) * width + P * l, parts, P * sizeof(T));
-                         std::memcpy(colour + (begin + i) * width + P * l, parts + P, P * sizeof(T));
-                       }
-                     });
-  }
+  for_blocks<T, P>(level, levels, x, n, table,
+                   [&](int l, const Corners<T, P>& corners, std::int64_t begin, int count) {
+                     const S* entries = table + level[l].first * 2 * P;
+                     alignas(64) T w[8][kBlock];
+                     corners.weights(w);
+                     for (int i = 0; i < count; ++i) {
+                       Entry<T, P> sum{};
+                       for (int k = 0; k < 8; ++k) sum += w[k][i] * load<T, P>(entries + corners.place[k][i]);
+                       T parts[2 * P];
+                       std::memcpy(parts, &sum, sizeof sum);
+                       std::memcpy(density + (begin + i) * width + P * l, parts, P * sizeof(T));
+                       std::memcpy(colour + (begin + i) * width + P * l, parts + P, P * sizeof(T));
+                     }
+                   });
 }
 
 // dL/d(entry) at one point and level; either part may be absent.
@@ -164,18 +167,19 @@ void by_level(int levels, const T* ddensity, const T* dcolour, std::int64_t begi
 template <class T, int P>
 void backward_level(const HashLevel& level, const T* x, std::int64_t n, const T* d, T* grad) {
   T* entries = grad + level.first * 2 * P;
-  for_blocks<T, P>(level, x, n, entries, [&](const Corners<T, P>& corners, std::int64_t begin, int count) {
-    alignas(64) T w[8][kBlock];
-    corners.weights(w);
-    for (int i = 0; i < count; ++i) {
-      const Entry<T, P> g = load<T, P>(d + (begin + i) * 2 * P);
-      for (int k = 0; k < 8; ++k) {
-        T* at = entries + corners.place[k][i];
-        const Entry<T, P> sum = load<T, P>(at) + w[k][i] * g;
-        std::memcpy(at, &sum, sizeof sum);
-      }
-    }
-  });
+  for_blocks<T, P>(&level, 1, x, n, grad,
+                   [&](int, const Corners<T, P>& corners, std::int64_t begin, int count) {
+                     alignas(64) T w[8][kBlock];
+                     corners.weights(w);
+                     for (int i = 0; i < count; ++i) {
+                       const Entry<T, P> g = load<T, P>(d + (begin + i) * 2 * P);
+                       for (int k = 0; k < 8; ++k) {
+                         T* at = entries + corners.place[k][i];
+                         const Entry<T, P> sum = load<T, P>(at) + w[k][i] * g;
+                         std::memcpy(at, &sum, sizeof sum);
+                       }
+                     }
+                   });
 }
 
 // y = sum_k w_k(f) e_k with f = x * resolution - cell, so dy/dx_a = resolution * sum_k dw_k/df_a e_k.

@@ -24,7 +24,7 @@ struct PrecisionBenchOptions {
   /// What a field is trained on and rendered from, and the views that training is judged by; both null: the
   /// built-in scene of 200 x 200 pixels.
   const nerf::Dataset* train = nullptr;
-  const nerf::Dataset* test = nullptr;
+  const nerf::Dataset* test = nullptr;  ///< see train
 };
 
 /// Speed against error of each precision and each approximation in use: layers in double, float and bf16; the

@@ -47,6 +47,11 @@ class Adam {
   /// @throws ShapeError unless both have n numbers   @throws ValueError if a range is not within [0, n]
   void step(std::span<T> values, std::span<T> grads, std::span<const AdamRange> ranges);
 
+  /// The step that was taken last over one more range, for gradients that are complete piece by piece. Ranges
+  /// of one step must not overlap; calls for different ranges may run at the same time.
+  /// @throws as step(), and ValueError before the first step
+  void extend_step(std::span<T> values, std::span<T> grads, const AdamRange& range);
+
   /// Steps taken: with the two moments, all that a checkpoint must hold.
   Index steps() const { return steps_; }
   /// @throws ValueError if negative
@@ -65,6 +70,8 @@ class Adam {
   const AdamOptions& options() const { return options_; }
 
  private:
+  void check(std::span<T> values, std::span<T> grads, std::span<const AdamRange> ranges) const;
+  void update(std::span<T> values, std::span<T> grads, const AdamRange& range);
   AdamOptions options_;
   AlignedVector<T> mean_, mean_square_;
   Index steps_ = 0;

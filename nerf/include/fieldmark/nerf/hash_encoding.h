@@ -69,6 +69,10 @@ class HashEncoding {
   int levels() const { return static_cast<int>(levels_.size()); }
   /// Entries of all levels, the rows of the table.
   Index rows() const { return rows_; }
+  /// First of the rows that a level owns; a level's end where the next begins, the last one's at rows().
+  Index first_row(int level) const {
+    return level < levels() ? levels_[static_cast<std::size_t>(level)].first : rows_;
+  }
   /// The table in the store.
   ParamId table() const { return table_; }
   /// Cells per axis of a level.
