@@ -76,15 +76,16 @@ double error_of(Index side, Index channels, std::uint64_t seed) {
                    relative_error(f.store.grads(), d.store.grads())});
 }
 
-// Where the argument of one ReLU in a million falls on different sides of 0 in float and double, gradients
-// differ by 1e-3 to 1e-2 however small the rounding: at 12 x 12 pixels that is one set of pictures in 16 for
-// the decoder, and the median does not see it.
+// The worst of several sets of pictures for the convolution alone. For the decoder the median: where the
+// argument of one ReLU in a million falls on different sides of 0 in float and double, gradients differ by
+// 1e-3 to 1e-2 however small the rounding, and at 12 x 12 pixels that is one set of pictures in 16.
 template <template <class> class Net>
 double typical_error(Index side, Index channels) {
+  constexpr int which = std::is_same_v<Net<float>, OneConv<float>> ? kErrorPictures - 1 : kErrorPictures / 2;
   std::array<double, kErrorPictures> errors{};
   for (std::size_t k = 0; k < errors.size(); ++k) errors[k] = error_of<Net>(side, channels, 3 + 2 * k);
-  std::nth_element(errors.begin(), errors.begin() + kErrorPictures / 2, errors.end());
-  return errors[kErrorPictures / 2];
+  std::nth_element(errors.begin(), errors.begin() + which, errors.end());
+  return errors[which];
 }
 
 // Multiplications and additions of 3 x 3 convolutions over all pictures, forward, dX and dW.

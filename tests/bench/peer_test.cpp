@@ -57,12 +57,25 @@ std::string ready(const std::string& seconds, const std::string& differences,
 const std::string kNear = R"({"y": 1e-7, "dx": 2e-6, "0/weight": 3e-6, "0/bias": 0})";
 const std::string kRuns = "while read -r line; do echo '{\"seconds\": 0.25}'; done\n";
 
-long peer_folders() {
-  long n = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(std::filesystem::temp_directory_path()))
-    n += entry.path().filename().string().starts_with("fieldmark_peer_");
-  return n;
-}
+// Temporary folders go to one of this test's own while it lives: other tests run beside it.
+class OwnTemporaries {
+ public:
+  OwnTemporaries() {
+    if (const char* was = std::getenv("TMPDIR")) before_ = was;
+    setenv("TMPDIR", folder_.path.c_str(), 1);
+  }
+  ~OwnTemporaries() { before_ ? setenv("TMPDIR", before_->c_str(), 1) : unsetenv("TMPDIR"); }
+  long peer_folders() const {
+    long n = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_.path))
+      n += entry.path().filename().string().starts_with("fieldmark_peer_");
+    return n;
+  }
+
+ private:
+  TemporaryFolder folder_;
+  std::optional<std::string> before_;
+};
 
 }  // namespace
 
@@ -94,7 +107,7 @@ TEST_CASE("peer: without an interpreter or PyTorch there is a way on in the text
 }
 
 TEST_CASE("peer: an interpreter that fails, hangs or talks nonsense is told of, and nothing is left behind") {
-  const long before = peer_folders();
+  const OwnTemporaries temporaries;
   CHECK(FakePython("echo why >&2; exit 3").failure() ==
         "PYTHON: ended with exit code 3 before it answered:\nwhy");
   CHECK(FakePython("exec sleep 600").failure(false, 0.2) == "PYTHON: no answer within 0.2 s, without a word");
@@ -105,7 +118,7 @@ TEST_CASE("peer: an interpreter that fails, hangs or talks nonsense is told of, 
   CHECK_THAT(FakePython(ready("0", kNear)).failure(), Contains("expected seconds above 0"));
   CHECK(FakePython(ready("1", kNear) + "read -r line; exit 5").failure() ==
         "PYTHON: ended with exit code 5 before it answered, without a word");
-  CHECK(peer_folders() == before);
+  CHECK(temporaries.peer_folders() == 0);
 }
 
 TEST_CASE("peer: work that differs is not timed") {

@@ -11,7 +11,7 @@ namespace fieldmark::nerf {
 struct RenderOptions {
   float stop = 1e-3f;          ///< a ray ends where its transmittance falls below this
   float least_weight = 1e-4f;  ///< samples of less weight get no colour
-  /// bf16 looks features up in a rounded table and multiplies rounded numbers: less memory, 50 dB from the
+  /// bf16 looks features up in a rounded table and multiplies rounded numbers: less memory, 62 dB from the
   /// picture in float. Needs bf16_units().
   Precision precision = Precision::fp32;
 };
