@@ -21,10 +21,9 @@ using Rows = std::vector<PrecisionRow>;
 
 struct Work {
   std::string name, measure;
-  void add(Rows& rows, const std::string& variant, double seconds, double error) const {
-    const bool first = rows.empty() || rows.back().work != name;
-    double base = seconds;
-    for (auto r = rows.rbegin(); !first && r != rows.rend() && r->work == name; ++r) base = r->seconds;
+  double base = 0;  // seconds of the first variant
+  void add(Rows& rows, const std::string& variant, double seconds, double error) {
+    if (base == 0) base = seconds;
     rows.push_back({name, variant, seconds, base / seconds, error, measure});
   }
 };
@@ -59,8 +58,7 @@ double layers(Index samples, Precision precision, int runs, std::vector<double>&
 }
 
 void add_layers(Rows& rows, const PrecisionBenchOptions& o) {
-  const Work work{"4 dense layers of 64, forward, dX and dW",
-                  "root mean square, in parts of double's results"};
+  Work work{"4 dense layers of 64, forward, dX and dW", "root mean square, in parts of double's results"};
   const Index samples = scaled(65536, o, kChunk);
   std::vector<double> exact, results;
   const double seconds = layers<double>(samples, Precision::fp32, o.runs, exact);
@@ -73,7 +71,7 @@ void add_layers(Rows& rows, const PrecisionBenchOptions& o) {
 }
 
 void add_exp(Rows& rows, const PrecisionBenchOptions& o) {
-  const Work work{"exp of numbers from -87 to 88", "worst relative, against double"};
+  Work work{"exp of numbers from -87 to 88", "worst relative, against double"};
   const Index n = scaled(1 << 20, o, 1024);
   std::vector<float> x = numbers<float>(n, 1), y(x.size());
   for (float& v : x) v = 0.5f + 87.5f * v;
@@ -135,8 +133,8 @@ struct Convolution {
 };
 
 void add_convolution(Rows& rows, const PrecisionBenchOptions& o) {
-  const Work work{"convolution 3 x 3, 64 to 64, forward, dX and dW",
-                  "root mean square, in parts of double's results"};
+  Work work{"convolution 3 x 3, 64 to 64, forward, dX and dW",
+            "root mean square, in parts of double's results"};
   const Index side = scaled(128, o, 24);
   Convolution<float> timed({4, side, side, 64}), small({1, 24, 24, 64});
   Convolution<double> exact({1, 24, 24, 64});
@@ -151,7 +149,7 @@ void add_convolution(Rows& rows, const PrecisionBenchOptions& o) {
 
 void add_rendering(Rows& rows, const nerf::RadianceField& field, const nerf::Dataset& test,
                    const PrecisionBenchOptions& o) {
-  const Work work{"a view of " + test.name, "dB, against every sample in float"};
+  Work work{"a view of " + test.name, "dB, against every sample in float"};
   struct Variant {
     std::string name;
     nerf::RenderOptions options;
@@ -180,8 +178,8 @@ void add_rendering(Rows& rows, const nerf::RadianceField& field, const nerf::Dat
 void add_training(Rows& rows, const nerf::Dataset& train, const nerf::Dataset& test,
                   const PrecisionBenchOptions& o) {
   const Index steps = scaled(600, o, 20);
-  const Work work{std::to_string(steps) + " steps of training on " + train.name,
-                  "dB on " + std::to_string(test.views.size()) + " test views"};
+  Work work{std::to_string(steps) + " steps of training on " + train.name,
+            "dB on " + std::to_string(test.views.size()) + " test views"};
   struct Variant {
     std::string name;
     nerf::TrainOptions options;

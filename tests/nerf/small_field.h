@@ -18,6 +18,19 @@ inline fieldmark::nerf::RadianceFieldOptions small_field_options() {
           .step = 1.f / 64};
 }
 
+/// A field that learns a scene of 48 x 48 pixels in a hundred steps of 8192 samples.
+inline fieldmark::nerf::RadianceFieldOptions trainable_field_options() {
+  return {.field = {.encoding = {.levels = 4,
+                                 .features = 2,
+                                 .log2_table = 12,
+                                 .base_resolution = 8,
+                                 .finest_resolution = 64},
+                    .width = 16,
+                    .geometry = 8},
+          .occupancy = 32,
+          .step = 1.f / 128};
+}
+
 /// Smooth random matter: table and networks with numbers large enough to matter, cameras around the origin.
 inline fieldmark::nerf::RadianceField small_field(unsigned seed = 1) {
   using namespace fieldmark;

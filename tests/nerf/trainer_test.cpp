@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "nerf/small_field.h"
 #include "support/catch.h"
 #include "support/each_isa.h"
 #include "support/temporary_folder.h"
@@ -17,18 +18,6 @@ namespace {
 const Dataset& scene() {
   static const Dataset data = make_scene({.size = 48, .views = 12});
   return data;
-}
-
-RadianceFieldOptions field_options() {
-  return {.field = {.encoding = {.levels = 4,
-                                 .features = 2,
-                                 .log2_table = 12,
-                                 .base_resolution = 8,
-                                 .finest_resolution = 64},
-                    .width = 16,
-                    .geometry = 8},
-          .occupancy = 32,
-          .step = 1.f / 128};
 }
 
 // Cells may be declared empty after 16 steps: short runs pass through everything a long one does.
@@ -51,7 +40,7 @@ Outcome outcome(const RadianceField& f, const Trainer& t) {
 }
 
 Outcome run(Index steps) {
-  RadianceField field(field_options());
+  RadianceField field(trainable_field_options());
   Trainer trainer(field, scene(), train_options(steps));
   while (!trainer.done()) trainer.step(0);
   return outcome(field, trainer);
@@ -59,7 +48,7 @@ Outcome run(Index steps) {
 }  // namespace
 
 TEST_CASE("trainer: 100 steps on the built-in scene reach 19 dB") {
-  RadianceField field(field_options());
+  RadianceField field(trainable_field_options());
   Trainer trainer(field, scene(), train_options(100));
   trainer.step(0);
   const double start = trainer.train_psnr();
@@ -74,7 +63,7 @@ TEST_CASE("trainer: 100 steps on the built-in scene reach 19 dB") {
 }
 
 TEST_CASE("trainer: sets bounds, background and cameras of the field from the data") {
-  RadianceFieldOptions options = field_options();
+  RadianceFieldOptions options = trainable_field_options();
   options.occupancy = 64;
   RadianceField field(options);
   // Many cameras, for a hull well inside the first cube on all sides.
@@ -90,7 +79,7 @@ TEST_CASE("trainer: opaque photographs leave bounds and cells alone") {
   Dataset opaque = scene();
   for (View& v : opaque.views)
     for (Index i = 3; i < v.rgba.size(); i += 4) v.rgba[i] = 1;
-  RadianceField field(field_options());
+  RadianceField field(trainable_field_options());
   Trainer trainer(field, opaque, train_options(2));
   CHECK(field.bounds.side == 3);
   CHECK(field.grid.occupied_cells() == field.grid.cells());
@@ -115,12 +104,12 @@ TEST_CASE("trainer: a run that is interrupted and restored gives the bytes of on
   const Index at = 23,
               steps = 45;  // between two looks at the occupancy, after the first cells are declared empty
   {
-    RadianceField field(field_options());
+    RadianceField field(trainable_field_options());
     Trainer trainer(field, scene(), train_options(steps));
     while (trainer.steps() < at) trainer.step(0);
     trainer.save(folder / "checkpoint");
   }
-  RadianceField field(field_options());
+  RadianceField field(trainable_field_options());
   Trainer trainer(field, scene(), train_options(steps));
   trainer.restore(folder / "checkpoint");
   CHECK(trainer.steps() == at);
@@ -129,7 +118,7 @@ TEST_CASE("trainer: a run that is interrupted and restored gives the bytes of on
 }
 
 TEST_CASE("trainer: a timed run's steps, given as a number, give the same bytes") {
-  RadianceField field(field_options());
+  RadianceField field(trainable_field_options());
   TrainOptions options = train_options(0);
   options.schedule.seconds = 1;
   Trainer trainer(field, scene(), options);
@@ -142,11 +131,11 @@ TEST_CASE("trainer: a timed run's steps, given as a number, give the same bytes"
 
 TEST_CASE("trainer: a checkpoint of another run is refused, with both runs named") {
   const TemporaryFolder folder;
-  RadianceField field(field_options());
+  RadianceField field(trainable_field_options());
   Trainer trainer(field, scene(), train_options(10));
   trainer.step(0);
   trainer.save(folder / "checkpoint");
-  RadianceField other(field_options());
+  RadianceField other(trainable_field_options());
   TrainOptions options = train_options(10);
   options.seed = 7;
   Trainer different(other, scene(), options);
@@ -162,7 +151,7 @@ TEST_CASE("trainer: a checkpoint of another run is refused, with both runs named
 }
 
 TEST_CASE("trainer: errors name option and value") {
-  RadianceField field(field_options());
+  RadianceField field(trainable_field_options());
   TrainOptions options = train_options(1);
   options.samples_per_step = 10;
   CHECK_THROWS_WITH(Trainer(field, scene(), options),

@@ -13,6 +13,7 @@
 #include <iostream>
 #include <memory>
 
+#include "nerf/small_field.h"
 #include "support/catch.h"
 #include "support/random.h"
 
@@ -153,15 +154,7 @@ TEST_CASE(
   using namespace nerf;
   const Dataset data = make_scene({.size = 48, .views = 12});
   for_threads([&] {
-    RadianceField field({.field = {.encoding = {.levels = 4,
-                                                .features = 2,
-                                                .log2_table = 12,
-                                                .base_resolution = 8,
-                                                .finest_resolution = 64},
-                                   .width = 16,
-                                   .geometry = 8},
-                         .occupancy = 32,
-                         .step = 1.f / 128});
+    RadianceField field(trainable_field_options());
     Trainer trainer(field, data, {.schedule = {.steps = 140}, .samples_per_step = 8192, .warm_up = 16});
     // Cells are found empty at steps 16, 32 and 48: rays have fewer samples from then on, so a step takes
     // more of them, and the last shards are used for the first time. The last buffer grows at step 55.

@@ -4,6 +4,7 @@
 #include <fieldmark/watermark/embed_views.h>
 #include <fieldmark/watermark/owner.h>
 
+#include "nerf/small_field.h"
 #include "test_key.h"
 
 /// The built-in scene at 48 x 48 pixels, learnt for 150 steps by a field of small tables; once a program.
@@ -11,15 +12,7 @@ inline const fieldmark::nerf::RadianceField& tiny_field() {
   using namespace fieldmark;
   static const nerf::RadianceField field = [] {
     const nerf::Dataset data = nerf::make_scene({.size = 48, .views = 20});
-    nerf::RadianceField f({.field = {.encoding = {.levels = 4,
-                                                  .features = 2,
-                                                  .log2_table = 12,
-                                                  .base_resolution = 8,
-                                                  .finest_resolution = 64},
-                                     .width = 16,
-                                     .geometry = 8},
-                           .occupancy = 32,
-                           .step = 1.f / 128});
+    nerf::RadianceField f(trainable_field_options());
     nerf::Trainer trainer(f, data, {.schedule = {.steps = 150}, .samples_per_step = 8192, .warm_up = 16});
     while (!trainer.done()) trainer.step(0);
     return f;

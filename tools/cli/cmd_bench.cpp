@@ -85,8 +85,10 @@ std::string speed_of(const bench::EngineRow& r) {
 
 void print_row(std::ostream& out, const bench::EngineRow& r) {
   char line[200];
-  std::snprintf(line, sizeof line, "%-26s %-32s spread %2.0f%%  error %.1e  %5.0f MB\n", r.name.c_str(),
-                speed_of(r).c_str(), 100 * r.spread, r.error, r.megabytes);
+  char error[16] = "      -";  // a training step is compared with nothing
+  if (r.error > 0) std::snprintf(error, sizeof error, "%.1e", r.error);
+  std::snprintf(line, sizeof line, "%-26s %-32s spread %2.0f%%  error %s  %5.0f MB\n", r.name.c_str(),
+                speed_of(r).c_str(), 100 * r.spread, error, r.megabytes);
   out << line;
   if (!r.peer) return;
   std::snprintf(line, sizeof line,

@@ -14,9 +14,8 @@ struct Timing {
 
 /// Calls `body` once to warm up, then `runs` times; where a call is shorter than `least_seconds`, a run is as
 /// many calls as take that long, and counts as their mean. The peak is measured in bursts of 0.3 ms right
-/// before and after each run, because a shared machine's speed drifts by a third within minutes, and the
-/// clock also depends on what was just run: 2.2 or 2.45 GHz after products of matrices, and some milliseconds
-/// to change.
+/// before and after each run, because a shared machine's speed drifts within minutes, and the clock also
+/// depends on what was just run and takes milliseconds to change.
 /// @param runs  at least 1   @param least_seconds  >= 0   @throws ValueError otherwise
 /// @param between  called after every run, outside of its time: for something else to be timed
 ///                 by turns. Only the peak after a run counts then
