@@ -5,6 +5,7 @@
 #include <fieldmark/engine/isa.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -111,7 +112,10 @@ void write_plot(const std::string& path, const bench::EngineBench& result) {
   char title[80];
   std::snprintf(title, sizeof title, "Part of the peak of %.0f GFLOP/s, kernels %s", result.peak_gflops,
                 isa_name());
-  write_file_atomically(path, bench::bar_chart(title, bars, 1));
+  // Winograd's convolution does with fewer operations what it is credited for, so its bar may pass the peak.
+  double longest = 1;
+  for (const auto& bar : bars) longest = std::max(longest, bar.value);
+  write_file_atomically(path, bench::bar_chart(title, bars, std::ceil(4 * longest) / 4));
 }
 
 struct Scene {
