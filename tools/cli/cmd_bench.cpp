@@ -115,7 +115,7 @@ void write_plot(const std::string& path, const bench::EngineBench& result) {
   // Winograd's convolution does with fewer operations what it is credited for, so its bar may pass the peak.
   double longest = 1;
   for (const auto& bar : bars) longest = std::max(longest, bar.value);
-  write_file_atomically(path, bench::bar_chart(title, bars, std::ceil(4 * longest) / 4));
+  write_file_atomically(path, bench::bar_chart(title, bars, std::ceil(longest)));
 }
 
 struct Scene {
