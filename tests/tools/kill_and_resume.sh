@@ -18,7 +18,9 @@ fail() {
 stop() {
   local signal=$1 pattern=$2 what=$3
   shift 3
-  "$fieldmark" "$what" "$@" >"$what.log" 2>&1 &
+  # Emptied here, not by the started process: the last run's log shows the pattern until that process opens it.
+  : >"$what.log"
+  "$fieldmark" "$what" "$@" >>"$what.log" 2>&1 &
   local run=$!
   until grep -q "$pattern" "$what.log"; do
     kill -0 "$run" 2>/dev/null || fail "$what ended before it was stopped"
