@@ -1,4 +1,5 @@
 #include <fieldmark/nerf/marching.h>
+#include <fieldmark/nerf/space.h>
 
 #include <algorithm>
 #include <cmath>
@@ -37,7 +38,63 @@ RayWalk::RayWalk(const float o[3], const float d[3], float step, float jitter)
   }
 }
 
-Index RayWalk::next(const OccupancyGrid& grid, Index max, float* t) {
+RayWalk RayWalk::contracted(const float o[3], const float d[3], float step, float jitter, float near) {
+  RayWalk walk(o, d, step, jitter);
+  walk.contracted_ = true;
+  walk.near_ = near + jitter * step * walk.scale_at(near);  // of the next sample
+  return walk;
+}
+
+// Inner half sides from the centre, 1 to kFarthest: by how much samples are further apart.
+float RayWalk::scale_at(float t) const {
+  float s = 1;
+  for (int a = 0; a < 3; ++a) {
+    const float y = 4 * std::abs(o_[a] + t * d_[a] - 0.5f);
+    if (!(y < kFarthest)) return kFarthest;  // also where it is NaN: the walk ends
+    s = std::max(s, y);
+  }
+  return s;
+}
+
+Index RayWalk::next(const OccupancyGrid& grid, Index max, float* t, float* x) {
+  if (contracted_) return next_contracted(grid, max, t, x);
+  const Index count = next_straight(grid, max, t);
+  for (Index i = 0; i < count; ++i)
+    for (Index a = 0; a < 3; ++a) x[3 * i + a] = o_[a] + t[i] * d_[a];
+  return count;
+}
+
+// How many samples surely stay in the empty blocks around this one: a step moves the image by at most `step`
+// where space is not contracted, and by less than 4 steps elsewhere. With |dy| = s step for the largest
+// coordinate and c = (2/s - 1/s^2) y, |dc| <= (2/s - 1/s^2) |dy| + s (2/s^2 - 2/s^3) |dy| = (4 - 3/s) step.
+Index RayWalk::next_contracted(const OccupancyGrid& grid, Index max, float* t, float* x) {
+  constexpr Index kMost = 1 << 16;  // a direction of zeros never leaves
+  const auto cells = static_cast<float>(grid.resolution());
+  const float block = 4 / cells;
+  Index count = 0;
+  while (count < max && k_ < kMost) {
+    float s = scale_at(near_);
+    if (!(s < kFarthest)) break;
+    float p[3], c[3];
+    for (int a = 0; a < 3; ++a) p[a] = o_[a] + near_ * d_[a];
+    contract(p, c);
+    Index cell[3];
+    for (int a = 0; a < 3; ++a) cell[a] = static_cast<Index>(c[a] * cells);
+    const Index clearance = grid.clearance(cell[0] / 4, cell[1] / 4, cell[2] / 4);
+    Index steps = 1;
+    if (clearance > 1) {
+      const float clear = block * static_cast<float>(clearance - 1);
+      steps = std::max<Index>(static_cast<Index>(clear / (s + 4 * clear < 1 ? step_ : 4 * step_)), 1);
+    } else if (clearance == 0 && grid.occupied(grid.cell(cell[0], cell[1], cell[2]))) {
+      t[count] = near_;
+      std::copy_n(c, 3, x + 3 * count++);
+    }
+    for (; steps > 0; --steps, ++k_) near_ += step_ * (s = scale_at(near_));
+  }
+  return count;
+}
+
+Index RayWalk::next_straight(const OccupancyGrid& grid, Index max, float* t) {
   using namespace kernels;
   const Index blocks = grid.resolution() / 4;
   MarchRay ray{.o = {o_[0], o_[1], o_[2]},

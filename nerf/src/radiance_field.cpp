@@ -3,6 +3,7 @@
 #include <fieldmark/nerf/radiance_field.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 namespace fieldmark::nerf {
@@ -37,6 +38,37 @@ Tensor<float> read_tensor(const SafetensorsFile& file, const std::string& name, 
   return t;
 }
 
+void add_space(Json& json, const Space& s) {
+  json["space"] = name_of(s.kind);
+  if (s.kind == SpaceKind::ndc) {
+    json["slopes"] = {s.slope_x, s.slope_y};
+  } else {
+    json["corner"] = s.bounds.corner;
+    json["side"] = s.bounds.side;
+  }
+  if (s.kind != SpaceKind::cube) json["near"] = s.near;
+}
+
+Space parse_space(const Json& j) {
+  Space s{.kind = parse_space_kind(j.value("space", "cube"))};
+  const auto positive = [&](const Json& number, const char* name, bool zero = false) {
+    const double value = number;
+    if (!(zero ? value >= 0 : value > 0) || !std::isfinite(value))
+      throw ValueError(std::string(name) + " must be positive and finite, got " + std::to_string(value));
+    return value;
+  };
+  if (s.kind == SpaceKind::ndc) {
+    s.near = positive(j.at("near"), "near");
+    s.slope_x = positive(j.at("slopes").at(0), "slopes");
+    s.slope_y = positive(j.at("slopes").at(1), "slopes");
+    return s;
+  }
+  s.bounds.corner = j.at("corner");
+  s.bounds.side = positive(j.at("side"), "side");
+  if (s.kind == SpaceKind::contracted) s.near = positive(j.at("near"), "near", true);
+  return s;
+}
+
 struct TablePart {
   const char* name;
   std::size_t begin;
@@ -55,26 +87,20 @@ RadianceField::RadianceField(const RadianceFieldOptions& options)
                      std::to_string(options.step));
 }
 
-void RadianceField::to_cube(const float* origin, float* cube_origin) const {
-  for (std::size_t a = 0; a < 3; ++a)
-    cube_origin[a] = static_cast<float>((static_cast<double>(origin[a]) - bounds.corner[a]) / bounds.side);
-}
-
 std::string RadianceField::configuration() const {
   const FieldOptions& f = options_.field;
-  const Json json{{"levels", f.encoding.levels},
-                  {"features", f.encoding.features},
-                  {"log2_table", f.encoding.log2_table},
-                  {"base_resolution", f.encoding.base_resolution},
-                  {"finest_resolution", f.encoding.finest_resolution},
-                  {"width", f.width},
-                  {"geometry", f.geometry},
-                  {"occupancy", options_.occupancy},
-                  {"step", options_.step},
-                  {"corner", bounds.corner},
-                  {"side", bounds.side},
-                  {"background", background == Background::white ? "white" : "black"},
-                  {"cameras", Json::parse(format_camera_span(cameras))}};
+  Json json{{"levels", f.encoding.levels},
+            {"features", f.encoding.features},
+            {"log2_table", f.encoding.log2_table},
+            {"base_resolution", f.encoding.base_resolution},
+            {"finest_resolution", f.encoding.finest_resolution},
+            {"width", f.width},
+            {"geometry", f.geometry},
+            {"occupancy", options_.occupancy},
+            {"step", options_.step},
+            {"background", background == Background::white ? "white" : "black"},
+            {"cameras", Json::parse(format_camera_span(cameras))}};
+  add_space(json, space);
   return json.dump();
 }
 
@@ -92,12 +118,9 @@ RadianceField RadianceField::from_configuration(std::string_view text, std::stri
     o.occupancy = j.at("occupancy");
     o.step = j.at("step");
     RadianceField field(o);
-    field.bounds.corner = j.at("corner");
-    field.bounds.side = j.at("side");
+    field.space = parse_space(j);
     field.background = j.at("background") == "white" ? Background::white : Background::black;
     field.cameras = parse_camera_span(j.at("cameras").dump(), std::string(place) + ": cameras");
-    if (!(field.bounds.side > 0))
-      throw ValueError("side must be positive, got " + std::to_string(field.bounds.side));
     return field;
   } catch (const Json::exception& e) {
     throw IoError(std::string(place) + ": expected a field's configuration, found " + e.what());

@@ -19,7 +19,8 @@ struct Renderer::Lane {
   RaySampler sampler;
   RaySamples samples;
   Tape<float> tape;
-  std::vector<float> pixels, origins, directions, out, weights, positions, seen_from, colours;
+  CubeRays rays;
+  std::vector<float> pixels, out, weights, positions, seen_from, colours;
   std::vector<std::int32_t> sample_ray, kept;
 };
 
@@ -68,7 +69,7 @@ void Renderer::trace(const RayBatch& rays, Index lane_index, float* out, float* 
     return gather_rows(tape.constant(all.data(), {static_cast<Index>(all.size()) / columns, columns}),
                        lane.kept);
   };
-  const Var<float> harmonics = spherical_harmonics(tape.constant(rays.directions.data(), {rays.size(), 3}));
+  const Var<float> harmonics = spherical_harmonics(tape.constant(rays.seen_from.data(), {rays.size(), 3}));
   const Var<float> rgb =
       field_.field.colour(params, field_.field.geometry(params, rows(s.density_features, width)),
                           rows(s.colour_features, width), gather_rows(harmonics, lane.sample_ray));
@@ -80,8 +81,8 @@ void Renderer::trace(const RayBatch& rays, Index lane_index, float* out, float* 
   if (recolour_) {
     lane.seen_from.clear();
     for (std::int32_t r : lane.sample_ray)
-      lane.seen_from.insert(lane.seen_from.end(), &rays.directions[3 * static_cast<std::size_t>(r)],
-                            &rays.directions[3 * static_cast<std::size_t>(r)] + 3);
+      lane.seen_from.insert(lane.seen_from.end(), &rays.seen_from[3 * static_cast<std::size_t>(r)],
+                            &rays.seen_from[3 * static_cast<std::size_t>(r)] + 3);
     recolour_(lane.positions.data(), lane.seen_from.data(), static_cast<Index>(lane.kept.size()),
               lane.colours.data());
   }
@@ -125,11 +126,10 @@ Rendering Renderer::render(const Camera& camera) {
           lane.pixels.push_back(static_cast<float>(y));
         }
       const Index n = (x1 - x0) * (y1 - y0);
-      for (auto* buffer : {&lane.origins, &lane.directions}) buffer->resize(at(3 * n));
+      lane.rays.resize(n);
       lane.out.resize(at(4 * n));
-      camera_rays(camera, lane.pixels, lane.origins.data(), lane.directions.data());
-      for (Index i = 0; i < n; ++i) field_.to_cube(&lane.origins[at(3 * i)], &lane.origins[at(3 * i)]);
-      trace({lane.origins, lane.directions}, l, lane.out.data());
+      lane.rays.set(field_.space, 0, camera, lane.pixels);
+      trace(lane.rays.batch(field_.space), l, lane.out.data());
       for (Index i = 0; i < n; ++i) {
         const Index pixel = (y0 + i / (x1 - x0)) * camera.width + x0 + i % (x1 - x0);
         const float* c = &lane.out[at(4 * i)];

@@ -35,15 +35,17 @@ void RaySampler::sample(const Field<float>& field, const ParamStore<float>& para
   segments_.clear();
   for (auto* buffer : {&t_, &x_, &density_features_, &colour_features_, &sigma_}) buffer->clear();
   for (Index r = 0; r < rays.size(); ++r) {
-    walks_.emplace_back(&rays.origins[at(3 * r)], &rays.directions[at(3 * r)], options.step,
-                        jitter.empty() ? 0.5f : jitter[at(r)]);
+    const float *o = &rays.origins[at(3 * r)], *d = &rays.directions[at(3 * r)];
+    const float shift = jitter.empty() ? 0.5f : jitter[at(r)];
+    walks_.push_back(rays.contracted ? RayWalk::contracted(o, d, options.step, shift, rays.near)
+                                     : RayWalk(o, d, options.step, shift));
     alive_.push_back(r);
   }
   transmittance_.assign(at(rays.size()), 1.f);
   while (!alive_.empty()) {
     const auto first_row = static_cast<Index>(t_.size());
     const std::size_t first_segment = segments_.size();
-    march_wave(grid, rays);
+    march_wave(grid);
     evaluate(field, params, packed, first_row);
     stop_rays(options, first_segment);
   }
@@ -51,18 +53,15 @@ void RaySampler::sample(const Field<float>& field, const ParamStore<float>& para
 }
 
 // One segment for each ray that is still alive; rays that end here leave the list.
-void RaySampler::march_wave(const OccupancyGrid& grid, const RayBatch& rays) {
+void RaySampler::march_wave(const OccupancyGrid& grid) {
   std::size_t kept = 0;
   const Index wave = std::clamp(kWaveSamples / static_cast<Index>(alive_.size()), kLeastWave, kMostWave);
   for (Index r : alive_) {
-    float t[kMostWave];
-    const Index count = walks_[at(r)].next(grid, wave, t);
+    float t[kMostWave], x[3 * kMostWave];
+    const Index count = walks_[at(r)].next(grid, wave, t, x);
     if (count > 0) segments_.push_back({r, static_cast<Index>(t_.size()), count});
-    for (Index i = 0; i < count; ++i) {
-      t_.push_back(t[i]);
-      for (Index a = 0; a < 3; ++a)
-        x_.push_back(rays.origins[at(3 * r + a)] + t[i] * rays.directions[at(3 * r + a)]);
-    }
+    t_.insert(t_.end(), t, t + count);
+    x_.insert(x_.end(), x, x + 3 * count);
     if (count == wave) alive_[kept++] = r;
   }
   alive_.resize(kept);

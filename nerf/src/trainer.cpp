@@ -50,7 +50,8 @@ struct Trainer::Shard {
       return numbers.data() + begin;
     }
   };
-  std::vector<float> origins, directions, jitter, photograph, background;  // the rays of a chunk
+  CubeRays rays;                                      // of a chunk
+  std::vector<float> jitter, photograph, background;  // the same
   RaySampler sampler;
   RaySamples found;
   // Of all chunks of a step, in their order; gradients of the features level by level in each.
@@ -94,15 +95,15 @@ void Trainer::carve() {
   std::vector<Silhouette> silhouettes;
   for (const View& v : data_.views) silhouettes.push_back({v.camera, &v.rgba});
   const Index n = field_.grid.resolution();
-  field_.bounds = tighten(field_.bounds, visual_hull(silhouettes, field_.bounds, n), n);
-  field_.grid.restrict_to(visual_hull(silhouettes, field_.bounds, n));
-  pixels_ = training_pixels(data_.views, hull_margin(data_.views, field_.bounds, n));
+  field_.space.bounds = tighten(field_.space.bounds, visual_hull(silhouettes, field_.space.bounds, n), n);
+  field_.grid.restrict_to(visual_hull(silhouettes, field_.space.bounds, n));
+  pixels_ = training_pixels(data_.views, hull_margin(data_.views, field_.space.bounds, n));
 }
 
 void Trainer::choose_rays(Index first, Index count, Shard& c) const {
   const auto step = static_cast<std::uint64_t>(steps_);
-  for (auto [buffer, columns] :
-       {std::pair{&c.origins, 3}, {&c.directions, 3}, {&c.jitter, 1}, {&c.photograph, 4}, {&c.background, 3}})
+  c.rays.resize(count);
+  for (auto [buffer, columns] : {std::pair{&c.jitter, 1}, {&c.photograph, 4}, {&c.background, 3}})
     buffer->resize(at(count * columns));
   const Index width = data_.views[0].camera.width, size = width * data_.views[0].camera.height;
   // Where a pixel lies in memory is random: all are asked for before the first is used, and so are the places
@@ -124,9 +125,7 @@ void Trainer::choose_rays(Index first, Index count, Shard& c) const {
     const View& view = data_.views[at(place[at(i)] / size)];
     const Index pixel = place[at(i)] % size, column = pixel % width, row = pixel / width;
     const float xy[2] = {static_cast<float>(column), static_cast<float>(row)};
-    float* origin = &c.origins[at(3 * i)];
-    camera_rays(view.camera, xy, origin, &c.directions[at(3 * i)]);
-    field_.to_cube(origin, origin);
+    c.rays.set(field_.space, i, view.camera, xy);
     std::copy_n(view.rgba.data.data() + 4 * pixel, 4, &c.photograph[at(4 * i)]);
     const auto b = background_rng_.uniform4(step, static_cast<std::uint64_t>(first + i));
     std::copy_n(b.data(), 3, &c.background[at(3 * i)]);
@@ -136,8 +135,8 @@ void Trainer::choose_rays(Index first, Index count, Shard& c) const {
 double Trainer::run_chunk(Index index, Shard& shard, Tape<float>& tape, float* grads) {
   choose_rays(index * kRays, kRays, shard);
   RaySamples& s = shard.found;
-  shard.sampler.sample(field_.field, field_.params, field_.grid, {shard.origins, shard.directions},
-                       shard.jitter, {.step = field_.step(), .stop = options_.stop}, s, &packed_);
+  shard.sampler.sample(field_.field, field_.params, field_.grid, shard.rays.batch(field_.space), shard.jitter,
+                       {.step = field_.step(), .stop = options_.stop}, s, &packed_);
   const Index n = s.size(), width = field_.field.encoding().width();
   shard.samples.push_back(n);
   std::copy(s.position.begin(), s.position.end(), shard.position.append(3 * n));
@@ -146,7 +145,7 @@ double Trainer::run_chunk(Index index, Shard& shard, Tape<float>& tape, float* g
   const Params<float> params(field_.params, grads, packed_);
   const Var<float> density_features = tape.fresh_leaf(s.density_features.data(), nullptr, {n, width});
   const Var<float> colour_features = tape.fresh_leaf(s.colour_features.data(), nullptr, {n, width});
-  const Var<float> of_ray = spherical_harmonics(tape.constant(shard.directions.data(), {kRays, 3}));
+  const Var<float> of_ray = spherical_harmonics(tape.constant(shard.rays.seen_from.data(), {kRays, 3}));
   float* harmonics = tape.scratch(n * kSphericalHarmonics);
   for (Index r = 0; r < kRays; ++r)
     for (Index i = s.ray_begin[at(r)]; i < s.ray_begin[at(r + 1)]; ++i)

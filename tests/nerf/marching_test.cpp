@@ -1,4 +1,5 @@
 #include <fieldmark/nerf/marching.h>
+#include <fieldmark/nerf/space.h>
 
 #include <algorithm>
 #include <cmath>
@@ -27,10 +28,14 @@ OccupancyGrid random_grid(Index resolution, double filled, unsigned seed) {
 std::vector<float> walk(const OccupancyGrid& grid, const Line& line, float step, float jitter,
                         Index max = 1000) {
   RayWalk ray(line.o, line.d, step, jitter);
-  std::vector<float> all, t(static_cast<std::size_t>(max));
+  std::vector<float> all, t(static_cast<std::size_t>(max)), x(static_cast<std::size_t>(3 * max));
   for (Index count = max; count == max;) {
-    count = ray.next(grid, max, t.data());
+    count = ray.next(grid, max, t.data(), x.data());
     all.insert(all.end(), t.begin(), t.begin() + count);
+    for (Index i = 0; i < 3 * count; ++i) {
+      const auto a = static_cast<std::size_t>(i % 3), k = static_cast<std::size_t>(i);
+      if (x[k] != line.o[a] + t[k / 3] * line.d[a]) FAIL("position " << i << " is not on the ray");
+    }
   }
   return all;
 }
@@ -159,4 +164,82 @@ TEST_CASE("marching: pieces of any length are the whole walk") {
 
 TEST_CASE("marching: nothing is sampled in an empty grid") {
   CHECK(walk(random_grid(16, 0, 1), {{-1, 0.4f, 0.6f}, {1, 0, 0}}, 1e-3f, 0.5f).empty());
+}
+
+namespace {
+// What a contracted walk is to give, step by step in double: t and, at a distance of 1e-4 or more from a
+// cell's face, whether the cell is occupied.
+struct Contracted {
+  std::vector<double> t;
+  std::vector<int> occupied;  // -1: too near to a face to say
+};
+Contracted contracted_by_steps(const OccupancyGrid& grid, const Line& line, double step, double jitter,
+                               double near) {
+  Contracted all;
+  const auto cells = static_cast<double>(grid.resolution());
+  const auto scale = [&](double t) {
+    double s = 1;
+    for (int a = 0; a < 3; ++a)
+      s = std::max(s,
+                   4 * std::abs(static_cast<double>(line.o[a]) + t * static_cast<double>(line.d[a]) - 0.5));
+    return s;
+  };
+  const Space space{.kind = SpaceKind::contracted, .bounds = {.corner = {0.25, 0.25, 0.25}, .side = 0.5}};
+  for (double t = near + jitter * step * scale(near); scale(t) < static_cast<double>(RayWalk::kFarthest);
+       t += step * scale(t)) {
+    Vec3 p;
+    for (std::size_t a = 0; a < 3; ++a)
+      p[a] = static_cast<double>(line.o[a]) + t * static_cast<double>(line.d[a]);
+    Index cell[3];
+    bool doubtful = false;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double c = cells * space.to_cube(p)[a];
+      cell[a] = static_cast<Index>(c);
+      doubtful |= std::abs(c - std::round(c)) < 1e-3;
+    }
+    all.t.push_back(t);
+    all.occupied.push_back(doubtful ? -1 : grid.occupied(grid.cell(cell[0], cell[1], cell[2])));
+  }
+  return all;
+}
+}  // namespace
+
+TEST_CASE("marching: a contracted walk finds the occupied samples of single steps, each t within 2e-5") {
+  const auto u = uniform({60, 6}, -1, 1, 5);
+  for (const double filled : {0.001, 0.1, 1.}) {
+    const OccupancyGrid grid = random_grid(32, filled, 2);
+    for (Index i = 0; i < 60; ++i) {
+      const Line line = towards(u, i);
+      const Contracted want = contracted_by_steps(grid, line, 0.01, 0.3, 0.05);
+      RayWalk ray = RayWalk::contracted(line.o, line.d, 0.01f, 0.3f, 0.05f);
+      float t[7], x[21];
+      std::size_t k = 0;
+      for (Index count = 7; count == 7;) {
+        count = ray.next(grid, 7, t, x);
+        for (Index s = 0; s < count; ++s, ++k) {
+          const auto same = [&] { return std::abs(static_cast<double>(t[s]) / want.t[k] - 1) < 2e-5; };
+          for (; k < want.t.size() && !same(); ++k) REQUIRE(want.occupied[k] != 1);
+          REQUIRE(k < want.t.size());
+          REQUIRE(want.occupied[k] != 0);
+          float p[3], c[3];
+          for (int a = 0; a < 3; ++a) p[a] = line.o[a] + t[s] * line.d[a];
+          contract(p, c);
+          CHECK(std::equal(c, c + 3, x + 3 * s));
+        }
+      }
+      for (; k < want.t.size(); ++k) CHECK(want.occupied[k] != 1);
+    }
+  }
+}
+
+TEST_CASE("marching: contracted walks without a direction or with NaN end") {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const OccupancyGrid grid(8);
+  std::vector<float> t(1 << 17), x(3 << 17);
+  for (const Line& line :
+       {Line{{0.5f, 0.5f, 0.5f}, {0, 0, 0}}, {{nan, 0.5f, 0.5f}, {1, 0, 0}}, {{2, 2, 2}, {nan, 0, 0}}}) {
+    RayWalk ray = RayWalk::contracted(line.o, line.d, 0.01f, 0.5f, 0.1f);
+    CHECK(ray.next(grid, 1 << 17, t.data(), x.data()) <= 1 << 16);
+    for (const float v : x) REQUIRE((v >= 0 && v <= 1));
+  }
 }

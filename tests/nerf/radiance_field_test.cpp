@@ -27,7 +27,7 @@ RadianceField field_with_holes() {
   std::vector<std::uint8_t> bits(static_cast<std::size_t>(f.grid.cells()));
   for (std::size_t c = 0; c < bits.size(); ++c) bits[c] = c * c % 5 == 1;
   f.grid.set_bits(bits);
-  f.bounds = {.corner = {-0.1, 0.3, 1e-17}, .side = 1.0 / 3};
+  f.space.bounds = {.corner = {-0.1, 0.3, 1e-17}, .side = 1.0 / 3};
   f.background = Background::black;
   return f;
 }
@@ -40,8 +40,8 @@ TEST_CASE("radiance_field: a file reads back to the same field, and writes to th
   const RadianceField g = RadianceField::load(folder / "a");
   CHECK(std::equal(f.params.values().begin(), f.params.values().end(), g.params.values().begin()));
   CHECK(std::equal(f.grid.bits().begin(), f.grid.bits().end(), g.grid.bits().begin()));
-  CHECK(g.bounds.corner == f.bounds.corner);
-  CHECK(g.bounds.side == f.bounds.side);
+  CHECK(g.space.bounds.corner == f.space.bounds.corner);
+  CHECK(g.space.bounds.side == f.space.bounds.side);
   CHECK(g.background == Background::black);
   CHECK(g.cameras.directions == f.cameras.directions);
   CHECK(g.step() == f.step());
@@ -81,13 +81,37 @@ TEST_CASE("radiance_field: inside a larger file under a prefix") {
   CHECK(std::equal(f.params.values().begin(), f.params.values().end(), g.params.values().begin()));
 }
 
-TEST_CASE("radiance_field: world origins become cube coordinates") {
+TEST_CASE("radiance_field: every kind of space comes back from its configuration") {
   RadianceField f = small_field();
-  f.bounds = {.corner = {-1, 0, 2}, .side = 4};
-  const float origin[] = {1, 1, 1};
-  float cube[3];
-  f.to_cube(origin, cube);
-  CHECK((cube[0] == 0.5f && cube[1] == 0.25f && cube[2] == -0.25f));
+  for (const Space& space :
+       {Space{.bounds = {.corner = {-1, 0, 2}, .side = 4}},
+        Space{.kind = SpaceKind::contracted, .bounds = {.corner = {1, 2, 3}, .side = 0.1}, .near = 0.3},
+        Space{.kind = SpaceKind::ndc, .near = 1.1, .slope_x = 0.7, .slope_y = 1.0 / 3}}) {
+    f.space = space;
+    const Space got = RadianceField::from_configuration(f.configuration(), "here").space;
+    CHECK(got.kind == space.kind);
+    CHECK(got.bounds.corner == space.bounds.corner);
+    CHECK(got.bounds.side == space.bounds.side);
+    CHECK(got.near == space.near);
+    CHECK(got.slope_x == space.slope_x);
+    CHECK(got.slope_y == space.slope_y);
+  }
+}
+
+TEST_CASE("radiance_field: spaces without an extent are refused") {
+  RadianceField f = small_field();
+  const auto refused = [&](const char* what) {
+    CHECK_THROWS_WITH(RadianceField::from_configuration(f.configuration(), "here"),
+                      Contains("here") && Contains(what));
+  };
+  f.space = {.bounds = {.side = 0}};
+  refused("side must be positive");
+  f.space = {.kind = SpaceKind::contracted, .near = -1};
+  refused("near must be positive");
+  f.space = {.kind = SpaceKind::ndc, .near = 0};
+  refused("near must be positive");
+  f.space = {.kind = SpaceKind::ndc, .near = 1, .slope_x = -1};
+  refused("slopes must be positive");
 }
 
 TEST_CASE("radiance_field: files that are no FIELD say what they are") {

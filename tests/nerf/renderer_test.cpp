@@ -29,7 +29,7 @@ struct Reference {
   std::array<double, 4> trace(const Ray& ray) const {
     double o[3], near = 0, far = 1e9;
     for (std::size_t a = 0; a < 3; ++a) {
-      o[a] = (ray.origin[a] - f.bounds.corner[a]) / f.bounds.side;
+      o[a] = (ray.origin[a] - f.space.bounds.corner[a]) / f.space.bounds.side;
       const double t0 = -o[a] / ray.direction[a], t1 = (1 - o[a]) / ray.direction[a];
       near = std::max(near, std::min(t0, t1));
       far = std::min(far, std::max(t0, t1));
@@ -122,10 +122,11 @@ TEST_CASE("renderer: trace gives what render shows") {
   Renderer renderer(f);
   const Rendering view = renderer.render(camera);
   const std::vector<float> pixels{0, 0, 1, 0, 2, 0, 0, 1, 1, 1, 2, 1};
-  std::vector<float> origins(18), directions(18), out(24);
-  camera_rays(camera, pixels, origins.data(), directions.data());
-  for (std::size_t i = 0; i < 18; i += 3) f.to_cube(&origins[i], &origins[i]);
-  renderer.trace({origins, directions}, 5, out.data());
+  std::vector<float> out(24);
+  CubeRays rays;
+  rays.resize(6);
+  rays.set(f.space, 0, camera, pixels);
+  renderer.trace(rays.batch(f.space), 5, out.data());
   for (std::size_t i = 0; i < 6; ++i) {
     CHECK(out[4 * i + 3] == view.opacity.data[i]);
     CHECK(out[4 * i] + (1 - out[4 * i + 3]) == view.rgb.data[3 * i]);
@@ -168,16 +169,17 @@ TEST_CASE("renderer: the position of a ray is the mean of its samples by weight"
   const Camera camera = test_camera(4, 1);
   Renderer renderer(f, {.stop = 0, .least_weight = 0});
   const std::vector<float> pixels{0, 0, 1, 0, 2, 0, 3, 0};
-  std::vector<float> origins(15), directions(15), out(20), position(15, 7.f);
-  camera_rays(camera, pixels, origins.data(), directions.data());
-  for (std::size_t i = 0; i < 12; i += 3) f.to_cube(&origins[i], &origins[i]);
-  origins[12] = 9, directions[12] = 1;  // sees nothing
-  renderer.trace({origins, directions}, 0, out.data(), position.data());
+  std::vector<float> out(20), position(15, 7.f);
+  CubeRays rays;
+  rays.resize(5);
+  rays.set(f.space, 0, camera, pixels);
+  rays.origins[12] = 9, rays.directions[12] = 1;  // sees nothing
+  renderer.trace(rays.batch(f.space), 0, out.data(), position.data());
 
   // Colours that are positions: composited, they are the mean position times opacity.
   renderer.set_recolour(
       [](const float* x, const float*, Index n, float* rgb) { std::copy_n(x, 3 * n, rgb); });
-  renderer.trace({origins, directions}, 0, out.data());
+  renderer.trace(rays.batch(f.space), 0, out.data());
   for (std::size_t r = 0; r < 4; ++r)
     for (std::size_t a = 0; a < 3; ++a) {
       const float mean = position[3 * r + a];

@@ -13,7 +13,7 @@ using namespace fieldmark::nerf;
 namespace {
 struct Rays {
   std::vector<float> origins, directions;
-  RayBatch batch() const { return {origins, directions}; }
+  RayBatch batch() const { return {origins, directions, directions}; }
 };
 
 // Rays at the cube from all around; every seventh misses it.
@@ -45,8 +45,8 @@ RaySamples sample(const RadianceField& f, const Rays& rays, const SamplingOption
 std::vector<float> walked(const RadianceField& f, const Rays& rays, Index r, float step, float jitter) {
   RayWalk walk(&rays.origins[static_cast<std::size_t>(3 * r)],
                &rays.directions[static_cast<std::size_t>(3 * r)], step, jitter);
-  std::vector<float> t(10000);
-  t.resize(static_cast<std::size_t>(walk.next(f.grid, 10000, t.data())));
+  std::vector<float> t(10000), x(30000);
+  t.resize(static_cast<std::size_t>(walk.next(f.grid, 10000, t.data(), x.data())));
   return t;
 }
 

@@ -69,7 +69,7 @@ TEST_CASE("trainer: sets bounds, background and cameras of the field from the da
   // Many cameras, for a hull well inside the first cube on all sides.
   const Dataset sphere = make_scene({.kind = SceneKind::sphere, .size = 48, .views = 40});
   const Trainer trainer(field, sphere, train_options(10));
-  CHECK(field.bounds.side < 2.9);
+  CHECK(field.space.bounds.side < 2.9);
   CHECK(field.background == Background::white);
   CHECK(field.cameras.directions.size() == 40);
   CHECK(field.grid.occupied_cells() < field.grid.cells());
@@ -81,7 +81,7 @@ TEST_CASE("trainer: opaque photographs leave bounds and cells alone") {
     for (Index i = 3; i < v.rgba.size(); i += 4) v.rgba[i] = 1;
   RadianceField field(trainable_field_options());
   Trainer trainer(field, opaque, train_options(2));
-  CHECK(field.bounds.side == 3);
+  CHECK(field.space.bounds.side == 3);
   CHECK(field.grid.occupied_cells() == field.grid.cells());
   trainer.step(0);
   CHECK(std::isfinite(trainer.train_psnr()));

@@ -73,7 +73,7 @@ TEST_CASE("view_cache: a sample lies on its pixel's ray, inside the cube") {
       const double x = static_cast<double>(view.position[3 * k + a]);
       CHECK(x >= 0);
       CHECK(x <= 1);
-      to[a] = x - (ray.origin[a] - field.bounds.corner[a]) / field.bounds.side;
+      to[a] = x - (ray.origin[a] - field.space.bounds.corner[a]) / field.space.bounds.side;
       along += to[a] * ray.direction[a];
     }
     CHECK(along > 0);

@@ -25,7 +25,8 @@ Index colour_begin(const ParamStore<float>& params) {
 // The samples of a chunk that light reaches, what they look like unmarked, and what they pass back to the
 // table.
 struct Baker::Chunk {
-  std::vector<float> origins, directions, jitter;
+  nerf::CubeRays rays;
+  std::vector<float> jitter;
   std::vector<float> position, direction, weight, geometry_features, base_features, harmonics, target,
       features, dfeatures, unused;
   Index samples = 0;
@@ -56,8 +57,8 @@ Baker::~Baker() = default;
 
 void Baker::choose_rays(Index chunk, Chunk& c) const {
   const auto step = static_cast<std::uint64_t>(steps_);
-  for (auto [buffer, columns] : {std::pair{&c.origins, 3}, {&c.directions, 3}, {&c.jitter, 1}})
-    buffer->resize(at(kRays * columns));
+  c.rays.resize(kRays);
+  c.jitter.resize(at(kRays));
   for (Index i = 0; i < kRays; ++i) {
     const auto u = rng_.uniform4(step, static_cast<std::uint64_t>(chunk * kRays + i));
     const auto pick = [](float x, Index n) {
@@ -66,8 +67,7 @@ void Baker::choose_rays(Index chunk, Chunk& c) const {
     const nerf::Camera& camera = cameras_[at(pick(u[0], static_cast<Index>(cameras_.size())))];
     const float pixel[2] = {u[1] * static_cast<float>(camera.width) - 0.5f,
                             u[2] * static_cast<float>(camera.height) - 0.5f};
-    nerf::camera_rays(camera, pixel, &c.origins[at(3 * i)], &c.directions[at(3 * i)]);
-    field_.to_cube(&c.origins[at(3 * i)], &c.origins[at(3 * i)]);
+    c.rays.set(field_.space, i, camera, pixel);
     c.jitter[at(i)] = u[3];
   }
 }
@@ -77,7 +77,7 @@ void Baker::select(const nerf::RaySamples& s, Chunk& c) const {
   std::vector<float> weights(at(s.size()));
   nerf::sample_weights(s, field_.step(), weights.data());
   Tape<float> tape;
-  const Var<float> of_ray = nerf::spherical_harmonics(tape.constant(c.directions.data(), {kRays, 3}));
+  const Var<float> of_ray = nerf::spherical_harmonics(tape.constant(c.rays.seen_from.data(), {kRays, 3}));
   for (auto* v : {&c.position, &c.direction, &c.weight, &c.geometry_features, &c.base_features, &c.harmonics})
     v->clear();
   const auto append = [](std::vector<float>& to, const float* from, Index n) {
@@ -87,7 +87,7 @@ void Baker::select(const nerf::RaySamples& s, Chunk& c) const {
     for (Index i = s.ray_begin[at(r)]; i < s.ray_begin[at(r + 1)]; ++i) {
       if (weights[at(i)] < kLeastWeight) continue;
       append(c.position, &s.position[at(3 * i)], 3);
-      append(c.direction, &c.directions[at(3 * r)], 3);
+      append(c.direction, &c.rays.seen_from[at(3 * r)], 3);
       append(c.weight, &weights[at(i)], 1);
       append(c.geometry_features, &s.density_features[at(i * width)], width);
       append(c.base_features, &s.colour_features[at(i * width)], width);
@@ -101,7 +101,8 @@ double Baker::run_chunk(Index index, Index shard, Tape<float>& tape, float* grad
   choose_rays(index, c);
   nerf::RaySamples& s = samples_[at(shard)];
   samplers_[at(shard)].sample(owner_.field.field, owner_.field.params, owner_.field.grid,
-                              {c.origins, c.directions}, c.jitter, {.step = field_.step(), .stop = 1e-3f}, s);
+                              c.rays.batch(field_.space), c.jitter, {.step = field_.step(), .stop = 1e-3f},
+                              s);
   select(s, c);
   const Index n = c.samples, width = field_.field.encoding().width();
   c.features.resize(at(n * width));

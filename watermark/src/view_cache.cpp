@@ -15,16 +15,17 @@ void trace_rows(nerf::Renderer& renderer, const nerf::RadianceField& field, cons
                 std::vector<float>& rgba, std::vector<float>& position, std::vector<float>& direction) {
   const Index w = camera.width;
   parallel_for(nerf::Renderer::kLanes, 1, [&](Index lane, Index) {
-    std::vector<float> pixels(at(2 * w)), origins(at(3 * w));
+    std::vector<float> pixels(at(2 * w));
+    nerf::CubeRays rays;
+    rays.resize(w);
     for (Index y = lane; y < camera.height; y += nerf::Renderer::kLanes) {
       for (Index x = 0; x < w; ++x) {
         pixels[at(2 * x)] = static_cast<float>(x);
         pixels[at(2 * x + 1)] = static_cast<float>(y);
       }
-      const std::span<float> directions(&direction[at(3 * y * w)], at(3 * w));
-      nerf::camera_rays(camera, pixels, origins.data(), directions.data());
-      for (Index x = 0; x < w; ++x) field.to_cube(&origins[at(3 * x)], &origins[at(3 * x)]);
-      renderer.trace({origins, directions}, lane, &rgba[at(4 * y * w)], &position[at(3 * y * w)]);
+      rays.set(field.space, 0, camera, pixels);
+      std::copy(rays.seen_from.begin(), rays.seen_from.end(), direction.begin() + 3 * y * w);
+      renderer.trace(rays.batch(field.space), lane, &rgba[at(4 * y * w)], &position[at(3 * y * w)]);
     }
   });
 }

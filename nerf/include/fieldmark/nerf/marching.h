@@ -13,21 +13,33 @@ struct CubeSpan {
 /// @param o, d  origin and direction; near and far count in lengths of d
 CubeSpan intersect_unit_cube(const float o[3], const float d[3]);
 
-/// A walk along one ray, resumable: the samples are at t_k = near + (k + jitter) step, k = 0, 1, ..., those
-/// in empty cells left out. @param o, d  origin and unit direction in cube coordinates   @param jitter  in
-/// [0, 1)
+/// A walk along one ray, resumable, that leaves out the samples in empty cells.
+///
+/// Straight: samples at t_k = near + (k + jitter) step, k = 0, 1, ..., where the ray is in the cube.
+/// Contracted (see Space): t_0 = near + jitter step s(near), t_{k+1} = t_k + step s(t_k), where s is the
+/// largest coordinate in half sides of the inner cube, at least 1, until s reaches kFarthest. A field's
+/// densities then count per t / s, which depends on the place and not on the ray, and samples are as far
+/// apart in the cube as matters.
 class RayWalk {
  public:
-  /// @param step  distance of samples, cube sides, > 0
+  static constexpr float kFarthest = 128;  ///< inner half sides from the centre: the cube's last 1/256
+  /// @param o, d    origin and unit direction, as RayBatch has them
+  /// @param step    distance of samples, cube sides, > 0   @param jitter  in [0, 1)
   RayWalk(const float o[3], const float d[3], float step, float jitter);
-  /// Writes the next samples, at most `max`. @return their number; fewer than `max` only at the end of the
-  /// ray
-  Index next(const OccupancyGrid& grid, Index max, float* t);
+  /// A walk in a contracted space. @param near  where it begins, cube sides
+  static RayWalk contracted(const float o[3], const float d[3], float step, float jitter, float near);
+  /// Writes the next samples, at most `max`: t and their positions x [max, 3] in the unit cube.
+  /// @return their number; fewer than `max` only at the end of the ray
+  Index next(const OccupancyGrid& grid, Index max, float* t, float* x);
 
  private:
+  Index next_straight(const OccupancyGrid& grid, Index max, float* t);
+  Index next_contracted(const OccupancyGrid& grid, Index max, float* t, float* x);
+  float scale_at(float t) const;
   float o_[3], d_[3], steps_[3];
   float near_, far_, step_, jitter_;
   Index k_ = 0;
+  bool contracted_ = false;
 };
 
 }  // namespace fieldmark::nerf

@@ -4,7 +4,7 @@
 #include <fieldmark/nerf/dataset.h>
 #include <fieldmark/nerf/field.h>
 #include <fieldmark/nerf/occupancy_grid.h>
-#include <fieldmark/nerf/visual_hull.h>
+#include <fieldmark/nerf/space.h>
 
 #include <filesystem>
 
@@ -27,8 +27,6 @@ class RadianceField {
 
   /// Spacing of samples, cube sides.
   float step() const { return options_.step * 1.7320508f; }
-  /// World ray to cube coordinates: the origin moves, the unit direction stays, lengths count in cube sides.
-  void to_cube(const float* origin, float* cube_origin) const;
 
   /// Writes a FIELD. Tensors: "density/*", "colour/*", "hash/density_features" and "hash/colour_features"
   /// [rows, F] and "density/occupancy" (one bit a cell). @throws IoError
@@ -52,7 +50,7 @@ class RadianceField {
   ParamStore<float> params;                   ///< all numbers of the networks and the table
   Field<float> field;                         ///< how they are read
   OccupancyGrid grid;                         ///< which cells of the cube are not empty
-  Bounds bounds;                              ///< where the cube lies in the world
+  Space space;                                ///< how the world is laid into the cube
   CameraSpan cameras;                         ///< where the training cameras stood
   Background background = Background::white;  ///< what its pictures are composited over
 

@@ -2,16 +2,9 @@
 #include <fieldmark/engine/packed_weights.h>
 #include <fieldmark/nerf/field.h>
 #include <fieldmark/nerf/marching.h>
+#include <fieldmark/nerf/space.h>
 
 namespace fieldmark::nerf {
-
-/// Rays in cube coordinates. @param origins, directions [R, 3], directions of unit length
-struct RayBatch {
-  std::span<const float> origins;     ///< must outlive the batch
-  std::span<const float> directions;  ///< must outlive the batch
-  /// R, the number of rays.
-  Index size() const { return static_cast<Index>(origins.size()) / 3; }
-};
 
 /// How rays are marched.
 struct SamplingOptions {
@@ -24,7 +17,7 @@ struct SamplingOptions {
 struct RaySamples {
   std::vector<Index> ray_begin;         ///< R + 1 offsets
   std::vector<float> position;          ///< [S, 3] cube coordinates
-  std::vector<float> t;                 ///< [S] distance along the ray, cube sides
+  std::vector<float> t;                 ///< [S] distance along the ray, cube sides, see RayWalk
   std::vector<float> density_features;  ///< [S, F L]
   std::vector<float> colour_features;   ///< [S, F L]
   std::vector<float> sigma;             ///< [S] 1 / cube side
@@ -50,7 +43,7 @@ class RaySampler {
   struct Segment {
     Index ray, row, count;
   };
-  void march_wave(const OccupancyGrid& grid, const RayBatch& rays);
+  void march_wave(const OccupancyGrid& grid);
   void evaluate(const Field<float>& field, const ParamStore<float>& params,
                 const PackedWeights<float>* packed, Index first);
   void stop_rays(const SamplingOptions& options, std::size_t first_segment);

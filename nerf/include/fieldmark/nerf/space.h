@@ -1,0 +1,81 @@
+#pragma once
+#include <fieldmark/nerf/camera.h>
+#include <fieldmark/nerf/visual_hull.h>
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace fieldmark::nerf {
+
+/// How the world is laid into the unit cube in which a field lives.
+enum class SpaceKind {
+  cube,       ///< a cube of the world, moved and scaled; nothing lies outside
+  ndc,        ///< what cameras that look along -z see from a plane to infinity
+  contracted  ///< all of the world: a cube as it is, in the middle, and around it what lies outside
+};
+/// "cube", "ndc" or "contracted".
+std::string name_of(SpaceKind kind);
+/// @throws ValueError if name is none of them
+SpaceKind parse_space_kind(std::string_view name);
+
+/// The map from the world to the unit cube.
+///
+/// cube:        x = (p - corner) / side.
+/// ndc:         x = (1/2 - a p_x / p_z, 1/2 - b p_y / p_z, 1 + near / p_z) for p_z <= -near: normalised
+/// device
+///              coordinates (Mildenhall et al. 2020, appendix C), scaled to the unit cube. Lines stay lines.
+/// contracted:  with y = 2 (p - corner) / side - 1 and s = max |y_i|,  x = 1/2 + y / 4 if s <= 1, else
+///              1/2 + (2 - 1/s) y / (4 s). Source: Barron et al. 2022 (mip-NeRF 360), eq. 10, with the
+///              largest coordinate in place of the length, so that the image fills the cube (Tancik et al.
+///              2023, Nerfstudio).
+struct Space {
+  SpaceKind kind = SpaceKind::cube;
+  /// cube: what is mapped to the unit cube. contracted: what is mapped to [1/4, 3/4]^3. ndc: without meaning.
+  Bounds bounds{};
+  double near = 0;  ///< ndc: distance of the plane, length, > 0. contracted: where rays begin, length, >= 0
+  double slope_x = 1;  ///< ndc: a, half the cotangent of half the angle that the cube holds across, > 0
+  double slope_y = 1;  ///< ndc: b, the same upwards, > 0
+
+  /// The image of a point; outside the unit cube, or not finite, where the space does not hold it.
+  Vec3 to_cube(const Vec3& p) const;
+  /// The point with the image x. @param x  in the open unit cube
+  Vec3 to_world(const Vec3& x) const;
+};
+
+/// Rays as a field's samplers take them. cube and ndc: origin + t direction is in the unit cube. contracted:
+/// it is in the linear coordinates 1/2 + y / 4, whose part outside [1/4, 3/4]^3 contract() brings in.
+struct RayBatch {
+  std::span<const float> origins;     ///< [R, 3]; must outlive the batch
+  std::span<const float> directions;  ///< [R, 3] unit; must outlive the batch
+  std::span<const float> seen_from;   ///< [R, 3] unit directions in the world; must outlive the batch
+  bool contracted = false;            ///< see above
+  float near = 0;                     ///< where contracted rays begin, cube sides
+  /// R, the number of rays.
+  Index size() const { return static_cast<Index>(origins.size()) / 3; }
+};
+
+/// Storage for the rays of some pixels of cameras.
+struct CubeRays {
+  std::vector<float> origins;     ///< [R, 3], see RayBatch
+  std::vector<float> directions;  ///< [R, 3] unit
+  std::vector<float> seen_from;   ///< [R, 3] unit, in the world
+  /// Makes room for n rays.
+  void resize(Index n);
+  /// The rays from `first` on through pixels of a camera. @param pixels  [n, 2] x and y in pixels, see
+  /// pixel_ray()
+  void set(const Space& space, Index first, const Camera& camera, std::span<const float> pixels);
+  /// All of them; valid until the next resize().
+  RayBatch batch(const Space& space) const;
+};
+
+/// The contraction on linear cube coordinates, see Space. @param p, x  [3], may be the same
+void contract(const float* p, float* x);
+
+/// Which cells of a grid over the cube at least one camera has in its picture, in front of it: the others are
+/// never trained. Judged at the cell's centre and its corners.
+/// @param resolution  cells per axis, >= 1   @return one entry a cell, x fastest, 1 where it is seen
+std::vector<std::uint8_t> seen_cells(std::span<const Camera> cameras, const Space& space, Index resolution);
+
+}  // namespace fieldmark::nerf
