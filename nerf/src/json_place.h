@@ -48,6 +48,7 @@ class JsonPlace {
     if (!value_->is_string()) fail("text", kind());
     return value_->get<std::string>();
   }
+  bool is_false() const { return value_->is_boolean() && !value_->get<bool>(); }
   Vec3 vec3() const {
     if (array_size() != 3) fail("3 numbers", std::to_string(array_size()));
     return {at(0).number(), at(1).number(), at(2).number()};

@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "json_place.h"
-#include "vec3.h"
+#include "rotation.h"
 
 namespace fieldmark::nerf {
 namespace {
@@ -16,14 +16,42 @@ std::string short_number(double x) {
   return text;
 }
 
-// Largest entry of |R^T R - I|, and the determinant against 1.
-double rotation_error(const Pose& p) {
-  const Vec3 x{p[0], p[4], p[8]}, y{p[1], p[5], p[9]}, z{p[2], p[6], p[10]};
-  double worst = std::abs(dot(cross(x, y), z) - 1);
-  for (const auto& [a, b, want] :
-       {std::tuple{x, x, 1.0}, {y, y, 1.0}, {z, z, 1.0}, {x, y, 0.0}, {x, z, 0.0}, {y, z, 0.0}})
-    worst = std::max(worst, std::abs(dot(a, b) - want));
-  return worst;
+constexpr double kMost = 1e9;
+
+double angle(const JsonPlace& value) { return value.number_in(0, std::numbers::pi, "(0, pi) radians"); }
+Index side(const JsonPlace& value) { return std::lround(value.number_in(0.5, 65536.5, "1 to 65536")); }
+
+void refuse_other_lenses(const JsonPlace& from) {
+  for (const char* key : {"k3", "k4"})
+    if (from.has(key) && from[key].number() != 0)
+      from[key].fail("0 (of radial distortion, k1 and k2 only are known here)",
+                     short_number(from[key].number()));
+  if (from.has("is_fisheye") && !from["is_fisheye"].is_false())
+    from["is_fisheye"].fail("false (fisheye lenses are not known here)", "something else");
+  if (!from.has("camera_model")) return;
+  const std::string model = from["camera_model"].text();
+  for (const char* known : {"OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL"})
+    if (model == known) return;
+  from["camera_model"].fail("OPENCV, PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL or RADIAL", "\"" + model + "\"");
+}
+
+// What stands at one place replaces what is there.
+void parse_intrinsics(const JsonPlace& from, Intrinsics& to) {
+  refuse_other_lenses(from);
+  // An angle and a length are two words for one thing: the one that stands here goes before one from above.
+  if (from.has("camera_angle_x")) to.angle_x = angle(from["camera_angle_x"]), to.fl_x = 0;
+  if (from.has("camera_angle_y")) to.angle_y = angle(from["camera_angle_y"]), to.fl_y = 0;
+  if (from.has("fl_x")) to.fl_x = from["fl_x"].number_in(1e-3, kMost, "(0.001, 1e9) pixels");
+  if (from.has("fl_y")) to.fl_y = from["fl_y"].number_in(1e-3, kMost, "(0.001, 1e9) pixels");
+  if (from.has("cx")) to.cx = from["cx"].number_in(-kMost, kMost, "(-1e9, 1e9)");
+  if (from.has("cy")) to.cy = from["cy"].number_in(-kMost, kMost, "(-1e9, 1e9)");
+  if (from.has("w")) to.width = side(from["w"]);
+  if (from.has("h")) to.height = side(from["h"]);
+  const auto coefficient = [&](const char* key, double& k) {
+    if (from.has(key)) k = from[key].number_in(-kMost, kMost, "(-1e9, 1e9)");
+  };
+  coefficient("k1", to.lens.k1), coefficient("k2", to.lens.k2);
+  coefficient("p1", to.lens.p1), coefficient("p2", to.lens.p2);
 }
 
 Pose parse_pose(const JsonPlace& matrix) {
@@ -36,14 +64,26 @@ Pose parse_pose(const JsonPlace& matrix) {
   }
   Pose pose{};
   std::copy_n(m, 12, pose.begin());
-  const double error = rotation_error(pose);
-  if (!(error <= 1e-3))
-    matrix.fail("a rotation in the upper left 3x3",
-                "columns that are off orthonormal by " + short_number(error));
+  pose = checked_rotation(
+      pose, [&](const std::string& found) { matrix.fail("a rotation in the upper left 3x3", found); });
   for (std::size_t c = 0; c < 4; ++c)
     if (std::abs(m[12 + c] - (c == 3 ? 1 : 0)) > 1e-6)
       matrix.at(3).fail("the row 0 0 0 1", short_number(m[12 + c]) + " in column " + std::to_string(c));
   return pose;
+}
+
+Transforms::Frame parse_frame(const JsonPlace& frame, const JsonPlace& root, const Intrinsics& all) {
+  const JsonPlace file = frame["file_path"];
+  Transforms::Frame made{.file_path = file.text(), .intrinsics = all};
+  if (made.file_path.empty()) file.fail("the name of a picture", "an empty text");
+  if (made.file_path.find('\0') != std::string::npos) file.fail("the name of a picture", "a text with a NUL");
+  parse_intrinsics(frame, made.intrinsics);
+  if (made.intrinsics.fl_x == 0 && made.intrinsics.angle_x == 0)
+    root.fail("the key \"camera_angle_x\" or \"fl_x\"", "neither, nor in " + frame.place());
+  if ((made.intrinsics.width == 0) != (made.intrinsics.height == 0))
+    root.fail("the keys \"w\" and \"h\" or neither of them", "one");
+  made.pose = parse_pose(frame["transform_matrix"]);
+  return made;
 }
 }  // namespace
 
@@ -51,19 +91,15 @@ Transforms parse_transforms(std::string_view text, std::string_view path) {
   const Json json = parse_json(text, path);
   const JsonPlace root(json, std::string(path));
   Transforms t;
-  t.camera_angle_x = root["camera_angle_x"].number_in(0, std::numbers::pi, "(0, pi) radians");
+  Intrinsics all;
+  if (json.is_object()) parse_intrinsics(root, all);
+  t.camera_angle_x = all.angle_x;
+  if (root.has("aabb_scale")) t.aabb_scale = root["aabb_scale"].number_in(0, kMost, "(0, 1e9)");
   const JsonPlace frames = root["frames"];
   const std::size_t count = frames.array_size();
   if (count == 0) frames.fail("at least one view", "none");
   t.frames.resize(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const JsonPlace file = frames.at(i)["file_path"];
-    t.frames[i].file_path = file.text();
-    if (t.frames[i].file_path.empty()) file.fail("the name of a picture", "an empty text");
-    if (t.frames[i].file_path.find('\0') != std::string::npos)
-      file.fail("the name of a picture", "a text with a NUL");
-    t.frames[i].pose = parse_pose(frames.at(i)["transform_matrix"]);
-  }
+  for (std::size_t i = 0; i < count; ++i) t.frames[i] = parse_frame(frames.at(i), root, all);
   return t;
 }
 

@@ -54,7 +54,8 @@ TEST_CASE("transforms: what is written reads back to the same numbers") {
 
 TEST_CASE("transforms: errors of content name place, expectation and find") {
   expect_error("[]", "expected an object, got array");
-  expect_error(with("\"camera_angle_x\"", "\"angle\""), "expected the key \"camera_angle_x\", got none");
+  expect_error(with("\"camera_angle_x\"", "\"angle\""),
+               "expected the key \"camera_angle_x\" or \"fl_x\", got neither, nor in frames[0]");
   expect_error(with("0.7", "\"wide\""), "camera_angle_x: expected a number, got string");
   for (const char* bad : {"0", "-1", "3.2"})
     expect_error(with("0.7", bad), "camera_angle_x: expected a number in (0, pi) radians, got ");

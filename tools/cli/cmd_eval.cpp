@@ -8,6 +8,7 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/scene_data.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -20,8 +21,8 @@ struct Options {
 
 int run(const Options& options, Context& context) {
   const auto field = nerf::RadianceField::load(options.field);
-  const auto data = nerf::load_dataset(
-      options.data, {.split = options.split, .size = options.size, .background = field.background});
+  const auto data = load_scene(
+      options.data, {.split = options.split, .size = options.size, .background = field.background}, context);
   nerf::Renderer renderer(field);
   const InterruptGuard guard;
   nerf::Evaluation evaluation;
@@ -66,7 +67,7 @@ int run(const Options& options, Context& context) {
 Command add_eval(CLI::App& app) {
   auto o = std::make_shared<Options>();
   app.add_option("--field", o->field, "Trained or baked field")->required()->type_name("FIELD");
-  app.add_option("--data", o->data, "Data set, Blender layout")->required()->type_name("DIR");
+  app.add_option("--data", o->data, "Data set, as of train")->required()->type_name("DIR");
   app.add_option("--split", o->split, "Views to compare with: train, val, test")
       ->check(CLI::IsMember({"train", "val", "test"}).description(""))
       ->type_name("SPLIT");

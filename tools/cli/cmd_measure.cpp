@@ -9,6 +9,7 @@
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/measured.h"
+#include "cli/scene_data.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -21,13 +22,13 @@ struct Options {
 };
 
 std::vector<nerf::Camera> cameras_of(const Options& options, const watermark::Owner& owner,
-                                     std::uint64_t seed) {
+                                     Context& context) {
   if (options.cameras != "test")
     return nerf::make_cameras(owner.field.cameras, nerf::parse_camera_set(options.cameras), options.count,
-                              options.size, seed);
+                              options.size, context.seed());
   if (options.data.empty()) throw UsageError("--cameras test: needs --data DIR, whose test views they are");
   std::vector<nerf::Camera> cameras;
-  for (const auto& view : nerf::load_dataset(options.data, {.split = "test"}).views)
+  for (const auto& view : load_scene(options.data, {.split = "test"}, context).views)
     cameras.push_back(view.camera.scaled(options.size));
   return cameras;
 }
@@ -35,8 +36,8 @@ std::vector<nerf::Camera> cameras_of(const Options& options, const watermark::Ow
 // Against the photographs, a figure apart from those against the unmarked field.
 nerf::Evaluation against_photographs(const Options& options, const nerf::RadianceField& field,
                                      const char* what, Context& context) {
-  const auto data = nerf::load_dataset(
-      options.data, {.split = "test", .size = options.size, .background = field.background});
+  const auto data = load_scene(
+      options.data, {.split = "test", .size = options.size, .background = field.background}, context);
   nerf::Renderer renderer(field);
   const InterruptGuard guard;
   Progress progress = context.progress(what);
@@ -58,7 +59,7 @@ int run(const Options& options, Context& context) {
     baked.emplace(nerf::RadianceField::load(options.field));
   }
   const auto measured = run_measure(owner, baked ? &*baked : nullptr, message ? &*message : nullptr,
-                                    {.cameras = cameras_of(options, owner, context.seed()),
+                                    {.cameras = cameras_of(options, owner, context),
                                      .under = options.under,
                                      .seed = context.seed(),
                                      .progress = {}},

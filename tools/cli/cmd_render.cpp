@@ -13,6 +13,7 @@
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/precision.h"
+#include "cli/scene_data.h"
 #include "cli/sheet.h"
 
 namespace fieldmark::cli {
@@ -31,16 +32,16 @@ struct NamedCamera {
 };
 
 std::vector<NamedCamera> cameras_of(const Options& options, const nerf::RadianceField& field,
-                                    std::uint64_t seed) {
+                                    Context& context) {
   std::vector<NamedCamera> cameras;
   if (!options.data.empty() || options.cameras == "test") {
     if (options.data.empty()) throw UsageError("--cameras test: needs --data DIR, whose views they are");
-    const auto data = nerf::load_dataset(options.data, {.split = options.split});
+    const auto data = load_scene(options.data, {.split = options.split}, context);
     for (const auto& view : data.views) cameras.push_back({view.name, view.camera.scaled(options.size)});
     return cameras;
   }
   for (const auto& camera : nerf::make_cameras(field.cameras, nerf::parse_camera_set(options.cameras),
-                                               options.count, options.size, seed)) {
+                                               options.count, options.size, context.seed())) {
     char name[32];
     std::snprintf(name, sizeof name, "view_%03zu", cameras.size());
     cameras.push_back({name, camera});
@@ -60,7 +61,7 @@ void write_sheet(const Options& options, nerf::Renderer& renderer, const std::ve
 
 int run(const Options& options, Context& context) {
   const auto field = nerf::RadianceField::load(options.field);
-  const auto cameras = cameras_of(options, field, context.seed());
+  const auto cameras = cameras_of(options, field, context);
   std::filesystem::create_directories(options.out);
   nerf::Renderer renderer(field, {.precision = precision_of(options.precision)});
   const InterruptGuard guard;

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <ostream>
 
 #include "cli/cli.h"
@@ -12,6 +13,7 @@
 #include "cli/context.h"
 #include "cli/long_run.h"
 #include "cli/precision.h"
+#include "cli/scene_data.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -20,14 +22,15 @@ constexpr double kHeaderBytes = 32e3;  // names and metadata, cameras included
 
 struct Options {
   std::string data, out;
-  std::string preset = "hash", background = "white", precision = "fp32";
+  std::string preset = "hash", background, precision = "fp32";
   Index size = 0;
   RunLength length;
   double target_psnr = 0, max_megabytes = 0;
   bool resume = false;
 };
 
-nerf::Background background_of(const std::string& name) {
+std::optional<nerf::Background> background_of(const std::string& name) {
+  if (name.empty()) return std::nullopt;
   return name == "white" ? nerf::Background::white : nerf::Background::black;
 }
 
@@ -68,9 +71,10 @@ double train(const Options& options, nerf::Trainer& trainer, const std::string& 
 
 // Of the data set's test views, after everything is saved; null where there are none.
 Json test_psnr(const Options& options, const nerf::RadianceField& field, Context& context) {
-  if (!std::filesystem::exists(std::filesystem::path(options.data) / "transforms_test.json")) return nullptr;
-  const auto data = nerf::load_dataset(
-      options.data, {.split = "test", .size = options.size, .background = background_of(options.background)});
+  if (!nerf::has_split(options.data, "test")) return nullptr;
+  const auto data = load_scene(
+      options.data, {.split = "test", .size = options.size, .background = background_of(options.background)},
+      context);
   nerf::Renderer renderer(field);
   const InterruptGuard guard;
   Progress progress = context.progress("test views");
@@ -85,9 +89,9 @@ Json test_psnr(const Options& options, const nerf::RadianceField& field, Context
 int run(const Options& options, Context& context) {
   const std::string checkpoint = options.out + ".checkpoint";
   check_writable(options.out);
-  const auto data = nerf::load_dataset(
-      options.data,
-      {.split = "train", .size = options.size, .background = background_of(options.background)});
+  const auto data = load_scene(
+      options.data, {.split = "train", .size = options.size, .background = background_of(options.background)},
+      context);
   nerf::RadianceField field(field_options(options, context.seed()));
   const nerf::TrainOptions train_options{
       .schedule = {.steps = options.length.steps, .seconds = options.length.seconds},
@@ -126,7 +130,11 @@ int run(const Options& options, Context& context) {
 
 Command add_train(CLI::App& app) {
   auto o = std::make_shared<Options>();
-  app.add_option("--data", o->data, "Data set, Blender layout")->required()->type_name("DIR");
+  app.add_option(
+         "--data", o->data,
+         "Data set: folder of transforms_*.json, transforms.json, poses_bounds.npy (LLFF) or a COLMAP model")
+      ->required()
+      ->type_name("DIR");
   app.add_option("--out", o->out, "File for the field; FIELD.checkpoint while it trains")
       ->required()
       ->type_name("FIELD");
@@ -144,9 +152,11 @@ Command add_train(CLI::App& app) {
       ->check(CLI::Range(1.0, 100.0).description(""))
       ->type_name("DB")
       ->default_str("");
-  app.add_option("--background", o->background, "Behind transparent photographs: white, black")
+  app.add_option("--background", o->background,
+                 "Behind transparent pictures: white, black (white for the Blender layout, else black)")
       ->check(CLI::IsMember({"white", "black"}).description(""))
-      ->type_name("COLOUR");
+      ->type_name("COLOUR")
+      ->default_str("");
   app.add_option("--max-megabytes", o->max_megabytes,
                  "Largest file for the field, MB, 0.1 to 100000 (no limit)")
       ->check(CLI::Range(0.1, 1e5).description(""))

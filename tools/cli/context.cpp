@@ -3,6 +3,7 @@
 #include <fieldmark/engine/files.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <ostream>
 
 #include "cli/report.h"
@@ -39,7 +40,15 @@ Context::Context(const CommonOptions& options, std::vector<std::string> command_
     if (!path.empty() && path != "-") check_writable(path);
 }
 
-void Context::result(const Json& json) {
+void Context::note(const std::string& text) {
+  if (std::find(notes_.begin(), notes_.end(), text) != notes_.end()) return;
+  text_ << "note: " << text << "\n";
+  notes_.push_back(text);
+}
+
+void Context::result(const Json& found) {
+  Json json = found;
+  if (!notes_.empty()) json["notes"] = notes_;
   if (options_.json == "-") {
     out_ << json.dump(2) << "\n";
   } else if (!options_.json.empty()) {

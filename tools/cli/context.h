@@ -46,6 +46,9 @@ class Context {
   std::uint64_t seed() const { return options_.seed; }
   /// For people: standard output, or standard error when the results take standard output.
   std::ostream& text() { return text_; }
+  /// What people should know of a run's input: printed at once, and in the results under "notes"; each text
+  /// once.
+  void note(const std::string& text);
   Progress progress(std::string what) { return Progress(err_, std::move(what)); }
   /// Since the command was called.
   double seconds() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
@@ -58,6 +61,7 @@ class Context {
   CommonOptions options_;
   std::vector<std::string> command_line_;
   std::ostream &out_, &err_, &text_;
+  std::vector<std::string> notes_;
 };
 
 }  // namespace fieldmark::cli

@@ -1,0 +1,22 @@
+#pragma once
+#include <fieldmark/engine/shape.h>
+
+#include <string_view>
+#include <vector>
+
+namespace fieldmark::nerf {
+
+/// An array of NumPy's .npy file.
+struct NpyArray {
+  std::vector<Index> shape;     ///< extents, outermost first; empty for a single number
+  std::vector<double> numbers;  ///< row-major
+};
+
+/// Reads an .npy file of format 1, 2 or 3 whose elements are little-endian floats of 4 or 8 bytes in C order.
+/// @param name  stands for the path in errors
+/// @throws IoError  naming the byte, what was expected and what was found: another format, element type
+///                  (`descr`) or order, a header that is not the three keys, an extent below 0, more or fewer
+///                  bytes than the shape says
+NpyArray parse_npy(std::string_view bytes, std::string_view name);
+
+}  // namespace fieldmark::nerf

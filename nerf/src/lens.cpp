@@ -1,0 +1,179 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/nerf/lens.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace fieldmark::nerf {
+namespace {
+
+// Row-major 2x2 matrix of derivatives of distorted(); symmetric.
+std::array<double, 3> derivative(const Lens& l, const Vec2& q) {
+  const double x = q[0], y = q[1], r2 = x * x + y * y;
+  const double a = 1 + r2 * (l.k1 + r2 * l.k2), slope = l.k1 + 2 * l.k2 * r2;  // a and da / d(r^2)
+  return {a + 2 * x * x * slope + 2 * l.p1 * y + 6 * l.p2 * x,
+          2 * x * y * slope + 2 * l.p1 * x + 2 * l.p2 * y,
+          a + 2 * y * y * slope + 6 * l.p1 * y + 2 * l.p2 * x};
+}
+double determinant(const std::array<double, 3>& m) { return m[0] * m[2] - m[1] * m[1]; }
+
+Vec2 on_plane(const Camera& c, double x, double y) { return {(x - c.cx) / c.fx, (y - c.cy) / c.fy}; }
+Vec2 on_picture(const Camera& c, const Vec2& q) { return {q[0] * c.fx + c.cx, q[1] * c.fy + c.cy}; }
+
+std::string short_number(double x) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", x);
+  return text;
+}
+
+void check_invertible(const Camera& c, const Lens& lens) {
+  constexpr int kSteps = 32;
+  for (int i = 0; i <= kSteps; ++i)
+    for (int j = 0; j <= kSteps; ++j) {
+      const double x = static_cast<double>(c.width) * j / kSteps;
+      const double y = static_cast<double>(c.height) * i / kSteps;
+      if (!lens.undistorted(on_plane(c, x, y)))
+        throw ValueError("[covered_part] lens: must have an inverse everywhere in the picture, got " +
+                         lens.text() + ", which has none at pixel (" + short_number(x) + ", " +
+                         short_number(y) + ") of " + std::to_string(c.width) + " x " +
+                         std::to_string(c.height));
+    }
+}
+
+// Whether the lens's picture has what the pinhole sees at a pixel.
+bool has_source(const Camera& c, const Lens& lens, Index column, Index row) {
+  const Vec2 q = on_plane(c, static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5);
+  const Vec2 p = on_picture(c, lens.distorted(q));
+  return p[0] >= 0 && p[1] >= 0 && p[0] <= static_cast<double>(c.width) &&
+         p[1] <= static_cast<double>(c.height) && lens.is_regular(q);
+}
+
+double missing_share(const Camera& c, const Lens& lens, const Crop& r, int side) {
+  const bool upright = side < 2;
+  const Index length = upright ? r.height : r.width;
+  Index missing = 0;
+  for (Index i = 0; i < length; ++i) {
+    const Index column = upright ? (side == 0 ? r.left : r.left + r.width - 1) : r.left + i;
+    const Index row = upright ? r.top + i : (side == 2 ? r.top : r.top + r.height - 1);
+    missing += has_source(c, lens, column, row) ? 0 : 1;
+  }
+  return static_cast<double>(missing) / static_cast<double>(length);
+}
+
+// Adds weight * the pixel at (row, column), or the nearest there is, to colour times alpha and alpha.
+void add_pixel(const Tensor<float>& rgba, Index column, Index row, double weight, double* sum) {
+  const Index height = rgba.shape[0], width = rgba.shape[1];
+  const Index y = std::clamp<Index>(row, 0, height - 1), x = std::clamp<Index>(column, 0, width - 1);
+  const float* in = rgba.data.data() + 4 * (y * width + x);
+  for (int k = 0; k < 3; ++k) sum[k] += weight * in[3] * in[k];
+  sum[3] += weight * in[3];
+}
+
+void sample(const Tensor<float>& rgba, const Vec2& at, float* out) {
+  const double x = at[0] - 0.5, y = at[1] - 0.5, x0 = std::floor(x), y0 = std::floor(y);
+  const double u = x - x0, v = y - y0;
+  const auto column = static_cast<Index>(x0), row = static_cast<Index>(y0);
+  double sum[4] = {};
+  add_pixel(rgba, column, row, (1 - u) * (1 - v), sum);
+  add_pixel(rgba, column + 1, row, u * (1 - v), sum);
+  add_pixel(rgba, column, row + 1, (1 - u) * v, sum);
+  add_pixel(rgba, column + 1, row + 1, u * v, sum);
+  for (int k = 0; k < 3; ++k) out[k] = sum[3] > 0 ? static_cast<float>(std::min(1.0, sum[k] / sum[3])) : 0.0f;
+  out[3] = static_cast<float>(std::min(1.0, sum[3]));
+}
+}  // namespace
+
+std::string Lens::text() const {
+  return "k1 " + short_number(k1) + " k2 " + short_number(k2) + " p1 " + short_number(p1) + " p2 " +
+         short_number(p2);
+}
+
+Vec2 Lens::distorted(const Vec2& q) const {
+  const double x = q[0], y = q[1], r2 = x * x + y * y, a = 1 + r2 * (k1 + r2 * k2);
+  return {x * a + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * a + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y};
+}
+
+bool Lens::is_regular(const Vec2& q) const {
+  constexpr int kPlaces = 32;
+  for (int i = 1; i <= kPlaces; ++i) {
+    const double t = static_cast<double>(i) / kPlaces;
+    const auto m = derivative(*this, {t * q[0], t * q[1]});
+    // Both eigenvalues: twice folded over is folded over.
+    if (!(determinant(m) > 0 && m[0] + m[2] > 0)) return false;
+  }
+  return true;
+}
+
+std::optional<Vec2> Lens::undistorted(const Vec2& seen) const {
+  const auto off = [&](const Vec2& q) {
+    const Vec2 p = distorted(q);
+    return Vec2{p[0] - seen[0], p[1] - seen[1]};
+  };
+  const double enough = 1e-12 * (1 + std::hypot(seen[0], seen[1]));
+  Vec2 q = seen, f = off(q);
+  for (int step = 0; step < 100; ++step) {
+    if (std::hypot(f[0], f[1]) <= enough) return is_regular(q) ? std::optional<Vec2>(q) : std::nullopt;
+    const auto m = derivative(*this, q);
+    const double d = determinant(m);
+    if (!(std::abs(d) > 1e-300)) return std::nullopt;
+    Vec2 to = q;
+    double scale = 1;
+    for (int halving = 0; halving < 30; ++halving, scale /= 2) {
+      to = {q[0] - scale * (m[2] * f[0] - m[1] * f[1]) / d, q[1] - scale * (m[0] * f[1] - m[1] * f[0]) / d};
+      const Vec2 g = off(to);
+      if (std::hypot(g[0], g[1]) < std::hypot(f[0], f[1])) break;
+    }
+    q = to, f = off(q);
+  }
+  return std::nullopt;
+}
+
+Crop covered_part(const Camera& camera, const Lens& lens) {
+  Crop r{.left = 0, .top = 0, .width = camera.width, .height = camera.height};
+  if (lens.is_pinhole()) return r;
+  check_invertible(camera, lens);
+  while (r.width > 0 && r.height > 0) {
+    int worst = 0;
+    double most = 0;
+    for (int side = 0; side < 4; ++side)
+      if (const double share = missing_share(camera, lens, r, side); share > most) most = share, worst = side;
+    if (most == 0) return r;
+    if (worst == 0) ++r.left;
+    if (worst == 2) ++r.top;
+    (worst < 2 ? r.width : r.height) -= 1;
+  }
+  throw ValueError("[covered_part] lens: must leave a part of the picture, got " + lens.text());
+}
+
+Camera cropped(const Camera& camera, const Crop& part) {
+  if (part.left < 0 || part.top < 0 || part.width < 1 || part.height < 1 ||
+      part.left + part.width > camera.width || part.top + part.height > camera.height)
+    throw ValueError("[cropped] part must be within the picture of " + std::to_string(camera.width) + " x " +
+                     std::to_string(camera.height) + ", got " + std::to_string(part.width) + " x " +
+                     std::to_string(part.height) + " at (" + std::to_string(part.left) + ", " +
+                     std::to_string(part.top) + ")");
+  Camera c = camera;
+  c.cx -= static_cast<double>(part.left), c.cy -= static_cast<double>(part.top);
+  c.width = part.width, c.height = part.height;
+  return c;
+}
+
+Tensor<float> undistorted_picture(const Tensor<float>& rgba, const Camera& camera, const Lens& lens,
+                                  const Crop& part) {
+  if (rgba.shape != Shape{camera.height, camera.width, 4})
+    throw ShapeError("[undistorted_picture] rgba must be [height, width, 4] of the camera, " +
+                     std::to_string(camera.height) + " x " + std::to_string(camera.width) + ", got shape " +
+                     rgba.shape.str());
+  cropped(camera, part);  // checks
+  Tensor<float> out(Shape{part.height, part.width, 4});
+  for (Index y = 0; y < part.height; ++y)
+    for (Index x = 0; x < part.width; ++x) {
+      const Vec2 q =
+          on_plane(camera, static_cast<double>(part.left + x) + 0.5, static_cast<double>(part.top + y) + 0.5);
+      sample(rgba, on_picture(camera, lens.distorted(q)), out.data.data() + 4 * (y * part.width + x));
+    }
+  return out;
+}
+
+}  // namespace fieldmark::nerf

@@ -1,0 +1,55 @@
+#pragma once
+// How far a pose is from a rotation, and the rotation nearest to it. Private.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+#include <tuple>
+
+#include "vec3.h"
+
+namespace fieldmark::nerf {
+
+inline Vec3 pose_column(const Pose& p, std::size_t c) { return {p[c], p[4 + c], p[8 + c]}; }
+
+/// Largest entry of |R^T R - I|, and the determinant against 1.
+inline double rotation_error(const Pose& p) {
+  const Vec3 x = pose_column(p, 0), y = pose_column(p, 1), z = pose_column(p, 2);
+  double worst = std::abs(dot(cross(x, y), z) - 1);
+  for (const auto& [a, b, want] :
+       {std::tuple{x, x, 1.0}, {y, y, 1.0}, {z, z, 1.0}, {x, y, 0.0}, {x, z, 0.0}, {y, z, 0.0}})
+    worst = std::max(worst, std::abs(dot(a, b) - want));
+  return worst;
+}
+
+/// The rotation nearest to a pose's (its polar factor), by R <- (R + R^-T) / 2, which squares a small error
+/// at each step.
+inline Pose with_rotation(Pose p) {
+  for (int step = 0; step < 8; ++step) {
+    const Vec3 x = pose_column(p, 0), y = pose_column(p, 1), z = pose_column(p, 2);
+    const double d = dot(cross(x, y), z);
+    const Vec3 inverse[] = {cross(y, z), cross(z, x), cross(x, y)};  // columns of d R^-T
+    for (std::size_t r = 0; r < 3; ++r)
+      for (std::size_t c = 0; c < 3; ++c) p[4 * r + c] = 0.5 * (p[4 * r + c] + inverse[c][r] / d);
+  }
+  return p;
+}
+
+// Poses of single precision and six digits are 1e-6 off; they are left as they stand.
+inline constexpr double kRotationExact = 1e-5, kRotationTolerance = 1e-2;
+
+/// A pose as it is, or with the nearest rotation where it is off by more than kRotationExact; fail(found) is
+/// to throw where it is off by more than kRotationTolerance.
+template <class Fail>
+Pose checked_rotation(const Pose& pose, Fail fail) {
+  const double error = rotation_error(pose);
+  if (error <= kRotationExact) return pose;
+  if (!(error <= kRotationTolerance)) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.4g", error);
+    fail(std::string("columns that are off orthonormal by ") + text);
+  }
+  return with_rotation(pose);
+}
+
+}  // namespace fieldmark::nerf
