@@ -39,6 +39,13 @@ Tensor<double> numbers(Shape shape, double phase = 0) {
   return t;
 }
 
+// All different, 0.1 apart at least.
+Tensor<double> apart(Shape shape) {
+  Tensor<double> t(shape);
+  for (Index i = 0; i < t.size(); ++i) t[i] = 0.1 * static_cast<double>(i * 37 % 101);
+  return t;
+}
+
 GradcheckCase make(const char* name, GradcheckFn f, std::vector<Tensor<double>> inputs) {
   return {name, [f = std::move(f), inputs = std::move(inputs)] { return gradcheck(f, inputs); }};
 }
@@ -80,6 +87,10 @@ Cases layout() {
           make("rows: broadcast_rows", [](D&, Vars v) { return broadcast_rows(v[0], 5); }, {numbers({1, 4})}),
           make("rows: gather_rows", [](D&, Vars v) { return gather_rows(v[0], kRows); }, {x}),
           make("pool: avg_pool", [](D&, Vars v) { return avg_pool(v[0], 2); }, {numbers({2, 3, 5, 2})}),
+          // No two numbers of a window are closer than 0.1: differences must not change the largest.
+          make("pool: max_pool",
+               [](D&, Vars v) { return max_pool(v[0], {.size = 3, .stride = 2, .partial = true}); },
+               {apart({2, 4, 6, 2})}),
           make("pool: global_avg_pool", [](D&, Vars v) { return global_avg_pool(v[0]); }, {image}),
           make("resample: upsample_nearest", [](D&, Vars v) { return upsample_nearest(v[0], 2); }, {image}),
           make("resample: upsample_to", [](D&, Vars v) { return upsample_to(v[0], 7, 5); }, {image}),

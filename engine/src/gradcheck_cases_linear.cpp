@@ -64,6 +64,13 @@ std::vector<GradcheckCase> gradcheck_cases_linear() {
        [] {
          return check_conv2d(Activation::relu, {2, 5, 7, 8}, 16);
        }},
+      {"conv2d with steps and a border",
+       [] {
+         const std::vector<Tensor<double>> in{numbers({2, 5, 7, 2}, 1), numbers({4, 4, 2, 3}, 2),
+                                              numbers({3}, 3)};
+         return gradcheck(
+             [](Tape<double>&, auto v) { return conv2d(v[0], v[1], v[2], {.stride = 3, .padding = 2}); }, in);
+       }},
       {"conv2d layer",
        [] {
          return check_layer<Conv2d<double>>(Conv2dOptions{.in = 2, .out = 3}, {1, 3, 4, 2});

@@ -1,4 +1,5 @@
 #include <fieldmark/engine/error.h>
+#include <fieldmark/engine/image.h>
 #include <fieldmark/engine/metrics.h>
 #include <fieldmark/nerf/evaluation.h>
 
@@ -34,7 +35,7 @@ double mean(const std::vector<ViewScore>& scores, double ViewScore::*number) {
 }  // namespace
 
 Evaluation evaluate(Renderer& renderer, const Dataset& dataset,
-                    const std::function<bool(Index done, Index total)>& progress) {
+                    const std::function<bool(Index done, Index total)>& progress, const Lpips<float>* lpips) {
   using Clock = std::chrono::steady_clock;
   if (dataset.views.empty()) throw ValueError("[evaluate] dataset must have at least one view, got 0");
   Evaluation result;
@@ -44,17 +45,22 @@ Evaluation evaluate(Renderer& renderer, const Dataset& dataset,
     const Rendering rendering = renderer.render(view.camera);
     seconds += std::chrono::duration<double>(Clock::now() - start).count();
     const Tensor<float> photograph = composited(view, dataset.background);
-    const bool large = std::min(view.camera.width, view.camera.height) >= kSsimWindow;
+    const Index side = std::min(view.camera.width, view.camera.height);
+    const double none = std::numeric_limits<double>::quiet_NaN();
     result.per_view.push_back(
         {.psnr = psnr(rendering.rgb, photograph),
          .psnr_object = psnr_masked(rendering.rgb, photograph, object_mask(view, rendering)),
-         .ssim = large ? ssim(rendering.rgb, photograph) : std::numeric_limits<double>::quiet_NaN()});
+         .ssim = side >= kSsimWindow ? ssim(rendering.rgb, photograph) : none,
+         .lpips = lpips && side >= lpips->smallest()
+                      ? lpips->distance(quantize8(rendering.rgb), quantize8(photograph)).value
+                      : none});
     ++result.views;
     if (progress && !progress(result.views, static_cast<Index>(dataset.views.size()))) break;
   }
   result.psnr = mean(result.per_view, &ViewScore::psnr);
   result.psnr_object = mean(result.per_view, &ViewScore::psnr_object);
   result.ssim = mean(result.per_view, &ViewScore::ssim);
+  result.lpips = mean(result.per_view, &ViewScore::lpips);
   result.seconds_per_view = seconds / static_cast<double>(result.views);
   return result;
 }

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "support/catch.h"
+#include "support/data.h"
 #include "support/random.h"
 
 using namespace fieldmark;
@@ -93,6 +94,25 @@ TEST_CASE("metrics: ssim equals the definition with the full window") {
     CHECK(std::abs(ssim(a, b) - ssim_reference(a, b)) < 1e-13);
     CHECK(std::abs(ssim(a, a) - 1) < 1e-14);
     CHECK(std::abs(ssim(a, b) - ssim(b, a)) < 1e-15);
+  }
+}
+
+// Protocol: 8-bit PNG / 255, per channel, numpy 1.24 in double, the 11 x 11 window as one outer product of
+// exp(-k^2 / (2 1.5^2)) scaled to sum 1, moments E[x^2] - E[x]^2 at the positions inside the picture
+// (sliding_window_view and einsum), mean over positions and channels.
+TEST_CASE("metrics: ssim of six pairs equals what numpy computes") {
+  const auto folder = data_or_skip("lpips_reference", "SSIM against numpy");
+  if (!folder) return;
+  const std::pair<const char*, double> pairs[] = {
+      {"lego400_blur", 0.894155277437},       {"lego400_noise", 0.407619879548},
+      {"chair201x193_tone", 0.996027737976},  {"fern504x378_jpeg15", 0.766610769419},
+      {"official_ex_ref_p0", 0.436746146820}, {"official_ex_ref_p1", 0.295903146654}};
+  for (const auto& [name, want] : pairs) {
+    CAPTURE(name);
+    const auto a = read_image(*folder / (std::string(name) + "_a.png")),
+               b = read_image(*folder / (std::string(name) + "_b.png"));
+    // Pictures are float: measured below 1e-8.
+    CHECK(std::abs(ssim(a, b) - want) < 1e-7);
   }
 }
 

@@ -1,4 +1,5 @@
 #include <fieldmark/engine/error.h>
+#include <fieldmark/engine/image.h>
 #include <fieldmark/engine/metrics.h>
 #include <fieldmark/nerf/evaluation.h>
 
@@ -7,20 +8,21 @@
 
 #include "small_field.h"
 #include "support/catch.h"
+#include "support/random_weights.h"
 
 using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
 // Photographs of the field itself, with its opacity as alpha, brightened by `error`.
-Dataset photographs(const RadianceField& field, int views, float error) {
+Dataset photographs(const RadianceField& field, int views, float error, Index height = 16) {
   Dataset data{.name = "self", .split = "test", .background = field.background, .views = {}};
   Renderer renderer(field);
   for (int v = 0; v < views; ++v) {
-    const Camera camera = make_camera(look_at({3.0 - v, -3, 1.5}, {0, 0, 0}, {0, 0, 1}), 0.9, 20, 16);
+    const Camera camera = make_camera(look_at({3.0 - v, -3, 1.5}, {0, 0, 0}, {0, 0, 1}), 0.9, 20, height);
     const Rendering r = renderer.render(camera);
-    View view{.camera = camera, .rgba = Tensor<float>(Shape{16, 20, 4}, 1.f), .name = "v"};
-    for (Index i = 0; i < 320; ++i) {
+    View view{.camera = camera, .rgba = Tensor<float>(Shape{height, 20, 4}, 1.f), .name = "v"};
+    for (Index i = 0; i < height * 20; ++i) {
       const float a = r.opacity[i];
       for (Index k = 0; k < 3; ++k) {
         const float straight = a > 0 ? (r.rgb[3 * i + k] - (1 - a)) / a : 0.f;
@@ -65,6 +67,26 @@ TEST_CASE("evaluation: scores are those of the metrics, and means are over the v
   CHECK(std::abs(e.psnr_object - sum[1] / 3) < 1e-12);
   CHECK(std::abs(e.ssim - sum[2] / 3) < 1e-12);
   CHECK(e.psnr_object < e.psnr);
+}
+
+TEST_CASE(
+    "evaluation: LPIPS of pictures rounded to 8 bits where there is a network and they are large enough") {
+  const RadianceField field = small_field();
+  Renderer renderer(field);
+  const Dataset data = photographs(field, 2, 0.1f, 18);
+  const Lpips<float> lpips(random_weights(lpips_tensors(LpipsNetwork::squeeze)), LpipsNetwork::squeeze);
+  const Evaluation e = evaluate(renderer, data, {}, &lpips);
+  double sum = 0;
+  for (std::size_t v = 0; v < 2; ++v) {
+    const Tensor<float> rendered = quantize8(renderer.render(data.views[v].camera).rgb),
+                        photo = quantize8(composited(data.views[v], data.background));
+    CHECK(e.per_view[v].lpips == lpips.distance(rendered, photo).value);
+    CHECK(e.per_view[v].lpips > 0);
+    sum += e.per_view[v].lpips;
+  }
+  CHECK(e.lpips == Approx(sum / 2).epsilon(1e-12));
+  CHECK(std::isnan(evaluate(renderer, data).lpips));
+  CHECK(std::isnan(evaluate(renderer, photographs(field, 1, 0.1f), {}, &lpips).lpips));  // 16 rows: too few
 }
 
 TEST_CASE("evaluation: without alpha the object is where the rendering is opaque") {

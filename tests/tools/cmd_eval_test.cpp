@@ -2,6 +2,7 @@
 
 #include "cli/cli.h"
 #include "support/catch.h"
+#include "support/random_weights.h"
 #include "support/temporary_folder.h"
 #include "tools/run_command.h"
 #include "tools/tiny_scene.h"
@@ -17,11 +18,29 @@ TEST_CASE("eval compares with the photographs of the split, one row each", "[eva
   REQUIRE(r.code == cli::kOk);
   const Json json = Json::parse(r.out);
   CHECK(json["views"] == 4);
-  CHECK(json["lpips_alex"].is_null());
+  CHECK(json["lpips_alex"].is_null());  // 16 pixels are too few for AlexNet
   double sum = 0;
   for (const auto& view : json["per_view"]) sum += view["psnr"].get<double>();
   CHECK(json["psnr"].get<double>() == Approx(sum / 4));
   for (const char* key : {"psnr_object", "ssim"}) CHECK(json.at(key).is_number());
+}
+
+TEST_CASE("eval gives LPIPS where there are weights, for each view and their mean", "[eval]") {
+  const TemporaryFolder folder;
+  const std::string scene = folder / "scene", weights = folder / "alex.safetensors";
+  REQUIRE(run_command({"scene", "--out", scene, "--kind", "sphere", "--size", "32", "--views", "4"}).code ==
+          0);
+  random_weights(lpips_tensors(LpipsNetwork::alex)).write(weights);
+  const auto r = run_command({"eval", "--field", tiny_field(folder, scene), "--data", scene, "--split",
+                              "train", "--lpips-weights", weights, "--json", "-"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  CHECK_THAT(r.err, Contains("lpips"));
+  const Json json = Json::parse(r.out);
+  double sum = 0;
+  for (const auto& view : json["per_view"]) sum += view["lpips_alex"].get<double>();
+  CHECK(json["lpips_alex"].get<double>() == Approx(sum / 4));
+  CHECK(sum > 0);
 }
 
 TEST_CASE("eval refuses what is no field, and splits that do not exist", "[eval]") {

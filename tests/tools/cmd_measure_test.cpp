@@ -1,4 +1,5 @@
 #include "cli/cli.h"
+#include "support/random_weights.h"
 #include "tools/tiny_job.h"
 
 using namespace fieldmark;
@@ -18,6 +19,26 @@ TEST_CASE("measure reports an owner's mark on several sets of cameras", "[measur
     CHECK(accuracy >= 0);
     CHECK(accuracy <= 1);
   }
+}
+
+TEST_CASE("measure gives LPIPS against the unmarked renders where there are weights", "[measure]") {
+  const TinyJob& job = TinyJob::get();
+  const TemporaryFolder folder;
+  const std::string weights = folder / "alex.safetensors";
+  random_weights(lpips_tensors(LpipsNetwork::alex)).write(weights);
+  const auto lpips_at = [&](const std::string& file, const char* size) {
+    const auto r = run_command({"measure", "--owner", job.owner, "--count", "2", "--size", size,
+                                "--lpips-weights", file, "--json", "-"});
+    INFO(r.err);
+    REQUIRE(r.code == cli::kOk);
+    return nlohmann::json::parse(r.out)["lpips_base"];
+  };
+  CHECK(lpips_at(weights, "40").get<double>() > 0);
+  CHECK(lpips_at(weights, "24").is_null());  // too small for the network
+  CHECK(lpips_at("none", "40").is_null());
+  const auto wrong = run_command({"measure", "--owner", job.owner, "--lpips-weights", job.owner});
+  CHECK(wrong.code == cli::kFailed);
+  CHECK_THAT(wrong.err, Contains("scaling.shift"));
 }
 
 TEST_CASE("measure wants field and message together, and known distortions", "[measure]") {

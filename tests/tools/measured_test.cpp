@@ -13,6 +13,7 @@ TEST_CASE("measured: JSON has the contract's keys, and null where there is no nu
   m.views = 3;
   m.accuracy.blind = 0.75;
   m.psnr_base = std::nan("");
+  m.lpips_base = 0.125;
   m.under["noise_0.05"].blind = 0.5;
   const auto json = cli::measurement_json(m, "ring");
   CHECK(json["bits"] == 16);
@@ -20,6 +21,7 @@ TEST_CASE("measured: JSON has the contract's keys, and null where there is no nu
   CHECK(json["accuracy"]["blind"] == 0.75);
   CHECK(json["accuracy"]["geometry"].is_null());
   CHECK(json["psnr_base"].is_null());
+  CHECK(json["lpips_base"] == 0.125);
   CHECK(json["under"]["noise_0.05"]["blind"] == 0.5);
 }
 

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "support/catch.h"
+#include "support/random_weights.h"
 #include "tiny_owner.h"
 
 using namespace fieldmark;
@@ -34,10 +35,11 @@ double mean(const std::vector<double>& v) {
 TEST_CASE("measurement: figures are the means over the views, view by view") {
   const Owner owner = owner_with_gain();
   const auto views = cameras(5);
-  const Measurement m = measure(owner, nullptr, nullptr, {.cameras = views, .seed = 6});
+  const Lpips<float> lpips(random_weights(lpips_tensors(LpipsNetwork::squeeze)), LpipsNetwork::squeeze);
+  const Measurement m = measure(owner, nullptr, nullptr, {.cameras = views, .seed = 6, .lpips = &lpips});
   nerf::Renderer plain(owner.field), marked(owner.field);
   const CounterRng messages(6, 41);
-  std::vector<double> accuracy, whole, object, similarity;
+  std::vector<double> accuracy, whole, object, similarity, perceptual;
   for (std::size_t i = 0; i < views.size(); ++i) {
     const Message sent = random_message(4, messages, i);
     marked.set_recolour(owner.marking(cell_signs(owner.code(), sent)));
@@ -50,6 +52,7 @@ TEST_CASE("measurement: figures are the means over the views, view by view") {
     whole.push_back(psnr(seen, base.rgb));
     object.push_back(psnr_masked(seen, base.rgb, base.opacity));
     similarity.push_back(ssim(seen, quantize8(base.rgb)));
+    perceptual.push_back(lpips.distance(seen, quantize8(base.rgb)).value);
   }
   CHECK(m.bits == 4);
   CHECK(m.views == 5);
@@ -60,6 +63,9 @@ TEST_CASE("measurement: figures are the means over the views, view by view") {
   CHECK(m.psnr_base_object == Approx(mean(object)).epsilon(1e-12));
   CHECK(m.psnr_base_object < m.psnr_base);
   CHECK(m.ssim_base == Approx(mean(similarity)).epsilon(1e-12));
+  CHECK(m.lpips_base == Approx(mean(perceptual)).epsilon(1e-12));
+  CHECK(m.lpips_base > 0);
+  CHECK(std::isnan(measure(owner, nullptr, nullptr, {.cameras = cameras(1), .seed = 6}).lpips_base));
   CHECK(m.under.empty());
 }
 

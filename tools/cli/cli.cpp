@@ -24,6 +24,7 @@ constexpr Entry kCommands[] = {
     {"data", "Public data sets by manifest: list, verify", add_data},
     {"train", "Train a field on photographs", add_train},
     {"eval", "Compare a field with photographs", add_eval},
+    {"compare", "Compare pictures: PSNR, SSIM, LPIPS", add_compare},
     {"render", "Render views of a field", add_render},
     {"key", "Make a secret key from the operating system's random numbers", add_key},
     {"embed", "Learn a mark for a field, and how to read it", add_embed},

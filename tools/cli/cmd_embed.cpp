@@ -14,6 +14,7 @@
 #include "cli/context.h"
 #include "cli/long_run.h"
 #include "cli/measured.h"
+#include "cli/perceptual.h"
 #include "cli/sheet.h"
 
 namespace fieldmark::cli {
@@ -22,7 +23,7 @@ namespace {
 constexpr Index kPicturedViews = 4;
 
 struct Options {
-  std::string field, out, key, picture;
+  std::string field, out, key, picture, lpips_weights;
   std::string preset = "fast";
   watermark::OwnerOptions owner;
   RunLength length{.seconds = watermark::EmbedOptions{}.schedule.seconds};
@@ -95,6 +96,7 @@ int run(const Options& options, Context& context) {
   check_writable(options.out);
   check_writable(picture);
   for (const auto& name : options.under) read_option("--under", [&] { return distort::parse_attack(name); });
+  const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
   const auto field = nerf::RadianceField::load(options.field);
   const auto key = key_of(options, checkpoint);
   auto owner_options = options.owner;
@@ -129,9 +131,13 @@ int run(const Options& options, Context& context) {
                  << picture << ": unmarked, marked, ten times the difference\n";
   const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, options.measured_views,
                                           0, context.seed() + 1);
-  const auto measured = run_measure(
-      owner, nullptr, nullptr,
-      {.cameras = cameras, .under = options.under, .seed = context.seed(), .progress = {}}, context);
+  const auto measured = run_measure(owner, nullptr, nullptr,
+                                    {.cameras = cameras,
+                                     .under = options.under,
+                                     .seed = context.seed(),
+                                     .lpips = lpips ? &*lpips : nullptr,
+                                     .progress = {}},
+                                    context);
   print_measurement(context.text(), measured, "near");
   Json json = measurement_json(measured, "near");
   json["seconds"] = seconds;
@@ -187,6 +193,7 @@ Command add_embed(CLI::App& app) {
                  "PNG with four views unmarked, marked, and the difference (OWNER.png)")
       ->type_name("FILE")
       ->default_str("");
+  add_lpips_weights(app, o->lpips_weights);
   app.add_flag("--resume", o->resume,
                "Go on from OWNER.checkpoint, with the options of the run that left it");
   return [o, reader_size](Context& context) {

@@ -8,13 +8,14 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/perceptual.h"
 #include "cli/scene_data.h"
 
 namespace fieldmark::cli {
 namespace {
 
 struct Options {
-  std::string field, data;
+  std::string field, data, lpips_weights;
   std::string split = "test";
   Index size = 0;
 };
@@ -23,37 +24,47 @@ int run(const Options& options, Context& context) {
   const auto field = nerf::RadianceField::load(options.field);
   const auto data = load_scene(
       options.data, {.split = options.split, .size = options.size, .background = field.background}, context);
+  const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
   nerf::Renderer renderer(field);
   const InterruptGuard guard;
   nerf::Evaluation evaluation;
   {
     Progress progress = context.progress("eval");
-    evaluation = nerf::evaluate(renderer, data, [&](Index done, Index total) {
-      progress.update(static_cast<double>(done) / static_cast<double>(total));
-      return !guard.interrupted();
-    });
+    evaluation = nerf::evaluate(
+        renderer, data,
+        [&](Index done, Index total) {
+          progress.update(static_cast<double>(done) / static_cast<double>(total));
+          return !guard.interrupted();
+        },
+        lpips ? &*lpips : nullptr);
   }
   if (guard.interrupted()) throw Interrupted("nothing was written");
   Json views = Json::array();
-  const auto add = [&](const std::string& name, double psnr, double object, double ssim) {
+  const auto add = [&](const std::string& name, double psnr, double object, double ssim, double distance) {
     char line[160];
-    std::snprintf(line, sizeof line, "%-16s %6.2f dB  object %6.2f dB  ssim %.4f\n", name.c_str(), psnr,
-                  object, ssim);
+    std::snprintf(line, sizeof line, "%-16s %6.2f dB  object %6.2f dB  ssim %.4f", name.c_str(), psnr, object,
+                  ssim);
     context.text() << line;
+    if (lpips) {
+      std::snprintf(line, sizeof line, "  lpips %.4f", distance);
+      context.text() << line;
+    }
+    context.text() << "\n";
   };
   for (std::size_t i = 0; i < evaluation.per_view.size(); ++i) {
     const nerf::ViewScore& score = evaluation.per_view[i];
-    add(data.views[i].name, score.psnr, score.psnr_object, score.ssim);
+    add(data.views[i].name, score.psnr, score.psnr_object, score.ssim, score.lpips);
     views.push_back({{"image", data.views[i].name},
                      {"psnr", number(score.psnr)},
                      {"psnr_object", number(score.psnr_object)},
-                     {"ssim", number(score.ssim)}});
+                     {"ssim", number(score.ssim)},
+                     {"lpips_alex", number(score.lpips)}});
   }
-  add("mean", evaluation.psnr, evaluation.psnr_object, evaluation.ssim);
+  add("mean", evaluation.psnr, evaluation.psnr_object, evaluation.ssim, evaluation.lpips);
   context.result({{"psnr", number(evaluation.psnr)},
                   {"psnr_object", number(evaluation.psnr_object)},
                   {"ssim", number(evaluation.ssim)},
-                  {"lpips_alex", nullptr},
+                  {"lpips_alex", number(evaluation.lpips)},
                   {"views", evaluation.views},
                   {"scene", data.name},
                   {"split", data.split},
@@ -75,6 +86,7 @@ Command add_eval(CLI::App& app) {
       ->check(CLI::Range(16, 8192).description(""))
       ->type_name("N")
       ->default_str("");
+  add_lpips_weights(app, o->lpips_weights);
   return [o](Context& context) { return run(*o, context); };
 }
 

@@ -9,13 +9,14 @@
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/measured.h"
+#include "cli/perceptual.h"
 #include "cli/scene_data.h"
 
 namespace fieldmark::cli {
 namespace {
 
 struct Options {
-  std::string owner, field, message, data;
+  std::string owner, field, message, data, lpips_weights;
   std::string cameras = "near";
   Index count = 200, size = 0;
   std::vector<std::string> under;
@@ -50,6 +51,7 @@ nerf::Evaluation against_photographs(const Options& options, const nerf::Radianc
 
 int run(const Options& options, Context& context) {
   for (const auto& name : options.under) read_option("--under", [&] { return distort::parse_attack(name); });
+  const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
   const auto owner = watermark::Owner::load(options.owner);
   std::optional<nerf::RadianceField> baked;
   std::optional<watermark::Message> message;
@@ -62,6 +64,7 @@ int run(const Options& options, Context& context) {
                                     {.cameras = cameras_of(options, owner, context),
                                      .under = options.under,
                                      .seed = context.seed(),
+                                     .lpips = lpips ? &*lpips : nullptr,
                                      .progress = {}},
                                     context);
   print_measurement(context.text(), measured, options.cameras);
@@ -109,6 +112,7 @@ Command add_measure(CLI::App& app) {
       ->default_str("");
   app.add_option("--data", o->data, "Data set for psnr_photo of a baked field and for --cameras test")
       ->type_name("DIR");
+  add_lpips_weights(app, o->lpips_weights);
   return [o](Context& context) { return run(*o, context); };
 }
 

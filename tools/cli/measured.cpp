@@ -1,5 +1,6 @@
 #include "cli/measured.h"
 
+#include <cmath>
 #include <cstdio>
 #include <ostream>
 
@@ -22,7 +23,7 @@ Json measurement_json(const watermark::Measurement& m, const std::string& camera
           {"psnr_base", number(m.psnr_base)},
           {"psnr_base_object", number(m.psnr_base_object)},
           {"ssim_base", number(m.ssim_base)},
-          {"lpips_base", nullptr},
+          {"lpips_base", number(m.lpips_base)},
           {"psnr_photo", nullptr},
           {"under", under}};
 }
@@ -36,6 +37,10 @@ void print_measurement(std::ostream& out, const watermark::Measurement& m, const
   std::snprintf(line, sizeof line, "against unmarked     %.2f dB, object %.2f dB, ssim %.4f\n", m.psnr_base,
                 m.psnr_base_object, m.ssim_base);
   out << line;
+  if (std::isfinite(m.lpips_base)) {
+    std::snprintf(line, sizeof line, "                     lpips %.4f\n", m.lpips_base);
+    out << line;
+  }
   std::snprintf(line, sizeof line,
                 "bits right, blind    %.2f%% of one view, worst 5%% of views below %.2f%%\n",
                 100 * m.accuracy.blind, 100 * m.accuracy_p5);

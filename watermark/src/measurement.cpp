@@ -60,7 +60,7 @@ Measurement measure(const Owner& owner, const nerf::RadianceField* baked, const 
   const CellCode code = owner.code();
   const PictureReader reader(owner);
   Views views(owner, baked);
-  std::vector<double> accuracy, psnr_whole, psnr_object, similarity;
+  std::vector<double> accuracy, psnr_whole, psnr_object, similarity, perceptual;
   std::vector<std::vector<double>> under(attacks.size());
   const auto total = static_cast<Index>(options.cameras.size());
   for (std::size_t i = 0; i < options.cameras.size(); ++i) {
@@ -75,7 +75,10 @@ Measurement measure(const Owner& owner, const nerf::RadianceField* baked, const 
           read(distort::apply_attack(attacks[a], p.marked, distortions, i * attacks.size() + a, background)));
     psnr_whole.push_back(psnr(p.marked, p.plain.rgb));
     psnr_object.push_back(psnr_masked(p.marked, p.plain.rgb, p.plain.opacity));
-    similarity.push_back(ssim(p.marked, quantize8(p.plain.rgb)));
+    const Tensor<float> plain = quantize8(p.plain.rgb);
+    similarity.push_back(ssim(p.marked, plain));
+    if (options.lpips && std::min(plain.shape[0], plain.shape[1]) >= options.lpips->smallest())
+      perceptual.push_back(options.lpips->distance(p.marked, plain).value);
     if (options.progress && !options.progress(static_cast<Index>(i) + 1, total))
       throw Error("stopped while measuring");
   }
@@ -87,6 +90,7 @@ Measurement measure(const Owner& owner, const nerf::RadianceField* baked, const 
                 .psnr_base = finite_mean(psnr_whole),
                 .psnr_base_object = finite_mean(psnr_object),
                 .ssim_base = finite_mean(similarity),
+                .lpips_base = finite_mean(perceptual),
                 .under = {}};
   for (std::size_t a = 0; a < attacks.size(); ++a) m.under[options.under[a]] = {finite_mean(under[a])};
   return m;

@@ -59,6 +59,42 @@ void fill(const T* row, std::int64_t pixels, std::int64_t channels, T* y, bool a
     });
 }
 
+template <class T>
+void largest(const MaxPoolRow& p, const T* x, T* y, T* place) {
+  for (std::int64_t w = 0; w < p.windows; ++w) {
+    const std::int64_t first = w * p.stride, columns = p.width - first < p.size ? p.width - first : p.size;
+    for_channels<T>(p.channels, [=](auto zero, std::int64_t c) {
+      using V = decltype(zero);
+      V best = load_as<V>(x + first * p.channels + c), at{};
+      for (std::int64_t u = 0; u < p.rows; ++u)
+        for (std::int64_t v = 0; v < columns; ++v) {
+          const V z = load_as<V>(x + (u * p.width + first + v) * p.channels + c);
+          const auto take = (z > best) | (z != z);  // a NaN stays: no comparison with it is true
+          best = take ? z : best;
+          at = take ? zero + static_cast<T>(u * p.size + v) : at;
+        }
+      store_as(y + w * p.channels + c, best);
+      if (place) store_as(place + w * p.channels + c, at);
+    });
+  }
+}
+
+template <class T>
+void spread(const MaxPoolRow& p, std::int64_t u, const T* dy, const T* place, T* dx) {
+  for (std::int64_t w = 0; w < p.windows; ++w) {
+    const std::int64_t first = w * p.stride, columns = p.width - first < p.size ? p.width - first : p.size;
+    for (std::int64_t v = 0; v < columns; ++v) {
+      const T number = static_cast<T>(u * p.size + v);
+      for_channels<T>(p.channels, [=](auto zero, std::int64_t c) {
+        using V = decltype(zero);
+        T* to = dx + (first + v) * p.channels + c;
+        const V d = load_as<V>(dy + w * p.channels + c);
+        store_as(to, load_as<V>(to) + (load_as<V>(place + w * p.channels + c) == zero + number ? d : zero));
+      });
+    }
+  }
+}
+
 }  // namespace
 
 namespace FIELDMARK_ISA_NS {
@@ -86,11 +122,21 @@ template <class T>
 void fill_pixels(const T* row, std::int64_t pixels, std::int64_t channels, T* y, bool add) {
   fill(row, pixels, channels, y, add);
 }
+template <class T>
+void max_pool_row(const MaxPoolRow& p, const T* x, T* y, T* place) {
+  largest(p, x, y, place);
+}
+template <class T>
+void max_pool_row_backward(const MaxPoolRow& p, std::int64_t u, const T* dy, const T* place, T* dx) {
+  spread(p, u, dy, place, dx);
+}
 
-#define FIELDMARK_INSTANTIATE(T)                                                       \
-  template void pool_row(const PoolRow&, const T*, T*);                                \
-  template void pool_row_backward(const PoolRow&, const T*, T*, bool);                 \
-  template void channel_sums(const T*, const T*, std::int64_t, std::int64_t, double*); \
+#define FIELDMARK_INSTANTIATE(T)                                                                \
+  template void max_pool_row(const MaxPoolRow&, const T*, T*, T*);                              \
+  template void max_pool_row_backward(const MaxPoolRow&, std::int64_t, const T*, const T*, T*); \
+  template void pool_row(const PoolRow&, const T*, T*);                                         \
+  template void pool_row_backward(const PoolRow&, const T*, T*, bool);                          \
+  template void channel_sums(const T*, const T*, std::int64_t, std::int64_t, double*);          \
   template void fill_pixels(const T*, std::int64_t, std::int64_t, T*, bool);
 FIELDMARK_INSTANTIATE(float)
 FIELDMARK_INSTANTIATE(double)

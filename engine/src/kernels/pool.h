@@ -23,4 +23,17 @@ FIELDMARK_DECLARE_KERNEL(template <class T> void, channel_sums,
 FIELDMARK_DECLARE_KERNEL(template <class T> void, fill_pixels,
                          (const T* row, std::int64_t pixels, std::int64_t channels, T* y, bool add))
 
+// A row of overlapping windows: x has `rows` rows of `width` pixels; windows begin `stride` pixels apart, and
+// what reaches beyond the width is left out.
+struct MaxPoolRow {
+  std::int64_t windows, size, stride, rows, width, channels;
+};
+// y[w, c] = the largest of window w, and place[w, c] the number of its pixel, u * size + v (null: not
+// wanted).
+FIELDMARK_DECLARE_KERNEL(template <class T> void, max_pool_row,
+                         (const MaxPoolRow& p, const T* x, T* y, T* place))
+// Row u of the windows: dx[pixel, c] += dy[w, c] where that pixel was the largest of window w.
+FIELDMARK_DECLARE_KERNEL(template <class T> void, max_pool_row_backward,
+                         (const MaxPoolRow& p, std::int64_t u, const T* dy, const T* place, T* dx))
+
 }  // namespace fieldmark::kernels

@@ -39,27 +39,23 @@ void bias_gradient(Tape<T>& tape, const T* dy, const T* mask, Index pixels, Inde
   }
 }
 
-ConvGeometry geometry(const Shape& x, const Shape& w, const Shape& b) {
+ConvGeometry geometry(const Shape& x, const Shape& w, const Shape& b, Index stride = 1, Index padding = 0) {
   check_rank("conv2d", "x", x, 4, "[N, H, W, C]");
   check_rank("conv2d", "w", w, 4, "[K, K, C, O]");
   check_rank("conv2d", "b", b, 1, "[O]");
   check_extent("conv2d", "w", w, 1, w[0], "a square window");
-  if (w[0] % 2 == 0)
-    throw ShapeError("[conv2d] w: axis 0 must be odd (a centred window), got shape " + w.str());
   check_extent("conv2d", "w", w, 2, x[3], "the channels of x, whose shape is " + x.str());
   check_extent("conv2d", "b", b, 0, w[3], "the outputs of w, whose shape is " + w.str());
-  return {x[0], x[1], x[2], x[3], w[3], w[0]};
+  return {x[0], x[1], x[2], x[3], w[3], w[0], stride, padding};
 }
 
-}  // namespace
-
 template <class T>
-Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, Activation activation, ConvMethod method) {
-  const ConvGeometry g = geometry(x.shape(), w.shape(), b.shape());
+Var<T> convolve(Var<T> x, Var<T> w, Var<T> b, const ConvGeometry& g, Activation activation,
+                ConvMethod method) {
   const bool relu = activation == Activation::relu;
   Tape<T>& tape = x.tape();
   T* y = nullptr;
-  const Var<T> out = tape.output({g.n, g.h, g.w, g.o}, &y, {x, w, b});
+  const Var<T> out = tape.output({g.n, g.out_h(), g.out_w(), g.o}, &y, {x, w, b});
   const bool winograd = method == ConvMethod::fastest && detail::winograd_pays(g);
   const detail::Convolution<T> forward{
       .x = x.value(), .w = w.value(), .bias = b.value(), .relu = relu, .y = y};
@@ -69,7 +65,8 @@ Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, Activation activation, ConvMethod me
   else
     bordered = detail::direct_convolve(tape, g, forward);
 
-  // dZ = dY through the ReLU; db sums it, dW correlates it with x, dX convolves it with the flipped weights.
+  // dZ = dY through the ReLU; db sums it, dW correlates it with x, dX convolves it with the flipped weights;
+  // where windows move by steps or are not centred, dX spreads it instead.
   tape.on_backward(out, [=](const T* dy) {
     Tape<T>& t = x.tape();
     const T* mask = relu ? y : nullptr;
@@ -82,6 +79,10 @@ Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, Activation activation, ConvMethod me
     }
     bool fresh = false;
     if (T* dx = x.grad_acc(&fresh)) {
+      if (!g.same()) {
+        detail::direct_input_gradient(t, g, w.value(), dy, mask, !fresh, dx);
+        return;
+      }
       const detail::Convolution<T> back{
           .x = dy, .mask = mask, .w = flipped(t, w.value(), g), .accumulate = !fresh, .y = dx};
       if (winograd)
@@ -93,7 +94,33 @@ Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, Activation activation, ConvMethod me
   return out;
 }
 
+}  // namespace
+
+template <class T>
+Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, Activation activation, ConvMethod method) {
+  ConvGeometry g = geometry(x.shape(), w.shape(), b.shape());
+  if (g.k % 2 == 0)
+    throw ShapeError("[conv2d] w: axis 0 must be odd (a centred window), got shape " + w.shape().str());
+  g.padding = g.k / 2;
+  return convolve(x, w, b, g, activation, method);
+}
+
+template <class T>
+Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, ConvSteps steps, Activation activation) {
+  if (steps.stride < 1 || steps.padding < 0)
+    throw ValueError("[conv2d] stride must be at least 1 and padding at least 0, got stride " +
+                     std::to_string(steps.stride) + " and padding " + std::to_string(steps.padding));
+  const ConvGeometry g = geometry(x.shape(), w.shape(), b.shape(), steps.stride, steps.padding);
+  if (std::min(g.h, g.w) + 2 * g.padding < g.k)
+    throw ShapeError("[conv2d] x: height and width must be at least " + std::to_string(g.k - 2 * g.padding) +
+                     " (the window's " + std::to_string(g.k) + " less two borders of " +
+                     std::to_string(g.padding) + "), got shape " + x.shape().str());
+  return convolve(x, w, b, g, activation, ConvMethod::fastest);
+}
+
 template Var<float> conv2d(Var<float>, Var<float>, Var<float>, Activation, ConvMethod);
 template Var<double> conv2d(Var<double>, Var<double>, Var<double>, Activation, ConvMethod);
+template Var<float> conv2d(Var<float>, Var<float>, Var<float>, ConvSteps, Activation);
+template Var<double> conv2d(Var<double>, Var<double>, Var<double>, ConvSteps, Activation);
 
 }  // namespace fieldmark

@@ -6,32 +6,32 @@ namespace {
 
 constexpr Index kDepth = 512;  // pixels that a product for dW sums over: as deep as stays in L2
 
-Index radius(const ConvGeometry& g) { return g.k / 2; }
-Index rows(const ConvGeometry& g) { return g.n * g.h; }
-Index padded_w(const ConvGeometry& g) { return g.w + 2 * radius(g); }
-Index padded_h(const ConvGeometry& g) { return g.h + 2 * radius(g); }
+Index rows(const ConvGeometry& g) { return g.n * g.out_h(); }
+Index padded_w(const ConvGeometry& g) { return g.w + 2 * g.padding; }
+Index padded_h(const ConvGeometry& g) { return g.h + 2 * g.padding; }
 
 // x [N, H, W, C] with a border of zeros, which every window then stays inside.
 template <class T>
 const T* with_border(Tape<T>& tape, const ConvGeometry& g, const T* x, const T* mask) {
-  const Index row = padded_w(g) * g.c, inner = g.w * g.c;
+  const Index row = padded_w(g) * g.c, inner = g.w * g.c, border = g.padding * g.c;
+  if (border == 0 && !mask) return x;
   T* out = tape.scratch(g.n * padded_h(g) * row);
   parallel_for(g.n * padded_h(g), 16, [&](Index begin, Index end) {
     for (Index p = begin; p < end; ++p) {
       T* to = out + p * row;
-      const Index image = p / padded_h(g), y = p % padded_h(g) - radius(g);
+      const Index image = p / padded_h(g), y = p % padded_h(g) - g.padding;
       if (y < 0 || y >= g.h) {
         std::fill_n(to, row, T(0));
         continue;
       }
       const Index from = (image * g.h + y) * inner;
-      std::fill_n(to, radius(g) * g.c, T(0));
-      T* middle = to + radius(g) * g.c;
+      std::fill_n(to, border, T(0));
+      T* middle = to + border;
       if (mask)
         for (Index i = 0; i < inner; ++i) middle[i] = mask[from + i] > 0 ? x[from + i] : T(0);
       else
         std::copy_n(x + from, inner, middle);
-      std::fill_n(middle + inner, radius(g) * g.c, T(0));
+      std::fill_n(middle + inner, border, T(0));
     }
   });
   return out;
@@ -49,16 +49,16 @@ const T* direct_convolve(Tape<T>& tape, const ConvGeometry& g, const Convolution
   const auto run = FIELDMARK_KERNEL(gemm<T>);
   parallel_for(rows(g), 4, [&](Index begin, Index end) {
     for (Index row = begin; row < end; ++row) {
-      const Index image = row / g.h, i = row % g.h;
-      run({.m = g.w,
+      const Index image = row / g.out_h(), i = row % g.out_h() * g.stride;
+      run({.m = g.out_w(),
            .n = g.o,
            .k = g.k * g.c,
            .segments = g.k,
            .a = padded + (image * padded_h(g) + i) * padded_w(g) * g.c,
-           .a_row = g.c,
+           .a_row = g.stride * g.c,
            .a_segment = padded_w(g) * g.c,
            .b = weights,
-           .c = c.y + row * g.w * g.o,
+           .c = c.y + row * g.out_w() * g.o,
            .ldc = g.o,
            .bias = c.bias,
            .accumulate = c.accumulate,
@@ -73,24 +73,26 @@ const T* direct_convolve(Tape<T>& tape, const ConvGeometry& g, const Convolution
 template <class T>
 void direct_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* padded, const T* dy, const T* mask,
                             T* dw) {
-  const Index size = g.k * g.k * g.c * g.o, together = std::max<Index>(1, kDepth / std::max<Index>(g.w, 1));
-  const Index pixels = rows(g) * g.w, panel = panel_width<T>(g.o);
+  const Index size = g.k * g.k * g.c * g.o,
+              together = std::max<Index>(1, kDepth / std::max<Index>(g.out_w(), 1));
+  const Index pixels = g.pixels(), panel = panel_width<T>(g.o);
   const T* d = packed(tape, dy, pixels, g.o, g.o, Index{1}, mask);
   sharded_sum(tape, rows(g), 64, dw, size, [&](Index begin, Index end, T* to) {
     using namespace kernels;
     const auto run = FIELDMARK_KERNEL(gemm<T>);
     for (Index row = begin; row < end;) {
-      const Index image = row / g.h, i = row % g.h, count = std::min({together, end - row, g.h - i});
+      const Index image = row / g.out_h(), i = row % g.out_h(),
+                  count = std::min({together, end - row, g.out_h() - i});
       for (Index u = 0; u < g.k; ++u)
         run({.m = g.k * g.c,
              .n = g.o,
-             .k = g.w,
+             .k = g.out_w(),
              .segments = count,
-             .a = padded + (image * padded_h(g) + i + u) * padded_w(g) * g.c,
+             .a = padded + (image * padded_h(g) + i * g.stride + u) * padded_w(g) * g.c,
              .a_row = 1,
-             .a_col = g.c,
-             .a_segment = padded_w(g) * g.c,
-             .b = d + row * g.w * panel,
+             .a_col = g.stride * g.c,
+             .a_segment = g.stride * padded_w(g) * g.c,
+             .b = d + row * g.out_w() * panel,
              .b_panel = pixels * panel,
              .c = to + u * g.k * g.c * g.o,
              .ldc = g.o,
@@ -100,9 +102,61 @@ void direct_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* padde
   });
 }
 
-#define FIELDMARK_INSTANTIATE(T)                                                           \
-  template const T* direct_convolve(Tape<T>&, const ConvGeometry&, const Convolution<T>&); \
-  template void direct_weight_gradient(Tape<T>&, const ConvGeometry&, const T*, const T*, const T*, T*);
+// dX[i s + u - p, j s + v - p, c] += sum over o of dY[i, j, o] w[u, v, c, o]: a row of dY times w[u] gives
+// for each of its pixels the K * channels numbers that lie together in the row of dX it sees. A piece owns
+// rows of dX with its border, gathers for each all the rows of dY that see it, and leaves the border out.
+template <class T>
+void direct_input_gradient(Tape<T>& tape, const ConvGeometry& g, const T* w, const T* dy, const T* mask,
+                           bool accumulate, T* dx) {
+  constexpr Index kRows = 8;
+  const Index run_length = g.k * g.c, line = padded_w(g) * g.c, width = g.out_w(), plane = g.out_h() * width;
+  const T* d = dy;
+  if (mask) {
+    T* masked = tape.scratch(g.pixels() * g.o);
+    parallel_for(g.pixels() * g.o, 1 << 15, [&](Index begin, Index end) {
+      for (Index i = begin; i < end; ++i) masked[i] = mask[i] > 0 ? dy[i] : T(0);
+    });
+    d = masked;
+  }
+  const Index panels = panels_size<T>(g.o, run_length);
+  T* weights = tape.scratch(g.k * panels);
+  for (Index u = 0; u < g.k; ++u)
+    pack(w + u * run_length * g.o, g.o, run_length, Index{1}, g.o, static_cast<const T*>(nullptr),
+         weights + u * panels);
+  const Index pieces = (g.n * g.h + kRows - 1) / kRows, room = line + width * run_length;
+  T* rooms = tape.scratch(pieces * room);
+  parallel_for(g.n * g.h, kRows, [&](Index begin, Index end) {
+    using namespace kernels;
+    const auto run = FIELDMARK_KERNEL(gemm<T>);
+    T *sum = rooms + begin / kRows * room, *product = sum + line;
+    for (Index row = begin; row < end; ++row) {
+      const Index image = row / g.h, r = row % g.h + g.padding;
+      std::fill_n(sum, line, T(0));
+      for (Index u = r % g.stride; u < std::min(g.k, r + 1); u += g.stride) {
+        const Index i = (r - u) / g.stride;
+        if (i >= g.out_h()) continue;
+        run({.m = width,
+             .n = run_length,
+             .k = g.o,
+             .a = d + (image * plane + i * width) * g.o,
+             .a_row = g.o,
+             .b = weights + u * panels,
+             .c = product,
+             .ldc = run_length});
+        for (Index j = 0; j < width; ++j)
+          for (Index k = 0; k < run_length; ++k) sum[j * g.stride * g.c + k] += product[j * run_length + k];
+      }
+      T* to = dx + row * g.w * g.c;
+      const T* from = sum + g.padding * g.c;
+      for (Index k = 0; k < g.w * g.c; ++k) to[k] = accumulate ? to[k] + from[k] : from[k];
+    }
+  });
+}
+
+#define FIELDMARK_INSTANTIATE(T)                                                                         \
+  template const T* direct_convolve(Tape<T>&, const ConvGeometry&, const Convolution<T>&);               \
+  template void direct_weight_gradient(Tape<T>&, const ConvGeometry&, const T*, const T*, const T*, T*); \
+  template void direct_input_gradient(Tape<T>&, const ConvGeometry&, const T*, const T*, const T*, bool, T*);
 FIELDMARK_INSTANTIATE(float)
 FIELDMARK_INSTANTIATE(double)
 

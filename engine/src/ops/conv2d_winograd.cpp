@@ -70,7 +70,7 @@ T* workspace(Index numbers) {
 // pictures has no say: a picture alone has the same bits as in a batch.
 bool winograd_pays(const ConvGeometry& g) {
   const Index tiles = tiles_along(g.h) * tiles_along(g.w);
-  return g.k == 3 && std::min(g.c, g.o) >= 8 && g.c + g.o >= 24 && g.h * g.w >= 6 * tiles &&
+  return g.k == 3 && g.same() && std::min(g.c, g.o) >= 8 && g.c + g.o >= 24 && g.h * g.w >= 6 * tiles &&
          tiles >= (g.c * g.o <= 4096 ? 4 : 32);
 }
 

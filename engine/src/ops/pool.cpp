@@ -74,6 +74,55 @@ Var<T> global_avg_pool(Var<T> x) {
   return out;
 }
 
+Index windows_along(Index extent, const MaxPool& m) {
+  if (extent < (m.partial ? 1 : m.size)) return 0;
+  const Index last = std::max<Index>(0, extent - m.size);
+  const Index count = (m.partial ? last + m.stride - 1 : last) / m.stride + 1;
+  return (count - 1) * m.stride < extent ? count : count - 1;
+}
+
+template <class T>
+Var<T> max_pool(Var<T> x, const MaxPool& m) {
+  const Shape s = x.shape();
+  const Index height = windows_along(s[1], m), width = windows_along(s[2], m), line = s[2] * s[3];
+  const Index out_line = width * s[3], grain = detail::row_grain(m.size * line);
+  const MaxPoolRow p{width, m.size, m.stride, m.size, s[2], s[3]};
+  Tape<T>& tape = x.tape();
+  T* y = nullptr;
+  const Var<T> out = tape.output({s[0], height, width, s[3]}, &y, {x});
+  T* place = x.needs_grad() ? tape.scratch(s[0] * height * out_line) : nullptr;
+  const auto forward = FIELDMARK_KERNEL(max_pool_row<T>);
+  parallel_for(s[0] * height, grain, [&](Index r0, Index r1) {
+    for (Index r = r0; r < r1; ++r) {
+      const Index top = r % height * m.stride;
+      MaxPoolRow row = p;
+      row.rows = std::min(m.size, s[1] - top);
+      forward(row, x.value() + (r / height * s[1] + top) * line, y + r * out_line,
+              place ? place + r * out_line : nullptr);
+    }
+  });
+
+  // The pixel that was the largest of a window receives its dy. A piece owns rows of x, and gathers from
+  // every row of windows that reaches them, in order.
+  tape.on_backward(out, [=](const T* dy) {
+    bool fresh = false;
+    T* dx = x.grad_acc(&fresh);
+    const auto backward = FIELDMARK_KERNEL(max_pool_row_backward<T>);
+    parallel_for(s[0] * s[1], detail::row_grain(line), [&](Index r0, Index r1) {
+      for (Index r = r0; r < r1; ++r) {
+        const Index n = r / s[1], i = r % s[1];
+        if (fresh) std::fill_n(dx + r * line, line, T(0));
+        const Index first = i < m.size ? 0 : (i - m.size) / m.stride + 1;
+        for (Index w = first; w < height && w * m.stride <= i; ++w) {
+          const Index at = (n * height + w) * out_line;
+          backward(p, i - w * m.stride, dy + at, place + at, dx + r * line);
+        }
+      }
+    });
+  });
+  return out;
+}
+
 }  // namespace
 }  // namespace kernels
 
@@ -92,9 +141,24 @@ Var<T> global_avg_pool(Var<T> x) {
   return kernels::global_avg_pool(x);
 }
 
+template <class T>
+Var<T> max_pool(Var<T> x, MaxPool windows) {
+  check_rank("max_pool", "x", x.shape(), 4, "[images, height, width, channels]");
+  if (windows.size < 1 || windows.stride < 1)
+    throw ValueError("[max_pool] size and stride must be at least 1, got size " +
+                     std::to_string(windows.size) + " and stride " + std::to_string(windows.stride));
+  const Index least = windows.partial ? 1 : windows.size;
+  if (std::min(x.shape()[1], x.shape()[2]) < least)
+    throw ShapeError("[max_pool] x: height and width must be at least " + std::to_string(least) +
+                     " (one window), got shape " + x.shape().str());
+  return kernels::max_pool(x, windows);
+}
+
 template Var<float> avg_pool(Var<float>, Index);
 template Var<double> avg_pool(Var<double>, Index);
 template Var<float> global_avg_pool(Var<float>);
 template Var<double> global_avg_pool(Var<double>);
+template Var<float> max_pool(Var<float>, MaxPool);
+template Var<double> max_pool(Var<double>, MaxPool);
 
 }  // namespace fieldmark

@@ -233,3 +233,102 @@ TEST_CASE("conv2d: a picture alone has the same bits as in a batch") {
       CHECK(std::equal(alone.dx.begin(), alone.dx.end(), all.dx.end() - static_cast<Index>(alone.dx.size())));
     }
 }
+
+namespace {
+// The definition with steps and a border, values and all gradients, in double.
+Result plain_steps(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, ConvSteps steps,
+                   Activation act) {
+  const Index H = x.shape[1], W = x.shape[2], C = x.shape[3], K = w.shape[0], O = w.shape[3],
+              s = steps.stride, p = steps.padding, OH = (H + 2 * p - K) / s + 1, OW = (W + 2 * p - K) / s + 1;
+  std::vector<double> y(x.shape[0] * OH * OW * O), dx(x.size()), dw(w.size()), db(O);
+  for (std::size_t at = 0; at < y.size(); ++at) {
+    const Index o = at % O, j = at / O % OW, i = at / (O * OW) % OH, n = at / (O * OW * OH);
+    const auto each = [&](auto&& f) {
+      for (Index k = 0; k < K * K * C; ++k) {
+        const Index r = i * s + k / (K * C) - p, c = j * s + k / C % K - p;
+        if (r >= 0 && r < H && c >= 0 && c < W) f(((n * H + r) * W + c) * C + k % C, k * O + o);
+      }
+    };
+    double sum = b[o];
+    each([&](Index xi, Index wi) { sum += double(x[xi]) * w[wi]; });
+    if (act == Activation::relu) sum = std::max(sum, 0.0);
+    y[at] = sum;
+    db[o] += sum;
+    each([&](Index xi, Index wi) {
+      dx[xi] += sum * w[wi];
+      dw[wi] += sum * x[xi];
+    });
+  }
+  const auto f = [](const std::vector<double>& v) { return std::vector<float>(v.begin(), v.end()); };
+  return {f(y), f(dx), f(dw), f(db)};
+}
+
+Result run_steps(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, ConvSteps steps,
+                 Activation act) {
+  Tape<float> tape;
+  Tensor<float> dx(x.shape), dw(w.shape), db(b.shape);
+  const auto y = conv2d(tape.leaf(x, dx), tape.leaf(w, dw), tape.leaf(b, db), steps, act);
+  const std::vector<float> values(y.value(), y.value() + y.shape().size());
+  tape.backward(y, values);
+  return {values, dx.data, dw.data, db.data};
+}
+}  // namespace
+
+TEST_CASE("conv2d: steps and borders, forward and all gradients, against the definition") {
+  for (const auto& [N, H, W, C, O, K, s, p] : {std::array<Index, 8>{1, 23, 30, 3, 64, 11, 4, 2},
+                                               {2, 15, 17, 3, 20, 3, 2, 0},
+                                               {1, 9, 8, 5, 7, 2, 1, 0},
+                                               {2, 7, 9, 4, 9, 2, 3, 1},
+                                               {1, 4, 4, 2, 3, 1, 5, 0},
+                                               {1, 3, 4, 16, 33, 3, 1, 2},
+                                               {1, 5, 6, 130, 17, 4, 2, 3},
+                                               {1, 1, 1, 1, 1, 3, 1, 1},
+                                               {0, 5, 6, 2, 3, 3, 2, 1}})
+    for (Activation act : {Activation::none, Activation::relu}) {
+      CAPTURE(N, H, W, C, O, K, s, p);
+      const auto x = uniform<float>({N, H, W, C}, -1, 1, 1), w = uniform<float>({K, K, C, O}, -1, 1, 2),
+                 b = uniform<float>({O}, -1, 1, 3);
+      const Result want = plain_steps(x, w, b, {.stride = s, .padding = p}, act);
+      each_isa([&] {
+        const Result got = run_steps(x, w, b, {.stride = s, .padding = p}, act);
+        REQUIRE(got.y.size() == want.y.size());
+        CHECK(error(got.y, want.y) < 1e-6);
+        CHECK(error(got.dx, want.dx) < 1e-6);
+        CHECK(error(got.dw, want.dw) < 1e-6);
+        CHECK(error(got.db, want.db) < 1e-6);
+      });
+    }
+}
+
+TEST_CASE("conv2d: steps of 1 inside half a window's border are the plain convolution, bit for bit") {
+  const auto x = uniform<float>({2, 20, 21, 24}, -1, 1, 1), w = uniform<float>({3, 3, 24, 32}, -1, 1, 2),
+             b = uniform<float>({32}, -1, 1, 3);
+  CHECK(run_steps(x, w, b, {.stride = 1, .padding = 1}, Activation::relu) == run(x, w, b, Activation::relu));
+}
+
+TEST_CASE("conv2d: gradient with steps and a border") {
+  const GradcheckFn f = [](Tape<double>&, auto v) {
+    return conv2d(v[0], v[1], v[2], {.stride = 3, .padding = 1});
+  };
+  for (const Shape s : {Shape{2, 6, 7, 2}, Shape{1, 2, 2, 2}, Shape{0, 6, 7, 2}})
+    expect_grad(f, {uniform(s, -1, 1, 1), uniform({4, 4, 2, 3}, -1, 1, 2), uniform({3}, -1, 1, 3)});
+}
+
+TEST_CASE("conv2d: errors of steps and borders, and the same bits for any thread count") {
+  Tape<float> tape;
+  const Tensor<float> x({1, 9, 4, 3}), w({7, 7, 3, 5}), b({5});
+  const auto vx = tape.constant(x), vw = tape.constant(w), vb = tape.constant(b);
+  CHECK_THROWS_WITH(conv2d(vx, vw, vb, {.stride = 0}),
+                    "[conv2d] stride must be at least 1 and padding at least 0, got stride 0 and padding 0");
+  CHECK_THROWS_WITH(conv2d(vx, vw, vb, {.stride = 2, .padding = 1}),
+                    "[conv2d] x: height and width must be at least 5 (the window's 7 less two borders of 1), "
+                    "got shape [1, 9, 4, 3]");
+  const auto picture = uniform<float>({2, 83, 90, 3}, -1, 1, 1),
+             weights = uniform<float>({11, 11, 3, 64}, -1, 1, 2), bias = uniform<float>({64}, -1, 1, 3);
+  const int before = threads();
+  set_threads(1);
+  const Result one = run_steps(picture, weights, bias, {.stride = 4, .padding = 2}, Activation::relu);
+  set_threads(2);
+  CHECK(one == run_steps(picture, weights, bias, {.stride = 4, .padding = 2}, Activation::relu));
+  set_threads(before);
+}

@@ -75,3 +75,102 @@ TEST_CASE("pool: float against double, and the same bits for any thread count") 
   CHECK(float_error_to_130(f_global, of_channels) < 2e-7);
   CHECK(float_error(f_global, {x}) < 2e-7);
 }
+
+namespace {
+constexpr MaxPool kWindows[] = {{.size = 3, .stride = 2}, {.size = 3, .stride = 2, .partial = true},
+                                {.size = 2, .stride = 2}, {.size = 2, .stride = 3, .partial = true},
+                                {.size = 3, .stride = 1}, {.size = 1, .stride = 2}};
+
+auto max_of(const MaxPool& windows) {
+  return [windows](auto&, auto v) { return max_pool(v[0], windows); };
+}
+
+// PyTorch's rule for the number of windows, counted instead of computed.
+Index count_windows(Index extent, const MaxPool& m) {
+  Index count = 0;
+  while (count * m.stride + m.size <= extent ||
+         (m.partial && count * m.stride < extent && (count == 0 || (count - 1) * m.stride + m.size < extent)))
+    ++count;
+  return count;
+}
+}  // namespace
+
+TEST_CASE(
+    "max_pool: values and gradients equal a plain loop, for windows that overlap, leave gaps or reach over "
+    "the edge") {
+  for (const MaxPool& m : kWindows)
+    for (const Shape s : {Shape{2, 7, 8, 3}, Shape{1, 3, 4, 1}, Shape{1, 10, 5, 18}, Shape{0, 4, 4, 2}}) {
+      CAPTURE(m.size, m.stride, m.partial, s.str());
+      const auto x = uniform(s, -1, 1, 5);
+      const Index height = count_windows(s[1], m), width = count_windows(s[2], m);
+      const Shape out{s[0], height, width, s[3]};
+      const auto u = uniform(out, -1, 1, 99);
+      std::vector<double> want(u.data.size()), gradient(x.data.size());
+      for (Index k = 0; k < u.size(); ++k) {
+        const Index c = k % s[3], j = k / s[3] % width, i = k / (s[3] * width) % height,
+                    n = k / (s[3] * width * height);
+        Index best = -1;
+        for (Index r = i * m.stride; r < std::min(i * m.stride + m.size, s[1]); ++r)
+          for (Index q = j * m.stride; q < std::min(j * m.stride + m.size, s[2]); ++q) {
+            const Index at = ((n * s[1] + r) * s[2] + q) * s[3] + c;
+            if (best < 0 || x[at] > x[best]) best = at;
+          }
+        want[static_cast<std::size_t>(k)] = x[best];
+        gradient[static_cast<std::size_t>(best)] += u[k];
+      }
+      const auto got = run_op(max_of(m), std::vector{x});
+      CHECK(got[0] == want);
+      REQUIRE(got[1].size() == gradient.size());
+      double worst = 0;
+      for (std::size_t i = 0; i < gradient.size(); ++i)
+        worst = std::max(worst, std::abs(got[1][i] - gradient[i]));
+      CHECK(worst < 1e-15);
+    }
+}
+
+TEST_CASE("max_pool: the first of equal numbers gets the gradient, NaN and infinities come through") {
+  Tensor<float> x({1, 2, 2, 1}, 1.f), g(x.shape);
+  Tape<float> tape;
+  const auto inner = avg_pool(tape.leaf(x, g), 1);  // its gradient buffer is made, not given
+  tape.backward(max_pool(inner, {.size = 2, .stride = 1}), std::vector<float>{3});
+  CHECK(g.data == std::vector<float>{3, 0, 0, 0});
+  for (Index at = 0; at < 4; ++at) {
+    x = Tensor<float>({1, 2, 2, 1}, 2.f);
+    x[at] = std::nanf("");
+    CHECK(std::isnan(op_values(max_of({.size = 2, .stride = 1}), std::vector{x})[0]));
+    x[at] = -INFINITY;
+    CHECK(op_values(max_of({.size = 2, .stride = 1}), std::vector{x})[0] == 2);
+  }
+  x.data.assign(4, -INFINITY);
+  CHECK(op_values(max_of({.size = 2, .stride = 1}), std::vector{x})[0] == -INFINITY);
+}
+
+TEST_CASE("max_pool: gradient") {
+  // Numbers a tenth apart: differences of 0.02 change no winner.
+  for (const Shape s : {Shape{0, 4, 4, 2}, Shape{1, 3, 3, 1}, Shape{2, 4, 5, 2}}) {
+    CAPTURE(s.str());
+    Tensor<double> x(s);
+    for (Index i = 0; i < x.size(); ++i) x[i] = 0.1 * static_cast<double>(i * 37 % 101);
+    for (const MaxPool& m : kWindows) expect_grad(max_of(m), {x});
+  }
+}
+
+TEST_CASE("max_pool: errors") {
+  Tape<double> tape;
+  const Tensor<double> x({1, 2, 5, 3}), flat({4, 3}), none({1, 0, 2, 3});
+  CHECK_THROWS_WITH(max_pool(tape.constant(flat), {}), Contains("[max_pool] x must have rank 4"));
+  CHECK_THROWS_WITH(max_pool(tape.constant(x), {.size = 0}),
+                    "[max_pool] size and stride must be at least 1, got size 0 and stride 2");
+  CHECK_THROWS_WITH(max_pool(tape.constant(x), {.size = 3}),
+                    "[max_pool] x: height and width must be at least 3 (one window), got shape [1, 2, 5, 3]");
+  CHECK_THROWS_WITH(max_pool(tape.constant(none), {.partial = true}),
+                    Contains("must be at least 1 (one window)"));
+}
+
+TEST_CASE("max_pool: float against double, and the same bits for any thread count") {
+  const auto of_channels = [](Index e) { return std::vector{uniform<float>({2, 6, 7, e}, -1, 1, 1)}; };
+  for (const MaxPool& m : kWindows) {
+    expect_same_bits(max_of(m), {uniform<float>({3, 50, 51, 17}, -1, 1, 1)});
+    CHECK(float_error_to_130(max_of(m), of_channels) < 2e-7);
+  }
+}

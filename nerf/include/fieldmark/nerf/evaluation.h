@@ -1,4 +1,5 @@
 #pragma once
+#include <fieldmark/engine/nn/lpips.h>
 #include <fieldmark/nerf/renderer.h>
 
 #include <functional>
@@ -11,6 +12,7 @@ struct ViewScore {
   double psnr;         ///< over the whole picture, dB
   double psnr_object;  ///< over the object's pixels, dB; NaN where the object is not in the picture
   double ssim;         ///< in [-1, 1]; NaN for a picture smaller than the window of ssim()
+  double lpips;  ///< both rounded to 8 bits; NaN without a network, or for a picture it is too small for
 };
 
 /// Means over the views of a data set. A view whose number is NaN is left out of that number's mean.
@@ -18,6 +20,7 @@ struct Evaluation {
   double psnr = 0;                  ///< mean of ViewScore::psnr
   double psnr_object = 0;           ///< mean of ViewScore::psnr_object
   double ssim = 0;                  ///< mean of ViewScore::ssim
+  double lpips = 0;                 ///< mean of ViewScore::lpips
   Index views = 0;                  ///< rendered
   double seconds_per_view = 0;      ///< of rendering alone
   std::vector<ViewScore> per_view;  ///< [views] in the order of the data set
@@ -28,8 +31,10 @@ struct Evaluation {
 /// everywhere), it is where the rendering's opacity does.
 /// @param progress  called after each view with how many are done and how many there are; false ends the
 ///                  evaluation with the views so far. May be empty
+/// @param lpips     the network of ViewScore::lpips, or null
 /// @throws ValueError if there are no views
 Evaluation evaluate(Renderer& renderer, const Dataset& dataset,
-                    const std::function<bool(Index done, Index total)>& progress = {});
+                    const std::function<bool(Index done, Index total)>& progress = {},
+                    const Lpips<float>* lpips = nullptr);
 
 }  // namespace fieldmark::nerf

@@ -1,5 +1,6 @@
 #pragma once
 #include <fieldmark/distort/attack.h>
+#include <fieldmark/engine/nn/lpips.h>
 #include <fieldmark/watermark/picture_reader.h>
 
 #include <functional>
@@ -18,6 +19,7 @@ struct MeasureOptions {
   std::vector<nerf::Camera> cameras = {};  ///< of the views, at their full resolution
   std::vector<std::string> under = {};     ///< distortions besides none, names of parse_attack()
   std::uint64_t seed = 0;                  ///< of messages and distortions
+  const Lpips<float>* lpips = nullptr;     ///< network of Measurement::lpips_base; null: it is NaN
   std::function<bool(Index done, Index total)> progress = {};  ///< returns false to stop, which throws Error
 };
 
@@ -30,8 +32,10 @@ struct Measurement {
       accuracy;            ///< share of bits right in one view, mean over views; an undecided bit counts 0.5
   double accuracy_p5 = 0;  ///< 5th percentile over views of the blind accuracy
   double psnr_base = 0;    ///< marked against unmarked, dB, both rounded to 8 bits, mean over views
-  double psnr_base_object = 0;                   ///< the same over pixels whose unmarked opacity exceeds 0.5
-  double ssim_base = 0;                          ///< marked against unmarked, mean over views
+  double psnr_base_object = 0;  ///< the same over pixels whose unmarked opacity exceeds 0.5
+  double ssim_base = 0;         ///< marked against unmarked, mean over views
+  double lpips_base = 0;  ///< the same, both rounded to 8 bits; NaN without a network or where views are too
+                          ///< small for it
   std::map<std::string, ReadingAccuracy> under;  ///< for each distortion
 };
 

@@ -19,4 +19,20 @@ template <class T>
 Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, Activation activation = Activation::none,
               ConvMethod method = ConvMethod::fastest);
 
+/// How the window of conv2d() moves where it does not visit every pixel, or the border is not half a window.
+struct ConvSteps {
+  Index stride = 1;   ///< pixels from one window to the next, both ways, >= 1
+  Index padding = 0;  ///< pixels of zeros around the picture, >= 0
+};
+
+/// The same with steps of `stride` pixels inside a border of `padding` zeros.
+///   y[n, i, j, o] = act(b[o] + sum_{u, v, c} x[n, i s + u - p, j s + v - p, c] w[u, v, c, o])
+/// @param x  [N, H, W, C]   @param w  [K, K, C, O], any K   @param b  [O]
+/// @return [N, (H + 2 p - K) / s + 1, (W + 2 p - K) / s + 1, O], rounded down
+/// @throws ShapeError if they do not fit or the picture with its border is smaller than the window
+/// @throws ValueError if stride or padding is out of range
+/// Differentiable in: x, w, b. With relu: a kink where the sum is 0, gradient 0 there.
+template <class T>
+Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, ConvSteps steps, Activation activation = Activation::none);
+
 }  // namespace fieldmark

@@ -18,4 +18,22 @@ Var<T> avg_pool(Var<T> x, Index size);
 template <class T>
 Var<T> global_avg_pool(Var<T> x);
 
+/// Windows of max_pool().
+struct MaxPool {
+  Index size = 2;        ///< side of a window in pixels, >= 1
+  Index stride = 2;      ///< pixels from one window to the next, both ways, >= 1
+  bool partial = false;  ///< also windows that reach over the lower or right edge ("ceil mode"): what lies
+                         ///< inside counts
+};
+
+/// Largest number of each channel in windows of size x size pixels, which may overlap or leave gaps.
+/// @param x [N, H, W, C]   @return [N, H', W', C], H' = (H - size) / stride + 1 rounded down, or, with
+/// partial windows, rounded up and at least 1, less a window that would begin outside; a NaN in a window is
+/// its result
+/// @throws ShapeError if x is not rank 4 or has no window   @throws ValueError if a number is out of range
+/// Differentiable in: x, where no two numbers of a window are both the largest; else the gradient goes to the
+/// first of them in reading order.
+template <class T>
+Var<T> max_pool(Var<T> x, MaxPool windows);
+
 }  // namespace fieldmark

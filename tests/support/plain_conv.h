@@ -1,0 +1,83 @@
+#pragma once
+#include <fieldmark/engine/safetensors.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+/// Networks as the papers write them, in plain loops in double over channels-first pictures: nothing here is
+/// shared with the library but the file reader.
+struct PlainPicture {
+  long c = 0, h = 0, w = 0;
+  std::vector<double> x;
+  double& at(long k, long i, long j) { return x[static_cast<std::size_t>((k * h + i) * w + j)]; }
+  double at(long k, long i, long j) const { return x[static_cast<std::size_t>((k * h + i) * w + j)]; }
+};
+
+inline PlainPicture plain_picture(long c, long h, long w) {
+  return {c, h, w, std::vector<double>(static_cast<std::size_t>(c * h * w))};
+}
+
+/// relu(conv2d), PyTorch's layout of weights [out, in, k, k].
+inline PlainPicture plain_conv(const PlainPicture& x, const fieldmark::SafetensorsFile& file,
+                               const std::string& name, long stride, long padding) {
+  const auto w = file.f32(name + ".weight"), b = file.f32(name + ".bias");
+  const long k = w.shape[2];
+  PlainPicture y =
+      plain_picture(w.shape[0], (x.h + 2 * padding - k) / stride + 1, (x.w + 2 * padding - k) / stride + 1);
+  for (long o = 0; o < y.c; ++o)
+    for (long i = 0; i < y.h; ++i)
+      for (long j = 0; j < y.w; ++j) {
+        double sum = static_cast<double>(b[o]);
+        for (long c = 0; c < x.c; ++c)
+          for (long u = 0; u < k; ++u)
+            for (long v = 0; v < k; ++v) {
+              const long r = i * stride + u - padding, s = j * stride + v - padding;
+              if (r >= 0 && r < x.h && s >= 0 && s < x.w)
+                sum += static_cast<double>(w[((o * x.c + c) * k + u) * k + v]) * x.at(c, r, s);
+            }
+        y.at(o, i, j) = std::max(sum, 0.0);
+      }
+  return y;
+}
+
+/// Largest numbers of windows; `ceil` as PyTorch's ceil_mode.
+inline PlainPicture plain_max_pool(const PlainPicture& x, long size, long stride, bool ceil) {
+  const auto extent = [&](long n) {
+    const double windows = static_cast<double>(n - size) / static_cast<double>(stride);
+    return static_cast<long>(ceil ? std::ceil(windows) : std::floor(windows)) + 1;
+  };
+  PlainPicture y = plain_picture(x.c, extent(x.h), extent(x.w));
+  for (long c = 0; c < y.c; ++c)
+    for (long i = 0; i < y.h; ++i)
+      for (long j = 0; j < y.w; ++j) {
+        double most = -1e300;
+        for (long u = i * stride; u < std::min(i * stride + size, x.h); ++u)
+          for (long v = j * stride; v < std::min(j * stride + size, x.w); ++v)
+            most = std::max(most, x.at(c, u, v));
+        y.at(c, i, j) = most;
+      }
+  return y;
+}
+
+/// The channels of a, then those of b.
+inline PlainPicture plain_concat(PlainPicture a, const PlainPicture& b) {
+  a.c += b.c;
+  a.x.insert(a.x.end(), b.x.begin(), b.x.end());
+  return a;
+}
+
+/// Largest difference in parts of the largest number. @param y  [1, H, W, C] of the library
+template <class T>
+double plain_error(const PlainPicture& want, const T* y) {
+  double off = 0, most = 1e-30;
+  for (long c = 0; c < want.c; ++c)
+    for (long p = 0; p < want.h * want.w; ++p) {
+      const double w = want.x[static_cast<std::size_t>(c * want.h * want.w + p)];
+      const double d = std::abs(static_cast<double>(y[p * want.c + c]) - w);
+      off = d <= off ? off : d;
+      most = std::max(most, std::abs(w));
+    }
+  return off / most;
+}

@@ -1,0 +1,25 @@
+#pragma once
+#include <cstdlib>
+#include <optional>
+#include <string>
+
+/// Sets a variable of the environment, or takes it away (null), until the end of the scope.
+struct EnvironmentVariable {
+  std::string name;
+  std::optional<std::string> before;
+  EnvironmentVariable(const char* name, const char* value) : name(name) {
+    if (const char* old = std::getenv(name)) before = old;
+    set(value);
+  }
+  EnvironmentVariable(const EnvironmentVariable&) = delete;
+  EnvironmentVariable& operator=(const EnvironmentVariable&) = delete;
+  ~EnvironmentVariable() { set(before ? before->c_str() : nullptr); }
+
+ private:
+  void set(const char* value) const {
+    if (value)
+      ::setenv(name.c_str(), value, 1);
+    else
+      ::unsetenv(name.c_str());
+  }
+};

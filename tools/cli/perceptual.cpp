@@ -1,0 +1,42 @@
+#include "cli/perceptual.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <ostream>
+
+namespace fieldmark::cli {
+
+void add_lpips_weights(CLI::App& app, std::string& file) {
+  app.add_option("--lpips-weights", file,
+                 "LPIPS weights, AlexNet ($FIELDMARK_DATA/weights/lpips_alex_v0.1.safetensors);\n"
+                 "none leaves LPIPS out")
+      ->type_name("FILE")
+      ->default_str("");
+}
+
+std::optional<Lpips<float>> load_lpips(LpipsNetwork network, const std::string& file, Context& context) {
+  if (file == "none") return std::nullopt;
+  const std::string name = network == LpipsNetwork::alex ? "alex" : "squeeze";
+  std::filesystem::path path = file;
+  if (file.empty()) {
+    const char* data = std::getenv("FIELDMARK_DATA");
+    if (data && *data)
+      path = std::filesystem::path(data) / "weights" / ("lpips_" + name + "_v0.1.safetensors");
+    if (path.empty() || !std::filesystem::exists(path)) {
+      context.text() << "no LPIPS (" << name << "): no weights given, none in $FIELDMARK_DATA/weights\n";
+      return std::nullopt;
+    }
+  }
+  return Lpips<float>(SafetensorsFile::read(path), network);
+}
+
+double lpips_or_nan(const std::optional<Lpips<float>>& lpips, const Tensor<float>& a,
+                    const Tensor<float>& b) {
+  if (!lpips || std::min(a.shape[0], a.shape[1]) < lpips->smallest()) return std::nan("");
+  return lpips->distance(a, b).value;
+}
+
+}  // namespace fieldmark::cli
