@@ -9,6 +9,12 @@ constexpr Index kGrain = 1024;  // rows a piece
 }
 
 template <class T>
+void frequency_values(const T* x, Index n, Index dims, int bands, T* y) {
+  using namespace kernels;
+  FIELDMARK_KERNEL(frequency_forward<T>)(x, n, static_cast<int>(dims), bands, y);
+}
+
+template <class T>
 Var<T> frequency_encoding(Var<T> x, int bands) {
   check_rank("frequency_encoding", "x", x.shape(), 2, "[N, D]");
   if (x.shape()[1] < 1 || x.shape()[1] > 4)
@@ -18,10 +24,8 @@ Var<T> frequency_encoding(Var<T> x, int bands) {
   const Index n = x.shape()[0], dims = x.shape()[1], row = 2 * bands * dims;
   T* y = nullptr;
   const Var<T> out = x.tape().output({n, row}, &y, {x});
-  using namespace kernels;
-  const auto forward = FIELDMARK_KERNEL(frequency_forward<T>);
   parallel_for(n, kGrain, [&](Index begin, Index end) {
-    forward(x.value() + begin * dims, end - begin, static_cast<int>(dims), bands, y + begin * row);
+    frequency_values(x.value() + begin * dims, end - begin, dims, bands, y + begin * row);
   });
 
   // d sin(k x) = k cos(k x), d cos(k x) = -k sin(k x), k = 2^b pi: both are in y. A row of dx has one owner.
@@ -42,6 +46,8 @@ Var<T> frequency_encoding(Var<T> x, int bands) {
   return out;
 }
 
+template void frequency_values(const float*, Index, Index, int, float*);
+template void frequency_values(const double*, Index, Index, int, double*);
 template Var<float> frequency_encoding(Var<float>, int);
 template Var<double> frequency_encoding(Var<double>, int);
 

@@ -78,28 +78,70 @@ std::array<TablePart, 2> table_parts(const FieldOptions& o) {
   return {TablePart{"hash/density_features", 0}, TablePart{"hash/colour_features", at(o.encoding.features)}};
 }
 
+// What tells kinds apart is the entry "kind"; a hash field, the first there was, has none.
+Json field_json(const RadianceFieldOptions& o) {
+  const FieldOptions& f = o.field;
+  if (f.kind == FieldKind::mlp)
+    return {{"kind", "mlp"},
+            {"layers", f.mlp.layers},
+            {"width", f.mlp.width},
+            {"skip", f.mlp.skip},
+            {"position_bands", f.mlp.position_bands},
+            {"direction_bands", f.mlp.direction_bands},
+            {"average_points", o.points.average},
+            {"importance_points", o.points.importance},
+            {"random_points", o.points.random}};
+  return {{"levels", f.encoding.levels},
+          {"features", f.encoding.features},
+          {"log2_table", f.encoding.log2_table},
+          {"base_resolution", f.encoding.base_resolution},
+          {"finest_resolution", f.encoding.finest_resolution},
+          {"width", f.width},
+          {"geometry", f.geometry}};
+}
+
+void parse_field(const Json& j, RadianceFieldOptions& o) {
+  const std::string kind = j.value("kind", "hash");
+  if (kind == "hash") {
+    o.field = {.encoding = {.levels = j.at("levels"),
+                            .features = j.at("features"),
+                            .log2_table = j.at("log2_table"),
+                            .base_resolution = j.at("base_resolution"),
+                            .finest_resolution = j.at("finest_resolution")},
+               .width = j.at("width"),
+               .geometry = j.at("geometry")};
+  } else if (kind == "mlp") {
+    o.field = {.kind = FieldKind::mlp,
+               .mlp = {.layers = j.at("layers"),
+                       .width = j.at("width"),
+                       .skip = j.at("skip"),
+                       .position_bands = j.at("position_bands"),
+                       .direction_bands = j.at("direction_bands")}};
+    o.points = {.average = j.at("average_points"),
+                .importance = j.at("importance_points"),
+                .random = j.at("random_points")};
+  } else {
+    throw ValueError("[radiance_field] kind must be hash or mlp, got " + kind);
+  }
+}
+
 }  // namespace
 
 RadianceField::RadianceField(const RadianceFieldOptions& options)
     : field(params, options.field, options.seed), grid(options.occupancy), options_(options) {
+  if (options.field.kind == FieldKind::mlp)
+    coarse.emplace(params, options.field, options.seed + 100, "coarse/");
   if (!(options.step > 0 && options.step <= 1))
     throw ValueError("[radiance_field] step must be above 0 and at most 1, got " +
                      std::to_string(options.step));
 }
 
 std::string RadianceField::configuration() const {
-  const FieldOptions& f = options_.field;
-  Json json{{"levels", f.encoding.levels},
-            {"features", f.encoding.features},
-            {"log2_table", f.encoding.log2_table},
-            {"base_resolution", f.encoding.base_resolution},
-            {"finest_resolution", f.encoding.finest_resolution},
-            {"width", f.width},
-            {"geometry", f.geometry},
-            {"occupancy", options_.occupancy},
-            {"step", options_.step},
-            {"background", background == Background::white ? "white" : "black"},
-            {"cameras", Json::parse(format_camera_span(cameras))}};
+  Json json = field_json(options_);
+  json.update({{"occupancy", options_.occupancy},
+               {"step", options_.step},
+               {"background", background == Background::white ? "white" : "black"},
+               {"cameras", Json::parse(format_camera_span(cameras))}});
   add_space(json, space);
   return json.dump();
 }
@@ -108,13 +150,7 @@ RadianceField RadianceField::from_configuration(std::string_view text, std::stri
   try {
     const Json j = Json::parse(text);
     RadianceFieldOptions o;
-    o.field = {.encoding = {.levels = j.at("levels"),
-                            .features = j.at("features"),
-                            .log2_table = j.at("log2_table"),
-                            .base_resolution = j.at("base_resolution"),
-                            .finest_resolution = j.at("finest_resolution")},
-               .width = j.at("width"),
-               .geometry = j.at("geometry")};
+    parse_field(j, o);
     o.occupancy = j.at("occupancy");
     o.step = j.at("step");
     RadianceField field(o);
@@ -135,11 +171,13 @@ void RadianceField::store(SafetensorsFile& file, const std::string& prefix) cons
     if (e.name == "hash/table") continue;
     file.add(prefix + e.name, e.shape, params.values(params.find(e.name)));
   }
-  const auto table = params.values(field.encoding().table());
-  const auto row = at(2 * field.encoding().features());
-  for (const TablePart& part : table_parts(options_.field))
-    file.add(prefix + part.name, {field.encoding().rows(), field.encoding().features()},
-             table_part(table, row, part.begin));
+  if (field.has_table()) {
+    const auto table = params.values(field.encoding().table());
+    const auto row = at(2 * field.encoding().features());
+    for (const TablePart& part : table_parts(options_.field))
+      file.add(prefix + part.name, {field.encoding().rows(), field.encoding().features()},
+               table_part(table, row, part.begin));
+  }
   std::vector<std::uint8_t> packed(at(grid.cells() / 8));
   for (Index c = 0; c < grid.cells(); ++c)
     if (grid.occupied(c)) packed[at(c / 8)] = static_cast<std::uint8_t>(packed[at(c / 8)] | (1u << (c % 8)));
@@ -152,11 +190,13 @@ void RadianceField::restore(const SafetensorsFile& file, const std::string& pref
     const Tensor<float> t = read_tensor(file, prefix + e.name, e.shape);
     std::copy(t.data.begin(), t.data.end(), params.values(params.find(e.name)).begin());
   }
-  const auto row = at(2 * field.encoding().features());
-  for (const TablePart& part : table_parts(options_.field))
-    set_table_part(
-        params.values(field.encoding().table()), row, part.begin,
-        read_tensor(file, prefix + part.name, {field.encoding().rows(), field.encoding().features()}).data);
+  if (field.has_table()) {
+    const auto row = at(2 * field.encoding().features());
+    const Shape shape{field.encoding().rows(), field.encoding().features()};
+    for (const TablePart& part : table_parts(options_.field))
+      set_table_part(params.values(field.encoding().table()), row, part.begin,
+                     read_tensor(file, prefix + part.name, shape).data);
+  }
   const std::vector<std::uint8_t> packed = file.u8(prefix + kOccupancy);
   if (static_cast<Index>(packed.size()) != grid.cells() / 8)
     throw IoError(file.path + ": tensor '" + prefix + kOccupancy + "': expected " +

@@ -1,7 +1,6 @@
 #include <fieldmark/engine/ops/rows.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/nerf/renderer.h>
-#include <fieldmark/nerf/spherical_harmonics.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,14 +8,15 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kTile = 16;  // pixels a side: rays of a tile pass through the same cells
+constexpr Index kMlpRays = 64;  // of an mlp field at a time: what is kept of a sample is large
+constexpr Index kTile = 16;     // pixels a side: rays of a tile pass through the same cells
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 }  // namespace
 
 struct Renderer::Lane {
-  RaySampler sampler;
+  FieldSampler sampler;
   RaySamples samples;
   Tape<float> tape;
   CubeRays rays;
@@ -34,20 +34,21 @@ Renderer::Renderer(const RadianceField& field, const RenderOptions& options)
 }
 Renderer::~Renderer() = default;
 
-void sample_weights(const RaySamples& samples, float step, float* weights) {
-  for (std::size_t r = 0; r + 1 < samples.ray_begin.size(); ++r) {
-    float transmittance = 1;
-    for (Index i = samples.ray_begin[r]; i < samples.ray_begin[r + 1]; ++i) {
-      weights[i] = -transmittance * std::expm1(-samples.sigma[at(i)] * step);
-      transmittance -= weights[i];
-    }
+void Renderer::trace(const RayBatch& rays, Index lane_index, float* out, float* position) {
+  Lane& lane = *lanes_[at(lane_index)];
+  const Index block = field_.coarse ? kMlpRays : rays.size();
+  for (Index begin = 0; begin < rays.size(); begin += block) {
+    const Index n = std::min(block, rays.size() - begin);
+    trace_block(
+        {rays.origins.subspan(at(3 * begin), at(3 * n)), rays.directions.subspan(at(3 * begin), at(3 * n))},
+        lane, out + 4 * begin, position ? position + 3 * begin : nullptr);
   }
 }
 
-void Renderer::trace(const RayBatch& rays, Index lane_index, float* out, float* position) {
-  Lane& lane = *lanes_[at(lane_index)];
-  lane.sampler.sample(field_.field, field_.params, field_.grid, rays, {},
-                      {.step = field_.step(), .stop = options_.stop}, lane.samples, &packed_);
+void Renderer::trace_block(const RayBatch& rays, Lane& lane, float* out, float* position) {
+  lane.sampler.sample(field_, rays, {},
+                      {.stop = options_.stop, .points = options_.points.value_or(field_.options().points)},
+                      lane.samples, &packed_);
   const RaySamples& s = lane.samples;
   lane.weights.resize(at(s.size()));
   sample_weights(s, field_.step(), lane.weights.data());
@@ -64,15 +65,15 @@ void Renderer::trace(const RayBatch& rays, Index lane_index, float* out, float* 
   lane.tape.reset();
   Tape<float>& tape = lane.tape;
   const Params<float> params(field_.params, nullptr, packed_);
-  const Index width = field_.field.encoding().width();
+  const Field<float>& net = field_.field;
   const auto rows = [&](const std::vector<float>& all, Index columns) {
-    return gather_rows(tape.constant(all.data(), {static_cast<Index>(all.size()) / columns, columns}),
-                       lane.kept);
+    return gather_rows(tape.constant(all.data(), {s.size(), columns}), lane.kept);
   };
-  const Var<float> harmonics = spherical_harmonics(tape.constant(rays.seen_from.data(), {rays.size(), 3}));
-  const Var<float> rgb =
-      field_.field.colour(params, field_.field.geometry(params, rows(s.density_features, width)),
-                          rows(s.colour_features, width), gather_rows(harmonics, lane.sample_ray));
+  const Var<float> of_ray = net.encode_directions(tape.constant(rays.seen_from.data(), {rays.size(), 3}));
+  const Var<float> z = field_.coarse ? rows(s.z, net.geometry_width())
+                                     : net.geometry(params, rows(s.density_features, net.density_width()));
+  const Var<float> rgb = net.colour(params, z, rows(s.colour_features, net.colour_width()),
+                                    gather_rows(of_ray, lane.sample_ray));
   lane.colours.assign(rgb.value(), rgb.value() + rgb.shape().size());
   lane.positions.clear();
   for (std::int32_t i : lane.kept)

@@ -49,7 +49,7 @@ void RaySampler::sample(const Field<float>& field, const ParamStore<float>& para
     evaluate(field, params, packed, first_row);
     stop_rays(options, first_segment);
   }
-  pack(rays.size(), field.encoding().width(), out);
+  pack(rays.size(), field.density_width(), field.colour_width(), out);
 }
 
 // One segment for each ray that is still alive; rays that end here leave the list.
@@ -69,18 +69,14 @@ void RaySampler::march_wave(const OccupancyGrid& grid) {
 
 void RaySampler::evaluate(const Field<float>& field, const ParamStore<float>& params,
                           const PackedWeights<float>* packed, Index first) {
-  const Index n = static_cast<Index>(t_.size()) - first, width = field.encoding().width();
+  const Index n = static_cast<Index>(t_.size()) - first, width = field.density_width();
   if (n == 0) return;
   density_features_.resize(at((first + n) * width));
-  colour_features_.resize(at((first + n) * width));
+  colour_features_.resize(at((first + n) * field.colour_width()));
   sigma_.resize(at(first + n));
-  float *features = density_features_.data() + first * width,
-        *colour = colour_features_.data() + first * width;
-  const ParamId table = field.encoding().table();
-  if (const std::uint16_t* rounded = packed ? packed->table(table) : nullptr)
-    field.encoding().encode(rounded, x_.data() + 3 * first, n, features, colour);
-  else
-    field.encoding().encode(params.values(table), x_.data() + 3 * first, n, features, colour);
+  float* features = density_features_.data() + first * width;
+  field.encode(params, x_.data() + 3 * first, n, features,
+               colour_features_.data() + first * field.colour_width(), packed);
   tape_.reset();
   const Params<float> weights =
       packed ? Params<float>(params, nullptr, *packed) : Params<float>(params, nullptr);
@@ -104,16 +100,18 @@ void RaySampler::stop_rays(const SamplingOptions& options, std::size_t first_seg
 
 // Waves hold segments of many rays; the packed form holds rays one after another. A stable count per ray
 // gives every segment its place, in the order of the waves.
-void RaySampler::pack(Index rays, Index width, RaySamples& out) {
+void RaySampler::pack(Index rays, Index density, Index colour, RaySamples& out) {
   out.ray_begin.assign(at(rays + 1), 0);
   for (const Segment& s : segments_) out.ray_begin[at(s.ray + 1)] += s.count;
   for (std::size_t r = 1; r < out.ray_begin.size(); ++r) out.ray_begin[r] += out.ray_begin[r - 1];
   const Index total = out.ray_begin.back();
+  out.delta.clear();
+  out.z.clear();
   out.t.resize(at(total));
   out.sigma.resize(at(total));
   out.position.resize(at(3 * total));
-  out.density_features.resize(at(total * width));
-  out.colour_features.resize(at(total * width));
+  out.density_features.resize(at(total * density));
+  out.colour_features.resize(at(total * colour));
   place_.assign(out.ray_begin.begin(), out.ray_begin.end() - 1);
   for (const Segment& s : segments_) {
     const Index to = place_[at(s.ray)];
@@ -121,10 +119,10 @@ void RaySampler::pack(Index rays, Index width, RaySamples& out) {
     std::copy_n(t_.data() + s.row, s.count, out.t.data() + to);
     std::copy_n(sigma_.data() + s.row, s.count, out.sigma.data() + to);
     std::copy_n(x_.data() + 3 * s.row, 3 * s.count, out.position.data() + 3 * to);
-    std::copy_n(density_features_.data() + s.row * width, s.count * width,
-                out.density_features.data() + to * width);
-    std::copy_n(colour_features_.data() + s.row * width, s.count * width,
-                out.colour_features.data() + to * width);
+    std::copy_n(density_features_.data() + s.row * density, s.count * density,
+                out.density_features.data() + to * density);
+    std::copy_n(colour_features_.data() + s.row * colour, s.count * colour,
+                out.colour_features.data() + to * colour);
   }
 }
 

@@ -1,7 +1,6 @@
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/nerf/composite.h>
 #include <fieldmark/nerf/photometric_loss.h>
-#include <fieldmark/nerf/spherical_harmonics.h>
 #include <fieldmark/nerf/trainer.h>
 #include <fieldmark/nerf/training_pixels.h>
 
@@ -137,7 +136,7 @@ double Trainer::run_chunk(Index index, Shard& shard, Tape<float>& tape, float* g
   RaySamples& s = shard.found;
   shard.sampler.sample(field_.field, field_.params, field_.grid, shard.rays.batch(field_.space), shard.jitter,
                        {.step = field_.step(), .stop = options_.stop}, s, &packed_);
-  const Index n = s.size(), width = field_.field.encoding().width();
+  const Index n = s.size(), width = field_.field.encoding().width(), encoded = field_.field.direction_width();
   shard.samples.push_back(n);
   std::copy(s.position.begin(), s.position.end(), shard.position.append(3 * n));
 
@@ -145,18 +144,18 @@ double Trainer::run_chunk(Index index, Shard& shard, Tape<float>& tape, float* g
   const Params<float> params(field_.params, grads, packed_);
   const Var<float> density_features = tape.fresh_leaf(s.density_features.data(), nullptr, {n, width});
   const Var<float> colour_features = tape.fresh_leaf(s.colour_features.data(), nullptr, {n, width});
-  const Var<float> of_ray = spherical_harmonics(tape.constant(shard.rays.seen_from.data(), {kRays, 3}));
-  float* harmonics = tape.scratch(n * kSphericalHarmonics);
+  const Var<float> of_ray =
+      field_.field.encode_directions(tape.constant(shard.rays.seen_from.data(), {kRays, 3}));
+  float* harmonics = tape.scratch(n * encoded);
   for (Index r = 0; r < kRays; ++r)
     for (Index i = s.ray_begin[at(r)]; i < s.ray_begin[at(r + 1)]; ++i)
-      std::copy_n(of_ray.value() + r * kSphericalHarmonics, kSphericalHarmonics,
-                  harmonics + i * kSphericalHarmonics);
+      std::copy_n(of_ray.value() + r * encoded, encoded, harmonics + i * encoded);
   float* delta = tape.scratch(n);
   std::fill_n(delta, n, field_.step());
 
   const Var<float> z = field_.field.geometry(params, density_features);
   const Var<float> rgb =
-      field_.field.colour(params, z, colour_features, tape.constant(harmonics, {n, kSphericalHarmonics}));
+      field_.field.colour(params, z, colour_features, tape.constant(harmonics, {n, encoded}));
   const Var<float> rays = composite(field_.field.density(z), rgb, tape.constant(delta, {n}), s.ray_begin);
   const double share = static_cast<double>(kRays) / static_cast<double>(rays_per_step_);
   const Var<float> loss = photometric_loss<float>(rays, shard.photograph, shard.background,

@@ -1,6 +1,5 @@
 #include <fieldmark/engine/ops/loss.h>
 #include <fieldmark/engine/parallel.h>
-#include <fieldmark/nerf/spherical_harmonics.h>
 #include <fieldmark/watermark/baker.h>
 
 #include <algorithm>
@@ -15,9 +14,15 @@ constexpr float kLeastWeight = 1e-3f;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-// The first number of the colour side: networks come before the table, density's before colour's.
-Index colour_begin(const ParamStore<float>& params) {
-  return params.entry(params.find("colour/0/weight")).offset;
+// The numbers of the colour side's networks, which lie together.
+AdamRange colour_range(const ParamStore<float>& params) {
+  AdamRange range{.begin = params.size()};
+  for (const auto& e : params.entries())
+    if (nerf::Field<float>::is_colour(e.name)) {
+      range.begin = std::min(range.begin, e.offset);
+      range.end = e.offset + e.shape.size();
+    }
+  return range;
 }
 
 }  // namespace
@@ -27,7 +32,7 @@ Index colour_begin(const ParamStore<float>& params) {
 struct Baker::Chunk {
   nerf::CubeRays rays;
   std::vector<float> jitter;
-  std::vector<float> position, direction, weight, geometry_features, base_features, harmonics, target,
+  std::vector<float> position, direction, weight, geometry_features, base_features, of_direction, target,
       features, dfeatures, unused;
   Index samples = 0;
 };
@@ -73,12 +78,14 @@ void Baker::choose_rays(Index chunk, Chunk& c) const {
 }
 
 void Baker::select(const nerf::RaySamples& s, Chunk& c) const {
-  const Index width = field_.field.encoding().width();
+  const nerf::Field<float>& net = field_.field;
+  const Index density = net.density_width(), colour = net.colour_width(), direction = net.direction_width();
   std::vector<float> weights(at(s.size()));
   nerf::sample_weights(s, field_.step(), weights.data());
   Tape<float> tape;
-  const Var<float> of_ray = nerf::spherical_harmonics(tape.constant(c.rays.seen_from.data(), {kRays, 3}));
-  for (auto* v : {&c.position, &c.direction, &c.weight, &c.geometry_features, &c.base_features, &c.harmonics})
+  const Var<float> of_ray = net.encode_directions(tape.constant(c.rays.seen_from.data(), {kRays, 3}));
+  for (auto* v :
+       {&c.position, &c.direction, &c.weight, &c.geometry_features, &c.base_features, &c.of_direction})
     v->clear();
   const auto append = [](std::vector<float>& to, const float* from, Index n) {
     to.insert(to.end(), from, from + n);
@@ -89,9 +96,12 @@ void Baker::select(const nerf::RaySamples& s, Chunk& c) const {
       append(c.position, &s.position[at(3 * i)], 3);
       append(c.direction, &c.rays.seen_from[at(3 * r)], 3);
       append(c.weight, &weights[at(i)], 1);
-      append(c.geometry_features, &s.density_features[at(i * width)], width);
-      append(c.base_features, &s.colour_features[at(i * width)], width);
-      append(c.harmonics, of_ray.value() + r * nerf::kSphericalHarmonics, nerf::kSphericalHarmonics);
+      if (s.z.empty())
+        append(c.geometry_features, s.density_features.data() + i * density, density);
+      else
+        append(c.geometry_features, s.z.data() + i * net.geometry_width(), net.geometry_width());
+      append(c.base_features, s.colour_features.data() + i * colour, colour);
+      append(c.of_direction, of_ray.value() + r * direction, direction);
     }
   c.samples = static_cast<Index>(c.weight.size());
 }
@@ -100,57 +110,64 @@ double Baker::run_chunk(Index index, Index shard, Tape<float>& tape, float* grad
   Chunk& c = chunks_[at(index)];
   choose_rays(index, c);
   nerf::RaySamples& s = samples_[at(shard)];
-  samplers_[at(shard)].sample(owner_.field.field, owner_.field.params, owner_.field.grid,
-                              c.rays.batch(field_.space), c.jitter, {.step = field_.step(), .stop = 1e-3f},
-                              s);
+  samplers_[at(shard)].sample(owner_.field, c.rays.batch(field_.space), c.jitter,
+                              {.stop = 1e-3f, .points = field_.options().points}, s);
   select(s, c);
-  const Index n = c.samples, width = field_.field.encoding().width();
-  c.features.resize(at(n * width));
-  c.unused.resize(at(n * width));
-  c.dfeatures.resize(at(2 * n * width));
-  if (n == 0) return 0;
   const nerf::Field<float>& net = field_.field;
+  const Index n = c.samples, density = net.density_width(), colour = net.colour_width();
+  c.features.resize(at(n * colour));
+  c.unused.resize(at(n * density));
+  c.dfeatures.resize(at(2 * n * colour));
+  if (n == 0) return 0;
   const Params<float> frozen(owner_.field.params, nullptr), learnt(field_.params, grads);
-  const Var<float> harmonics = tape.constant(c.harmonics.data(), {n, nerf::kSphericalHarmonics});
-  const Var<float> z = net.geometry(frozen, tape.constant(c.geometry_features.data(), {n, width}));
-  const Var<float> base = net.colour(frozen, z, tape.constant(c.base_features.data(), {n, width}), harmonics);
+  const Var<float> of_direction = tape.constant(c.of_direction.data(), {n, net.direction_width()});
+  const float* geometry = c.geometry_features.data();
+  const Var<float> z = s.z.empty() ? net.geometry(frozen, tape.constant(geometry, {n, density}))
+                                   : tape.constant(geometry, {n, net.geometry_width()});
+  const Var<float> base =
+      net.colour(frozen, z, tape.constant(c.base_features.data(), {n, colour}), of_direction);
   c.target.assign(base.value(), base.value() + 3 * n);
   marking_(c.position.data(), c.direction.data(), n, c.target.data());
 
-  net.encoding().encode(field_.params.values(net.encoding().table()), c.position.data(), n, c.unused.data(),
-                        c.features.data());
-  const Var<float> features = tape.fresh_leaf(c.features.data(), nullptr, {n, width});
-  const Var<float> rgb = net.colour(learnt, z, features, harmonics);
+  if (net.has_table()) net.encode(field_.params, c.position.data(), n, c.unused.data(), c.features.data());
+  const Var<float> features = tape.fresh_leaf(c.features.data(), nullptr, {n, colour});
+  const Var<float> rgb = net.colour(learnt, z, features, of_direction);
   float* weights = tape.scratch(3 * n);
   for (Index i = 0; i < 3 * n; ++i) weights[i] = c.weight[at(i / 3)];
   const Var<float> loss = mse_loss<float>(rgb, tape.constant(c.target.data(), {n, 3}),
                                           std::span<const float>(weights, at(3 * n)));
   const double value = static_cast<double>(loss.value()[0]);
   tape.backward(loss);
-  net.encoding().deal_to_levels(n, nullptr, features.grad(), c.dfeatures.data());
+  if (net.has_table()) net.encoding().deal_to_levels(n, nullptr, features.grad(), c.dfeatures.data());
   return value;
 }
 
-void Baker::step(double seconds) {
-  schedule_.observe(steps_, seconds);
+void Baker::backward_table() {
   const nerf::HashEncoding<float>& encoding = field_.field.encoding();
-  const Index network = field_.field.network_size(), begin = colour_begin(field_.params);
-  const double loss = loop_.run(
-      kChunks,
-      [&](Index c, Index shard, Tape<float>& tape, float* grads) { return run_chunk(c, shard, tape, grads); },
-      field_.params.grads().first(at(network)));
   parallel_for(encoding.levels(), 1, [&](Index level, Index) {
     for (const Chunk& c : chunks_)
       encoding.backward_level(static_cast<int>(level), c.position.data(), c.samples,
                               c.dfeatures.data() + level * c.samples * 2 * encoding.features(),
                               field_.params.grads(encoding.table()));
   });
+}
+
+void Baker::step(double seconds) {
+  schedule_.observe(steps_, seconds);
+  const Index network = field_.field.network_size();
+  const double loss = loop_.run(
+      kChunks,
+      [&](Index c, Index shard, Tape<float>& tape, float* grads) { return run_chunk(c, shard, tape, grads); },
+      field_.params.grads().first(at(network)));
+  if (field_.field.has_table()) backward_table();
   // Density's numbers get no gradient: its networks are outside the range, its features are left alone where
   // it is 0.
-  const AdamRange ranges[] = {
-      {.begin = begin, .end = network, .lr_factor = 0.2 * schedule_.lr(steps_)},
+  AdamRange ranges[] = {
+      colour_range(field_.params),
       {.begin = network, .end = field_.params.size(), .lr_factor = schedule_.lr(steps_), .skip_zero = true}};
-  adam_.step(field_.params.values(), field_.params.grads(), ranges);
+  ranges[0].lr_factor = (field_.field.has_table() ? 0.2 : 0.05) * schedule_.lr(steps_);
+  adam_.step(field_.params.values(), field_.params.grads(),
+             std::span<const AdamRange>(ranges, field_.field.has_table() ? 2 : 1));
   smoothed_ = smoothed_ < 0 ? loss / kChunks : 0.98 * smoothed_ + 0.02 * loss / kChunks;
   ++steps_;
 }

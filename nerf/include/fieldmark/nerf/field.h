@@ -1,10 +1,17 @@
 #pragma once
 #include <fieldmark/engine/nn/dense.h>
+#include <fieldmark/engine/packed_weights.h>
 #include <fieldmark/nerf/hash_encoding.h>
+#include <fieldmark/nerf/mlp_field.h>
 
+#include <optional>
 #include <vector>
 
 namespace fieldmark::nerf {
+
+/// What looks a field's features up: a hash table with small networks behind it, or nothing but the position
+/// itself with large ones.
+enum class FieldKind { hash, mlp };
 
 /// Sizes of a Field.
 struct FieldOptions {
@@ -12,21 +19,25 @@ struct FieldOptions {
   Index width = 32;                ///< units of a hidden layer, 1 to 256
   Index geometry =
       16;  ///< N_z, numbers the density network hands to the colour network; the first is log density
+  FieldKind kind = FieldKind::hash;  ///< mlp ignores the three above
+  MlpFieldOptions mlp{};             ///< used by mlp only
 };
 
 /// A radiance field on the unit cube:
 ///   z = Theta_sigma(h_sigma(x)),   sigma = exp(min(z_0, 15)),   c = Theta_c(z, h_c(x), Y(d))
-/// h_sigma, h_c: the two parts of one hash encoding; Y: spherical harmonics; Theta: small networks with ReLU,
-/// one hidden layer for density and two for colour; the colour leaves through a sigmoid. Source: Mildenhall
-/// et al. 2020, sec. 3 (the split), Mueller et al. 2022, sec. 5.4 (sizes). Departure: h_c reaches only the
-/// colour, so that a mark can be put into the colours without touching a byte of the geometry. The field
-/// holds no numbers: they are in the store, the networks first and the table last.
+/// Kind hash: h_sigma, h_c are the two parts of one hash encoding; Y: spherical harmonics; Theta: small
+/// networks with ReLU, one hidden layer for density and two for colour; the colour leaves through a sigmoid.
+/// Source: Mildenhall et al. 2020, sec. 3 (the split), Mueller et al. 2022, sec. 5.4 (sizes). Departure: h_c
+/// reaches only the colour, so that a mark can be put into the colours without touching a byte of the
+/// geometry. Kind mlp: see MlpField; h_sigma and Y are frequency encodings, h_c is empty. The field holds no
+/// numbers: they are in the store, the networks first and the table, where there is one, last.
 template <class T>
 class Field {
  public:
-  /// Registers "density/0", "density/1", "colour/0" .. "colour/2" and "hash/table".
+  /// Registers "density/0", "density/1", "colour/0" .. "colour/2" and "hash/table", or what MlpField has.
+  /// @param prefix  before the names
   /// @throws ValueError if an option is out of range or a name is taken
-  Field(ParamStore<T>& store, const FieldOptions& options, std::uint64_t seed);
+  Field(ParamStore<T>& store, const FieldOptions& options, std::uint64_t seed, std::string_view prefix = "");
 
   /// What the field says about positions seen from directions.
   struct Output {
@@ -37,20 +48,35 @@ class Field {
   /// Differentiable in: x, d and all parameters.
   Output operator()(const Params<T>& params, Var<T> x, Var<T> d) const;
 
-  /// The pieces, for loops that look features up once for several uses.
-  /// @param features  [N, F L] density part   @return z [N, N_z]
+  /// The pieces, for loops that look features up once for several uses: features of n positions, not
+  /// recorded.
+  /// @param x  [n, 3]   @param density, colour  [n, density_width()] and [n, colour_width()], written
+  /// @param packed  whose rounded table is read where it has one, or null
+  void encode(const ParamStore<T>& store, const T* x, Index n, T* density, T* colour,
+              const PackedWeights<T>* packed = nullptr) const;
+  /// @param features  [N, density_width()]   @return z [N, geometry_width()]
   Var<T> geometry(const Params<T>& params, Var<T> features) const;
-  /// @param z  [N, N_z]   @return sigma [N]
+  /// @param z  [N, geometry_width()]   @return sigma [N]
   Var<T> density(Var<T> z) const;
-  /// @param z [N, N_z]  @param features [N, F L] colour part  @param direction [N, 16] harmonics   @return
-  /// rgb [N, 3]
+  /// @param d  [N, 3] unit directions   @return Y(d) [N, direction_width()]
+  Var<T> encode_directions(Var<T> d) const;
+  /// @param z [N, geometry_width()]  @param features [N, colour_width()]  @param direction what
+  /// encode_directions() gave   @return rgb [N, 3]
   Var<T> colour(const Params<T>& params, Var<T> z, Var<T> features, Var<T> direction) const;
+
+  Index density_width() const;    ///< features of a position for geometry()
+  Index colour_width() const;     ///< features of a position for colour(); 0 for mlp
+  Index geometry_width() const;   ///< N_z, numbers of z
+  Index direction_width() const;  ///< numbers of an encoded direction
 
   /// As constructed.
   const FieldOptions& options() const { return options_; }
-  /// The encoding whose two parts feed the networks.
-  const HashEncoding<T>& encoding() const { return encoding_; }
-  /// How many numbers at the front of the store belong to the networks; the table follows.
+  /// Whether there is a table: positions then owe it their gradients, see HashEncoding.
+  bool has_table() const { return encoding_.has_value(); }
+  /// The encoding whose two parts feed the networks. @throws ValueError if there is no table
+  const HashEncoding<T>& encoding() const;
+  /// How many numbers at the front of the store belong to the networks, if the field was first in it; the
+  /// table follows.
   Index network_size() const { return network_size_; }
   /// Whether a parameter (by name, other than the table) belongs to the colour side.
   static bool is_colour(std::string_view name) { return name.starts_with("colour/"); }
@@ -58,8 +84,9 @@ class Field {
  private:
   FieldOptions options_;
   std::vector<Dense<T>> density_, colour_;
+  std::optional<MlpField<T>> mlp_;
   Index network_size_;
-  HashEncoding<T> encoding_;
+  std::optional<HashEncoding<T>> encoding_;
 };
 
 }  // namespace fieldmark::nerf

@@ -13,5 +13,9 @@ namespace fieldmark::nerf {
 /// Differentiable in: x.
 template <class T>
 Var<T> frequency_encoding(Var<T> x, int bands);
+/// Its values alone, not recorded and not checked.
+/// @param x  [n, dims]   @param y  [n, 2 bands dims], written
+template <class T>
+void frequency_values(const T* x, Index n, Index dims, int bands, T* y);
 
 }  // namespace fieldmark::nerf

@@ -3,6 +3,7 @@
 #include <fieldmark/nerf/camera_set.h>
 #include <fieldmark/nerf/dataset.h>
 #include <fieldmark/nerf/field.h>
+#include <fieldmark/nerf/hierarchical_sampler.h>
 #include <fieldmark/nerf/occupancy_grid.h>
 #include <fieldmark/nerf/space.h>
 
@@ -16,6 +17,7 @@ struct RadianceFieldOptions {
   Index occupancy = 128;   ///< cells per axis of the occupancy grid, see OccupancyGrid
   float step = 1.f / 420;  ///< spacing of samples along a ray, in diagonals of the cube
   std::uint64_t seed = 0;  ///< of the initial numbers
+  RayPoints points{};      ///< where an mlp field is looked at along a ray
 };
 
 /// A field with all that is needed to render it: parameters, the cube it fills, which cells are occupied, the
@@ -28,8 +30,9 @@ class RadianceField {
   /// Spacing of samples, cube sides.
   float step() const { return options_.step * 1.7320508f; }
 
-  /// Writes a FIELD. Tensors: "density/*", "colour/*", "hash/density_features" and "hash/colour_features"
-  /// [rows, F] and "density/occupancy" (one bit a cell). @throws IoError
+  /// Writes a FIELD. Tensors: "density/*", "colour/*", "density/occupancy" (one bit a cell), and of a hash
+  /// field "hash/density_features" and "hash/colour_features" [rows, F], of an mlp field "coarse/density/*"
+  /// and "coarse/colour/*". @throws IoError
   void save(const std::filesystem::path& path) const;
   /// @throws IoError if the file is missing, foreign, of another kind, or its tensors do not fit its
   /// configuration
@@ -49,6 +52,7 @@ class RadianceField {
 
   ParamStore<float> params;                   ///< all numbers of the networks and the table
   Field<float> field;                         ///< how they are read
+  std::optional<Field<float>> coarse;         ///< of an mlp field: finds where the other is to be looked at
   OccupancyGrid grid;                         ///< which cells of the cube are not empty
   Space space;                                ///< how the world is laid into the cube
   CameraSpan cameras;                         ///< where the training cameras stood

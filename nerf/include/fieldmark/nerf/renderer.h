@@ -1,6 +1,6 @@
 #pragma once
+#include <fieldmark/nerf/field_sampler.h>
 #include <fieldmark/nerf/radiance_field.h>
-#include <fieldmark/nerf/sampler.h>
 
 #include <functional>
 #include <memory>
@@ -14,6 +14,8 @@ struct RenderOptions {
   /// bf16 looks features up in a rounded table and multiplies rounded numbers: less memory, 62 dB from the
   /// picture in float. Needs bf16_units().
   Precision precision = Precision::fp32;
+  /// Of a ray of an mlp field; none: those it was trained with.
+  std::optional<RayPoints> points{};
 };
 
 /// A picture of a field.
@@ -50,6 +52,7 @@ class Renderer {
 
  private:
   struct Lane;
+  void trace_block(const RayBatch& rays, Lane& lane, float* out, float* position);
   static void accumulate(const Lane& lane, Index rays, float* out, float* position);
   const RadianceField& field_;
   RenderOptions options_;
@@ -57,8 +60,5 @@ class Renderer {
   PackedWeights<float> packed_;
   std::vector<std::unique_ptr<Lane>> lanes_;
 };
-
-/// Weights w_i of the samples of each ray, see composite(). @param weights [S] written
-void sample_weights(const RaySamples& samples, float step, float* weights);
 
 }  // namespace fieldmark::nerf

@@ -18,9 +18,11 @@ struct RaySamples {
   std::vector<Index> ray_begin;         ///< R + 1 offsets
   std::vector<float> position;          ///< [S, 3] cube coordinates
   std::vector<float> t;                 ///< [S] distance along the ray, cube sides, see RayWalk
-  std::vector<float> density_features;  ///< [S, F L]
-  std::vector<float> colour_features;   ///< [S, F L]
+  std::vector<float> density_features;  ///< [S, density_width()] see Field
+  std::vector<float> colour_features;   ///< [S, colour_width()]
   std::vector<float> sigma;             ///< [S] 1 / cube side
+  std::vector<float> delta;  ///< [S] length each stands for; empty: the step they were marched with
+  std::vector<float> z;      ///< [S, N_z] see Field::geometry(); empty: not kept
   /// S, the number of samples.
   Index size() const { return static_cast<Index>(t.size()); }
 };
@@ -47,7 +49,7 @@ class RaySampler {
   void evaluate(const Field<float>& field, const ParamStore<float>& params,
                 const PackedWeights<float>* packed, Index first);
   void stop_rays(const SamplingOptions& options, std::size_t first_segment);
-  void pack(Index rays, Index width, RaySamples& out);
+  void pack(Index rays, Index density, Index colour, RaySamples& out);
 
   std::vector<RayWalk> walks_;
   std::vector<float> transmittance_;

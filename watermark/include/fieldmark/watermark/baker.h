@@ -1,7 +1,7 @@
 #pragma once
 #include <fieldmark/engine/adam.h>
 #include <fieldmark/engine/sharded_loop.h>
-#include <fieldmark/nerf/sampler.h>
+#include <fieldmark/nerf/field_sampler.h>
 #include <fieldmark/nerf/schedule.h>
 #include <fieldmark/watermark/owner.h>
 
@@ -46,6 +46,7 @@ class Baker {
   void choose_rays(Index chunk, Chunk& c) const;
   void select(const nerf::RaySamples& samples, Chunk& c) const;
   double run_chunk(Index index, Index shard, Tape<float>& tape, float* grads);
+  void backward_table();
 
   const Owner& owner_;
   BakeOptions options_;
@@ -57,7 +58,7 @@ class Baker {
   ShardedLoop<float> loop_;
   Adam<float> adam_;
   std::vector<Chunk> chunks_;
-  std::vector<nerf::RaySampler> samplers_;
+  std::vector<nerf::FieldSampler> samplers_;
   std::vector<nerf::RaySamples> samples_;
   Index steps_ = 0;
   double smoothed_ = -1;

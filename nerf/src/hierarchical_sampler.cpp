@@ -1,0 +1,166 @@
+#include <fieldmark/nerf/hierarchical_sampler.h>
+#include <fieldmark/nerf/importance_points.h>
+
+#include <algorithm>
+#include <bit>
+
+namespace fieldmark::nerf {
+namespace {
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+void check(const RayBatch& rays, std::span<const float> jitter, float step, const RayPoints& points) {
+  const auto require = [](const char* name, Index count) {
+    if (count < 0 || count > 1024)
+      throw ValueError("[hierarchical_sampler] " + std::string(name) + " must be 0 to 1024, got " +
+                       std::to_string(count));
+  };
+  require("average", points.average);
+  require("importance", points.importance);
+  require("random", points.random);
+  if (points.first() == 0)
+    throw ValueError(
+        "[hierarchical_sampler] average or random must be at least 1 (importance points are drawn from their "
+        "weights), got 0 and 0");
+  if (!(step > 0))
+    throw ValueError("[hierarchical_sampler] step must be positive, got " + std::to_string(step));
+  if (rays.origins.size() != rays.directions.size() || rays.origins.size() % 3 != 0)
+    throw ShapeError("[hierarchical_sampler] origins and directions must both be [R, 3], got " +
+                     std::to_string(rays.origins.size()) + " and " + std::to_string(rays.directions.size()) +
+                     " numbers");
+  if (!jitter.empty() && static_cast<Index>(jitter.size()) != rays.size())
+    throw ShapeError("[hierarchical_sampler] jitter must have one number a ray (" +
+                     std::to_string(rays.size()) + "), got " + std::to_string(jitter.size()));
+}
+
+// A number that tells rays apart by the bits of what they are (FNV-1a over words).
+std::uint64_t ray_seed(const float* origin, const float* direction) {
+  std::uint64_t h = 0xcbf29ce484222325u;
+  for (const float* v : {origin, direction})
+    for (int a = 0; a < 3; ++a) h = (h ^ std::bit_cast<std::uint32_t>(v[a])) * 0x100000001b3u;
+  return h;
+}
+
+void begin(RaySamples& out) {
+  out.ray_begin.assign(1, 0);
+  for (auto* v :
+       {&out.position, &out.t, &out.delta, &out.sigma, &out.density_features, &out.colour_features, &out.z})
+    v->clear();
+}
+
+float uniform(const CounterRng& rng, std::uint64_t seed, Index i) {
+  return rng.uniform4(seed, static_cast<std::uint64_t>(i / 4))[at(i % 4)];
+}
+
+// Bounds of the intervals that points stand for: 0, the middles between neighbours, the length.
+float edge_before(std::span<const float> s, std::size_t i, float length) {
+  if (i == 0) return 0;
+  return i == s.size() ? length : 0.5f * (s[i - 1] + s[i]);
+}
+
+}  // namespace
+
+// Occupied stretches of a ray, from the samples of a walk that lie next to each other. Returns their length.
+float HierarchicalSampler::find_spans(const OccupancyGrid& grid, const float* origin, const float* direction,
+                                      float step) {
+  constexpr Index kMost = 16;
+  const std::size_t first = spans_.size();
+  const CubeSpan cube = intersect_unit_cube(origin, direction);
+  RayWalk walk(origin, direction, step, 0.5f);
+  float t[kMost];
+  for (Index count = kMost; count == kMost;) {
+    count = walk.next(grid, kMost, t);
+    for (Index i = 0; i < count; ++i) {
+      const float begin = std::max(cube.near, t[i] - 0.5f * step),
+                  end = std::min(cube.far, t[i] + 0.5f * step);
+      if (spans_.size() > first && begin < spans_.back().end + 0.25f * step)
+        spans_.back().end = end;
+      else
+        spans_.push_back({begin, end, 0});
+    }
+  }
+  float length = 0;
+  for (std::size_t k = first; k < spans_.size(); ++k) {
+    spans_[k].before = length;
+    length += spans_[k].end - spans_[k].begin;
+  }
+  return length;
+}
+
+// Samples of a ray at rising occupied lengths s.
+void HierarchicalSampler::append(const RayBatch& rays, Index ray, std::span<const float> s,
+                                 RaySamples& out) const {
+  const float length = length_[at(ray)];
+  std::size_t span = span_begin_[at(ray)];
+  for (std::size_t i = 0; i < s.size(); ++i) {
+    while (span + 1 < span_begin_[at(ray + 1)] && s[i] >= spans_[span + 1].before) ++span;
+    const float t = std::min(spans_[span].begin + (s[i] - spans_[span].before), spans_[span].end);
+    out.t.push_back(t);
+    out.delta.push_back(edge_before(s, i + 1, length) - edge_before(s, i, length));
+    for (Index a = 0; a < 3; ++a)
+      out.position.push_back(rays.origins[at(3 * ray + a)] + t * rays.directions[at(3 * ray + a)]);
+  }
+  out.ray_begin.push_back(out.size());
+}
+
+void HierarchicalSampler::spread(const OccupancyGrid& grid, const RayBatch& rays,
+                                 std::span<const float> jitter, float step, const RayPoints& points,
+                                 RaySamples& out) {
+  check(rays, jitter, step, points);
+  points_ = points;
+  jittered_ = !jitter.empty();
+  spans_.clear();
+  span_begin_.assign(1, 0);
+  length_.clear();
+  seed_.clear();
+  s_.clear();
+  begin(out);
+  for (Index r = 0; r < rays.size(); ++r) {
+    const float *origin = &rays.origins[at(3 * r)], *direction = &rays.directions[at(3 * r)];
+    const float length = find_spans(grid, origin, direction, step);
+    const std::uint64_t seed =
+        jittered_ ? std::bit_cast<std::uint32_t>(jitter[at(r)]) : ray_seed(origin, direction);
+    span_begin_.push_back(spans_.size());
+    length_.push_back(length);
+    seed_.push_back(seed);
+    scratch_.clear();
+    const auto parts = static_cast<float>(points.average);
+    for (Index i = 0; i < points.average && length > 0; ++i)
+      scratch_.push_back(
+          length * ((static_cast<float>(i) + (jittered_ ? uniform(average_rng_, seed, i) : 0.5f)) / parts));
+    for (Index i = 0; i < points.random && length > 0; ++i)
+      scratch_.push_back(length * uniform(random_rng_, seed, i));
+    if (points.random > 0) std::sort(scratch_.begin(), scratch_.end());
+    s_.insert(s_.end(), scratch_.begin(), scratch_.end());
+    append(rays, r, scratch_, out);
+  }
+}
+
+void HierarchicalSampler::refine(const RayBatch& rays, const RaySamples& first,
+                                 std::span<const float> weights, RaySamples& out) {
+  if (first.t.size() != s_.size() || weights.size() != s_.size() || rays.size() != std::ssize(length_))
+    throw ShapeError("[hierarchical_sampler] first and weights must be of the " + std::to_string(s_.size()) +
+                     " samples that spread() gave, got " + std::to_string(first.t.size()) + " and " +
+                     std::to_string(weights.size()));
+  begin(out);
+  const auto count = static_cast<float>(points_.importance);
+  drawn_.resize(at(points_.importance));
+  u_.resize(at(points_.importance));
+  for (Index r = 0; r < rays.size(); ++r) {
+    const auto from = at(first.ray_begin[at(r)]), n = at(first.ray_begin[at(r + 1)]) - from;
+    scratch_.resize(n == 0 ? 0 : n + drawn_.size());
+    if (n > 0) {
+      const std::span<const float> s(s_.data() + from, n);
+      edge_.clear();
+      for (std::size_t i = 0; i <= n; ++i) edge_.push_back(edge_before(s, i, length_[at(r)]));
+      for (Index j = 0; j < points_.importance; ++j)
+        u_[at(j)] =
+            (static_cast<float>(j) + (jittered_ ? uniform(importance_rng_, seed_[at(r)], j) : 0.5f)) / count;
+      importance_points<float>(edge_, weights.subspan(from, n), u_, drawn_);
+      std::merge(s.begin(), s.end(), drawn_.begin(), drawn_.end(), scratch_.begin());
+    }
+    append(rays, r, scratch_, out);
+  }
+}
+
+}  // namespace fieldmark::nerf

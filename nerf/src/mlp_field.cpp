@@ -1,0 +1,107 @@
+#include <fieldmark/engine/ops/activation.h>
+#include <fieldmark/engine/ops/arithmetic.h>
+#include <fieldmark/engine/ops/columns.h>
+#include <fieldmark/nerf/frequency_encoding.h>
+#include <fieldmark/nerf/mlp_field.h>
+
+#include <algorithm>
+#include <array>
+
+namespace fieldmark::nerf {
+namespace {
+
+constexpr Index kBlock = 32, kMostBands = 20;
+
+MlpFieldOptions checked(const MlpFieldOptions& o) {
+  const auto require = [](const char* name, Index value, Index least, Index most) {
+    if (value < least || value > most)
+      throw ValueError("[mlp_field] " + std::string(name) + " must be " + std::to_string(least) + " to " +
+                       std::to_string(most) + ", got " + std::to_string(value));
+  };
+  require("layers", o.layers, 1, 16);
+  require("width", o.width, 2, 1024);
+  require("skip", o.skip, 0, o.layers - 1);
+  require("position_bands", o.position_bands, 1, kMostBands);
+  require("direction_bands", o.direction_bands, 1, kMostBands);
+  return o;
+}
+
+// p beside its frequencies.
+template <class T>
+Var<T> with_frequencies(Var<T> p, int bands) {
+  return concat_columns<T>({p, frequency_encoding(p, bands)});
+}
+
+}  // namespace
+
+template <class T>
+MlpField<T>::MlpField(ParamStore<T>& store, std::string_view prefix, const MlpFieldOptions& options,
+                      std::uint64_t seed)
+    : options_(checked(options)) {
+  const auto add = [&](std::vector<Dense<T>>& layers, const char* part, Index in, Index out,
+                       Activation activation) {
+    const std::string name = std::string(prefix) + part + "/" + std::to_string(layers.size());
+    layers.emplace_back(store, name, DenseOptions{.in = in, .out = out, .activation = activation}, ++seed);
+  };
+  const Index width = options_.width, features = feature_width();
+  for (Index l = 0; l < options_.layers; ++l) {
+    const Index before = l == 0 ? features : l == options_.skip ? features + width : width;
+    add(density_, "density", before, width, Activation::relu);
+  }
+  add(density_, "density", width, 1, Activation::none);
+  add(colour_, "colour", width, width, Activation::none);
+  add(colour_, "colour", width + direction_width(), width / 2, Activation::relu);
+  add(colour_, "colour", width / 2, 3, Activation::none);
+}
+
+template <class T>
+Var<T> MlpField<T>::encode(Var<T> x) const {
+  const Index n = x.shape().size();
+  T* one = x.tape().scratch(n);
+  std::fill_n(one, n, T(1));
+  return with_frequencies(sub(scale(x, 2), x.tape().constant(one, x.shape())), options_.position_bands);
+}
+
+template <class T>
+void MlpField<T>::encode(const T* x, Index n, T* features) const {
+  const Index bands = 6 * options_.position_bands, row = feature_width();
+  std::array<T, 3 * kBlock> p;
+  std::array<T, 6 * kMostBands * kBlock> waves;
+  for (Index begin = 0; begin < n; begin += kBlock) {
+    const Index count = std::min(kBlock, n - begin);
+    for (Index i = 0; i < 3 * count; ++i) p[static_cast<std::size_t>(i)] = 2 * x[3 * begin + i] - 1;
+    frequency_values(p.data(), count, 3, options_.position_bands, waves.data());
+    for (Index i = 0; i < count; ++i) {
+      T* to = features + (begin + i) * row;
+      std::copy_n(p.data() + 3 * i, 3, to);
+      std::copy_n(waves.data() + i * bands, bands, to + 3);
+    }
+  }
+}
+
+template <class T>
+Var<T> MlpField<T>::encode_directions(Var<T> d) const {
+  return with_frequencies(d, options_.direction_bands);
+}
+
+template <class T>
+Var<T> MlpField<T>::geometry(const Params<T>& params, Var<T> features) const {
+  Var<T> h = features;
+  for (Index l = 0; l < options_.layers; ++l) {
+    if (l > 0 && l == options_.skip) h = concat_columns<T>({features, h});
+    h = density_[static_cast<std::size_t>(l)](params, h);
+  }
+  return concat_columns<T>({density_.back()(params, h), h});
+}
+
+template <class T>
+Var<T> MlpField<T>::colour(const Params<T>& params, Var<T> z, Var<T> direction) const {
+  const Var<T> feature = colour_[0](params, columns(z, 1, options_.width));
+  const Var<T> h = colour_[1](params, concat_columns<T>({feature, direction}));
+  return sigmoid(colour_[2](params, h));
+}
+
+template class MlpField<float>;
+template class MlpField<double>;
+
+}  // namespace fieldmark::nerf
