@@ -24,6 +24,10 @@ void check(const RayBatch& rays, std::span<const float> jitter, float step, cons
         "weights), got 0 and 0");
   if (!(step > 0))
     throw ValueError("[hierarchical_sampler] step must be positive, got " + std::to_string(step));
+  if (rays.contracted)
+    throw ValueError(
+        "[hierarchical_sampler] rays must be straight in the cube (points are spread by length), got "
+        "contracted ones");
   if (rays.origins.size() != rays.directions.size() || rays.origins.size() % 3 != 0)
     throw ShapeError("[hierarchical_sampler] origins and directions must both be [R, 3], got " +
                      std::to_string(rays.origins.size()) + " and " + std::to_string(rays.directions.size()) +
@@ -67,9 +71,9 @@ float HierarchicalSampler::find_spans(const OccupancyGrid& grid, const float* or
   const std::size_t first = spans_.size();
   const CubeSpan cube = intersect_unit_cube(origin, direction);
   RayWalk walk(origin, direction, step, 0.5f);
-  float t[kMost];
+  float t[kMost], x[3 * kMost];
   for (Index count = kMost; count == kMost;) {
-    count = walk.next(grid, kMost, t);
+    count = walk.next(grid, kMost, t, x);
     for (Index i = 0; i < count; ++i) {
       const float begin = std::max(cube.near, t[i] - 0.5f * step),
                   end = std::min(cube.far, t[i] + 0.5f * step);

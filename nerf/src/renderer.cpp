@@ -39,9 +39,7 @@ void Renderer::trace(const RayBatch& rays, Index lane_index, float* out, float* 
   const Index block = field_.coarse ? kMlpRays : rays.size();
   for (Index begin = 0; begin < rays.size(); begin += block) {
     const Index n = std::min(block, rays.size() - begin);
-    trace_block(
-        {rays.origins.subspan(at(3 * begin), at(3 * n)), rays.directions.subspan(at(3 * begin), at(3 * n))},
-        lane, out + 4 * begin, position ? position + 3 * begin : nullptr);
+    trace_block(rays.part(begin, n), lane, out + 4 * begin, position ? position + 3 * begin : nullptr);
   }
 }
 

@@ -92,6 +92,13 @@ Vec3 Space::to_world(const Vec3& x) const {
   return y;
 }
 
+RayBatch RayBatch::part(Index begin, Index n) const {
+  const auto rows = [&](std::span<const float> all) {
+    return all.subspan(static_cast<std::size_t>(3 * begin), static_cast<std::size_t>(3 * n));
+  };
+  return {rows(origins), rows(directions), rows(seen_from), contracted, near};
+}
+
 void CubeRays::resize(Index n) {
   for (auto* buffer : {&origins, &directions, &seen_from}) buffer->resize(static_cast<std::size_t>(3 * n));
 }

@@ -1,5 +1,6 @@
 #include <fieldmark/engine/image.h>
 #include <fieldmark/engine/metrics.h>
+#include <fieldmark/engine/nn/lpips.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>

@@ -1,3 +1,5 @@
+#include <fieldmark/engine/nn/lpips.h>
+
 #include <nlohmann/json.hpp>
 
 #include "cli/cli.h"

@@ -1,3 +1,5 @@
+#include <fieldmark/engine/nn/lpips.h>
+
 #include "cli/cli.h"
 #include "support/random_weights.h"
 #include "tools/tiny_job.h"

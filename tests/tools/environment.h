@@ -7,8 +7,8 @@
 struct EnvironmentVariable {
   std::string name;
   std::optional<std::string> before;
-  EnvironmentVariable(const char* name, const char* value) : name(name) {
-    if (const char* old = std::getenv(name)) before = old;
+  EnvironmentVariable(const char* variable, const char* value) : name(variable) {
+    if (const char* old = std::getenv(variable)) before = old;
     set(value);
   }
   EnvironmentVariable(const EnvironmentVariable&) = delete;

@@ -31,7 +31,8 @@ class HierarchicalSampler {
   /// @param step    to find occupied cells with, cube sides, > 0
   /// @param jitter  [R] in [0, 1): what the points of the ray are moved by at random; or empty: average
   /// points in the middles of their parts, random ones a function of the ray
-  /// @throws ValueError if a count is out of range or first() is 0   @throws ShapeError if sizes do not fit
+  /// @throws ValueError if a count is out of range, first() is 0 or rays are contracted   @throws ShapeError
+  /// if sizes do not fit
   void spread(const OccupancyGrid& grid, const RayBatch& rays, std::span<const float> jitter, float step,
               const RayPoints& points, RaySamples& out);
   /// The union of the last spread()'s points and those that their weights suggest, near to far.

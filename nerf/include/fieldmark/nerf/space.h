@@ -54,6 +54,8 @@ struct RayBatch {
   float near = 0;                     ///< where contracted rays begin, cube sides
   /// R, the number of rays.
   Index size() const { return static_cast<Index>(origins.size()) / 3; }
+  /// Rays [begin, begin + n) of these.
+  RayBatch part(Index begin, Index n) const;
 };
 
 /// Storage for the rays of some pixels of cameras.
