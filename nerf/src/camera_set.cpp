@@ -84,6 +84,20 @@ Vec3 near_direction(const std::vector<Vec3>& directions, Draw& draw) {
   return norm(inside) > 1e-6 ? normalised(inside) : first;
 }
 
+// Of the box, along the world's axes, around the positions of the cameras.
+Vec3 in_box(const CameraSpan& span, Draw& draw) {
+  Vec3 low, high, eye;
+  for (std::size_t i = 0; i < span.directions.size(); ++i) {
+    const Vec3 p = span.centre + span.distances[i] * span.directions[i];
+    for (std::size_t a = 0; a < 3; ++a) {
+      low[a] = i == 0 ? p[a] : std::min(low[a], p[a]);
+      high[a] = i == 0 ? p[a] : std::max(high[a], p[a]);
+    }
+  }
+  for (std::size_t a = 0; a < 3; ++a) eye[a] = low[a] + (high[a] - low[a]) * draw.uniform();
+  return eye;
+}
+
 Pose draw_pose(const CameraSpan& span, CameraSet kind, Draw draw) {
   if (kind == CameraSet::ring) {
     const double azimuth = 2 * std::numbers::pi * draw.uniform(), elevation = std::numbers::pi / 6;
@@ -96,16 +110,18 @@ Pose draw_pose(const CameraSpan& span, CameraSet kind, Draw draw) {
   const double distance = span.distances[draw.below(span.distances.size())];
   if (kind == CameraSet::sphere)
     return look_at(span.centre + distance * draw.direction(), span.centre, span.up);
-  const Vec3 eye =
-      span.centre + (distance * (0.8 + 0.7 * draw.uniform())) * near_direction(span.directions, draw);
+  const Vec3 eye = span.forward_facing ? in_box(span, draw)
+                                       : span.centre + (distance * (0.8 + 0.7 * draw.uniform())) *
+                                                           near_direction(span.directions, draw);
   const Vec3 shift = (0.1 * span.half_size * std::cbrt(draw.uniform())) * draw.direction();
   return look_at(eye, span.centre + shift, span.up);
 }
 }  // namespace
 
-CameraSpan camera_span(std::span<const Camera> cameras, Background background) {
-  if (cameras.empty()) throw ValueError("[camera_span] cameras must have at least one camera, got none");
-  CameraSpan span{.centre = look_at_point(cameras),
+namespace {
+
+CameraSpan span_about(const Vec3& centre, std::span<const Camera> cameras, Background background) {
+  CameraSpan span{.centre = centre,
                   .up = common_up(cameras),
                   .half_size = 0,
                   .directions = {},
@@ -128,10 +144,31 @@ CameraSpan camera_span(std::span<const Camera> cameras, Background background) {
   return span;
 }
 
+// Where a forward-facing capture looks, its mean camera being at the origin.
+Vec3 focus(const Dataset& data) {
+  double near = 0, far = 0;
+  for (const View& v : data.views) {
+    if (!v.depth) continue;
+    near = near > 0 ? std::min(near, v.depth->near) : v.depth->near;
+    far = std::max(far, v.depth->far);
+  }
+  return {0, 0, near > 0 ? -1 / (0.25 / near + 0.75 / far) : -1};
+}
+
+}  // namespace
+
+CameraSpan camera_span(std::span<const Camera> cameras, Background background) {
+  if (cameras.empty()) throw ValueError("[camera_span] cameras must have at least one camera, got none");
+  return span_about(look_at_point(cameras), cameras, background);
+}
+
 CameraSpan camera_span(const Dataset& dataset) {
   std::vector<Camera> cameras;
   for (const View& v : dataset.views) cameras.push_back(v.camera);
-  return camera_span(cameras, dataset.background);
+  if (!dataset.forward_facing) return camera_span(cameras, dataset.background);
+  CameraSpan span = span_about(focus(dataset), cameras, dataset.background);
+  span.forward_facing = true;
+  return span;
 }
 
 CameraSet parse_camera_set(std::string_view name) {
@@ -170,16 +207,17 @@ std::vector<Camera> make_cameras(const CameraSpan& span, CameraSet kind, Index c
 }
 
 std::string format_camera_span(const CameraSpan& s) {
-  return nlohmann::json{{"centre", s.centre},
-                        {"up", s.up},
-                        {"half_size", s.half_size},
-                        {"directions", s.directions},
-                        {"distances", s.distances},
-                        {"intrinsics", {s.fx, s.fy, s.cx, s.cy}},
-                        {"width", s.width},
-                        {"height", s.height},
-                        {"background", s.background == Background::white ? "white" : "black"}}
-      .dump();
+  nlohmann::json json{{"centre", s.centre},
+                      {"up", s.up},
+                      {"half_size", s.half_size},
+                      {"directions", s.directions},
+                      {"distances", s.distances},
+                      {"intrinsics", {s.fx, s.fy, s.cx, s.cy}},
+                      {"width", s.width},
+                      {"height", s.height},
+                      {"background", s.background == Background::white ? "white" : "black"}};
+  if (s.forward_facing) json["forward_facing"] = true;
+  return json.dump();
 }
 
 CameraSpan parse_camera_span(std::string_view text, std::string_view where) {
@@ -213,6 +251,7 @@ CameraSpan parse_camera_span(std::string_view text, std::string_view where) {
   const std::string background = root["background"].text();
   if (background != "white" && background != "black") root["background"].fail("white or black", background);
   s.background = background == "white" ? Background::white : Background::black;
+  s.forward_facing = json.value("forward_facing", false);
   return s;
 }
 

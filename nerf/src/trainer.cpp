@@ -1,6 +1,7 @@
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/nerf/composite.h>
 #include <fieldmark/nerf/photometric_loss.h>
+#include <fieldmark/nerf/scene_space.h>
 #include <fieldmark/nerf/trainer.h>
 #include <fieldmark/nerf/training_pixels.h>
 
@@ -19,14 +20,6 @@ constexpr Index kFirstRays = 512;       // of a step, until the samples of a ray
 constexpr Index kMostRays = 1 << 16;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
-bool has_alpha(const Dataset& data) {
-  return std::any_of(data.views.begin(), data.views.end(), [](const View& v) {
-    for (Index i = 3; i < v.rgba.size(); i += 4)
-      if (v.rgba[i] < 1) return true;
-    return false;
-  });
-}
 
 // One of n things, from two uniform numbers: one has 24 bits only.
 Index pick(float u, float v, Index n) {
@@ -85,7 +78,14 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
   if (data.views.empty()) throw ValueError("[trainer] data must have at least one view");
   field_.background = data.background;
   field_.cameras = camera_span(data);
-  if (has_alpha(data)) carve();
+  field_.space = scene_space(data, field_.space.bounds);
+  if (field_.space.kind == SpaceKind::cube) {
+    if (has_alpha(data)) carve();
+    return;
+  }
+  std::vector<Camera> cameras;
+  for (const View& v : data.views) cameras.push_back(v.camera);
+  field_.grid.restrict_to(seen_cells(cameras, field_.space, field_.grid.resolution()));
 }
 
 Trainer::~Trainer() = default;

@@ -132,3 +132,33 @@ TEST_CASE("camera_set: errors") {
   CHECK_THROWS_WITH(parse_camera_span(text, "f"), "f: background: expected white or black, got green");
   CHECK_THROWS_AS(parse_camera_span("{\"centre\": [1, 2]}", "f"), IoError);
 }
+
+TEST_CASE("camera_set: near cameras of a forward-facing capture stand in the box of its path") {
+  Dataset data;
+  data.forward_facing = true;
+  const auto u = uniform({9, 3}, -1, 1, 8);
+  for (Index i = 0; i < 9; ++i) {
+    const Pose pose{1, 0, 0, 0.5 * u[3 * i], 0, 1, 0, 0.3 * u[3 * i + 1], 0, 0, 1, 0.1 * u[3 * i + 2]};
+    data.views.push_back(
+        {.camera = make_camera(pose, 0.9, 40, 30), .rgba = {}, .name = {}, .depth = DepthRange{2, 8}});
+  }
+  const CameraSpan span = parse_camera_span(format_camera_span(camera_span(data)), "here");
+  CHECK(span.forward_facing);
+  CHECK(std::abs(span.centre[2] + 1 / (0.25 / 2 + 0.75 / 8)) < 1e-12);
+  Vec3 low{}, high{};
+  for (const View& v : data.views)
+    for (std::size_t a = 0; a < 3; ++a) {
+      low[a] = std::min(low[a], v.camera.position()[a]);
+      high[a] = std::max(high[a], v.camera.position()[a]);
+    }
+  Vec3 reached{};
+  for (const Camera& c : make_cameras(span, CameraSet::near, 100, 0, 3)) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      CHECK((c.position()[a] >= low[a] - 1e-12 && c.position()[a] <= high[a] + 1e-12));
+      reached[a] = std::max(reached[a], c.position()[a]);
+    }
+    CHECK(c.forward()[2] < -0.9);
+    CHECK(off_axis(c, span.centre) < 0.1 * span.half_size + 1e-9);
+  }
+  for (std::size_t a = 0; a < 3; ++a) CHECK(reached[a] > 0.8 * high[a]);
+}

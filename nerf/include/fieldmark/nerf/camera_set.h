@@ -24,6 +24,7 @@ struct CameraSpan {
   Index width = 1;                ///< of the training pictures, pixels
   Index height = 1;               ///< of the training pictures, pixels
   Background background = Background::white;  ///< of the data set
+  bool forward_facing = false;                ///< whether all cameras look one way, from a patch of a plane
 };
 
 /// The span of cameras that look at a scene from around it. `up` is the direction most at right angles to the
@@ -31,13 +32,15 @@ struct CameraSpan {
 /// fills a picture across. Intrinsics and size are those of the first camera.
 /// @throws ValueError  if there are no cameras, or all stand at the point they look at
 CameraSpan camera_span(std::span<const Camera> cameras, Background background);
-/// Of a data set's views.
+/// Of a data set's views. Forward-facing: the centre lies in front of the mean camera at the depth whose
+/// inverse is 1/4 of the least near bound's and 3/4 of the greatest far bound's (the focus of the render
+/// paths of Mildenhall et al. 2019, LLFF).
 CameraSpan camera_span(const Dataset& dataset);
 
 /// The sets of `--cameras`.
 enum class CameraSet {
   near,  ///< inside the training cameras' directions, 0.8 to 1.5 of their distances, look-at within 5% of the
-         ///< scene's size
+         ///< scene's size; forward-facing: inside the box of their positions
   ring,  ///< azimuth uniform, elevation 30 degrees, distance 4.0311
   sphere,  ///< every direction alike, at distances of training cameras
   test     ///< the data set's test views: read them from there
@@ -48,7 +51,8 @@ CameraSet parse_camera_set(std::string_view name);
 /// Cameras of a set, all with the intrinsics of the span. Camera i depends on span, kind, size, seed and i
 /// only. near: the direction is a random point of the spherical triangle of a random training direction and
 /// two of its six nearest neighbours; the look-at point is uniform in a ball of radius 0.05 * 2 * half_size
-/// about the centre.
+/// about the centre. near, forward-facing: the position is uniform in the box of the training cameras', along
+/// the axes of the mean camera; look-at as before.
 /// @param count  >= 0   @param size  pixels of the longer side; 0: as in training
 /// @throws ValueError  if kind is test, count or size is negative, or span has no directions
 std::vector<Camera> make_cameras(const CameraSpan& span, CameraSet kind, Index count, Index size,

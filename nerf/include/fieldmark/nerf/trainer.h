@@ -31,8 +31,9 @@ struct TrainOptions {
 /// buffers have grown, a step allocates nothing.
 class Trainer {
  public:
-  /// Where photographs have alpha, sets the field's bounds to their visual hull and rules out the cells
-  /// outside it. Field and data must outlive the trainer. @throws ValueError if an option is out of range
+  /// Lays the scene into the field's cube, see scene_space(). Where photographs have alpha, tightens its
+  /// bounds to their visual hull and rules out the cells outside it; in other spaces, the cells that no
+  /// camera sees. Field and data must outlive the trainer. @throws ValueError if an option is out of range
   Trainer(RadianceField& field, const Dataset& data, const TrainOptions& options);
   ~Trainer();
 

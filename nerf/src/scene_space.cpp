@@ -1,0 +1,68 @@
+#include <fieldmark/nerf/camera_set.h>
+#include <fieldmark/nerf/scene_space.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+namespace fieldmark::nerf {
+namespace {
+
+constexpr double kReach = 1.0;      // of the inner cube, in median distances of the cameras
+constexpr double kRayStart = 0.02;  // in the same
+constexpr double kBefore = 0.95;    // of the nearest bound: what is in front of it is cut off
+constexpr double kRim = 1.02;       // of the widest ray
+
+// The plane from the data set's bounds; slopes so that the rays through every picture's corners stay inside,
+// where they pass the plane and at infinity.
+Space device_coordinates(const Dataset& data) {
+  Space space{.kind = SpaceKind::ndc};
+  double near = 0;
+  for (const View& v : data.views)
+    if (v.depth && (near == 0 || v.depth->near < near)) near = v.depth->near;
+  space.near = near > 0 ? kBefore * near : 1;
+  double across = 0, up = 0;
+  for (const View& v : data.views)
+    for (const double x : {0., static_cast<double>(v.camera.width)})
+      for (const double y : {0., static_cast<double>(v.camera.height)}) {
+        const Ray ray = pixel_ray(v.camera, x - 0.5, y - 0.5);
+        const double t = (-space.near - ray.origin[2]) / ray.direction[2];
+        for (const double where : {t, 1e6 * t}) {
+          const double depth = -(ray.origin[2] + where * ray.direction[2]);
+          across = std::max(across, std::abs(ray.origin[0] + where * ray.direction[0]) / depth);
+          up = std::max(up, std::abs(ray.origin[1] + where * ray.direction[1]) / depth);
+        }
+      }
+  space.slope_x = 0.5 / (kRim * across);
+  space.slope_y = 0.5 / (kRim * up);
+  return space;
+}
+
+Space around(const Dataset& data) {
+  CameraSpan span = camera_span(data);
+  const auto middle = span.distances.begin() + static_cast<std::ptrdiff_t>(span.distances.size() / 2);
+  std::nth_element(span.distances.begin(), middle, span.distances.end());
+  const double reach = kReach * *middle;
+  const Vec3& c = span.centre;
+  return {.kind = SpaceKind::contracted,
+          .bounds = {.corner = {c[0] - reach, c[1] - reach, c[2] - reach}, .side = 2 * reach},
+          .near = kRayStart * *middle};
+}
+
+}  // namespace
+
+bool has_alpha(const Dataset& data) {
+  return std::any_of(data.views.begin(), data.views.end(), [](const View& v) {
+    for (Index i = 3; i < v.rgba.size(); i += 4)
+      if (v.rgba[i] < 1) return true;
+    return false;
+  });
+}
+
+Space scene_space(const Dataset& data, const Bounds& bounds) {
+  if (data.forward_facing) return device_coordinates(data);
+  if (data.layout == Layout::blender || has_alpha(data)) return {.bounds = bounds};
+  return around(data);
+}
+
+}  // namespace fieldmark::nerf
