@@ -2,6 +2,7 @@
 
 #include <fieldmark/engine/files.h>
 #include <fieldmark/engine/image.h>
+#include <fieldmark/nerf/colmap.h>
 #include <fieldmark/nerf/llff.h>
 #include <fieldmark/nerf/transforms.h>
 
@@ -38,7 +39,7 @@ int divisor_of(const std::string& name) {
   return error == std::errc() && stop == end && n > 0 ? n : 0;
 }
 
-// The folder of pictures that fits `size`, see load_dataset().
+// The folder of pictures that fits `size`, see load_dataset(); empty where there is none.
 fs::path picture_folder(const fs::path& folder, Index size) {
   fs::path best;
   Index best_side = 0;
@@ -56,9 +57,6 @@ fs::path picture_folder(const fs::path& folder, Index size) {
     const bool better = best_side < wanted ? side > best_side : side >= wanted && side < best_side;
     if (better) best = f, best_side = side;
   }
-  if (best.empty())
-    throw IoError(folder.string() +
-                  ": expected pictures (.png, .jpg, .jpeg) in a folder images or images_N, got none");
   return best;
 }
 
@@ -130,6 +128,9 @@ Capture read_llff(const fs::path& folder, Index size) {
     throw IoError(file.string() + ": " + e.what());
   }
   const fs::path pictures = picture_folder(folder, size);
+  if (pictures.empty())
+    throw IoError(folder.string() +
+                  ": expected pictures (.png, .jpg, .jpeg) in a folder images or images_N, got none");
   const auto files = pictures_in(pictures);
   if (files.size() != views.size())
     throw IoError(pictures.string() + ": expected a picture for each of the " + std::to_string(views.size()) +
@@ -143,6 +144,56 @@ Capture read_llff(const fs::path& folder, Index size) {
                              .pose = views[i].pose,
                              .intrinsics = views[i].intrinsics,
                              .depth = views[i].depth});
+  return capture;
+}
+
+fs::path colmap_folder(const fs::path& folder) {
+  for (const fs::path& model : {folder / "sparse" / "0", folder / "sparse", folder})
+    for (const char* file : {"cameras.bin", "cameras.txt"})
+      if (std::error_code ignored; fs::is_regular_file(model / file, ignored)) return model;
+  return {};
+}
+
+Capture read_colmap(const fs::path& folder, Index size) {
+  const fs::path model = colmap_folder(folder);
+  const bool binary = fs::exists(model / "cameras.bin");
+  const ColmapFormat format = binary ? ColmapFormat::binary : ColmapFormat::text;
+  const auto file = [&](const char* stem) {
+    return model / (std::string(stem) + (binary ? ".bin" : ".txt"));
+  };
+  const fs::path images = file("images"), cameras = file("cameras"), points = file("points3D");
+  const auto lenses = parse_colmap_cameras(read_text(cameras), format, cameras.string());
+  auto views = parse_colmap_images(read_text(images), format, images.string());
+  std::map<std::uint64_t, Vec3> seen;
+  if (fs::exists(points)) seen = parse_colmap_points(read_text(points), format, points.string());
+
+  // A model may lie below its pictures' folder, where that folder itself was not given.
+  fs::path pictures;
+  for (const fs::path& base : {folder, model / "..", model / ".." / ".."})
+    if (pictures.empty()) pictures = picture_folder(base, size);
+  if (pictures.empty()) pictures = folder / "images";
+  pictures = pictures.lexically_normal();
+  Capture capture{
+      .all_splits = true, .may_miss = true, .notes = {"pictures of " + pictures.filename().string()}};
+  std::sort(views.begin(), views.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+  for (const ColmapImage& view : views) {
+    const std::string place = images.string() + ": " + view.name;
+    const auto lens = lenses.find(view.camera);
+    if (lens == lenses.end())
+      throw IoError(place + ": expected a camera of " + cameras.string() + ", got number " +
+                    std::to_string(view.camera));
+    capture.shots.push_back({.picture = pictures / view.name,
+                             .label = "the first",
+                             .place = place,
+                             .pose = view.pose,
+                             .intrinsics = lens->second});
+    try {
+      if (!seen.empty()) capture.shots.back().depth = colmap_depth(view, seen);
+    } catch (const ValueError& e) {
+      throw IoError(place + ": " + e.what());
+    }
+  }
+  for (const auto& [key, point] : seen) capture.points.push_back(point);
   return capture;
 }
 

@@ -35,6 +35,10 @@ Capture read_transforms(const std::filesystem::path& folder);
 /// @param size  pixels that the longer side is wanted to have, 0: as many as there are
 Capture read_llff(const std::filesystem::path& folder, Index size);
 
+/// The folder of a COLMAP model: sparse/0, sparse or the folder itself; empty where there is none.
+std::filesystem::path colmap_folder(const std::filesystem::path& folder);
+Capture read_colmap(const std::filesystem::path& folder, Index size);
+
 /// Reads a picture; IoError begins with the shot's place.
 Tensor<float> read_shot(const Shot& shot, const std::filesystem::path& file);
 /// The files of a folder that are called as pictures are, sorted by name; none where there is no folder.

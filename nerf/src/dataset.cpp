@@ -165,8 +165,10 @@ Capture read_capture(const fs::path& folder, Layout layout, const DatasetOptions
       return read_blender(folder, options.split);
     case Layout::transforms:
       return read_transforms(folder);
-    default:
+    case Layout::llff:
       return read_llff(folder, options.size);
+    default:
+      return read_colmap(folder, options.size);
   }
 }
 
@@ -220,9 +222,12 @@ Layout find_layout(const fs::path& folder) {
     if (has_file(folder / ("transforms_" + std::string(split) + ".json"))) return Layout::blender;
   if (has_file(folder / "transforms.json")) return Layout::transforms;
   if (has_file(folder / "poses_bounds.npy")) return Layout::llff;
-  throw IoError(folder.string() +
-                ": expected a data set: transforms_train.json (Blender), transforms.json (instant-ngp, "
-                "nerfstudio) or poses_bounds.npy (LLFF), got none of these files");
+  if (!colmap_folder(folder).empty()) return Layout::colmap;
+  throw IoError(
+      folder.string() +
+      ": expected a data set: transforms_train.json (Blender), transforms.json (instant-ngp, "
+      "nerfstudio), poses_bounds.npy (LLFF), or cameras.bin or cameras.txt (COLMAP) in it, in sparse "
+      "or in sparse/0; got none of these files");
 }
 
 bool has_split(const fs::path& folder, std::string_view split) {

@@ -7,11 +7,10 @@
 #include <unistd.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
-#include <iostream>
 
 #include "support/catch.h"
+#include "support/data.h"
 #include "support/random.h"
 
 using namespace fieldmark;
@@ -147,12 +146,9 @@ TEST_CASE("dataset: errors of pictures name JSON, place and picture") {
 }
 
 TEST_CASE("dataset: the Blender lego scene") {
-  const char* data = std::getenv("FIELDMARK_DATA");
-  if (!data) {
-    std::cout << "SKIPPED: dataset: the Blender lego scene needs FIELDMARK_DATA\n";
-    return;
-  }
-  const Dataset set = load_dataset(fs::path(data) / "nerf_synthetic/lego", {.split = "test", .size = 40});
+  const auto lego = data_or_skip("nerf_synthetic/lego", "dataset: the Blender lego scene");
+  if (!lego) return;
+  const Dataset set = load_dataset(*lego, {.split = "test", .size = 40});
   CHECK(set.name == "lego");
   REQUIRE(set.views.size() == 25);
   const CameraSpan span = camera_span(set);

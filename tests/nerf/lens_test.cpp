@@ -1,1 +1,133 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/nerf/lens.h>
+
+#include <cmath>
+
 #include "support/catch.h"
+#include "support/random.h"
+
+using namespace fieldmark;
+using namespace fieldmark::nerf;
+
+namespace {
+const Lens kFox{.k1 = 0.0578421, .k2 = -0.0805099, .p1 = -0.000980296, .p2 = 0.00015575};
+const Camera kCamera{.fx = 40, .fy = 41, .cx = 19, .cy = 16, .width = 40, .height = 30};
+}  // namespace
+
+TEST_CASE("lens: distortion by the formula, one coefficient at a time") {
+  const double x = 0.3, y = -0.2, r2 = 0.13;
+  const auto expect = [&](const Lens& lens, double u, double v) {
+    const Vec2 p = lens.distorted({x, y});
+    CHECK(std::abs(p[0] - u) < 1e-15);
+    CHECK(std::abs(p[1] - v) < 1e-15);
+  };
+  expect({}, x, y);
+  expect({.k1 = 0.1}, x * (1 + 0.1 * r2), y * (1 + 0.1 * r2));
+  expect({.k2 = 0.1}, x * (1 + 0.1 * r2 * r2), y * (1 + 0.1 * r2 * r2));
+  expect({.p1 = 0.1}, x + 0.2 * x * y, y + 0.1 * (r2 + 2 * y * y));
+  expect({.p2 = 0.1}, x + 0.1 * (r2 + 2 * x * x), y + 0.2 * x * y);
+  CHECK(Lens{}.is_pinhole());
+  CHECK(!kFox.is_pinhole());
+}
+
+TEST_CASE("lens: undistorted inverts distorted") {
+  for (const Lens& lens : {kFox, Lens{.k1 = -0.2, .k2 = 0.03}, Lens{.k1 = 0.3, .p1 = 0.01, .p2 = -0.02}})
+    for (double x = -0.8; x <= 0.8; x += 0.1)
+      for (double y = -0.8; y <= 0.8; y += 0.1) {
+        const auto back = lens.undistorted(lens.distorted({x, y}));
+        REQUIRE(back);
+        CHECK(std::hypot((*back)[0] - x, (*back)[1] - y) < 1e-11);
+      }
+}
+
+TEST_CASE("lens: where the picture folds over there is no inverse") {
+  // r (1 - r^2 / 3) rises to 2/3 at r = 1 and falls from there.
+  const Lens lens{.k1 = -1.0 / 3};
+  CHECK(lens.undistorted({0.66, 0}));
+  CHECK(!lens.undistorted({0.67, 0}));
+  CHECK(!lens.undistorted({-0.5, 0.5}));
+  // Seen at -2/3 by way of the second branch, r = 2, it is not the inverse either.
+  CHECK(!lens.is_regular({2, 0}));
+  CHECK(!Lens{.k1 = std::nan("")}.undistorted({0.1, 0.1}));
+}
+
+TEST_CASE("lens: the covered part is a rectangle of sources that no larger one contains") {
+  const auto source = [](const Lens& lens, Index column, Index row) {
+    const auto x = static_cast<double>(column), y = static_cast<double>(row);
+    const Vec2 p = lens.distorted({(x + 0.5 - 19) / 40, (y + 0.5 - 16) / 41});
+    const double u = p[0] * 40 + 19, v = p[1] * 41 + 16;
+    return u >= 0 && v >= 0 && u <= 40 && v <= 30;
+  };
+  CHECK(covered_part(kCamera, {}) == Crop{0, 0, 40, 30});
+  // A barrel covers all of the pinhole's picture.
+  CHECK(covered_part(kCamera, {.k1 = -0.1}) == Crop{0, 0, 40, 30});
+  const Lens cushion{.k1 = 0.5, .p1 = 0.01};
+  const Crop part = covered_part(kCamera, cushion);
+  CHECK((part.left > 0 && part.top > 0 && part.width > 25 && part.height > 20));
+  const auto all = [&](Index left, Index top, Index right, Index bottom) {
+    for (Index y = top; y < bottom; ++y)
+      for (Index x = left; x < right; ++x)
+        if (x < 0 || y < 0 || !source(cushion, x, y)) return false;
+    return true;
+  };
+  const Index right = part.left + part.width, bottom = part.top + part.height;
+  CHECK(all(part.left, part.top, right, bottom));
+  CHECK(!all(part.left - 1, part.top, right, bottom));
+  CHECK(!all(part.left, part.top - 1, right, bottom));
+  CHECK(!all(part.left, part.top, right + 1, bottom));
+  CHECK(!all(part.left, part.top, right, bottom + 1));
+}
+
+TEST_CASE("lens: a camera of a part sees the same rays") {
+  const Camera part = cropped(kCamera, {.left = 3, .top = 5, .width = 20, .height = 10});
+  CHECK((part.width == 20 && part.height == 10));
+  CHECK(pixel_ray(part, 4, 2).direction == pixel_ray(kCamera, 7, 7).direction);
+  CHECK_THROWS_WITH(cropped(kCamera, {.left = 30, .top = 0, .width = 20, .height = 10}),
+                    Contains("part must be within the picture of 40 x 30, got 20 x 10 at (30, 0)"));
+}
+
+TEST_CASE("lens: an undistorted picture has at each pixel what the lens put elsewhere") {
+  // Linear interpolation is exact on a picture that is linear in x and y.
+  Tensor<float> rgba(Shape{30, 40, 4});
+  for (Index y = 0; y < 30; ++y)
+    for (Index x = 0; x < 40; ++x) {
+      float* p = rgba.data.data() + 4 * (y * 40 + x);
+      p[0] = static_cast<float>(x) / 40, p[1] = static_cast<float>(y) / 30, p[2] = 0.5f, p[3] = 1;
+    }
+  const Lens lens{.k1 = 0.2, .k2 = 0.05, .p1 = 0.003, .p2 = -0.002};
+  const Crop part = covered_part(kCamera, lens);
+  const Tensor<float> out = undistorted_picture(rgba, kCamera, lens, part);
+  REQUIRE(out.shape == Shape{part.height, part.width, 4});
+  double worst = 0;
+  for (Index y = 2; y < part.height - 2; ++y)
+    for (Index x = 2; x < part.width - 2; ++x) {
+      const double px = static_cast<double>(part.left + x) + 0.5,
+                   py = static_cast<double>(part.top + y) + 0.5;
+      const Vec2 p = lens.distorted({(px - 19) / 40, (py - 16) / 41});
+      const float* got = out.data.data() + 4 * (y * part.width + x);
+      worst = std::max({worst, std::abs(got[0] - (p[0] * 40 + 19 - 0.5) / 40),
+                        std::abs(got[1] - (p[1] * 41 + 16 - 0.5) / 30)});
+      CHECK(got[2] == Approx(0.5));
+      CHECK(got[3] == 1);
+    }
+  CHECK(worst < 1e-6);
+  const Tensor<float> same = undistorted_picture(rgba, kCamera, {}, {0, 0, 40, 30});
+  CHECK(same.data == rgba.data);
+}
+
+TEST_CASE("lens: the colour of what is transparent does not leak") {
+  Tensor<float> rgba(Shape{30, 40, 4});
+  for (Index i = 0; i < 1200; ++i)
+    rgba[4 * i] = i % 40 < 20 ? 1.0f : 0.0f, rgba[4 * i + 1] = 1 - rgba[4 * i], rgba[4 * i + 3] = rgba[4 * i];
+  const Tensor<float> out = undistorted_picture(rgba, kCamera, {.k1 = -0.1}, {0, 0, 40, 30});
+  for (Index i = 0; i < 1200; ++i) CHECK(out[4 * i + 1] == 0);
+}
+
+TEST_CASE("lens: errors name the coefficients and the place") {
+  CHECK_THROWS_WITH(
+      covered_part(kCamera, {.k1 = -2}),
+      Contains("must have an inverse everywhere in the picture, got k1 -2 k2 0 p1 0 p2 0, which "
+               "has none at pixel (0, 0) of 40 x 30"));
+  CHECK_THROWS_AS(covered_part(kCamera, {.k1 = -2}), ValueError);
+  CHECK_THROWS_AS(undistorted_picture(Tensor<float>(Shape{3, 4, 4}), kCamera, {}, {0, 0, 4, 3}), ShapeError);
+}

@@ -1,1 +1,70 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/nerf/npy.h>
+
+#include <string>
+
+#include "nerf/format_samples.h"
 #include "support/catch.h"
+
+using namespace fieldmark;
+using namespace fieldmark::nerf;
+
+namespace {
+void expect_error(const std::string& bytes, const std::string& message) {
+  CHECK_THROWS_WITH(parse_npy(bytes, "a.npy"), Contains("a.npy: byte ") && Contains(message));
+  CHECK_THROWS_AS(parse_npy(bytes, "a.npy"), IoError);
+}
+const std::string kHeader = "{'descr': '<f8', 'fortran_order': False, 'shape': (2, 3), }";
+const std::string kSix = packed<double>({1, 2, 3, 4, 5, 6});
+std::string with_header(const std::string& header) { return npy_file(header, kSix); }
+}  // namespace
+
+TEST_CASE("npy: formats 1 to 3, floats of 4 and 8 bytes, keys in any order") {
+  for (const char version : {1, 2, 3}) {
+    const NpyArray a = parse_npy(npy_file(kHeader, kSix, version), "a.npy");
+    CHECK(a.shape == std::vector<Index>{2, 3});
+    CHECK(a.numbers == std::vector<double>{1, 2, 3, 4, 5, 6});
+  }
+  const NpyArray f4 = parse_npy(
+      npy_file("{\"shape\":(3,),\"descr\":\"<f4\",\"fortran_order\":False}", packed<float>({0.5f, -1, 3})),
+      "a.npy");
+  CHECK(f4.shape == std::vector<Index>{3});
+  CHECK(f4.numbers == std::vector<double>{0.5, -1, 3});
+  const NpyArray scalar = parse_npy(
+      npy_file("{'descr': '<f8', 'fortran_order': False, 'shape': (), }", packed<double>({7})), "a");
+  CHECK(scalar.shape.empty());
+  CHECK(scalar.numbers == std::vector<double>{7});
+  CHECK(parse_npy(npy_file("{'descr': '<f8', 'fortran_order': False, 'shape': (0, 5), }", ""), "a")
+            .numbers.empty());
+}
+
+TEST_CASE("npy: what is not read is named") {
+  expect_error("hello world, hello", "expected an .npy file");
+  expect_error("\x93NUMPY\x01", "expected 12 bytes at least");
+  expect_error(npy_file(kHeader, kSix, 4), "expected format 1, 2 or 3, got 4");
+  expect_error(with_header("{'descr': '>f8', 'fortran_order': False, 'shape': (2, 3), }"),
+               "expected descr '<f4' or '<f8' (little-endian floats), got '>f8'");
+  expect_error(with_header("{'descr': '<f8', 'fortran_order': True, 'shape': (2, 3), }"),
+               "expected fortran_order False (C order), got True");
+  expect_error(with_header("{'descr': '<f8', 'fortran_order': False}"), "none called shape");
+  expect_error(with_header("{'descr': '<f8', 'descr': '<f8'}"), "once each, got 'descr'");
+  expect_error(with_header("{'descr': [('a', '<f8')]}"), "expected ''', got '['");
+  expect_error(with_header("{'descr': '<f8', 'fortran_order': False, 'shape': (2, -3), }"),
+               "expected a whole number from 0, got '-'");
+  expect_error(with_header("{'descr': '<f8'"), "expected ',', got the end of the header");
+  expect_error(with_header(kHeader + "x"), "expected the end of the header after '}', got 'x'");
+}
+
+TEST_CASE("npy: sizes that do not fit are refused before anything is allocated") {
+  expect_error(npy_file(kHeader, kSix.substr(0, 47)),
+               "expected 48 bytes of numbers for the shape in the header, got 47");
+  expect_error(npy_file(kHeader, kSix + "x"), "got 49 bytes");
+  for (const char* shape :
+       {"(999999999999999999, 999999999999999999)", "(2, 999999999999999999)", "(4294967296, 4294967296, 2)"})
+    expect_error(
+        with_header("{'descr': '<f8', 'fortran_order': False, 'shape': " + std::string(shape) + ", }"),
+        "expected more numbers than the file has bytes for the shape in the header, got 48 bytes");
+  std::string long_header = with_header(kHeader);
+  long_header[9] = '\x7F';
+  expect_error(long_header, "expected a header of at most ");
+}

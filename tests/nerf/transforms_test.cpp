@@ -1,6 +1,7 @@
 #include <fieldmark/engine/error.h>
 #include <fieldmark/nerf/transforms.h>
 
+#include <cmath>
 #include <random>
 #include <string>
 
@@ -81,6 +82,64 @@ TEST_CASE("transforms: errors of matrices name row and column") {
   expect_error(with(last, ", [0, 0, -1, 4], [0, 0, 0, 1]"), at + ": expected a rotation");  // a mirror
   expect_error(with(last, ", [0, 0, 1, 4], [0, 0, 0, 2]"),
                at + "[3]: expected the row 0 0 0 1, got 2 in column 3");
+}
+
+TEST_CASE("transforms: intrinsics of the file, each replaced where a frame has its own") {
+  const Transforms t = parse_transforms(
+      with("\"camera_angle_x\": 0.7,",
+           "\"fl_x\": 20, \"fl_y\": 21, \"cx\": 5.5, \"cy\": 4, \"w\": 12.0, \"h\": 8, \"k1\": 0.1, \"k2\": "
+           "0.2, "
+           "\"p1\": 0.3, \"p2\": 0.4, \"k3\": 0, \"k4\": 0.0, \"is_fisheye\": false, \"aabb_scale\": 16, "
+           "\"camera_model\": \"OPENCV\","),
+      "t.json");
+  CHECK(t.camera_angle_x == 0);
+  CHECK(t.aabb_scale == 16.0);
+  const Intrinsics& i = t.frames[1].intrinsics;
+  CHECK((i.fl_x == 20 && i.fl_y == 21 && i.cx == 5.5 && i.cy == 4.0 && i.width == 12 && i.height == 8));
+  CHECK(i.lens == Lens{.k1 = 0.1, .k2 = 0.2, .p1 = 0.3, .p2 = 0.4});
+  const Transforms own = parse_transforms(
+      with("\"b.png\",", "\"b.png\", \"camera_angle_y\": 0.5, \"fl_x\": 9, \"k1\": -0.1, \"cx\": 1,"),
+      "t.json");
+  CHECK(own.frames[0].intrinsics.angle_x == 0.7);
+  CHECK((own.frames[0].intrinsics.fl_x == 0 && !own.frames[0].intrinsics.cx));
+  const Intrinsics& frame = own.frames[1].intrinsics;
+  CHECK((frame.fl_x == 9 && frame.angle_y == 0.5 && frame.lens.k1 == -0.1 && frame.cx == 1.0));
+  // The angle of a frame goes before the focal length of the file.
+  std::string text = with("\"camera_angle_x\"", "\"fl_x\"");
+  text.insert(text.find("\"file_path\": \"b.png\""), "\"camera_angle_x\": 0.6, ");
+  const Transforms angle = parse_transforms(text, "t.json");
+  CHECK((angle.frames[1].intrinsics.angle_x == 0.6 && angle.frames[1].intrinsics.fl_x == 0));
+}
+
+TEST_CASE("transforms: lenses and sizes that are not known are refused by name") {
+  const auto expect = [](const std::string& keys, const std::string& message) {
+    expect_error(with("\"camera_angle_x\": 0.7,", "\"camera_angle_x\": 0.7, " + keys + ","), message);
+  };
+  expect("\"k3\": 0.01", "k3: expected 0 (of radial distortion, k1 and k2 only are known here), got 0.01");
+  expect("\"k4\": -1", "k4: expected 0");
+  expect("\"is_fisheye\": true", "is_fisheye: expected false (fisheye lenses are not known here)");
+  expect("\"camera_model\": \"OPENCV_FISHEYE\"",
+         "camera_model: expected OPENCV, PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL or RADIAL, got "
+         "\"OPENCV_FISHEYE\"");
+  expect("\"fl_x\": 0", "fl_x: expected a number in (0.001, 1e9) pixels, got 0");
+  expect("\"cx\": \"left\"", "cx: expected a number, got string");
+  expect("\"w\": 0, \"h\": 8", "w: expected a number in 1 to 65536, got 0");
+  expect("\"w\": 8", "expected the keys \"w\" and \"h\" or neither of them, got one");
+  expect("\"aabb_scale\": 0", "aabb_scale: expected a number in (0, 1e9), got 0");
+  expect("\"k1\": 1e300", "k1: expected a number in (-1e9, 1e9), got ");
+}
+
+TEST_CASE("transforms: a rotation that is a little off is replaced by the nearest one") {
+  // Scaled by 1.004 and sheared: off by 8e-3, and the nearest rotation is the one it was made from.
+  const Transforms t =
+      parse_transforms(with("[0.6, -0.8, 0, 1], [0.8, 0.6, 0, 2], [0, 0, 1, 4]",
+                            "[0.6024, -0.8032, 0, 1], [0.8032, 0.6024, 0, 2], [0, 0, 1.001, 4]"),
+                       "t.json");
+  const Pose want{0.6, -0.8, 0, 1, 0.8, 0.6, 0, 2, 0, 0, 1, 4};
+  for (std::size_t k = 0; k < 12; ++k) CHECK(std::abs(t.frames[1].pose[k] - want[k]) < 1e-12);
+  // What single precision leaves is kept as it stands.
+  const Transforms kept = parse_transforms(with("0.6, -0.8", "0.600001, -0.8"), "t.json");
+  CHECK(kept.frames[1].pose[0] == 0.600001);
 }
 
 TEST_CASE("transforms: errors of syntax name line and byte") {

@@ -232,7 +232,7 @@ Command add_bench(CLI::App& app) {
   app.add_option("--only", o->engine.only, "Only rows with TEXT in their name")
       ->type_name("TEXT")
       ->default_str("all");
-  app.add_option("--scene", o->scene, "Data set that nerf_step and --precision train on, Blender layout")
+  app.add_option("--scene", o->scene, "Data set that nerf_step and --precision train on")
       ->type_name("DIR")
       ->default_str("lego of FIELDMARK_DATA, else the built-in scene");
   app.add_flag("--precision", o->precision,

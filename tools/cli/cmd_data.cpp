@@ -1,6 +1,7 @@
 #include <fieldmark/engine/error.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <ostream>
@@ -8,6 +9,7 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/fetch.h"
 #include "cli/manifest.h"
 #include "cli/suggest.h"
 
@@ -15,8 +17,7 @@ namespace fieldmark::cli {
 namespace {
 
 struct Options {
-  std::string name, folder;
-  bool list = false;
+  std::string name, folder, base_url;
 };
 
 std::vector<Manifest> manifests() {
@@ -81,6 +82,36 @@ int verify(const Options& options, Context& context) {
   return faults.empty() ? kOk : kFailed;
 }
 
+int fetch(const Options& options, Context& context) {
+  Manifest m = find(options.name);
+  if (!options.base_url.empty()) m.base_url = options.base_url;
+  const InterruptGuard guard;
+  Fetched fetched;
+  {
+    Progress progress = context.progress("fetch " + m.name);
+    const double all = static_cast<double>(std::max<std::uintmax_t>(m.bytes(), 1));
+    fetched = fetch_manifest(m, options.folder, [&](std::uintmax_t bytes) {
+      progress.update(static_cast<double>(bytes) / all);
+      return !guard.interrupted();
+    });
+  }
+  if (!fetched.complete) throw Interrupted("what came is kept, and the same command goes on from there");
+  context.text() << m.name << ": " << fetched.fetched << " files fetched, " << fetched.present
+                 << " were there; all are right\n";
+  context.result({{"name", m.name},
+                  {"ok", true},
+                  {"files", m.files.size()},
+                  {"fetched", fetched.fetched},
+                  {"present", fetched.present}});
+  return kOk;
+}
+
+void add_name_and_folder(CLI::App& app, Options& options, const char* folder) {
+  app.fallthrough();
+  app.add_option("name", options.name, "Data set, a name from the list")->required()->type_name("NAME");
+  app.add_option("dir", options.folder, folder)->required()->type_name("DIR");
+}
+
 }  // namespace
 
 Command add_data(CLI::App& app) {
@@ -89,14 +120,24 @@ Command add_data(CLI::App& app) {
   app.fallthrough();
   CLI::App* lists =
       app.add_subcommand("list", "Name every data set with its size, licence and source")->fallthrough();
-  CLI::App* verifies =
-      app.add_subcommand("verify", "Compare each file's size and SHA-256 with the manifest")->fallthrough();
-  verifies->add_option("name", options->name, "Data set, a name from the list")
-      ->required()
-      ->type_name("NAME");
-  verifies->add_option("dir", options->folder, "Folder that holds its files")->required()->type_name("DIR");
-  return [options, lists](Context& context) {
-    return lists->parsed() ? list(context) : verify(*options, context);
+  CLI::App* verifies = app.add_subcommand("verify", "Compare each file's size and SHA-256 with the manifest");
+  add_name_and_folder(*verifies, *options, "Folder that holds its files");
+  CLI::App* fetches = app.add_subcommand("fetch", "Get what is missing or wrong over http, and check it");
+  add_name_and_folder(*fetches, *options, "Folder for its files");
+  fetches
+      ->add_option("--base-url", options->base_url,
+                   "Address of a folder with the files, http or https (that of the manifest)")
+      ->check(CLI::Validator(
+          [](const std::string& url) {
+            return url.starts_with("http://") || url.starts_with("https://")
+                       ? std::string()
+                       : "expected http:// or https://, got " + url;
+          },
+          ""))
+      ->type_name("URL");
+  return [options, lists, fetches](Context& context) {
+    if (lists->parsed()) return list(context);
+    return fetches->parsed() ? fetch(*options, context) : verify(*options, context);
   };
 }
 

@@ -28,7 +28,10 @@ Manifest from_json(const Json& json) {
              .licence = json.at("licence"),
              .citation = json.at("source").at("citation"),
              .url = json.at("source").at("url"),
+             .base_url = json.value("base_url", ""),
              .files = {}};
+  if (!m.base_url.empty() && !m.base_url.starts_with("http://") && !m.base_url.starts_with("https://"))
+    throw IoError("base_url: expected http:// or https://, found " + m.base_url);
   for (const auto& file : json.at("files")) {
     m.files.push_back({file.at("path"), file.at("bytes"), file.at("sha256")});
     const auto& f = m.files.back();
@@ -38,7 +41,9 @@ Manifest from_json(const Json& json) {
   return m;
 }
 
-std::string fault_of(const Manifest::File& file, const std::filesystem::path& path) {
+}  // namespace
+
+std::string file_fault(const Manifest::File& file, const std::filesystem::path& path) {
   std::error_code error;
   const auto bytes = std::filesystem::file_size(path, error);
   if (error) return "missing";
@@ -47,8 +52,6 @@ std::string fault_of(const Manifest::File& file, const std::filesystem::path& pa
   const std::string found = watermark::sha256_file_hex(path);
   return found == file.sha256 ? "" : "expected sha256 " + file.sha256 + ", found " + found;
 }
-
-}  // namespace
 
 std::uintmax_t Manifest::bytes() const {
   std::uintmax_t sum = 0;
@@ -71,7 +74,7 @@ std::vector<ManifestFault> verify_manifest(const Manifest& manifest, const std::
   std::uintmax_t seen = 0;
   for (const auto& file : manifest.files) {
     if (!keep_going(static_cast<double>(seen) / all)) break;
-    if (auto what = fault_of(file, folder / file.path); !what.empty())
+    if (auto what = file_fault(file, folder / file.path); !what.empty())
       faults.push_back({file.path, std::move(what)});
     seen += file.bytes;
   }

@@ -16,6 +16,7 @@ struct Manifest {
     std::string sha256;  ///< 64 hexadecimal digits
   };
   std::string name, kind, title, licence, citation, url;
+  std::string base_url{};  ///< http or https; a file's address is base_url + path; empty: none is known
   std::vector<File> files;
   std::uintmax_t bytes() const;
 };
@@ -25,6 +26,10 @@ std::vector<std::string_view> embedded_manifests();
 
 /// @param origin  named in errors   @throws IoError if the text is not JSON or not a manifest of format 1
 Manifest parse_manifest(std::string_view text, const std::string& origin);
+
+/// What is wrong with a file: missing, its size or SHA-256; empty if nothing is. @throws IoError if it cannot
+/// be read
+std::string file_fault(const Manifest::File& file, const std::filesystem::path& path);
 
 struct ManifestFault {
   std::string path, what;

@@ -62,7 +62,8 @@ struct DatasetOptions {
 };
 
 /// Reads one split of a data set. The layout is the first whose file the folder has: transforms_train.json
-/// (or _val, _test), transforms.json, poses_bounds.npy. All but blender hold out every 8th picture (0, 8, 16,
+/// (or _val, _test), transforms.json, poses_bounds.npy, cameras.bin or cameras.txt (in sparse/0,
+/// sparse or the folder itself). All but blender hold out every 8th picture (0, 8, 16,
 /// ... of the names sorted) as val and test, and have the others in train. Pictures without alpha are taken
 /// as opaque.
 ///
@@ -73,6 +74,9 @@ struct DatasetOptions {
 /// llff: see parse_poses_bounds(); poses are recentred and rescaled by recentre_llff(). Pictures are those of
 /// the folder images or images_N whose longer side is the smallest that reaches `size` (else the largest),
 /// sorted by name.
+///
+/// colmap: see parse_colmap_cameras(). World axes are COLMAP's. Pictures as for llff, lenses and missing
+/// pictures as for transforms; points3D is read where it is there.
 /// @throws ValueError  if an option is outside its range
 /// @throws IoError     naming file and place: folder, JSON or a picture missing, unreadable or malformed, no
 ///                     views, pictures of differing sizes, a distortion that has no inverse, none of the

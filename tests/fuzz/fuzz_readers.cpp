@@ -1,0 +1,207 @@
+// Gives the readers of foreign files mutations of valid ones: each must be read or refused with an Error.
+//   fuzz_readers [INPUTS = 20000] [SEED = 1] [FIRST = 0]
+// Input i depends on SEED and i only, so `fuzz_readers 1 SEED i` repeats one. Crashes and leaks are for the
+// sanitizers to see (preset asan).
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/safetensors.h>
+#include <fieldmark/nerf/colmap.h>
+#include <fieldmark/nerf/lens.h>
+#include <fieldmark/nerf/llff.h>
+#include <fieldmark/nerf/npy.h>
+#include <fieldmark/nerf/transforms.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <functional>
+#include <iostream>
+#include <limits>
+#include <map>
+#include <random>
+
+#include "nerf/format_samples.h"
+
+using namespace fieldmark;
+using namespace fieldmark::nerf;
+
+namespace {
+using Random = std::mt19937_64;
+constexpr double kSecondsForOne = 2;
+
+const std::string kTransforms =
+    R"({"camera_angle_x": 0.75, "fl_x": 343.88, "fl_y": 343.6, "k1": 0.0578, "k2": -0.08,
+ "p1": -0.00098, "p2": 0.00016, "cx": 138.6, "cy": 241.3, "w": 270.0, "h": 480.0, "aabb_scale": 4, "frames": [
+ {"file_path": "images/0001.png", "sharpness": 31.75, "transform_matrix": [[0.6, -0.8, 0, 3.1], [0.8, 0.6, 0, -5.4],
+  [0, 0, 1, -0.97], [0.0, 0.0, 0.0, 1.0]]},
+ {"file_path": "./b", "fl_x": 20, "k3": 0, "is_fisheye": false, "camera_model": "OPENCV", "transform_matrix":
+  [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}]})";
+
+std::string safetensors_file() {
+  const std::string header =
+      R"({"__metadata__":{"format":"a"},"w":{"dtype":"F32","shape":[2,3],"data_offsets":[0,24]},)"
+      R"("h":{"dtype":"BF16","shape":[4],"data_offsets":[24,32]},"b":{"dtype":"U8","shape":[],"data_offsets":[32,33]}})";
+  return packed(static_cast<std::uint64_t>(header.size())) + header + std::string(33, '\x3F');
+}
+
+// A lens that was read is also used, on a small picture.
+void use(const Intrinsics& i) {
+  const Camera c = i.camera({}, i.width, i.height).scaled(16, 12);
+  const Crop part = covered_part(c, i.lens);
+  undistorted_picture(Tensor<float>(Shape{12, 16, 4}), c, i.lens, part);
+}
+void use(const SafetensorsFile& file) {
+  for (const auto& t : file.tensors)
+    if (t.dtype == "F32" || t.dtype == "BF16" || t.dtype == "F16") file.f32(t.name);
+}
+
+struct Format {
+  const char* name;
+  std::vector<std::string> samples;
+  std::function<void(const std::string&)> read;
+};
+
+template <class Parse>
+std::function<void(const std::string&)> both(Parse parse, ColmapFormat format) {
+  return [=](const std::string& bytes) { parse(bytes, format, "input"); };
+}
+
+std::vector<Format> formats() {
+  constexpr auto kText = ColmapFormat::text, kBinary = ColmapFormat::binary;
+  const auto cameras = [](const std::string& bytes, ColmapFormat format, const char* name) {
+    for (const auto& [key, camera] : parse_colmap_cameras(bytes, format, name)) use(camera);
+  };
+  const std::string npy = npy_file("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }",
+                                   packed<float>({1, 2, 3, 4, 5, 6}), 2);
+  return {
+      {"npy", {npy, llff_file(llff_rows(1))}, [](const std::string& b) { parse_npy(b, "input"); }},
+      {"poses_bounds.npy",
+       {llff_file(llff_rows(2)), llff_file(llff_rows(3))},
+       [](const std::string& b) {
+         auto views = parse_poses_bounds(b, "input");
+         recentre_llff(views);
+       }},
+      {"cameras.txt", {kColmapCamerasText}, both(cameras, kText)},
+      {"cameras.bin", {colmap_cameras_binary()}, both(cameras, kBinary)},
+      {"images.txt", {kColmapImagesText}, both(parse_colmap_images, kText)},
+      {"images.bin", {colmap_images_binary()}, both(parse_colmap_images, kBinary)},
+      {"points3D.txt", {kColmapPointsText}, both(parse_colmap_points, kText)},
+      {"points3D.bin", {colmap_points_binary()}, both(parse_colmap_points, kBinary)},
+      {"transforms.json",
+       {kTransforms},
+       [](const std::string& b) {
+         for (const auto& frame : parse_transforms(b, "input").frames)
+           if (frame.intrinsics.width > 0) use(frame.intrinsics);
+       }},
+      {"safetensors",
+       {safetensors_file()},
+       [](const std::string& b) { use(SafetensorsFile::parse(std::as_bytes(std::span(b)), "input")); }},
+  };
+}
+
+std::string number(Random& random) {
+  static const std::string words[] = {
+      "0",     "-1",    "1e308",      "-1e-308", "nan",  "inf", "18446744073709551616",
+      "2.5e9", "1e999", "0x7fffffff", "65537",   "[",    "]",   "{",
+      "}",     "\"",    ",",          ":",       "null", "\n",  "\\u0000"};
+  static const std::string bytes[] = {packed(std::numeric_limits<std::uint64_t>::max()),
+                                      packed(std::numeric_limits<std::int64_t>::min()),
+                                      packed(std::numeric_limits<double>::quiet_NaN()),
+                                      packed(std::numeric_limits<double>::infinity()),
+                                      packed(std::numeric_limits<double>::denorm_min()),
+                                      packed(1e300),
+                                      packed(std::uint64_t{1} << 40),
+                                      packed(std::uint64_t{0}),
+                                      packed(std::uint32_t{0x80000000})};
+  return random() % 2 ? words[random() % std::size(words)] : bytes[random() % std::size(bytes)];
+}
+
+void mutate(std::string& s, const std::string& other, Random& random) {
+  if (s.empty()) {
+    s = number(random);
+    return;
+  }
+  const std::size_t at = random() % s.size(), length = 1 + random() % 40;
+  switch (random() % 8) {
+    case 0:
+      s[at] = static_cast<char>(s[at] ^ (1 << random() % 8));
+      break;
+    case 1:
+      s[at] = static_cast<char>(random());
+      break;
+    case 2:
+      s.resize(at);
+      break;
+    case 3:
+      s.erase(at, length);
+      break;
+    case 4:
+      s.insert(at, number(random));
+      break;
+    case 5: {
+      const std::string by = number(random);
+      s.replace(at, by.size(), by);
+      break;
+    }
+    case 6:
+      s.insert(at, s.substr(random() % s.size(), length));
+      break;
+    default:
+      s.replace(at, length, other.substr(random() % other.size(), 1 + random() % 40));
+  }
+}
+
+struct Outcome {
+  std::size_t read = 0, refused = 0;
+};
+
+// False if something other than an Error came out, or it took too long.
+bool try_one(const Format& format, const std::string& input, Outcome& outcome) {
+  const auto begin = std::chrono::steady_clock::now();
+  try {
+    format.read(input);
+    ++outcome.read;
+  } catch (const Error&) {
+    ++outcome.refused;
+  } catch (const std::exception& e) {
+    std::cerr << format.name << ": not an Error: " << e.what() << "\n";
+    return false;
+  } catch (...) {
+    std::cerr << format.name << ": not an exception\n";
+    return false;
+  }
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  if (seconds > kSecondsForOne) std::cerr << format.name << ": took " << seconds << " s\n";
+  return seconds <= kSecondsForOne;
+}
+
+int run(std::size_t inputs, std::uint64_t seed, std::size_t first) {
+  const std::vector<Format> all = formats();
+  std::vector<Outcome> outcomes(all.size());
+  for (std::size_t k = 0; k < all.size(); ++k)
+    for (const auto& sample : all[k].samples)
+      all[k].read(sample);  // valid: an exception here ends the program
+  std::size_t failures = 0;
+  for (std::size_t i = first; i < first + inputs; ++i) {
+    std::seed_seq words{seed, seed >> 32, std::uint64_t{i}, std::uint64_t{i} >> 32};
+    Random random(words);
+    const std::size_t k = i % all.size();
+    const Format &format = all[k], &other = all[random() % all.size()];
+    std::string input = format.samples[random() % format.samples.size()];
+    for (auto edits = 1 + random() % 5; edits > 0; --edits) mutate(input, other.samples[0], random);
+    if (!try_one(format, input, outcomes[k])) {
+      std::cerr << "  input " << i << ": repeat with fuzz_readers 1 " << seed << " " << i << "\n";
+      ++failures;
+    }
+  }
+  for (std::size_t k = 0; k < all.size(); ++k)
+    std::cout << all[k].name << ": " << outcomes[k].read << " read, " << outcomes[k].refused << " refused\n";
+  std::cout << inputs << " inputs, " << failures << " failures\n";
+  return failures == 0 ? 0 : 1;
+}
+}  // namespace
+
+int main(int count, char** words) {
+  const auto argument = [&](int i, unsigned long long otherwise) {
+    return i < count ? std::strtoull(words[i], nullptr, 10) : otherwise;
+  };
+  return run(argument(1, 20000), argument(2, 1), argument(3, 0));
+}
