@@ -113,8 +113,8 @@ TEST_CASE("dataset: JPEG, names without extension, and intrinsics of a frame of 
 
 TEST_CASE("dataset: distorted pictures are cut to what every lens covers, and keep their scale") {
   Photographs scene;
-  scene.json["k1"] = 0.8;
-  scene.json["frames"][4]["k1"] = 1.2;
+  scene.json["k1"] = 2;
+  scene.json["frames"][4]["k1"] = 4;
   scene.write();
   const Dataset train = load_dataset(scene.path), test = load_dataset(scene.path, {.split = "test"});
   const Camera& c = train.views[0].camera;
