@@ -8,6 +8,18 @@
 #include "kernels/march.h"
 
 namespace fieldmark::nerf {
+namespace {
+
+kernels::MarchGrid march_grid(const OccupancyGrid& grid) {
+  const Index blocks = grid.resolution() / 4;
+  return {.resolution = static_cast<std::int32_t>(grid.resolution()),
+          .block_side = static_cast<std::int32_t>(blocks),
+          .coarse_side = static_cast<std::int32_t>((blocks + 1) / 2),
+          .clearance = grid.clearances().data(),
+          .words = grid.block_halves().data()};
+}
+
+}  // namespace
 
 CubeSpan intersect_unit_cube(const float o[3], const float d[3]) {
   CubeSpan span{0, std::numeric_limits<float>::infinity()};
@@ -94,9 +106,32 @@ Index RayWalk::next_contracted(const OccupancyGrid& grid, Index max, float* t, f
   return count;
 }
 
+void RayWalk::skip_empty(const OccupancyGrid& grid, std::span<RayWalk> walks, std::span<const Index> which) {
+  using namespace kernels;
+  const MarchGrid seen = march_grid(grid);
+  const auto kernel = FIELDMARK_KERNEL(march_to_blocks);
+  for (std::size_t begin = 0; begin < which.size(); begin += kMarchLanes) {
+    MarchRays rays{};
+    const std::size_t count = std::min<std::size_t>(kMarchLanes, which.size() - begin);
+    for (std::size_t i = 0; i < kMarchLanes; ++i) {
+      if (i >= count) {
+        rays.far[i] = -1;
+        continue;
+      }
+      const RayWalk& w = walks[static_cast<std::size_t>(which[begin + i])];
+      if (w.contracted_) return;  // not straight
+      for (int a = 0; a < 3; ++a)
+        rays.o[a][i] = w.o_[a], rays.d[a][i] = w.d_[a], rays.steps[a][i] = w.steps_[a];
+      rays.near[i] = w.near_, rays.far[i] = w.far_, rays.step[i] = w.step_, rays.jitter[i] = w.jitter_;
+      rays.k[i] = static_cast<std::int32_t>(w.k_);
+    }
+    kernel(seen, rays);
+    for (std::size_t i = 0; i < count; ++i) walks[static_cast<std::size_t>(which[begin + i])].k_ = rays.k[i];
+  }
+}
+
 Index RayWalk::next_straight(const OccupancyGrid& grid, Index max, float* t) {
   using namespace kernels;
-  const Index blocks = grid.resolution() / 4;
   MarchRay ray{.o = {o_[0], o_[1], o_[2]},
                .d = {d_[0], d_[1], d_[2]},
                .steps = {steps_[0], steps_[1], steps_[2]},
@@ -105,12 +140,7 @@ Index RayWalk::next_straight(const OccupancyGrid& grid, Index max, float* t) {
                .step = step_,
                .jitter = jitter_,
                .k = static_cast<std::int32_t>(k_)};
-  const Index count = FIELDMARK_KERNEL(march)({.resolution = static_cast<std::int32_t>(grid.resolution()),
-                                               .block_side = static_cast<std::int32_t>(blocks),
-                                               .coarse_side = static_cast<std::int32_t>((blocks + 1) / 2),
-                                               .clearance = grid.clearances().data(),
-                                               .words = grid.block_halves().data()},
-                                              ray, max, t);
+  const Index count = FIELDMARK_KERNEL(march)(march_grid(grid), ray, max, t);
   k_ = ray.k;
   return count;
 }

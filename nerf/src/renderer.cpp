@@ -9,7 +9,13 @@ namespace fieldmark::nerf {
 namespace {
 
 constexpr Index kMlpRays = 64;  // of an mlp field at a time: what is kept of a sample is large
-constexpr Index kTile = 16;     // pixels a side: rays of a tile pass through the same cells
+
+// Every other bit of n, the lowest first: a coordinate of the n-th point of a Z-shaped curve.
+Index even_bits(Index n) {
+  Index out = 0;
+  for (Index bit = 0; n >> 2 * bit; ++bit) out |= (n >> 2 * bit & 1) << bit;
+  return out;
+}
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
@@ -29,6 +35,9 @@ Renderer::Renderer(const RadianceField& field, const RenderOptions& options)
       options_(options),
       packed_(field.params,
               {.precision = options.precision, .tables = options.precision == Precision::bf16}) {
+  if (options.order.width < 1 || options.order.height < 1)
+    throw ValueError("[renderer] order: a tile must have at least one pixel, got " +
+                     std::to_string(options.order.width) + " x " + std::to_string(options.order.height));
   refresh();
   for (Index i = 0; i < kLanes; ++i) lanes_.push_back(std::make_unique<Lane>());
 }
@@ -106,31 +115,49 @@ void Renderer::accumulate(const Lane& lane, Index rays, float* out, float* posit
       if (out[4 * r + 3] > 0) position[3 * r + a] /= out[4 * r + 3];
 }
 
+// The pixels of a tile, in the order in which its rays are traced.
+void Renderer::list_pixels(const Camera& camera, Index tile, Lane& lane) const {
+  const RayOrder& order = options_.order;
+  const Index columns = (camera.width + order.width - 1) / order.width;
+  const Index x0 = tile % columns * order.width, y0 = tile / columns * order.height;
+  const Index width = std::min(order.width, camera.width - x0),
+              height = std::min(order.height, camera.height - y0);
+  lane.pixels.clear();
+  const auto add = [&](Index x, Index y) {
+    lane.pixels.push_back(static_cast<float>(x0 + x));
+    lane.pixels.push_back(static_cast<float>(y0 + y));
+  };
+  if (order.morton) {
+    Index side = 1;
+    while (side < std::max(width, height)) side *= 2;
+    for (Index i = 0; i < side * side; ++i)
+      if (const Index x = even_bits(i), y = even_bits(i >> 1); x < width && y < height) add(x, y);
+    return;
+  }
+  for (Index y = 0; y < height; ++y)
+    for (Index x = 0; x < width; ++x) add(x, y);
+}
+
 Rendering Renderer::render(const Camera& camera) {
   refresh();
   Rendering view{Tensor<float>({camera.height, camera.width, 3}),
                  Tensor<float>({camera.height, camera.width})};
-  const Index columns = (camera.width + kTile - 1) / kTile,
-              tiles = columns * ((camera.height + kTile - 1) / kTile);
+  const RayOrder& order = options_.order;
+  const Index tiles =
+      ((camera.width + order.width - 1) / order.width) * ((camera.height + order.height - 1) / order.height);
   const float background = background_value(field_.background);
   parallel_for(kLanes, 1, [&](Index l, Index) {
     Lane& lane = *lanes_[at(l)];
     for (Index tile = l; tile < tiles; tile += kLanes) {
-      const Index x0 = tile % columns * kTile, y0 = tile / columns * kTile;
-      const Index x1 = std::min(x0 + kTile, camera.width), y1 = std::min(y0 + kTile, camera.height);
-      lane.pixels.clear();
-      for (Index y = y0; y < y1; ++y)
-        for (Index x = x0; x < x1; ++x) {
-          lane.pixels.push_back(static_cast<float>(x));
-          lane.pixels.push_back(static_cast<float>(y));
-        }
-      const Index n = (x1 - x0) * (y1 - y0);
+      list_pixels(camera, tile, lane);
+      const auto n = static_cast<Index>(lane.pixels.size()) / 2;
       lane.rays.resize(n);
       lane.out.resize(at(4 * n));
       lane.rays.set(field_.space, 0, camera, lane.pixels);
       trace(lane.rays.batch(field_.space), l, lane.out.data());
       for (Index i = 0; i < n; ++i) {
-        const Index pixel = (y0 + i / (x1 - x0)) * camera.width + x0 + i % (x1 - x0);
+        const Index pixel = static_cast<Index>(lane.pixels[at(2 * i + 1)]) * camera.width +
+                            static_cast<Index>(lane.pixels[at(2 * i)]);
         const float* c = &lane.out[at(4 * i)];
         for (Index a = 0; a < 3; ++a)
           view.rgb[3 * pixel + a] = std::clamp(c[a] + (1 - c[3]) * background, 0.f, 1.f);

@@ -55,6 +55,7 @@ void RaySampler::sample(const Field<float>& field, const ParamStore<float>& para
 // One segment for each ray that is still alive; rays that end here leave the list.
 void RaySampler::march_wave(const OccupancyGrid& grid) {
   std::size_t kept = 0;
+  RayWalk::skip_empty(grid, walks_, alive_);
   const Index wave = std::clamp(kWaveSamples / static_cast<Index>(alive_.size()), kLeastWave, kMostWave);
   for (Index r : alive_) {
     float t[kMostWave], x[3 * kMostWave];

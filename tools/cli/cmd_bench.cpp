@@ -8,12 +8,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <ostream>
 
+#include "cli/bench_field.h"
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
@@ -22,7 +22,8 @@ namespace fieldmark::cli {
 namespace {
 
 struct Options {
-  std::string what, plot, peer, scene;
+  std::string what, peer;
+  BenchFieldOptions field;  // and what both have: --scene, --plot, --runs
   bool precision = false;
   bench::PeerOptions python;
   bench::EngineBenchOptions engine;
@@ -124,12 +125,7 @@ struct Scene {
 
 // The data set of --scene, or else lego where FIELDMARK_DATA has it.
 Scene scene_of(const Options& options) {
-  std::filesystem::path folder = options.scene;
-  const char* data = std::getenv("FIELDMARK_DATA");
-  if (folder.empty() && data) {
-    folder = std::filesystem::path(data) / "nerf_synthetic" / "lego";
-    if (!std::filesystem::exists(folder)) folder.clear();
-  }
+  const std::filesystem::path folder = options.field.scene.empty() ? lego_folder() : options.field.scene;
   Scene scene;
   const bool step = std::string("nerf_step").find(options.engine.only) != std::string::npos;
   if (folder.empty() || !(step || options.precision)) return scene;
@@ -192,7 +188,9 @@ Json precision(const Options& options, const Scene& scene, Context& context) {
 }
 
 int run(Options options, Context& context) {
-  if (!options.plot.empty()) check_writable(options.plot);
+  if (options.what == "field") return bench_field(options.field, context);
+  options.engine.runs = options.field.runs;
+  if (!options.field.plot.empty()) check_writable(options.field.plot);
   const Scene scene = scene_of(options);
   if (scene.train) options.engine.scene = &*scene.train;
   const bench::EngineBench result = measured(options, context);
@@ -205,7 +203,7 @@ int run(Options options, Context& context) {
     print_row(context.text(), row);
     rows.push_back(row_json(row, !options.peer.empty()));
   }
-  if (!options.plot.empty()) write_plot(options.plot, result);
+  if (!options.field.plot.empty()) write_plot(options.field.plot, result);
   Json json{{"peak_gflops", result.peak_gflops}, {"isa", isa_name()}};
   if (!options.peer.empty()) json["peer"] = peer_json(result, options);
   json["rows"] = rows;
@@ -218,33 +216,39 @@ int run(Options options, Context& context) {
 
 Command add_bench(CLI::App& app) {
   auto o = std::make_shared<Options>();
-  app.add_option("what", o->what, "engine: kernels and training steps, against this machine's peak")
+  app.add_option("what", o->what,
+                 "engine: kernels and training steps, against this machine's peak;\n"
+                 "field: rendering in many ways, speed against error")
       ->required()
-      ->check(CLI::IsMember({"engine"}).description(""))
+      ->check(CLI::IsMember({"engine", "field"}).description(""))
       ->type_name("WHAT");
-  app.add_option("--runs", o->engine.runs, "Runs of each row, whose median counts, 1 to 1000")
+  app.add_option("--runs", o->field.runs, "Runs of each row, whose median counts, 1 to 1000")
       ->check(CLI::Range(1, 1000).description(""))
       ->type_name("N");
   app.add_option("--scale", o->engine.scale,
-                 "Of the numbers of samples, above 0 to 1: smaller is quicker and less exact")
+                 "engine: of the numbers of samples, above 0 to 1: smaller is quicker and less exact")
       ->check(CLI::Range(1e-6, 1.0).description(""))
       ->type_name("F");
-  app.add_option("--only", o->engine.only, "Only rows with TEXT in their name")
+  app.add_option("--only", o->engine.only, "engine: only rows with TEXT in their name")
       ->type_name("TEXT")
       ->default_str("all");
-  app.add_option("--scene", o->scene, "Data set that nerf_step and --precision train on")
+  app.add_option(
+         "--scene", o->field.scene,
+         "Data set that nerf_step, --precision and field train on, and whose test views field renders")
       ->type_name("DIR")
       ->default_str("lego of FIELDMARK_DATA, else the built-in scene");
-  app.add_flag("--precision", o->precision,
-               "Also a table of speed against error: double, float, bf16, and every approximation in use");
-  app.add_option("--plot", o->plot, "SVG picture of the rows (none)")->type_name("FILE")->default_str("");
-  auto* peer =
-      app.add_option(
-             "--peer", o->peer,
-             "pytorch: ratio to PyTorch on the rows it can do, timed by turns, gradients compared (none)")
-          ->check(CLI::IsMember({"pytorch"}).description(""))
-          ->type_name("NAME")
-          ->default_str("");
+  app.add_flag(
+      "--precision", o->precision,
+      "engine: also a table of speed against error: double, float, bf16, and every approximation in use");
+  app.add_option("--plot", o->field.plot, "SVG picture of the rows (none)")
+      ->type_name("FILE")
+      ->default_str("");
+  auto* peer = app.add_option("--peer", o->peer,
+                              "engine: pytorch: ratio to PyTorch on the rows it can do, timed by turns, "
+                              "gradients compared (none)")
+                   ->check(CLI::IsMember({"pytorch"}).description(""))
+                   ->type_name("NAME")
+                   ->default_str("");
   app.add_option("--python", o->python.python, "Interpreter with torch, for --peer")
       ->type_name("FILE")
       ->needs(peer);
@@ -252,6 +256,7 @@ Command add_bench(CLI::App& app) {
       ->check(CLI::Range(0.1, 86400.0).description(""))
       ->type_name("S")
       ->needs(peer);
+  add_bench_field(app, o->field);
   return [o](Context& context) { return run(*o, context); };
 }
 

@@ -21,6 +21,19 @@ struct MarchRay {
   std::int32_t k;
 };
 
+constexpr int kMarchLanes = 16;  ///< rays of a MarchRays
+
+/// Neighbouring rays side by side, see MarchRay; lanes that hold no ray have far = -1.
+struct MarchRays {
+  float o[3][kMarchLanes], d[3][kMarchLanes], steps[3][kMarchLanes];
+  float near[kMarchLanes], far[kMarchLanes];
+  float step[kMarchLanes], jitter[kMarchLanes];
+  std::int32_t k[kMarchLanes];
+};
+
+// Moves each k to the first sample that lies in a block with an occupied cell, or behind the ray's end.
+FIELDMARK_DECLARE_KERNEL(void, march_to_blocks, (const MarchGrid& grid, MarchRays& rays))
+
 // Writes the next samples in occupied cells to t, at most `max`, and moves k past them. Returns their number.
 FIELDMARK_DECLARE_KERNEL(std::int64_t, march,
                          (const MarchGrid& grid, MarchRay& ray, std::int64_t max, float* t))

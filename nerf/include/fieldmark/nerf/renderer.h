@@ -7,6 +7,13 @@
 
 namespace fieldmark::nerf {
 
+/// Which rays of a picture are traced together, and in what order.
+struct RayOrder {
+  Index width = 16;     ///< of a tile, pixels, at least 1: its rays pass through the same cells
+  Index height = 16;    ///< likewise
+  bool morton = false;  ///< along a Z-shaped curve within the tile, not line by line
+};
+
 /// How exactly a Renderer works.
 struct RenderOptions {
   float stop = 1e-3f;          ///< a ray ends where its transmittance falls below this
@@ -16,6 +23,7 @@ struct RenderOptions {
   Precision precision = Precision::fp32;
   /// Of a ray of an mlp field; none: those it was trained with.
   std::optional<RayPoints> points{};
+  RayOrder order{};  ///< changes no number of a picture, only how fast it comes
 };
 
 /// A picture of a field.
@@ -28,8 +36,8 @@ struct Rendering {
 /// between views; callers of trace() say so with refresh().
 class Renderer {
  public:
-  /// @param options  not checked; weights and transmittances are in [0, 1]
-  /// @throws ValueError for bf16 where the CPU has none
+  /// @param options  weights and transmittances are in [0, 1], not checked
+  /// @throws ValueError for bf16 where the CPU has none, or if a tile is empty
   explicit Renderer(const RadianceField& field, const RenderOptions& options = {});
   ~Renderer();
   /// One ray through the centre of every pixel, samples in the middle of their intervals.
@@ -53,6 +61,7 @@ class Renderer {
  private:
   struct Lane;
   void trace_block(const RayBatch& rays, Lane& lane, float* out, float* position);
+  void list_pixels(const Camera& camera, Index tile, Lane& lane) const;
   static void accumulate(const Lane& lane, Index rays, float* out, float* position);
   const RadianceField& field_;
   RenderOptions options_;

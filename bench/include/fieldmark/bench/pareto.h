@@ -1,0 +1,24 @@
+#pragma once
+#include <span>
+#include <vector>
+
+namespace fieldmark::bench {
+
+/// One way of doing something: what it costs and how good it is.
+struct SpeedQuality {
+  double seconds = 0;  ///< less is better
+  double psnr = 0;     ///< more is better, dB
+};
+
+/// What counts as equal: times of the same work differ, and nobody sees a tenth of a decibel.
+struct ParetoMargin {
+  double time = 0.04;  ///< part of a time, in [0, 1)
+  double psnr = 0.1;   ///< dB, >= 0
+};
+
+/// Marks the points that no other one beats. One beats another if it is faster by more than the margin and no
+/// less exact within the margin, or more exact by more than the margin and no slower within the margin. Times
+/// that are not finite and PSNRs that are no number lose. @throws ValueError if a margin is out of range
+std::vector<bool> pareto_front(std::span<const SpeedQuality> points, const ParetoMargin& margin = {});
+
+}  // namespace fieldmark::bench

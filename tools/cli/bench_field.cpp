@@ -1,0 +1,203 @@
+#include "cli/bench_field.h"
+
+#include <fieldmark/bench/field_bench.h>
+#include <fieldmark/bench/scatter_chart.h>
+#include <fieldmark/engine/files.h>
+#include <fieldmark/engine/isa.h>
+#include <fieldmark/nerf/analytic_scene.h>
+#include <fieldmark/nerf/trainer.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <ostream>
+
+#include "cli/cli.h"
+#include "cli/context.h"
+#include "cli/long_run.h"
+
+namespace fieldmark::cli {
+namespace {
+
+constexpr Index kSceneSize = 200, kSceneViews = 50;  // of the built-in scene
+
+struct Subject {
+  std::unique_ptr<nerf::RadianceField> field;
+  std::vector<nerf::Camera> cameras;
+  std::string name;
+};
+
+nerf::Dataset split_of(const std::string& folder, const std::string& split, bool quick) {
+  if (!folder.empty()) return nerf::load_dataset(folder, {.split = split});
+  const Index part = quick ? 8 : 1;
+  return nerf::make_scene({.size = kSceneSize / part, .views = kSceneViews / part}, split);
+}
+
+std::unique_ptr<nerf::RadianceField> trained(const nerf::Dataset& data, const BenchFieldOptions& options,
+                                             Context& context) {
+  auto field = std::make_unique<nerf::RadianceField>(nerf::RadianceFieldOptions{.seed = context.seed()});
+  const double begin = context.seconds();
+  nerf::Trainer trainer(*field, data, {.schedule = {.seconds = options.seconds}, .seed = context.seed()});
+  run_long({.what = "train",
+            .done = [&] { return trainer.done(); },
+            .step = [&](double seconds) { trainer.step(seconds - begin); },
+            .steps = [&] { return trainer.steps(); },
+            .note = [] { return std::string(); },
+            .save = {},
+            .checkpoint = {}},
+           {.steps = 0, .seconds = options.seconds}, context);
+  return field;
+}
+
+// Views spread evenly over the test split; without a data set, drawn around the training cameras.
+Subject subject_of(const BenchFieldOptions& options, Context& context) {
+  Subject subject;
+  const bool stored = !options.field.empty();
+  const std::string folder = stored || !options.scene.empty() ? options.scene : lego_folder();
+  if (stored) {
+    subject.field = std::make_unique<nerf::RadianceField>(nerf::RadianceField::load(options.field));
+    subject.name = std::filesystem::path(options.field).filename().string();
+    if (folder.empty()) {
+      subject.cameras = nerf::make_cameras(subject.field->cameras, nerf::CameraSet::near, options.views,
+                                           options.size, context.seed());
+      return subject;
+    }
+  }
+  const nerf::Dataset test = split_of(folder, "test", options.quick);
+  const auto all = static_cast<Index>(test.views.size()), count = std::min(options.views, all);
+  for (Index i = 0; i < count; ++i)
+    subject.cameras.push_back(
+        test.views[static_cast<std::size_t>(i * all / count)].camera.scaled(options.size));
+  if (!stored) {
+    const nerf::Dataset data = split_of(folder, "train", options.quick);
+    subject.field = trained(data, options, context);
+    subject.name = data.name;
+  }
+  return subject;
+}
+
+Json row_json(const bench::FieldRow& r) {
+  return {{"knob", r.variant.knob},
+          {"setting", r.variant.setting},
+          {"seconds", r.seconds},
+          {"spread", r.spread},
+          {"psnr", number(r.psnr)},
+          {"max_error", r.max_error},
+          {"dropped_mean", r.dropped_mean},
+          {"dropped_max", r.dropped_max},
+          {"front", r.front}};
+}
+
+void print_row(std::ostream& out, const bench::FieldRow& r) {
+  char line[240];
+  std::snprintf(line, sizeof line,
+                "%c %-12s %-48s %7.4f s  %6.2f dB  max %.3f  dropped %.1e, at most %.3f  spread %2.0f%%\n",
+                r.front ? '*' : ' ', r.variant.knob.c_str(), r.variant.setting.c_str(), r.seconds, r.psnr,
+                r.max_error, r.dropped_mean, r.dropped_max, 100 * r.spread);
+  out << line;
+}
+
+void write_plot(const std::string& path, const Subject& subject, const bench::FieldBench& result) {
+  std::vector<bench::ScatterPoint> points;
+  for (const bench::FieldRow& r : result.rows) {
+    const bool first = &r == result.rows.data();
+    points.push_back({.x = r.seconds,
+                      .y = r.psnr,
+                      .series = r.variant.knob,
+                      .label = r.front && !first ? r.variant.setting : "",
+                      .line = r.front,
+                      .ring = first});
+  }
+  write_file_atomically(
+      path, bench::scatter_chart({.title = "Rendering " + subject.name + ": speed against error",
+                                  .x = "seconds a view (the dashed line is the front, the ring the default)",
+                                  .y = "PSNR against the reference, dB"},
+                                 points));
+}
+
+Json occupancy_json(const bench::OccupancyCost& cost) {
+  return {{"pixels", cost.pixels},
+          {"psnr", number(cost.psnr)},
+          {"max_error", cost.max_error},
+          {"dropped_mean", cost.dropped_mean},
+          {"dropped_max", cost.dropped_max}};
+}
+
+constexpr const char* kReference =
+    "rays, look-ups, networks and composite in double; samples spread evenly over each ray's way through the "
+    "cube; no early stop; matter where the field's grid has occupied cells, as the FIELD file says";
+constexpr const char* kOccupancy =
+    "what the grid rules out: the reference with it against the reference without, on pixels drawn at "
+    "random; "
+    "outside the silhouettes a field was never trained, so this is no loss where the grid follows them";
+
+}  // namespace
+
+std::string lego_folder() {
+  const char* data = std::getenv("FIELDMARK_DATA");
+  if (!data) return "";
+  const auto folder = std::filesystem::path(data) / "nerf_synthetic" / "lego";
+  return std::filesystem::exists(folder) ? folder.string() : "";
+}
+
+void add_bench_field(CLI::App& app, BenchFieldOptions& o) {
+  app.add_option("--field", o.field, "field: what is rendered (trained for --seconds)")
+      ->type_name("FIELD")
+      ->default_str("");
+  app.add_option("--size", o.size, "field: pixels of the views' longer side, 16 to 8192")
+      ->check(CLI::Range(16, 8192).description(""))
+      ->type_name("N");
+  app.add_option("--views", o.views, "field: how many, 1 to 1000")
+      ->check(CLI::Range(1, 1000).description(""))
+      ->type_name("N");
+  app.add_option("--seconds", o.seconds, "field: of training, without --field, 0.1 to 86400")
+      ->check(CLI::Range(0.1, 86400.0).description(""))
+      ->type_name("S");
+  app.add_flag("--quick", o.quick, "field: only the default and one setting of each kind");
+}
+
+int bench_field(const BenchFieldOptions& options, Context& context) {
+  if (!options.plot.empty()) check_writable(options.plot);
+  const Subject subject = subject_of(options, context);
+  const InterruptGuard guard;
+  bench::FieldBenchOptions bench{.runs = options.runs, .seed = context.seed(), .quick = options.quick};
+  bench::FieldBench result;
+  {
+    Progress progress = context.progress("bench");
+    result = bench::run_field_bench(*subject.field, subject.cameras, bench,
+                                    [&](const std::string& what, double part) {
+                                      if (guard.interrupted()) throw Interrupted("nothing was written");
+                                      progress.update(part, what);
+                                    });
+  }
+  Json rows = Json::array();
+  for (const bench::FieldRow& row : result.rows) {
+    print_row(context.text(), row);
+    rows.push_back(row_json(row));
+  }
+  const std::string why = bench::judgement(result);
+  context.text() << why << "\n";
+  if (!options.plot.empty()) write_plot(options.plot, subject, result);
+  const nerf::Camera& camera = subject.cameras.front();
+  context.result({{"field", subject.name},
+                  {"views", subject.cameras.size()},
+                  {"width", camera.width},
+                  {"height", camera.height},
+                  {"isa", isa_name()},
+                  {"reference", kReference},
+                  {"reference_samples", bench.samples},
+                  {"reference_seconds", result.reference_seconds},
+                  {"default_on_front", result.rows.front().front},
+                  {"judgement", why},
+                  {"front_margin_time", bench.margin.time},
+                  {"front_margin_psnr", bench.margin.psnr},
+                  {"occupancy_says", kOccupancy},
+                  {"occupancy", occupancy_json(result.occupancy)},
+                  {"rows", rows}});
+  return kOk;
+}
+
+}  // namespace fieldmark::cli

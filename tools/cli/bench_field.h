@@ -1,0 +1,34 @@
+#pragma once
+#include <fieldmark/engine/shape.h>
+
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace fieldmark::cli {
+
+class Context;
+
+/// Of `bench field`.
+struct BenchFieldOptions {
+  std::string field;  ///< file; empty: trained for `seconds`
+  std::string
+      scene;  ///< data set that the views are of; empty: lego of FIELDMARK_DATA, else the built-in scene
+  std::string plot;  ///< SVG file; empty: none
+  Index size = 400, views = 3;
+  double seconds = 60;
+  int runs = 5;
+  bool quick = false;
+};
+/// Adds what `bench engine` does not have: --field, --size, --views, --seconds and --quick.
+void add_bench_field(CLI::App& app, BenchFieldOptions& options);
+
+/// lego of FIELDMARK_DATA, or empty where there is none.
+std::string lego_folder();
+
+/// Renders a field in many ways, and prints speed against error.
+int bench_field(const BenchFieldOptions& options, Context& context);
+
+}  // namespace fieldmark::cli
