@@ -52,7 +52,7 @@ void compare(const nerf::Rendering& view, const std::vector<double>& want, Error
 double render_views(const nerf::RadianceField& field, const Cameras& cameras, const FieldVariant& variant,
                     const std::vector<std::vector<double>>& want, Errors* errors) {
   std::unique_ptr<nerf::RadianceField> other;
-  if (variant.step > 0 || variant.occupancy > 0 || !variant.skip_empty)
+  if (variant.occupancy > 0 || !variant.skip_empty)
     other = std::make_unique<nerf::RadianceField>(with_variant(field, variant));
   nerf::Renderer renderer(other ? *other : field, variant.render);
   double seconds = 0;

@@ -2,7 +2,6 @@
 #include <fieldmark/engine/error.h>
 #include <fieldmark/engine/ops/rows.h>
 #include <fieldmark/engine/parallel.h>
-#include <fieldmark/nerf/spherical_harmonics.h>
 
 #include <algorithm>
 #include <array>
@@ -54,6 +53,9 @@ FieldReference::FieldReference(const nerf::RadianceField& field, const Reference
     : source_(field), options_(options), field_(params_, field.options().field, 0) {
   if (options.samples < 1)
     throw ValueError("[field_reference] samples must be at least 1, got " + std::to_string(options.samples));
+  if (field.coarse || field.space.kind != nerf::SpaceKind::cube)
+    throw ValueError("[field_reference] field must have a hash table and lie in a cube (others have no reference yet), got " +
+                     std::string(field.coarse ? "kind mlp" : "space " + nerf::name_of(field.space.kind)));
   std::copy(field.params.values().begin(), field.params.values().end(), params_.values().begin());
   for (Index i = 0; i < kLanes; ++i) lanes_.push_back(std::make_unique<Lane>());
 }
@@ -83,7 +85,7 @@ std::vector<double> FieldReference::render(const nerf::Camera& camera) {
 // The samples of a ray that count.
 void FieldReference::add_ray(const nerf::Ray& ray, Lane& lane) const {
   nerf::Vec3 o;
-  for (std::size_t a = 0; a < 3; ++a) o[a] = (ray.origin[a] - source_.bounds.corner[a]) / source_.bounds.side;
+  for (std::size_t a = 0; a < 3; ++a) o[a] = (ray.origin[a] - source_.space.bounds.corner[a]) / source_.space.bounds.side;
   const auto [near, far] = span_of(o, ray.direction);
   const double delta = (far - near) / static_cast<double>(options_.samples);
   for (Index k = 0; near < far && k < options_.samples; ++k) {
@@ -110,12 +112,11 @@ void FieldReference::trace_piece(const nerf::Camera& camera, std::span<const Ind
   const auto background = static_cast<double>(nerf::background_value(source_.background));
   std::fill_n(out, 4 * rays, 0);
   if (n > 0) {
-    const Index width = field_.encoding().width();
+    const Index width = field_.density_width(), colour_width = field_.colour_width();
     lane.density_features.resize(at(n * width));
-    lane.colour_features.resize(at(n * width));
+    lane.colour_features.resize(at(n * colour_width));
     lane.weights.resize(at(n));
-    field_.encoding().encode(params_.values(field_.encoding().table()), lane.x.data(), n,
-                             lane.density_features.data(), lane.colour_features.data());
+    field_.encode(params_, lane.x.data(), n, lane.density_features.data(), lane.colour_features.data());
     lane.tape.reset();
     const Params<double> params(params_, nullptr);
     const Var<double> z =
@@ -135,8 +136,8 @@ void FieldReference::trace_piece(const nerf::Camera& camera, std::span<const Ind
         lane.ray.push_back(static_cast<std::int32_t>(r));
       }
     }
-    const Var<double> harmonics = nerf::spherical_harmonics(lane.tape.constant(lane.d.data(), {rays, 3}));
-    const Var<double> colour_features = lane.tape.constant(lane.colour_features.data(), {n, width});
+    const Var<double> harmonics = field_.encode_directions(lane.tape.constant(lane.d.data(), {rays, 3}));
+    const Var<double> colour_features = lane.tape.constant(lane.colour_features.data(), {n, colour_width});
     const Var<double> rgb =
         field_.colour(params, gather_rows(z, lane.kept), gather_rows(colour_features, lane.kept),
                       gather_rows(harmonics, lane.ray));

@@ -4,7 +4,9 @@
 #include <fieldmark/engine/parallel.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 
 namespace fieldmark::bench {
 namespace {
@@ -15,24 +17,22 @@ constexpr Index kPiece = 64;         // coarse cells whose parts are looked at t
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-std::string fraction(Index n) { return "1/" + std::to_string(n) + " of the diagonal"; }
-
-std::string number(const char* format, double value) {
+std::string number(float value) {
   char text[40];
-  std::snprintf(text, sizeof text, format, value);
+  std::snprintf(text, sizeof text, "%g", static_cast<double>(value));
   return text;
 }
 
 // Densities at n places of the unit cube.
 void densities(const nerf::RadianceField& field, const std::vector<float>& x, Tape<float>& tape,
                std::vector<float>& sigma) {
-  const auto& encoding = field.field.encoding();
+  const nerf::Field<float>& net = field.field;
   const auto n = static_cast<Index>(x.size()) / 3;
   tape.reset();
-  float *features = tape.scratch(n * encoding.width()), *unused = tape.scratch(n * encoding.width());
-  encoding.encode(field.params.values(encoding.table()), x.data(), n, features, unused);
-  const Var<float> z = field.field.geometry(Params<float>(field.params, nullptr),
-                                            tape.constant(features, {n, encoding.width()}));
+  float *features = tape.scratch(n * net.density_width()), *unused = tape.scratch(n * net.colour_width());
+  net.encode(field.params, x.data(), n, features, unused);
+  const Var<float> z =
+      net.geometry(Params<float>(field.params, nullptr), tape.constant(features, {n, net.density_width()}));
   const float* found = field.field.density(z).value();
   sigma.assign(found, found + n);
 }
@@ -75,6 +75,72 @@ std::vector<std::uint8_t> finer(const nerf::RadianceField& field, const nerf::Oc
   return bits;
 }
 
+struct Sweep {
+  std::vector<FieldVariant> all;
+  double trained;  // samples on a diagonal
+
+  explicit Sweep(const nerf::RadianceField& field) : trained(1 / static_cast<double>(field.options().step)) {
+    add("default", text(nerf::RenderOptions{}), [](auto&) {});
+  }
+  template <class F>
+  void add(const char* knob, const std::string& setting, F change) {
+    FieldVariant v{knob, setting};
+    change(v);
+    all.push_back(v);
+  }
+  std::string samples(float finer) const {
+    return "1/" + std::to_string(std::lround(trained * static_cast<double>(finer))) + " of the diagonal";
+  }
+  std::string text(const nerf::RenderOptions& o) const {
+    return samples(o.finer) + ", stop " + number(o.stop) + ", least " + number(o.least_weight);
+  }
+
+  // Each on its own. @param cells  of the field's grid, per axis
+  void add_knobs(Index cells) {
+    for (const float finer : {0.25f, 0.5f, 0.75f, 1.f, 1.2f, 1.5f, 2.f, 4.f})
+      add("samples", samples(finer), [&](auto& v) { v.render.finer = finer; });
+    for (const float stop : {0.1f, 3e-2f, 1e-2f, 3e-3f, 3e-4f, 1e-4f, 0.f})
+      add("stop", number(stop), [&](auto& v) { v.render.stop = stop; });
+    for (const float least : {1e-2f, 3e-3f, 1e-3f, 3e-4f, 1e-5f, 0.f})
+      add("least weight", number(least), [&](auto& v) { v.render.least_weight = least; });
+    for (const Index side : {cells / 4, cells / 2, cells, 2 * cells})
+      if (side >= 4 && side % 4 == 0 && side <= 512)
+        add("occupancy", std::to_string(side) + (side == cells ? ", looked at anew" : ""),
+            [&](auto& v) { v.occupancy = side; });
+    add("occupancy", "none", [](auto& v) { v.skip_empty = false; });
+    if (bf16_units() != Bf16Units::none)
+      add("precision", "bf16", [](auto& v) { v.render.precision = Precision::bf16; });
+  }
+
+  void add_orders() {
+    struct Order {
+      const char* name;
+      nerf::RayOrder order;
+    };
+    for (const Order& o :
+         {Order{"lines of 256", {256, 1}}, Order{"tiles of 4 x 4", {4, 4}}, Order{"tiles of 8 x 8", {8, 8}},
+          Order{"tiles of 32 x 32", {32, 32}}, Order{"tiles of 64 x 64", {64, 64}},
+          Order{"Morton, 16 x 16", {16, 16, true}}, Order{"Morton, 32 x 32", {32, 32, true}}})
+      add("ray order", o.name, [&](auto& v) { v.render.order = o.order; });
+  }
+
+  // Coarser and finer in all at once, from quick to exact.
+  void add_together() {
+    for (const auto& [finer, stop, least] : {std::array{0.5f, 3e-2f, 3e-3f},
+                                             {0.75f, 1e-2f, 1e-3f},
+                                             {1.f, 1e-2f, 1e-3f},
+                                             {1.f, 1e-3f, 1e-4f},
+                                             {1.2f, 3e-3f, 3e-4f},
+                                             {1.5f, 3e-3f, 3e-4f},
+                                             {2.f, 1e-3f, 1e-4f},
+                                             {4.f, 1e-4f, 1e-5f},
+                                             {1.f, 0.f, 0.f}}) {
+      const nerf::RenderOptions o{.finer = finer, .stop = stop, .least_weight = least};
+      add("together", text(o), [&](auto& v) { v.render = o; });
+    }
+  }
+};
+
 }  // namespace
 
 nerf::OccupancyGrid occupancy_at(const nerf::RadianceField& field, Index resolution) {
@@ -89,7 +155,6 @@ nerf::OccupancyGrid occupancy_at(const nerf::RadianceField& field, Index resolut
 
 nerf::RadianceField with_variant(const nerf::RadianceField& field, const FieldVariant& variant) {
   nerf::RadianceFieldOptions options = field.options();
-  if (variant.step > 0) options.step = variant.step;
   if (variant.occupancy > 0) options.occupancy = variant.occupancy;
   nerf::RadianceField copy(options);
   std::copy(field.params.values().begin(), field.params.values().end(), copy.params.values().begin());
@@ -97,65 +162,20 @@ nerf::RadianceField with_variant(const nerf::RadianceField& field, const FieldVa
     copy.grid = occupancy_at(field, variant.occupancy);
   else if (variant.skip_empty)
     copy.grid = field.grid;
-  copy.bounds = field.bounds;
+  copy.space = field.space;
   copy.cameras = field.cameras;
   copy.background = field.background;
   return copy;
 }
 
 std::vector<FieldVariant> field_variants(const nerf::RadianceField& field, bool quick) {
-  const nerf::RenderOptions usual;
-  const float step = field.options().step;
-  const Index n = std::lround(1 / step), cells = field.grid.resolution();
-  std::vector<FieldVariant> all{{"default", fraction(n) + ", stop " + number("%g", usual.stop)}};
-  const auto render = [&](const char* knob, const std::string& setting, auto change) {
-    FieldVariant v{knob, setting, usual};
-    change(v);
-    all.push_back(v);
-  };
-  for (const double part : {0.25, 0.5, 0.7, 1.4, 2.0, 4.0}) {
-    const Index samples = std::lround(static_cast<double>(n) * part);
-    render("samples", fraction(samples), [&](auto& v) { v.step = 1 / static_cast<float>(samples); });
-  }
-  for (const float stop : {0.1f, 3e-2f, 1e-2f, 3e-3f, 3e-4f, 1e-4f, 0.f})
-    render("stop", number("%g", stop), [&](auto& v) { v.render.stop = stop; });
-  for (const float least : {1e-2f, 3e-3f, 1e-3f, 3e-4f, 1e-5f, 0.f})
-    render("least weight", number("%g", least), [&](auto& v) { v.render.least_weight = least; });
-  for (const Index resolution : {cells / 4, cells / 2, cells, 2 * cells})
-    if (resolution >= 4 && resolution % 4 == 0 && resolution <= 512)
-      render("occupancy", std::to_string(resolution) + (resolution == cells ? ", looked at anew" : ""),
-             [&](auto& v) { v.occupancy = resolution; });
-  render("occupancy", "none", [](auto& v) { v.skip_empty = false; });
-  if (bf16_units() != Bf16Units::none)
-    render("precision", "bf16", [](auto& v) { v.render.precision = Precision::bf16; });
-  struct Order {
-    const char* name;
-    nerf::RayOrder order;
-  };
-  for (const Order& o :
-       {Order{"lines of 256", {256, 1}}, Order{"tiles of 4 x 4", {4, 4}}, Order{"tiles of 8 x 8", {8, 8}},
-        Order{"tiles of 32 x 32", {32, 32}}, Order{"tiles of 64 x 64", {64, 64}},
-        Order{"Morton, 16 x 16", {16, 16, true}}, Order{"Morton, 32 x 32", {32, 32, true}}})
-    render("ray order", o.name, [&](auto& v) { v.render.order = o.order; });
-  const auto together = [&](double part, float stop, float least) {
-    const Index samples = std::lround(static_cast<double>(n) * part);
-    render("together", fraction(samples) + ", stop " + number("%g", stop) + ", least " + number("%g", least),
-           [&](auto& v) {
-             v.step = 1 / static_cast<float>(samples);
-             v.render.stop = stop;
-             v.render.least_weight = least;
-           });
-  };
-  together(0.5, 3e-2f, 3e-3f);
-  together(0.7, 1e-2f, 1e-3f);
-  together(1, 1e-2f, 1e-3f);
-  together(1, 3e-3f, 1e-3f);
-  together(1.4, 3e-3f, 3e-4f);
-  together(2, 1e-4f, 1e-5f);
-  together(1, 0, 0);
-  if (!quick) return all;
+  Sweep sweep(field);
+  sweep.add_knobs(field.grid.resolution());
+  sweep.add_orders();
+  sweep.add_together();
+  if (!quick) return sweep.all;
   std::vector<FieldVariant> few;
-  for (const FieldVariant& v : all)
+  for (const FieldVariant& v : sweep.all)
     if (few.empty() || few.back().knob != v.knob) few.push_back(v);
   return few;
 }

@@ -34,7 +34,7 @@ void FieldSampler::sample(const RadianceField& field, const RayBatch& rays, std:
                           const PackedWeights<float>* packed) {
   if (!field.coarse) {
     march_.sample(field.field, field.params, field.grid, rays, jitter,
-                  {.step = field.step(), .stop = options.stop}, out, packed);
+                  {.step = field.step() / options.finer, .stop = options.stop}, out, packed);
     return;
   }
   const Params<float> params = parameters(field, packed);

@@ -33,8 +33,11 @@ struct Renderer::Lane {
 Renderer::Renderer(const RadianceField& field, const RenderOptions& options)
     : field_(field),
       options_(options),
+      step_(field.step() / options.finer),
       packed_(field.params,
               {.precision = options.precision, .tables = options.precision == Precision::bf16}) {
+  if (!(options.finer > 0))
+    throw ValueError("[renderer] finer must be positive, got " + std::to_string(options.finer));
   if (options.order.width < 1 || options.order.height < 1)
     throw ValueError("[renderer] order: a tile must have at least one pixel, got " +
                      std::to_string(options.order.width) + " x " + std::to_string(options.order.height));
@@ -54,11 +57,11 @@ void Renderer::trace(const RayBatch& rays, Index lane_index, float* out, float* 
 
 void Renderer::trace_block(const RayBatch& rays, Lane& lane, float* out, float* position) {
   lane.sampler.sample(field_, rays, {},
-                      {.stop = options_.stop, .points = options_.points.value_or(field_.options().points)},
+                      {.finer = options_.finer, .stop = options_.stop, .points = options_.points.value_or(field_.options().points)},
                       lane.samples, &packed_);
   const RaySamples& s = lane.samples;
   lane.weights.resize(at(s.size()));
-  sample_weights(s, field_.step(), lane.weights.data());
+  sample_weights(s, step_, lane.weights.data());
 
   // Colours of the samples that matter, the ray's harmonics repeated for each.
   lane.kept.clear();

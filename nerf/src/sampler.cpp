@@ -33,7 +33,7 @@ void RaySampler::sample(const Field<float>& field, const ParamStore<float>& para
   walks_.clear();
   alive_.clear();
   segments_.clear();
-  for (auto* buffer : {&t_, &x_, &density_features_, &colour_features_, &sigma_}) buffer->clear();
+  for (auto* buffer : {&t_, &x_}) buffer->clear();  // the others are written from their first row on
   for (Index r = 0; r < rays.size(); ++r) {
     const float *o = &rays.origins[at(3 * r)], *d = &rays.directions[at(3 * r)];
     const float shift = jitter.empty() ? 0.5f : jitter[at(r)];
@@ -72,9 +72,13 @@ void RaySampler::evaluate(const Field<float>& field, const ParamStore<float>& pa
                           const PackedWeights<float>* packed, Index first) {
   const Index n = static_cast<Index>(t_.size()) - first, width = field.density_width();
   if (n == 0) return;
-  density_features_.resize(at((first + n) * width));
-  colour_features_.resize(at((first + n) * field.colour_width()));
-  sigma_.resize(at(first + n));
+  // Never shortened: growing by a wave would fill what is about to be written.
+  const auto rows = at(first + n);
+  if (sigma_.size() < rows) {
+    sigma_.resize(rows);
+    density_features_.resize(rows * at(width));
+    colour_features_.resize(rows * at(field.colour_width()));
+  }
   float* features = density_features_.data() + first * width;
   field.encode(params, x_.data() + 3 * first, n, features,
                colour_features_.data() + first * field.colour_width(), packed);

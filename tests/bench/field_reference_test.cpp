@@ -34,7 +34,7 @@ struct BruteForce {
   std::array<double, 4> trace(const nerf::Ray& ray, Index samples, bool occupancy) const {
     double o[3], near = 0, far = std::numeric_limits<double>::infinity();
     for (std::size_t a = 0; a < 3; ++a) {
-      o[a] = (ray.origin[a] - f.bounds.corner[a]) / f.bounds.side;
+      o[a] = (ray.origin[a] - f.space.bounds.corner[a]) / f.space.bounds.side;
       const double t0 = -o[a] / ray.direction[a], t1 = (1 - o[a]) / ray.direction[a];
       near = std::max(near, std::min(t0, t1));
       far = std::min(far, std::max(t0, t1));
@@ -68,7 +68,7 @@ TEST_CASE(
   std::vector<std::uint8_t> bits(static_cast<std::size_t>(f.grid.cells()));
   for (std::size_t c = 0; c < bits.size(); ++c) bits[c] = c % 3 != 0;
   f.grid.set_bits(bits);
-  f.bounds = {.corner = {-1, -1.2, -0.9}, .side = 2.1};
+  f.space.bounds = {.corner = {-1, -1.2, -0.9}, .side = 2.1};
   const BruteForce brute(f);
   const nerf::Camera camera = test_camera();
   for (const nerf::Background background : {nerf::Background::white, nerf::Background::black})

@@ -162,6 +162,32 @@ TEST_CASE("marching: pieces of any length are the whole walk") {
   for (const Index piece : {1, 3, 16}) CHECK(walk(grid, line, 0.002f, 0.25f, piece) == whole);
 }
 
+TEST_CASE("marching: skipping empty cells first changes no sample, for any number of walks together") {
+  const OccupancyGrid grid = random_grid(64, 0.0005, 7);
+  const auto u = uniform({40, 6}, -1, 1, 8);
+  for (const Index count : {1, 16, 37}) {
+    std::vector<RayWalk> walks;
+    std::vector<Index> which;
+    for (Index i = 0; i < 40; ++i) {
+      const Line line = towards(u, i);
+      walks.emplace_back(line.o, line.d, i % 2 ? 0.003f : 0.02f, 0.3f);
+      if (i % 40 < count) which.push_back(39 - i);
+    }
+    const std::vector<RayWalk> before = walks;
+    RayWalk::skip_empty(grid, walks, which);
+    Index samples = 0;
+    for (std::size_t i = 0; i < walks.size(); ++i) {
+      RayWalk plain = before[i];
+      std::vector<float> got(400), want(400);
+      got.resize(static_cast<std::size_t>(walks[i].next(grid, 400, got.data())));
+      want.resize(static_cast<std::size_t>(plain.next(grid, 400, want.data())));
+      CHECK(got == want);
+      samples += static_cast<Index>(want.size());
+    }
+    CHECK(samples > 20);
+  }
+}
+
 TEST_CASE("marching: nothing is sampled in an empty grid") {
   CHECK(walk(random_grid(16, 0, 1), {{-1, 0.4f, 0.6f}, {1, 0, 0}}, 1e-3f, 0.5f).empty());
 }

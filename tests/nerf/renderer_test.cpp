@@ -77,7 +77,7 @@ TEST_CASE(
   for (const Background background : {Background::white, Background::black}) {
     f.background = background;
     each_isa([&] {
-      Renderer renderer(f, {.stop = 0, .least_weight = 0});
+      Renderer renderer(f, {.finer = 1, .stop = 0, .least_weight = 0});
       CHECK(worst_error(f, renderer.render(camera), camera) < 1e-4);
     });
   }
@@ -87,7 +87,7 @@ TEST_CASE("renderer: what stopping and leaving out costs is below 0.01") {
   RadianceField f = small_field();
   f.params.values(f.params.find("density/1/bias"))[0] += 3;
   const Camera camera = test_camera();
-  Renderer renderer(f);
+  Renderer renderer(f, {.finer = 1});
   CHECK(worst_error(f, renderer.render(camera), camera) < 0.01);
 }
 
@@ -133,6 +133,41 @@ TEST_CASE("renderer: trace gives what render shows") {
   }
 }
 
+TEST_CASE("renderer: tiles of any shape and order show the same picture") {
+  const RadianceField f = small_field();
+  const Camera camera = test_camera(37, 29);
+  Renderer renderer(f);
+  const Rendering plain = renderer.render(camera);
+  for (const RayOrder order :
+       {RayOrder{64, 1}, RayOrder{8, 8}, RayOrder{5, 3, true}, RayOrder{16, 16, true}}) {
+    Renderer other(f, {.order = order});
+    const Rendering view = other.render(camera);
+    float worst = 0;
+    for (std::size_t i = 0; i < view.rgb.data.size(); ++i)
+      worst = std::max(worst, std::abs(view.rgb.data[i] - plain.rgb.data[i]));
+    CHECK(worst < 1e-6f);
+  }
+  CHECK_THROWS_WITH(Renderer(f, {.order = {0, 4}}),
+                    "[renderer] order: a tile must have at least one pixel, got 0 x 4");
+}
+
+TEST_CASE("renderer: finer steps come closer to the integral") {
+  const RadianceField f = small_field();
+  const Camera camera = test_camera();
+  Renderer coarse(f, {.finer = 0.5f, .stop = 0, .least_weight = 0}),
+      usual(f, {.finer = 2, .stop = 0, .least_weight = 0}),
+      exact(f, {.finer = 32, .stop = 0, .least_weight = 0});
+  const auto want = exact.render(camera).rgb.data;
+  const auto worst = [&](Renderer& renderer) {
+    const auto got = renderer.render(camera).rgb.data;
+    float error = 0;
+    for (std::size_t i = 0; i < want.size(); ++i) error = std::max(error, std::abs(got[i] - want[i]));
+    return error;
+  };
+  CHECK(worst(usual) < 0.7f * worst(coarse));
+  CHECK_THROWS_WITH(Renderer(f, {.finer = 0}), "[renderer] finer must be positive, got 0.000000");
+}
+
 TEST_CASE("renderer: follows changes of the field between views") {
   RadianceField f = small_field();
   Renderer renderer(f);
@@ -167,7 +202,7 @@ TEST_CASE("renderer: recolouring replaces colours and leaves opacity alone") {
 TEST_CASE("renderer: the position of a ray is the mean of its samples by weight") {
   const RadianceField f = small_field();
   const Camera camera = test_camera(4, 1);
-  Renderer renderer(f, {.stop = 0, .least_weight = 0});
+  Renderer renderer(f, {.finer = 1, .stop = 0, .least_weight = 0});
   const std::vector<float> pixels{0, 0, 1, 0, 2, 0, 3, 0};
   std::vector<float> out(20), position(15, 7.f);
   CubeRays rays;

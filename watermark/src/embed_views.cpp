@@ -9,7 +9,7 @@ constexpr Index kWindowSize = 160;  // pixels of the small picture that shows wh
 std::vector<CachedView> cache_near_views(const nerf::RadianceField& field, Index reader_size, Index count,
                                          std::uint64_t seed,
                                          const std::function<bool(Index, Index)>& progress) {
-  nerf::Renderer renderer(field);
+  nerf::Renderer renderer(field, {.finer = 1});  // the samples the field was trained with
   const float background = nerf::background_value(field.background);
   std::vector<CachedView> views;
   for (const nerf::Camera& camera :

@@ -161,7 +161,7 @@ void Embedder::calibrate(Index views) {
   for (int round = 0; round < 3; ++round) {
     double sum = 0;
     Index count = 0;
-    nerf::Renderer renderer(owner_.field);
+    nerf::Renderer renderer(owner_.field, {.finer = 1});
     for (std::size_t i = 0; i < cameras.size(); ++i) {
       renderer.set_recolour({});
       const nerf::Rendering plain = renderer.render(cameras[i]);

@@ -111,3 +111,46 @@ TEST_CASE("kernels/march: an empty grid is left at once, a full one in steps") {
     CHECK(walked(full, ray, 4).size() == static_cast<std::size_t>(ray.far * 64 + 0.5f));
   });
 }
+
+TEST_CASE("kernels/march: rays side by side stop in the block of their first sample, or behind their end") {
+  each_isa([] {
+    Grid grid;
+    grid.fill(6, 6, 6);
+    grid.fill(1, 10, 2);
+    const auto ends = uniform({kMarchLanes, 6}, 0, 1, 3);
+    MarchRays rays{};
+    std::vector<MarchRay> single;
+    for (int i = 0; i < kMarchLanes; ++i) {
+      const double* from = &ends.data[static_cast<std::size_t>(6 * i)];
+      MarchRay r = ray_through(from, from + 3, 0.004f, 0.5f);
+      if (i % 3 == 0) r.far = -1;  // a lane without a ray
+      single.push_back(r);
+      for (int a = 0; a < 3; ++a) rays.o[a][i] = r.o[a], rays.d[a][i] = r.d[a], rays.steps[a][i] = r.steps[a];
+      rays.near[i] = r.near, rays.far[i] = r.far, rays.step[i] = r.step, rays.jitter[i] = r.jitter;
+    }
+    FIELDMARK_KERNEL(march_to_blocks)(grid.view(), rays);
+    int jumped = 0, reached = 0;
+    for (int i = 0; i < kMarchLanes; ++i) {
+      MarchRay r = single[static_cast<std::size_t>(i)];
+      CAPTURE(i);
+      if (r.far < 0) {
+        CHECK(rays.k[i] == 0);
+        continue;
+      }
+      const auto want = walked(grid, r, 1000);
+      const float t = r.near + (static_cast<float>(rays.k[i]) + r.jitter) * r.step;
+      r.k = rays.k[i];
+      CHECK(walked(grid, r, 1000) == want);
+      if (t < r.far) {
+        std::size_t block = 0;
+        for (int a = 2; a >= 0; --a)
+          block = block * kBlocks + static_cast<std::size_t>((r.o[a] + t * r.d[a]) * kBlocks);
+        CHECK(grid.clearance[block] == 0);
+        ++reached;
+      }
+      jumped += rays.k[i] > 0;
+    }
+    CHECK(jumped > 0);
+    CHECK(reached > 0);
+  });
+}

@@ -21,7 +21,8 @@ struct ReferenceOptions {
 /// at most 1e-12 a sample.
 class FieldReference {
  public:
-  /// Takes the field's present numbers; the field must outlive it. @throws ValueError if options.samples < 1
+  /// Takes the field's present numbers; the field must outlive it. @throws ValueError if options.samples < 1,
+  /// or for an mlp field or one of another space than a cube
   FieldReference(const nerf::RadianceField& field, const ReferenceOptions& options = {});
   ~FieldReference();
   /// @param pixels  [n] y * width + x of the pixels wanted, any order

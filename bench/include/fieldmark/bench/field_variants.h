@@ -11,7 +11,6 @@ struct FieldVariant {
   std::string knob;              ///< what is swept: "samples", "stop", ...; "default" for the default itself
   std::string setting;           ///< its value, for people
   nerf::RenderOptions render{};  ///< as the Renderer takes them
-  float step = 0;                ///< spacing of samples, diagonals of the cube; 0: the field's own
   Index occupancy = 0;           ///< cells per axis of the grid, see occupancy_at(); 0: the field's own grid
   bool skip_empty = true;        ///< false: every cell counts as occupied
 };
@@ -25,7 +24,7 @@ std::vector<FieldVariant> field_variants(const nerf::RadianceField& field, bool 
 /// @throws ValueError if resolution is not one that OccupancyGrid takes, or neither a divisor nor a multiple
 nerf::OccupancyGrid occupancy_at(const nerf::RadianceField& field, Index resolution);
 
-/// The same field with a variant's step and grid.
+/// The same field with a variant's grid.
 nerf::RadianceField with_variant(const nerf::RadianceField& field, const FieldVariant& variant);
 
 }  // namespace fieldmark::bench

@@ -11,6 +11,7 @@ void sample_weights(const RaySamples& samples, float step, float* weights);
 
 /// Where and how exactly a FieldSampler looks.
 struct FieldSamplingOptions {
+  float finer = 1;     ///< samples along a ray for each at the field's step, > 0; without meaning for mlp
   float stop = 1e-4f;  ///< a ray ends where its transmittance falls below this; 0 never stops early
   RayPoints points{};  ///< of a ray of an mlp field
 };

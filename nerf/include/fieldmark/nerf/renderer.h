@@ -16,6 +16,9 @@ struct RayOrder {
 
 /// How exactly a Renderer works.
 struct RenderOptions {
+  /// Samples along a ray for each that training took, > 0. What a ray misses between its samples is most of a
+  /// picture's error (docs/results/field.md). Without meaning for mlp, see points.
+  float finer = 4.f / 3;
   float stop = 1e-3f;          ///< a ray ends where its transmittance falls below this
   float least_weight = 1e-4f;  ///< samples of less weight get no colour
   /// bf16 looks features up in a rounded table and multiplies rounded numbers: less memory, 62 dB from the
@@ -37,7 +40,7 @@ struct Rendering {
 class Renderer {
  public:
   /// @param options  weights and transmittances are in [0, 1], not checked
-  /// @throws ValueError for bf16 where the CPU has none, or if a tile is empty
+  /// @throws ValueError for bf16 where the CPU has none, if a tile is empty or `finer` is not positive
   explicit Renderer(const RadianceField& field, const RenderOptions& options = {});
   ~Renderer();
   /// One ray through the centre of every pixel, samples in the middle of their intervals.
@@ -65,6 +68,7 @@ class Renderer {
   static void accumulate(const Lane& lane, Index rays, float* out, float* position);
   const RadianceField& field_;
   RenderOptions options_;
+  float step_;  // cube sides
   Recolour recolour_;
   PackedWeights<float> packed_;
   std::vector<std::unique_ptr<Lane>> lanes_;
