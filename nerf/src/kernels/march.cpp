@@ -107,12 +107,18 @@ std::int64_t march(const MarchGrid& grid, MarchRay& r, std::int64_t max, float* 
     float candidates[kBatch];
     std::int32_t hit[kBatch];
     judge(grid, r, candidates, hit);
-    int i = 0;
-    for (; i < kBatch && count < max; ++i) {
-      out[count] = candidates[i];
-      count += hit[i];
+    std::uint32_t left = 0;
+    for (int i = 0; i < kBatch; ++i) left |= static_cast<std::uint32_t>(hit[i]) << i;
+    std::int32_t passed = kBatch;
+    while (left) {
+      const int i = __builtin_ctz(left);
+      left &= left - 1;
+      out[count++] = candidates[i];
+      if (count < max) continue;
+      passed = i + 1;
+      break;
     }
-    r.k += i;
+    r.k += passed;
   }
   return count;
 }
