@@ -54,8 +54,10 @@ FieldReference::FieldReference(const nerf::RadianceField& field, const Reference
   if (options.samples < 1)
     throw ValueError("[field_reference] samples must be at least 1, got " + std::to_string(options.samples));
   if (field.coarse || field.space.kind != nerf::SpaceKind::cube)
-    throw ValueError("[field_reference] field must have a hash table and lie in a cube (others have no reference yet), got " +
-                     std::string(field.coarse ? "kind mlp" : "space " + nerf::name_of(field.space.kind)));
+    throw ValueError(
+        "[field_reference] field must have a hash table and lie in a cube (others have no reference yet), "
+        "got " +
+        std::string(field.coarse ? "kind mlp" : "space " + nerf::name_of(field.space.kind)));
   std::copy(field.params.values().begin(), field.params.values().end(), params_.values().begin());
   for (Index i = 0; i < kLanes; ++i) lanes_.push_back(std::make_unique<Lane>());
 }
@@ -85,7 +87,8 @@ std::vector<double> FieldReference::render(const nerf::Camera& camera) {
 // The samples of a ray that count.
 void FieldReference::add_ray(const nerf::Ray& ray, Lane& lane) const {
   nerf::Vec3 o;
-  for (std::size_t a = 0; a < 3; ++a) o[a] = (ray.origin[a] - source_.space.bounds.corner[a]) / source_.space.bounds.side;
+  for (std::size_t a = 0; a < 3; ++a)
+    o[a] = (ray.origin[a] - source_.space.bounds.corner[a]) / source_.space.bounds.side;
   const auto [near, far] = span_of(o, ray.direction);
   const double delta = (far - near) / static_cast<double>(options_.samples);
   for (Index k = 0; near < far && k < options_.samples; ++k) {

@@ -57,7 +57,9 @@ void Renderer::trace(const RayBatch& rays, Index lane_index, float* out, float* 
 
 void Renderer::trace_block(const RayBatch& rays, Lane& lane, float* out, float* position) {
   lane.sampler.sample(field_, rays, {},
-                      {.finer = options_.finer, .stop = options_.stop, .points = options_.points.value_or(field_.options().points)},
+                      {.finer = options_.finer,
+                       .stop = options_.stop,
+                       .points = options_.points.value_or(field_.options().points)},
                       lane.samples, &packed_);
   const RaySamples& s = lane.samples;
   lane.weights.resize(at(s.size()));

@@ -178,9 +178,9 @@ TEST_CASE("marching: skipping empty cells first changes no sample, for any numbe
     Index samples = 0;
     for (std::size_t i = 0; i < walks.size(); ++i) {
       RayWalk plain = before[i];
-      std::vector<float> got(400), want(400);
-      got.resize(static_cast<std::size_t>(walks[i].next(grid, 400, got.data())));
-      want.resize(static_cast<std::size_t>(plain.next(grid, 400, want.data())));
+      std::vector<float> got(400), want(400), x(1200);
+      got.resize(static_cast<std::size_t>(walks[i].next(grid, 400, got.data(), x.data())));
+      want.resize(static_cast<std::size_t>(plain.next(grid, 400, want.data(), x.data())));
       CHECK(got == want);
       samples += static_cast<Index>(want.size());
     }
