@@ -1,5 +1,6 @@
 #include <fieldmark/engine/nn/lpips.h>
 #include <fieldmark/engine/nn/vgg16_features.h>
+#include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/feature_distance.h>
 #include <fieldmark/engine/ops/resample.h>
 #include <fieldmark/engine/random.h>
@@ -36,15 +37,18 @@ SafetensorsFile random_weights(std::span<const WeightTensor> tensors) {
 }
 
 // Kinks of ReLUs and pooling windows lie close together in a network: steps are small.
-constexpr GradcheckOptions kSmallSteps{.step = 0.01};
+constexpr GradcheckOptions kSmallSteps{.step = 1e-4};
 
 GradcheckReport check_lpips(LpipsNetwork network) {
   const Lpips<double> lpips(random_weights(lpips_tensors(network)), network);
   const Index side = lpips.smallest();
-  const std::vector<Tensor<double>> in{numbers({1, 1, 2, 3}, 0, 1, 91), numbers({1, 1, 2, 3}, 0, 1, 92)};
+  const auto a = numbers({1, side, side, 3}, 0, 1, 93), b = numbers({1, side, side, 3}, 0, 1, 94);
+  // Each colour of a picture moves by a number.
+  const std::vector<Tensor<double>> in{numbers({1, 1, 1, 3}, 0, 0.1, 91), numbers({1, 1, 1, 3}, 0, 0.1, 92)};
   return gradcheck(
-      [&](Tape<double>&, auto v) {
-        return lpips(upsample_to(v[0], side, side), upsample_to(v[1], side, side));
+      [&](Tape<double>& tape, auto v) {
+        return lpips(add(tape.constant(a), upsample_to(v[0], side, side)),
+                     add(tape.constant(b), upsample_to(v[1], side, side)));
       },
       in, kSmallSteps);
 }

@@ -62,7 +62,7 @@ WeightTensor lin_tensor(std::size_t stage, Index channels) {
   return {"lin" + std::to_string(stage) + ".weight", {1, channels, 1, 1}};
 }
 
-const WeightTensor kShift{"scaling.shift", {1, 3, 1, 1}}, kScale{"scaling.scale", {1, 3, 1, 1}};
+const WeightTensor kShift{"scaling.shift", {3}}, kScale{"scaling.scale", {3}};
 
 // ((2 x - 1) - shift) / scale = (2 / scale) x - (1 + shift) / scale.
 template <class T>

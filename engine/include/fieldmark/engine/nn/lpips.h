@@ -9,7 +9,7 @@ namespace fieldmark {
 enum class LpipsNetwork { alex, squeeze };
 
 /// Everything a weight file must hold for a network: convolutions, "lin<k>.weight" [1, C, 1, 1] and
-/// "scaling.shift", "scaling.scale" [1, 3, 1, 1].
+/// "scaling.shift", "scaling.scale" [3].
 std::vector<WeightTensor> lpips_tensors(LpipsNetwork network);
 
 /// What Lpips::distance() found.
