@@ -37,7 +37,7 @@ SafetensorsFile random_weights(std::span<const WeightTensor> tensors) {
 }
 
 // Kinks of ReLUs and pooling windows lie close together in a network: steps are small.
-constexpr GradcheckOptions kSmallSteps{.step = 1e-4};
+constexpr GradcheckOptions kSmallSteps{.step = 1e-5};
 
 GradcheckReport check_lpips(LpipsNetwork network) {
   const Lpips<double> lpips(random_weights(lpips_tensors(network)), network);

@@ -106,7 +106,7 @@ TEST_CASE("vgg16_features: gradient of the loss in both pictures") {
   // Small steps: kinks of ReLUs and pooling windows lie close together.
   expect_grad(
       [&](Tape<double>&, auto v) { return vgg.loss(upsample_to(v[0], 4, 5), upsample_to(v[1], 4, 5), taps); },
-      {uniform({1, 2, 1, 3}, 0, 1, 5), uniform({1, 2, 1, 3}, 0, 1, 6)}, {.step = 1e-4});
+      {uniform({1, 2, 1, 3}, 0, 1, 5), uniform({1, 2, 1, 3}, 0, 1, 6)}, {.step = 1e-5});
 }
 
 TEST_CASE("vgg16_features: errors") {
