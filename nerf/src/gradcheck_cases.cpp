@@ -100,6 +100,26 @@ GradcheckReport check_field(bool colour) {
       store, in);
 }
 
+GradcheckReport check_mlp_field(bool colour) {
+  ParamStore<double> store;
+  const Field<double> field(
+      store,
+      {.kind = FieldKind::mlp,
+       .mlp = {.layers = 3, .width = 5, .skip = 1, .position_bands = 2, .direction_bands = 2}},
+      1);
+  set_values(store.values(), numbers({store.size()}, 0.02, 0.1, 2));
+  // Biases that hold every ReLU open, as above.
+  for (const char* name : {"density/0/bias", "density/1/bias", "density/2/bias", "colour/1/bias"})
+    for (double& v : store.values(store.find(name))) v = 1;
+  const std::vector<Tensor<double>> in{numbers({3, 3}, 0, 1, 3), numbers({3, 3}, -0.7, 0.7, 4)};
+  return gradcheck_module(
+      [&](auto&, const auto& params, auto v) {
+        const auto out = field(params, v[0], v[1]);
+        return colour ? out.rgb : out.sigma;
+      },
+      store, in, {.step = 0.3});  // the highest band turns by 4 pi a cube side
+}
+
 }  // namespace
 
 std::vector<GradcheckCase> gradcheck_cases() {
@@ -111,6 +131,8 @@ std::vector<GradcheckCase> gradcheck_cases() {
       {"frequency_encoding", check_frequency_encoding},
       {"hash_encoding density", [] { return check_hash_encoding(Part::density); }},
       {"hash_encoding colour", [] { return check_hash_encoding(Part::colour); }},
+      {"mlp_field density", [] { return check_mlp_field(false); }},
+      {"mlp_field colour", [] { return check_mlp_field(true); }},
       {"photometric_loss square", [] { return check_photometric_loss(10, 0); }},
       {"photometric_loss huber", [] { return check_photometric_loss(0.01, 2); }},
       {"rays", check_rays},

@@ -10,16 +10,24 @@
 #include <cmath>
 #include <numeric>
 
+#include "trainer_shard.h"
+
 namespace fieldmark::nerf {
 namespace {
 
 constexpr int kShards = 32;             // the last one to finish keeps a thread waiting: a few chunks each
+constexpr int kMlpShards = 8;           // each has the gradients of two large networks
 constexpr Index kRays = 64;             // of a chunk
 constexpr Index kOccupancyPeriod = 16;  // steps
 constexpr Index kFirstRays = 512;       // of a step, until the samples of a ray are known; never fewer
 constexpr Index kMostRays = 1 << 16;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+AdamOptions adam_options(const RadianceField& field) {
+  if (field.coarse) return {.lr = 1, .beta2 = 0.999, .eps = 1e-8, .zero_grads = true};
+  return {.lr = 1, .zero_grads = true};
+}
 
 // One of n things, from two uniform numbers: one has 24 bits only.
 Index pick(float u, float v, Index n) {
@@ -29,33 +37,12 @@ Index pick(float u, float v, Index n) {
 
 }  // namespace
 
-// What the chunks of a shard use one after another, and what their samples pass back to the table.
-struct Trainer::Shard {
-  // Grows to twice what it must hold, so that steps with a few more samples than any before do not allocate.
-  struct Buffer {
-    std::vector<float> numbers;
-    std::size_t used = 0;
-    float* append(Index n) {
-      const std::size_t begin = used;
-      used += at(n);
-      if (numbers.size() < used) numbers.resize(2 * used);
-      return numbers.data() + begin;
-    }
-  };
-  CubeRays rays;                                      // of a chunk
-  std::vector<float> jitter, photograph, background;  // the same
-  RaySampler sampler;
-  RaySamples found;
-  // Of all chunks of a step, in their order; gradients of the features level by level in each.
-  std::vector<Index> samples;
-  Buffer position, dfeatures;
-
-  Shard() { samples.reserve(at(kMostRays / kRays / kShards + 1)); }
-  void begin_step() {
-    samples.clear();
-    position.used = dfeatures.used = 0;
-  }
-};
+TrainOptions train_options(FieldKind kind) {
+  TrainOptions options;
+  if (kind == FieldKind::mlp)
+    options.schedule = {.lr = 5e-4, .half_after = 1e9, .cooldown = 0.9, .last = 0.1};
+  return options;
+}
 
 Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& options)
     : field_(field),
@@ -66,9 +53,10 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
       background_rng_(options.seed, 2),
       occupancy_rng_(options.seed, 3),
       packed_(field.params, {.precision = options.precision}),
-      loop_(kShards, field.field.network_size()),
-      adam_(field.params.size(), {.lr = 1, .zero_grads = true}),
-      shards_(kShards),
+      loop_(field.coarse ? kMlpShards : kShards,
+            field.coarse ? field.params.size() : field.field.network_size()),
+      adam_(field.params.size(), adam_options(field)),
+      shards_(at(loop_.shards())),
       rays_per_step_(kFirstRays) {
   if (options.samples_per_step < 1024)
     throw ValueError("[trainer] samples_per_step must be at least 1024, got " +
@@ -78,17 +66,27 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
   if (data.views.empty()) throw ValueError("[trainer] data must have at least one view");
   field_.background = data.background;
   field_.cameras = camera_span(data);
-  field_.space = scene_space(data, field_.space.bounds);
-  if (field_.space.kind == SpaceKind::cube) {
-    if (has_alpha(data)) carve();
-    return;
-  }
-  std::vector<Camera> cameras;
-  for (const View& v : data.views) cameras.push_back(v.camera);
-  field_.grid.restrict_to(seen_cells(cameras, field_.space, field_.grid.resolution()));
+  lay_out_space();
+  if (field.coarse) rays_per_step_ = mlp_rays();
+  for (Shard& s : shards_) s.samples.reserve(at(kMostRays / kRays / kShards + 1));
 }
 
 Trainer::~Trainer() = default;
+
+void Trainer::lay_out_space() {
+  field_.space = scene_space(data_, field_.space.bounds);
+  if (field_.space.kind == SpaceKind::contracted && field_.coarse)
+    throw ValueError(
+        "[trainer] field must be a hash field where a scene has no bounds (points of mlp fields are "
+        "spread over straight rays), got an mlp field");
+  if (field_.space.kind == SpaceKind::cube) {
+    if (options_.carve && has_alpha(data_)) carve();
+    return;
+  }
+  std::vector<Camera> cameras;
+  for (const View& v : data_.views) cameras.push_back(v.camera);
+  field_.grid.restrict_to(seen_cells(cameras, field_.space, field_.grid.resolution()));
+}
 
 void Trainer::carve() {
   std::vector<Silhouette> silhouettes;
@@ -195,8 +193,16 @@ void Trainer::backward_table() {
 void Trainer::step(double seconds) {
   schedule_.observe(steps_, seconds);
   packed_.update();
-  if (steps_ % kOccupancyPeriod == 0) refresh_occupancy();
   for (Shard& s : shards_) s.begin_step();
+  const double loss = field_.coarse ? step_mlp() : step_hash();
+  for (const Shard& s : shards_)
+    samples_ += static_cast<double>(std::accumulate(s.samples.begin(), s.samples.end(), Index{0}));
+  smoothed_loss_ = smoothed_loss_ < 0 ? loss : 0.98 * smoothed_loss_ + 0.02 * loss;
+  ++steps_;
+}
+
+double Trainer::step_hash() {
+  if (steps_ % kOccupancyPeriod == 0) refresh_occupancy();
   const Index network = field_.field.network_size();
   const double loss = loop_.run(
       rays_per_step_ / kRays,
@@ -216,9 +222,7 @@ void Trainer::step(double seconds) {
   const Index next = static_cast<Index>(std::clamp(wanted, static_cast<double>(rays_per_step_) / 1.5,
                                                    static_cast<double>(rays_per_step_) * 1.5));
   rays_per_step_ = std::clamp(next / kRays * kRays, kFirstRays, kMostRays);
-  samples_ += static_cast<double>(samples);
-  smoothed_loss_ = smoothed_loss_ < 0 ? loss : 0.98 * smoothed_loss_ + 0.02 * loss;
-  ++steps_;
+  return loss;
 }
 
 double Trainer::train_psnr() const {
@@ -262,7 +266,7 @@ std::string Trainer::fingerprint() const {
          std::to_string(options_.stop) + " warm-up " + std::to_string(options_.warm_up) + " lr " +
          std::to_string(schedule.lr) + " half after " + std::to_string(schedule.half_after) + " cooldown " +
          std::to_string(schedule.cooldown) + " last " + std::to_string(schedule.last) +
-         (options_.precision == Precision::bf16 ? " bf16" : "");
+         (options_.precision == Precision::bf16 ? " bf16" : "") + (options_.carve ? "" : " not carved");
 }
 
 void Trainer::save(const std::filesystem::path& path) const {

@@ -70,6 +70,30 @@ TEST_CASE("radiance_field: density and colour are separate tensors, one bit a ce
   CHECK(file.u8("density/occupancy")[0] == ((1u << 1) | (1u << 4) | (1u << 6)));  // c with c^2 % 5 = 1
 }
 
+TEST_CASE("radiance_field: an mlp field's file reads back to the same field, both networks and all options") {
+  const TemporaryFolder folder;
+  RadianceFieldOptions options = small_mlp_options();
+  options.points.random = 3;
+  RadianceField f(options);
+  REQUIRE(f.coarse);
+  f.background = Background::black;
+  f.save(folder / "a");
+  const SafetensorsFile file = SafetensorsFile::read(folder / "a");
+  CHECK(file.at("density/0/weight").shape == Shape{27, 16});
+  CHECK(file.at("coarse/colour/2/weight").shape == Shape{8, 3});
+  CHECK_FALSE(file.has("hash/density_features"));
+  const RadianceField g = RadianceField::load(folder / "a");
+  REQUIRE(g.coarse);
+  CHECK(std::equal(f.params.values().begin(), f.params.values().end(), g.params.values().begin()));
+  CHECK(f.params.values(f.params.find("density/0/weight"))[0] !=
+        f.params.values(f.params.find("coarse/density/0/weight"))[0]);
+  CHECK(g.configuration() == f.configuration());
+  CHECK((g.options().points.average == 8 && g.options().points.importance == 8));
+  CHECK(g.options().points.random == 3);
+  CHECK_THROWS_WITH(RadianceField::from_configuration(R"({"kind":"tensor"})", "here"),
+                    Contains("kind must be hash or mlp, got tensor"));
+}
+
 TEST_CASE("radiance_field: inside a larger file under a prefix") {
   const TemporaryFolder folder;
   const RadianceField f = field_with_holes();

@@ -31,6 +31,15 @@ inline fieldmark::nerf::RadianceFieldOptions trainable_field_options() {
           .step = 1.f / 128};
 }
 
+/// The original field in small: networks of 3 layers of 16, 8 + 8 points a ray.
+inline fieldmark::nerf::RadianceFieldOptions small_mlp_options() {
+  return {.field = {.kind = fieldmark::nerf::FieldKind::mlp,
+                    .mlp = {.layers = 3, .width = 16, .skip = 2, .position_bands = 4, .direction_bands = 2}},
+          .occupancy = 32,
+          .step = 1.f / 128,
+          .points = {.average = 8, .importance = 8}};
+}
+
 /// Smooth random matter: table and networks with numbers large enough to matter, cameras around the origin.
 inline fieldmark::nerf::RadianceField small_field(unsigned seed = 1) {
   using namespace fieldmark;

@@ -45,6 +45,21 @@ Outcome run(Index steps) {
   while (!trainer.done()) trainer.step(0);
   return outcome(field, trainer);
 }
+
+TrainOptions mlp_options(Index steps) {
+  TrainOptions options = train_options(FieldKind::mlp);
+  options.schedule.steps = steps;
+  options.schedule.lr = 5e-3;  // the networks are small
+  options.samples_per_step = 4096;
+  return options;
+}
+
+Outcome run_mlp(Index steps) {
+  RadianceField field(small_mlp_options());
+  Trainer trainer(field, scene(), mlp_options(steps));
+  while (!trainer.done()) trainer.step(0);
+  return outcome(field, trainer);
+}
 }  // namespace
 
 TEST_CASE("trainer: 100 steps on the built-in scene reach 19 dB") {
@@ -60,6 +75,57 @@ TEST_CASE("trainer: 100 steps on the built-in scene reach 19 dB") {
   CHECK(trainer.train_psnr() > start + 5);
   CHECK(field.grid.occupied_cells() < field.grid.cells() / 2);
   CHECK(field.grid.occupied_cells() > 0);
+}
+
+TEST_CASE("trainer: 300 steps of a small mlp field reach 17 dB, and both its networks learn") {
+  RadianceField field(small_mlp_options());
+  const RadianceField untrained(small_mlp_options());
+  Trainer trainer(field, scene(), mlp_options(300));
+  trainer.step(0);
+  const double start = trainer.train_psnr();
+  while (!trainer.done()) trainer.step(0);
+  CAPTURE(start, trainer.train_psnr());
+  CHECK(trainer.train_psnr() > 17);
+  CHECK(trainer.train_psnr() > start + 3);
+  CHECK(trainer.samples() > 300 * 1000);
+  for (const auto& e : field.params.entries()) {
+    const auto now = field.params.values(field.params.find(e.name)),
+               then = untrained.params.values(untrained.params.find(e.name));
+    CAPTURE(e.name);
+    CHECK_FALSE(std::equal(now.begin(), now.end(), then.begin()));
+  }
+}
+
+TEST_CASE("trainer: an mlp field's bytes are the same for one and two threads, and across a restore") {
+  const TemporaryFolder folder;
+  const int before = threads();
+  set_threads(1);
+  const Outcome one = run_mlp(12);
+  set_threads(2);
+  CHECK(one == run_mlp(12));
+  {
+    RadianceField field(small_mlp_options());
+    Trainer trainer(field, scene(), mlp_options(12));
+    while (trainer.steps() < 5) trainer.step(0);
+    trainer.save(folder / "checkpoint");
+  }
+  RadianceField field(small_mlp_options());
+  Trainer trainer(field, scene(), mlp_options(12));
+  trainer.restore(folder / "checkpoint");
+  while (!trainer.done()) trainer.step(0);
+  CHECK(outcome(field, trainer) == one);
+  set_threads(before);
+}
+
+TEST_CASE("trainer: without carving, silhouettes leave bounds and cells alone") {
+  RadianceField field(small_mlp_options());
+  TrainOptions options = mlp_options(2);
+  options.carve = false;
+  Trainer trainer(field, scene(), options);
+  CHECK(field.bounds.side == 3);
+  CHECK(field.grid.occupied_cells() == field.grid.cells());
+  trainer.step(0);
+  CHECK(std::isfinite(trainer.train_psnr()));
 }
 
 TEST_CASE("trainer: sets bounds, background and cameras of the field from the data") {

@@ -164,3 +164,18 @@ TEST_CASE(
     CHECK(trainer.train_psnr() > 15);
   });
 }
+
+TEST_CASE("allocations: a step of an mlp field allocates nothing once its rays have filled the buffers") {
+  if (!counts()) return;
+  using namespace nerf;
+  const Dataset data = make_scene({.size = 48, .views = 12});
+  for_threads([&] {
+    RadianceField field(small_mlp_options());
+    TrainOptions options = train_options(FieldKind::mlp);
+    options.schedule.steps = 140;
+    options.samples_per_step = 4096;
+    Trainer trainer(field, data, options);
+    for (int i = 0; i < 60; ++i) trainer.step(0);
+    CHECK(allocations_in(40, [&] { trainer.step(0); }) == 0);
+  });
+}

@@ -33,6 +33,34 @@ TEST_CASE("train writes a field, its figures, and the same bytes for one and two
   CHECK(read_bytes(folder / "a.fm") == read_bytes(folder / "b.fm"));
 }
 
+TEST_CASE("train --preset mlp writes a field whose points a ray render can choose", "[train]") {
+  const TemporaryFolder folder;
+  const std::string scene = tiny_scene(folder), out = folder / "f.fm";
+  const auto r =
+      run_command({"train", "--data", scene, "--out", out, "--preset", "mlp", "--steps", "1", "--json", "-"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  CHECK(Json::parse(r.out)["parameters"] == 2 * 595844);
+  const auto info = run_command({"info", out});
+  CHECK_THAT(info.out, Contains("\"kind\": \"mlp\"") && Contains("coarse/density/0/weight"));
+  const auto render = [&](const std::string& field, const char* to, std::vector<std::string> more) {
+    std::vector<std::string> words{"render",  "--field", field,    "--out", folder / to,
+                                   "--count", "1",       "--size", "8"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_command(words);
+  };
+  CHECK(render(out, "trained", {}).code == cli::kOk);
+  CHECK(render(out, "random", {"--average", "0", "--importance", "0", "--random", "6"}).code == cli::kOk);
+  CHECK(read_bytes(folder / "trained/view_000.png") != read_bytes(folder / "random/view_000.png"));
+  const auto none = render(out, "none", {"--average", "0"});
+  CHECK(none.code == cli::kUsage);
+  CHECK_THAT(none.err, Contains("--average 0: needs --random N"));
+  CHECK(render(out, "many", {"--importance", "1025"}).code == cli::kUsage);
+  const auto hash = render(tiny_field(folder, scene), "hash", {"--importance", "8"});
+  CHECK(hash.code == cli::kUsage);
+  CHECK_THAT(hash.err, Contains("only for fields trained with --preset mlp"));
+}
+
 TEST_CASE("train says what is wrong with its data and its options, and leaves no file", "[train]") {
   const TemporaryFolder folder;
   const std::string out = folder / "f.fm";

@@ -7,6 +7,7 @@
 
 #include "support/catch.h"
 #include "support/temporary_folder.h"
+#include "small_owner.h"
 #include "tiny_owner.h"
 
 using namespace fieldmark;
@@ -17,6 +18,25 @@ const Message kMessage{{1, 0, 1, 1}}, kOther{{0, 1, 1, 0}};
 
 Owner owner_with_gain() {
   Owner owner = tiny_owner();
+  owner.gain = 0.15;
+  return owner;
+}
+
+Owner mlp_owner() {
+  static const nerf::RadianceField field = [] {
+    nerf::RadianceField f(small_mlp_options());
+    const auto data = nerf::make_scene({.kind = nerf::SceneKind::sphere, .size = 32, .views = 6});
+    nerf::TrainOptions o = nerf::train_options(nerf::FieldKind::mlp);
+    o.schedule.steps = 150;
+    o.schedule.lr = 5e-3;
+    o.samples_per_step = 4096;
+    nerf::Trainer trainer(f, data, o);
+    while (!trainer.done()) trainer.step(0);
+    return f;
+  }();
+  OwnerOptions o = small_owner_options();
+  o.bits = 4;
+  Owner owner(field, o, test_key(1), CellGrid(4, std::vector<double>(64, 1.0)));
   owner.gain = 0.15;
   return owner;
 }
@@ -77,6 +97,26 @@ TEST_CASE("baker: a baked file is an unmarked one with other colours, density to
   }
   CHECK(density == 6);  // two layers, the features, the occupancy
   CHECK(colour == 7);   // three layers, the features
+}
+
+TEST_CASE("baker: an mlp field is marked and baked, both its densities to the byte the same") {
+  const Owner owner = mlp_owner();
+  Baker baker(owner, kMessage, options(80));
+  baker.step(0);
+  const double first = baker.psnr();
+  while (!baker.done()) baker.step(0);
+  CAPTURE(first, baker.psnr());
+  CHECK(baker.psnr() > first + 1);
+  const SafetensorsFile plain = file_of(owner.field), baked = file_of(baker.field());
+  CHECK(baked.metadata == plain.metadata);
+  int colour = 0;
+  for (const auto& a : plain.tensors) {
+    CAPTURE(a.name);
+    const bool of_colour = nerf::Field<float>::is_colour(a.name);
+    CHECK((baked.at(a.name).data != a.data) == of_colour);
+    colour += of_colour;
+  }
+  CHECK(colour == 6);  // weights and biases of three layers
 }
 
 TEST_CASE("baker: two messages give different colours, the same one the same") {

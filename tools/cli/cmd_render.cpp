@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <ostream>
 
 #include "cli/cli.h"
@@ -24,7 +25,23 @@ struct Options {
   std::string split = "test", cameras = "near", precision = "fp32";
   std::string against, sheet;
   Index count = 10, size = 0;
+  std::optional<Index> average, importance, random;
 };
+
+// The points of a ray, where any was given: those of the field in place of the others.
+std::optional<nerf::RayPoints> points_of(const Options& options, const nerf::RadianceField& field) {
+  if (!options.average && !options.importance && !options.random) return {};
+  if (!field.coarse)
+    throw UsageError("--average, --importance, --random: only for fields trained with --preset mlp, which " +
+                     options.field + " is not");
+  nerf::RayPoints points = field.options().points;
+  points.average = options.average.value_or(points.average);
+  points.importance = options.importance.value_or(points.importance);
+  points.random = options.random.value_or(points.random);
+  if (points.first() == 0)
+    throw UsageError("--average 0: needs --random N, since importance points are drawn from others");
+  return points;
+}
 
 struct NamedCamera {
   std::string name;
@@ -63,7 +80,8 @@ int run(const Options& options, Context& context) {
   const auto field = nerf::RadianceField::load(options.field);
   const auto cameras = cameras_of(options, field, context);
   std::filesystem::create_directories(options.out);
-  nerf::Renderer renderer(field, {.precision = precision_of(options.precision)});
+  nerf::Renderer renderer(
+      field, {.precision = precision_of(options.precision), .points = points_of(options, field)});
   const InterruptGuard guard;
   Json images = Json::array();
   double seconds = 0;
@@ -118,6 +136,16 @@ Command add_render(CLI::App& app) {
       ->check(CLI::Range(1, 8192).description(""))
       ->type_name("N")
       ->default_str("");
+  const auto points = [&](const char* name, std::optional<Index>& count, const char* what) {
+    app.add_option(name, count,
+                   std::string(what) + " points of a ray of an mlp field, 0 to 1024 (as trained)")
+        ->check(CLI::Range(0, 1024).description(""))
+        ->type_name("N")
+        ->default_str("");
+  };
+  points("--average", o->average, "Average sampling");
+  points("--importance", o->importance, "Importance sampling");
+  points("--random", o->random, "Random sampling");
   CLI::Option* against =
       app.add_option("--against", o->against, "Another field, for --sheet")->type_name("FIELD");
   CLI::Option* sheet = app.add_option("--sheet", o->sheet,

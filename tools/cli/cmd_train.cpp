@@ -26,7 +26,7 @@ struct Options {
   Index size = 0;
   RunLength length;
   double target_psnr = 0, max_megabytes = 0;
-  bool resume = false;
+  bool resume = false, no_carve = false;
 };
 
 std::optional<nerf::Background> background_of(const std::string& name) {
@@ -38,8 +38,10 @@ std::optional<nerf::Background> background_of(const std::string& name) {
 nerf::RadianceFieldOptions field_options(const Options& options, std::uint64_t seed) {
   nerf::RadianceFieldOptions field;
   field.seed = seed;
+  if (options.preset == "mlp") field.field.kind = nerf::FieldKind::mlp;
   if (options.max_megabytes <= 0) return field;
-  for (int log2 = field.field.encoding.log2_table; log2 >= 4; --log2) {
+  const int least = field.field.kind == nerf::FieldKind::mlp ? field.field.encoding.log2_table : 4;
+  for (int log2 = field.field.encoding.log2_table; log2 >= least; --log2) {
     field.field.encoding.log2_table = log2;
     const nerf::RadianceField made(field);
     const double bytes =
@@ -93,10 +95,12 @@ int run(const Options& options, Context& context) {
       options.data, {.split = "train", .size = options.size, .background = background_of(options.background)},
       context);
   nerf::RadianceField field(field_options(options, context.seed()));
-  const nerf::TrainOptions train_options{
-      .schedule = {.steps = options.length.steps, .seconds = options.length.seconds},
-      .seed = context.seed(),
-      .precision = precision_of(options.precision)};
+  nerf::TrainOptions train_options = nerf::train_options(field.options().field.kind);
+  train_options.schedule.steps = options.length.steps;
+  train_options.schedule.seconds = options.length.seconds;
+  train_options.seed = context.seed();
+  train_options.precision = precision_of(options.precision);
+  train_options.carve = !options.no_carve;
   nerf::Trainer trainer(field, data, train_options);
   if (options.resume) trainer.restore(checkpoint);
 
@@ -142,8 +146,10 @@ Command add_train(CLI::App& app) {
       ->check(CLI::Range(16, 8192).description(""))
       ->type_name("N")
       ->default_str("");
-  app.add_option("--preset", o->preset, "hash: multiresolution hash table with small networks")
-      ->check(CLI::IsMember({"hash"}).description(""))
+  app.add_option("--preset", o->preset,
+                 "hash: multiresolution hash table with small networks;\n"
+                 "mlp: the original field, coarse and fine networks of 8 layers of 256")
+      ->check(CLI::IsMember({"hash", "mlp"}).description(""))
       ->type_name("NAME");
   add_run_length(app, o->length, true);
   add_precision(app, o->precision);
@@ -162,6 +168,7 @@ Command add_train(CLI::App& app) {
       ->check(CLI::Range(0.1, 1e5).description(""))
       ->type_name("M")
       ->default_str("");
+  app.add_flag("--no-carve", o->no_carve, "Do not rule out what silhouettes show to be empty");
   app.add_flag("--resume", o->resume,
                "Go on from FIELD.checkpoint, with the options of the run that left it");
   return [o](Context& context) { return run(*o, context); };

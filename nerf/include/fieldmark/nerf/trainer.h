@@ -10,7 +10,8 @@ namespace fieldmark::nerf {
 /// How a field is trained.
 struct TrainOptions {
   ScheduleOptions schedule{};      ///< length of the run and step sizes
-  Index samples_per_step = 24576;  ///< rays a step are chosen to have about this many samples, >= 1024
+  Index samples_per_step = 24576;  ///< rays a step are chosen to have about this many samples (of both
+                                   ///< networks of an mlp field), >= 1024
   double huber = 0.1;              ///< see PhotometricLossOptions
   float stop = 1e-2f;  ///< a ray ends where its transmittance falls below this, in [0, 1): what lies deeper
                        ///< than 1e-2 is worth less than the rays that its samples would cost
@@ -19,14 +20,22 @@ struct TrainOptions {
   /// bf16 rounds what the networks multiply, forward and in dX; weights, their gradients and the table stay
   /// float. Needs bf16_units(). No faster for networks as narrow as these.
   Precision precision = Precision::fp32;
+  /// Where photographs have alpha, rule out for good what their silhouettes show to be empty: no sample is
+  /// spent there. A departure from the original mlp field, whose rays have their points anywhere.
+  bool carve = true;
 };
+
+/// What suits a kind of field. mlp: Adam with 5e-4, falling exponentially over the last nine tenths of the
+/// run to a tenth, see ScheduleOptions.
+TrainOptions train_options(FieldKind kind);
 
 /// Trains a radiance field on photographs (Mildenhall et al. 2020, sec. 5; Mueller et al. 2022): random rays
 /// of all photographs (where they have alpha: of the silhouettes and a margin), random backgrounds behind
 /// alpha, Adam, occupancy refreshed as densities form.
 ///
 /// A step is a parallel loop over chunks of 64 rays (ShardedLoop); the gradient at the encoding's output is
-/// kept for the whole batch, and one pass over the levels, each owned by one thread, adds it to the table.
+/// kept for the whole batch, and one pass over the levels, each owned by one thread, adds it to the table. Of
+/// an mlp field both networks learn, each from its own loss over the same rays; a chunk is of 4 rays.
 /// Same seed and number of steps: same bytes, for any thread count and across save() and restore(). Once the
 /// buffers have grown, a step allocates nothing.
 class Trainer {
@@ -57,9 +66,14 @@ class Trainer {
 
  private:
   struct Shard;
+  void lay_out_space();
   void carve();
   void choose_rays(Index first, Index count, Shard& shard) const;
+  double step_hash();
   double run_chunk(Index index, Shard& shard, Tape<float>& tape, float* grads);
+  Index mlp_rays() const;
+  double step_mlp();
+  double run_mlp_chunk(Index index, Shard& shard, Tape<float>& tape, float* grads);
   void backward_table();
   void refresh_occupancy();
   std::string fingerprint() const;

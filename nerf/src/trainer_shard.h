@@ -1,0 +1,38 @@
+#pragma once
+#include <fieldmark/nerf/hierarchical_sampler.h>
+#include <fieldmark/nerf/trainer.h>
+
+namespace fieldmark::nerf {
+
+// What the chunks of a shard use one after another, and what their samples pass back to the table.
+struct Trainer::Shard {
+  // Grows to twice what it must hold, so that steps with a few more samples than any before do not allocate.
+  struct Buffer {
+    std::vector<float> numbers;
+    std::size_t used = 0;
+    float* append(Index n) {
+      const std::size_t begin = used;
+      used += static_cast<std::size_t>(n);
+      if (numbers.size() < used) numbers.resize(2 * used);
+      return numbers.data() + begin;
+    }
+  };
+  CubeRays rays;                                      // of a chunk
+  std::vector<float> jitter, photograph, background;  // the same
+  RaySampler sampler;
+  RaySamples found;
+  // Of an mlp field.
+  HierarchicalSampler hierarchical;
+  RaySamples first;
+  std::vector<float> weights;
+  // Of all chunks of a step, in their order; gradients of the features level by level in each.
+  std::vector<Index> samples;
+  Buffer position, dfeatures;
+
+  void begin_step() {
+    samples.clear();
+    position.used = dfeatures.used = 0;
+  }
+};
+
+}  // namespace fieldmark::nerf

@@ -1,0 +1,82 @@
+"""Colours of an mlp field by PyTorch, from its file alone.
+
+python3 torch_field.py FIELD RAYS: reads the networks and their sizes from FIELD, and from RAYS position [S, 3] and
+delta [S] of samples, ray_begin [R + 1], direction [R, 3] and rgba [R, 4], what Fieldmark drew. Prints the largest
+difference between those and PyTorch's own colours and opacities in double.
+"""
+import json
+import math
+import struct
+import sys
+
+import numpy
+import torch
+
+TYPES = {"F32": "<f4", "F64": "<f8", "I32": "<i4", "I64": "<i8", "U8": "u1"}
+
+
+def read_safetensors(path):
+    """Tensors by name, in double or as integers, and the file's metadata."""
+    with open(path, "rb") as file:
+        (length,) = struct.unpack("<Q", file.read(8))
+        header = json.loads(file.read(length))
+        data = file.read()
+    metadata = header.pop("__metadata__", {})
+    tensors = {}
+    for name, entry in header.items():
+        begin, end = entry["data_offsets"]
+        numbers = numpy.frombuffer(data[begin:end], TYPES[entry["dtype"]]).reshape(entry["shape"])
+        tensors[name] = torch.from_numpy(numbers.astype("f8" if entry["dtype"][0] == "F" else "i8"))
+    return tensors, metadata
+
+
+def gamma(p, bands):
+    """The vector itself, then its sines and cosines, band after band."""
+    parts = [p]
+    for band in range(bands):
+        parts += [torch.sin(2.0**band * math.pi * p), torch.cos(2.0**band * math.pi * p)]
+    return torch.cat(parts, dim=1)
+
+
+class Networks:
+    """The fine network of a FIELD of kind mlp."""
+
+    def __init__(self, path):
+        self.tensors, metadata = read_safetensors(path)
+        config = json.loads(metadata["fieldmark"])["config"]
+        self.config = json.loads(config) if isinstance(config, str) else config
+        assert self.config["kind"] == "mlp", self.config
+
+    def linear(self, name, x):
+        return x @ self.tensors[name + "/weight"] + self.tensors[name + "/bias"]
+
+    def __call__(self, x, d):
+        features = gamma(2 * x - 1, self.config["position_bands"])
+        h, layers = features, self.config["layers"]
+        for layer in range(layers):
+            if layer > 0 and layer == self.config["skip"]:
+                h = torch.cat([features, h], dim=1)
+            h = torch.relu(self.linear(f"density/{layer}", h))
+        sigma = torch.exp(torch.clamp(self.linear(f"density/{layers}", h)[:, 0], max=15))
+        view = torch.cat([self.linear("colour/0", h), gamma(d, self.config["direction_bands"])], dim=1)
+        return sigma, torch.sigmoid(self.linear("colour/2", torch.relu(self.linear("colour/1", view))))
+
+
+def main():
+    networks = Networks(sys.argv[1])
+    rays, _ = read_safetensors(sys.argv[2])
+    begin = rays["ray_begin"]
+    worst = 0.0
+    for r in range(len(begin) - 1):
+        here = slice(int(begin[r]), int(begin[r + 1]))
+        x = rays["position"][here]
+        sigma, rgb = networks(x, rays["direction"][r].expand(len(x), 3))
+        depth = sigma * rays["delta"][here]
+        weight = torch.exp(depth - torch.cumsum(depth, 0)) * -torch.expm1(-depth)
+        rgba = torch.cat([weight @ rgb, weight.sum().reshape(1)])
+        worst = max(worst, float((rgba - rays["rgba"][r]).abs().max()))
+    print(len(begin) - 1, worst)
+
+
+if __name__ == "__main__":
+    main()
