@@ -122,7 +122,7 @@ TEST_CASE("trainer: without carving, silhouettes leave bounds and cells alone") 
   TrainOptions options = mlp_options(2);
   options.carve = false;
   Trainer trainer(field, scene(), options);
-  CHECK(field.bounds.side == 3);
+  CHECK(field.space.bounds.side == 3);
   CHECK(field.grid.occupied_cells() == field.grid.cells());
   trainer.step(0);
   CHECK(std::isfinite(trainer.train_psnr()));

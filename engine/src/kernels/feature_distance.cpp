@@ -35,8 +35,8 @@ struct Difference {
   const T *a, *b;
   double length_a, scale_a;
   T scale, change;
-  Difference(const T* a, const T* b, std::int64_t channels)
-      : a(a), b(b), length_a(length(a, channels)), scale_a(1 / (length_a + kEpsilon)) {
+  Difference(const T* first, const T* second, std::int64_t channels)
+      : a(first), b(second), length_a(length(a, channels)), scale_a(1 / (length_a + kEpsilon)) {
     scale = static_cast<T>(scale_a);
     change = static_cast<T>(scale_a - 1 / (length(b, channels) + kEpsilon));
   }

@@ -6,12 +6,12 @@ namespace fieldmark::bench {
 
 /// One point of scatter_chart().
 struct ScatterPoint {
-  double x = 0;        ///< > 0, drawn on a logarithmic axis
-  double y = 0;        ///< points where x or y is not finite are left out
-  std::string series;  ///< points of one series share a colour, named below the title in the order they come
-  std::string label;   ///< beside the point; may be empty
-  bool line = false;   ///< joined by a line with the others of this kind, from left to right
-  bool ring = false;   ///< with a ring around it: the one that is in use
+  double x = 0;         ///< > 0, drawn on a logarithmic axis
+  double y = 0;         ///< points where x or y is not finite are left out
+  std::string series;   ///< points of one series share a colour, named below the title in the order they come
+  std::string label{};  ///< beside the point; may be empty
+  bool line = false;    ///< joined by a line with the others of this kind, from left to right
+  bool ring = false;    ///< with a ring around it: the one that is in use
 };
 
 /// What stands beside the axes.
