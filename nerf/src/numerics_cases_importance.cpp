@@ -45,7 +45,7 @@ std::vector<T> rising(std::size_t n, std::uint64_t seed) {
 
 void add_importance_numerics(std::vector<NumericsCase>& cases) {
   const auto add = [&](const char* what, auto weight_of) {
-    add_numerics(cases, std::string("importance_points: ") + what, "length of the ray", 6e-8, 1e-15,
+    add_numerics(cases, std::string("importance_points: ") + what, "length of the ray", 6e-8, 4e-15,
                  [=](auto t, WorstError& e) {
                    using T = decltype(t);
                    for (const std::size_t n : {std::size_t{1}, std::size_t{32}, std::size_t{1024}}) {

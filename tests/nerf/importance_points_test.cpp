@@ -1,3 +1,4 @@
+#include <fieldmark/engine/error.h>
 #include <fieldmark/nerf/importance_points.h>
 
 #include <algorithm>

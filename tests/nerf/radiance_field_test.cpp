@@ -76,6 +76,7 @@ TEST_CASE("radiance_field: an mlp field's file reads back to the same field, bot
   options.points.random = 3;
   RadianceField f(options);
   REQUIRE(f.coarse);
+  f.cameras = small_field().cameras;
   f.background = Background::black;
   f.save(folder / "a");
   const SafetensorsFile file = SafetensorsFile::read(folder / "a");

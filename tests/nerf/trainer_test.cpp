@@ -89,8 +89,8 @@ TEST_CASE("trainer: 300 steps of a small mlp field reach 17 dB, and both its net
   CHECK(trainer.train_psnr() > start + 3);
   CHECK(trainer.samples() > 300 * 1000);
   for (const auto& e : field.params.entries()) {
-    const auto now = field.params.values(field.params.find(e.name)),
-               then = untrained.params.values(untrained.params.find(e.name));
+    const std::span<const float> now = field.params.values(field.params.find(e.name)),
+                                 then = untrained.params.values(untrained.params.find(e.name));
     CAPTURE(e.name);
     CHECK_FALSE(std::equal(now.begin(), now.end(), then.begin()));
   }
