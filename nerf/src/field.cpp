@@ -23,11 +23,11 @@ void add_networks(ParamStore<T>& store, const std::string& prefix, const FieldOp
                        DenseOptions{.in = features, .out = o.width, .activation = Activation::relu},
                        seed + 1);
   density.emplace_back(store, prefix + "density/1", DenseOptions{.in = o.width, .out = o.geometry}, seed + 2);
-  colour.emplace_back(
-      store, prefix + "colour/0",
-      DenseOptions{
-          .in = o.geometry + features + kSphericalHarmonics, .out = o.width, .activation = Activation::relu},
-      seed + 3);
+  colour.emplace_back(store, prefix + "colour/0",
+                      DenseOptions{.in = o.geometry + features + (o.directional ? kSphericalHarmonics : 0),
+                                   .out = o.width,
+                                   .activation = Activation::relu},
+                      seed + 3);
   colour.emplace_back(store, prefix + "colour/1",
                       DenseOptions{.in = o.width, .out = o.width, .activation = Activation::relu}, seed + 4);
   colour.emplace_back(store, prefix + "colour/2", DenseOptions{.in = o.width, .out = 3}, seed + 5);
@@ -73,7 +73,8 @@ Index Field<T>::geometry_width() const {
 
 template <class T>
 Index Field<T>::direction_width() const {
-  return mlp_ ? mlp_->direction_width() : kSphericalHarmonics;
+  if (mlp_) return mlp_->direction_width();
+  return options_.directional ? kSphericalHarmonics : 0;
 }
 
 template <class T>
@@ -100,7 +101,8 @@ Var<T> Field<T>::density(Var<T> z) const {
 
 template <class T>
 Var<T> Field<T>::encode_directions(Var<T> d) const {
-  return mlp_ ? mlp_->encode_directions(d) : spherical_harmonics(d);
+  if (mlp_) return mlp_->encode_directions(d);
+  return options_.directional ? spherical_harmonics(d) : columns(d, 0, 0);
 }
 
 template <class T>

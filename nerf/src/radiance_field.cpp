@@ -1,6 +1,7 @@
 #include <fieldmark/engine/error.h>
 #include <fieldmark/engine/model_file.h>
 #include <fieldmark/nerf/radiance_field.h>
+#include <fieldmark/nerf/table_rows.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,24 +11,42 @@ namespace fieldmark::nerf {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char* kOccupancy = "density/occupancy";
+constexpr const char *kOccupancy = "density/occupancy", *kRows = "hash/rows";
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-// The interleaved table as two tensors: columns [begin, begin + F) of the rows.
-std::vector<float> table_part(std::span<const float> table, std::size_t row, std::size_t begin) {
+// The interleaved table as two tensors: columns [begin, begin + F) of the rows that are kept.
+std::vector<float> table_part(std::span<const float> table, std::size_t row, std::size_t begin,
+                              const std::vector<std::uint8_t>& kept) {
   std::vector<float> part;
-  part.reserve(table.size() / 2);
-  for (std::size_t r = 0; r < table.size(); r += row)
-    part.insert(part.end(), table.begin() + static_cast<std::ptrdiff_t>(r + begin),
-                table.begin() + static_cast<std::ptrdiff_t>(r + begin + row / 2));
+  for (std::size_t r = 0; r < kept.size(); ++r)
+    if (kept[r])
+      part.insert(part.end(), table.begin() + static_cast<std::ptrdiff_t>(r * row + begin),
+                  table.begin() + static_cast<std::ptrdiff_t>(r * row + begin + row / 2));
   return part;
 }
 
 void set_table_part(std::span<float> table, std::size_t row, std::size_t begin,
-                    const std::vector<float>& part) {
-  for (std::size_t r = 0, k = 0; r < table.size(); r += row)
-    for (std::size_t f = 0; f < row / 2; ++f) table[r + begin + f] = part[k++];
+                    const std::vector<std::uint8_t>& kept, const std::vector<float>& part) {
+  for (std::size_t r = 0, k = 0; r < kept.size(); ++r)
+    for (std::size_t f = 0; f < row / 2; ++f) table[r * row + begin + f] = kept[r] ? part[k++] : 0;
+}
+
+std::vector<std::uint8_t> to_bits(Index n, const auto& is_set) {
+  std::vector<std::uint8_t> packed(at((n + 7) / 8));
+  for (Index i = 0; i < n; ++i)
+    if (is_set(i)) packed[at(i / 8)] = static_cast<std::uint8_t>(packed[at(i / 8)] | (1u << (i % 8)));
+  return packed;
+}
+
+std::vector<std::uint8_t> read_bits(const SafetensorsFile& file, const std::string& name, Index n) {
+  const std::vector<std::uint8_t> packed = file.u8(name);
+  if (static_cast<Index>(packed.size()) != (n + 7) / 8)
+    throw IoError(file.path + ": tensor '" + name + "': expected " + std::to_string((n + 7) / 8) +
+                  " bytes, found " + std::to_string(packed.size()));
+  std::vector<std::uint8_t> bits(at(n));
+  for (std::size_t i = 0; i < bits.size(); ++i) bits[i] = (packed[i / 8] >> (i % 8)) & 1;
+  return bits;
 }
 
 Tensor<float> read_tensor(const SafetensorsFile& file, const std::string& name, const Shape& shape) {
@@ -97,7 +116,8 @@ Json field_json(const RadianceFieldOptions& o) {
           {"base_resolution", f.encoding.base_resolution},
           {"finest_resolution", f.encoding.finest_resolution},
           {"width", f.width},
-          {"geometry", f.geometry}};
+          {"geometry", f.geometry},
+          {"directional", f.directional}};
 }
 
 void parse_field(const Json& j, RadianceFieldOptions& o) {
@@ -109,7 +129,8 @@ void parse_field(const Json& j, RadianceFieldOptions& o) {
                             .base_resolution = j.at("base_resolution"),
                             .finest_resolution = j.at("finest_resolution")},
                .width = j.at("width"),
-               .geometry = j.at("geometry")};
+               .geometry = j.at("geometry"),
+               .directional = j.value("directional", true)};
   } else if (kind == "mlp") {
     o.field = {.kind = FieldKind::mlp,
                .mlp = {.layers = j.at("layers"),
@@ -174,14 +195,16 @@ void RadianceField::store(SafetensorsFile& file, const std::string& prefix) cons
   if (field.has_table()) {
     const auto table = params.values(field.encoding().table());
     const auto row = at(2 * field.encoding().features());
+    const std::vector<std::uint8_t> kept = rows_in_use(field.encoding(), grid);
+    const Index count = std::count(kept.begin(), kept.end(), std::uint8_t{1}), rows = std::ssize(kept);
     for (const TablePart& part : table_parts(options_.field))
-      file.add(prefix + part.name, {field.encoding().rows(), field.encoding().features()},
-               table_part(table, row, part.begin));
+      file.add(prefix + part.name, {count, field.encoding().features()},
+               table_part(table, row, part.begin, kept));
+    if (count < rows)
+      file.add(prefix + kRows, {(rows + 7) / 8}, to_bits(rows, [&](Index r) { return kept[at(r)] != 0; }));
   }
-  std::vector<std::uint8_t> packed(at(grid.cells() / 8));
-  for (Index c = 0; c < grid.cells(); ++c)
-    if (grid.occupied(c)) packed[at(c / 8)] = static_cast<std::uint8_t>(packed[at(c / 8)] | (1u << (c % 8)));
-  file.add(prefix + kOccupancy, {grid.cells() / 8}, packed);
+  file.add(prefix + kOccupancy, {grid.cells() / 8},
+           to_bits(grid.cells(), [&](Index c) { return grid.occupied(c); }));
 }
 
 void RadianceField::restore(const SafetensorsFile& file, const std::string& prefix) {
@@ -192,18 +215,15 @@ void RadianceField::restore(const SafetensorsFile& file, const std::string& pref
   }
   if (field.has_table()) {
     const auto row = at(2 * field.encoding().features());
-    const Shape shape{field.encoding().rows(), field.encoding().features()};
+    const Index rows = field.encoding().rows();
+    const std::vector<std::uint8_t> kept = file.has(prefix + kRows) ? read_bits(file, prefix + kRows, rows)
+                                                                    : std::vector<std::uint8_t>(at(rows), 1);
+    const Shape shape{std::count(kept.begin(), kept.end(), std::uint8_t{1}), field.encoding().features()};
     for (const TablePart& part : table_parts(options_.field))
-      set_table_part(params.values(field.encoding().table()), row, part.begin,
+      set_table_part(params.values(field.encoding().table()), row, part.begin, kept,
                      read_tensor(file, prefix + part.name, shape).data);
   }
-  const std::vector<std::uint8_t> packed = file.u8(prefix + kOccupancy);
-  if (static_cast<Index>(packed.size()) != grid.cells() / 8)
-    throw IoError(file.path + ": tensor '" + prefix + kOccupancy + "': expected " +
-                  std::to_string(grid.cells() / 8) + " bytes, found " + std::to_string(packed.size()));
-  std::vector<std::uint8_t> bits(at(grid.cells()));
-  for (std::size_t c = 0; c < bits.size(); ++c) bits[c] = (packed[c / 8] >> (c % 8)) & 1;
-  grid.set_bits(bits);
+  grid.set_bits(read_bits(file, prefix + kOccupancy, grid.cells()));
 }
 
 void RadianceField::save(const std::filesystem::path& path) const {

@@ -19,18 +19,20 @@ struct FieldOptions {
   Index width = 32;                ///< units of a hidden layer, 1 to 256
   Index geometry =
       16;  ///< N_z, numbers the density network hands to the colour network; the first is log density
-  FieldKind kind = FieldKind::hash;  ///< mlp ignores the three above
+  bool directional = true;           ///< whether colours depend on the viewing direction
+  FieldKind kind = FieldKind::hash;  ///< mlp ignores what is above
   MlpFieldOptions mlp{};             ///< used by mlp only
 };
 
 /// A radiance field on the unit cube:
 ///   z = Theta_sigma(h_sigma(x)),   sigma = exp(min(z_0, 15)),   c = Theta_c(z, h_c(x), Y(d))
-/// Kind hash: h_sigma, h_c are the two parts of one hash encoding; Y: spherical harmonics; Theta: small
-/// networks with ReLU, one hidden layer for density and two for colour; the colour leaves through a sigmoid.
-/// Source: Mildenhall et al. 2020, sec. 3 (the split), Mueller et al. 2022, sec. 5.4 (sizes). Departure: h_c
-/// reaches only the colour, so that a mark can be put into the colours without touching a byte of the
-/// geometry. Kind mlp: see MlpField; h_sigma and Y are frequency encodings, h_c is empty. The field holds no
-/// numbers: they are in the store, the networks first and the table, where there is one, last.
+/// Kind hash: h_sigma, h_c are the two parts of one hash encoding; Y: spherical harmonics, or nothing where
+/// the field is not directional; Theta: small networks with ReLU, one hidden layer for density and two for
+/// colour; the colour leaves through a sigmoid. Source: Mildenhall et al. 2020, sec. 3 (the split), Mueller
+/// et al. 2022, sec. 5.4 (sizes). Departure: h_c reaches only the colour, so that a mark can be put into the
+/// colours without touching a byte of the geometry. Kind mlp: see MlpField; h_sigma and Y are frequency
+/// encodings, h_c is empty. The field holds no numbers: they are in the store, the networks first and the
+/// table, where there is one, last.
 template <class T>
 class Field {
  public:

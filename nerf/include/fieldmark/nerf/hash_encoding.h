@@ -1,6 +1,8 @@
 #pragma once
 #include <fieldmark/engine/params.h>
 
+#include <array>
+#include <cstdint>
 #include <string_view>
 
 namespace fieldmark::nerf {
@@ -14,6 +16,14 @@ struct HashEncodingOptions {
   double finest_resolution =
       768;  ///< N_max, cells per axis of the finest level, at least N_min, at most 2^16
 };
+
+/// Row of a corner of a level's cells within the level: eq. 4 of HashEncoding, or directly.
+/// @param corner  each in [0, resolution]   @param mask  see HashEncoding::mask()
+inline Index hash_row(const std::array<Index, 3>& corner, Index resolution, std::uint32_t mask) {
+  if (mask == 0) return corner[0] + (resolution + 1) * (corner[1] + (resolution + 1) * corner[2]);
+  const auto at = [&](std::size_t a) { return static_cast<std::uint32_t>(corner[a]); };
+  return (at(0) ^ at(1) * 2654435761u ^ at(2) * 805459861u) & mask;
+}
 
 /// Multiresolution hash encoding (Mueller et al. 2022, Instant Neural Graphics Primitives, sec. 3) whose
 /// entries hold F features for the density network and F for the colour network: one look-up serves both, and
@@ -77,6 +87,8 @@ class HashEncoding {
   ParamId table() const { return table_; }
   /// Cells per axis of a level.
   Index resolution(int level) const { return levels_[static_cast<std::size_t>(level)].resolution; }
+  /// Rows of a hashed level less one, all ones in binary; 0 for a level that is indexed directly.
+  std::uint32_t mask(int level) const { return levels_[static_cast<std::size_t>(level)].mask; }
 
  private:
   struct Level {

@@ -31,8 +31,10 @@ class RadianceField {
   float step() const { return options_.step * 1.7320508f; }
 
   /// Writes a FIELD. Tensors: "density/*", "colour/*", "density/occupancy" (one bit a cell), and of a hash
-  /// field "hash/density_features" and "hash/colour_features" [rows, F], of an mlp field "coarse/density/*"
-  /// and "coarse/colour/*". @throws IoError
+  /// field "hash/density_features" and "hash/colour_features" [kept rows, F], of an mlp field
+  /// "coarse/density/*" and "coarse/colour/*". Rows of the table that no occupied cell reads are left out,
+  /// see rows_in_use(), and come back as zeros; "hash/rows" (one bit a row) then says which are kept. @throws
+  /// IoError
   void save(const std::filesystem::path& path) const;
   /// @throws IoError if the file is missing, foreign, of another kind, or its tensors do not fit its
   /// configuration

@@ -1,0 +1,148 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/nerf/field_sizing.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "vec3.h"
+
+namespace fieldmark::nerf {
+namespace {
+
+constexpr double kGrowth = 1.75, kFiner = 1.5;
+constexpr int kFirstTable = 11, kBase = 16, kMostFinest = 2048;
+constexpr Index kMostTrials = 10;
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Levels from kBase to the finest resolution; the grid that skips empty space follows it.
+void set_resolution(RadianceFieldOptions& field, double finest) {
+  HashEncodingOptions& e = field.field.encoding;
+  e.base_resolution = std::min(kBase, static_cast<int>(finest));
+  e.finest_resolution = finest;
+  e.levels = 1 + static_cast<int>(std::lround(std::log(finest / e.base_resolution) / std::log(kGrowth)));
+  field.occupancy = finest >= 384 ? 128 : finest >= 160 ? 64 : 32;
+}
+
+class Sizing {
+ public:
+  Sizing(const Dataset& data, const RadianceFieldOptions& start, const SizingOptions& options,
+         const std::function<bool(Index, Index)>& progress)
+      : data_(data), options_(options), progress_(progress) {
+    found_.field = start;
+    found_.field.seed = options.seed;
+  }
+
+  FieldSizing run() {
+    RadianceField probe(found_.field);
+    const Trainer layout(probe, data_, short_run());  // lays the scene into the cube
+    found_.pixels = pixel_resolution(data_, probe.space);
+    set_resolution(found_.field, std::clamp(std::floor(kFiner * found_.pixels), 16., double{kMostFinest}));
+    grow_table();
+    RadianceFieldOptions next = found_.field;
+    next.field.directional = false;
+    take_away("no viewing direction", next);
+    next = found_.field;
+    next.field.width = std::max<Index>(next.field.width / 2, 8);
+    next.field.geometry = std::max<Index>(next.field.geometry / 2, 4);
+    take_away("networks of half the width", next);
+    for (bool taken = true; taken && found_.field.field.encoding.levels > 2;) {
+      next = found_.field;
+      set_resolution(next, std::floor(next.field.encoding.finest_resolution / kGrowth));
+      taken = take_away("without the finest level", next);
+    }
+    return std::move(found_);
+  }
+
+ private:
+  TrainOptions short_run() const {
+    TrainOptions train;
+    train.schedule.steps = options_.steps;
+    train.samples_per_step = options_.samples_per_step;
+    train.seed = options_.seed;
+    return train;
+  }
+
+  // Whether the training was made.
+  bool attempt(const std::string& what, const RadianceFieldOptions& field) {
+    const Index done = std::ssize(found_.trials);
+    if (done >= kMostTrials || (progress_ && !progress_(done, kMostTrials))) return false;
+    RadianceField trial(field);
+    Trainer trainer(trial, data_, short_run());
+    while (!trainer.done()) trainer.step(0);
+    found_.trials.push_back(
+        {.what = what, .field = field, .parameters = trial.params.size(), .psnr = trainer.train_psnr()});
+    return true;
+  }
+
+  void grow_table() {
+    double best = -1;
+    for (int log2 = kFirstTable; log2 <= options_.most_log2_table;
+         log2 = log2 < options_.most_log2_table ? std::min(log2 + 2, options_.most_log2_table) : log2 + 1) {
+      RadianceFieldOptions next = found_.field;
+      next.field.encoding.log2_table = log2;
+      if (!attempt("table of 2^" + std::to_string(log2), next)) return;
+      SizingTrial& trial = found_.trials.back();
+      if (trial.psnr < best + options_.worth) return;
+      best = trial.psnr;
+      keep(trial);
+    }
+  }
+
+  bool take_away(const std::string& what, const RadianceFieldOptions& next) {
+    if (found_.trials.empty() || !attempt(what, next)) return false;
+    SizingTrial& trial = found_.trials.back();
+    if (trial.psnr < psnr_ - options_.worth / 2) return false;
+    keep(trial);
+    return true;
+  }
+
+  void keep(SizingTrial& trial) {
+    trial.kept = true;
+    psnr_ = trial.psnr;
+    found_.field = trial.field;
+  }
+
+  const Dataset& data_;
+  const SizingOptions& options_;
+  const std::function<bool(Index, Index)>& progress_;
+  FieldSizing found_;
+  double psnr_ = 0;  // of what found_.field did
+};
+
+}  // namespace
+
+double pixel_resolution(const Dataset& data, const Space& space) {
+  std::vector<double> cells;
+  const Bounds& b = space.bounds;
+  const Vec3 middle{b.corner[0] + b.side / 2, b.corner[1] + b.side / 2, b.corner[2] + b.side / 2};
+  for (const View& v : data.views) {
+    if (space.kind == SpaceKind::ndc)
+      cells.push_back(v.camera.fx / space.slope_x);
+    else if (space.kind == SpaceKind::contracted)
+      cells.push_back(2 * b.side / (b.side / 2) * v.camera.fx);
+    else
+      cells.push_back(b.side * v.camera.fx / norm(v.camera.position() - middle));
+  }
+  return median(std::move(cells));
+}
+
+FieldSizing size_field(const Dataset& data, const RadianceFieldOptions& start, const SizingOptions& options,
+                       const std::function<bool(Index, Index)>& progress) {
+  if (start.field.kind != FieldKind::hash)
+    throw ValueError("[size_field] start must be a hash field, got an mlp field");
+  if (options.steps < 64 || !(options.worth > 0) || options.most_log2_table < kFirstTable ||
+      options.most_log2_table > 24)
+    throw ValueError(
+        "[size_field] options must have at least 64 steps, a positive worth and a table of 2^11 to "
+        "2^24 at most, got " +
+        std::to_string(options.steps) + " steps, " + std::to_string(options.worth) + " dB and 2^" +
+        std::to_string(options.most_log2_table));
+  return Sizing(data, start, options, progress).run();
+}
+
+}  // namespace fieldmark::nerf
