@@ -10,8 +10,8 @@
 #include <fieldmark/nerf/npy.h>
 #include <fieldmark/nerf/transforms.h>
 
-#include <chrono>
 #include <cstdlib>
+#include <ctime>
 #include <functional>
 #include <iostream>
 #include <limits>
@@ -32,7 +32,7 @@ const std::string kTransforms =
  "p1": -0.00098, "p2": 0.00016, "cx": 138.6, "cy": 241.3, "w": 270.0, "h": 480.0, "aabb_scale": 4, "frames": [
  {"file_path": "images/0001.png", "sharpness": 31.75, "transform_matrix": [[0.6, -0.8, 0, 3.1], [0.8, 0.6, 0, -5.4],
   [0, 0, 1, -0.97], [0.0, 0.0, 0.0, 1.0]]},
- {"file_path": "./b", "fl_x": 20, "k3": 0, "is_fisheye": false, "camera_model": "OPENCV", "transform_matrix":
+ {"file_path": "./b", "fl_x": 300, "k3": 0, "is_fisheye": false, "camera_model": "OPENCV", "transform_matrix":
   [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}]})";
 
 std::string safetensors_file() {
@@ -155,7 +155,7 @@ struct Outcome {
 
 // False if something other than an Error came out, or it took too long.
 bool try_one(const Format& format, const std::string& input, Outcome& outcome) {
-  const auto begin = std::chrono::steady_clock::now();
+  const std::clock_t begin = std::clock();  // of this process: others may hold the machine
   try {
     format.read(input);
     ++outcome.read;
@@ -168,7 +168,7 @@ bool try_one(const Format& format, const std::string& input, Outcome& outcome) {
     std::cerr << format.name << ": not an exception\n";
     return false;
   }
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   if (seconds > kSecondsForOne) std::cerr << format.name << ": took " << seconds << " s\n";
   return seconds <= kSecondsForOne;
 }
@@ -186,7 +186,7 @@ int run(std::size_t inputs, std::uint64_t seed, std::size_t first) {
     const std::size_t k = i % all.size();
     const Format &format = all[k], &other = all[random() % all.size()];
     std::string input = format.samples[random() % format.samples.size()];
-    for (auto edits = 1 + random() % 5; edits > 0; --edits) mutate(input, other.samples[0], random);
+    for (auto edits = 1 + random() % 3; edits > 0; --edits) mutate(input, other.samples[0], random);
     if (!try_one(format, input, outcomes[k])) {
       std::cerr << "  input " << i << ": repeat with fuzz_readers 1 " << seed << " " << i << "\n";
       ++failures;
