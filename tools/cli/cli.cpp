@@ -100,8 +100,11 @@ class Program {
     }
     if (!sub) return "no command is called '" + line[1] + "'" + did_you_mean(line[1], names);
     names.clear();
-    for (const CLI::Option* option : sub->get_options())
-      for (const auto& name : option->get_lnames()) names.push_back("--" + name);
+    std::vector<const CLI::App*> apps = sub->get_subcommands(nullptr);  // `data fetch` has options of its own
+    apps.push_back(sub);
+    for (const CLI::App* app : apps)
+      for (const CLI::Option* option : app->get_options())
+        for (const auto& name : option->get_lnames()) names.push_back("--" + name);
     for (std::size_t i = 2; i < line.size() && line[i] != "--"; ++i) {
       const std::string word = line[i].substr(0, line[i].find('='));
       if (!word.starts_with("--") || std::find(names.begin(), names.end(), word) != names.end()) continue;
