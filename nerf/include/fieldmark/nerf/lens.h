@@ -20,7 +20,7 @@ struct Lens {
   double p1 = 0;  ///< tangential
   double p2 = 0;  ///< tangential
 
-  bool operator==(const Lens&) const = default;
+  bool operator==(const Lens&) const = default;  ///< equal in every coefficient
   /// Whether it leaves every point where it is.
   bool is_pinhole() const { return k1 == 0 && k2 == 0 && p1 == 0 && p2 == 0; }
   /// "k1 0.1 k2 0 p1 0 p2 0"
@@ -37,11 +37,11 @@ struct Lens {
 
 /// Part of a picture, pixels.
 struct Crop {
-  Index left = 0;    ///< columns cut off at the left
-  Index top = 0;     ///< rows cut off at the top
-  Index width = 0;   ///< columns kept
-  Index height = 0;  ///< rows kept
-  bool operator==(const Crop&) const = default;
+  Index left = 0;                                ///< columns cut off at the left
+  Index top = 0;                                 ///< rows cut off at the top
+  Index width = 0;                               ///< columns kept
+  Index height = 0;                              ///< rows kept
+  bool operator==(const Crop&) const = default;  ///< equal in all four
 };
 
 /// The part of a pinhole's picture that a lens's picture of the same size and intrinsics covers: the largest
