@@ -70,7 +70,10 @@ class Sizing {
   // Whether the training was made.
   bool attempt(const std::string& what, const RadianceFieldOptions& field) {
     const Index done = std::ssize(found_.trials);
-    if (done >= kMostTrials || (progress_ && !progress_(done, kMostTrials))) return false;
+    if (ended_ || done >= kMostTrials || (progress_ && !progress_(done, kMostTrials))) {
+      ended_ = true;
+      return false;
+    }
     RadianceField trial(field);
     Trainer trainer(trial, data_, short_run());
     while (!trainer.done()) trainer.step(0);
@@ -112,6 +115,7 @@ class Sizing {
   const std::function<bool(Index, Index)>& progress_;
   FieldSizing found_;
   double psnr_ = 0;  // of what found_.field did
+  bool ended_ = false;
 };
 
 }  // namespace

@@ -81,7 +81,8 @@ TEST_CASE(
   RadianceFieldOptions options;
   options.field.encoding = {.levels = 3, .log2_table = 8, .base_resolution = 4, .finest_resolution = 16};
   options.field.directional = false;
-  const RadianceField f(options);
+  RadianceField f(options);
+  f.cameras = camera_span(sphere());
   CHECK(f.field.direction_width() == 0);
   Tape<float> tape;
   const float x[] = {0.3f, 0.6f, 0.1f, 0.3f, 0.6f, 0.1f}, d[] = {1, 0, 0, 0, 0.6f, 0.8f};

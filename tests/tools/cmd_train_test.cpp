@@ -79,3 +79,24 @@ TEST_CASE("train says what is wrong with its data and its options, and leaves no
         cli::kFailed);
   CHECK(!std::filesystem::exists(out));
 }
+
+TEST_CASE(
+    "train sizes the model from the scene, says what it tried, and stops where held-out views look as wanted",
+    "[train]") {
+  const TemporaryFolder folder;
+  const std::string scene = folder / "scene";
+  REQUIRE(run_command({"scene", "--out", scene, "--kind", "sphere", "--size", "32", "--views", "8"}).code ==
+          0);
+  const auto r = run_command({"train", "--data", scene, "--out", folder / "sized.fm", "--model", "sized",
+                              "--steps", "2000", "--target-psnr", "12", "--json", "-"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  const Json json = Json::parse(r.out);
+  CHECK(json["steps"] == 250);  // the first look at the held-out views
+  REQUIRE(json["sizing"]["trials"].size() >= 3);
+  CHECK(json["sizing"]["trials"][0]["taken"] == true);
+  CHECK(json["file_bytes"].get<double>() < 1e6);
+  CHECK(run_command(
+            {"train", "--data", scene, "--out", folder / "no.fm", "--model", "sized", "--preset", "mlp"})
+            .code == cli::kUsage);
+}

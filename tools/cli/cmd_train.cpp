@@ -1,4 +1,5 @@
 #include <fieldmark/nerf/evaluation.h>
+#include <fieldmark/nerf/field_sizing.h>
 #include <fieldmark/nerf/trainer.h>
 
 #include <CLI/CLI.hpp>
@@ -22,7 +23,7 @@ constexpr double kHeaderBytes = 32e3;  // names and metadata, cameras included
 
 struct Options {
   std::string data, out;
-  std::string preset = "hash", background, precision = "fp32";
+  std::string preset = "hash", model = "fixed", background, precision = "fp32";
   Index size = 0;
   RunLength length;
   double target_psnr = 0, max_megabytes = 0;
@@ -34,41 +35,100 @@ std::optional<nerf::Background> background_of(const std::string& name) {
   return name == "white" ? nerf::Background::white : nerf::Background::black;
 }
 
-// The largest table whose field's numbers fit; the rest of the file is small.
-nerf::RadianceFieldOptions field_options(const Options& options, std::uint64_t seed) {
-  nerf::RadianceFieldOptions field;
-  field.seed = seed;
-  if (options.preset == "mlp") field.field.kind = nerf::FieldKind::mlp;
-  if (options.max_megabytes <= 0) return field;
+// With the largest table whose field's numbers fit; the rest of the file is small.
+nerf::RadianceFieldOptions fitted(nerf::RadianceFieldOptions field, double max_megabytes) {
+  if (max_megabytes <= 0) return field;
   const int least = field.field.kind == nerf::FieldKind::mlp ? field.field.encoding.log2_table : 4;
   for (int log2 = field.field.encoding.log2_table; log2 >= least; --log2) {
     field.field.encoding.log2_table = log2;
     const nerf::RadianceField made(field);
     const double bytes =
         4.0 * static_cast<double>(made.params.size()) + static_cast<double>(made.grid.cells()) / 8;
-    if (bytes + kHeaderBytes <= options.max_megabytes * 1e6) return field;
+    if (bytes + kHeaderBytes <= max_megabytes * 1e6) return field;
   }
-  throw UsageError("--max-megabytes: no field is as small as " + std::to_string(options.max_megabytes) +
-                   " MB");
+  throw UsageError("--max-megabytes: no field is as small as " + std::to_string(max_megabytes) + " MB");
 }
 
-double train(const Options& options, nerf::Trainer& trainer, const std::string& checkpoint,
+// As large as the scene needs: short trainings first, whose figures go into the result.
+nerf::RadianceFieldOptions sized(const nerf::RadianceFieldOptions& start, const nerf::Dataset& data,
+                                 Json& report, Context& context) {
+  const InterruptGuard guard;
+  nerf::FieldSizing sizing;
+  {
+    Progress progress = context.progress("sizing");
+    sizing = nerf::size_field(
+        data, start, {.most_log2_table = std::max(start.field.encoding.log2_table, 11), .seed = start.seed},
+        [&](Index done, Index total) {
+          progress.update(static_cast<double>(done) / static_cast<double>(total));
+          return !guard.interrupted();
+        });
+  }
+  if (guard.interrupted()) throw Interrupted("while the model was sized, nothing was written");
+  Json trials = Json::array();
+  for (const nerf::SizingTrial& t : sizing.trials) {
+    char line[160];
+    std::snprintf(line, sizeof line, "  %-28s %9lld parameters %6.2f dB  %s\n", t.what.c_str(),
+                  static_cast<long long>(t.parameters), t.psnr, t.kept ? "taken" : "not taken");
+    context.text() << line;
+    trials.push_back({{"what", t.what}, {"parameters", t.parameters}, {"psnr", t.psnr}, {"taken", t.kept}});
+  }
+  const nerf::FieldOptions& f = sizing.field.field;
+  report = {{"pixels", sizing.pixels},
+            {"trials", trials},
+            {"levels", f.encoding.levels},
+            {"log2_table", f.encoding.log2_table},
+            {"finest_resolution", f.encoding.finest_resolution},
+            {"width", f.width},
+            {"directional", f.directional},
+            {"occupancy", sizing.field.occupancy}};
+  return sizing.field;
+}
+
+// Whether held-out views look as good as is wanted: asked every so many steps, so that the clock has no part
+// in it.
+class Target {
+ public:
+  Target(const Options& options, const nerf::RadianceField& field, Context& context)
+      : wanted_(options.target_psnr), renderer_(field) {
+    if (wanted_ <= 0 || !nerf::has_split(options.data, "val")) return;
+    held_out_ = load_scene(
+        options.data, {.split = "val", .size = options.size, .background = background_of(options.background)},
+        context);
+    if (held_out_->views.size() > kViews) held_out_->views.resize(kViews);
+  }
+  bool reached(const nerf::Trainer& trainer) {
+    if (wanted_ <= 0) return false;
+    if (!held_out_) return trainer.train_psnr() >= wanted_;
+    if (trainer.steps() == 0 || trainer.steps() % kEvery != 0 || trainer.steps() == asked_) return false;
+    asked_ = trainer.steps();
+    return nerf::evaluate(renderer_, *held_out_).psnr >= wanted_;
+  }
+
+ private:
+  static constexpr std::size_t kViews = 4;
+  static constexpr Index kEvery = 250;
+  double wanted_;
+  nerf::Renderer renderer_;
+  std::optional<nerf::Dataset> held_out_;
+  Index asked_ = 0;
+};
+
+double train(const Options& options, nerf::Trainer& trainer, Target& target, const std::string& checkpoint,
              Context& context) {
-  const bool has_target = options.target_psnr > 0;
-  return run_long(
-      {.what = "train",
-       .done = [&] { return trainer.done() || (has_target && trainer.train_psnr() >= options.target_psnr); },
-       .step = [&](double seconds) { trainer.step(seconds); },
-       .steps = [&] { return trainer.steps(); },
-       .note =
-           [&] {
-             char note[64];
-             std::snprintf(note, sizeof note, "%.2f dB on the rays trained", trainer.train_psnr());
-             return std::string(note);
-           },
-       .save = [&] { trainer.save(checkpoint); },
-       .checkpoint = checkpoint},
-      options.length, context);
+  return run_long({.what = "train",
+                   .done = [&] { return trainer.done() || target.reached(trainer); },
+                   .step = [&](double seconds) { trainer.step(seconds); },
+                   .steps = [&] { return trainer.steps(); },
+                   .note =
+                       [&] {
+                         char note[64];
+                         std::snprintf(note, sizeof note, "%.2f dB on the rays trained",
+                                       trainer.train_psnr());
+                         return std::string(note);
+                       },
+                   .save = [&] { trainer.save(checkpoint); },
+                   .checkpoint = checkpoint},
+                  options.length, context);
 }
 
 // Of the data set's test views, after everything is saved; null where there are none.
@@ -90,11 +150,18 @@ Json test_psnr(const Options& options, const nerf::RadianceField& field, Context
 
 int run(const Options& options, Context& context) {
   const std::string checkpoint = options.out + ".checkpoint";
+  if (options.model == "sized" && options.preset == "mlp")
+    throw UsageError("--model sized: the mlp preset has one size");
   check_writable(options.out);
   const auto data = load_scene(
       options.data, {.split = "train", .size = options.size, .background = background_of(options.background)},
       context);
-  nerf::RadianceField field(field_options(options, context.seed()));
+  nerf::RadianceFieldOptions sizes{.seed = context.seed()};
+  if (options.preset == "mlp") sizes.field.kind = nerf::FieldKind::mlp;
+  sizes = fitted(sizes, options.max_megabytes);
+  Json sizing;
+  if (options.model == "sized") sizes = fitted(sized(sizes, data, sizing, context), options.max_megabytes);
+  nerf::RadianceField field(sizes);
   nerf::TrainOptions train_options = nerf::train_options(field.options().field.kind);
   train_options.schedule.steps = options.length.steps;
   train_options.schedule.seconds = options.length.seconds;
@@ -104,9 +171,10 @@ int run(const Options& options, Context& context) {
   nerf::Trainer trainer(field, data, train_options);
   if (options.resume) trainer.restore(checkpoint);
 
+  Target target(options, field, context);
   const double begun = context.seconds(), samples_before = trainer.samples();
   const InterruptGuard until_saved;  // between the last step and the file, Ctrl-C waits
-  const double seconds = train(options, trainer, checkpoint, context);
+  const double seconds = train(options, trainer, target, checkpoint, context);
   field.save(options.out);
   std::filesystem::remove(checkpoint);
 
@@ -121,12 +189,14 @@ int run(const Options& options, Context& context) {
     context.text() << line;
   }
   context.text() << "\n";
-  context.result({{"test_psnr", psnr},
-                  {"train_seconds", seconds},
-                  {"steps", trainer.steps()},
-                  {"samples_per_second", (trainer.samples() - samples_before) / (seconds - begun)},
-                  {"parameters", field.params.parameters()},
-                  {"file_bytes", bytes}});
+  Json result{{"test_psnr", psnr},
+              {"train_seconds", seconds},
+              {"steps", trainer.steps()},
+              {"samples_per_second", (trainer.samples() - samples_before) / (seconds - begun)},
+              {"parameters", field.params.parameters()},
+              {"file_bytes", bytes}};
+  if (!sizing.is_null()) result["sizing"] = sizing;
+  context.result(result);
   return kOk;
 }
 
@@ -151,10 +221,17 @@ Command add_train(CLI::App& app) {
                  "mlp: the original field, coarse and fine networks of 8 layers of 256")
       ->check(CLI::IsMember({"hash", "mlp"}).description(""))
       ->type_name("NAME");
+  app.add_option("--model", o->model,
+                 "fixed: the default sizes;\n"
+                 "sized: as large as the scene needs, found by short trainings of 15 s or so (hash only)")
+      ->check(CLI::IsMember({"fixed", "sized"}).description(""))
+      ->type_name("NAME");
   add_run_length(app, o->length, true);
   add_precision(app, o->precision);
   app.add_option("--target-psnr", o->target_psnr,
-                 "End when the rays trained on reach this, dB, 1 to 100 (off)")
+                 "End when held-out views (4 of split val, looked at every 250 steps) reach this, dB, 1 to "
+                 "100 (off);\n"
+                 "without such a split, when the rays trained on do")
       ->check(CLI::Range(1.0, 100.0).description(""))
       ->type_name("DB")
       ->default_str("");
