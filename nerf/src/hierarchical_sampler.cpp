@@ -7,6 +7,8 @@
 namespace fieldmark::nerf {
 namespace {
 
+constexpr Index kSpans = 64;  // occupied stretches of a ray that there is room for from the first call on
+
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 void check(const RayBatch& rays, std::span<const float> jitter, float step, const RayPoints& points) {
@@ -45,11 +47,15 @@ std::uint64_t ray_seed(const float* origin, const float* direction) {
   return h;
 }
 
-void begin(RaySamples& out) {
+void begin(Index rays, Index points, RaySamples& out) {
+  out.ray_begin.reserve(at(rays + 1));
   out.ray_begin.assign(1, 0);
   for (auto* v :
        {&out.position, &out.t, &out.delta, &out.sigma, &out.density_features, &out.colour_features, &out.z})
     v->clear();
+  // As much as rays can have at all: a later call with fewer that are empty does not allocate.
+  for (auto* v : {&out.t, &out.delta, &out.sigma}) v->reserve(at(rays * points));
+  out.position.reserve(at(3 * rays * points));
 }
 
 float uniform(const CounterRng& rng, std::uint64_t seed, Index i) {
@@ -118,7 +124,9 @@ void HierarchicalSampler::spread(const OccupancyGrid& grid, const RayBatch& rays
   length_.clear();
   seed_.clear();
   s_.clear();
-  begin(out);
+  s_.reserve(at(rays.size() * points.first()));
+  spans_.reserve(at(rays.size() * kSpans));
+  begin(rays.size(), points.first(), out);
   for (Index r = 0; r < rays.size(); ++r) {
     const float *origin = &rays.origins[at(3 * r)], *direction = &rays.directions[at(3 * r)];
     const float length = find_spans(grid, origin, direction, step);
@@ -146,7 +154,7 @@ void HierarchicalSampler::refine(const RayBatch& rays, const RaySamples& first,
     throw ShapeError("[hierarchical_sampler] first and weights must be of the " + std::to_string(s_.size()) +
                      " samples that spread() gave, got " + std::to_string(first.t.size()) + " and " +
                      std::to_string(weights.size()));
-  begin(out);
+  begin(rays.size(), points_.total(), out);
   const auto count = static_cast<float>(points_.importance);
   drawn_.resize(at(points_.importance));
   u_.resize(at(points_.importance));
