@@ -164,18 +164,20 @@ TEST_CASE("marching: pieces of any length are the whole walk") {
 
 TEST_CASE("marching: skipping empty cells first changes no sample, for any number of walks together") {
   const OccupancyGrid grid = random_grid(64, 0.0005, 7);
-  const auto u = uniform({40, 6}, -1, 1, 8);
-  for (const Index count : {1, 16, 37}) {
+  const auto u = uniform({200, 6}, -1, 1, 8);
+  for (const Index count : {1, 16, 37, 200}) {
     std::vector<RayWalk> walks;
     std::vector<Index> which;
-    for (Index i = 0; i < 40; ++i) {
-      const Line line = towards(u, i);
+    for (Index i = 0; i < 200; ++i) {
+      Line line = towards(u, i);  // through a place in the cube, most of them from outside
+      for (int a = 0; a < 3; ++a)
+        line.o[a] = 0.5f + 0.25f * (line.o[a] - 0.5f) - (i % 3 ? 1.5f * line.d[a] : 0);
       walks.emplace_back(line.o, line.d, i % 2 ? 0.003f : 0.02f, 0.3f);
-      if (i % 40 < count) which.push_back(39 - i);
+      if (i < count) which.push_back(199 - i);
     }
     const std::vector<RayWalk> before = walks;
     RayWalk::skip_empty(grid, walks, which);
-    Index samples = 0;
+    Index samples = 0, seen = 0;
     for (std::size_t i = 0; i < walks.size(); ++i) {
       RayWalk plain = before[i];
       std::vector<float> got(400), want(400), x(1200);
@@ -183,9 +185,33 @@ TEST_CASE("marching: skipping empty cells first changes no sample, for any numbe
       want.resize(static_cast<std::size_t>(plain.next(grid, 400, want.data(), x.data())));
       CHECK(got == want);
       samples += static_cast<Index>(want.size());
+      seen += !want.empty();
     }
-    CHECK(samples > 20);
+    CHECK((samples > 20 && seen > 10 && seen < 100));  // and some rays see nothing
   }
+}
+
+TEST_CASE("marching: contracted walks stay where they are when empty cells are skipped") {
+  const OccupancyGrid grid = random_grid(64, 0.005, 7);
+  const auto u = uniform({20, 6}, -0.2, 0.2, 9);
+  std::vector<RayWalk> walks;
+  std::vector<Index> which;
+  for (Index i = 0; i < 20; ++i) {
+    const Line line = towards(u, i);
+    walks.push_back(RayWalk::contracted(line.o, line.d, 0.002f, 0.3f, 0));
+    which.push_back(i);
+  }
+  std::vector<RayWalk> plain = walks;
+  RayWalk::skip_empty(grid, walks, which);
+  std::size_t samples = 0;
+  for (std::size_t i = 0; i < walks.size(); ++i) {
+    std::vector<float> got(400), want(400), x(1200);
+    got.resize(static_cast<std::size_t>(walks[i].next(grid, 400, got.data(), x.data())));
+    want.resize(static_cast<std::size_t>(plain[i].next(grid, 400, want.data(), x.data())));
+    CHECK(got == want);
+    samples += want.size();
+  }
+  CHECK(samples > 5);
 }
 
 TEST_CASE("marching: nothing is sampled in an empty grid") {
