@@ -15,7 +15,7 @@ TEST_CASE("embed_views: the views are near cameras, each looking through the obj
   const auto views = cache_near_views(field, 20, 3, 5);
   const auto cameras = nerf::make_cameras(field.cameras, nerf::CameraSet::near, 3, 160, 5);
   REQUIRE(views.size() == 3);
-  nerf::Renderer renderer(field);
+  nerf::Renderer renderer(field, {.finer = 1});  // as the field was trained
   for (std::size_t i = 0; i < 3; ++i) {
     const Window window = object_window(renderer.render(cameras[i]).rgb, 1);
     const Tensor<float> want = renderer.render(window_camera(cameras[i], window, 20)).rgb;
