@@ -10,8 +10,8 @@ namespace fieldmark::nerf {
 namespace {
 
 constexpr double kGrowth = 1.75, kFiner = 1.5;
-constexpr int kFirstTable = 11, kBase = 16, kMostFinest = 2048;
-constexpr Index kMostTrials = 10;
+constexpr int kFirstTable = 9, kBase = 16, kMostFinest = 2048;
+constexpr Index kMostTrials = 12;
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -45,15 +45,15 @@ class Sizing {
     grow_table();
     RadianceFieldOptions next = found_.field;
     next.field.directional = false;
-    take_away("no viewing direction", next);
+    take_away("no viewing direction", next, options_.worth / 2);
     next = found_.field;
     next.field.width = std::max<Index>(next.field.width / 2, 8);
     next.field.geometry = std::max<Index>(next.field.geometry / 2, 4);
-    take_away("networks of half the width", next);
+    take_away("networks of half the width", next, options_.worth / 6);
     for (bool taken = true; taken && found_.field.field.encoding.levels > 2;) {
       next = found_.field;
       set_resolution(next, std::floor(next.field.encoding.finest_resolution / kGrowth));
-      taken = take_away("without the finest level", next);
+      taken = take_away("without the finest level", next, options_.worth / 2);
     }
     return std::move(found_);
   }
@@ -93,13 +93,15 @@ class Sizing {
       if (trial.psnr < best + options_.worth) return;
       best = trial.psnr;
       keep(trial);
+      if (best >= options_.enough) return;
     }
   }
 
-  bool take_away(const std::string& what, const RadianceFieldOptions& next) {
+  // Whether the smaller field was taken: it loses at most `loss` dB, or is good enough.
+  bool take_away(const std::string& what, const RadianceFieldOptions& next, double loss) {
     if (found_.trials.empty() || !attempt(what, next)) return false;
     SizingTrial& trial = found_.trials.back();
-    if (trial.psnr < psnr_ - options_.worth / 2) return false;
+    if (trial.psnr < std::min(psnr_ - loss, options_.enough)) return false;
     keep(trial);
     return true;
   }
@@ -142,7 +144,7 @@ FieldSizing size_field(const Dataset& data, const RadianceFieldOptions& start, c
   if (options.steps < 64 || !(options.worth > 0) || options.most_log2_table < kFirstTable ||
       options.most_log2_table > 24)
     throw ValueError(
-        "[size_field] options must have at least 64 steps, a positive worth and a table of 2^11 to "
+        "[size_field] options must have at least 64 steps, a positive worth and a table of 2^9 to "
         "2^24 at most, got " +
         std::to_string(options.steps) + " steps, " + std::to_string(options.worth) + " dB and 2^" +
         std::to_string(options.most_log2_table));

@@ -57,7 +57,7 @@ nerf::RadianceFieldOptions sized(const nerf::RadianceFieldOptions& start, const 
   {
     Progress progress = context.progress("sizing");
     sizing = nerf::size_field(
-        data, start, {.most_log2_table = std::max(start.field.encoding.log2_table, 11), .seed = start.seed},
+        data, start, {.most_log2_table = std::max(start.field.encoding.log2_table, 9), .seed = start.seed},
         [&](Index done, Index total) {
           progress.update(static_cast<double>(done) / static_cast<double>(total));
           return !guard.interrupted();

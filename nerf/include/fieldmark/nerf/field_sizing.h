@@ -11,9 +11,12 @@ namespace fieldmark::nerf {
 struct SizingOptions {
   Index steps = 256;              ///< of each short training, >= 64
   Index samples_per_step = 8192;  ///< of each short training, see TrainOptions
-  double worth = 0.15;            ///< dB that a larger field must gain, > 0
-  int most_log2_table = 18;       ///< largest table that is tried, 11 to 24
-  std::uint64_t seed = 0;         ///< of fields and trainings
+  double worth = 0.3;             ///< dB that a table of four times the rows must gain, > 0
+  /// dB that are enough in a short training: more than photographs give, and what ends above 40 dB in a whole
+  /// one.
+  double enough = 34;
+  int most_log2_table = 18;  ///< largest table that is tried, 9 to 24
+  std::uint64_t seed = 0;    ///< of fields and trainings
 };
 
 /// One short training.
@@ -41,10 +44,9 @@ double pixel_resolution(const Dataset& data, const Space& space);
 ///   - the finest level has 1.5 pixel_resolution() cells per axis, the coarsest 16, each about 1.75 times the
 ///   last;
 ///   - the occupancy grid has a quarter of the finest level's cells per axis: 32, 64 or 128;
-///   - the table grows fourfold from 2^11 as long as that gains `worth` dB;
+///   - the table grows fourfold from 2^9 as long as that gains `worth` dB and `enough` is not reached;
 ///   - the viewing direction, half of the networks' width and then the finest levels, one by one, are taken
-///   away
-///     where that loses less than half of `worth`.
+///     away where that loses less than half, a sixth and half of `worth`, or leaves `enough`.
 /// Space, step and seed are those of `start`.
 /// @param progress  called before each training with how many are done and how many there may be; false ends
 /// the
