@@ -10,7 +10,7 @@ namespace fieldmark::bench {
 
 /// A variant beside the reference.
 struct FieldRow {
-  FieldVariant variant;
+  FieldVariant variant;     ///< how it was rendered
   double seconds = 0;       ///< of a view, median over the runs of the mean over the views
   double spread = 0;        ///< (slowest - fastest) / median over the runs
   double psnr = 0;          ///< of all views together, numbers not rounded to 8 bits, dB
@@ -42,8 +42,8 @@ struct FieldBenchOptions {
 
 /// What run_field_bench() measured; the first row is the default.
 struct FieldBench {
-  std::vector<FieldRow> rows;
-  OccupancyCost occupancy;
+  std::vector<FieldRow> rows;    ///< the default, then the others as field_variants() has them
+  OccupancyCost occupancy;       ///< of the field's own grid
   double reference_seconds = 0;  ///< of a view
 };
 

@@ -31,7 +31,7 @@ SpaceKind parse_space_kind(std::string_view name);
 ///              largest coordinate in place of the length, so that the image fills the cube (Tancik et al.
 ///              2023, Nerfstudio).
 struct Space {
-  SpaceKind kind = SpaceKind::cube;
+  SpaceKind kind = SpaceKind::cube;  ///< which of the maps
   /// cube: what is mapped to the unit cube. contracted: what is mapped to [1/4, 3/4]^3. ndc: without meaning.
   Bounds bounds{};
   double near = 0;  ///< ndc: distance of the plane, length, > 0. contracted: where rays begin, length, >= 0
