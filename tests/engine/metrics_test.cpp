@@ -111,7 +111,7 @@ TEST_CASE("metrics: ssim of six pairs equals what numpy computes") {
     CAPTURE(name);
     const auto a = read_image(*folder / (std::string(name) + "_a.png")),
                b = read_image(*folder / (std::string(name) + "_b.png"));
-    // Pictures are float: measured below 1e-8.
+    // Pictures are float: measured at most 1.9e-8 (lego400_noise), 2e-9 without that pair.
     CHECK(std::abs(ssim(a, b) - want) < 1e-7);
   }
 }

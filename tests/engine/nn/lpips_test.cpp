@@ -137,7 +137,7 @@ TEST_CASE("lpips: equal to the reference values on six pairs, whole, per layer a
       const auto a = read_image(*folder / pair["a"].get<std::string>()),
                  b = read_image(*folder / pair["b"].get<std::string>());
       const auto d = lpips.distance(a, b);
-      // Measured: at most 2e-7 whole and 1e-7 in a layer.
+      // Measured on each instruction set: at most 3.3e-7 whole (lego400_noise, squeeze), 7.5e-8 in a layer.
       CHECK(std::abs(d.value - want["value_f64"].get<double>()) < 1e-6);
       REQUIRE(d.per_layer.size() == want["per_layer_f32"].size());
       for (std::size_t k = 0; k < d.per_layer.size(); ++k)
