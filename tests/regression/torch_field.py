@@ -12,6 +12,7 @@ import sys
 import numpy
 import torch
 
+RAYS_TOGETHER = 16
 TYPES = {"F32": "<f4", "F64": "<f8", "I32": "<i4", "I64": "<i8", "U8": "u1"}
 
 
@@ -67,14 +68,16 @@ def main():
     rays, _ = read_safetensors(sys.argv[2])
     begin = rays["ray_begin"]
     worst = 0.0
-    for r in range(len(begin) - 1):
-        here = slice(int(begin[r]), int(begin[r + 1]))
-        x = rays["position"][here]
-        sigma, rgb = networks(x, rays["direction"][r].expand(len(x), 3))
-        depth = sigma * rays["delta"][here]
-        weight = torch.exp(depth - torch.cumsum(depth, 0)) * -torch.expm1(-depth)
-        rgba = torch.cat([weight @ rgb, weight.sum().reshape(1)])
-        worst = max(worst, float((rgba - rays["rgba"][r]).abs().max()))
+    for first in range(0, len(begin) - 1, RAYS_TOGETHER):
+        ends = begin[first:first + RAYS_TOGETHER + 1]
+        here, counts = slice(int(ends[0]), int(ends[-1])), ends[1:] - ends[:-1]
+        directions = rays["direction"][first:first + len(counts)]
+        sigma, rgb = networks(rays["position"][here], directions.repeat_interleave(counts, 0))
+        depths = (sigma * rays["delta"][here]).split(counts.tolist())
+        for r, (depth, colours) in enumerate(zip(depths, rgb.split(counts.tolist())), first):
+            weight = torch.exp(depth - torch.cumsum(depth, 0)) * -torch.expm1(-depth)
+            rgba = torch.cat([weight @ colours, weight.sum().reshape(1)])
+            worst = max(worst, float((rgba - rays["rgba"][r]).abs().max()))
     print(len(begin) - 1, worst)
 
 
