@@ -192,26 +192,20 @@ TEST_CASE("marching: skipping empty cells first changes no sample, for any numbe
 }
 
 TEST_CASE("marching: contracted walks stay where they are when empty cells are skipped") {
-  const OccupancyGrid grid = random_grid(64, 0.005, 7);
-  const auto u = uniform({20, 6}, -0.2, 0.2, 9);
-  std::vector<RayWalk> walks;
-  std::vector<Index> which;
-  for (Index i = 0; i < 20; ++i) {
-    const Line line = towards(u, i);
-    walks.push_back(RayWalk::contracted(line.o, line.d, 0.002f, 0.3f, 0));
-    which.push_back(i);
-  }
+  // Some 55,000 steps away, of the 65,536 that a walk has: one that was moved on as if it were straight would
+  // end before it gets there.
+  OccupancyGrid grid = random_grid(64, 0, 1);
+  std::vector<std::uint8_t> bits(static_cast<std::size_t>(grid.cells()), 0);
+  bits[static_cast<std::size_t>(grid.cell(51, 32, 32))] = 1;
+  grid.set_bits(bits);
+  const Line line{{0.25f, 0.51f, 0.51f}, {1, 0, 0}};
+  std::vector<RayWalk> walks{RayWalk::contracted(line.o, line.d, 1e-5f, 0.3f, 0)};
   std::vector<RayWalk> plain = walks;
-  RayWalk::skip_empty(grid, walks, which);
-  std::size_t samples = 0;
-  for (std::size_t i = 0; i < walks.size(); ++i) {
-    std::vector<float> got(400), want(400), x(1200);
-    got.resize(static_cast<std::size_t>(walks[i].next(grid, 400, got.data(), x.data())));
-    want.resize(static_cast<std::size_t>(plain[i].next(grid, 400, want.data(), x.data())));
-    CHECK(got == want);
-    samples += want.size();
-  }
-  CHECK(samples > 5);
+  RayWalk::skip_empty(grid, walks, std::vector<Index>{0});
+  std::vector<float> got(400), want(400), x(1200);
+  CHECK(walks[0].next(grid, 400, got.data(), x.data()) == 400);
+  CHECK(plain[0].next(grid, 400, want.data(), x.data()) == 400);
+  CHECK(got == want);
 }
 
 TEST_CASE("marching: nothing is sampled in an empty grid") {
