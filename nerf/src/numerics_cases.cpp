@@ -180,6 +180,7 @@ std::vector<NumericsCase> numerics_cases() {
   std::vector<NumericsCase> all;
   add_composite_numerics(all);
   add_importance_numerics(all);
+  add_space_numerics(all);
   for (const double far : {0.0, 1e2, 1e4, 1e6, 1e9}) {
     char name[80];
     std::snprintf(name, sizeof name, "frequency_encoding: 2^15 x at %g", far);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "small_field.h"
+#include "some_rays.h"
 #include "support/catch.h"
 #include "support/each_isa.h"
 
@@ -13,25 +14,6 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-struct Rays {
-  std::vector<float> origins, directions;
-  RayBatch batch() const { return {origins, directions, directions}; }
-};
-
-// Rays through the cube from all around.
-Rays some_rays(Index n) {
-  const auto u = uniform({n, 6}, -1, 1, 11);
-  Rays rays;
-  for (Index i = 0; i < n; ++i) {
-    const double norm = std::hypot(u[6 * i], u[6 * i + 1], u[6 * i + 2]);
-    for (Index a = 0; a < 3; ++a) {
-      rays.directions.push_back(static_cast<float>(u[6 * i + a] / norm));
-      rays.origins.push_back(static_cast<float>(0.5 + 0.2 * u[6 * i + 3 + a] - 2 * u[6 * i + a] / norm));
-    }
-  }
-  return rays;
-}
-
 // Networks with numbers large enough to matter.
 RadianceField small_mlp(double log_density) {
   RadianceField f(small_mlp_options());
@@ -79,7 +61,7 @@ std::vector<double> directions_of(const Rays& rays, const RaySamples& s) {
 TEST_CASE(
     "field_sampler: densities of an mlp field equal those in double within 1e-4, on each instruction set") {
   const RadianceField f = small_mlp(1);
-  const Rays rays = some_rays(40);
+  const Rays rays = some_rays(40, false);
   each_isa([&] {
     const RaySamples s = sample(f, rays, {.stop = 0, .points = {.average = 20, .importance = 12}});
     REQUIRE(s.size() == 40 * 32);
@@ -94,7 +76,7 @@ TEST_CASE(
 
 TEST_CASE("field_sampler: a ray of an mlp field ends with the sample that makes it opaque") {
   const RadianceField f = small_mlp(4);
-  const Rays rays = some_rays(60);
+  const Rays rays = some_rays(60, false);
   const RayPoints points{.average = 40, .importance = 24};
   const float stop = 0.01f;
   const RaySamples all = sample(f, rays, {.stop = 0, .points = points}),
@@ -121,7 +103,7 @@ TEST_CASE("field_sampler: a ray of an mlp field ends with the sample that makes 
 
 TEST_CASE("field_sampler: importance points of an mlp field come from the coarse network") {
   RadianceField f = small_mlp(2);
-  const Rays rays = some_rays(10);
+  const Rays rays = some_rays(10, false);
   const FieldSamplingOptions options{.stop = 0, .points = {.average = 8, .importance = 8}};
   const RaySamples before = sample(f, rays, options);
   for (const auto& e : f.params.entries())
@@ -136,7 +118,7 @@ TEST_CASE("field_sampler: importance points of an mlp field come from the coarse
 
 TEST_CASE("field_sampler: a picture of an mlp field is the quadrature in double, within 1e-4") {
   const RadianceField f = small_mlp(2);
-  const Rays rays = some_rays(150);  // three blocks
+  const Rays rays = some_rays(150, false);  // three blocks
   for (const RayPoints points : {RayPoints{.average = 32, .importance = 32},
                                  {.average = 64, .importance = 0},
                                  {.average = 0, .importance = 0, .random = 64}}) {
@@ -161,7 +143,7 @@ TEST_CASE("field_sampler: a picture of an mlp field is the quadrature in double,
 TEST_CASE(
     "field_sampler: a field with a table is marched, and buffers used by the other kind leave no trace") {
   const RadianceField hash = small_field(), mlp = small_mlp(1);
-  const Rays rays = some_rays(20);
+  const Rays rays = some_rays(20, false);
   FieldSampler sampler;
   RaySamples out, want;
   sampler.sample(mlp, rays.batch(), {}, {.stop = 0, .points = {.average = 4, .importance = 4}}, out);

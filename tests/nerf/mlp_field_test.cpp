@@ -1,9 +1,9 @@
-#include <fieldmark/engine/parallel.h>
 #include <fieldmark/nerf/field.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "field_threads.h"
 #include "support/expect_grad.h"
 #include "support/run_op.h"
 
@@ -175,17 +175,5 @@ TEST_CASE("mlp_field: the same bits for one and two threads") {
   ParamStore<float> store;
   const Field<float> field(store, kField, 1);
   randomise(store, 3);
-  std::vector<float> grads[2];
-  std::vector<std::vector<float>> results[2];
-  const int before = threads();
-  for (int n = 1; n <= 2; ++n) {
-    set_threads(n);
-    store.zero_grad();
-    results[n - 1] = run_op<float>([&](auto&, auto v) { return field(Params<float>(store), v[0], v[1]).rgb; },
-                                   {uniform<float>({3000, 3}, 0, 1, 4), uniform<float>({3000, 3}, -1, 1, 5)});
-    grads[n - 1].assign(store.grads().begin(), store.grads().end());
-  }
-  set_threads(before);
-  CHECK(results[0] == results[1]);
-  CHECK(grads[0] == grads[1]);
+  expect_same_for_threads(store, field);
 }

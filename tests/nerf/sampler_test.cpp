@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "small_field.h"
+#include "some_rays.h"
 #include "support/catch.h"
 #include "support/each_isa.h"
 
@@ -11,28 +12,6 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-struct Rays {
-  std::vector<float> origins, directions;
-  RayBatch batch() const { return {origins, directions, directions}; }
-};
-
-// Rays at the cube from all around; every seventh misses it.
-Rays some_rays(Index n) {
-  const auto u = uniform({n, 6}, -1, 1, 11);
-  Rays rays;
-  for (Index i = 0; i < n; ++i) {
-    const double far = i % 7 == 3 ? 9 : 0;
-    double norm = 0;
-    for (Index a = 0; a < 3; ++a) norm += u[6 * i + a] * u[6 * i + a];
-    for (Index a = 0; a < 3; ++a) {
-      const double direction = u[6 * i + a] / std::sqrt(norm);
-      rays.origins.push_back(static_cast<float>(0.5 + 0.2 * u[6 * i + 3 + a] - 2 * direction + far));
-      rays.directions.push_back(static_cast<float>(direction));
-    }
-  }
-  return rays;
-}
-
 RaySamples sample(const RadianceField& f, const Rays& rays, const SamplingOptions& options,
                   std::span<const float> jitter = {}) {
   RaySampler sampler;
