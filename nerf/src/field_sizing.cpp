@@ -77,23 +77,25 @@ class Sizing {
     RadianceField trial(field);
     Trainer trainer(trial, data_, short_run());
     while (!trainer.done()) trainer.step(0);
-    found_.trials.push_back(
-        {.what = what, .field = field, .parameters = trial.params.size(), .psnr = trainer.train_psnr()});
+    found_.trials.push_back({.what = what,
+                             .field = field,
+                             .parameters = trial.params.parameters(),
+                             .psnr = trainer.train_psnr()});
     return true;
   }
 
   void grow_table() {
     double best = -1;
-    for (int log2 = kFirstTable; log2 <= options_.most_log2_table;
-         log2 = log2 < options_.most_log2_table ? std::min(log2 + 2, options_.most_log2_table) : log2 + 1) {
+    for (int log2 = kFirstTable;; log2 += 2) {
+      const int rows = std::min(log2, options_.most_log2_table);
       RadianceFieldOptions next = found_.field;
-      next.field.encoding.log2_table = log2;
-      if (!attempt("table of 2^" + std::to_string(log2), next)) return;
+      next.field.encoding.log2_table = rows;
+      if (!attempt("table of 2^" + std::to_string(rows), next)) return;
       SizingTrial& trial = found_.trials.back();
       if (trial.psnr < best + options_.worth) return;
       best = trial.psnr;
       keep(trial);
-      if (best >= options_.enough) return;
+      if (best >= options_.enough || rows == options_.most_log2_table) return;
     }
   }
 
@@ -130,7 +132,7 @@ double pixel_resolution(const Dataset& data, const Space& space) {
     if (space.kind == SpaceKind::ndc)
       cells.push_back(v.camera.fx / space.slope_x);
     else if (space.kind == SpaceKind::contracted)
-      cells.push_back(2 * b.side / (b.side / 2) * v.camera.fx);
+      cells.push_back(4 * v.camera.fx);  // half a side of the inner cube away, of a cube of two sides
     else
       cells.push_back(b.side * v.camera.fx / norm(v.camera.position() - middle));
   }

@@ -181,10 +181,9 @@ void Trainer::backward_table() {
         d += encoding.levels() * n * entry;
       }
     }
-    const Index begin = table;
     adam_.extend_step(field_.params.values(), field_.params.grads(),
-                      {.begin = begin + encoding.first_row(level) * entry,
-                       .end = begin + encoding.first_row(level + 1) * entry,
+                      {.begin = table + encoding.first_row(level) * entry,
+                       .end = table + encoding.first_row(level + 1) * entry,
                        .lr_factor = schedule_.lr(steps_),
                        .skip_zero = true});
   });

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "field_threads.h"
+#include "plain_field.h"
 #include "support/expect_grad.h"
 #include "support/run_op.h"
 
@@ -17,12 +17,6 @@ constexpr FieldOptions kSmall{
     .width = 5,
     .geometry = 3};
 
-template <class T>
-void randomise(ParamStore<T>& store, unsigned seed) {
-  const auto random = uniform<T>({store.size()}, -1, 1, seed);
-  std::copy(random.data.begin(), random.data.end(), store.values().begin());
-}
-
 Tensor<double> unit_directions(Index n, unsigned seed) {
   auto d = uniform({n, 3}, -1, 1, seed);
   for (Index i = 0; i < n; ++i) {
@@ -30,18 +24,6 @@ Tensor<double> unit_directions(Index n, unsigned seed) {
     for (int a = 0; a < 3; ++a) d[3 * i + a] /= norm;
   }
   return d;
-}
-
-using Row = std::vector<double>;
-Row layer(const ParamStore<double>& store, const std::string& name, const Row& x, bool relu) {
-  const auto weight = store.values(store.find(name + "/weight")),
-             bias = store.values(store.find(name + "/bias"));
-  Row y(bias.begin(), bias.end());
-  for (std::size_t o = 0; o < y.size(); ++o) {
-    for (std::size_t i = 0; i < x.size(); ++i) y[o] += x[i] * weight[i * y.size() + o];
-    if (relu) y[o] = std::max(y[o], 0.0);
-  }
-  return y;
 }
 
 // sigma, red, green, blue at one position by plain loops over the named parameters.

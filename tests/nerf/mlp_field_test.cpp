@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "field_threads.h"
+#include "plain_field.h"
 #include "support/expect_grad.h"
 #include "support/run_op.h"
 
@@ -14,24 +14,6 @@ namespace {
 constexpr MlpFieldOptions kSmall{
     .layers = 3, .width = 6, .skip = 2, .position_bands = 3, .direction_bands = 2};
 constexpr FieldOptions kField{.kind = FieldKind::mlp, .mlp = kSmall};
-
-template <class T>
-void randomise(ParamStore<T>& store, unsigned seed) {
-  const auto random = uniform<T>({store.size()}, -1, 1, seed);
-  std::copy(random.data.begin(), random.data.end(), store.values().begin());
-}
-
-using Row = std::vector<double>;
-Row layer(const ParamStore<double>& store, const std::string& name, const Row& x, bool relu) {
-  const auto weight = store.values(store.find(name + "/weight")),
-             bias = store.values(store.find(name + "/bias"));
-  Row y(bias.begin(), bias.end());
-  for (std::size_t o = 0; o < y.size(); ++o) {
-    for (std::size_t i = 0; i < x.size(); ++i) y[o] += x[i] * weight[i * y.size() + o];
-    if (relu) y[o] = std::max(y[o], 0.0);
-  }
-  return y;
-}
 
 Row gamma(const Row& p, int bands) {
   Row y = p;

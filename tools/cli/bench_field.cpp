@@ -9,7 +9,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -18,6 +17,7 @@
 #include "cli/cli.h"
 #include "cli/context.h"
 #include "cli/long_run.h"
+#include "cli/scene_data.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -136,12 +136,7 @@ constexpr const char* kOccupancy =
 
 }  // namespace
 
-std::string lego_folder() {
-  const char* data = std::getenv("FIELDMARK_DATA");
-  if (!data) return "";
-  const auto folder = std::filesystem::path(data) / "nerf_synthetic" / "lego";
-  return std::filesystem::exists(folder) ? folder.string() : "";
-}
+std::string lego_folder() { return shared_data("nerf_synthetic/lego").string(); }
 
 void add_bench_field(CLI::App& app, BenchFieldOptions& o) {
   app.add_option("--field", o.field, "field: what is rendered (trained for --seconds)")

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -18,6 +17,7 @@
 #include "cli/context.h"
 #include "cli/perceptual.h"
 #include "cli/pictures.h"
+#include "cli/scene_data.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -90,9 +90,9 @@ int compare(const Options& options, const Networks& networks, Context& context) 
 
 std::filesystem::path reference_folder(const Options& options) {
   if (!options.paths.empty()) return options.paths[0];
-  const char* data = std::getenv("FIELDMARK_DATA");
-  if (!data || !*data) throw UsageError("--reference: needs a folder, or FIELDMARK_DATA");
-  return std::filesystem::path(data) / "lpips_reference";
+  const auto folder = shared_data("lpips_reference");
+  if (folder.empty()) throw UsageError("--reference: needs a folder, or FIELDMARK_DATA");
+  return folder;
 }
 
 Json read_reference(const std::filesystem::path& path) {

@@ -53,6 +53,7 @@ nerf::RadianceFieldOptions fitted(nerf::RadianceFieldOptions field, double max_m
 nerf::RadianceFieldOptions sized(const nerf::RadianceFieldOptions& start, const nerf::Dataset& data,
                                  Json& report, Context& context) {
   const InterruptGuard guard;
+  const double begun = context.seconds();
   nerf::FieldSizing sizing;
   {
     Progress progress = context.progress("sizing");
@@ -73,7 +74,12 @@ nerf::RadianceFieldOptions sized(const nerf::RadianceFieldOptions& start, const 
     trials.push_back({{"what", t.what}, {"parameters", t.parameters}, {"psnr", t.psnr}, {"taken", t.kept}});
   }
   const nerf::FieldOptions& f = sizing.field.field;
-  report = {{"pixels", sizing.pixels},
+  const double seconds = context.seconds() - begun;
+  char line[80];
+  std::snprintf(line, sizeof line, "  sized in %.1f s\n", seconds);
+  context.text() << line;
+  report = {{"seconds", seconds},
+            {"pixels", sizing.pixels},
             {"trials", trials},
             {"levels", f.encoding.levels},
             {"log2_table", f.encoding.log2_table},
@@ -223,7 +229,7 @@ Command add_train(CLI::App& app) {
       ->type_name("NAME");
   app.add_option("--model", o->model,
                  "fixed: the default sizes;\n"
-                 "sized: as large as the scene needs, found by short trainings of 15 s or so (hash only)")
+                 "sized: as large as the scene needs, found by short trainings (hash only)")
       ->check(CLI::IsMember({"fixed", "sized"}).description(""))
       ->type_name("NAME");
   add_run_length(app, o->length, true);

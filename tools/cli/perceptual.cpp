@@ -3,9 +3,10 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <ostream>
+
+#include "cli/scene_data.h"
 
 namespace fieldmark::cli {
 
@@ -22,10 +23,8 @@ std::optional<Lpips<float>> load_lpips(LpipsNetwork network, const std::string& 
   const std::string name = network == LpipsNetwork::alex ? "alex" : "squeeze";
   std::filesystem::path path = file;
   if (file.empty()) {
-    const char* data = std::getenv("FIELDMARK_DATA");
-    if (data && *data)
-      path = std::filesystem::path(data) / "weights" / ("lpips_" + name + "_v0.1.safetensors");
-    if (path.empty() || !std::filesystem::exists(path)) {
+    path = shared_data("weights/lpips_" + name + "_v0.1.safetensors");
+    if (path.empty()) {
       context.text() << "no LPIPS (" << name << "): no weights given, none in $FIELDMARK_DATA/weights\n";
       return std::nullopt;
     }

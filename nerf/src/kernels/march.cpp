@@ -60,8 +60,8 @@ constexpr int kBatch = 16;  // candidates judged together: the loops over them v
 
 }  // namespace
 
-// As empty_steps(), for all lanes at a time: one ray alone waits for each number in turn, some 80 cycles a
-// jump, and most rays of a picture do nothing but jump.
+// As empty_steps(), for all lanes at a time: one ray alone waits for each number in turn, and most rays of a
+// picture do nothing but jump.
 void march_to_blocks(const MarchGrid& g, MarchRays& rays) {
   MarchRays r = rays;
   const auto n = static_cast<float>(g.block_side);

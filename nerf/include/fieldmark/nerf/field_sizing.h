@@ -12,8 +12,8 @@ struct SizingOptions {
   Index steps = 256;              ///< of each short training, >= 64
   Index samples_per_step = 8192;  ///< of each short training, see TrainOptions
   double worth = 0.3;             ///< dB that a table of four times the rows must gain, > 0
-  /// dB that are enough in a short training: more than photographs give, and what ends above 40 dB in a whole
-  /// one.
+  /// dB that are enough in a short training: photographs give less, and the built-in sphere, which gives
+  /// more, ends above 40 dB in a whole one (docs/results/sizing.md).
   double enough = 34;
   int most_log2_table = 18;  ///< largest table that is tried, 9 to 24
   std::uint64_t seed = 0;    ///< of fields and trainings

@@ -2,11 +2,36 @@
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/nerf/field.h>
 
+#include <algorithm>
+#include <string>
 #include <vector>
 
 #include "support/catch.h"
 #include "support/random.h"
 #include "support/run_op.h"
+
+/// Every number of a store at random in [-1, 1).
+template <class T>
+void randomise(fieldmark::ParamStore<T>& store, unsigned seed) {
+  const auto random = uniform<T>({store.size()}, -1, 1, seed);
+  std::copy(random.data.begin(), random.data.end(), store.values().begin());
+}
+
+/// A row of numbers that passes through a network.
+using Row = std::vector<double>;
+
+/// What a named layer makes of a row, by plain loops.
+inline Row layer(const fieldmark::ParamStore<double>& store, const std::string& name, const Row& x,
+                 bool relu) {
+  const auto weight = store.values(store.find(name + "/weight")),
+             bias = store.values(store.find(name + "/bias"));
+  Row y(bias.begin(), bias.end());
+  for (std::size_t o = 0; o < y.size(); ++o) {
+    for (std::size_t i = 0; i < x.size(); ++i) y[o] += x[i] * weight[i * y.size() + o];
+    if (relu) y[o] = std::max(y[o], 0.0);
+  }
+  return y;
+}
 
 /// Colours and gradients of a field are the same bits for one and two threads. @param store  what `field` is
 /// in
