@@ -20,9 +20,14 @@ const Dataset& scene() {
   return data;
 }
 
-// Cells may be declared empty after 16 steps: short runs pass through everything a long one does.
+// Cells may be declared empty and steps grow after 16 steps: short runs pass through everything a long one
+// does.
 TrainOptions train_options(Index steps) {
-  return {.schedule = {.steps = steps}, .samples_per_step = 8192, .warm_up = 16};
+  return {.schedule = {.steps = steps},
+          .samples_per_step = 8192,
+          .first_samples = 2048,
+          .grow_after = 16,
+          .warm_up = 16};
 }
 
 // All that training left behind.
@@ -64,7 +69,9 @@ Outcome run_mlp(Index steps) {
 
 TEST_CASE("trainer: 100 steps on the built-in scene reach 19 dB") {
   RadianceField field(trainable_field_options());
-  Trainer trainer(field, scene(), train_options(100));
+  TrainOptions options = train_options(100);
+  options.first_samples = options.samples_per_step;
+  Trainer trainer(field, scene(), options);
   trainer.step(0);
   const double start = trainer.train_psnr();
   while (!trainer.done()) trainer.step(0);
@@ -216,12 +223,43 @@ TEST_CASE("trainer: a checkpoint of another run is refused, with both runs named
   CHECK_THROWS_AS(trainer.restore(folder / "missing"), IoError);
 }
 
+TEST_CASE("trainer: hashed levels take turns while steps are small, and the last step leaves no gradient") {
+  RadianceField field(trainable_field_options());
+  const HashEncoding<float>& encoding = field.field.encoding();
+  const Index entry = 2 * encoding.features();
+  Trainer trainer(field, scene(), train_options(40));
+  // Which levels still hold gradients after each step.
+  const auto waits = [&](int level) {
+    const auto grads = field.params.grads(encoding.table());
+    const auto rows = grads.subspan(
+        static_cast<std::size_t>(encoding.first_row(level) * entry),
+        static_cast<std::size_t>((encoding.first_row(level + 1) - encoding.first_row(level)) * entry));
+    return std::ranges::any_of(rows, [](float g) { return g != 0; });
+  };
+  int hashed = 0;
+  for (int step = 0; step < 8; ++step) {
+    trainer.step(0);
+    for (int level = 0; level < encoding.levels(); ++level) {
+      CAPTURE(step, level);
+      if (encoding.mask(level) != 0) ++hashed;
+      CHECK(waits(level) == (encoding.mask(level) != 0 && (step + level) % 4 != 0));  // 8192 / 2048
+    }
+  }
+  CHECK(hashed > 0);
+  while (!trainer.done()) trainer.step(0);
+  for (int level = 0; level < encoding.levels(); ++level) CHECK_FALSE(waits(level));
+}
+
 TEST_CASE("trainer: errors name option and value") {
   RadianceField field(trainable_field_options());
   TrainOptions options = train_options(1);
   options.samples_per_step = 10;
   CHECK_THROWS_WITH(Trainer(field, scene(), options),
                     "[trainer] samples_per_step must be at least 1024, got 10");
+  CHECK_THROWS_WITH(Trainer(field, scene(), {.first_samples = 10}),
+                    "[trainer] first_samples must be at least 1024, got 10");
+  CHECK_THROWS_WITH(Trainer(field, scene(), {.grow_after = 0}),
+                    "[trainer] grow_after must be positive, got 0.000000");
   CHECK_THROWS_WITH(Trainer(field, scene(), {.stop = 1}), "[trainer] stop must be in [0, 1), got 1.000000");
   CHECK_THROWS_WITH(Trainer(field, Dataset{}, train_options(1)),
                     "[trainer] data must have at least one view");

@@ -155,7 +155,9 @@ TEST_CASE(
   const Dataset data = make_scene({.size = 48, .views = 12});
   for_threads([&] {
     RadianceField field(trainable_field_options());
-    Trainer trainer(field, data, {.schedule = {.steps = 140}, .samples_per_step = 8192, .warm_up = 16});
+    Trainer trainer(
+        field, data,
+        {.schedule = {.steps = 140}, .samples_per_step = 8192, .first_samples = 8192, .warm_up = 16});
     // Cells are found empty at steps 16, 32 and 48: rays have fewer samples from then on, so a step takes
     // more of them, and the last shards are used for the first time. The last buffer grows at step 55.
     for (int i = 0; i < 80; ++i) trainer.step(0);
