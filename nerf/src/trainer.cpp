@@ -39,8 +39,10 @@ Index pick(float u, float v, Index n) {
 
 TrainOptions train_options(FieldKind kind) {
   TrainOptions options;
-  if (kind == FieldKind::mlp)
+  if (kind == FieldKind::mlp) {
     options.schedule = {.lr = 5e-4, .half_after = 1e9, .cooldown = 0.9, .last = 0.1};
+    options.samples_per_step = 6144;
+  }
   return options;
 }
 

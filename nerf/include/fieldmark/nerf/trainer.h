@@ -32,7 +32,9 @@ struct TrainOptions {
 };
 
 /// What suits a kind of field. mlp: Adam with 5e-4, falling exponentially over the last nine tenths of the
-/// run to a tenth, see ScheduleOptions.
+/// run to a tenth, see ScheduleOptions; 64 rays a step at the default 96 samples each. After 2.0 million
+/// samples of lego at 100 x 100 pixels, five val views: 64 rays a step 18.7 dB, 128 rays 18.3 dB; with 1e-3
+/// 19.1 and 18.6 dB, and 18.1 dB with 256 rays. 2e-3 does not leave the empty picture at 128.
 TrainOptions train_options(FieldKind kind);
 
 /// Trains a radiance field on photographs (Mildenhall et al. 2020, sec. 5; Mueller et al. 2022): random rays
