@@ -1,5 +1,6 @@
 #include <fieldmark/nerf/camera.h>
 #include <fieldmark/nerf/composite.h>
+#include <fieldmark/nerf/distortion_loss.h>
 #include <fieldmark/nerf/field.h>
 #include <fieldmark/nerf/frequency_encoding.h>
 #include <fieldmark/nerf/gradcheck_cases.h>
@@ -74,6 +75,16 @@ GradcheckReport check_composite() {
       in);
 }
 
+GradcheckReport check_distortion_loss() {
+  const std::vector<Index> ray_begin{0, 3, 3, 8};
+  const auto delta = numbers({8}, 0.05, 1, 3);
+  const std::vector<double> middle{0.1, 0.2, 1, 0, 0.5, 0.75, 2, 4};
+  const std::vector<Tensor<double>> in{numbers({8}, 0, 4, 1)};
+  return gradcheck(
+      [&](Tape<double>&, auto v) { return distortion_loss<double>(v[0], delta.data, middle, ray_begin); },
+      in);
+}
+
 GradcheckReport check_photometric_loss(double huber, double least) {
   const auto photograph = numbers({6, 4}, 0, 1, 2), background = numbers({6, 3}, 0, 1, 3);
   const std::vector<Tensor<double>> in{numbers({6, 4}, least, least + 1, 1)};
@@ -126,6 +137,7 @@ std::vector<GradcheckCase> gradcheck_cases() {
   using Part = HashEncoding<double>::Part;
   return {
       {"composite", check_composite},
+      {"distortion_loss", check_distortion_loss},
       {"field density", [] { return check_field(false); }},
       {"field colour", [] { return check_field(true); }},
       {"frequency_encoding", check_frequency_encoding},

@@ -1,5 +1,7 @@
+#include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/nerf/composite.h>
+#include <fieldmark/nerf/distortion_loss.h>
 #include <fieldmark/nerf/photometric_loss.h>
 #include <fieldmark/nerf/scene_space.h>
 #include <fieldmark/nerf/trainer.h>
@@ -29,10 +31,18 @@ AdamOptions adam_options(const RadianceField& field) {
   return {.lr = 1, .zero_grads = true};
 }
 
-// One of n things, from two uniform numbers: one has 24 bits only.
-Index pick(float u, float v, Index n) {
-  const double x = (static_cast<double>(u) + static_cast<double>(v) * 0x1.0p-24) * static_cast<double>(n);
-  return std::min(static_cast<Index>(x), n - 1);
+// Places of samples along their rays, from the positions of both ends of each way between them.
+void fill_middles(const RaySamples& s, float* middle) {
+  for (std::size_t r = 0; r + 1 < s.ray_begin.size(); ++r) {
+    float way = 0;
+    for (Index i = s.ray_begin[r]; i < s.ray_begin[r + 1]; ++i) {
+      if (i > s.ray_begin[r]) {
+        const float *a = &s.position[at(3 * i - 3)], *b = &s.position[at(3 * i)];
+        way += std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
+      }
+      middle[i] = way;
+    }
+  }
 }
 
 }  // namespace
@@ -54,6 +64,7 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
       pixel_rng_(options.seed, 1),
       background_rng_(options.seed, 2),
       occupancy_rng_(options.seed, 3),
+      second_rng_(options.seed, 4),
       packed_(field.params, {.precision = options.precision}),
       loop_(field.coarse ? kMlpShards : kShards,
             field.coarse ? field.params.size() : field.field.network_size()),
@@ -70,11 +81,17 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
     throw ValueError("[trainer] grow_after must be positive, got " + std::to_string(options.grow_after));
   if (!(options.stop >= 0 && options.stop < 1))
     throw ValueError("[trainer] stop must be in [0, 1), got " + std::to_string(options.stop));
+  if (!(options.distortion >= 0 && std::isfinite(options.distortion)))
+    throw ValueError("[trainer] distortion must be at least 0, got " + std::to_string(options.distortion));
+  if (!(options.hard_pixels >= 0 && options.hard_pixels <= 1))
+    throw ValueError("[trainer] hard_pixels must be in [0, 1], got " + std::to_string(options.hard_pixels));
   if (data.views.empty()) throw ValueError("[trainer] data must have at least one view");
   field_.background = data.background;
   field_.cameras = camera_span(data);
   lay_out_space();
   if (field.coarse) rays_per_step_ = mlp_rays();
+  // As if every tile were at its worst, so that what was never seen is preferred.
+  if (options.hard_pixels > 0 && !field.coarse) tile_errors_.assign(at(tile_of(all_pixels() - 1) + 1), 1.f);
   for (Shard& s : shards_) s.samples.reserve(at(kMostRays / kRays / kShards + 1));
 }
 
@@ -104,38 +121,6 @@ void Trainer::carve() {
   pixels_ = training_pixels(data_.views, hull_margin(data_.views, field_.space.bounds, n));
 }
 
-void Trainer::choose_rays(Index first, Index count, Shard& c) const {
-  const auto step = static_cast<std::uint64_t>(steps_);
-  c.rays.resize(count);
-  for (auto [buffer, columns] : {std::pair{&c.jitter, 1}, {&c.photograph, 4}, {&c.background, 3}})
-    buffer->resize(at(count * columns));
-  const Index width = data_.views[0].camera.width, size = width * data_.views[0].camera.height;
-  // Where a pixel lies in memory is random: all are asked for before the first is used, and so are the places
-  // of those that are listed.
-  const Index choices =
-      pixels_.empty() ? size * static_cast<Index>(data_.views.size()) : static_cast<Index>(pixels_.size());
-  std::array<Index, kRays> place;
-  for (Index i = 0; i < count; ++i) {
-    const auto u = pixel_rng_.uniform4(step, static_cast<std::uint64_t>(first + i));
-    c.jitter[at(i)] = u[2];
-    place[at(i)] = pick(u[0], u[1], choices);
-    if (!pixels_.empty()) __builtin_prefetch(&pixels_[at(place[at(i)])]);
-  }
-  for (Index i = 0; i < count; ++i) {
-    if (!pixels_.empty()) place[at(i)] = pixels_[at(place[at(i)])];
-    __builtin_prefetch(data_.views[at(place[at(i)] / size)].rgba.data.data() + 4 * (place[at(i)] % size));
-  }
-  for (Index i = 0; i < count; ++i) {
-    const View& view = data_.views[at(place[at(i)] / size)];
-    const Index pixel = place[at(i)] % size, column = pixel % width, row = pixel / width;
-    const float xy[2] = {static_cast<float>(column), static_cast<float>(row)};
-    c.rays.set(field_.space, i, view.camera, xy);
-    std::copy_n(view.rgba.data.data() + 4 * pixel, 4, &c.photograph[at(4 * i)]);
-    const auto b = background_rng_.uniform4(step, static_cast<std::uint64_t>(first + i));
-    std::copy_n(b.data(), 3, &c.background[at(3 * i)]);
-  }
-}
-
 double Trainer::run_chunk(Index index, Shard& shard, Tape<float>& tape, float* grads) {
   choose_rays(index * kRays, kRays, shard);
   RaySamples& s = shard.found;
@@ -161,12 +146,21 @@ double Trainer::run_chunk(Index index, Shard& shard, Tape<float>& tape, float* g
   const Var<float> z = field_.field.geometry(params, density_features);
   const Var<float> rgb =
       field_.field.colour(params, z, colour_features, tape.constant(harmonics, {n, encoded}));
-  const Var<float> rays = composite(field_.field.density(z), rgb, tape.constant(delta, {n}), s.ray_begin);
+  const Var<float> sigma = field_.field.density(z);
+  const Var<float> rays = composite(sigma, rgb, tape.constant(delta, {n}), s.ray_begin);
   const double share = static_cast<double>(kRays) / static_cast<double>(rays_per_step_);
   const Var<float> loss = photometric_loss<float>(rays, shard.photograph, shard.background,
                                                   {.huber = options_.huber, .scale = share});
   const double value = static_cast<double>(loss.value()[0]);
-  tape.backward(loss);
+  if (!tile_errors_.empty()) note_errors(rays, shard);
+  if (options_.distortion > 0) {
+    float* middle = tape.scratch(n);
+    fill_middles(s, middle);
+    tape.backward(add(loss, distortion_loss<float>(sigma, {delta, at(n)}, {middle, at(n)}, s.ray_begin,
+                                                   options_.distortion * share)));
+  } else {
+    tape.backward(loss);
+  }
   field_.field.encoding().deal_to_levels(n, density_features.grad(), colour_features.grad(),
                                          shard.dfeatures.append(2 * n * width));
   return value;
@@ -237,6 +231,10 @@ double Trainer::step_hash() {
   adam_.step(field_.params.values(), field_.params.grads(), std::span(&networks, 1));
   backward_table();
 
+  for (const Shard& s : shards_)
+    for (const auto& [tile, error] : s.errors)
+      tile_errors_[at(tile)] = 0.5f * (tile_errors_[at(tile)] + error);
+
   // The next step's rays: as many as have the wanted number of samples, changing by at most a half.
   Index samples = 0;
   for (const Shard& s : shards_) samples = std::accumulate(s.samples.begin(), s.samples.end(), samples);
@@ -286,11 +284,13 @@ std::string Trainer::fingerprint() const {
          std::to_string(data_.views.front().camera.height) + " seed " + std::to_string(options_.seed) +
          " steps " + std::to_string(schedule.steps) + " samples " +
          std::to_string(options_.samples_per_step) + " from " + std::to_string(options_.first_samples) +
-         " after " + std::to_string(options_.grow_after) + " huber " + std::to_string(options_.huber) +
-         " stop " + std::to_string(options_.stop) + " warm-up " + std::to_string(options_.warm_up) + " lr " +
-         std::to_string(schedule.lr) + " half after " + std::to_string(schedule.half_after) + " cooldown " +
-         std::to_string(schedule.cooldown) + " last " + std::to_string(schedule.last) +
-         (options_.precision == Precision::bf16 ? " bf16" : "") + (options_.carve ? "" : " not carved");
+         " after " + std::to_string(options_.grow_after) + " distortion " +
+         std::to_string(options_.distortion) + " hard pixels " + std::to_string(options_.hard_pixels) +
+         " huber " + std::to_string(options_.huber) + " stop " + std::to_string(options_.stop) + " warm-up " +
+         std::to_string(options_.warm_up) + " lr " + std::to_string(schedule.lr) + " half after " +
+         std::to_string(schedule.half_after) + " cooldown " + std::to_string(schedule.cooldown) + " last " +
+         std::to_string(schedule.last) + (options_.precision == Precision::bf16 ? " bf16" : "") +
+         (options_.carve ? "" : " not carved");
 }
 
 void Trainer::save(const std::filesystem::path& path) const {
@@ -302,6 +302,7 @@ void Trainer::save(const std::filesystem::path& path) const {
   file.add("mean", {n}, adam_.mean());
   file.add("mean_square", {n}, adam_.mean_square());
   if (!field_.coarse) file.add("gradients", {n}, field_.params.grads());  // of levels that wait
+  if (!tile_errors_.empty()) file.add("tile_errors", {static_cast<Index>(tile_errors_.size())}, tile_errors_);
   file.add("densities", {field_.grid.cells()}, field_.grid.densities());
   file.add("bits", {field_.grid.cells()}, field_.grid.bits());
   const std::int64_t counts[] = {steps_, rays_per_step_, schedule_.total()};
@@ -328,6 +329,7 @@ void Trainer::restore(const std::filesystem::path& path) {
   copy("mean", adam_.mean());
   copy("mean_square", adam_.mean_square());
   if (!field_.coarse) copy("gradients", field_.params.grads());
+  if (!tile_errors_.empty()) copy("tile_errors", tile_errors_);
   field_.grid.restore(file.f32("densities").data, file.u8("bits"));
   const auto counts = file.i64("counts");
   const auto sums = file.f64("sums").data;

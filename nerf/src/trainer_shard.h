@@ -28,9 +28,12 @@ struct Trainer::Shard {
   // Of all chunks of a step, in their order; gradients of the features level by level in each.
   std::vector<Index> samples;
   Buffer position, dfeatures;
+  std::vector<Index> places;                    // of the pixels of a chunk's rays in all photographs
+  std::vector<std::pair<Index, float>> errors;  // of the rays of all chunks: tile and mean square
 
   void begin_step() {
     samples.clear();
+    errors.clear();
     position.used = dfeatures.used = 0;
   }
 };

@@ -27,6 +27,7 @@ TrainOptions train_options(Index steps) {
           .samples_per_step = 8192,
           .first_samples = 2048,
           .grow_after = 16,
+          .distortion = 1e-3,
           .warm_up = 16};
 }
 
@@ -71,6 +72,7 @@ TEST_CASE("trainer: 100 steps on the built-in scene reach 19 dB") {
   RadianceField field(trainable_field_options());
   TrainOptions options = train_options(100);
   options.first_samples = options.samples_per_step;
+  options.hard_pixels = 0;  // the loss is of rays drawn evenly then
   Trainer trainer(field, scene(), options);
   trainer.step(0);
   const double start = trainer.train_psnr();
@@ -250,6 +252,46 @@ TEST_CASE("trainer: hashed levels take turns while steps are small, and the last
   for (int level = 0; level < encoding.levels(); ++level) CHECK_FALSE(waits(level));
 }
 
+TEST_CASE("trainer: hard pixels are sought where the error is, and change nothing when switched off") {
+  // A scene that is learnt within the run, but for a patch of noise that differs between photographs.
+  Dataset data = make_scene({.kind = SceneKind::sphere, .size = 48, .views = 8});
+  const CounterRng rng(1);
+  for (std::size_t v = 0; v < data.views.size(); ++v)
+    for (Index p = 0; p < 48 * 48; ++p)
+      if (p % 48 >= 20 && p % 48 < 28 && p / 48 >= 20 && p / 48 < 28)
+        for (Index k = 0; k < 3; ++k)
+          data.views[v].rgba[4 * p + k] =
+              rng.uniform4(v, static_cast<std::uint64_t>(p))[static_cast<std::size_t>(k)];
+  const auto psnr = [&](double share) {
+    RadianceField field(trainable_field_options());
+    TrainOptions options = train_options(150);
+    options.hard_pixels = share;
+    Trainer trainer(field, data, options);
+    while (!trainer.done()) trainer.step(0);
+    return trainer.train_psnr();
+  };
+  const double even = psnr(0), half = psnr(0.5), all = psnr(1);
+  CAPTURE(even, half, all);
+  // The rays chosen are harder: more of them meet the noise.
+  CHECK(half < even - 0.5);
+  CHECK(all < half - 0.5);
+}
+
+TEST_CASE("trainer: the distortion loss leaves less fog") {
+  const auto occupied = [](double weight) {
+    RadianceField field(trainable_field_options());
+    TrainOptions options = train_options(120);
+    options.distortion = weight;
+    options.carve = false;
+    Trainer trainer(field, scene(), options);
+    while (!trainer.done()) trainer.step(0);
+    return field.grid.occupied_cells();
+  };
+  const Index without = occupied(0), with = occupied(0.1);
+  CAPTURE(without, with);
+  CHECK(static_cast<double>(with) < 0.9 * static_cast<double>(without));
+}
+
 TEST_CASE("trainer: errors name option and value") {
   RadianceField field(trainable_field_options());
   TrainOptions options = train_options(1);
@@ -258,6 +300,10 @@ TEST_CASE("trainer: errors name option and value") {
                     "[trainer] samples_per_step must be at least 1024, got 10");
   CHECK_THROWS_WITH(Trainer(field, scene(), {.first_samples = 10}),
                     "[trainer] first_samples must be at least 1024, got 10");
+  CHECK_THROWS_WITH(Trainer(field, scene(), {.distortion = -1}),
+                    "[trainer] distortion must be at least 0, got -1.000000");
+  CHECK_THROWS_WITH(Trainer(field, scene(), {.hard_pixels = 2}),
+                    "[trainer] hard_pixels must be in [0, 1], got 2.000000");
   CHECK_THROWS_WITH(Trainer(field, scene(), {.grow_after = 0}),
                     "[trainer] grow_after must be positive, got 0.000000");
   CHECK_THROWS_WITH(Trainer(field, scene(), {.stop = 1}), "[trainer] stop must be in [0, 1), got 1.000000");

@@ -30,12 +30,6 @@ struct Subject {
   std::string name;
 };
 
-nerf::Dataset split_of(const std::string& folder, const std::string& split, bool quick) {
-  if (!folder.empty()) return nerf::load_dataset(folder, {.split = split});
-  const Index part = quick ? 8 : 1;
-  return nerf::make_scene({.size = kSceneSize / part, .views = kSceneViews / part}, split);
-}
-
 std::unique_ptr<nerf::RadianceField> trained(const nerf::Dataset& data, const BenchFieldOptions& options,
                                              Context& context) {
   auto field = std::make_unique<nerf::RadianceField>(nerf::RadianceFieldOptions{.seed = context.seed()});
@@ -66,13 +60,13 @@ Subject subject_of(const BenchFieldOptions& options, Context& context) {
       return subject;
     }
   }
-  const nerf::Dataset test = split_of(folder, "test", options.quick);
+  const nerf::Dataset test = bench_split(folder, "test", options.quick);
   const auto all = static_cast<Index>(test.views.size()), count = std::min(options.views, all);
   for (Index i = 0; i < count; ++i)
     subject.cameras.push_back(
         test.views[static_cast<std::size_t>(i * all / count)].camera.scaled(options.size));
   if (!stored) {
-    const nerf::Dataset data = split_of(folder, "train", options.quick);
+    const nerf::Dataset data = bench_split(folder, "train", options.quick);
     subject.field = trained(data, options, context);
     subject.name = data.name;
   }
@@ -136,6 +130,12 @@ constexpr const char* kOccupancy =
 
 }  // namespace
 
+nerf::Dataset bench_split(const std::string& folder, const std::string& split, bool quick) {
+  if (!folder.empty()) return nerf::load_dataset(folder, {.split = split});
+  const Index part = quick ? 8 : 1;
+  return nerf::make_scene({.size = kSceneSize / part, .views = kSceneViews / part}, split);
+}
+
 std::string lego_folder() { return shared_data("nerf_synthetic/lego").string(); }
 
 void add_bench_field(CLI::App& app, BenchFieldOptions& o) {
@@ -148,10 +148,12 @@ void add_bench_field(CLI::App& app, BenchFieldOptions& o) {
   app.add_option("--views", o.views, "field: how many, 1 to 1000")
       ->check(CLI::Range(1, 1000).description(""))
       ->type_name("N");
-  app.add_option("--seconds", o.seconds, "field: of training, without --field, 0.1 to 86400")
+  app.add_option("--seconds", o.seconds,
+                 "field: of training, without --field; training: of each training; 0.1 to 86400")
       ->check(CLI::Range(0.1, 86400.0).description(""))
       ->type_name("S");
-  app.add_flag("--quick", o.quick, "field: only the default and one setting of each kind");
+  app.add_flag("--quick", o.quick,
+               "field: only the default and one setting of each kind; training: only three rows");
 }
 
 int bench_field(const BenchFieldOptions& options, Context& context) {

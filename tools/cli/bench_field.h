@@ -1,5 +1,5 @@
 #pragma once
-#include <fieldmark/engine/shape.h>
+#include <fieldmark/nerf/dataset.h>
 
 #include <string>
 
@@ -11,7 +11,7 @@ namespace fieldmark::cli {
 
 class Context;
 
-/// Of `bench field`.
+/// Of `bench field` and `bench training`.
 struct BenchFieldOptions {
   std::string field;  ///< file; empty: trained for `seconds`
   std::string
@@ -27,6 +27,9 @@ void add_bench_field(CLI::App& app, BenchFieldOptions& options);
 
 /// lego of FIELDMARK_DATA, or empty where there is none.
 std::string lego_folder();
+
+/// A split of a data set, or of the built-in scene where no folder is given; `quick` makes that one small.
+nerf::Dataset bench_split(const std::string& folder, const std::string& split, bool quick);
 
 /// Renders a field in many ways, and prints speed against error.
 int bench_field(const BenchFieldOptions& options, Context& context);

@@ -14,6 +14,7 @@
 #include <ostream>
 
 #include "cli/bench_field.h"
+#include "cli/bench_training.h"
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
@@ -189,6 +190,7 @@ Json precision(const Options& options, const Scene& scene, Context& context) {
 
 int run(Options options, Context& context) {
   if (options.what == "field") return bench_field(options.field, context);
+  if (options.what == "training") return bench_training(options.field, context);
   options.engine.runs = options.field.runs;
   if (!options.field.plot.empty()) check_writable(options.field.plot);
   const Scene scene = scene_of(options);
@@ -218,9 +220,10 @@ Command add_bench(CLI::App& app) {
   auto o = std::make_shared<Options>();
   app.add_option("what", o->what,
                  "engine: kernels and training steps, against this machine's peak;\n"
-                 "field: rendering in many ways, speed against error")
+                 "field: rendering in many ways, speed against error;\n"
+                 "training: every choice of training switched off and on, for --seconds each")
       ->required()
-      ->check(CLI::IsMember({"engine", "field"}).description(""))
+      ->check(CLI::IsMember({"engine", "field", "training"}).description(""))
       ->type_name("WHAT");
   app.add_option("--runs", o->field.runs, "Runs of each row, whose median counts, 1 to 1000")
       ->check(CLI::Range(1, 1000).description(""))
@@ -234,7 +237,8 @@ Command add_bench(CLI::App& app) {
       ->default_str("all");
   app.add_option(
          "--scene", o->field.scene,
-         "Data set that nerf_step, --precision and field train on, and whose test views field renders")
+         "Data set that nerf_step, --precision, field and training train on, whose test views field renders, "
+         "and whose val views judge training")
       ->type_name("DIR")
       ->default_str("lego of FIELDMARK_DATA, else the built-in scene");
   app.add_flag(

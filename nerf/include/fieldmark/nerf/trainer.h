@@ -21,7 +21,13 @@ struct TrainOptions {
   double huber = 0.1;        ///< see PhotometricLossOptions
   float stop = 1e-2f;  ///< a ray ends where its transmittance falls below this, in [0, 1): what lies deeper
                        ///< than 1e-2 is worth less than the rays that its samples would cost
-  Index warm_up = 32;  ///< steps before cells may be declared empty
+  /// Weight of distortion_loss() beside photometric_loss(), in sides of the scene's cube, >= 0: thins the fog
+  /// that photographs alone leave where they say little. Of hash fields.
+  double distortion = 0;
+  /// Share of the rays, 0 to 1, that are the harder of two: those whose tile of 8 x 8 pixels was last seen
+  /// with the larger error. Of hash fields.
+  double hard_pixels = 0.75;
+  Index warm_up = 32;      ///< steps before cells may be declared empty
   std::uint64_t seed = 0;  ///< of the choice of rays, backgrounds and occupancy samples
   /// bf16 rounds what the networks multiply, forward and in dX; weights, their gradients and the table stay
   /// float. Needs bf16_units(). No faster for networks as narrow as these.
@@ -63,7 +69,8 @@ class Trainer {
   Index steps() const { return steps_; }
   /// Steps that the run will have in all; 0 until a timed run knows.
   Index planned() const { return schedule_.total(); }
-  /// Mean loss of the last steps over whole photographs, as the PSNR of the same mean square.
+  /// Mean loss of the last steps over whole photographs, as the PSNR of the same mean square; of the rays
+  /// chosen, which hard_pixels makes harder than the rest.
   double train_psnr() const;
   /// Samples that passed through the networks so far.
   double samples() const { return samples_; }
@@ -77,7 +84,11 @@ class Trainer {
   struct Shard;
   void lay_out_space();
   void carve();
+  Index all_pixels() const;
+  Index tile_of(Index place) const;
+  void prefer_hard(Index first, Index count, std::span<Index> place) const;
   void choose_rays(Index first, Index count, Shard& shard) const;
+  void note_errors(Var<float> rays, Shard& shard) const;
   double step_hash();
   double run_chunk(Index index, Shard& shard, Tape<float>& tape, float* grads);
   Index mlp_rays() const;
@@ -93,11 +104,12 @@ class Trainer {
   const Dataset& data_;
   TrainOptions options_;
   Schedule schedule_;
-  CounterRng pixel_rng_, background_rng_, occupancy_rng_;
+  CounterRng pixel_rng_, background_rng_, occupancy_rng_, second_rng_;
   PackedWeights<float> packed_;
   ShardedLoop<float> loop_;
   Adam<float> adam_;
   std::vector<std::uint32_t> pixels_;  // worth a ray; empty: all are
+  std::vector<float> tile_errors_;     // mean squares last seen, of tiles of all photographs; see hard_pixels
   std::vector<Shard> shards_;
   Index steps_ = 0, rays_per_step_;
   double samples_ = 0, smoothed_loss_ = -1;

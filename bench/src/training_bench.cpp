@@ -1,0 +1,73 @@
+#include <fieldmark/bench/training_bench.h>
+#include <fieldmark/nerf/evaluation.h>
+#include <fieldmark/nerf/renderer.h>
+
+#include <chrono>
+#include <limits>
+
+namespace fieldmark::bench {
+
+std::vector<TrainingVariant> training_variants(const nerf::ScheduleOptions& schedule, std::uint64_t seed) {
+  TrainingVariant base{"default", "as trained", {.seed = seed}, {.schedule = schedule, .seed = seed}};
+  std::vector<TrainingVariant> all{base};
+  const auto vary = [&](const char* choice, const char* setting, auto change) {
+    TrainingVariant v = base;
+    v.choice = choice;
+    v.setting = setting;
+    change(v);
+    all.push_back(std::move(v));
+  };
+  vary("batch", "24576 samples from the first step on",
+       [](TrainingVariant& v) { v.train.first_samples = v.train.samples_per_step; });
+  vary("batch", "6144 samples to the end, every level stepped each time",
+       [](TrainingVariant& v) { v.train.samples_per_step = v.train.first_samples; });
+  vary("batch", "3072 samples at first", [](TrainingVariant& v) { v.train.first_samples = 3072; });
+  vary("learning rate", "no last part that falls", [](TrainingVariant& v) { v.train.schedule.last = 1; });
+  vary("learning rate", "no decay before the last part",
+       [](TrainingVariant& v) { v.train.schedule.half_after = 1e12; });
+  vary("learning rate", "half", [](TrainingVariant& v) { v.train.schedule.lr /= 2; });
+  vary("hard pixels", "off", [](TrainingVariant& v) { v.train.hard_pixels = 0; });
+  vary("hard pixels", "every ray", [](TrainingVariant& v) { v.train.hard_pixels = 1; });
+  vary("distortion loss", "weight 1e-3", [](TrainingVariant& v) { v.train.distortion = 1e-3; });
+  vary("distortion loss", "weight 1e-2", [](TrainingVariant& v) { v.train.distortion = 1e-2; });
+  vary("loss", "plain square",
+       [](TrainingVariant& v) { v.train.huber = std::numeric_limits<double>::infinity(); });
+  vary("early stop", "rays end at a transmittance of 1e-4", [](TrainingVariant& v) { v.train.stop = 1e-4f; });
+  vary("silhouettes", "not used", [](TrainingVariant& v) { v.train.carve = false; });
+  vary("model", "table of 2^16", [](TrainingVariant& v) { v.field.field.encoding.log2_table = 16; });
+  vary("model", "networks of 64", [](TrainingVariant& v) { v.field.field.width = 64; });
+  return all;
+}
+
+std::vector<TrainingRow> run_training_bench(const nerf::Dataset& train, const nerf::Dataset& judge,
+                                            const std::vector<TrainingVariant>& variants,
+                                            const std::function<void(const std::string&, double)>& progress) {
+  std::vector<TrainingRow> rows;
+  for (const TrainingVariant& v : variants) {
+    const auto stop_or_go = [&] {
+      if (progress)
+        progress(v.choice + ": " + v.setting,
+                 static_cast<double>(rows.size()) / static_cast<double>(variants.size()));
+    };
+    const auto begin = std::chrono::steady_clock::now();
+    const auto seconds = [&] {
+      return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    };
+    nerf::RadianceField field(v.field);
+    nerf::Trainer trainer(field, train, v.train);
+    while (!trainer.done()) {
+      if (trainer.steps() % 64 == 0) stop_or_go();
+      trainer.step(seconds());
+    }
+    TrainingRow row{
+        .variant = v, .steps = trainer.steps(), .samples = trainer.samples(), .seconds = seconds()};
+    nerf::Renderer renderer(field);
+    const nerf::Evaluation judged = nerf::evaluate(renderer, judge);
+    row.psnr = judged.psnr;
+    row.seconds_per_view = judged.seconds_per_view;
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+}  // namespace fieldmark::bench
