@@ -11,10 +11,10 @@ namespace fieldmark::bench {
 
 /// One choice of how a hash field is trained, all else being as by default.
 struct TrainingVariant {
-  std::string choice;   ///< what is chosen: "batch", "learning rate", ...
-  std::string setting;  ///< how
-  nerf::RadianceFieldOptions field;
-  nerf::TrainOptions train;
+  std::string choice;                ///< what is chosen: "batch", "learning rate", ...
+  std::string setting;               ///< how
+  nerf::RadianceFieldOptions field;  ///< what is trained
+  nerf::TrainOptions train;          ///< how, the seed included
 };
 
 /// The default first, then every choice that trainings of this project make, switched off or set otherwise.
@@ -23,8 +23,8 @@ std::vector<TrainingVariant> training_variants(const nerf::ScheduleOptions& sche
 
 /// What a variant reached.
 struct TrainingRow {
-  TrainingVariant variant;
-  Index steps = 0;
+  TrainingVariant variant;      ///< how it was trained
+  Index steps = 0;              ///< taken
   double samples = 0;           ///< through the networks
   double seconds = 0;           ///< of training, the silhouettes included
   double psnr = 0;              ///< mean over the views of `judge`, against their photographs, dB
