@@ -1,0 +1,66 @@
+#pragma once
+#include <fieldmark/engine/shape.h>
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace fieldmark::watermark {
+
+/// What a decoder made of a word.
+struct CorrectedWord {
+  std::vector<std::uint8_t> bits;  ///< [length] the codeword, each 0 or 1
+  Index corrected = 0;             ///< bits in which it differs from the word that was given
+};
+
+/// A binary BCH code: narrow-sense, primitive, shortened to `length` bits, systematic.
+///   codewords c with c(alpha^j) = 0 for j = 1 .. 2 t, alpha primitive in GF(2^m); bit i is the coefficient
+///   of x^(length - 1 - i), and those beyond length are 0
+/// Source: Bose and Ray-Chaudhuri 1960, Hocquenghem 1959; decoding after Berlekamp 1968, Massey 1969 and
+/// Chien 1964.
+class Bch {
+ public:
+  /// @param m  3 to 8, @param t  errors to be corrected, at least 1, @param length  at most 2^m - 1
+  /// @throws ValueError if one is out of range, or the code has no information bit
+  Bch(int m, Index t, Index length);
+
+  /// The code with the most errors corrected whose codewords hold `dimension` bits of information.
+  /// @return nothing if not even one error can be corrected   @throws ValueError as the constructor
+  static std::optional<Bch> strongest(int m, Index length, Index dimension);
+
+  /// Bits of a codeword.
+  Index length() const { return length_; }
+  /// Of them information, which comes first.
+  Index dimension() const { return length_ - check_bits(); }
+  /// Of them check bits, the generator's degree.
+  Index check_bits() const { return static_cast<Index>(generator_.size()) - 1; }
+  /// Errors that are corrected wherever they are: half the number of successive powers of alpha, from the
+  /// first on, that are roots. It can exceed the constructor's t, of which it is the least with the same
+  /// generator.
+  Index corrects() const { return corrects_; }
+
+  /// The codeword of these bits.
+  /// @param information  [dimension] each 0 or 1   @return [length]   @throws ValueError for another size or
+  /// another value
+  std::vector<std::uint8_t> encode(std::span<const std::uint8_t> information) const;
+
+  /// The codeword that differs in at most corrects() bits, of which there is never more than one.
+  /// @param word  [length] each 0 or 1   @return nothing if there is none   @throws ValueError for another
+  /// size or another value
+  std::optional<CorrectedWord> decode(std::span<const std::uint8_t> word) const;
+
+ private:
+  unsigned multiply(unsigned a, unsigned b) const;
+  unsigned power(Index exponent) const { return exp_[static_cast<std::size_t>(exponent % order_)]; }
+  std::vector<std::uint8_t> minimal_polynomial(Index exponent) const;
+  std::vector<unsigned> syndromes(std::span<const std::uint8_t> word) const;
+  std::vector<unsigned> error_locator(const std::vector<unsigned>& s) const;
+  void check_word(const char* op, std::span<const std::uint8_t> word, Index size) const;
+
+  Index order_, length_, corrects_ = 0;  // order_ = 2^m - 1
+  std::vector<unsigned> exp_, log_;
+  std::vector<std::uint8_t> generator_;  // coefficients, highest power first
+};
+
+}  // namespace fieldmark::watermark
