@@ -11,12 +11,14 @@
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/long_run.h"
+#include "cli/message_option.h"
 
 namespace fieldmark::cli {
 namespace {
 
 struct Options {
-  std::string owner, message, out;
+  std::string owner, out;
+  MessageOption message;
   RunLength length{.seconds = watermark::BakeOptions{}.schedule.seconds};
 };
 
@@ -25,8 +27,7 @@ int run(const Options& options, Context& context) {
     throw UsageError("--out: " + options.out + " is the owner's file");
   check_writable(options.out);
   const auto owner = watermark::Owner::load(options.owner);
-  const auto message = read_option(
-      "--message", [&] { return watermark::message_from_hex(options.message, owner.options().bits); });
+  const auto message = message_of(options.message, owner.options().bits);
   watermark::BakeOptions bake_options{.seed = context.seed()};
   bake_options.schedule.steps = options.length.steps;
   bake_options.schedule.seconds = options.length.seconds;
@@ -48,16 +49,19 @@ int run(const Options& options, Context& context) {
                options.length, context);
   baker.field().save(options.out);
 
-  const auto claim = watermark::claim_digest(watermark::sha256_file_hex(options.owner), owner.key, message);
+  const auto owner_sha256 = watermark::sha256_file_hex(options.owner);
+  const auto claim = watermark::claim_digest(owner_sha256, owner.key, message);
   const auto bytes = std::filesystem::file_size(options.out);
   context.text() << options.out << ": " << baker.steps() << " steps in " << format_duration(seconds)
                  << "\nclaim " << claim << ", to be time-stamped before the field is published\n";
   context.result({{"message", to_hex(message)},
+                  {"payload", payload_json(message)},
                   {"bits", message.size()},
                   {"seconds", seconds},
                   {"steps", baker.steps()},
                   {"psnr_colours", number(baker.psnr())},
                   {"file_bytes", bytes},
+                  {"owner_sha256", owner_sha256},
                   {"claim", claim}});
   return kOk;
 }
@@ -67,10 +71,7 @@ int run(const Options& options, Context& context) {
 Command add_bake(CLI::App& app) {
   auto o = std::make_shared<Options>();
   app.add_option("--owner", o->owner, "What `fieldmark embed` wrote")->required()->type_name("OWNER");
-  app.add_option("--message", o->message,
-                 "Message, hexadecimal, most significant bit first, as long as the owner's bits")
-      ->required()
-      ->type_name("HEX");
+  add_message_options(app, o->message, "Message");
   app.add_option("--out", o->out, "File for the field to publish")->required()->type_name("FIELD");
   add_run_length(app, o->length, false);
   return [o](Context& context) { return run(*o, context); };

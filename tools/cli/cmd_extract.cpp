@@ -5,6 +5,7 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/message_option.h"
 #include "cli/reading.h"
 
 namespace fieldmark::cli {
@@ -24,13 +25,18 @@ int run(const Options& options, Context& context) {
   for (const auto& picture : pictures) {
     const auto reading = watermark::read_bits(picture.cells, code, bits);
     context.text() << to_bits(reading.message) << "  " << picture.image << "\n";
-    views.push_back(
-        {{"image", picture.image}, {"bits", to_bits(reading.message)}, {"logits", reading.logit}});
+    views.push_back({{"image", picture.image},
+                     {"bits", to_bits(reading.message)},
+                     {"payload", payload_json(read_payload(reading.logit))},
+                     {"logits", reading.logit}});
   }
   const auto reading = watermark::read_bits(total_evidence(pictures), code, bits);
-  context.text() << to_bits(reading.message) << "  all together: " << to_hex(reading.message) << "\n";
+  const auto payload = read_payload(reading.logit);
+  context.text() << to_bits(reading.message) << "  all together: " << to_hex(reading.message)
+                 << "\npayload: " << payload_text(payload, bits) << "\n";
   context.result({{"message", to_hex(reading.message)},
                   {"bits", to_bits(reading.message)},
+                  {"payload", payload_json(payload)},
                   {"reading", "blind"},
                   {"logits", reading.logit},
                   {"views", views}});

@@ -9,13 +9,15 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/message_option.h"
 #include "cli/reading.h"
 
 namespace fieldmark::cli {
 namespace {
 
 struct Options {
-  std::string owner, message, key;
+  std::string owner, key;
+  MessageOption message;
   double fpr = 1e-6;
   Index wrong_keys = 0;
   std::vector<std::string> images;
@@ -49,8 +51,7 @@ Json wrong_keys(const Options& options, const watermark::Owner& owner, const std
 int run(const Options& options, Context& context) {
   const auto owner = watermark::Owner::load(options.owner);
   const Index bits = owner.options().bits;
-  const auto message =
-      read_option("--message", [&] { return watermark::message_from_hex(options.message, bits); });
+  const auto message = message_of(options.message, bits);
   const auto key = options.key.empty() ? owner.key : watermark::load_key(options.key);
   const auto code = owner.code(key);
   const double least = watermark::least_p(code.carriers());
@@ -69,7 +70,8 @@ int run(const Options& options, Context& context) {
   const auto match = watermark::match_bits(watermark::read_bits(evidence, code, bits), message);
   const double p_bits = watermark::p_value_bits(match.matching, match.decided);
   const bool found = p <= options.fpr;
-  const auto claim = watermark::claim_digest(watermark::sha256_file_hex(options.owner), key, message);
+  const auto owner_sha256 = watermark::sha256_file_hex(options.owner);
+  const auto claim = watermark::claim_digest(owner_sha256, key, message);
 
   char text[400];
   std::snprintf(text, sizeof text,
@@ -78,7 +80,7 @@ int run(const Options& options, Context& context) {
                 "p-value, bits         %.2e, %lld of %lld match\n",
                 found ? "FOUND" : "NOT FOUND", options.fpr, p, two_sided, pictures.size(), p_bits,
                 static_cast<long long>(match.matching), static_cast<long long>(match.bits));
-  context.text() << text << "claim " << claim << "\n";
+  context.text() << text << "owner sha256 " << owner_sha256 << "\nclaim " << claim << "\n";
   const Json wrong = wrong_keys(options, owner, evidence, message, context);
   context.result({{"found", found},
                   {"p_value", p},
@@ -89,6 +91,8 @@ int run(const Options& options, Context& context) {
                   {"views", pictures.size()},
                   {"reading", "blind"},
                   {"fpr", options.fpr},
+                  {"payload", payload_json(message)},
+                  {"owner_sha256", owner_sha256},
                   {"claim", claim},
                   {"wrong_keys", wrong}});
   return found ? kOk : kNotFound;
@@ -99,9 +103,7 @@ int run(const Options& options, Context& context) {
 Command add_verify(CLI::App& app) {
   auto o = std::make_shared<Options>();
   app.add_option("--owner", o->owner, "What `fieldmark embed` wrote")->required()->type_name("OWNER");
-  app.add_option("--message", o->message, "Message to look for, hexadecimal, as long as the owner's bits")
-      ->required()
-      ->type_name("HEX");
+  add_message_options(app, o->message, "Message to look for");
   app.add_option("--fpr", o->fpr, "Rate of false alarms at which a mark counts as found, above 0 to 1")
       ->check(CLI::Range(1e-300, 1.0).description(""))
       ->type_name("P");

@@ -1,0 +1,77 @@
+#include "cli/message_option.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "cli/cli.h"
+
+namespace fieldmark::cli {
+namespace {
+
+using watermark::PayloadKind;
+
+watermark::Message encoded(const char* option, PayloadKind kind, const std::string& value, Index bits) {
+  return read_option(
+      option, [&] { return watermark::PayloadCodec(bits).encode(watermark::parse_payload(kind, value)); });
+}
+
+}  // namespace
+
+void add_message_options(CLI::App& app, MessageOption& o, const std::string& purpose) {
+  CLI::Option* all[] = {
+      app.add_option("--message", o.message,
+                     purpose + ", hexadecimal, most significant bit first, as long as the owner's bits")
+          ->type_name("HEX"),
+      app.add_option("--text", o.text, "The same as UTF-8 text that is encoded so that errors are corrected")
+          ->type_name("T"),
+      app.add_option("--uuid", o.uuid, "The same as a UUID, encoded likewise; needs some 170 bits")
+          ->type_name("U"),
+      app.add_option("--payload", o.payload, "The same as 1 to 32 hexadecimal digits, encoded likewise")
+          ->type_name("HEX")};
+  for (std::size_t i = 0; i < std::size(all); ++i)
+    for (std::size_t j = i + 1; j < std::size(all); ++j) all[i]->excludes(all[j]);
+}
+
+watermark::Message message_of(const MessageOption& o, Index bits) {
+  if (!o.text.empty()) return encoded("--text", PayloadKind::text, o.text, bits);
+  if (!o.uuid.empty()) return encoded("--uuid", PayloadKind::uuid, o.uuid, bits);
+  if (!o.payload.empty()) return encoded("--payload", PayloadKind::hex, o.payload, bits);
+  if (o.message.empty()) throw UsageError("one of --message, --text, --uuid and --payload is needed");
+  return read_option("--message", [&] { return watermark::message_from_hex(o.message, bits); });
+}
+
+Json payload_json(const watermark::Message& message) {
+  const auto payload = watermark::PayloadCodec(message.size()).payload(message);
+  if (!payload) return nullptr;
+  return {{"kind", watermark::payload_kind_name(payload->kind)}, {"value", payload->value}};
+}
+
+std::optional<watermark::PayloadReading> read_payload(const std::vector<double>& logit) {
+  return watermark::PayloadCodec(static_cast<Index>(logit.size())).read(logit);
+}
+
+Json payload_json(const std::optional<watermark::PayloadReading>& reading) {
+  if (!reading) return nullptr;
+  return {{"kind", watermark::payload_kind_name(reading->payload.kind)},
+          {"value", reading->payload.value},
+          {"corrected", reading->corrected},
+          {"chance", reading->chance}};
+}
+
+std::string payload_text(const std::optional<watermark::PayloadReading>& reading, Index bits) {
+  if (!reading) {
+    const watermark::PayloadCodec codec(bits);
+    if (codec.layouts().empty()) return "none: messages of so few bits hold no payload";
+    char text[80];
+    std::snprintf(text, sizeof text, "none (fair bits give one with a probability below %.1e)",
+                  codec.chance());
+    return text;
+  }
+  char text[80];
+  std::snprintf(text, sizeof text, ", %lld of %lld bits corrected, by chance below %.1e",
+                static_cast<long long>(reading->corrected), static_cast<long long>(bits), reading->chance);
+  return watermark::payload_kind_name(reading->payload.kind) + std::string(" ") + reading->payload.value +
+         text;
+}
+
+}  // namespace fieldmark::cli
