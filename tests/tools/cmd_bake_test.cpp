@@ -47,3 +47,67 @@ TEST_CASE("bake refuses a message that does not fit, and an owner that is none",
   CHECK_THAT(kind.err, Contains("expected an OWNER file (kind 'owner'), found kind 'field'"));
   CHECK(!std::filesystem::exists(out));
 }
+
+TEST_CASE("bake encodes payloads, and the other commands know them and their claim", "[bake]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string owner = job.folder / "long.fm", baked = job.folder / "long_baked.fm",
+                    pictures = job.pictures();
+  const auto json_of = [](const std::vector<std::string>& line) {
+    auto with_json = line;
+    with_json.insert(with_json.end(), {"--json", "-"});
+    const auto r = run_command(with_json);
+    INFO(r.err);
+    REQUIRE((r.code == cli::kOk || r.code == cli::kNotFound));
+    return nlohmann::json::parse(r.out);
+  };
+  const auto embedded =
+      json_of({"embed", "--field", job.field, "--out", owner, "--bits", "48", "--cells", "8", "--reader-size",
+               "32", "--steps", "1", "--views", "8", "--measured-views", "1", "--text", "hi"});
+  const auto bake = json_of({"bake", "--owner", owner, "--text", "hi", "--out", baked, "--steps", "1"});
+  CHECK(bake["payload"] == nlohmann::json{{"kind", "text"}, {"value", "hi"}});
+  CHECK(bake["message"].get<std::string>().substr(0, 5) == "76869");  // version 7, then the text
+  CHECK(bake["claim"] == embedded["claim"]);
+  CHECK(bake["owner_sha256"] == embedded["sha256"]);
+  const auto verified = json_of({"verify", "--owner", owner, "--text", "hi", pictures});
+  CHECK(verified["claim"] == bake["claim"]);
+  CHECK(verified["owner_sha256"] == bake["owner_sha256"]);
+  CHECK(verified["payload"] == bake["payload"]);
+  CHECK(json_of({"verify", "--owner", owner, "--message", bake["message"], pictures})["claim"] ==
+        bake["claim"]);
+  CHECK(json_of({"verify", "--owner", owner, "--payload", "c0fe", pictures})["claim"] != bake["claim"]);
+  // Nothing was learnt, so there is nothing to be read.
+  const auto extracted = json_of({"extract", "--owner", owner, pictures});
+  CHECK(extracted["payload"].is_null());
+  CHECK(extracted["views"][0]["payload"].is_null());
+  const auto of_baked =
+      json_of({"measure", "--owner", owner, "--field", baked, "--text", "hi", "--count", "2"});
+  CHECK(of_baked["payload"]["trials"] == 2);
+  CHECK(of_baked["payload"]["exact"] == 0);
+  const auto drawn = json_of(
+      {"measure", "--owner", owner, "--count", "4", "--payloads", "--together", "2", "--under", "blur_1"});
+  CHECK(drawn["payload"]["trials"] == 2);
+  CHECK(drawn["payload"]["together"] == 2);
+  CHECK(drawn["payload"]["under"]["blur_1"]["trials"] == 2);
+  CHECK(json_of({"measure", "--owner", owner, "--count", "1"})["payload"].is_null());
+  const auto refused = [&](const std::vector<std::string>& options, const char* why) {
+    std::vector<std::string> line{"bake",    "--owner", owner, "--out", job.folder / "refused.fm",
+                                  "--steps", "1"};
+    line.insert(line.end(), options.begin(), options.end());
+    const auto r = run_command(line);
+    CHECK(r.code == cli::kUsage);
+    CHECK_THAT(r.err, Contains(why));
+  };
+  refused({"--text", "hello"}, "has 40 bits, a message of 48 bits can hold at most 32");
+  refused({"--text", "\xff"}, "byte 1 must begin a character of UTF-8");
+  refused({"--uuid", "1234"}, "must have 32 digits");
+  refused({"--payload", "xyz"}, "must be a digit");
+  refused({"--text", "hi", "--message", "123456789abc"}, "excludes");
+  refused({}, "one of --message, --text, --uuid and --payload is needed");
+  for (const std::vector<std::string>& extra : {std::vector<std::string>{"--together", "3"},
+                                                {"--payloads", "--field", baked, "--text", "hi"},
+                                                {"--text", "hi"}}) {
+    std::vector<std::string> line{"measure", "--owner", owner, "--count", "2"};
+    line.insert(line.end(), extra.begin(), extra.end());
+    CHECK(run_command(line).code == cli::kUsage);
+  }
+}

@@ -115,6 +115,25 @@ TEST_CASE("measurement: progress is told after each view and may stop") {
   CHECK(calls.size() == 3);
 }
 
+TEST_CASE("measurement: messages may be chosen, and each reading is handed out") {
+  const Owner owner = owner_with_gain();
+  const Message odd{{1, 0, 1, 1}}, even{{0, 1, 1, 0}};
+  const auto of_view = [&](Index view) { return view % 2 ? odd : even; };
+  std::vector<std::string> calls;
+  double right = 0;
+  const MeasureOptions options{
+      .cameras = cameras(2),
+      .under = {"noise_0", "blur_1"},
+      .messages = of_view,
+      .on_reading = [&](Index view, const std::string& under, const auto& evidence, const Message& sent) {
+        calls.push_back(std::to_string(view) + under);
+        CHECK(sent == of_view(view));
+        if (under.empty()) right += match_bits(read_bits(evidence, owner.code(), 4), sent).accuracy() / 2;
+      }};
+  CHECK(measure(owner, nullptr, nullptr, options).accuracy.blind == Approx(right));
+  CHECK(calls == std::vector<std::string>{"0", "0noise_0", "0blur_1", "1", "1noise_0", "1blur_1"});
+}
+
 TEST_CASE("measurement: errors name what is missing") {
   const Owner owner = owner_with_gain();
   const Message sent{{1, 1, 0, 1}};

@@ -2,6 +2,7 @@
 #include <fieldmark/watermark/payload_trials.h>
 
 #include <cmath>
+#include <utility>
 
 #include "support/catch.h"
 
@@ -33,6 +34,37 @@ TEST_CASE("payload_trials: exact, wrong and missing payloads are counted apart")
   CHECK(random_payload(PayloadCodec(48), rng, 0).value.size() == 8);
   CHECK_THROWS_WITH(random_payload(PayloadCodec(16), rng, 0),
                     "[random_payload] codec: messages of 16 bits hold no payload");
+}
+
+TEST_CASE("payload_trials: views of a group are added before they are read") {
+  const PayloadCodec codec(48);
+  const Payload sent = random_payload(codec, CounterRng(2), 0);
+  const Message message = codec.encode(sent), plain = message_from_hex("123456789abc", 48);
+  REQUIRE_FALSE(codec.payload(plain));
+  // A cell a bit; of two views each shows one half of them.
+  CellCode code;
+  std::vector<double> first(48), second(48), whole(48);
+  for (std::size_t i = 0; i < 48; ++i) {
+    code.bit.push_back(static_cast<std::int32_t>(i));
+    code.sign.push_back(1);
+    whole[i] = message.bits[i] ? 1 : -1;
+    (i % 2 ? first : second)[i] = whole[i];
+  }
+  PayloadViews two(code, 48, 2), one(code, 48, 1);
+  for (Index view = 0; view < 5; ++view) {
+    two.add(view, "", view % 2 ? first : second, message);
+    two.add(view, "blur_1", view % 2 ? whole : first, plain);
+    one.add(view, "", first, message);
+    one.add(view, "blur_1", whole, message);
+  }
+  REQUIRE(two.accuracies().size() == 1);  // under the other name no payload was sent
+  CHECK(two.accuracies().at("").trials == 2);
+  CHECK(two.accuracies().at("").exact == 2);
+  CHECK(one.accuracies().at("").trials == 5);
+  CHECK(one.accuracies().at("").exact == 0);
+  CHECK(one.accuracies().at("blur_1").exact == 5);
+  CHECK_THROWS_WITH(PayloadViews(code, 48, 0), "[PayloadViews] together must be at least 1, got 0");
+  CHECK_THROWS_AS(one.add(0, "", std::vector<double>(3), message), ValueError);
 }
 
 TEST_CASE("payload_trials: intervals are Wilson's") {

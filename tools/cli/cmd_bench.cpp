@@ -14,6 +14,7 @@
 #include <ostream>
 
 #include "cli/bench_field.h"
+#include "cli/bench_payload.h"
 #include "cli/bench_training.h"
 #include "cli/cli.h"
 #include "cli/commands.h"
@@ -25,6 +26,7 @@ namespace {
 struct Options {
   std::string what, peer;
   BenchFieldOptions field;  // and what both have: --scene, --plot, --runs
+  BenchPayloadOptions payload;
   bool precision = false;
   bench::PeerOptions python;
   bench::EngineBenchOptions engine;
@@ -191,6 +193,7 @@ Json precision(const Options& options, const Scene& scene, Context& context) {
 int run(Options options, Context& context) {
   if (options.what == "field") return bench_field(options.field, context);
   if (options.what == "training") return bench_training(options.field, context);
+  if (options.what == "payload") return bench_payload(options.payload, context);
   options.engine.runs = options.field.runs;
   if (!options.field.plot.empty()) check_writable(options.field.plot);
   const Scene scene = scene_of(options);
@@ -221,9 +224,10 @@ Command add_bench(CLI::App& app) {
   app.add_option("what", o->what,
                  "engine: kernels and training steps, against this machine's peak;\n"
                  "field: rendering in many ways, speed against error;\n"
-                 "training: every choice of training switched off and on, for --seconds each")
+                 "training: every choice of training switched off and on, for --seconds each;\n"
+                 "payload: how often payloads are exact at rates of wrong bits, and how often noise is one")
       ->required()
-      ->check(CLI::IsMember({"engine", "field", "training"}).description(""))
+      ->check(CLI::IsMember({"engine", "field", "training", "payload"}).description(""))
       ->type_name("WHAT");
   app.add_option("--runs", o->field.runs, "Runs of each row, whose median counts, 1 to 1000")
       ->check(CLI::Range(1, 1000).description(""))
@@ -261,6 +265,7 @@ Command add_bench(CLI::App& app) {
       ->type_name("S")
       ->needs(peer);
   add_bench_field(app, o->field);
+  add_bench_payload(app, o->payload);
   return [o](Context& context) { return run(*o, context); };
 }
 

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <ostream>
 
 #include "cli/cli.h"
@@ -14,6 +15,7 @@
 #include "cli/context.h"
 #include "cli/long_run.h"
 #include "cli/measured.h"
+#include "cli/message_option.h"
 #include "cli/perceptual.h"
 #include "cli/sheet.h"
 
@@ -26,6 +28,7 @@ struct Options {
   std::string field, out, key, picture, lpips_weights;
   std::string preset = "fast";
   watermark::OwnerOptions owner;
+  MessageOption intended;
   RunLength length{.seconds = watermark::EmbedOptions{}.schedule.seconds};
   Index views = watermark::EmbedOptions{}.views, measured_views = 200;
   std::vector<std::string> under;
@@ -96,6 +99,8 @@ int run(const Options& options, Context& context) {
   check_writable(options.out);
   check_writable(picture);
   for (const auto& name : options.under) read_option("--under", [&] { return distort::parse_attack(name); });
+  std::optional<watermark::Message> intended;
+  if (options.intended.given()) intended = message_of(options.intended, options.owner.bits);
   const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
   const auto field = nerf::RadianceField::load(options.field);
   const auto key = key_of(options, checkpoint);
@@ -129,6 +134,12 @@ int run(const Options& options, Context& context) {
   context.text() << options.out << ": " << embedder.steps() << " steps in " << format_duration(seconds)
                  << ", keep it secret\nsha256 " << sha256 << "\n"
                  << picture << ": unmarked, marked, ten times the difference\n";
+  Json claim = nullptr;
+  if (intended) {
+    claim = watermark::claim_digest(sha256, owner.key, *intended);
+    context.text() << "claim " << claim.get<std::string>()
+                   << ", to be time-stamped before the field is published\n";
+  }
   const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, options.measured_views,
                                           0, context.seed() + 1);
   const auto measured = run_measure(owner, nullptr, nullptr,
@@ -143,6 +154,7 @@ int run(const Options& options, Context& context) {
   json["seconds"] = seconds;
   json["steps"] = embedder.steps();
   json["sha256"] = sha256;
+  json["claim"] = claim;
   context.result(json);
   return kOk;
 }
@@ -161,6 +173,7 @@ Command add_embed(CLI::App& app) {
   app.add_option("--bits", o->owner.bits, "Length of a message, 1 to 256")
       ->check(CLI::Range(1, 256).description(""))
       ->type_name("N");
+  add_message_options(app, o->intended, "Message that is going to be baked, to print its claim at once");
   app.add_option("--preset", o->preset,
                  "fast: local message with dense supervision, trains in minutes; paper: one message "
                  "everywhere, pooled "

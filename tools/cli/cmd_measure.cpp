@@ -1,6 +1,8 @@
 #include <fieldmark/nerf/evaluation.h>
+#include <fieldmark/watermark/payload_trials.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <memory>
 #include <optional>
 #include <ostream>
@@ -9,6 +11,7 @@
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/measured.h"
+#include "cli/message_option.h"
 #include "cli/perceptual.h"
 #include "cli/scene_data.h"
 
@@ -16,9 +19,11 @@ namespace fieldmark::cli {
 namespace {
 
 struct Options {
-  std::string owner, field, message, data, lpips_weights;
+  std::string owner, field, data, lpips_weights;
+  MessageOption message;
   std::string cameras = "near";
-  Index count = 200, size = 0;
+  Index count = 200, size = 0, together = 1;
+  bool payloads = false;
   std::vector<std::string> under;
 };
 
@@ -49,26 +54,76 @@ nerf::Evaluation against_photographs(const Options& options, const nerf::Radianc
   });
 }
 
+// Raw bits and payloads are two figures: those of a view, and what a correction makes of a group of views.
+Json payloads_json(const Options& options, const watermark::PayloadViews& views, Context& context) {
+  Json json = nullptr, under = Json::object();
+  for (const auto& [name, a] : views.accuracies()) {
+    const auto [low, high] = watermark::wilson_interval(a.exact, a.trials);
+    const double corrected = static_cast<double>(a.corrected) / static_cast<double>(a.exact);
+    const Json figures{{"trials", a.trials}, {"exact", number(a.share())}, {"exact_low", low},
+                       {"exact_high", high}, {"wrong", a.wrong},           {"corrected", number(corrected)}};
+    (name.empty() ? json : under[name]) = figures;
+    char line[200];
+    std::snprintf(line, sizeof line,
+                  "%-20s %.2f%% exact (95%%: %.2f to %.2f%%) of %lld readings of %lld views, %lld wrong\n",
+                  name.empty() ? "payload" : ("  under " + name).c_str(), 100 * a.share(), 100 * low,
+                  100 * high, static_cast<long long>(a.trials), static_cast<long long>(options.together),
+                  static_cast<long long>(a.wrong));
+    context.text() << line;
+  }
+  if (json.is_null()) return json;
+  json["together"] = options.together;
+  json["under"] = under;
+  return json;
+}
+
+// Random payloads in place of random messages, one for each group of views.
+std::function<watermark::Message(Index)> messages_of(const Options& options,
+                                                     const watermark::PayloadCodec& codec,
+                                                     std::uint64_t seed) {
+  if (!options.payloads) return {};
+  if (!options.field.empty()) throw UsageError("--payloads: a baked field has one message");
+  const CounterRng rng(seed, 43);
+  const auto message = [&codec, rng, together = options.together](Index view) {
+    return codec.encode(watermark::random_payload(codec, rng, static_cast<std::uint64_t>(view / together)));
+  };
+  read_option("--payloads", [&] { return message(0); });
+  return message;
+}
+
 int run(const Options& options, Context& context) {
+  if (options.message.given() == options.field.empty())
+    throw UsageError("--field needs the message that was baked into it, and a message its --field");
   for (const auto& name : options.under) read_option("--under", [&] { return distort::parse_attack(name); });
   const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
   const auto owner = watermark::Owner::load(options.owner);
   std::optional<nerf::RadianceField> baked;
   std::optional<watermark::Message> message;
+  const Index bits = owner.options().bits;
   if (!options.field.empty()) {
-    message = read_option("--message",
-                          [&] { return watermark::message_from_hex(options.message, owner.options().bits); });
+    message = message_of(options.message, bits);
     baked.emplace(nerf::RadianceField::load(options.field));
   }
-  const auto measured = run_measure(owner, baked ? &*baked : nullptr, message ? &*message : nullptr,
-                                    {.cameras = cameras_of(options, owner, context),
-                                     .under = options.under,
-                                     .seed = context.seed(),
-                                     .lpips = lpips ? &*lpips : nullptr,
-                                     .progress = {}},
-                                    context);
+  const auto cameras = cameras_of(options, owner, context);
+  if (options.together > static_cast<Index>(cameras.size()))
+    throw UsageError("--together: there are " + std::to_string(cameras.size()) + " views");
+  const watermark::PayloadCodec codec(bits);
+  const auto code = owner.code();
+  watermark::PayloadViews payloads(code, bits, options.together);
+  const auto measured =
+      run_measure(owner, baked ? &*baked : nullptr, message ? &*message : nullptr,
+                  {.cameras = cameras,
+                   .under = options.under,
+                   .seed = context.seed(),
+                   .messages = messages_of(options, codec, context.seed()),
+                   .on_reading = [&](Index view, const std::string& under, const auto& evidence,
+                                     const auto& sent) { payloads.add(view, under, evidence, sent); },
+                   .lpips = lpips ? &*lpips : nullptr,
+                   .progress = {}},
+                  context);
   print_measurement(context.text(), measured, options.cameras);
   Json json = measurement_json(measured, options.cameras);
+  json["payload"] = payloads_json(options, payloads, context);
   if (baked && !options.data.empty()) {
     const double marked = against_photographs(options, *baked, "photographs", context).psnr;
     const double unmarked = against_photographs(options, owner.field, "photographs, unmarked", context).psnr;
@@ -88,13 +143,10 @@ int run(const Options& options, Context& context) {
 Command add_measure(CLI::App& app) {
   auto o = std::make_shared<Options>();
   app.add_option("--owner", o->owner, "What `fieldmark embed` wrote")->required()->type_name("OWNER");
-  CLI::Option* field = app.add_option("--field", o->field, "A baked field (the mark as trained, not baked)")
-                           ->type_name("BAKED")
-                           ->default_str("");
-  CLI::Option* message =
-      app.add_option("--message", o->message, "The message baked into it")->type_name("HEX");
-  field->needs(message);
-  message->needs(field);
+  app.add_option("--field", o->field, "A baked field (the mark as trained, not baked)")
+      ->type_name("BAKED")
+      ->default_str("");
+  add_message_options(app, o->message, "The message baked into it");
   app.add_option("--cameras", o->cameras,
                  "near (drawn from the span of the training cameras),\n"
                  "ring (30 degrees above, radius 4.0311), sphere (all directions), test (of --data)")
@@ -112,6 +164,14 @@ Command add_measure(CLI::App& app) {
       ->default_str("");
   app.add_option("--data", o->data, "Data set for psnr_photo of a baked field and for --cameras test")
       ->type_name("DIR");
+  app.add_flag(
+      "--payloads", o->payloads,
+      "Random payloads of up to 40 bits in place of random messages, to count those that are read exactly");
+  app.add_option("--together", o->together,
+                 "Views whose evidence is added before a payload is read, 1 to 10000; each such group has "
+                 "one message")
+      ->check(CLI::Range(1, 10000).description(""))
+      ->type_name("N");
   add_lpips_weights(app, o->lpips_weights);
   return [o](Context& context) { return run(*o, context); };
 }

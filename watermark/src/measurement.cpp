@@ -64,15 +64,21 @@ Measurement measure(const Owner& owner, const nerf::RadianceField* baked, const 
   std::vector<std::vector<double>> under(attacks.size());
   const auto total = static_cast<Index>(options.cameras.size());
   for (std::size_t i = 0; i < options.cameras.size(); ++i) {
-    const Message sent = message ? *message : random_message(owner.options().bits, messages, i);
+    const auto view = static_cast<Index>(i);
+    const Message sent = message            ? *message
+                         : options.messages ? options.messages(view)
+                                            : random_message(owner.options().bits, messages, i);
     const Pictures p = views.render(options.cameras[i], code, sent);
-    const auto read = [&](const Tensor<float>& picture) {
-      return match_bits(read_bits(reader.evidence(picture), code, owner.options().bits), sent).accuracy();
+    const auto read = [&](const Tensor<float>& picture, const std::string& name) {
+      const auto evidence = reader.evidence(picture);
+      if (options.on_reading) options.on_reading(view, name, evidence, sent);
+      return match_bits(read_bits(evidence, code, owner.options().bits), sent).accuracy();
     };
-    accuracy.push_back(read(p.marked));
+    accuracy.push_back(read(p.marked, ""));
     for (std::size_t a = 0; a < attacks.size(); ++a)
       under[a].push_back(
-          read(distort::apply_attack(attacks[a], p.marked, distortions, i * attacks.size() + a, background)));
+          read(distort::apply_attack(attacks[a], p.marked, distortions, i * attacks.size() + a, background),
+               options.under[a]));
     psnr_whole.push_back(psnr(p.marked, p.plain.rgb));
     psnr_object.push_back(psnr_masked(p.marked, p.plain.rgb, p.plain.opacity));
     const Tensor<float> plain = quantize8(p.plain.rgb);

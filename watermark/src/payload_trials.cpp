@@ -1,4 +1,5 @@
 #include <fieldmark/engine/error.h>
+#include <fieldmark/watermark/evidence.h>
 #include <fieldmark/watermark/payload_trials.h>
 
 #include <cmath>
@@ -36,10 +37,38 @@ void PayloadTrials::add(std::span<const double> logit, const Payload& sent) {
   }
 }
 
-Payload random_payload(const PayloadCodec& codec, const CounterRng& rng, std::uint64_t index) {
+PayloadViews::PayloadViews(const CellCode& code, Index raw_bits, Index together)
+    : code_(&code), codec_(raw_bits), together_(together) {
+  if (together < 1)
+    throw ValueError("[PayloadViews] together must be at least 1, got " + std::to_string(together));
+}
+
+void PayloadViews::add(Index view, const std::string& under, std::span<const double> evidence,
+                       const Message& sent) {
+  const auto payload = codec_.payload(sent);
+  if (!payload) return;
+  Group& group = groups_.try_emplace(under, Group{{}, PayloadTrials(codec_)}).first->second;
+  if (view % together_ == 0) group.evidence.assign(evidence.size(), 0.0);
+  for (std::size_t c = 0; c < group.evidence.size(); ++c) group.evidence[c] += evidence[c];
+  if (view % together_ == together_ - 1)
+    group.trials.add(read_bits(group.evidence, *code_, codec_.raw_bits()).logit, *payload);
+}
+
+std::map<std::string, PayloadAccuracy> PayloadViews::accuracies() const {
+  std::map<std::string, PayloadAccuracy> all;
+  for (const auto& [name, group] : groups_) all[name] = group.trials.accuracy();
+  return all;
+}
+
+Index random_payload_bits(const PayloadCodec& codec) {
   Index bits = 0;
   for (const PayloadLayout& layout : codec.layouts())
     if (layout.data_bits <= 40) bits = layout.data_bits;
+  return bits;
+}
+
+Payload random_payload(const PayloadCodec& codec, const CounterRng& rng, std::uint64_t index) {
+  const Index bits = random_payload_bits(codec);
   if (bits == 0)
     throw ValueError("[random_payload] codec: messages of " + std::to_string(codec.raw_bits()) +
                      " bits hold no payload");

@@ -16,10 +16,15 @@ struct ReadingAccuracy {
 
 /// What measure() looks at.
 struct MeasureOptions {
-  std::vector<nerf::Camera> cameras = {};  ///< of the views, at their full resolution
-  std::vector<std::string> under = {};     ///< distortions besides none, names of parse_attack()
-  std::uint64_t seed = 0;                  ///< of messages and distortions
-  const Lpips<float>* lpips = nullptr;     ///< network of Measurement::lpips_base; null: it is NaN
+  std::vector<nerf::Camera> cameras = {};            ///< of the views, at their full resolution
+  std::vector<std::string> under = {};               ///< distortions besides none, names of parse_attack()
+  std::uint64_t seed = 0;                            ///< of messages and distortions
+  std::function<Message(Index view)> messages = {};  ///< in place of random messages, where none is baked
+  /// Called with the blind evidence of each picture that was read; `under` is empty for the view as it is.
+  std::function<void(Index view, const std::string& under, const std::vector<double>& evidence,
+                     const Message& sent)>
+      on_reading = {};
+  const Lpips<float>* lpips = nullptr;  ///< network of Measurement::lpips_base; null: it is NaN
   std::function<bool(Index done, Index total)> progress = {};  ///< returns false to stop, which throws Error
 };
 

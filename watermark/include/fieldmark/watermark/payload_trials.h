@@ -1,8 +1,10 @@
 #pragma once
 #include <fieldmark/engine/random.h>
+#include <fieldmark/watermark/cell_code.h>
 #include <fieldmark/watermark/payload_codec.h>
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -45,8 +47,36 @@ class PayloadTrials {
   PayloadAccuracy accuracy_;
 };
 
-/// Random hexadecimal payload for measuring, a function of (rng, index), of the longest data up to 40 bits
-/// that the codec's messages hold.   @throws ValueError if they hold none
+/// The same from the evidence of views, added up over groups of successive ones.
+class PayloadViews {
+ public:
+  /// @param code  of the owner, must outlive this   @param raw_bits  length of a message, 1 to 256
+  /// @param together  views of a group, at least 1; views of a group must have the same message
+  /// @throws ValueError if a number is out of range
+  PayloadViews(const CellCode& code, Index raw_bits, Index together);
+  /// Groups refer to what is in here.
+  PayloadViews(const PayloadViews&) = delete;
+  /// One picture, views in their order under each name; a message that is no payload is passed over.
+  /// @param evidence  [cells]   @throws ValueError as read_bits()
+  void add(Index view, const std::string& under, std::span<const double> evidence, const Message& sent);
+  /// Of whole groups, by the name they were added under.
+  std::map<std::string, PayloadAccuracy> accuracies() const;
+
+ private:
+  struct Group {
+    std::vector<double> evidence;
+    PayloadTrials trials;
+  };
+  const CellCode* code_;
+  PayloadCodec codec_;
+  Index together_;
+  std::map<std::string, Group> groups_;
+};
+
+/// Bits of random_payload(): the longest data up to 40 that the codec's messages hold; 0 if they hold none.
+Index random_payload_bits(const PayloadCodec& codec);
+/// Random hexadecimal payload for measuring, a function of (rng, index).   @throws ValueError if they hold
+/// none
 Payload random_payload(const PayloadCodec& codec, const CounterRng& rng, std::uint64_t index);
 
 }  // namespace fieldmark::watermark
