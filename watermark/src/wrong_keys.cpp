@@ -12,7 +12,7 @@
 
 namespace fieldmark::watermark {
 namespace {
-constexpr Index kKeysPerPiece = 128;
+constexpr Index kKeysPerPiece = 128, kPiecesPerRound = 64;
 
 Key root_key(std::uint64_t seed) {
   Key root;
@@ -22,10 +22,21 @@ Key root_key(std::uint64_t seed) {
 
 constexpr std::array<double, WrongKeyCounts::kThresholds> kThresholdValues{1e-1, 1e-2, 1e-3, 1e-4,
                                                                            1e-5, 1e-6, 1e-7, 1e-8};
-using Counts = decltype(WrongKeyCounts::counts);
 
-void add_p(double p, Counts& counts) {
-  for (std::size_t i = 0; i < counts.size(); ++i) counts[i] += p <= kThresholdValues[i];
+void add_statistic(double t, WrongKeyCounts& to) {
+  const double p = keyed_p_value(t);
+  for (std::size_t i = 0; i < to.counts.size(); ++i) to.counts[i] += p <= kThresholdValues[i];
+  to.least_p = std::min(to.least_p, p);
+  constexpr int kPerUnit = WrongKeyCounts::kBinsPerUnit, kBins = WrongKeyCounts::kBins;
+  ++to.histogram[static_cast<std::size_t>(std::clamp(std::floor(t * kPerUnit) + kBins / 2, 0., kBins - 1.))];
+  ++to.n;
+}
+
+void add_counts(const WrongKeyCounts& from, WrongKeyCounts& to) {
+  to.n += from.n;
+  for (std::size_t i = 0; i < from.counts.size(); ++i) to.counts[i] += from.counts[i];
+  for (std::size_t i = 0; i < from.histogram.size(); ++i) to.histogram[i] += from.histogram[i];
+  to.least_p = std::min(to.least_p, from.least_p);
 }
 
 // P(X = k + 1) / P(X = k) of a binomial with odds p / (1 - p).
@@ -43,23 +54,25 @@ void check_binomial(Index n, double p, double level) {
 }  // namespace
 
 WrongKeyCounts count_wrong_keys(std::span<const double> evidence, std::span<const double> area,
-                                const Message& message, Index n, std::uint64_t seed) {
+                                const Message& message, Index n, std::uint64_t seed,
+                                const std::function<bool(Index, Index)>& progress) {
   if (n < 0) throw ValueError("[count_wrong_keys] n must be at least 0, got " + std::to_string(n));
   const CellDealer dealer(area, message.size());
   const Key root = root_key(seed);
-  std::vector<Counts> pieces(static_cast<std::size_t>((n + kKeysPerPiece - 1) / kKeysPerPiece));
-  parallel_for(n, kKeysPerPiece, [&](Index begin, Index end) {
-    CellCode code;
-    Counts& counts = pieces[static_cast<std::size_t>(begin / kKeysPerPiece)];
-    for (Index i = begin; i < end; ++i) {
-      dealer.deal(derive_key(root, "fieldmark wrong key", static_cast<std::uint64_t>(i)), code);
-      add_p(keyed_p_value(keyed_statistic(evidence, code, message)), counts);
-    }
-  });
   WrongKeyCounts total;
-  total.n = n;
-  for (const Counts& counts : pieces) {
-    for (std::size_t i = 0; i < counts.size(); ++i) total.counts[i] += counts[i];
+  while (total.n < n) {
+    const Index first = total.n, round = std::min(n - first, kKeysPerPiece * kPiecesPerRound);
+    std::array<WrongKeyCounts, kPiecesPerRound> pieces;
+    parallel_for(round, kKeysPerPiece, [&](Index begin, Index end) {
+      CellCode code;
+      WrongKeyCounts& piece = pieces[static_cast<std::size_t>(begin / kKeysPerPiece)];
+      for (Index i = first + begin; i < first + end; ++i) {
+        dealer.deal(derive_key(root, "fieldmark wrong key", static_cast<std::uint64_t>(i)), code);
+        add_statistic(keyed_statistic(evidence, code, message), piece);
+      }
+    });
+    for (const WrongKeyCounts& piece : pieces) add_counts(piece, total);
+    if (progress && !progress(total.n, n)) throw Error("[count_wrong_keys] stopped");
   }
   return total;
 }
@@ -94,6 +107,12 @@ Index binomial_upper(Index n, double p, double level) {
     if (cumulated >= level * total) return mode + static_cast<Index>(i);
   }
   return mode + static_cast<Index>(above.size()) - 1;
+}
+
+CountInterval binomial_interval(Index n, double p, double level) {
+  // n - X ~ Binomial(n, 1 - p): its upper bound is the lower one of X.
+  const double each = 1 - (1 - level) / 2;
+  return {n - binomial_upper(n, 1 - p, each), binomial_upper(n, p, each)};
 }
 
 }  // namespace fieldmark::watermark
