@@ -9,6 +9,7 @@
 #include <fieldmark/nerf/llff.h>
 #include <fieldmark/nerf/npy.h>
 #include <fieldmark/nerf/transforms.h>
+#include <fieldmark/watermark/canonical_json.h>
 
 #include <cstdlib>
 #include <ctime>
@@ -19,6 +20,7 @@
 #include <random>
 
 #include "nerf/format_samples.h"
+#include "watermark/small_evidence.h"
 
 using namespace fieldmark;
 using namespace fieldmark::nerf;
@@ -94,6 +96,13 @@ std::vector<Format> formats() {
       {"safetensors",
        {safetensors_file()},
        [](const std::string& b) { use(SafetensorsFile::parse(std::as_bytes(std::span(b)), "input")); }},
+      // Brought to its canonical form first: otherwise nearly every mutation would end there.
+      {"evidence.json",
+       {watermark::evidence_json(small_evidence(), watermark::public_key(test_key(5)),
+                                 {{"report.html", "f"}})},
+       [](const std::string& b) {
+         watermark::parse_evidence(watermark::canonical_json(b, "input"), "input");
+       }},
   };
 }
 
