@@ -1,39 +1,25 @@
 #pragma once
 // Pieces of SVG pictures. Private.
+#include <fieldmark/bench/markup.h>
+
 #include <cstdio>
 #include <string>
 
 namespace fieldmark::bench {
 
-inline std::string svg_escaped(const std::string& text) {
-  std::string out;
-  for (char c : text) {
-    if (c == '&')
-      out += "&amp;";
-    else if (c == '<')
-      out += "&lt;";
-    else if (c == '>')
-      out += "&gt;";
-    else if (c == '"')
-      out += "&quot;";
-    else
-      out += c;
-  }
-  return out;
-}
-
 // White, with the title at the upper left. Ends with "</svg>\n", to be added last.
 inline std::string svg_begin(int width, int height, const std::string& title) {
-  return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + std::to_string(width) + "\" height=\"" +
-         std::to_string(height) + "\" font-family=\"sans-serif\" font-size=\"13\">\n" +
+  const std::string w = std::to_string(width), h = std::to_string(height);
+  return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + w + "\" height=\"" + h + "\" viewBox=\"0 0 " +
+         w + " " + h + "\" font-family=\"sans-serif\" font-size=\"13\">\n" +
          "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n" +
-         "<text x=\"12\" y=\"24\" font-size=\"16\">" + svg_escaped(title) + "</text>\n";
+         "<text x=\"12\" y=\"24\" font-size=\"16\">" + escaped_markup(title) + "</text>\n";
 }
 
 // @param attributes  begin with a space, or are empty
 inline std::string svg_text(int x, int y, const std::string& attributes, const std::string& text) {
   return "<text x=\"" + std::to_string(x) + "\" y=\"" + std::to_string(y) + "\"" + attributes + ">" +
-         svg_escaped(text) + "</text>\n";
+         escaped_markup(text) + "</text>\n";
 }
 
 inline std::string svg_line(int x1, int y1, int x2, int y2, const char* colour) {
