@@ -1,4 +1,7 @@
+#include <fieldmark/engine/files.h>
 #include <fieldmark/engine/image.h>
+
+#include <filesystem>
 
 #include "cli/cli.h"
 #include "tools/tiny_job.h"
@@ -47,4 +50,66 @@ TEST_CASE("verify refuses a rate that no picture can reach, and messages that do
   CHECK_THAT(rate.err, Contains("--fpr"));
   CHECK(run_command({"verify", "--owner", job.owner, "--message", "123", pictures}).code == cli::kUsage);
   CHECK(run_command({"verify", "--owner", job.field, "--message", "5", pictures}).code == cli::kFailed);
+}
+
+TEST_CASE("verify tells of every view, and tests controls beside the pictures", "[verify]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string pictures = job.pictures(), white = job.folder / "white.png";
+  write_png(white, Tensor<float>({32, 32, 3}, 1.f));
+  const auto r = run_command({"verify", "--owner", job.owner, "--message", "5", "--control", white, pictures,
+                              "--control", pictures, "--json", "-"});
+  INFO(r.err);
+  CHECK(r.code == cli::kNotFound);
+  const auto json = nlohmann::json::parse(r.out);
+  CHECK(json["views"] == 2);
+  REQUIRE(json["per_view"].size() == 2);
+  CHECK(json["per_view"][1]["bits"].get<std::string>().size() == 4);
+  CHECK(json["per_view"][1]["confidences"].size() == 4);
+  REQUIRE(json["controls"].size() == 5);
+  CHECK(json["controls"][3]["name"] == "white.png");
+  CHECK(json["controls"][4]["statistic"] == json["statistic"]);
+  for (const auto& control : json["controls"]) CHECK(control["found"] == false);
+  CHECK(json["p_value_bits_two_sided"].is_number());
+  CHECK(json["wrong_keys"].is_null());
+}
+
+TEST_CASE("verify counts the same wrong keys for any number of threads", "[verify]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string pictures = job.pictures();
+  const auto counted = [&](const char* threads) {
+    const auto r = run_command({"verify", "--owner", job.owner, "--message", "5", "--wrong-keys", "20000",
+                                "--threads", threads, pictures, "--json", "-"});
+    return nlohmann::json::parse(r.out)["wrong_keys"];
+  };
+  const auto one = counted("1"), two = counted("2");
+  CHECK(one == two);
+  CHECK(one["n"] == 20000);
+  CHECK(one["intervals_99"]["1e-1"][0] > 1800);
+  CHECK(one["intervals_99"]["1e-1"][1] < 2200);
+  CHECK(one["counts"]["1e-8"] == 0);
+  CHECK(one["least_p"] < 1);
+}
+
+TEST_CASE("verify writes equal evidence for equal work, and spares folders of others", "[verify]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string pictures = job.pictures(), folder = job.folder / "proof";
+  const auto verify = [&] {
+    return run_command({"verify", "--owner", job.owner, "--message", "5", "--evidence", folder,
+                        "--wrong-keys", "200", pictures});
+  };
+  const auto first = verify();
+  INFO(first.err);
+  CHECK(first.code == cli::kNotFound);
+  const std::string evidence = read_text(folder + "/evidence.json"),
+                    page = read_text(folder + "/report.html");
+  CHECK(verify().code == cli::kNotFound);
+  CHECK(read_text(folder + "/evidence.json") == evidence);
+  CHECK(read_text(folder + "/report.html") == page);
+  CHECK_THAT(evidence, Contains("\"name\": \"view_000.png\"") && !Contains(job.folder.path.string()));
+  CHECK_THAT(page, Contains("view_001.png") && !Contains(job.folder.path.string()));
+  write_file_atomically(folder + "/letter.txt", std::string_view("mine"));
+  const auto refused = verify();
+  CHECK(refused.code == cli::kFailed);
+  CHECK_THAT(refused.err, Contains("found letter.txt"));
+  CHECK(read_text(folder + "/evidence.json") == evidence);
 }

@@ -32,6 +32,7 @@ constexpr Entry kCommands[] = {
     {"measure", "Bit accuracy and quality of a mark", add_measure},
     {"extract", "Read the message from pictures", add_extract},
     {"verify", "Decide whether pictures show a message, with p-values", add_verify},
+    {"check", "Look for alterations in the evidence that verify wrote", add_check},
     {"attack", "Do to pictures what may remove a mark", add_attack},
     {"bench", "Measure speed and error against this machine's peak", add_bench},
     {"gradcheck", "Check every hand-derived gradient against finite differences", add_gradcheck},

@@ -1,5 +1,6 @@
 #include <fieldmark/watermark/baker.h>
 #include <fieldmark/watermark/digest.h>
+#include <fieldmark/watermark/signing.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -51,9 +52,11 @@ int run(const Options& options, Context& context) {
 
   const auto owner_sha256 = watermark::sha256_file_hex(options.owner);
   const auto claim = watermark::claim_digest(owner_sha256, owner.key, message);
+  const auto open = to_hex(watermark::public_key(owner.key));
   const auto bytes = std::filesystem::file_size(options.out);
   context.text() << options.out << ": " << baker.steps() << " steps in " << format_duration(seconds)
-                 << "\nclaim " << claim << ", to be time-stamped before the field is published\n";
+                 << "\nclaim " << claim << ", to be time-stamped before the field is published\npublic key "
+                 << open << ", to be time-stamped with it\n";
   context.result({{"message", to_hex(message)},
                   {"payload", payload_json(message)},
                   {"bits", message.size()},
@@ -62,7 +65,8 @@ int run(const Options& options, Context& context) {
                   {"psnr_colours", number(baker.psnr())},
                   {"file_bytes", bytes},
                   {"owner_sha256", owner_sha256},
-                  {"claim", claim}});
+                  {"claim", claim},
+                  {"public_key", open}});
   return kOk;
 }
 

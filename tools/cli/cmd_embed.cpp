@@ -2,6 +2,7 @@
 #include <fieldmark/watermark/digest.h>
 #include <fieldmark/watermark/embed_views.h>
 #include <fieldmark/watermark/embedder.h>
+#include <fieldmark/watermark/signing.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -131,8 +132,9 @@ int run(const Options& options, Context& context) {
   write_picture(picture, owner, context.seed());
 
   const auto sha256 = watermark::sha256_file_hex(options.out);
+  const auto open = to_hex(watermark::public_key(owner.key));
   context.text() << options.out << ": " << embedder.steps() << " steps in " << format_duration(seconds)
-                 << ", keep it secret\nsha256 " << sha256 << "\n"
+                 << ", keep it secret\nsha256 " << sha256 << "\npublic key " << open << "\n"
                  << picture << ": unmarked, marked, ten times the difference\n";
   Json claim = nullptr;
   if (intended) {
@@ -155,6 +157,7 @@ int run(const Options& options, Context& context) {
   json["steps"] = embedder.steps();
   json["sha256"] = sha256;
   json["claim"] = claim;
+  json["public_key"] = open;
   context.result(json);
   return kOk;
 }

@@ -1,5 +1,5 @@
 #include <fieldmark/watermark/digest.h>
-#include <fieldmark/watermark/key.h>
+#include <fieldmark/watermark/signing.h>
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
@@ -22,11 +22,13 @@ int run(const Options& options, Context& context) {
   // A lost key is a lost proof: it is replaced only on demand.
   if (std::filesystem::exists(options.out) && !options.force)
     throw IoError(options.out + ": exists already; --force replaces it, and what was marked with it is lost");
-  watermark::save_key(options.out, watermark::random_key());
+  const auto key = watermark::random_key();
+  watermark::save_key(options.out, key);
+  const std::string open = to_hex(watermark::public_key(key));
   const std::string sha256 = watermark::sha256_file_hex(options.out);
   context.text() << options.out << ": 256 bits from the operating system, keep them secret\nsha256 " << sha256
-                 << "\n";
-  context.result({{"file", options.out}, {"bits", 256}, {"sha256", sha256}});
+                 << "\npublic key " << open << ", by which anybody can tell what it signed\n";
+  context.result({{"file", options.out}, {"bits", 256}, {"sha256", sha256}, {"public_key", open}});
   return kOk;
 }
 

@@ -1,5 +1,5 @@
 #include <fieldmark/watermark/digest.h>
-#include <fieldmark/watermark/wrong_keys.h>
+#include <fieldmark/watermark/evidence_folder.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -9,43 +9,98 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/evidence_run.h"
 #include "cli/message_option.h"
-#include "cli/reading.h"
+#include "cli/report.h"
 
 namespace fieldmark::cli {
 namespace {
 
+constexpr Index kEvidenceKeys = 100000;
+
 struct Options {
-  std::string owner, key;
+  std::string owner, key, evidence;
   MessageOption message;
   double fpr = 1e-6;
   Index wrong_keys = 0;
-  std::vector<std::string> images;
+  std::vector<std::string> images, controls;
 };
 
-// How often keys that have nothing to do with the pictures reach each p-value, beside the most that chance
-// allows.
-Json wrong_keys(const Options& options, const watermark::Owner& owner, const std::vector<double>& evidence,
-                const watermark::Message& message, Context& context) {
-  if (options.wrong_keys == 0) return nullptr;
-  const auto found =
-      watermark::count_wrong_keys(evidence, owner.cells.area(), message, options.wrong_keys, context.seed());
-  Json counts = Json::object(), bounds = Json::object();
+watermark::WrongKeyCounts count_keys(const KeyTest& test, const std::vector<double>& evidence, Index n,
+                                     Context& context) {
+  const InterruptGuard guard;
+  Progress progress = context.progress("wrong keys");
+  return watermark::count_wrong_keys(
+      evidence, test.owner.cells.area(), test.message, n, context.seed(), [&](Index done, Index total) {
+        if (guard.interrupted()) throw Interrupted("nothing was decided");
+        progress.update(static_cast<double>(done) / static_cast<double>(total));
+        return true;
+      });
+}
+
+// How often keys that have nothing to do with the pictures reach each p-value, beside what chance allows.
+Json wrong_keys(const watermark::WrongKeyCounts& found, Context& context) {
+  Json counts = Json::object(), bounds = Json::object(), intervals = Json::object();
   double p = 1;
   for (int i = 0; i < watermark::WrongKeyCounts::kThresholds; ++i) {
     p /= 10;
     const std::string name = "1e-" + std::to_string(i + 1);
     const Index count = found.counts[static_cast<std::size_t>(i)],
                 bound = watermark::binomial_upper(found.n, p);
+    const auto interval = watermark::binomial_interval(found.n, p);
     counts[name] = count;
     bounds[name] = bound;
-    char line[120];
-    std::snprintf(line, sizeof line, "wrong keys at p <= %s   %lld of %lld, 99%% of the time at most %lld\n",
-                  name.c_str(), static_cast<long long>(count), static_cast<long long>(found.n),
-                  static_cast<long long>(bound));
+    intervals[name] = {interval.low, interval.high};
+    char line[160];
+    std::snprintf(
+        line, sizeof line,
+        "wrong keys at p <= %s   %lld of %lld, 99%% of the time at most %lld (99%% interval %lld to "
+        "%lld)\n",
+        name.c_str(), static_cast<long long>(count), static_cast<long long>(found.n),
+        static_cast<long long>(bound), static_cast<long long>(interval.low),
+        static_cast<long long>(interval.high));
     context.text() << line;
   }
-  return {{"n", found.n}, {"counts", counts}, {"bounds_99", bounds}};
+  char least[80];
+  std::snprintf(least, sizeof least, "wrong keys, least p      %.2e\n", found.least_p);
+  context.text() << least;
+  return {{"n", found.n},
+          {"counts", counts},
+          {"bounds_99", bounds},
+          {"intervals_99", intervals},
+          {"least_p", found.least_p}};
+}
+
+void print_verdict(const watermark::EvidenceRecord& record, Context& context) {
+  const auto& score = record.together;
+  char text[400];
+  std::snprintf(text, sizeof text,
+                "%s at a rate of false alarms of %g\n"
+                "p-value, keyed        %.2e (two-sided %.2e), from %zu pictures together\n"
+                "p-value, bits         %.2e (two-sided %.2e), %lld of %lld match\n",
+                record.found() ? "FOUND" : "NOT FOUND", record.fpr, score.p_value, score.p_value_two_sided,
+                record.pictures.size(), score.p_value_bits, score.p_value_bits_two_sided,
+                static_cast<long long>(score.match.matching), static_cast<long long>(score.match.bits));
+  context.text() << text << "owner sha256 " << record.owner_sha256 << "\nclaim " << record.claim << "\n";
+}
+
+Json result_json(const watermark::EvidenceRecord& record, const std::string& signer) {
+  const auto& score = record.together;
+  return {{"found", record.found()},
+          {"p_value", score.p_value},
+          {"p_value_bits", score.p_value_bits},
+          {"p_value_bits_two_sided", score.p_value_bits_two_sided},
+          {"p_value_two_sided", score.p_value_two_sided},
+          {"statistic", score.statistic},
+          {"matching_bits", score.match.matching},
+          {"bits", score.match.bits},
+          {"views", record.pictures.size()},
+          {"reading", record.reading},
+          {"fpr", record.fpr},
+          {"owner_sha256", record.owner_sha256},
+          {"claim", record.claim},
+          {"public_key", signer},
+          {"controls", controls_json(record.controls, record.fpr)}};
 }
 
 int run(const Options& options, Context& context) {
@@ -62,40 +117,42 @@ int run(const Options& options, Context& context) {
     throw UsageError(text);
   }
 
+  if (!options.evidence.empty()) watermark::prepare_evidence_folder(options.evidence);
   const auto pictures = read_pictures(owner, options.images, context);
   const auto evidence = total_evidence(pictures);
-  const double statistic = watermark::keyed_statistic(evidence, code, message);
-  const double p = watermark::keyed_p_value(statistic),
-               two_sided = watermark::keyed_p_value_two_sided(statistic);
-  const auto match = watermark::match_bits(watermark::read_bits(evidence, code, bits), message);
-  const double p_bits = watermark::p_value_bits(match.matching, match.decided);
-  const bool found = p <= options.fpr;
-  const auto owner_sha256 = watermark::sha256_file_hex(options.owner);
-  const auto claim = watermark::claim_digest(owner_sha256, key, message);
-
-  char text[400];
-  std::snprintf(text, sizeof text,
-                "%s at a rate of false alarms of %g\n"
-                "p-value, keyed        %.2e (two-sided %.2e), from %zu pictures together\n"
-                "p-value, bits         %.2e, %lld of %lld match\n",
-                found ? "FOUND" : "NOT FOUND", options.fpr, p, two_sided, pictures.size(), p_bits,
-                static_cast<long long>(match.matching), static_cast<long long>(match.bits));
-  context.text() << text << "owner sha256 " << owner_sha256 << "\nclaim " << claim << "\n";
-  const Json wrong = wrong_keys(options, owner, evidence, message, context);
-  context.result({{"found", found},
-                  {"p_value", p},
-                  {"p_value_bits", p_bits},
-                  {"p_value_two_sided", two_sided},
-                  {"matching_bits", match.matching},
-                  {"bits", match.bits},
-                  {"views", pictures.size()},
-                  {"reading", "blind"},
-                  {"fpr", options.fpr},
-                  {"payload", payload_json(message)},
-                  {"owner_sha256", owner_sha256},
-                  {"claim", claim},
-                  {"wrong_keys", wrong}});
-  return found ? kOk : kNotFound;
+  const KeyTest test{owner, code, message};
+  watermark::EvidenceRecord record{.owner_sha256 = watermark::sha256_file_hex(options.owner),
+                                   .message = message,
+                                   .fpr = options.fpr,
+                                   .cells = code.carriers(),
+                                   .together = test(evidence),
+                                   .pictures = score_pictures(test, pictures),
+                                   .seed = context.seed(),
+                                   .commit = machine().commit,
+                                   .isa = machine().isa};
+  record.claim = watermark::claim_digest(record.owner_sha256, key, message);
+  print_views(context.text(), pictures, record.pictures);
+  print_verdict(record, context);
+  TestedControls controls;
+  if (!options.controls.empty() || !options.evidence.empty())
+    controls = test_controls(test, pictures, options.controls, context);
+  record.controls = controls.controls;
+  print_controls(context.text(), record.controls, options.fpr);
+  const Index keys =
+      options.wrong_keys == 0 && !options.evidence.empty() ? kEvidenceKeys : options.wrong_keys;
+  if (keys > 0) record.wrong_keys = count_keys(test, evidence, keys, context);
+  const Json wrong = record.wrong_keys ? wrong_keys(*record.wrong_keys, context) : Json(nullptr);
+  const std::string signer = to_hex(watermark::public_key(key));
+  if (!options.evidence.empty()) {
+    write_evidence(options.evidence, record, pictures, controls.thumbnails, owner, key);
+    context.text() << options.evidence << ": report.html and what proves it, signed by " << signer << "\n";
+  }
+  Json json = result_json(record, signer);
+  json["payload"] = payload_json(message);
+  json["wrong_keys"] = wrong;
+  json["per_view"] = per_view_json(pictures, record.pictures);
+  context.result(json);
+  return record.found() ? kOk : kNotFound;
 }
 
 }  // namespace
@@ -108,9 +165,24 @@ Command add_verify(CLI::App& app) {
       ->check(CLI::Range(1e-300, 1.0).description(""))
       ->type_name("P");
   app.add_option("--key", o->key, "Another key than the owner's")->type_name("KEY");
-  app.add_option("--wrong-keys", o->wrong_keys, "Also test this many random keys, 0 to 10000000")
+  app.add_option("--wrong-keys", o->wrong_keys,
+                 "Also test this many random keys, 0 to 10000000 (0; with --evidence 100000)")
       ->check(CLI::Range(0, 10000000).description(""))
-      ->type_name("N");
+      ->type_name("N")
+      ->default_str("");
+  app.add_option(
+         "--control", o->controls,
+         "Picture, or folder of them, that is not marked: tested too, beside built-in controls; several "
+         "times")
+      ->allow_extra_args(false)
+      ->type_name("IMAGE|DIR")
+      ->default_str("");
+  app.add_option(
+         "--evidence", o->evidence,
+         "Folder for a signed record, a page and a C2PA soft binding (see `fieldmark check`); new, empty, "
+         "or with earlier evidence")
+      ->type_name("DIR")
+      ->default_str("");
   app.add_option("images", o->images,
                  "Pictures of one field, or folders of them (PNG, JPEG): one verdict for all")
       ->required()

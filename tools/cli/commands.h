@@ -17,6 +17,7 @@ using Command = std::function<int(Context&)>;
 Command add_attack(CLI::App& app);
 Command add_bake(CLI::App& app);
 Command add_bench(CLI::App& app);
+Command add_check(CLI::App& app);
 Command add_compare(CLI::App& app);
 Command add_data(CLI::App& app);
 Command add_embed(CLI::App& app);

@@ -1,6 +1,8 @@
 #include "cli/reading.h"
 
+#include <fieldmark/engine/files.h>
 #include <fieldmark/engine/image.h>
+#include <fieldmark/watermark/digest.h>
 
 #include "cli/cli.h"
 #include "cli/context.h"
@@ -9,10 +11,12 @@
 namespace fieldmark::cli {
 namespace {
 
-std::vector<double> evidence_of(const watermark::PictureReader& reader, const std::filesystem::path& path) {
-  const Tensor<float> picture = read_image(path);
+PictureEvidence evidence_of(const watermark::PictureReader& reader, const std::filesystem::path& path) {
+  const auto bytes = read_bytes(path);
+  const Tensor<float> picture = decode_image(bytes, path.string());
   try {
-    return reader.evidence(picture);
+    return {path.string(), reader.evidence(picture), watermark::sha256_hex(bytes), picture.shape[1],
+            picture.shape[0]};
   } catch (const ShapeError& e) {
     throw IoError(path.string() + ": " + e.what());
   }
@@ -29,7 +33,7 @@ std::vector<PictureEvidence> read_pictures(const watermark::Owner& owner,
   std::vector<PictureEvidence> read;
   for (const auto& path : pictures) {
     if (guard.interrupted()) throw Interrupted("nothing was decided");
-    read.push_back({path.string(), evidence_of(reader, path)});
+    read.push_back(evidence_of(reader, path));
     progress.update(static_cast<double>(read.size()) / static_cast<double>(pictures.size()));
   }
   return read;

@@ -12,6 +12,9 @@ class Context;
 struct PictureEvidence {
   std::string image;
   std::vector<double> cells;  ///< sign evidence S_c
+  std::string sha256{};       ///< of the file's bytes
+  Index width = 0;            ///< pixels
+  Index height = 0;           ///< pixels
 };
 
 /// Reads the pictures that IMAGE|DIR... names. @throws IoError naming the picture that cannot be read

@@ -1,0 +1,77 @@
+#include <fieldmark/watermark/evidence_folder.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <ostream>
+
+#include "cli/cli.h"
+#include "cli/commands.h"
+#include "cli/context.h"
+#include "cli/pictures.h"
+
+namespace fieldmark::cli {
+namespace {
+
+struct Options {
+  std::string folder, public_key;
+  std::vector<std::string> images;
+};
+
+Json result(const watermark::EvidenceCheck& check, std::size_t given) {
+  Json json{{"intact", check.faults.empty()},
+            {"faults", check.faults},
+            {"pictures", given},
+            {"pictures_known", check.pictures}};
+  if (const auto& s = check.summary) {
+    json["public_key"] = to_hex(s->signer);
+    json["claim"] = s->claim;
+    json["owner_sha256"] = s->owner_sha256;
+    json["message"] = to_hex(s->message);
+    json["found"] = s->found;
+    json["p_value"] = s->p_value;
+  }
+  return json;
+}
+
+int run(const Options& options, Context& context) {
+  std::optional<watermark::PublicKey> signer;
+  if (!options.public_key.empty())
+    signer = read_option("--public-key", [&] { return watermark::public_key_from_hex(options.public_key); });
+  const auto pictures =
+      options.images.empty() ? std::vector<std::filesystem::path>{} : list_pictures(options.images);
+  const auto check = watermark::check_evidence_folder(options.folder, pictures, signer);
+  auto& out = context.text();
+  for (const auto& fault : check.faults) out << fault << "\n";
+  out << options.folder << (check.faults.empty() ? ": INTACT" : ": ALTERED") << "\n";
+  if (const auto& s = check.summary; s && check.faults.empty()) {
+    char p[40];
+    std::snprintf(p, sizeof p, "%.2e", s->p_value);
+    out << "it says     " << (s->found ? "FOUND" : "NOT FOUND") << ", p " << p << ", message "
+        << to_hex(s->message) << "\nclaim       " << s->claim << "\nsigned by   " << to_hex(s->signer)
+        << (signer ? ", as expected" : ", not compared with anything (see --public-key)") << "\npictures    "
+        << check.pictures << " given that it is about\n";
+  }
+  context.result(result(check, pictures.size()));
+  return check.faults.empty() ? kOk : kFailed;
+}
+
+}  // namespace
+
+Command add_check(CLI::App& app) {
+  auto o = std::make_shared<Options>();
+  app.add_option("folder", o->folder, "What `fieldmark verify --evidence` wrote")
+      ->required()
+      ->type_name("DIR");
+  app.add_option(
+         "images", o->images,
+         "Pictures, or folders of them, that the evidence should be about (their SHA-256 is compared)")
+      ->type_name("IMAGE|DIR")
+      ->default_str("");
+  app.add_option("--public-key", o->public_key,
+                 "Whose signature it must be, 64 digits, as `key`, `embed` and `bake` print it (anybody's)")
+      ->type_name("HEX")
+      ->default_str("");
+  return [o](Context& context) { return run(*o, context); };
+}
+
+}  // namespace fieldmark::cli

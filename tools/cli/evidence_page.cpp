@@ -1,0 +1,273 @@
+#include "cli/evidence_page.h"
+
+#include <fieldmark/bench/bar_chart.h>
+#include <fieldmark/bench/histogram_chart.h>
+#include <fieldmark/bench/markup.h>
+#include <fieldmark/engine/image.h>
+#include <fieldmark/engine/resize.h>
+#include <fieldmark/watermark/base64.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace fieldmark::cli {
+namespace {
+
+using bench::escaped_markup;
+using watermark::EvidenceRecord;
+using watermark::EvidenceScore;
+constexpr Index kThumbnail = 160;             // pixels of the longer side
+constexpr int kQuality = 80;                  // of its JPEG
+constexpr std::size_t kPlottedPictures = 40;  // more would not fit a page
+
+constexpr char kHead[] = R"(<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; img-src data:; style-src 'unsafe-inline'">
+<title>Evidence of a mark</title>
+<style>
+body { font: 16px/1.5 sans-serif; color: #1a1a1a; background: #fff; max-width: 960px; margin: 2em auto; padding: 0 1em; }
+h1 { font-size: 1.6em; } h2 { font-size: 1.2em; margin-top: 2em; border-bottom: 1px solid #bbb; }
+.verdict { border: 3px solid; padding: 0.6em 1em; font-size: 1.1em; }
+.found { border-color: #1b5e20; } .missing { border-color: #8c2a20; }
+table { border-collapse: collapse; margin: 1em 0; width: 100%; }
+caption { text-align: left; font-weight: bold; padding: 0.3em 0; }
+th, td { border: 1px solid #bbb; padding: 0.3em 0.5em; text-align: left; vertical-align: top; }
+thead th { background: #eee; } td.n { text-align: right; white-space: nowrap; }
+code { font-size: 0.9em; overflow-wrap: anywhere; } u { text-decoration-thickness: 2px; }
+figure { margin: 1em 0; } figure svg { max-width: 100%; height: auto; }
+img { display: block; max-width: 160px; height: auto; }
+@media print { body { margin: 0; max-width: none; } tr, figure { break-inside: avoid; } }
+</style>
+</head>
+<body>
+)";
+
+std::string text_of(double value, const char* format = "%.2g") {
+  char text[40];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+std::string cell(const std::string& inner) { return "<td>" + inner + "</td>"; }
+std::string number_cell(const std::string& inner) { return "<td class=\"n\">" + inner + "</td>"; }
+std::string code(const std::string& text) { return "<code>" + escaped_markup(text) + "</code>"; }
+
+// A bound on a probability in words: "1 in 10 000 000".
+std::string one_in(double p) {
+  const int zeros = static_cast<int>(std::floor(-std::log10(p) + 1e-9));
+  if (zeros < 1) return text_of(100 * p, "%.3g") + "%";
+  if (zeros > 9) return "1 in 10<sup>" + std::to_string(zeros) + "</sup>";
+  std::string digits = "1" + std::string(static_cast<std::size_t>(zeros), '0');
+  for (int at = zeros - 2; at > 0; at -= 3) digits.insert(static_cast<std::size_t>(at), "&nbsp;");
+  return "1 in " + digits;
+}
+
+// Bits that differ from the message's are underlined.
+std::string marked_bits(const EvidenceScore& score, const watermark::Message& message) {
+  std::string out;
+  for (std::size_t i = 0; i < message.bits.size(); ++i) {
+    const bool bit = score.reading.message.bits[i];
+    const std::string digit = !score.reading.decided[i] ? "-" : bit ? "1" : "0";
+    out += digit != "-" && bit == (message.bits[i] == 1) ? digit : "<u>" + digit + "</u>";
+  }
+  return "<code>" + out + "</code>";
+}
+
+std::string score_cells(const EvidenceScore& s) {
+  return number_cell(std::to_string(s.match.matching) + " of " + std::to_string(s.match.bits)) +
+         number_cell(text_of(s.p_value)) + number_cell(text_of(s.p_value_two_sided)) +
+         number_cell(text_of(s.p_value_bits));
+}
+
+std::string verdict(const EvidenceRecord& r) {
+  const std::string count = r.pictures.size() == 1
+                                ? "the picture"
+                                : "the " + std::to_string(r.pictures.size()) + " pictures together";
+  if (r.found())
+    return "<p class=\"verdict found\"><strong>The mark was found</strong> in " + count +
+           ". If the owner's key had nothing to do with them, evidence this strong would come up with a "
+           "probability of at most " +
+           one_in(r.together.p_value) + " (asked for: " + one_in(r.fpr) + ").</p>\n";
+  return "<p class=\"verdict missing\"><strong>The mark was not found</strong> in " + count +
+         ". Evidence as strong as theirs comes up by chance with a probability of up to " +
+         one_in(r.together.p_value) + "; what was asked for is " + one_in(r.fpr) + ".</p>\n";
+}
+
+std::string controls_verdict(const EvidenceRecord& r) {
+  std::string loud;
+  for (const auto& control : r.controls)
+    if (control.together.p_value <= r.fpr) loud += (loud.empty() ? "" : ", ") + escaped_markup(control.name);
+  if (r.controls.empty()) return "<p>No controls were tested.</p>\n";
+  if (loud.empty())
+    return "<p>The same test found nothing in any of the controls, pictures that do not hold the mark.</p>\n";
+  return "<p><strong>The test also answered to controls: " + loud +
+         ".</strong> Either they hold the mark after all, or the test cannot be relied on here.</p>\n";
+}
+
+constexpr char kLimits[] = R"(<h2>What this does not prove</h2>
+<ul>
+<li><strong>It counts only if the claim below was fixed before the field or its pictures were published</strong>, by a
+time-stamp or by publishing it. Afterwards anybody can make up a mark that fits given pictures.</li>
+<li>It says that the pictures carry this owner's mark. It does not say who made them, who copied what, or who has which rights.</li>
+<li>The probabilities hold for pictures that were not selected by the result. Of a thousand tests, one reaches 0.001 by chance.</li>
+<li>Where no mark is found, that does not prove that there was none: a mark can be damaged.</li>
+<li>The signature shows that the holder of the key wrote these figures and that nobody changed them since. It does not show that
+they were computed honestly: whoever has the OWNER file can repeat the test.</li>
+</ul>
+)";
+
+std::string figures(const EvidenceRecord& r) {
+  const auto row = [](const char* what, const std::string& value) {
+    return std::string("<tr><th scope=\"row\">") + what + "</th>" + cell(value) + "</tr>\n";
+  };
+  const EvidenceScore& s = r.together;
+  return "<h2>Figures</h2>\n<table><caption>All pictures together</caption>\n" +
+         row("Message looked for",
+             code(to_hex(r.message)) + ", " + std::to_string(r.message.size()) + " bits") +
+         row("Bits read, wrong ones underlined", marked_bits(s, r.message)) +
+         row("p-value of the key", text_of(s.p_value) + " one-sided, " + text_of(s.p_value_two_sided) +
+                                       " two-sided; a bound for any picture, over " +
+                                       std::to_string(r.cells) +
+                                       " cells of the scene, T = " + text_of(s.statistic, "%.2f")) +
+         row("p-value of the matching bits", text_of(s.p_value_bits) + " one-sided, " +
+                                                 text_of(s.p_value_bits_two_sided) + " two-sided; " +
+                                                 std::to_string(s.match.matching) + " of " +
+                                                 std::to_string(s.match.decided) + " decided bits match") +
+         row("Rate of false alarms asked for", text_of(r.fpr)) +
+         row("Reading",
+             escaped_markup(r.reading) +
+                 (r.reading == "blind" ? ": picture and extractor only; key and message had no part in it"
+                                       : "")) +
+         "</table>\n";
+}
+
+std::string picture_plot(const EvidenceRecord& r) {
+  std::vector<bench::Bar> bars;
+  double longest = -std::log10(r.fpr);
+  for (std::size_t i = 0; i < std::min(r.pictures.size(), kPlottedPictures); ++i) {
+    const double p = r.pictures[i].score.p_value;
+    bars.push_back({"picture " + std::to_string(i + 1), -std::log10(p), "p " + text_of(p)});
+    longest = std::max(longest, bars.back().value);
+  }
+  bars.push_back({"asked for", -std::log10(r.fpr), "p " + text_of(r.fpr)});
+  const double full = 4 * std::max(1., std::ceil(longest / 4));
+  std::string more;
+  if (r.pictures.size() > kPlottedPictures)
+    more = " Only the first " + std::to_string(kPlottedPictures) + " are drawn.";
+  return "<figure role=\"img\" aria-label=\"Bars: evidence of each picture by itself\">\n" +
+         bench::bar_chart("Evidence of each picture by itself: zeros of its p-value (-log10 p)", bars, full) +
+         "<figcaption>Each bar is one picture alone. Together they weigh more than the longest of them." +
+         more + "</figcaption></figure>\n";
+}
+
+std::string pictures_table(const EvidenceRecord& r, const PagePictures& images) {
+  std::string out =
+      "<h2>Pictures</h2>\n" + picture_plot(r) +
+      "<table><caption>Each picture by itself; bits that differ from the message are underlined</caption>\n"
+      "<thead><tr><th scope=\"col\">Picture</th><th scope=\"col\">File and bits</th><th scope=\"col\">Bits "
+      "that "
+      "match</th><th scope=\"col\">p, key</th><th scope=\"col\">two-sided</th><th scope=\"col\">p, "
+      "bits</th></tr></thead>\n<tbody>\n";
+  for (std::size_t i = 0; i < r.pictures.size(); ++i) {
+    const auto& picture = r.pictures[i];
+    const std::string label = std::to_string(i + 1) + ": " + escaped_markup(picture.name);
+    out +=
+        "<tr>" + cell("<img alt=\"Picture " + label + "\" src=\"" + images.pictures.at(i) + "\">") +
+        cell(label + "<br>" + marked_bits(picture.score, r.message) + "<br>SHA-256 " + code(picture.sha256)) +
+        score_cells(picture.score) + "</tr>\n";
+  }
+  return out + "</tbody></table>\n";
+}
+
+std::string controls_table(const EvidenceRecord& r, const PagePictures& images) {
+  if (r.controls.empty()) return "";
+  std::string out =
+      "<h2>Controls</h2>\n" + controls_verdict(r) +
+      "<table><caption>The same key, message and test on pictures that do not hold the mark</caption>\n"
+      "<thead><tr><th scope=\"col\">Example</th><th scope=\"col\">Control</th><th scope=\"col\">Bits that "
+      "match</th><th scope=\"col\">p, key</th><th scope=\"col\">two-sided</th><th scope=\"col\">p, "
+      "bits</th></tr></thead>\n<tbody>\n";
+  for (std::size_t i = 0; i < r.controls.size(); ++i) {
+    const auto& control = r.controls[i];
+    const std::string name = escaped_markup(control.name);
+    double least = 1;
+    for (const auto& picture : control.pictures) least = std::min(least, picture.score.p_value);
+    out +=
+        "<tr>" + cell("<img alt=\"Control " + name + "\" src=\"" + images.controls.at(i) + "\">") +
+        cell("<strong>" + name + "</strong>, " + std::to_string(control.pictures.size()) + " together<br>" +
+             escaped_markup(control.meaning) + "<br>Least p of one alone: " + text_of(least)) +
+        score_cells(control.together) + "</tr>\n";
+  }
+  return out + "</tbody></table>\n";
+}
+
+std::string wrong_keys(const EvidenceRecord& r) {
+  if (!r.wrong_keys) return "";
+  const auto& w = *r.wrong_keys;
+  using Counts = watermark::WrongKeyCounts;
+  const std::string n = std::to_string(w.n);
+  std::string out =
+      "<h2>Wrong keys</h2>\n<p>The evidence of all pictures was tested under " + n +
+      " random keys that have nothing to do with them. The least p-value among them is " +
+      text_of(w.least_p) + "; the key in question has " + text_of(r.together.p_value) +
+      ".</p>\n<figure role=\"img\" aria-label=\"Histogram: statistic of wrong keys, and of the key in "
+      "question\">\n" +
+      bench::histogram_chart({.title = "How many of " + n + " wrong keys reach which evidence T",
+                              .x = "T: 0 on average for a key that has nothing to do with the pictures",
+                              .counts = {w.histogram.begin(), w.histogram.end()},
+                              .from = -Counts::kBins / 2. / Counts::kBinsPerUnit,
+                              .bin = 1. / Counts::kBinsPerUnit,
+                              .mark = r.together.statistic,
+                              .mark_label = "the key in question"}) +
+      "</figure>\n<table><caption>How often wrong keys reach a p-value</caption>\n<thead><tr><th "
+      "scope=\"col\">p at most</th><th scope=\"col\">wrong keys</th><th scope=\"col\">99% interval of as "
+      "many "
+      "fair trials</th></tr></thead>\n<tbody>\n";
+  for (int i = 0; i < Counts::kThresholds; ++i) {
+    const auto interval = watermark::binomial_interval(w.n, std::pow(10., -1 - i));
+    out += "<tr>" + number_cell("1e-" + std::to_string(i + 1)) +
+           number_cell(std::to_string(w.counts[static_cast<std::size_t>(i)])) +
+           number_cell(std::to_string(interval.low) + " to " + std::to_string(interval.high)) + "</tr>\n";
+  }
+  return out + "</tbody></table>\n<p>Counts below the interval are no fault: the p-value is a bound.</p>\n";
+}
+
+std::string identity(const EvidenceRecord& r, const watermark::PublicKey& signer) {
+  const auto row = [](const char* what, const std::string& value) {
+    return std::string("<tr><th scope=\"row\">") + what + "</th>" + cell(code(value)) + "</tr>\n";
+  };
+  return "<h2>What was fixed, and how to check it</h2>\n<table>\n" +
+         row("Claim (to have been time-stamped)", r.claim) + row("Public key of who signed", to_hex(signer)) +
+         row("SHA-256 of the OWNER file", r.owner_sha256) +
+         row("Program", r.commit + ", kernels x86-64-" + r.isa + ", seed " + std::to_string(r.seed)) +
+         "</table>\n"
+         "<p>The claim is the SHA-256 of the SHA-256 of the OWNER file, the key and the message; it gives "
+         "none of "
+         "them away. To check that nothing here was altered:</p>\n<pre><code>fieldmark check FOLDER "
+         "PICTURES\nopenssl pkeyutl -verify -pubin -inkey public_key.pem -rawin -in evidence.json -sigfile "
+         "evidence.sig</code></pre>\n<p>Whoever holds the OWNER file repeats the whole test with "
+         "<code>fieldmark "
+         "verify</code>.</p>\n";
+}
+
+}  // namespace
+
+std::string thumbnail(const Tensor<float>& rgb) {
+  const Index h = rgb.shape[0], w = rgb.shape[1], longer = std::max(h, w);
+  const auto scaled = [&](Index side) { return std::max<Index>(1, side * kThumbnail / longer); };
+  const auto jpeg = encode_jpeg(longer > kThumbnail ? resize_area(rgb, scaled(h), scaled(w)) : rgb, kQuality);
+  return "data:image/jpeg;base64," + watermark::to_base64(jpeg);
+}
+
+std::string evidence_page(const EvidenceRecord& record, const watermark::PublicKey& signer,
+                          const PagePictures& pictures) {
+  return kHead + std::string("<h1>Evidence of a mark</h1>\n") + verdict(record) + controls_verdict(record) +
+         kLimits + figures(record) + pictures_table(record, pictures) + controls_table(record, pictures) +
+         wrong_keys(record) + identity(record, signer) + "</body>\n</html>\n";
+}
+
+}  // namespace fieldmark::cli

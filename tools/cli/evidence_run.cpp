@@ -1,0 +1,148 @@
+#include "cli/evidence_run.h"
+
+#include <fieldmark/engine/image.h>
+#include <fieldmark/watermark/controls.h>
+#include <fieldmark/watermark/evidence_folder.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <ostream>
+
+#include "cli/cli.h"
+#include "cli/context.h"
+#include "cli/pictures.h"
+
+namespace fieldmark::cli {
+namespace {
+
+using watermark::EvidenceControl;
+using watermark::EvidencePicture;
+using watermark::EvidenceScore;
+constexpr Index kControlViews = 5;
+
+float background(const watermark::Owner& owner) { return nerf::background_value(owner.field.background); }
+
+std::string file_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
+
+// "views/" ends with an empty part.
+std::string given_name(const std::string& path) {
+  const std::string name = file_name(path);
+  return name.empty() ? std::filesystem::path(path).parent_path().filename().string() : name;
+}
+
+EvidenceControl built_in(const KeyTest& test, const watermark::Control& control) {
+  const watermark::PictureReader reader(test.owner);
+  const InterruptGuard guard;
+  EvidenceControl tested{control.name, control.meaning};
+  std::vector<PictureEvidence> read;
+  for (const auto& picture : control.pictures) {
+    if (guard.interrupted()) throw Interrupted("nothing was decided");
+    read.push_back({control.name + " " + std::to_string(read.size() + 1), reader.evidence(picture), "",
+                    picture.shape[1], picture.shape[0]});
+  }
+  tested.pictures = score_pictures(test, read);
+  tested.together = test(total_evidence(read));
+  return tested;
+}
+
+Json score_json(const EvidenceScore& s) {
+  return {{"statistic", s.statistic},
+          {"p_value", s.p_value},
+          {"p_value_two_sided", s.p_value_two_sided},
+          {"p_value_bits", s.p_value_bits},
+          {"matching_bits", s.match.matching}};
+}
+
+}  // namespace
+
+std::vector<EvidencePicture> score_pictures(const KeyTest& test,
+                                            const std::vector<PictureEvidence>& pictures) {
+  std::vector<EvidencePicture> scores;
+  for (const auto& p : pictures)
+    scores.push_back({file_name(p.image), p.sha256, p.width, p.height, test(p.cells)});
+  return scores;
+}
+
+TestedControls test_controls(const KeyTest& test, const std::vector<PictureEvidence>& pictures,
+                             const std::vector<std::string>& given, Context& context) {
+  TestedControls tested;
+  std::vector<Tensor<float>> questioned;
+  for (const auto& p : pictures)
+    if (static_cast<Index>(questioned.size()) < kControlViews)
+      questioned.push_back(read_rgb(p.image, background(test.owner)));
+  const auto controls = watermark::built_in_controls(test.owner, questioned, kControlViews, context.seed());
+  for (const auto& control : controls) {
+    tested.controls.push_back(built_in(test, control));
+    tested.thumbnails.push_back(thumbnail(control.pictures[0]));
+  }
+  for (const auto& path : given) {
+    const auto read = read_pictures(test.owner, {path}, context);
+    tested.controls.push_back(
+        {given_name(path), "Given as a control: pictures of which the user says that they are not marked.",
+         score_pictures(test, read), test(total_evidence(read))});
+    tested.thumbnails.push_back(thumbnail(read_rgb(read[0].image, background(test.owner))));
+  }
+  return tested;
+}
+
+Json controls_json(const std::vector<EvidenceControl>& controls, double fpr) {
+  Json list = Json::array();
+  for (const auto& control : controls) {
+    Json entry{{"name", control.name}, {"views", control.pictures.size()}};
+    entry.update(score_json(control.together));
+    entry["found"] = control.together.p_value <= fpr;
+    list.push_back(entry);
+  }
+  return list;
+}
+
+Json per_view_json(const std::vector<PictureEvidence>& pictures, const std::vector<EvidencePicture>& scores) {
+  Json list = Json::array();
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    const auto& reading = scores[i].score.reading;
+    Json entry{{"image", pictures[i].image}, {"bits", to_bits(reading.message)}};
+    entry.update(score_json(scores[i].score));
+    entry["logits"] = reading.logit;
+    entry["confidences"] = watermark::bit_confidence(reading);
+    list.push_back(entry);
+  }
+  return list;
+}
+
+void print_views(std::ostream& out, const std::vector<PictureEvidence>& pictures,
+                 const std::vector<EvidencePicture>& scores) {
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    const EvidenceScore& s = scores[i].score;
+    const auto sure = watermark::bit_confidence(s.reading);
+    char text[120];
+    std::snprintf(text, sizeof text, "  %lld of %lld, p %.1e, least sure bit %.1f%%  ",
+                  static_cast<long long>(s.match.matching), static_cast<long long>(s.match.bits), s.p_value,
+                  100 * *std::min_element(sure.begin(), sure.end()));
+    out << to_bits(s.reading.message) << text << pictures[i].image << "\n";
+  }
+}
+
+void print_controls(std::ostream& out, const std::vector<EvidenceControl>& controls, double fpr) {
+  for (const auto& control : controls) {
+    const EvidenceScore& s = control.together;
+    char text[160];
+    std::snprintf(text, sizeof text, "%.2g (two-sided %.2g), %lld of %lld match, pictures: %zu%s\n",
+                  s.p_value, s.p_value_two_sided, static_cast<long long>(s.match.matching),
+                  static_cast<long long>(s.match.bits), control.pictures.size(),
+                  s.p_value <= fpr ? ": THE TEST ANSWERS TO A CONTROL" : "");
+    out << "control " << control.name << ": p " << text;
+  }
+}
+
+void write_evidence(const std::string& folder, const watermark::EvidenceRecord& record,
+                    const std::vector<PictureEvidence>& pictures, const std::vector<std::string>& controls,
+                    const watermark::Owner& owner, const watermark::Key& key) {
+  PagePictures small{.controls = controls};
+  for (const auto& picture : pictures)
+    small.pictures.push_back(thumbnail(read_rgb(picture.image, background(owner))));
+  const std::string page = evidence_page(record, watermark::public_key(key), small);
+  watermark::write_evidence_folder(folder, record, page, key);
+}
+
+}  // namespace fieldmark::cli

@@ -1,0 +1,60 @@
+#pragma once
+#include <fieldmark/watermark/evidence_record.h>
+#include <fieldmark/watermark/owner.h>
+
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "cli/context.h"
+#include "cli/evidence_page.h"
+#include "cli/reading.h"
+
+namespace fieldmark::cli {
+
+/// What evidence is tested for.
+struct KeyTest {
+  const watermark::Owner& owner;      ///< whose field is asked about
+  const watermark::CellCode& code;    ///< of the key in question
+  const watermark::Message& message;  ///< looked for
+  watermark::EvidenceScore operator()(const std::vector<double>& cells) const {
+    return watermark::score_evidence(cells, code, message);
+  }
+};
+
+/// Each picture by itself.
+std::vector<watermark::EvidencePicture> score_pictures(const KeyTest& test,
+                                                       const std::vector<PictureEvidence>& pictures);
+
+/// Controls and a small copy of the first picture of each.
+struct TestedControls {
+  std::vector<watermark::EvidenceControl> controls{};
+  std::vector<std::string> thumbnails{};
+};
+
+/// The built-in controls (watermark::built_in_controls()) of the first five pictures, and one for each of
+/// `given`, pictures or folders of which the user says that they are not marked.
+/// @throws IoError naming the picture that cannot be read
+TestedControls test_controls(const KeyTest& test, const std::vector<PictureEvidence>& pictures,
+                             const std::vector<std::string>& given, Context& context);
+
+/// For --json: name, figures and whether it stays above the rate of false alarms.
+Json controls_json(const std::vector<watermark::EvidenceControl>& controls, double fpr);
+
+/// For --json: image, bits, confidences and figures of each picture.
+Json per_view_json(const std::vector<PictureEvidence>& pictures,
+                   const std::vector<watermark::EvidencePicture>& scores);
+
+/// A line for each picture: bits, how many match, p-value, the least confidence among the bits.
+void print_views(std::ostream& out, const std::vector<PictureEvidence>& pictures,
+                 const std::vector<watermark::EvidencePicture>& scores);
+
+/// A line for each control.
+void print_controls(std::ostream& out, const std::vector<watermark::EvidenceControl>& controls, double fpr);
+
+/// Writes the folder of --evidence (watermark::write_evidence_folder()) with its page.
+void write_evidence(const std::string& folder, const watermark::EvidenceRecord& record,
+                    const std::vector<PictureEvidence>& pictures, const std::vector<std::string>& controls,
+                    const watermark::Owner& owner, const watermark::Key& key);
+
+}  // namespace fieldmark::cli
