@@ -1,8 +1,23 @@
 #pragma once
 #include <fieldmark/watermark/evidence.h>
+#include <fieldmark/watermark/object_window.h>
 #include <fieldmark/watermark/owner.h>
 
 namespace fieldmark::watermark {
+
+/// Any 8-bit picture as the readers take it: grey is repeated, alpha is laid over the background.
+/// @param picture  [H, W, 1 to 4], sides of at least 16   @return [H, W, 3]
+/// @throws ShapeError if it is no picture or too small
+Tensor<float> opaque_picture(const Tensor<float>& picture, float background);
+
+/// What the extractor takes the places of a picture for, besides the mark.
+struct SeenPlaces {
+  Window window{};                   ///< of the picture that the places divide
+  Index height = 0;                  ///< in places; 0 for preset paper
+  Index width = 0;                   ///< in places
+  std::vector<std::int32_t> cell{};  ///< [height, width] the likeliest cell, -1 for the background
+  std::vector<float> share{};        ///< [height, width] how likely, in [0, 1]
+};
 
 /// The blind reading: the extractor looks at a picture, knowing neither key nor message nor camera.
 /// The owner must outlive it. Calls may run at the same time.
@@ -16,6 +31,8 @@ class PictureReader {
   /// least 16
   /// @return [cells]   @throws ShapeError if it is no picture or too small
   std::vector<double> evidence(const Tensor<float>& picture) const;
+  /// The same, and where the extractor sees which cell.   @param places  written unless null
+  std::vector<double> evidence(const Tensor<float>& picture, SeenPlaces* places) const;
 
  private:
   const Owner& owner_;

@@ -1,0 +1,113 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/random.h>
+#include <fieldmark/watermark/camera_motion.h>
+#include <fieldmark/watermark/camera_search.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "support/catch.h"
+#include "tiny_owner.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+namespace {
+constexpr CameraSearchOptions kOptions{.views = 60, .size = 32};
+
+// What an extractor that is right in two places of three would see.
+SeenPlaces places_of(const Owner& owner, const nerf::Camera& camera) {
+  nerf::Renderer renderer(owner.field);
+  const CachedView view = cache_view(renderer, owner.field, camera);
+  SeenPlaces places{{0, 0, static_cast<double>(camera.width)}, view.height, view.width, {}, {}};
+  const CounterRng rng(3);
+  for (Index p = 0; p < view.height * view.width; ++p) {
+    const auto at = static_cast<std::size_t>(p);
+    const bool some = view.sample_begin[at] < view.sample_begin[at + 1];
+    std::int32_t cell =
+        some ? owner.cells.at(&view.position[3 * static_cast<std::size_t>(view.sample_begin[at])]) : -1;
+    if (cell >= 0 && p % 3 == 0)
+      cell = static_cast<std::int32_t>(rng.below(owner.cells.count(), static_cast<std::uint64_t>(p)));
+    places.cell.push_back(cell);
+    places.share.push_back(0.5f);
+  }
+  return places;
+}
+
+double apart(const nerf::Camera& a, const nerf::Camera& b) {
+  std::vector<double> distances;
+  for (const double x : {-0.4, 0.0, 0.4})
+    for (const double y : {-0.4, 0.0, 0.4})
+      for (const double z : {-0.2, 0.1, 0.4}) {
+        const Projection p = project(a, {x, y, z}), q = project(b, {x, y, z});
+        distances.push_back(std::hypot(p.x - q.x, p.y - q.y));
+      }
+  std::sort(distances.begin(), distances.end());
+  return distances[distances.size() / 2];
+}
+}  // namespace
+
+TEST_CASE("camera_search: places that the extractor recognised lead to the camera, turned and cut or not") {
+  const Owner owner = tiny_owner();
+  const CameraSearch search(owner, kOptions);
+  for (const std::uint64_t seed : {11u, 12u, 13u}) {
+    nerf::Camera camera = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, 1, 48, seed).front();
+    if (seed == 12) camera = moved(camera, {0, 0, 0}, {0, 0, 0.5, 0, 0, 0, 0.2, 0.1, 0});
+    const auto found = search.find(places_of(owner, camera), 48, 48, 3);
+    REQUIRE(found.size() == 3);
+    CAPTURE(seed);
+    // Cells are a sixth of the cube, 6 pixels; a camera within half of one can be aligned.
+    CHECK(apart(camera, found.front()) < 3);
+    CHECK(found.front().width == 48);
+  }
+}
+
+TEST_CASE("camera_search: the whole object in a picture leads to the camera, turned or not") {
+  const Owner owner = tiny_owner();
+  const CameraSearch search(owner, kOptions);
+  nerf::Renderer renderer(owner.field);
+  Index close = 0;
+  for (const std::uint64_t seed : {11u, 12u, 13u, 14u}) {
+    nerf::Camera camera = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, 1, 96, seed).front();
+    if (seed == 12) camera = moved(camera, {0, 0, 0}, {0, 0, 0.5, 0, 0, 0, -0.2, 0.05, 0});
+    const auto found = search.find(renderer.render(camera).rgb, 3);
+    REQUIRE(found.size() == 3);
+    close +=
+        std::any_of(found.begin(), found.end(), [&](const nerf::Camera& c) { return apart(camera, c) < 8; });
+  }
+  CHECK(close >= 3);  // measured 4; 60 renders are some 15 degrees apart
+}
+
+TEST_CASE("camera_search: nothing recognised, nothing found") {
+  const Owner owner = tiny_owner();
+  const CameraSearch search(owner, {.views = 5, .size = 32});
+  SeenPlaces none{{0, 0, 48}, 12, 12, std::vector<std::int32_t>(144, -1), std::vector<float>(144, 0.9f)};
+  CHECK(search.find(none, 48, 48, 3).empty());
+}
+
+TEST_CASE("camera_search: one and two threads find the same") {
+  const Owner owner = tiny_owner();
+  const nerf::Camera camera =
+      nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, 1, 48, 14).front();
+  const SeenPlaces places = places_of(owner, camera);
+  const int before = threads();
+  std::vector<std::array<double, 16>> found[2];
+  for (int n : {1, 2}) {
+    set_threads(n);
+    for (const nerf::Camera& c : CameraSearch(owner, {.views = 20, .size = 32}).find(places, 48, 48, 4))
+      found[n - 1].push_back(c.parameters());
+  }
+  set_threads(before);
+  CHECK(!found[0].empty());
+  CHECK(found[0] == found[1]);
+}
+
+TEST_CASE("camera_search: errors name what is wrong") {
+  const Owner paper = tiny_paper_owner(), owner = tiny_owner();
+  CHECK_THROWS_WITH(CameraSearch(paper),
+                    "[camera_search] owner must be of preset fast: preset paper has no cells in space");
+  CHECK_THROWS_WITH(CameraSearch(owner, {.views = 0}),
+                    "[camera_search] views and size must be at least 1 and 16, got 0 and 40");
+  CHECK_THROWS_AS(CameraSearch(owner, {.size = 15}), ValueError);
+}

@@ -1,0 +1,112 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/image.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/watermark/camera_motion.h>
+#include <fieldmark/watermark/pose_alignment.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "support/catch.h"
+#include "tiny_owner.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+namespace {
+constexpr AlignmentStage kStages[] = {{.size = 32, .blur = 1.5, .steps = 10},
+                                      {.size = 64, .blur = 1, .steps = 8}};
+
+nerf::Camera near_camera(std::uint64_t seed) {
+  return nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::near, 1, 64, seed).front();
+}
+
+Tensor<float> picture_of(const nerf::Camera& camera) {
+  nerf::Renderer renderer(tiny_field());
+  return quantize8(renderer.render(camera).rgb);
+}
+
+// How far apart two cameras see points about the scene's centre: the median, in pixels.
+double apart(const nerf::Camera& a, const nerf::Camera& b) {
+  std::vector<double> distances;
+  for (const double x : {-0.4, 0.0, 0.4})
+    for (const double y : {-0.4, 0.0, 0.4})
+      for (const double z : {-0.2, 0.1, 0.4}) {
+        const Projection p = project(a, {x, y, z}), q = project(b, {x, y, z});
+        distances.push_back(std::hypot(p.x - q.x, p.y - q.y));
+      }
+  std::sort(distances.begin(), distances.end());
+  return distances[distances.size() / 2];
+}
+
+Alignment align(const Tensor<float>& picture, const nerf::Camera& start) {
+  PoseAligner aligner(tiny_field());
+  return aligner.align(picture, start, kStages);
+}
+}  // namespace
+
+TEST_CASE("pose_alignment: a disturbed camera comes back to a tenth of a pixel") {
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    const nerf::Camera camera = near_camera(seed);
+    const nerf::Camera start =
+        moved(camera, {0, 0, 0}, {0.04, -0.05, 0.06, 0.03, -0.02, 0.04, 0.03, -0.02, 0.01});
+    CAPTURE(seed);
+    CHECK(apart(camera, start) > 2);
+    const Alignment a = align(picture_of(camera), start);
+    CHECK(apart(camera, a.camera) < 0.1);
+    CHECK(a.agreement > 0.98);
+  }
+}
+
+TEST_CASE("pose_alignment: a turned and cut picture with other tones is met by roll, focal length and cut") {
+  const nerf::Camera camera = near_camera(4);
+  nerf::Camera part = moved(camera, {0, 0, 0}, {0, 0, 0.3, 0, 0, 0, std::log(1.3)});
+  part.cx -= 4;
+  part.height = 56;
+  Tensor<float> picture = picture_of(part);
+  for (Index i = 0; i < picture.size(); ++i)
+    picture[i] = 0.7f * picture[i] + 0.05f * static_cast<float>(i % 3);
+  const Alignment a = align(picture, moved(part, {0, 0, 0}, {0.03, 0.04, -0.08, 0, 0, 0, 0.06, 0.03, -0.02}));
+  CHECK(a.camera.width == 64);
+  CHECK(a.camera.height == 56);
+  CHECK(apart(part, a.camera) < 0.1);
+  CHECK(a.agreement > 0.98);
+}
+
+TEST_CASE("pose_alignment: pictures of something else do not agree") {
+  const nerf::Camera camera = near_camera(5);
+  CHECK(align(uniform<float>({64, 64, 3}, 0, 1, 3), camera).agreement < 0.3);
+  // The same silhouettes from another side.
+  CHECK(align(picture_of(near_camera(6)), camera).agreement < 0.75);
+  CHECK(align(Tensor<float>({64, 64, 3}, 1), camera).agreement < 0.1);
+  nerf::Camera away = camera;
+  for (std::size_t k : {2u, 6u, 10u}) away.pose[k] *= -1;
+  CHECK(align(picture_of(camera), away).agreement == -1);
+}
+
+TEST_CASE("pose_alignment: one and two threads give the same bits") {
+  const nerf::Camera camera = near_camera(7);
+  const Tensor<float> picture = picture_of(camera);
+  const nerf::Camera start = moved(camera, {0, 0, 0}, {0.02, -0.03, 0.02});
+  const int before = threads();
+  set_threads(1);
+  const Alignment one = align(picture, start);
+  set_threads(2);
+  const Alignment two = align(picture, start);
+  set_threads(before);
+  CHECK(one.camera.pose == two.camera.pose);
+  CHECK(one.camera.parameters() == two.camera.parameters());
+  CHECK(one.agreement == two.agreement);
+}
+
+TEST_CASE("pose_alignment: errors name what is wrong") {
+  PoseAligner aligner(tiny_field());
+  const nerf::Camera camera = near_camera(8);
+  CHECK_THROWS_AS(aligner.align(Tensor<float>({20, 20}), camera, kStages), ShapeError);
+  CHECK_THROWS_AS(aligner.align(Tensor<float>({20, 20, 1}), camera, kStages), ShapeError);
+  CHECK_THROWS_WITH(aligner.align(Tensor<float>({20, 20, 3}), camera, {}),
+                    "[pose_aligner] stages must not be empty");
+  const AlignmentStage small[] = {{.size = 8}};
+  CHECK_THROWS_WITH(aligner.align(Tensor<float>({20, 20, 3}), camera, small),
+                    "[pose_aligner] stages must be of at least 16 pixels, got 8");
+}

@@ -1,0 +1,60 @@
+#pragma once
+#include <fieldmark/watermark/picture_reader.h>
+#include <fieldmark/watermark/view_cache.h>
+
+namespace fieldmark::watermark {
+
+/// How cameras are looked for.
+struct CameraSearchOptions {
+  Index views = 256;       ///< near cameras to compare with, at least 1
+  Index size = 40;         ///< longer side of their renders, pixels, at least 16
+  std::uint64_t seed = 0;  ///< of the cameras and of the draws
+};
+
+/// Finds roughly from where a picture shows an owner's field, in two ways, by small renders of the field made
+/// once. Neither key nor message is looked at.
+///   - By the places that the extractor recognised. For each render, pairs of places propose how it would
+///   have
+///     to be turned, scaled and moved (Fischler and Bolles 1981), and the proposal that most places agree
+///     with is kept; the best few cameras are then moved until cells lie where they were seen.
+///   - By the picture itself: its object's window (see object_window.h), turned in steps of 15 degrees and
+///     brought to 24 pixels, is correlated with those of the renders. It needs no extractor, but the whole
+///     object in the picture or a field that fills it.
+class CameraSearch {
+ public:
+  /// @param owner  of preset fast; must outlive this   @throws ValueError if it is of another preset, or an
+  /// option is out of range
+  explicit CameraSearch(const Owner& owner, const CameraSearchOptions& options = {});
+  /// The likeliest cameras by places, best first, at most `count`; none if too few were recognised.
+  /// @param places  of a picture of height x width pixels
+  std::vector<nerf::Camera> find(const SeenPlaces& places, Index height, Index width, Index count) const;
+  /// The likeliest cameras by the picture, best first, at most `count`, each from another render.
+  /// @param picture  [H, W, 3]
+  std::vector<nerf::Camera> find(const Tensor<float>& picture, Index count) const;
+
+ private:
+  struct SeenCell {
+    double x, y;       // pixels of the small render
+    nerf::Vec3 point;  // world: the middle of what the view shows of the cell
+  };
+  struct SmallView {
+    nerf::Camera camera;
+    std::vector<std::int32_t> of_cell;  // [cells] entry in seen, -1 where the view does not show it
+    std::vector<SeenCell> seen;
+    Window window;             // of the object in the small render
+    std::vector<float> small;  // its content, see small_window()
+  };
+  struct Match;
+  struct Proposal;
+  Proposal propose(const SmallView& view, std::size_t number, const std::vector<Match>& matches,
+                   double tolerance) const;
+  nerf::Camera proposed(const Proposal& proposal, Index height, Index width) const;
+  nerf::Camera fitted(const Proposal& proposal, const std::vector<Match>& matches, double tolerance,
+                      Index height, Index width) const;
+
+  const Owner& owner_;
+  CameraSearchOptions options_;
+  std::vector<SmallView> views_;
+};
+
+}  // namespace fieldmark::watermark

@@ -1,0 +1,49 @@
+#pragma once
+#include <fieldmark/nerf/renderer.h>
+
+#include <span>
+
+namespace fieldmark::watermark {
+
+/// One stage of an alignment: steps at one size of the picture.
+struct AlignmentStage {
+  Index size = 64;  ///< of the longer side, pixels; never above the picture's own
+  double blur = 1;  ///< deviation of the Gaussian laid over picture and render, pixels of this size
+  int steps = 8;    ///< at most; a stage ends earlier where nothing moves any more
+  bool lens =
+      true;  ///< whether the focal length moves apart from the distance, and the cut apart from the aim
+};
+
+/// A camera and how well its view of the field agrees with a picture.
+struct Alignment {
+  nerf::Camera camera;  ///< of the picture's size
+  /// Correlation of the brightness slopes of picture and render on what the field shows, in [-1, 1]: 1 where
+  /// they are alike but for gain and offset. Of the last stage.
+  double agreement = -1;
+};
+
+/// Moves cameras until a field's view agrees with a picture.
+///
+/// Each step renders the field, fits gain, offset and gamma of each channel, and solves for the motion that
+/// the remaining difference asks for (Lucas and Kanade 1981 with the field's own depth; Levenberg and
+/// Marquardt's damping; Cauchy weights). A picture that was rotated, scaled or cut is seen by a camera that
+/// was rolled, or has another focal length or principal point, so that it needs nothing of its own.
+/// Keeps buffers: one object per thread. Equal arguments give equal bits for any number of threads.
+class PoseAligner {
+ public:
+  /// @param field  must outlive this and not change
+  explicit PoseAligner(const nerf::RadianceField& field);
+  /// @param picture  [H, W, 3], sides of at least 16   @param start  any size; its view is that of the
+  /// picture
+  /// @return the best camera met; agreement -1 where the field shows nothing in it
+  /// @throws ShapeError if the picture is none   @throws ValueError if there is no stage or one's size is
+  /// below 16
+  Alignment align(const Tensor<float>& picture, const nerf::Camera& start,
+                  std::span<const AlignmentStage> stages);
+
+ private:
+  const nerf::RadianceField& field_;
+  nerf::Renderer renderer_;
+};
+
+}  // namespace fieldmark::watermark
