@@ -7,7 +7,8 @@ using namespace fieldmark;
 
 TEST_CASE("extract reads every picture and all together", "[extract]") {
   const TinyJob& job = TinyJob::get();
-  const auto r = run_command({"extract", "--owner", job.owner, job.pictures(), "--json", "-"});
+  const auto r =
+      run_command({"extract", "--owner", job.owner, "--reading", "blind", job.pictures(), "--json", "-"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
   const auto json = nlohmann::json::parse(r.out);
@@ -17,6 +18,26 @@ TEST_CASE("extract reads every picture and all together", "[extract]") {
   REQUIRE(json["views"].size() == 2);
   CHECK(json["views"][0]["bits"].get<std::string>().size() == 4);
   CHECK(json["views"][0]["logits"].size() == 4);
+  CHECK(json["views"][0]["reading"] == "blind");
+  CHECK(json["views"][0]["agreement"].is_null());
+}
+
+TEST_CASE("extract says which reading it chose and how well the picture agrees", "[extract]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string pictures = job.pictures();
+  for (const std::string how : {"auto", "geometry"}) {
+    const auto r = run_command({"extract", "--owner", job.owner, "--reading", how, pictures, "--json", "-"});
+    INFO(r.err);
+    REQUIRE(r.code == cli::kOk);
+    const auto json = nlohmann::json::parse(r.out);
+    for (const auto& view : json["views"]) {
+      CHECK((view["reading"] == "blind" || view["reading"] == "geometry"));
+      CHECK(view["agreement"].is_number());
+      CHECK_THAT(r.err,
+                 Contains(view["image"].get<std::string>() + "  " + view["reading"].get<std::string>()));
+    }
+  }
+  CHECK(run_command({"extract", "--owner", job.owner, "--reading", "both", pictures}).code == cli::kUsage);
 }
 
 TEST_CASE("extract names the picture that cannot be read", "[extract]") {

@@ -19,7 +19,8 @@ struct Run {
   std::ostringstream out, err;
   Context context{CommonOptions{}, {"fieldmark", "verify"}, out, err};
   std::string folder = TinyJob::get().pictures();
-  std::vector<PictureEvidence> pictures = read_pictures(owner, {folder}, context);
+  SuspectReader reader{owner, "blind"};
+  std::vector<PictureEvidence> pictures = read_pictures(reader, {folder}, context);
 };
 }  // namespace
 
@@ -46,7 +47,7 @@ TEST_CASE("evidence_run: three built-in controls, and one for each path that is 
   Run run;
   const std::string photo = TinyJob::get().folder / "photo.png";
   write_png(photo, uniform<float>({20, 30, 3}, 0, 1, 3));
-  const auto tested = test_controls(run.test, run.pictures, {photo, run.folder + "/"}, run.context);
+  const auto tested = test_controls(run.test, run.reader, run.pictures, {photo, run.folder + "/"}, run.context);
   REQUIRE(tested.controls.size() == 5);
   CHECK(tested.thumbnails.size() == 5);
   std::string names;
@@ -65,5 +66,5 @@ TEST_CASE("evidence_run: three built-in controls, and one for each path that is 
   std::ostringstream quiet;
   print_controls(quiet, tested.controls, 1e-300);
   CHECK_THAT(quiet.str(), !Contains("THE TEST"));
-  CHECK_THROWS_AS(test_controls(run.test, run.pictures, {"/no/such.png"}, run.context), IoError);
+  CHECK_THROWS_AS(test_controls(run.test, run.reader, run.pictures, {"/no/such.png"}, run.context), IoError);
 }

@@ -9,3 +9,11 @@ TEST_CASE("reading: evidence of several pictures is added cell by cell", "[readi
         std::vector<double>{1.5, -1, 3});
   CHECK(cli::total_evidence({{"a.png", {4}}}) == std::vector<double>{4});
 }
+
+TEST_CASE("reading: what was used is named, and mixed where pictures differ", "[reading]") {
+  using watermark::ReadingKind;
+  const cli::PictureEvidence blind{"a.png", {1}}, geometry{"b.png", {1}, ReadingKind::geometry, 0.99};
+  CHECK(cli::reading_used({blind, blind}) == "blind");
+  CHECK(cli::reading_used({geometry}) == "geometry");
+  CHECK(cli::reading_used({blind, geometry}) == "mixed");
+}

@@ -12,21 +12,25 @@ namespace fieldmark::cli {
 namespace {
 
 struct Options {
-  std::string owner;
+  std::string owner, reading = "auto";
   std::vector<std::string> images;
 };
 
 int run(const Options& options, Context& context) {
   const auto owner = watermark::Owner::load(options.owner);
-  const auto pictures = read_pictures(owner, options.images, context);
+  SuspectReader reader(owner, options.reading);
+  const auto pictures = read_pictures(reader, options.images, context);
   const auto code = owner.code();
   const Index bits = owner.options().bits;
   Json views = Json::array();
   for (const auto& picture : pictures) {
     const auto reading = watermark::read_bits(picture.cells, code, bits);
-    context.text() << to_bits(reading.message) << "  " << picture.image << "\n";
+    const char* how = watermark::reading_name(picture.reading);
+    context.text() << to_bits(reading.message) << "  " << picture.image << "  " << how << "\n";
     views.push_back({{"image", picture.image},
                      {"bits", to_bits(reading.message)},
+                     {"reading", how},
+                     {"agreement", number(picture.agreement)},
                      {"payload", payload_json(read_payload(reading.logit))},
                      {"logits", reading.logit}});
   }
@@ -37,7 +41,7 @@ int run(const Options& options, Context& context) {
   context.result({{"message", to_hex(reading.message)},
                   {"bits", to_bits(reading.message)},
                   {"payload", payload_json(payload)},
-                  {"reading", "blind"},
+                  {"reading", reading_used(pictures)},
                   {"logits", reading.logit},
                   {"views", views}});
   return kOk;
@@ -48,6 +52,7 @@ int run(const Options& options, Context& context) {
 Command add_extract(CLI::App& app) {
   auto o = std::make_shared<Options>();
   app.add_option("--owner", o->owner, "What `fieldmark embed` wrote")->required()->type_name("OWNER");
+  add_reading(app, o->reading);
   app.add_option("images", o->images, "Pictures, or folders of them (PNG, JPEG)")
       ->required()
       ->type_name("IMAGE|DIR")

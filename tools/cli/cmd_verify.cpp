@@ -19,7 +19,7 @@ namespace {
 constexpr Index kEvidenceKeys = 100000;
 
 struct Options {
-  std::string owner, key, evidence;
+  std::string owner, key, evidence, reading = "auto";
   MessageOption message;
   double fpr = 1e-6;
   Index wrong_keys = 0;
@@ -77,10 +77,12 @@ void print_verdict(const watermark::EvidenceRecord& record, Context& context) {
   std::snprintf(text, sizeof text,
                 "%s at a rate of false alarms of %g\n"
                 "p-value, keyed        %.2e (two-sided %.2e), from %zu pictures together\n"
-                "p-value, bits         %.2e (two-sided %.2e), %lld of %lld match\n",
+                "p-value, bits         %.2e (two-sided %.2e), %lld of %lld match\n"
+                "reading               %s\n",
                 record.found() ? "FOUND" : "NOT FOUND", record.fpr, score.p_value, score.p_value_two_sided,
                 record.pictures.size(), score.p_value_bits, score.p_value_bits_two_sided,
-                static_cast<long long>(score.match.matching), static_cast<long long>(score.match.bits));
+                static_cast<long long>(score.match.matching), static_cast<long long>(score.match.bits),
+                record.reading.c_str());
   context.text() << text << "owner sha256 " << record.owner_sha256 << "\nclaim " << record.claim << "\n";
 }
 
@@ -118,7 +120,8 @@ int run(const Options& options, Context& context) {
   }
 
   if (!options.evidence.empty()) watermark::prepare_evidence_folder(options.evidence);
-  const auto pictures = read_pictures(owner, options.images, context);
+  SuspectReader reader(owner, options.reading);
+  const auto pictures = read_pictures(reader, options.images, context);
   const auto evidence = total_evidence(pictures);
   const KeyTest test{owner, code, message};
   watermark::EvidenceRecord record{.owner_sha256 = watermark::sha256_file_hex(options.owner),
@@ -126,6 +129,7 @@ int run(const Options& options, Context& context) {
                                    .fpr = options.fpr,
                                    .cells = code.carriers(),
                                    .together = test(evidence),
+                                   .reading = reading_used(pictures),
                                    .pictures = score_pictures(test, pictures),
                                    .seed = context.seed(),
                                    .commit = machine().commit,
@@ -135,7 +139,7 @@ int run(const Options& options, Context& context) {
   print_verdict(record, context);
   TestedControls controls;
   if (!options.controls.empty() || !options.evidence.empty())
-    controls = test_controls(test, pictures, options.controls, context);
+    controls = test_controls(test, reader, pictures, options.controls, context);
   record.controls = controls.controls;
   print_controls(context.text(), record.controls, options.fpr);
   const Index keys =
@@ -183,6 +187,7 @@ Command add_verify(CLI::App& app) {
          "or with earlier evidence")
       ->type_name("DIR")
       ->default_str("");
+  add_reading(app, o->reading);
   app.add_option("images", o->images,
                  "Pictures of one field, or folders of them (PNG, JPEG): one verdict for all")
       ->required()

@@ -31,15 +31,13 @@ std::string given_name(const std::string& path) {
   return name.empty() ? std::filesystem::path(path).parent_path().filename().string() : name;
 }
 
-EvidenceControl built_in(const KeyTest& test, const watermark::Control& control) {
-  const watermark::PictureReader reader(test.owner);
+EvidenceControl built_in(const KeyTest& test, SuspectReader& reader, const watermark::Control& control) {
   const InterruptGuard guard;
   EvidenceControl tested{control.name, control.meaning};
   std::vector<PictureEvidence> read;
   for (const auto& picture : control.pictures) {
     if (guard.interrupted()) throw Interrupted("nothing was decided");
-    read.push_back({control.name + " " + std::to_string(read.size() + 1), reader.evidence(picture), "",
-                    picture.shape[1], picture.shape[0]});
+    read.push_back(reader.read(picture, control.name + " " + std::to_string(read.size() + 1)));
   }
   tested.pictures = score_pictures(test, read);
   tested.together = test(total_evidence(read));
@@ -64,7 +62,8 @@ std::vector<EvidencePicture> score_pictures(const KeyTest& test,
   return scores;
 }
 
-TestedControls test_controls(const KeyTest& test, const std::vector<PictureEvidence>& pictures,
+TestedControls test_controls(const KeyTest& test, SuspectReader& reader,
+                             const std::vector<PictureEvidence>& pictures,
                              const std::vector<std::string>& given, Context& context) {
   TestedControls tested;
   std::vector<Tensor<float>> questioned;
@@ -73,11 +72,11 @@ TestedControls test_controls(const KeyTest& test, const std::vector<PictureEvide
       questioned.push_back(read_rgb(p.image, background(test.owner)));
   const auto controls = watermark::built_in_controls(test.owner, questioned, kControlViews, context.seed());
   for (const auto& control : controls) {
-    tested.controls.push_back(built_in(test, control));
+    tested.controls.push_back(built_in(test, reader, control));
     tested.thumbnails.push_back(thumbnail(control.pictures[0]));
   }
   for (const auto& path : given) {
-    const auto read = read_pictures(test.owner, {path}, context);
+    const auto read = read_pictures(reader, {path}, context);
     tested.controls.push_back(
         {given_name(path), "Given as a control: pictures of which the user says that they are not marked.",
          score_pictures(test, read), test(total_evidence(read))});

@@ -33,9 +33,10 @@ struct TestedControls {
 };
 
 /// The built-in controls (watermark::built_in_controls()) of the first five pictures, and one for each of
-/// `given`, pictures or folders of which the user says that they are not marked.
+/// `given`, read as they were; pictures or folders of which the user says that they are not marked.
 /// @throws IoError naming the picture that cannot be read
-TestedControls test_controls(const KeyTest& test, const std::vector<PictureEvidence>& pictures,
+TestedControls test_controls(const KeyTest& test, SuspectReader& reader,
+                             const std::vector<PictureEvidence>& pictures,
                              const std::vector<std::string>& given, Context& context);
 
 /// For --json: name, figures and whether it stays above the rate of false alarms.
