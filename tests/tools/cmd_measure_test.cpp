@@ -9,8 +9,8 @@ using namespace fieldmark;
 TEST_CASE("measure reports an owner's mark on several sets of cameras", "[measure]") {
   const TinyJob& job = TinyJob::get();
   for (const char* cameras : {"near", "ring", "sphere"}) {
-    const auto r =
-        run_command({"measure", "--owner", job.owner, "--cameras", cameras, "--count", "2", "--json", "-"});
+    const auto r = run_command({"measure", "--owner", job.owner, "--cameras", cameras, "--count", "2",
+                                "--geometry-count", "1", "--json", "-"});
     INFO(r.err);
     REQUIRE(r.code == cli::kOk);
     const auto json = nlohmann::json::parse(r.out);
@@ -20,6 +20,9 @@ TEST_CASE("measure reports an owner's mark on several sets of cameras", "[measur
     const double accuracy = json["accuracy"]["blind"];
     CHECK(accuracy >= 0);
     CHECK(accuracy <= 1);
+    CHECK(json["geometry_views"] == 1);
+    CHECK(json["accuracy"]["geometry"].is_number());
+    CHECK(json["geometry_seconds"] > 0);
   }
 }
 

@@ -23,6 +23,10 @@ TEST_CASE("measured: JSON has the contract's keys, and null where there is no nu
   CHECK(json["psnr_base"].is_null());
   CHECK(json["lpips_base"] == 0.125);
   CHECK(json["under"]["noise_0.05"]["blind"] == 0.5);
+  CHECK(json["under"]["noise_0.05"]["geometry"].is_null());
+  CHECK(json["geometry_views"] == 0);
+  m.accuracy.geometry = 1;
+  CHECK(cli::measurement_json(m, "ring")["accuracy"]["geometry"] == 1);
 }
 
 TEST_CASE("measured: people see the accuracies in percent", "[measured]") {
@@ -32,5 +36,9 @@ TEST_CASE("measured: people see the accuracies in percent", "[measured]") {
   std::ostringstream out;
   cli::print_measurement(out, m, "near");
   CHECK_THAT(out.str(), Contains("75.12%"));
-  CHECK_THAT(out.str(), Contains("blur_1"));
+  CHECK_THAT(out.str(), Contains("blur_1") && !Contains("geometry"));
+  m.geometry_views = 2;
+  m.under["blur_1"].geometry = 0.875;
+  cli::print_measurement(out, m, "near");
+  CHECK_THAT(out.str(), Contains("by geometry 87.50%"));
 }

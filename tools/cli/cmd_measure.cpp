@@ -22,7 +22,7 @@ struct Options {
   std::string owner, field, data, lpips_weights;
   MessageOption message;
   std::string cameras = "near";
-  Index count = 200, size = 0, together = 1;
+  Index count = 200, geometry_count = 20, size = 0, together = 1;
   bool payloads = false;
   std::vector<std::string> under;
 };
@@ -114,6 +114,7 @@ int run(const Options& options, Context& context) {
       run_measure(owner, baked ? &*baked : nullptr, message ? &*message : nullptr,
                   {.cameras = cameras,
                    .under = options.under,
+                   .geometry_views = options.geometry_count,
                    .seed = context.seed(),
                    .messages = messages_of(options, codec, context.seed()),
                    .on_reading = [&](Index view, const std::string& under, const auto& evidence,
@@ -154,6 +155,11 @@ Command add_measure(CLI::App& app) {
       ->type_name("SET");
   app.add_option("--count", o->count, "Views, 1 to 100000; each with its own random message if not baked")
       ->check(CLI::Range(1, 100000).description(""))
+      ->type_name("N");
+  app.add_option(
+         "--geometry-count", o->geometry_count,
+         "Of the first so many views geometry is read too, 0 to 100000: seconds a view and distortion")
+      ->check(CLI::Range(0, 100000).description(""))
       ->type_name("N");
   app.add_option("--size", o->size, "Pixels of the views' longer side, 16 to 8192 (as trained)")
       ->check(CLI::Range(16, 8192).description(""))

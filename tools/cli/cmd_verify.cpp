@@ -124,12 +124,12 @@ int run(const Options& options, Context& context) {
   const auto pictures = read_pictures(reader, options.images, context);
   const auto evidence = total_evidence(pictures);
   const KeyTest test{owner, code, message};
-  watermark::EvidenceRecord record{.owner_sha256 = watermark::sha256_file_hex(options.owner),
+  watermark::EvidenceRecord record{.reading = reading_used(pictures),
+                                   .owner_sha256 = watermark::sha256_file_hex(options.owner),
                                    .message = message,
                                    .fpr = options.fpr,
                                    .cells = code.carriers(),
                                    .together = test(evidence),
-                                   .reading = reading_used(pictures),
                                    .pictures = score_pictures(test, pictures),
                                    .seed = context.seed(),
                                    .commit = machine().commit,

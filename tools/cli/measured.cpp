@@ -10,7 +10,9 @@ namespace fieldmark::cli {
 
 Json measurement_json(const watermark::Measurement& m, const std::string& cameras) {
   const auto reading = [](const watermark::ReadingAccuracy& accuracy) {
-    return Json{{"blind", number(accuracy.blind)}, {"geometry", nullptr}};
+    return Json{{"blind", number(accuracy.blind)},
+                {"geometry", number(accuracy.geometry)},
+                {"chosen", number(accuracy.chosen)}};
   };
   Json under = Json::object();
   for (const auto& [name, accuracy] : m.under) under[name] = reading(accuracy);
@@ -25,7 +27,9 @@ Json measurement_json(const watermark::Measurement& m, const std::string& camera
           {"ssim_base", number(m.ssim_base)},
           {"lpips_base", number(m.lpips_base)},
           {"psnr_photo", nullptr},
-          {"under", under}};
+          {"under", under},
+          {"geometry_views", m.geometry_views},
+          {"geometry_seconds", number(m.geometry_seconds)}};
 }
 
 void print_measurement(std::ostream& out, const watermark::Measurement& m, const std::string& cameras) {
@@ -45,9 +49,22 @@ void print_measurement(std::ostream& out, const watermark::Measurement& m, const
                 "bits right, blind    %.2f%% of one view, worst 5%% of views below %.2f%%\n",
                 100 * m.accuracy.blind, 100 * m.accuracy_p5);
   out << line;
-  for (const auto& [name, accuracy] : m.under) {
-    std::snprintf(line, sizeof line, "  under %-20s %.2f%%\n", name.c_str(), 100 * accuracy.blind);
+  if (m.geometry_views > 0) {
+    std::snprintf(line, sizeof line,
+                  "by geometry          %.2f%%, as chosen %.2f%%, of %lld views, %.1f s a view\n",
+                  100 * m.accuracy.geometry, 100 * m.accuracy.chosen,
+                  static_cast<long long>(m.geometry_views), m.geometry_seconds);
     out << line;
+  }
+  for (const auto& [name, accuracy] : m.under) {
+    std::snprintf(line, sizeof line, "  under %-20s %.2f%%", name.c_str(), 100 * accuracy.blind);
+    out << line;
+    if (m.geometry_views > 0) {
+      std::snprintf(line, sizeof line, ", by geometry %.2f%%, as chosen %.2f%%", 100 * accuracy.geometry,
+                    100 * accuracy.chosen);
+      out << line;
+    }
+    out << "\n";
   }
 }
 

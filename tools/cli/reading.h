@@ -32,7 +32,8 @@ class SuspectReader {
   /// @param reading  auto: by geometry where the picture agrees with the owner's field. For preset paper auto
   /// is blind   @throws UsageError for geometry with preset paper
   SuspectReader(const watermark::Owner& owner, const std::string& reading);
-  /// @param name  of the picture, for the result and for errors   @throws IoError if it is too small to be read
+  /// @param name  of the picture, for the result and for errors   @throws IoError if it is too small to be
+  /// read
   PictureEvidence read(const Tensor<float>& picture, const std::string& name);
 
  private:

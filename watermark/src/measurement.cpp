@@ -3,7 +3,9 @@
 #include <fieldmark/watermark/measurement.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <optional>
 
 namespace fieldmark::watermark {
 namespace {
@@ -45,6 +47,58 @@ class Views {
   nerf::Renderer plain_, marked_;
 };
 
+// Both readings of pictures, and what they cost.
+class Readers {
+ public:
+  Readers(const Owner& owner, const CellCode& code, bool by_geometry)
+      : owner_(owner), code_(code), blind_(owner) {
+    if (by_geometry && owner.reader) geometry_.emplace(owner);
+  }
+  bool by_geometry() const { return geometry_.has_value(); }
+  // Only geometry's numbers may be NaN. Calls tell() with the blind evidence.
+  template <class F>
+  ReadingAccuracy read(const Tensor<float>& picture, const Message& sent, bool with_geometry, F tell) {
+    ReadingAccuracy accuracy;
+    if (!with_geometry || !geometry_) {
+      const auto evidence = blind_.evidence(picture);
+      tell(evidence);
+      accuracy.blind = share(evidence, sent);
+      return accuracy;
+    }
+    const auto begin = std::chrono::steady_clock::now();
+    const PictureReading reading = geometry_->read(picture);
+    seconds_.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    tell(reading.blind);
+    accuracy.blind = share(reading.blind, sent);
+    accuracy.geometry = share(reading.geometry.evidence, sent);
+    accuracy.chosen = share(reading.evidence(), sent);
+    return accuracy;
+  }
+  double seconds() const { return finite_mean(seconds_); }
+
+ private:
+  double share(const std::vector<double>& evidence, const Message& sent) const {
+    if (evidence.empty()) return 0.5;
+    return match_bits(read_bits(evidence, code_, owner_.options().bits), sent).accuracy();
+  }
+  const Owner& owner_;
+  const CellCode& code_;
+  PictureReader blind_;
+  std::optional<GeometryReader> geometry_;
+  std::vector<double> seconds_;
+};
+
+// Accuracies of the views so far.
+struct Accuracies {
+  std::vector<double> blind, geometry, chosen;
+  void add(const ReadingAccuracy& a) {
+    blind.push_back(a.blind);
+    geometry.push_back(a.geometry);
+    chosen.push_back(a.chosen);
+  }
+  ReadingAccuracy mean() const { return {finite_mean(blind), finite_mean(geometry), finite_mean(chosen)}; }
+};
+
 }  // namespace
 
 Measurement measure(const Owner& owner, const nerf::RadianceField* baked, const Message* message,
@@ -58,10 +112,11 @@ Measurement measure(const Owner& owner, const nerf::RadianceField* baked, const 
   const float level = nerf::background_value(owner.field.background);
   const float background[3] = {level, level, level};
   const CellCode code = owner.code();
-  const PictureReader reader(owner);
+  Readers readers(owner, code, options.geometry_views > 0);
   Views views(owner, baked);
-  std::vector<double> accuracy, psnr_whole, psnr_object, similarity, perceptual;
-  std::vector<std::vector<double>> under(attacks.size());
+  Accuracies accuracy;
+  std::vector<double> psnr_whole, psnr_object, similarity, perceptual;
+  std::vector<Accuracies> under(attacks.size());
   const auto total = static_cast<Index>(options.cameras.size());
   for (std::size_t i = 0; i < options.cameras.size(); ++i) {
     const auto view = static_cast<Index>(i);
@@ -70,13 +125,13 @@ Measurement measure(const Owner& owner, const nerf::RadianceField* baked, const 
                                             : random_message(owner.options().bits, messages, i);
     const Pictures p = views.render(options.cameras[i], code, sent);
     const auto read = [&](const Tensor<float>& picture, const std::string& name) {
-      const auto evidence = reader.evidence(picture);
-      if (options.on_reading) options.on_reading(view, name, evidence, sent);
-      return match_bits(read_bits(evidence, code, owner.options().bits), sent).accuracy();
+      return readers.read(picture, sent, view < options.geometry_views, [&](const auto& evidence) {
+        if (options.on_reading) options.on_reading(view, name, evidence, sent);
+      });
     };
-    accuracy.push_back(read(p.marked, ""));
+    accuracy.add(read(p.marked, ""));
     for (std::size_t a = 0; a < attacks.size(); ++a)
-      under[a].push_back(
+      under[a].add(
           read(distort::apply_attack(attacks[a], p.marked, distortions, i * attacks.size() + a, background),
                options.under[a]));
     psnr_whole.push_back(psnr(p.marked, p.plain.rgb));
@@ -91,14 +146,16 @@ Measurement measure(const Owner& owner, const nerf::RadianceField* baked, const 
   Measurement m{.bits = owner.options().bits,
                 .views = total,
                 .baked = baked != nullptr,
-                .accuracy = {finite_mean(accuracy)},
-                .accuracy_p5 = percentile_5(accuracy),
+                .accuracy = accuracy.mean(),
+                .accuracy_p5 = percentile_5(accuracy.blind),
                 .psnr_base = finite_mean(psnr_whole),
                 .psnr_base_object = finite_mean(psnr_object),
                 .ssim_base = finite_mean(similarity),
                 .lpips_base = finite_mean(perceptual),
-                .under = {}};
-  for (std::size_t a = 0; a < attacks.size(); ++a) m.under[options.under[a]] = {finite_mean(under[a])};
+                .under = {},
+                .geometry_views = readers.by_geometry() ? std::min(options.geometry_views, total) : 0,
+                .geometry_seconds = readers.seconds()};
+  for (std::size_t a = 0; a < attacks.size(); ++a) m.under[options.under[a]] = under[a].mean();
   return m;
 }
 

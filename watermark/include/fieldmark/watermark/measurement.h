@@ -1,9 +1,10 @@
 #pragma once
 #include <fieldmark/distort/attack.h>
 #include <fieldmark/engine/nn/lpips.h>
-#include <fieldmark/watermark/picture_reader.h>
+#include <fieldmark/watermark/geometry_reader.h>
 
 #include <functional>
+#include <limits>
 #include <map>
 #include <string>
 
@@ -12,13 +13,19 @@ namespace fieldmark::watermark {
 /// Accuracies of the two readings; a reading that was not made is NaN.
 struct ReadingAccuracy {
   double blind = 0;  ///< of the reading from the picture alone
+  /// Of the reading by geometry, over the first geometry_views views; a view whose camera was not found
+  /// counts 0.5.
+  double geometry = std::numeric_limits<double>::quiet_NaN();
+  /// Of the reading that GeometryReader chooses, over the same views.
+  double chosen = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// What measure() looks at.
 struct MeasureOptions {
-  std::vector<nerf::Camera> cameras = {};            ///< of the views, at their full resolution
-  std::vector<std::string> under = {};               ///< distortions besides none, names of parse_attack()
-  std::uint64_t seed = 0;                            ///< of messages and distortions
+  std::vector<nerf::Camera> cameras = {};  ///< of the views, at their full resolution
+  std::vector<std::string> under = {};     ///< distortions besides none, names of parse_attack()
+  Index geometry_views = 0;  ///< of the first so many views geometry is read too; 0 for preset paper
+  std::uint64_t seed = 0;    ///< of messages and distortions
   std::function<Message(Index view)> messages = {};  ///< in place of random messages, where none is baked
   /// Called with the blind evidence of each picture that was read; `under` is empty for the view as it is.
   std::function<void(Index view, const std::string& under, const std::vector<double>& evidence,
@@ -42,6 +49,8 @@ struct Measurement {
   double lpips_base = 0;  ///< the same, both rounded to 8 bits; NaN without a network or where views are too
                           ///< small for it
   std::map<std::string, ReadingAccuracy> under;  ///< for each distortion
+  Index geometry_views = 0;                      ///< views of accuracy.geometry
+  double geometry_seconds = 0;  ///< of one picture's reading by geometry and blindly, mean; NaN without one
 };
 
 /// Measures an owner's mark: each view with its own random message or, given a baked field, with the message
