@@ -166,7 +166,7 @@ PictureReading GeometryReader::read(const Tensor<float>& picture) {
     ours += g.evidence[c] * g.evidence[c];
     theirs += reading.blind[c] * reading.blind[c];
   }
-  if (ours > 0)
+  if (ours > 0 && theirs > 0)
     for (double& s : g.evidence) s *= std::sqrt(theirs / ours);
   if (g.agreement >= kLeastAgreement) reading.chosen = ReadingKind::geometry;
   return reading;
