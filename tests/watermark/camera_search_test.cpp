@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cameras_apart.h"
 #include "support/catch.h"
 #include "tiny_owner.h"
 
@@ -34,18 +35,6 @@ SeenPlaces places_of(const Owner& owner, const nerf::Camera& camera) {
   }
   return places;
 }
-
-double apart(const nerf::Camera& a, const nerf::Camera& b) {
-  std::vector<double> distances;
-  for (const double x : {-0.4, 0.0, 0.4})
-    for (const double y : {-0.4, 0.0, 0.4})
-      for (const double z : {-0.2, 0.1, 0.4}) {
-        const Projection p = project(a, {x, y, z}), q = project(b, {x, y, z});
-        distances.push_back(std::hypot(p.x - q.x, p.y - q.y));
-      }
-  std::sort(distances.begin(), distances.end());
-  return distances[distances.size() / 2];
-}
 }  // namespace
 
 TEST_CASE("camera_search: places that the extractor recognised lead to the camera, turned and cut or not") {
@@ -58,7 +47,7 @@ TEST_CASE("camera_search: places that the extractor recognised lead to the camer
     REQUIRE(found.size() == 3);
     CAPTURE(seed);
     // Cells are a sixth of the cube, 6 pixels; a camera within half of one can be aligned.
-    CHECK(apart(camera, found.front()) < 3);
+    CHECK(cameras_apart(camera, found.front()) < 3);
     CHECK(found.front().width == 48);
   }
 }
@@ -73,10 +62,10 @@ TEST_CASE("camera_search: the whole object in a picture leads to the camera, tur
     if (seed == 12) camera = moved(camera, {0, 0, 0}, {0, 0, 0.5, 0, 0, 0, -0.2, 0.05, 0});
     const auto found = search.find(renderer.render(camera).rgb, 3);
     REQUIRE(found.size() == 3);
-    close +=
-        std::any_of(found.begin(), found.end(), [&](const nerf::Camera& c) { return apart(camera, c) < 8; });
+    close += std::any_of(found.begin(), found.end(),
+                         [&](const nerf::Camera& c) { return cameras_apart(camera, c) < 8; });
   }
-  CHECK(close >= 3);  // measured 4; 60 renders are some 15 degrees apart
+  CHECK(close >= 3);  // 60 renders are some 15 degrees apart
 }
 
 TEST_CASE("camera_search: nothing recognised, nothing found") {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cameras_apart.h"
 #include "support/catch.h"
 #include "tiny_owner.h"
 
@@ -26,19 +27,6 @@ Tensor<float> picture_of(const nerf::Camera& camera) {
   return quantize8(renderer.render(camera).rgb);
 }
 
-// How far apart two cameras see points about the scene's centre: the median, in pixels.
-double apart(const nerf::Camera& a, const nerf::Camera& b) {
-  std::vector<double> distances;
-  for (const double x : {-0.4, 0.0, 0.4})
-    for (const double y : {-0.4, 0.0, 0.4})
-      for (const double z : {-0.2, 0.1, 0.4}) {
-        const Projection p = project(a, {x, y, z}), q = project(b, {x, y, z});
-        distances.push_back(std::hypot(p.x - q.x, p.y - q.y));
-      }
-  std::sort(distances.begin(), distances.end());
-  return distances[distances.size() / 2];
-}
-
 Alignment align(const Tensor<float>& picture, const nerf::Camera& start) {
   PoseAligner aligner(tiny_field());
   return aligner.align(picture, start, kStages);
@@ -51,9 +39,9 @@ TEST_CASE("pose_alignment: a disturbed camera comes back to a tenth of a pixel")
     const nerf::Camera start =
         moved(camera, {0, 0, 0}, {0.04, -0.05, 0.06, 0.03, -0.02, 0.04, 0.03, -0.02, 0.01});
     CAPTURE(seed);
-    CHECK(apart(camera, start) > 2);
+    CHECK(cameras_apart(camera, start) > 2);
     const Alignment a = align(picture_of(camera), start);
-    CHECK(apart(camera, a.camera) < 0.1);
+    CHECK(cameras_apart(camera, a.camera) < 0.1);
     CHECK(a.agreement > 0.98);
   }
 }
@@ -69,14 +57,14 @@ TEST_CASE("pose_alignment: a turned and cut picture with other tones is met by r
   const Alignment a = align(picture, moved(part, {0, 0, 0}, {0.03, 0.04, -0.08, 0, 0, 0, 0.06, 0.03, -0.02}));
   CHECK(a.camera.width == 64);
   CHECK(a.camera.height == 56);
-  CHECK(apart(part, a.camera) < 0.1);
+  CHECK(cameras_apart(part, a.camera) < 0.1);
   CHECK(a.agreement > 0.98);
 }
 
 TEST_CASE("pose_alignment: pictures of something else do not agree") {
   const nerf::Camera camera = near_camera(5);
   CHECK(align(uniform<float>({64, 64, 3}, 0, 1, 3), camera).agreement < 0.3);
-  // The same silhouettes from another side.
+  // The scene from another side.
   CHECK(align(picture_of(near_camera(6)), camera).agreement < 0.75);
   CHECK(align(Tensor<float>({64, 64, 3}, 1), camera).agreement < 0.1);
   nerf::Camera away = camera;

@@ -43,8 +43,8 @@ struct PictureReading {
 ///     So few large cells do not drown many small ones.
 class GeometryReader {
  public:
-  /// Least agreement at which an alignment is believed: pictures of the field reached 0.956 and more under
-  /// noise of 0.10, a crop to 40% and JPEG of quality 50 together, another scene of the same make 0.76.
+  /// Least agreement at which an alignment is believed. Another scene of the same make reaches 0.76 in the
+  /// tests, which is what the best camera of a wrong scene finds.
   static constexpr double kLeastAgreement = 0.85;
   /// @param owner  of preset fast; must outlive this   @throws ValueError if it is of another preset
   explicit GeometryReader(const Owner& owner, const CameraSearchOptions& search = {});
