@@ -1,6 +1,7 @@
 #include "fieldmark/distort/attack.h"
 
 #include <fieldmark/engine/image.h>
+#include <fieldmark/engine/resize.h>
 #include <fieldmark/engine/tape.h>
 
 #include <algorithm>
@@ -12,10 +13,12 @@
 
 #include "checks.h"
 #include "fieldmark/distort/blur.h"
+#include "fieldmark/distort/jpeg444.h"
 #include "fieldmark/distort/noise.h"
 #include "fieldmark/distort/quantize8.h"
 #include "fieldmark/distort/resize_area.h"
 #include "fieldmark/distort/rotate.h"
+#include "fieldmark/distort/similarity.h"
 
 namespace fieldmark::distort {
 namespace {
@@ -25,30 +28,43 @@ struct Kind {
   AttackKind kind;
   double low, high;
 };
-constexpr std::array<Kind, 9> kKinds{{{"noise", AttackKind::noise, 0, 1},
-                                      {"rotation", AttackKind::rotation, 0, 180},
-                                      {"scale", AttackKind::scale, 0.01, 4},
-                                      {"blur", AttackKind::blur, 0, 100},
-                                      {"crop", AttackKind::crop, 0.0001, 1},
-                                      {"jpeg", AttackKind::jpeg, 1, 90},
-                                      {"gamma", AttackKind::gamma, 0.01, 10},
-                                      {"brightness", AttackKind::brightness, 0, 10},
-                                      {"hue", AttackKind::hue, -360, 360}}};
-constexpr std::string_view kCombined = "noise_0.10,crop_0.40,jpeg_50";
+constexpr std::array<Kind, 15> kKinds{{{"noise", AttackKind::noise, 0, 1},
+                                       {"rotation", AttackKind::rotation, 0, 180},
+                                       {"scale", AttackKind::scale, 0.01, 4},
+                                       {"scale-nearest", AttackKind::scale_nearest, 0.01, 4},
+                                       {"scale-bilinear", AttackKind::scale_bilinear, 0.01, 4},
+                                       {"scale-bicubic", AttackKind::scale_bicubic, 0.01, 4},
+                                       {"scale-lanczos", AttackKind::scale_lanczos, 0.01, 4},
+                                       {"blur", AttackKind::blur, 0, 100},
+                                       {"crop", AttackKind::crop, 0.0001, 1},
+                                       {"jpeg", AttackKind::jpeg, 1, 90},
+                                       {"jpeg444", AttackKind::jpeg444, 1, 100},
+                                       {"gamma", AttackKind::gamma, 0.01, 10},
+                                       {"brightness", AttackKind::brightness, 0, 10},
+                                       {"contrast", AttackKind::contrast, 0, 10},
+                                       {"hue", AttackKind::hue, -360, 360}}};
+// Names that stand for a chain.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kChains{
+    {{"combined", "noise_0.10,crop_0.40,jpeg_50"},
+     {"screenshot", "scale-bicubic_1.25,blur_0.5,gamma_1.1,scale-lanczos_0.8,jpeg_80"}}};
+
+bool is_whole(AttackKind kind) { return kind == AttackKind::jpeg || kind == AttackKind::jpeg444; }
 
 [[noreturn]] void fail(std::string_view name) {
   std::string text = "[attack] name: must be a chain, separated by commas, of";
   for (const Kind& k : kKinds) {
     char range[64];
-    std::snprintf(range, sizeof range, "_A (%g to %g%s), ", k.low, k.high,
-                  k.kind == AttackKind::jpeg ? ", whole" : "");
+    std::snprintf(range, sizeof range, "_A (%g to %g%s), ", k.low, k.high, is_whole(k.kind) ? ", whole" : "");
     text += " " + std::string(k.name) + range;
     text.pop_back();
   }
-  throw ValueError(text + " combined, got '" + std::string(name) + "'");
+  text += " greyscale";
+  for (const auto& chain : kChains) text += ", " + std::string(chain.first);
+  throw ValueError(text + ", got '" + std::string(name) + "'");
 }
 
 Attack::Step parse_step(std::string_view name) {
+  if (name == "greyscale") return {AttackKind::greyscale, 0};
   const std::size_t line = name.find('_');
   const auto kind = std::find_if(kKinds.begin(), kKinds.end(),
                                  [&](const Kind& k) { return k.name == name.substr(0, line); });
@@ -58,7 +74,7 @@ Attack::Step parse_step(std::string_view name) {
   const auto [stop, error] = std::from_chars(begin, end, amount);
   // Written so that nan fails.
   if (error != std::errc() || stop != end || !(amount >= kind->low && amount <= kind->high)) fail(name);
-  if (kind->kind == AttackKind::jpeg && amount != std::floor(amount)) fail(name);
+  if (is_whole(kind->kind) && amount != std::floor(amount)) fail(name);
   return {kind->kind, amount};
 }
 
@@ -88,17 +104,29 @@ Index scaled(Index extent, double factor) {
   return std::max<Index>(1, std::llround(static_cast<double>(extent) * factor));
 }
 
-Tensor<float> crop(const Tensor<float>& x, double fraction, const Draws& draws) {
-  const Index h = x.shape[0], w = x.shape[1];
+struct Crop {
+  Index top, left, height, width;
+};
+
+Crop crop_window(const Shape& shape, double fraction, const Draws& draws) {
+  const Index h = shape[0], w = shape[1];
   const Index height = scaled(h, std::sqrt(fraction));
   // The width makes up for the height's rounding: the area is what was asked for.
   const Index width = std::min(w, scaled(w, fraction * static_cast<double>(h) / static_cast<double>(height)));
-  const Index top = draws.rng.below(h - height + 1, draws.index, draws.at(0));
-  const Index left = draws.rng.below(w - width + 1, draws.index, draws.at(1));
-  Tensor<float> y({height, width, 3});
-  for (Index i = 0; i < height; ++i)
-    std::copy_n(x.data.begin() + ((top + i) * w + left) * 3, width * 3, y.data.begin() + i * width * 3);
+  return {draws.rng.below(h - height + 1, draws.index, draws.at(0)),
+          draws.rng.below(w - width + 1, draws.index, draws.at(1)), height, width};
+}
+
+Tensor<float> crop(const Tensor<float>& x, const Crop& c) {
+  Tensor<float> y({c.height, c.width, 3});
+  for (Index i = 0; i < c.height; ++i)
+    std::copy_n(x.data.begin() + ((c.top + i) * x.shape[1] + c.left) * 3, c.width * 3,
+                y.data.begin() + i * c.width * 3);
   return y;
+}
+
+double angle(double amount, const Draws& draws) {
+  return amount * (2 * draws.rng.uniform_double(draws.index, draws.base) - 1) * std::numbers::pi / 180;
 }
 
 // Hue, saturation and value of Smith 1978, hue turned: channel n = v - v s max(0, min(k, 4 - k, 1)), k = n +
@@ -125,6 +153,17 @@ Tensor<float> turn_hue(const Tensor<float>& x, double degrees) {
   return y;
 }
 
+Tensor<float> grey(const Tensor<float>& x) {
+  Tensor<float> y(x.shape);
+  for (Index i = 0; i < x.size(); i += 3)
+    std::fill_n(y.data.begin() + i, 3, 0.299f * x[i] + 0.587f * x[i + 1] + 0.114f * x[i + 2]);
+  return y;
+}
+
+Tensor<float> scale(const Tensor<float>& x, double factor, ResizeFilter filter) {
+  return resize_filtered(x, scaled(x.shape[0], factor), scaled(x.shape[1], factor), filter);
+}
+
 // Runs one of this module's ops on a picture; what the tape holds goes with it.
 template <class F>
 Tensor<float> run(const Tensor<float>& x, const F& op) {
@@ -143,8 +182,7 @@ Tensor<float> apply(const Attack::Step& step, const Tensor<float>& x, const Draw
       return run(x, [&](auto v, auto& tape) { return noise(v, tape.constant(&parameter, {1}), field); });
     }
     case AttackKind::rotation: {
-      const double degrees = step.amount * (2 * draws.rng.uniform_double(draws.index, draws.base) - 1);
-      parameter = static_cast<float>(degrees * std::numbers::pi / 180);
+      parameter = static_cast<float>(angle(step.amount, draws));
       return run(x,
                  [&](auto v, auto& tape) { return rotate(v, tape.constant(&parameter, {1}), background); });
     }
@@ -152,23 +190,78 @@ Tensor<float> apply(const Attack::Step& step, const Tensor<float>& x, const Draw
       return run(x, [&](auto v, auto&) {
         return resize_area(v, scaled(x.shape[0], step.amount), scaled(x.shape[1], step.amount));
       });
+    case AttackKind::scale_nearest:
+      return scale(x, step.amount, ResizeFilter::nearest);
+    case AttackKind::scale_bilinear:
+      return scale(x, step.amount, ResizeFilter::bilinear);
+    case AttackKind::scale_bicubic:
+      return scale(x, step.amount, ResizeFilter::bicubic);
+    case AttackKind::scale_lanczos:
+      return scale(x, step.amount, ResizeFilter::lanczos);
     case AttackKind::blur:
       return run(x, [&](auto v, auto& tape) { return blur(v, tape.constant(&parameter, {1})); });
     case AttackKind::crop:
-      return crop(x, step.amount, draws);
+      return crop(x, crop_window(x.shape, step.amount, draws));
     case AttackKind::jpeg:
       return jpeg_round_trip(x, static_cast<int>(step.amount));
+    case AttackKind::jpeg444:
+      return jpeg444(x, static_cast<int>(step.amount));
     case AttackKind::gamma:
       return map_values(x, [a](float v) { return std::pow(std::max(v, 0.f), a); });
     case AttackKind::brightness:
       return map_values(x, [a](float v) { return v * a; });
+    case AttackKind::contrast:
+      return map_values(x, [a](float v) { return 0.5f + a * (v - 0.5f); });
+    case AttackKind::greyscale:
+      return grey(x);
     case AttackKind::hue:
       return turn_hue(x, step.amount);
   }
   return x;
 }
 
+// What one step does to places. Steps that keep the size and move nothing have the identity.
+PixelMap moved(const Attack::Step& step, const Shape& before, const Shape& after, const Draws& draws) {
+  const double sy = static_cast<double>(before[0]) / static_cast<double>(after[0]),
+               sx = static_cast<double>(before[1]) / static_cast<double>(after[1]);
+  if (step.kind == AttackKind::crop) {
+    const Crop c = crop_window(before, step.amount, draws);
+    return {{1, 0, static_cast<double>(c.left), 0, 1, static_cast<double>(c.top)}};
+  }
+  if (step.kind == AttackKind::rotation) {
+    PixelMap map{similarity_matrix(angle(step.amount, draws), 1.0, 0.0, 0.0)};
+    const double x = static_cast<double>(before[1] - 1) / 2, y = static_cast<double>(before[0] - 1) / 2;
+    const auto centre = map(x, y);
+    map.numbers[2] += x - centre[0];
+    map.numbers[5] += y - centre[1];
+    return map;
+  }
+  return {{sx, 0, sx / 2 - 0.5, 0, sy, sy / 2 - 0.5}};
+}
+
+PixelMap after(const PixelMap& first, const PixelMap& second) {
+  const auto &a = first.numbers, &b = second.numbers;
+  const auto t = first(b[2], b[5]);
+  return {{a[0] * b[0] + a[1] * b[3], a[0] * b[1] + a[1] * b[4], t[0], a[3] * b[0] + a[4] * b[3],
+           a[3] * b[1] + a[4] * b[4], t[1]}};
+}
+
 }  // namespace
+
+std::array<double, 2> PixelMap::operator()(double x, double y) const {
+  const auto& m = numbers;
+  return {m[0] * x + m[1] * y + m[2], m[3] * x + m[4] * y + m[5]};
+}
+
+PixelMap PixelMap::inverse() const {
+  const auto& m = numbers;
+  const double det = m[0] * m[4] - m[1] * m[3];
+  PixelMap back{{m[4] / det, -m[1] / det, 0, -m[3] / det, m[0] / det, 0}};
+  const auto t = back(m[2], m[5]);
+  back.numbers[2] = -t[0];
+  back.numbers[5] = -t[1];
+  return back;
+}
 
 Attack parse_attack(std::string_view name) {
   Attack attack{std::string(name), {}};
@@ -176,8 +269,10 @@ Attack parse_attack(std::string_view name) {
   for (bool more = true; more;) {
     const std::size_t comma = rest.find(',');
     const std::string_view step = rest.substr(0, comma);
-    if (step == "combined") {
-      for (const auto& s : parse_attack(kCombined).steps) attack.steps.push_back(s);
+    const auto chain =
+        std::find_if(kChains.begin(), kChains.end(), [&](const auto& c) { return c.first == step; });
+    if (chain != kChains.end()) {
+      for (const auto& s : parse_attack(chain->second).steps) attack.steps.push_back(s);
     } else {
       attack.steps.push_back(parse_step(step));
     }
@@ -188,7 +283,7 @@ Attack parse_attack(std::string_view name) {
 }
 
 Tensor<float> apply_attack(const Attack& attack, const Tensor<float>& image, const CounterRng& rng,
-                           std::uint64_t index, std::span<const float> background) {
+                           std::uint64_t index, std::span<const float> background, PixelMap* source) {
   check_rank("attack", "image", image.shape, 3, "[height, width, 3]");
   check_extent("attack", "image", image.shape, 2, 3, "red, green and blue");
   if (image.size() == 0)
@@ -199,11 +294,16 @@ Tensor<float> apply_attack(const Attack& attack, const Tensor<float>& image, con
     return run(x, [](auto v, auto&) { return quantize8(v); });
   };
   Tensor<float> x = image;
+  PixelMap map;
   std::uint64_t base = 0;
   for (const auto& step : attack.steps) {
-    x = round(apply(step, x, Draws{rng, index, base}, background));
+    const Draws draws{rng, index, base};
+    const Shape before = x.shape;
+    x = round(apply(step, x, draws, background));
+    map = after(map, moved(step, before, x.shape, draws));
     base += std::uint64_t{1} << 40;
   }
+  if (source) *source = map;
   return x;
 }
 

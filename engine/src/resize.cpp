@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,38 @@ Taps linear_taps(Index i, Index in, Index out) {
   const double f = c - static_cast<double>(first);
   if (in == 1) return {.first = 0, .weights = {1.0}};
   return {.first = first, .weights = {1 - f, f}};
+}
+
+Taps nearest_taps(Index i, Index in, Index out) {
+  return {.first = (2 * i + 1) * in / (2 * out), .weights = {1.0}};
+}
+
+double triangle(double x) { return std::max(0.0, 1 - std::abs(x)); }
+double cubic(double x) {
+  const double a = -0.5, t = std::abs(x);
+  if (t < 1) return ((a + 2) * t - (a + 3)) * t * t + 1;
+  return t < 2 ? (((t - 5) * t + 8) * t - 4) * a : 0;
+}
+double lanczos3(double x) {
+  if (x == 0) return 1;
+  const double p = std::numbers::pi * x;
+  return std::abs(x) < 3 ? 3 * std::sin(p) * std::sin(p / 3) / (p * p) : 0;
+}
+
+template <double (*kernel)(double), int half_width>
+Taps kernel_taps(Index i, Index in, Index out) {
+  const double s = static_cast<double>(in) / static_cast<double>(out), stretch = std::max(s, 1.0);
+  const double centre = (static_cast<double>(i) + 0.5) * s, reach = half_width * stretch;
+  const auto first = std::max<Index>(0, static_cast<Index>(std::floor(centre - reach + 0.5)));
+  const auto end = std::min(in, static_cast<Index>(std::floor(centre + reach + 0.5)));
+  Taps t{.first = first, .weights = {}};
+  double sum = 0;
+  for (Index k = first; k < end; ++k) {
+    t.weights.push_back(kernel((static_cast<double>(k) + 0.5 - centre) / stretch));
+    sum += t.weights.back();
+  }
+  for (double& w : t.weights) w /= sum;
+  return t;
 }
 
 // Input [outer, in, inner] to [outer, out, inner]; the sums in double.
@@ -83,6 +116,14 @@ Tensor<float> resize_area(const Tensor<float>& image, Index height, Index width)
 
 Tensor<float> resize_bilinear(const Tensor<float>& image, Index height, Index width) {
   return resize("resize_bilinear", image, height, width, linear_taps);
+}
+
+Tensor<float> resize_filtered(const Tensor<float>& image, Index height, Index width, ResizeFilter filter) {
+  MakeTaps make = nearest_taps;
+  if (filter == ResizeFilter::bilinear) make = kernel_taps<triangle, 1>;
+  if (filter == ResizeFilter::bicubic) make = kernel_taps<cubic, 2>;
+  if (filter == ResizeFilter::lanczos) make = kernel_taps<lanczos3, 3>;
+  return resize("resize_filtered", image, height, width, make);
 }
 
 }  // namespace fieldmark

@@ -4,6 +4,7 @@
 #include <fieldmark/distort/resize_area.h>
 #include <fieldmark/distort/rotate.h>
 #include <fieldmark/engine/error.h>
+#include <fieldmark/engine/resize.h>
 
 #include <numbers>
 #include <set>
@@ -56,15 +57,19 @@ TEST_CASE("attack: names, chains and combined") {
 }
 
 TEST_CASE("attack: wrong names list the right ones") {
-  CHECK_THROWS_WITH(parse_attack("sharpen_1"),
-                    "[attack] name: must be a chain, separated by commas, of noise_A (0 to 1), rotation_A (0 "
-                    "to 180), scale_A (0.01 to 4), "
-                    "blur_A (0 to 100), crop_A (0.0001 to 1), jpeg_A (1 to 90, whole), gamma_A (0.01 to "
-                    "10), brightness_A (0 to 10), "
-                    "hue_A (-360 to 360), combined, got 'sharpen_1'");
-  for (const char* bad :
-       {"", "noise", "noise_", "noise_0.1x", "noise_-1", "noise_nan", "noise_inf", "jpeg_0", "jpeg_91",
-        "jpeg_50.5", "crop_0", "noise_0.1,", ",noise_0.1", "noise_0.1,,blur_1", "Noise_0.1", "combined_1"})
+  CHECK_THROWS_WITH(
+      parse_attack("sharpen_1"),
+      "[attack] name: must be a chain, separated by commas, of noise_A (0 to 1), rotation_A (0 "
+      "to 180), scale_A (0.01 to 4), scale-nearest_A (0.01 to 4), scale-bilinear_A (0.01 to 4), "
+      "scale-bicubic_A (0.01 to 4), scale-lanczos_A (0.01 to 4), "
+      "blur_A (0 to 100), crop_A (0.0001 to 1), jpeg_A (1 to 90, whole), jpeg444_A (1 to 100, "
+      "whole), gamma_A (0.01 to 10), brightness_A (0 to 10), contrast_A (0 to 10), "
+      "hue_A (-360 to 360), greyscale, combined, screenshot, got 'sharpen_1'");
+  for (const char* bad : {"",           "noise",       "noise_",        "noise_0.1x",        "noise_-1",
+                          "noise_nan",  "noise_inf",   "jpeg_0",        "jpeg_91",           "jpeg_50.5",
+                          "crop_0",     "noise_0.1,",  ",noise_0.1",    "noise_0.1,,blur_1", "Noise_0.1",
+                          "combined_1", "greyscale_1", "scale-box_0.5", "scale-_0.5",        "jpeg444_0.5",
+                          "contrast_-1"})
     CHECK_THROWS_AS(parse_attack(bad), ValueError);
 }
 
@@ -83,7 +88,8 @@ TEST_CASE("attack: severities of nothing leave an 8-bit picture as it is") {
   for (Shape s : {Shape{9, 6, 3}, Shape{1, 1, 3}}) {
     const auto x = picture(s);
     for (const char* name : {"noise_0", "rotation_0", "scale_1", "blur_0", "blur_1e-6", "crop_1", "gamma_1",
-                             "brightness_1", "hue_0", "hue_360", "noise_0,crop_1,scale_1"}) {
+                             "scale-nearest_1", "scale-bilinear_1", "scale-bicubic_1", "scale-lanczos_1",
+                             "brightness_1", "contrast_1", "hue_0", "hue_360", "noise_0,crop_1,scale_1"}) {
       INFO(name);
       CHECK(attacked(name, x).data == x.data);
     }
@@ -92,8 +98,10 @@ TEST_CASE("attack: severities of nothing leave an 8-bit picture as it is") {
 
 TEST_CASE("attack: every result is of 8 bits and depends on the seed and the index alone") {
   const auto x = picture({30, 40, 3});
-  for (const char* name : {"noise_0.05", "rotation_30", "scale_0.75", "blur_1", "crop_0.40", "jpeg_50",
-                           "gamma_2.2", "brightness_1.5", "hue_90", "combined"}) {
+  for (const char* name :
+       {"noise_0.05", "rotation_30", "scale_0.75", "blur_1", "crop_0.40", "jpeg_50", "gamma_2.2",
+        "brightness_1.5", "hue_90", "combined", "scale-nearest_0.75", "scale-bilinear_1.3",
+        "scale-bicubic_0.75", "scale-lanczos_0.5", "jpeg444_50", "contrast_1.5", "greyscale", "screenshot"}) {
     INFO(name);
     const auto y = attacked(name, x, 3);
     CHECK(y.data == rounded(y).data);
@@ -162,6 +170,35 @@ TEST_CASE("attack: rotation fills the corners with the background") {
   CHECK((y[0] == 1 && y[1] == 0 && y[2] == 0.6f));
 }
 
+TEST_CASE("attack: scale with the filters of picture programs, rounded") {
+  const auto x = picture({40, 31, 3});
+  for (const auto& [name, filter] : {std::pair{"scale-nearest_0.75", ResizeFilter::nearest},
+                                     {"scale-bilinear_0.75", ResizeFilter::bilinear},
+                                     {"scale-bicubic_0.75", ResizeFilter::bicubic},
+                                     {"scale-lanczos_0.75", ResizeFilter::lanczos}})
+    CHECK(attacked(name, x).data == rounded(resize_filtered(x, 30, 23, filter)).data);
+}
+
+TEST_CASE("attack: a screenshot keeps the size and is its chain") {
+  for (Shape s : {Shape{200, 160, 3}, Shape{48, 48, 3}}) {
+    const auto x = picture(s);
+    const auto y = attacked("screenshot", x);
+    CHECK(y.shape == x.shape);
+    CHECK(y.data == attacked("scale-bicubic_1.25,blur_0.5,gamma_1.1,scale-lanczos_0.8,jpeg_80", x).data);
+  }
+}
+
+TEST_CASE("attack: contrast and greyscale") {
+  const Tensor<float> x({1, 2, 3}, {0.2f, 0.4f, 0.8f, 1.f, 0.f, 0.6f});
+  const auto strong = attacked("contrast_1.5", x), grey = attacked("greyscale", x);
+  const float want[6] = {0.05f, 0.35f, 0.95f, 1.f, 0.f, 0.65f};
+  for (Index i = 0; i < 6; ++i) CHECK(std::abs(strong[i] - want[i]) <= 0.5001f / 255);
+  for (Index c = 0; c < 3; ++c) {
+    CHECK(std::abs(grey[c] - 0.3858f) <= 0.5001f / 255);
+    CHECK(std::abs(grey[3 + c] - 0.3674f) <= 0.5001f / 255);
+  }
+}
+
 TEST_CASE("attack: scale and blur are the layer's, rounded") {
   const auto x = picture({40, 31, 3});
   const auto scaled = attacked("scale_0.75", x);
@@ -190,6 +227,43 @@ TEST_CASE("attack: crop keeps a window of the right area anywhere in the picture
   // 23 and 38 places: 300 windows reach both ends and nearly all between.
   CHECK((*tops.begin() == 0 && *tops.rbegin() == 22 && tops.size() == 23));
   CHECK((*lefts.begin() <= 1 && *lefts.rbegin() >= 36 && lefts.size() > 34));
+}
+
+TEST_CASE("attack: where pixels come from, checked on a picture of coordinates") {
+  // Smooth coordinates in red and green: bilinear reading at the source gives back what the attack shows.
+  const Index h = 90, w = 120;
+  Tensor<float> x({h, w, 3});
+  for (Index p = 0; p < h * w; ++p) {
+    x[3 * p] = static_cast<float>(p % w + 10) / 255;
+    x[3 * p + 1] = static_cast<float>(p / w + 10) / 255;
+    x[3 * p + 2] = 1;
+  }
+  for (const char* name :
+       {"noise_0", "crop_0.4", "rotation_40", "scale_0.5", "scale-bicubic_1.7", "scale_0.7",
+        "crop_0.5,rotation_30,scale_0.8", "rotation_30,crop_0.6,scale-lanczos_1.3"}) {
+    distort::PixelMap map;
+    const auto y = apply_attack(parse_attack(name), x, kRng, 5, std::vector<float>{0, 0, 0}, &map);
+    const distort::PixelMap back = map.inverse();
+    double worst = 0, inside = 0;
+    for (Index i = 6; i < y.shape[0] - 6; ++i)
+      for (Index j = 6; j < y.shape[1] - 6; ++j) {
+        const float* got = y.data.data() + 3 * (i * y.shape[1] + j);
+        const auto from = map(static_cast<double>(j), static_cast<double>(i));
+        // Corners that a rotation opened, and what is beside them, show no coordinates.
+        if (from[0] < 9 || from[0] > static_cast<double>(w) - 10 || from[1] < 9 ||
+            from[1] > static_cast<double>(h) - 10 || got[2] < 0.999f)
+          continue;
+        inside += 1;
+        worst = std::max({worst, std::abs(255 * static_cast<double>(got[0]) - 10 - from[0]),
+                          std::abs(255 * static_cast<double>(got[1]) - 10 - from[1])});
+        const auto again = back(from[0], from[1]);
+        CHECK(std::hypot(again[0] - static_cast<double>(j), again[1] - static_cast<double>(i)) < 1e-9);
+      }
+    INFO(name);
+    CHECK(inside > 500);
+    // Half a level for each step's rounding; lanczos bends a slope a little: 0.06 levels.
+    CHECK(worst < 1.6);
+  }
 }
 
 TEST_CASE("attack: jpeg costs more at a lower quality and halves chroma's resolution") {

@@ -39,6 +39,33 @@ double bilinear(const Tensor<float>& x, Index height, Index width, Index y, Inde
          fv * ((1 - fu) * at(v0 + 1, u0) + fu * at(v0 + 1, u0 + 1));
 }
 
+// The kernel's weights over all pixels, two-dimensional at once and divided by their sum.
+template <class Kernel>
+double filtered(const Kernel& f, const Tensor<float>& x, Index height, Index width, Index y, Index column,
+                Index c) {
+  const Index h = x.shape[0], w = x.shape[1];
+  const double sy = double(h) / double(height), sx = double(w) / double(width);
+  double sum = 0, weights = 0;
+  for (Index a = 0; a < h; ++a)
+    for (Index b = 0; b < w; ++b) {
+      const double weight = f((double(a) + 0.5 - (double(y) + 0.5) * sy) / std::max(sy, 1.0)) *
+                            f((double(b) + 0.5 - (double(column) + 0.5) * sx) / std::max(sx, 1.0));
+      sum += weight * pixel(x, a, b, c);
+      weights += weight;
+    }
+  return sum / weights;
+}
+
+double tent(double t) { return std::abs(t) < 1 ? 1 - std::abs(t) : 0; }
+// Keys' two cubics, written out for a = -1/2.
+double keys(double t) {
+  const double u = std::abs(t);
+  if (u < 1) return 1.5 * u * u * u - 2.5 * u * u + 1;
+  return u < 2 ? -0.5 * u * u * u + 2.5 * u * u - 4 * u + 2 : 0;
+}
+double sinc(double t) { return t == 0 ? 1 : std::sin(3.141592653589793 * t) / (3.141592653589793 * t); }
+double lanczos(double t) { return std::abs(t) < 3 ? sinc(t) * sinc(t / 3) : 0; }
+
 template <class Resize, class Reference>
 double worst_error(Resize resize, Reference reference) {
   double worst = 0;
@@ -63,6 +90,34 @@ TEST_CASE("resize: area equals the mean over a common grid, bilinear the four ne
   // Two roundings to float of numbers below 1.
   CHECK(worst_error(resize_area, area) < 1.2e-7);
   CHECK(worst_error(resize_bilinear, bilinear) < 1.2e-7);
+}
+
+TEST_CASE("resize: kernels equal their sums over the whole picture") {
+  const auto with = [](ResizeFilter filter) {
+    return [filter](const auto& x, Index h, Index w) { return resize_filtered(x, h, w, filter); };
+  };
+  const auto by = [](double (*f)(double)) {
+    return [f](const auto&... rest) { return filtered(f, rest...); };
+  };
+  // Weights of bicubic and lanczos add up to 1.6 in size along an axis.
+  CHECK(worst_error(with(ResizeFilter::bilinear), by(tent)) < 2e-7);
+  CHECK(worst_error(with(ResizeFilter::bicubic), by(keys)) < 4e-7);
+  CHECK(worst_error(with(ResizeFilter::lanczos), by(lanczos)) < 4e-7);
+  CHECK(worst_error(with(ResizeFilter::nearest),
+                    [](const auto& x, Index height, Index width, Index y, Index column, Index c) {
+                      const auto under = [](Index i, Index in, Index out) {
+                        return static_cast<Index>(std::floor((double(i) + 0.5) * double(in) / double(out)));
+                      };
+                      return pixel(x, under(y, x.shape[0], height), under(column, x.shape[1], width), c);
+                    }) == 0);
+  for (const auto filter :
+       {ResizeFilter::nearest, ResizeFilter::bilinear, ResizeFilter::bicubic, ResizeFilter::lanczos}) {
+    const auto x = uniform<float>({9, 11, 3}, 0, 1, 2);
+    const auto y = resize_filtered(x, 9, 11, filter);
+    for (Index i = 0; i < x.size(); ++i) CHECK(std::abs(y[i] - x[i]) < 1e-7f);
+  }
+  CHECK_THROWS_WITH(resize_filtered(Tensor<float>({2, 2, 3}), 1, 0, ResizeFilter::bicubic),
+                    "[resize_filtered] height and width must be at least 1, got 1 and 0");
 }
 
 TEST_CASE("resize: the same size is the identity, a constant stays, a checkerboard halves to its mean") {

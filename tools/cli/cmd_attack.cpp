@@ -76,14 +76,18 @@ Command add_attack(CLI::App& app) {
                  "Names separated by commas, run left to right:\n"
                  "noise_A       Gaussian, standard deviation 0 to 1\n"
                  "rotation_A    by up to A degrees either way, 0 to 180\n"
-                 "scale_A       to A times the size, 0.01 to 4\n"
+                 "scale_A       to A times the size, 0.01 to 4, area filter; scale-nearest_A,\n"
+                 "              scale-bilinear_A, scale-bicubic_A, scale-lanczos_A with others\n"
                  "blur_A        Gaussian, sigma 0 to 100 pixels\n"
                  "crop_A        keeps this share of the area, 0.0001 to 1\n"
-                 "jpeg_A        quality 1 to 90\n"
+                 "jpeg_A        quality 1 to 90, halved chroma; jpeg444_A full, 1 to 100\n"
                  "gamma_A       0.01 to 10\n"
                  "brightness_A  factor 0 to 10\n"
+                 "contrast_A    about 1/2, factor 0 to 10\n"
                  "hue_A         -360 to 360 degrees\n"
-                 "combined      noise_0.10,crop_0.40,jpeg_50")
+                 "greyscale     luma in all three\n"
+                 "combined      noise_0.10,crop_0.40,jpeg_50\n"
+                 "screenshot    scale-bicubic_1.25,blur_0.5,gamma_1.1,scale-lanczos_0.8,jpeg_80")
       ->required()
       ->type_name("NAME[,NAME...]");
   app.add_option("--background", options->background,
