@@ -86,9 +86,14 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
   if (!(options.hard_pixels >= 0 && options.hard_pixels <= 1))
     throw ValueError("[trainer] hard_pixels must be in [0, 1], got " + std::to_string(options.hard_pixels));
   if (data.views.empty()) throw ValueError("[trainer] data must have at least one view");
-  field_.background = data.background;
-  field_.cameras = camera_span(data);
-  lay_out_space();
+  if (options.keep) {
+    const std::vector<std::uint8_t> bits(field_.grid.bits().begin(), field_.grid.bits().end());
+    field_.grid.restrict_to(bits);
+  } else {
+    field_.background = data.background;
+    field_.cameras = camera_span(data);
+    lay_out_space();
+  }
   if (field.coarse) rays_per_step_ = mlp_rays();
   // As if every tile were at its worst, so that what was never seen is preferred.
   if (options.hard_pixels > 0 && !field.coarse) tile_errors_.assign(at(tile_of(all_pixels() - 1) + 1), 1.f);
@@ -290,7 +295,7 @@ std::string Trainer::fingerprint() const {
          std::to_string(options_.warm_up) + " lr " + std::to_string(schedule.lr) + " half after " +
          std::to_string(schedule.half_after) + " cooldown " + std::to_string(schedule.cooldown) + " last " +
          std::to_string(schedule.last) + (options_.precision == Precision::bf16 ? " bf16" : "") +
-         (options_.carve ? "" : " not carved");
+         (options_.carve ? "" : " not carved") + (options_.keep ? " kept" : "");
 }
 
 void Trainer::save(const std::filesystem::path& path) const {

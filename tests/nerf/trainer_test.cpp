@@ -86,6 +86,40 @@ TEST_CASE("trainer: 100 steps on the built-in scene reach 19 dB") {
   CHECK(field.grid.occupied_cells() > 0);
 }
 
+TEST_CASE("trainer: a field that is kept goes on from where it was, in its space and its cells") {
+  RadianceField field(trainable_field_options());
+  {
+    Trainer trainer(field, scene(), train_options(60));
+    while (!trainer.done()) trainer.step(0);
+  }
+  const std::string configuration = field.configuration();
+  const std::vector<std::uint8_t> occupied(field.grid.bits().begin(), field.grid.bits().end());
+  Dataset elsewhere = scene();  // what another data set says of cameras and background is not taken over
+  elsewhere.views.resize(3);
+  elsewhere.background = Background::black;
+  const auto further = [&](bool keep) {
+    RadianceField f = field;
+    TrainOptions options = train_options(30);
+    options.schedule.lr = 5e-3;
+    options.keep = keep;
+    Trainer trainer(f, elsewhere, options);
+    trainer.step(0);
+    const double start = trainer.train_psnr();
+    while (!trainer.done()) trainer.step(0);
+    CAPTURE(keep, start, trainer.train_psnr());
+    CHECK(start > 15);
+    CHECK(trainer.train_psnr() > start);
+    return f;
+  };
+  const RadianceField kept = further(true), moved = further(false);
+  CHECK(kept.configuration() == configuration);
+  CHECK(moved.configuration() != configuration);
+  Index beyond = 0;
+  for (std::size_t c = 0; c < occupied.size(); ++c) beyond += kept.grid.bits()[c] && !occupied[c];
+  CHECK(beyond == 0);
+  CHECK_FALSE(std::ranges::equal(kept.params.values(), field.params.values()));
+}
+
 TEST_CASE("trainer: 300 steps of a small mlp field reach 17 dB, and both its networks learn") {
   RadianceField field(small_mlp_options());
   const RadianceField untrained(small_mlp_options());

@@ -35,6 +35,9 @@ struct TrainOptions {
   /// Where photographs have alpha, rule out for good what their silhouettes show to be empty: no sample is
   /// spent there. A departure from the original mlp field, whose rays have their points anywhere.
   bool carve = true;
+  /// Go on with a field that has been trained: its cameras, background, bounds and space stay, and of its
+  /// cells only those are looked at again that are occupied. Nothing is carved.
+  bool keep = false;
 };
 
 /// What suits a kind of field. mlp: Adam with 5e-4, falling exponentially over the last nine tenths of the
@@ -56,7 +59,8 @@ class Trainer {
  public:
   /// Lays the scene into the field's cube, see scene_space(). Where photographs have alpha, tightens its
   /// bounds to their visual hull and rules out the cells outside it; in other spaces, the cells that no
-  /// camera sees. Field and data must outlive the trainer. @throws ValueError if an option is out of range
+  /// camera sees; unless the field is to keep what it has. Field and data must outlive the trainer. @throws
+  /// ValueError if an option is out of range
   Trainer(RadianceField& field, const Dataset& data, const TrainOptions& options);
   /// Clears the gradients that the table has not been stepped with yet.
   ~Trainer();
