@@ -98,6 +98,29 @@ std::string polyline(const Axes& axes, std::vector<ScatterPoint> points) {
   return points.empty() ? "" : svg + "\"/>\n";
 }
 
+const char* colour_of(std::size_t series) { return kColours[series % kColours.size()]; }
+
+// One line for each series, and its name beside the last point.
+std::string curves(const Axes& axes, const std::vector<ScatterPoint>& points, std::vector<Box>& taken) {
+  std::string lines, names;
+  std::vector<std::string> done;
+  for (const auto& first : points) {
+    if (std::find(done.begin(), done.end(), first.series) != done.end()) continue;
+    const char* colour = colour_of(done.size());
+    done.push_back(first.series);
+    int x = 0, y = 0;
+    lines += "<polyline class=\"curve\" fill=\"none\" stroke=\"" + std::string(colour) + "\" points=\"";
+    for (const auto& p : points) {
+      if (p.series != first.series) continue;
+      x = axes.x(p.x), y = axes.y(p.y);
+      lines += std::to_string(x) + "," + std::to_string(y) + " ";
+    }
+    lines += "\"/>\n";
+    names += place_label(x, y, first.series, taken);
+  }
+  return lines + names;
+}
+
 std::string circle(int x, int y, int radius, const std::string& attributes) {
   return "<circle cx=\"" + std::to_string(x) + "\" cy=\"" + std::to_string(y) + "\" r=\"" +
          std::to_string(radius) + "\"" + attributes + "/>\n";
@@ -116,20 +139,20 @@ std::string scatter_chart(const ScatterText& text, const std::vector<ScatterPoin
   std::string svg = svg_begin(kLeft + kWidth + kRight, kTop + kHeight + kBottom, text.title) +
                     grid_lines(axes) +
                     svg_text(kLeft + kWidth / 2, kTop + kHeight + 42, " text-anchor=\"middle\"", text.x) +
-                    svg_text(kLeft, kTop - 8, "", text.y) + polyline(axes, drawn);
+                    svg_text(kLeft, kTop - 8, "", text.y) + (text.curves ? "" : polyline(axes, drawn));
   std::vector<std::string> series;
   std::vector<Box> taken;
   int legend = kLeft;
   for (const auto& p : drawn) taken.push_back({axes.x(p.x) - 5, axes.x(p.x) + 5, axes.y(p.y) + 4});
+  if (text.curves) svg += curves(axes, drawn, taken);
   std::string labels;
   for (const auto& p : drawn) {
     auto known = std::find(series.begin(), series.end(), p.series);
     const bool fresh = known == series.end();
     if (fresh) known = series.insert(known, p.series);
-    const std::string fill = std::string(" fill=\"") +
-                             kColours[static_cast<std::size_t>(known - series.begin()) % kColours.size()] +
-                             "\"";
-    if (fresh) {
+    const std::string fill =
+        std::string(" fill=\"") + colour_of(static_cast<std::size_t>(known - series.begin())) + "\"";
+    if (fresh && !text.curves) {
       svg += circle(legend, 46, 5, fill) + svg_text(legend + 10, 50, "", p.series);
       legend += 30 + 8 * static_cast<int>(p.series.size());
     }

@@ -95,3 +95,21 @@ TEST_CASE("scatter_chart: what cannot be drawn") {
                     "[scatter_chart] points must have one that is finite");
   CHECK_THROWS_WITH(scatter_chart({}, {{0, 1, "s"}}), "[scatter_chart] x must be positive, got 0.000000");
 }
+
+TEST_CASE("scatter_chart: curves join each series in its own order and name it at its end") {
+  const auto svg = scatter_chart({.title = "t", .x = "x", .y = "y", .curves = true},
+                                 {{8, 1, "b"}, {1, 0.9, "a"}, {2, 0.8, "b"}, {4, 0.5, "a"}, {3, 0.7, "b"}});
+  CHECK(well_formed(svg));
+  const auto at = places(svg);
+  REQUIRE(at.size() == 5);
+  const auto line = [&](std::vector<std::size_t> order) {
+    std::string text = "points=\"";
+    for (const std::size_t i : order) text += std::to_string(at[i].x) + "," + std::to_string(at[i].y) + " ";
+    return text + "\"";
+  };
+  CHECK(count(svg, "class=\"curve\"") == 2);
+  CHECK(count(svg, line({0, 2, 4})) == 1);
+  CHECK(count(svg, line({1, 3})) == 1);
+  CHECK(count(svg, ">a</text>") == 1);
+  CHECK(count(svg, ">b</text>") == 1);
+}

@@ -7,25 +7,10 @@
 #include <cmath>
 #include <optional>
 
+#include "means.h"
+
 namespace fieldmark::watermark {
 namespace {
-
-// Mean of the finite numbers: identical pictures have no PSNR, and a view of the background alone has no
-// object.
-double finite_mean(const std::vector<double>& values) {
-  double sum = 0, count = 0;
-  for (double v : values)
-    if (std::isfinite(v)) {
-      sum += v;
-      count += 1;
-    }
-  return count > 0 ? sum / count : std::nan("");
-}
-
-double percentile_5(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(0.05 * static_cast<double>(values.size()))];
-}
 
 struct Pictures {
   nerf::Rendering plain;

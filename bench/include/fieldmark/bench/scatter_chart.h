@@ -19,6 +19,9 @@ struct ScatterText {
   std::string title;  ///< above
   std::string x;      ///< below
   std::string y;      ///< at the upper left
+  /// Every series is a curve through its points in the order they come, named beside its last one; `line` and
+  /// the names below the title are then not used.
+  bool curves = false;
 };
 
 /// A picture of points as a standalone SVG file, x on a logarithmic axis. Labels are moved up or down so that
