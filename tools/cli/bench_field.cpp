@@ -139,10 +139,12 @@ nerf::Dataset bench_split(const std::string& folder, const std::string& split, b
 std::string lego_folder() { return shared_data("nerf_synthetic/lego").string(); }
 
 void add_bench_field(CLI::App& app, BenchFieldOptions& o) {
-  app.add_option("--field", o.field, "field: what is rendered (trained for --seconds)")
+  app.add_option("--field", o.field,
+                 "field: what is rendered (trained for --seconds); attacks: the baked field")
       ->type_name("FIELD")
       ->default_str("");
-  app.add_option("--size", o.size, "field: pixels of the views' longer side, 16 to 8192")
+  app.add_option("--size", o.size,
+                 "field, attacks (as trained): pixels of the views' longer side, 16 to 8192")
       ->check(CLI::Range(16, 8192).description(""))
       ->type_name("N");
   app.add_option("--views", o.views, "field: how many, 1 to 1000")
@@ -152,8 +154,10 @@ void add_bench_field(CLI::App& app, BenchFieldOptions& o) {
                  "field: of training, without --field; training: of each training; 0.1 to 86400")
       ->check(CLI::Range(0.1, 86400.0).description(""))
       ->type_name("S");
-  app.add_flag("--quick", o.quick,
-               "field: only the default and one setting of each kind; training: only three rows");
+  app.add_flag(
+      "--quick", o.quick,
+      "field: only the default and one setting of each kind; training: only three rows; attacks: one "
+      "severity");
 }
 
 int bench_field(const BenchFieldOptions& options, Context& context) {

@@ -34,6 +34,7 @@ constexpr Entry kCommands[] = {
     {"verify", "Decide whether pictures show a message, with p-values", add_verify},
     {"check", "Look for alterations in the evidence that verify wrote", add_check},
     {"attack", "Do to pictures what may remove a mark", add_attack},
+    {"attack-field", "Do to a field's file what may remove a mark", add_attack_field},
     {"bench", "Measure speed and error against this machine's peak", add_bench},
     {"gradcheck", "Check every hand-derived gradient against finite differences", add_gradcheck},
     {"info", "What a field, owner, key or other safetensors file holds", add_info},

@@ -13,6 +13,7 @@
 #include <optional>
 #include <ostream>
 
+#include "cli/bench_attacks.h"
 #include "cli/bench_field.h"
 #include "cli/bench_payload.h"
 #include "cli/bench_training.h"
@@ -25,6 +26,7 @@ namespace {
 
 struct Options {
   std::string what, peer;
+  BenchAttacksOptions attacks;
   BenchFieldOptions field;  // and what both have: --scene, --plot, --runs
   BenchPayloadOptions payload;
   bool precision = false;
@@ -194,6 +196,12 @@ int run(Options options, Context& context) {
   if (options.what == "field") return bench_field(options.field, context);
   if (options.what == "training") return bench_training(options.field, context);
   if (options.what == "payload") return bench_payload(options.payload, context);
+  if (options.what == "attacks") {
+    options.attacks.field = options.field.field;
+    options.attacks.plot = options.field.plot;
+    options.attacks.quick = options.field.quick;
+    return bench_attacks(options.attacks, context);
+  }
   options.engine.runs = options.field.runs;
   if (!options.field.plot.empty()) check_writable(options.field.plot);
   const Scene scene = scene_of(options);
@@ -225,9 +233,10 @@ Command add_bench(CLI::App& app) {
                  "engine: kernels and training steps, against this machine's peak;\n"
                  "field: rendering in many ways, speed against error;\n"
                  "training: every choice of training switched off and on, for --seconds each;\n"
-                 "payload: how often payloads are exact at rates of wrong bits, and how often noise is one")
+                 "payload: how often payloads are exact at rates of wrong bits, and how often noise is one;\n"
+                 "attacks: a baked mark under attacks on its pictures and its file, accuracy against damage")
       ->required()
-      ->check(CLI::IsMember({"engine", "field", "training", "payload"}).description(""))
+      ->check(CLI::IsMember({"engine", "field", "training", "payload", "attacks"}).description(""))
       ->type_name("WHAT");
   app.add_option("--runs", o->field.runs, "Runs of each row, whose median counts, 1 to 1000")
       ->check(CLI::Range(1, 1000).description(""))
@@ -266,7 +275,12 @@ Command add_bench(CLI::App& app) {
       ->needs(peer);
   add_bench_field(app, o->field);
   add_bench_payload(app, o->payload);
-  return [o](Context& context) { return run(*o, context); };
+  add_bench_attacks(app, o->attacks);
+  const CLI::Option* size = app.get_option("--size");
+  return [o, size](Context& context) {
+    if (size->count() > 0) o->attacks.size = o->field.size;
+    return run(*o, context);
+  };
 }
 
 }  // namespace fieldmark::cli

@@ -15,6 +15,7 @@ class Context;
 using Command = std::function<int(Context&)>;
 
 Command add_attack(CLI::App& app);
+Command add_attack_field(CLI::App& app);
 Command add_bake(CLI::App& app);
 Command add_bench(CLI::App& app);
 Command add_check(CLI::App& app);

@@ -1,0 +1,57 @@
+#include "cli/training_attack.h"
+
+#include <algorithm>
+
+#include "cli/cli.h"
+#include "tools/tiny_job.h"
+
+using namespace fieldmark;
+
+TEST_CASE("attack-field trains a field further, or a new one on its pictures", "[attack-field]") {
+  const TemporaryFolder folder;
+  const std::string scene = tiny_scene(folder), field = tiny_field(folder, scene, "40"),
+                    out = folder / "out.fm";
+  const auto before = nerf::RadianceField::load(field);
+  const auto run = [&](std::vector<std::string> words) {
+    words.insert(words.begin(),
+                 {"attack-field", field, "--out", out, "--steps", "5", "--json", "-", "--under"});
+    return run_command(words);
+  };
+  for (const auto& words :
+       std::vector<std::vector<std::string>>{{"finetune", "--data", scene},
+                                             {"finetune-renders", "--views", "4"},
+                                             {"retrain", "--views", "4", "--size", "24"}}) {
+    const auto r = run(words);
+    INFO(r.err);
+    REQUIRE(r.code == cli::kOk);
+    const auto json = nlohmann::json::parse(r.out);
+    CHECK(json["steps"] == 5);
+    CHECK(json["under"] == words[0]);
+    const auto after = nerf::RadianceField::load(out);
+    CHECK(!std::ranges::equal(after.params.values(), before.params.values()));
+    // Further training keeps bounds and cameras; a new field finds its own.
+    CHECK((after.configuration() == before.configuration()) == (words[0] != "retrain"));
+    const auto again = run(words);
+    CHECK(std::ranges::equal(nerf::RadianceField::load(out).params.values(), after.params.values()));
+  }
+  CHECK_THAT(run({"finetune"}).err, Contains("needs --data"));
+  CHECK(run({"finetune,float16", "--data", scene}).code == cli::kUsage);
+}
+
+TEST_CASE("a second mark goes on top of a baked field", "[attack-field]") {
+  const TinyJob& job = TinyJob::get();
+  const TemporaryFolder folder;
+  const std::string first = folder / "first.fm", owner = folder / "second.owner", both = folder / "both.fm";
+  REQUIRE(
+      run_command({"bake", "--owner", job.owner, "--message", "5", "--out", first, "--steps", "2"}).code ==
+      cli::kOk);
+  REQUIRE(run_command({"embed", "--field", first, "--out", owner, "--bits", "4", "--cells", "6",
+                       "--reader-size", "32", "--steps", "2", "--views", "8", "--measured-views", "1"})
+              .code == cli::kOk);
+  REQUIRE(run_command({"bake", "--owner", owner, "--message", "a", "--out", both, "--steps", "2"}).code ==
+          cli::kOk);
+  const auto r =
+      run_command({"measure", "--owner", job.owner, "--field", both, "--message", "5", "--count", "1"});
+  INFO(r.err);
+  CHECK(r.code == cli::kOk);
+}

@@ -1,0 +1,103 @@
+#include "cli/training_attack.h"
+
+#include <fieldmark/nerf/rendered_dataset.h>
+#include <fieldmark/nerf/trainer.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "cli/cli.h"
+#include "cli/scene_data.h"
+
+namespace fieldmark::cli {
+namespace {
+
+nerf::Dataset renders(const nerf::RadianceField& field, const TrainingAttackOptions& options,
+                      Context& context) {
+  const auto cameras = nerf::make_cameras(field.cameras, nerf::CameraSet::near, options.views, options.size,
+                                          context.seed() + 61);
+  const InterruptGuard guard;
+  Progress progress = context.progress("renders");
+  return nerf::rendered_dataset(field, cameras, [&](Index done, Index total) {
+    if (guard.interrupted()) throw Interrupted("nothing was written");
+    progress.update(static_cast<double>(done) / static_cast<double>(total));
+    return true;
+  });
+}
+
+nerf::RadianceField start(const std::string& name, const nerf::RadianceField& field, Context& context) {
+  if (name != "retrain") return field;
+  if (field.space.kind == nerf::SpaceKind::ndc)
+    throw UsageError(
+        "--under retrain: a forward-facing field's pictures do not say how near its scene begins");
+  nerf::RadianceFieldOptions sizes = field.options();
+  sizes.seed = context.seed() + 62;
+  return nerf::RadianceField(sizes);
+}
+
+// Takes the steps until the run is done.
+void train(const std::string& name, nerf::Trainer& trainer, const RunLength& length, Context& context,
+           Json& result) {
+  const double seconds =
+      run_long({.what = name,
+                .done = [&] { return trainer.done(); },
+                .step = [&](double now) { trainer.step(now); },
+                .steps = [&] { return trainer.steps(); },
+                .note =
+                    [&] {
+                      char note[64];
+                      std::snprintf(note, sizeof note, "%.2f dB on the rays trained", trainer.train_psnr());
+                      return std::string(note);
+                    },
+                .save = {},
+                .checkpoint = {}},
+               length, context);
+  result["steps"] = trainer.steps();
+  result["seconds"] = seconds;
+  result["psnr_trained"] = number(trainer.train_psnr());
+}
+
+}  // namespace
+
+void add_training_attack(CLI::App& app, TrainingAttackOptions& o) {
+  app.add_option("--data", o.data, "For finetune: data set of clean photographs")->type_name("DIR");
+  app.add_option("--size", o.size,
+                 "Pixels of the longer side of what is trained on, 16 to 8192 (as it is, or as in training)")
+      ->check(CLI::Range(16, 8192).description(""))
+      ->type_name("N")
+      ->default_str("");
+  app.add_option("--views", o.views, "Views that finetune-renders and retrain train on, 4 to 10000")
+      ->check(CLI::Range(4, 10000).description(""))
+      ->type_name("N");
+  app.add_option("--lr", o.lr, "First step size of finetune and finetune-renders, 1e-6 to 1")
+      ->check(CLI::Range(1e-6, 1.0).description(""))
+      ->type_name("F");
+  add_run_length(app, o.length, false);
+}
+
+bool is_training_attack(const std::string& name) {
+  return name == "finetune" || name == "finetune-renders" || name == "retrain";
+}
+
+nerf::RadianceField run_training_attack(const std::string& name, const nerf::RadianceField& field,
+                                        const TrainingAttackOptions& options, Context& context,
+                                        Json& result) {
+  if (name == "finetune" && options.data.empty()) throw UsageError("--under finetune: needs --data DIR");
+  nerf::RadianceField out = start(name, field, context);
+  const nerf::Dataset data =
+      name == "finetune"
+          ? load_scene(options.data, {.split = "train", .size = options.size, .background = field.background},
+                       context)
+          : renders(field, options, context);
+  nerf::TrainOptions train_options = nerf::train_options(field.options().field.kind);
+  train_options.keep = name != "retrain";
+  if (train_options.keep) train_options.schedule.lr = options.lr;
+  train_options.schedule.steps = options.length.steps;
+  train_options.schedule.seconds = options.length.seconds;
+  train_options.seed = context.seed();
+  nerf::Trainer trainer(out, data, train_options);
+  train(name, trainer, options.length, context, result);
+  return out;
+}
+
+}  // namespace fieldmark::cli
