@@ -261,8 +261,8 @@ TEST_CASE("attack: where pixels come from, checked on a picture of coordinates")
       }
     INFO(name);
     CHECK(inside > 500);
-    // Half a level for each step's rounding; lanczos bends a slope a little: 0.06 levels.
-    CHECK(worst < 1.6);
+    // Half a level for each step's rounding: measured 0.5 for one step, 1.11 at most for three.
+    CHECK(worst < 1.3);
   }
 }
 

@@ -99,10 +99,10 @@ TEST_CASE("resize: kernels equal their sums over the whole picture") {
   const auto by = [](double (*f)(double)) {
     return [f](const auto&... rest) { return filtered(f, rest...); };
   };
-  // Weights of bicubic and lanczos add up to 1.6 in size along an axis.
+  // Two roundings to float; measured 5.7e-8, 7.3e-8 and 9.7e-8.
   CHECK(worst_error(with(ResizeFilter::bilinear), by(tent)) < 2e-7);
-  CHECK(worst_error(with(ResizeFilter::bicubic), by(keys)) < 4e-7);
-  CHECK(worst_error(with(ResizeFilter::lanczos), by(lanczos)) < 4e-7);
+  CHECK(worst_error(with(ResizeFilter::bicubic), by(keys)) < 2e-7);
+  CHECK(worst_error(with(ResizeFilter::lanczos), by(lanczos)) < 2e-7);
   CHECK(worst_error(with(ResizeFilter::nearest),
                     [](const auto& x, Index height, Index width, Index y, Index column, Index c) {
                       const auto under = [](Index i, Index in, Index out) {
