@@ -36,7 +36,7 @@ TEST_CASE("rendered_dataset: over the background its pictures are the field's") 
   }
 }
 
-TEST_CASE("rendered_dataset: other spaces have opaque pictures; errors, progress and threads") {
+TEST_CASE("rendered_dataset: other spaces have opaque pictures, and errors, progress and threads") {
   RadianceField field = small_field();
   const auto cameras = make_cameras(field.cameras, CameraSet::near, 2, 24, 1);
   const int before = threads();

@@ -9,22 +9,22 @@ using namespace fieldmark;
 
 namespace {
 
-watermark::Message message_of(const cli::MessageOption& options, Index bits) {
+watermark::Message cli::message_of(const cli::MessageOption& options, Index bits) {
   return cli::message_of(options, bits);
 }
 
 }  // namespace
 
 TEST_CASE("message options: each kind is encoded, and told again", "[message_option]") {
-  const auto text = message_of({.message = "", .text = "hello", .uuid = "", .payload = ""}, 100);
+  const auto text = cli::message_of({.message = "", .text = "hello", .uuid = "", .payload = ""}, 100);
   CHECK(text.size() == 100);
   CHECK(cli::payload_json(text) == cli::Json{{"kind", "text"}, {"value", "hello"}});
-  const auto hex = message_of({.message = "", .text = "", .uuid = "", .payload = "C0ffee"}, 64);
+  const auto hex = cli::message_of({.message = "", .text = "", .uuid = "", .payload = "C0ffee"}, 64);
   CHECK(cli::payload_json(hex) == cli::Json{{"kind", "hex"}, {"value", "c0ffee"}});
   const std::string uuid = "01234567-89ab-cdef-0123-456789abcdef";
   CHECK(cli::payload_json(
-            message_of({.message = "", .text = "", .uuid = uuid, .payload = ""}, 255))["value"] == uuid);
-  const auto plain = message_of({.message = "a5c3", .text = "", .uuid = "", .payload = ""}, 16);
+            cli::message_of({.message = "", .text = "", .uuid = uuid, .payload = ""}, 255))["value"] == uuid);
+  const auto plain = cli::message_of({.message = "a5c3", .text = "", .uuid = "", .payload = ""}, 16);
   CHECK(to_hex(plain) == "a5c3");
   CHECK(cli::payload_json(plain).is_null());
 }
@@ -35,12 +35,12 @@ TEST_CASE("message options: what does not fit is a usage error that names the op
       hex{.message = "", .text = "", .uuid = "", .payload = "xy"};
   CHECK_FALSE(none.given());
   CHECK(text.given());
-  CHECK_THROWS_WITH(message_of(none, 100), "one of --message, --text, --uuid and --payload is needed");
+  CHECK_THROWS_WITH(cli::message_of(none, 100), "one of --message, --text, --uuid and --payload is needed");
   CHECK_THROWS_WITH(
-      message_of(text, 48),
+      cli::message_of(text, 48),
       "--text: [PayloadCodec::encode] payload: has 40 bits, a message of 48 bits can hold at most 32");
-  CHECK_THROWS_AS(message_of(uuid, 256), cli::UsageError);
-  CHECK_THROWS_AS(message_of(hex, 100), cli::UsageError);
+  CHECK_THROWS_AS(cli::message_of(uuid, 256), cli::UsageError);
+  CHECK_THROWS_AS(cli::message_of(hex, 100), cli::UsageError);
   for (const char* pair :
        {"--text a --uuid b", "--text a --payload b", "--message a --text b", "--uuid a --payload b"}) {
     CLI::App app;
@@ -52,7 +52,7 @@ TEST_CASE("message options: what does not fit is a usage error that names the op
 
 TEST_CASE("message options: readings are told in words and as JSON", "[message_option]") {
   std::vector<double> logits;
-  for (auto bit : message_of({.message = "", .text = "hello", .uuid = "", .payload = ""}, 100).bits)
+  for (auto bit : cli::message_of({.message = "", .text = "hello", .uuid = "", .payload = ""}, 100).bits)
     logits.push_back(bit ? 2.0 : -2.0);
   logits[50] *= -1;
   const auto read = cli::read_payload(logits);
