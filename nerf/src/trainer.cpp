@@ -97,7 +97,10 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
   if (field.coarse) rays_per_step_ = mlp_rays();
   // As if every tile were at its worst, so that what was never seen is preferred.
   if (options.hard_pixels > 0 && !field.coarse) tile_errors_.assign(at(tile_of(all_pixels() - 1) + 1), 1.f);
-  for (Shard& s : shards_) s.samples.reserve(at(kMostRays / kRays / kShards + 1));
+  for (Shard& s : shards_) {
+    s.samples.reserve(at(kMostRays / kRays / kShards + 1));
+    if (!tile_errors_.empty()) s.errors.reserve(at(kMostRays / kShards + kRays));
+  }
 }
 
 Trainer::~Trainer() { std::ranges::fill(field_.params.grads(), 0.f); }

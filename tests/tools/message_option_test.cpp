@@ -7,14 +7,6 @@
 
 using namespace fieldmark;
 
-namespace {
-
-watermark::Message cli::message_of(const cli::MessageOption& options, Index bits) {
-  return cli::message_of(options, bits);
-}
-
-}  // namespace
-
 TEST_CASE("message options: each kind is encoded, and told again", "[message_option]") {
   const auto text = cli::message_of({.message = "", .text = "hello", .uuid = "", .payload = ""}, 100);
   CHECK(text.size() == 100);

@@ -42,7 +42,7 @@ struct PayloadBench {
   Index data_bits = 0;                            ///< of the random payloads
   std::vector<watermark::PayloadLayout> layouts;  ///< of messages of this length
   std::vector<PayloadRow> rows;                   ///< one for each rate
-  PayloadNoise noise;
+  PayloadNoise noise;                             ///< of messages of this length
 };
 
 /// The same results for any number of threads. @param progress  called with the part that is done, before

@@ -21,8 +21,8 @@ const char* payload_kind_name(PayloadKind kind);
 
 /// What an owner wants to have said by a mark.
 struct Payload {
-  PayloadKind kind = PayloadKind::hex;
-  std::string value{};  ///< digits of hex and uuid in lower case, a uuid with its hyphens
+  PayloadKind kind = PayloadKind::hex;  ///< how value is to be taken
+  std::string value{};                  ///< digits of hex and uuid in lower case, a uuid with its hyphens
   /// Equal in kind and value.
   friend bool operator==(const Payload&, const Payload&) = default;
 };
