@@ -68,27 +68,28 @@ TEST_CASE("bake encodes payloads, and the other commands know them and their cla
   CHECK(bake["message"].get<std::string>().substr(0, 5) == "76869");  // version 7, then the text
   CHECK(bake["claim"] == embedded["claim"]);
   CHECK(bake["owner_sha256"] == embedded["sha256"]);
-  const auto verified = json_of({"verify", "--owner", owner, "--text", "hi", pictures});
+  const auto verified = json_of({"verify", "--reading", "blind", "--owner", owner, "--text", "hi", pictures});
   CHECK(verified["claim"] == bake["claim"]);
   CHECK(verified["owner_sha256"] == bake["owner_sha256"]);
   CHECK(verified["payload"] == bake["payload"]);
-  CHECK(json_of({"verify", "--owner", owner, "--message", bake["message"], pictures})["claim"] ==
+  CHECK(json_of({"verify", "--reading", "blind", "--owner", owner, "--message", bake["message"],
+                 pictures})["claim"] == bake["claim"]);
+  CHECK(json_of({"verify", "--reading", "blind", "--owner", owner, "--payload", "c0fe", pictures})["claim"] !=
         bake["claim"]);
-  CHECK(json_of({"verify", "--owner", owner, "--payload", "c0fe", pictures})["claim"] != bake["claim"]);
   // Nothing was learnt, so there is nothing to be read.
   const auto extracted = json_of({"extract", "--owner", owner, pictures});
   CHECK(extracted["payload"].is_null());
   CHECK(extracted["views"][0]["payload"].is_null());
-  const auto of_baked =
-      json_of({"measure", "--owner", owner, "--field", baked, "--text", "hi", "--count", "2"});
+  const auto of_baked = json_of({"measure", "--geometry-count", "0", "--owner", owner, "--field", baked,
+                                 "--text", "hi", "--count", "2"});
   CHECK(of_baked["payload"]["trials"] == 2);
   CHECK(of_baked["payload"]["exact"] == 0);
-  const auto drawn = json_of(
-      {"measure", "--owner", owner, "--count", "4", "--payloads", "--together", "2", "--under", "blur_1"});
+  const auto drawn = json_of({"measure", "--geometry-count", "0", "--owner", owner, "--count", "4",
+                              "--payloads", "--together", "2", "--under", "blur_1"});
   CHECK(drawn["payload"]["trials"] == 2);
   CHECK(drawn["payload"]["together"] == 2);
   CHECK(drawn["payload"]["under"]["blur_1"]["trials"] == 2);
-  CHECK(json_of({"measure", "--owner", owner, "--count", "1"})["payload"].is_null());
+  CHECK(json_of({"measure", "--geometry-count", "0", "--owner", owner, "--count", "1"})["payload"].is_null());
   const auto refused = [&](const std::vector<std::string>& options, const char* why) {
     std::vector<std::string> line{"bake",    "--owner", owner, "--out", job.folder / "refused.fm",
                                   "--steps", "1"};
@@ -106,7 +107,7 @@ TEST_CASE("bake encodes payloads, and the other commands know them and their cla
   for (const std::vector<std::string>& extra : {std::vector<std::string>{"--together", "3"},
                                                 {"--payloads", "--field", baked, "--text", "hi"},
                                                 {"--text", "hi"}}) {
-    std::vector<std::string> line{"measure", "--owner", owner, "--count", "2"};
+    std::vector<std::string> line{"measure", "--geometry-count", "0", "--owner", owner, "--count", "2"};
     line.insert(line.end(), extra.begin(), extra.end());
     CHECK(run_command(line).code == cli::kUsage);
   }

@@ -13,8 +13,9 @@ struct Evidence {
   std::string folder = job.folder / "evidence", pictures = job.pictures();
   nlohmann::json verified;
   Evidence() {
-    const auto r = run_command({"verify", "--owner", job.owner, "--message", "5", "--fpr", "1", "--evidence",
-                                folder, "--wrong-keys", "300", pictures, "--json", "-"});
+    const auto r =
+        run_command({"verify", "--reading", "blind", "--owner", job.owner, "--message", "5", "--fpr", "1",
+                     "--evidence", folder, "--wrong-keys", "300", pictures, "--json", "-"});
     INFO(r.err);
     REQUIRE(r.code == cli::kOk);
     verified = nlohmann::json::parse(r.out);

@@ -32,8 +32,8 @@ TEST_CASE("measure gives LPIPS against the unmarked renders where there are weig
   const std::string weights = folder / "alex.safetensors";
   random_weights(lpips_tensors(LpipsNetwork::alex)).write(weights);
   const auto lpips_at = [&](const std::string& file, const char* size) {
-    const auto r = run_command({"measure", "--owner", job.owner, "--count", "2", "--size", size,
-                                "--lpips-weights", file, "--json", "-"});
+    const auto r = run_command({"measure", "--geometry-count", "0", "--owner", job.owner, "--count", "2",
+                                "--size", size, "--lpips-weights", file, "--json", "-"});
     INFO(r.err);
     REQUIRE(r.code == cli::kOk);
     return nlohmann::json::parse(r.out)["lpips_base"];

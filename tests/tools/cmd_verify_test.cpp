@@ -35,10 +35,12 @@ TEST_CASE("verify takes another key, and finds with a rate of 1 whatever it sees
   const TinyJob& job = TinyJob::get();
   const std::string key = job.folder / "other.key", pictures = job.pictures();
   REQUIRE(run_command({"key", "--out", key}).code == 0);
-  CHECK(run_command({"verify", "--owner", job.owner, "--message", "5", "--key", key, pictures}).code ==
-        cli::kNotFound);
-  CHECK(run_command({"verify", "--owner", job.owner, "--message", "5", "--fpr", "1", pictures}).code ==
-        cli::kOk);
+  CHECK(run_command(
+            {"verify", "--reading", "blind", "--owner", job.owner, "--message", "5", "--key", key, pictures})
+            .code == cli::kNotFound);
+  CHECK(run_command(
+            {"verify", "--reading", "blind", "--owner", job.owner, "--message", "5", "--fpr", "1", pictures})
+            .code == cli::kOk);
 }
 
 TEST_CASE("verify refuses a rate that no picture can reach, and messages that do not fit", "[verify]") {
@@ -56,8 +58,8 @@ TEST_CASE("verify tells of every view, and tests controls beside the pictures", 
   const TinyJob& job = TinyJob::get();
   const std::string pictures = job.pictures(), white = job.folder / "white.png";
   write_png(white, Tensor<float>({32, 32, 3}, 1.f));
-  const auto r = run_command({"verify", "--owner", job.owner, "--message", "5", "--control", white, pictures,
-                              "--control", pictures, "--json", "-"});
+  const auto r = run_command({"verify", "--reading", "blind", "--owner", job.owner, "--message", "5",
+                              "--control", white, pictures, "--control", pictures, "--json", "-"});
   INFO(r.err);
   CHECK(r.code == cli::kNotFound);
   const auto json = nlohmann::json::parse(r.out);
@@ -77,8 +79,8 @@ TEST_CASE("verify counts the same wrong keys for any number of threads", "[verif
   const TinyJob& job = TinyJob::get();
   const std::string pictures = job.pictures();
   const auto counted = [&](const char* threads) {
-    const auto r = run_command({"verify", "--owner", job.owner, "--message", "5", "--wrong-keys", "20000",
-                                "--threads", threads, pictures, "--json", "-"});
+    const auto r = run_command({"verify", "--reading", "blind", "--owner", job.owner, "--message", "5",
+                                "--wrong-keys", "20000", "--threads", threads, pictures, "--json", "-"});
     return nlohmann::json::parse(r.out)["wrong_keys"];
   };
   const auto one = counted("1"), two = counted("2");
@@ -94,8 +96,8 @@ TEST_CASE("verify writes equal evidence for equal work, and spares folders of ot
   const TinyJob& job = TinyJob::get();
   const std::string pictures = job.pictures(), folder = job.folder / "proof";
   const auto verify = [&] {
-    return run_command({"verify", "--owner", job.owner, "--message", "5", "--evidence", folder,
-                        "--wrong-keys", "200", pictures});
+    return run_command({"verify", "--reading", "blind", "--owner", job.owner, "--message", "5", "--evidence",
+                        folder, "--wrong-keys", "200", pictures});
   };
   const auto first = verify();
   INFO(first.err);
