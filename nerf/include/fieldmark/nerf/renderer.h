@@ -17,7 +17,7 @@ struct RayOrder {
 /// How exactly a Renderer works.
 struct RenderOptions {
   /// Samples along a ray for each that training took, > 0. What a ray misses between its samples is most of a
-  /// picture's error (docs/results/field.md). Without meaning for mlp, see points.
+  /// picture's error (`fieldmark bench field` measures it). Without meaning for mlp, see points.
   float finer = 4.f / 3;
   float stop = 1e-3f;          ///< a ray ends where its transmittance falls below this
   float least_weight = 1e-4f;  ///< samples of less weight get no colour
