@@ -29,6 +29,7 @@ Command add_info(CLI::App& app);
 Command add_key(CLI::App& app);
 Command add_measure(CLI::App& app);
 Command add_render(CLI::App& app);
+Command add_reproduce(CLI::App& app);
 Command add_scene(CLI::App& app);
 Command add_train(CLI::App& app);
 Command add_verify(CLI::App& app);

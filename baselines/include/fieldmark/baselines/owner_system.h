@@ -1,0 +1,50 @@
+#pragma once
+#include <fieldmark/baselines/cell.h>
+#include <fieldmark/baselines/mark_scores.h>
+#include <fieldmark/baselines/timed_run.h>
+#include <fieldmark/watermark/embedder.h>
+#include <fieldmark/watermark/owner.h>
+
+namespace fieldmark::baselines {
+
+/// How a system with an Owner is trained.
+struct OwnerSystem {
+  watermark::OwnerOptions owner;  ///< networks and strength
+  watermark::EmbedOptions embed;  ///< losses and distortions, without the length of the run
+};
+
+/// Whether a system of paper_systems() marks a frozen field through an Owner.
+bool has_owner(std::string_view system);
+/// The options of such a system: "ours" at 34 dB on the object, read at up to 128 pixels; the paper's at up
+/// to 150.
+/// @param picture  pixels of the views' longer side; the reader sees no more, and at least 32
+/// @throws ValueError if the system has none
+OwnerSystem owner_system(const CellName& name, Index picture);
+
+/// A key for measurements, a function of the seed: not secret, so that equal runs give equal cells.
+watermark::Key measuring_key(std::uint64_t seed);
+
+/// Where and how long an owner is trained.
+struct OwnerTraining {
+  double seconds = 300;              ///< of training, without the views' rendering
+  std::filesystem::path checkpoint;  ///< see TimedRun
+  Index views = 200;                 ///< near views to learn from
+  RunProgress progress = {};         ///< may be empty
+};
+
+/// An owner that has been trained.
+struct TrainedOwner {
+  watermark::Owner owner;  ///< calibrated
+  Index steps = 0;         ///< of training
+  double seconds = 0;      ///< of training
+};
+
+/// Renders views, trains mark and extractor and calibrates the strength; goes on from a checkpoint.
+/// @throws Stopped after saving   @throws as Embedder
+TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name, const OwnerSystem& system,
+                         const OwnerTraining& training);
+
+/// An owner's mark with a message of its own in every view, see message_of_view(). The owner must outlive it.
+MarkedScene marked_scene(const watermark::Owner& owner, std::uint64_t seed);
+
+}  // namespace fieldmark::baselines

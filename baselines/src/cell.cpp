@@ -1,0 +1,107 @@
+#include <fieldmark/baselines/cell.h>
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/files.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+namespace fieldmark::baselines {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+double read_number(const Json& j) { return j.is_null() ? std::nan("") : j.get<double>(); }
+
+Json numbers(const std::map<std::string, double>& values) {
+  Json j = Json::object();
+  for (const auto& [name, value] : values) j[name] = number(value);
+  return j;
+}
+
+std::map<std::string, double> read_numbers(const Json& j) {
+  std::map<std::string, double> values;
+  for (const auto& [name, value] : j.items()) values[name] = read_number(value);
+  return values;
+}
+
+}  // namespace
+
+std::string CellName::stem() const {
+  return system + "-" + scene + "-" + field + "-" + std::to_string(bits) + "-" + std::to_string(seed);
+}
+
+std::string format_cell(const Cell& c) {
+  const Json j{{"system", c.name.system},
+               {"scene", c.name.scene},
+               {"field", c.name.field},
+               {"bits", c.name.bits},
+               {"seed", c.name.seed},
+               {"steps", c.steps},
+               {"seconds", number(c.seconds)},
+               {"bit_accuracy", number(c.bit_accuracy)},
+               {"spread", number(c.spread)},
+               {"own_2d_accuracy", number(c.own_2d_accuracy)},
+               {"psnr_base", number(c.psnr_base)},
+               {"psnr_base_object", number(c.psnr_base_object)},
+               {"psnr_photo", number(c.psnr_photo)},
+               {"ssim", number(c.ssim)},
+               {"lpips", number(c.lpips)},
+               {"under", numbers(c.under)},
+               {"commit", c.commit},
+               {"more", numbers(c.more)}};
+  return j.dump(2) + "\n";
+}
+
+Cell parse_cell(std::string_view text, std::string_view place) {
+  try {
+    const Json j = Json::parse(text);
+    return {.name = {j.at("system"), j.at("scene"), j.at("field"), j.at("bits"), j.at("seed")},
+            .steps = j.at("steps"),
+            .seconds = read_number(j.at("seconds")),
+            .bit_accuracy = read_number(j.at("bit_accuracy")),
+            .spread = read_number(j.at("spread")),
+            .own_2d_accuracy = read_number(j.at("own_2d_accuracy")),
+            .psnr_base = read_number(j.at("psnr_base")),
+            .psnr_base_object = read_number(j.at("psnr_base_object")),
+            .psnr_photo = read_number(j.at("psnr_photo")),
+            .ssim = read_number(j.at("ssim")),
+            .lpips = read_number(j.at("lpips")),
+            .under = read_numbers(j.at("under")),
+            .commit = j.at("commit"),
+            .more = read_numbers(j.at("more"))};
+  } catch (const Json::exception& e) {
+    throw IoError(std::string(place) + ": expected a cell of `fieldmark reproduce`, found " + e.what());
+  }
+}
+
+std::filesystem::path cell_path(const std::filesystem::path& folder, const CellName& name) {
+  return folder / name.stem();
+}
+
+void save_cell(const std::filesystem::path& folder, const Cell& cell) {
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  if (failed) throw IoError(folder.string() + ": cannot make the folder: " + failed.message());
+  write_file_atomically(cell_path(folder, cell.name).string() + ".json", format_cell(cell));
+}
+
+std::vector<Cell> load_cells(const std::filesystem::path& folder) {
+  std::vector<Cell> cells;
+  if (!std::filesystem::is_directory(folder)) return cells;
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    if (entry.path().extension() == ".json") files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  for (const auto& file : files) {
+    cells.push_back(parse_cell(read_text(file), file.string()));
+    if (cells.back().name.stem() != file.stem())
+      throw IoError(file.string() + ": expected the cell of this name, found that of " +
+                    cells.back().name.stem());
+  }
+  return cells;
+}
+
+}  // namespace fieldmark::baselines

@@ -1,0 +1,104 @@
+#include <fieldmark/baselines/owner_system.h>
+#include <fieldmark/watermark/embed_views.h>
+#include <fieldmark/watermark/picture_reader.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+
+namespace fieldmark::baselines {
+namespace {
+
+constexpr std::array<std::string_view, 3> kOwners{"ours", "copyrnerf_paper", "without_drr"};
+constexpr double kStrength = 34;                                  // dB on the object
+constexpr Index kOurPatch = 128, kPaperPatch = 150, kLeast = 32;  // pixels
+
+watermark::Owner new_owner(const nerf::RadianceField& field, const CellName& name, const OwnerSystem& system,
+                           std::span<const watermark::CachedView> views) {
+  const auto& o = system.owner;
+  auto cells = o.preset == watermark::Preset::fast
+                   ? watermark::CellGrid(o.cells, watermark::visible_area(views, o.cells))
+                   : watermark::message_slots(o.bits);
+  return {field, o, measuring_key(name.seed), std::move(cells)};
+}
+
+}  // namespace
+
+bool has_owner(std::string_view system) {
+  return std::find(kOwners.begin(), kOwners.end(), system) != kOwners.end();
+}
+
+OwnerSystem owner_system(const CellName& name, Index picture) {
+  if (!has_owner(name.system))
+    throw ValueError("[owner_system] name.system must be one that marks a frozen field, got " + name.system);
+  const bool fast = name.system.starts_with("ours");
+  const auto preset = fast ? watermark::Preset::fast : watermark::Preset::paper;
+  OwnerSystem s{.owner = {.preset = preset, .bits = name.bits, .strength = kStrength, .seed = name.seed},
+                .embed = watermark::embed_options(preset)};
+  s.owner.reader_size = std::clamp(picture, kLeast, fast ? kOurPatch : kPaperPatch);
+  s.embed.seed = name.seed;
+  if (name.system == "without_drr")
+    s.embed.distortions = {
+        .noise = 0, .rotation = 0, .zoom_out = 1, .zoom_in = 1, .blur = 0, .sample_shift = 0};
+  return s;
+}
+
+watermark::Key measuring_key(std::uint64_t seed) {
+  const CounterRng rng(seed, 61);
+  std::array<std::uint8_t, 32> bytes{};
+  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<std::uint8_t>(rng.bits(i)[0]);
+  return watermark::key_from_bytes(bytes);
+}
+
+TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name, const OwnerSystem& system,
+                         const OwnerTraining& training) {
+  const auto tell = [&](const std::string& what, Index done, Index total) {
+    return !training.progress ||
+           training.progress(what, static_cast<double>(done) / static_cast<double>(total), "");
+  };
+  const auto views = watermark::cache_near_views(field, system.owner.reader_size, training.views, name.seed,
+                                                 [&](Index done, Index total) {
+                                                   if (!tell("views", done, total))
+                                                     throw Stopped("views: stopped, nothing to save");
+                                                   return true;
+                                                 });
+  TrainedOwner trained{.owner = new_owner(field, name, system, views)};
+  auto options = system.embed;
+  options.views = training.views;
+  options.schedule.steps = 0;
+  options.schedule.seconds = training.seconds;
+  watermark::Embedder embedder(trained.owner, views, options);
+  trained.seconds = timed_run({.what = name.stem(),
+                               .seconds = training.seconds,
+                               .done = [&] { return embedder.done(); },
+                               .step = [&](double seconds) { embedder.step(seconds); },
+                               .steps = [&] { return embedder.steps(); },
+                               .figure = [&] { return embedder.figures().bits; },
+                               .save = [&](const auto& path) { embedder.save(path); },
+                               .restore = [&](const auto& path) { embedder.restore(path); },
+                               .checkpoint = training.checkpoint},
+                              training.progress);
+  embedder.calibrate();
+  trained.steps = embedder.steps();
+  return trained;
+}
+
+MarkedScene marked_scene(const watermark::Owner& owner, std::uint64_t seed) {
+  const auto renderer = std::make_shared<nerf::Renderer>(owner.field);
+  const auto code = std::make_shared<watermark::CellCode>(owner.code());
+  const auto reader = std::make_shared<watermark::PictureReader>(owner);
+  const Index bits = owner.options().bits;
+  return {.bits = bits,
+          .message = [=](Index view) { return message_of_view(bits, seed, view); },
+          .render =
+              [=, &owner](const nerf::Camera& camera, const watermark::Message& message) {
+                renderer->set_recolour(owner.marking(watermark::cell_signs(*code, message)));
+                return renderer->render(camera).rgb;
+              },
+          .accuracy =
+              [=](const Tensor<float>& picture, const watermark::Message& sent) {
+                return match_bits(read_bits(reader->evidence(picture), *code, bits), sent).accuracy();
+              }};
+}
+
+}  // namespace fieldmark::baselines

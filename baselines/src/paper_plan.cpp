@@ -1,0 +1,116 @@
+#include <fieldmark/baselines/paper_plan.h>
+#include <fieldmark/engine/error.h>
+
+#include <algorithm>
+#include <array>
+#include <initializer_list>
+
+namespace fieldmark::baselines {
+namespace {
+
+const std::array kSystems{
+    PaperSystem{"ours", "Fieldmark, preset fast",
+                "a bit in every cell of the scene, read place by place, under a budget of power"},
+    PaperSystem{"copyrnerf_paper", "CopyRNeRF, preset paper",
+                "one message fused into every colour, read from the whole picture, under distortions"},
+    PaperSystem{"without_drr", "CopyRNeRF without DRR", "neither distortions nor moved samples in training"}};
+
+constexpr std::array<std::string_view, 6> kTables{"bits",     "quality",  "distortion",
+                                                  "ablation", "sampling", "weights"};
+constexpr std::array<Index, 5> kLengths{4, 8, 16, 32, 48};
+constexpr Index kBits = 16, kWeightsBits = 8;
+
+bool is_built(std::string_view name) {
+  return std::any_of(kSystems.begin(), kSystems.end(), [&](const PaperSystem& s) { return s.name == name; });
+}
+
+class Plan {
+ public:
+  explicit Plan(const PlanOptions& options) : options_(options) {}
+  void add(std::initializer_list<const char*> systems, const std::string& scene, std::span<const Index> bits,
+           const char* field = "hash") {
+    for (std::uint64_t k = 0; k < (options_.full ? 3u : 1u); ++k)
+      for (const Index n : bits)
+        for (const char* system : systems) {
+          const CellName name{system, scene, field, n, options_.seed + k};
+          if (is_built(system) && std::find(cells_.begin(), cells_.end(), name) == cells_.end())
+            cells_.push_back(name);
+        }
+  }
+  std::vector<CellName> take() { return std::move(cells_); }
+
+ private:
+  const PlanOptions& options_;
+  std::vector<CellName> cells_;
+};
+
+constexpr std::initializer_list<const char*> kMain{"ours", "copyrnerf_paper", "hidden_nerf", "nerf_message",
+                                                   "geometry"};
+constexpr std::initializer_list<const char*> kAll{"ours",        "copyrnerf_paper", "hidden_nerf",
+                                                  "mbrs_nerf",   "nerf_message",    "geometry",
+                                                  "nerf_hidden", "nerf_mbrs"};
+
+void plan_scene(PaperTable table, const std::string& scene, bool first, bool full, Plan& plan) {
+  const std::span<const Index> one(&kBits, 1), weights(&kWeightsBits, 1);
+  const auto main = first || full ? kAll : kMain;
+  switch (table) {
+    case PaperTable::bits:
+      if (full) return plan.add(kAll, scene, kLengths);
+      if (!first) return;
+      plan.add({"ours", "copyrnerf_paper", "nerf_message", "geometry"}, scene, kLengths);
+      return plan.add({"hidden_nerf", "mbrs_nerf"}, scene, one);
+    case PaperTable::quality:
+      plan.add(main, scene, one);
+      if (first || full) plan.add({"copyrnerf_paper"}, scene, one, "mlp");
+      return;
+    case PaperTable::distortion:
+      plan.add(main, scene, one);
+      if (first || full) plan.add({"without_drr"}, scene, one);
+      return;
+    case PaperTable::ablation:
+      if (first || full)
+        plan.add({"copyrnerf_paper", "without_drr", "without_mff", "without_cff", "drs", "ours",
+                  "ours_without_dense", "ours_without_cells", "ours_without_signs"},
+                 scene, one);
+      return;
+    case PaperTable::sampling:
+      if (first || full) plan.add({"copyrnerf_paper"}, scene, one, "mlp");
+      return;
+    case PaperTable::weights:
+      if (first || full) plan.add({"copyrnerf_paper", "ours"}, scene, weights);
+      return;
+  }
+}
+
+}  // namespace
+
+std::span<const PaperSystem> paper_systems() { return kSystems; }
+
+const PaperSystem& paper_system(std::string_view name) {
+  for (const PaperSystem& s : kSystems)
+    if (s.name == name) return s;
+  std::string known;
+  for (const PaperSystem& s : kSystems) known += (known.empty() ? "" : ", ") + s.name;
+  throw ValueError("[paper_system] name must be one of " + known + ", got " + std::string(name));
+}
+
+std::span<const std::string_view> paper_table_names() { return kTables; }
+
+PaperTable parse_paper_table(std::string_view name) {
+  const auto found = std::find(kTables.begin(), kTables.end(), name);
+  if (found == kTables.end())
+    throw ValueError(
+        "[paper_table] name must be bits, quality, distortion, ablation, sampling or weights, got " +
+        std::string(name));
+  return static_cast<PaperTable>(found - kTables.begin());
+}
+
+std::vector<CellName> plan_cells(PaperTable table, const PlanOptions& options) {
+  if (options.scenes.empty()) throw ValueError("[plan_cells] scenes must not be empty");
+  Plan plan(options);
+  for (const std::string& scene : options.scenes)
+    plan_scene(table, scene, &scene == &options.scenes.front(), options.full, plan);
+  return plan.take();
+}
+
+}  // namespace fieldmark::baselines

@@ -1,0 +1,71 @@
+#include <fieldmark/baselines/cell_runner.h>
+#include <fieldmark/engine/image.h>
+
+#include <cmath>
+
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+
+using namespace fieldmark;
+using namespace fieldmark::baselines;
+
+namespace {
+CellRunnerOptions tiny(const TemporaryFolder& folder) {
+  return {.scenes = {{"objects", ""}},
+          .budget = 0.2,
+          .base_seconds = 0.5,
+          .size = 32,
+          .views = 2,
+          .under_views = 1,
+          .photographs = 2,
+          .work = folder / "work",
+          .under = {"noise_0.1"},
+          .commit = "abc"};
+}
+}  // namespace
+
+TEST_CASE("cell_runner: a cell of the built-in scene, from training to files") {
+  const TemporaryFolder folder;
+  auto options = tiny(folder);
+  bool stopped = false;
+  options.progress = [&](const std::string& what, double, const std::string&) {
+    if (what != "ours-objects-hash-16-1" || stopped) return true;
+    stopped = true;
+    return false;
+  };
+  CellRunner runner(options);
+  const CellName name{"ours", "objects", "hash", 16, 1};
+  CHECK_THROWS_AS(runner.run(name), Stopped);
+  const MeasuredCell measured = runner.run(name);
+  CHECK(measured.cell.name == name);
+  CHECK(measured.cell.steps >= 1);
+  CHECK(measured.cell.under.contains("noise_0.1"));
+  CHECK(measured.cell.psnr_base_object == Approx(34).margin(3));
+  CHECK(std::isnan(measured.cell.own_2d_accuracy));
+  CHECK(measured.cell.psnr_photo > 5);
+  CHECK(measured.cell.more.at("photographs") == 2);
+  CHECK(measured.cell.commit == "abc");
+  CHECK(measured.picture.shape == Shape{32, 64, 3});
+  CHECK(measured.curve.starts_with("seconds,steps,figure\n"));
+  save_measured(folder / "cells", measured);
+  CHECK(load_cells(folder / "cells").size() == 1);
+  CHECK(read_image(folder / "cells/ours-objects-hash-16-1.png").shape == Shape{32, 64, 3});
+  CHECK(std::filesystem::exists(folder / "cells/ours-objects-hash-16-1.csv"));
+}
+
+TEST_CASE("cell_runner: errors") {
+  const TemporaryFolder folder;
+  auto options = tiny(folder);
+  CellRunner runner(options);
+  CHECK_THROWS_WITH(runner.run({"ours", "lego", "hash", 16, 1}),
+                    "[cell_runner] name.scene must be one of the scenes given, got lego");
+  CHECK_THROWS_WITH(runner.run({"ours", "objects", "grid", 16, 1}),
+                    "[cell_runner] name.field must be hash or mlp, got grid");
+  CHECK_THROWS_WITH(runner.run({"other", "objects", "hash", 16, 1}),
+                    Contains("[paper_system] name must be one of") && Contains("got other"));
+  options.budget = 0;
+  CHECK_THROWS_WITH(CellRunner(options),
+                    "[cell_runner] budget, views and photographs must be positive, got 0.000000, 2 and 2");
+  options.scenes.clear();
+  CHECK_THROWS_WITH(CellRunner(options), "[cell_runner] scenes must not be empty");
+}

@@ -1,0 +1,71 @@
+#include <fieldmark/baselines/cell.h>
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/files.h>
+
+#include <cmath>
+
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+
+using namespace fieldmark;
+using namespace fieldmark::baselines;
+
+namespace {
+Cell sample() {
+  return {.name = {"hidden_nerf", "lego", "hash", 16, 3},
+          .steps = 1200,
+          .seconds = 61.5,
+          .bit_accuracy = 0.5,
+          .spread = 0.1,
+          .own_2d_accuracy = 0.98,
+          .psnr_base = 31.25,
+          .psnr_base_object = 26,
+          .psnr_photo = 27,
+          .ssim = 0.9,
+          .lpips = std::nan(""),
+          .under = {{"noise_0.1", 0.5}, {"blur_1", 0.25}},
+          .commit = "abc",
+          .more = {{"views", 200}}};
+}
+}  // namespace
+
+TEST_CASE("cell: the keys that scripts read, null where nothing was measured") {
+  const std::string text = format_cell(sample());
+  std::size_t at = 0;
+  for (const char* key : {"system", "scene", "field", "bits", "seed", "steps", "seconds", "bit_accuracy",
+                          "spread", "own_2d_accuracy", "psnr_base", "psnr_base_object", "psnr_photo", "ssim",
+                          "lpips", "under", "commit"}) {
+    const std::size_t found = text.find("\"" + std::string(key) + "\":", at);
+    CAPTURE(key);
+    REQUIRE(found != std::string::npos);
+    at = found;
+  }
+  CHECK_THAT(text, Contains("\"lpips\": null") && Contains("\"blur_1\": 0.25") && Contains("\"seed\": 3"));
+}
+
+TEST_CASE("cell: written, read back and listed by name") {
+  const TemporaryFolder folder;
+  const std::filesystem::path cells = folder / "made/when/needed";
+  CHECK(load_cells(cells).empty());
+  Cell other = sample();
+  other.name.bits = 4;
+  save_cell(cells, other);
+  save_cell(cells, sample());
+  const auto read = load_cells(cells);
+  REQUIRE(read.size() == 2);
+  CHECK(read[0].name == sample().name);  // "-16-" before "-4-"
+  CHECK(read[1].name == other.name);
+  CHECK(format_cell(read[0]) == format_cell(sample()));
+  CHECK(std::isnan(read[0].lpips));
+}
+
+TEST_CASE("cell: a file that is not one is named") {
+  const TemporaryFolder folder;
+  write_file_atomically(folder / "a.json", "{\"system\": 3}");
+  CHECK_THROWS_WITH(load_cells(folder / ""),
+                    Contains("a.json: expected a cell of `fieldmark reproduce`, found"));
+  write_file_atomically(folder / "a.json", format_cell(sample()));
+  CHECK_THROWS_WITH(load_cells(folder / ""), Contains("a.json: expected the cell of this name, found that of "
+                                                      "hidden_nerf-lego-hash-16-3"));
+  CHECK_THROWS_AS(parse_cell("", "x"), IoError);
+}

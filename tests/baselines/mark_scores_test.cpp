@@ -1,0 +1,114 @@
+#include <fieldmark/baselines/mark_scores.h>
+#include <fieldmark/baselines/owner_system.h>
+#include <fieldmark/engine/image.h>
+#include <fieldmark/nerf/evaluation.h>
+#include <fieldmark/watermark/measurement.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "support/catch.h"
+#include "watermark/small_owner.h"
+
+using namespace fieldmark;
+using namespace fieldmark::baselines;
+
+namespace {
+
+watermark::Owner owner_of_6_bits() {
+  watermark::OwnerOptions options = small_owner_options();
+  options.bits = 6;
+  return small_owner(options);
+}
+
+std::vector<nerf::Camera> cameras_of(const nerf::RadianceField& field) {
+  return nerf::make_cameras(field.cameras, nerf::CameraSet::near, 4, 0, 5);
+}
+
+nerf::Dataset photographs_of(const nerf::RadianceField& field) {
+  nerf::Dataset data;
+  data.background = field.background;
+  nerf::Renderer renderer(field);
+  for (const nerf::Camera& camera : cameras_of(field)) {
+    const Tensor<float> rgb = renderer.render(camera).rgb;
+    Tensor<float> rgba({camera.height, camera.width, 4}, 1);
+    for (Index p = 0; p < camera.height * camera.width; ++p)
+      for (Index c = 0; c < 3; ++c) rgba[4 * p + c] = 0.9f * rgb[3 * p + c];
+    data.views.push_back({camera, rgba, "photo"});
+  }
+  return data;
+}
+
+}  // namespace
+
+// The same views, messages and distortions as watermark::measure(), which is a loop of its own.
+TEST_CASE("mark_scores: an owner's figures are those of measure") {
+  const watermark::Owner owner = owner_of_6_bits();
+  const auto cameras = cameras_of(owner.field);
+  const auto measured =
+      watermark::measure(owner, nullptr, nullptr, {.cameras = cameras, .under = {"noise_0.1"}, .seed = 7});
+  const auto scores = score_mark(owner.field, marked_scene(owner, 7),
+                                 {.cameras = cameras, .under = {"noise_0.1"}, .seed = 7});
+  CHECK(scores.accuracy == Approx(measured.accuracy.blind).epsilon(1e-12));
+  CHECK(scores.under.at("noise_0.1") == Approx(measured.under.at("noise_0.1").blind).epsilon(1e-12));
+  CHECK(scores.psnr_base == Approx(measured.psnr_base).epsilon(1e-9));
+  CHECK(scores.psnr_base_object == Approx(measured.psnr_base_object).epsilon(1e-9));
+  CHECK(scores.ssim_base == Approx(measured.ssim_base).epsilon(1e-9));
+  CHECK(scores.psnr_base < 60);  // there is a mark
+  CHECK(std::isnan(scores.psnr_photo));
+  CHECK(std::isnan(scores.lpips_base));
+}
+
+TEST_CASE(
+    "mark_scores: a scene that is not marked, against photographs, is what evaluate says of its field") {
+  const nerf::RadianceField field = small_field();
+  const nerf::Dataset photographs = photographs_of(field);
+  nerf::Renderer renderer(field), plain(field);
+  const auto expected = nerf::evaluate(renderer, photographs);
+  const MarkedScene marked{.bits = 4,
+                           .message = [](Index view) { return message_of_view(4, 0, view); },
+                           .render = [&](const nerf::Camera& camera,
+                                         const watermark::Message&) { return plain.render(camera).rgb; },
+                           .accuracy =
+                               [](const Tensor<float>&, const watermark::Message& sent) {
+                                 return sent.bits[0] ? 1.0 : 0.5;  // of messages 0, 1, 2, 3: half each
+                               }};
+  const auto scores = score_mark(field, marked, {.cameras = cameras_of(field), .photographs = &photographs});
+  CHECK(scores.psnr_photo == Approx(expected.psnr).epsilon(1e-9));
+  CHECK(scores.psnr_photo_unmarked == Approx(expected.psnr).epsilon(1e-9));
+  CHECK(scores.psnr_photo_object == Approx(expected.psnr_object).epsilon(1e-9));
+  // evaluate() does not round before ssim(): 2e-4 here
+  CHECK(scores.ssim_photo == Approx(expected.ssim).margin(1e-3));
+  CHECK(std::isnan(scores.psnr_base));  // equal pictures
+  CHECK(scores.accuracy == Approx(0.75));
+  CHECK(scores.spread == Approx(0.25));
+}
+
+TEST_CASE("mark_scores: messages of views") {
+  std::set<std::string> seen;
+  for (Index view = 0; view < 16; ++view) seen.insert(to_bits(message_of_view(4, 3, view)));
+  CHECK(seen.size() == 16);
+  CHECK(message_of_view(4, 3, 16) == message_of_view(4, 9, 0));
+  CHECK(message_of_view(16, 3, 5) == watermark::random_message(16, CounterRng(3, 41), 5));
+}
+
+TEST_CASE("mark_scores: only the first views under distortion, and stopping") {
+  const nerf::RadianceField field = small_field();
+  nerf::Renderer plain(field);
+  int read = 0;
+  const MarkedScene marked{
+      .bits = 4,
+      .message = [](Index view) { return message_of_view(4, 0, view); },
+      .render = [&](const nerf::Camera& camera,
+                    const watermark::Message&) { return plain.render(camera).rgb; },
+      .accuracy = [&](const Tensor<float>&, const watermark::Message&) { return ++read, 1.0; }};
+  ScoreOptions options{.cameras = cameras_of(field), .under = {"blur_1", "scale_0.5"}, .under_views = 3};
+  score_mark(field, marked, options);
+  CHECK(read == 4 + 3 * 2);
+  options.progress = [](double part) { return part < 0.5; };
+  CHECK_THROWS_WITH(score_mark(field, marked, options), "stopped while a mark was measured");
+  CHECK_THROWS_WITH(score_mark(field, marked, {}), "[score_mark] cameras must not be empty");
+  options.under = {"melt_1"};
+  CHECK_THROWS_AS(score_mark(field, marked, options), ValueError);
+}

@@ -1,0 +1,70 @@
+#include <fieldmark/baselines/owner_system.h>
+
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+#include "watermark/tiny_owner.h"
+
+using namespace fieldmark;
+using namespace fieldmark::baselines;
+
+namespace {
+
+const CellName kOurs{"ours", "objects", "hash", 8, 2};
+
+OwnerSystem tiny_system(const CellName& name) {
+  OwnerSystem s = owner_system(name, 48);
+  s.owner.cells = 6;
+  s.owner.mark = {.bands = 4, .features = 8};
+  s.owner.base_channels = 8;
+  s.owner.width = 16;
+  s.owner.channels = 8;
+  return s;
+}
+
+}  // namespace
+
+TEST_CASE("owner_system: what each system is") {
+  const auto ours = owner_system(kOurs, 160);
+  CHECK(ours.owner.preset == watermark::Preset::fast);
+  CHECK(ours.owner.bits == 8);
+  CHECK(ours.owner.strength == 34);
+  CHECK(ours.owner.reader_size == 128);
+  const auto paper = owner_system({"copyrnerf_paper", "lego", "hash", 16, 1}, 160);
+  CHECK(paper.owner.preset == watermark::Preset::paper);
+  CHECK(paper.owner.reader_size == 150);
+  CHECK(paper.embed.distortions.rotation == 30);
+  CHECK(owner_system({"copyrnerf_paper", "lego", "mlp", 16, 1}, 100).owner.reader_size == 100);
+  CHECK(owner_system(kOurs, 16).owner.reader_size == 32);
+  const auto plain = owner_system({"without_drr", "lego", "hash", 16, 1}, 160);
+  CHECK(plain.owner.preset == watermark::Preset::paper);
+  CHECK(plain.embed.distortions.rotation == 0);
+  CHECK(plain.embed.distortions.sample_shift == 0);
+  CHECK(!has_owner("hidden_nerf"));
+  CHECK_THROWS_WITH(owner_system({"hidden_nerf", "lego", "hash", 16, 1}, 160),
+                    "[owner_system] name.system must be one that marks a frozen field, got hidden_nerf");
+}
+
+TEST_CASE("owner_system: a key for each seed") {
+  CHECK(measuring_key(1) == measuring_key(1));
+  CHECK(!(measuring_key(1) == measuring_key(2)));
+}
+
+TEST_CASE("owner_system: trained, stopped and gone on with, it is calibrated") {
+  const TemporaryFolder folder;
+  OwnerTraining training{.seconds = 2, .checkpoint = folder / "ours", .views = 8};
+  int steps = 0;
+  training.progress = [&](const std::string& what, double, const std::string&) {
+    return what == "views" || ++steps < 3;
+  };
+  CHECK_THROWS_AS(train_owner(tiny_field(), kOurs, tiny_system(kOurs), training), Stopped);
+  training.progress = {};
+  const TrainedOwner trained = train_owner(tiny_field(), kOurs, tiny_system(kOurs), training);
+  CHECK(trained.steps > 3);
+  CHECK(trained.seconds >= 1.5);
+  CHECK(trained.seconds < 30);
+  CHECK_THAT(run_curve(training.checkpoint), Contains("seconds,steps,figure"));
+  const auto cameras = nerf::make_cameras(trained.owner.field.cameras, nerf::CameraSet::near, 4, 0, 123);
+  const auto scores = score_mark(trained.owner.field, marked_scene(trained.owner, 1), {.cameras = cameras});
+  CHECK(scores.psnr_base_object == Approx(34).margin(1));
+  CHECK(scores.accuracy >= 0.25);
+}

@@ -1,0 +1,81 @@
+#include <fieldmark/baselines/cell.h>
+#include <fieldmark/engine/files.h>
+
+#include <nlohmann/json.hpp>
+
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+#include "tools/paper_cells.h"
+#include "tools/run_command.h"
+
+using namespace fieldmark;
+
+TEST_CASE("reproduce measures what is missing on the built-in scene, once", "[reproduce]") {
+  const TemporaryFolder folder;
+  const std::vector<std::string> line{"reproduce",
+                                      "--table",
+                                      "weights",
+                                      "--scene",
+                                      "objects",
+                                      "--budget",
+                                      "0.1",
+                                      "--size",
+                                      "32",
+                                      "--views",
+                                      "1",
+                                      "--photographs",
+                                      "1",
+                                      "--base-seconds",
+                                      "1",
+                                      "--cells",
+                                      folder / "cells",
+                                      "--work",
+                                      folder / "work",
+                                      "--json",
+                                      "-",
+                                      "--lpips-weights",
+                                      "none"};
+  const auto first = run_command(line);
+  INFO(first.err);
+  REQUIRE(first.code == cli::kOk);
+  CHECK_THAT(first.err, Contains("2 of 2 cells are missing, about") &&
+                            Contains("copyrnerf_paper-objects-hash-8-1: ") && Contains("paper.md: written"));
+  CHECK(nlohmann::json::parse(first.out)["missing"].empty());
+  const auto cells = baselines::load_cells(folder / "cells");
+  REQUIRE(cells.size() == 2);
+  CHECK(cells[1].name == baselines::CellName{"ours", "objects", "hash", 8, 1});
+  CHECK(cells[1].more.at("total_seconds") > 0);
+  CHECK_THAT(read_text(folder / "paper.md"), Contains("| Fieldmark, preset fast | objects | hash |"));
+  CHECK(std::filesystem::exists(folder / "paper_bits.svg"));
+
+  const std::string kept = read_text(folder / "cells/ours-objects-hash-8-1.json");
+  const auto second = run_command(line);
+  CHECK(second.code == cli::kOk);
+  CHECK_THAT(second.err, Contains("0 of 2 cells are missing\n"));
+  CHECK(read_text(folder / "cells/ours-objects-hash-8-1.json") == kept);
+}
+
+TEST_CASE("reproduce --report-only writes the page from the cells that are there", "[reproduce]") {
+  const TemporaryFolder folder;
+  for (const auto& cell : paper_cells()) save_cell(folder / "cells", cell);
+  const auto r = run_command({"reproduce", "--report-only", "--table", "bits", "--scene", "lego", "--cells",
+                              folder / "cells", "--report", folder / "page.md", "--budget", "60"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  CHECK_THAT(r.out, Contains(" cells are missing, about ") && Contains("  ours-lego-hash-48-1\n") &&
+                        !Contains("  ours-lego-hash-16-1\n"));
+  CHECK_THAT(read_text(folder / "page.md"), Contains("98.44 ± 6.25"));
+  CHECK(!std::filesystem::exists(folder / "work"));
+}
+
+TEST_CASE("reproduce says what is wrong", "[reproduce]") {
+  const TemporaryFolder folder;
+  const auto table = run_command({"reproduce", "--table", "best", "--cells", folder / "cells"});
+  CHECK(table.code == cli::kUsage);
+  CHECK_THAT(table.err, Contains("--table: [paper_table] name must be bits, quality"));
+  const auto scene = run_command({"reproduce", "--table", "weights", "--scene", folder / "nowhere", "--cells",
+                                  folder / "cells", "--work", folder / "work", "--lpips-weights", "none"});
+  CHECK(scene.code == cli::kFailed);
+  CHECK_THAT(scene.err, Contains("nowhere"));
+  CHECK(run_command({"reproduce", "--budget", "0"}).code == cli::kUsage);
+}

@@ -1,0 +1,251 @@
+#include <fieldmark/baselines/cell_runner.h>
+#include <fieldmark/baselines/paper_plan.h>
+#include <fieldmark/engine/files.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <ostream>
+
+#include "cli/cli.h"
+#include "cli/commands.h"
+#include "cli/context.h"
+#include "cli/paper_figures.h"
+#include "cli/paper_page.h"
+#include "cli/perceptual.h"
+#include "cli/report.h"
+#include "cli/scene_data.h"
+
+namespace fieldmark::cli {
+namespace {
+
+constexpr const char* kBuiltIn = "objects";
+// Printed severities first, then those on the way to where reading ends.
+constexpr const char* kUnder[] = {"noise_0.1",  "rotation_30", "scale_0.75",  "blur_0.1",    "noise_0.02",
+                                  "noise_0.05", "noise_0.2",   "rotation_10", "rotation_60", "scale_0.5",
+                                  "blur_0.5",   "blur_1",      "blur_2"};
+
+struct Options {
+  std::vector<std::string> tables, scenes;
+  std::string cells = "docs/results/cells", work = "reproduce_work", lpips_weights;
+  double budget = 300, base_seconds = 0;
+  Index size = 0, views = 0, photographs = 20;
+  bool full = false, report_only = false;
+};
+
+std::vector<baselines::PaperScene> scenes_of(const Options& options) {
+  std::vector<baselines::PaperScene> scenes;
+  for (const std::string& given : options.scenes) {
+    const std::filesystem::path folder = std::filesystem::path(given).lexically_normal();
+    if (given == kBuiltIn && !std::filesystem::exists(folder))
+      scenes.push_back({kBuiltIn, {}});
+    else
+      scenes.push_back({(folder.has_filename() ? folder : folder.parent_path()).filename().string(), folder});
+  }
+  if (scenes.empty())
+    for (const char* known : {"nerf_synthetic/lego", "nerf_synthetic/chair", "nerf_llff/fern"})
+      if (const auto folder = shared_data(known); !folder.empty())
+        scenes.push_back({folder.filename().string(), folder});
+  if (scenes.empty()) scenes.push_back({kBuiltIn, {}});
+  return scenes;
+}
+
+std::vector<baselines::CellName> planned(const Options& options,
+                                         const std::vector<baselines::PaperScene>& scenes,
+                                         std::uint64_t seed) {
+  baselines::PlanOptions plan{.scenes = {}, .seed = seed, .full = options.full};
+  for (const auto& scene : scenes) plan.scenes.push_back(scene.name);
+  std::vector<std::string> tables = options.tables;
+  if (tables.empty())
+    for (const auto name : baselines::paper_table_names()) tables.emplace_back(name);
+  std::vector<baselines::CellName> cells;
+  for (const std::string& table : tables)
+    for (const auto& name : plan_cells(baselines::parse_paper_table(table), plan))
+      if (std::find(cells.begin(), cells.end(), name) == cells.end()) cells.push_back(name);
+  return cells;
+}
+
+std::vector<baselines::CellName> missing_of(const std::vector<baselines::CellName>& cells,
+                                            const std::filesystem::path& folder) {
+  std::vector<baselines::CellName> missing;
+  for (const auto& name : cells)
+    if (!std::filesystem::exists(cell_path(folder, name).string() + ".json")) missing.push_back(name);
+  return missing;
+}
+
+// Seconds that a cell takes: as those did that were measured with this budget, or half as much again.
+double seconds_of_a_cell(const std::vector<baselines::Cell>& cells, double budget) {
+  double sum = 0, count = 0;
+  for (const auto& c : cells)
+    if (c.more.contains("total_seconds") && c.more.contains("budget") && c.more.at("budget") == budget)
+      sum += c.more.at("total_seconds"), count += 1;
+  return count > 0 ? sum / count : 1.5 * budget;
+}
+
+// The page, its figures and the sheet, from the cells that are there.
+std::filesystem::path write_page(const Options& options, const Context& context) {
+  std::filesystem::path folder = std::filesystem::path(options.cells).lexically_normal();
+  if (!folder.has_filename()) folder = folder.parent_path();  // "cells/"
+  const std::filesystem::path page = context.options().report.empty()
+                                         ? folder.parent_path() / "paper.md"
+                                         : std::filesystem::path(context.options().report);
+  const auto cells = baselines::load_cells(folder);
+  const auto beside = [&](const std::string& name) { return page.parent_path() / name; };
+  std::vector<std::string> shown;
+  for (const auto& [name, svg] : paper_figures(cells, folder)) {
+    write_file_atomically(beside(name), svg);
+    shown.push_back(name);
+  }
+  std::string notes;
+  if (std::filesystem::exists(folder / "notes.md")) notes = read_text(folder / "notes.md");
+  const auto stems = write_paper_sheet(cells, folder, beside("paper_pictures.png"));
+  if (!stems.empty()) {
+    shown.push_back("paper_pictures.png");
+    notes += "\nRows of paper_pictures.png (unmarked, marked, ten times the difference):";
+    for (const auto& stem : stems) notes += " " + stem;
+    notes += "\n";
+  }
+  write_file_atomically(page, paper_page(cells, shown, notes));
+  return page;
+}
+
+class Shown {
+ public:
+  explicit Shown(Context& context) : context_(context) {}
+  bool operator()(const std::string& what, double part, const std::string& note) {
+    if (what != what_) {
+      progress_.reset();
+      progress_.reset(new Progress(context_.progress(what)));  // it cannot be moved
+      what_ = what;
+    }
+    progress_->update(part, note);
+    return !guard_.interrupted();
+  }
+
+ private:
+  Context& context_;
+  InterruptGuard guard_;
+  std::string what_;
+  std::unique_ptr<Progress> progress_;
+};
+
+void measure(const Options& options, const std::vector<baselines::PaperScene>& scenes,
+             const std::vector<baselines::CellName>& missing, Context& context) {
+  const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
+  Shown shown(context);
+  const Index views =
+      options.views > 0 ? options.views : std::clamp<Index>(static_cast<Index>(options.budget), 20, 200);
+  baselines::CellRunner runner({.scenes = scenes,
+                                .budget = options.budget,
+                                .base_seconds = options.base_seconds,
+                                .size = options.size,
+                                .views = views,
+                                .under_views = std::max<Index>(1, views / 5),
+                                .photographs = options.photographs,
+                                .work = options.work,
+                                .under = {std::begin(kUnder), std::end(kUnder)},
+                                .lpips = lpips ? &*lpips : nullptr,
+                                .commit = machine().commit,
+                                .progress = std::ref(shown)});
+  for (const auto& name : missing) {
+    const double begun = context.seconds();
+    try {
+      auto measured = runner.run(name);
+      measured.cell.more["total_seconds"] = context.seconds() - begun;
+      save_measured(options.cells, measured);
+      write_page(options, context);
+      char line[120];
+      std::snprintf(line, sizeof line, "%s: %.2f%% right, %.2f dB on the object, %s\n", name.stem().c_str(),
+                    100 * measured.cell.bit_accuracy, measured.cell.psnr_base_object,
+                    format_duration(context.seconds() - begun).c_str());
+      context.text() << line;
+    } catch (const baselines::Stopped& e) {
+      throw Interrupted(std::string(e.what()) + "; the same command goes on from there");
+    }
+  }
+}
+
+int run(const Options& options, Context& context) {
+  for (const auto& table : options.tables)
+    read_option("--table", [&] { return baselines::parse_paper_table(table); });
+  const auto scenes = scenes_of(options);
+  const auto cells = planned(options, scenes, context.seed());
+  std::filesystem::create_directories(options.cells);
+  auto missing = missing_of(cells, options.cells);
+  const double each = seconds_of_a_cell(baselines::load_cells(options.cells), options.budget);
+  context.text() << missing.size() << " of " << cells.size() << " cells are missing";
+  if (!missing.empty())
+    context.text() << ", about " << format_duration(each * static_cast<double>(missing.size()));
+  context.text() << "\n";
+  for (const auto& name : missing) context.text() << "  " << name.stem() << "\n";
+  if (!options.report_only) {
+    measure(options, scenes, missing, context);
+    missing = missing_of(cells, options.cells);
+  }
+  Json left = Json::array();
+  for (const auto& name : missing) left.push_back(name.stem());
+  context.result({{"cells", cells.size()},
+                  {"missing", left},
+                  {"seconds_left", each * static_cast<double>(missing.size())}});
+  const auto page = write_page(options, context);  // in place of the page that every command can write
+  context.text() << page.string() << ": written\n";
+  return kOk;
+}
+
+void add_measuring_options(CLI::App& app, Options& o) {
+  app.add_option("--budget", o.budget,
+                 "Seconds of training for each cell, 0.1 to 86400; cells of other budgets that are there "
+                 "stay: give them another --cells")
+      ->check(CLI::Range(0.1, 86400.0).description(""))
+      ->type_name("S");
+  app.add_option("--base-seconds", o.base_seconds,
+                 "Seconds of training for an unmarked field, 0.1 to 86400 (the budget, at most 60 for hash)")
+      ->check(CLI::Range(0.1, 86400.0).description(""))
+      ->type_name("S")
+      ->default_str("");
+  app.add_option("--size", o.size,
+                 "Pixels of the pictures' longer side, 16 to 8192 (as the released code: 160, photographs "
+                 "252, field mlp 100)")
+      ->check(CLI::Range(16, 8192).description(""))
+      ->type_name("N")
+      ->default_str("");
+  app.add_option("--views", o.views,
+                 "Near views that are read in each cell, 1 to 100000 (as many as seconds of --budget, 20 to "
+                 "200), a fifth of them under distortion")
+      ->check(CLI::Range(1, 100000).description(""))
+      ->type_name("N")
+      ->default_str("");
+  app.add_option("--photographs", o.photographs, "Test photographs to compare with, 1 to 100000")
+      ->check(CLI::Range(1, 100000).description(""))
+      ->type_name("N");
+}
+
+}  // namespace
+
+Command add_reproduce(CLI::App& app) {
+  auto o = std::make_shared<Options>();
+  app.add_option("--table", o->tables,
+                 "bits, quality, distortion, ablation, sampling or weights, several times (all)")
+      ->type_name("NAME")
+      ->default_str("");
+  app.add_option("--scene", o->scenes,
+                 "Data set, several times; the first has every system. objects is the built-in scene\n"
+                 "(lego, chair and fern of $FIELDMARK_DATA, or objects)")
+      ->type_name("DIR")
+      ->default_str("");
+  add_measuring_options(app, *o);
+  app.add_option("--cells", o->cells, "Folder of the cells; those that are there are not measured again")
+      ->type_name("DIR");
+  app.add_option("--work", o->work, "Folder of checkpoints and unmarked fields")->type_name("DIR");
+  add_lpips_weights(app, o->lpips_weights);
+  app.add_flag("--full", o->full, "Every length and system on every scene, with three seeds");
+  app.add_flag("--report-only", o->report_only,
+               "Measure nothing: list what is missing and write the page (--report, or paper.md beside the "
+               "folder of cells) and its figures");
+  return [o](Context& context) { return run(*o, context); };
+}
+
+}  // namespace fieldmark::cli

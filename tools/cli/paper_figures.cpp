@@ -1,0 +1,145 @@
+#include "cli/paper_figures.h"
+
+#include <fieldmark/baselines/paper_plan.h>
+#include <fieldmark/baselines/published.h>
+#include <fieldmark/bench/line_chart.h>
+#include <fieldmark/engine/files.h>
+#include <fieldmark/engine/image.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+
+#include "cli/sheet.h"
+
+namespace fieldmark::cli {
+namespace {
+
+using baselines::Cell;
+using bench::LineSeries;
+
+constexpr double kChance = 45, kAll = 100;  // %, of the accuracies' axis
+constexpr Index kBits = 16;                 // of all figures but that of lengths
+
+struct Kind {
+  const char *name, *axis;
+  double none;  // the severity that changes nothing
+};
+constexpr std::array<Kind, 4> kKinds{{{"noise", "standard deviation, pictures in [0, 1]", 0},
+                                      {"rotation", "largest angle, degrees", 0},
+                                      {"scale", "size of the picture, as a part", 1},
+                                      {"blur", "sigma, pixels", 0}}};
+
+std::string scene_of(const Cell& c) { return c.name.scene + ", " + c.name.field; }
+
+// The line of a name, made where there is none.
+LineSeries& line_of(std::vector<LineSeries>& lines, const std::string& name, bool dashed = false) {
+  const auto found = std::find_if(lines.begin(), lines.end(), [&](const auto& l) { return l.name == name; });
+  if (found != lines.end()) return *found;
+  lines.push_back({name, {}, dashed});
+  return lines.back();
+}
+
+std::vector<LineSeries> lines_of_lengths(const std::vector<Cell>& cells) {
+  std::vector<LineSeries> lines;
+  for (const auto& system : baselines::paper_systems())
+    for (const Cell& c : cells)
+      if (c.name.system == system.name)
+        line_of(lines, system.name + " (" + scene_of(c) + ")")
+            .points.push_back({static_cast<double>(c.name.bits), 100 * c.bit_accuracy});
+  for (const auto& system : baselines::paper_systems())
+    for (const int bits : {4, 8, 16, 32, 48})
+      if (const auto value = baselines::published("bits", system.name, std::to_string(bits)))
+        line_of(lines, system.name + ", published", true)
+            .points.push_back({static_cast<double>(bits), *value});
+  return lines;
+}
+
+std::vector<LineSeries> lines_of_severity(const std::vector<Cell>& cells, const Kind& kind) {
+  std::vector<LineSeries> lines;
+  const std::string prefix = std::string(kind.name) + "_";
+  for (const auto& system : baselines::paper_systems())
+    for (const Cell& c : cells) {
+      if (c.name.system != system.name || c.name.bits != kBits) continue;
+      LineSeries points;
+      for (const auto& [name, value] : c.under)
+        if (name.starts_with(prefix) && name.find(',') == std::string::npos)
+          points.points.push_back({std::strtod(name.c_str() + prefix.size(), nullptr), 100 * value});
+      if (points.points.empty()) continue;
+      LineSeries& line = line_of(lines, system.name + " (" + scene_of(c) + ")");
+      line.points.push_back({kind.none, 100 * c.bit_accuracy});
+      line.points.insert(line.points.end(), points.points.begin(), points.points.end());
+    }
+  return lines;
+}
+
+LineSeries learning_curve(const std::filesystem::path& file, const std::string& name) {
+  LineSeries line{name, {}, false};
+  const std::string text = read_text(file);
+  for (std::size_t at = text.find('\n'); at != std::string::npos; at = text.find('\n', at + 1)) {
+    double seconds = 0, figure = 0;
+    if (std::sscanf(text.c_str() + at + 1, "%lf,%*d,%lf", &seconds, &figure) == 2)
+      line.points.push_back({seconds, 100 * figure});
+  }
+  return line;
+}
+
+bool is_drawn(const std::vector<LineSeries>& lines) {
+  return std::any_of(lines.begin(), lines.end(), [](const LineSeries& l) {
+    return std::any_of(l.points.begin(), l.points.end(),
+                       [](const auto& p) { return std::isfinite(p.x) && std::isfinite(p.y); });
+  });
+}
+
+}  // namespace
+
+std::map<std::string, std::string> paper_figures(const std::vector<Cell>& cells,
+                                                 const std::filesystem::path& folder) {
+  std::map<std::string, std::string> figures;
+  const auto add = [&](const std::string& file, const bench::ScatterText& text,
+                       const std::vector<LineSeries>& lines) {
+    if (is_drawn(lines)) figures[file] = bench::line_chart(text, lines, kChance, kAll);
+  };
+  add("paper_bits.svg", {"Bit accuracy of one view against the message's length", "bits", "bits right, %"},
+      lines_of_lengths(cells));
+  for (const Kind& kind : kKinds)
+    add(std::string("paper_") + kind.name + ".svg",
+        {std::string("Bit accuracy of one view, 16 bits, under ") + kind.name, kind.axis, "bits right, %"},
+        lines_of_severity(cells, kind));
+  std::vector<LineSeries> curves;
+  for (const Cell& c : cells) {
+    const std::string file = cell_path(folder, c.name).string() + ".csv";
+    if (c.name.bits == kBits && std::filesystem::exists(file))
+      curves.push_back(learning_curve(file, c.name.system + " (" + scene_of(c) + ")"));
+  }
+  add("paper_learning.svg", {"Bits right in training, 16 bits", "seconds of training", "bits right, %"},
+      curves);
+  return figures;
+}
+
+std::vector<std::string> write_paper_sheet(const std::vector<Cell>& cells,
+                                           const std::filesystem::path& folder,
+                                           const std::filesystem::path& file) {
+  std::vector<PicturePair> pairs;
+  std::vector<std::string> stems;
+  for (const Cell& c : cells) {
+    const std::string picture = cell_path(folder, c.name).string() + ".png";
+    if (c.name.bits != kBits || !std::filesystem::exists(picture)) continue;
+    const Tensor<float> both = read_image(picture);
+    const Index h = both.shape[0], w = both.shape[1] / 2, channels = both.shape[2];
+    PicturePair pair{Tensor<float>({h, w, channels}), Tensor<float>({h, w, channels})};
+    for (Index y = 0; y < h; ++y) {
+      const auto row = both.data.begin() + 2 * y * w * channels;
+      std::copy_n(row, w * channels, pair.first.data.begin() + y * w * channels);
+      std::copy_n(row + w * channels, w * channels, pair.second.data.begin() + y * w * channels);
+    }
+    pairs.push_back(std::move(pair));
+    stems.push_back(c.name.stem());
+  }
+  if (!pairs.empty()) write_png(file, comparison_sheet(pairs));
+  return stems;
+}
+
+}  // namespace fieldmark::cli
