@@ -1,4 +1,6 @@
 #include <fieldmark/baselines/cell_runner.h>
+#include <fieldmark/baselines/hiding_system.h>
+#include <fieldmark/baselines/hiding_trainer.h>
 #include <fieldmark/baselines/owner_system.h>
 #include <fieldmark/baselines/paper_plan.h>
 #include <fieldmark/engine/files.h>
@@ -18,6 +20,10 @@ constexpr Index kBlenderSize = 160, kPhotographSize = 252, kMlpSize = 100;  // M
 constexpr double kHashSeconds = 60;  // more does not show at these sizes
 constexpr double kViewsASecond = 1;  // to learn from, for each second of the budget
 constexpr Index kFewestViews = 8, kMostViews = 200;
+constexpr double kNetworkPart = 0.6;  // of the budget, for a 2-D network; the rest for fields
+constexpr Index kOwnPictures = 200, kFixedMessage = 5;
+constexpr Index kWeightsBits = 8;  // as the paper's noise of 0.01 on the weights
+constexpr double kWeightsNoise = 0.01;
 constexpr std::uint64_t kCamerasSeed = 1000;  // views that are measured are not those learnt from
 
 // Of a split, evenly spread.
@@ -52,6 +58,8 @@ struct CellRunner::Trained {
   std::shared_ptr<const nerf::RadianceField> unmarked;
   std::shared_ptr<const watermark::Owner> owner;
   MarkedScene marked;
+  std::filesystem::path checkpoint;    // of the run whose curve is shown
+  std::map<std::string, double> more;  // for Cell::more
 };
 
 CellRunner::CellRunner(CellRunnerOptions options) : options_(std::move(options)) {
@@ -93,12 +101,9 @@ const CellRunner::Scene& CellRunner::scene(const CellName& name) {
   return *scene_;
 }
 
-// The unmarked field of a scene, the same for all systems of one seed.
-nerf::RadianceField CellRunner::base_field(const CellName& name, const Scene& scene) {
-  double seconds = options_.base_seconds;
-  if (seconds <= 0) seconds = is_mlp(name) ? options_.budget : std::min(options_.budget, kHashSeconds);
-  const std::string stem = "unmarked-" + name.scene + "-" + name.field + "-" + std::to_string(scene.size) +
-                           "-" + std::to_string(name.seed);
+// A field of photographs, once: a later call or process finds it in the work folder.
+nerf::RadianceField CellRunner::trained_field(const std::string& stem, const nerf::Dataset& photographs,
+                                              const CellName& name, double seconds) {
   const auto path = options_.work / (stem + ".field"), checkpoint = options_.work / (stem + ".checkpoint");
   if (std::filesystem::exists(path)) return nerf::RadianceField::load(path);
   nerf::RadianceFieldOptions sizes{.seed = name.seed};
@@ -107,7 +112,7 @@ nerf::RadianceField CellRunner::base_field(const CellName& name, const Scene& sc
   auto options = nerf::train_options(sizes.field.kind);
   options.schedule.seconds = seconds;
   options.seed = name.seed;
-  nerf::Trainer trainer(field, scene.train, options);
+  nerf::Trainer trainer(field, photographs, options);
   timed_run({.what = stem,
              .seconds = seconds,
              .done = [&] { return trainer.done(); },
@@ -123,28 +128,116 @@ nerf::RadianceField CellRunner::base_field(const CellName& name, const Scene& sc
   return nerf::RadianceField::load(path);  // as a later process will find it
 }
 
+// The unmarked field of a scene, the same for all systems of one seed.
+nerf::RadianceField CellRunner::base_field(const CellName& name, const Scene& scene) {
+  double seconds = options_.base_seconds;
+  if (seconds <= 0) seconds = is_mlp(name) ? options_.budget : std::min(options_.budget, kHashSeconds);
+  return trained_field("unmarked-" + name.scene + "-" + name.field + "-" + std::to_string(scene.size) + "-" +
+                           std::to_string(name.seed),
+                       scene.train, name, seconds);
+}
+
+// The 2-D network, shared by the cells that mark photographs and renders with it, then two fields of marked
+// photographs: three fifths of the budget for the network, a fifth for each field.
+CellRunner::Trained CellRunner::train_hiding(const CellName& name, const Scene& scene,
+                                             std::shared_ptr<const nerf::RadianceField> unmarked) {
+  const HidingSystem system = *hiding_system(name.system);
+  const auto marker =
+      std::make_shared<PictureMarker>(system.kind, HidingOptions{.bits = name.bits}, name.seed);
+  const CropSource crops(photographs_of(scene.train), name.seed);
+  auto options = hiding_train_options(system.kind);
+  options.schedule.seconds = kNetworkPart * options_.budget;
+  options.seed = name.seed;
+  HidingTrainer trainer(*marker, crops, options);
+  Trained trained;
+  trained.unmarked = unmarked;
+  trained.checkpoint = options_.work / (std::string(hiding_name(system.kind)) + "-" + name.scene + "-" +
+                                        std::to_string(scene.size) + "-" + std::to_string(name.bits) + "-" +
+                                        std::to_string(name.seed) + ".checkpoint");
+  trained.seconds = timed_run({.what = trained.checkpoint.stem().string(),
+                               .seconds = options.schedule.seconds,
+                               .done = [&] { return trainer.done(); },
+                               .step = [&](double now) { trainer.step(now); },
+                               .steps = [&] { return trainer.steps(); },
+                               .figure = [&] { return trainer.figures().bits; },
+                               .save = [&](const auto& to) { trainer.save(to); },
+                               .restore = [&](const auto& from) { trainer.restore(from); },
+                               .checkpoint = trained.checkpoint},
+                              options_.progress);
+  trained.steps = trainer.steps();
+  const OwnScores own = own_scores(*marker, CropSource(photographs_of(scene.test), name.seed), kOwnPictures,
+                                   options.crop, name.seed);
+  trained.own_2d_accuracy = own.accuracy;
+  trained.more = {{"own_2d_psnr", own.psnr}, {"network_seconds", trained.seconds}};
+  if (system.renders) {
+    trained.marked = marked_renders(marker, unmarked, name.seed);
+    return trained;
+  }
+  const auto message = message_of_view(name.bits, name.seed, kFixedMessage);
+  const double seconds = 0.5 * (1 - kNetworkPart) * options_.budget;
+  const auto field_of = [&](const watermark::Message& sent, const char* which) {
+    return std::make_shared<const nerf::RadianceField>(
+        trained_field(name.stem() + which, marked_photographs(scene.train, *marker, sent), name, seconds));
+  };
+  trained.marked =
+      marked_scene(marker, {field_of(message, "-one"), field_of(opposite(message), "-opposite")}, message);
+  trained.seconds += 2 * seconds;
+  return trained;
+}
+
 CellRunner::Trained CellRunner::train(const CellName& name, const Scene& scene) {
   paper_system(name.system);
-  const auto field = std::make_shared<nerf::RadianceField>(base_field(name, scene));
+  const auto field = std::make_shared<const nerf::RadianceField>(base_field(name, scene));
+  if (hiding_system(name.system)) return train_hiding(name, scene, field);
   const auto checkpoint = options_.work / (name.stem() + ".checkpoint");
   const auto views =
       std::clamp(static_cast<Index>(kViewsASecond * options_.budget), kFewestViews, kMostViews);
-  TrainedOwner trained = train_owner(
+  TrainedOwner owned = train_owner(
       *field, name, owner_system(name, scene.size),
       {.seconds = options_.budget, .checkpoint = checkpoint, .views = views, .progress = options_.progress});
-  const auto owner = std::make_shared<const watermark::Owner>(std::move(trained.owner));
-  return {.steps = trained.steps,
-          .seconds = trained.seconds,
-          .unmarked = field,
-          .owner = owner,
-          .marked = marked_scene(*owner, name.seed)};
+  Trained trained;
+  trained.steps = owned.steps;
+  trained.seconds = owned.seconds;
+  trained.unmarked = field;
+  trained.owner = std::make_shared<const watermark::Owner>(std::move(owned.owner));
+  trained.marked = marked_scene(*trained.owner, name.seed);
+  trained.checkpoint = checkpoint;
+  return trained;
+}
+
+// What the tables of sampling and of noise on weights ask of an owner: other points along the rays of an mlp
+// field of 16 bits, noise on the weights at 8 bits.
+void CellRunner::read_variants(const CellName& name, const Trained& trained,
+                               std::map<std::string, double>& under) const {
+  if (!trained.owner) return;
+  const auto read = [&](const std::string& what, const MarkedScene& marked) {
+    if (!tell(name.stem() + ": " + what, 0, ""))
+      throw Stopped(name.stem() + ": stopped while it was measured");
+    under[what] = score_mark(*trained.unmarked, marked,
+                             {.cameras = nerf::make_cameras(trained.unmarked->cameras, nerf::CameraSet::near,
+                                                            std::max<Index>(1, options_.under_views), 0,
+                                                            name.seed + kCamerasSeed)})
+                      .accuracy;
+  };
+  if (name.bits == kWeightsBits) {
+    const watermark::Owner noisy = with_noisy_weights(*trained.owner, kWeightsNoise, name.seed);
+    read("weights_0.01", marked_scene(noisy, name.seed));
+  }
+  if (!is_mlp(name) || name.bits != 16) return;
+  const std::pair<const char*, nerf::RayPoints> kinds[] = {{"sampling_32_asp_32_isp", {32, 32, 0}},
+                                                           {"sampling_64_asp", {64, 0, 0}},
+                                                           {"sampling_32_asp", {32, 0, 0}},
+                                                           {"sampling_16_asp", {16, 0, 0}},
+                                                           {"sampling_64_rsp", {0, 0, 64}}};
+  for (const auto& [what, points] : kinds)
+    read(what, marked_scene(*trained.owner, name.seed, {.points = points}));
 }
 
 MeasuredCell CellRunner::run(const CellName& name) {
   const Scene& data = scene(name);
   const Trained trained = train(name, data);
   const auto& o = options_;
-  const MarkScores s =
+  MarkScores s =
       score_mark(*trained.unmarked, trained.marked,
                  {.cameras = nerf::make_cameras(trained.unmarked->cameras, nerf::CameraSet::near, o.views, 0,
                                                 name.seed + kCamerasSeed),
@@ -158,10 +251,21 @@ MeasuredCell CellRunner::run(const CellName& name) {
                       throw Stopped(name.stem() + ": stopped while it was measured, its training is saved");
                     return true;
                   }});
+  read_variants(name, trained, s.under);
   const nerf::Camera& camera = data.test.views.front().camera;
   const Tensor<float> pair[] = {nerf::Renderer(*trained.unmarked).render(camera).rgb,
                                 trained.marked.render(camera, trained.marked.message(0))};
-  const auto checkpoint = o.work / (name.stem() + ".checkpoint");
+  std::map<std::string, double> more{{"views", static_cast<double>(o.views)},
+                                     {"under_views", static_cast<double>(o.under_views)},
+                                     {"photographs", static_cast<double>(data.test.views.size())},
+                                     {"width", static_cast<double>(camera.width)},
+                                     {"height", static_cast<double>(camera.height)},
+                                     {"budget", o.budget},
+                                     {"ssim_base", s.ssim_base},
+                                     {"lpips_base", s.lpips_base},
+                                     {"psnr_photo_object", s.psnr_photo_object},
+                                     {"psnr_photo_unmarked", s.psnr_photo_unmarked}};
+  more.insert(trained.more.begin(), trained.more.end());
   return {.cell = {.name = name,
                    .steps = trained.steps,
                    .seconds = trained.seconds,
@@ -175,18 +279,9 @@ MeasuredCell CellRunner::run(const CellName& name) {
                    .lpips = s.lpips_photo,
                    .under = s.under,
                    .commit = o.commit,
-                   .more = {{"views", static_cast<double>(o.views)},
-                            {"under_views", static_cast<double>(o.under_views)},
-                            {"photographs", static_cast<double>(data.test.views.size())},
-                            {"width", static_cast<double>(camera.width)},
-                            {"height", static_cast<double>(camera.height)},
-                            {"budget", o.budget},
-                            {"ssim_base", s.ssim_base},
-                            {"lpips_base", s.lpips_base},
-                            {"psnr_photo_object", s.psnr_photo_object},
-                            {"psnr_photo_unmarked", s.psnr_photo_unmarked}}},
+                   .more = more},
           .picture = tile(pair, 2, 0),
-          .curve = run_curve(checkpoint)};
+          .curve = run_curve(trained.checkpoint)};
 }
 
 void save_measured(const std::filesystem::path& folder, const MeasuredCell& measured) {

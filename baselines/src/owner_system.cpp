@@ -83,8 +83,27 @@ TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name,
   return trained;
 }
 
-MarkedScene marked_scene(const watermark::Owner& owner, std::uint64_t seed) {
-  const auto renderer = std::make_shared<nerf::Renderer>(owner.field);
+watermark::Owner with_noisy_weights(const watermark::Owner& owner, double deviation, std::uint64_t seed) {
+  if (!(deviation >= 0))
+    throw ValueError("[with_noisy_weights] deviation must not be negative, got " + std::to_string(deviation));
+  watermark::Owner noisy = owner;
+  const auto add = [&](ParamStore<float>& store, std::uint64_t stream, std::string_view prefix) {
+    const CounterRng rng(seed, stream);
+    for (const auto& e : store.entries()) {
+      if (!e.name.starts_with(prefix)) continue;
+      for (Index i = e.offset; i < e.offset + e.shape.size(); ++i)
+        store.values()[static_cast<std::size_t>(i)] +=
+            static_cast<float>(deviation) * rng.normal2(static_cast<std::uint64_t>(i))[0];
+    }
+  };
+  add(noisy.field.params, 62, "");
+  add(noisy.params, 63, "mark/");
+  return noisy;
+}
+
+MarkedScene marked_scene(const watermark::Owner& owner, std::uint64_t seed,
+                         const nerf::RenderOptions& options) {
+  const auto renderer = std::make_shared<nerf::Renderer>(owner.field, options);
   const auto code = std::make_shared<watermark::CellCode>(owner.code());
   const auto reader = std::make_shared<watermark::PictureReader>(owner);
   const Index bits = owner.options().bits;

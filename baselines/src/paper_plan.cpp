@@ -13,6 +13,12 @@ const std::array kSystems{
                 "a bit in every cell of the scene, read place by place, under a budget of power"},
     PaperSystem{"copyrnerf_paper", "CopyRNeRF, preset paper",
                 "one message fused into every colour, read from the whole picture, under distortions"},
+    PaperSystem{"hidden_nerf", "HiDDeN + NeRF",
+                "photographs marked by HiDDeN at 30 dB, a field trained on them, its renders read"},
+    PaperSystem{"mbrs_nerf", "MBRS + NeRF",
+                "photographs marked by MBRS at 30 dB, a field trained on them, its renders read"},
+    PaperSystem{"nerf_hidden", "NeRF + HiDDeN", "renders of an unmarked field marked by HiDDeN at 30 dB"},
+    PaperSystem{"nerf_mbrs", "NeRF + MBRS", "renders of an unmarked field marked by MBRS at 30 dB"},
     PaperSystem{"without_drr", "CopyRNeRF without DRR", "neither distortions nor moved samples in training"}};
 
 constexpr std::array<std::string_view, 6> kTables{"bits",     "quality",  "distortion",

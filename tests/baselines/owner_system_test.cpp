@@ -1,5 +1,7 @@
 #include <fieldmark/baselines/owner_system.h>
 
+#include <cmath>
+
 #include "support/catch.h"
 #include "support/temporary_folder.h"
 #include "watermark/tiny_owner.h"
@@ -67,4 +69,23 @@ TEST_CASE("owner_system: trained, stopped and gone on with, it is calibrated") {
   const auto scores = score_mark(trained.owner.field, marked_scene(trained.owner, 1), {.cameras = cameras});
   CHECK(scores.psnr_base_object == Approx(34).margin(1));
   CHECK(scores.accuracy >= 0.25);
+}
+
+TEST_CASE("owner_system: noise on the weights of field and mark, none on the extractor's") {
+  const watermark::Owner owner = tiny_owner();
+  const watermark::Owner noisy = with_noisy_weights(owner, 0.01, 3);
+  const auto change = [](const ParamStore<float>& a, const ParamStore<float>& b, std::string_view prefix) {
+    double square = 0, count = 0;
+    for (const auto& e : a.entries()) {
+      if (!e.name.starts_with(prefix)) continue;
+      for (std::size_t i = 0; i < a.values(a.find(e.name)).size(); ++i, count += 1)
+        square += std::pow(static_cast<double>(a.values(a.find(e.name))[i] - b.values(b.find(e.name))[i]), 2);
+    }
+    return std::sqrt(square / count);
+  };
+  CHECK(change(owner.field.params, noisy.field.params, "") == Approx(0.01).epsilon(0.05));
+  CHECK(change(owner.params, noisy.params, "mark/") == Approx(0.01).epsilon(0.2));
+  CHECK(change(owner.params, noisy.params, "extractor/") == 0);
+  CHECK_THROWS_WITH(with_noisy_weights(owner, -1, 3),
+                    "[with_noisy_weights] deviation must not be negative, got -1.000000");
 }

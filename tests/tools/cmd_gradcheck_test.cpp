@@ -54,7 +54,7 @@ TEST_CASE("Every unit that is documented as differentiable has a check that begi
           "[gradcheck]") {
   const Json cases = Json::parse(run_command({"gradcheck", "--json", "-"}).out)["cases"];
   int units = 0;
-  for (const char* module : {"engine", "nerf", "distort", "extractor", "watermark"}) {
+  for (const char* module : {"engine", "nerf", "distort", "extractor", "watermark", "baselines"}) {
     const std::filesystem::path headers = std::string(FIELDMARK_SOURCE_DIR "/") + module + "/include";
     if (!std::filesystem::exists(headers)) continue;
     for (const auto& file : std::filesystem::recursive_directory_iterator(headers)) {

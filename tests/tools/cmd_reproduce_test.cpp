@@ -45,6 +45,7 @@ TEST_CASE("reproduce measures what is missing on the built-in scene, once", "[re
   REQUIRE(cells.size() == 2);
   CHECK(cells[1].name == baselines::CellName{"ours", "objects", "hash", 8, 1});
   CHECK(cells[1].more.at("total_seconds") > 0);
+  CHECK(cells[1].under.contains("weights_0.01"));
   CHECK_THAT(read_text(folder / "paper.md"), Contains("| Fieldmark, preset fast | objects | hash |"));
   CHECK(std::filesystem::exists(folder / "paper_bits.svg"));
 

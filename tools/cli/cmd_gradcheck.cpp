@@ -1,3 +1,4 @@
+#include <fieldmark/baselines/gradcheck_cases.h>
 #include <fieldmark/distort/gradcheck_cases.h>
 #include <fieldmark/distort/numerics_cases.h>
 #include <fieldmark/engine/gradcheck_cases.h>
@@ -75,7 +76,8 @@ int run_gradients(const Options& options, Context& context) {
                                                     {"distort", distort::gradcheck_cases()},
                                                     {"extractor", extractor::gradcheck_cases()},
                                                     {"nerf", nerf::gradcheck_cases()},
-                                                    {"watermark", watermark::gradcheck_cases()}});
+                                                    {"watermark", watermark::gradcheck_cases()},
+                                                    {"baselines", baselines::gradcheck_cases()}});
   parallel_for(static_cast<Index>(rows.size()), 1, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) run_case(rows[static_cast<std::size_t>(i)]);
   });

@@ -4,7 +4,7 @@
 #include <fieldmark/baselines/timed_run.h>
 #include <fieldmark/nerf/dataset.h>
 
-#include <optional>
+#include <memory>
 
 namespace fieldmark::baselines {
 
@@ -54,7 +54,13 @@ class CellRunner {
   struct Trained;
   const Scene& scene(const CellName& name);
   nerf::RadianceField base_field(const CellName& name, const Scene& scene);
+  nerf::RadianceField trained_field(const std::string& stem, const nerf::Dataset& photographs,
+                                    const CellName& name, double seconds);
   Trained train(const CellName& name, const Scene& scene);
+  Trained train_hiding(const CellName& name, const Scene& scene,
+                       std::shared_ptr<const nerf::RadianceField> unmarked);
+  void read_variants(const CellName& name, const Trained& trained,
+                     std::map<std::string, double>& under) const;
   bool tell(const std::string& what, double part, const std::string& note) const;
 
   CellRunnerOptions options_;

@@ -45,6 +45,12 @@ TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name,
                          const OwnerTraining& training);
 
 /// An owner's mark with a message of its own in every view, see message_of_view(). The owner must outlive it.
-MarkedScene marked_scene(const watermark::Owner& owner, std::uint64_t seed);
+MarkedScene marked_scene(const watermark::Owner& owner, std::uint64_t seed,
+                         const nerf::RenderOptions& options = {});
+
+/// The owner with Gaussian noise on every weight of the field's networks and table and of the mark's
+/// networks; the extractor stays.
+/// @param deviation  of the noise, >= 0   @throws ValueError if it is negative
+watermark::Owner with_noisy_weights(const watermark::Owner& owner, double deviation, std::uint64_t seed);
 
 }  // namespace fieldmark::baselines

@@ -1,0 +1,32 @@
+#pragma once
+#include <fieldmark/engine/random.h>
+#include <fieldmark/engine/tensor.h>
+
+#include <vector>
+
+namespace fieldmark::baselines {
+
+/// A picture without a scene: several octaves of smooth noise between random colours over a ramp.
+/// @param index  one picture for each   @return [size, size, 3] in [0, 1]   @throws ValueError if size < 1
+Tensor<float> generated_texture(Index size, const CounterRng& rng, std::uint64_t index);
+
+/// Training pictures of 2-D networks: windows of photographs at random places and, one in two, generated
+/// textures.
+class CropSource {
+ public:
+  /// @param photographs  [H, W, 3] in [0, 1] of any sizes; none: textures alone
+  /// @throws ShapeError if one is not
+  CropSource(std::vector<Tensor<float>> photographs, std::uint64_t seed);
+  /// Of a photograph smaller than `size`, what there is, repeated at its edges. A window that shows hardly
+  /// anything is drawn anew, up to 8 times: a network learns nothing from a white background.
+  /// @param index  one picture for each   @return [size, size, 3] in [0, 1]
+  Tensor<float> picture(Index size, std::uint64_t index) const;
+  /// The same of photographs alone. @throws ValueError if there is none
+  Tensor<float> photograph(Index size, std::uint64_t index) const;
+
+ private:
+  std::vector<Tensor<float>> photographs_;
+  CounterRng rng_;
+};
+
+}  // namespace fieldmark::baselines

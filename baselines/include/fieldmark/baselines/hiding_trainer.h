@@ -1,0 +1,77 @@
+#pragma once
+#include <fieldmark/baselines/crop_source.h>
+#include <fieldmark/baselines/picture_marker.h>
+#include <fieldmark/engine/adam.h>
+#include <fieldmark/nerf/schedule.h>
+
+namespace fieldmark::baselines {
+
+/// How a 2-D network is trained.
+struct HidingTrainOptions {
+  /// Length of the run and step sizes; Adam as the networks' authors have it, with 1e-3.
+  nerf::ScheduleOptions schedule{.seconds = 180, .lr = 1e-3, .half_after = 1e6, .cooldown = 0.3, .last = 0.1};
+  Index batch = 8;            ///< pictures a step, at least 2
+  Index crop = 64;            ///< pixels of their sides, a multiple of 16
+  Index first_crop = 32;      ///< of the first part of the run: the message is found at a quarter of the work
+  double first_part = 0.4;    ///< of the run, in [0, 1)
+  double message_weight = 1;  ///< of the message's mean squared error
+  double image_weight = 0.7;  ///< of the pictures', in [-1, 1]; rises with the bits read, see HidingTrainer
+  double adversary_weight = 1e-3;  ///< of the discriminator's verdict
+  std::uint64_t seed = 0;          ///< of crops, messages and noise
+};
+/// The weights of a network's authors: HiDDeN 1, 0.7, 1e-3; MBRS 10, 1, 1e-4 and one size of
+/// crops, that of its map.
+HidingTrainOptions hiding_train_options(HidingKind kind);
+
+/// Trains encoder and decoder together, against a discriminator, through a random noise layer a batch:
+///   L = w_m |M' - M|^2 + u w_i |marked - plain|^2 + w_a BCE(discriminator(marked), "plain")
+/// Source: Zhu et al. 2018 (HiDDeN), section 3.3; Jia et al. 2021 (MBRS), section 3.4 for its weights.
+/// Departure: u rises from 0.02 to 1 while the running share of bits read right goes from 0.8 to 0.95, so
+/// that there is a message before it has to be invisible; the authors have u = 1 and epochs of it on a GPU.
+/// Same seed and number of steps: same bytes, for any thread count and across save() and restore().
+class HidingTrainer {
+ public:
+  /// Marker and crops must outlive the trainer. @throws ValueError if an option is out of range
+  HidingTrainer(PictureMarker& marker, const CropSource& crops, const HidingTrainOptions& options);
+  /// Takes one step. @param seconds  since the start of the run, for a schedule that ends at a time
+  void step(double seconds);
+  /// Whether the run has all its steps.
+  bool done() const { return schedule_.done(steps_); }
+  /// Steps taken, those before a restore() included.
+  Index steps() const { return steps_; }
+  /// Running means of training: share of bits read right behind the noise layer, and mean square of the
+  /// residual in [0, 1].
+  struct Figures {
+    double bits = 0.5;  ///< share of bits
+    double square = 0;  ///< of the residual
+  };
+  /// As of the last step.
+  const Figures& figures() const { return figures_; }
+  /// @throws IoError
+  void save(const std::filesystem::path& path) const;
+  /// @throws IoError if the file is not a checkpoint of the same configuration
+  void restore(const std::filesystem::path& path);
+
+ private:
+  Index crop_now(double seconds) const;
+  void draw(Index size);
+  void train_networks(Index size);
+  void train_discriminator(Index size);
+  std::string fingerprint() const;
+
+  PictureMarker& marker_;
+  const CropSource& crops_;
+  HidingTrainOptions options_;
+  nerf::Schedule schedule_;
+  CounterRng message_rng_, noise_rng_;
+  ParamStore<float> critic_params_;
+  Discriminator<float> critic_;
+  Adam<float> adam_, critic_adam_;
+  Tape<float> tape_;
+  std::vector<float> pictures_, messages_, marked_;
+  Figures figures_;
+  Index steps_ = 0;
+  bool large_ = false;  // the first part is over
+};
+
+}  // namespace fieldmark::baselines

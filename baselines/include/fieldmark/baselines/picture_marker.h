@@ -1,0 +1,51 @@
+#pragma once
+#include <fieldmark/baselines/hiding_network.h>
+#include <fieldmark/engine/tensor.h>
+#include <fieldmark/watermark/message.h>
+
+#include <filesystem>
+#include <memory>
+
+namespace fieldmark::baselines {
+
+/// The 2-D networks that there are.
+enum class HidingKind {
+  hidden,  ///< HiddenNetwork
+  mbrs     ///< MbrsNetwork
+};
+/// "hidden" or "mbrs".
+const char* hiding_name(HidingKind kind);
+
+/// A 2-D network with its numbers: marks pictures and reads them.
+class PictureMarker {
+ public:
+  /// With initial numbers. @throws ValueError if an option is out of range
+  PictureMarker(HidingKind kind, const HidingOptions& options, std::uint64_t seed);
+
+  /// The picture with a message, rounded to 8 bits, by the running statistics.
+  /// @param picture  [H, W, 3] in [0, 1]
+  /// @param strength  PSNR of the result, dB: the residual is scaled to it; 0: as the network has it
+  /// @throws ShapeError if the picture is not one   @throws ValueError if the message has another length
+  Tensor<float> mark(const Tensor<float>& picture, const watermark::Message& message,
+                     double strength = 0) const;
+  /// What is read from a picture [H, W, 3] in [0, 1]. @throws ShapeError if it is not one
+  watermark::Message read(const Tensor<float>& picture) const;
+  /// Share of the bits of `sent` that are read right.
+  double accuracy(const Tensor<float>& picture, const watermark::Message& sent) const;
+
+  /// As constructed.
+  HidingKind kind() const { return kind_; }
+  /// As constructed.
+  const HidingOptions& options() const { return options_; }
+  /// The network, to be trained.
+  const HidingNetwork<float>& network() const { return *network_; }
+
+  ParamStore<float> params;  ///< encoder and decoder, with their running statistics
+
+ private:
+  HidingKind kind_;
+  HidingOptions options_;
+  std::unique_ptr<HidingNetwork<float>> network_;
+};
+
+}  // namespace fieldmark::baselines

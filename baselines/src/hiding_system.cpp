@@ -1,0 +1,97 @@
+#include <fieldmark/baselines/hiding_system.h>
+#include <fieldmark/engine/metrics.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace fieldmark::baselines {
+
+std::optional<HidingSystem> hiding_system(std::string_view system) {
+  if (system == "hidden_nerf") return HidingSystem{HidingKind::hidden, false};
+  if (system == "mbrs_nerf") return HidingSystem{HidingKind::mbrs, false};
+  if (system == "nerf_hidden") return HidingSystem{HidingKind::hidden, true};
+  if (system == "nerf_mbrs") return HidingSystem{HidingKind::mbrs, true};
+  return std::nullopt;
+}
+
+std::vector<Tensor<float>> photographs_of(const nerf::Dataset& data) {
+  std::vector<Tensor<float>> pictures;
+  for (const nerf::View& view : data.views) pictures.push_back(nerf::composited(view, data.background));
+  return pictures;
+}
+
+nerf::Dataset marked_photographs(const nerf::Dataset& data, const PictureMarker& marker,
+                                 const watermark::Message& message, double strength) {
+  nerf::Dataset marked = data;
+  const float level = nerf::background_value(data.background);
+  for (nerf::View& view : marked.views) {
+    const Tensor<float> picture = marker.mark(nerf::composited(view, data.background), message, strength);
+    for (Index p = 0; p < picture.size() / 3; ++p) {
+      const float alpha = view.rgba[4 * p + 3];
+      for (Index c = 0; alpha > 0 && c < 3; ++c)
+        view.rgba[4 * p + c] = std::clamp((picture[3 * p + c] - (1 - alpha) * level) / alpha, 0.f, 1.f);
+    }
+  }
+  return marked;
+}
+
+OwnScores own_scores(const PictureMarker& marker, const CropSource& photographs, Index count, Index size,
+                     std::uint64_t seed, double strength) {
+  if (count < 1) throw ValueError("[own_scores] count must be at least 1, got " + std::to_string(count));
+  const CounterRng messages(seed, 43);
+  OwnScores scores;
+  for (Index i = 0; i < count; ++i) {
+    const auto index = static_cast<std::uint64_t>(i);
+    const Tensor<float> picture = photographs.photograph(size, index);
+    const auto sent = watermark::random_message(marker.options().bits, messages, index);
+    const Tensor<float> marked = marker.mark(picture, sent, strength);
+    scores.accuracy += marker.accuracy(marked, sent) / static_cast<double>(count);
+    scores.psnr += psnr(marked, picture) / static_cast<double>(count);
+  }
+  return scores;
+}
+
+watermark::Message opposite(const watermark::Message& message) {
+  watermark::Message flipped = message;
+  for (auto& bit : flipped.bits) bit = bit ? 0 : 1;
+  return flipped;
+}
+
+MarkedScene marked_scene(std::shared_ptr<const PictureMarker> marker,
+                         std::array<std::shared_ptr<const nerf::RadianceField>, 2> fields,
+                         const watermark::Message& message) {
+  struct Fields {
+    explicit Fields(const std::array<std::shared_ptr<const nerf::RadianceField>, 2>& both)
+        : held(both), first(*both[0]), second(*both[1]) {}
+    std::array<std::shared_ptr<const nerf::RadianceField>, 2> held;
+    nerf::Renderer first, second;
+  };
+  const auto shown = std::make_shared<Fields>(fields);
+  return {.bits = marker->options().bits,
+          .message = [=](Index view) { return view % 2 == 0 ? message : opposite(message); },
+          .render =
+              [=](const nerf::Camera& camera, const watermark::Message& sent) {
+                return (sent == message ? shown->first : shown->second).render(camera).rgb;
+              },
+          .accuracy = [=](const Tensor<float>& picture,
+                          const watermark::Message& sent) { return marker->accuracy(picture, sent); }};
+}
+
+MarkedScene marked_renders(std::shared_ptr<const PictureMarker> marker,
+                           std::shared_ptr<const nerf::RadianceField> field, std::uint64_t seed,
+                           double strength) {
+  const auto renderer = std::make_shared<nerf::Renderer>(*field);
+  const Index bits = marker->options().bits;
+  return {.bits = bits,
+          .message = [=](Index view) { return message_of_view(bits, seed, view); },
+          .render =
+              [=](const nerf::Camera& camera, const watermark::Message& sent) {
+                (void)field;  // held for the renderer
+                return marker->mark(renderer->render(camera).rgb, sent, strength);
+              },
+          .accuracy = [=](const Tensor<float>& picture,
+                          const watermark::Message& sent) { return marker->accuracy(picture, sent); }};
+}
+
+}  // namespace fieldmark::baselines

@@ -1,0 +1,58 @@
+#include <fieldmark/baselines/crop_source.h>
+#include <fieldmark/engine/error.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "support/catch.h"
+#include "support/random.h"
+
+using namespace fieldmark;
+using namespace fieldmark::baselines;
+
+TEST_CASE("crop_source: windows are parts of their photographs") {
+  Tensor<float> photograph({20, 30, 3});
+  for (Index i = 0; i < photograph.size(); ++i) photograph[i] = static_cast<float>(i) / 1800;
+  const CropSource crops({photograph}, 1);
+  for (std::uint64_t k = 0; k < 20; ++k) {
+    const auto window = crops.photograph(8, k);
+    const Index at = std::lround(window[0] * 1800);
+    REQUIRE(at % 3 == 0);
+    CHECK(at / 3 / 30 <= 12);
+    CHECK(at / 3 % 30 <= 22);
+    for (Index y = 0; y < 8; ++y)
+      for (Index x = 0; x < 24; ++x) CHECK(window[y * 24 + x] == photograph[at + y * 90 + x]);
+  }
+  CHECK(crops.photograph(8, 3).data != crops.photograph(8, 4).data);
+  CHECK(crops.photograph(40, 0).shape == Shape{40, 40, 3});
+}
+
+TEST_CASE("crop_source: half of the pictures are textures, and hardly any picture is blank") {
+  Tensor<float> photograph({64, 64, 3}, 1.f);  // white but for a corner
+  for (Index y = 0; y < 32; ++y)
+    for (Index x = 0; x < 32; ++x) photograph[(y * 64 + x) * 3] = static_cast<float>((x + y) % 2);
+  const CropSource crops({photograph}, 1);
+  int blank = 0, whole = 0;
+  for (std::uint64_t k = 0; k < 60; ++k) {
+    const auto picture = crops.picture(16, k);
+    const auto [low, high] = std::minmax_element(picture.data.begin(), picture.data.end());
+    CHECK(*low >= 0);
+    CHECK(*high <= 1);
+    blank += *low == *high;
+    whole += std::ranges::all_of(picture.data, [](float v) { return v == 0 || v == 1; });
+  }
+  CHECK(blank <= 6);
+  CHECK(whole >= 18);
+  CHECK(whole <= 42);
+  const auto texture = generated_texture(16, CounterRng(2), 5);
+  CHECK(texture.data == generated_texture(16, CounterRng(2), 5).data);
+  CHECK(texture.data != generated_texture(16, CounterRng(2), 6).data);
+}
+
+TEST_CASE("crop_source: errors") {
+  CHECK_THROWS_AS(CropSource({Tensor<float>({4, 4, 1})}, 1), ShapeError);
+  CHECK_THROWS_WITH(CropSource({}, 1).photograph(8, 0), "[crop_source] photographs must not be empty");
+  CHECK(CropSource({}, 1).picture(8, 0).shape == Shape{8, 8, 3});
+  CHECK_THROWS_WITH(generated_texture(0, CounterRng(1), 0),
+                    "[generated_texture] size must be at least 1, got 0");
+}

@@ -1,0 +1,77 @@
+#include <fieldmark/baselines/hiding_system.h>
+#include <fieldmark/engine/metrics.h>
+#include <fieldmark/nerf/analytic_scene.h>
+
+#include "nerf/small_field.h"
+#include "support/catch.h"
+
+using namespace fieldmark;
+using namespace fieldmark::baselines;
+
+namespace {
+std::shared_ptr<const PictureMarker> marker() {
+  return std::make_shared<PictureMarker>(HidingKind::hidden, HidingOptions{.bits = 6, .channels = 4}, 1);
+}
+}  // namespace
+
+TEST_CASE("hiding_system: which systems have a 2-D network") {
+  CHECK(hiding_system("hidden_nerf")->kind == HidingKind::hidden);
+  CHECK(!hiding_system("hidden_nerf")->renders);
+  CHECK(hiding_system("nerf_mbrs")->kind == HidingKind::mbrs);
+  CHECK(hiding_system("nerf_mbrs")->renders);
+  CHECK(!hiding_system("ours"));
+}
+
+TEST_CASE("hiding_system: marked photographs keep what is transparent, and their mark's strength") {
+  const nerf::Dataset data = nerf::make_scene({.size = 32, .views = 2});
+  const auto net = marker();
+  const watermark::Message message{{1, 0, 1, 1, 0, 0}};
+  const nerf::Dataset marked = marked_photographs(data, *net, message, 26);
+  REQUIRE(marked.views.size() == data.views.size());
+  for (std::size_t v = 0; v < data.views.size(); ++v) {
+    const auto& before = data.views[v].rgba;
+    const auto& after = marked.views[v].rgba;
+    double changed = 0;
+    for (Index p = 0; p < before.size() / 4; ++p) {
+      CHECK(before[4 * p + 3] == after[4 * p + 3]);
+      if (before[4 * p + 3] == 0) CHECK(before[4 * p] == after[4 * p]);
+      changed += before[4 * p] != after[4 * p];
+    }
+    CHECK(changed > 0);
+    // Over the whole picture at most as strong as asked for: the background's part is lost.
+    CHECK(psnr(nerf::composited(marked.views[v], data.background),
+               nerf::composited(data.views[v], data.background)) > 25.5);
+  }
+}
+
+TEST_CASE("hiding_system: two fields shown in turns with a message and its opposite") {
+  const auto field = std::make_shared<const nerf::RadianceField>(small_field());
+  const auto other = std::make_shared<const nerf::RadianceField>(small_field(2));
+  const watermark::Message message{{1, 0, 1, 1, 0, 0}};
+  CHECK(opposite(message) == watermark::Message{{0, 1, 0, 0, 1, 1}});
+  const MarkedScene scene = marked_scene(marker(), {field, other}, message);
+  CHECK(scene.message(0) == message);
+  CHECK(scene.message(3) == opposite(message));
+  const auto camera = nerf::make_cameras(field->cameras, nerf::CameraSet::near, 1, 0, 5).front();
+  CHECK(scene.render(camera, message).data == nerf::Renderer(*field).render(camera).rgb.data);
+  CHECK(scene.render(camera, opposite(message)).data == nerf::Renderer(*other).render(camera).rgb.data);
+  // A constant reading is right on half of the bits of any message and its opposite together.
+  const Tensor<float> grey({16, 16, 3}, 0.5f);
+  CHECK(scene.accuracy(grey, message) + scene.accuracy(grey, opposite(message)) == Approx(1));
+}
+
+TEST_CASE("hiding_system: marks on renders, and on its own pictures") {
+  const auto field = std::make_shared<const nerf::RadianceField>(small_field());
+  const auto net = marker();
+  const MarkedScene scene = marked_renders(net, field, 3, 28);
+  const auto camera = nerf::make_cameras(field->cameras, nerf::CameraSet::near, 1, 0, 5).front();
+  const auto render = nerf::Renderer(*field).render(camera).rgb;
+  CHECK(scene.message(2) == message_of_view(6, 3, 2));
+  CHECK(psnr(scene.render(camera, scene.message(2)), render) == Approx(28).margin(1));
+  const auto own = own_scores(*net, CropSource({render}, 1), 3, 16, 1, 28);
+  CHECK(own.psnr == Approx(28).margin(1));
+  CHECK(own.accuracy >= 0);
+  CHECK(own.accuracy <= 1);
+  CHECK_THROWS_WITH(own_scores(*net, CropSource({render}, 1), 0, 16, 1),
+                    "[own_scores] count must be at least 1, got 0");
+}

@@ -1,0 +1,87 @@
+#include <fieldmark/baselines/hiding_trainer.h>
+#include <fieldmark/engine/parallel.h>
+
+#include <algorithm>
+
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+
+using namespace fieldmark;
+using namespace fieldmark::baselines;
+
+namespace {
+
+HidingTrainOptions tiny(Index steps) {
+  HidingTrainOptions o;
+  o.schedule.steps = steps;
+  o.batch = 2;
+  o.crop = 32;
+  o.first_crop = 16;
+  o.first_part = 0.5;
+  return o;
+}
+
+PictureMarker tiny_marker(HidingKind kind) { return {kind, {.bits = 2, .channels = 8}, 1}; }
+
+}  // namespace
+
+TEST_CASE("hiding_trainer: the same numbers for any threads and across a checkpoint") {
+  const TemporaryFolder folder;
+  const CropSource crops({}, 1);
+  for (const HidingKind kind : {HidingKind::hidden, HidingKind::mbrs}) {
+    CAPTURE(hiding_name(kind));
+    PictureMarker one = tiny_marker(kind), two = tiny_marker(kind);
+    const int before = threads();
+    set_threads(1);
+    HidingTrainer straight(one, crops, tiny(6));
+    while (!straight.done()) straight.step(0);
+    set_threads(2);
+    {
+      PictureMarker begun = tiny_marker(kind);
+      HidingTrainer first(begun, crops, tiny(6));
+      for (int k = 0; k < 4; ++k) first.step(0);
+      first.save(folder / "c");
+    }
+    HidingTrainer second(two, crops, tiny(6));
+    second.restore(folder / "c");
+    CHECK(second.steps() == 4);
+    while (!second.done()) second.step(0);
+    set_threads(before);
+    CHECK(std::ranges::equal(one.params.values(), two.params.values()));
+    CHECK(second.figures().bits == straight.figures().bits);
+    CHECK(second.steps() == 6);
+  }
+}
+
+TEST_CASE("hiding_trainer: one bit is learnt in some steps") {
+  const CropSource crops({}, 1);
+  PictureMarker marker(HidingKind::hidden, {.bits = 1, .channels = 8}, 1);
+  HidingTrainOptions options = tiny(150);
+  options.batch = 8;
+  options.crop = 16;
+  options.schedule.lr = 5e-3;
+  HidingTrainer trainer(marker, crops, options);
+  while (!trainer.done()) trainer.step(0);
+  INFO("bits right " << trainer.figures().bits << ", mean square " << trainer.figures().square);
+  CHECK(trainer.figures().bits > 0.8);
+}
+
+TEST_CASE("hiding_trainer: the authors' weights, and errors") {
+  CHECK(hiding_train_options(HidingKind::hidden).image_weight == 0.7);
+  CHECK(hiding_train_options(HidingKind::mbrs).message_weight == 10);
+  CHECK(hiding_train_options(HidingKind::mbrs).adversary_weight == 1e-4);
+  const TemporaryFolder folder;
+  const CropSource crops({}, 1);
+  PictureMarker marker = tiny_marker(HidingKind::hidden);
+  HidingTrainOptions options = tiny(2);
+  options.crop = 40;
+  CHECK_THROWS_WITH(HidingTrainer(marker, crops, options),
+                    "[hiding_trainer] batch must be at least 2 and both crops multiples of 16, got 2, 40 and "
+                    "16");
+  HidingTrainer trainer(marker, crops, tiny(2));
+  trainer.save(folder / "c");
+  PictureMarker other = tiny_marker(HidingKind::mbrs);
+  HidingTrainer of_other(other, crops, tiny(2));
+  CHECK_THROWS_WITH(of_other.restore(folder / "c"),
+                    Contains("expected a checkpoint of this run (mbrs, 2 bits") && Contains("found hidden"));
+}
