@@ -35,6 +35,24 @@ TEST_CASE("bake changes colours only, and says nothing of the message in the fil
   CHECK(colours_differ);
 }
 
+TEST_CASE("bake makes the mark fainter where it is asked to", "[bake]") {
+  const TinyJob& job = TinyJob::get();
+  // A fainter mark leaves the colours that training starts from, the unmarked ones, nearer to what is wanted.
+  const auto distance = [&](const char* strength) {
+    const auto r =
+        run_command({"bake", "--owner", job.owner, "--message", "5", "--out", job.folder / "fainter.fm",
+                     "--steps", "1", "--strength", strength, "--json", "-"});
+    INFO(r.err);
+    REQUIRE(r.code == cli::kOk);
+    return nlohmann::json::parse(r.out)["psnr_colours"].get<double>();
+  };
+  const double strong = distance("30"), faint = distance("50");
+  CHECK(faint - strong == Approx(20).margin(1));
+  const auto r = run_command({"bake", "--owner", job.owner, "--message", "5", "--out",
+                              job.folder / "refused.fm", "--steps", "1", "--strength", "19"});
+  CHECK(r.code == cli::kUsage);
+}
+
 TEST_CASE("bake refuses a message that does not fit, and an owner that is none", "[bake]") {
   const TinyJob& job = TinyJob::get();
   const std::string out = job.folder / "refused.fm";

@@ -55,6 +55,18 @@ TEST_CASE("owner: opposite signs mark oppositely, no gain marks nothing") {
   CHECK(marked(owner, signs, x, rgb.data) == rgb.data);
 }
 
+TEST_CASE("owner: 20 dB fainter is a tenth of the amplitude, and presets without gain refuse") {
+  Owner owner = small_owner();
+  const double gain = owner.gain, strength = owner.options().strength;
+  owner.set_strength(strength + 20);
+  CHECK(owner.gain == Approx(gain / 10));
+  CHECK(owner.options().strength == strength + 20);
+  CHECK_THROWS_WITH(owner.set_strength(19), "[owner] strength must be in 20 to 60, got 19.000000");
+  CHECK_THROWS_AS(owner.set_strength(std::nan("")), ValueError);
+  Owner paper = small_paper_owner();
+  CHECK_THROWS_AS(paper.set_strength(36), ValueError);
+}
+
 TEST_CASE("owner: the code deals the cells under the key asked for") {
   const Owner owner = small_owner();
   const CellCode want = deal_cells(test_key(1), owner.cells.area(), 3);

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <ostream>
 
 #include "cli/cli.h"
@@ -19,6 +20,7 @@ namespace {
 
 struct Options {
   std::string owner, out;
+  std::optional<double> strength;
   MessageOption message;
   RunLength length{.seconds = watermark::BakeOptions{}.schedule.seconds};
 };
@@ -27,7 +29,11 @@ int run(const Options& options, Context& context) {
   if (std::filesystem::exists(options.out) && std::filesystem::equivalent(options.out, options.owner))
     throw UsageError("--out: " + options.out + " is the owner's file");
   check_writable(options.out);
-  const auto owner = watermark::Owner::load(options.owner);
+  auto owner = watermark::Owner::load(options.owner);
+  if (options.strength) {
+    if (!owner.mark) throw UsageError("--strength: an owner of preset paper has no strength to set");
+    owner.set_strength(*options.strength);
+  }
   const auto message = message_of(options.message, owner.options().bits);
   watermark::BakeOptions bake_options{.seed = context.seed()};
   bake_options.schedule.steps = options.length.steps;
@@ -77,6 +83,10 @@ Command add_bake(CLI::App& app) {
   app.add_option("--owner", o->owner, "What `fieldmark embed` wrote")->required()->type_name("OWNER");
   add_message_options(app, o->message, "Message");
   app.add_option("--out", o->out, "File for the field to publish")->required()->type_name("FIELD");
+  app.add_option("--strength", o->strength,
+                 "PSNR of the mark on the object, dB, 20 to 60; higher is fainter (as embedded)")
+      ->check(CLI::Range(20.0, 60.0).description(""))
+      ->type_name("DB");
   add_run_length(app, o->length, false);
   return [o](Context& context) { return run(*o, context); };
 }

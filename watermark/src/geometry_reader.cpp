@@ -1,10 +1,12 @@
 #include <fieldmark/engine/resize.h>
 #include <fieldmark/watermark/geometry_reader.h>
+#include <fieldmark/watermark/jpeg_score.h>
 #include <fieldmark/watermark/tone_fit.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #include "blurred.h"
 
@@ -44,50 +46,85 @@ Tensor<float> carriers(const Owner& owner, const CachedView& v) {
   return out;
 }
 
-// What is left of a picture without the owner's view, and the mark as the picture would show it: both in
-// deviations of the noise around each pixel, [H, W, 3].
-struct Compared {
-  Tensor<float> rest, mark;
-  std::vector<double> object;  // [P] 1 where the field is seen
+// The owner's unmarked view as a picture shows it, under the blur and the tones that leave least, and what is
+// left.
+struct Shown {
+  Tensor<float> render, rest;
+  double blur = 0, left = 0;
 };
 
-Compared compare(const Tensor<float>& picture, const CachedView& view, const Tensor<float>& mark) {
-  Compared c;
-  for (const float opacity : view.opacity.data) c.object.push_back(opacity > 0.5f ? 1 : 0);
-  // The blur that leaves least, and what it leaves.
-  double least = 0, blur = 0;
-  for (const double sigma : kBlurs) {
-    const Tensor<float> render = blurred(view.base, sigma);
-    const ToneFit tones = fit_tones(render, picture, c.object);
-    Tensor<float> rest(picture.shape);
-    double sum = 0;
-    for (Index i = 0; i < rest.size(); ++i) {
-      rest[i] = picture[i] - static_cast<float>(tones.at(i % 3, static_cast<double>(render[i])));
-      sum += c.object[at(i / 3)] * static_cast<double>(rest[i] * rest[i]);
-    }
-    if (c.rest.size() == rest.size() && sum >= least) {
-      if (sum > kFarFromLeast * least) break;
-      continue;
-    }
-    least = sum;
-    blur = sigma;
-    c.rest = std::move(rest);
+Shown shown_with(const Tensor<float>& picture, const Tensor<float>& base, const std::vector<double>& object,
+                 double blur) {
+  Shown s{.render = blurred(base, blur), .rest = Tensor<float>(picture.shape), .blur = blur};
+  const ToneFit tones = fit_tones(s.render, picture, object);
+  for (Index i = 0; i < s.rest.size(); ++i) {
+    s.render[i] = static_cast<float>(tones.at(i % 3, static_cast<double>(s.render[i])));
+    s.rest[i] = picture[i] - s.render[i];
+    s.left += object[at(i / 3)] * static_cast<double>(s.rest[i] * s.rest[i]);
   }
-  c.mark = blurred(mark, blur);
+  return s;
+}
+
+Shown shown(const Tensor<float>& picture, const Tensor<float>& base, const std::vector<double>& object) {
+  Shown best = shown_with(picture, base, object, kBlurs[0]);
+  for (const double blur : std::span(kBlurs).subspan(1)) {
+    Shown s = shown_with(picture, base, object, blur);
+    if (s.left < best.left)
+      best = std::move(s);
+    else if (s.left > kFarFromLeast * best.left)
+      break;
+  }
+  return best;
+}
+
+// What of a picture is multiplied with the mark, pixel by pixel, and what that may be expected to give.
+struct Compared {
+  Tensor<float> rest, mark, information;  // [H, W, 3]
+  std::vector<double> object;             // [P] 1 where the field is seen
+};
+
+// Both in deviations of the noise around each pixel.
+void compare_differences(const Shown& seen, Compared& c) {
+  c.rest = seen.rest;
   Tensor<float> power = c.rest;
   for (float& x : power.data) x *= x;
   power = blurred(power, kAround);
+  c.information = Tensor<float>(c.rest.shape);
   for (Index i = 0; i < power.size(); ++i) {
     const float deviation = std::sqrt(std::max(power[i], 0.f) + kLeastNoise);
     c.rest[i] /= deviation;
     c.mark[i] /= deviation;
+    c.information[i] = c.mark[i] * c.mark[i];
   }
+}
+
+Compared compare(const Tensor<float>& picture, const CachedView& view, const Tensor<float>& mark,
+                 const std::optional<JpegTrace>& jpeg) {
+  Compared c;
+  for (const float opacity : view.opacity.data) c.object.push_back(opacity > 0.5f ? 1 : 0);
+  const Shown seen = shown(picture, view.base, c.object);
+  c.mark = blurred(mark, seen.blur);
+  if (!jpeg) {
+    compare_differences(seen, c);
+    return c;
+  }
+  JpegScore score = jpeg_score(picture, seen.render, c.mark, c.object, *jpeg);
+  if (seen.blur > 0) {  // steps take fine detail away as blur does
+    JpegScore sharp =
+        jpeg_score(picture, shown_with(picture, view.base, c.object, 0).render, mark, c.object, *jpeg);
+    if (sharp.log_likelihood > score.log_likelihood) {
+      score = std::move(sharp);
+      c.mark = mark;
+    }
+  }
+  c.rest = std::move(score.score);
+  c.information = std::move(score.information);
   return c;
 }
 
 // Of the rest with the mark of each cell, the rest taken from so many pixels further down and right.
 struct Correlation {
-  std::vector<double> sum, power;  // [cells] power: of the mark where they met
+  std::vector<double> sum, information;  // [cells] information: where they met
 };
 
 Correlation correlate(const Compared& c, const std::vector<std::int32_t>& cell, Index cells, Index down,
@@ -99,9 +136,9 @@ Correlation correlate(const Compared& c, const std::vector<std::int32_t>& cell, 
       const Index p = y * w + x, other = (y + down) * w + x + right;
       if (cell[at(p)] < 0 || !(c.object[at(other)] > 0)) continue;
       for (Index a = 0; a < 3; ++a) {
-        const auto mark = static_cast<double>(c.mark[3 * p + a]);
-        out.sum[at(cell[at(p)])] += mark * static_cast<double>(c.rest[3 * other + a]);
-        out.power[at(cell[at(p)])] += mark * mark;
+        out.sum[at(cell[at(p)])] +=
+            static_cast<double>(c.mark[3 * p + a]) * static_cast<double>(c.rest[3 * other + a]);
+        out.information[at(cell[at(p)])] += static_cast<double>(c.information[3 * p + a]);
       }
     }
   return out;
@@ -116,7 +153,7 @@ GeometryReader::GeometryReader(const Owner& owner, const CameraSearchOptions& se
 
 std::vector<double> GeometryReader::evidence_at(const Tensor<float>& picture, const nerf::Camera& camera) {
   const CachedView view = cache_view(renderer_, owner_.field, camera);
-  const Compared c = compare(picture, view, carriers(owner_, view));
+  const Compared c = compare(picture, view, carriers(owner_, view), find_jpeg(picture));
   std::vector<std::int32_t> cell(c.object.size(), -1);
   for (std::size_t p = 0; p < cell.size(); ++p)
     if (view.sample_begin[p] < view.sample_begin[p + 1])
@@ -130,7 +167,7 @@ std::vector<double> GeometryReader::evidence_at(const Tensor<float>& picture, co
     const Correlation other = correlate(c, cell, owner_.cells.count(), dy, dx);
     for (std::size_t k = 0; k < other.sum.size(); ++k) {
       found += other.sum[k] * other.sum[k];
-      expected += other.power[k];
+      expected += other.information[k];
     }
   }
   const double worth = found > 0 ? expected / found : 0;

@@ -128,6 +128,15 @@ nerf::Renderer::Recolour Owner::marking(std::vector<std::int8_t> signs) const {
   };
 }
 
+// The mark's amplitude is in proportion to its gain while colours are not cut off at 0 and 1.
+void Owner::set_strength(double strength) {
+  if (!mark) throw ValueError("[owner] strength is the networks' own in preset paper");
+  if (!(strength >= 20 && strength <= 60))
+    throw ValueError("[owner] strength must be in 20 to 60, got " + std::to_string(strength));
+  gain *= std::pow(10.0, (options_.strength - strength) / 20);
+  options_.strength = strength;
+}
+
 void Owner::save(const std::filesystem::path& path) const {
   SafetensorsFile file;
   set_model_info(file, {"owner", configuration(options_, gain, field)});

@@ -60,6 +60,11 @@ class Owner {
   /// outlive it
   nerf::Renderer::Recolour marking(std::vector<std::int8_t> signs) const;
 
+  /// Makes the mark fainter or stronger than it was calibrated, without learning again: as the PSNR on the
+  /// object that options().strength counts in, dB, 20 to 60. Only for the life of this object.
+  /// @throws ValueError if it is outside, or the preset is paper, whose mark has no gain
+  void set_strength(double strength);
+
   /// Writes an OWNER. @throws IoError
   void save(const std::filesystem::path& path) const;
   /// @throws IoError if the file is missing, foreign, of another kind, or its tensors do not fit its
