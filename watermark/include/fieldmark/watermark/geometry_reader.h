@@ -41,6 +41,7 @@ struct PictureReading {
 ///       S_c = tanh(e / 2 sum_{p in c} R(p) K(p)),
 ///     where e makes up for differences that are alike from pixel to pixel: it is measured on R moved aside.
 ///     So few large cells do not drown many small ones.
+///   - Of a picture that find_jpeg() recognises, R is jpeg_score() instead and K is not divided.
 class GeometryReader {
  public:
   /// Least agreement at which an alignment is believed. Another scene of the same make reaches 0.76 in the
