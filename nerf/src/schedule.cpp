@@ -6,11 +6,12 @@
 
 namespace fieldmark::nerf {
 namespace {
-constexpr Index kLook = 16;         // steps between looks at the clock
 constexpr double kReserve = 0.965;  // of the time: the last part may turn out slower than the pace before it
+constexpr double kEarly = 0.9, kLate = 1.02;  // of the time: a run that would end outside is planned anew
+constexpr double kNewest = 0.014;             // weight of a step in the pace: a memory of some 70 steps
 }  // namespace
 
-Schedule::Schedule(const ScheduleOptions& o) : options_(o), total_(o.steps) {
+Schedule::Schedule(const ScheduleOptions& o) : options_(o), total_(o.steps), fixed_(o.steps > 0) {
   const auto require = [](bool ok, const char* what, double got) {
     if (!ok) throw ValueError("[schedule] " + std::string(what) + ", got " + std::to_string(got));
   };
@@ -23,15 +24,23 @@ Schedule::Schedule(const ScheduleOptions& o) : options_(o), total_(o.steps) {
 }
 
 void Schedule::observe(Index n, double seconds) {
-  if (total_ > 0 || n % kLook != 0 || n == 0) return;
+  if (fixed_) return;
   if (last_step_ >= 0 && n > last_step_) {
     const double pace = (seconds - last_seconds_) / static_cast<double>(n - last_step_);
-    pace_ = pace_ == 0 ? pace : 0.8 * pace_ + 0.2 * pace;
+    pace_ += (pace - pace_) * std::max(kNewest, 1 / static_cast<double>(++timed_steps_));
   }
   last_step_ = n;
   last_seconds_ = seconds;
-  const auto total = static_cast<Index>(std::ceil(static_cast<double>(n) / (1 - options_.cooldown)));
-  if (seconds + pace_ * static_cast<double>(total - n) >= kReserve * options_.seconds) total_ = total;
+  if (timed_steps_ == 0) return;
+  const auto end = [&](Index total) { return seconds + pace_ * static_cast<double>(total - n); };
+  if (total_ == 0) {
+    const auto total = static_cast<Index>(std::ceil(static_cast<double>(n) / (1 - options_.cooldown)));
+    if (end(total) >= kReserve * options_.seconds) total_ = total;
+  } else if (end(total_) > kLate * options_.seconds || end(total_) < kEarly * options_.seconds) {
+    const double left = (kReserve * options_.seconds - seconds) / std::max(pace_, 1e-9);
+    total_ = n + static_cast<Index>(std::clamp(left, 1.0, 1e12));
+    replanned_ = true;
+  }
 }
 
 double Schedule::lr(Index n) const {
@@ -44,7 +53,9 @@ double Schedule::lr(Index n) const {
 }
 
 void Schedule::resume(Index total) {
-  if (options_.steps == 0) total_ = total;
+  if (options_.steps > 0) return;
+  total_ = total;
+  fixed_ = total > 0;
 }
 
 }  // namespace fieldmark::nerf

@@ -67,11 +67,53 @@ TEST_CASE("schedule: a timed run ends within 5% of its time, also where the pace
   }
 }
 
+TEST_CASE("schedule: a timed run is planned anew where the pace changes after its total was fixed") {
+  // An mlp field's total is fixed after a tenth of the time.
+  for (const double cooldown : {0.3, 0.9})
+    for (const double slower : {0.25, 0.5, 1.0, 2.0, 5.0})
+      for (const double when : {0.2, 0.8}) {
+        CAPTURE(cooldown, slower, when);
+        const ScheduleOptions options{.seconds = 1800, .cooldown = cooldown};
+        Schedule schedule(options);
+        double now = 0;
+        Index n = 0;
+        for (; !schedule.done(n); ++n) {
+          schedule.observe(n, now);
+          now += 0.5 * (now > when * options.seconds ? slower : 1);
+        }
+        CHECK(now < 1.03 * options.seconds);
+        CHECK(now > 0.89 * options.seconds);
+        CHECK(n == schedule.total());
+        // The step size ends where that of a run by steps does.
+        ScheduleOptions fixed = options;
+        fixed.steps = n;
+        CHECK(schedule.lr(n - 1) == Schedule(fixed).lr(n - 1));
+        if (slower == 1) CHECK_FALSE(schedule.replanned());
+        if (cooldown == 0.9 && slower != 1) CHECK(schedule.replanned());
+      }
+}
+
+TEST_CASE("schedule: a timed run of few slow steps ends at its time, at the latest after the step begun") {
+  for (const double pace : {0.7, 3.0, 25.0}) {
+    double end = 0;
+    const auto [lr, total] = timed_run({.seconds = 60}, [&](Index) { return end += pace, pace; });
+    CAPTURE(pace, total, end);
+    CHECK(end < 60 * 1.02 + pace);
+    CHECK(end > 60 * 0.9 - pace);
+  }
+}
+
 TEST_CASE("schedule: a resumed timed run keeps its total") {
   Schedule s({.seconds = 60});
   s.resume(500);
-  s.observe(480, 1000);
+  for (const auto& [n, now] : {std::pair<Index, double>{480, 1000}, {481, 1001}, {482, 1100}})
+    s.observe(n, now);
   CHECK(s.total() == 500);
+  CHECK_FALSE(s.replanned());
+  s = Schedule({.seconds = 60});
+  s.resume(0);
+  for (Index n = 480; n < 483; ++n) s.observe(n, 59.0 + static_cast<double>(n - 480));
+  CHECK(s.total() == 483);  // not fixed before, and its time is over
   Schedule fixed({.steps = 300});
   fixed.resume(500);
   CHECK(fixed.total() == 300);

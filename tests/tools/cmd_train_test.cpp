@@ -27,6 +27,7 @@ TEST_CASE("train writes a field, its figures, and the same bytes for one and two
        {"test_psnr", "train_seconds", "steps", "samples_per_second", "parameters", "file_bytes"})
     CHECK(json.at(key).is_number());
   CHECK(json["steps"] == 6);
+  CHECK(json["replanned"] == false);
   CHECK(json["file_bytes"] == std::filesystem::file_size(folder / "a.fm"));
   CHECK(!std::filesystem::exists(folder / "a.fm.checkpoint"));
   REQUIRE(train("b.fm", "2").code == cli::kOk);

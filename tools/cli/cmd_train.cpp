@@ -187,8 +187,9 @@ int run(const Options& options, Context& context) {
   const Json psnr = test_psnr(options, field, context);
   const auto bytes = std::filesystem::file_size(options.out);
   char line[200];
-  std::snprintf(line, sizeof line, "%lld steps in %.1f s, %.2f MB", static_cast<long long>(trainer.steps()),
-                seconds, static_cast<double>(bytes) / 1e6);
+  std::snprintf(line, sizeof line, "%lld steps%s in %.1f s, %.2f MB", static_cast<long long>(trainer.steps()),
+                trainer.replanned() ? " (planned anew on the way)" : "", seconds,
+                static_cast<double>(bytes) / 1e6);
   context.text() << options.out << ": " << line;
   if (!psnr.is_null()) {
     std::snprintf(line, sizeof line, ", %.2f dB on the test views", psnr.get<double>());
@@ -198,6 +199,7 @@ int run(const Options& options, Context& context) {
   Json result{{"test_psnr", psnr},
               {"train_seconds", seconds},
               {"steps", trainer.steps()},
+              {"replanned", trainer.replanned()},
               {"samples_per_second", (trainer.samples() - samples_before) / (seconds - begun)},
               {"parameters", field.params.parameters()},
               {"file_bytes", bytes}};

@@ -73,6 +73,9 @@ class Trainer {
   Index steps() const { return steps_; }
   /// Steps that the run will have in all; 0 until a timed run knows.
   Index planned() const { return schedule_.total(); }
+  /// Whether a timed run's plan was changed since it began or was restored, see Schedule: given as steps, its
+  /// number of steps gives other bytes.
+  bool replanned() const { return schedule_.replanned(); }
   /// Mean loss of the last steps over whole photographs, as the PSNR of the same mean square; of the rays
   /// chosen, which hard_pixels makes harder than the rest.
   double train_psnr() const;
