@@ -20,7 +20,7 @@ namespace {
 constexpr int kShards = 32;             // the last one to finish keeps a thread waiting: a few chunks each
 constexpr int kMlpShards = 8;           // each has the gradients of two large networks
 constexpr Index kRays = 64;             // of a chunk
-constexpr Index kOccupancyPeriod = 16;  // steps; 32 and 48 in steps of 8192 samples cost 0.2 and 0.5 dB
+constexpr Index kOccupancyPeriod = 16;  // steps
 constexpr Index kFirstRays = 512;       // of a step, until the samples of a ray are known; never fewer
 constexpr Index kMostRays = 1 << 16;
 
@@ -180,9 +180,9 @@ double Trainer::wanted_samples() const {
   return std::min(most, static_cast<double>(options_.first_samples) * grown);
 }
 
-// A hashed level's step reads all its gradients and meets lines all over four arrays: 4 ms of the 14 ms that
-// a step of 8192 samples took. They wait for samples_per_step samples, each level in another step; the run's
-// last step leaves none behind.
+// A hashed level's step reads all its gradients and meets lines all over four arrays, which takes as long for
+// few samples as for many. They wait for samples_per_step samples, each level in another step; the run's last
+// step leaves none behind.
 bool Trainer::level_steps(int level) const {
   const auto period =
       std::max<Index>(1, std::lround(static_cast<double>(options_.samples_per_step) / wanted_samples()));

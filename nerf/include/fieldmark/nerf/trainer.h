@@ -12,8 +12,8 @@ struct TrainOptions {
   ScheduleOptions schedule{};      ///< length of the run and step sizes
   Index samples_per_step = 24576;  ///< rays a step are chosen to have about this many samples (of both
                                    ///< networks of an mlp field), >= 1024
-  /// Of a hash field's first steps, >= 1024 (never more than samples_per_step): at equal samples four small
-  /// steps teach more than a large one (lego, 12 M samples: 28.4 dB with 8192 a step, 27.2 with 24576).
+  /// Of a hash field's first steps, >= 1024 (never more than samples_per_step): early on, four small steps
+  /// teach more than a large one (docs/results/training.md has 24576 from the first step on beside it).
   /// Hashed levels still take a step only once in samples_per_step samples, by turns, since theirs costs as
   /// much for few samples as for many.
   Index first_samples = 6144;
@@ -41,9 +41,8 @@ struct TrainOptions {
 };
 
 /// What suits a kind of field. mlp: Adam with 5e-4, falling exponentially over the last nine tenths of the
-/// run to a tenth, see ScheduleOptions; 64 rays a step at the default 96 samples each. After 2.0 million
-/// samples of lego at 100 x 100 pixels, five val views: 64 rays a step 18.7 dB, 128 rays 18.3 dB; with 1e-3
-/// 19.1 and 18.6 dB, and 18.1 dB with 256 rays. 2e-3 does not leave the empty picture at 128.
+/// run to a tenth, see ScheduleOptions; 64 rays a step at the default 96 samples each, since many small steps
+/// teach it more than a few large ones. A much larger step size may never leave the empty picture.
 TrainOptions train_options(FieldKind kind);
 
 /// Trains a radiance field on photographs (Mildenhall et al. 2020, sec. 5; Mueller et al. 2022): random rays
