@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "photometric_residual.h"
+
 namespace fieldmark::nerf {
 
 template <class T>
@@ -26,7 +28,7 @@ Var<T> photometric_loss(Var<T> rays, std::span<const T> photograph, std::span<co
   for (Index r = 0; r < n; ++r) {
     const T *c = rays.value() + 4 * r, *p = photograph.data() + 4 * r, *b = background.data() + 3 * r;
     for (Index k = 0; k < 3; ++k) {
-      const T e = c[k] - p[3] * p[k] + (p[3] - c[3]) * b[k];
+      const T e = photometric_residual(c, p, b, k);
       error[3 * r + k] = e;
       const T a = std::abs(e);
       sum += static_cast<double>(a <= limit ? e * e / 2 : limit * (a - limit / 2));

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "photometric_residual.h"
 #include "trainer_shard.h"
 
 // Which pixels of which photographs a step's rays go through.
@@ -49,8 +50,8 @@ void Trainer::note_errors(Var<float> rays, Shard& c) const {
   for (Index r = 0; r < static_cast<Index>(c.places.size()); ++r) {
     const float *y = rays.value() + 4 * r, *p = &c.photograph[at(4 * r)], *b = &c.background[at(3 * r)];
     float sum = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const float e = y[k] - p[3] * p[k] + (p[3] - y[3]) * b[k];
+    for (Index k = 0; k < 3; ++k) {
+      const float e = photometric_residual(y, p, b, k);
       sum += e * e;
     }
     c.errors.emplace_back(tile_of(c.places[at(r)]), sum / 3);
