@@ -1,8 +1,8 @@
 #include <fieldmark/baselines/hiding_trainer.h>
 #include <fieldmark/baselines/picture_noise.h>
+#include <fieldmark/engine/checkpoint.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/loss.h>
-#include <fieldmark/engine/safetensors.h>
 
 #include <algorithm>
 #include <string>
@@ -139,9 +139,7 @@ std::string HidingTrainer::fingerprint() const {
 }
 
 void HidingTrainer::save(const std::filesystem::path& path) const {
-  SafetensorsFile file;
-  file.metadata["fieldmark"] = R"({"format":1,"kind":"checkpoint"})";
-  file.metadata["of"] = fingerprint();
+  SafetensorsFile file = new_checkpoint(fingerprint());
   const Index n = marker_.params.size(), c = critic_params_.size();
   const ParamStore<float>& net = marker_.params;
   file.add("values", {n}, net.values());
@@ -158,24 +156,13 @@ void HidingTrainer::save(const std::filesystem::path& path) const {
 }
 
 void HidingTrainer::restore(const std::filesystem::path& path) {
-  const SafetensorsFile file = SafetensorsFile::read(path);
-  const auto of = file.metadata.find("of");
-  if (of == file.metadata.end() || of->second != fingerprint())
-    throw IoError(path.string() + ": expected a checkpoint of this run (" + fingerprint() + "), found " +
-                  (of == file.metadata.end() ? std::string("another kind of file") : of->second));
-  const auto copy = [&](const char* name, std::span<float> to) {
-    const Tensor<float> t = file.f32(name);
-    if (t.data.size() != to.size())
-      throw IoError(path.string() + ": tensor '" + name + "': expected " + std::to_string(to.size()) +
-                    " numbers, found " + std::to_string(t.data.size()));
-    std::copy(t.data.begin(), t.data.end(), to.begin());
-  };
-  copy("values", marker_.params.values());
-  copy("mean", adam_.mean());
-  copy("mean_square", adam_.mean_square());
-  copy("critic/values", critic_params_.values());
-  copy("critic/mean", critic_adam_.mean());
-  copy("critic/mean_square", critic_adam_.mean_square());
+  const SafetensorsFile file = read_checkpoint(path, fingerprint());
+  restore_numbers(file, "values", marker_.params.values());
+  restore_numbers(file, "mean", adam_.mean());
+  restore_numbers(file, "mean_square", adam_.mean_square());
+  restore_numbers(file, "critic/values", critic_params_.values());
+  restore_numbers(file, "critic/mean", critic_adam_.mean());
+  restore_numbers(file, "critic/mean_square", critic_adam_.mean_square());
   const auto counts = file.i64("counts");
   const auto figures = file.f64("figures").data;
   if (counts.size() != 3 || figures.size() != 2)

@@ -1,3 +1,4 @@
+#include <fieldmark/engine/checkpoint.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/nerf/composite.h>
@@ -302,9 +303,7 @@ std::string Trainer::fingerprint() const {
 }
 
 void Trainer::save(const std::filesystem::path& path) const {
-  SafetensorsFile file;
-  file.metadata["fieldmark"] = R"({"format":1,"kind":"checkpoint"})";
-  file.metadata["of"] = fingerprint();
+  SafetensorsFile file = new_checkpoint(fingerprint());
   const Index n = field_.params.size();
   file.add("values", {n}, field_.params.values());
   file.add("mean", {n}, adam_.mean());
@@ -321,23 +320,12 @@ void Trainer::save(const std::filesystem::path& path) const {
 }
 
 void Trainer::restore(const std::filesystem::path& path) {
-  const SafetensorsFile file = SafetensorsFile::read(path);
-  const auto of = file.metadata.find("of");
-  if (of == file.metadata.end() || of->second != fingerprint())
-    throw IoError(path.string() + ": expected a checkpoint of this run (" + fingerprint() + "), found " +
-                  (of == file.metadata.end() ? std::string("another kind of file") : of->second));
-  const auto copy = [&](const char* name, std::span<float> to) {
-    const Tensor<float> t = file.f32(name);
-    if (t.data.size() != to.size())
-      throw IoError(path.string() + ": tensor '" + name + "': expected " + std::to_string(to.size()) +
-                    " numbers, found " + std::to_string(t.data.size()));
-    std::copy(t.data.begin(), t.data.end(), to.begin());
-  };
-  copy("values", field_.params.values());
-  copy("mean", adam_.mean());
-  copy("mean_square", adam_.mean_square());
-  if (!field_.coarse) copy("gradients", field_.params.grads());
-  if (!tile_errors_.empty()) copy("tile_errors", tile_errors_);
+  const SafetensorsFile file = read_checkpoint(path, fingerprint());
+  restore_numbers(file, "values", field_.params.values());
+  restore_numbers(file, "mean", adam_.mean());
+  restore_numbers(file, "mean_square", adam_.mean_square());
+  if (!field_.coarse) restore_numbers(file, "gradients", field_.params.grads());
+  if (!tile_errors_.empty()) restore_numbers(file, "tile_errors", tile_errors_);
   field_.grid.restore(file.f32("densities").data, file.u8("bits"));
   const auto counts = file.i64("counts");
   const auto sums = file.f64("sums").data;

@@ -3,6 +3,7 @@
 #include <fieldmark/distort/noise.h>
 #include <fieldmark/distort/quantize8.h>
 #include <fieldmark/distort/similarity.h>
+#include <fieldmark/engine/checkpoint.h>
 #include <fieldmark/engine/metrics.h>
 
 #include <algorithm>
@@ -215,9 +216,7 @@ std::string Embedder::fingerprint() const {
 }
 
 void Embedder::save(const std::filesystem::path& path) const {
-  SafetensorsFile file;
-  file.metadata["fieldmark"] = R"({"format":1,"kind":"checkpoint"})";
-  file.metadata["of"] = fingerprint();
+  SafetensorsFile file = new_checkpoint(fingerprint());
   const Index n = owner_.params.size();
   file.add("values", {n}, owner_.params.values());
   file.add("mean", {n}, adam_.mean());
@@ -232,23 +231,12 @@ void Embedder::save(const std::filesystem::path& path) const {
 }
 
 void Embedder::restore(const std::filesystem::path& path) {
-  const SafetensorsFile file = SafetensorsFile::read(path);
-  const auto of = file.metadata.find("of");
-  if (of == file.metadata.end() || of->second != fingerprint())
-    throw IoError(path.string() + ": expected a checkpoint of this run (" + fingerprint() + "), found " +
-                  (of == file.metadata.end() ? std::string("another kind of file") : of->second));
+  const SafetensorsFile file = read_checkpoint(path, fingerprint());
   if (file.u8("key") != std::vector<std::uint8_t>(owner_.key.bytes.begin(), owner_.key.bytes.end()))
     throw IoError(path.string() + ": expected a checkpoint under this key, found one under another");
-  const auto copy = [&](const char* name, std::span<float> to) {
-    const Tensor<float> t = file.f32(name);
-    if (t.data.size() != to.size())
-      throw IoError(path.string() + ": tensor '" + name + "': expected " + std::to_string(to.size()) +
-                    " numbers, found " + std::to_string(t.data.size()));
-    std::copy(t.data.begin(), t.data.end(), to.begin());
-  };
-  copy("values", owner_.params.values());
-  copy("mean", adam_.mean());
-  copy("mean_square", adam_.mean_square());
+  restore_numbers(file, "values", owner_.params.values());
+  restore_numbers(file, "mean", adam_.mean());
+  restore_numbers(file, "mean_square", adam_.mean_square());
   const auto counts = file.i64("counts");
   const auto figures = file.f64("figures").data;
   if (counts.size() != 2 || figures.size() != 4)
