@@ -1,0 +1,51 @@
+#pragma once
+#include <fieldmark/engine/gradcheck_cases.h>
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "support/catch.h"
+
+/// Every case of a module passes, under a name of its own, with a relative error of at most `worst`.
+inline void expect_cases_pass(const std::vector<fieldmark::GradcheckCase>& cases,
+                              double worst = std::numeric_limits<double>::infinity()) {
+  std::set<std::string> names;
+  for (const auto& c : cases) {
+    const fieldmark::GradcheckReport r = c.run();
+    INFO(c.name << ": worst relative error " << r.worst << "\n" << r.table);
+    CHECK(r.ok);
+    CHECK(r.worst <= worst);
+    CHECK(r.entries > 0);
+    CHECK(names.insert(c.name).second);
+  }
+}
+
+/// Every header below a folder of the sources that says what it is differentiable in has a case whose name
+/// begins with the header's word. @return how many say so
+inline int expect_case_of_each_header(const std::vector<fieldmark::GradcheckCase>& cases,
+                                      const std::string& folder) {
+  int found = 0;
+  for (const auto& file :
+       std::filesystem::recursive_directory_iterator(FIELDMARK_SOURCE_DIR + std::string("/") + folder)) {
+    if (file.path().extension() != ".h") continue;
+    std::ostringstream text;
+    text << std::ifstream(file.path()).rdbuf();
+    if (text.str().find("Differentiable in:") == std::string::npos) continue;
+    ++found;
+    const std::string stem = file.path().stem().string();
+    INFO("no gradcheck case begins with the word " << stem << " (" << file.path().string() << ")");
+    CHECK(std::any_of(cases.begin(), cases.end(), [&](const auto& c) {
+      if (!c.name.starts_with(stem)) return false;
+      const char next = c.name.c_str()[stem.size()];
+      return next != '_' && std::isalnum(static_cast<unsigned char>(next)) == 0;
+    }));
+  }
+  return found;
+}
