@@ -26,6 +26,11 @@ Tensor<float> straight(const Rendering& r, float background, bool opaque) {
 Dataset rendered_dataset(const RadianceField& field, std::span<const Camera> cameras,
                          const std::function<bool(Index done, Index total)>& progress) {
   if (cameras.empty()) throw ValueError("[rendered_dataset] cameras must be at least one, got 0");
+  for (const Camera& c : cameras)
+    if (c.width != cameras[0].width || c.height != cameras[0].height)
+      throw ValueError("[rendered_dataset] cameras must be of one size, " + std::to_string(cameras[0].width) +
+                       " x " + std::to_string(cameras[0].height) + ", got " + std::to_string(c.width) +
+                       " x " + std::to_string(c.height));
   const bool cube = field.space.kind == SpaceKind::cube;
   Dataset data{.name = "renders",
                .split = "train",

@@ -46,6 +46,8 @@ TEST_CASE("rendered_dataset: other spaces have opaque pictures, and errors, prog
   CHECK(rendered_dataset(field, cameras).views[1].rgba.data == one.views[1].rgba.data);
   set_threads(before);
   CHECK_THROWS_WITH(rendered_dataset(field, {}), "[rendered_dataset] cameras must be at least one, got 0");
+  CHECK_THROWS_WITH(rendered_dataset(field, std::vector<Camera>{cameras[0], cameras[1].scaled(20)}),
+                    "[rendered_dataset] cameras must be of one size, 24 x 18, got 20 x 15");
   Index done = 0;
   CHECK_THROWS_WITH(rendered_dataset(field, cameras,
                                      [&](Index d, Index total) {

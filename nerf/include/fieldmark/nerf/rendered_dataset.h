@@ -14,7 +14,7 @@ namespace fieldmark::nerf {
 /// @param cameras   at least one, all of one size
 /// @param progress  called after each view; returns false to stop, which throws Error
 /// @return split "train"; layout blender for a cube, else transforms   @throws ValueError if there are no
-/// cameras
+/// cameras, or of several sizes
 Dataset rendered_dataset(const RadianceField& field, std::span<const Camera> cameras,
                          const std::function<bool(Index done, Index total)>& progress = {});
 
