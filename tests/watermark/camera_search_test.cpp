@@ -68,6 +68,27 @@ TEST_CASE("camera_search: the whole object in a picture leads to the camera, tur
   CHECK(close >= 3);  // 60 renders are some 15 degrees apart
 }
 
+TEST_CASE("camera_search: two fifths of a picture lead to the camera") {
+  const Owner owner = tiny_owner();
+  const CameraSearch search(owner, kOptions);
+  nerf::Renderer renderer(owner.field);
+  Index close = 0;
+  for (const std::uint64_t seed : {11u, 12u, 13u, 14u}) {
+    nerf::Camera camera = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, 1, 96, seed).front();
+    camera.cx -= 20;  // 60 x 64 pixels of 96 x 96
+    camera.cy -= 16;
+    camera.width = 60;
+    camera.height = 64;
+    const auto found = search.find_part(renderer.render(camera).rgb, 6);
+    REQUIRE(found.size() == 6);
+    CHECK(found.front().width == 60);
+    CHECK(found.front().height == 64);
+    close += std::any_of(found.begin(), found.end(),
+                         [&](const nerf::Camera& c) { return cameras_apart(camera, c) < 8; });
+  }
+  CHECK(close >= 3);
+}
+
 TEST_CASE("camera_search: nothing recognised, nothing found") {
   const Owner owner = tiny_owner();
   const CameraSearch search(owner, {.views = 5, .size = 32});
@@ -99,4 +120,6 @@ TEST_CASE("camera_search: errors name what is wrong") {
   CHECK_THROWS_WITH(CameraSearch(owner, {.views = 0}),
                     "[camera_search] views and size must be at least 1 and 16, got 0 and 40");
   CHECK_THROWS_AS(CameraSearch(owner, {.size = 15}), ValueError);
+  CHECK_THROWS_AS(CameraSearch(owner, {.views = 1, .size = 16}).find_part(Tensor<float>({8, 8}), 1),
+                  ShapeError);
 }

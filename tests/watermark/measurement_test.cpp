@@ -121,7 +121,7 @@ TEST_CASE("measurement: messages may be chosen, and each reading is handed out")
   const auto of_view = [&](Index view) { return view % 2 ? odd : even; };
   std::vector<std::string> calls;
   double right = 0;
-  const MeasureOptions options{
+  MeasureOptions options{
       .cameras = cameras(2),
       .under = {"noise_0", "blur_1"},
       .messages = of_view,
@@ -133,6 +133,12 @@ TEST_CASE("measurement: messages may be chosen, and each reading is handed out")
   const double blind = measure(owner, nullptr, nullptr, options).accuracy.blind;
   CHECK(blind == Approx(right));
   CHECK(calls == std::vector<std::string>{"0", "0noise_0", "0blur_1", "1", "1noise_0", "1blur_1"});
+  // Where geometry is read too, it is the reading that was chosen.
+  options.geometry_views = 2;
+  options.under.clear();
+  right = 0;
+  const double chosen = measure(owner, nullptr, nullptr, options).accuracy.chosen;
+  CHECK(chosen == Approx(right));
 }
 
 TEST_CASE("measurement: errors name what is missing") {

@@ -8,8 +8,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <numbers>
+
+#include "camera_proposal.h"
 
 namespace fieldmark::watermark {
 namespace {
@@ -21,7 +22,6 @@ constexpr double kTolerance = 0.05;  // of the window's side: about a cell
 constexpr int kFitSteps = 12;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-using Complex = std::complex<double>;
 
 constexpr Index kSmall = 24;    // pixels of a window's side
 constexpr Index kReduced = 96;  // longer side of the picture that is turned
@@ -30,11 +30,7 @@ constexpr int kTurns = 24;      // of 15 degrees
 // A window's content as a vector of length 1, without its mean.
 std::vector<float> small_window(const Tensor<float>& picture, const Window& window, float background) {
   std::vector<float> v = cut_window(picture, window, kSmall, background).data;
-  double mean = 0, square = 0;
-  for (const float x : v) mean += static_cast<double>(x) / static_cast<double>(v.size());
-  for (const float x : v) square += std::pow(static_cast<double>(x) - mean, 2);
-  const double scale = square > 0 ? 1 / std::sqrt(square) : 0;
-  for (float& x : v) x = static_cast<float>((static_cast<double>(x) - mean) * scale);
+  make_unit(v);
   return v;
 }
 
@@ -49,19 +45,6 @@ Tensor<float> turned(const Tensor<float>& picture, double angle, float backgroun
 Complex middle(const Window& w) { return {w.x + w.side / 2, w.y + w.side / 2}; }
 
 }  // namespace
-
-struct CameraSearch::Match {
-  std::int32_t cell;
-  Complex place;  // pixels of the picture
-  double share;
-};
-
-// A small view's pixel u goes to a u + b in the picture.
-struct CameraSearch::Proposal {
-  std::size_t view = 0;
-  Complex a{1, 0}, b{};
-  double score = -1;
-};
 
 CameraSearch::CameraSearch(const Owner& owner, const CameraSearchOptions& options)
     : owner_(owner), options_(options) {
@@ -104,6 +87,7 @@ CameraSearch::CameraSearch(const Owner& owner, const CameraSearchOptions& option
     const float background = nerf::background_value(owner.field.background);
     view.window = object_window(v.base, background);
     view.small = small_window(v.base, view.window, background);
+    view.area = SummedArea(v.base);
     views_.push_back(std::move(view));
   }
 }
@@ -283,12 +267,17 @@ std::vector<nerf::Camera> CameraSearch::find(const Tensor<float>& picture, Index
       best[v] = {v, a / zoom, b / zoom, score};
     }
   }
-  std::stable_sort(best.begin(), best.end(),
+  return best_cameras(best, h, w, count);
+}
+
+std::vector<nerf::Camera> CameraSearch::best_cameras(std::vector<Proposal>& proposals, Index height,
+                                                     Index width, Index count) const {
+  std::stable_sort(proposals.begin(), proposals.end(),
                    [](const Proposal& p, const Proposal& q) { return p.score > q.score; });
   std::vector<nerf::Camera> cameras;
-  for (const Proposal& p : best) {
+  for (const Proposal& p : proposals) {
     if (static_cast<Index>(cameras.size()) == count || !(p.score > 0)) break;
-    cameras.push_back(proposed(p, h, w));
+    cameras.push_back(proposed(p, height, width));
   }
   return cameras;
 }

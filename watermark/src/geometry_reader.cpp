@@ -13,7 +13,7 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr Index kByPlaces = 3, kByPicture = 3;  // cameras that are tried
+constexpr Index kByPlaces = 3, kByPicture = 3, kByPart = 6;  // cameras that are tried
 constexpr AlignmentStage kCoarse[] = {{.size = 48, .blur = 1.5, .steps = 6}};
 constexpr AlignmentStage kFine[] = {{.size = 96, .blur = 1.2, .steps = 10},
                                     {.size = 200, .blur = 1.2, .steps = 6}};
@@ -185,13 +185,17 @@ PictureReading GeometryReader::read(const Tensor<float>& picture) {
   std::vector<nerf::Camera> starts = search_.find(places, h, w, kByPlaces);
   const std::vector<nerf::Camera> others = search_.find(whole, kByPicture);
   starts.insert(starts.end(), others.begin(), others.end());
-  for (const nerf::Camera& start : starts) {
-    const Alignment a = aligner_.align(whole, start, kCoarse);
-    if (a.agreement > g.agreement) {
-      g.agreement = a.agreement;
-      g.camera = a.camera;
+  const auto try_all = [&](const std::vector<nerf::Camera>& cameras) {
+    for (const nerf::Camera& start : cameras) {
+      const Alignment a = aligner_.align(whole, start, kCoarse);
+      if (a.agreement > g.agreement) {
+        g.agreement = a.agreement;
+        g.camera = a.camera;
+      }
     }
-  }
+  };
+  try_all(starts);
+  if (g.agreement < kLeastAgreement) try_all(search_.find_part(whole, kByPart));
   if (g.agreement < 0) return reading;
   const Alignment a = aligner_.align(whole, g.camera, kFine);
   g.camera = a.camera;

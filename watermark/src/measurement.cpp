@@ -40,7 +40,7 @@ class Readers {
     if (by_geometry && owner.reader) geometry_.emplace(owner);
   }
   bool by_geometry() const { return geometry_.has_value(); }
-  // Only geometry's numbers may be NaN. Calls tell() with the blind evidence.
+  // Only geometry's numbers may be NaN. Calls tell() with the chosen reading's evidence.
   template <class F>
   ReadingAccuracy read(const Tensor<float>& picture, const Message& sent, bool with_geometry, F tell) {
     ReadingAccuracy accuracy;
@@ -53,7 +53,7 @@ class Readers {
     const auto begin = std::chrono::steady_clock::now();
     const PictureReading reading = geometry_->read(picture);
     seconds_.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
-    tell(reading.blind);
+    tell(reading.evidence());
     accuracy.blind = share(reading.blind, sent);
     accuracy.geometry = share(reading.geometry.evidence, sent);
     accuracy.chosen = share(reading.evidence(), sent);

@@ -1,5 +1,6 @@
 #pragma once
 #include <fieldmark/watermark/picture_reader.h>
+#include <fieldmark/watermark/summed_area.h>
 #include <fieldmark/watermark/view_cache.h>
 
 namespace fieldmark::watermark {
@@ -11,8 +12,8 @@ struct CameraSearchOptions {
   std::uint64_t seed = 0;  ///< of the cameras and of the draws
 };
 
-/// Finds roughly from where a picture shows an owner's field, in two ways, by small renders of the field made
-/// once. Neither key nor message is looked at.
+/// Finds roughly from where a picture shows an owner's field, in three ways, by small renders of the field
+/// made once. Neither key nor message is looked at.
 ///   - By the places that the extractor recognised. For each render, pairs of places propose how it would
 ///   have
 ///     to be turned, scaled and moved (Fischler and Bolles 1981), and the proposal that most places agree
@@ -20,6 +21,9 @@ struct CameraSearchOptions {
 ///   - By the picture itself: its object's window (see object_window.h), turned in steps of 15 degrees and
 ///     brought to 24 pixels, is correlated with those of the renders. It needs no extractor, but the whole
 ///     object in the picture or a field that fills it.
+///   - By the picture as a part of a render, where it was cut: it is correlated, upright, with windows of
+///   several
+///     sizes all over the renders.
 class CameraSearch {
  public:
   /// @param owner  of preset fast; must outlive this   @throws ValueError if it is of another preset, or an
@@ -31,6 +35,9 @@ class CameraSearch {
   /// The likeliest cameras by the picture, best first, at most `count`, each from another render.
   /// @param picture  [H, W, 3]
   std::vector<nerf::Camera> find(const Tensor<float>& picture, Index count) const;
+  /// The likeliest cameras of a picture that was cut to a part, best first, at most `count`, each from
+  /// another render.   @param picture  [H, W, 3]
+  std::vector<nerf::Camera> find_part(const Tensor<float>& picture, Index count) const;
 
  private:
   struct SeenCell {
@@ -43,12 +50,16 @@ class CameraSearch {
     std::vector<SeenCell> seen;
     Window window;             // of the object in the small render
     std::vector<float> small;  // its content, see small_window()
+    SummedArea area;           // of the whole small render
   };
   struct Match;
   struct Proposal;
   Proposal propose(const SmallView& view, std::size_t number, const std::vector<Match>& matches,
                    double tolerance) const;
+  Proposal best_part(std::size_t number, std::span<const float> picture, double height_to_width) const;
   nerf::Camera proposed(const Proposal& proposal, Index height, Index width) const;
+  std::vector<nerf::Camera> best_cameras(std::vector<Proposal>& proposals, Index height, Index width,
+                                         Index count) const;
   nerf::Camera fitted(const Proposal& proposal, const std::vector<Match>& matches, double tolerance,
                       Index height, Index width) const;
 

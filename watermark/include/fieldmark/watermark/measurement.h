@@ -27,7 +27,8 @@ struct MeasureOptions {
   Index geometry_views = 0;  ///< of the first so many views geometry is read too; 0 for preset paper
   std::uint64_t seed = 0;    ///< of messages and distortions
   std::function<Message(Index view)> messages = {};  ///< in place of random messages, where none is baked
-  /// Called with the blind evidence of each picture that was read; `under` is empty for the view as it is.
+  /// Called with the evidence of each picture that was read, of the reading that was chosen (blind where only
+  /// that was tried); `under` is empty for the view as it is.
   std::function<void(Index view, const std::string& under, const std::vector<double>& evidence,
                      const Message& sent)>
       on_reading = {};
