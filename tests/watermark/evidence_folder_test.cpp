@@ -116,4 +116,7 @@ TEST_CASE("evidence_folder: only nothing and earlier evidence are replaced") {
                     Contains("expected an empty folder or one with earlier evidence only, found letter.txt"));
   CHECK_THROWS_WITH(prepare_evidence_folder(folder / "new/inside/letter.txt"), Contains("found a file"));
   CHECK(read_text(folder / "new/inside/letter.txt") == "mine");
+  const fs::path too_long = folder / std::string(300, 'n');  // the system refuses to look for it
+  CHECK_THROWS_AS(prepare_evidence_folder(too_long), IoError);
+  CHECK_THROWS_AS(check_evidence_folder(too_long, {}, {}), IoError);
 }

@@ -67,14 +67,16 @@ void check_pictures(std::span<const fs::path> pictures, EvidenceCheck& check) {
 
 void prepare_evidence_folder(const fs::path& folder) {
   std::error_code error;
-  if (fs::exists(folder) && !fs::is_directory(folder))
+  if (fs::exists(folder, error) && !fs::is_directory(folder, error))
     throw IoError(folder.string() + ": expected a folder for the evidence, found a file");
   fs::create_directories(folder, error);
   if (error) throw IoError(folder.string() + ": cannot be made: " + error.message());
-  for (const auto& entry : fs::directory_iterator(folder)) {
+  const fs::directory_iterator entries(folder, error);
+  if (error) throw IoError(folder.string() + ": cannot be read: " + error.message());
+  for (const auto& entry : entries) {
     const std::string name = entry.path().filename().string();
     if (std::find(kEvidenceFiles.begin(), kEvidenceFiles.end(), name) != kEvidenceFiles.end() &&
-        entry.is_regular_file())
+        entry.is_regular_file(error))
       continue;
     throw IoError(folder.string() + ": expected an empty folder or one with earlier evidence only, found " +
                   name);
@@ -99,7 +101,8 @@ void write_evidence_folder(const fs::path& folder, const EvidenceRecord& record,
 
 EvidenceCheck check_evidence_folder(const fs::path& folder, std::span<const fs::path> pictures,
                                     const std::optional<PublicKey>& signer) {
-  if (!fs::is_directory(folder)) throw IoError(folder.string() + ": expected a folder with evidence");
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) throw IoError(folder.string() + ": expected a folder with evidence");
   EvidenceCheck check;
   const auto evidence = file_text(folder, kEvidence, check);
   if (!evidence) return check;
