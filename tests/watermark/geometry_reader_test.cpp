@@ -87,6 +87,7 @@ TEST_CASE(
   const PictureReading wrong = reader.read(other.views.front().rgba);
   CAPTURE(wrong.geometry.agreement);
   CHECK(wrong.chosen == ReadingKind::blind);
+  CHECK(wrong.geometry.agreement < 0.8);
   CHECK(wrong.evidence() == wrong.blind);
 }
 

@@ -83,7 +83,7 @@ class Stage {
     picture_ = blurred(resize_area(picture, side(picture.shape[0]), side(picture.shape[1])), options.blur);
   }
 
-  // Renders, and fits tones and spread; weights are those of the last call for the fit of tones.
+  // Renders the field from a camera; differ() adds spread and cost.
   Look look(const nerf::Camera& camera) {
     Look l;
     l.camera = camera.scaled(picture_.shape[1], picture_.shape[0]);
@@ -213,7 +213,7 @@ class Stage {
       Eigen::Map<Vector>(motion.data()) = m.cwiseMax(-0.3).cwiseMin(0.3);
       Look next = look(moved(best.camera, best.pivot, motion));
       ToneFit next_tones;
-      std::vector<double> next_r = differ(next, next_tones, best.spread);
+      differ(next, next_tones, best.spread);
       if (next.points.empty() || !(next.cost < best.cost)) {
         damping *= 10;
         ++failures;

@@ -23,7 +23,7 @@ struct JpegScore {
   Tensor<float> score;  ///< [H, W, 3] d log P(picture | render) / d render
   /// [H, W, 3] expectation of the square of score times mark, of each block spread over its pixels.
   Tensor<float> information;
-  double log_likelihood = 0;
+  double log_likelihood = 0;  ///< log P(picture | render), of blocks on the object
 };
 
 /// The locally best test of a mark under quantisation. With b the coefficients of the render, q the steps and
