@@ -50,6 +50,7 @@ void check_row(const AttackRow& row, const Owner& owner, const std::vector<Tenso
     p.push_back(keyed_p_value(keyed_statistic(sum, owner.code(), kMessage)));
   }
   CHECK(row.accuracy.blind == Approx(accuracy / static_cast<double>(pictures.size())));
+  CHECK((std::isnan(row.accuracy.geometry) && row.chosen() == row.accuracy.blind));
   std::sort(p.begin(), p.end());
   REQUIRE(p.size() == 3);
   CHECK(row.p_value == Approx(p[1]));
@@ -143,6 +144,36 @@ TEST_CASE("attack_meter: damage is of the object's pixels that still show, where
   CHECK_THROWS_WITH(attack_damage(before, Tensor<float>({4, 5}), after, {}),
                     "[attack_damage] opacity must have a number for each pixel of before, [4, 6, 3], got "
                     "shape [4, 5]");
+}
+
+TEST_CASE("attack_meter: of the first views geometry is read too, as the tool would choose") {
+  const Owner owner = small_owner();
+  auto o = options(2, owner);
+  CHECK(AttackMeter(owner, owner.field, kMessage, o).geometry_views() == 0);
+  o.geometry_views = 1;
+  const AttackMeter meter(owner, owner.field, kMessage, o);
+  CHECK(meter.geometry_views() == 1);
+  GeometryReader reader(owner);
+  const auto share = [&](const std::vector<double>& evidence) {
+    return evidence.empty() ? 0.5 : match_bits(read_bits(evidence, owner.code(), 3), kMessage).accuracy();
+  };
+  const float white[3] = {1, 1, 1};
+  const Tensor<float> first = render(owner.field, o).rgb[0];
+  for (const char* name : {"", "rotation_20"}) {
+    CAPTURE(name);
+    const AttackRow row = *name ? meter.picture(name) : meter.none();
+    const PictureReading read = reader.read(
+        *name ? distort::apply_attack(distort::parse_attack(name), first, CounterRng(5, 42), 0, white)
+              : first);
+    CHECK(row.accuracy.geometry == share(read.geometry.evidence));
+    CHECK(row.accuracy.chosen == share(read.evidence()));
+    CHECK(row.chosen() == row.accuracy.chosen);
+  }
+  const AttackRow unreadable = meter.picture("scale_0.2");
+  CHECK((unreadable.accuracy.geometry == 0.5 && unreadable.chosen() == 0.5));
+  o.geometry_views = -1;
+  CHECK_THROWS_WITH(AttackMeter(owner, owner.field, kMessage, o),
+                    "[attack_meter] geometry_views must not be negative, got -1");
 }
 
 TEST_CASE("attack_meter: errors, progress and threads") {

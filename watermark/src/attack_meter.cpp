@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "means.h"
+#include "readers.h"
 
 namespace fieldmark::watermark {
 namespace {
@@ -69,36 +69,21 @@ AttackDamage attack_damage(const Tensor<float>& before, const Tensor<float>& opa
 // Gathers what the views of one attack say.
 class AttackMeter::Row {
  public:
-  Row(const AttackMeter& meter, std::string name) : meter_(meter), reader_(meter.owner_) {
-    row_.name = std::move(name);
-  }
+  Row(const AttackMeter& meter, std::string name) : meter_(meter) { row_.name = std::move(name); }
   void add(const Tensor<float>& picture, const AttackDamage& damage) {
-    const Index bits = meter_.owner_.options().bits;
-    const auto evidence = read(picture);
-    accuracy_.push_back(match_bits(read_bits(evidence, meter_.code_, bits), meter_.message_).accuracy());
+    const Index view = std::ssize(accuracy_.blind), all = std::ssize(meter_.views_);
+    accuracy_.add(read(picture, view < meter_.geometry_views()));
     damage_.push_back(damage.psnr);
     kept_.push_back(damage.kept);
-    sum_.resize(evidence.size());
-    for (std::size_t c = 0; c < sum_.size(); ++c) sum_[c] += evidence[c];
-    const auto views = static_cast<Index>(accuracy_.size());
-    const Index all = std::ssize(meter_.views_), group = std::min(meter_.options_.group, all);
-    if (views % group == 0) {
+    if ((view + 1) % std::min(meter_.options_.group, all) == 0) {
       p_values_.push_back(keyed_p_value(keyed_statistic(sum_, meter_.code_, meter_.message_)));
-      sum_.clear();
+      std::ranges::fill(sum_, 0.0);
     }
-    meter_.tell(accuracy_.size());
-  }
-  // What is too small to be read says nothing.
-  std::vector<double> read(const Tensor<float>& picture) const {
-    try {
-      return reader_.evidence(picture);
-    } catch (const ShapeError&) {
-      return std::vector<double>(static_cast<std::size_t>(meter_.owner_.cells.count()), 0.0);
-    }
+    meter_.tell(static_cast<std::size_t>(view + 1));
   }
   AttackRow finish() {
-    row_.accuracy = {.blind = finite_mean(accuracy_)};
-    row_.accuracy_p5 = percentile_5(accuracy_);
+    row_.accuracy = accuracy_.mean();
+    row_.accuracy_p5 = percentile_5(accuracy_.blind);
     row_.p_value = median(p_values_);
     row_.psnr_object = finite_mean(damage_);
     row_.kept = finite_mean(kept_);
@@ -106,10 +91,22 @@ class AttackMeter::Row {
   }
 
  private:
+  // What is too small to be read says nothing.
+  ReadingAccuracy read(const Tensor<float>& picture, bool with_geometry) {
+    try {
+      return meter_.readers_->read(picture, meter_.message_, with_geometry, [this](const auto& evidence) {
+        for (std::size_t c = 0; c < sum_.size(); ++c) sum_[c] += evidence[c];
+      });
+    } catch (const ShapeError&) {
+      const double none = with_geometry ? 0.5 : std::nan("");
+      return {.blind = 0.5, .geometry = none, .chosen = none};
+    }
+  }
+
   const AttackMeter& meter_;
-  PictureReader reader_;
   AttackRow row_;
-  std::vector<double> accuracy_, damage_, kept_, p_values_, sum_;
+  Accuracies accuracy_;
+  std::vector<double> damage_, kept_, p_values_, sum_ = std::vector<double>(meter_.code_.bit.size(), 0.0);
 };
 
 AttackMeter::AttackMeter(const Owner& owner, const nerf::RadianceField& marked, const Message& message,
@@ -121,12 +118,22 @@ AttackMeter::AttackMeter(const Owner& owner, const nerf::RadianceField& marked, 
   if (message.size() != owner.options().bits)
     throw ValueError("[attack_meter] message must have the owner's " + std::to_string(owner.options().bits) +
                      " bits, got " + std::to_string(message.size()));
+  if (options.geometry_views < 0)
+    throw ValueError("[attack_meter] geometry_views must not be negative, got " +
+                     std::to_string(options.geometry_views));
+  readers_ = std::make_unique<Readers>(owner, code_, options.geometry_views > 0);
   nerf::Renderer renderer(marked);
   for (const nerf::Camera& camera : options_.cameras) {
     nerf::Rendering r = renderer.render(camera);
     views_.push_back({quantize8(r.rgb), std::move(r.opacity)});
     tell(views_.size());
   }
+}
+
+AttackMeter::~AttackMeter() = default;
+
+Index AttackMeter::geometry_views() const {
+  return readers_->by_geometry() ? std::min(options_.geometry_views, std::ssize(options_.cameras)) : 0;
 }
 
 void AttackMeter::tell(std::size_t done) const {

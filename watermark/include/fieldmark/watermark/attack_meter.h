@@ -1,17 +1,22 @@
 #pragma once
 #include <fieldmark/watermark/measurement.h>
 
+#include <cmath>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
 namespace fieldmark::watermark {
 
+class Readers;
+
 /// What an AttackMeter looks at.
 struct AttackMeterOptions {
   std::vector<nerf::Camera> cameras = {};  ///< of the views
   Index group = 10;                        ///< views whose evidence makes one p-value, at least 1
-  std::uint64_t seed = 0;                  ///< of the attacks on pictures
+  Index geometry_views = 0;  ///< of the first so many views geometry is read too; none for preset paper
+  std::uint64_t seed = 0;    ///< of the attacks on pictures
   /// Called after each view of each measurement; returns false to stop, which throws Error.
   std::function<bool(Index done, Index total)> progress = {};
 };
@@ -21,8 +26,11 @@ struct AttackRow {
   std::string name;          ///< of the attack
   ReadingAccuracy accuracy;  ///< of one view, mean over views, see Measurement
   double accuracy_p5 = 0;    ///< 5th percentile over views of the blind accuracy
-  /// Keyed p-value of a group's views together, median over the groups; of all views where they are fewer.
+  /// Keyed p-value of a group's views together, read blindly, median over the groups; of all views where they
+  /// are fewer.
   double p_value = 1;
+  /// Of accuracy.chosen, or of accuracy.blind where geometry was not read.
+  double chosen() const { return std::isnan(accuracy.chosen) ? accuracy.blind : accuracy.chosen; }
   /// Damage: the attacked against the marked picture over the object, dB, mean over views where it is finite;
   /// NaN where there is none, as with a crop.
   double psnr_object = 0;
@@ -32,13 +40,17 @@ struct AttackRow {
 /// Measures one marked field under many attacks: bit accuracy, evidence and damage from the same views. The
 /// damage is the attack's own, against the marked picture before it, over pixels whose opacity there exceeds
 /// 0.5. An attack that moves pixels is undone first, as its PixelMap says, with bilinear interpolation: then
-/// only what it did to the colours counts, and what it cut off is `kept`.
+/// only what it did to the colours counts, and what it cut off is `kept`. Keeps buffers: one object per
+/// thread.
 class AttackMeter {
  public:
   /// Renders the views. @param owner, marked  must outlive it   @throws ValueError if there are no cameras,
   /// group is below 1, or the message has another length than the owner's
   AttackMeter(const Owner& owner, const nerf::RadianceField& marked, const Message& message,
               const AttackMeterOptions& options);
+  ~AttackMeter();
+  /// Views of AttackRow::accuracy.geometry and .chosen.
+  Index geometry_views() const;
   /// The marked pictures as they are.
   AttackRow none() const;
   /// The marked pictures under an attack. @throws ValueError for a name that parse_attack() does not know
@@ -60,6 +72,7 @@ class AttackMeter {
   Message message_;
   AttackMeterOptions options_;
   CellCode code_;
+  std::unique_ptr<Readers> readers_;
   std::vector<View> views_;
 };
 
