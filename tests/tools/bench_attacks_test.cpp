@@ -21,6 +21,8 @@ TEST_CASE("bench attacks has a row for each attack on pictures and files, with d
                               job.owner,
                               "--message",
                               "5",
+                              "--geometry-count",
+                              "1",
                               "--field",
                               baked,
                               "--other",
@@ -44,6 +46,7 @@ TEST_CASE("bench attacks has a row for each attack on pictures and files, with d
   REQUIRE(r.code == cli::kOk);
   const auto json = nlohmann::json::parse(r.out);
   CHECK(json["views"] == 2);
+  CHECK(json["geometry_views"] == 1);
   CHECK(json["bits"] == 4);
   CHECK(json["unattacked"]["psnr_object"].is_null());
   const auto has = [](const nlohmann::json& rows, const std::string& name) {
@@ -51,7 +54,8 @@ TEST_CASE("bench attacks has a row for each attack on pictures and files, with d
       if (row["attack"] == name) {
         for (const char* key : {"blind", "p_value", "psnr_object", "kept", "blind_p5"})
           CHECK(row.contains(key));
-        CHECK(row["geometry"].is_null());
+        for (const char* key : {"geometry", "chosen"})
+          CHECK((row[key].is_number() && row[key] >= 0 && row[key] <= 1));
         CHECK((row["blind"] >= 0 && row["blind"] <= 1 && row["p_value"] > 0 && row["p_value"] <= 1));
         return true;
       }
@@ -65,7 +69,8 @@ TEST_CASE("bench attacks has a row for each attack on pictures and files, with d
     CHECK(has(json["fields"], name));
   CHECK_THAT(read_text(folder / "attacks.md"), Contains("## pictures") && Contains("## fields"));
   for (const char* plot : {"attacks.svg", "attacks-fields.svg"})
-    CHECK_THAT(read_text(folder / plot), Contains("class=\"curve\"") && Contains("grey levels"));
+    CHECK_THAT(read_text(folder / plot),
+               Contains("class=\"curve\"") && Contains("grey levels") && Contains("as extract reads them"));
 }
 
 TEST_CASE("bench attacks: what is missing", "[bench]") {
@@ -73,6 +78,10 @@ TEST_CASE("bench attacks: what is missing", "[bench]") {
   const auto r = run_command({"bench", "attacks", "--owner", job.owner, "--field", job.field});
   CHECK(r.code == cli::kUsage);
   CHECK_THAT(r.err, Contains("--message"));
+  const auto text = run_command(
+      {"bench", "attacks", "--owner", job.owner, "--field", job.field, "--text", "hello", "--count", "1"});
+  CHECK(text.code == cli::kUsage);  // 4 bits hold no payload
+  CHECK_THAT(text.err, Contains("--text"));
   CHECK(run_command({"bench", "attacks", "--owner", job.owner, "--field", job.field, "--message", "5",
                      "--attacked", "/no/such.fm"})
             .code == cli::kFailed);

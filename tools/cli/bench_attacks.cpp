@@ -77,9 +77,7 @@ class Bench {
       : options_(options),
         context_(context),
         owner_(watermark::Owner::load(options.owner)),
-        message_(
-            read_option("--message",
-                        [&] { return watermark::message_from_hex(options.message, owner_.options().bits); })),
+        message_(message_of(options.message, owner_.options().bits)),
         marked_(nerf::RadianceField::load(options.field)),
         progress_(context.progress("attacks")),
         meter_(owner_, marked_, message_, meter_options()) {}
@@ -87,7 +85,6 @@ class Bench {
   const watermark::AttackMeter& meter() const { return meter_; }
   const nerf::RadianceField& marked() const { return marked_; }
   const watermark::Owner& owner() const { return owner_; }
-  Index views() const { return options_.count; }
 
   Curve pictures(const Names& names) {
     Curve curve{family(names.front()), {}};
@@ -95,24 +92,15 @@ class Bench {
       curve.rows.push_back(add(name, [&] { return meter_.picture(name); }));
     return curve;
   }
-  Curve fields(const Names& names, const nerf::FieldAttackInputs& inputs) {
+  // Of the marked field; or what is put onto another one, whose damage counts.
+  Curve fields(const Names& names, const nerf::FieldAttackInputs& inputs,
+               const nerf::RadianceField* onto = nullptr) {
     Curve curve{family(names.front()), {}};
     for (const std::string& name : used(names))
       curve.rows.push_back(add(name, [&] {
-        const auto attack = nerf::parse_field_attack(name);
-        return meter_.field(name,
-                            nerf::apply_field_attack(attack, marked_, CounterRng(context_.seed()), inputs));
-      }));
-    return curve;
-  }
-  // The mark's change of the numbers put onto another field: damage is that field's.
-  Curve copies(const nerf::RadianceField& onto) {
-    Curve curve{"copy", {}};
-    for (const std::string& name : used(kCopy))
-      curve.rows.push_back(add(name, [&] {
-        const auto copied = nerf::apply_field_attack(nerf::parse_field_attack(name), onto, CounterRng(0),
-                                                     {.unmarked = &owner_.field, .marked = &marked_});
-        return meter_.field(name, copied, &onto);
+        const auto attacked = nerf::apply_field_attack(nerf::parse_field_attack(name), onto ? *onto : marked_,
+                                                       CounterRng(context_.seed()), inputs);
+        return meter_.field(name, attacked, onto);
       }));
     return curve;
   }
@@ -128,6 +116,7 @@ class Bench {
   watermark::AttackMeterOptions meter_options() {
     return {.cameras = nerf::make_cameras(owner_.field.cameras, nerf::parse_camera_set(options_.cameras),
                                           options_.count, options_.size, context_.seed()),
+            .geometry_views = options_.geometry_count,
             .seed = context_.seed(),
             .progress = [this](Index done, Index total) {
               if (guard_.interrupted()) throw Interrupted("nothing was written");
@@ -140,10 +129,13 @@ class Bench {
   AttackRow add(const std::string& name, const F& measure) {
     now_ = name;
     const AttackRow row = measure();
-    char line[160];
-    std::snprintf(line, sizeof line, "%-24s %6.2f%%  worst 5%% %6.2f%%  p %.1e  %6.2f dB  kept %3.0f%%\n",
-                  name.c_str(), 100 * row.accuracy.blind, 100 * row.accuracy_p5, row.p_value, row.psnr_object,
-                  100 * row.kept);
+    char line[200], informed[60] = "";
+    if (meter_.geometry_views() > 0)
+      std::snprintf(informed, sizeof informed, "  geometry %6.2f%%  chosen %6.2f%%",
+                    100 * row.accuracy.geometry, 100 * row.accuracy.chosen);
+    std::snprintf(line, sizeof line, "%-24s %6.2f%%%s  worst 5%% %6.2f%%  p %.1e  %6.2f dB  kept %3.0f%%\n",
+                  name.c_str(), 100 * row.accuracy.blind, informed, 100 * row.accuracy_p5, row.p_value,
+                  row.psnr_object, 100 * row.kept);
     context_.text() << line;
     return row;
   }
@@ -160,9 +152,13 @@ class Bench {
 };
 
 Json row_json(const AttackRow& row) {
-  return {{"attack", row.name},      {"blind", number(row.accuracy.blind)},
-          {"geometry", nullptr},     {"blind_p5", number(row.accuracy_p5)},
-          {"p_value", row.p_value},  {"psnr_object", number(row.psnr_object)},
+  return {{"attack", row.name},
+          {"blind", number(row.accuracy.blind)},
+          {"geometry", number(row.accuracy.geometry)},
+          {"chosen", number(row.accuracy.chosen)},
+          {"blind_p5", number(row.accuracy_p5)},
+          {"p_value", row.p_value},
+          {"psnr_object", number(row.psnr_object)},
           {"kept", number(row.kept)}};
 }
 
@@ -174,21 +170,20 @@ Json rows_json(const std::vector<Curve>& curves) {
 }
 
 // Damage as an error in grey levels: to the right is more, as severities go.
-void write_plot(const std::filesystem::path& path, const std::string& title,
+void write_plot(const std::filesystem::path& path, const std::string& title, const char* reading,
                 const std::vector<Curve>& curves) {
   std::vector<bench::ScatterPoint> points;
   for (const Curve& curve : curves)
     for (const AttackRow& row : curve.rows)
       if (std::isfinite(row.psnr_object))
-        points.push_back({.x = 255 * std::pow(10, -row.psnr_object / 20),
-                          .y = 100 * row.accuracy.blind,
-                          .series = curve.name});
+        points.push_back(
+            {.x = 255 * std::pow(10, -row.psnr_object / 20), .y = 100 * row.chosen(), .series = curve.name});
   if (points.empty()) return;
   write_file_atomically(
       path, bench::scatter_chart({.title = title,
                                   .x = "damage on the object, rms error in grey levels (2.55: 40 dB, 8.1: 30 "
                                        "dB, 25.5: 20 dB)",
-                                  .y = "bits right in one view, blind, %",
+                                  .y = std::string("bits right in one view, ") + reading + ", %",
                                   .curves = true},
                                  points));
 }
@@ -199,12 +194,13 @@ std::filesystem::path beside(std::filesystem::path path, const char* what) {
 
 constexpr const char* kDamage =
     "psnr_object: attacked against marked picture over the object, dB, moved back first where an attack "
-    "moves pixels; kept: share of the object's pixels still shown; p_value: of 10 views together, median; "
-    "geometry: null until that reading is built";
+    "moves pixels; kept: share of the object's pixels still shown; blind, blind_p5, p_value: from the "
+    "picture alone, all views; p_value: of 10 views together, median; geometry: informed, of the first "
+    "geometry_views views; chosen: of the reading that extract would believe there, by agreement alone";
 
 void check(const BenchAttacksOptions& o) {
-  if (o.owner.empty() || o.message.empty() || o.field.empty())
-    throw UsageError("bench attacks: needs --owner OWNER, --field BAKED and --message HEX");
+  if (o.owner.empty() || !o.message.given() || o.field.empty())
+    throw UsageError("bench attacks: needs --owner OWNER, --field BAKED and the --message baked into it");
   for (const std::string& path : o.attacked)
     if (!std::filesystem::exists(path)) throw IoError(path + ": no such file");
   if (o.plot.empty()) return;
@@ -215,28 +211,26 @@ void check(const BenchAttacksOptions& o) {
 }  // namespace
 
 void add_bench_attacks(CLI::App& app, BenchAttacksOptions& o) {
-  app.add_option("--owner", o.owner, "attacks: what `fieldmark embed` wrote")
-      ->type_name("OWNER")
-      ->default_str("");
-  app.add_option("--message", o.message, "attacks: the message baked into --field")
-      ->type_name("HEX")
-      ->default_str("");
-  app.add_option("--other", o.other,
-                 "attacks: a field baked with another message, to be averaged with (none)")
-      ->type_name("FIELD")
-      ->default_str("");
-  app.add_option("--onto", o.onto, "attacks: another scene's field, onto which the mark is copied (none)")
-      ->type_name("FIELD")
-      ->default_str("");
-  app.add_option("--attacked", o.attacked,
-                 "attacks: files made from --field by other means, a row each, several times")
-      ->type_name("FIELD")
-      ->default_str("");
+  const auto add_file = [&](const char* name, auto& to, const char* what, const char* type) {
+    app.add_option(name, to, what)->type_name(type)->default_str("");
+  };
+  add_file("--owner", o.owner, "attacks: what `fieldmark embed` wrote", "OWNER");
+  add_message_options(app, o.message, "attacks: the message baked into --field");
+  add_file("--other", o.other, "attacks: a field baked with another message, to be averaged with (none)",
+           "FIELD");
+  add_file("--onto", o.onto, "attacks: another scene's field, onto which the mark is copied (none)", "FIELD");
+  add_file("--attacked", o.attacked,
+           "attacks: files made from --field by other means, a row each, several times", "FIELD");
   app.add_option("--cameras", o.cameras, "attacks: near, ring, sphere (see measure)")
       ->check(CLI::IsMember({"near", "ring", "sphere"}).description(""))
       ->type_name("SET");
   app.add_option("--count", o.count, "attacks: views, 1 to 1000")
       ->check(CLI::Range(1, 1000).description(""))
+      ->type_name("N");
+  app.add_option(
+         "--geometry-count", o.geometry_count,
+         "attacks: of the first so many views geometry is read too, 0 to 1000: seconds a view and row")
+      ->check(CLI::Range(0, 1000).description(""))
       ->type_name("N");
 }
 
@@ -252,18 +246,22 @@ int bench_attacks(const BenchAttacksOptions& options, Context& context) {
   for (const Names& names : kFields)
     fields.push_back(bench.fields(names, {.unmarked = &bench.owner().field}));
   if (other) fields.push_back(bench.fields(kAverage, {.other = &*other}));
-  if (onto) fields.push_back(bench.copies(*onto));
+  if (onto)
+    fields.push_back(
+        bench.fields(kCopy, {.unmarked = &bench.owner().field, .marked = &bench.marked()}, &*onto));
   for (const std::string& path : options.attacked) fields.push_back(bench.file(path));
   if (!options.plot.empty()) {
-    write_plot(options.plot, "Attacks on pictures: what is read against the damage", pictures);
+    const char* reading = bench.meter().geometry_views() > 0 ? "as extract reads them" : "blind";
+    write_plot(options.plot, "Attacks on pictures: what is read against the damage", reading, pictures);
     write_plot(beside(options.plot, "-fields"),
-               "Attacks on the field's file: what is read against the damage", fields);
+               "Attacks on the field's file: what is read against the damage", reading, fields);
   }
   Json unattacked = row_json(none);
   unattacked.erase("attack");
   context.result({{"field", std::filesystem::path(options.field).filename().string()},
                   {"bits", bench.owner().options().bits},
-                  {"views", bench.views()},
+                  {"views", options.count},
+                  {"geometry_views", bench.meter().geometry_views()},
                   {"cameras", options.cameras},
                   {"columns", kDamage},
                   {"unattacked", unattacked},

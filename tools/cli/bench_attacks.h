@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "cli/message_option.h"
+
 namespace CLI {
 class App;
 }
@@ -14,13 +16,14 @@ class Context;
 
 /// Of `bench attacks`.
 struct BenchAttacksOptions {
-  std::string owner, message;
+  std::string owner;
+  MessageOption message;              ///< baked into the field
   std::string field;                  ///< baked
   std::string other;                  ///< baked with another message, for average
   std::string onto;                   ///< another field, for copy
   std::vector<std::string> attacked;  ///< files made from the baked field by other means
   std::string cameras = "near", plot;
-  Index count = 50, size = 0;
+  Index count = 50, geometry_count = 4, size = 0;
   bool quick = false;
 };
 /// Adds what the other benches do not have.
