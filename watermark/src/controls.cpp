@@ -50,8 +50,8 @@ std::vector<Control> built_in_controls(const Owner& owner, std::span<const Tenso
        {Tensor<float>({pictures[0].shape[0], pictures[0].shape[1], 3},
                       nerf::background_value(owner.field.background))}},
       {"unmarked",
-       "Views of the owner's field as it was before the mark. They show the same scene from the same "
-       "directions; only the mark is missing.",
+       "Views of the owner's field as it was before the mark, from directions like those of its photographs. "
+       "They show the same scene; only the mark is missing.",
        {}},
       {"shuffled",
        "The pictures in question, cut into small squares that were put together in a random order. Every "
