@@ -120,10 +120,11 @@ they were computed honestly: whoever has the OWNER file can repeat the test.</li
 </ul>
 )";
 
+std::string row(const char* what, const std::string& value) {
+  return std::string("<tr><th scope=\"row\">") + what + "</th>" + cell(value) + "</tr>\n";
+}
+
 std::string figures(const EvidenceRecord& r) {
-  const auto row = [](const char* what, const std::string& value) {
-    return std::string("<tr><th scope=\"row\">") + what + "</th>" + cell(value) + "</tr>\n";
-  };
   const EvidenceScore& s = r.together;
   return "<h2>Figures</h2>\n<table><caption>All pictures together</caption>\n" +
          row("Message looked for",
@@ -164,43 +165,50 @@ std::string picture_plot(const EvidenceRecord& r) {
          more + "</figcaption></figure>\n";
 }
 
+// The beginning of a table of pictures and their figures.
+std::string scores_head(const char* caption, const char* picture, const char* about) {
+  std::string out = std::string("<table><caption>") + caption + "</caption>\n<thead><tr>";
+  for (const char* column : {picture, about, "Bits that match", "p, key", "two-sided", "p, bits"})
+    out += std::string("<th scope=\"col\">") + column + "</th>";
+  return out + "</tr></thead>\n<tbody>\n";
+}
+
+std::string scores_row(const std::string& alt, const std::string& source, const std::string& about,
+                       const EvidenceScore& score) {
+  return "<tr>" + cell("<img alt=\"" + alt + "\" src=\"" + source + "\">") + cell(about) +
+         score_cells(score) + "</tr>\n";
+}
+
 std::string pictures_table(const EvidenceRecord& r, const PagePictures& images) {
-  std::string out =
-      "<h2>Pictures</h2>\n" + picture_plot(r) +
-      "<table><caption>Each picture by itself; bits that differ from the message are underlined</caption>\n"
-      "<thead><tr><th scope=\"col\">Picture</th><th scope=\"col\">File and bits</th><th scope=\"col\">Bits "
-      "that "
-      "match</th><th scope=\"col\">p, key</th><th scope=\"col\">two-sided</th><th scope=\"col\">p, "
-      "bits</th></tr></thead>\n<tbody>\n";
+  std::string out = "<h2>Pictures</h2>\n" + picture_plot(r) +
+                    scores_head("Each picture by itself; bits that differ from the message are underlined",
+                                "Picture", "File and bits");
   for (std::size_t i = 0; i < r.pictures.size(); ++i) {
     const auto& picture = r.pictures[i];
     const std::string label = std::to_string(i + 1) + ": " + escaped_markup(picture.name);
-    out +=
-        "<tr>" + cell("<img alt=\"Picture " + label + "\" src=\"" + images.pictures.at(i) + "\">") +
-        cell(label + "<br>" + marked_bits(picture.score, r.message) + "<br>SHA-256 " + code(picture.sha256)) +
-        score_cells(picture.score) + "</tr>\n";
+    out += scores_row(
+        "Picture " + label, images.pictures.at(i),
+        label + "<br>" + marked_bits(picture.score, r.message) + "<br>SHA-256 " + code(picture.sha256),
+        picture.score);
   }
   return out + "</tbody></table>\n";
 }
 
 std::string controls_table(const EvidenceRecord& r, const PagePictures& images) {
   if (r.controls.empty()) return "";
-  std::string out =
-      "<h2>Controls</h2>\n" + controls_verdict(r) +
-      "<table><caption>The same key, message and test on pictures that do not hold the mark</caption>\n"
-      "<thead><tr><th scope=\"col\">Example</th><th scope=\"col\">Control</th><th scope=\"col\">Bits that "
-      "match</th><th scope=\"col\">p, key</th><th scope=\"col\">two-sided</th><th scope=\"col\">p, "
-      "bits</th></tr></thead>\n<tbody>\n";
+  std::string out = "<h2>Controls</h2>\n" + controls_verdict(r) +
+                    scores_head("The same key, message and test on pictures that do not hold the mark",
+                                "Example", "Control");
   for (std::size_t i = 0; i < r.controls.size(); ++i) {
     const auto& control = r.controls[i];
     const std::string name = escaped_markup(control.name);
     double least = 1;
     for (const auto& picture : control.pictures) least = std::min(least, picture.score.p_value);
-    out +=
-        "<tr>" + cell("<img alt=\"Control " + name + "\" src=\"" + images.controls.at(i) + "\">") +
-        cell("<strong>" + name + "</strong>, " + std::to_string(control.pictures.size()) + " together<br>" +
-             escaped_markup(control.meaning) + "<br>Least p of one alone: " + text_of(least)) +
-        score_cells(control.together) + "</tr>\n";
+    out += scores_row("Control " + name, images.controls.at(i),
+                      "<strong>" + name + "</strong>, " + std::to_string(control.pictures.size()) +
+                          " together<br>" + escaped_markup(control.meaning) +
+                          "<br>Least p of one alone: " + text_of(least),
+                      control.together);
   }
   return out + "</tbody></table>\n";
 }
@@ -237,13 +245,11 @@ std::string wrong_keys(const EvidenceRecord& r) {
 }
 
 std::string identity(const EvidenceRecord& r, const watermark::PublicKey& signer) {
-  const auto row = [](const char* what, const std::string& value) {
-    return std::string("<tr><th scope=\"row\">") + what + "</th>" + cell(code(value)) + "</tr>\n";
-  };
   return "<h2>What was fixed, and how to check it</h2>\n<table>\n" +
-         row("Claim (to have been time-stamped)", r.claim) + row("Public key of who signed", to_hex(signer)) +
-         row("SHA-256 of the OWNER file", r.owner_sha256) +
-         row("Program", r.commit + ", kernels x86-64-" + r.isa + ", seed " + std::to_string(r.seed)) +
+         row("Claim (to have been time-stamped)", code(r.claim)) +
+         row("Public key of who signed", code(to_hex(signer))) +
+         row("SHA-256 of the OWNER file", code(r.owner_sha256)) +
+         row("Program", code(r.commit + ", kernels x86-64-" + r.isa + ", seed " + std::to_string(r.seed))) +
          "</table>\n"
          "<p>The claim is the SHA-256 of the SHA-256 of the OWNER file, the key and the message; it gives "
          "none of "
