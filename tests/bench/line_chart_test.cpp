@@ -3,25 +3,12 @@
 
 #include <cmath>
 #include <limits>
-#include <regex>
 
+#include "bench/drawn_points.h"
 #include "support/catch.h"
 
 using namespace fieldmark;
 using namespace fieldmark::bench;
-
-namespace {
-struct Place {
-  int x, y;
-};
-std::vector<Place> places(const std::string& svg) {
-  std::vector<Place> found;
-  const std::regex point("<circle class=\"point\" cx=\"(\\d+)\" cy=\"(\\d+)\"");
-  for (std::sregex_iterator i(svg.begin(), svg.end(), point), end; i != end; ++i)
-    found.push_back({std::stoi((*i)[1]), std::stoi((*i)[2])});
-  return found;
-}
-}  // namespace
 
 TEST_CASE("line_chart: both axes are linear, and lines go from left to right") {
   const auto svg = line_chart({"t", "x", "y"}, {{"a", {{8, 75}, {0, 50}, {4, 100}}}}, 50, 100);

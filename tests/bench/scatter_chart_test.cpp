@@ -5,24 +5,13 @@
 #include <limits>
 #include <regex>
 
+#include "bench/drawn_points.h"
 #include "support/catch.h"
 
 using namespace fieldmark;
 using namespace fieldmark::bench;
 
 namespace {
-struct Place {
-  int x, y;
-};
-
-std::vector<Place> places(const std::string& svg) {
-  std::vector<Place> found;
-  const std::regex point("<circle cx=\"(\\d+)\" cy=\"(\\d+)\" r=\"\\d+\" class=\"point\"");
-  for (std::sregex_iterator i(svg.begin(), svg.end(), point), end; i != end; ++i)
-    found.push_back({std::stoi((*i)[1]), std::stoi((*i)[2])});
-  return found;
-}
-
 // Every element closes, texts hold no bare bracket: one pass over the tags with a stack.
 bool well_formed(const std::string& svg) {
   std::vector<std::string> open;

@@ -8,8 +8,18 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "tools/tiny_scene.h"
+
+/// Embeds messages of 4 bits in a field in two steps: too few to read anything.
+inline Outcome tiny_embed(const std::string& field, const std::string& owner,
+                          const std::vector<std::string>& more) {
+  std::vector<std::string> words{"embed", "--field",       field, "--out",   owner, "--bits",  "4", "--cells",
+                                 "6",     "--reader-size", "32",  "--steps", "2",   "--views", "8"};
+  words.insert(words.end(), more.begin(), more.end());
+  return run_command(words);
+}
 
 /// A field and an owner of 4-bit messages, made once by the commands themselves: too little training to read
 /// anything, enough to run every path. Tests run as processes of their own, so where FIELDMARK_TINY_JOB names
@@ -74,27 +84,8 @@ struct TinyJob {
   }
   void make() const {
     tiny_field(folder, tiny_scene(folder), "100");
-    const auto r = run_command({"embed",
-                                "--field",
-                                field,
-                                "--out",
-                                owner,
-                                "--bits",
-                                "4",
-                                "--cells",
-                                "6",
-                                "--reader-size",
-                                "32",
-                                "--steps",
-                                "2",
-                                "--views",
-                                "8",
-                                "--measured-views",
-                                "2",
-                                "--under",
-                                "blur_1",
-                                "--json",
-                                folder / "embedded.json"});
+    const auto r = tiny_embed(
+        field, owner, {"--measured-views", "2", "--under", "blur_1", "--json", folder / "embedded.json"});
     INFO(r.err);
     REQUIRE(r.code == 0);
   }
