@@ -92,6 +92,19 @@ void write_picture(const std::string& path, const watermark::Owner& owner, std::
   write_png(path, comparison_sheet(pairs));
 }
 
+// From views that the owner has not learnt from.
+Json measure_owner(const Options& options, const watermark::Owner& owner, const Lpips<float>* lpips,
+                   Context& context) {
+  const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, options.measured_views,
+                                          0, context.seed() + 1);
+  const auto measured = run_measure(
+      owner, nullptr, nullptr,
+      {.cameras = cameras, .under = options.under, .seed = context.seed(), .lpips = lpips, .progress = {}},
+      context);
+  print_measurement(context.text(), measured, "near");
+  return measurement_json(measured, "near");
+}
+
 int run(const Options& options, Context& context) {
   const std::string checkpoint = options.out + ".checkpoint";
   const std::string picture = options.picture.empty() ? options.out + ".png" : options.picture;
@@ -142,17 +155,7 @@ int run(const Options& options, Context& context) {
     context.text() << "claim " << claim.get<std::string>()
                    << ", to be time-stamped before the field is published\n";
   }
-  const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, options.measured_views,
-                                          0, context.seed() + 1);
-  const auto measured = run_measure(owner, nullptr, nullptr,
-                                    {.cameras = cameras,
-                                     .under = options.under,
-                                     .seed = context.seed(),
-                                     .lpips = lpips ? &*lpips : nullptr,
-                                     .progress = {}},
-                                    context);
-  print_measurement(context.text(), measured, "near");
-  Json json = measurement_json(measured, "near");
+  Json json = measure_owner(options, owner, lpips ? &*lpips : nullptr, context);
   json["seconds"] = seconds;
   json["steps"] = embedder.steps();
   json["sha256"] = sha256;
