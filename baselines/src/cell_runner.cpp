@@ -10,6 +10,7 @@
 #include <fieldmark/nerf/trainer.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <memory>
 #include <system_error>
 
@@ -68,6 +69,10 @@ CellRunner::CellRunner(CellRunnerOptions options) : options_(std::move(options))
     throw ValueError("[cell_runner] budget, views and photographs must be positive, got " +
                      std::to_string(options_.budget) + ", " + std::to_string(options_.views) + " and " +
                      std::to_string(options_.photographs));
+  // What another budget left is of no use.
+  char of_budget[80];
+  std::snprintf(of_budget, sizeof of_budget, "%gs-%gs", options_.budget, options_.base_seconds);
+  options_.work /= of_budget;
   std::error_code failed;
   std::filesystem::create_directories(options_.work, failed);
   if (failed) throw IoError(options_.work.string() + ": cannot make the folder: " + failed.message());

@@ -47,6 +47,11 @@ TEST_CASE("cell_runner: a cell of the built-in scene, from training to files") {
   CHECK(measured.cell.commit == "abc");
   CHECK(measured.picture.shape == Shape{32, 64, 3});
   CHECK(measured.curve.starts_with("seconds,steps,figure\n"));
+  // A run of another budget neither finds this one's networks nor goes on with them.
+  CHECK(std::filesystem::exists(folder / "work/0.2s-0.5s/ours-objects-hash-16-1.checkpoint"));
+  options.budget = 0.4;
+  CellRunner longer(options);
+  CHECK(std::filesystem::is_empty(folder / "work/0.4s-0.5s"));
   save_measured(folder / "cells", measured);
   CHECK(load_cells(folder / "cells").size() == 1);
   CHECK(read_image(folder / "cells/ours-objects-hash-16-1.png").shape == Shape{32, 64, 3});

@@ -40,7 +40,7 @@ struct MeasuredCell {
 void save_measured(const std::filesystem::path& folder, const MeasuredCell& measured);
 
 /// Trains and measures cells one after another; scenes and unmarked fields are kept between them, fields and
-/// checkpoints also between processes, in the work folder.
+/// checkpoints also between processes, in the work folder, for each budget in a folder of its own.
 class CellRunner {
  public:
   /// @throws ValueError if there is no scene or a number is out of range
