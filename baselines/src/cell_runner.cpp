@@ -57,7 +57,7 @@ struct CellRunner::Trained {
   Index steps = 0;
   double seconds = 0, own_2d_accuracy = std::nan("");
   std::shared_ptr<const nerf::RadianceField> unmarked;
-  std::shared_ptr<const watermark::Owner> owner;
+  std::shared_ptr<const TrainedOwner> owner;
   MarkedScene marked;
   std::filesystem::path checkpoint;    // of the run whose curve is shown
   std::map<std::string, double> more;  // for Cell::more
@@ -204,7 +204,7 @@ CellRunner::Trained CellRunner::train(const CellName& name, const Scene& scene) 
   trained.steps = owned.steps;
   trained.seconds = owned.seconds;
   trained.unmarked = field;
-  trained.owner = std::make_shared<const watermark::Owner>(std::move(owned.owner));
+  trained.owner = std::make_shared<const TrainedOwner>(std::move(owned));
   trained.marked = marked_scene(*trained.owner, name.seed);
   trained.checkpoint = checkpoint;
   return trained;
@@ -225,7 +225,8 @@ void CellRunner::read_variants(const CellName& name, const Trained& trained,
                       .accuracy;
   };
   if (name.bits == kWeightsBits) {
-    const watermark::Owner noisy = with_noisy_weights(*trained.owner, kWeightsNoise, name.seed);
+    TrainedOwner noisy = *trained.owner;
+    noisy.owner = with_noisy_weights(noisy.owner, kWeightsNoise, name.seed);
     read("weights_0.01", marked_scene(noisy, name.seed));
   }
   if (!is_mlp(name) || name.bits != 16) return;

@@ -9,7 +9,8 @@
 namespace fieldmark::baselines {
 namespace {
 
-constexpr std::array<std::string_view, 3> kOwners{"ours", "copyrnerf_paper", "without_drr"};
+constexpr std::array<std::string_view, 5> kOwners{"ours", "copyrnerf_paper", "without_drr", "nerf_message",
+                                                  "geometry"};
 constexpr double kStrength = 34;                                  // dB on the object
 constexpr Index kOurPatch = 128, kPaperPatch = 150, kLeast = 32;  // pixels
 
@@ -30,13 +31,17 @@ bool has_owner(std::string_view system) {
 
 OwnerSystem owner_system(const CellName& name, Index picture) {
   if (!has_owner(name.system))
-    throw ValueError("[owner_system] name.system must be one that marks a frozen field, got " + name.system);
+    throw ValueError("[owner_system] name.system must be one that is trained through an owner, got " +
+                     name.system);
   const bool fast = name.system.starts_with("ours");
   const auto preset = fast ? watermark::Preset::fast : watermark::Preset::paper;
   OwnerSystem s{.owner = {.preset = preset, .bits = name.bits, .strength = kStrength, .seed = name.seed},
                 .embed = watermark::embed_options(preset)};
   s.owner.reader_size = std::clamp(picture, kLeast, fast ? kOurPatch : kPaperPatch);
   s.embed.seed = name.seed;
+  if (name.system == "nerf_message") s.place = MessagePlace::inputs;
+  if (name.system == "geometry") s.place = MessagePlace::density;
+  s.owner.colours = !s.place;
   if (name.system == "without_drr")
     s.embed.distortions = {
         .noise = 0, .rotation = 0, .zoom_out = 1, .zoom_in = 1, .blur = 0, .sample_shift = 0};
@@ -62,8 +67,18 @@ TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name,
                                                      throw Stopped("views: stopped, nothing to save");
                                                    return true;
                                                  });
-  TrainedOwner trained{.owner = new_owner(field, name, system, views)};
+  TrainedOwner trained{.owner = new_owner(field, name, system, views), .field = {}};
   auto options = system.embed;
+  if (system.place) {
+    const auto& o = system.owner;
+    trained.field.emplace(
+        trained.owner.params, field,
+        MessageFieldOptions{.place = *system.place, .bits = o.bits, .width = o.width, .seed = o.seed});
+    options.picture = [&](Tape<float>& tape, const Params<float>& params, const watermark::CachedView& view,
+                          Var<float> message) {
+      return trained.field->picture(tape, params, field, view.camera, message);
+    };
+  }
   options.views = training.views;
   options.schedule.steps = 0;
   options.schedule.seconds = training.seconds;
@@ -101,8 +116,8 @@ watermark::Owner with_noisy_weights(const watermark::Owner& owner, double deviat
   return noisy;
 }
 
-MarkedScene marked_scene(const watermark::Owner& owner, std::uint64_t seed,
-                         const nerf::RenderOptions& options) {
+MarkedScene marked_scene(const TrainedOwner& marked, std::uint64_t seed, const nerf::RenderOptions& options) {
+  const watermark::Owner& owner = marked.owner;
   const auto renderer = std::make_shared<nerf::Renderer>(owner.field, options);
   const auto code = std::make_shared<watermark::CellCode>(owner.code());
   const auto reader = std::make_shared<watermark::PictureReader>(owner);
@@ -110,8 +125,11 @@ MarkedScene marked_scene(const watermark::Owner& owner, std::uint64_t seed,
   return {.bits = bits,
           .message = [=](Index view) { return message_of_view(bits, seed, view); },
           .render =
-              [=, &owner](const nerf::Camera& camera, const watermark::Message& message) {
-                renderer->set_recolour(owner.marking(watermark::cell_signs(*code, message)));
+              [=, &marked, &owner](const nerf::Camera& camera, const watermark::Message& message) {
+                const auto signs = watermark::cell_signs(*code, message);
+                if (marked.field)
+                  return marked.field->render(owner.params, owner.field, camera, signs, options);
+                renderer->set_recolour(owner.marking(signs));
                 return renderer->render(camera).rgb;
               },
           .accuracy =

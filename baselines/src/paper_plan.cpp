@@ -17,6 +17,11 @@ const std::array kSystems{
                 "photographs marked by HiDDeN at 30 dB, a field trained on them, its renders read"},
     PaperSystem{"mbrs_nerf", "MBRS + NeRF",
                 "photographs marked by MBRS at 30 dB, a field trained on them, its renders read"},
+    PaperSystem{
+        "nerf_message", "NeRF with message",
+        "the message beside the inputs of the field's networks, trained on from the unmarked field's"},
+    PaperSystem{"geometry", "CopyRNeRF in geometry",
+                "the message fused into the density, colours left as they are"},
     PaperSystem{"nerf_hidden", "NeRF + HiDDeN", "renders of an unmarked field marked by HiDDeN at 30 dB"},
     PaperSystem{"nerf_mbrs", "NeRF + MBRS", "renders of an unmarked field marked by MBRS at 30 dB"},
     PaperSystem{"without_drr", "CopyRNeRF without DRR", "neither distortions nor moved samples in training"}};

@@ -48,7 +48,8 @@ TEST_CASE("mark_scores: an owner's figures are those of measure") {
   const auto cameras = cameras_of(owner.field);
   const auto measured =
       watermark::measure(owner, nullptr, nullptr, {.cameras = cameras, .under = {"noise_0.1"}, .seed = 7});
-  const auto scores = score_mark(owner.field, marked_scene(owner, 7),
+  const TrainedOwner trained{.owner = owner, .field = {}};
+  const auto scores = score_mark(owner.field, marked_scene(trained, 7),
                                  {.cameras = cameras, .under = {"noise_0.1"}, .seed = 7});
   CHECK(scores.accuracy == Approx(measured.accuracy.blind).epsilon(1e-12));
   CHECK(scores.under.at("noise_0.1") == Approx(measured.under.at("noise_0.1").blind).epsilon(1e-12));

@@ -41,9 +41,17 @@ TEST_CASE("owner_system: what each system is") {
   CHECK(plain.owner.preset == watermark::Preset::paper);
   CHECK(plain.embed.distortions.rotation == 0);
   CHECK(plain.embed.distortions.sample_shift == 0);
+  CHECK(!plain.place);
+  const auto message = owner_system({"nerf_message", "lego", "hash", 16, 1}, 160),
+             geometry = owner_system({"geometry", "lego", "hash", 16, 1}, 160);
+  CHECK(message.place == MessagePlace::inputs);
+  CHECK(geometry.place == MessagePlace::density);
+  CHECK(!geometry.owner.colours);
+  CHECK(geometry.embed.distortions.rotation == 30);
   CHECK(!has_owner("hidden_nerf"));
-  CHECK_THROWS_WITH(owner_system({"hidden_nerf", "lego", "hash", 16, 1}, 160),
-                    "[owner_system] name.system must be one that marks a frozen field, got hidden_nerf");
+  CHECK_THROWS_WITH(
+      owner_system({"hidden_nerf", "lego", "hash", 16, 1}, 160),
+      "[owner_system] name.system must be one that is trained through an owner, got hidden_nerf");
 }
 
 TEST_CASE("owner_system: a key for each seed") {
@@ -66,9 +74,30 @@ TEST_CASE("owner_system: trained, stopped and gone on with, it is calibrated") {
   CHECK(trained.seconds < 30);
   CHECK_THAT(run_curve(training.checkpoint), Contains("seconds,steps,figure"));
   const auto cameras = nerf::make_cameras(trained.owner.field.cameras, nerf::CameraSet::near, 4, 0, 123);
-  const auto scores = score_mark(trained.owner.field, marked_scene(trained.owner, 1), {.cameras = cameras});
+  const auto scores = score_mark(trained.owner.field, marked_scene(trained, 1), {.cameras = cameras});
   CHECK(scores.psnr_base_object == Approx(34).margin(1));
   CHECK(scores.accuracy >= 0.25);
+}
+
+TEST_CASE("owner_system: systems with the message in the density learn to keep the pictures, and are read") {
+  for (const char* name : {"nerf_message", "geometry"}) {
+    const TemporaryFolder folder;
+    const CellName cell{name, "objects", "hash", 4, 2};
+    OwnerSystem system = tiny_system(cell);
+    system.embed.message_weight = 0;
+    const auto psnr_after = [&](double seconds) {
+      const TrainedOwner trained =
+          train_owner(tiny_field(), cell, system,
+                      {.seconds = seconds, .checkpoint = folder / std::to_string(seconds), .views = 8});
+      const auto cameras = nerf::make_cameras(trained.owner.field.cameras, nerf::CameraSet::near, 4, 0, 123);
+      const auto scores = score_mark(trained.owner.field, marked_scene(trained, 1), {.cameras = cameras});
+      CHECK(scores.accuracy >= 0.25);
+      return scores.psnr_base;
+    };
+    const double first = psnr_after(1e-3), last = psnr_after(1);
+    CAPTURE(name, first, last);
+    CHECK(last > first + 3);
+  }
 }
 
 TEST_CASE("owner_system: noise on the weights of field and mark, none on the extractor's") {

@@ -19,7 +19,8 @@ TEST_CASE("paper_plan: what the tables of one scene are made of") {
   const PlanOptions lego{.scenes = {"lego"}, .seed = 4};
   const auto bits = plan_cells(PaperTable::bits, lego);
   for (const Index n : {4, 8, 16, 32, 48})
-    for (const char* system : {"ours", "copyrnerf_paper"}) CHECK(has(bits, {system, "lego", "hash", n, 4}));
+    for (const char* system : {"ours", "copyrnerf_paper", "nerf_message", "geometry"})
+      CHECK(has(bits, {system, "lego", "hash", n, 4}));
   CHECK(has(plan_cells(PaperTable::quality, lego), {"copyrnerf_paper", "lego", "mlp", 16, 4}));
   CHECK(has(plan_cells(PaperTable::distortion, lego), {"without_drr", "lego", "hash", 16, 4}));
   CHECK(plan_cells(PaperTable::sampling, lego).size() == 1);

@@ -1,6 +1,7 @@
 #include <fieldmark/engine/error.h>
 #include <fieldmark/engine/files.h>
 #include <fieldmark/engine/metrics.h>
+#include <fieldmark/engine/ops/rows.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/watermark/embedder.h>
 
@@ -215,6 +216,30 @@ TEST_CASE("embedder: calibration gives views the owner's strength") {
     CHECK(measured(options(1).seed + 77, CounterRng(options(1).seed, 12)) == Approx(strength).margin(0.03));
     CHECK(measured(1234, CounterRng(5)) == Approx(strength).margin(0.5));
   }
+}
+
+TEST_CASE("embedder: pictures of another maker take the place of the owner's colours") {
+  OwnerOptions small = tiny_paper_owner().options();
+  small.colours = false;
+  Owner owner(tiny_field(), small, test_key(5), message_slots(4));
+  EmbedOptions o = options(20);
+  CHECK_THROWS_WITH(Embedder(owner, tiny_views(), o),
+                    "[embedder] picture must be given for an owner without colours of its own, got none");
+  // A grey for all pixels that the message says nothing to.
+  const ParamId grey = owner.params.add("grey", {1, 3});
+  o.picture = [&](Tape<float>& tape, const Params<float>& params, const CachedView& view,
+                  Var<float> message) {
+    REQUIRE(view.camera.width == view.width);
+    REQUIRE(message.shape() == Shape{1, 4});
+    return broadcast_rows(params.leaf(tape, grey), view.height * view.width);
+  };
+  o.message_weight = 0;
+  Embedder embedder(owner, tiny_views(), o);
+  embedder.step(0);
+  const double first = embedder.figures().loss;
+  while (!embedder.done()) embedder.step(0);
+  CHECK(embedder.figures().loss < first);
+  CHECK(owner.params.values(grey)[0] > 0.01f);
 }
 
 TEST_CASE("embedder: options outside their ranges are refused") {

@@ -121,6 +121,21 @@ TEST_CASE("owner: preset paper marks by its network of position, direction, colo
         marked(again, signs, x, rgb.data));
 }
 
+TEST_CASE("owner: preset paper without colours of its own has its extractor alone") {
+  const TemporaryFolder folder;
+  OwnerOptions o = small_owner_options();
+  o.preset = Preset::paper;
+  o.channels = 4;
+  o.colours = false;
+  const Owner owner(small_field(), o, test_key(1), message_slots(3));
+  CHECK(std::ranges::all_of(owner.params.entries(),
+                            [](const auto& e) { return e.name.starts_with("extractor/"); }));
+  owner.save(folder / "a");
+  CHECK_FALSE(Owner::load(folder / "a").options().colours);
+  CHECK_THROWS_WITH(owner.marking({1, 1, 1}),
+                    "[owner] marking: expected an owner that marks colours, got one without");
+}
+
 TEST_CASE("owner: slots are one for each bit, of equal area, and presets have names") {
   for (Index bits : {1, 8, 9, 16, 48, 256}) {
     const CellGrid slots = message_slots(bits);

@@ -45,6 +45,8 @@ Embedder::Embedder(Owner& owner, std::span<const CachedView> views, const EmbedO
   if (options.batch < 1 || options.batch > 64)
     throw ValueError("[embedder] batch must be 1 to 64, got " + std::to_string(options.batch));
   if (views.empty()) throw ValueError("[embedder] views must not be empty");
+  if (!owner.mark && !owner.global_mark && !options.picture)
+    throw ValueError("[embedder] picture must be given for an owner without colours of its own, got none");
   if (owner.mark) label_views();
 }
 

@@ -34,7 +34,9 @@ double Embedder::run_pooled(const Picture& p, Tape<float>& tape, const Params<fl
   const auto bits = static_cast<Index>(p.signs.size());
   float* sent = tape.scratch(bits);
   std::copy(p.signs.begin(), p.signs.end(), sent);
-  const Var<float> marked = fused_picture(tape, params, p, tape.constant(sent, {1, bits}));
+  const Var<float> message = tape.constant(sent, {1, bits});
+  const Var<float> marked =
+      options_.picture ? options_.picture(tape, params, v, message) : fused_picture(tape, params, p, message);
   const Var<float> content = mse_loss<float>(marked, tape.constant(v.base.data.data(), marked.shape()));
 
   const Var<float> picture = distort(tape, tape.reshape(marked, {v.height, v.width, 3}), p);

@@ -23,6 +23,7 @@ std::string configuration(const OwnerOptions& o, double gain, const nerf::Radian
   return Json{{"preset", preset_name(o.preset)},
               {"width", o.width},
               {"channels", o.channels},
+              {"colours", o.colours},
               {"bits", o.bits},
               {"strength", o.strength},
               {"cells", o.cells},
@@ -40,10 +41,11 @@ std::string configuration(const OwnerOptions& o, double gain, const nerf::Radian
 
 OwnerOptions parse_options(const Json& j) {
   OwnerOptions o;
-  // Owners of before there were presets have none of the three.
+  // Older owners have none of the four.
   o.preset = parse_preset(j.value("preset", preset_name(o.preset)));
   o.width = j.value("width", o.width);
   o.channels = j.value("channels", o.channels);
+  o.colours = j.value("colours", o.colours);
   o.bits = j.at("bits");
   o.strength = j.at("strength");
   o.cells = j.at("cells");
@@ -90,12 +92,13 @@ Owner::Owner(nerf::RadianceField base, const OwnerOptions& options, const Key& o
   if (cells.count() != options.bits)
     throw ValueError("[owner] cells must be message_slots(bits) for preset paper: " +
                      std::to_string(options.bits) + ", got " + std::to_string(cells.count()));
-  global_mark.emplace(params, "mark",
-                      GlobalMarkOptions{.bits = options.bits,
-                                        .message_features = options.width,
-                                        .colour_features = options.width,
-                                        .width = options.width},
-                      options.seed + 100);
+  if (options.colours)
+    global_mark.emplace(params, "mark",
+                        GlobalMarkOptions{.bits = options.bits,
+                                          .message_features = options.width,
+                                          .colour_features = options.width,
+                                          .width = options.width},
+                        options.seed + 100);
   pooled_reader.emplace(
       params, "extractor",
       extractor::PooledExtractorOptions{.n_bits = options.bits, .channels = options.channels},
@@ -105,6 +108,8 @@ Owner::Owner(nerf::RadianceField base, const OwnerOptions& options, const Key& o
 CellCode Owner::code(const Key& other) const { return deal_cells(other, cells.area(), options_.bits); }
 
 nerf::Renderer::Recolour Owner::marking(std::vector<std::int8_t> signs) const {
+  if (!mark && !global_mark)
+    throw ValueError("[owner] marking: expected an owner that marks colours, got one without");
   if (global_mark) {
     std::vector<float> message(signs.begin(), signs.end());
     return [this, message = std::move(message)](const float* x, const float* d, Index n, float* rgb) {

@@ -53,6 +53,7 @@ CachedView cache_view(nerf::Renderer& renderer, const nerf::RadianceField& field
     }
     view.sample_begin.push_back(static_cast<std::int32_t>(view.weight.size()));
   }
+  view.camera = camera;
   return view;
 }
 

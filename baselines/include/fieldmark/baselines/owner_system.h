@@ -1,9 +1,12 @@
 #pragma once
 #include <fieldmark/baselines/cell.h>
 #include <fieldmark/baselines/mark_scores.h>
+#include <fieldmark/baselines/message_field.h>
 #include <fieldmark/baselines/timed_run.h>
 #include <fieldmark/watermark/embedder.h>
 #include <fieldmark/watermark/owner.h>
+
+#include <optional>
 
 namespace fieldmark::baselines {
 
@@ -11,9 +14,12 @@ namespace fieldmark::baselines {
 struct OwnerSystem {
   watermark::OwnerOptions owner;  ///< networks and strength
   watermark::EmbedOptions embed;  ///< losses and distortions, without the length of the run
+  /// Of systems whose densities depend on the message: the owner then has no colours of its own, and its
+  /// extractor reads what a MessageField shows.
+  std::optional<MessagePlace> place{};
 };
 
-/// Whether a system of paper_systems() marks a frozen field through an Owner.
+/// Whether a system of paper_systems() is trained through an Owner.
 bool has_owner(std::string_view system);
 /// The options of such a system: "ours" at 34 dB on the object, read at up to 128 pixels; the paper's at up
 /// to 150.
@@ -34,9 +40,10 @@ struct OwnerTraining {
 
 /// An owner that has been trained.
 struct TrainedOwner {
-  watermark::Owner owner;  ///< calibrated
-  Index steps = 0;         ///< of training
-  double seconds = 0;      ///< of training
+  watermark::Owner owner;             ///< calibrated
+  std::optional<MessageField> field;  ///< whose numbers are among the owner's, see OwnerSystem::place
+  Index steps = 0;                    ///< of training
+  double seconds = 0;                 ///< of training
 };
 
 /// Renders views, trains mark and extractor and calibrates the strength; goes on from a checkpoint.
@@ -44,8 +51,8 @@ struct TrainedOwner {
 TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name, const OwnerSystem& system,
                          const OwnerTraining& training);
 
-/// An owner's mark with a message of its own in every view, see message_of_view(). The owner must outlive it.
-MarkedScene marked_scene(const watermark::Owner& owner, std::uint64_t seed,
+/// An owner's mark with a message of its own in every view, see message_of_view(). `marked` must outlive it.
+MarkedScene marked_scene(const TrainedOwner& marked, std::uint64_t seed,
                          const nerf::RenderOptions& options = {});
 
 /// The owner with Gaussian noise on every weight of the field's networks and table and of the mark's

@@ -34,8 +34,14 @@ struct EmbedOptions {
   double smooth_weight = 0.4;  ///< of the share of the residual's power left after averaging 8 x 8 pixels
   double flat_weight =
       0.4;  ///< of the residual's power where the base picture is flat, relative to all of it
-  double content_weight = 1;          ///< preset paper: gamma_1, of the content loss ...
-  double message_weight = 5;          ///< ... and gamma_2, of the message loss
+  double content_weight = 1;  ///< preset paper: gamma_1, of the content loss ...
+  double message_weight = 5;  ///< ... and gamma_2, of the message loss
+  /// Preset paper: makes the marked picture [pixels, 3] of a view in place of the owner's colours, from
+  /// parameters that its maker added to the owner's; called from several threads at once.
+  /// @param message  [1, N_b], -1 or 1
+  std::function<Var<float>(Tape<float>& tape, const Params<float>& params, const CachedView& view,
+                           Var<float> message)>
+      picture = {};
   EmbedDistortions distortions = {};  ///< what training pictures go through
   std::uint64_t seed = 0;             ///< of messages, views and distortions
 };
@@ -58,7 +64,8 @@ EmbedOptions embed_options(Preset preset);
 /// steps: same bytes, for any thread count and across save() and restore().
 class Embedder {
  public:
-  /// Owner and views must outlive the embedder. @throws ValueError if an option is out of range
+  /// Owner and views must outlive the embedder. @throws ValueError if an option is out of range, or neither
+  /// owner nor options say what a message does
   Embedder(Owner& owner, std::span<const CachedView> views, const EmbedOptions& options);
   /// Takes one step. @param seconds  since the start of the run, for a schedule that ends at a time
   void step(double seconds);

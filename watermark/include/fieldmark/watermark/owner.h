@@ -34,7 +34,9 @@ struct OwnerOptions {
   Index base_channels = 32;   ///< of the extractor, see DenseExtractorOptions
   Index width = 256;          ///< preset paper: units of D, E and G, and N_m and N_c, see GlobalMarkOptions
   Index channels = 64;        ///< preset paper: of the extractor, see PooledExtractorOptions
-  std::uint64_t seed = 0;     ///< of the initial numbers of the networks
+  /// Preset paper: whether it has a GlobalMark. Without, EmbedOptions::picture says what a message does.
+  bool colours = true;
+  std::uint64_t seed = 0;  ///< of the initial numbers of the networks
 };
 
 /// For preset paper: slots without a place take the part of cells, one for each bit and all of the same area,
@@ -57,7 +59,7 @@ class Owner {
   /// Colours of the marked field of one message, not yet baked. Preset fast adds the residual g s(x) P(x, c)
   /// to them and keeps them in [0, 1]; preset paper puts c_m in their place.
   /// @param signs  of the cells, see cell_signs()   @return a function for Renderer::set_recolour; this must
-  /// outlive it
+  /// outlive it   @throws ValueError if the options' `colours` is off
   nerf::Renderer::Recolour marking(std::vector<std::int8_t> signs) const;
 
   /// Makes the mark fainter or stronger than it was calibrated, without learning again: as the PSNR on the

@@ -16,6 +16,7 @@ struct CachedView {
   std::vector<float> direction;            ///< [S, 3] unit, seen from the camera
   std::vector<float> colour;               ///< [S, 3] of the base field
   std::vector<float> weight;  ///< [S] share of the sample in its pixel; a pixel's sum is about its opacity
+  nerf::Camera camera{};      ///< that sees it
 };
 
 /// Marches the rays of one view and keeps what they see.
