@@ -32,20 +32,22 @@ TEST_CASE("embed gives the same bytes for the same seed and key", "[embed]") {
   CHECK(read_bytes(job.folder / "again1") == read_bytes(job.folder / "again2"));
 }
 
-TEST_CASE("embed --preset paper gives an owner that bakes and reads like any other", "[embed]") {
+TEST_CASE("embed --preset paper and code give an owner that bakes and reads like any other", "[embed]") {
   const TinyJob& job = TinyJob::get();
-  const std::string owner = job.folder / "paper.fm", baked = job.folder / "paper_baked.fm";
-  const auto r = run_command({"embed", "--preset", "paper", "--field", job.field, "--out", owner, "--bits",
-                              "4", "--reader-size", "32", "--steps", "1", "--views", "8", "--measured-views",
-                              "1", "--json", "-"});
-  INFO(r.err);
-  REQUIRE(r.code == cli::kOk);
-  CHECK(nlohmann::json::parse(r.out)["accuracy"]["blind"].is_number());
-  REQUIRE(run_command({"bake", "--owner", owner, "--message", "6", "--out", baked, "--steps", "2"}).code ==
-          cli::kOk);
-  const auto read = run_command({"extract", "--owner", owner, job.pictures(), "--json", "-"});
-  REQUIRE(read.code == cli::kOk);
-  CHECK(nlohmann::json::parse(read.out)["bits"].get<std::string>().size() == 4);
+  for (const std::string preset : {"paper", "code"}) {
+    const std::string owner = job.folder / "paper.fm", baked = job.folder / "paper_baked.fm";
+    const auto r = run_command({"embed", "--preset", preset, "--field", job.field, "--out", owner, "--bits",
+                                "4", "--reader-size", "32", "--steps", "1", "--views", "8",
+                                "--measured-views", "1", "--json", "-"});
+    INFO(r.err);
+    REQUIRE(r.code == cli::kOk);
+    CHECK(nlohmann::json::parse(r.out)["accuracy"]["blind"].is_number());
+    REQUIRE(run_command({"bake", "--owner", owner, "--message", "6", "--out", baked, "--steps", "2"}).code ==
+            cli::kOk);
+    const auto read = run_command({"extract", "--owner", owner, job.pictures(), "--json", "-"});
+    REQUIRE(read.code == cli::kOk);
+    CHECK(nlohmann::json::parse(read.out)["bits"].get<std::string>().size() == 4);
+  }
 }
 
 TEST_CASE("embed says what is wrong, and leaves no file", "[embed]") {

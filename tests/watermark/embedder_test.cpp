@@ -6,6 +6,7 @@
 #include <fieldmark/watermark/embedder.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "support/catch.h"
@@ -92,6 +93,11 @@ TEST_CASE("embedder: preset paper's message loss begins at that of guessing, fiv
   embedder.step(0);
   CHECK(embedder.figures().loss == Approx(5 * std::log(2.0)).epsilon(0.25));
   CHECK(embed_options(Preset::paper).schedule.lr == 5e-4);
+  CHECK(embed_options(Preset::paper).extractor_lr == 1);
+  CHECK(embed_options(Preset::code).schedule.lr == 5e-4);
+  CHECK(embed_options(Preset::code).extractor_lr == 2);
+  CHECK(embed_options(Preset::code).distortions.noise == 0);
+  CHECK(embed_options(Preset::code).distortions.sample_shift == Approx(8.248e-4).epsilon(1e-3));
   CHECK(embed_options(Preset::fast).schedule.lr == EmbedOptions{}.schedule.lr);
 }
 
@@ -173,11 +179,13 @@ TEST_CASE("embedder: a checkpoint of other weights, distortions or step sizes is
   const std::vector<Change> fast = {{[](EmbedOptions& o) { o.first_strength = 25; }, "first strength 25.0"},
                                     {[](EmbedOptions& o) { o.anneal = 21; }, "anneal 21.0"},
                                     {[](EmbedOptions& o) { o.index_weight = 2; }, "index 2.0"},
+                                    {[](EmbedOptions& o) { o.sign_weight = 2; }, "sign 2.0"},
                                     {[](EmbedOptions& o) { o.bits_weight = 2; }, "bits 2.0"},
                                     {[](EmbedOptions& o) { o.smooth_weight = 2; }, "smooth 2.0"},
                                     {[](EmbedOptions& o) { o.flat_weight = 2; }, "flat 2.0"}};
   const std::vector<Change> paper = {{[](EmbedOptions& o) { o.content_weight = 2; }, "content 2.0"},
-                                     {[](EmbedOptions& o) { o.message_weight = 2; }, "message 2.0"}};
+                                     {[](EmbedOptions& o) { o.message_weight = 2; }, "message 2.0"},
+                                     {[](EmbedOptions& o) { o.extractor_lr = 2; }, "extractor 2.0"}};
   const TemporaryFolder folder;
   const auto path = folder / "checkpoint";
   for (const bool is_paper : {false, true}) {
@@ -218,6 +226,66 @@ TEST_CASE("embedder: calibration gives views the owner's strength") {
   }
 }
 
+TEST_CASE("embedder: the extractor has a step size of its own") {
+  const auto moved = [](double extractor_lr) {
+    Owner owner = tiny_paper_owner();
+    const auto before = owner.params;
+    EmbedOptions o = options(1);
+    o.extractor_lr = extractor_lr;
+    Embedder(owner, tiny_views(), o).step(0);
+    double mark = 0, extractor = 0;
+    for (const auto& e : before.entries())
+      for (std::size_t i = 0; i < before.values(before.find(e.name)).size(); ++i)
+        (e.name.starts_with("mark/") ? mark : extractor) += std::abs(static_cast<double>(
+            owner.params.values(owner.params.find(e.name))[i] - before.values(before.find(e.name))[i]));
+    return std::pair(mark, extractor);
+  };
+  const auto one = moved(1), two = moved(2);
+  CHECK(two.first == one.first);
+  CHECK(two.second == Approx(2 * one.second).epsilon(1e-3));
+  Owner owner = tiny_paper_owner();
+  EmbedOptions o = options(1);
+  o.extractor_lr = 0;
+  CHECK_THROWS_WITH(Embedder(owner, tiny_views(), o),
+                    "[embedder] extractor_lr must be positive, got 0.000000");
+}
+
+TEST_CASE("embedder: under a budget preset paper is calibrated, and content costs nothing") {
+  OwnerOptions small = tiny_paper_owner().options();
+  small.budget = true;
+  small.strength = 30;
+  Owner owner(tiny_field(), small, test_key(5), message_slots(4));
+  EmbedOptions o = options(1);
+  o.message_weight = 0;
+  Embedder embedder(owner, tiny_views(), o);
+  embedder.step(0);
+  CHECK(embedder.figures().loss == 0);
+  embedder.calibrate();
+  nerf::Renderer plain(owner.field, {.finer = 1}), marked(owner.field, {.finer = 1});
+  const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, 8, 0, 9);
+  double sum = 0;
+  for (const auto& camera : cameras) {
+    marked.set_recolour(owner.marking(cell_signs(owner.code(), Message{{1, 0, 0, 1}})));
+    const nerf::Rendering base = plain.render(camera);
+    sum += psnr_masked(marked.render(camera).rgb, base.rgb, base.opacity) / 8;
+  }
+  CHECK(sum == Approx(30).margin(0.7));
+}
+
+TEST_CASE("embedder: preset code learns the colours of the field from raw numbers") {
+  OwnerOptions small = tiny_paper_owner().options();
+  small.preset = Preset::code;
+  small.fusion = owner_options(Preset::code).fusion;
+  Owner owner(tiny_field(), small, test_key(5), message_slots(4));
+  EmbedOptions o = options(60);
+  o.message_weight = 0;
+  Embedder embedder(owner, tiny_views(), o);
+  embedder.step(0);
+  const double first = embedder.figures().loss;
+  while (!embedder.done()) embedder.step(0);
+  CHECK(embedder.figures().loss < 0.6 * first);
+}
+
 TEST_CASE("embedder: pictures of another maker take the place of the owner's colours") {
   OwnerOptions small = tiny_paper_owner().options();
   small.colours = false;
@@ -226,11 +294,11 @@ TEST_CASE("embedder: pictures of another maker take the place of the owner's col
   CHECK_THROWS_WITH(Embedder(owner, tiny_views(), o),
                     "[embedder] picture must be given for an owner without colours of its own, got none");
   // A grey for all pixels that the message says nothing to.
+  std::atomic<bool> misfits = false;  // set from several threads
   const ParamId grey = owner.params.add("grey", {1, 3});
   o.picture = [&](Tape<float>& tape, const Params<float>& params, const CachedView& view,
                   Var<float> message) {
-    REQUIRE(view.camera.width == view.width);
-    REQUIRE(message.shape() == Shape{1, 4});
+    if (view.camera.width != view.width || message.shape() != Shape{1, 4}) misfits = true;
     return broadcast_rows(params.leaf(tape, grey), view.height * view.width);
   };
   o.message_weight = 0;
@@ -240,6 +308,7 @@ TEST_CASE("embedder: pictures of another maker take the place of the owner's col
   while (!embedder.done()) embedder.step(0);
   CHECK(embedder.figures().loss < first);
   CHECK(owner.params.values(grey)[0] > 0.01f);
+  CHECK(!misfits);
 }
 
 TEST_CASE("embedder: options outside their ranges are refused") {

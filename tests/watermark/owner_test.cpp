@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include "small_owner.h"
 #include "support/catch.h"
@@ -121,6 +122,62 @@ TEST_CASE("owner: preset paper marks by its network of position, direction, colo
         marked(again, signs, x, rgb.data));
 }
 
+TEST_CASE("owner: preset code reads raw colours and density, and is kept with all its switches") {
+  const TemporaryFolder folder;
+  OwnerOptions o = owner_options(Preset::code);
+  CHECK(o.message_features == 128);
+  CHECK(o.fusion == MarkFusion{.late_direction = true, .raw_colour = true, .repeated = true});
+  CHECK(owner_options(Preset::paper).fusion == MarkFusion{});
+  o.bits = 3;
+  o.reader_size = 32;
+  o.width = 8;
+  o.message_features = 5;
+  o.channels = 4;
+  const Owner owner(small_field(), o, test_key(1), message_slots(3));
+  owner.save(folder / "a");
+  const Owner again = Owner::load(folder / "a");
+  CHECK(again.options().preset == Preset::code);
+  CHECK(again.options().fusion == o.fusion);
+  CHECK(again.options().message_features == 5);
+  const Tensor<float> x = uniform<float>({20, 3}, 0, 1, 1), rgb = uniform<float>({20, 3}, 0, 1, 2);
+  const auto raw = owner.fusion_colours(x.data.data(), rgb.data.data(), 20);
+  REQUIRE(raw.size() == 80);
+  Tape<float> tape;
+  const auto said =
+      owner.field.field(Params<float>(owner.field.params, nullptr), tape.constant(x), tape.constant(x));
+  for (std::size_t i = 0; i < 20; ++i) {
+    CHECK(1 / (1 + std::exp(-raw[4 * i + 1])) == Approx(rgb.data[3 * i + 1]).margin(2e-3));
+    CHECK(std::exp(16 * raw[4 * i + 3]) == Approx(said.sigma.value()[i]).epsilon(1e-4));
+  }
+  CHECK(marked(again, {1, -1, 1}, x, rgb.data) == marked(owner, {1, -1, 1}, x, rgb.data));
+  CHECK(marked(again, {1, -1, 1}, x, rgb.data) != marked(owner, {1, -1, -1}, x, rgb.data));
+}
+
+TEST_CASE("owner: under a budget preset paper adds its gain times what it would change") {
+  const Owner plain = small_paper_owner();
+  OwnerOptions o = plain.options();
+  o.budget = true;
+  Owner owner(small_field(), o, test_key(1), message_slots(3));
+  owner.gain = 0.25;
+  const Tensor<float> x = uniform<float>({20, 3}, 0, 1, 1), rgb = uniform<float>({20, 3}, 0.2, 0.8, 2);
+  const auto got = marked(owner, {1, -1, 1}, x, rgb.data), whole = marked(plain, {1, -1, 1}, x, rgb.data);
+  for (std::size_t i = 0; i < got.size(); ++i)
+    CHECK(got[i] == Approx(rgb.data[i] + 0.25f * (whole[i] - rgb.data[i])).margin(1e-6));
+}
+
+TEST_CASE("owner: without keyed signs a cell's sign is its bit's, whatever the key") {
+  OwnerOptions o = small_owner_options();
+  o.keyed_signs = false;
+  const Owner owner = small_owner(o), keyed = small_owner();
+  CHECK(owner.code().bit == keyed.code().bit);
+  for (std::size_t c = 0; c < owner.code().sign.size(); ++c)
+    CHECK(owner.code().sign[c] == std::abs(keyed.code().sign[c]));
+  CHECK(keyed.code().sign != owner.code().sign);
+  const TemporaryFolder folder;
+  owner.save(folder / "a");
+  CHECK_FALSE(Owner::load(folder / "a").options().keyed_signs);
+}
+
 TEST_CASE("owner: preset paper without colours of its own has its extractor alone") {
   const TemporaryFolder folder;
   OwnerOptions o = small_owner_options();
@@ -143,9 +200,9 @@ TEST_CASE("owner: slots are one for each bit, of equal area, and presets have na
     for (double a : slots.area()) CHECK(a == Approx(1.0 / static_cast<double>(bits)));
   }
   CHECK_THROWS_WITH(message_slots(0), "[message_slots] bits must be at least 1, got 0");
-  for (Preset p : {Preset::fast, Preset::paper}) CHECK(parse_preset(preset_name(p)) == p);
+  for (Preset p : {Preset::fast, Preset::paper, Preset::code}) CHECK(parse_preset(preset_name(p)) == p);
   CHECK_THROWS_AS(parse_preset("slow"), ValueError);
-  CHECK_THROWS_WITH(parse_preset("slow"), "[owner] preset must be fast or paper, got slow");
+  CHECK_THROWS_WITH(parse_preset("slow"), "[owner] preset must be fast, paper or code, got slow");
   OwnerOptions o = small_owner_options();
   o.preset = Preset::paper;
   CHECK_THROWS_WITH(Owner(small_field(), o, test_key(1), message_slots(4)),

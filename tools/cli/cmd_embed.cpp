@@ -120,6 +120,9 @@ int run(const Options& options, Context& context) {
   const auto key = key_of(options, checkpoint);
   auto owner_options = options.owner;
   owner_options.preset = watermark::parse_preset(options.preset);
+  const auto preset = watermark::owner_options(owner_options.preset);
+  owner_options.message_features = preset.message_features;
+  owner_options.fusion = preset.fusion;
   owner_options.seed = context.seed();
   const bool fast = owner_options.preset == watermark::Preset::fast;
   if (!fast && !options.reader_size_given) owner_options.reader_size = kPaperPatch;
@@ -182,9 +185,9 @@ Command add_embed(CLI::App& app) {
   add_message_options(app, o->intended, "Message that is going to be baked, to print its claim at once");
   app.add_option("--preset", o->preset,
                  "fast: local message with dense supervision, trains in minutes; paper: one message "
-                 "everywhere, pooled "
-                 "reading, --strength and --cells unused")
-      ->check(CLI::IsMember({"fast", "paper"}).description(""))
+                 "everywhere, pooled reading, --strength and --cells unused; code: the same as the paper's "
+                 "authors have it in their code")
+      ->check(CLI::IsMember({"fast", "paper", "code"}).description(""))
       ->type_name("NAME");
   app.add_option("--strength", o->owner.strength,
                  "PSNR of the mark on the object, dB, 20 to 60; higher is fainter")
@@ -195,7 +198,7 @@ Command add_embed(CLI::App& app) {
       ->type_name("N");
   auto* reader_size = app.add_option("--reader-size", o->owner.reader_size,
                                      "Side of the square in which the extractor sees the object, pixels, 32 "
-                                     "to 1024 (200; paper: 150)")
+                                     "to 1024 (200; paper, code: 150)")
                           ->check(CLI::Range(32, 1024).description(""))
                           ->type_name("N");
   app.add_option("--views", o->views, "Views to learn from, 8 to 10000")

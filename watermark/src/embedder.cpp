@@ -16,6 +16,8 @@ namespace {
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
+constexpr double kSpacing = 1.7320508 / 420;  // of samples, cube sides: a field's by default
+
 double blend(double from, double to, double fraction) { return from + (to - from) * fraction; }
 
 }  // namespace
@@ -24,6 +26,12 @@ EmbedOptions embed_options(Preset preset) {
   EmbedOptions o;
   if (preset == Preset::fast) return o;
   o.schedule.lr = 5e-4;
+  if (preset == Preset::code) {
+    o.extractor_lr = 2;
+    o.distortions = {
+        .noise = 0, .rotation = 0, .zoom_out = 1, .zoom_in = 1, .blur = 0, .sample_shift = 0.2 * kSpacing};
+    return o;
+  }
   o.distortions.noise = 0.1;
   o.distortions.rotation = 30;
   o.distortions.blur = 0.1;
@@ -47,7 +55,23 @@ Embedder::Embedder(Owner& owner, std::span<const CachedView> views, const EmbedO
   if (views.empty()) throw ValueError("[embedder] views must not be empty");
   if (!owner.mark && !owner.global_mark && !options.picture)
     throw ValueError("[embedder] picture must be given for an owner without colours of its own, got none");
+  if (!(options.extractor_lr > 0))
+    throw ValueError("[embedder] extractor_lr must be positive, got " + std::to_string(options.extractor_lr));
+  find_objects();
   if (owner.mark) label_views();
+  if (owner.global_mark)
+    for (const CachedView& v : views)
+      colours_.push_back(
+          owner.fusion_colours(v.position.data(), v.colour.data(), static_cast<Index>(v.weight.size())));
+}
+
+void Embedder::find_objects() {
+  for (const CachedView& v : views_) {
+    std::vector<float> object(at(v.height * v.width), 0.f);
+    for (Index p = 0; p < v.height * v.width; ++p)
+      if (v.opacity[p] > 0.5f && v.sample_begin[at(p)] != v.sample_begin[at(p + 1)]) object[at(p)] = 1;
+    object_.push_back(std::move(object));
+  }
 }
 
 Embedder::Picture Embedder::draw(Index image) const {
@@ -142,7 +166,7 @@ void Embedder::step(double seconds) {
         return run_picture(image, tape, grads, figures[at(image)]);
       },
       owner_.params.grads());
-  adam_.step(owner_.params.values(), owner_.params.grads(), schedule_.lr(steps_));
+  step_parameters();
   const double keep = steps_ == 0 ? 0 : 0.98, each = (1 - keep) / static_cast<double>(options_.batch);
   figures_ = {keep * figures_.sign, keep * figures_.index, keep * figures_.bits,
               keep * figures_.loss + (1 - keep) * loss};
@@ -154,8 +178,23 @@ void Embedder::step(double seconds) {
   ++steps_;
 }
 
+// The extractor's parameters follow one another in the store.
+void Embedder::step_parameters() {
+  const double lr = schedule_.lr(steps_);
+  Index begin = owner_.params.size(), end = 0;
+  for (const auto& e : owner_.params.entries())
+    if (e.name.starts_with("extractor/")) {
+      begin = std::min(begin, e.offset);
+      end = std::max(end, e.offset + e.shape.size());
+    }
+  const AdamRange ranges[] = {{.begin = 0, .end = begin, .lr_factor = lr},
+                              {.begin = begin, .end = end, .lr_factor = lr * options_.extractor_lr},
+                              {.begin = end, .end = owner_.params.size(), .lr_factor = lr}};
+  adam_.step(owner_.params.values(), owner_.params.grads(), ranges);
+}
+
 void Embedder::calibrate(Index views) {
-  if (!owner_.mark) return;  // preset paper has no gain: the content loss decides its strength
+  if (!owner_.mark && !owner_.options().budget) return;  // the content loss decides the strength
   const auto cameras =
       nerf::make_cameras(owner_.field.cameras, nerf::CameraSet::near, views, 0, options_.seed + 77);
   const double target = owner_.options().strength;
@@ -196,12 +235,17 @@ std::string Embedder::fingerprint() const {
   add("half after", s.half_after);
   add("cooldown", s.cooldown);
   add("last", s.last);
-  if (o.preset == Preset::paper) {
+  if (o.preset != Preset::fast) {
     add("content", options_.content_weight);
     add("message", options_.message_weight);
-  } else {
+    add("extractor", options_.extractor_lr);
+  }
+  if (o.preset == Preset::fast || o.budget) {
     add("first strength", options_.first_strength);
     add("anneal", options_.anneal);
+  }
+  if (o.preset == Preset::fast) {
+    add("sign", options_.sign_weight);
     add("index", options_.index_weight);
     add("bits", options_.bits_weight);
     add("smooth", options_.smooth_weight);

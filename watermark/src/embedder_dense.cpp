@@ -56,17 +56,15 @@ void Embedder::label_views() {
     if (code_.bit[at(c)] >= 0)
       code_matrix_[at(c * bits + code_.bit[at(c)])] = static_cast<float>(code_.sign[at(c)]);
   for (const CachedView& v : views_) {
+    const std::vector<float>& object = object_[labels_.size()];
     Tensor<std::int32_t> label({v.height, v.width}, static_cast<std::int32_t>(cells));
-    std::vector<float> object(at(label.size()), 0.f);
     for (Index p = 0; p < label.size(); ++p) {
-      if (v.opacity[p] <= 0.5f || v.sample_begin[at(p)] == v.sample_begin[at(p + 1)]) continue;
-      object[at(p)] = 1;
+      if (object[at(p)] == 0) continue;
       const std::int32_t cell = owner_.cells.at(&v.position[at(3 * Index{v.sample_begin[at(p)]})]);
       if (cell >= 0) label[p] = cell;
     }
     labels_.push_back(std::move(label));
     flat_.push_back(flatness(v, object));
-    object_.push_back(std::move(object));
   }
 }
 
@@ -141,7 +139,7 @@ double Embedder::run_dense(const Picture& p, Tape<float>& tape, const Params<flo
   const Var<float> index_loss = softmax_cross_entropy<float>(out.index, labels.data);
   const Var<float> bits_loss = bce_with_logits<float>(pooled, bits);
   const Var<float> loss =
-      scale(add(add(sign_loss, visibility(added, p)),
+      scale(add(add(scale(sign_loss, options_.sign_weight), visibility(added, p)),
                 add(scale(index_loss, options_.index_weight), scale(bits_loss, options_.bits_weight))),
             1.0 / static_cast<double>(options_.batch));
   const double value = static_cast<double>(loss.value()[0]);

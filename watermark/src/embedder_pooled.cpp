@@ -1,5 +1,6 @@
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/loss.h>
+#include <fieldmark/watermark/power_budget.h>
 #include <fieldmark/watermark/weighted_segments.h>
 
 #include "embedder_picture.h"
@@ -10,14 +11,23 @@ namespace {
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 }  // namespace
 
-// The watermarked picture [pixels, 3]: colours of the message composited over the background.
+// The watermarked picture [pixels, 3]: colours of the message composited over the background or, under a
+// budget, the base picture and what they change in it.
 Var<float> Embedder::fused_picture(Tape<float>& tape, const Params<float>& params, const Picture& p,
                                    Var<float> message) const {
   const CachedView& v = views_[at(p.view)];
   const Index samples = static_cast<Index>(v.weight.size()), pixels = v.height * v.width;
+  const std::vector<float>& base = colours_[at(p.view)];
   const Var<float> colour = (*owner_.global_mark)(
       params, tape.constant(shifted_positions(tape, p), {samples, 3}),
-      tape.constant(v.direction.data(), {samples, 3}), tape.constant(v.colour.data(), {samples, 3}), message);
+      tape.constant(v.direction.data(), {samples, 3}),
+      tape.constant(base.data(), {samples, owner_.global_mark->colour_inputs()}), message);
+  if (owner_.options().budget)
+    return add(tape.constant(v.base.data.data(), {pixels, 3}),
+               power_budget<float>(
+                   weighted_segments<float>(sub(colour, tape.constant(v.colour.data(), {samples, 3})),
+                                            v.sample_begin, v.weight),
+                   object_[at(p.view)], p.target));
   const float level = nerf::background_value(owner_.field.background);
   float* behind = tape.scratch(3 * pixels);
   for (Index i = 0; i < pixels; ++i) {
@@ -45,7 +55,8 @@ double Embedder::run_pooled(const Picture& p, Tape<float>& tape, const Params<fl
       {bits});
   std::vector<float> targets(at(bits));
   for (Index b = 0; b < bits; ++b) targets[at(b)] = sent[b] > 0 ? 1.f : 0.f;
-  const Var<float> loss = scale(add(scale(content, options_.content_weight),
+  const double content_weight = owner_.options().budget ? 0 : options_.content_weight;
+  const Var<float> loss = scale(add(scale(content, content_weight),
                                     scale(bce_with_logits<float>(logits, targets), options_.message_weight)),
                                 1.0 / static_cast<double>(options_.batch));
   const double value = static_cast<double>(loss.value()[0]);

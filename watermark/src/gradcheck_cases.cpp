@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <string>
+#include <string_view>
 #include <utility>
 
 namespace fieldmark::watermark {
@@ -39,7 +40,7 @@ GradcheckReport check_mark_network() {
       store, in);
 }
 
-GradcheckReport check_global_mark() {
+GradcheckReport check_global_mark(const MarkFusion& fusion) {
   ParamStore<double> store;
   const GlobalMark<double> net(store, "mark",
                                {.bits = 2,
@@ -47,18 +48,22 @@ GradcheckReport check_global_mark() {
                                 .colour_features = 3,
                                 .position_bands = 2,
                                 .direction_bands = 1,
-                                .width = 4},
+                                .width = 4,
+                                .fusion = fusion},
                                3);
   // Layers with a ReLU get weights so small that no sum of theirs reaches the bias.
   const std::pair<const char*, double> layers[] = {
       {"encode/0", 0.05},  {"encode/1", 0.2}, {"encode/2", 0.15}, {"message/0", 0.2},
       {"message/1", 0.15}, {"fuse/0", 0.06},  {"fuse/1", 0.15}};
   for (const auto& [layer, weights] : layers) {
+    if ((fusion.bare_colour && std::string_view(layer).starts_with("encode")) ||
+        (fusion.bare_message && std::string_view(layer).starts_with("message")))
+      continue;
     open_and_shut(store, std::string("mark/") + layer, 1);
     for (double& w : store.values(store.find(std::string("mark/") + layer + "/weight"))) w *= weights;
   }
-  const std::vector<Tensor<double>> in{numbers({2, 3}, 1), numbers({2, 3}, 2), numbers({2, 3}, 3),
-                                       numbers({1, 2}, 4)};
+  const std::vector<Tensor<double>> in{numbers({2, 3}, 1), numbers({2, 3}, 2),
+                                       numbers({2, net.colour_inputs()}, 3), numbers({1, 2}, 4)};
   return gradcheck_module([&](Tape<double>&, const Params<double>& params,
                               auto v) { return net(params, v[0], v[1], v[2], v[3]); },
                           store, in);
@@ -83,7 +88,11 @@ GradcheckReport check_weighted_segments() {
 }  // namespace
 
 std::vector<GradcheckCase> gradcheck_cases() {
-  return {{"global_mark", check_global_mark},
+  return {{"global_mark", [] { return check_global_mark({}); }},
+          {"global_mark, without MFF", [] { return check_global_mark({.bare_message = true}); }},
+          {"global_mark, without CFF", [] { return check_global_mark({.bare_colour = true}); }},
+          {"global_mark, code",
+           [] { return check_global_mark({.late_direction = true, .raw_colour = true, .repeated = true}); }},
           {"mark_network", check_mark_network},
           {"power_budget", check_power_budget},
           {"weighted_segments", check_weighted_segments}};

@@ -2,12 +2,17 @@
 #include <fieldmark/watermark/owner.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 namespace fieldmark::watermark {
 namespace {
 
 using Json = nlohmann::json;
+
+constexpr std::array<const char*, 3> kPresets{"fast", "paper", "code"};
 
 OwnerOptions checked(const OwnerOptions& o) {
   if (o.bits < 1 || o.bits > 256)
@@ -19,11 +24,29 @@ OwnerOptions checked(const OwnerOptions& o) {
   return o;
 }
 
+constexpr std::pair<const char*, bool MarkFusion::*> kFusion[] = {
+    {"bare_message", &MarkFusion::bare_message},
+    {"bare_colour", &MarkFusion::bare_colour},
+    {"late_direction", &MarkFusion::late_direction},
+    {"raw_colour", &MarkFusion::raw_colour},
+    {"repeated", &MarkFusion::repeated}};
+
+Json fusion_names(const MarkFusion& fusion) {
+  Json names = Json::array();
+  for (const auto& [name, part] : kFusion)
+    if (fusion.*part) names.push_back(name);
+  return names;
+}
+
 std::string configuration(const OwnerOptions& o, double gain, const nerf::RadianceField& field) {
   return Json{{"preset", preset_name(o.preset)},
               {"width", o.width},
+              {"message_features", o.message_features},
+              {"fusion", fusion_names(o.fusion)},
               {"channels", o.channels},
               {"colours", o.colours},
+              {"budget", o.budget},
+              {"keyed_signs", o.keyed_signs},
               {"bits", o.bits},
               {"strength", o.strength},
               {"cells", o.cells},
@@ -41,11 +64,17 @@ std::string configuration(const OwnerOptions& o, double gain, const nerf::Radian
 
 OwnerOptions parse_options(const Json& j) {
   OwnerOptions o;
-  // Older owners have none of the four.
+  // Older owners do not have what is optional here.
   o.preset = parse_preset(j.value("preset", preset_name(o.preset)));
   o.width = j.value("width", o.width);
   o.channels = j.value("channels", o.channels);
+  o.message_features = j.value("message_features", o.message_features);
+  for (const auto& name : j.value("fusion", Json::array()))
+    for (const auto& [known, part] : kFusion)
+      if (name == known) o.fusion.*part = true;
   o.colours = j.value("colours", o.colours);
+  o.budget = j.value("budget", o.budget);
+  o.keyed_signs = j.value("keyed_signs", o.keyed_signs);
   o.bits = j.at("bits");
   o.strength = j.at("strength");
   o.cells = j.at("cells");
@@ -61,12 +90,21 @@ OwnerOptions parse_options(const Json& j) {
 
 }  // namespace
 
-const char* preset_name(Preset preset) { return preset == Preset::paper ? "paper" : "fast"; }
+const char* preset_name(Preset preset) { return kPresets[static_cast<std::size_t>(preset)]; }
 
 Preset parse_preset(std::string_view name) {
-  for (Preset p : {Preset::fast, Preset::paper})
-    if (name == preset_name(p)) return p;
-  throw ValueError("[owner] preset must be fast or paper, got " + std::string(name));
+  const auto found = std::find(kPresets.begin(), kPresets.end(), name);
+  if (found == kPresets.end())
+    throw ValueError("[owner] preset must be fast, paper or code, got " + std::string(name));
+  return static_cast<Preset>(found - kPresets.begin());
+}
+
+OwnerOptions owner_options(Preset preset) {
+  OwnerOptions o{.preset = preset};
+  if (preset != Preset::code) return o;
+  o.message_features = 128;
+  o.fusion = {.late_direction = true, .raw_colour = true, .repeated = true};
+  return o;
 }
 
 CellGrid message_slots(Index bits) {
@@ -90,22 +128,51 @@ Owner::Owner(nerf::RadianceField base, const OwnerOptions& options, const Key& o
     return;
   }
   if (cells.count() != options.bits)
-    throw ValueError("[owner] cells must be message_slots(bits) for preset paper: " +
-                     std::to_string(options.bits) + ", got " + std::to_string(cells.count()));
+    throw ValueError(std::string("[owner] cells must be message_slots(bits) for preset ") +
+                     preset_name(options.preset) + ": " + std::to_string(options.bits) + ", got " +
+                     std::to_string(cells.count()));
   if (options.colours)
-    global_mark.emplace(params, "mark",
-                        GlobalMarkOptions{.bits = options.bits,
-                                          .message_features = options.width,
-                                          .colour_features = options.width,
-                                          .width = options.width},
-                        options.seed + 100);
+    global_mark.emplace(
+        params, "mark",
+        GlobalMarkOptions{
+            .bits = options.bits,
+            .message_features = options.message_features > 0 ? options.message_features : options.width,
+            .colour_features = options.width,
+            .width = options.width,
+            .fusion = options.fusion},
+        options.seed + 100);
   pooled_reader.emplace(
       params, "extractor",
       extractor::PooledExtractorOptions{.n_bits = options.bits, .channels = options.channels},
       options.seed + 200);
 }
 
-CellCode Owner::code(const Key& other) const { return deal_cells(other, cells.area(), options_.bits); }
+CellCode Owner::code(const Key& other) const {
+  CellCode code = deal_cells(other, cells.area(), options_.bits);
+  if (!options_.keyed_signs)
+    for (std::int8_t& sign : code.sign) sign = static_cast<std::int8_t>(std::abs(sign));
+  return code;
+}
+
+std::vector<float> Owner::fusion_colours(const float* x, const float* rgb, Index n) const {
+  if (!options_.fusion.raw_colour) return {rgb, rgb + 3 * n};
+  const nerf::Field<float>& net = field.field;
+  const auto size = [&](Index columns) { return static_cast<std::size_t>(n * columns); };
+  std::vector<float> density(size(net.density_width())), colour(size(net.colour_width()));
+  net.encode(field.params, x, n, density.data(), colour.data());
+  Tape<float> tape;
+  const Var<float> z = net.geometry(Params<float>(field.params, nullptr),
+                                    tape.constant(density.data(), {n, net.density_width()}));
+  std::vector<float> raw(size(4));
+  for (Index i = 0; i < n; ++i) {
+    for (Index a = 0; a < 3; ++a) {
+      const float c = std::clamp(rgb[3 * i + a], 1e-3f, 1 - 1e-3f);
+      raw[static_cast<std::size_t>(4 * i + a)] = std::log(c / (1 - c));
+    }
+    raw[static_cast<std::size_t>(4 * i + 3)] = z.value()[i * net.geometry_width()] / 16;
+  }
+  return raw;
+}
 
 nerf::Renderer::Recolour Owner::marking(std::vector<std::int8_t> signs) const {
   if (!mark && !global_mark)
@@ -114,10 +181,15 @@ nerf::Renderer::Recolour Owner::marking(std::vector<std::int8_t> signs) const {
     std::vector<float> message(signs.begin(), signs.end());
     return [this, message = std::move(message)](const float* x, const float* d, Index n, float* rgb) {
       Tape<float> tape;
-      const Var<float> colour = (*global_mark)(
-          Params<float>(params, nullptr), tape.constant(x, {n, 3}), tape.constant(d, {n, 3}),
-          tape.constant(rgb, {n, 3}), tape.constant(message.data(), {1, static_cast<Index>(message.size())}));
-      std::copy_n(colour.value(), 3 * n, rgb);
+      const std::vector<float> base = fusion_colours(x, rgb, n);
+      const Var<float> colour =
+          (*global_mark)(Params<float>(params, nullptr), tape.constant(x, {n, 3}), tape.constant(d, {n, 3}),
+                         tape.constant(base.data(), {n, global_mark->colour_inputs()}),
+                         tape.constant(message.data(), {1, std::ssize(message)}));
+      const float* c = colour.value();
+      for (Index i = 0; i < 3 * n; ++i)
+        rgb[i] = options_.budget ? std::clamp(rgb[i] + static_cast<float>(gain) * (c[i] - rgb[i]), 0.f, 1.f)
+                                 : c[i];
     };
   }
   return [this, signs = std::move(signs)](const float* x, const float*, Index n, float* rgb) {
@@ -135,7 +207,9 @@ nerf::Renderer::Recolour Owner::marking(std::vector<std::int8_t> signs) const {
 
 // The mark's amplitude is in proportion to its gain while colours are not cut off at 0 and 1.
 void Owner::set_strength(double strength) {
-  if (!mark) throw ValueError("[owner] strength is the networks' own in preset paper");
+  if (!mark && !options_.budget)
+    throw ValueError(std::string("[owner] strength is the networks' own in preset ") +
+                     preset_name(options_.preset));
   if (!(strength >= 20 && strength <= 60))
     throw ValueError("[owner] strength must be in 20 to 60, got " + std::to_string(strength));
   gain *= std::pow(10.0, (options_.strength - strength) / 20);

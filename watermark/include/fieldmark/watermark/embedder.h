@@ -29,15 +29,17 @@ struct EmbedOptions {
   Index batch = 4;             ///< pictures a step, 1 to 64
   double first_strength = 28;  ///< dB at the first step; falls towards the owner's strength ...
   double anneal = 200;         ///< ... with this time constant, steps
+  double sign_weight = 1;      ///< of the cross-entropy of the signs, place by place
   double index_weight = 0.5;   ///< of the cross-entropy of the cell index
   double bits_weight = 0.5;    ///< of the pooled bits' loss
   double smooth_weight = 0.4;  ///< of the share of the residual's power left after averaging 8 x 8 pixels
   double flat_weight =
       0.4;  ///< of the residual's power where the base picture is flat, relative to all of it
-  double content_weight = 1;  ///< preset paper: gamma_1, of the content loss ...
+  double content_weight = 1;  ///< presets paper and code: gamma_1, of the content loss ...
   double message_weight = 5;  ///< ... and gamma_2, of the message loss
-  /// Preset paper: makes the marked picture [pixels, 3] of a view in place of the owner's colours, from
-  /// parameters that its maker added to the owner's; called from several threads at once.
+  double extractor_lr = 1;    ///< step size of the extractor beside the mark's, > 0
+  /// Presets paper and code: makes the marked picture [pixels, 3] of a view in place of the owner's colours,
+  /// from parameters that its maker added to the owner's; called from several threads at once.
   /// @param message  [1, N_b], -1 or 1
   std::function<Var<float>(Tape<float>& tape, const Params<float>& params, const CachedView& view,
                            Var<float> message)>
@@ -48,6 +50,13 @@ struct EmbedOptions {
 
 /// The options of a preset: the defaults for fast; for paper a step size of 5e-4 and its distortions at most
 /// (noise 0.1, 30 degrees, scale 0.75, blur 0.1).   Source: Luo et al. 2023, section 4.1.
+/// For code what the authors' code has in its place: the extractor learns twice as fast, at 1e-3
+/// (extractor_lr); a picture is one piece at a random place, not a part of changing size (zoom_out, zoom_in);
+/// there are no distortions (noise, rotation, blur), of which it would take one kind a run: then noise is of
+/// 1e-4, and blur of 0.1 pixels, which changes nothing; samples move by 0.2 of their spacing (sample_shift,
+/// for that of RadianceFieldOptions). Left as in preset paper: samples move in all directions and not along
+/// the ray about the lower end of their interval, and the length of the run is the schedule's (400,000 steps
+/// there).
 EmbedOptions embed_options(Preset preset);
 
 /// Trains mark and extractor together on a frozen field (Luo et al. 2023, sec. 3.3 and 3.4, with dense local
@@ -57,11 +66,12 @@ EmbedOptions embed_options(Preset preset);
 /// with the residual r under a budget of power that takes the place of the content loss: the budget says how
 /// much is changed, the last two terms keep it where eyes do not look, in fine detail and on texture. u rises
 /// from 0 to 1 while the share of right signs goes from 0.7 to 0.8: a mark must be readable before it can
-/// hide (with u = 1 from the first step on, signs stayed at 50% for 500 steps). An owner of preset paper has
-/// the paper's loss in its place:
+/// hide (with u = 1 from the first step on, signs stayed at 50% for 500 steps). An owner of preset paper
+/// or code has the paper's loss in its place:
 ///   L = gamma_1 mean |P~ - P^|^2 + gamma_2 BCE(pooled bits, M)
-/// without the perceptual term. Each picture draws a message, a view, distortions. Same seed and number of
-/// steps: same bytes, for any thread count and across save() and restore().
+/// without the perceptual term and, under a budget, without the content loss. Each picture draws a message, a
+/// view, distortions. Same seed and number of steps: same bytes, for any thread count and across save() and
+/// restore().
 class Embedder {
  public:
   /// Owner and views must outlive the embedder. @throws ValueError if an option is out of range, or neither
@@ -76,7 +86,7 @@ class Embedder {
   /// Steps that the run will have in all; 0 until a timed run knows.
   Index planned() const { return schedule_.total(); }
   /// Running means over the last pictures: share of places on the object whose sign is right, whose index is
-  /// right (both 0 for preset paper), and of bits right, all under training distortions.
+  /// right (both 0 for presets paper and code), and of bits right, all under training distortions.
   struct Figures {
     double sign = 0;   ///< share of places
     double index = 0;  ///< share of places
@@ -86,7 +96,7 @@ class Embedder {
   /// As of the last step.
   const Figures& figures() const { return figures_; }
   /// Sets the owner's gain so that the mean PSNR on the object over `views` new near views is the owner's
-  /// strength; nothing for preset paper, which has no gain.
+  /// strength; nothing for presets paper and code, which have no gain without a budget.
   void calibrate(Index views = 16);
 
   /// @throws IoError
@@ -98,6 +108,7 @@ class Embedder {
 
  private:
   struct Picture;
+  void find_objects();
   void label_views();
   Picture draw(Index image) const;
   float* shifted_positions(Tape<float>& tape, const Picture& p) const;
@@ -109,6 +120,7 @@ class Embedder {
   double run_dense(const Picture& p, Tape<float>& tape, const Params<float>& params, Figures& figures) const;
   double run_pooled(const Picture& p, Tape<float>& tape, const Params<float>& params, Figures& figures) const;
   double run_picture(Index image, Tape<float>& tape, float* grads, Figures& figures) const;
+  void step_parameters();
   std::string fingerprint() const;
 
   Owner& owner_;
@@ -120,6 +132,7 @@ class Embedder {
   std::vector<float> code_matrix_;            // [cells, bits]
   std::vector<Tensor<std::int32_t>> labels_;  // cell of every pixel of every view; count() is background
   std::vector<std::vector<float>> object_;    // 1 where a view's opacity exceeds 0.5
+  std::vector<std::vector<float>> colours_;   // of a view's samples as the GlobalMark reads them
   std::vector<std::vector<float>>
       flat_;  // [pixels, 3]: 1 on flat parts of the object, falling to 0 on texture
   ShardedLoop<float> loop_;
