@@ -194,7 +194,7 @@ CellRunner::Trained CellRunner::train(const CellName& name, const Scene& scene) 
   paper_system(name.system);
   const auto field = std::make_shared<const nerf::RadianceField>(base_field(name, scene));
   if (hiding_system(name.system)) return train_hiding(name, scene, field);
-  const auto checkpoint = options_.work / (name.stem() + ".checkpoint");
+  const auto checkpoint = options_.work / (trained_as(name).stem() + ".checkpoint");
   const auto views =
       std::clamp(static_cast<Index>(kViewsASecond * options_.budget), kFewestViews, kMostViews);
   TrainedOwner owned = train_owner(
@@ -210,16 +210,17 @@ CellRunner::Trained CellRunner::train(const CellName& name, const Scene& scene) 
   return trained;
 }
 
-// What the tables of sampling and of noise on weights ask of an owner: other points along the rays of an mlp
-// field of 16 bits, noise on the weights at 8 bits.
+// What single tables ask of an owner: other points along the rays of an mlp field of 16 bits, noise on the
+// weights at 8 bits, the cameras of the authors' code for the preset that follows it.
 void CellRunner::read_variants(const CellName& name, const Trained& trained,
                                std::map<std::string, double>& under) const {
   if (!trained.owner) return;
-  const auto read = [&](const std::string& what, const MarkedScene& marked) {
+  const auto read = [&](const std::string& what, const MarkedScene& marked,
+                        nerf::CameraSet cameras = nerf::CameraSet::near) {
     if (!tell(name.stem() + ": " + what, 0, ""))
       throw Stopped(name.stem() + ": stopped while it was measured");
     under[what] = score_mark(*trained.unmarked, marked,
-                             {.cameras = nerf::make_cameras(trained.unmarked->cameras, nerf::CameraSet::near,
+                             {.cameras = nerf::make_cameras(trained.unmarked->cameras, cameras,
                                                             std::max<Index>(1, options_.under_views), 0,
                                                             name.seed + kCamerasSeed)})
                       .accuracy;
@@ -229,6 +230,8 @@ void CellRunner::read_variants(const CellName& name, const Trained& trained,
     noisy.owner = with_noisy_weights(noisy.owner, kWeightsNoise, name.seed);
     read("weights_0.01", marked_scene(noisy, name.seed));
   }
+  if (name.system == "copyrnerf_code" && !trained.unmarked->cameras.forward_facing)
+    read("cameras_ring", trained.marked, nerf::CameraSet::ring);
   if (!is_mlp(name) || name.bits != 16) return;
   const std::pair<const char*, nerf::RayPoints> kinds[] = {{"sampling_32_asp_32_isp", {32, 32, 0}},
                                                            {"sampling_64_asp", {64, 0, 0}},

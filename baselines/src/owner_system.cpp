@@ -1,16 +1,16 @@
 #include <fieldmark/baselines/owner_system.h>
+#include <fieldmark/baselines/paper_plan.h>
 #include <fieldmark/watermark/embed_views.h>
 #include <fieldmark/watermark/picture_reader.h>
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <memory>
 
 namespace fieldmark::baselines {
 namespace {
 
-constexpr std::array<std::string_view, 5> kOwners{"ours", "copyrnerf_paper", "without_drr", "nerf_message",
-                                                  "geometry"};
 constexpr double kStrength = 34;                                  // dB on the object
 constexpr Index kOurPatch = 128, kPaperPatch = 150, kLeast = 32;  // pixels
 
@@ -25,27 +25,44 @@ watermark::Owner new_owner(const nerf::RadianceField& field, const CellName& nam
 
 }  // namespace
 
-bool has_owner(std::string_view system) {
-  return std::find(kOwners.begin(), kOwners.end(), system) != kOwners.end();
-}
+bool has_owner(std::string_view system) { return paper_system(system).through_owner; }
 
 OwnerSystem owner_system(const CellName& name, Index picture) {
-  if (!has_owner(name.system))
+  const std::string& system = name.system;
+  if (!has_owner(system))
     throw ValueError("[owner_system] name.system must be one that is trained through an owner, got " +
-                     name.system);
-  const bool fast = name.system.starts_with("ours");
-  const auto preset = fast ? watermark::Preset::fast : watermark::Preset::paper;
-  OwnerSystem s{.owner = {.preset = preset, .bits = name.bits, .strength = kStrength, .seed = name.seed},
-                .embed = watermark::embed_options(preset)};
-  s.owner.reader_size = std::clamp(picture, kLeast, fast ? kOurPatch : kPaperPatch);
+                     system);
+  using watermark::Preset;
+  const bool ours = system.starts_with("ours"), cells = system != "ours_without_cells";
+  const Preset preset = system == "copyrnerf_code" ? Preset::code
+                        : ours && cells            ? Preset::fast
+                                                   : Preset::paper;
+  OwnerSystem s{.owner = watermark::owner_options(preset),
+                .embed = watermark::embed_options(ours ? Preset::fast : preset)};
+  s.owner.bits = name.bits;
+  s.owner.strength = kStrength;
+  s.owner.seed = name.seed;
+  s.owner.reader_size = std::clamp(picture, kLeast, ours ? kOurPatch : kPaperPatch);
   s.embed.seed = name.seed;
-  if (name.system == "nerf_message") s.place = MessagePlace::inputs;
-  if (name.system == "geometry") s.place = MessagePlace::density;
+  if (system == "ours_without_dense") s.embed.sign_weight = s.embed.index_weight = 0;
+  s.owner.budget = !cells;
+  s.owner.keyed_signs = system != "ours_without_signs";
+  if (system == "nerf_message") s.place = MessagePlace::inputs;
+  if (system == "geometry") s.place = MessagePlace::density;
   s.owner.colours = !s.place;
-  if (name.system == "without_drr")
+  if (system == "without_mff") s.owner.fusion.bare_message = true;
+  if (system == "without_cff") s.owner.fusion.bare_colour = true;
+  if (system == "without_drr")
     s.embed.distortions = {
         .noise = 0, .rotation = 0, .zoom_out = 1, .zoom_in = 1, .blur = 0, .sample_shift = 0};
+  if (system == "drs") s.test_shift = s.embed.distortions.sample_shift;
   return s;
+}
+
+CellName trained_as(const CellName& name) {
+  CellName trained = name;
+  if (name.system == "drs") trained.system = "copyrnerf_paper";
+  return trained;
 }
 
 watermark::Key measuring_key(std::uint64_t seed) {
@@ -67,7 +84,8 @@ TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name,
                                                      throw Stopped("views: stopped, nothing to save");
                                                    return true;
                                                  });
-  TrainedOwner trained{.owner = new_owner(field, name, system, views), .field = {}};
+  TrainedOwner trained{
+      .owner = new_owner(field, name, system, views), .field = {}, .test_shift = system.test_shift};
   auto options = system.embed;
   if (system.place) {
     const auto& o = system.owner;
@@ -83,7 +101,7 @@ TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name,
   options.schedule.steps = 0;
   options.schedule.seconds = training.seconds;
   watermark::Embedder embedder(trained.owner, views, options);
-  trained.seconds = timed_run({.what = name.stem(),
+  trained.seconds = timed_run({.what = trained_as(name).stem(),
                                .seconds = training.seconds,
                                .done = [&] { return embedder.done(); },
                                .step = [&](double seconds) { embedder.step(seconds); },
@@ -116,6 +134,22 @@ watermark::Owner with_noisy_weights(const watermark::Owner& owner, double deviat
   return noisy;
 }
 
+namespace {
+
+// Positions moved as EmbedDistortions::sample_shift moves them, each by numbers that depend on where it is.
+std::vector<float> moved(const float* x, Index n, double shift, const CounterRng& rng) {
+  std::vector<float> y(x, x + 3 * n);
+  for (std::size_t k = 0; k < y.size(); k += 3) {
+    const auto z = rng.uniform4(
+        (std::uint64_t{std::bit_cast<std::uint32_t>(y[k])} << 32) | std::bit_cast<std::uint32_t>(y[k + 1]),
+        std::bit_cast<std::uint32_t>(y[k + 2]));
+    for (std::size_t a = 0; a < 3; ++a) y[k + a] += static_cast<float>(shift) * 3.4641f * (z[a] - 0.5f);
+  }
+  return y;
+}
+
+}  // namespace
+
 MarkedScene marked_scene(const TrainedOwner& marked, std::uint64_t seed, const nerf::RenderOptions& options) {
   const watermark::Owner& owner = marked.owner;
   const auto renderer = std::make_shared<nerf::Renderer>(owner.field, options);
@@ -125,11 +159,17 @@ MarkedScene marked_scene(const TrainedOwner& marked, std::uint64_t seed, const n
   return {.bits = bits,
           .message = [=](Index view) { return message_of_view(bits, seed, view); },
           .render =
-              [=, &marked, &owner](const nerf::Camera& camera, const watermark::Message& message) {
+              [=, &marked](const nerf::Camera& camera, const watermark::Message& message) {
                 const auto signs = watermark::cell_signs(*code, message);
                 if (marked.field)
-                  return marked.field->render(owner.params, owner.field, camera, signs, options);
-                renderer->set_recolour(owner.marking(signs));
+                  return marked.field->render(marked.owner.params, marked.owner.field, camera, signs,
+                                              options);
+                auto recolour = marked.owner.marking(signs);
+                if (marked.test_shift > 0)
+                  recolour = [=, &marked](const float* x, const float* d, Index n, float* rgb) {
+                    recolour(moved(x, n, marked.test_shift, CounterRng(seed, 64)).data(), d, n, rgb);
+                  };
+                renderer->set_recolour(recolour);
                 return renderer->render(camera).rgb;
               },
           .accuracy =

@@ -13,27 +13,35 @@ const std::array kSystems{
                 "a bit in every cell of the scene, read place by place, under a budget of power"},
     PaperSystem{"copyrnerf_paper", "CopyRNeRF, preset paper",
                 "one message fused into every colour, read from the whole picture, under distortions"},
+    PaperSystem{"copyrnerf_code", "CopyRNeRF, preset code",
+                "the same with the networks, step sizes and pictures of the authors' code"},
     PaperSystem{"hidden_nerf", "HiDDeN + NeRF",
-                "photographs marked by HiDDeN at 30 dB, a field trained on them, its renders read"},
+                "photographs marked by HiDDeN at 30 dB, a field trained on them, its renders read", false},
     PaperSystem{"mbrs_nerf", "MBRS + NeRF",
-                "photographs marked by MBRS at 30 dB, a field trained on them, its renders read"},
+                "photographs marked by MBRS at 30 dB, a field trained on them, its renders read", false},
     PaperSystem{
         "nerf_message", "NeRF with message",
         "the message beside the inputs of the field's networks, trained on from the unmarked field's"},
     PaperSystem{"geometry", "CopyRNeRF in geometry",
                 "the message fused into the density, colours left as they are"},
-    PaperSystem{"nerf_hidden", "NeRF + HiDDeN", "renders of an unmarked field marked by HiDDeN at 30 dB"},
-    PaperSystem{"nerf_mbrs", "NeRF + MBRS", "renders of an unmarked field marked by MBRS at 30 dB"},
-    PaperSystem{"without_drr", "CopyRNeRF without DRR", "neither distortions nor moved samples in training"}};
+    PaperSystem{"nerf_hidden", "NeRF + HiDDeN", "renders of an unmarked field marked by HiDDeN at 30 dB",
+                false},
+    PaperSystem{"nerf_mbrs", "NeRF + MBRS", "renders of an unmarked field marked by MBRS at 30 dB", false},
+    PaperSystem{"without_drr", "CopyRNeRF without DRR", "neither distortions nor moved samples in training"},
+    PaperSystem{"without_mff", "CopyRNeRF without MFF", "the message itself in the fusion, not its features"},
+    PaperSystem{"without_cff", "CopyRNeRF without CFF", "the colour itself in the fusion, not its features"},
+    PaperSystem{"drs", "CopyRNeRF, DRS", "preset paper, with samples moved at test as in training"},
+    PaperSystem{"ours_without_dense", "Fieldmark without dense supervision",
+                "the bits of the whole picture teach, not signs and cells of its places"},
+    PaperSystem{"ours_without_cells", "Fieldmark without cells",
+                "preset paper's networks, one message everywhere, under our budget of power"},
+    PaperSystem{"ours_without_signs", "Fieldmark without keyed signs",
+                "a cell shows its bit as it is, not with the sign that the key gives it"}};
 
 constexpr std::array<std::string_view, 6> kTables{"bits",     "quality",  "distortion",
                                                   "ablation", "sampling", "weights"};
 constexpr std::array<Index, 5> kLengths{4, 8, 16, 32, 48};
 constexpr Index kBits = 16, kWeightsBits = 8;
-
-bool is_built(std::string_view name) {
-  return std::any_of(kSystems.begin(), kSystems.end(), [&](const PaperSystem& s) { return s.name == name; });
-}
 
 class Plan {
  public:
@@ -44,8 +52,7 @@ class Plan {
       for (const Index n : bits)
         for (const char* system : systems) {
           const CellName name{system, scene, field, n, options_.seed + k};
-          if (is_built(system) && std::find(cells_.begin(), cells_.end(), name) == cells_.end())
-            cells_.push_back(name);
+          if (std::find(cells_.begin(), cells_.end(), name) == cells_.end()) cells_.push_back(name);
         }
   }
   std::vector<CellName> take() { return std::move(cells_); }
@@ -72,8 +79,9 @@ void plan_scene(PaperTable table, const std::string& scene, bool first, bool ful
       return plan.add({"hidden_nerf", "mbrs_nerf"}, scene, one);
     case PaperTable::quality:
       plan.add(main, scene, one);
-      if (first || full) plan.add({"copyrnerf_paper"}, scene, one, "mlp");
-      return;
+      if (!first && !full) return;
+      plan.add({"copyrnerf_code"}, scene, one);
+      return plan.add({"copyrnerf_paper"}, scene, one, "mlp");
     case PaperTable::distortion:
       plan.add(main, scene, one);
       if (first || full) plan.add({"without_drr"}, scene, one);

@@ -1,4 +1,7 @@
+#include <fieldmark/baselines/hiding_system.h>
 #include <fieldmark/baselines/owner_system.h>
+#include <fieldmark/baselines/paper_plan.h>
+#include <fieldmark/engine/metrics.h>
 
 #include <cmath>
 
@@ -52,6 +55,79 @@ TEST_CASE("owner_system: what each system is") {
   CHECK_THROWS_WITH(
       owner_system({"hidden_nerf", "lego", "hash", 16, 1}, 160),
       "[owner_system] name.system must be one that is trained through an owner, got hidden_nerf");
+}
+
+TEST_CASE("owner_system: each ablation takes away its part and nothing else") {
+  const auto system = [](const char* name) { return owner_system({name, "lego", "hash", 16, 1}, 160); };
+  const auto paper = system("copyrnerf_paper"), ours = system("ours");
+  CHECK(paper.owner.fusion == watermark::MarkFusion{});
+  CHECK(system("without_mff").owner.fusion == watermark::MarkFusion{.bare_message = true});
+  CHECK(system("without_cff").owner.fusion == watermark::MarkFusion{.bare_colour = true});
+  CHECK(system("without_cff").embed.distortions.rotation == 30);
+  CHECK(system("drs").test_shift == paper.embed.distortions.sample_shift);
+  CHECK(paper.test_shift == 0);
+  CHECK(trained_as({"drs", "lego", "hash", 16, 1}) == CellName{"copyrnerf_paper", "lego", "hash", 16, 1});
+  CHECK(trained_as({"ours", "lego", "hash", 16, 1}).system == "ours");
+  const auto code = system("copyrnerf_code");
+  CHECK(code.owner.preset == watermark::Preset::code);
+  CHECK(code.owner.message_features == 128);
+  CHECK(code.embed.extractor_lr == 2);
+  CHECK(code.owner.reader_size == 150);
+
+  CHECK(ours.embed.sign_weight == 1);
+  CHECK(ours.owner.keyed_signs);
+  const auto dense = system("ours_without_dense"), cells = system("ours_without_cells"),
+             signs = system("ours_without_signs");
+  CHECK(dense.owner.preset == watermark::Preset::fast);
+  CHECK(dense.embed.sign_weight == 0);
+  CHECK(dense.embed.index_weight == 0);
+  CHECK(dense.embed.bits_weight == ours.embed.bits_weight);
+  CHECK(cells.owner.preset == watermark::Preset::paper);
+  CHECK(cells.owner.budget);
+  CHECK(cells.owner.reader_size == 128);
+  CHECK(cells.owner.strength == 34);
+  CHECK(cells.embed.schedule.lr == ours.embed.schedule.lr);
+  CHECK(!signs.owner.keyed_signs);
+  CHECK(!ours.owner.budget);
+}
+
+TEST_CASE("owner_system: every system of the tables has an owner or a 2-D network") {
+  for (const PaperSystem& system : paper_systems()) {
+    CAPTURE(system.name);
+    CHECK(has_owner(system.name) == !hiding_system(system.name));
+    if (has_owner(system.name))
+      CHECK(owner_system({system.name, "lego", "hash", 16, 1}, 160).owner.bits == 16);
+  }
+}
+
+TEST_CASE("owner_system: moved samples at test change pictures a little, in the same way each time") {
+  TrainedOwner trained{.owner = tiny_owner(), .field = {}};
+  trained.owner.gain = 0.05;
+  const auto camera = nerf::make_cameras(trained.owner.field.cameras, nerf::CameraSet::near, 1, 0, 7).front();
+  const auto picture = [&](double shift) {
+    trained.test_shift = shift;
+    return marked_scene(trained, 1).render(camera, watermark::Message{{1, 0, 0, 1}});
+  };
+  const auto still = picture(0), a = picture(1e-2), b = picture(1e-2);
+  CHECK(a.data == b.data);
+  CHECK(a.data != still.data);
+  CHECK(psnr(a, still) > psnr(nerf::Renderer(trained.owner.field).render(camera).rgb, still));
+}
+
+TEST_CASE("owner_system: each ablation takes its steps and is measured") {
+  for (const char* name : {"ours_without_dense", "ours_without_cells", "ours_without_signs", "without_mff",
+                           "without_cff", "drs", "copyrnerf_code"}) {
+    CAPTURE(name);
+    const TemporaryFolder folder;
+    const CellName cell{name, "objects", "hash", 4, 2};
+    const TrainedOwner trained = train_owner(tiny_field(), cell, tiny_system(cell),
+                                             {.seconds = 0.05, .checkpoint = folder / "run", .views = 8});
+    CHECK(trained.steps >= 1);
+    const auto cameras = nerf::make_cameras(trained.owner.field.cameras, nerf::CameraSet::near, 2, 0, 123);
+    const auto scores = score_mark(trained.owner.field, marked_scene(trained, 1), {.cameras = cameras});
+    CHECK(scores.accuracy >= 0);
+    CHECK(scores.psnr_base < 60);
+  }
 }
 
 TEST_CASE("owner_system: a key for each seed") {

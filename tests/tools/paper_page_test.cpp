@@ -17,6 +17,7 @@ TEST_CASE("The paper's page has our figures beside the published ones", "[paper_
              Contains("![paper_bits.svg](paper_bits.svg)") && Contains("A note.\n") && Contains("ICCV 2023"));
   CHECK_THAT(page, Contains("| copyrnerf_paper-lego-hash-16-1 | 100 | 60.0 | 90 |"));
   CHECK_THAT(page, Contains("In all 3 cells, 0.07 hours."));
+  CHECK_THAT(page, Contains("Fieldmark without cells") && Contains("## Cameras of the authors' code"));
   CHECK(page == cli::paper_page(paper_cells(), {"paper_bits.svg"}, "A note.\n"));
 }
 

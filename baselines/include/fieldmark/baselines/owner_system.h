@@ -17,12 +17,21 @@ struct OwnerSystem {
   /// Of systems whose densities depend on the message: the owner then has no colours of its own, and its
   /// extractor reads what a MessageField shows.
   std::optional<MessagePlace> place{};
+  double test_shift = 0;  ///< DRS: samples are moved so far at test too, see EmbedDistortions::sample_shift
 };
 
 /// Whether a system of paper_systems() is trained through an Owner.
 bool has_owner(std::string_view system);
-/// The options of such a system: "ours" at 34 dB on the object, read at up to 128 pixels; the paper's at up
-/// to 150.
+/// The options of such a system: ours at 34 dB on the object, read at up to 128 pixels; the paper's at up to
+/// 150. Without one of its parts a system has, in its place,
+///   ours_without_dense: signs and cells of places cost nothing, the pooled bits alone do;
+///   ours_without_cells: preset paper's networks under our budget, distortions and step sizes: one message
+///   for
+///     all places, which then cannot be told apart either;
+///   ours_without_signs: the bit's own sign in every cell;
+///   without_drr: neither distortions nor moved samples; without_mff and without_cff: see MarkFusion; drs:
+///   the
+///     full method, with the samples moved at test as in training.
 /// @param picture  pixels of the views' longer side; the reader sees no more, and at least 32
 /// @throws ValueError if the system has none
 OwnerSystem owner_system(const CellName& name, Index picture);
@@ -42,9 +51,13 @@ struct OwnerTraining {
 struct TrainedOwner {
   watermark::Owner owner;             ///< calibrated
   std::optional<MessageField> field;  ///< whose numbers are among the owner's, see OwnerSystem::place
+  double test_shift = 0;              ///< see OwnerSystem
   Index steps = 0;                    ///< of training
   double seconds = 0;                 ///< of training
 };
+
+/// The cell whose training a system's is: drs trains as copyrnerf_paper does.
+CellName trained_as(const CellName& name);
 
 /// Renders views, trains mark and extractor and calibrates the strength; goes on from a checkpoint.
 /// @throws Stopped after saving   @throws as Embedder

@@ -7,9 +7,10 @@ namespace fieldmark::baselines {
 
 /// A row of the paper's tables.
 struct PaperSystem {
-  std::string name;   ///< in cells and their files
-  std::string title;  ///< as the paper or we call it
-  std::string what;   ///< a sentence on what is trained
+  std::string name;           ///< in cells and their files
+  std::string title;          ///< as the paper or we call it
+  std::string what;           ///< a sentence on what is trained
+  bool through_owner = true;  ///< an Owner is trained, see owner_system(); else a 2-D network
 };
 /// Every system that can be run, in the order of the tables.
 std::span<const PaperSystem> paper_systems();
