@@ -3,7 +3,9 @@
 #include <fieldmark/engine/files.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <system_error>
 
 namespace fieldmark::baselines {
@@ -27,7 +29,44 @@ std::map<std::string, double> read_numbers(const Json& j) {
   return values;
 }
 
+constexpr std::string_view kLearning = "learning ";  // of names in Cell::more
+constexpr std::size_t kCurvePoints = 50;
+
 }  // namespace
+
+void keep_curve(Cell& cell, std::string_view curve) {
+  std::vector<CurvePoint> points;
+  std::istringstream lines{std::string(curve)};
+  std::string line;
+  std::getline(lines, line);  // the header
+  while (std::getline(lines, line)) {
+    CurvePoint p;
+    if (std::sscanf(line.c_str(), "%lf,%lf,%lf", &p.seconds, &p.steps, &p.figure) != 3)
+      throw IoError(cell.name.stem() + ": expected a point of its course, found '" + line + "'");
+    points.push_back(p);
+  }
+  const std::size_t kept = std::min(points.size(), kCurvePoints);
+  for (std::size_t k = 0; k < kept; ++k) {
+    const CurvePoint& p = points[(k + 1) * points.size() / kept - 1];
+    char name[64];
+    std::snprintf(name, sizeof name, "%s%.1f %.0f", kLearning.data(), p.seconds, p.steps);
+    cell.more[name] = p.figure;
+  }
+}
+
+std::vector<CurvePoint> kept_curve(const Cell& cell) {
+  std::vector<CurvePoint> points;
+  for (const auto& [name, figure] : cell.more) {
+    CurvePoint p{.figure = figure};
+    if (name.starts_with(kLearning) &&
+        std::sscanf(name.c_str() + kLearning.size(), "%lf %lf", &p.seconds, &p.steps) == 2)
+      points.push_back(p);
+  }
+  std::sort(points.begin(), points.end(), [](const CurvePoint& a, const CurvePoint& b) {
+    return a.seconds != b.seconds ? a.seconds < b.seconds : a.steps < b.steps;
+  });
+  return points;
+}
 
 std::string CellName::stem() const {
   return system + "-" + scene + "-" + field + "-" + std::to_string(bits) + "-" + std::to_string(seed);

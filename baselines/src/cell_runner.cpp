@@ -111,8 +111,9 @@ nerf::RadianceField CellRunner::trained_field(const std::string& stem, const ner
                                               const CellName& name, double seconds) {
   const auto path = options_.work / (stem + ".field"), checkpoint = options_.work / (stem + ".checkpoint");
   if (std::filesystem::exists(path)) return nerf::RadianceField::load(path);
-  nerf::RadianceFieldOptions sizes{.seed = name.seed};
+  nerf::RadianceFieldOptions sizes = is_mlp(name) ? nerf::RadianceFieldOptions{} : options_.hash;
   if (is_mlp(name)) sizes.field.kind = nerf::FieldKind::mlp;
+  sizes.seed = name.seed;
   nerf::RadianceField field(sizes);
   auto options = nerf::train_options(sizes.field.kind);
   options.schedule.seconds = seconds;
@@ -275,22 +276,22 @@ MeasuredCell CellRunner::run(const CellName& name) {
                                      {"psnr_photo_object", s.psnr_photo_object},
                                      {"psnr_photo_unmarked", s.psnr_photo_unmarked}};
   more.insert(trained.more.begin(), trained.more.end());
-  return {.cell = {.name = name,
-                   .steps = trained.steps,
-                   .seconds = trained.seconds,
-                   .bit_accuracy = s.accuracy,
-                   .spread = s.spread,
-                   .own_2d_accuracy = trained.own_2d_accuracy,
-                   .psnr_base = s.psnr_base,
-                   .psnr_base_object = s.psnr_base_object,
-                   .psnr_photo = s.psnr_photo,
-                   .ssim = s.ssim_photo,
-                   .lpips = s.lpips_photo,
-                   .under = s.under,
-                   .commit = o.commit,
-                   .more = more},
-          .picture = tile(pair, 2, 0),
-          .curve = run_curve(trained.checkpoint)};
+  Cell cell{.name = name,
+            .steps = trained.steps,
+            .seconds = trained.seconds,
+            .bit_accuracy = s.accuracy,
+            .spread = s.spread,
+            .own_2d_accuracy = trained.own_2d_accuracy,
+            .psnr_base = s.psnr_base,
+            .psnr_base_object = s.psnr_base_object,
+            .psnr_photo = s.psnr_photo,
+            .ssim = s.ssim_photo,
+            .lpips = s.lpips_photo,
+            .under = s.under,
+            .commit = o.commit,
+            .more = more};
+  keep_curve(cell, run_curve(trained.checkpoint));
+  return {.cell = cell, .picture = tile(pair, 2, 0)};
 }
 
 void save_measured(const std::filesystem::path& folder, const MeasuredCell& measured) {
@@ -299,7 +300,6 @@ void save_measured(const std::filesystem::path& folder, const MeasuredCell& meas
   if (failed) throw IoError(folder.string() + ": cannot make the folder: " + failed.message());
   const std::string stem = cell_path(folder, measured.cell.name).string();
   write_png(stem + ".png", measured.picture);
-  write_file_atomically(stem + ".csv", measured.curve);
   save_cell(folder, measured.cell);
 }
 

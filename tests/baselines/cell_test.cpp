@@ -29,6 +29,27 @@ Cell sample() {
 }
 }  // namespace
 
+TEST_CASE("cell: the course of training is kept in it, thinned out, and comes back") {
+  std::string curve = "seconds,steps,figure\n";
+  for (int k = 1; k <= 120; ++k)
+    curve +=
+        std::to_string(k) + ".5," + std::to_string(10 * k) + "," + std::to_string(0.5 + 0.004 * k) + "\n";
+  Cell cell = sample();
+  CHECK(kept_curve(cell).empty());
+  keep_curve(cell, curve);
+  const auto points = kept_curve(parse_cell(format_cell(cell), "here"));
+  REQUIRE(points.size() == 50);
+  CHECK(points.front().seconds < 4);
+  CHECK(points.back().seconds == 120.5);
+  CHECK(points.back().steps == 1200);
+  CHECK(points.back().figure == Approx(0.98));
+  for (std::size_t k = 1; k < points.size(); ++k) CHECK(points[k].seconds > points[k - 1].seconds);
+  keep_curve(cell = sample(), "seconds,steps,figure\n1.0,2,nan\n");
+  CHECK(kept_curve(cell).size() == 1);
+  CHECK_THROWS_WITH(keep_curve(cell, "seconds,steps,figure\nmany\n"),
+                    "hidden_nerf-lego-hash-16-3: expected a point of its course, found 'many'");
+}
+
 TEST_CASE("cell: the keys that scripts read, null where nothing was measured") {
   const std::string text = format_cell(sample());
   std::size_t at = 0;

@@ -1,7 +1,9 @@
 #include <fieldmark/baselines/cell.h>
+#include <fieldmark/baselines/paper_plan.h>
 #include <fieldmark/engine/files.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "support/catch.h"
 #include "support/temporary_folder.h"
@@ -26,7 +28,9 @@ TEST_CASE("reproduce measures what is missing on the built-in scene, once", "[re
                                       "--photographs",
                                       "1",
                                       "--base-seconds",
-                                      "1",
+                                      "0.1",
+                                      "--log2-table",
+                                      "9",
                                       "--cells",
                                       folder / "cells",
                                       "--work",
@@ -67,6 +71,26 @@ TEST_CASE("reproduce --report-only writes the page from the cells that are there
                         !Contains("  ours-lego-hash-16-1\n"));
   CHECK_THAT(read_text(folder / "page.md"), Contains("98.44 ± 6.25"));
   CHECK(!std::filesystem::exists(folder / "work"));
+}
+
+TEST_CASE("reproduce has every system once before it turns to other lengths and scenes", "[reproduce]") {
+  const TemporaryFolder folder;
+  const auto r = run_command({"reproduce", "--report-only", "--scene", "lego", "--scene", "chair", "--cells",
+                              folder / "cells", "--json", "-"});
+  REQUIRE(r.code == cli::kOk);
+  const auto missing = nlohmann::json::parse(r.out)["missing"].get<std::vector<std::string>>();
+  std::set<std::string> systems;
+  for (const auto& s : baselines::paper_systems()) systems.insert(s.name);
+  std::size_t cells = 0;
+  while (!systems.empty() && cells < missing.size()) {
+    CHECK(!missing[cells].ends_with("-48-1"));
+    CHECK(missing[cells].find("-lego-") != std::string::npos);
+    systems.erase(missing[cells].substr(0, missing[cells].find('-')));
+    ++cells;
+  }
+  CHECK(systems.empty());
+  CHECK(cells <= 18);
+  CHECK(missing.back().find("-chair-") != std::string::npos);
 }
 
 TEST_CASE("reproduce says what is wrong", "[reproduce]") {

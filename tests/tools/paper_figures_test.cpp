@@ -16,33 +16,43 @@ std::size_t count(const std::string& text, const std::string& part) {
 
 TEST_CASE("Lines of lengths, of the severities that were measured, and of the course of training",
           "[paper_figures]") {
-  const TemporaryFolder folder;
-  write_file_atomically(folder / "ours-lego-hash-16-1.csv",
-                        "seconds,steps,figure\n1.5,10,0.5\n3.0,20,0.75\n");
-  const auto figures = cli::paper_figures(paper_cells(), folder.path);
-  REQUIRE(figures.size() == 3);  // nothing was rotated, scaled or blurred
+  auto cells = paper_cells();
+  keep_curve(cells.back(), "seconds,steps,figure\n1.5,10,0.5\n3.0,20,0.75\n");
+  const auto figures = cli::paper_figures(cells);
+  REQUIRE(figures.size() == 4);  // nothing was rotated, scaled or blurred
   // Three of ours, and what the paper has of five lengths for the systems that can be run.
   CHECK(count(figures.at("paper_bits.svg"), "class=\"point\"") % 5 == 3);
   CHECK_THAT(figures.at("paper_bits.svg"), Contains("copyrnerf_paper, published"));
   CHECK(count(figures.at("paper_noise.svg"), "class=\"point\"") == 2 * 3);  // none and two severities
   CHECK(count(figures.at("paper_learning.svg"), "class=\"point\"") == 2);
-  CHECK(cli::paper_figures({}, folder.path).empty() == false);  // published lengths alone
+  CHECK(count(figures.at("paper_learning_steps.svg"), "class=\"point\"") == 2);
+  CHECK(cli::paper_figures({}).size() == 1);  // published lengths alone
 }
 
 TEST_CASE("The sheet has a row for each picture of a cell of 16 bits", "[paper_figures]") {
   const TemporaryFolder folder;
-  CHECK(cli::write_paper_sheet(paper_cells(), folder.path, folder / "sheet.png").empty());
+  const cli::PaperSheet all = cli::paper_sheets().front(), residual = cli::paper_sheets().back();
+  CHECK(cli::write_paper_sheet(all, paper_cells(), folder.path, folder / "sheet.png").empty());
   CHECK(folder.entries() == 0);
   Tensor<float> both({2, 6, 3}, 0.2f);
   for (Index p = 0; p < 12; ++p)
     for (Index c = 0; c < 3; ++c)
       if (p % 6 >= 3) both[3 * p + c] = 0.24f;
   write_png(folder / "ours-lego-hash-16-1.png", both);
-  const auto rows = cli::write_paper_sheet(paper_cells(), folder.path, folder / "sheet.png");
+  const auto rows = cli::write_paper_sheet(all, paper_cells(), folder.path, folder / "sheet.png");
   CHECK(rows == std::vector<std::string>{"ours-lego-hash-16-1"});
   const auto sheet = read_image(folder / "sheet.png");
   CHECK(sheet.shape == Shape{2, 3 * 3 + 2 * 4, 3});
   CHECK(sheet[0] == 51 / 255.f);
   CHECK(sheet[3 * 7] == 61 / 255.f);
   CHECK(sheet[3 * 14] == Approx(0.5 + 10 * 10 / 255.0).margin(0.002));
+  // Thirty times the difference, of the 2-D networks on renders alone.
+  CHECK(residual.name == "paper_residual.png");
+  CHECK(cli::write_paper_sheet(residual, paper_cells(), folder.path, folder / "residual.png").empty());
+  auto cells = paper_cells();
+  cells.back().name.system = "nerf_mbrs";
+  for (Index p = 0; p < 12; ++p) both[3 * p] = 0.2f + (p % 6 >= 3 ? 3 / 255.f : 0.f);
+  write_png(folder / "nerf_mbrs-lego-hash-16-1.png", both);
+  CHECK(cli::write_paper_sheet(residual, cells, folder.path, folder / "residual.png").size() == 1);
+  CHECK(read_image(folder / "residual.png")[3 * 14] == Approx(0.5 + 30 * 3 / 255.0).margin(0.002));
 }

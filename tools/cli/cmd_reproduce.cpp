@@ -33,6 +33,7 @@ struct Options {
   std::string cells = "docs/results/cells", work = "reproduce_work", lpips_weights;
   double budget = 300, base_seconds = 0;
   Index size = 0, views = 0, photographs = 20;
+  int log2_table = nerf::HashEncodingOptions{}.log2_table;
   bool full = false, report_only = false;
 };
 
@@ -61,10 +62,14 @@ std::vector<baselines::CellName> planned(const Options& options,
   std::vector<std::string> tables = options.tables;
   if (tables.empty())
     for (const auto name : baselines::paper_table_names()) tables.emplace_back(name);
+  // Every row once before any has its other lengths and scenes: a run that ends early shows them all.
+  std::stable_partition(tables.begin(), tables.end(), [](const std::string& name) { return name != "bits"; });
   std::vector<baselines::CellName> cells;
   for (const std::string& table : tables)
     for (const auto& name : plan_cells(baselines::parse_paper_table(table), plan))
       if (std::find(cells.begin(), cells.end(), name) == cells.end()) cells.push_back(name);
+  std::stable_partition(cells.begin(), cells.end(),
+                        [&](const baselines::CellName& name) { return name.scene == scenes.front().name; });
   return cells;
 }
 
@@ -95,16 +100,19 @@ std::filesystem::path write_page(const Options& options, const Context& context)
   const auto cells = baselines::load_cells(folder);
   const auto beside = [&](const std::string& name) { return page.parent_path() / name; };
   std::vector<std::string> shown;
-  for (const auto& [name, svg] : paper_figures(cells, folder)) {
+  for (const auto& [name, svg] : paper_figures(cells)) {
     write_file_atomically(beside(name), svg);
     shown.push_back(name);
   }
   std::string notes;
   if (std::filesystem::exists(folder / "notes.md")) notes = read_text(folder / "notes.md");
-  const auto stems = write_paper_sheet(cells, folder, beside("paper_pictures.png"));
-  if (!stems.empty()) {
-    shown.push_back("paper_pictures.png");
-    notes += "\nRows of paper_pictures.png (unmarked, marked, ten times the difference):";
+  for (const PaperSheet& sheet : paper_sheets()) {
+    const auto stems = write_paper_sheet(sheet, cells, folder, beside(sheet.name));
+    if (stems.empty()) continue;
+    shown.push_back(sheet.name);
+    char gain[16];
+    std::snprintf(gain, sizeof gain, "%.0f", static_cast<double>(sheet.gain));
+    notes += "\nRows of " + sheet.name + " (unmarked, marked, " + gain + " times the difference):";
     for (const auto& stem : stems) notes += " " + stem;
     notes += "\n";
   }
@@ -138,9 +146,12 @@ void measure(const Options& options, const std::vector<baselines::PaperScene>& s
   Shown shown(context);
   const Index views =
       options.views > 0 ? options.views : std::clamp<Index>(static_cast<Index>(options.budget), 20, 200);
+  nerf::RadianceFieldOptions hash;
+  hash.field.encoding.log2_table = options.log2_table;
   baselines::CellRunner runner({.scenes = scenes,
                                 .budget = options.budget,
                                 .base_seconds = options.base_seconds,
+                                .hash = hash,
                                 .size = options.size,
                                 .views = views,
                                 .under_views = std::max<Index>(1, views / 5),
@@ -212,6 +223,9 @@ void add_measuring_options(CLI::App& app, Options& o) {
       ->check(CLI::Range(16, 8192).description(""))
       ->type_name("N")
       ->default_str("");
+  app.add_option("--log2-table", o.log2_table, "Rows of a hash field's table, as a power of two, 9 to 24")
+      ->check(CLI::Range(9, 24).description(""))
+      ->type_name("N");
   app.add_option("--views", o.views,
                  "Near views that are read in each cell, 1 to 100000 (as many as seconds of --budget, 20 to "
                  "200), a fifth of them under distortion")

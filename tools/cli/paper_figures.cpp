@@ -3,7 +3,6 @@
 #include <fieldmark/baselines/paper_plan.h>
 #include <fieldmark/baselines/published.h>
 #include <fieldmark/bench/line_chart.h>
-#include <fieldmark/engine/files.h>
 #include <fieldmark/engine/image.h>
 
 #include <algorithm>
@@ -75,15 +74,16 @@ std::vector<LineSeries> lines_of_severity(const std::vector<Cell>& cells, const 
   return lines;
 }
 
-LineSeries learning_curve(const std::filesystem::path& file, const std::string& name) {
-  LineSeries line{name, {}, false};
-  const std::string text = read_text(file);
-  for (std::size_t at = text.find('\n'); at != std::string::npos; at = text.find('\n', at + 1)) {
-    double seconds = 0, figure = 0;
-    if (std::sscanf(text.c_str() + at + 1, "%lf,%*d,%lf", &seconds, &figure) == 2)
-      line.points.push_back({seconds, 100 * figure});
+std::vector<LineSeries> learning_curves(const std::vector<Cell>& cells,
+                                        double baselines::CurvePoint::*against) {
+  std::vector<LineSeries> lines;
+  for (const Cell& c : cells) {
+    if (c.name.bits != kBits) continue;
+    LineSeries line{c.name.system + " (" + scene_of(c) + ")", {}, false};
+    for (const auto& p : kept_curve(c)) line.points.push_back({p.*against, 100 * p.figure});
+    lines.push_back(line);
   }
-  return line;
+  return lines;
 }
 
 bool is_drawn(const std::vector<LineSeries>& lines) {
@@ -95,8 +95,7 @@ bool is_drawn(const std::vector<LineSeries>& lines) {
 
 }  // namespace
 
-std::map<std::string, std::string> paper_figures(const std::vector<Cell>& cells,
-                                                 const std::filesystem::path& folder) {
+std::map<std::string, std::string> paper_figures(const std::vector<Cell>& cells) {
   std::map<std::string, std::string> figures;
   const auto add = [&](const std::string& file, const bench::ScatterText& text,
                        const std::vector<LineSeries>& lines) {
@@ -108,25 +107,31 @@ std::map<std::string, std::string> paper_figures(const std::vector<Cell>& cells,
     add(std::string("paper_") + kind.name + ".svg",
         {std::string("Bit accuracy of one view, 16 bits, under ") + kind.name, kind.axis, "bits right, %"},
         lines_of_severity(cells, kind));
-  std::vector<LineSeries> curves;
-  for (const Cell& c : cells) {
-    const std::string file = cell_path(folder, c.name).string() + ".csv";
-    if (c.name.bits == kBits && std::filesystem::exists(file))
-      curves.push_back(learning_curve(file, c.name.system + " (" + scene_of(c) + ")"));
-  }
   add("paper_learning.svg", {"Bits right in training, 16 bits", "seconds of training", "bits right, %"},
-      curves);
+      learning_curves(cells, &baselines::CurvePoint::seconds));
+  add("paper_learning_steps.svg", {"Bits right in training, 16 bits", "steps", "bits right, %"},
+      learning_curves(cells, &baselines::CurvePoint::steps));
   return figures;
 }
 
-std::vector<std::string> write_paper_sheet(const std::vector<Cell>& cells,
+const std::vector<PaperSheet>& paper_sheets() {
+  static const std::vector<PaperSheet> sheets{
+      {.name = "paper_pictures.png", .systems = {}},
+      {.name = "paper_residual.png", .systems = {"nerf_hidden", "nerf_mbrs"}, .gain = 30}};
+  return sheets;
+}
+
+std::vector<std::string> write_paper_sheet(const PaperSheet& sheet, const std::vector<Cell>& cells,
                                            const std::filesystem::path& folder,
                                            const std::filesystem::path& file) {
   std::vector<PicturePair> pairs;
   std::vector<std::string> stems;
   for (const Cell& c : cells) {
     const std::string picture = cell_path(folder, c.name).string() + ".png";
-    if (c.name.bits != kBits || !std::filesystem::exists(picture)) continue;
+    const auto& shown = sheet.systems;
+    if (c.name.bits != kBits || !std::filesystem::exists(picture) ||
+        (!shown.empty() && std::find(shown.begin(), shown.end(), c.name.system) == shown.end()))
+      continue;
     const Tensor<float> both = read_image(picture);
     const Index h = both.shape[0], w = both.shape[1] / 2, channels = both.shape[2];
     PicturePair pair{Tensor<float>({h, w, channels}), Tensor<float>({h, w, channels})};
@@ -138,7 +143,7 @@ std::vector<std::string> write_paper_sheet(const std::vector<Cell>& cells,
     pairs.push_back(std::move(pair));
     stems.push_back(c.name.stem());
   }
-  if (!pairs.empty()) write_png(file, comparison_sheet(pairs));
+  if (!pairs.empty()) write_png(file, comparison_sheet(pairs, sheet.gain));
   return stems;
 }
 

@@ -8,15 +8,23 @@
 
 namespace fieldmark::cli {
 
-/// SVG files by name: accuracy against length, severity curves and the learning curves (see run_curve()) of
-/// the cells whose STEM.csv lies in `folder`. Figures without a point are left out.
-std::map<std::string, std::string> paper_figures(const std::vector<baselines::Cell>& cells,
-                                                 const std::filesystem::path& folder);
+/// SVG files by name: accuracy against length, severity curves and, against seconds and steps, the learning
+/// curves of the cells of 16 bits, see kept_curve(). Figures without a point are left out.
+std::map<std::string, std::string> paper_figures(const std::vector<baselines::Cell>& cells);
 
-/// Writes a contact sheet of the cells' STEM.png: unmarked, marked, ten times the difference, a row for each
+/// A picture of the page.
+struct PaperSheet {
+  std::string name;                  ///< of its file: "paper_residual.png"
+  std::vector<std::string> systems;  ///< whose cells it shows; empty: all
+  float gain = 10;                   ///< of the differences
+};
+/// All cells with ten times the differences; thirty times what HiDDeN and MBRS put into renders, where the
+/// paper's figure shows traces in empty areas.
+const std::vector<PaperSheet>& paper_sheets();
+/// Writes a contact sheet of the cells' STEM.png: unmarked, marked, the difference enlarged, a row for each
 /// cell of 16 bits; nothing where there is none.
 /// @return the stems of the rows, from the top   @throws IoError
-std::vector<std::string> write_paper_sheet(const std::vector<baselines::Cell>& cells,
+std::vector<std::string> write_paper_sheet(const PaperSheet& sheet, const std::vector<baselines::Cell>& cells,
                                            const std::filesystem::path& folder,
                                            const std::filesystem::path& file);
 

@@ -42,6 +42,18 @@ struct Cell {
   std::map<std::string, double> more;   ///< the protocol in numbers, and figures beside those above
 };
 
+/// A point of the course of a system's training.
+struct CurvePoint {
+  double seconds = 0;  ///< of training
+  double steps = 0;    ///< taken
+  double figure = 0;   ///< what the curve follows: of systems with a message, the share of bits right
+};
+/// Keeps the course of a run, as run_curve() has it, in Cell::more: at most 50 points, evenly spread, the
+/// last among them, under names "learning SECONDS STEPS". @throws IoError if a line is no point
+void keep_curve(Cell& cell, std::string_view curve);
+/// What keep_curve() kept, in order of time; none where nothing was kept.
+std::vector<CurvePoint> kept_curve(const Cell& cell);
+
 /// JSON with the keys {system, scene, field, bits, seed, steps, seconds, bit_accuracy, spread,
 /// own_2d_accuracy, psnr_base, psnr_base_object, psnr_photo, ssim, lpips, under, commit, more}; what is not
 /// finite is null.

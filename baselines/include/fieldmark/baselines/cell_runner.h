@@ -19,6 +19,7 @@ struct CellRunnerOptions {
   std::vector<PaperScene> scenes;  ///< at least one
   double budget = 300;             ///< seconds of a system's own training, > 0
   double base_seconds = 0;         ///< of the unmarked field's; 0: the budget, at most 60 s for a hash field
+  nerf::RadianceFieldOptions hash{};  ///< sizes of hash fields; their seed is the cell's
   Index size = 0;          ///< pixels of the pictures' longer side; 0: 160 (Blender), 252 (others), 100 (mlp)
   Index views = 200;       ///< near cameras that are read, at least 1
   Index under_views = 50;  ///< of them under each distortion and sampling
@@ -30,13 +31,12 @@ struct CellRunnerOptions {
   RunProgress progress = {};            ///< may be empty
 };
 
-/// A cell that is complete, with what its figures are drawn from.
+/// A cell that is complete, with its pictures.
 struct MeasuredCell {
   Cell cell;              ///< the numbers
   Tensor<float> picture;  ///< [H, 2 W, 3] the first test view unmarked and, beside it, marked
-  std::string curve;      ///< see run_curve()
 };
-/// Writes STEM.png, STEM.csv and, when they are there, STEM.json. @throws IoError
+/// Writes STEM.png and, when it is there, STEM.json. @throws IoError
 void save_measured(const std::filesystem::path& folder, const MeasuredCell& measured);
 
 /// Trains and measures cells one after another; scenes and unmarked fields are kept between them, fields and
