@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "json_place.h"
 #include "vec3.h"
@@ -11,6 +12,9 @@
 namespace fieldmark::nerf {
 namespace {
 using Mat3 = std::array<Vec3, 3>;  // symmetric, rows
+
+constexpr int kTries = 256;
+const double kUnseen = std::cos(std::numbers::pi / 6);  // of a direction that no training camera had
 
 void add_outer(Mat3& m, double scale, const Vec3& v) {
   for (std::size_t i = 0; i < 3; ++i) m[i] = m[i] + (scale * v[i]) * v;
@@ -84,35 +88,96 @@ Vec3 near_direction(const std::vector<Vec3>& directions, Draw& draw) {
   return norm(inside) > 1e-6 ? normalised(inside) : first;
 }
 
-// Of the box, along the world's axes, around the positions of the cameras.
-Vec3 in_box(const CameraSpan& span, Draw& draw) {
-  Vec3 low, high, eye;
+struct Box {
+  Vec3 low, high;
+};
+
+// Along the world's axes, around the positions of the cameras.
+Box box_of(const CameraSpan& span) {
+  Box box{};
   for (std::size_t i = 0; i < span.directions.size(); ++i) {
     const Vec3 p = span.centre + span.distances[i] * span.directions[i];
     for (std::size_t a = 0; a < 3; ++a) {
-      low[a] = i == 0 ? p[a] : std::min(low[a], p[a]);
-      high[a] = i == 0 ? p[a] : std::max(high[a], p[a]);
+      box.low[a] = i == 0 ? p[a] : std::min(box.low[a], p[a]);
+      box.high[a] = i == 0 ? p[a] : std::max(box.high[a], p[a]);
     }
   }
-  for (std::size_t a = 0; a < 3; ++a) eye[a] = low[a] + (high[a] - low[a]) * draw.uniform();
+  return box;
+}
+
+Vec3 in_box(const Box& box, Draw& draw) {
+  Vec3 eye;
+  for (std::size_t a = 0; a < 3; ++a) eye[a] = box.low[a] + (box.high[a] - box.low[a]) * draw.uniform();
   return eye;
 }
 
-Pose draw_pose(const CameraSpan& span, CameraSet kind, Draw draw) {
-  if (kind == CameraSet::ring) {
-    const double azimuth = 2 * std::numbers::pi * draw.uniform(), elevation = std::numbers::pi / 6;
-    const Vec3 axis = std::abs(span.up[0]) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
-    const Vec3 x = normalised(axis - dot(axis, span.up) * span.up), y = cross(span.up, x);
-    const Vec3 d =
-        std::cos(elevation) * (std::cos(azimuth) * x + std::sin(azimuth) * y) + std::sin(elevation) * span.up;
-    return look_at(span.centre + 4.0311 * d, span.centre, span.up);
+// In the box grown to twice its sides, outside of it.
+Vec3 around_box(const Box& box, Draw& draw) {
+  Box twice;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double half = 0.5 * (box.high[a] - box.low[a]);
+    twice.low[a] = box.low[a] - half, twice.high[a] = box.high[a] + half;
   }
+  Vec3 eye{};
+  for (int i = 0; i < kTries; ++i) {
+    eye = in_box(twice, draw);
+    for (std::size_t a = 0; a < 3; ++a)
+      if (eye[a] < box.low[a] || eye[a] > box.high[a]) return eye;
+  }
+  return eye;
+}
+
+Vec3 unseen_direction(const std::vector<Vec3>& directions, Draw& draw) {
+  Vec3 best{};
+  double least = 2;  // cosine of the angle to the nearest training direction
+  for (int i = 0; i < kTries && least > kUnseen; ++i) {
+    const Vec3 d = draw.direction();
+    double nearest = -1;
+    for (const Vec3& seen : directions) nearest = std::max(nearest, dot(seen, d));
+    if (nearest < least) least = nearest, best = d;
+  }
+  return best;
+}
+
+struct Range {
+  double low, high;
+  double at(double u) const { return low + (high - low) * u; }
+};
+
+// Of the training cameras' distances.
+Range distances_of(CameraSet kind, bool forward_facing) {
+  if (kind == CameraSet::closer) return forward_facing ? Range{0.8, 1} : Range{0.5, 0.8};
+  if (kind == CameraSet::farther) return forward_facing ? Range{1, 1.25} : Range{1.5, 3};
+  return forward_facing ? Range{1, 1} : Range{0.8, 1.5};
+}
+
+Pose ring_pose(const CameraSpan& span, Draw& draw) {
+  const double azimuth = 2 * std::numbers::pi * draw.uniform(), elevation = std::numbers::pi / 6;
+  const Vec3 axis = std::abs(span.up[0]) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
+  const Vec3 x = normalised(axis - dot(axis, span.up) * span.up), y = cross(span.up, x);
+  const Vec3 d =
+      std::cos(elevation) * (std::cos(azimuth) * x + std::sin(azimuth) * y) + std::sin(elevation) * span.up;
+  return look_at(span.centre + 4.0311 * d, span.centre, span.up);
+}
+
+Pose draw_pose(const CameraSpan& span, CameraSet kind, Draw draw) {
+  if (kind == CameraSet::ring) return ring_pose(span, draw);
   const double distance = span.distances[draw.below(span.distances.size())];
   if (kind == CameraSet::sphere)
     return look_at(span.centre + distance * draw.direction(), span.centre, span.up);
-  const Vec3 eye = span.forward_facing ? in_box(span, draw)
-                                       : span.centre + (distance * (0.8 + 0.7 * draw.uniform())) *
-                                                           near_direction(span.directions, draw);
+  if (kind == CameraSet::unseen)
+    return look_at(span.forward_facing ? around_box(box_of(span), draw)
+                                       : span.centre + distance * unseen_direction(span.directions, draw),
+                   span.centre, span.up);
+  const Range range = distances_of(kind, span.forward_facing);
+  Vec3 eye;
+  if (span.forward_facing) {
+    eye = in_box(box_of(span), draw);
+    if (kind != CameraSet::near) eye = span.centre + range.at(draw.uniform()) * (eye - span.centre);
+  } else {
+    const Vec3 direction = near_direction(span.directions, draw);
+    eye = span.centre + (distance * range.at(draw.uniform())) * direction;
+  }
   const Vec3 shift = (0.1 * span.half_size * std::cbrt(draw.uniform())) * draw.direction();
   return look_at(eye, span.centre + shift, span.up);
 }
@@ -171,19 +236,31 @@ CameraSpan camera_span(const Dataset& dataset) {
   return span;
 }
 
+namespace {
+constexpr std::pair<const char*, CameraSet> kSets[]{
+    {"near", CameraSet::near},     {"ring", CameraSet::ring},     {"sphere", CameraSet::sphere},
+    {"unseen", CameraSet::unseen}, {"closer", CameraSet::closer}, {"farther", CameraSet::farther},
+    {"test", CameraSet::test}};
+}  // namespace
+
+std::vector<std::string> camera_set_names() {
+  std::vector<std::string> names;
+  for (const auto& [name, set] : kSets) names.emplace_back(name);
+  return names;
+}
+
 CameraSet parse_camera_set(std::string_view name) {
-  if (name == "near") return CameraSet::near;
-  if (name == "ring") return CameraSet::ring;
-  if (name == "sphere") return CameraSet::sphere;
-  if (name == "test") return CameraSet::test;
-  throw ValueError("[cameras] set must be near, ring, sphere or test, got \"" + std::string(name) + "\"");
+  for (const auto& [known, set] : kSets)
+    if (name == known) return set;
+  throw ValueError("[cameras] set must be near, ring, sphere, unseen, closer, farther or test, got \"" +
+                   std::string(name) + "\"");
 }
 
 std::vector<Camera> make_cameras(const CameraSpan& span, CameraSet kind, Index count, Index size,
                                  std::uint64_t seed) {
   if (kind == CameraSet::test)
     throw ValueError(
-        "[make_cameras] kind must be near, ring or sphere (test views are in the data set), got test");
+        "[make_cameras] kind must be drawn from the span (test views are in the data set), got test");
   if (count < 0 || size < 0)
     throw ValueError("[make_cameras] count and size must not be negative, got " + std::to_string(count) +
                      " and " + std::to_string(size));

@@ -97,9 +97,67 @@ TEST_CASE("camera_set: ring and sphere") {
   CHECK(length(sphere_mean) < 0.15);           // 3 deviations of 400 directions
 }
 
+TEST_CASE("camera_set: closer and farther are near ones at other distances") {
+  const CameraSpan s = camera_span(cap(60), Background::white);
+  const auto [low, high] = std::minmax_element(s.distances.begin(), s.distances.end());
+  const auto check = [&](CameraSet kind, double least, double most) {
+    double nearest = 1e9, farthest = 0;
+    for (const Camera& c : make_cameras(s, kind, 300, 0, 9)) {
+      const Vec3 from = minus(c.position(), s.centre);
+      CHECK(from[2] / length(from) > 0.34);
+      CHECK(off_axis(c, s.centre) <= 0.1 * s.half_size);
+      nearest = std::min(nearest, length(from)), farthest = std::max(farthest, length(from));
+    }
+    CAPTURE(nearest, farthest);
+    CHECK((nearest >= least * *low - 1e-9 && nearest < 1.25 * least * *low));
+    CHECK((farthest <= most * *high + 1e-9 && farthest > 0.8 * most * *high));
+  };
+  check(CameraSet::closer, 0.5, 0.8);
+  check(CameraSet::farther, 1.5, 3);
+}
+
+TEST_CASE("camera_set: unseen cameras look from where no training camera was") {
+  const CameraSpan s = camera_span(cap(60), Background::white);
+  const auto nearest = [&](const Camera& c) {
+    double most = -1;
+    for (const Vec3& d : s.directions) most = std::max(most, -dot3(d, c.forward()));
+    return std::acos(most) * 180 / 3.14159265358979;
+  };
+  double widest = 0;
+  for (const Camera& c : make_cameras(s, CameraSet::unseen, 100, 0, 3)) {
+    CHECK(nearest(c) > 30);
+    CHECK(off_axis(c, s.centre) < 1e-6);
+    widest = std::max(widest, nearest(c));
+  }
+  CHECK(widest > 90);  // the whole cap below is unseen
+  // Cameras all around leave no such direction: the farthest of those that were drawn.
+  CameraSpan all = s;
+  all.directions.clear();
+  for (const Camera& c : make_cameras(s, CameraSet::sphere, 400, 0, 5)) {
+    const Vec3 f = c.forward();
+    all.directions.push_back({-f[0], -f[1], -f[2]});
+  }
+  all.distances.assign(400, 4);
+  for (const Camera& c : make_cameras(all, CameraSet::unseen, 5, 0, 3)) {
+    double most = -1;
+    for (const Vec3& d : all.directions) most = std::max(most, -dot3(d, c.forward()));
+    CHECK(most < std::cos(0.1));
+  }
+}
+
+TEST_CASE("camera_set: names and sets belong together") {
+  const auto names = camera_set_names();
+  CHECK(names.size() == 7);
+  CHECK(names.front() == "near");
+  for (const auto& name : names) CHECK_NOTHROW(parse_camera_set(name));
+  CHECK(parse_camera_set("unseen") == CameraSet::unseen);
+  CHECK(parse_camera_set("farther") == CameraSet::farther);
+}
+
 TEST_CASE("camera_set: camera i depends on the seed and i only") {
   const CameraSpan s = camera_span(cap(20), Background::white);
-  for (const CameraSet kind : {CameraSet::near, CameraSet::ring, CameraSet::sphere}) {
+  for (const CameraSet kind : {CameraSet::near, CameraSet::ring, CameraSet::sphere, CameraSet::closer,
+                               CameraSet::farther, CameraSet::unseen}) {
     const auto few = make_cameras(s, kind, 3, 0, 5), many = make_cameras(s, kind, 10, 0, 5);
     for (std::size_t i = 0; i < 3; ++i) CHECK(few[i].pose == many[i].pose);
     CHECK(few[0].pose != few[1].pose);
@@ -118,7 +176,8 @@ TEST_CASE("camera_set: the span survives its JSON text bit for bit") {
 TEST_CASE("camera_set: errors") {
   CHECK_THROWS_WITH(camera_span(std::vector<Camera>{}, Background::white),
                     Contains("at least one camera, got none"));
-  CHECK_THROWS_WITH(parse_camera_set("far"), "[cameras] set must be near, ring, sphere or test, got \"far\"");
+  CHECK_THROWS_WITH(parse_camera_set("far"),
+                    "[cameras] set must be near, ring, sphere, unseen, closer, farther or test, got \"far\"");
   CHECK(parse_camera_set("test") == CameraSet::test);
   const CameraSpan s = camera_span(cap(2), Background::white);
   CHECK_THROWS_WITH(make_cameras(s, CameraSet::test, 1, 0, 0), Contains("test views are in the data set"));
@@ -161,4 +220,19 @@ TEST_CASE("camera_set: near cameras of a forward-facing capture stand in the box
     CHECK(off_axis(c, span.centre) < 0.1 * span.half_size + 1e-9);
   }
   for (std::size_t a = 0; a < 3; ++a) CHECK(reached[a] > 0.8 * high[a]);
+  const auto inside = [&](const Vec3& p) {
+    for (std::size_t a = 0; a < 3; ++a)
+      if (p[a] < low[a] - 1e-12 || p[a] > high[a] + 1e-12) return false;
+    return true;
+  };
+  for (const Camera& c : make_cameras(span, CameraSet::unseen, 50, 0, 3)) {
+    CHECK_FALSE(inside(c.position()));
+    for (std::size_t a = 0; a < 3; ++a)
+      CHECK(std::abs(c.position()[a] - 0.5 * (low[a] + high[a])) <= high[a] - low[a] + 1e-12);
+  }
+  const double depth = -span.centre[2];
+  for (const Camera& c : make_cameras(span, CameraSet::closer, 50, 0, 3))
+    CHECK((c.position()[2] < high[2] && c.position()[2] > -0.2 * depth + low[2]));
+  for (const Camera& c : make_cameras(span, CameraSet::farther, 50, 0, 3))
+    CHECK((c.position()[2] > low[2] && c.position()[2] < 0.25 * depth + 1.25 * high[2]));
 }

@@ -26,6 +26,33 @@ TEST_CASE("measure reports an owner's mark on several sets of cameras", "[measur
   }
 }
 
+TEST_CASE("measure gives a row for each of several sets of cameras", "[measure]") {
+  const TinyJob& job = TinyJob::get();
+  const TemporaryFolder folder;
+  const auto r = run_command({"measure", "--owner", job.owner, "--cameras", "sphere,unseen,closer,farther",
+                              "--count", "2", "--geometry-count", "0", "--under", "blur_1", "--json", "-",
+                              "--report", folder / "measure.md"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  const auto json = nlohmann::json::parse(r.out);
+  CHECK(json["cameras"] == "sphere");
+  REQUIRE(json["rows"].size() == 4);
+  const char* sets[] = {"sphere", "unseen", "closer", "farther"};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto& row = json["rows"][i];
+    CHECK(row["cameras"] == sets[i]);
+    CHECK(row["views"] == 2);
+    CHECK(row["blind"].is_number());
+    CHECK(row["blur_1 blind"].is_number());
+    CHECK(row["psnr_base_object"].is_number());
+    CHECK(row["geometry"].is_null());
+  }
+  CHECK(json["rows"][0]["blind"] == json["accuracy"]["blind"]);
+  CHECK_THAT(read_text(folder / "measure.md"), Contains("| farther | 2 |"));
+  CHECK_THAT(r.err, Contains("2 views of unseen cameras"));
+  CHECK(run_command({"measure", "--owner", job.owner, "--cameras", "near,moon"}).code == cli::kUsage);
+}
+
 TEST_CASE("measure gives LPIPS against the unmarked renders where there are weights", "[measure]") {
   const TinyJob& job = TinyJob::get();
   const TemporaryFolder folder;

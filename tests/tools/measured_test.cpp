@@ -29,6 +29,25 @@ TEST_CASE("measured: JSON has the contract's keys, and null where there is no nu
   CHECK(cli::measurement_json(m, "ring")["accuracy"]["geometry"] == 1);
 }
 
+TEST_CASE("measured: a row has the figures side by side", "[measured]") {
+  watermark::Measurement m;
+  m.views = 3;
+  m.accuracy = {.blind = 0.75, .geometry = 0.875, .chosen = 1};
+  m.psnr_base_object = 36;
+  m.under["blur_1"].blind = 0.5;
+  const auto row = cli::measurement_row(m, "closer");
+  CHECK(row["cameras"] == "closer");
+  CHECK(row["views"] == 3);
+  CHECK(row["blind"] == 0.75);
+  CHECK(row["geometry"] == 0.875);
+  CHECK(row["chosen"] == 1);
+  CHECK(row["psnr_base_object"] == 36);
+  CHECK(row["blur_1 blind"] == 0.5);
+  CHECK(row["blur_1 chosen"].is_null());
+  for (const auto& [key, value] : row.items())
+    CHECK_FALSE(value.is_structured());  // a report's table takes it
+}
+
 TEST_CASE("measured: people see the accuracies in percent", "[measured]") {
   watermark::Measurement m;
   m.accuracy.blind = 0.7512;

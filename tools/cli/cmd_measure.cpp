@@ -21,17 +21,17 @@ namespace {
 struct Options {
   std::string owner, field, data, lpips_weights;
   MessageOption message;
-  std::string cameras = "near";
+  std::vector<std::string> cameras{"near"};
   Index count = 200, geometry_count = 20, size = 0, together = 1;
   bool payloads = false;
   std::vector<std::string> under;
 };
 
-std::vector<nerf::Camera> cameras_of(const Options& options, const watermark::Owner& owner,
-                                     Context& context) {
-  if (options.cameras != "test")
-    return nerf::make_cameras(owner.field.cameras, nerf::parse_camera_set(options.cameras), options.count,
-                              options.size, context.seed());
+std::vector<nerf::Camera> cameras_of(const std::string& set, const Options& options,
+                                     const watermark::Owner& owner, Context& context) {
+  if (set != "test")
+    return nerf::make_cameras(owner.field.cameras, nerf::parse_camera_set(set), options.count, options.size,
+                              context.seed());
   if (options.data.empty()) throw UsageError("--cameras test: needs --data DIR, whose test views they are");
   std::vector<nerf::Camera> cameras;
   for (const auto& view : load_scene(options.data, {.split = "test"}, context).views)
@@ -91,50 +91,76 @@ std::function<watermark::Message(Index)> messages_of(const Options& options,
   return message;
 }
 
+struct Subject {
+  watermark::Owner owner;
+  std::optional<nerf::RadianceField> baked;
+  std::optional<watermark::Message> message;
+};
+
+// On one set of cameras: the figures, and those of a row where there are several sets.
+struct Measured {
+  Json json, row;
+};
+
+Measured measured_on(const std::string& set, const std::vector<nerf::Camera>& cameras, const Options& options,
+                     const Subject& subject, const Lpips<float>* lpips, Context& context) {
+  const Index bits = subject.owner.options().bits;
+  if (options.together > static_cast<Index>(cameras.size()))
+    throw UsageError("--together: there are " + std::to_string(cameras.size()) + " views");
+  const watermark::PayloadCodec codec(bits);
+  const auto code = subject.owner.code();
+  watermark::PayloadViews payloads(code, bits, options.together);
+  const auto measured = run_measure(
+      subject.owner, subject.baked ? &*subject.baked : nullptr, subject.message ? &*subject.message : nullptr,
+      {.cameras = cameras,
+       .under = options.under,
+       .geometry_views = options.geometry_count,
+       .seed = context.seed(),
+       .messages = messages_of(options, codec, context.seed()),
+       .on_reading = [&](Index view, const std::string& under, const auto& evidence,
+                         const auto& sent) { payloads.add(view, under, evidence, sent); },
+       .lpips = lpips,
+       .progress = {}},
+      context);
+  print_measurement(context.text(), measured, set);
+  Json json = measurement_json(measured, set);
+  json["payload"] = payloads_json(options, payloads, context);
+  return {json, measurement_row(measured, set)};
+}
+
+void add_photographs(const Options& options, const Subject& subject, Json& json, Context& context) {
+  const double marked = against_photographs(options, *subject.baked, "photographs", context).psnr;
+  const double unmarked =
+      against_photographs(options, subject.owner.field, "photographs, unmarked", context).psnr;
+  char line[120];
+  std::snprintf(line, sizeof line, "against photographs  %.2f dB, unmarked field %.2f dB\n", marked,
+                unmarked);
+  context.text() << line;
+  json["psnr_photo"] = number(marked);
+  json["psnr_photo_unmarked"] = number(unmarked);
+}
+
 int run(const Options& options, Context& context) {
   if (options.message.given() == options.field.empty())
     throw UsageError("--field needs the message that was baked into it, and a message its --field");
   for (const auto& name : options.under) read_option("--under", [&] { return distort::parse_attack(name); });
   const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
-  const auto owner = watermark::Owner::load(options.owner);
-  std::optional<nerf::RadianceField> baked;
-  std::optional<watermark::Message> message;
-  const Index bits = owner.options().bits;
+  Subject subject{watermark::Owner::load(options.owner), {}, {}};
   if (!options.field.empty()) {
-    message = message_of(options.message, bits);
-    baked.emplace(nerf::RadianceField::load(options.field));
+    subject.message = message_of(options.message, subject.owner.options().bits);
+    subject.baked.emplace(nerf::RadianceField::load(options.field));
   }
-  const auto cameras = cameras_of(options, owner, context);
-  if (options.together > static_cast<Index>(cameras.size()))
-    throw UsageError("--together: there are " + std::to_string(cameras.size()) + " views");
-  const watermark::PayloadCodec codec(bits);
-  const auto code = owner.code();
-  watermark::PayloadViews payloads(code, bits, options.together);
-  const auto measured =
-      run_measure(owner, baked ? &*baked : nullptr, message ? &*message : nullptr,
-                  {.cameras = cameras,
-                   .under = options.under,
-                   .geometry_views = options.geometry_count,
-                   .seed = context.seed(),
-                   .messages = messages_of(options, codec, context.seed()),
-                   .on_reading = [&](Index view, const std::string& under, const auto& evidence,
-                                     const auto& sent) { payloads.add(view, under, evidence, sent); },
-                   .lpips = lpips ? &*lpips : nullptr,
-                   .progress = {}},
-                  context);
-  print_measurement(context.text(), measured, options.cameras);
-  Json json = measurement_json(measured, options.cameras);
-  json["payload"] = payloads_json(options, payloads, context);
-  if (baked && !options.data.empty()) {
-    const double marked = against_photographs(options, *baked, "photographs", context).psnr;
-    const double unmarked = against_photographs(options, owner.field, "photographs, unmarked", context).psnr;
-    char line[120];
-    std::snprintf(line, sizeof line, "against photographs  %.2f dB, unmarked field %.2f dB\n", marked,
-                  unmarked);
-    context.text() << line;
-    json["psnr_photo"] = number(marked);
-    json["psnr_photo_unmarked"] = number(unmarked);
+  std::vector<std::vector<nerf::Camera>> cameras;
+  for (const auto& set : options.cameras) cameras.push_back(cameras_of(set, options, subject.owner, context));
+  Json json, rows = Json::array();
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const Measured on =
+        measured_on(options.cameras[i], cameras[i], options, subject, lpips ? &*lpips : nullptr, context);
+    if (i == 0) json = on.json;
+    rows.push_back(on.row);
   }
+  if (subject.baked && !options.data.empty()) add_photographs(options, subject, json, context);
+  if (cameras.size() > 1) json["rows"] = rows;
   context.result(json);
   return kOk;
 }
@@ -150,9 +176,13 @@ Command add_measure(CLI::App& app) {
   add_message_options(app, o->message, "The message baked into it");
   app.add_option("--cameras", o->cameras,
                  "near (drawn from the span of the training cameras),\n"
-                 "ring (30 degrees above, radius 4.0311), sphere (all directions), test (of --data)")
-      ->check(CLI::IsMember({"near", "ring", "sphere", "test"}).description(""))
-      ->type_name("SET");
+                 "ring (30 degrees above, radius 4.0311), sphere (all directions),\n"
+                 "unseen (directions that no photograph has), closer, farther, test (of --data);\n"
+                 "several with commas between them: a row each, the figures of the first")
+      ->delimiter(',')
+      ->check(CLI::IsMember(nerf::camera_set_names()).description(""))
+      ->type_name("SET")
+      ->default_str("near");
   app.add_option("--count", o->count, "Views, 1 to 100000; each with its own random message if not baked")
       ->check(CLI::Range(1, 100000).description(""))
       ->type_name("N");

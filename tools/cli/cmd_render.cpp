@@ -124,8 +124,9 @@ Command add_render(CLI::App& app) {
       ->type_name("SPLIT");
   app.add_option("--cameras", o->cameras,
                  "Without --data: near (drawn from the span of the training cameras),\n"
-                 "ring (30 degrees above, radius 4.0311), sphere (all directions)")
-      ->check(CLI::IsMember({"near", "ring", "sphere", "test"}).description(""))
+                 "ring (30 degrees above, radius 4.0311), sphere (all directions),\n"
+                 "unseen (directions that no photograph has), closer, farther")
+      ->check(CLI::IsMember(nerf::camera_set_names()).description(""))
       ->type_name("SET");
   add_precision(app, o->precision);
   app.add_option("--count", o->count, "Cameras to draw, 1 to 100000")

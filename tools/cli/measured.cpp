@@ -32,6 +32,25 @@ Json measurement_json(const watermark::Measurement& m, const std::string& camera
           {"geometry_seconds", number(m.geometry_seconds)}};
 }
 
+Json measurement_row(const watermark::Measurement& m, const std::string& cameras) {
+  Json row{{"cameras", cameras},
+           {"views", m.views},
+           {"blind", number(m.accuracy.blind)},
+           {"geometry", number(m.accuracy.geometry)},
+           {"chosen", number(m.accuracy.chosen)},
+           {"accuracy_p5", number(m.accuracy_p5)},
+           {"psnr_base", number(m.psnr_base)},
+           {"psnr_base_object", number(m.psnr_base_object)},
+           {"ssim_base", number(m.ssim_base)},
+           {"lpips_base", number(m.lpips_base)}};
+  for (const auto& [name, accuracy] : m.under) {
+    row[name + " blind"] = number(accuracy.blind);
+    row[name + " geometry"] = number(accuracy.geometry);
+    row[name + " chosen"] = number(accuracy.chosen);
+  }
+  return row;
+}
+
 void print_measurement(std::ostream& out, const watermark::Measurement& m, const std::string& cameras) {
   char line[200];
   std::snprintf(line, sizeof line, "%lld bits, %lld views of %s cameras, %s\n",

@@ -11,6 +11,9 @@ namespace fieldmark::cli {
 /// The figures that `measure` and `embed` report. @param cameras  name of their set
 Json measurement_json(const watermark::Measurement& measured, const std::string& cameras);
 
+/// Its figures side by side, as a row of a table: those of --under with the reading behind their names.
+Json measurement_row(const watermark::Measurement& measured, const std::string& cameras);
+
 /// The same for people: a line a figure.
 void print_measurement(std::ostream& out, const watermark::Measurement& measured, const std::string& cameras);
 

@@ -43,16 +43,24 @@ enum class CameraSet {
          ///< scene's size; forward-facing: inside the box of their positions
   ring,  ///< azimuth uniform, elevation 30 degrees, distance 4.0311
   sphere,  ///< every direction alike, at distances of training cameras
-  test     ///< the data set's test views: read them from there
+  test,    ///< the data set's test views: read them from there
+  closer,  ///< as near, at 0.5 to 0.8 of the training cameras' distances; forward-facing: 0.8 to 1 of the way
+           ///< from the centre
+  farther,  ///< as near, at 1.5 to 3 of the distances; forward-facing: 1 to 1.25 of the way from the centre
+  unseen    ///< as sphere, in directions more than 30 degrees from every training camera's; forward-facing:
+            ///< around the box, in one of twice its sides
 };
-/// @throws ValueError  if name is not near, ring, sphere or test
+/// The names of parse_camera_set(), in the order of a table.
+std::vector<std::string> camera_set_names();
+/// @throws ValueError  if name is not one of camera_set_names()
 CameraSet parse_camera_set(std::string_view name);
 
 /// Cameras of a set, all with the intrinsics of the span. Camera i depends on span, kind, size, seed and i
 /// only. near: the direction is a random point of the spherical triangle of a random training direction and
 /// two of its six nearest neighbours; the look-at point is uniform in a ball of radius 0.05 * 2 * half_size
 /// about the centre. near, forward-facing: the position is uniform in the box of the training cameras', along
-/// the axes of the mean camera; look-at as before.
+/// the axes of the mean camera; look-at as before. unseen: of 256 directions, the first that is far enough
+/// from the training cameras', or the farthest where none is.
 /// @param count  >= 0   @param size  pixels of the longer side; 0: as in training
 /// @throws ValueError  if kind is test, count or size is negative, or span has no directions
 std::vector<Camera> make_cameras(const CameraSpan& span, CameraSet kind, Index count, Index size,
