@@ -46,16 +46,39 @@ Renderer::Renderer(const RadianceField& field, const RenderOptions& options)
 }
 Renderer::~Renderer() = default;
 
-void Renderer::trace(const RayBatch& rays, Index lane_index, float* out, float* position) {
-  Lane& lane = *lanes_[at(lane_index)];
+// Calls use(first ray, rays) after each block of rays, whose samples the lane then holds.
+template <class F>
+void Renderer::trace_blocks(const RayBatch& rays, Lane& lane, F use) {
   const Index block = field_.coarse ? kMlpRays : rays.size();
   for (Index begin = 0; begin < rays.size(); begin += block) {
     const Index n = std::min(block, rays.size() - begin);
-    trace_block(rays.part(begin, n), lane, out + 4 * begin, position ? position + 3 * begin : nullptr);
+    trace_block(rays.part(begin, n), lane);
+    use(begin, n);
   }
 }
 
-void Renderer::trace_block(const RayBatch& rays, Lane& lane, float* out, float* position) {
+void Renderer::trace(const RayBatch& rays, Index lane_index, float* out, float* position) {
+  Lane& lane = *lanes_[at(lane_index)];
+  trace_blocks(rays, lane, [&](Index begin, Index n) {
+    accumulate(lane, n, out + 4 * begin, position ? position + 3 * begin : nullptr);
+  });
+}
+
+void Renderer::trace_samples(const RayBatch& rays, Index lane_index, std::vector<SeenSample>& out) {
+  Lane& lane = *lanes_[at(lane_index)];
+  out.clear();
+  trace_blocks(rays, lane, [&](Index begin, Index) {
+    for (std::size_t k = 0; k < lane.kept.size(); ++k) {
+      const float *x = &lane.positions[3 * k], *c = &lane.colours[3 * k];
+      out.push_back({.ray = begin + lane.sample_ray[k],
+                     .weight = lane.weights[static_cast<std::size_t>(lane.kept[k])],
+                     .position = {x[0], x[1], x[2]},
+                     .colour = {c[0], c[1], c[2]}});
+    }
+  });
+}
+
+void Renderer::trace_block(const RayBatch& rays, Lane& lane) {
   lane.sampler.sample(field_, rays, {},
                       {.finer = options_.finer,
                        .stop = options_.stop,
@@ -99,7 +122,6 @@ void Renderer::trace_block(const RayBatch& rays, Lane& lane, float* out, float* 
     recolour_(lane.positions.data(), lane.seen_from.data(), static_cast<Index>(lane.kept.size()),
               lane.colours.data());
   }
-  accumulate(lane, rays.size(), out, position);
 }
 
 void Renderer::accumulate(const Lane& lane, Index rays, float* out, float* position) {

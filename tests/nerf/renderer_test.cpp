@@ -222,6 +222,29 @@ TEST_CASE("renderer: the position of a ray is the mean of its samples by weight"
       CHECK((mean > 0 && mean < 1));
     }
   for (std::size_t a = 0; a < 3; ++a) CHECK(position[12 + a] == 0);
+
+  // The samples themselves, near to far, put both together again.
+  std::vector<SeenSample> seen{{.ray = 3}};
+  renderer.set_recolour({});
+  renderer.trace(rays.batch(f.space), 0, out.data());
+  renderer.trace_samples(rays.batch(f.space), 0, seen);
+  std::vector<double> sums(20), means(15), last(5, -1);
+  CHECK(seen.size() > 8);
+  for (const SeenSample& s : seen) {
+    const auto r = static_cast<std::size_t>(s.ray);
+    double along = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      sums[4 * r + a] += static_cast<double>(s.weight * s.colour[a]);
+      means[3 * r + a] += static_cast<double>(s.weight * s.position[a]);
+      along += static_cast<double>((s.position[a] - rays.origins[3 * r + a]) * rays.directions[3 * r + a]);
+    }
+    sums[4 * r + 3] += static_cast<double>(s.weight);
+    CHECK(along > last[r]);
+    last[r] = along;
+  }
+  for (std::size_t i = 0; i < 20; ++i) CHECK(std::abs(sums[i] - static_cast<double>(out[i])) < 1e-6);
+  for (std::size_t i = 0; i < 12; ++i)
+    CHECK(std::abs(means[i] - static_cast<double>(position[i]) * sums[4 * (i / 3) + 3]) < 1e-6);
 }
 
 TEST_CASE("renderer: sample weights are the composite's") {

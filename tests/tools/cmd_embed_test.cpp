@@ -32,6 +32,23 @@ TEST_CASE("embed gives the same bytes for the same seed and key", "[embed]") {
   CHECK(read_bytes(job.folder / "again1") == read_bytes(job.folder / "again2"));
 }
 
+TEST_CASE("embed learns from views at several distances, and from several samples of a ray", "[embed]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string owner = job.folder / "several.fm";
+  const auto embed = [&](const char* distances, const char* more) {
+    return run_command(
+        {"embed", "--field",       job.field, "--out",     owner, "--bits",  "4", "--cells",
+         "6",     "--reader-size", "32",      "--steps",   "1",   "--views", "8", "--measured-views",
+         "1",     "--distances",   distances, "--samples", more});
+  };
+  const auto r = embed("several", "2");
+  INFO(r.err);
+  CHECK(r.code == cli::kOk);
+  CHECK(std::filesystem::exists(owner));
+  CHECK(embed("all", "2").code == cli::kUsage);
+  CHECK(embed("native", "0").code == cli::kUsage);
+}
+
 TEST_CASE("embed --preset paper and code give an owner that bakes and reads like any other", "[embed]") {
   const TinyJob& job = TinyJob::get();
   for (const std::string preset : {"paper", "code"}) {

@@ -2,6 +2,8 @@
 #include <fieldmark/watermark/embed_views.h>
 #include <fieldmark/watermark/object_window.h>
 
+#include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "nerf/small_field.h"
@@ -28,6 +30,41 @@ TEST_CASE("embed_views: the views are near cameras, each looking through the obj
   CHECK(views[0].base.data != views[1].base.data);
   CHECK(cache_near_views(field, 20, 1, 5)[0].base.data == views[0].base.data);
   CHECK(cache_near_views(field, 20, 1, 6)[0].base.data != views[0].base.data);
+}
+
+TEST_CASE("embed_views: at several distances, the object has no more pixels than pictures of it") {
+  const nerf::RadianceField field = small_field();  // of pictures of 24 pixels
+  const Index own = std::max(field.cameras.width, field.cameras.height);
+  const auto sides = [&](EmbedDistances distances) {
+    std::vector<Index> out;
+    for (const CachedView& v : cache_embed_views(field, 2 * own, {.count = 8, .distances = distances}, 5)) {
+      CHECK(v.height == v.width);
+      out.push_back(v.width);
+    }
+    return out;
+  };
+  const auto near = sides(EmbedDistances::near), native = sides(EmbedDistances::native),
+             several = sides(EmbedDistances::several);
+  CHECK(near == std::vector<Index>(8, 2 * own));
+  const auto cameras = nerf::make_cameras(field.cameras, nerf::CameraSet::near, 8, 160, 5);
+  const auto far = nerf::make_cameras(field.cameras, nerf::CameraSet::farther, 8, 160, 5);
+  nerf::Renderer renderer(field, {.finer = 1});
+  const auto pixels = [&](const nerf::Camera& camera) {
+    const double side = object_window(renderer.render(camera).rgb, 1).side * static_cast<double>(own) / 160;
+    return std::clamp<Index>(std::lround(side), own / 2, 2 * own);
+  };
+  for (std::size_t i = 0; i < 8; ++i) {
+    CHECK(native[i] == pixels(cameras[i]));
+    if (i % 2 == 0) CHECK(several[i] == native[i]);
+    if (i % 4 == 3) CHECK(several[i] == pixels(far[i]));
+  }
+  const auto kept = cache_embed_views(field, 16, {.count = 1, .samples = 4}, 5);
+  CHECK(kept[0].weight.size() > cache_near_views(field, 16, 1, 5)[0].weight.size());
+  CHECK(parse_distances("several") == EmbedDistances::several);
+  for (const auto d : {EmbedDistances::near, EmbedDistances::native, EmbedDistances::several})
+    CHECK(parse_distances(distances_name(d)) == d);
+  CHECK_THROWS_WITH(parse_distances("far"),
+                    "[embed_views] distances must be near, native or several, got \"far\"");
 }
 
 TEST_CASE("embed_views: progress is told after each view and may stop") {

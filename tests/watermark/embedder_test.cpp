@@ -101,6 +101,36 @@ TEST_CASE("embedder: preset paper's message loss begins at that of guessing, fiv
   CHECK(embed_options(Preset::fast).schedule.lr == EmbedOptions{}.schedule.lr);
 }
 
+TEST_CASE("embedder: views of fewer pixels than the reader's are learnt from as well, with their labels") {
+  const auto views = cache_near_views(tiny_field(), 32, 8, 3);
+  Owner owner = tiny_owner();
+  Embedder embedder(owner, views, options(200));
+  embedder.step(0);
+  const Embedder::Figures first = embedder.figures();
+  while (!embedder.done()) embedder.step(0);
+  const Embedder::Figures last = embedder.figures();
+  CAPTURE(first.loss, last.loss, first.index, last.index, last.sign);
+  CHECK(std::isfinite(last.loss));
+  CHECK(last.loss < 0.8 * first.loss);
+  CHECK(last.index > first.index + 0.03);
+}
+
+TEST_CASE("embedder: distortions that are not mixed, and no loss of signs, train otherwise") {
+  const auto values = [](auto change) {
+    Owner owner = tiny_owner();
+    EmbedOptions o = options(3);
+    change(o);
+    Embedder embedder(owner, tiny_views(), o);
+    while (!embedder.done()) embedder.step(0);
+    return outcome(owner, embedder).values;
+  };
+  const auto usual = values([](EmbedOptions&) {});
+  const auto apart = values([](EmbedOptions& o) { o.distortions.mixed = false; });
+  CHECK(usual != apart);
+  CHECK(apart == values([](EmbedOptions& o) { o.distortions.mixed = false; }));
+  CHECK(usual != values([](EmbedOptions& o) { o.sign_weight = 0; }));
+}
+
 TEST_CASE("embedder: one and two threads give the same bits") {
   const int before = threads();
   for (const bool paper : {false, true}) {
@@ -175,9 +205,11 @@ TEST_CASE("embedder: a checkpoint of other weights, distortions or step sizes is
                          {[](EmbedOptions& o) { o.distortions.zoom_out = 0.5; }, "zoom out 0.5"},
                          {[](EmbedOptions& o) { o.distortions.zoom_in = 1.5; }, "zoom in 1.5"},
                          {[](EmbedOptions& o) { o.distortions.blur = 0.5; }, "blur 0.5"},
-                         {[](EmbedOptions& o) { o.distortions.sample_shift = 0.5; }, "sample shift 0.5"}};
+                         {[](EmbedOptions& o) { o.distortions.sample_shift = 0.5; }, "sample shift 0.5"},
+                         {[](EmbedOptions& o) { o.distortions.mixed = false; }, "mixed 0.0"}};
   const std::vector<Change> fast = {{[](EmbedOptions& o) { o.first_strength = 25; }, "first strength 25.0"},
                                     {[](EmbedOptions& o) { o.anneal = 21; }, "anneal 21.0"},
+                                    {[](EmbedOptions& o) { o.sign_weight = 2; }, "sign 2.0"},
                                     {[](EmbedOptions& o) { o.index_weight = 2; }, "index 2.0"},
                                     {[](EmbedOptions& o) { o.sign_weight = 2; }, "sign 2.0"},
                                     {[](EmbedOptions& o) { o.bits_weight = 2; }, "bits 2.0"},

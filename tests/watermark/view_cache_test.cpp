@@ -1,3 +1,4 @@
+#include <fieldmark/engine/error.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/watermark/view_cache.h>
 
@@ -81,6 +82,43 @@ TEST_CASE("view_cache: a sample lies on its pixel's ray, inside the cube") {
     off = std::max(off, std::sqrt(square));
   }
   CHECK(off < 1e-5);
+}
+
+TEST_CASE("view_cache: several samples of a ray are its heaviest, and few leave the pixel's weight") {
+  const nerf::RadianceField field = half_field();
+  nerf::Renderer renderer(field);
+  const CachedView one = cache_view(renderer, field, camera()),
+                   two = cache_view(renderer, field, camera(), 2),
+                   all = cache_view(renderer, field, camera(), 1000);
+  double worst = 0, composed = 0;
+  Index more = 0;
+  for (Index p = 0; p < 23 * 18; ++p) {
+    const auto at = [](Index i) { return static_cast<std::size_t>(i); };
+    const auto share = [&](const CachedView& v) {
+      double sum = 0;
+      for (auto k = v.sample_begin[at(p)]; k < v.sample_begin[at(p + 1)]; ++k)
+        sum += static_cast<double>(v.weight[at(k)]);
+      return sum;
+    };
+    const auto count = [&](const CachedView& v) { return v.sample_begin[at(p + 1)] - v.sample_begin[at(p)]; };
+    CHECK((count(one) == 0) == (count(all) == 0));
+    CHECK(count(two) == std::min(2, count(all)));
+    more += count(all) > 2;
+    worst = std::max({worst, std::abs(share(two) - share(one)), std::abs(share(all) - share(one))});
+    for (auto k = all.sample_begin[at(p)]; k + 1 < all.sample_begin[at(p + 1)]; ++k)
+      CHECK(all.weight[at(k)] >= all.weight[at(k) + 1]);
+    for (Index a = 0; a < 3 && count(all) > 0; ++a) {
+      double c = 1 - share(all);
+      for (auto k = all.sample_begin[at(p)]; k < all.sample_begin[at(p + 1)]; ++k)
+        c += static_cast<double>(all.weight[at(k)] * all.colour[at(3 * k + a)]);
+      composed = std::max(composed, std::abs(c - static_cast<double>(all.base[3 * p + a])));
+    }
+  }
+  CHECK(more > 20);
+  CHECK(worst < 1e-5);
+  CHECK(composed < 1e-5);
+  CHECK_THROWS_WITH(cache_view(renderer, field, camera(), 0),
+                    "[cache_view] samples must be at least 1, got 0");
 }
 
 TEST_CASE("view_cache: one and two threads give the same bits") {

@@ -27,11 +27,11 @@ constexpr Index kPicturedViews = 4;
 
 struct Options {
   std::string field, out, key, picture, lpips_weights;
-  std::string preset = "fast";
+  std::string preset = "fast", distances = "near";
   watermark::OwnerOptions owner;
   MessageOption intended;
   RunLength length{.seconds = watermark::EmbedOptions{}.schedule.seconds};
-  Index views = watermark::EmbedOptions{}.views, measured_views = 200;
+  Index views = watermark::EmbedOptions{}.views, samples = 1, measured_views = 200;
   std::vector<std::string> under;
   bool resume = false, reader_size_given = false;
 };
@@ -49,8 +49,11 @@ std::vector<watermark::CachedView> cached_views(const Options& options, const ne
                                                 Index reader_size, Context& context) {
   const InterruptGuard guard;
   Progress progress = context.progress("views");
-  return watermark::cache_near_views(
-      field, reader_size, options.views, context.seed(), [&](Index done, Index total) {
+  const watermark::EmbedViewOptions views{.count = options.views,
+                                          .samples = options.samples,
+                                          .distances = watermark::parse_distances(options.distances)};
+  return watermark::cache_embed_views(
+      field, reader_size, views, context.seed(), [&](Index done, Index total) {
         if (guard.interrupted()) throw Interrupted("nothing was written");
         progress.update(static_cast<double>(done) / static_cast<double>(total));
         return true;
@@ -203,6 +206,14 @@ Command add_embed(CLI::App& app) {
                           ->type_name("N");
   app.add_option("--views", o->views, "Views to learn from, 8 to 10000")
       ->check(CLI::Range(8, 10000).description(""))
+      ->type_name("N");
+  app.add_option("--distances", o->distances,
+                 "near: near cameras, the object always as large as the extractor sees it;\n"
+                 "native: only as large as their pictures have it; several: also closer and farther cameras")
+      ->check(CLI::IsMember({"near", "native", "several"}).description(""))
+      ->type_name("NAME");
+  app.add_option("--samples", o->samples, "Samples kept of a ray of a view, 1 to 64")
+      ->check(CLI::Range(1, 64).description(""))
       ->type_name("N");
   add_run_length(app, o->length, true);
   app.add_option("--measured-views", o->measured_views, "Near views to measure on at the end, 1 to 100000")

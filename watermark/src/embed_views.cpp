@@ -1,25 +1,65 @@
+#include <fieldmark/engine/error.h>
 #include <fieldmark/watermark/embed_views.h>
 #include <fieldmark/watermark/object_window.h>
+
+#include <algorithm>
+#include <cmath>
 
 namespace fieldmark::watermark {
 namespace {
 constexpr Index kWindowSize = 160;  // pixels of the small picture that shows where the object is
+constexpr Index kCoarsest = 4;      // the reader's size over the least of a view
+
+std::vector<nerf::Camera> cameras_of(const nerf::CameraSpan& span, const EmbedViewOptions& options,
+                                     std::uint64_t seed) {
+  const auto draw = [&](nerf::CameraSet set) {
+    return nerf::make_cameras(span, set, options.count, kWindowSize, seed);
+  };
+  std::vector<nerf::Camera> cameras = draw(nerf::CameraSet::near);
+  if (options.distances != EmbedDistances::several) return cameras;
+  const auto closer = draw(nerf::CameraSet::closer), farther = draw(nerf::CameraSet::farther);
+  for (std::size_t i = 1; i < cameras.size(); i += 2) cameras[i] = i % 4 == 1 ? closer[i] : farther[i];
+  return cameras;
+}
+
+}  // namespace
+
+const char* distances_name(EmbedDistances distances) {
+  if (distances == EmbedDistances::near) return "near";
+  return distances == EmbedDistances::native ? "native" : "several";
+}
+
+EmbedDistances parse_distances(std::string_view name) {
+  for (const auto d : {EmbedDistances::near, EmbedDistances::native, EmbedDistances::several})
+    if (name == distances_name(d)) return d;
+  throw ValueError("[embed_views] distances must be near, native or several, got \"" + std::string(name) +
+                   "\"");
+}
+
+std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, Index reader_size,
+                                          const EmbedViewOptions& options, std::uint64_t seed,
+                                          const std::function<bool(Index, Index)>& progress) {
+  nerf::Renderer renderer(field, {.finer = 1});  // the samples the field was trained with
+  const float background = nerf::background_value(field.background);
+  const Index own = std::max(field.cameras.width, field.cameras.height);  // pixels of its pictures
+  std::vector<CachedView> views;
+  for (const nerf::Camera& camera : cameras_of(field.cameras, options, seed)) {
+    const Window window = object_window(renderer.render(camera).rgb, background);
+    Index size = reader_size;
+    if (options.distances != EmbedDistances::near)
+      size = std::clamp<Index>(std::lround(window.side * static_cast<double>(own) / kWindowSize),
+                               (reader_size + kCoarsest - 1) / kCoarsest, reader_size);
+    views.push_back(cache_view(renderer, field, window_camera(camera, window, size), options.samples));
+    if (progress && !progress(static_cast<Index>(views.size()), options.count))
+      throw Error("stopped while views were cached");
+  }
+  return views;
 }
 
 std::vector<CachedView> cache_near_views(const nerf::RadianceField& field, Index reader_size, Index count,
                                          std::uint64_t seed,
                                          const std::function<bool(Index, Index)>& progress) {
-  nerf::Renderer renderer(field, {.finer = 1});  // the samples the field was trained with
-  const float background = nerf::background_value(field.background);
-  std::vector<CachedView> views;
-  for (const nerf::Camera& camera :
-       nerf::make_cameras(field.cameras, nerf::CameraSet::near, count, kWindowSize, seed)) {
-    const Window window = object_window(renderer.render(camera).rgb, background);
-    views.push_back(cache_view(renderer, field, window_camera(camera, window, reader_size)));
-    if (progress && !progress(static_cast<Index>(views.size()), count))
-      throw Error("stopped while views were cached");
-  }
-  return views;
+  return cache_embed_views(field, reader_size, {.count = count}, seed, progress);
 }
 
 std::vector<double> visible_area(std::span<const CachedView> views, Index side) {

@@ -17,6 +17,7 @@ namespace {
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 constexpr double kSpacing = 1.7320508 / 420;  // of samples, cube sides: a field's by default
+constexpr std::uint64_t kOfBatch = 8 * 64;  // place of what a whole batch draws: after those of 64 pictures
 
 double blend(double from, double to, double fraction) { return from + (to - from) * fraction; }
 
@@ -88,19 +89,24 @@ Embedder::Picture Embedder::draw(Index image) const {
                              step * static_cast<std::uint64_t>(options_.batch) + i);
   p.signs = cell_signs(code_, p.message);
   const auto often = [](float x) { return x < 2.f / 3; };
+  // Unless they are mixed, one of none, rotation, zoom, blur and noise for the whole batch.
+  const int only = d.mixed ? 0 : static_cast<int>(5 * choice_rng_.uniform4(step, kOfBatch)[0]);
+  const auto through = [&](int kind, bool drawn) { return d.mixed ? drawn : kind == only; };
+  const bool turned = through(1, often(a[1])), zoomed = through(2, often(a[3]));
   const double angle =
-      often(a[1]) ? blend(-d.rotation, d.rotation, static_cast<double>(a[2])) * 3.14159265358979 / 180 : 0;
-  const double zoom = often(a[3]) ? blend(d.zoom_out, d.zoom_in, static_cast<double>(b[0])) : 1;
+      turned ? blend(-d.rotation, d.rotation, static_cast<double>(a[2])) * 3.14159265358979 / 180 : 0;
+  const double zoom = zoomed ? blend(d.zoom_out, d.zoom_in, static_cast<double>(b[0])) : 1;
   // A window at a random place that stays inside the picture; a small shift where the whole picture is seen.
-  const auto& size = views_[at(p.view)];
+  const auto size = static_cast<double>(owner_.options().reader_size),
+             height = static_cast<double>(views_[at(p.view)].height);
   const double room = 0.5 * std::max(zoom - 1, 0.04);
-  const double sx = blend(-room, room, static_cast<double>(b[1])) * static_cast<double>(size.width),
-               sy = blend(-room, room, static_cast<double>(b[2])) * static_cast<double>(size.height);
-  p.warped = often(a[1]) || often(a[3]);
-  p.warp = distort::similarity_matrix(static_cast<float>(angle), static_cast<float>(zoom),
+  const double sx = blend(-room, room, static_cast<double>(b[1])) * size,
+               sy = blend(-room, room, static_cast<double>(b[2])) * size;
+  p.warped = turned || zoomed || height != size;
+  p.warp = distort::similarity_matrix(static_cast<float>(angle), static_cast<float>(zoom * size / height),
                                       static_cast<float>(sx), static_cast<float>(sy));
-  p.blur = b[3] < 1.f / 3 ? static_cast<float>(d.blur) * c[0] : 0.f;
-  p.noise = often(c[1]) ? static_cast<float>(d.noise) * c[2] : 0.f;
+  p.blur = through(3, b[3] < 1.f / 3) ? static_cast<float>(d.blur) * c[0] : 0.f;
+  p.noise = through(4, often(c[1])) ? static_cast<float>(d.noise) * c[2] : 0.f;
   const double strength = owner_.options().strength;
   const double db = strength - (strength - options_.first_strength) *
                                    std::exp(-static_cast<double>(steps_) / options_.anneal);
@@ -135,7 +141,9 @@ Var<float> Embedder::distort(Tape<float>& tape, Var<float> image, const Picture&
   if (p.warped) {
     float* matrix = tape.scratch(6);
     std::copy(p.warp.begin(), p.warp.end(), matrix);
-    image = distort::affine_warp(image, tape.constant(matrix, {6}), {.background = background});
+    const Index size = owner_.options().reader_size;
+    image = distort::affine_warp(image, tape.constant(matrix, {6}),
+                                 {.height = size, .width = size, .background = background});
   }
   if (p.blur > 0) image = distort::blur(image, number(p.blur));
   if (p.noise > 0) {
@@ -221,12 +229,14 @@ void Embedder::calibrate(Index views) {
 
 std::string Embedder::fingerprint() const {
   const OwnerOptions& o = owner_.options();
+  std::size_t samples = 0;  // tells views of other cameras and sizes apart
+  for (const CachedView& v : views_) samples += v.weight.size();
   std::string text = std::string(preset_name(o.preset)) + ", " + std::to_string(o.bits) + " bits, " +
                      std::to_string(o.strength) + " dB, " + std::to_string(owner_.cells.count()) +
                      " cells, seed " + std::to_string(options_.seed) + ", steps " +
                      std::to_string(options_.schedule.steps) + ", batch " + std::to_string(options_.batch) +
-                     ", views " + std::to_string(views_.size()) + ", parameters " +
-                     std::to_string(owner_.params.size());
+                     ", views " + std::to_string(views_.size()) + " with " + std::to_string(samples) +
+                     " samples" + ", parameters " + std::to_string(owner_.params.size());
   const auto add = [&](const char* name, double value) {
     text += ", " + std::string(name) + " " + std::to_string(value);
   };
@@ -258,6 +268,7 @@ std::string Embedder::fingerprint() const {
   add("zoom in", d.zoom_in);
   add("blur", d.blur);
   add("sample shift", d.sample_shift);
+  add("mixed", d.mixed);
   return text;
 }
 

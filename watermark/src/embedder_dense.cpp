@@ -121,7 +121,7 @@ double Embedder::run_dense(const Picture& p, Tape<float>& tape, const Params<flo
   // Labels move with the pixels, then go to the extractor's places.
   const auto background = static_cast<std::int32_t>(owner_.cells.count());
   Tensor<std::int32_t> labels = labels_[at(p.view)];
-  if (p.warped) labels = fieldmark::distort::warp_labels<float>(labels, p.warp, background);
+  if (p.warped) labels = fieldmark::distort::warp_labels<float>(labels, p.warp, background, h, w);
   labels = fieldmark::distort::resize_labels(labels, out.height, out.width);
   const Index places = out.height * out.width;
   float *target = tape.scratch(places), *on_object = tape.scratch(places);

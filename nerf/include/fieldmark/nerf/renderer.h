@@ -2,6 +2,7 @@
 #include <fieldmark/nerf/field_sampler.h>
 #include <fieldmark/nerf/radiance_field.h>
 
+#include <array>
 #include <functional>
 #include <memory>
 
@@ -35,6 +36,14 @@ struct Rendering {
   Tensor<float> opacity;  ///< [height, width] in [0, 1]
 };
 
+/// A sample that a ray sees.
+struct SeenSample {
+  Index ray = 0;                    ///< of the batch
+  float weight = 0;                 ///< part of the ray's colour
+  std::array<float, 3> position{};  ///< unit cube
+  std::array<float, 3> colour{};    ///< as composited
+};
+
 /// Renders views of one field; keeps its buffers from view to view. The field must outlive it and may change
 /// between views; callers of trace() say so with refresh().
 class Renderer {
@@ -60,10 +69,15 @@ class Renderer {
   /// @param out  [R, 4] written   @param position  [R, 3] written unless null: the mean position of what the
   /// ray sees, by weight, in the unit cube; 0 where it sees nothing
   void trace(const RayBatch& rays, Index lane, float* out, float* position = nullptr);
+  /// The samples of given rays that weigh more than least_weight, ray after ray, near to far.
+  /// @param rays, lane  as above   @param out  overwritten
+  void trace_samples(const RayBatch& rays, Index lane, std::vector<SeenSample>& out);
 
  private:
   struct Lane;
-  void trace_block(const RayBatch& rays, Lane& lane, float* out, float* position);
+  template <class F>
+  void trace_blocks(const RayBatch& rays, Lane& lane, F use);
+  void trace_block(const RayBatch& rays, Lane& lane);
   void list_pixels(const Camera& camera, Index tile, Lane& lane) const;
   static void accumulate(const Lane& lane, Index rays, float* out, float* position);
   const RadianceField& field_;

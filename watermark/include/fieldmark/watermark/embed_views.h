@@ -3,12 +3,38 @@
 #include <fieldmark/watermark/view_cache.h>
 
 #include <functional>
+#include <string_view>
 
 namespace fieldmark::watermark {
 
-/// Renders and caches the views to embed in: near cameras, each cut to the object's window at the reader's
-/// size as the reader will cut a picture (see object_window.h).
+/// Where the cameras of the views to embed in stand, and how fine their pictures are.
+enum class EmbedDistances {
+  near,    ///< near cameras, the object always at the reader's size
+  native,  ///< near cameras, the object with no more pixels than their pictures would have of it
+  several  ///< native, but a quarter of the views closer and a quarter farther, see nerf::CameraSet
+};
+/// "near", "native" or "several".
+const char* distances_name(EmbedDistances distances);
+/// @throws ValueError if the name is none of these
+EmbedDistances parse_distances(std::string_view name);
+
+/// The views to embed in.
+struct EmbedViewOptions {
+  Index count = 200;                                ///< of them, >= 1
+  Index samples = 1;                                ///< kept of a ray, see cache_view()
+  EmbedDistances distances = EmbedDistances::near;  ///< of their cameras
+};
+
+/// Renders and caches the views to embed in, each cut to the object's window as the reader will cut a picture
+/// (see object_window.h), `reader_size` pixels a side; from native on fewer where a picture of the field's
+/// size has fewer, though no fewer than a quarter: the embedder enlarges those as the reader would.
 /// @param progress  called after each view with (done, total); returns false to stop, which throws Error
+/// @throws ValueError as cache_view()
+std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, Index reader_size,
+                                          const EmbedViewOptions& options, std::uint64_t seed,
+                                          const std::function<bool(Index, Index)>& progress = {});
+
+/// The same of near cameras, with one sample of a ray.
 std::vector<CachedView> cache_near_views(const nerf::RadianceField& field, Index reader_size, Index count,
                                          std::uint64_t seed,
                                          const std::function<bool(Index, Index)>& progress = {});

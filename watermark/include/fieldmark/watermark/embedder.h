@@ -9,8 +9,7 @@
 
 namespace fieldmark::watermark {
 
-/// What a training picture goes through, each drawn anew for every picture: a batch mixes them, so that no
-/// layer's statistics belong to one of them.
+/// What a training picture goes through, each drawn anew for every picture.
 struct EmbedDistortions {
   double noise = 0.08;         ///< largest standard deviation, on two pictures of three
   double rotation = 35;        ///< largest angle, degrees, on two of three
@@ -18,6 +17,8 @@ struct EmbedDistortions {
   double zoom_in = 1.25;       ///< ... and largest: above 1 the picture is a window at a random place
   double blur = 1.3;           ///< largest sigma, pixels of the reader, on one of three
   double sample_shift = 1e-3;  ///< beta of x + z, z ~ N(0, beta^2), cube sides
+  /// A batch mixes them, and a picture may go through several; false: one kind or none for a whole batch.
+  bool mixed = true;
 };
 
 /// How mark and extractor are trained.
@@ -25,7 +26,7 @@ struct EmbedOptions {
   /// Length of the run and step sizes.
   nerf::ScheduleOptions schedule{
       .seconds = 900, .lr = 2e-3, .half_after = 8000, .cooldown = 0.5, .last = 0.05};
-  Index views = 200;           ///< near cameras whose geometry is cached, >= 8
+  Index views = 200;           ///< cameras whose geometry is cached, >= 8
   Index batch = 4;             ///< pictures a step, 1 to 64
   double first_strength = 28;  ///< dB at the first step; falls towards the owner's strength ...
   double anneal = 200;         ///< ... with this time constant, steps
@@ -70,12 +71,14 @@ EmbedOptions embed_options(Preset preset);
 /// or code has the paper's loss in its place:
 ///   L = gamma_1 mean |P~ - P^|^2 + gamma_2 BCE(pooled bits, M)
 /// without the perceptual term and, under a budget, without the content loss. Each picture draws a message, a
-/// view, distortions. Same seed and number of steps: same bytes, for any thread count and across save() and
-/// restore().
+/// view, distortions; a view of fewer pixels than the reader's is enlarged with its marks, as the reader
+/// enlarges a small picture. Same seed and number of steps: same bytes, for any thread count and across save()
+/// and restore().
 class Embedder {
  public:
-  /// Owner and views must outlive the embedder. @throws ValueError if an option is out of range, or neither
-  /// owner nor options say what a message does
+  /// Owner and views must outlive the embedder.
+  /// @param views  see cache_embed_views()
+  /// @throws ValueError if an option is out of range, or neither owner nor options say what a message does
   Embedder(Owner& owner, std::span<const CachedView> views, const EmbedOptions& options);
   /// Takes one step. @param seconds  since the start of the run, for a schedule that ends at a time
   void step(double seconds);

@@ -4,8 +4,8 @@
 namespace fieldmark::watermark {
 
 /// What embedding needs of one view of the frozen field, computed once: geometry and base colours do not
-/// change while the mark is learnt. A pixel that sees something has one sample, at the mean position of what
-/// its ray sees.
+/// change while the mark is learnt. A pixel that sees something has one sample at the mean position of what
+/// its ray sees, or the heaviest samples of its ray.
 struct CachedView {
   Index height = 0;                        ///< pixels
   Index width = 0;                         ///< pixels
@@ -20,6 +20,10 @@ struct CachedView {
 };
 
 /// Marches the rays of one view and keeps what they see.
-CachedView cache_view(nerf::Renderer& renderer, const nerf::RadianceField& field, const nerf::Camera& camera);
+/// @param samples  kept of a ray, at least 1. 1: one at the mean position; more: the heaviest ones of the
+/// ray, heaviest first, their weights scaled so that they sum to the opacity
+/// @throws ValueError if samples < 1
+CachedView cache_view(nerf::Renderer& renderer, const nerf::RadianceField& field, const nerf::Camera& camera,
+                      Index samples = 1);
 
 }  // namespace fieldmark::watermark
