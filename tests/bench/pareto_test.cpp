@@ -45,3 +45,16 @@ TEST_CASE("pareto: numbers that are none lose, infinitely exact wins") {
       "[pareto_front] margins must be at least 0, that of times below 1, got -1.000000 and 0.000000");
   CHECK_THROWS_AS(front({}, {.time = 0, .psnr = nan}), ValueError);
 }
+
+TEST_CASE("pareto: any number of figures, and better in one of them is enough") {
+  const auto of = [](std::vector<std::vector<double>> points) {
+    return pareto_front(points, std::vector<double>{0.5, 0, 1});
+  };
+  //          the best of each figure, then one that the first beats in two, then one it beats by margins only
+  CHECK(of({{9, 1, 1}, {1, 9, 1}, {1, 1, 9}, {9, 0, 0}, {8.6, 1, 0.1}}) ==
+        std::vector<bool>{true, true, true, false, true});
+  CHECK(of({{1, 1, std::nan("")}, {0, 0, 0}}) == std::vector<bool>{false, true});
+  CHECK_THROWS_WITH(of({{1, 2}}), "[pareto_front] points must have a figure for each margin (3), got 2");
+  CHECK_THROWS_WITH(pareto_front(std::vector<std::vector<double>>{}, std::vector<double>{-1}),
+                    "[pareto_front] margins must be at least 0, got -1.000000");
+}

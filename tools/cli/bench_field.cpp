@@ -30,22 +30,6 @@ struct Subject {
   std::string name;
 };
 
-std::unique_ptr<nerf::RadianceField> trained(const nerf::Dataset& data, const BenchFieldOptions& options,
-                                             Context& context) {
-  auto field = std::make_unique<nerf::RadianceField>(nerf::RadianceFieldOptions{.seed = context.seed()});
-  const double begin = context.seconds();
-  nerf::Trainer trainer(*field, data, {.schedule = {.seconds = options.seconds}, .seed = context.seed()});
-  run_long({.what = "train",
-            .done = [&] { return trainer.done(); },
-            .step = [&](double seconds) { trainer.step(seconds - begin); },
-            .steps = [&] { return trainer.steps(); },
-            .note = [] { return std::string(); },
-            .save = {},
-            .checkpoint = {}},
-           {.steps = 0, .seconds = options.seconds}, context);
-  return field;
-}
-
 // Views spread evenly over the test split; without a data set, drawn around the training cameras.
 Subject subject_of(const BenchFieldOptions& options, Context& context) {
   Subject subject;
@@ -67,7 +51,7 @@ Subject subject_of(const BenchFieldOptions& options, Context& context) {
         test.views[static_cast<std::size_t>(i * all / count)].camera.scaled(options.size));
   if (!stored) {
     const nerf::Dataset data = bench_split(folder, "train", options.quick);
-    subject.field = trained(data, options, context);
+    subject.field = trained_field(data, options.seconds, context);
     subject.name = data.name;
   }
   return subject;
@@ -130,6 +114,22 @@ constexpr const char* kOccupancy =
 
 }  // namespace
 
+std::unique_ptr<nerf::RadianceField> trained_field(const nerf::Dataset& data, double seconds,
+                                                   Context& context) {
+  auto field = std::make_unique<nerf::RadianceField>(nerf::RadianceFieldOptions{.seed = context.seed()});
+  const double begin = context.seconds();
+  nerf::Trainer trainer(*field, data, {.schedule = {.seconds = seconds}, .seed = context.seed()});
+  run_long({.what = "train",
+            .done = [&] { return trainer.done(); },
+            .step = [&](double now) { trainer.step(now - begin); },
+            .steps = [&] { return trainer.steps(); },
+            .note = [] { return std::string(); },
+            .save = {},
+            .checkpoint = {}},
+           {.steps = 0, .seconds = seconds}, context);
+  return field;
+}
+
 nerf::Dataset bench_split(const std::string& folder, const std::string& split, bool quick) {
   if (!folder.empty()) return nerf::load_dataset(folder, {.split = split});
   const Index part = quick ? 8 : 1;
@@ -139,25 +139,26 @@ nerf::Dataset bench_split(const std::string& folder, const std::string& split, b
 std::string lego_folder() { return shared_data("nerf_synthetic/lego").string(); }
 
 void add_bench_field(CLI::App& app, BenchFieldOptions& o) {
-  app.add_option("--field", o.field,
-                 "field: what is rendered (trained for --seconds); attacks: the baked field")
+  app.add_option(
+         "--field", o.field,
+         "field: what is rendered (trained for --seconds); embed: what is marked (trained for a minute); "
+         "attacks: the baked field")
       ->type_name("FIELD")
       ->default_str("");
   app.add_option("--size", o.size,
-                 "field, attacks (as trained): pixels of the views' longer side, 16 to 8192")
+                 "field, embed and attacks (as trained): pixels of the views' longer side, 16 to 8192")
       ->check(CLI::Range(16, 8192).description(""))
       ->type_name("N");
-  app.add_option("--views", o.views, "field: how many, 1 to 1000")
+  app.add_option("--views", o.views, "field: how many; embed: to judge by (24); 1 to 1000")
       ->check(CLI::Range(1, 1000).description(""))
       ->type_name("N");
   app.add_option("--seconds", o.seconds,
-                 "field: of training, without --field; training: of each training; 0.1 to 86400")
+                 "field: of training, without --field; training, embed: of each; 0.1 to 86400")
       ->check(CLI::Range(0.1, 86400.0).description(""))
       ->type_name("S");
-  app.add_flag(
-      "--quick", o.quick,
-      "field: only the default and one setting of each kind; training: only three rows; attacks: one "
-      "severity");
+  app.add_flag("--quick", o.quick,
+               "field: only the default and one setting of each kind; training: only three rows; embed: only "
+               "four small ones; attacks: one severity");
 }
 
 int bench_field(const BenchFieldOptions& options, Context& context) {

@@ -1,6 +1,8 @@
 #pragma once
 #include <fieldmark/nerf/dataset.h>
+#include <fieldmark/nerf/radiance_field.h>
 
+#include <memory>
 #include <string>
 
 namespace CLI {
@@ -30,6 +32,10 @@ std::string lego_folder();
 
 /// A split of a data set, or of the built-in scene where no folder is given; `quick` makes that one small.
 nerf::Dataset bench_split(const std::string& folder, const std::string& split, bool quick);
+
+/// A field trained on a data set for a while, with progress. @throws Interrupted on Ctrl-C
+std::unique_ptr<nerf::RadianceField> trained_field(const nerf::Dataset& data, double seconds,
+                                                   Context& context);
 
 /// Renders a field in many ways, and prints speed against error.
 int bench_field(const BenchFieldOptions& options, Context& context);

@@ -14,6 +14,7 @@
 #include <ostream>
 
 #include "cli/bench_attacks.h"
+#include "cli/bench_embed.h"
 #include "cli/bench_field.h"
 #include "cli/bench_payload.h"
 #include "cli/bench_training.h"
@@ -27,6 +28,7 @@ namespace {
 struct Options {
   std::string what, peer;
   BenchAttacksOptions attacks;
+  BenchEmbedOptions embed;
   BenchFieldOptions field;  // and what both have: --scene, --plot, --runs
   BenchPayloadOptions payload;
   bool precision = false;
@@ -202,6 +204,17 @@ int run(Options options, Context& context) {
     options.attacks.quick = options.field.quick;
     return bench_attacks(options.attacks, context);
   }
+  if (options.what == "embed") {
+    const BenchFieldOptions& shared = options.field;
+    options.embed.owner = options.attacks.owner;
+    options.embed.field = shared.field;
+    options.embed.scene = shared.scene;
+    options.embed.plot = shared.plot;
+    options.embed.only = options.engine.only;
+    options.embed.seconds = shared.seconds;
+    options.embed.quick = shared.quick;
+    return bench_embed(options.embed, context);
+  }
   options.engine.runs = options.field.runs;
   if (!options.field.plot.empty()) check_writable(options.field.plot);
   const Scene scene = scene_of(options);
@@ -233,10 +246,11 @@ Command add_bench(CLI::App& app) {
                  "engine: kernels and training steps, against this machine's peak;\n"
                  "field: rendering in many ways, speed against error;\n"
                  "training: every choice of training switched off and on, for --seconds each;\n"
+                 "embed: embedding in many ways, for --seconds each: what is read, and at which strength;\n"
                  "payload: how often payloads are exact at rates of wrong bits, and how often noise is one;\n"
                  "attacks: a baked mark under attacks on its pictures and its file, accuracy against damage")
       ->required()
-      ->check(CLI::IsMember({"engine", "field", "training", "payload", "attacks"}).description(""))
+      ->check(CLI::IsMember({"engine", "field", "training", "embed", "payload", "attacks"}).description(""))
       ->type_name("WHAT");
   app.add_option("--runs", o->field.runs, "Runs of each row, whose median counts, 1 to 1000")
       ->check(CLI::Range(1, 1000).description(""))
@@ -245,13 +259,13 @@ Command add_bench(CLI::App& app) {
                  "engine: of the numbers of samples, above 0 to 1: smaller is quicker and less exact")
       ->check(CLI::Range(1e-6, 1.0).description(""))
       ->type_name("F");
-  app.add_option("--only", o->engine.only, "engine: only rows with TEXT in their name")
+  app.add_option("--only", o->engine.only, "engine, embed: only rows with TEXT in their name")
       ->type_name("TEXT")
       ->default_str("all");
-  app.add_option(
-         "--scene", o->field.scene,
-         "Data set that nerf_step, --precision, field and training train on, whose test views field renders, "
-         "and whose val views judge training")
+  app.add_option("--scene", o->field.scene,
+                 "Data set that nerf_step, --precision, field, training and embed train on, whose test views "
+                 "field renders, "
+                 "and whose val views judge training")
       ->type_name("DIR")
       ->default_str("lego of FIELDMARK_DATA, else the built-in scene");
   app.add_flag(
@@ -274,11 +288,13 @@ Command add_bench(CLI::App& app) {
       ->type_name("S")
       ->needs(peer);
   add_bench_field(app, o->field);
+  add_bench_embed(app, o->embed);
   add_bench_payload(app, o->payload);
   add_bench_attacks(app, o->attacks);
-  const CLI::Option* size = app.get_option("--size");
-  return [o, size](Context& context) {
-    if (size->count() > 0) o->attacks.size = o->field.size;
+  const CLI::Option *size = app.get_option("--size"), *views = app.get_option("--views");
+  return [o, size, views](Context& context) {
+    if (size->count() > 0) o->attacks.size = o->embed.size = o->field.size;
+    if (views->count() > 0) o->embed.views = o->field.views;
     return run(*o, context);
   };
 }

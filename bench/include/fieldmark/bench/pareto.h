@@ -16,6 +16,12 @@ struct ParetoMargin {
   double psnr = 0.1;   ///< dB, >= 0
 };
 
+/// Marks the points that no other one beats, for any number of figures of which more is better. One beats
+/// another if it is better in one figure by more than the margin, and worse by more than the margin in none.
+/// A point with a figure that is no number loses. @param margins  of each figure, in its unit
+/// @throws ValueError if a margin is not positive or 0, or a point has another number of figures
+std::vector<bool> pareto_front(std::span<const std::vector<double>> points, std::span<const double> margins);
+
 /// Marks the points that no other one beats. One beats another if it is faster by more than the margin and no
 /// less exact within the margin, or more exact by more than the margin and no slower within the margin. Times
 /// that are not finite and PSNRs that are no number lose. @throws ValueError if a margin is out of range

@@ -1,0 +1,24 @@
+#pragma once
+#include <fieldmark/watermark/embed_views.h>
+#include <fieldmark/watermark/embedder.h>
+
+#include <string>
+#include <vector>
+
+namespace fieldmark::bench {
+
+/// One way of embedding a mark: what differs from the default, and the settings themselves.
+struct EmbedVariant {
+  std::string choice;                 ///< what is chosen: "patch", "cells", ...; "default" for the default
+  std::string setting;                ///< how, for people
+  watermark::OwnerOptions owner;      ///< what is made
+  watermark::EmbedOptions embed;      ///< how it is trained, the seed included
+  watermark::EmbedViewOptions views;  ///< what it is trained on
+};
+
+/// The default first, then other lengths of the run, then every choice that embedding makes, switched off or
+/// set otherwise.
+/// @param length  of a run: its steps and seconds are kept   @param bits  of a message
+std::vector<EmbedVariant> embed_variants(const nerf::ScheduleOptions& length, Index bits, std::uint64_t seed);
+
+}  // namespace fieldmark::bench

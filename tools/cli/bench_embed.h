@@ -1,0 +1,26 @@
+#pragma once
+#include <string>
+
+#include "cli/bench_field.h"
+
+namespace fieldmark::cli {
+
+/// Of `bench embed`.
+struct BenchEmbedOptions {
+  std::string owner;  ///< file whose field is marked; empty: see `field`
+  std::string field;  ///< file; empty: `scene`, trained for a while
+  std::string scene;  ///< data set; empty: lego of FIELDMARK_DATA, else the built-in scene
+  std::string plot;   ///< SVG file; empty: none
+  std::string only;   ///< part of a row's name; the default is always measured
+  double seconds = 60;
+  Index views = 24, bits = 48;
+  Index size = 0;  ///< of the views to judge by; 0: as trained
+  bool quick = false;
+};
+/// Adds what the other benches do not have: --bits.
+void add_bench_embed(CLI::App& app, BenchEmbedOptions& options);
+
+/// Embeds a mark in many ways for --seconds each, and prints what is read against time and strength.
+int bench_embed(const BenchEmbedOptions& options, Context& context);
+
+}  // namespace fieldmark::cli
