@@ -57,7 +57,7 @@ CameraSearch::CameraSearch(const Owner& owner, const CameraSearchOptions& option
   for (const nerf::Camera& camera : nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near,
                                                        options.views, options.size, options.seed)) {
     const CachedView v = cache_view(renderer, owner.field, camera);
-    SmallView view{camera, std::vector<std::int32_t>(at(owner.cells.count()), -1), {}, {}, {}};
+    SmallView view{camera, std::vector<std::int32_t>(at(owner.cells.count()), -1), {}, {}, {}, {}};
     std::vector<double> weight;
     for (Index p = 0; p < v.height * v.width; ++p)
       for (std::int32_t k = v.sample_begin[at(p)]; k < v.sample_begin[at(p + 1)]; ++k) {
