@@ -17,6 +17,15 @@ using namespace fieldmark::watermark;
 namespace {
 constexpr CameraSearchOptions kOptions{.views = 60, .size = 32};
 
+nerf::Camera near_camera(const Owner& owner, Index size, std::uint64_t seed) {
+  return nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, 1, size, seed).front();
+}
+
+bool one_is_close(const std::vector<nerf::Camera>& found, const nerf::Camera& camera) {
+  return std::any_of(found.begin(), found.end(),
+                     [&](const nerf::Camera& c) { return cameras_apart(camera, c) < 8; });
+}
+
 // What an extractor that is right in two places of three would see.
 SeenPlaces places_of(const Owner& owner, const nerf::Camera& camera) {
   nerf::Renderer renderer(owner.field);
@@ -41,7 +50,7 @@ TEST_CASE("camera_search: places that the extractor recognised lead to the camer
   const Owner owner = tiny_owner();
   const CameraSearch search(owner, kOptions);
   for (const std::uint64_t seed : {11u, 12u, 13u}) {
-    nerf::Camera camera = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, 1, 48, seed).front();
+    nerf::Camera camera = near_camera(owner, 48, seed);
     if (seed == 12) camera = moved(camera, {0, 0, 0}, {0, 0, 0.5, 0, 0, 0, 0.2, 0.1, 0});
     const auto found = search.find(places_of(owner, camera), 48, 48, 3);
     REQUIRE(found.size() == 3);
@@ -58,12 +67,11 @@ TEST_CASE("camera_search: the whole object in a picture leads to the camera, tur
   nerf::Renderer renderer(owner.field);
   Index close = 0;
   for (const std::uint64_t seed : {11u, 12u, 13u, 14u}) {
-    nerf::Camera camera = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, 1, 96, seed).front();
+    nerf::Camera camera = near_camera(owner, 96, seed);
     if (seed == 12) camera = moved(camera, {0, 0, 0}, {0, 0, 0.5, 0, 0, 0, -0.2, 0.05, 0});
     const auto found = search.find(renderer.render(camera).rgb, 3);
     REQUIRE(found.size() == 3);
-    close += std::any_of(found.begin(), found.end(),
-                         [&](const nerf::Camera& c) { return cameras_apart(camera, c) < 8; });
+    close += one_is_close(found, camera);
   }
   CHECK(close >= 3);  // 60 renders are some 15 degrees apart
 }
@@ -74,7 +82,7 @@ TEST_CASE("camera_search: two fifths of a picture lead to the camera") {
   nerf::Renderer renderer(owner.field);
   Index close = 0;
   for (const std::uint64_t seed : {11u, 12u, 13u, 14u}) {
-    nerf::Camera camera = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, 1, 96, seed).front();
+    nerf::Camera camera = near_camera(owner, 96, seed);
     camera.cx -= 20;  // 60 x 64 pixels of 96 x 96
     camera.cy -= 16;
     camera.width = 60;
@@ -83,8 +91,7 @@ TEST_CASE("camera_search: two fifths of a picture lead to the camera") {
     REQUIRE(found.size() == 6);
     CHECK(found.front().width == 60);
     CHECK(found.front().height == 64);
-    close += std::any_of(found.begin(), found.end(),
-                         [&](const nerf::Camera& c) { return cameras_apart(camera, c) < 8; });
+    close += one_is_close(found, camera);
   }
   CHECK(close >= 3);
 }
@@ -98,8 +105,7 @@ TEST_CASE("camera_search: nothing recognised, nothing found") {
 
 TEST_CASE("camera_search: one and two threads find the same") {
   const Owner owner = tiny_owner();
-  const nerf::Camera camera =
-      nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, 1, 48, 14).front();
+  const nerf::Camera camera = near_camera(owner, 48, 14);
   const SeenPlaces places = places_of(owner, camera);
   const int before = threads();
   std::vector<std::array<double, 16>> found[2];

@@ -95,6 +95,17 @@ void write_picture(const std::string& path, const watermark::Owner& owner, std::
   write_png(path, comparison_sheet(pairs));
 }
 
+watermark::OwnerOptions owner_options_of(const Options& options, std::uint64_t seed) {
+  watermark::OwnerOptions owner = options.owner;
+  owner.preset = watermark::parse_preset(options.preset);
+  const auto preset = watermark::owner_options(owner.preset);
+  owner.message_features = preset.message_features;
+  owner.fusion = preset.fusion;
+  owner.seed = seed;
+  if (owner.preset != watermark::Preset::fast && !options.reader_size_given) owner.reader_size = kPaperPatch;
+  return owner;
+}
+
 // From views that the owner has not learnt from.
 Json measure_owner(const Options& options, const watermark::Owner& owner, const Lpips<float>* lpips,
                    Context& context) {
@@ -121,14 +132,8 @@ int run(const Options& options, Context& context) {
   const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
   const auto field = nerf::RadianceField::load(options.field);
   const auto key = key_of(options, checkpoint);
-  auto owner_options = options.owner;
-  owner_options.preset = watermark::parse_preset(options.preset);
-  const auto preset = watermark::owner_options(owner_options.preset);
-  owner_options.message_features = preset.message_features;
-  owner_options.fusion = preset.fusion;
-  owner_options.seed = context.seed();
+  auto owner_options = owner_options_of(options, context.seed());
   const bool fast = owner_options.preset == watermark::Preset::fast;
-  if (!fast && !options.reader_size_given) owner_options.reader_size = kPaperPatch;
   const auto views = cached_views(options, field, owner_options.reader_size, context);
   auto cells =
       fast ? watermark::CellGrid(owner_options.cells, watermark::visible_area(views, owner_options.cells))
@@ -171,6 +176,20 @@ int run(const Options& options, Context& context) {
   return kOk;
 }
 
+void add_view_options(CLI::App& app, Options& o) {
+  app.add_option("--views", o.views, "Views to learn from, 8 to 10000")
+      ->check(CLI::Range(8, 10000).description(""))
+      ->type_name("N");
+  app.add_option("--distances", o.distances,
+                 "near: near cameras, the object always as large as the extractor sees it;\n"
+                 "native: only as large as their pictures have it; several: also closer and farther cameras")
+      ->check(CLI::IsMember({"near", "native", "several"}).description(""))
+      ->type_name("NAME");
+  app.add_option("--samples", o.samples, "Samples kept of a ray of a view, 1 to 64")
+      ->check(CLI::Range(1, 64).description(""))
+      ->type_name("N");
+}
+
 }  // namespace
 
 Command add_embed(CLI::App& app) {
@@ -204,17 +223,7 @@ Command add_embed(CLI::App& app) {
                                      "to 1024 (200; paper, code: 150)")
                           ->check(CLI::Range(32, 1024).description(""))
                           ->type_name("N");
-  app.add_option("--views", o->views, "Views to learn from, 8 to 10000")
-      ->check(CLI::Range(8, 10000).description(""))
-      ->type_name("N");
-  app.add_option("--distances", o->distances,
-                 "near: near cameras, the object always as large as the extractor sees it;\n"
-                 "native: only as large as their pictures have it; several: also closer and farther cameras")
-      ->check(CLI::IsMember({"near", "native", "several"}).description(""))
-      ->type_name("NAME");
-  app.add_option("--samples", o->samples, "Samples kept of a ray of a view, 1 to 64")
-      ->check(CLI::Range(1, 64).description(""))
-      ->type_name("N");
+  add_view_options(app, *o);
   add_run_length(app, o->length, true);
   app.add_option("--measured-views", o->measured_views, "Near views to measure on at the end, 1 to 100000")
       ->check(CLI::Range(1, 100000).description(""))
