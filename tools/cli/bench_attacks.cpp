@@ -214,7 +214,8 @@ void add_bench_attacks(CLI::App& app, BenchAttacksOptions& o) {
   const auto add_file = [&](const char* name, auto& to, const char* what, const char* type) {
     app.add_option(name, to, what)->type_name(type)->default_str("");
   };
-  add_file("--owner", o.owner, "attacks: what `fieldmark embed` wrote; embed: the owner of the field", "OWNER");
+  add_file("--owner", o.owner, "attacks: what `fieldmark embed` wrote; embed: the owner of the field",
+           "OWNER");
   add_message_options(app, o.message, "attacks: the message baked into --field");
   add_file("--other", o.other, "attacks: a field baked with another message, to be averaged with (none)",
            "FIELD");

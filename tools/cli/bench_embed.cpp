@@ -161,12 +161,6 @@ constexpr const char* kColumns =
 
 }  // namespace
 
-void add_bench_embed(CLI::App& app, BenchEmbedOptions& o) {
-  app.add_option("--bits", o.bits, "embed: length of the message, 1 to 256")
-      ->check(CLI::Range(1, 256).description(""))
-      ->type_name("N");
-}
-
 int bench_embed(const BenchEmbedOptions& options, Context& context) {
   if (!options.plot.empty()) {
     check_writable(options.plot);

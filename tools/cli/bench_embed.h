@@ -17,8 +17,6 @@ struct BenchEmbedOptions {
   Index size = 0;  ///< of the views to judge by; 0: as trained
   bool quick = false;
 };
-/// Adds what the other benches do not have: --bits.
-void add_bench_embed(CLI::App& app, BenchEmbedOptions& options);
 
 /// Embeds a mark in many ways for --seconds each, and prints what is read against time and strength.
 int bench_embed(const BenchEmbedOptions& options, Context& context);

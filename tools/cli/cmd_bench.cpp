@@ -288,13 +288,14 @@ Command add_bench(CLI::App& app) {
       ->type_name("S")
       ->needs(peer);
   add_bench_field(app, o->field);
-  add_bench_embed(app, o->embed);
   add_bench_payload(app, o->payload);
   add_bench_attacks(app, o->attacks);
-  const CLI::Option *size = app.get_option("--size"), *views = app.get_option("--views");
-  return [o, size, views](Context& context) {
+  const CLI::Option *size = app.get_option("--size"), *views = app.get_option("--views"),
+                    *bits = app.get_option("--bits");
+  return [o, size, views, bits](Context& context) {
     if (size->count() > 0) o->attacks.size = o->embed.size = o->field.size;
     if (views->count() > 0) o->embed.views = o->field.views;
+    if (bits->count() > 0) o->embed.bits = o->payload.bits;
     return run(*o, context);
   };
 }

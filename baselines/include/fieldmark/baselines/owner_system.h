@@ -42,6 +42,7 @@ watermark::Key measuring_key(std::uint64_t seed);
 /// Where and how long an owner is trained.
 struct OwnerTraining {
   double seconds = 300;              ///< of training, without the views' rendering
+  Index steps = 0;                   ///< above 0: so many in place of the seconds
   std::filesystem::path checkpoint;  ///< see TimedRun
   Index views = 200;                 ///< near views to learn from
   RunProgress progress = {};         ///< may be empty
