@@ -98,8 +98,8 @@ TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name,
     };
   }
   options.views = training.views;
+  options.schedule.steps = 0;
   options.schedule.seconds = training.seconds;
-  options.schedule.steps = training.steps;
   watermark::Embedder embedder(trained.owner, views, options);
   trained.seconds = timed_run({.what = trained_as(name).stem(),
                                .seconds = training.seconds,

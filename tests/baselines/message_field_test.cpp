@@ -1,4 +1,5 @@
 #include <fieldmark/baselines/message_field.h>
+#include <fieldmark/engine/adam.h>
 #include <fieldmark/engine/ops/loss.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/nerf/field_sampler.h>
@@ -178,6 +179,26 @@ TEST_CASE("message_field: a step along the gradient changes the loss by its squa
     };
     const double up = moved(step), down = moved(-2 * step);
     CHECK((up - down) / (2 * step) == Approx(square).epsilon(0.02));
+  }
+}
+
+TEST_CASE("message_field: in 40 steps it learns to look like the base field") {
+  for (const MessagePlace place : {MessagePlace::inputs, MessagePlace::density}) {
+    Made made(place);
+    const Tensor<float> want = nerf::Renderer(made.base).render(camera()).rgb;
+    Adam<float> adam(made.store.size(), {.lr = 0.01, .zero_grads = true});
+    std::vector<double> losses;
+    for (int step = 0; step < 40; ++step) {
+      Tape<float> tape;
+      const Var<float> loss = mse_loss<float>(made.field.picture(tape, Params<float>(made.store), made.base,
+                                                                 camera(), tape.constant(kMessage, {1, 3})),
+                                              tape.constant(want.data.data(), {63, 3}));
+      tape.backward(loss);
+      losses.push_back(static_cast<double>(loss.value()[0]));
+      adam.step(made.store.values(), made.store.grads());
+    }
+    CAPTURE(losses.front(), losses.back());
+    CHECK(losses.back() < 0.3 * losses.front());
   }
 }
 

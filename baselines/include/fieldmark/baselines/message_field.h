@@ -21,8 +21,8 @@ struct MessageFieldOptions {
   std::uint64_t seed = 0;  ///< of the initial numbers
 };
 
-/// A field whose densities depend on a message: the two systems of the paper's tables that leave the geometry
-/// no peace, with h, Theta, Y as in nerf::Field.
+/// A field whose densities depend on a message, as in two systems of the paper's tables; h, Theta and Y are
+/// those of nerf::Field.
 ///   inputs:   z = Theta'_sigma(h_sigma(x), M),   sigma = exp(z_0),   c = Theta'_c(z, h_c(x), Y(d), M)
 ///   density:  sigma = exp(z_0 + G(z_0 / 16, M)),   c as the base field has it
 /// Source: Luo et al. 2023 (CopyRNeRF), section 4.1; G as in the authors' code, two hidden layers of 256 and

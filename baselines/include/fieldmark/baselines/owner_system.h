@@ -23,15 +23,14 @@ struct OwnerSystem {
 /// Whether a system of paper_systems() is trained through an Owner.
 bool has_owner(std::string_view system);
 /// The options of such a system: ours at 34 dB on the object, read at up to 128 pixels; the paper's at up to
-/// 150. Without one of its parts a system has, in its place,
-///   ours_without_dense: signs and cells of places cost nothing, the pooled bits alone do;
-///   ours_without_cells: preset paper's networks under our budget, distortions and step sizes: one message
-///   for
-///     all places, which then cannot be told apart either;
-///   ours_without_signs: the bit's own sign in every cell;
-///   without_drr: neither distortions nor moved samples; without_mff and without_cff: see MarkFusion; drs:
-///   the
-///     full method, with the samples moved at test as in training.
+/// 150. Systems without one of their parts:
+///   ours_without_dense: signs and cells of places cost nothing, the pooled bits alone do
+///   ours_without_cells: preset paper's networks, one message for all places, under our budget, distortions
+///   and step sizes; without places there is nothing dense to supervise
+///   ours_without_signs: in every cell the bit as it is
+///   without_drr: neither distortions nor moved samples
+///   without_mff, without_cff: see MarkFusion
+///   drs: the full method, with the samples moved at test as in training
 /// @param picture  pixels of the views' longer side; the reader sees no more, and at least 32
 /// @throws ValueError if the system has none
 OwnerSystem owner_system(const CellName& name, Index picture);
@@ -42,7 +41,6 @@ watermark::Key measuring_key(std::uint64_t seed);
 /// Where and how long an owner is trained.
 struct OwnerTraining {
   double seconds = 300;              ///< of training, without the views' rendering
-  Index steps = 0;                   ///< above 0: so many in place of the seconds
   std::filesystem::path checkpoint;  ///< see TimedRun
   Index views = 200;                 ///< near views to learn from
   RunProgress progress = {};         ///< may be empty
