@@ -133,9 +133,11 @@ std::string HidingTrainer::fingerprint() const {
   return std::string(hiding_name(marker_.kind())) + ", " + std::to_string(marker_.options().bits) +
          " bits, " + std::to_string(marker_.options().channels) + " channels, batch " +
          std::to_string(o.batch) + ", crops " + std::to_string(o.first_crop) + " and " +
-         std::to_string(o.crop) + ", weights " + std::to_string(o.message_weight) + " " +
-         std::to_string(o.image_weight) + " " + std::to_string(o.adversary_weight) + ", lr " +
-         std::to_string(o.schedule.lr) + ", seed " + std::to_string(o.seed);
+         std::to_string(o.crop) + " after " + std::to_string(o.first_part) + ", weights " +
+         std::to_string(o.message_weight) + " " + std::to_string(o.image_weight) + " " +
+         std::to_string(o.adversary_weight) + ", lr " + std::to_string(o.schedule.lr) + ", half after " +
+         std::to_string(o.schedule.half_after) + ", cooldown " + std::to_string(o.schedule.cooldown) +
+         " to " + std::to_string(o.schedule.last) + ", seed " + std::to_string(o.seed);
 }
 
 void HidingTrainer::save(const std::filesystem::path& path) const {
