@@ -192,7 +192,6 @@ CellRunner::Trained CellRunner::train_hiding(const CellName& name, const Scene& 
 }
 
 CellRunner::Trained CellRunner::train(const CellName& name, const Scene& scene) {
-  paper_system(name.system);
   const auto field = std::make_shared<const nerf::RadianceField>(base_field(name, scene));
   if (hiding_system(name.system)) return train_hiding(name, scene, field);
   const auto checkpoint = options_.work / (trained_as(name).stem() + ".checkpoint");
@@ -244,6 +243,7 @@ void CellRunner::read_variants(const CellName& name, const Trained& trained,
 }
 
 MeasuredCell CellRunner::run(const CellName& name) {
+  paper_system(name.system);  // before a scene is read in vain
   const Scene& data = scene(name);
   const Trained trained = train(name, data);
   const auto& o = options_;

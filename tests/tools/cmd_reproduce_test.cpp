@@ -28,7 +28,7 @@ TEST_CASE("reproduce measures what is missing on the built-in scene, once", "[re
                                       "--photographs",
                                       "1",
                                       "--base-seconds",
-                                      "0.1",
+                                      "0.3",
                                       "--log2-table",
                                       "9",
                                       "--cells",
@@ -39,11 +39,14 @@ TEST_CASE("reproduce measures what is missing on the built-in scene, once", "[re
                                       "-",
                                       "--lpips-weights",
                                       "none"};
+  auto there = paper_cells().front();  // of the two cells of the table one has been measured
+  there.name = {"copyrnerf_paper", "objects", "hash", 8, 1};
+  save_cell(folder / "cells", there);
   const auto first = run_command(line);
   INFO(first.err);
   REQUIRE(first.code == cli::kOk);
-  CHECK_THAT(first.err, Contains("2 of 2 cells are missing, about") &&
-                            Contains("copyrnerf_paper-objects-hash-8-1: ") && Contains("paper.md: written"));
+  CHECK_THAT(first.err, Contains("1 of 2 cells are missing, about") && Contains("ours-objects-hash-8-1: ") &&
+                            Contains("paper.md: written"));
   CHECK(nlohmann::json::parse(first.out)["missing"].empty());
   const auto cells = baselines::load_cells(folder / "cells");
   REQUIRE(cells.size() == 2);
