@@ -100,9 +100,9 @@ GradcheckReport check_noise(NoiseLayer layer) {
 }
 
 template <class Network>
-GradcheckReport check_network(Index side, bool encoder) {
+GradcheckReport check_network(Index side, bool encoder, Index channels) {
   ParamStore<double> store;
-  const Network net(store, {.bits = 2, .channels = 2}, 1);
+  const Network net(store, {.bits = 2, .channels = channels}, 1);
   open_relus(store);
   const std::vector<Tensor<double>> in{numbers({1, side, side, 3}, 1), numbers({1, 2}, 2)};
   return gradcheck_module(
@@ -132,11 +132,11 @@ std::vector<GradcheckCase> gradcheck_cases() {
   return {{"conv_block", check_conv_block},
           {"doubling_conv", check_doubling_conv},
           {"doubling_conv, depth_to_space", check_depth_to_space},
-          {"hiding_network, encoder", [] { return check_network<HiddenNetwork<double>>(3, true); }},
-          {"hiding_network, decoder", [] { return check_network<HiddenNetwork<double>>(3, false); }},
+          {"hiding_network, encoder", [] { return check_network<HiddenNetwork<double>>(3, true, 2); }},
+          {"hiding_network, decoder", [] { return check_network<HiddenNetwork<double>>(3, false, 2); }},
           {"hiding_network, discriminator", check_discriminator},
-          {"mbrs_network, encoder", [] { return check_network<MbrsNetwork<double>>(4, true); }},
-          {"mbrs_network, decoder", [] { return check_network<MbrsNetwork<double>>(16, false); }},
+          {"mbrs_network, encoder", [] { return check_network<MbrsNetwork<double>>(4, true, 1); }},
+          {"mbrs_network, decoder", [] { return check_network<MbrsNetwork<double>>(16, false, 1); }},
           {"picture_noise, dropout", [] { return check_noise(NoiseLayer::dropout); }},
           {"picture_noise, cropout", [] { return check_noise(NoiseLayer::cropout); }},
           {"picture_noise, blur", [] { return check_noise(NoiseLayer::blur); }},
