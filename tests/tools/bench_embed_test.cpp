@@ -32,7 +32,6 @@ TEST_CASE("bench embed tells what is read against time and strength, and where t
     on_front = on_front || row["front"].get<bool>();
   }
   CHECK(on_front);
-  CHECK(json["rows"][3]["seconds"] > json["rows"][1]["seconds"]);  // twice and a quarter of the time
   CHECK(json["curves"].size() > 4);
   CHECK_THAT(r.err, Contains("The default reads"));
   CHECK_THAT(read_text(folder / "embed.md"),
