@@ -17,7 +17,7 @@ namespace {
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 constexpr double kSpacing = 1.7320508 / 420;  // of samples, cube sides: a field's by default
-constexpr std::uint64_t kOfBatch = 8 * 64;  // place of what a whole batch draws: after those of 64 pictures
+constexpr std::uint64_t kOfBatch = 8 * 64;    // place of what a whole batch draws: after those of 64 pictures
 
 double blend(double from, double to, double fraction) { return from + (to - from) * fraction; }
 

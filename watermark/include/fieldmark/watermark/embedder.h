@@ -72,8 +72,8 @@ EmbedOptions embed_options(Preset preset);
 ///   L = gamma_1 mean |P~ - P^|^2 + gamma_2 BCE(pooled bits, M)
 /// without the perceptual term and, under a budget, without the content loss. Each picture draws a message, a
 /// view, distortions; a view of fewer pixels than the reader's is enlarged with its marks, as the reader
-/// enlarges a small picture. Same seed and number of steps: same bytes, for any thread count and across save()
-/// and restore().
+/// enlarges a small picture. Same seed and number of steps: same bytes, for any thread count and across
+/// save() and restore().
 class Embedder {
  public:
   /// Owner and views must outlive the embedder.
