@@ -122,9 +122,11 @@ std::vector<EmbedVariant> embed_variants(const nerf::ScheduleOptions& length, In
                                          std::uint64_t seed) {
   Variants all(base_variant(Preset::fast, length, bits, seed));
   lengths(all);
-  EmbedVariant paper = base_variant(Preset::paper, length, bits, seed);
-  paper.owner.reader_size = kPaperPatch;
-  all.add("preset", "paper", std::move(paper));
+  for (const Preset preset : {Preset::paper, Preset::code}) {
+    EmbedVariant v = base_variant(preset, length, bits, seed);
+    v.owner.reader_size = kPaperPatch;
+    all.add("preset", watermark::preset_name(preset), std::move(v));
+  }
   views(all);
   marks(all);
   training(all);
