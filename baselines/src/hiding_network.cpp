@@ -1,4 +1,5 @@
 #include <fieldmark/baselines/hiding_network.h>
+#include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/engine/ops/pool.h>
 #include <fieldmark/engine/ops/rows.h>
@@ -74,7 +75,7 @@ Var<T> HiddenNetwork<T>::encode(const Params<T>& params, Var<T> pictures, Var<T>
   for (int k = 0; k < kEncoderBlocks; ++k) x = encoder_[static_cast<std::size_t>(k)](params, x, pass);
   const Var<T> sent = at_every_pixel(messages, pictures.shape()[1], pictures.shape()[2]);
   const Var<T> joined = encoder_.back()(params, concat_columns<T>({sent, x, pictures}), pass);
-  return (*to_colour_)(params, joined);
+  return add(pictures, (*to_colour_)(params, joined));
 }
 
 template <class T>

@@ -5,25 +5,36 @@
 #include <fieldmark/engine/ops/loss.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 namespace fieldmark::baselines {
 namespace {
 
-constexpr double kKeep = 0.95;  // of a running mean
-constexpr double kLeastImageWeight = 0.02, kUnread = 0.8, kRead = 0.95;
+constexpr double kKeep = 0.95;      // of a running mean
+constexpr double kRead = 0.9;       // share of bits at which the mark becomes fainter
+constexpr double kFainter = 0.015;  // dB a step
+constexpr double kLeastRms = 1e-6;
+constexpr double kNoiseFrom = 6;        // dB before the last strength: files and noise layers come in
+constexpr std::uint64_t kWhether = 50;  // draws: below it are those of a layer
 constexpr AdamOptions kAdam{.lr = 1, .beta2 = 0.999, .eps = 1e-8, .zero_grads = true};
 
-double part(double value, double from, double to) {
-  return std::clamp((value - from) / (to - from), 0.0, 1.0);
+// As a file keeps it, in [0, 1] and steps of 1/255; gradients pass as if it were the marked picture.
+Var<float> as_file(Var<float> marked) {
+  const Index n = marked.shape().size();
+  float* change = marked.tape().scratch(n);
+  for (Index i = 0; i < n; ++i) {
+    const float v = marked.value()[i], level = std::round(255 * std::clamp(v / 2 + 0.5f, 0.f, 1.f));
+    change[i] = 2 * level / 255 - 1 - v;
+  }
+  return add(marked, marked.tape().constant(change, marked.shape()));
 }
 
 }  // namespace
 
 HidingTrainOptions hiding_train_options(HidingKind kind) {
   HidingTrainOptions o;
-  if (kind == HidingKind::mbrs)
-    o.message_weight = 10, o.image_weight = 1, o.adversary_weight = 1e-4, o.first_crop = o.crop;
+  if (kind == HidingKind::mbrs) o.message_weight = 10, o.adversary_weight = 1e-4, o.first_crop = o.crop;
   return o;
 }
 
@@ -46,6 +57,10 @@ HidingTrainer::HidingTrainer(PictureMarker& marker, const CropSource& crops,
   if (!(options.first_part >= 0 && options.first_part < 1))
     throw ValueError("[hiding_trainer] first_part must be at least 0 and below 1, got " +
                      std::to_string(options.first_part));
+  if (!(options.strength >= options.first_strength))
+    throw ValueError("[hiding_trainer] strength must be at least first_strength, got " +
+                     std::to_string(options.strength) + " and " + std::to_string(options.first_strength));
+  figures_.strength = options.first_strength;
 }
 
 // By steps where the run has a number of them, else by the clock; never back.
@@ -69,6 +84,36 @@ void HidingTrainer::draw(Index size) {
   }
 }
 
+// Whether this step's pictures pass a file and a noise layer: none as long as the mark is loud, then all.
+bool HidingTrainer::noisy() const {
+  const double share = (figures_.strength - options_.strength + kNoiseFrom) / kNoiseFrom;
+  return static_cast<double>(noise_rng_.uniform(static_cast<std::uint64_t>(steps_), kWhether)) < share;
+}
+
+Var<float> HidingTrainer::sent_on(Var<float> marked, Var<float> plain) const {
+  if (!noisy()) return marked;
+  const auto step = static_cast<std::uint64_t>(steps_);
+  const auto layers = marker_.kind() == HidingKind::mbrs ? mbrs_noise_layers() : hidden_noise_layers();
+  const auto which = noise_rng_.below(static_cast<Index>(layers.size()), step);
+  return apply_noise_layer(layers[static_cast<std::size_t>(which)], as_file(marked), plain, noise_rng_, step);
+}
+
+// plain + g (encoded - plain), with g of each picture so that the second term has the strength of now.
+Var<float> HidingTrainer::at_strength(Var<float> encoded, Var<float> plain) const {
+  const Index n = plain.shape()[0], each = plain.shape().size() / n;
+  const Var<float> residual = sub(encoded, plain);
+  float* gains = plain.tape().scratch(n * each);
+  for (Index i = 0; i < n; ++i) {
+    double square = 0;
+    for (Index k = i * each; k < (i + 1) * each; ++k)
+      square += std::pow(0.5 * static_cast<double>(residual.value()[k]), 2);
+    const double rms = std::sqrt(square / static_cast<double>(each));
+    std::fill_n(gains + i * each, each,
+                static_cast<float>(std::pow(10.0, -figures_.strength / 20) / std::max(rms, kLeastRms)));
+  }
+  return add(plain, mul(residual, plain.tape().constant(gains, plain.shape())));
+}
+
 void HidingTrainer::train_networks(Index size) {
   const Index n = options_.batch, bits = marker_.options().bits;
   tape_.reset();
@@ -76,19 +121,11 @@ void HidingTrainer::train_networks(Index size) {
   NormPass<float> pass, critic_pass;
   const Var<float> plain = tape_.constant(pictures_.data(), {n, size, size, 3});
   const Var<float> sent = tape_.constant(messages_.data(), {n, bits});
-  const Var<float> marked = marker_.network().encode(params, plain, sent, pass);
-  const auto layers = marker_.kind() == HidingKind::mbrs ? mbrs_noise_layers() : hidden_noise_layers();
-  const auto layer = layers[static_cast<std::size_t>(
-      noise_rng_.below(static_cast<Index>(layers.size()), static_cast<std::uint64_t>(steps_)))];
-  const Var<float> noised =
-      apply_noise_layer(layer, marked, plain, noise_rng_, static_cast<std::uint64_t>(steps_));
-  const Var<float> read = marker_.network().decode(params, noised, pass);
+  const Var<float> marked = at_strength(marker_.network().encode(params, plain, sent, pass), plain);
+  const Var<float> read = marker_.network().decode(params, sent_on(marked, plain), pass);
   const Var<float> verdict = critic_(Params<float>(critic_params_, nullptr), marked, critic_pass);
   const std::vector<float> as_plain(static_cast<std::size_t>(n), 0.f);
-  const Var<float> message_loss = mse_loss<float>(read, sent), image_loss = mse_loss<float>(marked, plain);
-  const double visible =
-      options_.image_weight * std::max(kLeastImageWeight, part(figures_.bits, kUnread, kRead));
-  const Var<float> loss = add(add(scale(message_loss, options_.message_weight), scale(image_loss, visible)),
+  const Var<float> loss = add(scale(mse_loss<float>(read, sent), options_.message_weight),
                               scale(bce_with_logits<float>(verdict, as_plain), options_.adversary_weight));
   tape_.backward(loss);
   adam_.step(marker_.params.values(), marker_.params.grads(), schedule_.lr(steps_));
@@ -100,7 +137,7 @@ void HidingTrainer::train_networks(Index size) {
     right += (read.value()[i] > 0.5f) == (messages_[static_cast<std::size_t>(i)] > 0.5f);
   const double keep = steps_ == 0 ? 0 : kKeep;
   figures_.bits = keep * figures_.bits + (1 - keep) * right / static_cast<double>(n * bits);
-  figures_.square = keep * figures_.square + (1 - keep) * static_cast<double>(image_loss.value()[0]) / 4;
+  if (figures_.bits > kRead) figures_.strength = std::min(figures_.strength + kFainter, options_.strength);
 }
 
 void HidingTrainer::train_discriminator(Index size) {
@@ -134,10 +171,11 @@ std::string HidingTrainer::fingerprint() const {
          " bits, " + std::to_string(marker_.options().channels) + " channels, batch " +
          std::to_string(o.batch) + ", crops " + std::to_string(o.first_crop) + " and " +
          std::to_string(o.crop) + " after " + std::to_string(o.first_part) + ", weights " +
-         std::to_string(o.message_weight) + " " + std::to_string(o.image_weight) + " " +
-         std::to_string(o.adversary_weight) + ", lr " + std::to_string(o.schedule.lr) + ", half after " +
-         std::to_string(o.schedule.half_after) + ", cooldown " + std::to_string(o.schedule.cooldown) +
-         " to " + std::to_string(o.schedule.last) + ", seed " + std::to_string(o.seed);
+         std::to_string(o.message_weight) + " " + std::to_string(o.adversary_weight) + ", strength " +
+         std::to_string(o.first_strength) + " to " + std::to_string(o.strength) + ", lr " +
+         std::to_string(o.schedule.lr) + ", half after " + std::to_string(o.schedule.half_after) +
+         ", cooldown " + std::to_string(o.schedule.cooldown) + " to " + std::to_string(o.schedule.last) +
+         ", seed " + std::to_string(o.seed);
 }
 
 void HidingTrainer::save(const std::filesystem::path& path) const {
@@ -151,7 +189,7 @@ void HidingTrainer::save(const std::filesystem::path& path) const {
   file.add("critic/mean", {c}, critic_adam_.mean());
   file.add("critic/mean_square", {c}, critic_adam_.mean_square());
   const std::int64_t counts[] = {steps_, schedule_.total(), large_ ? 1 : 0};
-  const double figures[] = {figures_.bits, figures_.square};
+  const double figures[] = {figures_.bits, figures_.strength};
   file.add("counts", {3}, counts);
   file.add("figures", {2}, figures);
   file.write(path);

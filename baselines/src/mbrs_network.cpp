@@ -1,4 +1,5 @@
 #include <fieldmark/baselines/mbrs_network.h>
+#include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/engine/ops/pool.h>
 #include <fieldmark/engine/ops/resample.h>
@@ -59,7 +60,7 @@ Var<T> MbrsNetwork<T>::encode(const Params<T>& params, Var<T> pictures, Var<T> m
   map = encoder_[1](params, map, pass);
   if (map.shape()[1] != h || map.shape()[2] != w) map = upsample_to(map, h, w);
   const Var<T> both = blocks_[of_both](params, concat_columns<T>({shown, map}), pass);
-  return (*to_colour_)(params, concat_columns<T>({both, pictures}));
+  return add(pictures, (*to_colour_)(params, concat_columns<T>({both, pictures})));
 }
 
 template <class T>

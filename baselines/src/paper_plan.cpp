@@ -15,10 +15,14 @@ const std::array kSystems{
                 "one message fused into every colour, read from the whole picture, under distortions"},
     PaperSystem{"copyrnerf_code", "CopyRNeRF, preset code",
                 "the same with the networks, step sizes and pictures of the authors' code"},
-    PaperSystem{"hidden_nerf", "HiDDeN + NeRF",
-                "photographs marked by HiDDeN at 30 dB, a field trained on them, its renders read", false},
-    PaperSystem{"mbrs_nerf", "MBRS + NeRF",
-                "photographs marked by MBRS at 30 dB, a field trained on them, its renders read", false},
+    PaperSystem{
+        "hidden_nerf", "HiDDeN + NeRF",
+        "photographs marked by HiDDeN (32 channels) at 30 dB, a field trained on them, its renders read",
+        false},
+    PaperSystem{
+        "mbrs_nerf", "MBRS + NeRF",
+        "photographs marked by MBRS (32 channels) at 30 dB, a field trained on them, its renders read",
+        false},
     PaperSystem{
         "nerf_message", "NeRF with message",
         "the message beside the inputs of the field's networks, trained on from the unmarked field's"},

@@ -1,6 +1,7 @@
 #include <fieldmark/baselines/mbrs_network.h>
 #include <fieldmark/baselines/picture_marker.h>
 #include <fieldmark/engine/image.h>
+#include <fieldmark/engine/metrics.h>
 
 #include <cmath>
 #include <string>
@@ -14,6 +15,30 @@ Tensor<float> centred(const Tensor<float>& picture) {
   Tensor<float> x({1, picture.shape[0], picture.shape[1], 3});
   for (Index i = 0; i < x.size(); ++i) x[i] = 2 * picture[i] - 1;
   return x;
+}
+
+constexpr int kGainRounds = 8;
+constexpr double kNear = 0.01;  // dB
+
+Tensor<float> added(const Tensor<float>& picture, const Tensor<float>& residual, double gain) {
+  Tensor<float> out(picture.shape);
+  for (Index i = 0; i < out.size(); ++i) out[i] = picture[i] + static_cast<float>(gain) * residual[i];
+  return quantize8(out);
+}
+
+// With the gain at which the file has the strength: black and white take a part of the residual away.
+Tensor<float> added_at(const Tensor<float>& picture, const Tensor<float>& residual, double strength) {
+  const double level = psnr(residual, Tensor<float>(residual.shape));
+  if (!std::isfinite(level)) return added(picture, residual, 1);
+  double gain = std::pow(10.0, (level - strength) / 20);
+  Tensor<float> out = added(picture, residual, gain);
+  for (int k = 0; k < kGainRounds; ++k) {
+    const double miss = psnr(out, picture) - strength;
+    if (!std::isfinite(miss) || std::abs(miss) < kNear) break;
+    gain *= std::pow(10.0, miss / 20);
+    out = added(picture, residual, gain);
+  }
+  return out;
 }
 
 }  // namespace
@@ -39,15 +64,9 @@ Tensor<float> PictureMarker::mark(const Tensor<float>& picture, const watermark:
   NormPass<float> pass{.running = true};
   const Var<float> marked = network_->encode(Params<float>(params, nullptr), tape.constant(x),
                                              tape.constant(bits.data(), {1, options_.bits}), pass);
-  double square = 0;
-  for (Index i = 0; i < x.size(); ++i)
-    square +=
-        std::pow(0.5 * static_cast<double>(marked.value()[i] - x[i]), 2) / static_cast<double>(x.size());
-  const double gain = strength > 0 && square > 0 ? std::pow(10.0, -strength / 20) / std::sqrt(square) : 1;
-  Tensor<float> out(picture.shape);
-  for (Index i = 0; i < out.size(); ++i)
-    out[i] = picture[i] + static_cast<float>(gain) * 0.5f * (marked.value()[i] - x[i]);
-  return quantize8(out);
+  Tensor<float> residual(picture.shape);
+  for (Index i = 0; i < x.size(); ++i) residual[i] = 0.5f * (marked.value()[i] - x[i]);
+  return strength > 0 ? added_at(picture, residual, strength) : added(picture, residual, 1);
 }
 
 watermark::Message PictureMarker::read(const Tensor<float>& picture) const {

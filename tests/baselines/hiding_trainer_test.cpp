@@ -62,12 +62,13 @@ TEST_CASE("hiding_trainer: one bit is learnt in some steps") {
   options.schedule.lr = 5e-3;
   HidingTrainer trainer(marker, crops, options);
   while (!trainer.done()) trainer.step(0);
-  INFO("bits right " << trainer.figures().bits << ", mean square " << trainer.figures().square);
+  INFO("bits right " << trainer.figures().bits << ", " << trainer.figures().strength << " dB");
   CHECK(trainer.figures().bits > 0.8);
+  CHECK(trainer.figures().strength > options.first_strength);
 }
 
 TEST_CASE("hiding_trainer: the authors' weights, and errors") {
-  CHECK(hiding_train_options(HidingKind::hidden).image_weight == 0.7);
+  CHECK(hiding_train_options(HidingKind::hidden).message_weight == 1);
   CHECK(hiding_train_options(HidingKind::mbrs).message_weight == 10);
   CHECK(hiding_train_options(HidingKind::mbrs).adversary_weight == 1e-4);
   const TemporaryFolder folder;
@@ -78,6 +79,10 @@ TEST_CASE("hiding_trainer: the authors' weights, and errors") {
   CHECK_THROWS_WITH(HidingTrainer(marker, crops, options),
                     "[hiding_trainer] batch must be at least 2 and both crops multiples of 16, got 2, 40 and "
                     "16");
+  options = tiny(2);
+  options.strength = 10;
+  CHECK_THROWS_WITH(HidingTrainer(marker, crops, options),
+                    Contains("[hiding_trainer] strength must be at least first_strength, got 10"));
   HidingTrainer trainer(marker, crops, tiny(2));
   trainer.save(folder / "c");
   PictureMarker other = tiny_marker(HidingKind::mbrs);

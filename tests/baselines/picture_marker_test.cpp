@@ -16,7 +16,7 @@ TEST_CASE("picture_marker: the strength asked for, on 8 bits") {
     const watermark::Message message{{1, 0, 0, 1}};
     for (const double strength : {25.0, 35.0}) {
       const auto marked = marker.mark(picture, message, strength);
-      CHECK(psnr(marked, picture) == Approx(strength).margin(0.2));  // clamping and rounding
+      CHECK(psnr(marked, picture) == Approx(strength).margin(0.02));
       CHECK(quantize8(marked).data == marked.data);
     }
     const auto read = marker.read(picture);
@@ -26,6 +26,14 @@ TEST_CASE("picture_marker: the strength asked for, on 8 bits") {
     other.bits[2] ^= 1;
     CHECK(marker.accuracy(picture, other) == 0.75);
   }
+}
+
+TEST_CASE("picture_marker: what white takes away is made up for") {
+  const PictureMarker marker(HidingKind::hidden, {.bits = 4, .channels = 4}, 1);
+  auto picture = quantize8(uniform<float>({32, 48, 3}, 0.3f, 0.7f, 1));
+  std::fill_n(picture.data.begin(), picture.size() / 2, 1.f);
+  const auto marked = marker.mark(picture, {{1, 0, 0, 1}}, 30);
+  CHECK(psnr(marked, picture) == Approx(30).margin(0.02));
 }
 
 TEST_CASE("picture_marker: errors") {

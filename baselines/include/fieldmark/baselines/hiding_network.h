@@ -30,9 +30,10 @@ class HidingNetwork {
 
 /// HiDDeN. Encoder: 4 blocks (convolution 3 x 3, batch normalisation, ReLU) of 64 channels, the message
 /// repeated for every pixel and joined with their output and the picture, one more block, and a convolution
-/// 1 x 1 to the three colours. Decoder: 7 blocks of 64, one to L channels, the average over all pixels, one
-/// linear layer.
-/// Source: Zhu et al. 2018 (HiDDeN: hiding data with deep networks), section 3.2.
+/// 1 x 1 to the three colours, which are added to the picture. Decoder: 7 blocks of 64, one to L channels,
+/// the average over all pixels, one linear layer. Source: Zhu et al. 2018 (HiDDeN: hiding data with deep
+/// networks), section 3.2. Departure: their last convolution gives the marked picture itself, which the
+/// network then has to learn to copy first.
 template <class T>
 class HiddenNetwork final : public HidingNetwork<T> {
  public:

@@ -10,24 +10,28 @@ namespace fieldmark::baselines {
 struct HidingTrainOptions {
   /// Length of the run and step sizes; Adam as the networks' authors have it, with 1e-3.
   nerf::ScheduleOptions schedule{.seconds = 180, .lr = 1e-3, .half_after = 1e6, .cooldown = 0.3, .last = 0.1};
-  Index batch = 8;            ///< pictures a step, at least 2
-  Index crop = 64;            ///< pixels of their sides, a multiple of 16
-  Index first_crop = 32;      ///< of the first part of the run: the message is found at a quarter of the work
-  double first_part = 0.4;    ///< of the run, in [0, 1)
-  double message_weight = 1;  ///< of the message's mean squared error
-  double image_weight = 0.7;  ///< of the pictures', in [-1, 1]; rises with the bits read, see HidingTrainer
+  Index batch = 12;         ///< pictures a step, at least 2
+  Index crop = 64;          ///< pixels of their sides, a multiple of 16
+  Index first_crop = 16;    ///< of the first part of the run: the message is found at a sixteenth of the work
+  double first_part = 0.5;  ///< of the run, in [0, 1)
+  double first_strength = 14;      ///< of the mark at first, dB
+  double strength = 30;            ///< to which it is brought, dB, not below first_strength
+  double message_weight = 1;       ///< of the message's mean squared error
   double adversary_weight = 1e-3;  ///< of the discriminator's verdict
   std::uint64_t seed = 0;          ///< of crops, messages and noise
 };
-/// The weights of a network's authors: HiDDeN 1, 0.7, 1e-3; MBRS 10, 1, 1e-4 and one size of
-/// crops, that of its map.
+/// The weights of a network's authors: HiDDeN 1 and 1e-3; MBRS 10 and 1e-4, and one size of crops, that of
+/// its map.
 HidingTrainOptions hiding_train_options(HidingKind kind);
 
 /// Trains encoder and decoder together, against a discriminator, through a random noise layer a batch:
-///   L = w_m |M' - M|^2 + u w_i |marked - plain|^2 + w_a BCE(discriminator(marked), "plain")
+///   L = w_m |M' - M|^2 + w_a BCE(discriminator(marked), "plain"),   marked = plain + g (encoded - plain)
 /// Source: Zhu et al. 2018 (HiDDeN), section 3.3; Jia et al. 2021 (MBRS), section 3.4 for its weights.
-/// Departure: u rises from 0.02 to 1 while the running share of bits read right goes from 0.8 to 0.95, so
-/// that there is a message before it has to be invisible; the authors have u = 1 and epochs of it on a GPU.
+/// Departure: the authors have w_i |marked - plain|^2 in the loss, and epochs of it on a GPU. Here g, which
+/// gradients take for a constant, brings the residual of each picture to a strength in dB that goes from
+/// first_strength to strength by 0.015 a step as long as nine bits in ten are read; files (8 bits, no values
+/// beyond black and white) and noise layers come in over the last 6 dB. There is a message before it has to
+/// be invisible or robust, and PictureMarker::mark() brings it to a strength in the same way.
 /// Same seed and number of steps: same bytes, for any thread count and across save() and restore().
 class HidingTrainer {
  public:
@@ -39,11 +43,10 @@ class HidingTrainer {
   bool done() const { return schedule_.done(steps_); }
   /// Steps taken, those before a restore() included.
   Index steps() const { return steps_; }
-  /// Running means of training: share of bits read right behind the noise layer, and mean square of the
-  /// residual in [0, 1].
+  /// Of training as it goes.
   struct Figures {
-    double bits = 0.5;  ///< share of bits
-    double square = 0;  ///< of the residual
+    double bits = 0.5;     ///< running mean of the share of bits read right, behind the noise layer
+    double strength = 14;  ///< at which pictures are marked now, dB
   };
   /// As of the last step.
   const Figures& figures() const { return figures_; }
@@ -54,6 +57,9 @@ class HidingTrainer {
 
  private:
   Index crop_now(double seconds) const;
+  bool noisy() const;
+  Var<float> sent_on(Var<float> marked, Var<float> plain) const;
+  Var<float> at_strength(Var<float> encoded, Var<float> plain) const;
   void draw(Index size);
   void train_networks(Index size);
   void train_discriminator(Index size);

@@ -8,12 +8,12 @@ namespace fieldmark::baselines {
 /// MBRS. Encoder: the picture through a block (convolution 3 x 3, batch normalisation, ReLU) of 64 channels
 /// and a squeeze-and-excitation block; the message as a map of s x s, s = ceil(sqrt L), through a block, four
 /// transposed convolutions that double it, and a squeeze-and-excitation block; both joined, a block, joined
-/// with the picture, a convolution 1 x 1 to the colours. Decoder: a block, four times a
+/// with the picture, a convolution 1 x 1 to the colours, added to the picture. Decoder: a block, four times a
 /// squeeze-and-excitation block and an average over 2 x 2 pixels, a block to one channel on a map of s x s.
 /// Where L is no square, linear layers stand between message and map. Source: Jia et al. 2021 (MBRS),
 /// section 3.2. Departures: one squeeze-and-excitation block where the paper has four, averages where its
-/// decoder has strides. Pictures of other sizes than 16 s have the map resampled (bilinear) on the way in,
-/// and on the way out averaged.
+/// decoder has strides, and the picture need not be copied by the network. Pictures of other sizes than 16 s
+/// have the map resampled (bilinear) on the way in, and on the way out averaged.
 template <class T>
 class MbrsNetwork final : public HidingNetwork<T> {
  public:

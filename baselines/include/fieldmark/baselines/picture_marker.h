@@ -24,7 +24,8 @@ class PictureMarker {
 
   /// The picture with a message, rounded to 8 bits, by the running statistics.
   /// @param picture  [H, W, 3] in [0, 1]
-  /// @param strength  PSNR of the result, dB: the residual is scaled to it; 0: as the network has it
+  /// @param strength  PSNR of the result, dB: the residual is scaled until the rounded picture has it, to
+  ///                  0.01 dB where black and white let it; 0: as the network has it
   /// @throws ShapeError if the picture is not one   @throws ValueError if the message has another length
   Tensor<float> mark(const Tensor<float>& picture, const watermark::Message& message,
                      double strength = 0) const;
