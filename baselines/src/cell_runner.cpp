@@ -21,7 +21,7 @@ constexpr Index kBlenderSize = 160, kPhotographSize = 252, kMlpSize = 100;  // M
 constexpr double kHashSeconds = 60;  // more does not show at these sizes
 constexpr double kViewsASecond = 1;  // to learn from, for each second of the budget
 constexpr Index kFewestViews = 8, kMostViews = 200;
-constexpr double kNetworkPart = 0.6;    // of the budget, for a 2-D network; the rest for fields
+constexpr double kNetworkPart = 0.8;    // of the budget, for a 2-D network; the rest for fields
 constexpr Index kNetworkChannels = 32;  // the authors' 64 are learnt at a third of the pace, here
 constexpr Index kOwnPictures = 200, kFixedMessage = 5;
 constexpr Index kWeightsBits = 8;  // as the paper's noise of 0.01 on the weights
@@ -145,7 +145,7 @@ nerf::RadianceField CellRunner::base_field(const CellName& name, const Scene& sc
 }
 
 // The 2-D network, shared by the cells that mark photographs and renders with it, then two fields of marked
-// photographs: three fifths of the budget for the network, a fifth for each field.
+// photographs: four fifths of the budget for the network, the rest for the fields.
 CellRunner::Trained CellRunner::train_hiding(const CellName& name, const Scene& scene,
                                              std::shared_ptr<const nerf::RadianceField> unmarked) {
   const HidingSystem system = *hiding_system(name.system);

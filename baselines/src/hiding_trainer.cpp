@@ -11,11 +11,12 @@
 namespace fieldmark::baselines {
 namespace {
 
-constexpr double kKeep = 0.95;      // of a running mean
-constexpr double kRead = 0.9;       // share of bits at which the mark becomes fainter
-constexpr double kFainter = 0.015;  // dB a step
+constexpr double kKeep = 0.95;               // of a running mean
+constexpr double kRead = 0.93;               // share of bits at which the mark becomes fainter
+constexpr double kFainter = 0.015;           // dB a step
+constexpr double kSure = 0.96, kFaster = 2;  // from there, dB a step more for each unit of that share
 constexpr double kLeastRms = 1e-6;
-constexpr double kNoiseFrom = 6;        // dB before the last strength: files and noise layers come in
+constexpr double kNoiseFrom = 3;        // dB before the last strength: files and noise layers come in
 constexpr std::uint64_t kWhether = 50;  // draws: below it are those of a layer
 constexpr AdamOptions kAdam{.lr = 1, .beta2 = 0.999, .eps = 1e-8, .zero_grads = true};
 
@@ -68,7 +69,13 @@ Index HidingTrainer::crop_now(double seconds) const {
   const auto& s = options_.schedule;
   const double done =
       s.steps > 0 ? static_cast<double>(steps_) / static_cast<double>(s.steps) : seconds / s.seconds;
-  return large_ || done >= options_.first_part ? options_.crop : options_.first_crop;
+  if (done < options_.first_part) return std::max(crop_, options_.first_crop);
+  double sizes = 0;  // after the first
+  for (Index size = options_.first_crop; size < options_.crop; size *= 2) ++sizes;
+  const double rest = (done - options_.first_part) / (1 - options_.first_part);
+  const auto doublings = std::min(std::floor(rest * sizes) + 1, sizes);
+  const Index size = options_.first_crop << static_cast<int>(doublings);
+  return std::max(crop_, std::min(size, options_.crop));
 }
 
 void HidingTrainer::draw(Index size) {
@@ -137,7 +144,10 @@ void HidingTrainer::train_networks(Index size) {
     right += (read.value()[i] > 0.5f) == (messages_[static_cast<std::size_t>(i)] > 0.5f);
   const double keep = steps_ == 0 ? 0 : kKeep;
   figures_.bits = keep * figures_.bits + (1 - keep) * right / static_cast<double>(n * bits);
-  if (figures_.bits > kRead) figures_.strength = std::min(figures_.strength + kFainter, options_.strength);
+  if (figures_.bits > kRead) {
+    const double by = kFainter + kFaster * std::max(0.0, figures_.bits - kSure);
+    figures_.strength = std::min(figures_.strength + by, options_.strength);
+  }
 }
 
 void HidingTrainer::train_discriminator(Index size) {
@@ -158,7 +168,7 @@ void HidingTrainer::train_discriminator(Index size) {
 void HidingTrainer::step(double seconds) {
   schedule_.observe(steps_, seconds);
   const Index size = crop_now(seconds);
-  large_ = size == options_.crop;
+  crop_ = size;
   draw(size);
   train_networks(size);
   train_discriminator(size);
@@ -188,7 +198,7 @@ void HidingTrainer::save(const std::filesystem::path& path) const {
   file.add("critic/values", {c}, critic_params_.values());
   file.add("critic/mean", {c}, critic_adam_.mean());
   file.add("critic/mean_square", {c}, critic_adam_.mean_square());
-  const std::int64_t counts[] = {steps_, schedule_.total(), large_ ? 1 : 0};
+  const std::int64_t counts[] = {steps_, schedule_.total(), crop_};
   const double figures[] = {figures_.bits, figures_.strength};
   file.add("counts", {3}, counts);
   file.add("figures", {2}, figures);
@@ -210,7 +220,7 @@ void HidingTrainer::restore(const std::filesystem::path& path) {
                   std::to_string(counts.size()) + " and " + std::to_string(figures.size()));
   steps_ = counts[0];
   schedule_.resume(counts[1]);
-  large_ = counts[2] != 0;
+  crop_ = counts[2];
   adam_.set_steps(steps_);
   critic_adam_.set_steps(steps_);
   figures_ = {figures[0], figures[1]};
