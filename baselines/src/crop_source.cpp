@@ -26,17 +26,17 @@ float value_noise(const CounterRng& rng, std::uint64_t index, Index octave, Inde
          t * ((1 - s) * at(i, j + 1) + s * at(i + 1, j + 1));
 }
 
-double deviation(const Tensor<float>& picture) {
+}  // namespace
+
+bool shows_something(const Tensor<float>& picture) {
   double sum = 0, squares = 0;
   for (const float v : picture.data) {
     sum += static_cast<double>(v);
     squares += static_cast<double>(v) * static_cast<double>(v);
   }
   const double n = static_cast<double>(picture.size()), mean = sum / n;
-  return std::sqrt(std::max(0.0, squares / n - mean * mean));
+  return squares / n - mean * mean > kLeastDeviation * kLeastDeviation;
 }
-
-}  // namespace
 
 Tensor<float> generated_texture(Index size, const CounterRng& rng, std::uint64_t index) {
   if (size < 1) throw ValueError("[generated_texture] size must be at least 1, got " + std::to_string(size));
@@ -83,7 +83,7 @@ Tensor<float> CropSource::photograph(Index size, std::uint64_t index) const {
         const Index row = std::min(top + y, h - 1), column = std::min(left + x, w - 1);
         std::copy_n(from.data.begin() + (row * w + column) * 3, 3, window.data.begin() + (y * size + x) * 3);
       }
-    if (deviation(window) > kLeastDeviation) break;
+    if (shows_something(window)) break;
   }
   return window;
 }

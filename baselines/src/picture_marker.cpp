@@ -1,19 +1,50 @@
+#include <fieldmark/baselines/crop_source.h>
 #include <fieldmark/baselines/mbrs_network.h>
 #include <fieldmark/baselines/picture_marker.h>
 #include <fieldmark/engine/image.h>
 #include <fieldmark/engine/metrics.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 
 namespace fieldmark::baselines {
 namespace {
 
-Tensor<float> centred(const Tensor<float>& picture) {
+void check_picture(const Tensor<float>& picture) {
   check_rank("picture_marker", "picture", picture.shape, 3, "[height, width, 3]");
   check_extent("picture_marker", "picture", picture.shape, 2, 3, "red, green, blue");
-  Tensor<float> x({1, picture.shape[0], picture.shape[1], 3});
-  for (Index i = 0; i < x.size(); ++i) x[i] = 2 * picture[i] - 1;
+}
+
+// Where a picture's tiles begin, and how large they are: a side shorter than a tile has one of its own
+// length, and the last of a side may reach beyond it.
+struct Tiles {
+  Tiles(const Shape& picture, Index tile)
+      : height(std::min(tile, picture[0])), width(std::min(tile, picture[1])) {
+    for (Index y = 0; y < picture[0]; y += height)
+      for (Index x = 0; x < picture[1]; x += width) corners.push_back({y, x});
+  }
+  Index height, width;
+  std::vector<std::array<Index, 2>> corners;
+};
+
+// Edges are repeated beyond the picture.
+Tensor<float> tile_of(const Tensor<float>& picture, const Tiles& tiles, const std::array<Index, 2>& corner) {
+  const Index h = picture.shape[0], w = picture.shape[1];
+  Tensor<float> tile({tiles.height, tiles.width, 3});
+  for (Index y = 0; y < tiles.height; ++y)
+    for (Index x = 0; x < tiles.width; ++x)
+      for (Index c = 0; c < 3; ++c)
+        tile[(y * tiles.width + x) * 3 + c] =
+            picture[(std::min(corner[0] + y, h - 1) * w + std::min(corner[1] + x, w - 1)) * 3 + c];
+  return tile;
+}
+
+// As the networks have pictures: [1, H, W, 3] in [-1, 1].
+Tensor<float> centred(const Tensor<float>& tile) {
+  Tensor<float> x({1, tile.shape[0], tile.shape[1], 3});
+  for (Index i = 0; i < x.size(); ++i) x[i] = 2 * tile[i] - 1;
   return x;
 }
 
@@ -47,6 +78,8 @@ const char* hiding_name(HidingKind kind) { return kind == HidingKind::mbrs ? "mb
 
 PictureMarker::PictureMarker(HidingKind kind, const HidingOptions& options, std::uint64_t seed)
     : kind_(kind), options_(options) {
+  if (options.tile < 16)
+    throw ValueError("[picture_marker] tile must be at least 16 pixels, got " + std::to_string(options.tile));
   if (kind == HidingKind::mbrs)
     network_ = std::make_unique<MbrsNetwork<float>>(params, options, seed);
   else
@@ -58,24 +91,48 @@ Tensor<float> PictureMarker::mark(const Tensor<float>& picture, const watermark:
   if (message.size() != options_.bits)
     throw ValueError("[picture_marker] message must have the network's " + std::to_string(options_.bits) +
                      " bits, got " + std::to_string(message.size()));
-  const Tensor<float> x = centred(picture);
+  check_picture(picture);
   const std::vector<float> bits(message.bits.begin(), message.bits.end());
-  Tape<float> tape;
-  NormPass<float> pass{.running = true};
-  const Var<float> marked = network_->encode(Params<float>(params, nullptr), tape.constant(x),
-                                             tape.constant(bits.data(), {1, options_.bits}), pass);
+  const Index h = picture.shape[0], w = picture.shape[1];
+  const Tiles tiles(picture.shape, options_.tile);
   Tensor<float> residual(picture.shape);
-  for (Index i = 0; i < x.size(); ++i) residual[i] = 0.5f * (marked.value()[i] - x[i]);
+  for (const auto& corner : tiles.corners) {
+    const Tensor<float> x = centred(tile_of(picture, tiles, corner));
+    Tape<float> tape;
+    NormPass<float> pass{.running = true};
+    const Var<float> marked = network_->encode(Params<float>(params, nullptr), tape.constant(x),
+                                               tape.constant(bits.data(), {1, options_.bits}), pass);
+    for (Index y = 0; y < std::min(tiles.height, h - corner[0]); ++y)
+      for (Index k = 0; k < 3 * std::min(tiles.width, w - corner[1]); ++k) {
+        const Index i = y * tiles.width * 3 + k;
+        residual[((corner[0] + y) * w + corner[1]) * 3 + k] = 0.5f * (marked.value()[i] - x[i]);
+      }
+  }
   return strength > 0 ? added_at(picture, residual, strength) : added(picture, residual, 1);
 }
 
 watermark::Message PictureMarker::read(const Tensor<float>& picture) const {
-  const Tensor<float> x = centred(picture);
-  Tape<float> tape;
-  NormPass<float> pass{.running = true};
-  const Var<float> said = network_->decode(Params<float>(params, nullptr), tape.constant(x), pass);
+  check_picture(picture);
+  const Tiles tiles(picture.shape, options_.tile);
+  std::vector<double> of_all(static_cast<std::size_t>(options_.bits)), of_shown(of_all);
+  double all = 0, shown = 0;
+  for (const auto& corner : tiles.corners) {
+    if (corner[0] + tiles.height > picture.shape[0] || corner[1] + tiles.width > picture.shape[1]) continue;
+    const Tensor<float> tile = tile_of(picture, tiles, corner), x = centred(tile);
+    const bool shows = shows_something(tile);
+    Tape<float> tape;
+    NormPass<float> pass{.running = true};
+    const Var<float> said = network_->decode(Params<float>(params, nullptr), tape.constant(x), pass);
+    for (std::size_t b = 0; b < of_all.size(); ++b) {
+      of_all[b] += static_cast<double>(said.value()[b]);
+      if (shows) of_shown[b] += static_cast<double>(said.value()[b]);
+    }
+    ++all;
+    shown += shows ? 1 : 0;
+  }
   watermark::Message message;
-  for (Index b = 0; b < options_.bits; ++b) message.bits.push_back(said.value()[b] > 0.5f ? 1 : 0);
+  for (std::size_t b = 0; b < of_all.size(); ++b)
+    message.bits.push_back((shown > 0 ? of_shown[b] / shown : of_all[b] / all) > 0.5 ? 1 : 0);
   return message;
 }
 

@@ -36,7 +36,31 @@ TEST_CASE("picture_marker: what white takes away is made up for") {
   CHECK(psnr(marked, picture) == Approx(30).margin(0.02));
 }
 
+TEST_CASE("picture_marker: a picture is marked and read tile by tile") {
+  const PictureMarker marker(HidingKind::mbrs, {.bits = 4, .channels = 4, .tile = 32}, 1);
+  const auto part = [](const Tensor<float>& from, Index top, Index left, Index side) {
+    Tensor<float> out({side, side, 3});
+    for (Index y = 0; y < side; ++y)
+      for (Index k = 0; k < 3 * side; ++k)
+        out[y * side * 3 + k] = from[((top + y) * from.shape[1] + left) * 3 + k];
+    return out;
+  };
+  const watermark::Message message{{1, 0, 0, 1}};
+  const auto picture = quantize8(uniform<float>({72, 80, 3}, 0.3f, 0.7f, 1));
+  const auto marked = marker.mark(picture, message);
+  CHECK(part(marked, 32, 32, 32).data == marker.mark(part(picture, 32, 32, 32), message).data);
+  CHECK(part(marked, 64, 0, 8).data != part(picture, 64, 0, 8).data);  // the rest of a side, too
+  // White tiles are not asked where another shows something.
+  auto mostly_white = picture;
+  std::fill(mostly_white.data.begin(), mostly_white.data.end(), 1.f);
+  for (Index y = 0; y < 32; ++y)
+    std::copy_n(picture.data.begin() + (y * 80 + 32) * 3, 96, mostly_white.data.begin() + (y * 80 + 32) * 3);
+  CHECK(marker.read(mostly_white).bits == marker.read(part(picture, 0, 32, 32)).bits);
+}
+
 TEST_CASE("picture_marker: errors") {
+  CHECK_THROWS_WITH(PictureMarker(HidingKind::hidden, {.tile = 8}, 1),
+                    "[picture_marker] tile must be at least 16 pixels, got 8");
   const PictureMarker marker(HidingKind::hidden, {.bits = 4, .channels = 4}, 1);
   const Tensor<float> picture({16, 16, 3}), grey({16, 16, 1});
   CHECK_THROWS_WITH(marker.mark(picture, {{1, 0}}),

@@ -6,6 +6,9 @@
 
 namespace fieldmark::baselines {
 
+/// Whether a picture in [0, 1] is more than a plain background: values whose standard deviation exceeds 0.03.
+bool shows_something(const Tensor<float>& picture);
+
 /// A picture without a scene: several octaves of smooth noise between random colours over a ramp.
 /// @param index  one picture for each   @return [size, size, 3] in [0, 1]   @throws ValueError if size < 1
 Tensor<float> generated_texture(Index size, const CounterRng& rng, std::uint64_t index);

@@ -11,6 +11,7 @@ namespace fieldmark::baselines {
 struct HidingOptions {
   Index bits = 16;      ///< L, at least 1
   Index channels = 64;  ///< of all hidden convolutions, at least 1
+  Index tile = 64;      ///< pixels of the squares that a PictureMarker cuts pictures into, at least 16
 };
 
 /// A network that hides a message in pictures and reads it. Pictures are [N, H, W, 3] in [-1, 1], messages

@@ -29,11 +29,11 @@ HidingTrainOptions hiding_train_options(HidingKind kind);
 /// Source: Zhu et al. 2018 (HiDDeN), section 3.3; Jia et al. 2021 (MBRS), section 3.4 for its weights.
 /// Departure: the authors have w_i |marked - plain|^2 in the loss, and epochs of it on a GPU. Here g, which
 /// gradients take for a constant, brings the residual of each picture to a strength in dB that goes from
-/// first_strength to strength by 0.015 a step as long as 93 bits in a hundred are read, and faster where hardly
-/// one is wrong; files (8 bits, no values beyond black and white) and noise layers come in over the last 3
-/// dB. There is a message before it has to be invisible or robust, and PictureMarker::mark() brings it to a
-/// strength in the same way.
-/// Same seed and number of steps: same bytes, for any thread count and across save() and restore().
+/// first_strength to strength by 0.015 a step as long as 93 bits in a hundred are read, and faster where
+/// hardly one is wrong; files (8 bits, no values beyond black and white) and noise layers come in over the
+/// last 3 dB. There is a message before it has to be invisible or robust, and PictureMarker::mark() brings it
+/// to a strength in the same way. Same seed and number of steps: same bytes, for any thread count and across
+/// save() and restore().
 class HidingTrainer {
  public:
   /// Marker and crops must outlive the trainer. @throws ValueError if an option is out of range

@@ -16,7 +16,9 @@ enum class HidingKind {
 /// "hidden" or "mbrs".
 const char* hiding_name(HidingKind kind);
 
-/// A 2-D network with its numbers: marks pictures and reads them.
+/// A 2-D network with its numbers: marks pictures and reads them, in tiles of the size that it was trained
+/// on, each with the whole message. What its whole tiles say is averaged, of those that show something if any
+/// does.
 class PictureMarker {
  public:
   /// With initial numbers. @throws ValueError if an option is out of range
