@@ -36,6 +36,14 @@ nerf::Dataset marked_photographs(const nerf::Dataset& data, const PictureMarker&
   return marked;
 }
 
+double accuracy_of(const PictureMarker& marker, const std::vector<Tensor<float>>& pictures,
+                   const watermark::Message& sent) {
+  if (pictures.empty()) throw ValueError("[accuracy_of] pictures must not be empty");
+  double sum = 0;
+  for (const Tensor<float>& picture : pictures) sum += marker.accuracy(picture, sent);
+  return sum / static_cast<double>(pictures.size());
+}
+
 OwnScores own_scores(const PictureMarker& marker, const CropSource& photographs, Index count, Index size,
                      std::uint64_t seed, double strength) {
   if (count < 1) throw ValueError("[own_scores] count must be at least 1, got " + std::to_string(count));

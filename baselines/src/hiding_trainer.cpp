@@ -1,5 +1,6 @@
 #include <fieldmark/baselines/hiding_trainer.h>
 #include <fieldmark/baselines/picture_noise.h>
+#include <fieldmark/distort/quantize8.h>
 #include <fieldmark/engine/checkpoint.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/loss.h>
@@ -20,15 +21,14 @@ constexpr double kNoiseFrom = 3;        // dB before the last strength: files an
 constexpr std::uint64_t kWhether = 50;  // draws: below it are those of a layer
 constexpr AdamOptions kAdam{.lr = 1, .beta2 = 0.999, .eps = 1e-8, .zero_grads = true};
 
-// As a file keeps it, in [0, 1] and steps of 1/255; gradients pass as if it were the marked picture.
+// Of numbers in [-1, 1], as a file keeps a picture.
 Var<float> as_file(Var<float> marked) {
+  Tape<float>& tape = marked.tape();
   const Index n = marked.shape().size();
-  float* change = marked.tape().scratch(n);
-  for (Index i = 0; i < n; ++i) {
-    const float v = marked.value()[i], level = std::round(255 * std::clamp(v / 2 + 0.5f, 0.f, 1.f));
-    change[i] = 2 * level / 255 - 1 - v;
-  }
-  return add(marked, marked.tape().constant(change, marked.shape()));
+  float* halves = tape.scratch(n);
+  std::fill_n(halves, n, 0.5f);
+  const Var<float> half = tape.constant(halves, marked.shape());
+  return scale(sub(distort::quantize8(add(scale(marked, 0.5), half)), half), 2);
 }
 
 }  // namespace
@@ -69,13 +69,12 @@ Index HidingTrainer::crop_now(double seconds) const {
   const auto& s = options_.schedule;
   const double done =
       s.steps > 0 ? static_cast<double>(steps_) / static_cast<double>(s.steps) : seconds / s.seconds;
-  if (done < options_.first_part) return std::max(crop_, options_.first_crop);
-  double sizes = 0;  // after the first
-  for (Index size = options_.first_crop; size < options_.crop; size *= 2) ++sizes;
-  const double rest = (done - options_.first_part) / (1 - options_.first_part);
-  const auto doublings = std::min(std::floor(rest * sizes) + 1, sizes);
-  const Index size = options_.first_crop << static_cast<int>(doublings);
-  return std::max(crop_, std::min(size, options_.crop));
+  int last = 0, now = 0;  // doublings of the first size
+  while (options_.first_crop << last < options_.crop) ++last;
+  if (done >= options_.first_part)
+    now =
+        std::min(last, 1 + static_cast<int>(last * (done - options_.first_part) / (1 - options_.first_part)));
+  return std::max(crop_, std::min(options_.first_crop << now, options_.crop));
 }
 
 void HidingTrainer::draw(Index size) {

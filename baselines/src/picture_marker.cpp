@@ -59,9 +59,9 @@ Tensor<float> added(const Tensor<float>& picture, const Tensor<float>& residual,
 
 // With the gain at which the file has the strength: black and white take a part of the residual away.
 Tensor<float> added_at(const Tensor<float>& picture, const Tensor<float>& residual, double strength) {
-  const double level = psnr(residual, Tensor<float>(residual.shape));
-  if (!std::isfinite(level)) return added(picture, residual, 1);
-  double gain = std::pow(10.0, (level - strength) / 20);
+  const double square = mse(residual, Tensor<float>(residual.shape));
+  if (square <= 0) return quantize8(picture);
+  double gain = std::pow(10.0, -strength / 20) / std::sqrt(square);
   Tensor<float> out = added(picture, residual, gain);
   for (int k = 0; k < kGainRounds; ++k) {
     const double miss = psnr(out, picture) - strength;
@@ -114,25 +114,23 @@ Tensor<float> PictureMarker::mark(const Tensor<float>& picture, const watermark:
 watermark::Message PictureMarker::read(const Tensor<float>& picture) const {
   check_picture(picture);
   const Tiles tiles(picture.shape, options_.tile);
-  std::vector<double> of_all(static_cast<std::size_t>(options_.bits)), of_shown(of_all);
-  double all = 0, shown = 0;
+  std::vector<Tensor<float>> whole, shown;
   for (const auto& corner : tiles.corners) {
     if (corner[0] + tiles.height > picture.shape[0] || corner[1] + tiles.width > picture.shape[1]) continue;
-    const Tensor<float> tile = tile_of(picture, tiles, corner), x = centred(tile);
-    const bool shows = shows_something(tile);
+    whole.push_back(tile_of(picture, tiles, corner));
+    if (shows_something(whole.back())) shown.push_back(whole.back());
+  }
+  const auto& asked = shown.empty() ? whole : shown;
+  std::vector<double> sum(static_cast<std::size_t>(options_.bits));
+  for (const Tensor<float>& tile : asked) {
     Tape<float> tape;
     NormPass<float> pass{.running = true};
+    const Tensor<float> x = centred(tile);
     const Var<float> said = network_->decode(Params<float>(params, nullptr), tape.constant(x), pass);
-    for (std::size_t b = 0; b < of_all.size(); ++b) {
-      of_all[b] += static_cast<double>(said.value()[b]);
-      if (shows) of_shown[b] += static_cast<double>(said.value()[b]);
-    }
-    ++all;
-    shown += shows ? 1 : 0;
+    for (std::size_t b = 0; b < sum.size(); ++b) sum[b] += static_cast<double>(said.value()[b]);
   }
   watermark::Message message;
-  for (std::size_t b = 0; b < of_all.size(); ++b)
-    message.bits.push_back((shown > 0 ? of_shown[b] / shown : of_all[b] / all) > 0.5 ? 1 : 0);
+  for (const double s : sum) message.bits.push_back(s > 0.5 * static_cast<double>(asked.size()) ? 1 : 0);
   return message;
 }
 

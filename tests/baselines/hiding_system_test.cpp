@@ -70,8 +70,17 @@ TEST_CASE("hiding_system: marks on renders, and on its own pictures") {
   CHECK(psnr(scene.render(camera, scene.message(2)), render) == Approx(28).margin(1));
   const auto own = own_scores(*net, CropSource({render}, 1), 3, 16, 1, 28);
   CHECK(own.psnr == Approx(28).margin(1));
-  CHECK(own.accuracy >= 0);
-  CHECK(own.accuracy <= 1);
+  const CropSource crops({render}, 1);
+  double by_hand = 0;
+  for (std::uint64_t i = 0; i < 3; ++i) {
+    const auto sent = watermark::random_message(6, CounterRng(1, 43), i);
+    by_hand += accuracy_of(*net, {net->mark(crops.photograph(16, i), sent, 28)}, sent) / 3;
+  }
+  CHECK(own.accuracy == Approx(by_hand));
+  const auto read = net->read(render);
+  CHECK(accuracy_of(*net, {render, render}, read) == 1);
+  CHECK(accuracy_of(*net, {render}, opposite(read)) == 0);
+  CHECK_THROWS_WITH(accuracy_of(*net, {}, read), "[accuracy_of] pictures must not be empty");
   CHECK_THROWS_WITH(own_scores(*net, CropSource({render}, 1), 0, 16, 1),
                     "[own_scores] count must be at least 1, got 0");
 }

@@ -18,6 +18,7 @@ HidingTrainOptions tiny(Index steps) {
   o.crop = 32;
   o.first_crop = 16;
   o.first_part = 0.5;
+  o.first_strength = o.strength;  // files and noise layers from the first step on
   return o;
 }
 
@@ -58,6 +59,7 @@ TEST_CASE("hiding_trainer: one bit is learnt in some steps") {
   PictureMarker marker(HidingKind::hidden, {.bits = 1, .channels = 8}, 1);
   HidingTrainOptions options = tiny(150);
   options.batch = 8;
+  options.first_strength = 14;
   options.crop = 16;
   options.schedule.lr = 5e-3;
   HidingTrainer trainer(marker, crops, options);

@@ -36,6 +36,15 @@ TEST_CASE("picture_marker: what white takes away is made up for") {
   CHECK(psnr(marked, picture) == Approx(30).margin(0.02));
 }
 
+TEST_CASE("picture_marker: a mark that nobody would see is brought to its strength too") {
+  PictureMarker marker(HidingKind::hidden, {.bits = 4, .channels = 4}, 1);
+  for (const auto& e : marker.params.entries())
+    if (e.name.starts_with("encoder/colour"))
+      for (float& v : marker.params.values(marker.params.find(e.name))) v *= 1e-4f;
+  const auto picture = quantize8(uniform<float>({32, 32, 3}, 0.3f, 0.7f, 1));
+  CHECK(psnr(marker.mark(picture, {{1, 0, 0, 1}}, 30), picture) == Approx(30).margin(0.02));
+}
+
 TEST_CASE("picture_marker: a picture is marked and read tile by tile") {
   const PictureMarker marker(HidingKind::mbrs, {.bits = 4, .channels = 4, .tile = 32}, 1);
   const auto part = [](const Tensor<float>& from, Index top, Index left, Index side) {

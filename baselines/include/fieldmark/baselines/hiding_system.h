@@ -32,6 +32,11 @@ std::vector<Tensor<float>> photographs_of(const nerf::Dataset& data);
 nerf::Dataset marked_photographs(const nerf::Dataset& data, const PictureMarker& marker,
                                  const watermark::Message& message, double strength = kHidingStrength);
 
+/// Share of the bits of `sent` that are read right, mean over pictures [H, W, 3] in [0, 1].
+/// @throws ValueError if there are none   @throws ShapeError if one is not a picture
+double accuracy_of(const PictureMarker& marker, const std::vector<Tensor<float>>& pictures,
+                   const watermark::Message& sent);
+
 /// How well a 2-D network reads the pictures that it marked itself.
 struct OwnScores {
   double accuracy = 0;  ///< share of bits right, mean over pictures
