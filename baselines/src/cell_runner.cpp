@@ -23,7 +23,7 @@ constexpr double kViewsASecond = 1;  // to learn from, for each second of the bu
 constexpr Index kFewestViews = 8, kMostViews = 200;
 constexpr double kNetworkPart = 0.8;    // of the budget, for a 2-D network; the rest for fields
 constexpr Index kNetworkChannels = 32;  // a quarter of the work of a step with the authors' 64
-constexpr Index kOwnPictures = 200, kFixedMessage = 5;
+constexpr Index kOwnPictures = 200, kOwnSize = 64, kFixedMessage = 5;
 constexpr Index kWeightsBits = 8;  // as the paper's noise of 0.01 on the weights
 constexpr double kWeightsNoise = 0.01;
 constexpr std::uint64_t kCamerasSeed = 1000;  // views that are measured are not those learnt from
@@ -174,7 +174,7 @@ CellRunner::Trained CellRunner::train_hiding(const CellName& name, const Scene& 
                               options_.progress);
   trained.steps = trainer.steps();
   const OwnScores own = own_scores(*marker, CropSource(photographs_of(scene.test), name.seed), kOwnPictures,
-                                   options.crop, name.seed);
+                                   kOwnSize, name.seed);
   trained.own_2d_accuracy = own.accuracy;
   trained.more = {{"own_2d_psnr", own.psnr}, {"network_seconds", trained.seconds}};
   if (system.renders) {

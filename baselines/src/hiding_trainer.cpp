@@ -35,7 +35,11 @@ Var<float> as_file(Var<float> marked) {
 
 HidingTrainOptions hiding_train_options(HidingKind kind) {
   HidingTrainOptions o;
-  if (kind == HidingKind::mbrs) o.message_weight = 10, o.adversary_weight = 1e-4, o.first_crop = o.crop;
+  if (kind == HidingKind::mbrs) {
+    o.message_weight = 10, o.adversary_weight = 1e-4, o.first_crop = o.crop;
+  } else {
+    o.crop = 32, o.first_part = 0.8, o.noisy_part = 0.5, o.schedule.lr = 3e-3;
+  }
   return o;
 }
 
@@ -58,6 +62,9 @@ HidingTrainer::HidingTrainer(PictureMarker& marker, const CropSource& crops,
   if (!(options.first_part >= 0 && options.first_part < 1))
     throw ValueError("[hiding_trainer] first_part must be at least 0 and below 1, got " +
                      std::to_string(options.first_part));
+  if (!(options.noisy_part >= 0 && options.noisy_part <= 1))
+    throw ValueError("[hiding_trainer] noisy_part must be in [0, 1], got " +
+                     std::to_string(options.noisy_part));
   if (!(options.strength >= options.first_strength))
     throw ValueError("[hiding_trainer] strength must be at least first_strength, got " +
                      std::to_string(options.strength) + " and " + std::to_string(options.first_strength));
@@ -90,10 +97,11 @@ void HidingTrainer::draw(Index size) {
   }
 }
 
-// Whether this step's pictures pass a file and a noise layer: none as long as the mark is loud, then all.
+// Whether this step's pictures pass a file and a noise layer: none as long as the mark is loud.
 bool HidingTrainer::noisy() const {
   const double share = (figures_.strength - options_.strength + kNoiseFrom) / kNoiseFrom;
-  return static_cast<double>(noise_rng_.uniform(static_cast<std::uint64_t>(steps_), kWhether)) < share;
+  return static_cast<double>(noise_rng_.uniform(static_cast<std::uint64_t>(steps_), kWhether)) <
+         std::min(share, options_.noisy_part);
 }
 
 Var<float> HidingTrainer::sent_on(Var<float> marked, Var<float> plain) const {
@@ -181,10 +189,10 @@ std::string HidingTrainer::fingerprint() const {
          std::to_string(o.batch) + ", crops " + std::to_string(o.first_crop) + " and " +
          std::to_string(o.crop) + " after " + std::to_string(o.first_part) + ", weights " +
          std::to_string(o.message_weight) + " " + std::to_string(o.adversary_weight) + ", strength " +
-         std::to_string(o.first_strength) + " to " + std::to_string(o.strength) + ", lr " +
-         std::to_string(o.schedule.lr) + ", half after " + std::to_string(o.schedule.half_after) +
-         ", cooldown " + std::to_string(o.schedule.cooldown) + " to " + std::to_string(o.schedule.last) +
-         ", seed " + std::to_string(o.seed);
+         std::to_string(o.first_strength) + " to " + std::to_string(o.strength) + ", noisy " +
+         std::to_string(o.noisy_part) + ", lr " + std::to_string(o.schedule.lr) + ", half after " +
+         std::to_string(o.schedule.half_after) + ", cooldown " + std::to_string(o.schedule.cooldown) +
+         " to " + std::to_string(o.schedule.last) + ", seed " + std::to_string(o.seed);
 }
 
 void HidingTrainer::save(const std::filesystem::path& path) const {

@@ -85,6 +85,10 @@ TEST_CASE("hiding_trainer: the authors' weights, and errors") {
   options.strength = 10;
   CHECK_THROWS_WITH(HidingTrainer(marker, crops, options),
                     Contains("[hiding_trainer] strength must be at least first_strength, got 10"));
+  options = tiny(2);
+  options.noisy_part = 1.5;
+  CHECK_THROWS_WITH(HidingTrainer(marker, crops, options),
+                    Contains("[hiding_trainer] noisy_part must be in [0, 1], got 1.5"));
   HidingTrainer trainer(marker, crops, tiny(2));
   trainer.save(folder / "c");
   PictureMarker other = tiny_marker(HidingKind::mbrs);

@@ -1,16 +1,19 @@
 #pragma once
 #include <unistd.h>
 
+#include <cerrno>
 #include <filesystem>
 #include <iterator>
 #include <string>
+#include <system_error>
 
 /// A fresh folder for a test's files, removed at the end of the scope.
 struct TemporaryFolder {
   std::filesystem::path path;
   TemporaryFolder() {
     std::string name = (std::filesystem::temp_directory_path() / "fieldmark_test_XXXXXX").string();
-    path = ::mkdtemp(name.data());
+    if (!::mkdtemp(name.data())) throw std::system_error(errno, std::generic_category(), name);
+    path = name;
   }
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;

@@ -11,17 +11,19 @@ struct HidingTrainOptions {
   /// Length of the run and step sizes; Adam as the networks' authors have it, with 1e-3.
   nerf::ScheduleOptions schedule{.seconds = 180, .lr = 1e-3, .half_after = 1e6, .cooldown = 0.3, .last = 0.1};
   Index batch = 12;         ///< pictures a step, at least 2
-  Index crop = 64;          ///< pixels of their sides, a multiple of 16
+  Index crop = 64;          ///< pixels of their sides, a multiple of 16; the size of a PictureMarker's tiles
   Index first_crop = 16;    ///< of the first part of the run: the message is found at a sixteenth of the work
   double first_part = 0.4;  ///< of the run, in [0, 1); then the sides double, after equal parts, up to crop
   double first_strength = 14;      ///< of the mark at first, dB
   double strength = 30;            ///< to which it is brought, dB, not below first_strength
   double message_weight = 1;       ///< of the message's mean squared error
   double adversary_weight = 1e-3;  ///< of the discriminator's verdict
+  double noisy_part = 1;           ///< of the steps at the last strength that pass a noise layer, in [0, 1]
   std::uint64_t seed = 0;          ///< of crops, messages and noise
 };
 /// The weights of a network's authors: HiDDeN 1 and 1e-3; MBRS 10 and 1e-4, and one size of crops, that of
-/// its map.
+/// its map. HiDDeN, whose networks look at some pixels around each, takes crops of 16 for four fifths of the
+/// run, then 32; a step size of 3e-3 (1e-3 is a third slower); and noise layers on half of the steps.
 HidingTrainOptions hiding_train_options(HidingKind kind);
 
 /// Trains encoder and decoder together, against a discriminator, through a random noise layer a batch:
@@ -31,9 +33,9 @@ HidingTrainOptions hiding_train_options(HidingKind kind);
 /// gradients take for a constant, brings the residual of each picture to a strength in dB that goes from
 /// first_strength to strength by 0.015 a step as long as 93 bits in a hundred are read, and faster where
 /// hardly one is wrong; files (8 bits, no values beyond black and white) and noise layers come in over the
-/// last 3 dB. There is a message before it has to be invisible or robust, and PictureMarker::mark() brings it
-/// to a strength in the same way. Same seed and number of steps: same bytes, for any thread count and across
-/// save() and restore().
+/// last 3 dB, up to noisy_part of the steps. There is a message before it has to be invisible or robust, and
+/// PictureMarker::mark() brings it to a strength in the same way. Same seed and number of steps: same bytes,
+/// for any thread count and across save() and restore().
 class HidingTrainer {
  public:
   /// Marker and crops must outlive the trainer. @throws ValueError if an option is out of range
