@@ -12,6 +12,8 @@ namespace {
 constexpr double kGrowth = 1.75, kFiner = 1.5;
 constexpr int kFirstTable = 9, kBase = 16, kMostFinest = 2048;
 constexpr Index kMostTrials = 12;
+constexpr Index kLeastRays = 128;  // of a step: scenes without bounds have hundreds of samples a ray at first
+constexpr Index kAsked = 16;       // steps between two looks at the clock
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -63,20 +65,26 @@ class Sizing {
     TrainOptions train;
     train.schedule.steps = options_.steps;
     train.samples_per_step = options_.samples_per_step;
+    train.least_rays = kLeastRays;
     train.seed = options_.seed;
     return train;
   }
 
+  bool goes_on() {
+    const Index done = std::ssize(found_.trials);
+    if (done >= kMostTrials || (progress_ && !progress_(done, kMostTrials))) ended_ = true;
+    return !ended_;
+  }
+
   // Whether the training was made.
   bool attempt(const std::string& what, const RadianceFieldOptions& field) {
-    const Index done = std::ssize(found_.trials);
-    if (ended_ || done >= kMostTrials || (progress_ && !progress_(done, kMostTrials))) {
-      ended_ = true;
-      return false;
-    }
+    if (ended_ || !goes_on()) return false;
     RadianceField trial(field);
     Trainer trainer(trial, data_, short_run());
-    while (!trainer.done()) trainer.step(0);
+    while (!trainer.done()) {
+      trainer.step(0);
+      if (trainer.steps() % kAsked == 0 && !goes_on()) return false;
+    }
     found_.trials.push_back({.what = what,
                              .field = field,
                              .parameters = trial.params.parameters(),
@@ -90,7 +98,10 @@ class Sizing {
       const int rows = std::min(log2, options_.most_log2_table);
       RadianceFieldOptions next = found_.field;
       next.field.encoding.log2_table = rows;
-      if (!attempt("table of 2^" + std::to_string(rows), next)) return;
+      if (!attempt("table of 2^" + std::to_string(rows), next)) {
+        found_.field.field.encoding.log2_table = options_.most_log2_table;  // what is enough is not known
+        return;
+      }
       SizingTrial& trial = found_.trials.back();
       if (trial.psnr < best + options_.worth) return;
       best = trial.psnr;

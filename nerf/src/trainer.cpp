@@ -22,8 +22,8 @@ constexpr int kShards = 32;             // the last one to finish keeps a thread
 constexpr int kMlpShards = 8;           // each has the gradients of two large networks
 constexpr Index kRays = 64;             // of a chunk
 constexpr Index kOccupancyPeriod = 16;  // steps
-constexpr Index kFirstRays = 512;       // of a step, until the samples of a ray are known; never fewer
 constexpr Index kMostRays = 1 << 16;
+constexpr const char* kAfterField = " data ";  // in the words of a checkpoint
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
@@ -71,13 +71,16 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
             field.coarse ? field.params.size() : field.field.network_size()),
       adam_(field.params.size(), adam_options(field)),
       shards_(at(loop_.shards())),
-      rays_per_step_(kFirstRays) {
+      rays_per_step_(options.least_rays) {
   if (options.samples_per_step < 1024)
     throw ValueError("[trainer] samples_per_step must be at least 1024, got " +
                      std::to_string(options.samples_per_step));
   if (options.first_samples < 1024)
     throw ValueError("[trainer] first_samples must be at least 1024, got " +
                      std::to_string(options.first_samples));
+  if (options.least_rays < kRays || options.least_rays > kMostRays || options.least_rays % kRays != 0)
+    throw ValueError("[trainer] least_rays must be a multiple of 64, 64 to 65536, got " +
+                     std::to_string(options.least_rays));
   if (!(options.grow_after > 0))
     throw ValueError("[trainer] grow_after must be positive, got " + std::to_string(options.grow_after));
   if (!(options.stop >= 0 && options.stop < 1))
@@ -251,7 +254,7 @@ double Trainer::step_hash() {
                         static_cast<double>(std::max<Index>(samples, 1));
   const Index next = static_cast<Index>(std::clamp(wanted, static_cast<double>(rays_per_step_) / 1.5,
                                                    static_cast<double>(rays_per_step_) * 1.5));
-  rays_per_step_ = std::clamp(next / kRays * kRays, kFirstRays, kMostRays);
+  rays_per_step_ = std::clamp(next / kRays * kRays, options_.least_rays, kMostRays);
   return loss;
 }
 
@@ -288,7 +291,7 @@ void Trainer::refresh_occupancy() {
 
 std::string Trainer::fingerprint() const {
   const ScheduleOptions& schedule = options_.schedule;
-  return field_.configuration() + " data " + data_.name + " " + std::to_string(data_.views.size()) +
+  return field_.configuration() + kAfterField + data_.name + " " + std::to_string(data_.views.size()) +
          " views " + std::to_string(data_.views.front().camera.width) + "x" +
          std::to_string(data_.views.front().camera.height) + " seed " + std::to_string(options_.seed) +
          " steps " + std::to_string(schedule.steps) + " samples " +
@@ -300,6 +303,17 @@ std::string Trainer::fingerprint() const {
          std::to_string(schedule.half_after) + " cooldown " + std::to_string(schedule.cooldown) + " last " +
          std::to_string(schedule.last) + (options_.precision == Precision::bf16 ? " bf16" : "") +
          (options_.carve ? "" : " not carved") + (options_.keep ? " kept" : "");
+}
+
+RadianceFieldOptions checkpointed_field(const std::filesystem::path& path) {
+  const SafetensorsFile file = SafetensorsFile::read(path);
+  const auto of = file.metadata.find("of");
+  if (of == file.metadata.end())
+    throw IoError(path.string() +
+                  ": expected a checkpoint of a field's training, found another kind of file");
+  return RadianceField::from_configuration(of->second.substr(0, of->second.find(kAfterField)),
+                                           path.string() + ": metadata 'of'")
+      .options();
 }
 
 void Trainer::save(const std::filesystem::path& path) const {

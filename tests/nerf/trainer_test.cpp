@@ -342,7 +342,40 @@ TEST_CASE("trainer: errors name option and value") {
                     "[trainer] hard_pixels must be in [0, 1], got 2.000000");
   CHECK_THROWS_WITH(Trainer(field, scene(), {.grow_after = 0}),
                     "[trainer] grow_after must be positive, got 0.000000");
+  CHECK_THROWS_WITH(Trainer(field, scene(), {.least_rays = 100}),
+                    "[trainer] least_rays must be a multiple of 64, 64 to 65536, got 100");
   CHECK_THROWS_WITH(Trainer(field, scene(), {.stop = 1}), "[trainer] stop must be in [0, 1), got 1.000000");
   CHECK_THROWS_WITH(Trainer(field, Dataset{}, train_options(1)),
                     "[trainer] data must have at least one view");
+}
+
+TEST_CASE("trainer: a step has the least rays however many samples they have") {
+  // All cells occupied: a ray has so many samples that 1024 of them are a few rays.
+  const auto samples_of = [](Index least) {
+    RadianceField field(small_field_options());
+    TrainOptions options = train_options(1);
+    options.samples_per_step = options.first_samples = 1024;
+    options.least_rays = least;
+    Trainer trainer(field, scene(), options);
+    trainer.step(0);
+    return trainer.samples();
+  };
+  const double few = samples_of(64), many = samples_of(256);
+  CHECK(few > 0);
+  CHECK(many > 3 * few);
+  CHECK(many < 5 * few);
+}
+
+TEST_CASE("trainer: a checkpoint knows the sizes of its field") {
+  const TemporaryFolder folder;
+  RadianceField field(small_field_options());
+  Trainer trainer(field, scene(), train_options(2));
+  trainer.save(folder / "checkpoint");
+  RadianceField same(checkpointed_field(folder / "checkpoint"));
+  CHECK(same.params.size() == field.params.size());
+  Trainer second(same, scene(), train_options(2));
+  second.restore(folder / "checkpoint");
+  field.save(folder / "field.fm");
+  CHECK_THROWS_WITH(checkpointed_field(folder / "field.fm"),
+                    Contains("field.fm: expected a checkpoint of a field's training"));
 }

@@ -96,11 +96,24 @@ TEST_CASE("reproduce has every system once before it turns to other lengths and 
   CHECK(missing.back().find("-chair-") != std::string::npos);
 }
 
+TEST_CASE("reproduce --system keeps to the rows that are named", "[reproduce]") {
+  const TemporaryFolder folder;
+  const auto r = run_command({"reproduce", "--report-only", "--table", "bits", "--system", "ours", "--system",
+                              "geometry", "--scene", "lego", "--cells", folder / "cells", "--json", "-"});
+  REQUIRE(r.code == cli::kOk);
+  const auto missing = nlohmann::json::parse(r.out)["missing"].get<std::vector<std::string>>();
+  CHECK(missing.size() == 10);
+  for (const auto& stem : missing) CHECK((stem.starts_with("ours-") || stem.starts_with("geometry-")));
+}
+
 TEST_CASE("reproduce says what is wrong", "[reproduce]") {
   const TemporaryFolder folder;
   const auto table = run_command({"reproduce", "--table", "best", "--cells", folder / "cells"});
   CHECK(table.code == cli::kUsage);
   CHECK_THAT(table.err, Contains("--table: [paper_table] name must be bits, quality"));
+  const auto system = run_command({"reproduce", "--system", "theirs", "--cells", folder / "cells"});
+  CHECK(system.code == cli::kUsage);
+  CHECK_THAT(system.err, Contains("--system: [paper_system] name must be one of ours, copyrnerf_paper"));
   const auto scene = run_command({"reproduce", "--table", "weights", "--scene", folder / "nowhere", "--cells",
                                   folder / "cells", "--work", folder / "work", "--lpips-weights", "none"});
   CHECK(scene.code == cli::kFailed);

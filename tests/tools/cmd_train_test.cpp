@@ -1,4 +1,6 @@
 #include <fieldmark/engine/files.h>
+#include <fieldmark/nerf/dataset.h>
+#include <fieldmark/nerf/trainer.h>
 
 #include <csignal>
 #include <nlohmann/json.hpp>
@@ -100,4 +102,34 @@ TEST_CASE(
   CHECK(run_command(
             {"train", "--data", scene, "--out", folder / "no.fm", "--model", "sized", "--preset", "mlp"})
             .code == cli::kUsage);
+
+  // A third of a second is over before tables have been compared.
+  const auto short_run = run_command({"train", "--data", scene, "--out", folder / "short.fm", "--model",
+                                      "sized", "--seconds", "1", "--json", "-"});
+  INFO(short_run.err);
+  REQUIRE(short_run.code == cli::kOk);
+  const Json unknown = Json::parse(short_run.out)["sizing"];
+  CHECK(unknown["trials"].size() <= 2);
+  CHECK(unknown["log2_table"] == nerf::HashEncodingOptions{}.log2_table);
+}
+
+TEST_CASE("train --model sized goes on with the sizes of its checkpoint", "[train]") {
+  const TemporaryFolder folder;
+  const std::string scene = tiny_scene(folder);
+  nerf::RadianceFieldOptions small{.seed = 1};
+  small.field.encoding.log2_table = 6;
+  nerf::RadianceField field(small);
+  auto options = nerf::train_options(nerf::FieldKind::hash);
+  options.schedule.steps = 4;
+  options.seed = 1;
+  const auto data = nerf::load_dataset(scene, {.split = "train"});
+  nerf::Trainer trainer(field, data, options);
+  trainer.step(0);
+  trainer.save(folder / "f.fm.checkpoint");
+  const auto r = run_command({"train", "--data", scene, "--out", folder / "f.fm", "--model", "sized",
+                              "--resume", "--steps", "4", "--json", "-"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  CHECK(Json::parse(r.out)["parameters"] == field.params.parameters());
+  CHECK(!Json::parse(r.out).contains("sizing"));
 }

@@ -29,7 +29,7 @@ constexpr const char* kUnder[] = {"noise_0.1",  "rotation_30", "scale_0.75",  "b
                                   "blur_0.5",   "blur_1",      "blur_2"};
 
 struct Options {
-  std::vector<std::string> tables, scenes;
+  std::vector<std::string> tables, scenes, systems;
   std::string cells = "docs/results/cells", work = "reproduce_work", lpips_weights;
   double budget = 300, base_seconds = 0;
   Index size = 0, views = 0, photographs = 20;
@@ -68,6 +68,10 @@ std::vector<baselines::CellName> planned(const Options& options,
   for (const std::string& table : tables)
     for (const auto& name : plan_cells(baselines::parse_paper_table(table), plan))
       if (std::find(cells.begin(), cells.end(), name) == cells.end()) cells.push_back(name);
+  if (!options.systems.empty())
+    std::erase_if(cells, [&](const baselines::CellName& name) {
+      return std::find(options.systems.begin(), options.systems.end(), name.system) == options.systems.end();
+    });
   std::stable_partition(cells.begin(), cells.end(),
                         [&](const baselines::CellName& name) { return name.scene == scenes.front().name; });
   return cells;
@@ -182,6 +186,8 @@ void measure(const Options& options, const std::vector<baselines::PaperScene>& s
 int run(const Options& options, Context& context) {
   for (const auto& table : options.tables)
     read_option("--table", [&] { return baselines::parse_paper_table(table); });
+  for (const auto& system : options.systems)
+    read_option("--system", [&] { return baselines::paper_system(system).name; });
   const auto scenes = scenes_of(options);
   const auto cells = planned(options, scenes, context.seed());
   std::filesystem::create_directories(options.cells);
@@ -249,6 +255,11 @@ Command add_reproduce(CLI::App& app) {
                  "Data set, several times; the first has every system. objects is the built-in scene\n"
                  "(lego, chair and fern of $FIELDMARK_DATA, or objects)")
       ->type_name("DIR")
+      ->default_str("");
+  app.add_option("--system", o->systems,
+                 "Only this row, by its name in the cells (ours, copyrnerf_paper, hidden_nerf ...), several "
+                 "times (all)")
+      ->type_name("NAME")
       ->default_str("");
   add_measuring_options(app, *o);
   app.add_option("--cells", o->cells, "Folder of the cells; those that are there are not measured again")

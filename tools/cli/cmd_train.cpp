@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <ostream>
@@ -19,6 +20,7 @@
 namespace fieldmark::cli {
 namespace {
 
+constexpr double kSizing = 1. / 3;     // of --seconds, at most
 constexpr double kHeaderBytes = 32e3;  // names and metadata, cameras included
 
 struct Options {
@@ -49,11 +51,13 @@ nerf::RadianceFieldOptions fitted(nerf::RadianceFieldOptions field, double max_m
   throw UsageError("--max-megabytes: no field is as small as " + std::to_string(max_megabytes) + " MB");
 }
 
-// As large as the scene needs: short trainings first, whose figures go into the result.
+// As large as the scene needs: short trainings first, whose figures go into the result. A run by
+// the clock gives them kSizing of its seconds; one that is resumed has its sizes in its checkpoint.
 nerf::RadianceFieldOptions sized(const nerf::RadianceFieldOptions& start, const nerf::Dataset& data,
-                                 Json& report, Context& context) {
+                                 const RunLength& length, Json& report, Context& context) {
   const InterruptGuard guard;
   const double begun = context.seconds();
+  const double most = length.steps > 0 ? std::numeric_limits<double>::infinity() : kSizing * length.seconds;
   nerf::FieldSizing sizing;
   {
     Progress progress = context.progress("sizing");
@@ -61,7 +65,7 @@ nerf::RadianceFieldOptions sized(const nerf::RadianceFieldOptions& start, const 
         data, start, {.most_log2_table = std::max(start.field.encoding.log2_table, 9), .seed = start.seed},
         [&](Index done, Index total) {
           progress.update(static_cast<double>(done) / static_cast<double>(total));
-          return !guard.interrupted();
+          return context.seconds() - begun < most && !guard.interrupted();
         });
   }
   if (guard.interrupted()) throw Interrupted("while the model was sized, nothing was written");
@@ -166,7 +170,12 @@ int run(const Options& options, Context& context) {
   if (options.preset == "mlp") sizes.field.kind = nerf::FieldKind::mlp;
   sizes = fitted(sizes, options.max_megabytes);
   Json sizing;
-  if (options.model == "sized") sizes = fitted(sized(sizes, data, sizing, context), options.max_megabytes);
+  if (options.model == "sized") {
+    sizes = options.resume
+                ? nerf::checkpointed_field(checkpoint)
+                : fitted(sized(sizes, data, options.length, sizing, context), options.max_megabytes);
+    sizes.seed = context.seed();
+  }
   nerf::RadianceField field(sizes);
   nerf::TrainOptions train_options = nerf::train_options(field.options().field.kind);
   train_options.schedule.steps = options.length.steps;

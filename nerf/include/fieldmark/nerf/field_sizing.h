@@ -48,9 +48,9 @@ double pixel_resolution(const Dataset& data, const Space& space);
 ///   - the viewing direction, half of the networks' width and then the finest levels, one by one, are taken
 ///     away where that loses less than half, a sixth and half of `worth`, or leaves `enough`.
 /// Space, step and seed are those of `start`.
-/// @param progress  called before each training with how many are done and how many there may be; false ends
-/// the
-///                  sizing with what is known. May be empty
+/// @param progress  called before each training and on its way, with how many are done and how many there may
+///                  be; false ends the sizing: what was not tried to its end stays as it is in `start`. May
+///                  be empty
 /// @throws ValueError if an option is out of range or start is not of kind hash
 FieldSizing size_field(const Dataset& data, const RadianceFieldOptions& start, const SizingOptions& options,
                        const std::function<bool(Index done, Index total)>& progress = {});

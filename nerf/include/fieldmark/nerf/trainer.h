@@ -17,6 +17,9 @@ struct TrainOptions {
   /// Hashed levels still take a step only once in samples_per_step samples, by turns, since theirs costs as
   /// much for few samples as for many.
   Index first_samples = 6144;
+  /// Rays of a step, >= 64, however many samples they have: of the first steps of a scene without bounds,
+  /// where a ray has hundreds, that is what decides how long they take.
+  Index least_rays = 512;
   double grow_after = 1500;  ///< steps, above 0; from then on first_samples grows with the number of the step
   double huber = 0.1;        ///< see PhotometricLossOptions
   float stop = 1e-2f;  ///< a ray ends where its transmittance falls below this, in [0, 1): what lies deeper
@@ -44,6 +47,10 @@ struct TrainOptions {
 /// run to a tenth, see ScheduleOptions; 64 rays a step at the default 96 samples each, since many small steps
 /// teach it more than a few large ones. A much larger step size may never leave the empty picture.
 TrainOptions train_options(FieldKind kind);
+
+/// Sizes of the field that a Trainer::save() is of: a run whose sizes were found once goes on with them.
+/// @throws IoError if the file is no checkpoint of a field's training
+RadianceFieldOptions checkpointed_field(const std::filesystem::path& path);
 
 /// Trains a radiance field on photographs (Mildenhall et al. 2020, sec. 5; Mueller et al. 2022): random rays
 /// of all photographs (where they have alpha: of the silhouettes and a margin), random backgrounds behind
