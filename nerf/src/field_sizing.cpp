@@ -34,9 +34,9 @@ class Sizing {
  public:
   Sizing(const Dataset& data, const RadianceFieldOptions& start, const SizingOptions& options,
          const std::function<bool(Index, Index)>& progress)
-      : data_(data), options_(options), progress_(progress) {
-    found_.field = start;
-    found_.field.seed = options.seed;
+      : data_(data), options_(options), progress_(progress), start_(start) {
+    start_.seed = options.seed;
+    found_.field = start_;
   }
 
   FieldSizing run() {
@@ -99,7 +99,8 @@ class Sizing {
       RadianceFieldOptions next = found_.field;
       next.field.encoding.log2_table = rows;
       if (!attempt("table of 2^" + std::to_string(rows), next)) {
-        found_.field.field.encoding.log2_table = options_.most_log2_table;  // what is enough is not known
+        found_.field = start_;
+        found_.compared = false;
         return;
       }
       SizingTrial& trial = found_.trials.back();
@@ -128,6 +129,7 @@ class Sizing {
   const Dataset& data_;
   const SizingOptions& options_;
   const std::function<bool(Index, Index)>& progress_;
+  RadianceFieldOptions start_;
   FieldSizing found_;
   double psnr_ = 0;  // of what found_.field did
   bool ended_ = false;

@@ -1,4 +1,5 @@
 #include <fieldmark/engine/files.h>
+#include <fieldmark/watermark/owner.h>
 
 #include "cli/cli.h"
 #include "tools/tiny_job.h"
@@ -47,6 +48,24 @@ TEST_CASE("embed learns from views at several distances, and from several sample
   CHECK(std::filesystem::exists(owner));
   CHECK(embed("all", "2").code == cli::kUsage);
   CHECK(embed("native", "0").code == cli::kUsage);
+}
+
+TEST_CASE("embed has finer cells for a long message, unless they are given", "[embed]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string owner = job.folder / "long.fm";
+  const auto cells_of = [&](const char* bits, const std::vector<std::string>& more) {
+    std::vector<std::string> line{"embed", "--field",          job.field, "--out",         owner, "--bits",
+                                  bits,    "--steps",          "1",       "--reader-size", "32",  "--views",
+                                  "8",     "--measured-views", "1"};
+    line.insert(line.end(), more.begin(), more.end());
+    const auto r = run_command(line);
+    INFO(r.err);
+    REQUIRE(r.code == cli::kOk);
+    return watermark::Owner::load(owner).cells.side();
+  };
+  CHECK(cells_of("64", {}) == 16);
+  CHECK(cells_of("65", {}) == 22);
+  CHECK(cells_of("65", {"--cells", "14"}) == 14);
 }
 
 TEST_CASE("embed --preset paper and code give an owner that bakes and reads like any other", "[embed]") {

@@ -82,6 +82,8 @@ nerf::RadianceFieldOptions sized(const nerf::RadianceFieldOptions& start, const 
   char line[80];
   std::snprintf(line, sizeof line, "  sized in %.1f s\n", seconds);
   context.text() << line;
+  if (!sizing.compared)
+    context.text() << "  too short to compare tables: the model stays as it is without --model sized\n";
   report = {{"seconds", seconds},
             {"pixels", sizing.pixels},
             {"trials", trials},

@@ -33,6 +33,7 @@ struct FieldSizing {
   RadianceFieldOptions field;       ///< as sized
   double pixels = 0;                ///< cells per axis of the cube at which a cell looks as large as a pixel
   std::vector<SizingTrial> trials;  ///< in the order they were made
+  bool compared = true;             ///< false: ended before tables were, so that field is as it was
 };
 
 /// Cells per axis of the unit cube at which a cell, at the distance of the cube's middle (contracted: of the
@@ -49,8 +50,8 @@ double pixel_resolution(const Dataset& data, const Space& space);
 ///     away where that loses less than half, a sixth and half of `worth`, or leaves `enough`.
 /// Space, step and seed are those of `start`.
 /// @param progress  called before each training and on its way, with how many are done and how many there may
-///                  be; false ends the sizing: what was not tried to its end stays as it is in `start`. May
-///                  be empty
+///                  be; false ends the sizing: with `start` itself as long as tables are compared, later with
+///                  what is known. May be empty
 /// @throws ValueError if an option is out of range or start is not of kind hash
 FieldSizing size_field(const Dataset& data, const RadianceFieldOptions& start, const SizingOptions& options,
                        const std::function<bool(Index done, Index total)>& progress = {});
