@@ -101,6 +101,7 @@ class Sizing {
       if (!attempt("table of 2^" + std::to_string(rows), next)) {
         found_.field = start_;
         found_.compared = false;
+        for (SizingTrial& t : found_.trials) t.kept = false;
         return;
       }
       SizingTrial& trial = found_.trials.back();

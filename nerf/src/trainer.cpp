@@ -296,13 +296,14 @@ std::string Trainer::fingerprint() const {
          std::to_string(data_.views.front().camera.height) + " seed " + std::to_string(options_.seed) +
          " steps " + std::to_string(schedule.steps) + " samples " +
          std::to_string(options_.samples_per_step) + " from " + std::to_string(options_.first_samples) +
-         " after " + std::to_string(options_.grow_after) + " distortion " +
-         std::to_string(options_.distortion) + " hard pixels " + std::to_string(options_.hard_pixels) +
-         " huber " + std::to_string(options_.huber) + " stop " + std::to_string(options_.stop) + " warm-up " +
-         std::to_string(options_.warm_up) + " lr " + std::to_string(schedule.lr) + " half after " +
-         std::to_string(schedule.half_after) + " cooldown " + std::to_string(schedule.cooldown) + " last " +
-         std::to_string(schedule.last) + (options_.precision == Precision::bf16 ? " bf16" : "") +
-         (options_.carve ? "" : " not carved") + (options_.keep ? " kept" : "");
+         " after " + std::to_string(options_.grow_after) + " rays " + std::to_string(options_.least_rays) +
+         " distortion " + std::to_string(options_.distortion) + " hard pixels " +
+         std::to_string(options_.hard_pixels) + " huber " + std::to_string(options_.huber) + " stop " +
+         std::to_string(options_.stop) + " warm-up " + std::to_string(options_.warm_up) + " lr " +
+         std::to_string(schedule.lr) + " half after " + std::to_string(schedule.half_after) + " cooldown " +
+         std::to_string(schedule.cooldown) + " last " + std::to_string(schedule.last) +
+         (options_.precision == Precision::bf16 ? " bf16" : "") + (options_.carve ? "" : " not carved") +
+         (options_.keep ? " kept" : "");
 }
 
 RadianceFieldOptions checkpointed_field(const std::filesystem::path& path) {

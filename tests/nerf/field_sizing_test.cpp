@@ -68,6 +68,8 @@ TEST_CASE("field_sizing: the same for the same seed, and ends when told to") {
     return done < 2;
   });
   CHECK(cut.trials.size() == 2);
+  CHECK(!cut.compared);
+  for (const SizingTrial& t : cut.trials) CHECK(!t.kept);
 }
 
 TEST_CASE("field_sizing: ended before tables have been compared, the field is as it was") {
