@@ -38,6 +38,18 @@ bool shows_something(const Tensor<float>& picture) {
   return squares / n - mean * mean > kLeastDeviation * kLeastDeviation;
 }
 
+Tensor<float> window_of(const Tensor<float>& picture, Index top, Index left, const Shape& shape) {
+  const Index h = picture.shape[0], w = picture.shape[1];
+  Tensor<float> window(shape);
+  for (Index y = 0; y < shape[0]; ++y)
+    for (Index x = 0; x < shape[1]; ++x) {
+      const Index row = std::min(top + y, h - 1), column = std::min(left + x, w - 1);
+      std::copy_n(picture.data.begin() + (row * w + column) * 3, 3,
+                  window.data.begin() + (y * shape[1] + x) * 3);
+    }
+  return window;
+}
+
 Tensor<float> generated_texture(Index size, const CounterRng& rng, std::uint64_t index) {
   if (size < 1) throw ValueError("[generated_texture] size must be at least 1, got " + std::to_string(size));
   const auto dark = rng.uniform4(index, 0), light = rng.uniform4(index, 1), shape = rng.uniform4(index, 2);
@@ -71,18 +83,14 @@ CropSource::CropSource(std::vector<Tensor<float>> photographs, std::uint64_t see
 
 Tensor<float> CropSource::photograph(Index size, std::uint64_t index) const {
   if (photographs_.empty()) throw ValueError("[crop_source] photographs must not be empty");
-  Tensor<float> window({size, size, 3});
+  Tensor<float> window;
   for (std::uint64_t attempt = 0; attempt < kTries; ++attempt) {
     const auto which = rng_.below(static_cast<Index>(photographs_.size()), index, 3 * attempt + 100);
     const Tensor<float>& from = photographs_[static_cast<std::size_t>(which)];
     const Index h = from.shape[0], w = from.shape[1];
     const Index top = rng_.below(std::max<Index>(h - size, 0) + 1, index, 3 * attempt + 101);
     const Index left = rng_.below(std::max<Index>(w - size, 0) + 1, index, 3 * attempt + 102);
-    for (Index y = 0; y < size; ++y)
-      for (Index x = 0; x < size; ++x) {
-        const Index row = std::min(top + y, h - 1), column = std::min(left + x, w - 1);
-        std::copy_n(from.data.begin() + (row * w + column) * 3, 3, window.data.begin() + (y * size + x) * 3);
-      }
+    window = window_of(from, top, left, {size, size, 3});
     if (shows_something(window)) break;
   }
   return window;

@@ -29,16 +29,8 @@ struct Tiles {
   std::vector<std::array<Index, 2>> corners;
 };
 
-// Edges are repeated beyond the picture.
 Tensor<float> tile_of(const Tensor<float>& picture, const Tiles& tiles, const std::array<Index, 2>& corner) {
-  const Index h = picture.shape[0], w = picture.shape[1];
-  Tensor<float> tile({tiles.height, tiles.width, 3});
-  for (Index y = 0; y < tiles.height; ++y)
-    for (Index x = 0; x < tiles.width; ++x)
-      for (Index c = 0; c < 3; ++c)
-        tile[(y * tiles.width + x) * 3 + c] =
-            picture[(std::min(corner[0] + y, h - 1) * w + std::min(corner[1] + x, w - 1)) * 3 + c];
-  return tile;
+  return window_of(picture, corner[0], corner[1], {tiles.height, tiles.width, 3});
 }
 
 // As the networks have pictures: [1, H, W, 3] in [-1, 1].

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 
+#include "small_owner.h"
 #include "support/catch.h"
 #include "support/temporary_folder.h"
-#include "small_owner.h"
 #include "tiny_owner.h"
 
 using namespace fieldmark;

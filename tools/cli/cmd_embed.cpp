@@ -37,7 +37,8 @@ struct Options {
 };
 
 constexpr Index kPaperPatch = 150;  // pixels, Luo et al. 2023, section 4.1
-// Chair, 100 bits at 36 dB on the object, by geometry: 95.6% of the bits with 16 cells a side, 98.1% with 22.
+// Chair, 100 bits at 36 dB on the object, by geometry: 95.6% of the bits with 16 cells a side, 98.7% with 22
+// (docs/results/mark.md).
 constexpr Index kFewBits = 64, kManyCells = 22;
 
 // A run that was begun without --key made one, and its checkpoint has it.

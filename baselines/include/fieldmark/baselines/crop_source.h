@@ -9,6 +9,10 @@ namespace fieldmark::baselines {
 /// Whether a picture in [0, 1] is more than a plain background: values whose standard deviation exceeds 0.03.
 bool shows_something(const Tensor<float>& picture);
 
+/// The part of a picture [H, W, 3] that begins at row `top` and column `left`, both inside it; edges are
+/// repeated beyond it.   @param shape  of the part, [h, w, 3]
+Tensor<float> window_of(const Tensor<float>& picture, Index top, Index left, const Shape& shape);
+
 /// A picture without a scene: several octaves of smooth noise between random colours over a ramp.
 /// @param index  one picture for each   @return [size, size, 3] in [0, 1]   @throws ValueError if size < 1
 Tensor<float> generated_texture(Index size, const CounterRng& rng, std::uint64_t index);

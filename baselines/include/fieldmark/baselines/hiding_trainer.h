@@ -23,7 +23,7 @@ struct HidingTrainOptions {
 };
 /// The weights of a network's authors: HiDDeN 1 and 1e-3; MBRS 10 and 1e-4, and one size of crops, that of
 /// its map. HiDDeN, whose networks look at some pixels around each, takes crops of 16 for four fifths of the
-/// run, then 32; a step size of 3e-3 (1e-3 is a third slower); and noise layers on half of the steps.
+/// run, then 32; a step size of 3e-3; and noise layers on half of the steps.
 HidingTrainOptions hiding_train_options(HidingKind kind);
 
 /// Trains encoder and decoder together, against a discriminator, through a random noise layer a batch:
