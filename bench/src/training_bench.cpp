@@ -8,7 +8,9 @@
 namespace fieldmark::bench {
 
 std::vector<TrainingVariant> training_variants(const nerf::ScheduleOptions& schedule, std::uint64_t seed) {
-  TrainingVariant base{"default", "as trained", {.seed = seed}, {.schedule = schedule, .seed = seed}};
+  TrainingVariant base{
+      "default", "as trained", nerf::field_options(schedule), {.schedule = schedule, .seed = seed}};
+  base.field.seed = seed;
   std::vector<TrainingVariant> all{base};
   const auto vary = [&](const char* choice, const char* setting, auto change) {
     TrainingVariant v = base;
@@ -35,6 +37,10 @@ std::vector<TrainingVariant> training_variants(const nerf::ScheduleOptions& sche
   vary("early stop", "rays end at a transmittance of 1e-4", [](TrainingVariant& v) { v.train.stop = 1e-4f; });
   vary("silhouettes", "not used", [](TrainingVariant& v) { v.train.carve = false; });
   vary("model", "table of 2^16", [](TrainingVariant& v) { v.field.field.encoding.log2_table = 16; });
+  vary("model", "table of 2^18, finest level of 768: the default of longer runs", [](TrainingVariant& v) {
+    v.field.field.encoding.log2_table = 18;
+    v.field.field.encoding.finest_resolution = 768;
+  });
   vary("model", "networks of 64", [](TrainingVariant& v) { v.field.field.width = 64; });
   return all;
 }

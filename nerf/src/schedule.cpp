@@ -7,7 +7,7 @@
 namespace fieldmark::nerf {
 namespace {
 constexpr double kReserve = 0.965;  // of the time: the last part may turn out slower than the pace before it
-constexpr double kEarly = 0.9, kLate = 1.02;  // of the time: a run that would end outside is planned anew
+constexpr double kEarly = 0.95, kLate = 1.02;  // of the time: a run that would end outside is planned anew
 constexpr double kNewest = 0.014;             // weight of a step in the pace: a memory of some 70 steps
 }  // namespace
 

@@ -23,6 +23,8 @@ constexpr int kMlpShards = 8;           // each has the gradients of two large n
 constexpr Index kRays = 64;             // of a chunk
 constexpr Index kOccupancyPeriod = 16;  // steps
 constexpr Index kMostRays = 1 << 16;
+constexpr Index kShortSteps = 8000;  // of a run, see field_options()
+constexpr double kShortSeconds = 120;
 constexpr const char* kAfterField = " data ";  // in the words of a checkpoint
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
@@ -53,6 +55,15 @@ TrainOptions train_options(FieldKind kind) {
   if (kind == FieldKind::mlp) {
     options.schedule = {.lr = 5e-4, .half_after = 1e9, .cooldown = 0.9, .last = 0.1};
     options.samples_per_step = 6144;
+  }
+  return options;
+}
+
+RadianceFieldOptions field_options(const ScheduleOptions& length) {
+  RadianceFieldOptions options;
+  if (length.steps > 0 ? length.steps <= kShortSteps : length.seconds <= kShortSeconds) {
+    options.field.encoding.log2_table = 17;
+    options.field.encoding.finest_resolution = 512;
   }
   return options;
 }

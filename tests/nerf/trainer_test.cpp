@@ -366,6 +366,21 @@ TEST_CASE("trainer: a step has the least rays however many samples they have") {
   CHECK(many < 5 * few);
 }
 
+TEST_CASE("trainer: short runs get a field that they can fill, others the default") {
+  const HashEncodingOptions whole{};
+  for (const auto& [length, small] : {std::pair<ScheduleOptions, bool>{{.seconds = 20}, true},
+                                      {{.seconds = 120}, true},
+                                      {{.seconds = 121}, false},
+                                      {{.steps = 8000, .seconds = 900}, true},
+                                      {{.steps = 8001, .seconds = 1}, false}}) {
+    CAPTURE(length.steps, length.seconds);
+    const RadianceFieldOptions sizes = field_options(length);
+    CHECK(sizes.field.encoding.log2_table == (small ? 17 : whole.log2_table));
+    CHECK(sizes.field.encoding.finest_resolution == (small ? 512 : whole.finest_resolution));
+    CHECK(sizes.field.width == FieldOptions{}.width);
+  }
+}
+
 TEST_CASE("trainer: a checkpoint knows the sizes of its field") {
   const TemporaryFolder folder;
   RadianceField field(small_field_options());

@@ -39,7 +39,11 @@ const Trained& trained() {
   static const Trained result = [] {
     Trained t;
     const Dataset data = make_scene({.size = kSide, .views = 40});
-    Trainer trainer(t.field, data, {.schedule = {.steps = 300}, .samples_per_step = 8192, .warm_up = 16});
+    Trainer trainer(t.field, data,
+                    {.schedule = {.steps = 300, .half_after = 4000},
+                     .samples_per_step = 8192,
+                     .grow_after = 1500,
+                     .warm_up = 16});
     while (!trainer.done()) {
       trainer.step(0);
       const Index n = trainer.steps();
@@ -90,7 +94,7 @@ TEST_CASE("regression: 8 bits embedded, baked, rendered and read") {
               test_key(5), CellGrid(6, visible_area(views, 6), 1e-3));
   Embedder embedder(
       owner, views,
-      {.schedule = {.steps = 500, .lr = 4e-3},
+      {.schedule = {.steps = 500, .lr = 4e-3, .half_after = 4000},
        .batch = 4,
        .anneal = 50,
        .distortions = {.noise = 0.02, .rotation = 5, .zoom_out = 0.95, .zoom_in = 1.05, .blur = 0.3},
@@ -101,7 +105,7 @@ TEST_CASE("regression: 8 bits embedded, baked, rendered and read") {
   CAPTURE(f.sign, f.index, f.bits, owner.gain);
 
   const Message message = message_from_hex("a6", 8);
-  Baker baker(owner, message, {.schedule = {.steps = 300}, .cameras = 40});
+  Baker baker(owner, message, {.schedule = {.steps = 300, .half_after = 4000}, .cameras = 40});
   while (!baker.done()) baker.step(0);
   Renderer renderer(baker.field());
   const PictureReader reader(owner);

@@ -70,6 +70,9 @@ TEST_CASE("bench engine --peer pytorch adds its figures to every row, and fails 
   CHECK(row["peer_variant"].is_string());
   CHECK(json["rows"][1]["name"] == "mlp_4x64_tape_fb_f32");
   CHECK(json["rows"][1]["peer_ratio"].is_null());
+  CHECK(row["peer_ratio_at_peak"].get<double>() * row["ratio_to_peak"].get<double>() ==
+        Approx(row["peer_ratio"].get<double>()));
+  CHECK(json["rows"][1]["peer_ratio_at_peak"].is_null());
   CHECK(json["rows"][1]["peer_seconds"].is_null());
   CHECK_THAT(r.err, Contains("PyTorch") && Contains("ratio"));
   const std::string report = read_text(folder / "engine.md");

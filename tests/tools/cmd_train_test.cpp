@@ -110,7 +110,7 @@ TEST_CASE(
   REQUIRE(short_run.code == cli::kOk);
   const Json unknown = Json::parse(short_run.out)["sizing"];
   CHECK(unknown["trials"].size() <= 2);
-  CHECK(unknown["log2_table"] == nerf::HashEncodingOptions{}.log2_table);
+  CHECK(unknown["log2_table"] == nerf::field_options({.seconds = 1}).field.encoding.log2_table);
 }
 
 TEST_CASE("train --model sized goes on with the sizes of its checkpoint", "[train]") {

@@ -116,7 +116,9 @@ constexpr const char* kOccupancy =
 
 std::unique_ptr<nerf::RadianceField> trained_field(const nerf::Dataset& data, double seconds,
                                                    Context& context) {
-  auto field = std::make_unique<nerf::RadianceField>(nerf::RadianceFieldOptions{.seed = context.seed()});
+  nerf::RadianceFieldOptions sizes = nerf::field_options({.seconds = seconds});
+  sizes.seed = context.seed();
+  auto field = std::make_unique<nerf::RadianceField>(sizes);
   const double begin = context.seconds();
   nerf::Trainer trainer(*field, data, {.schedule = {.seconds = seconds}, .seed = context.seed()});
   run_long({.what = "train",

@@ -53,6 +53,8 @@ Json row_json(const bench::EngineRow& r, bool with_peer) {
   const bench::PeerRow peer = r.peer.value_or(bench::PeerRow{});
   const bench::Peer::Found& found = peer.found;
   const auto of_peer = [&](const auto& value) { return r.peer ? Json(value) : Json(nullptr); };
+  row["peer_ratio_at_peak"] =
+      r.peer && r.ratio_to_peak > 0 ? Json(peer.ratio / r.ratio_to_peak) : Json(nullptr);
   row["peer_seconds"] = of_peer(peer.seconds);
   row["peer_untuned_seconds"] = of_peer(found.untuned_seconds);
   row["peer_variant"] = of_peer(found.variant);

@@ -168,7 +168,9 @@ int run(const Options& options, Context& context) {
   const auto data = load_scene(
       options.data, {.split = "train", .size = options.size, .background = background_of(options.background)},
       context);
-  nerf::RadianceFieldOptions sizes{.seed = context.seed()};
+  nerf::RadianceFieldOptions sizes =
+      nerf::field_options({.steps = options.length.steps, .seconds = options.length.seconds});
+  sizes.seed = context.seed();
   if (options.preset == "mlp") sizes.field.kind = nerf::FieldKind::mlp;
   sizes = fitted(sizes, options.max_megabytes);
   Json sizing;
@@ -241,7 +243,7 @@ Command add_train(CLI::App& app) {
       ->check(CLI::IsMember({"hash", "mlp"}).description(""))
       ->type_name("NAME");
   app.add_option("--model", o->model,
-                 "fixed: the default sizes;\n"
+                 "fixed: what a run of this length can fill;\n"
                  "sized: as large as the scene needs, found by short trainings (hash only)")
       ->check(CLI::IsMember({"fixed", "sized"}).description(""))
       ->type_name("NAME");

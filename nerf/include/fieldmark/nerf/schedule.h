@@ -8,7 +8,7 @@ struct ScheduleOptions {
   Index steps = 0;           ///< length of the run in steps; 0: by time
   double seconds = 60;       ///< length of the run in seconds, where steps is 0, > 0
   double lr = 2e-2;          ///< step size at the start, > 0
-  double half_after = 4000;  ///< steps after which 1 / (1 + n / half_after) has halved the step size, > 0
+  double half_after = 8000;  ///< steps after which 1 / (1 + n / half_after) has halved the step size, > 0
   double cooldown =
       0.3;  ///< the last part of the run, in (0, 1), over which the step size falls exponentially ...
   double last = 0.03;  ///< ... to this fraction of what it was, in (0, 1]
@@ -18,7 +18,7 @@ struct ScheduleOptions {
 ///   lr(n) = lr / (1 + n / half_after) * last^max(0, (n - n_c) / (N - n_c)),   n_c = floor((1 - cooldown) N)
 /// A timed run looks at the clock to decide at which step the last part begins, which fixes N. While the pace
 /// stays, it looks for nothing else, so that N given as steps has the same step sizes, and gives the same
-/// bytes. Where the pace changes so much that N steps would end before 0.9 or after 1.02 of the time, N
+/// bytes. Where the pace changes so much that N steps would end before 0.95 or after 1.02 of the time, N
 /// becomes what the rest of the time allows, and the formula goes on with it: such a run is not repeated by
 /// steps.
 class Schedule {

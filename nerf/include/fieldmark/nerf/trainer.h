@@ -20,7 +20,7 @@ struct TrainOptions {
   /// Rays of a step, >= 64, however many samples they have: of the first steps of a scene without bounds,
   /// where a ray has hundreds, that is what decides how long they take.
   Index least_rays = 512;
-  double grow_after = 1500;  ///< steps, above 0; from then on first_samples grows with the number of the step
+  double grow_after = 1000;  ///< steps, above 0; from then on first_samples grows with the number of the step
   double huber = 0.1;        ///< see PhotometricLossOptions
   float stop = 1e-2f;  ///< a ray ends where its transmittance falls below this, in [0, 1): what lies deeper
                        ///< than 1e-2 is worth less than the rays that its samples would cost
@@ -47,6 +47,11 @@ struct TrainOptions {
 /// run to a tenth, see ScheduleOptions; 64 rays a step at the default 96 samples each, since many small steps
 /// teach it more than a few large ones. A much larger step size may never leave the empty picture.
 TrainOptions train_options(FieldKind kind);
+
+/// Sizes of a hash field that a run of this length can fill: those of RadianceFieldOptions, and for runs of at
+/// most 120 seconds or 8000 steps a table of 2^17 rows and a finest level of 512 cells, whose steps are faster
+/// (docs/results/training.md has both beside each other).
+RadianceFieldOptions field_options(const ScheduleOptions& length);
 
 /// Sizes of the field that a Trainer::save() is of: a run whose sizes were found once goes on with them.
 /// @throws IoError if the file is no checkpoint of a field's training
