@@ -23,8 +23,8 @@ constexpr int kMlpShards = 8;           // each has the gradients of two large n
 constexpr Index kRays = 64;             // of a chunk
 constexpr Index kOccupancyPeriod = 16;  // steps
 constexpr Index kMostRays = 1 << 16;
-constexpr Index kShortSteps = 8000;  // of a run, see field_options()
-constexpr double kShortSeconds = 120;
+constexpr Index kShortSteps = 8000, kLongSteps = 20000;  // of a run, see field_options()
+constexpr double kShortSeconds = 120, kLongSeconds = 400;
 constexpr const char* kAfterField = " data ";  // in the words of a checkpoint
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
@@ -61,9 +61,16 @@ TrainOptions train_options(FieldKind kind) {
 
 RadianceFieldOptions field_options(const ScheduleOptions& length) {
   RadianceFieldOptions options;
-  if (length.steps > 0 ? length.steps <= kShortSteps : length.seconds <= kShortSeconds) {
-    options.field.encoding.log2_table = 17;
-    options.field.encoding.finest_resolution = 512;
+  HashEncodingOptions& e = options.field.encoding;
+  const bool by_steps = length.steps > 0;
+  if (by_steps ? length.steps <= kShortSteps : length.seconds <= kShortSeconds) {
+    e.log2_table = 17;
+    e.finest_resolution = 512;
+  } else if (by_steps ? length.steps > kLongSteps : length.seconds > kLongSeconds) {
+    e.log2_table = 19;
+    e.finest_resolution = 1024;
+    options.field.width = 64;
+    options.step = 1.f / 512;
   }
   return options;
 }

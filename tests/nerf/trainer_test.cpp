@@ -366,18 +366,26 @@ TEST_CASE("trainer: a step has the least rays however many samples they have") {
   CHECK(many < 5 * few);
 }
 
-TEST_CASE("trainer: short runs get a field that they can fill, others the default") {
-  const HashEncodingOptions whole{};
-  for (const auto& [length, small] : {std::pair<ScheduleOptions, bool>{{.seconds = 20}, true},
-                                      {{.seconds = 120}, true},
-                                      {{.seconds = 121}, false},
-                                      {{.steps = 8000, .seconds = 900}, true},
-                                      {{.steps = 8001, .seconds = 1}, false}}) {
+TEST_CASE("trainer: a run gets a field that it can fill") {
+  const HashEncodingOptions middle{};
+  struct Case {
+    ScheduleOptions length;
+    int log2_table;
+    double finest;
+    Index width;
+  };
+  for (const auto& [length, log2_table, finest, width] :
+       {Case{{.seconds = 20}, 17, 512, 32}, Case{{.seconds = 120}, 17, 512, 32},
+        Case{{.seconds = 121}, middle.log2_table, middle.finest_resolution, 32},
+        Case{{.seconds = 400}, middle.log2_table, middle.finest_resolution, 32},
+        Case{{.seconds = 401}, 19, 1024, 64}, Case{{.steps = 8000, .seconds = 900}, 17, 512, 32},
+        Case{{.steps = 8001, .seconds = 1}, middle.log2_table, middle.finest_resolution, 32},
+        Case{{.steps = 20001, .seconds = 1}, 19, 1024, 64}}) {
     CAPTURE(length.steps, length.seconds);
     const RadianceFieldOptions sizes = field_options(length);
-    CHECK(sizes.field.encoding.log2_table == (small ? 17 : whole.log2_table));
-    CHECK(sizes.field.encoding.finest_resolution == (small ? 512 : whole.finest_resolution));
-    CHECK(sizes.field.width == FieldOptions{}.width);
+    CHECK(sizes.field.encoding.log2_table == log2_table);
+    CHECK(sizes.field.encoding.finest_resolution == finest);
+    CHECK(sizes.field.width == width);
   }
 }
 

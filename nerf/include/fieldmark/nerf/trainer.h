@@ -48,9 +48,10 @@ struct TrainOptions {
 /// teach it more than a few large ones. A much larger step size may never leave the empty picture.
 TrainOptions train_options(FieldKind kind);
 
-/// Sizes of a hash field that a run of this length can fill: those of RadianceFieldOptions, and for runs of at
-/// most 120 seconds or 8000 steps a table of 2^17 rows and a finest level of 512 cells, whose steps are faster
-/// (docs/results/training.md has both beside each other).
+/// Sizes of a hash field that a run of this length can fill: those of RadianceFieldOptions; for runs of at most
+/// 120 seconds or 8000 steps a table of 2^17 rows and a finest level of 512 cells, whose steps are faster
+/// (docs/results/training.md has both beside each other); for runs of more than 400 seconds or 20000 steps a
+/// table of 2^19 rows, a finest level of 1024 cells, networks of 64 and samples 1 / 512 of a diagonal apart.
 RadianceFieldOptions field_options(const ScheduleOptions& length);
 
 /// Sizes of the field that a Trainer::save() is of: a run whose sizes were found once goes on with them.
