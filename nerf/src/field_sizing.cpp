@@ -30,6 +30,23 @@ void set_resolution(RadianceFieldOptions& field, double finest) {
   field.occupancy = finest >= 384 ? 128 : finest >= 160 ? 64 : 32;
 }
 
+// Bits of a grid of `from` cells per axis for one of `to`: 1 where any cell that overlaps is 1.
+std::vector<std::uint8_t> resampled(std::span<const std::uint8_t> bits, Index from, Index to) {
+  std::vector<std::uint8_t> out(static_cast<std::size_t>(to * to * to));
+  const auto first = [&](Index c) { return c * to / from; };
+  const auto end = [&](Index c) { return ((c + 1) * to + from - 1) / from; };
+  for (Index z = 0; z < from; ++z)
+    for (Index y = 0; y < from; ++y)
+      for (Index x = 0; x < from; ++x) {
+        if (!bits[static_cast<std::size_t>(x + from * (y + from * z))]) continue;
+        for (Index k = first(z); k < end(z); ++k)
+          for (Index j = first(y); j < end(y); ++j)
+            for (Index i = first(x); i < end(x); ++i)
+              out[static_cast<std::size_t>(i + to * (j + to * k))] = 1;
+      }
+  return out;
+}
+
 class Sizing {
  public:
   Sizing(const Dataset& data, const RadianceFieldOptions& start, const SizingOptions& options,
@@ -41,7 +58,8 @@ class Sizing {
 
   FieldSizing run() {
     RadianceField probe(found_.field);
-    const Trainer layout(probe, data_, short_run());  // lays the scene into the cube
+    Trainer scout(probe, data_, short_run());  // lays the scene into the cube
+    if (probe.space.kind != SpaceKind::cube) find_empty(scout, probe.grid);
     found_.pixels = pixel_resolution(data_, probe.space);
     set_resolution(found_.field, std::clamp(std::floor(kFiner * found_.pixels), 16., double{kMostFinest}));
     grow_table();
@@ -76,11 +94,21 @@ class Sizing {
     return !ended_;
   }
 
+  // Where rays have no bounds, most of a short training goes into finding out what is empty: once for all.
+  void find_empty(Trainer& scout, const OccupancyGrid& grid) {
+    while (!scout.done()) {
+      scout.step(0);
+      if (scout.steps() % kAsked == 0 && !goes_on()) return;
+    }
+    seen_.assign(grid.bits().begin(), grid.bits().end());
+  }
+
   // Whether the training was made.
   bool attempt(const std::string& what, const RadianceFieldOptions& field) {
     if (ended_ || !goes_on()) return false;
     RadianceField trial(field);
     Trainer trainer(trial, data_, short_run());
+    if (!seen_.empty()) trial.grid.restrict_to(resampled(seen_, start_.occupancy, trial.grid.resolution()));
     while (!trainer.done()) {
       trainer.step(0);
       if (trainer.steps() % kAsked == 0 && !goes_on()) return false;
@@ -88,6 +116,7 @@ class Sizing {
     found_.trials.push_back({.what = what,
                              .field = field,
                              .parameters = trial.params.parameters(),
+                             .samples = trainer.samples(),
                              .psnr = trainer.train_psnr()});
     return true;
   }
@@ -132,7 +161,8 @@ class Sizing {
   const std::function<bool(Index, Index)>& progress_;
   RadianceFieldOptions start_;
   FieldSizing found_;
-  double psnr_ = 0;  // of what found_.field did
+  std::vector<std::uint8_t> seen_;  // cells of start_'s grid that are not empty; none: not known
+  double psnr_ = 0;                 // of what found_.field did
   bool ended_ = false;
 };
 

@@ -83,6 +83,26 @@ TEST_CASE("field_sizing: ended before tables have been compared, the field is as
   CHECK(RadianceField(cut.field).configuration() == RadianceField(RadianceFieldOptions{}).configuration());
 }
 
+TEST_CASE("field_sizing: without bounds, what is empty is found once, not by each training") {
+  Dataset photographs = sphere();
+  photographs.layout = Layout::transforms;
+  for (View& v : photographs.views)
+    for (Index i = 3; i < v.rgba.size(); i += 4) v.rgba[i] = 1;
+  const FieldSizing sizing = size_field(photographs, {}, kShort);
+  REQUIRE(sizing.compared);
+  RadianceField alone(sizing.trials[0].field);
+  Trainer trainer(alone, photographs,
+                  {.schedule = {.steps = kShort.steps},
+                   .samples_per_step = kShort.samples_per_step,
+                   .least_rays = 128,
+                   .seed = kShort.seed});
+  REQUIRE(alone.space.kind == SpaceKind::contracted);
+  while (!trainer.done()) trainer.step(0);
+  CAPTURE(trainer.samples(), sizing.trials[0].samples);
+  CHECK(sizing.trials[0].samples > 0);
+  CHECK(sizing.trials[0].samples < 0.6 * trainer.samples());
+}
+
 TEST_CASE("field_sizing: options out of range") {
   RadianceFieldOptions mlp;
   mlp.field.kind = FieldKind::mlp;

@@ -24,6 +24,7 @@ struct SizingTrial {
   std::string what;            ///< what it tries, for people: "table of 2^13"
   RadianceFieldOptions field;  ///< that was trained
   Index parameters = 0;        ///< numbers of that field
+  double samples = 0;          ///< that passed through its networks
   double psnr = 0;             ///< see Trainer::train_psnr(), at its end
   bool kept = false;           ///< whether what it tried was taken
 };
@@ -48,7 +49,8 @@ double pixel_resolution(const Dataset& data, const Space& space);
 ///   - the table grows fourfold from 2^9 as long as that gains `worth` dB and `enough` is not reached;
 ///   - the viewing direction, half of the networks' width and then the finest levels, one by one, are taken
 ///     away where that loses less than half, a sixth and half of `worth`, or leaves `enough`.
-/// Space, step and seed are those of `start`.
+/// Space, step and seed are those of `start`. Where a scene has no bounds, a training of `start` finds out first
+/// what is empty, and the others leave that out.
 /// @param progress  called before each training and on its way, with how many are done and how many there may
 ///                  be; false ends the sizing: with `start` itself as long as tables are compared, later with
 ///                  what is known. May be empty
