@@ -13,6 +13,7 @@ constexpr double kGrowth = 1.75, kFiner = 1.5;
 constexpr int kFirstTable = 9, kBase = 16, kMostFinest = 2048;
 constexpr Index kMostTrials = 12;
 constexpr Index kLeastRays = 128;  // of a step: scenes without bounds have hundreds of samples a ray at first
+constexpr Index kScout = 256;      // steps at most that find out what is empty
 constexpr Index kAsked = 16;       // steps between two looks at the clock
 
 double median(std::vector<double> values) {
@@ -65,7 +66,7 @@ class Sizing {
     grow_table();
     RadianceFieldOptions next = found_.field;
     next.field.directional = false;
-    take_away("no viewing direction", next, options_.worth / 2);
+    take_away("no viewing direction", next, -options_.worth / 6);
     next = found_.field;
     next.field.width = std::max<Index>(next.field.width / 2, 8);
     next.field.geometry = std::max<Index>(next.field.geometry / 2, 4);
@@ -96,7 +97,7 @@ class Sizing {
 
   // Where rays have no bounds, most of a short training goes into finding out what is empty: once for all.
   void find_empty(Trainer& scout, const OccupancyGrid& grid) {
-    while (!scout.done()) {
+    while (scout.steps() < std::min(kScout, options_.steps)) {
       scout.step(0);
       if (scout.steps() % kAsked == 0 && !goes_on()) return;
     }

@@ -9,9 +9,9 @@ namespace fieldmark::nerf {
 
 /// How a field's sizes are found.
 struct SizingOptions {
-  Index steps = 256;              ///< of each short training, >= 64
+  Index steps = 512;              ///< of each short training, >= 64
   Index samples_per_step = 8192;  ///< of each short training, see TrainOptions
-  double worth = 0.3;             ///< dB that a table of four times the rows must gain, > 0
+  double worth = 0.35;            ///< dB that a table of four times the rows must gain, > 0
   /// dB that are enough in a short training: photographs give less, and the built-in sphere, which gives
   /// more, ends above 40 dB in a whole one (docs/results/sizing.md).
   double enough = 34;
@@ -47,10 +47,13 @@ double pixel_resolution(const Dataset& data, const Space& space);
 ///   last;
 ///   - the occupancy grid has a quarter of the finest level's cells per axis: 32, 64 or 128;
 ///   - the table grows fourfold from 2^9 as long as that gains `worth` dB and `enough` is not reached;
-///   - the viewing direction, half of the networks' width and then the finest levels, one by one, are taken
-///     away where that loses less than half, a sixth and half of `worth`, or leaves `enough`.
-/// Space, step and seed are those of `start`. Where a scene has no bounds, a training of `start` finds out first
-/// what is empty, and the others leave that out.
+///   - the viewing direction is taken away where that gains a sixth of `worth` or leaves `enough`: it is few
+///     numbers, and short trainings see little of what it is for;
+///   - half of the networks' width and then the finest levels, one by one, are taken away where that loses
+///   less
+///     than a sixth and half of `worth`, or leaves `enough`.
+/// Space, step and seed are those of `start`. Where a scene has no bounds, a training of `start` finds out
+/// first what is empty, and the others leave that out.
 /// @param progress  called before each training and on its way, with how many are done and how many there may
 ///                  be; false ends the sizing: with `start` itself as long as tables are compared, later with
 ///                  what is known. May be empty
