@@ -367,25 +367,21 @@ TEST_CASE("trainer: a step has the least rays however many samples they have") {
 }
 
 TEST_CASE("trainer: a run gets a field that it can fill") {
+  using Case = std::tuple<ScheduleOptions, int, double, Index>;
   const HashEncodingOptions middle{};
-  struct Case {
-    ScheduleOptions length;
-    int log2_table;
-    double finest;
-    Index width;
-  };
   for (const auto& [length, log2_table, finest, width] :
-       {Case{{.seconds = 20}, 17, 512, 32}, Case{{.seconds = 120}, 17, 512, 32},
-        Case{{.seconds = 121}, middle.log2_table, middle.finest_resolution, 32},
-        Case{{.seconds = 400}, middle.log2_table, middle.finest_resolution, 32},
-        Case{{.seconds = 401}, 19, 1024, 64}, Case{{.steps = 8000, .seconds = 900}, 17, 512, 32},
-        Case{{.steps = 8001, .seconds = 1}, middle.log2_table, middle.finest_resolution, 32},
-        Case{{.steps = 20001, .seconds = 1}, 19, 1024, 64}}) {
+       {Case{ScheduleOptions{.seconds = 20}, 17, 512, 32}, Case{ScheduleOptions{.seconds = 120}, 17, 512, 32},
+        Case{ScheduleOptions{.seconds = 121}, middle.log2_table, middle.finest_resolution, 32},
+        Case{ScheduleOptions{.seconds = 400}, middle.log2_table, middle.finest_resolution, 32},
+        Case{ScheduleOptions{.seconds = 401}, 19, 1024, 64},
+        Case{ScheduleOptions{.steps = 8000, .seconds = 900}, 17, 512, 32},
+        Case{ScheduleOptions{.steps = 8001, .seconds = 1}, middle.log2_table, middle.finest_resolution, 32},
+        Case{ScheduleOptions{.steps = 20001, .seconds = 1}, 19, 1024, 64}}) {
     CAPTURE(length.steps, length.seconds);
-    const RadianceFieldOptions sizes = field_options(length);
-    CHECK(sizes.field.encoding.log2_table == log2_table);
-    CHECK(sizes.field.encoding.finest_resolution == finest);
-    CHECK(sizes.field.width == width);
+    const FieldOptions sizes = field_options(length).field;
+    CHECK(sizes.encoding.log2_table == log2_table);
+    CHECK(sizes.encoding.finest_resolution == finest);
+    CHECK(sizes.width == width);
   }
 }
 

@@ -168,10 +168,12 @@ int run(const Options& options, Context& context) {
   const auto data = load_scene(
       options.data, {.split = "train", .size = options.size, .background = background_of(options.background)},
       context);
-  nerf::RadianceFieldOptions sizes =
-      nerf::field_options({.steps = options.length.steps, .seconds = options.length.seconds});
+  nerf::RadianceFieldOptions sizes;
+  if (options.preset == "mlp")
+    sizes.field.kind = nerf::FieldKind::mlp;
+  else
+    sizes = nerf::field_options({.steps = options.length.steps, .seconds = options.length.seconds});
   sizes.seed = context.seed();
-  if (options.preset == "mlp") sizes.field.kind = nerf::FieldKind::mlp;
   sizes = fitted(sizes, options.max_megabytes);
   Json sizing;
   if (options.model == "sized") {
