@@ -38,6 +38,30 @@ TEST_CASE("attack-field trains a field further, or a new one on its pictures", "
   CHECK(run({"finetune,float16", "--data", scene}).code == cli::kUsage);
 }
 
+TEST_CASE("attack-field turns pictures against a known extractor and trains the field on them",
+          "[attack-field]") {
+  const TinyJob& job = TinyJob::get();
+  const TemporaryFolder folder;
+  const std::string marked = folder / "marked.fm", out = folder / "out.fm";
+  REQUIRE(
+      run_command({"bake", "--owner", job.owner, "--message", "5", "--out", marked, "--steps", "2"}).code ==
+      cli::kOk);
+  const auto run = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), {"attack-field", marked, "--out", out, "--under", "remove", "--steps", "3",
+                                 "--views", "4", "--json", "-"});
+    return run_command(words);
+  };
+  const auto r = run({"--owner", job.owner, "--strength", "30"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  CHECK(nlohmann::json::parse(r.out)["steps"] == 3);
+  const auto before = nerf::RadianceField::load(marked), after = nerf::RadianceField::load(out);
+  CHECK(after.configuration() == before.configuration());
+  CHECK(!std::ranges::equal(after.params.values(), before.params.values()));
+  CHECK_THAT(run({}).err, Contains("--under remove: needs --owner OWNER"));
+  CHECK(run({"--owner", marked}).code == cli::kFailed);
+}
+
 TEST_CASE("a second mark goes on top of a baked field", "[attack-field]") {
   const TinyJob& job = TinyJob::get();
   const TemporaryFolder folder;

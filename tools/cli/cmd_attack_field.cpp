@@ -100,6 +100,7 @@ Command add_attack_field(CLI::App& app) {
                  "By training, each alone:\n"
                  "finetune         goes on, on the photographs of --data\n"
                  "finetune-renders goes on, on pictures of itself\n"
+                 "remove           goes on, on pictures of itself turned against the extractor of --owner\n"
                  "retrain          a new field on pictures of this one")
       ->required()
       ->type_name("NAME[,NAME...]");

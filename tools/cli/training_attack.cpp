@@ -2,6 +2,7 @@
 
 #include <fieldmark/nerf/rendered_dataset.h>
 #include <fieldmark/nerf/trainer.h>
+#include <fieldmark/watermark/extractor_attack.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -12,17 +13,41 @@
 namespace fieldmark::cli {
 namespace {
 
-nerf::Dataset renders(const nerf::RadianceField& field, const TrainingAttackOptions& options,
-                      Context& context) {
-  const auto cameras = nerf::make_cameras(field.cameras, nerf::CameraSet::near, options.views, options.size,
-                                          context.seed() + 61);
+// Calls make(told after each view), with progress of that name.
+template <class F>
+nerf::Dataset with_progress(const char* name, Context& context, F make) {
   const InterruptGuard guard;
-  Progress progress = context.progress("renders");
-  return nerf::rendered_dataset(field, cameras, [&](Index done, Index total) {
+  Progress progress = context.progress(name);
+  return make([&](Index done, Index total) {
     if (guard.interrupted()) throw Interrupted("nothing was written");
     progress.update(static_cast<double>(done) / static_cast<double>(total));
     return true;
   });
+}
+
+nerf::Dataset renders(const nerf::RadianceField& field, const TrainingAttackOptions& options,
+                      Context& context) {
+  const auto cameras = nerf::make_cameras(field.cameras, nerf::CameraSet::near, options.views, options.size,
+                                          context.seed() + 61);
+  return with_progress("renders", context,
+                       [&](auto tell) { return nerf::rendered_dataset(field, cameras, tell); });
+}
+
+nerf::Dataset turned_renders(const nerf::RadianceField& field, const TrainingAttackOptions& options,
+                             Context& context) {
+  const auto owner = watermark::Owner::load(options.owner);
+  return with_progress("against the extractor", context, [&](auto tell) {
+    return watermark::renders_against_extractor(
+        owner, field, options.views, {.strength = options.strength, .seed = context.seed() + 63}, tell);
+  });
+}
+
+nerf::Dataset data_of(const std::string& name, const nerf::RadianceField& field,
+                      const TrainingAttackOptions& options, Context& context) {
+  if (name == "finetune")
+    return load_scene(options.data, {.split = "train", .size = options.size, .background = field.background},
+                      context);
+  return name == "remove" ? turned_renders(field, options, context) : renders(field, options, context);
 }
 
 nerf::RadianceField start(const std::string& name, const nerf::RadianceField& field, Context& context) {
@@ -61,34 +86,37 @@ void train(const std::string& name, nerf::Trainer& trainer, const RunLength& len
 
 void add_training_attack(CLI::App& app, TrainingAttackOptions& o) {
   app.add_option("--data", o.data, "For finetune: data set of clean photographs")->type_name("DIR");
+  app.add_option("--owner", o.owner, "For remove: whose extractor is known; nothing else of it is used")
+      ->type_name("OWNER");
+  app.add_option("--strength", o.strength,
+                 "Of what remove changes in a picture: PSNR on the object, dB, 10 to 60")
+      ->check(CLI::Range(10.0, 60.0).description(""))
+      ->type_name("DB");
   app.add_option("--size", o.size,
                  "Pixels of the longer side of what is trained on, 16 to 8192 (as it is, or as in training)")
       ->check(CLI::Range(16, 8192).description(""))
       ->type_name("N")
       ->default_str("");
-  app.add_option("--views", o.views, "Views that finetune-renders and retrain train on, 4 to 10000")
+  app.add_option("--views", o.views, "Views that finetune-renders, remove and retrain train on, 4 to 10000")
       ->check(CLI::Range(4, 10000).description(""))
       ->type_name("N");
-  app.add_option("--lr", o.lr, "First step size of finetune and finetune-renders, 1e-6 to 1")
+  app.add_option("--lr", o.lr, "First step size of finetune, finetune-renders and remove, 1e-6 to 1")
       ->check(CLI::Range(1e-6, 1.0).description(""))
       ->type_name("F");
   add_run_length(app, o.length, false);
 }
 
 bool is_training_attack(const std::string& name) {
-  return name == "finetune" || name == "finetune-renders" || name == "retrain";
+  return name == "finetune" || name == "finetune-renders" || name == "remove" || name == "retrain";
 }
 
 nerf::RadianceField run_training_attack(const std::string& name, const nerf::RadianceField& field,
                                         const TrainingAttackOptions& options, Context& context,
                                         Json& result) {
   if (name == "finetune" && options.data.empty()) throw UsageError("--under finetune: needs --data DIR");
+  if (name == "remove" && options.owner.empty()) throw UsageError("--under remove: needs --owner OWNER");
   nerf::RadianceField out = start(name, field, context);
-  const nerf::Dataset data =
-      name == "finetune"
-          ? load_scene(options.data, {.split = "train", .size = options.size, .background = field.background},
-                       context)
-          : renders(field, options, context);
+  const nerf::Dataset data = data_of(name, field, options, context);
   nerf::TrainOptions train_options = nerf::train_options(field.options().field.kind);
   train_options.keep = name != "retrain";
   if (train_options.keep) train_options.schedule.lr = options.lr;

@@ -10,20 +10,22 @@ namespace fieldmark::cli {
 
 /// Of the attacks that train a field.
 struct TrainingAttackOptions {
-  std::string data;  ///< photographs, for finetune
-  Index size = 0;    ///< of photographs and renders, longer side; 0: as they are, as in training
+  std::string data;      ///< photographs, for finetune
+  std::string owner;     ///< whose extractor is known, for remove
+  double strength = 34;  ///< of what remove changes in a picture, dB on the object
+  Index size = 0;        ///< of photographs and renders, longer side; 0: as they are, as in training
   Index views = 100;
   double lr = 5e-3;
   RunLength length;
 };
 void add_training_attack(CLI::App& app, TrainingAttackOptions& options);
 
-/// "finetune", "finetune-renders" and "retrain".
+/// "finetune", "finetune-renders", "remove" and "retrain".
 bool is_training_attack(const std::string& name);
 
-/// finetune goes on training the field on photographs, finetune-renders on its own pictures; retrain trains a
-/// new field of the same sizes, with other initial numbers, on those. @param result  gets "steps", "seconds"
-/// and "psnr_trained"
+/// finetune goes on training the field on photographs, finetune-renders on its own pictures, remove on
+/// pictures of it turned against the extractor; retrain trains a new field of the same sizes, with other
+/// initial numbers, on its pictures. @param result  gets "steps", "seconds" and "psnr_trained"
 nerf::RadianceField run_training_attack(const std::string& name, const nerf::RadianceField& field,
                                         const TrainingAttackOptions& options, Context& context, Json& result);
 
