@@ -119,8 +119,8 @@ Tensor<float> against_extractor(const Owner& owner, const Tensor<float>& picture
     residual.swap(next);
   }
   Tensor<float> out(picture.shape);
-  std::transform(changed().value(), changed().value() + 3 * pixels, out.data.begin(),
-                 [](float x) { return std::clamp(x, 0.f, 1.f); });
+  const float* y = changed().value();
+  std::transform(y, y + 3 * pixels, out.data.begin(), [](float x) { return std::clamp(x, 0.f, 1.f); });
   return out;
 }
 

@@ -50,8 +50,7 @@ double pixel_resolution(const Dataset& data, const Space& space);
 ///   - the viewing direction is taken away where that gains a sixth of `worth` or leaves `enough`: it is few
 ///     numbers, and short trainings see little of what it is for;
 ///   - half of the networks' width and then the finest levels, one by one, are taken away where that loses
-///   less
-///     than a sixth and half of `worth`, or leaves `enough`.
+///     less than a sixth and half of `worth`, or leaves `enough`.
 /// Space, step and seed are those of `start`. Where a scene has no bounds, a training of `start` finds out
 /// first what is empty, and the others leave that out.
 /// @param progress  called before each training and on its way, with how many are done and how many there may
