@@ -9,16 +9,18 @@ namespace fieldmark::bench {
 namespace {
 
 // Samples a second once the field has taken shape. Steps differ, so the rows' runs are stretches of steps.
-EngineRow training_step(const RowOptions& o) {
+EngineRow training_steps(const RowOptions& o, const std::string& which, Index first_samples, Index warm) {
   const auto scaled = [&](Index n) {
     return std::max<Index>(8, static_cast<Index>(static_cast<double>(n) * o.scale));
   };
   const nerf::Dataset built_in =
       o.scene ? nerf::Dataset{} : nerf::make_scene({.size = scaled(200), .views = scaled(50)});
   nerf::RadianceField field(nerf::RadianceFieldOptions{});
-  const Index warm = scaled(600), stretch = scaled(40);
-  nerf::Trainer trainer(field, o.scene ? *o.scene : built_in,
-                        {.schedule = {.steps = warm + stretch * (o.runs + 1)}});
+  warm = scaled(warm);
+  const Index stretch = scaled(40);
+  nerf::Trainer trainer(
+      field, o.scene ? *o.scene : built_in,
+      {.schedule = {.steps = warm + stretch * (o.runs + 1)}, .first_samples = first_samples});
   while (trainer.steps() < warm) trainer.step(0);
   const double before = trainer.samples();
   const Index steps = trainer.steps();
@@ -31,12 +33,21 @@ EngineRow training_step(const RowOptions& o) {
   const auto each = static_cast<double>(stretch);
   EngineRow row =
       row_of({t.seconds / each, t.least / each, t.most / each, t.peak_operations / each}, 0, samples);
-  row.what = "training step of the default field on " + (o.scene ? *o.scene : built_in).name;
+  row.what = which + " of the default field on " + (o.scene ? *o.scene : built_in).name;
   return row;
 }
 
 }  // namespace
 
-std::vector<RowSpec> nerf_rows() { return {{"nerf_step", "", training_step}}; }
+std::vector<RowSpec> nerf_rows() {
+  const nerf::TrainOptions defaults;
+  return {{"nerf_step", "",
+           [=](const RowOptions& o) {
+             return training_steps(o, "training step", defaults.samples_per_step, 300);
+           }},
+          {"nerf_step_first", "", [=](const RowOptions& o) {
+             return training_steps(o, "smaller first training step", defaults.first_samples, 600);
+           }}};
+}
 
 }  // namespace fieldmark::bench

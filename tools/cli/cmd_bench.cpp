@@ -136,7 +136,7 @@ struct Scene {
 Scene scene_of(const Options& options) {
   const std::filesystem::path folder = options.field.scene.empty() ? lego_folder() : options.field.scene;
   Scene scene;
-  const bool step = std::string("nerf_step").find(options.engine.only) != std::string::npos;
+  const bool step = std::string("nerf_step_first").find(options.engine.only) != std::string::npos;
   if (folder.empty() || !(step || options.precision)) return scene;
   scene.train = nerf::load_dataset(folder);
   if (options.precision) scene.test = nerf::load_dataset(folder, {.split = "test"});

@@ -39,7 +39,7 @@ struct EngineBenchOptions {
   double scale = 1;                   ///< of the numbers of samples, in (0, 1]: for tests
   std::string only{};                 ///< rows with this text in their name
   std::optional<PeerOptions> peer{};  ///< PyTorch beside the rows it can do
-  /// What nerf_step trains on; null: the built-in scene of 200 x 200 pixels.
+  /// What nerf_step* train on; null: the built-in scene of 200 x 200 pixels.
   const nerf::Dataset* scene = nullptr;
 };
 
@@ -58,8 +58,9 @@ struct EngineBench {
 /// - hidden_decoder_fb_f32: 3 to 64, 7 x 64, batch norm, ReLU, average, linear, 4 pictures of 128 x 128
 /// - hash_2e17_*: 16 levels of 2 + 2 features, 2^17 entries, 16 to 512 cells; points along rays in the order
 ///   of image tiles, and at random
-/// - nerf_step: a training step of the default field once it has taken shape (steps 600 on), everything
-/// included
+/// - nerf_step: a training step of the default field once it has taken shape, everything included, with the
+///   samples that a run's steps have after growing (TrainOptions::samples_per_step, from 4,000 steps on);
+///   _first: with the fewer that its first have (first_samples)
 /// @param progress  called before each row with its name and the part of the rows that is done
 /// With a peer, the rows mlp_4x64_fb_f32, mlp_8x256_fb_f32, conv3x3_64_fb_f32 and hidden_decoder_fb_f32 are
 /// done by PyTorch too, a run of ours and a run of its by turns; first its results are compared with ours, on
