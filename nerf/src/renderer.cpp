@@ -1,5 +1,6 @@
 #include <fieldmark/engine/ops/rows.h>
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/resize.h>
 #include <fieldmark/nerf/renderer.h>
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 namespace fieldmark::nerf {
 namespace {
 
+constexpr Index kMostSupersampling = 8;
 constexpr Index kMlpRays = 64;  // of an mlp field at a time: what is kept of a sample is large
 
 // Every other bit of n, the lowest first: a coordinate of the n-th point of a Z-shaped curve.
@@ -41,6 +43,9 @@ Renderer::Renderer(const RadianceField& field, const RenderOptions& options)
   if (options.order.width < 1 || options.order.height < 1)
     throw ValueError("[renderer] order: a tile must have at least one pixel, got " +
                      std::to_string(options.order.width) + " x " + std::to_string(options.order.height));
+  if (options.supersampling < 1 || options.supersampling > kMostSupersampling)
+    throw ValueError("[renderer] supersampling must be 1 to 8 rays along a pixel's side, got " +
+                     std::to_string(options.supersampling));
   refresh();
   for (Index i = 0; i < kLanes; ++i) lanes_.push_back(std::make_unique<Lane>());
 }
@@ -167,6 +172,17 @@ void Renderer::list_pixels(const Camera& camera, Index tile, Lane& lane) const {
 
 Rendering Renderer::render(const Camera& camera) {
   refresh();
+  const Index k = options_.supersampling, height = camera.height, width = camera.width;
+  if (k == 1) return trace_centres(camera);
+  Rendering fine = trace_centres(camera.scaled(k * width, k * height));
+  fine.opacity.shape = {k * height, k * width, 1};
+  Rendering view{resize_area(fine.rgb, height, width), resize_area(fine.opacity, height, width)};
+  view.opacity.shape = {height, width};
+  return view;
+}
+
+// One ray through the centre of every pixel.
+Rendering Renderer::trace_centres(const Camera& camera) {
   Rendering view{Tensor<float>({camera.height, camera.width, 3}),
                  Tensor<float>({camera.height, camera.width})};
   const RayOrder& order = options_.order;

@@ -83,6 +83,37 @@ TEST_CASE(
   }
 }
 
+TEST_CASE("renderer: a pixel of several rays is the mean of what they see, in double, within 1e-4") {
+  const RadianceField f = small_field();
+  const Camera camera = test_camera(9, 7);
+  const Reference reference(f);
+  constexpr Index kRays = 3;
+  Renderer renderer(f, {.finer = 1, .stop = 0, .least_weight = 0, .supersampling = kRays});
+  const Rendering view = renderer.render(camera);
+  REQUIRE(view.rgb.shape == Shape{7, 9, 3});
+  REQUIRE(view.opacity.shape == Shape{7, 9});
+  double worst = 0;
+  for (Index y = 0; y < camera.height; ++y)
+    for (Index x = 0; x < camera.width; ++x) {
+      std::array<double, 4> mean{};
+      for (Index part = 0; part < kRays * kRays; ++part) {
+        const auto seen = reference.trace(
+            pixel_ray(camera, static_cast<double>(x) + static_cast<double>(part % kRays - 1) / 3,
+                      static_cast<double>(y) + static_cast<double>(part / kRays - 1) / 3));
+        for (std::size_t k = 0; k < 4; ++k) mean[k] += seen[k] / (kRays * kRays);
+      }
+      const Index pixel = y * camera.width + x;
+      worst = std::max(worst, std::abs(static_cast<double>(view.opacity[pixel]) - mean[3]));
+      for (Index k = 0; k < 3; ++k)
+        worst = std::max(worst, std::abs(static_cast<double>(view.rgb[3 * pixel + k]) -
+                                         (mean[static_cast<std::size_t>(k)] + (1 - mean[3]))));
+    }
+  CHECK(worst < 1e-4);
+  CHECK_THROWS_WITH(Renderer(f, {.supersampling = 0}),
+                    "[renderer] supersampling must be 1 to 8 rays along a pixel's side, got 0");
+  CHECK_THROWS_AS(Renderer(f, {.supersampling = 9}), ValueError);
+}
+
 TEST_CASE("renderer: what stopping and leaving out costs is below 0.01") {
   RadianceField f = small_field();
   f.params.values(f.params.find("density/1/bias"))[0] += 3;

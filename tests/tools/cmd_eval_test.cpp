@@ -25,6 +25,11 @@ TEST_CASE("eval compares with the photographs of the split, one row each", "[eva
   for (const auto& view : json["per_view"]) sum += view["psnr"].get<double>();
   CHECK(json["psnr"].get<double>() == Approx(sum / 4));
   for (const char* key : {"psnr_object", "ssim"}) CHECK(json.at(key).is_number());
+  const auto finer = run_command(
+      {"eval", "--field", field, "--data", scene, "--split", "train", "--supersampling", "2", "--json", "-"});
+  REQUIRE(finer.code == cli::kOk);
+  CHECK(Json::parse(finer.out)["supersampling"] == 2);
+  CHECK(Json::parse(finer.out)["psnr"] != json["psnr"]);
 }
 
 TEST_CASE("eval gives LPIPS where there are weights, for each view and their mean", "[eval]") {

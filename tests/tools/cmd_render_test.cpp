@@ -25,6 +25,11 @@ TEST_CASE("render draws cameras from the field alone, or takes a data set's", "[
     CHECK(read_image(json["images"][1].get<std::string>()).shape == Shape{12, 12, 3});
   }
   CHECK(read_image(folder / "near/view_000.png").data != read_image(folder / "sphere/view_000.png").data);
+  REQUIRE(run_command({"render", "--field", field, "--out", folder / "fine", "--count", "2", "--size", "12",
+                       "--supersampling", "3"})
+              .code == cli::kOk);
+  CHECK(read_image(folder / "fine/view_000.png").shape == Shape{12, 12, 3});
+  CHECK(read_image(folder / "fine/view_000.png").data != read_image(folder / "near/view_000.png").data);
   const auto data = run_command({"render", "--field", field, "--out", folder / "data", "--data", scene,
                                  "--against", field, "--sheet", folder / "sheet.png"});
   REQUIRE(data.code == cli::kOk);

@@ -96,3 +96,36 @@ TEST_CASE("embed_views: visible area adds the weights of the samples in each cel
   CHECK(want > 10);
   CHECK(std::accumulate(area.begin(), area.end(), 0.0) == Approx(want).epsilon(1e-9));
 }
+
+// As many cells of a grid of 16 an axis as there are weights, in a row along x.
+CachedView row_of_cells(const std::vector<float>& weights) {
+  CachedView view;
+  view.weight = weights;
+  for (std::size_t k = 0; k < weights.size(); ++k)
+    view.position.insert(view.position.end(), {(static_cast<float>(k % 16) + 0.5f) / 16,
+                                               (static_cast<float>(k / 16) + 0.5f) / 16, 0});
+  return view;
+}
+
+TEST_CASE("embed_views: a view shows as many cells as have area, and slivers count little") {
+  CHECK(cells_shown(row_of_cells({1, 1, 1, 1}), 16) == 4);
+  CHECK(cells_shown(row_of_cells({3, 1}), 16) == Approx(16.0 / 10));
+  CHECK(cells_shown(row_of_cells({1, 1, 0.001f}), 16) == Approx(2).epsilon(0.01));
+  CHECK(cells_shown(row_of_cells({1, 1, 1, 1}), 8) == 2);
+  CHECK(cells_shown(CachedView{}, 16) == 0);
+  // Of 20 views two are the poorest tenth; the next shows five cells.
+  std::vector<CachedView> views(2, row_of_cells({1}));
+  views.insert(views.end(), 18, row_of_cells({1, 1, 1, 1, 1}));
+  CHECK(cells_shown(views, 16) == 5);
+  CHECK(cells_shown(std::span<const CachedView>(), 16) == 0);
+}
+
+TEST_CASE("embed_views: cells are as fine as a message needs, and no finer") {
+  const std::vector views(3, row_of_cells(std::vector<float>(40, 1.f)));
+  CHECK(cells_for_message(views, 20) == 16);
+  const Index finer = cells_for_message(views, 21);
+  CHECK(finer > 16);
+  CHECK((finer == 46 || cells_shown(views, finer) >= 42));
+  CHECK(cells_for_message(views, 100) == 46);
+  CHECK(cells_for_message({}, 1) == 46);
+}

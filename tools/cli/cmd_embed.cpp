@@ -5,11 +5,13 @@
 #include <fieldmark/watermark/signing.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <ostream>
+#include <span>
 
 #include "cli/cli.h"
 #include "cli/commands.h"
@@ -37,9 +39,6 @@ struct Options {
 };
 
 constexpr Index kPaperPatch = 150;  // pixels, Luo et al. 2023, section 4.1
-// Chair, 100 bits at 36 dB on the object, by geometry: 95.6% of the bits with 16 cells a side, 98.7% with 22
-// (docs/results/mark.md).
-constexpr Index kFewBits = 64, kManyCells = 22;
 
 // A run that was begun without --key made one, and its checkpoint has it.
 watermark::Key key_of(const Options& options, const std::string& checkpoint) {
@@ -106,8 +105,20 @@ watermark::OwnerOptions owner_options_of(const Options& options, std::uint64_t s
   owner.fusion = preset.fusion;
   owner.seed = seed;
   if (owner.preset != watermark::Preset::fast && !options.reader_size_given) owner.reader_size = kPaperPatch;
-  if (owner.bits > kFewBits && !options.cells_given) owner.cells = kManyCells;
   return owner;
+}
+
+void choose_cells(std::span<const watermark::CachedView> views, watermark::OwnerOptions& owner,
+                  Context& context) {
+  owner.cells = watermark::cells_for_message(views, owner.bits);
+  const double shown = watermark::cells_shown(views, owner.cells);
+  context.text() << owner.cells << " cells an axis: nine of ten views show " << std::lround(shown)
+                 << " or more, for " << owner.bits << " bits\n";
+  if (shown < static_cast<double>(owner.bits))
+    context.note(
+        "many views show fewer cells than the message has bits, and some bits can only be guessed from one "
+        "of "
+        "those: take fewer --bits, or read several views");
 }
 
 // From views that the owner has not learnt from.
@@ -139,6 +150,7 @@ int run(const Options& options, Context& context) {
   auto owner_options = owner_options_of(options, context.seed());
   const bool fast = owner_options.preset == watermark::Preset::fast;
   const auto views = cached_views(options, field, owner_options.reader_size, context);
+  if (fast && !options.cells_given) choose_cells(views, owner_options, context);
   auto cells =
       fast ? watermark::CellGrid(owner_options.cells, watermark::visible_area(views, owner_options.cells))
            : watermark::message_slots(owner_options.bits);
@@ -173,6 +185,7 @@ int run(const Options& options, Context& context) {
   Json json = measure_owner(options, owner, lpips ? &*lpips : nullptr, context);
   json["seconds"] = seconds;
   json["steps"] = embedder.steps();
+  json["cells"] = owner.options().cells;
   json["sha256"] = sha256;
   json["claim"] = claim;
   json["public_key"] = open;
@@ -221,8 +234,8 @@ Command add_embed(CLI::App& app) {
       ->type_name("DB");
   auto* cells =
       app.add_option("--cells", o->owner.cells,
-                     "Cells an axis of the scene's cube, 2 to 64 (16; for more than 64 bits 22, so that a "
-                     "view has several of each bit)")
+                     "Cells an axis of the scene's cube, 2 to 64 (16 to 46: as many as a view needs to show "
+                     "two or more for each bit)")
           ->check(CLI::Range(2, 64).description(""))
           ->type_name("N")
           ->default_str("");

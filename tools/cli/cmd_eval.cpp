@@ -10,6 +10,7 @@
 #include "cli/context.h"
 #include "cli/perceptual.h"
 #include "cli/scene_data.h"
+#include "cli/supersampling.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -17,7 +18,7 @@ namespace {
 struct Options {
   std::string field, data, lpips_weights;
   std::string split = "test";
-  Index size = 0;
+  Index size = 0, supersampling = 1;
 };
 
 int run(const Options& options, Context& context) {
@@ -25,7 +26,7 @@ int run(const Options& options, Context& context) {
   const auto data = load_scene(
       options.data, {.split = options.split, .size = options.size, .background = field.background}, context);
   const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
-  nerf::Renderer renderer(field);
+  nerf::Renderer renderer(field, {.supersampling = options.supersampling});
   const InterruptGuard guard;
   nerf::Evaluation evaluation;
   {
@@ -66,6 +67,7 @@ int run(const Options& options, Context& context) {
                   {"ssim", number(evaluation.ssim)},
                   {"lpips_alex", number(evaluation.lpips)},
                   {"views", evaluation.views},
+                  {"supersampling", options.supersampling},
                   {"scene", data.name},
                   {"split", data.split},
                   {"seconds_per_view", evaluation.seconds_per_view},
@@ -86,6 +88,7 @@ Command add_eval(CLI::App& app) {
       ->check(CLI::Range(16, 8192).description(""))
       ->type_name("N")
       ->default_str("");
+  add_supersampling(app, o->supersampling);
   add_lpips_weights(app, o->lpips_weights);
   return [o](Context& context) { return run(*o, context); };
 }

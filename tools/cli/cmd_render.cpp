@@ -16,6 +16,7 @@
 #include "cli/precision.h"
 #include "cli/scene_data.h"
 #include "cli/sheet.h"
+#include "cli/supersampling.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -24,7 +25,7 @@ struct Options {
   std::string field, out, data;
   std::string split = "test", cameras = "near", precision = "fp32";
   std::string against, sheet;
-  Index count = 10, size = 0;
+  Index count = 10, size = 0, supersampling = 1;
   std::optional<Index> average, importance, random;
 };
 
@@ -69,7 +70,7 @@ std::vector<NamedCamera> cameras_of(const Options& options, const nerf::Radiance
 // The views of both fields side by side, for the first few cameras.
 void write_sheet(const Options& options, nerf::Renderer& renderer, const std::vector<NamedCamera>& cameras) {
   const auto other = nerf::RadianceField::load(options.against);
-  nerf::Renderer against(other);
+  nerf::Renderer against(other, {.supersampling = options.supersampling});
   std::vector<PicturePair> pairs;
   for (std::size_t i = 0; i < std::min<std::size_t>(cameras.size(), 4); ++i)
     pairs.push_back({against.render(cameras[i].camera).rgb, renderer.render(cameras[i].camera).rgb});
@@ -80,8 +81,9 @@ int run(const Options& options, Context& context) {
   const auto field = nerf::RadianceField::load(options.field);
   const auto cameras = cameras_of(options, field, context);
   std::filesystem::create_directories(options.out);
-  nerf::Renderer renderer(
-      field, {.precision = precision_of(options.precision), .points = points_of(options, field)});
+  nerf::Renderer renderer(field, {.precision = precision_of(options.precision),
+                                  .points = points_of(options, field),
+                                  .supersampling = options.supersampling});
   const InterruptGuard guard;
   Json images = Json::array();
   double seconds = 0;
@@ -129,6 +131,7 @@ Command add_render(CLI::App& app) {
       ->check(CLI::IsMember(nerf::camera_set_names()).description(""))
       ->type_name("SET");
   add_precision(app, o->precision);
+  add_supersampling(app, o->supersampling);
   app.add_option("--count", o->count, "Cameras to draw, 1 to 100000")
       ->check(CLI::Range(1, 100000).description(""))
       ->excludes(data)

@@ -42,4 +42,16 @@ std::vector<CachedView> cache_near_views(const nerf::RadianceField& field, Index
 /// Visible area of the cells of a grid over the cube, summed over views. @return [side^3]
 std::vector<double> visible_area(std::span<const CachedView> views, Index side);
 
+/// How many cells a view shows, of which slivers count little: (sum a)^2 / sum a^2 over the cells' visible
+/// areas a; 0 if it shows nothing.
+double cells_shown(const CachedView& view, Index side);
+/// Of several views: as many as nine of ten show at least; 0 without views.
+double cells_shown(std::span<const CachedView> views, Index side);
+
+/// Cells an axis so that one view shows the whole message: the least of 16, 22, 28 ... 46 at which
+/// cells_shown() is two or more for each bit, or 46 if none is. Fewer are easier to recognise; a bit that a
+/// view does not show cannot be read from it.
+/// @param bits  length of the message, at least 1
+Index cells_for_message(std::span<const CachedView> views, Index bits);
+
 }  // namespace fieldmark::watermark

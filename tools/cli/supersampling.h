@@ -1,0 +1,13 @@
+#pragma once
+#include <fieldmark/engine/shape.h>
+
+namespace CLI {
+class App;
+}
+
+namespace fieldmark::cli {
+
+/// --supersampling N, see RenderOptions::supersampling.
+void add_supersampling(CLI::App& app, Index& rays);
+
+}  // namespace fieldmark::cli
