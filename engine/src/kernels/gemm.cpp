@@ -19,11 +19,30 @@ constexpr int rows_of(int vectors) {
 template <class T>
 constexpr int kPanel = kVectors* kLanes<T>;
 
+// A block with sums this long takes a microsecond or more, and what it needs at its two ends may have left L2
+// since the block before: the numbers of C that it overwrites and those of the mask; of C that it adds to,
+// the next block's, since its own are needed at once. Asked for here, they come while it multiplies (8 x 256
+// on Zen 4: 3% faster, AVX2 5%).
+constexpr std::int64_t kLongSum = 128;
+
+template <class T, int R, int V>
+[[gnu::always_inline]] inline void ask_for_ends(const Gemm<T>& g, const T* c, std::int64_t ldc,
+                                                const T* mask) {
+  constexpr int kToWrite = 1;
+  const T* written = g.accumulate ? c + R * ldc : c;
+  for (int i = 0; i < R; ++i)
+    for (int j = 0; j < V; ++j) {
+      __builtin_prefetch(written + i * ldc + j * kLanes<T>, kToWrite);
+      if (mask) __builtin_prefetch(mask + i * ldc + j * kLanes<T>);
+    }
+}
+
 // One block of C in registers; B's rows are `stride` apart.
 template <class T, int R, int V>
 [[gnu::always_inline]] inline void block(const Gemm<T>& g, const T* a, const T* b, std::int64_t stride, T* c,
                                          std::int64_t ldc, const T* bias, const T* mask) {
   constexpr int L = kLanes<T>;
+  if (g.k >= kLongSum) ask_for_ends<T, R, V>(g, c, ldc, mask);
   Vec<T> acc[R][V];
   for (int i = 0; i < R; ++i)
     for (int j = 0; j < V; ++j)
