@@ -54,9 +54,12 @@ OwnScores own_scores(const PictureMarker& marker, const CropSource& photographs,
     const Tensor<float> picture = photographs.photograph(size, index);
     const auto sent = watermark::random_message(marker.options().bits, messages, index);
     const Tensor<float> marked = marker.mark(picture, sent, strength);
-    scores.accuracy += marker.accuracy(marked, sent) / static_cast<double>(count);
-    scores.psnr += psnr(marked, picture) / static_cast<double>(count);
+    scores.accuracy += marker.accuracy(marked, sent);
+    scores.psnr += psnr(marked, picture);
   }
+  // Divided once: a sum of parts may exceed 1.
+  scores.accuracy /= static_cast<double>(count);
+  scores.psnr /= static_cast<double>(count);
   return scores;
 }
 

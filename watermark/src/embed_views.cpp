@@ -7,17 +7,18 @@
 
 namespace fieldmark::watermark {
 namespace {
-constexpr Index kWindowSize = 160;  // pixels of the small picture that shows where the object is
-constexpr Index kCoarsest = 4;      // the reader's size over the least of a view
+constexpr Index kWindowSize = 160;    // pixels of the small picture that shows where the object is
+constexpr Index kMlpWindowSize = 80;  // of an mlp field, where larger ones would take longer than the views
+constexpr Index kCoarsest = 4;        // the reader's size over the least of a view
 // Lego and chair, 48 bits, 16 an axis: nine of ten views show 2.8 and 2.4 cells a bit, and all bits are read.
 // Fox: 0.4, and 73% of them are (docs/results/mark.md).
 constexpr Index kFewestCells = 16, kMostCells = 46, kMoreCells = 6;
 constexpr double kCellsABit = 2, kPoorViews = 0.1;
 
 std::vector<nerf::Camera> cameras_of(const nerf::CameraSpan& span, const EmbedViewOptions& options,
-                                     std::uint64_t seed) {
+                                     Index size, std::uint64_t seed) {
   const auto draw = [&](nerf::CameraSet set) {
-    return nerf::make_cameras(span, set, options.count, kWindowSize, seed);
+    return nerf::make_cameras(span, set, options.count, size, seed);
   };
   std::vector<nerf::Camera> cameras = draw(nerf::CameraSet::near);
   if (options.distances != EmbedDistances::several) return cameras;
@@ -47,12 +48,14 @@ std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, Inde
   const float background = nerf::background_value(field.background);
   const Index own = std::max(field.cameras.width, field.cameras.height);  // pixels of its pictures
   std::vector<CachedView> views;
-  for (const nerf::Camera& camera : cameras_of(field.cameras, options, seed)) {
+  const Index seen = field.coarse ? kMlpWindowSize : kWindowSize;
+  for (const nerf::Camera& camera : cameras_of(field.cameras, options, seen, seed)) {
     const Window window = object_window(renderer.render(camera).rgb, background);
     Index size = reader_size;
     if (options.distances != EmbedDistances::near)
-      size = std::clamp<Index>(std::lround(window.side * static_cast<double>(own) / kWindowSize),
-                               (reader_size + kCoarsest - 1) / kCoarsest, reader_size);
+      size =
+          std::clamp<Index>(std::lround(window.side * static_cast<double>(own) / static_cast<double>(seen)),
+                            (reader_size + kCoarsest - 1) / kCoarsest, reader_size);
     views.push_back(cache_view(renderer, field, window_camera(camera, window, size), options.samples));
     if (progress && !progress(static_cast<Index>(views.size()), options.count))
       throw Error("stopped while views were cached");
