@@ -116,9 +116,8 @@ void choose_cells(std::span<const watermark::CachedView> views, watermark::Owner
                  << " or more, for " << owner.bits << " bits\n";
   if (shown < static_cast<double>(owner.bits))
     context.note(
-        "many views show fewer cells than the message has bits, and some bits can only be guessed from one "
-        "of "
-        "those: take fewer --bits, or read several views");
+        "many views show fewer cells than the message has bits, and of one such view some bits are guesses: "
+        "take fewer --bits, or read several views");
 }
 
 // From views that the owner has not learnt from.
