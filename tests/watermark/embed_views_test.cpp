@@ -121,11 +121,15 @@ TEST_CASE("embed_views: a view shows as many cells as have area, and slivers cou
 }
 
 TEST_CASE("embed_views: cells are as fine as a message needs, and no finer") {
-  const std::vector views(3, row_of_cells(std::vector<float>(40, 1.f)));
-  CHECK(cells_for_message(views, 20) == 16);
-  const Index finer = cells_for_message(views, 21);
-  CHECK(finer > 16);
-  CHECK((finer == 46 || cells_shown(views, finer) >= 42));
-  CHECK(cells_for_message(views, 100) == 46);
+  CachedView wall;  // 64 x 64 places of one plane: 256 cells of 16 an axis, of 16 places each
+  for (Index k = 0; k < 64 * 64; ++k) {
+    wall.weight.push_back(1);
+    wall.position.insert(wall.position.end(), {(static_cast<float>(k % 64) + 0.5f) / 64,
+                                               (static_cast<float>(k / 64) + 0.5f) / 64, 0.5f});
+  }
+  const std::vector views(3, wall);
+  CHECK(cells_for_message(views, 128) == 16);
+  CHECK(cells_for_message(views, 129) == 22);
+  CHECK(cells_for_message(views, 2000) == 46);
   CHECK(cells_for_message({}, 1) == 46);
 }

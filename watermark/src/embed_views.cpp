@@ -10,8 +10,8 @@ namespace {
 constexpr Index kWindowSize = 160;    // pixels of the small picture that shows where the object is
 constexpr Index kMlpWindowSize = 80;  // of an mlp field, where larger ones would take longer than the views
 constexpr Index kCoarsest = 4;        // the reader's size over the least of a view
-// Lego and chair, 48 bits, 16 an axis: nine of ten views show 2.8 and 2.4 cells a bit, and all bits are read.
-// Fox: 0.4, and 73% of them are (docs/results/mark.md).
+// With 16 an axis views of lego show more than two cells for each of 48 bits, views of fox less than half a
+// one: 96% and 75% of the bits are read blindly (docs/results/mark.md).
 constexpr Index kFewestCells = 16, kMostCells = 46, kMoreCells = 6;
 constexpr double kCellsABit = 2, kPoorViews = 0.1;
 

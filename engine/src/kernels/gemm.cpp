@@ -21,8 +21,7 @@ constexpr int kPanel = kVectors* kLanes<T>;
 
 // A block with sums this long takes a microsecond or more, and what it needs at its two ends may have left L2
 // since the block before: the numbers of C that it overwrites and those of the mask; of C that it adds to,
-// the next block's, since its own are needed at once. Asked for here, they come while it multiplies (8 x 256
-// on Zen 4: 3% faster, AVX2 5%).
+// the next block's, since its own are needed at once. Asked for here, they come while it multiplies.
 constexpr std::int64_t kLongSum = 128;
 
 template <class T, int R, int V>
