@@ -257,6 +257,7 @@ MeasuredCell CellRunner::run(const CellName& name) {
                                                 name.seed + kCamerasSeed),
                   .under = name.bits == 16 ? o.under : std::vector<std::string>{},
                   .under_views = o.under_views,
+                  .seconds = o.budget,
                   .photographs = &data.test,
                   .seed = name.seed,
                   .lpips = o.lpips,
@@ -269,7 +270,7 @@ MeasuredCell CellRunner::run(const CellName& name) {
   const nerf::Camera& camera = data.test.views.front().camera;
   const Tensor<float> pair[] = {nerf::Renderer(*trained.unmarked).render(camera).rgb,
                                 trained.marked.render(camera, trained.marked.message(0))};
-  std::map<std::string, double> more{{"views", static_cast<double>(o.views)},
+  std::map<std::string, double> more{{"views", static_cast<double>(s.views)},
                                      {"under_views", static_cast<double>(o.under_views)},
                                      {"photographs", static_cast<double>(data.test.views.size())},
                                      {"width", static_cast<double>(camera.width)},

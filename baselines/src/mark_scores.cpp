@@ -5,10 +5,13 @@
 #include <fieldmark/nerf/evaluation.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
 namespace fieldmark::baselines {
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 constexpr Index kWindow = 11;      // of ssim()
 constexpr Index kAllMessages = 4;  // bits up to which every message has its turn
@@ -54,7 +57,12 @@ class Scorer {
     std::vector<Mean> under(attacks_.size());
     const auto under_views =
         options_.under_views > 0 ? static_cast<std::size_t>(options_.under_views) : options_.cameras.size();
+    const Clock::time_point start = Clock::now();
     for (std::size_t i = 0; i < options_.cameras.size(); ++i) {
+      if (i >= under_views && options_.seconds > 0 &&
+          std::chrono::duration<double>(Clock::now() - start).count() > options_.seconds)
+        break;
+      scores.views = static_cast<Index>(i) + 1;
       const watermark::Message sent = marked_.message(static_cast<Index>(i));
       const Tensor<float> picture = quantize8(marked_.render(options_.cameras[i], sent));
       const nerf::Rendering plain = plain_.render(options_.cameras[i]);

@@ -105,8 +105,14 @@ TEST_CASE("mark_scores: only the first views under distortion, and stopping") {
                     const watermark::Message&) { return plain.render(camera).rgb; },
       .accuracy = [&](const Tensor<float>&, const watermark::Message&) { return ++read, 1.0; }};
   ScoreOptions options{.cameras = cameras_of(field), .under = {"blur_1", "scale_0.5"}, .under_views = 3};
-  score_mark(field, marked, options);
+  CHECK(score_mark(field, marked, options).views == 4);
   CHECK(read == 4 + 3 * 2);
+  read = 0;
+  options.seconds = 1e-9;  // over after the views that are read under distortion
+  CHECK(score_mark(field, marked, options).views == 3);
+  CHECK(read == 3 + 3 * 2);
+  options.seconds = 1e9;
+  CHECK(score_mark(field, marked, options).views == 4);
   options.progress = [](double part) { return part < 0.5; };
   CHECK_THROWS_WITH(score_mark(field, marked, options), "stopped while a mark was measured");
   CHECK_THROWS_WITH(score_mark(field, marked, {}), "[score_mark] cameras must not be empty");

@@ -25,16 +25,17 @@ std::vector<float> marked(const Owner& owner, const std::vector<std::int8_t>& si
 
 TEST_CASE("owner: marking adds g s P to colours, which stay in their range") {
   const Owner owner = small_owner();
-  const Tensor<float> x = uniform<float>({200, 3}, 0, 1, 1), rgb = uniform<float>({200, 3}, 0, 1, 2);
+  constexpr Index n = 2500;  // samples, of several blocks, the last not a whole one
+  const Tensor<float> x = uniform<float>({n, 3}, 0, 1, 1), rgb = uniform<float>({n, 3}, 0, 1, 2);
   const auto signs = cell_signs(owner.code(), Message{{1, 0, 1}});
   const auto got = marked(owner, signs, x, rgb.data);
-  std::vector<float> s(200);
-  owner.cells.blend(signs, x.data.data(), 200, s.data());
+  std::vector<float> s(n);
+  owner.cells.blend(signs, x.data.data(), n, s.data());
   Tape<float> tape;
   const auto p =
       owner.mark->carrier(Params<float>(owner.params, nullptr), tape.constant(x), tape.constant(rgb));
   double worst = 0, most = 0;
-  for (Index i = 0; i < 600; ++i) {
+  for (Index i = 0; i < 3 * n; ++i) {
     const float want =
         std::clamp(rgb[i] + 0.05f * s[static_cast<std::size_t>(i / 3)] * p.value()[i], 0.f, 1.f);
     worst = std::max(worst, std::abs(static_cast<double>(want - got[static_cast<std::size_t>(i)])));
@@ -111,13 +112,13 @@ TEST_CASE("owner: preset paper marks by its network of position, direction, colo
   CHECK(again.options().preset == Preset::paper);
   again.save(folder / "b");
   CHECK(read_bytes(folder / "a") == read_bytes(folder / "b"));
-  const Tensor<float> x = uniform<float>({50, 3}, 0, 1, 1), rgb = uniform<float>({50, 3}, 0, 1, 2);
+  const Tensor<float> x = uniform<float>({1100, 3}, 0, 1, 1), rgb = uniform<float>({1100, 3}, 0, 1, 2);
   const auto signs = cell_signs(owner.code(), Message{{0, 1, 1}});
   const Tensor<float> message({1, 3}, std::vector<float>(signs.begin(), signs.end()));
   Tape<float> tape;
   const auto want = (*owner.global_mark)(Params<float>(owner.params, nullptr), tape.constant(x),
                                          tape.constant(x), tape.constant(rgb), tape.constant(message));
-  CHECK(marked(again, signs, x, rgb.data) == std::vector<float>(want.value(), want.value() + 150));
+  CHECK(marked(again, signs, x, rgb.data) == std::vector<float>(want.value(), want.value() + 3300));
   CHECK(marked(again, cell_signs(owner.code(), Message{{1, 0, 0}}), x, rgb.data) !=
         marked(again, signs, x, rgb.data));
 }

@@ -234,7 +234,7 @@ void add_measuring_options(CLI::App& app, Options& o) {
       ->type_name("N");
   app.add_option("--views", o.views,
                  "Near views that are read in each cell, 1 to 100000 (as many as seconds of --budget, 20 to "
-                 "200), a fifth of them under distortion")
+                 "200), a fifth of them under distortion; reading ends after --budget seconds and that fifth")
       ->check(CLI::Range(1, 100000).description(""))
       ->type_name("N")
       ->default_str("");

@@ -88,6 +88,21 @@ OwnerOptions parse_options(const Json& j) {
   return o;
 }
 
+// Samples that a network takes at a time, so that what lies between its layers stays in cache.
+constexpr Index kBlock = 1024;
+
+// A Recolour of colour(tape, x, d, n, rgb), called for block after block of the samples.
+template <class F>
+nerf::Renderer::Recolour in_blocks(F colour) {
+  return [colour = std::move(colour)](const float* x, const float* d, Index n, float* rgb) {
+    Tape<float> tape;
+    for (Index begin = 0; begin < n; begin += kBlock) {
+      tape.reset();
+      colour(tape, x + 3 * begin, d + 3 * begin, std::min(kBlock, n - begin), rgb + 3 * begin);
+    }
+  };
+}
+
 }  // namespace
 
 const char* preset_name(Preset preset) { return kPresets[static_cast<std::size_t>(preset)]; }
@@ -179,8 +194,8 @@ nerf::Renderer::Recolour Owner::marking(std::vector<std::int8_t> signs) const {
     throw ValueError("[owner] marking: expected an owner that marks colours, got one without");
   if (global_mark) {
     std::vector<float> message(signs.begin(), signs.end());
-    return [this, message = std::move(message)](const float* x, const float* d, Index n, float* rgb) {
-      Tape<float> tape;
+    return in_blocks([this, message = std::move(message)](Tape<float>& tape, const float* x, const float* d,
+                                                          Index n, float* rgb) {
       const std::vector<float> base = fusion_colours(x, rgb, n);
       const Var<float> colour =
           (*global_mark)(Params<float>(params, nullptr), tape.constant(x, {n, 3}), tape.constant(d, {n, 3}),
@@ -190,10 +205,10 @@ nerf::Renderer::Recolour Owner::marking(std::vector<std::int8_t> signs) const {
       for (Index i = 0; i < 3 * n; ++i)
         rgb[i] = options_.budget ? std::clamp(rgb[i] + static_cast<float>(gain) * (c[i] - rgb[i]), 0.f, 1.f)
                                  : c[i];
-    };
+    });
   }
-  return [this, signs = std::move(signs)](const float* x, const float*, Index n, float* rgb) {
-    Tape<float> tape;
+  return in_blocks([this, signs = std::move(signs)](Tape<float>& tape, const float* x, const float*, Index n,
+                                                    float* rgb) {
     std::vector<float> s(static_cast<std::size_t>(n));
     cells.blend(signs, x, n, s.data());
     const Var<float> carrier =
@@ -202,7 +217,7 @@ nerf::Renderer::Recolour Owner::marking(std::vector<std::int8_t> signs) const {
       rgb[i] = std::clamp(
           rgb[i] + static_cast<float>(gain) * s[static_cast<std::size_t>(i / 3)] * carrier.value()[i], 0.f,
           1.f);
-  };
+  });
 }
 
 // The mark's amplitude is in proportion to its gain while colours are not cut off at 0 and 1.

@@ -30,6 +30,9 @@ struct ScoreOptions {
   std::vector<nerf::Camera> cameras = {};  ///< of the views that are read
   std::vector<std::string> under = {};     ///< names of parse_attack()
   Index under_views = 0;  ///< the first so many views are also read under distortions; 0: all
+  /// After so many seconds, and `under_views` views, no further view is read: large networks take long for
+  /// each. 0: all are read.
+  double seconds = 0;
   const nerf::Dataset* photographs = nullptr;  ///< whose views are compared with; null: none
   std::uint64_t seed = 0;                      ///< of the distortions
   const Lpips<float>* lpips = nullptr;         ///< AlexNet; null: lpips are NaN
@@ -39,6 +42,7 @@ struct ScoreOptions {
 
 /// How well a mark is read and what it does to pictures; a mean without a finite number is NaN.
 struct MarkScores {
+  Index views = 0;                      ///< that were read, see ScoreOptions::seconds
   double accuracy = 0;                  ///< share of bits right in one view, mean over views
   double spread = 0;                    ///< standard deviation over views
   double psnr_base = 0;                 ///< against the unmarked render, dB, mean over views
