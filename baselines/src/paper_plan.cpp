@@ -31,16 +31,20 @@ const std::array kSystems{
     PaperSystem{"nerf_hidden", "NeRF + HiDDeN", "renders of an unmarked field marked by HiDDeN at 30 dB",
                 false},
     PaperSystem{"nerf_mbrs", "NeRF + MBRS", "renders of an unmarked field marked by MBRS at 30 dB", false},
-    PaperSystem{"without_drr", "CopyRNeRF without DRR", "neither distortions nor moved samples in training"},
-    PaperSystem{"without_mff", "CopyRNeRF without MFF", "the message itself in the fusion, not its features"},
-    PaperSystem{"without_cff", "CopyRNeRF without CFF", "the colour itself in the fusion, not its features"},
-    PaperSystem{"drs", "CopyRNeRF, DRS", "preset paper, with samples moved at test as in training"},
+    PaperSystem{"without_drr", "CopyRNeRF without DRR", "neither distortions nor moved samples in training",
+                true, true},
+    PaperSystem{"without_mff", "CopyRNeRF without MFF", "the message itself in the fusion, not its features",
+                true, true},
+    PaperSystem{"without_cff", "CopyRNeRF without CFF", "the colour itself in the fusion, not its features",
+                true, true},
+    PaperSystem{"drs", "CopyRNeRF, DRS", "preset paper, with samples moved at test as in training", true,
+                true},
     PaperSystem{"ours_without_dense", "Fieldmark without dense supervision",
-                "the bits of the whole picture teach, not signs and cells of its places"},
+                "the bits of the whole picture teach, not signs and cells of its places", true, true},
     PaperSystem{"ours_without_cells", "Fieldmark without cells",
-                "preset paper's networks, one message everywhere, under our budget of power"},
+                "preset paper's networks, one message everywhere, under our budget of power", true, true},
     PaperSystem{"ours_without_signs", "Fieldmark without keyed signs",
-                "a cell shows its bit as it is, not with the sign that the key gives it"}};
+                "a cell shows its bit as it is, not with the sign that the key gives it", true, true}};
 
 constexpr std::array<std::string_view, 6> kTables{"bits",     "quality",  "distortion",
                                                   "ablation", "sampling", "weights"};

@@ -12,10 +12,12 @@ namespace fieldmark::bench {
 namespace {
 
 // Pixels.
-constexpr int kLeft = 60, kWidth = 560, kTop = 56, kHeight = 320, kBottom = 52, kLegend = 250, kRow = 20;
-constexpr int kTicks = 5;  // of y, beside the lowest
-constexpr std::array<const char*, 8> kColours{"#1f6fb4", "#d9541e", "#2b8a3e", "#9036a8",
-                                              "#a87b00", "#00838f", "#c2185b", "#555555"};
+constexpr int kLeft = 60, kWidth = 560, kTop = 56, kHeight = 320, kBottom = 52, kRow = 20;
+constexpr int kMark = 46, kLetter = 8;   // of the legend: what is before a name, and room for a letter
+constexpr int kTicks = 5;                // of y, beside the lowest
+constexpr std::size_t kMostPlaces = 16;  // of x that have a line each; more of them share round numbers
+constexpr std::array<const char*, 10> kColours{"#1f6fb4", "#d9541e", "#2b8a3e", "#9036a8", "#a87b00",
+                                               "#00838f", "#c2185b", "#555555", "#7cb342", "#5c4033"};
 
 struct Axes {
   double x0, x1, y0, y1;
@@ -27,6 +29,22 @@ struct Axes {
     return kTop + kHeight - static_cast<int>(std::lround(part * kHeight));
   }
 };
+
+// Where x has its lines: at the places of the points, or at some five to ten multiples of 1, 2 or 5 times a
+// power of ten.
+std::set<double> ticks_of(const std::set<double>& places) {
+  if (places.size() <= kMostPlaces) return places;
+  const double low = *places.begin(), high = *places.rbegin();
+  double step = std::pow(10.0, std::floor(std::log10((high - low) / 5)));
+  for (const double factor : {5.0, 2.0})
+    if ((high - low) / (factor * step) >= 5) {
+      step *= factor;
+      break;
+    }
+  std::set<double> ticks;
+  for (double i = std::ceil(low / step); i * step <= high; ++i) ticks.insert(i * step);
+  return ticks;
+}
 
 std::string frame(const Axes& axes, const std::set<double>& places) {
   std::string svg;
@@ -85,9 +103,11 @@ std::string line_chart(const ScatterText& text, const std::vector<LineSeries>& l
   const double margin = std::max(0.04 * (*places.rbegin() - *places.begin()), 1e-3);
   const Axes axes{*places.begin() - margin, *places.rbegin() + margin, y_low, y_high};
   const int rows = static_cast<int>(kept.size());
-  std::string svg = svg_begin(kLeft + kWidth + kLegend,
+  std::size_t letters = 0;
+  for (const LineSeries& line : kept) letters = std::max(letters, line.name.size());
+  std::string svg = svg_begin(kLeft + kWidth + kMark + kLetter * static_cast<int>(letters),
                               std::max(kTop + kHeight + kBottom, kTop + (rows + 1) * kRow), text.title) +
-                    frame(axes, places) +
+                    frame(axes, ticks_of(places)) +
                     svg_text(kLeft + kWidth / 2, kTop + kHeight + 40, " text-anchor=\"middle\"", text.x) +
                     svg_text(kLeft, kTop - 10, "", text.y);
   for (int i = 0; i < rows; ++i)

@@ -34,6 +34,19 @@ TEST_CASE("line_chart: dashes, texts that cannot break out, and points that cann
   CHECK(at[1].y - at[0].y == 64);  // 30 is drawn at 50: 60 is a fifth of the height above
 }
 
+TEST_CASE("line_chart: few places have their numbers, many share round ones, and names have room") {
+  LineSeries line{"a", {}};
+  for (int i = 0; i < 16; ++i) line.points.push_back({1.25 + i, 60});
+  CHECK_THAT(line_chart({}, {line}, 50, 100), Contains(">1.25</text>") && Contains(">16.25</text>"));
+  line.points.push_back({47, 60});
+  const auto many = line_chart({}, {line}, 50, 100);
+  for (const char* number : {">5</text>", ">20</text>", ">45</text>"}) CHECK_THAT(many, Contains(number));
+  CHECK_THAT(many, !Contains(">1.25</text>") && !Contains(">0</text>"));
+  const auto width = [](const std::string& svg) { return std::stoi(svg.substr(svg.find("width=\"") + 7)); };
+  line.name = "forty letters, as many as there are here";
+  CHECK(width(line_chart({}, {line}, 50, 100)) == width(many) + 39 * 8);
+}
+
 TEST_CASE("line_chart: errors") {
   CHECK_THROWS_WITH(line_chart({}, {{"a", {{1, std::nan("")}}}}, 0, 1),
                     "[line_chart] lines must have a point that is finite");

@@ -20,13 +20,35 @@ TEST_CASE("Lines of lengths, of the severities that were measured, and of the co
   keep_curve(cells.back(), "seconds,steps,figure\n1.5,10,0.5\n3.0,20,0.75\n");
   const auto figures = cli::paper_figures(cells);
   REQUIRE(figures.size() == 4);  // nothing was rotated, scaled or blurred
-  // Three of ours, and what the paper has of five lengths for the systems that can be run.
-  CHECK(count(figures.at("paper_bits.svg"), "class=\"point\"") % 5 == 3);
-  CHECK_THAT(figures.at("paper_bits.svg"), Contains("copyrnerf_paper, published"));
+  // Two lengths of one system, and what the paper has of five lengths for the systems that can be run.
+  CHECK(count(figures.at("paper_bits.svg"), "class=\"point\"") % 5 == 2);
+  CHECK_THAT(figures.at("paper_bits.svg"), Contains("CopyRNeRF, preset paper, published"));
+  CHECK_THAT(figures.at("paper_bits.svg"), !Contains("Fieldmark"));
   CHECK(count(figures.at("paper_noise.svg"), "class=\"point\"") == 2 * 3);  // none and two severities
   CHECK(count(figures.at("paper_learning.svg"), "class=\"point\"") == 2);
-  CHECK(count(figures.at("paper_learning_steps.svg"), "class=\"point\"") == 2);
+  CHECK(count(figures.at("paper_learning_ablation.svg"), "class=\"point\"") == 2);
   CHECK(cli::paper_figures({}).size() == 1);  // published lengths alone
+}
+
+TEST_CASE("Figures are of the scene with most cells, and ablations are in their own", "[paper_figures]") {
+  auto cells = paper_cells();
+  keep_curve(cells.back(), "seconds,steps,figure\n1.5,10,0.5\n3.0,20,0.75\n");
+  const auto add = [&](const char* system, const char* scene, const char* field) {
+    cells.push_back(cells[2]);
+    cells.back().name.system = system;
+    cells.back().name.scene = scene;
+    cells.back().name.field = field;
+  };
+  const auto before = cli::paper_figures(cells);
+  add("nerf_message", "chair", "hash");
+  add("copyrnerf_code", "lego", "mlp");
+  CHECK(cli::paper_figures(cells) == before);
+  add("without_drr", "lego", "hash");
+  const auto after = cli::paper_figures(cells);
+  CHECK(after.at("paper_noise.svg") == before.at("paper_noise.svg"));
+  CHECK(after.at("paper_learning.svg") == before.at("paper_learning.svg"));
+  CHECK_THAT(after.at("paper_learning_ablation.svg"), Contains("CopyRNeRF without DRR"));
+  CHECK_THAT(before.at("paper_noise.svg"), Contains("lego") && Contains("Fieldmark, preset fast"));
 }
 
 TEST_CASE("The sheet has a row for each picture of a cell of 16 bits", "[paper_figures]") {

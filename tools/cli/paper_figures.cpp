@@ -31,7 +31,18 @@ constexpr std::array<Kind, 4> kKinds{{{"noise", "standard deviation, pictures in
                                       {"scale", "size of the picture, as a part", 1},
                                       {"blur", "sigma, pixels", 0}}};
 
-std::string scene_of(const Cell& c) { return c.name.scene + ", " + c.name.field; }
+// Those that figures show, so that their lines can be told apart: of the scene with most cells, on the hash
+// field. The page's tables have the others.
+std::vector<Cell> drawn_cells(const std::vector<Cell>& cells) {
+  std::map<std::string, int> count;
+  for (const Cell& c : cells) ++count[c.name.scene];
+  const auto most = std::max_element(count.begin(), count.end(),
+                                     [](const auto& a, const auto& b) { return a.second < b.second; });
+  std::vector<Cell> drawn;
+  for (const Cell& c : cells)
+    if (c.name.scene == most->first && c.name.field == "hash") drawn.push_back(c);
+  return drawn;
+}
 
 // The line of a name, made where there is none.
 LineSeries& line_of(std::vector<LineSeries>& lines, const std::string& name, bool dashed = false) {
@@ -41,17 +52,19 @@ LineSeries& line_of(std::vector<LineSeries>& lines, const std::string& name, boo
   return lines.back();
 }
 
+// Of systems of which two lengths or more are there.
 std::vector<LineSeries> lines_of_lengths(const std::vector<Cell>& cells) {
   std::vector<LineSeries> lines;
   for (const auto& system : baselines::paper_systems())
     for (const Cell& c : cells)
       if (c.name.system == system.name)
-        line_of(lines, system.name + " (" + scene_of(c) + ")")
+        line_of(lines, system.title)
             .points.push_back({static_cast<double>(c.name.bits), 100 * c.bit_accuracy});
+  std::erase_if(lines, [](const LineSeries& line) { return line.points.size() < 2; });
   for (const auto& system : baselines::paper_systems())
     for (const int bits : {4, 8, 16, 32, 48})
       if (const auto value = baselines::published("bits", system.name, std::to_string(bits)))
-        line_of(lines, system.name + ", published", true)
+        line_of(lines, system.title + ", published", true)
             .points.push_back({static_cast<double>(bits), *value});
   return lines;
 }
@@ -61,27 +74,31 @@ std::vector<LineSeries> lines_of_severity(const std::vector<Cell>& cells, const 
   const std::string prefix = std::string(kind.name) + "_";
   for (const auto& system : baselines::paper_systems())
     for (const Cell& c : cells) {
-      if (c.name.system != system.name || c.name.bits != kBits) continue;
+      if (c.name.system != system.name || c.name.bits != kBits || system.ablation) continue;
       LineSeries points;
       for (const auto& [name, value] : c.under)
         if (name.starts_with(prefix) && name.find(',') == std::string::npos)
           points.points.push_back({std::strtod(name.c_str() + prefix.size(), nullptr), 100 * value});
       if (points.points.empty()) continue;
-      LineSeries& line = line_of(lines, system.name + " (" + scene_of(c) + ")");
+      LineSeries& line = line_of(lines, system.title);
       line.points.push_back({kind.none, 100 * c.bit_accuracy});
       line.points.insert(line.points.end(), points.points.begin(), points.points.end());
     }
   return lines;
 }
 
-std::vector<LineSeries> learning_curves(const std::vector<Cell>& cells,
-                                        double baselines::CurvePoint::*against) {
+// Of the systems themselves, or of the full models and what is left without a part.
+std::vector<LineSeries> learning_curves(const std::vector<Cell>& cells, bool ablation) {
   std::vector<LineSeries> lines;
-  for (const Cell& c : cells) {
-    if (c.name.bits != kBits) continue;
-    LineSeries line{c.name.system + " (" + scene_of(c) + ")", {}, false};
-    for (const auto& p : kept_curve(c)) line.points.push_back({p.*against, 100 * p.figure});
-    lines.push_back(line);
+  for (const auto& system : baselines::paper_systems()) {
+    const bool whole = system.name == "ours" || system.name == "copyrnerf_paper";
+    if (ablation ? !(system.ablation || whole) : system.ablation) continue;
+    for (const Cell& c : cells) {
+      if (c.name.system != system.name || c.name.bits != kBits) continue;
+      LineSeries line{system.title, {}, false};
+      for (const auto& p : kept_curve(c)) line.points.push_back({p.seconds, 100 * p.figure});
+      lines.push_back(line);
+    }
   }
   return lines;
 }
@@ -95,29 +112,39 @@ bool is_drawn(const std::vector<LineSeries>& lines) {
 
 }  // namespace
 
-std::map<std::string, std::string> paper_figures(const std::vector<Cell>& cells) {
+std::map<std::string, std::string> paper_figures(const std::vector<Cell>& measured) {
+  const std::vector<Cell> cells = drawn_cells(measured);
+  std::string scene;
+  if (!cells.empty()) scene.append(", ").append(cells.front().name.scene);
   std::map<std::string, std::string> figures;
   const auto add = [&](const std::string& file, const bench::ScatterText& text,
                        const std::vector<LineSeries>& lines) {
     if (is_drawn(lines)) figures[file] = bench::line_chart(text, lines, kChance, kAll);
   };
-  add("paper_bits.svg", {"Bit accuracy of one view against the message's length", "bits", "bits right, %"},
+  add("paper_bits.svg",
+      {"Bit accuracy of one view against the message's length" + scene, "bits", "bits right, %"},
       lines_of_lengths(cells));
   for (const Kind& kind : kKinds)
     add(std::string("paper_") + kind.name + ".svg",
-        {std::string("Bit accuracy of one view, 16 bits, under ") + kind.name, kind.axis, "bits right, %"},
+        {std::string("Bit accuracy of one view, 16 bits, under ") + kind.name + scene, kind.axis,
+         "bits right, %"},
         lines_of_severity(cells, kind));
-  add("paper_learning.svg", {"Bits right in training, 16 bits", "seconds of training", "bits right, %"},
-      learning_curves(cells, &baselines::CurvePoint::seconds));
-  add("paper_learning_steps.svg", {"Bits right in training, 16 bits", "steps", "bits right, %"},
-      learning_curves(cells, &baselines::CurvePoint::steps));
+  for (const bool ablation : {false, true})
+    add(ablation ? "paper_learning_ablation.svg" : "paper_learning.svg",
+        {"Bits right in training, 16 bits" + scene, "seconds of training", "bits right, %"},
+        learning_curves(cells, ablation));
   return figures;
 }
 
 const std::vector<PaperSheet>& paper_sheets() {
-  static const std::vector<PaperSheet> sheets{
-      {.name = "paper_pictures.png", .systems = {}},
-      {.name = "paper_residual.png", .systems = {"nerf_hidden", "nerf_mbrs"}, .gain = 30}};
+  static const std::vector<PaperSheet> sheets = [] {
+    std::vector<std::string> systems, ablations;
+    for (const auto& s : baselines::paper_systems()) (s.ablation ? ablations : systems).push_back(s.name);
+    return std::vector<PaperSheet>{
+        {.name = "paper_pictures.png", .systems = systems},
+        {.name = "paper_ablation.png", .systems = ablations},
+        {.name = "paper_residual.png", .systems = {"nerf_hidden", "nerf_mbrs"}, .gain = 30}};
+  }();
   return sheets;
 }
 
@@ -128,9 +155,8 @@ std::vector<std::string> write_paper_sheet(const PaperSheet& sheet, const std::v
   std::vector<std::string> stems;
   for (const Cell& c : cells) {
     const std::string picture = cell_path(folder, c.name).string() + ".png";
-    const auto& shown = sheet.systems;
     if (c.name.bits != kBits || !std::filesystem::exists(picture) ||
-        (!shown.empty() && std::find(shown.begin(), shown.end(), c.name.system) == shown.end()))
+        std::find(sheet.systems.begin(), sheet.systems.end(), c.name.system) == sheet.systems.end())
       continue;
     const Tensor<float> both = read_image(picture);
     const Index h = both.shape[0], w = both.shape[1] / 2, channels = both.shape[2];

@@ -11,6 +11,7 @@ struct PaperSystem {
   std::string title;          ///< as the paper or we call it
   std::string what;           ///< a sentence on what is trained
   bool through_owner = true;  ///< an Owner is trained, see owner_system(); else a 2-D network
+  bool ablation = false;      ///< another system but for a part
 };
 /// Every system that can be run, in the order of the tables.
 std::span<const PaperSystem> paper_systems();
