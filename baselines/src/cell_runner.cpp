@@ -10,6 +10,7 @@
 #include <fieldmark/nerf/trainer.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <system_error>
@@ -18,9 +19,10 @@ namespace fieldmark::baselines {
 namespace {
 
 constexpr Index kBlenderSize = 160, kPhotographSize = 252, kMlpSize = 100;  // METHOD: as in the released code
-constexpr double kHashSeconds = 60;  // more does not show at these sizes
-constexpr double kViewsASecond = 1;  // to learn from, for each second of the budget
-constexpr Index kFewestViews = 8, kMostViews = 200, kMostMlpViews = 60;  // one takes seconds of an mlp field
+constexpr double kHashSeconds = 60;       // more does not show at these sizes
+constexpr double kViewsASecond = 1;       // to learn from, for each second of the budget
+constexpr double kMlpViewsASecond = 0.2;  // of an mlp field, where making one takes seconds
+constexpr Index kFewestViews = 8, kMostViews = 200;
 constexpr double kNetworkPart = 0.8;    // of the budget, for a 2-D network; the rest for fields
 constexpr Index kNetworkChannels = 32;  // a quarter of the work of a step with the authors' 64
 constexpr Index kOwnPictures = 200, kOwnSize = 64, kFixedMessage = 5;
@@ -199,8 +201,9 @@ CellRunner::Trained CellRunner::train(const CellName& name, const Scene& scene) 
   const auto field = std::make_shared<const nerf::RadianceField>(base_field(name, scene));
   if (hiding_system(name.system)) return train_hiding(name, scene, field);
   const auto checkpoint = options_.work / (trained_as(name).stem() + ".checkpoint");
-  const auto views = std::clamp(static_cast<Index>(kViewsASecond * options_.budget), kFewestViews,
-                                is_mlp(name) ? kMostMlpViews : kMostViews);
+  const double views_a_second = is_mlp(name) ? kMlpViewsASecond : kViewsASecond;
+  const auto views =
+      std::clamp(static_cast<Index>(std::lround(views_a_second * options_.budget)), kFewestViews, kMostViews);
   TrainedOwner owned = train_owner(
       *field, name, owner_system(name, scene.size),
       {.seconds = options_.budget, .checkpoint = checkpoint, .views = views, .progress = options_.progress});
