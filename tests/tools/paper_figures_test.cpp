@@ -43,6 +43,9 @@ TEST_CASE("Figures are of the scene with most cells, and ablations are in their 
   add("nerf_message", "chair", "hash");
   add("copyrnerf_code", "lego", "mlp");
   CHECK(cli::paper_figures(cells) == before);
+  add("ours", "lego", "hash");  // another seed is no other length
+  CHECK(cli::paper_figures(cells).at("paper_bits.svg") == before.at("paper_bits.svg"));
+  cells.pop_back();
   add("without_drr", "lego", "hash");
   const auto after = cli::paper_figures(cells);
   CHECK(after.at("paper_noise.svg") == before.at("paper_noise.svg"));

@@ -60,7 +60,9 @@ std::vector<LineSeries> lines_of_lengths(const std::vector<Cell>& cells) {
       if (c.name.system == system.name)
         line_of(lines, system.title)
             .points.push_back({static_cast<double>(c.name.bits), 100 * c.bit_accuracy});
-  std::erase_if(lines, [](const LineSeries& line) { return line.points.size() < 2; });
+  std::erase_if(lines, [](const LineSeries& line) {
+    return std::ranges::all_of(line.points, [&](const auto& p) { return p.x == line.points.front().x; });
+  });
   for (const auto& system : baselines::paper_systems())
     for (const int bits : {4, 8, 16, 32, 48})
       if (const auto value = baselines::published("bits", system.name, std::to_string(bits)))
