@@ -32,6 +32,12 @@ std::vector<TrainingVariant> training_variants(const nerf::ScheduleOptions& sche
   vary("hard pixels", "every ray", [](TrainingVariant& v) { v.train.hard_pixels = 1; });
   vary("distortion loss", "weight 1e-3", [](TrainingVariant& v) { v.train.distortion = 1e-3; });
   vary("distortion loss", "weight 1e-2", [](TrainingVariant& v) { v.train.distortion = 1e-2; });
+  vary("pixels", "means of 2 x 2 rays after 1000 steps, rendered so", [](TrainingVariant& v) {
+    v.field.supersampling = 2;
+    v.train.supersample_after = 1000;
+  });
+  vary("table decay", "off", [](TrainingVariant& v) { v.train.table_decay = 0; });
+  vary("table decay", "from the first step on", [](TrainingVariant& v) { v.train.decay_after = 0; });
   vary("loss", "plain square",
        [](TrainingVariant& v) { v.train.huber = std::numeric_limits<double>::infinity(); });
   vary("early stop", "rays end at a transmittance of 1e-4", [](TrainingVariant& v) { v.train.stop = 1e-4f; });

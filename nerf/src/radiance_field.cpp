@@ -152,6 +152,10 @@ RadianceField::RadianceField(const RadianceFieldOptions& options)
     : field(params, options.field, options.seed), grid(options.occupancy), options_(options) {
   if (options.field.kind == FieldKind::mlp)
     coarse.emplace(params, options.field, options.seed + 100, "coarse/");
+  if (options.supersampling < 1 || options.supersampling > kMostSupersampling ||
+      kMostSupersampling % options.supersampling != 0)
+    throw ValueError("[radiance_field] supersampling must be 1, 2, 4 or 8, got " +
+                     std::to_string(options.supersampling));
   if (!(options.step > 0 && options.step <= 1))
     throw ValueError("[radiance_field] step must be above 0 and at most 1, got " +
                      std::to_string(options.step));
@@ -163,6 +167,7 @@ std::string RadianceField::configuration() const {
                {"step", options_.step},
                {"background", background == Background::white ? "white" : "black"},
                {"cameras", Json::parse(format_camera_span(cameras))}});
+  if (options_.supersampling > 1) json["supersampling"] = options_.supersampling;
   add_space(json, space);
   return json.dump();
 }
@@ -174,6 +179,7 @@ RadianceField RadianceField::from_configuration(std::string_view text, std::stri
     parse_field(j, o);
     o.occupancy = j.at("occupancy");
     o.step = j.at("step");
+    o.supersampling = j.value("supersampling", Index{1});
     RadianceField field(o);
     field.space = parse_space(j);
     field.background = j.at("background") == "white" ? Background::white : Background::black;

@@ -9,7 +9,6 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kMostSupersampling = 8;
 constexpr Index kMlpRays = 64;  // of an mlp field at a time: what is kept of a sample is large
 
 // Every other bit of n, the lowest first: a coordinate of the n-th point of a Z-shaped curve.
@@ -43,9 +42,10 @@ Renderer::Renderer(const RadianceField& field, const RenderOptions& options)
   if (options.order.width < 1 || options.order.height < 1)
     throw ValueError("[renderer] order: a tile must have at least one pixel, got " +
                      std::to_string(options.order.width) + " x " + std::to_string(options.order.height));
-  if (options.supersampling < 1 || options.supersampling > kMostSupersampling)
-    throw ValueError("[renderer] supersampling must be 1 to 8 rays along a pixel's side, got " +
+  if (options.supersampling < 0 || options.supersampling > kMostSupersampling)
+    throw ValueError("[renderer] supersampling must be 1 to 8 rays along a pixel's side, or 0, got " +
                      std::to_string(options.supersampling));
+  if (options.supersampling == 0) options_.supersampling = field.options().supersampling;
   refresh();
   for (Index i = 0; i < kLanes; ++i) lanes_.push_back(std::make_unique<Lane>());
 }

@@ -1,5 +1,6 @@
 #include <fieldmark/engine/checkpoint.h>
 #include <fieldmark/engine/ops/arithmetic.h>
+#include <fieldmark/engine/ops/pool.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/nerf/composite.h>
 #include <fieldmark/nerf/distortion_loss.h>
@@ -84,6 +85,7 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
       background_rng_(options.seed, 2),
       occupancy_rng_(options.seed, 3),
       second_rng_(options.seed, 4),
+      place_rng_(options.seed, 5),
       packed_(field.params, {.precision = options.precision}),
       loop_(field.coarse ? kMlpShards : kShards,
             field.coarse ? field.params.size() : field.field.network_size()),
@@ -105,6 +107,15 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
     throw ValueError("[trainer] stop must be in [0, 1), got " + std::to_string(options.stop));
   if (!(options.distortion >= 0 && std::isfinite(options.distortion)))
     throw ValueError("[trainer] distortion must be at least 0, got " + std::to_string(options.distortion));
+  if (!(options.table_decay >= 0 && std::isfinite(options.table_decay)))
+    throw ValueError("[trainer] table_decay must be at least 0, got " + std::to_string(options.table_decay));
+  if (options.decay_after < 0)
+    throw ValueError("[trainer] decay_after must be at least 0, got " + std::to_string(options.decay_after));
+  if (options.supersample_after < 0)
+    throw ValueError("[trainer] supersample_after must be at least 0, got " +
+                     std::to_string(options.supersample_after));
+  if (field.coarse && field.options().supersampling > 1)
+    throw ValueError("[trainer] field must be a hash field to have supersampling, got an mlp field");
   if (!(options.hard_pixels >= 0 && options.hard_pixels <= 1))
     throw ValueError("[trainer] hard_pixels must be in [0, 1], got " + std::to_string(options.hard_pixels));
   if (data.views.empty()) throw ValueError("[trainer] data must have at least one view");
@@ -177,7 +188,9 @@ double Trainer::run_chunk(Index index, Shard& shard, Tape<float>& tape, float* g
   const Var<float> rgb =
       field_.field.colour(params, z, colour_features, tape.constant(harmonics, {n, encoded}));
   const Var<float> sigma = field_.field.density(z);
-  const Var<float> rays = composite(sigma, rgb, tape.constant(delta, {n}), s.ray_begin);
+  Var<float> rays = composite(sigma, rgb, tape.constant(delta, {n}), s.ray_begin);
+  if (const Index k = rays_along_pixel(); k > 1)
+    rays = tape.reshape(avg_pool(tape.reshape(rays, {kRays / (k * k), k, k, 4}), k), {kRays / (k * k), 4});
   const double share = static_cast<double>(kRays) / static_cast<double>(rays_per_step_);
   const Var<float> loss = photometric_loss<float>(rays, shard.photograph, shard.background,
                                                   {.huber = options_.huber, .scale = share});
@@ -233,7 +246,8 @@ void Trainer::backward_table() {
                       {.begin = table + encoding.first_row(level) * entry,
                        .end = table + encoding.first_row(level + 1) * entry,
                        .lr_factor = schedule_.lr(steps_),
-                       .skip_zero = true});
+                       .skip_zero = true,
+                       .weight_decay = steps_ < options_.decay_after ? 0 : options_.table_decay});
   });
 }
 
@@ -317,9 +331,11 @@ std::string Trainer::fingerprint() const {
          " after " + std::to_string(options_.grow_after) + " rays " + std::to_string(options_.least_rays) +
          " distortion " + std::to_string(options_.distortion) + " hard pixels " +
          std::to_string(options_.hard_pixels) + " huber " + std::to_string(options_.huber) + " stop " +
-         std::to_string(options_.stop) + " warm-up " + std::to_string(options_.warm_up) + " lr " +
-         std::to_string(schedule.lr) + " half after " + std::to_string(schedule.half_after) + " cooldown " +
-         std::to_string(schedule.cooldown) + " last " + std::to_string(schedule.last) +
+         std::to_string(options_.stop) + " table decay " + std::to_string(options_.table_decay) + " after " +
+         std::to_string(options_.decay_after) + " supersampled after " +
+         std::to_string(options_.supersample_after) + " warm-up " + std::to_string(options_.warm_up) +
+         " lr " + std::to_string(schedule.lr) + " half after " + std::to_string(schedule.half_after) +
+         " cooldown " + std::to_string(schedule.cooldown) + " last " + std::to_string(schedule.last) +
          (options_.precision == Precision::bf16 ? " bf16" : "") + (options_.carve ? "" : " not carved") +
          (options_.keep ? " kept" : "");
 }

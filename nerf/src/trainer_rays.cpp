@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 
 #include "photometric_residual.h"
 #include "trainer_shard.h"
@@ -8,7 +9,8 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kTile = 8;  // pixels along a side, see hard_pixels
+constexpr Index kTile = 8;                                             // pixels along a side, see hard_pixels
+constexpr Index kMostParts = kMostSupersampling * kMostSupersampling;  // of a pixel
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
@@ -58,11 +60,41 @@ void Trainer::note_errors(Var<float> rays, Shard& c) const {
   }
 }
 
-void Trainer::choose_rays(Index first, Index count, Shard& c) const {
+Index Trainer::rays_along_pixel() const {
+  return steps_ < options_.supersample_after ? 1 : field_.options().supersampling;
+}
+
+// One ray through the centre of each pixel, or one anywhere in each of its parts, row by row.
+void Trainer::aim(Index first, Shard& c) const {
   const auto step = static_cast<std::uint64_t>(steps_);
-  c.rays.resize(count);
-  for (auto [buffer, columns] : {std::pair{&c.jitter, 1}, {&c.photograph, 4}, {&c.background, 3}})
-    buffer->resize(at(count * columns));
+  const Index k = rays_along_pixel();
+  const Index width = data_.views[0].camera.width, size = width * data_.views[0].camera.height;
+  std::array<float, 2 * kMostParts> xy{};
+  for (Index i = 0; i < std::ssize(c.places); ++i) {
+    const Index pixel = c.places[at(i)] % size;
+    for (Index part = 0; part < k * k; ++part) {
+      std::array<float, 4> u{0.5f, 0.5f};
+      if (k > 1) u = place_rng_.uniform4(step, static_cast<std::uint64_t>((first + i) * k * k + part));
+      const auto within = [&](Index p, float v) {
+        return (static_cast<float>(p) + v) / static_cast<float>(k) - 0.5f;
+      };
+      xy[at(2 * part)] = static_cast<float>(pixel % width) + within(part % k, u[0]);
+      xy[at(2 * part + 1)] = static_cast<float>(pixel / width) + within(part / k, u[1]);
+      if (k > 1) c.jitter[at(i * k * k + part)] = u[2];
+    }
+    c.rays.set(field_.space, i * k * k, data_.views[at(c.places[at(i)] / size)].camera,
+               std::span(xy).first(at(2 * k * k)));
+  }
+}
+
+void Trainer::choose_rays(Index first, Index rays, Shard& c) const {
+  const auto step = static_cast<std::uint64_t>(steps_);
+  const Index along = rays_along_pixel(), count = rays / (along * along);
+  first /= along * along;
+  c.rays.resize(rays);
+  for (auto [buffer, numbers] :
+       {std::pair{&c.jitter, rays}, {&c.photograph, 4 * count}, {&c.background, 3 * count}})
+    buffer->resize(at(numbers));
   c.places.resize(at(count));
   std::vector<Index>& place = c.places;
   const Index width = data_.views[0].camera.width, size = width * data_.views[0].camera.height;
@@ -81,13 +113,11 @@ void Trainer::choose_rays(Index first, Index count, Shard& c) const {
   for (const Index p : place) __builtin_prefetch(data_.views[at(p / size)].rgba.data.data() + 4 * (p % size));
   for (Index i = 0; i < count; ++i) {
     const View& view = data_.views[at(place[at(i)] / size)];
-    const Index pixel = place[at(i)] % size, column = pixel % width, row = pixel / width;
-    const float xy[2] = {static_cast<float>(column), static_cast<float>(row)};
-    c.rays.set(field_.space, i, view.camera, xy);
-    std::copy_n(view.rgba.data.data() + 4 * pixel, 4, &c.photograph[at(4 * i)]);
+    std::copy_n(view.rgba.data.data() + 4 * (place[at(i)] % size), 4, &c.photograph[at(4 * i)]);
     const auto b = background_rng_.uniform4(step, static_cast<std::uint64_t>(first + i));
     std::copy_n(b.data(), 3, &c.background[at(3 * i)]);
   }
+  aim(first, c);
 }
 
 }  // namespace fieldmark::nerf

@@ -26,12 +26,14 @@ TEST_CASE("training_bench: every variant but the first differs from the default 
         (v.train.schedule.lr != d.train.schedule.lr || v.train.schedule.last != d.train.schedule.last ||
          v.train.schedule.half_after != d.train.schedule.half_after) +
         (v.train.hard_pixels != d.train.hard_pixels) + (v.train.distortion != d.train.distortion) +
+        (v.field.supersampling != d.field.supersampling) +
+        (v.train.table_decay != d.train.table_decay || v.train.decay_after != d.train.decay_after) +
         (v.train.huber != d.train.huber) + (v.train.stop != d.train.stop) + (v.train.carve != d.train.carve) +
         (v.field.field.width != d.field.field.width ||
          v.field.field.encoding.log2_table != d.field.field.encoding.log2_table);
     CHECK(differs == (&v == all.data() ? 0 : 1));
   }
-  CHECK(choices.size() == 9);
+  CHECK(choices.size() == 11);
 }
 
 TEST_CASE("training_bench: a longer training is better, and what was done is told") {

@@ -50,6 +50,15 @@ TEST_CASE("radiance_field: a file reads back to the same field, and writes to th
   CHECK(folder.entries() == 2);
 }
 
+TEST_CASE("radiance_field: how many rays a pixel has is in the file where it is not one") {
+  RadianceFieldOptions options = small_field_options();
+  CHECK(RadianceField(options).configuration().find("supersampling") == std::string::npos);
+  options.supersampling = 4;
+  RadianceField f(options);
+  f.cameras = small_field().cameras;
+  CHECK(RadianceField::from_configuration(f.configuration(), "test").options().supersampling == 4);
+}
+
 TEST_CASE("radiance_field: density and colour are separate tensors, one bit a cell") {
   const TemporaryFolder folder;
   const RadianceField f = field_with_holes();
@@ -199,4 +208,10 @@ TEST_CASE("radiance_field: errors name option and value") {
   options.step = 0;
   CHECK_THROWS_WITH(RadianceField(options),
                     Contains("[radiance_field] step must be above 0 and at most 1, got 0"));
+  options = small_field_options();
+  for (const Index wrong : {0, 3, 16}) {
+    options.supersampling = wrong;
+    CHECK_THROWS_WITH(RadianceField(options),
+                      "[radiance_field] supersampling must be 1, 2, 4 or 8, got " + std::to_string(wrong));
+  }
 }

@@ -109,8 +109,8 @@ TEST_CASE("renderer: a pixel of several rays is the mean of what they see, in do
                                          (mean[static_cast<std::size_t>(k)] + (1 - mean[3]))));
     }
   CHECK(worst < 1e-4);
-  CHECK_THROWS_WITH(Renderer(f, {.supersampling = 0}),
-                    "[renderer] supersampling must be 1 to 8 rays along a pixel's side, got 0");
+  CHECK_THROWS_WITH(Renderer(f, {.supersampling = -1}),
+                    "[renderer] supersampling must be 1 to 8 rays along a pixel's side, or 0, got -1");
   CHECK_THROWS_AS(Renderer(f, {.supersampling = 9}), ValueError);
 }
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "nerf/small_field.h"
 #include "support/catch.h"
@@ -288,29 +289,24 @@ TEST_CASE("trainer: hashed levels take turns while steps are small, and the last
   for (int level = 0; level < encoding.levels(); ++level) CHECK_FALSE(waits(level));
 }
 
-TEST_CASE("trainer: hard pixels are sought where the error is, and change nothing when switched off") {
-  // A scene that is learnt within the run, but for a patch of noise that differs between photographs.
-  Dataset data = make_scene({.kind = SceneKind::sphere, .size = 48, .views = 8});
-  const CounterRng rng(1);
-  for (std::size_t v = 0; v < data.views.size(); ++v)
-    for (Index p = 0; p < 48 * 48; ++p)
-      if (p % 48 >= 20 && p % 48 < 28 && p / 48 >= 20 && p / 48 < 28)
-        for (Index k = 0; k < 3; ++k)
-          data.views[v].rgba[4 * p + k] =
-              rng.uniform4(v, static_cast<std::uint64_t>(p))[static_cast<std::size_t>(k)];
-  const auto psnr = [&](double share) {
+TEST_CASE("trainer: decay keeps the table small, after its steps and nothing before") {
+  const auto table_of = [](double decay, Index after) {
     RadianceField field(trainable_field_options());
-    TrainOptions options = train_options(150);
-    options.hard_pixels = share;
-    Trainer trainer(field, data, options);
+    TrainOptions options = train_options(60);
+    options.table_decay = decay;
+    options.decay_after = after;
+    Trainer trainer(field, scene(), options);
     while (!trainer.done()) trainer.step(0);
-    return trainer.train_psnr();
+    const auto table = field.params.values(field.field.encoding().table());
+    return std::vector<float>(table.begin(), table.end());
   };
-  const double even = psnr(0), half = psnr(0.5), all = psnr(1);
-  CAPTURE(even, half, all);
-  // The rays chosen are harder: more of them meet the noise.
-  CHECK(half < even - 0.5);
-  CHECK(all < half - 0.5);
+  const auto size = [](const std::vector<float>& x) {
+    return std::inner_product(x.begin(), x.end(), x.begin(), 0.0);
+  };
+  const std::vector<float> free = table_of(0, 0);
+  CHECK(size(table_of(5, 30)) < 0.9 * size(free));
+  CHECK(size(table_of(5, 0)) < 0.9 * size(table_of(5, 30)));
+  CHECK(table_of(5, 60) == free);
 }
 
 TEST_CASE("trainer: the distortion loss leaves less fog") {

@@ -36,6 +36,31 @@ TEST_CASE("train writes a field, its figures, and the same bytes for one and two
   CHECK(read_bytes(folder / "a.fm") == read_bytes(folder / "b.fm"));
 }
 
+TEST_CASE("train --supersampling makes a field that is rendered so", "[train]") {
+  const TemporaryFolder folder;
+  const std::string scene = tiny_scene(folder), out = folder / "f.fm";
+  const auto r =
+      run_command({"train", "--data", scene, "--out", out, "--supersampling", "2", "--steps", "2"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  const auto eval = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"eval", "--field", out, "--data", scene, "--json", "-"};
+    words.insert(words.end(), more.begin(), more.end());
+    return Json::parse(run_command(words).out);
+  };
+  const Json as_trained = eval({}), finer = eval({"--supersampling", "2"}),
+             centres = eval({"--supersampling", "1"});
+  CHECK(as_trained["supersampling"] == 2);
+  CHECK(as_trained["psnr"] == finer["psnr"]);
+  CHECK(as_trained["psnr"] != centres["psnr"]);
+  const auto three = run_command({"train", "--data", scene, "--out", out, "--supersampling", "3"});
+  CHECK(three.code == cli::kUsage);
+  const auto mlp =
+      run_command({"train", "--data", scene, "--out", out, "--supersampling", "2", "--preset", "mlp"});
+  CHECK(mlp.code == cli::kUsage);
+  CHECK_THAT(mlp.err, Contains("--supersampling: the mlp preset"));
+}
+
 TEST_CASE("train --preset mlp writes a field whose points a ray render can choose", "[train]") {
   const TemporaryFolder folder;
   const std::string scene = tiny_scene(folder), out = folder / "f.fm";

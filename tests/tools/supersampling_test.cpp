@@ -7,16 +7,16 @@
 
 using namespace fieldmark;
 
-TEST_CASE("supersampling: one ray unless another number of 1 to 8 is given") {
+TEST_CASE("supersampling: the number given, 1 to 8, or what was there before") {
   const auto parsed = [](std::vector<std::string> line) {
     CLI::App app;
-    Index rays = 1;
+    Index rays = 0;
     cli::add_supersampling(app, rays);
     std::reverse(line.begin(), line.end());
     app.parse(line);
     return rays;
   };
-  CHECK(parsed({}) == 1);
+  CHECK(parsed({}) == 0);
   CHECK(parsed({"--supersampling", "8"}) == 8);
   for (const char* wrong : {"0", "9", "2.5", "two"})
     CHECK_THROWS_AS(parsed({"--supersampling", wrong}), CLI::ParseError);

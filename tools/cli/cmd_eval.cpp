@@ -18,7 +18,7 @@ namespace {
 struct Options {
   std::string field, data, lpips_weights;
   std::string split = "test";
-  Index size = 0, supersampling = 1;
+  Index size = 0, supersampling = 0;
 };
 
 int run(const Options& options, Context& context) {
@@ -26,7 +26,8 @@ int run(const Options& options, Context& context) {
   const auto data = load_scene(
       options.data, {.split = options.split, .size = options.size, .background = field.background}, context);
   const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
-  nerf::Renderer renderer(field, {.supersampling = options.supersampling});
+  const Index rays = options.supersampling > 0 ? options.supersampling : field.options().supersampling;
+  nerf::Renderer renderer(field, {.supersampling = rays});
   const InterruptGuard guard;
   nerf::Evaluation evaluation;
   {
@@ -67,7 +68,7 @@ int run(const Options& options, Context& context) {
                   {"ssim", number(evaluation.ssim)},
                   {"lpips_alex", number(evaluation.lpips)},
                   {"views", evaluation.views},
-                  {"supersampling", options.supersampling},
+                  {"supersampling", rays},
                   {"scene", data.name},
                   {"split", data.split},
                   {"seconds_per_view", evaluation.seconds_per_view},

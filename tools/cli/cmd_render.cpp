@@ -25,7 +25,7 @@ struct Options {
   std::string field, out, data;
   std::string split = "test", cameras = "near", precision = "fp32";
   std::string against, sheet;
-  Index count = 10, size = 0, supersampling = 1;
+  Index count = 10, size = 0, supersampling = 0;
   std::optional<Index> average, importance, random;
 };
 

@@ -44,7 +44,8 @@ EmbedDistances parse_distances(std::string_view name) {
 std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, Index reader_size,
                                           const EmbedViewOptions& options, std::uint64_t seed,
                                           const std::function<bool(Index, Index)>& progress) {
-  nerf::Renderer renderer(field, {.finer = 1});  // the samples the field was trained with
+  // The samples the field was trained with: quick pictures to find the object in.
+  nerf::Renderer renderer(field, {.finer = 1, .supersampling = 1});
   const float background = nerf::background_value(field.background);
   const Index own = std::max(field.cameras.width, field.cameras.height);  // pixels of its pictures
   std::vector<CachedView> views;

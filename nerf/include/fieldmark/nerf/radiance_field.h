@@ -11,6 +11,9 @@
 
 namespace fieldmark::nerf {
 
+/// Rays along each side of a pixel, at most.
+inline constexpr Index kMostSupersampling = 8;
+
 /// Sizes of a RadianceField.
 struct RadianceFieldOptions {
   FieldOptions field{};    ///< of the networks and the encoding
@@ -18,6 +21,9 @@ struct RadianceFieldOptions {
   float step = 1.f / 420;  ///< spacing of samples along a ray, in diagonals of the cube
   std::uint64_t seed = 0;  ///< of the initial numbers
   RayPoints points{};      ///< where an mlp field is looked at along a ray
+  /// Rays along each side of a pixel that its pictures are made of, 1, 2, 4 or 8: what a Renderer sends
+  /// unless told otherwise, and a Trainer in the later part of a run, see TrainOptions::supersample_after.
+  Index supersampling = 1;
 };
 
 /// A field with all that is needed to render it: parameters, the cube it fills, which cells are occupied, the

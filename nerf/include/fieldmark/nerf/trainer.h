@@ -30,6 +30,14 @@ struct TrainOptions {
   /// Share of the rays, 0 to 1, that are the harder of two: those whose tile of 8 x 8 pixels was last seen
   /// with the larger error. Of hash fields.
   double hard_pixels = 0.75;
+  /// Weight decay of the hash table, >= 0 (AdamRange::weight_decay): a number falls with every step that it
+  /// takes, so that what photographs say little of, and a long run learns by heart, does not grow.
+  double table_decay = 0.1;
+  Index decay_after = 2000;  ///< steps, >= 0, without table_decay: at first the table has to grow
+  /// Steps, >= 0, after which the pixels of a field with supersampling (RadianceFieldOptions) are means of
+  /// that many rays, each anywhere in its part of the pixel; before, where there is more to learn of more
+  /// pixels than of their edges, one ray through the centre. Of hash fields.
+  Index supersample_after = 8000;
   Index warm_up = 32;      ///< steps before cells may be declared empty
   std::uint64_t seed = 0;  ///< of the choice of rays, backgrounds and occupancy samples
   /// bf16 rounds what the networks multiply, forward and in dX; weights, their gradients and the table stay
@@ -48,10 +56,11 @@ struct TrainOptions {
 /// teach it more than a few large ones. A much larger step size may never leave the empty picture.
 TrainOptions train_options(FieldKind kind);
 
-/// Sizes of a hash field that a run of this length can fill: those of RadianceFieldOptions; for runs of at most
-/// 120 seconds or 8000 steps a table of 2^17 rows and a finest level of 512 cells, whose steps are faster
-/// (docs/results/training.md has both beside each other); for runs of more than 400 seconds or 20000 steps a
-/// table of 2^19 rows, a finest level of 1024 cells, networks of 64 and samples 1 / 512 of a diagonal apart.
+/// Sizes of a hash field that a run of this length can fill: those of RadianceFieldOptions; for runs of at
+/// most 120 seconds or 8000 steps a table of 2^17 rows and a finest level of 512 cells, whose steps are
+/// faster (docs/results/training.md has both beside each other); for runs of more than 400 seconds or 20000
+/// steps a table of 2^19 rows, a finest level of 1024 cells, networks of 64 and samples 1 / 512 of a diagonal
+/// apart.
 RadianceFieldOptions field_options(const ScheduleOptions& length);
 
 /// Sizes of the field that a Trainer::save() is of: a run whose sizes were found once goes on with them.
@@ -106,7 +115,9 @@ class Trainer {
   Index all_pixels() const;
   Index tile_of(Index place) const;
   void prefer_hard(Index first, Index count, std::span<Index> place) const;
-  void choose_rays(Index first, Index count, Shard& shard) const;
+  Index rays_along_pixel() const;
+  void choose_rays(Index first, Index rays, Shard& shard) const;
+  void aim(Index first, Shard& shard) const;
   void note_errors(Var<float> rays, Shard& shard) const;
   double step_hash();
   double run_chunk(Index index, Shard& shard, Tape<float>& tape, float* grads);
@@ -123,7 +134,7 @@ class Trainer {
   const Dataset& data_;
   TrainOptions options_;
   Schedule schedule_;
-  CounterRng pixel_rng_, background_rng_, occupancy_rng_, second_rng_;
+  CounterRng pixel_rng_, background_rng_, occupancy_rng_, second_rng_, place_rng_;
   PackedWeights<float> packed_;
   ShardedLoop<float> loop_;
   Adam<float> adam_;

@@ -1,0 +1,159 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/random.h>
+#include <fieldmark/engine/resize.h>
+#include <fieldmark/nerf/analytic_scene.h>
+#include <fieldmark/nerf/evaluation.h>
+#include <fieldmark/nerf/trainer.h>
+
+#include <algorithm>
+
+#include "nerf/small_field.h"
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+
+using namespace fieldmark;
+using namespace fieldmark::nerf;
+
+namespace {
+
+constexpr Index kSize = 24, kParts = 8;
+
+// Photographs whose pixels are the means of kParts x kParts of the scene's, over its background.
+Dataset blurred_scene() {
+  Dataset data = make_scene({.size = kSize * kParts, .views = 12});
+  for (View& v : data.views) {
+    const Tensor<float> mean = resize_area(composited(v, data.background), kSize, kSize);
+    v.camera = v.camera.scaled(kSize, kSize);
+    v.rgba = Tensor<float>({kSize, kSize, 4});
+    for (Index p = 0; p < kSize * kSize; ++p) {
+      std::copy_n(mean.data.data() + 3 * p, 3, v.rgba.data.data() + 4 * p);
+      v.rgba[4 * p + 3] = 1;
+    }
+  }
+  return data;
+}
+
+RadianceFieldOptions field_options(Index supersampling) {
+  RadianceFieldOptions options = trainable_field_options();
+  options.supersampling = supersampling;
+  return options;
+}
+
+TrainOptions train_options(Index steps, Index after) {
+  return {.schedule = {.steps = steps},
+          .samples_per_step = 8192,
+          .first_samples = 4096,
+          .grow_after = 16,
+          .supersample_after = after,
+          .warm_up = 16};
+}
+
+std::vector<float> numbers(const RadianceField& f) {
+  return {f.params.values().begin(), f.params.values().end()};
+}
+
+std::vector<float> trained(const Dataset& data, Index supersampling, Index after, Index steps) {
+  RadianceField field(field_options(supersampling));
+  Trainer trainer(field, data, train_options(steps, after));
+  while (!trainer.done()) trainer.step(0);
+  return numbers(field);
+}
+
+}  // namespace
+
+TEST_CASE(
+    "trainer_rays: a field taught with means over pixels is nearer to photographs that are such means") {
+  const Dataset data = blurred_scene();
+  const auto psnr = [&](Index taught, Index shown) {
+    RadianceField field(field_options(taught));
+    Trainer trainer(field, data, train_options(400, 100));
+    while (!trainer.done()) trainer.step(0);
+    Renderer renderer(field, {.supersampling = shown});
+    return evaluate(renderer, data).psnr;
+  };
+  const double centres = psnr(1, 1), shown = psnr(1, 2), taught = psnr(2, 2);
+  CAPTURE(centres, shown, taught);
+  CHECK(taught > shown + 0.5);
+  CHECK(taught > centres + 0.5);
+  CHECK(psnr(2, 0) == taught);
+}
+
+TEST_CASE("trainer_rays: supersampling begins after its steps, and only then") {
+  const Dataset data = blurred_scene();
+  CHECK(trained(data, 2, 10, 10) == trained(data, 1, 0, 10));
+  CHECK(trained(data, 2, 9, 10) != trained(data, 1, 0, 10));
+  CHECK(trained(data, 2, 0, 10) != trained(data, 4, 0, 10));
+}
+
+TEST_CASE("trainer_rays: supersampled steps give the same bytes for any thread count and across a restore") {
+  const Dataset data = blurred_scene();
+  const int before = threads();
+  set_threads(1);
+  const std::vector<float> one = trained(data, 2, 8, 24);
+  set_threads(2);
+  CHECK(trained(data, 2, 8, 24) == one);
+  set_threads(before);
+
+  const TemporaryFolder folder;
+  {
+    RadianceField field(field_options(2));
+    Trainer trainer(field, data, train_options(24, 8));
+    while (trainer.steps() < 13) trainer.step(0);
+    trainer.save(folder / "checkpoint");
+  }
+  RadianceField field(field_options(2));
+  Trainer trainer(field, data, train_options(24, 8));
+  trainer.restore(folder / "checkpoint");
+  while (!trainer.done()) trainer.step(0);
+  CHECK(numbers(field) == one);
+  Trainer other(field, data, train_options(24, 9));
+  CHECK_THROWS_WITH(other.restore(folder / "checkpoint"),
+                    Contains("supersampled after 9") && Contains("supersampled after 8"));
+}
+
+TEST_CASE("trainer_rays: hard pixels are sought where the error is, and change nothing when switched off") {
+  // A scene that is learnt within the run, but for a patch of noise that differs between photographs.
+  Dataset data = make_scene({.kind = SceneKind::sphere, .size = 48, .views = 8});
+  const CounterRng rng(1);
+  for (std::size_t v = 0; v < data.views.size(); ++v)
+    for (Index p = 0; p < 48 * 48; ++p)
+      if (p % 48 >= 20 && p % 48 < 28 && p / 48 >= 20 && p / 48 < 28)
+        for (Index k = 0; k < 3; ++k)
+          data.views[v].rgba[4 * p + k] =
+              rng.uniform4(v, static_cast<std::uint64_t>(p))[static_cast<std::size_t>(k)];
+  const auto psnr = [&](double share) {
+    RadianceField field(trainable_field_options());
+    TrainOptions options = train_options(150, 0);
+    options.first_samples = 2048;
+    options.distortion = 1e-3;
+    options.hard_pixels = share;
+    Trainer trainer(field, data, options);
+    while (!trainer.done()) trainer.step(0);
+    return trainer.train_psnr();
+  };
+  const double even = psnr(0), half = psnr(0.5), all = psnr(1);
+  CAPTURE(even, half, all);
+  // The rays chosen are harder: more of them meet the noise.
+  CHECK(half < even - 0.5);
+  CHECK(all < half - 0.5);
+}
+
+TEST_CASE("trainer_rays: errors name option and value") {
+  const Dataset data = blurred_scene();
+  RadianceField field(field_options(2));
+  CHECK_THROWS_WITH(Trainer(field, data, train_options(1, -1)),
+                    "[trainer] supersample_after must be at least 0, got -1");
+  TrainOptions options = train_options(1, 0);
+  options.table_decay = -0.5;
+  CHECK_THROWS_WITH(Trainer(field, data, options),
+                    Contains("[trainer] table_decay must be at least 0, got -0.5"));
+  options = train_options(1, 0);
+  options.decay_after = -2;
+  CHECK_THROWS_WITH(Trainer(field, data, options), "[trainer] decay_after must be at least 0, got -2");
+  RadianceFieldOptions mlp = small_mlp_options();
+  mlp.supersampling = 2;
+  RadianceField original(mlp);
+  CHECK_THROWS_WITH(Trainer(original, data, train_options(1, 0)),
+                    "[trainer] field must be a hash field to have supersampling, got an mlp field");
+}
