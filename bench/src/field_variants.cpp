@@ -101,7 +101,7 @@ struct Sweep {
       add("samples", samples(finer), [&](auto& v) { v.render.finer = finer; });
     for (const float stop : {0.1f, 3e-2f, 1e-2f, 3e-3f, 3e-4f, 1e-4f, 0.f})
       add("stop", number(stop), [&](auto& v) { v.render.stop = stop; });
-    for (const float least : {1e-2f, 3e-3f, 1e-3f, 3e-4f, 1e-5f, 0.f})
+    for (const float least : {1e-2f, 3e-3f, 3e-4f, 1e-4f, 1e-5f, 0.f})
       add("least weight", number(least), [&](auto& v) { v.render.least_weight = least; });
     for (const Index side : {cells / 4, cells / 2, cells, 2 * cells})
       if (side >= 4 && side % 4 == 0 && side <= 512)
