@@ -88,19 +88,22 @@ OccupancyCost occupancy_cost(const nerf::RadianceField& field, const Cameras& ca
           errors.dropped_most};
 }
 
-// By turns, because a shared machine's speed drifts.
+// Each right after the default, whose time it is divided by, because a shared machine's speed drifts.
 void time_variants(const nerf::RadianceField& field, const Cameras& cameras,
                    const std::vector<std::vector<double>>& want, int runs, const Say& say,
                    std::vector<FieldRow>& rows) {
-  std::vector<std::vector<double>> seconds(rows.size());
+  std::vector<double> usual;
+  std::vector<std::vector<double>> ratios(rows.size());
   for (int run = 0; run < runs; ++run)
     for (std::size_t i = 0; i < rows.size(); ++i) {
       FieldRow& row = rows[i];
-      if (run > 0 && seconds[i].front() > kSlow * seconds.front().front()) continue;
+      if (run > 0 && ratios[i].front() > kSlow) continue;
       say(row.variant.knob + " " + row.variant.setting,
           (static_cast<double>(run) + static_cast<double>(i) / static_cast<double>(rows.size())) / runs);
       Errors errors;
-      seconds[i].push_back(render_views(field, cameras, row.variant, want, run == 0 ? &errors : nullptr));
+      usual.push_back(render_views(field, cameras, rows.front().variant, want, nullptr));
+      ratios[i].push_back(render_views(field, cameras, row.variant, want, run == 0 ? &errors : nullptr) /
+                          usual.back());
       if (run > 0) continue;
       row.psnr = errors.psnr();
       row.max_error = errors.worst;
@@ -108,9 +111,10 @@ void time_variants(const nerf::RadianceField& field, const Cameras& cameras,
       row.dropped_max = errors.dropped_most;
     }
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    rows[i].seconds = median(seconds[i]);
-    const auto [least, most] = std::minmax_element(seconds[i].begin(), seconds[i].end());
-    rows[i].spread = (*most - *least) / rows[i].seconds;
+    const double ratio = i == 0 ? 1 : median(ratios[i]);
+    rows[i].seconds = ratio * median(usual);
+    const auto [least, most] = std::minmax_element(ratios[i].begin(), ratios[i].end());
+    rows[i].spread = (*most - *least) / ratio;
   }
 }
 

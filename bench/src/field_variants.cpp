@@ -99,7 +99,7 @@ struct Sweep {
   void add_knobs(Index cells) {
     for (const float finer : {0.25f, 0.5f, 0.75f, 1.f, 1.2f, 1.5f, 2.f, 4.f})
       add("samples", samples(finer), [&](auto& v) { v.render.finer = finer; });
-    for (const float stop : {0.1f, 3e-2f, 1e-2f, 3e-3f, 3e-4f, 1e-4f, 0.f})
+    for (const float stop : {0.1f, 3e-2f, 1e-2f, 1e-3f, 3e-4f, 1e-4f, 0.f})
       add("stop", number(stop), [&](auto& v) { v.render.stop = stop; });
     for (const float least : {1e-2f, 3e-3f, 3e-4f, 1e-4f, 1e-5f, 0.f})
       add("least weight", number(least), [&](auto& v) { v.render.least_weight = least; });

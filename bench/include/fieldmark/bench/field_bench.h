@@ -10,9 +10,11 @@ namespace fieldmark::bench {
 
 /// A variant beside the reference.
 struct FieldRow {
-  FieldVariant variant;     ///< how it was rendered
-  double seconds = 0;       ///< of a view, median over the runs of the mean over the views
-  double spread = 0;        ///< (slowest - fastest) / median over the runs
+  FieldVariant variant;  ///< how it was rendered
+  /// Of a view: the median over the runs of its ratio to the default right before it, times the default's
+  /// median. Of the mean over the views.
+  double seconds = 0;
+  double spread = 0;        ///< (largest - smallest) / median of that ratio over the runs
   double psnr = 0;          ///< of all views together, numbers not rounded to 8 bits, dB
   double max_error = 0;     ///< largest difference of a colour, in [0, 1]
   double dropped_mean = 0;  ///< mean over all pixels of the opacity that is missing: max(0, reference - it)

@@ -20,7 +20,7 @@ struct RenderOptions {
   /// Samples along a ray for each that training took, > 0. What a ray misses between its samples is most of a
   /// picture's error (`fieldmark bench field` measures it). Without meaning for mlp, see points.
   float finer = 4.f / 3;
-  float stop = 1e-3f;          ///< a ray ends where its transmittance falls below this
+  float stop = 3e-3f;          ///< a ray ends where its transmittance falls below this
   float least_weight = 1e-3f;  ///< samples of less weight get no colour
   /// bf16 looks features up in a rounded table and multiplies rounded numbers: less memory, 62 dB from the
   /// picture in float. Needs bf16_units().
