@@ -137,10 +137,13 @@ FieldBench run_field_bench(const nerf::RadianceField& field, const Cameras& came
   }
   result.reference_seconds = (now() - begin) / static_cast<double>(cameras.size());
   result.occupancy = occupancy_cost(field, cameras, want, options, say);
-  for (const FieldVariant& v : field_variants(field, options.quick)) result.rows.push_back({.variant = v});
+  for (const FieldVariant& v : field_variants(field, options.quick)) {
+    const auto side = static_cast<double>(v.occupancy > 0 ? v.occupancy : field.grid.resolution());
+    result.rows.push_back({.variant = v, .grid_bytes = side * side * side / 8});
+  }
   time_variants(field, cameras, want, options.runs, say, result.rows);
   std::vector<SpeedQuality> points;
-  for (const FieldRow& row : result.rows) points.push_back({row.seconds, row.psnr});
+  for (const FieldRow& row : result.rows) points.push_back({row.seconds, row.psnr, row.grid_bytes});
   const std::vector<bool> front = pareto_front(points, options.margin);
   for (std::size_t i = 0; i < front.size(); ++i) result.rows[i].front = front[i];
   return result;
@@ -167,9 +170,12 @@ std::string judgement(const FieldBench& bench, const ParetoMargin& margin) {
   text += usual.front ? "It is on the front: " : "It is not on the front: ";
   text += faster ? line(
                        "the most exact of what is more than %.0f%% faster, %s, takes %.2f of its time and is "
-                       "%.1f dB %s it; ",
+                       "%.1f dB %s it%s; ",
                        100 * margin.time, name(*faster).c_str(), faster->seconds / usual.seconds,
-                       std::abs(faster->psnr - usual.psnr), faster->psnr < usual.psnr ? "below" : "above")
+                       std::abs(faster->psnr - usual.psnr), faster->psnr < usual.psnr ? "below" : "above",
+                       faster->grid_bytes > usual.grid_bytes
+                           ? line(", with %.0f times the grid", faster->grid_bytes / usual.grid_bytes).c_str()
+                           : "")
                  : line("nothing is more than %.0f%% faster; ", 100 * margin.time);
   text += better ? line("the fastest of what is more exact, %s, takes %.2f times as long for %.1f dB more.",
                         name(*better).c_str(), better->seconds / usual.seconds, better->psnr - usual.psnr)

@@ -48,8 +48,8 @@ std::vector<bool> pareto_front(std::span<const SpeedQuality> points, const Paret
   // Parts of a time are differences of logarithms.
   std::vector<Figures> figures;
   for (const SpeedQuality& p : points)
-    figures.push_back({std::isfinite(p.seconds) ? -std::log(p.seconds) : std::nan(""), p.psnr});
-  const double margins[] = {-std::log1p(-margin.time), margin.psnr};
+    figures.push_back({std::isfinite(p.seconds) ? -std::log(p.seconds) : std::nan(""), p.psnr, -p.bytes});
+  const double margins[] = {-std::log1p(-margin.time), margin.psnr, 0};
   return pareto_front(figures, margins);
 }
 

@@ -64,6 +64,8 @@ TEST_CASE("field_bench: figures of the default are those of its pictures and the
   CHECK(first.dropped_max == Approx(most));
   CHECK(first.dropped_max > 0);
   for (const FieldRow& r : bench.rows) CHECK(r.seconds > 0);
+  const double cells = static_cast<double>(f.grid.cells());
+  CHECK(first.grid_bytes == cells / 8);
   CHECK(std::any_of(bench.rows.begin(), bench.rows.end(), [](const auto& r) { return r.front; }));
   // Every cell is occupied: the grid leaves nothing out.
   CHECK(bench.occupancy.pixels == 100);
@@ -95,6 +97,11 @@ TEST_CASE("field_bench: the judgement names what is faster and what is better") 
                        Contains("c x, takes 2.00 times as long for 10.0 dB more"));
   bench.rows = {row("default", 1, 40, false), row("a", 0.5, 41, true)};
   CHECK_THAT(judgement(bench), Contains("It is not on the front") && Contains("1.0 dB above it"));
+  bench.rows = {row("default", 1, 40, true), row("a", 0.5, 40, true)};
+  bench.rows[0].grid_bytes = 100;
+  bench.rows[1].grid_bytes = 800;
+  CHECK_THAT(judgement(bench),
+             Contains("takes 0.50 of its time and is 0.0 dB above it, with 8 times the grid;"));
   bench.rows = {row("default", 1, 40, true)};
   CHECK_THAT(judgement(bench), Contains("nothing is more than 4% faster; nothing is more exact."));
   CHECK_THROWS_AS(judgement({}), ValueError);

@@ -36,6 +36,13 @@ TEST_CASE("pareto: a lead within the margin is none") {
   CHECK(front({{1, 40}, {1.15, 50}}, margin) == std::vector<bool>{true, true});
 }
 
+TEST_CASE("pareto: what is smaller is beaten by nothing larger, what is no better and larger by all") {
+  const ParetoMargin margin{.time = 0.1, .psnr = 0.5};
+  CHECK(front({{1, 40, 10}, {0.5, 40, 80}}, margin) == std::vector<bool>{true, true});
+  CHECK(front({{1, 40, 10}, {0.95, 40.4, 80}}, margin) == std::vector<bool>{true, false});
+  CHECK(front({{1, 40, 10}, {0.5, 40, 10}}, margin) == std::vector<bool>{false, true});
+}
+
 TEST_CASE("pareto: numbers that are none lose, infinitely exact wins") {
   const double nan = std::nan(""), inf = std::numeric_limits<double>::infinity();
   CHECK(front({{nan, 50}, {1, nan}, {inf, 99}, {2, 20}, {3, inf}}) ==

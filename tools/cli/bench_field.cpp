@@ -58,15 +58,11 @@ Subject subject_of(const BenchFieldOptions& options, Context& context) {
 }
 
 Json row_json(const bench::FieldRow& r) {
-  return {{"knob", r.variant.knob},
-          {"setting", r.variant.setting},
-          {"seconds", r.seconds},
-          {"spread", r.spread},
-          {"psnr", number(r.psnr)},
-          {"max_error", r.max_error},
-          {"dropped_mean", r.dropped_mean},
-          {"dropped_max", r.dropped_max},
-          {"front", r.front}};
+  return {{"knob", r.variant.knob},         {"setting", r.variant.setting},
+          {"seconds", r.seconds},           {"spread", r.spread},
+          {"psnr", number(r.psnr)},         {"max_error", r.max_error},
+          {"dropped_mean", r.dropped_mean}, {"dropped_max", r.dropped_max},
+          {"grid_kb", r.grid_bytes / 1000}, {"front", r.front}};
 }
 
 void print_row(std::ostream& out, const bench::FieldRow& r) {

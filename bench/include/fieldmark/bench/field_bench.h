@@ -19,7 +19,8 @@ struct FieldRow {
   double max_error = 0;     ///< largest difference of a colour, in [0, 1]
   double dropped_mean = 0;  ///< mean over all pixels of the opacity that is missing: max(0, reference - it)
   double dropped_max = 0;   ///< the largest of them
-  bool front = false;       ///< no other one beats it, see pareto_front()
+  double grid_bytes = 0;    ///< of the occupancy grid, one bit a cell, in a file
+  bool front = false;       ///< no other one beats it in time, psnr and grid_bytes, see pareto_front()
 };
 
 /// What the field's grid leaves out, of some pixels of every view: the reference without it against that

@@ -8,6 +8,7 @@ namespace fieldmark::bench {
 struct SpeedQuality {
   double seconds = 0;  ///< less is better
   double psnr = 0;     ///< more is better, dB
+  double bytes = 0;    ///< of a file or of memory: less is better
 };
 
 /// What counts as equal: times of the same work differ, and nobody sees a tenth of a decibel.
@@ -22,9 +23,9 @@ struct ParetoMargin {
 /// @throws ValueError if a margin is not positive or 0, or a point has another number of figures
 std::vector<bool> pareto_front(std::span<const std::vector<double>> points, std::span<const double> margins);
 
-/// Marks the points that no other one beats. One beats another if it is faster by more than the margin and no
-/// less exact within the margin, or more exact by more than the margin and no slower within the margin. Times
-/// that are not finite and PSNRs that are no number lose. @throws ValueError if a margin is out of range
+/// Marks the points that no other one beats. One beats another if it is faster or more exact by more than the
+/// margin, or smaller, and neither slower nor less exact by more than the margin, nor larger. Times that are
+/// not finite and PSNRs that are no number lose. @throws ValueError if a margin is out of range
 std::vector<bool> pareto_front(std::span<const SpeedQuality> points, const ParetoMargin& margin = {});
 
 }  // namespace fieldmark::bench
