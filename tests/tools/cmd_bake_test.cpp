@@ -46,6 +46,11 @@ TEST_CASE("bake makes the mark fainter where it is asked to", "[bake]") {
     REQUIRE(r.code == cli::kOk);
     return nlohmann::json::parse(r.out)["psnr_colours"].get<double>();
   };
+  const auto one_step = run_command({"bake", "--owner", job.owner, "--message", "5", "--out",
+                                     job.folder / "brief.fm", "--steps", "1", "--strength", "30"});
+  CHECK_THAT(one_step.out, Contains("dB on the object, 30.0 dB asked for"));
+  CHECK_THAT(one_step.err + one_step.out,
+             Contains("the file's colours hold only") && Contains("--strength 2"));
   const double strong = distance("30"), faint = distance("50");
   CHECK(faint - strong == Approx(20).margin(1));
   const auto r = run_command({"bake", "--owner", job.owner, "--message", "5", "--out",

@@ -4,6 +4,7 @@
 #include <fieldmark/watermark/baker.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "small_owner.h"
 #include "support/catch.h"
@@ -77,6 +78,29 @@ TEST_CASE("baker: baked colours approach the marked ones, by its own figure and 
   CAPTURE(first, baker.psnr(), before, after);
   CHECK(baker.psnr() > first + 1);
   CHECK(after > before + 2);
+}
+
+TEST_CASE("baker: a mark's strength in the file comes near the owner's as it is learnt") {
+  const Owner owner = owner_with_gain();
+  const auto strength_after = [&](Index steps) {
+    Baker baker(owner, kMessage, options(300));
+    while (baker.steps() < steps) baker.step(0);
+    return baker.strength(4);
+  };
+  CHECK(std::isinf(strength_after(0)));
+  double marked = 0;
+  nerf::Renderer renderer(owner.field);
+  for (const auto& camera : nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, 4, 0, 32)) {
+    renderer.set_recolour({});
+    const nerf::Rendering plain = renderer.render(camera);
+    renderer.set_recolour(owner.marking(cell_signs(owner.code(), kMessage)));
+    marked += psnr_masked(renderer.render(camera).rgb, plain.rgb, plain.opacity) / 4;
+  }
+  const double early = strength_after(5), late = strength_after(300);
+  CAPTURE(marked, early, late);
+  CHECK(late > marked - 0.5);
+  CHECK(late < marked + 6);
+  CHECK(early > late + 1);
 }
 
 TEST_CASE("baker: a baked file is an unmarked one with other colours, density to the byte the same") {

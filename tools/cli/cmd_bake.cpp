@@ -3,6 +3,8 @@
 #include <fieldmark/watermark/signing.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -18,12 +20,35 @@
 namespace fieldmark::cli {
 namespace {
 
+constexpr double kMuchFainter = 2;  // dB: what a bake usually loses is 1.3
+
 struct Options {
   std::string owner, out;
   std::optional<double> strength;
   MessageOption message;
   RunLength length{.seconds = watermark::BakeOptions{}.schedule.seconds};
 };
+
+// How strong the mark is in the file, beside what the owner asked for.
+void say_strength(const watermark::Owner& owner, double strength, Context& context) {
+  char line[240];
+  std::snprintf(line, sizeof line, "mark of %.1f dB on the object", strength);
+  context.text() << line;
+  const double asked = owner.options().strength, fainter = strength - asked;
+  if (!owner.mark) {
+    context.text() << "\n";
+    return;
+  }
+  std::snprintf(line, sizeof line, ", %.1f dB asked for\n", asked);
+  context.text() << line;
+  if (!(fainter > kMuchFainter)) return;
+  std::snprintf(
+      line, sizeof line,
+      "the file's colours hold only %.0f%% of the mark: a longer --seconds, a larger field or, at the "
+      "price of a coarser mark, --strength %.1f brings it to what was asked for",
+      100 * std::pow(10.0, -fainter / 20), std::max(20.0, asked - fainter));
+  context.note(line);
+}
 
 int run(const Options& options, Context& context) {
   if (std::filesystem::exists(options.out) && std::filesystem::equivalent(options.out, options.owner))
@@ -55,6 +80,7 @@ int run(const Options& options, Context& context) {
                 .checkpoint = {}},
                options.length, context);
   baker.field().save(options.out);
+  const double strength = baker.strength();
 
   const auto owner_sha256 = watermark::sha256_file_hex(options.owner);
   const auto claim = watermark::claim_digest(owner_sha256, owner.key, message);
@@ -63,12 +89,14 @@ int run(const Options& options, Context& context) {
   context.text() << options.out << ": " << baker.steps() << " steps in " << format_duration(seconds)
                  << "\nclaim " << claim << ", to be time-stamped before the field is published\npublic key "
                  << open << ", to be time-stamped with it\n";
+  say_strength(owner, strength, context);
   context.result({{"message", to_hex(message)},
                   {"payload", payload_json(message)},
                   {"bits", message.size()},
                   {"seconds", seconds},
                   {"steps", baker.steps()},
                   {"psnr_colours", number(baker.psnr())},
+                  {"strength", number(strength)},
                   {"file_bytes", bytes},
                   {"owner_sha256", owner_sha256},
                   {"claim", claim},

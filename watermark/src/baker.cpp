@@ -1,9 +1,11 @@
+#include <fieldmark/engine/metrics.h>
 #include <fieldmark/engine/ops/loss.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/watermark/baker.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace fieldmark::watermark {
 namespace {
@@ -170,6 +172,20 @@ void Baker::step(double seconds) {
              std::span<const AdamRange>(ranges, field_.field.has_table() ? 2 : 1));
   smoothed_ = smoothed_ < 0 ? loss / kChunks : 0.98 * smoothed_ + 0.02 * loss / kChunks;
   ++steps_;
+}
+
+double Baker::strength(Index views) const {
+  nerf::Renderer plain(owner_.field), marked(field_);
+  double sum = 0, count = 0;
+  for (const nerf::Camera& camera :
+       nerf::make_cameras(owner_.field.cameras, nerf::CameraSet::near, views, 0, options_.seed + 32)) {
+    const nerf::Rendering base = plain.render(camera);
+    const double psnr = psnr_masked(marked.render(camera).rgb, base.rgb, base.opacity);
+    if (!std::isfinite(psnr)) continue;
+    sum += psnr;
+    ++count;
+  }
+  return count > 0 ? sum / count : std::numeric_limits<double>::infinity();
 }
 
 double Baker::psnr() const { return -10 * std::log10(std::max(smoothed_, 1e-10)); }

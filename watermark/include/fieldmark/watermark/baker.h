@@ -38,6 +38,11 @@ class Baker {
   Index planned() const { return schedule_.total(); }
   /// Running mean of the distance between baked and marked colours, as a PSNR over the samples by weight.
   double psnr() const;
+  /// Strength of the mark in the baked field as far as it is: the mean of psnr_masked() of those of its
+  /// near views that differ against the unmarked ones, dB; infinity where none does. Above the owner's
+  /// strength, the colours have not taken the whole mark: the run was short, or the field has no room for it.
+  /// @param views  >= 1
+  double strength(Index views = 8) const;
   /// The baked field as far as it is.
   const nerf::RadianceField& field() const { return field_; }
 
