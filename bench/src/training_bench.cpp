@@ -2,10 +2,70 @@
 #include <fieldmark/nerf/evaluation.h>
 #include <fieldmark/nerf/renderer.h>
 
+#include <algorithm>
 #include <chrono>
 #include <limits>
+#include <memory>
+#include <optional>
 
 namespace fieldmark::bench {
+
+namespace {
+
+constexpr double kTurn = 0.5;  // seconds
+
+// A variant in training, with a clock of its own.
+struct Run {
+  const TrainingVariant& variant;
+  nerf::RadianceField field;
+  std::optional<nerf::Trainer> trainer;
+  double seconds = 0;
+
+  Run(const TrainingVariant& v, const nerf::Dataset& train) : variant(v), field(v.field) {
+    timed([&](auto) { trainer.emplace(field, train, v.train); });
+  }
+  std::string name() const { return variant.choice + ": " + variant.setting; }
+  // The clock goes on while work(now) is done, now being what it shows.
+  template <class F>
+  void timed(F work) {
+    const auto begin = std::chrono::steady_clock::now();
+    const auto now = [&, before = seconds] {
+      return before + std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    };
+    work(now);
+    seconds = now();
+  }
+  void take_turn() {
+    const double until = seconds + kTurn;
+    timed([&](auto now) {
+      while (!trainer->done() && now() < until) trainer->step(now());
+    });
+  }
+  double part() const {
+    if (trainer->done()) return 1;
+    const nerf::ScheduleOptions& length = variant.train.schedule;
+    return length.steps > 0 ? static_cast<double>(trainer->steps()) / static_cast<double>(length.steps)
+                            : std::min(1.0, seconds / length.seconds);
+  }
+  TrainingRow judged(const nerf::Dataset& judge) const {
+    nerf::Renderer renderer(field);
+    const nerf::Evaluation evaluation = nerf::evaluate(renderer, judge);
+    return {.variant = variant,
+            .steps = trainer->steps(),
+            .samples = trainer->samples(),
+            .seconds = seconds,
+            .psnr = evaluation.psnr,
+            .seconds_per_view = evaluation.seconds_per_view};
+  }
+};
+
+double mean_part(const std::vector<std::unique_ptr<Run>>& runs) {
+  double sum = 0;
+  for (const auto& run : runs) sum += run->part();
+  return sum / static_cast<double>(runs.size());
+}
+
+}  // namespace
 
 std::vector<TrainingVariant> training_variants(const nerf::ScheduleOptions& schedule, std::uint64_t seed) {
   TrainingVariant base{
@@ -54,31 +114,18 @@ std::vector<TrainingVariant> training_variants(const nerf::ScheduleOptions& sche
 std::vector<TrainingRow> run_training_bench(const nerf::Dataset& train, const nerf::Dataset& judge,
                                             const std::vector<TrainingVariant>& variants,
                                             const std::function<void(const std::string&, double)>& progress) {
-  std::vector<TrainingRow> rows;
-  for (const TrainingVariant& v : variants) {
-    const auto stop_or_go = [&] {
-      if (progress)
-        progress(v.choice + ": " + v.setting,
-                 static_cast<double>(rows.size()) / static_cast<double>(variants.size()));
-    };
-    const auto begin = std::chrono::steady_clock::now();
-    const auto seconds = [&] {
-      return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    };
-    nerf::RadianceField field(v.field);
-    nerf::Trainer trainer(field, train, v.train);
-    while (!trainer.done()) {
-      if (trainer.steps() % 64 == 0) stop_or_go();
-      trainer.step(seconds());
+  std::vector<std::unique_ptr<Run>> runs;
+  for (const TrainingVariant& v : variants) runs.push_back(std::make_unique<Run>(v, train));
+  for (bool more = true; more;) {
+    more = false;
+    for (const auto& run : runs) {
+      if (progress) progress(run->name(), mean_part(runs));
+      run->take_turn();
+      more = more || !run->trainer->done();
     }
-    TrainingRow row{
-        .variant = v, .steps = trainer.steps(), .samples = trainer.samples(), .seconds = seconds()};
-    nerf::Renderer renderer(field);
-    const nerf::Evaluation judged = nerf::evaluate(renderer, judge);
-    row.psnr = judged.psnr;
-    row.seconds_per_view = judged.seconds_per_view;
-    rows.push_back(std::move(row));
   }
+  std::vector<TrainingRow> rows;
+  for (const auto& run : runs) rows.push_back(run->judged(judge));
   return rows;
 }
 

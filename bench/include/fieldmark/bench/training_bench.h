@@ -26,14 +26,16 @@ struct TrainingRow {
   TrainingVariant variant;      ///< how it was trained
   Index steps = 0;              ///< taken
   double samples = 0;           ///< through the networks
-  double seconds = 0;           ///< of training, the silhouettes included
+  double seconds = 0;           ///< of its own training, the silhouettes included
   double psnr = 0;              ///< mean over the views of `judge`, against their photographs, dB
   double seconds_per_view = 0;  ///< of rendering them
 };
 
-/// Trains a field for each variant, one after another.
+/// Trains a field for each variant, all at once and by turns of half a second, each with a clock of its own:
+/// a machine's drift meets them all alike. Takes the memory of all trainings together.
 /// @param train     what is learnt   @param judge  what the fields are judged by
-/// @param progress  called before each variant with its name and the part that is done; may throw to stop
+/// @param progress  called before each turn with the variant's name and the part that is done of all; may
+/// throw to stop
 /// @throws ValueError if an option is out of range
 std::vector<TrainingRow> run_training_bench(
     const nerf::Dataset& train, const nerf::Dataset& judge, const std::vector<TrainingVariant>& variants,
