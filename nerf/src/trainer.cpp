@@ -49,6 +49,26 @@ void fill_middles(const RaySamples& s, float* middle) {
   }
 }
 
+void must(bool holds, const char* rule, auto value) {
+  if (!holds) throw ValueError(std::string("[trainer] ") + rule + ", got " + std::to_string(value));
+}
+
+void check(const TrainOptions& o, const RadianceField& field) {
+  must(o.samples_per_step >= 1024, "samples_per_step must be at least 1024", o.samples_per_step);
+  must(o.first_samples >= 1024, "first_samples must be at least 1024", o.first_samples);
+  must(o.least_rays >= kRays && o.least_rays <= kMostRays && o.least_rays % kRays == 0,
+       "least_rays must be a multiple of 64, 64 to 65536", o.least_rays);
+  must(o.grow_after > 0, "grow_after must be positive", o.grow_after);
+  must(o.stop >= 0 && o.stop < 1, "stop must be in [0, 1)", o.stop);
+  must(o.distortion >= 0 && std::isfinite(o.distortion), "distortion must be at least 0", o.distortion);
+  must(o.table_decay >= 0 && std::isfinite(o.table_decay), "table_decay must be at least 0", o.table_decay);
+  must(o.decay_after >= 0, "decay_after must be at least 0", o.decay_after);
+  must(o.supersample_after >= 0, "supersample_after must be at least 0", o.supersample_after);
+  must(o.hard_pixels >= 0 && o.hard_pixels <= 1, "hard_pixels must be in [0, 1]", o.hard_pixels);
+  if (field.coarse && field.options().supersampling > 1)
+    throw ValueError("[trainer] field must be a hash field to have supersampling, got an mlp field");
+}
+
 }  // namespace
 
 TrainOptions train_options(FieldKind kind) {
@@ -92,32 +112,7 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
       adam_(field.params.size(), adam_options(field)),
       shards_(at(loop_.shards())),
       rays_per_step_(options.least_rays) {
-  if (options.samples_per_step < 1024)
-    throw ValueError("[trainer] samples_per_step must be at least 1024, got " +
-                     std::to_string(options.samples_per_step));
-  if (options.first_samples < 1024)
-    throw ValueError("[trainer] first_samples must be at least 1024, got " +
-                     std::to_string(options.first_samples));
-  if (options.least_rays < kRays || options.least_rays > kMostRays || options.least_rays % kRays != 0)
-    throw ValueError("[trainer] least_rays must be a multiple of 64, 64 to 65536, got " +
-                     std::to_string(options.least_rays));
-  if (!(options.grow_after > 0))
-    throw ValueError("[trainer] grow_after must be positive, got " + std::to_string(options.grow_after));
-  if (!(options.stop >= 0 && options.stop < 1))
-    throw ValueError("[trainer] stop must be in [0, 1), got " + std::to_string(options.stop));
-  if (!(options.distortion >= 0 && std::isfinite(options.distortion)))
-    throw ValueError("[trainer] distortion must be at least 0, got " + std::to_string(options.distortion));
-  if (!(options.table_decay >= 0 && std::isfinite(options.table_decay)))
-    throw ValueError("[trainer] table_decay must be at least 0, got " + std::to_string(options.table_decay));
-  if (options.decay_after < 0)
-    throw ValueError("[trainer] decay_after must be at least 0, got " + std::to_string(options.decay_after));
-  if (options.supersample_after < 0)
-    throw ValueError("[trainer] supersample_after must be at least 0, got " +
-                     std::to_string(options.supersample_after));
-  if (field.coarse && field.options().supersampling > 1)
-    throw ValueError("[trainer] field must be a hash field to have supersampling, got an mlp field");
-  if (!(options.hard_pixels >= 0 && options.hard_pixels <= 1))
-    throw ValueError("[trainer] hard_pixels must be in [0, 1], got " + std::to_string(options.hard_pixels));
+  check(options, field);
   if (data.views.empty()) throw ValueError("[trainer] data must have at least one view");
   if (options.keep) {
     const std::vector<std::uint8_t> bits(field_.grid.bits().begin(), field_.grid.bits().end());
