@@ -3,7 +3,6 @@
 #include <fieldmark/watermark/signing.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -44,9 +43,9 @@ void say_strength(const watermark::Owner& owner, double strength, Context& conte
   if (!(fainter > kMuchFainter)) return;
   std::snprintf(
       line, sizeof line,
-      "the file's colours hold only %.0f%% of the mark: a longer --seconds, a larger field or, at the "
-      "price of a coarser mark, --strength %.1f brings it to what was asked for",
-      100 * std::pow(10.0, -fainter / 20), std::max(20.0, asked - fainter));
+      "the file's colours hold only %.0f%% of the mark: a longer --seconds, a larger field or a lower "
+      "--strength makes it stronger",
+      100 * std::pow(10.0, -fainter / 20));
   context.note(line);
 }
 

@@ -30,7 +30,7 @@ struct RenderOptions {
   RayOrder order{};  ///< changes no number of a picture, only how fast it comes
   /// Rays along each side of a pixel, 1 to 8, at the centres of its parts; the pixel is the mean of them all;
   /// 0: RadianceFieldOptions::supersampling. A camera's pixel has its own area's mean too: what one ray
-  /// through its centre misses of that is up to 0.4 dB against photographs (docs/results/quality.md), at a
+  /// through its centre misses of that is up to 0.3 dB against photographs (docs/results/quality.md), at a
   /// quarter of the time of 2.
   Index supersampling = 0;
 };
