@@ -1,5 +1,4 @@
 #include <fieldmark/nerf/marching.h>
-#include <fieldmark/nerf/space.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +8,8 @@
 
 namespace fieldmark::nerf {
 namespace {
+
+static_assert(RayWalk::kFarthest == kernels::kMarchFarthest);
 
 kernels::MarchGrid march_grid(const OccupancyGrid& grid) {
   const Index blocks = grid.resolution() / 4;
@@ -57,7 +58,7 @@ RayWalk RayWalk::contracted(const float o[3], const float d[3], float step, floa
   return walk;
 }
 
-// Inner half sides from the centre, 1 to kFarthest: by how much samples are further apart.
+// Inner half sides from the centre, 1 to kFarthest.
 float RayWalk::scale_at(float t) const {
   float s = 1;
   for (int a = 0; a < 3; ++a) {
@@ -76,58 +77,62 @@ Index RayWalk::next(const OccupancyGrid& grid, Index max, float* t, float* x) {
   return count;
 }
 
-// How many samples surely stay in the empty blocks around this one: a step moves the image by at most `step`
-// where space is not contracted, and by less than 4 steps elsewhere. With |dy| = s step for the largest
-// coordinate and c = (2/s - 1/s^2) y, |dc| <= (2/s - 1/s^2) |dy| + s (2/s^2 - 2/s^3) |dy| = (4 - 3/s) step.
-Index RayWalk::next_contracted(const OccupancyGrid& grid, Index max, float* t, float* x) {
-  constexpr Index kMost = 1 << 16;  // a direction of zeros never leaves
-  const auto cells = static_cast<float>(grid.resolution());
-  const float block = 4 / cells;
-  Index count = 0;
-  while (count < max && k_ < kMost) {
-    float s = scale_at(near_);
-    if (!(s < kFarthest)) break;
-    float p[3], c[3];
-    for (int a = 0; a < 3; ++a) p[a] = o_[a] + near_ * d_[a];
-    contract(p, c);
-    Index cell[3];
-    for (int a = 0; a < 3; ++a) cell[a] = static_cast<Index>(c[a] * cells);
-    const Index clearance = grid.clearance(cell[0] / 4, cell[1] / 4, cell[2] / 4);
-    Index steps = 1;
-    if (clearance > 1) {
-      const float clear = block * static_cast<float>(clearance - 1);
-      steps = std::max<Index>(static_cast<Index>(clear / (s + 4 * clear < 1 ? step_ : 4 * step_)), 1);
-    } else if (clearance == 0 && grid.occupied(grid.cell(cell[0], cell[1], cell[2]))) {
-      t[count] = near_;
-      std::copy_n(c, 3, x + 3 * count++);
-    }
-    for (; steps > 0; --steps, ++k_) near_ += step_ * (s = scale_at(near_));
+void RayWalk::skip_empty(const OccupancyGrid& grid, std::span<RayWalk> walks, std::span<const Index> which) {
+  for (std::size_t begin = 0; begin < which.size(); begin += kernels::kMarchLanes) {
+    const auto some = which.subspan(begin, std::min<std::size_t>(kernels::kMarchLanes, which.size() - begin));
+    if (walks[static_cast<std::size_t>(some[0])].contracted_)
+      skip_contracted(grid, walks, some);
+    else
+      skip_straight(grid, walks, some);
   }
-  return count;
 }
 
-void RayWalk::skip_empty(const OccupancyGrid& grid, std::span<RayWalk> walks, std::span<const Index> which) {
-  using namespace kernels;
-  const MarchGrid seen = march_grid(grid);
-  const auto kernel = FIELDMARK_KERNEL(march_to_blocks);
-  for (std::size_t begin = 0; begin < which.size(); begin += kMarchLanes) {
-    MarchRays rays{};
-    const std::size_t count = std::min<std::size_t>(kMarchLanes, which.size() - begin);
-    for (std::size_t i = 0; i < kMarchLanes; ++i) {
-      if (i >= count) {
-        rays.far[i] = -1;
-        continue;
-      }
-      const RayWalk& w = walks[static_cast<std::size_t>(which[begin + i])];
-      if (w.contracted_) return;  // not straight
-      for (int a = 0; a < 3; ++a)
-        rays.o[a][i] = w.o_[a], rays.d[a][i] = w.d_[a], rays.steps[a][i] = w.steps_[a];
-      rays.near[i] = w.near_, rays.far[i] = w.far_, rays.step[i] = w.step_, rays.jitter[i] = w.jitter_;
-      rays.k[i] = static_cast<std::int32_t>(w.k_);
-    }
-    kernel(seen, rays);
-    for (std::size_t i = 0; i < count; ++i) walks[static_cast<std::size_t>(which[begin + i])].k_ = rays.k[i];
+void RayWalk::skip_straight(const OccupancyGrid& grid, std::span<RayWalk> walks,
+                            std::span<const Index> which) {
+  kernels::MarchRays rays{};
+  std::fill_n(rays.far, kernels::kMarchLanes, -1.f);
+  for (std::size_t i = 0; i < which.size(); ++i) {
+    const RayWalk& w = walks[static_cast<std::size_t>(which[i])];
+    for (int a = 0; a < 3; ++a)
+      rays.o[a][i] = w.o_[a], rays.d[a][i] = w.d_[a], rays.steps[a][i] = w.steps_[a];
+    rays.near[i] = w.near_, rays.far[i] = w.far_, rays.step[i] = w.step_, rays.jitter[i] = w.jitter_;
+    rays.k[i] = static_cast<std::int32_t>(w.k_);
   }
+  using namespace kernels;
+  FIELDMARK_KERNEL(march_to_blocks)(march_grid(grid), rays);
+  for (std::size_t i = 0; i < which.size(); ++i) walks[static_cast<std::size_t>(which[i])].k_ = rays.k[i];
+}
+
+void RayWalk::skip_contracted(const OccupancyGrid& grid, std::span<RayWalk> walks,
+                              std::span<const Index> which) {
+  kernels::ContractedRays rays{};
+  std::fill_n(rays.k, kernels::kMarchLanes, kernels::kMarchMost);
+  for (std::size_t i = 0; i < which.size(); ++i) {
+    const RayWalk& w = walks[static_cast<std::size_t>(which[i])];
+    for (int a = 0; a < 3; ++a) rays.o[a][i] = w.o_[a], rays.d[a][i] = w.d_[a];
+    rays.near[i] = w.near_, rays.step[i] = w.step_;
+    rays.k[i] = static_cast<std::int32_t>(w.k_);
+  }
+  using namespace kernels;
+  FIELDMARK_KERNEL(march_contracted_to_blocks)(march_grid(grid), rays);
+  for (std::size_t i = 0; i < which.size(); ++i) {
+    RayWalk& w = walks[static_cast<std::size_t>(which[i])];
+    w.near_ = rays.near[i];
+    w.k_ = rays.k[i];
+  }
+}
+
+Index RayWalk::next_contracted(const OccupancyGrid& grid, Index max, float* t, float* x) {
+  using namespace kernels;
+  ContractedRay ray{.o = {o_[0], o_[1], o_[2]},
+                    .d = {d_[0], d_[1], d_[2]},
+                    .near = near_,
+                    .step = step_,
+                    .k = static_cast<std::int32_t>(k_)};
+  const Index count = FIELDMARK_KERNEL(march_contracted)(march_grid(grid), ray, max, t, x);
+  near_ = ray.near;
+  k_ = ray.k;
+  return count;
 }
 
 Index RayWalk::next_straight(const OccupancyGrid& grid, Index max, float* t) {

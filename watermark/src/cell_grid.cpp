@@ -57,33 +57,70 @@ Index CellGrid::place(Index side, const float x[3]) {
   return c[0] + side * (c[1] + side * c[2]);
 }
 
+// The cells around a position with their trilinear weights, each cell once.
+CellGrid::Near CellGrid::near(const float* x) const {
+  Index base[3];
+  float f[3];
+  for (int a = 0; a < 3; ++a) {
+    // As place() does, NaN goes to cell 0: the cast of NaN to an integer would be undefined.
+    const float inside = x[a] > 0 ? std::min(x[a], 1.f) : 0.f;
+    const float p = inside * static_cast<float>(side_) - 0.5f;
+    base[a] = static_cast<Index>(std::floor(p));
+    f[a] = p - static_cast<float>(base[a]);
+  }
+  Near out;
+  float total = 0;
+  for (int k = 0; k < 8; ++k) {
+    float w = 1;
+    Index c[3];
+    for (int a = 0; a < 3; ++a) {
+      const bool up = (k >> a) & 1;
+      c[a] = std::clamp<Index>(base[a] + (up ? 1 : 0), 0, side_ - 1);
+      w *= up ? f[a] : 1 - f[a];
+    }
+    const std::int32_t cell = numbers_[static_cast<std::size_t>(c[0] + side_ * (c[1] + side_ * c[2]))];
+    if (cell < 0 || !(w > 0)) continue;
+    total += w;
+    const auto known = std::find(out.cell, out.cell + out.count, cell) - out.cell;
+    if (known == out.count) {
+      out.cell[out.count] = cell;
+      out.weight[out.count++] = 0;
+    }
+    out.weight[known] += w;
+  }
+  for (int i = 0; i < out.count; ++i) out.weight[i] /= total;
+  return out;
+}
+
 void CellGrid::blend(std::span<const std::int8_t> signs, const float* x, Index n, float* s) const {
   for (Index i = 0; i < n; ++i) {
-    Index base[3];
-    float f[3];
-    for (int a = 0; a < 3; ++a) {
-      // As place() does, NaN goes to cell 0: the cast of NaN to an integer would be undefined.
-      const float inside = x[3 * i + a] > 0 ? std::min(x[3 * i + a], 1.f) : 0.f;
-      const float p = inside * static_cast<float>(side_) - 0.5f;
-      base[a] = static_cast<Index>(std::floor(p));
-      f[a] = p - static_cast<float>(base[a]);
-    }
-    float sum = 0, weight = 0;
-    for (int k = 0; k < 8; ++k) {
-      float w = 1;
-      Index c[3];
-      for (int a = 0; a < 3; ++a) {
-        const bool up = (k >> a) & 1;
-        c[a] = std::clamp<Index>(base[a] + (up ? 1 : 0), 0, side_ - 1);
-        w *= up ? f[a] : 1 - f[a];
-      }
-      const std::int32_t cell = numbers_[static_cast<std::size_t>(c[0] + side_ * (c[1] + side_ * c[2]))];
-      if (cell < 0) continue;
-      sum += w * static_cast<float>(signs[static_cast<std::size_t>(cell)]);
-      weight += w;
-    }
-    s[i] = weight > 0 ? std::clamp(kSteepness * sum / weight, -1.f, 1.f) : 0.f;
+    const Near cells = near(x + 3 * i);
+    float sum = 0;
+    for (int k = 0; k < cells.count; ++k)
+      sum += cells.weight[k] * static_cast<float>(signs[static_cast<std::size_t>(cells.cell[k])]);
+    s[i] = std::clamp(kSteepness * sum, -1.f, 1.f);
   }
+}
+
+CellGrid::Mix CellGrid::mix(const float* x) const {
+  const Near cells = near(x);
+  Mix out{.count = cells.count};
+  std::copy_n(cells.cell, cells.count, out.cell.begin());
+  for (int k = 0; k < cells.count; ++k)
+    if (kSteepness * (2 * cells.weight[k] - 1) >= 1) {  // whatever the others' signs are
+      out.part[static_cast<std::size_t>(k)] = 1;
+      return out;
+    }
+  // The first cell's sign is +: all signs turned give the same products.
+  const int ways = cells.count > 0 ? 1 << (cells.count - 1) : 0;
+  for (int way = 0; way < ways; ++way) {
+    const auto sign = [&](int k) { return (2 * way >> k & 1) != 0 ? -1.f : 1.f; };
+    float sum = 0;
+    for (int k = 0; k < cells.count; ++k) sum += sign(k) * cells.weight[k];
+    const float s = std::clamp(kSteepness * sum, -1.f, 1.f) / static_cast<float>(ways);
+    for (int k = 0; k < cells.count; ++k) out.part[static_cast<std::size_t>(k)] += sign(k) * s;
+  }
+  return out;
 }
 
 }  // namespace fieldmark::watermark

@@ -154,3 +154,113 @@ TEST_CASE("kernels/march: rays side by side stop in the block of their first sam
     CHECK(reached > 0);
   });
 }
+
+namespace {
+// t and what contract() makes of o + t d, in double.
+struct Placed {
+  double scale, x[3];
+};
+Placed placed(const ContractedRay& r, double t) {
+  Placed p{1, {}};
+  for (int a = 0; a < 3; ++a) {
+    p.x[a] = static_cast<double>(r.o[a]) + t * static_cast<double>(r.d[a]) - 0.5;
+    p.scale = std::max(p.scale, 4 * std::abs(p.x[a]));
+  }
+  for (double& x : p.x) x = 0.5 + x * (2 - 1 / p.scale) / p.scale;
+  return p;
+}
+
+std::vector<ContractedRay> contracted_rays() {
+  const auto ends = uniform({kMarchLanes, 6}, 0, 1, 3);
+  std::vector<ContractedRay> rays;
+  for (int i = 0; i < kMarchLanes; ++i) {
+    const MarchRay r = ray_through(&ends.data[static_cast<std::size_t>(6 * i)],
+                                   &ends.data[static_cast<std::size_t>(6 * i + 3)], 0.004f, 0);
+    ContractedRay c{.near = 0.002f, .step = 0.004f, .k = 0};
+    for (int a = 0; a < 3; ++a) c.o[a] = r.o[a], c.d[a] = r.d[a];
+    rays.push_back(c);
+  }
+  return rays;
+}
+
+std::vector<float> walked(const Grid& grid, ContractedRay ray, std::int64_t piece) {
+  std::vector<float> all, t(static_cast<std::size_t>(piece) + 1, -7.f),
+      x(static_cast<std::size_t>(3 * piece) + 1, -7.f);
+  for (std::int64_t count = piece; count == piece;) {
+    count = FIELDMARK_KERNEL(march_contracted)(grid.view(), ray, piece, t.data(), x.data());
+    REQUIRE((t.back() == -7.f && x.back() == -7.f));
+    for (std::int64_t s = 0; s < count; ++s) {
+      const Placed want = placed(ray, static_cast<double>(t[static_cast<std::size_t>(s)]));
+      for (int a = 0; a < 3; ++a)
+        REQUIRE(std::abs(static_cast<double>(x[static_cast<std::size_t>(3 * s + a)]) - want.x[a]) < 2e-7);
+    }
+    all.insert(all.end(), t.begin(), t.begin() + count);
+  }
+  return all;
+}
+}  // namespace
+
+TEST_CASE(
+    "kernels/march: contracted rays give every sample in a full grid, in pieces of any length, x within "
+    "2e-7") {
+  each_isa([] {
+    Grid full;
+    for (int c = 0; c < kSide * kSide * kSide; ++c)
+      full.fill(c % kSide, c / kSide % kSide, c / kSide / kSide);
+    for (const ContractedRay& ray : contracted_rays()) {
+      const auto got = walked(full, ray, 4000);
+      for (const std::int64_t piece : {1, 5, 16}) REQUIRE(walked(full, ray, piece) == got);
+      double t = static_cast<double>(ray.near);
+      std::size_t k = 0;
+      for (; placed(ray, t).scale < static_cast<double>(kMarchFarthest); ++k) {
+        REQUIRE(k < got.size());
+        REQUIRE(std::abs(static_cast<double>(got[k]) / t - 1) < 2e-5);
+        t += static_cast<double>(ray.step) * placed(ray, t).scale;
+      }
+      CHECK((k > 250 && k + 1 >= got.size()));  // the last may be on either side of the end
+    }
+  });
+}
+
+TEST_CASE(
+    "kernels/march: contracted rays side by side stop in the block of their first sample, or at their end") {
+  each_isa([] {
+    Grid grid;
+    grid.fill(6, 6, 6);
+    grid.fill(1, 10, 2);
+    grid.fill(11, 5, 5);  // far outside
+    const std::vector<ContractedRay> single = contracted_rays();
+    ContractedRays rays{};
+    for (int i = 0; i < kMarchLanes; ++i) {
+      const ContractedRay& r = single[static_cast<std::size_t>(i)];
+      for (int a = 0; a < 3; ++a) rays.o[a][i] = r.o[a], rays.d[a][i] = r.d[a];
+      rays.near[i] = r.near, rays.step[i] = r.step, rays.k[i] = i % 3 ? 0 : kMarchMost;  // or without a ray
+    }
+    FIELDMARK_KERNEL(march_contracted_to_blocks)(grid.view(), rays);
+    int jumped = 0, reached = 0, ended = 0;
+    for (int i = 0; i < kMarchLanes; ++i) {
+      ContractedRay r = single[static_cast<std::size_t>(i)];
+      CAPTURE(i);
+      if (i % 3 == 0) {
+        CHECK((rays.k[i] == kMarchMost && rays.near[i] == r.near));
+        continue;
+      }
+      const auto want = walked(grid, r, 1000);
+      jumped += rays.k[i] > 0;
+      r.near = rays.near[i];
+      r.k = rays.k[i];
+      CHECK(walked(grid, r, 1000) == want);
+      const Placed p = placed(r, static_cast<double>(r.near));
+      std::size_t block = 0;
+      for (int a = 2; a >= 0; --a) block = block * kBlocks + static_cast<std::size_t>(p.x[a] * kBlocks);
+      if (p.scale < static_cast<double>(kMarchFarthest)) {
+        CHECK(grid.clearance[block] == 0);
+        ++reached;
+      } else {
+        CHECK(want.empty());
+        ++ended;
+      }
+    }
+    CHECK((jumped > 2 && reached > 2 && ended > 0));
+  });
+}

@@ -33,10 +33,14 @@ class RayWalk {
   Index next(const OccupancyGrid& grid, Index max, float* t, float* x);
   /// Moves walks to where their next samples may be, past empty cells; next() then gives the same samples as
   /// without, sooner: rays that pass through the same cells jump together.
-  /// @param which  numbers of the walks that are moved, in [0, walks.size())
+  /// @param which  numbers of the walks that are moved, in [0, walks.size()): all straight or all contracted
   static void skip_empty(const OccupancyGrid& grid, std::span<RayWalk> walks, std::span<const Index> which);
 
  private:
+  static void skip_straight(const OccupancyGrid& grid, std::span<RayWalk> walks,
+                            std::span<const Index> which);
+  static void skip_contracted(const OccupancyGrid& grid, std::span<RayWalk> walks,
+                              std::span<const Index> which);
   Index next_straight(const OccupancyGrid& grid, Index max, float* t);
   Index next_contracted(const OccupancyGrid& grid, Index max, float* t, float* x);
   float scale_at(float t) const;

@@ -1,6 +1,7 @@
 #pragma once
 #include <fieldmark/engine/shape.h>
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -41,7 +42,24 @@ class CellGrid {
   /// where no cell is near
   void blend(std::span<const std::int8_t> signs, const float* x, Index n, float* s) const;
 
+  /// Cells that blend() mixes at one position, and how much of the mark there is of each.
+  struct Mix {
+    Index count = 0;                     ///< at most 8
+    std::array<std::int32_t, 8> cell{};  ///< [count] each once
+    std::array<float, 8> part{};         ///< [count] in [0, 1]
+  };
+  /// part_c is the mean, over all signs that the cells could have, of c's sign times what blend() gives: the
+  /// weights of the best linear guess of it, since signs are independent. Inside a cell its part is 1.
+  /// @param x  [3]
+  Mix mix(const float* x) const;
+
  private:
+  struct Near {
+    int count = 0;
+    std::int32_t cell[8];
+    float weight[8];  // sum 1
+  };
+  Near near(const float* x) const;
   CellGrid() = default;
   Index side_ = 0;
   std::vector<std::int32_t> numbers_;

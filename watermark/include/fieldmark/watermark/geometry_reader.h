@@ -36,12 +36,12 @@ struct PictureReading {
 ///   - Cameras are proposed by CameraSearch and aligned coarse to fine by PoseAligner; the one that agrees
 ///     best is kept.
 ///   - The picture's blur is taken for the one of a few that leaves least; gain, offset and gamma are fitted.
-///   - With R the difference left and K the mark of sign +1 seen by this camera (what MarkNetwork adds, under
-///     the same blur), both divided by the deviation of R around each pixel,
-///       S_c = tanh(e / 2 sum_{p in c} R(p) K(p)),
-///     where e makes up for differences that are alike from pixel to pixel: it is measured on R moved aside.
-///     So few large cells do not drown many small ones.
-///   - Of a picture that find_jpeg() recognises, R is jpeg_score() instead and K is not divided.
+///   - With R the difference left and V its power around each pixel, R / V is the score and 1 / V the
+///   precision
+///     of a MarkScore; of a picture that find_jpeg() recognises both are jpeg_score()'s.
+///   - The cells' signs are those that explain all of it together, S_c = s_c of fit_signs(): a pixel's ray
+///   passes
+///     several cells, in a scene without hard surfaces many.
 class GeometryReader {
  public:
   /// Least agreement at which an alignment is believed. In the tests the best camera of another scene of the
