@@ -46,6 +46,33 @@ TEST_CASE("pose_alignment: a disturbed camera comes back to a tenth of a pixel")
   }
 }
 
+TEST_CASE("pose_alignment: plain corners do not count where the scene fills its pictures") {
+  nerf::RadianceField field = small_field();
+  field.space = {.kind = nerf::SpaceKind::contracted, .bounds = {.corner = {-1, -1, -1}, .side = 2}};
+  const nerf::Camera camera =
+      nerf::make_camera(nerf::look_at({0.3, -0.4, 0.2}, {0, 1, 0}, {0, 0, 1}), 0.9, 96, 96);
+  nerf::Renderer renderer(field);
+  Tensor<float> picture = quantize8(renderer.render(camera).rgb), spotted = picture;
+  Index corners = 0;
+  for (Index p = 0; p < 96 * 96; ++p) {
+    const Index y = p / 96, x = p % 96;
+    if (std::min(y, 95 - y) + std::min(x, 95 - x) >= 30) continue;
+    ++corners;
+    for (Index a = 0; a < 3; ++a) {
+      picture[3 * p + a] = 1;
+      spotted[3 * p + a] = static_cast<float>((x / 6 + y / 6) % 2);  // as large, but not plain
+    }
+  }
+  CHECK(corners > 1000);
+  constexpr AlignmentStage kStay[] = {{.size = 96, .blur = 1, .steps = 0}};
+  PoseAligner aligner(field);
+  const double plain = aligner.align(picture, camera, kStay).agreement,
+               rough = aligner.align(spotted, camera, kStay).agreement;
+  CAPTURE(plain, rough);
+  CHECK(plain > 0.98);
+  CHECK(rough < 0.8);
+}
+
 TEST_CASE("pose_alignment: a turned and cut picture with other tones is met by roll, focal length and cut") {
   const nerf::Camera camera = near_camera(4);
   nerf::Camera part = moved(camera, {0, 0, 0}, {0, 0, 0.3, 0, 0, 0, std::log(1.3)});

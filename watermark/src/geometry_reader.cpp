@@ -1,6 +1,7 @@
 #include <fieldmark/engine/resize.h>
 #include <fieldmark/watermark/geometry_reader.h>
 #include <fieldmark/watermark/jpeg_score.h>
+#include <fieldmark/watermark/plain_border.h>
 #include <fieldmark/watermark/sign_fit.h>
 #include <fieldmark/watermark/tone_fit.h>
 
@@ -83,10 +84,12 @@ void use_jpeg(JpegScore&& jpeg, const Tensor<float>& mark, MarkScore& s) {
 }
 
 MarkScore score_of(const Tensor<float>& picture, const CachedView& view, const Tensor<float>& mark,
-                   const std::optional<JpegTrace>& jpeg) {
+                   const std::vector<std::uint8_t>& border, const std::optional<JpegTrace>& jpeg) {
   MarkScore s{
       .score = Tensor<float>(picture.shape), .precision = Tensor<float>(picture.shape), .on_object = {}};
   for (const float opacity : view.opacity.data) s.on_object.push_back(opacity > 0.5f ? 1 : 0);
+  for (std::size_t p = 0; p < border.size(); ++p)
+    if (border[p]) s.on_object[p] = 0;
   const Shown seen = shown(picture, view.base, s.on_object);
   s.blur = seen.blur;
   if (!jpeg) {
@@ -118,7 +121,8 @@ GeometryReader::GeometryReader(const Owner& owner, const CameraSearchOptions& se
 std::vector<double> GeometryReader::evidence_at(const Tensor<float>& picture, const nerf::Camera& camera) {
   const CachedView view = cache_view(renderer_, owner_.field, camera, kSamples);
   const Carriers mark = carriers(owner_, view);
-  const MarkScore score = score_of(picture, view, mark.whole, find_jpeg(picture));
+  const MarkScore score =
+      score_of(picture, view, mark.whole, border_of(owner_.field, picture), find_jpeg(picture));
   return fit_signs(mark, score, owner_.cells.count()).sign;
 }
 

@@ -1,5 +1,6 @@
 #include <fieldmark/engine/resize.h>
 #include <fieldmark/watermark/camera_motion.h>
+#include <fieldmark/watermark/plain_border.h>
 #include <fieldmark/watermark/pose_alignment.h>
 #include <fieldmark/watermark/tone_fit.h>
 #include <fieldmark/watermark/view_cache.h>
@@ -74,13 +75,17 @@ double slope_y(const Tensor<float>& t, Index y, Index x, Index c) {
 // A picture at a stage's size, and what is done with it.
 class Stage {
  public:
+  // border: [H W] 1 where the picture shows no scene; empty: everywhere
   Stage(nerf::Renderer& renderer, const nerf::RadianceField& field, const Tensor<float>& picture,
-        const AlignmentStage& options)
+        const std::vector<std::uint8_t>& border, const AlignmentStage& options)
       : renderer_(renderer), field_(field), options_(options) {
     const Index longer = std::max(picture.shape[0], picture.shape[1]);
     const double zoom = static_cast<double>(std::min(options.size, longer)) / static_cast<double>(longer);
     const auto side = [&](Index n) { return std::max<Index>(2, std::lround(zoom * static_cast<double>(n))); };
     picture_ = blurred(resize_area(picture, side(picture.shape[0]), side(picture.shape[1])), options.blur);
+    if (!border.empty())
+      border_ = border_at(border, picture.shape[0], picture.shape[1], picture_.shape[0], picture_.shape[1],
+                          reach());
   }
 
   // Renders the field from a camera; differ() adds spread and cost.
@@ -89,7 +94,9 @@ class Stage {
     l.camera = camera.scaled(picture_.shape[1], picture_.shape[0]);
     const CachedView view = cache_view(renderer_, field_, l.camera);
     l.render = blurred(view.base, options_.blur);
-    l.seen = seen_or_beside(view, static_cast<Index>(std::ceil(2 * options_.blur)));
+    l.seen = seen_or_beside(view, reach());
+    for (std::size_t p = 0; p < border_.size(); ++p)
+      if (border_[p]) l.seen[p] = -1;
     double total = 0, depth = 0;
     for (std::size_t k = 0; k < view.weight.size(); ++k) {
       const float* x = &view.position[3 * k];
@@ -230,6 +237,8 @@ class Stage {
   }
 
  private:
+  Index reach() const { return static_cast<Index>(std::ceil(2 * options_.blur)); }
+
   static void hold(Matrix& h, Vector& g, int k) {
     h.row(k).setZero();
     h.col(k).setZero();
@@ -253,6 +262,7 @@ class Stage {
   const nerf::RadianceField& field_;
   AlignmentStage options_;
   Tensor<float> picture_;
+  std::vector<std::uint8_t> border_;  // at the stage's size
 };
 
 }  // namespace
@@ -268,8 +278,10 @@ Alignment PoseAligner::align(const Tensor<float>& picture, const nerf::Camera& s
     if (stage.size < 16)
       throw ValueError("[pose_aligner] stages must be of at least 16 pixels, got " +
                        std::to_string(stage.size));
+  const auto border = border_of(field_, picture);
   Alignment out{start, -1};
-  for (const AlignmentStage& stage : stages) out = Stage(renderer_, field_, picture, stage).run(out.camera);
+  for (const AlignmentStage& stage : stages)
+    out = Stage(renderer_, field_, picture, border, stage).run(out.camera);
   out.camera = out.camera.scaled(picture.shape[1], picture.shape[0]);
   return out;
 }

@@ -27,7 +27,8 @@ struct Alignment {
 /// Each step renders the field, fits gain, offset and gamma of each channel, and solves for the motion that
 /// the remaining difference asks for (Lucas and Kanade 1981 with the field's own depth; Levenberg and
 /// Marquardt's damping; Cauchy weights). A picture that was rotated, scaled or cut is seen by a camera that
-/// was rolled, or has another focal length or principal point, so that it needs nothing of its own.
+/// was rolled, or has another focal length or principal point, so that it needs nothing of its own; the plain
+/// corners that turning leaves (see plain_border.h) do not count where the field's scene fills its pictures.
 /// Keeps buffers: one object per thread. Equal arguments give equal bits for any number of threads.
 class PoseAligner {
  public:

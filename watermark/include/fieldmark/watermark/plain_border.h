@@ -1,0 +1,26 @@
+#pragma once
+#include <fieldmark/nerf/radiance_field.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace fieldmark::watermark {
+
+/// [H W] 1 where a picture shows no scene but a plain border, as turning leaves it in the corners, else 0:
+/// what hangs together with a corner and has its colour to 0.06 in every channel under a blur of deviation 2
+/// pixels (so that noise of deviation 0.1 does not hide it), with 6 pixels around for the blur. Corners whose
+/// part is below 0.5% of the picture do not count. A plain wall in a corner is taken for one, too.
+/// @param picture  [H, W, 3] in [0, 1]   @throws ShapeError if it is not
+std::vector<std::uint8_t> plain_border(const Tensor<float>& picture);
+
+/// The same of a picture of a field's scene if that fills its pictures; else empty, since an object's plain
+/// background says where it ends.
+std::vector<std::uint8_t> border_of(const nerf::RadianceField& field, const Tensor<float>& picture);
+
+/// The same at another size: 1 where any pixel within `reach` of the place was 1.
+/// @param border  [H W]   @param to_height, to_width  at least 1   @throws ShapeError if a size is below 1 or
+/// border is not [H W]
+std::vector<std::uint8_t> border_at(const std::vector<std::uint8_t>& border, Index height, Index width,
+                                    Index to_height, Index to_width, Index reach);
+
+}  // namespace fieldmark::watermark
