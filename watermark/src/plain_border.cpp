@@ -9,10 +9,9 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr double kBlur = 3;       // deviation, pixels
-constexpr Index kAround = 6;      // pixels
-constexpr float kAlike = 0.06f;   // of every channel
-constexpr double kLeast = 0.005;  // of the picture
+constexpr double kBlurs[] = {0.5, 3};  // deviations, pixels
+constexpr Index kAround = 6;           // pixels
+constexpr float kAlike = 0.06f;        // of every channel
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
@@ -50,11 +49,10 @@ std::vector<std::uint8_t> plain_border(const Tensor<float>& picture) {
   const Index h = picture.shape[0], w = picture.shape[1];
   std::vector<std::uint8_t> border(at(h * w));
   if (h * w == 0) return border;
-  const Tensor<float> soft = blurred(picture, kBlur);
-  for (const Index corner : {Index{0}, w - 1, (h - 1) * w, h * w - 1}) {
-    const std::vector<Index> part = region(soft, corner);
-    if (static_cast<double>(part.size()) < kLeast * static_cast<double>(h * w)) continue;
-    for (const Index p : part) border[at(p)] = 1;
+  for (const double blur : kBlurs) {
+    const Tensor<float> soft = blurred(picture, blur);
+    for (const Index corner : {Index{0}, w - 1, (h - 1) * w, h * w - 1})
+      for (const Index p : region(soft, corner)) border[at(p)] = 1;
   }
   return border_at(border, h, w, h, w, kAround);
 }

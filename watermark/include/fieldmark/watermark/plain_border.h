@@ -7,9 +7,9 @@
 namespace fieldmark::watermark {
 
 /// [H W] 1 where a picture shows no scene but a plain border, as turning leaves it in the corners, else 0:
-/// what hangs together with a corner and has its colour to 0.06 in every channel under a blur of deviation 2
-/// pixels (so that noise of deviation 0.1 does not hide it), with 6 pixels around for the blur. Corners whose
-/// part is below 0.5% of the picture do not count. A plain wall in a corner is taken for one, too.
+/// what hangs together with a corner and has its colour to 0.06 in every channel, under a blur of deviation
+/// 0.5 pixels (thin wedges) or of 3 (noise of deviation 0.1 does not hide it), with 6 pixels around for the
+/// blur. What is plain about a corner of the scene itself counts too; it says little.
 /// @param picture  [H, W, 3] in [0, 1]   @throws ShapeError if it is not
 std::vector<std::uint8_t> plain_border(const Tensor<float>& picture);
 
