@@ -176,7 +176,9 @@ std::vector<ContractedRay> contracted_rays() {
   for (int i = 0; i < kMarchLanes; ++i) {
     const MarchRay r = ray_through(&ends.data[static_cast<std::size_t>(6 * i)],
                                    &ends.data[static_cast<std::size_t>(6 * i + 3)], 0.004f, 0);
-    ContractedRay c{.near = 0.002f, .step = 0.004f, .k = 0};
+    ContractedRay c{};
+    c.near = 0.002f;
+    c.step = 0.004f;
     for (int a = 0; a < 3; ++a) c.o[a] = r.o[a], c.d[a] = r.d[a];
     rays.push_back(c);
   }
