@@ -1,7 +1,6 @@
 #include <fieldmark/engine/error.h>
 #include <fieldmark/watermark/sign_fit.h>
 
-#include <Eigen/Cholesky>
 #include <cmath>
 
 #include "support/catch.h"
@@ -53,18 +52,34 @@ MarkScore score_of(const Carriers& c, double deviation, double blur = 0) {
   return s;
 }
 
-// Pixels' marks of every cell under the blur, one after another.
-Eigen::MatrixXd carriers_of(const Carriers& c, double blur) {
-  Eigen::MatrixXd m = Eigen::MatrixXd::Zero(3 * kPixels, kCells);
+// [cells][3 P] pixels' marks of every cell under the blur.
+std::vector<std::vector<double>> carriers_of(const Carriers& c, double blur) {
+  std::vector<std::vector<double>> m;
   for (Index cell = 0; cell < kCells; ++cell) {
     Tensor<float> own(c.whole.shape);
     for (std::size_t e = 0; e < c.cell.size(); ++e)
       for (std::size_t a = 0; a < 3; ++a)
         if (c.cell[e] == cell) own.data[3 * (e / 2) + a] += c.part[3 * e + a];
     own = blurred(own, blur);
-    for (Index i = 0; i < own.size(); ++i) m(i, cell) = static_cast<double>(own[i]);
+    m.emplace_back(own.data.begin(), own.data.end());
   }
   return m;
+}
+
+// x of A x = b, A [n, n] symmetric and positive, by elimination.
+std::vector<double> solved(std::vector<std::vector<double>> a, std::vector<double> b) {
+  const std::size_t n = b.size();
+  for (std::size_t k = 0; k < n; ++k)
+    for (std::size_t i = k + 1; i < n; ++i) {
+      const double f = a[i][k] / a[k][k];
+      for (std::size_t j = k; j < n; ++j) a[i][j] -= f * a[k][j];
+      b[i] -= f * b[k];
+    }
+  for (std::size_t k = n; k-- > 0;) {
+    for (std::size_t j = k + 1; j < n; ++j) b[k] -= a[k][j] * b[j];
+    b[k] /= a[k][k];
+  }
+  return b;
 }
 }  // namespace
 
@@ -75,20 +90,22 @@ TEST_CASE(
     MarkScore s = score_of(c, 0.02, blur);
     for (std::size_t p = 0; p < 200; ++p) s.on_object[p] = 0;
     const SignFit fit = fit_signs(c, s, kCells);
-    const Eigen::MatrixXd m = carriers_of(c, blur);
-    Eigen::VectorXd g(3 * kPixels), w(3 * kPixels);
-    for (Index i = 0; i < 3 * kPixels; ++i) {
-      const double counts = s.on_object[static_cast<std::size_t>(i / 3)];
-      g[i] = counts * static_cast<double>(s.score[i]);
-      w[i] = counts * static_cast<double>(s.precision[i]);
+    const auto m = carriers_of(c, blur);
+    std::vector<std::vector<double>> normal(kCells, std::vector<double>(kCells));
+    std::vector<double> right(kCells);
+    for (std::size_t k = 0; k < kCells; ++k) {
+      for (std::size_t i = 0; i < m[k].size(); ++i) {
+        if (!(s.on_object[i / 3] > 0)) continue;
+        right[k] += m[k][i] * static_cast<double>(s.score.data[i]);
+        for (std::size_t l = 0; l < kCells; ++l)
+          normal[k][l] += m[k][i] * m[l][i] * static_cast<double>(s.precision.data[i]);
+      }
+      normal[k][k] += fit.noise;
     }
-    const Eigen::MatrixXd normal =
-        m.transpose() * w.asDiagonal() * m + fit.noise * Eigen::MatrixXd::Identity(kCells, kCells);
-    const Eigen::VectorXd want = normal.ldlt().solve(m.transpose() * g);
-    for (Index cell = 0; cell < kCells; ++cell) {
-      CAPTURE(blur, cell, fit.noise);
-      CHECK(fit.sign[static_cast<std::size_t>(cell)] ==
-            Approx(std::clamp(want[cell], -1.0, 1.0)).margin(2e-2));
+    const auto want = solved(normal, right);
+    for (std::size_t k = 0; k < kCells; ++k) {
+      CAPTURE(blur, k, fit.noise);
+      CHECK(fit.sign[k] == Approx(std::clamp(want[k], -1.0, 1.0)).margin(2e-2));
     }
   }
 }
