@@ -3,9 +3,9 @@
 
 #include <cmath>
 
+#include "blurred.h"
 #include "support/catch.h"
 #include "support/random.h"
-#include "watermark/blurred.h"
 
 using namespace fieldmark;
 using namespace fieldmark::watermark;
