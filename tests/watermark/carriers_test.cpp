@@ -12,12 +12,6 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
-Owner marking_owner() {
-  Owner owner = tiny_owner();
-  owner.gain = 0.05;
-  return owner;
-}
-
 nerf::Camera camera() {
   return nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::near, 1, 64, 3).front();
 }
@@ -59,7 +53,7 @@ Left left_of(const Owner& owner, const std::vector<std::int8_t>& signs, Index sa
 }  // namespace
 
 TEST_CASE("carriers: where all signs are alike a marked view's difference is the whole") {
-  const Owner owner = marking_owner();
+  const Owner owner = marking_owner(0.05);
   const Left left =
       left_of(owner, std::vector<std::int8_t>(static_cast<std::size_t>(owner.cells.count()), 1), 64, true);
   CAPTURE(left.rest, left.all);
@@ -67,7 +61,7 @@ TEST_CASE("carriers: where all signs are alike a marked view's difference is the
 }
 
 TEST_CASE("carriers: where signs differ it is about the sum of parts with their cells' signs") {
-  const Owner owner = marking_owner();
+  const Owner owner = marking_owner(0.05);
   const auto signs = cell_signs(owner.code(), Message{{1, 0, 0, 1}});
   const auto left = [&](Index samples) { return left_of(owner, signs, samples, false); };
   const Left one = left(1), four = left(4), all = left(64);
@@ -78,7 +72,7 @@ TEST_CASE("carriers: where signs differ it is about the sum of parts with their 
 }
 
 TEST_CASE("carriers: a pixel's parts are of different cells, one alone is the whole, and some have none") {
-  const Owner owner = marking_owner();
+  const Owner owner = marking_owner(0.05);
   const CachedView view = view_of(owner, 1);
   const Carriers c = carriers(owner, view);
   REQUIRE(c.begin.size() == static_cast<std::size_t>(view.height * view.width) + 1);

@@ -16,13 +16,6 @@ namespace {
 constexpr CameraSearchOptions kSearch{.views = 40, .size = 32};
 const Message kMessage{{1, 0, 0, 1}};
 
-// The mark of networks that have not learnt anything: of some strength, so that it can be found.
-Owner marking_owner() {
-  Owner owner = tiny_owner();
-  owner.gain = 0.1;
-  return owner;
-}
-
 nerf::Camera near_camera(std::uint64_t seed) {
   return nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::near, 1, 96, seed).front();
 }

@@ -15,12 +15,6 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
-Owner owner_with_gain() {
-  Owner owner = tiny_owner();
-  owner.gain = 0.1;
-  return owner;
-}
-
 std::vector<nerf::Camera> cameras(Index count) {
   return nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::near, count, 0, 8);
 }
@@ -33,7 +27,7 @@ double mean(const std::vector<double>& v) {
 }  // namespace
 
 TEST_CASE("measurement: figures are the means over the views, view by view") {
-  const Owner owner = owner_with_gain();
+  const Owner owner = marking_owner();
   const auto views = cameras(5);
   const Lpips<float> lpips(random_weights(lpips_tensors(LpipsNetwork::squeeze)), LpipsNetwork::squeeze);
   const Measurement m = measure(owner, nullptr, nullptr, {.cameras = views, .seed = 6, .lpips = &lpips});
@@ -70,7 +64,7 @@ TEST_CASE("measurement: figures are the means over the views, view by view") {
 }
 
 TEST_CASE("measurement: distortions are measured each under its name, on the same bits for any threads") {
-  const Owner owner = owner_with_gain();
+  const Owner owner = marking_owner();
   const MeasureOptions options{.cameras = cameras(3), .under = {"noise_0", "blur_2", "crop_0.5"}, .seed = 6};
   const int before = threads();
   set_threads(1);
@@ -91,7 +85,7 @@ TEST_CASE("measurement: distortions are measured each under its name, on the sam
 }
 
 TEST_CASE("measurement: a baked field is looked at as it is, with the message it was given") {
-  const Owner owner = owner_with_gain();
+  const Owner owner = marking_owner();
   const Message sent{{1, 1, 0, 1}}, opposite{{0, 0, 1, 0}};
   const auto views = cameras(3);
   const Measurement m = measure(owner, &owner.field, &sent, {.cameras = views});
@@ -103,7 +97,7 @@ TEST_CASE("measurement: a baked field is looked at as it is, with the message it
 }
 
 TEST_CASE("measurement: progress is told after each view and may stop") {
-  const Owner owner = owner_with_gain();
+  const Owner owner = marking_owner();
   std::vector<std::pair<Index, Index>> calls;
   MeasureOptions options{.cameras = cameras(2), .progress = [&](Index done, Index total) {
                            calls.emplace_back(done, total);
@@ -116,7 +110,7 @@ TEST_CASE("measurement: progress is told after each view and may stop") {
 }
 
 TEST_CASE("measurement: messages may be chosen, and each reading is handed out") {
-  const Owner owner = owner_with_gain();
+  const Owner owner = marking_owner();
   const Message odd{{1, 0, 1, 1}}, even{{0, 1, 1, 0}};
   const auto of_view = [&](Index view) { return view % 2 ? odd : even; };
   std::vector<std::string> calls;
@@ -142,7 +136,7 @@ TEST_CASE("measurement: messages may be chosen, and each reading is handed out")
 }
 
 TEST_CASE("measurement: errors name what is missing") {
-  const Owner owner = owner_with_gain();
+  const Owner owner = marking_owner();
   const Message sent{{1, 1, 0, 1}};
   CHECK_THROWS_AS(measure(owner, &owner.field, nullptr, {.cameras = cameras(1)}), ValueError);
   CHECK_THROWS_WITH(measure(owner, nullptr, &sent, {.cameras = cameras(1)}),

@@ -40,7 +40,14 @@ inline fieldmark::watermark::Owner tiny_owner(double strength = 30) {
           CellGrid(6, visible_area(tiny_views(), 6), 1e-3)};
 }
 
-/// The same under preset paper, with small networks.
+/// The mark of networks that have not learnt anything, of some strength, so that it can be found.
+inline fieldmark::watermark::Owner marking_owner(double gain = 0.1) {
+  fieldmark::watermark::Owner owner = tiny_owner();
+  owner.gain = gain;
+  return owner;
+}
+
+/// An owner under preset paper, with small networks.
 inline fieldmark::watermark::Owner tiny_paper_owner() {
   using namespace fieldmark::watermark;
   return {tiny_field(),
