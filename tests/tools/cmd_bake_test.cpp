@@ -118,6 +118,9 @@ TEST_CASE("bake encodes payloads, and the other commands know them and their cla
   CHECK(drawn["payload"]["trials"] == 2);
   CHECK(drawn["payload"]["together"] == 2);
   CHECK(drawn["payload"]["under"]["blur_1"]["trials"] == 2);
+  CHECK(drawn["payload"]["single"]["trials"] == 4);
+  CHECK(drawn["payload"]["single"]["under"]["blur_1"]["trials"] == 4);
+  CHECK(!of_baked["payload"].contains("single"));
   CHECK(json_of({"measure", "--geometry-count", "0", "--owner", owner, "--count", "1"})["payload"].is_null());
   const auto refused = [&](const std::vector<std::string>& options, const char* why) {
     std::vector<std::string> line{"bake",    "--owner", owner, "--out", job.folder / "refused.fm",

@@ -129,8 +129,8 @@ TEST_CASE("sign_fit: a cell that is seen through a stronger one keeps its sign")
 
 TEST_CASE("sign_fit: noise that is alike from pixel to pixel counts for what it is") {
   const Carriers c = overlapping(0);
-  MarkScore rough = score_of(c, 1), alike = rough;
-  rough.score = score_of(c, 1).score;
+  const MarkScore rough = score_of(c, 1);
+  MarkScore alike = rough;
   alike.score = blurred(rough.score, 3);
   const double power = [&] {
     double a = 0, b = 0;

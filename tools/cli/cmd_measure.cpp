@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <ostream>
+#include <span>
 
 #include "cli/cli.h"
 #include "cli/commands.h"
@@ -55,7 +56,7 @@ nerf::Evaluation against_photographs(const Options& options, const nerf::Radianc
 }
 
 // Raw bits and payloads are two figures: those of a view, and what a correction makes of a group of views.
-Json payloads_json(const Options& options, const watermark::PayloadViews& views, Context& context) {
+Json payloads_json(Index together, const watermark::PayloadViews& views, Context& context) {
   Json json = nullptr, under = Json::object();
   for (const auto& [name, a] : views.accuracies()) {
     const auto [low, high] = watermark::wilson_interval(a.exact, a.trials);
@@ -67,15 +68,36 @@ Json payloads_json(const Options& options, const watermark::PayloadViews& views,
     std::snprintf(line, sizeof line,
                   "%-20s %.2f%% exact (95%%: %.2f to %.2f%%) of %lld readings of %lld views, %lld wrong\n",
                   name.empty() ? "payload" : ("  under " + name).c_str(), 100 * a.share(), 100 * low,
-                  100 * high, static_cast<long long>(a.trials), static_cast<long long>(options.together),
+                  100 * high, static_cast<long long>(a.trials), static_cast<long long>(together),
                   static_cast<long long>(a.wrong));
     context.text() << line;
   }
   if (json.is_null()) return json;
-  json["together"] = options.together;
+  json["together"] = together;
   json["under"] = under;
   return json;
 }
+
+// Payloads of groups of views and, where a group has several, of each view by itself.
+class PayloadCounts {
+ public:
+  PayloadCounts(const watermark::CellCode& code, Index bits, Index together)
+      : together_(together), groups_(code, bits, together), singles_(code, bits, 1) {}
+  void add(Index view, const std::string& under, std::span<const double> evidence,
+           const watermark::Message& sent) {
+    groups_.add(view, under, evidence, sent);
+    if (together_ > 1) singles_.add(view, under, evidence, sent);
+  }
+  Json json(Context& context) const {
+    Json json = payloads_json(together_, groups_, context);
+    if (!json.is_null() && together_ > 1) json["single"] = payloads_json(1, singles_, context);
+    return json;
+  }
+
+ private:
+  Index together_;
+  watermark::PayloadViews groups_, singles_;
+};
 
 // Random payloads in place of random messages, one for each group of views.
 std::function<watermark::Message(Index)> messages_of(const Options& options,
@@ -109,7 +131,7 @@ Measured measured_on(const std::string& set, const std::vector<nerf::Camera>& ca
     throw UsageError("--together: there are " + std::to_string(cameras.size()) + " views");
   const watermark::PayloadCodec codec(bits);
   const auto code = subject.owner.code();
-  watermark::PayloadViews payloads(code, bits, options.together);
+  PayloadCounts payloads(code, bits, options.together);
   const auto measured = run_measure(
       subject.owner, subject.baked ? &*subject.baked : nullptr, subject.message ? &*subject.message : nullptr,
       {.cameras = cameras,
@@ -124,7 +146,7 @@ Measured measured_on(const std::string& set, const std::vector<nerf::Camera>& ca
       context);
   print_measurement(context.text(), measured, set);
   Json json = measurement_json(measured, set);
-  json["payload"] = payloads_json(options, payloads, context);
+  json["payload"] = payloads.json(context);
   return {json, measurement_row(measured, set)};
 }
 
@@ -204,8 +226,8 @@ Command add_measure(CLI::App& app) {
       "--payloads", o->payloads,
       "Random payloads of up to 40 bits in place of random messages, to count those that are read exactly");
   app.add_option("--together", o->together,
-                 "Views whose evidence is added before a payload is read, 1 to 10000; each such group has "
-                 "one message")
+                 "Views whose evidence is added before a payload is read, 1 to 10000; each such group has\n"
+                 "one message. Above 1 each view is also read by itself")
       ->check(CLI::Range(1, 10000).description(""))
       ->type_name("N");
   add_lpips_weights(app, o->lpips_weights);

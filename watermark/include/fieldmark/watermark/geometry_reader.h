@@ -36,12 +36,10 @@ struct PictureReading {
 ///   - Cameras are proposed by CameraSearch and aligned coarse to fine by PoseAligner; the one that agrees
 ///     best is kept.
 ///   - The picture's blur is taken for the one of a few that leaves least; gain, offset and gamma are fitted.
-///   - With R the difference left and V its power around each pixel, R / V is the score and 1 / V the
-///   precision
-///     of a MarkScore; of a picture that find_jpeg() recognises both are jpeg_score()'s.
+///   - Of the difference left R, whose power around each pixel is V, R / V is the score of a MarkScore and
+///     1 / V its precision; of a picture that find_jpeg() recognises both are jpeg_score()'s.
 ///   - The cells' signs are those that explain all of it together, S_c = s_c of fit_signs(): a pixel's ray
-///   passes
-///     several cells, in a scene without hard surfaces many.
+///     passes several cells, in a scene without hard surfaces many.
 class GeometryReader {
  public:
   /// Least agreement at which an alignment is believed. In the tests the best camera of another scene of the
