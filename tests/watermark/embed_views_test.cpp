@@ -128,8 +128,11 @@ TEST_CASE("embed_views: cells are as fine as a message needs, and no finer") {
                                                (static_cast<float>(k / 64) + 0.5f) / 64, 0.5f});
   }
   const std::vector views(3, wall);
-  CHECK(cells_for_message(views, 128) == 16);
-  CHECK(cells_for_message(views, 129) == 22);
-  CHECK(cells_for_message(views, 2000) == 46);
-  CHECK(cells_for_message({}, 1) == 46);
+  const auto object = nerf::SpaceKind::cube, cut = nerf::SpaceKind::contracted;
+  CHECK(cells_for_message(views, 128, object) == 16);
+  CHECK(cells_for_message(views, 129, object) == 22);
+  CHECK(cells_for_message(views, 51, cut) == 16);
+  CHECK(cells_for_message(views, 52, cut) == 22);
+  CHECK(cells_for_message(views, 4000, object) == 64);
+  CHECK(cells_for_message({}, 1, object) == 64);
 }

@@ -108,9 +108,9 @@ watermark::OwnerOptions owner_options_of(const Options& options, std::uint64_t s
   return owner;
 }
 
-void choose_cells(std::span<const watermark::CachedView> views, watermark::OwnerOptions& owner,
-                  Context& context) {
-  owner.cells = watermark::cells_for_message(views, owner.bits);
+void choose_cells(std::span<const watermark::CachedView> views, nerf::SpaceKind space,
+                  watermark::OwnerOptions& owner, Context& context) {
+  owner.cells = watermark::cells_for_message(views, owner.bits, space);
   const double shown = watermark::cells_shown(views, owner.cells);
   context.text() << owner.cells << " cells an axis: nine of ten views show " << std::lround(shown)
                  << " or more, for " << owner.bits << " bits\n";
@@ -149,7 +149,7 @@ int run(const Options& options, Context& context) {
   auto owner_options = owner_options_of(options, context.seed());
   const bool fast = owner_options.preset == watermark::Preset::fast;
   const auto views = cached_views(options, field, owner_options.reader_size, context);
-  if (fast && !options.cells_given) choose_cells(views, owner_options, context);
+  if (fast && !options.cells_given) choose_cells(views, field.space.kind, owner_options, context);
   auto cells =
       fast ? watermark::CellGrid(owner_options.cells, watermark::visible_area(views, owner_options.cells))
            : watermark::message_slots(owner_options.bits);
@@ -233,8 +233,8 @@ Command add_embed(CLI::App& app) {
       ->type_name("DB");
   auto* cells =
       app.add_option("--cells", o->owner.cells,
-                     "Cells an axis of the scene's cube, 2 to 64 (16 to 46: as many as a view needs to show "
-                     "two or more for each bit)")
+                     "Cells an axis of the scene's cube, 2 to 64 (16 to 64: as many as a view needs to show "
+                     "two or more for each bit, five in scenes without bounds)")
           ->check(CLI::Range(2, 64).description(""))
           ->type_name("N")
           ->default_str("");

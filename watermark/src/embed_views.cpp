@@ -10,10 +10,8 @@ namespace {
 constexpr Index kWindowSize = 160;    // pixels of the small picture that shows where the object is
 constexpr Index kMlpWindowSize = 80;  // of an mlp field, where larger ones would take longer than the views
 constexpr Index kCoarsest = 4;        // the reader's size over the least of a view
-// With 16 an axis views of lego show more than two cells for each of 48 bits, views of fox less than half a
-// one: 96% and 75% of the bits are read blindly (docs/results/mark.md).
-constexpr Index kFewestCells = 16, kMostCells = 46, kMoreCells = 6;
-constexpr double kCellsABit = 2, kPoorViews = 0.1;
+constexpr Index kFewestCells = 16, kMostCells = 64, kMoreCells = 6;
+constexpr double kCellsABit = 2, kCellsABitOfACut = 5, kPoorViews = 0.1;
 
 std::vector<nerf::Camera> cameras_of(const nerf::CameraSpan& span, const EmbedViewOptions& options,
                                      Index size, std::uint64_t seed) {
@@ -98,10 +96,11 @@ double cells_shown(std::span<const CachedView> views, Index side) {
   return *poor;
 }
 
-Index cells_for_message(std::span<const CachedView> views, Index bits) {
+Index cells_for_message(std::span<const CachedView> views, Index bits, nerf::SpaceKind space) {
+  const double least =
+      (space == nerf::SpaceKind::cube ? kCellsABit : kCellsABitOfACut) * static_cast<double>(bits);
   Index side = kFewestCells;
-  while (side < kMostCells && cells_shown(views, side) < kCellsABit * static_cast<double>(bits))
-    side += kMoreCells;
+  while (side < kMostCells && cells_shown(views, side) < least) side += kMoreCells;
   return side;
 }
 

@@ -48,10 +48,11 @@ double cells_shown(const CachedView& view, Index side);
 /// Of several views: as many as nine of ten show at least; 0 without views.
 double cells_shown(std::span<const CachedView> views, Index side);
 
-/// Cells an axis so that one view shows the whole message: the least of 16, 22, 28 ... 46 at which
-/// cells_shown() is two or more for each bit, or 46 if none is. Fewer are easier to recognise; a bit that a
-/// view does not show cannot be read from it.
-/// @param bits  length of the message, at least 1
-Index cells_for_message(std::span<const CachedView> views, Index bits);
+/// Cells an axis so that one view shows the whole message: the least of 16, 22, 28 ... 64 at which
+/// cells_shown() is two or more for each bit, or 64 if none is. Fewer are easier to recognise; a bit that a
+/// view does not show cannot be read from it. Pictures of a scene without bounds are cuts of it, and may be
+/// cut again: five or more for each bit, so that two in five of a picture still show two.
+/// @param bits  length of the message, at least 1   @param space  of the field
+Index cells_for_message(std::span<const CachedView> views, Index bits, nerf::SpaceKind space);
 
 }  // namespace fieldmark::watermark
