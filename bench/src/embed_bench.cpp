@@ -145,6 +145,13 @@ EmbedRow embedded(const nerf::RadianceField& field, const EmbedVariant& v, const
   return row;
 }
 
+const EmbedRow* known_row(const std::vector<EmbedRow>& known, const EmbedVariant& v) {
+  const auto row = std::find_if(known.begin(), known.end(), [&](const EmbedRow& r) {
+    return r.variant.choice == v.choice && r.variant.setting == v.setting;
+  });
+  return row == known.end() ? nullptr : &*row;
+}
+
 std::vector<double> figures_of(const EmbedRow& row) {
   return {-std::log(row.seconds), row.accuracy, row.psnr_object};
 }
@@ -169,7 +176,12 @@ std::vector<EmbedRow> run_embed_bench(const nerf::RadianceField& field,
         progress(v.choice + ": " + v.setting,
                  static_cast<double>(rows.size()) / static_cast<double>(variants.size()));
     };
+    if (const EmbedRow* known = known_row(options.known, v)) {
+      rows.push_back(*known);
+      continue;
+    }
     rows.push_back(embedded(field, v, caches.get(v, stop_or_go), options, stop_or_go));
+    if (options.on_row) options.on_row(rows.back());
   }
   return rows;
 }

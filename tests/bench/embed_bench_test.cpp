@@ -65,6 +65,27 @@ TEST_CASE("embed_bench: a mark is embedded in every way, and judged on the way a
   }
 }
 
+TEST_CASE("embed_bench: rows that are known are not measured again, and new ones are told at once") {
+  std::vector<EmbedVariant> two{tiny_variant(2), tiny_variant(2)};
+  two[1].choice = "length";
+  std::vector<std::string> told;
+  const auto rows = run_embed_bench(
+      tiny_field(), two,
+      {.views = 1, .points = 1, .known = {row("length", 60, 0.9, 36)}, .on_row = [&](const EmbedRow& r) {
+         told.push_back(r.variant.choice);
+       }});
+  // The known one's setting is another: both are run.
+  CHECK(told == std::vector<std::string>{"default", "length"});
+  told.clear();
+  const auto again = run_embed_bench(
+      tiny_field(), two, {.views = 1, .points = 1, .known = rows, .on_row = [&](const EmbedRow& r) {
+                            told.push_back(r.variant.choice);
+                          }});
+  CHECK(told.empty());
+  REQUIRE(again.size() == 2);
+  CHECK(again[1].seconds == rows[1].seconds);
+}
+
 TEST_CASE("embed_bench: the clock of embedding stands still while a mark is judged") {
   using Now = std::chrono::steady_clock;
   const auto begin = Now::now();

@@ -52,6 +52,26 @@ TEST_CASE("bench embed takes an owner's field, and only the rows that are asked 
   CHECK(json["rows"][1]["choice"] == "distances");
 }
 
+TEST_CASE("bench embed goes on with the rows that a file has", "[bench]") {
+  const TinyJob& job = TinyJob::get();
+  const TemporaryFolder folder;
+  const auto rows_of = [&](const char* only) {
+    const auto r =
+        run_command({"bench", "embed", "--field", job.field, "--seconds", "0.2", "--views", "1", "--bits",
+                     "4", "--quick", "--only", only, "--rows", folder / "rows.json", "--json", "-"});
+    INFO(r.err);
+    REQUIRE(r.code == cli::kOk);
+    return nlohmann::json::parse(r.out)["rows"];
+  };
+  const auto first = rows_of("length: half"), both = rows_of("length: ");
+  REQUIRE(first.size() == 2);
+  REQUIRE(both.size() == 4);
+  CHECK(both[0] == first[0]);
+  CHECK(both[2]["seconds"] == first[1]["seconds"]);
+  CHECK(both[2]["commit"] == first[1]["commit"]);
+  CHECK(rows_of("length: half")[1]["seconds"] == first[1]["seconds"]);
+}
+
 TEST_CASE("bench embed: what is not there", "[bench]") {
   CHECK_THAT(run_command({"bench", "embed", "--field", "/nowhere/field.fm"}).err,
              Contains("/nowhere/field.fm"));

@@ -14,6 +14,7 @@
 
 #include "cli/cli.h"
 #include "cli/context.h"
+#include "cli/embed_rows.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -55,7 +56,7 @@ std::vector<bench::EmbedVariant> variants_of(const BenchEmbedOptions& o, std::ui
   return all;
 }
 
-Json row_json(const bench::EmbedRow& r, double usual) {
+Json row_json(const bench::EmbedRow& r, double usual, const std::string& commit) {
   return {{"choice", r.variant.choice},
           {"setting", r.variant.setting},
           {"front", r.front},
@@ -71,7 +72,8 @@ Json row_json(const bench::EmbedRow& r, double usual) {
           {"unseen", r.unseen},
           {"sign", r.figures.sign},
           {"cell", r.figures.index},
-          {"bits_in_training", r.figures.bits}};
+          {"bits_in_training", r.figures.bits},
+          {"commit", commit}};
 }
 
 void print_row(std::ostream& out, const bench::EmbedRow& r, double usual) {
@@ -140,16 +142,34 @@ void write_plots(const std::string& path, const std::string& name, const std::ve
           {.title = "Embedding in " + name + ": the way there", .x = seconds, .y = y, .curves = true}, ways));
 }
 
+EmbedRows kept_rows(const BenchEmbedOptions& o, const std::string& field, Context& context) {
+  return {o.rows,
+          {{"field", field},
+           {"bits", o.bits},
+           {"seconds", o.seconds},
+           {"views", o.views},
+           {"size", o.size},
+           {"seed", context.seed()},
+           {"quick", o.quick}}};
+}
+
 std::vector<bench::EmbedRow> measured(const BenchEmbedOptions& o, const nerf::RadianceField& field,
-                                      Context& context) {
+                                      EmbedRows& kept, Context& context) {
   const auto variants = variants_of(o, context.seed());
   const InterruptGuard guard;
   Progress progress = context.progress("bench");
-  return bench::run_embed_bench(field, variants, {.views = o.views, .size = o.size, .seed = context.seed()},
-                                [&](const std::string& what, double part) {
-                                  if (guard.interrupted()) throw Interrupted("nothing was written");
-                                  progress.update(part, what);
-                                });
+  return bench::run_embed_bench(
+      field, variants,
+      {.views = o.views,
+       .size = o.size,
+       .seed = context.seed(),
+       .known = kept.rows(),
+       .on_row = [&](const bench::EmbedRow& row) { kept.add(row); }},
+      [&](const std::string& what, double part) {
+        if (guard.interrupted())
+          throw Interrupted(o.rows.empty() ? "nothing was written" : "what was measured is in " + o.rows);
+        progress.update(part, what);
+      });
 }
 
 constexpr const char* kColumns =
@@ -166,15 +186,17 @@ int bench_embed(const BenchEmbedOptions& options, Context& context) {
     check_writable(options.plot);
     check_writable(curves_path(options.plot).string());
   }
+  if (!options.rows.empty()) check_writable(options.rows);
   const Subject subject = subject_of(options, context);
-  auto rows = measured(options, *subject.field, context);
+  EmbedRows kept = kept_rows(options, subject.name, context);
+  auto rows = measured(options, *subject.field, kept, context);
   const bench::EmbedMargin margin;
   bench::mark_front(rows, margin);
   const double usual = rows.front().accuracy;
   Json list = Json::array();
   for (const bench::EmbedRow& row : rows) {
     print_row(context.text(), row, usual);
-    list.push_back(row_json(row, usual));
+    list.push_back(row_json(row, usual, kept.commit_of(row)));
   }
   const std::string why = bench::judgement(rows, margin);
   context.text() << why << "\n";

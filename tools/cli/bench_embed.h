@@ -12,6 +12,7 @@ struct BenchEmbedOptions {
   std::string scene;  ///< data set; empty: lego of FIELDMARK_DATA, else the built-in scene
   std::string plot;   ///< SVG file; empty: none
   std::string only;   ///< part of a row's name; the default is always measured
+  std::string rows;   ///< file in which rows are kept as they are measured, see EmbedRows; empty: none
   double seconds = 60;
   Index views = 24, bits = 48;
   Index size = 0;  ///< of the views to judge by; 0: as trained

@@ -42,6 +42,9 @@ struct EmbedBenchOptions {
   Index size = 0;          ///< pixels of their longer side; 0: as the field was trained
   Index points = 4;        ///< of a curve, at least 1
   std::uint64_t seed = 1;  ///< of cameras and messages
+  /// Measured before: a variant with the choice and setting of one of them is not run again.
+  std::vector<EmbedRow> known{};
+  std::function<void(const EmbedRow&)> on_row{};  ///< called with each row that was measured now
 };
 
 /// Embeds a mark in every way, one after another. The clock stands still while a mark is judged. Views are
