@@ -25,7 +25,7 @@ bench::EmbedRow row(const char* choice, double accuracy) {
   r.closer = 0.75;
   r.farther = 0.625;
   r.unseen = std::nan("");
-  r.figures = {.loss = 0, .sign = 0.1, .index = 0.2, .bits = 0.3};
+  r.figures = {.sign = 0.1, .index = 0.2, .bits = 0.3, .loss = 0};
   r.curve = {{30, 0.6, 35}, {60.25, accuracy, 36.125}};
   return r;
 }
