@@ -131,8 +131,9 @@ TEST_CASE("embed_views: cells are as fine as a message needs, and no finer") {
   const auto object = nerf::SpaceKind::cube, cut = nerf::SpaceKind::contracted;
   CHECK(cells_for_message(views, 128, object) == 16);
   CHECK(cells_for_message(views, 129, object) == 22);
-  CHECK(cells_for_message(views, 51, cut) == 16);
-  CHECK(cells_for_message(views, 52, cut) == 22);
+  CHECK(cells_for_message(views, 129, nerf::SpaceKind::ndc) == 22);
+  CHECK(cells_for_message(views, 32, cut) == 16);
+  CHECK(cells_for_message(views, 33, cut) == 22);
   CHECK(cells_for_message(views, 4000, object) == 64);
   CHECK(cells_for_message({}, 1, object) == 64);
 }

@@ -234,7 +234,7 @@ Command add_embed(CLI::App& app) {
   auto* cells =
       app.add_option("--cells", o->owner.cells,
                      "Cells an axis of the scene's cube, 2 to 64 (16 to 64: as many as a view needs to show "
-                     "two or more for each bit, five in scenes without bounds)")
+                     "two or more for each bit, eight in scenes without bounds)")
           ->check(CLI::Range(2, 64).description(""))
           ->type_name("N")
           ->default_str("");

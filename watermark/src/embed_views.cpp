@@ -11,7 +11,7 @@ constexpr Index kWindowSize = 160;    // pixels of the small picture that shows 
 constexpr Index kMlpWindowSize = 80;  // of an mlp field, where larger ones would take longer than the views
 constexpr Index kCoarsest = 4;        // the reader's size over the least of a view
 constexpr Index kFewestCells = 16, kMostCells = 64, kMoreCells = 6;
-constexpr double kCellsABit = 2, kCellsABitOfACut = 5, kPoorViews = 0.1;
+constexpr double kCellsABit = 2, kCellsABitOfACut = 8, kPoorViews = 0.1;
 
 std::vector<nerf::Camera> cameras_of(const nerf::CameraSpan& span, const EmbedViewOptions& options,
                                      Index size, std::uint64_t seed) {
@@ -98,7 +98,7 @@ double cells_shown(std::span<const CachedView> views, Index side) {
 
 Index cells_for_message(std::span<const CachedView> views, Index bits, nerf::SpaceKind space) {
   const double least =
-      (space == nerf::SpaceKind::cube ? kCellsABit : kCellsABitOfACut) * static_cast<double>(bits);
+      (space == nerf::SpaceKind::contracted ? kCellsABitOfACut : kCellsABit) * static_cast<double>(bits);
   Index side = kFewestCells;
   while (side < kMostCells && cells_shown(views, side) < least) side += kMoreCells;
   return side;

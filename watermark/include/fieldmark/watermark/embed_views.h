@@ -51,7 +51,7 @@ double cells_shown(std::span<const CachedView> views, Index side);
 /// Cells an axis so that one view shows the whole message: the least of 16, 22, 28 ... 64 at which
 /// cells_shown() is two or more for each bit, or 64 if none is. Fewer are easier to recognise; a bit that a
 /// view does not show cannot be read from it. Pictures of a scene without bounds are cuts of it, and may be
-/// cut again: five or more for each bit, so that two in five of a picture still show two.
+/// cut again: eight or more for each bit, so that two in five of a picture still show three.
 /// @param bits  length of the message, at least 1   @param space  of the field
 Index cells_for_message(std::span<const CachedView> views, Index bits, nerf::SpaceKind space);
 
