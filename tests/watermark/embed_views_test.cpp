@@ -12,21 +12,62 @@
 using namespace fieldmark;
 using namespace fieldmark::watermark;
 
-TEST_CASE("embed_views: the views are near cameras, each looking through the object's window") {
-  const nerf::RadianceField field = small_field();
+namespace {
+// What a reader has of a picture in its window, and how many pixels of matter lie beyond the picture.
+struct InWindow {
+  nerf::Rendering seen;
+  Index cut = 0;
+};
+
+InWindow in_window(nerf::Renderer& renderer, const nerf::Camera& camera, Index size) {
+  const Window window = object_window(renderer.render(camera).rgb, 1);
+  InWindow out{renderer.render(window_camera(camera, window, size)), 0};
+  for (Index p = 0; p < size * size; ++p) {
+    const double pixel = window.side / static_cast<double>(size),
+                 x = window.x + (static_cast<double>(p % size) + 0.5) * pixel,
+                 y = window.y + (static_cast<double>(p / size) + 0.5) * pixel;
+    if (x >= 0 && x < static_cast<double>(camera.width) && y >= 0 && y < static_cast<double>(camera.height))
+      continue;
+    out.cut += out.seen.opacity[p] > 0.5f;
+    out.seen.opacity[p] = 0;
+    for (Index c = 0; c < 3; ++c) out.seen.rgb[3 * p + c] = 1;
+  }
+  return out;
+}
+}  // namespace
+
+TEST_CASE("embed_views: near cameras, each through the object's window, nothing beyond their pictures") {
+  nerf::RadianceField field = small_field();
+  SECTION("square pictures") {}
+  SECTION("flat ones, that cut the object") {
+    field.cameras.height /= 2;
+    field.cameras.cy /= 2;
+  }
   const auto views = cache_near_views(field, 20, 3, 5);
   const auto cameras = nerf::make_cameras(field.cameras, nerf::CameraSet::near, 3, 160, 5);
   REQUIRE(views.size() == 3);
   nerf::Renderer renderer(field, {.finer = 1});  // as the field was trained
+  Index all_cut = 0;
   for (std::size_t i = 0; i < 3; ++i) {
-    const Window window = object_window(renderer.render(cameras[i]).rgb, 1);
-    const Tensor<float> want = renderer.render(window_camera(cameras[i], window, 20)).rgb;
-    REQUIRE(views[i].base.shape == Shape{20, 20, 3});
+    const CachedView& v = views[i];
+    const auto [want, cut] = in_window(renderer, cameras[i], 20);
+    all_cut += cut;
+    REQUIRE(v.base.shape == Shape{20, 20, 3});
+    REQUIRE(v.sample_begin.size() == 401);
+    CHECK(v.sample_begin.back() == std::ssize(v.weight));
+    CHECK(v.camera.width == 20);
     double worst = 0;
-    for (Index k = 0; k < want.size(); ++k)
-      worst = std::max(worst, static_cast<double>(std::abs(views[i].base[k] - want[k])));
+    for (Index k = 0; k < 1200; ++k)
+      worst = std::max(worst, static_cast<double>(std::abs(v.base[k] - want.rgb[k])));
     CHECK(worst < 1e-5);
+    for (Index p = 0; p < 400; ++p) {
+      CAPTURE(i, p);
+      const auto begin = v.sample_begin.begin() + p;
+      CHECK(v.opacity[p] == Approx(static_cast<double>(want.opacity[p])).margin(1e-5));
+      CHECK(begin[1] - begin[0] == (want.opacity[p] > 0.02f ? 1 : 0));
+    }
   }
+  CHECK(all_cut > 10);
   CHECK(views[0].base.data != views[1].base.data);
   CHECK(cache_near_views(field, 20, 1, 5)[0].base.data == views[0].base.data);
   CHECK(cache_near_views(field, 20, 1, 6)[0].base.data != views[0].base.data);

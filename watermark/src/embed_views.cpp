@@ -25,6 +25,45 @@ std::vector<nerf::Camera> cameras_of(const nerf::CameraSpan& span, const EmbedVi
   return cameras;
 }
 
+// The window's view as a reader has it: nothing where the window reaches beyond the picture.
+CachedView view_of_window(nerf::Renderer& renderer, const nerf::RadianceField& field,
+                          const nerf::Camera& picture, const Window& window, Index size, Index samples) {
+  const nerf::Camera camera = window_camera(picture, window, size);
+  const double zoom = static_cast<double>(size) / window.side;
+  // The first pixel whose centre is not before a place of the picture.
+  const auto first = [&](double place, double edge) {
+    return std::clamp<Index>(static_cast<Index>(std::ceil((place - edge) * zoom - 0.5)), 0, size);
+  };
+  const Index left = first(0, window.x), right = first(static_cast<double>(picture.width), window.x),
+              top = first(0, window.y), bottom = first(static_cast<double>(picture.height), window.y);
+  nerf::Camera inside = camera;
+  inside.cx -= static_cast<double>(left);
+  inside.cy -= static_cast<double>(top);
+  inside.width = right - left;
+  inside.height = bottom - top;
+  CachedView view = cache_view(renderer, field, inside, samples);
+  view.camera = camera;
+  if (inside.width == size && inside.height == size) return view;
+  const CachedView seen = view;
+  view.height = view.width = size;
+  view.base = Tensor<float>({size, size, 3}, nerf::background_value(field.background));
+  view.opacity = Tensor<float>({size, size});
+  view.sample_begin = {0};
+  for (Index y = 0; y < size; ++y)
+    for (Index x = 0; x < size; ++x) {
+      std::int32_t samples_here = 0;
+      if (x >= left && x < right && y >= top && y < bottom) {
+        const Index from = (y - top) * inside.width + x - left, to = y * size + x;
+        const auto begin = seen.sample_begin.begin() + from;
+        samples_here = begin[1] - begin[0];
+        std::copy_n(&seen.base[3 * from], 3, &view.base[3 * to]);
+        view.opacity[to] = seen.opacity[from];
+      }
+      view.sample_begin.push_back(view.sample_begin.back() + samples_here);
+    }
+  return view;
+}
+
 }  // namespace
 
 const char* distances_name(EmbedDistances distances) {
@@ -55,7 +94,7 @@ std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, Inde
       size =
           std::clamp<Index>(std::lround(window.side * static_cast<double>(own) / static_cast<double>(seen)),
                             (reader_size + kCoarsest - 1) / kCoarsest, reader_size);
-    views.push_back(cache_view(renderer, field, window_camera(camera, window, size), options.samples));
+    views.push_back(view_of_window(renderer, field, camera, window, size, options.samples));
     if (progress && !progress(static_cast<Index>(views.size()), options.count))
       throw Error("stopped while views were cached");
   }

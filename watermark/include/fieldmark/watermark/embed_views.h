@@ -26,8 +26,9 @@ struct EmbedViewOptions {
 };
 
 /// Renders and caches the views to embed in, each cut to the object's window as the reader will cut a picture
-/// (see object_window.h), `reader_size` pixels a side; from native on fewer where a picture of the field's
-/// size has fewer, though no fewer than a quarter: the embedder enlarges those as the reader would.
+/// (see object_window.h), with background where the window reaches beyond it, `reader_size` pixels a side;
+/// from native on fewer where a picture of the field's size has fewer, though no fewer than a quarter: the
+/// embedder enlarges those as the reader would.
 /// @param progress  called after each view with (done, total); returns false to stop, which throws Error
 /// @throws ValueError as cache_view()
 std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, Index reader_size,
