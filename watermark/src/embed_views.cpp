@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace fieldmark::watermark {
 namespace {
@@ -25,6 +26,31 @@ std::vector<nerf::Camera> cameras_of(const nerf::CameraSpan& span, const EmbedVi
   return cameras;
 }
 
+// A view as a part of a square of background, from a pixel on.
+CachedView in_square(CachedView view, Index left, Index top, Index size, float background) {
+  const Index height = view.height, width = view.width;
+  if (height == size && width == size) return view;
+  const Tensor<float> base = std::move(view.base), opacity = std::move(view.opacity);
+  const std::vector<std::int32_t> begin = std::move(view.sample_begin);
+  view.height = view.width = size;
+  view.base = Tensor<float>({size, size, 3}, background);
+  view.opacity = Tensor<float>({size, size});
+  view.sample_begin = {0};
+  for (Index y = 0; y < size; ++y)
+    for (Index x = 0; x < size; ++x) {
+      std::int32_t samples = 0;
+      if (x >= left && x < left + width && y >= top && y < top + height) {
+        const Index from = (y - top) * width + x - left, to = y * size + x;
+        const auto here = begin.begin() + from;
+        samples = here[1] - here[0];
+        std::copy_n(&base[3 * from], 3, &view.base[3 * to]);
+        view.opacity[to] = opacity[from];
+      }
+      view.sample_begin.push_back(view.sample_begin.back() + samples);
+    }
+  return view;
+}
+
 // The window's view as a reader has it: nothing where the window reaches beyond the picture.
 CachedView view_of_window(nerf::Renderer& renderer, const nerf::RadianceField& field,
                           const nerf::Camera& picture, const Window& window, Index size, Index samples) {
@@ -41,26 +67,9 @@ CachedView view_of_window(nerf::Renderer& renderer, const nerf::RadianceField& f
   inside.cy -= static_cast<double>(top);
   inside.width = right - left;
   inside.height = bottom - top;
-  CachedView view = cache_view(renderer, field, inside, samples);
+  CachedView view = in_square(cache_view(renderer, field, inside, samples), left, top, size,
+                              nerf::background_value(field.background));
   view.camera = camera;
-  if (inside.width == size && inside.height == size) return view;
-  const CachedView seen = view;
-  view.height = view.width = size;
-  view.base = Tensor<float>({size, size, 3}, nerf::background_value(field.background));
-  view.opacity = Tensor<float>({size, size});
-  view.sample_begin = {0};
-  for (Index y = 0; y < size; ++y)
-    for (Index x = 0; x < size; ++x) {
-      std::int32_t samples_here = 0;
-      if (x >= left && x < right && y >= top && y < bottom) {
-        const Index from = (y - top) * inside.width + x - left, to = y * size + x;
-        const auto begin = seen.sample_begin.begin() + from;
-        samples_here = begin[1] - begin[0];
-        std::copy_n(&seen.base[3 * from], 3, &view.base[3 * to]);
-        view.opacity[to] = seen.opacity[from];
-      }
-      view.sample_begin.push_back(view.sample_begin.back() + samples_here);
-    }
   return view;
 }
 
