@@ -145,13 +145,6 @@ EmbedRow embedded(const nerf::RadianceField& field, const EmbedVariant& v, const
   return row;
 }
 
-const EmbedRow* known_row(const std::vector<EmbedRow>& known, const EmbedVariant& v) {
-  const auto row = std::find_if(known.begin(), known.end(), [&](const EmbedRow& r) {
-    return r.variant.choice == v.choice && r.variant.setting == v.setting;
-  });
-  return row == known.end() ? nullptr : &*row;
-}
-
 std::vector<double> figures_of(const EmbedRow& row) {
   return {-std::log(row.seconds), row.accuracy, row.psnr_object};
 }
@@ -176,7 +169,7 @@ std::vector<EmbedRow> run_embed_bench(const nerf::RadianceField& field,
         progress(v.choice + ": " + v.setting,
                  static_cast<double>(rows.size()) / static_cast<double>(variants.size()));
     };
-    if (const EmbedRow* known = known_row(options.known, v)) {
+    if (const EmbedRow* known = find_row(options.known, v)) {
       rows.push_back(*known);
       continue;
     }
@@ -184,6 +177,13 @@ std::vector<EmbedRow> run_embed_bench(const nerf::RadianceField& field,
     if (options.on_row) options.on_row(rows.back());
   }
   return rows;
+}
+
+const EmbedRow* find_row(const std::vector<EmbedRow>& rows, const EmbedVariant& v) {
+  const auto row = std::find_if(rows.begin(), rows.end(), [&](const EmbedRow& r) {
+    return r.variant.choice == v.choice && r.variant.setting == v.setting;
+  });
+  return row == rows.end() ? nullptr : &*row;
 }
 
 void mark_front(std::vector<EmbedRow>& rows, const EmbedMargin& margin) {

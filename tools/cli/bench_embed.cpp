@@ -57,23 +57,13 @@ std::vector<bench::EmbedVariant> variants_of(const BenchEmbedOptions& o, std::ui
 }
 
 Json row_json(const bench::EmbedRow& r, double usual, const std::string& commit) {
-  return {{"choice", r.variant.choice},
-          {"setting", r.variant.setting},
-          {"front", r.front},
-          {"accuracy", r.accuracy},
-          {"difference", r.accuracy - usual},
-          {"accuracy_p5", r.accuracy_p5},
-          {"psnr_object", number(r.psnr_object)},
-          {"seconds", r.seconds},
-          {"view_seconds", r.cache_seconds},
-          {"steps", r.steps},
-          {"closer", r.closer},
-          {"farther", r.farther},
-          {"unseen", r.unseen},
-          {"sign", r.figures.sign},
-          {"cell", r.figures.index},
-          {"bits_in_training", r.figures.bits},
-          {"commit", commit}};
+  Json json{{"choice", r.variant.choice},
+            {"setting", r.variant.setting},
+            {"front", r.front},
+            {"difference", r.accuracy - usual}};
+  json.update(embed_figures(r));
+  json["commit"] = commit;
+  return json;
 }
 
 void print_row(std::ostream& out, const bench::EmbedRow& r, double usual) {

@@ -32,12 +32,8 @@ double value_of(const Json& json) {
 }
 
 Json json_of(const EmbedRow& row, const std::string& commit) {
-  Json j{{"choice", row.variant.choice},
-         {"setting", row.variant.setting},
-         {"commit", commit},
-         {"steps", row.steps}};
-  for (const auto& [name, figure] : kFigures) j[name] = number(row.*figure);
-  for (const auto& [name, figure] : kInTraining) j[name] = number(row.figures.*figure);
+  Json j{{"choice", row.variant.choice}, {"setting", row.variant.setting}, {"commit", commit}};
+  j.update(embed_figures(row));
   Json curve = Json::array();
   for (const bench::EmbedPoint& p : row.curve)
     curve.push_back({number(p.seconds), number(p.accuracy), number(p.psnr_object)});
@@ -58,6 +54,14 @@ EmbedRow row_of(const Json& j) {
 }
 
 }  // namespace
+
+Json embed_figures(const EmbedRow& row) {
+  Json j;
+  for (const auto& [name, figure] : kFigures) j[name] = number(row.*figure);
+  j["steps"] = row.steps;
+  for (const auto& [name, figure] : kInTraining) j[name] = number(row.figures.*figure);
+  return j;
+}
 
 EmbedRows::EmbedRows(std::filesystem::path path, Json configuration)
     : path_(std::move(path)), configuration_(std::move(configuration)) {
@@ -83,10 +87,8 @@ void EmbedRows::add(const EmbedRow& row) {
 }
 
 std::string EmbedRows::commit_of(const EmbedRow& row) const {
-  for (std::size_t i = 0; i < rows_.size(); ++i)
-    if (rows_[i].variant.choice == row.variant.choice && rows_[i].variant.setting == row.variant.setting)
-      return commits_[i];
-  return "";
+  const EmbedRow* known = bench::find_row(rows_, row.variant);
+  return known ? commits_[static_cast<std::size_t>(known - rows_.data())] : "";
 }
 
 void EmbedRows::write() const {

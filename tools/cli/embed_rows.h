@@ -9,6 +9,9 @@
 
 namespace fieldmark::cli {
 
+/// Every figure of a row under its name, null where it is no number.
+Json embed_figures(const bench::EmbedRow& row);
+
 /// Rows of `bench embed` in a file, kept as they are measured, so that hours of it survive a stop.
 class EmbedRows {
  public:

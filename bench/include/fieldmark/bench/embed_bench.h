@@ -42,7 +42,7 @@ struct EmbedBenchOptions {
   Index size = 0;          ///< pixels of their longer side; 0: as the field was trained
   Index points = 4;        ///< of a curve, at least 1
   std::uint64_t seed = 1;  ///< of cameras and messages
-  /// Measured before: a variant with the choice and setting of one of them is not run again.
+  /// Measured before: a variant that find_row() finds among them is not run again.
   std::vector<EmbedRow> known{};
   std::function<void(const EmbedRow&)> on_row{};  ///< called with each row that was measured now
 };
@@ -55,6 +55,9 @@ std::vector<EmbedRow> run_embed_bench(const nerf::RadianceField& field,
                                       const std::vector<EmbedVariant>& variants,
                                       const EmbedBenchOptions& options = {},
                                       const std::function<void(const std::string&, double)>& progress = {});
+
+/// The row of a variant, by its choice and setting; null where there is none.
+const EmbedRow* find_row(const std::vector<EmbedRow>& rows, const EmbedVariant& variant);
 
 /// Marks the rows that no other beats in time, accuracy and PSNR together, see pareto_front().
 void mark_front(std::vector<EmbedRow>& rows, const EmbedMargin& margin = {});
