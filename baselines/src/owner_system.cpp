@@ -78,7 +78,7 @@ TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name,
     return !training.progress ||
            training.progress(what, static_cast<double>(done) / static_cast<double>(total), "");
   };
-  const auto views = watermark::cache_near_views(field, system.owner.reader_size, training.views, name.seed,
+  const auto views = watermark::cache_near_views(field, system.owner.patch(), training.views, name.seed,
                                                  [&](Index done, Index total) {
                                                    if (!tell("views", done, total))
                                                      throw Stopped("views: stopped, nothing to save");

@@ -45,7 +45,7 @@ class Caches {
  public:
   struct Cache {
     watermark::EmbedViewOptions options;
-    Index reader_size = 0;
+    watermark::PatchSize patch{};
     std::uint64_t seed = 0;
     std::vector<CachedView> views{};
     double seconds = 0;
@@ -55,15 +55,13 @@ class Caches {
   const Cache& get(const EmbedVariant& v, const std::function<void()>& stop_or_go) {
     for (const Cache& c : kept_)
       if (c.options.count == v.views.count && c.options.samples == v.views.samples &&
-          c.options.distances == v.views.distances && c.reader_size == v.owner.reader_size &&
-          c.seed == v.embed.seed)
+          c.options.distances == v.views.distances && c.patch == v.owner.patch() && c.seed == v.embed.seed)
         return c;
     if (kept_.size() == 2) kept_.pop_back();
     kept_.reserve(2);
-    Cache& c = kept_.emplace_back(
-        Cache{.options = v.views, .reader_size = v.owner.reader_size, .seed = v.embed.seed});
+    Cache& c = kept_.emplace_back(Cache{.options = v.views, .patch = v.owner.patch(), .seed = v.embed.seed});
     const Clock clock;
-    c.views = watermark::cache_embed_views(field_, c.reader_size, c.options, c.seed, [&](Index, Index) {
+    c.views = watermark::cache_embed_views(field_, c.patch, c.options, c.seed, [&](Index, Index) {
       stop_or_go();
       return true;
     });

@@ -83,7 +83,7 @@ TEST_CASE("regression: the field stays above its floor on views it has not seen"
 
 TEST_CASE("regression: 8 bits embedded, baked, rendered and read") {
   const RadianceField& field = trained().field;
-  const auto views = cache_near_views(field, kSide, 24, 3);
+  const auto views = cache_near_views(field, square_patch(kSide), 24, 3);
   Owner owner(field,
               {.bits = 8,
                .strength = 28,

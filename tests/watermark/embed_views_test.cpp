@@ -19,13 +19,13 @@ struct InWindow {
   Index cut = 0;
 };
 
-InWindow in_window(nerf::Renderer& renderer, const nerf::Camera& camera, Index size) {
-  const Window window = object_window(renderer.render(camera).rgb, 1);
+InWindow in_window(nerf::Renderer& renderer, const nerf::Camera& camera, const PatchSize& size) {
+  const Window window = object_window(renderer.render(camera).rgb, 1, size.aspect());
   InWindow out{renderer.render(window_camera(camera, window, size)), 0};
-  for (Index p = 0; p < size * size; ++p) {
-    const double pixel = window.side / static_cast<double>(size),
-                 x = window.x + (static_cast<double>(p % size) + 0.5) * pixel,
-                 y = window.y + (static_cast<double>(p / size) + 0.5) * pixel;
+  for (Index p = 0; p < size.height * size.width; ++p) {
+    const double pixel = window.height / static_cast<double>(size.height),
+                 x = window.x + (static_cast<double>(p % size.width) + 0.5) * pixel,
+                 y = window.y + (static_cast<double>(p / size.width) + 0.5) * pixel;
     if (x >= 0 && x < static_cast<double>(camera.width) && y >= 0 && y < static_cast<double>(camera.height))
       continue;
     out.cut += out.seen.opacity[p] > 0.5f;
@@ -38,29 +38,38 @@ InWindow in_window(nerf::Renderer& renderer, const nerf::Camera& camera, Index s
 
 TEST_CASE("embed_views: near cameras, each through the object's window, nothing beyond their pictures") {
   nerf::RadianceField field = small_field();
+  PatchSize size = square_patch(20);
   SECTION("square pictures") {}
   SECTION("flat ones, that cut the object") {
     field.cameras.height /= 2;
     field.cameras.cy /= 2;
   }
-  const auto views = cache_near_views(field, 20, 3, 5);
+  SECTION("the same, in an upright patch") {
+    field.cameras.height /= 2;
+    field.cameras.cy /= 2;
+    size = {25, 16};
+  }
+  const auto views = cache_near_views(field, size, 3, 5);
   const auto cameras = nerf::make_cameras(field.cameras, nerf::CameraSet::near, 3, 160, 5);
   REQUIRE(views.size() == 3);
   nerf::Renderer renderer(field, {.finer = 1});  // as the field was trained
   Index all_cut = 0;
   for (std::size_t i = 0; i < 3; ++i) {
     const CachedView& v = views[i];
-    const auto [want, cut] = in_window(renderer, cameras[i], 20);
+    const auto [want, cut] = in_window(renderer, cameras[i], size);
     all_cut += cut;
-    REQUIRE(v.base.shape == Shape{20, 20, 3});
-    REQUIRE(v.sample_begin.size() == 401);
+    REQUIRE(v.base.shape == Shape{size.height, size.width, 3});
+    CHECK(v.height == size.height);
+    CHECK(v.camera.height == size.height);
+    REQUIRE(std::ssize(v.sample_begin) == size.height * size.width + 1);
+    CHECK(v.width == size.width);
     CHECK(v.sample_begin.back() == std::ssize(v.weight));
-    CHECK(v.camera.width == 20);
+    CHECK(v.camera.width == size.width);
     double worst = 0;
-    for (Index k = 0; k < 1200; ++k)
+    for (Index k = 0; k < v.base.size(); ++k)
       worst = std::max(worst, static_cast<double>(std::abs(v.base[k] - want.rgb[k])));
     CHECK(worst < 1e-5);
-    for (Index p = 0; p < 400; ++p) {
+    for (Index p = 0; p < v.opacity.size(); ++p) {
       CAPTURE(i, p);
       const auto begin = v.sample_begin.begin() + p;
       CHECK(v.opacity[p] == Approx(static_cast<double>(want.opacity[p])).margin(1e-5));
@@ -69,8 +78,8 @@ TEST_CASE("embed_views: near cameras, each through the object's window, nothing 
   }
   CHECK(all_cut > 10);
   CHECK(views[0].base.data != views[1].base.data);
-  CHECK(cache_near_views(field, 20, 1, 5)[0].base.data == views[0].base.data);
-  CHECK(cache_near_views(field, 20, 1, 6)[0].base.data != views[0].base.data);
+  CHECK(cache_near_views(field, size, 1, 5)[0].base.data == views[0].base.data);
+  CHECK(cache_near_views(field, size, 1, 6)[0].base.data != views[0].base.data);
 }
 
 TEST_CASE("embed_views: at several distances, the object has no more pixels than pictures of it") {
@@ -78,7 +87,8 @@ TEST_CASE("embed_views: at several distances, the object has no more pixels than
   const Index own = std::max(field.cameras.width, field.cameras.height);
   const auto sides = [&](EmbedDistances distances) {
     std::vector<Index> out;
-    for (const CachedView& v : cache_embed_views(field, 2 * own, {.count = 4, .distances = distances}, 5)) {
+    for (const CachedView& v :
+         cache_embed_views(field, square_patch(2 * own), {.count = 4, .distances = distances}, 5)) {
       CHECK(v.height == v.width);
       out.push_back(v.width);
     }
@@ -91,7 +101,7 @@ TEST_CASE("embed_views: at several distances, the object has no more pixels than
   const auto far = nerf::make_cameras(field.cameras, nerf::CameraSet::farther, 4, 160, 5);
   nerf::Renderer renderer(field, {.finer = 1});
   const auto pixels = [&](const nerf::Camera& camera) {
-    const double side = object_window(renderer.render(camera).rgb, 1).side * static_cast<double>(own) / 160;
+    const double side = object_window(renderer.render(camera).rgb, 1).height * static_cast<double>(own) / 160;
     return std::clamp<Index>(std::lround(side), own / 2, 2 * own);
   };
   for (std::size_t i = 0; i < 4; ++i) {
@@ -99,8 +109,13 @@ TEST_CASE("embed_views: at several distances, the object has no more pixels than
     if (i % 2 == 0) CHECK(several[i] == native[i]);
     if (i % 4 == 3) CHECK(several[i] == pixels(far[i]));
   }
-  const auto kept = cache_embed_views(field, 16, {.count = 1, .samples = 4}, 5);
-  CHECK(kept[0].weight.size() > cache_near_views(field, 16, 1, 5)[0].weight.size());
+  for (const CachedView& v :
+       cache_embed_views(field, {96, 64}, {.count = 4, .distances = EmbedDistances::several}, 5)) {
+    CHECK(v.height < 96);
+    CHECK(v.width == std::lround(static_cast<double>(v.height) * 2 / 3));
+  }
+  const auto kept = cache_embed_views(field, square_patch(16), {.count = 1, .samples = 4}, 5);
+  CHECK(kept[0].weight.size() > cache_near_views(field, square_patch(16), 1, 5)[0].weight.size());
   CHECK(parse_distances("several") == EmbedDistances::several);
   for (const auto d : {EmbedDistances::near, EmbedDistances::native, EmbedDistances::several})
     CHECK(parse_distances(distances_name(d)) == d);
@@ -111,14 +126,14 @@ TEST_CASE("embed_views: at several distances, the object has no more pixels than
 TEST_CASE("embed_views: progress is told after each view and may stop") {
   const nerf::RadianceField field = small_field();
   std::vector<std::pair<Index, Index>> calls;
-  cache_near_views(field, 16, 2, 5, [&](Index done, Index total) {
+  cache_near_views(field, square_patch(16), 2, 5, [&](Index done, Index total) {
     calls.emplace_back(done, total);
     return true;
   });
   CHECK(calls == std::vector<std::pair<Index, Index>>{{1, 2}, {2, 2}});
   const auto stop = [](Index, Index) { return false; };
-  CHECK_THROWS_AS(cache_near_views(field, 16, 2, 5, stop), Error);
-  CHECK_THROWS_WITH(cache_near_views(field, 16, 2, 5, stop), "stopped while views were cached");
+  CHECK_THROWS_AS(cache_near_views(field, square_patch(16), 2, 5, stop), Error);
+  CHECK_THROWS_WITH(cache_near_views(field, square_patch(16), 2, 5, stop), "stopped while views were cached");
 }
 
 TEST_CASE("embed_views: visible area adds the weights of the samples in each cell") {
@@ -129,7 +144,7 @@ TEST_CASE("embed_views: visible area adds the weights of the samples in each cel
   b.weight = {0.25f, 0.75f};
   CHECK(visible_area(std::vector{a, b}, 2) == std::vector<double>{1, 0.75, 0, 0, 0, 0, 0, 0.75});
   CHECK(visible_area({}, 2) == std::vector<double>(8, 0.0));
-  const auto views = cache_near_views(small_field(), 16, 2, 5);
+  const auto views = cache_near_views(small_field(), square_patch(16), 2, 5);
   double want = 0;
   for (const CachedView& v : views) want = std::accumulate(v.weight.begin(), v.weight.end(), want);
   const auto area = visible_area(views, 6);

@@ -116,7 +116,7 @@ TEST_CASE("embedder: preset paper's message loss begins at that of guessing, fiv
 }
 
 TEST_CASE("embedder: views of fewer pixels than the reader's are learnt from as well, with their labels") {
-  const auto views = cache_near_views(tiny_field(), 32, 8, 3);
+  const auto views = cache_near_views(tiny_field(), square_patch(32), 8, 3);
   Owner owner = tiny_owner();
   Embedder embedder(owner, views, options(200));
   embedder.step(0);

@@ -276,4 +276,42 @@ TEST_CASE("owner: options outside their ranges are refused") {
   CHECK_THROWS_AS(with([](OwnerOptions& o) { o.strength = std::nan(""); }), ValueError);
   CHECK_THROWS_WITH(with([](OwnerOptions& o) { o.reader_size = 31; }),
                     "[owner] reader_size must be at least 32 pixels, got 31");
+  CHECK_THROWS_WITH(with([](OwnerOptions& o) { o.reader_aspect = 0.24; }),
+                    "[owner] reader_aspect must be 0.25 to 4, got 0.240000");
+  CHECK_THROWS_AS(with([](OwnerOptions& o) { o.reader_aspect = 4.1; }), ValueError);
+  CHECK_THROWS_AS(with([](OwnerOptions& o) { o.reader_aspect = std::nan(""); }), ValueError);
+}
+
+TEST_CASE("owner: the patch keeps its pixels in another shape, and is kept with the owner") {
+  OwnerOptions o = small_owner_options();
+  o.reader_size = 75;
+  CHECK(o.patch() == square_patch(75));
+  for (const double aspect : {0.25, 0.5625, 4. / 3, 4.}) {
+    o.reader_aspect = aspect;
+    const PatchSize patch = o.patch();
+    CAPTURE(aspect, patch.height, patch.width);
+    CHECK(patch.height % 8 == 0);
+    CHECK(patch.width % 8 == 0);
+    CHECK(static_cast<double>(patch.height) == Approx(75 / std::sqrt(aspect)).margin(4));
+    CHECK(static_cast<double>(patch.width) == Approx(75 * std::sqrt(aspect)).margin(4));
+  }
+  const TemporaryFolder folder;
+  small_owner(o).save(folder / "a");
+  CHECK(Owner::load(folder / "a").options().patch() == o.patch());
+}
+
+TEST_CASE("owner: photographs without a background are seen in their shape, objects in a square") {
+  nerf::RadianceField field = small_field();
+  REQUIRE(field.cameras.width == 24);
+  REQUIRE(field.cameras.height == 18);
+  CHECK(reader_aspect(field) == 1);
+  for (const auto kind : {nerf::SpaceKind::contracted, nerf::SpaceKind::ndc}) {
+    field.space.kind = kind;
+    field.cameras.height = 18;
+    CHECK(reader_aspect(field) == Approx(4. / 3));
+    field.cameras.height = 5;
+    CHECK(reader_aspect(field) == 4);
+    field.cameras.height = 0;  // of a field without photographs
+    CHECK(reader_aspect(field) == 1);
+  }
 }

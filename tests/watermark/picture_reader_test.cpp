@@ -36,15 +36,19 @@ Tensor<float> coloured(const Tensor<float>& grey) {
 }  // namespace
 
 TEST_CASE("picture_reader: evidence is the window's sign evidence, summed by loops") {
-  const Owner owner = small_owner();
+  OwnerOptions options = small_owner_options();
+  SECTION("of a square") {}
+  SECTION("of an upright window") { options.reader_aspect = 0.5; }
+  const Owner owner = small_owner(options);
+  const PatchSize patch = owner.options().patch();
   const Tensor<float> picture = block(3);
   const auto got = PictureReader(owner).evidence(picture);
   const Index cells = owner.cells.count(), classes = cells + 1;
   REQUIRE(static_cast<Index>(got.size()) == cells);
-  const Tensor<float> cut = cut_window(picture, object_window(picture, 1), 32, 1);
+  const Tensor<float> cut = cut_window(picture, object_window(picture, 1, patch.aspect()), patch, 1);
   Tape<float> tape;
-  const auto out =
-      (*owner.reader)(Params<float>(owner.params, nullptr), tape.constant(cut.data.data(), {1, 32, 32, 3}));
+  const auto out = (*owner.reader)(Params<float>(owner.params, nullptr),
+                                   tape.constant(cut.data.data(), {1, patch.height, patch.width, 3}));
   std::vector<double> want(static_cast<std::size_t>(cells));
   for (Index p = 0; p < out.height * out.width; ++p) {
     const float* logit = out.index.value() + p * classes;
@@ -64,7 +68,8 @@ TEST_CASE("picture_reader: evidence is the window's sign evidence, summed by loo
 
 TEST_CASE("picture_reader: for preset paper the evidence is the window's logits") {
   const Owner owner = small_paper_owner();
-  const Tensor<float> picture = block(3), cut = cut_window(picture, object_window(picture, 1), 32, 1);
+  const Tensor<float> picture = block(3),
+                      cut = cut_window(picture, object_window(picture, 1), square_patch(32), 1);
   Tape<float> tape;
   const auto logits = (*owner.pooled_reader)(Params<float>(owner.params, nullptr),
                                              tape.constant(cut.data.data(), {1, 32, 32, 3}));
@@ -92,7 +97,8 @@ TEST_CASE("picture_reader: what surrounds the object does not matter") {
   const Owner owner = small_owner();
   const PictureReader reader(owner);
   const Tensor<float> picture = block(3);
-  CHECK(reader.evidence(picture) == reader.evidence(cut_window(picture, {-6, -10, 70}, 70, 1)));
+  CHECK(reader.evidence(picture) ==
+        reader.evidence(cut_window(picture, {-6, -10, 70, 70}, square_patch(70), 1)));
 }
 
 TEST_CASE("picture_reader: one and two threads give the same bits") {

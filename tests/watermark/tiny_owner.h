@@ -22,7 +22,8 @@ inline const fieldmark::nerf::RadianceField& tiny_field() {
 
 /// Eight near views of it at 48 x 48 pixels.
 inline const std::vector<fieldmark::watermark::CachedView>& tiny_views() {
-  static const auto views = fieldmark::watermark::cache_near_views(tiny_field(), 48, 8, 3);
+  static const auto views =
+      fieldmark::watermark::cache_near_views(tiny_field(), fieldmark::watermark::square_patch(48), 8, 3);
   return views;
 }
 

@@ -39,8 +39,11 @@ Subject subject_of(const BenchEmbedOptions& o, Context& context) {
   return {trained_field(data, o.quick ? kQuickFieldSeconds : kFieldSeconds, context), data.name};
 }
 
-std::vector<bench::EmbedVariant> variants_of(const BenchEmbedOptions& o, std::uint64_t seed) {
+std::vector<bench::EmbedVariant> variants_of(const BenchEmbedOptions& o, const nerf::RadianceField& field,
+                                             std::uint64_t seed) {
   auto all = bench::embed_variants({.seconds = o.seconds}, o.bits, seed);
+  for (bench::EmbedVariant& v : all)
+    if (v.owner.preset == watermark::Preset::fast) v.owner.reader_aspect = watermark::reader_aspect(field);
   const auto wanted = [&](const bench::EmbedVariant& v) {
     return v.choice == "default" || (v.choice + ": " + v.setting).find(o.only) != std::string::npos;
   };
@@ -145,7 +148,7 @@ EmbedRows kept_rows(const BenchEmbedOptions& o, const std::string& field, Contex
 
 std::vector<bench::EmbedRow> measured(const BenchEmbedOptions& o, const nerf::RadianceField& field,
                                       EmbedRows& kept, Context& context) {
-  const auto variants = variants_of(o, context.seed());
+  const auto variants = variants_of(o, field, context.seed());
   const InterruptGuard guard;
   Progress progress = context.progress("bench");
   return bench::run_embed_bench(

@@ -48,18 +48,17 @@ watermark::Key key_of(const Options& options, const std::string& checkpoint) {
 }
 
 std::vector<watermark::CachedView> cached_views(const Options& options, const nerf::RadianceField& field,
-                                                Index reader_size, Context& context) {
+                                                const watermark::PatchSize& patch, Context& context) {
   const InterruptGuard guard;
   Progress progress = context.progress("views");
   const watermark::EmbedViewOptions views{.count = options.views,
                                           .samples = options.samples,
                                           .distances = watermark::parse_distances(options.distances)};
-  return watermark::cache_embed_views(
-      field, reader_size, views, context.seed(), [&](Index done, Index total) {
-        if (guard.interrupted()) throw Interrupted("nothing was written");
-        progress.update(static_cast<double>(done) / static_cast<double>(total));
-        return true;
-      });
+  return watermark::cache_embed_views(field, patch, views, context.seed(), [&](Index done, Index total) {
+    if (guard.interrupted()) throw Interrupted("nothing was written");
+    progress.update(static_cast<double>(done) / static_cast<double>(total));
+    return true;
+  });
 }
 
 double embed(const Options& options, watermark::Embedder& embedder, const std::string& checkpoint,
@@ -148,7 +147,8 @@ int run(const Options& options, Context& context) {
   const auto key = key_of(options, checkpoint);
   auto owner_options = owner_options_of(options, context.seed());
   const bool fast = owner_options.preset == watermark::Preset::fast;
-  const auto views = cached_views(options, field, owner_options.reader_size, context);
+  if (fast) owner_options.reader_aspect = watermark::reader_aspect(field);
+  const auto views = cached_views(options, field, owner_options.patch(), context);
   if (fast && !options.cells_given) choose_cells(views, field.space.kind, owner_options, context);
   auto cells =
       fast ? watermark::CellGrid(owner_options.cells, watermark::visible_area(views, owner_options.cells))
@@ -239,8 +239,9 @@ Command add_embed(CLI::App& app) {
           ->type_name("N")
           ->default_str("");
   auto* reader_size = app.add_option("--reader-size", o->owner.reader_size,
-                                     "Side of the square in which the extractor sees the object, pixels, 32 "
-                                     "to 1024 (200; paper, code: 150)")
+                                     "Side of the square with as many pixels as the extractor sees, 32 to "
+                                     "1024 (200; paper, code: 150); photographs without a background are "
+                                     "seen in their own shape")
                           ->check(CLI::Range(32, 1024).description(""))
                           ->type_name("N");
   add_view_options(app, *o);

@@ -18,7 +18,7 @@ namespace {
 constexpr Index kMostMatches = 240;  // places that are compared
 constexpr std::size_t kLeastMatches = 8;
 constexpr Index kDraws = 48;         // pairs of places for each view
-constexpr double kTolerance = 0.05;  // of the window's side: about a cell
+constexpr double kTolerance = 0.05;  // of the window's longer side: about a cell
 constexpr int kFitSteps = 12;
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
@@ -29,7 +29,7 @@ constexpr int kTurns = 24;      // of 15 degrees
 
 // A window's content as a vector of length 1, without its mean.
 std::vector<float> small_window(const Tensor<float>& picture, const Window& window, float background) {
-  std::vector<float> v = cut_window(picture, window, kSmall, background).data;
+  std::vector<float> v = cut_window(picture, window, square_patch(kSmall), background).data;
   make_unit(v);
   return v;
 }
@@ -42,7 +42,7 @@ Tensor<float> turned(const Tensor<float>& picture, double angle, float backgroun
   return {y.shape(), std::vector<float>(y.value(), y.value() + y.shape().size())};
 }
 
-Complex middle(const Window& w) { return {w.x + w.side / 2, w.y + w.side / 2}; }
+Complex middle(const Window& w) { return {w.x + w.width / 2, w.y + w.height / 2}; }
 
 }  // namespace
 
@@ -212,21 +212,21 @@ nerf::Camera CameraSearch::fitted(const Proposal& proposal, const std::vector<Ma
 std::vector<nerf::Camera> CameraSearch::find(const SeenPlaces& places, Index height, Index width,
                                              Index count) const {
   std::vector<Match> matches;
-  const double side = places.window.side;
   for (Index p = 0; p < places.height * places.width; ++p) {
     if (places.cell[at(p)] < 0) continue;
     const double x = (static_cast<double>(p % places.width) + 0.5) / static_cast<double>(places.width),
                  y = (static_cast<double>(p / places.width) + 0.5) / static_cast<double>(places.height);
-    matches.push_back({places.cell[at(p)],
-                       {places.window.x + x * side, places.window.y + y * side},
-                       static_cast<double>(places.share[at(p)])});
+    matches.push_back(
+        {places.cell[at(p)],
+         {places.window.x + x * places.window.width, places.window.y + y * places.window.height},
+         static_cast<double>(places.share[at(p)])});
   }
   if (matches.size() < kLeastMatches) return {};
   std::stable_sort(matches.begin(), matches.end(),
                    [](const Match& a, const Match& b) { return a.share > b.share; });
   if (static_cast<Index>(matches.size()) > kMostMatches) matches.resize(at(kMostMatches));
 
-  const double tolerance = kTolerance * side;
+  const double tolerance = kTolerance * std::max(places.window.width, places.window.height);
   std::vector<Proposal> proposals(views_.size());
   parallel_for(static_cast<Index>(views_.size()), 8, [&](Index begin, Index end) {
     for (Index v = begin; v < end; ++v) proposals[at(v)] = propose(views_[at(v)], at(v), matches, tolerance);
@@ -259,10 +259,10 @@ std::vector<nerf::Camera> CameraSearch::find(const Tensor<float>& picture, Index
       for (std::size_t i = 0; i < small.size(); ++i)
         score += static_cast<double>(small[i] * views_[v].small[i]);
       if (score <= best[v].score) continue;
-      // u in the render is at (u - middle) side / side' + middle' in the turned picture, which shows the
+      // u in the render is at (u - middle) width / width' + middle' in the turned picture, which shows the
       // picture's point q at e^(-i angle) (q - centre) + centre: y points down.
       const Complex back = std::polar(1.0, angle);
-      const Complex a = back * window.side / views_[v].window.side;
+      const Complex a = back * window.width / views_[v].window.width;
       const Complex b = back * (middle(window) - centre) + centre - a * middle(views_[v].window);
       best[v] = {v, a / zoom, b / zoom, score};
     }

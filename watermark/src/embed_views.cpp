@@ -10,7 +10,7 @@ namespace fieldmark::watermark {
 namespace {
 constexpr Index kWindowSize = 160;    // pixels of the small picture that shows where the object is
 constexpr Index kMlpWindowSize = 80;  // of an mlp field, where larger ones would take longer than the views
-constexpr Index kCoarsest = 4;        // the reader's size over the least of a view
+constexpr Index kCoarsest = 4;        // a side of the patch over the least of a view's
 constexpr Index kFewestCells = 16, kMostCells = 64, kMoreCells = 6;
 constexpr double kCellsABit = 2, kCellsABitOfACut = 8, kPoorViews = 0.1;
 
@@ -26,21 +26,22 @@ std::vector<nerf::Camera> cameras_of(const nerf::CameraSpan& span, const EmbedVi
   return cameras;
 }
 
-// A view as a part of a square of background, from a pixel on.
-CachedView in_square(CachedView view, Index left, Index top, Index size, float background) {
+// A view as a part of a larger one of background, from a pixel on.
+CachedView with_background(CachedView view, Index left, Index top, const PatchSize& size, float background) {
   const Index height = view.height, width = view.width;
-  if (height == size && width == size) return view;
+  if (height == size.height && width == size.width) return view;
   const Tensor<float> base = std::move(view.base), opacity = std::move(view.opacity);
   const std::vector<std::int32_t> begin = std::move(view.sample_begin);
-  view.height = view.width = size;
-  view.base = Tensor<float>({size, size, 3}, background);
-  view.opacity = Tensor<float>({size, size});
+  view.height = size.height;
+  view.width = size.width;
+  view.base = Tensor<float>({size.height, size.width, 3}, background);
+  view.opacity = Tensor<float>({size.height, size.width});
   view.sample_begin = {0};
-  for (Index y = 0; y < size; ++y)
-    for (Index x = 0; x < size; ++x) {
+  for (Index y = 0; y < size.height; ++y)
+    for (Index x = 0; x < size.width; ++x) {
       std::int32_t samples = 0;
       if (x >= left && x < left + width && y >= top && y < top + height) {
-        const Index from = (y - top) * width + x - left, to = y * size + x;
+        const Index from = (y - top) * width + x - left, to = y * size.width + x;
         const auto here = begin.begin() + from;
         samples = here[1] - here[0];
         std::copy_n(&base[3 * from], 3, &view.base[3 * to]);
@@ -53,22 +54,28 @@ CachedView in_square(CachedView view, Index left, Index top, Index size, float b
 
 // The window's view as a reader has it: nothing where the window reaches beyond the picture.
 CachedView view_of_window(nerf::Renderer& renderer, const nerf::RadianceField& field,
-                          const nerf::Camera& picture, const Window& window, Index size, Index samples) {
+                          const nerf::Camera& picture, const Window& window, const PatchSize& size,
+                          Index samples) {
   const nerf::Camera camera = window_camera(picture, window, size);
-  const double zoom = static_cast<double>(size) / window.side;
-  // The first pixel whose centre is not before a place of the picture.
-  const auto first = [&](double place, double edge) {
-    return std::clamp<Index>(static_cast<Index>(std::ceil((place - edge) * zoom - 0.5)), 0, size);
+  // The first pixel whose centre is not before an offset from the window's edge.
+  const auto first = [](double offset, double extent, Index pixels) {
+    const double place = offset * static_cast<double>(pixels) / extent - 0.5;
+    return std::clamp<Index>(static_cast<Index>(std::ceil(place)), 0, pixels);
   };
-  const Index left = first(0, window.x), right = first(static_cast<double>(picture.width), window.x),
-              top = first(0, window.y), bottom = first(static_cast<double>(picture.height), window.y);
+  const auto column = [&](Index x) {
+    return first(static_cast<double>(x) - window.x, window.width, size.width);
+  };
+  const auto row = [&](Index y) {
+    return first(static_cast<double>(y) - window.y, window.height, size.height);
+  };
+  const Index left = column(0), right = column(picture.width), top = row(0), bottom = row(picture.height);
   nerf::Camera inside = camera;
   inside.cx -= static_cast<double>(left);
   inside.cy -= static_cast<double>(top);
   inside.width = right - left;
   inside.height = bottom - top;
-  CachedView view = in_square(cache_view(renderer, field, inside, samples), left, top, size,
-                              nerf::background_value(field.background));
+  CachedView view = with_background(cache_view(renderer, field, inside, samples), left, top, size,
+                                    nerf::background_value(field.background));
   view.camera = camera;
   return view;
 }
@@ -87,7 +94,7 @@ EmbedDistances parse_distances(std::string_view name) {
                    "\"");
 }
 
-std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, Index reader_size,
+std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, const PatchSize& patch,
                                           const EmbedViewOptions& options, std::uint64_t seed,
                                           const std::function<bool(Index, Index)>& progress) {
   // The samples the field was trained with: quick pictures to find the object in.
@@ -97,12 +104,14 @@ std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, Inde
   std::vector<CachedView> views;
   const Index seen = field.coarse ? kMlpWindowSize : kWindowSize;
   for (const nerf::Camera& camera : cameras_of(field.cameras, options, seen, seed)) {
-    const Window window = object_window(renderer.render(camera).rgb, background);
-    Index size = reader_size;
-    if (options.distances != EmbedDistances::near)
-      size =
-          std::clamp<Index>(std::lround(window.side * static_cast<double>(own) / static_cast<double>(seen)),
-                            (reader_size + kCoarsest - 1) / kCoarsest, reader_size);
+    const Window window = object_window(renderer.render(camera).rgb, background, patch.aspect());
+    PatchSize size = patch;
+    if (options.distances != EmbedDistances::near) {
+      size.height =
+          std::clamp<Index>(std::lround(window.height * static_cast<double>(own) / static_cast<double>(seen)),
+                            (patch.height + kCoarsest - 1) / kCoarsest, patch.height);
+      size.width = std::lround(static_cast<double>(size.height) * patch.aspect());
+    }
     views.push_back(view_of_window(renderer, field, camera, window, size, options.samples));
     if (progress && !progress(static_cast<Index>(views.size()), options.count))
       throw Error("stopped while views were cached");
@@ -110,10 +119,10 @@ std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, Inde
   return views;
 }
 
-std::vector<CachedView> cache_near_views(const nerf::RadianceField& field, Index reader_size, Index count,
-                                         std::uint64_t seed,
+std::vector<CachedView> cache_near_views(const nerf::RadianceField& field, const PatchSize& patch,
+                                         Index count, std::uint64_t seed,
                                          const std::function<bool(Index, Index)>& progress) {
-  return cache_embed_views(field, reader_size, {.count = count}, seed, progress);
+  return cache_embed_views(field, patch, {.count = count}, seed, progress);
 }
 
 std::vector<double> visible_area(std::span<const CachedView> views, Index side) {

@@ -97,10 +97,11 @@ Embedder::Picture Embedder::draw(Index image) const {
       turned ? blend(-d.rotation, d.rotation, static_cast<double>(a[2])) * 3.14159265358979 / 180 : 0;
   const double zoom = zoomed ? blend(d.zoom_out, d.zoom_in, static_cast<double>(b[0])) : 1;
   // A window at a random place that stays inside the picture; a small shift where the whole picture is seen.
-  const auto size = static_cast<double>(owner_.options().reader_size),
+  const PatchSize patch = owner_.options().patch();
+  const auto size = static_cast<double>(patch.height),
              height = static_cast<double>(views_[at(p.view)].height);
   const double room = 0.5 * std::max(zoom - 1, 0.04);
-  const double sx = blend(-room, room, static_cast<double>(b[1])) * size,
+  const double sx = blend(-room, room, static_cast<double>(b[1])) * static_cast<double>(patch.width),
                sy = blend(-room, room, static_cast<double>(b[2])) * size;
   p.warped = turned || zoomed || height != size;
   p.warp = distort::similarity_matrix(static_cast<float>(angle), static_cast<float>(zoom * size / height),
@@ -141,9 +142,9 @@ Var<float> Embedder::distort(Tape<float>& tape, Var<float> image, const Picture&
   if (p.warped) {
     float* matrix = tape.scratch(6);
     std::copy(p.warp.begin(), p.warp.end(), matrix);
-    const Index size = owner_.options().reader_size;
+    const PatchSize size = owner_.options().patch();
     image = distort::affine_warp(image, tape.constant(matrix, {6}),
-                                 {.height = size, .width = size, .background = background});
+                                 {.height = size.height, .width = size.width, .background = background});
   }
   if (p.blur > 0) image = distort::blur(image, number(p.blur));
   if (p.noise > 0) {

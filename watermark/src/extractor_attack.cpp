@@ -128,7 +128,7 @@ nerf::Dataset renders_against_extractor(const Owner& owner, const nerf::Radiance
                                         const ExtractorAttackOptions& options,
                                         const std::function<bool(Index done, Index total)>& progress) {
   std::vector<nerf::Camera> cameras;
-  for (const CachedView& v : cache_near_views(field, owner.options().reader_size, views, options.seed + 51))
+  for (const CachedView& v : cache_near_views(field, owner.options().patch(), views, options.seed + 51))
     cameras.push_back(v.camera);
   nerf::Dataset data = nerf::rendered_dataset(field, cameras);
   const float background = nerf::background_value(field.background);

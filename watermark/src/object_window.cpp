@@ -29,7 +29,7 @@ std::vector<float> box_mean(const std::vector<float>& x, Index lines, Index leng
 
 }  // namespace
 
-Window object_window(const Tensor<float>& rgb, float background) {
+Window object_window(const Tensor<float>& rgb, float background, double aspect) {
   check_rank("object_window", "rgb", rgb.shape, 3, "[H, W, 3]");
   check_extent("object_window", "rgb", rgb.shape, 2, 3, "red, green, blue");
   const Index h = rgb.shape[0], w = rgb.shape[1];
@@ -52,33 +52,42 @@ Window object_window(const Tensor<float>& rgb, float background) {
   };
   if (x0 >= x1 || (full(x1 - x0, w) && full(y1 - y0, h))) x0 = y0 = 0, x1 = w, y1 = h;
   const double margin = x1 - x0 == w && y1 - y0 == h ? 0 : kMargin;
-  const double side = static_cast<double>(std::max(x1 - x0, y1 - y0)) * (1 + 2 * margin);
-  return {0.5 * (static_cast<double>(x0 + x1) - side), 0.5 * (static_cast<double>(y0 + y1) - side), side};
+  const double height =
+      std::max(static_cast<double>(x1 - x0) / aspect, static_cast<double>(y1 - y0)) * (1 + 2 * margin);
+  const double width = height * aspect;
+  return {0.5 * (static_cast<double>(x0 + x1) - width), 0.5 * (static_cast<double>(y0 + y1) - height), width,
+          height};
 }
 
-Tensor<float> cut_window(const Tensor<float>& rgb, const Window& window, Index size, float background) {
-  if (!(window.side > 0) || size < 1)
-    throw ValueError("[cut_window] window and size must be positive, got side " +
-                     std::to_string(window.side) + " and size " + std::to_string(size));
+Tensor<float> cut_window(const Tensor<float>& rgb, const Window& window, const PatchSize& size,
+                         float background) {
+  if (!(window.width > 0 && window.height > 0) || size.width < 1 || size.height < 1)
+    throw ValueError("[cut_window] window and size must be positive, got " + std::to_string(window.width) +
+                     " x " + std::to_string(window.height) + " and " + std::to_string(size.width) + " x " +
+                     std::to_string(size.height));
   // Whole pixels around the window first, then one resize of exactly the window by sampling between them.
-  const Index h = rgb.shape[0], w = rgb.shape[1], side = std::max<Index>(1, std::lround(window.side));
+  const auto whole = [](double extent) { return std::max<Index>(1, std::lround(extent)); };
+  const Index h = rgb.shape[0], w = rgb.shape[1], height = whole(window.height), width = whole(window.width);
   const Index left = std::lround(window.x), top = std::lround(window.y);
-  Tensor<float> part({side, side, 3}, background);
-  for (Index y = std::max<Index>(0, -top); y < std::min(side, h - top); ++y)
-    for (Index x = std::max<Index>(0, -left); x < std::min(side, w - left); ++x)
-      for (Index c = 0; c < 3; ++c) part[(y * side + x) * 3 + c] = rgb[((y + top) * w + x + left) * 3 + c];
-  if (side == size) return part;
-  return side > size ? resize_area(part, size, size) : resize_bilinear(part, size, size);
+  Tensor<float> part({height, width, 3}, background);
+  for (Index y = std::max<Index>(0, -top); y < std::min(height, h - top); ++y)
+    for (Index x = std::max<Index>(0, -left); x < std::min(width, w - left); ++x)
+      for (Index c = 0; c < 3; ++c) part[(y * width + x) * 3 + c] = rgb[((y + top) * w + x + left) * 3 + c];
+  if (height == size.height && width == size.width) return part;
+  return height > size.height ? resize_area(part, size.height, size.width)
+                              : resize_bilinear(part, size.height, size.width);
 }
 
-nerf::Camera window_camera(const nerf::Camera& camera, const Window& window, Index size) {
+nerf::Camera window_camera(const nerf::Camera& camera, const Window& window, const PatchSize& size) {
   nerf::Camera out = camera;
-  const double zoom = static_cast<double>(size) / window.side;
-  out.fx *= zoom;
-  out.fy *= zoom;
-  out.cx = (camera.cx - window.x) * zoom;
-  out.cy = (camera.cy - window.y) * zoom;
-  out.width = out.height = size;
+  const double zoom_x = static_cast<double>(size.width) / window.width,
+               zoom_y = static_cast<double>(size.height) / window.height;
+  out.fx *= zoom_x;
+  out.fy *= zoom_y;
+  out.cx = (camera.cx - window.x) * zoom_x;
+  out.cy = (camera.cy - window.y) * zoom_y;
+  out.width = size.width;
+  out.height = size.height;
   return out;
 }
 

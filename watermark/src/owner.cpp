@@ -13,6 +13,8 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::array<const char*, 3> kPresets{"fast", "paper", "code"};
+constexpr double kLeastAspect = 0.25;
+constexpr double kPatchStep = 8;  // pixels: the extractor halves its pictures, the embedder averages as many
 
 OwnerOptions checked(const OwnerOptions& o) {
   if (o.bits < 1 || o.bits > 256)
@@ -21,6 +23,8 @@ OwnerOptions checked(const OwnerOptions& o) {
     throw ValueError("[owner] strength must be 20 to 60 dB, got " + std::to_string(o.strength));
   if (o.reader_size < 32)
     throw ValueError("[owner] reader_size must be at least 32 pixels, got " + std::to_string(o.reader_size));
+  if (!(o.reader_aspect >= kLeastAspect && o.reader_aspect <= 1 / kLeastAspect))
+    throw ValueError("[owner] reader_aspect must be 0.25 to 4, got " + std::to_string(o.reader_aspect));
   return o;
 }
 
@@ -51,6 +55,7 @@ std::string configuration(const OwnerOptions& o, double gain, const nerf::Radian
               {"strength", o.strength},
               {"cells", o.cells},
               {"reader_size", o.reader_size},
+              {"reader_aspect", o.reader_aspect},
               {"bands", o.mark.bands},
               {"features", o.mark.features},
               {"red_green", o.mark.red_green},
@@ -79,6 +84,7 @@ OwnerOptions parse_options(const Json& j) {
   o.strength = j.at("strength");
   o.cells = j.at("cells");
   o.reader_size = j.at("reader_size");
+  o.reader_aspect = j.value("reader_aspect", o.reader_aspect);
   o.mark = {.bands = j.at("bands"),
             .features = j.at("features"),
             .red_green = j.at("red_green"),
@@ -120,6 +126,23 @@ OwnerOptions owner_options(Preset preset) {
   o.message_features = 128;
   o.fusion = {.late_direction = true, .raw_colour = true, .repeated = true};
   return o;
+}
+
+PatchSize OwnerOptions::patch() const {
+  if (reader_aspect == 1) return square_patch(reader_size);
+  const auto side = [&](double factor) {
+    return static_cast<Index>(kPatchStep *
+                              std::round(static_cast<double>(reader_size) * factor / kPatchStep));
+  };
+  const double longer = std::sqrt(reader_aspect);
+  return {side(1 / longer), side(longer)};
+}
+
+double reader_aspect(const nerf::RadianceField& field) {
+  const nerf::CameraSpan& photographs = field.cameras;
+  if (field.space.kind == nerf::SpaceKind::cube || photographs.height < 1 || photographs.width < 1) return 1;
+  return std::clamp(static_cast<double>(photographs.width) / static_cast<double>(photographs.height),
+                    kLeastAspect, 1 / kLeastAspect);
 }
 
 CellGrid message_slots(Index bits) {

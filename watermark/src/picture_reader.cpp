@@ -51,12 +51,12 @@ std::vector<double> PictureReader::evidence(const Tensor<float>& picture) const 
 std::vector<double> PictureReader::evidence(const Tensor<float>& picture, SeenPlaces* places) const {
   const float background = nerf::background_value(owner_.field.background);
   const Tensor<float> whole = opaque_picture(picture, background);
-  const Index size = owner_.options().reader_size;
-  const Window window = object_window(whole, background);
+  const PatchSize size = owner_.options().patch();
+  const Window window = object_window(whole, background, size.aspect());
   const Tensor<float> image = cut_window(whole, window, size, background);
   Tape<float> tape;
   const Params<float> params(owner_.params, nullptr);
-  const Var<float> input = tape.constant(image.data.data(), {1, size, size, 3});
+  const Var<float> input = tape.constant(image.data.data(), {1, size.height, size.width, 3});
   if (places) *places = {.window = window};
   if (owner_.pooled_reader) {
     const Var<float> logits = (*owner_.pooled_reader)(params, input);

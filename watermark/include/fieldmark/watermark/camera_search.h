@@ -18,7 +18,8 @@ struct CameraSearchOptions {
 ///   have
 ///     to be turned, scaled and moved (Fischler and Bolles 1981), and the proposal that most places agree
 ///     with is kept; the best few cameras are then moved until cells lie where they were seen.
-///   - By the picture itself: its object's window (see object_window.h), turned in steps of 15 degrees and
+///   - By the picture itself: its object's square window (see object_window.h), turned in steps of 15 degrees
+///   and
 ///     brought to 24 pixels, is correlated with those of the renders. It needs no extractor, but the whole
 ///     object in the picture or a field that fills it.
 ///   - By the picture as a part of a render, where it was cut: it is correlated, upright, with windows of

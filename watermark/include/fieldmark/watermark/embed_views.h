@@ -1,5 +1,6 @@
 #pragma once
 #include <fieldmark/watermark/cell_grid.h>
+#include <fieldmark/watermark/object_window.h>
 #include <fieldmark/watermark/view_cache.h>
 
 #include <functional>
@@ -26,18 +27,19 @@ struct EmbedViewOptions {
 };
 
 /// Renders and caches the views to embed in, each cut to the object's window as the reader will cut a picture
-/// (see object_window.h), with background where the window reaches beyond it, `reader_size` pixels a side;
-/// from native on fewer where a picture of the field's size has fewer, though no fewer than a quarter: the
-/// embedder enlarges those as the reader would.
+/// (see object_window.h), with background where the window reaches beyond it, as large as the extractor's
+/// patch; from native on smaller where a picture of the field's size has fewer pixels, though no less than a
+/// quarter a side: the embedder enlarges those as the reader would.
+/// @param patch  see OwnerOptions::patch()
 /// @param progress  called after each view with (done, total); returns false to stop, which throws Error
 /// @throws ValueError as cache_view()
-std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, Index reader_size,
+std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, const PatchSize& patch,
                                           const EmbedViewOptions& options, std::uint64_t seed,
                                           const std::function<bool(Index, Index)>& progress = {});
 
 /// The same of near cameras, with one sample of a ray.
-std::vector<CachedView> cache_near_views(const nerf::RadianceField& field, Index reader_size, Index count,
-                                         std::uint64_t seed,
+std::vector<CachedView> cache_near_views(const nerf::RadianceField& field, const PatchSize& patch,
+                                         Index count, std::uint64_t seed,
                                          const std::function<bool(Index, Index)>& progress = {});
 
 /// Visible area of the cells of a grid over the cube, summed over views. @return [side^3]

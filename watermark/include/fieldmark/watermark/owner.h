@@ -6,6 +6,7 @@
 #include <fieldmark/watermark/cell_grid.h>
 #include <fieldmark/watermark/global_mark.h>
 #include <fieldmark/watermark/mark_network.h>
+#include <fieldmark/watermark/object_window.h>
 
 #include <optional>
 #include <string_view>
@@ -30,7 +31,8 @@ struct OwnerOptions {
   double strength =
       36.5;          ///< PSNR of marked against unmarked on the object, dB, mean over near views, 20 to 60
   Index cells = 16;  ///< per axis of the field's cube, see CellGrid
-  Index reader_size = 200;     ///< side of the square in which the extractor sees the object, pixels, >= 32
+  Index reader_size = 200;     ///< side of the square with as many pixels as the extractor sees, >= 32
+  double reader_aspect = 1;    ///< width over height of what it sees, 1/4 to 4, see reader_aspect()
   MarkNetworkOptions mark{};   ///< preset fast
   Index base_channels = 32;    ///< of the extractor, see DenseExtractorOptions
   Index width = 256;           ///< presets paper and code: units of E and G, and N_c, see GlobalMarkOptions
@@ -44,7 +46,14 @@ struct OwnerOptions {
   bool budget = false;
   bool keyed_signs = true;  ///< whether a bit's sign in a cell is the key's, or always the bit's own
   std::uint64_t seed = 0;   ///< of the initial numbers of the networks
+  /// What the extractor sees: reader_size squared pixels in the shape of reader_aspect, both sides multiples
+  /// of 8 unless the shape is a square.
+  PatchSize patch() const;
 };
+
+/// The shape of the part of a picture that the extractor best sees: where the scene has no bounds, the shape
+/// of the field's photographs, which it fills, within 1/4 to 4; of an object before a background, a square.
+double reader_aspect(const nerf::RadianceField& field);
 
 /// The options of a preset: the defaults for fast and paper. For code the networks of the authors' code, row
 /// by row of its differences to the paper: N_m is 128, and D has as many units (message_features); E and G
