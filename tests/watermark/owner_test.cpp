@@ -282,7 +282,7 @@ TEST_CASE("owner: options outside their ranges are refused") {
   CHECK_THROWS_AS(with([](OwnerOptions& o) { o.reader_aspect = std::nan(""); }), ValueError);
 }
 
-TEST_CASE("owner: the patch keeps its pixels in another shape, and is kept with the owner") {
+TEST_CASE("owner: the patch keeps its longer side in another shape, and is kept with the owner") {
   OwnerOptions o = small_owner_options();
   o.reader_size = 75;
   CHECK(o.patch() == square_patch(75));
@@ -290,11 +290,15 @@ TEST_CASE("owner: the patch keeps its pixels in another shape, and is kept with 
     o.reader_aspect = aspect;
     const PatchSize patch = o.patch();
     CAPTURE(aspect, patch.height, patch.width);
-    CHECK(patch.height % 8 == 0);
-    CHECK(patch.width % 8 == 0);
-    CHECK(static_cast<double>(patch.height) == Approx(75 / std::sqrt(aspect)).margin(4));
-    CHECK(static_cast<double>(patch.width) == Approx(75 * std::sqrt(aspect)).margin(4));
+    CHECK(std::max(patch.height, patch.width) == 75);
+    CHECK(std::min(patch.height, patch.width) % 8 == 0);
+    CHECK((patch.width > patch.height) == (aspect > 1));
+    CHECK(static_cast<double>(std::min(patch.height, patch.width)) ==
+          Approx(75 * std::min(aspect, 1 / aspect)).margin(4));
   }
+  o.reader_size = 32;
+  CHECK(o.patch() == PatchSize{16, 32});  // the extractor takes no less
+  o.reader_size = 75;
   const TemporaryFolder folder;
   small_owner(o).save(folder / "a");
   CHECK(Owner::load(folder / "a").options().patch() == o.patch());

@@ -238,12 +238,13 @@ Command add_embed(CLI::App& app) {
           ->check(CLI::Range(2, 64).description(""))
           ->type_name("N")
           ->default_str("");
-  auto* reader_size = app.add_option("--reader-size", o->owner.reader_size,
-                                     "Side of the square with as many pixels as the extractor sees, 32 to "
-                                     "1024 (200; paper, code: 150); photographs without a background are "
-                                     "seen in their own shape")
-                          ->check(CLI::Range(32, 1024).description(""))
-                          ->type_name("N");
+  auto* reader_size =
+      app.add_option("--reader-size", o->owner.reader_size,
+                     "Longer side of what the extractor sees, pixels, 32 to 1024 (200; paper, "
+                     "code: 150): objects in a square, photographs without a background in "
+                     "their own shape")
+          ->check(CLI::Range(32, 1024).description(""))
+          ->type_name("N");
   add_view_options(app, *o);
   add_run_length(app, o->length, true);
   app.add_option("--measured-views", o->measured_views, "Near views to measure on at the end, 1 to 100000")

@@ -14,7 +14,7 @@ using Json = nlohmann::json;
 
 constexpr std::array<const char*, 3> kPresets{"fast", "paper", "code"};
 constexpr double kLeastAspect = 0.25;
-constexpr double kPatchStep = 8;  // pixels: the extractor halves its pictures, the embedder averages as many
+constexpr double kPatchStep = 8;  // pixels: the extractor halves its pictures again and again
 
 OwnerOptions checked(const OwnerOptions& o) {
   if (o.bits < 1 || o.bits > 256)
@@ -130,12 +130,9 @@ OwnerOptions owner_options(Preset preset) {
 
 PatchSize OwnerOptions::patch() const {
   if (reader_aspect == 1) return square_patch(reader_size);
-  const auto side = [&](double factor) {
-    return static_cast<Index>(kPatchStep *
-                              std::round(static_cast<double>(reader_size) * factor / kPatchStep));
-  };
-  const double longer = std::sqrt(reader_aspect);
-  return {side(1 / longer), side(longer)};
+  const double shorter = static_cast<double>(reader_size) * std::min(reader_aspect, 1 / reader_aspect);
+  const auto side = static_cast<Index>(kPatchStep * std::max(std::round(shorter / kPatchStep), 2.0));
+  return reader_aspect > 1 ? PatchSize{side, reader_size} : PatchSize{reader_size, side};
 }
 
 double reader_aspect(const nerf::RadianceField& field) {

@@ -31,7 +31,7 @@ struct OwnerOptions {
   double strength =
       36.5;          ///< PSNR of marked against unmarked on the object, dB, mean over near views, 20 to 60
   Index cells = 16;  ///< per axis of the field's cube, see CellGrid
-  Index reader_size = 200;     ///< side of the square with as many pixels as the extractor sees, >= 32
+  Index reader_size = 200;     ///< longer side of what the extractor sees, pixels, >= 32
   double reader_aspect = 1;    ///< width over height of what it sees, 1/4 to 4, see reader_aspect()
   MarkNetworkOptions mark{};   ///< preset fast
   Index base_channels = 32;    ///< of the extractor, see DenseExtractorOptions
@@ -46,8 +46,8 @@ struct OwnerOptions {
   bool budget = false;
   bool keyed_signs = true;  ///< whether a bit's sign in a cell is the key's, or always the bit's own
   std::uint64_t seed = 0;   ///< of the initial numbers of the networks
-  /// What the extractor sees: reader_size squared pixels in the shape of reader_aspect, both sides multiples
-  /// of 8 unless the shape is a square.
+  /// What the extractor sees: its shorter side is the multiple of 8 pixels nearest to the shape of
+  /// reader_aspect, but not below 16.
   PatchSize patch() const;
 };
 
