@@ -40,12 +40,13 @@ Subject subject_of(const BenchEmbedOptions& o, Context& context) {
 }
 
 std::vector<bench::EmbedVariant> variants_of(const BenchEmbedOptions& o, const nerf::RadianceField& field,
-                                             std::uint64_t seed) {
+                                             const std::vector<bench::EmbedRow>& known, std::uint64_t seed) {
   auto all = bench::embed_variants({.seconds = o.seconds}, o.bits, seed);
   for (bench::EmbedVariant& v : all)
     if (v.owner.preset == watermark::Preset::fast) v.owner.reader_aspect = watermark::reader_aspect(field);
   const auto wanted = [&](const bench::EmbedVariant& v) {
-    return v.choice == "default" || (v.choice + ": " + v.setting).find(o.only) != std::string::npos;
+    return v.choice == "default" || bench::find_row(known, v) ||
+           (v.choice + ": " + v.setting).find(o.only) != std::string::npos;
   };
   std::erase_if(all, [&](const auto& v) { return !wanted(v); });
   if (!o.quick) return all;
@@ -148,7 +149,7 @@ EmbedRows kept_rows(const BenchEmbedOptions& o, const std::string& field, Contex
 
 std::vector<bench::EmbedRow> measured(const BenchEmbedOptions& o, const nerf::RadianceField& field,
                                       EmbedRows& kept, Context& context) {
-  const auto variants = variants_of(o, field, context.seed());
+  const auto variants = variants_of(o, field, kept.rows(), context.seed());
   const InterruptGuard guard;
   Progress progress = context.progress("bench");
   return bench::run_embed_bench(

@@ -11,7 +11,7 @@ struct BenchEmbedOptions {
   std::string field;  ///< file; empty: `scene`, trained for a while
   std::string scene;  ///< data set; empty: lego of FIELDMARK_DATA, else the built-in scene
   std::string plot;   ///< SVG file; empty: none
-  std::string only;   ///< part of a row's name; the default is always measured
+  std::string only;   ///< part of a row's name; the default and what `rows` has are always there
   std::string rows;   ///< file in which rows are kept as they are measured, see EmbedRows; empty: none
   double seconds = 60;
   Index views = 24, bits = 48;

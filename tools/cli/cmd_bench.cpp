@@ -264,9 +264,9 @@ Command add_bench(CLI::App& app) {
   app.add_option("--only", o->engine.only, "engine, embed: only rows with TEXT in their name")
       ->type_name("TEXT")
       ->default_str("all");
-  app.add_option(
-         "--rows", o->embed.rows,
-         "embed: keeps rows in FILE as they are measured; those in FILE are not measured again (none)")
+  app.add_option("--rows", o->embed.rows,
+                 "embed: keeps rows in FILE as they are measured; those in FILE are not measured again, and "
+                 "shown whatever --only says (none)")
       ->type_name("FILE")
       ->default_str("");
   app.add_option("--scene", o->field.scene,
