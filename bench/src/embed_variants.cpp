@@ -63,7 +63,7 @@ void lengths(Variants& all) {
 
 // What the extractor sees, and of what.
 void views(Variants& all) {
-  for (const Index side : {128, 160, 256})
+  for (const Index side : {128, 200, 256})
     all.vary("patch", std::to_string(side) + " pixels", [=](EmbedVariant& v) { v.owner.reader_size = side; });
   for (const Index kept : {2, 4})
     all.vary("samples", std::to_string(kept) + " kept of a ray",

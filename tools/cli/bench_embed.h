@@ -13,8 +13,8 @@ struct BenchEmbedOptions {
   std::string plot;   ///< SVG file; empty: none
   std::string only;   ///< part of a row's name; the default and what `rows` has are always there
   std::string rows;   ///< file in which rows are kept as they are measured, see EmbedRows; empty: none
-  double seconds = 60;
-  Index views = 24, bits = 48;
+  double seconds = 90;
+  Index views = 24, bits = 16;
   Index size = 0;  ///< of the views to judge by; 0: as trained
   bool quick = false;
 };

@@ -158,7 +158,8 @@ void add_bench_field(CLI::App& app, BenchFieldOptions& o) {
   app.add_option("--seconds", o.seconds,
                  "field: of training, without --field; training, embed: of each; 0.1 to 86400")
       ->check(CLI::Range(0.1, 86400.0).description(""))
-      ->type_name("S");
+      ->type_name("S")
+      ->default_str("60; embed 90");
   app.add_flag("--quick", o.quick,
                "field: only the default and one setting of each kind; training: only three rows; embed: only "
                "four small ones; attacks: one severity");

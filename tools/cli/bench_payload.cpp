@@ -39,7 +39,7 @@ void add_bench_payload(CLI::App& app, BenchPayloadOptions& o) {
   app.add_option("--bits", o.bits, "payload, embed: length of a message, 1 to 256")
       ->check(CLI::Range(1, 256).description(""))
       ->type_name("N")
-      ->default_str("100; embed 48");
+      ->default_str("100; embed 16");
   app.add_option("--trials", o.trials, "payload: of each row, 1 to 1000000")
       ->check(CLI::Range(1, 1000000).description(""))
       ->type_name("N");

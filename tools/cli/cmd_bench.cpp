@@ -213,7 +213,6 @@ int run(Options options, Context& context) {
     options.embed.scene = shared.scene;
     options.embed.plot = shared.plot;
     options.embed.only = options.engine.only;
-    options.embed.seconds = shared.seconds;
     options.embed.quick = shared.quick;
     return bench_embed(options.embed, context);
   }
@@ -298,11 +297,12 @@ Command add_bench(CLI::App& app) {
   add_bench_payload(app, o->payload);
   add_bench_attacks(app, o->attacks);
   const CLI::Option *size = app.get_option("--size"), *views = app.get_option("--views"),
-                    *bits = app.get_option("--bits");
-  return [o, size, views, bits](Context& context) {
+                    *bits = app.get_option("--bits"), *seconds = app.get_option("--seconds");
+  return [o, size, views, bits, seconds](Context& context) {
     if (size->count() > 0) o->attacks.size = o->embed.size = o->field.size;
     if (views->count() > 0) o->embed.views = o->field.views;
     if (bits->count() > 0) o->embed.bits = o->payload.bits;
+    if (seconds->count() > 0) o->embed.seconds = o->field.seconds;
     return run(*o, context);
   };
 }

@@ -240,7 +240,7 @@ Command add_embed(CLI::App& app) {
           ->default_str("");
   auto* reader_size =
       app.add_option("--reader-size", o->owner.reader_size,
-                     "Longer side of what the extractor sees, pixels, 32 to 1024 (200; paper, "
+                     "Longer side of what the extractor sees, pixels, 32 to 1024 (160; paper, "
                      "code: 150): objects in a square, photographs without a background in "
                      "their own shape")
           ->check(CLI::Range(32, 1024).description(""))

@@ -14,17 +14,14 @@ struct CameraSearchOptions {
 
 /// Finds roughly from where a picture shows an owner's field, in three ways, by small renders of the field
 /// made once. Neither key nor message is looked at.
-///   - By the places that the extractor recognised. For each render, pairs of places propose how it would
-///   have
-///     to be turned, scaled and moved (Fischler and Bolles 1981), and the proposal that most places agree
-///     with is kept; the best few cameras are then moved until cells lie where they were seen.
-///   - By the picture itself: its object's square window (see object_window.h), turned in steps of 15 degrees
-///   and
-///     brought to 24 pixels, is correlated with those of the renders. It needs no extractor, but the whole
-///     object in the picture or a field that fills it.
-///   - By the picture as a part of a render, where it was cut: it is correlated, upright, with windows of
-///   several
-///     sizes all over the renders.
+///   - By the places that the extractor recognised. For each render, pairs of places propose how it
+///     would have to be turned, scaled and moved (Fischler and Bolles 1981), and the proposal that most
+///     places agree with is kept; the best few cameras are then moved until cells lie where they were seen.
+///   - By the picture itself: its object's window, a square (see object_window.h), turned in steps of 15
+///     degrees and brought to 24 pixels, is correlated with those of the renders. It needs no extractor, but
+///     the whole object in the picture or a field that fills it.
+///   - By the picture as a part of a render, where it was cut: it is correlated, upright, with windows
+///     of several sizes all over the renders.
 class CameraSearch {
  public:
   /// @param owner  of preset fast; must outlive this   @throws ValueError if it is of another preset, or an

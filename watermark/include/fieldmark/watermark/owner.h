@@ -31,7 +31,7 @@ struct OwnerOptions {
   double strength =
       36.5;          ///< PSNR of marked against unmarked on the object, dB, mean over near views, 20 to 60
   Index cells = 16;  ///< per axis of the field's cube, see CellGrid
-  Index reader_size = 200;     ///< longer side of what the extractor sees, pixels, >= 32
+  Index reader_size = 160;     ///< longer side of what the extractor sees, pixels, >= 32
   double reader_aspect = 1;    ///< width over height of what it sees, 1/4 to 4, see reader_aspect()
   MarkNetworkOptions mark{};   ///< preset fast
   Index base_channels = 32;    ///< of the extractor, see DenseExtractorOptions
@@ -51,8 +51,9 @@ struct OwnerOptions {
   PatchSize patch() const;
 };
 
-/// The shape of the part of a picture that the extractor best sees: where the scene has no bounds, the shape
-/// of the field's photographs, which it fills, within 1/4 to 4; of an object before a background, a square.
+/// The shape of the part of a picture that the extractor best sees: the shape of the field's photographs,
+/// within 1/4 to 4, where a scene fills them (its space is contracted or ndc); of an object in a cube, before
+/// a plain background, a square.   @return width over height
 double reader_aspect(const nerf::RadianceField& field);
 
 /// The options of a preset: the defaults for fast and paper. For code the networks of the authors' code, row
