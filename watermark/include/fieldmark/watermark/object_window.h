@@ -18,6 +18,7 @@ struct PatchSize {
   Index width = 0;   ///< likewise
   /// Width over height.
   double aspect() const { return static_cast<double>(width) / static_cast<double>(height); }
+  /// Whether both sides agree.
   bool operator==(const PatchSize&) const = default;
 };
 /// One of both sides alike.
