@@ -160,6 +160,8 @@ TEST_CASE("object_window: errors name what is wrong") {
   CHECK_THROWS_WITH(object_window(Tensor<float>({5, 5}), 1),
                     "[object_window] rgb must have rank 3 [H, W, 3], got shape [5, 5]");
   const Tensor<float> picture({5, 5, 3});
+  CHECK_THROWS_WITH(object_window(picture, 1, 0), "[object_window] aspect must be positive, got 0.000000");
+  CHECK_THROWS_AS(object_window(picture, 1, std::nan("")), ValueError);
   CHECK_THROWS_AS(cut_window(picture, {0, 0, 0, 4}, square_patch(4), 1), ValueError);
   CHECK_THROWS_AS(cut_window(picture, {0, 0, 4, std::nan("")}, square_patch(4), 1), ValueError);
   CHECK_THROWS_WITH(cut_window(picture, {0, 0, 2, 3}, {0, 4}, 1),

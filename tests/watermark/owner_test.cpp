@@ -249,6 +249,8 @@ TEST_CASE("owner: an owner whose parts do not fit its configuration is refused")
     text.replace(text.find(from), from.size(), to);
     return file;
   };
+  configured("\"reader_aspect\":1.0,", "").write(path);  // as owners were before
+  CHECK(Owner::load(path).options().patch() == square_patch(32));
   refused(configured("\"bits\":3", "\"bits\":0"), "bits must be 1 to 256, got 0");
   refused(configured("\"bits\":3", "\"bits\":\"three\""), "expected an owner's configuration, found");
   refused(configured("\"bits\":3,", ""), "expected an owner's configuration, found");

@@ -32,6 +32,8 @@ std::vector<float> box_mean(const std::vector<float>& x, Index lines, Index leng
 Window object_window(const Tensor<float>& rgb, float background, double aspect) {
   check_rank("object_window", "rgb", rgb.shape, 3, "[H, W, 3]");
   check_extent("object_window", "rgb", rgb.shape, 2, 3, "red, green, blue");
+  if (!(aspect > 0))
+    throw ValueError("[object_window] aspect must be positive, got " + std::to_string(aspect));
   const Index h = rgb.shape[0], w = rgb.shape[1];
   std::vector<float> distance(static_cast<std::size_t>(h * w));
   for (Index p = 0; p < h * w; ++p)

@@ -30,7 +30,7 @@ constexpr PatchSize square_patch(Index side) { return {side, side}; }
 /// over 5 x 5 pixels of its distance from the background exceeds 0.08: noise of deviation 0.1 does not (its
 /// mean distance on white is 0.04).
 /// @param rgb  [H, W, 3] in [0, 1]   @param background  of all channels   @param aspect  width over height of
-/// the window, > 0   @throws ShapeError if rgb is not [H, W, 3]
+/// the window   @throws ShapeError if rgb is not [H, W, 3]   @throws ValueError if aspect is not positive
 Window object_window(const Tensor<float>& rgb, float background, double aspect = 1);
 
 /// The part of a picture in a window at a size, background outside: area filter where it shrinks, bilinear
