@@ -111,15 +111,27 @@ CellGrid::Mix CellGrid::mix(const float* x) const {
       out.part[static_cast<std::size_t>(k)] = 1;
       return out;
     }
-  // The first cell's sign is +: all signs turned give the same products.
-  const int ways = cells.count > 0 ? 1 << (cells.count - 1) : 0;
-  for (int way = 0; way < ways; ++way) {
-    const auto sign = [&](int k) { return (2 * way >> k & 1) != 0 ? -1.f : 1.f; };
-    float sum = 0;
-    for (int k = 0; k < cells.count; ++k) sum += sign(k) * cells.weight[k];
-    const float s = std::clamp(kSteepness * sum, -1.f, 1.f) / static_cast<float>(ways);
-    for (int k = 0; k < cells.count; ++k) out.part[static_cast<std::size_t>(k)] += sign(k) * s;
+  if (cells.count == 0) return out;
+  // s[way]: what blend() gives where bit k - 1 of way is set if cell k's sign is -. The first cell's is +:
+  // all signs turned give the same products.
+  std::array<float, 128> s{cells.weight[0]};
+  std::size_t ways = 1;
+  for (int k = 1; k < cells.count; ++k, ways *= 2)
+    for (std::size_t i = 0; i < ways; ++i) {
+      s[ways + i] = s[i] - cells.weight[k];
+      s[i] += cells.weight[k];
+    }
+  for (std::size_t i = 0; i < ways; ++i)
+    s[i] = std::clamp(kSteepness * s[i], -1.f, 1.f) / static_cast<float>(ways);
+  // A cell's part is the sum over its + less that over its -; then both are one for the cells before it.
+  for (auto k = static_cast<std::size_t>(cells.count) - 1; k > 0; --k) {
+    ways /= 2;
+    for (std::size_t i = 0; i < ways; ++i) {
+      out.part[k] += s[i] - s[ways + i];
+      s[i] += s[ways + i];
+    }
   }
+  out.part[0] = s[0];
   return out;
 }
 

@@ -16,8 +16,8 @@ namespace fieldmark::watermark {
 namespace {
 
 constexpr Index kByPlaces = 3, kByPicture = 3, kByPart = 6;  // cameras that are tried
-constexpr AlignmentStage kCoarse[] = {{.size = 48, .blur = 1.5, .steps = 6}};
-constexpr AlignmentStage kFine[] = {{.size = 96, .blur = 1.2, .steps = 10},
+constexpr AlignmentStage kCoarse[] = {{.size = 48, .blur = 1.5, .steps = 6, .quick = true}};
+constexpr AlignmentStage kFine[] = {{.size = 96, .blur = 1.2, .steps = 10, .quick = true},
                                     {.size = 200, .blur = 1.2, .steps = 6}};
 constexpr Index kSamples = 4;          // of a ray, that the mark of a pixel is the sum of
 constexpr Index kLargest = 512;        // longer side at which evidence is taken, pixels

@@ -218,6 +218,7 @@ class Stage {
       if (!m.allFinite()) break;
       CameraMotion motion;
       Eigen::Map<Vector>(motion.data()) = m.cwiseMax(-0.3).cwiseMin(0.3);
+      if (furthest(best, motion) < kStill) break;
       Look next = look(moved(best.camera, best.pivot, motion));
       ToneFit next_tones;
       differ(next, next_tones, best.spread);
@@ -226,12 +227,10 @@ class Stage {
         ++failures;
         continue;
       }
-      const bool still = furthest(best, motion) < kStill;
       best = std::move(next);
       r = differ(best, tones);
       damping = std::max(1e-6, damping / 4);
       failures = 0;
-      if (still) break;
     }
     return {best.camera, best.points.empty() ? -1 : agreement(best)};
   }
@@ -267,7 +266,8 @@ class Stage {
 
 }  // namespace
 
-PoseAligner::PoseAligner(const nerf::RadianceField& field) : field_(field), renderer_(field, {.finer = 1}) {}
+PoseAligner::PoseAligner(const nerf::RadianceField& field)
+    : field_(field), renderer_(field, {.finer = 1}), quick_(field, {.finer = 0.5f}) {}
 
 Alignment PoseAligner::align(const Tensor<float>& picture, const nerf::Camera& start,
                              std::span<const AlignmentStage> stages) {
@@ -281,7 +281,7 @@ Alignment PoseAligner::align(const Tensor<float>& picture, const nerf::Camera& s
   const auto border = border_of(field_, picture);
   Alignment out{start, -1};
   for (const AlignmentStage& stage : stages)
-    out = Stage(renderer_, field_, picture, border, stage).run(out.camera);
+    out = Stage(stage.quick ? quick_ : renderer_, field_, picture, border, stage).run(out.camera);
   out.camera = out.camera.scaled(picture.shape[1], picture.shape[0]);
   return out;
 }

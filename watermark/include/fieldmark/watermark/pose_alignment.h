@@ -12,6 +12,7 @@ struct AlignmentStage {
   int steps = 8;    ///< at most; a stage ends earlier where nothing moves any more
   bool lens =
       true;  ///< whether the focal length moves apart from the distance, and the cut apart from the aim
+  bool quick = false;  ///< whether steps along the rays are twice as long: a camera that later stages mend
 };
 
 /// A camera and how well its view of the field agrees with a picture.
@@ -44,7 +45,7 @@ class PoseAligner {
 
  private:
   const nerf::RadianceField& field_;
-  nerf::Renderer renderer_;
+  nerf::Renderer renderer_, quick_;
 };
 
 }  // namespace fieldmark::watermark
