@@ -34,7 +34,22 @@ double tick_step(double range) {
   return 10 * power;
 }
 
-Axes axes_of(const std::vector<ScatterPoint>& points) {
+// Where x has its lines: 1, 2 and 5 times the powers of ten, or whole steps where less than three of those
+// are in sight.
+std::vector<double> x_ticks(const Axes& axes) {
+  std::vector<double> ticks;
+  for (double power = std::floor(axes.x0); power <= axes.x1; ++power)
+    for (const double times : {1.0, 2.0, 5.0})
+      if (const double at = std::log10(times) + power; at >= axes.x0 && at <= axes.x1)
+        ticks.push_back(times * std::pow(10, power));
+  if (ticks.size() >= 3) return ticks;
+  const double low = std::pow(10, axes.x0), high = std::pow(10, axes.x1), step = tick_step(high - low);
+  ticks.clear();
+  for (double i = std::ceil(low / step); i * step <= high; ++i) ticks.push_back(i * step);
+  return ticks;
+}
+
+Axes axes_of(const std::vector<ScatterPoint>& points, double y_most) {
   Axes axes{1e300, -1e300, 1e300, -1e300};
   for (const auto& p : points) {
     axes.x0 = std::min(axes.x0, std::log10(p.x)), axes.x1 = std::max(axes.x1, std::log10(p.x));
@@ -44,19 +59,16 @@ Axes axes_of(const std::vector<ScatterPoint>& points) {
   axes.x0 -= margin, axes.x1 += margin;
   const double step = tick_step(std::max(axes.y1 - axes.y0, 1e-3));
   axes.y0 = std::floor(axes.y0 / step - 0.1) * step, axes.y1 = std::ceil(axes.y1 / step + 0.1) * step;
+  while (axes.y1 > y_most + step / 2 && axes.y1 > axes.y0 + 1.5 * step) axes.y1 -= step;
   return axes;
 }
 
 std::string grid_lines(const Axes& axes) {
   std::string svg;
   const int foot = kTop + kHeight;
-  for (double power = std::floor(axes.x0); power <= axes.x1; ++power)
-    for (const double times : {1.0, 2.0, 5.0}) {
-      const double value = times * std::pow(10, power);
-      if (std::log10(value) < axes.x0 || std::log10(value) > axes.x1) continue;
-      svg += svg_line(axes.x(value), kTop, axes.x(value), foot, "#ddd") +
-             svg_text(axes.x(value), foot + 18, " text-anchor=\"middle\" fill=\"#666\"", short_number(value));
-    }
+  for (const double value : x_ticks(axes))
+    svg += svg_line(axes.x(value), kTop, axes.x(value), foot, "#ddd") +
+           svg_text(axes.x(value), foot + 18, " text-anchor=\"middle\" fill=\"#666\"", short_number(value));
   const double step = tick_step(axes.y1 - axes.y0);
   for (double value = axes.y0; value <= axes.y1 + step / 2; value += step)
     svg += svg_line(kLeft, axes.y(value), kLeft + kWidth, axes.y(value), "#ddd") +
@@ -135,7 +147,7 @@ std::string scatter_chart(const ScatterText& text, const std::vector<ScatterPoin
     if (std::isfinite(p.x) && std::isfinite(p.y)) drawn.push_back(p);
   }
   if (drawn.empty()) throw ValueError("[scatter_chart] points must have one that is finite");
-  const Axes axes = axes_of(drawn);
+  const Axes axes = axes_of(drawn, text.y_most);
   std::string svg = svg_begin(kLeft + kWidth + kRight, kTop + kHeight + kBottom, text.title) +
                     grid_lines(axes) +
                     svg_text(kLeft + kWidth / 2, kTop + kHeight + 42, " text-anchor=\"middle\"", text.x) +

@@ -60,6 +60,17 @@ TEST_CASE("scatter_chart: series, the line from left to right, and the ring") {
   CHECK(std::stoi(line[3]) < std::stoi(line[5]));
 }
 
+TEST_CASE("scatter_chart: points close in x have lines between them, and y ends where it must") {
+  const std::vector<ScatterPoint> points{{86, 46, "s"}, {94, 100, "s"}};
+  const auto open = scatter_chart({"t", "x", "y"}, points);
+  for (const char* tick : {">86<", ">90<", ">94<", ">110<"}) CHECK_THAT(open, Contains(tick));
+  const auto closed = scatter_chart({.title = "t", .x = "x", .y = "y", .y_most = 100}, points);
+  CHECK_THAT(closed, Contains(">100<") && !Contains(">110<"));
+  CHECK(places(closed)[1].y == 84);  // the frame's upper end
+  // No limit can take the picture away.
+  CHECK_THAT(scatter_chart({.title = "t", .x = "x", .y = "y", .y_most = -5}, points), !Contains("nan"));
+}
+
 TEST_CASE("scatter_chart: labels do not lie on each other, and text cannot break out of the picture") {
   std::vector<ScatterPoint> points(9, {1, 1, "s", "label"});
   const auto svg = scatter_chart({"a<b>&\"c\"", "</svg>", "y"}, points);

@@ -184,7 +184,8 @@ void write_plot(const std::filesystem::path& path, const std::string& title, con
                                   .x = "damage on the object, rms error in grey levels (2.55: 40 dB, 8.1: 30 "
                                        "dB, 25.5: 20 dB)",
                                   .y = std::string("bits right in one view, ") + reading + ", %",
-                                  .curves = true},
+                                  .curves = true,
+                                  .y_most = 100},
                                  points));
 }
 

@@ -128,12 +128,16 @@ void write_plots(const std::string& path, const std::string& name, const std::ve
       path,
       bench::scatter_chart({.title = "Embedding in " + name + ": what is read against time",
                             .x = std::string(seconds) + " (the ring is the default; names: on the front)",
-                            .y = y},
+                            .y = y,
+                            .y_most = 100},
                            ends));
-  write_file_atomically(
-      curves_path(path),
-      bench::scatter_chart(
-          {.title = "Embedding in " + name + ": the way there", .x = seconds, .y = y, .curves = true}, ways));
+  write_file_atomically(curves_path(path),
+                        bench::scatter_chart({.title = "Embedding in " + name + ": the way there",
+                                              .x = seconds,
+                                              .y = y,
+                                              .curves = true,
+                                              .y_most = 100},
+                                             ways));
 }
 
 EmbedRows kept_rows(const BenchEmbedOptions& o, const std::string& field, Context& context) {

@@ -1,4 +1,5 @@
 #pragma once
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,8 @@ struct ScatterText {
   /// Every series is a curve through its points in the order they come, named beside its last one; `line` and
   /// the names below the title are then not used.
   bool curves = false;
+  /// Where y ends at the latest, if no point can be higher: 100 of a share in percent.
+  double y_most = std::numeric_limits<double>::infinity();
 };
 
 /// A picture of points as a standalone SVG file, x on a logarithmic axis. Labels are moved up or down so that
