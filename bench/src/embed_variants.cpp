@@ -7,6 +7,7 @@ namespace fieldmark::bench {
 namespace {
 
 using watermark::EmbedDistances;
+using watermark::MarkColours;
 using watermark::Preset;
 
 constexpr Index kPaperPatch = 150;  // pixels, Luo et al. 2023, section 4.1
@@ -83,7 +84,7 @@ void views(Variants& all) {
 }
 
 // What carries the message, and how much it may change.
-void marks(Variants& all) {
+void marks(Variants& all, MarkColours colours) {
   for (const Index side : {8, 12, 20, 24, 32})
     all.vary("cells", std::to_string(side) + " an axis", [=](EmbedVariant& v) { v.owner.cells = side; });
   for (const int strength : {33, 40})
@@ -97,6 +98,9 @@ void marks(Variants& all) {
              [=](EmbedVariant& v) { v.embed.anneal = steps; });
   all.vary("hiding", "off", [](EmbedVariant& v) { v.embed.smooth_weight = v.embed.flat_weight = 0; });
   all.vary("colours", "grey too", [](EmbedVariant& v) { v.owner.mark.luminance = 1; });
+  const MarkColours other = colours == MarkColours::light ? MarkColours::blue : MarkColours::light;
+  all.vary("colours", watermark::mark_colours_name(other),
+           [=](EmbedVariant& v) { watermark::use_colours(other, v.owner.mark, v.embed); });
 }
 
 // How it is learnt.
@@ -118,9 +122,11 @@ void training(Variants& all) {
 
 }  // namespace
 
-std::vector<EmbedVariant> embed_variants(const nerf::ScheduleOptions& length, Index bits,
-                                         std::uint64_t seed) {
-  Variants all(base_variant(Preset::fast, length, bits, seed));
+std::vector<EmbedVariant> embed_variants(const nerf::ScheduleOptions& length, Index bits, std::uint64_t seed,
+                                         MarkColours colours) {
+  EmbedVariant usual = base_variant(Preset::fast, length, bits, seed);
+  watermark::use_colours(colours, usual.owner.mark, usual.embed);
+  Variants all(usual);
   lengths(all);
   for (const Preset preset : {Preset::paper, Preset::code}) {
     EmbedVariant v = base_variant(preset, length, bits, seed);
@@ -128,7 +134,7 @@ std::vector<EmbedVariant> embed_variants(const nerf::ScheduleOptions& length, In
     all.add("preset", watermark::preset_name(preset), std::move(v));
   }
   views(all);
-  marks(all);
+  marks(all, colours);
   training(all);
   return all.take();
 }

@@ -45,8 +45,10 @@ const std::map<std::string, Differs> kChoices{
      [](const EmbedVariant& a, const EmbedVariant& b) {
        return a.embed.smooth_weight != b.embed.smooth_weight && a.embed.flat_weight != b.embed.flat_weight;
      }},
-    {"colours", [](const EmbedVariant& a,
-                   const EmbedVariant& b) { return a.owner.mark.luminance != b.owner.mark.luminance; }},
+    {"colours",
+     [](const EmbedVariant& a, const EmbedVariant& b) {
+       return a.owner.mark.luminance != b.owner.mark.luminance || a.owner.mark.tilt != b.owner.mark.tilt;
+     }},
     {"supervision",
      [](const EmbedVariant& a, const EmbedVariant& b) {
        return a.embed.sign_weight != b.embed.sign_weight || a.embed.index_weight != b.embed.index_weight ||

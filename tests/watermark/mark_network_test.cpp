@@ -25,14 +25,17 @@ Row by_loops(const ParamStore<double>& store, const MarkNetworkOptions& o, const
   f.insert(f.end(), c.begin(), c.end());
   const Row g = layer(store, "mark/fuse/1", layer(store, "mark/fuse/0", f, true), false);
   const double blue = std::sqrt(1 + 2 * std::pow(114.0 / 886, 2)), red_green = std::hypot(587.0, 299.0);
+  const double t = o.tilt * std::numbers::pi / 180, g3 = std::sin(t) / std::sqrt(3), b = std::cos(t) / blue;
+  const double rg = g3 - 114.0 / 886 * b, third = g3 + b, norm = std::sqrt(2 * rg * rg + third * third);
   const double axes[3][3] = {
-      {-114.0 / 886 / blue, -114.0 / 886 / blue, 1 / blue},
+      {rg / norm, rg / norm, third / norm},
       {o.red_green * 587 / red_green, -o.red_green * 299 / red_green, 0},
       {o.luminance / std::sqrt(3), o.luminance / std::sqrt(3), o.luminance / std::sqrt(3)}};
   Row p(3);
   for (int k = 0; k < 3; ++k)
     for (int a = 0; a < 3; ++a)
       p[static_cast<std::size_t>(a)] += std::tanh(g[static_cast<std::size_t>(k)]) * axes[k][a];
+  for (std::size_t a = 0; a < 3; ++a) p[a] *= 1 - o.shading + o.shading * c[a];
   return p;
 }
 
@@ -44,8 +47,11 @@ auto carrier(const MarkNetwork<T>& net, const ParamStore<T>& store) {
 
 TEST_CASE("mark_network: the carrier is what its formula says") {
   ParamStore<double> store;
-  const MarkNetwork<double> net(store, "mark",
-                                {.bands = 3, .features = 5, .red_green = 0.7, .luminance = 0.2}, 7);
+  MarkNetworkOptions options{.bands = 3, .features = 5, .red_green = 0.7, .luminance = 0.2};
+  SECTION("blue") {}
+  SECTION("tilted towards grey") { options.tilt = 50; }
+  SECTION("stronger where it is bright") { options.shading = 0.9; }
+  const MarkNetwork<double> net(store, "mark", options, 7);
   const auto x = uniform({4, 3}, 0, 1, 1), c = uniform({4, 3}, 0, 1, 2);
   const auto y = op_values(carrier(net, store), std::vector{x, c});
   for (std::size_t i = 0; i < 4; ++i) {
@@ -71,6 +77,20 @@ TEST_CASE("mark_network: without luminance the carrier has no luma, and it is ne
   CHECK(largest <=
         std::sqrt(2 + 2 * 0.05535));  // the two axes are not quite at right angles: their product is -0.0553
   CHECK(largest > 0.5);
+}
+
+TEST_CASE("mark_network: at 90 degrees the carrier is grey, with all shading black carries nothing") {
+  ParamStore<double> store;
+  const MarkNetwork<double> net(store, "mark", {.tilt = 90, .shading = 1}, 7);
+  for (double& v : store.values()) v *= 5;
+  const auto x = uniform({50, 3}, 0, 1, 1);
+  const auto white = op_values(carrier(net, store), std::vector{x, Tensor<double>({50, 3}, 1.0)});
+  for (std::size_t i = 0; i < white.size(); i += 3) {
+    CHECK(white[i] != 0);
+    CHECK(white[i + 1] == Approx(white[i]).epsilon(1e-12));
+    CHECK(white[i + 2] == Approx(white[i]).epsilon(1e-12));
+  }
+  for (double v : op_values(carrier(net, store), std::vector{x, Tensor<double>({50, 3}, 0.0)})) CHECK(v == 0);
 }
 
 TEST_CASE("mark_network: gradients in position, colour and parameters") {
@@ -114,6 +134,10 @@ TEST_CASE("mark_network: errors name what is wrong") {
   CHECK_THROWS_WITH(make({.bands = 0}), "[mark_network] bands must be 1 to 12, got 0");
   CHECK_THROWS_WITH(make({.bands = 13}), "[mark_network] bands must be 1 to 12, got 13");
   CHECK_THROWS_WITH(make({.features = 0}), "[mark_network] features must be at least 1, got 0");
+  CHECK_THROWS_WITH(make({.tilt = 91}), "[mark_network] tilt must be 0 to 90 degrees, got 91.000000");
+  CHECK_THROWS_AS(make({.tilt = std::nan("")}), ValueError);
+  CHECK_THROWS_WITH(make({.shading = -0.5}), "[mark_network] shading must be 0 to 1, got -0.500000");
+  CHECK_THROWS_AS(make({.shading = 1.1}), ValueError);
   CHECK_THROWS_WITH(make({.luminance = 1.5}),
                     "[mark_network] red_green and luminance must be 0 to 1, got 0.000000 and 1.500000");
   CHECK_THROWS_AS(make({.red_green = -0.1}), ValueError);

@@ -265,6 +265,26 @@ TEST_CASE("owner: an owner whose parts do not fit its configuration is refused")
   }
 }
 
+TEST_CASE("owner: how the mark looks is kept, and owners of before are blue") {
+  const TemporaryFolder folder;
+  const auto path = folder / "x";
+  OwnerOptions o = small_owner_options();
+  o.mark.tilt = 50;
+  o.mark.shading = 0.75;
+  small_owner(o).save(path);
+  CHECK(Owner::load(path).options().mark.tilt == 50);
+  CHECK(Owner::load(path).options().mark.shading == 0.75);
+  SafetensorsFile file = SafetensorsFile::read(path);
+  std::string& text = file.metadata.at("fieldmark");
+  for (const std::string gone : {"\"shading\":0.75,", ",\"tilt\":50.0"}) {
+    REQUIRE(text.find(gone) != std::string::npos);
+    text.replace(text.find(gone), gone.size(), "");
+  }
+  file.write(path);
+  CHECK(Owner::load(path).options().mark.tilt == 0);
+  CHECK(Owner::load(path).options().mark.shading == 0);
+}
+
 TEST_CASE("owner: options outside their ranges are refused") {
   const auto with = [](auto change) {
     OwnerOptions o = small_owner_options();

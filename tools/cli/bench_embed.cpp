@@ -41,7 +41,8 @@ Subject subject_of(const BenchEmbedOptions& o, Context& context) {
 
 std::vector<bench::EmbedVariant> variants_of(const BenchEmbedOptions& o, const nerf::RadianceField& field,
                                              const std::vector<bench::EmbedRow>& known, std::uint64_t seed) {
-  auto all = bench::embed_variants({.seconds = o.seconds}, o.bits, seed);
+  auto all =
+      bench::embed_variants({.seconds = o.seconds}, o.bits, seed, watermark::colours_for(field.space.kind));
   for (bench::EmbedVariant& v : all)
     if (v.owner.preset == watermark::Preset::fast) v.owner.reader_aspect = watermark::reader_aspect(field);
   const auto wanted = [&](const bench::EmbedVariant& v) {

@@ -2,6 +2,7 @@
 #include <fieldmark/watermark/digest.h>
 #include <fieldmark/watermark/embed_views.h>
 #include <fieldmark/watermark/embedder.h>
+#include <fieldmark/watermark/mark_colours.h>
 #include <fieldmark/watermark/signing.h>
 
 #include <CLI/CLI.hpp>
@@ -29,7 +30,7 @@ constexpr Index kPicturedViews = 4;
 
 struct Options {
   std::string field, out, key, picture, lpips_weights;
-  std::string preset = "fast", distances = "near";
+  std::string preset = "fast", distances = "near", colours;
   watermark::OwnerOptions owner;
   MessageOption intended;
   RunLength length{.seconds = watermark::EmbedOptions{}.schedule.seconds};
@@ -107,6 +108,14 @@ watermark::OwnerOptions owner_options_of(const Options& options, std::uint64_t s
   return owner;
 }
 
+void suit_scene(const Options& options, const nerf::RadianceField& field, watermark::OwnerOptions& owner,
+                watermark::EmbedOptions& embed) {
+  owner.reader_aspect = watermark::reader_aspect(field);
+  watermark::use_colours(options.colours.empty() ? watermark::colours_for(field.space.kind)
+                                                 : watermark::parse_mark_colours(options.colours),
+                         owner.mark, embed);
+}
+
 void choose_cells(std::span<const watermark::CachedView> views, nerf::SpaceKind space,
                   watermark::OwnerOptions& owner, Context& context) {
   owner.cells = watermark::cells_for_message(views, owner.bits, space);
@@ -147,7 +156,8 @@ int run(const Options& options, Context& context) {
   const auto key = key_of(options, checkpoint);
   auto owner_options = owner_options_of(options, context.seed());
   const bool fast = owner_options.preset == watermark::Preset::fast;
-  if (fast) owner_options.reader_aspect = watermark::reader_aspect(field);
+  auto embed_options = watermark::embed_options(owner_options.preset);
+  if (fast) suit_scene(options, field, owner_options, embed_options);
   const auto views = cached_views(options, field, owner_options.patch(), context);
   if (fast && !options.cells_given) choose_cells(views, field.space.kind, owner_options, context);
   auto cells =
@@ -155,7 +165,6 @@ int run(const Options& options, Context& context) {
            : watermark::message_slots(owner_options.bits);
   owner_options.cells = cells.side();
   watermark::Owner owner(field, owner_options, key, std::move(cells));
-  auto embed_options = watermark::embed_options(owner_options.preset);
   embed_options.views = options.views;
   embed_options.seed = context.seed();
   embed_options.schedule.steps = options.length.steps;
@@ -245,6 +254,13 @@ Command add_embed(CLI::App& app) {
                      "their own shape")
           ->check(CLI::Range(32, 1024).description(""))
           ->type_name("N");
+  app.add_option(
+         "--colours", o->colours,
+         "How the mark looks: light, like an uneven light, least seen; blue, blue and yellow, read sooner "
+         "(light in scenes without bounds, blue on objects; presets paper and code choose their own)")
+      ->check(CLI::IsMember({"light", "blue"}).description(""))
+      ->type_name("NAME")
+      ->default_str("");
   add_view_options(app, *o);
   add_run_length(app, o->length, true);
   app.add_option("--measured-views", o->measured_views, "Near views to measure on at the end, 1 to 100000")

@@ -28,7 +28,7 @@ void open_and_shut(ParamStore<double>& store, const std::string& layer, double o
 
 GradcheckReport check_mark_network() {
   ParamStore<double> store;
-  const MarkNetwork<double> net(store, "mark", {.bands = 2, .features = 4}, 3);
+  const MarkNetwork<double> net(store, "mark", {.bands = 2, .features = 4, .tilt = 50, .shading = 0.9}, 3);
   open_and_shut(store, "mark/encode/0", 20);
   open_and_shut(store, "mark/encode/1", 4);
   open_and_shut(store, "mark/fuse/0", 2);

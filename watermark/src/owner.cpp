@@ -58,6 +58,8 @@ std::string configuration(const OwnerOptions& o, double gain, const nerf::Radian
               {"reader_aspect", o.reader_aspect},
               {"bands", o.mark.bands},
               {"features", o.mark.features},
+              {"tilt", o.mark.tilt},
+              {"shading", o.mark.shading},
               {"red_green", o.mark.red_green},
               {"luminance", o.mark.luminance},
               {"base_channels", o.base_channels},
@@ -87,6 +89,8 @@ OwnerOptions parse_options(const Json& j) {
   o.reader_aspect = j.value("reader_aspect", o.reader_aspect);
   o.mark = {.bands = j.at("bands"),
             .features = j.at("features"),
+            .tilt = j.value("tilt", 0.0),
+            .shading = j.value("shading", 0.0),
             .red_green = j.at("red_green"),
             .luminance = j.at("luminance")};
   o.base_channels = j.at("base_channels");

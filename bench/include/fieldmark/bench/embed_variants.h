@@ -1,6 +1,7 @@
 #pragma once
 #include <fieldmark/watermark/embed_views.h>
 #include <fieldmark/watermark/embedder.h>
+#include <fieldmark/watermark/mark_colours.h>
 
 #include <string>
 #include <vector>
@@ -19,6 +20,8 @@ struct EmbedVariant {
 /// The default first, then other lengths of the run, then every choice that embedding makes, switched off or
 /// set otherwise.
 /// @param length  of a run: its steps and seconds are kept   @param bits  of a message
-std::vector<EmbedVariant> embed_variants(const nerf::ScheduleOptions& length, Index bits, std::uint64_t seed);
+/// @param colours  that the scene's default is, see watermark::colours_for()
+std::vector<EmbedVariant> embed_variants(const nerf::ScheduleOptions& length, Index bits, std::uint64_t seed,
+                                         watermark::MarkColours colours = watermark::MarkColours::blue);
 
 }  // namespace fieldmark::bench

@@ -8,22 +8,24 @@ struct MarkNetworkOptions {
   int bands = 7;  ///< of the frequency encoding of the position, 1 to 12: the finest period is 2^(2 - bands)
                   ///< cube sides
   Index features = 32;   ///< N_c, of the colour feature field, >= 1
-  double red_green = 0;  ///< length of the red-green axis beside the blue one, in [0, 1] ...
-  double luminance =
-      0;  ///< ... and of the grey one: eyes see brightness best and blue worst,
-          ///< and the budget is of power, so that a short axis is used as much as a long one: both are off
+  double tilt = 0;       ///< of the first axis, degrees, 0 (blue without luma) to 90 (grey)
+  double shading = 0;    ///< h, how much of the carrier is as strong as the colour is bright, in [0, 1]
+  double red_green = 0;  ///< length of a red-green axis beside the first, in [0, 1] ...
+  double luminance = 0;  ///< ... and of a grey one: the budget is of power, so that a short axis is used
+                         ///< as much as a long one: both are off
 };
 
 /// The watermarked colour c_m = c + g s(x) P(x, c) of CopyRNeRF (Luo et al. 2023, sec. 3), with a local
 /// message:
-///   f_c = E(c, gamma(x)),   f_M(x) = s(x) = (2 M[b] - 1) w of the cell x lies in,   G(f_c, f_M, c) = f_M
-///   tanh(g(f_c, c)) B
-/// E and g are networks with one hidden ReLU layer each; the rows of B are a blue, a red-green and
-/// a grey axis, the first two without luma, the last two shortened. Departures: D is the keyed code of cells
-/// instead of a network, so that any message can be chosen after training and every place teaches the
-/// extractor (a message fused globally stayed at 60% bit accuracy in 3,000 steps, a local one passed 90% in
-/// 1,500); G is odd in f_M, so flipping a bit flips its carrier; the direction enters through c alone, which
-/// makes the mark easier to bake.
+///   f_c = E(c, gamma(x)),   f_M(x) = s(x) = (2 M[b] - 1) w of the cell x lies in,
+///   G(f_c, f_M, c) = f_M P,   P = (1 - h + h c) tanh(g(f_c, c)) B
+/// E and g are networks with one hidden ReLU layer each; the rows of B are cos(tilt) blue + sin(tilt) grey,
+/// red-green and grey, where blue and red-green have no luma, and the last two are shortened. With h > 0 the
+/// change is like one of the light that falls on a surface: dark colours change less. Departures: D is the
+/// keyed code of cells instead of a network, so that any message can be chosen after training and every place
+/// teaches the extractor (a message fused globally stayed at 60% bit accuracy in 3,000 steps, a local one
+/// passed 90% in 1,500); G is odd in f_M, so flipping a bit flips its carrier; the direction enters through c
+/// alone, which makes the mark easier to bake.
 template <class T>
 class MarkNetwork {
  public:
