@@ -68,6 +68,17 @@ TEST_CASE("embed has cells as fine as its views and message need, unless they ar
   CHECK(cells_of("100", {"--cells", "14"}) == 14);
 }
 
+TEST_CASE("embed marks an object in blue, unless another look is asked for", "[embed]") {
+  const TinyJob& job = TinyJob::get();
+  CHECK(watermark::Owner::load(job.owner).options().mark.shading == 0);
+  const std::string owner = job.folder / "light.fm";
+  const auto r = tiny_embed(job.field, owner, {"--colours", "light", "--measured-views", "1"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  CHECK(watermark::Owner::load(owner).options().mark.shading > 0);
+  CHECK(tiny_embed(job.field, owner, {"--colours", "green"}).code == cli::kUsage);
+}
+
 TEST_CASE("embed --preset paper and code give an owner that bakes and reads like any other", "[embed]") {
   const TinyJob& job = TinyJob::get();
   for (const std::string preset : {"paper", "code"}) {

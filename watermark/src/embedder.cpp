@@ -261,6 +261,8 @@ std::string Embedder::fingerprint() const {
     add("bits", options_.bits_weight);
     add("smooth", options_.smooth_weight);
     add("flat", options_.flat_weight);
+    add("tilt", o.mark.tilt);
+    add("shading", o.mark.shading);
   }
   const EmbedDistortions& d = options_.distortions;
   add("noise", d.noise);
