@@ -10,6 +10,8 @@ namespace {
 
 constexpr Index kPlaces = 256;             // in a piece
 constexpr double kLeastForeground = 1e-3;  // places a bit: an empty picture has no evidence instead of noise
+constexpr double kSliver = 0.25;           // places: what a cell has to show to count
+constexpr double kTogether = 0.3;          // power of a cell's places that its evidence is divided by
 
 template <class T>
 void check_pool(Var<T> sign, Var<T> index, std::span<const T> code, Index n_bits) {
@@ -125,22 +127,31 @@ void cell_evidence(const float* sign, const float* index, Index places, Index ce
   if (places < 0 || cells < 0)
     throw ValueError("[cell_evidence] places and cells must not be negative, got " + std::to_string(places) +
                      " and " + std::to_string(cells));
+  // Of each piece the cells' sums of q tanh(s / 2), then those of q.
   const Index pieces = (places + kPlaces - 1) / kPlaces;
-  std::vector<double> parts(static_cast<std::size_t>(pieces * cells));
+  std::vector<double> parts(static_cast<std::size_t>(pieces * 2 * cells));
   parallel_for(places, kPlaces, [&](Index begin, Index end) {
-    double* part = parts.data() + begin / kPlaces * cells;
+    double *part = parts.data() + begin / kPlaces * 2 * cells, *share = part + cells;
     std::vector<double> q(static_cast<std::size_t>(cells) + 1);
     for (Index p = begin; p < end; ++p) {
       const float* row = index + p * (cells + 1);
       const double most = static_cast<double>(*std::max_element(row, row + cells + 1));
       double total = 0;
       for (std::size_t c = 0; c < q.size(); ++c) total += q[c] = std::exp(static_cast<double>(row[c]) - most);
-      const double factor = std::tanh(static_cast<double>(sign[p]) / 2) / total;
-      for (Index c = 0; c < cells; ++c) part[c] += factor * q[static_cast<std::size_t>(c)];
+      const double tau = std::tanh(static_cast<double>(sign[p]) / 2);
+      for (Index c = 0; c < cells; ++c) {
+        const double here = q[static_cast<std::size_t>(c)] / total;
+        part[c] += tau * here;
+        share[c] += here;
+      }
     }
   });
-  for (Index k = 0; k < pieces; ++k)
-    for (Index c = 0; c < cells; ++c) evidence[c] += parts[static_cast<std::size_t>(k * cells + c)];
+  for (Index k = 1; k < pieces; ++k)
+    for (Index i = 0; i < 2 * cells; ++i)
+      parts[static_cast<std::size_t>(i)] += parts[static_cast<std::size_t>(k * 2 * cells + i)];
+  for (Index c = 0; pieces > 0 && c < cells; ++c)
+    evidence[c] += parts[static_cast<std::size_t>(c)] *
+                   std::pow(parts[static_cast<std::size_t>(cells + c)] + kSliver, -kTogether);
 }
 
 template Var<float> pooled_bits(Var<float>, Var<float>, std::span<const float>, Index);

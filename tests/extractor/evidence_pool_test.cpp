@@ -13,14 +13,15 @@ namespace {
 
 // Row by row, in double: softmax, then the sums as they stand in the header.
 struct Plain {
-  std::vector<double> evidence;  // [cells]
+  std::vector<double> evidence, share;  // [cells]
   double foreground = 0;
 };
 
 template <class T>
 Plain plain_sums(const Tensor<T>& sign, const Tensor<T>& index) {
   const Index columns = index.shape[1];
-  Plain sums{std::vector<double>(static_cast<std::size_t>(columns - 1)), 0};
+  const std::vector<double> none(static_cast<std::size_t>(columns - 1));
+  Plain sums{none, none, 0};
   for (Index p = 0; p < sign.size(); ++p) {
     double z = 0;
     for (Index c = 0; c < columns; ++c) z += std::exp(static_cast<double>(index[p * columns + c]));
@@ -28,6 +29,7 @@ Plain plain_sums(const Tensor<T>& sign, const Tensor<T>& index) {
     for (Index c = 0; c + 1 < columns; ++c) {
       const double q = std::exp(static_cast<double>(index[p * columns + c])) / z;
       sums.evidence[static_cast<std::size_t>(c)] += q * expected;
+      sums.share[static_cast<std::size_t>(c)] += q;
       sums.foreground += q;
     }
   }
@@ -124,14 +126,32 @@ TEST_CASE("evidence_pool: evidence of cells is what plain loops give, and is add
       cell_evidence(sign.data.data(), index.data.data(), places, cells, evidence.data());
       const Plain want = plain_sums(sign, index);
       for (std::size_t c = 0; c < evidence.size(); ++c)
-        CHECK(evidence[c] == Approx(2 + want.evidence[c]).epsilon(1e-12));
+        CHECK(evidence[c] ==
+              Approx(2 + want.evidence[c] / std::pow(want.share[c] + 0.25, 0.3)).epsilon(1e-12));
     }
   // Logits that overflow a plain exp.
   const float sign[] = {1000}, index[] = {1e30f, -1e30f, 0};
   double evidence[] = {0, 0};
   cell_evidence(sign, index, 1, 2, evidence);
-  CHECK(evidence[0] == 1);
+  CHECK(evidence[0] == Approx(std::pow(1.25, -0.3)).epsilon(1e-14));
   CHECK(evidence[1] == 0);
+}
+
+TEST_CASE("evidence_pool: a cell of many places counts less than each of them alone, a sliver hardly") {
+  // Cell 0 shows in 100 places, cell 1 in 4, cell 2 in hardly one, all with the sign of a 1.
+  const Index counts[] = {100, 4, 1};
+  Tensor<float> sign({105}, 60.f), index({105, 4}, -200.f);
+  for (Index p = 0, cell = 0, left = counts[0]; p < 105; ++p, --left) {
+    if (left == 0) left = counts[++cell];
+    index[p * 4 + cell] = 200;
+  }
+  index[104 * 4 + 3] = 204.6f;  // nearly background: e^-4.6, a hundredth of a place
+  std::vector<double> evidence(3);
+  cell_evidence(sign.data.data(), index.data.data(), 105, 3, evidence.data());
+  CHECK(evidence[0] == Approx(25.1).epsilon(2e-3));
+  CHECK(evidence[1] == Approx(2.59).epsilon(2e-3));
+  CHECK(evidence[2] < 0.02);
+  CHECK(evidence[2] > 0);
 }
 
 TEST_CASE("evidence_pool: the same bits on one and two threads") {

@@ -116,6 +116,11 @@ TEST_CASE("embed_views: at several distances, the object has no more pixels than
   }
   const auto kept = cache_embed_views(field, square_patch(16), {.count = 1, .samples = 4}, 5);
   CHECK(kept[0].weight.size() > cache_near_views(field, square_patch(16), 1, 5)[0].weight.size());
+  CHECK(samples_for(nerf::SpaceKind::cube) == 1);
+  CHECK(samples_for(nerf::SpaceKind::ndc) == 1);
+  CHECK(samples_for(nerf::SpaceKind::contracted) == 4);
+  CHECK(cache_embed_views(field, square_patch(16), {.count = 1}, 5)[0].position ==
+        cache_near_views(field, square_patch(16), 1, 5)[0].position);
   CHECK(parse_distances("several") == EmbedDistances::several);
   for (const auto d : {EmbedDistances::near, EmbedDistances::native, EmbedDistances::several})
     CHECK(parse_distances(distances_name(d)) == d);

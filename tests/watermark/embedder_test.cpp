@@ -60,6 +60,12 @@ void refused(const std::filesystem::path& path, Owner& owner, const EmbedOptions
 }
 }  // namespace
 
+TEST_CASE("embedder: more steps of fewer pictures where there are thousands of cells") {
+  CHECK(batch_for(nerf::SpaceKind::cube) == EmbedOptions{}.batch);
+  CHECK(batch_for(nerf::SpaceKind::ndc) == EmbedOptions{}.batch);
+  CHECK(batch_for(nerf::SpaceKind::contracted) == 2);
+}
+
 TEST_CASE("embedder: in 300 steps the losses fall, places are told apart and bits begin to be read") {
   Owner owner = tiny_owner();
   const std::vector<float> field(owner.field.params.values().begin(), owner.field.params.values().end());

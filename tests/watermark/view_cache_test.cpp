@@ -84,13 +84,13 @@ TEST_CASE("view_cache: a sample lies on its pixel's ray, inside the cube") {
   CHECK(off < 1e-5);
 }
 
-TEST_CASE("view_cache: several samples of a ray are its heaviest, and few leave the pixel's weight") {
+TEST_CASE("view_cache: several samples of a ray are its heaviest parts, and few leave the pixel's weight") {
   const nerf::RadianceField field = half_field();
   nerf::Renderer renderer(field);
   const CachedView one = cache_view(renderer, field, camera()),
                    two = cache_view(renderer, field, camera(), 2),
                    all = cache_view(renderer, field, camera(), 1000);
-  double worst = 0, composed = 0;
+  double worst = 0, composed = 0, moved = 0;
   Index more = 0;
   for (Index p = 0; p < 23 * 18; ++p) {
     const auto at = [](Index i) { return static_cast<std::size_t>(i); };
@@ -112,13 +112,43 @@ TEST_CASE("view_cache: several samples of a ray are its heaviest, and few leave 
       for (auto k = all.sample_begin[at(p)]; k < all.sample_begin[at(p + 1)]; ++k)
         c += static_cast<double>(all.weight[at(k)] * all.colour[at(3 * k + a)]);
       composed = std::max(composed, std::abs(c - static_cast<double>(all.base[3 * p + a])));
+      double mean = 0;
+      for (auto k = all.sample_begin[at(p)]; k < all.sample_begin[at(p + 1)]; ++k)
+        mean += static_cast<double>(all.weight[at(k)] * all.position[at(3 * k + a)]) / share(all);
+      const auto only = 3 * Index{one.sample_begin[at(p)]} + a;
+      moved = std::max(moved, std::abs(mean - static_cast<double>(one.position[at(only)])));
     }
   }
   CHECK(more > 20);
   CHECK(worst < 1e-5);
   CHECK(composed < 1e-5);
+  CHECK(moved < 1e-5);
   CHECK_THROWS_WITH(cache_view(renderer, field, camera(), 0),
                     "[cache_view] samples must be at least 1, got 0");
+}
+
+TEST_CASE("view_cache: what lies together on a ray is one part, and parts lie apart") {
+  const nerf::RadianceField field = half_field();
+  nerf::Renderer fine(field, {.finer = 8}), coarse(field, {.finer = 2});
+  const CachedView many = cache_view(fine, field, camera(), 1000),
+                   few = cache_view(coarse, field, camera(), 1000);
+  // Four times as many samples are not as many parts more.
+  CHECK(many.weight.size() < few.weight.size() * 5 / 4);
+  Index pairs = 0;
+  for (Index p = 0; p < 23 * 18; ++p)
+    for (auto k = many.sample_begin[static_cast<std::size_t>(p)];
+         k < many.sample_begin[static_cast<std::size_t>(p) + 1]; ++k)
+      for (auto l = many.sample_begin[static_cast<std::size_t>(p)]; l < k; ++l, ++pairs) {
+        double square = 0;
+        for (std::size_t a = 0; a < 3; ++a)
+          square += std::pow(static_cast<double>(many.position[3 * static_cast<std::size_t>(k) + a] -
+                                                 many.position[3 * static_cast<std::size_t>(l) + a]),
+                             2);
+        // Means of neighbouring runs of at most 1/128 are nearest where one ends and the other has hardly
+        // begun.
+        CHECK(std::sqrt(square) > 1.0 / 512);
+      }
+  CHECK(pairs > 20);
 }
 
 TEST_CASE("view_cache: one and two threads give the same bits") {

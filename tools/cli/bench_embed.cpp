@@ -43,8 +43,11 @@ std::vector<bench::EmbedVariant> variants_of(const BenchEmbedOptions& o, const n
                                              const std::vector<bench::EmbedRow>& known, std::uint64_t seed) {
   auto all =
       bench::embed_variants({.seconds = o.seconds}, o.bits, seed, watermark::colours_for(field.space.kind));
-  for (bench::EmbedVariant& v : all)
-    if (v.owner.preset == watermark::Preset::fast) v.owner.reader_aspect = watermark::reader_aspect(field);
+  for (bench::EmbedVariant& v : all) {
+    if (v.owner.preset != watermark::Preset::fast) continue;
+    v.owner.reader_aspect = watermark::reader_aspect(field);
+    if (v.choice != "batch") v.embed.batch = watermark::batch_for(field.space.kind);
+  }
   const auto wanted = [&](const bench::EmbedVariant& v) {
     return v.choice == "default" || bench::find_row(known, v) ||
            (v.choice + ": " + v.setting).find(o.only) != std::string::npos;

@@ -34,7 +34,7 @@ struct Options {
   watermark::OwnerOptions owner;
   MessageOption intended;
   RunLength length{.seconds = watermark::EmbedOptions{}.schedule.seconds};
-  Index views = watermark::EmbedOptions{}.views, samples = 1, measured_views = 200;
+  Index views = watermark::EmbedOptions{}.views, samples = 0, batch = 0, measured_views = 200;
   std::vector<std::string> under;
   bool resume = false, reader_size_given = false, cells_given = false;
 };
@@ -114,6 +114,7 @@ void suit_scene(const Options& options, const nerf::RadianceField& field, waterm
   watermark::use_colours(options.colours.empty() ? watermark::colours_for(field.space.kind)
                                                  : watermark::parse_mark_colours(options.colours),
                          owner.mark, embed);
+  embed.batch = options.batch > 0 ? options.batch : watermark::batch_for(field.space.kind);
 }
 
 void choose_cells(std::span<const watermark::CachedView> views, nerf::SpaceKind space,
@@ -210,9 +211,17 @@ void add_view_options(CLI::App& app, Options& o) {
                  "native: only as large as their pictures have it; several: also closer and farther cameras")
       ->check(CLI::IsMember({"near", "native", "several"}).description(""))
       ->type_name("NAME");
-  app.add_option("--samples", o.samples, "Samples kept of a ray of a view, 1 to 64")
+  app.add_option("--samples", o.samples,
+                 "Parts of a ray that the mark of a pixel is the sum of, 1 to 64 (1; 4 in scenes without "
+                 "bounds)")
       ->check(CLI::Range(1, 64).description(""))
-      ->type_name("N");
+      ->type_name("N")
+      ->default_str("");
+  app.add_option("--batch", o.batch,
+                 "Pictures a step, 1 to 64 (4; 2 in scenes without bounds); presets paper and code take 4")
+      ->check(CLI::Range(1, 64).description(""))
+      ->type_name("N")
+      ->default_str("");
 }
 
 }  // namespace

@@ -11,6 +11,7 @@ namespace {
 constexpr Index kWindowSize = 160;    // pixels of the small picture that shows where the object is
 constexpr Index kMlpWindowSize = 80;  // of an mlp field, where larger ones would take longer than the views
 constexpr Index kCoarsest = 4;        // a side of the patch over the least of a view's
+constexpr Index kParts = 4;           // of a ray where it passes through more than a surface
 constexpr Index kFewestCells = 16, kMostCells = 64, kMoreCells = 6;
 constexpr double kCellsABit = 2, kCellsABitOfACut = 8, kPoorViews = 0.1;
 
@@ -94,6 +95,8 @@ EmbedDistances parse_distances(std::string_view name) {
                    "\"");
 }
 
+Index samples_for(nerf::SpaceKind space) { return space == nerf::SpaceKind::contracted ? kParts : 1; }
+
 std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, const PatchSize& patch,
                                           const EmbedViewOptions& options, std::uint64_t seed,
                                           const std::function<bool(Index, Index)>& progress) {
@@ -103,6 +106,7 @@ std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, cons
   const Index own = std::max(field.cameras.width, field.cameras.height);  // pixels of its pictures
   std::vector<CachedView> views;
   const Index seen = field.coarse ? kMlpWindowSize : kWindowSize;
+  const Index samples = options.samples > 0 ? options.samples : samples_for(field.space.kind);
   for (const nerf::Camera& camera : cameras_of(field.cameras, options, seen, seed)) {
     const Window window = object_window(renderer.render(camera).rgb, background, patch.aspect());
     PatchSize size = patch;
@@ -112,7 +116,7 @@ std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, cons
                             (patch.height + kCoarsest - 1) / kCoarsest, patch.height);
       size.width = std::lround(static_cast<double>(size.height) * patch.aspect());
     }
-    views.push_back(view_of_window(renderer, field, camera, window, size, options.samples));
+    views.push_back(view_of_window(renderer, field, camera, window, size, samples));
     if (progress && !progress(static_cast<Index>(views.size()), options.count))
       throw Error("stopped while views were cached");
   }
@@ -122,7 +126,7 @@ std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, cons
 std::vector<CachedView> cache_near_views(const nerf::RadianceField& field, const PatchSize& patch,
                                          Index count, std::uint64_t seed,
                                          const std::function<bool(Index, Index)>& progress) {
-  return cache_embed_views(field, patch, {.count = count}, seed, progress);
+  return cache_embed_views(field, patch, {.count = count, .samples = 1}, seed, progress);
 }
 
 std::vector<double> visible_area(std::span<const CachedView> views, Index side) {

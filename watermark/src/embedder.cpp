@@ -39,6 +39,10 @@ EmbedOptions embed_options(Preset preset) {
   return o;
 }
 
+Index batch_for(nerf::SpaceKind space) {
+  return space == nerf::SpaceKind::contracted ? 2 : EmbedOptions{}.batch;
+}
+
 Embedder::Embedder(Owner& owner, std::span<const CachedView> views, const EmbedOptions& options)
     : owner_(owner),
       views_(views),

@@ -152,7 +152,7 @@ double Embedder::run_dense(const Picture& p, Tape<float>& tape, const Params<flo
     const float* q = out.index.value() + i * classes;
     all += 1;
     sign += (out.sign.value()[i] > 0) == (target[i] > 0);
-    index += std::max_element(q, q + classes) - q == labels[i];
+    index += std::none_of(q, q + classes, [most = q[labels[i]]](float other) { return other > most; });
   }
   for (std::size_t b = 0; b < bits.size(); ++b) right += (pooled.value()[b] > 0) == (bits[b] > 0);
   figures = {all > 0 ? sign / all : 0, all > 0 ? index / all : 0, right / static_cast<double>(bits.size()),

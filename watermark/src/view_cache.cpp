@@ -3,11 +3,13 @@
 #include <fieldmark/watermark/view_cache.h>
 
 #include <algorithm>
+#include <array>
 
 namespace fieldmark::watermark {
 namespace {
 
 constexpr float kLeastOpacity = 0.02f;  // a ray that sees less is background
+constexpr float kPart = 1.f / 128;      // cube sides, half of the finest cell: what lies so near is one part
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
@@ -32,9 +34,33 @@ void for_rows(const nerf::RadianceField& field, const nerf::Camera& camera, std:
   });
 }
 
-// Leaves the heaviest samples of each ray of a row, heaviest first. rgba [w, 4] is written: the picture,
+// Joins what lies together on a ray: samples from `from` on, near to far, become parts of at most kPart along
+// the ray, each at the mean place and colour of its samples by weight. Returns the end of the parts.
+std::vector<nerf::SeenSample>::iterator join_parts(std::vector<nerf::SeenSample>::iterator from,
+                                                   std::vector<nerf::SeenSample>::iterator to) {
+  auto part = from;
+  std::array<float, 3> start = from->position;
+  for (auto s = from + 1; s != to; ++s) {
+    float square = 0;
+    for (std::size_t a = 0; a < 3; ++a) square += (s->position[a] - start[a]) * (s->position[a] - start[a]);
+    if (square > kPart * kPart) {
+      start = s->position;
+      *++part = *s;
+      continue;
+    }
+    const float share = s->weight / (part->weight + s->weight);
+    for (std::size_t a = 0; a < 3; ++a) {
+      part->position[a] += share * (s->position[a] - part->position[a]);
+      part->colour[a] += share * (s->colour[a] - part->colour[a]);
+    }
+    part->weight += s->weight;
+  }
+  return part + 1;
+}
+
+// Leaves the heaviest parts of each ray of a row, heaviest first. rgba [w, 4] is written: the picture,
 // without the background.
-void keep_heaviest(std::vector<nerf::SeenSample>& row, Index samples, float* rgba) {
+void keep_heaviest(std::vector<nerf::SeenSample>& row, Index parts, float* rgba) {
   auto end = row.begin();
   for (auto from = row.begin(); from != row.end();) {
     const Index ray = from->ray;
@@ -44,8 +70,9 @@ void keep_heaviest(std::vector<nerf::SeenSample>& row, Index samples, float* rgb
       for (std::size_t a = 0; a < 3; ++a) c[a] += s->weight * s->colour[a];
       c[3] += s->weight;
     }
-    std::stable_sort(from, to, [](const auto& a, const auto& b) { return a.weight > b.weight; });
-    const auto kept = std::min<std::ptrdiff_t>(samples, to - from);
+    const auto joined = join_parts(from, to);
+    std::stable_sort(from, joined, [](const auto& a, const auto& b) { return a.weight > b.weight; });
+    const auto kept = std::min<std::ptrdiff_t>(parts, joined - from);
     float sum = 0;
     for (auto s = from; s != from + kept; ++s) sum += s->weight;
     for (auto s = from; s != from + kept; ++s, ++end) {

@@ -1,5 +1,6 @@
 #include <fieldmark/engine/ops/softmax.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "kernels/elementwise.h"
@@ -9,6 +10,18 @@ namespace fieldmark {
 namespace kernels {
 namespace {
 
+// Eight at a time, so that the loop vectorises. A NaN may be passed over: its exponential is not.
+template <class T>
+T largest(const T* row, Index cols) {
+  T most[8];
+  std::fill_n(most, 8, row[0]);
+  Index i = 0;
+  for (; i + 8 <= cols; i += 8)
+    for (Index k = 0; k < 8; ++k) most[k] = row[i + k] > most[k] ? row[i + k] : most[k];
+  for (; i < cols; ++i) most[0] = std::max(most[0], row[i]);
+  return *std::max_element(most, most + 8);
+}
+
 // p = softmax of each row. log_sum(r, z) receives log sum_k exp x[r, k] by way of the row's maximum m and z.
 template <class T, class F>
 void softmax_rows(const T* x, T* p, Index rows, Index cols, F log_sum) {
@@ -17,7 +30,7 @@ void softmax_rows(const T* x, T* p, Index rows, Index cols, F log_sum) {
     for (Index r = r0; r < r1; ++r) {
       const T* xr = x + r * cols;
       T* pr = p + r * cols;
-      const T m = *std::max_element(xr, xr + cols);
+      const T m = largest(xr, cols);
       const T z = exp_row(xr, m, pr, cols);
       for (Index c = 0; c < cols; ++c) pr[c] /= z;
       log_sum(r, m, z);

@@ -22,7 +22,12 @@ template <class T>
 Var<T> pooled_bits(Var<T> sign, Var<T> index, std::span<const std::type_identity_t<T>> code, Index n_bits);
 
 /// Adds one picture's sign evidence to each cell, for tests that need the key only later.
-///   S_c += sum_p q_c(p) tanh(s_p / 2),   q = softmax(index)
+///   S_c += sum_p q_c(p) tanh(s_p / 2) / (n_c + 1/4)^0.3,   n_c = sum_p q_c(p),   q = softmax(index)
+/// The sum of n places has a signal as n and, between places that err by chance and places that all err
+/// together, noise as n^(1/2) to n: the best weight falls as n^0 to n^-1. The power 0.3 reads as much as none
+/// or more from four extractors of fox (48 bits, 60 views: 93.75, 92.4, 95.6 and 96.1% instead of 93.4, 92.3,
+/// 95.5 and 95.9%); 1/2 gains on the first (94.1%) and loses on two. The quarter of a place keeps cells that
+/// hardly show from counting.
 /// Runs in double, in an order that no thread count changes.
 /// @param sign [places]   @param index [places, cells + 1], the last column the background
 /// @param evidence [cells] S, added to   @throws ValueError if places or cells is negative

