@@ -27,10 +27,11 @@ TEST_CASE("mark_colours: blue is what the options are by themselves, light is sm
   CHECK((mark.tilt > 0 && mark.tilt < 90));
   CHECK((mark.shading > 0 && mark.shading <= 1));
   CHECK(embed.smooth_weight == 0);
-  CHECK(embed.flat_weight == EmbedOptions{}.flat_weight);
+  CHECK(embed.flat_weight > EmbedOptions{}.flat_weight);
   use_colours(MarkColours::blue, mark, embed);
   CHECK(mark.bands == MarkNetworkOptions{}.bands);
   CHECK(mark.tilt == 0);
   CHECK(mark.shading == 0);
   CHECK(embed.smooth_weight == EmbedOptions{}.smooth_weight);
+  CHECK(embed.flat_weight == EmbedOptions{}.flat_weight);
 }

@@ -24,6 +24,7 @@ void use_colours(MarkColours colours, MarkNetworkOptions& mark, EmbedOptions& em
   mark.tilt = light ? 50 : usual_mark.tilt;
   mark.shading = light ? 0.97 : usual_mark.shading;
   embed.smooth_weight = light ? 0 : usual.smooth_weight;  // light is smooth
+  embed.flat_weight = light ? 0.8 : usual.flat_weight;    // and what is left to be seen of it is on walls
 }
 
 }  // namespace fieldmark::watermark

@@ -19,7 +19,8 @@ MarkColours parse_mark_colours(std::string_view name);
 /// much of the mark everywhere as an object has; blue for an object in a cube, before a plain background.
 MarkColours colours_for(nerf::SpaceKind space);
 
-/// Sets the options that make a mark look so: `mark`'s bands, tilt and shading, and `embed`'s smooth_weight.
+/// Sets the options that make a mark look so: `mark`'s bands, tilt and shading, and `embed`'s smooth_weight
+/// and flat_weight.
 void use_colours(MarkColours colours, MarkNetworkOptions& mark, EmbedOptions& embed);
 
 }  // namespace fieldmark::watermark
