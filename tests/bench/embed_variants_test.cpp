@@ -43,7 +43,10 @@ const std::map<std::string, Differs> kChoices{
      }},
     {"hiding",
      [](const EmbedVariant& a, const EmbedVariant& b) {
-       return a.embed.smooth_weight != b.embed.smooth_weight && a.embed.flat_weight != b.embed.flat_weight;
+       const auto off = [](const EmbedVariant& v) {
+         return v.embed.smooth_weight + v.embed.flat_weight == 0;
+       };
+       return off(a) != off(b);
      }},
     {"colours",
      [](const EmbedVariant& a, const EmbedVariant& b) {
