@@ -1,4 +1,5 @@
 #include <fieldmark/engine/safetensors.h>
+#include <fieldmark/watermark/baker.h>
 
 #include <cmath>
 
@@ -53,15 +54,39 @@ TEST_CASE("bake makes the mark fainter where it is asked to", "[bake]") {
                    "--steps", "1", "--strength", "30", "--json", "-"});
   CHECK_THAT(one_step.err, Contains("dB on the object, 30.0 dB asked for"));
   const auto json = nlohmann::json::parse(one_step.out);
-  const double held = 100 * std::pow(10.0, (30 - json["strength"].get<double>()) / 20);
-  REQUIRE(held < 79);  // 2 dB
-  CHECK_THAT(json["notes"][0].get<std::string>(),
-             Contains("the file's colours hold only " + std::to_string(std::lround(held)) + "% of the mark"));
+  const double learnt = json["strength_learnt"], taken = 100 * std::pow(10.0, (30 - learnt) / 20);
+  REQUIRE(taken < 79);  // 2 dB
+  CHECK_THAT(
+      json["notes"][0].get<std::string>(),
+      Contains("the file's colours took only " + std::to_string(std::lround(taken)) + "% of the mark"));
+  CHECK(json["scale"] == watermark::Baker::kLargestScale);
+  CHECK(json["strength"].get<double>() == Approx(learnt - 6).margin(0.5));
   const double strong = distance("30"), faint = distance("50");
   CHECK(faint - strong == Approx(20).margin(1));
   const auto r = run_command({"bake", "--owner", job.owner, "--message", "5", "--out",
                               job.folder / "refused.fm", "--steps", "1", "--strength", "19"});
   CHECK(r.code == cli::kUsage);
+}
+
+TEST_CASE("bake gives the file the strength asked for", "[bake]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string out = job.folder / "asked.fm";
+  const auto json_of = [](const std::vector<std::string>& line) {
+    const auto r = run_command(line);
+    INFO(r.err);
+    REQUIRE(r.code == cli::kOk);
+    return nlohmann::json::parse(r.out);
+  };
+  for (const char* strength : {"30", "38"}) {
+    const auto bake = json_of({"bake", "--owner", job.owner, "--message", "5", "--out", out, "--steps", "120",
+                               "--strength", strength, "--json", "-"});
+    CAPTURE(bake);
+    CHECK(bake["strength"].get<double>() == Approx(std::stod(strength)).margin(0.03));
+    CHECK(bake.count("notes") == 0);
+    const auto measured = json_of({"measure", "--geometry-count", "0", "--owner", job.owner, "--field", out,
+                                   "--message", "5", "--count", "40", "--json", "-"});
+    CHECK(measured["psnr_base_object"].get<double>() == Approx(std::stod(strength)).margin(0.4));
+  }
 }
 
 TEST_CASE("bake refuses a message that does not fit, and an owner that is none", "[bake]") {

@@ -47,6 +47,7 @@ BakeOptions options(Index steps) { return {.schedule = {.steps = steps, .lr = 1e
 nerf::RadianceField bake(const Owner& owner, const Message& message, Index steps) {
   Baker baker(owner, message, options(steps));
   while (!baker.done()) baker.step(0);
+  baker.scale_to(baker.strength() - 1);
   return baker.field();
 }
 
@@ -85,7 +86,7 @@ TEST_CASE("baker: a mark's strength in the file comes near the owner's as it is 
   const auto strength_after = [&](Index steps) {
     Baker baker(owner, kMessage, options(300));
     while (baker.steps() < steps) baker.step(0);
-    return baker.strength(4);
+    return baker.strength({.count = 4, .seed = 32});
   };
   CHECK(std::isinf(strength_after(0)));
   double marked = 0;
@@ -101,6 +102,40 @@ TEST_CASE("baker: a mark's strength in the file comes near the owner's as it is 
   CHECK(late > marked - 0.5);
   CHECK(late < marked + 6);
   CHECK(early > late + 1);
+}
+
+TEST_CASE("baker: scaling gives the file the strength asked for, on other views too") {
+  const Owner owner = owner_with_gain();
+  Baker baker(owner, kMessage, options(60));
+  while (!baker.done()) baker.step(0);
+  const StrengthViews other{.count = 96, .seed = 500};
+  const double learnt = baker.strength();
+  for (const double change : {1.5, -1.5, 0.0}) {  // each from where the one before left the colours
+    const double before = baker.strength(), target = learnt + change;
+    const auto found = baker.scale_to(target);
+    CAPTURE(change, before, found.learnt, found.scaled, found.scale);
+    CHECK(found.learnt == before);
+    CHECK(found.scaled == Approx(target).margin(0.02));
+    CHECK(found.scaled == baker.strength());
+    CHECK(found.scale == Approx(std::pow(10.0, (before - target) / 20)).epsilon(0.1));
+    CHECK(baker.strength(other) == Approx(target).margin(0.2));
+  }
+}
+
+TEST_CASE("baker: scaling goes no further than its bound, and finds nothing to scale before the first step") {
+  const Owner owner = owner_with_gain();
+  Baker baker(owner, kMessage, options(20));
+  const auto nothing = baker.scale_to(30);
+  CHECK(std::isinf(nothing.learnt));
+  CHECK(std::isinf(nothing.scaled));
+  CHECK(nothing.scale == 1);
+  while (!baker.done()) baker.step(0);
+  const double learnt = baker.strength();
+  const auto most = baker.scale_to(learnt - 20);
+  CHECK(most.scale == Baker::kLargestScale);
+  CHECK(most.scaled == Approx(learnt - 6).margin(0.5));
+  const auto least = baker.scale_to(learnt + 20);
+  CHECK(least.scale == 1 / Baker::kLargestScale);
 }
 
 TEST_CASE("baker: a baked file is an unmarked one with other colours, density to the byte the same") {

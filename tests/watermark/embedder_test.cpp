@@ -259,7 +259,7 @@ TEST_CASE("embedder: a checkpoint of other weights, distortions or step sizes is
 TEST_CASE("embedder: calibration gives views the owner's strength") {
   for (double strength : {28.0, 34.5}) {
     Owner owner = tiny_owner(strength);
-    Embedder(owner, tiny_views(), options(1)).calibrate();
+    Embedder(owner, tiny_views(), options(1)).calibrate(16);
     // Exactly on the views and messages it looked at; others are so few and small that they differ.
     CHECK(measured_strength(owner, options(1).seed + 77, CounterRng(options(1).seed, 12)) ==
           Approx(strength).margin(0.03));
@@ -301,9 +301,8 @@ TEST_CASE("embedder: under a budget preset paper is calibrated, and content cost
   Embedder embedder(owner, tiny_views(), o);
   embedder.step(0);
   CHECK(embedder.figures().loss == 0);
-  embedder.calibrate();
-  // As the views and messages that it looked at, but for the samples along a ray, of which it took fewer.
-  CHECK(measured_strength(owner, o.seed + 77, CounterRng(o.seed, 12)) == Approx(30).margin(0.1));
+  embedder.calibrate(16);
+  CHECK(measured_strength(owner, o.seed + 77, CounterRng(o.seed, 12)) == Approx(30).margin(0.03));
 }
 
 TEST_CASE("embedder: preset code learns the colours of the field from raw numbers") {

@@ -19,7 +19,7 @@
 namespace fieldmark::cli {
 namespace {
 
-constexpr double kMuchFainter = 2;  // dB: what a bake usually loses is 1.3
+constexpr double kMuchFainter = 2;  // dB: what learning usually loses is 1.3
 
 struct Options {
   std::string owner, out;
@@ -28,12 +28,19 @@ struct Options {
   RunLength length{.seconds = watermark::BakeOptions{}.schedule.seconds};
 };
 
-// How strong the mark is in the file, beside what the owner asked for.
-void say_strength(const watermark::Owner& owner, double strength, Context& context) {
-  char line[240];
-  std::snprintf(line, sizeof line, "mark of %.1f dB on the object", strength);
+watermark::Baker::Strength scaled_to(const watermark::Owner& owner, watermark::Baker& baker) {
+  if (owner.mark) return baker.scale_to(owner.options().strength);
+  const double strength = baker.strength();  // the networks' own
+  return {.learnt = strength, .scaled = strength};
+}
+
+// How strong the mark is in the file, beside what the owner asked for, and how much of it was learnt.
+void say_strength(const watermark::Owner& owner, const watermark::Baker::Strength& strength,
+                  Context& context) {
+  char line[320];
+  std::snprintf(line, sizeof line, "mark of %.1f dB on the object", strength.scaled);
   context.text() << line;
-  const double asked = owner.options().strength, fainter = strength - asked;
+  const double asked = owner.options().strength, fainter = strength.learnt - asked;
   if (!owner.mark) {
     context.text() << "\n";
     return;
@@ -43,9 +50,9 @@ void say_strength(const watermark::Owner& owner, double strength, Context& conte
   if (!(fainter > kMuchFainter)) return;
   std::snprintf(
       line, sizeof line,
-      "the file's colours hold only %.0f%% of the mark: a longer --seconds, a larger field or a lower "
-      "--strength makes it stronger",
-      100 * std::pow(10.0, -fainter / 20));
+      "the file's colours took only %.0f%% of the mark, which was then multiplied by %.2f with what "
+      "they got wrong: a longer --seconds, a larger field or a lower --strength holds it better",
+      100 * std::pow(10.0, -fainter / 20), strength.scale);
   context.note(line);
 }
 
@@ -78,8 +85,8 @@ int run(const Options& options, Context& context) {
                 .save = {},
                 .checkpoint = {}},
                options.length, context);
+  const auto strength = scaled_to(owner, baker);
   baker.field().save(options.out);
-  const double strength = baker.strength();
 
   const auto owner_sha256 = watermark::sha256_file_hex(options.owner);
   const auto claim = watermark::claim_digest(owner_sha256, owner.key, message);
@@ -95,7 +102,9 @@ int run(const Options& options, Context& context) {
                   {"seconds", seconds},
                   {"steps", baker.steps()},
                   {"psnr_colours", number(baker.psnr())},
-                  {"strength", number(strength)},
+                  {"strength", number(strength.scaled)},
+                  {"strength_learnt", number(strength.learnt)},
+                  {"scale", strength.scale},
                   {"file_bytes", bytes},
                   {"owner_sha256", owner_sha256},
                   {"claim", claim},
@@ -111,7 +120,8 @@ Command add_bake(CLI::App& app) {
   add_message_options(app, o->message, "Message");
   app.add_option("--out", o->out, "File for the field to publish")->required()->type_name("FIELD");
   app.add_option("--strength", o->strength,
-                 "PSNR of the mark on the object, dB, 20 to 60; higher is fainter (as embedded)")
+                 "PSNR that the file's mark is to have on the object, dB, 20 to 60; higher is fainter (as "
+                 "embedded)")
       ->check(CLI::Range(20.0, 60.0).description(""))
       ->type_name("DB");
   add_run_length(app, o->length, false);

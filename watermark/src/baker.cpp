@@ -1,11 +1,9 @@
-#include <fieldmark/engine/metrics.h>
 #include <fieldmark/engine/ops/loss.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/watermark/baker.h>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace fieldmark::watermark {
 namespace {
@@ -174,18 +172,41 @@ void Baker::step(double seconds) {
   ++steps_;
 }
 
-double Baker::strength(Index views) const {
-  nerf::Renderer plain(owner_.field), marked(field_);
-  double sum = 0, count = 0;
-  for (const nerf::Camera& camera :
-       nerf::make_cameras(owner_.field.cameras, nerf::CameraSet::near, views, 0, options_.seed + 32)) {
-    const nerf::Rendering base = plain.render(camera);
-    const double psnr = psnr_masked(marked.render(camera).rgb, base.rgb, base.opacity);
-    if (!std::isfinite(psnr)) continue;
-    sum += psnr;
-    ++count;
+double Baker::strength(const StrengthViews& views) const {
+  nerf::Renderer marked(field_);
+  return StrengthMeter(owner_.field, views)(marked);
+}
+
+// Numbers that learning left alone keep their bytes, the sign of a zero too.
+void Baker::set_scale(double scale, std::span<const float> learnt) {
+  const auto unmarked = owner_.field.params.values();
+  const auto values = field_.params.values();
+  const auto s = static_cast<float>(scale);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = learnt[i] == unmarked[i] ? unmarked[i] : unmarked[i] + s * (learnt[i] - unmarked[i]);
+}
+
+Baker::Strength Baker::scale_to(double target, const StrengthViews& views) {
+  const StrengthMeter meter(owner_.field, views);
+  nerf::Renderer marked(field_);
+  Strength found{.learnt = meter(marked)};
+  found.scaled = found.learnt;
+  const std::vector<float> learnt(field_.params.values().begin(), field_.params.values().end());
+  // Secants of strength over log scale; the first is that of a change twice as large, 6 dB stronger, which
+  // rounding and colours at the ends of their range bend.
+  double slope = -1;
+  for (int round = 0; round < 6 && std::abs(found.scaled - target) > 0.02; ++round) {
+    const double scale = std::clamp(found.scale * std::pow(10.0, (target - found.scaled) / slope / 20),
+                                    1 / kLargestScale, kLargestScale);
+    if (!std::isfinite(found.scaled) || scale == found.scale) break;
+    set_scale(scale, learnt);
+    const double scaled = meter(marked),
+                 secant = (scaled - found.scaled) / (20 * std::log10(scale / found.scale));
+    if (secant < -0.2) slope = secant;
+    found.scale = scale;
+    found.scaled = scaled;
   }
-  return count > 0 ? sum / count : std::numeric_limits<double>::infinity();
+  return found;
 }
 
 double Baker::psnr() const { return -10 * std::log10(std::max(smoothed_, 1e-10)); }

@@ -4,7 +4,6 @@
 #include <fieldmark/distort/quantize8.h>
 #include <fieldmark/distort/similarity.h>
 #include <fieldmark/engine/checkpoint.h>
-#include <fieldmark/engine/metrics.h>
 
 #include <algorithm>
 #include <cmath>
@@ -208,27 +207,19 @@ void Embedder::step_parameters() {
 
 void Embedder::calibrate(Index views) {
   if (!owner_.mark && !owner_.options().budget) return;  // the content loss decides the strength
-  const auto cameras =
-      nerf::make_cameras(owner_.field.cameras, nerf::CameraSet::near, views, 0, options_.seed + 77);
+  const StrengthMeter meter(owner_.field, {.count = views, .seed = options_.seed + 77});
   const double target = owner_.options().strength;
   owner_.gain = std::pow(10.0, -target / 20);
+  nerf::Renderer renderer(owner_.field);
   // Three rounds: the first sets the size, the others what clamping and rounding to 8 bits change.
   for (int round = 0; round < 3; ++round) {
-    double sum = 0;
-    Index count = 0;
-    nerf::Renderer renderer(owner_.field, {.finer = 1});
-    for (std::size_t i = 0; i < cameras.size(); ++i) {
-      renderer.set_recolour({});
-      const nerf::Rendering plain = renderer.render(cameras[i]);
-      renderer.set_recolour(owner_.marking(
-          cell_signs(code_, random_message(owner_.options().bits, message_rng_, ~std::uint64_t{i}))));
-      const double psnr = psnr_masked(renderer.render(cameras[i]).rgb, plain.rgb, plain.opacity);
-      if (!std::isfinite(psnr)) continue;
-      sum += psnr;
-      ++count;
-    }
-    if (count == 0) return;
-    owner_.gain *= std::pow(10.0, (sum / static_cast<double>(count) - target) / 20);
+    const double strength = meter(renderer, [&](Index i) {
+      const auto message =
+          random_message(owner_.options().bits, message_rng_, ~static_cast<std::uint64_t>(i));
+      renderer.set_recolour(owner_.marking(cell_signs(code_, message)));
+    });
+    if (!std::isfinite(strength)) return;
+    owner_.gain *= std::pow(10.0, (strength - target) / 20);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <fieldmark/nerf/field_sampler.h>
 #include <fieldmark/nerf/schedule.h>
 #include <fieldmark/watermark/owner.h>
+#include <fieldmark/watermark/strength_meter.h>
 
 namespace fieldmark::watermark {
 
@@ -38,11 +39,22 @@ class Baker {
   Index planned() const { return schedule_.total(); }
   /// Running mean of the distance between baked and marked colours, as a PSNR over the samples by weight.
   double psnr() const;
-  /// Strength of the mark in the baked field as far as it is: the mean of psnr_masked() of those of its
-  /// near views that differ against the unmarked ones, dB; infinity where none does. Above the owner's
-  /// strength, the colours have not taken the whole mark: the run was short, or the field has no room for it.
-  /// @param views  >= 1
-  double strength(Index views = 8) const;
+  /// How strong the mark is in the baked field, dB as options().strength of the owner counts.
+  struct Strength {
+    double learnt = 0;  ///< as the steps left it, infinity where nothing differs
+    double scaled = 0;  ///< after scale_to()
+    double scale = 1;   ///< what scale_to() multiplied the learnt change of the colour numbers by
+  };
+  /// Moves the colour numbers along the line from the unmarked to the learnt ones to where the mark has the
+  /// strength asked for, by secants until it is within 0.02 dB on the views it looks at. Colours
+  /// learn a mark some 1.3 dB fainter than the owner's; more if the run was short or the field has no room
+  /// for it. What they learnt wrong is scaled, too. For after the last step.
+  /// @param target  dB   @return what came of it; the scale stays within 1/kLargestScale to kLargestScale
+  Strength scale_to(double target, const StrengthViews& views = {.seed = 32});
+  /// Bound of the scale: 6 dB.
+  static constexpr double kLargestScale = 2;
+  /// The strength as far as it is, see StrengthMeter.
+  double strength(const StrengthViews& views = {.seed = 32}) const;
   /// The baked field as far as it is.
   const nerf::RadianceField& field() const { return field_; }
 
@@ -52,6 +64,7 @@ class Baker {
   void select(const nerf::RaySamples& samples, Chunk& c) const;
   double run_chunk(Index index, Index shard, Tape<float>& tape, float* grads);
   void backward_table();
+  void set_scale(double scale, std::span<const float> learnt);
 
   const Owner& owner_;
   BakeOptions options_;

@@ -3,6 +3,7 @@
 #include <fieldmark/engine/sharded_loop.h>
 #include <fieldmark/nerf/schedule.h>
 #include <fieldmark/watermark/owner.h>
+#include <fieldmark/watermark/strength_meter.h>
 #include <fieldmark/watermark/view_cache.h>
 
 #include <functional>
@@ -103,9 +104,10 @@ class Embedder {
   };
   /// As of the last step.
   const Figures& figures() const { return figures_; }
-  /// Sets the owner's gain so that the mean PSNR on the object over `views` new near views is the owner's
-  /// strength; nothing for presets paper and code, which have no gain without a budget.
-  void calibrate(Index views = 16);
+  /// Sets the owner's gain so that the mark has the owner's strength on `views` new near views, each with a
+  /// random message, see StrengthMeter; nothing for presets paper and code, which have no gain without a
+  /// budget.
+  void calibrate(Index views = StrengthViews{}.count);
 
   /// @throws IoError
   void save(const std::filesystem::path& path) const;

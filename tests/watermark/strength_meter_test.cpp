@@ -1,0 +1,78 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/metrics.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/watermark/strength_meter.h>
+
+#include <cmath>
+
+#include "support/catch.h"
+#include "tiny_owner.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+namespace {
+// Every colour darker by a known step.
+nerf::Renderer::Recolour darker_by(float step) {
+  return [step](const float*, const float*, Index n, float* rgb) {
+    for (Index i = 0; i < 3 * n; ++i) rgb[i] -= step;
+  };
+}
+}  // namespace
+
+TEST_CASE("strength_meter: the mean over near views of what psnr_masked says of each, called view by view") {
+  const Owner owner = tiny_owner();
+  const StrengthViews views{.count = 5, .side = 1000, .seed = 9};  // no larger than the photographs
+  nerf::Renderer plain(owner.field), marked(owner.field);
+  double sum = 0;
+  const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, 5, 0, 9);
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    marked.set_recolour(darker_by(0.01f * static_cast<float>(i + 1)));
+    const nerf::Rendering base = plain.render(cameras[i]);
+    sum += psnr_masked(marked.render(cameras[i]).rgb, base.rgb, base.opacity);
+  }
+  nerf::Renderer renderer(owner.field);
+  std::vector<Index> called;
+  const double strength = StrengthMeter(owner.field, views)(renderer, [&](Index i) {
+    called.push_back(i);
+    renderer.set_recolour(darker_by(0.01f * static_cast<float>(i + 1)));
+  });
+  CHECK(strength == Approx(sum / 5).epsilon(1e-12));
+  CHECK(called == std::vector<Index>{0, 1, 2, 3, 4});
+}
+
+TEST_CASE("strength_meter: views of fewer pixels say the same of a mark as large ones") {
+  const Owner owner = tiny_owner();
+  nerf::Renderer renderer(owner.field);
+  renderer.set_recolour(darker_by(0.03f));
+  const auto at = [&](Index side) {
+    return StrengthMeter(owner.field, {.count = 24, .side = side})(renderer);
+  };
+  const double large = at(1000), small = at(12);
+  CAPTURE(large, small);
+  CHECK(large == Approx(-20 * std::log10(0.03)).margin(1));
+  CHECK(small == Approx(large).margin(0.15));
+}
+
+TEST_CASE("strength_meter: infinity where nothing differs, and the same for any number of threads") {
+  const Owner owner = tiny_owner();
+  const StrengthMeter meter(owner.field, {.count = 3});
+  nerf::Renderer renderer(owner.field);
+  CHECK(std::isinf(meter(renderer)));
+  renderer.set_recolour(darker_by(0.02f));
+  const int before = threads();
+  set_threads(1);
+  const double one = meter(renderer);
+  set_threads(2);
+  CHECK(meter(renderer) == one);
+  set_threads(before);
+}
+
+TEST_CASE("strength_meter: no views and no pixels are refused") {
+  const Owner owner = tiny_owner();
+  CHECK_THROWS_AS(StrengthMeter(owner.field, {.count = 0}), ValueError);
+  CHECK_THROWS_WITH(StrengthMeter(owner.field, {.count = 0}),
+                    "[strength_meter] count and side must be at least 1, got 0 and 80");
+  CHECK_THROWS_WITH(StrengthMeter(owner.field, {.side = 0}),
+                    "[strength_meter] count and side must be at least 1, got 256 and 0");
+}

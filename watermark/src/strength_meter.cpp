@@ -1,0 +1,38 @@
+#include <fieldmark/engine/error.h>
+#include <fieldmark/engine/metrics.h>
+#include <fieldmark/watermark/strength_meter.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+namespace fieldmark::watermark {
+
+StrengthMeter::StrengthMeter(const nerf::RadianceField& unmarked, const StrengthViews& views) {
+  if (views.count < 1 || views.side < 1)
+    throw ValueError("[strength_meter] count and side must be at least 1, got " +
+                     std::to_string(views.count) + " and " + std::to_string(views.side));
+  const nerf::CameraSpan& span = unmarked.cameras;
+  cameras_ = nerf::make_cameras(span, nerf::CameraSet::near, views.count,
+                                std::min(views.side, std::max(span.width, span.height)), views.seed);
+  nerf::Renderer renderer(unmarked);
+  for (const nerf::Camera& camera : cameras_) unmarked_.push_back(renderer.render(camera));
+}
+
+double StrengthMeter::operator()(nerf::Renderer& marked,
+                                 const std::function<void(Index view)>& before) const {
+  double sum = 0;
+  Index count = 0;
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    if (before) before(static_cast<Index>(i));
+    const nerf::Rendering& plain = unmarked_[i];
+    const double psnr = psnr_masked(marked.render(cameras_[i]).rgb, plain.rgb, plain.opacity);
+    if (!std::isfinite(psnr)) continue;
+    sum += psnr;
+    ++count;
+  }
+  return count > 0 ? sum / static_cast<double>(count) : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace fieldmark::watermark
