@@ -104,6 +104,25 @@ TEST_CASE("baker: a mark's strength in the file comes near the owner's as it is 
   CHECK(early > late + 1);
 }
 
+TEST_CASE("baker: an object keeps its likeness in directions that the photographs never saw") {
+  const Owner owner = owner_with_gain();
+  const auto unseen = [&](Index around) {
+    BakeOptions o = options(150);
+    o.around = around;
+    Baker baker(owner, kMessage, o);
+    while (!baker.done()) baker.step(0);
+    nerf::Renderer marked(owner.field), baked(baker.field());
+    marked.set_recolour(owner.marking(cell_signs(owner.code(), kMessage)));
+    double sum = 0;
+    for (const auto& camera : nerf::make_cameras(owner.field.cameras, nerf::CameraSet::unseen, 6, 0, 44))
+      sum += psnr(baked.render(camera).rgb, marked.render(camera).rgb);
+    return sum / 6;
+  };
+  const double without = unseen(0), with = unseen(20);
+  CAPTURE(without, with);
+  CHECK(with > without + 1);
+}
+
 TEST_CASE("baker: scaling gives the file the strength asked for, on other views too") {
   const Owner owner = owner_with_gain();
   Baker baker(owner, kMessage, options(60));
@@ -209,5 +228,6 @@ TEST_CASE("baker: options outside their ranges are refused") {
   BakeOptions none = options(1);
   none.cameras = 0;
   CHECK_THROWS_AS(Baker(owner, kMessage, none), ValueError);
-  CHECK_THROWS_WITH(Baker(owner, kMessage, none), "[baker] cameras must be at least 1, got 0");
+  CHECK_THROWS_WITH(Baker(owner, kMessage, none),
+                    "[baker] cameras must be at least 1 and around at least 0, got 0 and 130");
 }

@@ -84,6 +84,23 @@ TEST_CASE("camera_search: the whole object in a picture leads to the camera, tur
   CHECK(close >= 3);  // 60 renders are some 15 degrees apart
 }
 
+TEST_CASE("camera_search: an object is found from below, where no photograph was taken") {
+  const Owner owner = tiny_owner();
+  REQUIRE(owner.field.space.kind == nerf::SpaceKind::cube);
+  nerf::Renderer renderer(owner.field);
+  const auto close = [&](Index around) {
+    const CameraSearch search(owner, {.views = 60, .around = around, .size = 32});
+    Index n = 0;
+    for (const auto& camera : nerf::make_cameras(owner.field.cameras, nerf::CameraSet::unseen, 8, 96, 21))
+      n += one_is_close(search.find(renderer.render(camera).rgb, 3), camera);
+    return n;
+  };
+  const Index without = close(0), with = close(120);
+  CAPTURE(without, with);
+  CHECK(with >= 6);
+  CHECK(with > without + 2);
+}
+
 TEST_CASE("camera_search: two fifths of a picture lead to the camera") {
   const Owner owner = tiny_owner();
   const CameraSearch search(owner, kOptions);
@@ -132,7 +149,7 @@ TEST_CASE("camera_search: errors name what is wrong") {
   CHECK_THROWS_WITH(CameraSearch(paper),
                     "[camera_search] owner must be of preset fast: preset paper has no cells in space");
   CHECK_THROWS_WITH(CameraSearch(owner, {.views = 0}),
-                    "[camera_search] views and size must be at least 1 and 16, got 0 and 40");
+                    "[camera_search] views, around and size must be at least 1, 0 and 16, got 0, 192 and 40");
   CHECK_THROWS_AS(CameraSearch(owner, {.size = 15}), ValueError);
   CHECK_THROWS_AS(CameraSearch(owner, {.views = 1, .size = 16}).find_part(Tensor<float>({8, 8}), 1),
                   ShapeError);

@@ -42,6 +42,17 @@ Tensor<float> turned(const Tensor<float>& picture, double angle, float backgroun
   return {y.shape(), std::vector<float>(y.value(), y.value() + y.shape().size())};
 }
 
+std::vector<nerf::Camera> compared_cameras(const nerf::RadianceField& field,
+                                           const CameraSearchOptions& options) {
+  auto cameras =
+      nerf::make_cameras(field.cameras, nerf::CameraSet::near, options.views, options.size, options.seed);
+  if (field.space.kind != nerf::SpaceKind::cube) return cameras;
+  const auto around =
+      nerf::make_cameras(field.cameras, nerf::CameraSet::sphere, options.around, options.size, options.seed);
+  cameras.insert(cameras.end(), around.begin(), around.end());
+  return cameras;
+}
+
 Complex middle(const Window& w) { return {w.x + w.width / 2, w.y + w.height / 2}; }
 
 }  // namespace
@@ -50,12 +61,12 @@ CameraSearch::CameraSearch(const Owner& owner, const CameraSearchOptions& option
     : owner_(owner), options_(options) {
   if (!owner.reader)
     throw ValueError("[camera_search] owner must be of preset fast: preset paper has no cells in space");
-  if (options.views < 1 || options.size < 16)
-    throw ValueError("[camera_search] views and size must be at least 1 and 16, got " +
-                     std::to_string(options.views) + " and " + std::to_string(options.size));
+  if (options.views < 1 || options.around < 0 || options.size < 16)
+    throw ValueError("[camera_search] views, around and size must be at least 1, 0 and 16, got " +
+                     std::to_string(options.views) + ", " + std::to_string(options.around) + " and " +
+                     std::to_string(options.size));
   nerf::Renderer renderer(owner.field, {.finer = 1});
-  for (const nerf::Camera& camera : nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near,
-                                                       options.views, options.size, options.seed)) {
+  for (const nerf::Camera& camera : compared_cameras(owner.field, options)) {
     const CachedView v = cache_view(renderer, owner.field, camera);
     SmallView view{camera, std::vector<std::int32_t>(at(owner.cells.count()), -1), {}, {}, {}, {}};
     std::vector<double> weight;

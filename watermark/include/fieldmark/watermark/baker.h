@@ -14,12 +14,13 @@ struct BakeOptions {
   nerf::ScheduleOptions schedule{
       .seconds = 45, .lr = 1e-2, .half_after = 4000, .cooldown = 0.6, .last = 0.02};
   Index cameras = 400;     ///< near cameras whose rays are used, >= 1
+  Index around = 130;      ///< more in every direction, of an object that has no surroundings (a cube), >= 0
   std::uint64_t seed = 0;  ///< of cameras and rays
 };
 
 /// Distils the marked colours of one message into the colour side of a plain field:
-///   minimise sum_i w_i |c(x_i, d_i) - c_m(x_i, d_i)|^2 over samples of rays of near cameras, w_i their
-///   weights.
+///   minimise sum_i w_i |c(x_i, d_i) - c_m(x_i, d_i)|^2 over samples of rays of near cameras and, of an
+///   object, of cameras in every direction, w_i their weights.
 /// Only the colour network and the colour features of the table move; whatever density depends on keeps its
 /// bytes. The result has the tensor names, shapes and metadata of the unmarked field, and holds neither
 /// network, extractor, key nor message.

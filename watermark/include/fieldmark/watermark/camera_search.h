@@ -8,6 +8,7 @@ namespace fieldmark::watermark {
 /// How cameras are looked for.
 struct CameraSearchOptions {
   Index views = 256;       ///< near cameras to compare with, at least 1
+  Index around = 192;      ///< more in every direction, of an object that has no surroundings (a cube), >= 0
   Index size = 40;         ///< longer side of their renders, pixels, at least 16
   std::uint64_t seed = 0;  ///< of the cameras and of the draws
 };
