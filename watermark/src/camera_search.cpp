@@ -11,6 +11,7 @@
 #include <numbers>
 
 #include "camera_proposal.h"
+#include "cameras_around.h"
 
 namespace fieldmark::watermark {
 namespace {
@@ -42,17 +43,6 @@ Tensor<float> turned(const Tensor<float>& picture, double angle, float backgroun
   return {y.shape(), std::vector<float>(y.value(), y.value() + y.shape().size())};
 }
 
-std::vector<nerf::Camera> compared_cameras(const nerf::RadianceField& field,
-                                           const CameraSearchOptions& options) {
-  auto cameras =
-      nerf::make_cameras(field.cameras, nerf::CameraSet::near, options.views, options.size, options.seed);
-  if (field.space.kind != nerf::SpaceKind::cube) return cameras;
-  const auto around =
-      nerf::make_cameras(field.cameras, nerf::CameraSet::sphere, options.around, options.size, options.seed);
-  cameras.insert(cameras.end(), around.begin(), around.end());
-  return cameras;
-}
-
 Complex middle(const Window& w) { return {w.x + w.width / 2, w.y + w.height / 2}; }
 
 }  // namespace
@@ -66,7 +56,8 @@ CameraSearch::CameraSearch(const Owner& owner, const CameraSearchOptions& option
                      std::to_string(options.views) + ", " + std::to_string(options.around) + " and " +
                      std::to_string(options.size));
   nerf::Renderer renderer(owner.field, {.finer = 1});
-  for (const nerf::Camera& camera : compared_cameras(owner.field, options)) {
+  for (const nerf::Camera& camera :
+       cameras_around(owner.field, options.views, options.around, options.size, options.seed)) {
     const CachedView v = cache_view(renderer, owner.field, camera);
     SmallView view{camera, std::vector<std::int32_t>(at(owner.cells.count()), -1), {}, {}, {}, {}};
     std::vector<double> weight;
