@@ -176,7 +176,7 @@ void Baker::step(double seconds) {
 }
 
 double Baker::strength(const StrengthViews& views) const {
-  nerf::Renderer marked(field_);
+  nerf::Renderer marked(field_, strength_rendering());
   return StrengthMeter(owner_.field, views)(marked);
 }
 
@@ -191,7 +191,7 @@ void Baker::set_scale(double scale, std::span<const float> learnt) {
 
 Baker::Strength Baker::scale_to(double target, const StrengthViews& views) {
   const StrengthMeter meter(owner_.field, views);
-  nerf::Renderer marked(field_);
+  nerf::Renderer marked(field_, strength_rendering());
   Strength found{.learnt = meter(marked)};
   found.scaled = found.learnt;
   const std::vector<float> learnt(field_.params.values().begin(), field_.params.values().end());

@@ -210,7 +210,7 @@ void Embedder::calibrate(Index views) {
   const StrengthMeter meter(owner_.field, {.count = views, .seed = options_.seed + 77});
   const double target = owner_.options().strength;
   owner_.gain = std::pow(10.0, -target / 20);
-  nerf::Renderer renderer(owner_.field);
+  nerf::Renderer renderer(owner_.field, strength_rendering());
   // Three rounds: the first sets the size, the others what clamping and rounding to 8 bits change.
   for (int round = 0; round < 3; ++round) {
     const double strength = meter(renderer, [&](Index i) {

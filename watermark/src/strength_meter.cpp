@@ -7,6 +7,8 @@
 #include <limits>
 #include <string>
 
+#include "means.h"
+
 namespace fieldmark::watermark {
 
 StrengthMeter::StrengthMeter(const nerf::RadianceField& unmarked, const StrengthViews& views) {
@@ -16,23 +18,20 @@ StrengthMeter::StrengthMeter(const nerf::RadianceField& unmarked, const Strength
   const nerf::CameraSpan& span = unmarked.cameras;
   cameras_ = nerf::make_cameras(span, nerf::CameraSet::near, views.count,
                                 std::min(views.side, std::max(span.width, span.height)), views.seed);
-  nerf::Renderer renderer(unmarked);
+  nerf::Renderer renderer(unmarked, strength_rendering());
   for (const nerf::Camera& camera : cameras_) unmarked_.push_back(renderer.render(camera));
 }
 
 double StrengthMeter::operator()(nerf::Renderer& marked,
                                  const std::function<void(Index view)>& before) const {
-  double sum = 0;
-  Index count = 0;
+  std::vector<double> psnr;
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     if (before) before(static_cast<Index>(i));
     const nerf::Rendering& plain = unmarked_[i];
-    const double psnr = psnr_masked(marked.render(cameras_[i]).rgb, plain.rgb, plain.opacity);
-    if (!std::isfinite(psnr)) continue;
-    sum += psnr;
-    ++count;
+    psnr.push_back(psnr_masked(marked.render(cameras_[i]).rgb, plain.rgb, plain.opacity));
   }
-  return count > 0 ? sum / static_cast<double>(count) : std::numeric_limits<double>::infinity();
+  const double mean = finite_mean(psnr);
+  return std::isnan(mean) ? std::numeric_limits<double>::infinity() : mean;
 }
 
 }  // namespace fieldmark::watermark

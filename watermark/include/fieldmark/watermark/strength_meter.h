@@ -7,14 +7,18 @@
 
 namespace fieldmark::watermark {
 
-/// Which views a StrengthMeter looks at: near ones, no larger than the photographs. Every pixel is one ray, so
-/// that views of few pixels have the mean that large ones have, and many of them come closer to the mean over
-/// all views than a few large ones that take as long.
+/// Which views a StrengthMeter looks at: near ones, no larger than the photographs. Every pixel is one ray,
+/// so that views of few pixels have the mean that large ones have, and many of them come closer to the mean
+/// over all views than a few large ones that take as long.
 struct StrengthViews {
   Index count = 256;       ///< >= 1
   Index side = 80;         ///< pixels of the longer side at most, >= 1
   std::uint64_t seed = 0;  ///< of the cameras
 };
+
+/// How the views are to be rendered: one ray a pixel, of fields with supersampling too, whose mean over a
+/// large pixel would hide a part of the mark.
+inline nerf::RenderOptions strength_rendering() { return {.supersampling = 1}; }
 
 /// Measures the strength of marks of one field: the mean over views of psnr_masked() of the marked against
 /// the unmarked view, dB. It keeps the unmarked views.
@@ -22,8 +26,8 @@ class StrengthMeter {
  public:
   /// Renders the views of the unmarked field. @throws ValueError if a number is out of range
   explicit StrengthMeter(const nerf::RadianceField& unmarked, const StrengthViews& views = {});
-  /// @param marked  renders the marked field   @param before  called with each view's number before it is
-  /// rendered, or empty
+  /// @param marked  renders the marked field, made with strength_rendering()   @param before  called with
+  /// each view's number before it is rendered, or empty
   /// @return mean over the views that have an object and differ, dB; infinity where there is none
   double operator()(nerf::Renderer& marked, const std::function<void(Index view)>& before = {}) const;
 
