@@ -121,6 +121,28 @@ TEST_CASE("camera_search: two fifths of a picture lead to the camera") {
   CHECK(close >= 3);
 }
 
+TEST_CASE(
+    "camera_search: cameras have the pixels of the owner's pictures, where small renders cannot have their "
+    "shape") {
+  Owner owner = tiny_owner();
+  owner.field.cameras.width = 100;
+  owner.field.cameras.height = 53;  // 16.96 of 32: stretched to 17, the error would be 0.2%; of 54 1.6%
+  for (const Index height : {53, 54}) {
+    owner.field.cameras.height = height;
+    const CameraSearch search(owner, kOptions);
+    const nerf::Camera camera = near_camera(owner, 100, 11);
+    REQUIRE(camera.height == height);
+    const double pixel = camera.fy / camera.fx;
+    const Tensor<float> picture = nerf::Renderer(owner.field).render(camera).rgb;
+    std::vector<nerf::Camera> found = search.find(picture, 3);
+    for (const auto& c : search.find_part(picture, 3)) found.push_back(c);
+    for (const auto& c : search.find(places_of(owner, camera), height, 100, 3)) found.push_back(c);
+    REQUIRE(found.size() == 9);
+    CAPTURE(height);
+    for (const auto& c : found) CHECK(std::abs(c.fy / c.fx / pixel - 1) < 1e-9);
+  }
+}
+
 TEST_CASE("camera_search: nothing recognised, nothing found") {
   const Owner owner = tiny_owner();
   const CameraSearch search(owner, {.views = 5, .size = 32});
