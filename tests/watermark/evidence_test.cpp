@@ -108,6 +108,11 @@ TEST_CASE("evidence: bits are read with their signs, and a bit without evidence 
   CHECK(reading.logit[1] == Approx(-2 / std::sqrt(2.0)).epsilon(1e-15));
   CHECK(reading.logit[2] == 0);
   CHECK(reading.logit[3] == 0);
+  const double largest = 3;
+  CHECK(reading.sum[0] == Approx((3 + 2 + 0.5) / largest).epsilon(1e-15));
+  CHECK(reading.sum[1] == Approx(-2 / largest).epsilon(1e-15));
+  CHECK(reading.sum[2] == 0);
+  CHECK(reading.sum[3] == 0);
   CHECK(reading.message.bits == std::vector<std::uint8_t>{1, 0, 0, 0});
   CHECK(reading.decided == std::vector<std::uint8_t>{1, 1, 0, 0});
   const BitMatch match = match_bits(reading, Message{{1, 1, 0, 1}});

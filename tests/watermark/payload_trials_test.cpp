@@ -1,4 +1,5 @@
 #include <fieldmark/engine/error.h>
+#include <fieldmark/watermark/evidence.h>
 #include <fieldmark/watermark/payload_trials.h>
 
 #include <cmath>
@@ -82,4 +83,25 @@ TEST_CASE("payload_trials: intervals are Wilson's") {
   CHECK(wilson_interval(0, 0).low == 0);
   CHECK(wilson_interval(0, 0).high == 1);
   CHECK_THROWS_WITH(wilson_interval(3, 2), "[wilson_interval] successes must be 0 to 2 (the trials), got 3");
+}
+
+TEST_CASE("payload_trials: bits that a picture hardly shows do not count against a payload") {
+  const PayloadCodec codec(100);
+  const Payload sent = random_payload(codec, CounterRng(4), 0);
+  const Message message = codec.encode(sent);
+  // A cell a bit; every third is a hundred times fainter and, half of the time, reads wrong.
+  CellCode code;
+  std::vector<double> evidence;
+  for (std::size_t i = 0; i < 100; ++i) {
+    code.bit.push_back(static_cast<std::int32_t>(i));
+    code.sign.push_back(i % 2 ? 1 : -1);
+    const double right = code.sign[i] * (message.bits[i] ? 1 : -1);
+    evidence.push_back(i % 3 ? right : i % 6 ? -0.01 * right : 0.01 * right);
+  }
+  const BitReading reading = read_bits(evidence, code, 100);
+  REQUIRE(match_bits(reading, message).matching == 83);
+  CHECK_FALSE(codec.read(reading.logit).has_value());  // all alike: 17 errors are too many
+  PayloadViews views(code, 100, 1);
+  views.add(0, "", evidence, message);
+  CHECK(views.accuracies().at("").exact == 1);
 }

@@ -31,11 +31,11 @@ int run(const Options& options, Context& context) {
                      {"bits", to_bits(reading.message)},
                      {"reading", how},
                      {"agreement", number(picture.agreement)},
-                     {"payload", payload_json(read_payload(reading.logit))},
+                     {"payload", payload_json(read_payload(reading.sum))},
                      {"logits", reading.logit}});
   }
   const auto reading = watermark::read_bits(total_evidence(pictures), code, bits);
-  const auto payload = read_payload(reading.logit);
+  const auto payload = read_payload(reading.sum);
   context.text() << to_bits(reading.message) << "  all together: " << to_hex(reading.message)
                  << "\npayload: " << payload_text(payload, bits) << "\n";
   context.result({{"message", to_hex(reading.message)},

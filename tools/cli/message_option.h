@@ -29,7 +29,7 @@ watermark::Message message_of(const MessageOption& options, Index bits);
 /// {kind, value} of a message that stands for something, else null.
 Json payload_json(const watermark::Message& message);
 
-/// The payload that logits tell, if any.
+/// The payload that logits tell, if any, see PayloadCodec::read().
 std::optional<watermark::PayloadReading> read_payload(const std::vector<double>& logit);
 
 /// {kind, value, corrected, chance}, or null.

@@ -101,7 +101,10 @@ BitReading read_bits(std::span<const double> evidence, const CellCode& code, Ind
   if (n_bits < 1) throw ValueError("[read_bits] n_bits must be at least 1, got " + std::to_string(n_bits));
   const double largest = check_evidence("read_bits", evidence, code);
   const auto n = static_cast<std::size_t>(n_bits);
-  BitReading reading{std::vector<double>(n), {std::vector<std::uint8_t>(n)}, std::vector<std::uint8_t>(n)};
+  BitReading reading{std::vector<double>(n),
+                     std::vector<double>(n),
+                     {std::vector<std::uint8_t>(n)},
+                     std::vector<std::uint8_t>(n)};
   std::vector<double> squares(n);
   for (std::size_t c = 0; c < evidence.size(); ++c) {
     if (code.bit[c] < 0) continue;
@@ -111,11 +114,11 @@ BitReading read_bits(std::span<const double> evidence, const CellCode& code, Ind
     }
     const auto b = static_cast<std::size_t>(code.bit[c]);
     const double s = largest > 0 ? evidence[c] / largest : 0;
-    reading.logit[b] += s * code.sign[c];
+    reading.sum[b] += s * code.sign[c];
     squares[b] += s * s;
   }
   for (std::size_t b = 0; b < n; ++b) {
-    if (squares[b] > 0) reading.logit[b] /= std::sqrt(squares[b]);
+    if (squares[b] > 0) reading.logit[b] = reading.sum[b] / std::sqrt(squares[b]);
     reading.message.bits[b] = reading.logit[b] > 0;
     reading.decided[b] = reading.logit[b] != 0;
   }

@@ -51,7 +51,7 @@ void PayloadViews::add(Index view, const std::string& under, std::span<const dou
   if (view % together_ == 0) group.evidence.assign(evidence.size(), 0.0);
   for (std::size_t c = 0; c < group.evidence.size(); ++c) group.evidence[c] += evidence[c];
   if (view % together_ == together_ - 1)
-    group.trials.add(read_bits(group.evidence, *code_, codec_.raw_bits()).logit, *payload);
+    group.trials.add(read_bits(group.evidence, *code_, codec_.raw_bits()).sum, *payload);
 }
 
 std::map<std::string, PayloadAccuracy> PayloadViews::accuracies() const {

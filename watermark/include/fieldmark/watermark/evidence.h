@@ -41,6 +41,10 @@ struct BitReading {
   /// [bits] L_b = sum_{c: bit_c = b} sign_c S_c / sqrt(sum_{c: bit_c = b} S_c^2): mean 0 and variance 1 under
   /// a key that has nothing to do with the picture; 0 without evidence.
   std::vector<double> logit;
+  /// [bits] sum_{c: bit_c = b} sign_c S_c / max_c |S_c|: the same, but a bit that the picture shows little of
+  /// is small. What PayloadCodec::read() should weigh bits by; under such a key its signs are fair too, given
+  /// the sizes.
+  std::vector<double> sum;
   /// [bits] 1 where the logit is positive, else 0.
   Message message;
   /// [bits] 1 where the logit is not 0; an undecided bit counts as half right.

@@ -66,7 +66,7 @@ class PayloadCodec {
   /// The payload that a reading tells, if any: of those found by Bch::decode and by OrderedStatistics, the
   /// one that agrees best, provided that at most PayloadLayout::corrects bits of its codeword are wrong, one
   /// without evidence counting as wrong, or that its chance is at most kMostSoftChance.
-  /// @param logit  [raw_bits] finite, see BitReading   @throws ValueError otherwise
+  /// @param logit  [raw_bits] finite, of any scale, see BitReading::sum   @throws ValueError otherwise
   std::optional<PayloadReading> read(std::span<const double> logit) const;
 
  private:
