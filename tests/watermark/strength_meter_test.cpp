@@ -54,6 +54,31 @@ TEST_CASE("strength_meter: views of fewer pixels say the same of a mark as large
   CHECK(small == Approx(large).margin(0.15));
 }
 
+TEST_CASE("strength_meter: a field with supersampling is measured by single rays") {
+  const nerf::RadianceField& single = tiny_field();
+  nerf::RadianceFieldOptions options = single.options();
+  options.supersampling = 4;
+  nerf::RadianceField several(options);
+  several.params = single.params;
+  several.grid = single.grid;
+  several.space = single.space;
+  several.cameras = single.cameras;
+  several.background = single.background;
+  // A mark finer than a pixel: the mean of a pixel's rays would hide it.
+  const nerf::Renderer::Recolour fine = [](const float* x, const float*, Index n, float* rgb) {
+    for (Index i = 0; i < n; ++i)
+      for (Index a = 0; a < 3; ++a)
+        rgb[3 * i + a] = 0.5f + 0.05f * std::sin(700 * x[3 * i] + 500 * x[3 * i + 1] + 300 * x[3 * i + 2]);
+  };
+  const auto strength = [&](const nerf::RadianceField& field, const nerf::RenderOptions& rendering) {
+    nerf::Renderer renderer(field, rendering);
+    renderer.set_recolour(fine);
+    return StrengthMeter(field, {.count = 4, .side = 16})(renderer);
+  };
+  CHECK(strength(several, strength_rendering()) == strength(single, {}));
+  CHECK(std::abs(strength(several, {}) - strength(single, {})) > 0.1);
+}
+
 TEST_CASE("strength_meter: infinity where nothing differs, and the same for any number of threads") {
   const Owner owner = tiny_owner();
   const StrengthMeter meter(owner.field, {.count = 3});
