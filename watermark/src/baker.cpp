@@ -1,6 +1,8 @@
+#include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/loss.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/watermark/baker.h>
+#include <fieldmark/watermark/weighted_segments.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +15,7 @@ namespace {
 constexpr int kShards = 16;
 constexpr Index kRays = 64, kChunks = 32;  // of a chunk, of a step
 constexpr float kLeastWeight = 1e-3f;
+constexpr float kOfSamples = 0.1f;  // weight of the samples' own colours beside what rays show
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
@@ -36,6 +39,7 @@ struct Baker::Chunk {
   std::vector<float> jitter;
   std::vector<float> position, direction, weight, geometry_features, base_features, of_direction, target,
       features, dfeatures, unused;
+  std::vector<std::int32_t> begin;  // of each ray's samples, and the end
   Index samples = 0;
 };
 
@@ -90,10 +94,11 @@ void Baker::select(const nerf::RaySamples& s, Chunk& c) const {
   for (auto* v :
        {&c.position, &c.direction, &c.weight, &c.geometry_features, &c.base_features, &c.of_direction})
     v->clear();
+  c.begin.assign(1, 0);
   const auto append = [](std::vector<float>& to, const float* from, Index n) {
     to.insert(to.end(), from, from + n);
   };
-  for (Index r = 0; r < kRays; ++r)
+  for (Index r = 0; r < kRays; ++r) {
     for (Index i = s.ray_begin[at(r)]; i < s.ray_begin[at(r + 1)]; ++i) {
       if (weights[at(i)] < kLeastWeight) continue;
       append(c.position, &s.position[at(3 * i)], 3);
@@ -106,6 +111,8 @@ void Baker::select(const nerf::RaySamples& s, Chunk& c) const {
       append(c.base_features, s.colour_features.data() + i * colour, colour);
       append(c.of_direction, of_ray.value() + r * direction, direction);
     }
+    c.begin.push_back(static_cast<std::int32_t>(c.weight.size()));
+  }
   c.samples = static_cast<Index>(c.weight.size());
 }
 
@@ -137,10 +144,14 @@ double Baker::run_chunk(Index index, Index shard, Tape<float>& tape, float* grad
   const Var<float> rgb = net.colour(learnt, z, features, of_direction);
   float* weights = tape.scratch(3 * n);
   for (Index i = 0; i < 3 * n; ++i) weights[i] = c.weight[at(i / 3)];
-  const Var<float> loss = mse_loss<float>(rgb, tape.constant(c.target.data(), {n, 3}),
-                                          std::span<const float>(weights, at(3 * n)));
-  const double value = static_cast<double>(loss.value()[0]);
-  tape.backward(loss);
+  const Var<float> target = tape.constant(c.target.data(), {n, 3});
+  const Var<float> of_samples = mse_loss<float>(rgb, target, std::span<const float>(weights, at(3 * n)));
+  const Var<float> seen = weighted_segments<float>(sub(rgb, target), c.begin, c.weight);
+  float* nothing = tape.scratch(3 * kRays);
+  std::fill_n(nothing, 3 * kRays, 0.f);
+  const Var<float> of_rays = mse_loss<float>(seen, tape.constant(nothing, {kRays, 3}));
+  const double value = static_cast<double>(of_rays.value()[0]);
+  tape.backward(add(of_rays, scale(of_samples, kOfSamples)));
   if (net.has_table()) net.encoding().deal_to_levels(n, nullptr, features.grad(), c.dfeatures.data());
   return value;
 }

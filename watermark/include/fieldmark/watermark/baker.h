@@ -19,11 +19,13 @@ struct BakeOptions {
 };
 
 /// Distils the marked colours of one message into the colour side of a plain field:
-///   minimise sum_i w_i |c(x_i, d_i) - c_m(x_i, d_i)|^2 over samples of rays of near cameras and, of an
-///   object, of cameras in every direction, w_i their weights.
-/// Only the colour network and the colour features of the table move; whatever density depends on keeps its
-/// bytes. The result has the tensor names, shapes and metadata of the unmarked field, and holds neither
-/// network, extractor, key nor message.
+///   minimise mean_r |sum_{i in r} w_i e_i|^2 + sum_i w_i |e_i|^2 / (10 sum_i w_i),
+///   e_i = c(x_i, d_i) - c_m(x_i, d_i)
+/// over samples i of rays r of near cameras and, of an object, of cameras in every direction, w_i their
+/// weights, both divided by the three channels. The first is what pictures show, the second keeps colours
+/// behind one another from making up for each other. Only the colour network and the colour features of the
+/// table move; whatever density depends on keeps its bytes. The result has the tensor names, shapes and
+/// metadata of the unmarked field, and holds neither network, extractor, key nor message.
 class Baker {
  public:
   /// The owner must outlive it. @throws ValueError if the message has another length than the owner's, or an
@@ -38,7 +40,7 @@ class Baker {
   Index steps() const { return steps_; }
   /// Steps that the run will have in all; 0 until a timed run knows.
   Index planned() const { return schedule_.total(); }
-  /// Running mean of the distance between baked and marked colours, as a PSNR over the samples by weight.
+  /// Running mean of the distance between what rays of the baked and of the marked field show, as a PSNR.
   double psnr() const;
   /// How strong the mark is in the baked field, dB as options().strength of the owner counts.
   struct Strength {
