@@ -8,7 +8,7 @@ namespace fieldmark::nerf {
 namespace {
 constexpr double kReserve = 0.965;  // of the time: the last part may turn out slower than the pace before it
 constexpr double kEarly = 0.95, kLate = 1.02;  // of the time: a run that would end outside is planned anew
-constexpr double kNewest = 0.014;             // weight of a step in the pace: a memory of some 70 steps
+constexpr double kNewest = 0.014;              // weight of a step in the pace: a memory of some 70 steps
 }  // namespace
 
 Schedule::Schedule(const ScheduleOptions& o) : options_(o), total_(o.steps), fixed_(o.steps > 0) {

@@ -47,7 +47,8 @@ TEST_CASE("evidence_run: three built-in controls, and one for each path that is 
   Run run;
   const std::string photo = TinyJob::get().folder / "photo.png";
   write_png(photo, uniform<float>({20, 30, 3}, 0, 1, 3));
-  const auto tested = test_controls(run.test, run.reader, run.pictures, {photo, run.folder + "/"}, run.context);
+  const auto tested =
+      test_controls(run.test, run.reader, run.pictures, {photo, run.folder + "/"}, run.context);
   REQUIRE(tested.controls.size() == 5);
   CHECK(tested.thumbnails.size() == 5);
   std::string names;

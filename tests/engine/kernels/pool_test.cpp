@@ -67,8 +67,8 @@ TEST_CASE("kernels/pool: sums over pixels and their transpose, for every number 
       const std::int64_t pixels = 131 - channels;
       const auto x = uniform<float>({pixels * channels}, -1, 1, 1);
       const auto mask = uniform<float>({pixels * channels}, -1, 1, 2);
-      std::vector<double> want(static_cast<std::size_t>(channels)), want_part = want, sums(want.size() + 1, 7.),
-          part = sums;
+      std::vector<double> want(static_cast<std::size_t>(channels)), want_part = want;
+      std::vector<double> sums(want.size() + 1, 7.), part = sums;
       FIELDMARK_KERNEL(channel_sums<float>)(x.data.data(), nullptr, pixels, channels, sums.data());
       FIELDMARK_KERNEL(channel_sums<float>)
       (x.data.data(), mask.data.data(), pixels, channels, part.data());

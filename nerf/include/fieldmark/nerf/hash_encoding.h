@@ -33,11 +33,11 @@ inline Index hash_row(const std::array<Index, 3>& corner, Index resolution, std:
 ///   h(x) = (x_0 XOR x_1 p_1 XOR x_2 p_2) mod T                         eq. 4, p_1 = 2654435761, p_2 =
 ///   805459861
 ///
-/// The defaults suit what a minute of training on two cores can fill: more features or rows are slower to look
-/// up and learn less in that time. A level whose (N_l + 1)^3 corners fit in T is indexed directly, without
-/// hashing. Trilinear, so the gradient in x is piecewise constant along an axis and jumps on cell faces, where
-/// the cell above is taken. Outside [0, 1] the outermost cell's form is continued;
-/// NaN is treated as cell 0.
+/// The defaults suit what a minute of training on two cores can fill: more features or rows are slower to
+/// look up and learn less in that time. A level whose (N_l + 1)^3 corners fit in T is indexed directly,
+/// without hashing. Trilinear, so the gradient in x is piecewise constant along an axis and jumps on cell
+/// faces, where the cell above is taken. Outside [0, 1] the outermost cell's form is continued; NaN is
+/// treated as cell 0.
 template <class T>
 class HashEncoding {
  public:
