@@ -149,7 +149,7 @@ nerf::RadianceField CellRunner::base_field(const CellName& name, const Scene& sc
 // The 2-D network, shared by the cells that mark photographs and renders with it, then two fields of marked
 // photographs: four fifths of the budget for the network, the rest for the fields.
 CellRunner::Trained CellRunner::train_hiding(const CellName& name, const Scene& scene,
-                                             std::shared_ptr<const nerf::RadianceField> unmarked) {
+                                             const std::shared_ptr<const nerf::RadianceField>& unmarked) {
   const HidingSystem system = *hiding_system(name.system);
   auto options = hiding_train_options(system.kind);
   options.schedule.seconds = kNetworkPart * options_.budget;

@@ -69,8 +69,8 @@ watermark::Message opposite(const watermark::Message& message) {
   return flipped;
 }
 
-MarkedScene marked_scene(std::shared_ptr<const PictureMarker> marker,
-                         std::array<std::shared_ptr<const nerf::RadianceField>, 2> fields,
+MarkedScene marked_scene(const std::shared_ptr<const PictureMarker>& marker,
+                         const std::array<std::shared_ptr<const nerf::RadianceField>, 2>& fields,
                          const watermark::Message& message) {
   struct Fields {
     explicit Fields(const std::array<std::shared_ptr<const nerf::RadianceField>, 2>& both)
@@ -89,8 +89,8 @@ MarkedScene marked_scene(std::shared_ptr<const PictureMarker> marker,
                           const watermark::Message& sent) { return marker->accuracy(picture, sent); }};
 }
 
-MarkedScene marked_renders(std::shared_ptr<const PictureMarker> marker,
-                           std::shared_ptr<const nerf::RadianceField> field, std::uint64_t seed,
+MarkedScene marked_renders(const std::shared_ptr<const PictureMarker>& marker,
+                           const std::shared_ptr<const nerf::RadianceField>& field, std::uint64_t seed,
                            double strength) {
   const auto renderer = std::make_shared<nerf::Renderer>(*field);
   const Index bits = marker->options().bits;

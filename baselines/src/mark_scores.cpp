@@ -87,9 +87,9 @@ class Scorer {
   void compare_photographs(MarkScores& scores) {
     Mean whole, object, similar, perceptual, unmarked;
     Index i = 0;
-    for (const nerf::View& view :
-         options_.photographs ? std::span(options_.photographs->views) : std::span<const nerf::View>()) {
-      const Tensor<float> photo = nerf::composited(view, options_.photographs->background);
+    const nerf::Dataset none, &photographs = options_.photographs ? *options_.photographs : none;
+    for (const nerf::View& view : photographs.views) {
+      const Tensor<float> photo = nerf::composited(view, photographs.background);
       const Tensor<float> picture = quantize8(marked_.render(view.camera, marked_.message(i++)));
       const nerf::Rendering plain = plain_.render(view.camera);
       whole.add(psnr(picture, photo));

@@ -113,9 +113,11 @@ MessageField::Rays MessageField::march(Tape<float>& tape, const nerf::RadianceFi
                                        const nerf::RenderOptions& options) const {
   const Index rays = end - begin;
   std::vector<float> pixels;
+  pixels.reserve(static_cast<std::size_t>(2 * rays));
   for (Index p = begin; p < end; ++p) {
-    pixels.push_back(static_cast<float>(p % camera.width));
-    pixels.push_back(static_cast<float>(p / camera.width));
+    const Index column = p % camera.width, row = p / camera.width;
+    pixels.push_back(static_cast<float>(column));
+    pixels.push_back(static_cast<float>(row));
   }
   nerf::CubeRays cube;
   cube.resize(rays);

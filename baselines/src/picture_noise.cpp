@@ -58,7 +58,8 @@ Var<T> blurred(Var<T> marked, const CounterRng& rng, std::uint64_t step) {
   std::array<double, kBlurSide> row{};
   double sum = 0;
   for (Index i = 0; i < kBlurSide; ++i) {
-    const double x = static_cast<double>(i - kBlurSide / 2);
+    constexpr Index kMiddle = kBlurSide / 2;
+    const auto x = static_cast<double>(i - kMiddle);
     sum += row[static_cast<std::size_t>(i)] = std::exp(-x * x / (2 * sigma * sigma));
   }
   Tape<T>& tape = marked.tape();

@@ -186,6 +186,7 @@ const EmbedRow* find_row(const std::vector<EmbedRow>& rows, const EmbedVariant& 
 
 void mark_front(std::vector<EmbedRow>& rows, const EmbedMargin& margin) {
   std::vector<std::vector<double>> figures;
+  figures.reserve(rows.size());
   for (const EmbedRow& row : rows) figures.push_back(figures_of(row));
   const auto front = pareto_front(figures, margins_of(margin));
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i].front = front[i];

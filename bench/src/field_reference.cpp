@@ -107,10 +107,10 @@ void FieldReference::trace_piece(const nerf::Camera& camera, std::span<const Ind
                                  double* out) const {
   for (auto* list : {&lane.x, &lane.d, &lane.delta}) list->clear();
   lane.ray_begin.assign(1, 0);
-  for (const Index p : pixels)
-    add_ray(
-        nerf::pixel_ray(camera, static_cast<double>(p % camera.width), static_cast<double>(p / camera.width)),
-        lane);
+  for (const Index p : pixels) {
+    const Index column = p % camera.width, row = p / camera.width;
+    add_ray(nerf::pixel_ray(camera, static_cast<double>(column), static_cast<double>(row)), lane);
+  }
   const auto n = static_cast<Index>(lane.delta.size()), rays = static_cast<Index>(pixels.size());
   const auto background = static_cast<double>(nerf::background_value(source_.background));
   std::fill_n(out, 4 * rays, 0);

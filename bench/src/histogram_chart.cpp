@@ -41,9 +41,11 @@ class Axes {
   std::string ticks() const {
     std::string svg;
     const double step = high_ - low_ > 40 ? 10 : high_ - low_ > 16 ? 4 : 2;
-    for (double v = std::ceil(low_ / step) * step; v <= high_; v += step)
+    for (auto i = std::lround(std::ceil(low_ / step)); static_cast<double>(i) * step <= high_; ++i) {
+      const double v = static_cast<double>(i) * step;
       svg += svg_line(x(v), kTop + kHeight, x(v), kTop + kHeight + 5, "#555") +
              svg_text(x(v), kTop + kHeight + 20, " text-anchor=\"middle\" fill=\"#333\"", short_number(v));
+    }
     for (int decade = 0; decade <= static_cast<int>(decades_); decade += decades_ > 4 ? 2 : 1) {
       const double count = std::pow(10., decade);
       svg += svg_line(kLeft, y(count), kLeft + kAxis, y(count), "#ddd") +

@@ -37,6 +37,7 @@ std::vector<std::string> merged_environment(const std::vector<std::string>& ours
 
 std::vector<char*> pointers(std::vector<std::string>& strings) {
   std::vector<char*> out;
+  out.reserve(strings.size() + 1);
   for (std::string& s : strings) out.push_back(s.data());
   out.push_back(nullptr);
   return out;
@@ -101,7 +102,7 @@ std::string LineProcess::read_line() {
   const double until = now() + limit_seconds_;
   for (;;) {
     if (const auto end = received_.find('\n'); end != std::string::npos) {
-      const std::string line = received_.substr(0, end);
+      std::string line = received_.substr(0, end);
       received_.erase(0, end + 1);
       return line;
     }

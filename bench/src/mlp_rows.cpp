@@ -64,7 +64,7 @@ EngineRow whole_batch(Index depth, Index width, Index samples, const RowOptions&
 EngineRow with_avx2(const std::function<EngineRow()>& row) {
   const Isa before = isa();
   force_isa(Isa::v3);
-  const EngineRow result = row();
+  EngineRow result = row();
   force_isa(before);
   return result;
 }

@@ -38,14 +38,15 @@ double tick_step(double range) {
 // are in sight.
 std::vector<double> x_ticks(const Axes& axes) {
   std::vector<double> ticks;
-  for (double power = std::floor(axes.x0); power <= axes.x1; ++power)
+  for (int power = static_cast<int>(std::floor(axes.x0)); power <= axes.x1; ++power)
     for (const double times : {1.0, 2.0, 5.0})
       if (const double at = std::log10(times) + power; at >= axes.x0 && at <= axes.x1)
         ticks.push_back(times * std::pow(10, power));
   if (ticks.size() >= 3) return ticks;
   const double low = std::pow(10, axes.x0), high = std::pow(10, axes.x1), step = tick_step(high - low);
   ticks.clear();
-  for (double i = std::ceil(low / step); i * step <= high; ++i) ticks.push_back(i * step);
+  for (auto i = std::lround(std::ceil(low / step)); static_cast<double>(i) * step <= high; ++i)
+    ticks.push_back(static_cast<double>(i) * step);
   return ticks;
 }
 
@@ -70,10 +71,13 @@ std::string grid_lines(const Axes& axes) {
     svg += svg_line(axes.x(value), kTop, axes.x(value), foot, "#ddd") +
            svg_text(axes.x(value), foot + 18, " text-anchor=\"middle\" fill=\"#666\"", short_number(value));
   const double step = tick_step(axes.y1 - axes.y0);
-  for (double value = axes.y0; value <= axes.y1 + step / 2; value += step)
+  const auto last = static_cast<int>(std::floor((axes.y1 - axes.y0) / step + 0.5));
+  for (int i = 0; i <= last; ++i) {
+    const double value = axes.y0 + i * step;
     svg += svg_line(kLeft, axes.y(value), kLeft + kWidth, axes.y(value), "#ddd") +
            svg_text(kLeft - 8, axes.y(value) + 4, " text-anchor=\"end\" fill=\"#666\"",
                     short_number(std::abs(value) < step / 2 ? 0 : value));
+  }
   return svg;
 }
 
@@ -154,6 +158,7 @@ std::string scatter_chart(const ScatterText& text, const std::vector<ScatterPoin
                     svg_text(kLeft, kTop - 8, "", text.y) + (text.curves ? "" : polyline(axes, drawn));
   std::vector<std::string> series;
   std::vector<Box> taken;
+  taken.reserve(drawn.size());
   int legend = kLeft;
   for (const auto& p : drawn) taken.push_back({axes.x(p.x) - 5, axes.x(p.x) + 5, axes.y(p.y) + 4});
   if (text.curves) svg += curves(axes, drawn, taken);

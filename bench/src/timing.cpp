@@ -53,7 +53,7 @@ Timing time_calls(const std::function<void()>& body, int runs, double least_seco
   return {median(seconds), *least, *most, median(operations)};
 }
 
-double peak_gflops(int bursts, double least) {
+double peak_gflops(int bursts, double seconds) {
   using namespace kernels;
   constexpr std::int64_t kRounds = 1 << 9;
   const auto run = FIELDMARK_KERNEL(fma_peak_f32);
@@ -63,9 +63,9 @@ double peak_gflops(int bursts, double least) {
     std::vector<double> rate(static_cast<std::size_t>(n));
     parallel_for(n, 1, [&](Index i, Index) {
       const double begin = now();
-      double operations = 0, seconds = 0;
-      while ((seconds = now() - begin) < least) operations += run(kRounds);
-      rate[static_cast<std::size_t>(i)] = operations / seconds;
+      double operations = 0, passed = 0;
+      while ((passed = now() - begin) < seconds) operations += run(kRounds);
+      rate[static_cast<std::size_t>(i)] = operations / passed;
     });
     rates.push_back(std::accumulate(rate.begin(), rate.end(), 0.0) * 1e-9);
   }

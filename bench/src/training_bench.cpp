@@ -115,6 +115,7 @@ std::vector<TrainingRow> run_training_bench(const nerf::Dataset& train, const ne
                                             const std::vector<TrainingVariant>& variants,
                                             const std::function<void(const std::string&, double)>& progress) {
   std::vector<std::unique_ptr<Run>> runs;
+  runs.reserve(variants.size());
   for (const TrainingVariant& v : variants) runs.push_back(std::make_unique<Run>(v, train));
   for (bool more = true; more;) {
     more = false;
@@ -125,6 +126,7 @@ std::vector<TrainingRow> run_training_bench(const nerf::Dataset& train, const ne
     }
   }
   std::vector<TrainingRow> rows;
+  rows.reserve(runs.size());
   for (const auto& run : runs) rows.push_back(run->judged(judge));
   return rows;
 }

@@ -27,7 +27,8 @@ SafetensorsFile random_weights(std::span<const WeightTensor> tensors) {
   SafetensorsFile file;
   for (const WeightTensor& t : tensors) {
     const bool matrix = t.shape.rank() == 4 && t.shape[1] > 0 && t.shape[0] > 1;
-    const double size = matrix ? std::sqrt(6 / static_cast<double>(t.shape.size() / t.shape[0])) : 0.5;
+    const Index inputs = matrix ? t.shape.size() / t.shape[0] : 0;
+    const double size = matrix ? std::sqrt(6 / static_cast<double>(inputs)) : 0.5;
     const double low = t.name.starts_with("lin") || t.name == "scaling.scale" ? size / 2 : -size;
     const auto values = numbers(t.shape, low, size, file.tensors.size());
     file.add(t.name, t.shape,

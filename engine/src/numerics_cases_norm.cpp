@@ -70,7 +70,7 @@ void compare_group_norm(const std::vector<Tensor<T>>& in, WorstError& error) {
   const auto g = scattered<T>(s, -1, 1, 4);
   const auto got = values_and_gradients<T>(
       [](auto&, const auto& v) { return group_norm(v[0], v[1], v[2], {.groups = kGroups}); }, in,
-      [&](Shape) { return g; });
+      [&](Shape) -> const Tensor<T>& { return g; });
   const Index image = s[1] * s[2] * s[3], width = s[3] / kGroups;
   compare_all(got,
               exact_norm<T>(in, g, s[0] * kGroups,
@@ -83,7 +83,7 @@ void compare_batch_norm(const std::vector<Tensor<T>>& in, WorstError& error) {
   const Shape s = in[0].shape;
   const auto g = scattered<T>(s, -1, 1, 4);
   const auto got = values_and_gradients<T>([](auto&, const auto& v) { return batch_norm(v[0], v[1], v[2]); },
-                                           in, [&](Shape) { return g; });
+                                           in, [&](Shape) -> const Tensor<T>& { return g; });
   compare_all(got, exact_norm<T>(in, g, s[3], [=](Index i) { return at(i % s[3]); }), error);
 }
 

@@ -43,7 +43,7 @@ template <class T>
 void compare_cancelling_sum(WorstError& error) {
   Tensor<T> x({kPixels});
   for (Index i = 0; i < kPixels; ++i) x[i] = i % 2 == 0 ? T(1e6) : T(0.0625 - 1e6);
-  error.equal(one_value<T>([](auto v) { return sum(v); }, x), Real{0.0625} * (kPixels / 2));
+  error.equal(one_value<T>([](auto v) { return sum(v); }, x), Real{0.0625} * Real{kPixels} / 2);
 }
 
 // All roundings go to the same side.
@@ -63,7 +63,7 @@ void compare_long_gradients(WorstError& error) {
   const auto g = scattered<T>({rows, out}, -1, 1, 4);
   const auto got =
       values_and_gradients<T>([](auto&, const auto& v) { return dense(v[0], v[1], v[2], Activation::none); },
-                              inputs, [&](Shape) { return g; });
+                              inputs, [&](Shape) -> const Tensor<T>& { return g; });
   for (Index j = 0; j < out; ++j)
     for (Index k = 0; k <= in; ++k) {
       Real sum = 0, size = 0;

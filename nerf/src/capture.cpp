@@ -86,7 +86,7 @@ std::vector<fs::path> pictures_in(const fs::path& folder) {
 
 fs::path picture_file(const Shot& shot) {
   for (const char* extension : {"", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"}) {
-    const fs::path file = shot.picture.string() + extension;
+    fs::path file = shot.picture.string() + extension;
     std::error_code ignored;
     if (fs::is_regular_file(file, ignored)) return file;
   }

@@ -65,8 +65,8 @@ void HashEncoding<T>::encode(std::span<const T> table, const T* x, Index n, T* d
 }
 
 template <class T>
-void HashEncoding<T>::encode(const std::uint16_t* table, const T* x, Index n, T* density,
-                             T* colour) const requires std::is_same_v<T, float> {
+void HashEncoding<T>::encode(const std::uint16_t* table, const float* x, Index n, float* density,
+                             float* colour) const requires std::is_same_v<T, float> {
   using namespace kernels;
   const auto forward = FIELDMARK_KERNEL(hash_forward_bf16);
   parallel_for(n, kGrain, [&](Index begin, Index end) {

@@ -89,16 +89,16 @@ std::string Lens::text() const {
          short_number(p2);
 }
 
-Vec2 Lens::distorted(const Vec2& q) const {
-  const double x = q[0], y = q[1], r2 = x * x + y * y, a = 1 + r2 * (k1 + r2 * k2);
+Vec2 Lens::distorted(const Vec2& point) const {
+  const double x = point[0], y = point[1], r2 = x * x + y * y, a = 1 + r2 * (k1 + r2 * k2);
   return {x * a + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * a + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y};
 }
 
-bool Lens::is_regular(const Vec2& q) const {
+bool Lens::is_regular(const Vec2& point) const {
   constexpr int kPlaces = 32;
   for (int i = 1; i <= kPlaces; ++i) {
     const double t = static_cast<double>(i) / kPlaces;
-    const auto m = derivative(*this, {t * q[0], t * q[1]});
+    const auto m = derivative(*this, {t * point[0], t * point[1]});
     // Both eigenvalues: twice folded over is folded over.
     if (!(determinant(m) > 0 && m[0] + m[2] > 0)) return false;
   }

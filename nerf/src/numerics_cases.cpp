@@ -21,8 +21,9 @@ void compare_frequency(double far, WorstError& error) {
   const Index n = 300;
   const auto x = scattered<T>({n, 1}, far, far + std::max(1.0, far / 100), 2),
              g = scattered<T>({n, 2 * bands}, -1, 1, 3);
-  const auto got = values_and_gradients<T>(
-      [](auto&, const auto& v) { return frequency_encoding(v[0], bands); }, {x}, [&](Shape) { return g; });
+  const auto got =
+      values_and_gradients<T>([](auto&, const auto& v) { return frequency_encoding(v[0], bands); }, {x},
+                              [&](Shape) -> const Tensor<T>& { return g; });
   for (Index i = 0; i < n; ++i) {
     Real slope = 0, size = 0;
     for (Index b = 0; b < bands; ++b) {
@@ -56,7 +57,7 @@ struct Hash {
         [&](auto&, const auto& v) {
           return encoding(Params<T>(store), v[0], HashEncoding<T>::Part::density);
         },
-        {x}, [&](Shape) { return g; });
+        {x}, [&](Shape) -> const Tensor<T>& { return g; });
   }
 };
 

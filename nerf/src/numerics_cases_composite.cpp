@@ -53,7 +53,7 @@ void compare_ray(const Tensor<T>& sigma, const Tensor<T>& delta, WorstError& err
   const std::vector<Index> ray_begin{0, sigma.size()};
   const auto got = values_and_gradients<T>(
       [&](auto&, const auto& v) { return composite(v[0], v[1], v[2], std::span<const Index>(ray_begin)); },
-      {sigma, rgb, delta}, [&](Shape) { return g; });
+      {sigma, rgb, delta}, [&](Shape) -> const Tensor<T>& { return g; });
   const Exact want = exact_ray(sigma, rgb, delta, g.data.data());
   for (std::size_t k = 0; k < 4; ++k)
     error.compare(got[0][k], want.out[k], std::max<Real>(want.out[3], std::numeric_limits<T>::min()));

@@ -128,7 +128,7 @@ class Bench {
   template <class F>
   AttackRow add(const std::string& name, const F& measure) {
     now_ = name;
-    const AttackRow row = measure();
+    AttackRow row = measure();
     char line[200], informed[60] = "";
     if (meter_.geometry_views() > 0)
       std::snprintf(informed, sizeof informed, "  geometry %6.2f%%  chosen %6.2f%%",

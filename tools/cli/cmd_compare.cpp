@@ -90,7 +90,7 @@ int compare(const Options& options, const Networks& networks, Context& context) 
 
 std::filesystem::path reference_folder(const Options& options) {
   if (!options.paths.empty()) return options.paths[0];
-  const auto folder = shared_data("lpips_reference");
+  auto folder = shared_data("lpips_reference");
   if (folder.empty()) throw UsageError("--reference: needs a folder, or FIELDMARK_DATA");
   return folder;
 }

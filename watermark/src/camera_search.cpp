@@ -89,8 +89,9 @@ CameraSearch::CameraSearch(const Owner& owner, const CameraSearchOptions& option
         SeenCell& seen = view.seen[at(entry)];
         const auto w = static_cast<double>(v.weight[at(k)]);
         weight[at(entry)] += w;
+        const Index row = p / v.width;
         seen.x += w * (static_cast<double>(p % v.width) + 0.5);
-        seen.y += w * (static_cast<double>(p / v.width) + 0.5);
+        seen.y += w * (static_cast<double>(row) + 0.5);
         for (std::size_t a = 0; a < 3; ++a) seen.point[a] += w * static_cast<double>(x[a]);
       }
     for (std::size_t e = 0; e < weight.size(); ++e) {
@@ -230,8 +231,9 @@ std::vector<nerf::Camera> CameraSearch::find(const SeenPlaces& places, Index hei
   std::vector<Match> matches;
   for (Index p = 0; p < places.height * places.width; ++p) {
     if (places.cell[at(p)] < 0) continue;
+    const Index row = p / places.width;
     const double x = (static_cast<double>(p % places.width) + 0.5) / static_cast<double>(places.width),
-                 y = (static_cast<double>(p / places.width) + 0.5) / static_cast<double>(places.height);
+                 y = (static_cast<double>(row) + 0.5) / static_cast<double>(places.height);
     matches.push_back(
         {places.cell[at(p)],
          {places.window.x + x * places.window.width, places.window.y + y * places.window.height},

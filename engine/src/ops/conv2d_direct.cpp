@@ -71,8 +71,8 @@ const T* direct_convolve(Tape<T>& tape, const ConvGeometry& g, const Convolution
 // dW[u, (v, c), o] = sum over pixels of x[pixel + (u, v), c] dY[pixel, o]: a few rows of dY at a time are
 // packed once and multiplied with the input rows that each u shifts to.
 template <class T>
-void direct_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* padded, const T* dy, const T* mask,
-                            T* dw) {
+void direct_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* bordered, const T* dy,
+                            const T* mask, T* dw) {
   const Index size = g.k * g.k * g.c * g.o,
               together = std::max<Index>(1, kDepth / std::max<Index>(g.out_w(), 1));
   const Index pixels = g.pixels(), panel = panel_width<T>(g.o);
@@ -88,7 +88,7 @@ void direct_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* padde
              .n = g.o,
              .k = g.out_w(),
              .segments = count,
-             .a = padded + (image * padded_h(g) + i * g.stride + u) * padded_w(g) * g.c,
+             .a = bordered + (image * padded_h(g) + i * g.stride + u) * padded_w(g) * g.c,
              .a_row = 1,
              .a_col = g.stride * g.c,
              .a_segment = g.stride * padded_w(g) * g.c,

@@ -60,7 +60,7 @@ class CellRunner {
                                     const CellName& name, double seconds);
   Trained train(const CellName& name, const Scene& scene);
   Trained train_hiding(const CellName& name, const Scene& scene,
-                       std::shared_ptr<const nerf::RadianceField> unmarked);
+                       const std::shared_ptr<const nerf::RadianceField>& unmarked);
   void read_variants(const CellName& name, const Trained& trained,
                      std::map<std::string, double>& under) const;
   bool tell(const std::string& what, double part, const std::string& note) const;

@@ -50,15 +50,15 @@ OwnScores own_scores(const PictureMarker& marker, const CropSource& photographs,
 /// Fields trained on marked photographs, one for a message and one for the message with every bit flipped,
 /// shown in turns: a reader that says the same of every picture is right on half of the bits exactly.
 /// @param fields  of `message` and of its opposite()
-MarkedScene marked_scene(std::shared_ptr<const PictureMarker> marker,
-                         std::array<std::shared_ptr<const nerf::RadianceField>, 2> fields,
+MarkedScene marked_scene(const std::shared_ptr<const PictureMarker>& marker,
+                         const std::array<std::shared_ptr<const nerf::RadianceField>, 2>& fields,
                          const watermark::Message& message);
 /// The message with every bit flipped.
 watermark::Message opposite(const watermark::Message& message);
 
 /// Renders of an unmarked field, each marked with a message of its own after it was rendered.
-MarkedScene marked_renders(std::shared_ptr<const PictureMarker> marker,
-                           std::shared_ptr<const nerf::RadianceField> field, std::uint64_t seed,
+MarkedScene marked_renders(const std::shared_ptr<const PictureMarker>& marker,
+                           const std::shared_ptr<const nerf::RadianceField>& field, std::uint64_t seed,
                            double strength = kHidingStrength);
 
 }  // namespace fieldmark::baselines

@@ -78,6 +78,7 @@ std::vector<std::vector<T>> values_and_gradients(const F& f, const std::vector<T
                                                  const C& cotangent) {
   Tape<T> tape;
   std::vector<Tensor<T>> grads;
+  grads.reserve(inputs.size());
   for (const auto& x : inputs) grads.emplace_back(x.shape);
   std::vector<Var<T>> vars;
   for (std::size_t k = 0; k < inputs.size(); ++k) vars.push_back(tape.leaf(inputs[k], grads[k]));

@@ -57,8 +57,8 @@ class HashEncoding {
   /// are written
   void encode(std::span<const T> table, const T* x, Index n, T* density, T* colour) const;
   /// The same from a table rounded to bf16 (PackedWeights::table), half as large. float only.
-  void encode(const std::uint16_t* table, const T* x, Index n, T* density,
-              T* colour) const requires std::is_same_v<T, float>;
+  void encode(const std::uint16_t* table, const float* x, Index n, float* density,
+              float* colour) const requires std::is_same_v<T, float>;
   /// Adds to `grad` [rows, 2 F] what `encode` of x would pass back from ddensity, dcolour [n, F L] (null:
   /// zeros).
   /// @param scratch  [n, 2 F L], overwritten

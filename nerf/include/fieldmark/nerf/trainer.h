@@ -116,9 +116,9 @@ class Trainer {
   Index tile_of(Index place) const;
   void prefer_hard(Index first, Index count, std::span<Index> place) const;
   Index rays_along_pixel() const;
-  void choose_rays(Index first, Index rays, Shard& shard) const;
-  void aim(Index first, Shard& shard) const;
-  void note_errors(Var<float> rays, Shard& shard) const;
+  void choose_rays(Index first, Index rays, Shard& c) const;
+  void aim(Index first, Shard& c) const;
+  void note_errors(Var<float> rays, Shard& c) const;
   double step_hash();
   double run_chunk(Index index, Shard& shard, Tape<float>& tape, float* grads);
   Index mlp_rays() const;
