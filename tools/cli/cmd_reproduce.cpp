@@ -98,9 +98,9 @@ double seconds_of_a_cell(const std::vector<baselines::Cell>& cells, double budge
 std::filesystem::path write_page(const Options& options, const Context& context) {
   std::filesystem::path folder = std::filesystem::path(options.cells).lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();  // "cells/"
-  const std::filesystem::path page = context.options().report.empty()
-                                         ? folder.parent_path() / "paper.md"
-                                         : std::filesystem::path(context.options().report);
+  std::filesystem::path page = context.options().report.empty()
+                                   ? folder.parent_path() / "paper.md"
+                                   : std::filesystem::path(context.options().report);
   const auto cells = baselines::load_cells(folder);
   const auto beside = [&](const std::string& name) { return page.parent_path() / name; };
   std::vector<std::string> shown;

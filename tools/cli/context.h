@@ -53,7 +53,7 @@ class Context {
   /// Since the command was called.
   double seconds() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
   /// Writes the results to --json and --report. @throws IoError if a file cannot be written
-  void result(const Json& json);
+  void result(const Json& found);
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -57,6 +57,7 @@ Json score_json(const EvidenceScore& s) {
 std::vector<EvidencePicture> score_pictures(const KeyTest& test,
                                             const std::vector<PictureEvidence>& pictures) {
   std::vector<EvidencePicture> scores;
+  scores.reserve(pictures.size());
   for (const auto& p : pictures)
     scores.push_back({file_name(p.image), p.sha256, p.width, p.height, test(p.cells)});
   return scores;

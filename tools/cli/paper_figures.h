@@ -11,7 +11,7 @@ namespace fieldmark::cli {
 /// SVG files by name: accuracy against length, severity curves and, against seconds, the learning curves of
 /// the cells of 16 bits, see kept_curve(), those of ablations in a figure of their own. All of the scene with
 /// most cells, on the hash field. Figures without a point are left out.
-std::map<std::string, std::string> paper_figures(const std::vector<baselines::Cell>& cells);
+std::map<std::string, std::string> paper_figures(const std::vector<baselines::Cell>& measured);
 
 /// A picture of the page.
 struct PaperSheet {

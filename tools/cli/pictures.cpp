@@ -68,7 +68,7 @@ std::vector<std::filesystem::path> list_pictures(const std::vector<std::string>&
 }
 
 Tensor<float> read_rgb(const std::filesystem::path& path, float background) {
-  const Tensor<float> image = read_image(path);
+  Tensor<float> image = read_image(path);
   const Index channels = image.shape[2], pixels = image.shape[0] * image.shape[1];
   if (channels == 3) return image;
   const bool has_alpha = channels % 2 == 0;

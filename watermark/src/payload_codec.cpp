@@ -145,7 +145,7 @@ std::optional<Payload> PayloadCodec::payload_of(const Code& code, std::span<cons
 std::optional<Payload> PayloadCodec::payload(const Message& message) const {
   check_size("PayloadCodec::payload", message.size(), raw_bits_);
   for (const Code& code : codes_) {
-    const auto found = payload_of(code, message.bits);
+    auto found = payload_of(code, message.bits);
     if (found && encode(*found) == message) return found;
   }
   return std::nullopt;

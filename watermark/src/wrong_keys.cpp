@@ -27,8 +27,8 @@ void add_statistic(double t, WrongKeyCounts& to) {
   const double p = keyed_p_value(t);
   for (std::size_t i = 0; i < to.counts.size(); ++i) to.counts[i] += p <= kThresholdValues[i];
   to.least_p = std::min(to.least_p, p);
-  constexpr int kPerUnit = WrongKeyCounts::kBinsPerUnit, kBins = WrongKeyCounts::kBins;
-  ++to.histogram[static_cast<std::size_t>(std::clamp(std::floor(t * kPerUnit) + kBins / 2, 0., kBins - 1.))];
+  constexpr int kPerUnit = WrongKeyCounts::kBinsPerUnit, kBins = WrongKeyCounts::kBins, kZero = kBins / 2;
+  ++to.histogram[static_cast<std::size_t>(std::clamp(std::floor(t * kPerUnit) + kZero, 0., kBins - 1.))];
   ++to.n;
 }
 
