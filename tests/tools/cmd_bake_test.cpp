@@ -60,9 +60,10 @@ TEST_CASE("bake makes the mark fainter where it is asked to", "[bake]") {
       json["notes"][0].get<std::string>(),
       Contains("the file's colours took only " + std::to_string(std::lround(taken)) + "% of the mark"));
   CHECK(json["scale"] == watermark::Baker::kLargestScale);
-  // Twice as strong. Near 49 dB rounding to 8 bits and clipping count: 5.25 dB have been seen, for the job's
-  // owner is as good as the machine's seconds made it.
-  CHECK(json["strength"].get<double>() == Approx(learnt - 6).margin(1));
+  // Twice the difference, four times its square. PSNR is of pictures in bytes: two roundings add 1/12 of a
+  // step squared each, and the owner's random key decides how much that is beside the mark.
+  const double rounding = 2 / 12. / (255 * 255), square = std::pow(10.0, -learnt / 10) - rounding;
+  CHECK(json["strength"].get<double>() == Approx(-10 * std::log10(4 * square + rounding)).margin(0.25));
   const double strong = distance("30"), faint = distance("50");
   CHECK(faint - strong == Approx(20).margin(1));
   const auto r = run_command({"bake", "--owner", job.owner, "--message", "5", "--out",
