@@ -1,0 +1,129 @@
+#include <fieldmark/engine/files.h>
+#include <fieldmark/engine/isa.h>
+#include <fieldmark/watermark/digest.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <iostream>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "regression/bytes_of_version_0_1.h"
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+#include "tools/run_command.h"
+#include "watermark/test_key.h"
+
+// Every file that the command writes for a fixed seed, key and number of steps has the bytes that version 0.1
+// wrote, for one thread and for two. The hashes were recorded at commit 07c747b; a change that is meant to
+// change results says so and records them anew from the test's own output.
+using namespace fieldmark;
+
+namespace {
+
+using Hashes = std::map<std::string, std::string>;
+
+void run(std::vector<std::string> words, const std::string& threads) {
+  words.insert(words.end(), {"--threads", threads, "--seed", "7"});
+  const Outcome outcome = run_command(words);
+  INFO(outcome.err);
+  REQUIRE(outcome.code == 0);
+}
+
+// Of all files in a folder, by name.
+std::string folder_hash(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> paths;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) paths.push_back(entry.path());
+  std::sort(paths.begin(), paths.end());
+  std::string lines;
+  for (const auto& path : paths)
+    lines += path.filename().string() + " " + watermark::sha256_file_hex(path) + "\n";
+  return watermark::sha256_hex(lines);
+}
+
+// Of the logits of every bit in every view: the detector's reading, digit for digit.
+std::string logits_hash(const std::string& json_file) {
+  const auto json = nlohmann::json::parse(read_text(json_file));
+  std::string numbers;
+  for (const auto& view : json.at("views")) numbers += view.at("logits").dump() + "\n";
+  return watermark::sha256_hex(numbers);
+}
+
+// What one preset of `embed` writes, marks and reads.
+void add_mark(Hashes& hashes, const TemporaryFolder& folder, const std::string& preset,
+              const std::string& threads) {
+  const std::string owner = folder / (preset + "_owner.fm"), baked = folder / (preset + "_baked.fm"),
+                    views = folder / (preset + "_views"), read = folder / (preset + "_read.json");
+  std::vector<std::string> embed{"embed",
+                                 "--field",
+                                 folder / "hash.fm",
+                                 "--out",
+                                 owner,
+                                 "--key",
+                                 folder / "key",
+                                 "--bits",
+                                 "8",
+                                 "--preset",
+                                 preset,
+                                 "--reader-size",
+                                 "32",
+                                 "--steps",
+                                 "6",
+                                 "--views",
+                                 "8",
+                                 "--measured-views",
+                                 "1"};
+  if (preset == "fast") embed.insert(embed.end(), {"--cells", "6"});
+  run(embed, threads);
+  hashes[preset + " owner"] = watermark::sha256_file_hex(owner);
+  run({"bake", "--owner", owner, "--message", "a6", "--out", baked, "--steps", "4"}, threads);
+  hashes[preset + " baked field"] = watermark::sha256_file_hex(baked);
+  run({"render", "--field", baked, "--out", views, "--count", "2", "--size", "32"}, threads);
+  hashes[preset + " renders"] = folder_hash(views);
+  run({"extract", "--owner", owner, views, "--json", read}, threads);
+  hashes[preset + " logits"] = logits_hash(read);
+}
+
+Hashes written(const std::string& threads) {
+  const TemporaryFolder folder;
+  Hashes hashes;
+  run({"scene", "--out", folder / "scene", "--kind", "sphere", "--size", "16", "--views", "12"}, threads);
+  hashes["scene"] = folder_hash(std::filesystem::path(folder / "scene") / "train");
+  run({"train", "--data", folder / "scene", "--out", folder / "hash.fm", "--steps", "60"}, threads);
+  hashes["hash field"] = watermark::sha256_file_hex(folder / "hash.fm");
+  run({"train", "--data", folder / "scene", "--out", folder / "mlp.fm", "--preset", "mlp", "--steps", "4"},
+      threads);
+  hashes["mlp field"] = watermark::sha256_file_hex(folder / "mlp.fm");
+  watermark::save_key(folder / "key", test_key(5));
+  for (const char* preset : {"fast", "paper", "code"}) add_mark(hashes, folder, preset, threads);
+  return hashes;
+}
+
+void check_bytes(Isa level, const Hashes& expected, std::initializer_list<const char*> thread_counts) {
+  if (isa_supported() < level) {
+    std::cout << "SKIPPED: bytes of version 0.1 needs a CPU with another instruction set\n";
+    return;
+  }
+  const Isa before = isa();
+  force_isa(level);
+  for (const char* threads : thread_counts) {
+    const Hashes got = written(threads);
+    INFO(isa_name() << ", " << threads << " threads");
+    for (const auto& [name, hash] : got) {
+      INFO("{\"" << name << "\", \"" << hash << "\"},");
+      const auto found = expected.find(name);
+      CHECK((found != expected.end() && found->second == hash));
+    }
+    CHECK(got.size() == expected.size());
+  }
+  force_isa(before);
+}
+
+}  // namespace
+
+TEST_CASE("bytes: all files are those of version 0.1 on x86-64-v2") { check_bytes(Isa::v2, kBytesV2, {"2"}); }
+
+TEST_CASE("bytes: all files are those of version 0.1 on AVX2, with one thread and with two") {
+  check_bytes(Isa::v3, kBytesV3, {"1", "2"});
+}
