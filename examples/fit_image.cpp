@@ -1,11 +1,11 @@
-// Fits a picture with a small network: colour as a function of place. Public headers only.
-//   fit_image [PICTURE.png [RESULT.png]]      without a picture: a pattern of its own
+// Fits an image with a small network: colour as a function of place. Public headers only.
+//   fit_image [PICTURE.png [RESULT.png]]      without an image: a pattern of its own
 #include <fieldmark/engine/adam.h>
-#include <fieldmark/engine/image.h>
-#include <fieldmark/engine/metrics.h>
 #include <fieldmark/engine/nn/dense.h>
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/loss.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/metrics.h>
 #include <fieldmark/nerf/frequency_encoding.h>
 
 #include <cmath>

@@ -1,6 +1,6 @@
 #include <fieldmark/baselines/cell.h>
-#include <fieldmark/engine/error.h>
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/error.h>
+#include <fieldmark/core/files.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -84,7 +84,7 @@ std::string format_cell(const Cell& c) {
                {"spread", number(c.spread)},
                {"own_2d_accuracy", number(c.own_2d_accuracy)},
                {"psnr_base", number(c.psnr_base)},
-               {"psnr_base_object", number(c.psnr_base_object)},
+               {"psnr_base_foreground", number(c.psnr_base_foreground)},
                {"psnr_photo", number(c.psnr_photo)},
                {"ssim", number(c.ssim)},
                {"lpips", number(c.lpips)},
@@ -104,7 +104,7 @@ Cell parse_cell(std::string_view text, std::string_view place) {
             .spread = read_number(j.at("spread")),
             .own_2d_accuracy = read_number(j.at("own_2d_accuracy")),
             .psnr_base = read_number(j.at("psnr_base")),
-            .psnr_base_object = read_number(j.at("psnr_base_object")),
+            .psnr_base_foreground = read_number(j.at("psnr_base_foreground")),
             .psnr_photo = read_number(j.at("psnr_photo")),
             .ssim = read_number(j.at("ssim")),
             .lpips = read_number(j.at("lpips")),

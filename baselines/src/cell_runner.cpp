@@ -1,13 +1,13 @@
 #include <fieldmark/baselines/cell_runner.h>
-#include <fieldmark/baselines/hiding_system.h>
-#include <fieldmark/baselines/hiding_trainer.h>
-#include <fieldmark/baselines/owner_system.h>
 #include <fieldmark/baselines/paper_plan.h>
-#include <fieldmark/engine/files.h>
-#include <fieldmark/engine/image.h>
+#include <fieldmark/core/files.h>
+#include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/analytic_scene.h>
 #include <fieldmark/nerf/camera_set.h>
 #include <fieldmark/nerf/trainer.h>
+#include "hiding_system.h"
+#include "hiding_trainer.h"
+#include "owner_system.h"
 
 #include <algorithm>
 #include <cmath>
@@ -25,7 +25,7 @@ constexpr double kMlpViewsASecond = 0.2;  // of an mlp field, where making one t
 constexpr Index kFewestViews = 8, kMostViews = 200;
 constexpr double kNetworkPart = 0.8;    // of the budget, for a 2-D network; the rest for fields
 constexpr Index kNetworkChannels = 32;  // a quarter of the work of a step with the authors' 64
-constexpr Index kOwnPictures = 200, kOwnSize = 64, kFixedMessage = 5;
+constexpr Index kOwnImages = 200, kOwnSize = 64, kFixedMessage = 5;
 constexpr Index kWeightsBits = 8;  // as the paper's noise of 0.01 on the weights
 constexpr double kWeightsNoise = 0.01;
 constexpr std::uint64_t kCamerasSeed = 1000;  // views that are measured are not those learnt from
@@ -153,7 +153,7 @@ CellRunner::Trained CellRunner::train_hiding(const CellName& name, const Scene& 
   const HidingSystem system = *hiding_system(name.system);
   auto options = hiding_train_options(system.kind);
   options.schedule.seconds = kNetworkPart * options_.budget;
-  const auto marker = std::make_shared<PictureMarker>(
+  const auto marker = std::make_shared<ImageMarker>(
       system.kind, HidingOptions{.bits = name.bits, .channels = kNetworkChannels, .tile = options.crop},
       name.seed);
   const CropSource crops(photographs_of(scene.train), name.seed);
@@ -175,8 +175,8 @@ CellRunner::Trained CellRunner::train_hiding(const CellName& name, const Scene& 
                                .checkpoint = trained.checkpoint},
                               options_.progress);
   trained.steps = trainer.steps();
-  const OwnScores own = own_scores(*marker, CropSource(photographs_of(scene.test), name.seed), kOwnPictures,
-                                   kOwnSize, name.seed);
+  const OwnScores own =
+      own_scores(*marker, CropSource(photographs_of(scene.test), name.seed), kOwnImages, kOwnSize, name.seed);
   trained.own_2d_accuracy = own.accuracy;
   trained.more = {{"own_2d_psnr", own.psnr}, {"network_seconds", trained.seconds}};
   if (system.renders) {
@@ -223,7 +223,7 @@ void CellRunner::read_variants(const CellName& name, const Trained& trained,
                                std::map<std::string, double>& under) const {
   if (!trained.owner) return;
   const auto read = [&](const std::string& what, const MarkedScene& marked,
-                        nerf::CameraSet cameras = nerf::CameraSet::near) {
+                        nerf::CameraSet cameras = nerf::CameraSet::novel) {
     if (!tell(name.stem() + ": " + what, 0, ""))
       throw Stopped(name.stem() + ": stopped while it was measured");
     under[what] = score_mark(*trained.unmarked, marked,
@@ -256,7 +256,7 @@ MeasuredCell CellRunner::run(const CellName& name) {
   const auto& o = options_;
   MarkScores s =
       score_mark(*trained.unmarked, trained.marked,
-                 {.cameras = nerf::make_cameras(trained.unmarked->cameras, nerf::CameraSet::near, o.views, 0,
+                 {.cameras = nerf::make_cameras(trained.unmarked->cameras, nerf::CameraSet::novel, o.views, 0,
                                                 name.seed + kCamerasSeed),
                   .under = name.bits == 16 ? o.under : std::vector<std::string>{},
                   .under_views = o.under_views,
@@ -291,7 +291,7 @@ MeasuredCell CellRunner::run(const CellName& name) {
             .spread = s.spread,
             .own_2d_accuracy = trained.own_2d_accuracy,
             .psnr_base = s.psnr_base,
-            .psnr_base_object = s.psnr_base_object,
+            .psnr_base_foreground = s.psnr_base_foreground,
             .psnr_photo = s.psnr_photo,
             .ssim = s.ssim_photo,
             .lpips = s.lpips_photo,
@@ -299,7 +299,7 @@ MeasuredCell CellRunner::run(const CellName& name) {
             .commit = o.commit,
             .more = more};
   keep_curve(cell, run_curve(trained.checkpoint));
-  return {.cell = cell, .picture = tile(pair, 2, 0)};
+  return {.cell = cell, .image = tile(pair, 2, 0)};
 }
 
 void save_measured(const std::filesystem::path& folder, const MeasuredCell& measured) {
@@ -307,7 +307,7 @@ void save_measured(const std::filesystem::path& folder, const MeasuredCell& meas
   std::filesystem::create_directories(folder, failed);
   if (failed) throw IoError(folder.string() + ": cannot make the folder: " + failed.message());
   const std::string stem = cell_path(folder, measured.cell.name).string();
-  write_png(stem + ".png", measured.picture);
+  write_png(stem + ".png", measured.image);
   save_cell(folder, measured.cell);
 }
 

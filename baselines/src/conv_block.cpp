@@ -1,4 +1,4 @@
-#include <fieldmark/baselines/conv_block.h>
+#include "conv_block.h"
 
 #include <string>
 

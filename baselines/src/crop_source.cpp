@@ -1,5 +1,5 @@
-#include <fieldmark/baselines/crop_source.h>
-#include <fieldmark/engine/error.h>
+#include "crop_source.h"
+#include <fieldmark/engine/shape_checks.h>
 
 #include <algorithm>
 #include <array>
@@ -28,23 +28,23 @@ float value_noise(const CounterRng& rng, std::uint64_t index, Index octave, Inde
 
 }  // namespace
 
-bool shows_something(const Tensor<float>& picture) {
+bool shows_something(const Tensor<float>& image) {
   double sum = 0, squares = 0;
-  for (const float v : picture.data) {
+  for (const float v : image.data) {
     sum += static_cast<double>(v);
     squares += static_cast<double>(v) * static_cast<double>(v);
   }
-  const double n = static_cast<double>(picture.size()), mean = sum / n;
+  const double n = static_cast<double>(image.size()), mean = sum / n;
   return squares / n - mean * mean > kLeastDeviation * kLeastDeviation;
 }
 
-Tensor<float> window_of(const Tensor<float>& picture, Index top, Index left, const Shape& shape) {
-  const Index h = picture.shape[0], w = picture.shape[1];
+Tensor<float> window_of(const Tensor<float>& image, Index top, Index left, const Shape& shape) {
+  const Index h = image.shape[0], w = image.shape[1];
   Tensor<float> window(shape);
   for (Index y = 0; y < shape[0]; ++y)
     for (Index x = 0; x < shape[1]; ++x) {
       const Index row = std::min(top + y, h - 1), column = std::min(left + x, w - 1);
-      std::copy_n(picture.data.begin() + (row * w + column) * 3, 3,
+      std::copy_n(image.data.begin() + (row * w + column) * 3, 3,
                   window.data.begin() + (y * shape[1] + x) * 3);
     }
   return window;
@@ -54,7 +54,7 @@ Tensor<float> generated_texture(Index size, const CounterRng& rng, std::uint64_t
   if (size < 1) throw ValueError("[generated_texture] size must be at least 1, got " + std::to_string(size));
   const auto dark = rng.uniform4(index, 0), light = rng.uniform4(index, 1), shape = rng.uniform4(index, 2);
   const Index first = 2 + static_cast<Index>(shape[0] * 5);
-  Tensor<float> picture({size, size, 3});
+  Tensor<float> image({size, size, 3});
   for (Index y = 0; y < size; ++y)
     for (Index x = 0; x < size; ++x) {
       const float u = (static_cast<float>(x) + 0.5f) / static_cast<float>(size),
@@ -67,10 +67,10 @@ Tensor<float> generated_texture(Index size, const CounterRng& rng, std::uint64_t
       mix = std::clamp(1.6f * (mix / weight - 0.5f) + 0.5f + 0.6f * (shape[2] - 0.5f) * (u - v), 0.f, 1.f);
       for (Index c = 0; c < 3; ++c) {
         const auto channel = static_cast<std::size_t>(c);
-        picture[(y * size + x) * 3 + c] = dark[channel] + mix * (light[channel] - dark[channel]);
+        image[(y * size + x) * 3 + c] = dark[channel] + mix * (light[channel] - dark[channel]);
       }
     }
-  return picture;
+  return image;
 }
 
 CropSource::CropSource(std::vector<Tensor<float>> photographs, std::uint64_t seed)
@@ -96,7 +96,7 @@ Tensor<float> CropSource::photograph(Index size, std::uint64_t index) const {
   return window;
 }
 
-Tensor<float> CropSource::picture(Index size, std::uint64_t index) const {
+Tensor<float> CropSource::image(Index size, std::uint64_t index) const {
   if (photographs_.empty() || rng_.uniform(index, 99) < 0.5f) return generated_texture(size, rng_, index);
   return photograph(size, index);
 }

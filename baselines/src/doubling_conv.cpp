@@ -1,5 +1,6 @@
-#include <fieldmark/baselines/doubling_conv.h>
+#include "doubling_conv.h"
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include <algorithm>
 #include <string>
@@ -8,7 +9,7 @@ namespace fieldmark::baselines {
 
 template <class T>
 Var<T> depth_to_space(Var<T> x) {
-  check_rank("depth_to_space", "x", x.shape(), 4, "[pictures, height, width, 4 channels]");
+  check_rank("depth_to_space", "x", x.shape(), 4, "[images, height, width, 4 channels]");
   const Shape s = x.shape();
   if (s[3] % 4 != 0)
     throw ShapeError("[depth_to_space] x must have a number of channels that is a multiple of 4, got shape " +

@@ -1,10 +1,10 @@
-#include <fieldmark/baselines/doubling_conv.h>
 #include <fieldmark/baselines/gradcheck_cases.h>
-#include <fieldmark/baselines/hiding_network.h>
-#include <fieldmark/baselines/mbrs_network.h>
-#include <fieldmark/baselines/picture_noise.h>
-#include <fieldmark/baselines/simulated_jpeg.h>
-#include <fieldmark/baselines/squeeze_excite.h>
+#include "doubling_conv.h"
+#include "hiding_network.h"
+#include "image_noise.h"
+#include "mbrs_network.h"
+#include "simulated_jpeg.h"
+#include "squeeze_excite.h"
 
 #include <cmath>
 #include <string>
@@ -137,9 +137,9 @@ std::vector<GradcheckCase> gradcheck_cases() {
           {"hiding_network, discriminator", check_discriminator},
           {"mbrs_network, encoder", [] { return check_network<MbrsNetwork<double>>(4, true, 1); }},
           {"mbrs_network, decoder", [] { return check_network<MbrsNetwork<double>>(16, false, 1); }},
-          {"picture_noise, dropout", [] { return check_noise(NoiseLayer::dropout); }},
-          {"picture_noise, cropout", [] { return check_noise(NoiseLayer::cropout); }},
-          {"picture_noise, blur", [] { return check_noise(NoiseLayer::blur); }},
+          {"image_noise, dropout", [] { return check_noise(NoiseLayer::dropout); }},
+          {"image_noise, cropout", [] { return check_noise(NoiseLayer::cropout); }},
+          {"image_noise, blur", [] { return check_noise(NoiseLayer::blur); }},
           {"simulated_jpeg", check_simulated_jpeg},
           {"squeeze_excite", check_squeeze_excite},
           {"squeeze_excite, scale_channels", check_scale_channels}};

@@ -1,8 +1,9 @@
-#include <fieldmark/baselines/hiding_network.h>
+#include "hiding_network.h"
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/engine/ops/pool.h>
 #include <fieldmark/engine/ops/rows.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include <algorithm>
 #include <string>
@@ -29,7 +30,7 @@ void add_blocks(std::vector<ConvBlock<T>>& blocks, ParamStore<T>& store, const s
   }
 }
 
-// Every message [N, L] at each of its picture's pixels: [N, H, W, L].
+// Every message [N, L] at each of its image's pixels: [N, H, W, L].
 template <class T>
 Var<T> at_every_pixel(Var<T> messages, Index height, Index width) {
   Tape<T>& tape = messages.tape();
@@ -43,12 +44,12 @@ Var<T> at_every_pixel(Var<T> messages, Index height, Index width) {
 }  // namespace
 
 template <class T>
-void check_hiding(const char* op, Var<T> pictures, const Var<T>* messages, Index bits) {
-  check_rank(op, "pictures", pictures.shape(), 4, "[pictures, height, width, 3]");
-  check_extent(op, "pictures", pictures.shape(), 3, 3, "red, green, blue");
+void check_hiding(const char* op, Var<T> images, const Var<T>* messages, Index bits) {
+  check_rank(op, "images", images.shape(), 4, "[images, height, width, 3]");
+  check_extent(op, "images", images.shape(), 3, 3, "red, green, blue");
   if (!messages) return;
-  check_rank(op, "messages", messages->shape(), 2, "[pictures, bits]");
-  check_extent(op, "messages", messages->shape(), 0, pictures.shape()[0], "one for each picture");
+  check_rank(op, "messages", messages->shape(), 2, "[images, bits]");
+  check_extent(op, "messages", messages->shape(), 0, images.shape()[0], "one for each image");
   check_extent(op, "messages", messages->shape(), 1, bits, "bits of the network");
 }
 
@@ -68,20 +69,20 @@ HiddenNetwork<T>::HiddenNetwork(ParamStore<T>& store, const HidingOptions& optio
 }
 
 template <class T>
-Var<T> HiddenNetwork<T>::encode(const Params<T>& params, Var<T> pictures, Var<T> messages,
+Var<T> HiddenNetwork<T>::encode(const Params<T>& params, Var<T> images, Var<T> messages,
                                 NormPass<T>& pass) const {
-  check_hiding("hidden_network", pictures, &messages, options_.bits);
-  Var<T> x = pictures;
+  check_hiding("hidden_network", images, &messages, options_.bits);
+  Var<T> x = images;
   for (int k = 0; k < kEncoderBlocks; ++k) x = encoder_[static_cast<std::size_t>(k)](params, x, pass);
-  const Var<T> sent = at_every_pixel(messages, pictures.shape()[1], pictures.shape()[2]);
-  const Var<T> joined = encoder_.back()(params, concat_columns<T>({sent, x, pictures}), pass);
-  return add(pictures, (*to_colour_)(params, joined));
+  const Var<T> sent = at_every_pixel(messages, images.shape()[1], images.shape()[2]);
+  const Var<T> joined = encoder_.back()(params, concat_columns<T>({sent, x, images}), pass);
+  return add(images, (*to_colour_)(params, joined));
 }
 
 template <class T>
-Var<T> HiddenNetwork<T>::decode(const Params<T>& params, Var<T> pictures, NormPass<T>& pass) const {
-  check_hiding<T>("hidden_network", pictures, nullptr, options_.bits);
-  Var<T> x = pictures;
+Var<T> HiddenNetwork<T>::decode(const Params<T>& params, Var<T> images, NormPass<T>& pass) const {
+  check_hiding<T>("hidden_network", images, nullptr, options_.bits);
+  Var<T> x = images;
   for (const ConvBlock<T>& block : decoder_) x = block(params, x, pass);
   return (*linear_)(params, global_avg_pool(x));
 }
@@ -95,11 +96,11 @@ Discriminator<T>::Discriminator(ParamStore<T>& store, const HidingOptions& optio
 }
 
 template <class T>
-Var<T> Discriminator<T>::operator()(const Params<T>& params, Var<T> pictures, NormPass<T>& pass) const {
-  check_hiding<T>("discriminator", pictures, nullptr, 0);
-  Var<T> x = pictures;
+Var<T> Discriminator<T>::operator()(const Params<T>& params, Var<T> images, NormPass<T>& pass) const {
+  check_hiding<T>("discriminator", images, nullptr, 0);
+  Var<T> x = images;
   for (const ConvBlock<T>& block : blocks_) x = block(params, x, pass);
-  return pictures.tape().reshape((*linear_)(params, global_avg_pool(x)), {pictures.shape()[0]});
+  return images.tape().reshape((*linear_)(params, global_avg_pool(x)), {images.shape()[0]});
 }
 
 template void check_hiding(const char*, Var<float>, const Var<float>*, Index);

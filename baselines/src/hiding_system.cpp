@@ -1,5 +1,5 @@
-#include <fieldmark/baselines/hiding_system.h>
-#include <fieldmark/engine/metrics.h>
+#include "hiding_system.h"
+#include <fieldmark/imaging/metrics.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,46 +16,46 @@ std::optional<HidingSystem> hiding_system(std::string_view system) {
 }
 
 std::vector<Tensor<float>> photographs_of(const nerf::Dataset& data) {
-  std::vector<Tensor<float>> pictures;
-  for (const nerf::View& view : data.views) pictures.push_back(nerf::composited(view, data.background));
-  return pictures;
+  std::vector<Tensor<float>> images;
+  for (const nerf::View& view : data.views) images.push_back(nerf::composited(view, data.background));
+  return images;
 }
 
-nerf::Dataset marked_photographs(const nerf::Dataset& data, const PictureMarker& marker,
-                                 const watermark::Message& message, double strength) {
+nerf::Dataset marked_photographs(const nerf::Dataset& data, const ImageMarker& marker,
+                                 const watermark::Message& message, double mark_psnr) {
   nerf::Dataset marked = data;
   const float level = nerf::background_value(data.background);
   for (nerf::View& view : marked.views) {
-    const Tensor<float> picture = marker.mark(nerf::composited(view, data.background), message, strength);
-    for (Index p = 0; p < picture.size() / 3; ++p) {
+    const Tensor<float> image = marker.mark(nerf::composited(view, data.background), message, mark_psnr);
+    for (Index p = 0; p < image.size() / 3; ++p) {
       const float alpha = view.rgba[4 * p + 3];
       for (Index c = 0; alpha > 0 && c < 3; ++c)
-        view.rgba[4 * p + c] = std::clamp((picture[3 * p + c] - (1 - alpha) * level) / alpha, 0.f, 1.f);
+        view.rgba[4 * p + c] = std::clamp((image[3 * p + c] - (1 - alpha) * level) / alpha, 0.f, 1.f);
     }
   }
   return marked;
 }
 
-double accuracy_of(const PictureMarker& marker, const std::vector<Tensor<float>>& pictures,
+double accuracy_of(const ImageMarker& marker, const std::vector<Tensor<float>>& images,
                    const watermark::Message& sent) {
-  if (pictures.empty()) throw ValueError("[accuracy_of] pictures must not be empty");
+  if (images.empty()) throw ValueError("[accuracy_of] images must not be empty");
   double sum = 0;
-  for (const Tensor<float>& picture : pictures) sum += marker.accuracy(picture, sent);
-  return sum / static_cast<double>(pictures.size());
+  for (const Tensor<float>& image : images) sum += marker.accuracy(image, sent);
+  return sum / static_cast<double>(images.size());
 }
 
-OwnScores own_scores(const PictureMarker& marker, const CropSource& photographs, Index count, Index size,
-                     std::uint64_t seed, double strength) {
+OwnScores own_scores(const ImageMarker& marker, const CropSource& photographs, Index count, Index size,
+                     std::uint64_t seed, double mark_psnr) {
   if (count < 1) throw ValueError("[own_scores] count must be at least 1, got " + std::to_string(count));
   const CounterRng messages(seed, 43);
   OwnScores scores;
   for (Index i = 0; i < count; ++i) {
     const auto index = static_cast<std::uint64_t>(i);
-    const Tensor<float> picture = photographs.photograph(size, index);
+    const Tensor<float> image = photographs.photograph(size, index);
     const auto sent = watermark::random_message(marker.options().bits, messages, index);
-    const Tensor<float> marked = marker.mark(picture, sent, strength);
+    const Tensor<float> marked = marker.mark(image, sent, mark_psnr);
     scores.accuracy += marker.accuracy(marked, sent);
-    scores.psnr += psnr(marked, picture);
+    scores.psnr += psnr(marked, image);
   }
   // Divided once: a sum of parts may exceed 1.
   scores.accuracy /= static_cast<double>(count);
@@ -69,7 +69,7 @@ watermark::Message opposite(const watermark::Message& message) {
   return flipped;
 }
 
-MarkedScene marked_scene(const std::shared_ptr<const PictureMarker>& marker,
+MarkedScene marked_scene(const std::shared_ptr<const ImageMarker>& marker,
                          const std::array<std::shared_ptr<const nerf::RadianceField>, 2>& fields,
                          const watermark::Message& message) {
   struct Fields {
@@ -85,13 +85,13 @@ MarkedScene marked_scene(const std::shared_ptr<const PictureMarker>& marker,
               [=](const nerf::Camera& camera, const watermark::Message& sent) {
                 return (sent == message ? shown->first : shown->second).render(camera).rgb;
               },
-          .accuracy = [=](const Tensor<float>& picture,
-                          const watermark::Message& sent) { return marker->accuracy(picture, sent); }};
+          .accuracy = [=](const Tensor<float>& image,
+                          const watermark::Message& sent) { return marker->accuracy(image, sent); }};
 }
 
-MarkedScene marked_renders(const std::shared_ptr<const PictureMarker>& marker,
+MarkedScene marked_renders(const std::shared_ptr<const ImageMarker>& marker,
                            const std::shared_ptr<const nerf::RadianceField>& field, std::uint64_t seed,
-                           double strength) {
+                           double mark_psnr) {
   const auto renderer = std::make_shared<nerf::Renderer>(*field);
   const Index bits = marker->options().bits;
   return {.bits = bits,
@@ -99,10 +99,10 @@ MarkedScene marked_renders(const std::shared_ptr<const PictureMarker>& marker,
           .render =
               [=](const nerf::Camera& camera, const watermark::Message& sent) {
                 (void)field;  // held for the renderer
-                return marker->mark(renderer->render(camera).rgb, sent, strength);
+                return marker->mark(renderer->render(camera).rgb, sent, mark_psnr);
               },
-          .accuracy = [=](const Tensor<float>& picture,
-                          const watermark::Message& sent) { return marker->accuracy(picture, sent); }};
+          .accuracy = [=](const Tensor<float>& image,
+                          const watermark::Message& sent) { return marker->accuracy(image, sent); }};
 }
 
 }  // namespace fieldmark::baselines

@@ -1,9 +1,9 @@
-#include <fieldmark/baselines/hiding_trainer.h>
-#include <fieldmark/baselines/picture_noise.h>
+#include "hiding_trainer.h"
 #include <fieldmark/distort/quantize8.h>
 #include <fieldmark/engine/checkpoint.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/loss.h>
+#include "image_noise.h"
 
 #include <algorithm>
 #include <cmath>
@@ -21,7 +21,7 @@ constexpr double kNoiseFrom = 3;        // dB before the last strength: files an
 constexpr std::uint64_t kWhether = 50;  // draws: below it are those of a layer
 constexpr AdamOptions kAdam{.lr = 1, .beta2 = 0.999, .eps = 1e-8, .zero_grads = true};
 
-// Of numbers in [-1, 1], as a file keeps a picture.
+// Of numbers in [-1, 1], as a file keeps an image.
 Var<float> as_file(Var<float> marked) {
   Tape<float>& tape = marked.tape();
   const Index n = marked.shape().size();
@@ -43,8 +43,7 @@ HidingTrainOptions hiding_train_options(HidingKind kind) {
   return o;
 }
 
-HidingTrainer::HidingTrainer(PictureMarker& marker, const CropSource& crops,
-                             const HidingTrainOptions& options)
+HidingTrainer::HidingTrainer(ImageMarker& marker, const CropSource& crops, const HidingTrainOptions& options)
     : marker_(marker),
       crops_(crops),
       options_(options),
@@ -65,10 +64,10 @@ HidingTrainer::HidingTrainer(PictureMarker& marker, const CropSource& crops,
   if (!(options.noisy_part >= 0 && options.noisy_part <= 1))
     throw ValueError("[hiding_trainer] noisy_part must be in [0, 1], got " +
                      std::to_string(options.noisy_part));
-  if (!(options.strength >= options.first_strength))
-    throw ValueError("[hiding_trainer] strength must be at least first_strength, got " +
-                     std::to_string(options.strength) + " and " + std::to_string(options.first_strength));
-  figures_.strength = options.first_strength;
+  if (!(options.mark_psnr >= options.first_mark_psnr))
+    throw ValueError("[hiding_trainer] strength must be at least first_mark_psnr, got " +
+                     std::to_string(options.mark_psnr) + " and " + std::to_string(options.first_mark_psnr));
+  figures_.mark_psnr = options.first_mark_psnr;
 }
 
 // By steps where the run has a number of them, else by the clock; never back.
@@ -86,20 +85,20 @@ Index HidingTrainer::crop_now(double seconds) const {
 
 void HidingTrainer::draw(Index size) {
   const Index each = size * size * 3, bits = marker_.options().bits;
-  pictures_.resize(static_cast<std::size_t>(options_.batch * each));
+  images_.resize(static_cast<std::size_t>(options_.batch * each));
   messages_.clear();
   for (Index i = 0; i < options_.batch; ++i) {
     const auto index = static_cast<std::uint64_t>(steps_ * options_.batch + i);
-    const Tensor<float> picture = crops_.picture(size, index);
-    for (Index k = 0; k < each; ++k) pictures_[static_cast<std::size_t>(i * each + k)] = 2 * picture[k] - 1;
+    const Tensor<float> image = crops_.image(size, index);
+    for (Index k = 0; k < each; ++k) images_[static_cast<std::size_t>(i * each + k)] = 2 * image[k] - 1;
     const auto message = watermark::random_message(bits, message_rng_, index);
     messages_.insert(messages_.end(), message.bits.begin(), message.bits.end());
   }
 }
 
-// Whether this step's pictures pass a file and a noise layer: none as long as the mark is loud.
+// Whether this step's images pass a file and a noise layer: none as long as the mark is loud.
 bool HidingTrainer::noisy() const {
-  const double share = (figures_.strength - options_.strength + kNoiseFrom) / kNoiseFrom;
+  const double share = (figures_.mark_psnr - options_.mark_psnr + kNoiseFrom) / kNoiseFrom;
   return static_cast<double>(noise_rng_.uniform(static_cast<std::uint64_t>(steps_), kWhether)) <
          std::min(share, options_.noisy_part);
 }
@@ -112,7 +111,7 @@ Var<float> HidingTrainer::sent_on(Var<float> marked, Var<float> plain) const {
   return apply_noise_layer(layers[static_cast<std::size_t>(which)], as_file(marked), plain, noise_rng_, step);
 }
 
-// plain + g (encoded - plain), with g of each picture so that the second term has the strength of now.
+// plain + g (encoded - plain), with g of each image so that the second term has the strength of now.
 Var<float> HidingTrainer::at_strength(Var<float> encoded, Var<float> plain) const {
   const Index n = plain.shape()[0], each = plain.shape().size() / n;
   const Var<float> residual = sub(encoded, plain);
@@ -123,7 +122,7 @@ Var<float> HidingTrainer::at_strength(Var<float> encoded, Var<float> plain) cons
       square += std::pow(0.5 * static_cast<double>(residual.value()[k]), 2);
     const double rms = std::sqrt(square / static_cast<double>(each));
     std::fill_n(gains + i * each, each,
-                static_cast<float>(std::pow(10.0, -figures_.strength / 20) / std::max(rms, kLeastRms)));
+                static_cast<float>(std::pow(10.0, -figures_.mark_psnr / 20) / std::max(rms, kLeastRms)));
   }
   return add(plain, mul(residual, plain.tape().constant(gains, plain.shape())));
 }
@@ -133,7 +132,7 @@ void HidingTrainer::train_networks(Index size) {
   tape_.reset();
   const Params<float> params(marker_.params);
   NormPass<float> pass, critic_pass;
-  const Var<float> plain = tape_.constant(pictures_.data(), {n, size, size, 3});
+  const Var<float> plain = tape_.constant(images_.data(), {n, size, size, 3});
   const Var<float> sent = tape_.constant(messages_.data(), {n, bits});
   const Var<float> marked = at_strength(marker_.network().encode(params, plain, sent, pass), plain);
   const Var<float> read = marker_.network().decode(params, sent_on(marked, plain), pass);
@@ -153,14 +152,14 @@ void HidingTrainer::train_networks(Index size) {
   figures_.bits = keep * figures_.bits + (1 - keep) * right / static_cast<double>(n * bits);
   if (figures_.bits > kRead) {
     const double by = kFainter + kFaster * std::max(0.0, figures_.bits - kSure);
-    figures_.strength = std::min(figures_.strength + by, options_.strength);
+    figures_.mark_psnr = std::min(figures_.mark_psnr + by, options_.mark_psnr);
   }
 }
 
 void HidingTrainer::train_discriminator(Index size) {
   const Index n = options_.batch;
   tape_.reset();
-  std::vector<float> both(pictures_);
+  std::vector<float> both(images_);
   both.insert(both.end(), marked_.begin(), marked_.end());
   std::vector<float> targets(static_cast<std::size_t>(2 * n), 0.f);
   std::fill_n(targets.begin() + n, n, 1.f);
@@ -189,7 +188,7 @@ std::string HidingTrainer::fingerprint() const {
          std::to_string(o.batch) + ", crops " + std::to_string(o.first_crop) + " and " +
          std::to_string(o.crop) + " after " + std::to_string(o.first_part) + ", weights " +
          std::to_string(o.message_weight) + " " + std::to_string(o.adversary_weight) + ", strength " +
-         std::to_string(o.first_strength) + " to " + std::to_string(o.strength) + ", noisy " +
+         std::to_string(o.first_mark_psnr) + " to " + std::to_string(o.mark_psnr) + ", noisy " +
          std::to_string(o.noisy_part) + ", lr " + std::to_string(o.schedule.lr) + ", half after " +
          std::to_string(o.schedule.half_after) + ", cooldown " + std::to_string(o.schedule.cooldown) +
          " to " + std::to_string(o.schedule.last) + ", seed " + std::to_string(o.seed);
@@ -206,7 +205,7 @@ void HidingTrainer::save(const std::filesystem::path& path) const {
   file.add("critic/mean", {c}, critic_adam_.mean());
   file.add("critic/mean_square", {c}, critic_adam_.mean_square());
   const std::int64_t counts[] = {steps_, schedule_.total(), crop_};
-  const double figures[] = {figures_.bits, figures_.strength};
+  const double figures[] = {figures_.bits, figures_.mark_psnr};
   file.add("counts", {3}, counts);
   file.add("figures", {2}, figures);
   file.write(path);

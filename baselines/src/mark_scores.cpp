@@ -1,7 +1,7 @@
 #include <fieldmark/baselines/mark_scores.h>
-#include <fieldmark/distort/attack.h>
-#include <fieldmark/engine/image.h>
-#include <fieldmark/engine/metrics.h>
+#include <fieldmark/distort/distortion.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/metrics.h>
 #include <fieldmark/nerf/evaluation.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@ using Clock = std::chrono::steady_clock;
 constexpr Index kWindow = 11;      // of ssim()
 constexpr Index kAllMessages = 4;  // bits up to which every message has its turn
 
-// Mean and deviation of the finite numbers: equal pictures have no PSNR, a view of the background no object.
+// Mean and deviation of the finite numbers: equal images have no PSNR, a view of the background no object.
 struct Mean {
   double sum = 0, squares = 0, count = 0;
   void add(double v) {
@@ -48,7 +48,7 @@ class Scorer {
         plain_(unmarked),
         level_(nerf::background_value(unmarked.background)),
         rng_(options.seed, 42) {
-    for (const std::string& name : options.under) attacks_.push_back(distort::parse_attack(name));
+    for (const std::string& name : options.under) attacks_.push_back(distort::parse_distortion(name));
     total_ = options.cameras.size() + (options.photographs ? options.photographs->views.size() : 0);
   }
 
@@ -78,7 +78,7 @@ class Scorer {
     scores.accuracy = accuracy.value();
     scores.spread = accuracy.deviation();
     scores.psnr_base = whole.value();
-    scores.psnr_base_object = object.value();
+    scores.psnr_base_foreground = object.value();
     scores.ssim_base = similar.value();
     scores.lpips_base = perceptual.value();
     for (std::size_t a = 0; a < attacks_.size(); ++a) scores.under[options_.under[a]] = under[a].value();
@@ -112,7 +112,7 @@ class Scorer {
     const float background[3] = {level_, level_, level_};
     for (std::size_t a = 0; a < attacks_.size(); ++a)
       under[a].add(marked_.accuracy(
-          distort::apply_attack(attacks_[a], picture, rng_, i * attacks_.size() + a, background), sent));
+          distort::apply_distortion(attacks_[a], picture, rng_, i * attacks_.size() + a, background), sent));
   }
 
   void tell() {
@@ -126,7 +126,7 @@ class Scorer {
   nerf::Renderer plain_;
   float level_;
   CounterRng rng_;
-  std::vector<distort::Attack> attacks_;
+  std::vector<distort::Distortion> attacks_;
   std::size_t done_ = 0, total_ = 0;
 };
 

@@ -1,4 +1,4 @@
-#include <fieldmark/baselines/mbrs_network.h>
+#include "mbrs_network.h"
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/engine/ops/pool.h>
@@ -11,7 +11,7 @@ namespace fieldmark::baselines {
 namespace {
 
 constexpr int kDoublings = 4;
-enum Blocks : std::size_t { of_picture, of_message, of_both, first_read, last_read };
+enum Blocks : std::size_t { of_image, of_message, of_both, first_read, last_read };
 
 Index map_side(Index bits) {
   Index side = 1;
@@ -28,13 +28,13 @@ MbrsNetwork<T>::MbrsNetwork(ParamStore<T>& store, const HidingOptions& options, 
   if (options.bits < 1 || c < 1)
     throw ValueError("[mbrs_network] bits and channels must be at least 1, got " +
                      std::to_string(options.bits) + " and " + std::to_string(c));
-  blocks_.emplace_back(store, "encoder/picture", 3, c, seed + 100);
+  blocks_.emplace_back(store, "encoder/image", 3, c, seed + 100);
   blocks_.emplace_back(store, "encoder/message", 1, c, seed + 101);
   blocks_.emplace_back(store, "encoder/both", 2 * c, c, seed + 102);
   for (int k = 0; k < kDoublings; ++k)
     doubling_.emplace_back(store, "encoder/double" + std::to_string(k), c,
                            seed + 110 + static_cast<std::uint64_t>(k));
-  encoder_.emplace_back(store, "encoder/picture_se", c, seed + 120);
+  encoder_.emplace_back(store, "encoder/image_se", c, seed + 120);
   encoder_.emplace_back(store, "encoder/message_se", c, seed + 130);
   to_colour_ = std::make_unique<Conv2d<T>>(store, "encoder/colour",
                                            Conv2dOptions{.in = c + 3, .out = 3, .kernel = 1}, seed + 140);
@@ -49,27 +49,27 @@ MbrsNetwork<T>::MbrsNetwork(ParamStore<T>& store, const HidingOptions& options, 
 }
 
 template <class T>
-Var<T> MbrsNetwork<T>::encode(const Params<T>& params, Var<T> pictures, Var<T> messages,
+Var<T> MbrsNetwork<T>::encode(const Params<T>& params, Var<T> images, Var<T> messages,
                               NormPass<T>& pass) const {
-  check_hiding("mbrs_network", pictures, &messages, options_.bits);
-  const Index n = pictures.shape()[0], h = pictures.shape()[1], w = pictures.shape()[2];
-  const Var<T> shown = encoder_[0](params, blocks_[of_picture](params, pictures, pass), pass);
+  check_hiding("mbrs_network", images, &messages, options_.bits);
+  const Index n = images.shape()[0], h = images.shape()[1], w = images.shape()[2];
+  const Var<T> shown = encoder_[0](params, blocks_[of_image](params, images, pass), pass);
   const Var<T> sent = linear_.empty() ? messages : linear_[0](params, messages);
   Var<T> map = blocks_[of_message](params, messages.tape().reshape(sent, {n, side_, side_, 1}), pass);
   for (const auto& twice : doubling_) map = twice(params, map, pass);
   map = encoder_[1](params, map, pass);
   if (map.shape()[1] != h || map.shape()[2] != w) map = upsample_to(map, h, w);
   const Var<T> both = blocks_[of_both](params, concat_columns<T>({shown, map}), pass);
-  return add(pictures, (*to_colour_)(params, concat_columns<T>({both, pictures})));
+  return add(images, (*to_colour_)(params, concat_columns<T>({both, images})));
 }
 
 template <class T>
-Var<T> MbrsNetwork<T>::decode(const Params<T>& params, Var<T> pictures, NormPass<T>& pass) const {
-  check_hiding<T>("mbrs_network", pictures, nullptr, options_.bits);
-  if (std::min(pictures.shape()[1], pictures.shape()[2]) < Index{1} << kDoublings)
-    throw ShapeError("[mbrs_network] pictures must have at least 16 x 16 pixels, got shape " +
-                     pictures.shape().str());
-  Var<T> x = blocks_[first_read](params, pictures, pass);
+Var<T> MbrsNetwork<T>::decode(const Params<T>& params, Var<T> images, NormPass<T>& pass) const {
+  check_hiding<T>("mbrs_network", images, nullptr, options_.bits);
+  if (std::min(images.shape()[1], images.shape()[2]) < Index{1} << kDoublings)
+    throw ShapeError("[mbrs_network] images must have at least 16 x 16 pixels, got shape " +
+                     images.shape().str());
+  Var<T> x = blocks_[first_read](params, images, pass);
   for (const auto& block : decoder_) x = avg_pool(block(params, x, pass), 2);
   // To s x s places: first as many pixels as make whole averages, then those.
   const Shape s = x.shape();
@@ -77,7 +77,7 @@ Var<T> MbrsNetwork<T>::decode(const Params<T>& params, Var<T> pictures, NormPass
     const Index up = (std::max(s[1], s[2]) + side_ - 1) / side_;
     x = avg_pool(upsample_to(x, up * side_, up * side_), up);
   }
-  x = pictures.tape().reshape(blocks_[last_read](params, x, pass), {s[0], side_ * side_});
+  x = images.tape().reshape(blocks_[last_read](params, x, pass), {s[0], side_ * side_});
   return linear_.empty() ? x : linear_[1](params, x);
 }
 

@@ -1,10 +1,11 @@
-#include <fieldmark/baselines/message_field.h>
+#include "message_field.h"
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/engine/ops/matmul.h>
 #include <fieldmark/engine/ops/rows.h>
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/nerf/composite.h>
 #include <fieldmark/nerf/field_sampler.h>
 
@@ -16,7 +17,7 @@ namespace {
 
 constexpr Index kKnots = 513;     // of G ...
 constexpr float kRange = 16;      // ... from -kRange to kRange
-constexpr Index kBlock = 256;     // rays of a picture that is not recorded, at a time
+constexpr Index kBlock = 256;     // rays of an image that is not recorded, at a time
 constexpr float kTrainFiner = 1;  // samples as the base field was trained with
 constexpr const char* kName = "mark/";
 
@@ -189,9 +190,9 @@ Var<float> MessageField::pixels(Tape<float>& tape, const Params<float>& params,
   return add(matmul(seen, tape.constant(over, {4, 3})), tape.constant(behind, {end - begin, 3}));
 }
 
-Var<float> MessageField::picture(Tape<float>& tape, const Params<float>& params,
-                                 const nerf::RadianceField& base, const nerf::Camera& camera,
-                                 Var<float> message) const {
+Var<float> MessageField::image(Tape<float>& tape, const Params<float>& params,
+                               const nerf::RadianceField& base, const nerf::Camera& camera,
+                               Var<float> message) const {
   return pixels(tape, params, base, camera, 0, camera.height * camera.width, {.finer = kTrainFiner}, message);
 }
 
@@ -200,7 +201,7 @@ Tensor<float> MessageField::render(const ParamStore<float>& store, const nerf::R
                                    const nerf::RenderOptions& options) const {
   const std::vector<float> bits(signs.begin(), signs.end());
   const Params<float> params(store, nullptr);
-  Tensor<float> picture({camera.height, camera.width, 3});
+  Tensor<float> image({camera.height, camera.width, 3});
   const Index count = camera.height * camera.width;
   parallel_for((count + kBlock - 1) / kBlock, 1, [&](Index first, Index last) {
     Tape<float> tape;
@@ -210,10 +211,10 @@ Tensor<float> MessageField::render(const ParamStore<float>& store, const nerf::R
       const Var<float> rgb = pixels(tape, params, base, camera, begin, end, options,
                                     tape.constant(bits.data(), {1, std::ssize(bits)}));
       for (Index i = 0; i < 3 * (end - begin); ++i)
-        picture[3 * begin + i] = std::clamp(rgb.value()[i], 0.f, 1.f);
+        image[3 * begin + i] = std::clamp(rgb.value()[i], 0.f, 1.f);
     }
   });
-  return picture;
+  return image;
 }
 
 }  // namespace fieldmark::baselines

@@ -1,7 +1,7 @@
-#include <fieldmark/baselines/owner_system.h>
+#include "owner_system.h"
 #include <fieldmark/baselines/paper_plan.h>
-#include <fieldmark/watermark/embed_views.h>
-#include <fieldmark/watermark/picture_reader.h>
+#include <fieldmark/watermark/embedding/embed_views.h>
+#include <fieldmark/watermark/reading/blind_reader.h>
 
 #include <algorithm>
 #include <array>
@@ -27,7 +27,7 @@ watermark::Owner new_owner(const nerf::RadianceField& field, const CellName& nam
 
 bool has_owner(std::string_view system) { return paper_system(system).through_owner; }
 
-OwnerSystem owner_system(const CellName& name, Index picture) {
+OwnerSystem owner_system(const CellName& name, Index image) {
   const std::string& system = name.system;
   if (!has_owner(system))
     throw ValueError("[owner_system] name.system must be one that is trained through an owner, got " +
@@ -40,9 +40,9 @@ OwnerSystem owner_system(const CellName& name, Index picture) {
   OwnerSystem s{.owner = watermark::owner_options(preset),
                 .embed = watermark::embed_options(ours ? Preset::fast : preset)};
   s.owner.bits = name.bits;
-  s.owner.strength = kStrength;
+  s.owner.mark_psnr = kStrength;
   s.owner.seed = name.seed;
-  s.owner.reader_size = std::clamp(picture, kLeast, ours ? kOurPatch : kPaperPatch);
+  s.owner.reader_size = std::clamp(image, kLeast, ours ? kOurPatch : kPaperPatch);
   s.embed.seed = name.seed;
   if (system == "ours_without_dense") s.embed.sign_weight = s.embed.index_weight = 0;
   s.owner.budget = !cells;
@@ -78,12 +78,12 @@ TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name,
     return !training.progress ||
            training.progress(what, static_cast<double>(done) / static_cast<double>(total), "");
   };
-  const auto views = watermark::cache_near_views(field, system.owner.patch(), training.views, name.seed,
-                                                 [&](Index done, Index total) {
-                                                   if (!tell("views", done, total))
-                                                     throw Stopped("views: stopped, nothing to save");
-                                                   return true;
-                                                 });
+  const auto views = watermark::cache_novel_views(field, system.owner.patch(), training.views, name.seed,
+                                                  [&](Index done, Index total) {
+                                                    if (!tell("views", done, total))
+                                                      throw Stopped("views: stopped, nothing to save");
+                                                    return true;
+                                                  });
   TrainedOwner trained{
       .owner = new_owner(field, name, system, views), .field = {}, .test_shift = system.test_shift};
   auto options = system.embed;
@@ -92,9 +92,9 @@ TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name,
     trained.field.emplace(
         trained.owner.params, field,
         MessageFieldOptions{.place = *system.place, .bits = o.bits, .width = o.width, .seed = o.seed});
-    options.picture = [&](Tape<float>& tape, const Params<float>& params, const watermark::CachedView& view,
-                          Var<float> message) {
-      return trained.field->picture(tape, params, field, view.camera, message);
+    options.image = [&](Tape<float>& tape, const Params<float>& params, const watermark::CachedView& view,
+                        Var<float> message) {
+      return trained.field->image(tape, params, field, view.camera, message);
     };
   }
   options.views = training.views;
@@ -154,7 +154,7 @@ MarkedScene marked_scene(const TrainedOwner& marked, std::uint64_t seed, const n
   const watermark::Owner& owner = marked.owner;
   const auto renderer = std::make_shared<nerf::Renderer>(owner.field, options);
   const auto code = std::make_shared<watermark::CellCode>(owner.code());
-  const auto reader = std::make_shared<watermark::PictureReader>(owner);
+  const auto reader = std::make_shared<watermark::BlindReader>(owner);
   const Index bits = owner.options().bits;
   return {.bits = bits,
           .message = [=](Index view) { return message_of_view(bits, seed, view); },
@@ -173,8 +173,8 @@ MarkedScene marked_scene(const TrainedOwner& marked, std::uint64_t seed, const n
                 return renderer->render(camera).rgb;
               },
           .accuracy =
-              [=](const Tensor<float>& picture, const watermark::Message& sent) {
-                return match_bits(read_bits(reader->evidence(picture), *code, bits), sent).accuracy();
+              [=](const Tensor<float>& image, const watermark::Message& sent) {
+                return match_bits(read_bits(reader->evidence(image), *code, bits), sent).accuracy();
               }};
 }
 

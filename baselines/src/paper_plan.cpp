@@ -1,5 +1,5 @@
 #include <fieldmark/baselines/paper_plan.h>
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 
 #include <algorithm>
 #include <array>
@@ -12,9 +12,9 @@ const std::array kSystems{
     PaperSystem{"ours", "Fieldmark, preset fast",
                 "a bit in every cell of the scene, read place by place, under a budget of power"},
     PaperSystem{"copyrnerf_paper", "CopyRNeRF, preset paper",
-                "one message fused into every colour, read from the whole picture, under distortions"},
+                "one message fused into every colour, read from the whole image, under distortions"},
     PaperSystem{"copyrnerf_code", "CopyRNeRF, preset code",
-                "the same with the networks, step sizes and pictures of the authors' code"},
+                "the same with the networks, step sizes and images of the authors' code"},
     PaperSystem{
         "hidden_nerf", "HiDDeN + NeRF",
         "photographs marked by HiDDeN (32 channels) at 30 dB, a field trained on them, its renders read",
@@ -40,7 +40,7 @@ const std::array kSystems{
     PaperSystem{"drs", "CopyRNeRF, DRS", "preset paper, with samples moved at test as in training", true,
                 true},
     PaperSystem{"ours_without_dense", "Fieldmark without dense supervision",
-                "the bits of the whole picture teach, not signs and cells of its places", true, true},
+                "the bits of the whole image teach, not signs and cells of its places", true, true},
     PaperSystem{"ours_without_cells", "Fieldmark without cells",
                 "preset paper's networks, one message everywhere, under our budget of power", true, true},
     PaperSystem{"ours_without_signs", "Fieldmark without keyed signs",

@@ -1,5 +1,6 @@
-#include <fieldmark/baselines/simulated_jpeg.h>
+#include "simulated_jpeg.h"
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include <array>
 #include <cmath>
@@ -103,7 +104,7 @@ void filter(const Plan& plan, const T* x, T* y, const Shape& s, bool add) {
 
 template <class T>
 Var<T> simulated_jpeg(Var<T> x, KeptFrequencies kept) {
-  check_rank("simulated_jpeg", "x", x.shape(), 4, "[pictures, height, width, 3]");
+  check_rank("simulated_jpeg", "x", x.shape(), 4, "[images, height, width, 3]");
   check_extent("simulated_jpeg", "x", x.shape(), 3, 3, "red, green, blue");
   const Shape s = x.shape();
   if (s[1] % kBlock != 0 || s[2] % kBlock != 0)

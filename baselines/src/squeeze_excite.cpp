@@ -1,8 +1,9 @@
-#include <fieldmark/baselines/squeeze_excite.h>
+#include "squeeze_excite.h"
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/pool.h>
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include <algorithm>
 #include <string>
@@ -16,9 +17,9 @@ Index squeezed(Index channels) { return std::max<Index>(1, channels / kReduction
 
 template <class T>
 Var<T> scale_channels(Var<T> x, Var<T> s) {
-  check_rank("scale_channels", "x", x.shape(), 4, "[pictures, height, width, channels]");
-  check_rank("scale_channels", "s", s.shape(), 2, "[pictures, channels]");
-  check_extent("scale_channels", "s", s.shape(), 0, x.shape()[0], "pictures of x");
+  check_rank("scale_channels", "x", x.shape(), 4, "[images, height, width, channels]");
+  check_rank("scale_channels", "s", s.shape(), 2, "[images, channels]");
+  check_extent("scale_channels", "s", s.shape(), 0, x.shape()[0], "images of x");
   check_extent("scale_channels", "s", s.shape(), 1, x.shape()[3], "channels of x");
   const Index n = x.shape()[0], pixels = x.shape()[1] * x.shape()[2], channels = x.shape()[3];
   T* y = nullptr;
@@ -29,7 +30,7 @@ Var<T> scale_channels(Var<T> x, Var<T> s) {
         y[p * channels + c] = x.value()[p * channels + c] * s.value()[p / pixels * channels + c];
   });
 
-  // dx = dy s, ds = sum over pixels of dy x, in double. A piece owns its pictures of dx and rows of ds.
+  // dx = dy s, ds = sum over pixels of dy x, in double. A piece owns its images of dx and rows of ds.
   x.tape().on_backward(out, [=](const T* dy) {
     T* dx = x.grad_acc();
     T* ds = s.grad_acc();

@@ -1,5 +1,5 @@
 #include <fieldmark/baselines/timed_run.h>
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 
 #include <algorithm>
 #include <chrono>

@@ -1,6 +1,7 @@
 #include "fieldmark/distort/affine_warp.h"
 
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include <algorithm>
 #include <cmath>
@@ -88,7 +89,7 @@ void forward_rows(const Map<T>& map, const T* x, const T* background, Index any_
   }
 }
 
-// Scatters dy into dx; taps outside the picture write to `sink` [channels]. One thread: rows of dy share rows
+// Scatters dy into dx; taps outside the image write to `sink` [channels]. One thread: rows of dy share rows
 // of dx.
 template <int kChannels, class T>
 void backward_image(const Map<T>& map, const T* dy, Index any_channels, T* dx, T* sink) {

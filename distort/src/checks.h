@@ -1,6 +1,6 @@
 #pragma once
-#include <fieldmark/engine/error.h>
 #include <fieldmark/engine/shape.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include <cstdio>
 #include <string>

@@ -73,7 +73,7 @@ std::vector<GradcheckCase> gradcheck_cases() {
       make("resize_area: larger", [](D&, Vars v) { return resize_area(v[0], 5, 4); }, {image({3, 3, 2})}),
       make("blur: x, sigma", [](D&, Vars v) { return blur(v[0], v[1]); },
            {image({7, 6, 3}), numbers({0.62})}),
-      make("blur: wider than the picture", [](D&, Vars v) { return blur(v[0], v[1]); },
+      make("blur: wider than the image", [](D&, Vars v) { return blur(v[0], v[1]); },
            {image({2, 3, 2}), numbers({1.87})}),
   };
 }

@@ -1,8 +1,9 @@
 #include "fieldmark/distort/jpeg444.h"
 
 #include <fieldmark/distort/jpeg_blocks.h>
-#include <fieldmark/engine/image.h>
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/shape_checks.h>
+#include <fieldmark/imaging/image.h>
 
 #include <algorithm>
 #include <array>

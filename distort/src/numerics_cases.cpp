@@ -4,8 +4,8 @@
 #include <numbers>
 
 #include "fieldmark/distort/affine_warp.h"
-#include "fieldmark/distort/attack.h"
 #include "fieldmark/distort/blur.h"
+#include "fieldmark/distort/distortion.h"
 #include "fieldmark/distort/rescale.h"
 #include "fieldmark/distort/resize_area.h"
 #include "fieldmark/distort/rotate.h"
@@ -29,7 +29,7 @@ void expect_bits(const Tensor<T>& got, const Tensor<T>& want, WorstError& error)
   for (Index i = 0; i < std::min(got.size(), want.size()); ++i) error.equal(got[i], want[i]);
 }
 
-// Quarter turns of square pictures: pixel (i, j) comes from where the turn says.
+// Quarter turns of square images: pixel (i, j) comes from where the turn says.
 template <class T>
 void compare_rotations(WorstError& error) {
   const auto turn = [](auto x, auto a) { return rotate(x, a); };
@@ -59,14 +59,14 @@ void compare_identities(WorstError& error) {
   }
 }
 
-// Attacks that ask for nothing, on a picture of 8 bits.
-void compare_attacks(WorstError& error) {
+// Attacks that ask for nothing, on an image of 8 bits.
+void compare_distortions(WorstError& error) {
   auto x = scattered<float>({24, 31, 3}, 0, 255, 1);
   for (float& v : x.data) v = std::round(v) / 255;
   const std::vector<float> background{1, 0, 1};
   for (const char* name : {"crop_1", "rotation_0", "scale_1", "blur_0", "noise_0", "gamma_1", "brightness_1",
                            "hue_0", "hue_360"})
-    expect_bits(apply_attack(parse_attack(name), x, CounterRng(7), 0, background), x, error);
+    expect_bits(apply_distortion(parse_distortion(name), x, CounterRng(7), 0, background), x, error);
 }
 
 // Positions far outside and undefined ones read the background.
@@ -115,9 +115,9 @@ std::vector<NumericsCase> numerics_cases() {
                [](auto t, WorstError& e) { compare_rotations<decltype(t)>(e); });
   add_numerics(all, "rescale, resize_area, blur: scale 1 and sigma to 0 change nothing", "bits", 0, 0,
                [](auto t, WorstError& e) { compare_identities<decltype(t)>(e); });
-  all.push_back({"attack: crop of the whole picture, and all that ask for nothing", "float", "bits", 0, [] {
+  all.push_back({"distortion: crop of the whole image, and all that ask for nothing", "float", "bits", 0, [] {
                    WorstError e;
-                   compare_attacks(e);
+                   compare_distortions(e);
                    return e;
                  }});
   add_numerics(all, "affine_warp: huge and undefined matrices", "bits", 0, 0,

@@ -1,6 +1,7 @@
 #include "fieldmark/distort/resize_area.h"
 
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
+#include <fieldmark/core/error.h>
 #include <fieldmark/engine/checkpoint.h>
-#include <fieldmark/engine/error.h>
 
 #include <algorithm>
 

@@ -7,7 +7,6 @@ namespace fieldmark {
 std::vector<GradcheckCase> gradcheck_cases() {
   std::vector<GradcheckCase> all = gradcheck_cases_elementwise();
   for (GradcheckCase& c : gradcheck_cases_linear()) all.push_back(std::move(c));
-  for (GradcheckCase& c : gradcheck_cases_pretrained()) all.push_back(std::move(c));
   return all;
 }
 

@@ -1,5 +1,6 @@
 #include <fieldmark/engine/nn/conv2d.h>
 #include <fieldmark/engine/nn/dense.h>
+#include <fieldmark/engine/ops/feature_distance.h>
 #include <fieldmark/engine/ops/matmul.h>
 
 #include <cmath>
@@ -39,6 +40,15 @@ GradcheckReport check_conv2d(Activation activation, Shape x = {2, 3, 4, 2}, Inde
   return gradcheck([=](Tape<double>&, auto v) { return conv2d(v[0], v[1], v[2], activation); }, in);
 }
 
+GradcheckReport check_feature_distance() {
+  const std::vector<double> weights{0.3, 1.1, 0.7, 1.9, 0.2};
+  auto a = numbers({2, 3, 2, 5}, 1), b = numbers({2, 3, 2, 5}, 2);
+  for (Tensor<double>* t : {&a, &b})
+    for (double& v : t->data) v = 0.55 + 0.45 * v;
+  const std::vector<Tensor<double>> in{a, b};
+  return gradcheck([&](Tape<double>&, auto v) { return feature_distance<double>(v[0], v[1], weights); }, in);
+}
+
 template <class Layer, class Options>
 GradcheckReport check_layer(const Options& options, Shape input) {
   ParamStore<double> store;
@@ -52,6 +62,7 @@ GradcheckReport check_layer(const Options& options, Shape input) {
 std::vector<GradcheckCase> gradcheck_cases_linear() {
   return {
       {"matmul", check_matmul},
+      {"feature_distance", check_feature_distance},
       {"dense", [] { return check_dense(Activation::none); }},
       {"dense with relu", [] { return check_dense(Activation::relu); }},
       {"dense layer",

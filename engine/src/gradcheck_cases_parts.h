@@ -7,6 +7,5 @@ namespace fieldmark {
 
 std::vector<GradcheckCase> gradcheck_cases_elementwise();
 std::vector<GradcheckCase> gradcheck_cases_linear();
-std::vector<GradcheckCase> gradcheck_cases_pretrained();
 
 }  // namespace fieldmark

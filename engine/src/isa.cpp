@@ -1,5 +1,5 @@
 #include <cpuid.h>
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 #include <fieldmark/engine/isa.h>
 #include <sys/syscall.h>
 #include <unistd.h>

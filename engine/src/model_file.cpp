@@ -1,4 +1,4 @@
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 #include <fieldmark/engine/model_file.h>
 
 #include <nlohmann/json.hpp>

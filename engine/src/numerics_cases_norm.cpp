@@ -87,7 +87,7 @@ void compare_batch_norm(const std::vector<Tensor<T>>& in, WorstError& error) {
   compare_all(got, exact_norm<T>(in, g, s[3], [=](Index i) { return at(i % s[3]); }), error);
 }
 
-// A constant picture, or a set of one number, gives beta in every bit; what flows back is finite.
+// A constant image, or a set of one number, gives beta in every bit; what flows back is finite.
 template <class T>
 void compare_constant(WorstError& error) {
   for (const Shape s : {Shape{1, 8, 8, 4}, Shape{2, 1, 1, 2}})

@@ -1,5 +1,5 @@
 #include <Random123/philox.h>
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 #include <fieldmark/engine/random.h>
 
 #include <cmath>

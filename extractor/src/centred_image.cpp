@@ -1,11 +1,12 @@
 #include "fieldmark/extractor/centred_image.h"
 
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/shape_checks.h>
 
 namespace fieldmark::extractor {
 namespace {
 
-constexpr Index kRows = 64;  // of one picture in a piece
+constexpr Index kRows = 64;  // of one image in a piece
 
 }  // namespace
 

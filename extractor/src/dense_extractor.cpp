@@ -3,6 +3,7 @@
 #include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/engine/ops/pool.h>
 #include <fieldmark/engine/ops/resample.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include <string>
 
@@ -16,7 +17,7 @@ constexpr Index kLeastSide = 16;  // pixels: one at the coarsest level
 
 void check_image(const Shape& s) {
   check_rank("DenseExtractor", "image", s, 4, "[1, height, width, 3]");
-  check_extent("DenseExtractor", "image", s, 0, 1, "one picture a pass");
+  check_extent("DenseExtractor", "image", s, 0, 1, "one image a pass");
   check_extent("DenseExtractor", "image", s, 3, 3, "red, green, blue");
   if (s[1] < kLeastSide || s[2] < kLeastSide)
     throw ShapeError(

@@ -2,6 +2,7 @@
 
 #include <fieldmark/engine/ops/softmax.h>
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include <cmath>
 
@@ -9,7 +10,7 @@ namespace fieldmark::extractor {
 namespace {
 
 constexpr Index kPlaces = 256;             // in a piece
-constexpr double kLeastForeground = 1e-3;  // places a bit: an empty picture has no evidence instead of noise
+constexpr double kLeastForeground = 1e-3;  // places a bit: an empty image has no evidence instead of noise
 constexpr double kSliver = 0.25;           // places: what a cell has to show to count
 constexpr double kTogether = 0.3;          // power of a cell's places that its evidence is divided by
 

@@ -1,6 +1,7 @@
 #include "fieldmark/extractor/pooled_extractor.h"
 
 #include <fieldmark/engine/ops/pool.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include <string>
 

@@ -1,12 +1,12 @@
-#include <fieldmark/engine/error.h>
-#include <fieldmark/engine/files.h>
-#include <fieldmark/engine/image.h>
+#include <fieldmark/core/error.h>
+#include <fieldmark/core/files.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/engine/random.h>
+#include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/analytic_scene.h>
-#include <fieldmark/nerf/solid_texture.h>
-#include <fieldmark/nerf/solids.h>
-#include <fieldmark/nerf/transforms.h>
+#include "solid_texture.h"
+#include "solids.h"
+#include "transforms.h"
 
 #include <algorithm>
 #include <array>

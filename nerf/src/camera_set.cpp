@@ -165,7 +165,7 @@ Pose draw_pose(const CameraSpan& span, CameraSet kind, Draw draw) {
   const double distance = span.distances[draw.below(span.distances.size())];
   if (kind == CameraSet::sphere)
     return look_at(span.centre + distance * draw.direction(), span.centre, span.up);
-  if (kind == CameraSet::unseen)
+  if (kind == CameraSet::extrapolated)
     return look_at(span.forward_facing ? around_box(box_of(span), draw)
                                        : span.centre + distance * unseen_direction(span.directions, draw),
                    span.centre, span.up);
@@ -173,7 +173,7 @@ Pose draw_pose(const CameraSpan& span, CameraSet kind, Draw draw) {
   Vec3 eye;
   if (span.forward_facing) {
     eye = in_box(box_of(span), draw);
-    if (kind != CameraSet::near) eye = span.centre + range.at(draw.uniform()) * (eye - span.centre);
+    if (kind != CameraSet::novel) eye = span.centre + range.at(draw.uniform()) * (eye - span.centre);
   } else {
     const Vec3 direction = near_direction(span.directions, draw);
     eye = span.centre + (distance * range.at(draw.uniform())) * direction;
@@ -238,8 +238,9 @@ CameraSpan camera_span(const Dataset& dataset) {
 
 namespace {
 constexpr std::pair<const char*, CameraSet> kSets[]{
-    {"near", CameraSet::near},     {"ring", CameraSet::ring},     {"sphere", CameraSet::sphere},
-    {"unseen", CameraSet::unseen}, {"closer", CameraSet::closer}, {"farther", CameraSet::farther},
+    {"novel", CameraSet::novel},   {"ring", CameraSet::ring},
+    {"sphere", CameraSet::sphere}, {"extrapolated", CameraSet::extrapolated},
+    {"closer", CameraSet::closer}, {"farther", CameraSet::farther},
     {"test", CameraSet::test}};
 }  // namespace
 

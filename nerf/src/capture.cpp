@@ -1,10 +1,10 @@
 #include "capture.h"
 
-#include <fieldmark/engine/files.h>
-#include <fieldmark/engine/image.h>
-#include <fieldmark/nerf/colmap.h>
-#include <fieldmark/nerf/llff.h>
-#include <fieldmark/nerf/transforms.h>
+#include <fieldmark/core/files.h>
+#include <fieldmark/imaging/image.h>
+#include "colmap.h"
+#include "llff.h"
+#include "transforms.h"
 
 #include <algorithm>
 #include <charconv>
@@ -20,7 +20,7 @@ std::vector<Shot> shots_of(const Transforms& transforms, const fs::path& folder,
   std::vector<Shot> shots;
   for (const auto& frame : transforms.frames) {
     const std::string label = "frames[" + std::to_string(shots.size()) + "]";
-    shots.push_back({.picture = (folder / frame.file_path).lexically_normal(),
+    shots.push_back({.image = (folder / frame.file_path).lexically_normal(),
                      .label = label,
                      .place = json + ": " + label + ".file_path",
                      .pose = frame.pose,
@@ -39,8 +39,8 @@ int divisor_of(const std::string& name) {
   return error == std::errc() && stop == end && n > 0 ? n : 0;
 }
 
-// The folder of pictures that fits `size`, see load_dataset(); empty where there is none.
-fs::path picture_folder(const fs::path& folder, Index size) {
+// The folder of images that fits `size`, see load_dataset(); empty where there is none.
+fs::path image_folder(const fs::path& folder, Index size) {
   fs::path best;
   Index best_side = 0;
   const Index wanted = size > 0 ? size : std::numeric_limits<Index>::max();
@@ -50,7 +50,7 @@ fs::path picture_folder(const fs::path& folder, Index size) {
       folders.push_back(entry.path());
   std::sort(folders.begin(), folders.end());
   for (const auto& f : folders) {
-    const auto pictures = pictures_in(f);
+    const auto pictures = images_in(f);
     if (pictures.empty()) continue;
     const Tensor<float> first = read_image(pictures.front());
     const Index side = std::max(first.shape[0], first.shape[1]);
@@ -70,7 +70,7 @@ bool faces_forward(const std::vector<LlffView>& views) {
 }
 }  // namespace
 
-std::vector<fs::path> pictures_in(const fs::path& folder) {
+std::vector<fs::path> images_in(const fs::path& folder) {
   std::vector<fs::path> found;
   std::error_code none;
   if (!fs::is_directory(folder, none)) return found;
@@ -84,9 +84,9 @@ std::vector<fs::path> pictures_in(const fs::path& folder) {
   return found;
 }
 
-fs::path picture_file(const Shot& shot) {
+fs::path image_file(const Shot& shot) {
   for (const char* extension : {"", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"}) {
-    fs::path file = shot.picture.string() + extension;
+    fs::path file = shot.image.string() + extension;
     std::error_code ignored;
     if (fs::is_regular_file(file, ignored)) return file;
   }
@@ -115,7 +115,7 @@ Capture read_transforms(const fs::path& folder) {
                   .may_miss = true,
                   .aabb_scale = t.aabb_scale};
   std::stable_sort(capture.shots.begin(), capture.shots.end(),
-                   [](const Shot& a, const Shot& b) { return a.picture.native() < b.picture.native(); });
+                   [](const Shot& a, const Shot& b) { return a.image.native() < b.image.native(); });
   return capture;
 }
 
@@ -127,18 +127,18 @@ Capture read_llff(const fs::path& folder, Index size) {
   } catch (const ValueError& e) {
     throw IoError(file.string() + ": " + e.what());
   }
-  const fs::path pictures = picture_folder(folder, size);
+  const fs::path pictures = image_folder(folder, size);
   if (pictures.empty())
     throw IoError(folder.string() +
-                  ": expected pictures (.png, .jpg, .jpeg) in a folder images or images_N, got none");
-  const auto files = pictures_in(pictures);
+                  ": expected images (.png, .jpg, .jpeg) in a folder images or images_N, got none");
+  const auto files = images_in(pictures);
   if (files.size() != views.size())
-    throw IoError(pictures.string() + ": expected a picture for each of the " + std::to_string(views.size()) +
+    throw IoError(pictures.string() + ": expected an image for each of the " + std::to_string(views.size()) +
                   " rows of " + file.string() + ", got " + std::to_string(files.size()));
   Capture capture{.all_splits = true, .forward_facing = faces_forward(views)};
-  capture.notes.push_back("pictures of " + pictures.filename().string());
+  capture.notes.push_back("images of " + pictures.filename().string());
   for (std::size_t i = 0; i < views.size(); ++i)
-    capture.shots.push_back({.picture = files[i],
+    capture.shots.push_back({.image = files[i],
                              .label = "the first",
                              .place = file.string() + ": row " + std::to_string(i),
                              .pose = views[i].pose,
@@ -167,14 +167,14 @@ Capture read_colmap(const fs::path& folder, Index size) {
   std::map<std::uint64_t, Vec3> seen;
   if (fs::exists(points)) seen = parse_colmap_points(read_text(points), format, points.string());
 
-  // A model may lie below its pictures' folder, where that folder itself was not given.
+  // A model may lie below its images' folder, where that folder itself was not given.
   fs::path pictures;
   for (const fs::path& base : {folder, model / "..", model / ".." / ".."})
-    if (pictures.empty()) pictures = picture_folder(base, size);
+    if (pictures.empty()) pictures = image_folder(base, size);
   if (pictures.empty()) pictures = folder / "images";
   pictures = pictures.lexically_normal();
   Capture capture{
-      .all_splits = true, .may_miss = true, .notes = {"pictures of " + pictures.filename().string()}};
+      .all_splits = true, .may_miss = true, .notes = {"images of " + pictures.filename().string()}};
   std::sort(views.begin(), views.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
   for (const ColmapImage& view : views) {
     const std::string place = images.string() + ": " + view.name;
@@ -182,7 +182,7 @@ Capture read_colmap(const fs::path& folder, Index size) {
     if (lens == lenses.end())
       throw IoError(place + ": expected a camera of " + cameras.string() + ", got number " +
                     std::to_string(view.camera));
-    capture.shots.push_back({.picture = pictures / view.name,
+    capture.shots.push_back({.image = pictures / view.name,
                              .label = "the first",
                              .place = place,
                              .pose = view.pose,

@@ -1,4 +1,4 @@
-#include <fieldmark/nerf/colmap.h>
+#include "colmap.h"
 
 #include <algorithm>
 #include <array>
@@ -89,10 +89,10 @@ ColmapImage read_image_head(Reader& reader) {
 
 void check_name(const ColmapImage& image, const auto& reader) {
   if (image.name.empty() || image.name.find('\0') != std::string::npos)
-    reader.fail("the name of a picture", "an empty text or one with a NUL");
+    reader.fail("the name of an image", "an empty text or one with a NUL");
 }
 
-// -1 is a place in the picture without a point.
+// -1 is a place in the image without a point.
 void add_point(ColmapImage& image, std::int64_t key, const auto& reader) {
   if (key < -1) reader.fail("the key of a point, or -1", std::to_string(key));
   if (key >= 0) image.points.push_back(static_cast<std::uint64_t>(key));
@@ -148,10 +148,10 @@ std::vector<ColmapImage> parse_colmap_images(std::string_view bytes, ColmapForma
     ColmapBytes in(bytes, name);
     for (auto left = in.count(4 + 7 * 8 + 4 + 1 + 8, "a count of images"); left > 0; --left) {
       ColmapImage image = read_image_head(in);
-      image.name = in.text("the name of a picture");
+      image.name = in.text("the name of an image");
       check_name(image, in);
-      for (auto n = in.count(8 + 8 + 8, "a count of places in the picture"); n > 0; --n) {
-        in.skip(16);  // where in the picture
+      for (auto n = in.count(8 + 8 + 8, "a count of places in the image"); n > 0; --n) {
+        in.skip(16);  // where in the image
         add_point(image, in.get<std::int64_t>("the key of a point"), in);
       }
       images.push_back(std::move(image));
@@ -161,12 +161,12 @@ std::vector<ColmapImage> parse_colmap_images(std::string_view bytes, ColmapForma
     ColmapLines in(bytes, name);
     while (in.next_record()) {
       ColmapImage image = read_image_head(in);
-      image.name = in.rest("the name of a picture");
+      image.name = in.rest("the name of an image");
       check_name(image, in);
-      // The line of places in the picture may be empty, and the last may lack.
+      // The line of places in the image may be empty, and the last may lack.
       if (in.next())
         while (!in.at_end()) {
-          in.number("a place in the picture"), in.number("a place in the picture");
+          in.number("a place in the image"), in.number("a place in the image");
           add_point(image, in.get<std::int64_t>("the key of a point"), in);
         }
       images.push_back(std::move(image));

@@ -1,6 +1,6 @@
 #pragma once
 // The two ways a COLMAP file is written, read record by record through one set of calls. Private.
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 
 #include <charconv>
 #include <cmath>

@@ -1,9 +1,9 @@
-#include <fieldmark/engine/error.h>
-#include <fieldmark/engine/image.h>
+#include <fieldmark/core/error.h>
 #include <fieldmark/engine/parallel.h>
-#include <fieldmark/engine/resize.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/resize.h>
 #include <fieldmark/nerf/dataset.h>
-#include <fieldmark/nerf/lens.h>
+#include "lens.h"
 
 #include <algorithm>
 #include <exception>
@@ -43,13 +43,13 @@ Tensor<float> resize_rgba(Tensor<float> image, Index height, Index width) {
 struct Plan {
   std::vector<Shot> shots;
   std::vector<fs::path> files;
-  Index size = 0;               // of the pictures before they are cut, 0: as they are
-  Index width = 0, height = 0;  // of the first picture where there are lenses
+  Index size = 0;               // of the images before they are cut, 0: as they are
+  Index width = 0, height = 0;  // of the first image where there are lenses
   std::optional<Crop> part{};   // where there are lenses
 };
 
 [[noreturn]] void fail_size(const Plan& plan, const Shot& shot, Index w0, Index h0, Index w, Index h) {
-  throw IoError(shot.place + ": expected a picture of " + std::to_string(w0) + " x " + std::to_string(h0) +
+  throw IoError(shot.place + ": expected an image of " + std::to_string(w0) + " x " + std::to_string(h0) +
                 " pixels as " + plan.shots.front().label + ", got " + std::to_string(w) + " x " +
                 std::to_string(h));
 }
@@ -75,7 +75,7 @@ View read_view(const Plan& plan, std::size_t i) {
   if (plan.part) {
     if (width != plan.width || height != plan.height)
       fail_size(plan, shot, plan.width, plan.height, width, height);
-    view.rgba = undistorted_picture(view.rgba, view.camera, shot.intrinsics.lens, *plan.part);
+    view.rgba = undistorted_image(view.rgba, view.camera, shot.intrinsics.lens, *plan.part);
     const auto shrunk = [&](Index side, Index from, Index to) {
       return std::max<Index>(1, (2 * side * to + from) / (2 * from));
     };
@@ -87,7 +87,7 @@ View read_view(const Plan& plan, std::size_t i) {
   return view;
 }
 
-// The part of a picture that every lens of the capture covers.
+// The part of an image that every lens of the capture covers.
 void plan_lenses(const std::vector<Shot>& all, Plan& plan, std::vector<std::string>& notes) {
   if (std::all_of(all.begin(), all.end(), [](const Shot& s) { return s.intrinsics.lens.is_pinhole(); }))
     return;
@@ -111,15 +111,14 @@ void plan_lenses(const std::vector<Shot>& all, Plan& plan, std::vector<std::stri
     right = std::min(right, part.left + part.width), bottom = std::min(bottom, part.top + part.height);
   }
   if (left >= right || top >= bottom)
-    throw IoError(all.front().place +
-                  ": expected lenses that have a part of the picture in common, got none");
+    throw IoError(all.front().place + ": expected lenses that have a part of the image in common, got none");
   plan.part = {.left = left, .top = top, .width = right - left, .height = bottom - top};
-  notes.push_back("lens distortion removed: pictures of " + std::to_string(plan.width) + " x " +
+  notes.push_back("lens distortion removed: images of " + std::to_string(plan.width) + " x " +
                   std::to_string(plan.height) + " pixels are cut to the " + std::to_string(right - left) +
                   " x " + std::to_string(bottom - top) + " that all of them have");
 }
 
-// The shots of a split, with the files of their pictures.
+// The shots of a split, with the files of their images.
 Plan plan_split(const Capture& capture, const DatasetOptions& options, const fs::path& folder,
                 std::vector<std::string>& notes) {
   Plan plan{.shots = {}, .files = {}, .size = options.size};
@@ -129,27 +128,27 @@ Plan plan_split(const Capture& capture, const DatasetOptions& options, const fs:
   for (std::size_t i = 0; i < capture.shots.size(); ++i) {
     if (capture.all_splits && (options.split == "train") == (i % kHeldOut == 0)) continue;
     const Shot& shot = capture.shots[i];
-    const fs::path file = picture_file(shot);
+    const fs::path file = image_file(shot);
     ++wanted;
     if (!file.empty()) {
       plan.shots.push_back(shot), plan.files.push_back(file);
     } else if (capture.may_miss) {
-      if (missing++ == 0) first_missing = shot.picture.string();
+      if (missing++ == 0) first_missing = shot.image.string();
     } else {
-      throw IoError(shot.place + ": expected a picture, got no file " + shot.picture.string() + ".png");
+      throw IoError(shot.place + ": expected an image, got no file " + shot.image.string() + ".png");
     }
   }
   if (plan.shots.empty())
     throw IoError(
-        folder.string() + ": expected pictures to " + options.split + " on, got none" +
+        folder.string() + ": expected images to " + options.split + " on, got none" +
         (missing > 0
              ? ": all " + std::to_string(wanted) + " are missing, the first is " + first_missing
              : ": there are " + std::to_string(capture.shots.size()) + " views, and every 8th is held out"));
   if (capture.all_splits)
     notes.push_back("every 8th of " + std::to_string(capture.shots.size()) +
-                    " pictures is held out for val and test");
+                    " images is held out for val and test");
   if (missing > 0)
-    notes.push_back(std::to_string(missing) + " of " + std::to_string(wanted) + " pictures of " +
+    notes.push_back(std::to_string(missing) + " of " + std::to_string(wanted) + " images of " +
                     options.split + " are missing and left out, the first is " + first_missing);
   return plan;
 }
@@ -172,7 +171,7 @@ Capture read_capture(const fs::path& folder, Layout layout, const DatasetOptions
   }
 }
 
-// In parallel; the first picture's error is the one reported, however many threads read.
+// In parallel; the first image's error is the one reported, however many threads read.
 std::vector<View> read_views(const Plan& plan) {
   const std::size_t count = plan.shots.size();
   std::vector<View> views(count);

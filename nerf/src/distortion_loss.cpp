@@ -1,3 +1,4 @@
+#include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/nerf/distortion_loss.h>
 
 #include <algorithm>

@@ -1,6 +1,6 @@
-#include <fieldmark/engine/error.h>
-#include <fieldmark/engine/image.h>
-#include <fieldmark/engine/metrics.h>
+#include <fieldmark/core/error.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/metrics.h>
 #include <fieldmark/nerf/evaluation.h>
 
 #include <algorithm>
@@ -49,7 +49,7 @@ Evaluation evaluate(Renderer& renderer, const Dataset& dataset,
     const double none = std::numeric_limits<double>::quiet_NaN();
     result.per_view.push_back(
         {.psnr = psnr(rendering.rgb, photograph),
-         .psnr_object = psnr_masked(rendering.rgb, photograph, object_mask(view, rendering)),
+         .psnr_foreground = psnr_masked(rendering.rgb, photograph, object_mask(view, rendering)),
          .ssim = side >= kSsimWindow ? ssim(rendering.rgb, photograph) : none,
          .lpips = lpips && side >= lpips->smallest()
                       ? lpips->distance(quantize8(rendering.rgb), quantize8(photograph)).value
@@ -58,7 +58,7 @@ Evaluation evaluate(Renderer& renderer, const Dataset& dataset,
     if (progress && !progress(result.views, static_cast<Index>(dataset.views.size()))) break;
   }
   result.psnr = mean(result.per_view, &ViewScore::psnr);
-  result.psnr_object = mean(result.per_view, &ViewScore::psnr_object);
+  result.psnr_foreground = mean(result.per_view, &ViewScore::psnr_foreground);
   result.ssim = mean(result.per_view, &ViewScore::ssim);
   result.lpips = mean(result.per_view, &ViewScore::lpips);
   result.seconds_per_view = seconds / static_cast<double>(result.views);

@@ -1,23 +1,23 @@
-#include <fieldmark/engine/error.h>
-#include <fieldmark/nerf/intrinsics.h>
+#include "intrinsics.h"
+#include <fieldmark/core/error.h>
 
 #include <cmath>
 #include <string>
 
 namespace fieldmark::nerf {
 
-Camera Intrinsics::camera(const Pose& pose, Index picture_width, Index picture_height) const {
+Camera Intrinsics::camera(const Pose& pose, Index image_width, Index image_height) const {
   if (!(fl_x > 0) && !(angle_x > 0)) throw ValueError("[camera] intrinsics: fl_x or angle_x must be stated");
-  const auto w = static_cast<double>(picture_width), h = static_cast<double>(picture_height);
+  const auto w = static_cast<double>(image_width), h = static_cast<double>(image_height);
   const bool sized = width > 0 && height > 0;
   const double sx = sized ? w / static_cast<double>(width) : 1,
                sy = sized ? h / static_cast<double>(height) : 1;
   if (sized && std::abs(sx - sy) > 1 / static_cast<double>(width) + 1 / static_cast<double>(height))
-    throw ValueError("[camera] picture: must be of " + std::to_string(width) + " x " +
-                     std::to_string(height) + " pixels as stated, or that scaled, got " +
-                     std::to_string(picture_width) + " x " + std::to_string(picture_height));
-  Camera c = angle_x > 0 ? make_camera(pose, angle_x, picture_width, picture_height)
-                         : Camera{.pose = pose, .width = picture_width, .height = picture_height};
+    throw ValueError("[camera] image: must be of " + std::to_string(width) + " x " + std::to_string(height) +
+                     " pixels as stated, or that scaled, got " + std::to_string(image_width) + " x " +
+                     std::to_string(image_height));
+  Camera c = angle_x > 0 ? make_camera(pose, angle_x, image_width, image_height)
+                         : Camera{.pose = pose, .width = image_width, .height = image_height};
   if (fl_x > 0) c.fx = fl_x * sx;
   if (fl_y > 0)
     c.fy = fl_y * sy;

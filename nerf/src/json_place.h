@@ -1,6 +1,6 @@
 #pragma once
 // A value inside a JSON text that knows where it stands, so that errors can say so. Private.
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 #include <fieldmark/nerf/camera.h>
 
 #include <algorithm>

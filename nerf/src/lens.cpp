@@ -1,5 +1,5 @@
-#include <fieldmark/engine/error.h>
-#include <fieldmark/nerf/lens.h>
+#include "lens.h"
+#include <fieldmark/core/error.h>
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +19,7 @@ std::array<double, 3> derivative(const Lens& l, const Vec2& q) {
 double determinant(const std::array<double, 3>& m) { return m[0] * m[2] - m[1] * m[1]; }
 
 Vec2 on_plane(const Camera& c, double x, double y) { return {(x - c.cx) / c.fx, (y - c.cy) / c.fy}; }
-Vec2 on_picture(const Camera& c, const Vec2& q) { return {q[0] * c.fx + c.cx, q[1] * c.fy + c.cy}; }
+Vec2 on_image(const Camera& c, const Vec2& q) { return {q[0] * c.fx + c.cx, q[1] * c.fy + c.cy}; }
 
 std::string short_number(double x) {
   char text[32];
@@ -34,17 +34,17 @@ void check_invertible(const Camera& c, const Lens& lens) {
       const double x = static_cast<double>(c.width) * j / kSteps;
       const double y = static_cast<double>(c.height) * i / kSteps;
       if (!lens.undistorted(on_plane(c, x, y)))
-        throw ValueError("[covered_part] lens: must have an inverse everywhere in the picture, got " +
+        throw ValueError("[covered_part] lens: must have an inverse everywhere in the image, got " +
                          lens.text() + ", which has none at pixel (" + short_number(x) + ", " +
                          short_number(y) + ") of " + std::to_string(c.width) + " x " +
                          std::to_string(c.height));
     }
 }
 
-// Whether the lens's picture has what the pinhole sees at a pixel.
+// Whether the lens's image has what the pinhole sees at a pixel.
 bool has_source(const Camera& c, const Lens& lens, Index column, Index row) {
   const Vec2 q = on_plane(c, static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5);
-  const Vec2 p = on_picture(c, lens.distorted(q));
+  const Vec2 p = on_image(c, lens.distorted(q));
   return p[0] >= 0 && p[1] >= 0 && p[0] <= static_cast<double>(c.width) &&
          p[1] <= static_cast<double>(c.height) && lens.is_regular(q);
 }
@@ -143,13 +143,13 @@ Crop covered_part(const Camera& camera, const Lens& lens) {
     if (worst == 2) ++r.top;
     (worst < 2 ? r.width : r.height) -= 1;
   }
-  throw ValueError("[covered_part] lens: must leave a part of the picture, got " + lens.text());
+  throw ValueError("[covered_part] lens: must leave a part of the image, got " + lens.text());
 }
 
 Camera cropped(const Camera& camera, const Crop& part) {
   if (part.left < 0 || part.top < 0 || part.width < 1 || part.height < 1 ||
       part.left + part.width > camera.width || part.top + part.height > camera.height)
-    throw ValueError("[cropped] part must be within the picture of " + std::to_string(camera.width) + " x " +
+    throw ValueError("[cropped] part must be within the image of " + std::to_string(camera.width) + " x " +
                      std::to_string(camera.height) + ", got " + std::to_string(part.width) + " x " +
                      std::to_string(part.height) + " at (" + std::to_string(part.left) + ", " +
                      std::to_string(part.top) + ")");
@@ -159,10 +159,10 @@ Camera cropped(const Camera& camera, const Crop& part) {
   return c;
 }
 
-Tensor<float> undistorted_picture(const Tensor<float>& rgba, const Camera& camera, const Lens& lens,
-                                  const Crop& part) {
+Tensor<float> undistorted_image(const Tensor<float>& rgba, const Camera& camera, const Lens& lens,
+                                const Crop& part) {
   if (rgba.shape != Shape{camera.height, camera.width, 4})
-    throw ShapeError("[undistorted_picture] rgba must be [height, width, 4] of the camera, " +
+    throw ShapeError("[undistorted_image] rgba must be [height, width, 4] of the camera, " +
                      std::to_string(camera.height) + " x " + std::to_string(camera.width) + ", got shape " +
                      rgba.shape.str());
   cropped(camera, part);  // checks
@@ -171,7 +171,7 @@ Tensor<float> undistorted_picture(const Tensor<float>& rgba, const Camera& camer
     for (Index x = 0; x < part.width; ++x) {
       const Vec2 q =
           on_plane(camera, static_cast<double>(part.left + x) + 0.5, static_cast<double>(part.top + y) + 0.5);
-      sample(rgba, on_picture(camera, lens.distorted(q)), out.data.data() + 4 * (y * part.width + x));
+      sample(rgba, on_image(camera, lens.distorted(q)), out.data.data() + 4 * (y * part.width + x));
     }
   return out;
 }

@@ -1,6 +1,6 @@
-#include <fieldmark/engine/error.h>
-#include <fieldmark/nerf/llff.h>
-#include <fieldmark/nerf/npy.h>
+#include "llff.h"
+#include <fieldmark/core/error.h>
+#include "npy.h"
 
 #include <cmath>
 #include <string>

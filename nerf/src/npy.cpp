@@ -1,5 +1,5 @@
-#include <fieldmark/engine/error.h>
-#include <fieldmark/nerf/npy.h>
+#include "npy.h"
+#include <fieldmark/core/error.h>
 
 #include <bit>
 #include <cstdint>

@@ -1,5 +1,5 @@
-#include <fieldmark/engine/error.h>
-#include <fieldmark/engine/image.h>
+#include <fieldmark/core/error.h>
+#include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/rendered_dataset.h>
 
 #include <algorithm>

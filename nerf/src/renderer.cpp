@@ -1,6 +1,6 @@
 #include <fieldmark/engine/ops/rows.h>
 #include <fieldmark/engine/parallel.h>
-#include <fieldmark/engine/resize.h>
+#include <fieldmark/imaging/resize.h>
 #include <fieldmark/nerf/renderer.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
+#include "scene_space.h"
 #include <fieldmark/nerf/camera_set.h>
-#include <fieldmark/nerf/scene_space.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,7 +13,7 @@ constexpr double kRayStart = 0.02;  // in the same
 constexpr double kBefore = 0.95;    // of the nearest bound: what is in front of it is cut off
 constexpr double kRim = 1.02;       // of the widest ray
 
-// The plane from the data set's bounds; slopes so that the rays through every picture's corners stay inside,
+// The plane from the data set's bounds; slopes so that the rays through every image's corners stay inside,
 // where they pass the plane and at infinity.
 Space device_coordinates(const Dataset& data) {
   Space space{.kind = SpaceKind::ndc};

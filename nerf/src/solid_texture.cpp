@@ -1,4 +1,4 @@
-#include <fieldmark/nerf/solid_texture.h>
+#include "solid_texture.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include <fieldmark/nerf/solids.h>
+#include "solids.h"
 
 #include <algorithm>
 #include <cmath>

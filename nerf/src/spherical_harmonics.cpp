@@ -1,4 +1,5 @@
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/nerf/spherical_harmonics.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
+#include "table_rows.h"
 #include <fieldmark/engine/parallel.h>
-#include <fieldmark/nerf/table_rows.h>
 
 #include <algorithm>
 #include <array>

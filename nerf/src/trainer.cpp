@@ -5,9 +5,9 @@
 #include <fieldmark/nerf/composite.h>
 #include <fieldmark/nerf/distortion_loss.h>
 #include <fieldmark/nerf/photometric_loss.h>
-#include <fieldmark/nerf/scene_space.h>
 #include <fieldmark/nerf/trainer.h>
-#include <fieldmark/nerf/training_pixels.h>
+#include "scene_space.h"
+#include "training_pixels.h"
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
-#include <fieldmark/engine/error.h>
+#include "training_pixels.h"
+#include <fieldmark/core/error.h>
 #include <fieldmark/engine/parallel.h>
-#include <fieldmark/nerf/training_pixels.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include <fieldmark/nerf/transforms.h>
+#include "transforms.h"
 
 #include <cmath>
 #include <numbers>
@@ -75,8 +75,8 @@ Pose parse_pose(const JsonPlace& matrix) {
 Transforms::Frame parse_frame(const JsonPlace& frame, const JsonPlace& root, const Intrinsics& all) {
   const JsonPlace file = frame["file_path"];
   Transforms::Frame made{.file_path = file.text(), .intrinsics = all};
-  if (made.file_path.empty()) file.fail("the name of a picture", "an empty text");
-  if (made.file_path.find('\0') != std::string::npos) file.fail("the name of a picture", "a text with a NUL");
+  if (made.file_path.empty()) file.fail("the name of an image", "an empty text");
+  if (made.file_path.find('\0') != std::string::npos) file.fail("the name of an image", "a text with a NUL");
   parse_intrinsics(frame, made.intrinsics);
   if (made.intrinsics.fl_x == 0 && made.intrinsics.angle_x == 0)
     root.fail("the key \"camera_angle_x\" or \"fl_x\"", "neither, nor in " + frame.place());

@@ -1,5 +1,5 @@
-#include <fieldmark/engine/error.h>
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/nerf/visual_hull.h>
 
 #include <algorithm>
@@ -32,7 +32,7 @@ struct Coverage {
     const double x = m[0] * d[0] + m[4] * d[1] + m[8] * d[2], y = m[1] * d[0] + m[5] * d[1] + m[9] * d[2];
     const double depth = -(m[2] * d[0] + m[6] * d[1] + m[10] * d[2]);
     if (depth <= radius) return true;
-    // The ball's nearest point bounds how large it can look; one more pixel for the picture's own sampling.
+    // The ball's nearest point bounds how large it can look; one more pixel for the image's own sampling.
     const double r = std::max(camera.fx, camera.fy) * radius / (depth - radius) + 1;
     const double u = camera.cx + camera.fx * x / depth, v = camera.cy - camera.fy * y / depth;
     const auto u0 = static_cast<Index>(std::floor(u - r)), u1 = static_cast<Index>(std::ceil(u + r));

@@ -1,5 +1,5 @@
 #include <fieldmark/baselines/cell_runner.h>
-#include <fieldmark/engine/image.h>
+#include <fieldmark/imaging/image.h>
 
 #include <cmath>
 
@@ -42,12 +42,12 @@ TEST_CASE("cell_runner: a cell of the built-in scene, from training to files") {
   CHECK(measured.cell.name == name);
   CHECK(measured.cell.steps >= 1);
   CHECK(measured.cell.under.contains("noise_0.1"));
-  CHECK(measured.cell.psnr_base_object == Approx(34).margin(3));
+  CHECK(measured.cell.psnr_base_foreground == Approx(34).margin(3));
   CHECK(std::isnan(measured.cell.own_2d_accuracy));
   CHECK(measured.cell.psnr_photo > 5);
   CHECK(measured.cell.more.at("photographs") == 2);
   CHECK(measured.cell.commit == "abc");
-  CHECK(measured.picture.shape == Shape{32, 64, 3});
+  CHECK(measured.image.shape == Shape{32, 64, 3});
   CHECK(!kept_curve(measured.cell).empty());
   // A run of another budget neither finds this one's networks nor goes on with them.
   CHECK(std::filesystem::exists(folder / "work/0.2s-0.5s/ours-objects-hash-16-1.checkpoint"));

@@ -1,6 +1,6 @@
 #include <fieldmark/baselines/cell.h>
-#include <fieldmark/engine/error.h>
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/error.h>
+#include <fieldmark/core/files.h>
 
 #include <cmath>
 
@@ -19,7 +19,7 @@ Cell sample() {
           .spread = 0.1,
           .own_2d_accuracy = 0.98,
           .psnr_base = 31.25,
-          .psnr_base_object = 26,
+          .psnr_base_foreground = 26,
           .psnr_photo = 27,
           .ssim = 0.9,
           .lpips = std::nan(""),
@@ -54,8 +54,8 @@ TEST_CASE("cell: the keys that scripts read, null where nothing was measured") {
   const std::string text = format_cell(sample());
   std::size_t at = 0;
   for (const char* key : {"system", "scene", "field", "bits", "seed", "steps", "seconds", "bit_accuracy",
-                          "spread", "own_2d_accuracy", "psnr_base", "psnr_base_object", "psnr_photo", "ssim",
-                          "lpips", "under", "commit"}) {
+                          "spread", "own_2d_accuracy", "psnr_base", "psnr_base_foreground", "psnr_photo",
+                          "ssim", "lpips", "under", "commit"}) {
     const std::size_t found = text.find("\"" + std::string(key) + "\":", at);
     CAPTURE(key);
     REQUIRE(found != std::string::npos);

@@ -1,4 +1,4 @@
-#include <fieldmark/baselines/conv_block.h>
+#include "conv_block.h"
 #include <fieldmark/engine/ops/batch_norm.h>
 #include <fieldmark/engine/ops/conv2d.h>
 

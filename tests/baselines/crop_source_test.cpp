@@ -1,5 +1,5 @@
-#include <fieldmark/baselines/crop_source.h>
-#include <fieldmark/engine/error.h>
+#include "crop_source.h"
+#include <fieldmark/core/error.h>
 
 #include <algorithm>
 #include <cmath>
@@ -27,19 +27,19 @@ TEST_CASE("crop_source: windows are parts of their photographs") {
   CHECK(crops.photograph(40, 0).shape == Shape{40, 40, 3});
 }
 
-TEST_CASE("crop_source: half of the pictures are textures, and hardly any picture is blank") {
+TEST_CASE("crop_source: half of the images are textures, and hardly any image is blank") {
   Tensor<float> photograph({64, 64, 3}, 1.f);  // white but for a corner
   for (Index y = 0; y < 32; ++y)
     for (Index x = 0; x < 32; ++x) photograph[(y * 64 + x) * 3] = static_cast<float>((x + y) % 2);
   const CropSource crops({photograph}, 1);
   int blank = 0, whole = 0;
   for (std::uint64_t k = 0; k < 60; ++k) {
-    const auto picture = crops.picture(16, k);
-    const auto [low, high] = std::minmax_element(picture.data.begin(), picture.data.end());
+    const auto image = crops.image(16, k);
+    const auto [low, high] = std::minmax_element(image.data.begin(), image.data.end());
     CHECK(*low >= 0);
     CHECK(*high <= 1);
     blank += *low == *high;
-    whole += std::ranges::all_of(picture.data, [](float v) { return v == 0 || v == 1; });
+    whole += std::ranges::all_of(image.data, [](float v) { return v == 0 || v == 1; });
   }
   CHECK(blank <= 6);
   CHECK(whole >= 18);
@@ -52,7 +52,7 @@ TEST_CASE("crop_source: half of the pictures are textures, and hardly any pictur
 TEST_CASE("crop_source: errors") {
   CHECK_THROWS_AS(CropSource({Tensor<float>({4, 4, 1})}, 1), ShapeError);
   CHECK_THROWS_WITH(CropSource({}, 1).photograph(8, 0), "[crop_source] photographs must not be empty");
-  CHECK(CropSource({}, 1).picture(8, 0).shape == Shape{8, 8, 3});
+  CHECK(CropSource({}, 1).image(8, 0).shape == Shape{8, 8, 3});
   CHECK_THROWS_WITH(generated_texture(0, CounterRng(1), 0),
                     "[generated_texture] size must be at least 1, got 0");
 }

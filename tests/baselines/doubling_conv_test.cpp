@@ -1,4 +1,4 @@
-#include <fieldmark/baselines/doubling_conv.h>
+#include "doubling_conv.h"
 #include <fieldmark/engine/ops/resample.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-#include <fieldmark/baselines/hiding_network.h>
+#include "hiding_network.h"
 
 #include "support/run_op.h"
 
@@ -8,13 +8,13 @@ using namespace fieldmark::baselines;
 namespace {
 
 std::vector<float> encoded(const HidingNetwork<float>& net, const ParamStore<float>& store,
-                           const Tensor<float>& pictures, const Tensor<float>& messages) {
+                           const Tensor<float>& images, const Tensor<float>& messages) {
   return op_values<float>(
       [&](auto&, auto v) {
         NormPass<float> pass{.running = true};
         return net.encode(Params<float>(store, nullptr), v[0], v[1], pass);
       },
-      {pictures, messages});
+      {images, messages});
 }
 
 }  // namespace
@@ -34,20 +34,20 @@ TEST_CASE("hiding_network: HiDDeN's layers") {
   CHECK_THROWS_AS(store.find("discriminator/3/conv/weight"), ValueError);
 }
 
-TEST_CASE("hiding_network: any size of pictures, and a bit changes its own picture alone") {
+TEST_CASE("hiding_network: any size of images, and a bit changes its own image alone") {
   ParamStore<float> store;
   const HiddenNetwork<float> net(store, {.bits = 3, .channels = 4}, 1);
-  const auto pictures = uniform<float>({2, 9, 7, 3}, -1, 1, 1);
+  const auto images = uniform<float>({2, 9, 7, 3}, -1, 1, 1);
   Tensor<float> messages({2, 3});
-  const auto before = encoded(net, store, pictures, messages);
-  messages[4] = 1;  // of the second picture
-  const auto after = encoded(net, store, pictures, messages);
+  const auto before = encoded(net, store, images, messages);
+  messages[4] = 1;  // of the second image
+  const auto after = encoded(net, store, images, messages);
   REQUIRE(before.size() == 2 * 9 * 7 * 3);
   for (std::size_t i = 0; i < before.size() / 2; ++i) CHECK(before[i] == after[i]);
   CHECK(before != after);
   Tape<float> tape;
   NormPass<float> pass;
-  const auto x = tape.constant(pictures);
+  const auto x = tape.constant(images);
   CHECK(net.decode(Params<float>(store, nullptr), x, pass).shape() == Shape{2, 3});
   ParamStore<float> other;
   const Discriminator<float> critic(other, {.channels = 4}, 1);
@@ -69,9 +69,9 @@ TEST_CASE("hiding_network: threads and errors") {
   const Params<float> params(store, nullptr);
   const Tensor<float> x({2, 8, 8, 3}), few({1, 3}), grey({2, 8, 8, 1});
   CHECK_THROWS_WITH(net.encode(params, tape.constant(x), tape.constant(few), pass),
-                    "[hidden_network] messages: axis 0 must be 2 (one for each picture), got shape [1, 3]");
+                    "[hidden_network] messages: axis 0 must be 2 (one for each image), got shape [1, 3]");
   CHECK_THROWS_WITH(net.decode(params, tape.constant(grey), pass),
-                    "[hidden_network] pictures: axis 3 must be 3 (red, green, blue), got shape [2, 8, 8, 1]");
+                    "[hidden_network] images: axis 3 must be 3 (red, green, blue), got shape [2, 8, 8, 1]");
   CHECK_THROWS_WITH((HiddenNetwork<float>(store, {.bits = 0}, 1)),
                     "[hiding_network] bits and channels must be at least 1, got 0 and 64");
 }

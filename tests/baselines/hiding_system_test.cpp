@@ -1,5 +1,5 @@
-#include <fieldmark/baselines/hiding_system.h>
-#include <fieldmark/engine/metrics.h>
+#include "hiding_system.h"
+#include <fieldmark/imaging/metrics.h>
 #include <fieldmark/nerf/analytic_scene.h>
 
 #include "nerf/small_field.h"
@@ -9,8 +9,8 @@ using namespace fieldmark;
 using namespace fieldmark::baselines;
 
 namespace {
-std::shared_ptr<const PictureMarker> marker() {
-  return std::make_shared<PictureMarker>(HidingKind::hidden, HidingOptions{.bits = 6, .channels = 4}, 1);
+std::shared_ptr<const ImageMarker> marker() {
+  return std::make_shared<ImageMarker>(HidingKind::hidden, HidingOptions{.bits = 6, .channels = 4}, 1);
 }
 }  // namespace
 
@@ -38,7 +38,7 @@ TEST_CASE("hiding_system: marked photographs keep what is transparent, and their
       changed += before[4 * p] != after[4 * p];
     }
     CHECK(changed > 0);
-    // Over the whole picture at most as strong as asked for: the background's part is lost.
+    // Over the whole image at most as strong as asked for: the background's part is lost.
     CHECK(psnr(nerf::composited(marked.views[v], data.background),
                nerf::composited(data.views[v], data.background)) > 25.5);
   }
@@ -52,7 +52,7 @@ TEST_CASE("hiding_system: two fields shown in turns with a message and its oppos
   const MarkedScene scene = marked_scene(marker(), {field, other}, message);
   CHECK(scene.message(0) == message);
   CHECK(scene.message(3) == opposite(message));
-  const auto camera = nerf::make_cameras(field->cameras, nerf::CameraSet::near, 1, 0, 5).front();
+  const auto camera = nerf::make_cameras(field->cameras, nerf::CameraSet::novel, 1, 0, 5).front();
   CHECK(scene.render(camera, message).data == nerf::Renderer(*field).render(camera).rgb.data);
   CHECK(scene.render(camera, opposite(message)).data == nerf::Renderer(*other).render(camera).rgb.data);
   // A constant reading is right on half of the bits of any message and its opposite together.
@@ -60,11 +60,11 @@ TEST_CASE("hiding_system: two fields shown in turns with a message and its oppos
   CHECK(scene.accuracy(grey, message) + scene.accuracy(grey, opposite(message)) == Approx(1));
 }
 
-TEST_CASE("hiding_system: marks on renders, and on its own pictures") {
+TEST_CASE("hiding_system: marks on renders, and on its own images") {
   const auto field = std::make_shared<const nerf::RadianceField>(small_field());
   const auto net = marker();
   const MarkedScene scene = marked_renders(net, field, 3, 28);
-  const auto camera = nerf::make_cameras(field->cameras, nerf::CameraSet::near, 1, 0, 5).front();
+  const auto camera = nerf::make_cameras(field->cameras, nerf::CameraSet::novel, 1, 0, 5).front();
   const auto render = nerf::Renderer(*field).render(camera).rgb;
   CHECK(scene.message(2) == message_of_view(6, 3, 2));
   CHECK(psnr(scene.render(camera, scene.message(2)), render) == Approx(28).margin(1));
@@ -80,7 +80,7 @@ TEST_CASE("hiding_system: marks on renders, and on its own pictures") {
   const auto read = net->read(render);
   CHECK(accuracy_of(*net, {render, render}, read) == 1);
   CHECK(accuracy_of(*net, {render}, opposite(read)) == 0);
-  CHECK_THROWS_WITH(accuracy_of(*net, {}, read), "[accuracy_of] pictures must not be empty");
+  CHECK_THROWS_WITH(accuracy_of(*net, {}, read), "[accuracy_of] images must not be empty");
   CHECK_THROWS_WITH(own_scores(*net, CropSource({render}, 1), 0, 16, 1),
                     "[own_scores] count must be at least 1, got 0");
 }

@@ -1,4 +1,4 @@
-#include <fieldmark/baselines/hiding_trainer.h>
+#include "hiding_trainer.h"
 #include <fieldmark/engine/parallel.h>
 
 #include <algorithm>
@@ -18,11 +18,11 @@ HidingTrainOptions tiny(Index steps) {
   o.crop = 32;
   o.first_crop = 16;
   o.first_part = 0.5;
-  o.first_strength = o.strength;  // files and noise layers from the first step on
+  o.first_mark_psnr = o.mark_psnr;  // files and noise layers from the first step on
   return o;
 }
 
-PictureMarker tiny_marker(HidingKind kind) { return {kind, {.bits = 2, .channels = 8}, 1}; }
+ImageMarker tiny_marker(HidingKind kind) { return {kind, {.bits = 2, .channels = 8}, 1}; }
 
 }  // namespace
 
@@ -31,14 +31,14 @@ TEST_CASE("hiding_trainer: the same numbers for any threads and across a checkpo
   const CropSource crops({}, 1);
   for (const HidingKind kind : {HidingKind::hidden, HidingKind::mbrs}) {
     CAPTURE(hiding_name(kind));
-    PictureMarker one = tiny_marker(kind), two = tiny_marker(kind);
+    ImageMarker one = tiny_marker(kind), two = tiny_marker(kind);
     const int before = threads();
     set_threads(1);
     HidingTrainer straight(one, crops, tiny(6));
     while (!straight.done()) straight.step(0);
     set_threads(2);
     {
-      PictureMarker begun = tiny_marker(kind);
+      ImageMarker begun = tiny_marker(kind);
       HidingTrainer first(begun, crops, tiny(6));
       for (int k = 0; k < 4; ++k) first.step(0);
       first.save(folder / "c");
@@ -56,17 +56,17 @@ TEST_CASE("hiding_trainer: the same numbers for any threads and across a checkpo
 
 TEST_CASE("hiding_trainer: one bit is learnt in some steps") {
   const CropSource crops({}, 1);
-  PictureMarker marker(HidingKind::hidden, {.bits = 1, .channels = 8}, 1);
+  ImageMarker marker(HidingKind::hidden, {.bits = 1, .channels = 8}, 1);
   HidingTrainOptions options = tiny(150);
   options.batch = 8;
-  options.first_strength = 14;
+  options.first_mark_psnr = 14;
   options.crop = 16;
   options.schedule.lr = 5e-3;
   HidingTrainer trainer(marker, crops, options);
   while (!trainer.done()) trainer.step(0);
-  INFO("bits right " << trainer.figures().bits << ", " << trainer.figures().strength << " dB");
+  INFO("bits right " << trainer.figures().bits << ", " << trainer.figures().mark_psnr << " dB");
   CHECK(trainer.figures().bits > 0.8);
-  CHECK(trainer.figures().strength > options.first_strength);
+  CHECK(trainer.figures().mark_psnr > options.first_mark_psnr);
 }
 
 TEST_CASE("hiding_trainer: the authors' weights, and errors") {
@@ -75,23 +75,23 @@ TEST_CASE("hiding_trainer: the authors' weights, and errors") {
   CHECK(hiding_train_options(HidingKind::mbrs).adversary_weight == 1e-4);
   const TemporaryFolder folder;
   const CropSource crops({}, 1);
-  PictureMarker marker = tiny_marker(HidingKind::hidden);
+  ImageMarker marker = tiny_marker(HidingKind::hidden);
   HidingTrainOptions options = tiny(2);
   options.crop = 40;
   CHECK_THROWS_WITH(HidingTrainer(marker, crops, options),
                     "[hiding_trainer] batch must be at least 2 and both crops multiples of 16, got 2, 40 and "
                     "16");
   options = tiny(2);
-  options.strength = 10;
+  options.mark_psnr = 10;
   CHECK_THROWS_WITH(HidingTrainer(marker, crops, options),
-                    Contains("[hiding_trainer] strength must be at least first_strength, got 10"));
+                    Contains("[hiding_trainer] strength must be at least first_mark_psnr, got 10"));
   options = tiny(2);
   options.noisy_part = 1.5;
   CHECK_THROWS_WITH(HidingTrainer(marker, crops, options),
                     Contains("[hiding_trainer] noisy_part must be in [0, 1], got 1.5"));
   HidingTrainer trainer(marker, crops, tiny(2));
   trainer.save(folder / "c");
-  PictureMarker other = tiny_marker(HidingKind::mbrs);
+  ImageMarker other = tiny_marker(HidingKind::mbrs);
   HidingTrainer of_other(other, crops, tiny(2));
   CHECK_THROWS_WITH(of_other.restore(folder / "c"),
                     Contains("expected a checkpoint of this run (mbrs, 2 bits") && Contains("found hidden"));

@@ -1,8 +1,8 @@
 #include <fieldmark/baselines/mark_scores.h>
-#include <fieldmark/baselines/owner_system.h>
-#include <fieldmark/engine/image.h>
+#include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/evaluation.h>
-#include <fieldmark/watermark/measurement.h>
+#include <fieldmark/watermark/attacks/measurement.h>
+#include "owner_system.h"
 
 #include <algorithm>
 #include <cmath>
@@ -23,7 +23,7 @@ watermark::Owner owner_of_6_bits() {
 }
 
 std::vector<nerf::Camera> cameras_of(const nerf::RadianceField& field) {
-  return nerf::make_cameras(field.cameras, nerf::CameraSet::near, 4, 0, 5);
+  return nerf::make_cameras(field.cameras, nerf::CameraSet::novel, 4, 0, 5);
 }
 
 nerf::Dataset photographs_of(const nerf::RadianceField& field) {
@@ -54,7 +54,7 @@ TEST_CASE("mark_scores: an owner's figures are those of measure") {
   CHECK(scores.accuracy == Approx(measured.accuracy.blind).epsilon(1e-12));
   CHECK(scores.under.at("noise_0.1") == Approx(measured.under.at("noise_0.1").blind).epsilon(1e-12));
   CHECK(scores.psnr_base == Approx(measured.psnr_base).epsilon(1e-9));
-  CHECK(scores.psnr_base_object == Approx(measured.psnr_base_object).epsilon(1e-9));
+  CHECK(scores.psnr_base_foreground == Approx(measured.psnr_base_foreground).epsilon(1e-9));
   CHECK(scores.ssim_base == Approx(measured.ssim_base).epsilon(1e-9));
   CHECK(scores.psnr_base < 60);  // there is a mark
   CHECK(std::isnan(scores.psnr_photo));
@@ -78,10 +78,10 @@ TEST_CASE(
   const auto scores = score_mark(field, marked, {.cameras = cameras_of(field), .photographs = &photographs});
   CHECK(scores.psnr_photo == Approx(expected.psnr).epsilon(1e-9));
   CHECK(scores.psnr_photo_unmarked == Approx(expected.psnr).epsilon(1e-9));
-  CHECK(scores.psnr_photo_object == Approx(expected.psnr_object).epsilon(1e-9));
+  CHECK(scores.psnr_photo_object == Approx(expected.psnr_foreground).epsilon(1e-9));
   // evaluate() does not round before ssim(): 2e-4 here
   CHECK(scores.ssim_photo == Approx(expected.ssim).margin(1e-3));
-  CHECK(std::isnan(scores.psnr_base));  // equal pictures
+  CHECK(std::isnan(scores.psnr_base));  // equal images
   CHECK(scores.accuracy == Approx(0.75));
   CHECK(scores.spread == Approx(0.25));
 }

@@ -1,4 +1,4 @@
-#include <fieldmark/baselines/mbrs_network.h>
+#include "mbrs_network.h"
 
 #include "support/run_op.h"
 
@@ -16,7 +16,7 @@ TEST_CASE("mbrs_network: a square message is the map itself, others pass through
   CHECK(other.entry(other.find("decoder/map/weight")).shape == Shape{9, 8});
 }
 
-TEST_CASE("mbrs_network: pictures of the map's size and of others") {
+TEST_CASE("mbrs_network: images of the map's size and of others") {
   for (const Index bits : {4, 8}) {
     ParamStore<float> store;
     const MbrsNetwork<float> net(store, {.bits = bits, .channels = 2}, 1);
@@ -25,9 +25,9 @@ TEST_CASE("mbrs_network: pictures of the map's size and of others") {
       CAPTURE(bits, s.str());
       Tape<float> tape;
       NormPass<float> pass;
-      const auto pictures = uniform<float>(s, -1, 1, 1);
+      const auto images = uniform<float>(s, -1, 1, 1);
       const auto messages = uniform<float>({s[0], bits}, 0, 1, 2);
-      const auto x = tape.constant(pictures);
+      const auto x = tape.constant(images);
       CHECK(net.encode(params, x, tape.constant(messages), pass).shape() == s);
       CHECK(net.decode(params, x, pass).shape() == Shape{s[0], bits});
     }
@@ -37,7 +37,7 @@ TEST_CASE("mbrs_network: pictures of the map's size and of others") {
 TEST_CASE("mbrs_network: a bit is spread where its place on the map lies") {
   ParamStore<float> store;
   const MbrsNetwork<float> net(store, {.bits = 16, .channels = 4}, 1);
-  const auto pictures = uniform<float>({1, 64, 64, 3}, -1, 1, 1);
+  const auto images = uniform<float>({1, 64, 64, 3}, -1, 1, 1);
   Tensor<float> messages({1, 16});
   const auto run = [&] {
     return op_values<float>(
@@ -45,7 +45,7 @@ TEST_CASE("mbrs_network: a bit is spread where its place on the map lies") {
           NormPass<float> pass{.running = true};
           return net.encode(Params<float>(store, nullptr), v[0], v[1], pass);
         },
-        {pictures, messages});
+        {images, messages});
   };
   const auto before = run();
   messages[0] = 1;  // upper left
@@ -75,5 +75,5 @@ TEST_CASE("mbrs_network: threads and errors") {
   NormPass<float> pass;
   const Tensor<float> small({1, 15, 32, 3});
   CHECK_THROWS_WITH(net.decode(Params<float>(store, nullptr), tape.constant(small), pass),
-                    "[mbrs_network] pictures must have at least 16 x 16 pixels, got shape [1, 15, 32, 3]");
+                    "[mbrs_network] images must have at least 16 x 16 pixels, got shape [1, 15, 32, 3]");
 }

@@ -1,4 +1,4 @@
-#include <fieldmark/baselines/message_field.h>
+#include "message_field.h"
 #include <fieldmark/engine/adam.h>
 #include <fieldmark/engine/ops/loss.h>
 #include <fieldmark/engine/parallel.h>
@@ -35,10 +35,10 @@ struct Made {
     auto values = store.values(store.find(name + "/weight"));
     std::fill(values.begin() + first * shape[1], values.end(), 0.f);
   }
-  Tensor<float> picture() {
+  Tensor<float> image() {
     Tape<float> tape;
     const Var<float> y =
-        field.picture(tape, Params<float>(store, nullptr), base, camera(), tape.constant(kMessage, {1, 3}));
+        field.image(tape, Params<float>(store, nullptr), base, camera(), tape.constant(kMessage, {1, 3}));
     return {y.shape(), std::vector<float>(y.value(), y.value() + y.shape().size())};
   }
 };
@@ -104,17 +104,17 @@ Row colours(const ParamStore<double>& store, const std::string& before, Row x) {
 
 }  // namespace
 
-TEST_CASE("message_field: where no weight listens to the message, pictures are the base field's") {
+TEST_CASE("message_field: where no weight listens to the message, images are the base field's") {
   Made inputs(MessagePlace::inputs), density(MessagePlace::density);
   inputs.silence("mark/density/0", 4);
   inputs.silence("mark/colour/0", 4 + 4 + 16);
   density.silence("mark/geometry/2", 0);
   const Tensor<float> want =
       nerf::Renderer(inputs.base, {.finer = 1, .least_weight = 0}).render(camera()).rgb;
-  CHECK(worst(inputs.picture().data, want.data) < 1e-5);
-  CHECK(worst(density.picture().data, want.data) < 1e-5);
-  CHECK(worst(Made(MessagePlace::inputs).picture().data, want.data) > 1e-2);
-  CHECK(worst(Made(MessagePlace::density).picture().data, want.data) > 1e-2);
+  CHECK(worst(inputs.image().data, want.data) < 1e-5);
+  CHECK(worst(density.image().data, want.data) < 1e-5);
+  CHECK(worst(Made(MessagePlace::inputs).image().data, want.data) > 1e-2);
+  CHECK(worst(Made(MessagePlace::density).image().data, want.data) > 1e-2);
 }
 
 TEST_CASE("message_field: a ray by loops, the message beside the inputs") {
@@ -129,7 +129,7 @@ TEST_CASE("message_field: a ray by loops, the message beside the inputs") {
     for (const Row* part : {&colour, &direction, &bits}) append(z, *part);
     return std::pair(sigma, colours(store, "mark/", z));
   });
-  const auto got = made.picture();
+  const auto got = made.image();
   for (Index a = 0; a < 3; ++a)
     CHECK(got[3 * pixel + a] == Approx(want[static_cast<std::size_t>(a)]).margin(1e-4));
 }
@@ -148,7 +148,7 @@ TEST_CASE("message_field: a ray by loops, the message in the density") {
     append(z, direction);
     return std::pair(sigma, colours(base, "", z));
   });
-  const auto got = made.picture();
+  const auto got = made.image();
   // Interpolation between 513 values: a kink of the network lies within a sixteenth.
   for (Index a = 0; a < 3; ++a)
     CHECK(got[3 * pixel + a] == Approx(want[static_cast<std::size_t>(a)]).margin(1e-3));
@@ -161,8 +161,8 @@ TEST_CASE("message_field: a step along the gradient changes the loss by its squa
     const Tensor<float> target = uniform<float>({63, 3}, 0, 1, 8);
     const auto loss = [&](float* to) {
       Tape<float> tape;
-      const Var<float> l = mse_loss<float>(made.field.picture(tape, Params<float>(made.store, to), made.base,
-                                                              camera(), tape.constant(kMessage, {1, 3})),
+      const Var<float> l = mse_loss<float>(made.field.image(tape, Params<float>(made.store, to), made.base,
+                                                            camera(), tape.constant(kMessage, {1, 3})),
                                            tape.constant(target));
       if (to) tape.backward(l);
       return static_cast<double>(l.value()[0]);
@@ -190,8 +190,8 @@ TEST_CASE("message_field: in 40 steps it learns to look like the base field") {
     std::vector<double> losses;
     for (int step = 0; step < 40; ++step) {
       Tape<float> tape;
-      const Var<float> loss = mse_loss<float>(made.field.picture(tape, Params<float>(made.store), made.base,
-                                                                 camera(), tape.constant(kMessage, {1, 3})),
+      const Var<float> loss = mse_loss<float>(made.field.image(tape, Params<float>(made.store), made.base,
+                                                               camera(), tape.constant(kMessage, {1, 3})),
                                               tape.constant(want.data.data(), {63, 3}));
       tape.backward(loss);
       losses.push_back(static_cast<double>(loss.value()[0]));
@@ -212,7 +212,7 @@ TEST_CASE("message_field: rendered as recorded, with the same bits on one and tw
     };
     CHECK(render(1).data == render(2).data);
     CHECK(worst(made.field.render(made.store, made.base, camera(), kSigns, {.finer = 1}).data,
-                made.picture().data) < 1e-6);
+                made.image().data) < 1e-6);
   }
   set_threads(before);
 }

@@ -1,7 +1,7 @@
-#include <fieldmark/baselines/hiding_system.h>
-#include <fieldmark/baselines/owner_system.h>
+#include "owner_system.h"
 #include <fieldmark/baselines/paper_plan.h>
-#include <fieldmark/engine/metrics.h>
+#include <fieldmark/imaging/metrics.h>
+#include "hiding_system.h"
 
 #include <cmath>
 
@@ -32,7 +32,7 @@ TEST_CASE("owner_system: what each system is") {
   const auto ours = owner_system(kOurs, 160);
   CHECK(ours.owner.preset == watermark::Preset::fast);
   CHECK(ours.owner.bits == 8);
-  CHECK(ours.owner.strength == 34);
+  CHECK(ours.owner.mark_psnr == 34);
   CHECK(ours.owner.reader_size == 128);
   const auto paper = owner_system({"copyrnerf_paper", "lego", "hash", 16, 1}, 160);
   CHECK(paper.owner.preset == watermark::Preset::paper);
@@ -85,7 +85,7 @@ TEST_CASE("owner_system: each ablation takes away its part and nothing else") {
   CHECK(cells.owner.preset == watermark::Preset::paper);
   CHECK(cells.owner.budget);
   CHECK(cells.owner.reader_size == 128);
-  CHECK(cells.owner.strength == 34);
+  CHECK(cells.owner.mark_psnr == 34);
   CHECK(cells.embed.schedule.lr == ours.embed.schedule.lr);
   CHECK(!signs.owner.keyed_signs);
   CHECK(!ours.owner.budget);
@@ -100,15 +100,16 @@ TEST_CASE("owner_system: every system of the tables has an owner or a 2-D networ
   }
 }
 
-TEST_CASE("owner_system: moved samples at test change pictures a little, in the same way each time") {
+TEST_CASE("owner_system: moved samples at test change images a little, in the same way each time") {
   TrainedOwner trained{.owner = tiny_owner(), .field = {}};
   trained.owner.gain = 0.05;
-  const auto camera = nerf::make_cameras(trained.owner.field.cameras, nerf::CameraSet::near, 1, 0, 7).front();
-  const auto picture = [&](double shift) {
+  const auto camera =
+      nerf::make_cameras(trained.owner.field.cameras, nerf::CameraSet::novel, 1, 0, 7).front();
+  const auto image = [&](double shift) {
     trained.test_shift = shift;
     return marked_scene(trained, 1).render(camera, watermark::Message{{1, 0, 0, 1}});
   };
-  const auto still = picture(0), a = picture(1e-2), b = picture(1e-2);
+  const auto still = image(0), a = image(1e-2), b = image(1e-2);
   CHECK(a.data == b.data);
   CHECK(a.data != still.data);
   CHECK(psnr(a, still) > psnr(nerf::Renderer(trained.owner.field).render(camera).rgb, still));
@@ -124,7 +125,7 @@ TEST_CASE("owner_system: each variant takes its steps and is measured") {
     const TrainedOwner trained = train_owner(tiny_field(), cell, tiny_system(cell),
                                              {.seconds = 0.05, .checkpoint = folder / "run", .views = 8});
     CHECK(trained.steps >= 1);
-    const auto cameras = nerf::make_cameras(trained.owner.field.cameras, nerf::CameraSet::near, 2, 0, 123);
+    const auto cameras = nerf::make_cameras(trained.owner.field.cameras, nerf::CameraSet::novel, 2, 0, 123);
     const auto scores = score_mark(trained.owner.field, marked_scene(trained, 1), {.cameras = cameras});
     CHECK(scores.psnr_base < 60);  // it shows, and is a number
   }
@@ -149,9 +150,9 @@ TEST_CASE("owner_system: trained, stopped and gone on with, it is calibrated") {
   CHECK(trained.seconds >= 1.5);
   CHECK(trained.seconds < 30);
   CHECK_THAT(run_curve(training.checkpoint), Contains("seconds,steps,figure"));
-  const auto cameras = nerf::make_cameras(trained.owner.field.cameras, nerf::CameraSet::near, 4, 0, 123);
+  const auto cameras = nerf::make_cameras(trained.owner.field.cameras, nerf::CameraSet::novel, 4, 0, 123);
   const auto scores = score_mark(trained.owner.field, marked_scene(trained, 1), {.cameras = cameras});
-  CHECK(scores.psnr_base_object == Approx(34).margin(1));
+  CHECK(scores.psnr_base_foreground == Approx(34).margin(1));
 }
 
 TEST_CASE("owner_system: noise on the weights of field and mark, none on the extractor's") {

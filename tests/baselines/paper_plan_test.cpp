@@ -1,5 +1,5 @@
 #include <fieldmark/baselines/paper_plan.h>
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 
 #include <algorithm>
 #include <set>
@@ -61,9 +61,9 @@ TEST_CASE("paper_plan: every cell once, each of a system that is known") {
 }
 
 TEST_CASE("paper_plan: errors") {
-  CHECK_THROWS_WITH(parse_paper_table("pictures"),
+  CHECK_THROWS_WITH(parse_paper_table("images"),
                     "[paper_table] name must be bits, quality, distortion, ablation, sampling or weights, "
-                    "got pictures");
+                    "got images");
   CHECK_THROWS_WITH(plan_cells(PaperTable::bits, {}), "[plan_cells] scenes must not be empty");
   CHECK_THROWS_WITH(paper_system("x"), Contains("[paper_system] name must be one of ours, copyrnerf_paper") &&
                                            Contains(", got x"));

@@ -1,4 +1,4 @@
-#include <fieldmark/baselines/simulated_jpeg.h>
+#include "simulated_jpeg.h"
 
 #include <cmath>
 #include <numbers>
@@ -56,14 +56,14 @@ TEST_CASE("simulated_jpeg: the transform written out") {
   }
 }
 
-TEST_CASE("simulated_jpeg: blocks by themselves, all frequencies and flat pictures stay") {
+TEST_CASE("simulated_jpeg: blocks by themselves, all frequencies and flat images stay") {
   const auto x = uniform({2, 16, 24, 3}, -1, 1, 1);
   const auto all = op_values<double>(op({8, 8}), {x});
   for (std::size_t i = 0; i < all.size(); ++i) CHECK(all[i] == Approx(x.data[i]).margin(1e-12));
   const auto flat = op_values<double>(op({}), {Tensor<double>({1, 8, 8, 3}, 0.3)});
   for (const double v : flat) CHECK(v == Approx(0.3).margin(1e-12));
   Tensor<double> other = x;
-  other[0] += 1;  // of the first block of the first picture
+  other[0] += 1;  // of the first block of the first image
   const auto before = op_values<double>(op({}), {x}), after = op_values<double>(op({}), {other});
   for (Index i = 0; i < x.size(); ++i) {
     const bool inside = i < 8 * 24 * 3 && i % (24 * 3) < 8 * 3;

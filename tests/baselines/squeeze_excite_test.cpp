@@ -1,4 +1,4 @@
-#include <fieldmark/baselines/squeeze_excite.h>
+#include "squeeze_excite.h"
 
 #include <algorithm>
 #include <cmath>

@@ -53,7 +53,7 @@ TEST_CASE("blur: sigma to 0 is the exact identity with a finite gradient") {
   }
 }
 
-TEST_CASE("blur: constant pictures stay constant, edges too") {
+TEST_CASE("blur: constant images stay constant, edges too") {
   for (double sigma : {0.4, 1.0, 20.0}) {
     const auto y = run_op<float>(soften, {Tensor<float>({33, 20, 3}, 0.3f), number<float>(sigma)});
     for (float v : y.data) CHECK(std::abs(v - 0.3f) < 5e-7f);

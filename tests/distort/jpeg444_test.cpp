@@ -1,5 +1,5 @@
 #include <fieldmark/distort/jpeg444.h>
-#include <fieldmark/engine/image.h>
+#include <fieldmark/imaging/image.h>
 
 #include <cmath>
 #include <numbers>
@@ -21,7 +21,7 @@ double worst_level(const Tensor<float>& a, const Tensor<float>& b) {
   return worst;
 }
 
-// Luma varies smoothly with some noise, colour is one for the whole picture.
+// Luma varies smoothly with some noise, colour is one for the whole image.
 Tensor<float> one_colour(Index h, Index w, float blue, float red) {
   const auto noise = uniform<float>({h * w}, -0.05f, 0.05f, 3);
   Tensor<float> x({h, w, 3});
@@ -88,7 +88,7 @@ TEST_CASE("jpeg444: chroma of single columns survives, which halved chroma blend
   CHECK(half[middle + 2] - half[middle + 5] < 0.2f);
 }
 
-TEST_CASE("jpeg444: even pictures, quality, thread count and errors") {
+TEST_CASE("jpeg444: even images, quality, thread count and errors") {
   const Tensor<float> grey({5, 3, 3}, 128.f / 255);
   CHECK(jpeg444(grey, 1).data == grey.data);
   const auto x = quantize8(uniform<float>({43, 29, 3}, 0, 1, 1));

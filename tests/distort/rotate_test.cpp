@@ -38,7 +38,7 @@ TEST_CASE("rotate: quarter turns permute the pixels exactly, 0 changes nothing")
   check_quarter_turns<double>();
 }
 
-TEST_CASE("rotate: a constant picture stays constant inside, corners take the background") {
+TEST_CASE("rotate: a constant image stays constant inside, corners take the background") {
   const std::vector<float> grey{0.5f, 0.6f, 0.7f};
   const auto y = run_op<float>([&](auto&, auto v) { return rotate(v[0], v[1], grey); },
                                {Tensor<float>({41, 41, 3}, 0.3f), number<float>(kQuarter / 3)});

@@ -5,8 +5,8 @@
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/loss.h>
 #include <fieldmark/nerf/gradcheck_cases.h>
-#include <fieldmark/watermark/key.h>
-#include <fieldmark/watermark/message.h>
+#include <fieldmark/watermark/keys/key.h>
+#include <fieldmark/watermark/payload/message.h>
 
 #include <cmath>
 #include <cstdio>

@@ -1,5 +1,5 @@
+#include <fieldmark/core/error.h>
 #include <fieldmark/engine/adam.h>
-#include <fieldmark/engine/error.h>
 #include <fieldmark/engine/parallel.h>
 
 #include <cmath>

@@ -33,7 +33,7 @@ Reading read(const DenseExtractor<float>& net, const ParamStore<float>& store, c
 
 }  // namespace
 
-TEST_CASE("dense_extractor: places are a quarter of the picture, whatever its size") {
+TEST_CASE("dense_extractor: places are a quarter of the image, whatever its size") {
   ParamStore<float> store;
   const DenseExtractor<float> net(store, "net", {.classes = 4, .base = 8}, 3);
   for (const auto& [h, w] : {std::array<Index, 2>{16, 16}, {17, 31}, {19, 22}, {33, 50}, {64, 47}}) {
@@ -94,7 +94,7 @@ TEST_CASE("dense_extractor: every parameter takes part, and has a name below the
   CHECK(store.entry(store.find("net/up1/conv/weight")).shape == Shape{3, 3, 80, 32});
 }
 
-TEST_CASE("dense_extractor: the same bits alone, beside another picture, on one and two threads") {
+TEST_CASE("dense_extractor: the same bits alone, beside another image, on one and two threads") {
   ParamStore<float> store;
   const DenseExtractor<float> net(store, "net", {.classes = 40, .base = 16}, 3);
   const std::array<Tensor<float>, 2> images{uniform<float>({1, 100, 90, 3}, 0, 1, 1),
@@ -138,9 +138,8 @@ TEST_CASE("dense_extractor: errors") {
   const Tensor<float> flat({20, 20, 3}), two({2, 20, 20, 3}), grey({1, 20, 20, 1}), low({1, 15, 20, 3});
   CHECK_THROWS_WITH(net(params, tape.constant(flat)),
                     "[DenseExtractor] image must have rank 4 [1, height, width, 3], got shape [20, 20, 3]");
-  CHECK_THROWS_WITH(
-      net(params, tape.constant(two)),
-      "[DenseExtractor] image: axis 0 must be 1 (one picture a pass), got shape [2, 20, 20, 3]");
+  CHECK_THROWS_WITH(net(params, tape.constant(two)),
+                    "[DenseExtractor] image: axis 0 must be 1 (one image a pass), got shape [2, 20, 20, 3]");
   CHECK_THROWS_WITH(net(params, tape.constant(grey)),
                     "[DenseExtractor] image: axis 3 must be 3 (red, green, blue), got shape [1, 20, 20, 1]");
   CHECK_THROWS_WITH(

@@ -74,7 +74,7 @@ TEST_CASE("evidence_pool: pooled bits are what plain loops give") {
   check_values<double>(12, 4, 1, 1e-13);
 }
 
-TEST_CASE("evidence_pool: certain places give the bits, an empty picture gives 0") {
+TEST_CASE("evidence_pool: certain places give the bits, an empty image gives 0") {
   // 4 places, 2 cells, 2 bits: places 0 and 1 show cell 0, places 2 and 3 cell 1, both with the sign of a 1.
   const std::vector<float> code{-1, 0, 0, 1};
   const Tensor<float> sign({4}, {-90, -90, 90, 90});

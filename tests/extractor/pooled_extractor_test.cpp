@@ -40,7 +40,7 @@ TEST_CASE("pooled_extractor: one layer by hand, on a patch of one size") {
   CHECK(got[0] == Approx(2 * pooled - 0.5).epsilon(1e-12));
 }
 
-TEST_CASE("pooled_extractor: any patch size, a batch or one picture") {
+TEST_CASE("pooled_extractor: any patch size, a batch or one image") {
   ParamStore<float> store;
   const PooledExtractor<float> net(store, "h", {.n_bits = 6, .channels = 8, .layers = 3}, 1);
   const Params<float> params(store, nullptr);
@@ -54,7 +54,7 @@ TEST_CASE("pooled_extractor: any patch size, a batch or one picture") {
   }
 }
 
-TEST_CASE("pooled_extractor: running statistics follow the batch's, then a picture is read alone") {
+TEST_CASE("pooled_extractor: running statistics follow the batch's, then an image is read alone") {
   ParamStore<double> store;
   const PooledExtractor<double> net(store, "h", {.n_bits = 3, .channels = 4, .layers = 2}, 1);
   const Params<double> params(store, nullptr);
@@ -75,7 +75,7 @@ TEST_CASE("pooled_extractor: running statistics follow the batch's, then a pictu
   }
 }
 
-TEST_CASE("pooled_extractor: gradient in pictures and every parameter") {
+TEST_CASE("pooled_extractor: gradient in images and every parameter") {
   ParamStore<double> store;
   const PooledExtractor<double> net(store, "h", {.n_bits = 2, .channels = 3, .layers = 2}, 1);
   // ReLUs well open or shut: differences must not step over a kink.

@@ -2,14 +2,14 @@
 //   fuzz_readers [INPUTS = 20000] [SEED = 1] [FIRST = 0]
 // Input i depends on SEED and i only, so `fuzz_readers 1 SEED i` repeats one. Crashes and leaks are for the
 // sanitizers to see (preset asan).
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 #include <fieldmark/engine/safetensors.h>
-#include <fieldmark/nerf/colmap.h>
-#include <fieldmark/nerf/lens.h>
-#include <fieldmark/nerf/llff.h>
-#include <fieldmark/nerf/npy.h>
-#include <fieldmark/nerf/transforms.h>
-#include <fieldmark/watermark/canonical_json.h>
+#include "canonical_json.h"
+#include "colmap.h"
+#include "lens.h"
+#include "llff.h"
+#include "npy.h"
+#include "transforms.h"
 
 #include <cstdlib>
 #include <ctime>
@@ -44,11 +44,11 @@ std::string safetensors_file() {
   return packed(static_cast<std::uint64_t>(header.size())) + header + std::string(33, '\x3F');
 }
 
-// A lens that was read is also used, on a small picture.
+// A lens that was read is also used, on a small image.
 void use(const Intrinsics& i) {
   const Camera c = i.camera({}, i.width, i.height).scaled(16, 12);
   const Crop part = covered_part(c, i.lens);
-  undistorted_picture(Tensor<float>(Shape{12, 16, 4}), c, i.lens, part);
+  undistorted_image(Tensor<float>(Shape{12, 16, 4}), c, i.lens, part);
 }
 void use(const SafetensorsFile& file) {
   for (const auto& t : file.tensors)

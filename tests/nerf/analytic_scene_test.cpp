@@ -1,7 +1,7 @@
-#include <fieldmark/engine/error.h>
-#include <fieldmark/engine/files.h>
-#include <fieldmark/engine/image.h>
+#include <fieldmark/core/error.h>
+#include <fieldmark/core/files.h>
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/analytic_scene.h>
 #include <unistd.h>
 

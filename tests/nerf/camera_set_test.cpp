@@ -1,4 +1,4 @@
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 #include <fieldmark/nerf/camera_set.h>
 
 #include <algorithm>
@@ -53,13 +53,13 @@ TEST_CASE("camera_set: the span finds centre, up and distances of the cameras it
 TEST_CASE("camera_set: one camera spans itself") {
   const CameraSpan s = camera_span(cap(1), Background::white);
   CHECK(length(s.centre) < length(cap(1)[0].position()));
-  for (const Camera& c : make_cameras(s, CameraSet::near, 5, 0, 1))
+  for (const Camera& c : make_cameras(s, CameraSet::novel, 5, 0, 1))
     CHECK(dot3(minus(c.position(), s.centre), s.directions[0]) > 0.79 * s.distances[0]);
 }
 
 TEST_CASE("camera_set: near stays inside directions, distances and look-at of training") {
   const CameraSpan s = camera_span(cap(60), Background::white);
-  const auto cameras = make_cameras(s, CameraSet::near, 300, 40, 9);
+  const auto cameras = make_cameras(s, CameraSet::novel, 300, 40, 9);
   REQUIRE(cameras.size() == 300);
   const auto [low, high] = std::minmax_element(s.distances.begin(), s.distances.end());
   double nearest = 1e9, farthest = 0, aside = 0;
@@ -124,7 +124,7 @@ TEST_CASE("camera_set: unseen cameras look from where no training camera was") {
     return std::acos(most) * 180 / 3.14159265358979;
   };
   double widest = 0;
-  for (const Camera& c : make_cameras(s, CameraSet::unseen, 100, 0, 3)) {
+  for (const Camera& c : make_cameras(s, CameraSet::extrapolated, 100, 0, 3)) {
     CHECK(nearest(c) > 30);
     CHECK(off_axis(c, s.centre) < 1e-6);
     widest = std::max(widest, nearest(c));
@@ -138,7 +138,7 @@ TEST_CASE("camera_set: unseen cameras look from where no training camera was") {
     all.directions.push_back({-f[0], -f[1], -f[2]});
   }
   all.distances.assign(400, 4);
-  for (const Camera& c : make_cameras(all, CameraSet::unseen, 5, 0, 3)) {
+  for (const Camera& c : make_cameras(all, CameraSet::extrapolated, 5, 0, 3)) {
     double most = -1;
     for (const Vec3& d : all.directions) most = std::max(most, -dot3(d, c.forward()));
     CHECK(most < std::cos(0.1));
@@ -148,16 +148,16 @@ TEST_CASE("camera_set: unseen cameras look from where no training camera was") {
 TEST_CASE("camera_set: names and sets belong together") {
   const auto names = camera_set_names();
   CHECK(names.size() == 7);
-  CHECK(names.front() == "near");
+  CHECK(names.front() == "novel");
   for (const auto& name : names) CHECK_NOTHROW(parse_camera_set(name));
-  CHECK(parse_camera_set("unseen") == CameraSet::unseen);
+  CHECK(parse_camera_set("extrapolated") == CameraSet::extrapolated);
   CHECK(parse_camera_set("farther") == CameraSet::farther);
 }
 
 TEST_CASE("camera_set: camera i depends on the seed and i only") {
   const CameraSpan s = camera_span(cap(20), Background::white);
-  for (const CameraSet kind : {CameraSet::near, CameraSet::ring, CameraSet::sphere, CameraSet::closer,
-                               CameraSet::farther, CameraSet::unseen}) {
+  for (const CameraSet kind : {CameraSet::novel, CameraSet::ring, CameraSet::sphere, CameraSet::closer,
+                               CameraSet::farther, CameraSet::extrapolated}) {
     const auto few = make_cameras(s, kind, 3, 0, 5), many = make_cameras(s, kind, 10, 0, 5);
     for (std::size_t i = 0; i < 3; ++i) CHECK(few[i].pose == many[i].pose);
     CHECK(few[0].pose != few[1].pose);
@@ -181,9 +181,9 @@ TEST_CASE("camera_set: errors") {
   CHECK(parse_camera_set("test") == CameraSet::test);
   const CameraSpan s = camera_span(cap(2), Background::white);
   CHECK_THROWS_WITH(make_cameras(s, CameraSet::test, 1, 0, 0), Contains("test views are in the data set"));
-  CHECK_THROWS_WITH(make_cameras(s, CameraSet::near, -1, 0, 0),
+  CHECK_THROWS_WITH(make_cameras(s, CameraSet::novel, -1, 0, 0),
                     Contains("must not be negative, got -1 and 0"));
-  CHECK_THROWS_WITH(make_cameras(CameraSpan{}, CameraSet::near, 1, 0, 0), Contains("got 0 and 0"));
+  CHECK_THROWS_WITH(make_cameras(CameraSpan{}, CameraSet::novel, 1, 0, 0), Contains("got 0 and 0"));
   CHECK_THROWS_WITH(parse_camera_span("{}", "f.safetensors: cameras"),
                     "f.safetensors: cameras: expected the key \"centre\", got none");
   std::string text = format_camera_span(s);
@@ -192,7 +192,7 @@ TEST_CASE("camera_set: errors") {
   CHECK_THROWS_AS(parse_camera_span("{\"centre\": [1, 2]}", "f"), IoError);
 }
 
-TEST_CASE("camera_set: near cameras of a forward-facing capture stand in the box of its path") {
+TEST_CASE("camera_set: novel cameras of a forward-facing capture stand in the box of its path") {
   Dataset data;
   data.forward_facing = true;
   const auto u = uniform({9, 3}, -1, 1, 8);
@@ -211,7 +211,7 @@ TEST_CASE("camera_set: near cameras of a forward-facing capture stand in the box
       high[a] = std::max(high[a], v.camera.position()[a]);
     }
   Vec3 reached{};
-  for (const Camera& c : make_cameras(span, CameraSet::near, 100, 0, 3)) {
+  for (const Camera& c : make_cameras(span, CameraSet::novel, 100, 0, 3)) {
     for (std::size_t a = 0; a < 3; ++a) {
       CHECK((c.position()[a] >= low[a] - 1e-12 && c.position()[a] <= high[a] + 1e-12));
       reached[a] = std::max(reached[a], c.position()[a]);
@@ -225,7 +225,7 @@ TEST_CASE("camera_set: near cameras of a forward-facing capture stand in the box
       if (p[a] < low[a] - 1e-12 || p[a] > high[a] + 1e-12) return false;
     return true;
   };
-  for (const Camera& c : make_cameras(span, CameraSet::unseen, 50, 0, 3)) {
+  for (const Camera& c : make_cameras(span, CameraSet::extrapolated, 50, 0, 3)) {
     CHECK_FALSE(inside(c.position()));
     for (std::size_t a = 0; a < 3; ++a)
       CHECK(std::abs(c.position()[a] - 0.5 * (low[a] + high[a])) <= high[a] - low[a] + 1e-12);

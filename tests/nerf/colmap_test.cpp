@@ -1,5 +1,5 @@
-#include <fieldmark/engine/error.h>
-#include <fieldmark/nerf/colmap.h>
+#include "colmap.h"
+#include <fieldmark/core/error.h>
 
 #include <cmath>
 
@@ -64,7 +64,7 @@ TEST_CASE("colmap: each model's parameters go where they belong") {
   CHECK(c.lens == Lens{.k1 = 0.1, .k2 = 0.2});
 }
 
-TEST_CASE("colmap: near and far are those of the points that a picture shows") {
+TEST_CASE("colmap: near and far are those of the points that an image shows") {
   const auto images = parse_colmap_images(kColmapImagesText, kText, "i");
   const auto points = parse_colmap_points(kColmapPointsText, kText, "p");
   const auto range = colmap_depth(images[0], points);
@@ -97,7 +97,7 @@ TEST_CASE("colmap: errors of text name the line") {
   expect_image_error("1 1 1 0 0 0 0 0 1 b.png", kText,
                      "line 1: expected a rotation, a quaternion of length 1, got one of length 1.41");
   expect_image_error("1 1 0 0 0 0 0 0 1", kText,
-                     "line 1: expected the name of a picture, got the end of the line");
+                     "line 1: expected the name of an image, got the end of the line");
   expect_image_error("1 1 0 0 0 0 0 0 1 b.png\n1 2", kText,
                      "line 2: expected the key of a point, got the end");
   expect_image_error("1 1 0 0 0 0 0 0 1 b.png\n1 2 -2", kText,
@@ -138,5 +138,5 @@ TEST_CASE("colmap: errors of bytes name the byte, and a count never allocates wh
   expect_camera_error(model, kBinary, "byte 16: expected a camera model");
   expect_image_error(
       packed(std::uint64_t{1}) + colmap_image_binary(1, {1, 0, 0, 0, 0, 0, 0}, 1, "", {}) + "   ", kBinary,
-      "byte 73: expected the name of a picture");
+      "byte 73: expected the name of an image");
 }

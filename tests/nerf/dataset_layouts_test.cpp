@@ -1,7 +1,7 @@
 // The layouts of photographs, which load_dataset() reads besides Blender's.
-#include <fieldmark/engine/error.h>
-#include <fieldmark/engine/files.h>
-#include <fieldmark/engine/image.h>
+#include <fieldmark/core/error.h>
+#include <fieldmark/core/files.h>
+#include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/camera_set.h>
 #include <fieldmark/nerf/dataset.h>
 
@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 namespace {
-void write_picture(const fs::path& path, Index width, Index height, std::uint64_t seed = 1) {
+void write_image(const fs::path& path, Index width, Index height, std::uint64_t seed = 1) {
   fs::create_directories(path.parent_path());
   const auto picture = quantize8(uniform<float>({height, width, 3}, 0, 1, seed));
   if (path.extension() == ".png")
@@ -42,7 +42,7 @@ Json ten_frames() {
 struct Photographs : TemporaryFolder {
   Json json = ten_frames();
   Photographs() {
-    for (int i = 0; i < 10; ++i) write_picture(picture(i), 12, 8);
+    for (int i = 0; i < 10; ++i) write_image(picture(i), 12, 8);
     write();
   }
   fs::path picture(int i) const { return path / "images" / (std::to_string(i) + ".png"); }
@@ -78,28 +78,28 @@ TEST_CASE("dataset: one transforms.json holds out every 8th of the sorted names"
   CHECK(has_split(scene.path, "test"));
 }
 
-TEST_CASE("dataset: frames without a picture are left out and told of, all missing is an error") {
+TEST_CASE("dataset: frames without an image are left out and told of, all missing is an error") {
   Photographs scene;
-  fs::remove(scene.picture(3));
-  fs::remove(scene.picture(8));
+  fs::remove(scene.image(3));
+  fs::remove(scene.image(8));
   const Dataset train = load_dataset(scene.path);
   CHECK(names(train) == "1 2 4 5 6 7 9 ");
   REQUIRE(train.notes.size() == 2);
-  CHECK(train.notes[0] == "every 8th of 10 pictures is held out for val and test");
-  CHECK_THAT(train.notes[1], Contains("1 of 8 pictures of train are missing and left out, the first is ") &&
+  CHECK(train.notes[0] == "every 8th of 10 images is held out for val and test");
+  CHECK_THAT(train.notes[1], Contains("1 of 8 images of train are missing and left out, the first is ") &&
                                  Contains("images/3.png"));
   CHECK(names(load_dataset(scene.path, {.split = "test"})) == "0 ");
-  fs::remove(scene.picture(0));
-  scene.expect_error("expected pictures to test on, got none: all 2 are missing, the first is ", "test");
+  fs::remove(scene.image(0));
+  scene.expect_error("expected images to test on, got none: all 2 are missing, the first is ", "test");
   scene.json["frames"] = Json::array({scene.json["frames"][0]});
   scene.write();
-  scene.expect_error("expected pictures to train on, got none: there are 1 views, and every 8th is held out");
+  scene.expect_error("expected images to train on, got none: there are 1 views, and every 8th is held out");
 }
 
 TEST_CASE("dataset: JPEG, names without extension, and intrinsics of a frame of its own") {
   Photographs scene;
-  fs::remove(scene.picture(1));
-  write_picture(scene.path / "images/1.jpg", 12, 8);
+  fs::remove(scene.image(1));
+  write_image(scene.path / "images/1.jpg", 12, 8);
   for (auto& frame : scene.json["frames"])
     if (frame["file_path"] == "images/1.png")
       frame["file_path"] = "images/1", frame["fl_x"] = 30, frame["cy"] = 3;
@@ -111,7 +111,7 @@ TEST_CASE("dataset: JPEG, names without extension, and intrinsics of a frame of 
   CHECK((common.fx == 20 && common.cy == 4.5));
 }
 
-TEST_CASE("dataset: distorted pictures are cut to what every lens covers, and keep their scale") {
+TEST_CASE("dataset: distorted images are cut to what every lens covers, and keep their scale") {
   Photographs scene;
   scene.json["k1"] = 2;
   scene.json["frames"][4]["k1"] = 4;
@@ -126,9 +126,8 @@ TEST_CASE("dataset: distorted pictures are cut to what every lens covers, and ke
       CHECK(v.camera.parameters()[14] == c.cx);
       CHECK(v.rgba.shape == Shape{c.height, c.width, 4});
     }
-  CHECK_THAT(train.notes.back(),
-             Contains("lens distortion removed: pictures of 12 x 8 pixels are cut to the " +
-                      std::to_string(c.width) + " x " + std::to_string(c.height)));
+  CHECK_THAT(train.notes.back(), Contains("lens distortion removed: images of 12 x 8 pixels are cut to the " +
+                                          std::to_string(c.width) + " x " + std::to_string(c.height)));
   const Dataset half = load_dataset(scene.path, {.size = 6});
   CHECK(half.views[0].camera.width == (c.width + 1) / 2);
   CHECK(half.views[0].camera.fx ==
@@ -137,23 +136,23 @@ TEST_CASE("dataset: distorted pictures are cut to what every lens covers, and ke
   scene.write();
   scene.expect_error(
       "transforms.json: frames[9].file_path: [covered_part] lens: must have an inverse everywhere "
-      "in the picture, got k1 -30 k2 0 p1 0 p2 0");
+      "in the image, got k1 -30 k2 0 p1 0 p2 0");
 }
 
-TEST_CASE("dataset: pictures of another size than stated or than the first are refused") {
+TEST_CASE("dataset: images of another size than stated or than the first are refused") {
   Photographs scene;
-  write_picture(scene.picture(2), 24, 16);
-  scene.expect_error("frames[7].file_path: expected a picture of 12 x 8 pixels as frames[8], got 24 x 16");
+  write_image(scene.image(2), 24, 16);
+  scene.expect_error("frames[7].file_path: expected an image of 12 x 8 pixels as frames[8], got 24 x 16");
   scene.json["k1"] = 0.1;
   scene.write();
-  scene.expect_error("frames[7].file_path: expected a picture of 12 x 8 pixels as frames[8], got 24 x 16");
-  write_picture(scene.picture(2), 8, 12);
+  scene.expect_error("frames[7].file_path: expected an image of 12 x 8 pixels as frames[8], got 24 x 16");
+  write_image(scene.image(2), 8, 12);
   scene.json.erase("k1");
   scene.write();
   scene.expect_error(
-      "frames[7].file_path: [camera] picture: must be of 12 x 8 pixels as stated, or that scaled, "
+      "frames[7].file_path: [camera] image: must be of 12 x 8 pixels as stated, or that scaled, "
       "got 8 x 12");
-  write_file_atomically(scene.picture(2), "no picture");
+  write_file_atomically(scene.image(2), "no image");
   scene.expect_error("frames[7].file_path: ");
 }
 
@@ -174,25 +173,25 @@ TEST_CASE("dataset: a folder that is no data set names what was looked for") {
   CHECK(!has_split(folder.path, "train"));
 }
 
-TEST_CASE("dataset: LLFF takes the folder of pictures that fits the size") {
+TEST_CASE("dataset: LLFF takes the folder of images that fits the size") {
   const TemporaryFolder folder;
   write_file_atomically(folder.path / "poses_bounds.npy", std::string_view(llff_file(llff_rows(3))));
   for (int i = 0; i < 3; ++i) {
-    write_picture(folder.path / "images" / ("p" + std::to_string(i) + ".png"), 80, 60);
-    write_picture(folder.path / "images_4" / ("p" + std::to_string(i) + ".jpg"), 20, 15);
-    write_picture(folder.path / "images_2" / ("p" + std::to_string(i) + ".png"), 40, 30);
+    write_image(folder.path / "images" / ("p" + std::to_string(i) + ".png"), 80, 60);
+    write_image(folder.path / "images_4" / ("p" + std::to_string(i) + ".jpg"), 20, 15);
+    write_image(folder.path / "images_2" / ("p" + std::to_string(i) + ".png"), 40, 30);
   }
   const auto width = [&](Index size) {
     const Dataset set = load_dataset(folder.path, {.size = size});
     CHECK(set.views[0].camera.fx == Approx(70.0 * static_cast<double>(set.views[0].camera.width) / 80));
     return set.notes.front() + " " + std::to_string(set.views[0].camera.width);
   };
-  CHECK(width(0) == "pictures of images 80");
-  CHECK(width(80) == "pictures of images 80");
-  CHECK(width(41) == "pictures of images 41");
-  CHECK(width(40) == "pictures of images_2 40");
-  CHECK(width(20) == "pictures of images_4 20");
-  CHECK(width(16) == "pictures of images_4 16");
+  CHECK(width(0) == "images of images 80");
+  CHECK(width(80) == "images of images 80");
+  CHECK(width(41) == "images of images 41");
+  CHECK(width(40) == "images of images_2 40");
+  CHECK(width(20) == "images of images_4 20");
+  CHECK(width(16) == "images of images_4 16");
   const Dataset test = load_dataset(folder.path, {.split = "test"}), train = load_dataset(folder.path);
   CHECK(names(test) == "p0 ");
   CHECK(names(train) == "p1 p2 ");
@@ -204,10 +203,10 @@ TEST_CASE("dataset: LLFF takes the folder of pictures that fits the size") {
   fs::remove(folder.path / "images_4/p1.jpg");
   CHECK_THROWS_WITH(
       load_dataset(folder.path, {.size = 16}),
-      Contains("images_4: expected a picture for each of the 3 rows of ") && Contains(", got 2"));
+      Contains("images_4: expected an image for each of the 3 rows of ") && Contains(", got 2"));
   for (const char* images : {"images", "images_2", "images_4"}) fs::remove_all(folder.path / images);
   CHECK_THROWS_WITH(load_dataset(folder.path),
-                    Contains("expected pictures (.png, .jpg, .jpeg) in a folder images"));
+                    Contains("expected images (.png, .jpg, .jpeg) in a folder images"));
 }
 
 TEST_CASE("dataset: cameras all around are not forward-facing") {
@@ -218,14 +217,13 @@ TEST_CASE("dataset: cameras all around are not forward-facing") {
   std::copy(std::begin(turned), std::end(turned), rows.begin() + 34);
   write_file_atomically(folder.path / "poses_bounds.npy", std::string_view(llff_file(rows)));
   for (const char* name : {"a", "b", "c"})
-    write_picture(folder.path / "images" / (std::string(name) + ".png"), 8, 6);
+    write_image(folder.path / "images" / (std::string(name) + ".png"), 8, 6);
   CHECK(!load_dataset(folder.path).forward_facing);
 }
 
 TEST_CASE("dataset: COLMAP models in text and binary, in each of their places") {
   const TemporaryFolder folder;
-  for (const char* name : {"a.png", "b.png", "sub/c.png"})
-    write_picture(folder.path / "images" / name, 80, 60);
+  for (const char* name : {"a.png", "b.png", "sub/c.png"}) write_image(folder.path / "images" / name, 80, 60);
   const auto write = [&](const fs::path& model, bool binary) {
     fs::create_directories(model);
     const std::string end = binary ? ".bin" : ".txt";
@@ -270,7 +268,7 @@ TEST_CASE("dataset: errors of COLMAP models name file and image") {
   expect("images.txt: a.png: expected a camera of " + (folder.path / "cameras.txt").string() +
          ", got number 2");
   write_file_atomically(folder.path / "cameras.txt", std::string_view(kColmapCamerasText));
-  expect("expected pictures to train on, got none: all 2 are missing, the first is ");
+  expect("expected images to train on, got none: all 2 are missing, the first is ");
   write_file_atomically(folder.path / "points3D.txt", std::string_view("7 0 0 5\n"));
   expect("images.txt: b.png: [colmap_depth] image: must name points of the model, got 9 in b.png");
 }

@@ -1,10 +1,10 @@
-#include <fieldmark/engine/error.h>
-#include <fieldmark/engine/files.h>
-#include <fieldmark/engine/image.h>
+#include <fieldmark/core/error.h>
+#include <fieldmark/core/files.h>
+#include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/camera_set.h>
 #include <fieldmark/nerf/dataset.h>
-#include <fieldmark/nerf/transforms.h>
 #include <unistd.h>
+#include "transforms.h"
 
 #include <cmath>
 #include <filesystem>
@@ -43,14 +43,14 @@ struct Toy {
 };
 }  // namespace
 
-TEST_CASE("dataset: pictures, cameras and names as in the folder") {
+TEST_CASE("dataset: images, cameras and names as in the folder") {
   const Toy toy;
   const Dataset set = load_dataset(toy.path / "", {.background = Background::black});
   CHECK(set.name == "toy");
   CHECK(set.split == "train");
   CHECK(set.background == Background::black);
   REQUIRE(set.views.size() == 2);
-  CHECK(set.views[0].rgba.data == toy.picture.data);
+  CHECK(set.views[0].rgba.data == toy.image.data);
   CHECK(set.views[0].name == "a");
   CHECK(set.views[1].name == "b");
   CHECK(set.views[1].camera.position() == Vec3{4, 5, 6});
@@ -59,7 +59,7 @@ TEST_CASE("dataset: pictures, cameras and names as in the folder") {
   CHECK(std::abs(c.fx - 3 / std::tan(0.4)) < 1e-12);
 }
 
-TEST_CASE("dataset: pictures without alpha are opaque, grey ones have equal channels") {
+TEST_CASE("dataset: images without alpha are opaque, grey ones have equal channels") {
   const Toy toy;
   const auto rgb = quantize8(uniform<float>({4, 6, 3}, 0, 1, 5)),
              grey = quantize8(uniform<float>({4, 6, 1}, 0, 1, 6));
@@ -86,7 +86,7 @@ TEST_CASE("dataset: resizing weighs colour by alpha and scales the camera") {
     for (Index x = 0; x < 3; ++x) {
       double alpha = 0, red = 0;
       for (Index k = 0; k < 4; ++k) {
-        const float* p = toy.picture.data.data() + 4 * (6 * (2 * y + k / 2) + 2 * x + k % 2);
+        const float* p = toy.image.data.data() + 4 * (6 * (2 * y + k / 2) + 2 * x + k % 2);
         alpha += p[3] / 4.0, red += p[0] * p[3] / 4.0;
       }
       CHECK(std::abs(half.views[0].rgba[4 * (3 * y + x) + 3] - alpha) < 1e-6);
@@ -119,16 +119,16 @@ TEST_CASE("dataset: errors of options and folders") {
   toy.expect_error("transforms_train.json: line 2, byte 2: expected JSON, got '?'");
 }
 
-TEST_CASE("dataset: errors of pictures name JSON, place and picture") {
+TEST_CASE("dataset: errors of images name JSON, place and image") {
   Toy toy;
   const std::string place = toy.json.string() + ": frames[1].file_path: ",
                     b = (toy.path / "train/b.png").string();
   write_png(b, quantize8(uniform<float>({4, 5, 3}, 0, 1, 5)));
-  toy.expect_error(place + "expected a picture of 6 x 4 pixels as frames[0], got 5 x 4");
-  // Other sizes even where the resized pictures agree.
+  toy.expect_error(place + "expected an image of 6 x 4 pixels as frames[0], got 5 x 4");
+  // Other sizes even where the resized images agree.
   write_png(b, quantize8(uniform<float>({8, 12, 3}, 0, 1, 5)));
   CHECK_THROWS_WITH(load_dataset(toy.path, {.size = 3}), Contains("got 12 x 8"));
-  write_file_atomically(b, "not a picture");
+  write_file_atomically(b, "not an image");
   toy.expect_error(place);
   toy.expect_error(b + ": ");
   auto bytes = read_bytes(toy.path / "train/a.png");
@@ -137,9 +137,9 @@ TEST_CASE("dataset: errors of pictures name JSON, place and picture") {
   toy.expect_error(place);
   toy.expect_error(b + ": ");
   fs::remove(b);
-  toy.expect_error(place + "expected a picture, got no file " + b + ".png");
+  toy.expect_error(place + "expected an image, got no file " + b + ".png");
   fs::create_directory(b);
-  toy.expect_error(place + "expected a picture, got no file");
+  toy.expect_error(place + "expected an image, got no file");
   toy.transforms.frames.clear();
   toy.write();
   toy.expect_error("transforms_train.json: frames: expected at least one view, got none");

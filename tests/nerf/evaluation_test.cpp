@@ -1,6 +1,6 @@
-#include <fieldmark/engine/error.h>
-#include <fieldmark/engine/image.h>
-#include <fieldmark/engine/metrics.h>
+#include <fieldmark/core/error.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/metrics.h>
 #include <fieldmark/nerf/evaluation.h>
 
 #include <algorithm>
@@ -59,18 +59,18 @@ TEST_CASE("evaluation: scores are those of the metrics, and means are over the v
     Tensor<float> mask(Shape{16, 20});
     for (Index i = 0; i < 320; ++i) mask[i] = data.views[v].rgba[4 * i + 3];
     CHECK(e.per_view[v].psnr == psnr(r.rgb, photo));
-    CHECK(e.per_view[v].psnr_object == psnr_masked(r.rgb, photo, mask));
+    CHECK(e.per_view[v].psnr_foreground == psnr_masked(r.rgb, photo, mask));
     CHECK(e.per_view[v].ssim == ssim(r.rgb, photo));
-    sum[0] += e.per_view[v].psnr, sum[1] += e.per_view[v].psnr_object, sum[2] += e.per_view[v].ssim;
+    sum[0] += e.per_view[v].psnr, sum[1] += e.per_view[v].psnr_foreground, sum[2] += e.per_view[v].ssim;
   }
   CHECK(std::abs(e.psnr - sum[0] / 3) < 1e-12);
-  CHECK(std::abs(e.psnr_object - sum[1] / 3) < 1e-12);
+  CHECK(std::abs(e.psnr_foreground - sum[1] / 3) < 1e-12);
   CHECK(std::abs(e.ssim - sum[2] / 3) < 1e-12);
-  CHECK(e.psnr_object < e.psnr);
+  CHECK(e.psnr_foreground < e.psnr);
 }
 
 TEST_CASE(
-    "evaluation: LPIPS of pictures rounded to 8 bits where there is a network and they are large enough") {
+    "evaluation: LPIPS of images rounded to 8 bits where there is a network and they are large enough") {
   const RadianceField field = small_field();
   Renderer renderer(field);
   const Dataset data = photographs(field, 2, 0.1f, 18);
@@ -100,17 +100,17 @@ TEST_CASE("evaluation: without alpha the object is where the rendering is opaque
   }
   const Rendering r = renderer.render(data.views[0].camera);
   const Evaluation e = evaluate(renderer, data);
-  CHECK(e.psnr_object == psnr_masked(r.rgb, composited(data.views[0], data.background), r.opacity));
+  CHECK(e.psnr_foreground == psnr_masked(r.rgb, composited(data.views[0], data.background), r.opacity));
 }
 
-TEST_CASE("evaluation: a view without the object and a tiny picture are left out of their means") {
+TEST_CASE("evaluation: a view without the object and a tiny image are left out of their means") {
   const RadianceField field = small_field();
   Renderer renderer(field);
   Dataset data = photographs(field, 2, 0.1f);
   for (Index i = 0; i < 320; ++i) data.views[1].rgba[4 * i + 3] = 0;
   const Evaluation e = evaluate(renderer, data);
-  CHECK(std::isnan(e.per_view[1].psnr_object));
-  CHECK(e.psnr_object == e.per_view[0].psnr_object);
+  CHECK(std::isnan(e.per_view[1].psnr_foreground));
+  CHECK(e.psnr_foreground == e.per_view[0].psnr_foreground);
   data.views.resize(1);
   data.views[0].camera = data.views[0].camera.scaled(4, 4);
   data.views[0].rgba = Tensor<float>(Shape{4, 4, 4}, 0.5f);

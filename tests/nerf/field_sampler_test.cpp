@@ -116,7 +116,7 @@ TEST_CASE("field_sampler: importance points of an mlp field come from the coarse
   CHECK(sample(f, rays, average).t == even.t);
 }
 
-TEST_CASE("field_sampler: a picture of an mlp field is the quadrature in double, within 1e-4") {
+TEST_CASE("field_sampler: an image of an mlp field is the quadrature in double, within 1e-4") {
   const RadianceField f = small_mlp(2);
   const Rays rays = some_rays(150, false);  // three blocks
   for (const RayPoints points : {RayPoints{.average = 32, .importance = 32},

@@ -1,4 +1,4 @@
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 #include <fieldmark/nerf/importance_points.h>
 
 #include <algorithm>

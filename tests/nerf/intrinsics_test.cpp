@@ -1,5 +1,5 @@
-#include <fieldmark/engine/error.h>
-#include <fieldmark/nerf/intrinsics.h>
+#include "intrinsics.h"
+#include <fieldmark/core/error.h>
 
 #include <cmath>
 
@@ -14,7 +14,7 @@ TEST_CASE("intrinsics: an angle alone is make_camera") {
   CHECK((a.width == 30 && a.height == 20));
 }
 
-TEST_CASE("intrinsics: lengths are scaled to the picture, the middle is the default") {
+TEST_CASE("intrinsics: lengths are scaled to the image, the middle is the default") {
   const Intrinsics full{.fl_x = 100, .fl_y = 110, .cx = 60.0, .cy = 45.0, .width = 120, .height = 80};
   const Camera half = full.camera({}, 60, 40);
   CHECK((half.fx == 50 && half.fy == 55 && half.cx == 30 && half.cy == 22.5));
@@ -26,7 +26,7 @@ TEST_CASE("intrinsics: lengths are scaled to the picture, the middle is the defa
   CHECK(Intrinsics{.angle_x = 0.7, .fl_x = 100}.camera({}, 60, 40).fx == 100);
 }
 
-TEST_CASE("intrinsics: a picture may be off the stated proportions by its rounding only") {
+TEST_CASE("intrinsics: an image may be off the stated proportions by its rounding only") {
   const Intrinsics full{.fl_x = 100, .width = 1009, .height = 757};
   CHECK(full.camera({}, 126, 94).width == 126);
   CHECK(full.camera({}, 127, 95).width == 127);

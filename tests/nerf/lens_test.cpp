@@ -1,5 +1,5 @@
-#include <fieldmark/engine/error.h>
-#include <fieldmark/nerf/lens.h>
+#include "lens.h"
+#include <fieldmark/core/error.h>
 
 #include <cmath>
 
@@ -40,7 +40,7 @@ TEST_CASE("lens: undistorted inverts distorted") {
       }
 }
 
-TEST_CASE("lens: where the picture folds over there is no inverse") {
+TEST_CASE("lens: where the image folds over there is no inverse") {
   // r (1 - r^2 / 3) rises to 2/3 at r = 1 and falls from there.
   const Lens lens{.k1 = -1.0 / 3};
   CHECK(lens.undistorted({0.66, 0}));
@@ -59,7 +59,7 @@ TEST_CASE("lens: the covered part is a rectangle of sources that no larger one c
     return u >= 0 && v >= 0 && u <= 40 && v <= 30;
   };
   CHECK(covered_part(kCamera, {}) == Crop{0, 0, 40, 30});
-  // A barrel covers all of the pinhole's picture.
+  // A barrel covers all of the pinhole's image.
   CHECK(covered_part(kCamera, {.k1 = -0.1}) == Crop{0, 0, 40, 30});
   const Lens cushion{.k1 = 0.5, .p1 = 0.01};
   const Crop part = covered_part(kCamera, cushion);
@@ -83,11 +83,11 @@ TEST_CASE("lens: a camera of a part sees the same rays") {
   CHECK((part.width == 20 && part.height == 10));
   CHECK(pixel_ray(part, 4, 2).direction == pixel_ray(kCamera, 7, 7).direction);
   CHECK_THROWS_WITH(cropped(kCamera, {.left = 30, .top = 0, .width = 20, .height = 10}),
-                    Contains("part must be within the picture of 40 x 30, got 20 x 10 at (30, 0)"));
+                    Contains("part must be within the image of 40 x 30, got 20 x 10 at (30, 0)"));
 }
 
-TEST_CASE("lens: an undistorted picture has at each pixel what the lens put elsewhere") {
-  // Linear interpolation is exact on a picture that is linear in x and y.
+TEST_CASE("lens: an undistorted image has at each pixel what the lens put elsewhere") {
+  // Linear interpolation is exact on an image that is linear in x and y.
   Tensor<float> rgba(Shape{30, 40, 4});
   for (Index y = 0; y < 30; ++y)
     for (Index x = 0; x < 40; ++x) {
@@ -96,7 +96,7 @@ TEST_CASE("lens: an undistorted picture has at each pixel what the lens put else
     }
   const Lens lens{.k1 = 0.2, .k2 = 0.05, .p1 = 0.003, .p2 = -0.002};
   const Crop part = covered_part(kCamera, lens);
-  const Tensor<float> out = undistorted_picture(rgba, kCamera, lens, part);
+  const Tensor<float> out = undistorted_image(rgba, kCamera, lens, part);
   REQUIRE(out.shape == Shape{part.height, part.width, 4});
   double worst = 0;
   for (Index y = 2; y < part.height - 2; ++y)
@@ -111,7 +111,7 @@ TEST_CASE("lens: an undistorted picture has at each pixel what the lens put else
       CHECK(got[3] == 1);
     }
   CHECK(worst < 1e-6);
-  const Tensor<float> same = undistorted_picture(rgba, kCamera, {}, {0, 0, 40, 30});
+  const Tensor<float> same = undistorted_image(rgba, kCamera, {}, {0, 0, 40, 30});
   CHECK(same.data == rgba.data);
 }
 
@@ -119,15 +119,14 @@ TEST_CASE("lens: the colour of what is transparent does not leak") {
   Tensor<float> rgba(Shape{30, 40, 4});
   for (Index i = 0; i < 1200; ++i)
     rgba[4 * i] = i % 40 < 20 ? 1.0f : 0.0f, rgba[4 * i + 1] = 1 - rgba[4 * i], rgba[4 * i + 3] = rgba[4 * i];
-  const Tensor<float> out = undistorted_picture(rgba, kCamera, {.k1 = -0.1}, {0, 0, 40, 30});
+  const Tensor<float> out = undistorted_image(rgba, kCamera, {.k1 = -0.1}, {0, 0, 40, 30});
   for (Index i = 0; i < 1200; ++i) CHECK(out[4 * i + 1] == 0);
 }
 
 TEST_CASE("lens: errors name the coefficients and the place") {
-  CHECK_THROWS_WITH(
-      covered_part(kCamera, {.k1 = -2}),
-      Contains("must have an inverse everywhere in the picture, got k1 -2 k2 0 p1 0 p2 0, which "
-               "has none at pixel (0, 0) of 40 x 30"));
+  CHECK_THROWS_WITH(covered_part(kCamera, {.k1 = -2}),
+                    Contains("must have an inverse everywhere in the image, got k1 -2 k2 0 p1 0 p2 0, which "
+                             "has none at pixel (0, 0) of 40 x 30"));
   CHECK_THROWS_AS(covered_part(kCamera, {.k1 = -2}), ValueError);
-  CHECK_THROWS_AS(undistorted_picture(Tensor<float>(Shape{3, 4, 4}), kCamera, {}, {0, 0, 4, 3}), ShapeError);
+  CHECK_THROWS_AS(undistorted_image(Tensor<float>(Shape{3, 4, 4}), kCamera, {}, {0, 0, 4, 3}), ShapeError);
 }

@@ -1,5 +1,5 @@
-#include <fieldmark/engine/error.h>
-#include <fieldmark/nerf/llff.h>
+#include "llff.h"
+#include <fieldmark/core/error.h>
 
 #include <cmath>
 #include <limits>

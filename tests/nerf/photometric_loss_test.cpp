@@ -16,7 +16,7 @@ auto op(const Tensor<double>& photograph, const Tensor<double>& background, Phot
   };
 }
 
-// The formula, written per channel as two pictures over one background.
+// The formula, written per channel as two images over one background.
 double reference(const Tensor<double>& rays, const Tensor<double>& photo, const Tensor<double>& back,
                  double huber, double scale) {
   double sum = 0;

@@ -1,5 +1,5 @@
-#include <fieldmark/engine/image.h>
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/rendered_dataset.h>
 
 #include <cmath>
@@ -10,9 +10,9 @@
 using namespace fieldmark;
 using namespace fieldmark::nerf;
 
-TEST_CASE("rendered_dataset: over the background its pictures are the field's") {
+TEST_CASE("rendered_dataset: over the background its images are the field's") {
   RadianceField field = small_field();
-  const auto cameras = make_cameras(field.cameras, CameraSet::near, 3, 24, 1);
+  const auto cameras = make_cameras(field.cameras, CameraSet::novel, 3, 24, 1);
   for (const Background background : {Background::white, Background::black}) {
     field.background = background;
     const Dataset data = rendered_dataset(field, cameras);
@@ -36,9 +36,9 @@ TEST_CASE("rendered_dataset: over the background its pictures are the field's") 
   }
 }
 
-TEST_CASE("rendered_dataset: other spaces have opaque pictures, and errors, progress and threads") {
+TEST_CASE("rendered_dataset: other spaces have opaque images, and errors, progress and threads") {
   RadianceField field = small_field();
-  const auto cameras = make_cameras(field.cameras, CameraSet::near, 2, 24, 1);
+  const auto cameras = make_cameras(field.cameras, CameraSet::novel, 2, 24, 1);
   const int before = threads();
   set_threads(1);
   const Dataset one = rendered_dataset(field, cameras);

@@ -122,7 +122,7 @@ TEST_CASE("renderer: what stopping and leaving out costs is below 0.01") {
   CHECK(worst_error(f, renderer.render(camera), camera) < 0.01);
 }
 
-TEST_CASE("renderer: bf16 shows the same picture within its rounding") {
+TEST_CASE("renderer: bf16 shows the same image within its rounding") {
   const RadianceField f = small_field();
   const Camera camera = test_camera();
   Renderer plain(f);
@@ -164,7 +164,7 @@ TEST_CASE("renderer: trace gives what render shows") {
   }
 }
 
-TEST_CASE("renderer: tiles of any shape and order show the same picture") {
+TEST_CASE("renderer: tiles of any shape and order show the same image") {
   const RadianceField f = small_field();
   const Camera camera = test_camera(37, 29);
   Renderer renderer(f);

@@ -1,5 +1,5 @@
+#include "scene_space.h"
 #include <fieldmark/nerf/marching.h>
-#include <fieldmark/nerf/scene_space.h>
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/nerf/marching.h>
 #include <fieldmark/nerf/space.h>
@@ -117,7 +117,7 @@ TEST_CASE(
     }
 }
 
-TEST_CASE("space: seen cells are those of a picture's cone, the same for every thread count") {
+TEST_CASE("space: seen cells are those of an image's cone, the same for every thread count") {
   const Camera camera = camera_at({3, 2, 14}, {1, 2, 4}, 0.2);
   const Camera two[] = {camera, camera_at({9, 2, 4}, {1, 2, 4}, 0.2)};
   for (const Space& space : {kCube, kContracted}) {
@@ -133,7 +133,7 @@ TEST_CASE("space: seen cells are those of a picture's cone, the same for every t
       REQUIRE(seen[c] >= first[c]);
       more += seen[c] > first[c];
       unseen += !seen[c];
-      // A cell whose middle is in the picture, by the camera's own rays.
+      // A cell whose middle is in the image, by the camera's own rays.
       const auto cell = static_cast<Index>(c);
       const auto middle = [](Index i) { return (static_cast<double>(i) + 0.5) / 12; };
       const Vec3 p = space.to_world({middle(cell % 12), middle(cell / 12 % 12), middle(cell / 144)});

@@ -1,5 +1,5 @@
+#include "table_rows.h"
 #include <fieldmark/nerf/renderer.h>
-#include <fieldmark/nerf/table_rows.h>
 
 #include <algorithm>
 
@@ -79,7 +79,7 @@ TEST_CASE("table_rows: an empty grid reads nothing, a full one everything direct
   CHECK(std::all_of(none.begin(), none.end(), [](std::uint8_t v) { return v == 0; }));
 }
 
-TEST_CASE("table_rows: a field's file leaves rows out, and its pictures are the same") {
+TEST_CASE("table_rows: a field's file leaves rows out, and its images are the same") {
   const TemporaryFolder folder;
   RadianceField f = small_field();
   const OccupancyGrid grid = shell(f.grid.resolution());

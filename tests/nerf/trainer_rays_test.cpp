@@ -1,7 +1,7 @@
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/engine/random.h>
-#include <fieldmark/engine/resize.h>
+#include <fieldmark/imaging/resize.h>
 #include <fieldmark/nerf/analytic_scene.h>
 #include <fieldmark/nerf/evaluation.h>
 #include <fieldmark/nerf/trainer.h>

@@ -1,4 +1,4 @@
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/nerf/analytic_scene.h>
 #include <fieldmark/nerf/trainer.h>

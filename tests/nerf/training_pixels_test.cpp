@@ -1,5 +1,5 @@
+#include "training_pixels.h"
 #include <fieldmark/engine/parallel.h>
-#include <fieldmark/nerf/training_pixels.h>
 
 #include <cmath>
 #include <cstdlib>

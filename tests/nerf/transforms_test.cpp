@@ -1,5 +1,5 @@
-#include <fieldmark/engine/error.h>
-#include <fieldmark/nerf/transforms.h>
+#include "transforms.h"
+#include <fieldmark/core/error.h>
 
 #include <cmath>
 #include <random>
@@ -65,7 +65,7 @@ TEST_CASE("transforms: errors of content name place, expectation and find") {
   expect_error("{\"camera_angle_x\": 1, \"frames\": [3]}", "frames[0]: expected an object, got number");
   expect_error(with("\"b.png\"", "7"), "frames[1].file_path: expected text, got number");
   expect_error(with("\"b.png\"", "\"\""),
-               "frames[1].file_path: expected the name of a picture, got an empty text");
+               "frames[1].file_path: expected the name of an image, got an empty text");
   expect_error(with("\"file_path\": \"b.png\", ", ""), "frames[1]: expected the key \"file_path\", got none");
 }
 

@@ -1,4 +1,4 @@
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/nerf/visual_hull.h>
 
@@ -79,7 +79,7 @@ TEST_CASE("visual_hull: never cuts the ball, and cuts all but a rim outside of i
   CHECK(kept_outside * 100 < outside);
 }
 
-TEST_CASE("visual_hull: cells out of the picture or behind the camera are kept") {
+TEST_CASE("visual_hull: cells out of the image or behind the camera are kept") {
   // One camera inside of the cube, looking along -x at nothing.
   Tensor<float> empty(Shape{32, 32, 4});
   const Camera camera = make_camera(look_at({0.5, 0, 0}, {-1, 0, 0}, {0, 0, 1}), 0.8, 32, 32);
@@ -90,7 +90,7 @@ TEST_CASE("visual_hull: cells out of the picture or behind the camera are kept")
     return hull[static_cast<std::size_t>(x + n * (y + n * z))];
   };
   CHECK(at(14, 8, 8) == 1);  // behind
-  CHECK(at(2, 0, 8) == 1);   // in front, out of the picture
+  CHECK(at(2, 0, 8) == 1);   // in front, out of the image
   CHECK(at(1, 8, 8) == 0);   // seen to be empty
 }
 

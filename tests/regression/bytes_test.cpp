@@ -1,6 +1,6 @@
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/digest.h>
+#include <fieldmark/core/files.h>
 #include <fieldmark/engine/isa.h>
-#include <fieldmark/watermark/digest.h>
 
 #include <algorithm>
 #include <array>
@@ -37,9 +37,8 @@ std::string folder_hash(const std::filesystem::path& folder) {
   for (const auto& entry : std::filesystem::directory_iterator(folder)) paths.push_back(entry.path());
   std::sort(paths.begin(), paths.end());
   std::string lines;
-  for (const auto& path : paths)
-    lines += path.filename().string() + " " + watermark::sha256_file_hex(path) + "\n";
-  return watermark::sha256_hex(lines);
+  for (const auto& path : paths) lines += path.filename().string() + " " + sha256_file_hex(path) + "\n";
+  return sha256_hex(lines);
 }
 
 // Of the logits of every bit in every view: the detector's reading, digit for digit.
@@ -47,7 +46,7 @@ std::string logits_hash(const std::string& json_file) {
   const auto json = nlohmann::json::parse(read_text(json_file));
   std::string numbers;
   for (const auto& view : json.at("views")) numbers += view.at("logits").dump() + "\n";
-  return watermark::sha256_hex(numbers);
+  return sha256_hex(numbers);
 }
 
 // What one preset of `embed` writes, marks and reads.
@@ -76,9 +75,9 @@ void add_mark(Hashes& hashes, const TemporaryFolder& folder, const std::string& 
                                  "1"};
   if (preset == "fast") embed.insert(embed.end(), {"--cells", "6"});
   run(embed, threads);
-  hashes[preset + " owner"] = watermark::sha256_file_hex(owner);
+  hashes[preset + " owner"] = sha256_file_hex(owner);
   run({"bake", "--owner", owner, "--message", "a6", "--out", baked, "--steps", "4"}, threads);
-  hashes[preset + " baked field"] = watermark::sha256_file_hex(baked);
+  hashes[preset + " baked field"] = sha256_file_hex(baked);
   run({"render", "--field", baked, "--out", views, "--count", "2", "--size", "32"}, threads);
   hashes[preset + " renders"] = folder_hash(views);
   run({"extract", "--owner", owner, views, "--json", read}, threads);
@@ -91,10 +90,10 @@ Hashes written(const std::string& threads) {
   run({"scene", "--out", folder / "scene", "--kind", "sphere", "--size", "16", "--views", "12"}, threads);
   hashes["scene"] = folder_hash(std::filesystem::path(folder / "scene") / "train");
   run({"train", "--data", folder / "scene", "--out", folder / "hash.fm", "--steps", "60"}, threads);
-  hashes["hash field"] = watermark::sha256_file_hex(folder / "hash.fm");
+  hashes["hash field"] = sha256_file_hex(folder / "hash.fm");
   run({"train", "--data", folder / "scene", "--out", folder / "mlp.fm", "--preset", "mlp", "--steps", "4"},
       threads);
-  hashes["mlp field"] = watermark::sha256_file_hex(folder / "mlp.fm");
+  hashes["mlp field"] = sha256_file_hex(folder / "mlp.fm");
   watermark::save_key(folder / "key", test_key(5));
   for (const char* preset : {"fast", "paper", "code"}) add_mark(hashes, folder, preset, threads);
   return hashes;

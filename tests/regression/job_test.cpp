@@ -2,16 +2,16 @@
 #include <fieldmark/nerf/analytic_scene.h>
 #include <fieldmark/nerf/evaluation.h>
 #include <fieldmark/nerf/trainer.h>
-#include <fieldmark/watermark/baker.h>
-#include <fieldmark/watermark/embed_views.h>
-#include <fieldmark/watermark/embedder.h>
-#include <fieldmark/watermark/picture_reader.h>
+#include <fieldmark/watermark/embedding/baker.h>
+#include <fieldmark/watermark/embedding/embed_views.h>
+#include <fieldmark/watermark/embedding/embedder.h>
+#include <fieldmark/watermark/reading/blind_reader.h>
 
 #include "support/catch.h"
 #include "watermark/test_key.h"
 
 // The whole job on the built-in scene at 64 x 64 pixels, from the first step to the message read from
-// pictures of the baked field. What changes results shows here, whether it was meant to or not.
+// images of the baked field. What changes results shows here, whether it was meant to or not.
 using namespace fieldmark;
 using namespace fieldmark::nerf;
 using namespace fieldmark::watermark;
@@ -77,16 +77,16 @@ TEST_CASE("regression: the field stays above its floor on views it has not seen"
   const Dataset test = make_scene({.size = kSide, .views = 24}, "test");
   Renderer renderer(trained().field);
   const Evaluation e = evaluate(renderer, test);
-  CAPTURE(e.psnr, e.psnr_object, e.ssim);
+  CAPTURE(e.psnr, e.psnr_foreground, e.ssim);
   CHECK(e.psnr > 30);  // 31.15
 }
 
 TEST_CASE("regression: 8 bits embedded, baked, rendered and read") {
   const RadianceField& field = trained().field;
-  const auto views = cache_near_views(field, square_patch(kSide), 24, 3);
+  const auto views = cache_novel_views(field, square_patch(kSide), 24, 3);
   Owner owner(field,
               {.bits = 8,
-               .strength = 28,
+               .mark_psnr = 28,
                .cells = 6,
                .reader_size = kSide,
                .mark = {.bands = 5, .features = 16},
@@ -108,9 +108,9 @@ TEST_CASE("regression: 8 bits embedded, baked, rendered and read") {
   Baker baker(owner, message, {.schedule = {.steps = 300, .half_after = 4000}, .cameras = 40});
   while (!baker.done()) baker.step(0);
   Renderer renderer(baker.field());
-  const PictureReader reader(owner);
+  const BlindReader reader(owner);
   std::vector<double> sum(static_cast<std::size_t>(owner.cells.count()));
-  for (const Camera& camera : make_cameras(field.cameras, CameraSet::near, 10, kSide, 99)) {
+  for (const Camera& camera : make_cameras(field.cameras, CameraSet::novel, 10, kSide, 99)) {
     const auto evidence = reader.evidence(renderer.render(camera).rgb);
     for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += evidence[c];
   }

@@ -8,6 +8,7 @@
 
 #include "support/catch.h"
 #include "support/random.h"
+#include "support/source_dir.h"
 #include "support/temporary_folder.h"
 #include "support/torch.h"
 
@@ -69,10 +70,9 @@ TEST_CASE("regression: PyTorch draws an mlp field of full size from its file, 10
   const std::vector<std::int64_t> ray_begin(s.ray_begin.begin(), s.ray_begin.end());
   file.add("ray_begin", {kRays + 1}, std::span<const std::int64_t>(ray_begin));
   file.write(folder / "rays");
-  const std::string command = "OMP_NUM_THREADS=2 /usr/bin/python3 " FIELDMARK_SOURCE_DIR
-                              "/tests/regression/torch_field.py '" +
-                              (folder / "field").string() + "' '" + (folder / "rays").string() + "' > '" +
-                              (folder / "answer").string() + "'";
+  const std::string command = "OMP_NUM_THREADS=2 /usr/bin/python3 " + source_dir() +
+                              "/tests/regression/torch_field.py '" + (folder / "field").string() + "' '" +
+                              (folder / "rays").string() + "' > '" + (folder / "answer").string() + "'";
   REQUIRE(std::system(command.c_str()) == 0);
   double worst = 1;
   Index compared = 0;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "support/catch.h"
+#include "support/source_dir.h"
 
 /// Every case of a module passes, under a name of its own, with a relative error of at most `worst`.
 inline void expect_cases_pass(const std::vector<fieldmark::GradcheckCase>& cases,
@@ -32,8 +33,7 @@ inline void expect_cases_pass(const std::vector<fieldmark::GradcheckCase>& cases
 inline int expect_case_of_each_header(const std::vector<fieldmark::GradcheckCase>& cases,
                                       const std::string& folder) {
   int found = 0;
-  for (const auto& file :
-       std::filesystem::recursive_directory_iterator(FIELDMARK_SOURCE_DIR + std::string("/") + folder)) {
+  for (const auto& file : std::filesystem::recursive_directory_iterator(source_dir() + "/" + folder)) {
     if (file.path().extension() != ".h") continue;
     std::ostringstream text;
     text << std::ifstream(file.path()).rdbuf();

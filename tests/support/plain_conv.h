@@ -6,26 +6,26 @@
 #include <string>
 #include <vector>
 
-/// Networks as the papers write them, in plain loops in double over channels-first pictures: nothing here is
+/// Networks as the papers write them, in plain loops in double over channels-first images: nothing here is
 /// shared with the library but the file reader.
-struct PlainPicture {
+struct PlainImage {
   long c = 0, h = 0, w = 0;
   std::vector<double> x;
   double& at(long k, long i, long j) { return x[static_cast<std::size_t>((k * h + i) * w + j)]; }
   double at(long k, long i, long j) const { return x[static_cast<std::size_t>((k * h + i) * w + j)]; }
 };
 
-inline PlainPicture plain_picture(long c, long h, long w) {
+inline PlainImage plain_image(long c, long h, long w) {
   return {c, h, w, std::vector<double>(static_cast<std::size_t>(c * h * w))};
 }
 
 /// relu(conv2d), PyTorch's layout of weights [out, in, k, k].
-inline PlainPicture plain_conv(const PlainPicture& x, const fieldmark::SafetensorsFile& file,
-                               const std::string& name, long stride, long padding) {
+inline PlainImage plain_conv(const PlainImage& x, const fieldmark::SafetensorsFile& file,
+                             const std::string& name, long stride, long padding) {
   const auto w = file.f32(name + ".weight"), b = file.f32(name + ".bias");
   const long k = w.shape[2];
-  PlainPicture y =
-      plain_picture(w.shape[0], (x.h + 2 * padding - k) / stride + 1, (x.w + 2 * padding - k) / stride + 1);
+  PlainImage y =
+      plain_image(w.shape[0], (x.h + 2 * padding - k) / stride + 1, (x.w + 2 * padding - k) / stride + 1);
   for (long o = 0; o < y.c; ++o)
     for (long i = 0; i < y.h; ++i)
       for (long j = 0; j < y.w; ++j) {
@@ -43,12 +43,12 @@ inline PlainPicture plain_conv(const PlainPicture& x, const fieldmark::Safetenso
 }
 
 /// Largest numbers of windows; `ceil` as PyTorch's ceil_mode.
-inline PlainPicture plain_max_pool(const PlainPicture& x, long size, long stride, bool ceil) {
+inline PlainImage plain_max_pool(const PlainImage& x, long size, long stride, bool ceil) {
   const auto extent = [&](long n) {
     const double windows = static_cast<double>(n - size) / static_cast<double>(stride);
     return static_cast<long>(ceil ? std::ceil(windows) : std::floor(windows)) + 1;
   };
-  PlainPicture y = plain_picture(x.c, extent(x.h), extent(x.w));
+  PlainImage y = plain_image(x.c, extent(x.h), extent(x.w));
   for (long c = 0; c < y.c; ++c)
     for (long i = 0; i < y.h; ++i)
       for (long j = 0; j < y.w; ++j) {
@@ -62,7 +62,7 @@ inline PlainPicture plain_max_pool(const PlainPicture& x, long size, long stride
 }
 
 /// The channels of a, then those of b.
-inline PlainPicture plain_concat(PlainPicture a, const PlainPicture& b) {
+inline PlainImage plain_concat(PlainImage a, const PlainImage& b) {
   a.c += b.c;
   a.x.insert(a.x.end(), b.x.begin(), b.x.end());
   return a;
@@ -70,7 +70,7 @@ inline PlainPicture plain_concat(PlainPicture a, const PlainPicture& b) {
 
 /// Largest difference in parts of the largest number. @param y  [1, H, W, C] of the library
 template <class T>
-double plain_error(const PlainPicture& want, const T* y) {
+double plain_error(const PlainImage& want, const T* y) {
   double off = 0, most = 1e-30;
   for (long c = 0; c < want.c; ++c)
     for (long p = 0; p < want.h * want.w; ++p) {

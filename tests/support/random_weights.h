@@ -1,5 +1,5 @@
 #pragma once
-#include <fieldmark/engine/nn/pretrained_conv.h>
+#include <fieldmark/imaging/pretrained_conv.h>
 
 #include <cmath>
 #include <span>

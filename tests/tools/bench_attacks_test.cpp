@@ -1,13 +1,13 @@
 #include "cli/bench_attacks.h"
 
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 
 #include "cli/cli.h"
 #include "tools/tiny_job.h"
 
 using namespace fieldmark;
 
-TEST_CASE("bench attacks has a row for each attack on pictures and files, with damage and evidence",
+TEST_CASE("bench attacks has a row for each attack on images and files, with damage and evidence",
           "[bench]") {
   const TinyJob& job = TinyJob::get();
   const TemporaryFolder folder;
@@ -21,7 +21,7 @@ TEST_CASE("bench attacks has a row for each attack on pictures and files, with d
                               job.owner,
                               "--message",
                               "5",
-                              "--geometry-count",
+                              "--informed-count",
                               "1",
                               "--field",
                               baked,
@@ -46,15 +46,15 @@ TEST_CASE("bench attacks has a row for each attack on pictures and files, with d
   REQUIRE(r.code == cli::kOk);
   const auto json = nlohmann::json::parse(r.out);
   CHECK(json["views"] == 2);
-  CHECK(json["geometry_views"] == 1);
+  CHECK(json["informed_views"] == 1);
   CHECK(json["bits"] == 4);
-  CHECK(json["unattacked"]["psnr_object"].is_null());
+  CHECK(json["unattacked"]["psnr_foreground"].is_null());
   const auto has = [](const nlohmann::json& rows, const std::string& name) {
     for (const auto& row : rows)
       if (row["attack"] == name) {
-        for (const char* key : {"blind", "p_value", "psnr_object", "kept", "blind_p5"})
+        for (const char* key : {"blind", "p_value", "psnr_foreground", "kept", "blind_p5"})
           CHECK(row.contains(key));
-        for (const char* key : {"geometry", "chosen"})
+        for (const char* key : {"informed", "chosen"})
           CHECK((row[key].is_number() && row[key] >= 0 && row[key] <= 1));
         CHECK((row["blind"] >= 0 && row["blind"] <= 1 && row["p_value"] > 0 && row["p_value"] <= 1));
         return true;
@@ -63,11 +63,11 @@ TEST_CASE("bench attacks has a row for each attack on pictures and files, with d
   };
   for (const char* name : {"noise_0.10", "jpeg_50", "jpeg444_50", "scale-lanczos_0.5", "crop_0.40",
                            "greyscale", "screenshot,screenshot"})
-    CHECK(has(json["pictures"], name));
+    CHECK(has(json["images"], name));
   for (const char* name : {"weights_noise_0.1", "float16", "int6", "prune_0.5", "sign_flip_1.5",
                            "average_0.5", "copy_1", "retold"})
     CHECK(has(json["fields"], name));
-  CHECK_THAT(read_text(folder / "attacks.md"), Contains("## pictures") && Contains("## fields"));
+  CHECK_THAT(read_text(folder / "attacks.md"), Contains("## images") && Contains("## fields"));
   for (const char* plot : {"attacks.svg", "attacks-fields.svg"})
     CHECK_THAT(read_text(folder / plot),
                Contains("class=\"curve\"") && Contains("grey levels") && Contains("as extract reads them"));

@@ -1,6 +1,6 @@
 #include "cli/bench_embed.h"
 
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 
 #include "tools/tiny_job.h"
 
@@ -27,7 +27,7 @@ TEST_CASE("bench embed tells what is read against time and strength, and where t
   for (const auto& row : json["rows"]) {
     CHECK(row["steps"] > 0);
     CHECK(row["seconds"] > row["view_seconds"]);
-    for (const char* key : {"accuracy", "accuracy_p5", "closer", "farther", "unseen", "sign", "cell"})
+    for (const char* key : {"accuracy", "accuracy_p5", "closer", "farther", "extrapolated", "sign", "cell"})
       CHECK((row[key] >= 0 && row[key] <= 1));
     on_front = on_front || row["front"].get<bool>();
   }
@@ -66,7 +66,7 @@ TEST_CASE("bench embed goes on with the rows that a file has", "[bench]") {
   const auto first = rows_of("length: half"), both = rows_of("length: ");
   REQUIRE(first.size() == 2);
   REQUIRE(both.size() == 4);
-  for (const char* key : {"choice", "seconds", "accuracy", "psnr_object", "steps", "commit"})
+  for (const char* key : {"choice", "seconds", "accuracy", "psnr_foreground", "steps", "commit"})
     CHECK(both[0][key] == first[0][key]);  // which rows are on the front depends on the others
   CHECK(both[2]["seconds"] == first[1]["seconds"]);
   CHECK(both[2]["commit"] == first[1]["commit"]);

@@ -1,6 +1,6 @@
 #include "cli/bench_payload.h"
 
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 
 #include <nlohmann/json.hpp>
 

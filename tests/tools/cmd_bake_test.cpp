@@ -1,5 +1,5 @@
 #include <fieldmark/engine/safetensors.h>
-#include <fieldmark/watermark/baker.h>
+#include <fieldmark/watermark/embedding/baker.h>
 
 #include <cmath>
 
@@ -41,33 +41,33 @@ TEST_CASE("bake changes colours only, and says nothing of the message in the fil
 TEST_CASE("bake makes the mark fainter where it is asked to", "[bake]") {
   const TinyJob& job = TinyJob::get();
   // A fainter mark leaves the colours that training starts from, the unmarked ones, nearer to what is wanted.
-  const auto distance = [&](const char* strength) {
+  const auto distance = [&](const char* mark_psnr) {
     const auto r =
         run_command({"bake", "--owner", job.owner, "--message", "5", "--out", job.folder / "fainter.fm",
-                     "--steps", "1", "--strength", strength, "--json", "-"});
+                     "--steps", "1", "--mark-psnr", mark_psnr, "--json", "-"});
     INFO(r.err);
     REQUIRE(r.code == cli::kOk);
     return nlohmann::json::parse(r.out)["psnr_colours"].get<double>();
   };
   const auto one_step =
       run_command({"bake", "--owner", job.owner, "--message", "5", "--out", job.folder / "brief.fm",
-                   "--steps", "1", "--strength", "30", "--json", "-"});
+                   "--steps", "1", "--mark-psnr", "30", "--json", "-"});
   CHECK_THAT(one_step.err, Contains("dB on the object, 30.0 dB asked for"));
   const auto json = nlohmann::json::parse(one_step.out);
-  const double learnt = json["strength_learnt"], taken = 100 * std::pow(10.0, (30 - learnt) / 20);
+  const double learnt = json["mark_psnr_learnt"], taken = 100 * std::pow(10.0, (30 - learnt) / 20);
   REQUIRE(taken < 79);  // 2 dB
   CHECK_THAT(
       json["notes"][0].get<std::string>(),
       Contains("the file's colours took only " + std::to_string(std::lround(taken)) + "% of the mark"));
   CHECK(json["scale"] == watermark::Baker::kLargestScale);
-  // Twice the difference, four times its square. PSNR is of pictures in bytes: two roundings add 1/12 of a
+  // Twice the difference, four times its square. PSNR is of images in bytes: two roundings add 1/12 of a
   // step squared each, and the owner's random key decides how much that is beside the mark.
   const double rounding = 2 / 12. / (255 * 255), square = std::pow(10.0, -learnt / 10) - rounding;
-  CHECK(json["strength"].get<double>() == Approx(-10 * std::log10(4 * square + rounding)).margin(0.25));
+  CHECK(json["mark_psnr"].get<double>() == Approx(-10 * std::log10(4 * square + rounding)).margin(0.25));
   const double strong = distance("30"), faint = distance("50");
   CHECK(faint - strong == Approx(20).margin(1));
   const auto r = run_command({"bake", "--owner", job.owner, "--message", "5", "--out",
-                              job.folder / "refused.fm", "--steps", "1", "--strength", "19"});
+                              job.folder / "refused.fm", "--steps", "1", "--mark-psnr", "19"});
   CHECK(r.code == cli::kUsage);
 }
 
@@ -80,15 +80,15 @@ TEST_CASE("bake gives the file the strength asked for", "[bake]") {
     REQUIRE(r.code == cli::kOk);
     return nlohmann::json::parse(r.out);
   };
-  for (const char* strength : {"30", "38"}) {
+  for (const char* mark_psnr : {"30", "38"}) {
     const auto bake = json_of({"bake", "--owner", job.owner, "--message", "5", "--out", out, "--steps", "120",
-                               "--strength", strength, "--json", "-"});
+                               "--mark-psnr", mark_psnr, "--json", "-"});
     CAPTURE(bake);
-    CHECK(bake["strength"].get<double>() == Approx(std::stod(strength)).margin(0.03));
+    CHECK(bake["mark_psnr"].get<double>() == Approx(std::stod(mark_psnr)).margin(0.03));
     CHECK(bake.count("notes") == 0);
-    const auto measured = json_of({"measure", "--geometry-count", "0", "--owner", job.owner, "--field", out,
+    const auto measured = json_of({"measure", "--informed-count", "0", "--owner", job.owner, "--field", out,
                                    "--message", "5", "--count", "40", "--json", "-"});
-    CHECK(measured["psnr_base_object"].get<double>() == Approx(std::stod(strength)).margin(0.4));
+    CHECK(measured["psnr_base_foreground"].get<double>() == Approx(std::stod(mark_psnr)).margin(0.4));
   }
 }
 
@@ -105,10 +105,10 @@ TEST_CASE("bake refuses a message that does not fit, and an owner that is none",
   CHECK(!std::filesystem::exists(out));
 }
 
-TEST_CASE("bake encodes payloads, and the other commands know them and their claim", "[bake]") {
+TEST_CASE("bake encodes payloads, and the other commands know them and their commitment", "[bake]") {
   const TinyJob& job = TinyJob::get();
   const std::string owner = job.folder / "long.fm", baked = job.folder / "long_baked.fm",
-                    pictures = job.pictures();
+                    images = job.images();
   const auto json_of = [](const std::vector<std::string>& line) {
     auto with_json = line;
     with_json.insert(with_json.end(), {"--json", "-"});
@@ -123,33 +123,33 @@ TEST_CASE("bake encodes payloads, and the other commands know them and their cla
   const auto bake = json_of({"bake", "--owner", owner, "--text", "hi", "--out", baked, "--steps", "1"});
   CHECK(bake["payload"] == nlohmann::json{{"kind", "text"}, {"value", "hi"}});
   CHECK(bake["message"].get<std::string>().substr(0, 5) == "76869");  // version 7, then the text
-  CHECK(bake["claim"] == embedded["claim"]);
+  CHECK(bake["commitment"] == embedded["commitment"]);
   CHECK(bake["owner_sha256"] == embedded["sha256"]);
-  const auto verified = json_of({"verify", "--reading", "blind", "--owner", owner, "--text", "hi", pictures});
-  CHECK(verified["claim"] == bake["claim"]);
+  const auto verified = json_of({"verify", "--detection", "blind", "--owner", owner, "--text", "hi", images});
+  CHECK(verified["commitment"] == bake["commitment"]);
   CHECK(verified["owner_sha256"] == bake["owner_sha256"]);
   CHECK(verified["payload"] == bake["payload"]);
-  CHECK(json_of({"verify", "--reading", "blind", "--owner", owner, "--message", bake["message"],
-                 pictures})["claim"] == bake["claim"]);
-  CHECK(json_of({"verify", "--reading", "blind", "--owner", owner, "--payload", "c0fe", pictures})["claim"] !=
-        bake["claim"]);
+  CHECK(json_of({"verify", "--detection", "blind", "--owner", owner, "--message", bake["message"],
+                 images})["commitment"] == bake["commitment"]);
+  CHECK(json_of({"verify", "--detection", "blind", "--owner", owner, "--payload", "c0fe",
+                 images})["commitment"] != bake["commitment"]);
   // Nothing was learnt, so there is nothing to be read.
-  const auto extracted = json_of({"extract", "--owner", owner, pictures});
+  const auto extracted = json_of({"extract", "--owner", owner, images});
   CHECK(extracted["payload"].is_null());
   CHECK(extracted["views"][0]["payload"].is_null());
-  const auto of_baked = json_of({"measure", "--geometry-count", "0", "--owner", owner, "--field", baked,
+  const auto of_baked = json_of({"measure", "--informed-count", "0", "--owner", owner, "--field", baked,
                                  "--text", "hi", "--count", "2"});
   CHECK(of_baked["payload"]["trials"] == 2);
   CHECK(of_baked["payload"]["exact"] == 0);
-  const auto drawn = json_of({"measure", "--geometry-count", "0", "--owner", owner, "--count", "4",
-                              "--payloads", "--together", "2", "--under", "blur_1"});
+  const auto drawn = json_of({"measure", "--informed-count", "0", "--owner", owner, "--count", "4",
+                              "--payloads", "--together", "2", "--distort", "blur_1"});
   CHECK(drawn["payload"]["trials"] == 2);
   CHECK(drawn["payload"]["together"] == 2);
   CHECK(drawn["payload"]["under"]["blur_1"]["trials"] == 2);
   CHECK(drawn["payload"]["single"]["trials"] == 4);
   CHECK(drawn["payload"]["single"]["under"]["blur_1"]["trials"] == 4);
   CHECK(!of_baked["payload"].contains("single"));
-  CHECK(json_of({"measure", "--geometry-count", "0", "--owner", owner, "--count", "1"})["payload"].is_null());
+  CHECK(json_of({"measure", "--informed-count", "0", "--owner", owner, "--count", "1"})["payload"].is_null());
   const auto refused = [&](const std::vector<std::string>& options, const char* why) {
     std::vector<std::string> line{"bake",    "--owner", owner, "--out", job.folder / "refused.fm",
                                   "--steps", "1"};
@@ -167,7 +167,7 @@ TEST_CASE("bake encodes payloads, and the other commands know them and their cla
   for (const std::vector<std::string>& extra : {std::vector<std::string>{"--together", "3"},
                                                 {"--payloads", "--field", baked, "--text", "hi"},
                                                 {"--text", "hi"}}) {
-    std::vector<std::string> line{"measure", "--geometry-count", "0", "--owner", owner, "--count", "2"};
+    std::vector<std::string> line{"measure", "--informed-count", "0", "--owner", owner, "--count", "2"};
     line.insert(line.end(), extra.begin(), extra.end());
     CHECK(run_command(line).code == cli::kUsage);
   }

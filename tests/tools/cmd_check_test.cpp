@@ -1,4 +1,4 @@
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 
 #include <filesystem>
 
@@ -10,12 +10,12 @@ using namespace fieldmark;
 namespace {
 struct Evidence {
   const TinyJob& job = TinyJob::get();
-  std::string folder = job.folder / "evidence", pictures = job.pictures();
+  std::string folder = job.folder / "evidence", images = job.images();
   nlohmann::json verified;
   Evidence() {
     const auto r =
-        run_command({"verify", "--reading", "blind", "--owner", job.owner, "--message", "5", "--fpr", "1",
-                     "--evidence", folder, "--wrong-keys", "300", pictures, "--json", "-"});
+        run_command({"verify", "--detection", "blind", "--owner", job.owner, "--message", "5", "--fpr", "1",
+                     "--evidence", folder, "--wrong-keys", "300", images, "--json", "-"});
     INFO(r.err);
     REQUIRE(r.code == cli::kOk);
     verified = nlohmann::json::parse(r.out);
@@ -23,19 +23,19 @@ struct Evidence {
 };
 }  // namespace
 
-TEST_CASE("check passes the evidence that verify wrote, with its pictures and its signer", "[check]") {
+TEST_CASE("check passes the evidence that verify wrote, with its images and its signer", "[check]") {
   const Evidence e;
   const std::string signer = e.verified["public_key"];
   CHECK(signer == e.job.embedded["public_key"]);
-  const auto r = run_command({"check", e.folder, e.pictures, "--public-key", signer, "--json", "-"});
+  const auto r = run_command({"check", e.folder, e.images, "--public-key", signer, "--json", "-"});
   INFO(r.err);
   CHECK(r.code == cli::kOk);
   const auto json = nlohmann::json::parse(r.out);
   CHECK(json["intact"] == true);
   CHECK(json["faults"].empty());
-  CHECK(json["pictures"] == 2);
-  CHECK(json["pictures_known"] == 2);
-  CHECK(json["claim"] == e.verified["claim"]);
+  CHECK(json["images"] == 2);
+  CHECK(json["images_known"] == 2);
+  CHECK(json["commitment"] == e.verified["commitment"]);
   CHECK(json["found"] == true);
   CHECK(json["message"] == "5");
   CHECK_THAT(run_command({"check", e.folder}).out, Contains(": INTACT") && Contains("not compared"));
@@ -51,8 +51,8 @@ TEST_CASE("check says what was altered, and ends with 1", "[check]") {
   };
   failed({"--public-key", std::string(64, '0')}, "signed by another key");
   const std::string other = e.job.folder / "other.png";
-  write_file_atomically(other, std::string_view("another picture"));
-  failed({other}, "other.png is none of the pictures");
+  write_file_atomically(other, std::string_view("another image"));
+  failed({other}, "other.png is none of the images");
   const std::string evidence = e.folder + "/evidence.json", report = e.folder + "/report.html";
   std::string text = read_text(evidence), page = read_text(report);
   write_file_atomically(report, page + " ");

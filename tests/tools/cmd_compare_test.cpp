@@ -1,6 +1,6 @@
-#include <fieldmark/engine/image.h>
-#include <fieldmark/engine/metrics.h>
-#include <fieldmark/engine/nn/lpips.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/lpips.h>
+#include <fieldmark/imaging/metrics.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -33,7 +33,7 @@ struct Pairs {
 
 }  // namespace
 
-TEST_CASE("compare prints PSNR, SSIM and LPIPS of two pictures, and the means of two folders", "[compare]") {
+TEST_CASE("compare prints PSNR, SSIM and LPIPS of two images, and the means of two folders", "[compare]") {
   const EnvironmentVariable data("FIELDMARK_DATA", nullptr);
   const Pairs p;
   const auto r = run_command({"compare", p.a, p.b, "--squeeze-weights", p.weights, "--json", "-"});
@@ -56,7 +56,7 @@ TEST_CASE("compare prints PSNR, SSIM and LPIPS of two pictures, and the means of
   CHECK(single["ssim"].get<double>() == ssim(a, b));
   CHECK(single["lpips_squeeze"].get<double>() == squeeze.distance(a, b).value);
   CHECK(single["lpips_squeeze"] == json["pairs"][1]["lpips_squeeze"]);
-  // Equal pictures have no PSNR; the distance is 0.
+  // Equal images have no PSNR; the distance is 0.
   const auto same = run_command({"compare", p.a, p.a, "--squeeze-weights", p.weights, "--json", "-"});
   CHECK(Json::parse(same.out)["psnr"].is_null());
   CHECK(Json::parse(same.out)["lpips_squeeze"] == 0);
@@ -71,7 +71,7 @@ TEST_CASE("compare refuses what cannot be paired", "[compare]") {
   CHECK(run_command({"compare", p.a, p.folder / "none"}).code == cli::kFailed);
   const auto count = run_command({"compare", p.a, p.b + "/r_0.png"});
   CHECK(count.code == cli::kFailed);
-  CHECK_THAT(count.err, Contains("expected 2 pictures") && Contains("found 1"));
+  CHECK_THAT(count.err, Contains("expected 2 images") && Contains("found 1"));
   const std::string small = p.folder / "small.png";
   write_png(small, Tensor<float>({8, 8, 3}));
   const auto size = run_command({"compare", small, p.b + "/r_0.png"});
@@ -95,7 +95,7 @@ TEST_CASE("compare --reference holds LPIPS against the values in a folder, and f
   CHECK(json["pairs"].size() == 12);
   CHECK(json["worst_error"].get<double>() < 1e-6);
   CHECK(json["worst_layer_error"].get<double>() < 1e-6);
-  // Measured 5.1e-7 dB: the reference has PSNR of the pictures rounded to float in [-1, 1], which in double
+  // Measured 5.1e-7 dB: the reference has PSNR of the images rounded to float in [-1, 1], which in double
   // gives its values to 4e-15; that of their bytes is exact.
   CHECK(json["worst_psnr_error"].get<double>() < 1e-6);
   // One value changed by two times the bar.

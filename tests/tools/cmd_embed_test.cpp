@@ -1,22 +1,22 @@
-#include <fieldmark/engine/files.h>
-#include <fieldmark/watermark/owner.h>
+#include <fieldmark/core/files.h>
+#include <fieldmark/watermark/mark/owner.h>
 
 #include "cli/cli.h"
 #include "tools/tiny_job.h"
 
 using namespace fieldmark;
 
-TEST_CASE("embed writes an owner, a picture and the figures that scripts read", "[embed]") {
+TEST_CASE("embed writes an owner, an image and the figures that scripts read", "[embed]") {
   const TinyJob& job = TinyJob::get();
   for (const char* key :
-       {"bits", "views", "cameras", "baked", "accuracy", "accuracy_p5", "psnr_base", "psnr_base_object",
+       {"bits", "views", "cameras", "baked", "accuracy", "accuracy_p5", "psnr_base", "psnr_base_foreground",
         "ssim_base", "lpips_base", "psnr_photo", "under", "seconds", "steps", "cells"})
     CHECK(job.embedded.contains(key));
   CHECK(job.embedded["bits"] == 4);
   CHECK(job.embedded["views"] == 2);
   CHECK(job.embedded["steps"] == 2);
-  CHECK(job.embedded["cameras"] == "near");
-  CHECK(job.embedded["accuracy"]["geometry"].is_null());
+  CHECK(job.embedded["cameras"] == "novel");
+  CHECK(job.embedded["accuracy"]["informed"].is_null());
   CHECK(job.embedded["under"]["blur_1"]["blind"].is_number());
   CHECK(std::filesystem::exists(job.owner + ".png"));
   CHECK(!std::filesystem::exists(job.owner + ".checkpoint"));
@@ -91,7 +91,7 @@ TEST_CASE("embed --preset paper and code give an owner that bakes and reads like
     CHECK(nlohmann::json::parse(r.out)["accuracy"]["blind"].is_number());
     REQUIRE(run_command({"bake", "--owner", owner, "--message", "6", "--out", baked, "--steps", "2"}).code ==
             cli::kOk);
-    const auto read = run_command({"extract", "--owner", owner, job.pictures(), "--json", "-"});
+    const auto read = run_command({"extract", "--owner", owner, job.images(), "--json", "-"});
     REQUIRE(read.code == cli::kOk);
     CHECK(nlohmann::json::parse(read.out)["bits"].get<std::string>().size() == 4);
   }
@@ -104,11 +104,10 @@ TEST_CASE("embed says what is wrong, and leaves no file", "[embed]") {
   CHECK(wrong_kind.code == cli::kFailed);
   CHECK_THAT(wrong_kind.err, Contains("expected a FIELD file (kind 'field'), found kind 'owner'"));
   CHECK(run_command({"embed", "--field", job.field, "--out", out, "--bits", "0"}).code == cli::kUsage);
-  CHECK(run_command({"embed", "--field", job.field, "--out", out, "--strength", "5"}).code == cli::kUsage);
+  CHECK(run_command({"embed", "--field", job.field, "--out", out, "--mark-psnr", "5"}).code == cli::kUsage);
   CHECK(run_command({"embed", "--field", job.field, "--out", out, "--preset", "other"}).code == cli::kUsage);
-  CHECK(
-      run_command({"embed", "--field", job.field, "--out", out, "--steps", "1", "--under", "melt_3"}).code ==
-      cli::kUsage);
+  CHECK(run_command({"embed", "--field", job.field, "--out", out, "--steps", "1", "--distort", "melt_3"})
+            .code == cli::kUsage);
   CHECK(run_command({"embed", "--field", job.field, "--out", out, "--steps", "1", "--resume"}).code ==
         cli::kFailed);
   CHECK(!std::filesystem::exists(out));

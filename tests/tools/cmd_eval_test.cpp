@@ -1,4 +1,4 @@
-#include <fieldmark/engine/nn/lpips.h>
+#include <fieldmark/imaging/lpips.h>
 
 #include <nlohmann/json.hpp>
 
@@ -24,7 +24,7 @@ TEST_CASE("eval compares with the photographs of the split, one row each", "[eva
   double sum = 0;
   for (const auto& view : json["per_view"]) sum += view["psnr"].get<double>();
   CHECK(json["psnr"].get<double>() == Approx(sum / 4));
-  for (const char* key : {"psnr_object", "ssim"}) CHECK(json.at(key).is_number());
+  for (const char* key : {"psnr_foreground", "ssim"}) CHECK(json.at(key).is_number());
   const auto finer = run_command(
       {"eval", "--field", field, "--data", scene, "--split", "train", "--supersampling", "2", "--json", "-"});
   REQUIRE(finer.code == cli::kOk);

@@ -1,14 +1,14 @@
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 
 #include "cli/cli.h"
 #include "tools/tiny_job.h"
 
 using namespace fieldmark;
 
-TEST_CASE("extract reads every picture and all together", "[extract]") {
+TEST_CASE("extract reads every image and all together", "[extract]") {
   const TinyJob& job = TinyJob::get();
   const auto r =
-      run_command({"extract", "--owner", job.owner, "--reading", "blind", job.pictures(), "--json", "-"});
+      run_command({"extract", "--owner", job.owner, "--detection", "blind", job.images(), "--json", "-"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
   const auto json = nlohmann::json::parse(r.out);
@@ -22,28 +22,28 @@ TEST_CASE("extract reads every picture and all together", "[extract]") {
   CHECK(json["views"][0]["agreement"].is_null());
 }
 
-TEST_CASE("extract says which reading it chose and how well the picture agrees", "[extract]") {
+TEST_CASE("extract says which reading it chose and how well the image agrees", "[extract]") {
   const TinyJob& job = TinyJob::get();
-  const std::string pictures = job.pictures();
-  for (const std::string how : {"auto", "geometry"}) {
-    const auto r = run_command({"extract", "--owner", job.owner, "--reading", how, pictures, "--json", "-"});
+  const std::string images = job.images();
+  for (const std::string how : {"auto", "informed"}) {
+    const auto r = run_command({"extract", "--owner", job.owner, "--detection", how, images, "--json", "-"});
     INFO(r.err);
     REQUIRE(r.code == cli::kOk);
     const auto json = nlohmann::json::parse(r.out);
     for (const auto& view : json["views"]) {
-      CHECK((view["reading"] == "blind" || view["reading"] == "geometry"));
+      CHECK((view["reading"] == "blind" || view["reading"] == "informed"));
       CHECK(view["agreement"].is_number());
       CHECK_THAT(r.err,
                  Contains(view["image"].get<std::string>() + "  " + view["reading"].get<std::string>()));
     }
   }
-  CHECK(run_command({"extract", "--owner", job.owner, "--reading", "both", pictures}).code == cli::kUsage);
+  CHECK(run_command({"extract", "--owner", job.owner, "--detection", "both", images}).code == cli::kUsage);
 }
 
-TEST_CASE("extract names the picture that cannot be read", "[extract]") {
+TEST_CASE("extract names the image that cannot be read", "[extract]") {
   const TinyJob& job = TinyJob::get();
   const std::string broken = job.folder / "broken.png";
-  write_file_atomically(broken, std::string_view("no picture"));
+  write_file_atomically(broken, std::string_view("no image"));
   const auto r = run_command({"extract", "--owner", job.owner, broken});
   CHECK(r.code == cli::kFailed);
   CHECK_THAT(r.err, Contains("broken.png"));

@@ -1,4 +1,4 @@
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 #include <fieldmark/engine/isa.h>
 
 #include <nlohmann/json.hpp>
@@ -6,6 +6,7 @@
 
 #include "cli/cli.h"
 #include "support/catch.h"
+#include "support/source_dir.h"
 #include "support/temporary_folder.h"
 #include "tools/run_command.h"
 
@@ -54,11 +55,12 @@ TEST_CASE("Every unit that is documented as differentiable has a check that begi
           "[gradcheck]") {
   const Json cases = Json::parse(run_command({"gradcheck", "--json", "-"}).out)["cases"];
   int units = 0;
-  for (const char* module : {"engine", "nerf", "distort", "extractor", "watermark", "baselines"}) {
-    const std::filesystem::path headers = std::string(FIELDMARK_SOURCE_DIR "/") + module + "/include";
+  for (const char* module : {"engine", "imaging", "nerf", "distort", "extractor", "watermark", "baselines"}) {
+    const std::filesystem::path headers = source_dir() + "/" + module;
     if (!std::filesystem::exists(headers)) continue;
     for (const auto& file : std::filesystem::recursive_directory_iterator(headers)) {
-      if (!file.is_regular_file() || read_text(file.path()).find("Differentiable in:") == std::string::npos)
+      if (file.path().extension() != ".h" ||
+          read_text(file.path()).find("Differentiable in:") == std::string::npos)
         continue;
       const std::string stem = file.path().stem().string();
       INFO(module << "/" << stem << " has no entry in gradcheck_cases()");

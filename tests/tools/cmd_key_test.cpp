@@ -1,5 +1,5 @@
-#include <fieldmark/engine/files.h>
-#include <fieldmark/watermark/key.h>
+#include <fieldmark/core/files.h>
+#include <fieldmark/watermark/keys/key.h>
 
 #include <nlohmann/json.hpp>
 

@@ -1,4 +1,4 @@
-#include <fieldmark/engine/nn/lpips.h>
+#include <fieldmark/imaging/lpips.h>
 
 #include "cli/cli.h"
 #include "support/random_weights.h"
@@ -8,9 +8,9 @@ using namespace fieldmark;
 
 TEST_CASE("measure reports an owner's mark on several sets of cameras", "[measure]") {
   const TinyJob& job = TinyJob::get();
-  for (const char* cameras : {"near", "ring", "sphere"}) {
+  for (const char* cameras : {"novel", "ring", "sphere"}) {
     const auto r = run_command({"measure", "--owner", job.owner, "--cameras", cameras, "--count", "2",
-                                "--geometry-count", "1", "--json", "-"});
+                                "--informed-count", "1", "--json", "-"});
     INFO(r.err);
     REQUIRE(r.code == cli::kOk);
     const auto json = nlohmann::json::parse(r.out);
@@ -20,9 +20,9 @@ TEST_CASE("measure reports an owner's mark on several sets of cameras", "[measur
     const double accuracy = json["accuracy"]["blind"];
     CHECK(accuracy >= 0);
     CHECK(accuracy <= 1);
-    CHECK(json["geometry_views"] == 1);
-    CHECK(json["accuracy"]["geometry"].is_number());
-    CHECK(json["geometry_seconds"] > 0);
+    CHECK(json["informed_views"] == 1);
+    CHECK(json["accuracy"]["informed"].is_number());
+    CHECK(json["informed_seconds"] > 0);
   }
 }
 
@@ -30,22 +30,22 @@ TEST_CASE("measure gives a row for each of several sets of cameras", "[measure]"
   const TinyJob& job = TinyJob::get();
   const TemporaryFolder folder;
   const auto r = run_command({"measure", "--owner", job.owner, "--cameras", "sphere,unseen,closer,farther",
-                              "--count", "2", "--geometry-count", "0", "--under", "blur_1", "--json", "-",
+                              "--count", "2", "--informed-count", "0", "--distort", "blur_1", "--json", "-",
                               "--report", folder / "measure.md"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
   const auto json = nlohmann::json::parse(r.out);
   CHECK(json["cameras"] == "sphere");
   REQUIRE(json["rows"].size() == 4);
-  const char* sets[] = {"sphere", "unseen", "closer", "farther"};
+  const char* sets[] = {"sphere", "extrapolated", "closer", "farther"};
   for (std::size_t i = 0; i < 4; ++i) {
     const auto& row = json["rows"][i];
     CHECK(row["cameras"] == sets[i]);
     CHECK(row["views"] == 2);
     CHECK(row["blind"].is_number());
     CHECK(row["blur_1 blind"].is_number());
-    CHECK(row["psnr_base_object"].is_number());
-    CHECK(row["geometry"].is_null());
+    CHECK(row["psnr_base_foreground"].is_number());
+    CHECK(row["informed"].is_null());
   }
   CHECK(json["rows"][0]["blind"] == json["accuracy"]["blind"]);
   CHECK_THAT(read_text(folder / "measure.md"), Contains("| farther | 2 |"));
@@ -59,7 +59,7 @@ TEST_CASE("measure gives LPIPS against the unmarked renders where there are weig
   const std::string weights = folder / "alex.safetensors";
   random_weights(lpips_tensors(LpipsNetwork::alex)).write(weights);
   const auto lpips_at = [&](const std::string& file, const char* size) {
-    const auto r = run_command({"measure", "--geometry-count", "0", "--owner", job.owner, "--count", "2",
+    const auto r = run_command({"measure", "--informed-count", "0", "--owner", job.owner, "--count", "2",
                                 "--size", size, "--lpips-weights", file, "--json", "-"});
     INFO(r.err);
     REQUIRE(r.code == cli::kOk);
@@ -77,7 +77,7 @@ TEST_CASE("measure wants field and message together, and known distortions", "[m
   const TinyJob& job = TinyJob::get();
   CHECK(run_command({"measure", "--owner", job.owner, "--field", job.field}).code == cli::kUsage);
   CHECK(run_command({"measure", "--owner", job.owner, "--message", "5"}).code == cli::kUsage);
-  CHECK(run_command({"measure", "--owner", job.owner, "--count", "1", "--under", "melt_3"}).code ==
+  CHECK(run_command({"measure", "--owner", job.owner, "--count", "1", "--distort", "melt_3"}).code ==
         cli::kUsage);
   CHECK(run_command({"measure", "--owner", job.owner, "--count", "1", "--cameras", "test"}).code ==
         cli::kUsage);

@@ -1,4 +1,4 @@
-#include <fieldmark/engine/image.h>
+#include <fieldmark/imaging/image.h>
 
 #include <nlohmann/json.hpp>
 
@@ -14,7 +14,7 @@ using Json = nlohmann::json;
 TEST_CASE("render draws cameras from the field alone, or takes a data set's", "[render]") {
   const TemporaryFolder folder;
   const std::string scene = tiny_scene(folder), field = tiny_field(folder, scene);
-  for (const char* cameras : {"near", "ring", "sphere", "unseen", "closer", "farther"}) {
+  for (const char* cameras : {"novel", "ring", "sphere", "extrapolated", "closer", "farther"}) {
     const auto r = run_command({"render", "--field", field, "--out", folder / cameras, "--cameras", cameras,
                                 "--count", "2", "--size", "12", "--json", "-"});
     INFO(r.err);

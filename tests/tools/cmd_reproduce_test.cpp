@@ -1,6 +1,6 @@
 #include <fieldmark/baselines/cell.h>
 #include <fieldmark/baselines/paper_plan.h>
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 
 #include <nlohmann/json.hpp>
 #include <set>

@@ -1,4 +1,4 @@
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 #include <fieldmark/nerf/dataset.h>
 
 #include <nlohmann/json.hpp>
@@ -21,7 +21,7 @@ TEST_CASE("scene writes a data set that loads, the same bytes for the same seed"
   };
   const auto r = with(a, "3");
   CHECK(r.code == cli::kOk);
-  CHECK(nlohmann::json::parse(r.out)["pictures"] == 4);
+  CHECK(nlohmann::json::parse(r.out)["images"] == 4);
   CHECK_THAT(r.err, Contains("4 views of 8x8"));
   REQUIRE(with(b, "3").code == cli::kOk);
   REQUIRE(with(c, "4").code == cli::kOk);

@@ -1,4 +1,4 @@
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 #include <fieldmark/nerf/dataset.h>
 #include <fieldmark/nerf/trainer.h>
 

@@ -1,5 +1,5 @@
-#include <fieldmark/engine/files.h>
-#include <fieldmark/engine/image.h>
+#include <fieldmark/core/files.h>
+#include <fieldmark/imaging/image.h>
 
 #include <filesystem>
 
@@ -33,33 +33,33 @@ TEST_CASE("verify answers with numbers, and with exit code 3 where nothing is fo
 
 TEST_CASE("verify takes another key, and finds with a rate of 1 whatever it sees", "[verify]") {
   const TinyJob& job = TinyJob::get();
-  const std::string key = job.folder / "other.key", pictures = job.pictures();
+  const std::string key = job.folder / "other.key", images = job.images();
   REQUIRE(run_command({"key", "--out", key}).code == 0);
   CHECK(run_command(
-            {"verify", "--reading", "blind", "--owner", job.owner, "--message", "5", "--key", key, pictures})
+            {"verify", "--detection", "blind", "--owner", job.owner, "--message", "5", "--key", key, images})
             .code == cli::kNotFound);
   CHECK(run_command(
-            {"verify", "--reading", "blind", "--owner", job.owner, "--message", "5", "--fpr", "1", pictures})
+            {"verify", "--detection", "blind", "--owner", job.owner, "--message", "5", "--fpr", "1", images})
             .code == cli::kOk);
 }
 
-TEST_CASE("verify refuses a rate that no picture can reach, and messages that do not fit", "[verify]") {
+TEST_CASE("verify refuses a rate that no image can reach, and messages that do not fit", "[verify]") {
   const TinyJob& job = TinyJob::get();
-  const std::string pictures = job.pictures();
+  const std::string images = job.images();
   const auto rate =
-      run_command({"verify", "--owner", job.owner, "--message", "5", "--fpr", "1e-100", pictures});
+      run_command({"verify", "--owner", job.owner, "--message", "5", "--fpr", "1e-100", images});
   CHECK(rate.code == cli::kUsage);
   CHECK_THAT(rate.err, Contains("--fpr"));
-  CHECK(run_command({"verify", "--owner", job.owner, "--message", "123", pictures}).code == cli::kUsage);
-  CHECK(run_command({"verify", "--owner", job.field, "--message", "5", pictures}).code == cli::kFailed);
+  CHECK(run_command({"verify", "--owner", job.owner, "--message", "123", images}).code == cli::kUsage);
+  CHECK(run_command({"verify", "--owner", job.field, "--message", "5", images}).code == cli::kFailed);
 }
 
-TEST_CASE("verify tells of every view, and tests controls beside the pictures", "[verify]") {
+TEST_CASE("verify tells of every view, and tests controls beside the images", "[verify]") {
   const TinyJob& job = TinyJob::get();
-  const std::string pictures = job.pictures(), white = job.folder / "white.png";
+  const std::string images = job.images(), white = job.folder / "white.png";
   write_png(white, Tensor<float>({32, 32, 3}, 1.f));
-  const auto r = run_command({"verify", "--reading", "blind", "--owner", job.owner, "--message", "5",
-                              "--control", white, pictures, "--control", pictures, "--json", "-"});
+  const auto r = run_command({"verify", "--detection", "blind", "--owner", job.owner, "--message", "5",
+                              "--control", white, images, "--control", images, "--json", "-"});
   INFO(r.err);
   CHECK(r.code == cli::kNotFound);
   const auto json = nlohmann::json::parse(r.out);
@@ -77,10 +77,10 @@ TEST_CASE("verify tells of every view, and tests controls beside the pictures", 
 
 TEST_CASE("verify counts the same wrong keys for any number of threads", "[verify]") {
   const TinyJob& job = TinyJob::get();
-  const std::string pictures = job.pictures();
+  const std::string images = job.images();
   const auto counted = [&](const char* threads) {
-    const auto r = run_command({"verify", "--reading", "blind", "--owner", job.owner, "--message", "5",
-                                "--wrong-keys", "20000", "--threads", threads, pictures, "--json", "-"});
+    const auto r = run_command({"verify", "--detection", "blind", "--owner", job.owner, "--message", "5",
+                                "--wrong-keys", "20000", "--threads", threads, images, "--json", "-"});
     return nlohmann::json::parse(r.out)["wrong_keys"];
   };
   const auto one = counted("1"), two = counted("2");
@@ -94,10 +94,10 @@ TEST_CASE("verify counts the same wrong keys for any number of threads", "[verif
 
 TEST_CASE("verify writes equal evidence for equal work, and spares folders of others", "[verify]") {
   const TinyJob& job = TinyJob::get();
-  const std::string pictures = job.pictures(), folder = job.folder / "proof";
+  const std::string images = job.images(), folder = job.folder / "proof";
   const auto verify = [&] {
-    return run_command({"verify", "--reading", "blind", "--owner", job.owner, "--message", "5", "--evidence",
-                        folder, "--wrong-keys", "200", pictures});
+    return run_command({"verify", "--detection", "blind", "--owner", job.owner, "--message", "5",
+                        "--evidence", folder, "--wrong-keys", "200", images});
   };
   const auto first = verify();
   INFO(first.err);

@@ -1,7 +1,7 @@
 #include "cli/context.h"
 
-#include <fieldmark/engine/error.h>
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/error.h>
+#include <fieldmark/core/files.h>
 
 #include <sstream>
 

@@ -1,7 +1,7 @@
 #include "cli/embed_rows.h"
 
-#include <fieldmark/engine/error.h>
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/error.h>
+#include <fieldmark/core/files.h>
 
 #include <cmath>
 
@@ -21,7 +21,7 @@ bench::EmbedRow row(const char* choice, double accuracy) {
   r.seconds = 60.25;
   r.accuracy = accuracy;
   r.accuracy_p5 = 0.5;
-  r.psnr_object = 36.125;
+  r.psnr_foreground = 36.125;
   r.closer = 0.75;
   r.farther = 0.625;
   r.unseen = std::nan("");
@@ -51,7 +51,7 @@ TEST_CASE("embed_rows: rows come back as they were added, with the commit they w
   CHECK(a.seconds == b.seconds);
   CHECK(a.accuracy == b.accuracy);
   CHECK(a.accuracy_p5 == b.accuracy_p5);
-  CHECK(a.psnr_object == b.psnr_object);
+  CHECK(a.psnr_foreground == b.psnr_foreground);
   CHECK(a.closer == b.closer);
   CHECK(a.farther == b.farther);
   CHECK(std::isnan(a.unseen));

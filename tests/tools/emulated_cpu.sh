@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # Kernels, ops and the command on CPUs that the machine at hand is not, emulated: one without AVX, which must find the
 # kernels of x86-64-v2 and never meet an instruction beyond them, and one with AVX2 and without AVX-512.
-#   emulated_cpu.sh FIELDMARK TEST_ENGINE TEST_NERF TEST_DISTORT
+#   emulated_cpu.sh FIELDMARK TEST_ENGINE TEST_NERF
 set -euo pipefail
 if ! command -v qemu-x86_64 >/dev/null; then
   echo "SKIPPED: an emulated CPU needs qemu-x86_64 (package qemu-user)"
   exit 0
 fi
-fieldmark=$(realpath "$1") engine=$(realpath "$2") nerf=$(realpath "$3") distort=$(realpath "$4")
+fieldmark=$(realpath "$1") engine=$(realpath "$2") nerf=$(realpath "$3")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work"
@@ -43,8 +43,7 @@ old=Nehalem new=Haswell-noTSX
 # Every kernel by loops, the ops whose float paths have code of their own, and training.
 ops="dense: the float*,matmul: the float*,softmax: a certain*,activation: float*,pool: float*"
 passes $old "$engine" "kernels/*,adam kernel*,gemm:*,isa*,$ops"
-passes $old "$nerf" "kernels/*,composite*,sampler: densities*,trainer: opaque*"
-passes $old "$distort" "weighted_taps*,blur*,rotate*"
+passes $old "$nerf" "kernels/*,composite*,sampler: densities*,trainer: opaque*,weighted_taps*,blur*,rotate*"
 on $old "$fieldmark" gradcheck || fail "gradcheck on $old"
 
 # The command: a field as large as its own takes minutes to train there, so it is trained here and rendered there.

@@ -1,6 +1,6 @@
 #include "cli/evidence_page.h"
 
-#include <fieldmark/engine/image.h>
+#include <fieldmark/imaging/image.h>
 
 #include <cmath>
 #include <set>
@@ -13,10 +13,10 @@ using namespace fieldmark;
 using namespace fieldmark::cli;
 
 namespace {
-PagePictures small_pictures() { return {{"data:a", "data:b"}, {"data:c", "data:d"}}; }
+PageImages small_images() { return {{"data:a", "data:b"}, {"data:c", "data:d"}}; }
 
 std::string small_page(const watermark::EvidenceRecord& record = small_evidence()) {
-  return evidence_page(record, watermark::public_key(test_key(5)), small_pictures());
+  return evidence_page(record, watermark::public_key(test_key(5)), small_images());
 }
 
 // Tags that are opened and not closed, but those that need no end.
@@ -38,7 +38,7 @@ std::vector<std::string> open_tags(const std::string& html) {
 }
 }  // namespace
 
-TEST_CASE("evidence_page: verdict, limits, figures and pictures, in tags that close", "[evidence]") {
+TEST_CASE("evidence_page: verdict, limits, figures and images, in tags that close", "[evidence]") {
   const std::string page = small_page();
   CHECK(page == small_page());
   CHECK(open_tags(page).empty());
@@ -47,15 +47,15 @@ TEST_CASE("evidence_page: verdict, limits, figures and pictures, in tags that cl
         "view_1.png", "Wrong keys", "class=\"mark\"", "fieldmark check", "lang=\"en\"", "scope=\"col\""}) {
     CHECK_THAT(page, Contains(text));
   }
-  const std::string claim(64, 'c');
-  CHECK_THAT(page, Contains(claim) && Contains(to_hex(watermark::public_key(test_key(5)))));
+  const std::string commitment(64, 'c');
+  CHECK_THAT(page, Contains(commitment) && Contains(to_hex(watermark::public_key(test_key(5)))));
   for (const char* image : {"src=\"data:a\"", "src=\"data:b\"", "src=\"data:c\"", "src=\"data:d\""})
     CHECK_THAT(page, Contains(image));
   CHECK_THAT(page, !Contains("<script") && !Contains("https://"));
   CHECK_THAT(page, !Contains(to_hex(test_key(5))));
 }
 
-TEST_CASE("evidence_page: no picture is without words for who cannot see it", "[evidence]") {
+TEST_CASE("evidence_page: no image is without words for who cannot see it", "[evidence]") {
   const std::string page = small_page();
   for (std::size_t at = page.find("<img"); at != std::string::npos; at = page.find("<img", at + 1))
     CHECK_THAT(page.substr(at, page.find('>', at) - at), Contains(" alt=\"") && !Contains("alt=\"\""));
@@ -65,7 +65,7 @@ TEST_CASE("evidence_page: no picture is without words for who cannot see it", "[
 
 TEST_CASE("evidence_page: names of files cannot break out", "[evidence]") {
   auto record = small_evidence();
-  record.pictures[0].name = "\"><script>alert('1')</script>&.png";
+  record.images[0].name = "\"><script>alert('1')</script>&.png";
   record.controls[1].name = "<b onclick='x'>";
   const std::string page = small_page(record);
   CHECK(open_tags(page).empty());
@@ -101,13 +101,13 @@ TEST_CASE("evidence_page: a small probability is told as one in so many", "[evid
 
 TEST_CASE("evidence_page: a wrong bit is underlined, an undecided one a dash", "[evidence]") {
   auto record = small_evidence();
-  auto& reading = record.pictures[0].score.reading;
+  auto& reading = record.images[0].score.reading;
   reading.message = {{1, 1, 0, 1}};
   reading.decided = {1, 1, 0, 1};
   CHECK_THAT(small_page(record), Contains("<code>1<u>1</u><u>-</u>1</code>"));
 }
 
-TEST_CASE("evidence_page: a small copy keeps the picture's shape and is a JPEG", "[evidence]") {
+TEST_CASE("evidence_page: a small copy keeps the image's shape and is a JPEG", "[evidence]") {
   const auto decoded = [](const Tensor<float>& picture) {
     const std::string address = thumbnail(picture), head = "data:image/jpeg;base64,";
     REQUIRE(address.starts_with(head));

@@ -1,6 +1,6 @@
 #include "cli/evidence_run.h"
 
-#include <fieldmark/engine/image.h>
+#include <fieldmark/imaging/image.h>
 
 #include <sstream>
 
@@ -18,47 +18,45 @@ struct Run {
   KeyTest test{owner, code, message};
   std::ostringstream out, err;
   Context context{CommonOptions{}, {"fieldmark", "verify"}, out, err};
-  std::string folder = TinyJob::get().pictures();
+  std::string folder = TinyJob::get().images();
   SuspectReader reader{owner, "blind"};
-  std::vector<PictureEvidence> pictures = read_pictures(reader, {folder}, context);
+  std::vector<ImageEvidence> images = read_images(reader, {folder}, context);
 };
 }  // namespace
 
-TEST_CASE("evidence_run: pictures are scored one by one, under their names", "[evidence]") {
+TEST_CASE("evidence_run: images are scored one by one, under their names", "[evidence]") {
   Run run;
-  const auto scores = score_pictures(run.test, run.pictures);
+  const auto scores = score_images(run.test, run.images);
   REQUIRE(scores.size() == 2);
   CHECK(scores[0].name == "view_000.png");
-  CHECK(scores[0].sha256 == run.pictures[0].sha256);
+  CHECK(scores[0].sha256 == run.images[0].sha256);
   CHECK(scores[0].sha256.size() == 64);
   CHECK(scores[0].width == 32);
-  CHECK(scores[1].score.statistic ==
-        watermark::keyed_statistic(run.pictures[1].cells, run.code, run.message));
-  print_views(run.out, run.pictures, scores);
+  CHECK(scores[1].score.statistic == watermark::keyed_statistic(run.images[1].cells, run.code, run.message));
+  print_views(run.out, run.images, scores);
   CHECK_THAT(run.out.str(), Contains("of 4, p ") && Contains("least sure bit") && Contains("view_001.png"));
-  const Json json = per_view_json(run.pictures, scores);
+  const Json json = per_view_json(run.images, scores);
   REQUIRE(json.size() == 2);
   CHECK(json[0]["confidences"].size() == 4);
   CHECK(json[0]["logits"].size() == 4);
-  CHECK(json[0]["image"] == run.pictures[0].image);
+  CHECK(json[0]["image"] == run.images[0].image);
 }
 
 TEST_CASE("evidence_run: three built-in controls, and one for each path that is given", "[evidence]") {
   Run run;
   const std::string photo = TinyJob::get().folder / "photo.png";
   write_png(photo, uniform<float>({20, 30, 3}, 0, 1, 3));
-  const auto tested =
-      test_controls(run.test, run.reader, run.pictures, {photo, run.folder + "/"}, run.context);
+  const auto tested = test_controls(run.test, run.reader, run.images, {photo, run.folder + "/"}, run.context);
   REQUIRE(tested.controls.size() == 5);
   CHECK(tested.thumbnails.size() == 5);
   std::string names;
   for (const auto& control : tested.controls) names += control.name + " ";
   CHECK(names == "blank unmarked shuffled photo.png views ");
-  CHECK(tested.controls[0].pictures[0].sha256.empty());
-  CHECK(tested.controls[3].pictures[0].sha256.size() == 64);
-  // A folder of the pictures in question as its own control: the same evidence.
+  CHECK(tested.controls[0].images[0].sha256.empty());
+  CHECK(tested.controls[3].images[0].sha256.size() == 64);
+  // A folder of the images in question as its own control: the same evidence.
   CHECK(tested.controls[4].together.statistic ==
-        watermark::keyed_statistic(total_evidence(run.pictures), run.code, run.message));
+        watermark::keyed_statistic(total_evidence(run.images), run.code, run.message));
   const Json json = controls_json(tested.controls, 1);
   CHECK(json[0]["found"] == true);
   CHECK(json[4]["views"] == 2);
@@ -67,5 +65,5 @@ TEST_CASE("evidence_run: three built-in controls, and one for each path that is 
   std::ostringstream quiet;
   print_controls(quiet, tested.controls, 1e-300);
   CHECK_THAT(quiet.str(), !Contains("THE TEST"));
-  CHECK_THROWS_AS(test_controls(run.test, run.reader, run.pictures, {"/no/such.png"}, run.context), IoError);
+  CHECK_THROWS_AS(test_controls(run.test, run.reader, run.images, {"/no/such.png"}, run.context), IoError);
 }

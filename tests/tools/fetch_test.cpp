@@ -1,8 +1,8 @@
 #include "cli/fetch.h"
 
-#include <fieldmark/engine/error.h>
-#include <fieldmark/engine/files.h>
-#include <fieldmark/watermark/digest.h>
+#include <fieldmark/core/digest.h>
+#include <fieldmark/core/error.h>
+#include <fieldmark/core/files.h>
 
 #include <nlohmann/json.hpp>
 
@@ -25,7 +25,7 @@ std::string content(std::size_t bytes) {
 const std::string kFile = content(100'000);
 
 Manifest::File expected(const std::string& path = "f") {
-  return {path, kFile.size(), watermark::sha256_hex(std::string_view(kFile))};
+  return {path, kFile.size(), sha256_hex(std::string_view(kFile))};
 }
 std::string answer(const std::string& status, const std::string& body, const std::string& fields = "") {
   return "HTTP/1.1 " + status + "\r\n" + fields + "Content-Length: " + std::to_string(body.size()) +

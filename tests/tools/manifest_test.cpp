@@ -1,9 +1,10 @@
 #include "cli/manifest.h"
 
-#include <fieldmark/engine/error.h>
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/error.h>
+#include <fieldmark/core/files.h>
 
 #include "support/catch.h"
+#include "support/source_dir.h"
 #include "support/temporary_folder.h"
 
 using namespace fieldmark;
@@ -59,7 +60,7 @@ TEST_CASE("Every embedded manifest is one, and its name is its own", "[manifest]
   std::vector<std::string> names;
   for (const auto text : embedded_manifests()) {
     const auto m = parse_manifest(text, "embedded");
-    CHECK(std::filesystem::exists(std::string(FIELDMARK_SOURCE_DIR "/data_manifests/") + m.name + ".json"));
+    CHECK(std::filesystem::exists(source_dir() + "/data_manifests/" + m.name + ".json"));
     CHECK(!m.files.empty());
     CHECK(!m.licence.empty());
     names.push_back(m.name);

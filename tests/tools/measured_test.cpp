@@ -19,29 +19,29 @@ TEST_CASE("measured: JSON has the contract's keys, and null where there is no nu
   CHECK(json["bits"] == 16);
   CHECK(json["cameras"] == "ring");
   CHECK(json["accuracy"]["blind"] == 0.75);
-  CHECK(json["accuracy"]["geometry"].is_null());
+  CHECK(json["accuracy"]["informed"].is_null());
   CHECK(json["psnr_base"].is_null());
   CHECK(json["lpips_base"] == 0.125);
   CHECK(json["under"]["noise_0.05"]["blind"] == 0.5);
-  CHECK(json["under"]["noise_0.05"]["geometry"].is_null());
-  CHECK(json["geometry_views"] == 0);
-  m.accuracy.geometry = 1;
-  CHECK(cli::measurement_json(m, "ring")["accuracy"]["geometry"] == 1);
+  CHECK(json["under"]["noise_0.05"]["informed"].is_null());
+  CHECK(json["informed_views"] == 0);
+  m.accuracy.informed = 1;
+  CHECK(cli::measurement_json(m, "ring")["accuracy"]["informed"] == 1);
 }
 
 TEST_CASE("measured: a row has the figures side by side", "[measured]") {
   watermark::Measurement m;
   m.views = 3;
-  m.accuracy = {.blind = 0.75, .geometry = 0.875, .chosen = 1};
-  m.psnr_base_object = 36;
+  m.accuracy = {.blind = 0.75, .informed = 0.875, .chosen = 1};
+  m.psnr_base_foreground = 36;
   m.under["blur_1"].blind = 0.5;
   const auto row = cli::measurement_row(m, "closer");
   CHECK(row["cameras"] == "closer");
   CHECK(row["views"] == 3);
   CHECK(row["blind"] == 0.75);
-  CHECK(row["geometry"] == 0.875);
+  CHECK(row["informed"] == 0.875);
   CHECK(row["chosen"] == 1);
-  CHECK(row["psnr_base_object"] == 36);
+  CHECK(row["psnr_base_foreground"] == 36);
   CHECK(row["blur_1 blind"] == 0.5);
   CHECK(row["blur_1 chosen"].is_null());
   for (const auto& [key, value] : row.items())
@@ -53,11 +53,11 @@ TEST_CASE("measured: people see the accuracies in percent", "[measured]") {
   m.accuracy.blind = 0.7512;
   m.under["blur_1"].blind = 0.5;
   std::ostringstream out;
-  cli::print_measurement(out, m, "near");
+  cli::print_measurement(out, m, "novel");
   CHECK_THAT(out.str(), Contains("75.12%"));
-  CHECK_THAT(out.str(), Contains("blur_1") && !Contains("geometry"));
-  m.geometry_views = 2;
-  m.under["blur_1"].geometry = 0.875;
-  cli::print_measurement(out, m, "near");
-  CHECK_THAT(out.str(), Contains("by geometry 87.50%"));
+  CHECK_THAT(out.str(), Contains("blur_1") && !Contains("informed"));
+  m.informed_views = 2;
+  m.under["blur_1"].informed = 0.875;
+  cli::print_measurement(out, m, "novel");
+  CHECK_THAT(out.str(), Contains("informed 87.50%"));
 }

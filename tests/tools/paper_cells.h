@@ -1,7 +1,7 @@
 #pragma once
 #include <fieldmark/baselines/cell.h>
-#include <fieldmark/engine/files.h>
-#include <fieldmark/engine/image.h>
+#include <fieldmark/core/files.h>
+#include <fieldmark/imaging/image.h>
 
 /// Two systems at two lengths, ours below the paper's at 16 bits.
 inline std::vector<fieldmark::baselines::Cell> paper_cells() {
@@ -15,7 +15,7 @@ inline std::vector<fieldmark::baselines::Cell> paper_cells() {
                      .spread = 0.0625,
                      .own_2d_accuracy = std::nan(""),
                      .psnr_base = 38.5,
-                     .psnr_base_object = 34.25,
+                     .psnr_base_foreground = 34.25,
                      .psnr_photo = 30,
                      .ssim = 0.75,
                      .lpips = std::nan(""),

@@ -54,7 +54,7 @@ TEST_CASE("Figures are of the scene with most cells, and ablations are in their 
   CHECK_THAT(before.at("paper_noise.svg"), Contains("lego") && Contains("Fieldmark, preset fast"));
 }
 
-TEST_CASE("The sheet has a row for each picture of a cell of 16 bits", "[paper_figures]") {
+TEST_CASE("The sheet has a row for each image of a cell of 16 bits", "[paper_figures]") {
   const TemporaryFolder folder;
   const cli::PaperSheet all = cli::paper_sheets().front(), residual = cli::paper_sheets().back();
   CHECK(cli::write_paper_sheet(all, paper_cells(), folder.path, folder / "sheet.png").empty());

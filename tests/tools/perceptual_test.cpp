@@ -35,7 +35,7 @@ TEST_CASE("Weights for LPIPS come from the option, else from below FIELDMARK_DAT
                     Contains(path) && Contains("\"features.0.weight\": expected F32 [64, 3, 11, 11]"));
 }
 
-TEST_CASE("LPIPS of pictures that are too small, or without a network, is no number", "[perceptual]") {
+TEST_CASE("LPIPS of images that are too small, or without a network, is no number", "[perceptual]") {
   const std::optional<Lpips<float>> squeeze(
       std::in_place, random_weights(lpips_tensors(LpipsNetwork::squeeze)), LpipsNetwork::squeeze);
   const Tensor<float> small({16, 40, 3}, 0.5f), a({17, 40, 3}, 0.5f), b({17, 40, 3}, 0.25f);

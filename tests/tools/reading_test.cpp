@@ -4,16 +4,16 @@
 
 using namespace fieldmark;
 
-TEST_CASE("reading: evidence of several pictures is added cell by cell", "[reading]") {
+TEST_CASE("reading: evidence of several images is added cell by cell", "[reading]") {
   CHECK(cli::total_evidence({{"a.png", {1, -2, 0}}, {"b.png", {0.5, 1, 3}}}) ==
         std::vector<double>{1.5, -1, 3});
   CHECK(cli::total_evidence({{"a.png", {4}}}) == std::vector<double>{4});
 }
 
-TEST_CASE("reading: what was used is named, and mixed where pictures differ", "[reading]") {
+TEST_CASE("reading: what was used is named, and mixed where images differ", "[reading]") {
   using watermark::ReadingKind;
-  const cli::PictureEvidence blind{"a.png", {1}}, geometry{"b.png", {1}, ReadingKind::geometry, 0.99};
+  const cli::ImageEvidence blind{"a.png", {1}}, informed{"b.png", {1}, ReadingKind::informed, 0.99};
   CHECK(cli::reading_used({blind, blind}) == "blind");
-  CHECK(cli::reading_used({geometry}) == "geometry");
-  CHECK(cli::reading_used({blind, geometry}) == "mixed");
+  CHECK(cli::reading_used({informed}) == "informed");
+  CHECK(cli::reading_used({blind, informed}) == "mixed");
 }

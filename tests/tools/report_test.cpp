@@ -28,7 +28,7 @@ TEST_CASE("markdown_report holds the protocol and every number", "[report]") {
       .commit = "abc", .cpu = "Some CPU", .isa = "v3", .compiler = "GNU 12 -O2", .threads = 2};
   const Json results{{"psnr", 30.51234567},
                      {"lpips", nullptr},
-                     {"accuracy", {{"blind", 0.98}, {"geometry", nullptr}}},
+                     {"accuracy", {{"blind", 0.98}, {"informed", nullptr}}},
                      {"rows", {{{"name", "x"}, {"gflops", 2}, {"inner", {1, 2}}}, {{"name", "y"}}}}};
   const auto text = markdown_report({"fieldmark", "eval", "--size", "9"}, machine, results);
   CHECK_THAT(text, Contains("# eval\n\n```\nfieldmark eval --size 9\n```\n"));
@@ -36,7 +36,7 @@ TEST_CASE("markdown_report holds the protocol and every number", "[report]") {
                        Contains("| threads | 2 |"));
   CHECK_THAT(
       text,
-      Contains("| psnr | 30.5123 |\n| lpips | - |\n| accuracy.blind | 0.98 |\n| accuracy.geometry | - |"));
+      Contains("| psnr | 30.5123 |\n| lpips | - |\n| accuracy.blind | 0.98 |\n| accuracy.informed | - |"));
   CHECK_THAT(text, Contains("## rows\n\n| name | gflops |\n| --- | --- |\n| x | 2 |\n| y | - |\n"));
   CHECK(text == markdown_report({"fieldmark", "eval", "--size", "9"}, machine, results));
 }

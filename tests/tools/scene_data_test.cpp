@@ -1,6 +1,6 @@
 #include "cli/scene_data.h"
 
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 
 #include <nlohmann/json.hpp>
 
@@ -29,9 +29,9 @@ TEST_CASE("a scene of one transforms.json trains on its own split, and its notes
   REQUIRE(r.code == cli::kOk);
   const Json result = Json::parse(read_text(folder / "r.json"));
   REQUIRE(result.at("notes").size() == 2);
-  CHECK(result["notes"][0] == "every 8th of 5 pictures is held out for val and test");
+  CHECK(result["notes"][0] == "every 8th of 5 images is held out for val and test");
   CHECK_THAT(result["notes"][1].get<std::string>(),
-             Contains("1 of 4 pictures of train are missing and left out, the first is ") &&
+             Contains("1 of 4 images of train are missing and left out, the first is ") &&
                  Contains("train/zz_missing.png"));
   CHECK(result.at("test_psnr").is_number());
   for (const auto& note : result["notes"]) {

@@ -1,18 +1,18 @@
 #include "cli/sheet.h"
 
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 
 #include <cmath>
 
 #include "support/catch.h"
 
 using namespace fieldmark;
-using cli::PicturePair;
+using cli::ImagePair;
 
 TEST_CASE("comparison_sheet has first, second and ten times the difference in a row for each pair",
           "[sheet]") {
-  const std::vector<PicturePair> pairs{{Tensor<float>({2, 3, 3}, 0.2f), Tensor<float>({2, 3, 3}, 0.24f)},
-                                       {Tensor<float>({2, 3, 3}, 0.6f), Tensor<float>({2, 3, 3}, 0.f)}};
+  const std::vector<ImagePair> pairs{{Tensor<float>({2, 3, 3}, 0.2f), Tensor<float>({2, 3, 3}, 0.24f)},
+                                     {Tensor<float>({2, 3, 3}, 0.6f), Tensor<float>({2, 3, 3}, 0.f)}};
   const auto sheet = cli::comparison_sheet(pairs);
   REQUIRE(sheet.shape == Shape{2 * 2 + 4, 3 * 3 + 2 * 4, 3});
   const auto pixel = [&](Index row, Index column) { return sheet[(row * sheet.shape[1] + column) * 3]; };
@@ -25,8 +25,8 @@ TEST_CASE("comparison_sheet has first, second and ten times the difference in a 
   CHECK(pixel(6, 14) == 0);  // -5.5 clamped
 }
 
-TEST_CASE("comparison_sheet refuses pictures of two sizes", "[sheet]") {
-  const PicturePair pair{Tensor<float>({2, 2, 3}), Tensor<float>({2, 3, 3})};
+TEST_CASE("comparison_sheet refuses images of two sizes", "[sheet]") {
+  const ImagePair pair{Tensor<float>({2, 2, 3}), Tensor<float>({2, 3, 3})};
   CHECK_THROWS_AS(cli::comparison_sheet(std::span(&pair, 1)), ShapeError);
   CHECK_THROWS_AS(cli::comparison_sheet({}), ValueError);
 }

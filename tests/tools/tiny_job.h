@@ -3,7 +3,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 #include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -33,8 +33,8 @@ struct TinyJob {
     static const TinyJob job;
     return job;
   }
-  /// Two pictures of the field, in a folder.
-  std::string pictures() const {
+  /// Two images of the field, in a folder.
+  std::string images() const {
     const std::string out = folder / "views";
     const auto r = run_command({"render", "--field", field, "--out", out, "--count", "2", "--size", "32"});
     INFO(r.err);
@@ -85,7 +85,7 @@ struct TinyJob {
   void make() const {
     tiny_field(folder, tiny_scene(folder), "100");
     const auto r = tiny_embed(
-        field, owner, {"--measured-views", "2", "--under", "blur_1", "--json", folder / "embedded.json"});
+        field, owner, {"--measured-views", "2", "--distort", "blur_1", "--json", folder / "embedded.json"});
     INFO(r.err);
     REQUIRE(r.code == 0);
   }

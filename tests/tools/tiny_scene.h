@@ -5,7 +5,7 @@
 #include "support/temporary_folder.h"
 #include "tools/run_command.h"
 
-/// A built-in scene of a few small pictures, below the folder; returns its path.
+/// A built-in scene of a few small images, below the folder; returns its path.
 inline std::string tiny_scene(const TemporaryFolder& folder) {
   const std::string path = folder / "scene";
   const auto r = run_command({"scene", "--out", path, "--kind", "sphere", "--size", "16", "--views", "4"});

@@ -7,14 +7,14 @@
 
 using namespace fieldmark;
 
-TEST_CASE("attack-field trains a field further, or a new one on its pictures", "[attack-field]") {
+TEST_CASE("attack-field trains a field further, or a new one on its images", "[attack-field]") {
   const TemporaryFolder folder;
   const std::string scene = tiny_scene(folder), field = tiny_field(folder, scene, "40"),
                     out = folder / "out.fm";
   const auto before = nerf::RadianceField::load(field);
   const auto run = [&](std::vector<std::string> words) {
     words.insert(words.begin(),
-                 {"attack-field", field, "--out", out, "--steps", "5", "--json", "-", "--under"});
+                 {"attack-field", field, "--out", out, "--steps", "5", "--json", "-", "--distort"});
     return run_command(words);
   };
   for (const auto& words :
@@ -38,7 +38,7 @@ TEST_CASE("attack-field trains a field further, or a new one on its pictures", "
   CHECK(run({"finetune,float16", "--data", scene}).code == cli::kUsage);
 }
 
-TEST_CASE("attack-field turns pictures against a known extractor and trains the field on them",
+TEST_CASE("attack-field turns images against a known extractor and trains the field on them",
           "[attack-field]") {
   const TinyJob& job = TinyJob::get();
   const TemporaryFolder folder;
@@ -47,18 +47,18 @@ TEST_CASE("attack-field turns pictures against a known extractor and trains the 
       run_command({"bake", "--owner", job.owner, "--message", "5", "--out", marked, "--steps", "2"}).code ==
       cli::kOk);
   const auto run = [&](std::vector<std::string> words) {
-    words.insert(words.begin(), {"attack-field", marked, "--out", out, "--under", "remove", "--steps", "3",
+    words.insert(words.begin(), {"attack-field", marked, "--out", out, "--distort", "remove", "--steps", "3",
                                  "--views", "4", "--json", "-"});
     return run_command(words);
   };
-  const auto r = run({"--owner", job.owner, "--strength", "30"});
+  const auto r = run({"--owner", job.owner, "--mark-psnr", "30"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
   CHECK(nlohmann::json::parse(r.out)["steps"] == 3);
   const auto before = nerf::RadianceField::load(marked), after = nerf::RadianceField::load(out);
   CHECK(after.configuration() == before.configuration());
   CHECK(!std::ranges::equal(after.params.values(), before.params.values()));
-  CHECK_THAT(run({}).err, Contains("--under remove: needs --owner OWNER"));
+  CHECK_THAT(run({}).err, Contains("--distort remove: needs --owner OWNER"));
   CHECK(run({"--owner", marked}).code == cli::kFailed);
 }
 

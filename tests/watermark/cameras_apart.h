@@ -1,5 +1,5 @@
 #pragma once
-#include <fieldmark/watermark/camera_motion.h>
+#include "camera_motion.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,9 @@
 #pragma once
-#include <fieldmark/watermark/evidence_record.h>
+#include <fieldmark/watermark/evidence/evidence_record.h>
 
-#include "test_key.h"
+#include "watermark/test_key.h"
 
-/// Evidence of two pictures for a message of four bits on twelve cells, with a control and counted keys.
+/// Evidence of two images for a message of four bits on twelve cells, with a control and counted keys.
 inline fieldmark::watermark::EvidenceRecord small_evidence() {
   using namespace fieldmark::watermark;
   const std::vector<double> area(12, 1.0);
@@ -15,13 +15,13 @@ inline fieldmark::watermark::EvidenceRecord small_evidence() {
   marked[2] *= -0.5;  // one cell is read wrongly
   EvidenceRecord record;
   record.owner_sha256 = std::string(64, 'a');
-  record.claim = std::string(64, 'c');
+  record.commitment = std::string(64, 'c');
   record.message = message;
   record.fpr = 0.02;
   record.cells = 12;
   record.together = score_evidence(marked, code, message);
-  record.pictures = {{"view_0.png", std::string(64, '0'), 40, 30, score_evidence(marked, code, message)},
-                     {"view_1.png", std::string(64, '1'), 40, 30, score_evidence(marked, code, message)}};
+  record.images = {{"view_0.png", std::string(64, '0'), 40, 30, score_evidence(marked, code, message)},
+                   {"view_1.png", std::string(64, '1'), 40, 30, score_evidence(marked, code, message)}};
   const auto quiet = score_evidence(other, code, message);
   record.controls = {{"blank", "Nothing.", {{"blank 1", "", 40, 30, quiet}}, quiet},
                      {"photos", "Given.", {{"cat.jpg", std::string(64, '2'), 9, 8, quiet}}, quiet}};

@@ -1,13 +1,13 @@
 #pragma once
-#include <fieldmark/watermark/embed_views.h>
-#include <fieldmark/watermark/owner.h>
+#include <fieldmark/watermark/embedding/embed_views.h>
+#include <fieldmark/watermark/mark/owner.h>
 
 #include "nerf/small_field.h"
-#include "test_key.h"
+#include "watermark/test_key.h"
 
 inline fieldmark::watermark::OwnerOptions small_owner_options() {
   return {.bits = 3,
-          .strength = 30,
+          .mark_psnr = 30,
           .cells = 4,
           .reader_size = 32,
           .mark = {.bands = 2, .features = 4},

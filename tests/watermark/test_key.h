@@ -1,5 +1,5 @@
 #pragma once
-#include <fieldmark/watermark/key.h>
+#include <fieldmark/watermark/keys/key.h>
 
 /// Bytes first, first + 1, ... modulo 256.
 inline fieldmark::watermark::Key test_key(unsigned first) {

@@ -1,11 +1,11 @@
 #pragma once
 #include <fieldmark/nerf/analytic_scene.h>
 #include <fieldmark/nerf/trainer.h>
-#include <fieldmark/watermark/embed_views.h>
-#include <fieldmark/watermark/owner.h>
+#include <fieldmark/watermark/embedding/embed_views.h>
+#include <fieldmark/watermark/mark/owner.h>
 
 #include "nerf/small_field.h"
-#include "test_key.h"
+#include "watermark/test_key.h"
 
 /// The built-in scene at 48 x 48 pixels, learnt for 150 steps by a field of small tables; once a program.
 inline const fieldmark::nerf::RadianceField& tiny_field() {
@@ -20,19 +20,19 @@ inline const fieldmark::nerf::RadianceField& tiny_field() {
   return field;
 }
 
-/// Eight near views of it at 48 x 48 pixels.
+/// Eight novel views of it at 48 x 48 pixels.
 inline const std::vector<fieldmark::watermark::CachedView>& tiny_views() {
   static const auto views =
-      fieldmark::watermark::cache_near_views(tiny_field(), fieldmark::watermark::square_patch(48), 8, 3);
+      fieldmark::watermark::cache_novel_views(tiny_field(), fieldmark::watermark::square_patch(48), 8, 3);
   return views;
 }
 
 /// An owner of it whose networks have not learnt anything yet.
-inline fieldmark::watermark::Owner tiny_owner(double strength = 30) {
+inline fieldmark::watermark::Owner tiny_owner(double mark_psnr = 30) {
   using namespace fieldmark::watermark;
   return {tiny_field(),
           {.bits = 4,
-           .strength = strength,
+           .mark_psnr = mark_psnr,
            .cells = 6,
            .reader_size = 48,
            .mark = {.bands = 4, .features = 8},

@@ -1,9 +1,9 @@
 #include "cli/bench_attacks.h"
 
-#include <fieldmark/bench/scatter_chart.h>
-#include <fieldmark/engine/files.h>
-#include <fieldmark/nerf/field_attack.h>
-#include <fieldmark/watermark/attack_meter.h>
+#include <fieldmark/core/files.h>
+#include <fieldmark/imaging/scatter_chart.h>
+#include <fieldmark/watermark/attacks/attack_meter.h>
+#include <fieldmark/watermark/attacks/field_attack.h>
 
 #include <CLI/CLI.hpp>
 #include <cmath>
@@ -22,7 +22,7 @@ using watermark::AttackRow;
 using Names = std::vector<std::string>;
 
 // Each line a curve, from mild to strong.
-const std::vector<Names> kPictures{
+const std::vector<Names> kImages{
     {"noise_0.02", "noise_0.05", "noise_0.10", "noise_0.20"},
     {"blur_0.5", "blur_1", "blur_2", "blur_4"},
     {"jpeg_90", "jpeg_70", "jpeg_50", "jpeg_30", "jpeg_10"},
@@ -86,20 +86,20 @@ class Bench {
   const nerf::RadianceField& marked() const { return marked_; }
   const watermark::Owner& owner() const { return owner_; }
 
-  Curve pictures(const Names& names) {
+  Curve images(const Names& names) {
     Curve curve{family(names.front()), {}};
     for (const std::string& name : used(names))
-      curve.rows.push_back(add(name, [&] { return meter_.picture(name); }));
+      curve.rows.push_back(add(name, [&] { return meter_.image(name); }));
     return curve;
   }
   // Of the marked field; or what is put onto another one, whose damage counts.
-  Curve fields(const Names& names, const nerf::FieldAttackInputs& inputs,
+  Curve fields(const Names& names, const watermark::FieldAttackInputs& inputs,
                const nerf::RadianceField* onto = nullptr) {
     Curve curve{family(names.front()), {}};
     for (const std::string& name : used(names))
       curve.rows.push_back(add(name, [&] {
-        const auto attacked = nerf::apply_field_attack(nerf::parse_field_attack(name), onto ? *onto : marked_,
-                                                       CounterRng(context_.seed()), inputs);
+        const auto attacked = watermark::apply_field_attack(
+            watermark::parse_field_attack(name), onto ? *onto : marked_, CounterRng(context_.seed()), inputs);
         return meter_.field(name, attacked, onto);
       }));
     return curve;
@@ -116,7 +116,7 @@ class Bench {
   watermark::AttackMeterOptions meter_options() {
     return {.cameras = nerf::make_cameras(owner_.field.cameras, nerf::parse_camera_set(options_.cameras),
                                           options_.count, options_.size, context_.seed()),
-            .geometry_views = options_.geometry_count,
+            .informed_views = options_.informed_count,
             .seed = context_.seed(),
             .progress = [this](Index done, Index total) {
               if (guard_.interrupted()) throw Interrupted("nothing was written");
@@ -130,12 +130,12 @@ class Bench {
     now_ = name;
     AttackRow row = measure();
     char line[200], informed[60] = "";
-    if (meter_.geometry_views() > 0)
-      std::snprintf(informed, sizeof informed, "  geometry %6.2f%%  chosen %6.2f%%",
-                    100 * row.accuracy.geometry, 100 * row.accuracy.chosen);
+    if (meter_.informed_views() > 0)
+      std::snprintf(informed, sizeof informed, "  informed %6.2f%%  chosen %6.2f%%",
+                    100 * row.accuracy.informed, 100 * row.accuracy.chosen);
     std::snprintf(line, sizeof line, "%-24s %6.2f%%%s  worst 5%% %6.2f%%  p %.1e  %6.2f dB  kept %3.0f%%\n",
                   name.c_str(), 100 * row.accuracy.blind, informed, 100 * row.accuracy_p5, row.p_value,
-                  row.psnr_object, 100 * row.kept);
+                  row.psnr_foreground, 100 * row.kept);
     context_.text() << line;
     return row;
   }
@@ -154,11 +154,11 @@ class Bench {
 Json row_json(const AttackRow& row) {
   return {{"attack", row.name},
           {"blind", number(row.accuracy.blind)},
-          {"geometry", number(row.accuracy.geometry)},
+          {"informed", number(row.accuracy.informed)},
           {"chosen", number(row.accuracy.chosen)},
           {"blind_p5", number(row.accuracy_p5)},
           {"p_value", row.p_value},
-          {"psnr_object", number(row.psnr_object)},
+          {"psnr_foreground", number(row.psnr_foreground)},
           {"kept", number(row.kept)}};
 }
 
@@ -175,9 +175,10 @@ void write_plot(const std::filesystem::path& path, const std::string& title, con
   std::vector<bench::ScatterPoint> points;
   for (const Curve& curve : curves)
     for (const AttackRow& row : curve.rows)
-      if (std::isfinite(row.psnr_object))
-        points.push_back(
-            {.x = 255 * std::pow(10, -row.psnr_object / 20), .y = 100 * row.chosen(), .series = curve.name});
+      if (std::isfinite(row.psnr_foreground))
+        points.push_back({.x = 255 * std::pow(10, -row.psnr_foreground / 20),
+                          .y = 100 * row.chosen(),
+                          .series = curve.name});
   if (points.empty()) return;
   write_file_atomically(
       path, bench::scatter_chart({.title = title,
@@ -194,10 +195,10 @@ std::filesystem::path beside(std::filesystem::path path, const char* what) {
 }
 
 constexpr const char* kDamage =
-    "psnr_object: attacked against marked picture over the object, dB, moved back first where an attack "
+    "psnr_foreground: attacked against marked image over the object, dB, moved back first where an attack "
     "moves pixels; kept: share of the object's pixels still shown; blind, blind_p5, p_value: from the "
-    "picture alone, all views; p_value: of 10 views together, median; geometry: informed, of the first "
-    "geometry_views views; chosen: of the reading that extract would believe there, by agreement alone";
+    "image alone, all views; p_value: of 10 views together, median; informed: informed, of the first "
+    "informed_views views; chosen: of the reading that extract would believe there, by agreement alone";
 
 void check(const BenchAttacksOptions& o) {
   if (o.owner.empty() || !o.message.given() || o.field.empty())
@@ -224,14 +225,14 @@ void add_bench_attacks(CLI::App& app, BenchAttacksOptions& o) {
   add_file("--attacked", o.attacked,
            "attacks: files made from --field by other means, a row each, several times", "FIELD");
   app.add_option("--cameras", o.cameras, "attacks: near, ring, sphere (see measure)")
-      ->check(CLI::IsMember({"near", "ring", "sphere"}).description(""))
+      ->check(CLI::IsMember({"novel", "ring", "sphere"}).description(""))
       ->type_name("SET");
   app.add_option("--count", o.count, "attacks: views, 1 to 1000")
       ->check(CLI::Range(1, 1000).description(""))
       ->type_name("N");
   app.add_option(
-         "--geometry-count", o.geometry_count,
-         "attacks: of the first so many views geometry is read too, 0 to 1000: seconds a view and row")
+         "--informed-count", o.informed_count,
+         "attacks: of the first so many views informed is read too, 0 to 1000: seconds a view and row")
       ->check(CLI::Range(0, 1000).description(""))
       ->type_name("N");
 }
@@ -243,8 +244,8 @@ int bench_attacks(const BenchAttacksOptions& options, Context& context) {
   if (!options.onto.empty()) onto.emplace(nerf::RadianceField::load(options.onto));
   Bench bench(options, context);
   const AttackRow none = bench.none();
-  std::vector<Curve> pictures, fields;
-  for (const Names& names : kPictures) pictures.push_back(bench.pictures(names));
+  std::vector<Curve> images, fields;
+  for (const Names& names : kImages) images.push_back(bench.images(names));
   for (const Names& names : kFields)
     fields.push_back(bench.fields(names, {.unmarked = &bench.owner().field}));
   if (other) fields.push_back(bench.fields(kAverage, {.other = &*other}));
@@ -253,8 +254,8 @@ int bench_attacks(const BenchAttacksOptions& options, Context& context) {
         bench.fields(kCopy, {.unmarked = &bench.owner().field, .marked = &bench.marked()}, &*onto));
   for (const std::string& path : options.attacked) fields.push_back(bench.file(path));
   if (!options.plot.empty()) {
-    const char* reading = bench.meter().geometry_views() > 0 ? "as extract reads them" : "blind";
-    write_plot(options.plot, "Attacks on pictures: what is read against the damage", reading, pictures);
+    const char* reading = bench.meter().informed_views() > 0 ? "as extract reads them" : "blind";
+    write_plot(options.plot, "Attacks on images: what is read against the damage", reading, images);
     write_plot(beside(options.plot, "-fields"),
                "Attacks on the field's file: what is read against the damage", reading, fields);
   }
@@ -263,11 +264,11 @@ int bench_attacks(const BenchAttacksOptions& options, Context& context) {
   context.result({{"field", std::filesystem::path(options.field).filename().string()},
                   {"bits", bench.owner().options().bits},
                   {"views", options.count},
-                  {"geometry_views", bench.meter().geometry_views()},
+                  {"informed_views", bench.meter().informed_views()},
                   {"cameras", options.cameras},
                   {"columns", kDamage},
                   {"unattacked", unattacked},
-                  {"pictures", rows_json(pictures)},
+                  {"images", rows_json(images)},
                   {"fields", rows_json(fields)}});
   return kOk;
 }

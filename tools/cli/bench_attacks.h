@@ -22,14 +22,14 @@ struct BenchAttacksOptions {
   std::string other;                  ///< baked with another message, for average
   std::string onto;                   ///< another field, for copy
   std::vector<std::string> attacked;  ///< files made from the baked field by other means
-  std::string cameras = "near", plot;
-  Index count = 50, geometry_count = 4, size = 0;
+  std::string cameras = "novel", plot;
+  Index count = 50, informed_count = 4, size = 0;
   bool quick = false;
 };
 /// Adds what the other benches do not have.
 void add_bench_attacks(CLI::App& app, BenchAttacksOptions& options);
 
-/// Severity curves: how a baked mark fares under attacks on its pictures and its file, and what they cost.
+/// Severity curves: how a baked mark fares under attacks on its images and its file, and what they cost.
 int bench_attacks(const BenchAttacksOptions& options, Context& context);
 
 }  // namespace fieldmark::cli

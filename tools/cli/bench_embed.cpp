@@ -1,10 +1,10 @@
 #include "cli/bench_embed.h"
 
-#include <fieldmark/bench/embed_bench.h>
-#include <fieldmark/bench/scatter_chart.h>
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 #include <fieldmark/engine/isa.h>
-#include <fieldmark/watermark/owner.h>
+#include <fieldmark/imaging/scatter_chart.h>
+#include <fieldmark/tools/bench/embed_bench.h>
+#include <fieldmark/watermark/mark/owner.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -81,7 +81,7 @@ void print_row(std::ostream& out, const bench::EmbedRow& r, double usual) {
       "%c %-13s %-40s %6.2f%%  %+6.2f  %5.2f dB  %5.1f s  %5ld steps  closer %5.1f%%  farther %5.1f%%  "
       "unseen %5.1f%%  sign %5.1f%%  cell %5.1f%%\n",
       r.front ? '*' : ' ', r.variant.choice.c_str(), r.variant.setting.c_str(), 100 * r.accuracy,
-      100 * (r.accuracy - usual), r.psnr_object, r.seconds, static_cast<long>(r.steps), 100 * r.closer,
+      100 * (r.accuracy - usual), r.psnr_foreground, r.seconds, static_cast<long>(r.steps), 100 * r.closer,
       100 * r.farther, 100 * r.unseen, 100 * r.figures.sign, 100 * r.figures.index);
   out << line;
 }
@@ -94,7 +94,7 @@ Json curves_json(const std::vector<bench::EmbedRow>& rows) {
                       {"setting", r.variant.setting},
                       {"seconds", p.seconds},
                       {"accuracy", p.accuracy},
-                      {"psnr_object", number(p.psnr_object)}});
+                      {"psnr_foreground", number(p.psnr_foreground)}});
   return list;
 }
 
@@ -106,7 +106,7 @@ std::filesystem::path curves_path(std::filesystem::path path) {
   return path.replace_filename(path.stem().string() + "-curves" + path.extension().string());
 }
 
-// Accuracy and strength against time: one picture of where the runs ended, one of the way of those on the
+// Accuracy and strength against time: one image of where the runs ended, one of the way of those on the
 // front.
 void write_plots(const std::string& path, const std::string& name, const std::vector<bench::EmbedRow>& rows) {
   const char* seconds = "seconds of embedding";
@@ -114,7 +114,7 @@ void write_plots(const std::string& path, const std::string& name, const std::ve
   for (const bench::EmbedRow& r : rows) {
     const bool first = &r == rows.data();
     char label[160];
-    std::snprintf(label, sizeof label, "%s, %.1f dB", name_of(r).c_str(), r.psnr_object);
+    std::snprintf(label, sizeof label, "%s, %.1f dB", name_of(r).c_str(), r.psnr_foreground);
     ends.push_back({.x = r.seconds,
                     .y = 100 * r.accuracy,
                     .series = first                          ? "default"
@@ -175,7 +175,7 @@ std::vector<bench::EmbedRow> measured(const BenchEmbedOptions& o, const nerf::Ra
 }
 
 constexpr const char* kColumns =
-    "accuracy: blind, of one view, mean over near views that were not learnt from; closer, farther, unseen: "
+    "accuracy: blind, of one view, mean over novel views that were not learnt from; closer, farther, unseen: "
     "of "
     "a third as many views of such cameras; seconds: views, training and calibration; sign, cell, "
     "bits_in_training: shares right under the distortions of training; curves: on the way, a third of the "

@@ -1,11 +1,11 @@
 #include "cli/bench_field.h"
 
-#include <fieldmark/bench/field_bench.h>
-#include <fieldmark/bench/scatter_chart.h>
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 #include <fieldmark/engine/isa.h>
+#include <fieldmark/imaging/scatter_chart.h>
 #include <fieldmark/nerf/analytic_scene.h>
 #include <fieldmark/nerf/trainer.h>
+#include <fieldmark/tools/bench/field_bench.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -39,7 +39,7 @@ Subject subject_of(const BenchFieldOptions& options, Context& context) {
     subject.field = std::make_unique<nerf::RadianceField>(nerf::RadianceField::load(options.field));
     subject.name = std::filesystem::path(options.field).filename().string();
     if (folder.empty()) {
-      subject.cameras = nerf::make_cameras(subject.field->cameras, nerf::CameraSet::near, options.views,
+      subject.cameras = nerf::make_cameras(subject.field->cameras, nerf::CameraSet::novel, options.views,
                                            options.size, context.seed());
       return subject;
     }

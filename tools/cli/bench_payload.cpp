@@ -1,6 +1,6 @@
 #include "cli/bench_payload.h"
 
-#include <fieldmark/bench/payload_bench.h>
+#include <fieldmark/tools/bench/payload_bench.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>

@@ -1,7 +1,7 @@
 #include "cli/bench_training.h"
 
-#include <fieldmark/bench/training_bench.h>
 #include <fieldmark/engine/isa.h>
+#include <fieldmark/tools/bench/training_bench.h>
 
 #include <cstdio>
 #include <ostream>

@@ -1,6 +1,6 @@
 #include "cli/cli.h"
 
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 #include <fieldmark/engine/parallel.h>
 
 #include <CLI/CLI.hpp>
@@ -24,16 +24,16 @@ constexpr Entry kCommands[] = {
     {"data", "Public data sets by manifest: list, verify", add_data},
     {"train", "Train a field on photographs", add_train},
     {"eval", "Compare a field with photographs", add_eval},
-    {"compare", "Compare pictures: PSNR, SSIM, LPIPS", add_compare},
+    {"compare", "Compare images: PSNR, SSIM, LPIPS", add_compare},
     {"render", "Render views of a field", add_render},
     {"key", "Make a secret key from the operating system's random numbers", add_key},
     {"embed", "Learn a mark for a field, and how to read it", add_embed},
     {"bake", "Put a message into a field that can be published", add_bake},
     {"measure", "Bit accuracy and quality of a mark", add_measure},
-    {"extract", "Read the message from pictures", add_extract},
-    {"verify", "Decide whether pictures show a message, with p-values", add_verify},
+    {"extract", "Read the message from images", add_extract},
+    {"verify", "Decide whether images show a message, with p-values", add_verify},
     {"check", "Look for alterations in the evidence that verify wrote", add_check},
-    {"attack", "Do to pictures what may remove a mark", add_attack},
+    {"distort", "Distort images as they are distorted on their way to a reader", add_distort},
     {"attack-field", "Do to a field's file what may remove a mark", add_attack_field},
     {"bench", "Measure speed and error against this machine's peak", add_bench},
     {"reproduce", "Run every system of the paper's tables, beside its figures", add_reproduce},
@@ -124,7 +124,7 @@ class Program {
   std::ostream &out_, &err_;
   CommonOptions common_;
   CLI::App app_{
-      "Marks a radiance field so that its owner can prove from any rendered picture that it is theirs."};
+      "Marks a radiance field so that its owner can prove from any rendered image that it is theirs."};
   std::vector<Subcommand> subcommands_;
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 
 #include <iosfwd>
 #include <stdexcept>

@@ -1,4 +1,4 @@
-#include <fieldmark/nerf/field_attack.h>
+#include <fieldmark/watermark/attacks/field_attack.h>
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
@@ -14,7 +14,7 @@
 namespace fieldmark::cli {
 namespace {
 
-using nerf::FieldAttackKind;
+using watermark::FieldAttackKind;
 
 struct Options {
   std::string field, out, under;
@@ -26,8 +26,8 @@ struct Options {
 class Input {
  public:
   Input(const std::string& path, const char* option, bool needed) {
-    if (needed && path.empty()) throw UsageError(std::string("--under: needs ") + option + " FIELD");
-    if (!needed && !path.empty()) throw UsageError(std::string(option) + ": --under does not use it");
+    if (needed && path.empty()) throw UsageError(std::string("--distort: needs ") + option + " FIELD");
+    if (!needed && !path.empty()) throw UsageError(std::string(option) + ": --distort does not use it");
     if (needed) field_.emplace(nerf::RadianceField::load(path));
   }
   const nerf::RadianceField* get() const { return field_ ? &*field_ : nullptr; }
@@ -45,14 +45,14 @@ void check_out(const Options& options) {
 }
 
 nerf::RadianceField changed_numbers(const Options& options, Context& context) {
-  const auto attack = read_option("--under", [&] { return nerf::parse_field_attack(options.under); });
+  const auto attack = read_option("--distort", [&] { return watermark::parse_field_attack(options.under); });
   const bool copy = attack.has(FieldAttackKind::copy);
   const Input other(options.other, "--other", attack.has(FieldAttackKind::average)),
       unmarked(options.unmarked, "--unmarked", copy || attack.has(FieldAttackKind::sign_flip)),
       marked(options.marked, "--marked", copy);
-  return nerf::apply_field_attack(attack, nerf::RadianceField::load(options.field),
-                                  CounterRng(context.seed()),
-                                  {.other = other.get(), .unmarked = unmarked.get(), .marked = marked.get()});
+  return watermark::apply_field_attack(
+      attack, nerf::RadianceField::load(options.field), CounterRng(context.seed()),
+      {.other = other.get(), .unmarked = unmarked.get(), .marked = marked.get()});
 }
 
 int run(const Options& options, Context& context) {
@@ -81,7 +81,7 @@ Command add_attack_field(CLI::App& app) {
   app.add_option("--out", o->out, "File for the attacked field, as large as it was")
       ->required()
       ->type_name("FIELD");
-  app.add_option("--under", o->under,
+  app.add_option("--distort", o->under,
                  "Names separated by commas, run left to right. Each tensor by itself:\n"
                  "weights_noise_A  Gaussian, A times the tensor's rms, 0 to 10\n"
                  "float16          rounded to half precision\n"
@@ -99,9 +99,9 @@ Command add_attack_field(CLI::App& app) {
                  "copy_A           FIELD + A (MARKED - UNMARKED), -4 to 4\n"
                  "By training, each alone:\n"
                  "finetune         goes on, on the photographs of --data\n"
-                 "finetune-renders goes on, on pictures of itself\n"
-                 "remove           goes on, on pictures of itself turned against the extractor of --owner\n"
-                 "retrain          a new field on pictures of this one")
+                 "finetune-renders goes on, on images of itself\n"
+                 "remove           goes on, on images of itself turned against the extractor of --owner\n"
+                 "retrain          a new field on images of this one")
       ->required()
       ->type_name("NAME[,NAME...]");
   app.add_option("--other", o->other, "For average: say, the same field with another message")

@@ -1,6 +1,7 @@
-#include <fieldmark/watermark/baker.h>
-#include <fieldmark/watermark/digest.h>
-#include <fieldmark/watermark/signing.h>
+#include <fieldmark/core/digest.h>
+#include <fieldmark/watermark/embedding/baker.h>
+#include <fieldmark/watermark/evidence/commitment.h>
+#include <fieldmark/watermark/keys/signing.h>
 
 #include <CLI/CLI.hpp>
 #include <cmath>
@@ -23,24 +24,24 @@ constexpr double kMuchFainter = 2;  // dB: what learning usually loses is 1.3
 
 struct Options {
   std::string owner, out;
-  std::optional<double> strength;
+  std::optional<double> mark_psnr;
   MessageOption message;
   RunLength length{.seconds = watermark::BakeOptions{}.schedule.seconds};
 };
 
-watermark::Baker::Strength scaled_to(const watermark::Owner& owner, watermark::Baker& baker) {
-  if (owner.mark) return baker.scale_to(owner.options().strength);
-  const double strength = baker.strength();  // the networks' own
-  return {.learnt = strength, .scaled = strength};
+watermark::Baker::MarkPsnr scaled_to(const watermark::Owner& owner, watermark::Baker& baker) {
+  if (owner.mark) return baker.scale_to(owner.options().mark_psnr);
+  const double mark_psnr = baker.mark_psnr();  // the networks' own
+  return {.learnt = mark_psnr, .scaled = mark_psnr};
 }
 
 // How strong the mark is in the file, beside what the owner asked for, and how much of it was learnt.
-void say_strength(const watermark::Owner& owner, const watermark::Baker::Strength& strength,
+void say_strength(const watermark::Owner& owner, const watermark::Baker::MarkPsnr& mark_psnr,
                   Context& context) {
   char line[320];
-  std::snprintf(line, sizeof line, "mark of %.1f dB on the object", strength.scaled);
+  std::snprintf(line, sizeof line, "mark of %.1f dB on the object", mark_psnr.scaled);
   context.text() << line;
-  const double asked = owner.options().strength, fainter = strength.learnt - asked;
+  const double asked = owner.options().mark_psnr, fainter = mark_psnr.learnt - asked;
   if (!owner.mark) {
     context.text() << "\n";
     return;
@@ -51,8 +52,8 @@ void say_strength(const watermark::Owner& owner, const watermark::Baker::Strengt
   std::snprintf(
       line, sizeof line,
       "the file's colours took only %.0f%% of the mark, which was then multiplied by %.2f with what "
-      "they got wrong: a longer --seconds, a larger field or a lower --strength holds it better",
-      100 * std::pow(10.0, -fainter / 20), strength.scale);
+      "they got wrong: a longer --seconds, a larger field or a lower --mark-psnr holds it better",
+      100 * std::pow(10.0, -fainter / 20), mark_psnr.scale);
   context.note(line);
 }
 
@@ -61,9 +62,9 @@ int run(const Options& options, Context& context) {
     throw UsageError("--out: " + options.out + " is the owner's file");
   check_writable(options.out);
   auto owner = watermark::Owner::load(options.owner);
-  if (options.strength) {
-    if (!owner.mark) throw UsageError("--strength: an owner of preset paper has no strength to set");
-    owner.set_strength(*options.strength);
+  if (options.mark_psnr) {
+    if (!owner.mark) throw UsageError("--mark-psnr: an owner of preset paper has no strength to set");
+    owner.set_mark_psnr(*options.mark_psnr);
   }
   const auto message = message_of(options.message, owner.options().bits);
   watermark::BakeOptions bake_options{.seed = context.seed()};
@@ -85,29 +86,30 @@ int run(const Options& options, Context& context) {
                 .save = {},
                 .checkpoint = {}},
                options.length, context);
-  const auto strength = scaled_to(owner, baker);
+  const auto mark_psnr = scaled_to(owner, baker);
   baker.field().save(options.out);
 
-  const auto owner_sha256 = watermark::sha256_file_hex(options.owner);
-  const auto claim = watermark::claim_digest(owner_sha256, owner.key, message);
+  const auto owner_sha256 = sha256_file_hex(options.owner);
+  const auto commitment = watermark::commitment(owner_sha256, owner.key, message);
   const auto open = to_hex(watermark::public_key(owner.key));
   const auto bytes = std::filesystem::file_size(options.out);
   context.text() << options.out << ": " << baker.steps() << " steps in " << format_duration(seconds)
-                 << "\nclaim " << claim << ", to be time-stamped before the field is published\npublic key "
-                 << open << ", to be time-stamped with it\n";
-  say_strength(owner, strength, context);
+                 << "\nclaim " << commitment
+                 << ", to be time-stamped before the field is published\npublic key " << open
+                 << ", to be time-stamped with it\n";
+  say_strength(owner, mark_psnr, context);
   context.result({{"message", to_hex(message)},
                   {"payload", payload_json(message)},
                   {"bits", message.size()},
                   {"seconds", seconds},
                   {"steps", baker.steps()},
                   {"psnr_colours", number(baker.psnr())},
-                  {"strength", number(strength.scaled)},
-                  {"strength_learnt", number(strength.learnt)},
-                  {"scale", strength.scale},
+                  {"mark_psnr", number(mark_psnr.scaled)},
+                  {"mark_psnr_learnt", number(mark_psnr.learnt)},
+                  {"scale", mark_psnr.scale},
                   {"file_bytes", bytes},
                   {"owner_sha256", owner_sha256},
-                  {"claim", claim},
+                  {"commitment", commitment},
                   {"public_key", open}});
   return kOk;
 }
@@ -119,7 +121,7 @@ Command add_bake(CLI::App& app) {
   app.add_option("--owner", o->owner, "What `fieldmark embed` wrote")->required()->type_name("OWNER");
   add_message_options(app, o->message, "Message");
   app.add_option("--out", o->out, "File for the field to publish")->required()->type_name("FIELD");
-  app.add_option("--strength", o->strength,
+  app.add_option("--mark-psnr", o->mark_psnr,
                  "PSNR that the file's mark is to have on the object, dB, 20 to 60; higher is fainter (as "
                  "embedded)")
       ->check(CLI::Range(20.0, 60.0).description(""))

@@ -1,8 +1,8 @@
-#include <fieldmark/bench/bar_chart.h>
-#include <fieldmark/bench/engine_bench.h>
-#include <fieldmark/bench/precision_bench.h>
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 #include <fieldmark/engine/isa.h>
+#include <fieldmark/imaging/bar_chart.h>
+#include <fieldmark/tools/bench/engine_bench.h>
+#include <fieldmark/tools/bench/precision_bench.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -249,7 +249,7 @@ Command add_bench(CLI::App& app) {
                  "training: every choice of training switched off and on, for --seconds each;\n"
                  "embed: embedding in many ways, for --seconds each: what is read, and at which strength;\n"
                  "payload: how often payloads are exact at rates of wrong bits, and how often noise is one;\n"
-                 "attacks: a baked mark under attacks on its pictures and its file, accuracy against damage")
+                 "attacks: a baked mark under attacks on its images and its file, accuracy against damage")
       ->required()
       ->check(CLI::IsMember({"engine", "field", "training", "embed", "payload", "attacks"}).description(""))
       ->type_name("WHAT");
@@ -277,9 +277,7 @@ Command add_bench(CLI::App& app) {
   app.add_flag(
       "--precision", o->precision,
       "engine: also a table of speed against error: double, float, bf16, and every approximation in use");
-  app.add_option("--plot", o->field.plot, "SVG picture of the rows (none)")
-      ->type_name("FILE")
-      ->default_str("");
+  app.add_option("--plot", o->field.plot, "SVG image of the rows (none)")->type_name("FILE")->default_str("");
   auto* peer = app.add_option("--peer", o->peer,
                               "engine: pytorch: ratio to PyTorch on the rows it can do, timed by turns, "
                               "gradients compared (none)")

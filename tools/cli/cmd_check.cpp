@@ -1,4 +1,4 @@
-#include <fieldmark/watermark/evidence_folder.h>
+#include <fieldmark/watermark/evidence/evidence_folder.h>
 
 #include <CLI/CLI.hpp>
 #include <memory>
@@ -7,7 +7,7 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
-#include "cli/pictures.h"
+#include "cli/images.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -20,11 +20,11 @@ struct Options {
 Json result(const watermark::EvidenceCheck& check, std::size_t given) {
   Json json{{"intact", check.faults.empty()},
             {"faults", check.faults},
-            {"pictures", given},
-            {"pictures_known", check.pictures}};
+            {"images", given},
+            {"images_known", check.images}};
   if (const auto& s = check.summary) {
     json["public_key"] = to_hex(s->signer);
-    json["claim"] = s->claim;
+    json["commitment"] = s->commitment;
     json["owner_sha256"] = s->owner_sha256;
     json["message"] = to_hex(s->message);
     json["found"] = s->found;
@@ -38,7 +38,7 @@ int run(const Options& options, Context& context) {
   if (!options.public_key.empty())
     signer = read_option("--public-key", [&] { return watermark::public_key_from_hex(options.public_key); });
   const auto pictures =
-      options.images.empty() ? std::vector<std::filesystem::path>{} : list_pictures(options.images);
+      options.images.empty() ? std::vector<std::filesystem::path>{} : list_images(options.images);
   const auto check = watermark::check_evidence_folder(options.folder, pictures, signer);
   auto& out = context.text();
   for (const auto& fault : check.faults) out << fault << "\n";
@@ -47,9 +47,9 @@ int run(const Options& options, Context& context) {
     char p[40];
     std::snprintf(p, sizeof p, "%.2e", s->p_value);
     out << "it says     " << (s->found ? "FOUND" : "NOT FOUND") << ", p " << p << ", message "
-        << to_hex(s->message) << "\nclaim       " << s->claim << "\nsigned by   " << to_hex(s->signer)
-        << (signer ? ", as expected" : ", not compared with anything (see --public-key)") << "\npictures    "
-        << check.pictures << " given that it is about\n";
+        << to_hex(s->message) << "\nclaim       " << s->commitment << "\nsigned by   " << to_hex(s->signer)
+        << (signer ? ", as expected" : ", not compared with anything (see --public-key)") << "\nimages    "
+        << check.images << " given that it is about\n";
   }
   context.result(result(check, pictures.size()));
   return check.faults.empty() ? kOk : kFailed;
@@ -62,9 +62,8 @@ Command add_check(CLI::App& app) {
   app.add_option("folder", o->folder, "What `fieldmark verify --evidence` wrote")
       ->required()
       ->type_name("DIR");
-  app.add_option(
-         "images", o->images,
-         "Pictures, or folders of them, that the evidence should be about (their SHA-256 is compared)")
+  app.add_option("images", o->images,
+                 "Images, or folders of them, that the evidence should be about (their SHA-256 is compared)")
       ->type_name("IMAGE|DIR")
       ->default_str("");
   app.add_option("--public-key", o->public_key,

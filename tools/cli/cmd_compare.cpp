@@ -1,7 +1,7 @@
-#include <fieldmark/engine/error.h>
-#include <fieldmark/engine/files.h>
-#include <fieldmark/engine/image.h>
-#include <fieldmark/engine/metrics.h>
+#include <fieldmark/core/error.h>
+#include <fieldmark/core/files.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/metrics.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -15,8 +15,8 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/images.h"
 #include "cli/perceptual.h"
-#include "cli/pictures.h"
 #include "cli/scene_data.h"
 
 namespace fieldmark::cli {
@@ -59,9 +59,9 @@ Json json_of(const Scores& s) {
 }
 
 int compare(const Options& options, const Networks& networks, Context& context) {
-  const auto left = list_pictures({options.paths[0]}), right = list_pictures({options.paths[1]});
+  const auto left = list_images({options.paths[0]}), right = list_images({options.paths[1]});
   if (left.size() != right.size())
-    throw IoError(options.paths[1] + ": expected " + std::to_string(left.size()) + " pictures, as " +
+    throw IoError(options.paths[1] + ": expected " + std::to_string(left.size()) + " images, as " +
                   options.paths[0] + " has, found " + std::to_string(right.size()));
   Scores mean{};
   Json pairs = Json::array();
@@ -167,7 +167,7 @@ int compare_with_reference(const Options& options, const Networks& networks, Con
 
 int run(const Options& options, Context& context) {
   if (!options.reference && options.paths.size() != 2)
-    throw UsageError("expected two pictures or folders, got " + std::to_string(options.paths.size()));
+    throw UsageError("expected two images or folders, got " + std::to_string(options.paths.size()));
   if (options.reference && options.paths.size() > 1)
     throw UsageError("--reference: expected at most one folder, got " + std::to_string(options.paths.size()));
   const Networks networks{load_lpips(LpipsNetwork::alex, options.alex, context),
@@ -180,8 +180,8 @@ int run(const Options& options, Context& context) {
 
 Command add_compare(CLI::App& app) {
   auto o = std::make_shared<Options>();
-  app.add_option("pictures", o->paths,
-                 "Two pictures, or two folders whose pictures are paired in order (PNG, JPEG)")
+  app.add_option("images", o->paths,
+                 "Two images, or two folders whose images are paired in order (PNG, JPEG)")
       ->type_name("IMAGE|DIR")
       ->default_str("");
   add_lpips_weights(app, o->alex);

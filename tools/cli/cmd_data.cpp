@@ -1,4 +1,4 @@
-#include <fieldmark/engine/error.h>
+#include <fieldmark/core/error.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>

@@ -1,9 +1,10 @@
-#include <fieldmark/engine/image.h>
-#include <fieldmark/watermark/digest.h>
-#include <fieldmark/watermark/embed_views.h>
-#include <fieldmark/watermark/embedder.h>
-#include <fieldmark/watermark/mark_colours.h>
-#include <fieldmark/watermark/signing.h>
+#include <fieldmark/core/digest.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/watermark/embedding/embed_views.h>
+#include <fieldmark/watermark/embedding/embedder.h>
+#include <fieldmark/watermark/embedding/mark_colours.h>
+#include <fieldmark/watermark/evidence/commitment.h>
+#include <fieldmark/watermark/keys/signing.h>
 
 #include <CLI/CLI.hpp>
 #include <cmath>
@@ -26,11 +27,11 @@
 namespace fieldmark::cli {
 namespace {
 
-constexpr Index kPicturedViews = 4;
+constexpr Index kImagedViews = 4;
 
 struct Options {
   std::string field, out, key, picture, lpips_weights;
-  std::string preset = "fast", distances = "near", colours;
+  std::string preset = "fast", distances = "novel", colours;
   watermark::OwnerOptions owner;
   MessageOption intended;
   RunLength length{.seconds = watermark::EmbedOptions{}.schedule.seconds};
@@ -85,14 +86,14 @@ double embed(const Options& options, watermark::Embedder& embedder, const std::s
                   options.length, context);
 }
 
-void write_picture(const std::string& path, const watermark::Owner& owner, std::uint64_t seed) {
+void write_image(const std::string& path, const watermark::Owner& owner, std::uint64_t seed) {
   nerf::Renderer plain(owner.field), marked(owner.field);
   const CounterRng rng(seed, 51);
   marked.set_recolour(owner.marking(
       watermark::cell_signs(owner.code(), watermark::random_message(owner.options().bits, rng, 0))));
-  std::vector<PicturePair> pairs;
+  std::vector<ImagePair> pairs;
   for (const auto& camera :
-       nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, kPicturedViews, 0, seed))
+       nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, kImagedViews, 0, seed))
     pairs.push_back({plain.render(camera).rgb, marked.render(camera).rgb});
   write_png(path, comparison_sheet(pairs));
 }
@@ -132,24 +133,25 @@ void choose_cells(std::span<const watermark::CachedView> views, nerf::SpaceKind 
 // From views that the owner has not learnt from.
 Json measure_owner(const Options& options, const watermark::Owner& owner, const Lpips<float>* lpips,
                    Context& context) {
-  const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::near, options.measured_views,
+  const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, options.measured_views,
                                           0, context.seed() + 1);
   const auto measured = run_measure(
       owner, nullptr, nullptr,
       {.cameras = cameras, .under = options.under, .seed = context.seed(), .lpips = lpips, .progress = {}},
       context);
-  print_measurement(context.text(), measured, "near");
-  return measurement_json(measured, "near");
+  print_measurement(context.text(), measured, "novel");
+  return measurement_json(measured, "novel");
 }
 
 int run(const Options& options, Context& context) {
   const std::string checkpoint = options.out + ".checkpoint";
-  const std::string picture = options.picture.empty() ? options.out + ".png" : options.picture;
+  const std::string picture = options.image.empty() ? options.out + ".png" : options.image;
   if (std::filesystem::exists(options.out) && std::filesystem::equivalent(options.out, options.field))
     throw UsageError("--out: " + options.out + " is the field that is to be marked");
   check_writable(options.out);
   check_writable(picture);
-  for (const auto& name : options.under) read_option("--under", [&] { return distort::parse_attack(name); });
+  for (const auto& name : options.under)
+    read_option("--distort", [&] { return distort::parse_distortion(name); });
   std::optional<watermark::Message> intended;
   if (options.intended.given()) intended = message_of(options.intended, options.owner.bits);
   const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
@@ -178,17 +180,17 @@ int run(const Options& options, Context& context) {
   embedder.calibrate();
   owner.save(options.out);
   std::filesystem::remove(checkpoint);
-  write_picture(picture, owner, context.seed());
+  write_image(picture, owner, context.seed());
 
-  const auto sha256 = watermark::sha256_file_hex(options.out);
+  const auto sha256 = sha256_file_hex(options.out);
   const auto open = to_hex(watermark::public_key(owner.key));
   context.text() << options.out << ": " << embedder.steps() << " steps in " << format_duration(seconds)
                  << ", keep it secret\nsha256 " << sha256 << "\npublic key " << open << "\n"
                  << picture << ": unmarked, marked, ten times the difference\n";
-  Json claim = nullptr;
+  Json commitment = nullptr;
   if (intended) {
-    claim = watermark::claim_digest(sha256, owner.key, *intended);
-    context.text() << "claim " << claim.get<std::string>()
+    commitment = watermark::commitment(sha256, owner.key, *intended);
+    context.text() << "commitment " << commitment.get<std::string>()
                    << ", to be time-stamped before the field is published\n";
   }
   Json json = measure_owner(options, owner, lpips ? &*lpips : nullptr, context);
@@ -196,7 +198,7 @@ int run(const Options& options, Context& context) {
   json["steps"] = embedder.steps();
   json["cells"] = owner.options().cells;
   json["sha256"] = sha256;
-  json["claim"] = claim;
+  json["commitment"] = commitment;
   json["public_key"] = open;
   context.result(json);
   return kOk;
@@ -207,9 +209,9 @@ void add_view_options(CLI::App& app, Options& o) {
       ->check(CLI::Range(8, 10000).description(""))
       ->type_name("N");
   app.add_option("--distances", o.distances,
-                 "near: near cameras, the object always as large as the extractor sees it;\n"
-                 "native: only as large as their pictures have it; several: also closer and farther cameras")
-      ->check(CLI::IsMember({"near", "native", "several"}).description(""))
+                 "near: novel cameras, the object always as large as the extractor sees it;\n"
+                 "native: only as large as their images have it; several: also closer and farther cameras")
+      ->check(CLI::IsMember({"novel", "native", "several"}).description(""))
       ->type_name("NAME");
   app.add_option("--samples", o.samples,
                  "Parts of a ray that the mark of a pixel is the sum of, 1 to 64 (1; 4 in scenes without "
@@ -218,7 +220,7 @@ void add_view_options(CLI::App& app, Options& o) {
       ->type_name("N")
       ->default_str("");
   app.add_option("--batch", o.batch,
-                 "Pictures a step, 1 to 64 (4; 2 in scenes without bounds); presets paper and code take 4")
+                 "Images a step, 1 to 64 (4; 2 in scenes without bounds); presets paper and code take 4")
       ->check(CLI::Range(1, 64).description(""))
       ->type_name("N")
       ->default_str("");
@@ -238,14 +240,14 @@ Command add_embed(CLI::App& app) {
   app.add_option("--bits", o->owner.bits, "Length of a message, 1 to 256")
       ->check(CLI::Range(1, 256).description(""))
       ->type_name("N");
-  add_message_options(app, o->intended, "Message that is going to be baked, to print its claim at once");
+  add_message_options(app, o->intended, "Message that is going to be baked, to print its commitment at once");
   app.add_option("--preset", o->preset,
                  "fast: local message with dense supervision, trains in minutes; paper: one message "
-                 "everywhere, pooled reading, --strength and --cells unused; code: the same as the paper's "
+                 "everywhere, pooled reading, --mark-psnr and --cells unused; code: the same as the paper's "
                  "authors have it in their code")
       ->check(CLI::IsMember({"fast", "paper", "code"}).description(""))
       ->type_name("NAME");
-  app.add_option("--strength", o->owner.strength,
+  app.add_option("--mark-psnr", o->owner.mark_psnr,
                  "PSNR of the mark on the object, dB, 20 to 60; higher is fainter")
       ->check(CLI::Range(20.0, 60.0).description(""))
       ->type_name("DB");
@@ -272,14 +274,14 @@ Command add_embed(CLI::App& app) {
       ->default_str("");
   add_view_options(app, *o);
   add_run_length(app, o->length, true);
-  app.add_option("--measured-views", o->measured_views, "Near views to measure on at the end, 1 to 100000")
+  app.add_option("--measured-views", o->measured_views, "Novel views to measure on at the end, 1 to 100000")
       ->check(CLI::Range(1, 100000).description(""))
       ->type_name("N");
-  app.add_option("--under", o->under, "Distortions to measure under besides none (see attack), several times")
+  app.add_option("--distort", o->under,
+                 "Distortions to measure under besides none (see attack), several times")
       ->type_name("NAME")
       ->default_str("");
-  app.add_option("--picture", o->picture,
-                 "PNG with four views unmarked, marked, and the difference (OWNER.png)")
+  app.add_option("--image", o->image, "PNG with four views unmarked, marked, and the difference (OWNER.png)")
       ->type_name("FILE")
       ->default_str("");
   add_lpips_weights(app, o->lpips_weights);

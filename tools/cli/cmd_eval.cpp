@@ -55,16 +55,16 @@ int run(const Options& options, Context& context) {
   };
   for (std::size_t i = 0; i < evaluation.per_view.size(); ++i) {
     const nerf::ViewScore& score = evaluation.per_view[i];
-    add(data.views[i].name, score.psnr, score.psnr_object, score.ssim, score.lpips);
+    add(data.views[i].name, score.psnr, score.psnr_foreground, score.ssim, score.lpips);
     views.push_back({{"image", data.views[i].name},
                      {"psnr", number(score.psnr)},
-                     {"psnr_object", number(score.psnr_object)},
+                     {"psnr_foreground", number(score.psnr_foreground)},
                      {"ssim", number(score.ssim)},
                      {"lpips_alex", number(score.lpips)}});
   }
-  add("mean", evaluation.psnr, evaluation.psnr_object, evaluation.ssim, evaluation.lpips);
+  add("mean", evaluation.psnr, evaluation.psnr_foreground, evaluation.ssim, evaluation.lpips);
   context.result({{"psnr", number(evaluation.psnr)},
-                  {"psnr_object", number(evaluation.psnr_object)},
+                  {"psnr_foreground", number(evaluation.psnr_foreground)},
                   {"ssim", number(evaluation.ssim)},
                   {"lpips_alex", number(evaluation.lpips)},
                   {"views", evaluation.views},
@@ -85,7 +85,7 @@ Command add_eval(CLI::App& app) {
   app.add_option("--split", o->split, "Views to compare with: train, val, test")
       ->check(CLI::IsMember({"train", "val", "test"}).description(""))
       ->type_name("SPLIT");
-  app.add_option("--size", o->size, "Pixels of the pictures' longer side, 16 to 8192 (as they are)")
+  app.add_option("--size", o->size, "Pixels of the images' longer side, 16 to 8192 (as they are)")
       ->check(CLI::Range(16, 8192).description(""))
       ->type_name("N")
       ->default_str("");

@@ -19,7 +19,7 @@ struct Options {
 int run(const Options& options, Context& context) {
   const auto owner = watermark::Owner::load(options.owner);
   SuspectReader reader(owner, options.reading);
-  const auto pictures = read_pictures(reader, options.images, context);
+  const auto pictures = read_images(reader, options.images, context);
   const auto code = owner.code();
   const Index bits = owner.options().bits;
   Json views = Json::array();
@@ -53,7 +53,7 @@ Command add_extract(CLI::App& app) {
   auto o = std::make_shared<Options>();
   app.add_option("--owner", o->owner, "What `fieldmark embed` wrote")->required()->type_name("OWNER");
   add_reading(app, o->reading);
-  app.add_option("images", o->images, "Pictures, or folders of them (PNG, JPEG)")
+  app.add_option("images", o->images, "Images, or folders of them (PNG, JPEG)")
       ->required()
       ->type_name("IMAGE|DIR")
       ->default_str("");

@@ -7,10 +7,12 @@
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/extractor/gradcheck_cases.h>
 #include <fieldmark/extractor/numerics_cases.h>
+#include <fieldmark/imaging/gradcheck_cases.h>
+#include <fieldmark/imaging/numerics_cases.h>
 #include <fieldmark/nerf/gradcheck_cases.h>
 #include <fieldmark/nerf/numerics_cases.h>
-#include <fieldmark/watermark/gradcheck_cases.h>
-#include <fieldmark/watermark/numerics_cases.h>
+#include <fieldmark/watermark/evidence/numerics_cases.h>
+#include <fieldmark/watermark/mark/gradcheck_cases.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -73,6 +75,7 @@ Json to_json(const std::vector<Row>& rows, const Row& worst, Index entries, bool
 
 int run_gradients(const Options& options, Context& context) {
   auto rows = collect<Row, GradcheckCase>(options, {{"engine", gradcheck_cases()},
+                                                    {"imaging", imaging::gradcheck_cases()},
                                                     {"distort", distort::gradcheck_cases()},
                                                     {"extractor", extractor::gradcheck_cases()},
                                                     {"nerf", nerf::gradcheck_cases()},
@@ -155,6 +158,7 @@ Json numerics_json(const std::vector<NumericsRow>& rows, const std::vector<std::
 
 int run_numerics(const Options& options, Context& context) {
   auto rows = collect<NumericsRow, NumericsCase>(options, {{"engine", numerics_cases()},
+                                                           {"imaging", imaging::numerics_cases()},
                                                            {"distort", distort::numerics_cases()},
                                                            {"extractor", extractor::numerics_cases()},
                                                            {"nerf", nerf::numerics_cases()},

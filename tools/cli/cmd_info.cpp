@@ -1,5 +1,5 @@
+#include <fieldmark/core/digest.h>
 #include <fieldmark/engine/safetensors.h>
-#include <fieldmark/watermark/digest.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -30,7 +30,7 @@ Json metadata_json(const SafetensorsFile& file) {
 
 int run(const Options& options, Context& context) {
   const auto file = SafetensorsFile::read(options.file);
-  const std::string sha256 = watermark::sha256_file_hex(options.file);
+  const std::string sha256 = sha256_file_hex(options.file);
   const Json metadata = metadata_json(file);
   Json tensors = Json::array();
   Index numbers = 0;

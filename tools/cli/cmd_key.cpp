@@ -1,5 +1,5 @@
-#include <fieldmark/watermark/digest.h>
-#include <fieldmark/watermark/signing.h>
+#include <fieldmark/core/digest.h>
+#include <fieldmark/watermark/keys/signing.h>
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
@@ -25,7 +25,7 @@ int run(const Options& options, Context& context) {
   const auto key = watermark::random_key();
   watermark::save_key(options.out, key);
   const std::string open = to_hex(watermark::public_key(key));
-  const std::string sha256 = watermark::sha256_file_hex(options.out);
+  const std::string sha256 = sha256_file_hex(options.out);
   context.text() << options.out << ": 256 bits from the operating system, keep them secret\nsha256 " << sha256
                  << "\npublic key " << open << ", by which anybody can tell what it signed\n";
   context.result({{"file", options.out}, {"bits", 256}, {"sha256", sha256}, {"public_key", open}});

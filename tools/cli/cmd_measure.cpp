@@ -1,5 +1,5 @@
 #include <fieldmark/nerf/evaluation.h>
-#include <fieldmark/watermark/payload_trials.h>
+#include <fieldmark/watermark/attacks/payload_trials.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -22,8 +22,8 @@ namespace {
 struct Options {
   std::string owner, field, data, lpips_weights;
   MessageOption message;
-  std::vector<std::string> cameras{"near"};
-  Index count = 200, geometry_count = 20, size = 0, together = 1;
+  std::vector<std::string> cameras{"novel"};
+  Index count = 200, informed_count = 20, size = 0, together = 1;
   bool payloads = false;
   std::vector<std::string> under;
 };
@@ -136,7 +136,7 @@ Measured measured_on(const std::string& set, const std::vector<nerf::Camera>& ca
       subject.owner, subject.baked ? &*subject.baked : nullptr, subject.message ? &*subject.message : nullptr,
       {.cameras = cameras,
        .under = options.under,
-       .geometry_views = options.geometry_count,
+       .informed_views = options.informed_count,
        .seed = context.seed(),
        .messages = messages_of(options, codec, context.seed()),
        .on_reading = [&](Index view, const std::string& under, const auto& evidence,
@@ -165,7 +165,8 @@ void add_photographs(const Options& options, const Subject& subject, Json& json,
 int run(const Options& options, Context& context) {
   if (options.message.given() == options.field.empty())
     throw UsageError("--field needs the message that was baked into it, and a message its --field");
-  for (const auto& name : options.under) read_option("--under", [&] { return distort::parse_attack(name); });
+  for (const auto& name : options.under)
+    read_option("--distort", [&] { return distort::parse_distortion(name); });
   const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
   Subject subject{watermark::Owner::load(options.owner), {}, {}};
   if (!options.field.empty()) {
@@ -204,20 +205,21 @@ Command add_measure(CLI::App& app) {
       ->delimiter(',')
       ->check(CLI::IsMember(nerf::camera_set_names()).description(""))
       ->type_name("SET")
-      ->default_str("near");
+      ->default_str("novel");
   app.add_option("--count", o->count, "Views, 1 to 100000; each with its own random message if not baked")
       ->check(CLI::Range(1, 100000).description(""))
       ->type_name("N");
   app.add_option(
-         "--geometry-count", o->geometry_count,
-         "Of the first so many views geometry is read too, 0 to 100000: seconds a view and distortion")
+         "--informed-count", o->informed_count,
+         "Of the first so many views informed is read too, 0 to 100000: seconds a view and distortion")
       ->check(CLI::Range(0, 100000).description(""))
       ->type_name("N");
   app.add_option("--size", o->size, "Pixels of the views' longer side, 16 to 8192 (as trained)")
       ->check(CLI::Range(16, 8192).description(""))
       ->type_name("N")
       ->default_str("");
-  app.add_option("--under", o->under, "Distortions to measure under besides none (see attack), several times")
+  app.add_option("--distort", o->under,
+                 "Distortions to measure under besides none (see attack), several times")
       ->type_name("NAME")
       ->default_str("");
   app.add_option("--data", o->data, "Data set for psnr_photo of a baked field and for --cameras test")

@@ -1,4 +1,4 @@
-#include <fieldmark/engine/image.h>
+#include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/renderer.h>
 
 #include <CLI/CLI.hpp>
@@ -23,7 +23,7 @@ namespace {
 
 struct Options {
   std::string field, out, data;
-  std::string split = "test", cameras = "near", precision = "fp32";
+  std::string split = "test", cameras = "novel", precision = "fp32";
   std::string against, sheet;
   Index count = 10, size = 0, supersampling = 0;
   std::optional<Index> average, importance, random;
@@ -71,7 +71,7 @@ std::vector<NamedCamera> cameras_of(const Options& options, const nerf::Radiance
 void write_sheet(const Options& options, nerf::Renderer& renderer, const std::vector<NamedCamera>& cameras) {
   const auto other = nerf::RadianceField::load(options.against);
   nerf::Renderer against(other, {.supersampling = options.supersampling});
-  std::vector<PicturePair> pairs;
+  std::vector<ImagePair> pairs;
   for (std::size_t i = 0; i < std::min<std::size_t>(cameras.size(), 4); ++i)
     pairs.push_back({against.render(cameras[i].camera).rgb, renderer.render(cameras[i].camera).rgb});
   write_png(options.sheet, comparison_sheet(pairs));
@@ -118,7 +118,7 @@ int run(const Options& options, Context& context) {
 Command add_render(CLI::App& app) {
   auto o = std::make_shared<Options>();
   app.add_option("--field", o->field, "Trained or baked field")->required()->type_name("FIELD");
-  app.add_option("--out", o->out, "Folder for the pictures, PNG")->required()->type_name("DIR");
+  app.add_option("--out", o->out, "Folder for the images, PNG")->required()->type_name("DIR");
   CLI::Option* data = app.add_option("--data", o->data, "Take the cameras of a data set")->type_name("DIR");
   app.add_option("--split", o->split, "Views of the data set: train, val, test")
       ->check(CLI::IsMember({"train", "val", "test"}).description(""))
@@ -136,7 +136,7 @@ Command add_render(CLI::App& app) {
       ->check(CLI::Range(1, 100000).description(""))
       ->excludes(data)
       ->type_name("N");
-  app.add_option("--size", o->size, "Pixels of the pictures' longer side, 1 to 8192 (as trained)")
+  app.add_option("--size", o->size, "Pixels of the images' longer side, 1 to 8192 (as trained)")
       ->check(CLI::Range(1, 8192).description(""))
       ->type_name("N")
       ->default_str("");

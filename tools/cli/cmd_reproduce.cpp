@@ -1,6 +1,6 @@
 #include <fieldmark/baselines/cell_runner.h>
 #include <fieldmark/baselines/paper_plan.h>
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -174,7 +174,7 @@ void measure(const Options& options, const std::vector<baselines::PaperScene>& s
       write_page(options, context);
       char line[120];
       std::snprintf(line, sizeof line, "%s: %.2f%% right, %.2f dB on the object, %s\n", name.stem().c_str(),
-                    100 * measured.cell.bit_accuracy, measured.cell.psnr_base_object,
+                    100 * measured.cell.bit_accuracy, measured.cell.psnr_base_foreground,
                     format_duration(context.seconds() - begun).c_str());
       context.text() << line;
     } catch (const baselines::Stopped& e) {
@@ -224,7 +224,7 @@ void add_measuring_options(CLI::App& app, Options& o) {
       ->type_name("S")
       ->default_str("");
   app.add_option("--size", o.size,
-                 "Pixels of the pictures' longer side, 16 to 8192 (as the released code: 160, photographs "
+                 "Pixels of the images' longer side, 16 to 8192 (as the released code: 160, photographs "
                  "252, field mlp 100)")
       ->check(CLI::Range(16, 8192).description(""))
       ->type_name("N")
@@ -233,7 +233,7 @@ void add_measuring_options(CLI::App& app, Options& o) {
       ->check(CLI::Range(9, 24).description(""))
       ->type_name("N");
   app.add_option("--views", o.views,
-                 "Near views that are read in each cell, 1 to 100000 (as many as seconds of --budget, 20 to "
+                 "Novel views that are read in each cell, 1 to 100000 (as many as seconds of --budget, 20 to "
                  "200), a fifth of them under distortion; reading ends after --budget seconds and that fifth")
       ->check(CLI::Range(1, 100000).description(""))
       ->type_name("N")

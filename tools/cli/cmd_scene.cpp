@@ -25,22 +25,22 @@ int run(const Options& options, Context& context) {
       .views = options.views,
       .seed = context.seed()};
   const InterruptGuard guard;
-  Index pictures = 0;
+  Index images = 0;
   {
     Progress progress = context.progress("scene");
     nerf::write_scene(scene, options.out, [&](Index done, Index total) {
       progress.update(static_cast<double>(done) / static_cast<double>(total));
-      pictures = total;
-      if (guard.interrupted()) throw Interrupted(options.out + " has some pictures, but no transforms yet");
+      images = total;
+      if (guard.interrupted()) throw Interrupted(options.out + " has some images, but no transforms yet");
     });
   }
-  context.text() << options.out << ": " << pictures << " views of " << options.size << "x" << options.size
+  context.text() << options.out << ": " << images << " views of " << options.size << "x" << options.size
                  << "\n";
   context.result({{"out", options.out},
                   {"kind", options.kind},
                   {"size", options.size},
                   {"views", options.views},
-                  {"pictures", pictures}});
+                  {"images", images}});
   return kOk;
 }
 

@@ -255,7 +255,7 @@ Command add_train(CLI::App& app) {
   app.add_option(
          "--supersampling", o->supersampling,
          "Rays along each side of a pixel, 1, 2, 4 or 8, whose mean it is in the later part of long runs\n"
-         "(after 8000 steps) and wherever the field is rendered: 2 for what is worth a slower picture "
+         "(after 8000 steps) and wherever the field is rendered: 2 for what is worth a slower image "
          "(hash only)")
       ->check(CLI::IsMember({1, 2, 4, 8}).description(""))
       ->type_name("N");
@@ -269,7 +269,7 @@ Command add_train(CLI::App& app) {
       ->type_name("DB")
       ->default_str("");
   app.add_option("--background", o->background,
-                 "Behind transparent pictures: white, black (white for the Blender layout, else black)")
+                 "Behind transparent images: white, black (white for the Blender layout, else black)")
       ->check(CLI::IsMember({"white", "black"}).description(""))
       ->type_name("COLOUR")
       ->default_str("");

@@ -1,5 +1,6 @@
-#include <fieldmark/watermark/digest.h>
-#include <fieldmark/watermark/evidence_folder.h>
+#include <fieldmark/core/digest.h>
+#include <fieldmark/watermark/evidence/commitment.h>
+#include <fieldmark/watermark/evidence/evidence_folder.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -38,7 +39,7 @@ watermark::WrongKeyCounts count_keys(const KeyTest& test, const std::vector<doub
       });
 }
 
-// How often keys that have nothing to do with the pictures reach each p-value, beside what chance allows.
+// How often keys that have nothing to do with the images reach each p-value, beside what chance allows.
 Json wrong_keys(const watermark::WrongKeyCounts& found, Context& context) {
   Json counts = Json::object(), bounds = Json::object(), intervals = Json::object();
   double p = 1;
@@ -76,14 +77,14 @@ void print_verdict(const watermark::EvidenceRecord& record, Context& context) {
   char text[400];
   std::snprintf(text, sizeof text,
                 "%s at a rate of false alarms of %g\n"
-                "p-value, keyed        %.2e (two-sided %.2e), from %zu pictures together\n"
+                "p-value, keyed        %.2e (two-sided %.2e), from %zu images together\n"
                 "p-value, bits         %.2e (two-sided %.2e), %lld of %lld match\n"
                 "reading               %s\n",
                 record.found() ? "FOUND" : "NOT FOUND", record.fpr, score.p_value, score.p_value_two_sided,
-                record.pictures.size(), score.p_value_bits, score.p_value_bits_two_sided,
+                record.images.size(), score.p_value_bits, score.p_value_bits_two_sided,
                 static_cast<long long>(score.match.matching), static_cast<long long>(score.match.bits),
                 record.reading.c_str());
-  context.text() << text << "owner sha256 " << record.owner_sha256 << "\nclaim " << record.claim << "\n";
+  context.text() << text << "owner sha256 " << record.owner_sha256 << "\nclaim " << record.commitment << "\n";
 }
 
 Json result_json(const watermark::EvidenceRecord& record, const std::string& signer) {
@@ -96,11 +97,11 @@ Json result_json(const watermark::EvidenceRecord& record, const std::string& sig
           {"statistic", score.statistic},
           {"matching_bits", score.match.matching},
           {"bits", score.match.bits},
-          {"views", record.pictures.size()},
+          {"views", record.images.size()},
           {"reading", record.reading},
           {"fpr", record.fpr},
           {"owner_sha256", record.owner_sha256},
-          {"claim", record.claim},
+          {"commitment", record.commitment},
           {"public_key", signer},
           {"controls", controls_json(record.controls, record.fpr)}};
 }
@@ -114,28 +115,28 @@ int run(const Options& options, Context& context) {
   const double least = watermark::least_p(code.carriers());
   if (least > options.fpr) {
     char text[120];
-    std::snprintf(text, sizeof text, "--fpr: with %lld cells no picture can reach %g, the least is %.1e",
+    std::snprintf(text, sizeof text, "--fpr: with %lld cells no image can reach %g, the least is %.1e",
                   static_cast<long long>(code.carriers()), options.fpr, least);
     throw UsageError(text);
   }
 
   if (!options.evidence.empty()) watermark::prepare_evidence_folder(options.evidence);
   SuspectReader reader(owner, options.reading);
-  const auto pictures = read_pictures(reader, options.images, context);
+  const auto pictures = read_images(reader, options.images, context);
   const auto evidence = total_evidence(pictures);
   const KeyTest test{owner, code, message};
   watermark::EvidenceRecord record{.reading = reading_used(pictures),
-                                   .owner_sha256 = watermark::sha256_file_hex(options.owner),
+                                   .owner_sha256 = sha256_file_hex(options.owner),
                                    .message = message,
                                    .fpr = options.fpr,
                                    .cells = code.carriers(),
                                    .together = test(evidence),
-                                   .pictures = score_pictures(test, pictures),
+                                   .images = score_images(test, pictures),
                                    .seed = context.seed(),
                                    .commit = machine().commit,
                                    .isa = machine().isa};
-  record.claim = watermark::claim_digest(record.owner_sha256, key, message);
-  print_views(context.text(), pictures, record.pictures);
+  record.commitment = watermark::commitment(record.owner_sha256, key, message);
+  print_views(context.text(), pictures, record.images);
   print_verdict(record, context);
   TestedControls controls;
   if (!options.controls.empty() || !options.evidence.empty())
@@ -154,7 +155,7 @@ int run(const Options& options, Context& context) {
   Json json = result_json(record, signer);
   json["payload"] = payload_json(message);
   json["wrong_keys"] = wrong;
-  json["per_view"] = per_view_json(pictures, record.pictures);
+  json["per_view"] = per_view_json(pictures, record.images);
   context.result(json);
   return record.found() ? kOk : kNotFound;
 }
@@ -176,7 +177,7 @@ Command add_verify(CLI::App& app) {
       ->default_str("");
   app.add_option(
          "--control", o->controls,
-         "Picture, or folder of them, that is not marked: tested too, beside built-in controls; several "
+         "Image, or folder of them, that is not marked: tested too, beside built-in controls; several "
          "times")
       ->allow_extra_args(false)
       ->type_name("IMAGE|DIR")
@@ -189,7 +190,7 @@ Command add_verify(CLI::App& app) {
       ->default_str("");
   add_reading(app, o->reading);
   app.add_option("images", o->images,
-                 "Pictures of one field, or folders of them (PNG, JPEG): one verdict for all")
+                 "Images of one field, or folders of them (PNG, JPEG): one verdict for all")
       ->required()
       ->type_name("IMAGE|DIR")
       ->default_str("");

@@ -14,7 +14,7 @@ class Context;
 /// A subcommand after its options were added: to be called once they are parsed; returns the exit code.
 using Command = std::function<int(Context&)>;
 
-Command add_attack(CLI::App& app);
+Command add_distort(CLI::App& app);
 Command add_attack_field(CLI::App& app);
 Command add_bake(CLI::App& app);
 Command add_bench(CLI::App& app);

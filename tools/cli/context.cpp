@@ -1,6 +1,6 @@
 #include "cli/context.h"
 
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>

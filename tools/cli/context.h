@@ -17,7 +17,7 @@ namespace fieldmark::cli {
 
 using Json = nlohmann::ordered_json;
 
-/// JSON knows neither infinity nor NaN: the PSNR of equal pictures, or of an object that is not there, is
+/// JSON knows neither infinity nor NaN: the PSNR of equal images, or of an object that is not there, is
 /// null.
 inline Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 

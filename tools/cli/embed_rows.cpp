@@ -1,6 +1,6 @@
 #include "cli/embed_rows.h"
 
-#include <fieldmark/engine/files.h>
+#include <fieldmark/core/files.h>
 
 #include <cmath>
 #include <limits>
@@ -14,14 +14,15 @@ namespace {
 using bench::EmbedRow;
 
 // The figures of a row with their names in the file.
-constexpr std::pair<const char*, double EmbedRow::*> kFigures[] = {{"view_seconds", &EmbedRow::cache_seconds},
-                                                                   {"seconds", &EmbedRow::seconds},
-                                                                   {"accuracy", &EmbedRow::accuracy},
-                                                                   {"accuracy_p5", &EmbedRow::accuracy_p5},
-                                                                   {"psnr_object", &EmbedRow::psnr_object},
-                                                                   {"closer", &EmbedRow::closer},
-                                                                   {"farther", &EmbedRow::farther},
-                                                                   {"unseen", &EmbedRow::unseen}};
+constexpr std::pair<const char*, double EmbedRow::*> kFigures[] = {
+    {"view_seconds", &EmbedRow::cache_seconds},
+    {"seconds", &EmbedRow::seconds},
+    {"accuracy", &EmbedRow::accuracy},
+    {"accuracy_p5", &EmbedRow::accuracy_p5},
+    {"psnr_foreground", &EmbedRow::psnr_foreground},
+    {"closer", &EmbedRow::closer},
+    {"farther", &EmbedRow::farther},
+    {"extrapolated", &EmbedRow::unseen}};
 constexpr std::pair<const char*, double watermark::Embedder::Figures::*> kInTraining[] = {
     {"sign", &watermark::Embedder::Figures::sign},
     {"cell", &watermark::Embedder::Figures::index},
@@ -36,7 +37,7 @@ Json json_of(const EmbedRow& row, const std::string& commit) {
   j.update(embed_figures(row));
   Json curve = Json::array();
   for (const bench::EmbedPoint& p : row.curve)
-    curve.push_back({number(p.seconds), number(p.accuracy), number(p.psnr_object)});
+    curve.push_back({number(p.seconds), number(p.accuracy), number(p.psnr_foreground)});
   j["curve"] = curve;
   return j;
 }

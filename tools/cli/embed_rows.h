@@ -1,5 +1,5 @@
 #pragma once
-#include <fieldmark/bench/embed_bench.h>
+#include <fieldmark/tools/bench/embed_bench.h>
 
 #include <filesystem>
 #include <string>

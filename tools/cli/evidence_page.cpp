@@ -1,11 +1,11 @@
 #include "cli/evidence_page.h"
 
-#include <fieldmark/bench/bar_chart.h>
-#include <fieldmark/bench/histogram_chart.h>
-#include <fieldmark/bench/markup.h>
-#include <fieldmark/engine/image.h>
-#include <fieldmark/engine/resize.h>
-#include <fieldmark/watermark/base64.h>
+#include <fieldmark/core/base64.h>
+#include <fieldmark/imaging/bar_chart.h>
+#include <fieldmark/imaging/histogram_chart.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/markup.h>
+#include <fieldmark/imaging/resize.h>
 
 #include <algorithm>
 #include <cmath>
@@ -17,9 +17,9 @@ namespace {
 using bench::escaped_markup;
 using watermark::EvidenceRecord;
 using watermark::EvidenceScore;
-constexpr Index kThumbnail = 160;             // pixels of the longer side
-constexpr int kQuality = 80;                  // of its JPEG
-constexpr std::size_t kPlottedPictures = 40;  // more would not fit a page
+constexpr Index kThumbnail = 160;           // pixels of the longer side
+constexpr int kQuality = 80;                // of its JPEG
+constexpr std::size_t kPlottedImages = 40;  // more would not fit a page
 
 constexpr char kHead[] = R"(<!doctype html>
 <html lang="en">
@@ -84,9 +84,8 @@ std::string score_cells(const EvidenceScore& s) {
 }
 
 std::string verdict(const EvidenceRecord& r) {
-  const std::string count = r.pictures.size() == 1
-                                ? "the picture"
-                                : "the " + std::to_string(r.pictures.size()) + " pictures together";
+  const std::string count =
+      r.images.size() == 1 ? "the image" : "the " + std::to_string(r.images.size()) + " images together";
   if (r.found())
     return "<p class=\"verdict found\"><strong>The mark was found</strong> in " + count +
            ". If the owner's key had nothing to do with them, evidence this strong would come up with a "
@@ -103,14 +102,14 @@ std::string controls_verdict(const EvidenceRecord& r) {
     if (control.together.p_value <= r.fpr) loud += (loud.empty() ? "" : ", ") + escaped_markup(control.name);
   if (r.controls.empty()) return "<p>No controls were tested.</p>\n";
   if (loud.empty())
-    return "<p>The same test found nothing in any of the controls, pictures that do not hold the mark.</p>\n";
+    return "<p>The same test found nothing in any of the controls, images that do not hold the mark.</p>\n";
   return "<p><strong>The test also answered to controls: " + loud +
          ".</strong> Either they hold the mark after all, or the test cannot be relied on here.</p>\n";
 }
 
 constexpr char kLimits[] = R"(<h2>What this does not prove</h2>
 <ul>
-<li><strong>It counts only if the claim below was fixed before the field or its pictures were published</strong>, by a
+<li><strong>It counts only if the commitment below was fixed before the field or its pictures were published</strong>, by a
 time-stamp or by publishing it. Afterwards anybody can make up a mark that fits given pictures.</li>
 <li>It says that the pictures carry this owner's mark. It does not say who made them, who copied what, or who has which rights.</li>
 <li>The probabilities hold for pictures that were not selected by the result. Of a thousand tests, one reaches 0.001 by chance.</li>
@@ -126,13 +125,12 @@ std::string row(const char* what, const std::string& value) {
 
 std::string figures(const EvidenceRecord& r) {
   const EvidenceScore& s = r.together;
-  return "<h2>Figures</h2>\n<table><caption>All pictures together</caption>\n" +
+  return "<h2>Figures</h2>\n<table><caption>All images together</caption>\n" +
          row("Message looked for",
              code(to_hex(r.message)) + ", " + std::to_string(r.message.size()) + " bits") +
          row("Bits read, wrong ones underlined", marked_bits(s, r.message)) +
          row("p-value of the key", text_of(s.p_value) + " one-sided, " + text_of(s.p_value_two_sided) +
-                                       " two-sided; a bound for any picture, over " +
-                                       std::to_string(r.cells) +
+                                       " two-sided; a bound for any image, over " + std::to_string(r.cells) +
                                        " cells of the scene, T = " + text_of(s.statistic, "%.2f")) +
          row("p-value of the matching bits", text_of(s.p_value_bits) + " one-sided, " +
                                                  text_of(s.p_value_bits_two_sided) + " two-sided; " +
@@ -141,31 +139,31 @@ std::string figures(const EvidenceRecord& r) {
          row("Rate of false alarms asked for", text_of(r.fpr)) +
          row("Reading",
              escaped_markup(r.reading) +
-                 (r.reading == "blind" ? ": picture and extractor only; key and message had no part in it"
+                 (r.reading == "blind" ? ": image and extractor only; key and message had no part in it"
                                        : "")) +
          "</table>\n";
 }
 
-std::string picture_plot(const EvidenceRecord& r) {
+std::string image_plot(const EvidenceRecord& r) {
   std::vector<bench::Bar> bars;
   double longest = -std::log10(r.fpr);
-  for (std::size_t i = 0; i < std::min(r.pictures.size(), kPlottedPictures); ++i) {
-    const double p = r.pictures[i].score.p_value;
-    bars.push_back({"picture " + std::to_string(i + 1), -std::log10(p), "p " + text_of(p)});
+  for (std::size_t i = 0; i < std::min(r.images.size(), kPlottedImages); ++i) {
+    const double p = r.images[i].score.p_value;
+    bars.push_back({"image " + std::to_string(i + 1), -std::log10(p), "p " + text_of(p)});
     longest = std::max(longest, bars.back().value);
   }
   bars.push_back({"asked for", -std::log10(r.fpr), "p " + text_of(r.fpr)});
   const double full = 4 * std::max(1., std::ceil(longest / 4));
   std::string more;
-  if (r.pictures.size() > kPlottedPictures)
-    more = " Only the first " + std::to_string(kPlottedPictures) + " are drawn.";
-  return "<figure role=\"img\" aria-label=\"Bars: evidence of each picture by itself\">\n" +
-         bench::bar_chart("Evidence of each picture by itself: zeros of its p-value (-log10 p)", bars, full) +
-         "<figcaption>Each bar is one picture alone. Together they weigh more than the longest of them." +
+  if (r.images.size() > kPlottedImages)
+    more = " Only the first " + std::to_string(kPlottedImages) + " are drawn.";
+  return "<figure role=\"img\" aria-label=\"Bars: evidence of each image by itself\">\n" +
+         bench::bar_chart("Evidence of each image by itself: zeros of its p-value (-log10 p)", bars, full) +
+         "<figcaption>Each bar is one image alone. Together they weigh more than the longest of them." +
          more + "</figcaption></figure>\n";
 }
 
-// The beginning of a table of pictures and their figures.
+// The beginning of a table of images and their figures.
 std::string scores_head(const char* caption, const char* picture, const char* about) {
   std::string out = std::string("<table><caption>") + caption + "</caption>\n<thead><tr>";
   for (const char* column : {picture, about, "Bits that match", "p, key", "two-sided", "p, bits"})
@@ -179,33 +177,33 @@ std::string scores_row(const std::string& alt, const std::string& source, const 
          score_cells(score) + "</tr>\n";
 }
 
-std::string pictures_table(const EvidenceRecord& r, const PagePictures& images) {
-  std::string out = "<h2>Pictures</h2>\n" + picture_plot(r) +
-                    scores_head("Each picture by itself; bits that differ from the message are underlined",
-                                "Picture", "File and bits");
-  for (std::size_t i = 0; i < r.pictures.size(); ++i) {
-    const auto& picture = r.pictures[i];
+std::string images_table(const EvidenceRecord& r, const PageImages& images) {
+  std::string out = "<h2>Images</h2>\n" + image_plot(r) +
+                    scores_head("Each image by itself; bits that differ from the message are underlined",
+                                "Image", "File and bits");
+  for (std::size_t i = 0; i < r.images.size(); ++i) {
+    const auto& picture = r.images[i];
     const std::string label = std::to_string(i + 1) + ": " + escaped_markup(picture.name);
     out += scores_row(
-        "Picture " + label, images.pictures.at(i),
+        "Image " + label, images.images.at(i),
         label + "<br>" + marked_bits(picture.score, r.message) + "<br>SHA-256 " + code(picture.sha256),
         picture.score);
   }
   return out + "</tbody></table>\n";
 }
 
-std::string controls_table(const EvidenceRecord& r, const PagePictures& images) {
+std::string controls_table(const EvidenceRecord& r, const PageImages& images) {
   if (r.controls.empty()) return "";
-  std::string out = "<h2>Controls</h2>\n" + controls_verdict(r) +
-                    scores_head("The same key, message and test on pictures that do not hold the mark",
-                                "Example", "Control");
+  std::string out =
+      "<h2>Controls</h2>\n" + controls_verdict(r) +
+      scores_head("The same key, message and test on images that do not hold the mark", "Example", "Control");
   for (std::size_t i = 0; i < r.controls.size(); ++i) {
     const auto& control = r.controls[i];
     const std::string name = escaped_markup(control.name);
     double least = 1;
-    for (const auto& picture : control.pictures) least = std::min(least, picture.score.p_value);
+    for (const auto& picture : control.images) least = std::min(least, picture.score.p_value);
     out += scores_row("Control " + name, images.controls.at(i),
-                      "<strong>" + name + "</strong>, " + std::to_string(control.pictures.size()) +
+                      "<strong>" + name + "</strong>, " + std::to_string(control.images.size()) +
                           " together<br>" + escaped_markup(control.meaning) +
                           "<br>Least p of one alone: " + text_of(least),
                       control.together);
@@ -219,13 +217,13 @@ std::string wrong_keys(const EvidenceRecord& r) {
   using Counts = watermark::WrongKeyCounts;
   const std::string n = std::to_string(w.n);
   std::string out =
-      "<h2>Wrong keys</h2>\n<p>The evidence of all pictures was tested under " + n +
+      "<h2>Wrong keys</h2>\n<p>The evidence of all images was tested under " + n +
       " random keys that have nothing to do with them. The least p-value among them is " +
       text_of(w.least_p) + "; the key in question has " + text_of(r.together.p_value) +
       ".</p>\n<figure role=\"img\" aria-label=\"Histogram: statistic of wrong keys, and of the key in "
       "question\">\n" +
       bench::histogram_chart({.title = "How many of " + n + " wrong keys reach which evidence T",
-                              .x = "T: 0 on average for a key that has nothing to do with the pictures",
+                              .x = "T: 0 on average for a key that has nothing to do with the images",
                               .counts = {w.histogram.begin(), w.histogram.end()},
                               .from = -Counts::kBins / 2. / Counts::kBinsPerUnit,
                               .bin = 1. / Counts::kBinsPerUnit,
@@ -246,12 +244,13 @@ std::string wrong_keys(const EvidenceRecord& r) {
 
 std::string identity(const EvidenceRecord& r, const watermark::PublicKey& signer) {
   return "<h2>What was fixed, and how to check it</h2>\n<table>\n" +
-         row("Claim (to have been time-stamped)", code(r.claim)) +
+         row("Claim (to have been time-stamped)", code(r.commitment)) +
          row("Public key of who signed", code(to_hex(signer))) +
          row("SHA-256 of the OWNER file", code(r.owner_sha256)) +
          row("Program", code(r.commit + ", kernels x86-64-" + r.isa + ", seed " + std::to_string(r.seed))) +
          "</table>\n"
-         "<p>The claim is the SHA-256 of the SHA-256 of the OWNER file, the key and the message; it gives "
+         "<p>The commitment is the SHA-256 of the SHA-256 of the OWNER file, the key and the message; it "
+         "gives "
          "none of "
          "them away. To check that nothing here was altered:</p>\n<pre><code>fieldmark check FOLDER "
          "PICTURES\nopenssl pkeyutl -verify -pubin -inkey public_key.pem -rawin -in evidence.json -sigfile "
@@ -266,13 +265,13 @@ std::string thumbnail(const Tensor<float>& rgb) {
   const Index h = rgb.shape[0], w = rgb.shape[1], longer = std::max(h, w);
   const auto scaled = [&](Index side) { return std::max<Index>(1, side * kThumbnail / longer); };
   const auto jpeg = encode_jpeg(longer > kThumbnail ? resize_area(rgb, scaled(h), scaled(w)) : rgb, kQuality);
-  return "data:image/jpeg;base64," + watermark::to_base64(jpeg);
+  return "data:image/jpeg;base64," + to_base64(jpeg);
 }
 
 std::string evidence_page(const EvidenceRecord& record, const watermark::PublicKey& signer,
-                          const PagePictures& pictures) {
+                          const PageImages& pictures) {
   return kHead + std::string("<h1>Evidence of a mark</h1>\n") + verdict(record) + controls_verdict(record) +
-         kLimits + figures(record) + pictures_table(record, pictures) + controls_table(record, pictures) +
+         kLimits + figures(record) + images_table(record, pictures) + controls_table(record, pictures) +
          wrong_keys(record) + identity(record, signer) + "</body>\n</html>\n";
 }
 

@@ -1,8 +1,8 @@
 #include "cli/evidence_run.h"
 
-#include <fieldmark/engine/image.h>
-#include <fieldmark/watermark/controls.h>
-#include <fieldmark/watermark/evidence_folder.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/watermark/evidence/controls.h>
+#include <fieldmark/watermark/evidence/evidence_folder.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -11,13 +11,13 @@
 
 #include "cli/cli.h"
 #include "cli/context.h"
-#include "cli/pictures.h"
+#include "cli/images.h"
 
 namespace fieldmark::cli {
 namespace {
 
 using watermark::EvidenceControl;
-using watermark::EvidencePicture;
+using watermark::EvidenceImage;
 using watermark::EvidenceScore;
 constexpr Index kControlViews = 5;
 
@@ -34,12 +34,12 @@ std::string given_name(const std::string& path) {
 EvidenceControl built_in(const KeyTest& test, SuspectReader& reader, const watermark::Control& control) {
   const InterruptGuard guard;
   EvidenceControl tested{control.name, control.meaning};
-  std::vector<PictureEvidence> read;
-  for (const auto& picture : control.pictures) {
+  std::vector<ImageEvidence> read;
+  for (const auto& picture : control.images) {
     if (guard.interrupted()) throw Interrupted("nothing was decided");
     read.push_back(reader.read(picture, control.name + " " + std::to_string(read.size() + 1)));
   }
-  tested.pictures = score_pictures(test, read);
+  tested.images = score_images(test, read);
   tested.together = test(total_evidence(read));
   return tested;
 }
@@ -54,33 +54,32 @@ Json score_json(const EvidenceScore& s) {
 
 }  // namespace
 
-std::vector<EvidencePicture> score_pictures(const KeyTest& test,
-                                            const std::vector<PictureEvidence>& pictures) {
-  std::vector<EvidencePicture> scores;
-  scores.reserve(pictures.size());
-  for (const auto& p : pictures)
+std::vector<EvidenceImage> score_images(const KeyTest& test, const std::vector<ImageEvidence>& images) {
+  std::vector<EvidenceImage> scores;
+  scores.reserve(images.size());
+  for (const auto& p : images)
     scores.push_back({file_name(p.image), p.sha256, p.width, p.height, test(p.cells)});
   return scores;
 }
 
 TestedControls test_controls(const KeyTest& test, SuspectReader& reader,
-                             const std::vector<PictureEvidence>& pictures,
-                             const std::vector<std::string>& given, Context& context) {
+                             const std::vector<ImageEvidence>& images, const std::vector<std::string>& given,
+                             Context& context) {
   TestedControls tested;
   std::vector<Tensor<float>> questioned;
-  for (const auto& p : pictures)
+  for (const auto& p : images)
     if (static_cast<Index>(questioned.size()) < kControlViews)
       questioned.push_back(read_rgb(p.image, background(test.owner)));
   const auto controls = watermark::built_in_controls(test.owner, questioned, kControlViews, context.seed());
   for (const auto& control : controls) {
     tested.controls.push_back(built_in(test, reader, control));
-    tested.thumbnails.push_back(thumbnail(control.pictures[0]));
+    tested.thumbnails.push_back(thumbnail(control.images[0]));
   }
   for (const auto& path : given) {
-    const auto read = read_pictures(reader, {path}, context);
-    tested.controls.push_back(
-        {given_name(path), "Given as a control: pictures of which the user says that they are not marked.",
-         score_pictures(test, read), test(total_evidence(read))});
+    const auto read = read_images(reader, {path}, context);
+    tested.controls.push_back({given_name(path),
+                               "Given as a control: images of which the user says that they are not marked.",
+                               score_images(test, read), test(total_evidence(read))});
     tested.thumbnails.push_back(thumbnail(read_rgb(read[0].image, background(test.owner))));
   }
   return tested;
@@ -89,7 +88,7 @@ TestedControls test_controls(const KeyTest& test, SuspectReader& reader,
 Json controls_json(const std::vector<EvidenceControl>& controls, double fpr) {
   Json list = Json::array();
   for (const auto& control : controls) {
-    Json entry{{"name", control.name}, {"views", control.pictures.size()}};
+    Json entry{{"name", control.name}, {"views", control.images.size()}};
     entry.update(score_json(control.together));
     entry["found"] = control.together.p_value <= fpr;
     list.push_back(entry);
@@ -97,11 +96,11 @@ Json controls_json(const std::vector<EvidenceControl>& controls, double fpr) {
   return list;
 }
 
-Json per_view_json(const std::vector<PictureEvidence>& pictures, const std::vector<EvidencePicture>& scores) {
+Json per_view_json(const std::vector<ImageEvidence>& images, const std::vector<EvidenceImage>& scores) {
   Json list = Json::array();
   for (std::size_t i = 0; i < scores.size(); ++i) {
     const auto& reading = scores[i].score.reading;
-    Json entry{{"image", pictures[i].image}, {"bits", to_bits(reading.message)}};
+    Json entry{{"image", images[i].image}, {"bits", to_bits(reading.message)}};
     entry.update(score_json(scores[i].score));
     entry["logits"] = reading.logit;
     entry["confidences"] = watermark::bit_confidence(reading);
@@ -110,8 +109,8 @@ Json per_view_json(const std::vector<PictureEvidence>& pictures, const std::vect
   return list;
 }
 
-void print_views(std::ostream& out, const std::vector<PictureEvidence>& pictures,
-                 const std::vector<EvidencePicture>& scores) {
+void print_views(std::ostream& out, const std::vector<ImageEvidence>& images,
+                 const std::vector<EvidenceImage>& scores) {
   for (std::size_t i = 0; i < scores.size(); ++i) {
     const EvidenceScore& s = scores[i].score;
     const auto sure = watermark::bit_confidence(s.reading);
@@ -119,7 +118,7 @@ void print_views(std::ostream& out, const std::vector<PictureEvidence>& pictures
     std::snprintf(text, sizeof text, "  %lld of %lld, p %.1e, least sure bit %.1f%%  ",
                   static_cast<long long>(s.match.matching), static_cast<long long>(s.match.bits), s.p_value,
                   100 * *std::min_element(sure.begin(), sure.end()));
-    out << to_bits(s.reading.message) << text << pictures[i].image << "\n";
+    out << to_bits(s.reading.message) << text << images[i].image << "\n";
   }
 }
 
@@ -127,20 +126,20 @@ void print_controls(std::ostream& out, const std::vector<EvidenceControl>& contr
   for (const auto& control : controls) {
     const EvidenceScore& s = control.together;
     char text[160];
-    std::snprintf(text, sizeof text, "%.2g (two-sided %.2g), %lld of %lld match, pictures: %zu%s\n",
-                  s.p_value, s.p_value_two_sided, static_cast<long long>(s.match.matching),
-                  static_cast<long long>(s.match.bits), control.pictures.size(),
+    std::snprintf(text, sizeof text, "%.2g (two-sided %.2g), %lld of %lld match, images: %zu%s\n", s.p_value,
+                  s.p_value_two_sided, static_cast<long long>(s.match.matching),
+                  static_cast<long long>(s.match.bits), control.images.size(),
                   s.p_value <= fpr ? ": THE TEST ANSWERS TO A CONTROL" : "");
     out << "control " << control.name << ": p " << text;
   }
 }
 
 void write_evidence(const std::string& folder, const watermark::EvidenceRecord& record,
-                    const std::vector<PictureEvidence>& pictures, const std::vector<std::string>& controls,
+                    const std::vector<ImageEvidence>& images, const std::vector<std::string>& controls,
                     const watermark::Owner& owner, const watermark::Key& key) {
-  PagePictures small{.controls = controls};
-  for (const auto& picture : pictures)
-    small.pictures.push_back(thumbnail(read_rgb(picture.image, background(owner))));
+  PageImages small{.controls = controls};
+  for (const auto& picture : images)
+    small.images.push_back(thumbnail(read_rgb(picture.image, background(owner))));
   const std::string page = evidence_page(record, watermark::public_key(key), small);
   watermark::write_evidence_folder(folder, record, page, key);
 }

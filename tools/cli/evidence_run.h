@@ -1,6 +1,6 @@
 #pragma once
-#include <fieldmark/watermark/evidence_record.h>
-#include <fieldmark/watermark/owner.h>
+#include <fieldmark/watermark/evidence/evidence_record.h>
+#include <fieldmark/watermark/mark/owner.h>
 
 #include <iosfwd>
 #include <string>
@@ -22,40 +22,40 @@ struct KeyTest {
   }
 };
 
-/// Each picture by itself.
-std::vector<watermark::EvidencePicture> score_pictures(const KeyTest& test,
-                                                       const std::vector<PictureEvidence>& pictures);
+/// Each image by itself.
+std::vector<watermark::EvidenceImage> score_images(const KeyTest& test,
+                                                   const std::vector<ImageEvidence>& images);
 
-/// Controls and a small copy of the first picture of each.
+/// Controls and a small copy of the first image of each.
 struct TestedControls {
   std::vector<watermark::EvidenceControl> controls{};
   std::vector<std::string> thumbnails{};
 };
 
-/// The built-in controls (watermark::built_in_controls()) of the first five pictures, and one for each of
-/// `given`, read as they were; pictures or folders of which the user says that they are not marked.
-/// @throws IoError naming the picture that cannot be read
+/// The built-in controls (watermark::built_in_controls()) of the first five images, and one for each of
+/// `given`, read as they were; images or folders of which the user says that they are not marked.
+/// @throws IoError naming the image that cannot be read
 TestedControls test_controls(const KeyTest& test, SuspectReader& reader,
-                             const std::vector<PictureEvidence>& pictures,
-                             const std::vector<std::string>& given, Context& context);
+                             const std::vector<ImageEvidence>& images, const std::vector<std::string>& given,
+                             Context& context);
 
 /// For --json: name, figures and whether it stays above the rate of false alarms.
 Json controls_json(const std::vector<watermark::EvidenceControl>& controls, double fpr);
 
-/// For --json: image, bits, confidences and figures of each picture.
-Json per_view_json(const std::vector<PictureEvidence>& pictures,
-                   const std::vector<watermark::EvidencePicture>& scores);
+/// For --json: image, bits, confidences and figures of each image.
+Json per_view_json(const std::vector<ImageEvidence>& images,
+                   const std::vector<watermark::EvidenceImage>& scores);
 
-/// A line for each picture: bits, how many match, p-value, the least confidence among the bits.
-void print_views(std::ostream& out, const std::vector<PictureEvidence>& pictures,
-                 const std::vector<watermark::EvidencePicture>& scores);
+/// A line for each image: bits, how many match, p-value, the least confidence among the bits.
+void print_views(std::ostream& out, const std::vector<ImageEvidence>& images,
+                 const std::vector<watermark::EvidenceImage>& scores);
 
 /// A line for each control.
 void print_controls(std::ostream& out, const std::vector<watermark::EvidenceControl>& controls, double fpr);
 
 /// Writes the folder of --evidence (watermark::write_evidence_folder()) with its page.
 void write_evidence(const std::string& folder, const watermark::EvidenceRecord& record,
-                    const std::vector<PictureEvidence>& pictures, const std::vector<std::string>& controls,
+                    const std::vector<ImageEvidence>& images, const std::vector<std::string>& controls,
                     const watermark::Owner& owner, const watermark::Key& key);
 
 }  // namespace fieldmark::cli

@@ -2,8 +2,8 @@
 
 #include <curl/curl.h>
 #include <fcntl.h>
-#include <fieldmark/engine/error.h>
-#include <fieldmark/watermark/digest.h>
+#include <fieldmark/core/digest.h>
+#include <fieldmark/core/error.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -169,7 +169,7 @@ bool fetch_file(const std::string& url, const fs::path& to, const Manifest::File
     if (size_of(part) == 0) fs::remove(part);
     throw;
   }
-  const std::string found = watermark::sha256_file_hex(part);
+  const std::string found = sha256_file_hex(part);
   if (found != expected.sha256) {
     fs::remove(part);
     throw IoError(url + ": expected sha256 " + expected.sha256 + ", got " + found + "; nothing was kept");

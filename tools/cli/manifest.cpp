@@ -1,7 +1,7 @@
 #include "cli/manifest.h"
 
-#include <fieldmark/engine/error.h>
-#include <fieldmark/watermark/digest.h>
+#include <fieldmark/core/digest.h>
+#include <fieldmark/core/error.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -49,7 +49,7 @@ std::string file_fault(const Manifest::File& file, const std::filesystem::path& 
   if (error) return "missing";
   if (bytes != file.bytes)
     return "expected " + std::to_string(file.bytes) + " bytes, found " + std::to_string(bytes);
-  const std::string found = watermark::sha256_file_hex(path);
+  const std::string found = sha256_file_hex(path);
   return found == file.sha256 ? "" : "expected sha256 " + file.sha256 + ", found " + found;
 }
 

@@ -11,7 +11,7 @@ namespace fieldmark::cli {
 Json measurement_json(const watermark::Measurement& m, const std::string& cameras) {
   const auto reading = [](const watermark::ReadingAccuracy& accuracy) {
     return Json{{"blind", number(accuracy.blind)},
-                {"geometry", number(accuracy.geometry)},
+                {"informed", number(accuracy.informed)},
                 {"chosen", number(accuracy.chosen)}};
   };
   Json under = Json::object();
@@ -23,29 +23,29 @@ Json measurement_json(const watermark::Measurement& m, const std::string& camera
           {"accuracy", reading(m.accuracy)},
           {"accuracy_p5", number(m.accuracy_p5)},
           {"psnr_base", number(m.psnr_base)},
-          {"psnr_base_object", number(m.psnr_base_object)},
+          {"psnr_base_foreground", number(m.psnr_base_foreground)},
           {"ssim_base", number(m.ssim_base)},
           {"lpips_base", number(m.lpips_base)},
           {"psnr_photo", nullptr},
           {"under", under},
-          {"geometry_views", m.geometry_views},
-          {"geometry_seconds", number(m.geometry_seconds)}};
+          {"informed_views", m.informed_views},
+          {"informed_seconds", number(m.informed_seconds)}};
 }
 
 Json measurement_row(const watermark::Measurement& m, const std::string& cameras) {
   Json row{{"cameras", cameras},
            {"views", m.views},
            {"blind", number(m.accuracy.blind)},
-           {"geometry", number(m.accuracy.geometry)},
+           {"informed", number(m.accuracy.informed)},
            {"chosen", number(m.accuracy.chosen)},
            {"accuracy_p5", number(m.accuracy_p5)},
            {"psnr_base", number(m.psnr_base)},
-           {"psnr_base_object", number(m.psnr_base_object)},
+           {"psnr_base_foreground", number(m.psnr_base_foreground)},
            {"ssim_base", number(m.ssim_base)},
            {"lpips_base", number(m.lpips_base)}};
   for (const auto& [name, accuracy] : m.under) {
     row[name + " blind"] = number(accuracy.blind);
-    row[name + " geometry"] = number(accuracy.geometry);
+    row[name + " informed"] = number(accuracy.informed);
     row[name + " chosen"] = number(accuracy.chosen);
   }
   return row;
@@ -58,7 +58,7 @@ void print_measurement(std::ostream& out, const watermark::Measurement& m, const
                 m.baked ? "baked field" : "not baked");
   out << line;
   std::snprintf(line, sizeof line, "against unmarked     %.2f dB, object %.2f dB, ssim %.4f\n", m.psnr_base,
-                m.psnr_base_object, m.ssim_base);
+                m.psnr_base_foreground, m.ssim_base);
   out << line;
   if (std::isfinite(m.lpips_base)) {
     std::snprintf(line, sizeof line, "                     lpips %.4f\n", m.lpips_base);
@@ -68,18 +68,18 @@ void print_measurement(std::ostream& out, const watermark::Measurement& m, const
                 "bits right, blind    %.2f%% of one view, worst 5%% of views below %.2f%%\n",
                 100 * m.accuracy.blind, 100 * m.accuracy_p5);
   out << line;
-  if (m.geometry_views > 0) {
+  if (m.informed_views > 0) {
     std::snprintf(line, sizeof line,
-                  "by geometry          %.2f%%, as chosen %.2f%%, of %lld views, %.1f s a view\n",
-                  100 * m.accuracy.geometry, 100 * m.accuracy.chosen,
-                  static_cast<long long>(m.geometry_views), m.geometry_seconds);
+                  "informed          %.2f%%, as chosen %.2f%%, of %lld views, %.1f s a view\n",
+                  100 * m.accuracy.informed, 100 * m.accuracy.chosen,
+                  static_cast<long long>(m.informed_views), m.informed_seconds);
     out << line;
   }
   for (const auto& [name, accuracy] : m.under) {
     std::snprintf(line, sizeof line, "  under %-20s %.2f%%", name.c_str(), 100 * accuracy.blind);
     out << line;
-    if (m.geometry_views > 0) {
-      std::snprintf(line, sizeof line, ", by geometry %.2f%%, as chosen %.2f%%", 100 * accuracy.geometry,
+    if (m.informed_views > 0) {
+      std::snprintf(line, sizeof line, ", informed %.2f%%, as chosen %.2f%%", 100 * accuracy.informed,
                     100 * accuracy.chosen);
       out << line;
     }

@@ -1,5 +1,5 @@
 #pragma once
-#include <fieldmark/watermark/measurement.h>
+#include <fieldmark/watermark/attacks/measurement.h>
 
 #include <iosfwd>
 #include <string>
@@ -11,7 +11,7 @@ namespace fieldmark::cli {
 /// The figures that `measure` and `embed` report. @param cameras  name of their set
 Json measurement_json(const watermark::Measurement& measured, const std::string& cameras);
 
-/// Its figures side by side, as a row of a table: those of --under with the reading behind their names.
+/// Its figures side by side, as a row of a table: those of --distort with the reading behind their names.
 Json measurement_row(const watermark::Measurement& measured, const std::string& cameras);
 
 /// The same for people: a line a figure.

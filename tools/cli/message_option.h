@@ -1,5 +1,5 @@
 #pragma once
-#include <fieldmark/watermark/payload_codec.h>
+#include <fieldmark/watermark/payload/payload_codec.h>
 
 #include <optional>
 #include <string>

@@ -2,8 +2,8 @@
 
 #include <fieldmark/baselines/paper_plan.h>
 #include <fieldmark/baselines/published.h>
-#include <fieldmark/bench/line_chart.h>
-#include <fieldmark/engine/image.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/line_chart.h>
 
 #include <algorithm>
 #include <array>
@@ -26,9 +26,9 @@ struct Kind {
   const char *name, *axis;
   double none;  // the severity that changes nothing
 };
-constexpr std::array<Kind, 4> kKinds{{{"noise", "standard deviation, pictures in [0, 1]", 0},
+constexpr std::array<Kind, 4> kKinds{{{"noise", "standard deviation, images in [0, 1]", 0},
                                       {"rotation", "largest angle, degrees", 0},
-                                      {"scale", "size of the picture, as a part", 1},
+                                      {"scale", "size of the image, as a part", 1},
                                       {"blur", "sigma, pixels", 0}}};
 
 // Those that figures show, so that their lines can be told apart: of the scene with most cells, on the hash
@@ -143,7 +143,7 @@ const std::vector<PaperSheet>& paper_sheets() {
     std::vector<std::string> systems, ablations;
     for (const auto& s : baselines::paper_systems()) (s.ablation ? ablations : systems).push_back(s.name);
     return std::vector<PaperSheet>{
-        {.name = "paper_pictures.png", .systems = systems},
+        {.name = "paper_images.png", .systems = systems},
         {.name = "paper_ablation.png", .systems = ablations},
         {.name = "paper_residual.png", .systems = {"nerf_hidden", "nerf_mbrs"}, .gain = 30}};
   }();
@@ -153,7 +153,7 @@ const std::vector<PaperSheet>& paper_sheets() {
 std::vector<std::string> write_paper_sheet(const PaperSheet& sheet, const std::vector<Cell>& cells,
                                            const std::filesystem::path& folder,
                                            const std::filesystem::path& file) {
-  std::vector<PicturePair> pairs;
+  std::vector<ImagePair> pairs;
   std::vector<std::string> stems;
   for (const Cell& c : cells) {
     const std::string picture = cell_path(folder, c.name).string() + ".png";
@@ -162,7 +162,7 @@ std::vector<std::string> write_paper_sheet(const PaperSheet& sheet, const std::v
       continue;
     const Tensor<float> both = read_image(picture);
     const Index h = both.shape[0], w = both.shape[1] / 2, channels = both.shape[2];
-    PicturePair pair{Tensor<float>({h, w, channels}), Tensor<float>({h, w, channels})};
+    ImagePair pair{Tensor<float>({h, w, channels}), Tensor<float>({h, w, channels})};
     for (Index y = 0; y < h; ++y) {
       const auto row = both.data.begin() + 2 * y * w * channels;
       std::copy_n(row, w * channels, pair.first.data.begin() + y * w * channels);

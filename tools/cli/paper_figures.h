@@ -13,7 +13,7 @@ namespace fieldmark::cli {
 /// most cells, on the hash field. Figures without a point are left out.
 std::map<std::string, std::string> paper_figures(const std::vector<baselines::Cell>& measured);
 
-/// A picture of the page.
+/// An image of the page.
 struct PaperSheet {
   std::string name;                  ///< of its file: "paper_residual.png"
   std::vector<std::string> systems;  ///< whose cells it shows

@@ -118,13 +118,13 @@ std::string quality_table(const std::vector<Group>& groups) {
     rows.push_back(
         {g.title, g.scene, g.field, accuracy_of(g) + " (" + of_paper("quality", g.system, "accuracy") + ")",
          percent(mean(g.cells, &Cell::own_2d_accuracy)), fixed(mean(g.cells, &Cell::psnr_base), 2),
-         fixed(mean(g.cells, &Cell::psnr_base_object), 2), fixed(mean_more(g.cells, "ssim_base"), 3),
+         fixed(mean(g.cells, &Cell::psnr_base_foreground), 2), fixed(mean_more(g.cells, "ssim_base"), 3),
          fixed(mean_more(g.cells, "lpips_base"), 3), both(mean(g.cells, &Cell::psnr_photo), "psnr", 2),
          fixed(mean_more(g.cells, "psnr_photo_unmarked"), 2), both(mean(g.cells, &Cell::ssim), "ssim", 3),
          both(mean(g.cells, &Cell::lpips), "lpips", 3)});
   }
   return markdown_table(
-      {"system", "scene", "field", "bits right, % (published)", "2-D network on its own pictures, %",
+      {"system", "scene", "field", "bits right, % (published)", "2-D network on its own images, %",
        "PSNR to the unmarked render", "the same on the object", "SSIM to it", "LPIPS to it",
        "PSNR to photographs (published)", "of the unmarked field", "SSIM to photographs (published)",
        "LPIPS to photographs (published)"},
@@ -250,7 +250,7 @@ std::string protocol_table(const std::vector<Cell>& cells) {
                     more("views"), more("under_views"), more("photographs"),
                     more("width") + " x " + more("height"), c.commit});
   }
-  return markdown_table({"cell", "steps", "seconds of training", "seconds in all", "near views",
+  return markdown_table({"cell", "steps", "seconds of training", "seconds in all", "novel views",
                          "under distortion", "photographs", "pixels", "commit"},
                         rows) +
          "\nIn all " + std::to_string(cells.size()) + " cells, " + fixed(seconds / 3600, 2) + " hours.\n";
@@ -265,7 +265,7 @@ std::string paper_page(const std::vector<Cell>& cells, const std::vector<std::st
       "# The paper's tables\n\nWritten by `fieldmark reproduce` from the cells alone. Published figures, in "
       "brackets: " +
       std::string(baselines::kPublishedSource) +
-      ". Bit accuracy: of one view, mean over random near views with a message each (at 4 bits all 16 in "
+      ". Bit accuracy: of one view, mean over random novel views with a message each (at 4 bits all 16 in "
       "turns), ± its standard deviation over views. Differences to the unmarked render and to photographs "
       "are "
       "separate columns, never to be compared with each other; the published PSNR is almost certainly "

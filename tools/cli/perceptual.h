@@ -1,5 +1,5 @@
 #pragma once
-#include <fieldmark/engine/nn/lpips.h>
+#include <fieldmark/imaging/lpips.h>
 
 #include <optional>
 #include <string>
@@ -16,7 +16,7 @@ void add_lpips_weights(CLI::App& app, std::string& file);
 /// @throws IoError if a file that is given or there is no network's
 std::optional<Lpips<float>> load_lpips(LpipsNetwork network, const std::string& file, Context& context);
 
-/// The distance of two pictures [H, W, 3]; NaN without a network and where they are too small for it.
+/// The distance of two images [H, W, 3]; NaN without a network and where they are too small for it.
 double lpips_or_nan(const std::optional<Lpips<float>>& lpips, const Tensor<float>& a, const Tensor<float>& b);
 
 }  // namespace fieldmark::cli

@@ -1,14 +1,14 @@
 #include "cli/reading.h"
 
-#include <fieldmark/engine/files.h>
-#include <fieldmark/engine/image.h>
-#include <fieldmark/watermark/digest.h>
+#include <fieldmark/core/digest.h>
+#include <fieldmark/core/files.h>
+#include <fieldmark/imaging/image.h>
 
 #include <CLI/CLI.hpp>
 
 #include "cli/cli.h"
 #include "cli/context.h"
-#include "cli/pictures.h"
+#include "cli/images.h"
 
 namespace fieldmark::cli {
 
@@ -16,63 +16,63 @@ using watermark::ReadingKind;
 
 void add_reading(CLI::App& app, std::string& reading) {
   app.add_option(
-         "--reading", reading,
-         "blind: the extractor alone; geometry: find the camera, subtract the owner's unmarked view;\n"
-         "auto: geometry where the picture agrees with the owner's field, else blind")
-      ->check(CLI::IsMember({"auto", "blind", "geometry"}).description(""))
+         "--detection", reading,
+         "blind: the extractor alone; informed: find the camera, subtract the owner's unmarked view;\n"
+         "auto: informed where the image agrees with the owner's field, else blind")
+      ->check(CLI::IsMember({"auto", "blind", "informed"}).description(""))
       ->type_name("NAME");
 }
 
 SuspectReader::SuspectReader(const watermark::Owner& owner, const std::string& reading)
-    : blind_(owner), forced_(reading == "geometry") {
+    : blind_(owner), forced_(reading == "informed") {
   if (forced_ && !owner.reader)
-    throw UsageError("--reading geometry: an owner of preset paper has no cells in space");
-  if (reading != "blind" && owner.reader) geometry_.emplace(owner);
+    throw UsageError("--detection informed: an owner of preset paper has no cells in space");
+  if (reading != "blind" && owner.reader) informed_.emplace(owner);
 }
 
-PictureEvidence SuspectReader::read(const Tensor<float>& picture, const std::string& name) {
-  PictureEvidence out{.image = name, .cells = {}, .width = picture.shape[1], .height = picture.shape[0]};
+ImageEvidence SuspectReader::read(const Tensor<float>& picture, const std::string& name) {
+  ImageEvidence out{.image = name, .cells = {}, .width = picture.shape[1], .height = picture.shape[0]};
   try {
-    if (!geometry_) {
+    if (!informed_) {
       out.cells = blind_.evidence(picture);
       return out;
     }
-    const watermark::PictureReading r = geometry_->read(picture);
-    out.agreement = r.geometry.agreement;
-    out.reading = forced_ && !r.geometry.evidence.empty() ? ReadingKind::geometry : r.chosen;
-    out.cells = out.reading == ReadingKind::geometry ? r.geometry.evidence : r.blind;
+    const watermark::ImageReading r = informed_->read(picture);
+    out.agreement = r.informed.agreement;
+    out.reading = forced_ && !r.informed.evidence.empty() ? ReadingKind::informed : r.chosen;
+    out.cells = out.reading == ReadingKind::informed ? r.informed.evidence : r.blind;
     return out;
   } catch (const ShapeError& e) {
     throw IoError(name + ": " + e.what());
   }
 }
 
-std::vector<PictureEvidence> read_pictures(SuspectReader& reader, const std::vector<std::string>& paths,
-                                           Context& context) {
-  const auto pictures = list_pictures(paths);
+std::vector<ImageEvidence> read_images(SuspectReader& reader, const std::vector<std::string>& paths,
+                                       Context& context) {
+  const auto images = list_images(paths);
   const InterruptGuard guard;
   Progress progress = context.progress("read");
-  std::vector<PictureEvidence> read;
-  for (const auto& path : pictures) {
+  std::vector<ImageEvidence> read;
+  for (const auto& path : images) {
     if (guard.interrupted()) throw Interrupted("nothing was decided");
     const auto bytes = read_bytes(path);
     read.push_back(reader.read(decode_image(bytes, path.string()), path.string()));
-    read.back().sha256 = watermark::sha256_hex(bytes);
-    progress.update(static_cast<double>(read.size()) / static_cast<double>(pictures.size()));
+    read.back().sha256 = sha256_hex(bytes);
+    progress.update(static_cast<double>(read.size()) / static_cast<double>(images.size()));
   }
   return read;
 }
 
-std::string reading_used(const std::vector<PictureEvidence>& pictures) {
-  const ReadingKind first = pictures.front().reading;
-  for (const auto& p : pictures)
+std::string reading_used(const std::vector<ImageEvidence>& images) {
+  const ReadingKind first = images.front().reading;
+  for (const auto& p : images)
     if (p.reading != first) return "mixed";
   return watermark::reading_name(first);
 }
 
-std::vector<double> total_evidence(const std::vector<PictureEvidence>& pictures) {
-  std::vector<double> sum(pictures.front().cells.size(), 0.0);
-  for (const auto& picture : pictures)
+std::vector<double> total_evidence(const std::vector<ImageEvidence>& images) {
+  std::vector<double> sum(images.front().cells.size(), 0.0);
+  for (const auto& picture : images)
     for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += picture.cells[c];
   return sum;
 }

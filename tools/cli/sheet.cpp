@@ -1,7 +1,7 @@
 #include "cli/sheet.h"
 
-#include <fieldmark/engine/error.h>
-#include <fieldmark/engine/image.h>
+#include <fieldmark/engine/shape_checks.h>
+#include <fieldmark/imaging/image.h>
 
 #include <algorithm>
 
@@ -18,7 +18,7 @@ Tensor<float> magnified_difference(const Tensor<float>& a, const Tensor<float>& 
 
 }  // namespace
 
-Tensor<float> comparison_sheet(std::span<const PicturePair> pairs, float gain) {
+Tensor<float> comparison_sheet(std::span<const ImagePair> pairs, float gain) {
   std::vector<Tensor<float>> cells;
   for (const auto& pair : pairs) {
     check_same("comparison_sheet", "first", pair.first.shape, "second", pair.second.shape);

@@ -2,7 +2,7 @@
 
 #include <fieldmark/nerf/rendered_dataset.h>
 #include <fieldmark/nerf/trainer.h>
-#include <fieldmark/watermark/extractor_attack.h>
+#include <fieldmark/watermark/attacks/extractor_attack.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -27,7 +27,7 @@ nerf::Dataset with_progress(const char* name, Context& context, F make) {
 
 nerf::Dataset renders(const nerf::RadianceField& field, const TrainingAttackOptions& options,
                       Context& context) {
-  const auto cameras = nerf::make_cameras(field.cameras, nerf::CameraSet::near, options.views, options.size,
+  const auto cameras = nerf::make_cameras(field.cameras, nerf::CameraSet::novel, options.views, options.size,
                                           context.seed() + 61);
   return with_progress("renders", context,
                        [&](auto tell) { return nerf::rendered_dataset(field, cameras, tell); });
@@ -38,7 +38,7 @@ nerf::Dataset turned_renders(const nerf::RadianceField& field, const TrainingAtt
   const auto owner = watermark::Owner::load(options.owner);
   return with_progress("against the extractor", context, [&](auto tell) {
     return watermark::renders_against_extractor(
-        owner, field, options.views, {.strength = options.strength, .seed = context.seed() + 63}, tell);
+        owner, field, options.views, {.mark_psnr = options.mark_psnr, .seed = context.seed() + 63}, tell);
   });
 }
 
@@ -54,7 +54,7 @@ nerf::RadianceField start(const std::string& name, const nerf::RadianceField& fi
   if (name != "retrain") return field;
   if (field.space.kind == nerf::SpaceKind::ndc)
     throw UsageError(
-        "--under retrain: a forward-facing field's pictures do not say how near its scene begins");
+        "--distort retrain: a forward-facing field's images do not say how near its scene begins");
   nerf::RadianceFieldOptions sizes = field.options();
   sizes.seed = context.seed() + 62;
   return nerf::RadianceField(sizes);
@@ -88,8 +88,8 @@ void add_training_attack(CLI::App& app, TrainingAttackOptions& o) {
   app.add_option("--data", o.data, "For finetune: data set of clean photographs")->type_name("DIR");
   app.add_option("--owner", o.owner, "For remove: whose extractor is known; nothing else of it is used")
       ->type_name("OWNER");
-  app.add_option("--strength", o.strength,
-                 "Of what remove changes in a picture: PSNR on the object, dB, 10 to 60")
+  app.add_option("--mark-psnr", o.mark_psnr,
+                 "Of what remove changes in an image: PSNR on the object, dB, 10 to 60")
       ->check(CLI::Range(10.0, 60.0).description(""))
       ->type_name("DB");
   app.add_option("--size", o.size,
@@ -113,8 +113,8 @@ bool is_training_attack(const std::string& name) {
 nerf::RadianceField run_training_attack(const std::string& name, const nerf::RadianceField& field,
                                         const TrainingAttackOptions& options, Context& context,
                                         Json& result) {
-  if (name == "finetune" && options.data.empty()) throw UsageError("--under finetune: needs --data DIR");
-  if (name == "remove" && options.owner.empty()) throw UsageError("--under remove: needs --owner OWNER");
+  if (name == "finetune" && options.data.empty()) throw UsageError("--distort finetune: needs --data DIR");
+  if (name == "remove" && options.owner.empty()) throw UsageError("--distort remove: needs --owner OWNER");
   nerf::RadianceField out = start(name, field, context);
   const nerf::Dataset data = data_of(name, field, options, context);
   nerf::TrainOptions train_options = nerf::train_options(field.options().field.kind);

@@ -7,7 +7,7 @@ namespace fieldmark::kernels {
 
 /// C[i, j] = start + sum_{s, k} A[i, s, k] B[s K + k, j], where start is C's old value, the bias or 0, and
 /// the result may pass through a ReLU. A is read at a[i a_row + s a_segment + k a_col], so that it can be a
-/// matrix, its transpose, or the windows of a picture (a convolution's rows are the segments). B comes from
+/// matrix, its transpose, or the windows of an image (a convolution's rows are the segments). B comes from
 /// pack_panels(), or is a row-major matrix of whole vectors of columns where it lies: b_row = its row's
 /// length, b_panel = gemm_panel(n).
 template <class T>

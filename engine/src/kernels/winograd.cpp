@@ -126,8 +126,8 @@ template <class T, class F>
 
 constexpr std::int64_t smaller(std::int64_t a, std::int64_t b) { return a < b ? a : b; }
 
-// Calls f(number within `count`, offset of the tile's first pixel from the picture's, its row, its column,
-// and the picture's first pixel).
+// Calls f(number within `count`, offset of the tile's first pixel from the image's, its row, its column,
+// and the image's first pixel).
 template <class T, class F>
 [[gnu::always_inline]] inline void for_tiles(const WinogradTiles<T>& x, F f) {
   const std::int64_t down = (x.h + kWinogradTile - 1) / kWinogradTile,
@@ -156,9 +156,9 @@ template <class T, class F>
 template <class Line, std::int64_t border, class T>
 void transform(const WinogradTiles<T>& x, const WinogradMatrices<T>& to) {
   const std::int64_t pixel = x.channels, line = x.w * pixel;
-  for_tiles(x, [=](std::int64_t t, std::int64_t picture, std::int64_t row, std::int64_t column) {
+  for_tiles(x, [=](std::int64_t t, std::int64_t image, std::int64_t row, std::int64_t column) {
     const std::int64_t top = row - border, left = column - border;
-    const std::int64_t begin = (picture + top * x.w + left) * pixel;
+    const std::int64_t begin = (image + top * x.w + left) * pixel;
     const bool inside = top >= 0 && left >= 0 && top + Line::from <= x.h && left + Line::from <= x.w;
     for_row(to, t, x.channels, [=](auto zero, std::int64_t c, T* at) {
       using V = decltype(zero);
@@ -191,9 +191,9 @@ void transform(const WinogradTiles<T>& x, const WinogradMatrices<T>& to) {
 template <class T>
 void outputs(const WinogradTiles<T>& x, const WinogradMatrices<const T>& m, const WinogradOutput<T>& out) {
   const std::int64_t pixel = x.channels, line = x.w * pixel;
-  for_tiles(x, [=](std::int64_t t, std::int64_t picture, std::int64_t row, std::int64_t column) {
+  for_tiles(x, [=](std::int64_t t, std::int64_t image, std::int64_t row, std::int64_t column) {
     const std::int64_t rows = x.h - row, columns = x.w - column;
-    T* y = out.y + (picture + row * x.w + column) * pixel;
+    T* y = out.y + (image + row * x.w + column) * pixel;
     for_vectors<T>(pixel, [=](auto zero, std::int64_t c) {
       using V = decltype(zero);
       const T* from = m.data + t * pixel + c;

@@ -20,8 +20,8 @@ struct WinogradMatrices {
   std::int64_t stride = 0, panel = 0, distance = 0;
 };
 
-/// Tiles first .. first + count of the pictures [n, h, w, channels], numbered picture by picture and row by
-/// row; there are ceil(h / 4) ceil(w / 4) in a picture. Where `mask` (laid out as the pictures) is not
+/// Tiles first .. first + count of the images [n, h, w, channels], numbered image by image and row by
+/// row; there are ceil(h / 4) ceil(w / 4) in an image. Where `mask` (laid out as the images) is not
 /// positive, a number counts as 0.
 template <class T>
 struct WinogradTiles {

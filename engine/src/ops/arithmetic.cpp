@@ -1,4 +1,5 @@
 #include <fieldmark/engine/ops/arithmetic.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include "ops/pieces.h"
 

@@ -1,4 +1,5 @@
 #include <fieldmark/engine/ops/conv2d.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include "kernels/pool.h"
 #include "ops/conv2d_parts.h"

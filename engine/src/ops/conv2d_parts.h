@@ -1,5 +1,5 @@
 #pragma once
-// The two ways of conv2d: directly, as products with the windows of a bordered picture, and Winograd's.
+// The two ways of conv2d: directly, as products with the windows of a bordered image, and Winograd's.
 // Private.
 #include <fieldmark/engine/tape.h>
 

@@ -12,7 +12,7 @@
 // definition, of which the transforms leave 2.5 (64 channels, AVX-512, one core: forward 2.7, with
 // gradients 2.6).
 //
-// Worst error in parts of the largest number, uniform random pictures and weights, direct way in brackets:
+// Worst error in parts of the largest number, uniform random images and weights, direct way in brackets:
 //   channels    y                    dX                   dW
 //   64          1.7e-6 (1.1e-6)      1.7e-6 (1.1e-6)      8.5e-7 (1.7e-6)
 //   256         3.0e-6 (2.1e-6)      2.6e-6 (1.9e-6)      7.5e-7 (1.9e-6)
@@ -67,7 +67,7 @@ T* workspace(Index numbers) {
 // 8 and 64 it is 1.2 and 1.7 times faster, at 64 and 64 2.5. Fewer than 6 pixels to a tile (a row of pixels,
 // where 5 x 5 has 6.25) waste the products. Transforming the weights pays from 4 tiles on while they stay in
 // L2, else from 32 (256 channels: 1.4 times slower at 16 tiles, 1.2 times faster at 36). The number of
-// pictures has no say: a picture alone has the same bits as in a batch.
+// images has no say: an image alone has the same bits as in a batch.
 bool winograd_pays(const ConvGeometry& g) {
   const Index tiles = tiles_along(g.h) * tiles_along(g.w);
   return g.k == 3 && g.same() && std::min(g.c, g.o) >= 8 && g.c + g.o >= 24 && g.h * g.w >= 6 * tiles &&

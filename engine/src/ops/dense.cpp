@@ -1,4 +1,5 @@
 #include <fieldmark/engine/ops/dense.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include "ops/product.h"
 

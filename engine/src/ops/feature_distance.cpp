@@ -1,4 +1,5 @@
 #include <fieldmark/engine/ops/feature_distance.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include "kernels/feature_distance.h"
 #include "ops/pieces.h"

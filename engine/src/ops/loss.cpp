@@ -1,4 +1,5 @@
 #include <fieldmark/engine/ops/loss.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include <cmath>
 

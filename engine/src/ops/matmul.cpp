@@ -1,4 +1,5 @@
 #include <fieldmark/engine/ops/matmul.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include "ops/product.h"
 

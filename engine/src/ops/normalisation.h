@@ -1,4 +1,5 @@
 #pragma once
+#include <fieldmark/engine/shape_checks.h>
 #include <cmath>
 #include <cstdint>
 

@@ -1,4 +1,5 @@
 #include <fieldmark/engine/ops/pool.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include "kernels/pool.h"
 #include "ops/pieces.h"

@@ -110,7 +110,7 @@ constexpr int kFew = 8;     // the same in a contracted space, where each waits 
 }  // namespace
 
 // As empty_steps(), for all lanes at a time: one ray alone waits for each number in turn, and most rays of a
-// picture do nothing but jump.
+// image do nothing but jump.
 void march_to_blocks(const MarchGrid& g, MarchRays& rays) {
   MarchRays r = rays;
   const auto n = static_cast<float>(g.block_side);

@@ -192,7 +192,7 @@ TEST_CASE("kernels/winograd: weights and their gradient are what the definition 
   });
 }
 
-TEST_CASE("kernels/winograd: outputs stay inside the picture, with bias, ReLU or what was there") {
+TEST_CASE("kernels/winograd: outputs stay inside the image, with bias, ReLU or what was there") {
   each_isa([] {
     const Matrix line = transposed(powers(4));
     for (const Size& s : sizes())

@@ -158,7 +158,7 @@ TEST_CASE("conv2d: a large offset, a huge pixel and zeros through Winograd's way
   });
 }
 
-TEST_CASE("conv2d: NaN in a picture reaches every output that sees it and none more than 4 pixels away") {
+TEST_CASE("conv2d: NaN in an image reaches every output that sees it and none more than 4 pixels away") {
   each_isa([] {
     const Index side = 26, c = 16, row = 9;
     const auto w = uniform<float>({3, 3, c, c}, -1, 1, 2), b = uniform<float>({c}, -1, 1, 3);
@@ -220,7 +220,7 @@ TEST_CASE("conv2d: same bits for 1 and 2 threads, also where the sum over pixels
   });
 }
 
-TEST_CASE("conv2d: a picture alone has the same bits as in a batch") {
+TEST_CASE("conv2d: an image alone has the same bits as in a batch") {
   for (Index side : {3, 4, 5, 8, 9, 30})
     for (Index c : {8, 24, 72}) {
       const auto x = uniform<float>({5, side, side, c}, -1, 1, 1),
@@ -323,12 +323,12 @@ TEST_CASE("conv2d: errors of steps and borders, and the same bits for any thread
   CHECK_THROWS_WITH(conv2d(vx, vw, vb, {.stride = 2, .padding = 1}),
                     "[conv2d] x: height and width must be at least 5 (the window's 7 less two borders of 1), "
                     "got shape [1, 9, 4, 3]");
-  const auto picture = uniform<float>({2, 83, 90, 3}, -1, 1, 1),
+  const auto image = uniform<float>({2, 83, 90, 3}, -1, 1, 1),
              weights = uniform<float>({11, 11, 3, 64}, -1, 1, 2), bias = uniform<float>({64}, -1, 1, 3);
   const int before = threads();
   set_threads(1);
-  const Result one = run_steps(picture, weights, bias, {.stride = 4, .padding = 2}, Activation::relu);
+  const Result one = run_steps(image, weights, bias, {.stride = 4, .padding = 2}, Activation::relu);
   set_threads(2);
-  CHECK(one == run_steps(picture, weights, bias, {.stride = 4, .padding = 2}, Activation::relu));
+  CHECK(one == run_steps(image, weights, bias, {.stride = 4, .padding = 2}, Activation::relu));
   set_threads(before);
 }

@@ -34,7 +34,7 @@ struct Weights {
 
 }  // namespace
 
-TEST_CASE("feature_distance: values equal the formula, each picture of a batch for itself") {
+TEST_CASE("feature_distance: values equal the formula, each image of a batch for itself") {
   const auto a = uniform({2, 3, 4, 7}, -1, 1, 1), b = uniform({2, 3, 4, 7}, -1, 1, 2);
   const auto w = uniform({7}, 0, 1, 3).data;
   const auto y = op_values(with(w), std::vector{a, b});

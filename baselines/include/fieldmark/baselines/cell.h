@@ -29,11 +29,11 @@ struct Cell {
   CellName name;                        ///< what it is of
   Index steps = 0;                      ///< of the system's own training, without the unmarked field's
   double seconds = 0;                   ///< of the same
-  double bit_accuracy = 0;              ///< of one view from random near cameras, mean over views
+  double bit_accuracy = 0;              ///< of one view from random novel cameras, mean over views
   double spread = 0;                    ///< standard deviation of the bit accuracy over views
-  double own_2d_accuracy;               ///< of a 2-D network on the pictures that it marked itself
+  double own_2d_accuracy;               ///< of a 2-D network on the images that it marked itself
   double psnr_base = 0;                 ///< marked against unmarked render, dB, mean over views
-  double psnr_base_object = 0;          ///< the same over the object's pixels
+  double psnr_base_foreground = 0;      ///< the same over the object's pixels
   double psnr_photo = 0;                ///< marked render against photographs of the test split, dB
   double ssim = 0;                      ///< marked render against photographs
   double lpips = 0;                     ///< marked render against photographs (AlexNet)
@@ -55,8 +55,8 @@ void keep_curve(Cell& cell, std::string_view curve);
 std::vector<CurvePoint> kept_curve(const Cell& cell);
 
 /// JSON with the keys {system, scene, field, bits, seed, steps, seconds, bit_accuracy, spread,
-/// own_2d_accuracy, psnr_base, psnr_base_object, psnr_photo, ssim, lpips, under, commit, more}; what is not
-/// finite is null.
+/// own_2d_accuracy, psnr_base, psnr_base_foreground, psnr_photo, ssim, lpips, under, commit, more}; what is
+/// not finite is null.
 std::string format_cell(const Cell& cell);
 /// What format_cell() wrote. @param place  named in errors   @throws IoError if the text is not a cell
 Cell parse_cell(std::string_view text, std::string_view place);

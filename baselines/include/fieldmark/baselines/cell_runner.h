@@ -20,23 +20,23 @@ struct CellRunnerOptions {
   double budget = 300;             ///< seconds of a system's own training, > 0
   double base_seconds = 0;         ///< of the unmarked field's; 0: the budget, at most 60 s for a hash field
   nerf::RadianceFieldOptions hash{};  ///< sizes of hash fields; their seed is the cell's
-  Index size = 0;  ///< pixels of the pictures' longer side; 0: 160 (Blender), 252 (others), 100 (mlp)
-  /// Near cameras that are read, at least 1; fewer, but no fewer than under_views, where reading them would
+  Index size = 0;  ///< pixels of the images' longer side; 0: 160 (Blender), 252 (others), 100 (mlp)
+  /// Novel cameras that are read, at least 1; fewer, but no fewer than under_views, where reading them would
   /// take longer than `budget`.
   Index views = 200;
   Index under_views = 50;               ///< of them under each distortion and sampling
   Index photographs = 20;               ///< of the test split, evenly spread
   std::filesystem::path work;           ///< folder of checkpoints and unmarked fields
-  std::vector<std::string> under;       ///< distortions of cells of 16 bits, names of parse_attack()
+  std::vector<std::string> under;       ///< distortions of cells of 16 bits, names of parse_distortion()
   const Lpips<float>* lpips = nullptr;  ///< AlexNet, or null
   std::string commit;                   ///< of the sources, for the cells
   RunProgress progress = {};            ///< may be empty
 };
 
-/// A cell that is complete, with its pictures.
+/// A cell that is complete, with its images.
 struct MeasuredCell {
-  Cell cell;              ///< the numbers
-  Tensor<float> picture;  ///< [H, 2 W, 3] the first test view unmarked and, beside it, marked
+  Cell cell;            ///< the numbers
+  Tensor<float> image;  ///< [H, 2 W, 3] the first test view unmarked and, beside it, marked
 };
 /// Writes STEM.png and, when it is there, STEM.json. @throws IoError
 void save_measured(const std::filesystem::path& folder, const MeasuredCell& measured);

@@ -22,7 +22,7 @@ const PaperSystem& paper_system(std::string_view name);
 enum class PaperTable {
   bits,        ///< bit accuracy against the message's length
   quality,     ///< bit accuracy and quality at 16 bits
-  distortion,  ///< bit accuracy at 16 bits under distortion of the pictures
+  distortion,  ///< bit accuracy at 16 bits under distortion of the images
   ablation,    ///< the full method without its parts
   sampling,    ///< other points along the rays at test
   weights      ///< noise on the weights

@@ -16,7 +16,7 @@ struct WarpOptions {
   std::span<const T> background = {};  ///< [channels] colour outside x; empty = 0. Copied
 };
 
-/// Resamples an image once, bilinearly, under an affine map about the centres of both pictures.
+/// Resamples an image once, bilinearly, under an affine map about the centres of both images.
 ///   y(p) = sum_q x(q) max(0, 1 - |q_x - s_x|) max(0, 1 - |q_y - s_y|),   s = A (p - c_out) + t + c_in
 /// where q runs over pixels and outside x has the background's colour. Whole positions copy pixels exactly.
 /// @param x       [height, width, channels]

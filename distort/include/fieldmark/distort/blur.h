@@ -3,10 +3,10 @@
 
 namespace fieldmark::distort {
 
-/// Separable Gaussian blur; the picture's edge pixels continue outside it.
+/// Separable Gaussian blur; the image's edge pixels continue outside it.
 ///   y(i, j) = sum_kl g_k g_l x(i + k, j + l),   g_k = exp(-k^2 / 2 sigma^2) / sum,   |k| <= r = max(1,
 ///   ceil(4 sigma))
-/// Constant pictures stay constant; sigma to 0 is the exact identity.
+/// Constant images stay constant; sigma to 0 is the exact identity.
 /// @param x      [height, width, channels]
 /// @param sigma  [1] standard deviation in pixels, 0 to 1000
 /// @return [height, width, channels]

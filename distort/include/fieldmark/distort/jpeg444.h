@@ -3,7 +3,7 @@
 
 namespace fieldmark::distort {
 
-/// What is left of a picture after JPEG with chroma at full size (4:4:4), which the encoder behind
+/// What is left of an image after JPEG with chroma at full size (4:4:4), which the encoder behind
 /// jpeg_round_trip() has at its best qualities only. Each 8 x 8 block of each component, the last row and
 /// column repeated to fill it:
 ///   c' = q round(DCT(c) / q),   q = clamp(floor((s base + 50) / 100), 1, 255),   s = 5000 / Q below 50, else

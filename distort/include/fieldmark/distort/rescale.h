@@ -3,11 +3,11 @@
 
 namespace fieldmark::distort {
 
-/// Zooms a picture about its centre into a picture of fixed size, bilinear: affine_warp of similarity(0, s,
+/// Zooms an image about its centre into an image of fixed size, bilinear: affine_warp of similarity(0, s,
 /// 0). Scale 1 into the same size is the exact identity. Not a low-pass: to shrink below 0.5 use resize_area.
 /// @param x        [height, width, channels]
 /// @param scale    [1] > 0; above 1 enlarges, below 1 shrinks
-/// @param options  size of the result (round(s height) fits the shrunken picture exactly) and background
+/// @param options  size of the result (round(s height) fits the shrunken image exactly) and background
 /// @return [options.height, options.width, channels]
 /// @throws ShapeError and ValueError as affine_warp and similarity
 /// Differentiable in: x, scale. Kinks as affine_warp.

@@ -6,9 +6,9 @@
 
 namespace fieldmark::distort {
 
-/// Resizes a picture with an area (box) filter: every output pixel is the mean of x over its own rectangle.
+/// Resizes an image with an area (box) filter: every output pixel is the mean of x over its own rectangle.
 ///   y(i, j) = sum_rs a_ir b_js x(r, s),   a_ir = |[i, i+1] H/h  cut with  [r, r+1]| h/H, b alike
-/// The weights are exact ratios of integers; the same size is the exact identity, and the picture's mean is
+/// The weights are exact ratios of integers; the same size is the exact identity, and the image's mean is
 /// kept.
 /// @param x  [height, width, channels], height and width at least 1
 /// @param height, width  of the result, at least 1; any ratio, larger too

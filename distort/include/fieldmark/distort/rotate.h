@@ -8,7 +8,7 @@
 
 namespace fieldmark::distort {
 
-/// Turns a picture about its centre, same size, bilinear: affine_warp of similarity(angle, 1, 0).
+/// Turns an image about its centre, same size, bilinear: affine_warp of similarity(angle, 1, 0).
 /// Exact for 0, and for multiples of pi/2 where the size allows (height - width even).
 /// @param x           [height, width, channels]
 /// @param angle       [1] radians, counter-clockwise as seen

@@ -5,10 +5,10 @@
 
 namespace fieldmark::distort {
 
-/// What affine_warp reads for a turn, a zoom and a shift of the picture about its centre.
+/// What affine_warp reads for a turn, a zoom and a shift of the image about its centre.
 ///   A = R(-angle) / scale,   t = -A shift,   out [a00, a01, t_x, a10, a11, t_y]
-/// so a picture's point at offset p from the centre moves to scale R(angle) p + shift. The axes are x to the
-/// right and y down; a positive angle turns the picture counter-clockwise as seen. Sines and cosines within
+/// so an image's point at offset p from the centre moves to scale R(angle) p + shift. The axes are x to the
+/// right and y down; a positive angle turns the image counter-clockwise as seen. Sines and cosines within
 /// two ulp of 0 are 0: an angle of pi/2 in T gives an exact permutation of the pixels.
 /// @param angle  [1] radians   @param scale  [1] > 0, above 1 enlarges   @param shift  [2] (x, y) in pixels
 /// @return [6]

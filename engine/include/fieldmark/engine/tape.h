@@ -1,6 +1,6 @@
 #pragma once
+#include <fieldmark/core/error.h>
 #include <fieldmark/engine/arena.h>
-#include <fieldmark/engine/error.h>
 #include <fieldmark/engine/shape.h>
 #include <fieldmark/engine/tensor.h>
 

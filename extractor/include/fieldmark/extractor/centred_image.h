@@ -3,7 +3,7 @@
 
 namespace fieldmark::extractor {
 
-/// Pictures as a network likes them: colours around 0, extents without a remainder.
+/// Images as a network likes them: colours around 0, extents without a remainder.
 ///   y[n, i, j, c] = 2 x[n, i, j, c] - 1   for i < H - H mod m, j < W - W mod m
 /// Rows at the bottom and columns at the right beyond the last multiple are dropped: padding would show an
 /// edge that is not in the scene.

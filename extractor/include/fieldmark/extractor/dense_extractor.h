@@ -17,16 +17,16 @@ struct DenseExtractorOptions {
 
 /// Reads the mark place by place: which cell of the scene each 4 x 4 pixels show, and the sign of the mark
 /// there. A U-shaped network: 2 x 2 pixels into channels, then 3 x 3 convolutions at 1/2 (base channels), 1/4
-/// (2 base), 1/8 (3 base) and 1/16 (3 base) of the picture, back up to 1/4 by bilinear interpolation with the
+/// (2 base), 1/8 (3 base) and 1/16 (3 base) of the image, back up to 1/4 by bilinear interpolation with the
 /// skipped features joined on, and two heads of 1 x 1 convolutions. Each 3 x 3 convolution is followed by
-/// group normalisation and ReLU, so that a picture is read the same in training and test, alone and among
+/// group normalisation and ReLU, so that an image is read the same in training and test, alone and among
 /// others. Source: Ronneberger et al. 2015 (U-Net), figure 1; Wu and He 2018 (group normalisation).
 /// Departures: four levels instead of five, zeros around instead of valid convolutions, output at 1/4: a
 /// place needs no finer label, and full resolution would cost 16 times as much.
 template <class T>
 class DenseExtractor {
  public:
-  /// What the network says about every place of a picture.
+  /// What the network says about every place of an image.
   struct Output {
     Var<T> sign;   ///< [P] logit that the mark is positive at each place, row by row
     Var<T> index;  ///< [P, classes] logits of the cell each place shows, the last class the background

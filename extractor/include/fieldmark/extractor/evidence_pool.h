@@ -6,7 +6,7 @@
 
 namespace fieldmark::extractor {
 
-/// Evidence for each bit of a message in one picture: average pooling weighted by where a place lies.
+/// Evidence for each bit of a message in one image: average pooling weighted by where a place lies.
 ///   L_b = sum_p tanh(s_p / 2) sum_c q_c(p) code[c, b] / (sum_p (1 - q_C(p)) / N_b + 1e-3),   q =
 ///   softmax(index)
 /// tanh(s / 2) = 2 sigmoid(s) - 1 is the expected sign; class C is the background. Where every place shows a
@@ -21,7 +21,7 @@ namespace fieldmark::extractor {
 template <class T>
 Var<T> pooled_bits(Var<T> sign, Var<T> index, std::span<const std::type_identity_t<T>> code, Index n_bits);
 
-/// Adds one picture's sign evidence to each cell, for tests that need the key only later.
+/// Adds one image's sign evidence to each cell, for tests that need the key only later.
 ///   S_c += sum_p q_c(p) tanh(s_p / 2) / (n_c + 1/4)^0.3,   n_c = sum_p q_c(p),   q = softmax(index)
 /// The sum of n places has a signal as n and, between places that err by chance and places that all err
 /// together, noise as n^(1/2) to n: the best weight falls as n^0 to n^-1. The power 0.3 reads as much as none

@@ -28,8 +28,8 @@ class PooledExtractor {
   PooledExtractor(ParamStore<T>& store, std::string_view name, const PooledExtractorOptions& options,
                   std::uint64_t seed);
 
-  /// Normalises with the statistics of the pictures given: in training, and for the preset `code` also at
-  /// test, one picture at a time.
+  /// Normalises with the statistics of the images given: in training, and for the preset `code` also at
+  /// test, one image at a time.
   /// @param images [N, H, W, 3] in [0, 1], any H and W from 1
   /// @param statistics  where not null, becomes one entry a layer, for update()
   /// @return [N, N_b] logits; a bit is 1 where its logit is positive
@@ -37,7 +37,7 @@ class PooledExtractor {
   /// Differentiable in: images and the parameters; kinks of the ReLUs.
   Var<T> operator()(const Params<T>& params, Var<T> images,
                     std::vector<BatchStatistics>* statistics = nullptr) const;
-  /// The same with the running statistics: no picture depends on another.
+  /// The same with the running statistics: no image depends on another.
   Var<T> evaluate(const Params<T>& params, Var<T> images) const;
   /// Moves the running statistics towards a batch's, see BatchNorm::update().
   /// @throws ShapeError unless there is one entry for each layer   @throws as BatchNorm::update()

@@ -30,16 +30,16 @@ struct SceneOptions {
 /// its range
 Tensor<float> render_scene(const SceneOptions& options, const Camera& camera);
 
-/// One split in memory: the same pictures and cameras that write_scene() writes.
+/// One split in memory: the same images and cameras that write_scene() writes.
 /// @throws ValueError  if an option is outside its range or split is not "train", "val" or "test"
 Dataset make_scene(const SceneOptions& options, const std::string& split = "train",
                    Background background = Background::white);
 
-/// Called with the pictures done and their total, from the calling thread; may throw to stop.
+/// Called with the images done and their total, from the calling thread; may throw to stop.
 using SceneProgress = std::function<void(Index done, Index total)>;
 
 /// Writes all splits as a data set that load_dataset() reads: train, val and test folders of RGBA PNG files,
-/// and, when their pictures are complete, transforms_{train,val,test}.json. Equal options give equal bytes.
+/// and, when their images are complete, transforms_{train,val,test}.json. Equal options give equal bytes.
 /// @throws ValueError  if an option is outside its range   @throws IoError if folder or files cannot be
 /// written
 void write_scene(const SceneOptions& options, const std::filesystem::path& folder,

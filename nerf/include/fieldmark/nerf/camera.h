@@ -19,7 +19,7 @@ struct Ray {
 };
 
 /// Pinhole camera with OpenGL (Blender) axes: x right, y up, looking along -z. Pixel (0, 0) is at the top
-/// left, and whole numbers are the centres of pixels; cx and cy are measured from the picture's corner.
+/// left, and whole numbers are the centres of pixels; cx and cy are measured from the image's corner.
 struct Camera {
   Pose pose{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};  ///< from the camera to the world
   double fx = 1;                                  ///< focal length across, pixels, > 0
@@ -47,7 +47,7 @@ struct Camera {
 /// is below 1
 Camera make_camera(const Pose& pose, double angle_x, Index width, Index height);
 
-/// The pose at `eye` that looks at `target` with `up` upwards in the picture. Where the view is along `up`,
+/// The pose at `eye` that looks at `target` with `up` upwards in the image. Where the view is along `up`,
 /// the coordinate axis furthest from the view replaces it.
 /// @throws ValueError if eye and target coincide or a number is not finite
 Pose look_at(const Vec3& eye, const Vec3& target, const Vec3& up);

@@ -10,7 +10,7 @@
 
 namespace fieldmark::nerf {
 
-/// What is behind the scene where a picture is not opaque.
+/// What is behind the scene where an image is not opaque.
 enum class Background { white, black };
 
 /// How a folder holds a data set.
@@ -31,7 +31,7 @@ struct DepthRange {
 
 /// A photograph and the camera that took it.
 struct View {
-  Camera camera;                      ///< of the size of the picture
+  Camera camera;                      ///< of the size of the image
   Tensor<float> rgba;                 ///< [height, width, 4] in [0, 1], straight (not premultiplied) alpha
   std::string name;                   ///< as in the data set, without folder and extension: "r_12"
   std::optional<DepthRange> depth{};  ///< where the data set knows it (layouts llff and colmap)
@@ -55,7 +55,7 @@ struct Dataset {
 struct DatasetOptions {
   std::string split = "train";  ///< "train", "val" or "test"
   /// Pixels of the longer side after an area filter on premultiplied colour; 0: as it is. Where distorted
-  /// pictures lose their rims, it is the size before that.
+  /// images lose their rims, it is the size before that.
   Index size = 0;
   /// Of the Dataset that is made; none: white for the layout blender, black for photographs.
   std::optional<Background> background{};
@@ -63,23 +63,23 @@ struct DatasetOptions {
 
 /// Reads one split of a data set. The layout is the first whose file the folder has: transforms_train.json
 /// (or _val, _test), transforms.json, poses_bounds.npy, cameras.bin or cameras.txt (in sparse/0,
-/// sparse or the folder itself). All but blender hold out every 8th picture (0, 8, 16,
-/// ... of the names sorted) as val and test, and have the others in train. Pictures without alpha are taken
+/// sparse or the folder itself). All but blender hold out every 8th image (0, 8, 16,
+/// ... of the names sorted) as val and test, and have the others in train. Images without alpha are taken
 /// as opaque.
 ///
-/// transforms: see parse_transforms(). Frames without a picture are left out, with a note. Distorted pictures
-/// are made into those of a pinhole (undistorted_picture()), all cut to the part that covered_part() has for
+/// transforms: see parse_transforms(). Frames without an image are left out, with a note. Distorted images
+/// are made into those of a pinhole (undistorted_image()), all cut to the part that covered_part() has for
 /// every lens of the file; what is outside is neither trained on nor measured.
 ///
-/// llff: see parse_poses_bounds(); poses are recentred and rescaled by recentre_llff(). Pictures are those of
+/// llff: see parse_poses_bounds(); poses are recentred and rescaled by recentre_llff(). Images are those of
 /// the folder images or images_N whose longer side is the smallest that reaches `size` (else the largest),
 /// sorted by name.
 ///
-/// colmap: see parse_colmap_cameras(). World axes are COLMAP's. Pictures as for llff, lenses and missing
-/// pictures as for transforms; points3D is read where it is there.
+/// colmap: see parse_colmap_cameras(). World axes are COLMAP's. Images as for llff, lenses and missing
+/// images as for transforms; points3D is read where it is there.
 /// @throws ValueError  if an option is outside its range
-/// @throws IoError     naming file and place: folder, JSON or a picture missing, unreadable or malformed, no
-///                     views, pictures of differing sizes, a distortion that has no inverse, none of the
+/// @throws IoError     naming file and place: folder, JSON or an image missing, unreadable or malformed, no
+///                     views, images of differing sizes, a distortion that has no inverse, none of the
 ///                     files above
 Dataset load_dataset(const std::filesystem::path& folder, const DatasetOptions& options = {});
 

@@ -1,5 +1,5 @@
 #pragma once
-#include <fieldmark/engine/nn/lpips.h>
+#include <fieldmark/imaging/lpips.h>
 #include <fieldmark/nerf/renderer.h>
 
 #include <functional>
@@ -9,16 +9,16 @@ namespace fieldmark::nerf {
 
 /// How close one rendering is to its photograph, see psnr(), psnr_masked() and ssim().
 struct ViewScore {
-  double psnr;         ///< over the whole picture, dB
-  double psnr_object;  ///< over the object's pixels, dB; NaN where the object is not in the picture
-  double ssim;         ///< in [-1, 1]; NaN for a picture smaller than the window of ssim()
-  double lpips;  ///< both rounded to 8 bits; NaN without a network, or for a picture it is too small for
+  double psnr;             ///< over the whole image, dB
+  double psnr_foreground;  ///< over the object's pixels, dB; NaN where the object is not in the image
+  double ssim;             ///< in [-1, 1]; NaN for an image smaller than the window of ssim()
+  double lpips;  ///< both rounded to 8 bits; NaN without a network, or for an image it is too small for
 };
 
 /// Means over the views of a data set. A view whose number is NaN is left out of that number's mean.
 struct Evaluation {
   double psnr = 0;                  ///< mean of ViewScore::psnr
-  double psnr_object = 0;           ///< mean of ViewScore::psnr_object
+  double psnr_foreground = 0;       ///< mean of ViewScore::psnr_foreground
   double ssim = 0;                  ///< mean of ViewScore::ssim
   double lpips = 0;                 ///< mean of ViewScore::lpips
   Index views = 0;                  ///< rendered

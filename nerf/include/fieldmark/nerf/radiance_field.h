@@ -21,7 +21,7 @@ struct RadianceFieldOptions {
   float step = 1.f / 420;  ///< spacing of samples along a ray, in diagonals of the cube
   std::uint64_t seed = 0;  ///< of the initial numbers
   RayPoints points{};      ///< where an mlp field is looked at along a ray
-  /// Rays along each side of a pixel that its pictures are made of, 1, 2, 4 or 8: what a Renderer sends
+  /// Rays along each side of a pixel that its images are made of, 1, 2, 4 or 8: what a Renderer sends
   /// unless told otherwise, and a Trainer in the later part of a run, see TrainOptions::supersample_after.
   Index supersampling = 1;
 };
@@ -64,7 +64,7 @@ class RadianceField {
   OccupancyGrid grid;                         ///< which cells of the cube are not empty
   Space space;                                ///< how the world is laid into the cube
   CameraSpan cameras;                         ///< where the training cameras stood
-  Background background = Background::white;  ///< what its pictures are composited over
+  Background background = Background::white;  ///< what its images are composited over
 
  private:
   RadianceFieldOptions options_;

@@ -4,7 +4,7 @@
 namespace fieldmark::nerf {
 
 /// Rays through pixels, as pixel_ray(), with gradients to the camera: pose and focal length can be fitted to
-/// pictures.
+/// images.
 ///   o = t,   d = w / |w|,   w = R (u, v, -1),   u = (x + 1/2 - cx) / fx,   v = -(y + 1/2 - cy) / fy
 /// @param camera  [16] or [N, 16]: the pose [R | t], row-major 3 x 4, then fx, fy, cx, cy in pixels; one
 /// camera for all

@@ -7,7 +7,7 @@
 
 namespace fieldmark::nerf {
 
-/// Pictures of a field as a data set: what somebody has who trains a new field, or the same one further, on
+/// Images of a field as a data set: what somebody has who trains a new field, or the same one further, on
 /// what it shows. Numbers are rounded to 8 bits as files keep them. In a cube, alpha is the rendering's
 /// opacity a and colours are straight, (C - (1 - a) b) / a with the background b; in other spaces everything
 /// is opaque, as in photographs.

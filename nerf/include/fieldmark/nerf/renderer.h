@@ -8,7 +8,7 @@
 
 namespace fieldmark::nerf {
 
-/// Which rays of a picture are traced together, and in what order.
+/// Which rays of an image are traced together, and in what order.
 struct RayOrder {
   Index width = 16;     ///< of a tile, pixels, at least 1: its rays pass through the same cells
   Index height = 16;    ///< likewise
@@ -18,16 +18,16 @@ struct RayOrder {
 /// How exactly a Renderer works.
 struct RenderOptions {
   /// Samples along a ray for each that training took, > 0. What a ray misses between its samples is most of a
-  /// picture's error (`fieldmark bench field` measures it). Without meaning for mlp, see points.
+  /// image's error (`fieldmark bench field` measures it). Without meaning for mlp, see points.
   float finer = 4.f / 3;
   float stop = 3e-3f;          ///< a ray ends where its transmittance falls below this
   float least_weight = 1e-3f;  ///< samples of less weight get no colour
   /// bf16 looks features up in a rounded table and multiplies rounded numbers: less memory, 62 dB from the
-  /// picture in float. Needs bf16_units().
+  /// image in float. Needs bf16_units().
   Precision precision = Precision::fp32;
   /// Of a ray of an mlp field; none: those it was trained with.
   std::optional<RayPoints> points{};
-  RayOrder order{};  ///< changes no number of a picture, only how fast it comes
+  RayOrder order{};  ///< changes no number of an image, only how fast it comes
   /// Rays along each side of a pixel, 1 to 8, at the centres of its parts; the pixel is the mean of them all;
   /// 0: RadianceFieldOptions::supersampling. A camera's pixel has its own area's mean too: what one ray
   /// through its centre misses of that is up to 0.3 dB against photographs (docs/results/quality.md), at a
@@ -35,7 +35,7 @@ struct RenderOptions {
   Index supersampling = 0;
 };
 
-/// A picture of a field.
+/// An image of a field.
 struct Rendering {
   Tensor<float> rgb;      ///< [height, width, 3] over the field's background, in [0, 1]
   Tensor<float> opacity;  ///< [height, width] in [0, 1]
@@ -66,7 +66,7 @@ class Renderer {
   /// directions d [n, 3] they are seen from, and colours rgb [n, 3]. Called from several threads at once. An
   /// empty function draws the field as it is.
   using Recolour = std::function<void(const float* x, const float* d, Index n, float* rgb)>;
-  /// Used from the next picture on.
+  /// Used from the next image on.
   void set_recolour(Recolour recolour) { recolour_ = std::move(recolour); }
   static constexpr Index kLanes = 16;  ///< calls of trace() that may run at the same time
   /// Colour and opacity of given rays, background not added.

@@ -75,7 +75,7 @@ struct CubeRays {
 /// The contraction on linear cube coordinates, see Space. @param p, x  [3], may be the same
 void contract(const float* p, float* x);
 
-/// Which cells of a grid over the cube at least one camera has in its picture, in front of it: the others are
+/// Which cells of a grid over the cube at least one camera has in its image, in front of it: the others are
 /// never trained. Judged at the cell's centre and its corners.
 /// @param resolution  cells per axis, >= 1   @return one entry a cell, x fastest, 1 where it is seen
 std::vector<std::uint8_t> seen_cells(std::span<const Camera> cameras, const Space& space, Index resolution);

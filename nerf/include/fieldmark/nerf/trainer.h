@@ -53,7 +53,7 @@ struct TrainOptions {
 
 /// What suits a kind of field. mlp: Adam with 5e-4, falling exponentially over the last nine tenths of the
 /// run to a tenth, see ScheduleOptions; 64 rays a step at the default 96 samples each, since many small steps
-/// teach it more than a few large ones. A much larger step size may never leave the empty picture.
+/// teach it more than a few large ones. A much larger step size may never leave the empty image.
 TrainOptions train_options(FieldKind kind);
 
 /// Sizes of a hash field that a run of this length can fill: those of RadianceFieldOptions; for runs of at

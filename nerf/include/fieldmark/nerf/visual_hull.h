@@ -22,7 +22,7 @@ struct Silhouette {
 
 /// The visual hull (Laurentini 1994): cells of a grid over `bounds` that no silhouette rules out.
 /// A cell stays if in every view its projection, enlarged to the circle around its corners, touches a pixel
-/// with alpha > 0, leaves the picture, or lies behind the camera: it is never ruled out wrongly.
+/// with alpha > 0, leaves the image, or lies behind the camera: it is never ruled out wrongly.
 /// @param resolution  cells per axis, a multiple of 4, at most 512   @return one entry a cell, x fastest, 1
 /// where it stays
 /// @throws ShapeError if an image is not [H, W, 4]   @throws ValueError if resolution is out of range

@@ -6,7 +6,7 @@
 
 namespace fieldmark {
 
-/// Joins tensors along their last axis: features [N, Ci], or the channels of pictures [N, H, W, Ci].
+/// Joins tensors along their last axis: features [N, Ci], or the channels of images [N, H, W, Ci].
 /// @param xs  one or more; the leading axes of all are the same
 /// @return    [.., C0 + C1 + ..]
 /// @throws ShapeError if the leading axes differ or a rank is 0   @throws ValueError if xs is empty

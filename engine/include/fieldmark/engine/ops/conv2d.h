@@ -6,7 +6,7 @@ namespace fieldmark {
 /// How conv2d() computes: Winograd's way where it is faster, or always the sums as they are written.
 enum class ConvMethod { fastest, direct };
 
-/// Two-dimensional convolution (cross-correlation) of pictures, stride 1, zeros around, same size.
+/// Two-dimensional convolution (cross-correlation) of images, stride 1, zeros around, same size.
 ///   y[n, i, j, o] = act(b[o] + sum_{u, v, c} x[n, i + u - r, j + v - r, c] w[u, v, c, o]),   r = (K - 1) / 2
 /// Wide layers with K = 3 take Winograd's way (Lavin & Gray 2016), which computes tiles of 4 x 4 outputs. In
 /// float its errors are parts of the largest number of a tile, below 5e-6 of it up to 512 channels, and a NaN
@@ -22,14 +22,14 @@ Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, Activation activation = Activation::
 /// How the window of conv2d() moves where it does not visit every pixel, or the border is not half a window.
 struct ConvSteps {
   Index stride = 1;   ///< pixels from one window to the next, both ways, >= 1
-  Index padding = 0;  ///< pixels of zeros around the picture, >= 0
+  Index padding = 0;  ///< pixels of zeros around the image, >= 0
 };
 
 /// The same with steps of `stride` pixels inside a border of `padding` zeros.
 ///   y[n, i, j, o] = act(b[o] + sum_{u, v, c} x[n, i s + u - p, j s + v - p, c] w[u, v, c, o])
 /// @param x  [N, H, W, C]   @param w  [K, K, C, O], any K   @param b  [O]
 /// @return [N, (H + 2 p - K) / s + 1, (W + 2 p - K) / s + 1, O], rounded down
-/// @throws ShapeError if they do not fit or the picture with its border is smaller than the window
+/// @throws ShapeError if they do not fit or the image with its border is smaller than the window
 /// @throws ValueError if stride or padding is out of range
 /// Differentiable in: x, w, b. With relu: a kink where the sum is 0, gradient 0 there.
 template <class T>

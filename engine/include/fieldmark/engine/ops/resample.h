@@ -14,7 +14,7 @@ template <class T>
 Var<T> upsample_nearest(Var<T> x, Index factor);
 
 /// Resamples to a given size. Output pixel i lies at u = (i + 1/2) H / height - 1/2 in units of input pixels,
-/// so that the corners of the pictures coincide; beyond the outermost centres the border's value is kept.
+/// so that the corners of the images coincide; beyond the outermost centres the border's value is kept.
 /// `nearest` takes the pixel that contains u. It also shrinks, but without a filter: for that use an area
 /// average first.
 /// @param x [N, H, W, C]   @param height, width  of the output, >= 0   @return [N, height, width, C]

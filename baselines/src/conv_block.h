@@ -1,0 +1,40 @@
+#pragma once
+#include <fieldmark/engine/nn/batch_norm.h>
+#include <fieldmark/engine/nn/conv2d.h>
+
+#include <utility>
+#include <vector>
+
+namespace fieldmark::baselines {
+
+/// How batch normalisation works in a pass through a network, and what it saw.
+template <class T>
+struct NormPass {
+  /// With the running statistics, so that no image depends on another; else with the batch's own.
+  bool running = false;
+  /// The statistics of each normalisation, in the order they were met, for update_statistics().
+  std::vector<std::pair<const BatchNorm<T>*, BatchStatistics>> seen = {};
+};
+
+/// Moves the running statistics of all normalisations that a pass met towards the batch's.
+/// @param momentum  see BatchNorm::update()
+template <class T>
+void update_statistics(ParamStore<T>& store, const NormPass<T>& pass, double momentum = 0.1);
+
+/// Convolution 3 x 3, batch normalisation and ReLU, "<name>/conv" and "<name>/norm" in the store.
+template <class T>
+class ConvBlock {
+ public:
+  /// @param relu  without it, the block ends after the normalisation
+  /// @throws ValueError if an extent is below 1 or a name is taken
+  ConvBlock(ParamStore<T>& store, std::string_view name, Index in, Index out, std::uint64_t seed,
+            bool relu = true);
+  /// @param x [N, H, W, in]   @return [N, H, W, out]   Differentiable in: x and the parameters.
+  Var<T> operator()(const Params<T>& params, Var<T> x, NormPass<T>& pass) const;
+
+ private:
+  Conv2d<T> conv_;
+  BatchNorm<T> norm_;
+};
+
+}  // namespace fieldmark::baselines

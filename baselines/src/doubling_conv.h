@@ -1,0 +1,32 @@
+#pragma once
+#include <fieldmark/engine/nn/dense.h>
+#include "conv_block.h"
+
+namespace fieldmark::baselines {
+
+/// Spreads channels over blocks of 2 x 2 pixels, the inverse of space_to_depth().
+///   y[n, 2 i + a, 2 j + b, c] = x[n, i, j, (2 a + b) C + c]
+/// @param x [N, H, W, 4 C]   @return [N, 2 H, 2 W, C]   @throws ShapeError if x is not
+/// Differentiable in: x.
+template <class T>
+Var<T> depth_to_space(Var<T> x);
+
+/// Transposed convolution of 2 x 2 with stride 2, batch normalisation and ReLU: an image of twice the size.
+/// With the stride as large as the window no two windows meet, so it is a linear layer from each pixel to
+/// 2 x 2 pixels.
+template <class T>
+class DoublingConv {
+ public:
+  /// @throws ValueError if channels is below 1 or a name is taken
+  DoublingConv(ParamStore<T>& store, std::string_view name, Index channels, std::uint64_t seed);
+  /// @param x [N, H, W, channels]   @return [N, 2 H, 2 W, channels]
+  /// Differentiable in: x and the parameters.
+  Var<T> operator()(const Params<T>& params, Var<T> x, NormPass<T>& pass) const;
+
+ private:
+  Index channels_;
+  Dense<T> spread_;
+  BatchNorm<T> norm_;
+};
+
+}  // namespace fieldmark::baselines

@@ -1,0 +1,75 @@
+#pragma once
+#include <fieldmark/baselines/cell.h>
+#include <fieldmark/baselines/mark_scores.h>
+#include <fieldmark/baselines/timed_run.h>
+#include <fieldmark/watermark/embedding/embedder.h>
+#include <fieldmark/watermark/mark/owner.h>
+#include "message_field.h"
+
+#include <optional>
+
+namespace fieldmark::baselines {
+
+/// How a system with an Owner is trained.
+struct OwnerSystem {
+  watermark::OwnerOptions owner;  ///< networks and strength
+  watermark::EmbedOptions embed;  ///< losses and distortions, without the length of the run
+  /// Of systems whose densities depend on the message: the owner then has no colours of its own, and its
+  /// extractor reads what a MessageField shows.
+  std::optional<MessagePlace> place{};
+  double test_shift = 0;  ///< DRS: samples are moved so far at test too, see EmbedDistortions::sample_shift
+};
+
+/// Whether a system of paper_systems() is trained through an Owner.
+bool has_owner(std::string_view system);
+/// The options of such a system: ours at 34 dB on the object, read at up to 128 pixels; the paper's at up to
+/// 150. Systems without one of their parts:
+///   ours_without_dense: signs and cells of places cost nothing, the pooled bits alone do
+///   ours_without_cells: preset paper's networks, one message for all places, under our budget, distortions
+///   and step sizes; without places there is nothing dense to supervise
+///   ours_without_signs: in every cell the bit as it is
+///   without_drr: neither distortions nor moved samples
+///   without_mff, without_cff: see MarkFusion
+///   drs: the full method, with the samples moved at test as in training
+/// @param image  pixels of the views' longer side; the reader sees no more, and at least 32
+/// @throws ValueError if the system has none
+OwnerSystem owner_system(const CellName& name, Index image);
+
+/// A key for measurements, a function of the seed: not secret, so that equal runs give equal cells.
+watermark::Key measuring_key(std::uint64_t seed);
+
+/// Where and how long an owner is trained.
+struct OwnerTraining {
+  double seconds = 300;              ///< of training, without the views' rendering
+  std::filesystem::path checkpoint;  ///< see TimedRun
+  Index views = 200;                 ///< novel views to learn from
+  RunProgress progress = {};         ///< may be empty
+};
+
+/// An owner that has been trained.
+struct TrainedOwner {
+  watermark::Owner owner;             ///< calibrated
+  std::optional<MessageField> field;  ///< whose numbers are among the owner's, see OwnerSystem::place
+  double test_shift = 0;              ///< see OwnerSystem
+  Index steps = 0;                    ///< of training
+  double seconds = 0;                 ///< of training
+};
+
+/// The cell whose training a system's is: drs trains as copyrnerf_paper does.
+CellName trained_as(const CellName& name);
+
+/// Renders views, trains mark and extractor and calibrates the strength; goes on from a checkpoint.
+/// @throws Stopped after saving   @throws as Embedder
+TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name, const OwnerSystem& system,
+                         const OwnerTraining& training);
+
+/// An owner's mark with a message of its own in every view, see message_of_view(). `marked` must outlive it.
+MarkedScene marked_scene(const TrainedOwner& marked, std::uint64_t seed,
+                         const nerf::RenderOptions& options = {});
+
+/// The owner with Gaussian noise on every weight of the field's networks and table and of the mark's
+/// networks; the extractor stays.
+/// @param deviation  of the noise, >= 0   @throws ValueError if it is negative
+watermark::Owner with_noisy_weights(const watermark::Owner& owner, double deviation, std::uint64_t seed);
+
+}  // namespace fieldmark::baselines

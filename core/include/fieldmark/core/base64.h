@@ -1,0 +1,11 @@
+#pragma once
+#include <cstddef>
+#include <span>
+#include <string>
+
+namespace fieldmark {
+
+/// Bytes as text, with padding and without line breaks.   Source: RFC 4648, section 4
+std::string to_base64(std::span<const std::byte> bytes);
+
+}  // namespace fieldmark

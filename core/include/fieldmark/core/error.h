@@ -1,0 +1,24 @@
+#pragma once
+#include <stdexcept>
+
+namespace fieldmark {
+
+/// Root of every exception this library throws on purpose.
+struct Error : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+/// An argument's shape does not fit the operation.
+struct ShapeError : Error {
+  using Error::Error;
+};
+/// An argument's value is outside the operation's domain.
+struct ValueError : Error {
+  using Error::Error;
+};
+/// A file or folder is missing, unreadable, malformed or cannot be written. The text names the path, the
+/// place in it, what was expected and what was found.
+struct IoError : Error {
+  using Error::Error;
+};
+
+}  // namespace fieldmark

@@ -1,0 +1,93 @@
+#pragma once
+#include <fieldmark/engine/random.h>
+#include <fieldmark/engine/tensor.h>
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace fieldmark::distort {
+
+/// One kind of damage; parse_distortion() lists what each does.
+enum class DistortionKind {
+  noise,
+  rotation,
+  scale,
+  scale_nearest,
+  scale_bilinear,
+  scale_bicubic,
+  scale_lanczos,
+  blur,
+  crop,
+  jpeg,
+  jpeg444,
+  gamma,
+  brightness,
+  contrast,
+  hue,
+  greyscale
+};
+
+/// What somebody does to an image to remove its mark, from a name such as "rotation_30" or
+/// "noise_0.1,jpeg_50".
+struct Distortion {
+  /// One damage and how much of it.
+  struct Step {
+    DistortionKind kind;  ///< what is done
+    double amount;  ///< severity, in the unit that parse_distortion() gives for the kind; 0 for greyscale
+  };
+  std::string name;         ///< as it was given
+  std::vector<Step> steps;  ///< from left to right
+};
+
+/// Reads a name, or names separated by commas. Severities are true: deviations on the scale of [0, 1], sigma
+/// in pixels of the image at hand.
+///   noise_A       Gaussian of standard deviation A, 0 to 1
+///   rotation_A    uniform in +-A degrees about the centre, bilinear, same size, 0 to 180
+///   scale_A       to A times the size with an area filter and left so, 0.01 to 4
+///   scale-F_A     the same with another filter F: nearest, bilinear, bicubic or lanczos, see
+///                 resize_filtered()
+///   blur_A        Gaussian of sigma A pixels, 0 to 100
+///   crop_A        a random window of the image's aspect that keeps the fraction A of the area, 0.0001 to 1
+///   jpeg_A        quality A, 4:2:0 chroma, a whole number 1 to 90 (see encode_jpeg)
+///   jpeg444_A     the same with chroma at full size, 1 to 100 (see jpeg444)
+///   gamma_A       value to the power A, 0.01 to 10
+///   brightness_A  value times A, 0 to 10
+///   contrast_A    distance from 1/2 times A, 0 to 10
+///   hue_A         hue (of hue, saturation, value) turned by A degrees, -360 to 360
+///   greyscale     0.299 red + 0.587 green + 0.114 blue in all three
+///   combined      noise_0.10,crop_0.40,jpeg_50
+///   screenshot    scale-bicubic_1.25,blur_0.5,gamma_1.1,scale-lanczos_0.8,jpeg_80: shown on a screen at
+///                 another size, captured, brought back and sent on
+/// @throws ValueError, which lists all of these, on any other name and on amounts outside the ranges
+Distortion parse_distortion(std::string_view name);
+
+/// Where a pixel of an distorted image comes from, in pixels of the image before, centres at whole
+/// numbers, x to the right and y down:
+///   x' = a00 x + a01 y + t_x,   y' = a10 x + a11 y + t_y
+struct PixelMap {
+  std::array<double, 6> numbers{1, 0, 0, 0, 1, 0};  ///< [a00, a01, t_x, a10, a11, t_y]
+  /// The place that (x, y) comes from.
+  std::array<double, 2> operator()(double x, double y) const;
+  /// The map the other way: where a pixel of the image before went. Attacks' maps always have one.
+  PixelMap inverse() const;
+};
+
+/// Applies the steps in order. Each result is clamped to [0, 1] and rounded to 8 bits, so that a chain does
+/// what the same distortions do one after another on saved images.
+/// @param image       [height, width, 3] in [0, 1], at least one pixel
+/// @param rng         where noise, angles and windows come from
+/// @param index       number of the image: the counter rng is read at, so results depend on nothing else
+/// @param background  3 numbers, shown where a rotation opens corners
+/// @param source      where the result's pixels come from, written unless null: what rotation, scale and crop
+///                    of all steps did together
+/// @return [height', width', 3], multiples of 1/255
+/// @throws ShapeError if the image or the background has another shape
+Tensor<float> apply_distortion(const Distortion& distortion, const Tensor<float>& image,
+                               const CounterRng& rng, std::uint64_t index, std::span<const float> background,
+                               PixelMap* source = nullptr);
+
+}  // namespace fieldmark::distort

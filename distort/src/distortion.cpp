@@ -1,0 +1,313 @@
+#include "fieldmark/distort/distortion.h"
+
+#include <fieldmark/engine/shape_checks.h>
+#include <fieldmark/engine/tape.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/resize.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "checks.h"
+#include "fieldmark/distort/blur.h"
+#include "fieldmark/distort/jpeg444.h"
+#include "fieldmark/distort/noise.h"
+#include "fieldmark/distort/quantize8.h"
+#include "fieldmark/distort/resize_area.h"
+#include "fieldmark/distort/rotate.h"
+#include "fieldmark/distort/similarity.h"
+
+namespace fieldmark::distort {
+namespace {
+
+struct Kind {
+  std::string_view name;
+  DistortionKind kind;
+  double low, high;
+};
+constexpr std::array<Kind, 15> kKinds{{{"noise", DistortionKind::noise, 0, 1},
+                                       {"rotation", DistortionKind::rotation, 0, 180},
+                                       {"scale", DistortionKind::scale, 0.01, 4},
+                                       {"scale-nearest", DistortionKind::scale_nearest, 0.01, 4},
+                                       {"scale-bilinear", DistortionKind::scale_bilinear, 0.01, 4},
+                                       {"scale-bicubic", DistortionKind::scale_bicubic, 0.01, 4},
+                                       {"scale-lanczos", DistortionKind::scale_lanczos, 0.01, 4},
+                                       {"blur", DistortionKind::blur, 0, 100},
+                                       {"crop", DistortionKind::crop, 0.0001, 1},
+                                       {"jpeg", DistortionKind::jpeg, 1, 90},
+                                       {"jpeg444", DistortionKind::jpeg444, 1, 100},
+                                       {"gamma", DistortionKind::gamma, 0.01, 10},
+                                       {"brightness", DistortionKind::brightness, 0, 10},
+                                       {"contrast", DistortionKind::contrast, 0, 10},
+                                       {"hue", DistortionKind::hue, -360, 360}}};
+// Names that stand for a chain.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kChains{
+    {{"combined", "noise_0.10,crop_0.40,jpeg_50"},
+     {"screenshot", "scale-bicubic_1.25,blur_0.5,gamma_1.1,scale-lanczos_0.8,jpeg_80"}}};
+
+bool is_whole(DistortionKind kind) { return kind == DistortionKind::jpeg || kind == DistortionKind::jpeg444; }
+
+[[noreturn]] void fail(std::string_view name) {
+  std::string text = "[distortion] name: must be a chain, separated by commas, of";
+  for (const Kind& k : kKinds) {
+    char range[64];
+    std::snprintf(range, sizeof range, "_A (%g to %g%s), ", k.low, k.high, is_whole(k.kind) ? ", whole" : "");
+    text += " " + std::string(k.name) + range;
+    text.pop_back();
+  }
+  text += " greyscale";
+  for (const auto& chain : kChains) text += ", " + std::string(chain.first);
+  throw ValueError(text + ", got '" + std::string(name) + "'");
+}
+
+Distortion::Step parse_step(std::string_view name) {
+  if (name == "greyscale") return {DistortionKind::greyscale, 0};
+  const std::size_t line = name.find('_');
+  const auto kind = std::find_if(kKinds.begin(), kKinds.end(),
+                                 [&](const Kind& k) { return k.name == name.substr(0, line); });
+  if (line == std::string_view::npos || kind == kKinds.end()) fail(name);
+  const char *begin = name.data() + line + 1, *end = name.data() + name.size();
+  double amount = 0;
+  const auto [stop, error] = std::from_chars(begin, end, amount);
+  // Written so that nan fails.
+  if (error != std::errc() || stop != end || !(amount >= kind->low && amount <= kind->high)) fail(name);
+  if (is_whole(kind->kind) && amount != std::floor(amount)) fail(name);
+  return {kind->kind, amount};
+}
+
+// Counters of one step for one image: (index, step << 40 | i).
+struct Draws {
+  const CounterRng& rng;
+  std::uint64_t index, base;
+  std::uint64_t at(Index i) const { return base + static_cast<std::uint64_t>(i); }
+  std::vector<float> normal(Index n) const {
+    std::vector<float> field(static_cast<std::size_t>(n));
+    for (Index i = 0; i < n; i += 4) {
+      const auto four = rng.normal4(index, at(i / 4));
+      std::copy_n(four.begin(), std::min<Index>(4, n - i), field.begin() + i);
+    }
+    return field;
+  }
+};
+
+template <class F>
+Tensor<float> map_values(const Tensor<float>& x, const F& f) {
+  Tensor<float> y(x.shape);
+  std::transform(x.data.begin(), x.data.end(), y.data.begin(), f);
+  return y;
+}
+
+Index scaled(Index extent, double factor) {
+  return std::max<Index>(1, std::llround(static_cast<double>(extent) * factor));
+}
+
+struct Crop {
+  Index top, left, height, width;
+};
+
+Crop crop_window(const Shape& shape, double fraction, const Draws& draws) {
+  const Index h = shape[0], w = shape[1];
+  const Index height = scaled(h, std::sqrt(fraction));
+  // The width makes up for the height's rounding: the area is what was asked for.
+  const Index width = std::min(w, scaled(w, fraction * static_cast<double>(h) / static_cast<double>(height)));
+  return {draws.rng.below(h - height + 1, draws.index, draws.at(0)),
+          draws.rng.below(w - width + 1, draws.index, draws.at(1)), height, width};
+}
+
+Tensor<float> crop(const Tensor<float>& x, const Crop& c) {
+  Tensor<float> y({c.height, c.width, 3});
+  for (Index i = 0; i < c.height; ++i)
+    std::copy_n(x.data.begin() + ((c.top + i) * x.shape[1] + c.left) * 3, c.width * 3,
+                y.data.begin() + i * c.width * 3);
+  return y;
+}
+
+double angle(double amount, const Draws& draws) {
+  return amount * (2 * draws.rng.uniform_double(draws.index, draws.base) - 1) * std::numbers::pi / 180;
+}
+
+// Hue, saturation and value of Smith 1978, hue turned: channel n = v - v s max(0, min(k, 4 - k, 1)), k = n +
+// hue/60.
+Tensor<float> turn_hue(const Tensor<float>& x, double degrees) {
+  Tensor<float> y(x.shape);
+  const double turn = degrees / 60 + 12;
+  for (Index i = 0; i < x.size(); i += 3) {
+    const double r = static_cast<double>(x[i]), g = static_cast<double>(x[i + 1]),
+                 b = static_cast<double>(x[i + 2]);
+    const double value = std::max({r, g, b}), chroma = value - std::min({r, g, b});
+    if (chroma <= 0) {
+      std::copy_n(x.data.begin() + i, 3, y.data.begin() + i);
+      continue;
+    }
+    const double sector = value == r   ? (g - b) / chroma
+                          : value == g ? 2 + (b - r) / chroma
+                                       : 4 + (r - g) / chroma;
+    for (Index c = 0; c < 3; ++c) {
+      const double k = std::fmod(static_cast<double>(5 - 2 * c) + sector + turn, 6.0);
+      y[i + c] = static_cast<float>(value - chroma * std::max(0.0, std::min({k, 4 - k, 1.0})));
+    }
+  }
+  return y;
+}
+
+Tensor<float> grey(const Tensor<float>& x) {
+  Tensor<float> y(x.shape);
+  for (Index i = 0; i < x.size(); i += 3)
+    std::fill_n(y.data.begin() + i, 3, 0.299f * x[i] + 0.587f * x[i + 1] + 0.114f * x[i + 2]);
+  return y;
+}
+
+Tensor<float> scale(const Tensor<float>& x, double factor, ResizeFilter filter) {
+  return resize_filtered(x, scaled(x.shape[0], factor), scaled(x.shape[1], factor), filter);
+}
+
+// Runs one of this module's ops on an image; what the tape holds goes with it.
+template <class F>
+Tensor<float> run(const Tensor<float>& x, const F& op) {
+  Tape<float> tape;
+  const Var<float> y = op(tape.constant(x), tape);
+  return {y.shape(), std::vector<float>(y.value(), y.value() + y.shape().size())};
+}
+
+Tensor<float> apply(const Distortion::Step& step, const Tensor<float>& x, const Draws& draws,
+                    std::span<const float> background) {
+  const auto a = static_cast<float>(step.amount);
+  float parameter = a;
+  switch (step.kind) {
+    case DistortionKind::noise: {
+      const auto field = draws.normal(x.size());
+      return run(x, [&](auto v, auto& tape) { return noise(v, tape.constant(&parameter, {1}), field); });
+    }
+    case DistortionKind::rotation: {
+      parameter = static_cast<float>(angle(step.amount, draws));
+      return run(x,
+                 [&](auto v, auto& tape) { return rotate(v, tape.constant(&parameter, {1}), background); });
+    }
+    case DistortionKind::scale:
+      return run(x, [&](auto v, auto&) {
+        return resize_area(v, scaled(x.shape[0], step.amount), scaled(x.shape[1], step.amount));
+      });
+    case DistortionKind::scale_nearest:
+      return scale(x, step.amount, ResizeFilter::nearest);
+    case DistortionKind::scale_bilinear:
+      return scale(x, step.amount, ResizeFilter::bilinear);
+    case DistortionKind::scale_bicubic:
+      return scale(x, step.amount, ResizeFilter::bicubic);
+    case DistortionKind::scale_lanczos:
+      return scale(x, step.amount, ResizeFilter::lanczos);
+    case DistortionKind::blur:
+      return run(x, [&](auto v, auto& tape) { return blur(v, tape.constant(&parameter, {1})); });
+    case DistortionKind::crop:
+      return crop(x, crop_window(x.shape, step.amount, draws));
+    case DistortionKind::jpeg:
+      return jpeg_round_trip(x, static_cast<int>(step.amount));
+    case DistortionKind::jpeg444:
+      return jpeg444(x, static_cast<int>(step.amount));
+    case DistortionKind::gamma:
+      return map_values(x, [a](float v) { return std::pow(std::max(v, 0.f), a); });
+    case DistortionKind::brightness:
+      return map_values(x, [a](float v) { return v * a; });
+    case DistortionKind::contrast:
+      return map_values(x, [a](float v) { return 0.5f + a * (v - 0.5f); });
+    case DistortionKind::greyscale:
+      return grey(x);
+    case DistortionKind::hue:
+      return turn_hue(x, step.amount);
+  }
+  return x;
+}
+
+// What one step does to places. Steps that keep the size and move nothing have the identity.
+PixelMap moved(const Distortion::Step& step, const Shape& before, const Shape& after, const Draws& draws) {
+  const double sy = static_cast<double>(before[0]) / static_cast<double>(after[0]),
+               sx = static_cast<double>(before[1]) / static_cast<double>(after[1]);
+  if (step.kind == DistortionKind::crop) {
+    const Crop c = crop_window(before, step.amount, draws);
+    return {{1, 0, static_cast<double>(c.left), 0, 1, static_cast<double>(c.top)}};
+  }
+  if (step.kind == DistortionKind::rotation) {
+    PixelMap map{similarity_matrix(angle(step.amount, draws), 1.0, 0.0, 0.0)};
+    const double x = static_cast<double>(before[1] - 1) / 2, y = static_cast<double>(before[0] - 1) / 2;
+    const auto centre = map(x, y);
+    map.numbers[2] += x - centre[0];
+    map.numbers[5] += y - centre[1];
+    return map;
+  }
+  return {{sx, 0, sx / 2 - 0.5, 0, sy, sy / 2 - 0.5}};
+}
+
+PixelMap after(const PixelMap& first, const PixelMap& second) {
+  const auto &a = first.numbers, &b = second.numbers;
+  const auto t = first(b[2], b[5]);
+  return {{a[0] * b[0] + a[1] * b[3], a[0] * b[1] + a[1] * b[4], t[0], a[3] * b[0] + a[4] * b[3],
+           a[3] * b[1] + a[4] * b[4], t[1]}};
+}
+
+}  // namespace
+
+std::array<double, 2> PixelMap::operator()(double x, double y) const {
+  const auto& m = numbers;
+  return {m[0] * x + m[1] * y + m[2], m[3] * x + m[4] * y + m[5]};
+}
+
+PixelMap PixelMap::inverse() const {
+  const auto& m = numbers;
+  const double det = m[0] * m[4] - m[1] * m[3];
+  PixelMap back{{m[4] / det, -m[1] / det, 0, -m[3] / det, m[0] / det, 0}};
+  const auto t = back(m[2], m[5]);
+  back.numbers[2] = -t[0];
+  back.numbers[5] = -t[1];
+  return back;
+}
+
+Distortion parse_distortion(std::string_view name) {
+  Distortion distortion{std::string(name), {}};
+  std::string_view rest = name;
+  for (bool more = true; more;) {
+    const std::size_t comma = rest.find(',');
+    const std::string_view step = rest.substr(0, comma);
+    const auto chain =
+        std::find_if(kChains.begin(), kChains.end(), [&](const auto& c) { return c.first == step; });
+    if (chain != kChains.end()) {
+      for (const auto& s : parse_distortion(chain->second).steps) distortion.steps.push_back(s);
+    } else {
+      distortion.steps.push_back(parse_step(step));
+    }
+    more = comma != std::string_view::npos;
+    if (more) rest.remove_prefix(comma + 1);
+  }
+  return distortion;
+}
+
+Tensor<float> apply_distortion(const Distortion& distortion, const Tensor<float>& image,
+                               const CounterRng& rng, std::uint64_t index, std::span<const float> background,
+                               PixelMap* source) {
+  check_rank("distortion", "image", image.shape, 3, "[height, width, 3]");
+  check_extent("distortion", "image", image.shape, 2, 3, "red, green and blue");
+  if (image.size() == 0)
+    throw ShapeError("[distortion] image: must have at least one pixel, got shape " + image.shape.str());
+  if (background.size() != 3)
+    throw ShapeError("[distortion] background: must have 3 numbers, got " +
+                     std::to_string(background.size()));
+  const auto round = [](const Tensor<float>& x) {
+    return run(x, [](auto v, auto&) { return quantize8(v); });
+  };
+  Tensor<float> x = image;
+  PixelMap map;
+  std::uint64_t base = 0;
+  for (const auto& step : distortion.steps) {
+    const Draws draws{rng, index, base};
+    const Shape before = x.shape;
+    x = round(apply(step, x, draws, background));
+    map = after(map, moved(step, before, x.shape, draws));
+    base += std::uint64_t{1} << 40;
+  }
+  if (source) *source = map;
+  return x;
+}
+
+}  // namespace fieldmark::distort

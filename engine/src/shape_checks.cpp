@@ -1,0 +1,41 @@
+#include <fieldmark/engine/shape_checks.h>
+
+#include <string>
+
+namespace fieldmark {
+namespace {
+std::string head(std::string_view op, std::string_view arg) {
+  std::string text = "[";  // not as one sum: GCC 12 warns of an overlap there that cannot be
+  text.append(op).append("] ").append(arg);
+  return text;
+}
+}  // namespace
+
+void check_extent(std::string_view op, std::string_view arg, const Shape& got, int axis, Index want,
+                  std::string_view why) {
+  if (got[axis] == want) return;
+  throw ShapeError(head(op, arg) + ": axis " + std::to_string(axis) + " must be " + std::to_string(want) +
+                   " (" + std::string(why) + "), got shape " + got.str());
+}
+
+void check_extent(std::string_view op, std::string_view arg, const Shape& got, int axis, Index want,
+                  std::string_view why, const Shape& of) {
+  if (got[axis] != want)
+    check_extent(op, arg, got, axis, want, std::string(why) + ", whose shape is " + of.str());
+}
+
+void check_rank(std::string_view op, std::string_view arg, const Shape& got, int rank,
+                std::string_view layout) {
+  if (got.rank() == rank) return;
+  throw ShapeError(head(op, arg) + " must have rank " + std::to_string(rank) + " " + std::string(layout) +
+                   ", got shape " + got.str());
+}
+
+void check_same(std::string_view op, std::string_view arg_a, const Shape& a, std::string_view arg_b,
+                const Shape& b) {
+  if (a == b) return;
+  throw ShapeError(head(op, arg_b) + " must have the shape of " + std::string(arg_a) + ", " + a.str() +
+                   ", got shape " + b.str());
+}
+
+}  // namespace fieldmark

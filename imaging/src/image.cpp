@@ -1,0 +1,196 @@
+#include <fieldmark/core/files.h>
+#include <fieldmark/engine/shape_checks.h>
+#include <fieldmark/imaging/image.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <limits>
+#include <memory>
+#include <string>
+
+// Static, and in this file only: a program that brings its own stb does not collide with ours.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wall"
+#pragma GCC diagnostic ignored "-Wextra"
+#pragma GCC diagnostic ignored "-Wconversion"
+#pragma GCC diagnostic ignored "-Wsign-conversion"
+#pragma GCC diagnostic ignored "-Wold-style-cast"
+#pragma GCC diagnostic ignored "-Wshadow"
+#pragma GCC diagnostic ignored "-Wunused-function"
+#define STB_IMAGE_STATIC
+#ifdef __clang_analyzer__  // what is inside stb is not ours to mend: clang-tidy sees declarations alone
+static unsigned char* stbi_write_png_to_mem(const unsigned char*, int, int, int, int, int*);
+#else
+#define STB_IMAGE_IMPLEMENTATION
+#define STB_IMAGE_WRITE_IMPLEMENTATION
+#endif
+#define STBI_NO_STDIO
+#define STBI_ONLY_PNG
+#define STBI_ONLY_JPEG
+#include <stb/stb_image.h>
+#define STB_IMAGE_WRITE_STATIC
+#define STBI_WRITE_NO_STDIO
+#include <stb/stb_image_write.h>
+#pragma GCC diagnostic pop
+
+namespace fieldmark {
+namespace {
+
+struct Free {
+  void operator()(unsigned char* p) const { std::free(p); }
+};
+using Pixels = std::unique_ptr<unsigned char, Free>;
+
+// One table for all who turn a byte into a number: an image read equals the image quantised.
+float unit(std::uint8_t byte) { return static_cast<float>(byte) / 255.0f; }
+
+std::uint8_t byte_of(float x) {
+  const float scaled = x > 0 ? std::min(x, 1.0f) * 255.0f + 0.5f : 0.0f;  // NaN is not > 0
+  return static_cast<std::uint8_t>(scaled);
+}
+
+void check_image(const char* op, const Tensor<float>& image, Index max_side) {
+  const Shape& s = image.shape;
+  check_rank(op, "image", s, 3, "[height, width, channels]");
+  const bool channels = s[2] >= 1 && s[2] <= 4;
+  // stb counts bytes in an int.
+  if (!channels || s[0] < 1 || s[1] < 1 || s[0] > max_side || s[1] > max_side ||
+      s[0] * (s[1] * s[2] + 1) > std::numeric_limits<int>::max() / 2)
+    throw ShapeError("[" + std::string(op) + "] image: height and width must be from 1 to " +
+                     std::to_string(max_side) + ", channels from 1 to 4, 2^30 bytes in all, got shape " +
+                     s.str());
+}
+
+bool is_marker(std::span<const std::byte> bytes, std::size_t at, int code) {
+  return bytes[at] == std::byte{0xff} && bytes[at + 1] == static_cast<std::byte>(code);
+}
+
+// stb fills what is missing of a JPEG with grey and reports success. A whole one has an end marker (FF D9)
+// behind its last scan (FF DA); neither pair can occur inside a scan's data.
+bool is_truncated_jpeg(std::span<const std::byte> bytes) {
+  if (bytes.size() < 4 || !is_marker(bytes, 0, 0xd8)) return false;
+  for (std::size_t at = bytes.size() - 1; at-- > 0;) {
+    if (is_marker(bytes, at, 0xd9)) return false;
+    if (is_marker(bytes, at, 0xda)) return true;
+  }
+  return true;
+}
+
+Tensor<float> decode(std::span<const std::byte> bytes, std::string_view name, int want_channels) {
+  auto fail = [&](const std::string& reason) {
+    throw IoError("[read_image] " + std::string(name) + ": expected a PNG or JPEG image, found " +
+                  std::to_string(bytes.size()) + " bytes that do not decode: " + reason);
+  };
+  if (bytes.size() > std::numeric_limits<int>::max()) fail("more than 2^31 bytes");
+  if (is_truncated_jpeg(bytes)) fail("no end marker, truncated");
+  int width = 0, height = 0, channels = 0;
+  const Pixels pixels(stbi_load_from_memory(reinterpret_cast<const unsigned char*>(bytes.data()),
+                                            static_cast<int>(bytes.size()), &width, &height, &channels,
+                                            want_channels));
+  if (!pixels) fail(stbi_failure_reason());
+  Tensor<float> image(Shape{height, width, want_channels ? want_channels : channels});
+  std::transform(pixels.get(), pixels.get() + image.size(), image.data.begin(), unit);
+  return image;
+}
+
+}  // namespace
+
+Tensor<float> decode_image(std::span<const std::byte> bytes, std::string_view name) {
+  return decode(bytes, name, 0);
+}
+
+Tensor<float> read_image(const std::filesystem::path& path) {
+  return decode(read_bytes(path), path.string(), 0);
+}
+
+void write_png(const std::filesystem::path& path, const Tensor<float>& image) {
+  check_image("write_png", image, 1 << 24);
+  const auto pixels = bytes_of(image);
+  const int width = static_cast<int>(image.shape[1]), channels = static_cast<int>(image.shape[2]);
+  int size = 0;
+  const Pixels png(stbi_write_png_to_mem(pixels.data(), width * channels, width,
+                                         static_cast<int>(image.shape[0]), channels, &size));
+  if (!png)
+    throw IoError("[write_png] " + path.string() + ": no memory to encode shape " + image.shape.str());
+  write_file_atomically(path, std::as_bytes(std::span(png.get(), static_cast<std::size_t>(size))));
+}
+
+std::vector<std::byte> encode_jpeg(const Tensor<float>& image, int quality) {
+  check_image("encode_jpeg", image, 65535);
+  if (image.shape[2] == 2 || image.shape[2] == 4)
+    throw ShapeError("[encode_jpeg] image: channels must be 1 or 3 (JPEG has no alpha), got shape " +
+                     image.shape.str());
+  if (quality < 1 || quality > 90)
+    throw ValueError(
+        "[encode_jpeg] quality must be from 1 to 90 (above 90 the encoder does not halve chroma), got " +
+        std::to_string(quality));
+  const auto pixels = bytes_of(image);
+  std::vector<std::byte> out;
+  auto append = [](void* context, void* data, int size) {
+    const auto* bytes = static_cast<const std::byte*>(data);
+    auto& to = *static_cast<std::vector<std::byte>*>(context);
+    to.insert(to.end(), bytes, bytes + size);
+  };
+  if (!stbi_write_jpg_to_func(append, &out, static_cast<int>(image.shape[1]),
+                              static_cast<int>(image.shape[0]), static_cast<int>(image.shape[2]),
+                              pixels.data(), quality))
+    throw Error("[encode_jpeg] the encoder refused shape " + image.shape.str());
+  return out;
+}
+
+Tensor<float> jpeg_round_trip(const Tensor<float>& image, int quality) {
+  const auto file = encode_jpeg(image, quality);
+  return decode(file, "JPEG in memory", static_cast<int>(image.shape[2]));
+}
+
+std::vector<std::uint8_t> bytes_of(const Tensor<float>& image) {
+  std::vector<std::uint8_t> bytes(image.data.size());
+  std::transform(image.data.begin(), image.data.end(), bytes.begin(), byte_of);
+  return bytes;
+}
+
+Tensor<float> quantize8(const Tensor<float>& image) {
+  Tensor<float> out(image.shape);
+  std::transform(image.data.begin(), image.data.end(), out.data.begin(),
+                 [](float x) { return unit(byte_of(x)); });
+  return out;
+}
+
+void paste(Tensor<float>& canvas, const Tensor<float>& picture, Index row, Index column) {
+  const Shape& c = canvas.shape;
+  const Shape& p = picture.shape;
+  check_rank("paste", "canvas", c, 3, "[height, width, channels]");
+  check_rank("paste", "image", p, 3, "[height, width, channels]");
+  check_extent("paste", "image", p, 2, c[2], "the canvas has as many channels");
+  if (row < 0 || column < 0 || row + p[0] > c[0] || column + p[1] > c[1])
+    throw ShapeError("[paste] image: must fit into the canvas " + c.str() + " at (" + std::to_string(row) +
+                     ", " + std::to_string(column) + "), got shape " + p.str());
+  const Index line = p[1] * p[2];
+  for (Index y = 0; y < p[0]; ++y)
+    std::copy_n(picture.data.begin() + y * line, line,
+                canvas.data.begin() + ((row + y) * c[1] + column) * c[2]);
+}
+
+Tensor<float> tile(std::span<const Tensor<float>> images, Index columns, Index gap, float background) {
+  if (images.empty()) throw ValueError("[tile] images must be at least one, got 0");
+  if (columns < 1 || gap < 0)
+    throw ValueError("[tile] columns must be at least 1 and gap at least 0, got " + std::to_string(columns) +
+                     " and " + std::to_string(gap));
+  Index height = 0, width = 0;
+  for (const auto& p : images) {
+    check_rank("tile", "images", p.shape, 3, "[height, width, channels]");
+    height = std::max(height, p.shape[0]);
+    width = std::max(width, p.shape[1]);
+  }
+  const Index count = static_cast<Index>(images.size());
+  columns = std::min(columns, count);
+  const Index rows = (count + columns - 1) / columns;
+  Tensor<float> sheet(Shape{rows * (height + gap) - gap, columns * (width + gap) - gap, images[0].shape[2]},
+                      background);
+  for (Index i = 0; i < count; ++i)
+    paste(sheet, images[static_cast<std::size_t>(i)], i / columns * (height + gap),
+          i % columns * (width + gap));
+  return sheet;
+}
+
+}  // namespace fieldmark

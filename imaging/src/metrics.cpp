@@ -1,0 +1,154 @@
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/shape_checks.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/metrics.h>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace fieldmark {
+namespace {
+
+void check_pair(const char* op, const Tensor<float>& a, const Tensor<float>& b) {
+  check_same(op, "a", a.shape, "b", b.shape);
+  if (a.size() == 0)
+    throw ShapeError("[" + std::string(op) + "] a must not be empty (a mean of nothing), got shape " +
+                     a.shape.str());
+}
+
+double pairwise(std::span<const double> x) {
+  if (x.size() == 1) return x[0];
+  return pairwise(x.first(x.size() / 2)) + pairwise(x.subspan(x.size() / 2));
+}
+
+// Sums over [0, n), n >= 1: each piece on its own, then the pieces pairwise, so that threads change no bit
+// and the error grows with the piece, not with n.
+template <class Piece>
+double sum_pieces(Index n, Index grain, Piece piece) {
+  std::vector<double> sums(static_cast<std::size_t>((n + grain - 1) / grain));
+  parallel_for(n, grain, [&](Index begin, Index end) {
+    sums[static_cast<std::size_t>(begin / grain)] = piece(begin, end);
+  });
+  return pairwise(sums);
+}
+
+double decibels(std::uint64_t squares, Index count) {
+  if (count == 0) return std::numeric_limits<double>::quiet_NaN();
+  if (squares == 0) return std::numeric_limits<double>::infinity();
+  return 10 * std::log10(255.0 * 255.0 * static_cast<double>(count) / static_cast<double>(squares));
+}
+
+std::uint64_t square_of_difference(std::uint8_t a, std::uint8_t b) {
+  const std::int64_t d = std::int64_t{a} - b;
+  return static_cast<std::uint64_t>(d * d);
+}
+
+constexpr int kWindow = 11;
+constexpr double kC1 = 0.01 * 0.01, kC2 = 0.03 * 0.03;
+
+std::array<double, kWindow> gaussian() {
+  std::array<double, kWindow> w{};
+  constexpr int kMiddle = kWindow / 2;
+  for (int k = 0; k < kWindow; ++k) {
+    const double x = (k - kMiddle) / 1.5;
+    w[static_cast<std::size_t>(k)] = std::exp(-0.5 * x * x);
+  }
+  const double sum = std::accumulate(w.begin(), w.end(), 0.0);
+  for (double& v : w) v /= sum;
+  return w;
+}
+
+// Rows [begin, end) of window positions. The window is separable: five moments are filtered down the columns
+// for each row of positions, over all channels at once, and then along the row.
+double ssim_rows(const Tensor<float>& a, const Tensor<float>& b, Index begin, Index end) {
+  static const std::array<double, kWindow> window = gaussian();
+  const Index channels = a.shape[2], line = a.shape[1] * channels,
+              positions = line - (kWindow - 1) * channels;
+  using Moments = std::array<double, 5>;  // a, b, a a, b b, a b
+  std::vector<Moments> column(static_cast<std::size_t>(line));
+  double sum = 0;
+  for (Index row = begin; row < end; ++row) {
+    column.assign(column.size(), Moments{});
+    for (Index k = 0; k < kWindow; ++k) {
+      const double w = window[static_cast<std::size_t>(k)];
+      for (Index i = 0; i < line; ++i) {
+        const double x = static_cast<double>(a[(row + k) * line + i]),
+                     y = static_cast<double>(b[(row + k) * line + i]);
+        Moments& m = column[static_cast<std::size_t>(i)];
+        m = {m[0] + w * x, m[1] + w * y, m[2] + w * x * x, m[3] + w * y * y, m[4] + w * x * y};
+      }
+    }
+    double row_sum = 0;
+    for (Index i = 0; i < positions; ++i) {
+      Moments m{};
+      for (Index k = 0; k < kWindow; ++k)
+        for (std::size_t q = 0; q < m.size(); ++q)
+          m[q] += window[static_cast<std::size_t>(k)] * column[static_cast<std::size_t>(i + k * channels)][q];
+      const double ma = m[0], mb = m[1], va = m[2] - ma * ma, vb = m[3] - mb * mb, cov = m[4] - ma * mb;
+      row_sum += (2 * ma * mb + kC1) * (2 * cov + kC2) / ((ma * ma + mb * mb + kC1) * (va + vb + kC2));
+    }
+    sum += row_sum;
+  }
+  return sum;
+}
+
+}  // namespace
+
+double mse(const Tensor<float>& a, const Tensor<float>& b) {
+  check_pair("mse", a, b);
+  const double sum = sum_pieces(a.size(), 1024, [&](Index begin, Index end) {
+    double s = 0;
+    for (Index i = begin; i < end; ++i) {
+      const double d = static_cast<double>(a[i]) - static_cast<double>(b[i]);
+      s += d * d;
+    }
+    return s;
+  });
+  return sum / static_cast<double>(a.size());
+}
+
+double psnr(const Tensor<float>& a, const Tensor<float>& b) {
+  check_pair("psnr", a, b);
+  const auto x = bytes_of(a), y = bytes_of(b);
+  std::uint64_t squares = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) squares += square_of_difference(x[i], y[i]);
+  return decibels(squares, a.size());
+}
+
+double psnr_masked(const Tensor<float>& a, const Tensor<float>& b, const Tensor<float>& mask) {
+  check_pair("psnr_masked", a, b);
+  check_rank("psnr_masked", "a", a.shape, 3, "[height, width, channels]");
+  check_rank("psnr_masked", "mask", mask.shape, 2, "[height, width]");
+  check_extent("psnr_masked", "mask", mask.shape, 0, a.shape[0], "the image's height");
+  check_extent("psnr_masked", "mask", mask.shape, 1, a.shape[1], "the image's width");
+  const auto x = bytes_of(a), y = bytes_of(b);
+  const std::size_t channels = static_cast<std::size_t>(a.shape[2]);
+  std::uint64_t squares = 0;
+  Index count = 0;
+  for (std::size_t pixel = 0; pixel < mask.data.size(); ++pixel) {
+    if (!(mask.data[pixel] > 0.5f)) continue;
+    for (std::size_t i = pixel * channels; i < (pixel + 1) * channels; ++i)
+      squares += square_of_difference(x[i], y[i]);
+    count += a.shape[2];
+  }
+  return decibels(squares, count);
+}
+
+double ssim(const Tensor<float>& a, const Tensor<float>& b) {
+  check_pair("ssim", a, b);
+  check_rank("ssim", "a", a.shape, 3, "[height, width, channels]");
+  const Index rows = a.shape[0] - kWindow + 1, columns = a.shape[1] - kWindow + 1;
+  if (rows < 1 || columns < 1)
+    throw ShapeError("[ssim] a: height and width must be at least 11 (the window's), got shape " +
+                     a.shape.str());
+  const double sum = sum_pieces(rows, 8, [&](Index begin, Index end) { return ssim_rows(a, b, begin, end); });
+  return sum / static_cast<double>(rows * columns * a.shape[2]);
+}
+
+}  // namespace fieldmark

@@ -1,0 +1,13 @@
+#include <fieldmark/imaging/gradcheck_cases.h>
+
+#include "support/gradcheck_cases.h"
+
+using namespace fieldmark;
+
+TEST_CASE("gradcheck_cases: every case of the module passes") {
+  expect_cases_pass(imaging::gradcheck_cases());
+}
+
+TEST_CASE("gradcheck_cases: every header that promises a gradient has a case") {
+  CHECK(expect_case_of_each_header(imaging::gradcheck_cases(), "imaging/include") == 2);
+}

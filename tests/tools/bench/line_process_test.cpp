@@ -1,0 +1,73 @@
+#include <fieldmark/core/error.h>
+#include <fieldmark/tools/bench/line_process.h>
+
+#include <chrono>
+#include <csignal>
+
+#include "support/catch.h"
+
+using namespace fieldmark;
+using namespace fieldmark::bench;
+
+namespace {
+std::vector<std::string> shell(const std::string& script) { return {"/bin/sh", "-c", script}; }
+std::string failure(const std::string& script, double limit_seconds = 60) {
+  LineProcess process(shell(script), {}, limit_seconds);
+  try {
+    return "answered: " + process.read_line();
+  } catch (const IoError& e) {
+    return e.what();
+  }
+}
+}  // namespace
+
+TEST_CASE("line_process: lines go both ways, with the environment that was asked for") {
+  ::setenv("FIELDMARK_TEST_OLD", "kept", 1);
+  ::setenv("FIELDMARK_TEST_NEW", "not seen", 1);
+  LineProcess process(
+      shell("echo $FIELDMARK_TEST_OLD $FIELDMARK_TEST_NEW; while read -r x; do echo \"<$x>\"; done"),
+      {"FIELDMARK_TEST_NEW=new"}, 60);
+  CHECK(process.read_line() == "kept new");
+  for (const std::string line : {"one", "", "two words"}) {
+    process.write_line(line);
+    CHECK(process.read_line() == "<" + line + ">");
+  }
+}
+
+TEST_CASE("line_process: a program that ends says why") {
+  CHECK(failure("exit 3") == "/bin/sh: ended with exit code 3 before it answered, without a word");
+  CHECK(failure("printf 'no line'; for i in 1 2 3 4 5 6 7; do echo word $i >&2; done; exit 1") ==
+        "/bin/sh: ended with exit code 1 before it answered:\nword 3\nword 4\nword 5\nword 6\nword 7");
+  CHECK(failure("echo alone >&2; kill -9 $$") ==
+        "/bin/sh: was killed by signal 9 before it answered:\nalone");
+  CHECK_THROWS_WITH(LineProcess({"/nowhere/python3"}, {}, 1),
+                    "/nowhere/python3: cannot be started (No such file or directory)");
+  CHECK_THROWS_AS(LineProcess({}, {}, 1), ValueError);
+  CHECK_THROWS_WITH(
+      LineProcess(shell("exit"), {}, 0),
+      "[LineProcess] command must not be empty and limit_seconds above 0, got '/bin/sh' and 0.000000");
+}
+
+TEST_CASE("line_process: what hangs or never ends its line is killed in time") {
+  const auto begin = std::chrono::steady_clock::now();
+  CHECK(failure("echo thinking >&2; exec sleep 600", 0.2) == "/bin/sh: no answer within 0.2 s:\nthinking");
+  CHECK(failure("exec >&- <&-; exec sleep 600", 0.2) ==
+        "/bin/sh: closed its output before it answered, without a word");
+  CHECK(failure("exec tr '\\0' x </dev/zero") == "/bin/sh: an answer without an end, without a word");
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(60));
+}
+
+TEST_CASE(
+    "line_process: a program that is gone is noticed when it is asked, and does not outlive its object") {
+  LineProcess gone(shell("echo ready; exit 4"), {}, 60);
+  CHECK(gone.read_line() == "ready");
+  for (int i = 0; i < 3; ++i) gone.write_line("are you there");
+  CHECK_THROWS_WITH(gone.read_line(), Contains("ended with exit code 4"));
+  pid_t pid = 0;
+  {
+    LineProcess sleeps(shell("echo $$; exec sleep 600"), {}, 60);
+    pid = static_cast<pid_t>(std::stol(sleeps.read_line()));
+    CHECK(::kill(pid, 0) == 0);
+  }
+  CHECK(::kill(pid, 0) == -1);
+}

@@ -1,0 +1,234 @@
+#include <fieldmark/core/error.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/imaging/metrics.h>
+#include <fieldmark/watermark/embedding/baker.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+#include "watermark/small_owner.h"
+#include "watermark/tiny_owner.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+namespace {
+const Message kMessage{{1, 0, 1, 1}}, kOther{{0, 1, 1, 0}};
+
+Owner owner_with_gain() {
+  Owner owner = tiny_owner();
+  owner.gain = 0.15;
+  return owner;
+}
+
+Owner mlp_owner() {
+  static const nerf::RadianceField field = [] {
+    nerf::RadianceField f(small_mlp_options());
+    const auto data = nerf::make_scene({.kind = nerf::SceneKind::sphere, .size = 32, .views = 6});
+    nerf::TrainOptions o = nerf::train_options(nerf::FieldKind::mlp);
+    o.schedule.steps = 150;
+    o.schedule.lr = 5e-3;
+    o.samples_per_step = 4096;
+    nerf::Trainer trainer(f, data, o);
+    while (!trainer.done()) trainer.step(0);
+    return f;
+  }();
+  OwnerOptions o = small_owner_options();
+  o.bits = 4;
+  Owner owner(field, o, test_key(1), CellGrid(4, std::vector<double>(64, 1.0)));
+  owner.gain = 0.15;
+  return owner;
+}
+
+BakeOptions options(Index steps) { return {.schedule = {.steps = steps, .lr = 1e-2}, .cameras = 20}; }
+
+nerf::RadianceField bake(const Owner& owner, const Message& message, Index steps) {
+  Baker baker(owner, message, options(steps));
+  while (!baker.done()) baker.step(0);
+  baker.scale_to(baker.mark_psnr() - 1);
+  return baker.field();
+}
+
+SafetensorsFile file_of(const nerf::RadianceField& field) {
+  const TemporaryFolder folder;
+  field.save(folder / "field");
+  return SafetensorsFile::read(folder / "field");
+}
+
+double mean_psnr(nerf::Renderer& a, nerf::Renderer& b, const Owner& owner) {
+  double sum = 0;
+  for (const auto& camera : nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, 3, 0, 99))
+    sum += psnr(a.render(camera).rgb, b.render(camera).rgb);
+  return sum / 3;
+}
+}  // namespace
+
+TEST_CASE("baker: baked colours approach the marked ones, by its own figure and in images") {
+  const Owner owner = owner_with_gain();
+  Baker baker(owner, kMessage, options(60));
+  baker.step(0);
+  const double first = baker.psnr();
+  while (!baker.done()) baker.step(0);
+  CHECK(baker.steps() == 60);
+  CHECK(baker.planned() == 60);
+  nerf::Renderer plain(owner.field), marked(owner.field), baked(baker.field());
+  marked.set_recolour(owner.marking(cell_signs(owner.code(), kMessage)));
+  const double before = mean_psnr(plain, marked, owner), after = mean_psnr(baked, marked, owner);
+  CAPTURE(first, baker.psnr(), before, after);
+  CHECK(baker.psnr() > first + 1);
+  CHECK(after > before + 2);
+}
+
+TEST_CASE("baker: a mark's strength in the file comes near the owner's as it is learnt") {
+  const Owner owner = owner_with_gain();
+  const auto strength_after = [&](Index steps) {
+    Baker baker(owner, kMessage, options(300));
+    while (baker.steps() < steps) baker.step(0);
+    return baker.mark_psnr({.count = 4, .seed = 32});
+  };
+  CHECK(std::isinf(strength_after(0)));
+  double marked = 0;
+  nerf::Renderer renderer(owner.field);
+  for (const auto& camera : nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, 4, 0, 32)) {
+    renderer.set_recolour({});
+    const nerf::Rendering plain = renderer.render(camera);
+    renderer.set_recolour(owner.marking(cell_signs(owner.code(), kMessage)));
+    marked += psnr_masked(renderer.render(camera).rgb, plain.rgb, plain.opacity) / 4;
+  }
+  const double early = strength_after(5), late = strength_after(300);
+  CAPTURE(marked, early, late);
+  CHECK(late > marked - 0.5);
+  CHECK(late < marked + 6);
+  CHECK(early > late + 1);
+}
+
+TEST_CASE("baker: an object keeps its likeness in directions that the photographs never saw") {
+  const Owner owner = owner_with_gain();
+  const auto unseen = [&](Index around) {
+    BakeOptions o = options(150);
+    o.around = around;
+    Baker baker(owner, kMessage, o);
+    while (!baker.done()) baker.step(0);
+    nerf::Renderer marked(owner.field), baked(baker.field());
+    marked.set_recolour(owner.marking(cell_signs(owner.code(), kMessage)));
+    double sum = 0;
+    for (const auto& camera :
+         nerf::make_cameras(owner.field.cameras, nerf::CameraSet::extrapolated, 6, 0, 44))
+      sum += psnr(baked.render(camera).rgb, marked.render(camera).rgb);
+    return sum / 6;
+  };
+  const double without = unseen(0), with = unseen(20);
+  CAPTURE(without, with);
+  CHECK(with > without + 1);
+}
+
+TEST_CASE("baker: scaling gives the file the strength asked for, on other views too") {
+  const Owner owner = owner_with_gain();
+  Baker baker(owner, kMessage, options(60));
+  while (!baker.done()) baker.step(0);
+  const MarkPsnrViews other{.count = 96, .seed = 500};
+  const double learnt = baker.mark_psnr();
+  for (const double change : {1.5, -1.5, 0.0}) {  // each from where the one before left the colours
+    const double before = baker.mark_psnr(), target = learnt + change;
+    const auto found = baker.scale_to(target);
+    CAPTURE(change, before, found.learnt, found.scaled, found.scale);
+    CHECK(found.learnt == before);
+    CHECK(found.scaled == Approx(target).margin(0.02));
+    CHECK(found.scaled == baker.mark_psnr());
+    CHECK(found.scale == Approx(std::pow(10.0, (before - target) / 20)).epsilon(0.1));
+    CHECK(baker.mark_psnr(other) == Approx(target).margin(0.2));
+  }
+}
+
+TEST_CASE("baker: scaling goes no further than its bound, and finds nothing to scale before the first step") {
+  const Owner owner = owner_with_gain();
+  Baker baker(owner, kMessage, options(20));
+  const auto nothing = baker.scale_to(30);
+  CHECK(std::isinf(nothing.learnt));
+  CHECK(std::isinf(nothing.scaled));
+  CHECK(nothing.scale == 1);
+  while (!baker.done()) baker.step(0);
+  const double learnt = baker.mark_psnr();
+  const auto most = baker.scale_to(learnt - 20);
+  CHECK(most.scale == Baker::kLargestScale);
+  CHECK(most.scaled == Approx(learnt - 6).margin(0.5));
+  const auto least = baker.scale_to(learnt + 20);
+  CHECK(least.scale == 1 / Baker::kLargestScale);
+}
+
+TEST_CASE("baker: a baked file is an unmarked one with other colours, density to the byte the same") {
+  const Owner owner = owner_with_gain();
+  const SafetensorsFile plain = file_of(owner.field), baked = file_of(bake(owner, kMessage, 5));
+  CHECK(baked.metadata == plain.metadata);
+  REQUIRE(baked.tensors.size() == plain.tensors.size());
+  int density = 0, colour = 0;
+  for (std::size_t i = 0; i < plain.tensors.size(); ++i) {
+    const auto &a = plain.tensors[i], &b = baked.tensors[i];
+    CAPTURE(a.name);
+    CHECK(b.name == a.name);
+    CHECK(b.dtype == a.dtype);
+    CHECK(b.shape == a.shape);
+    const bool of_density = a.name.find("density") != std::string::npos || a.name == "hash/rows";
+    CHECK((b.data == a.data) == of_density);
+    ++(of_density ? density : colour);
+  }
+  CHECK(density == 7);  // two layers, the features, which rows of them are kept, the occupancy
+  CHECK(colour == 7);   // three layers, the features
+}
+
+TEST_CASE("baker: an mlp field is marked and baked, both its densities to the byte the same") {
+  const Owner owner = mlp_owner();
+  Baker baker(owner, kMessage, options(80));
+  baker.step(0);
+  const double first = baker.psnr();
+  while (!baker.done()) baker.step(0);
+  CAPTURE(first, baker.psnr());
+  CHECK(baker.psnr() > first + 1);
+  const SafetensorsFile plain = file_of(owner.field), baked = file_of(baker.field());
+  CHECK(baked.metadata == plain.metadata);
+  int colour = 0;
+  for (const auto& a : plain.tensors) {
+    CAPTURE(a.name);
+    const bool of_colour = nerf::Field<float>::is_colour(a.name);
+    CHECK((baked.at(a.name).data != a.data) == of_colour);
+    colour += of_colour;
+  }
+  CHECK(colour == 6);  // weights and biases of three layers
+}
+
+TEST_CASE("baker: two messages give different colours, the same one the same") {
+  const Owner owner = owner_with_gain();
+  const auto a = file_of(bake(owner, kMessage, 3)), b = file_of(bake(owner, kOther, 3)),
+             again = file_of(bake(owner, kMessage, 3));
+  for (const char* name : {"hash/colour_features", "colour/0/weight", "colour/2/bias"}) {
+    CAPTURE(name);
+    CHECK(a.at(name).data != b.at(name).data);
+    CHECK(a.at(name).data == again.at(name).data);
+  }
+  CHECK(a.at("hash/density_features").data == b.at("hash/density_features").data);
+}
+
+TEST_CASE("baker: one and two threads give the same bits") {
+  const Owner owner = owner_with_gain();
+  const int before = threads();
+  set_threads(1);
+  const auto one = bake(owner, kMessage, 3);
+  set_threads(2);
+  const auto two = bake(owner, kMessage, 3);
+  set_threads(before);
+  CHECK(std::equal(one.params.values().begin(), one.params.values().end(), two.params.values().begin()));
+}
+
+TEST_CASE("baker: options outside their ranges are refused") {
+  const Owner owner = owner_with_gain();
+  const Message brief{{1, 0, 1}};
+  CHECK_THROWS_AS(Baker(owner, brief, options(1)), ValueError);
+  CHECK_THROWS_WITH(Baker(owner, brief, options(1)), "[baker] message must have the owner's 4 bits, got 3");
+  BakeOptions none = options(1);
+  none.cameras = 0;
+  CHECK_THROWS_AS(Baker(owner, kMessage, none), ValueError);
+  CHECK_THROWS_WITH(Baker(owner, kMessage, none),
+                    "[baker] cameras must be at least 1 and around at least 0, got 0 and 130");
+}

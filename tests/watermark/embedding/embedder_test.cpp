@@ -1,0 +1,357 @@
+#include <fieldmark/core/error.h>
+#include <fieldmark/core/files.h>
+#include <fieldmark/engine/ops/rows.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/imaging/metrics.h>
+#include <fieldmark/watermark/embedding/embedder.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+#include "watermark/tiny_owner.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+namespace {
+EmbedOptions options(Index steps) {
+  return {.schedule = {.steps = steps, .lr = 4e-3}, .batch = 3, .anneal = 20, .seed = 4};
+}
+
+// All that some steps leave behind.
+struct Outcome {
+  std::vector<float> values;
+  std::vector<double> figures;
+  friend bool operator==(const Outcome&, const Outcome&) = default;
+};
+Outcome outcome(const Owner& owner, const Embedder& e) {
+  const auto& f = e.figures();
+  return {{owner.params.values().begin(), owner.params.values().end()}, {f.sign, f.index, f.bits, f.loss}};
+}
+
+Outcome run(Index steps, Owner owner = tiny_owner()) {
+  Embedder embedder(owner, tiny_views(), options(steps));
+  while (!embedder.done()) embedder.step(0);
+  return outcome(owner, embedder);
+}
+
+// dB on the object, mean over 16 novel views with a message each.
+double measured_strength(const Owner& owner, std::uint64_t view_seed, const CounterRng& messages) {
+  nerf::Renderer plain(owner.field), marked(owner.field);
+  double sum = 0;
+  const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, 16, 0, view_seed);
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const Message sent = random_message(4, messages, ~std::uint64_t{i});
+    marked.set_recolour(owner.marking(cell_signs(owner.code(), sent)));
+    const nerf::Rendering base = plain.render(cameras[i]);
+    sum += psnr_masked(marked.render(cameras[i]).rgb, base.rgb, base.opacity);
+  }
+  return sum / 16;
+}
+
+void refused(const std::filesystem::path& path, Owner& owner, const EmbedOptions& with,
+             const std::string& text) {
+  Embedder embedder(owner, tiny_views(), with);
+  CHECK_THROWS_AS(embedder.restore(path), IoError);
+  CHECK_THROWS_WITH(embedder.restore(path), Contains(path.string()) && Contains(text));
+}
+}  // namespace
+
+TEST_CASE("embedder: more steps of fewer images where there are thousands of cells") {
+  CHECK(batch_for(nerf::SpaceKind::cube) == EmbedOptions{}.batch);
+  CHECK(batch_for(nerf::SpaceKind::ndc) == EmbedOptions{}.batch);
+  CHECK(batch_for(nerf::SpaceKind::contracted) == 2);
+}
+
+TEST_CASE("embedder: in 300 steps the losses fall, places are told apart and bits begin to be read") {
+  Owner owner = tiny_owner();
+  const std::vector<float> field(owner.field.params.values().begin(), owner.field.params.values().end());
+  Embedder embedder(owner, tiny_views(), options(300));
+  embedder.step(0);
+  const Embedder::Figures first = embedder.figures();
+  while (!embedder.done()) {
+    embedder.step(0);
+    REQUIRE(std::isfinite(embedder.figures().loss));
+  }
+  CHECK(embedder.steps() == 300);
+  CHECK(embedder.planned() == 300);
+  const Embedder::Figures last = embedder.figures();
+  CAPTURE(first.loss, last.loss, first.sign, last.sign, first.index, last.index, last.bits);
+  CHECK(last.loss < 0.7 * first.loss);
+  CHECK(last.index > first.index + 0.03);
+  CHECK(last.sign > 0.65);
+  CHECK(last.bits > 0.6);
+  CHECK(std::ranges::all_of(owner.params.values(), [](float v) { return std::isfinite(v); }));
+  CHECK(field == std::vector<float>(owner.field.params.values().begin(), owner.field.params.values().end()));
+}
+
+TEST_CASE("embedder: preset paper learns the colours of the field, then its content loss is small") {
+  Owner owner = tiny_paper_owner();
+  EmbedOptions o = options(150);
+  o.message_weight = 0;  // of 5 the message would be most of the loss
+  Embedder embedder(owner, tiny_views(), o);
+  embedder.step(0);
+  const double first = embedder.figures().loss;
+  while (!embedder.done()) {
+    embedder.step(0);
+    REQUIRE(std::isfinite(embedder.figures().loss));
+  }
+  CAPTURE(first, embedder.figures().loss);
+  CHECK(embedder.figures().loss < 0.3 * first);
+  embedder.calibrate();
+  CHECK(owner.gain == 0);
+}
+
+TEST_CASE("embedder: preset paper's message loss begins at that of guessing, five times") {
+  Owner owner = tiny_paper_owner();
+  EmbedOptions o = options(10);
+  o.content_weight = 0;
+  Embedder embedder(owner, tiny_views(), o);
+  embedder.step(0);
+  CHECK(embedder.figures().loss == Approx(5 * std::log(2.0)).epsilon(0.25));
+  CHECK(embed_options(Preset::paper).schedule.lr == 5e-4);
+  CHECK(embed_options(Preset::paper).extractor_lr == 1);
+  CHECK(embed_options(Preset::code).schedule.lr == 5e-4);
+  CHECK(embed_options(Preset::code).extractor_lr == 2);
+  CHECK(embed_options(Preset::code).distortions.noise == 0);
+  CHECK(embed_options(Preset::code).distortions.sample_shift == Approx(8.248e-4).epsilon(1e-3));
+  CHECK(embed_options(Preset::fast).schedule.lr == EmbedOptions{}.schedule.lr);
+}
+
+TEST_CASE("embedder: views of fewer pixels than the reader's are learnt from as well, with their labels") {
+  const auto views = cache_novel_views(tiny_field(), square_patch(32), 8, 3);
+  Owner owner = tiny_owner();
+  Embedder embedder(owner, views, options(200));
+  embedder.step(0);
+  const Embedder::Figures first = embedder.figures();
+  while (!embedder.done()) embedder.step(0);
+  const Embedder::Figures last = embedder.figures();
+  CAPTURE(first.loss, last.loss, first.index, last.index, last.sign);
+  CHECK(std::isfinite(last.loss));
+  CHECK(last.loss < 0.8 * first.loss);
+  CHECK(last.index > first.index + 0.03);
+}
+
+TEST_CASE("embedder: distortions that are not mixed, and no loss of signs, train otherwise") {
+  const auto values = [](auto change) {
+    Owner owner = tiny_owner();
+    EmbedOptions o = options(3);
+    change(o);
+    Embedder embedder(owner, tiny_views(), o);
+    while (!embedder.done()) embedder.step(0);
+    return outcome(owner, embedder).values;
+  };
+  const auto usual = values([](EmbedOptions&) {});
+  const auto apart = values([](EmbedOptions& o) { o.distortions.mixed = false; });
+  CHECK(usual != apart);
+  CHECK(apart == values([](EmbedOptions& o) { o.distortions.mixed = false; }));
+  CHECK(usual != values([](EmbedOptions& o) { o.sign_weight = 0; }));
+}
+
+TEST_CASE("embedder: one and two threads give the same bits") {
+  const int before = threads();
+  for (const bool paper : {false, true}) {
+    const auto owner = [&] { return paper ? tiny_paper_owner() : tiny_owner(); };
+    set_threads(1);
+    const Outcome one = run(4, owner());
+    set_threads(2);
+    const Outcome two = run(4, owner());
+    CHECK(one == two);
+  }
+  set_threads(before);
+}
+
+TEST_CASE("embedder: a run that is saved and restored ends as an uninterrupted one") {
+  const TemporaryFolder folder;
+  const Outcome whole = run(6);
+  {
+    Owner owner = tiny_owner();
+    Embedder embedder(owner, tiny_views(), options(6));
+    for (int i = 0; i < 3; ++i) embedder.step(0);
+    embedder.save(folder / "checkpoint");
+  }
+  Owner owner = tiny_owner();
+  Embedder embedder(owner, tiny_views(), options(6));
+  embedder.restore(folder / "checkpoint");
+  CHECK(embedder.steps() == 3);
+  while (!embedder.done()) embedder.step(0);
+  CHECK(outcome(owner, embedder) == whole);
+}
+
+TEST_CASE("embedder: a checkpoint of another run is refused") {
+  const TemporaryFolder folder;
+  const auto path = folder / "checkpoint";
+  Owner owner = tiny_owner();
+  Embedder embedder(owner, tiny_views(), options(6));
+  embedder.save(path);
+  using std::filesystem::perms;
+  CHECK(std::filesystem::status(path).permissions() == (perms::owner_read | perms::owner_write));
+  CHECK(Embedder::checkpoint_key(path) == owner.key);
+  refused(path, owner, options(7), "expected a checkpoint of this run");
+  Owner other_key = tiny_owner();
+  other_key.key = test_key(6);
+  refused(path, other_key, options(6), "found one under another");
+  const auto bytes = read_bytes(path);
+  write_file_atomically(path, std::span(bytes).first(bytes.size() - 1));
+  refused(path, owner, options(6), "");
+  owner.save(path);
+  refused(path, owner, options(6), "another kind of file");
+  owner.field.save(path);
+  CHECK_THROWS_AS(Embedder::checkpoint_key(path), IoError);
+  CHECK_THROWS_WITH(Embedder::checkpoint_key(path),
+                    path.string() + ": expected a checkpoint of embed, found no tensor 'key'");
+  SafetensorsFile short_key;
+  const std::uint8_t bytes_of_key[] = {1, 2, 3};
+  short_key.add("key", {3}, std::span<const std::uint8_t>(bytes_of_key));
+  short_key.write(path);
+  CHECK_THROWS_WITH(Embedder::checkpoint_key(path),
+                    path.string() + ": tensor 'key': expected 32 bytes, found 3");
+}
+
+TEST_CASE("embedder: a checkpoint of other weights, distortions or step sizes is refused") {
+  struct Change {
+    void (*make)(EmbedOptions&);
+    const char* text;  // how the run that was asked for names it
+  };
+  const Change both[] = {{[](EmbedOptions& o) { o.schedule.lr = 0.125; }, "lr 0.125"},
+                         {[](EmbedOptions& o) { o.schedule.half_after = 5; }, "half after 5.0"},
+                         {[](EmbedOptions& o) { o.schedule.cooldown = 0.25; }, "cooldown 0.25"},
+                         {[](EmbedOptions& o) { o.schedule.last = 0.75; }, "last 0.75"},
+                         {[](EmbedOptions& o) { o.distortions.noise = 0.125; }, "noise 0.125"},
+                         {[](EmbedOptions& o) { o.distortions.rotation = 7; }, "rotation 7.0"},
+                         {[](EmbedOptions& o) { o.distortions.zoom_out = 0.5; }, "zoom out 0.5"},
+                         {[](EmbedOptions& o) { o.distortions.zoom_in = 1.5; }, "zoom in 1.5"},
+                         {[](EmbedOptions& o) { o.distortions.blur = 0.5; }, "blur 0.5"},
+                         {[](EmbedOptions& o) { o.distortions.sample_shift = 0.5; }, "sample shift 0.5"},
+                         {[](EmbedOptions& o) { o.distortions.mixed = false; }, "mixed 0.0"}};
+  const std::vector<Change> fast = {{[](EmbedOptions& o) { o.first_mark_psnr = 25; }, "first strength 25.0"},
+                                    {[](EmbedOptions& o) { o.anneal = 21; }, "anneal 21.0"},
+                                    {[](EmbedOptions& o) { o.sign_weight = 2; }, "sign 2.0"},
+                                    {[](EmbedOptions& o) { o.index_weight = 2; }, "index 2.0"},
+                                    {[](EmbedOptions& o) { o.sign_weight = 2; }, "sign 2.0"},
+                                    {[](EmbedOptions& o) { o.bits_weight = 2; }, "bits 2.0"},
+                                    {[](EmbedOptions& o) { o.smooth_weight = 2; }, "smooth 2.0"},
+                                    {[](EmbedOptions& o) { o.flat_weight = 2; }, "flat 2.0"}};
+  const std::vector<Change> paper = {{[](EmbedOptions& o) { o.content_weight = 2; }, "content 2.0"},
+                                     {[](EmbedOptions& o) { o.message_weight = 2; }, "message 2.0"},
+                                     {[](EmbedOptions& o) { o.extractor_lr = 2; }, "extractor 2.0"}};
+  const TemporaryFolder folder;
+  const auto path = folder / "checkpoint";
+  for (const bool is_paper : {false, true}) {
+    Owner owner = is_paper ? tiny_paper_owner() : tiny_owner();
+    Embedder(owner, tiny_views(), options(6)).save(path);
+    const auto asked = [](const Change& change) {
+      EmbedOptions o = options(6);
+      change.make(o);
+      return o;
+    };
+    const std::vector<Change>& read = is_paper ? paper : fast;
+    const std::vector<Change>& unread = is_paper ? fast : paper;
+    for (const Change& c : both) refused(path, owner, asked(c), c.text);
+    for (const Change& c : read) refused(path, owner, asked(c), c.text);
+    for (const Change& c : unread) CHECK_NOTHROW(Embedder(owner, tiny_views(), asked(c)).restore(path));
+  }
+}
+
+TEST_CASE("embedder: calibration gives views the owner's strength") {
+  for (double mark_psnr : {28.0, 34.5}) {
+    Owner owner = tiny_owner(mark_psnr);
+    Embedder(owner, tiny_views(), options(1)).calibrate(16);
+    // Exactly on the views and messages it looked at; others are so few and small that they differ.
+    CHECK(measured_strength(owner, options(1).seed + 77, CounterRng(options(1).seed, 12)) ==
+          Approx(mark_psnr).margin(0.03));
+    CHECK(measured_strength(owner, 1234, CounterRng(5)) == Approx(mark_psnr).margin(0.5));
+  }
+}
+
+TEST_CASE("embedder: the extractor has a step size of its own") {
+  const auto moved = [](double extractor_lr) {
+    Owner owner = tiny_paper_owner();
+    const auto before = owner.params;
+    EmbedOptions o = options(1);
+    o.extractor_lr = extractor_lr;
+    Embedder(owner, tiny_views(), o).step(0);
+    double mark = 0, extractor = 0;
+    for (const auto& e : before.entries())
+      for (std::size_t i = 0; i < before.values(before.find(e.name)).size(); ++i)
+        (e.name.starts_with("mark/") ? mark : extractor) += std::abs(static_cast<double>(
+            owner.params.values(owner.params.find(e.name))[i] - before.values(before.find(e.name))[i]));
+    return std::pair(mark, extractor);
+  };
+  const auto one = moved(1), two = moved(2);
+  CHECK(two.first == one.first);
+  CHECK(two.second == Approx(2 * one.second).epsilon(1e-3));
+  Owner owner = tiny_paper_owner();
+  EmbedOptions o = options(1);
+  o.extractor_lr = 0;
+  CHECK_THROWS_WITH(Embedder(owner, tiny_views(), o),
+                    "[embedder] extractor_lr must be positive, got 0.000000");
+}
+
+TEST_CASE("embedder: under a budget preset paper is calibrated, and content costs nothing") {
+  OwnerOptions small = tiny_paper_owner().options();
+  small.budget = true;
+  small.mark_psnr = 30;
+  Owner owner(tiny_field(), small, test_key(5), message_slots(4));
+  EmbedOptions o = options(1);
+  o.message_weight = 0;
+  Embedder embedder(owner, tiny_views(), o);
+  embedder.step(0);
+  CHECK(embedder.figures().loss == 0);
+  embedder.calibrate(16);
+  CHECK(measured_strength(owner, o.seed + 77, CounterRng(o.seed, 12)) == Approx(30).margin(0.03));
+}
+
+TEST_CASE("embedder: preset code learns the colours of the field from raw numbers") {
+  OwnerOptions small = tiny_paper_owner().options();
+  small.preset = Preset::code;
+  small.fusion = owner_options(Preset::code).fusion;
+  Owner owner(tiny_field(), small, test_key(5), message_slots(4));
+  EmbedOptions o = options(60);
+  o.message_weight = 0;
+  Embedder embedder(owner, tiny_views(), o);
+  embedder.step(0);
+  const double first = embedder.figures().loss;
+  while (!embedder.done()) embedder.step(0);
+  CHECK(embedder.figures().loss < 0.6 * first);
+}
+
+TEST_CASE("embedder: images of another maker take the place of the owner's colours") {
+  OwnerOptions small = tiny_paper_owner().options();
+  small.colours = false;
+  Owner owner(tiny_field(), small, test_key(5), message_slots(4));
+  EmbedOptions o = options(20);
+  CHECK_THROWS_WITH(Embedder(owner, tiny_views(), o),
+                    "[embedder] image must be given for an owner without colours of its own, got none");
+  // A grey for all pixels that the message says nothing to.
+  std::atomic<bool> misfits = false;  // set from several threads
+  const ParamId grey = owner.params.add("grey", {1, 3});
+  o.image = [&](Tape<float>& tape, const Params<float>& params, const CachedView& view, Var<float> message) {
+    if (view.camera.width != view.width || message.shape() != Shape{1, 4}) misfits = true;
+    return broadcast_rows(params.leaf(tape, grey), view.height * view.width);
+  };
+  o.message_weight = 0;
+  Embedder embedder(owner, tiny_views(), o);
+  embedder.step(0);
+  const double first = embedder.figures().loss;
+  while (!embedder.done()) embedder.step(0);
+  CHECK(embedder.figures().loss < first);
+  CHECK(owner.params.values(grey)[0] > 0.01f);
+  CHECK(!misfits);
+}
+
+TEST_CASE("embedder: options outside their ranges are refused") {
+  Owner owner = tiny_owner();
+  for (Index batch : {0, 65}) {
+    EmbedOptions bad = options(1);
+    bad.batch = batch;
+    CHECK_THROWS_AS(Embedder(owner, tiny_views(), bad), ValueError);
+    CHECK_THROWS_WITH(Embedder(owner, tiny_views(), bad),
+                      "[embedder] batch must be 1 to 64, got " + std::to_string(batch));
+  }
+  CHECK_THROWS_AS(Embedder(owner, {}, options(1)), ValueError);
+  CHECK_THROWS_WITH(Embedder(owner, {}, options(1)), "[embedder] views must not be empty");
+}

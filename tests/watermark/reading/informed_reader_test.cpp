@@ -1,0 +1,108 @@
+#include <fieldmark/core/error.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/watermark/evidence/wrong_keys.h>
+#include <fieldmark/watermark/reading/informed_reader.h>
+
+#include <cmath>
+
+#include "support/catch.h"
+#include "watermark/tiny_owner.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+namespace {
+constexpr CameraSearchOptions kSearch{.views = 40, .size = 32};
+const Message kMessage{{1, 0, 0, 1}};
+
+nerf::Camera near_camera(std::uint64_t seed) {
+  return nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::novel, 1, 96, seed).front();
+}
+
+Tensor<float> image_of(const Owner& owner, const nerf::Camera& camera, bool marked) {
+  nerf::Renderer renderer(owner.field);
+  if (marked) renderer.set_recolour(owner.marking(cell_signs(owner.code(), kMessage)));
+  return quantize8(renderer.render(camera).rgb);
+}
+}  // namespace
+
+TEST_CASE("informed_reader: with the camera known every bit is read, whatever gain and offset") {
+  const Owner owner = marking_owner();
+  InformedReader reader(owner, kSearch);
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    Tensor<float> picture = image_of(owner, near_camera(seed), true);
+    for (Index i = 0; i < picture.size(); ++i) picture[i] = 0.8f * picture[i] + 0.05f;
+    const auto evidence = reader.evidence_at(quantize8(picture), near_camera(seed));
+    CHECK(read_bits(evidence, owner.code(), 4).message == kMessage);
+    CHECK(keyed_p_value(keyed_statistic(evidence, owner.code(), kMessage)) < 1e-4);
+  }
+}
+
+TEST_CASE("informed_reader: an unmarked view is not leant to any key") {
+  const Owner owner = marking_owner();
+  InformedReader reader(owner, kSearch);
+  const auto evidence = reader.evidence_at(image_of(owner, near_camera(1), false), near_camera(1));
+  double power = 0;
+  for (double s : evidence) power += s * s;
+  CHECK(power > 0);
+  const auto counts = count_wrong_keys(evidence, owner.cells.area(), kMessage, 20000, 5);
+  double p = 1;
+  for (int i = 0; i < 4; ++i)
+    CHECK(counts.counts[static_cast<std::size_t>(i)] <= binomial_upper(20000, p /= 10));
+  // T^2 under a wrong key has mean 1, so that it passes 1 about as often as a normal number's square does.
+  Index above = 0;
+  for (std::uint8_t k = 0; k < 200; ++k) {
+    const double t = keyed_statistic(evidence, owner.code(test_key(k)), kMessage);
+    above += t * t > 1;
+  }
+  CHECK(above > 35);
+  CHECK(above < 95);
+}
+
+TEST_CASE("informed_reader: the camera is found from the image, and the reading chosen by the scene alone") {
+  const Owner owner = marking_owner();
+  InformedReader reader(owner, kSearch);
+  const nerf::Camera camera = near_camera(4);
+  const ImageReading marked = reader.read(image_of(owner, camera, true));
+  CHECK(marked.chosen == ReadingKind::informed);
+  CHECK(marked.informed.agreement > 0.95);
+  CHECK(read_bits(marked.evidence(), owner.code(), 4).message == kMessage);
+  CHECK(reader.read(image_of(owner, camera, false)).chosen == ReadingKind::informed);
+  // Its evidence counts as much as the blind detection's.
+  double ours = 0, theirs = 0;
+  for (double s : marked.informed.evidence) ours += s * s;
+  for (double s : marked.blind) theirs += s * s;
+  CHECK(ours == Approx(theirs));
+
+  const nerf::Dataset other = nerf::make_scene({.size = 96, .views = 1, .seed = 9});
+  const ImageReading wrong = reader.read(other.views.front().rgba);
+  CAPTURE(wrong.informed.agreement);
+  CHECK(wrong.chosen == ReadingKind::blind);
+  CHECK(wrong.informed.agreement < 0.8);
+  CHECK(wrong.evidence() == wrong.blind);
+}
+
+TEST_CASE("informed_reader: one and two threads give the same bits") {
+  const Owner owner = marking_owner();
+  const Tensor<float> picture = image_of(owner, near_camera(5), true);
+  const int before = threads();
+  std::vector<double> evidence[2];
+  for (const int n : {1, 2}) {
+    set_threads(n);
+    InformedReader reader(owner, {.views = 10, .size = 32});
+    evidence[n - 1] = reader.read(picture).informed.evidence;
+  }
+  set_threads(before);
+  CHECK(!evidence[0].empty());
+  CHECK(evidence[0] == evidence[1]);
+}
+
+TEST_CASE("informed_reader: errors name what is wrong") {
+  const Owner paper = tiny_paper_owner(), owner = tiny_owner();
+  CHECK_THROWS_AS(InformedReader(paper), ValueError);
+  InformedReader reader(owner, {.views = 1, .size = 16});
+  CHECK_THROWS_AS(reader.read(Tensor<float>({15, 50, 3})), ShapeError);
+  CHECK(std::string(reading_name(ReadingKind::blind)) == "blind");
+  CHECK(std::string(reading_name(ReadingKind::informed)) == "informed");
+}

@@ -1,0 +1,166 @@
+#include "jpeg_score.h"
+#include <fieldmark/core/error.h>
+#include <fieldmark/distort/jpeg444.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/random.h>
+#include <fieldmark/imaging/image.h>
+
+#include <cmath>
+
+#include "support/catch.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+namespace {
+
+constexpr Index kHeight = 104, kWidth = 136;
+
+// Waves, edges and fine grain; the amplitude of the grain says how much detail there is.
+Tensor<float> picture(float grain, std::uint64_t seed) {
+  const CounterRng rng(seed, 1);
+  Tensor<float> x({kHeight, kWidth, 3});
+  for (Index p = 0; p < kHeight * kWidth; ++p) {
+    const auto u = static_cast<float>(p % kWidth), v = static_cast<float>(p / kWidth);
+    const float edge = std::fmod(u + 2 * v, 37.f) < 18 ? 0.12f : -0.12f;
+    const auto noise = rng.normal2(static_cast<std::uint64_t>(p));
+    for (Index c = 0; c < 3; ++c)
+      x[3 * p + c] = 0.5f + edge + 0.1f * std::sin(0.21f * u + static_cast<float>(c)) +
+                     grain * noise[static_cast<std::size_t>(c % 2)];
+  }
+  return quantize8(x);
+}
+
+// A faint pattern of the size a mark has, rms amplitude.
+Tensor<float> pattern(float amplitude) {
+  const CounterRng rng(9, 2);
+  Tensor<float> x({kHeight, kWidth, 3});
+  for (Index p = 0; p < kHeight * kWidth; ++p) {
+    const Index patch = p / kWidth / 3 * kWidth + p % kWidth / 3;
+    const float a = amplitude * rng.normal2(static_cast<std::uint64_t>(patch))[0];
+    for (Index c = 0; c < 3; ++c) x[3 * p + c] = a * (c == 2 ? 0.5f : 1.f);
+  }
+  return x;
+}
+
+Tensor<float> sum(const Tensor<float>& a, const Tensor<float>& b, float sign) {
+  Tensor<float> out = a;
+  for (Index i = 0; i < out.size(); ++i) out[i] += sign * b[i];
+  return quantize8(out);
+}
+
+const std::vector<double> kEverywhere(static_cast<std::size_t>(kHeight* kWidth), 1.0);
+
+// Of 8-row strips with their signs, how many the score's product with the mark gets right; and a plain
+// difference's.
+struct Right {
+  int score = 0, difference = 0, of = 0;
+};
+
+Right strips_right(int quality, float amplitude) {
+  Right right;
+  for (const std::uint64_t seed : {1u, 2u, 3u, 4u}) {
+    const Tensor<float> base = picture(0.03f, seed), mark = pattern(amplitude);
+    const CounterRng rng(seed, 3);
+    const auto sign = [&](Index y, Index x) {
+      return rng.uniform4(static_cast<std::uint64_t>(y / 8 * 10 + x / 34))[0] < 0.5f ? -1.f : 1.f;
+    };
+    Tensor<float> marked = base;
+    for (Index i = 0; i < marked.size(); ++i) marked[i] += mark[i] * sign(i / 3 / kWidth, i / 3 % kWidth);
+    const Tensor<float> seen = jpeg_round_trip(quantize8(marked), quality);
+    const JpegScore s = jpeg_score(seen, base, mark, kEverywhere, *find_jpeg(seen));
+    for (Index y = 0; y < kHeight; y += 8)
+      for (Index x = 0; x < kWidth; x += 34) {
+        double ours = 0, plain = 0;
+        for (Index i = 0; i < 8 * 34 * 3; ++i) {
+          const Index p = 3 * ((y + i / 3 / 34) * kWidth + x + i / 3 % 34) + i % 3;
+          ours += static_cast<double>(mark[p] * s.score[p]);
+          plain += static_cast<double>(mark[p] * (seen[p] - base[p]));
+        }
+        const double truth = static_cast<double>(sign(y, x));
+        right.score += ours * truth > 0;
+        right.difference += plain * truth > 0;
+        ++right.of;
+      }
+  }
+  return right;
+}
+
+}  // namespace
+
+TEST_CASE("find_jpeg: names quality and chroma of what was compressed, and nothing else") {
+  for (const std::uint64_t seed : {1u, 2u}) {
+    const Tensor<float> base = picture(0.05f, seed);
+    CHECK_FALSE(find_jpeg(base).has_value());
+    for (const int quality : {30, 50, 75, 90}) {
+      INFO(quality);
+      const auto half = find_jpeg(jpeg_round_trip(base, quality));
+      REQUIRE(half.has_value());
+      CHECK(half->quality == quality);
+      CHECK(half->subsampled);
+      const auto full = find_jpeg(distort::jpeg444(base, quality));
+      REQUIRE(full.has_value());
+      CHECK(full->quality == quality);
+      CHECK_FALSE(full->subsampled);
+    }
+  }
+  CHECK_FALSE(find_jpeg(Tensor<float>({40, 40, 3})).has_value());
+  CHECK_FALSE(find_jpeg(Tensor<float>({0, 40, 3})).has_value());
+}
+
+TEST_CASE("jpeg_score: reads faint signs that a plain difference does not") {
+  const Right right = strips_right(50, 0.0012f);
+  CAPTURE(right.score, right.difference, right.of);
+  CHECK(right.score > right.of * 75 / 100);  // measured 170 against 141 of 208
+  CHECK(right.score > right.difference + right.of * 8 / 100);
+}
+
+TEST_CASE("jpeg_score: the slope is that of the likelihood, and leans to no sign without a mark") {
+  const Tensor<float> base = picture(0.03f, 7), mark = pattern(0.01f);
+  const Tensor<float> seen = jpeg_round_trip(sum(base, mark, 1), 60);
+  const JpegTrace trace = *find_jpeg(seen);
+  const auto along = [&](const JpegScore& s) {
+    double out = 0;
+    for (Index i = 0; i < mark.size(); ++i) out += static_cast<double>(s.score[i] * mark[i]);
+    return out;
+  };
+  const JpegScore unmarked = jpeg_score(jpeg_round_trip(base, 60), base, mark, kEverywhere, trace);
+  double information = 0;
+  for (const float v : unmarked.information.data) information += static_cast<double>(v);
+  CHECK(information > 0);
+  CHECK(std::abs(along(unmarked)) < 4 * std::sqrt(information));
+  CHECK(along(jpeg_score(seen, base, mark, kEverywhere, trace)) > 0);
+  CHECK(along(jpeg_score(jpeg_round_trip(sum(base, mark, -1), 60), base, mark, kEverywhere, trace)) < 0);
+}
+
+TEST_CASE("jpeg_score: says nothing off the object, and the same for one and two threads") {
+  const Tensor<float> base = picture(0.03f, 8), mark = pattern(0.01f);
+  const Tensor<float> seen = jpeg_round_trip(sum(base, mark, 1), 40);
+  std::vector<double> object(kEverywhere.size(), 0);
+  for (std::size_t p = 0; p < object.size(); ++p)
+    if (p % kWidth < 64) object[p] = 1;
+  const JpegTrace trace{.quality = 40, .subsampled = true};
+  const int before = threads();
+  Tensor<float> scores[2];
+  for (const int n : {1, 2}) {
+    set_threads(n);
+    scores[n - 1] = jpeg_score(seen, base, mark, object, trace).score;
+  }
+  set_threads(before);
+  CHECK(scores[0].data == scores[1].data);
+  double left = 0, right = 0;
+  for (Index i = 0; i < seen.size(); ++i)
+    (i / 3 % kWidth < 64 ? left : right) += static_cast<double>(std::abs(scores[0][i]));
+  CHECK(left > 0);
+  CHECK(right == 0);
+}
+
+TEST_CASE("jpeg_score: errors name what is wrong") {
+  const Tensor<float> x({16, 16, 3}), other({16, 8, 3});
+  const std::vector<double> object(256, 1.0);
+  CHECK_THROWS_AS(find_jpeg(Tensor<float>({16, 16})), ShapeError);
+  CHECK_THROWS_WITH(jpeg_score(x, other, x, object, {50, true}),
+                    "[jpeg_score] render, mark and object must fit the image [16, 16, 3], got [16, 8, 3], "
+                    "[16, 16, 3] and 256 pixels");
+  CHECK_THROWS_AS(jpeg_score(x, x, x, object, {0, true}), ValueError);
+}

@@ -1,0 +1,127 @@
+#include <fieldmark/core/error.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/watermark/reading/pose_alignment.h>
+#include "camera_motion.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "support/catch.h"
+#include "watermark/cameras_apart.h"
+#include "watermark/tiny_owner.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+namespace {
+constexpr AlignmentStage kStages[] = {{.size = 32, .blur = 1.5, .steps = 10},
+                                      {.size = 64, .blur = 1, .steps = 8}};
+
+nerf::Camera near_camera(std::uint64_t seed) {
+  return nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::novel, 1, 64, seed).front();
+}
+
+Tensor<float> image_of(const nerf::Camera& camera) {
+  nerf::Renderer renderer(tiny_field());
+  return quantize8(renderer.render(camera).rgb);
+}
+
+Alignment align(const Tensor<float>& picture, const nerf::Camera& start) {
+  PoseAligner aligner(tiny_field());
+  return aligner.align(picture, start, kStages);
+}
+}  // namespace
+
+TEST_CASE("pose_alignment: a disturbed camera comes back to a tenth of a pixel") {
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    const nerf::Camera camera = near_camera(seed);
+    const nerf::Camera start =
+        moved(camera, {0, 0, 0}, {0.04, -0.05, 0.06, 0.03, -0.02, 0.04, 0.03, -0.02, 0.01});
+    CAPTURE(seed);
+    CHECK(cameras_apart(camera, start) > 2);
+    const Alignment a = align(image_of(camera), start);
+    CHECK(cameras_apart(camera, a.camera) < 0.1);
+    CHECK(a.agreement > 0.98);
+  }
+}
+
+TEST_CASE("pose_alignment: plain corners do not count where the scene fills its images") {
+  nerf::RadianceField field = small_field();
+  field.space = {.kind = nerf::SpaceKind::contracted, .bounds = {.corner = {-1, -1, -1}, .side = 2}};
+  const nerf::Camera camera =
+      nerf::make_camera(nerf::look_at({0.3, -0.4, 0.2}, {0, 1, 0}, {0, 0, 1}), 0.9, 96, 96);
+  nerf::Renderer renderer(field);
+  Tensor<float> picture = quantize8(renderer.render(camera).rgb), spotted = picture;
+  Index corners = 0;
+  for (Index p = 0; p < 96 * 96; ++p) {
+    const Index y = p / 96, x = p % 96;
+    if (std::min(y, 95 - y) + std::min(x, 95 - x) >= 30) continue;
+    ++corners;
+    for (Index a = 0; a < 3; ++a) {
+      picture[3 * p + a] = 1;
+      spotted[3 * p + a] = static_cast<float>((x / 6 + y / 6) % 2);  // as large, but not plain
+    }
+  }
+  CHECK(corners > 1000);
+  constexpr AlignmentStage kStay[] = {{.size = 96, .blur = 1, .steps = 0}};
+  PoseAligner aligner(field);
+  const double plain = aligner.align(picture, camera, kStay).agreement,
+               rough = aligner.align(spotted, camera, kStay).agreement;
+  CAPTURE(plain, rough);
+  CHECK(plain > 0.98);
+  CHECK(rough < 0.8);
+}
+
+TEST_CASE("pose_alignment: a turned and cut image with other tones is met by roll, focal length and cut") {
+  const nerf::Camera camera = near_camera(4);
+  nerf::Camera part = moved(camera, {0, 0, 0}, {0, 0, 0.3, 0, 0, 0, std::log(1.3)});
+  part.cx -= 4;
+  part.height = 56;
+  Tensor<float> picture = image_of(part);
+  for (Index i = 0; i < picture.size(); ++i)
+    picture[i] = 0.7f * picture[i] + 0.05f * static_cast<float>(i % 3);
+  const Alignment a = align(picture, moved(part, {0, 0, 0}, {0.03, 0.04, -0.08, 0, 0, 0, 0.06, 0.03, -0.02}));
+  CHECK(a.camera.width == 64);
+  CHECK(a.camera.height == 56);
+  CHECK(cameras_apart(part, a.camera) < 0.1);
+  CHECK(a.agreement > 0.98);
+}
+
+TEST_CASE("pose_alignment: images of something else do not agree") {
+  const nerf::Camera camera = near_camera(5);
+  CHECK(align(uniform<float>({64, 64, 3}, 0, 1, 3), camera).agreement < 0.3);
+  // The scene from another side.
+  CHECK(align(image_of(near_camera(6)), camera).agreement < 0.75);
+  CHECK(align(Tensor<float>({64, 64, 3}, 1), camera).agreement < 0.1);
+  nerf::Camera away = camera;
+  for (std::size_t k : {2u, 6u, 10u}) away.pose[k] *= -1;
+  CHECK(align(image_of(camera), away).agreement == -1);
+}
+
+TEST_CASE("pose_alignment: one and two threads give the same bits") {
+  const nerf::Camera camera = near_camera(7);
+  const Tensor<float> picture = image_of(camera);
+  const nerf::Camera start = moved(camera, {0, 0, 0}, {0.02, -0.03, 0.02});
+  const int before = threads();
+  set_threads(1);
+  const Alignment one = align(picture, start);
+  set_threads(2);
+  const Alignment two = align(picture, start);
+  set_threads(before);
+  CHECK(one.camera.pose == two.camera.pose);
+  CHECK(one.camera.parameters() == two.camera.parameters());
+  CHECK(one.agreement == two.agreement);
+}
+
+TEST_CASE("pose_alignment: errors name what is wrong") {
+  PoseAligner aligner(tiny_field());
+  const nerf::Camera camera = near_camera(8);
+  CHECK_THROWS_AS(aligner.align(Tensor<float>({20, 20}), camera, kStages), ShapeError);
+  CHECK_THROWS_AS(aligner.align(Tensor<float>({20, 20, 1}), camera, kStages), ShapeError);
+  CHECK_THROWS_WITH(aligner.align(Tensor<float>({20, 20, 3}), camera, {}),
+                    "[pose_aligner] stages must not be empty");
+  const AlignmentStage small[] = {{.size = 8}};
+  CHECK_THROWS_WITH(aligner.align(Tensor<float>({20, 20, 3}), camera, small),
+                    "[pose_aligner] stages must be of at least 16 pixels, got 8");
+}

@@ -1,0 +1,156 @@
+#include <fieldmark/engine/ops/arithmetic.h>
+#include <fieldmark/engine/ops/loss.h>
+#include <fieldmark/engine/ops/softmax.h>
+#include <fieldmark/engine/shape_checks.h>
+#include <fieldmark/nerf/rendered_dataset.h>
+#include <fieldmark/watermark/attacks/extractor_attack.h>
+#include <fieldmark/watermark/embedding/embed_views.h>
+#include <fieldmark/watermark/mark/power_budget.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace fieldmark::watermark {
+namespace {
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+void check(const Tensor<float>& picture, const Tensor<float>& object, const ExtractorAttackOptions& o) {
+  check_rank("extractor_attack", "image", picture.shape, 3, "[H, W, 3]");
+  if (picture.shape[2] != 3 || object.shape != Shape{picture.shape[0], picture.shape[1]})
+    throw ShapeError("[extractor_attack] image must be [H, W, 3] and object [H, W], got " +
+                     picture.shape.str() + " and " + object.shape.str());
+  if (!(o.mark_psnr >= 10 && o.mark_psnr <= 60))
+    throw ValueError("[extractor_attack] strength must be 10 to 60 dB, got " + std::to_string(o.mark_psnr));
+  if (o.steps < 1)
+    throw ValueError("[extractor_attack] steps must be at least 1, got " + std::to_string(o.steps));
+  if (!(o.step > 0 && o.step <= 1))
+    throw ValueError("[extractor_attack] step must be above 0 and at most 1, got " + std::to_string(o.step));
+}
+
+// What the extractor says of the image as it is, and how far from it what it says of another is.
+class Verdict {
+ public:
+  Verdict(const Owner& owner, const Tensor<float>& picture)
+      : owner_(owner), params_(owner.params, nullptr), shape_{1, picture.shape[0], picture.shape[1], 3} {
+    Tape<float> tape;
+    const Var<float> image = tape.constant(picture.data.data(), shape_);
+    const auto note_signs = [&](Var<float> logits) {
+      for (Index i = 0; i < logits.shape().size(); ++i)
+        positive_.push_back(logits.value()[i] > 0 ? 1.f : 0.f);
+    };
+    if (owner_.pooled_reader) {
+      note_signs((*owner_.pooled_reader)(params_, image));
+      return;
+    }
+    const auto out = (*owner_.reader)(params_, image);
+    note_signs(out.sign);
+    const Index classes = out.index.shape()[1];
+    for (Index p = 0; p < out.index.shape()[0]; ++p) {
+      const float* q = out.index.value() + p * classes;
+      index_.push_back(static_cast<std::int32_t>(std::max_element(q, q + classes) - q));
+      on_object_.push_back(index_.back() + 1 < classes ? 1.f : 0.f);
+    }
+  }
+
+  // Of an image [pixels, 3]; [1].
+  Var<float> loss(Var<float> picture) const {
+    Tape<float>& tape = picture.tape();
+    const Var<float> image = tape.reshape(picture, shape_);
+    if (owner_.pooled_reader) {
+      const Var<float> logits = (*owner_.pooled_reader)(params_, image);
+      return bce_with_logits<float>(tape.reshape(logits, {static_cast<Index>(positive_.size())}), positive_);
+    }
+    const auto out = (*owner_.reader)(params_, image);
+    return add(bce_with_logits<float>(out.sign, positive_, on_object_),
+               softmax_cross_entropy<float>(out.index, index_, on_object_));
+  }
+
+ private:
+  const Owner& owner_;
+  Params<float> params_;
+  Shape shape_;
+  std::vector<float> positive_, on_object_;
+  std::vector<std::int32_t> index_;
+};
+
+// To length 1, times `factor`; 0 stays 0.
+void add_direction(const std::vector<float>& from, double factor, std::vector<float>& to) {
+  double squares = 0;
+  for (const float x : from) squares += static_cast<double>(x) * static_cast<double>(x);
+  const auto scale = static_cast<float>(squares > 0 ? factor / std::sqrt(squares) : 0);
+  for (std::size_t i = 0; i < to.size(); ++i) to[i] += scale * from[i];
+}
+
+// Normal numbers on the object.
+std::vector<float> first_residual(const Tensor<float>& object, const CounterRng& rng) {
+  std::vector<float> r(at(3 * object.size()), 0.f);
+  for (Index p = 0; p < object.size(); ++p)
+    if (object[p] > 0.5f) {
+      const auto z = rng.normal4(static_cast<std::uint64_t>(p));
+      std::copy_n(z.data(), 3, &r[at(3 * p)]);
+    }
+  return r;
+}
+
+}  // namespace
+
+Tensor<float> against_extractor(const Owner& owner, const Tensor<float>& picture, const Tensor<float>& object,
+                                const ExtractorAttackOptions& options) {
+  check(picture, object, options);
+  const Verdict verdict(owner, picture);
+  const Index pixels = object.size();
+  const double target = std::pow(10.0, -options.mark_psnr / 20);
+  std::vector<float> mask(at(pixels)), gradient(at(3 * pixels)), next(at(3 * pixels)),
+      residual = first_residual(object, CounterRng(options.seed, 41));
+  for (Index p = 0; p < pixels; ++p) mask[at(p)] = object[p] > 0.5f ? 1.f : 0.f;
+  Tape<float> tape;
+  const auto changed = [&] {
+    tape.reset();
+    const Var<float> r = tape.fresh_leaf(residual.data(), gradient.data(), {pixels, 3});
+    return add(tape.constant(picture.data.data(), {pixels, 3}), power_budget<float>(r, mask, target));
+  };
+  for (Index k = 0; k < options.steps; ++k) {
+    tape.backward(verdict.loss(changed()));
+    for (Index p = 0; p < pixels; ++p)
+      if (mask[at(p)] == 0) std::fill_n(&gradient[at(3 * p)], 3, 0.f);
+    std::ranges::fill(next, 0.f);
+    add_direction(residual, 1, next);
+    add_direction(gradient, options.step, next);
+    residual.swap(next);
+  }
+  Tensor<float> out(picture.shape);
+  const float* y = changed().value();
+  std::transform(y, y + 3 * pixels, out.data.begin(), [](float x) { return std::clamp(x, 0.f, 1.f); });
+  return out;
+}
+
+nerf::Dataset renders_against_extractor(const Owner& owner, const nerf::RadianceField& field, Index views,
+                                        const ExtractorAttackOptions& options,
+                                        const std::function<bool(Index done, Index total)>& progress) {
+  std::vector<nerf::Camera> cameras;
+  for (const CachedView& v : cache_novel_views(field, owner.options().patch(), views, options.seed + 51))
+    cameras.push_back(v.camera);
+  nerf::Dataset data = nerf::rendered_dataset(field, cameras);
+  const float background = nerf::background_value(field.background);
+  ExtractorAttackOptions of_view = options;
+  for (nerf::View& view : data.views) {
+    Tensor<float>& rgba = view.rgba;
+    Tensor<float> object({rgba.shape[0], rgba.shape[1]});
+    for (Index p = 0; p < object.size(); ++p) object[p] = rgba[4 * p + 3];
+    const Tensor<float> changed =
+        against_extractor(owner, nerf::composited(view, field.background), object, of_view);
+    // Straight colours again: an image's change is its opacity times theirs.
+    for (Index p = 0; p < object.size(); ++p)
+      for (Index c = 0; c < 3 && object[p] > 0.5f; ++c)
+        rgba[4 * p + c] =
+            std::clamp((changed[3 * p + c] - (1 - object[p]) * background) / object[p], 0.f, 1.f);
+    ++of_view.seed;
+    const Index done = &view - data.views.data() + 1;
+    if (progress && !progress(done, std::ssize(data.views)))
+      throw Error("stopped while images were turned against the extractor");
+  }
+  return data;
+}
+
+}  // namespace fieldmark::watermark

@@ -1,0 +1,66 @@
+#pragma once
+#include <fieldmark/watermark/attacks/measurement.h>
+
+#include <chrono>
+#include <optional>
+#include <vector>
+
+#include <fieldmark/imaging/means.h>
+
+namespace fieldmark::watermark {
+
+// Both readings of images, and what they cost.
+class Readers {
+ public:
+  // For preset paper there is no informed detection. Owner and code must outlive it.
+  Readers(const Owner& owner, const CellCode& code, bool informed)
+      : owner_(owner), code_(code), blind_(owner) {
+    if (informed && owner.reader) informed_.emplace(owner);
+  }
+  bool informed() const { return informed_.has_value(); }
+  // Only informed's numbers may be NaN. Calls tell() with the chosen reading's evidence.
+  template <class F>
+  ReadingAccuracy read(const Tensor<float>& image, const Message& sent, bool with_informed, F tell) {
+    ReadingAccuracy accuracy;
+    if (!with_informed || !informed_) {
+      const auto evidence = blind_.evidence(image);
+      tell(evidence);
+      accuracy.blind = share(evidence, sent);
+      return accuracy;
+    }
+    const auto begin = std::chrono::steady_clock::now();
+    const ImageReading reading = informed_->read(image);
+    seconds_.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    tell(reading.evidence());
+    accuracy.blind = share(reading.blind, sent);
+    accuracy.informed = share(reading.informed.evidence, sent);
+    accuracy.chosen = share(reading.evidence(), sent);
+    return accuracy;
+  }
+  // Of one image informed and blindly, mean; NaN without one.
+  double seconds() const { return finite_mean(seconds_); }
+
+ private:
+  double share(const std::vector<double>& evidence, const Message& sent) const {
+    if (evidence.empty()) return 0.5;
+    return match_bits(read_bits(evidence, code_, owner_.options().bits), sent).accuracy();
+  }
+  const Owner& owner_;
+  const CellCode& code_;
+  BlindReader blind_;
+  std::optional<InformedReader> informed_;
+  std::vector<double> seconds_;
+};
+
+// Accuracies of the views so far.
+struct Accuracies {
+  std::vector<double> blind, informed, chosen;
+  void add(const ReadingAccuracy& a) {
+    blind.push_back(a.blind);
+    informed.push_back(a.informed);
+    chosen.push_back(a.chosen);
+  }
+  ReadingAccuracy mean() const { return {finite_mean(blind), finite_mean(informed), finite_mean(chosen)}; }
+};
+
+}  // namespace fieldmark::watermark

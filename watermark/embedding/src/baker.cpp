@@ -1,0 +1,228 @@
+#include <fieldmark/engine/ops/arithmetic.h>
+#include <fieldmark/engine/ops/loss.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/watermark/embedding/baker.h>
+#include <fieldmark/watermark/mark/weighted_segments.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include <fieldmark/watermark/mark/cameras_around.h>
+
+namespace fieldmark::watermark {
+namespace {
+
+constexpr int kShards = 16;
+constexpr Index kRays = 64, kChunks = 32;  // of a chunk, of a step
+constexpr float kLeastWeight = 1e-3f;
+constexpr float kOfSamples = 0.1f;  // weight of the samples' own colours beside what rays show
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+// The numbers of the colour side's networks, which lie together.
+AdamRange colour_range(const ParamStore<float>& params) {
+  AdamRange range{.begin = params.size()};
+  for (const auto& e : params.entries())
+    if (nerf::Field<float>::is_colour(e.name)) {
+      range.begin = std::min(range.begin, e.offset);
+      range.end = e.offset + e.shape.size();
+    }
+  return range;
+}
+
+}  // namespace
+
+// The samples of a chunk that light reaches, what they look like unmarked, and what they pass back to the
+// table.
+struct Baker::Chunk {
+  nerf::CubeRays rays;
+  std::vector<float> jitter;
+  std::vector<float> position, direction, weight, geometry_features, base_features, of_direction, target,
+      features, dfeatures, unused;
+  std::vector<std::int32_t> begin;  // of each ray's samples, and the end
+  Index samples = 0;
+};
+
+Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& options)
+    : owner_(owner),
+      options_(options),
+      schedule_(options.schedule),
+      rng_(options.seed, 21),
+      field_(owner.field),
+      loop_(kShards, owner.field.field.network_size()),
+      adam_(owner.field.params.size(), {.lr = 1, .zero_grads = true}),
+      chunks_(kChunks),
+      samplers_(kShards),
+      samples_(kShards) {
+  if (message.size() != owner.options().bits)
+    throw ValueError("[baker] message must have the owner's " + std::to_string(owner.options().bits) +
+                     " bits, got " + std::to_string(message.size()));
+  if (options.cameras < 1 || options.around < 0)
+    throw ValueError("[baker] cameras must be at least 1 and around at least 0, got " +
+                     std::to_string(options.cameras) + " and " + std::to_string(options.around));
+  marking_ = owner.marking(cell_signs(owner.code(), message));
+  // Colours that no ray asks for go astray: without those around, lego's underside changes by 29 dB.
+  cameras_ = cameras_around(owner.field, options.cameras, options.around, 0, options.seed + 31);
+}
+
+Baker::~Baker() = default;
+
+void Baker::choose_rays(Index chunk, Chunk& c) const {
+  const auto step = static_cast<std::uint64_t>(steps_);
+  c.rays.resize(kRays);
+  c.jitter.resize(at(kRays));
+  for (Index i = 0; i < kRays; ++i) {
+    const auto u = rng_.uniform4(step, static_cast<std::uint64_t>(chunk * kRays + i));
+    const auto pick = [](float x, Index n) {
+      return std::min(static_cast<Index>(x * static_cast<float>(n)), n - 1);
+    };
+    const nerf::Camera& camera = cameras_[at(pick(u[0], static_cast<Index>(cameras_.size())))];
+    const float pixel[2] = {u[1] * static_cast<float>(camera.width) - 0.5f,
+                            u[2] * static_cast<float>(camera.height) - 0.5f};
+    c.rays.set(field_.space, i, camera, pixel);
+    c.jitter[at(i)] = u[3];
+  }
+}
+
+void Baker::select(const nerf::RaySamples& s, Chunk& c) const {
+  const nerf::Field<float>& net = field_.field;
+  const Index density = net.density_width(), colour = net.colour_width(), direction = net.direction_width();
+  std::vector<float> weights(at(s.size()));
+  nerf::sample_weights(s, field_.step(), weights.data());
+  Tape<float> tape;
+  const Var<float> of_ray = net.encode_directions(tape.constant(c.rays.seen_from.data(), {kRays, 3}));
+  for (auto* v :
+       {&c.position, &c.direction, &c.weight, &c.geometry_features, &c.base_features, &c.of_direction})
+    v->clear();
+  c.begin.assign(1, 0);
+  const auto append = [](std::vector<float>& to, const float* from, Index n) {
+    to.insert(to.end(), from, from + n);
+  };
+  for (Index r = 0; r < kRays; ++r) {
+    for (Index i = s.ray_begin[at(r)]; i < s.ray_begin[at(r + 1)]; ++i) {
+      if (weights[at(i)] < kLeastWeight) continue;
+      append(c.position, &s.position[at(3 * i)], 3);
+      append(c.direction, &c.rays.seen_from[at(3 * r)], 3);
+      append(c.weight, &weights[at(i)], 1);
+      if (s.z.empty())
+        append(c.geometry_features, s.density_features.data() + i * density, density);
+      else
+        append(c.geometry_features, s.z.data() + i * net.geometry_width(), net.geometry_width());
+      append(c.base_features, s.colour_features.data() + i * colour, colour);
+      append(c.of_direction, of_ray.value() + r * direction, direction);
+    }
+    c.begin.push_back(static_cast<std::int32_t>(c.weight.size()));
+  }
+  c.samples = static_cast<Index>(c.weight.size());
+}
+
+double Baker::run_chunk(Index index, Index shard, Tape<float>& tape, float* grads) {
+  Chunk& c = chunks_[at(index)];
+  choose_rays(index, c);
+  nerf::RaySamples& s = samples_[at(shard)];
+  samplers_[at(shard)].sample(owner_.field, c.rays.batch(field_.space), c.jitter,
+                              {.stop = 1e-3f, .points = field_.options().points}, s);
+  select(s, c);
+  const nerf::Field<float>& net = field_.field;
+  const Index n = c.samples, density = net.density_width(), colour = net.colour_width();
+  c.features.resize(at(n * colour));
+  c.unused.resize(at(n * density));
+  c.dfeatures.resize(at(2 * n * colour));
+  if (n == 0) return 0;
+  const Params<float> frozen(owner_.field.params, nullptr), learnt(field_.params, grads);
+  const Var<float> of_direction = tape.constant(c.of_direction.data(), {n, net.direction_width()});
+  const float* geometry = c.geometry_features.data();
+  const Var<float> z = s.z.empty() ? net.geometry(frozen, tape.constant(geometry, {n, density}))
+                                   : tape.constant(geometry, {n, net.geometry_width()});
+  const Var<float> base =
+      net.colour(frozen, z, tape.constant(c.base_features.data(), {n, colour}), of_direction);
+  c.target.assign(base.value(), base.value() + 3 * n);
+  marking_(c.position.data(), c.direction.data(), n, c.target.data());
+
+  if (net.has_table()) net.encode(field_.params, c.position.data(), n, c.unused.data(), c.features.data());
+  const Var<float> features = tape.fresh_leaf(c.features.data(), nullptr, {n, colour});
+  const Var<float> rgb = net.colour(learnt, z, features, of_direction);
+  float* weights = tape.scratch(3 * n);
+  for (Index i = 0; i < 3 * n; ++i) weights[i] = c.weight[at(i / 3)];
+  const Var<float> target = tape.constant(c.target.data(), {n, 3});
+  const Var<float> of_samples = mse_loss<float>(rgb, target, std::span<const float>(weights, at(3 * n)));
+  const Var<float> seen = weighted_segments<float>(sub(rgb, target), c.begin, c.weight);
+  float* nothing = tape.scratch(3 * kRays);
+  std::fill_n(nothing, 3 * kRays, 0.f);
+  const Var<float> of_rays = mse_loss<float>(seen, tape.constant(nothing, {kRays, 3}));
+  const double value = static_cast<double>(of_rays.value()[0]);
+  tape.backward(add(of_rays, scale(of_samples, kOfSamples)));
+  if (net.has_table()) net.encoding().deal_to_levels(n, nullptr, features.grad(), c.dfeatures.data());
+  return value;
+}
+
+void Baker::backward_table() {
+  const nerf::HashEncoding<float>& encoding = field_.field.encoding();
+  parallel_for(encoding.levels(), 1, [&](Index level, Index) {
+    for (const Chunk& c : chunks_)
+      encoding.backward_level(static_cast<int>(level), c.position.data(), c.samples,
+                              c.dfeatures.data() + level * c.samples * 2 * encoding.features(),
+                              field_.params.grads(encoding.table()));
+  });
+}
+
+void Baker::step(double seconds) {
+  schedule_.observe(steps_, seconds);
+  const Index network = field_.field.network_size();
+  const double loss = loop_.run(
+      kChunks,
+      [&](Index c, Index shard, Tape<float>& tape, float* grads) { return run_chunk(c, shard, tape, grads); },
+      field_.params.grads().first(at(network)));
+  if (field_.field.has_table()) backward_table();
+  // Density's numbers get no gradient: its networks are outside the range, its features are left alone where
+  // it is 0.
+  AdamRange ranges[] = {
+      colour_range(field_.params),
+      {.begin = network, .end = field_.params.size(), .lr_factor = schedule_.lr(steps_), .skip_zero = true}};
+  ranges[0].lr_factor = (field_.field.has_table() ? 0.2 : 0.05) * schedule_.lr(steps_);
+  adam_.step(field_.params.values(), field_.params.grads(),
+             std::span<const AdamRange>(ranges, field_.field.has_table() ? 2 : 1));
+  smoothed_ = smoothed_ < 0 ? loss / kChunks : 0.98 * smoothed_ + 0.02 * loss / kChunks;
+  ++steps_;
+}
+
+double Baker::mark_psnr(const MarkPsnrViews& views) const {
+  nerf::Renderer marked(field_, mark_psnr_rendering());
+  return MarkPsnrMeter(owner_.field, views)(marked);
+}
+
+// Numbers that learning left alone keep their bytes, the sign of a zero too.
+void Baker::set_scale(double scale, std::span<const float> learnt) {
+  const auto unmarked = owner_.field.params.values();
+  const auto values = field_.params.values();
+  const auto s = static_cast<float>(scale);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = learnt[i] == unmarked[i] ? unmarked[i] : unmarked[i] + s * (learnt[i] - unmarked[i]);
+}
+
+Baker::MarkPsnr Baker::scale_to(double target, const MarkPsnrViews& views) {
+  const MarkPsnrMeter meter(owner_.field, views);
+  nerf::Renderer marked(field_, mark_psnr_rendering());
+  MarkPsnr found{.learnt = meter(marked)};
+  found.scaled = found.learnt;
+  const std::vector<float> learnt(field_.params.values().begin(), field_.params.values().end());
+  // Secants of strength over log scale; the first is that of a change twice as large, 6 dB stronger, which
+  // rounding and colours at the ends of their range bend.
+  double slope = -1;
+  for (int round = 0; round < 6 && std::abs(found.scaled - target) > 0.02; ++round) {
+    const double scale = std::clamp(found.scale * std::pow(10.0, (target - found.scaled) / slope / 20),
+                                    1 / kLargestScale, kLargestScale);
+    if (!std::isfinite(found.scaled) || scale == found.scale) break;
+    set_scale(scale, learnt);
+    const double scaled = meter(marked),
+                 secant = (scaled - found.scaled) / (20 * std::log10(scale / found.scale));
+    if (secant < -0.2) slope = secant;
+    found.scale = scale;
+    found.scaled = scaled;
+  }
+  return found;
+}
+
+double Baker::psnr() const { return -10 * std::log10(std::max(smoothed_, 1e-10)); }
+
+}  // namespace fieldmark::watermark

@@ -1,0 +1,317 @@
+#include <fieldmark/distort/affine_warp.h>
+#include <fieldmark/distort/blur.h>
+#include <fieldmark/distort/noise.h>
+#include <fieldmark/distort/quantize8.h>
+#include <fieldmark/distort/similarity.h>
+#include <fieldmark/engine/checkpoint.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "training_image.h"
+
+namespace fieldmark::watermark {
+namespace {
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+constexpr double kSpacing = 1.7320508 / 420;  // of samples, cube sides: a field's by default
+constexpr std::uint64_t kOfBatch = 8 * 64;    // place of what a whole batch draws: after those of 64 images
+
+double blend(double from, double to, double fraction) { return from + (to - from) * fraction; }
+
+}  // namespace
+
+EmbedOptions embed_options(Preset preset) {
+  EmbedOptions o;
+  if (preset == Preset::fast) return o;
+  o.schedule.lr = 5e-4;
+  if (preset == Preset::code) {
+    o.extractor_lr = 2;
+    o.distortions = {
+        .noise = 0, .rotation = 0, .zoom_out = 1, .zoom_in = 1, .blur = 0, .sample_shift = 0.2 * kSpacing};
+    return o;
+  }
+  o.distortions.noise = 0.1;
+  o.distortions.rotation = 30;
+  o.distortions.blur = 0.1;
+  return o;
+}
+
+Index batch_for(nerf::SpaceKind space) {
+  return space == nerf::SpaceKind::contracted ? 2 : EmbedOptions{}.batch;
+}
+
+Embedder::Embedder(Owner& owner, std::span<const CachedView> views, const EmbedOptions& options)
+    : owner_(owner),
+      views_(views),
+      options_(options),
+      schedule_(options.schedule),
+      choice_rng_(options.seed, 11),
+      message_rng_(options.seed, 12),
+      noise_rng_(options.seed, 13),
+      shift_rng_(options.seed, 14),
+      code_(owner.code()),
+      loop_(static_cast<int>(std::clamp<Index>(options.batch, 1, 64)), owner.params.size()),
+      adam_(owner.params.size(), {.lr = 1, .beta2 = 0.99, .eps = 1e-8, .zero_grads = true}) {
+  if (options.batch < 1 || options.batch > 64)
+    throw ValueError("[embedder] batch must be 1 to 64, got " + std::to_string(options.batch));
+  if (views.empty()) throw ValueError("[embedder] views must not be empty");
+  if (!owner.mark && !owner.global_mark && !options.image)
+    throw ValueError("[embedder] image must be given for an owner without colours of its own, got none");
+  if (!(options.extractor_lr > 0))
+    throw ValueError("[embedder] extractor_lr must be positive, got " + std::to_string(options.extractor_lr));
+  find_objects();
+  if (owner.mark) label_views();
+  if (owner.global_mark)
+    for (const CachedView& v : views)
+      colours_.push_back(
+          owner.fusion_colours(v.position.data(), v.colour.data(), static_cast<Index>(v.weight.size())));
+}
+
+void Embedder::find_objects() {
+  for (const CachedView& v : views_) {
+    std::vector<float> object(at(v.height * v.width), 0.f);
+    for (Index p = 0; p < v.height * v.width; ++p)
+      if (v.opacity[p] > 0.5f && v.sample_begin[at(p)] != v.sample_begin[at(p + 1)]) object[at(p)] = 1;
+    object_.push_back(std::move(object));
+  }
+}
+
+Embedder::Image Embedder::draw(Index image) const {
+  const auto step = static_cast<std::uint64_t>(steps_), i = static_cast<std::uint64_t>(image);
+  const EmbedDistortions& d = options_.distortions;
+  const auto u = [&](std::uint64_t k) { return choice_rng_.uniform4(step, 8 * i + k); };
+  const auto a = u(0), b = u(1), c = u(2);
+  Image p{};
+  p.step = step;
+  p.image = i;
+  p.view = std::min(static_cast<Index>(a[0] * static_cast<float>(views_.size())),
+                    static_cast<Index>(views_.size()) - 1);
+  p.message = random_message(owner_.options().bits, message_rng_,
+                             step * static_cast<std::uint64_t>(options_.batch) + i);
+  p.signs = cell_signs(code_, p.message);
+  const auto often = [](float x) { return x < 2.f / 3; };
+  // Unless they are mixed, one of none, rotation, zoom, blur and noise for the whole batch.
+  const int only = d.mixed ? 0 : static_cast<int>(5 * choice_rng_.uniform4(step, kOfBatch)[0]);
+  const auto through = [&](int kind, bool drawn) { return d.mixed ? drawn : kind == only; };
+  const bool turned = through(1, often(a[1])), zoomed = through(2, often(a[3]));
+  const double angle =
+      turned ? blend(-d.rotation, d.rotation, static_cast<double>(a[2])) * 3.14159265358979 / 180 : 0;
+  const double zoom = zoomed ? blend(d.zoom_out, d.zoom_in, static_cast<double>(b[0])) : 1;
+  // A window at a random place that stays inside the image; a small shift where the whole image is seen.
+  const PatchSize patch = owner_.options().patch();
+  const auto size = static_cast<double>(patch.height),
+             height = static_cast<double>(views_[at(p.view)].height);
+  const double room = 0.5 * std::max(zoom - 1, 0.04);
+  const double sx = blend(-room, room, static_cast<double>(b[1])) * static_cast<double>(patch.width),
+               sy = blend(-room, room, static_cast<double>(b[2])) * size;
+  p.warped = turned || zoomed || height != size;
+  p.warp = distort::similarity_matrix(static_cast<float>(angle), static_cast<float>(zoom * size / height),
+                                      static_cast<float>(sx), static_cast<float>(sy));
+  p.blur = through(3, b[3] < 1.f / 3) ? static_cast<float>(d.blur) * c[0] : 0.f;
+  p.noise = through(4, often(c[1])) ? static_cast<float>(d.noise) * c[2] : 0.f;
+  const double mark_psnr = owner_.options().mark_psnr;
+  const double db = mark_psnr - (mark_psnr - options_.first_mark_psnr) *
+                                    std::exp(-static_cast<double>(steps_) / options_.anneal);
+  p.target = std::pow(10.0, -db / 20);
+  return p;
+}
+
+// The cached samples, each moved by a random shift.
+float* Embedder::shifted_positions(Tape<float>& tape, const Image& p) const {
+  const CachedView& v = views_[at(p.view)];
+  const Index samples = static_cast<Index>(v.weight.size());
+  float* x = tape.scratch(3 * samples);
+  const auto beta = static_cast<float>(options_.distortions.sample_shift);
+  const std::uint64_t place = p.step * static_cast<std::uint64_t>(options_.batch) + p.image;
+  for (Index k = 0; k < samples; ++k) {
+    const auto z = shift_rng_.uniform4(place, static_cast<std::uint64_t>(k));
+    // A uniform number of variance 1 for each axis: the shape of so small a shift does not matter.
+    for (Index a = 0; a < 3; ++a)
+      x[3 * k + a] = v.position[at(3 * k + a)] + beta * 3.4641f * (z[at(a)] - 0.5f);
+  }
+  return x;
+}
+
+Var<float> Embedder::distort(Tape<float>& tape, Var<float> image, const Image& p) const {
+  const float level = nerf::background_value(owner_.field.background);
+  const float background[3] = {level, level, level};
+  const auto number = [&](float value) {
+    float* to = tape.scratch(1);
+    *to = value;
+    return tape.constant(to, {1});
+  };
+  if (p.warped) {
+    float* matrix = tape.scratch(6);
+    std::copy(p.warp.begin(), p.warp.end(), matrix);
+    const PatchSize size = owner_.options().patch();
+    image = distort::affine_warp(image, tape.constant(matrix, {6}),
+                                 {.height = size.height, .width = size.width, .background = background});
+  }
+  if (p.blur > 0) image = distort::blur(image, number(p.blur));
+  if (p.noise > 0) {
+    const Index n = image.shape().size();
+    float* field = tape.scratch(n + 3);
+    const std::uint64_t place = p.step * static_cast<std::uint64_t>(options_.batch) + p.image;
+    for (Index i = 0; i < n; i += 4) {
+      const auto z = noise_rng_.normal4(place, static_cast<std::uint64_t>(i));
+      std::copy_n(z.data(), std::min<Index>(4, n - i), field + i);
+    }
+    image = distort::noise(image, number(p.noise), std::span<const float>(field, at(n)));
+  }
+  return distort::quantize8(image);
+}
+
+double Embedder::run_image(Index image, Tape<float>& tape, float* grads, Figures& figures) const {
+  const Image p = draw(image);
+  const Params<float> params(owner_.params, grads);
+  return owner_.mark ? run_dense(p, tape, params, figures) : run_pooled(p, tape, params, figures);
+}
+
+void Embedder::step(double seconds) {
+  schedule_.observe(steps_, seconds);
+  std::vector<Figures> figures(at(options_.batch));
+  const double loss = loop_.run(
+      options_.batch,
+      [&](Index image, Index, Tape<float>& tape, float* grads) {
+        return run_image(image, tape, grads, figures[at(image)]);
+      },
+      owner_.params.grads());
+  step_parameters();
+  const double keep = steps_ == 0 ? 0 : 0.98, each = (1 - keep) / static_cast<double>(options_.batch);
+  figures_ = {keep * figures_.sign, keep * figures_.index, keep * figures_.bits,
+              keep * figures_.loss + (1 - keep) * loss};
+  for (const Figures& f : figures) {
+    figures_.sign += each * f.sign;
+    figures_.index += each * f.index;
+    figures_.bits += each * f.bits;
+  }
+  ++steps_;
+}
+
+// The extractor's parameters follow one another in the store.
+void Embedder::step_parameters() {
+  const double lr = schedule_.lr(steps_);
+  Index begin = owner_.params.size(), end = 0;
+  for (const auto& e : owner_.params.entries())
+    if (e.name.starts_with("extractor/")) {
+      begin = std::min(begin, e.offset);
+      end = std::max(end, e.offset + e.shape.size());
+    }
+  const AdamRange ranges[] = {{.begin = 0, .end = begin, .lr_factor = lr},
+                              {.begin = begin, .end = end, .lr_factor = lr * options_.extractor_lr},
+                              {.begin = end, .end = owner_.params.size(), .lr_factor = lr}};
+  adam_.step(owner_.params.values(), owner_.params.grads(), ranges);
+}
+
+void Embedder::calibrate(Index views) {
+  if (!owner_.mark && !owner_.options().budget) return;  // the content loss decides the strength
+  const MarkPsnrMeter meter(owner_.field, {.count = views, .seed = options_.seed + 77});
+  const double target = owner_.options().mark_psnr;
+  owner_.gain = std::pow(10.0, -target / 20);
+  nerf::Renderer renderer(owner_.field, mark_psnr_rendering());
+  // Three rounds: the first sets the size, the others what clamping and rounding to 8 bits change.
+  for (int round = 0; round < 3; ++round) {
+    const double mark_psnr = meter(renderer, [&](Index i) {
+      const auto message =
+          random_message(owner_.options().bits, message_rng_, ~static_cast<std::uint64_t>(i));
+      renderer.set_recolour(owner_.marking(cell_signs(code_, message)));
+    });
+    if (!std::isfinite(mark_psnr)) return;
+    owner_.gain *= std::pow(10.0, (mark_psnr - target) / 20);
+  }
+}
+
+std::string Embedder::fingerprint() const {
+  const OwnerOptions& o = owner_.options();
+  std::size_t samples = 0;  // tells views of other cameras and sizes apart
+  for (const CachedView& v : views_) samples += v.weight.size();
+  std::string text = std::string(preset_name(o.preset)) + ", " + std::to_string(o.bits) + " bits, " +
+                     std::to_string(o.mark_psnr) + " dB, " + std::to_string(owner_.cells.count()) +
+                     " cells, seed " + std::to_string(options_.seed) + ", steps " +
+                     std::to_string(options_.schedule.steps) + ", batch " + std::to_string(options_.batch) +
+                     ", views " + std::to_string(views_.size()) + " with " + std::to_string(samples) +
+                     " samples" + ", parameters " + std::to_string(owner_.params.size());
+  const auto add = [&](const char* name, double value) {
+    text += ", " + std::string(name) + " " + std::to_string(value);
+  };
+  const nerf::ScheduleOptions& s = options_.schedule;
+  add("lr", s.lr);
+  add("half after", s.half_after);
+  add("cooldown", s.cooldown);
+  add("last", s.last);
+  if (o.preset != Preset::fast) {
+    add("content", options_.content_weight);
+    add("message", options_.message_weight);
+    add("extractor", options_.extractor_lr);
+  }
+  if (o.preset == Preset::fast || o.budget) {
+    add("first strength", options_.first_mark_psnr);
+    add("anneal", options_.anneal);
+  }
+  if (o.preset == Preset::fast) {
+    add("sign", options_.sign_weight);
+    add("index", options_.index_weight);
+    add("bits", options_.bits_weight);
+    add("smooth", options_.smooth_weight);
+    add("flat", options_.flat_weight);
+    add("tilt", o.mark.tilt);
+    add("shading", o.mark.shading);
+  }
+  const EmbedDistortions& d = options_.distortions;
+  add("noise", d.noise);
+  add("rotation", d.rotation);
+  add("zoom out", d.zoom_out);
+  add("zoom in", d.zoom_in);
+  add("blur", d.blur);
+  add("sample shift", d.sample_shift);
+  add("mixed", d.mixed);
+  return text;
+}
+
+void Embedder::save(const std::filesystem::path& path) const {
+  SafetensorsFile file = new_checkpoint(fingerprint());
+  const Index n = owner_.params.size();
+  file.add("values", {n}, owner_.params.values());
+  file.add("mean", {n}, adam_.mean());
+  file.add("mean_square", {n}, adam_.mean_square());
+  const std::int64_t counts[] = {steps_, schedule_.total()};
+  const double figures[] = {figures_.sign, figures_.index, figures_.bits, figures_.loss};
+  file.add("counts", {2}, counts);
+  file.add("figures", {4}, figures);
+  file.add("key", {32}, std::span<const std::uint8_t>(owner_.key.bytes));
+  file.write(path);
+  make_private(path);
+}
+
+void Embedder::restore(const std::filesystem::path& path) {
+  const SafetensorsFile file = read_checkpoint(path, fingerprint());
+  if (file.u8("key") != std::vector<std::uint8_t>(owner_.key.bytes.begin(), owner_.key.bytes.end()))
+    throw IoError(path.string() + ": expected a checkpoint under this key, found one under another");
+  restore_numbers(file, "values", owner_.params.values());
+  restore_numbers(file, "mean", adam_.mean());
+  restore_numbers(file, "mean_square", adam_.mean_square());
+  const auto counts = file.i64("counts");
+  const auto figures = file.f64("figures").data;
+  if (counts.size() != 2 || figures.size() != 4)
+    throw IoError(path.string() + ": expected 2 counts and 4 figures, found " +
+                  std::to_string(counts.size()) + " and " + std::to_string(figures.size()));
+  steps_ = counts[0];
+  schedule_.resume(counts[1]);
+  adam_.set_steps(steps_);
+  figures_ = {figures[0], figures[1], figures[2], figures[3]};
+}
+
+Key Embedder::checkpoint_key(const std::filesystem::path& path) {
+  const SafetensorsFile file = SafetensorsFile::read(path);
+  if (!file.has("key"))
+    throw IoError(path.string() + ": expected a checkpoint of embed, found no tensor 'key'");
+  const std::vector<std::uint8_t> bytes = file.u8("key");
+  if (bytes.size() != Key{}.bytes.size())
+    throw IoError(path.string() + ": tensor 'key': expected " + std::to_string(Key{}.bytes.size()) +
+                  " bytes, found " + std::to_string(bytes.size()));
+  return key_from_bytes(bytes);
+}
+
+}  // namespace fieldmark::watermark

@@ -1,0 +1,118 @@
+#include <fieldmark/core/error.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/watermark/evidence/evidence.h>
+#include <fieldmark/watermark/evidence/wrong_keys.h>
+#include <fieldmark/watermark/keys/keyed_hash.h>
+#include <fieldmark/watermark/mark/cell_code.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+namespace fieldmark::watermark {
+namespace {
+constexpr Index kKeysPerPiece = 128, kPiecesPerRound = 64;
+
+Key root_key(std::uint64_t seed) {
+  Key root;
+  for (std::size_t k = 0; k < sizeof(seed); ++k) root.bytes[k] = static_cast<std::uint8_t>(seed >> (8 * k));
+  return root;
+}
+
+constexpr std::array<double, WrongKeyCounts::kThresholds> kThresholdValues{1e-1, 1e-2, 1e-3, 1e-4,
+                                                                           1e-5, 1e-6, 1e-7, 1e-8};
+
+void add_statistic(double t, WrongKeyCounts& to) {
+  const double p = keyed_p_value(t);
+  for (std::size_t i = 0; i < to.counts.size(); ++i) to.counts[i] += p <= kThresholdValues[i];
+  to.least_p = std::min(to.least_p, p);
+  constexpr int kPerUnit = WrongKeyCounts::kBinsPerUnit, kBins = WrongKeyCounts::kBins, kZero = kBins / 2;
+  ++to.histogram[static_cast<std::size_t>(std::clamp(std::floor(t * kPerUnit) + kZero, 0., kBins - 1.))];
+  ++to.n;
+}
+
+void add_counts(const WrongKeyCounts& from, WrongKeyCounts& to) {
+  to.n += from.n;
+  for (std::size_t i = 0; i < from.counts.size(); ++i) to.counts[i] += from.counts[i];
+  for (std::size_t i = 0; i < from.histogram.size(); ++i) to.histogram[i] += from.histogram[i];
+  to.least_p = std::min(to.least_p, from.least_p);
+}
+
+// P(X = k + 1) / P(X = k) of a binomial with odds p / (1 - p).
+long double rise(Index k, Index n, long double odds) {
+  return static_cast<long double>(n - k) / static_cast<long double>(k + 1) * odds;
+}
+
+void check_binomial(Index n, double p, double level) {
+  if (n < 0) throw ValueError("[binomial_upper] n must be at least 0, got " + std::to_string(n));
+  if (!(p >= 0 && p <= 1)) throw ValueError("[binomial_upper] p must be in [0, 1], got " + std::to_string(p));
+  if (!(level > 0 && level < 1)) {
+    throw ValueError("[binomial_upper] level must be in (0, 1), got " + std::to_string(level));
+  }
+}
+}  // namespace
+
+WrongKeyCounts count_wrong_keys(std::span<const double> evidence, std::span<const double> area,
+                                const Message& message, Index n, std::uint64_t seed,
+                                const std::function<bool(Index, Index)>& progress) {
+  if (n < 0) throw ValueError("[count_wrong_keys] n must be at least 0, got " + std::to_string(n));
+  const CellDealer dealer(area, message.size());
+  const Key root = root_key(seed);
+  WrongKeyCounts total;
+  while (total.n < n) {
+    const Index first = total.n, round = std::min(n - first, kKeysPerPiece * kPiecesPerRound);
+    std::array<WrongKeyCounts, kPiecesPerRound> pieces;
+    parallel_for(round, kKeysPerPiece, [&](Index begin, Index end) {
+      CellCode code;
+      WrongKeyCounts& piece = pieces[static_cast<std::size_t>(begin / kKeysPerPiece)];
+      for (Index i = first + begin; i < first + end; ++i) {
+        dealer.deal(derive_key(root, "fieldmark wrong key", static_cast<std::uint64_t>(i)), code);
+        add_statistic(keyed_statistic(evidence, code, message), piece);
+      }
+    });
+    for (const WrongKeyCounts& piece : pieces) add_counts(piece, total);
+    if (progress && !progress(total.n, n)) throw Error("[count_wrong_keys] stopped");
+  }
+  return total;
+}
+
+Index binomial_upper(Index n, double p, double level) {
+  check_binomial(n, p, level);
+  if (p == 0 || n == 0) return 0;
+  if (p == 1) return n;
+  // Weights relative to the mode's, as far as they count on both sides: no factorials, no underflow for any
+  // n.
+  const long double odds = static_cast<long double>(p) / (1 - static_cast<long double>(p));
+  const auto mode = std::min(n, static_cast<Index>(static_cast<double>(n + 1) * p));
+  constexpr long double kNegligible = 1e-25L;
+  std::vector<long double> below, above{1};
+  for (Index k = mode; k > 0; --k) {
+    below.push_back((below.empty() ? 1 : below.back()) / rise(k - 1, n, odds));
+    if (below.back() < kNegligible) break;
+  }
+  for (Index k = mode; k < n && above.back() >= kNegligible; ++k)
+    above.push_back(above.back() * rise(k, n, odds));
+  long double total = 0;
+  for (long double weight : below) total += weight;
+  for (long double weight : above) total += weight;
+
+  long double cumulated = 0;
+  for (std::size_t i = below.size(); i-- > 0;) {
+    cumulated += below[i];
+    if (cumulated >= level * total) return mode - 1 - static_cast<Index>(i);
+  }
+  for (std::size_t i = 0; i < above.size(); ++i) {
+    cumulated += above[i];
+    if (cumulated >= level * total) return mode + static_cast<Index>(i);
+  }
+  return mode + static_cast<Index>(above.size()) - 1;
+}
+
+CountInterval binomial_interval(Index n, double p, double level) {
+  // n - X ~ Binomial(n, 1 - p): its upper bound is the lower one of X.
+  const double each = 1 - (1 - level) / 2;
+  return {n - binomial_upper(n, 1 - p, each), binomial_upper(n, p, each)};
+}
+
+}  // namespace fieldmark::watermark

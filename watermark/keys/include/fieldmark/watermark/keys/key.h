@@ -1,0 +1,40 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+
+namespace fieldmark::watermark {
+
+/// The owner's secret, 256 bits: who does not hold it cannot say what an image's cells should show.
+struct Key {
+  std::array<std::uint8_t, 32> bytes{};  ///< to be kept from logs and reports
+  /// Compares in a time that may depend on the bytes.
+  friend bool operator==(const Key&, const Key&) = default;
+};
+
+/// 256 bits from the operating system's random source; never from a seed.
+/// @throws Error if the system has none
+Key random_key();
+
+/// A key from known bytes, for tests and for keys kept elsewhere.
+/// @param bytes  32 of them   @throws ValueError otherwise
+Key key_from_bytes(std::span<const std::uint8_t> bytes);
+
+/// 64 lower-case hexadecimal digits.
+std::string to_hex(const Key& key);
+
+/// Writes a KEY file: safetensors with an array "key" of 32 bytes and the kind "key" (see ModelInfo). A file
+/// is made readable by its owner alone.   @throws IoError if writing fails
+void save_key(const std::filesystem::path& path, const Key& key);
+
+/// Lets only its owner read and write a file: done to whatever holds a key. Pipes and devices stay as they
+/// are.
+/// @throws IoError if the system refuses
+void make_private(const std::filesystem::path& path);
+
+/// @throws IoError if the file cannot be read, is of another kind, or its array is not 32 bytes
+Key load_key(const std::filesystem::path& path);
+
+}  // namespace fieldmark::watermark

@@ -1,0 +1,76 @@
+#include <fieldmark/core/error.h>
+#include <fieldmark/watermark/keys/keyed_hash.h>
+#include <fieldmark/watermark/mark/cell_code.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+namespace fieldmark::watermark {
+
+Index CellCode::carriers() const {
+  return std::count_if(bit.begin(), bit.end(), [](std::int32_t b) { return b >= 0; });
+}
+
+CellDealer::CellDealer(std::span<const double> area, Index n_bits)
+    : cells_(area.size()), n_bits_(static_cast<std::size_t>(n_bits)) {
+  if (n_bits < 1) throw ValueError("[deal_cells] n_bits must be at least 1, got " + std::to_string(n_bits));
+  for (std::size_t c = 0; c < area.size(); ++c) {
+    if (!std::isfinite(area[c]) || area[c] < 0) {
+      throw ValueError("[deal_cells] area: cell " + std::to_string(c) + " must be finite and >= 0, got " +
+                       std::to_string(area[c]));
+    }
+    if (area[c] > 0) ranked_.push_back(c);
+  }
+  if (ranked_.size() < n_bits_) {
+    throw ValueError("[deal_cells] area: must have at least " + std::to_string(n_bits) +
+                     " cells of positive area (one for each bit), got " + std::to_string(ranked_.size()));
+  }
+  std::stable_sort(ranked_.begin(), ranked_.end(),
+                   [&](std::size_t a, std::size_t b) { return area[a] > area[b]; });
+}
+
+void CellDealer::deal(const Key& key, CellCode& code) const {
+  // A word for each bit of each group: where the last group is short, which bits it serves is keyed too.
+  const std::size_t groups = (ranked_.size() + n_bits_ - 1) / n_bits_;
+  std::vector<std::uint64_t> words(groups * n_bits_);
+  keyed_words(key, "fieldmark cell order", words);
+  code.bit.assign(cells_, -1);
+  code.sign.resize(cells_);
+  keyed_signs(key, "fieldmark cell sign", code.sign);
+
+  std::vector<std::pair<std::uint64_t, std::int32_t>> bits(n_bits_);
+  for (std::size_t begin = 0; begin < ranked_.size(); begin += n_bits_) {
+    for (std::size_t k = 0; k < n_bits_; ++k) bits[k] = {words[begin + k], static_cast<std::int32_t>(k)};
+    std::sort(bits.begin(), bits.end());
+    const std::size_t count = std::min(n_bits_, ranked_.size() - begin);
+    for (std::size_t k = 0; k < count; ++k) code.bit[ranked_[begin + k]] = bits[k].second;
+  }
+  for (std::size_t c = 0; c < cells_; ++c) {
+    if (code.bit[c] < 0) code.sign[c] = 0;
+  }
+}
+
+CellCode deal_cells(const Key& key, std::span<const double> area, Index n_bits) {
+  CellCode code;
+  CellDealer(area, n_bits).deal(key, code);
+  return code;
+}
+
+std::vector<std::int8_t> cell_signs(const CellCode& code, const Message& message) {
+  std::vector<std::int8_t> signs(code.bit.size(), 0);
+  for (std::size_t c = 0; c < signs.size(); ++c) {
+    if (code.bit[c] < 0) continue;
+    if (code.bit[c] >= message.size()) {
+      throw ValueError("[cell_signs] code: the bit of cell " + std::to_string(c) + " must be below " +
+                       std::to_string(message.size()) + " (the message's length), got " +
+                       std::to_string(code.bit[c]));
+    }
+    const int bipolar = 2 * message.bits[static_cast<std::size_t>(code.bit[c])] - 1;
+    signs[c] = static_cast<std::int8_t>(bipolar * code.sign[c]);
+  }
+  return signs;
+}
+
+}  // namespace fieldmark::watermark

@@ -1,0 +1,120 @@
+#include <fieldmark/engine/ops/activation.h>
+#include <fieldmark/engine/ops/columns.h>
+#include <fieldmark/engine/ops/rows.h>
+#include <fieldmark/engine/shape_checks.h>
+#include <fieldmark/nerf/frequency_encoding.h>
+#include <fieldmark/watermark/mark/global_mark.h>
+
+#include <string>
+
+namespace fieldmark::watermark {
+namespace {
+
+GlobalMarkOptions checked(const GlobalMarkOptions& o) {
+  if (o.bits < 1 || o.message_features < 1 || o.colour_features < 1 || o.width < 2)
+    throw ValueError(
+        "[global_mark] bits, message_features and colour_features must be at least 1 and width at least 2, "
+        "got " +
+        std::to_string(o.bits) + ", " + std::to_string(o.message_features) + ", " +
+        std::to_string(o.colour_features) + " and " + std::to_string(o.width));
+  if (o.position_bands < 1 || o.position_bands > 20 || o.direction_bands < 1 || o.direction_bands > 20)
+    throw ValueError("[global_mark] position_bands and direction_bands must be 1 to 20, got " +
+                     std::to_string(o.position_bands) + " and " + std::to_string(o.direction_bands));
+  return o;
+}
+
+// A network of the given widths, ReLU behind all layers but the last, and there too if asked for.
+template <class T>
+std::vector<Dense<T>> network(ParamStore<T>& store, const std::string& name,
+                              std::initializer_list<Index> widths, bool relu_at_end, std::uint64_t seed) {
+  std::vector<Dense<T>> layers;
+  for (const Index* w = widths.begin(); w + 1 != widths.end(); ++w) {
+    const bool last = w + 2 == widths.end();
+    layers.emplace_back(
+        store, name + "/" + std::to_string(layers.size()),
+        DenseOptions{.in = w[0],
+                     .out = w[1],
+                     .activation = last && !relu_at_end ? Activation::none : Activation::relu},
+        seed + layers.size());
+  }
+  return layers;
+}
+
+template <class T>
+Var<T> through(const std::vector<Dense<T>>& layers, const Params<T>& params, Var<T> x) {
+  for (const Dense<T>& layer : layers) x = layer(params, x);
+  return x;
+}
+
+}  // namespace
+
+template <class T>
+GlobalMark<T>::GlobalMark(ParamStore<T>& store, std::string_view name, const GlobalMarkOptions& options,
+                          std::uint64_t seed)
+    : options_(checked(options)) {
+  const std::string prefix(name);
+  const auto& o = options_;
+  const Index position = 3 + 6 * o.position_bands, direction = 3 + 6 * o.direction_bands;
+  if (!o.fusion.bare_colour)
+    encode_ = network(store, prefix + "/encode",
+                      {position + (o.fusion.late_direction ? 0 : direction) + colour_inputs(), o.width,
+                       o.width, o.width, o.colour_features},
+                      false, seed + 10);
+  if (!o.fusion.bare_message)
+    message_ = network(store, prefix + "/message", {o.bits, o.message_features, o.message_features}, true,
+                       seed + 20);
+  register_fusion(store, prefix + "/fuse", seed + 30);
+}
+
+template <class T>
+void GlobalMark<T>::register_fusion(ParamStore<T>& store, const std::string& name, std::uint64_t seed) {
+  const auto& o = options_;
+  const Index again = o.fusion.repeated ? o.bits + colour_inputs() : 0;
+  const Index first = (o.fusion.bare_colour ? 0 : o.colour_features) +
+                      (o.fusion.bare_message ? o.bits : o.message_features) +
+                      (o.fusion.late_direction ? 3 + 6 * o.direction_bands : 0) + colour_inputs() + again;
+  const Index in[] = {first, o.width + again, o.width / 2}, out[] = {o.width, o.width / 2, 3};
+  for (int k = 0; k < 3; ++k)
+    fuse_.emplace_back(
+        store, name + "/" + std::to_string(k),
+        DenseOptions{.in = in[k], .out = out[k], .activation = k < 2 ? Activation::relu : Activation::none},
+        seed + static_cast<std::uint64_t>(k));
+}
+
+template <class T>
+Var<T> GlobalMark<T>::operator()(const Params<T>& params, Var<T> x, Var<T> d, Var<T> c,
+                                 Var<T> message) const {
+  check_rank("global_mark", "message", message.shape(), 2, "[1, N_b]");
+  check_extent("global_mark", "message", message.shape(), 0, 1, "one message for all places");
+  check_extent("global_mark", "message", message.shape(), 1, options_.bits, "bits of the mark");
+  const Index n = x.shape()[0];
+  const MarkFusion& fusion = options_.fusion;
+  const Var<T> of_direction = concat_columns<T>({d, nerf::frequency_encoding(d, options_.direction_bands)});
+  std::vector<Var<T>> inputs;  // of G, but for c
+  if (!fusion.bare_colour) {
+    std::vector<Var<T>> of_place{x, nerf::frequency_encoding(x, options_.position_bands)};
+    if (!fusion.late_direction) of_place.push_back(of_direction);
+    of_place.push_back(c);
+    inputs.push_back(through(encode_, params, concat_columns<T>(of_place)));
+  }
+  inputs.push_back(broadcast_rows(through(message_, params, message), n));
+  if (fusion.late_direction) inputs.push_back(of_direction);
+  return fused(params, std::move(inputs), c, broadcast_rows(message, n));
+}
+
+// c_m = sigmoid(G(inputs, c)), with M and c once more before each hidden layer where the fusion says so.
+template <class T>
+Var<T> GlobalMark<T>::fused(const Params<T>& params, std::vector<Var<T>> inputs, Var<T> c,
+                            Var<T> message) const {
+  inputs.push_back(c);
+  for (std::size_t k = 0; k < fuse_.size(); ++k) {
+    if (options_.fusion.repeated && k < 2) inputs.insert(inputs.end(), {message, c});
+    inputs = {fuse_[k](params, concat_columns<T>(inputs))};
+  }
+  return sigmoid(inputs.front());
+}
+
+template class GlobalMark<float>;
+template class GlobalMark<double>;
+
+}  // namespace fieldmark::watermark

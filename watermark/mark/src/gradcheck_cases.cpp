@@ -1,0 +1,101 @@
+#include <fieldmark/watermark/mark/global_mark.h>
+#include <fieldmark/watermark/mark/gradcheck_cases.h>
+#include <fieldmark/watermark/mark/mark_network.h>
+#include <fieldmark/watermark/mark/power_budget.h>
+#include <fieldmark/watermark/mark/weighted_segments.h>
+
+#include <cmath>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace fieldmark::watermark {
+namespace {
+
+// Fixed numbers in (0, 1) without a pattern.
+Tensor<double> numbers(Shape shape, double phase) {
+  Tensor<double> t(shape);
+  for (Index i = 0; i < t.size(); ++i)
+    t[i] = 0.5 + 0.5 * std::sin(phase + 1.7 * static_cast<double>(i * i + i));
+  return t;
+}
+
+// Every ReLU of a layer well open or well shut, in turns: differences must not step over its kink.
+void open_and_shut(ParamStore<double>& store, const std::string& layer, double open) {
+  const std::span<double> bias = store.values(store.find(layer + "/bias"));
+  for (std::size_t i = 0; i < bias.size(); ++i) bias[i] = i % 2 == 0 ? open : -2 * open;
+}
+
+GradcheckReport check_mark_network() {
+  ParamStore<double> store;
+  const MarkNetwork<double> net(store, "mark", {.bands = 2, .features = 4, .tilt = 50, .shading = 0.9}, 3);
+  open_and_shut(store, "mark/encode/0", 20);
+  open_and_shut(store, "mark/encode/1", 4);
+  open_and_shut(store, "mark/fuse/0", 2);
+  for (const char* name : {"mark/encode/1/weight", "mark/fuse/0/weight"})  // the tanh stays where it bends
+    for (double& w : store.values(store.find(name))) w *= 0.02;
+  const std::vector<Tensor<double>> in{numbers({3, 3}, 1), numbers({3, 3}, 2)};
+  return gradcheck_module(
+      [&](Tape<double>&, const Params<double>& params, auto v) { return net.carrier(params, v[0], v[1]); },
+      store, in);
+}
+
+GradcheckReport check_global_mark(const MarkFusion& fusion) {
+  ParamStore<double> store;
+  const GlobalMark<double> net(store, "mark",
+                               {.bits = 2,
+                                .message_features = 3,
+                                .colour_features = 3,
+                                .position_bands = 2,
+                                .direction_bands = 1,
+                                .width = 4,
+                                .fusion = fusion},
+                               3);
+  // Layers with a ReLU get weights so small that no sum of theirs reaches the bias.
+  const std::pair<const char*, double> layers[] = {
+      {"encode/0", 0.05},  {"encode/1", 0.2}, {"encode/2", 0.15}, {"message/0", 0.2},
+      {"message/1", 0.15}, {"fuse/0", 0.06},  {"fuse/1", 0.15}};
+  for (const auto& [layer, weights] : layers) {
+    if ((fusion.bare_colour && std::string_view(layer).starts_with("encode")) ||
+        (fusion.bare_message && std::string_view(layer).starts_with("message")))
+      continue;
+    open_and_shut(store, std::string("mark/") + layer, 1);
+    for (double& w : store.values(store.find(std::string("mark/") + layer + "/weight"))) w *= weights;
+  }
+  const std::vector<Tensor<double>> in{numbers({2, 3}, 1), numbers({2, 3}, 2),
+                                       numbers({2, net.colour_inputs()}, 3), numbers({1, 2}, 4)};
+  return gradcheck_module([&](Tape<double>&, const Params<double>& params,
+                              auto v) { return net(params, v[0], v[1], v[2], v[3]); },
+                          store, in);
+}
+
+GradcheckReport check_power_budget() {
+  const std::vector<double> mask{1, 0, 0.5, 2};
+  const std::vector<Tensor<double>> in{numbers({4, 3}, 1)};
+  return gradcheck(
+      [&](Tape<double>&, auto v) { return power_budget(v[0], std::span<const double>(mask), 0.3); }, in);
+}
+
+GradcheckReport check_weighted_segments() {
+  const std::vector<std::int32_t> begin{0, 2, 2, 3, 6};
+  const std::vector<double> weights{0.5, -1, 2, 0, 0.25, 1};
+  const std::vector<Tensor<double>> in{numbers({6, 2}, 1)};
+  return gradcheck(
+      [&](Tape<double>&, auto v) { return weighted_segments(v[0], begin, std::span<const double>(weights)); },
+      in);
+}
+
+}  // namespace
+
+std::vector<GradcheckCase> gradcheck_cases() {
+  return {{"global_mark", [] { return check_global_mark({}); }},
+          {"global_mark, without MFF", [] { return check_global_mark({.bare_message = true}); }},
+          {"global_mark, without CFF", [] { return check_global_mark({.bare_colour = true}); }},
+          {"global_mark, code",
+           [] { return check_global_mark({.late_direction = true, .raw_colour = true, .repeated = true}); }},
+          {"mark_network", check_mark_network},
+          {"power_budget", check_power_budget},
+          {"weighted_segments", check_weighted_segments}};
+}
+
+}  // namespace fieldmark::watermark

@@ -1,0 +1,155 @@
+#include <fieldmark/core/error.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/watermark/mark/view_cache.h>
+
+#include <algorithm>
+#include <array>
+
+namespace fieldmark::watermark {
+namespace {
+
+constexpr float kLeastOpacity = 0.02f;  // a ray that sees less is background
+constexpr float kPart = 1.f / 128;      // cube sides, half of the finest cell: what lies so near is one part
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+// Calls trace(lane, row, rays) for the rays of every row of pixels; directions [P, 3] are written.
+template <class F>
+void for_rows(const nerf::RadianceField& field, const nerf::Camera& camera, std::vector<float>& direction,
+              F trace) {
+  const Index w = camera.width;
+  parallel_for(nerf::Renderer::kLanes, 1, [&](Index lane, Index) {
+    std::vector<float> pixels(at(2 * w));
+    nerf::CubeRays rays;
+    rays.resize(w);
+    for (Index y = lane; y < camera.height; y += nerf::Renderer::kLanes) {
+      for (Index x = 0; x < w; ++x) {
+        pixels[at(2 * x)] = static_cast<float>(x);
+        pixels[at(2 * x + 1)] = static_cast<float>(y);
+      }
+      rays.set(field.space, 0, camera, pixels);
+      std::copy(rays.seen_from.begin(), rays.seen_from.end(), direction.begin() + 3 * y * w);
+      trace(lane, y, rays);
+    }
+  });
+}
+
+// Joins what lies together on a ray: samples from `from` on, near to far, become parts of at most kPart along
+// the ray, each at the mean place and colour of its samples by weight. Returns the end of the parts.
+std::vector<nerf::SeenSample>::iterator join_parts(std::vector<nerf::SeenSample>::iterator from,
+                                                   std::vector<nerf::SeenSample>::iterator to) {
+  auto part = from;
+  std::array<float, 3> start = from->position;
+  for (auto s = from + 1; s != to; ++s) {
+    float square = 0;
+    for (std::size_t a = 0; a < 3; ++a) square += (s->position[a] - start[a]) * (s->position[a] - start[a]);
+    if (square > kPart * kPart) {
+      start = s->position;
+      *++part = *s;
+      continue;
+    }
+    const float share = s->weight / (part->weight + s->weight);
+    for (std::size_t a = 0; a < 3; ++a) {
+      part->position[a] += share * (s->position[a] - part->position[a]);
+      part->colour[a] += share * (s->colour[a] - part->colour[a]);
+    }
+    part->weight += s->weight;
+  }
+  return part + 1;
+}
+
+// Leaves the heaviest parts of each ray of a row, heaviest first. rgba [w, 4] is written: the image,
+// without the background.
+void keep_heaviest(std::vector<nerf::SeenSample>& row, Index parts, float* rgba) {
+  auto end = row.begin();
+  for (auto from = row.begin(); from != row.end();) {
+    const Index ray = from->ray;
+    const auto to = std::find_if(from, row.end(), [&](const auto& s) { return s.ray != ray; });
+    float* c = rgba + 4 * ray;
+    for (auto s = from; s != to; ++s) {
+      for (std::size_t a = 0; a < 3; ++a) c[a] += s->weight * s->colour[a];
+      c[3] += s->weight;
+    }
+    const auto joined = join_parts(from, to);
+    std::stable_sort(from, joined, [](const auto& a, const auto& b) { return a.weight > b.weight; });
+    const auto kept = std::min<std::ptrdiff_t>(parts, joined - from);
+    float sum = 0;
+    for (auto s = from; s != from + kept; ++s) sum += s->weight;
+    for (auto s = from; s != from + kept; ++s, ++end) {
+      *end = *s;
+      end->weight *= std::min(c[3], 1.f) / sum;
+    }
+    from = to;
+  }
+  row.erase(end, row.end());
+}
+
+// All pixels: rgba [P, 4], direction [P, 3] and, row by row, the samples.
+struct Traced {
+  std::vector<float> rgba, direction;
+  std::vector<std::vector<nerf::SeenSample>> rows;
+};
+
+Traced trace_all(nerf::Renderer& renderer, const nerf::RadianceField& field, const nerf::Camera& camera,
+                 Index samples) {
+  const Index w = camera.width, pixels = camera.height * w;
+  Traced t{std::vector<float>(at(4 * pixels)), std::vector<float>(at(3 * pixels)), {}};
+  t.rows.resize(at(camera.height));
+  for_rows(field, camera, t.direction, [&](Index lane, Index y, const nerf::CubeRays& rays) {
+    float* rgba = &t.rgba[at(4 * y * w)];
+    auto& row = t.rows[at(y)];
+    if (samples > 1) {
+      renderer.trace_samples(rays.batch(field.space), lane, row);
+      keep_heaviest(row, samples, rgba);
+      return;
+    }
+    std::vector<float> position(at(3 * w));
+    renderer.trace(rays.batch(field.space), lane, rgba, position.data());
+    for (Index i = 0; i < w; ++i) {
+      const float *c = rgba + 4 * i, *x = &position[at(3 * i)];
+      if (c[3] > 0)
+        row.push_back({.ray = i,
+                       .weight = std::min(c[3], 1.f),
+                       .position = {x[0], x[1], x[2]},
+                       .colour = {c[0] / c[3], c[1] / c[3], c[2] / c[3]}});
+    }
+  });
+  return t;
+}
+
+}  // namespace
+
+CachedView cache_view(nerf::Renderer& renderer, const nerf::RadianceField& field, const nerf::Camera& camera,
+                      Index samples) {
+  if (samples < 1)
+    throw ValueError("[cache_view] samples must be at least 1, got " + std::to_string(samples));
+  const Index h = camera.height, w = camera.width;
+  const Traced traced = trace_all(renderer, field, camera, samples);
+  const float background = nerf::background_value(field.background);
+  CachedView view{h, w, Tensor<float>({h, w, 3}), Tensor<float>({h, w}), {0}, {}, {}, {}, {}};
+  for (Index y = 0; y < h; ++y) {
+    auto next = traced.rows[at(y)].begin();
+    const auto end = traced.rows[at(y)].end();
+    for (Index x = 0; x < w; ++x) {
+      const Index p = y * w + x;
+      const float* c = &traced.rgba[at(4 * p)];
+      for (Index a = 0; a < 3; ++a)
+        view.base[3 * p + a] = std::clamp(c[a] + (1 - c[3]) * background, 0.f, 1.f);
+      view.opacity[p] = std::min(c[3], 1.f);
+      for (; next != end && next->ray == x; ++next) {
+        if (c[3] < kLeastOpacity) continue;
+        for (std::size_t a = 0; a < 3; ++a) {
+          view.position.push_back(next->position[a]);
+          view.direction.push_back(traced.direction[at(3 * p) + a]);
+          view.colour.push_back(std::clamp(next->colour[a], 0.f, 1.f));
+        }
+        view.weight.push_back(next->weight);
+      }
+      view.sample_begin.push_back(static_cast<std::int32_t>(view.weight.size()));
+    }
+  }
+  view.camera = camera;
+  return view;
+}
+
+}  // namespace fieldmark::watermark

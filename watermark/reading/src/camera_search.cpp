@@ -1,0 +1,303 @@
+#include <fieldmark/distort/rotate.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/random.h>
+#include <fieldmark/imaging/resize.h>
+#include <fieldmark/watermark/reading/camera_search.h>
+#include "camera_motion.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fieldmark/watermark/mark/cameras_around.h>
+#include "camera_proposal.h"
+
+namespace fieldmark::watermark {
+namespace {
+
+constexpr Index kMostMatches = 240;  // places that are compared
+constexpr std::size_t kLeastMatches = 8;
+constexpr Index kDraws = 48;         // pairs of places for each view
+constexpr double kTolerance = 0.05;  // of the window's longer side: about a cell
+constexpr int kFitSteps = 12;
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+constexpr Index kSmall = 24;    // pixels of a window's side
+constexpr Index kReduced = 96;  // longer side of the image that is turned
+constexpr int kTurns = 24;      // of 15 degrees
+
+// A window's content as a vector of length 1, without its mean.
+std::vector<float> small_window(const Tensor<float>& image, const Window& window, float background) {
+  std::vector<float> v = cut_window(image, window, square_patch(kSmall), background).data;
+  make_unit(v);
+  return v;
+}
+
+Tensor<float> turned(const Tensor<float>& image, double angle, float background) {
+  Tape<float> tape;
+  const auto a = static_cast<float>(angle);
+  const std::vector<float> around(3, background);
+  const Var<float> y = distort::rotate(tape.constant(image), tape.constant(&a, {1}), around);
+  return {y.shape(), std::vector<float>(y.value(), y.value() + y.shape().size())};
+}
+
+// The camera's view at another size in pixels of the same shape, to which sides of whole pixels would stretch
+// it: what a proposal takes over from a small render, no later motion mends. The right and lower edge move by
+// up to half a pixel.
+nerf::Camera reduced(const nerf::Camera& camera, Index size) {
+  const double zoom = static_cast<double>(size) / static_cast<double>(std::max(camera.width, camera.height));
+  nerf::Camera small = camera.scaled(size);
+  small.fx = zoom * camera.fx;
+  small.fy = zoom * camera.fy;
+  small.cx = zoom * camera.cx;
+  small.cy = zoom * camera.cy;
+  return small;
+}
+
+Complex middle(const Window& w) { return {w.x + w.width / 2, w.y + w.height / 2}; }
+
+}  // namespace
+
+CameraSearch::CameraSearch(const Owner& owner, const CameraSearchOptions& options)
+    : owner_(owner), options_(options) {
+  if (!owner.reader)
+    throw ValueError("[camera_search] owner must be of preset fast: preset paper has no cells in space");
+  if (options.views < 1 || options.around < 0 || options.size < 16)
+    throw ValueError("[camera_search] views, around and size must be at least 1, 0 and 16, got " +
+                     std::to_string(options.views) + ", " + std::to_string(options.around) + " and " +
+                     std::to_string(options.size));
+  nerf::Renderer renderer(owner.field, {.finer = 1});
+  for (const nerf::Camera& whole :
+       cameras_around(owner.field, options.views, options.around, 0, options.seed)) {
+    const nerf::Camera camera = reduced(whole, options.size);
+    const CachedView v = cache_view(renderer, owner.field, camera);
+    SmallView view{camera, std::vector<std::int32_t>(at(owner.cells.count()), -1), {}, {}, {}, {}};
+    std::vector<double> weight;
+    for (Index p = 0; p < v.height * v.width; ++p)
+      for (std::int32_t k = v.sample_begin[at(p)]; k < v.sample_begin[at(p + 1)]; ++k) {
+        const float* x = &v.position[3 * at(k)];
+        const std::int32_t cell = owner.cells.at(x);
+        if (cell < 0) continue;
+        std::int32_t& entry = view.of_cell[at(cell)];
+        if (entry < 0) {
+          entry = static_cast<std::int32_t>(view.seen.size());
+          view.seen.push_back({});
+          weight.push_back(0);
+        }
+        SeenCell& seen = view.seen[at(entry)];
+        const auto w = static_cast<double>(v.weight[at(k)]);
+        weight[at(entry)] += w;
+        const Index row = p / v.width;
+        seen.x += w * (static_cast<double>(p % v.width) + 0.5);
+        seen.y += w * (static_cast<double>(row) + 0.5);
+        for (std::size_t a = 0; a < 3; ++a) seen.point[a] += w * static_cast<double>(x[a]);
+      }
+    for (std::size_t e = 0; e < weight.size(); ++e) {
+      SeenCell& seen = view.seen[e];
+      seen.x /= weight[e];
+      seen.y /= weight[e];
+      for (double& a : seen.point) a /= weight[e];
+      seen.point = owner.field.space.to_world(seen.point);
+    }
+    const float background = nerf::background_value(owner.field.background);
+    view.window = object_window(v.base, background);
+    view.small = small_window(v.base, view.window, background);
+    view.area = SummedArea(v.base);
+    views_.push_back(std::move(view));
+  }
+}
+
+CameraSearch::Proposal CameraSearch::propose(const SmallView& view, std::size_t number,
+                                             const std::vector<Match>& matches, double tolerance) const {
+  struct Pair {
+    Complex from, to;
+    double share;
+  };
+  std::vector<Pair> pairs;
+  for (const Match& m : matches)
+    if (const std::int32_t e = view.of_cell[at(m.cell)]; e >= 0)
+      pairs.push_back({{view.seen[at(e)].x, view.seen[at(e)].y}, m.place, m.share});
+  Proposal best{number};
+  if (pairs.size() < kLeastMatches) return best;
+  const CounterRng rng(options_.seed, 43);
+  const auto n = static_cast<Index>(pairs.size());
+  const auto agreeing = [&](const Proposal& p, const Pair& q) {
+    const double d2 = std::norm(p.a * q.from + p.b - q.to) / (tolerance * tolerance);
+    return d2 < 1 ? q.share * (1 - d2) : 0.0;
+  };
+  for (Index draw = 0; draw < kDraws; ++draw) {
+    const Pair &p = pairs[at(rng.below(n, number, static_cast<std::uint64_t>(2 * draw)))],
+               &q = pairs[at(rng.below(n, number, static_cast<std::uint64_t>(2 * draw + 1)))];
+    if (std::abs(p.from - q.from) < 3 || std::abs(p.to - q.to) < 2 * tolerance) continue;
+    Proposal proposal{number, (p.to - q.to) / (p.from - q.from)};
+    proposal.b = p.to - proposal.a * p.from;
+    proposal.score = 0;
+    for (const Pair& pair : pairs) proposal.score += agreeing(proposal, pair);
+    if (proposal.score > best.score) best = proposal;
+  }
+  // Least squares over those that agree.
+  for (int pass = 0; pass < 3 && best.score > 0; ++pass) {
+    Complex from, to;
+    double total = 0;
+    std::vector<double> w;
+    for (const Pair& p : pairs) {
+      w.push_back(agreeing(best, p));
+      total += w.back();
+      from += w.back() * p.from;
+      to += w.back() * p.to;
+    }
+    if (!(total > 0)) break;
+    from /= total;
+    to /= total;
+    Complex cross;
+    double square = 0;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      cross += w[i] * std::conj(pairs[i].from - from) * (pairs[i].to - to);
+      square += w[i] * std::norm(pairs[i].from - from);
+    }
+    if (!(square > 0)) break;
+    Proposal next{number, cross / square};
+    next.b = to - next.a * from;
+    next.score = 0;
+    for (const Pair& p : pairs) next.score += agreeing(next, p);
+    if (!(next.score > best.score)) break;
+    best = next;
+  }
+  return best;
+}
+
+// The small view's camera, rolled, zoomed and slid as the proposal says.
+nerf::Camera CameraSearch::proposed(const Proposal& proposal, Index height, Index width) const {
+  const SmallView& view = views_[proposal.view];
+  nerf::Camera camera = view.camera;
+  const double zoom = std::abs(proposal.a), turn = std::arg(proposal.a);
+  // With y down, a turn of the image by an angle is a turn of the scene about the viewing axis against it.
+  camera =
+      moved(camera,
+            nerf::Vec3{camera.position()[0] + camera.forward()[0], camera.position()[1] + camera.forward()[1],
+                       camera.position()[2] + camera.forward()[2]},
+            {0, 0, -turn});
+  camera.fx *= zoom;
+  camera.fy *= zoom;
+  const Complex centre = proposal.a * Complex(view.camera.cx, view.camera.cy) + proposal.b;
+  camera.cx = centre.real();
+  camera.cy = centre.imag();
+  camera.width = width;
+  camera.height = height;
+  return camera;
+}
+
+// That camera, moved until its cells lie where they were seen.
+nerf::Camera CameraSearch::fitted(const Proposal& proposal, const std::vector<Match>& matches,
+                                  double tolerance, Index height, Index width) const {
+  const SmallView& view = views_[proposal.view];
+  nerf::Camera camera = proposed(proposal, height, width);
+  using Matrix = Eigen::Matrix<double, 9, 9>;
+  using Vector = Eigen::Matrix<double, 9, 1>;
+  nerf::Vec3 pivot{};
+  for (const SeenCell& s : view.seen)
+    for (std::size_t a = 0; a < 3; ++a) pivot[a] += s.point[a] / static_cast<double>(view.seen.size());
+  for (int step = 0; step < kFitSteps; ++step) {
+    Matrix h = Matrix::Zero();
+    Vector g = Vector::Zero();
+    for (const Match& m : matches) {
+      const std::int32_t e = view.of_cell[at(m.cell)];
+      if (e < 0) continue;
+      const nerf::Vec3& point = view.seen[at(e)].point;
+      const Projection p = project(camera, point);
+      if (!(p.depth > 0)) continue;
+      const double dx = m.place.real() - p.x, dy = m.place.imag() - p.y;
+      const double w = m.share / std::pow(1 + (dx * dx + dy * dy) / (tolerance * tolerance), 2);
+      const auto j = motion_gradient(camera, pivot, point);
+      const Eigen::Map<const Vector> jx(j[0].data()), jy(j[1].data());
+      h += w * (jx * jx.transpose() + jy * jy.transpose());
+      g += w * (dx * jx + dy * jy);
+    }
+    h.diagonal() = h.diagonal() * 1.02 + Vector::Constant(1e-3 * h.diagonal().maxCoeff());
+    const Vector m = h.ldlt().solve(g);
+    if (!m.allFinite()) break;
+    CameraMotion motion;
+    Eigen::Map<Vector>(motion.data()) = m.cwiseMax(-0.2).cwiseMin(0.2);
+    camera = moved(camera, pivot, motion);
+    if (!(project(camera, pivot).depth > 0)) return proposed(proposal, height, width);
+  }
+  return camera;
+}
+
+std::vector<nerf::Camera> CameraSearch::find(const SeenPlaces& places, Index height, Index width,
+                                             Index count) const {
+  std::vector<Match> matches;
+  for (Index p = 0; p < places.height * places.width; ++p) {
+    if (places.cell[at(p)] < 0) continue;
+    const Index row = p / places.width;
+    const double x = (static_cast<double>(p % places.width) + 0.5) / static_cast<double>(places.width),
+                 y = (static_cast<double>(row) + 0.5) / static_cast<double>(places.height);
+    matches.push_back(
+        {places.cell[at(p)],
+         {places.window.x + x * places.window.width, places.window.y + y * places.window.height},
+         static_cast<double>(places.share[at(p)])});
+  }
+  if (matches.size() < kLeastMatches) return {};
+  std::stable_sort(matches.begin(), matches.end(),
+                   [](const Match& a, const Match& b) { return a.share > b.share; });
+  if (static_cast<Index>(matches.size()) > kMostMatches) matches.resize(at(kMostMatches));
+
+  const double tolerance = kTolerance * std::max(places.window.width, places.window.height);
+  std::vector<Proposal> proposals(views_.size());
+  parallel_for(static_cast<Index>(views_.size()), 8, [&](Index begin, Index end) {
+    for (Index v = begin; v < end; ++v) proposals[at(v)] = propose(views_[at(v)], at(v), matches, tolerance);
+  });
+  std::stable_sort(proposals.begin(), proposals.end(),
+                   [](const Proposal& a, const Proposal& b) { return a.score > b.score; });
+  std::vector<nerf::Camera> cameras;
+  for (const Proposal& p : proposals) {
+    if (static_cast<Index>(cameras.size()) == count || !(p.score > 0)) break;
+    cameras.push_back(fitted(p, matches, tolerance, height, width));
+  }
+  return cameras;
+}
+
+std::vector<nerf::Camera> CameraSearch::find(const Tensor<float>& image, Index count) const {
+  const float background = nerf::background_value(owner_.field.background);
+  const Index h = image.shape[0], w = image.shape[1];
+  const double zoom = std::min(1.0, static_cast<double>(kReduced) / static_cast<double>(std::max(h, w)));
+  const auto side = [&](Index n) { return std::max<Index>(1, std::lround(zoom * static_cast<double>(n))); };
+  const Tensor<float> reduced = resize_area(image, side(h), side(w));
+  const Complex centre(0.5 * static_cast<double>(side(w)), 0.5 * static_cast<double>(side(h)));
+  std::vector<Proposal> best(views_.size());
+  for (int turn = 0; turn < kTurns; ++turn) {
+    const double angle = 2 * std::numbers::pi * turn / kTurns;
+    const Tensor<float> upright = turned(reduced, angle, background);
+    const Window window = object_window(upright, background);
+    const std::vector<float> small = small_window(upright, window, background);
+    for (std::size_t v = 0; v < views_.size(); ++v) {
+      double score = 0;
+      for (std::size_t i = 0; i < small.size(); ++i)
+        score += static_cast<double>(small[i] * views_[v].small[i]);
+      if (score <= best[v].score) continue;
+      // u in the render is at (u - middle) width / width' + middle' in the turned image, which shows the
+      // image's point q at e^(-i angle) (q - centre) + centre: y points down.
+      const Complex back = std::polar(1.0, angle);
+      const Complex a = back * window.width / views_[v].window.width;
+      const Complex b = back * (middle(window) - centre) + centre - a * middle(views_[v].window);
+      best[v] = {v, a / zoom, b / zoom, score};
+    }
+  }
+  return best_cameras(best, h, w, count);
+}
+
+std::vector<nerf::Camera> CameraSearch::best_cameras(std::vector<Proposal>& proposals, Index height,
+                                                     Index width, Index count) const {
+  std::stable_sort(proposals.begin(), proposals.end(),
+                   [](const Proposal& p, const Proposal& q) { return p.score > q.score; });
+  std::vector<nerf::Camera> cameras;
+  for (const Proposal& p : proposals) {
+    if (static_cast<Index>(cameras.size()) == count || !(p.score > 0)) break;
+    cameras.push_back(proposed(p, height, width));
+  }
+  return cameras;
+}
+
+}  // namespace fieldmark::watermark

@@ -1,0 +1,67 @@
+#include "carriers.h"
+#include <fieldmark/core/error.h>
+
+#include <algorithm>
+
+namespace fieldmark::watermark {
+namespace {
+
+constexpr Index kBlock = 4096;  // samples
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+// The entry of a cell among those of the last pixel, added where there is none.
+std::size_t entry_of(Carriers& c, std::int32_t cell) {
+  const auto entry = std::find(c.cell.begin() + c.begin.back(), c.cell.end(), cell);
+  const auto number = static_cast<std::size_t>(entry - c.cell.begin());
+  if (entry == c.cell.end()) {
+    c.cell.push_back(cell);
+    c.part.insert(c.part.end(), 3, 0.f);
+  }
+  return number;
+}
+
+// [S, 3] of all samples, by blocks: what the network keeps of a block stays in cache.
+std::vector<float> carrier_of(const Owner& owner, const CachedView& v) {
+  const auto n = static_cast<Index>(v.weight.size());
+  std::vector<float> out(at(3 * n));
+  Tape<float> tape;
+  for (Index begin = 0; begin < n; begin += kBlock) {
+    const Index count = std::min(kBlock, n - begin);
+    tape.reset();
+    const Var<float> carrier = owner.mark->carrier(Params<float>(owner.params, nullptr),
+                                                   tape.constant(&v.position[at(3 * begin)], {count, 3}),
+                                                   tape.constant(&v.colour[at(3 * begin)], {count, 3}));
+    std::copy_n(carrier.value(), 3 * count, out.begin() + 3 * begin);
+  }
+  return out;
+}
+
+}  // namespace
+
+Carriers carriers(const Owner& owner, const CachedView& v) {
+  if (!owner.mark) throw ValueError("[carriers] expected an owner that marks colours, got one without");
+  Carriers out{Tensor<float>({v.height, v.width, 3}), {0}, {}, {}};
+  const std::vector<float> carrier = carrier_of(owner, v);
+  const auto gain = static_cast<float>(owner.gain);
+  for (Index p = 0; p < v.height * v.width; ++p) {
+    for (std::int32_t k = v.sample_begin[at(p)]; k < v.sample_begin[at(p + 1)]; ++k) {
+      float seen[3];
+      for (std::size_t a = 0; a < 3; ++a) {
+        const float c = v.colour[3 * at(k) + a], add = gain * carrier[3 * at(k) + a];
+        seen[a] = v.weight[at(k)] * 0.5f * (std::clamp(c + add, 0.f, 1.f) - std::clamp(c - add, 0.f, 1.f));
+      }
+      const CellGrid::Mix mix = owner.cells.mix(&v.position[3 * at(k)]);
+      for (std::size_t m = 0; m < at(mix.count); ++m) {
+        if (mix.part[m] == 0) continue;
+        const std::size_t entry = entry_of(out, mix.cell[m]);
+        for (std::size_t a = 0; a < 3; ++a) out.part[3 * entry + a] += mix.part[m] * seen[a];
+      }
+      for (std::size_t a = 0; a < 3; ++a) out.whole[3 * p + static_cast<Index>(a)] += seen[a];
+    }
+    out.begin.push_back(static_cast<std::int32_t>(out.cell.size()));
+  }
+  return out;
+}
+
+}  // namespace fieldmark::watermark

@@ -1,0 +1,264 @@
+#include "jpeg_score.h"
+#include <fieldmark/distort/jpeg_blocks.h>
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/shape_checks.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace fieldmark::watermark {
+namespace {
+
+using distort::JpegBlock;
+using distort::JpegComponent;
+
+constexpr double kDecoding = 0.5;             // deviation of a decoder's rounding, levels
+constexpr double kOutlier = 0.02;             // share of coefficients that follow no rule ...
+constexpr double kOutlierWay = 512;           // ... and may be anywhere in so many levels
+constexpr double kLeastGain = 50;             // log-likelihood by which a table must explain an image
+constexpr double kFirst = 0.3, kRatio = 1.5;  // deviations tried, levels
+constexpr int kDeviations = 13;
+constexpr std::array kFactors{0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0};
+constexpr double kOnObject = 32;  // pixels of a block from which it counts for its band's deviation
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+// One component of an image, in levels, chroma perhaps at half size.
+struct Plane {
+  Index height = 0, width = 0;
+  std::vector<double> level;
+};
+
+Plane component_of(const Tensor<float>& image, int component, Index cell) {
+  const auto row = distort::jpeg_colour_row(component);
+  const Index h = image.shape[0], w = image.shape[1];
+  Plane p{(h + cell - 1) / cell, (w + cell - 1) / cell, {}};
+  p.level.resize(at(p.height * p.width));
+  const double share = 255 / static_cast<double>(cell * cell);
+  for (Index y = 0; y < p.height * cell; ++y)
+    for (Index x = 0; x < p.width * cell; ++x) {
+      const float* rgb = image.data.data() + 3 * (std::min(y, h - 1) * w + std::min(x, w - 1));
+      double& out = p.level[at((y / cell) * p.width + x / cell)];
+      for (std::size_t c = 0; c < 3; ++c) out += share * row[c] * static_cast<double>(rgb[c]);
+    }
+  return p;
+}
+
+// A decoder makes two pixels of one with weights of 3/4 and 1/4 (its neighbour's), so that their mean is
+// 1/8, 3/4, 1/8: solved for what there was, along one line (Thomas).
+void sharpen(double* line, Index n, Index step, std::vector<double>& above) {
+  if (n < 2) return;
+  above.assign(at(n), 0);
+  double pivot = 0.875;
+  line[0] /= pivot;
+  for (Index i = 1; i < n; ++i) {
+    above[at(i - 1)] = 0.125 / pivot;
+    pivot = (i + 1 < n ? 0.75 : 0.875) - 0.125 * above[at(i - 1)];
+    line[i * step] = (line[i * step] - 0.125 * line[(i - 1) * step]) / pivot;
+  }
+  for (Index i = n - 2; i >= 0; --i) line[i * step] -= above[at(i)] * line[(i + 1) * step];
+}
+
+Plane decoded_component(const Tensor<float>& image, int component, Index cell) {
+  Plane p = component_of(image, component, cell);
+  if (cell == 1) return p;
+  std::vector<double> work;
+  for (Index y = 0; y < p.height; ++y) sharpen(&p.level[at(y * p.width)], p.width, 1, work);
+  for (Index x = 0; x < p.width; ++x) sharpen(&p.level[at(x)], p.height, p.width, work);
+  return p;
+}
+
+// Coefficients of every block, the last row and column repeated to fill it; luma about its middle.
+std::vector<JpegBlock> coefficients(const Plane& p, double middle) {
+  const Index down = (p.height + 7) / 8, across = (p.width + 7) / 8;
+  std::vector<JpegBlock> out(at(down * across));
+  for (Index b = 0; b < down * across; ++b) {
+    JpegBlock levels;
+    for (Index i = 0; i < 64; ++i) {
+      const Index y = std::min(8 * (b / across) + i / 8, p.height - 1),
+                  x = std::min(8 * (b % across) + i % 8, p.width - 1);
+      levels[at(i)] = p.level[at(y * p.width + x)] - middle;
+    }
+    out[at(b)] = distort::jpeg_cosines(levels);
+  }
+  return out;
+}
+
+// By how much a table of steps explains where coefficients other than 0 lie, against any place.
+double explained(const std::vector<JpegBlock>& blocks, const JpegBlock& steps) {
+  double sum = 0;
+  for (const JpegBlock& c : blocks)
+    for (std::size_t k = 1; k < 64; ++k) {
+      const double n = std::round(c[k] / steps[k]);
+      if (n == 0) continue;
+      const double d = (c[k] - n * steps[k]) / kDecoding;
+      const double density = std::exp(-0.5 * d * d) / (kDecoding * std::sqrt(2 * std::numbers::pi));
+      sum += std::log(kOutlier + (1 - kOutlier) * steps[k] * density);
+    }
+  return sum;
+}
+
+// log P(n | b), and its slope in b.
+struct Likelihood {
+  double log_p, slope;
+};
+
+Likelihood likelihood(double n, double step, double b, double deviation) {
+  const double low = ((n - 0.5) * step - b) / deviation, high = ((n + 0.5) * step - b) / deviation;
+  // Of two small tails, not of two numbers near 1.
+  const double sign = low + high > 0 ? 1 : -1, near = sign > 0 ? low : -high, far = sign > 0 ? high : -low;
+  const double p = 0.5 * (std::erfc(near / std::numbers::sqrt2) - std::erfc(far / std::numbers::sqrt2));
+  const double total = (1 - kOutlier) * p + kOutlier * step / kOutlierWay;
+  const double bells = std::exp(-0.5 * low * low) - std::exp(-0.5 * high * high);
+  return {std::log(total), (1 - kOutlier) * bells / (std::sqrt(2 * std::numbers::pi) * deviation * total)};
+}
+
+// One component of image, render and mark in coefficients, and their deviations.
+class ComponentScore {
+ public:
+  ComponentScore(int component, const JpegTrace& trace)
+      : component_(component),
+        cell_(component > 0 && trace.subsampled ? 2 : 1),
+        steps_(distort::jpeg_steps(component > 0 ? JpegComponent::chroma : JpegComponent::luma,
+                                   trace.quality)) {}
+
+  void add(const Tensor<float>& image, const Tensor<float>& render, const Tensor<float>& mark,
+           std::span<const double> object, JpegScore& out) {
+    const double middle = component_ == 0 ? 128 : 0;
+    const Plane seen = decoded_component(image, component_, cell_);
+    height_ = seen.height;
+    width_ = seen.width;
+    image_ = coefficients(seen, middle);
+    render_ = coefficients(component_of(render, component_, cell_), middle);
+    count_object(object, image.shape[1], image.shape[0]);
+    fit_deviations();
+    spread(component_of(mark, component_, cell_), out);
+  }
+
+ private:
+  Index across() const { return (width_ + 7) / 8; }
+
+  void count_object(std::span<const double> object, Index w, Index h) {
+    on_object_.assign(image_.size(), 0);
+    const Index side = 8 * cell_;
+    for (Index y = 0; y < h; ++y)
+      for (Index x = 0; x < w; ++x)
+        on_object_[at((y / side) * across() + x / side)] +=
+            object[at(y * w + x)] / static_cast<double>(cell_ * cell_);
+  }
+
+  Likelihood of(std::size_t block, std::size_t k, double deviation) const {
+    return likelihood(std::round(image_[block][k] / steps_[k]), steps_[k], render_[block][k], deviation);
+  }
+
+  // Bands first, then blocks, each its likeliest.
+  void fit_deviations() {
+    parallel_for(64, 1, [&](Index begin, Index end) {
+      for (auto k = at(begin); k < at(end); ++k) {
+        double best = 0;
+        for (int d = 0; d < kDeviations; ++d) {
+          const double deviation = kFirst * std::pow(kRatio, d);
+          double sum = 0;
+          for (std::size_t b = 0; b < image_.size(); ++b)
+            if (on_object_[b] >= kOnObject) sum += of(b, k, deviation).log_p;
+          if (d > 0 && sum <= best) continue;
+          best = sum;
+          deviation_[k] = deviation;
+        }
+      }
+    });
+    factor_.assign(image_.size(), 1);
+    parallel_for(static_cast<Index>(image_.size()), 16, [&](Index begin, Index end) {
+      for (auto b = at(begin); b < at(end); ++b) {
+        if (!(on_object_[b] > 0)) continue;
+        double best = 0;
+        for (const double factor : kFactors) {
+          double sum = 0;
+          for (std::size_t k = 0; k < 64; ++k) sum += of(b, k, factor * deviation_[k]).log_p;
+          if (factor > kFactors.front() && sum <= best) continue;
+          best = sum;
+          factor_[b] = factor;
+        }
+      }
+    });
+  }
+
+  void spread(const Plane& mark, JpegScore& out) const {
+    const std::vector<JpegBlock> marks = coefficients(mark, 0);
+    const auto row = distort::jpeg_colour_row(component_);
+    const double share = 255 / static_cast<double>(cell_ * cell_);
+    const Index h = out.score.shape[0], w = out.score.shape[1];
+    for (std::size_t b = 0; b < image_.size(); ++b) {
+      if (!(on_object_[b] > 0)) continue;
+      JpegBlock slopes;
+      double information = 0;
+      for (std::size_t k = 0; k < 64; ++k) {
+        const Likelihood l = of(b, k, factor_[b] * deviation_[k]);
+        out.log_likelihood += l.log_p;
+        slopes[k] = l.slope;
+        information += l.slope * l.slope * marks[b][k] * marks[b][k];
+      }
+      const JpegBlock levels = distort::from_jpeg_cosines(slopes);
+      const Index side = 8 * cell_, top = static_cast<Index>(b) / across() * side,
+                  left = static_cast<Index>(b) % across() * side;
+      for (Index y = top; y < std::min(h, top + side); ++y)
+        for (Index x = left; x < std::min(w, left + side); ++x)
+          for (Index c = 0; c < 3; ++c) {
+            const Index i = 3 * (y * w + x) + c;
+            out.score[i] += static_cast<float>(share * row[at(c)] *
+                                               levels[at((y - top) / cell_ * 8 + (x - left) / cell_)]);
+            out.information[i] += static_cast<float>(information / static_cast<double>(3 * side * side));
+          }
+    }
+  }
+
+  int component_;
+  Index cell_, height_ = 0, width_ = 0;
+  JpegBlock steps_;
+  std::vector<JpegBlock> image_, render_;
+  std::vector<double> on_object_, factor_;  // [blocks] pixels of the component; of the band's deviation
+  JpegBlock deviation_{};
+};
+
+}  // namespace
+
+std::optional<JpegTrace> find_jpeg(const Tensor<float>& image) {
+  check_rank("find_jpeg", "image", image.shape, 3, "[H, W, 3]");
+  check_extent("find_jpeg", "image", image.shape, 2, 3, "red, green, blue");
+  if (image.size() == 0) return std::nullopt;
+  const auto luma = coefficients(component_of(image, 0, 1), 128);
+  std::array<double, 101> gain{};
+  parallel_for(100, 1, [&](Index begin, Index end) {
+    for (Index q = begin + 1; q <= end; ++q)
+      gain[at(q)] = explained(luma, distort::jpeg_steps(JpegComponent::luma, static_cast<int>(q)));
+  });
+  const auto best = std::max_element(gain.begin() + 1, gain.end());
+  if (*best < kLeastGain) return std::nullopt;
+  JpegTrace trace{.quality = static_cast<int>(best - gain.begin())};
+  const JpegBlock steps = distort::jpeg_steps(JpegComponent::chroma, trace.quality);
+  std::array<double, 2> chroma{};
+  for (const Index cell : {1, 2})
+    for (const int component : {1, 2})
+      chroma[at(cell - 1)] += explained(coefficients(decoded_component(image, component, cell), 0), steps);
+  trace.subsampled = chroma[1] >= chroma[0];
+  return trace;
+}
+
+JpegScore jpeg_score(const Tensor<float>& image, const Tensor<float>& render, const Tensor<float>& mark,
+                     std::span<const double> object, const JpegTrace& trace) {
+  check_rank("jpeg_score", "image", image.shape, 3, "[H, W, 3]");
+  check_extent("jpeg_score", "image", image.shape, 2, 3, "red, green, blue");
+  if (render.shape != image.shape || mark.shape != image.shape ||
+      static_cast<Index>(object.size()) * 3 != image.size())
+    throw ShapeError("[jpeg_score] render, mark and object must fit the image " + image.shape.str() +
+                     ", got " + render.shape.str() + ", " + mark.shape.str() + " and " +
+                     std::to_string(object.size()) + " pixels");
+  JpegScore out{Tensor<float>(image.shape), Tensor<float>(image.shape)};
+  for (const int component : {0, 1, 2})
+    ComponentScore(component, trace).add(image, render, mark, object, out);
+  return out;
+}
+
+}  // namespace fieldmark::watermark

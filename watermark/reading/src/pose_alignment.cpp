@@ -1,0 +1,289 @@
+#include <fieldmark/engine/shape_checks.h>
+#include <fieldmark/imaging/resize.h>
+#include <fieldmark/watermark/mark/view_cache.h>
+#include <fieldmark/watermark/reading/pose_alignment.h>
+#include "camera_motion.h"
+#include "plain_border.h"
+#include "tone_fit.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "blurred.h"
+
+namespace fieldmark::watermark {
+namespace {
+
+constexpr Index kParameters = 9;
+constexpr double kCauchy = 2.385;      // deviations at which a difference counts half (95% efficiency)
+constexpr double kLeastSpread = 2e-3;  // of differences: half a grey level
+constexpr double kStill = 0.01;        // pixels: a motion below it ends the stage
+constexpr int kMostFailures = 3;
+constexpr double kDamping = 1e-3;
+
+std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+
+using Matrix = Eigen::Matrix<double, kParameters, kParameters>;
+using Vector = Eigen::Matrix<double, kParameters, 1>;
+
+// One camera's view beside the image, at a stage's size.
+struct Look {
+  nerf::Camera camera;
+  Tensor<float> render;            // blurred
+  std::vector<std::int32_t> seen;  // [P] sample of the pixel, or of the nearest one beside it; -1: none
+  std::vector<nerf::Vec3> points;  // [samples] world
+  nerf::Vec3 pivot{};
+  double spread = 0;  // of the differences
+  double cost = 0;
+};
+
+// Pixels without matter take the sample of a neighbour: where the field's edge moves, they change too.
+std::vector<std::int32_t> seen_or_beside(const CachedView& v, Index reach) {
+  std::vector<std::int32_t> seen(at(v.height * v.width), -1);
+  const auto sample = [&](Index y, Index x) {
+    const auto p = at(y * v.width + x);
+    return v.sample_begin[p] < v.sample_begin[p + 1] ? v.sample_begin[p] : -1;
+  };
+  for (Index y = 0; y < v.height; ++y)
+    for (Index x = 0; x < v.width; ++x) {
+      std::int32_t& s = seen[at(y * v.width + x)];
+      s = sample(y, x);
+      Index nearest = reach * reach + 1;
+      for (Index dy = -reach; s < 0 && dy <= reach; ++dy)
+        for (Index dx = -reach; dx <= reach; ++dx) {
+          if (y + dy < 0 || y + dy >= v.height || x + dx < 0 || x + dx >= v.width) continue;
+          const Index distance = dy * dy + dx * dx;
+          const std::int32_t other = distance < nearest ? sample(y + dy, x + dx) : -1;
+          if (other < 0) continue;
+          nearest = distance;
+          seen[at(y * v.width + x)] = other;
+        }
+    }
+  return seen;
+}
+
+double slope_x(const Tensor<float>& t, Index y, Index x, Index c) {
+  const Index w = t.shape[1], a = std::max<Index>(x - 1, 0), b = std::min(x + 1, w - 1);
+  return static_cast<double>(t[(y * w + b) * 3 + c] - t[(y * w + a) * 3 + c]) / static_cast<double>(b - a);
+}
+
+double slope_y(const Tensor<float>& t, Index y, Index x, Index c) {
+  const Index w = t.shape[1], a = std::max<Index>(y - 1, 0), b = std::min(y + 1, t.shape[0] - 1);
+  return static_cast<double>(t[(b * w + x) * 3 + c] - t[(a * w + x) * 3 + c]) / static_cast<double>(b - a);
+}
+
+// An image at a stage's size, and what is done with it.
+class Stage {
+ public:
+  // border: [H W] 1 where the image shows no scene; empty: everywhere
+  Stage(nerf::Renderer& renderer, const nerf::RadianceField& field, const Tensor<float>& image,
+        const std::vector<std::uint8_t>& border, const AlignmentStage& options)
+      : renderer_(renderer), field_(field), options_(options) {
+    const Index longer = std::max(image.shape[0], image.shape[1]);
+    const double zoom = static_cast<double>(std::min(options.size, longer)) / static_cast<double>(longer);
+    const auto side = [&](Index n) { return std::max<Index>(2, std::lround(zoom * static_cast<double>(n))); };
+    image_ = blurred(resize_area(image, side(image.shape[0]), side(image.shape[1])), options.blur);
+    if (!border.empty())
+      border_ = border_at(border, image.shape[0], image.shape[1], image_.shape[0], image_.shape[1], reach());
+  }
+
+  // Renders the field from a camera; differ() adds spread and cost.
+  Look look(const nerf::Camera& camera) {
+    Look l;
+    l.camera = camera.scaled(image_.shape[1], image_.shape[0]);
+    const CachedView view = cache_view(renderer_, field_, l.camera);
+    l.render = blurred(view.base, options_.blur);
+    l.seen = seen_or_beside(view, reach());
+    for (std::size_t p = 0; p < border_.size(); ++p)
+      if (border_[p]) l.seen[p] = -1;
+    double total = 0, depth = 0;
+    for (std::size_t k = 0; k < view.weight.size(); ++k) {
+      const float* x = &view.position[3 * k];
+      l.points.push_back(field_.space.to_world(
+          {static_cast<double>(x[0]), static_cast<double>(x[1]), static_cast<double>(x[2])}));
+      const double d = project(l.camera, l.points.back()).depth;
+      if (!(d > 0)) continue;
+      total += 1;
+      depth += 1 / d;
+    }
+    // The mean of inverse depths: parts far behind do not carry the pivot away.
+    if (total > 0) {
+      const nerf::Vec3 eye = l.camera.position(), ahead = l.camera.forward();
+      for (std::size_t a = 0; a < 3; ++a) l.pivot[a] = eye[a] + total / depth * ahead[a];
+    }
+    return l;
+  }
+
+  // Differences [P, 3] of image and render in the image's tones, and the look's spread and cost; the
+  // spread of another look makes costs comparable.
+  std::vector<double> differ(Look& l, ToneFit& tones, double spread = 0) const {
+    std::vector<double> weight(l.seen.size());
+    for (std::size_t p = 0; p < weight.size(); ++p) weight[p] = l.seen[p] >= 0 ? 1 : 0;
+    std::vector<double> r(3 * weight.size());
+    for (int pass = 0; pass < 2; ++pass) {
+      tones = fit_tones(l.render, image_, weight);
+      std::vector<double> sizes;
+      for (std::size_t i = 0; i < r.size(); ++i) {
+        r[i] = static_cast<double>(image_.data[i]) -
+               tones.at(static_cast<Index>(i % 3), static_cast<double>(l.render.data[i]));
+        if (l.seen[i / 3] >= 0) sizes.push_back(std::abs(r[i]));
+      }
+      if (sizes.empty()) return r;
+      const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+      std::nth_element(sizes.begin(), middle, sizes.end());
+      l.spread = std::max(kLeastSpread, 1.4826 * *middle);
+      for (std::size_t p = 0; p < weight.size(); ++p)
+        if (weight[p] > 0) {
+          const double d2 = r[3 * p] * r[3 * p] + r[3 * p + 1] * r[3 * p + 1] + r[3 * p + 2] * r[3 * p + 2];
+          weight[p] = 1 / (1 + d2 / (3 * std::pow(kCauchy * l.spread, 2)));
+        }
+    }
+    const double scale = kCauchy * (spread > 0 ? spread : l.spread);
+    l.cost = 0;
+    double count = 0;
+    for (std::size_t i = 0; i < r.size(); ++i)
+      if (l.seen[i / 3] >= 0) {
+        l.cost += std::log1p(std::pow(r[i] / scale, 2));
+        count += 1;
+      }
+    l.cost /= count;
+    return r;
+  }
+
+  // Gauss-Newton: with a = t'(B) grad B . dx/dmotion, a render after a motion m is B - a m, so that
+  // sum w a a^T m = -sum w a r.
+  void normal_equations(const Look& l, const ToneFit& tones, const std::vector<double>& r, Matrix& h,
+                        Vector& g) const {
+    h.setZero();
+    g.setZero();
+    const Index width = image_.shape[1];
+    for (Index p = 0; p < static_cast<Index>(l.seen.size()); ++p) {
+      const std::int32_t s = l.seen[at(p)];
+      if (s < 0 || !(project(l.camera, l.points[at(s)]).depth > 0)) continue;
+      const auto j = motion_gradient(l.camera, l.pivot, l.points[at(s)]);
+      const Eigen::Map<const Vector> jx(j[0].data()), jy(j[1].data());
+      double xx = 0, xy = 0, yy = 0, xr = 0, yr = 0;
+      for (Index c = 0; c < 3; ++c) {
+        const double difference = r[at(3 * p + c)];
+        const double w = 1 / (1 + std::pow(difference / (kCauchy * l.spread), 2));
+        const double t = tones.slope(c, static_cast<double>(l.render[3 * p + c]));
+        const double bx = t * slope_x(l.render, p / width, p % width, c),
+                     by = t * slope_y(l.render, p / width, p % width, c);
+        xx += w * bx * bx;
+        xy += w * bx * by;
+        yy += w * by * by;
+        xr += w * bx * difference;
+        yr += w * by * difference;
+      }
+      h += xx * jx * jx.transpose() + yy * jy * jy.transpose() +
+           xy * (jx * jy.transpose() + jy * jx.transpose());
+      g -= xr * jx + yr * jy;
+    }
+    if (!options_.lens)  // distance and aim go by zoom and slide
+      for (const int k : {3, 4, 5}) hold(h, g, k);
+  }
+
+  double agreement(const Look& l) const {
+    double ab = 0, aa = 0, bb = 0;
+    const Index width = image_.shape[1];
+    for (Index p = 0; p < static_cast<Index>(l.seen.size()); ++p) {
+      if (l.seen[at(p)] < 0) continue;
+      for (Index c = 0; c < 3; ++c) {
+        const double ax = slope_x(image_, p / width, p % width, c),
+                     ay = slope_y(image_, p / width, p % width, c),
+                     bx = slope_x(l.render, p / width, p % width, c),
+                     by = slope_y(l.render, p / width, p % width, c);
+        ab += ax * bx + ay * by;
+        aa += ax * ax + ay * ay;
+        bb += bx * bx + by * by;
+      }
+    }
+    return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : -1;
+  }
+
+  Alignment run(const nerf::Camera& start) {
+    Look best = look(start);
+    ToneFit tones;
+    std::vector<double> r = differ(best, tones);
+    double damping = kDamping;
+    int failures = 0;
+    for (int step = 0; step < options_.steps && !best.points.empty() && failures < kMostFailures; ++step) {
+      Matrix h;
+      Vector g;
+      normal_equations(best, tones, r, h, g);
+      const double ridge = 1e-6 * h.diagonal().maxCoeff();
+      h.diagonal() = (1 + damping) * h.diagonal().array() + ridge;
+      const Vector m = h.ldlt().solve(g);
+      if (!m.allFinite()) break;
+      CameraMotion motion;
+      Eigen::Map<Vector>(motion.data()) = m.cwiseMax(-0.3).cwiseMin(0.3);
+      if (furthest(best, motion) < kStill) break;
+      Look next = look(moved(best.camera, best.pivot, motion));
+      ToneFit next_tones;
+      differ(next, next_tones, best.spread);
+      if (next.points.empty() || !(next.cost < best.cost)) {
+        damping *= 10;
+        ++failures;
+        continue;
+      }
+      best = std::move(next);
+      r = differ(best, tones);
+      damping = std::max(1e-6, damping / 4);
+      failures = 0;
+    }
+    return {best.camera, best.points.empty() ? -1 : agreement(best)};
+  }
+
+ private:
+  Index reach() const { return static_cast<Index>(std::ceil(2 * options_.blur)); }
+
+  static void hold(Matrix& h, Vector& g, int k) {
+    h.row(k).setZero();
+    h.col(k).setZero();
+    h(k, k) = 1;
+    g[k] = 0;
+  }
+
+  // How far a motion takes the points it moves most, pixels.
+  static double furthest(const Look& l, const CameraMotion& motion) {
+    const Eigen::Map<const Vector> m(motion.data());
+    double most = 0;
+    for (std::size_t k = 0; k < l.points.size(); k += 16) {
+      const auto j = motion_gradient(l.camera, l.pivot, l.points[k]);
+      most = std::max(most, std::hypot(Eigen::Map<const Vector>(j[0].data()).dot(m),
+                                       Eigen::Map<const Vector>(j[1].data()).dot(m)));
+    }
+    return most;
+  }
+
+  nerf::Renderer& renderer_;
+  const nerf::RadianceField& field_;
+  AlignmentStage options_;
+  Tensor<float> image_;
+  std::vector<std::uint8_t> border_;  // at the stage's size
+};
+
+}  // namespace
+
+PoseAligner::PoseAligner(const nerf::RadianceField& field)
+    : field_(field), renderer_(field, {.finer = 1}), quick_(field, {.finer = 0.5f}) {}
+
+Alignment PoseAligner::align(const Tensor<float>& image, const nerf::Camera& start,
+                             std::span<const AlignmentStage> stages) {
+  check_rank("pose_aligner", "image", image.shape, 3, "[H, W, 3]");
+  check_extent("pose_aligner", "image", image.shape, 2, 3, "red, green, blue");
+  if (stages.empty()) throw ValueError("[pose_aligner] stages must not be empty");
+  for (const AlignmentStage& stage : stages)
+    if (stage.size < 16)
+      throw ValueError("[pose_aligner] stages must be of at least 16 pixels, got " +
+                       std::to_string(stage.size));
+  const auto border = border_of(field_, image);
+  Alignment out{start, -1};
+  for (const AlignmentStage& stage : stages)
+    out = Stage(stage.quick ? quick_ : renderer_, field_, image, border, stage).run(out.camera);
+  out.camera = out.camera.scaled(image.shape[1], image.shape[0]);
+  return out;
+}
+
+}  // namespace fieldmark::watermark
