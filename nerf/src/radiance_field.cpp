@@ -65,7 +65,7 @@ void add_space(Json& json, const Space& s) {
     json["corner"] = s.bounds.corner;
     json["side"] = s.bounds.side;
   }
-  if (s.kind != SpaceKind::cube) json["novel"] = s.near;
+  if (s.kind != SpaceKind::cube) json["near"] = s.near;
 }
 
 Space parse_space(const Json& j) {
@@ -77,14 +77,14 @@ Space parse_space(const Json& j) {
     return value;
   };
   if (s.kind == SpaceKind::ndc) {
-    s.near = positive(j.at("novel"), "novel");
+    s.near = positive(j.at("near"), "near");
     s.slope_x = positive(j.at("slopes").at(0), "slopes");
     s.slope_y = positive(j.at("slopes").at(1), "slopes");
     return s;
   }
   s.bounds.corner = j.at("corner");
   s.bounds.side = positive(j.at("side"), "side");
-  if (s.kind == SpaceKind::contracted) s.near = positive(j.at("novel"), "novel", true);
+  if (s.kind == SpaceKind::contracted) s.near = positive(j.at("near"), "near", true);
   return s;
 }
 
@@ -116,7 +116,7 @@ Json field_json(const RadianceFieldOptions& o) {
           {"base_resolution", f.encoding.base_resolution},
           {"finest_resolution", f.encoding.finest_resolution},
           {"width", f.width},
-          {"informed", f.geometry},
+          {"geometry", f.geometry},
           {"directional", f.directional}};
 }
 
@@ -129,7 +129,7 @@ void parse_field(const Json& j, RadianceFieldOptions& o) {
                             .base_resolution = j.at("base_resolution"),
                             .finest_resolution = j.at("finest_resolution")},
                .width = j.at("width"),
-               .geometry = j.at("informed"),
+               .geometry = j.at("geometry"),
                .directional = j.value("directional", true)};
   } else if (kind == "mlp") {
     o.field = {.kind = FieldKind::mlp,
