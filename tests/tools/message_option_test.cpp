@@ -1,7 +1,6 @@
 #include "cli/message_option.h"
 
 #include <CLI/CLI.hpp>
-
 #include "cli/cli.h"
 #include "support/catch.h"
 
@@ -36,8 +35,9 @@ TEST_CASE("message options: what does not fit is a usage error that names the op
   for (const char* pair :
        {"--text a --uuid b", "--text a --payload b", "--message a --text b", "--uuid a --payload b"}) {
     CLI::App app;
+    cli::CommandLine options(app);
     cli::MessageOption options;
-    cli::add_message_options(app, options, "Message");
+    cli::add_message_options(options, options, "Message");
     CHECK_THROWS_AS(app.parse(pair), CLI::ExcludesError);
   }
 }

@@ -10,8 +10,9 @@ using namespace fieldmark;
 TEST_CASE("supersampling: the number given, 1 to 8, or what was there before") {
   const auto parsed = [](std::vector<std::string> line) {
     CLI::App app;
+    cli::CommandLine options(app);
     Index rays = 0;
-    cli::add_supersampling(app, rays);
+    cli::add_supersampling(options, rays);
     std::reverse(line.begin(), line.end());
     app.parse(line);
     return rays;

@@ -5,7 +5,6 @@
 #include <fieldmark/watermark/attacks/attack_meter.h>
 #include <fieldmark/watermark/attacks/field_attack.h>
 
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -212,7 +211,7 @@ void check(const BenchAttacksOptions& o) {
 
 }  // namespace
 
-void add_bench_attacks(CLI::App& app, BenchAttacksOptions& o) {
+void add_bench_attacks(CommandLine& app, BenchAttacksOptions& o) {
   const auto add_file = [&](const char* name, auto& to, const char* what, const char* type) {
     app.add_option(name, to, what)->type_name(type)->default_str("");
   };
@@ -225,15 +224,13 @@ void add_bench_attacks(CLI::App& app, BenchAttacksOptions& o) {
   add_file("--attacked", o.attacked,
            "attacks: files made from --field by other means, a row each, several times", "FIELD");
   app.add_option("--cameras", o.cameras, "attacks: near, ring, sphere (see measure)")
-      ->check(CLI::IsMember({"novel", "ring", "sphere"}).description(""))
+      ->one_of({"novel", "ring", "sphere"})
       ->type_name("SET");
-  app.add_option("--count", o.count, "attacks: views, 1 to 1000")
-      ->check(CLI::Range(1, 1000).description(""))
-      ->type_name("N");
+  app.add_option("--count", o.count, "attacks: views, 1 to 1000")->range(1, 1000)->type_name("N");
   app.add_option(
          "--informed-count", o.informed_count,
          "attacks: of the first so many views informed is read too, 0 to 1000: seconds a view and row")
-      ->check(CLI::Range(0, 1000).description(""))
+      ->range(0, 1000)
       ->type_name("N");
 }
 

@@ -4,11 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "cli/command_line.h"
 #include "cli/message_option.h"
-
-namespace CLI {
-class App;
-}
 
 namespace fieldmark::cli {
 
@@ -27,7 +24,7 @@ struct BenchAttacksOptions {
   bool quick = false;
 };
 /// Adds what the other benches do not have.
-void add_bench_attacks(CLI::App& app, BenchAttacksOptions& options);
+void add_bench_attacks(CommandLine& app, BenchAttacksOptions& options);
 
 /// Severity curves: how a baked mark fares under attacks on its images and its file, and what they cost.
 int bench_attacks(const BenchAttacksOptions& options, Context& context);

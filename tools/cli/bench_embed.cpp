@@ -6,7 +6,6 @@
 #include <fieldmark/tools/bench/embed_bench.h>
 #include <fieldmark/watermark/mark/owner.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 #include <memory>

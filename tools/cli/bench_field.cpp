@@ -7,7 +7,6 @@
 #include <fieldmark/nerf/trainer.h>
 #include <fieldmark/tools/bench/field_bench.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -141,7 +140,7 @@ nerf::Dataset bench_split(const std::string& folder, const std::string& split, b
 
 std::string lego_folder() { return shared_data("nerf_synthetic/lego").string(); }
 
-void add_bench_field(CLI::App& app, BenchFieldOptions& o) {
+void add_bench_field(CommandLine& app, BenchFieldOptions& o) {
   app.add_option(
          "--field", o.field,
          "field: what is rendered (trained for --seconds); embed: what is marked (trained for a minute); "
@@ -150,14 +149,14 @@ void add_bench_field(CLI::App& app, BenchFieldOptions& o) {
       ->default_str("");
   app.add_option("--size", o.size,
                  "field, embed and attacks (as trained): pixels of the views' longer side, 16 to 8192")
-      ->check(CLI::Range(16, 8192).description(""))
+      ->range(16, 8192)
       ->type_name("N");
   app.add_option("--views", o.views, "field: how many; embed: to judge by (24); 1 to 1000")
-      ->check(CLI::Range(1, 1000).description(""))
+      ->range(1, 1000)
       ->type_name("N");
   app.add_option("--seconds", o.seconds,
                  "field: of training, without --field; training, embed: of each; 0.1 to 86400")
-      ->check(CLI::Range(0.1, 86400.0).description(""))
+      ->range(0.1, 86400.0)
       ->type_name("S")
       ->default_str("60; embed 90");
   app.add_flag("--quick", o.quick,

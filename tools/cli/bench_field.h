@@ -5,9 +5,7 @@
 #include <memory>
 #include <string>
 
-namespace CLI {
-class App;
-}
+#include "cli/command_line.h"
 
 namespace fieldmark::cli {
 
@@ -25,7 +23,7 @@ struct BenchFieldOptions {
   bool quick = false;
 };
 /// Adds what `bench engine` does not have: --field, --size, --views, --seconds and --quick.
-void add_bench_field(CLI::App& app, BenchFieldOptions& options);
+void add_bench_field(CommandLine& app, BenchFieldOptions& options);
 
 /// lego of FIELDMARK_DATA, or empty where there is none.
 std::string lego_folder();

@@ -2,7 +2,6 @@
 
 #include <fieldmark/tools/bench/payload_bench.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <ostream>
 
@@ -35,13 +34,13 @@ Json row_json(const bench::PayloadRow& r) {
 
 }  // namespace
 
-void add_bench_payload(CLI::App& app, BenchPayloadOptions& o) {
+void add_bench_payload(CommandLine& app, BenchPayloadOptions& o) {
   app.add_option("--bits", o.bits, "payload, embed: length of a message, 1 to 256")
-      ->check(CLI::Range(1, 256).description(""))
+      ->range(1, 256)
       ->type_name("N")
       ->default_str("100; embed 16");
   app.add_option("--trials", o.trials, "payload: of each row, 1 to 1000000")
-      ->check(CLI::Range(1, 1000000).description(""))
+      ->range(1, 1000000)
       ->type_name("N");
 }
 

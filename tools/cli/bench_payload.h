@@ -1,9 +1,7 @@
 #pragma once
 #include <fieldmark/engine/shape.h>
 
-namespace CLI {
-class App;
-}
+#include "cli/command_line.h"
 
 namespace fieldmark::cli {
 
@@ -14,7 +12,7 @@ struct BenchPayloadOptions {
   Index bits = 100, trials = 1000;
 };
 /// Adds --bits and --trials.
-void add_bench_payload(CLI::App& app, BenchPayloadOptions& options);
+void add_bench_payload(CommandLine& app, BenchPayloadOptions& options);
 
 /// How often payloads are exact at rates of wrong bits, and how often noise is one.
 int bench_payload(const BenchPayloadOptions& options, Context& context);

@@ -17,7 +17,7 @@ namespace {
 struct Entry {
   const char* name;
   const char* help;
-  Command (*add)(CLI::App&);
+  Command (*add)(CommandLine&);
 };
 constexpr Entry kCommands[] = {
     {"scene", "Make a data set of a built-in scene", add_scene},
@@ -56,8 +56,9 @@ class Program {
     for (const auto& entry : kCommands) {
       CLI::App* sub = app_.add_subcommand(entry.name, entry.help);
       sub->option_defaults()->always_capture_default();
-      Command command = entry.add(*sub);
-      add_common(*sub, common_);
+      CommandLine options(*sub);
+      Command command = entry.add(options);
+      add_common(options, common_);
       subcommands_.push_back({sub, std::move(command)});
     }
   }

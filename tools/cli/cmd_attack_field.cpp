@@ -1,6 +1,5 @@
 #include <fieldmark/watermark/attacks/field_attack.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -72,7 +71,7 @@ int run(const Options& options, Context& context) {
 
 }  // namespace
 
-Command add_attack_field(CLI::App& app) {
+Command add_attack_field(CommandLine& app) {
   auto o = std::make_shared<Options>();
   app.add_option("field", o->field, "What `fieldmark bake` or `fieldmark train` wrote")
       ->required()

@@ -3,7 +3,6 @@
 #include <fieldmark/watermark/evidence/commitment.h>
 #include <fieldmark/watermark/keys/signing.h>
 
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -116,7 +115,7 @@ int run(const Options& options, Context& context) {
 
 }  // namespace
 
-Command add_bake(CLI::App& app) {
+Command add_bake(CommandLine& app) {
   auto o = std::make_shared<Options>();
   app.add_option("--owner", o->owner, "What `fieldmark embed` wrote")->required()->type_name("OWNER");
   add_message_options(app, o->message, "Message");
@@ -124,7 +123,7 @@ Command add_bake(CLI::App& app) {
   app.add_option("--mark-psnr", o->mark_psnr,
                  "PSNR that the file's mark is to have on the object, dB, 20 to 60; higher is fainter (as "
                  "embedded)")
-      ->check(CLI::Range(20.0, 60.0).description(""))
+      ->range(20.0, 60.0)
       ->type_name("DB");
   add_run_length(app, o->length, false);
   return [o](Context& context) { return run(*o, context); };

@@ -4,7 +4,6 @@
 #include <fieldmark/tools/bench/engine_bench.h>
 #include <fieldmark/tools/bench/precision_bench.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -241,7 +240,7 @@ int run(Options options, Context& context) {
 
 }  // namespace
 
-Command add_bench(CLI::App& app) {
+Command add_bench(CommandLine& app) {
   auto o = std::make_shared<Options>();
   app.add_option("what", o->what,
                  "engine: kernels and training steps, against this machine's peak;\n"
@@ -251,14 +250,14 @@ Command add_bench(CLI::App& app) {
                  "payload: how often payloads are exact at rates of wrong bits, and how often noise is one;\n"
                  "attacks: a baked mark under attacks on its images and its file, accuracy against damage")
       ->required()
-      ->check(CLI::IsMember({"engine", "field", "training", "embed", "payload", "attacks"}).description(""))
+      ->one_of({"engine", "field", "training", "embed", "payload", "attacks"})
       ->type_name("WHAT");
   app.add_option("--runs", o->field.runs, "Runs of each row, whose median counts, 1 to 1000")
-      ->check(CLI::Range(1, 1000).description(""))
+      ->range(1, 1000)
       ->type_name("N");
   app.add_option("--scale", o->engine.scale,
                  "engine: of the numbers of samples, above 0 to 1: smaller is quicker and less exact")
-      ->check(CLI::Range(1e-6, 1.0).description(""))
+      ->range(1e-6, 1.0)
       ->type_name("F");
   app.add_option("--only", o->engine.only, "engine, embed: only rows with TEXT in their name")
       ->type_name("TEXT")
@@ -278,24 +277,25 @@ Command add_bench(CLI::App& app) {
       "--precision", o->precision,
       "engine: also a table of speed against error: double, float, bf16, and every approximation in use");
   app.add_option("--plot", o->field.plot, "SVG image of the rows (none)")->type_name("FILE")->default_str("");
-  auto* peer = app.add_option("--peer", o->peer,
-                              "engine: pytorch: ratio to PyTorch on the rows it can do, timed by turns, "
-                              "gradients compared (none)")
-                   ->check(CLI::IsMember({"pytorch"}).description(""))
-                   ->type_name("NAME")
-                   ->default_str("");
+  const Option peer =
+      app.add_option("--peer", o->peer,
+                     "engine: pytorch: ratio to PyTorch on the rows it can do, timed by turns, "
+                     "gradients compared (none)")
+          ->one_of({"pytorch"})
+          ->type_name("NAME")
+          ->default_str("");
   app.add_option("--python", o->python.python, "Interpreter with torch, for --peer")
       ->type_name("FILE")
       ->needs(peer);
   app.add_option("--peer-limit", o->python.limit_seconds, "Of each answer of the peer, seconds, 0.1 to 86400")
-      ->check(CLI::Range(0.1, 86400.0).description(""))
+      ->range(0.1, 86400.0)
       ->type_name("S")
       ->needs(peer);
   add_bench_field(app, o->field);
   add_bench_payload(app, o->payload);
   add_bench_attacks(app, o->attacks);
-  const CLI::Option *size = app.get_option("--size"), *views = app.get_option("--views"),
-                    *bits = app.get_option("--bits"), *seconds = app.get_option("--seconds");
+  const Option size = app.option("--size"), views = app.option("--views"), bits = app.option("--bits"),
+               seconds = app.option("--seconds");
   return [o, size, views, bits, seconds](Context& context) {
     if (size->count() > 0) o->attacks.size = o->embed.size = o->field.size;
     if (views->count() > 0) o->embed.views = o->field.views;

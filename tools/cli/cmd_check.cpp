@@ -1,6 +1,5 @@
 #include <fieldmark/watermark/evidence/evidence_folder.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <ostream>
 
@@ -57,7 +56,7 @@ int run(const Options& options, Context& context) {
 
 }  // namespace
 
-Command add_check(CLI::App& app) {
+Command add_check(CommandLine& app) {
   auto o = std::make_shared<Options>();
   app.add_option("folder", o->folder, "What `fieldmark verify --evidence` wrote")
       ->required()

@@ -3,7 +3,6 @@
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/imaging/metrics.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -178,7 +177,7 @@ int run(const Options& options, Context& context) {
 
 }  // namespace
 
-Command add_compare(CLI::App& app) {
+Command add_compare(CommandLine& app) {
   auto o = std::make_shared<Options>();
   app.add_option("images", o->paths,
                  "Two images, or two folders whose images are paired in order (PNG, JPEG)")

@@ -1,6 +1,5 @@
 #include <fieldmark/core/error.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <memory>
@@ -106,38 +105,33 @@ int fetch(const Options& options, Context& context) {
   return kOk;
 }
 
-void add_name_and_folder(CLI::App& app, Options& options, const char* folder) {
-  app.fallthrough();
+void add_name_and_folder(CommandLine& app, Options& options, const char* folder) {
   app.add_option("name", options.name, "Data set, a name from the list")->required()->type_name("NAME");
   app.add_option("dir", options.folder, folder)->required()->type_name("DIR");
 }
 
 }  // namespace
 
-Command add_data(CLI::App& app) {
+Command add_data(CommandLine& app) {
   auto options = std::make_shared<Options>();
-  app.require_subcommand(1);
-  app.fallthrough();
-  CLI::App* lists =
-      app.add_subcommand("list", "Name every data set with its size, licence and source")->fallthrough();
-  CLI::App* verifies = app.add_subcommand("verify", "Compare each file's size and SHA-256 with the manifest");
-  add_name_and_folder(*verifies, *options, "Folder that holds its files");
-  CLI::App* fetches = app.add_subcommand("fetch", "Get what is missing or wrong over http, and check it");
-  add_name_and_folder(*fetches, *options, "Folder for its files");
+  CommandLine lists = app.add_subcommand("list", "Name every data set with its size, licence and source");
+  CommandLine verifies =
+      app.add_subcommand("verify", "Compare each file's size and SHA-256 with the manifest");
+  add_name_and_folder(verifies, *options, "Folder that holds its files");
+  CommandLine fetches = app.add_subcommand("fetch", "Get what is missing or wrong over http, and check it");
+  add_name_and_folder(fetches, *options, "Folder for its files");
   fetches
-      ->add_option("--base-url", options->base_url,
-                   "Address of a folder with the files, http or https (that of the manifest)")
-      ->check(CLI::Validator(
-          [](const std::string& url) {
-            return url.starts_with("http://") || url.starts_with("https://")
-                       ? std::string()
-                       : "expected http:// or https://, got " + url;
-          },
-          ""))
+      .add_option("--base-url", options->base_url,
+                  "Address of a folder with the files, http or https (that of the manifest)")
+      ->check([](const std::string& url) {
+        return url.starts_with("http://") || url.starts_with("https://")
+                   ? std::string()
+                   : "expected http:// or https://, got " + url;
+      })
       ->type_name("URL");
   return [options, lists, fetches](Context& context) {
-    if (lists->parsed()) return list(context);
-    return fetches->parsed() ? fetch(*options, context) : verify(*options, context);
+    if (lists.parsed()) return list(context);
+    return fetches.parsed() ? fetch(*options, context) : verify(*options, context);
   };
 }
 

@@ -1,7 +1,6 @@
 #include <fieldmark/distort/distortion.h>
 #include <fieldmark/imaging/image.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
 #include <ostream>
@@ -64,7 +63,7 @@ int run(const Options& options, Context& context) {
 
 }  // namespace
 
-Command add_distort(CLI::App& app) {
+Command add_distort(CommandLine& app) {
   auto options = std::make_shared<Options>();
   app.add_option("images", options->inputs, "Images, or folders of them (PNG, JPEG)")
       ->required()
@@ -93,7 +92,7 @@ Command add_distort(CLI::App& app) {
       ->type_name("NAME[,NAME...]");
   app.add_option("--background", options->background,
                  "What shows behind transparency and in opened corners: white, black")
-      ->check(CLI::IsMember({"white", "black"}).description(""))
+      ->one_of({"white", "black"})
       ->type_name("COLOUR");
   return [options](Context& context) { return run(*options, context); };
 }

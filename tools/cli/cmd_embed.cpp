@@ -6,7 +6,6 @@
 #include <fieldmark/watermark/evidence/commitment.h>
 #include <fieldmark/watermark/keys/signing.h>
 
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -30,7 +29,7 @@ namespace {
 constexpr Index kImagedViews = 4;
 
 struct Options {
-  std::string field, out, key, picture, lpips_weights;
+  std::string field, out, key, image, lpips_weights;
   std::string preset = "fast", distances = "novel", colours;
   watermark::OwnerOptions owner;
   MessageOption intended;
@@ -204,31 +203,29 @@ int run(const Options& options, Context& context) {
   return kOk;
 }
 
-void add_view_options(CLI::App& app, Options& o) {
-  app.add_option("--views", o.views, "Views to learn from, 8 to 10000")
-      ->check(CLI::Range(8, 10000).description(""))
-      ->type_name("N");
+void add_view_options(CommandLine& app, Options& o) {
+  app.add_option("--views", o.views, "Views to learn from, 8 to 10000")->range(8, 10000)->type_name("N");
   app.add_option("--distances", o.distances,
                  "near: novel cameras, the object always as large as the extractor sees it;\n"
                  "native: only as large as their images have it; several: also closer and farther cameras")
-      ->check(CLI::IsMember({"novel", "native", "several"}).description(""))
+      ->one_of({"novel", "native", "several"})
       ->type_name("NAME");
   app.add_option("--samples", o.samples,
                  "Parts of a ray that the mark of a pixel is the sum of, 1 to 64 (1; 4 in scenes without "
                  "bounds)")
-      ->check(CLI::Range(1, 64).description(""))
+      ->range(1, 64)
       ->type_name("N")
       ->default_str("");
   app.add_option("--batch", o.batch,
                  "Images a step, 1 to 64 (4; 2 in scenes without bounds); presets paper and code take 4")
-      ->check(CLI::Range(1, 64).description(""))
+      ->range(1, 64)
       ->type_name("N")
       ->default_str("");
 }
 
 }  // namespace
 
-Command add_embed(CLI::App& app) {
+Command add_embed(CommandLine& app) {
   auto o = std::make_shared<Options>();
   app.add_option("--field", o->field, "Trained field; it stays as it is")->required()->type_name("FIELD");
   app.add_option("--out", o->out, "File for the owner; OWNER.checkpoint while it trains")
@@ -237,45 +234,43 @@ Command add_embed(CLI::App& app) {
   app.add_option("--key", o->key, "Key of `fieldmark key` (a new one, inside OWNER)")
       ->type_name("KEY")
       ->default_str("");
-  app.add_option("--bits", o->owner.bits, "Length of a message, 1 to 256")
-      ->check(CLI::Range(1, 256).description(""))
-      ->type_name("N");
+  app.add_option("--bits", o->owner.bits, "Length of a message, 1 to 256")->range(1, 256)->type_name("N");
   add_message_options(app, o->intended, "Message that is going to be baked, to print its commitment at once");
   app.add_option("--preset", o->preset,
                  "fast: local message with dense supervision, trains in minutes; paper: one message "
                  "everywhere, pooled reading, --mark-psnr and --cells unused; code: the same as the paper's "
                  "authors have it in their code")
-      ->check(CLI::IsMember({"fast", "paper", "code"}).description(""))
+      ->one_of({"fast", "paper", "code"})
       ->type_name("NAME");
   app.add_option("--mark-psnr", o->owner.mark_psnr,
                  "PSNR of the mark on the object, dB, 20 to 60; higher is fainter")
-      ->check(CLI::Range(20.0, 60.0).description(""))
+      ->range(20.0, 60.0)
       ->type_name("DB");
-  auto* cells =
+  const Option cells =
       app.add_option("--cells", o->owner.cells,
                      "Cells an axis of the scene's cube, 2 to 64 (16 to 64: as many as a view needs to show "
                      "two or more for each bit, eight in scenes without bounds)")
-          ->check(CLI::Range(2, 64).description(""))
+          ->range(2, 64)
           ->type_name("N")
           ->default_str("");
-  auto* reader_size =
+  const Option reader_size =
       app.add_option("--reader-size", o->owner.reader_size,
                      "Longer side of what the extractor sees, pixels, 32 to 1024 (160; paper, "
                      "code: 150): objects in a square, photographs without a background in "
                      "their own shape")
-          ->check(CLI::Range(32, 1024).description(""))
+          ->range(32, 1024)
           ->type_name("N");
   app.add_option(
          "--colours", o->colours,
          "How the mark looks: light, like an uneven light, least seen; blue, blue and yellow, read sooner "
          "(light in scenes without bounds, blue on objects; presets paper and code choose their own)")
-      ->check(CLI::IsMember({"light", "blue"}).description(""))
+      ->one_of({"light", "blue"})
       ->type_name("NAME")
       ->default_str("");
   add_view_options(app, *o);
   add_run_length(app, o->length, true);
   app.add_option("--measured-views", o->measured_views, "Novel views to measure on at the end, 1 to 100000")
-      ->check(CLI::Range(1, 100000).description(""))
+      ->range(1, 100000)
       ->type_name("N");
   app.add_option("--distort", o->under,
                  "Distortions to measure under besides none (see attack), several times")

@@ -1,6 +1,5 @@
 #include <fieldmark/nerf/evaluation.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
 #include <ostream>
@@ -78,15 +77,15 @@ int run(const Options& options, Context& context) {
 
 }  // namespace
 
-Command add_eval(CLI::App& app) {
+Command add_eval(CommandLine& app) {
   auto o = std::make_shared<Options>();
   app.add_option("--field", o->field, "Trained or baked field")->required()->type_name("FIELD");
   app.add_option("--data", o->data, "Data set, as of train")->required()->type_name("DIR");
   app.add_option("--split", o->split, "Views to compare with: train, val, test")
-      ->check(CLI::IsMember({"train", "val", "test"}).description(""))
+      ->one_of({"train", "val", "test"})
       ->type_name("SPLIT");
   app.add_option("--size", o->size, "Pixels of the images' longer side, 16 to 8192 (as they are)")
-      ->check(CLI::Range(16, 8192).description(""))
+      ->range(16, 8192)
       ->type_name("N")
       ->default_str("");
   add_supersampling(app, o->supersampling);

@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <ostream>
 
@@ -49,7 +48,7 @@ int run(const Options& options, Context& context) {
 
 }  // namespace
 
-Command add_extract(CLI::App& app) {
+Command add_extract(CommandLine& app) {
   auto o = std::make_shared<Options>();
   app.add_option("--owner", o->owner, "What `fieldmark embed` wrote")->required()->type_name("OWNER");
   add_reading(app, o->reading);

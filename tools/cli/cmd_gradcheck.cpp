@@ -14,7 +14,6 @@
 #include <fieldmark/watermark/evidence/numerics_cases.h>
 #include <fieldmark/watermark/mark/gradcheck_cases.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -182,7 +181,7 @@ int run_numerics(const Options& options, Context& context) {
 
 }  // namespace
 
-Command add_gradcheck(CLI::App& app) {
+Command add_gradcheck(CommandLine& app) {
   auto options = std::make_shared<Options>();
   app.add_option("--only", options->only, "Only checks with TEXT in their name")
       ->type_name("TEXT")

@@ -1,7 +1,6 @@
 #include <fieldmark/core/digest.h>
 #include <fieldmark/engine/safetensors.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -60,7 +59,7 @@ int run(const Options& options, Context& context) {
 
 }  // namespace
 
-Command add_info(CLI::App& app) {
+Command add_info(CommandLine& app) {
   auto options = std::make_shared<Options>();
   app.add_option("file", options->file, "A field, owner, key or any other safetensors file")
       ->required()

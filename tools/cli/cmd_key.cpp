@@ -1,7 +1,6 @@
 #include <fieldmark/core/digest.h>
 #include <fieldmark/watermark/keys/signing.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
 #include <ostream>
@@ -34,7 +33,7 @@ int run(const Options& options, Context& context) {
 
 }  // namespace
 
-Command add_key(CLI::App& app) {
+Command add_key(CommandLine& app) {
   auto options = std::make_shared<Options>();
   app.add_option("--out", options->out, "File for the key")->required()->type_name("KEY");
   app.add_flag("--force", options->force, "Replace a key that exists");

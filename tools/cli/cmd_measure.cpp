@@ -1,7 +1,6 @@
 #include <fieldmark/nerf/evaluation.h>
 #include <fieldmark/watermark/attacks/payload_trials.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -190,7 +189,7 @@ int run(const Options& options, Context& context) {
 
 }  // namespace
 
-Command add_measure(CLI::App& app) {
+Command add_measure(CommandLine& app) {
   auto o = std::make_shared<Options>();
   app.add_option("--owner", o->owner, "What `fieldmark embed` wrote")->required()->type_name("OWNER");
   app.add_option("--field", o->field, "A baked field (the mark as trained, not baked)")
@@ -203,19 +202,19 @@ Command add_measure(CLI::App& app) {
                  "unseen (directions that no photograph has), closer, farther, test (of --data);\n"
                  "several with commas between them: a row each, the figures of the first")
       ->delimiter(',')
-      ->check(CLI::IsMember(nerf::camera_set_names()).description(""))
+      ->one_of(nerf::camera_set_names())
       ->type_name("SET")
       ->default_str("novel");
   app.add_option("--count", o->count, "Views, 1 to 100000; each with its own random message if not baked")
-      ->check(CLI::Range(1, 100000).description(""))
+      ->range(1, 100000)
       ->type_name("N");
   app.add_option(
          "--informed-count", o->informed_count,
          "Of the first so many views informed is read too, 0 to 100000: seconds a view and distortion")
-      ->check(CLI::Range(0, 100000).description(""))
+      ->range(0, 100000)
       ->type_name("N");
   app.add_option("--size", o->size, "Pixels of the views' longer side, 16 to 8192 (as trained)")
-      ->check(CLI::Range(16, 8192).description(""))
+      ->range(16, 8192)
       ->type_name("N")
       ->default_str("");
   app.add_option("--distort", o->under,
@@ -230,7 +229,7 @@ Command add_measure(CLI::App& app) {
   app.add_option("--together", o->together,
                  "Views whose evidence is added before a payload is read, 1 to 10000; each such group has\n"
                  "one message. Above 1 each view is also read by itself")
-      ->check(CLI::Range(1, 10000).description(""))
+      ->range(1, 10000)
       ->type_name("N");
   add_lpips_weights(app, o->lpips_weights);
   return [o](Context& context) { return run(*o, context); };

@@ -1,7 +1,6 @@
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/renderer.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -115,47 +114,46 @@ int run(const Options& options, Context& context) {
 
 }  // namespace
 
-Command add_render(CLI::App& app) {
+Command add_render(CommandLine& app) {
   auto o = std::make_shared<Options>();
   app.add_option("--field", o->field, "Trained or baked field")->required()->type_name("FIELD");
   app.add_option("--out", o->out, "Folder for the images, PNG")->required()->type_name("DIR");
-  CLI::Option* data = app.add_option("--data", o->data, "Take the cameras of a data set")->type_name("DIR");
+  Option data = app.add_option("--data", o->data, "Take the cameras of a data set")->type_name("DIR");
   app.add_option("--split", o->split, "Views of the data set: train, val, test")
-      ->check(CLI::IsMember({"train", "val", "test"}).description(""))
+      ->one_of({"train", "val", "test"})
       ->needs(data)
       ->type_name("SPLIT");
   app.add_option("--cameras", o->cameras,
                  "Without --data: near (drawn from the span of the training cameras),\n"
                  "ring (30 degrees above, radius 4.0311), sphere (all directions),\n"
                  "unseen (directions that no photograph has), closer, farther")
-      ->check(CLI::IsMember(nerf::camera_set_names()).description(""))
+      ->one_of(nerf::camera_set_names())
       ->type_name("SET");
   add_precision(app, o->precision);
   add_supersampling(app, o->supersampling);
   app.add_option("--count", o->count, "Cameras to draw, 1 to 100000")
-      ->check(CLI::Range(1, 100000).description(""))
+      ->range(1, 100000)
       ->excludes(data)
       ->type_name("N");
   app.add_option("--size", o->size, "Pixels of the images' longer side, 1 to 8192 (as trained)")
-      ->check(CLI::Range(1, 8192).description(""))
+      ->range(1, 8192)
       ->type_name("N")
       ->default_str("");
   const auto points = [&](const char* name, std::optional<Index>& count, const char* what) {
     app.add_option(name, count,
                    std::string(what) + " points of a ray of an mlp field, 0 to 1024 (as trained)")
-        ->check(CLI::Range(0, 1024).description(""))
+        ->range(0, 1024)
         ->type_name("N")
         ->default_str("");
   };
   points("--average", o->average, "Average sampling");
   points("--importance", o->importance, "Importance sampling");
   points("--random", o->random, "Random sampling");
-  CLI::Option* against =
-      app.add_option("--against", o->against, "Another field, for --sheet")->type_name("FIELD");
-  CLI::Option* sheet = app.add_option("--sheet", o->sheet,
-                                      "PNG with four views of the other field, of this one, and ten times\n"
-                                      "their difference")
-                           ->type_name("FILE");
+  Option against = app.add_option("--against", o->against, "Another field, for --sheet")->type_name("FIELD");
+  Option sheet = app.add_option("--sheet", o->sheet,
+                                "PNG with four views of the other field, of this one, and ten times\n"
+                                "their difference")
+                     ->type_name("FILE");
   against->needs(sheet);
   sheet->needs(against);
   return [o](Context& context) { return run(*o, context); };

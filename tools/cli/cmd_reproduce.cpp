@@ -2,7 +2,6 @@
 #include <fieldmark/baselines/paper_plan.h>
 #include <fieldmark/core/files.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -212,40 +211,40 @@ int run(const Options& options, Context& context) {
   return kOk;
 }
 
-void add_measuring_options(CLI::App& app, Options& o) {
+void add_measuring_options(CommandLine& app, Options& o) {
   app.add_option("--budget", o.budget,
                  "Seconds of training for each cell, 0.1 to 86400; cells of other budgets that are there "
                  "stay: give them another --cells")
-      ->check(CLI::Range(0.1, 86400.0).description(""))
+      ->range(0.1, 86400.0)
       ->type_name("S");
   app.add_option("--base-seconds", o.base_seconds,
                  "Seconds of training for an unmarked field, 0.1 to 86400 (the budget, at most 60 for hash)")
-      ->check(CLI::Range(0.1, 86400.0).description(""))
+      ->range(0.1, 86400.0)
       ->type_name("S")
       ->default_str("");
   app.add_option("--size", o.size,
                  "Pixels of the images' longer side, 16 to 8192 (as the released code: 160, photographs "
                  "252, field mlp 100)")
-      ->check(CLI::Range(16, 8192).description(""))
+      ->range(16, 8192)
       ->type_name("N")
       ->default_str("");
   app.add_option("--log2-table", o.log2_table, "Rows of a hash field's table, as a power of two, 9 to 24")
-      ->check(CLI::Range(9, 24).description(""))
+      ->range(9, 24)
       ->type_name("N");
   app.add_option("--views", o.views,
                  "Novel views that are read in each cell, 1 to 100000 (as many as seconds of --budget, 20 to "
                  "200), a fifth of them under distortion; reading ends after --budget seconds and that fifth")
-      ->check(CLI::Range(1, 100000).description(""))
+      ->range(1, 100000)
       ->type_name("N")
       ->default_str("");
   app.add_option("--photographs", o.photographs, "Test photographs to compare with, 1 to 100000")
-      ->check(CLI::Range(1, 100000).description(""))
+      ->range(1, 100000)
       ->type_name("N");
 }
 
 }  // namespace
 
-Command add_reproduce(CLI::App& app) {
+Command add_reproduce(CommandLine& app) {
   auto o = std::make_shared<Options>();
   app.add_option("--table", o->tables,
                  "bits, quality, distortion, ablation, sampling or weights, several times (all)")

@@ -1,6 +1,5 @@
 #include <fieldmark/nerf/analytic_scene.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <ostream>
 
@@ -46,20 +45,18 @@ int run(const Options& options, Context& context) {
 
 }  // namespace
 
-Command add_scene(CLI::App& app) {
+Command add_scene(CommandLine& app) {
   auto options = std::make_shared<Options>();
   app.add_option("--out", options->out, "Folder for the data set, Blender layout")
       ->required()
       ->type_name("DIR");
   app.add_option("--kind", options->kind, "objects: textured solids on a slab; sphere: one shaded sphere")
-      ->check(CLI::IsMember({"objects", "sphere"}).description(""))
+      ->one_of({"objects", "sphere"})
       ->type_name("KIND");
-  app.add_option("--size", options->size, "Pixels of both sides, 1 to 8192")
-      ->check(CLI::Range(1, 8192).description(""))
-      ->type_name("N");
+  app.add_option("--size", options->size, "Pixels of both sides, 1 to 8192")->range(1, 8192)->type_name("N");
   app.add_option("--views", options->views,
                  "Views to train on, 1 to 100000; val gets a tenth, test a quarter")
-      ->check(CLI::Range(1, 100000).description(""))
+      ->range(1, 100000)
       ->type_name("N");
   return [options](Context& context) { return run(*options, context); };
 }

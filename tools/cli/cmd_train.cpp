@@ -2,7 +2,6 @@
 #include <fieldmark/nerf/field_sizing.h>
 #include <fieldmark/nerf/trainer.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 #include <limits>
@@ -228,7 +227,7 @@ int run(const Options& options, Context& context) {
 
 }  // namespace
 
-Command add_train(CLI::App& app) {
+Command add_train(CommandLine& app) {
   auto o = std::make_shared<Options>();
   app.add_option(
          "--data", o->data,
@@ -239,25 +238,25 @@ Command add_train(CLI::App& app) {
       ->required()
       ->type_name("FIELD");
   app.add_option("--size", o->size, "Pixels of the photographs' longer side, 16 to 8192 (as they are)")
-      ->check(CLI::Range(16, 8192).description(""))
+      ->range(16, 8192)
       ->type_name("N")
       ->default_str("");
   app.add_option("--preset", o->preset,
                  "hash: multiresolution hash table with small networks;\n"
                  "mlp: the original field, coarse and fine networks of 8 layers of 256")
-      ->check(CLI::IsMember({"hash", "mlp"}).description(""))
+      ->one_of({"hash", "mlp"})
       ->type_name("NAME");
   app.add_option("--model", o->model,
                  "fixed: what a run of this length can fill;\n"
                  "sized: as large as the scene needs, found by short trainings (hash only)")
-      ->check(CLI::IsMember({"fixed", "sized"}).description(""))
+      ->one_of({"fixed", "sized"})
       ->type_name("NAME");
   app.add_option(
          "--supersampling", o->supersampling,
          "Rays along each side of a pixel, 1, 2, 4 or 8, whose mean it is in the later part of long runs\n"
          "(after 8000 steps) and wherever the field is rendered: 2 for what is worth a slower image "
          "(hash only)")
-      ->check(CLI::IsMember({1, 2, 4, 8}).description(""))
+      ->one_of({1, 2, 4, 8})
       ->type_name("N");
   add_run_length(app, o->length, true);
   add_precision(app, o->precision);
@@ -265,17 +264,17 @@ Command add_train(CLI::App& app) {
                  "End when held-out views (4 of split val, looked at every 250 steps) reach this, dB, 1 to "
                  "100 (off);\n"
                  "without such a split, when the rays trained on do")
-      ->check(CLI::Range(1.0, 100.0).description(""))
+      ->range(1.0, 100.0)
       ->type_name("DB")
       ->default_str("");
   app.add_option("--background", o->background,
                  "Behind transparent images: white, black (white for the Blender layout, else black)")
-      ->check(CLI::IsMember({"white", "black"}).description(""))
+      ->one_of({"white", "black"})
       ->type_name("COLOUR")
       ->default_str("");
   app.add_option("--max-megabytes", o->max_megabytes,
                  "Largest file for the field, MB, 0.1 to 100000 (no limit)")
-      ->check(CLI::Range(0.1, 1e5).description(""))
+      ->range(0.1, 1e5)
       ->type_name("M")
       ->default_str("");
   app.add_flag("--no-carve", o->no_carve, "Do not rule out what silhouettes show to be empty");

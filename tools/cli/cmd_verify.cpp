@@ -2,7 +2,6 @@
 #include <fieldmark/watermark/evidence/commitment.h>
 #include <fieldmark/watermark/evidence/evidence_folder.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
 #include <ostream>
@@ -162,24 +161,24 @@ int run(const Options& options, Context& context) {
 
 }  // namespace
 
-Command add_verify(CLI::App& app) {
+Command add_verify(CommandLine& app) {
   auto o = std::make_shared<Options>();
   app.add_option("--owner", o->owner, "What `fieldmark embed` wrote")->required()->type_name("OWNER");
   add_message_options(app, o->message, "Message to look for");
   app.add_option("--fpr", o->fpr, "Rate of false alarms at which a mark counts as found, above 0 to 1")
-      ->check(CLI::Range(1e-300, 1.0).description(""))
+      ->range(1e-300, 1.0)
       ->type_name("P");
   app.add_option("--key", o->key, "Another key than the owner's")->type_name("KEY");
   app.add_option("--wrong-keys", o->wrong_keys,
                  "Also test this many random keys, 0 to 10000000 (0; with --evidence 100000)")
-      ->check(CLI::Range(0, 10000000).description(""))
+      ->range(0, 10000000)
       ->type_name("N")
       ->default_str("");
   app.add_option(
          "--control", o->controls,
          "Image, or folder of them, that is not marked: tested too, beside built-in controls; several "
          "times")
-      ->allow_extra_args(false)
+      ->one_value()
       ->type_name("IMAGE|DIR")
       ->default_str("");
   app.add_option(

@@ -2,7 +2,6 @@
 
 #include <fieldmark/core/files.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <ostream>
 
@@ -10,12 +9,12 @@
 
 namespace fieldmark::cli {
 
-void add_common(CLI::App& app, CommonOptions& options) {
+void add_common(CommandLine& app, CommonOptions& options) {
   app.add_option("--seed", options.seed, "Seed of every random choice except keys, 0 to 2^64 - 1")
       ->group("Common")
       ->type_name("N");
   app.add_option("--threads", options.threads, "Threads, 1 to 1024 (all that the machine offers)")
-      ->check(CLI::Range(1, 1024).description(""))
+      ->range(1, 1024)
       ->group("Common")
       ->type_name("N")
       ->default_str("");

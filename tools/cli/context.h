@@ -7,11 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "cli/command_line.h"
 #include "cli/progress.h"
-
-namespace CLI {
-class App;
-}
 
 namespace fieldmark::cli {
 
@@ -28,7 +25,7 @@ struct CommonOptions {
   std::string json{};      ///< file for the results, "-" for standard output, empty for none
   std::string report{};    ///< Markdown file for the results with their protocol, empty for none
 };
-void add_common(CLI::App& app, CommonOptions& options);
+void add_common(CommandLine& app, CommonOptions& options);
 
 /// @throws IoError if no file can be made under this name; what is there stays
 void check_writable(const std::string& path);

@@ -1,7 +1,5 @@
 #include "cli/long_run.h"
 
-#include <CLI/CLI.hpp>
-
 #include "cli/cli.h"
 #include "cli/context.h"
 
@@ -17,19 +15,19 @@ namespace {
 
 }  // namespace
 
-void add_run_length(CLI::App& app, RunLength& length, bool checkpoint) {
-  CLI::Option* steps = app.add_option("--steps", length.steps, "Length of the run in steps, 1 to 10000000")
-                           ->check(CLI::Range(1, 10000000).description(""))
-                           ->type_name("N")
-                           ->default_str("");
+void add_run_length(CommandLine& app, RunLength& length, bool checkpoint) {
+  Option steps = app.add_option("--steps", length.steps, "Length of the run in steps, 1 to 10000000")
+                     ->range(1, 10000000)
+                     ->type_name("N")
+                     ->default_str("");
   app.add_option("--seconds", length.seconds,
                  "Length of the run from the start of the command, loading included, 1 to 1000000")
-      ->check(CLI::Range(1.0, 1e6).description(""))
+      ->range(1.0, 1e6)
       ->excludes(steps)
       ->type_name("S");
   if (!checkpoint) return;
   app.add_option("--checkpoint-seconds", length.checkpoint_seconds, "Time between checkpoints, 1 to 1000000")
-      ->check(CLI::Range(1.0, 1e6).description(""))
+      ->range(1.0, 1e6)
       ->type_name("S");
 }
 

@@ -4,9 +4,7 @@
 #include <functional>
 #include <string>
 
-namespace CLI {
-class App;
-}
+#include "cli/command_line.h"
 
 namespace fieldmark::cli {
 
@@ -19,7 +17,7 @@ struct RunLength {
   double checkpoint_seconds = 60;
 };
 /// Adds --steps and --seconds, and with `checkpoint` --checkpoint-seconds.
-void add_run_length(CLI::App& app, RunLength& length, bool checkpoint);
+void add_run_length(CommandLine& app, RunLength& length, bool checkpoint);
 
 /// Work in steps, as the library's trainers offer it.
 struct Work {

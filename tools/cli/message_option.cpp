@@ -1,6 +1,5 @@
 #include "cli/message_option.h"
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 
 #include "cli/cli.h"
@@ -17,8 +16,8 @@ watermark::Message encoded(const char* option, PayloadKind kind, const std::stri
 
 }  // namespace
 
-void add_message_options(CLI::App& app, MessageOption& o, const std::string& purpose) {
-  CLI::Option* all[] = {
+void add_message_options(CommandLine& app, MessageOption& o, const std::string& purpose) {
+  Option all[] = {
       app.add_option("--message", o.message,
                      purpose + ", hexadecimal, most significant bit first, as long as the owner's bits")
           ->type_name("HEX"),

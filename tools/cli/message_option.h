@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "cli/command_line.h"
 #include "cli/context.h"
 
 namespace CLI {
@@ -21,7 +22,7 @@ struct MessageOption {
 
 /// Adds --message, --text, --uuid and --payload, which exclude each other. @param purpose  what is done with
 /// the message: "Message ..."
-void add_message_options(CLI::App& app, MessageOption& options, const std::string& purpose);
+void add_message_options(CommandLine& app, MessageOption& options, const std::string& purpose);
 
 /// The message that was asked for. @throws UsageError if none is given, or it does not fit
 watermark::Message message_of(const MessageOption& options, Index bits);

@@ -1,6 +1,5 @@
 #include "cli/perceptual.h"
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -10,7 +9,7 @@
 
 namespace fieldmark::cli {
 
-void add_lpips_weights(CLI::App& app, std::string& file) {
+void add_lpips_weights(CommandLine& app, std::string& file) {
   app.add_option("--lpips-weights", file,
                  "LPIPS weights, AlexNet ($FIELDMARK_DATA/weights/lpips_alex_v0.1.safetensors);\n"
                  "none leaves LPIPS out")

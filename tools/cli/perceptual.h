@@ -4,12 +4,13 @@
 #include <optional>
 #include <string>
 
+#include "cli/command_line.h"
 #include "cli/context.h"
 
 namespace fieldmark::cli {
 
 /// Adds --lpips-weights, the file of AlexNet's weights for LPIPS; empty where it is not given.
-void add_lpips_weights(CLI::App& app, std::string& file);
+void add_lpips_weights(CommandLine& app, std::string& file);
 
 /// A network for LPIPS from `file`, or, where that is empty, from the file of that network below
 /// $FIELDMARK_DATA/weights. Without either, and where `file` is "none", there is none, and people are told.

@@ -2,17 +2,14 @@
 
 #include <fieldmark/engine/isa.h>
 
-#include <CLI/CLI.hpp>
-
 #include "cli/cli.h"
 
 namespace fieldmark::cli {
 
-void add_precision(CLI::App& app, std::string& name) {
+void add_precision(CommandLine& app, std::string& name) {
   app.add_option("--precision", name, "Of what the networks multiply: fp32, bf16 (where the CPU has it)")
-      ->check(CLI::IsMember({"fp32", "bf16"}).description(""))
-      ->type_name("NAME")
-      ->capture_default_str();
+      ->one_of({"fp32", "bf16"})
+      ->type_name("NAME");
 }
 
 Precision precision_of(const std::string& name) {

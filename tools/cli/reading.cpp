@@ -4,8 +4,6 @@
 #include <fieldmark/core/files.h>
 #include <fieldmark/imaging/image.h>
 
-#include <CLI/CLI.hpp>
-
 #include "cli/cli.h"
 #include "cli/context.h"
 #include "cli/images.h"
@@ -14,12 +12,12 @@ namespace fieldmark::cli {
 
 using watermark::ReadingKind;
 
-void add_reading(CLI::App& app, std::string& reading) {
+void add_reading(CommandLine& app, std::string& reading) {
   app.add_option(
          "--detection", reading,
          "blind: the extractor alone; informed: find the camera, subtract the owner's unmarked view;\n"
          "auto: informed where the image agrees with the owner's field, else blind")
-      ->check(CLI::IsMember({"auto", "blind", "informed"}).description(""))
+      ->one_of({"auto", "blind", "informed"})
       ->type_name("NAME");
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/command_line.h"
 #include "cli/context.h"
 
 namespace fieldmark::cli {
@@ -23,7 +24,7 @@ struct ImageEvidence {
 };
 
 /// --detection auto|blind|informed.
-void add_reading(CLI::App& app, std::string& reading);
+void add_reading(CommandLine& app, std::string& reading);
 
 /// Reads images in the way that --detection names.
 class SuspectReader {

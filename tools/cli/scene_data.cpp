@@ -1,6 +1,5 @@
 #include "cli/scene_data.h"
 
-#include <CLI/CLI.hpp>
 #include <cstdlib>
 
 #include "cli/context.h"

@@ -1,13 +1,11 @@
 #pragma once
 #include <fieldmark/engine/shape.h>
 
-namespace CLI {
-class App;
-}
+#include "cli/command_line.h"
 
 namespace fieldmark::cli {
 
 /// --supersampling N, see RenderOptions::supersampling. @param rays  0 where it is not given
-void add_supersampling(CLI::App& app, Index& rays);
+void add_supersampling(CommandLine& app, Index& rays);
 
 }  // namespace fieldmark::cli

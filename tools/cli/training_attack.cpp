@@ -4,7 +4,6 @@
 #include <fieldmark/nerf/trainer.h>
 #include <fieldmark/watermark/attacks/extractor_attack.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 
 #include "cli/cli.h"
@@ -84,24 +83,24 @@ void train(const std::string& name, nerf::Trainer& trainer, const RunLength& len
 
 }  // namespace
 
-void add_training_attack(CLI::App& app, TrainingAttackOptions& o) {
+void add_training_attack(CommandLine& app, TrainingAttackOptions& o) {
   app.add_option("--data", o.data, "For finetune: data set of clean photographs")->type_name("DIR");
   app.add_option("--owner", o.owner, "For remove: whose extractor is known; nothing else of it is used")
       ->type_name("OWNER");
   app.add_option("--mark-psnr", o.mark_psnr,
                  "Of what remove changes in an image: PSNR on the object, dB, 10 to 60")
-      ->check(CLI::Range(10.0, 60.0).description(""))
+      ->range(10.0, 60.0)
       ->type_name("DB");
   app.add_option("--size", o.size,
                  "Pixels of the longer side of what is trained on, 16 to 8192 (as it is, or as in training)")
-      ->check(CLI::Range(16, 8192).description(""))
+      ->range(16, 8192)
       ->type_name("N")
       ->default_str("");
   app.add_option("--views", o.views, "Views that finetune-renders, remove and retrain train on, 4 to 10000")
-      ->check(CLI::Range(4, 10000).description(""))
+      ->range(4, 10000)
       ->type_name("N");
   app.add_option("--lr", o.lr, "First step size of finetune, finetune-renders and remove, 1e-6 to 1")
-      ->check(CLI::Range(1e-6, 1.0).description(""))
+      ->range(1e-6, 1.0)
       ->type_name("F");
   add_run_length(app, o.length, false);
 }

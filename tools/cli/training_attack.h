@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "cli/command_line.h"
 #include "cli/context.h"
 #include "cli/long_run.h"
 
@@ -18,7 +19,7 @@ struct TrainingAttackOptions {
   double lr = 5e-3;
   RunLength length;
 };
-void add_training_attack(CLI::App& app, TrainingAttackOptions& options);
+void add_training_attack(CommandLine& app, TrainingAttackOptions& options);
 
 /// "finetune", "finetune-renders", "remove" and "retrain".
 bool is_training_attack(const std::string& name);

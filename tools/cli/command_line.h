@@ -1,0 +1,80 @@
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <initializer_list>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+// The options of a command. They stand on CLI11, a header so large that it costs each source that includes it
+// ten seconds: only command_line.cpp and cli.cpp do.
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
+namespace fieldmark::cli {
+
+/// One option or positional argument of a command; each call refines it and returns it.
+class Option {
+ public:
+  explicit Option(CLI::Option* option) : option_(option) {}
+  Option* operator->() { return this; }
+  const Option* operator->() const { return this; }
+
+  Option required();
+  /// The word that stands for the value in help texts, as in `--bits N`.
+  Option type_name(const std::string& name);
+  /// The default that help texts show in place of the variable's value; empty: none.
+  Option default_str(const std::string& text);
+  Option group(const std::string& name);
+  /// Refuses numbers outside low to high; both whole: also those that are not whole.
+  template <class T>
+  Option range(T low, T high) {
+    if constexpr (std::is_integral_v<T>)
+      return whole(low, high);
+    else
+      return real(low, high);
+  }
+  Option one_of(const std::vector<std::string>& names);
+  Option one_of(std::initializer_list<int> values);
+  /// Refuses a value of which `fault` returns a text.
+  Option check(std::function<std::string(const std::string& value)> fault);
+  /// Refuses the option without another, or with another.
+  Option needs(Option other);
+  Option excludes(Option other);
+  /// Splits one value at this character into several.
+  Option delimiter(char character);
+  /// Takes one value each time that a list option is given, so that positional arguments may follow it.
+  Option one_value();
+  /// How often the option was given.
+  std::size_t count() const;
+
+ private:
+  Option whole(std::int64_t low, std::int64_t high);
+  Option real(double low, double high);
+  CLI::Option* option_;
+};
+
+/// The options that a command accepts. Infinity and NaN are refused wherever a number is expected.
+class CommandLine {
+ public:
+  explicit CommandLine(CLI::App& app) : app_(&app) {}
+  /// An option whose name begins with dashes, or a positional argument. `value` is its default, and must
+  /// outlive the parse. T is std::string, std::vector<std::string>, double, int, std::int64_t or
+  /// std::uint64_t.
+  template <class T>
+  Option add_option(const std::string& name, T& value, const std::string& help);
+  Option add_flag(const std::string& name, bool& value, const std::string& help);
+  /// An option that was added already.
+  Option option(const std::string& name);
+  /// A word after the command's own, as in `data fetch`; one of them must be given.
+  CommandLine add_subcommand(const std::string& name, const std::string& help);
+  /// Whether this command was called.
+  bool parsed() const;
+
+ private:
+  CLI::App* app_;
+};
+
+}  // namespace fieldmark::cli
