@@ -4,10 +4,10 @@
 
 using namespace fieldmark;
 
-TEST_CASE("gradcheck_cases: every case of the module passes") {
+TEST_CASE("distort gradcheck_cases: every case of the module passes") {
   expect_cases_pass(distort::gradcheck_cases());
 }
 
-TEST_CASE("gradcheck_cases: every header that promises a gradient has a case") {
+TEST_CASE("distort gradcheck_cases: every header that promises a gradient has a case") {
   CHECK(expect_case_of_each_header(distort::gradcheck_cases(), "distort/include") == 7);
 }

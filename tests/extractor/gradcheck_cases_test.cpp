@@ -4,10 +4,10 @@
 
 using namespace fieldmark;
 
-TEST_CASE("gradcheck_cases: every case of the module passes") {
+TEST_CASE("extractor gradcheck_cases: every case of the module passes") {
   expect_cases_pass(extractor::gradcheck_cases());
 }
 
-TEST_CASE("gradcheck_cases: every header that promises a gradient has a case") {
+TEST_CASE("extractor gradcheck_cases: every header that promises a gradient has a case") {
   CHECK(expect_case_of_each_header(extractor::gradcheck_cases(), "extractor/include") == 4);
 }

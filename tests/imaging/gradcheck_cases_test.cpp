@@ -8,6 +8,6 @@ TEST_CASE("gradcheck_cases: every case of the module passes") {
   expect_cases_pass(imaging::gradcheck_cases());
 }
 
-TEST_CASE("gradcheck_cases: every header that promises a gradient has a case") {
+TEST_CASE("imaging gradcheck_cases: every header that promises a gradient has a case") {
   CHECK(expect_case_of_each_header(imaging::gradcheck_cases(), "imaging/include") == 2);
 }

@@ -42,10 +42,10 @@ Json ten_frames() {
 struct Photographs : TemporaryFolder {
   Json json = ten_frames();
   Photographs() {
-    for (int i = 0; i < 10; ++i) write_image(picture(i), 12, 8);
+    for (int i = 0; i < 10; ++i) write_image(image(i), 12, 8);
     write();
   }
-  fs::path picture(int i) const { return path / "images" / (std::to_string(i) + ".png"); }
+  fs::path image(int i) const { return path / "images" / (std::to_string(i) + ".png"); }
   void write() const { write_file_atomically(path / "transforms.json", json.dump()); }
   void expect_error(const std::string& message, const std::string& split = "train") const {
     CHECK_THROWS_WITH(load_dataset(path, {.split = split}), Contains(message));

@@ -23,15 +23,15 @@ struct Toy {
   fs::path root = fs::temp_directory_path() / ("fieldmark_dataset_" + std::to_string(::getpid()));
   fs::path path = root / "toy";
   fs::path json = path / "transforms_train.json";
-  Tensor<float> picture = quantize8(uniform<float>({4, 6, 4}, 0, 1, 3));
+  Tensor<float> image = quantize8(uniform<float>({4, 6, 4}, 0, 1, 3));
   Transforms transforms{.camera_angle_x = 0.8,
                         .frames = {{"./train/a", {1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 3}},
                                    {"train/b.png", {1, 0, 0, 4, 0, 1, 0, 5, 0, 0, 1, 6}}}};
   Toy() {
     fs::remove_all(root);
     fs::create_directories(path / "train");
-    write_png(path / "train/a.png", picture);
-    write_png(path / "train/b.png", picture);
+    write_png(path / "train/a.png", image);
+    write_png(path / "train/b.png", image);
     write();
   }
   ~Toy() { fs::remove_all(root); }
