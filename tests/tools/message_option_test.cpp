@@ -35,9 +35,9 @@ TEST_CASE("message options: what does not fit is a usage error that names the op
   for (const char* pair :
        {"--text a --uuid b", "--text a --payload b", "--message a --text b", "--uuid a --payload b"}) {
     CLI::App app;
-    cli::CommandLine options(app);
+    cli::CommandLine line(app);
     cli::MessageOption options;
-    cli::add_message_options(options, options, "Message");
+    cli::add_message_options(line, options, "Message");
     CHECK_THROWS_AS(app.parse(pair), CLI::ExcludesError);
   }
 }

@@ -11,6 +11,7 @@
 
 using namespace fieldmark;
 using namespace fieldmark::nerf;
+using namespace fieldmark::watermark;
 
 namespace {
 
