@@ -30,13 +30,13 @@ bool is_device(const fs::path& path) {
   return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
 }
 
-// Permissions as the umask has it, unlike mkstemp; the pid and a counter keep writers apart.
-int open_temporary(const fs::path& target, fs::path* temporary) {
+// Unlike mkstemp, which ignores the umask. The pid and a counter keep writers apart.
+int open_temporary(const fs::path& target, mode_t mode, fs::path* temporary) {
   static std::atomic<unsigned> counter{0};
   for (;;) {
     *temporary = target;
     *temporary += ".tmp." + std::to_string(::getpid()) + "." + std::to_string(counter++);
-    const int fd = ::open(temporary->c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    const int fd = ::open(temporary->c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
     if (fd >= 0 || errno != EEXIST) return fd;
   }
 }
@@ -73,13 +73,13 @@ Buffer read_all(const fs::path& path) {
 
 }  // namespace
 
-AtomicFile::AtomicFile(const fs::path& path) : path_(path), target_(resolve(path)) {
+AtomicFile::AtomicFile(const fs::path& path, Access access) : path_(path), target_(resolve(path)) {
   if (is_device(target_)) {
     fd_ = ::open(target_.c_str(), O_WRONLY | O_CLOEXEC);
     if (fd_ < 0) fail("open", errno);
     return;
   }
-  fd_ = open_temporary(target_, &temporary_);
+  fd_ = open_temporary(target_, access == Access::secret ? 0600 : 0666, &temporary_);
   if (fd_ >= 0) return;
   const int error = errno;
   temporary_.clear();

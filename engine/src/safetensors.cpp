@@ -252,7 +252,7 @@ SafetensorsFile SafetensorsFile::read(const std::filesystem::path& path) {
   return parse(read_bytes(path), path.string());
 }
 
-void SafetensorsFile::write(const std::filesystem::path& to) const {
+void SafetensorsFile::write(const std::filesystem::path& to, Access access) const {
   std::vector<const Entry*> order;
   for (const Entry& e : tensors) order.push_back(&e);
   std::stable_sort(order.begin(), order.end(), [](const Entry* a, const Entry* b) {
@@ -276,7 +276,7 @@ void SafetensorsFile::write(const std::filesystem::path& to) const {
   }
   text.append((8 - text.size() % 8) % 8, ' ');
   const std::uint64_t length = text.size();
-  AtomicFile file(to);
+  AtomicFile file(to, access);
   file.write(std::as_bytes(std::span(&length, 1)));
   file.write(std::as_bytes(std::span(text)));
   for (const Entry* e : order) file.write(e->data);

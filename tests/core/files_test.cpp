@@ -58,6 +58,26 @@ TEST_CASE("files: nothing changes before commit, and a file that is not committe
   CHECK(folder.entries() == 1);
 }
 
+TEST_CASE("files: a secret file is its owner's alone at every moment, whatever the umask") {
+  const TemporaryFolder folder;
+  const auto only_mine = [&] {
+    CHECK(folder.entries() == 1);
+    for (const auto& entry : fs::directory_iterator(folder.path))
+      CHECK(entry.status().permissions() == static_cast<fs::perms>(0600));
+  };
+  const mode_t mask = ::umask(0);
+  {
+    AtomicFile file(folder / "a", Access::secret);
+    only_mine();
+    file.write(std::as_bytes(std::span(std::string_view("key"))));
+    only_mine();
+    file.commit();
+  }
+  ::umask(mask);
+  only_mine();
+  CHECK(read_text(folder / "a") == "key");
+}
+
 TEST_CASE("files: a full disk is an error that keeps the old file") {
   const TemporaryFolder folder;
   const std::string path = (folder / "a").string();

@@ -3,6 +3,8 @@
 #include <fieldmark/engine/model_file.h>
 #include <fieldmark/watermark/keys/key.h>
 
+#include <sys/stat.h>
+
 #include <set>
 #include <vector>
 
@@ -45,7 +47,9 @@ TEST_CASE("key: from bytes and to hex") {
 TEST_CASE("key: a saved key is loaded again, equal keys give equal files that only their owner can read") {
   const TemporaryFolder folder;
   const auto path = folder / "my.key", twin = folder / "twin.key";
+  const mode_t mask = ::umask(0);
   save_key(path, test_key(200));
+  ::umask(mask);
   save_key(twin, test_key(200));
   CHECK(load_key(path) == test_key(200));
   CHECK(read_bytes(path) == read_bytes(twin));

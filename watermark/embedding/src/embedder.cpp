@@ -281,8 +281,7 @@ void Embedder::save(const std::filesystem::path& path) const {
   file.add("counts", {2}, counts);
   file.add("figures", {4}, figures);
   file.add("key", {32}, std::span<const std::uint8_t>(owner_.key.bytes));
-  file.write(path);
-  make_private(path);
+  file.write(path, Access::secret);
 }
 
 void Embedder::restore(const std::filesystem::path& path) {

@@ -3,7 +3,6 @@
 #include <fieldmark/watermark/keys/key.h>
 
 #include <algorithm>
-#include <system_error>
 
 #include <fieldmark/core/sodium.h>
 
@@ -37,21 +36,11 @@ std::string to_hex(const Key& key) {
   return text;
 }
 
-void make_private(const std::filesystem::path& path) {
-  namespace fs = std::filesystem;
-  if (!fs::is_regular_file(path)) return;  // a pipe or device
-  std::error_code error;
-  fs::permissions(path, fs::perms::owner_read | fs::perms::owner_write, error);
-  if (error)
-    throw IoError(path.string() + ": cannot be made readable by its owner alone: " + error.message());
-}
-
 void save_key(const std::filesystem::path& path, const Key& key) {
   SafetensorsFile file;
   set_model_info(file, {.kind = kKind});
   file.add(kArray, {static_cast<Index>(key.bytes.size())}, std::span<const std::uint8_t>(key.bytes));
-  file.write(path);
-  make_private(path);
+  file.write(path, Access::secret);
 }
 
 Key load_key(const std::filesystem::path& path) {

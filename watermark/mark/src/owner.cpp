@@ -263,8 +263,7 @@ void Owner::save(const std::filesystem::path& path) const {
   file.add("cells/numbers", {static_cast<Index>(cells.numbers().size())}, cells.numbers());
   file.add("cells/area", {cells.count()}, cells.area());
   file.add("key", {32}, std::span<const std::uint8_t>(key.bytes));
-  file.write(path);
-  make_private(path);
+  file.write(path, Access::secret);
 }
 
 Owner Owner::load(const std::filesystem::path& path) {

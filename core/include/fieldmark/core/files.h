@@ -8,13 +8,19 @@
 
 namespace fieldmark {
 
+/// Who may read a new file.
+enum class Access {
+  shared,  ///< everybody whom the umask allows
+  secret   ///< its owner alone (mode 0600), from the first byte; devices and pipes keep their mode
+};
+
 /// A file that appears under its name only when it is complete: it is written to a temporary file in the same
 /// folder, flushed to the disk and renamed by commit(). Destroyed before commit(), it leaves what was there
 /// before and no temporary file. A symbolic link is followed; a device or pipe is written directly.
 class AtomicFile {
  public:
   /// @throws IoError if no file can be made in the folder of `path`
-  explicit AtomicFile(const std::filesystem::path& path);
+  explicit AtomicFile(const std::filesystem::path& path, Access access = Access::shared);
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
   ~AtomicFile();

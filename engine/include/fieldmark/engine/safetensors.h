@@ -1,4 +1,5 @@
 #pragma once
+#include <fieldmark/core/files.h>
 #include <fieldmark/engine/tensor.h>
 
 #include <cstddef>
@@ -36,8 +37,9 @@ struct SafetensorsFile {
   /// Replaces the file when it is complete (see AtomicFile). Equal contents give equal bytes: header keys are
   /// sorted; arrays follow each other in the order added, those of wider elements first, so that each is
   /// aligned.
+  /// @param access  secret for a file that holds a key
   /// @throws IoError if writing fails   @throws ValueError if a name or metadata is not UTF-8
-  void write(const std::filesystem::path& to) const;
+  void write(const std::filesystem::path& to, Access access = Access::shared) const;
 
   /// @{
   /// Appends an array. @throws ValueError if the name is taken or "__metadata__"

@@ -25,15 +25,11 @@ Key key_from_bytes(std::span<const std::uint8_t> bytes);
 /// 64 lower-case hexadecimal digits.
 std::string to_hex(const Key& key);
 
-/// Writes a KEY file: safetensors with an array "key" of 32 bytes and the kind "key" (see ModelInfo). A file
-/// is made readable by its owner alone.   @throws IoError if writing fails
+/// Writes a KEY file: safetensors with an array "key" of 32 bytes and the kind "key" (see ModelInfo), secret
+/// from the first byte (Access::secret).   @throws IoError if writing fails
 void save_key(const std::filesystem::path& path, const Key& key);
 
-/// Lets only its owner read and write a file: done to whatever holds a key. Pipes and devices stay as they
-/// are.
-/// @throws IoError if the system refuses
-void make_private(const std::filesystem::path& path);
-
+/// Reads a KEY file.
 /// @throws IoError if the file cannot be read, is of another kind, or its array is not 32 bytes
 Key load_key(const std::filesystem::path& path);
 
