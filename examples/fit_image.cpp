@@ -1,5 +1,5 @@
-// Fits an image with a small network: colour as a function of place. Public headers only.
-//   fit_image [PICTURE.png [RESULT.png]]      without an image: a pattern of its own
+// Fits an image with a small network: colour as a function of position. Public headers only.
+//   fit_image [IMAGE.png [RESULT.png]]      default: a built-in pattern
 #include <fieldmark/engine/adam.h>
 #include <fieldmark/engine/nn/dense.h>
 #include <fieldmark/engine/ops/activation.h>
@@ -36,7 +36,7 @@ int main(int argc, char** argv) {
     place[2 * p + 1] = static_cast<float>(p / width) / static_cast<float>(height);
   }
 
-  // Layers register their numbers in a store; the optimiser sees one flat array.
+  // Layers register their parameters in a store; the optimiser sees one flat array.
   constexpr int kBands = 5;
   ParamStore<float> store;
   const Dense<float> first(store, "first", {.in = 4 * kBands, .out = 48, .activation = Activation::relu}, 1);

@@ -113,8 +113,7 @@ void AtomicFile::commit() {
   if (temporary_.empty()) return;
   if (std::rename(temporary_.c_str(), target_.c_str()) != 0) fail("rename", errno);
   temporary_.clear();
-  // The rename itself is on the disk once the folder is. Some file systems cannot flush a folder: then it is
-  // on its way.
+  // Flushing the folder puts the rename on the disk. Some file systems cannot: then it follows later.
   const fs::path folder = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
   const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (fd < 0) return;

@@ -20,7 +20,7 @@ Var<T> quantize8(Var<T> x) {
       y[i] = v >= 255 ? T(1) : v > 0 ? static_cast<T>(static_cast<int>(v + T(0.5))) / 255 : T(0);
     }
   });
-  // dx = dy inside [0, 1]; pieces own their dx.
+  // dx = dy inside [0, 1]; chunks own their dx.
   x.tape().on_backward(out, [x, n](const T* dy) {
     T* dx = x.grad_acc();
     parallel_for(n, kGrain, [=](Index begin, Index end) {

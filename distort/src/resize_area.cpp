@@ -19,9 +19,9 @@ struct Overlaps {
   const T* weight;
 };
 
-// Lengths in units in which a whole axis is n * m: a cell of n is m long, a cell of m is n long. The weight
-// is the overlap over the length of a pixel of the resized axis, so that the transposed table holds the same
-// numbers.
+// Lengths in units of which an axis has n * m: a cell of n has length m, a cell of m length n. The weight is
+// the overlap over the length of a pixel of the resized axis, so that the transposed table has the same
+// values.
 template <class T>
 Overlaps<T> overlaps(Tape<T>& tape, Index n, Index m, Index length, Index stride) {
   auto* start = tape.template scratch<Index>(n + 1);
@@ -40,7 +40,7 @@ Overlaps<T> overlaps(Tape<T>& tape, Index n, Index m, Index length, Index stride
   return {start, at, weight};
 }
 
-// y [rows, row] (+)= table * x, rows of `row` numbers.
+// y [rows, row] (+)= table * x, rows of `row` elements.
 template <class T>
 void apply_rows(const Overlaps<T>& table, const T* x, Index rows, Index row, T* y, bool add) {
   parallel_for(rows, 1 + (Index{1} << 14) / std::max<Index>(row, 1), [&](Index begin, Index end) {

@@ -18,7 +18,7 @@ T one_value(const F& op, const Tensor<T>& x) {
   return op(tape.constant(x)).value()[0];
 }
 
-// A running float sum of such numbers stops growing near 2^24 / 10.
+// A running float sum of such values stops growing near 2^24 / 10.
 template <class T>
 void compare_sums(WorstError& error) {
   const auto x = scattered<T>({kPixels}, 0.1, 1, 8), w = scattered<T>({kPixels}, 0, 1, 9);
@@ -45,7 +45,7 @@ void compare_cancelling_sum(WorstError& error) {
   error.equal(one_value<T>([](auto v) { return sum(v); }, x), Real{0.0625} * Real{kPixels} / 2);
 }
 
-// All roundings go to the same side.
+// All roundings have the same sign.
 template <class T>
 void compare_equal_pixels(WorstError& error) {
   const Tensor<T> x({1, 1000, 1000, 3}, T(0.1));
@@ -53,7 +53,7 @@ void compare_equal_pixels(WorstError& error) {
   error.compare(got, x[0], x[0]);
 }
 
-// Gradients of a layer that many samples share, relative to the sum of the terms' sizes.
+// Gradients of a layer over many rows, relative to the sum of the terms' magnitudes.
 template <class T>
 void compare_long_gradients(WorstError& error) {
   constexpr Index rows = 300'000, in = 3, out = 5;

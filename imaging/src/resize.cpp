@@ -11,7 +11,7 @@
 namespace fieldmark {
 namespace {
 
-/// Which inputs an output pixel of one axis is made of.
+/// The inputs of an output pixel along one axis.
 struct Taps {
   Index first = 0;
   std::vector<double> weights;
@@ -20,7 +20,7 @@ using MakeTaps = Taps (*)(Index i, Index in, Index out);
 
 Taps area_taps(Index i, Index in, Index out) {
   // In units of 1 / out the output pixel covers [i in, (i + 1) in) and input pixel k covers [k out, (k + 1)
-  // out): whole numbers, so that the weights are exact.
+  // out): integers, so that the weights are exact.
   const Index begin = i * in, end = begin + in;
   Taps t{.first = begin / out, .weights = {}};
   for (Index k = t.first; k * out < end; ++k) {

@@ -32,7 +32,7 @@ constexpr std::array<Layer, 13> kLayers{{{"features.0", "relu1_1", false, 3, 64}
 
 PretrainedConvOptions options_of(const Layer& layer) { return {.in = layer.in, .out = layer.out}; }
 
-// (x - mean) / deviation, torchvision's numbers for ImageNet.
+// (x - mean) / deviation, torchvision's values for ImageNet.
 template <class T>
 PretrainedConv<T> imagenet() {
   constexpr std::array mean{0.485, 0.456, 0.406}, deviation{0.229, 0.224, 0.225};
@@ -45,7 +45,7 @@ PretrainedConv<T> imagenet() {
 }
 
 std::size_t layers_in(const SafetensorsFile& file) {
-  std::size_t count = 1;  // without the first there is nothing: reading it says what is missing
+  std::size_t count = 1;  // reading the first one reports an empty file
   for (std::size_t k = 0; k < kLayers.size(); ++k)
     for (const WeightTensor& t : pretrained_conv_tensors(kLayers[k].name, options_of(kLayers[k])))
       if (file.has(t.name)) count = k + 1;

@@ -26,7 +26,7 @@ double rms(const Tensor<float>& a, const Tensor<float>& b, Index channel) {
   for (Index i = channel; i < a.size(); i += a.shape[2]) sum += std::pow(static_cast<double>(a[i] - b[i]), 2);
   return std::sqrt(sum * static_cast<double>(a.shape[2]) / static_cast<double>(a.size()));
 }
-/// Smooth colours, as photographs have.
+/// Smooth colours, as in a training image.
 Tensor<float> gradient(Index height, Index width, Index channels) {
   Tensor<float> x({height, width, channels});
   for (Index i = 0; i < x.size(); ++i) {
