@@ -3,24 +3,34 @@
 // Input i depends on SEED and i only, so `fuzz_readers 1 SEED i` repeats one. Crashes and leaks are for the
 // sanitizers to see (preset asan).
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/files.h>
 #include <fieldmark/engine/safetensors.h>
-#include "canonical_json.h"
-#include "colmap.h"
-#include "lens.h"
-#include "llff.h"
-#include "npy.h"
-#include "transforms.h"
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/watermark/embedding/embedder.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <cstdlib>
+#include <cstring>
 #include <ctime>
 #include <functional>
 #include <iostream>
 #include <limits>
 #include <map>
+#include <memory>
 #include <random>
 
+#include "canonical_json.h"
+#include "colmap.h"
+#include "lens.h"
+#include "llff.h"
 #include "nerf/format_samples.h"
+#include "npy.h"
+#include "support/temporary_folder.h"
+#include "transforms.h"
 #include "watermark/small_evidence.h"
+#include "watermark/small_owner.h"
 
 using namespace fieldmark;
 using namespace fieldmark::nerf;
@@ -28,6 +38,7 @@ using namespace fieldmark::nerf;
 namespace {
 using Random = std::mt19937_64;
 constexpr double kSecondsForOne = 2;
+constexpr rlim_t kMemory = rlim_t{2} << 30;  // a file of kilobytes may not take more
 
 const std::string kTransforms =
     R"({"camera_angle_x": 0.75, "fl_x": 343.88, "fl_y": 343.6, "k1": 0.0578, "k2": -0.08,
@@ -55,10 +66,59 @@ void use(const SafetensorsFile& file) {
     if (t.dtype == "F32" || t.dtype == "BF16" || t.dtype == "F16") file.f32(t.name);
 }
 
+std::string text_of(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+auto bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
+
+// A file in memory, for readers that take a path.
+class MemoryFile {
+ public:
+  MemoryFile() : file_(::memfd_create("input", 0)) {
+    if (file_ < 0) throw IoError("memfd_create failed");
+  }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+  ~MemoryFile() { ::close(file_); }
+  std::filesystem::path holding(const std::string& bytes) const {
+    if (::ftruncate(file_, 0) != 0 ||
+        ::pwrite(file_, bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
+      throw IoError("the file in memory cannot be written");
+    return "/proc/self/fd/" + std::to_string(file_);
+  }
+
+ private:
+  int file_;
+};
+
+// The bytes of the file that `write` leaves at a path.
+template <class Write>
+std::string written(Write write) {
+  const TemporaryFolder folder;
+  write(folder / "file");
+  return text_of(read_bytes(folder / "file"));
+}
+
+std::string png(Index channels) {
+  return written([&](const auto& path) { write_png(path, Tensor<float>(Shape{5, 4, channels}, 0.4f)); });
+}
+std::string jpeg(Index channels, int quality) {
+  return text_of(encode_jpeg(Tensor<float>(Shape{20, 18, channels}, 0.4f), quality));
+}
+
+// A run of embed that a checkpoint is read for.
+struct EmbedRun {
+  watermark::Owner owner = small_owner();
+  std::vector<watermark::CachedView> views =
+      watermark::cache_novel_views(owner.field, watermark::square_patch(32), 2, 3);
+  watermark::Embedder embedder{owner, views, {.schedule = {.steps = 2}, .batch = 1}};
+};
+
 struct Format {
   const char* name;
   std::vector<std::string> samples;
   std::function<void(const std::string&)> read;
+  bool safetensors = false;  ///< mutations keep to the header, whose length is set anew
 };
 
 template <class Parse>
@@ -71,6 +131,11 @@ std::vector<Format> formats() {
   const auto cameras = [](const std::string& bytes, ColmapFormat format, const char* name) {
     for (const auto& [key, camera] : parse_colmap_cameras(bytes, format, name)) use(camera);
   };
+  const auto saved = [](const auto& model) { return written([&](const auto& path) { model.save(path); }); };
+  RadianceField mlp(small_mlp_options());
+  mlp.cameras = small_field().cameras;
+  const auto file = std::make_shared<MemoryFile>();
+  const auto run = std::make_shared<EmbedRun>();
   const std::string npy = npy_file("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }",
                                    packed<float>({1, 2, 3, 4, 5, 6}), 2);
   return {
@@ -95,7 +160,31 @@ std::vector<Format> formats() {
        }},
       {"safetensors",
        {safetensors_file()},
-       [](const std::string& b) { use(SafetensorsFile::parse(std::as_bytes(std::span(b)), "input")); }},
+       [](const std::string& b) { use(SafetensorsFile::parse(bytes_of(b), "input")); }},
+      {"FIELD",
+       {saved(small_field()), saved(mlp)},
+       [=](const std::string& b) { RadianceField::load(file->holding(b)); },
+       true},
+      {"OWNER",
+       {saved(small_owner()), saved(small_paper_owner())},
+       [=](const std::string& b) { watermark::Owner::load(file->holding(b)); },
+       true},
+      {"KEY",
+       {written([](const auto& path) { watermark::save_key(path, test_key(5)); })},
+       [=](const std::string& b) { watermark::load_key(file->holding(b)); },
+       true},
+      {"checkpoint",
+       {saved(run->embedder)},
+       [=](const std::string& b) {
+         const auto path = file->holding(b);
+         watermark::Embedder::checkpoint_key(path);
+         run->embedder.restore(path);
+       },
+       true},
+      {"png",
+       {png(1), png(2), png(3), png(4)},
+       [](const std::string& b) { decode_image(bytes_of(b), "input"); }},
+      {"jpeg", {jpeg(1, 50), jpeg(3, 90)}, [](const std::string& b) { decode_image(bytes_of(b), "input"); }},
       // Brought to its canonical form first: otherwise nearly every mutation would end there.
       {"evidence.json",
        {watermark::evidence_json(small_evidence(), watermark::public_key(test_key(5)),
@@ -158,6 +247,15 @@ void mutate(std::string& s, const std::string& other, Random& random) {
   }
 }
 
+// Mutates the header of a safetensors file and gives it its new length, so that what follows fits.
+void mutate_header(std::string& s, const std::string& other, Random& random) {
+  std::uint64_t length = 0;
+  std::memcpy(&length, s.data(), sizeof length);
+  std::string header = s.substr(sizeof length, length);
+  mutate(header, other, random);
+  s = packed(static_cast<std::uint64_t>(header.size())) + header + s.substr(sizeof length + length);
+}
+
 struct Outcome {
   std::size_t read = 0, refused = 0;
 };
@@ -195,7 +293,9 @@ int run(std::size_t inputs, std::uint64_t seed, std::size_t first) {
     const std::size_t k = i % all.size();
     const Format &format = all[k], &other = all[random() % all.size()];
     std::string input = format.samples[random() % format.samples.size()];
-    for (auto edits = 1 + random() % 3; edits > 0; --edits) mutate(input, other.samples[0], random);
+    const bool header = format.safetensors && random() % 8 != 0;
+    for (auto edits = 1 + random() % 3; edits > 0; --edits)
+      (header ? mutate_header : mutate)(input, other.samples[0], random);
     if (!try_one(format, input, outcomes[k])) {
       std::cerr << "  input " << i << ": repeat with fuzz_readers 1 " << seed << " " << i << "\n";
       ++failures;
@@ -209,6 +309,11 @@ int run(std::size_t inputs, std::uint64_t seed, std::size_t first) {
 }  // namespace
 
 int main(int count, char** words) {
+#ifndef __SANITIZE_ADDRESS__  // which maps terabytes; there ASAN_OPTIONS=max_allocation_size_mb bounds an
+                              // allocation
+  const rlimit memory{kMemory, kMemory};
+  ::setrlimit(RLIMIT_AS, &memory);
+#endif
   const auto argument = [&](int i, unsigned long long otherwise) {
     return i < count ? std::strtoull(words[i], nullptr, 10) : otherwise;
   };
