@@ -66,7 +66,7 @@ TEST_CASE("verify tells of every view, and tests controls beside the images", "[
   CHECK(json["views"] == 2);
   REQUIRE(json["per_view"].size() == 2);
   CHECK(json["per_view"][1]["bits"].get<std::string>().size() == 4);
-  CHECK(json["per_view"][1]["confidences"].size() == 4);
+  CHECK(json["per_view"][1]["bit_p_values"].size() == 4);
   REQUIRE(json["controls"].size() == 5);
   CHECK(json["controls"][3]["name"] == "white.png");
   CHECK(json["controls"][4]["statistic"] == json["statistic"]);

@@ -34,10 +34,10 @@ TEST_CASE("evidence_run: images are scored one by one, under their names", "[evi
   CHECK(scores[0].width == 32);
   CHECK(scores[1].score.statistic == watermark::keyed_statistic(run.images[1].cells, run.code, run.message));
   print_views(run.out, run.images, scores);
-  CHECK_THAT(run.out.str(), Contains("of 4, p ") && Contains("least sure bit") && Contains("view_001.png"));
+  CHECK_THAT(run.out.str(), Contains("of 4, p ") && Contains("weakest bit p") && Contains("view_001.png"));
   const Json json = per_view_json(run.images, scores);
   REQUIRE(json.size() == 2);
-  CHECK(json[0]["confidences"].size() == 4);
+  CHECK(json[0]["bit_p_values"].size() == 4);
   CHECK(json[0]["logits"].size() == 4);
   CHECK(json[0]["image"] == run.images[0].image);
 }

@@ -103,7 +103,7 @@ Json per_view_json(const std::vector<ImageEvidence>& images, const std::vector<E
     Json entry{{"image", images[i].image}, {"bits", to_bits(reading.message)}};
     entry.update(score_json(scores[i].score));
     entry["logits"] = reading.logit;
-    entry["confidences"] = watermark::bit_confidence(reading);
+    entry["bit_p_values"] = watermark::bit_p_values(reading);
     list.push_back(entry);
   }
   return list;
@@ -113,11 +113,11 @@ void print_views(std::ostream& out, const std::vector<ImageEvidence>& images,
                  const std::vector<EvidenceImage>& scores) {
   for (std::size_t i = 0; i < scores.size(); ++i) {
     const EvidenceScore& s = scores[i].score;
-    const auto sure = watermark::bit_confidence(s.reading);
+    const auto p_values = watermark::bit_p_values(s.reading);
     char text[120];
-    std::snprintf(text, sizeof text, "  %lld of %lld, p %.1e, least sure bit %.1f%%  ",
+    std::snprintf(text, sizeof text, "  %lld of %lld, p %.1e, weakest bit p %.1e  ",
                   static_cast<long long>(s.match.matching), static_cast<long long>(s.match.bits), s.p_value,
-                  100 * *std::min_element(sure.begin(), sure.end()));
+                  *std::max_element(p_values.begin(), p_values.end()));
     out << to_bits(s.reading.message) << text << images[i].image << "\n";
   }
 }

@@ -42,11 +42,11 @@ TestedControls test_controls(const KeyTest& test, SuspectReader& reader,
 /// For --json: name, figures and whether it stays above the rate of false alarms.
 Json controls_json(const std::vector<watermark::EvidenceControl>& controls, double fpr);
 
-/// For --json: image, bits, confidences and figures of each image.
+/// For --json: image, bits, p-value of each bit and scores of each image.
 Json per_view_json(const std::vector<ImageEvidence>& images,
                    const std::vector<watermark::EvidenceImage>& scores);
 
-/// A line for each image: bits, how many match, p-value, the least confidence among the bits.
+/// A line for each image: bits, matching bits, p-value, p-value of the weakest bit.
 void print_views(std::ostream& out, const std::vector<ImageEvidence>& images,
                  const std::vector<watermark::EvidenceImage>& scores);
 

@@ -13,13 +13,13 @@ using namespace fieldmark::watermark;
 
 TEST_CASE("controls: shuffled blocks are the image's squares in another order") {
   // 3 x 4 squares of 2 pixels, each of a number of its own, with a row and a column left over.
-  Tensor<float> picture({7, 9, 3});
+  Tensor<float> view_image({7, 9, 3});
   for (Index y = 0; y < 7; ++y)
     for (Index x = 0; x < 9; ++x)
       for (Index c = 0; c < 3; ++c)
-        picture[(y * 9 + x) * 3 + c] =
+        view_image[(y * 9 + x) * 3 + c] =
             static_cast<float>(1000 * (y / 2 * 4 + x / 2) + 100 * (y % 2) + 10 * (x % 2) + c);
-  const Tensor<float> out = shuffled_blocks(picture, 3, CounterRng(1), 0);
+  const Tensor<float> out = shuffled_blocks(view_image, 3, CounterRng(1), 0);
   REQUIRE(out.shape == Shape{6, 8, 3});
   std::set<int> seen;
   bool moved = false;
@@ -34,8 +34,8 @@ TEST_CASE("controls: shuffled blocks are the image's squares in another order") 
       }
   CHECK(seen.size() == 12);
   CHECK(moved);
-  CHECK(shuffled_blocks(picture, 3, CounterRng(1), 0).data == out.data);
-  CHECK(shuffled_blocks(picture, 3, CounterRng(1), 1).data != out.data);
+  CHECK(shuffled_blocks(view_image, 3, CounterRng(1), 0).data == out.data);
+  CHECK(shuffled_blocks(view_image, 3, CounterRng(1), 1).data != out.data);
 }
 
 TEST_CASE("controls: blocks that do not fit are refused") {

@@ -192,3 +192,38 @@ TEST_CASE("evidence: sizes and values that make no sense are refused") {
   CHECK_THROWS_WITH(keyed_p_value(kInfinity - kInfinity),
                     "[keyed_p_value] statistic must be a number, got nan");
 }
+
+namespace {
+// Eight cells, two for each of four bits; the last bit of the message is read wrongly, the third not at all.
+const CellCode kScoreCode{{0, 0, 1, 1, 2, 2, 3, 3}, {1, -1, 1, -1, 1, -1, 1, -1}};
+const Message kScoreMessage{{1, 0, 1, 0}};
+const std::vector<double> kScoreEvidence{2, -1, -2, 2, 0, 0, 1, 0};
+}  // namespace
+
+TEST_CASE("evidence: score, every figure, by hand") {
+  const EvidenceScore score = score_evidence(kScoreEvidence, kScoreCode, kScoreMessage);
+  // sum S_c s_c = 2 + 1 + 2 + 2 - 1 = 6, sum S_c^2 = 4 + 1 + 4 + 4 + 1 = 14
+  const double t = 6 / std::sqrt(14.);
+  CHECK(score.statistic == Approx(t));
+  CHECK(score.p_value == Approx(std::exp(-t * t / 2)));
+  CHECK(score.p_value_two_sided == Approx(2 * std::exp(-t * t / 2)));
+  CHECK(score.reading.message == Message{{1, 0, 0, 1}});
+  CHECK(score.match.matching == 2);
+  CHECK(score.match.decided == 3);
+  CHECK(score.p_value_bits == Approx(0.5));  // 4 of the 8 outcomes of three coins
+  CHECK(score.p_value_bits_two_sided == Approx(1));
+}
+
+TEST_CASE("evidence: score, the p-value of a bit falls with its logit") {
+  const auto p = bit_p_values(score_evidence(kScoreEvidence, kScoreCode, kScoreMessage).reading);
+  REQUIRE(p.size() == 4);
+  CHECK(p[0] == Approx(2 * std::exp(-0.9)));  // L = 3 / sqrt 5
+  CHECK(p[1] == Approx(2 * std::exp(-1.0)));  // L = -4 / sqrt 8
+  CHECK(p[2] == 1);
+  CHECK(p[3] == 1);
+}
+
+TEST_CASE("evidence: score, sizes that do not fit are named") {
+  CHECK_THROWS_WITH(score_evidence(std::vector<double>(3), kScoreCode, kScoreMessage),
+                    Contains("must have 8 entries"));
+}

@@ -13,15 +13,15 @@ constexpr std::uint64_t kShuffleStream = 61;
 
 }  // namespace
 
-Tensor<float> shuffled_blocks(const Tensor<float>& picture, Index across, const CounterRng& rng,
+Tensor<float> shuffled_blocks(const Tensor<float>& image, Index across, const CounterRng& rng,
                               std::uint64_t index) {
-  check_rank("shuffled_blocks", "image", picture.shape, 3, "[H, W, C]");
+  check_rank("shuffled_blocks", "image", image.shape, 3, "[H, W, C]");
   if (across < 1)
     throw ValueError("[shuffled_blocks] across must be at least 1, got " + std::to_string(across));
-  const Index h = picture.shape[0], w = picture.shape[1], channels = picture.shape[2];
+  const Index h = image.shape[0], w = image.shape[1], channels = image.shape[2];
   if (std::min(h, w) < across)
     throw ShapeError("[shuffled_blocks] image must have sides of at least " + std::to_string(across) +
-                     " pixels, got shape " + picture.shape.str());
+                     " pixels, got shape " + image.shape.str());
   const Index side = std::min(h, w) / across, rows = h / side, columns = w / side;
   const auto order = permutation(rows * columns, rng, index);
   Tensor<float> out({rows * side, columns * side, channels});
@@ -30,7 +30,7 @@ Tensor<float> shuffled_blocks(const Tensor<float>& picture, Index across, const 
     for (Index y = 0; y < side; ++y) {
       const Index row = (from / columns) * side + y, column = (from % columns) * side;
       std::copy_n(
-          picture.data.data() + (row * w + column) * channels, side * channels,
+          image.data.data() + (row * w + column) * channels, side * channels,
           out.data.data() + (((block / columns) * side + y) * columns + block % columns) * side * channels);
     }
   }

@@ -34,7 +34,7 @@ void check_count(std::string_view op, Index matching, Index n) {
 }
 
 // P(X >= k) for k >= n / 2 (0 above n): C(n, k) / 2^n times a series of falling ratios. Mantissa and exponent
-// of the product are kept apart, so that no size of n overflows on the way.
+// of the product are kept apart against overflow.
 long double upper_tail(Index k, Index n) {
   if (k > n) return 0;
   long double term = 1;
@@ -165,13 +165,30 @@ Index least_matching_bits(Index n, double rate) {
   Index low = 0, high = n + 1;  // p(low - 1) > rate >= p(high), with p(n + 1) = 0
   while (low < high) {
     const Index middle = low + (high - low) / 2;
-    if (p_value_bits(middle, n) <= rate) {
+    if (p_value_bits(middle, n) <= rate)
       high = middle;
-    } else {
+    else
       low = middle + 1;
-    }
   }
   return low;
+}
+
+EvidenceScore score_evidence(std::span<const double> evidence, const CellCode& code, const Message& message) {
+  EvidenceScore score;
+  score.statistic = keyed_statistic(evidence, code, message);
+  score.p_value = keyed_p_value(score.statistic);
+  score.p_value_two_sided = keyed_p_value_two_sided(score.statistic);
+  score.reading = read_bits(evidence, code, message.size());
+  score.match = match_bits(score.reading, message);
+  score.p_value_bits = p_value_bits(score.match.matching, score.match.decided);
+  score.p_value_bits_two_sided = p_value_bits_two_sided(score.match.matching, score.match.decided);
+  return score;
+}
+
+std::vector<double> bit_p_values(const BitReading& reading) {
+  std::vector<double> p;
+  for (double logit : reading.logit) p.push_back(keyed_p_value_two_sided(logit));
+  return p;
 }
 
 }  // namespace fieldmark::watermark

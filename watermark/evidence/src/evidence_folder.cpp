@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 constexpr char kSoftBinding[] = "c2pa_soft_binding.json", kEvidence[] = "evidence.json",
                kSignature[] = "evidence.sig", kPublicKey[] = "public_key.pem", kReport[] = "report.html";
 
-// Nothing and a fault where there is no such file.
+// Adds a fault if the file cannot be read.
 std::optional<std::string> file_text(const fs::path& folder, const char* name, EvidenceCheck& check) {
   try {
     return read_text(folder / name);

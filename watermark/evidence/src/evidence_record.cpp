@@ -13,6 +13,8 @@ using Json = nlohmann::json;
 constexpr char kFormat[] = "fieldmark evidence 1";
 
 Json score_json(const EvidenceScore& s) {
+  std::vector<double> confidences;  // the format's name for 1 - p of each bit
+  for (const double p : bit_p_values(s.reading)) confidences.push_back(1 - p);
   return {{"statistic", s.statistic},
           {"p_value", s.p_value},
           {"p_value_two_sided", s.p_value_two_sided},
@@ -22,7 +24,7 @@ Json score_json(const EvidenceScore& s) {
           {"decided_bits", s.match.decided},
           {"bits", to_bits(s.reading.message)},
           {"logits", s.reading.logit},
-          {"confidences", bit_confidence(s.reading)}};
+          {"confidences", confidences}};
 }
 
 Json images_json(const std::vector<EvidenceImage>& images) {
@@ -65,14 +67,13 @@ Json wrong_keys_json(const WrongKeyCounts& found) {
           {"histogram_bins_per_unit", WrongKeyCounts::kBinsPerUnit}};
 }
 
-// What is wrong with a text is said once, with the name of the file in front.
 [[noreturn]] void refuse(std::string_view name, const std::string& what) {
   throw IoError(std::string(name) + ": " + what);
 }
 
 bool is_near(double a, double b) { return std::abs(a - b) <= 1e-5 * std::abs(b); }
 
-// A number with a fraction or beyond the range would be cast.
+// get<Index>() would truncate fractions and wrap large numbers.
 Index whole_number(const Json& j, std::string_view name) {
   constexpr Index kMost = 1 << 30;
   if (!j.is_number_unsigned() || j.get<std::uint64_t>() > kMost)
@@ -80,8 +81,8 @@ Index whole_number(const Json& j, std::string_view name) {
   return j.get<Index>();
 }
 
-// Ten digits of T leave T^2 / 2 with an error of 5e-10 T^2, 2e-6 at the most (T^2 is below the number of
-// cells).
+// Ten digits of T leave T^2 / 2 with an error of 5e-10 T^2, at most 2e-6 since T^2 is below the number of
+// cells.
 void check_score(const Json& j, const Message& message, std::string_view name) {
   const double t = j.at("statistic").get<double>();
   const std::string bits = j.at("bits").get<std::string>();
@@ -92,7 +93,7 @@ void check_score(const Json& j, const Message& message, std::string_view name) {
   const std::string wanted = to_bits(message);
   Index agree = 0;
   for (std::size_t i = 0; i < bits.size(); ++i) agree += bits[i] == wanted[i];
-  // Bits that are not decided are written as 0 and do not count.
+  // Undecided bits are written as 0 and do not count.
   if (matching > agree || matching < agree - (message.size() - decided) || matching > decided)
     refuse(name, "the number of matching bits does not follow from the bits");
   const auto fits = [&](const char* key, double expected) {

@@ -30,7 +30,7 @@ void compare_keyed(WorstError& error) {
   }
 }
 
-// Evidence of any size has the same statistic.
+// The statistic does not depend on the scale of the evidence.
 void compare_statistic(WorstError& error) {
   constexpr std::size_t cells = 600;
   const auto signs = scattered<double>({600}, -1, 1, 1), sizes = scattered<double>({600}, -1, 1, 2);
@@ -50,7 +50,7 @@ void compare_statistic(WorstError& error) {
   }
 }
 
-// A residual of any size is scaled to the same strength; where there is none it stays 0.
+// A residual of any scale gets the same RMS; 0 stays 0.
 template <class T>
 void compare_budget(WorstError& error) {
   const std::vector<T> mask(300, T(1));

@@ -12,7 +12,7 @@
 
 namespace fieldmark::watermark {
 namespace {
-constexpr Index kKeysPerPiece = 128, kPiecesPerRound = 64;
+constexpr Index kKeysPerChunk = 128, kChunksPerRound = 64;
 
 Key root_key(std::uint64_t seed) {
   Key root;
@@ -61,17 +61,17 @@ WrongKeyCounts count_wrong_keys(std::span<const double> evidence, std::span<cons
   const Key root = root_key(seed);
   WrongKeyCounts total;
   while (total.n < n) {
-    const Index first = total.n, round = std::min(n - first, kKeysPerPiece * kPiecesPerRound);
-    std::array<WrongKeyCounts, kPiecesPerRound> pieces;
-    parallel_for(round, kKeysPerPiece, [&](Index begin, Index end) {
+    const Index first = total.n, round = std::min(n - first, kKeysPerChunk * kChunksPerRound);
+    std::array<WrongKeyCounts, kChunksPerRound> chunks;
+    parallel_for(round, kKeysPerChunk, [&](Index begin, Index end) {
       CellCode code;
-      WrongKeyCounts& piece = pieces[static_cast<std::size_t>(begin / kKeysPerPiece)];
+      WrongKeyCounts& chunk = chunks[static_cast<std::size_t>(begin / kKeysPerChunk)];
       for (Index i = first + begin; i < first + end; ++i) {
         dealer.deal(derive_key(root, "fieldmark wrong key", static_cast<std::uint64_t>(i)), code);
-        add_statistic(keyed_statistic(evidence, code, message), piece);
+        add_statistic(keyed_statistic(evidence, code, message), chunk);
       }
     });
-    for (const WrongKeyCounts& piece : pieces) add_counts(piece, total);
+    for (const WrongKeyCounts& chunk : chunks) add_counts(chunk, total);
     if (progress && !progress(total.n, n)) throw Error("[count_wrong_keys] stopped");
   }
   return total;
@@ -81,8 +81,7 @@ Index binomial_upper(Index n, double p, double level) {
   check_binomial(n, p, level);
   if (p == 0 || n == 0) return 0;
   if (p == 1) return n;
-  // Weights relative to the mode's, as far as they count on both sides: no factorials, no underflow for any
-  // n.
+  // Weights relative to the mode's, down to negligible ones: no factorials, no underflow for any n.
   const long double odds = static_cast<long double>(p) / (1 - static_cast<long double>(p));
   const auto mode = std::min(n, static_cast<Index>(static_cast<double>(n + 1) * p));
   constexpr long double kNegligible = 1e-25L;

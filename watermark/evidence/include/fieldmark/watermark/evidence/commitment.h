@@ -7,9 +7,10 @@
 
 namespace fieldmark::watermark {
 
-/// What an owner publishes, or has time-stamped, before the field: it fixes OWNER, key and message without
-/// giving them away. SHA-256 of this text, each line ended by a line feed, so that `sha256sum` repeats it:
-///   fieldmark commitment 1
+/// The commitment that an owner publishes or time-stamps before the field. It fixes OWNER, key and message
+/// without revealing them: the SHA-256 of this text, each line ended by a line feed, as `sha256sum` computes
+/// it:
+///   fieldmark claim 1
 ///   owner SHA-256-OF-THE-OWNER-FILE
 ///   key 64-DIGITS
 ///   message NUMBER-OF-BITS HEXADECIMAL-DIGITS

@@ -7,30 +7,27 @@
 
 namespace fieldmark::watermark {
 
-/// Images that cannot show a mark: what the test says of them shows what it says without one.
+/// Images that cannot show a mark, which calibrate the test.
 struct Control {
   std::string name;                   ///< one word
-  std::string meaning;                ///< a sentence on what it is and what it shows
+  std::string meaning;                ///< a sentence for readers of the report
   std::vector<Tensor<float>> images;  ///< [H, W, 3] each
 };
 
-/// An image cut into equal squares, `across` of them along its shorter side, put together in a random order:
-/// every colour and the finest detail stay, the object is gone. Rows and columns left over are dropped.
+/// Shuffles equal squares of an image, `across` of them along its shorter side. Colours and fine detail stay,
+/// the scene is gone. Left-over rows and columns are dropped.
 /// @param image  [H, W, C], both sides at least `across`   @param across  at least 1
 /// @throws ShapeError if it is no image or too small   @throws ValueError if across is below 1
 Tensor<float> shuffled_blocks(const Tensor<float>& image, Index across, const CounterRng& rng,
                               std::uint64_t index);
 
 /// Three controls that every owner has:
-///   blank     one image in the background's colour: what key and extractor give of themselves
-///   unmarked  novel views of the owner's field as it was before the mark: the scene without the mark
-///   shuffled  the images in question in 16 blocks across (shuffled_blocks()): their colours without the
-///             scene
-/// Images with inverted colours or mirrored are none: the one turns every sign of the mark, the other
-/// leaves small parts of it readable.
-/// @param images  in question, [H, W, 1 to 4], sides of at least 16; the first `views` are shuffled, and as
-///                  many views rendered
-/// @param views     at least 1   @throws ValueError if there is no image or views is below 1
+///   blank     an image of the background's colour: the bias of key and extractor
+///   unmarked  novel views of the owner's unmarked field: the scene without the mark
+///   shuffled  the given images in 16 blocks across (shuffled_blocks()): their colours without the scene
+/// @param images  [H, W, 1 to 4], sides of at least 16; the first `views` are shuffled, and as many views
+/// rendered
+/// @param views  at least 1   @throws ValueError without images or if views is below 1
 std::vector<Control> built_in_controls(const Owner& owner, std::span<const Tensor<float>> images, Index views,
                                        std::uint64_t seed);
 

@@ -5,8 +5,7 @@
 
 namespace fieldmark::watermark {
 
-/// p-values down to the least numbers, pixels in long segments and residuals near 0, each with the error that
-/// it may have.
+/// Hard cases of p-values, weighted segments and residual budgets, each with its error bound.
 std::vector<NumericsCase> numerics_cases();
 
 }  // namespace fieldmark::watermark

@@ -8,7 +8,7 @@
 
 namespace fieldmark::watermark {
 
-/// How often keys that have nothing to do with an image reach a p-value.
+/// How often keys independent of an image reach a p-value.
 struct WrongKeyCounts {
   static constexpr int kThresholds = 8;  ///< least p-value counted is 10^-kThresholds
   Index n = 0;                           ///< keys tried
@@ -17,15 +17,15 @@ struct WrongKeyCounts {
   double least_p = 1;                     ///< the least p-value of all keys, 1 without keys
   static constexpr int kBins = 80;        ///< of the histogram
   static constexpr int kBinsPerUnit = 4;  ///< so it spans T from -10 to 10
-  /// histogram[i] keys gave a statistic T with i <= 4 (T + 10) < i + 1; what lies beyond counts at the ends.
+  /// histogram[i] keys gave a statistic T with i <= 4 (T + 10) < i + 1; the end bins include outliers.
   std::array<Index, kBins> histogram{};
   /// Equal in everything.
   friend bool operator==(const WrongKeyCounts&, const WrongKeyCounts&) = default;
 };
 
-/// Deals the cells anew for n keys and tests the same evidence under each (see keyed_statistic,
-/// keyed_p_value). Keys are BLAKE2b of the seed, apart from any key of random_key(); equal arguments give
-/// equal counts, for any number of threads. 10^4 keys on 500 cells take 0.4 s on one core.
+/// Tests the same evidence under n wrong keys (see keyed_statistic, keyed_p_value). Keys are BLAKE2b of the
+/// seed, independent of any random_key(). Counts do not depend on the number of threads. 10^4 keys on 500
+/// cells take 0.4 s on one core.
 /// @param evidence  [cells] summed sign evidence   @param area  [cells] as for deal_cells
 /// @param n         number of keys, >= 0
 /// @param progress  called now and then with (done, total); returns false to stop, which throws Error
@@ -34,11 +34,11 @@ WrongKeyCounts count_wrong_keys(std::span<const double> evidence, std::span<cons
                                 const Message& message, Index n, std::uint64_t seed,
                                 const std::function<bool(Index, Index)>& progress = {});
 
-/// Upper bound that a count of rare events keeps: the least k with P(X <= k) >= level, X ~ Binomial(n, p).
+/// Quantile of the binomial distribution: the least k with P(X <= k) >= level, X ~ Binomial(n, p).
 /// @param n  >= 0   @param p  in [0, 1]   @param level  in (0, 1)   @throws ValueError otherwise
 Index binomial_upper(Index n, double p, double level = 0.99);
 
-/// Where a count lies, both ends included.
+/// Interval of counts, both ends included.
 struct CountInterval {
   Index low = 0;   ///< at least
   Index high = 0;  ///< at most
@@ -46,8 +46,7 @@ struct CountInterval {
   friend bool operator==(const CountInterval&, const CountInterval&) = default;
 };
 
-/// The narrowest interval that X ~ Binomial(n, p) leaves to either side with a probability of at most
-/// (1 - level) / 2.
+/// The narrowest interval with a probability of at most (1 - level) / 2 on either side, X ~ Binomial(n, p).
 /// @param n  >= 0   @param p  in [0, 1]   @param level  in (0, 1)   @throws ValueError otherwise
 CountInterval binomial_interval(Index n, double p, double level = 0.99);
 

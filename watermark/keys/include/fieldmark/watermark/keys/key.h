@@ -7,19 +7,19 @@
 
 namespace fieldmark::watermark {
 
-/// The owner's secret, 256 bits: who does not hold it cannot say what an image's cells should show.
+/// The owner's secret of 256 bits. Without it nobody can tell the sign that a cell should show.
 struct Key {
-  std::array<std::uint8_t, 32> bytes{};  ///< to be kept from logs and reports
-  /// Compares in a time that may depend on the bytes.
+  std::array<std::uint8_t, 32> bytes{};  ///< never logged or reported
+  /// Not constant-time.
   friend bool operator==(const Key&, const Key&) = default;
 };
 
-/// 256 bits from the operating system's random source; never from a seed.
-/// @throws Error if the system has none
+/// Draws 256 bits from the operating system; never from a seed.
+/// @throws Error if libsodium cannot start
 Key random_key();
 
 /// A key from known bytes, for tests and for keys kept elsewhere.
-/// @param bytes  32 of them   @throws ValueError otherwise
+/// @param bytes  [32]   @throws ValueError for another size
 Key key_from_bytes(std::span<const std::uint8_t> bytes);
 
 /// 64 lower-case hexadecimal digits.

@@ -8,7 +8,7 @@
 
 namespace fieldmark::watermark {
 
-/// What everybody may know of a pair of Ed25519 keys: it tells whether its holder signed.
+/// The public half of an Ed25519 key pair: it verifies signatures.
 struct PublicKey {
   std::array<std::uint8_t, 32> bytes{};  ///< RFC 8032, section 5.1.5
   /// Equal in every byte.
@@ -20,11 +20,11 @@ struct Signature {
   std::array<std::uint8_t, 64> bytes{};  ///< RFC 8032, section 5.1.6
 };
 
-/// The public half of the pair that a key signs with. The pair's seed is derive_key(key, "fieldmark evidence
-/// signature", 0), so nothing is to be kept besides the key, and what is signed tells nothing of it.
+/// The public half of the pair that a key signs with. Its seed is derive_key(key, "fieldmark evidence
+/// signature", 0), so that the owner keeps one secret only, and signatures reveal nothing of it.
 PublicKey public_key(const Key& key);
 
-/// Signs bytes with the pair of a key: equal bytes give equal signatures.
+/// Signs bytes with the pair of a key. Deterministic.
 Signature sign(const Key& key, std::string_view bytes);
 
 /// Whether the holder of a public key signed exactly these bytes.
@@ -36,7 +36,7 @@ std::string to_hex(const PublicKey& key);
 /// @param hex  64 digits 0-9 or a-f   @throws ValueError otherwise
 PublicKey public_key_from_hex(std::string_view hex);
 
-/// The key as a PEM file (SubjectPublicKeyInfo, RFC 8410), which OpenSSL and others read.
+/// The key as PEM text (SubjectPublicKeyInfo, RFC 8410), for OpenSSL and other tools.
 std::string to_pem(const PublicKey& key);
 
 }  // namespace fieldmark::watermark
