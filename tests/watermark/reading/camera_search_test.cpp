@@ -1,7 +1,7 @@
+#include "camera_search.h"
 #include <fieldmark/core/error.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/engine/random.h>
-#include <fieldmark/watermark/reading/camera_search.h>
 #include "camera_motion.h"
 
 #include <algorithm>
@@ -84,7 +84,7 @@ TEST_CASE("camera_search: the whole object in an image leads to the camera, turn
   CHECK(close >= 3);  // 60 renders are some 15 degrees apart
 }
 
-TEST_CASE("camera_search: an object is found from below, where no photograph was taken") {
+TEST_CASE("camera_search: an object is found from below, where no training image was taken") {
   const Owner owner = tiny_owner();
   REQUIRE(owner.field.space.kind == nerf::SpaceKind::cube);
   nerf::Renderer renderer(owner.field);

@@ -31,9 +31,9 @@ TEST_CASE("informed_reader: with the camera known every bit is read, whatever ga
   const Owner owner = marking_owner();
   InformedReader reader(owner, kSearch);
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
-    Tensor<float> picture = image_of(owner, near_camera(seed), true);
-    for (Index i = 0; i < picture.size(); ++i) picture[i] = 0.8f * picture[i] + 0.05f;
-    const auto evidence = reader.evidence_at(quantize8(picture), near_camera(seed));
+    Tensor<float> view_image = image_of(owner, near_camera(seed), true);
+    for (Index i = 0; i < view_image.size(); ++i) view_image[i] = 0.8f * view_image[i] + 0.05f;
+    const auto evidence = reader.evidence_at(quantize8(view_image), near_camera(seed));
     CHECK(read_bits(evidence, owner.code(), 4).message == kMessage);
     CHECK(keyed_p_value(keyed_statistic(evidence, owner.code(), kMessage)) < 1e-4);
   }
@@ -85,13 +85,13 @@ TEST_CASE("informed_reader: the camera is found from the image, and the reading 
 
 TEST_CASE("informed_reader: one and two threads give the same bits") {
   const Owner owner = marking_owner();
-  const Tensor<float> picture = image_of(owner, near_camera(5), true);
+  const Tensor<float> view_image = image_of(owner, near_camera(5), true);
   const int before = threads();
   std::vector<double> evidence[2];
   for (const int n : {1, 2}) {
     set_threads(n);
     InformedReader reader(owner, {.views = 10, .size = 32});
-    evidence[n - 1] = reader.read(picture).informed.evidence;
+    evidence[n - 1] = reader.read(view_image).informed.evidence;
   }
   set_threads(before);
   CHECK(!evidence[0].empty());

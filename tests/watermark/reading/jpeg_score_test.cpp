@@ -17,7 +17,7 @@ namespace {
 constexpr Index kHeight = 104, kWidth = 136;
 
 // Waves, edges and fine grain; the amplitude of the grain says how much detail there is.
-Tensor<float> picture(float grain, std::uint64_t seed) {
+Tensor<float> view_image(float grain, std::uint64_t seed) {
   const CounterRng rng(seed, 1);
   Tensor<float> x({kHeight, kWidth, 3});
   for (Index p = 0; p < kHeight * kWidth; ++p) {
@@ -60,7 +60,7 @@ struct Right {
 Right strips_right(int quality, float amplitude) {
   Right right;
   for (const std::uint64_t seed : {1u, 2u, 3u, 4u}) {
-    const Tensor<float> base = picture(0.03f, seed), mark = pattern(amplitude);
+    const Tensor<float> base = view_image(0.03f, seed), mark = pattern(amplitude);
     const CounterRng rng(seed, 3);
     const auto sign = [&](Index y, Index x) {
       return rng.uniform4(static_cast<std::uint64_t>(y / 8 * 10 + x / 34))[0] < 0.5f ? -1.f : 1.f;
@@ -90,7 +90,7 @@ Right strips_right(int quality, float amplitude) {
 
 TEST_CASE("find_jpeg: names quality and chroma of what was compressed, and nothing else") {
   for (const std::uint64_t seed : {1u, 2u}) {
-    const Tensor<float> base = picture(0.05f, seed);
+    const Tensor<float> base = view_image(0.05f, seed);
     CHECK_FALSE(find_jpeg(base).has_value());
     for (const int quality : {30, 50, 75, 90}) {
       INFO(quality);
@@ -116,7 +116,7 @@ TEST_CASE("jpeg_score: reads faint signs that a plain difference does not") {
 }
 
 TEST_CASE("jpeg_score: the slope is that of the likelihood, and leans to no sign without a mark") {
-  const Tensor<float> base = picture(0.03f, 7), mark = pattern(0.01f);
+  const Tensor<float> base = view_image(0.03f, 7), mark = pattern(0.01f);
   const Tensor<float> seen = jpeg_round_trip(sum(base, mark, 1), 60);
   const JpegTrace trace = *find_jpeg(seen);
   const auto along = [&](const JpegScore& s) {
@@ -134,7 +134,7 @@ TEST_CASE("jpeg_score: the slope is that of the likelihood, and leans to no sign
 }
 
 TEST_CASE("jpeg_score: says nothing off the object, and the same for one and two threads") {
-  const Tensor<float> base = picture(0.03f, 8), mark = pattern(0.01f);
+  const Tensor<float> base = view_image(0.03f, 8), mark = pattern(0.01f);
   const Tensor<float> seen = jpeg_round_trip(sum(base, mark, 1), 40);
   std::vector<double> object(kEverywhere.size(), 0);
   for (std::size_t p = 0; p < object.size(); ++p)

@@ -1,7 +1,7 @@
+#include "pose_alignment.h"
 #include <fieldmark/core/error.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/imaging/image.h>
-#include <fieldmark/watermark/reading/pose_alignment.h>
 #include "camera_motion.h"
 
 #include <algorithm>
@@ -27,9 +27,9 @@ Tensor<float> image_of(const nerf::Camera& camera) {
   return quantize8(renderer.render(camera).rgb);
 }
 
-Alignment align(const Tensor<float>& picture, const nerf::Camera& start) {
+Alignment align(const Tensor<float>& view_image, const nerf::Camera& start) {
   PoseAligner aligner(tiny_field());
-  return aligner.align(picture, start, kStages);
+  return aligner.align(view_image, start, kStages);
 }
 }  // namespace
 
@@ -52,21 +52,21 @@ TEST_CASE("pose_alignment: plain corners do not count where the scene fills its 
   const nerf::Camera camera =
       nerf::make_camera(nerf::look_at({0.3, -0.4, 0.2}, {0, 1, 0}, {0, 0, 1}), 0.9, 96, 96);
   nerf::Renderer renderer(field);
-  Tensor<float> picture = quantize8(renderer.render(camera).rgb), spotted = picture;
+  Tensor<float> view_image = quantize8(renderer.render(camera).rgb), spotted = view_image;
   Index corners = 0;
   for (Index p = 0; p < 96 * 96; ++p) {
     const Index y = p / 96, x = p % 96;
     if (std::min(y, 95 - y) + std::min(x, 95 - x) >= 30) continue;
     ++corners;
     for (Index a = 0; a < 3; ++a) {
-      picture[3 * p + a] = 1;
+      view_image[3 * p + a] = 1;
       spotted[3 * p + a] = static_cast<float>((x / 6 + y / 6) % 2);  // as large, but not plain
     }
   }
   CHECK(corners > 1000);
   constexpr AlignmentStage kStay[] = {{.size = 96, .blur = 1, .steps = 0}};
   PoseAligner aligner(field);
-  const double plain = aligner.align(picture, camera, kStay).agreement,
+  const double plain = aligner.align(view_image, camera, kStay).agreement,
                rough = aligner.align(spotted, camera, kStay).agreement;
   CAPTURE(plain, rough);
   CHECK(plain > 0.98);
@@ -78,10 +78,11 @@ TEST_CASE("pose_alignment: a turned and cut image with other tones is met by rol
   nerf::Camera part = moved(camera, {0, 0, 0}, {0, 0, 0.3, 0, 0, 0, std::log(1.3)});
   part.cx -= 4;
   part.height = 56;
-  Tensor<float> picture = image_of(part);
-  for (Index i = 0; i < picture.size(); ++i)
-    picture[i] = 0.7f * picture[i] + 0.05f * static_cast<float>(i % 3);
-  const Alignment a = align(picture, moved(part, {0, 0, 0}, {0.03, 0.04, -0.08, 0, 0, 0, 0.06, 0.03, -0.02}));
+  Tensor<float> view_image = image_of(part);
+  for (Index i = 0; i < view_image.size(); ++i)
+    view_image[i] = 0.7f * view_image[i] + 0.05f * static_cast<float>(i % 3);
+  const Alignment a =
+      align(view_image, moved(part, {0, 0, 0}, {0.03, 0.04, -0.08, 0, 0, 0, 0.06, 0.03, -0.02}));
   CHECK(a.camera.width == 64);
   CHECK(a.camera.height == 56);
   CHECK(cameras_apart(part, a.camera) < 0.1);
@@ -101,13 +102,13 @@ TEST_CASE("pose_alignment: images of something else do not agree") {
 
 TEST_CASE("pose_alignment: one and two threads give the same bits") {
   const nerf::Camera camera = near_camera(7);
-  const Tensor<float> picture = image_of(camera);
+  const Tensor<float> view_image = image_of(camera);
   const nerf::Camera start = moved(camera, {0, 0, 0}, {0.02, -0.03, 0.02});
   const int before = threads();
   set_threads(1);
-  const Alignment one = align(picture, start);
+  const Alignment one = align(view_image, start);
   set_threads(2);
-  const Alignment two = align(picture, start);
+  const Alignment two = align(view_image, start);
   set_threads(before);
   CHECK(one.camera.pose == two.camera.pose);
   CHECK(one.camera.parameters() == two.camera.parameters());

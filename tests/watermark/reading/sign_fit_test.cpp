@@ -147,6 +147,15 @@ TEST_CASE("sign_fit: noise that is alike from pixel to pixel counts for what it 
   CHECK(many > 10);
 }
 
+TEST_CASE("sign_fit: without information and noise every sign is 0, not NaN") {
+  const Carriers c = overlapping(0.5f);
+  MarkScore s = score_of(c, 0.01);
+  std::fill(s.precision.data.begin(), s.precision.data.end(), 0.f);
+  const SignFit fit = fit_signs(c, s, kCells);
+  CHECK(fit.noise == 0);
+  for (const double sign : fit.sign) CHECK(sign == 0);
+}
+
 TEST_CASE("sign_fit: what is not seen has no sign, and shapes that do not fit are named") {
   const Carriers c = overlapping(0.5f);
   MarkScore s = score_of(c, 0.01);

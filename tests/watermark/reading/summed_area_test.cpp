@@ -1,5 +1,5 @@
+#include "summed_area.h"
 #include <fieldmark/core/error.h>
-#include <fieldmark/watermark/reading/summed_area.h>
 
 #include <array>
 #include <cmath>

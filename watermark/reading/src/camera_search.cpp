@@ -1,34 +1,52 @@
+#include "camera_search.h"
 #include <fieldmark/distort/rotate.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/engine/random.h>
 #include <fieldmark/imaging/resize.h>
-#include <fieldmark/watermark/reading/camera_search.h>
+#include <fieldmark/watermark/mark/cameras_around.h>
 #include "camera_motion.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <complex>
 #include <numbers>
-
-#include <fieldmark/watermark/mark/cameras_around.h>
-#include "camera_proposal.h"
 
 namespace fieldmark::watermark {
 namespace {
 
-constexpr Index kMostMatches = 240;  // places that are compared
+using Complex = std::complex<double>;
+
+constexpr Index kMostMatches = 240;  // places compared
 constexpr std::size_t kLeastMatches = 8;
 constexpr Index kDraws = 48;         // pairs of places for each view
-constexpr double kTolerance = 0.05;  // of the window's longer side: about a cell
+constexpr double kTolerance = 0.05;  // share of the window's longer side: about a cell
 constexpr int kFitSteps = 12;
+constexpr Index kSmall = 24;    // pixels of a window's side
+constexpr Index kReduced = 96;  // longer side of the image before rotation
+constexpr int kTurns = 24;      // of 15 degrees
+constexpr Index kParts = 12;    // grid of a cropped image and of the windows it is compared with
+constexpr std::array kSides{0.5, 0.57, 0.64, 0.72, 0.81, 0.92};  // share of the render's longer side
+constexpr double kStride = 0.04;                                 // between windows, the same share
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-constexpr Index kSmall = 24;    // pixels of a window's side
-constexpr Index kReduced = 96;  // longer side of the image that is turned
-constexpr int kTurns = 24;      // of 15 degrees
+// Subtracts the mean and scales to length 1; a constant vector becomes 0.
+void make_unit(std::span<float> v) {
+  double mean = 0, square = 0;
+  for (const float x : v) mean += static_cast<double>(x) / static_cast<double>(v.size());
+  for (const float x : v) square += std::pow(static_cast<double>(x) - mean, 2);
+  const double scale = square > 0 ? 1 / std::sqrt(square) : 0;
+  for (float& x : v) x = static_cast<float>((static_cast<double>(x) - mean) * scale);
+}
 
-// A window's content as a vector of length 1, without its mean.
+double correlation(std::span<const float> a, std::span<const float> b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += static_cast<double>(a[i] * b[i]);
+  return sum;
+}
+
 std::vector<float> small_window(const Tensor<float>& image, const Window& window, float background) {
   std::vector<float> v = cut_window(image, window, square_patch(kSmall), background).data;
   make_unit(v);
@@ -43,9 +61,8 @@ Tensor<float> turned(const Tensor<float>& image, double angle, float background)
   return {y.shape(), std::vector<float>(y.value(), y.value() + y.shape().size())};
 }
 
-// The camera's view at another size in pixels of the same shape, to which sides of whole pixels would stretch
-// it: what a proposal takes over from a small render, no later motion mends. The right and lower edge move by
-// up to half a pixel.
+// Camera::scaled() rounds both sides and so changes the aspect of pixels, which no later motion corrects.
+// This one keeps it; the right and lower edges move by up to half a pixel.
 nerf::Camera reduced(const nerf::Camera& camera, Index size) {
   const double zoom = static_cast<double>(size) / static_cast<double>(std::max(camera.width, camera.height));
   nerf::Camera small = camera.scaled(size);
@@ -58,7 +75,32 @@ nerf::Camera reduced(const nerf::Camera& camera, Index size) {
 
 Complex middle(const Window& w) { return {w.x + w.width / 2, w.y + w.height / 2}; }
 
+// The cameras that `camera_of` makes of the `count` best proposals with a positive score.
+template <class Proposals, class F>
+std::vector<nerf::Camera> best_cameras(Proposals& proposals, Index count, F camera_of) {
+  std::ranges::stable_sort(proposals, [](const auto& p, const auto& q) { return p.score > q.score; });
+  std::vector<nerf::Camera> cameras;
+  for (const auto& p : proposals) {
+    if (std::ssize(cameras) == count || !(p.score > 0)) break;
+    cameras.push_back(camera_of(p));
+  }
+  return cameras;
+}
+
 }  // namespace
+
+struct CameraSearch::Match {
+  std::int32_t cell;
+  Complex place;  // pixels of the image
+  double share;
+};
+
+// Pixel u of a small view goes to a u + b in the image.
+struct CameraSearch::Proposal {
+  std::size_t view = 0;
+  Complex a{1, 0}, b{};
+  double score = -1;
+};
 
 CameraSearch::CameraSearch(const Owner& owner, const CameraSearchOptions& options)
     : owner_(owner), options_(options) {
@@ -137,7 +179,7 @@ CameraSearch::Proposal CameraSearch::propose(const SmallView& view, std::size_t 
     for (const Pair& pair : pairs) proposal.score += agreeing(proposal, pair);
     if (proposal.score > best.score) best = proposal;
   }
-  // Least squares over those that agree.
+  // Least squares over the pairs that agree.
   for (int pass = 0; pass < 3 && best.score > 0; ++pass) {
     Complex from, to;
     double total = 0;
@@ -168,12 +210,12 @@ CameraSearch::Proposal CameraSearch::propose(const SmallView& view, std::size_t 
   return best;
 }
 
-// The small view's camera, rolled, zoomed and slid as the proposal says.
+// The small view's camera, rolled, zoomed and shifted by the proposal.
 nerf::Camera CameraSearch::proposed(const Proposal& proposal, Index height, Index width) const {
   const SmallView& view = views_[proposal.view];
   nerf::Camera camera = view.camera;
   const double zoom = std::abs(proposal.a), turn = std::arg(proposal.a);
-  // With y down, a turn of the image by an angle is a turn of the scene about the viewing axis against it.
+  // y points down: a rotation of the image is the opposite rotation of the scene about the viewing axis.
   camera =
       moved(camera,
             nerf::Vec3{camera.position()[0] + camera.forward()[0], camera.position()[1] + camera.forward()[1],
@@ -189,7 +231,7 @@ nerf::Camera CameraSearch::proposed(const Proposal& proposal, Index height, Inde
   return camera;
 }
 
-// That camera, moved until its cells lie where they were seen.
+// The proposed camera after Gauss-Newton on the distances of projected cells to their places.
 nerf::Camera CameraSearch::fitted(const Proposal& proposal, const std::vector<Match>& matches,
                                   double tolerance, Index height, Index width) const {
   const SmallView& view = views_[proposal.view];
@@ -249,14 +291,8 @@ std::vector<nerf::Camera> CameraSearch::find(const SeenPlaces& places, Index hei
   parallel_for(static_cast<Index>(views_.size()), 8, [&](Index begin, Index end) {
     for (Index v = begin; v < end; ++v) proposals[at(v)] = propose(views_[at(v)], at(v), matches, tolerance);
   });
-  std::stable_sort(proposals.begin(), proposals.end(),
-                   [](const Proposal& a, const Proposal& b) { return a.score > b.score; });
-  std::vector<nerf::Camera> cameras;
-  for (const Proposal& p : proposals) {
-    if (static_cast<Index>(cameras.size()) == count || !(p.score > 0)) break;
-    cameras.push_back(fitted(p, matches, tolerance, height, width));
-  }
-  return cameras;
+  return best_cameras(proposals, count,
+                      [&](const Proposal& p) { return fitted(p, matches, tolerance, height, width); });
 }
 
 std::vector<nerf::Camera> CameraSearch::find(const Tensor<float>& image, Index count) const {
@@ -273,31 +309,53 @@ std::vector<nerf::Camera> CameraSearch::find(const Tensor<float>& image, Index c
     const Window window = object_window(upright, background);
     const std::vector<float> small = small_window(upright, window, background);
     for (std::size_t v = 0; v < views_.size(); ++v) {
-      double score = 0;
-      for (std::size_t i = 0; i < small.size(); ++i)
-        score += static_cast<double>(small[i] * views_[v].small[i]);
+      const double score = correlation(small, views_[v].small);
       if (score <= best[v].score) continue;
-      // u in the render is at (u - middle) width / width' + middle' in the turned image, which shows the
-      // image's point q at e^(-i angle) (q - centre) + centre: y points down.
+      // Pixel u of the render is (u - middle) width / width' + middle' in the rotated image, which shows
+      // pixel q of the image at e^(-i angle) (q - centre) + centre, since y points down.
       const Complex back = std::polar(1.0, angle);
       const Complex a = back * window.width / views_[v].window.width;
       const Complex b = back * (middle(window) - centre) + centre - a * middle(views_[v].window);
       best[v] = {v, a / zoom, b / zoom, score};
     }
   }
-  return best_cameras(best, h, w, count);
+  return best_cameras(best, count, [&](const Proposal& p) { return proposed(p, h, w); });
 }
 
-std::vector<nerf::Camera> CameraSearch::best_cameras(std::vector<Proposal>& proposals, Index height,
-                                                     Index width, Index count) const {
-  std::stable_sort(proposals.begin(), proposals.end(),
-                   [](const Proposal& p, const Proposal& q) { return p.score > q.score; });
-  std::vector<nerf::Camera> cameras;
-  for (const Proposal& p : proposals) {
-    if (static_cast<Index>(cameras.size()) == count || !(p.score > 0)) break;
-    cameras.push_back(proposed(p, height, width));
+CameraSearch::Proposal CameraSearch::best_part(std::size_t number, std::span<const float> image,
+                                               double height_to_width) const {
+  const SummedArea& area = views_[number].area;
+  const double longer = static_cast<double>(std::max(area.height(), area.width()));
+  std::vector<float> parts(image.size());
+  Proposal best{number};
+  for (const double side : kSides) {
+    const double wide = side * longer / std::max(1.0, height_to_width), high = wide * height_to_width;
+    for (double top = 0; top + high <= static_cast<double>(area.height()); top += kStride * longer)
+      for (double left = 0; left + wide <= static_cast<double>(area.width()); left += kStride * longer) {
+        area.means(left, top, wide, high, kParts, parts);
+        make_unit(parts);
+        if (const double score = correlation(parts, image); score > best.score)
+          best = {number, 1 / wide, Complex(-left, -top) / wide, score};
+      }
   }
-  return cameras;
+  return best;
+}
+
+std::vector<nerf::Camera> CameraSearch::find_part(const Tensor<float>& image, Index count) const {
+  const Index h = image.shape[0], w = image.shape[1];
+  std::vector<float> parts(at(kParts * kParts * 3));
+  SummedArea(image).means(0, 0, static_cast<double>(w), static_cast<double>(h), kParts, parts);
+  make_unit(parts);
+  std::vector<Proposal> best(views_.size());
+  parallel_for(std::ssize(views_), 8, [&](Index begin, Index end) {
+    for (Index v = begin; v < end; ++v)
+      best[at(v)] = best_part(at(v), parts, static_cast<double>(h) / static_cast<double>(w));
+  });
+  for (Proposal& p : best) {
+    p.a *= static_cast<double>(w);
+    p.b *= static_cast<double>(w);
+  }
+  return best_cameras(best, count, [&](const Proposal& p) { return proposed(p, h, w); });
 }
 
 }  // namespace fieldmark::watermark

@@ -1,7 +1,9 @@
 #include <fieldmark/imaging/resize.h>
 #include <fieldmark/watermark/reading/informed_reader.h>
+#include "camera_search.h"
 #include "jpeg_score.h"
 #include "plain_border.h"
+#include "pose_alignment.h"
 #include "sign_fit.h"
 #include "tone_fit.h"
 
@@ -15,21 +17,20 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr Index kByPlaces = 3, kByImage = 3, kByPart = 6;  // cameras that are tried
+constexpr Index kByPlaces = 3, kByImage = 3, kByPart = 6;  // candidate cameras
 constexpr AlignmentStage kCoarse[] = {{.size = 48, .blur = 1.5, .steps = 6, .quick = true}};
 constexpr AlignmentStage kFine[] = {{.size = 96, .blur = 1.2, .steps = 10, .quick = true},
                                     {.size = 200, .blur = 1.2, .steps = 6}};
-constexpr Index kSamples = 4;          // of a ray, that the mark of a pixel is the sum of
+constexpr Index kSamples = 4;          // of a ray
 constexpr Index kLargest = 512;        // longer side at which evidence is taken, pixels
-constexpr double kFarFromLeast = 1.2;  // of what is left: no larger blur is tried then
-constexpr double kBlurs[] = {0, 0.4, 0.6, 0.8, 1, 1.25, 1.5, 2, 2.5, 3};  // deviations tried, pixels
-constexpr double kAround = 4;           // deviation of the window in which the noise is measured, pixels
+constexpr double kFarFromLeast = 1.2;  // of the least residual: the search for a blur ends beyond
+constexpr double kBlurs[] = {0, 0.4, 0.6, 0.8, 1, 1.25, 1.5, 2, 2.5, 3};  // standard deviations tried, pixels
+constexpr double kAround = 4;           // standard deviation of the window for the local power, pixels
 constexpr float kLeastNoise = 1.2e-6f;  // variance of rounding to 8 bits
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-// The owner's unmarked view as an image shows it, under the blur and the tones that leave least, and what is
-// left.
+// The unmarked render in the image's blur and tones, and the residual.
 struct Shown {
   Tensor<float> render, rest;
   double blur = 0, left = 0;
@@ -59,7 +60,7 @@ Shown shown(const Tensor<float>& image, const Tensor<float>& base, const std::ve
   return best;
 }
 
-// Noise as it is around each pixel; the mark is a part of it.
+// The noise is the local power of the residual, mark included.
 void score_differences(const Tensor<float>& rest, MarkScore& s) {
   Tensor<float> power = rest;
   for (float& x : power.data) x *= x;
@@ -70,7 +71,7 @@ void score_differences(const Tensor<float>& rest, MarkScore& s) {
   }
 }
 
-// JpegScore's information is of a whole block: its precision is the same for all colours of a pixel.
+// JpegScore's information is of a whole block, so all channels of a pixel get the same precision.
 void use_jpeg(JpegScore&& jpeg, const Tensor<float>& mark, MarkScore& s) {
   s.score = std::move(jpeg.score);
   for (Index p = 0; p < mark.size() / 3; ++p) {
@@ -97,7 +98,7 @@ MarkScore score_of(const Tensor<float>& image, const CachedView& view, const Ten
   }
   const Tensor<float> soft = blurred(mark, seen.blur);
   JpegScore score = jpeg_score(image, seen.render, soft, s.on_object, *jpeg);
-  if (seen.blur > 0) {  // steps take fine detail away as blur does
+  if (seen.blur > 0) {  // quantisation removes detail as blur does
     JpegScore sharp =
         jpeg_score(image, shown_with(image, view.base, s.on_object, 0).render, mark, s.on_object, *jpeg);
     if (sharp.log_likelihood > score.log_likelihood) {
@@ -114,11 +115,20 @@ MarkScore score_of(const Tensor<float>& image, const CachedView& view, const Ten
 
 const char* reading_name(ReadingKind kind) { return kind == ReadingKind::informed ? "informed" : "blind"; }
 
+struct InformedReader::Parts {
+  CameraSearch search;
+  PoseAligner aligner;
+  nerf::Renderer renderer;
+  Parts(const Owner& owner, const CameraSearchOptions& options)
+      : search(owner, options), aligner(owner.field), renderer(owner.field) {}
+};
+
 InformedReader::InformedReader(const Owner& owner, const CameraSearchOptions& search)
-    : owner_(owner), blind_(owner), search_(owner, search), aligner_(owner.field), renderer_(owner.field) {}
+    : owner_(owner), blind_(owner), parts_(std::make_unique<Parts>(owner, search)) {}
+InformedReader::~InformedReader() = default;
 
 std::vector<double> InformedReader::evidence_at(const Tensor<float>& image, const nerf::Camera& camera) {
-  const CachedView view = cache_view(renderer_, owner_.field, camera, kSamples);
+  const CachedView view = cache_view(parts_->renderer, owner_.field, camera, kSamples);
   const Carriers mark = carriers(owner_, view);
   const MarkScore score = score_of(image, view, mark.whole, border_of(owner_.field, image), find_jpeg(image));
   return fit_signs(mark, score, owner_.cells.count()).sign;
@@ -131,12 +141,12 @@ ImageReading InformedReader::read(const Tensor<float>& image) {
   const Tensor<float> whole = opaque_image(image, nerf::background_value(owner_.field.background));
   const Index h = whole.shape[0], w = whole.shape[1];
   InformedReading& g = reading.informed;
-  std::vector<nerf::Camera> starts = search_.find(places, h, w, kByPlaces);
-  const std::vector<nerf::Camera> others = search_.find(whole, kByImage);
+  std::vector<nerf::Camera> starts = parts_->search.find(places, h, w, kByPlaces);
+  const std::vector<nerf::Camera> others = parts_->search.find(whole, kByImage);
   starts.insert(starts.end(), others.begin(), others.end());
   const auto try_all = [&](const std::vector<nerf::Camera>& cameras) {
     for (const nerf::Camera& start : cameras) {
-      const Alignment a = aligner_.align(whole, start, kCoarse);
+      const Alignment a = parts_->aligner.align(whole, start, kCoarse);
       if (a.agreement > g.agreement) {
         g.agreement = a.agreement;
         g.camera = a.camera;
@@ -144,9 +154,9 @@ ImageReading InformedReader::read(const Tensor<float>& image) {
     }
   };
   try_all(starts);
-  if (g.agreement < kLeastAgreement) try_all(search_.find_part(whole, kByPart));
+  if (g.agreement < kLeastAgreement) try_all(parts_->search.find_part(whole, kByPart));
   if (g.agreement < 0) return reading;
-  const Alignment a = aligner_.align(whole, g.camera, kFine);
+  const Alignment a = parts_->aligner.align(whole, g.camera, kFine);
   g.camera = a.camera;
   g.agreement = a.agreement;
   const nerf::Camera used = g.camera.scaled(std::min(kLargest, std::max(h, w)));

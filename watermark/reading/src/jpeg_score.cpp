@@ -15,13 +15,13 @@ using distort::JpegBlock;
 using distort::JpegComponent;
 
 constexpr double kDecoding = 0.5;             // deviation of a decoder's rounding, levels
-constexpr double kOutlier = 0.02;             // share of coefficients that follow no rule ...
-constexpr double kOutlierWay = 512;           // ... and may be anywhere in so many levels
-constexpr double kLeastGain = 50;             // log-likelihood by which a table must explain an image
+constexpr double kOutlier = 0.02;             // share of outlier coefficients ...
+constexpr double kOutlierWay = 512;           // ... and their range in levels
+constexpr double kLeastGain = 50;             // least log-likelihood ratio of a table
 constexpr double kFirst = 0.3, kRatio = 1.5;  // deviations tried, levels
 constexpr int kDeviations = 13;
 constexpr std::array kFactors{0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0};
-constexpr double kOnObject = 32;  // pixels of a block from which it counts for its band's deviation
+constexpr double kOnObject = 32;  // least foreground pixels of a block that counts for its band
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
@@ -46,8 +46,8 @@ Plane component_of(const Tensor<float>& image, int component, Index cell) {
   return p;
 }
 
-// A decoder makes two pixels of one with weights of 3/4 and 1/4 (its neighbour's), so that their mean is
-// 1/8, 3/4, 1/8: solved for what there was, along one line (Thomas).
+// Inverts a decoder's chroma upsampling along one line. It makes two pixels of one with weights 3/4 and 1/4
+// (the neighbour's), whose mean has weights 1/8, 3/4, 1/8: a tridiagonal system (Thomas algorithm).
 void sharpen(double* line, Index n, Index step, std::vector<double>& above) {
   if (n < 2) return;
   above.assign(at(n), 0);
@@ -70,7 +70,7 @@ Plane decoded_component(const Tensor<float>& image, int component, Index cell) {
   return p;
 }
 
-// Coefficients of every block, the last row and column repeated to fill it; luma about its middle.
+// Coefficients of every block; the last row and column are repeated to fill blocks.
 std::vector<JpegBlock> coefficients(const Plane& p, double middle) {
   const Index down = (p.height + 7) / 8, across = (p.width + 7) / 8;
   std::vector<JpegBlock> out(at(down * across));
@@ -86,7 +86,7 @@ std::vector<JpegBlock> coefficients(const Plane& p, double middle) {
   return out;
 }
 
-// By how much a table of steps explains where coefficients other than 0 lie, against any place.
+// Log-likelihood ratio of a table of steps for the nonzero coefficients, against a uniform density.
 double explained(const std::vector<JpegBlock>& blocks, const JpegBlock& steps) {
   double sum = 0;
   for (const JpegBlock& c : blocks)
@@ -107,7 +107,7 @@ struct Likelihood {
 
 Likelihood likelihood(double n, double step, double b, double deviation) {
   const double low = ((n - 0.5) * step - b) / deviation, high = ((n + 0.5) * step - b) / deviation;
-  // Of two small tails, not of two numbers near 1.
+  // The difference of two small tails, not of two numbers near 1.
   const double sign = low + high > 0 ? 1 : -1, near = sign > 0 ? low : -high, far = sign > 0 ? high : -low;
   const double p = 0.5 * (std::erfc(near / std::numbers::sqrt2) - std::erfc(far / std::numbers::sqrt2));
   const double total = (1 - kOutlier) * p + kOutlier * step / kOutlierWay;
@@ -153,7 +153,7 @@ class ComponentScore {
     return likelihood(std::round(image_[block][k] / steps_[k]), steps_[k], render_[block][k], deviation);
   }
 
-  // Bands first, then blocks, each its likeliest.
+  // Maximum likelihood, first of bands, then of blocks.
   void fit_deviations() {
     parallel_for(64, 1, [&](Index begin, Index end) {
       for (auto k = at(begin); k < at(end); ++k) {

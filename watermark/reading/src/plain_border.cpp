@@ -15,7 +15,7 @@ constexpr float kAlike = 0.06f;        // of every channel
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-// Pixels that hang together with one and are like it.
+// Flood fill from a corner.
 std::vector<Index> region(const Tensor<float>& image, Index corner) {
   const Index h = image.shape[0], w = image.shape[1];
   const auto alike = [&](Index p) {

@@ -1,7 +1,7 @@
+#include "pose_alignment.h"
 #include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/imaging/resize.h>
 #include <fieldmark/watermark/mark/view_cache.h>
-#include <fieldmark/watermark/reading/pose_alignment.h>
 #include "camera_motion.h"
 #include "plain_border.h"
 #include "tone_fit.h"
@@ -16,9 +16,9 @@ namespace fieldmark::watermark {
 namespace {
 
 constexpr Index kParameters = 9;
-constexpr double kCauchy = 2.385;      // deviations at which a difference counts half (95% efficiency)
-constexpr double kLeastSpread = 2e-3;  // of differences: half a grey level
-constexpr double kStill = 0.01;        // pixels: a motion below it ends the stage
+constexpr double kCauchy = 2.385;      // deviations at which a residual counts half (95% efficiency)
+constexpr double kLeastSpread = 2e-3;  // of residuals: half a grey level
+constexpr double kStill = 0.01;        // pixels: a smaller motion ends the stage
 constexpr int kMostFailures = 3;
 constexpr double kDamping = 1e-3;
 
@@ -27,18 +27,18 @@ std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 using Matrix = Eigen::Matrix<double, kParameters, kParameters>;
 using Vector = Eigen::Matrix<double, kParameters, 1>;
 
-// One camera's view beside the image, at a stage's size.
+// A camera's render beside the image, at the stage's size.
 struct Look {
   nerf::Camera camera;
   Tensor<float> render;            // blurred
-  std::vector<std::int32_t> seen;  // [P] sample of the pixel, or of the nearest one beside it; -1: none
+  std::vector<std::int32_t> seen;  // [P] sample of the pixel or of its nearest neighbour; -1: none
   std::vector<nerf::Vec3> points;  // [samples] world
   nerf::Vec3 pivot{};
-  double spread = 0;  // of the differences
+  double spread = 0;  // of the residuals
   double cost = 0;
 };
 
-// Pixels without matter take the sample of a neighbour: where the field's edge moves, they change too.
+// Empty pixels take a sample of a neighbour, since they change where the silhouette moves.
 std::vector<std::int32_t> seen_or_beside(const CachedView& v, Index reach) {
   std::vector<std::int32_t> seen(at(v.height * v.width), -1);
   const auto sample = [&](Index y, Index x) {
@@ -73,10 +73,10 @@ double slope_y(const Tensor<float>& t, Index y, Index x, Index c) {
   return static_cast<double>(t[(b * w + x) * 3 + c] - t[(a * w + x) * 3 + c]) / static_cast<double>(b - a);
 }
 
-// An image at a stage's size, and what is done with it.
+// The image at one stage's size, and the optimisation there.
 class Stage {
  public:
-  // border: [H W] 1 where the image shows no scene; empty: everywhere
+  // border: [H W] 1 where the image shows no scene; empty if it shows the scene everywhere
   Stage(nerf::Renderer& renderer, const nerf::RadianceField& field, const Tensor<float>& image,
         const std::vector<std::uint8_t>& border, const AlignmentStage& options)
       : renderer_(renderer), field_(field), options_(options) {
@@ -107,7 +107,7 @@ class Stage {
       total += 1;
       depth += 1 / d;
     }
-    // The mean of inverse depths: parts far behind do not carry the pivot away.
+    // Mean inverse depth, so that a far background does not carry the pivot away.
     if (total > 0) {
       const nerf::Vec3 eye = l.camera.position(), ahead = l.camera.forward();
       for (std::size_t a = 0; a < 3; ++a) l.pivot[a] = eye[a] + total / depth * ahead[a];
@@ -115,8 +115,8 @@ class Stage {
     return l;
   }
 
-  // Differences [P, 3] of image and render in the image's tones, and the look's spread and cost; the
-  // spread of another look makes costs comparable.
+  // Residuals [P, 3] of image and render in the image's tones; sets the look's spread and cost. Costs compare
+  // only under the spread of one look.
   std::vector<double> differ(Look& l, ToneFit& tones, double spread = 0) const {
     std::vector<double> weight(l.seen.size());
     for (std::size_t p = 0; p < weight.size(); ++p) weight[p] = l.seen[p] >= 0 ? 1 : 0;
@@ -151,7 +151,7 @@ class Stage {
     return r;
   }
 
-  // Gauss-Newton: with a = t'(B) grad B . dx/dmotion, a render after a motion m is B - a m, so that
+  // Gauss-Newton: with a = t'(B) grad B . dx/dmotion, the render after a motion m is B - a m, so that
   // sum w a a^T m = -sum w a r.
   void normal_equations(const Look& l, const ToneFit& tones, const std::vector<double>& r, Matrix& h,
                         Vector& g) const {
@@ -180,7 +180,7 @@ class Stage {
            xy * (jx * jy.transpose() + jy * jx.transpose());
       g -= xr * jx + yr * jy;
     }
-    if (!options_.lens)  // distance and aim go by zoom and slide
+    if (!options_.lens)  // zoom and slide stand for distance and aim
       for (const int k : {3, 4, 5}) hold(h, g, k);
   }
 
@@ -245,7 +245,7 @@ class Stage {
     g[k] = 0;
   }
 
-  // How far a motion takes the points it moves most, pixels.
+  // Largest displacement of a point under a motion, pixels.
   static double furthest(const Look& l, const CameraMotion& motion) {
     const Eigen::Map<const Vector> m(motion.data());
     double most = 0;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr Index kElsewhere[][2] = {{11, 7}, {-7, 11}, {-11, -7}, {7, -11}};  // down and right, pixels
 constexpr int kSteps = 10;
-constexpr double kRest = 1e-4;  // of the right side's norm: closer is of no use
+constexpr double kRest = 1e-4;  // relative residual at which the iteration ends
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
@@ -75,7 +75,7 @@ class Fit {
       for (auto e = at(mark_.begin[at(p)]); e < at(mark_.begin[at(p + 1)]); ++e) use(p, e, at(mark_.cell[e]));
   }
 
-  // Where the pixel so much further down and right lies in the image and on the object, it; -1 elsewhere.
+  // The pixel that lies `down` and `right` of p if it is on the foreground, else -1.
   Index from(Index p, Index down, Index right) const {
     const Index h = seen_.shape[0], w = seen_.shape[1], y = p / w + down, x = p % w + right;
     return y >= 0 && y < h && x >= 0 && x < w && score_.on_object[at(y * w + x)] > 0 ? y * w + x : -1;
@@ -89,7 +89,7 @@ class Fit {
     return v;
   }
 
-  // Of the sums with such a score: blur takes from a part what it takes from the pixel's whole mark.
+  // Expected power for independent noise. Blur is taken to weaken a cell's part as it weakens the whole mark.
   double expected_power(Index down, Index right) const {
     double sum = 0;
     for_entries([&](Index p, std::size_t e, std::size_t) {
@@ -129,7 +129,9 @@ SignFit fit_signs(const Carriers& mark, const MarkScore& score, Index cells) {
   for (int step = 0; step < kSteps && square > kRest * kRest * first; ++step) {
     Values moved = fit.normal(way);
     for (std::size_t c = 0; c < moved.size(); ++c) moved[c] += out.noise * way[c];
-    const double length = square / dot(way, moved);
+    const double curvature = dot(way, moved);
+    if (!(curvature > 0)) break;  // no noise and no information along this direction: nothing more to learn
+    const double length = square / curvature;
     for (std::size_t c = 0; c < moved.size(); ++c) {
       out.sign[c] += length * way[c];
       rest[c] -= length * moved[c];

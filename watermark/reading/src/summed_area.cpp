@@ -1,5 +1,5 @@
+#include "summed_area.h"
 #include <fieldmark/engine/shape_checks.h>
-#include <fieldmark/watermark/reading/summed_area.h>
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr double kRounding = 1e-9;  // pixels by which a rectangle may stand out
+constexpr double kRounding = 1e-9;  // pixels by which a rectangle may leave the image
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
@@ -40,7 +40,7 @@ void SummedArea::means(double left, double top, double wide, double high, Index 
                      std::to_string(wide) + " x " + std::to_string(high) + " at " + std::to_string(left) +
                      ", " + std::to_string(top) + " and " + std::to_string(out.size()) + " numbers");
   const Index row = (width_ + 1) * channels_;
-  // S at a corner; its row is between two, its column too.
+  // S at a corner, interpolated.
   const auto corner = [&](Index i, Index j, Index c) {
     const double y = std::clamp(top + high * static_cast<double>(i) / static_cast<double>(n), 0.0,
                                 static_cast<double>(height_)),

@@ -7,8 +7,8 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr double kHold = 0.01;  // pixels that show no change, as a part of all
-constexpr double kDark = 0.02;  // slopes of v ln v have no end at 0
+constexpr double kHold = 0.01;  // weight of the identity, relative to all pixels
+constexpr double kDark = 0.02;  // the slope of v ln v diverges at 0
 
 std::size_t at_(Index i) { return static_cast<std::size_t>(i); }
 

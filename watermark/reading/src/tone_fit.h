@@ -6,10 +6,9 @@
 
 namespace fieldmark::watermark {
 
-/// What became of a render's values in an image, channel by channel:
-///   t(v) = offset + gain v + bend v ln v,   v ln v being what a gamma near 1 adds: v^(1 + e) = v + e v ln v
-///   +
-///   ...
+/// Tone curve of each channel between a render and an image:
+///   t(v) = offset + gain v + bend v ln v,   where v ln v stands for a gamma near 1: v^(1 + e) = v + e v ln v
+///   + ...
 struct ToneFit {
   std::array<double, 3> offset{};       ///< added
   std::array<double, 3> gain{1, 1, 1};  ///< factor
@@ -20,9 +19,9 @@ struct ToneFit {
   double slope(Index channel, double v) const;
 };
 
-/// The tones that explain an image by a render, by weighted least squares. They are held near no change as
-/// if 1% more pixels had shown none, so that a plain render keeps its gain.
-/// @param render, image  [H, W, 3] in [0, 1]   @param weight  [H W] >= 0; without any there is no change
+/// Fits the tone curves by weighted least squares, regularised towards the identity as by 1% more pixels
+/// without change, so that a constant render keeps its gain.
+/// @param render, image  [H, W, 3] in [0, 1]   @param weight  [H W] >= 0; all 0 gives the identity
 /// @throws ShapeError if shapes differ
 ToneFit fit_tones(const Tensor<float>& render, const Tensor<float>& image, std::span<const double> weight);
 

@@ -1,64 +1,73 @@
 #pragma once
-#include <fieldmark/watermark/reading/camera_search.h>
-#include <fieldmark/watermark/reading/pose_alignment.h>
+#include <fieldmark/watermark/reading/blind_reader.h>
+
+#include <memory>
 
 namespace fieldmark::watermark {
 
-/// What an image shows when it is laid over the owner's field.
-struct InformedReading {
-  /// [cells] S_c, see evidence.h, on the scale of the blind detection's: views read either way may be added.
-  /// Empty where no camera was found.
-  std::vector<double> evidence;
-  nerf::Camera camera;    ///< found
-  double agreement = -1;  ///< of the alignment, see Alignment
+/// How the informed detector looks for the camera of an image.
+struct CameraSearchOptions {
+  Index views = 256;       ///< novel cameras to compare with, at least 1
+  Index around = 192;      ///< further cameras from all directions, for an object without surroundings, >= 0
+  Index size = 40;         ///< longer side of their renders, pixels, at least 16
+  std::uint64_t seed = 0;  ///< of the cameras and of the search
 };
 
-/// Which reading of an image to believe.
+/// The informed detector's result for one image.
+struct InformedReading {
+  /// [cells] S_c, see evidence.h, on the scale of the blind reading, so that both may be added. Empty if no
+  /// camera was found.
+  std::vector<double> evidence;
+  nerf::Camera camera;    ///< found
+  double agreement = -1;  ///< correlation of the gradients of image and aligned render, in [-1, 1]
+};
+
+/// Which detector a reading comes from.
 enum class ReadingKind { blind, informed };
 /// "blind" or "informed".
 const char* reading_name(ReadingKind kind);
 
-/// Both readings of an image, and which is to be believed.
+/// The readings of both detectors, and the choice between them.
 struct ImageReading {
   std::vector<double> blind;                ///< [cells] of BlindReader
-  InformedReading informed;                 ///< without evidence where it was not tried
+  InformedReading informed;                 ///< without evidence if no camera was found
   ReadingKind chosen = ReadingKind::blind;  ///< by the alignment's agreement alone
-  /// [cells] of the chosen one.
+  /// [cells] of the chosen detector.
   const std::vector<double>& evidence() const {
     return chosen == ReadingKind::informed ? informed.evidence : blind;
   }
 };
 
-/// The informed detection: finds the camera of an image, subtracts the owner's unmarked view and compares
-/// what is left with what the mark would add in each cell. It needs the owner's field, which a blind reader
-/// does not; like it, it knows neither key nor message, so that its evidence may be tested against any.
+/// Informed detection: finds the camera of an image, subtracts the owner's unmarked render and compares the
+/// residual with the carriers of all cells. Like the blind detector, it knows neither key nor message, so its
+/// evidence may be tested against any.
 ///
-///   - Cameras are proposed by CameraSearch and aligned coarse to fine by PoseAligner; the one that agrees
-///     best is kept.
-///   - The image's blur is taken for the one of a few that leaves least; gain, offset and gamma are fitted.
-///   - Of the difference left R, whose power around each pixel is V, R / V is the score of a MarkScore and
-///     1 / V its precision; of an image that find_jpeg() recognises both are jpeg_score()'s.
-///   - The cells' signs are those that explain all of it together, S_c = s_c of fit_signs(): a pixel's ray
-///     passes several cells, in a scene without hard surfaces many.
+///   - Candidate cameras are aligned coarse to fine; the best agreement wins.
+///   - The blur that leaves the smallest residual is kept; gain, offset and gamma are fitted.
+///   - With the residual R and its power V around each pixel, R / V is the score and 1 / V the precision. In
+///   a
+///     JPEG image both come from the quantised coefficients.
+///   - S_c are the signs that explain the whole residual by linear least squares, since a ray passes several
+///     cells.
 class InformedReader {
  public:
-  /// Least agreement at which an alignment is believed. In the tests the best camera of another scene of the
-  /// same make stays below 0.8, and that of the scene itself exceeds 0.95.
+  /// Least agreement of a trusted alignment; docs/notes/reading.md has the measurements.
   static constexpr double kLeastAgreement = 0.85;
-  /// @param owner  of preset fast; must outlive this   @throws ValueError if it is of another preset
+  /// @param owner  of preset fast; must outlive the reader
+  /// @throws ValueError for another preset or an option out of range
   explicit InformedReader(const Owner& owner, const CameraSearchOptions& search = {});
-  /// Both readings; informed is chosen where its alignment agrees to kLeastAgreement.
-  /// @throws ShapeError as BlindReader
+  ~InformedReader();
+  /// Both readings; informed is chosen if its agreement is at least kLeastAgreement.
+  /// @param image  as BlindReader::evidence()   @throws ShapeError as there
   ImageReading read(const Tensor<float>& image);
-  /// Evidence of an image whose camera is known.   @param image  [H, W, 3]   @param camera  of its size
+  /// Evidence of an image with a known camera.   @param image  [H, W, 3]   @param camera  of its size
   std::vector<double> evidence_at(const Tensor<float>& image, const nerf::Camera& camera);
 
  private:
+  struct Parts;
   const Owner& owner_;
   BlindReader blind_;
-  CameraSearch search_;
-  PoseAligner aligner_;
-  nerf::Renderer renderer_;
+  std::unique_ptr<Parts> parts_;
 };
 
 }  // namespace fieldmark::watermark

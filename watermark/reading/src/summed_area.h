@@ -6,9 +6,9 @@
 
 namespace fieldmark::watermark {
 
-/// Sums over rectangles of an image in constant time (Crow 1984):
-///   S(x, y) = sum of the pixels above and left of (x, y), between whole numbers by bilinear interpolation,
-/// which is the exact integral of an image of square pixels.
+/// Summed-area table (Crow 1984): means over rectangles of an image in constant time.
+///   S(x, y) = sum of the pixels above and left of (x, y), bilinear between grid points: the exact integral
+///   of square pixels
 class SummedArea {
  public:
   SummedArea() = default;
@@ -16,10 +16,9 @@ class SummedArea {
   explicit SummedArea(const Tensor<float>& image);
   Index height() const { return height_; }  ///< pixels
   Index width() const { return width_; }    ///< pixels
-  /// Means over the n x n parts of a rectangle, row by row, [n, n, C].
+  /// Means over the n x n parts of a rectangle.
   /// @param left, top, wide, high  pixels, within the image; wide and high above 0   @param n  at least 1
-  /// @param out  n n C numbers   @throws ValueError if the rectangle is not in the image or out does not
-  /// fit
+  /// @param out  [n, n, C]   @throws ValueError if the rectangle leaves the image or out has another size
   void means(double left, double top, double wide, double high, Index n, std::span<float> out) const;
 
  private:

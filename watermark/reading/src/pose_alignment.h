@@ -1,0 +1,48 @@
+#pragma once
+#include <fieldmark/nerf/renderer.h>
+
+#include <span>
+
+namespace fieldmark::watermark {
+
+/// One stage of a coarse-to-fine alignment.
+struct AlignmentStage {
+  Index size = 64;     ///< longer side, pixels; at most the image's own
+  double blur = 1;     ///< standard deviation of the Gaussian on image and render, pixels of this size
+  int steps = 8;       ///< at most; a stage ends once nothing moves
+  bool lens = true;    ///< whether position moves besides focal length and principal point
+  bool quick = false;  ///< whether ray steps are twice as long: coarse stages need no more
+};
+
+/// A camera and how well its view of the field agrees with an image.
+struct Alignment {
+  nerf::Camera camera;  ///< of the image's size
+  /// Correlation of the gradients of image and render on the foreground after the last stage, in [-1, 1]: 1
+  /// if they differ by gain and offset alone.
+  double agreement = -1;
+};
+
+/// Refines a camera until the field's render agrees with an image.
+///
+/// Each step renders the field, fits gain, offset and gamma of each channel, and solves for the motion that
+/// reduces the residual (Lucas and Kanade 1981 with the field's depth; Levenberg-Marquardt damping; Cauchy
+/// weights). A rolled camera, another focal length or another principal point explains an image that was
+/// rotated, scaled or cropped. Where the scene fills its images, the plain corners that a rotation leaves do
+/// not count (see plain_border.h). Keeps buffers: one object per thread. Results do not depend on the number
+/// of threads.
+class PoseAligner {
+ public:
+  /// @param field  must outlive this and not change
+  explicit PoseAligner(const nerf::RadianceField& field);
+  /// @param image  [H, W, 3], sides of at least 16   @param start  first guess, of any size
+  /// @return the best camera; agreement -1 if it does not show the field
+  /// @throws ShapeError for another rank   @throws ValueError without stages or for a size below 16
+  Alignment align(const Tensor<float>& image, const nerf::Camera& start,
+                  std::span<const AlignmentStage> stages);
+
+ private:
+  const nerf::RadianceField& field_;
+  nerf::Renderer renderer_, quick_;
+};
+
+}  // namespace fieldmark::watermark
