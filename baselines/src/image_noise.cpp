@@ -81,11 +81,11 @@ Var<T> through_file(Var<T> marked) {
   const Shape s = marked.shape();
   const Index each = s[1] * s[2] * 3;
   T* y = marked.tape().scratch(s.size());
-  Tensor<float> picture({s[1], s[2], 3});
+  Tensor<float> view_image({s[1], s[2], 3});
   for (Index n = 0; n < s[0]; ++n) {
     for (Index i = 0; i < each; ++i)
-      picture[i] = static_cast<float>(std::clamp(marked.value()[n * each + i] / 2 + T(0.5), T(0), T(1)));
-    const Tensor<float> back = jpeg_round_trip(picture, kQuality);
+      view_image[i] = static_cast<float>(std::clamp(marked.value()[n * each + i] / 2 + T(0.5), T(0), T(1)));
+    const Tensor<float> back = jpeg_round_trip(view_image, kQuality);
     for (Index i = 0; i < each; ++i) y[n * each + i] = static_cast<T>(2 * back[i] - 1);
   }
   return marked.tape().constant(y, s);

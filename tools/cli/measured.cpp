@@ -33,56 +33,37 @@ Json measurement_json(const watermark::Measurement& m, const std::string& camera
 }
 
 Json measurement_row(const watermark::Measurement& m, const std::string& cameras) {
-  Json row{{"cameras", cameras},
-           {"views", m.views},
-           {"blind", number(m.accuracy.blind)},
-           {"informed", number(m.accuracy.informed)},
-           {"chosen", number(m.accuracy.chosen)},
-           {"accuracy_p5", number(m.accuracy_p5)},
-           {"psnr_base", number(m.psnr_base)},
-           {"psnr_base_foreground", number(m.psnr_base_foreground)},
-           {"ssim_base", number(m.ssim_base)},
-           {"lpips_base", number(m.lpips_base)}};
-  for (const auto& [name, accuracy] : m.under) {
-    row[name + " blind"] = number(accuracy.blind);
-    row[name + " informed"] = number(accuracy.informed);
-    row[name + " chosen"] = number(accuracy.chosen);
-  }
+  const Json all = measurement_json(m, cameras);
+  Json row{{"cameras", cameras}, {"views", m.views}};
+  row.update(all.at("accuracy"));
+  for (const char* name : {"accuracy_p5", "psnr_base", "psnr_base_foreground", "ssim_base", "lpips_base"})
+    row[name] = all.at(name);
+  for (const auto& [name, reading] : all.at("under").items())
+    for (const auto& [kind, accuracy] : reading.items()) row[name + " " + kind] = accuracy;
   return row;
 }
 
 void print_measurement(std::ostream& out, const watermark::Measurement& m, const std::string& cameras) {
-  char line[200];
-  std::snprintf(line, sizeof line, "%lld bits, %lld views of %s cameras, %s\n",
-                static_cast<long long>(m.bits), static_cast<long long>(m.views), cameras.c_str(),
-                m.baked ? "baked field" : "not baked");
-  out << line;
-  std::snprintf(line, sizeof line, "against unmarked     %.2f dB, object %.2f dB, ssim %.4f\n", m.psnr_base,
-                m.psnr_base_foreground, m.ssim_base);
-  out << line;
-  if (std::isfinite(m.lpips_base)) {
-    std::snprintf(line, sizeof line, "                     lpips %.4f\n", m.lpips_base);
+  const auto print = [&](const char* format, auto... values) {
+    char line[200];
+    std::snprintf(line, sizeof line, format, values...);
     out << line;
-  }
-  std::snprintf(line, sizeof line,
-                "bits right, blind    %.2f%% of one view, worst 5%% of views below %.2f%%\n",
-                100 * m.accuracy.blind, 100 * m.accuracy_p5);
-  out << line;
-  if (m.informed_views > 0) {
-    std::snprintf(line, sizeof line,
-                  "informed          %.2f%%, as chosen %.2f%%, of %lld views, %.1f s a view\n",
-                  100 * m.accuracy.informed, 100 * m.accuracy.chosen,
-                  static_cast<long long>(m.informed_views), m.informed_seconds);
-    out << line;
-  }
+  };
+  print("%lld bits, %lld views of %s cameras, %s\n", static_cast<long long>(m.bits),
+        static_cast<long long>(m.views), cameras.c_str(), m.baked ? "baked field" : "not baked");
+  print("against unmarked     %.2f dB, foreground %.2f dB, ssim %.4f\n", m.psnr_base, m.psnr_base_foreground,
+        m.ssim_base);
+  if (std::isfinite(m.lpips_base)) print("                     lpips %.4f\n", m.lpips_base);
+  print("bits right, blind    %.2f%% of one view, worst 5%% of views below %.2f%%\n", 100 * m.accuracy.blind,
+        100 * m.accuracy_p5);
+  if (m.informed_views > 0)
+    print("informed             %.2f%%, as chosen %.2f%%, of %lld views, %.1f s a view\n",
+          100 * m.accuracy.informed, 100 * m.accuracy.chosen, static_cast<long long>(m.informed_views),
+          m.informed_seconds);
   for (const auto& [name, accuracy] : m.under) {
-    std::snprintf(line, sizeof line, "  under %-20s %.2f%%", name.c_str(), 100 * accuracy.blind);
-    out << line;
-    if (m.informed_views > 0) {
-      std::snprintf(line, sizeof line, ", informed %.2f%%, as chosen %.2f%%", 100 * accuracy.informed,
-                    100 * accuracy.chosen);
-      out << line;
-    }
+    print("  under %-20s %.2f%%", name.c_str(), 100 * accuracy.blind);
+    if (m.informed_views > 0)
+      print(", informed %.2f%%, as chosen %.2f%%", 100 * accuracy.informed, 100 * accuracy.chosen);
     out << "\n";
   }
 }

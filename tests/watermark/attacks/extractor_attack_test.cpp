@@ -13,11 +13,11 @@ using namespace fieldmark::watermark;
 
 namespace {
 
-std::vector<float> signs(const Owner& owner, const Tensor<float>& picture) {
+std::vector<float> signs(const Owner& owner, const Tensor<float>& view_image) {
   Tape<float> tape;
-  const Shape shape{1, picture.shape[0], picture.shape[1], 3};
+  const Shape shape{1, view_image.shape[0], view_image.shape[1], 3};
   const Params<float> params(owner.params, nullptr);
-  const Var<float> image = tape.constant(picture.data.data(), shape);
+  const Var<float> image = tape.constant(view_image.data.data(), shape);
   const Var<float> logits =
       owner.reader ? (*owner.reader)(params, image).sign : (*owner.pooled_reader)(params, image);
   return {logits.value(), logits.value() + logits.shape().size()};
@@ -33,28 +33,28 @@ double turned(const Owner& owner, const Tensor<float>& a, const Tensor<float>& b
 
 // Of a view in the middle of the scale, so that nothing is cut off at black or white.
 Tensor<float> image_of(const CachedView& v) {
-  Tensor<float> picture = v.base;
-  for (float& x : picture.data) x = 0.25f + 0.5f * x;
-  return picture;
+  Tensor<float> view_image = v.base;
+  for (float& x : view_image.data) x = 0.25f + 0.5f * x;
+  return view_image;
 }
 
 }  // namespace
 
 TEST_CASE("extractor_attack: the extractor takes back more than after noise of the same strength") {
   const CachedView& view = tiny_views()[0];
-  const Tensor<float> picture = image_of(view);
+  const Tensor<float> view_image = image_of(view);
   for (const Owner& owner : {tiny_owner(), tiny_paper_owner()}) {
     const ExtractorAttackOptions options{.mark_psnr = 24, .steps = 12, .seed = 3};
-    const Tensor<float> changed = against_extractor(owner, picture, view.opacity, options);
-    CHECK(psnr_masked(changed, picture, view.opacity) == Approx(24).margin(0.05));
+    const Tensor<float> changed = against_extractor(owner, view_image, view.opacity, options);
+    CHECK(psnr_masked(changed, view_image, view.opacity) == Approx(24).margin(0.05));
     for (Index p = 0; p < view.opacity.size(); ++p)
       if (view.opacity[p] <= 0.5f)
-        for (Index c = 0; c < 3; ++c) REQUIRE(changed[3 * p + c] == picture[3 * p + c]);
+        for (Index c = 0; c < 3; ++c) REQUIRE(changed[3 * p + c] == view_image[3 * p + c]);
     // One step of next to no length leaves the noise that the ascent begins with.
-    const Tensor<float> noise = against_extractor(owner, picture, view.opacity,
+    const Tensor<float> noise = against_extractor(owner, view_image, view.opacity,
                                                   {.mark_psnr = 24, .steps = 1, .step = 1e-9, .seed = 3});
-    CHECK(psnr_masked(noise, picture, view.opacity) == Approx(24).margin(0.05));
-    CHECK(turned(owner, picture, changed) > turned(owner, picture, noise) + 0.2);
+    CHECK(psnr_masked(noise, view_image, view.opacity) == Approx(24).margin(0.05));
+    CHECK(turned(owner, view_image, changed) > turned(owner, view_image, noise) + 0.2);
   }
 }
 
@@ -95,7 +95,7 @@ TEST_CASE("extractor_attack: errors name what is wrong") {
   const auto run = [&](ExtractorAttackOptions o) {
     return against_extractor(owner, view.base, view.opacity, o);
   };
-  CHECK_THROWS_WITH(run({.mark_psnr = 9}), "[extractor_attack] strength must be 10 to 60 dB, got 9.000000");
+  CHECK_THROWS_WITH(run({.mark_psnr = 9}), "[extractor_attack] mark_psnr must be 10 to 60 dB, got 9.000000");
   CHECK_THROWS_WITH(run({.steps = 0}), "[extractor_attack] steps must be at least 1, got 0");
   CHECK_THROWS_WITH(run({.step = 0}), Contains("step must be above 0 and at most 1, got 0"));
   CHECK_THROWS_WITH(against_extractor(owner, view.base, Tensor<float>({3, 4}), {}),

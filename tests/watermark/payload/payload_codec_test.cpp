@@ -104,12 +104,12 @@ TEST_CASE("payload_codec: payloads come back through as many wrong bits as are p
   }
 }
 
-TEST_CASE("payload_codec: weak bits may be wrong, or unseen, beyond what is promised") {
+TEST_CASE("payload_codec: weak bits may be wrong, or absent, beyond what is promised") {
   const PayloadCodec codec(100);
   const Payload payload{PayloadKind::hex, "feedfacade"};
   const Message message = codec.encode(payload);
   const CounterRng rng(2);
-  int read_signs = 0, read_strengths = 0, unseen = 0;
+  int read_signs = 0, read_strengths = 0, absent = 0;
   for (std::uint64_t trial = 0; trial < 15; ++trial) {
     std::vector<double> logits = logits_of(message), signs;
     for (std::size_t i = 0; i < logits.size(); ++i)
@@ -122,11 +122,11 @@ TEST_CASE("payload_codec: weak bits may be wrong, or unseen, beyond what is prom
     const auto order = permutation(100, rng, trial + 1000);
     for (std::size_t i = 0; i < 30; ++i) half[static_cast<std::size_t>(order[i])] = 0;
     const auto filled = codec.read(half);
-    unseen += filled && filled->payload == payload;
+    absent += filled && filled->payload == payload;
   }
   CHECK(read_signs <= 10);  // 10% of the bits are wrong
   CHECK(read_strengths >= 13);
-  CHECK(unseen == 15);
+  CHECK(absent == 15);
 }
 
 TEST_CASE("payload_codec: random bits are seldom a payload, and as seldom as is told") {

@@ -71,9 +71,9 @@ AttackDamage attack_damage(const Tensor<float>& before, const Tensor<float>& opa
 class AttackMeter::Row {
  public:
   Row(const AttackMeter& meter, std::string name) : meter_(meter) { row_.name = std::move(name); }
-  void add(const Tensor<float>& picture, const AttackDamage& damage) {
+  void add(const Tensor<float>& view_image, const AttackDamage& damage) {
     const Index view = std::ssize(accuracy_.blind), all = std::ssize(meter_.views_);
-    accuracy_.add(read(picture, view < meter_.informed_views()));
+    accuracy_.add(read(view_image, view < meter_.informed_views()));
     damage_.push_back(damage.psnr);
     kept_.push_back(damage.kept);
     if ((view + 1) % std::min(meter_.options_.group, all) == 0) {
@@ -93,9 +93,9 @@ class AttackMeter::Row {
 
  private:
   // What is too small to be read says nothing.
-  ReadingAccuracy read(const Tensor<float>& picture, bool with_informed) {
+  ReadingAccuracy read(const Tensor<float>& view_image, bool with_informed) {
     try {
-      return meter_.readers_->read(picture, meter_.message_, with_informed, [this](const auto& evidence) {
+      return meter_.readers_->read(view_image, meter_.message_, with_informed, [this](const auto& evidence) {
         for (std::size_t c = 0; c < sum_.size(); ++c) sum_[c] += evidence[c];
       });
     } catch (const ShapeError&) {

@@ -15,26 +15,28 @@ namespace {
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-void check(const Tensor<float>& picture, const Tensor<float>& object, const ExtractorAttackOptions& o) {
-  check_rank("extractor_attack", "image", picture.shape, 3, "[H, W, 3]");
-  if (picture.shape[2] != 3 || object.shape != Shape{picture.shape[0], picture.shape[1]})
+void check(const Tensor<float>& view_image, const Tensor<float>& object, const ExtractorAttackOptions& o) {
+  check_rank("extractor_attack", "image", view_image.shape, 3, "[H, W, 3]");
+  if (view_image.shape[2] != 3 || object.shape != Shape{view_image.shape[0], view_image.shape[1]})
     throw ShapeError("[extractor_attack] image must be [H, W, 3] and object [H, W], got " +
-                     picture.shape.str() + " and " + object.shape.str());
+                     view_image.shape.str() + " and " + object.shape.str());
   if (!(o.mark_psnr >= 10 && o.mark_psnr <= 60))
-    throw ValueError("[extractor_attack] strength must be 10 to 60 dB, got " + std::to_string(o.mark_psnr));
+    throw ValueError("[extractor_attack] mark_psnr must be 10 to 60 dB, got " + std::to_string(o.mark_psnr));
   if (o.steps < 1)
     throw ValueError("[extractor_attack] steps must be at least 1, got " + std::to_string(o.steps));
   if (!(o.step > 0 && o.step <= 1))
     throw ValueError("[extractor_attack] step must be above 0 and at most 1, got " + std::to_string(o.step));
 }
 
-// What the extractor says of the image as it is, and how far from it what it says of another is.
+// The extractor's verdict on an image, and the distance of another image's verdict from it.
 class Verdict {
  public:
-  Verdict(const Owner& owner, const Tensor<float>& picture)
-      : owner_(owner), params_(owner.params, nullptr), shape_{1, picture.shape[0], picture.shape[1], 3} {
+  Verdict(const Owner& owner, const Tensor<float>& view_image)
+      : owner_(owner),
+        params_(owner.params, nullptr),
+        shape_{1, view_image.shape[0], view_image.shape[1], 3} {
     Tape<float> tape;
-    const Var<float> image = tape.constant(picture.data.data(), shape_);
+    const Var<float> image = tape.constant(view_image.data.data(), shape_);
     const auto note_signs = [&](Var<float> logits) {
       for (Index i = 0; i < logits.shape().size(); ++i)
         positive_.push_back(logits.value()[i] > 0 ? 1.f : 0.f);
@@ -54,9 +56,9 @@ class Verdict {
   }
 
   // Of an image [pixels, 3]; [1].
-  Var<float> loss(Var<float> picture) const {
-    Tape<float>& tape = picture.tape();
-    const Var<float> image = tape.reshape(picture, shape_);
+  Var<float> loss(Var<float> view_image) const {
+    Tape<float>& tape = view_image.tape();
+    const Var<float> image = tape.reshape(view_image, shape_);
     if (owner_.pooled_reader) {
       const Var<float> logits = (*owner_.pooled_reader)(params_, image);
       return bce_with_logits<float>(tape.reshape(logits, {static_cast<Index>(positive_.size())}), positive_);
@@ -74,7 +76,7 @@ class Verdict {
   std::vector<std::int32_t> index_;
 };
 
-// To length 1, times `factor`; 0 stays 0.
+// Adds `factor` times the unit vector; adds 0 for 0.
 void add_direction(const std::vector<float>& from, double factor, std::vector<float>& to) {
   double squares = 0;
   for (const float x : from) squares += static_cast<double>(x) * static_cast<double>(x);
@@ -82,7 +84,7 @@ void add_direction(const std::vector<float>& from, double factor, std::vector<fl
   for (std::size_t i = 0; i < to.size(); ++i) to[i] += scale * from[i];
 }
 
-// Normal numbers on the object.
+// Normal random numbers on the foreground.
 std::vector<float> first_residual(const Tensor<float>& object, const CounterRng& rng) {
   std::vector<float> r(at(3 * object.size()), 0.f);
   for (Index p = 0; p < object.size(); ++p)
@@ -95,10 +97,10 @@ std::vector<float> first_residual(const Tensor<float>& object, const CounterRng&
 
 }  // namespace
 
-Tensor<float> against_extractor(const Owner& owner, const Tensor<float>& picture, const Tensor<float>& object,
-                                const ExtractorAttackOptions& options) {
-  check(picture, object, options);
-  const Verdict verdict(owner, picture);
+Tensor<float> against_extractor(const Owner& owner, const Tensor<float>& view_image,
+                                const Tensor<float>& object, const ExtractorAttackOptions& options) {
+  check(view_image, object, options);
+  const Verdict verdict(owner, view_image);
   const Index pixels = object.size();
   const double target = std::pow(10.0, -options.mark_psnr / 20);
   std::vector<float> mask(at(pixels)), gradient(at(3 * pixels)), next(at(3 * pixels)),
@@ -108,7 +110,7 @@ Tensor<float> against_extractor(const Owner& owner, const Tensor<float>& picture
   const auto changed = [&] {
     tape.reset();
     const Var<float> r = tape.fresh_leaf(residual.data(), gradient.data(), {pixels, 3});
-    return add(tape.constant(picture.data.data(), {pixels, 3}), power_budget<float>(r, mask, target));
+    return add(tape.constant(view_image.data.data(), {pixels, 3}), power_budget<float>(r, mask, target));
   };
   for (Index k = 0; k < options.steps; ++k) {
     tape.backward(verdict.loss(changed()));
@@ -119,7 +121,7 @@ Tensor<float> against_extractor(const Owner& owner, const Tensor<float>& picture
     add_direction(gradient, options.step, next);
     residual.swap(next);
   }
-  Tensor<float> out(picture.shape);
+  Tensor<float> out(view_image.shape);
   const float* y = changed().value();
   std::transform(y, y + 3 * pixels, out.data.begin(), [](float x) { return std::clamp(x, 0.f, 1.f); });
   return out;
@@ -140,7 +142,7 @@ nerf::Dataset renders_against_extractor(const Owner& owner, const nerf::Radiance
     for (Index p = 0; p < object.size(); ++p) object[p] = rgba[4 * p + 3];
     const Tensor<float> changed =
         against_extractor(owner, nerf::composited(view, field.background), object, of_view);
-    // Straight colours again: an image's change is its opacity times theirs.
+    // Back to straight alpha: the change of a composited pixel is opacity times that of its colour.
     for (Index p = 0; p < object.size(); ++p)
       for (Index c = 0; c < 3 && object[p] > 0.5f; ++c)
         rgba[4 * p + c] =
@@ -148,7 +150,7 @@ nerf::Dataset renders_against_extractor(const Owner& owner, const nerf::Radiance
     ++of_view.seed;
     const Index done = &view - data.views.data() + 1;
     if (progress && !progress(done, std::ssize(data.views)))
-      throw Error("stopped while images were turned against the extractor");
+      throw Error("stopped while attacking the extractor");
   }
   return data;
 }

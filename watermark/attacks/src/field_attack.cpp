@@ -17,7 +17,7 @@ namespace {
 using Kind = FieldAttackKind;
 
 constexpr Index kBlock = 32;       // numbers with one scale
-constexpr Index kPiece = 1 << 14;  // numbers of a thread's turn
+constexpr Index kChunk = 1 << 14;  // numbers of a thread's turn
 constexpr std::array<double, 3> kLuma{0.299, 0.587, 0.114};
 
 struct Named {
@@ -103,7 +103,7 @@ void add_noise(std::span<float> w, double amount, const CounterRng& rng, std::ui
   for (float v : w) squares += static_cast<double>(v) * static_cast<double>(v);
   const auto deviation = static_cast<float>(amount * std::sqrt(squares / static_cast<double>(w.size())));
   const auto n = static_cast<Index>(w.size());
-  parallel_for((n + 3) / 4, kPiece / 4, [&](Index begin, Index end) {
+  parallel_for((n + 3) / 4, kChunk / 4, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       const auto normal = rng.normal4(stream, static_cast<std::uint64_t>(i));
       for (Index k = 4 * i; k < std::min(4 * i + 4, n); ++k)

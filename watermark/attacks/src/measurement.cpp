@@ -55,8 +55,8 @@ Measurement measure(const Owner& owner, const nerf::RadianceField* baked, const 
                          : options.messages ? options.messages(view)
                                             : random_message(owner.options().bits, messages, i);
     const Images p = views.render(options.cameras[i], code, sent);
-    const auto read = [&](const Tensor<float>& picture, const std::string& name) {
-      return readers.read(picture, sent, view < options.informed_views, [&](const auto& evidence) {
+    const auto read = [&](const Tensor<float>& image, const std::string& name) {
+      return readers.read(image, sent, view < options.informed_views, [&](const auto& evidence) {
         if (options.on_reading) options.on_reading(view, name, evidence, sent);
       });
     };

@@ -18,7 +18,7 @@ void add(Word& word, const Word& other) {
   for (std::size_t i = 0; i < word.size(); ++i) word[i] ^= other[i];
 }
 
-// Sum of the strengths where a word has bits, eight positions by one look-up.
+// Sum of |logit| over the set bits of a word, eight positions a look-up.
 class Disagreement {
  public:
   explicit Disagreement(std::span<const double> logits) : bytes_((logits.size() + 7) / 8) {
@@ -40,7 +40,7 @@ class Disagreement {
   std::array<std::array<double, 256>, kMostBits / 8> sums_{};
 };
 
-// The least disagreement over all ways to add up to `order` rows to a word.
+// The least disagreement over all sums of a word and up to `order` rows.
 struct Search {
   const std::vector<Word>& rows;
   const Disagreement& disagreement;

@@ -14,7 +14,7 @@ constexpr Index kVersionBits = 4, kDataBits[] = {16, 24, 32, 40, 64, 128};
 constexpr unsigned kHexVersion = 1, kTextVersion = 7, kUuidVersion = 13;
 constexpr int kLeastField = 4, kMostField = 8;
 
-// Words within so many bits of one of n bits, over 2^n.
+// Share of the words of n bits within a Hamming radius of one word.
 double sphere(Index n, Index radius) {
   double sum = 0, term = std::ldexp(1.0, static_cast<int>(-n));
   for (Index i = 0; i <= radius; ++i) {
@@ -24,7 +24,7 @@ double sphere(Index n, Index radius) {
   return sum;
 }
 
-// The most errors, as far as the code corrects, that keep the chance.
+// The largest radius within the code's that keeps kMostChance.
 Index radius_of(const Bch& code, double payloads) {
   Index radius = code.corrects();
   while (radius > 0 && payloads * sphere(code.length(), radius) > PayloadCodec::kMostChance) --radius;
@@ -66,7 +66,7 @@ std::optional<PayloadCodec::Code> PayloadCodec::make_code(Index raw_bits, Index 
   if (payload_count(PayloadKind::uuid, data_bits) > 0) versions.push_back({kUuidVersion, PayloadKind::uuid});
   double payloads = 0;
   for (const Version& v : versions) payloads += payload_count(v.kind, data_bits);
-  // A smaller field can correct more although it leaves bits unused.
+  // A smaller field may correct more although it leaves bits unused.
   std::optional<Bch> best;
   for (int m = kMostField; m >= kLeastField; --m) {
     const Index length = std::min(raw_bits, (Index{1} << m) - 1);
@@ -151,14 +151,14 @@ std::optional<Payload> PayloadCodec::payload(const Message& message) const {
   return std::nullopt;
 }
 
-// Codewords that a reading may have come from.
+// Candidate codewords of a reading.
 std::vector<Bits> PayloadCodec::candidates(const Code& code, std::span<const double> logit) const {
   std::vector<Bits> words;
   const auto used = logit.first(static_cast<std::size_t>(code.bch.length()));
   Bits signs;
   for (double x : used) signs.push_back(x > 0);
   if (auto word = code.bch.decode(signs)) words.push_back(std::move(word->bits));
-  // Against each version the words of the data are a linear code of their own.
+  // Relative to each version's offset the data words form a linear code.
   const int order = code.layout.data_bits <= 40 ? 3 : 2;
   for (const Bits& offset : code.offsets) {
     std::vector<double> turned(used.begin(), used.end());
@@ -205,8 +205,8 @@ double log_chance_of_agreement(std::span<const double> logit, double agreement) 
   double largest = 0;
   for (double x : logit) largest = std::max(largest, std::abs(x));
   if (largest == 0 || agreement <= 0) return 0;
-  // The slope sum_i |l_i| tanh(x |l_i|) - agreement rises with x; any x gives a bound, so a few digits will
-  // do.
+  // The slope sum_i |l_i| tanh(x |l_i|) - agreement rises with x. Any x gives a bound, so a few digits
+  // suffice.
   double low = std::log(1e-6 / largest), high = std::log(1e4 / largest);
   for (int step = 0; step < 40; ++step) {
     const double middle = (low + high) / 2, x = std::exp(middle);

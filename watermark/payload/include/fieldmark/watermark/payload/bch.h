@@ -8,10 +8,10 @@
 
 namespace fieldmark::watermark {
 
-/// What a decoder made of a word.
+/// A decoder's result.
 struct CorrectedWord {
   std::vector<std::uint8_t> bits;  ///< [length] the codeword, each 0 or 1
-  Index corrected = 0;             ///< bits in which it differs from the word that was given
+  Index corrected = 0;             ///< bits in which the codeword differs from the given word
 };
 
 /// A binary BCH code: narrow-sense, primitive, shortened to `length` bits, systematic.
@@ -21,33 +21,30 @@ struct CorrectedWord {
 /// Chien 1964.
 class Bch {
  public:
-  /// @param m  3 to 8, @param t  errors to be corrected, at least 1, @param length  at most 2^m - 1
-  /// @throws ValueError if one is out of range, or the code has no information bit
+  /// @param m  3 to 8   @param t  errors to correct, at least 1   @param length  1 to 2^m - 1
+  /// @throws ValueError out of range, or if no information bit is left
   Bch(int m, Index t, Index length);
 
-  /// The code with the most errors corrected whose codewords hold `dimension` bits of information.
-  /// @return nothing if not even one error can be corrected   @throws ValueError as the constructor
+  /// The code that corrects most errors with `dimension` information bits.
+  /// @return nothing if no code corrects one error   @throws ValueError as the constructor
   static std::optional<Bch> strongest(int m, Index length, Index dimension);
 
   /// Bits of a codeword.
   Index length() const { return length_; }
-  /// Of them information, which comes first.
+  /// Information bits, which come first.
   Index dimension() const { return length_ - check_bits(); }
-  /// Of them check bits, the generator's degree.
+  /// Check bits: the generator's degree.
   Index check_bits() const { return static_cast<Index>(generator_.size()) - 1; }
-  /// Errors that are corrected wherever they are: half the number of successive powers of alpha, from the
-  /// first on, that are roots. It can exceed the constructor's t, of which it is the least with the same
-  /// generator.
+  /// Errors that are always corrected: half the number of successive powers alpha, alpha^2, ... that are
+  /// roots. It can exceed the constructor's t.
   Index corrects() const { return corrects_; }
 
-  /// The codeword of these bits.
-  /// @param information  [dimension] each 0 or 1   @return [length]   @throws ValueError for another size or
-  /// another value
+  /// Encodes information bits.
+  /// @param information  [dimension] each 0 or 1   @return [length]   @throws ValueError otherwise
   std::vector<std::uint8_t> encode(std::span<const std::uint8_t> information) const;
 
-  /// The codeword that differs in at most corrects() bits, of which there is never more than one.
-  /// @param word  [length] each 0 or 1   @return nothing if there is none   @throws ValueError for another
-  /// size or another value
+  /// Finds the one codeword that differs in at most corrects() bits.
+  /// @param word  [length] each 0 or 1   @return nothing if there is none   @throws ValueError otherwise
   std::optional<CorrectedWord> decode(std::span<const std::uint8_t> word) const;
 
  private:

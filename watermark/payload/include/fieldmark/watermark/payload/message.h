@@ -9,7 +9,7 @@
 
 namespace fieldmark::watermark {
 
-/// The bits that a mark carries, first bit first, each 0 or 1.
+/// The bits that a mark carries, each 0 or 1.
 struct Message {
   std::vector<std::uint8_t> bits;  ///< [n]
   /// Number of bits.
@@ -21,8 +21,7 @@ struct Message {
 /// Message from hexadecimal digits of either case, most significant bit first: "a0" is 1010 0000.
 /// @param hex     ceil(n_bits / 4) digits without a prefix; bits of the last digit beyond n_bits must be 0
 /// @param n_bits  at least 1
-/// @throws ValueError for a character that is no digit, too many or too few digits, or unused bits that are
-/// set
+/// @throws ValueError for another character, another number of digits, or unused bits that are set
 Message message_from_hex(std::string_view hex, Index n_bits);
 
 /// ceil(size / 4) lower-case digits, most significant bit first; unused bits of the last digit are 0.
@@ -32,9 +31,8 @@ std::string to_hex(const Message& message);
 /// A string of '0' and '1', first bit first.   @throws ValueError if a bit is neither 0 nor 1
 std::string to_bits(const Message& message);
 
-/// Fair, independent bits for training and measuring, a function of (rng, index): bit i is bit (i mod 32) of
-/// the generator's word (i div 32) at (index, ..). Not secret.   @param n_bits  at least 1   @throws
-/// ValueError otherwise
+/// Fair, independent bits for training and measuring; not secret. Bit i is bit (i mod 32) of the generator's
+/// word (i div 32) at (index, ..).   @param n_bits  at least 1   @throws ValueError otherwise
 Message random_message(Index n_bits, const CounterRng& rng, std::uint64_t index);
 
 }  // namespace fieldmark::watermark

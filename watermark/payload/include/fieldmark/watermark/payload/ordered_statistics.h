@@ -8,21 +8,19 @@
 
 namespace fieldmark::watermark {
 
-/// Decoding of any short binary linear code from logits: the bits' strengths count, not only their signs.
-/// The most reliable independent positions are taken as they are seen, and every choice of up to `order` of
-/// them flipped; of the codewords that this gives, the one that agrees best is the answer. Source: Fossorier
-/// and Lin 1995 (soft-decision decoding of linear block codes based on ordered statistics).
+/// Soft-decision decoder of any short binary linear code. It re-encodes the hard decisions on the most
+/// reliable independent positions with up to `order` of them flipped, and returns the codeword that agrees
+/// best. Source: Fossorier and Lin 1995 (ordered statistics decoding).
 class OrderedStatistics {
  public:
   /// @param generator  [k][n] linearly independent words that span the code, each bit 0 or 1; n at most 256
-  /// @throws ValueError for no words, words of several lengths or too long, or words that are dependent
+  /// @throws ValueError without words, or if they differ in length, are too long or dependent
   explicit OrderedStatistics(const std::vector<std::vector<std::uint8_t>>& generator);
 
-  /// The codeword c found to have most of sum_i logit_i (2 c_i - 1); the same for the same input. Equal
-  /// strengths count by position, so that a logit of 0 is an erasure.
-  /// @param logits  [n] finite; positive where the bit seems to be 1   @param order  0 to 3: time grows as
-  /// k^order
-  /// @throws ValueError for another size, a number that is not finite, or another order
+  /// The codeword c with the largest sum_i logit_i (2 c_i - 1) found. Ties go by position; a logit of 0 is an
+  /// erasure.
+  /// @param logits  [n] finite; positive for a 1   @param order  0 to 3: time grows as k^order
+  /// @throws ValueError otherwise
   std::vector<std::uint8_t> nearest(std::span<const double> logits, int order) const;
 
  private:
