@@ -8,7 +8,7 @@ void add_elementwise_numerics(std::vector<NumericsCase>& cases);
 void add_norm_numerics(std::vector<NumericsCase>& cases);
 void add_sum_numerics(std::vector<NumericsCase>& cases);
 
-// Magnitudes below the least normal number count as one of them: rounding there is absolute.
+// A magnitude of at least the least normal number: below it rounding is absolute.
 template <class T>
 long double size_of(long double exact) {
   return std::max(std::abs(exact), static_cast<long double>(std::numeric_limits<T>::min()));

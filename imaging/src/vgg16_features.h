@@ -15,16 +15,16 @@ std::vector<WeightTensor> vgg16_tensors();
 /// Features of VGG-16 (Simonyan & Zisserman 2015, configuration D) for perceptual losses.
 /// Images in [0, 1] are normalised as torchvision does: (x - mean) / deviation of ImageNet, per channel.
 /// Depths are named after the ReLU that ends them: "relu1_1", "relu1_2", "relu2_1", ... "relu5_3". Gradients
-/// reach the images; the weights stay.
+/// reach the images; the weights are fixed.
 template <class T>
 class Vgg16Features {
  public:
-  /// Reads the convolutions that the file has, from the first on: all 13, or only the first layers. Other
-  /// tensors, such as a classifier's, are left aside.
+  /// Reads all 13 convolutions of the file or only the first ones; ignores other tensors, such as a
+  /// classifier's.
   /// @throws IoError if the first is missing, one is missing before another that is there, or a shape differs
   explicit Vgg16Features(const SafetensorsFile& file);
 
-  /// Names of the depths that the weights reach, shallowest first.
+  /// Names of the available depths, shallowest first.
   std::vector<std::string> depths() const;
 
   /// @param x     [N, H, W, 3] in [0, 1], RGB; 2^k pixels each way at least for depth relu(k + 1)

@@ -1,6 +1,5 @@
 #pragma once
-// The two ways of conv2d: directly, as products with the windows of a bordered image, and Winograd's.
-// Private.
+// The two methods of conv2d: direct products with the windows of a bordered image, and Winograd's. Private.
 #include <fieldmark/engine/tape.h>
 
 namespace fieldmark::detail {
@@ -10,11 +9,11 @@ struct ConvGeometry {
   Index stride = 1, padding = (k - 1) / 2;  // pixels
   Index out_h() const { return (h + 2 * padding - k) / stride + 1; }
   Index out_w() const { return (w + 2 * padding - k) / stride + 1; }
-  /// Of the result.
+  /// Pixels of the result.
   Index pixels() const { return n * out_h() * out_w(); }
   /// Whether the result is as large as x, with centred windows.
   bool same() const { return stride == 1 && 2 * padding == k - 1; }
-  /// Of the convolution that takes dY to dX, where same().
+  /// The convolution from dY to dX, if same().
   ConvGeometry transposed() const { return {n, h, w, o, c, k}; }
 };
 
@@ -29,20 +28,19 @@ struct Convolution {
   T* y = nullptr;  ///< [n, h, w, o]
 };
 
-/// Returns x with a border of zeros (x itself where it needs none), which direct_weight_gradient() reads
-/// again.
+/// Returns x with a border of zeros (x itself where it needs none) for direct_weight_gradient().
 template <class T>
 const T* direct_convolve(Tape<T>& tape, const ConvGeometry& g, const Convolution<T>& c);
 /// dw += the correlation of x with dy, dy masked. @param bordered  what direct_convolve() returned
 template <class T>
 void direct_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* bordered, const T* dy,
                             const T* mask, T* dw);
-/// dx = or += the spread of dy, masked, over the windows it came from: for any stride and border.
+/// dx = or += dy, masked, scattered over its windows: for any stride and padding.
 template <class T>
 void direct_input_gradient(Tape<T>& tape, const ConvGeometry& g, const T* w, const T* dy, const T* mask,
                            bool accumulate, T* dx);
 
-/// Whether the two below take less time than their counterparts above; they need k = 3.
+/// Whether the two functions below are faster than their direct counterparts; they need k = 3.
 bool winograd_pays(const ConvGeometry& g);
 template <class T>
 void winograd_convolve(Tape<T>& tape, const ConvGeometry& g, const Convolution<T>& c);

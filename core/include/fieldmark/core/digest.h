@@ -9,10 +9,10 @@ namespace fieldmark {
 
 /// SHA-256 of a range of bytes, 64 lower-case hexadecimal digits.
 std::string sha256_hex(std::span<const std::byte> bytes);
-/// The same of the bytes of a text.
+/// The same for a text.
 std::string sha256_hex(std::string_view text);
 
-/// SHA-256 of a file's bytes, read in pieces, 64 lower-case hexadecimal digits.
+/// SHA-256 of a file's bytes, read in chunks, 64 lower-case hexadecimal digits.
 /// @throws IoError if the file cannot be opened or read
 std::string sha256_file_hex(const std::filesystem::path& path);
 

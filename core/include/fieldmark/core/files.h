@@ -15,8 +15,8 @@ enum class Access {
 };
 
 /// A file that appears under its name only when it is complete: it is written to a temporary file in the same
-/// folder, flushed to the disk and renamed by commit(). Destroyed before commit(), it leaves what was there
-/// before and no temporary file. A symbolic link is followed; a device or pipe is written directly.
+/// folder, flushed to the disk and renamed by commit(). Destroyed before commit(), it leaves the old
+/// file and no temporary file. A symbolic link is followed; a device or pipe is written directly.
 class AtomicFile {
  public:
   /// @throws IoError if no file can be made in the folder of `path`
@@ -32,7 +32,7 @@ class AtomicFile {
  private:
   [[noreturn]] void fail(const char* what, int error) const;
   std::filesystem::path path_;       ///< as the caller named it
-  std::filesystem::path target_;     ///< what the rename replaces
+  std::filesystem::path target_;     ///< that the rename replaces
   std::filesystem::path temporary_;  ///< empty where target_ is written directly
   std::size_t written_ = 0;
   int fd_ = -1;

@@ -4,7 +4,7 @@
 
 namespace fieldmark {
 
-// libsodium picks its code for this CPU and opens the system's random source once; safe from any thread.
+// Initialises libsodium once; safe from any thread.
 inline void ensure_sodium() {
   static const int status = sodium_init();
   if (status < 0) throw Error("[sodium] libsodium could not be initialised (no source of random numbers)");

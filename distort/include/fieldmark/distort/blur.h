@@ -11,7 +11,7 @@ namespace fieldmark::distort {
 /// @param sigma  [1] standard deviation in pixels, 0 to 1000
 /// @return [height, width, channels]
 /// @throws ShapeError if x is not an image or sigma not [1]   @throws ValueError on sigma
-/// Differentiable in: x, sigma. Jumps by up to 3e-4 of the range where 4 sigma is whole, as r grows.
+/// Differentiable in: x, sigma. Jumps by up to 3e-4 of the range where 4 sigma is an integer, as r grows.
 template <class T>
 Var<T> blur(Var<T> x, Var<T> sigma);
 

@@ -11,7 +11,7 @@
 
 namespace fieldmark::distort {
 
-/// One kind of damage; parse_distortion() lists what each does.
+/// Kinds of distortion, see parse_distortion().
 enum class DistortionKind {
   noise,
   rotation,
@@ -31,20 +31,18 @@ enum class DistortionKind {
   greyscale
 };
 
-/// What somebody does to an image to remove its mark, from a name such as "rotation_30" or
-/// "noise_0.1,jpeg_50".
+/// A chain of distortions of an image, from a name such as "rotation_30" or "noise_0.1,jpeg_50".
 struct Distortion {
-  /// One damage and how much of it.
+  /// One distortion of the chain.
   struct Step {
-    DistortionKind kind;  ///< what is done
-    double amount;  ///< severity, in the unit that parse_distortion() gives for the kind; 0 for greyscale
+    DistortionKind kind;  ///< of the distortion
+    double amount;        ///< severity in the unit of parse_distortion(); 0 for greyscale
   };
   std::string name;         ///< as it was given
   std::vector<Step> steps;  ///< from left to right
 };
 
-/// Reads a name, or names separated by commas. Severities are true: deviations on the scale of [0, 1], sigma
-/// in pixels of the image at hand.
+/// Reads a name, or names separated by commas. Deviations are on the scale of [0, 1], sigma is in pixels.
 ///   noise_A       Gaussian of standard deviation A, 0 to 1
 ///   rotation_A    uniform in +-A degrees about the centre, bilinear, same size, 0 to 180
 ///   scale_A       to A times the size with an area filter and left so, 0.01 to 4
@@ -52,7 +50,7 @@ struct Distortion {
 ///                 resize_filtered()
 ///   blur_A        Gaussian of sigma A pixels, 0 to 100
 ///   crop_A        a random window of the image's aspect that keeps the fraction A of the area, 0.0001 to 1
-///   jpeg_A        quality A, 4:2:0 chroma, a whole number 1 to 90 (see encode_jpeg)
+///   jpeg_A        quality A, 4:2:0 chroma, an integer 1 to 90 (see encode_jpeg)
 ///   jpeg444_A     the same with chroma at full size, 1 to 100 (see jpeg444)
 ///   gamma_A       value to the power A, 0.01 to 10
 ///   brightness_A  value times A, 0 to 10
@@ -62,28 +60,28 @@ struct Distortion {
 ///   combined      noise_0.10,crop_0.40,jpeg_50
 ///   screenshot    scale-bicubic_1.25,blur_0.5,gamma_1.1,scale-lanczos_0.8,jpeg_80: shown on a screen at
 ///                 another size, captured, brought back and sent on
-/// @throws ValueError, which lists all of these, on any other name and on amounts outside the ranges
+/// @throws ValueError on any other name or an amount outside its range; the text lists all of these
 Distortion parse_distortion(std::string_view name);
 
-/// Where a pixel of an distorted image comes from, in pixels of the image before, centres at whole
-/// numbers, x to the right and y down:
+/// Source position of a pixel of a distorted image, in pixels of the original, centres at integers, x right
+/// and y down:
 ///   x' = a00 x + a01 y + t_x,   y' = a10 x + a11 y + t_y
 struct PixelMap {
   std::array<double, 6> numbers{1, 0, 0, 0, 1, 0};  ///< [a00, a01, t_x, a10, a11, t_y]
-  /// The place that (x, y) comes from.
+  /// The source position of (x, y).
   std::array<double, 2> operator()(double x, double y) const;
-  /// The map the other way: where a pixel of the image before went. Attacks' maps always have one.
+  /// The map from the original to the distorted image. Every distortion has one.
   PixelMap inverse() const;
 };
 
-/// Applies the steps in order. Each result is clamped to [0, 1] and rounded to 8 bits, so that a chain does
-/// what the same distortions do one after another on saved images.
+/// Applies the steps in order. Each result is clamped to [0, 1] and rounded to 8 bits, so that a chain equals
+/// the same distortions one after another on saved images.
 /// @param image       [height, width, 3] in [0, 1], at least one pixel
-/// @param rng         where noise, angles and windows come from
-/// @param index       number of the image: the counter rng is read at, so results depend on nothing else
-/// @param background  3 numbers, shown where a rotation opens corners
-/// @param source      where the result's pixels come from, written unless null: what rotation, scale and crop
-///                    of all steps did together
+/// @param rng         source of noise, angles and windows
+/// @param index       of the image: rng's counter, so that results depend on nothing else
+/// @param background  [3] colour of the corners that a rotation opens
+/// @param source      unless null, receives the source positions: rotation, scale and crop of all steps
+/// together
 /// @return [height', width', 3], multiples of 1/255
 /// @throws ShapeError if the image or the background has another shape
 Tensor<float> apply_distortion(const Distortion& distortion, const Tensor<float>& image,

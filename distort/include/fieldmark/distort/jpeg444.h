@@ -3,13 +3,12 @@
 
 namespace fieldmark::distort {
 
-/// What is left of an image after JPEG with chroma at full size (4:4:4), which the encoder behind
-/// jpeg_round_trip() has at its best qualities only. Each 8 x 8 block of each component, the last row and
-/// column repeated to fill it:
+/// JPEG round trip with chroma at full size (4:4:4), which the encoder of jpeg_round_trip() has at its best
+/// qualities only. For each 8 x 8 block of each component, the last row and column repeated to fill it:
 ///   c' = q round(DCT(c) / q),   q = clamp(floor((s base + 50) / 100), 1, 255),   s = 5000 / Q below 50, else
 ///   200 - 2 Q
 /// with the base tables of ITU-T T.81, annex K, luma's for Y and chroma's for Cb and Cr (JFIF). Components
-/// are rounded to 8 bits before colours are made of them, as decoders do. Entropy coding loses nothing and is
+/// are rounded to 8 bits before the conversion to colours, as in decoders. Entropy coding is lossless and
 /// left out.
 /// @param image    [height, width, 3] in [0, 1], at least one pixel; rounded to 8 bits first
 /// @param quality  Q, 1 to 100, scaled as libjpeg does

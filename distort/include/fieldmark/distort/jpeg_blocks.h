@@ -3,20 +3,20 @@
 
 namespace fieldmark::distort {
 
-/// 8 x 8 numbers, row by row: levels of one component, or coefficients.
+/// 8 x 8 values, row by row: levels of one component, or coefficients.
 using JpegBlock = std::array<double, 64>;
 
-/// The component a table of steps is for.
+/// The component of a quantisation table.
 enum class JpegComponent { luma, chroma };
 
-/// Steps of the coefficients: the base table of ITU-T T.81, annex K, scaled as libjpeg does,
+/// Quantisation steps of the coefficients: the base table of ITU-T T.81, annex K, scaled as libjpeg does,
 ///   q = clamp(floor((s base + 50) / 100), 1, 255),   s = 5000 / Q below 50, else 200 - 2 Q.
 /// @param quality  Q, 1 to 100   @throws ValueError if it is outside
 JpegBlock jpeg_steps(JpegComponent component, int quality);
 
-/// The orthonormal cosine transform of a block (T.81, A.3.3), no level shifted.
+/// The orthonormal cosine transform of a block (T.81, A.3.3), without level shift.
 JpegBlock jpeg_cosines(const JpegBlock& levels);
-/// Its inverse, which is its transpose too.
+/// Its inverse.
 JpegBlock from_jpeg_cosines(const JpegBlock& coefficients);
 
 /// Row a of the colour transform of JFIF without its offset of 128: Y, Cb or Cr = sum_c row[c] rgb[c].

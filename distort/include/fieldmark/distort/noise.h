@@ -6,14 +6,14 @@
 
 namespace fieldmark::distort {
 
-/// Additive Gaussian noise of a given field of standard normal numbers; nothing is clamped.
+/// Additive Gaussian noise from given standard normal values; no clamp.
 ///   y_i = x_i + mu + sigma n_i
 /// Source: Luo et al. 2023 (CopyRNeRF), distortion-resistant rendering; sigma is the true standard deviation
 /// on the scale of x (the released code squares it).
 /// @param x       [any] image, in [0, 1]
 /// @param mu      [1] mean
 /// @param sigma   [1] standard deviation, 0 to 1e6
-/// @param normal  one standard normal number for each of x; read again by the backward: must outlive the pass
+/// @param normal  one standard normal value for each element of x; must outlive the pass
 /// @return [x's shape]
 /// @throws ShapeError if mu or sigma is not [1] or `normal` has another size than x   @throws ValueError on
 /// sigma Differentiable in: x, mu, sigma.

@@ -5,8 +5,7 @@
 
 namespace fieldmark::distort {
 
-/// The distortions that must change nothing, or only permute pixels, and blur, each with the error that it
-/// may have.
+/// Identities, permutations of pixels and blur, each with its error limit.
 std::vector<NumericsCase> numerics_cases();
 
 }  // namespace fieldmark::distort

@@ -5,7 +5,7 @@
 
 namespace fieldmark::distort {
 
-/// What affine_warp reads for a turn, a zoom and a shift of the image about its centre.
+/// The matrix of affine_warp() for a rotation, a zoom and a shift of the image about its centre.
 ///   A = R(-angle) / scale,   t = -A shift,   out [a00, a01, t_x, a10, a11, t_y]
 /// so an image's point at offset p from the centre moves to scale R(angle) p + shift. The axes are x to the
 /// right and y down; a positive angle turns the image counter-clockwise as seen. Sines and cosines within
@@ -17,7 +17,7 @@ namespace fieldmark::distort {
 template <class T>
 Var<T> similarity(Var<T> angle, Var<T> scale, Var<T> shift);
 
-/// The same numbers without a tape, for moving labels along. @throws ValueError as above
+/// The same matrix without a tape, for warp_labels(). @throws ValueError as above
 template <class T>
 std::array<T, 6> similarity_matrix(T angle, T scale, T shift_x, T shift_y);
 

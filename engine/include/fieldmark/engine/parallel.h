@@ -5,20 +5,19 @@
 
 namespace fieldmark {
 
-/// Threads the library uses outside of an existing parallel region; at first all that the machine offers.
+/// Sets the number of threads outside of an existing parallel region; default: all of the machine.
 /// @param n  at least 1   @throws ValueError otherwise
 void set_threads(int n);
-/// What set_threads() was last given, or the number the machine offers.
+/// The number of threads in use.
 int threads();
 
 namespace detail {
 void parallel_chunks(Index chunks, void* context, void (*run)(void*, Index chunk));
 }  // namespace detail
 
-/// Calls f(begin, end) over [0, n) in pieces of `grain`, on several threads; serial when called from inside
-/// another parallel loop or where there is only one piece. The pieces do not depend on the thread count, so a
-/// result that depends only on the piece has the same bits for any number of threads. An exception thrown by
-/// f is rethrown here.
+/// Calls f(begin, end) over [0, n) in chunks of `grain`, on several threads; serial inside another parallel
+/// loop and for a single chunk. Chunks do not depend on the thread count, so a result that depends only on
+/// the chunk has the same bits for any number of threads. Rethrows an exception of f.
 template <class F>
 void parallel_for(Index n, Index grain, F&& f) {
   if (n <= 0) return;

@@ -11,12 +11,12 @@ namespace fieldmark {
 
 /// Names one tensor of a ParamStore. Modules keep ids, never pointers: add() may move the buffers.
 struct ParamId {
-  int index = -1;  ///< of its entry in the order added; -1 names none
+  int index = -1;  ///< position among the entries; -1: none
 };
 
-/// All trainable numbers of a model in one flat buffer, gradients in a second one of equal length,
-/// so that an optimiser step, a checkpoint and zero_grad() are each one loop. Tensors of 4096 numbers or more
-/// start on a cache line; the zeros before them get no gradient and stay.
+/// All parameters of a model in one flat buffer, their gradients in a second one of equal length: an
+/// optimiser step, a checkpoint and zero_grad() are each one loop. Tensors of 4096 elements or more start on
+/// a cache line; the gap before them stays zero.
 template <class T>
 class ParamStore {
  public:
@@ -31,7 +31,7 @@ class ParamStore {
   /// @throws ValueError if there is no such name
   ParamId find(std::string_view name) const;
   /// @{
-  /// The numbers of one tensor; valid until the next add().
+  /// The elements of one tensor; valid until the next add().
   std::span<T> values(ParamId id);
   std::span<const T> values(ParamId id) const;
   /// @}
@@ -50,7 +50,7 @@ class ParamStore {
   const Entry& entry(ParamId id) const { return entries_[static_cast<std::size_t>(id.index)]; }
   /// Length of the buffers, with the gaps between tensors.
   Index size() const { return static_cast<Index>(values_.size()); }
-  /// Numbers in all tensors.
+  /// Elements of all tensors.
   Index parameters() const;
   /// Sets all gradients to 0.
   void zero_grad();
@@ -63,8 +63,8 @@ class ParamStore {
 template <class T>
 class PackedWeights;
 
-/// Where a pass reads parameters and where it adds their gradients: the store itself, a shard's private
-/// buffer, or nowhere (inference). Cheap to copy; the store must outlive it.
+/// The source of a pass's parameters and the target of their gradients: the store itself, a shard's private
+/// buffer, or none (inference). Cheap to copy; the store must outlive it.
 template <class T>
 class Params {
  public:
@@ -76,11 +76,11 @@ class Params {
   Params(const ParamStore<T>& store, T* grads, const PackedWeights<T>& packed) : Params(store, grads) {
     packed_ = &packed;
   }
-  /// Reads `values` laid out as the store's: how gradcheck treats a module's parameters as an input.
+  /// Reads `values`, laid out as the store's: gradcheck_module() treats parameters as an input.
   Params(const ParamStore<T>& layout, const T* values, T* grads)
       : layout_(&layout), values_(values), grads_(grads) {}
 
-  /// A parameter on the tape: a leaf, or a constant where gradients are not computed; packed where it was.
+  /// A parameter on the tape: a leaf, or a constant where gradients are not computed.
   Var<T> leaf(Tape<T>& tape, ParamId id) const;
 
  private:

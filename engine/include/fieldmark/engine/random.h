@@ -7,13 +7,12 @@
 
 namespace fieldmark {
 
-/// Random numbers without a state: every number is a function of (seed, stream, a, b), so neither the thread
-/// count nor a resumed run can change it. Use a for what is drawn for (a step, an image) and b for the place
-/// in it (ray, sample).
+/// Counter-based random numbers: each is a function of (seed, stream, a, b), so neither the thread count nor
+/// a resumed run changes it. Use a for the step or image, b for the ray or sample in it.
 ///   words(a, b) = Philox4x32-10(counter = a | b << 64, key),   key = seed for stream 0
 /// Source: Salmon et al. 2011 (Parallel random numbers: as easy as 1, 2, 3), section 3.3.
-/// Other streams have as key two words of a Philox block of their number under the seed: two of them share a
-/// key with probability 2^-64. Cheap to copy.
+/// The key of another stream is half a Philox block of its number under the seed: two streams share a key
+/// with probability 2^-64. Cheap to copy.
 class CounterRng {
  public:
   /// @param stream  separates the uses of one seed: pixels, backgrounds, messages
@@ -27,18 +26,18 @@ class CounterRng {
   std::array<float, 4> uniform4(std::uint64_t a, std::uint64_t b = 0) const;
   /// In [0, 1), a multiple of 2^-53.
   double uniform_double(std::uint64_t a, std::uint64_t b = 0) const;
-  /// Two independent normal numbers of mean 0 and deviation 1; the first two of normal4().
+  /// Two independent standard normal numbers; the first two of normal4().
   std::array<float, 2> normal2(std::uint64_t a, std::uint64_t b = 0) const;
-  /// Four independent normal numbers, at most 6.67 in size.   Source: Box and Muller 1958.
+  /// Four independent standard normal numbers, at most 6.67 in size.   Source: Box and Muller 1958.
   std::array<float, 4> normal4(std::uint64_t a, std::uint64_t b = 0) const;
-  /// A whole number in [0, n), uniform to within n / 2^64.   @throws ValueError unless n is positive
+  /// An integer in [0, n), uniform to within n / 2^64.   @throws ValueError unless n is positive
   Index below(Index n, std::uint64_t a, std::uint64_t b = 0) const;
 
  private:
   std::array<std::uint32_t, 2> key_;
 };
 
-/// A uniformly random order of 0 .. n - 1 (Fisher and Yates), from rng's numbers at (a, 0 .. n - 1).
+/// A uniformly random order of 0 .. n - 1 (Fisher and Yates), from rng at (a, 0 .. n - 1).
 /// @throws ValueError if n is negative
 std::vector<Index> permutation(Index n, const CounterRng& rng, std::uint64_t a);
 

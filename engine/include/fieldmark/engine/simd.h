@@ -2,9 +2,9 @@
 #include <cstdint>
 #include <cstring>
 
-// Vectors for kernel files only: a kernel is compiled once per instruction set, so everything here has
-// internal linkage (two levels must never share an inline function). GCC and Clang vector extensions, no
-// intrinsics: one source serves SSE4, AVX2 and AVX-512.
+// Vectors for kernel files only. Everything has internal linkage: two instruction sets must never share an
+// inline function. GCC and Clang vector extensions instead of intrinsics: one source serves SSE4, AVX2 and
+// AVX-512.
 namespace {
 namespace simd {
 
@@ -16,7 +16,7 @@ inline constexpr int kBytes = 32;
 inline constexpr int kBytes = 16;
 #endif
 
-/// Numbers of type T in one register.
+/// Elements of type T in one register.
 template <class T>
 constexpr int kLanes = kBytes / static_cast<int>(sizeof(T));
 

@@ -5,8 +5,8 @@
 
 namespace fieldmark {
 
-/// Mean of the finite numbers: identical images have no PSNR, and a view of the background alone has no
-/// object. NaN where there is none.
+/// Mean of the finite values: the PSNR of identical images is infinite, that of a view without foreground
+/// NaN. NaN if no value is finite.
 inline double finite_mean(const std::vector<double>& values) {
   double sum = 0, count = 0;
   for (double v : values)
@@ -17,7 +17,7 @@ inline double finite_mean(const std::vector<double>& values) {
   return count > 0 ? sum / count : std::nan("");
 }
 
-/// The value that a twentieth of the values lie below, not interpolated.   @param values  at least one
+/// The 5th percentile, not interpolated.   @param values  at least one
 inline double percentile_5(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   return values[static_cast<std::size_t>(0.05 * static_cast<double>(values.size()))];

@@ -10,13 +10,13 @@ double mse(const Tensor<float>& a, const Tensor<float>& b);
 /// Peak signal to noise ratio of the whole image, both rounded to 8 bits first (quantize8()).
 ///   psnr = -10 log10(mean (a - b)^2), in dB; the sum of squares is exact
 /// @param a, b  images of one shape in [0, 1], not empty
-/// @return infinity where the rounded images are equal: average over views says so too
+/// @return infinity if the rounded images are equal
 /// @throws ShapeError if the shapes differ or are empty
 double psnr(const Tensor<float>& a, const Tensor<float>& b);
 
-/// As psnr(), over the pixels whose mask exceeds 0.5: the object's, where the mask is its opacity.
+/// As psnr(), over the pixels whose mask exceeds 0.5: the foreground, if the mask is the opacity.
 /// @param a, b  [H, W, C]   @param mask  [H, W]
-/// @return NaN where the mask is empty: leave such a view out of a mean   @throws ShapeError
+/// @return NaN if the mask is empty   @throws ShapeError
 double psnr_masked(const Tensor<float>& a, const Tensor<float>& b, const Tensor<float>& mask);
 
 /// Structural similarity, mean over channels and over the window positions that lie inside the image.

@@ -17,7 +17,7 @@ Tensor<float> resize_area(const Tensor<float>& image, Index height, Index width)
 /// Parameters, result and errors as resize_area().
 Tensor<float> resize_bilinear(const Tensor<float>& image, Index height, Index width);
 
-/// Kernels of resize_filtered(), as other programs have them.
+/// Kernels of resize_filtered().
 enum class ResizeFilter {
   nearest,   ///< the pixel under the new pixel's centre
   bilinear,  ///< triangle of half width 1
@@ -25,8 +25,8 @@ enum class ResizeFilter {
   lanczos    ///< sinc windowed by its own first three lobes, half width 3
 };
 
-/// Resizes as image programs do: a kernel that is stretched where the image shrinks, so that it does not
-/// alias, and whose weights are divided by their sum, at the rim too.
+/// Resizes as image programs do: the kernel stretches where the image shrinks, so that it does not alias, and
+/// its weights are divided by their sum, at the border too.
 ///   y_i = sum_k w_k x_k / sum_k w_k,   w_k = f((k + 1/2 - c_i) / max(s, 1)),   c_i = (i + 1/2) s, s = in /
 ///   out
 /// The same size is the identity. bicubic and lanczos may leave the range of x. `nearest` is not stretched.

@@ -6,10 +6,10 @@
 
 namespace fieldmark {
 
-/// Batch normalisation with its parameters "<name>/gamma" [C], at first 1, and "<name>/beta" [C], at first 0,
-/// and the running statistics "<name>/running_mean" [C], at first 0, and "<name>/running_variance" [C], at
-/// first 1. Those are stored beside the parameters so that checkpoints hold them; their gradient is always 0,
-/// and weight decay must not touch them.
+/// Batch normalisation layer with the parameters "<name>/gamma" [C], initially 1, and "<name>/beta" [C],
+/// initially 0, and the running statistics "<name>/running_mean" [C], initially 0, and
+/// "<name>/running_variance" [C], initially 1. The store holds the statistics too, for checkpoints; their
+/// gradient is always 0, and weight decay must not touch them.
 template <class T>
 class BatchNorm {
  public:

@@ -6,7 +6,7 @@
 
 namespace fieldmark {
 
-/// Extents of a Conv2d layer and what follows its sums.
+/// Extents and activation of a Conv2d layer.
 struct Conv2dOptions {
   Index in = 0;                              ///< channels of the input, >= 1
   Index out = 0;                             ///< channels of the output, >= 1
@@ -15,8 +15,7 @@ struct Conv2dOptions {
 };
 
 /// Convolution layer, see conv2d(). Weights start uniform in +-sqrt(6 / (kernel^2 in)) (He et al. 2015), the
-/// bias at 0. Holds no numbers: they are "<name>/weight" [K, K, in, out] and "<name>/bias" [out] in the
-/// store.
+/// bias at 0. The store holds the parameters "<name>/weight" [K, K, in, out] and "<name>/bias" [out].
 template <class T>
 class Conv2d {
  public:

@@ -6,7 +6,7 @@
 
 namespace fieldmark {
 
-/// Extents of a Dense layer and what follows its sums.
+/// Extents and activation of a Dense layer.
 struct DenseOptions {
   Index in = 0;                              ///< features of an input row, >= 1
   Index out = 0;                             ///< features of an output row, >= 1
@@ -14,7 +14,7 @@ struct DenseOptions {
 };
 
 /// Affine layer y = act(x W + b). W starts uniform in +-sqrt(6 / in) (He et al. 2015, eq. 10, uniform form),
-/// b at 0. Holds no numbers: they are "<name>/weight" [in, out] and "<name>/bias" [out] in the store.
+/// b at 0. The store holds the parameters "<name>/weight" [in, out] and "<name>/bias" [out].
 template <class T>
 class Dense {
  public:

@@ -6,7 +6,8 @@
 
 namespace fieldmark {
 
-/// Group normalisation with its parameters "<name>/gamma" [C], at first 1, and "<name>/beta" [C], at first 0.
+/// Group normalisation layer with the parameters "<name>/gamma" [C], initially 1, and "<name>/beta" [C],
+/// initially 0.
 template <class T>
 class GroupNorm {
  public:

@@ -12,7 +12,7 @@ struct BatchNormOptions {
   bool relu = false;  ///< max(y, 0) in the same pass over memory
 };
 
-/// What a batch was normalised by, one number a channel.
+/// Statistics of a batch, one value for each channel.
 struct BatchStatistics {
   std::vector<double> mean;      ///< over images, height and width
   std::vector<double> variance;  ///< E[(x - mean)^2], divided by the count
@@ -23,7 +23,7 @@ struct BatchStatistics {
 /// Source: Ioffe and Szegedy 2015, algorithm 1. A constant channel, or a batch of one pixel, gives beta
 /// exactly.
 /// @param x [N, H, W, C]   @param gamma [C]   @param beta [C]
-/// @param statistics  where not null, receives what was used (for running averages)
+/// @param statistics  where not null, receives the statistics (for running averages)
 /// @return [N, H, W, C]
 /// @throws ShapeError if the shapes do not fit   @throws ValueError if eps is not above 0
 /// Differentiable in: x (also through the statistics), gamma, beta; with relu, except where y = 0.
@@ -31,9 +31,9 @@ template <class T>
 Var<T> batch_norm(Var<T> x, Var<T> gamma, Var<T> beta, const BatchNormOptions& options = {},
                   BatchStatistics* statistics = nullptr);
 
-/// As batch_norm, with given statistics: how a trained network is evaluated.
-/// @param mean, variance  C numbers each, copied   @throws as batch_norm; ValueError if a variance is
-/// negative Differentiable in: x, gamma, beta; with relu, except where y = 0.
+/// As batch_norm, with given statistics: for the evaluation of a trained network.
+/// @param mean, variance  [C], copied   @throws as batch_norm; ValueError if a variance is negative
+/// Differentiable in: x, gamma, beta; with relu, except where y = 0.
 template <class T>
 Var<T> batch_norm_fixed(Var<T> x, Var<T> gamma, Var<T> beta, std::span<const T> mean,
                         std::span<const T> variance, const BatchNormOptions& options = {});

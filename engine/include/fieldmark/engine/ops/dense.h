@@ -3,13 +3,14 @@
 
 namespace fieldmark {
 
-/// What follows an affine map within the same op.
+/// Activation that an op applies to its sums.
 enum class Activation { none, relu };
 
 /// Affine map of rows, with its activation.
 ///   y = act(x W + b)
-/// @param x  [N, in]   @param w  [in, out]   @param b  [out]   @return [N, out]   @throws ShapeError if they
-/// do not fit Differentiable in: x, w, b. With relu: a kink where x W + b = 0, gradient 0 there.
+/// @param x  [N, in]   @param w  [in, out]   @param b  [out]   @return [N, out]
+/// @throws ShapeError if they do not fit
+/// Differentiable in: x, w, b. With relu: a kink where x W + b = 0, gradient 0 there.
 template <class T>
 Var<T> dense(Var<T> x, Var<T> w, Var<T> b, Activation activation = Activation::none);
 

@@ -13,8 +13,8 @@ struct GroupNormOptions {
 /// Group normalisation: mean and variance of each image's group of neighbouring channels over height and
 /// width.
 ///   y = gamma (x - mean) / sqrt(var + eps) + beta,   var = E[(x - mean)^2]
-/// Source: Wu and He 2018, eq. 7. It depends on no other image, so training and test agree.
-/// A constant image, or a group of one number, gives beta exactly; statistics are kept in double.
+/// Source: Wu and He 2018, eq. 7. Images are independent, so training and test agree.
+/// A constant image, or a group of one element, gives beta exactly; statistics are kept in double.
 /// @param x [N, H, W, C]   @param gamma [C]   @param beta [C]   @return [N, H, W, C]
 /// @throws ShapeError if the shapes do not fit   @throws ValueError if groups does not divide C or eps is not
 /// above 0 Differentiable in: x, gamma, beta; with relu, except where y = 0.

@@ -5,10 +5,10 @@
 
 namespace fieldmark {
 
-// Each loss is a mean over elements, sum_i w_i l_i / sum_i w_i, in one number of shape [1]. `weights` is
-// empty (all 1) or holds one number >= 0 for each element, and must outlive the pass; where nothing has
-// weight the loss is 0. Sums run in double. @throws ShapeError if shapes or sizes differ   @throws ValueError
-// if a weight is negative or NaN
+// Each loss is a mean over elements, sum_i w_i l_i / sum_i w_i, of shape [1]; 0 if all weights are 0.
+// `weights` is empty (all 1) or has one value >= 0 for each element, and must outlive the pass. Sums run in
+// double.
+// @throws ShapeError if shapes or sizes differ   @throws ValueError if a weight is negative or NaN
 
 /// Mean squared error, l_i = (a_i - b_i)^2.
 /// Differentiable in: a, b.

@@ -5,8 +5,8 @@
 
 namespace fieldmark {
 
-// Sums run in double over fixed pieces of 32768 numbers, so that they have the same bits for any thread count
-// and a float sum over millions of numbers is off by its final rounding only (measured: 6e-8 of the sum of
+// Sums run in double over fixed chunks of 32768 elements: they have the same bits for any thread count, and a
+// float sum over millions of elements has the error of its final rounding only (measured: 6e-8 of the sum of
 // magnitudes).
 
 /// Sum of all elements.

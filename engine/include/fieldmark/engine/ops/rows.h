@@ -13,12 +13,11 @@ namespace fieldmark {
 template <class T>
 Var<T> broadcast_rows(Var<T> x, Index rows);
 
-/// Rows of x by number: y[i] = x[index[i]].
-/// @param x [R, C]   @param index  N row numbers in [0, R), in any order, repeats allowed; must outlive the
-/// pass
+/// Rows of x by index: y[i] = x[index[i]].
+/// @param x [R, C]   @param index  [N] in [0, R), in any order, repeats allowed; must outlive the pass
 /// @return [N, C]
 /// @throws ShapeError if x is not rank 2   @throws ValueError if an index is outside
-/// Differentiable in: x. A row's gradient adds its takers in the order of index, for any thread count.
+/// Differentiable in: x. A row's gradient sums in the order of index, for any thread count.
 template <class T>
 Var<T> gather_rows(Var<T> x, std::span<const std::int32_t> index);
 

@@ -14,7 +14,7 @@ namespace fieldmark {
 template <class T>
 Var<T> softmax(Var<T> x);
 
-/// Cross-entropy of logits against class numbers, a weighted mean over rows:
+/// Cross-entropy of logits against class labels, a weighted mean over rows:
 ///   L = sum_r w_r (log sum_k exp x[r, k] - x[r, label_r]) / sum_r w_r   over the rows whose label is not -1
 /// @param logits [.., C], C >= 1   @param labels  one in [-1, C) for each row, -1 = ignored
 /// @param weights  empty (all 1) or one >= 0 for each row; labels and weights must outlive the pass
