@@ -1,26 +1,107 @@
 #include "owner_system.h"
+
 #include <fieldmark/baselines/paper_plan.h>
+#include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/watermark/embedding/embed_views.h>
+#include <fieldmark/watermark/mark/power_budget.h>
 #include <fieldmark/watermark/reading/blind_reader.h>
 
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cstdlib>
 #include <memory>
+
+#include "message_field.h"
 
 namespace fieldmark::baselines {
 namespace {
 
-constexpr double kStrength = 34;                                  // dB on the object
+constexpr double kMarkPsnr = 34;                                  // dB
+constexpr Index kCells = 16;                                      // per axis
 constexpr Index kOurPatch = 128, kPaperPatch = 150, kLeast = 32;  // pixels
 
-watermark::Owner new_owner(const nerf::RadianceField& field, const CellName& name, const OwnerSystem& system,
-                           std::span<const watermark::CachedView> views) {
-  const auto& o = system.owner;
-  auto cells = o.preset == watermark::Preset::fast
-                   ? watermark::CellGrid(o.cells, watermark::visible_area(views, o.cells))
-                   : watermark::message_slots(o.bits);
-  return {field, o, measuring_key(name.seed), std::move(cells)};
+using watermark::Owner;
+using Signs = std::vector<std::int8_t>;
+
+// Cells that show the bit as it is, whatever the key.
+struct UnkeyedMark : watermark::CellMark {
+  using CellMark::CellMark;
+  watermark::CellCode code(const watermark::CellGrid& cells, const watermark::Key& key,
+                           Index bits) const override {
+    auto code = CellMark::code(cells, key, bits);
+    for (std::int8_t& sign : code.sign) sign = static_cast<std::int8_t>(std::abs(sign));
+    return code;
+  }
+};
+
+// c + g (c_m - c) in place of c_m, trained under a power budget in place of the content loss.
+class BudgetMark : public watermark::FusionMark {
+ public:
+  using FusionMark::FusionMark;
+  bool has_gain() const override { return true; }
+  nerf::Renderer::Recolour recolour(const Owner& owner, Signs signs) const override {
+    return [&owner, whole = FusionMark::recolour(owner, std::move(signs))](const float* x, const float* d,
+                                                                           Index n, float* rgb) {
+      std::vector<float> marked(rgb, rgb + 3 * n);
+      whole(x, d, n, marked.data());
+      for (Index i = 0; i < 3 * n; ++i)
+        rgb[i] = std::clamp(
+            rgb[i] + static_cast<float>(owner.gain) * (marked[static_cast<std::size_t>(i)] - rgb[i]), 0.f,
+            1.f);
+    };
+  }
+
+ protected:
+  Painter painter(const Owner& owner, std::span<const watermark::CachedView> views) const override {
+    std::vector<std::vector<float>> foreground;
+    for (const auto& v : views) foreground.push_back(watermark::foreground_mask(v));
+    return [&owner, views, whole = FusionMark::painter(owner, views), foreground = std::move(foreground)](
+               Tape<float>& tape, const Params<float>& params, const watermark::TrainingImage& image,
+               Var<float> message) {
+      const auto view = static_cast<std::size_t>(image.view);
+      const Var<float> marked = whole(tape, params, image, message),
+                       base = tape.constant(views[view].base.data.data(), marked.shape());
+      const double rms = watermark::residual_rms({}, owner.options().mark_psnr, image.step);
+      return add(base, watermark::power_budget<float>(sub(marked, base), foreground[view], rms));
+    };
+  }
+};
+
+// The densities of a MessageField depend on the message, so it renders its own images.
+class MessageMark : public watermark::PooledMark {
+ public:
+  MessageMark(MessageField field, extractor::PooledExtractor<float> reader)
+      : PooledMark(std::move(reader), {}), field_(std::move(field)) {}
+  std::string preset() const override { return "message_field"; }
+  std::string configuration() const override { throw Error("[owner_system] a message field is not stored"); }
+  nerf::Renderer::Recolour recolour(const Owner&, Signs) const override {
+    throw ValueError("[owner_system] a message field marks more than colours");
+  }
+  const MessageField& field() const { return field_; }
+
+ protected:
+  Painter painter(const Owner& owner, std::span<const watermark::CachedView> views) const override {
+    return [this, &owner, views](Tape<float>& tape, const Params<float>& params,
+                                 const watermark::TrainingImage& image, Var<float> message) {
+      return field_.image(tape, params, owner.field, views[static_cast<std::size_t>(image.view)].camera,
+                          message);
+    };
+  }
+
+ private:
+  MessageField field_;
+};
+
+// A mark of the paper's networks, of which `change` leaves something out.
+template <class Mark, class Change>
+watermark::MarkMaker paper_mark(const watermark::FusionMarkOptions& options, Change change) {
+  return [=](const watermark::MarkSite& site) {
+    auto network = watermark::network_options(options, site.bits);
+    change(network);
+    watermark::GlobalMark<float> mark(site.params, "mark", network, site.seed + 100);
+    return std::make_shared<Mark>(std::move(mark), watermark::pooled_reader(site, options.channels), options);
+  };
 }
 
 }  // namespace
@@ -32,31 +113,56 @@ OwnerSystem owner_system(const CellName& name, Index image) {
   if (!has_owner(system))
     throw ValueError("[owner_system] name.system must be one that is trained through an owner, got " +
                      system);
-  using watermark::Preset;
-  const bool ours = system.starts_with("ours"), cells = system != "ours_without_cells";
-  const Preset preset = system == "copyrnerf_code" ? Preset::code
-                        : ours && cells            ? Preset::fast
-                                                   : Preset::paper;
-  OwnerSystem s{.owner = watermark::owner_options(preset),
-                .embed = watermark::embed_options(ours ? Preset::fast : preset)};
-  s.owner.bits = name.bits;
-  s.owner.mark_psnr = kStrength;
-  s.owner.seed = name.seed;
-  s.owner.reader_size = std::clamp(image, kLeast, ours ? kOurPatch : kPaperPatch);
-  s.embed.seed = name.seed;
-  if (system == "ours_without_dense") s.embed.sign_weight = s.embed.index_weight = 0;
-  s.owner.budget = !cells;
-  s.owner.keyed_signs = system != "ours_without_signs";
-  if (system == "nerf_message") s.place = MessagePlace::inputs;
-  if (system == "geometry") s.place = MessagePlace::density;
-  s.owner.colours = !s.place;
-  if (system == "without_mff") s.owner.fusion.bare_message = true;
-  if (system == "without_cff") s.owner.fusion.bare_colour = true;
+  const bool ours = system.starts_with("ours");
+  OwnerSystem s{.recipe = watermark::embed_recipe(system == "copyrnerf_code" ? "code"
+                                                  : ours                     ? "fast"
+                                                                             : "paper")};
+  auto& r = s.recipe;
+  r.owner.bits = name.bits;
+  r.owner.mark_psnr = kMarkPsnr;
+  r.owner.seed = r.embed.seed = name.seed;
+  r.owner.reader_size = std::clamp(image, kLeast, ours ? kOurPatch : kPaperPatch);
+  r.cells = kCells;
+  if (system == "ours_without_dense") r.cell().training.sign_weight = r.cell().training.index_weight = 0;
+  if (system == "ours_without_cells") {  // no content loss
+    r.mark = watermark::FusionMarkOptions{.training = {.content_weight = 0}};
+  }
+  for (const auto& [of, ablation] : {std::pair{"ours_without_signs", Ablation::unkeyed_signs},
+                                     {"ours_without_cells", Ablation::power_budget},
+                                     {"without_mff", Ablation::no_message_features},
+                                     {"without_cff", Ablation::no_colour_features},
+                                     {"nerf_message", Ablation::message_in_inputs},
+                                     {"geometry", Ablation::message_in_density}})
+    if (system == of) s.ablation = ablation;
   if (system == "without_drr")
-    s.embed.distortions = {
+    r.embed.distortions = {
         .noise = 0, .rotation = 0, .zoom_out = 1, .zoom_in = 1, .blur = 0, .sample_shift = 0};
-  if (system == "drs") s.test_shift = s.embed.distortions.sample_shift;
+  if (system == "drs") s.test_shift = r.embed.distortions.sample_shift;
   return s;
+}
+
+watermark::MarkMaker mark_maker(const OwnerSystem& system) {
+  const watermark::EmbedRecipe& recipe = system.recipe;
+  if (system.ablation == Ablation::none) return recipe.maker();
+  if (system.ablation == Ablation::unkeyed_signs)
+    return [options = std::get<watermark::CellMarkOptions>(recipe.mark)](const watermark::MarkSite& site) {
+      return std::make_shared<UnkeyedMark>(site, options);
+    };
+  const auto options = std::get<watermark::FusionMarkOptions>(recipe.mark);
+  using watermark::FusionMark, watermark::GlobalMarkOptions;
+  if (system.ablation == Ablation::no_message_features)
+    return paper_mark<FusionMark>(options, [](GlobalMarkOptions& o) { o.message_features = 0; });
+  if (system.ablation == Ablation::no_colour_features)
+    return paper_mark<FusionMark>(options, [](GlobalMarkOptions& o) { o.colour_features = 0; });
+  if (system.ablation == Ablation::power_budget)
+    return paper_mark<BudgetMark>(options, [](GlobalMarkOptions&) {});
+  const auto place =
+      system.ablation == Ablation::message_in_inputs ? MessagePlace::inputs : MessagePlace::density;
+  return [=](const watermark::MarkSite& site) {
+    MessageField field(site.params, site.field,
+                       {.place = place, .bits = site.bits, .width = options.width, .seed = site.seed});
+    return std::make_shared<MessageMark>(std::move(field), watermark::pooled_reader(site, options.channels));
+  };
 }
 
 CellName trained_as(const CellName& name) {
@@ -78,26 +184,17 @@ TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name,
     return !training.progress ||
            training.progress(what, static_cast<double>(done) / static_cast<double>(total), "");
   };
-  const auto views = watermark::cache_novel_views(field, system.owner.patch(), training.views, name.seed,
-                                                  [&](Index done, Index total) {
+  const auto views = watermark::cache_novel_views(field, system.recipe.owner.patch(), training.views,
+                                                  name.seed, [&](Index done, Index total) {
                                                     if (!tell("views", done, total))
                                                       throw Stopped("views: stopped, nothing to save");
                                                     return true;
                                                   });
+  const auto& recipe = system.recipe;
   TrainedOwner trained{
-      .owner = new_owner(field, name, system, views), .field = {}, .test_shift = system.test_shift};
-  auto options = system.embed;
-  if (system.place) {
-    const auto& o = system.owner;
-    trained.field.emplace(
-        trained.owner.params, field,
-        MessageFieldOptions{.place = *system.place, .bits = o.bits, .width = o.width, .seed = o.seed});
-    options.image = [&](Tape<float>& tape, const Params<float>& params, const watermark::CachedView& view,
-                        Var<float> message) {
-      return trained.field->image(tape, params, field, view.camera, message);
-    };
-  }
-  options.views = training.views;
+      .owner = {field, recipe.owner, measuring_key(name.seed), recipe.grid(field, views), mark_maker(system)},
+      .test_shift = system.test_shift};
+  auto options = recipe.embed;
   options.schedule.steps = 0;
   options.schedule.seconds = training.seconds;
   watermark::Embedder embedder(trained.owner, views, options);
@@ -161,8 +258,8 @@ MarkedScene marked_scene(const TrainedOwner& marked, std::uint64_t seed, const n
           .render =
               [=, &marked](const nerf::Camera& camera, const watermark::Message& message) {
                 const auto signs = watermark::cell_signs(*code, message);
-                if (marked.field)
-                  return marked.field->render(marked.owner.params, marked.owner.field, camera, signs,
+                if (const auto* mark = dynamic_cast<const MessageMark*>(&marked.owner.mark()))
+                  return mark->field().render(marked.owner.params, marked.owner.field, camera, signs,
                                               options);
                 auto recolour = marked.owner.marking(signs);
                 if (marked.test_shift > 0)

@@ -2,34 +2,39 @@
 #include <fieldmark/baselines/cell.h>
 #include <fieldmark/baselines/mark_scores.h>
 #include <fieldmark/baselines/timed_run.h>
-#include <fieldmark/watermark/embedding/embedder.h>
-#include <fieldmark/watermark/mark/owner.h>
-#include "message_field.h"
-
-#include <optional>
+#include <fieldmark/watermark/embedding/recipe.h>
 
 namespace fieldmark::baselines {
 
+/// A part of a system that an ablation takes away or replaces.
+enum class Ablation {
+  none,
+  unkeyed_signs,        ///< cells: each shows its bit as it is
+  no_message_features,  ///< fusion: no D, the message itself enters G
+  no_colour_features,   ///< fusion: no E, the colour alone enters G
+  power_budget,         ///< fusion: the residual has our power budget in place of the content loss
+  message_in_inputs,    ///< a MessageField with MessagePlace::inputs
+  message_in_density    ///< a MessageField with MessagePlace::density
+};
+
 /// How a system with an Owner is trained.
 struct OwnerSystem {
-  watermark::OwnerOptions owner;  ///< networks and strength
-  watermark::EmbedOptions embed;  ///< losses and distortions, without the length of the run
-  /// Of systems whose densities depend on the message: the owner then has no colours of its own, and its
-  /// extractor reads what a MessageField shows.
-  std::optional<MessagePlace> place{};
+  watermark::EmbedRecipe recipe;       ///< options, without the length of the run
+  Ablation ablation = Ablation::none;  ///< of the recipe's mark
   double test_shift = 0;  ///< DRS: samples are moved so far at test too, see EmbedDistortions::sample_shift
 };
+/// Makes the system's mark.
+watermark::MarkMaker mark_maker(const OwnerSystem& system);
 
 /// Whether a system of paper_systems() is trained through an Owner.
 bool has_owner(std::string_view system);
 /// The options of such a system: ours at 34 dB on the object, read at up to 128 pixels; the paper's at up to
 /// 150. Systems without one of their parts:
 ///   ours_without_dense: signs and cells of places cost nothing, the pooled bits alone do
-///   ours_without_cells: preset paper's networks, one message for all places, under our budget, distortions
-///   and step sizes; without places there is nothing dense to supervise
-///   ours_without_signs: in every cell the bit as it is
+///   ours_without_cells: preset paper's networks under our power budget, distortions and step sizes; without
+///   cells there is nothing dense to supervise
+///   ours_without_signs, without_mff, without_cff, nerf_message, geometry: see Ablation
 ///   without_drr: neither distortions nor moved samples
-///   without_mff, without_cff: see MarkFusion
 ///   drs: the full method, with the samples moved at test as in training
 /// @param image  pixels of the views' longer side; the reader sees no more, and at least 32
 /// @throws ValueError if the system has none
@@ -48,11 +53,10 @@ struct OwnerTraining {
 
 /// An owner that has been trained.
 struct TrainedOwner {
-  watermark::Owner owner;             ///< calibrated
-  std::optional<MessageField> field;  ///< whose numbers are among the owner's, see OwnerSystem::place
-  double test_shift = 0;              ///< see OwnerSystem
-  Index steps = 0;                    ///< of training
-  double seconds = 0;                 ///< of training
+  watermark::Owner owner;  ///< calibrated
+  double test_shift = 0;   ///< see OwnerSystem
+  Index steps = 0;         ///< of training
+  double seconds = 0;      ///< of training
 };
 
 /// The cell whose training a system's is: drs trains as copyrnerf_paper does.

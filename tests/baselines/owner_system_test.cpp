@@ -18,11 +18,15 @@ const CellName kOurs{"ours", "objects", "hash", 8, 2};
 
 OwnerSystem tiny_system(const CellName& name) {
   OwnerSystem s = owner_system(name, 48);
-  s.owner.cells = 6;
-  s.owner.mark = {.bands = 4, .features = 8};
-  s.owner.base_channels = 8;
-  s.owner.width = 16;
-  s.owner.channels = 8;
+  s.recipe.cells = 6;
+  if (auto* cell = std::get_if<watermark::CellMarkOptions>(&s.recipe.mark)) {
+    cell->network = {.bands = 4, .features = 8};
+    cell->base_channels = 8;
+  } else {
+    auto& fusion = std::get<watermark::FusionMarkOptions>(s.recipe.mark);
+    fusion.width = 16;
+    fusion.channels = 8;
+  }
   return s;
 }
 
@@ -30,27 +34,25 @@ OwnerSystem tiny_system(const CellName& name) {
 
 TEST_CASE("owner_system: what each system is") {
   const auto ours = owner_system(kOurs, 160);
-  CHECK(ours.owner.preset == watermark::Preset::fast);
-  CHECK(ours.owner.bits == 8);
-  CHECK(ours.owner.mark_psnr == 34);
-  CHECK(ours.owner.reader_size == 128);
+  CHECK(std::holds_alternative<watermark::CellMarkOptions>(ours.recipe.mark));
+  CHECK(ours.recipe.owner.bits == 8);
+  CHECK(ours.recipe.owner.mark_psnr == 34);
+  CHECK(ours.recipe.owner.reader_size == 128);
   const auto paper = owner_system({"copyrnerf_paper", "lego", "hash", 16, 1}, 160);
-  CHECK(paper.owner.preset == watermark::Preset::paper);
-  CHECK(paper.owner.reader_size == 150);
-  CHECK(paper.embed.distortions.rotation == 30);
-  CHECK(owner_system({"copyrnerf_paper", "lego", "mlp", 16, 1}, 100).owner.reader_size == 100);
-  CHECK(owner_system(kOurs, 16).owner.reader_size == 32);
+  CHECK(std::holds_alternative<watermark::FusionMarkOptions>(paper.recipe.mark));
+  CHECK(paper.recipe.owner.reader_size == 150);
+  CHECK(paper.recipe.embed.distortions.rotation == 30);
+  CHECK(owner_system({"copyrnerf_paper", "lego", "mlp", 16, 1}, 100).recipe.owner.reader_size == 100);
+  CHECK(owner_system(kOurs, 16).recipe.owner.reader_size == 32);
   const auto plain = owner_system({"without_drr", "lego", "hash", 16, 1}, 160);
-  CHECK(plain.owner.preset == watermark::Preset::paper);
-  CHECK(plain.embed.distortions.rotation == 0);
-  CHECK(plain.embed.distortions.sample_shift == 0);
-  CHECK(!plain.place);
+  CHECK(plain.recipe.embed.distortions.rotation == 0);
+  CHECK(plain.recipe.embed.distortions.sample_shift == 0);
+  CHECK(plain.ablation == Ablation::none);
   const auto message = owner_system({"nerf_message", "lego", "hash", 16, 1}, 160),
              geometry = owner_system({"geometry", "lego", "hash", 16, 1}, 160);
-  CHECK(message.place == MessagePlace::inputs);
-  CHECK(geometry.place == MessagePlace::density);
-  CHECK(!geometry.owner.colours);
-  CHECK(geometry.embed.distortions.rotation == 30);
+  CHECK(message.ablation == Ablation::message_in_inputs);
+  CHECK(geometry.ablation == Ablation::message_in_density);
+  CHECK(geometry.recipe.embed.distortions.rotation == 30);
   CHECK(!has_owner("hidden_nerf"));
   CHECK_THROWS_WITH(
       owner_system({"hidden_nerf", "lego", "hash", 16, 1}, 160),
@@ -59,36 +61,61 @@ TEST_CASE("owner_system: what each system is") {
 
 TEST_CASE("owner_system: each ablation takes away its part and nothing else") {
   const auto system = [](const char* name) { return owner_system({name, "lego", "hash", 16, 1}, 160); };
-  const auto paper = system("copyrnerf_paper"), ours = system("ours");
-  CHECK(paper.owner.fusion == watermark::MarkFusion{});
-  CHECK(system("without_mff").owner.fusion == watermark::MarkFusion{.bare_message = true});
-  CHECK(system("without_cff").owner.fusion == watermark::MarkFusion{.bare_colour = true});
-  CHECK(system("without_cff").embed.distortions.rotation == 30);
-  CHECK(system("drs").test_shift == paper.embed.distortions.sample_shift);
+  const auto fusion = [](const OwnerSystem& s) {
+    return std::get<watermark::FusionMarkOptions>(s.recipe.mark);
+  };
+  auto paper = system("copyrnerf_paper"), ours = system("ours");
+  CHECK(system("without_mff").ablation == Ablation::no_message_features);
+  CHECK(system("without_cff").ablation == Ablation::no_colour_features);
+  CHECK(system("without_cff").recipe.embed.distortions.rotation == 30);
+  CHECK(system("drs").test_shift == paper.recipe.embed.distortions.sample_shift);
   CHECK(paper.test_shift == 0);
   CHECK(trained_as({"drs", "lego", "hash", 16, 1}) == CellName{"copyrnerf_paper", "lego", "hash", 16, 1});
   CHECK(trained_as({"ours", "lego", "hash", 16, 1}).system == "ours");
   const auto code = system("copyrnerf_code");
-  CHECK(code.owner.preset == watermark::Preset::code);
-  CHECK(code.owner.message_features == 128);
-  CHECK(code.embed.extractor_lr == 2);
-  CHECK(code.owner.reader_size == 150);
+  CHECK(fusion(code).authors_code);
+  CHECK(fusion(code).message_features == 128);
+  CHECK(code.recipe.embed.extractor_lr == 2);
+  CHECK(code.recipe.owner.reader_size == 150);
+  CHECK(!fusion(paper).authors_code);
 
-  CHECK(ours.embed.sign_weight == 1);
-  CHECK(ours.owner.keyed_signs);
-  const auto dense = system("ours_without_dense"), cells = system("ours_without_cells"),
-             signs = system("ours_without_signs");
-  CHECK(dense.owner.preset == watermark::Preset::fast);
-  CHECK(dense.embed.sign_weight == 0);
-  CHECK(dense.embed.index_weight == 0);
-  CHECK(dense.embed.bits_weight == ours.embed.bits_weight);
-  CHECK(cells.owner.preset == watermark::Preset::paper);
-  CHECK(cells.owner.budget);
-  CHECK(cells.owner.reader_size == 128);
-  CHECK(cells.owner.mark_psnr == 34);
-  CHECK(cells.embed.schedule.lr == ours.embed.schedule.lr);
-  CHECK(!signs.owner.keyed_signs);
-  CHECK(!ours.owner.budget);
+  const auto& usual = ours.recipe.cell().training;
+  auto dense = system("ours_without_dense"), cells = system("ours_without_cells"),
+       signs = system("ours_without_signs");
+  CHECK(usual.sign_weight == 1);
+  CHECK(dense.recipe.cell().training.sign_weight == 0);
+  CHECK(dense.recipe.cell().training.index_weight == 0);
+  CHECK(dense.recipe.cell().training.bits_weight == usual.bits_weight);
+  CHECK(cells.ablation == Ablation::power_budget);
+  CHECK(fusion(cells).training.content_weight == 0);
+  CHECK(cells.recipe.owner.reader_size == 128);
+  CHECK(cells.recipe.owner.mark_psnr == 34);
+  CHECK(cells.recipe.embed.schedule.lr == ours.recipe.embed.schedule.lr);
+  CHECK(signs.ablation == Ablation::unkeyed_signs);
+  CHECK(ours.ablation == Ablation::none);
+}
+
+TEST_CASE("owner_system: without keyed signs a cell's sign is its bit's, whatever the key") {
+  const CellName name{"ours_without_signs", "objects", "hash", 4, 2};
+  const OwnerSystem system = tiny_system(name);
+  const watermark::Owner owner(tiny_field(), system.recipe.owner, test_key(5),
+                               system.recipe.grid(tiny_field(), tiny_views()), mark_maker(system));
+  const auto code = owner.code(), keyed = watermark::deal_cells(test_key(5), owner.cells.area(), 4);
+  CHECK(code.bit == keyed.bit);
+  for (std::size_t c = 0; c < code.sign.size(); ++c) CHECK(code.sign[c] == std::abs(keyed.sign[c]));
+  CHECK(keyed.sign != code.sign);
+}
+
+TEST_CASE("owner_system: networks without message or colour features have fewer parameters") {
+  const auto parameters = [](const char* system) {
+    const OwnerSystem s = tiny_system({system, "objects", "hash", 4, 2});
+    const watermark::Owner owner(tiny_field(), s.recipe.owner, test_key(5), watermark::message_slots(4),
+                                 mark_maker(s));
+    return owner.params.size();
+  };
+  const Index whole = parameters("copyrnerf_paper");
+  CHECK(parameters("without_mff") < whole);
+  CHECK(parameters("without_cff") < whole);
 }
 
 TEST_CASE("owner_system: every system of the tables has an owner or a 2-D network") {
@@ -96,12 +123,12 @@ TEST_CASE("owner_system: every system of the tables has an owner or a 2-D networ
     CAPTURE(system.name);
     CHECK(has_owner(system.name) == !hiding_system(system.name));
     if (has_owner(system.name))
-      CHECK(owner_system({system.name, "lego", "hash", 16, 1}, 160).owner.bits == 16);
+      CHECK(owner_system({system.name, "lego", "hash", 16, 1}, 160).recipe.owner.bits == 16);
   }
 }
 
 TEST_CASE("owner_system: moved samples at test change images a little, in the same way each time") {
-  TrainedOwner trained{.owner = tiny_owner(), .field = {}};
+  TrainedOwner trained{.owner = tiny_owner()};
   trained.owner.gain = 0.05;
   const auto camera =
       nerf::make_cameras(trained.owner.field.cameras, nerf::CameraSet::novel, 1, 0, 7).front();

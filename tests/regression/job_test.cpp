@@ -5,6 +5,7 @@
 #include <fieldmark/watermark/embedding/baker.h>
 #include <fieldmark/watermark/embedding/embed_views.h>
 #include <fieldmark/watermark/embedding/embedder.h>
+#include <fieldmark/watermark/mark/cell_mark.h>
 #include <fieldmark/watermark/reading/blind_reader.h>
 
 #include "support/catch.h"
@@ -84,19 +85,14 @@ TEST_CASE("regression: the field stays above its floor on views it has not seen"
 TEST_CASE("regression: 8 bits embedded, baked, rendered and read") {
   const RadianceField& field = trained().field;
   const auto views = cache_novel_views(field, square_patch(kSide), 24, 3);
-  Owner owner(field,
-              {.bits = 8,
-               .mark_psnr = 28,
-               .cells = 6,
-               .reader_size = kSide,
-               .mark = {.bands = 5, .features = 16},
-               .base_channels = 16},
-              test_key(5), CellGrid(6, visible_area(views, 6), 1e-3));
+  Owner owner(
+      field, {.bits = 8, .mark_psnr = 28, .reader_size = kSide}, test_key(5),
+      CellGrid(6, visible_area(views, 6), 1e-3),
+      cell_mark({.network = {.bands = 5, .features = 16}, .base_channels = 16, .training = {.anneal = 50}}));
   Embedder embedder(
       owner, views,
       {.schedule = {.steps = 500, .lr = 4e-3, .half_after = 4000},
        .batch = 4,
-       .anneal = 50,
        .distortions = {.noise = 0.02, .rotation = 5, .zoom_out = 0.95, .zoom_in = 1.05, .blur = 0.3},
        .seed = 4});
   while (!embedder.done()) embedder.step(0);

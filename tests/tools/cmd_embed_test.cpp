@@ -1,4 +1,5 @@
 #include <fieldmark/core/files.h>
+#include <fieldmark/watermark/mark/cell_mark.h>
 #include <fieldmark/watermark/mark/owner.h>
 
 #include "cli/cli.h"
@@ -70,12 +71,17 @@ TEST_CASE("embed has cells as fine as its views and message need, unless they ar
 
 TEST_CASE("embed marks an object in blue, unless another look is asked for", "[embed]") {
   const TinyJob& job = TinyJob::get();
-  CHECK(watermark::Owner::load(job.owner).options().mark.shading == 0);
+  const auto shading = [](const std::string& file) {
+    return dynamic_cast<const watermark::CellMark&>(watermark::Owner::load(file).mark())
+        .options()
+        .network.shading;
+  };
+  CHECK(shading(job.owner) == 0);
   const std::string owner = job.folder / "light.fm";
   const auto r = tiny_embed(job.field, owner, {"--colours", "light", "--measured-views", "1"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
-  CHECK(watermark::Owner::load(owner).options().mark.shading > 0);
+  CHECK(shading(owner) > 0);
   CHECK(tiny_embed(job.field, owner, {"--colours", "green"}).code == cli::kUsage);
 }
 
@@ -95,6 +101,20 @@ TEST_CASE("embed --preset paper and code give an owner that bakes and reads like
     REQUIRE(read.code == cli::kOk);
     CHECK(nlohmann::json::parse(read.out)["bits"].get<std::string>().size() == 4);
   }
+}
+
+TEST_CASE("embed refuses options that a preset does not have", "[embed]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string owner = job.folder / "refused.fm";
+  for (const auto& [option, value] :
+       {std::pair{"--mark-psnr", "36"}, {"--cells", "8"}, {"--batch", "2"}, {"--colours", "light"}})
+    for (const std::string preset : {"paper", "code"}) {
+      const auto r =
+          run_command({"embed", "--preset", preset, "--field", job.field, "--out", owner, option, value});
+      CHECK(r.code == cli::kUsage);
+      CHECK_THAT(r.err, Contains(std::string(option) + ": preset " + preset + " does not have this option"));
+      CHECK(!std::filesystem::exists(owner));
+    }
 }
 
 TEST_CASE("embed says what is wrong, and leaves no file", "[embed]") {

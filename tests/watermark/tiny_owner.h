@@ -2,6 +2,8 @@
 #include <fieldmark/nerf/analytic_scene.h>
 #include <fieldmark/nerf/trainer.h>
 #include <fieldmark/watermark/embedding/embed_views.h>
+#include <fieldmark/watermark/mark/cell_mark.h>
+#include <fieldmark/watermark/mark/fusion_mark.h>
 #include <fieldmark/watermark/mark/owner.h>
 
 #include "nerf/small_field.h"
@@ -28,17 +30,15 @@ inline const std::vector<fieldmark::watermark::CachedView>& tiny_views() {
 }
 
 /// An owner of it whose networks have not learnt anything yet.
-inline fieldmark::watermark::Owner tiny_owner(double mark_psnr = 30) {
+inline fieldmark::watermark::Owner tiny_owner(double mark_psnr = 30,
+                                              const fieldmark::watermark::CellTrainingOptions& training = {
+                                                  .anneal = 20}) {
   using namespace fieldmark::watermark;
   return {tiny_field(),
-          {.bits = 4,
-           .mark_psnr = mark_psnr,
-           .cells = 6,
-           .reader_size = 48,
-           .mark = {.bands = 4, .features = 8},
-           .base_channels = 8},
+          {.bits = 4, .mark_psnr = mark_psnr, .reader_size = 48},
           test_key(5),
-          CellGrid(6, visible_area(tiny_views(), 6), 1e-3)};
+          CellGrid(6, visible_area(tiny_views(), 6), 1e-3),
+          cell_mark({.network = {.bands = 4, .features = 8}, .base_channels = 8, .training = training})};
 }
 
 /// The mark of networks that have not learnt anything, of some strength, so that it can be found.
@@ -49,10 +49,12 @@ inline fieldmark::watermark::Owner marking_owner(double gain = 0.1) {
 }
 
 /// An owner under preset paper, with small networks.
-inline fieldmark::watermark::Owner tiny_paper_owner() {
+inline fieldmark::watermark::Owner tiny_paper_owner(
+    const fieldmark::watermark::PooledTrainingOptions& training = {}, bool authors_code = false) {
   using namespace fieldmark::watermark;
   return {tiny_field(),
-          {.preset = Preset::paper, .bits = 4, .reader_size = 48, .width = 16, .channels = 8},
+          {.bits = 4, .reader_size = 48},
           test_key(5),
-          message_slots(4)};
+          message_slots(4),
+          fusion_mark({.width = 16, .channels = 8, .authors_code = authors_code, .training = training})};
 }

@@ -43,9 +43,9 @@ std::vector<bench::EmbedVariant> variants_of(const BenchEmbedOptions& o, const n
   auto all =
       bench::embed_variants({.seconds = o.seconds}, o.bits, seed, watermark::colours_for(field.space.kind));
   for (bench::EmbedVariant& v : all) {
-    if (v.owner.preset != watermark::Preset::fast) continue;
-    v.owner.reader_aspect = watermark::reader_aspect(field);
-    if (v.choice != "batch") v.embed.batch = watermark::batch_for(field.space.kind);
+    if (v.choice == "preset") continue;
+    v.recipe.owner.reader_aspect = watermark::reader_aspect(field);
+    if (v.choice != "batch") v.recipe.embed.batch = watermark::batch_for(field.space.kind);
   }
   const auto wanted = [&](const bench::EmbedVariant& v) {
     return v.choice == "default" || bench::find_row(known, v) ||
@@ -55,10 +55,10 @@ std::vector<bench::EmbedVariant> variants_of(const BenchEmbedOptions& o, const n
   if (!o.quick) return all;
   if (all.size() > kQuickRows) all.resize(kQuickRows);
   for (bench::EmbedVariant& v : all) {
-    v.owner.reader_size = kQuickPatch;
-    v.owner.base_channels = kQuickChannels;
-    v.owner.cells = kQuickCells;
-    v.views.count = v.embed.views = kQuickViews;
+    v.recipe.owner.reader_size = kQuickPatch;
+    if (v.choice != "preset") v.recipe.cell().base_channels = kQuickChannels;
+    v.recipe.cells = kQuickCells;
+    v.views.count = kQuickViews;
   }
   return all;
 }

@@ -29,7 +29,7 @@ struct Options {
 };
 
 watermark::Baker::MarkPsnr scaled_to(const watermark::Owner& owner, watermark::Baker& baker) {
-  if (owner.mark) return baker.scale_to(owner.options().mark_psnr);
+  if (owner.mark().has_gain()) return baker.scale_to(owner.options().mark_psnr);
   const double mark_psnr = baker.mark_psnr();  // the networks' own
   return {.learnt = mark_psnr, .scaled = mark_psnr};
 }
@@ -41,7 +41,7 @@ void say_strength(const watermark::Owner& owner, const watermark::Baker::MarkPsn
   std::snprintf(line, sizeof line, "mark of %.1f dB on the object", mark_psnr.scaled);
   context.text() << line;
   const double asked = owner.options().mark_psnr, fainter = mark_psnr.learnt - asked;
-  if (!owner.mark) {
+  if (!owner.mark().has_gain()) {
     context.text() << "\n";
     return;
   }
@@ -62,7 +62,9 @@ int run(const Options& options, Context& context) {
   check_writable(options.out);
   auto owner = watermark::Owner::load(options.owner);
   if (options.mark_psnr) {
-    if (!owner.mark) throw UsageError("--mark-psnr: an owner of preset paper has no strength to set");
+    if (!owner.mark().has_gain())
+      throw UsageError("--mark-psnr: an owner of preset " + owner.mark().preset() +
+                       " has no mark PSNR to set, its networks decide it");
     owner.set_mark_psnr(*options.mark_psnr);
   }
   const auto message = message_of(options.message, owner.options().bits);

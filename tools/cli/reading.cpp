@@ -23,9 +23,11 @@ void add_reading(CommandLine& app, std::string& reading) {
 
 SuspectReader::SuspectReader(const watermark::Owner& owner, const std::string& reading)
     : blind_(owner), forced_(reading == "informed") {
-  if (forced_ && !owner.reader)
-    throw UsageError("--detection informed: an owner of preset paper has no cells in space");
-  if (reading != "blind" && owner.reader) informed_.emplace(owner);
+  const bool has_cells = owner.mark().has_cells();
+  if (forced_ && !has_cells)
+    throw UsageError("--detection informed: an owner of preset " + owner.mark().preset() +
+                     " has no cells in space");
+  if (reading != "blind" && has_cells) informed_.emplace(owner);
 }
 
 ImageEvidence SuspectReader::read(const Tensor<float>& picture, const std::string& name) {

@@ -14,13 +14,13 @@ using namespace fieldmark::bench;
 namespace {
 EmbedVariant tiny_variant(Index steps) {
   EmbedVariant v = embed_variants({.steps = steps}, 4, 3).front();
-  v.owner.cells = 6;
-  v.owner.reader_size = 48;
-  v.owner.mark_psnr = 30;
-  v.owner.base_channels = 8;
-  v.owner.mark = {.bands = 4, .features = 8};
-  v.embed.batch = 2;
-  v.embed.schedule.lr = 4e-3;
+  v.recipe.cells = 6;
+  v.recipe.owner.reader_size = 48;
+  v.recipe.owner.mark_psnr = 30;
+  v.recipe.cell().base_channels = 8;
+  v.recipe.cell().network = {.bands = 4, .features = 8};
+  v.recipe.embed.batch = 2;
+  v.recipe.embed.schedule.lr = 4e-3;
   v.views.count = 8;
   return v;
 }
@@ -51,7 +51,7 @@ TEST_CASE("embed_bench: a mark is embedded in every way, and judged on the way a
   REQUIRE(rows.size() == 2);
   CHECK(names == std::vector<std::string>{"default: as embed does", "length: as embed does"});
   for (const EmbedRow& r : rows) {
-    CHECK(r.steps == r.variant.embed.schedule.steps);
+    CHECK(r.steps == r.variant.recipe.embed.schedule.steps);
     CHECK(r.cache_seconds > 0);
     CHECK(r.seconds > r.cache_seconds);
     CHECK(r.psnr_foreground == Approx(30).margin(1.5));

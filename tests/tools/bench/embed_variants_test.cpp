@@ -9,21 +9,26 @@ using namespace fieldmark;
 using namespace fieldmark::bench;
 
 namespace {
+const watermark::CellMarkOptions& cell(const EmbedVariant& v) {
+  return std::get<watermark::CellMarkOptions>(v.recipe.mark);
+}
+
 using Differs = bool (*)(const EmbedVariant&, const EmbedVariant&);
 // What each choice may change.
 const std::map<std::string, Differs> kChoices{
     {"length",
      [](const EmbedVariant& a, const EmbedVariant& b) {
-       return a.embed.schedule.steps != b.embed.schedule.steps &&
-              a.embed.schedule.seconds != b.embed.schedule.seconds;
+       return a.recipe.embed.schedule.steps != b.recipe.embed.schedule.steps &&
+              a.recipe.embed.schedule.seconds != b.recipe.embed.schedule.seconds;
      }},
     {"seed",
      [](const EmbedVariant& a, const EmbedVariant& b) {
-       return a.embed.seed != b.embed.seed && a.owner.seed != b.owner.seed;
+       return a.recipe.embed.seed != b.recipe.embed.seed && a.recipe.owner.seed != b.recipe.owner.seed;
      }},
-    {"preset", [](const EmbedVariant& a, const EmbedVariant& b) { return a.owner.preset != b.owner.preset; }},
-    {"patch",
-     [](const EmbedVariant& a, const EmbedVariant& b) { return a.owner.reader_size != b.owner.reader_size; }},
+    {"preset", [](const EmbedVariant& a,
+                  const EmbedVariant& b) { return a.recipe.mark.index() != b.recipe.mark.index(); }},
+    {"patch", [](const EmbedVariant& a,
+                 const EmbedVariant& b) { return a.recipe.owner.reader_size != b.recipe.owner.reader_size; }},
     {"samples",
      [](const EmbedVariant& a, const EmbedVariant& b) { return a.views.samples != b.views.samples; }},
     {"views", [](const EmbedVariant& a, const EmbedVariant& b) { return a.views.count != b.views.count; }},
@@ -31,38 +36,42 @@ const std::map<std::string, Differs> kChoices{
      [](const EmbedVariant& a, const EmbedVariant& b) { return a.views.distances != b.views.distances; }},
     {"distortions",
      [](const EmbedVariant& a, const EmbedVariant& b) {
-       return a.embed.distortions.mixed != b.embed.distortions.mixed ||
-              a.embed.distortions.noise != b.embed.distortions.noise;
+       return a.recipe.embed.distortions.mixed != b.recipe.embed.distortions.mixed ||
+              a.recipe.embed.distortions.noise != b.recipe.embed.distortions.noise;
      }},
-    {"cells", [](const EmbedVariant& a, const EmbedVariant& b) { return a.owner.cells != b.owner.cells; }},
-    {"mark_psnr",
-     [](const EmbedVariant& a, const EmbedVariant& b) { return a.owner.mark_psnr != b.owner.mark_psnr; }},
+    {"cells", [](const EmbedVariant& a, const EmbedVariant& b) { return a.recipe.cells != b.recipe.cells; }},
+    {"mark_psnr", [](const EmbedVariant& a,
+                     const EmbedVariant& b) { return a.recipe.owner.mark_psnr != b.recipe.owner.mark_psnr; }},
     {"budget",
      [](const EmbedVariant& a, const EmbedVariant& b) {
-       return a.embed.first_mark_psnr != b.embed.first_mark_psnr || a.embed.anneal != b.embed.anneal;
+       return cell(a).training.first_mark_psnr != cell(b).training.first_mark_psnr ||
+              cell(a).training.anneal != cell(b).training.anneal;
      }},
     {"hiding",
      [](const EmbedVariant& a, const EmbedVariant& b) {
        const auto off = [](const EmbedVariant& v) {
-         return v.embed.smooth_weight + v.embed.flat_weight == 0;
+         return cell(v).training.smooth_weight + cell(v).training.flat_weight == 0;
        };
        return off(a) != off(b);
      }},
     {"colours",
      [](const EmbedVariant& a, const EmbedVariant& b) {
-       return a.owner.mark.luminance != b.owner.mark.luminance || a.owner.mark.tilt != b.owner.mark.tilt;
+       return cell(a).network.luminance != cell(b).network.luminance ||
+              cell(a).network.tilt != cell(b).network.tilt;
      }},
     {"supervision",
      [](const EmbedVariant& a, const EmbedVariant& b) {
-       return a.embed.sign_weight != b.embed.sign_weight || a.embed.index_weight != b.embed.index_weight ||
-              a.embed.bits_weight != b.embed.bits_weight;
+       return cell(a).training.sign_weight != cell(b).training.sign_weight ||
+              cell(a).training.index_weight != cell(b).training.index_weight ||
+              cell(a).training.bits_weight != cell(b).training.bits_weight;
      }},
-    {"batch", [](const EmbedVariant& a, const EmbedVariant& b) { return a.embed.batch != b.embed.batch; }},
+    {"batch", [](const EmbedVariant& a,
+                 const EmbedVariant& b) { return a.recipe.embed.batch != b.recipe.embed.batch; }},
     {"extractor", [](const EmbedVariant& a,
-                     const EmbedVariant& b) { return a.owner.base_channels != b.owner.base_channels; }},
+                     const EmbedVariant& b) { return cell(a).base_channels != cell(b).base_channels; }},
     {"learning rate", [](const EmbedVariant& a, const EmbedVariant& b) {
-       return a.embed.schedule.lr != b.embed.schedule.lr ||
-              a.embed.schedule.cooldown != b.embed.schedule.cooldown;
+       return a.recipe.embed.schedule.lr != b.recipe.embed.schedule.lr ||
+              a.recipe.embed.schedule.cooldown != b.recipe.embed.schedule.cooldown;
      }}};
 }  // namespace
 
@@ -70,16 +79,15 @@ TEST_CASE("embed_variants: every variant but the first differs from the default 
   const auto all = embed_variants({.steps = 40, .seconds = 60}, 48, 5);
   const EmbedVariant& usual = all.front();
   CHECK(usual.choice == "default");
-  CHECK(usual.owner.bits == 48);
-  CHECK(usual.owner.cells == watermark::OwnerOptions{}.cells);
-  CHECK(usual.views.count == watermark::EmbedOptions{}.views);
+  CHECK(usual.recipe.owner.bits == 48);
+  CHECK(usual.recipe.cells == 16);
+  CHECK(usual.views.count == watermark::EmbedViewOptions{}.count);
   std::set<std::string> names, choices;
   for (const EmbedVariant& v : all) {
     CAPTURE(v.choice, v.setting);
     CHECK(names.insert(v.choice + v.setting).second);
-    CHECK(v.owner.bits == 48);
-    CHECK(v.owner.seed == v.embed.seed);
-    CHECK(v.embed.views == v.views.count);
+    CHECK(v.recipe.owner.bits == 48);
+    CHECK(v.recipe.owner.seed == v.recipe.embed.seed);
     if (&v == &usual) continue;
     REQUIRE(kChoices.contains(v.choice));
     choices.insert(v.choice);
@@ -93,13 +101,13 @@ TEST_CASE("embed_variants: every variant but the first differs from the default 
 TEST_CASE("embed_variants: lengths are parts of the run's, and the paper's preset is the paper's") {
   for (const EmbedVariant& v : embed_variants({.steps = 40, .seconds = 60}, 8, 1)) {
     if (v.choice == "length" && v.setting == "a quarter") {
-      CHECK(v.embed.schedule.steps == 10);
-      CHECK(v.embed.schedule.seconds == 15);
+      CHECK(v.recipe.embed.schedule.steps == 10);
+      CHECK(v.recipe.embed.schedule.seconds == 15);
     }
     if (v.choice == "preset") {
-      CHECK(v.owner.reader_size == 150);
-      CHECK(v.embed.schedule.lr == 5e-4);
-      CHECK(v.embed.schedule.steps == 40);
+      CHECK(v.recipe.owner.reader_size == 150);
+      CHECK(v.recipe.embed.schedule.lr == 5e-4);
+      CHECK(v.recipe.embed.schedule.steps == 40);
     }
   }
 }

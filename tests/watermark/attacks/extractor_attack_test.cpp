@@ -18,8 +18,9 @@ std::vector<float> signs(const Owner& owner, const Tensor<float>& view_image) {
   const Shape shape{1, view_image.shape[0], view_image.shape[1], 3};
   const Params<float> params(owner.params, nullptr);
   const Var<float> image = tape.constant(view_image.data.data(), shape);
-  const Var<float> logits =
-      owner.reader ? (*owner.reader)(params, image).sign : (*owner.pooled_reader)(params, image);
+  const Var<float> logits = owner.mark().has_cells()
+                                ? dynamic_cast<const CellMark&>(owner.mark()).reader()(params, image).sign
+                                : dynamic_cast<const FusionMark&>(owner.mark()).reader()(params, image);
   return {logits.value(), logits.value() + logits.shape().size()};
 }
 

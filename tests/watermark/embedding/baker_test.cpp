@@ -37,7 +37,7 @@ Owner mlp_owner() {
   }();
   OwnerOptions o = small_owner_options();
   o.bits = 4;
-  Owner owner(field, o, test_key(1), CellGrid(4, std::vector<double>(64, 1.0)));
+  Owner owner(field, o, test_key(1), CellGrid(4, std::vector<double>(64, 1.0)), cell_mark(small_cell_mark()));
   owner.gain = 0.15;
   return owner;
 }

@@ -26,22 +26,22 @@ void append_encoded(Row& to, const Row& x, int bands) {
   }
 }
 
-Row by_loops(const ParamStore<double>& store, const MarkFusion& fusion, const Row& x, const Row& d,
+Row by_loops(const ParamStore<double>& store, const GlobalMarkOptions& o, const Row& x, const Row& d,
              const Row& c, const Row& message) {
   Row in;
-  if (!fusion.bare_colour) {
+  if (o.colour_features > 0) {
     append_encoded(in, x, 10);
-    if (!fusion.late_direction) append_encoded(in, d, 4);
+    if (!o.authors_code) append_encoded(in, d, 4);
     append(in, c);
     for (int k = 0; k < 4; ++k) in = layer(store, "mark/encode/" + std::to_string(k), in, k < 3);
   }
-  append(in, fusion.bare_message
+  append(in, o.message_features == 0
                  ? message
                  : layer(store, "mark/message/1", layer(store, "mark/message/0", message, true), true));
-  if (fusion.late_direction) append_encoded(in, d, 4);
+  if (o.authors_code) append_encoded(in, d, 4);
   append(in, c);
   for (int k = 0; k < 3; ++k) {
-    if (fusion.repeated && k < 2) {
+    if (o.authors_code && k < 2) {
       append(in, message);
       append(in, c);
     }
@@ -57,18 +57,16 @@ auto colour(const GlobalMark<T>& net, const ParamStore<T>& store) {
 }
 }  // namespace
 
-TEST_CASE("global_mark: the colour is what its formula says, whatever is left out or put elsewhere") {
-  const MarkFusion fusions[] = {{},
-                                {.bare_message = true},
-                                {.bare_colour = true},
-                                {.late_direction = true},
-                                {.raw_colour = true},
-                                {.repeated = true},
-                                {.late_direction = true, .raw_colour = true, .repeated = true}};
-  for (const MarkFusion& fusion : fusions) {
+TEST_CASE(
+    "global_mark: the colour is what its formula says, with a part left out and as in the authors' code "
+    "too") {
+  std::vector<GlobalMarkOptions> kinds(5, kSmall);
+  kinds[1].message_features = 0;
+  kinds[2].colour_features = 0;
+  kinds[3].authors_code = kinds[4].authors_code = true;
+  kinds[4].message_features = 0;
+  for (const GlobalMarkOptions& options : kinds) {
     ParamStore<double> store;
-    GlobalMarkOptions options = kSmall;
-    options.fusion = fusion;
     const GlobalMark<double> net(store, "mark", options, 7);
     const auto x = uniform({4, 3}, 0, 1, 1), d = uniform({4, 3}, -1, 1, 2),
                c = uniform({4, net.colour_inputs()}, 0, 1, 3);
@@ -79,7 +77,7 @@ TEST_CASE("global_mark: the colour is what its formula says, whatever is left ou
         const auto begin = t.data.begin() + static_cast<long>(i) * t.shape[1];
         return Row(begin, begin + t.shape[1]);
       };
-      const Row want = by_loops(store, fusion, row(x), row(d), row(c), message.data);
+      const Row want = by_loops(store, options, row(x), row(d), row(c), message.data);
       for (std::size_t a = 0; a < 3; ++a) CHECK(y[3 * i + a] == Approx(want[a]).margin(1e-12));
     }
   }
@@ -87,11 +85,7 @@ TEST_CASE("global_mark: the colour is what its formula says, whatever is left ou
 
 TEST_CASE("global_mark: the layers of preset code have the widths of the authors' code") {
   ParamStore<float> store;
-  const GlobalMark<float> net(store, "mark",
-                              {.bits = 16,
-                               .message_features = 128,
-                               .fusion = {.late_direction = true, .raw_colour = true, .repeated = true}},
-                              1);
+  const GlobalMark<float> net(store, "mark", {.bits = 16, .message_features = 128, .authors_code = true}, 1);
   const auto shape = [&](const char* layer) {
     return store.entry(store.find(std::string("mark/") + layer + "/weight")).shape;
   };
@@ -146,8 +140,8 @@ TEST_CASE("global_mark: errors name what is wrong") {
   };
   CHECK_THROWS_AS(make({.bits = 0}), ValueError);
   CHECK_THROWS_WITH(make({.bits = 0}),
-                    Contains("[global_mark] bits, message_features and colour_features must be at "
-                             "least 1 and width at least 2, got 0, 256, 256 and 256"));
+                    Contains("[global_mark] bits, message_features, colour_features and width must be at "
+                             "least 1, 0, 0 and 2, got 0, 256, 256 and 256"));
   CHECK_THROWS_AS(make({.position_bands = 0}), ValueError);
   CHECK_THROWS_AS(make({.width = 1}), ValueError);
   ParamStore<double> store;

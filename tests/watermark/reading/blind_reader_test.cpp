@@ -47,7 +47,7 @@ TEST_CASE("blind_reader: evidence is the window's sign evidence, summed by loops
   REQUIRE(static_cast<Index>(got.size()) == cells);
   const Tensor<float> cut = cut_window(image, object_window(image, 1, patch.aspect()), patch, 1);
   Tape<float> tape;
-  const auto out = (*owner.reader)(Params<float>(owner.params, nullptr),
+  const auto out = cell_mark_of(owner).reader()(Params<float>(owner.params, nullptr),
                                    tape.constant(cut.data.data(), {1, patch.height, patch.width, 3}));
   std::vector<double> want(static_cast<std::size_t>(cells)), share(want.size());
   for (Index p = 0; p < out.height * out.width; ++p) {
@@ -72,7 +72,7 @@ TEST_CASE("blind_reader: for preset paper the evidence is the window's logits") 
   const Owner owner = small_paper_owner();
   const Tensor<float> image = block(3), cut = cut_window(image, object_window(image, 1), square_patch(32), 1);
   Tape<float> tape;
-  const auto logits = (*owner.pooled_reader)(Params<float>(owner.params, nullptr),
+  const auto logits = fusion_mark_of(owner).reader()(Params<float>(owner.params, nullptr),
                                              tape.constant(cut.data.data(), {1, 32, 32, 3}));
   CHECK(BlindReader(owner).evidence(image) == std::vector<double>(logits.value(), logits.value() + 3));
 }

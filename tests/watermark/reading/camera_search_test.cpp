@@ -170,7 +170,7 @@ TEST_CASE("camera_search: one and two threads find the same") {
 TEST_CASE("camera_search: errors name what is wrong") {
   const Owner paper = tiny_paper_owner(), owner = tiny_owner();
   CHECK_THROWS_WITH(CameraSearch(paper),
-                    "[camera_search] owner must be of preset fast: preset paper has no cells in space");
+                    "[camera_search] owner must have cells in space, got one of preset paper");
   CHECK_THROWS_WITH(CameraSearch(owner, {.views = 0}),
                     "[camera_search] views, around and size must be at least 1, 0 and 16, got 0, 192 and 40");
   CHECK_THROWS_AS(CameraSearch(owner, {.size = 15}), ValueError);

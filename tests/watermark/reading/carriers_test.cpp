@@ -95,5 +95,5 @@ TEST_CASE("carriers: a pixel's parts are of different cells, one alone is the wh
 TEST_CASE("carriers: an owner whose message is in networks has none") {
   const Owner paper = tiny_paper_owner();
   CHECK_THROWS_WITH(carriers(paper, view_of(paper, 1)),
-                    "[carriers] expected an owner that marks colours, got one without");
+                    "[carriers] owner must have cells in space, got one of preset paper");
 }

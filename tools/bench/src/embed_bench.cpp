@@ -55,11 +55,13 @@ class Caches {
   const Cache& get(const EmbedVariant& v, const std::function<void()>& stop_or_go) {
     for (const Cache& c : kept_)
       if (c.options.count == v.views.count && c.options.samples == v.views.samples &&
-          c.options.distances == v.views.distances && c.patch == v.owner.patch() && c.seed == v.embed.seed)
+          c.options.distances == v.views.distances && c.patch == v.recipe.owner.patch() &&
+          c.seed == v.recipe.embed.seed)
         return c;
     if (kept_.size() == 2) kept_.pop_back();
     kept_.reserve(2);
-    Cache& c = kept_.emplace_back(Cache{.options = v.views, .patch = v.owner.patch(), .seed = v.embed.seed});
+    Cache& c = kept_.emplace_back(
+        Cache{.options = v.views, .patch = v.recipe.owner.patch(), .seed = v.recipe.embed.seed});
     const Clock clock;
     c.views = watermark::cache_embed_views(field_, c.patch, c.options, c.seed, [&](Index, Index) {
       stop_or_go();
@@ -81,15 +83,6 @@ watermark::Key bench_key() {
   return watermark::key_from_bytes(bytes);
 }
 
-Owner owner_of(const nerf::RadianceField& field, const EmbedVariant& v, std::span<const CachedView> views) {
-  const bool fast = v.owner.preset == watermark::Preset::fast;
-  auto cells = fast ? watermark::CellGrid(v.owner.cells, watermark::visible_area(views, v.owner.cells))
-                    : watermark::message_slots(v.owner.bits);
-  watermark::OwnerOptions options = v.owner;
-  options.cells = cells.side();
-  return {field, options, bench_key(), std::move(cells)};
-}
-
 watermark::Measurement judged(const Owner& owner, nerf::CameraSet set, Index views,
                               const EmbedBenchOptions& options, const std::function<void()>& stop_or_go) {
   return watermark::measure(
@@ -107,9 +100,9 @@ EmbedRow embedded(const nerf::RadianceField& field, const EmbedVariant& v, const
   EmbedRow row{.variant = v, .cache_seconds = cache.seconds};
   const Index few = std::max<Index>(1, options.views / 3);
   Clock clock(cache.seconds);
-  Owner owner = owner_of(field, v, cache.views);
-  watermark::Embedder embedder(owner, cache.views, v.embed);
-  const nerf::ScheduleOptions& length = v.embed.schedule;
+  Owner owner = v.recipe.make(field, bench_key(), cache.views);
+  watermark::Embedder embedder(owner, cache.views, v.recipe.embed);
+  const nerf::ScheduleOptions& length = v.recipe.embed.schedule;
   for (Index next = 1; !embedder.done();) {
     stop_or_go();
     embedder.step(clock.seconds());

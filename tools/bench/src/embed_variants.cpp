@@ -8,20 +8,20 @@ namespace {
 
 using watermark::EmbedDistances;
 using watermark::MarkColours;
-using watermark::Preset;
 
-constexpr Index kPaperPatch = 150;  // pixels, Luo et al. 2023, section 4.1
+constexpr Index kCells = 16;  // per axis, of every scene, so that rows of several scenes compare
 
-EmbedVariant base_variant(Preset preset, const nerf::ScheduleOptions& length, Index bits,
+EmbedVariant base_variant(const char* preset, const nerf::ScheduleOptions& length, Index bits,
                           std::uint64_t seed) {
   EmbedVariant v{.choice = "default",
                  .setting = "as embed does",
-                 .owner = {.preset = preset, .bits = bits, .seed = seed},
-                 .embed = watermark::embed_options(preset),
+                 .recipe = watermark::embed_recipe(preset),
                  .views = {}};
-  v.embed.schedule.steps = length.steps;
-  v.embed.schedule.seconds = length.seconds;
-  v.embed.seed = seed;
+  v.recipe.owner.bits = bits;
+  v.recipe.owner.seed = v.recipe.embed.seed = seed;
+  v.recipe.embed.schedule.steps = length.steps;
+  v.recipe.embed.schedule.seconds = length.seconds;
+  v.recipe.cells = kCells;
   return v;
 }
 
@@ -38,7 +38,6 @@ class Variants {
   void add(const char* choice, const std::string& setting, EmbedVariant v) {
     v.choice = choice;
     v.setting = setting;
-    v.embed.views = v.views.count;
     all_.push_back(std::move(v));
   }
   std::vector<EmbedVariant> take() { return std::move(all_); }
@@ -52,20 +51,21 @@ void lengths(Variants& all) {
   for (const auto& [name, factor] :
        {std::pair{"a quarter", 0.25}, std::pair{"half", 0.5}, std::pair{"twice", 2.0}})
     all.vary("length", name, [f = factor](EmbedVariant& v) {
-      nerf::ScheduleOptions& s = v.embed.schedule;
+      nerf::ScheduleOptions& s = v.recipe.embed.schedule;
       s.seconds *= f;
       s.steps = std::lround(f * static_cast<double>(s.steps));
     });
   all.vary("seed", "the next one: what chance does", [](EmbedVariant& v) {
-    ++v.owner.seed;
-    ++v.embed.seed;
+    ++v.recipe.owner.seed;
+    ++v.recipe.embed.seed;
   });
 }
 
 // What the extractor sees, and of what.
 void views(Variants& all) {
   for (const Index side : {128, 200, 256})
-    all.vary("patch", std::to_string(side) + " pixels", [=](EmbedVariant& v) { v.owner.reader_size = side; });
+    all.vary("patch", std::to_string(side) + " pixels",
+             [=](EmbedVariant& v) { v.recipe.owner.reader_size = side; });
   for (const Index kept : {2, 4})
     all.vary("samples", std::to_string(kept) + " kept of a ray",
              [=](EmbedVariant& v) { v.views.samples = kept; });
@@ -76,63 +76,66 @@ void views(Variants& all) {
   all.vary("distances", "half of the views closer or farther",
            [](EmbedVariant& v) { v.views.distances = EmbedDistances::several; });
   all.vary("distortions", "none", [](EmbedVariant& v) {
-    v.embed.distortions = {
+    v.recipe.embed.distortions = {
         .noise = 0, .rotation = 0, .zoom_out = 1, .zoom_in = 1, .blur = 0, .sample_shift = 0};
   });
   all.vary("distortions", "one kind a batch, not mixed",
-           [](EmbedVariant& v) { v.embed.distortions.mixed = false; });
+           [](EmbedVariant& v) { v.recipe.embed.distortions.mixed = false; });
 }
 
 // What carries the message, and how much it may change.
 void marks(Variants& all, MarkColours colours) {
   for (const Index side : {8, 12, 20, 24, 32})
-    all.vary("cells", std::to_string(side) + " an axis", [=](EmbedVariant& v) { v.owner.cells = side; });
+    all.vary("cells", std::to_string(side) + " an axis", [=](EmbedVariant& v) { v.recipe.cells = side; });
   for (const int mark_psnr : {33, 40})
     all.vary("mark_psnr", std::to_string(mark_psnr) + " dB",
-             [=](EmbedVariant& v) { v.owner.mark_psnr = mark_psnr; });
+             [=](EmbedVariant& v) { v.recipe.owner.mark_psnr = mark_psnr; });
   all.vary("budget", "the strength from the first step on",
-           [](EmbedVariant& v) { v.embed.first_mark_psnr = v.owner.mark_psnr; });
-  all.vary("budget", "annealed from 24 dB", [](EmbedVariant& v) { v.embed.first_mark_psnr = 24; });
+           [](EmbedVariant& v) { v.recipe.cell().training.first_mark_psnr = v.recipe.owner.mark_psnr; });
+  all.vary("budget", "annealed from 24 dB",
+           [](EmbedVariant& v) { v.recipe.cell().training.first_mark_psnr = 24; });
   for (const int steps : {50, 800})
     all.vary("budget", "annealed over " + std::to_string(steps) + " steps",
-             [=](EmbedVariant& v) { v.embed.anneal = steps; });
-  all.vary("hiding", "off", [](EmbedVariant& v) { v.embed.smooth_weight = v.embed.flat_weight = 0; });
-  all.vary("colours", "grey too", [](EmbedVariant& v) { v.owner.mark.luminance = 1; });
+             [=](EmbedVariant& v) { v.recipe.cell().training.anneal = steps; });
+  all.vary("hiding", "off", [](EmbedVariant& v) {
+    v.recipe.cell().training.smooth_weight = v.recipe.cell().training.flat_weight = 0;
+  });
+  all.vary("colours", "grey too", [](EmbedVariant& v) { v.recipe.cell().network.luminance = 1; });
   const MarkColours other = colours == MarkColours::light ? MarkColours::blue : MarkColours::light;
   all.vary("colours", watermark::mark_colours_name(other),
-           [=](EmbedVariant& v) { watermark::use_colours(other, v.owner.mark, v.embed); });
+           [=](EmbedVariant& v) { watermark::use_colours(other, v.recipe.cell()); });
 }
 
 // How it is learnt.
 void training(Variants& all) {
-  all.vary("supervision", "pooled bits alone",
-           [](EmbedVariant& v) { v.embed.sign_weight = v.embed.index_weight = 0; });
-  all.vary("supervision", "places alone", [](EmbedVariant& v) { v.embed.bits_weight = 0; });
-  all.vary("supervision", "cells weigh twice", [](EmbedVariant& v) { v.embed.index_weight *= 2; });
+  all.vary("supervision", "pooled bits alone", [](EmbedVariant& v) {
+    v.recipe.cell().training.sign_weight = v.recipe.cell().training.index_weight = 0;
+  });
+  all.vary("supervision", "places alone", [](EmbedVariant& v) { v.recipe.cell().training.bits_weight = 0; });
+  all.vary("supervision", "cells weigh twice",
+           [](EmbedVariant& v) { v.recipe.cell().training.index_weight *= 2; });
   for (const Index batch : {2, 8})
-    all.vary("batch", std::to_string(batch) + " images", [=](EmbedVariant& v) { v.embed.batch = batch; });
+    all.vary("batch", std::to_string(batch) + " images",
+             [=](EmbedVariant& v) { v.recipe.embed.batch = batch; });
   for (const Index channels : {16, 48})
     all.vary("extractor", std::to_string(channels) + " channels",
-             [=](EmbedVariant& v) { v.owner.base_channels = channels; });
-  all.vary("learning rate", "half", [](EmbedVariant& v) { v.embed.schedule.lr /= 2; });
-  all.vary("learning rate", "twice", [](EmbedVariant& v) { v.embed.schedule.lr *= 2; });
+             [=](EmbedVariant& v) { v.recipe.cell().base_channels = channels; });
+  all.vary("learning rate", "half", [](EmbedVariant& v) { v.recipe.embed.schedule.lr /= 2; });
+  all.vary("learning rate", "twice", [](EmbedVariant& v) { v.recipe.embed.schedule.lr *= 2; });
   all.vary("learning rate", "falls over the last quarter",
-           [](EmbedVariant& v) { v.embed.schedule.cooldown = 0.25; });
+           [](EmbedVariant& v) { v.recipe.embed.schedule.cooldown = 0.25; });
 }
 
 }  // namespace
 
 std::vector<EmbedVariant> embed_variants(const nerf::ScheduleOptions& length, Index bits, std::uint64_t seed,
                                          MarkColours colours) {
-  EmbedVariant usual = base_variant(Preset::fast, length, bits, seed);
-  watermark::use_colours(colours, usual.owner.mark, usual.embed);
+  EmbedVariant usual = base_variant("fast", length, bits, seed);
+  watermark::use_colours(colours, usual.recipe.cell());
   Variants all(usual);
   lengths(all);
-  for (const Preset preset : {Preset::paper, Preset::code}) {
-    EmbedVariant v = base_variant(preset, length, bits, seed);
-    v.owner.reader_size = kPaperPatch;
-    all.add("preset", watermark::preset_name(preset), std::move(v));
-  }
+  for (const char* preset : {"paper", "code"})
+    all.add("preset", preset, base_variant(preset, length, bits, seed));
   views(all);
   marks(all, colours);
   training(all);

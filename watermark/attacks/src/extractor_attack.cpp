@@ -1,6 +1,4 @@
 #include <fieldmark/engine/ops/arithmetic.h>
-#include <fieldmark/engine/ops/loss.h>
-#include <fieldmark/engine/ops/softmax.h>
 #include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/nerf/rendered_dataset.h>
 #include <fieldmark/watermark/attacks/extractor_attack.h>
@@ -28,54 +26,6 @@ void check(const Tensor<float>& view_image, const Tensor<float>& object, const E
     throw ValueError("[extractor_attack] step must be above 0 and at most 1, got " + std::to_string(o.step));
 }
 
-// The extractor's verdict on an image, and the distance of another image's verdict from it.
-class Verdict {
- public:
-  Verdict(const Owner& owner, const Tensor<float>& view_image)
-      : owner_(owner),
-        params_(owner.params, nullptr),
-        shape_{1, view_image.shape[0], view_image.shape[1], 3} {
-    Tape<float> tape;
-    const Var<float> image = tape.constant(view_image.data.data(), shape_);
-    const auto note_signs = [&](Var<float> logits) {
-      for (Index i = 0; i < logits.shape().size(); ++i)
-        positive_.push_back(logits.value()[i] > 0 ? 1.f : 0.f);
-    };
-    if (owner_.pooled_reader) {
-      note_signs((*owner_.pooled_reader)(params_, image));
-      return;
-    }
-    const auto out = (*owner_.reader)(params_, image);
-    note_signs(out.sign);
-    const Index classes = out.index.shape()[1];
-    for (Index p = 0; p < out.index.shape()[0]; ++p) {
-      const float* q = out.index.value() + p * classes;
-      index_.push_back(static_cast<std::int32_t>(std::max_element(q, q + classes) - q));
-      on_object_.push_back(index_.back() + 1 < classes ? 1.f : 0.f);
-    }
-  }
-
-  // Of an image [pixels, 3]; [1].
-  Var<float> loss(Var<float> view_image) const {
-    Tape<float>& tape = view_image.tape();
-    const Var<float> image = tape.reshape(view_image, shape_);
-    if (owner_.pooled_reader) {
-      const Var<float> logits = (*owner_.pooled_reader)(params_, image);
-      return bce_with_logits<float>(tape.reshape(logits, {static_cast<Index>(positive_.size())}), positive_);
-    }
-    const auto out = (*owner_.reader)(params_, image);
-    return add(bce_with_logits<float>(out.sign, positive_, on_object_),
-               softmax_cross_entropy<float>(out.index, index_, on_object_));
-  }
-
- private:
-  const Owner& owner_;
-  Params<float> params_;
-  Shape shape_;
-  std::vector<float> positive_, on_object_;
-  std::vector<std::int32_t> index_;
-};
-
 // Adds `factor` times the unit vector; adds 0 for 0.
 void add_direction(const std::vector<float>& from, double factor, std::vector<float>& to) {
   double squares = 0;
@@ -100,7 +50,7 @@ std::vector<float> first_residual(const Tensor<float>& object, const CounterRng&
 Tensor<float> against_extractor(const Owner& owner, const Tensor<float>& view_image,
                                 const Tensor<float>& object, const ExtractorAttackOptions& options) {
   check(view_image, object, options);
-  const Verdict verdict(owner, view_image);
+  const auto confirmation = owner.mark().confirmation(owner, view_image);
   const Index pixels = object.size();
   const double target = std::pow(10.0, -options.mark_psnr / 20);
   std::vector<float> mask(at(pixels)), gradient(at(3 * pixels)), next(at(3 * pixels)),
@@ -113,7 +63,7 @@ Tensor<float> against_extractor(const Owner& owner, const Tensor<float>& view_im
     return add(tape.constant(view_image.data.data(), {pixels, 3}), power_budget<float>(r, mask, target));
   };
   for (Index k = 0; k < options.steps; ++k) {
-    tape.backward(verdict.loss(changed()));
+    tape.backward(confirmation(changed()));
     for (Index p = 0; p < pixels; ++p)
       if (mask[at(p)] == 0) std::fill_n(&gradient[at(3 * p)], 3, 0.f);
     std::ranges::fill(next, 0.f);

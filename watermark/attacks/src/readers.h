@@ -12,10 +12,10 @@ namespace fieldmark::watermark {
 // Both readings of images, and what they cost.
 class Readers {
  public:
-  // For preset paper there is no informed detection. Owner and code must outlive it.
+  // Without cells in space there is no informed detection. Owner and code must outlive it.
   Readers(const Owner& owner, const CellCode& code, bool informed)
       : owner_(owner), code_(code), blind_(owner) {
-    if (informed && owner.reader) informed_.emplace(owner);
+    if (informed && owner.mark().has_cells()) informed_.emplace(owner);
   }
   bool informed() const { return informed_.has_value(); }
   // Only informed's numbers may be NaN. Calls tell() with the chosen reading's evidence.

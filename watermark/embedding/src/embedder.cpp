@@ -4,43 +4,22 @@
 #include <fieldmark/distort/quantize8.h>
 #include <fieldmark/distort/similarity.h>
 #include <fieldmark/engine/checkpoint.h>
+#include <fieldmark/engine/ops/arithmetic.h>
+#include <fieldmark/watermark/embedding/embedder.h>
 
 #include <algorithm>
 #include <cmath>
-
-#include "training_image.h"
 
 namespace fieldmark::watermark {
 namespace {
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-constexpr double kSpacing = 1.7320508 / 420;  // of samples, cube sides: a field's by default
-constexpr std::uint64_t kOfBatch = 8 * 64;    // place of what a whole batch draws: after those of 64 images
+constexpr std::uint64_t kOfBatch = 8 * 64;  // place of what a whole batch draws: after those of 64 images
 
 double blend(double from, double to, double fraction) { return from + (to - from) * fraction; }
 
 }  // namespace
-
-EmbedOptions embed_options(Preset preset) {
-  EmbedOptions o;
-  if (preset == Preset::fast) return o;
-  o.schedule.lr = 5e-4;
-  if (preset == Preset::code) {
-    o.extractor_lr = 2;
-    o.distortions = {
-        .noise = 0, .rotation = 0, .zoom_out = 1, .zoom_in = 1, .blur = 0, .sample_shift = 0.2 * kSpacing};
-    return o;
-  }
-  o.distortions.noise = 0.1;
-  o.distortions.rotation = 30;
-  o.distortions.blur = 0.1;
-  return o;
-}
-
-Index batch_for(nerf::SpaceKind space) {
-  return space == nerf::SpaceKind::contracted ? 2 : EmbedOptions{}.batch;
-}
 
 Embedder::Embedder(Owner& owner, std::span<const CachedView> views, const EmbedOptions& options)
     : owner_(owner),
@@ -57,39 +36,21 @@ Embedder::Embedder(Owner& owner, std::span<const CachedView> views, const EmbedO
   if (options.batch < 1 || options.batch > 64)
     throw ValueError("[embedder] batch must be 1 to 64, got " + std::to_string(options.batch));
   if (views.empty()) throw ValueError("[embedder] views must not be empty");
-  if (!owner.mark && !owner.global_mark && !options.image)
-    throw ValueError("[embedder] image must be given for an owner without colours of its own, got none");
   if (!(options.extractor_lr > 0))
     throw ValueError("[embedder] extractor_lr must be positive, got " + std::to_string(options.extractor_lr));
-  find_objects();
-  if (owner.mark) label_views();
-  if (owner.global_mark)
-    for (const CachedView& v : views)
-      colours_.push_back(
-          owner.fusion_colours(v.position.data(), v.colour.data(), static_cast<Index>(v.weight.size())));
+  training_ = owner.mark().training(owner, views);
 }
 
-void Embedder::find_objects() {
-  for (const CachedView& v : views_) {
-    std::vector<float> object(at(v.height * v.width), 0.f);
-    for (Index p = 0; p < v.height * v.width; ++p)
-      if (v.opacity[p] > 0.5f && v.sample_begin[at(p)] != v.sample_begin[at(p + 1)]) object[at(p)] = 1;
-    object_.push_back(std::move(object));
-  }
-}
-
-Embedder::Image Embedder::draw(Index image) const {
+TrainingImage Embedder::draw(Index image, Tape<float>& tape) const {
   const auto step = static_cast<std::uint64_t>(steps_), i = static_cast<std::uint64_t>(image);
   const EmbedDistortions& d = options_.distortions;
   const auto u = [&](std::uint64_t k) { return choice_rng_.uniform4(step, 8 * i + k); };
   const auto a = u(0), b = u(1), c = u(2);
-  Image p{};
-  p.step = step;
-  p.image = i;
+  TrainingImage p{.step = steps_};
   p.view = std::min(static_cast<Index>(a[0] * static_cast<float>(views_.size())),
                     static_cast<Index>(views_.size()) - 1);
-  p.message = random_message(owner_.options().bits, message_rng_,
-                             step * static_cast<std::uint64_t>(options_.batch) + i);
+  const std::uint64_t place = step * static_cast<std::uint64_t>(options_.batch) + i;
+  p.message = random_message(owner_.options().bits, message_rng_, place);
   p.signs = cell_signs(code_, p.message);
   const auto often = [](float x) { return x < 2.f / 3; };
   // Unless they are mixed, one of none, rotation, zoom, blur and noise for the whole batch.
@@ -109,22 +70,21 @@ Embedder::Image Embedder::draw(Index image) const {
   p.warped = turned || zoomed || height != size;
   p.warp = distort::similarity_matrix(static_cast<float>(angle), static_cast<float>(zoom * size / height),
                                       static_cast<float>(sx), static_cast<float>(sy));
-  p.blur = through(3, b[3] < 1.f / 3) ? static_cast<float>(d.blur) * c[0] : 0.f;
-  p.noise = through(4, often(c[1])) ? static_cast<float>(d.noise) * c[2] : 0.f;
-  const double mark_psnr = owner_.options().mark_psnr;
-  const double db = mark_psnr - (mark_psnr - options_.first_mark_psnr) *
-                                    std::exp(-static_cast<double>(steps_) / options_.anneal);
-  p.target = std::pow(10.0, -db / 20);
+  const float blur = through(3, b[3] < 1.f / 3) ? static_cast<float>(d.blur) * c[0] : 0.f,
+              noise = through(4, often(c[1])) ? static_cast<float>(d.noise) * c[2] : 0.f;
+  p.positions = shifted_positions(tape, p.view, place);
+  p.distort = [this, place, blur, noise, warped = p.warped, warp = p.warp](Var<float> x) {
+    return distorted(x, place, warped, warp, blur, noise);
+  };
   return p;
 }
 
-// The cached samples, each moved by a random shift.
-float* Embedder::shifted_positions(Tape<float>& tape, const Image& p) const {
-  const CachedView& v = views_[at(p.view)];
+// The samples of a view, each moved by a random shift.
+float* Embedder::shifted_positions(Tape<float>& tape, Index view, std::uint64_t place) const {
+  const CachedView& v = views_[at(view)];
   const Index samples = static_cast<Index>(v.weight.size());
   float* x = tape.scratch(3 * samples);
   const auto beta = static_cast<float>(options_.distortions.sample_shift);
-  const std::uint64_t place = p.step * static_cast<std::uint64_t>(options_.batch) + p.image;
   for (Index k = 0; k < samples; ++k) {
     const auto z = shift_rng_.uniform4(place, static_cast<std::uint64_t>(k));
     // A uniform number of variance 1 for each axis: the shape of so small a shift does not matter.
@@ -134,7 +94,9 @@ float* Embedder::shifted_positions(Tape<float>& tape, const Image& p) const {
   return x;
 }
 
-Var<float> Embedder::distort(Tape<float>& tape, Var<float> image, const Image& p) const {
+Var<float> Embedder::distorted(Var<float> image, std::uint64_t place, bool warped,
+                               const std::array<float, 6>& warp, float blur, float noise) const {
+  Tape<float>& tape = image.tape();
   const float level = nerf::background_value(owner_.field.background);
   const float background[3] = {level, level, level};
   const auto number = [&](float value) {
@@ -142,31 +104,34 @@ Var<float> Embedder::distort(Tape<float>& tape, Var<float> image, const Image& p
     *to = value;
     return tape.constant(to, {1});
   };
-  if (p.warped) {
+  if (warped) {
     float* matrix = tape.scratch(6);
-    std::copy(p.warp.begin(), p.warp.end(), matrix);
+    std::copy(warp.begin(), warp.end(), matrix);
     const PatchSize size = owner_.options().patch();
     image = distort::affine_warp(image, tape.constant(matrix, {6}),
                                  {.height = size.height, .width = size.width, .background = background});
   }
-  if (p.blur > 0) image = distort::blur(image, number(p.blur));
-  if (p.noise > 0) {
+  if (blur > 0) image = distort::blur(image, number(blur));
+  if (noise > 0) {
     const Index n = image.shape().size();
     float* field = tape.scratch(n + 3);
-    const std::uint64_t place = p.step * static_cast<std::uint64_t>(options_.batch) + p.image;
     for (Index i = 0; i < n; i += 4) {
       const auto z = noise_rng_.normal4(place, static_cast<std::uint64_t>(i));
       std::copy_n(z.data(), std::min<Index>(4, n - i), field + i);
     }
-    image = distort::noise(image, number(p.noise), std::span<const float>(field, at(n)));
+    image = distort::noise(image, number(noise), std::span<const float>(field, at(n)));
   }
   return distort::quantize8(image);
 }
 
 double Embedder::run_image(Index image, Tape<float>& tape, float* grads, Figures& figures) const {
-  const Image p = draw(image);
-  const Params<float> params(owner_.params, grads);
-  return owner_.mark ? run_dense(p, tape, params, figures) : run_pooled(p, tape, params, figures);
+  const TrainingImage p = draw(image, tape);
+  const Var<float> loss =
+      scale(training_->loss(tape, Params<float>(owner_.params, grads), p, figures_, figures),
+            1.0 / static_cast<double>(options_.batch));
+  const double value = static_cast<double>(loss.value()[0]);
+  tape.backward(loss);
+  return value;
 }
 
 void Embedder::step(double seconds) {
@@ -206,7 +171,7 @@ void Embedder::step_parameters() {
 }
 
 void Embedder::calibrate(Index views) {
-  if (!owner_.mark && !owner_.options().budget) return;  // the content loss decides the strength
+  if (!owner_.mark().has_gain()) return;
   const MarkPsnrMeter meter(owner_.field, {.count = views, .seed = options_.seed + 77});
   const double target = owner_.options().mark_psnr;
   owner_.gain = std::pow(10.0, -target / 20);
@@ -227,12 +192,12 @@ std::string Embedder::fingerprint() const {
   const OwnerOptions& o = owner_.options();
   std::size_t samples = 0;  // tells views of other cameras and sizes apart
   for (const CachedView& v : views_) samples += v.weight.size();
-  std::string text = std::string(preset_name(o.preset)) + ", " + std::to_string(o.bits) + " bits, " +
-                     std::to_string(o.mark_psnr) + " dB, " + std::to_string(owner_.cells.count()) +
-                     " cells, seed " + std::to_string(options_.seed) + ", steps " +
-                     std::to_string(options_.schedule.steps) + ", batch " + std::to_string(options_.batch) +
-                     ", views " + std::to_string(views_.size()) + " with " + std::to_string(samples) +
-                     " samples" + ", parameters " + std::to_string(owner_.params.size());
+  std::string text = owner_.mark().preset() + ", " + std::to_string(o.bits) + " bits, " +
+                     std::to_string(owner_.cells.count()) + " cells, seed " + std::to_string(options_.seed) +
+                     ", steps " + std::to_string(options_.schedule.steps) + ", batch " +
+                     std::to_string(options_.batch) + ", views " + std::to_string(views_.size()) + " with " +
+                     std::to_string(samples) + " samples" + ", parameters " +
+                     std::to_string(owner_.params.size());
   const auto add = [&](const char* name, double value) {
     text += ", " + std::string(name) + " " + std::to_string(value);
   };
@@ -241,24 +206,8 @@ std::string Embedder::fingerprint() const {
   add("half after", s.half_after);
   add("cooldown", s.cooldown);
   add("last", s.last);
-  if (o.preset != Preset::fast) {
-    add("content", options_.content_weight);
-    add("message", options_.message_weight);
-    add("extractor", options_.extractor_lr);
-  }
-  if (o.preset == Preset::fast || o.budget) {
-    add("first strength", options_.first_mark_psnr);
-    add("anneal", options_.anneal);
-  }
-  if (o.preset == Preset::fast) {
-    add("sign", options_.sign_weight);
-    add("index", options_.index_weight);
-    add("bits", options_.bits_weight);
-    add("smooth", options_.smooth_weight);
-    add("flat", options_.flat_weight);
-    add("tilt", o.mark.tilt);
-    add("shading", o.mark.shading);
-  }
+  add("extractor", options_.extractor_lr);
+  text += ", " + training_->fingerprint();
   const EmbedDistortions& d = options_.distortions;
   add("noise", d.noise);
   add("rotation", d.rotation);

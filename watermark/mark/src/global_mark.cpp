@@ -11,9 +11,9 @@ namespace fieldmark::watermark {
 namespace {
 
 GlobalMarkOptions checked(const GlobalMarkOptions& o) {
-  if (o.bits < 1 || o.message_features < 1 || o.colour_features < 1 || o.width < 2)
+  if (o.bits < 1 || o.message_features < 0 || o.colour_features < 0 || o.width < 2)
     throw ValueError(
-        "[global_mark] bits, message_features and colour_features must be at least 1 and width at least 2, "
+        "[global_mark] bits, message_features, colour_features and width must be at least 1, 0, 0 and 2, "
         "got " +
         std::to_string(o.bits) + ", " + std::to_string(o.message_features) + ", " +
         std::to_string(o.colour_features) + " and " + std::to_string(o.width));
@@ -55,12 +55,12 @@ GlobalMark<T>::GlobalMark(ParamStore<T>& store, std::string_view name, const Glo
   const std::string prefix(name);
   const auto& o = options_;
   const Index position = 3 + 6 * o.position_bands, direction = 3 + 6 * o.direction_bands;
-  if (!o.fusion.bare_colour)
+  if (o.colour_features > 0)
     encode_ = network(store, prefix + "/encode",
-                      {position + (o.fusion.late_direction ? 0 : direction) + colour_inputs(), o.width,
-                       o.width, o.width, o.colour_features},
+                      {position + (o.authors_code ? 0 : direction) + colour_inputs(), o.width, o.width,
+                       o.width, o.colour_features},
                       false, seed + 10);
-  if (!o.fusion.bare_message)
+  if (o.message_features > 0)
     message_ = network(store, prefix + "/message", {o.bits, o.message_features, o.message_features}, true,
                        seed + 20);
   register_fusion(store, prefix + "/fuse", seed + 30);
@@ -69,10 +69,9 @@ GlobalMark<T>::GlobalMark(ParamStore<T>& store, std::string_view name, const Glo
 template <class T>
 void GlobalMark<T>::register_fusion(ParamStore<T>& store, const std::string& name, std::uint64_t seed) {
   const auto& o = options_;
-  const Index again = o.fusion.repeated ? o.bits + colour_inputs() : 0;
-  const Index first = (o.fusion.bare_colour ? 0 : o.colour_features) +
-                      (o.fusion.bare_message ? o.bits : o.message_features) +
-                      (o.fusion.late_direction ? 3 + 6 * o.direction_bands : 0) + colour_inputs() + again;
+  const Index again = o.authors_code ? o.bits + colour_inputs() : 0;
+  const Index first = o.colour_features + (o.message_features > 0 ? o.message_features : o.bits) +
+                      (o.authors_code ? 3 + 6 * o.direction_bands : 0) + colour_inputs() + again;
   const Index in[] = {first, o.width + again, o.width / 2}, out[] = {o.width, o.width / 2, 3};
   for (int k = 0; k < 3; ++k)
     fuse_.emplace_back(
@@ -88,27 +87,26 @@ Var<T> GlobalMark<T>::operator()(const Params<T>& params, Var<T> x, Var<T> d, Va
   check_extent("global_mark", "message", message.shape(), 0, 1, "one message for all places");
   check_extent("global_mark", "message", message.shape(), 1, options_.bits, "bits of the mark");
   const Index n = x.shape()[0];
-  const MarkFusion& fusion = options_.fusion;
   const Var<T> of_direction = concat_columns<T>({d, nerf::frequency_encoding(d, options_.direction_bands)});
   std::vector<Var<T>> inputs;  // of G, but for c
-  if (!fusion.bare_colour) {
+  if (options_.colour_features > 0) {
     std::vector<Var<T>> of_place{x, nerf::frequency_encoding(x, options_.position_bands)};
-    if (!fusion.late_direction) of_place.push_back(of_direction);
+    if (!options_.authors_code) of_place.push_back(of_direction);
     of_place.push_back(c);
     inputs.push_back(through(encode_, params, concat_columns<T>(of_place)));
   }
   inputs.push_back(broadcast_rows(through(message_, params, message), n));
-  if (fusion.late_direction) inputs.push_back(of_direction);
+  if (options_.authors_code) inputs.push_back(of_direction);
   return fused(params, std::move(inputs), c, broadcast_rows(message, n));
 }
 
-// c_m = sigmoid(G(inputs, c)), with M and c once more before each hidden layer where the fusion says so.
+// c_m = sigmoid(G(inputs, c)); in the authors' code M and c enter each hidden layer once more.
 template <class T>
 Var<T> GlobalMark<T>::fused(const Params<T>& params, std::vector<Var<T>> inputs, Var<T> c,
                             Var<T> message) const {
   inputs.push_back(c);
   for (std::size_t k = 0; k < fuse_.size(); ++k) {
-    if (options_.fusion.repeated && k < 2) inputs.insert(inputs.end(), {message, c});
+    if (options_.authors_code && k < 2) inputs.insert(inputs.end(), {message, c});
     inputs = {fuse_[k](params, concat_columns<T>(inputs))};
   }
   return sigmoid(inputs.front());

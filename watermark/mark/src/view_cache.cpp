@@ -152,4 +152,11 @@ CachedView cache_view(nerf::Renderer& renderer, const nerf::RadianceField& field
   return view;
 }
 
+std::vector<float> foreground_mask(const CachedView& v) {
+  std::vector<float> mask(at(v.height * v.width), 0.f);
+  for (Index p = 0; p < v.height * v.width; ++p)
+    if (v.opacity[p] > 0.5f && v.sample_begin[at(p)] != v.sample_begin[at(p + 1)]) mask[at(p)] = 1;
+  return mask;
+}
+
 }  // namespace fieldmark::watermark

@@ -1,30 +1,10 @@
 #include <fieldmark/engine/shape_checks.h>
-#include <fieldmark/extractor/evidence_pool.h>
 #include <fieldmark/watermark/reading/blind_reader.h>
-
-#include <algorithm>
-#include <cmath>
 
 namespace fieldmark::watermark {
 namespace {
 
 constexpr Index kLeastSide = 16;
-
-// The likeliest class of each place and its softmax.
-void likeliest(const float* logits, Index classes, SeenPlaces& places) {
-  const Index n = places.height * places.width;
-  places.cell.resize(static_cast<std::size_t>(n));
-  places.share.resize(static_cast<std::size_t>(n));
-  for (Index p = 0; p < n; ++p) {
-    const float* row = logits + p * classes;
-    const float* most = std::max_element(row, row + classes);
-    double total = 0;
-    for (Index c = 0; c < classes; ++c) total += std::exp(static_cast<double>(row[c] - *most));
-    const Index cell = most - row;
-    places.cell[static_cast<std::size_t>(p)] = cell + 1 < classes ? static_cast<std::int32_t>(cell) : -1;
-    places.share[static_cast<std::size_t>(p)] = static_cast<float>(1 / total);
-  }
-}
 
 }  // namespace
 
@@ -55,24 +35,8 @@ std::vector<double> BlindReader::evidence(const Tensor<float>& picture, SeenPlac
   const PatchSize size = owner_.options().patch();
   const Window window = object_window(whole, background, size.aspect());
   const Tensor<float> image = cut_window(whole, window, size, background);
-  Tape<float> tape;
-  const Params<float> params(owner_.params, nullptr);
-  const Var<float> input = tape.constant(image.data.data(), {1, size.height, size.width, 3});
   if (places) *places = {.window = window};
-  if (owner_.pooled_reader) {
-    const Var<float> logits = (*owner_.pooled_reader)(params, input);
-    return {logits.value(), logits.value() + logits.shape().size()};
-  }
-  const auto out = (*owner_.reader)(params, input);
-  std::vector<double> evidence(static_cast<std::size_t>(owner_.cells.count()));
-  extractor::cell_evidence(out.sign.value(), out.index.value(), out.height * out.width, owner_.cells.count(),
-                           evidence.data());
-  if (places) {
-    places->height = out.height;
-    places->width = out.width;
-    likeliest(out.index.value(), owner_.cells.count() + 1, *places);
-  }
-  return evidence;
+  return owner_.mark().evidence(owner_, image, places);
 }
 
 }  // namespace fieldmark::watermark

@@ -104,8 +104,9 @@ struct CameraSearch::Proposal {
 
 CameraSearch::CameraSearch(const Owner& owner, const CameraSearchOptions& options)
     : owner_(owner), options_(options) {
-  if (!owner.reader)
-    throw ValueError("[camera_search] owner must be of preset fast: preset paper has no cells in space");
+  if (!owner.mark().has_cells())
+    throw ValueError("[camera_search] owner must have cells in space, got one of preset " +
+                     owner.mark().preset());
   if (options.views < 1 || options.around < 0 || options.size < 16)
     throw ValueError("[camera_search] views, around and size must be at least 1, 0 and 16, got " +
                      std::to_string(options.views) + ", " + std::to_string(options.around) + " and " +

@@ -29,9 +29,9 @@ std::vector<float> carrier_of(const Owner& owner, const CachedView& v) {
   for (Index begin = 0; begin < n; begin += kBlock) {
     const Index count = std::min(kBlock, n - begin);
     tape.reset();
-    const Var<float> carrier = owner.mark->carrier(Params<float>(owner.params, nullptr),
-                                                   tape.constant(&v.position[at(3 * begin)], {count, 3}),
-                                                   tape.constant(&v.colour[at(3 * begin)], {count, 3}));
+    const Var<float> carrier = owner.mark().carrier(Params<float>(owner.params, nullptr),
+                                                    tape.constant(&v.position[at(3 * begin)], {count, 3}),
+                                                    tape.constant(&v.colour[at(3 * begin)], {count, 3}));
     std::copy_n(carrier.value(), 3 * count, out.begin() + 3 * begin);
   }
   return out;
@@ -40,7 +40,6 @@ std::vector<float> carrier_of(const Owner& owner, const CachedView& v) {
 }  // namespace
 
 Carriers carriers(const Owner& owner, const CachedView& v) {
-  if (!owner.mark) throw ValueError("[carriers] expected an owner that marks colours, got one without");
   Carriers out{Tensor<float>({v.height, v.width, 3}), {0}, {}, {}};
   const std::vector<float> carrier = carrier_of(owner, v);
   const auto gain = static_cast<float>(owner.gain);

@@ -1,7 +1,6 @@
 #pragma once
 #include <fieldmark/watermark/embedding/embed_views.h>
-#include <fieldmark/watermark/embedding/embedder.h>
-#include <fieldmark/watermark/embedding/mark_colours.h>
+#include <fieldmark/watermark/embedding/recipe.h>
 
 #include <string>
 #include <vector>
@@ -12,8 +11,7 @@ namespace fieldmark::bench {
 struct EmbedVariant {
   std::string choice;                 ///< what is chosen: "patch", "cells", ...; "default" for the default
   std::string setting;                ///< how, for people
-  watermark::OwnerOptions owner;      ///< what is made
-  watermark::EmbedOptions embed;      ///< how it is trained, the seed included
+  watermark::EmbedRecipe recipe;      ///< options of owner, mark and training, the seed included
   watermark::EmbedViewOptions views;  ///< what it is trained on
 };
 

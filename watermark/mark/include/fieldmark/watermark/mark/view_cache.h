@@ -27,4 +27,7 @@ struct CachedView {
 CachedView cache_view(nerf::Renderer& renderer, const nerf::RadianceField& field, const nerf::Camera& camera,
                       Index samples = 1);
 
+/// 1 where a pixel's opacity exceeds 0.5 and the pixel has a sample, else 0. @return [height width]
+std::vector<float> foreground_mask(const CachedView& view);
+
 }  // namespace fieldmark::watermark

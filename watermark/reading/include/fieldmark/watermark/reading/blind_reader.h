@@ -10,22 +10,13 @@ namespace fieldmark::watermark {
 /// @throws ShapeError if it is no image or too small
 Tensor<float> opaque_image(const Tensor<float>& image, float background);
 
-/// What the extractor takes the places of an image for, besides the mark.
-struct SeenPlaces {
-  Window window{};                   ///< of the image that the places divide
-  Index height = 0;                  ///< in places; 0 for preset paper
-  Index width = 0;                   ///< in places
-  std::vector<std::int32_t> cell{};  ///< [height, width] the likeliest cell, -1 for the background
-  std::vector<float> share{};        ///< [height, width] how likely, in [0, 1]
-};
-
 /// The blind detection: the extractor looks at an image, knowing neither key nor message nor camera.
 /// The owner must outlive it. Calls may run at the same time.
 class BlindReader {
  public:
   /// @param owner  must outlive the reader
   explicit BlindReader(const Owner& owner) : owner_(owner) {}
-  /// Sign evidence S_c of every cell (for preset paper the logit of every slot), see evidence.h. The object's
+  /// Sign evidence S_c of every cell (without cells the logit of every slot), see evidence.h. The object's
   /// window is cut out and brought to the reader's size first (see object_window.h).
   /// @param image  [H, W, 1 to 4]; grey is repeated, alpha is laid over the field's background; sides of at
   /// least 16

@@ -1,0 +1,75 @@
+#include <fieldmark/core/error.h>
+#include <fieldmark/watermark/embedding/recipe.h>
+
+#include "support/catch.h"
+#include "watermark/tiny_owner.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+TEST_CASE("recipe: names of colours there and back, others are refused") {
+  for (const MarkColours c : {MarkColours::blue, MarkColours::light})
+    CHECK(parse_mark_colours(mark_colours_name(c)) == c);
+  CHECK_THROWS_AS(parse_mark_colours("grey"), ValueError);
+  CHECK_THROWS_WITH(parse_mark_colours("grey"), "[mark_colours] expected blue or light, got 'grey'");
+}
+
+TEST_CASE("recipe: what suits a scene") {
+  CHECK(colours_for(nerf::SpaceKind::cube) == MarkColours::blue);
+  CHECK(colours_for(nerf::SpaceKind::contracted) == MarkColours::light);
+  CHECK(colours_for(nerf::SpaceKind::ndc) == MarkColours::light);
+  CHECK(batch_for(nerf::SpaceKind::cube) == EmbedOptions{}.batch);
+  CHECK(batch_for(nerf::SpaceKind::ndc) == EmbedOptions{}.batch);
+  CHECK(batch_for(nerf::SpaceKind::contracted) == 2);
+}
+
+TEST_CASE("recipe: blue is the default, light is smooth, tilted and shaded") {
+  const CellMarkOptions usual;
+  CellMarkOptions mark;
+  use_colours(MarkColours::light, mark);
+  CHECK(mark.network.bands < usual.network.bands);
+  CHECK((mark.network.tilt > 0 && mark.network.tilt < 90));
+  CHECK((mark.network.shading > 0 && mark.network.shading <= 1));
+  CHECK(mark.training.smooth_weight == 0);
+  CHECK(mark.training.flat_weight > usual.training.flat_weight);
+  use_colours(MarkColours::blue, mark);
+  CHECK(mark.network.bands == usual.network.bands);
+  CHECK(mark.network.tilt == 0);
+  CHECK(mark.network.shading == 0);
+  CHECK(mark.training.smooth_weight == usual.training.smooth_weight);
+  CHECK(mark.training.flat_weight == usual.training.flat_weight);
+}
+
+TEST_CASE("recipe: each preset makes its kind of mark, and refuses the options of another") {
+  for (const std::string preset : kPresets) {
+    CAPTURE(preset);
+    EmbedRecipe recipe = embed_recipe(preset);
+    recipe.suit(tiny_field());
+    recipe.owner.bits = 4;
+    const Owner owner = recipe.make(tiny_field(), test_key(1), tiny_views());
+    CHECK(owner.mark().preset() == preset);
+    CHECK(owner.mark().has_cells() == (preset == "fast"));
+    CHECK(owner.mark().has_gain() == (preset == "fast"));
+    CHECK(owner.options().reader_size == (preset == "fast" ? 160 : 150));
+    if (preset == "fast")
+      CHECK(owner.cells.side() == cells_for_message(tiny_views(), 4, tiny_field().space.kind));
+    else
+      CHECK_THROWS_WITH(recipe.cell(), "preset " + preset + " does not have this option");
+  }
+  CHECK_THROWS_WITH(embed_recipe("slow"), "[embed_recipe] preset must be fast, paper or code, got slow");
+  EmbedRecipe recipe = embed_recipe("fast");
+  recipe.cells = 6;
+  CHECK(recipe.grid(tiny_field(), tiny_views()).side() == 6);
+}
+
+TEST_CASE("recipe: presets paper and code train as the paper and its authors' code") {
+  const EmbedRecipe paper = embed_recipe("paper"), code = embed_recipe("code");
+  CHECK(paper.embed.schedule.lr == 5e-4);
+  CHECK(paper.embed.extractor_lr == 1);
+  CHECK(paper.embed.distortions.rotation == 30);
+  CHECK(code.embed.schedule.lr == 5e-4);
+  CHECK(code.embed.extractor_lr == 2);
+  CHECK(code.embed.distortions.noise == 0);
+  CHECK(code.embed.distortions.sample_shift == Approx(8.248e-4).epsilon(1e-3));
+  CHECK(std::get<FusionMarkOptions>(code.mark).message_features == 128);
+}

@@ -1,0 +1,62 @@
+#pragma once
+#include <fieldmark/watermark/embedding/embedder.h>
+#include <fieldmark/watermark/mark/cell_mark.h>
+#include <fieldmark/watermark/mark/fusion_mark.h>
+
+#include <array>
+#include <variant>
+
+namespace fieldmark::watermark {
+
+/// Presets of `embed`.
+///   fast   every cell of the scene carries one bit: trains in minutes
+///   paper  one message for all places. Source: Luo et al. 2023 (CopyRNeRF), section 4.1: images of 150
+///          pixels, step size 5e-4, distortions of at most noise 0.1, 30 degrees, scale 0.75, blur 0.1
+///   code   preset paper as in its authors' code: the extractor's step size is 1e-3, no distortions, samples
+///          move by 0.2 of their spacing, N_m is 128, and GlobalMarkOptions::authors_code
+inline constexpr std::array<const char*, 3> kPresets{"fast", "paper", "code"};
+
+/// Appearance of a cell mark.
+enum class MarkColours {
+  blue,   ///< blue and yellow without luma, in fine detail: read soonest on objects before a background
+  light,  ///< like an uneven light: smooth, between blue and grey, fainter on dark colours
+};
+/// "blue" or "light".
+const char* mark_colours_name(MarkColours colours);
+/// @throws ValueError if the name is neither
+MarkColours parse_mark_colours(std::string_view name);
+/// Colours that suit a scene: blue for an object in a cube, else light, because the scene then fills its
+/// images and shows the mark everywhere.
+MarkColours colours_for(nerf::SpaceKind space);
+/// Sets bands, tilt and shading of the network and the weights against visibility.
+void use_colours(MarkColours colours, CellMarkOptions& mark);
+
+/// Images a step of preset fast: two where space is contracted, whose thousands of cells need more steps;
+/// else four.
+Index batch_for(nerf::SpaceKind space);
+
+/// All options of one preset, to be changed before an owner is made.
+struct EmbedRecipe {
+  OwnerOptions owner{};                                   ///< which OWNER stores
+  EmbedOptions embed{};                                   ///< of training
+  std::variant<CellMarkOptions, FusionMarkOptions> mark;  ///< of the preset's kind of mark
+  Index cells = 0;  ///< per axis of the scene's cube, 2 to 64; 0: cells_for_message(); unused without cells
+
+  /// Options that only preset fast has.   @throws ValueError for another preset, which it names
+  CellMarkOptions& cell();
+  /// Suits the options of preset fast to a scene: shape of the extractor's images, colours, batch.
+  void suit(const nerf::RadianceField& field);
+  /// Cells that the views show, or slots.
+  CellGrid grid(const nerf::RadianceField& field, std::span<const CachedView> views) const;
+  /// Makes the mark.
+  MarkMaker maker() const;
+  /// Makes the owner whose mark the views will train.
+  Owner make(const nerf::RadianceField& field, const Key& key, std::span<const CachedView> views) const {
+    return {field, owner, key, grid(field, views), maker()};
+  }
+};
+
+/// The recipe of a preset.   @throws ValueError if the name is not in kPresets
+EmbedRecipe embed_recipe(std::string_view preset);
+
+}  // namespace fieldmark::watermark

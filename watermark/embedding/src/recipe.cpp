@@ -1,0 +1,89 @@
+#include <fieldmark/watermark/embedding/embed_views.h>
+#include <fieldmark/watermark/embedding/recipe.h>
+
+namespace fieldmark::watermark {
+namespace {
+
+constexpr double kSpacing = 1.7320508 / 420;  // of samples, cube sides: a field's by default
+constexpr Index kPaperPatch = 150;            // pixels
+
+}  // namespace
+
+const char* mark_colours_name(MarkColours colours) {
+  return colours == MarkColours::light ? "light" : "blue";
+}
+
+MarkColours parse_mark_colours(std::string_view name) {
+  for (const MarkColours c : {MarkColours::blue, MarkColours::light})
+    if (name == mark_colours_name(c)) return c;
+  throw ValueError("[mark_colours] expected blue or light, got '" + std::string(name) + "'");
+}
+
+MarkColours colours_for(nerf::SpaceKind space) {
+  return space == nerf::SpaceKind::cube ? MarkColours::blue : MarkColours::light;
+}
+
+void use_colours(MarkColours colours, CellMarkOptions& mark) {
+  const CellMarkOptions usual;
+  const bool light = colours == MarkColours::light;
+  mark.network.bands =
+      light ? 5 : usual.network.bands;  // finer detail than a cell costs likeness for nothing
+  mark.network.tilt = light ? 50 : usual.network.tilt;
+  mark.network.shading = light ? 0.97 : usual.network.shading;
+  mark.training.smooth_weight = light ? 0 : usual.training.smooth_weight;  // light is smooth
+  mark.training.flat_weight = light ? 0.8 : usual.training.flat_weight;    // and shows most on walls
+}
+
+Index batch_for(nerf::SpaceKind space) {
+  return space == nerf::SpaceKind::contracted ? 2 : EmbedOptions{}.batch;
+}
+
+EmbedRecipe embed_recipe(std::string_view preset) {
+  EmbedRecipe r;
+  if (preset == "fast") return r;
+  r.owner.reader_size = kPaperPatch;
+  r.embed.schedule.lr = 5e-4;
+  if (preset == "paper") {
+    r.mark = FusionMarkOptions{};
+    r.embed.distortions.noise = 0.1;
+    r.embed.distortions.rotation = 30;
+    r.embed.distortions.blur = 0.1;
+  } else if (preset == "code") {
+    r.mark = code_options();
+    r.embed.extractor_lr = 2;
+    // Samples move in all directions there too, and not along the ray about the lower end of their interval.
+    r.embed.distortions = {
+        .noise = 0, .rotation = 0, .zoom_out = 1, .zoom_in = 1, .blur = 0, .sample_shift = 0.2 * kSpacing};
+  } else {
+    throw ValueError("[embed_recipe] preset must be fast, paper or code, got " + std::string(preset));
+  }
+  return r;
+}
+
+CellMarkOptions& EmbedRecipe::cell() {
+  if (const auto* fusion = std::get_if<FusionMarkOptions>(&mark))
+    throw ValueError(std::string("preset ") + (fusion->authors_code ? "code" : "paper") +
+                     " does not have this option");
+  return std::get<CellMarkOptions>(mark);
+}
+
+void EmbedRecipe::suit(const nerf::RadianceField& field) {
+  auto* cells_of_scene = std::get_if<CellMarkOptions>(&mark);
+  if (!cells_of_scene) return;
+  owner.reader_aspect = reader_aspect(field);
+  use_colours(colours_for(field.space.kind), *cells_of_scene);
+  embed.batch = batch_for(field.space.kind);
+}
+
+CellGrid EmbedRecipe::grid(const nerf::RadianceField& field, std::span<const CachedView> views) const {
+  if (!std::holds_alternative<CellMarkOptions>(mark)) return message_slots(owner.bits);
+  const Index side = cells > 0 ? cells : cells_for_message(views, owner.bits, field.space.kind);
+  return {side, visible_area(views, side)};
+}
+
+MarkMaker EmbedRecipe::maker() const {
+  if (const auto* fusion = std::get_if<FusionMarkOptions>(&mark)) return fusion_mark(*fusion);
+  return cell_mark(std::get<CellMarkOptions>(mark));
+}
+
+}  // namespace fieldmark::watermark

@@ -1,0 +1,98 @@
+#pragma once
+#include <fieldmark/extractor/pooled_extractor.h>
+#include <fieldmark/watermark/mark/global_mark.h>
+#include <fieldmark/watermark/mark/mark.h>
+
+namespace fieldmark::watermark {
+
+/// Weights of a pooled mark's losses.
+struct PooledTrainingOptions {
+  double content_weight = 1;  ///< gamma_1
+  double message_weight = 5;  ///< gamma_2
+};
+
+/// Slots without a place that stand for cells, one for each bit, of equal area: the key deals order and signs
+/// of the bits also where there are no cells.   @param bits  at least 1
+CellGrid message_slots(Index bits);
+
+/// Mark with one message for all places, which PooledExtractor reads from a whole image: the base of
+/// FusionMark. Its evidence is the logit of every slot. Training minimises
+///   L = gamma_1 mean |marked - base|^2 + gamma_2 BCE(bits, M)
+/// Source: Luo et al. 2023 (CopyRNeRF), section 3.4, without the perceptual term.
+class PooledMark : public Mark {
+ public:
+  /// Makes the marked image [pixels, 3] of a training image.   @param message  [1, N_b], -1 or 1
+  using Painter = std::function<Var<float>(Tape<float>& tape, const Params<float>& params,
+                                           const TrainingImage& image, Var<float> message)>;
+
+  bool has_gain() const override { return false; }
+  bool has_cells() const override { return false; }
+  std::vector<double> evidence(const Owner& owner, const Tensor<float>& image,
+                               SeenPlaces* places) const override;
+  std::function<Var<float>(Var<float>)> confirmation(const Owner& owner,
+                                                     const Tensor<float>& image) const override;
+  std::unique_ptr<MarkTraining> training(const Owner& owner,
+                                         std::span<const CachedView> views) const override;
+  /// Reads the mark.
+  const extractor::PooledExtractor<float>& reader() const { return reader_; }
+
+ protected:
+  PooledMark(extractor::PooledExtractor<float> reader, const PooledTrainingOptions& training)
+      : reader_(std::move(reader)), training_(training) {}
+  /// Prepares the training images of the views, which must outlive the result, like the owner.
+  virtual Painter painter(const Owner& owner, std::span<const CachedView> views) const = 0;
+
+ private:
+  extractor::PooledExtractor<float> reader_;
+  PooledTrainingOptions training_;
+};
+
+/// How a fusion mark is made and trained.
+struct FusionMarkOptions {
+  Index width = 256;           ///< units of E and G, and N_c, see GlobalMarkOptions
+  Index message_features = 0;  ///< N_m; 0: width
+  Index channels = 64;         ///< of the extractor, see PooledExtractorOptions
+  bool authors_code = false;   ///< see GlobalMarkOptions
+  /// Not stored in OWNER.
+  PooledTrainingOptions training{};
+};
+/// Options of preset code: the networks of the authors' code, with N_m = 128.
+FusionMarkOptions code_options();
+
+/// Mark of presets paper and code: GlobalMark puts c_m in place of each colour.
+class FusionMark : public PooledMark {
+ public:
+  /// @param network  of the mark   @param reader  of images
+  FusionMark(GlobalMark<float> network, extractor::PooledExtractor<float> reader,
+             const FusionMarkOptions& options)
+      : PooledMark(std::move(reader), options.training), network_(std::move(network)), options_(options) {}
+  std::string preset() const override { return options_.authors_code ? "code" : "paper"; }
+  std::string configuration() const override;
+  nerf::Renderer::Recolour recolour(const Owner& owner, std::vector<std::int8_t> signs) const override;
+  /// Colours as the network reads them: the colours themselves or, of the authors' code, the logit of each,
+  /// clamped to those of 1e-3 and 1 - 1e-3, and a sixteenth of log sigma at x.
+  /// @param x  [n, 3]   @param rgb  [n, 3]   @return [n, 3] or [n, 4]
+  std::vector<float> network_colours(const nerf::RadianceField& field, const float* x, const float* rgb,
+                                     Index n) const;
+  /// Fuses message and colours.
+  const GlobalMark<float>& network() const { return network_; }
+
+ protected:
+  Painter painter(const Owner& owner, std::span<const CachedView> views) const override;
+
+ private:
+  GlobalMark<float> network_;
+  FusionMarkOptions options_;
+};
+
+/// Sizes of the mark's network for messages of some bits.
+GlobalMarkOptions network_options(const FusionMarkOptions& options, Index bits);
+/// Extractor of a pooled mark, whose parameters follow those of the mark in the owner's store.
+/// @throws ValueError unless the site has one slot for each bit
+extractor::PooledExtractor<float> pooled_reader(const MarkSite& site, Index channels);
+/// Makes a FusionMark.   @throws ValueError as pooled_reader(), or if an option is out of range
+MarkMaker fusion_mark(const FusionMarkOptions& options = {});
+/// Options from a configuration of OWNER.   @throws ValueError for an ablation of version 0.1
+FusionMarkOptions stored_fusion_mark(const std::string& configuration);
+
+}  // namespace fieldmark::watermark
