@@ -4,7 +4,6 @@
 #include <fieldmark/engine/random.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/analytic_scene.h>
-#include "solid_texture.h"
 #include "solids.h"
 #include "transforms.h"
 

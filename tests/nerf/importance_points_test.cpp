@@ -1,5 +1,5 @@
 #include <fieldmark/core/error.h>
-#include <fieldmark/nerf/importance_points.h>
+#include "hierarchical_sampler.h"
 
 #include <algorithm>
 #include <cmath>
