@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "intrinsics.h"
+#include "lens.h"
 
 namespace fieldmark::nerf {
 

@@ -1,7 +1,6 @@
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/nerf/field.h>
-#include <fieldmark/nerf/spherical_harmonics.h>
 
 #include "checks.h"
 
@@ -51,27 +50,6 @@ template <class T>
 const HashEncoding<T>& Field<T>::encoding() const {
   if (!encoding_) throw ValueError("[field] encoding: expected a field with a hash table, got an mlp field");
   return *encoding_;
-}
-
-template <class T>
-Index Field<T>::density_width() const {
-  return mlp_ ? mlp_->feature_width() : encoding_->width();
-}
-
-template <class T>
-Index Field<T>::colour_width() const {
-  return mlp_ ? 0 : encoding_->width();
-}
-
-template <class T>
-Index Field<T>::geometry_width() const {
-  return mlp_ ? mlp_->geometry_width() : options_.geometry;
-}
-
-template <class T>
-Index Field<T>::direction_width() const {
-  if (mlp_) return mlp_->direction_width();
-  return options_.directional ? kSphericalHarmonics : 0;
 }
 
 template <class T>

@@ -1,6 +1,6 @@
 #pragma once
 #include <fieldmark/nerf/dataset.h>
-#include "intrinsics.h"
+#include "lens.h"
 
 #include <string_view>
 #include <vector>

@@ -1,4 +1,5 @@
 #include "scene_space.h"
+
 #include <fieldmark/nerf/camera_set.h>
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 #pragma once
 #include <fieldmark/nerf/camera.h>
-#include "intrinsics.h"
+#include "lens.h"
 
 #include <string>
 #include <string_view>

@@ -3,6 +3,7 @@
 #include <fieldmark/engine/packed_weights.h>
 #include <fieldmark/nerf/hash_encoding.h>
 #include <fieldmark/nerf/mlp_field.h>
+#include <fieldmark/nerf/spherical_harmonics.h>
 
 #include <optional>
 #include <vector>
@@ -62,10 +63,16 @@ class Field {
   /// encode_directions()   @return rgb [N, 3]
   Var<T> colour(const Params<T>& params, Var<T> z, Var<T> features, Var<T> direction) const;
 
-  Index density_width() const;    ///< features of a position for geometry()
-  Index colour_width() const;     ///< features of a position for colour(); 0 for mlp
-  Index geometry_width() const;   ///< N_z, elements of z
-  Index direction_width() const;  ///< elements of an encoded direction
+  /// Features of a position for geometry().
+  Index density_width() const { return mlp_ ? mlp_->feature_width() : encoding_->width(); }
+  /// Features of a position for colour(); 0 for mlp.
+  Index colour_width() const { return mlp_ ? 0 : encoding_->width(); }
+  /// N_z, elements of z.
+  Index geometry_width() const { return mlp_ ? mlp_->geometry_width() : options_.geometry; }
+  /// Elements of an encoded direction.
+  Index direction_width() const {
+    return mlp_ ? mlp_->direction_width() : options_.directional ? kSphericalHarmonics : 0;
+  }
 
   /// As constructed.
   const FieldOptions& options() const { return options_; }
