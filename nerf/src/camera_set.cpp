@@ -192,7 +192,7 @@ CameraSpan span_about(const Vec3& centre, std::span<const Camera> cameras, Backg
     span.half_size = std::max(span.half_size, 1.05 * distance * 0.5 * static_cast<double>(c.width) / c.fx);
   }
   if (span.directions.empty())
-    throw ValueError("[camera_span] cameras must stand around what they look at, got all at one point");
+    throw ValueError("[camera_span] cameras must stand around the point they look at, got all at that point");
   const Camera& c = cameras.front();
   const double w = static_cast<double>(c.width);
   span.fx = c.fx / w, span.fy = c.fy / w, span.cx = c.cx / w, span.cy = c.cy / w;

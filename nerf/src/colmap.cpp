@@ -13,7 +13,7 @@
 namespace fieldmark::nerf {
 namespace {
 
-// The binary format: numbers in memory order, with counts that are checked against the bytes left.
+// The binary format: values in memory order, and counts that are checked against the bytes left.
 class Bytes {
  public:
   static constexpr bool kBinary = true;

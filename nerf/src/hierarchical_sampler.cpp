@@ -62,11 +62,11 @@ void importance_points(std::span<const T> edge, std::span<const T> weight, std::
                        std::span<T> out) {
   if (weight.empty() || edge.size() != weight.size() + 1)
     throw ShapeError(
-        "[importance_points] edge must have one number more than weight, which has at least 1, got " +
+        "[importance_points] edge must have one element more than weight, which has at least 1, got " +
         std::to_string(edge.size()) + " and " + std::to_string(weight.size()));
   if (out.size() != u.size())
     throw ShapeError("[importance_points] out must have the " + std::to_string(u.size()) +
-                     " numbers of u, got " + std::to_string(out.size()));
+                     " elements of u, got " + std::to_string(out.size()));
   const std::size_t n = weight.size();
   const double length = static_cast<double>(edge[n]) - static_cast<double>(edge[0]);
   const double per_length = length > 0 ? kFloor / length : 0;
@@ -77,7 +77,7 @@ void importance_points(std::span<const T> edge, std::span<const T> weight, std::
   double total = 0;
   for (std::size_t i = 0; i < n; ++i) total += mass(i);
 
-  // Sums in double: what is left within an interval is a difference of them.
+  // Sums in double: the rest within an interval is a difference of two sums.
   std::size_t i = 0;
   double before = 0, here = mass(0);
   for (std::size_t j = 0; j < u.size(); ++j) {

@@ -196,7 +196,7 @@ std::vector<NumericsCase> numerics_cases() {
                [](auto t, WorstError& e) {
                  compare_hash(grid<decltype(t)>({-3, -0.25, 0.4, 1.25, 7}), e);
                });
-  add_numerics(all, "hash_encoding: positions that are no numbers", "bits", 0, 0,
+  add_numerics(all, "hash_encoding: NaN and infinite positions", "bits", 0, 0,
                [](auto t, WorstError& e) { compare_hash_nan<decltype(t)>(e); });
   all.push_back(
       {"marching: rays parallel to faces, in them and from inside", "float", "distance, 1", 2e-7, [] {

@@ -5,7 +5,7 @@
 
 namespace fieldmark::nerf {
 
-/// The visible samples of some rays, packed ray after ray, with the numbers that were computed to find them.
+/// The visible samples of some rays, packed ray after ray, with the values computed to find them.
 struct RaySamples {
   std::vector<Index> ray_begin;         ///< R + 1 offsets
   std::vector<float> position;          ///< [S, 3] cube coordinates

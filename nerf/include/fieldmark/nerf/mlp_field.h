@@ -31,7 +31,7 @@ struct RayPoints {
 ///   h = relu layers of gamma(2 x - 1), one of which reads it again,   z = (w h + b, h),
 ///   c = sigmoid(linear(relu layer(linear(h), gamma(d))))
 /// Source: Mildenhall et al. 2020 (NeRF), sec. 5.1 and fig. 7; gamma with the position itself, as in its
-/// code, whose eighth-layer network is the default here. Departures: the cube spans [-1, 1] (the paper's
+/// code, whose eight-layer network is the default here. Departures: the cube spans [-1, 1] (the paper's
 /// normalised coordinates; its code leaves pi out and world units in); z_0 is the log density, see Field.
 template <class T>
 class MlpField {
