@@ -11,6 +11,7 @@
 #include <numbers>
 #include <vector>
 
+#include "checks.h"
 #include "solids.h"
 #include "transforms.h"
 #include "vec3.h"
