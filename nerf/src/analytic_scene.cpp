@@ -4,9 +4,6 @@
 #include <fieldmark/engine/random.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/analytic_scene.h>
-#include "solid_texture.h"
-#include "solids.h"
-#include "transforms.h"
 
 #include <algorithm>
 #include <array>
@@ -14,6 +11,9 @@
 #include <numbers>
 #include <vector>
 
+#include "checks.h"
+#include "solids.h"
+#include "transforms.h"
 #include "vec3.h"
 
 namespace fieldmark::nerf {
@@ -23,7 +23,7 @@ constexpr double kRadius = 4.0311, kAngle = 0.6911112070083618;  // of the Blend
 constexpr int kSide = 4;                                         // samples along a pixel's side
 const std::array<std::string, 3> kSplits{"train", "val", "test"};
 
-// Sphere inside a solid that stands for it where it shades others.
+// A sphere inside a solid that casts its shadow.
 struct Shade {
   Vec3 centre;
   double radius;
@@ -120,7 +120,7 @@ std::vector<Object> make_objects(const SceneOptions& options) {
   return objects;
 }
 
-// Share of the sun and of the sky that other objects leave at a point.
+// Shares of sun and sky that other objects do not occlude at a point.
 std::array<double, 2> light_left(const std::vector<Object>& objects, const Object& self, const Vec3& p,
                                  const Vec3& n, const Vec3& sun) {
   constexpr double kSoft = 0.35;  // width of the sun's penumbra, per distance
@@ -131,7 +131,7 @@ std::array<double, 2> light_left(const std::vector<Object>& objects, const Objec
     for (const Shade& s : other.shades) {
       const Vec3 to = s.centre - p;
       const double square = dot(to, to), along = dot(to, sun), facing = dot(to, n);
-      // Most spheres leave the sun alone: found without a root.
+      // Most spheres do not occlude the sun: this finds them without a root.
       const double aside2 = square - along * along, clear = s.radius + 0.5 * kSoft * along;
       if (along > 0 && lit && aside2 < clear * clear) {
         const double aside = std::sqrt(std::max(0.0, aside2));
@@ -145,7 +145,7 @@ std::array<double, 2> light_left(const std::vector<Object>& objects, const Objec
   return {direct, sky};
 }
 
-// Colour of what the ray meets first; false if nothing.
+// Colour at the first intersection; false if there is none.
 bool trace(const std::vector<Object>& objects, const std::vector<const Object*>& candidates, const Ray& ray,
            Vec3* colour) {
   const Object* object = nullptr;
@@ -164,8 +164,8 @@ bool trace(const std::vector<Object>& objects, const std::vector<const Object*>&
   return true;
 }
 
-// Objects whose bounding spheres a sample of the pixel may meet. Its samples are within 0.75 / focal of its
-// middle in angle, so within that times the distance of the sphere's centre.
+// Objects whose bounding spheres a sample of the pixel may meet: samples are within an angle of 0.75 / focal
+// of the pixel's middle.
 void find_candidates(const std::vector<Object>& objects, const Camera& camera, const Ray& middle,
                      std::vector<const Object*>* candidates) {
   candidates->clear();
@@ -211,13 +211,8 @@ Tensor<float> render(const std::vector<Object>& objects, const Camera& camera) {
 }
 
 void check_options(const SceneOptions& o) {
-  const auto check = [](const char* name, Index value, Index most) {
-    if (value < 1 || value > most)
-      throw ValueError(std::string("[scene] ") + name + " must be in 1 to " + std::to_string(most) +
-                       ", got " + std::to_string(value));
-  };
-  check("size", o.size, 8192);
-  check("views", o.views, 100000);
+  check_range("scene", "size", o.size, 1, 8192);
+  check_range("scene", "views", o.views, 1, 100000);
 }
 
 // Directions follow the R2 sequence (Roberts 2018), so that any number of views covers the half sphere
@@ -275,7 +270,7 @@ void write_scene(const SceneOptions& options, const std::filesystem::path& folde
     Transforms transforms{.camera_angle_x = kAngle, .frames = {}};
     for (std::size_t i = 0; i < cameras.size(); ++i)
       transforms.frames.push_back({"./" + split + "/r_" + std::to_string(i), cameras[i].pose});
-    // Whole views in parallel, so that compressing PNG is too, in batches for the progress.
+    // Whole views in parallel, PNG compression included, in batches for the progress.
     constexpr Index kBatch = 8;
     const Index count = static_cast<Index>(cameras.size());
     for (Index first = 0; first < count; first += kBatch) {

@@ -90,7 +90,7 @@ Ray pixel_ray(const Camera& c, double x, double y) {
 void camera_rays(const Camera& camera, std::span<const float> pixels, float* origins, float* directions) {
   if (pixels.size() % 2 != 0)
     throw ValueError("[camera_rays] pixels must hold x and y for each pixel, got " +
-                     std::to_string(pixels.size()) + " numbers");
+                     std::to_string(pixels.size()) + " elements");
   float m[12];
   for (std::size_t k = 0; k < 12; ++k) m[k] = static_cast<float>(camera.pose[k]);
   const auto sx = static_cast<float>(1 / camera.fx), sy = static_cast<float>(-1 / camera.fy);

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <utility>
 
+#include "checks.h"
 #include "json_place.h"
 #include "vec3.h"
 
@@ -14,7 +15,11 @@ namespace {
 using Mat3 = std::array<Vec3, 3>;  // symmetric, rows
 
 constexpr int kTries = 256;
-const double kUnseen = std::cos(std::numbers::pi / 6);  // of a direction that no training camera had
+constexpr std::pair<const char*, CameraSet> kSets[]{
+    {"novel", CameraSet::novel},   {"ring", CameraSet::ring},
+    {"sphere", CameraSet::sphere}, {"extrapolated", CameraSet::extrapolated},
+    {"closer", CameraSet::closer}, {"farther", CameraSet::farther},
+    {"test", CameraSet::test}};
 
 void add_outer(Mat3& m, double scale, const Vec3& v) {
   for (std::size_t i = 0; i < 3; ++i) m[i] = m[i] + (scale * v[i]) * v;
@@ -28,7 +33,7 @@ Vec3 solve(Mat3 m, const Vec3& b, double ridge) {
 }
 
 // The point with the least sum of squared distances to the viewing axes: sum (I - f f^T) (p - o) = 0.
-// Parallel axes leave it open along them; then it is where they pass the origin.
+// Parallel axes leave it open along them; the ridge then picks the point next to the origin.
 Vec3 look_at_point(std::span<const Camera> cameras) {
   Mat3 m{};
   Vec3 b{};
@@ -41,8 +46,8 @@ Vec3 look_at_point(std::span<const Camera> cameras) {
   return solve(m, b, 1e-9 * static_cast<double>(cameras.size()));
 }
 
-// One step of inverse iteration on sum x x^T from the mean y axis: the direction most at right angles to the
-// x axes.
+// One step of inverse iteration on sum x x^T from the mean y axis: the direction most nearly perpendicular to
+// the x axes.
 Vec3 common_up(std::span<const Camera> cameras) {
   Mat3 m{};
   Vec3 mean{};
@@ -54,15 +59,17 @@ Vec3 common_up(std::span<const Camera> cameras) {
   return norm(up) > 0 ? normalised(up) : Vec3{0, 0, 1};
 }
 
-// Numbers of camera i of a set.
+// The random values of camera i of a set, one after another.
 class Draw {
  public:
   Draw(std::uint64_t seed, CameraSet kind, Index camera)
       : rng_(seed, 0x63616D00u + static_cast<std::uint64_t>(kind)),
         camera_(static_cast<std::uint64_t>(camera)) {}
   double uniform() { return rng_.uniform_double(camera_, next_++); }
-  std::size_t below(std::size_t n) {
-    return static_cast<std::size_t>(rng_.below(static_cast<Index>(n), camera_, next_++));
+  double uniform(double low, double high) { return low + (high - low) * uniform(); }
+  template <class T>
+  const T& one_of(const std::vector<T>& all, std::size_t first) {
+    return all[at(rng_.below(static_cast<Index>(first), camera_, next_++))];
   }
   Vec3 direction() {
     const double z = 2 * uniform() - 1, azimuth = 2 * std::numbers::pi * uniform(),
@@ -75,62 +82,25 @@ class Draw {
   std::uint64_t camera_, next_ = 0;
 };
 
-Vec3 near_direction(const std::vector<Vec3>& directions, Draw& draw) {
-  const Vec3& first = directions[draw.below(directions.size())];
+Vec3 novel_direction(const std::vector<Vec3>& directions, Draw& draw) {
+  const Vec3& first = draw.one_of(directions, directions.size());
   std::vector<Vec3> nearest(directions);
   const std::size_t kept = std::min<std::size_t>(7, nearest.size());  // itself and six more
   std::partial_sort(nearest.begin(), nearest.begin() + static_cast<std::ptrdiff_t>(kept), nearest.end(),
                     [&](const Vec3& a, const Vec3& b) { return dot(a, first) > dot(b, first); });
-  const Vec3 &second = nearest[draw.below(kept)], &third = nearest[draw.below(kept)];
+  const Vec3 &second = draw.one_of(nearest, kept), &third = draw.one_of(nearest, kept);
   double u = draw.uniform(), v = draw.uniform();
   if (u + v > 1) u = 1 - u, v = 1 - v;
   const Vec3 inside = (1 - u - v) * first + u * second + v * third;
   return norm(inside) > 1e-6 ? normalised(inside) : first;
 }
 
-struct Box {
-  Vec3 low, high;
-};
-
-// Along the world's axes, around the positions of the cameras.
-Box box_of(const CameraSpan& span) {
-  Box box{};
-  for (std::size_t i = 0; i < span.directions.size(); ++i) {
-    const Vec3 p = span.centre + span.distances[i] * span.directions[i];
-    for (std::size_t a = 0; a < 3; ++a) {
-      box.low[a] = i == 0 ? p[a] : std::min(box.low[a], p[a]);
-      box.high[a] = i == 0 ? p[a] : std::max(box.high[a], p[a]);
-    }
-  }
-  return box;
-}
-
-Vec3 in_box(const Box& box, Draw& draw) {
-  Vec3 eye;
-  for (std::size_t a = 0; a < 3; ++a) eye[a] = box.low[a] + (box.high[a] - box.low[a]) * draw.uniform();
-  return eye;
-}
-
-// In the box grown to twice its sides, outside of it.
-Vec3 around_box(const Box& box, Draw& draw) {
-  Box twice;
-  for (std::size_t a = 0; a < 3; ++a) {
-    const double half = 0.5 * (box.high[a] - box.low[a]);
-    twice.low[a] = box.low[a] - half, twice.high[a] = box.high[a] + half;
-  }
-  Vec3 eye{};
-  for (int i = 0; i < kTries; ++i) {
-    eye = in_box(twice, draw);
-    for (std::size_t a = 0; a < 3; ++a)
-      if (eye[a] < box.low[a] || eye[a] > box.high[a]) return eye;
-  }
-  return eye;
-}
-
-Vec3 unseen_direction(const std::vector<Vec3>& directions, Draw& draw) {
+// Far enough from all training directions; the farthest that was drawn if none is.
+Vec3 extrapolated_direction(const std::vector<Vec3>& directions, Draw& draw) {
+  const double far_enough = std::cos(std::numbers::pi / 6);
   Vec3 best{};
   double least = 2;  // cosine of the angle to the nearest training direction
-  for (int i = 0; i < kTries && least > kUnseen; ++i) {
+  for (int i = 0; i < kTries && least > far_enough; ++i) {
     const Vec3 d = draw.direction();
     double nearest = -1;
     for (const Vec3& seen : directions) nearest = std::max(nearest, dot(seen, d));
@@ -139,51 +109,72 @@ Vec3 unseen_direction(const std::vector<Vec3>& directions, Draw& draw) {
   return best;
 }
 
-struct Range {
-  double low, high;
-  double at(double u) const { return low + (high - low) * u; }
+// An axis-aligned box.
+struct Box {
+  Vec3 low, high;
+
+  // Around the positions of the training cameras.
+  explicit Box(const CameraSpan& span)
+      : low(span.centre + span.distances[0] * span.directions[0]), high(low) {
+    for (std::size_t i = 1; i < span.directions.size(); ++i) {
+      const Vec3 p = span.centre + span.distances[i] * span.directions[i];
+      for (std::size_t a = 0; a < 3; ++a) low[a] = std::min(low[a], p[a]), high[a] = std::max(high[a], p[a]);
+    }
+  }
+  Vec3 point(Draw& draw) const {
+    Vec3 p;
+    for (std::size_t a = 0; a < 3; ++a) p[a] = draw.uniform(low[a], high[a]);
+    return p;
+  }
+  // Outside of the box, in one of twice its sides.
+  Vec3 point_around(Draw& draw) const {
+    Box twice = *this;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double half = 0.5 * (high[a] - low[a]);
+      twice.low[a] -= half, twice.high[a] += half;
+    }
+    Vec3 p{};
+    for (int i = 0; i < kTries; ++i) {
+      p = twice.point(draw);
+      for (std::size_t a = 0; a < 3; ++a)
+        if (p[a] < low[a] || p[a] > high[a]) return p;
+    }
+    return p;
+  }
 };
 
-// Of the training cameras' distances.
-Range distances_of(CameraSet kind, bool forward_facing) {
-  if (kind == CameraSet::closer) return forward_facing ? Range{0.8, 1} : Range{0.5, 0.8};
-  if (kind == CameraSet::farther) return forward_facing ? Range{1, 1.25} : Range{1.5, 3};
-  return forward_facing ? Range{1, 1} : Range{0.8, 1.5};
-}
-
-Pose ring_pose(const CameraSpan& span, Draw& draw) {
+Vec3 ring_direction(const Vec3& up, Draw& draw) {
   const double azimuth = 2 * std::numbers::pi * draw.uniform(), elevation = std::numbers::pi / 6;
-  const Vec3 axis = std::abs(span.up[0]) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
-  const Vec3 x = normalised(axis - dot(axis, span.up) * span.up), y = cross(span.up, x);
-  const Vec3 d =
-      std::cos(elevation) * (std::cos(azimuth) * x + std::sin(azimuth) * y) + std::sin(elevation) * span.up;
-  return look_at(span.centre + 4.0311 * d, span.centre, span.up);
+  const Vec3 axis = std::abs(up[0]) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
+  const Vec3 x = normalised(axis - dot(axis, up) * up), y = cross(up, x);
+  return std::cos(elevation) * (std::cos(azimuth) * x + std::sin(azimuth) * y) + std::sin(elevation) * up;
 }
 
 Pose draw_pose(const CameraSpan& span, CameraSet kind, Draw draw) {
-  if (kind == CameraSet::ring) return ring_pose(span, draw);
-  const double distance = span.distances[draw.below(span.distances.size())];
-  if (kind == CameraSet::sphere)
-    return look_at(span.centre + distance * draw.direction(), span.centre, span.up);
+  const Vec3& centre = span.centre;
+  if (kind == CameraSet::ring)
+    return look_at(centre + 4.0311 * ring_direction(span.up, draw), centre, span.up);
+  const double distance = draw.one_of(span.distances, span.distances.size());
+  if (kind == CameraSet::sphere) return look_at(centre + distance * draw.direction(), centre, span.up);
   if (kind == CameraSet::extrapolated)
-    return look_at(span.forward_facing ? around_box(box_of(span), draw)
-                                       : span.centre + distance * unseen_direction(span.directions, draw),
-                   span.centre, span.up);
-  const Range range = distances_of(kind, span.forward_facing);
+    return look_at(span.forward_facing ? Box(span).point_around(draw)
+                                       : centre + distance * extrapolated_direction(span.directions, draw),
+                   centre, span.up);
   Vec3 eye;
   if (span.forward_facing) {
-    eye = in_box(box_of(span), draw);
-    if (kind != CameraSet::novel) eye = span.centre + range.at(draw.uniform()) * (eye - span.centre);
+    eye = Box(span).point(draw);
+    if (kind == CameraSet::closer) eye = centre + draw.uniform(0.8, 1) * (eye - centre);
+    if (kind == CameraSet::farther) eye = centre + draw.uniform(1, 1.25) * (eye - centre);
   } else {
-    const Vec3 direction = near_direction(span.directions, draw);
-    eye = span.centre + (distance * range.at(draw.uniform())) * direction;
+    const Vec3 direction = novel_direction(span.directions, draw);
+    const double scale = kind == CameraSet::closer    ? draw.uniform(0.5, 0.8)
+                         : kind == CameraSet::farther ? draw.uniform(1.5, 3)
+                                                      : draw.uniform(0.8, 1.5);
+    eye = centre + (distance * scale) * direction;
   }
   const Vec3 shift = (0.1 * span.half_size * std::cbrt(draw.uniform())) * draw.direction();
-  return look_at(eye, span.centre + shift, span.up);
+  return look_at(eye, centre + shift, span.up);
 }
-}  // namespace
-
-namespace {
 
 CameraSpan span_about(const Vec3& centre, std::span<const Camera> cameras, Background background) {
   CameraSpan span{.centre = centre,
@@ -201,7 +192,7 @@ CameraSpan span_about(const Vec3& centre, std::span<const Camera> cameras, Backg
     span.half_size = std::max(span.half_size, 1.05 * distance * 0.5 * static_cast<double>(c.width) / c.fx);
   }
   if (span.directions.empty())
-    throw ValueError("[camera_span] cameras must stand around what they look at, got all at one point");
+    throw ValueError("[camera_span] cameras must stand around the point they look at, got all at that point");
   const Camera& c = cameras.front();
   const double w = static_cast<double>(c.width);
   span.fx = c.fx / w, span.fy = c.fy / w, span.cx = c.cx / w, span.cy = c.cy / w;
@@ -209,7 +200,7 @@ CameraSpan span_about(const Vec3& centre, std::span<const Camera> cameras, Backg
   return span;
 }
 
-// Where a forward-facing capture looks, its mean camera being at the origin.
+// The centre of a forward-facing capture, whose mean camera is at the origin.
 Vec3 focus(const Dataset& data) {
   double near = 0, far = 0;
   for (const View& v : data.views) {
@@ -236,14 +227,6 @@ CameraSpan camera_span(const Dataset& dataset) {
   return span;
 }
 
-namespace {
-constexpr std::pair<const char*, CameraSet> kSets[]{
-    {"novel", CameraSet::novel},   {"ring", CameraSet::ring},
-    {"sphere", CameraSet::sphere}, {"extrapolated", CameraSet::extrapolated},
-    {"closer", CameraSet::closer}, {"farther", CameraSet::farther},
-    {"test", CameraSet::test}};
-}  // namespace
-
 std::vector<std::string> camera_set_names() {
   std::vector<std::string> names;
   for (const auto& [name, set] : kSets) names.emplace_back(name);
@@ -253,8 +236,9 @@ std::vector<std::string> camera_set_names() {
 CameraSet parse_camera_set(std::string_view name) {
   for (const auto& [known, set] : kSets)
     if (name == known) return set;
-  throw ValueError("[cameras] set must be near, ring, sphere, unseen, closer, farther or test, got \"" +
-                   std::string(name) + "\"");
+  throw ValueError(
+      "[cameras] set must be novel, ring, sphere, extrapolated, closer, farther or test, got \"" +
+      std::string(name) + "\"");
 }
 
 std::vector<Camera> make_cameras(const CameraSpan& span, CameraSet kind, Index count, Index size,
@@ -270,17 +254,15 @@ std::vector<Camera> make_cameras(const CameraSpan& span, CameraSet kind, Index c
                      std::to_string(span.distances.size()) + " and " +
                      std::to_string(span.directions.size()));
   const double w = static_cast<double>(span.width);
-  Camera base{.pose = {},
-              .fx = span.fx * w,
-              .fy = span.fy * w,
-              .cx = span.cx * w,
-              .cy = span.cy * w,
-              .width = span.width,
-              .height = span.height};
-  base = base.scaled(size);
-  std::vector<Camera> cameras(static_cast<std::size_t>(count), base);
-  for (Index i = 0; i < count; ++i)
-    cameras[static_cast<std::size_t>(i)].pose = draw_pose(span, kind, Draw(seed, kind, i));
+  const Camera base{.pose = {},
+                    .fx = span.fx * w,
+                    .fy = span.fy * w,
+                    .cx = span.cx * w,
+                    .cy = span.cy * w,
+                    .width = span.width,
+                    .height = span.height};
+  std::vector<Camera> cameras(at(count), base.scaled(size));
+  for (Index i = 0; i < count; ++i) cameras[at(i)].pose = draw_pose(span, kind, Draw(seed, kind, i));
   return cameras;
 }
 
@@ -301,31 +283,29 @@ std::string format_camera_span(const CameraSpan& s) {
 CameraSpan parse_camera_span(std::string_view text, std::string_view where) {
   const nlohmann::json json = parse_json(text, where);
   const JsonPlace root(json, std::string(where));
-  constexpr double kMost = 1e12;
+  const auto length = [](const JsonPlace& value) { return value.number_in(0, 1e12, "(0, 1e12)"); };
+  const auto unit = [](const JsonPlace& value) {
+    const Vec3 v = value.vec3();
+    if (!(std::abs(norm(v) - 1) < 1e-6)) value.fail("a unit vector", "length " + std::to_string(norm(v)));
+    return v;
+  };
   CameraSpan s{.centre = root["centre"].vec3(),
-               .up = root["up"].vec3(),
-               .half_size = root["half_size"].number_in(0, kMost, "(0, 1e12)"),
+               .up = unit(root["up"]),
+               .half_size = length(root["half_size"]),
                .directions = {},
                .distances = {}};
-  if (!(std::abs(norm(s.up) - 1) < 1e-6))
-    root["up"].fail("a unit vector", "length " + std::to_string(norm(s.up)));
   const JsonPlace directions = root["directions"], distances = root["distances"];
   const std::size_t count = directions.array_size();
   if (count == 0 || distances.array_size() != count)
     distances.fail("as many numbers as directions, at least one", std::to_string(distances.array_size()));
   for (std::size_t i = 0; i < count; ++i) {
-    s.directions.push_back(directions.at(i).vec3());
-    const double length = norm(s.directions.back());
-    if (!(std::abs(length - 1) < 1e-6))
-      directions.at(i).fail("a unit vector", "length " + std::to_string(length));
-    s.distances.push_back(distances.at(i).number_in(0, kMost, "(0, 1e12)"));
+    s.directions.push_back(unit(directions.at(i)));
+    s.distances.push_back(length(distances.at(i)));
   }
   const JsonPlace k = root["intrinsics"];
   if (k.array_size() != 4) k.fail("4 numbers", std::to_string(k.array_size()));
-  s.fx = k.at(0).number_in(0, kMost, "(0, 1e12)"), s.fy = k.at(1).number_in(0, kMost, "(0, 1e12)");
-  s.cx = k.at(2).number(), s.cy = k.at(3).number();
-  s.width = std::lround(root["width"].number_in(0.5, 65536.5, "1 to 65536"));
-  s.height = std::lround(root["height"].number_in(0.5, 65536.5, "1 to 65536"));
+  s.fx = length(k.at(0)), s.fy = length(k.at(1)), s.cx = k.at(2).number(), s.cy = k.at(3).number();
+  s.width = root["width"].side(), s.height = root["height"].side();
   const std::string background = root["background"].text();
   if (background != "white" && background != "black") root["background"].fail("white or black", background);
   s.background = background == "white" ? Background::white : Background::black;

@@ -1,17 +1,141 @@
 #include "colmap.h"
 
+#include <fieldmark/core/error.h>
+
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <cmath>
+#include <cstring>
 
-#include "colmap_reader.h"
 #include "vec3.h"
 
 namespace fieldmark::nerf {
 namespace {
 
+// The binary format: values in memory order, and counts that are checked against the bytes left.
+class Bytes {
+ public:
+  static constexpr bool kBinary = true;
+  Bytes(std::string_view bytes, std::string_view name) : bytes_(bytes), name_(name) {}
+
+  [[noreturn]] void fail(const std::string& expected, const std::string& got) const {
+    throw IoError(std::string(name_) + ": byte " + std::to_string(at_) + ": expected " + expected + ", got " +
+                  got);
+  }
+  template <class T>
+  T get(const char* what) {
+    if (bytes_.size() - at_ < sizeof(T)) fail(what, "the end of the file");
+    T x;
+    std::memcpy(&x, bytes_.data() + at_, sizeof(T));
+    at_ += sizeof(T);
+    return x;
+  }
+  // A count of records that take at least `least` bytes each.
+  std::uint64_t count(std::size_t least, const char* what) {
+    const auto n = get<std::uint64_t>(what);
+    const std::size_t most = (bytes_.size() - at_) / least;
+    if (n > most)
+      fail(std::string(what) + " of at most " + std::to_string(most) + " in the bytes left",
+           std::to_string(n));
+    return n;
+  }
+  std::string text(const char* what) {
+    const std::size_t end = bytes_.find('\0', at_);
+    if (end == std::string_view::npos) fail(what, "no byte 0 that ends it");
+    std::string found(bytes_.substr(at_, end - at_));
+    at_ = end + 1;
+    return found;
+  }
+  void skip(std::uint64_t bytes) { at_ += static_cast<std::size_t>(bytes); }
+  void end() const {
+    if (at_ != bytes_.size())
+      fail("the end of the file", std::to_string(bytes_.size() - at_) + " bytes more");
+  }
+
+ private:
+  std::string_view bytes_, name_;
+  std::size_t at_ = 0;
+};
+
+// The text format: lines of words between blanks.
+class Lines {
+ public:
+  static constexpr bool kBinary = false;
+  Lines(std::string_view bytes, std::string_view name) : bytes_(bytes), name_(name) {}
+
+  [[noreturn]] void fail(const std::string& expected, const std::string& got) const {
+    throw IoError(std::string(name_) + ": line " + std::to_string(number_) + ": expected " + expected +
+                  ", got " + got);
+  }
+  // Goes to the next line; false at the end.
+  bool next() {
+    if (at_ >= bytes_.size()) return false;
+    const std::size_t end = std::min(bytes_.find('\n', at_), bytes_.size());
+    line_ = bytes_.substr(at_, end - at_);
+    at_ = end + 1, ++number_;
+    return true;
+  }
+  // Goes to the next line that is neither empty nor a comment.
+  bool next_record() {
+    while (next())
+      if (!at_end() && line_.front() != '#') return true;
+    return false;
+  }
+  bool at_end() {
+    line_.remove_prefix(std::min(line_.find_first_not_of(" \t\r"), line_.size()));
+    return line_.empty();
+  }
+  std::string_view word(const char* what) {
+    if (at_end()) fail(what, "the end of the line");
+    const std::string_view w = line_.substr(0, line_.find_first_of(" \t\r"));
+    line_.remove_prefix(w.size());
+    return w;
+  }
+  // The rest of the line.
+  std::string text(const char* what) {
+    if (at_end()) fail(what, "the end of the line");
+    return std::string(line_.substr(0, line_.find_last_not_of(" \r") + 1));
+  }
+  template <class T>
+  T get(const char* what) {
+    const std::string_view w = word(what);
+    T x{};
+    const auto [stop, error] = std::from_chars(w.data(), w.data() + w.size(), x);
+    if (error != std::errc() || stop != w.data() + w.size())
+      fail(what, "'" + std::string(w.substr(0, 40)) + "'");
+    return x;
+  }
+
+ private:
+  std::string_view bytes_, name_, line_;
+  std::size_t at_ = 0, number_ = 0;
+};
+
+// Calls use(reader) at each record. @param least, count  bytes of a record, and their count in errors
+template <class F>
+void each_record(std::string_view bytes, ColmapFormat format, std::string_view name, std::size_t least,
+                 const char* count, F use) {
+  if (format == ColmapFormat::binary) {
+    Bytes in(bytes, name);
+    for (auto left = in.count(least, count); left > 0; --left) use(in);
+    in.end();
+  } else {
+    Lines in(bytes, name);
+    while (in.next_record()) use(in);
+  }
+}
+
+double number(auto& in, const char* what) {
+  const double x = in.template get<double>(what);
+  // So small that sums and products stay finite.
+  if (!(std::abs(x) < 1e9)) in.fail(std::string(what) + " in (-1e9, 1e9)", std::to_string(x));
+  return x;
+}
+
 struct Model {
   std::string_view name;
-  std::size_t parameters;  // 0: not known here
+  std::size_t parameters;  // 0: unsupported
 };
 // In the order of COLMAP's numbers.
 constexpr Model kModels[] = {{"SIMPLE_PINHOLE", 3},
@@ -25,37 +149,53 @@ constexpr Model kModels[] = {{"SIMPLE_PINHOLE", 3},
                              {"SIMPLE_RADIAL_FISHEYE", 0},
                              {"RADIAL_FISHEYE", 0},
                              {"THIN_PRISM_FISHEYE", 0}};
-constexpr const char* kKnown = "a camera model SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL or OPENCV";
 
 template <class Reader>
-Intrinsics read_camera(Reader& reader, const Model& model) {
+const Model& read_model(Reader& in) {
+  const Model *end = std::end(kModels), *model = end;
+  std::string found;
+  if constexpr (Reader::kBinary) {
+    const auto index = in.template get<std::int32_t>("a camera model");
+    if (index >= 0 && index < std::ssize(kModels)) model = &kModels[index];
+    found = model == end ? "number " + std::to_string(index) : std::string(model->name);
+  } else {
+    const std::string_view word = in.word("a camera model");
+    model = std::find_if(std::begin(kModels), end, [&](const Model& m) { return m.name == word; });
+    found = "'" + std::string(word.substr(0, 40)) + "'";
+  }
+  if (model == end || model->parameters == 0)
+    in.fail("a camera model SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL or OPENCV", found);
+  return *model;
+}
+
+Intrinsics read_camera(auto& in) {
+  const Model& model = read_model(in);
   const auto side = [&](const char* what) {
-    const auto n = reader.template get<std::uint64_t>(what);
-    if (n < 1 || n > 65536) reader.fail(std::string(what) + " of 1 to 65536 pixels", std::to_string(n));
+    const auto n = in.template get<std::uint64_t>(what);
+    if (n < 1 || n > 65536) in.fail(std::string(what) + " of 1 to 65536 pixels", std::to_string(n));
     return static_cast<Index>(n);
   };
   const auto focal = [&] {
-    const double f = reader.number("a focal length");
-    if (!(f > 1e-3)) reader.fail("a focal length in (0.001, 1e9) pixels", std::to_string(f));
+    const double f = number(in, "a focal length");
+    if (!(f > 1e-3)) in.fail("a focal length in (0.001, 1e9) pixels", std::to_string(f));
     return f;
   };
   Intrinsics c;
   c.width = side("a width"), c.height = side("a height");
   c.fl_x = c.fl_y = focal();
-  if (model.name == "PINHOLE" || model.name == "OPENCV") c.fl_y = focal();
-  c.cx = reader.number("a principal point"), c.cy = reader.number("a principal point");
-  const std::size_t left = model.parameters - (model.name == "PINHOLE" || model.name == "OPENCV" ? 4 : 3);
-  double* const to[] = {&c.lens.k1, &c.lens.k2, &c.lens.p1, &c.lens.p2};
-  for (std::size_t i = 0; i < left; ++i) *to[i] = reader.number("a distortion coefficient");
+  const bool two = model.name == "PINHOLE" || model.name == "OPENCV";
+  if (two) c.fl_y = focal();
+  c.cx = number(in, "a principal point"), c.cy = number(in, "a principal point");
+  double* const coefficients[] = {&c.lens.k1, &c.lens.k2, &c.lens.p1, &c.lens.p2};
+  for (std::size_t i = 0; i < model.parameters - (two ? 4 : 3); ++i)
+    *coefficients[i] = number(in, "a distortion coefficient");
+  if constexpr (!std::remove_reference_t<decltype(in)>::kBinary)
+    if (!in.at_end())
+      in.fail(std::to_string(model.parameters) + " parameters of " + std::string(model.name), "more");
   return c;
 }
 
-void add(std::map<std::uint32_t, Intrinsics>& cameras, std::uint32_t key, const Intrinsics& camera,
-         const auto& reader) {
-  if (!cameras.emplace(key, camera).second) reader.fail("each camera once", std::to_string(key) + " again");
-}
-
-// COLMAP has x_camera = R x + t with axes right, down, forwards.
+// COLMAP maps x to R x + t, with the camera's axes right, down, forwards.
 Pose pose_of(std::array<double, 4> q, const Vec3& t, const auto& reader) {
   const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (!(std::abs(length - 1) <= 1e-2))
@@ -73,35 +213,25 @@ Pose pose_of(std::array<double, 4> q, const Vec3& t, const auto& reader) {
   return p;
 }
 
-// The key, rotation, position and camera, which both formats have in this order.
 template <class Reader>
-ColmapImage read_image_head(Reader& reader) {
-  reader.template get<std::uint32_t>("the key of an image");
+ColmapImage read_image(Reader& in) {
+  in.template get<std::uint32_t>("the key of an image");
   std::array<double, 4> q{};
   Vec3 t{};
-  for (double& x : q) x = reader.number("a quaternion");
-  for (double& x : t) x = reader.number("a translation");
+  for (double& x : q) x = number(in, "a quaternion");
+  for (double& x : t) x = number(in, "a translation");
   ColmapImage image;
-  image.pose = pose_of(q, t, reader);
-  image.camera = reader.template get<std::uint32_t>("the key of a camera");
-  return image;
-}
-
-void check_name(const ColmapImage& image, const auto& reader) {
+  image.pose = pose_of(q, t, in);
+  image.camera = in.template get<std::uint32_t>("the key of a camera");
+  image.name = in.text("the name of an image");
   if (image.name.empty() || image.name.find('\0') != std::string::npos)
-    reader.fail("the name of an image", "an empty text or one with a NUL");
-}
-
-// -1 is a place in the image without a point.
-void add_point(ColmapImage& image, std::int64_t key, const auto& reader) {
-  if (key < -1) reader.fail("the key of a point, or -1", std::to_string(key));
-  if (key >= 0) image.points.push_back(static_cast<std::uint64_t>(key));
-}
-
-void add(std::map<std::uint64_t, Vec3>& points, std::uint64_t key, auto& reader) {
-  Vec3 p{};
-  for (double& x : p) x = reader.number("a coordinate");
-  if (!points.emplace(key, p).second) reader.fail("each point once", std::to_string(key) + " again");
+    in.fail("the name of an image", "an empty text or one with a NUL");
+  // The points that the image shows are skipped; in text, a line that may be empty, or lack at the end.
+  if constexpr (Reader::kBinary)
+    in.skip(24 * in.count(8 + 8 + 8, "a count of places in the image"));
+  else
+    in.next();
+  return image;
 }
 
 void check_some(const auto& found, std::string_view name, const char* what) {
@@ -112,31 +242,11 @@ void check_some(const auto& found, std::string_view name, const char* what) {
 std::map<std::uint32_t, Intrinsics> parse_colmap_cameras(std::string_view bytes, ColmapFormat format,
                                                          std::string_view name) {
   std::map<std::uint32_t, Intrinsics> cameras;
-  if (format == ColmapFormat::binary) {
-    ColmapBytes in(bytes, name);
-    for (auto left = in.count(4 + 4 + 8 + 8 + 3 * 8, "a count of cameras"); left > 0; --left) {
-      const auto key = in.get<std::uint32_t>("the key of a camera");
-      const auto model = in.get<std::int32_t>("a camera model");
-      const bool named = model >= 0 && static_cast<std::size_t>(model) < std::size(kModels);
-      if (!named) in.fail(kKnown, "number " + std::to_string(model));
-      const Model& m = kModels[model];
-      if (m.parameters == 0) in.fail(kKnown, std::string(m.name));
-      add(cameras, key, read_camera(in, m), in);
-    }
-    in.end();
-  } else {
-    ColmapLines in(bytes, name);
-    while (in.next_record()) {
-      const auto key = in.get<std::uint32_t>("the key of a camera");
-      const std::string_view word = in.word("a camera model");
-      const auto* m = std::find_if(std::begin(kModels), std::end(kModels),
-                                   [&](const Model& k) { return k.name == word && k.parameters > 0; });
-      if (m == std::end(kModels)) in.fail(kKnown, "'" + std::string(word.substr(0, 40)) + "'");
-      add(cameras, key, read_camera(in, *m), in);
-      if (!in.at_end())
-        in.fail(std::to_string(m->parameters) + " parameters of " + std::string(m->name), "more");
-    }
-  }
+  each_record(bytes, format, name, 4 + 4 + 8 + 8 + 3 * 8, "a count of cameras", [&](auto& in) {
+    const auto key = in.template get<std::uint32_t>("the key of a camera");
+    if (!cameras.emplace(key, read_camera(in)).second)
+      in.fail("each camera once", std::to_string(key) + " again");
+  });
   check_some(cameras, name, "camera");
   return cameras;
 }
@@ -144,75 +254,10 @@ std::map<std::uint32_t, Intrinsics> parse_colmap_cameras(std::string_view bytes,
 std::vector<ColmapImage> parse_colmap_images(std::string_view bytes, ColmapFormat format,
                                              std::string_view name) {
   std::vector<ColmapImage> images;
-  if (format == ColmapFormat::binary) {
-    ColmapBytes in(bytes, name);
-    for (auto left = in.count(4 + 7 * 8 + 4 + 1 + 8, "a count of images"); left > 0; --left) {
-      ColmapImage image = read_image_head(in);
-      image.name = in.text("the name of an image");
-      check_name(image, in);
-      for (auto n = in.count(8 + 8 + 8, "a count of places in the image"); n > 0; --n) {
-        in.skip(16);  // where in the image
-        add_point(image, in.get<std::int64_t>("the key of a point"), in);
-      }
-      images.push_back(std::move(image));
-    }
-    in.end();
-  } else {
-    ColmapLines in(bytes, name);
-    while (in.next_record()) {
-      ColmapImage image = read_image_head(in);
-      image.name = in.rest("the name of an image");
-      check_name(image, in);
-      // The line of places in the image may be empty, and the last may lack.
-      if (in.next())
-        while (!in.at_end()) {
-          in.number("a place in the image"), in.number("a place in the image");
-          add_point(image, in.get<std::int64_t>("the key of a point"), in);
-        }
-      images.push_back(std::move(image));
-    }
-  }
+  each_record(bytes, format, name, 4 + 7 * 8 + 4 + 1 + 8, "a count of images",
+              [&](auto& in) { images.push_back(read_image(in)); });
   check_some(images, name, "image");
   return images;
-}
-
-std::map<std::uint64_t, Vec3> parse_colmap_points(std::string_view bytes, ColmapFormat format,
-                                                  std::string_view name) {
-  std::map<std::uint64_t, Vec3> points;
-  if (format == ColmapFormat::binary) {
-    ColmapBytes in(bytes, name);
-    for (auto left = in.count(8 + 3 * 8 + 3 + 8 + 8, "a count of points"); left > 0; --left) {
-      add(points, in.get<std::uint64_t>("the key of a point"), in);
-      in.get<std::array<std::uint8_t, 3>>("a colour"), in.get<double>("an error");
-      in.skip(8 * in.count(8, "a count of images that show it"));
-    }
-    in.end();
-  } else {
-    ColmapLines in(bytes, name);
-    while (in.next_record()) add(points, in.get<std::uint64_t>("the key of a point"), in);
-  }
-  return points;
-}
-
-std::optional<DepthRange> colmap_depth(const ColmapImage& image,
-                                       const std::map<std::uint64_t, Vec3>& points) {
-  const Pose& p = image.pose;
-  std::vector<double> depths;
-  for (const auto key : image.points) {
-    const auto at = points.find(key);
-    if (at == points.end())
-      throw ValueError("[colmap_depth] image: must name points of the model, got " + std::to_string(key) +
-                       " in " + image.name);
-    const double depth = -dot({p[2], p[6], p[10]}, at->second - Vec3{p[3], p[7], p[11]});
-    if (depth > 0) depths.push_back(depth);
-  }
-  if (depths.empty()) return std::nullopt;
-  std::sort(depths.begin(), depths.end());
-  const auto quantile = [&](double q) {
-    return depths[static_cast<std::size_t>(std::lround(q * static_cast<double>(depths.size() - 1)))];
-  };
-  const DepthRange range{.near = quantile(0.001), .far = quantile(0.999)};
-  return range.near < range.far ? std::optional<DepthRange>(range) : std::nullopt;
 }
 
 }  // namespace fieldmark::nerf

@@ -8,7 +8,7 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kGrain = 256;  // rays a piece
+constexpr Index kGrain = 256;  // rays of a chunk
 
 void check_offsets(std::span<const Index> ray_begin, Index samples) {
   if (ray_begin.empty() || ray_begin.back() != samples)

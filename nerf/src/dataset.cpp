@@ -3,12 +3,12 @@
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/imaging/resize.h>
 #include <fieldmark/nerf/dataset.h>
-#include "lens.h"
 
 #include <algorithm>
 #include <exception>
 
 #include "capture.h"
+#include "lens.h"
 
 namespace fieldmark::nerf {
 namespace {
@@ -27,7 +27,7 @@ Tensor<float> to_rgba(const Tensor<float>& image) {
   return out;
 }
 
-// Filters colour times alpha, so that the colour of what is transparent does not leak into edges.
+// Filters premultiplied colour, so that the colour of transparent pixels does not leak into edges.
 Tensor<float> resize_rgba(Tensor<float> image, Index height, Index width) {
   if (image.shape[0] == height && image.shape[1] == width) return image;
   for (Index i = 0; i < image.size(); i += 4)
@@ -39,7 +39,7 @@ Tensor<float> resize_rgba(Tensor<float> image, Index height, Index width) {
   return out;
 }
 
-// What is common to the views of a split.
+// The views of a split before they are read.
 struct Plan {
   std::vector<Shot> shots;
   std::vector<fs::path> files;
@@ -54,23 +54,13 @@ struct Plan {
                 std::to_string(h));
 }
 
-// ValueErrors of a camera or lens, as what is wrong with the shot.
-template <class F>
-auto of_shot(const Shot& shot, F make) {
-  try {
-    return make();
-  } catch (const ValueError& e) {
-    throw IoError(shot.place + ": " + e.what());
-  }
-}
-
 View read_view(const Plan& plan, std::size_t i) {
   const Shot& shot = plan.shots[i];
   const fs::path& path = plan.files[i];
   View view{.camera = {}, .rgba = {}, .name = path.stem().string(), .depth = shot.depth};
-  view.rgba = to_rgba(read_shot(shot, path));
+  view.rgba = to_rgba(at_place(shot.place, [&] { return read_image(path); }));
   const Index width = view.rgba.shape[1], height = view.rgba.shape[0];
-  view.camera = of_shot(shot, [&] { return shot.intrinsics.camera(shot.pose, width, height); });
+  view.camera = at_place(shot.place, [&] { return shot.intrinsics.camera(shot.pose, width, height); });
   Camera scaled = view.camera.scaled(plan.size);
   if (plan.part) {
     if (width != plan.width || height != plan.height)
@@ -91,13 +81,14 @@ View read_view(const Plan& plan, std::size_t i) {
 void plan_lenses(const std::vector<Shot>& all, Plan& plan, std::vector<std::string>& notes) {
   if (std::all_of(all.begin(), all.end(), [](const Shot& s) { return s.intrinsics.lens.is_pinhole(); }))
     return;
-  const Tensor<float> first = read_shot(plan.shots.front(), plan.files.front());
+  const Tensor<float> first =
+      at_place(plan.shots.front().place, [&] { return read_image(plan.files.front()); });
   plan.width = first.shape[1], plan.height = first.shape[0];
   Index left = 0, top = 0, right = plan.width, bottom = plan.height;
   std::vector<std::pair<Camera, Lens>> seen;
   for (const Shot& shot : all) {
     const Lens& lens = shot.intrinsics.lens;
-    const Crop part = of_shot(shot, [&] {
+    const Crop part = at_place(shot.place, [&] {
       const Camera camera = shot.intrinsics.camera({}, plan.width, plan.height);
       const auto same = [&](const auto& s) {
         return s.first.parameters() == camera.parameters() && s.second == lens;
@@ -159,16 +150,9 @@ bool has_file(const fs::path& path) {
 }
 
 Capture read_capture(const fs::path& folder, Layout layout, const DatasetOptions& options) {
-  switch (layout) {
-    case Layout::blender:
-      return read_blender(folder, options.split);
-    case Layout::transforms:
-      return read_transforms(folder);
-    case Layout::llff:
-      return read_llff(folder, options.size);
-    default:
-      return read_colmap(folder, options.size);
-  }
+  if (layout == Layout::blender) return read_blender(folder, options.split);
+  if (layout == Layout::transforms) return read_transforms(folder);
+  return layout == Layout::llff ? read_llff(folder, options.size) : read_colmap(folder, options.size);
 }
 
 // In parallel; the first image's error is the one reported, however many threads read.
@@ -196,19 +180,6 @@ std::vector<View> read_views(const Plan& plan) {
 }  // namespace
 
 float background_value(Background background) { return background == Background::white ? 1.0f : 0.0f; }
-
-std::string_view layout_name(Layout layout) {
-  switch (layout) {
-    case Layout::blender:
-      return "blender";
-    case Layout::transforms:
-      return "transforms";
-    case Layout::llff:
-      return "llff";
-    default:
-      return "colmap";
-  }
-}
 
 Layout find_layout(const fs::path& folder) {
   std::error_code error;
@@ -250,8 +221,6 @@ Dataset load_dataset(const fs::path& folder, const DatasetOptions& options) {
           .views = read_views(plan),
           .layout = layout,
           .forward_facing = capture.forward_facing,
-          .aabb_scale = capture.aabb_scale,
-          .points = std::move(capture.points),
           .notes = std::move(capture.notes)};
 }
 

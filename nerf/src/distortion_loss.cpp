@@ -12,7 +12,7 @@ void check(const Shape& sigma, std::size_t delta, std::size_t middle, std::span<
   check_rank("distortion_loss", "sigma", sigma, 1, "[S]");
   const Index n = sigma[0];
   if (static_cast<Index>(delta) != n || static_cast<Index>(middle) != n)
-    throw ShapeError("[distortion_loss] delta and middle must have a number for each of " +
+    throw ShapeError("[distortion_loss] delta and middle must have an element for each of " +
                      std::to_string(n) + " samples, got " + std::to_string(delta) + " and " +
                      std::to_string(middle));
   if (ray_begin.empty() || ray_begin.front() != 0 || ray_begin.back() != n ||
@@ -45,7 +45,7 @@ Var<T> distortion_loss(Var<T> sigma, std::span<const T> delta, std::span<const T
     for (Index i = begin[r]; i < begin[r + 1]; ++i) {
       const T x = sigma.value()[i] * d[i], w = -t * std::expm1(-x);
       t = x < T(0.5) ? t - w : t * std::exp(-x);
-      // Grown by what was left behind times the way: differences of products m W would cancel far away.
+      // Accumulated step by step: differences of products m W would cancel far away.
       if (i > begin[r]) apart += w_sum * (m[i] - m[i - 1]);
       weight[i] = w, after[i] = t, before[i] = apart;
       sum += static_cast<double>(2 * w * apart + w * w * d[i] / 3);

@@ -13,8 +13,8 @@ namespace {
 
 constexpr Index kSsimWindow = 11;
 
-// [H, W], above 0.5 on the object.
-Tensor<float> object_mask(const View& view, const Rendering& rendering) {
+// [H, W], above 0.5 on the foreground.
+Tensor<float> foreground_mask(const View& view, const Rendering& rendering) {
   Tensor<float> alpha({view.rgba.shape[0], view.rgba.shape[1]});
   for (Index i = 0; i < alpha.size(); ++i) alpha[i] = view.rgba[4 * i + 3];
   const bool opaque = std::all_of(alpha.data.begin(), alpha.data.end(), [](float a) { return a >= 1; });
@@ -44,15 +44,15 @@ Evaluation evaluate(Renderer& renderer, const Dataset& dataset,
     const auto start = Clock::now();
     const Rendering rendering = renderer.render(view.camera);
     seconds += std::chrono::duration<double>(Clock::now() - start).count();
-    const Tensor<float> photograph = composited(view, dataset.background);
+    const Tensor<float> truth = composited(view, dataset.background);
     const Index side = std::min(view.camera.width, view.camera.height);
     const double none = std::numeric_limits<double>::quiet_NaN();
     result.per_view.push_back(
-        {.psnr = psnr(rendering.rgb, photograph),
-         .psnr_foreground = psnr_masked(rendering.rgb, photograph, object_mask(view, rendering)),
-         .ssim = side >= kSsimWindow ? ssim(rendering.rgb, photograph) : none,
+        {.psnr = psnr(rendering.rgb, truth),
+         .psnr_foreground = psnr_masked(rendering.rgb, truth, foreground_mask(view, rendering)),
+         .ssim = side >= kSsimWindow ? ssim(rendering.rgb, truth) : none,
          .lpips = lpips && side >= lpips->smallest()
-                      ? lpips->distance(quantize8(rendering.rgb), quantize8(photograph)).value
+                      ? lpips->distance(quantize8(rendering.rgb), quantize8(truth)).value
                       : none});
     ++result.views;
     if (progress && !progress(result.views, static_cast<Index>(dataset.views.size()))) break;

@@ -1,36 +1,33 @@
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/nerf/field.h>
-#include <fieldmark/nerf/spherical_harmonics.h>
+
+#include "checks.h"
 
 namespace fieldmark::nerf {
 namespace {
 
 FieldOptions checked(const FieldOptions& o) {
-  if (o.kind == FieldKind::mlp) return o;  // its options are checked where they are used
-  if (o.width < 1 || o.width > 256)
-    throw ValueError("[field] width must be 1 to 256, got " + std::to_string(o.width));
-  if (o.geometry < 1 || o.geometry > 256)
-    throw ValueError("[field] geometry must be 1 to 256, got " + std::to_string(o.geometry));
+  if (o.kind == FieldKind::mlp) return o;  // MlpField checks its options
+  check_range("field", "width", o.width, 1, 256);
+  check_range("field", "geometry", o.geometry, 1, 256);
   return o;
 }
 
 template <class T>
 void add_networks(ParamStore<T>& store, const std::string& prefix, const FieldOptions& o, std::uint64_t seed,
                   std::vector<Dense<T>>& density, std::vector<Dense<T>>& colour) {
+  const auto add = [&](std::vector<Dense<T>>& layers, const char* part, Index in, Index out, bool relu) {
+    const std::string name = prefix + part + std::to_string(layers.size());
+    const Activation activation = relu ? Activation::relu : Activation::none;
+    layers.emplace_back(store, name, DenseOptions{.in = in, .out = out, .activation = activation}, ++seed);
+  };
   const Index features = Index{o.encoding.features} * o.encoding.levels;
-  density.emplace_back(store, prefix + "density/0",
-                       DenseOptions{.in = features, .out = o.width, .activation = Activation::relu},
-                       seed + 1);
-  density.emplace_back(store, prefix + "density/1", DenseOptions{.in = o.width, .out = o.geometry}, seed + 2);
-  colour.emplace_back(store, prefix + "colour/0",
-                      DenseOptions{.in = o.geometry + features + (o.directional ? kSphericalHarmonics : 0),
-                                   .out = o.width,
-                                   .activation = Activation::relu},
-                      seed + 3);
-  colour.emplace_back(store, prefix + "colour/1",
-                      DenseOptions{.in = o.width, .out = o.width, .activation = Activation::relu}, seed + 4);
-  colour.emplace_back(store, prefix + "colour/2", DenseOptions{.in = o.width, .out = 3}, seed + 5);
+  add(density, "density/", features, o.width, true);
+  add(density, "density/", o.width, o.geometry, false);
+  add(colour, "colour/", o.geometry + features + (o.directional ? kSphericalHarmonics : 0), o.width, true);
+  add(colour, "colour/", o.width, o.width, true);
+  add(colour, "colour/", o.width, 3, false);
 }
 
 }  // namespace
@@ -46,7 +43,6 @@ Field<T>::Field(ParamStore<T>& store, const FieldOptions& options, std::uint64_t
   else
     add_networks(store, before, options_, seed, density_, colour_);
   network_size_ = store.size() - size;
-  // The table comes after the networks.
   if (!mlp_) encoding_.emplace(store, before + "hash", options_.encoding, seed);
 }
 
@@ -54,27 +50,6 @@ template <class T>
 const HashEncoding<T>& Field<T>::encoding() const {
   if (!encoding_) throw ValueError("[field] encoding: expected a field with a hash table, got an mlp field");
   return *encoding_;
-}
-
-template <class T>
-Index Field<T>::density_width() const {
-  return mlp_ ? mlp_->feature_width() : encoding_->width();
-}
-
-template <class T>
-Index Field<T>::colour_width() const {
-  return mlp_ ? 0 : encoding_->width();
-}
-
-template <class T>
-Index Field<T>::geometry_width() const {
-  return mlp_ ? mlp_->geometry_width() : options_.geometry;
-}
-
-template <class T>
-Index Field<T>::direction_width() const {
-  if (mlp_) return mlp_->direction_width();
-  return options_.directional ? kSphericalHarmonics : 0;
 }
 
 template <class T>

@@ -13,8 +13,9 @@ constexpr double kGrowth = 1.75, kFiner = 1.5;
 constexpr int kFirstTable = 9, kBase = 16, kMostFinest = 2048;
 constexpr Index kMostTrials = 12;
 constexpr Index kLeastRays = 128;  // of a step: scenes without bounds have hundreds of samples a ray at first
-constexpr Index kScout = 256;      // steps at most that find out what is empty
-constexpr Index kAsked = 16;       // steps between two looks at the clock
+constexpr Index kScout = 256;      // steps at most to find empty cells
+constexpr Index kAsked = 16;       // steps between two calls of progress
+constexpr double kHeaderBytes = 32e3;  // names and metadata of a file, cameras included
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -22,7 +23,7 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-// Levels from kBase to the finest resolution; the grid that skips empty space follows it.
+// Levels from kBase to the finest resolution, and the occupancy grid that goes with them.
 void set_resolution(RadianceFieldOptions& field, double finest) {
   HashEncodingOptions& e = field.field.encoding;
   e.base_resolution = std::min(kBase, static_cast<int>(finest));
@@ -31,7 +32,7 @@ void set_resolution(RadianceFieldOptions& field, double finest) {
   field.occupancy = finest >= 384 ? 128 : finest >= 160 ? 64 : 32;
 }
 
-// Bits of a grid of `from` cells per axis for one of `to`: 1 where any cell that overlaps is 1.
+// Resamples a grid of `from` cells per axis to `to`: 1 where any overlapping cell is 1.
 std::vector<std::uint8_t> resampled(std::span<const std::uint8_t> bits, Index from, Index to) {
   std::vector<std::uint8_t> out(static_cast<std::size_t>(to * to * to));
   const auto first = [&](Index c) { return c * to / from; };
@@ -95,7 +96,7 @@ class Sizing {
     return !ended_;
   }
 
-  // Where rays have no bounds, most of a short training goes into finding out what is empty: once for all.
+  // Without bounds, most of a short training goes into finding empty cells: done once for all.
   void find_empty(Trainer& scout, const OccupancyGrid& grid) {
     while (scout.steps() < std::min(kScout, options_.steps)) {
       scout.step(0);
@@ -104,7 +105,7 @@ class Sizing {
     seen_.assign(grid.bits().begin(), grid.bits().end());
   }
 
-  // Whether the training was made.
+  // Whether the training ran to its end.
   bool attempt(const std::string& what, const RadianceFieldOptions& field) {
     if (ended_ || !goes_on()) return false;
     RadianceField trial(field);
@@ -142,7 +143,7 @@ class Sizing {
     }
   }
 
-  // Whether the smaller field was taken: it loses at most `loss` dB, or is good enough.
+  // Whether the smaller field was kept: it loses at most `loss` dB, or is good enough.
   bool take_away(const std::string& what, const RadianceFieldOptions& next, double loss) {
     if (found_.trials.empty() || !attempt(what, next)) return false;
     SizingTrial& trial = found_.trials.back();
@@ -162,12 +163,24 @@ class Sizing {
   const std::function<bool(Index, Index)>& progress_;
   RadianceFieldOptions start_;
   FieldSizing found_;
-  std::vector<std::uint8_t> seen_;  // cells of start_'s grid that are not empty; none: not known
-  double psnr_ = 0;                 // of what found_.field did
+  std::vector<std::uint8_t> seen_;  // occupied cells of start_'s grid; none: unknown
+  double psnr_ = 0;                 // of found_.field
   bool ended_ = false;
 };
 
 }  // namespace
+
+std::optional<RadianceFieldOptions> fit_field(RadianceFieldOptions field, double max_bytes) {
+  int& log2_table = field.field.encoding.log2_table;
+  for (const int least = field.field.kind == FieldKind::mlp ? log2_table : 4; log2_table >= least;
+       --log2_table) {
+    const RadianceField made(field);
+    const double bytes =
+        4.0 * static_cast<double>(made.params.size()) + static_cast<double>(made.grid.cells()) / 8;
+    if (bytes + kHeaderBytes <= max_bytes) return field;
+  }
+  return std::nullopt;
+}
 
 double pixel_resolution(const Dataset& data, const Space& space) {
   std::vector<double> cells;

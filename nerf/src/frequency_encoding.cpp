@@ -6,7 +6,7 @@
 
 namespace fieldmark::nerf {
 namespace {
-constexpr Index kGrain = 1024;  // rows a piece
+constexpr Index kGrain = 1024;  // rows of a chunk
 }
 
 template <class T>

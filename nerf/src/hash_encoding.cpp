@@ -1,24 +1,22 @@
 #include <fieldmark/engine/parallel.h>
-#include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/nerf/hash_encoding.h>
 
 #include <cmath>
 #include <random>
 
+#include "checks.h"
 #include "kernels/hash_grid.h"
 
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kGrain = 1024;  // points a piece
+constexpr Index kGrain = 1024;  // points of a chunk
 
 void check(const HashEncodingOptions& o) {
-  if (o.levels < 1 || o.levels > 32)
-    throw ValueError("[hash_encoding] levels must be 1 to 32, got " + std::to_string(o.levels));
+  check_range("hash_encoding", "levels", o.levels, 1, 32);
   if (o.features != 2 && o.features != 4)
     throw ValueError("[hash_encoding] features must be 2 or 4, got " + std::to_string(o.features));
-  if (o.log2_table < 4 || o.log2_table > 24)
-    throw ValueError("[hash_encoding] log2_table must be 4 to 24, got " + std::to_string(o.log2_table));
+  check_range("hash_encoding", "log2_table", o.log2_table, 4, 24);
   if (o.base_resolution < 1 || !(o.finest_resolution >= o.base_resolution) || o.finest_resolution > 65536)
     throw ValueError("[hash_encoding] resolutions must satisfy 1 <= base <= finest <= 65536, got base " +
                      std::to_string(o.base_resolution) + " and finest " +
@@ -114,8 +112,8 @@ Var<T> HashEncoding<T>::operator()(const Params<T>& params, Var<T> x, Part part)
   encode({table.value(), static_cast<std::size_t>(table.shape().size())}, x.value(), n, density ? y : unused,
          density ? unused : y);
 
-  // Positions write only their own row of dx, so pieces of them run in parallel; many positions share a table
-  // entry, so there the levels run in parallel, each owning its rows of the table.
+  // A position owns its row of dx, so chunks of positions run in parallel. Positions share rows of the table,
+  // so there levels run in parallel: each owns its rows.
   tape.on_backward(out, [this, x, table, n, density](const T* dy) {
     using namespace kernels;
     const T *dd = density ? dy : nullptr, *dc = density ? nullptr : dy;

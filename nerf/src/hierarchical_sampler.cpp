@@ -1,45 +1,32 @@
-#include <fieldmark/nerf/hierarchical_sampler.h>
-#include <fieldmark/nerf/importance_points.h>
+#include "hierarchical_sampler.h"
 
 #include <algorithm>
 #include <bit>
 
+#include "checks.h"
+
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kSpans = 64;  // occupied stretches of a ray that there is room for from the first call on
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+constexpr double kFloor = 3e-4;  // see importance_points()
+constexpr Index kSpans = 64;     // occupied stretches of a ray that are reserved from the first call on
 
 void check(const RayBatch& rays, std::span<const float> jitter, float step, const RayPoints& points) {
-  const auto require = [](const char* name, Index count) {
-    if (count < 0 || count > 1024)
-      throw ValueError("[hierarchical_sampler] " + std::string(name) + " must be 0 to 1024, got " +
-                       std::to_string(count));
-  };
-  require("average", points.average);
-  require("importance", points.importance);
-  require("random", points.random);
+  check_range("hierarchical_sampler", "average", points.average, 0, 1024);
+  check_range("hierarchical_sampler", "importance", points.importance, 0, 1024);
+  check_range("hierarchical_sampler", "random", points.random, 0, 1024);
   if (points.first() == 0)
     throw ValueError(
         "[hierarchical_sampler] average or random must be at least 1 (importance points are drawn from their "
         "weights), got 0 and 0");
-  if (!(step > 0))
-    throw ValueError("[hierarchical_sampler] step must be positive, got " + std::to_string(step));
   if (rays.contracted)
     throw ValueError(
         "[hierarchical_sampler] rays must be straight in the cube (points are spread by length), got "
         "contracted ones");
-  if (rays.origins.size() != rays.directions.size() || rays.origins.size() % 3 != 0)
-    throw ShapeError("[hierarchical_sampler] origins and directions must both be [R, 3], got " +
-                     std::to_string(rays.origins.size()) + " and " + std::to_string(rays.directions.size()) +
-                     " numbers");
-  if (!jitter.empty() && static_cast<Index>(jitter.size()) != rays.size())
-    throw ShapeError("[hierarchical_sampler] jitter must have one number a ray (" +
-                     std::to_string(rays.size()) + "), got " + std::to_string(jitter.size()));
+  check_rays("hierarchical_sampler", rays, jitter, step);
 }
 
-// A number that tells rays apart by the bits of what they are (FNV-1a over words).
+// A hash of a ray (FNV-1a over the words of its floats).
 std::uint64_t ray_seed(const float* origin, const float* direction) {
   std::uint64_t h = 0xcbf29ce484222325u;
   for (const float* v : {origin, direction})
@@ -53,7 +40,7 @@ void begin(Index rays, Index points, RaySamples& out) {
   for (auto* v :
        {&out.position, &out.t, &out.delta, &out.sigma, &out.density_features, &out.colour_features, &out.z})
     v->clear();
-  // As much as rays can have at all: a later call with fewer that are empty does not allocate.
+  // The most that these rays can have: a later call with fewer empty ones does not allocate.
   for (auto* v : {&out.t, &out.delta, &out.sigma}) v->reserve(at(rays * points));
   out.position.reserve(at(3 * rays * points));
 }
@@ -62,13 +49,53 @@ float uniform(const CounterRng& rng, std::uint64_t seed, Index i) {
   return rng.uniform4(seed, static_cast<std::uint64_t>(i / 4))[at(i % 4)];
 }
 
-// Bounds of the intervals that points stand for: 0, the middles between neighbours, the length.
+// Bounds of the points' intervals: 0, the middles between neighbours, the length.
 float edge_before(std::span<const float> s, std::size_t i, float length) {
   if (i == 0) return 0;
   return i == s.size() ? length : 0.5f * (s[i - 1] + s[i]);
 }
 
 }  // namespace
+
+template <class T>
+void importance_points(std::span<const T> edge, std::span<const T> weight, std::span<const T> u,
+                       std::span<T> out) {
+  if (weight.empty() || edge.size() != weight.size() + 1)
+    throw ShapeError(
+        "[importance_points] edge must have one element more than weight, which has at least 1, got " +
+        std::to_string(edge.size()) + " and " + std::to_string(weight.size()));
+  if (out.size() != u.size())
+    throw ShapeError("[importance_points] out must have the " + std::to_string(u.size()) +
+                     " elements of u, got " + std::to_string(out.size()));
+  const std::size_t n = weight.size();
+  const double length = static_cast<double>(edge[n]) - static_cast<double>(edge[0]);
+  const double per_length = length > 0 ? kFloor / length : 0;
+  const auto mass = [&](std::size_t i) {
+    return static_cast<double>(weight[i]) +
+           per_length * (static_cast<double>(edge[i + 1]) - static_cast<double>(edge[i]));
+  };
+  double total = 0;
+  for (std::size_t i = 0; i < n; ++i) total += mass(i);
+
+  // Sums in double: the rest within an interval is a difference of two sums.
+  std::size_t i = 0;
+  double before = 0, here = mass(0);
+  for (std::size_t j = 0; j < u.size(); ++j) {
+    const double want = static_cast<double>(u[j]) * total;
+    while (i + 1 < n && before + here < want) {
+      before += here;
+      here = mass(++i);
+    }
+    const double lower = static_cast<double>(edge[i]), upper = static_cast<double>(edge[i + 1]);
+    const double part = here > 0 ? std::clamp((want - before) / here, 0.0, 1.0) : 0;
+    out[j] = static_cast<T>(lower + part * (upper - lower));
+  }
+}
+
+template void importance_points(std::span<const float>, std::span<const float>, std::span<const float>,
+                                std::span<float>);
+template void importance_points(std::span<const double>, std::span<const double>, std::span<const double>,
+                                std::span<double>);
 
 // Occupied stretches of a ray, from the samples of a walk that lie next to each other. Returns their length.
 float HierarchicalSampler::find_spans(const OccupancyGrid& grid, const float* origin, const float* direction,
@@ -152,7 +179,7 @@ void HierarchicalSampler::refine(const RayBatch& rays, const RaySamples& first,
                                  std::span<const float> weights, RaySamples& out) {
   if (first.t.size() != s_.size() || weights.size() != s_.size() || rays.size() != std::ssize(length_))
     throw ShapeError("[hierarchical_sampler] first and weights must be of the " + std::to_string(s_.size()) +
-                     " samples that spread() gave, got " + std::to_string(first.t.size()) + " and " +
+                     " samples of spread(), got " + std::to_string(first.t.size()) + " and " +
                      std::to_string(weights.size()));
   begin(rays.size(), points_.total(), out);
   const auto count = static_cast<float>(points_.importance);

@@ -1,5 +1,5 @@
 #pragma once
-// A value inside a JSON text that knows where it stands, so that errors can say so. Private.
+// A value inside a JSON text with its place, which errors name.
 #include <fieldmark/core/error.h>
 #include <fieldmark/nerf/camera.h>
 
@@ -44,6 +44,8 @@ class JsonPlace {
     if (!(x > low && x < high)) fail("a number in " + range, std::to_string(x));
     return x;
   }
+  /// A side of an image, pixels.
+  Index side() const { return std::lround(number_in(0.5, 65536.5, "1 to 65536")); }
   std::string text() const {
     if (!value_->is_string()) fail("text", kind());
     return value_->get<std::string>();

@@ -1,4 +1,5 @@
 #include "lens.h"
+
 #include <fieldmark/core/error.h>
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 namespace fieldmark::nerf {
 namespace {
 
-// Row-major 2x2 matrix of derivatives of distorted(); symmetric.
+// The derivative of distorted(), a symmetric 2x2 matrix: xx, xy, yy.
 std::array<double, 3> derivative(const Lens& l, const Vec2& q) {
   const double x = q[0], y = q[1], r2 = x * x + y * y;
   const double a = 1 + r2 * (l.k1 + r2 * l.k2), slope = l.k1 + 2 * l.k2 * r2;  // a and da / d(r^2)
@@ -41,7 +42,7 @@ void check_invertible(const Camera& c, const Lens& lens) {
     }
 }
 
-// Whether the lens's image has what the pinhole sees at a pixel.
+// Whether a pixel of the pinhole has a source in the lens's image.
 bool has_source(const Camera& c, const Lens& lens, Index column, Index row) {
   const Vec2 q = on_plane(c, static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5);
   const Vec2 p = on_image(c, lens.distorted(q));
@@ -61,7 +62,7 @@ double missing_share(const Camera& c, const Lens& lens, const Crop& r, int side)
   return static_cast<double>(missing) / static_cast<double>(length);
 }
 
-// Adds weight * the pixel at (row, column), or the nearest there is, to colour times alpha and alpha.
+// Adds weight times a pixel, or the nearest one in the image, to premultiplied colour and alpha.
 void add_pixel(const Tensor<float>& rgba, Index column, Index row, double weight, double* sum) {
   const Index height = rgba.shape[0], width = rgba.shape[1];
   const Index y = std::clamp<Index>(row, 0, height - 1), x = std::clamp<Index>(column, 0, width - 1);
@@ -127,6 +128,30 @@ std::optional<Vec2> Lens::undistorted(const Vec2& seen) const {
     q = to, f = off(q);
   }
   return std::nullopt;
+}
+
+Camera Intrinsics::camera(const Pose& pose, Index image_width, Index image_height) const {
+  if (!(fl_x > 0) && !(angle_x > 0)) throw ValueError("[camera] intrinsics: fl_x or angle_x must be stated");
+  const auto w = static_cast<double>(image_width), h = static_cast<double>(image_height);
+  const bool sized = width > 0 && height > 0;
+  const double sx = sized ? w / static_cast<double>(width) : 1,
+               sy = sized ? h / static_cast<double>(height) : 1;
+  if (sized && std::abs(sx - sy) > 1 / static_cast<double>(width) + 1 / static_cast<double>(height))
+    throw ValueError("[camera] image: must be of " + std::to_string(width) + " x " + std::to_string(height) +
+                     " pixels as stated, or that scaled, got " + std::to_string(image_width) + " x " +
+                     std::to_string(image_height));
+  Camera c = angle_x > 0 ? make_camera(pose, angle_x, image_width, image_height)
+                         : Camera{.pose = pose, .width = image_width, .height = image_height};
+  if (fl_x > 0) c.fx = fl_x * sx;
+  if (fl_y > 0)
+    c.fy = fl_y * sy;
+  else if (angle_y > 0)
+    c.fy = 0.5 * h / std::tan(0.5 * angle_y);
+  else if (fl_x > 0)
+    c.fy = fl_x * sy;
+  c.cx = cx ? *cx * sx : 0.5 * w;
+  c.cy = cy ? *cy * sy : 0.5 * h;
+  return c;
 }
 
 Crop covered_part(const Camera& camera, const Lens& lens) {

@@ -1,10 +1,11 @@
 #include "llff.h"
+
 #include <fieldmark/core/error.h>
-#include "npy.h"
 
 #include <cmath>
 #include <string>
 
+#include "npy.h"
 #include "rotation.h"
 
 namespace fieldmark::nerf {

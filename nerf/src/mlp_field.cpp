@@ -7,26 +7,23 @@
 #include <algorithm>
 #include <array>
 
+#include "checks.h"
+
 namespace fieldmark::nerf {
 namespace {
 
 constexpr Index kBlock = 32, kMostBands = 20;
 
 MlpFieldOptions checked(const MlpFieldOptions& o) {
-  const auto require = [](const char* name, Index value, Index least, Index most) {
-    if (value < least || value > most)
-      throw ValueError("[mlp_field] " + std::string(name) + " must be " + std::to_string(least) + " to " +
-                       std::to_string(most) + ", got " + std::to_string(value));
-  };
-  require("layers", o.layers, 1, 16);
-  require("width", o.width, 2, 1024);
-  require("skip", o.skip, 0, o.layers - 1);
-  require("position_bands", o.position_bands, 1, kMostBands);
-  require("direction_bands", o.direction_bands, 1, kMostBands);
+  check_range("mlp_field", "layers", o.layers, 1, 16);
+  check_range("mlp_field", "width", o.width, 2, 1024);
+  check_range("mlp_field", "skip", o.skip, 0, o.layers - 1);
+  check_range("mlp_field", "position_bands", o.position_bands, 1, kMostBands);
+  check_range("mlp_field", "direction_bands", o.direction_bands, 1, kMostBands);
   return o;
 }
 
-// p beside its frequencies.
+// p and its frequencies.
 template <class T>
 Var<T> with_frequencies(Var<T> p, int bands) {
   return concat_columns<T>({p, frequency_encoding(p, bands)});
@@ -89,7 +86,7 @@ Var<T> MlpField<T>::geometry(const Params<T>& params, Var<T> features) const {
   Var<T> h = features;
   for (Index l = 0; l < options_.layers; ++l) {
     if (l > 0 && l == options_.skip) h = concat_columns<T>({features, h});
-    h = density_[static_cast<std::size_t>(l)](params, h);
+    h = density_[at(l)](params, h);
   }
   return concat_columns<T>({density_.back()(params, h), h});
 }

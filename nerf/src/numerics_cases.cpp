@@ -1,20 +1,22 @@
 #include <fieldmark/nerf/frequency_encoding.h>
 #include <fieldmark/nerf/hash_encoding.h>
-#include <fieldmark/nerf/marching.h>
 #include <fieldmark/nerf/numerics_cases.h>
 
 #include <algorithm>
 #include <numbers>
 
 #include "hash_reference.h"
-#include "numerics_cases_parts.h"
+#include "marching.h"
 
 namespace fieldmark::nerf {
+
+void add_ray_numerics(std::vector<NumericsCase>& cases);  // numerics_cases_rays.cpp
+
 namespace {
 
 using Real = long double;
 
-// sin and cos of 2^b pi x, b < 16, and the gradient in x, relative to the sum of its terms' sizes.
+// sin and cos of 2^b pi x, b < 16, and the gradient in x, relative to the sum of its terms' magnitudes.
 template <class T>
 void compare_frequency(double far, WorstError& error) {
   constexpr int bands = 16;
@@ -61,8 +63,8 @@ struct Hash {
   }
 };
 
-// Values, gradients in positions and in the table, by the paper's formulas, relative to the sums of the
-// terms' sizes.
+// Values and gradients in positions and table, by the paper's formulas, relative to the sum of the terms'
+// magnitudes.
 template <class T>
 void compare_hash(const Tensor<T>& x, WorstError& error) {
   Hash<T> hash;
@@ -104,7 +106,7 @@ void compare_hash(const Tensor<T>& x, WorstError& error) {
     error.compare(hash.store.grads()[k], dt[k], std::max(dt_size[k], Real{1e-30L}));
 }
 
-// Every mixture of the given coordinates.
+// All points with the given coordinates.
 template <class T>
 Tensor<T> grid(const std::vector<double>& at) {
   Tensor<T> x(Shape{0, 3});
@@ -116,7 +118,7 @@ Tensor<T> grid(const std::vector<double>& at) {
   return x;
 }
 
-// What is not a number makes its own row no number, and touches no other.
+// A NaN makes its own row NaN and touches no other.
 template <class T>
 void compare_hash_nan(WorstError& error) {
   using Limits = std::numeric_limits<T>;
@@ -140,7 +142,7 @@ void compare_hash_nan(WorstError& error) {
   }
 }
 
-// The span of a ray in the cube by the definition, in long double: empty where near >= far.
+// The span of a ray in the cube by the definition, in long double; empty where near >= far.
 std::pair<Real, Real> exact_span(const float* o, const float* d) {
   Real near = 0, far = std::numeric_limits<Real>::infinity();
   for (int a = 0; a < 3; ++a) {
@@ -179,9 +181,7 @@ void compare_spans(WorstError& error) {
 
 std::vector<NumericsCase> numerics_cases() {
   std::vector<NumericsCase> all;
-  add_composite_numerics(all);
-  add_importance_numerics(all);
-  add_space_numerics(all);
+  add_ray_numerics(all);
   for (const double far : {0.0, 1e2, 1e4, 1e6, 1e9}) {
     char name[80];
     std::snprintf(name, sizeof name, "frequency_encoding: 2^15 x at %g", far);
@@ -196,7 +196,7 @@ std::vector<NumericsCase> numerics_cases() {
                [](auto t, WorstError& e) {
                  compare_hash(grid<decltype(t)>({-3, -0.25, 0.4, 1.25, 7}), e);
                });
-  add_numerics(all, "hash_encoding: positions that are no numbers", "bits", 0, 0,
+  add_numerics(all, "hash_encoding: NaN and infinite positions", "bits", 0, 0,
                [](auto t, WorstError& e) { compare_hash_nan<decltype(t)>(e); });
   all.push_back(
       {"marching: rays parallel to faces, in them and from inside", "float", "distance, 1", 2e-7, [] {

@@ -4,14 +4,20 @@
 
 #include <algorithm>
 
+#include "checks.h"
+
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kPiece = 1024;  // cells looked at together
+constexpr Index kChunk = 1024;  // cells sampled together
 constexpr float kExcluded = -1.f;
 constexpr std::uint8_t kFarthest = 16;  // blocks
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+void check_cells(const char* name, std::size_t size, Index cells) {
+  if (size != at(cells))
+    throw ShapeError("[occupancy_grid] " + std::string(name) + " must have " + std::to_string(cells) +
+                     " entries, got " + std::to_string(size));
+}
 
 }  // namespace
 
@@ -34,9 +40,7 @@ Index OccupancyGrid::occupied_cells() const {
 }
 
 void OccupancyGrid::restrict_to(std::span<const std::uint8_t> keep) {
-  if (static_cast<Index>(keep.size()) != cells())
-    throw ShapeError("[occupancy_grid] keep must have " + std::to_string(cells()) + " entries, got " +
-                     std::to_string(keep.size()));
+  check_cells("keep", keep.size(), cells());
   for (std::size_t c = 0; c < keep.size(); ++c)
     if (!keep[c]) {
       density_[c] = kExcluded;
@@ -52,7 +56,7 @@ void OccupancyGrid::update(const Density& density, const CounterRng& rng, const 
   const Index looked = n > offset ? (n - offset + fraction - 1) / fraction : 0;
   const float side = 1.f / static_cast<float>(resolution_);
   const auto look = [&](Index lane, Index begin, Index end) {
-    float x[3 * kPiece], sigma[kPiece];
+    float x[3 * kChunk], sigma[kChunk];
     for (Index i = begin; i < end; ++i) {
       const Index c = candidates_[at(offset + i * fraction)];
       const auto jitter = rng.uniform4(u.round, static_cast<std::uint64_t>(c));
@@ -67,18 +71,16 @@ void OccupancyGrid::update(const Density& density, const CounterRng& rng, const 
       bits_[c] = density_[c] * u.step > u.threshold;
     }
   };
-  // Pieces are dealt to the lanes in turn; a cell has one owner.
+  // Chunks go to the lanes in turn; a cell has one owner.
   parallel_for(kLanes, 1, [&](Index lane, Index) {
-    for (Index begin = lane * kPiece; begin < looked; begin += kLanes * kPiece)
-      look(lane, begin, std::min(begin + kPiece, looked));
+    for (Index begin = lane * kChunk; begin < looked; begin += kLanes * kChunk)
+      look(lane, begin, std::min(begin + kChunk, looked));
   });
   rebuild_blocks();
 }
 
 void OccupancyGrid::restore(std::span<const float> densities, std::span<const std::uint8_t> bits) {
-  if (static_cast<Index>(densities.size()) != cells())
-    throw ShapeError("[occupancy_grid] densities must have " + std::to_string(cells()) + " entries, got " +
-                     std::to_string(densities.size()));
+  check_cells("densities", densities.size(), cells());
   set_bits(bits);
   density_.assign(densities.begin(), densities.end());
   candidates_.clear();
@@ -87,9 +89,7 @@ void OccupancyGrid::restore(std::span<const float> densities, std::span<const st
 }
 
 void OccupancyGrid::set_bits(std::span<const std::uint8_t> bits) {
-  if (static_cast<Index>(bits.size()) != cells())
-    throw ShapeError("[occupancy_grid] bits must have " + std::to_string(cells()) + " entries, got " +
-                     std::to_string(bits.size()));
+  check_cells("bits", bits.size(), cells());
   bits_.assign(bits.begin(), bits.end());
   rebuild_blocks();
 }
@@ -113,7 +113,7 @@ void OccupancyGrid::rebuild_blocks() {
 
 // The distance is the largest of those along the axes, so the axes can be taken one after another:
 //   d'(i) = min over j of max(d(j), |i - j|)
-// No block further away than the best so far can better it.
+// A block further away than the best so far cannot improve on it.
 void OccupancyGrid::measure_clearance() {
   const Index n = block_side_;
   for (Index stride : {Index{1}, n, n * n})

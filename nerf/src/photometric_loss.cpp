@@ -3,19 +3,17 @@
 
 #include <cmath>
 
-#include "photometric_residual.h"
-
 namespace fieldmark::nerf {
 
 template <class T>
-Var<T> photometric_loss(Var<T> rays, std::span<const T> photograph, std::span<const T> background,
+Var<T> photometric_loss(Var<T> rays, std::span<const T> truth, std::span<const T> background,
                         const PhotometricLossOptions& options) {
   check_rank("photometric_loss", "rays", rays.shape(), 2, "[R, 4]");
   check_extent("photometric_loss", "rays", rays.shape(), 1, 4, "red, green, blue, opacity");
   const Index n = rays.shape()[0];
-  if (static_cast<Index>(photograph.size()) != 4 * n || static_cast<Index>(background.size()) != 3 * n)
-    throw ShapeError("[photometric_loss] photograph and background must have 4 and 3 numbers a ray (" +
-                     std::to_string(n) + " rays), got " + std::to_string(photograph.size()) + " and " +
+  if (static_cast<Index>(truth.size()) != 4 * n || static_cast<Index>(background.size()) != 3 * n)
+    throw ShapeError("[photometric_loss] truth and background must have 4 and 3 elements a ray (" +
+                     std::to_string(n) + " rays), got " + std::to_string(truth.size()) + " and " +
                      std::to_string(background.size()));
   if (!(options.huber > 0))
     throw ValueError("[photometric_loss] huber must be positive, got " + std::to_string(options.huber));
@@ -27,7 +25,7 @@ Var<T> photometric_loss(Var<T> rays, std::span<const T> photograph, std::span<co
   const T limit = static_cast<T>(options.huber);
   double sum = 0;
   for (Index r = 0; r < n; ++r) {
-    const T *c = rays.value() + 4 * r, *p = photograph.data() + 4 * r, *b = background.data() + 3 * r;
+    const T *c = rays.value() + 4 * r, *p = truth.data() + 4 * r, *b = background.data() + 3 * r;
     for (Index k = 0; k < 3; ++k) {
       const T e = photometric_residual(c, p, b, k);
       error[3 * r + k] = e;

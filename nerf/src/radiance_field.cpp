@@ -1,35 +1,26 @@
-#include <fieldmark/core/error.h>
 #include <fieldmark/engine/model_file.h>
 #include <fieldmark/nerf/radiance_field.h>
-#include "table_rows.h"
 
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "checks.h"
+#include "table_rows.h"
+
 namespace fieldmark::nerf {
 namespace {
 
 using Json = nlohmann::json;
-constexpr const char *kOccupancy = "density/occupancy", *kRows = "hash/rows";
+constexpr const char *kTable = "hash/table", *kRows = "hash/rows", *kOccupancy = "density/occupancy";
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
-// The interleaved table as two tensors: columns [begin, begin + F) of the rows that are kept.
-std::vector<float> table_part(std::span<const float> table, std::size_t row, std::size_t begin,
-                              const std::vector<std::uint8_t>& kept) {
-  std::vector<float> part;
-  for (std::size_t r = 0; r < kept.size(); ++r)
-    if (kept[r])
-      part.insert(part.end(), table.begin() + static_cast<std::ptrdiff_t>(r * row + begin),
-                  table.begin() + static_cast<std::ptrdiff_t>(r * row + begin + row / 2));
-  return part;
-}
-
-void set_table_part(std::span<float> table, std::size_t row, std::size_t begin,
-                    const std::vector<std::uint8_t>& kept, const std::vector<float>& part) {
-  for (std::size_t r = 0, k = 0; r < kept.size(); ++r)
-    for (std::size_t f = 0; f < row / 2; ++f) table[r * row + begin + f] = kept[r] ? part[k++] : 0;
+// One of the two tensors of the interleaved table: columns [begin, begin + F) of the kept rows.
+struct TablePart {
+  const char* name;
+  std::size_t begin;
+};
+std::array<TablePart, 2> table_parts(const FieldOptions& o) {
+  return {TablePart{"hash/density_features", 0}, TablePart{"hash/colour_features", at(o.encoding.features)}};
 }
 
 std::vector<std::uint8_t> to_bits(Index n, const auto& is_set) {
@@ -88,62 +79,21 @@ Space parse_space(const Json& j) {
   return s;
 }
 
-struct TablePart {
-  const char* name;
-  std::size_t begin;
-};
-
-std::array<TablePart, 2> table_parts(const FieldOptions& o) {
-  return {TablePart{"hash/density_features", 0}, TablePart{"hash/colour_features", at(o.encoding.features)}};
-}
-
-// What tells kinds apart is the entry "kind"; a hash field, the first there was, has none.
-Json field_json(const RadianceFieldOptions& o) {
-  const FieldOptions& f = o.field;
-  if (f.kind == FieldKind::mlp)
-    return {{"kind", "mlp"},
-            {"layers", f.mlp.layers},
-            {"width", f.mlp.width},
-            {"skip", f.mlp.skip},
-            {"position_bands", f.mlp.position_bands},
-            {"direction_bands", f.mlp.direction_bands},
-            {"average_points", o.points.average},
-            {"importance_points", o.points.importance},
-            {"random_points", o.points.random}};
-  return {{"levels", f.encoding.levels},
-          {"features", f.encoding.features},
-          {"log2_table", f.encoding.log2_table},
-          {"base_resolution", f.encoding.base_resolution},
-          {"finest_resolution", f.encoding.finest_resolution},
-          {"width", f.width},
-          {"geometry", f.geometry},
-          {"directional", f.directional}};
-}
-
-void parse_field(const Json& j, RadianceFieldOptions& o) {
-  const std::string kind = j.value("kind", "hash");
-  if (kind == "hash") {
-    o.field = {.encoding = {.levels = j.at("levels"),
-                            .features = j.at("features"),
-                            .log2_table = j.at("log2_table"),
-                            .base_resolution = j.at("base_resolution"),
-                            .finest_resolution = j.at("finest_resolution")},
-               .width = j.at("width"),
-               .geometry = j.at("geometry"),
-               .directional = j.value("directional", true)};
-  } else if (kind == "mlp") {
-    o.field = {.kind = FieldKind::mlp,
-               .mlp = {.layers = j.at("layers"),
-                       .width = j.at("width"),
-                       .skip = j.at("skip"),
-                       .position_bands = j.at("position_bands"),
-                       .direction_bands = j.at("direction_bands")}};
-    o.points = {.average = j.at("average_points"),
-                .importance = j.at("importance_points"),
-                .random = j.at("random_points")};
+// Calls use(key, size) for each size of a field in its file, except the kind.
+void each_size(RadianceFieldOptions& o, const auto& use) {
+  FieldOptions& f = o.field;
+  if (f.kind == FieldKind::mlp) {
+    use("layers", f.mlp.layers), use("width", f.mlp.width), use("skip", f.mlp.skip);
+    use("position_bands", f.mlp.position_bands), use("direction_bands", f.mlp.direction_bands);
+    use("average_points", o.points.average), use("importance_points", o.points.importance);
+    use("random_points", o.points.random);
   } else {
-    throw ValueError("[radiance_field] kind must be hash or mlp, got " + kind);
+    HashEncodingOptions& e = f.encoding;
+    use("levels", e.levels), use("features", e.features), use("log2_table", e.log2_table);
+    use("base_resolution", e.base_resolution), use("finest_resolution", e.finest_resolution);
+    use("width", f.width), use("geometry", f.geometry), use("directional", f.directional);
   }
+  use("occupancy", o.occupancy), use("step", o.step);
 }
 
 }  // namespace
@@ -162,23 +112,26 @@ RadianceField::RadianceField(const RadianceFieldOptions& options)
 }
 
 std::string RadianceField::configuration() const {
-  Json json = field_json(options_);
-  json.update({{"occupancy", options_.occupancy},
-               {"step", options_.step},
-               {"background", background == Background::white ? "white" : "black"},
-               {"cameras", Json::parse(format_camera_span(cameras))}});
-  if (options_.supersampling > 1) json["supersampling"] = options_.supersampling;
+  Json json{{"background", background == Background::white ? "white" : "black"},
+            {"cameras", Json::parse(format_camera_span(cameras))}};
+  RadianceFieldOptions o = options_;
+  each_size(o, [&](const char* key, const auto& size) { json[key] = size; });
+  if (o.field.kind == FieldKind::mlp) json["kind"] = "mlp";  // hash fields, the first kind, have no such key
+  if (o.supersampling > 1) json["supersampling"] = o.supersampling;
   add_space(json, space);
   return json.dump();
 }
 
 RadianceField RadianceField::from_configuration(std::string_view text, std::string_view place) {
   try {
-    const Json j = Json::parse(text);
+    Json j = Json::parse(text);
     RadianceFieldOptions o;
-    parse_field(j, o);
-    o.occupancy = j.at("occupancy");
-    o.step = j.at("step");
+    const std::string kind = j.value("kind", "hash");
+    if (kind != "hash" && kind != "mlp")
+      throw ValueError("[radiance_field] kind must be hash or mlp, got " + kind);
+    o.field.kind = kind == "mlp" ? FieldKind::mlp : FieldKind::hash;
+    j.emplace("directional", true);  // files before version 0.1 may lack it
+    each_size(o, [&](const char* key, auto& size) { j.at(key).get_to(size); });
     o.supersampling = j.value("supersampling", Index{1});
     RadianceField field(o);
     field.space = parse_space(j);
@@ -194,18 +147,21 @@ RadianceField RadianceField::from_configuration(std::string_view text, std::stri
 }
 
 void RadianceField::store(SafetensorsFile& file, const std::string& prefix) const {
-  for (const auto& e : params.entries()) {
-    if (e.name == "hash/table") continue;
-    file.add(prefix + e.name, e.shape, params.values(params.find(e.name)));
-  }
+  for (const auto& e : params.entries())
+    if (e.name != kTable) file.add(prefix + e.name, e.shape, params.values(params.find(e.name)));
   if (field.has_table()) {
     const auto table = params.values(field.encoding().table());
-    const auto row = at(2 * field.encoding().features());
+    const Index features = field.encoding().features();
     const std::vector<std::uint8_t> kept = rows_in_use(field.encoding(), grid);
     const Index count = std::count(kept.begin(), kept.end(), std::uint8_t{1}), rows = std::ssize(kept);
-    for (const TablePart& part : table_parts(options_.field))
-      file.add(prefix + part.name, {count, field.encoding().features()},
-               table_part(table, row, part.begin, kept));
+    for (const TablePart& part : table_parts(options_.field)) {
+      std::vector<float> numbers;
+      for (std::size_t r = 0; r < kept.size(); ++r) {
+        const auto from = table.begin() + static_cast<std::ptrdiff_t>(2 * at(features) * r + part.begin);
+        if (kept[r]) numbers.insert(numbers.end(), from, from + features);
+      }
+      file.add(prefix + part.name, {count, features}, numbers);
+    }
     if (count < rows)
       file.add(prefix + kRows, {(rows + 7) / 8}, to_bits(rows, [&](Index r) { return kept[at(r)] != 0; }));
   }
@@ -215,19 +171,22 @@ void RadianceField::store(SafetensorsFile& file, const std::string& prefix) cons
 
 void RadianceField::restore(const SafetensorsFile& file, const std::string& prefix) {
   for (const auto& e : params.entries()) {
-    if (e.name == "hash/table") continue;
+    if (e.name == kTable) continue;
     const Tensor<float> t = read_tensor(file, prefix + e.name, e.shape);
     std::copy(t.data.begin(), t.data.end(), params.values(params.find(e.name)).begin());
   }
   if (field.has_table()) {
-    const auto row = at(2 * field.encoding().features());
-    const Index rows = field.encoding().rows();
+    const std::span<float> table = params.values(field.encoding().table());
+    const Index rows = field.encoding().rows(), features = field.encoding().features();
     const std::vector<std::uint8_t> kept = file.has(prefix + kRows) ? read_bits(file, prefix + kRows, rows)
                                                                     : std::vector<std::uint8_t>(at(rows), 1);
-    const Shape shape{std::count(kept.begin(), kept.end(), std::uint8_t{1}), field.encoding().features()};
-    for (const TablePart& part : table_parts(options_.field))
-      set_table_part(params.values(field.encoding().table()), row, part.begin, kept,
-                     read_tensor(file, prefix + part.name, shape).data);
+    const Shape shape{std::count(kept.begin(), kept.end(), std::uint8_t{1}), features};
+    for (const TablePart& part : table_parts(options_.field)) {
+      const Tensor<float> t = read_tensor(file, prefix + part.name, shape);
+      for (Index r = 0, k = 0; r < rows; ++r)
+        for (Index f = 0; f < features; ++f)
+          table[at(2 * features * r + f) + part.begin] = kept[at(r)] ? t[k++] : 0;
+    }
   }
   grid.set_bits(read_bits(file, prefix + kOccupancy, grid.cells()));
 }

@@ -7,9 +7,9 @@
 
 namespace fieldmark::nerf {
 namespace {
-constexpr Index kGrain = 1024;  // pixels a piece: its partial camera gradient is 16 numbers
+constexpr Index kGrain = 1024;  // pixels of a chunk, which has a partial camera gradient of 16 elements
 
-// What forward and backward both need of one ray.
+// The terms of one ray that forward and backward share.
 template <class T>
 struct Projection {
   T u, v, w[3], inv_norm;
@@ -20,7 +20,7 @@ struct Projection {
   }
 };
 
-// Adds the gradient of one ray to its camera's 16 numbers and its pixel's 2; either may be null.
+// Adds the gradient of one ray to its camera's 16 elements and its pixel's 2; either may be null.
 template <class T>
 void add_ray(const T* c, const T* pixel, const T* dy, T* dc, T* dp) {
   const Projection<T> p(c, pixel);
@@ -81,21 +81,21 @@ Var<T> rays(Var<T> camera, Var<T> pixels) {
 
   // With g = dL/dd: dL/dw = (g - d <d, g>) / |w|, dL/dR = dL/dw (u, v, -1)^T, dL/d(u, v) = the first two of
   // R^T dL/dw; u and v are quotients, so du/dfx = -u / fx, du/dcx = -1 / fx, dv/dfy = -v / fy, dv/dcy = 1 /
-  // fy. A ray owns its pixel, and its camera unless shared: then each piece sums into its own 16 numbers,
-  // which are added in the order of the pieces.
+  // fy. A ray owns its pixel, and its camera unless shared: then each chunk sums into 16 elements of its
+  // own, which are added in the order of the chunks.
   tape.on_backward(out, [=](const T* dy) {
     T* dc = camera.grad_acc();
     T* dp = pixels.grad_acc();
-    const Index pieces = (n + kGrain - 1) / kGrain;
-    T* partial = shared && dc ? camera.tape().template scratch<T>(pieces * 16) : nullptr;
-    if (partial) std::fill_n(partial, pieces * 16, T(0));
+    const Index chunks = (n + kGrain - 1) / kGrain;
+    T* partial = shared && dc ? camera.tape().template scratch<T>(chunks * 16) : nullptr;
+    if (partial) std::fill_n(partial, chunks * 16, T(0));
     parallel_for(n, kGrain, [=](Index begin, Index end) {
       for (Index i = begin; i < end; ++i)
         add_ray(camera.value() + i * stride, pixels.value() + 2 * i, dy + 6 * i,
                 partial ? partial + begin / kGrain * 16 : (dc ? dc + i * stride : nullptr),
                 dp ? dp + 2 * i : nullptr);
     });
-    for (Index i = 0; partial && i < pieces * 16; ++i) dc[i % 16] += partial[i];
+    for (Index i = 0; partial && i < chunks * 16; ++i) dc[i % 16] += partial[i];
   });
   return out;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// How far a pose is from a rotation, and the rotation nearest to it. Private.
+// The distance of a pose from a rotation, and the nearest rotation.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -35,11 +35,11 @@ inline Pose with_rotation(Pose p) {
   return p;
 }
 
-// Poses of single precision and six digits are 1e-6 off; they are left as they stand.
+// Poses in single precision with six digits are 1e-6 off; they are kept.
 inline constexpr double kRotationExact = 1e-5, kRotationTolerance = 1e-2;
 
-/// A pose as it is, or with the nearest rotation where it is off by more than kRotationExact; fail(found) is
-/// to throw where it is off by more than kRotationTolerance.
+/// The pose, with the nearest rotation if it is off by more than kRotationExact; calls fail(found), which
+/// throws, if it is off by more than kRotationTolerance.
 template <class Fail>
 Pose checked_rotation(const Pose& pose, Fail fail) {
   const double error = rotation_error(pose);

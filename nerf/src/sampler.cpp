@@ -1,35 +1,35 @@
-#include <fieldmark/nerf/sampler.h>
+#include "sampler.h"
 
 #include <algorithm>
 #include <cmath>
 
+#include "checks.h"
+
 namespace fieldmark::nerf {
 namespace {
 
-// Samples of a ray in a wave: few, so that little lies behind the surface; more once few rays are left, since
-// a wave has a price of its own.
+// Samples of a ray in a wave: few, so that few lie behind the surface; more once few rays are left, since a
+// wave has a cost of its own.
 constexpr Index kLeastWave = 4, kMostWave = 16, kWaveSamples = 192;
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+}  // namespace
 
-void check(const RayBatch& rays, std::span<const float> jitter, const SamplingOptions& options) {
-  if (!(options.step > 0))
-    throw ValueError("[sampler] step must be positive, got " + std::to_string(options.step));
+void check_rays(const char* op, const RayBatch& rays, std::span<const float> jitter, float step) {
+  const std::string where = "[" + std::string(op) + "] ";
+  if (!(step > 0)) throw ValueError(where + "step must be positive, got " + std::to_string(step));
   if (rays.origins.size() != rays.directions.size() || rays.origins.size() % 3 != 0)
-    throw ShapeError("[sampler] origins and directions must both be [R, 3], got " +
+    throw ShapeError(where + "origins and directions must both be [R, 3], got " +
                      std::to_string(rays.origins.size()) + " and " + std::to_string(rays.directions.size()) +
-                     " numbers");
+                     " elements");
   if (!jitter.empty() && static_cast<Index>(jitter.size()) != rays.size())
-    throw ShapeError("[sampler] jitter must have one number a ray (" + std::to_string(rays.size()) +
+    throw ShapeError(where + "jitter must have one element a ray (" + std::to_string(rays.size()) +
                      "), got " + std::to_string(jitter.size()));
 }
-
-}  // namespace
 
 void RaySampler::sample(const Field<float>& field, const ParamStore<float>& params, const OccupancyGrid& grid,
                         const RayBatch& rays, std::span<const float> jitter, const SamplingOptions& options,
                         RaySamples& out, const PackedWeights<float>* packed) {
-  check(rays, jitter, options);
+  check_rays("sampler", rays, jitter, options.step);
   walks_.clear();
   alive_.clear();
   segments_.clear();
@@ -52,7 +52,7 @@ void RaySampler::sample(const Field<float>& field, const ParamStore<float>& para
   pack(rays.size(), field.density_width(), field.colour_width(), out);
 }
 
-// One segment for each ray that is still alive; rays that end here leave the list.
+// Adds a segment for each ray that is alive; rays that end leave the list.
 void RaySampler::march_wave(const OccupancyGrid& grid) {
   std::size_t kept = 0;
   RayWalk::skip_empty(grid, walks_, alive_);
@@ -72,7 +72,7 @@ void RaySampler::evaluate(const Field<float>& field, const ParamStore<float>& pa
                           const PackedWeights<float>* packed, Index first) {
   const Index n = static_cast<Index>(t_.size()) - first, width = field.density_width();
   if (n == 0) return;
-  // Never shortened: growing by a wave would fill what is about to be written.
+  // Never shortened: growing by a wave would fill elements that are about to be overwritten.
   const auto rows = at(first + n);
   if (sigma_.size() < rows) {
     sigma_.resize(rows);
@@ -89,8 +89,8 @@ void RaySampler::evaluate(const Field<float>& field, const ParamStore<float>& pa
   std::copy_n(field.density(z).value(), n, sigma_.data() + first);
 }
 
-// Cuts segments where the transmittance falls below the threshold. The sample that crosses it is kept: it is
-// what stops the light.
+// Cuts segments where the transmittance falls below the threshold. Keeps the sample that crosses it: that
+// sample stops the light.
 void RaySampler::stop_rays(const SamplingOptions& options, std::size_t first_segment) {
   for (std::size_t s = first_segment; s < segments_.size(); ++s) {
     Segment& segment = segments_[s];
@@ -103,8 +103,8 @@ void RaySampler::stop_rays(const SamplingOptions& options, std::size_t first_seg
   std::erase_if(alive_, [&](Index r) { return transmittance_[at(r)] < options.stop; });
 }
 
-// Waves hold segments of many rays; the packed form holds rays one after another. A stable count per ray
-// gives every segment its place, in the order of the waves.
+// Waves hold segments of many rays; the packed form holds rays one after another. Counting the samples of
+// each ray gives every segment its place, in the order of the waves.
 void RaySampler::pack(Index rays, Index density, Index colour, RaySamples& out) {
   out.ray_begin.assign(at(rays + 1), 0);
   for (const Segment& s : segments_) out.ray_begin[at(s.ray + 1)] += s.count;

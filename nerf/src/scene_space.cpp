@@ -1,4 +1,5 @@
 #include "scene_space.h"
+
 #include <fieldmark/nerf/camera_set.h>
 
 #include <algorithm>
@@ -8,13 +9,12 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr double kReach = 1.0;      // of the inner cube, in median distances of the cameras
-constexpr double kRayStart = 0.02;  // in the same
-constexpr double kBefore = 0.95;    // of the nearest bound: what is in front of it is cut off
+constexpr double kRayStart = 0.02;  // in median distances of the cameras
+constexpr double kBefore = 0.95;    // of the nearest bound: the space in front is cut off
 constexpr double kRim = 1.02;       // of the widest ray
 
-// The plane from the data set's bounds; slopes so that the rays through every image's corners stay inside,
-// where they pass the plane and at infinity.
+// The plane from the data set's bounds, and slopes that hold the rays through every image's corners, at the
+// plane and at infinity.
 Space device_coordinates(const Dataset& data) {
   Space space{.kind = SpaceKind::ndc};
   double near = 0;
@@ -42,7 +42,7 @@ Space around(const Dataset& data) {
   CameraSpan span = camera_span(data);
   const auto middle = span.distances.begin() + static_cast<std::ptrdiff_t>(span.distances.size() / 2);
   std::nth_element(span.distances.begin(), middle, span.distances.end());
-  const double reach = kReach * *middle;
+  const double reach = *middle;
   const Vec3& c = span.centre;
   return {.kind = SpaceKind::contracted,
           .bounds = {.corner = {c[0] - reach, c[1] - reach, c[2] - reach}, .side = 2 * reach},

@@ -1,9 +1,11 @@
-#include <fieldmark/core/error.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/nerf/space.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "checks.h"
+#include "rotation.h"
 
 namespace fieldmark::nerf {
 namespace {
@@ -13,7 +15,7 @@ constexpr std::array<const char*, 3> kNames{"cube", "ndc", "contracted"};
 
 double largest(const Vec3& y) { return std::max({std::abs(y[0]), std::abs(y[1]), std::abs(y[2])}); }
 
-// Where a ray that the space does not hold goes: past the cube.
+// A ray that misses the cube, for one that the space does not hold.
 void miss(float* o, float* d) {
   for (int a = 0; a < 3; ++a) o[a] = 2, d[a] = a == 0;
 }
@@ -26,8 +28,8 @@ void to_ndc(const Space& s, const float* origin, const float* direction, float* 
   const Vec3 w{direction[0], direction[1], direction[2]};
   if (p[2] > -s.near) {
     if (!(w[2] < 0)) return miss(o, d);
-    const double t = (-s.near - p[2]) / w[2];
-    p = {p[0] + t * w[0], p[1] + t * w[1], -s.near};
+    p = p + ((-s.near - p[2]) / w[2]) * w;
+    p[2] = -s.near;
   }
   const Vec3 along{-s.slope_x * (w[0] * p[2] - p[0] * w[2]), -s.slope_y * (w[1] * p[2] - p[1] * w[2]),
                    -s.near * w[2]};
@@ -40,18 +42,15 @@ void to_ndc(const Space& s, const float* origin, const float* direction, float* 
   }
 }
 
-// Length of the world that a cube side is, where the map is linear.
+// World length of a cube side, where the map is linear.
 double unit(const Space& s) { return s.kind == SpaceKind::contracted ? 2 * s.bounds.side : s.bounds.side; }
 
 bool sees(const Camera& c, const Vec3& p) {
-  const Vec3 o = c.position();
-  const double v[3] = {p[0] - o[0], p[1] - o[1], p[2] - o[2]};
-  const auto along = [&](std::size_t column) {
-    return c.pose[column] * v[0] + c.pose[4 + column] * v[1] + c.pose[8 + column] * v[2];
-  };
-  const double depth = -along(2);
+  const Vec3 v = p - c.position();
+  const double depth = -dot(pose_column(c.pose, 2), v);
   if (!(depth > 0)) return false;
-  const double x = c.cx + c.fx * along(0) / depth, y = c.cy - c.fy * along(1) / depth;
+  const double x = c.cx + c.fx * dot(pose_column(c.pose, 0), v) / depth,
+               y = c.cy - c.fy * dot(pose_column(c.pose, 1), v) / depth;
   return x >= 0 && x < static_cast<double>(c.width) && y >= 0 && y < static_cast<double>(c.height);
 }
 
@@ -93,18 +92,16 @@ Vec3 Space::to_world(const Vec3& x) const {
 }
 
 RayBatch RayBatch::part(Index begin, Index n) const {
-  const auto rows = [&](std::span<const float> all) {
-    return all.subspan(static_cast<std::size_t>(3 * begin), static_cast<std::size_t>(3 * n));
-  };
+  const auto rows = [&](std::span<const float> all) { return all.subspan(at(3 * begin), at(3 * n)); };
   return {rows(origins), rows(directions), rows(seen_from), contracted, near};
 }
 
 void CubeRays::resize(Index n) {
-  for (auto* buffer : {&origins, &directions, &seen_from}) buffer->resize(static_cast<std::size_t>(3 * n));
+  for (auto* buffer : {&origins, &directions, &seen_from}) buffer->resize(at(3 * n));
 }
 
 void CubeRays::set(const Space& space, Index first, const Camera& camera, std::span<const float> pixels) {
-  const auto row = static_cast<std::size_t>(3 * first), n = pixels.size() / 2 * 3;
+  const std::size_t row = at(3 * first), n = pixels.size() / 2 * 3;
   float *o = &origins[row], *d = &directions[row], *world = &seen_from[row];
   camera_rays(camera, pixels, o, world);
   if (space.kind == SpaceKind::ndc) {
@@ -134,26 +131,24 @@ void contract(const float* p, float* x) {
 }
 
 std::vector<std::uint8_t> seen_cells(std::span<const Camera> cameras, const Space& space, Index resolution) {
-  std::vector<std::uint8_t> seen(static_cast<std::size_t>(resolution * resolution * resolution));
+  std::vector<std::uint8_t> seen(at(resolution * resolution * resolution));
   const double side = 1 / static_cast<double>(resolution);
   parallel_for(resolution, 1, [&](Index first, Index last) {
-    std::size_t likely = 0;  // neighbours are seen by the same camera
+    std::size_t likely = 0;  // the same camera sees neighbours
     for (Index z = first; z < last; ++z)
       for (Index y = 0; y < resolution; ++y)
         for (Index x = 0; x < resolution; ++x) {
-          std::uint8_t& cell = seen[static_cast<std::size_t>(x + resolution * (y + resolution * z))];
+          std::uint8_t& cell = seen[at(x + resolution * (y + resolution * z))];
           for (int corner = 0; corner < 9 && !cell; ++corner) {
-            // Just inside the cell: the cube's faces may be at infinity.
-            const auto at = [&](Index i, int bit) {
+            // Just inside the cell: the cube's faces may lie at infinity.
+            const auto place = [&](Index i, int bit) {
               const double shift = corner == 8 ? 0.5 : (corner >> bit & 1) ? 0.999 : 0.001;
               return (static_cast<double>(i) + shift) * side;
             };
-            const Vec3 p = space.to_world({at(x, 0), at(y, 1), at(z, 2)});
+            const Vec3 p = space.to_world({place(x, 0), place(y, 1), place(z, 2)});
             for (std::size_t c = 0; c < cameras.size() && !cell; ++c) {
               const std::size_t camera = (likely + c) % cameras.size();
-              if (!sees(cameras[camera], p)) continue;
-              cell = 1;
-              likely = camera;
+              if (sees(cameras[camera], p)) cell = 1, likely = camera;
             }
           }
         }

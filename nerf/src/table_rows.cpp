@@ -1,9 +1,12 @@
 #include "table_rows.h"
+
 #include <fieldmark/engine/parallel.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "checks.h"
 
 namespace fieldmark::nerf {
 namespace {
@@ -37,7 +40,7 @@ void mark_level(const OccupancyGrid& grid, Index resolution, std::uint32_t mask,
     for (Index z = along[2].first; z <= along[2].last; ++z)
       for (Index y = along[1].first; y <= along[1].last; ++y)
         for (Index x = along[0].first; x <= along[0].last; ++x) {
-          std::uint8_t& row = used[static_cast<std::size_t>(hash_row({x, y, z}, resolution, mask))];
+          std::uint8_t& row = used[at(hash_row({x, y, z}, resolution, mask))];
           left -= row == 0;
           row = 1;
         }
@@ -47,11 +50,10 @@ void mark_level(const OccupancyGrid& grid, Index resolution, std::uint32_t mask,
 }  // namespace
 
 std::vector<std::uint8_t> rows_in_use(const HashEncoding<float>& encoding, const OccupancyGrid& grid) {
-  std::vector<std::uint8_t> used(static_cast<std::size_t>(encoding.rows()));
+  std::vector<std::uint8_t> used(at(encoding.rows()));
   parallel_for(encoding.levels(), 1, [&](Index l, Index) {
     const int level = static_cast<int>(l);
-    const auto first = static_cast<std::size_t>(encoding.first_row(level)),
-               last = static_cast<std::size_t>(encoding.first_row(level + 1));
+    const std::size_t first = at(encoding.first_row(level)), last = at(encoding.first_row(level + 1));
     mark_level(grid, encoding.resolution(level), encoding.mask(level),
                std::span(used).subspan(first, last - first));
   });

@@ -7,7 +7,7 @@
 #include <fieldmark/nerf/photometric_loss.h>
 #include <fieldmark/nerf/trainer.h>
 #include "scene_space.h"
-#include "training_pixels.h"
+#include "silhouettes.h"
 
 #include <algorithm>
 #include <array>
@@ -149,11 +149,9 @@ void Trainer::lay_out_space() {
 }
 
 void Trainer::carve() {
-  std::vector<Silhouette> silhouettes;
-  for (const View& v : data_.views) silhouettes.push_back({v.camera, &v.rgba});
   const Index n = field_.grid.resolution();
-  field_.space.bounds = tighten(field_.space.bounds, visual_hull(silhouettes, field_.space.bounds, n), n);
-  field_.grid.restrict_to(visual_hull(silhouettes, field_.space.bounds, n));
+  field_.space.bounds = tighten(field_.space.bounds, visual_hull(data_.views, field_.space.bounds, n), n);
+  field_.grid.restrict_to(visual_hull(data_.views, field_.space.bounds, n));
   pixels_ = training_pixels(data_.views, hull_margin(data_.views, field_.space.bounds, n));
 }
 

@@ -1,7 +1,8 @@
 #include <algorithm>
 #include <array>
 
-#include "photometric_residual.h"
+#include <fieldmark/nerf/photometric_loss.h>
+
 #include "trainer_shard.h"
 
 // Which pixels of which photographs a step's rays go through.

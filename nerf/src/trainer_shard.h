@@ -1,6 +1,6 @@
 #pragma once
-#include <fieldmark/nerf/hierarchical_sampler.h>
 #include <fieldmark/nerf/trainer.h>
+#include "hierarchical_sampler.h"
 
 namespace fieldmark::nerf {
 

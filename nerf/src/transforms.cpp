@@ -16,11 +16,6 @@ std::string short_number(double x) {
   return text;
 }
 
-constexpr double kMost = 1e9;
-
-double angle(const JsonPlace& value) { return value.number_in(0, std::numbers::pi, "(0, pi) radians"); }
-Index side(const JsonPlace& value) { return std::lround(value.number_in(0.5, 65536.5, "1 to 65536")); }
-
 void refuse_other_lenses(const JsonPlace& from) {
   for (const char* key : {"k3", "k4"})
     if (from.has(key) && from[key].number() != 0)
@@ -35,23 +30,24 @@ void refuse_other_lenses(const JsonPlace& from) {
   from["camera_model"].fail("OPENCV, PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL or RADIAL", "\"" + model + "\"");
 }
 
-// What stands at one place replaces what is there.
+// The intrinsics at one place replace those of `to`.
 void parse_intrinsics(const JsonPlace& from, Intrinsics& to) {
   refuse_other_lenses(from);
-  // An angle and a length are two words for one thing: the one that stands here goes before one from above.
-  if (from.has("camera_angle_x")) to.angle_x = angle(from["camera_angle_x"]), to.fl_x = 0;
-  if (from.has("camera_angle_y")) to.angle_y = angle(from["camera_angle_y"]), to.fl_y = 0;
-  if (from.has("fl_x")) to.fl_x = from["fl_x"].number_in(1e-3, kMost, "(0.001, 1e9) pixels");
-  if (from.has("fl_y")) to.fl_y = from["fl_y"].number_in(1e-3, kMost, "(0.001, 1e9) pixels");
-  if (from.has("cx")) to.cx = from["cx"].number_in(-kMost, kMost, "(-1e9, 1e9)");
-  if (from.has("cy")) to.cy = from["cy"].number_in(-kMost, kMost, "(-1e9, 1e9)");
-  if (from.has("w")) to.width = side(from["w"]);
-  if (from.has("h")) to.height = side(from["h"]);
-  const auto coefficient = [&](const char* key, double& k) {
-    if (from.has(key)) k = from[key].number_in(-kMost, kMost, "(-1e9, 1e9)");
+  const auto read = [&](const char* key, auto& value, double low, double high, const char* range) {
+    if (!from.has(key)) return false;
+    value = from[key].number_in(low, high, range);
+    return true;
   };
-  coefficient("k1", to.lens.k1), coefficient("k2", to.lens.k2);
-  coefficient("p1", to.lens.p1), coefficient("p2", to.lens.p2);
+  const char *angles = "(0, pi) radians", *pixels = "(0.001, 1e9) pixels", *any = "(-1e9, 1e9)";
+  // Angle and length state the same thing: the one at this place overrides either from above.
+  if (read("camera_angle_x", to.angle_x, 0, std::numbers::pi, angles)) to.fl_x = 0;
+  if (read("camera_angle_y", to.angle_y, 0, std::numbers::pi, angles)) to.fl_y = 0;
+  read("fl_x", to.fl_x, 1e-3, 1e9, pixels), read("fl_y", to.fl_y, 1e-3, 1e9, pixels);
+  read("cx", to.cx, -1e9, 1e9, any), read("cy", to.cy, -1e9, 1e9, any);
+  if (from.has("w")) to.width = from["w"].side();
+  if (from.has("h")) to.height = from["h"].side();
+  read("k1", to.lens.k1, -1e9, 1e9, any), read("k2", to.lens.k2, -1e9, 1e9, any);
+  read("p1", to.lens.p1, -1e9, 1e9, any), read("p2", to.lens.p2, -1e9, 1e9, any);
 }
 
 Pose parse_pose(const JsonPlace& matrix) {
@@ -94,7 +90,6 @@ Transforms parse_transforms(std::string_view text, std::string_view path) {
   Intrinsics all;
   if (json.is_object()) parse_intrinsics(root, all);
   t.camera_angle_x = all.angle_x;
-  if (root.has("aabb_scale")) t.aabb_scale = root["aabb_scale"].number_in(0, kMost, "(0, 1e9)");
   const JsonPlace frames = root["frames"];
   const std::size_t count = frames.array_size();
   if (count == 0) frames.fail("at least one view", "none");

@@ -1,44 +1,40 @@
 #pragma once
 #include <fieldmark/nerf/camera.h>
-#include "intrinsics.h"
+#include "lens.h"
 
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace fieldmark::nerf {
 
-/// The contents of a transforms_*.json of the Blender layout, or of a transforms.json as instant-ngp and
-/// nerfstudio write it.
+/// The contents of a transforms_*.json of the Blender layout, or of a transforms.json of instant-ngp or
+/// nerfstudio.
 struct Transforms {
-  /// One image and where it was taken from.
+  /// An image and its camera.
   struct Frame {
     std::string file_path;    ///< relative to the folder of the JSON, with or without extension
     Pose pose{};              ///< from the camera to the world, OpenGL axes
-    Intrinsics intrinsics{};  ///< those of the whole file, each replaced where the frame has its own
+    Intrinsics intrinsics{};  ///< those of the whole file, each replaced by the frame's own
   };
   double camera_angle_x = 0;  ///< of the whole file: horizontal field of view, radians, in (0, pi); 0: none
   std::vector<Frame> frames;  ///< at least one
-  std::optional<double> aabb_scale{};  ///< side of the scene's cube in instant-ngp's units, > 0
 };
 
-/// Reads the text of a transforms.json or transforms_*.json. At the top or in a frame, which goes before:
+/// Reads the text of a transforms.json or transforms_*.json. Keys of the file, or of a frame, which then win:
 /// camera_angle_x, camera_angle_y (radians), fl_x, fl_y, cx, cy, w, h (pixels), k1, k2, p1, p2 (see Lens).
 /// Rotations that are off orthonormal by 1e-5 to 1e-2 (largest entry of |R^T R - I|) are replaced by the
-/// nearest rotation; those closer are kept as they stand. Coordinates stay those of the file: instant-ngp's
-/// scaling by 0.33 about (0.5, 0.5, 0.5) is not applied. Other keys are ignored.
+/// nearest rotation; closer ones are kept. Coordinates stay those of the file: instant-ngp's scaling by 0.33
+/// about (0.5, 0.5, 0.5) is not applied. Other keys are ignored.
 /// @param path  named in errors
 /// @throws IoError  with line and byte where the text is not JSON; with the place
-///                  (`frames[3].transform_matrix`), what was expected and what was found where it is: a key
-///                  missing or of the wrong type, an angle outside (0, pi), a length, size or aabb_scale that
-///                  is not positive, k3, k4 or is_fisheye other than 0, a camera_model without a Lens, no
-///                  frames, an empty file_path, a matrix that is not 4x4 finite numbers, whose upper left 3x3
-///                  is further from a rotation or whose last row is not 0 0 0 1
+///                  (`frames[3].transform_matrix`), the expectation and the find where it is: a key missing
+///                  or of the wrong type, an angle outside (0, pi), a length or size that is not positive,
+///                  k3, k4 or is_fisheye other than 0, a camera_model without a Lens, no frames, an empty
+///                  file_path, a matrix that is not 4x4 finite numbers with a rotation and a last row 0 0 0 1
 Transforms parse_transforms(std::string_view text, std::string_view path);
 
-/// The text that parse_transforms() reads back to the same camera_angle_x, names and poses; the rest is not
-/// written.
+/// Text that parse_transforms() reads back to the same camera_angle_x, names and poses; the rest is left out.
 std::string format_transforms(const Transforms& transforms);
 
 }  // namespace fieldmark::nerf

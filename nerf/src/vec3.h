@@ -1,5 +1,5 @@
 #pragma once
-// Small vector algebra for cameras and scenes. Private.
+// Vector algebra for cameras and scenes.
 #include <fieldmark/nerf/camera.h>
 
 #include <cmath>

@@ -150,8 +150,6 @@ std::vector<Format> formats() {
       {"cameras.bin", {colmap_cameras_binary()}, both(cameras, kBinary)},
       {"images.txt", {kColmapImagesText}, both(parse_colmap_images, kText)},
       {"images.bin", {colmap_images_binary()}, both(parse_colmap_images, kBinary)},
-      {"points3D.txt", {kColmapPointsText}, both(parse_colmap_points, kText)},
-      {"points3D.bin", {colmap_points_binary()}, both(parse_colmap_points, kBinary)},
       {"transforms.json",
        {kTransforms},
        [](const std::string& b) {

@@ -116,8 +116,8 @@ TEST_CASE("analytic_scene: equal for one and two threads, different for another 
 }
 
 TEST_CASE("analytic_scene: errors") {
-  CHECK_THROWS_WITH(make_scene({.size = 0}), "[scene] size must be in 1 to 8192, got 0");
-  CHECK_THROWS_WITH(make_scene({.views = 0}), "[scene] views must be in 1 to 100000, got 0");
+  CHECK_THROWS_WITH(make_scene({.size = 0}), "[scene] size must be 1 to 8192, got 0");
+  CHECK_THROWS_WITH(make_scene({.views = 0}), "[scene] views must be 1 to 100000, got 0");
   CHECK_THROWS_WITH(make_scene({.size = 1}, "dev"),
                     Contains("split must be \"train\", \"val\" or \"test\", got \"dev\""));
   const TemporaryFolder folder;

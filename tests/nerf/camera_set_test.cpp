@@ -57,7 +57,7 @@ TEST_CASE("camera_set: one camera spans itself") {
     CHECK(dot3(minus(c.position(), s.centre), s.directions[0]) > 0.79 * s.distances[0]);
 }
 
-TEST_CASE("camera_set: near stays inside directions, distances and look-at of training") {
+TEST_CASE("camera_set: novel stays inside directions, distances and look-at of training") {
   const CameraSpan s = camera_span(cap(60), Background::white);
   const auto cameras = make_cameras(s, CameraSet::novel, 300, 40, 9);
   REQUIRE(cameras.size() == 300);
@@ -97,7 +97,7 @@ TEST_CASE("camera_set: ring and sphere") {
   CHECK(length(sphere_mean) < 0.15);           // 3 deviations of 400 directions
 }
 
-TEST_CASE("camera_set: closer and farther are near ones at other distances") {
+TEST_CASE("camera_set: closer and farther are novel ones at other distances") {
   const CameraSpan s = camera_span(cap(60), Background::white);
   const auto [low, high] = std::minmax_element(s.distances.begin(), s.distances.end());
   const auto check = [&](CameraSet kind, double least, double most) {
@@ -116,7 +116,7 @@ TEST_CASE("camera_set: closer and farther are near ones at other distances") {
   check(CameraSet::farther, 1.5, 3);
 }
 
-TEST_CASE("camera_set: unseen cameras look from where no training camera was") {
+TEST_CASE("camera_set: extrapolated cameras look from where no training camera was") {
   const CameraSpan s = camera_span(cap(60), Background::white);
   const auto nearest = [&](const Camera& c) {
     double most = -1;
@@ -176,8 +176,9 @@ TEST_CASE("camera_set: the span survives its JSON text bit for bit") {
 TEST_CASE("camera_set: errors") {
   CHECK_THROWS_WITH(camera_span(std::vector<Camera>{}, Background::white),
                     Contains("at least one camera, got none"));
-  CHECK_THROWS_WITH(parse_camera_set("far"),
-                    "[cameras] set must be near, ring, sphere, unseen, closer, farther or test, got \"far\"");
+  CHECK_THROWS_WITH(
+      parse_camera_set("far"),
+      "[cameras] set must be novel, ring, sphere, extrapolated, closer, farther or test, got \"far\"");
   CHECK(parse_camera_set("test") == CameraSet::test);
   const CameraSpan s = camera_span(cap(2), Background::white);
   CHECK_THROWS_WITH(make_cameras(s, CameraSet::test, 1, 0, 0), Contains("test views are in the data set"));

@@ -24,7 +24,6 @@ void check_cameras(const std::map<std::uint32_t, Intrinsics>& cameras) {
 void check_images(const std::vector<ColmapImage>& images) {
   REQUIRE(images.size() == 3);
   CHECK(images[0].name == "b.png");
-  CHECK(images[0].points == std::vector<std::uint64_t>{7, 9});
   CHECK(images[2].name == "sub/c.png");
   CHECK(images[1].camera == 2);
   // Looking along z with y down: in OpenGL's axes y and z are turned round.
@@ -50,9 +49,6 @@ TEST_CASE("colmap: text and binary hold the same model") {
   check_cameras(parse_colmap_cameras(colmap_cameras_binary(), kBinary, "c"));
   check_images(parse_colmap_images(kColmapImagesText, kText, "i"));
   check_images(parse_colmap_images(colmap_images_binary(), kBinary, "i"));
-  const auto points = parse_colmap_points(kColmapPointsText, kText, "p");
-  CHECK(points == parse_colmap_points(colmap_points_binary(), kBinary, "p"));
-  CHECK(points == std::map<std::uint64_t, Vec3>{{7, {0, 0, 5}}, {8, {1, 0, 6}}, {9, {0.5, 0.5, 20}}});
 }
 
 TEST_CASE("colmap: each model's parameters go where they belong") {
@@ -62,17 +58,6 @@ TEST_CASE("colmap: each model's parameters go where they belong") {
   CHECK((a.fl_x == 7 && a.fl_y == 7 && *a.cx == 4 && *a.cy == 3 && a.lens.is_pinhole()));
   CHECK((b.fl_x == 7 && b.fl_y == 9 && *b.cx == 4 && *b.cy == 3 && b.lens.is_pinhole()));
   CHECK(c.lens == Lens{.k1 = 0.1, .k2 = 0.2});
-}
-
-TEST_CASE("colmap: near and far are those of the points that an image shows") {
-  const auto images = parse_colmap_images(kColmapImagesText, kText, "i");
-  const auto points = parse_colmap_points(kColmapPointsText, kText, "p");
-  const auto range = colmap_depth(images[0], points);
-  REQUIRE(range);
-  CHECK((range->near == 5 && range->far == 20));
-  CHECK(!colmap_depth(images[1], points));  // none
-  CHECK(!colmap_depth(images[2], points));  // one
-  CHECK_THROWS_WITH(colmap_depth(images[0], {}), Contains("must name points of the model, got 7 in b.png"));
 }
 
 TEST_CASE("colmap: errors of text name the line") {
@@ -98,25 +83,14 @@ TEST_CASE("colmap: errors of text name the line") {
                      "line 1: expected a rotation, a quaternion of length 1, got one of length 1.41");
   expect_image_error("1 1 0 0 0 0 0 0 1", kText,
                      "line 1: expected the name of an image, got the end of the line");
-  expect_image_error("1 1 0 0 0 0 0 0 1 b.png\n1 2", kText,
-                     "line 2: expected the key of a point, got the end");
-  expect_image_error("1 1 0 0 0 0 0 0 1 b.png\n1 2 -2", kText,
-                     "line 2: expected the key of a point, or -1, got -2");
-  CHECK_THROWS_WITH(parse_colmap_points("1 2 3", kText, "p"),
-                    "p: line 1: expected a coordinate, got the end of the line");
-  CHECK_THROWS_WITH(parse_colmap_points("1 2 3 4\n1 2 3 4", kText, "p"),
-                    "p: line 2: expected each point once, got 1 again");
 }
 
 TEST_CASE("colmap: errors of bytes name the byte, and a count never allocates what is not there") {
-  const std::string cameras = colmap_cameras_binary(), images = colmap_images_binary(),
-                    points = colmap_points_binary();
+  const std::string cameras = colmap_cameras_binary(), images = colmap_images_binary();
   for (std::size_t n = 0; n < cameras.size(); ++n)
     CHECK_THROWS_AS(parse_colmap_cameras(cameras.substr(0, n), kBinary, "c"), IoError);
   for (std::size_t n = 0; n < images.size(); ++n)
     CHECK_THROWS_AS(parse_colmap_images(images.substr(0, n), kBinary, "i"), IoError);
-  for (std::size_t n = 0; n < points.size(); ++n)
-    CHECK_THROWS_AS(parse_colmap_points(points.substr(0, n), kBinary, "p"), IoError);
   expect_camera_error(
       cameras + "x", kBinary,
       "byte " + std::to_string(cameras.size()) + ": expected the end of the file, got 1 bytes more");

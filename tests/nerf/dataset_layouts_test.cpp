@@ -69,7 +69,6 @@ TEST_CASE("dataset: one transforms.json holds out every 8th of the sorted names"
   CHECK(train.layout == Layout::transforms);
   CHECK(train.background == Background::black);
   CHECK(load_dataset(scene.path, {.background = Background::white}).background == Background::white);
-  CHECK(train.aabb_scale == 4.0);
   CHECK(!train.forward_facing);
   const Camera& c = test.views[1].camera;
   CHECK((c.fx == 20 && c.fy == 21 && c.cx == 6.5 && c.cy == 4.5));
@@ -231,8 +230,6 @@ TEST_CASE("dataset: COLMAP models in text and binary, in each of their places") 
                           std::string_view(binary ? colmap_cameras_binary() : kColmapCamerasText));
     write_file_atomically(model / ("images" + end),
                           std::string_view(binary ? colmap_images_binary() : kColmapImagesText));
-    write_file_atomically(model / ("points3D" + end),
-                          std::string_view(binary ? colmap_points_binary() : kColmapPointsText));
   };
   for (const bool binary : {false, true})
     for (const fs::path& model : {folder.path / "sparse" / "0", folder.path / "sparse", folder.path}) {
@@ -242,16 +239,12 @@ TEST_CASE("dataset: COLMAP models in text and binary, in each of their places") 
         CHECK(train.layout == Layout::colmap);
         CHECK(names(train) == "b c ");
         CHECK(names(test) == "a ");
-        CHECK(train.points == std::vector<Vec3>{{0, 0, 5}, {1, 0, 6}, {0.5, 0.5, 20}});
-        REQUIRE(train.views[0].depth);
-        CHECK((train.views[0].depth->near == 5 && train.views[0].depth->far == 20));
-        CHECK(!train.views[1].depth);
         CHECK(train.views[0].camera.fy == 71);
         CHECK(test.views[0].camera.fy == 70);
         CHECK(train.views[0].rgba.shape == test.views[0].rgba.shape);
       }
       fs::remove_all(folder.path / "sparse");
-      for (const char* stem : {"cameras", "images", "points3D"})
+      for (const char* stem : {"cameras", "images"})
         fs::remove(folder.path / (std::string(stem) + (binary ? ".bin" : ".txt")));
     }
 }
@@ -269,8 +262,6 @@ TEST_CASE("dataset: errors of COLMAP models name file and image") {
          ", got number 2");
   write_file_atomically(folder.path / "cameras.txt", std::string_view(kColmapCamerasText));
   expect("expected images to train on, got none: all 2 are missing, the first is ");
-  write_file_atomically(folder.path / "points3D.txt", std::string_view("7 0 0 5\n"));
-  expect("images.txt: b.png: [colmap_depth] image: must name points of the model, got 9 in b.png");
 }
 
 TEST_CASE("dataset: the photographs of fox and fern") {
@@ -282,7 +273,6 @@ TEST_CASE("dataset: the photographs of fox and fern") {
   CHECK(train.views[0].rgba.shape == Shape{475, 266, 4});
   CHECK(test.views[0].rgba.shape == Shape{119, 67, 4});
   CHECK(test.views[1].name == "0009");
-  CHECK(train.aabb_scale == 4.0);
   CHECK(camera_span(train).up[2] > 0.99);
   const Dataset leaves = load_dataset(*fern, {.split = "test"});
   CHECK(leaves.views.size() == 3);

@@ -131,3 +131,16 @@ TEST_CASE(
   for (Index k = 0; k < 3; ++k) CHECK(out.rgb.value()[k] == out.rgb.value()[3 + k]);
   CHECK_FALSE(RadianceField::from_configuration(f.configuration(), "here").options().field.directional);
 }
+
+TEST_CASE("field_sizing: fit_field takes the largest table whose file fits") {
+  const RadianceFieldOptions start{.field = {.encoding = {.levels = 4, .log2_table = 14}}, .occupancy = 32};
+  const auto fit = fit_field(start, 200e3);
+  REQUIRE(fit);
+  const auto bytes = [](const RadianceFieldOptions& o) { return 4 * RadianceField(o).params.size(); };
+  CHECK(bytes(*fit) < 200e3 - 32e3);
+  RadianceFieldOptions larger = *fit;
+  ++larger.field.encoding.log2_table;
+  CHECK(bytes(larger) + 32 * 32 * 32 / 8 + 32e3 > 200e3);
+  CHECK(fit_field(start, 1e9)->field.encoding.log2_table == 14);
+  CHECK_FALSE(fit_field(start, 33e3));
+}

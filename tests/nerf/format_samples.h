@@ -39,7 +39,7 @@ inline std::string llff_file(const std::vector<double>& rows) {
       packed(rows));
 }
 
-// A COLMAP model of two cameras, three images and three points, in both formats. Images 1 and 3 stand at the
+// A COLMAP model of two cameras and three images, in both formats. Images 1 and 3 stand at the
 // origin and see along z; image 2 is turned by 90 degrees about y.
 inline const std::string kColmapCamerasText =
     "# Camera list\n1 OPENCV 80 60 70 71 40 30 0.01 -0.002 0.0003 0.0004\n\n2 SIMPLE_RADIAL 80 60 70 40 30 "
@@ -49,9 +49,6 @@ inline const std::string kColmapImagesText =
     "1 1 0 0 0 0 0 0 1 b.png\n10.5 11.5 7 12 13 -1 14 15 9\n"
     "2 0.70710678118654752 0 0.70710678118654752 0 1 2 3 2 a.png\n\n"
     "3 1 0 0 0 0 0 -1 1 sub/c.png\n1 2 8\n";
-inline const std::string kColmapPointsText =
-    "# 3D point list\n7 0 0 5 255 0 0 0.5 1 0 2 1\n8 1 0 6 0 255 0 0.5\n9 0.5 0.5 20 0 0 255 0.5\n";
-
 inline std::string colmap_cameras_binary() {
   return packed(std::uint64_t{2}) + packed(std::uint32_t{1}) + packed(std::int32_t{4}) +
          packed(std::vector<std::uint64_t>{80, 60}) +
@@ -72,13 +69,4 @@ inline std::string colmap_images_binary() {
   return packed(std::uint64_t{3}) + colmap_image_binary(1, {1, 0, 0, 0, 0, 0, 0}, 1, "b.png", {7, -1, 9}) +
          colmap_image_binary(2, {0.70710678118654752, 0, 0.70710678118654752, 0, 1, 2, 3}, 2, "a.png", {}) +
          colmap_image_binary(3, {1, 0, 0, 0, 0, 0, -1}, 1, "sub/c.png", {8});
-}
-
-inline std::string colmap_points_binary() {
-  const auto point = [](std::uint64_t key, const std::vector<double>& at, std::uint64_t track) {
-    return packed(key) + packed(at) + std::string("abc") + packed(0.5) + packed(track) +
-           std::string(8 * track, '\1');
-  };
-  return packed(std::uint64_t{3}) + point(7, {0, 0, 5}, 2) + point(8, {1, 0, 6}, 0) +
-         point(9, {0.5, 0.5, 20}, 0);
 }

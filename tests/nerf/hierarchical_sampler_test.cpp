@@ -1,4 +1,4 @@
-#include <fieldmark/nerf/hierarchical_sampler.h>
+#include "hierarchical_sampler.h"
 
 #include <algorithm>
 #include <cmath>
@@ -145,7 +145,7 @@ TEST_CASE("hierarchical_sampler: errors name argument and what came") {
                     "[hierarchical_sampler] importance must be 0 to 1024, got 2000");
   CHECK_THROWS_WITH(spread(sampler, grid, {.average = 0}), Contains("average or random must be at least 1"));
   CHECK_THROWS_WITH(spread(sampler, grid, {}, std::vector<float>(3)),
-                    "[hierarchical_sampler] jitter must have one number a ray (4), got 3");
+                    "[hierarchical_sampler] jitter must have one element a ray (4), got 3");
   CHECK_THROWS_WITH(sampler.spread(grid, rays.batch(), {}, 0, {}, out), Contains("step must be positive"));
   const RaySamples first = spread(sampler, grid, {.average = 4});
   CHECK_THROWS_WITH(sampler.refine(rays.batch(), first, std::vector<float>(3), out),

@@ -1,5 +1,5 @@
 #include <fieldmark/core/error.h>
-#include <fieldmark/nerf/importance_points.h>
+#include "hierarchical_sampler.h"
 
 #include <algorithm>
 #include <cmath>
@@ -81,7 +81,7 @@ TEST_CASE("importance_points: errors name sizes") {
   std::vector<double> edge(3), weight(3), u(2), out(1);
   CHECK_THROWS_WITH(
       importance_points<double>(edge, weight, u, out),
-      Contains("[importance_points] edge must have one number more than weight") && Contains("got 3 and 3"));
+      Contains("[importance_points] edge must have one element more than weight") && Contains("got 3 and 3"));
   CHECK_THROWS_WITH(importance_points<double>(edge, std::span(weight).first(2), u, out),
                     "[importance_points] out must have the 2 numbers of u, got 1");
   CHECK_THROWS_AS(importance_points<double>(std::span(edge).first(1), {}, {}, {}), ShapeError);

@@ -1,4 +1,4 @@
-#include "intrinsics.h"
+#include "lens.h"
 #include <fieldmark/core/error.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-#include <fieldmark/nerf/marching.h>
+#include "marching.h"
 #include <fieldmark/nerf/space.h>
 
 #include <algorithm>
@@ -236,7 +236,7 @@ Contracted contracted_by_steps(const OccupancyGrid& grid, const Line& line, doub
     return s;
   };
   const Space space{.kind = SpaceKind::contracted, .bounds = {.corner = {0.25, 0.25, 0.25}, .side = 0.5}};
-  for (double t = near + jitter * step * scale(near); scale(t) < static_cast<double>(RayWalk::kFarthest);
+  for (double t = near + jitter * step * scale(near); scale(t) < static_cast<double>(kernels::kMarchFarthest);
        t += step * scale(t)) {
     Vec3 p;
     for (std::size_t a = 0; a < 3; ++a)

@@ -69,7 +69,7 @@ TEST_CASE("photometric_loss: errors name argument and what came") {
   CHECK_THROWS_WITH(
       run(wrong, back, 1),
       "[photometric_loss] rays: axis 1 must be 4 (red, green, blue, opacity), got shape [2, 3]");
-  CHECK_THROWS_WITH(run(rays, photo, 1), Contains("3 numbers a ray (2 rays), got 8 and 8"));
+  CHECK_THROWS_WITH(run(rays, photo, 1), Contains("3 elements a ray (2 rays), got 8 and 8"));
   CHECK_THROWS_WITH(run(rays, back, 0), Contains("[photometric_loss] huber must be positive, got 0"));
   CHECK_THROWS_AS(run(rays, back, std::nan("")), ValueError);
 }

@@ -1,4 +1,5 @@
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/nerf/field_sampler.h>
 #include <fieldmark/nerf/renderer.h>
 
 #include <algorithm>
@@ -110,7 +111,7 @@ TEST_CASE("renderer: a pixel of several rays is the mean of what they see, in do
     }
   CHECK(worst < 1e-4);
   CHECK_THROWS_WITH(Renderer(f, {.supersampling = -1}),
-                    "[renderer] supersampling must be 1 to 8 rays along a pixel's side, or 0, got -1");
+                    "[renderer] supersampling must be 0 to 8, got -1");
   CHECK_THROWS_AS(Renderer(f, {.supersampling = 9}), ValueError);
 }
 
@@ -162,24 +163,6 @@ TEST_CASE("renderer: trace gives what render shows") {
     CHECK(out[4 * i + 3] == view.opacity.data[i]);
     CHECK(out[4 * i] + (1 - out[4 * i + 3]) == view.rgb.data[3 * i]);
   }
-}
-
-TEST_CASE("renderer: tiles of any shape and order show the same image") {
-  const RadianceField f = small_field();
-  const Camera camera = test_camera(37, 29);
-  Renderer renderer(f);
-  const Rendering plain = renderer.render(camera);
-  for (const RayOrder order :
-       {RayOrder{64, 1}, RayOrder{8, 8}, RayOrder{5, 3, true}, RayOrder{16, 16, true}}) {
-    Renderer other(f, {.order = order});
-    const Rendering view = other.render(camera);
-    float worst = 0;
-    for (std::size_t i = 0; i < view.rgb.data.size(); ++i)
-      worst = std::max(worst, std::abs(view.rgb.data[i] - plain.rgb.data[i]));
-    CHECK(worst < 1e-6f);
-  }
-  CHECK_THROWS_WITH(Renderer(f, {.order = {0, 4}}),
-                    "[renderer] order: a tile must have at least one pixel, got 0 x 4");
 }
 
 TEST_CASE("renderer: finer steps come closer to the integral") {

@@ -1,4 +1,4 @@
-#include <fieldmark/nerf/sampler.h>
+#include "sampler.h"
 
 #include <algorithm>
 #include <cmath>
@@ -132,7 +132,7 @@ TEST_CASE("sampler: errors name argument and what came") {
   const Rays rays = some_rays(2);
   CHECK_THROWS_WITH(sample(f, rays, {.step = 0}), Contains("[sampler] step must be positive, got 0"));
   CHECK_THROWS_WITH(sample(f, rays, {}, std::vector<float>(3)),
-                    "[sampler] jitter must have one number a ray (2), got 3");
+                    "[sampler] jitter must have one element a ray (2), got 3");
   Rays odd = rays;
   odd.directions.pop_back();
   CHECK_THROWS_WITH(sample(f, odd, {}),

@@ -1,5 +1,5 @@
 #include "scene_space.h"
-#include <fieldmark/nerf/marching.h>
+#include "marching.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "solid_texture.h"
+#include "solids.h"
 
 #include <cmath>
 #include <set>

@@ -1,6 +1,6 @@
 #include <fieldmark/core/error.h>
 #include <fieldmark/engine/parallel.h>
-#include <fieldmark/nerf/marching.h>
+#include "marching.h"
 #include <fieldmark/nerf/space.h>
 
 #include <algorithm>

@@ -93,7 +93,6 @@ TEST_CASE("transforms: intrinsics of the file, each replaced where a frame has i
            "\"camera_model\": \"OPENCV\","),
       "t.json");
   CHECK(t.camera_angle_x == 0);
-  CHECK(t.aabb_scale == 16.0);
   const Intrinsics& i = t.frames[1].intrinsics;
   CHECK((i.fl_x == 20 && i.fl_y == 21 && i.cx == 5.5 && i.cy == 4.0 && i.width == 12 && i.height == 8));
   CHECK(i.lens == Lens{.k1 = 0.1, .k2 = 0.2, .p1 = 0.3, .p2 = 0.4});
@@ -125,7 +124,6 @@ TEST_CASE("transforms: lenses and sizes that are not known are refused by name")
   expect("\"cx\": \"left\"", "cx: expected a number, got string");
   expect("\"w\": 0, \"h\": 8", "w: expected a number in 1 to 65536, got 0");
   expect("\"w\": 8", "expected the keys \"w\" and \"h\" or neither of them, got one");
-  expect("\"aabb_scale\": 0", "aabb_scale: expected a number in (0, 1e9), got 0");
   expect("\"k1\": 1e300", "k1: expected a number in (-1e9, 1e9), got ");
 }
 

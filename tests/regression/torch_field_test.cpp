@@ -1,4 +1,5 @@
 #include <fieldmark/engine/safetensors.h>
+#include <fieldmark/nerf/field_sampler.h>
 #include <fieldmark/nerf/renderer.h>
 
 #include <algorithm>

@@ -1,5 +1,6 @@
 #include <fieldmark/nerf/evaluation.h>
 #include <fieldmark/nerf/field_sizing.h>
+#include <fieldmark/nerf/psnr_target.h>
 #include <fieldmark/nerf/trainer.h>
 
 #include <cstdio>
@@ -19,8 +20,7 @@
 namespace fieldmark::cli {
 namespace {
 
-constexpr double kSizing = 1. / 3;     // of --seconds, at most
-constexpr double kHeaderBytes = 32e3;  // names and metadata, cameras included
+constexpr double kSizing = 1. / 3;  // of --seconds, at most
 
 struct Options {
   std::string data, out;
@@ -36,17 +36,9 @@ std::optional<nerf::Background> background_of(const std::string& name) {
   return name == "white" ? nerf::Background::white : nerf::Background::black;
 }
 
-// With the largest table whose field's numbers fit; the rest of the file is small.
-nerf::RadianceFieldOptions fitted(nerf::RadianceFieldOptions field, double max_megabytes) {
+nerf::RadianceFieldOptions fitted(const nerf::RadianceFieldOptions& field, double max_megabytes) {
   if (max_megabytes <= 0) return field;
-  const int least = field.field.kind == nerf::FieldKind::mlp ? field.field.encoding.log2_table : 4;
-  for (int log2 = field.field.encoding.log2_table; log2 >= least; --log2) {
-    field.field.encoding.log2_table = log2;
-    const nerf::RadianceField made(field);
-    const double bytes =
-        4.0 * static_cast<double>(made.params.size()) + static_cast<double>(made.grid.cells()) / 8;
-    if (bytes + kHeaderBytes <= max_megabytes * 1e6) return field;
-  }
+  if (const auto fit = nerf::fit_field(field, max_megabytes * 1e6)) return *fit;
   throw UsageError("--max-megabytes: no field is as small as " + std::to_string(max_megabytes) + " MB");
 }
 
@@ -95,51 +87,31 @@ nerf::RadianceFieldOptions sized(const nerf::RadianceFieldOptions& start, const 
   return sizing.field;
 }
 
-// Whether held-out views look as good as is wanted: asked every so many steps, so that the clock has no part
-// in it.
-class Target {
- public:
-  Target(const Options& options, const nerf::RadianceField& field, Context& context)
-      : wanted_(options.target_psnr), renderer_(field) {
-    if (wanted_ <= 0 || !nerf::has_split(options.data, "val")) return;
-    held_out_ = load_scene(
+nerf::PsnrTarget psnr_target(const Options& options, const nerf::RadianceField& field, Context& context) {
+  std::optional<nerf::Dataset> held_out;
+  if (options.target_psnr > 0 && nerf::has_split(options.data, "val"))
+    held_out = load_scene(
         options.data, {.split = "val", .size = options.size, .background = background_of(options.background)},
         context);
-    if (held_out_->views.size() > kViews) held_out_->views.resize(kViews);
-  }
-  bool reached(const nerf::Trainer& trainer) {
-    if (wanted_ <= 0) return false;
-    if (!held_out_) return trainer.train_psnr() >= wanted_;
-    if (trainer.steps() == 0 || trainer.steps() % kEvery != 0 || trainer.steps() == asked_) return false;
-    asked_ = trainer.steps();
-    return nerf::evaluate(renderer_, *held_out_).psnr >= wanted_;
-  }
+  return {field, options.target_psnr, std::move(held_out)};
+}
 
- private:
-  static constexpr std::size_t kViews = 4;
-  static constexpr Index kEvery = 250;
-  double wanted_;
-  nerf::Renderer renderer_;
-  std::optional<nerf::Dataset> held_out_;
-  Index asked_ = 0;
-};
-
-double train(const Options& options, nerf::Trainer& trainer, Target& target, const std::string& checkpoint,
-             Context& context) {
-  return run_long({.what = "train",
-                   .done = [&] { return trainer.done() || target.reached(trainer); },
-                   .step = [&](double seconds) { trainer.step(seconds); },
-                   .steps = [&] { return trainer.steps(); },
-                   .note =
-                       [&] {
-                         char note[64];
-                         std::snprintf(note, sizeof note, "%.2f dB on the rays trained",
-                                       trainer.train_psnr());
-                         return std::string(note);
-                       },
-                   .save = [&] { trainer.save(checkpoint); },
-                   .checkpoint = checkpoint},
-                  options.length, context);
+double train(const Options& options, nerf::Trainer& trainer, nerf::PsnrTarget& target,
+             const std::string& checkpoint, Context& context) {
+  return run_long(
+      {.what = "train",
+       .done = [&] { return trainer.done() || target.reached(trainer.steps(), trainer.train_psnr()); },
+       .step = [&](double seconds) { trainer.step(seconds); },
+       .steps = [&] { return trainer.steps(); },
+       .note =
+           [&] {
+             char note[64];
+             std::snprintf(note, sizeof note, "%.2f dB on the rays trained", trainer.train_psnr());
+             return std::string(note);
+           },
+       .save = [&] { trainer.save(checkpoint); },
+       .checkpoint = checkpoint},
+      options.length, context);
 }
 
 // Of the data set's test views, after everything is saved; null where there are none.
@@ -194,7 +166,7 @@ int run(const Options& options, Context& context) {
   nerf::Trainer trainer(field, data, train_options);
   if (options.resume) trainer.restore(checkpoint);
 
-  Target target(options, field, context);
+  nerf::PsnrTarget target = psnr_target(options, field, context);
   const double begun = context.seconds(), samples_before = trainer.samples();
   const InterruptGuard until_saved;  // between the last step and the file, Ctrl-C waits
   const double seconds = train(options, trainer, target, checkpoint, context);

@@ -75,7 +75,7 @@ constexpr int kFew = 8;     // the same in a contracted space, where each waits 
   return in ? s : kMarchFarthest;
 }
 
-[[gnu::always_inline]] inline float scale_at(const ContractedRay& r, float t) {
+[[gnu::always_inline]] inline float scale_at(const MarchRay& r, float t) {
   return scale_at(r.o[0] + t * r.d[0], r.o[1] + t * r.d[1], r.o[2] + t * r.d[2]);
 }
 
@@ -94,7 +94,8 @@ constexpr int kFew = 8;     // the same in a contracted space, where each waits 
 }
 
 // 0 if the next sample lies in a block with an occupied cell, or behind the end.
-[[gnu::always_inline]] inline std::int32_t empty_steps(const MarchGrid& g, const ContractedRay& r) {
+[[gnu::always_inline]] inline std::int32_t empty_contracted_steps(const MarchGrid& g,
+                                                                  const MarchRay& r) {
   const auto n = static_cast<float>(g.block_side);
   const float s = scale_at(r, r.near);
   std::int32_t at = 0;
@@ -172,8 +173,8 @@ std::int64_t march(const MarchGrid& grid, MarchRay& r, std::int64_t max, float* 
   return count;
 }
 
-void march_contracted_to_blocks(const MarchGrid& g, ContractedRays& rays) {
-  ContractedRays r = rays;
+void march_contracted_to_blocks(const MarchGrid& g, MarchRays& rays) {
+  MarchRays r = rays;
   const auto n = static_cast<float>(g.block_side);
   const float side = 1 / n;
   for (std::int32_t going = 1; going;) {
@@ -212,14 +213,14 @@ void march_contracted_to_blocks(const MarchGrid& g, ContractedRays& rays) {
   rays = r;
 }
 
-std::int64_t march_contracted(const MarchGrid& g, ContractedRay& ray, std::int64_t max, float* out,
+std::int64_t march_contracted(const MarchGrid& g, MarchRay& ray, std::int64_t max, float* out,
                               float* x) {
-  ContractedRay r = ray;
+  MarchRay r = ray;
   const auto n = static_cast<float>(g.resolution);
   std::int64_t count = 0;
   bool ended = false;
   while (count < max && r.k < kMarchMost && !ended) {
-    if (const std::int32_t steps = empty_steps(g, r)) {
+    if (const std::int32_t steps = empty_contracted_steps(g, r)) {
       for (std::int32_t i = 0; i < steps; ++i) r.near += r.step * scale_at(r, r.near);
       r.k += steps;
       continue;

@@ -160,7 +160,7 @@ namespace {
 struct Placed {
   double scale, x[3];
 };
-Placed placed(const ContractedRay& r, double t) {
+Placed placed(const MarchRay& r, double t) {
   Placed p{1, {}};
   for (int a = 0; a < 3; ++a) {
     p.x[a] = static_cast<double>(r.o[a]) + t * static_cast<double>(r.d[a]) - 0.5;
@@ -170,13 +170,13 @@ Placed placed(const ContractedRay& r, double t) {
   return p;
 }
 
-std::vector<ContractedRay> contracted_rays() {
+std::vector<MarchRay> contracted_rays() {
   const auto ends = uniform({kMarchLanes, 6}, 0, 1, 3);
-  std::vector<ContractedRay> rays;
+  std::vector<MarchRay> rays;
   for (int i = 0; i < kMarchLanes; ++i) {
     const MarchRay r = ray_through(&ends.data[static_cast<std::size_t>(6 * i)],
                                    &ends.data[static_cast<std::size_t>(6 * i + 3)], 0.004f, 0);
-    ContractedRay c{};
+    MarchRay c{};
     c.near = 0.002f;
     c.step = 0.004f;
     for (int a = 0; a < 3; ++a) c.o[a] = r.o[a], c.d[a] = r.d[a];
@@ -185,7 +185,7 @@ std::vector<ContractedRay> contracted_rays() {
   return rays;
 }
 
-std::vector<float> walked(const Grid& grid, ContractedRay ray, std::int64_t piece) {
+std::vector<float> walked(const Grid& grid, MarchRay ray, std::int64_t piece) {
   std::vector<float> all, t(static_cast<std::size_t>(piece) + 1, -7.f),
       x(static_cast<std::size_t>(3 * piece) + 1, -7.f);
   for (std::int64_t count = piece; count == piece;) {
@@ -209,7 +209,7 @@ TEST_CASE(
     Grid full;
     for (int c = 0; c < kSide * kSide * kSide; ++c)
       full.fill(c % kSide, c / kSide % kSide, c / kSide / kSide);
-    for (const ContractedRay& ray : contracted_rays()) {
+    for (const MarchRay& ray : contracted_rays()) {
       const auto got = walked(full, ray, 4000);
       for (const std::int64_t piece : {1, 5, 16}) REQUIRE(walked(full, ray, piece) == got);
       double t = static_cast<double>(ray.near);
@@ -231,17 +231,17 @@ TEST_CASE(
     grid.fill(6, 6, 6);
     grid.fill(1, 10, 2);
     grid.fill(11, 5, 5);  // far outside
-    const std::vector<ContractedRay> single = contracted_rays();
-    ContractedRays rays{};
+    const std::vector<MarchRay> single = contracted_rays();
+    MarchRays rays{};
     for (int i = 0; i < kMarchLanes; ++i) {
-      const ContractedRay& r = single[static_cast<std::size_t>(i)];
+      const MarchRay& r = single[static_cast<std::size_t>(i)];
       for (int a = 0; a < 3; ++a) rays.o[a][i] = r.o[a], rays.d[a][i] = r.d[a];
       rays.near[i] = r.near, rays.step[i] = r.step, rays.k[i] = i % 3 ? 0 : kMarchMost;  // or without a ray
     }
     FIELDMARK_KERNEL(march_contracted_to_blocks)(grid.view(), rays);
     int jumped = 0, reached = 0, ended = 0;
     for (int i = 0; i < kMarchLanes; ++i) {
-      ContractedRay r = single[static_cast<std::size_t>(i)];
+      MarchRay r = single[static_cast<std::size_t>(i)];
       CAPTURE(i);
       if (i % 3 == 0) {
         CHECK((rays.k[i] == kMarchMost && rays.near[i] == r.near));

@@ -38,7 +38,7 @@ TEST_CASE("field_variants: the default comes first, names are single, each diffe
   std::set<std::string> names;
   for (const FieldVariant& v : all) names.insert(v.knob + " " + v.setting);
   CHECK(names.size() == all.size());
-  for (const char* knob : {"samples", "stop", "least weight", "occupancy", "ray order", "together"})
+  for (const char* knob : {"samples", "stop", "least weight", "occupancy", "together"})
     CHECK(std::any_of(all.begin(), all.end(), [&](const auto& v) { return v.knob == knob; }));
   const auto few = field_variants(f, true);
   CHECK(few.size() < 10);

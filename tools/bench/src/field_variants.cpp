@@ -112,18 +112,6 @@ struct Sweep {
       add("precision", "bf16", [](auto& v) { v.render.precision = Precision::bf16; });
   }
 
-  void add_orders() {
-    struct Order {
-      const char* name;
-      nerf::RayOrder order;
-    };
-    for (const Order& o :
-         {Order{"lines of 256", {256, 1}}, Order{"tiles of 4 x 4", {4, 4}}, Order{"tiles of 8 x 8", {8, 8}},
-          Order{"tiles of 32 x 32", {32, 32}}, Order{"tiles of 64 x 64", {64, 64}},
-          Order{"Morton, 16 x 16", {16, 16, true}}, Order{"Morton, 32 x 32", {32, 32, true}}})
-      add("ray order", o.name, [&](auto& v) { v.render.order = o.order; });
-  }
-
   // Coarser and finer in all at once, from quick to exact.
   void add_together() {
     for (const auto& [finer, stop, least] : {std::array{0.5f, 3e-2f, 3e-3f},
@@ -171,7 +159,6 @@ nerf::RadianceField with_variant(const nerf::RadianceField& field, const FieldVa
 std::vector<FieldVariant> field_variants(const nerf::RadianceField& field, bool quick) {
   Sweep sweep(field);
   sweep.add_knobs(field.grid.resolution());
-  sweep.add_orders();
   sweep.add_together();
   if (!quick) return sweep.all;
   std::vector<FieldVariant> few;

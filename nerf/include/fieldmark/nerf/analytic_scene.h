@@ -8,40 +8,39 @@
 
 namespace fieldmark::nerf {
 
-/// Which of the built-in scenes.
+/// The built-in scenes.
 enum class SceneKind {
   objects,  ///< textured solids of every kind on a round slab, with soft shadows
   sphere    ///< one sphere of one colour, shaded
 };
 
-/// A built-in scene, within 1.2 of the origin, and cameras around it like those of the Blender scenes: on the
-/// upper half of a sphere of radius 4.0311, looking at the origin, camera_angle_x 0.6911.
+/// A built-in scene, within 1.2 of the origin, and cameras like those of the Blender scenes: on the upper
+/// half of a sphere of radius 4.0311, looking at the origin, camera_angle_x 0.6911.
 struct SceneOptions {
-  SceneKind kind = SceneKind::objects;  ///< what stands in it
+  SceneKind kind = SceneKind::objects;  ///< which scene
   Index size = 200;                     ///< pixels of both sides, 1 to 8192
   Index views = 100;  ///< of the training split, 1 to 100000; val has a tenth and test a quarter, at least 1
   std::uint64_t seed = 0;  ///< of placement, colours and cameras
 };
 
 /// Ray-traces one view with 4 x 4 samples a pixel; alpha is the covered share of a pixel. Surfaces are
-/// diffuse under a sky and a sun with soft edges, both approximated by spheres inside the solids (shadow: the
-/// angle between sun and sphere; sky: (r / d)^2), so a point has one colour from every side.
-/// @return  [height, width, 4] straight alpha, rounded to 8 bits   @throws ValueError if an option is outside
-/// its range
+/// diffuse under a sky and a soft sun, both occluded by spheres inside the solids (sun: the angle to the
+/// sphere; sky: (r / d)^2), so a point has one colour from all sides.
+/// @return  [height, width, 4] straight alpha, rounded to 8 bits   @throws ValueError if an option is out of
+/// range
 Tensor<float> render_scene(const SceneOptions& options, const Camera& camera);
 
-/// One split in memory: the same images and cameras that write_scene() writes.
-/// @throws ValueError  if an option is outside its range or split is not "train", "val" or "test"
+/// One split in memory: the images and cameras of write_scene().
+/// @throws ValueError  if an option is out of range or split is not "train", "val" or "test"
 Dataset make_scene(const SceneOptions& options, const std::string& split = "train",
                    Background background = Background::white);
 
-/// Called with the images done and their total, from the calling thread; may throw to stop.
+/// Called on the calling thread with the images done and their total; may throw to stop.
 using SceneProgress = std::function<void(Index done, Index total)>;
 
-/// Writes all splits as a data set that load_dataset() reads: train, val and test folders of RGBA PNG files,
-/// and, when their images are complete, transforms_{train,val,test}.json. Equal options give equal bytes.
-/// @throws ValueError  if an option is outside its range   @throws IoError if folder or files cannot be
-/// written
+/// Writes all splits as a data set for load_dataset(): folders train, val and test of RGBA PNG files, and,
+/// when their images are complete, transforms_{train,val,test}.json. Equal options give equal bytes.
+/// @throws ValueError  if an option is out of range   @throws IoError if folder or files cannot be written
 void write_scene(const SceneOptions& options, const std::filesystem::path& folder,
                  const SceneProgress& progress = {});
 

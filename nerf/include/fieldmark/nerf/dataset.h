@@ -10,73 +10,64 @@
 
 namespace fieldmark::nerf {
 
-/// What is behind the scene where an image is not opaque.
+/// The colour behind transparent pixels.
 enum class Background { white, black };
 
-/// How a folder holds a data set.
+/// The file layout of a data set.
 enum class Layout {
   blender,     ///< transforms_{train,val,test}.json, one for each split: Mildenhall et al. 2020 (NeRF)
   transforms,  ///< one transforms.json, of instant-ngp or nerfstudio
   llff,        ///< poses_bounds.npy: Mildenhall et al. 2019 (LLFF)
   colmap       ///< a sparse model of COLMAP, text or binary
 };
-/// "blender", "transforms", "llff" or "colmap".
-std::string_view layout_name(Layout layout);
 
-/// From where to where a view shows something, along its axis.
+/// The depths of a view's scene, along its axis.
 struct DepthRange {
   double near = 0;  ///< length, > 0
   double far = 0;   ///< length, > near
 };
 
-/// A photograph and the camera that took it.
+/// A ground truth image and its camera.
 struct View {
   Camera camera;                      ///< of the size of the image
   Tensor<float> rgba;                 ///< [height, width, 4] in [0, 1], straight (not premultiplied) alpha
-  std::string name;                   ///< as in the data set, without folder and extension: "r_12"
-  std::optional<DepthRange> depth{};  ///< where the data set knows it (layouts llff and colmap)
+  std::string name;                   ///< of the file, without folder and extension: "r_12"
+  std::optional<DepthRange> depth{};  ///< of layout llff
 };
 
 /// One split of a data set in memory.
 struct Dataset {
   std::string name;                           ///< of the folder: "lego"
   std::string split;                          ///< "train", "val" or "test"
-  Background background = Background::white;  ///< in front of which its views are shown
+  Background background = Background::white;  ///< behind its views
   std::vector<View> views;                    ///< at least one; all of one size
-  Layout layout = Layout::blender;            ///< how the folder holds it
+  Layout layout = Layout::blender;            ///< of the folder
   /// Whether it is of layout llff and every camera looks within 60 degrees of their mean axis, -z.
   bool forward_facing = false;
-  std::optional<double> aabb_scale{};  ///< side of the scene's cube in instant-ngp's units, where stated
-  std::vector<Vec3> points{};          ///< points of the scene's surface, where the layout has them (colmap)
-  std::vector<std::string> notes{};  ///< for people: what was left out, cut off or held out, a sentence each
+  std::vector<std::string> notes{};  ///< for people: a sentence for each omission, crop and hold-out
 };
 
-/// What load_dataset() reads, and at what size.
+/// Split, size and background for load_dataset().
 struct DatasetOptions {
   std::string split = "train";  ///< "train", "val" or "test"
-  /// Pixels of the longer side after an area filter on premultiplied colour; 0: as it is. Where distorted
-  /// images lose their rims, it is the size before that.
+  /// Pixels of the longer side after an area filter on premultiplied colour, before distorted images lose
+  /// their rims; 0: original size.
   Index size = 0;
-  /// Of the Dataset that is made; none: white for the layout blender, black for photographs.
+  /// Behind the views; none: white for the layout blender, else black.
   std::optional<Background> background{};
 };
 
 /// Reads one split of a data set. The layout is the first whose file the folder has: transforms_train.json
-/// (or _val, _test), transforms.json, poses_bounds.npy, cameras.bin or cameras.txt (in sparse/0,
-/// sparse or the folder itself). All but blender hold out every 8th image (0, 8, 16,
-/// ... of the names sorted) as val and test, and have the others in train. Images without alpha are taken
-/// as opaque.
+/// (or _val, _test), transforms.json, poses_bounds.npy, cameras.bin or cameras.txt (in sparse/0, sparse or
+/// the folder itself). All layouts but blender hold out every 8th image (0, 8, 16, ... of the sorted names)
+/// as val and test, and have the others in train. Images without alpha are opaque.
 ///
 /// transforms: see parse_transforms(). Frames without an image are left out, with a note. Distorted images
-/// are made into those of a pinhole (undistorted_image()), all cut to the part that covered_part() has for
-/// every lens of the file; what is outside is neither trained on nor measured.
-///
-/// llff: see parse_poses_bounds(); poses are recentred and rescaled by recentre_llff(). Images are those of
-/// the folder images or images_N whose longer side is the smallest that reaches `size` (else the largest),
-/// sorted by name.
-///
-/// colmap: see parse_colmap_cameras(). World axes are COLMAP's. Images as for llff, lenses and missing
-/// images as for transforms; points3D is read where it is there.
+/// become those of a pinhole (undistorted_image()), cut to the part that every lens of the file covers. llff:
+/// see parse_poses_bounds(); recentre_llff() recentres and rescales the poses. Images are those of the folder
+/// images or images_N whose longer side is the smallest that reaches `size` (else the largest). colmap: see
+/// parse_colmap_cameras(). World axes are COLMAP's. Images as for llff, lenses and missing images as for
+/// transforms.
 /// @throws ValueError  if an option is outside its range
 /// @throws IoError     naming file and place: folder, JSON or an image missing, unreadable or malformed, no
 ///                     views, images of differing sizes, a distortion that has no inverse, none of the

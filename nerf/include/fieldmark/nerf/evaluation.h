@@ -7,15 +7,15 @@
 
 namespace fieldmark::nerf {
 
-/// How close one rendering is to its photograph, see psnr(), psnr_masked() and ssim().
+/// Metrics of one render against ground truth.
 struct ViewScore {
   double psnr;             ///< over the whole image, dB
-  double psnr_foreground;  ///< over the object's pixels, dB; NaN where the object is not in the image
+  double psnr_foreground;  ///< over the foreground, dB; NaN if it is empty
   double ssim;             ///< in [-1, 1]; NaN for an image smaller than the window of ssim()
-  double lpips;  ///< both rounded to 8 bits; NaN without a network, or for an image it is too small for
+  double lpips;            ///< of both rounded to 8 bits; NaN without a network or for too small an image
 };
 
-/// Means over the views of a data set. A view whose number is NaN is left out of that number's mean.
+/// Means over the views of a data set; each leaves out the views where its metric is NaN.
 struct Evaluation {
   double psnr = 0;                  ///< mean of ViewScore::psnr
   double psnr_foreground = 0;       ///< mean of ViewScore::psnr_foreground
@@ -26,11 +26,10 @@ struct Evaluation {
   std::vector<ViewScore> per_view;  ///< [views] in the order of the data set
 };
 
-/// Renders every view of a data set and compares it with the photograph in front of the data set's
-/// background. The object is where the photograph's alpha exceeds 0.5; where a photograph has no alpha (1
-/// everywhere), it is where the rendering's opacity does.
-/// @param progress  called after each view with how many are done and how many there are; false ends the
-///                  evaluation with the views so far. May be empty
+/// Renders every view of a data set and compares it with the ground truth over the data set's background. The
+/// foreground is the pixels whose alpha exceeds 0.5 in the ground truth; in the render where the ground truth
+/// is opaque.
+/// @param progress  called after each view; false ends the evaluation with the views so far. May be empty
 /// @param lpips     the network of ViewScore::lpips, or null
 /// @throws ValueError if there are no views
 Evaluation evaluate(Renderer& renderer, const Dataset& dataset,

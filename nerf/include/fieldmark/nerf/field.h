@@ -3,45 +3,42 @@
 #include <fieldmark/engine/packed_weights.h>
 #include <fieldmark/nerf/hash_encoding.h>
 #include <fieldmark/nerf/mlp_field.h>
+#include <fieldmark/nerf/spherical_harmonics.h>
 
 #include <optional>
 #include <vector>
 
 namespace fieldmark::nerf {
 
-/// What looks a field's features up: a hash table with small networks behind it, or nothing but the position
-/// itself with large ones.
+/// The kinds of a field: hash table and small networks, or frequency encoding and large networks.
 enum class FieldKind { hash, mlp };
 
 /// Sizes of a Field.
 struct FieldOptions {
   HashEncodingOptions encoding{};  ///< of positions
   Index width = 32;                ///< units of a hidden layer, 1 to 256
-  Index geometry =
-      16;  ///< N_z, numbers the density network hands to the colour network; the first is log density
-  bool directional = true;           ///< whether colours depend on the viewing direction
-  FieldKind kind = FieldKind::hash;  ///< mlp ignores what is above
-  MlpFieldOptions mlp{};             ///< used by mlp only
+  Index geometry = 16;      ///< N_z, outputs of the density network, 1 to 256; the first is log density
+  bool directional = true;  ///< whether colours depend on the viewing direction
+  FieldKind kind = FieldKind::hash;  ///< mlp ignores the options above
+  MlpFieldOptions mlp{};             ///< of kind mlp
 };
 
 /// A radiance field on the unit cube:
 ///   z = Theta_sigma(h_sigma(x)),   sigma = exp(min(z_0, 15)),   c = Theta_c(z, h_c(x), Y(d))
 /// Kind hash: h_sigma, h_c are the two parts of one hash encoding; Y: spherical harmonics, or nothing where
-/// the field is not directional; Theta: small networks with ReLU, one hidden layer for density and two for
-/// colour; the colour leaves through a sigmoid. Source: Mildenhall et al. 2020, sec. 3 (the split), Mueller
-/// et al. 2022, sec. 5.4 (sizes). Departure: h_c reaches only the colour, so that a mark can be put into the
-/// colours without touching a byte of the geometry. Kind mlp: see MlpField; h_sigma and Y are frequency
-/// encodings, h_c is empty. The field holds no numbers: they are in the store, the networks first and the
-/// table, where there is one, last.
+/// the field is not directional; Theta: ReLU networks with one hidden layer for density and two for colour,
+/// and a sigmoid on the colour. Source: Mildenhall et al. 2020, sec. 3 (the split), Mueller et al. 2022,
+/// sec. 5.4 (sizes). Departure: h_c reaches only the colour, so that colours can change without a byte of the
+/// geometry. Kind mlp: see MlpField; h_sigma and Y are frequency encodings, h_c is empty. The store holds the
+/// parameters: the networks' first, then the table.
 template <class T>
 class Field {
  public:
-  /// Registers "density/0", "density/1", "colour/0" .. "colour/2" and "hash/table", or what MlpField has.
-  /// @param prefix  before the names
-  /// @throws ValueError if an option is out of range or a name is taken
+  /// Registers "density/0", "density/1", "colour/0" .. "colour/2" and "hash/table", or those of MlpField.
+  /// @param prefix  before the names   @throws ValueError if an option is out of range or a name is taken
   Field(ParamStore<T>& store, const FieldOptions& options, std::uint64_t seed, std::string_view prefix = "");
 
-  /// What the field says about positions seen from directions.
+  /// Density and colour.
   struct Output {
     Var<T> sigma;  ///< [N], 1 / cube side
     Var<T> rgb;    ///< [N, 3] in (0, 1)
@@ -50,7 +47,7 @@ class Field {
   /// Differentiable in: x, d and all parameters.
   Output operator()(const Params<T>& params, Var<T> x, Var<T> d) const;
 
-  /// The pieces, for loops that look features up once for several uses: features of n positions, not
+  /// The steps of operator(), for loops that use features several times: features of n positions, not
   /// recorded.
   /// @param x  [n, 3]   @param density, colour  [n, density_width()] and [n, colour_width()], written
   /// @param packed  whose rounded table is read where it has one, or null
@@ -62,25 +59,30 @@ class Field {
   Var<T> density(Var<T> z) const;
   /// @param d  [N, 3] unit directions   @return Y(d) [N, direction_width()]
   Var<T> encode_directions(Var<T> d) const;
-  /// @param z [N, geometry_width()]  @param features [N, colour_width()]  @param direction what
-  /// encode_directions() gave   @return rgb [N, 3]
+  /// @param z [N, geometry_width()]  @param features [N, colour_width()]  @param direction  see
+  /// encode_directions()   @return rgb [N, 3]
   Var<T> colour(const Params<T>& params, Var<T> z, Var<T> features, Var<T> direction) const;
 
-  Index density_width() const;    ///< features of a position for geometry()
-  Index colour_width() const;     ///< features of a position for colour(); 0 for mlp
-  Index geometry_width() const;   ///< N_z, numbers of z
-  Index direction_width() const;  ///< numbers of an encoded direction
+  /// Features of a position for geometry().
+  Index density_width() const { return mlp_ ? mlp_->feature_width() : encoding_->width(); }
+  /// Features of a position for colour(); 0 for mlp.
+  Index colour_width() const { return mlp_ ? 0 : encoding_->width(); }
+  /// N_z, elements of z.
+  Index geometry_width() const { return mlp_ ? mlp_->geometry_width() : options_.geometry; }
+  /// Elements of an encoded direction.
+  Index direction_width() const {
+    return mlp_ ? mlp_->direction_width() : options_.directional ? kSphericalHarmonics : 0;
+  }
 
   /// As constructed.
   const FieldOptions& options() const { return options_; }
-  /// Whether there is a table: positions then owe it their gradients, see HashEncoding.
+  /// Whether there is a hash table.
   bool has_table() const { return encoding_.has_value(); }
   /// The encoding whose two parts feed the networks. @throws ValueError if there is no table
   const HashEncoding<T>& encoding() const;
-  /// How many numbers at the front of the store belong to the networks, if the field was first in it; the
-  /// table follows.
+  /// Parameters of the networks: the first of the store, if the field was first in it; the table follows.
   Index network_size() const { return network_size_; }
-  /// Whether a parameter (by name, other than the table) belongs to the colour side.
+  /// Whether a parameter (by name, other than the table) belongs to the colour network.
   static bool is_colour(std::string_view name) { return name.starts_with("colour/"); }
 
  private:

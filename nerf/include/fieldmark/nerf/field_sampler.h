@@ -1,46 +1,56 @@
 #pragma once
-#include <fieldmark/nerf/hierarchical_sampler.h>
 #include <fieldmark/nerf/radiance_field.h>
 
+#include <memory>
+
 namespace fieldmark::nerf {
+
+/// The visible samples of some rays, packed ray after ray, with the values computed to find them.
+struct RaySamples {
+  std::vector<Index> ray_begin;         ///< R + 1 offsets
+  std::vector<float> position;          ///< [S, 3] cube coordinates
+  std::vector<float> t;                 ///< [S] distance along the ray, cube sides
+  std::vector<float> density_features;  ///< [S, density_width()] see Field
+  std::vector<float> colour_features;   ///< [S, colour_width()]
+  std::vector<float> sigma;             ///< [S] 1 / cube side
+  std::vector<float> delta;  ///< [S] length of each sample's interval; empty: the step of the march
+  std::vector<float> z;      ///< [S, N_z] see Field::geometry(); empty: not kept
+  /// S, the number of samples.
+  Index size() const { return static_cast<Index>(t.size()); }
+};
 
 /// Weights w_i of the samples of each ray, see composite(). @param step  spacing of samples that have no
 /// delta
 /// @param weights [S] written
 void sample_weights(const RaySamples& samples, float step, float* weights);
 
-/// Where and how exactly a FieldSampler looks.
+/// Number and extent of the samples of a FieldSampler.
 struct FieldSamplingOptions {
-  float finer = 1;     ///< samples along a ray for each at the field's step, > 0; without meaning for mlp
-  float stop = 1e-4f;  ///< a ray ends where its transmittance falls below this; 0 never stops early
+  float finer = 1;     ///< samples per sample at the field's step, > 0; mlp fields ignore it
+  float stop = 1e-4f;  ///< transmittance threshold below which a ray ends; 0 never ends one early
   RayPoints points{};  ///< of a ray of an mlp field
 };
 
-/// The samples of a field's rays that light still reaches, by what suits the field: RaySampler for one with a
-/// table; for an mlp field the coarse network and HierarchicalSampler, then the fine network in waves of 16
-/// samples a ray, near to far, until the rays are opaque. Of the latter RaySamples holds z and delta, but no
-/// features. Reuses its buffers. One object per thread.
+/// Finds the visible samples of a field's rays. A hash field is marched (RaySampler). An mlp field is sampled
+/// by its coarse network (HierarchicalSampler) and evaluated in waves of 16 samples a ray, near to far, until
+/// the rays are opaque; its RaySamples hold z and delta, but no features. Reuses its buffers. One object per
+/// thread.
 class FieldSampler {
  public:
+  FieldSampler();
+  FieldSampler(FieldSampler&&) noexcept;
+  ~FieldSampler();
+
   /// @param packed  the matrices of field.params as they are now, or null
   /// @param jitter  [R] in [0, 1), or empty: samples in the middles of their intervals
-  /// @throws as RaySampler and HierarchicalSampler
+  /// @throws ValueError or ShapeError if an argument does not fit
   void sample(const RadianceField& field, const RayBatch& rays, std::span<const float> jitter,
               const FieldSamplingOptions& options, RaySamples& out,
               const PackedWeights<float>* packed = nullptr);
 
  private:
-  void coarse_densities(const RadianceField& field, const Params<float>& params);
-  void evaluate(const RadianceField& field, const Params<float>& params, float stop, RaySamples& out);
-  void evaluate_wave(const RadianceField& field, const Params<float>& params, RaySamples& out);
-  void keep_evaluated(Index width, RaySamples& out);
-
-  RaySampler march_;
-  HierarchicalSampler hierarchical_;
-  RaySamples first_;
-  std::vector<float> weights_, x_, features_, transmittance_;
-  std::vector<Index> alive_, evaluated_, rows_;
-  Tape<float> tape_;
+  struct State;
+  std::unique_ptr<State> state_;
 };
 
 }  // namespace fieldmark::nerf

@@ -1,7 +1,7 @@
 #pragma once
 #include <fieldmark/nerf/camera.h>
-#include <fieldmark/nerf/visual_hull.h>
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
@@ -9,11 +9,17 @@
 
 namespace fieldmark::nerf {
 
-/// How the world is laid into the unit cube in which a field lives.
+/// A cube in world coordinates: positions x map to (x - corner) / side in [0, 1]^3.
+struct Bounds {
+  std::array<double, 3> corner{-1.5, -1.5, -1.5};  ///< the least x, y and z
+  double side = 3;                                 ///< length of an edge, > 0
+};
+
+/// The maps from the world to the unit cube in which a field lives.
 enum class SpaceKind {
-  cube,       ///< a cube of the world, moved and scaled; nothing lies outside
-  ndc,        ///< what cameras that look along -z see from a plane to infinity
-  contracted  ///< all of the world: a cube as it is, in the middle, and around it what lies outside
+  cube,       ///< a cube of the world; nothing lies outside
+  ndc,        ///< the view of cameras that look along -z, from a plane to infinity
+  contracted  ///< all of the world: a cube in the middle, linear, and around it the rest, contracted
 };
 /// "cube", "ndc" or "contracted".
 std::string name_of(SpaceKind kind);
@@ -28,15 +34,15 @@ SpaceKind parse_space_kind(std::string_view name);
 ///              coordinates (Mildenhall et al. 2020, appendix C), scaled to the unit cube. Lines stay lines.
 /// contracted:  with y = 2 (p - corner) / side - 1 and s = max |y_i|,  x = 1/2 + y / 4 if s <= 1, else
 ///              1/2 + (2 - 1/s) y / (4 s). Source: Barron et al. 2022 (mip-NeRF 360), eq. 10, with the
-///              largest coordinate in place of the length, so that the image fills the cube (Tancik et al.
-///              2023, Nerfstudio).
+///              largest coordinate in place of the length, so that the image of the world fills the cube
+///              (Tancik et al. 2023, Nerfstudio).
 struct Space {
   SpaceKind kind = SpaceKind::cube;  ///< which of the maps
-  /// cube: what is mapped to the unit cube. contracted: what is mapped to [1/4, 3/4]^3. ndc: without meaning.
+  /// cube: maps to the unit cube. contracted: maps to [1/4, 3/4]^3. ndc: not used.
   Bounds bounds{};
-  double near = 0;  ///< ndc: distance of the plane, length, > 0. contracted: where rays begin, length, >= 0
-  double slope_x = 1;  ///< ndc: a, half the cotangent of half the angle that the cube holds across, > 0
-  double slope_y = 1;  ///< ndc: b, the same upwards, > 0
+  double near = 0;  ///< ndc: distance of the plane, length, > 0. contracted: beginning of rays, length, >= 0
+  double slope_x = 1;  ///< ndc: a, half the cotangent of half the cube's horizontal angle, > 0
+  double slope_y = 1;  ///< ndc: b, the same vertically, > 0
 
   /// The image of a point; outside the unit cube, or not finite, where the space does not hold it.
   Vec3 to_cube(const Vec3& p) const;
@@ -44,14 +50,14 @@ struct Space {
   Vec3 to_world(const Vec3& x) const;
 };
 
-/// Rays as a field's samplers take them. cube and ndc: origin + t direction is in the unit cube. contracted:
-/// it is in the linear coordinates 1/2 + y / 4, whose part outside [1/4, 3/4]^3 contract() brings in.
+/// The rays of a field's samplers. cube and ndc: origin + t direction is in the unit cube. contracted: it is
+/// in the linear coordinates 1/2 + y / 4, whose part outside [1/4, 3/4]^3 contract() brings in.
 struct RayBatch {
   std::span<const float> origins;     ///< [R, 3]; must outlive the batch
   std::span<const float> directions;  ///< [R, 3] unit; must outlive the batch
   std::span<const float> seen_from;   ///< [R, 3] unit directions in the world; must outlive the batch
   bool contracted = false;            ///< see above
-  float near = 0;                     ///< where contracted rays begin, cube sides
+  float near = 0;                     ///< beginning of contracted rays, cube sides
   /// R, the number of rays.
   Index size() const { return static_cast<Index>(origins.size()) / 3; }
   /// Rays [begin, begin + n) of these.
@@ -63,9 +69,9 @@ struct CubeRays {
   std::vector<float> origins;     ///< [R, 3], see RayBatch
   std::vector<float> directions;  ///< [R, 3] unit
   std::vector<float> seen_from;   ///< [R, 3] unit, in the world
-  /// Makes room for n rays.
+  /// Sets the number of rays.
   void resize(Index n);
-  /// The rays from `first` on through pixels of a camera. @param pixels  [n, 2] x and y in pixels, see
+  /// Sets the rays from `first` on, through pixels of a camera. @param pixels  [n, 2] x and y, see
   /// pixel_ray()
   void set(const Space& space, Index first, const Camera& camera, std::span<const float> pixels);
   /// All of them; valid until the next resize().
@@ -75,9 +81,9 @@ struct CubeRays {
 /// The contraction on linear cube coordinates, see Space. @param p, x  [3], may be the same
 void contract(const float* p, float* x);
 
-/// Which cells of a grid over the cube at least one camera has in its image, in front of it: the others are
-/// never trained. Judged at the cell's centre and its corners.
-/// @param resolution  cells per axis, >= 1   @return one entry a cell, x fastest, 1 where it is seen
+/// The cells of a grid over the cube that lie in at least one camera's image, in front of the camera: the
+/// others cannot be trained. Tests each cell's centre and corners.
+/// @param resolution  cells per axis, >= 1   @return [cells] x fastest, 1 where a camera sees the cell
 std::vector<std::uint8_t> seen_cells(std::span<const Camera> cameras, const Space& space, Index resolution);
 
 }  // namespace fieldmark::nerf

@@ -10,7 +10,7 @@ constexpr Index kSphericalHarmonics = 16;  ///< functions of degree 0 to 3
 /// et al. 2022. Polynomials in x, y, z: for directions that are not of unit length they are continued as
 /// written.
 /// @param d  [N, 3] unit directions   @return [N, 16]   @throws ShapeError if d is not [N, 3]
-/// Differentiable in: d (as three independent numbers).
+/// Differentiable in: d (as three independent coordinates).
 template <class T>
 Var<T> spherical_harmonics(Var<T> d);
 

@@ -2,7 +2,6 @@
 #include <fieldmark/engine/adam.h>
 #include <fieldmark/engine/sharded_loop.h>
 #include <fieldmark/nerf/radiance_field.h>
-#include <fieldmark/nerf/sampler.h>
 #include <fieldmark/nerf/schedule.h>
 
 namespace fieldmark::nerf {

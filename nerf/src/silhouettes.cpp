@@ -1,29 +1,29 @@
+#include "silhouettes.h"
+
 #include <fieldmark/engine/parallel.h>
-#include <fieldmark/engine/shape_checks.h>
-#include <fieldmark/nerf/visual_hull.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "checks.h"
 
 namespace fieldmark::nerf {
 namespace {
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
-// Counts of opaque pixels left of and above, so that any rectangle is asked with four look-ups.
+// Counts of pixels with alpha > 0 left of and above each, so that four look-ups test any rectangle.
 struct Coverage {
   Camera camera;
   Index width, height;
   std::vector<std::int32_t> sum;  // [height + 1, width + 1]
 
-  explicit Coverage(const Silhouette& s)
-      : camera(s.camera), width(s.image->shape[1]), height(s.image->shape[0]) {
+  explicit Coverage(const View& v) : camera(v.camera), width(v.rgba.shape[1]), height(v.rgba.shape[0]) {
     sum.assign(at((width + 1) * (height + 1)), 0);
     for (Index y = 0; y < height; ++y)
       for (Index x = 0; x < width; ++x)
         sum[at((y + 1) * (width + 1) + x + 1)] =
             sum[at(y * (width + 1) + x + 1)] + sum[at((y + 1) * (width + 1) + x)] -
-            sum[at(y * (width + 1) + x)] + ((*s.image)[4 * (y * width + x) + 3] > 0 ? 1 : 0);
+            sum[at(y * (width + 1) + x)] + (v.rgba[4 * (y * width + x) + 3] > 0 ? 1 : 0);
   }
 
   bool may_contain(const double p[3], double radius) const {
@@ -32,7 +32,7 @@ struct Coverage {
     const double x = m[0] * d[0] + m[4] * d[1] + m[8] * d[2], y = m[1] * d[0] + m[5] * d[1] + m[9] * d[2];
     const double depth = -(m[2] * d[0] + m[6] * d[1] + m[10] * d[2]);
     if (depth <= radius) return true;
-    // The ball's nearest point bounds how large it can look; one more pixel for the image's own sampling.
+    // The ball's nearest point bounds its size in the image; one more pixel for the image's own sampling.
     const double r = std::max(camera.fx, camera.fy) * radius / (depth - radius) + 1;
     const double u = camera.cx + camera.fx * x / depth, v = camera.cy - camera.fy * y / depth;
     const auto u0 = static_cast<Index>(std::floor(u - r)), u1 = static_cast<Index>(std::ceil(u + r));
@@ -55,30 +55,52 @@ bool stays(const std::vector<Coverage>& views, const Bounds& b, double cell, Ind
   return std::all_of(views.begin(), views.end(), [&](const Coverage& v) { return v.may_contain(p, radius); });
 }
 
+// Marks the entries within `margin` of a set one.
+void dilate(const std::uint8_t* in, Index n, Index stride, Index margin, std::uint8_t* out) {
+  Index last = -margin - 1;
+  for (Index i = 0; i < n; ++i) {
+    if (in[i * stride]) last = i;
+    out[i * stride] = i - last <= margin;
+  }
+  last = n + margin;
+  for (Index i = n - 1; i >= 0; --i) {
+    if (in[i * stride]) last = i;
+    out[i * stride] |= last - i <= margin;
+  }
+}
+
+std::vector<std::uint8_t> near_alpha(const View& view, Index margin) {
+  const Index h = view.camera.height, w = view.camera.width;
+  std::vector<std::uint8_t> mask(at(h * w)), rows(at(h * w));
+  for (Index p = 0; p < h * w; ++p) mask[at(p)] = view.rgba[4 * p + 3] > 0;
+  for (Index y = 0; y < h; ++y) dilate(&mask[at(y * w)], w, 1, margin, &rows[at(y * w)]);
+  for (Index x = 0; x < w; ++x) dilate(&rows[at(x)], h, w, margin, &mask[at(x)]);
+  return mask;
+}
+
 }  // namespace
 
-std::vector<std::uint8_t> visual_hull(std::span<const Silhouette> silhouettes, const Bounds& bounds,
-                                      Index resolution) {
+std::vector<std::uint8_t> visual_hull(std::span<const View> views, const Bounds& bounds, Index resolution) {
   if (resolution < 4 || resolution > 512 || resolution % 4 != 0)
     throw ValueError("[visual_hull] resolution must be a multiple of 4 from 4 to 512, got " +
                      std::to_string(resolution));
-  std::vector<Coverage> views;
-  for (const Silhouette& s : silhouettes) {
-    check_rank("visual_hull", "image", s.image->shape, 3, "[H, W, 4]");
-    check_extent("visual_hull", "image", s.image->shape, 2, 4, "red, green, blue, alpha");
-    views.emplace_back(s);
+  std::vector<Coverage> coverage;
+  for (const View& view : views) {
+    check_rank("visual_hull", "image", view.rgba.shape, 3, "[H, W, 4]");
+    check_extent("visual_hull", "image", view.rgba.shape, 2, 4, "red, green, blue, alpha");
+    coverage.emplace_back(view);
   }
   std::vector<std::uint8_t> hull(at(resolution * resolution * resolution), 0);
   const double cell = bounds.side / static_cast<double>(resolution);
   const Index blocks = resolution / 4;
-  // Blocks of 4 x 4 x 4 first: most of the cube goes at a 64th of the price.
+  // Blocks of 4 x 4 x 4 first: most of the cube goes at a 64th of the cost.
   parallel_for(blocks, 1, [&](Index bz, Index) {
     for (Index by = 0; by < blocks; ++by)
       for (Index bx = 0; bx < blocks; ++bx) {
-        if (!stays(views, bounds, cell, 4, 4 * bx, 4 * by, 4 * bz)) continue;
+        if (!stays(coverage, bounds, cell, 4, 4 * bx, 4 * by, 4 * bz)) continue;
         for (Index i = 0; i < 64; ++i) {
           const Index x = 4 * bx + i % 4, y = 4 * by + i / 4 % 4, z = 4 * bz + i / 16;
-          hull[at(x + resolution * (y + resolution * z))] = stays(views, bounds, cell, 1, x, y, z);
+          hull[at(x + resolution * (y + resolution * z))] = stays(coverage, bounds, cell, 1, x, y, z);
         }
       }
   });
@@ -105,6 +127,41 @@ Bounds tighten(const Bounds& bounds, std::span<const std::uint8_t> hull, Index r
   for (std::size_t a = 0; a < 3; ++a)
     tight.corner[a] = bounds.corner[a] + 0.5 * (static_cast<double>(low[a] + high[a]) * cell - tight.side);
   return tight;
+}
+
+Index hull_margin(std::span<const View> views, const Bounds& bounds, Index resolution) {
+  const double diagonal = std::sqrt(3.0) * bounds.side / static_cast<double>(resolution);
+  double widest = 0;
+  for (const View& v : views) {
+    double square = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double p = v.camera.position()[a], low = bounds.corner[a], high = low + bounds.side;
+      const double outside = p < low ? low - p : p > high ? p - high : 0;
+      square += outside * outside;
+    }
+    const double nearest = std::max(std::sqrt(square), diagonal);
+    widest = std::max(widest, std::max(v.camera.fx, v.camera.fy) * diagonal / nearest);
+  }
+  return static_cast<Index>(std::ceil(widest)) + 4;
+}
+
+std::vector<std::uint32_t> training_pixels(std::span<const View> views, Index margin) {
+  if (margin < 0)
+    throw ValueError("[training_pixels] margin must not be negative, got " + std::to_string(margin));
+  const Index count = static_cast<Index>(views.size());
+  const Index size = count > 0 ? views[0].camera.height * views[0].camera.width : 0;
+  if (count * size > Index{std::numeric_limits<std::uint32_t>::max()})
+    throw ValueError("[training_pixels] views must have at most 2^32 - 1 pixels together, got " +
+                     std::to_string(count * size));
+  std::vector<std::vector<std::uint32_t>> of_view(at(count));
+  parallel_for(count, 1, [&](Index v, Index) {
+    const auto mask = near_alpha(views[at(v)], margin);
+    for (Index p = 0; p < size; ++p)
+      if (mask[at(p)]) of_view[at(v)].push_back(static_cast<std::uint32_t>(v * size + p));
+  });
+  std::vector<std::uint32_t> all;
+  for (const auto& pixels : of_view) all.insert(all.end(), pixels.begin(), pixels.end());
+  return all;
 }
 
 }  // namespace fieldmark::nerf
