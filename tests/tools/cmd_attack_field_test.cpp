@@ -22,11 +22,11 @@ TEST_CASE("attack-field writes the field that the library makes, the same for th
   const std::string field = tiny_field(folder, tiny_scene(folder));
   const auto before = nerf::RadianceField::load(field);
   const auto attack = [&](const std::string& out, const char* seed) {
-    const auto r = run_command({"attack-field", field, "--out", folder / out, "--distort",
+    const auto r = run_command({"attack-field", field, "--out", folder / out, "--attack",
                                 "weights_noise_0.1,float16", "--seed", seed, "--json", "-"});
     INFO(r.err);
     REQUIRE(r.code == cli::kOk);
-    CHECK(nlohmann::json::parse(r.out)["under"] == "weights_noise_0.1,float16");
+    CHECK(nlohmann::json::parse(r.out)["attack"] == "weights_noise_0.1,float16");
     return nerf::RadianceField::load(folder / out);
   };
   const auto a = attack("a.fm", "3"), b = attack("b.fm", "3"), c = attack("c.fm", "4");
@@ -44,31 +44,32 @@ TEST_CASE("attack-field with other fields, and their absence", "[attack-field]")
   const TemporaryFolder folder;
   const std::string scene = tiny_scene(folder), field = tiny_field(folder, scene), marked = folder / "m.fm",
                     out = folder / "out.fm";
-  REQUIRE(run_command({"attack-field", field, "--out", marked, "--distort", "weights_noise_0.1"}).code ==
+  REQUIRE(run_command({"attack-field", field, "--out", marked, "--attack", "weights_noise_0.1"}).code ==
           cli::kOk);
   const auto run = [&](std::vector<std::string> words) {
     words.insert(words.begin(), {"attack-field", marked, "--out", out});
     return run_command(words);
   };
-  REQUIRE(run({"--distort", "sign_flip_1", "--unmarked", field}).code == cli::kOk);
+  REQUIRE(run({"--attack", "sign_flip_1", "--unmarked", field}).code == cli::kOk);
   const auto plain = nerf::RadianceField::load(field), undone = nerf::RadianceField::load(out);
   double worst = 0;
   for (std::size_t i = 0; i < plain.params.values().size(); ++i)
     worst =
         std::max(worst, std::abs(static_cast<double>(plain.params.values()[i] - undone.params.values()[i])));
   CHECK(worst < 1e-6);
-  REQUIRE(run({"--distort", "average_0.5", "--other", field}).code == cli::kOk);
-  for (const auto& words : std::vector<std::vector<std::string>>{{"--distort", "average_0.5"},
-                                                                 {"--distort", "copy_1", "--unmarked", field},
-                                                                 {"--distort", "float16", "--other", field},
-                                                                 {"--distort", "int9"}}) {
+  REQUIRE(run({"--attack", "average_0.5", "--other", field}).code == cli::kOk);
+  for (const auto& words : std::vector<std::vector<std::string>>{{"--attack", "average_0.5"},
+                                                                 {"--attack", "copy_1", "--unmarked", field},
+                                                                 {"--attack", "float16", "--other", field},
+                                                                 {"--attack", "float16", "--steps", "5"},
+                                                                 {"--attack", "int9"}}) {
     const auto r = run(words);
     CHECK(r.code == cli::kUsage);
     CHECK_THAT(r.err, Contains("--"));
   }
-  const auto own = run_command({"attack-field", field, "--out", field, "--distort", "float16"});
+  const auto own = run_command({"attack-field", field, "--out", field, "--attack", "float16"});
   CHECK(own.code == cli::kUsage);
   CHECK_THAT(own.err, Contains("overwritten"));
-  CHECK(run_command({"attack-field", "/no/such.fm", "--out", out, "--distort", "float16"}).code ==
+  CHECK(run_command({"attack-field", "/no/such.fm", "--out", out, "--attack", "float16"}).code ==
         cli::kFailed);
 }

@@ -52,13 +52,13 @@ TEST_CASE("bake makes the mark fainter where it is asked to", "[bake]") {
   const auto one_step =
       run_command({"bake", "--owner", job.owner, "--message", "5", "--out", job.folder / "brief.fm",
                    "--steps", "1", "--mark-psnr", "30", "--json", "-"});
-  CHECK_THAT(one_step.err, Contains("dB on the object, 30.0 dB asked for"));
+  CHECK_THAT(one_step.err, Contains("dB on the foreground, 30.0 dB requested"));
   const auto json = nlohmann::json::parse(one_step.out);
   const double learnt = json["mark_psnr_learnt"], taken = 100 * std::pow(10.0, (30 - learnt) / 20);
   REQUIRE(taken < 79);  // 2 dB
-  CHECK_THAT(
-      json["notes"][0].get<std::string>(),
-      Contains("the file's colours took only " + std::to_string(std::lround(taken)) + "% of the mark"));
+  CHECK_THAT(json["notes"][0].get<std::string>(),
+             Contains("the colours of the file learned only " + std::to_string(std::lround(taken)) +
+                      "% of the mark"));
   CHECK(json["scale"] == watermark::Baker::kLargestScale);
   // Twice the difference, four times its square. PSNR is of images in bytes: two roundings add 1/12 of a
   // step squared each, and the owner's random key decides how much that is beside the mark.
@@ -145,9 +145,9 @@ TEST_CASE("bake encodes payloads, and the other commands know them and their com
                               "--payloads", "--together", "2", "--distort", "blur_1"});
   CHECK(drawn["payload"]["trials"] == 2);
   CHECK(drawn["payload"]["together"] == 2);
-  CHECK(drawn["payload"]["under"]["blur_1"]["trials"] == 2);
+  CHECK(drawn["payload"]["distorted"]["blur_1"]["trials"] == 2);
   CHECK(drawn["payload"]["single"]["trials"] == 4);
-  CHECK(drawn["payload"]["single"]["under"]["blur_1"]["trials"] == 4);
+  CHECK(drawn["payload"]["single"]["distorted"]["blur_1"]["trials"] == 4);
   CHECK(!of_baked["payload"].contains("single"));
   CHECK(json_of({"measure", "--informed-count", "0", "--owner", owner, "--count", "1"})["payload"].is_null());
   const auto refused = [&](const std::vector<std::string>& options, const char* why) {

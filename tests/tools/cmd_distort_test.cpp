@@ -16,7 +16,7 @@ TEST_CASE("attack writes one image for each, the same for the same seed", "[atta
   write_png(folder / "in/r_0.png", uniform<float>({8, 8, 3}, 0, 1, 1));
   write_png(folder / "in/r_1.png", uniform<float>({8, 8, 4}, 0, 1, 2));
   const auto attack = [&](const std::string& out, const std::string& seed) {
-    return run_command({"attack", folder / "in", "--out", folder / out, "--distort", "scale_0.5,noise_0.1",
+    return run_command({"distort", folder / "in", "--out", folder / out, "--distort", "scale_0.5,noise_0.1",
                         "--seed", seed, "--json", "-"});
   };
   const auto r = attack("a", "1");
@@ -35,7 +35,7 @@ TEST_CASE("attack by an unknown name or out of its range is a usage error", "[at
   const TemporaryFolder folder;
   write_png(folder / "x.png", Tensor<float>({2, 2, 3}));
   for (const char* name : {"nois_0.1", "noise_7", "noise"}) {
-    const auto r = run_command({"attack", folder / "x.png", "--out", folder / "out", "--distort", name});
+    const auto r = run_command({"distort", folder / "x.png", "--out", folder / "out", "--distort", name});
     CHECK(r.code == cli::kUsage);
     CHECK_THAT(r.err, Contains("--distort") && Contains(name));
   }
@@ -45,14 +45,14 @@ TEST_CASE("attack by an unknown name or out of its range is a usage error", "[at
 TEST_CASE("attack never overwrites what it reads, nor one result with another", "[attack]") {
   const TemporaryFolder folder;
   write_png(folder / "x.png", Tensor<float>({2, 2, 3}));
-  const auto own = run_command({"attack", folder / "x.png", "--out", folder.path, "--distort", "blur_1"});
+  const auto own = run_command({"distort", folder / "x.png", "--out", folder.path, "--distort", "blur_1"});
   CHECK(own.code == cli::kUsage);
   CHECK_THAT(own.err, Contains("overwritten"));
   const auto twice = run_command(
-      {"attack", folder / "x.png", folder / "x.png", "--out", folder / "out", "--distort", "blur_1"});
+      {"distort", folder / "x.png", folder / "x.png", "--out", folder / "out", "--distort", "blur_1"});
   CHECK(twice.code == cli::kUsage);
   CHECK_THAT(twice.err, Contains("two images"));
   const auto missing =
-      run_command({"attack", "/no/such.png", "--out", folder / "out", "--distort", "blur_1"});
+      run_command({"distort", "/no/such.png", "--out", folder / "out", "--distort", "blur_1"});
   CHECK(missing.code == cli::kFailed);
 }

@@ -11,14 +11,14 @@ TEST_CASE("embed writes an owner, an image and the figures that scripts read", "
   const TinyJob& job = TinyJob::get();
   for (const char* key :
        {"bits", "views", "cameras", "baked", "accuracy", "accuracy_p5", "psnr_base", "psnr_base_foreground",
-        "ssim_base", "lpips_base", "psnr_photo", "under", "seconds", "steps", "cells"})
+        "ssim_base", "lpips_base", "psnr_gt", "distorted", "seconds", "steps", "cells"})
     CHECK(job.embedded.contains(key));
   CHECK(job.embedded["bits"] == 4);
   CHECK(job.embedded["views"] == 2);
   CHECK(job.embedded["steps"] == 2);
   CHECK(job.embedded["cameras"] == "novel");
   CHECK(job.embedded["accuracy"]["informed"].is_null());
-  CHECK(job.embedded["under"]["blur_1"]["blind"].is_number());
+  CHECK(job.embedded["distorted"]["blur_1"]["blind"].is_number());
   CHECK(std::filesystem::exists(job.owner + ".png"));
   CHECK(!std::filesystem::exists(job.owner + ".checkpoint"));
 }

@@ -12,7 +12,7 @@
 using namespace fieldmark;
 using Json = nlohmann::json;
 
-TEST_CASE("eval compares with the photographs of the split, one row each", "[eval]") {
+TEST_CASE("eval compares with the images of the split, one row each", "[eval]") {
   const TemporaryFolder folder;
   const std::string scene = tiny_scene(folder), field = tiny_field(folder, scene);
   const auto r = run_command({"eval", "--field", field, "--data", scene, "--split", "train", "--json", "-"});

@@ -14,11 +14,13 @@ TEST_CASE("extract reads every image and all together", "[extract]") {
   const auto json = nlohmann::json::parse(r.out);
   CHECK(json["message"].get<std::string>().size() == 1);
   CHECK(json["bits"].get<std::string>().size() == 4);
-  CHECK(json["reading"] == "blind");
+  CHECK(json["detection"] == "blind");
+  REQUIRE(json["p_noise"].size() == json["logits"].size());
+  for (const auto& p : json["p_noise"]) CHECK((p > 0 && p <= 1));
   REQUIRE(json["views"].size() == 2);
   CHECK(json["views"][0]["bits"].get<std::string>().size() == 4);
   CHECK(json["views"][0]["logits"].size() == 4);
-  CHECK(json["views"][0]["reading"] == "blind");
+  CHECK(json["views"][0]["detection"] == "blind");
   CHECK(json["views"][0]["agreement"].is_null());
 }
 
@@ -31,10 +33,10 @@ TEST_CASE("extract says which reading it chose and how well the image agrees", "
     REQUIRE(r.code == cli::kOk);
     const auto json = nlohmann::json::parse(r.out);
     for (const auto& view : json["views"]) {
-      CHECK((view["reading"] == "blind" || view["reading"] == "informed"));
+      CHECK((view["detection"] == "blind" || view["detection"] == "informed"));
       CHECK(view["agreement"].is_number());
       CHECK_THAT(r.err,
-                 Contains(view["image"].get<std::string>() + "  " + view["reading"].get<std::string>()));
+                 Contains(view["image"].get<std::string>() + "  " + view["detection"].get<std::string>()));
     }
   }
   CHECK(run_command({"extract", "--owner", job.owner, "--detection", "both", images}).code == cli::kUsage);

@@ -29,9 +29,9 @@ TEST_CASE("measure reports an owner's mark on several sets of cameras", "[measur
 TEST_CASE("measure gives a row for each of several sets of cameras", "[measure]") {
   const TinyJob& job = TinyJob::get();
   const TemporaryFolder folder;
-  const auto r = run_command({"measure", "--owner", job.owner, "--cameras", "sphere,unseen,closer,farther",
-                              "--count", "2", "--informed-count", "0", "--distort", "blur_1", "--json", "-",
-                              "--report", folder / "measure.md"});
+  const auto r = run_command({"measure", "--owner", job.owner, "--cameras",
+                              "sphere,extrapolated,closer,farther", "--count", "2", "--informed-count", "0",
+                              "--distort", "blur_1", "--json", "-", "--report", folder / "measure.md"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
   const auto json = nlohmann::json::parse(r.out);
@@ -49,8 +49,8 @@ TEST_CASE("measure gives a row for each of several sets of cameras", "[measure]"
   }
   CHECK(json["rows"][0]["blind"] == json["accuracy"]["blind"]);
   CHECK_THAT(read_text(folder / "measure.md"), Contains("| farther | 2 |"));
-  CHECK_THAT(r.err, Contains("2 views of unseen cameras"));
-  CHECK(run_command({"measure", "--owner", job.owner, "--cameras", "near,moon"}).code == cli::kUsage);
+  CHECK_THAT(r.err, Contains("2 views of extrapolated cameras"));
+  CHECK(run_command({"measure", "--owner", job.owner, "--cameras", "novel,moon"}).code == cli::kUsage);
 }
 
 TEST_CASE("measure gives LPIPS against the unmarked renders where there are weights", "[measure]") {
@@ -81,5 +81,11 @@ TEST_CASE("measure wants field and message together, and known distortions", "[m
         cli::kUsage);
   CHECK(run_command({"measure", "--owner", job.owner, "--count", "1", "--cameras", "test"}).code ==
         cli::kUsage);
+  const auto data = run_command({"measure", "--owner", job.owner, "--data", job.folder.path});
+  CHECK(data.code == cli::kUsage);
+  CHECK_THAT(data.err, Contains("--data: only for --field and --cameras test"));
+  CHECK(run_command(
+            {"measure", "--owner", job.owner, "--data", job.folder.path, "--cameras", "test", "--count", "2"})
+            .code == cli::kUsage);
   CHECK(run_command({"measure", "--owner", job.field, "--count", "1"}).code == cli::kFailed);
 }

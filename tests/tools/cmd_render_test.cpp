@@ -24,12 +24,12 @@ TEST_CASE("render draws cameras from the field alone, or takes a data set's", "[
     REQUIRE(json["images"].size() == 2);
     CHECK(read_image(json["images"][1].get<std::string>()).shape == Shape{12, 12, 3});
   }
-  CHECK(read_image(folder / "near/view_000.png").data != read_image(folder / "sphere/view_000.png").data);
+  CHECK(read_image(folder / "novel/view_000.png").data != read_image(folder / "sphere/view_000.png").data);
   REQUIRE(run_command({"render", "--field", field, "--out", folder / "fine", "--count", "2", "--size", "12",
                        "--supersampling", "3"})
               .code == cli::kOk);
   CHECK(read_image(folder / "fine/view_000.png").shape == Shape{12, 12, 3});
-  CHECK(read_image(folder / "fine/view_000.png").data != read_image(folder / "near/view_000.png").data);
+  CHECK(read_image(folder / "fine/view_000.png").data != read_image(folder / "novel/view_000.png").data);
   const auto data = run_command({"render", "--field", field, "--out", folder / "data", "--data", scene,
                                  "--against", field, "--sheet", folder / "sheet.png"});
   REQUIRE(data.code == cli::kOk);
@@ -47,6 +47,7 @@ TEST_CASE("render refuses options that contradict each other", "[render]") {
   CHECK(with({"--sheet", "s.png"}) == cli::kUsage);
   CHECK(with({"--split", "val"}) == cli::kUsage);
   CHECK(with({"--cameras", "circle"}) == cli::kUsage);
+  CHECK(with({"--cameras", "ring", "--data", "d"}) == cli::kUsage);
   CHECK(with({"--count", "0"}) == cli::kUsage);
   CHECK(with({}) == cli::kFailed);
 }

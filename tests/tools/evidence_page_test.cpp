@@ -73,12 +73,12 @@ TEST_CASE("evidence_page: names of files cannot break out", "[evidence]") {
   CHECK_THAT(page, Contains("&quot;&gt;&lt;script&gt;alert(&#39;1&#39;)&lt;/script&gt;&amp;.png"));
 }
 
-TEST_CASE("evidence_page: no mark, and a control that answers, are said in words", "[evidence]") {
+TEST_CASE("evidence_page: no mark, and a control that responds, are said in words", "[evidence]") {
   auto record = small_evidence();
   record.fpr = 1e-9;
   CHECK_THAT(small_page(record), Contains("The mark was not found") && !Contains("The mark was found"));
   record.fpr = 1;
-  CHECK_THAT(small_page(record), Contains("The test also answered to controls: blank, photos"));
+  CHECK_THAT(small_page(record), Contains("The test also responded to controls: blank, clean"));
   record.controls.clear();
   record.wrong_keys.reset();
   const std::string page = evidence_page(record, {}, {{"data:a", "data:b"}, {}});
@@ -92,11 +92,11 @@ TEST_CASE("evidence_page: a small probability is told as one in so many", "[evid
     record.fpr = fpr;
     CHECK_THAT(small_page(record), Contains(text));
   };
-  told(1, "asked for: 100%)");
-  told(0.5, "asked for: 50%)");
-  told(1e-6, "asked for is 1 in 1&nbsp;000&nbsp;000.");
-  told(2e-5, "asked for is 1 in 10&nbsp;000.");
-  told(1e-12, "asked for is 1 in 10<sup>12</sup>.");
+  told(1, "required: 100%)");
+  told(0.5, "required: 50%)");
+  told(1e-6, "at most 1 in 1&nbsp;000&nbsp;000 was required.");
+  told(2e-5, "at most 1 in 10&nbsp;000 was required.");
+  told(1e-12, "at most 1 in 10<sup>12</sup> was required.");
 }
 
 TEST_CASE("evidence_page: a wrong bit is underlined, an undecided one a dash", "[evidence]") {
@@ -108,8 +108,8 @@ TEST_CASE("evidence_page: a wrong bit is underlined, an undecided one a dash", "
 }
 
 TEST_CASE("evidence_page: a small copy keeps the image's shape and is a JPEG", "[evidence]") {
-  const auto decoded = [](const Tensor<float>& picture) {
-    const std::string address = thumbnail(picture), head = "data:image/jpeg;base64,";
+  const auto decoded = [](const Tensor<float>& image) {
+    const std::string address = thumbnail(image), head = "data:image/jpeg;base64,";
     REQUIRE(address.starts_with(head));
     std::vector<std::byte> bytes;
     unsigned buffer = 0, bits = 0;

@@ -44,14 +44,14 @@ TEST_CASE("evidence_run: images are scored one by one, under their names", "[evi
 
 TEST_CASE("evidence_run: three built-in controls, and one for each path that is given", "[evidence]") {
   Run run;
-  const std::string photo = TinyJob::get().folder / "photo.png";
-  write_png(photo, uniform<float>({20, 30, 3}, 0, 1, 3));
-  const auto tested = test_controls(run.test, run.reader, run.images, {photo, run.folder + "/"}, run.context);
+  const std::string clean = TinyJob::get().folder / "clean.png";
+  write_png(clean, uniform<float>({20, 30, 3}, 0, 1, 3));
+  const auto tested = test_controls(run.test, run.reader, run.images, {clean, run.folder + "/"}, run.context);
   REQUIRE(tested.controls.size() == 5);
   CHECK(tested.thumbnails.size() == 5);
   std::string names;
   for (const auto& control : tested.controls) names += control.name + " ";
-  CHECK(names == "blank unmarked shuffled photo.png views ");
+  CHECK(names == "blank unmarked shuffled clean.png views ");
   CHECK(tested.controls[0].images[0].sha256.empty());
   CHECK(tested.controls[3].images[0].sha256.size() == 64);
   // A folder of the images in question as its own control: the same evidence.
@@ -61,7 +61,7 @@ TEST_CASE("evidence_run: three built-in controls, and one for each path that is 
   CHECK(json[0]["found"] == true);
   CHECK(json[4]["views"] == 2);
   print_controls(run.out, tested.controls, 1);
-  CHECK_THAT(run.out.str(), Contains("control photo.png: p ") && Contains("THE TEST ANSWERS TO A CONTROL"));
+  CHECK_THAT(run.out.str(), Contains("control clean.png: p ") && Contains("THE TEST RESPONDS TO A CONTROL"));
   std::ostringstream quiet;
   print_controls(quiet, tested.controls, 1e-300);
   CHECK_THAT(quiet.str(), !Contains("THE TEST"));

@@ -46,7 +46,7 @@ refuses other.key key --out other.key
 refuses other.fm embed --field field.fm --out other.fm "${small[@]}"
 refuses other.fm bake --owner owner.fm --message a --out other.fm --steps 2
 refuses other render --field field.fm --out other --count 1 --size 32
-refuses other attack views --distort blur_1 --out other
+refuses other distort views --distort blur_1 --out other
 refuses result.json eval --field field.fm --data scene --json result.json
 refuses result.md eval --field field.fm --data scene --report result.md
 echo "9 writers on a full disk: refused, named, nothing left"

@@ -48,7 +48,7 @@ TEST_CASE("run_long saves and stops at Ctrl-C", "[long_run]") {
   Counter counter;
   counter.interrupt_at = 2;
   CHECK_THROWS_WITH(run_long(counter.work(true), {.steps = 5}, context),
-                    Contains("after 2 steps, --resume goes on from x.checkpoint"));
+                    Contains("after 2 steps, --resume continues from x.checkpoint"));
   CHECK(counter.steps == 2);
   CHECK(counter.saved == 1);
   counter = {.interrupt_at = 3};

@@ -22,8 +22,8 @@ TEST_CASE("measured: JSON has the contract's keys, and null where there is no nu
   CHECK(json["accuracy"]["informed"].is_null());
   CHECK(json["psnr_base"].is_null());
   CHECK(json["lpips_base"] == 0.125);
-  CHECK(json["under"]["noise_0.05"]["blind"] == 0.5);
-  CHECK(json["under"]["noise_0.05"]["informed"].is_null());
+  CHECK(json["distorted"]["noise_0.05"]["blind"] == 0.5);
+  CHECK(json["distorted"]["noise_0.05"]["informed"].is_null());
   CHECK(json["informed_views"] == 0);
   m.accuracy.informed = 1;
   CHECK(cli::measurement_json(m, "ring")["accuracy"]["informed"] == 1);

@@ -14,7 +14,9 @@ TEST_CASE("message options: each kind is encoded, and told again", "[message_opt
   CHECK(cli::payload_json(hex) == cli::Json{{"kind", "hex"}, {"value", "c0ffee"}});
   const std::string uuid = "01234567-89ab-cdef-0123-456789abcdef";
   CHECK(cli::payload_json(
-            cli::message_of({.message = "", .text = "", .uuid = uuid, .payload = ""}, 255))["value"] == uuid);
+            cli::message_of({.message = "", .text = "", .uuid = uuid, .payload = ""}, 147))["value"] == uuid);
+  CHECK_THROWS_AS(cli::message_of({.message = "", .text = "", .uuid = uuid, .payload = ""}, 146),
+                  cli::UsageError);  // as the help says
   const auto plain = cli::message_of({.message = "a5c3", .text = "", .uuid = "", .payload = ""}, 16);
   CHECK(to_hex(plain) == "a5c3");
   CHECK(cli::payload_json(plain).is_null());
@@ -56,6 +58,6 @@ TEST_CASE("message options: readings are told in words and as JSON", "[message_o
   CHECK_THAT(cli::payload_text(read, 100), Contains("text hello, 1 of 100 bits corrected"));
   const auto nothing = cli::read_payload(std::vector<double>(100, 0.0));
   CHECK(cli::payload_json(nothing).is_null());
-  CHECK_THAT(cli::payload_text(nothing, 100), Contains("none (fair bits"));
-  CHECK_THAT(cli::payload_text(nothing, 8), Contains("hold no payload"));
+  CHECK_THAT(cli::payload_text(nothing, 100), Contains("none (random bits"));
+  CHECK_THAT(cli::payload_text(nothing, 8), Contains("holds no payload"));
 }

@@ -14,7 +14,7 @@ TEST_CASE("attack-field trains a field further, or a new one on its images", "[a
   const auto before = nerf::RadianceField::load(field);
   const auto run = [&](std::vector<std::string> words) {
     words.insert(words.begin(),
-                 {"attack-field", field, "--out", out, "--steps", "5", "--json", "-", "--distort"});
+                 {"attack-field", field, "--out", out, "--steps", "5", "--json", "-", "--attack"});
     return run_command(words);
   };
   for (const auto& words :
@@ -26,7 +26,7 @@ TEST_CASE("attack-field trains a field further, or a new one on its images", "[a
     REQUIRE(r.code == cli::kOk);
     const auto json = nlohmann::json::parse(r.out);
     CHECK(json["steps"] == 5);
-    CHECK(json["under"] == words[0]);
+    CHECK(json["attack"] == words[0]);
     const auto after = nerf::RadianceField::load(out);
     CHECK(!std::ranges::equal(after.params.values(), before.params.values()));
     // Further training keeps bounds and cameras; a new field finds its own.
@@ -36,6 +36,9 @@ TEST_CASE("attack-field trains a field further, or a new one on its images", "[a
   }
   CHECK_THAT(run({"finetune"}).err, Contains("needs --data"));
   CHECK(run({"finetune,float16", "--data", scene}).code == cli::kUsage);
+  const auto ignored = run({"retrain", "--views", "4", "--lr", "0.1"});
+  CHECK(ignored.code == cli::kUsage);
+  CHECK_THAT(ignored.err, Contains("--lr: --attack retrain does not use it"));
 }
 
 TEST_CASE("attack-field turns images against a known extractor and trains the field on them",
@@ -47,7 +50,7 @@ TEST_CASE("attack-field turns images against a known extractor and trains the fi
       run_command({"bake", "--owner", job.owner, "--message", "5", "--out", marked, "--steps", "2"}).code ==
       cli::kOk);
   const auto run = [&](std::vector<std::string> words) {
-    words.insert(words.begin(), {"attack-field", marked, "--out", out, "--distort", "remove", "--steps", "3",
+    words.insert(words.begin(), {"attack-field", marked, "--out", out, "--attack", "remove", "--steps", "3",
                                  "--views", "4", "--json", "-"});
     return run_command(words);
   };
@@ -58,7 +61,7 @@ TEST_CASE("attack-field turns images against a known extractor and trains the fi
   const auto before = nerf::RadianceField::load(marked), after = nerf::RadianceField::load(out);
   CHECK(after.configuration() == before.configuration());
   CHECK(!std::ranges::equal(after.params.values(), before.params.values()));
-  CHECK_THAT(run({}).err, Contains("--distort remove: needs --owner OWNER"));
+  CHECK_THAT(run({}).err, Contains("--attack remove: needs --owner OWNER"));
   CHECK(run({"--owner", marked}).code == cli::kFailed);
 }
 

@@ -24,7 +24,7 @@ inline fieldmark::watermark::EvidenceRecord small_evidence() {
                    {"view_1.png", std::string(64, '1'), 40, 30, score_evidence(marked, code, message)}};
   const auto quiet = score_evidence(other, code, message);
   record.controls = {{"blank", "Nothing.", {{"blank 1", "", 40, 30, quiet}}, quiet},
-                     {"photos", "Given.", {{"cat.jpg", std::string(64, '2'), 9, 8, quiet}}, quiet}};
+                     {"clean", "Given.", {{"cat.jpg", std::string(64, '2'), 9, 8, quiet}}, quiet}};
   record.wrong_keys = count_wrong_keys(marked, area, message, 200, 1);
   record.seed = 1;
   record.commit = "0123456789ab";

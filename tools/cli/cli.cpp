@@ -21,24 +21,24 @@ struct Entry {
 };
 constexpr Entry kCommands[] = {
     {"scene", "Make a data set of a built-in scene", add_scene},
-    {"data", "Public data sets by manifest: list, verify", add_data},
-    {"train", "Train a field on photographs", add_train},
-    {"eval", "Compare a field with photographs", add_eval},
+    {"data", "List, verify and fetch public data sets", add_data},
+    {"train", "Train a field on images", add_train},
+    {"eval", "Compare a field with the ground truth", add_eval},
     {"compare", "Compare images: PSNR, SSIM, LPIPS", add_compare},
     {"render", "Render views of a field", add_render},
-    {"key", "Make a secret key from the operating system's random numbers", add_key},
-    {"embed", "Learn a mark for a field, and how to read it", add_embed},
-    {"bake", "Put a message into a field that can be published", add_bake},
-    {"measure", "Bit accuracy and quality of a mark", add_measure},
+    {"key", "Make a secret key", add_key},
+    {"embed", "Train a mark for a field and its extractor", add_embed},
+    {"bake", "Write a field with a message, to publish", add_bake},
+    {"measure", "Measure bit accuracy and quality of a mark", add_measure},
     {"extract", "Read the message from images", add_extract},
     {"verify", "Decide whether images show a message, with p-values", add_verify},
-    {"check", "Look for alterations in the evidence that verify wrote", add_check},
-    {"distort", "Distort images as they are distorted on their way to a reader", add_distort},
-    {"attack-field", "Do to a field's file what may remove a mark", add_attack_field},
+    {"check", "Check evidence of verify for alterations", add_check},
+    {"distort", "Distort images: noise, rotation, JPEG and more", add_distort},
+    {"attack-field", "Attack the mark of a field", add_attack_field},
     {"bench", "Measure speed and error against this machine's peak", add_bench},
-    {"reproduce", "Run every system of the paper's tables, beside its figures", add_reproduce},
+    {"reproduce", "Train and measure the systems of the paper's tables", add_reproduce},
     {"gradcheck", "Check every hand-derived gradient against finite differences", add_gradcheck},
-    {"info", "What a field, owner, key or other safetensors file holds", add_info},
+    {"info", "Print the contents of a field, owner, key or other safetensors file", add_info},
 };
 
 struct Subcommand {
@@ -93,7 +93,7 @@ class Program {
   }
 
  private:
-  // A word that is no command or an option that this command does not have, with what was probably meant.
+  // An unknown command or option, with the nearest known one.
   std::string unknown_word(const std::vector<std::string>& line) {
     if (line.size() < 2 || line[1].starts_with("-")) return "";
     std::vector<std::string> names;
@@ -125,7 +125,7 @@ class Program {
   std::ostream &out_, &err_;
   CommonOptions common_;
   CLI::App app_{
-      "Marks a radiance field so that its owner can prove from any rendered image that it is theirs."};
+      "Watermarks radiance fields, so that owners can prove from any rendered image that a field is theirs."};
   std::vector<Subcommand> subcommands_;
 };
 

@@ -1,5 +1,6 @@
 #include <fieldmark/watermark/attacks/field_attack.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -16,7 +17,7 @@ namespace {
 using watermark::FieldAttackKind;
 
 struct Options {
-  std::string field, out, under;
+  std::string field, out, attack;
   std::string other, unmarked, marked;
   TrainingAttackOptions training;
 };
@@ -25,8 +26,8 @@ struct Options {
 class Input {
  public:
   Input(const std::string& path, const char* option, bool needed) {
-    if (needed && path.empty()) throw UsageError(std::string("--distort: needs ") + option + " FIELD");
-    if (!needed && !path.empty()) throw UsageError(std::string(option) + ": --distort does not use it");
+    if (needed && path.empty()) throw UsageError(std::string("--attack: needs ") + option + " FIELD");
+    if (!needed && !path.empty()) throw UsageError(std::string(option) + ": --attack does not use it");
     if (needed) field_.emplace(nerf::RadianceField::load(path));
   }
   const nerf::RadianceField* get() const { return field_ ? &*field_ : nullptr; }
@@ -43,8 +44,8 @@ void check_out(const Options& options) {
   check_writable(options.out);
 }
 
-nerf::RadianceField changed_numbers(const Options& options, Context& context) {
-  const auto attack = read_option("--distort", [&] { return watermark::parse_field_attack(options.under); });
+nerf::RadianceField changed_weights(const Options& options, Context& context) {
+  const auto attack = read_option("--attack", [&] { return watermark::parse_field_attack(options.attack); });
   const bool copy = attack.has(FieldAttackKind::copy);
   const Input other(options.other, "--other", attack.has(FieldAttackKind::average)),
       unmarked(options.unmarked, "--unmarked", copy || attack.has(FieldAttackKind::sign_flip)),
@@ -54,17 +55,32 @@ nerf::RadianceField changed_numbers(const Options& options, Context& context) {
       {.other = other.get(), .unmarked = unmarked.get(), .marked = marked.get()});
 }
 
+// Options that this attack would ignore.
+void refuse_unused(CommandLine& app, const std::string& attack) {
+  std::vector<std::string> used{"--size", "--steps", "--seconds"};
+  const auto uses = [&](std::initializer_list<std::string> names) { used.insert(used.end(), names); };
+  if (attack == "finetune") uses({"--data", "--lr"});
+  if (attack == "finetune-renders") uses({"--views", "--lr"});
+  if (attack == "remove") uses({"--owner", "--mark-psnr", "--views", "--lr"});
+  if (attack == "retrain") uses({"--views"});
+  if (!is_training_attack(attack)) used = {"--other", "--unmarked", "--marked"};
+  for (const char* name : {"--data", "--owner", "--mark-psnr", "--size", "--views", "--lr", "--steps",
+                           "--seconds", "--other", "--unmarked", "--marked"})
+    if (app.option(name).count() > 0 && std::ranges::find(used, name) == used.end())
+      throw UsageError(std::string(name) + ": --attack " + attack + " does not use it");
+}
+
 int run(const Options& options, Context& context) {
   check_out(options);
-  Json json{{"under", options.under}, {"field", options.field}, {"out", options.out}};
+  Json json{{"attack", options.attack}, {"field", options.field}, {"out", options.out}};
   const InterruptGuard until_saved;  // between the last step and the file, Ctrl-C waits
-  const auto result = is_training_attack(options.under)
-                          ? run_training_attack(options.under, nerf::RadianceField::load(options.field),
+  const auto result = is_training_attack(options.attack)
+                          ? run_training_attack(options.attack, nerf::RadianceField::load(options.field),
                                                 options.training, context, json)
-                          : changed_numbers(options, context);
+                          : changed_weights(options, context);
   result.save(options.out);
   json["file_bytes"] = std::filesystem::file_size(options.out);
-  context.text() << options.out << ": " << options.field << " after " << options.under << "\n";
+  context.text() << options.out << ": " << options.field << " after " << options.attack << "\n";
   context.result(json);
   return kOk;
 }
@@ -73,43 +89,44 @@ int run(const Options& options, Context& context) {
 
 Command add_attack_field(CommandLine& app) {
   auto o = std::make_shared<Options>();
-  app.add_option("field", o->field, "What `fieldmark bake` or `fieldmark train` wrote")
+  app.add_option("field", o->field, "Field to attack, of `fieldmark bake` or `fieldmark train`")
       ->required()
       ->type_name("FIELD")
       ->default_str("");
-  app.add_option("--out", o->out, "File for the attacked field, as large as it was")
-      ->required()
-      ->type_name("FIELD");
-  app.add_option("--distort", o->under,
-                 "Names separated by commas, run left to right. Each tensor by itself:\n"
-                 "weights_noise_A  Gaussian, A times the tensor's rms, 0 to 10\n"
-                 "float16          rounded to half precision\n"
-                 "int8             to whole numbers of 2 to 8 bits (int2 .. int8), one scale a tensor;\n"
-                 "                 int8-blocks with one for each 32 numbers\n"
-                 "prune_A          the fraction A of least size becomes 0, 0 to 1\n"
-                 "Colours, before their sigmoid:\n"
-                 "greyscale        luma in all three\n"
-                 "hue_A            about the grey axis, -360 to 360 degrees\n"
+  app.add_option("--out", o->out, "File to write, the attacked field")->required()->type_name("FIELD");
+  app.add_option("--attack", o->attack,
+                 "Attacks to run, left to right. On each tensor:\n"
+                 "weights_noise_A  Gaussian noise of A times the tensor's rms, 0 to 10\n"
+                 "float16          rounding to half precision\n"
+                 "int8             rounding to 8 bits (int2 to int8: 2 to 8), one scale per tensor;\n"
+                 "                 int8-blocks: one scale per 32 elements\n"
+                 "prune_A          sets the smallest fraction A of the elements to 0, 0 to 1\n"
+                 "On colours, before their sigmoid:\n"
+                 "greyscale        luma in all three channels\n"
+                 "hue_A            rotation about the grey axis by A degrees, -360 to 360\n"
                  "brightness_A     odds times A, 0.01 to 100\n"
-                 "contrast_A       factor 0 to 10\n"
+                 "contrast_A       factor A, 0 to 10\n"
                  "With other fields of the same sizes:\n"
                  "average_A        (1 - A) FIELD + A OTHER, 0 to 1\n"
                  "sign_flip_A      FIELD + A (UNMARKED - FIELD), 0 to 4; 2 reverses every sign of the mark\n"
                  "copy_A           FIELD + A (MARKED - UNMARKED), -4 to 4\n"
-                 "By training, each alone:\n"
-                 "finetune         goes on, on the photographs of --data\n"
-                 "finetune-renders goes on, on images of itself\n"
-                 "remove           goes on, on images of itself turned against the extractor of --owner\n"
-                 "retrain          a new field on images of this one")
+                 "By training, one at a time:\n"
+                 "finetune         trains on, with the clean images of --data\n"
+                 "finetune-renders trains on, with renders of the field\n"
+                 "remove           trains on, with renders changed against the extractor of --owner\n"
+                 "retrain          trains a new field with renders of this one")
       ->required()
       ->type_name("NAME[,NAME...]");
-  app.add_option("--other", o->other, "For average: say, the same field with another message")
+  app.add_option("--other", o->other, "Field to average with, such as one with another message; for average")
       ->type_name("FIELD");
-  app.add_option("--unmarked", o->unmarked, "For sign_flip and copy: the field before its mark was baked")
+  app.add_option("--unmarked", o->unmarked, "Field before its mark was baked; for sign_flip and copy")
       ->type_name("FIELD");
-  app.add_option("--marked", o->marked, "For copy: the field whose mark is copied")->type_name("FIELD");
+  app.add_option("--marked", o->marked, "Field whose mark is copied; for copy")->type_name("FIELD");
   add_training_attack(app, o->training);
-  return [o](Context& context) { return run(*o, context); };
+  return [o, app](Context& context) mutable {
+    refuse_unused(app, o->attack);
+    return run(*o, context);
+  };
 }
 
 }  // namespace fieldmark::cli

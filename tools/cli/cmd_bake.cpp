@@ -38,20 +38,20 @@ watermark::Baker::MarkPsnr scaled_to(const watermark::Owner& owner, watermark::B
 void say_strength(const watermark::Owner& owner, const watermark::Baker::MarkPsnr& mark_psnr,
                   Context& context) {
   char line[320];
-  std::snprintf(line, sizeof line, "mark of %.1f dB on the object", mark_psnr.scaled);
+  std::snprintf(line, sizeof line, "mark PSNR %.1f dB on the foreground", mark_psnr.scaled);
   context.text() << line;
   const double asked = owner.options().mark_psnr, fainter = mark_psnr.learnt - asked;
   if (!owner.mark().has_gain()) {
     context.text() << "\n";
     return;
   }
-  std::snprintf(line, sizeof line, ", %.1f dB asked for\n", asked);
+  std::snprintf(line, sizeof line, ", %.1f dB requested\n", asked);
   context.text() << line;
   if (!(fainter > kMuchFainter)) return;
   std::snprintf(
       line, sizeof line,
-      "the file's colours took only %.0f%% of the mark, which was then multiplied by %.2f with what "
-      "they got wrong: a longer --seconds, a larger field or a lower --mark-psnr holds it better",
+      "the colours of the file learned only %.0f%% of the mark, which was scaled by %.2f together with its "
+      "errors: a longer --seconds, a larger field or a lower --mark-psnr helps",
       100 * std::pow(10.0, -fainter / 20), mark_psnr.scale);
   context.note(line);
 }
@@ -95,9 +95,9 @@ int run(const Options& options, Context& context) {
   const auto open = to_hex(watermark::public_key(owner.key));
   const auto bytes = std::filesystem::file_size(options.out);
   context.text() << options.out << ": " << baker.steps() << " steps in " << format_duration(seconds)
-                 << "\nclaim " << commitment
-                 << ", to be time-stamped before the field is published\npublic key " << open
-                 << ", to be time-stamped with it\n";
+                 << "\ncommitment " << commitment
+                 << ", time-stamp it before you publish the field\npublic key " << open
+                 << ", time-stamp it too\n";
   say_strength(owner, mark_psnr, context);
   context.result({{"message", to_hex(message)},
                   {"payload", payload_json(message)},
@@ -119,12 +119,11 @@ int run(const Options& options, Context& context) {
 
 Command add_bake(CommandLine& app) {
   auto o = std::make_shared<Options>();
-  app.add_option("--owner", o->owner, "What `fieldmark embed` wrote")->required()->type_name("OWNER");
-  add_message_options(app, o->message, "Message");
-  app.add_option("--out", o->out, "File for the field to publish")->required()->type_name("FIELD");
+  app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
+  add_message_options(app, o->message, "Message to bake");
+  app.add_option("--out", o->out, "File to write, the field to publish")->required()->type_name("FIELD");
   app.add_option("--mark-psnr", o->mark_psnr,
-                 "PSNR that the file's mark is to have on the object, dB, 20 to 60; higher is fainter (as "
-                 "embedded)")
+                 "Mark PSNR on the foreground in dB, 20 to 60; higher is fainter; default: that of embed")
       ->range(20.0, 60.0)
       ->type_name("DB");
   add_run_length(app, o->length, false);

@@ -36,21 +36,21 @@ int run(const Options& options, Context& context) {
   std::optional<watermark::PublicKey> signer;
   if (!options.public_key.empty())
     signer = read_option("--public-key", [&] { return watermark::public_key_from_hex(options.public_key); });
-  const auto pictures =
+  const auto images =
       options.images.empty() ? std::vector<std::filesystem::path>{} : list_images(options.images);
-  const auto check = watermark::check_evidence_folder(options.folder, pictures, signer);
+  const auto check = watermark::check_evidence_folder(options.folder, images, signer);
   auto& out = context.text();
   for (const auto& fault : check.faults) out << fault << "\n";
   out << options.folder << (check.faults.empty() ? ": INTACT" : ": ALTERED") << "\n";
   if (const auto& s = check.summary; s && check.faults.empty()) {
     char p[40];
     std::snprintf(p, sizeof p, "%.2e", s->p_value);
-    out << "it says     " << (s->found ? "FOUND" : "NOT FOUND") << ", p " << p << ", message "
-        << to_hex(s->message) << "\nclaim       " << s->commitment << "\nsigned by   " << to_hex(s->signer)
-        << (signer ? ", as expected" : ", not compared with anything (see --public-key)") << "\nimages    "
-        << check.images << " given that it is about\n";
+    out << "verdict     " << (s->found ? "FOUND" : "NOT FOUND") << ", p " << p << ", message "
+        << to_hex(s->message) << "\ncommitment  " << s->commitment << "\nsigned by   " << to_hex(s->signer)
+        << (signer ? ", as expected" : ", not compared with a known key (see --public-key)")
+        << "\nimages      " << check.images << " of those given belong to it\n";
   }
-  context.result(result(check, pictures.size()));
+  context.result(result(check, images.size()));
   return check.faults.empty() ? kOk : kFailed;
 }
 
@@ -58,15 +58,13 @@ int run(const Options& options, Context& context) {
 
 Command add_check(CommandLine& app) {
   auto o = std::make_shared<Options>();
-  app.add_option("folder", o->folder, "What `fieldmark verify --evidence` wrote")
-      ->required()
-      ->type_name("DIR");
+  app.add_option("folder", o->folder, "Evidence folder of `fieldmark verify`")->required()->type_name("DIR");
   app.add_option("images", o->images,
-                 "Images, or folders of them, that the evidence should be about (their SHA-256 is compared)")
+                 "Images, or folders of them, to compare by SHA-256 with those of the evidence")
       ->type_name("IMAGE|DIR")
       ->default_str("");
   app.add_option("--public-key", o->public_key,
-                 "Whose signature it must be, 64 digits, as `key`, `embed` and `bake` print it (anybody's)")
+                 "Public key of the signer, 64 digits, as `key`, `embed` and `bake` print it; default: any")
       ->type_name("HEX")
       ->default_str("");
   return [o](Context& context) { return run(*o, context); };

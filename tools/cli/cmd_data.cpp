@@ -94,9 +94,9 @@ int fetch(const Options& options, Context& context) {
       return !guard.interrupted();
     });
   }
-  if (!fetched.complete) throw Interrupted("what came is kept, and the same command goes on from there");
+  if (!fetched.complete) throw Interrupted("the same command resumes the download");
   context.text() << m.name << ": " << fetched.fetched << " files fetched, " << fetched.present
-                 << " were there; all are right\n";
+                 << " were present; all are right\n";
   context.result({{"name", m.name},
                   {"ok", true},
                   {"files", m.files.size()},
@@ -106,7 +106,9 @@ int fetch(const Options& options, Context& context) {
 }
 
 void add_name_and_folder(CommandLine& app, Options& options, const char* folder) {
-  app.add_option("name", options.name, "Data set, a name from the list")->required()->type_name("NAME");
+  app.add_option("name", options.name, "Data set to use, a name of `fieldmark data list`")
+      ->required()
+      ->type_name("NAME");
   app.add_option("dir", options.folder, folder)->required()->type_name("DIR");
 }
 
@@ -114,15 +116,15 @@ void add_name_and_folder(CommandLine& app, Options& options, const char* folder)
 
 Command add_data(CommandLine& app) {
   auto options = std::make_shared<Options>();
-  CommandLine lists = app.add_subcommand("list", "Name every data set with its size, licence and source");
+  CommandLine lists = app.add_subcommand("list", "List every data set with size, licence and source");
   CommandLine verifies =
-      app.add_subcommand("verify", "Compare each file's size and SHA-256 with the manifest");
-  add_name_and_folder(verifies, *options, "Folder that holds its files");
-  CommandLine fetches = app.add_subcommand("fetch", "Get what is missing or wrong over http, and check it");
-  add_name_and_folder(fetches, *options, "Folder for its files");
+      app.add_subcommand("verify", "Compare size and SHA-256 of each file with the manifest");
+  add_name_and_folder(verifies, *options, "Folder to check");
+  CommandLine fetches = app.add_subcommand("fetch", "Download missing and damaged files, and check them");
+  add_name_and_folder(fetches, *options, "Folder to download to");
   fetches
       .add_option("--base-url", options->base_url,
-                  "Address of a folder with the files, http or https (that of the manifest)")
+                  "Address of a folder with the files, http or https; default: that of the manifest")
       ->check([](const std::string& url) {
         return url.starts_with("http://") || url.starts_with("https://")
                    ? std::string()

@@ -16,7 +16,7 @@ namespace {
 
 struct Options {
   std::vector<std::string> inputs;
-  std::string out, under;
+  std::string out, distort;
   std::string background = "white";
 };
 
@@ -25,18 +25,19 @@ std::vector<std::filesystem::path> outputs_of(const std::vector<std::filesystem:
                                               const std::filesystem::path& out) {
   std::vector<std::filesystem::path> outputs;
   std::set<std::filesystem::path> taken;
-  for (const auto& picture : images) {
-    outputs.push_back(out / picture.stem().concat(".png"));
+  for (const auto& image : images) {
+    outputs.push_back(out / image.stem().concat(".png"));
     if (!taken.insert(outputs.back()).second)
       throw UsageError("two images would be written to " + outputs.back().string());
-    if (std::filesystem::exists(outputs.back()) && std::filesystem::equivalent(outputs.back(), picture))
-      throw UsageError("--out: " + picture.string() + " would be overwritten by its own result");
+    if (std::filesystem::exists(outputs.back()) && std::filesystem::equivalent(outputs.back(), image))
+      throw UsageError("--out: " + image.string() + " would be overwritten by its own result");
   }
   return outputs;
 }
 
 int run(const Options& options, Context& context) {
-  const auto attack = read_option("--distort", [&] { return distort::parse_distortion(options.under); });
+  const auto distortion =
+      read_option("--distort", [&] { return distort::parse_distortion(options.distort); });
   const auto images = list_images(options.inputs);
   const auto outputs = outputs_of(images, options.out);
   std::filesystem::create_directories(options.out);
@@ -47,17 +48,17 @@ int run(const Options& options, Context& context) {
   const InterruptGuard guard;
   Json list = Json::array();
   {
-    Progress progress = context.progress("attack");
+    Progress progress = context.progress("distort");
     for (std::size_t i = 0; i < images.size(); ++i) {
       if (guard.interrupted()) throw Interrupted(std::to_string(i) + " images were written");
       write_png(outputs[i],
-                distort::apply_distortion(attack, read_rgb(images[i], value), rng, i, background));
+                distort::apply_distortion(distortion, read_rgb(images[i], value), rng, i, background));
       list.push_back({{"image", images[i].string()}, {"out", outputs[i].string()}});
       progress.update(static_cast<double>(i + 1) / static_cast<double>(images.size()));
     }
   }
-  context.text() << options.out << ": " << images.size() << " images after " << options.under << "\n";
-  context.result({{"under", options.under}, {"images", list}});
+  context.text() << options.out << ": " << images.size() << " images after " << options.distort << "\n";
+  context.result({{"distort", options.distort}, {"images", list}});
   return kOk;
 }
 
@@ -65,33 +66,31 @@ int run(const Options& options, Context& context) {
 
 Command add_distort(CommandLine& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("images", options->inputs, "Images, or folders of them (PNG, JPEG)")
+  app.add_option("images", options->inputs, "Images to distort, or folders of them; PNG or JPEG")
       ->required()
       ->type_name("IMAGE|DIR")
       ->default_str("");
-  app.add_option("--out", options->out, "Folder for the results, one PNG for each image")
-      ->required()
-      ->type_name("DIR");
-  app.add_option("--distort", options->under,
-                 "Names separated by commas, run left to right:\n"
-                 "noise_A       Gaussian, standard deviation 0 to 1\n"
-                 "rotation_A    by up to A degrees either way, 0 to 180\n"
-                 "scale_A       to A times the size, 0.01 to 4, area filter; scale-nearest_A,\n"
-                 "              scale-bilinear_A, scale-bicubic_A, scale-lanczos_A with others\n"
-                 "blur_A        Gaussian, sigma 0 to 100 pixels\n"
-                 "crop_A        keeps this share of the area, 0.0001 to 1\n"
-                 "jpeg_A        quality 1 to 90, halved chroma; jpeg444_A full, 1 to 100\n"
-                 "gamma_A       0.01 to 10\n"
-                 "brightness_A  factor 0 to 10\n"
-                 "contrast_A    about 1/2, factor 0 to 10\n"
-                 "hue_A         -360 to 360 degrees\n"
-                 "greyscale     luma in all three\n"
+  app.add_option("--out", options->out, "Folder to write, one PNG per image")->required()->type_name("DIR");
+  app.add_option("--distort", options->distort,
+                 "Distortions to apply, left to right:\n"
+                 "noise_A       Gaussian noise of standard deviation A, 0 to 1\n"
+                 "rotation_A    rotation by up to A degrees either way, 0 to 180\n"
+                 "scale_A       A times the size, 0.01 to 4, area filter; scale-nearest_A,\n"
+                 "              scale-bilinear_A, scale-bicubic_A, scale-lanczos_A: other filters\n"
+                 "blur_A        Gaussian blur of sigma A, 0 to 100 pixels\n"
+                 "crop_A        random window with the fraction A of the area, 0.0001 to 1\n"
+                 "jpeg_A        JPEG of quality A, 1 to 90, 4:2:0 chroma; jpeg444_A: 4:4:4, 1 to 100\n"
+                 "gamma_A       power A, 0.01 to 10\n"
+                 "brightness_A  factor A, 0 to 10\n"
+                 "contrast_A    factor A about 1/2, 0 to 10\n"
+                 "hue_A         hue rotation by A degrees, -360 to 360\n"
+                 "greyscale     luma in all three channels\n"
                  "combined      noise_0.10,crop_0.40,jpeg_50\n"
                  "screenshot    scale-bicubic_1.25,blur_0.5,gamma_1.1,scale-lanczos_0.8,jpeg_80")
       ->required()
       ->type_name("NAME[,NAME...]");
   app.add_option("--background", options->background,
-                 "What shows behind transparency and in opened corners: white, black")
+                 "Colour behind transparent pixels and in the corners of rotations: white, black")
       ->one_of({"white", "black"})
       ->type_name("COLOUR");
   return [options](Context& context) { return run(*options, context); };

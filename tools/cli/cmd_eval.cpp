@@ -41,10 +41,11 @@ int run(const Options& options, Context& context) {
   }
   if (guard.interrupted()) throw Interrupted("nothing was written");
   Json views = Json::array();
-  const auto add = [&](const std::string& name, double psnr, double object, double ssim, double distance) {
+  const auto add = [&](const std::string& name, double psnr, double foreground, double ssim,
+                       double distance) {
     char line[160];
-    std::snprintf(line, sizeof line, "%-16s %6.2f dB  object %6.2f dB  ssim %.4f", name.c_str(), psnr, object,
-                  ssim);
+    std::snprintf(line, sizeof line, "%-16s %6.2f dB  foreground %6.2f dB  ssim %.4f", name.c_str(), psnr,
+                  foreground, ssim);
     context.text() << line;
     if (lpips) {
       std::snprintf(line, sizeof line, "  lpips %.4f", distance);
@@ -79,12 +80,12 @@ int run(const Options& options, Context& context) {
 
 Command add_eval(CommandLine& app) {
   auto o = std::make_shared<Options>();
-  app.add_option("--field", o->field, "Trained or baked field")->required()->type_name("FIELD");
-  app.add_option("--data", o->data, "Data set, as of train")->required()->type_name("DIR");
-  app.add_option("--split", o->split, "Views to compare with: train, val, test")
+  app.add_option("--field", o->field, "Field to evaluate")->required()->type_name("FIELD");
+  app.add_option("--data", o->data, "Data set to compare with, as in train")->required()->type_name("DIR");
+  app.add_option("--split", o->split, "Part of the data set: train, val, test")
       ->one_of({"train", "val", "test"})
       ->type_name("SPLIT");
-  app.add_option("--size", o->size, "Pixels of the images' longer side, 16 to 8192 (as they are)")
+  app.add_option("--size", o->size, "Longer side of the images in pixels, 16 to 8192; default: original size")
       ->range(16, 8192)
       ->type_name("N")
       ->default_str("");

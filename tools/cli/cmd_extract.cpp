@@ -18,29 +18,31 @@ struct Options {
 int run(const Options& options, Context& context) {
   const auto owner = watermark::Owner::load(options.owner);
   SuspectReader reader(owner, options.reading);
-  const auto pictures = read_images(reader, options.images, context);
+  const auto images = read_images(reader, options.images, context);
   const auto code = owner.code();
   const Index bits = owner.options().bits;
   Json views = Json::array();
-  for (const auto& picture : pictures) {
-    const auto reading = watermark::read_bits(picture.cells, code, bits);
-    const char* how = watermark::reading_name(picture.reading);
-    context.text() << to_bits(reading.message) << "  " << picture.image << "  " << how << "\n";
-    views.push_back({{"image", picture.image},
+  for (const auto& image : images) {
+    const auto reading = watermark::read_bits(image.cells, code, bits);
+    const char* how = watermark::reading_name(image.reading);
+    context.text() << to_bits(reading.message) << "  " << image.image << "  " << how << "\n";
+    views.push_back({{"image", image.image},
                      {"bits", to_bits(reading.message)},
-                     {"reading", how},
-                     {"agreement", number(picture.agreement)},
+                     {"detection", how},
+                     {"agreement", number(image.agreement)},
                      {"payload", payload_json(read_payload(reading.sum))},
+                     {"p_noise", watermark::bit_p_values(reading)},
                      {"logits", reading.logit}});
   }
-  const auto reading = watermark::read_bits(total_evidence(pictures), code, bits);
+  const auto reading = watermark::read_bits(total_evidence(images), code, bits);
   const auto payload = read_payload(reading.sum);
   context.text() << to_bits(reading.message) << "  all together: " << to_hex(reading.message)
                  << "\npayload: " << payload_text(payload, bits) << "\n";
   context.result({{"message", to_hex(reading.message)},
                   {"bits", to_bits(reading.message)},
                   {"payload", payload_json(payload)},
-                  {"reading", reading_used(pictures)},
+                  {"detection", reading_used(images)},
+                  {"p_noise", watermark::bit_p_values(reading)},
                   {"logits", reading.logit},
                   {"views", views}});
   return kOk;
@@ -50,9 +52,9 @@ int run(const Options& options, Context& context) {
 
 Command add_extract(CommandLine& app) {
   auto o = std::make_shared<Options>();
-  app.add_option("--owner", o->owner, "What `fieldmark embed` wrote")->required()->type_name("OWNER");
+  app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
   add_reading(app, o->reading);
-  app.add_option("images", o->images, "Images, or folders of them (PNG, JPEG)")
+  app.add_option("images", o->images, "Images to read, or folders of them; PNG or JPEG")
       ->required()
       ->type_name("IMAGE|DIR")
       ->default_str("");

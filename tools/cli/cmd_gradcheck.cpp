@@ -183,12 +183,12 @@ int run_numerics(const Options& options, Context& context) {
 
 Command add_gradcheck(CommandLine& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("--only", options->only, "Only checks with TEXT in their name")
+  app.add_option("--only", options->only, "Text that the names of the checks contain")
       ->type_name("TEXT")
       ->default_str("all");
-  app.add_flag("--numerics", options->numerics,
-               "Cases hard on rounding and range against long double, on every instruction set, in place of "
-               "gradients");
+  app.add_flag(
+      "--numerics", options->numerics,
+      "Check hard numerical cases against long double on every instruction set, instead of gradients");
   return [options](Context& context) {
     return options->numerics ? run_numerics(*options, context) : run_gradients(*options, context);
   };

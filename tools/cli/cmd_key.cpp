@@ -20,13 +20,14 @@ struct Options {
 int run(const Options& options, Context& context) {
   // A lost key is a lost proof: it is replaced only on demand.
   if (std::filesystem::exists(options.out) && !options.force)
-    throw IoError(options.out + ": exists already; --force replaces it, and what was marked with it is lost");
+    throw IoError(options.out +
+                  ": exists already; --force replaces it, and proofs with the old key are lost");
   const auto key = watermark::random_key();
   watermark::save_key(options.out, key);
   const std::string open = to_hex(watermark::public_key(key));
   const std::string sha256 = sha256_file_hex(options.out);
   context.text() << options.out << ": 256 bits from the operating system, keep them secret\nsha256 " << sha256
-                 << "\npublic key " << open << ", by which anybody can tell what it signed\n";
+                 << "\npublic key " << open << ", checks its signatures\n";
   context.result({{"file", options.out}, {"bits", 256}, {"sha256", sha256}, {"public_key", open}});
   return kOk;
 }
@@ -35,8 +36,8 @@ int run(const Options& options, Context& context) {
 
 Command add_key(CommandLine& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("--out", options->out, "File for the key")->required()->type_name("KEY");
-  app.add_flag("--force", options->force, "Replace a key that exists");
+  app.add_option("--out", options->out, "File to write, the key")->required()->type_name("KEY");
+  app.add_flag("--force", options->force, "Replace an existing key");
   return [options](Context& context) { return run(*options, context); };
 }
 

@@ -1,6 +1,7 @@
 #include <fieldmark/nerf/evaluation.h>
 #include <fieldmark/watermark/attacks/payload_trials.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -23,7 +24,7 @@ struct Options {
   MessageOption message;
   std::vector<std::string> cameras{"novel"};
   Index count = 200, informed_count = 20, size = 0, together = 1;
-  bool payloads = false;
+  bool payloads = false, count_given = false;
   std::vector<std::string> under;
 };
 
@@ -32,16 +33,16 @@ std::vector<nerf::Camera> cameras_of(const std::string& set, const Options& opti
   if (set != "test")
     return nerf::make_cameras(owner.field.cameras, nerf::parse_camera_set(set), options.count, options.size,
                               context.seed());
-  if (options.data.empty()) throw UsageError("--cameras test: needs --data DIR, whose test views they are");
+  if (options.data.empty()) throw UsageError("--cameras test: needs --data DIR");
   std::vector<nerf::Camera> cameras;
   for (const auto& view : load_scene(options.data, {.split = "test"}, context).views)
     cameras.push_back(view.camera.scaled(options.size));
   return cameras;
 }
 
-// Against the photographs, a figure apart from those against the unmarked field.
-nerf::Evaluation against_photographs(const Options& options, const nerf::RadianceField& field,
-                                     const char* what, Context& context) {
+// Against the ground truth, apart from the figures against the unmarked field.
+nerf::Evaluation against_ground_truth(const Options& options, const nerf::RadianceField& field,
+                                      const char* what, Context& context) {
   const auto data = load_scene(
       options.data, {.split = "test", .size = options.size, .background = field.background}, context);
   nerf::Renderer renderer(field);
@@ -66,14 +67,14 @@ Json payloads_json(Index together, const watermark::PayloadViews& views, Context
     char line[200];
     std::snprintf(line, sizeof line,
                   "%-20s %.2f%% exact (95%%: %.2f to %.2f%%) of %lld readings of %lld views, %lld wrong\n",
-                  name.empty() ? "payload" : ("  under " + name).c_str(), 100 * a.share(), 100 * low,
+                  name.empty() ? "payload" : ("  after " + name).c_str(), 100 * a.share(), 100 * low,
                   100 * high, static_cast<long long>(a.trials), static_cast<long long>(together),
                   static_cast<long long>(a.wrong));
     context.text() << line;
   }
   if (json.is_null()) return json;
   json["together"] = together;
-  json["under"] = under;
+  json["distorted"] = under;
   return json;
 }
 
@@ -149,21 +150,26 @@ Measured measured_on(const std::string& set, const std::vector<nerf::Camera>& ca
   return {json, measurement_row(measured, set)};
 }
 
-void add_photographs(const Options& options, const Subject& subject, Json& json, Context& context) {
-  const double marked = against_photographs(options, *subject.baked, "photographs", context).psnr;
+void add_ground_truth(const Options& options, const Subject& subject, Json& json, Context& context) {
+  const double marked = against_ground_truth(options, *subject.baked, "ground truth", context).psnr;
   const double unmarked =
-      against_photographs(options, subject.owner.field, "photographs, unmarked", context).psnr;
+      against_ground_truth(options, subject.owner.field, "ground truth, unmarked", context).psnr;
   char line[120];
-  std::snprintf(line, sizeof line, "against photographs  %.2f dB, unmarked field %.2f dB\n", marked,
+  std::snprintf(line, sizeof line, "against ground truth %.2f dB, unmarked field %.2f dB\n", marked,
                 unmarked);
   context.text() << line;
-  json["psnr_photo"] = number(marked);
-  json["psnr_photo_unmarked"] = number(unmarked);
+  json["psnr_gt"] = number(marked);
+  json["psnr_gt_unmarked"] = number(unmarked);
 }
 
 int run(const Options& options, Context& context) {
   if (options.message.given() == options.field.empty())
-    throw UsageError("--field needs the message that was baked into it, and a message its --field");
+    throw UsageError("--field and a message: one needs the other");
+  const bool test = std::ranges::count(options.cameras, "test") > 0;
+  if (!options.data.empty() && !test && options.field.empty())
+    throw UsageError("--data: only for --field and --cameras test");
+  if (options.count_given && test && options.cameras.size() == 1)
+    throw UsageError("--count: --cameras test has a number of its own");
   for (const auto& name : options.under)
     read_option("--distort", [&] { return distort::parse_distortion(name); });
   const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
@@ -181,7 +187,7 @@ int run(const Options& options, Context& context) {
     if (i == 0) json = on.json;
     rows.push_back(on.row);
   }
-  if (subject.baked && !options.data.empty()) add_photographs(options, subject, json, context);
+  if (subject.baked && !options.data.empty()) add_ground_truth(options, subject, json, context);
   if (cameras.size() > 1) json["rows"] = rows;
   context.result(json);
   return kOk;
@@ -191,48 +197,54 @@ int run(const Options& options, Context& context) {
 
 Command add_measure(CommandLine& app) {
   auto o = std::make_shared<Options>();
-  app.add_option("--owner", o->owner, "What `fieldmark embed` wrote")->required()->type_name("OWNER");
-  app.add_option("--field", o->field, "A baked field (the mark as trained, not baked)")
+  app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
+  app.add_option("--field", o->field, "Baked field to measure; default: the mark as trained")
       ->type_name("BAKED")
       ->default_str("");
-  add_message_options(app, o->message, "The message baked into it");
+  add_message_options(app, o->message, "Message of the baked field");
   app.add_option("--cameras", o->cameras,
-                 "near (drawn from the span of the training cameras),\n"
-                 "ring (30 degrees above, radius 4.0311), sphere (all directions),\n"
-                 "unseen (directions that no photograph has), closer, farther, test (of --data);\n"
-                 "several with commas between them: a row each, the figures of the first")
+                 "Cameras to measure from, separated by commas, one row each:\n"
+                 "novel (from the span of the training cameras),\n"
+                 "ring (elevation 30 degrees, radius 4.0311), sphere (all directions),\n"
+                 "extrapolated (over 30 degrees from every training direction), closer, farther,\n"
+                 "test (of --data)")
       ->delimiter(',')
       ->one_of(nerf::camera_set_names())
       ->type_name("SET")
       ->default_str("novel");
-  app.add_option("--count", o->count, "Views, 1 to 100000; each with its own random message if not baked")
-      ->range(1, 100000)
-      ->type_name("N");
-  app.add_option(
-         "--informed-count", o->informed_count,
-         "Of the first so many views informed is read too, 0 to 100000: seconds a view and distortion")
+  const Option count =
+      app.add_option(
+             "--count", o->count,
+             "Views to draw per set of cameras, 1 to 100000; each has its own random message unless baked")
+          ->range(1, 100000)
+          ->type_name("N");
+  app.add_option("--informed-count", o->informed_count,
+                 "Views to read informed too, 0 to 100000; seconds per view and distortion")
       ->range(0, 100000)
       ->type_name("N");
-  app.add_option("--size", o->size, "Pixels of the views' longer side, 16 to 8192 (as trained)")
+  app.add_option("--size", o->size, "Longer side of the views in pixels, 16 to 8192; default: as trained")
       ->range(16, 8192)
       ->type_name("N")
       ->default_str("");
   app.add_option("--distort", o->under,
-                 "Distortions to measure under besides none (see attack), several times")
+                 "Distortion to measure as well, see `fieldmark distort --help`; repeatable")
       ->type_name("NAME")
       ->default_str("");
-  app.add_option("--data", o->data, "Data set for psnr_photo of a baked field and for --cameras test")
+  app.add_option("--data", o->data,
+                 "Data set for --cameras test and, with --field, for the PSNR against the ground truth")
       ->type_name("DIR");
-  app.add_flag(
-      "--payloads", o->payloads,
-      "Random payloads of up to 40 bits in place of random messages, to count those that are read exactly");
+  app.add_flag("--payloads", o->payloads,
+               "Draw payloads of up to 40 bits instead of raw messages, and count exact readings");
   app.add_option("--together", o->together,
-                 "Views whose evidence is added before a payload is read, 1 to 10000; each such group has\n"
-                 "one message. Above 1 each view is also read by itself")
+                 "Views of one message whose evidence is added before a payload is read, 1 to 10000;\n"
+                 "above 1, single views are read too")
       ->range(1, 10000)
       ->type_name("N");
   add_lpips_weights(app, o->lpips_weights);
-  return [o](Context& context) { return run(*o, context); };
+  return [o, count](Context& context) {
+    o->count_given = count.count() > 0;
+    return run(*o, context);
+  };
 }
 
 }  // namespace fieldmark::cli

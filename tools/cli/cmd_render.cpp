@@ -24,11 +24,12 @@ struct Options {
   std::string field, out, data;
   std::string split = "test", cameras = "novel", precision = "fp32";
   std::string against, sheet;
+  bool cameras_given = false;
   Index count = 10, size = 0, supersampling = 0;
   std::optional<Index> average, importance, random;
 };
 
-// The points of a ray, where any was given: those of the field in place of the others.
+// The samples of a ray if any were given, with those of the field for the rest.
 std::optional<nerf::RayPoints> points_of(const Options& options, const nerf::RadianceField& field) {
   if (!options.average && !options.importance && !options.random) return {};
   if (!field.coarse)
@@ -39,7 +40,7 @@ std::optional<nerf::RayPoints> points_of(const Options& options, const nerf::Rad
   points.importance = options.importance.value_or(points.importance);
   points.random = options.random.value_or(points.random);
   if (points.first() == 0)
-    throw UsageError("--average 0: needs --random N, since importance points are drawn from others");
+    throw UsageError("--average 0: needs --random N, because importance samples need others");
   return points;
 }
 
@@ -52,7 +53,7 @@ std::vector<NamedCamera> cameras_of(const Options& options, const nerf::Radiance
                                     Context& context) {
   std::vector<NamedCamera> cameras;
   if (!options.data.empty() || options.cameras == "test") {
-    if (options.data.empty()) throw UsageError("--cameras test: needs --data DIR, whose views they are");
+    if (options.data.empty()) throw UsageError("--cameras test: needs --data DIR");
     const auto data = load_scene(options.data, {.split = options.split}, context);
     for (const auto& view : data.views) cameras.push_back({view.name, view.camera.scaled(options.size)});
     return cameras;
@@ -77,6 +78,8 @@ void write_sheet(const Options& options, nerf::Renderer& renderer, const std::ve
 }
 
 int run(const Options& options, Context& context) {
+  if (options.cameras_given && !options.data.empty() && options.cameras != "test")
+    throw UsageError("--cameras " + options.cameras + ": --data has cameras of its own");
   const auto field = nerf::RadianceField::load(options.field);
   const auto cameras = cameras_of(options, field, context);
   std::filesystem::create_directories(options.out);
@@ -116,47 +119,52 @@ int run(const Options& options, Context& context) {
 
 Command add_render(CommandLine& app) {
   auto o = std::make_shared<Options>();
-  app.add_option("--field", o->field, "Trained or baked field")->required()->type_name("FIELD");
-  app.add_option("--out", o->out, "Folder for the images, PNG")->required()->type_name("DIR");
-  Option data = app.add_option("--data", o->data, "Take the cameras of a data set")->type_name("DIR");
-  app.add_option("--split", o->split, "Views of the data set: train, val, test")
+  app.add_option("--field", o->field, "Field to render")->required()->type_name("FIELD");
+  app.add_option("--out", o->out, "Folder to write, one PNG per view")->required()->type_name("DIR");
+  Option data = app.add_option("--data", o->data, "Data set whose cameras to use")->type_name("DIR");
+  app.add_option("--split", o->split, "Part of the data set: train, val, test")
       ->one_of({"train", "val", "test"})
       ->needs(data)
       ->type_name("SPLIT");
-  app.add_option("--cameras", o->cameras,
-                 "Without --data: near (drawn from the span of the training cameras),\n"
-                 "ring (30 degrees above, radius 4.0311), sphere (all directions),\n"
-                 "unseen (directions that no photograph has), closer, farther")
-      ->one_of(nerf::camera_set_names())
-      ->type_name("SET");
+  const Option cameras =
+      app.add_option("--cameras", o->cameras,
+                     "Cameras to draw without --data: novel (from the span of the training cameras),\n"
+                     "ring (elevation 30 degrees, radius 4.0311), sphere (all directions),\n"
+                     "extrapolated (over 30 degrees from every training direction), closer, farther")
+          ->one_of(nerf::camera_set_names())
+          ->type_name("SET");
   add_precision(app, o->precision);
   add_supersampling(app, o->supersampling);
   app.add_option("--count", o->count, "Cameras to draw, 1 to 100000")
       ->range(1, 100000)
       ->excludes(data)
       ->type_name("N");
-  app.add_option("--size", o->size, "Pixels of the images' longer side, 1 to 8192 (as trained)")
+  app.add_option("--size", o->size, "Longer side of the images in pixels, 1 to 8192; default: as trained")
       ->range(1, 8192)
       ->type_name("N")
       ->default_str("");
   const auto points = [&](const char* name, std::optional<Index>& count, const char* what) {
-    app.add_option(name, count,
-                   std::string(what) + " points of a ray of an mlp field, 0 to 1024 (as trained)")
+    app.add_option(
+           name, count,
+           std::string(what) + " samples per ray, 0 to 1024; default: as trained; for fields of preset mlp")
         ->range(0, 1024)
         ->type_name("N")
         ->default_str("");
   };
-  points("--average", o->average, "Average sampling");
-  points("--importance", o->importance, "Importance sampling");
-  points("--random", o->random, "Random sampling");
-  Option against = app.add_option("--against", o->against, "Another field, for --sheet")->type_name("FIELD");
+  points("--average", o->average, "Average");
+  points("--importance", o->importance, "Importance");
+  points("--random", o->random, "Random");
+  Option against =
+      app.add_option("--against", o->against, "Field to compare with in --sheet")->type_name("FIELD");
   Option sheet = app.add_option("--sheet", o->sheet,
-                                "PNG with four views of the other field, of this one, and ten times\n"
-                                "their difference")
+                                "PNG to write, four views of both fields and ten times their difference")
                      ->type_name("FILE");
   against->needs(sheet);
   sheet->needs(against);
-  return [o](Context& context) { return run(*o, context); };
+  return [o, cameras](Context& context) {
+    o->cameras_given = cameras.count() > 0;
+    return run(*o, context);
+  };
 }
 
 }  // namespace fieldmark::cli

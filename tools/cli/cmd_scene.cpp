@@ -47,15 +47,18 @@ int run(const Options& options, Context& context) {
 
 Command add_scene(CommandLine& app) {
   auto options = std::make_shared<Options>();
-  app.add_option("--out", options->out, "Folder for the data set, Blender layout")
+  app.add_option("--out", options->out, "Folder to write, a data set in Blender layout")
       ->required()
       ->type_name("DIR");
-  app.add_option("--kind", options->kind, "objects: textured solids on a slab; sphere: one shaded sphere")
+  app.add_option("--kind", options->kind,
+                 "Scene to render: objects, textured solids on a slab; sphere, one shaded sphere")
       ->one_of({"objects", "sphere"})
       ->type_name("KIND");
-  app.add_option("--size", options->size, "Pixels of both sides, 1 to 8192")->range(1, 8192)->type_name("N");
+  app.add_option("--size", options->size, "Width and height of the images in pixels, 1 to 8192")
+      ->range(1, 8192)
+      ->type_name("N");
   app.add_option("--views", options->views,
-                 "Views to train on, 1 to 100000; val gets a tenth, test a quarter")
+                 "Training images, 1 to 100000; val gets a tenth of that, test a quarter")
       ->range(1, 100000)
       ->type_name("N");
   return [options](Context& context) { return run(*options, context); };

@@ -177,8 +177,7 @@ int run(const Options& options, Context& context) {
   const auto bytes = std::filesystem::file_size(options.out);
   char line[200];
   std::snprintf(line, sizeof line, "%lld steps%s in %.1f s, %.2f MB", static_cast<long long>(trainer.steps()),
-                trainer.replanned() ? " (planned anew on the way)" : "", seconds,
-                static_cast<double>(bytes) / 1e6);
+                trainer.replanned() ? " (schedule revised)" : "", seconds, static_cast<double>(bytes) / 1e6);
   context.text() << options.out << ": " << line;
   if (!psnr.is_null()) {
     std::snprintf(line, sizeof line, ", %.2f dB on the test views", psnr.get<double>());
@@ -203,55 +202,56 @@ Command add_train(CommandLine& app) {
   auto o = std::make_shared<Options>();
   app.add_option(
          "--data", o->data,
-         "Data set: folder of transforms_*.json, transforms.json, poses_bounds.npy (LLFF) or a COLMAP model")
+         "Data set to train on: folder with transforms_*.json, transforms.json, poses_bounds.npy or a COLMAP "
+         "model")
       ->required()
       ->type_name("DIR");
-  app.add_option("--out", o->out, "File for the field; FIELD.checkpoint while it trains")
+  app.add_option("--out", o->out, "File to write, the field; FIELD.checkpoint during training")
       ->required()
       ->type_name("FIELD");
-  app.add_option("--size", o->size, "Pixels of the photographs' longer side, 16 to 8192 (as they are)")
+  app.add_option("--size", o->size,
+                 "Longer side of the training images in pixels, 16 to 8192; default: original size")
       ->range(16, 8192)
       ->type_name("N")
       ->default_str("");
   app.add_option("--preset", o->preset,
-                 "hash: multiresolution hash table with small networks;\n"
-                 "mlp: the original field, coarse and fine networks of 8 layers of 256")
+                 "hash: multiresolution hash grid with small networks;\n"
+                 "mlp: original NeRF, coarse and fine networks of 8 layers of 256 units")
       ->one_of({"hash", "mlp"})
       ->type_name("NAME");
   app.add_option("--model", o->model,
-                 "fixed: what a run of this length can fill;\n"
-                 "sized: as large as the scene needs, found by short trainings (hash only)")
+                 "fixed: model size by the length of the run;\n"
+                 "sized: model size by short trainings on the scene; for preset hash")
       ->one_of({"fixed", "sized"})
       ->type_name("NAME");
   app.add_option(
          "--supersampling", o->supersampling,
-         "Rays along each side of a pixel, 1, 2, 4 or 8, whose mean it is in the later part of long runs\n"
-         "(after 8000 steps) and wherever the field is rendered: 2 for what is worth a slower image "
-         "(hash only)")
+         "Rays per side of a pixel, 1, 2, 4 or 8, in training after 8000 steps and in every later render;\n"
+         "for preset hash")
       ->one_of({1, 2, 4, 8})
       ->type_name("N");
   add_run_length(app, o->length, true);
   add_precision(app, o->precision);
   app.add_option("--target-psnr", o->target_psnr,
-                 "End when held-out views (4 of split val, looked at every 250 steps) reach this, dB, 1 to "
-                 "100 (off);\n"
-                 "without such a split, when the rays trained on do")
+                 "PSNR at which training ends in dB, 1 to 100, of 4 validation images every 250 steps,\n"
+                 "or of the training rays without validation images; default: off")
       ->range(1.0, 100.0)
       ->type_name("DB")
       ->default_str("");
-  app.add_option("--background", o->background,
-                 "Behind transparent images: white, black (white for the Blender layout, else black)")
+  app.add_option(
+         "--background", o->background,
+         "Colour behind transparent pixels: white, black; default: white for the Blender layout, else black")
       ->one_of({"white", "black"})
       ->type_name("COLOUR")
       ->default_str("");
   app.add_option("--max-megabytes", o->max_megabytes,
-                 "Largest file for the field, MB, 0.1 to 100000 (no limit)")
+                 "Largest file size of the field in MB, 0.1 to 100000; default: no limit")
       ->range(0.1, 1e5)
       ->type_name("M")
       ->default_str("");
-  app.add_flag("--no-carve", o->no_carve, "Do not rule out what silhouettes show to be empty");
+  app.add_flag("--no-carve", o->no_carve, "Keep samples outside the silhouettes");
   app.add_flag("--resume", o->resume,
-               "Go on from FIELD.checkpoint, with the options of the run that left it");
+               "Resume from FIELD.checkpoint, with the options of the interrupted run");
   return [o](Context& context) { return run(*o, context); };
 }
 

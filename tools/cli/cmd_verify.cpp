@@ -38,7 +38,7 @@ watermark::WrongKeyCounts count_keys(const KeyTest& test, const std::vector<doub
       });
 }
 
-// How often keys that have nothing to do with the images reach each p-value, beside what chance allows.
+// How often random keys reach each p-value, beside the bounds of chance.
 Json wrong_keys(const watermark::WrongKeyCounts& found, Context& context) {
   Json counts = Json::object(), bounds = Json::object(), intervals = Json::object();
   double p = 1;
@@ -52,17 +52,15 @@ Json wrong_keys(const watermark::WrongKeyCounts& found, Context& context) {
     bounds[name] = bound;
     intervals[name] = {interval.low, interval.high};
     char line[160];
-    std::snprintf(
-        line, sizeof line,
-        "wrong keys at p <= %s   %lld of %lld, 99%% of the time at most %lld (99%% interval %lld to "
-        "%lld)\n",
-        name.c_str(), static_cast<long long>(count), static_cast<long long>(found.n),
-        static_cast<long long>(bound), static_cast<long long>(interval.low),
-        static_cast<long long>(interval.high));
+    std::snprintf(line, sizeof line,
+                  "wrong keys at p <= %s   %lld of %lld, 99%% bound %lld (99%% interval %lld to %lld)\n",
+                  name.c_str(), static_cast<long long>(count), static_cast<long long>(found.n),
+                  static_cast<long long>(bound), static_cast<long long>(interval.low),
+                  static_cast<long long>(interval.high));
     context.text() << line;
   }
   char least[80];
-  std::snprintf(least, sizeof least, "wrong keys, least p      %.2e\n", found.least_p);
+  std::snprintf(least, sizeof least, "wrong keys, smallest p   %.2e\n", found.least_p);
   context.text() << least;
   return {{"n", found.n},
           {"counts", counts},
@@ -75,15 +73,16 @@ void print_verdict(const watermark::EvidenceRecord& record, Context& context) {
   const auto& score = record.together;
   char text[400];
   std::snprintf(text, sizeof text,
-                "%s at a rate of false alarms of %g\n"
-                "p-value, keyed        %.2e (two-sided %.2e), from %zu images together\n"
-                "p-value, bits         %.2e (two-sided %.2e), %lld of %lld match\n"
-                "reading               %s\n",
+                "%s at a false-positive rate of %g\n"
+                "p-value of the key    %.2e (two-sided %.2e), from %zu images together\n"
+                "p-value of the bits   %.2e (two-sided %.2e), %lld of %lld match\n"
+                "detection             %s\n",
                 record.found() ? "FOUND" : "NOT FOUND", record.fpr, score.p_value, score.p_value_two_sided,
                 record.images.size(), score.p_value_bits, score.p_value_bits_two_sided,
                 static_cast<long long>(score.match.matching), static_cast<long long>(score.match.bits),
                 record.reading.c_str());
-  context.text() << text << "owner sha256 " << record.owner_sha256 << "\nclaim " << record.commitment << "\n";
+  context.text() << text << "owner sha256 " << record.owner_sha256 << "\ncommitment " << record.commitment
+                 << "\n";
 }
 
 Json result_json(const watermark::EvidenceRecord& record, const std::string& signer) {
@@ -97,7 +96,7 @@ Json result_json(const watermark::EvidenceRecord& record, const std::string& sig
           {"matching_bits", score.match.matching},
           {"bits", score.match.bits},
           {"views", record.images.size()},
-          {"reading", record.reading},
+          {"detection", record.reading},
           {"fpr", record.fpr},
           {"owner_sha256", record.owner_sha256},
           {"commitment", record.commitment},
@@ -114,32 +113,33 @@ int run(const Options& options, Context& context) {
   const double least = watermark::least_p(code.carriers());
   if (least > options.fpr) {
     char text[120];
-    std::snprintf(text, sizeof text, "--fpr: with %lld cells no image can reach %g, the least is %.1e",
+    std::snprintf(text, sizeof text,
+                  "--fpr: with %lld cells no image can reach %g, the smallest p-value is %.1e",
                   static_cast<long long>(code.carriers()), options.fpr, least);
     throw UsageError(text);
   }
 
   if (!options.evidence.empty()) watermark::prepare_evidence_folder(options.evidence);
   SuspectReader reader(owner, options.reading);
-  const auto pictures = read_images(reader, options.images, context);
-  const auto evidence = total_evidence(pictures);
+  const auto images = read_images(reader, options.images, context);
+  const auto evidence = total_evidence(images);
   const KeyTest test{owner, code, message};
-  watermark::EvidenceRecord record{.reading = reading_used(pictures),
+  watermark::EvidenceRecord record{.reading = reading_used(images),
                                    .owner_sha256 = sha256_file_hex(options.owner),
                                    .message = message,
                                    .fpr = options.fpr,
                                    .cells = code.carriers(),
                                    .together = test(evidence),
-                                   .images = score_images(test, pictures),
+                                   .images = score_images(test, images),
                                    .seed = context.seed(),
                                    .commit = machine().commit,
                                    .isa = machine().isa};
   record.commitment = watermark::commitment(record.owner_sha256, key, message);
-  print_views(context.text(), pictures, record.images);
+  print_views(context.text(), images, record.images);
   print_verdict(record, context);
   TestedControls controls;
   if (!options.controls.empty() || !options.evidence.empty())
-    controls = test_controls(test, reader, pictures, options.controls, context);
+    controls = test_controls(test, reader, images, options.controls, context);
   record.controls = controls.controls;
   print_controls(context.text(), record.controls, options.fpr);
   const Index keys =
@@ -148,13 +148,13 @@ int run(const Options& options, Context& context) {
   const Json wrong = record.wrong_keys ? wrong_keys(*record.wrong_keys, context) : Json(nullptr);
   const std::string signer = to_hex(watermark::public_key(key));
   if (!options.evidence.empty()) {
-    write_evidence(options.evidence, record, pictures, controls.thumbnails, owner, key);
-    context.text() << options.evidence << ": report.html and what proves it, signed by " << signer << "\n";
+    write_evidence(options.evidence, record, images, controls.thumbnails, owner, key);
+    context.text() << options.evidence << ": signed record with report.html, public key " << signer << "\n";
   }
   Json json = result_json(record, signer);
   json["payload"] = payload_json(message);
   json["wrong_keys"] = wrong;
-  json["per_view"] = per_view_json(pictures, record.images);
+  json["per_view"] = per_view_json(images, record.images);
   context.result(json);
   return record.found() ? kOk : kNotFound;
 }
@@ -163,33 +163,30 @@ int run(const Options& options, Context& context) {
 
 Command add_verify(CommandLine& app) {
   auto o = std::make_shared<Options>();
-  app.add_option("--owner", o->owner, "What `fieldmark embed` wrote")->required()->type_name("OWNER");
+  app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
   add_message_options(app, o->message, "Message to look for");
-  app.add_option("--fpr", o->fpr, "Rate of false alarms at which a mark counts as found, above 0 to 1")
+  app.add_option("--fpr", o->fpr, "False-positive rate at which a mark counts as found, above 0 to 1")
       ->range(1e-300, 1.0)
       ->type_name("P");
-  app.add_option("--key", o->key, "Another key than the owner's")->type_name("KEY");
+  app.add_option("--key", o->key, "Key to test instead of the owner's")->type_name("KEY");
   app.add_option("--wrong-keys", o->wrong_keys,
-                 "Also test this many random keys, 0 to 10000000 (0; with --evidence 100000)")
+                 "Random keys to test as well, 0 to 10000000; default: 0, with --evidence 100000")
       ->range(0, 10000000)
       ->type_name("N")
       ->default_str("");
-  app.add_option(
-         "--control", o->controls,
-         "Image, or folder of them, that is not marked: tested too, beside built-in controls; several "
-         "times")
+  app.add_option("--control", o->controls,
+                 "Unmarked image or folder to test beside the built-in controls; repeatable")
       ->one_value()
       ->type_name("IMAGE|DIR")
       ->default_str("");
   app.add_option(
          "--evidence", o->evidence,
-         "Folder for a signed record, a page and a C2PA soft binding (see `fieldmark check`); new, empty, "
-         "or with earlier evidence")
+         "Folder to write a signed record to, with a page and a C2PA soft binding; new, empty or with "
+         "earlier evidence")
       ->type_name("DIR")
       ->default_str("");
   add_reading(app, o->reading);
-  app.add_option("images", o->images,
-                 "Images of one field, or folders of them (PNG, JPEG): one verdict for all")
+  app.add_option("images", o->images, "Images of one field, or folders of them, for one verdict; PNG or JPEG")
       ->required()
       ->type_name("IMAGE|DIR")
       ->default_str("");

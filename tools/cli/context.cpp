@@ -13,15 +13,16 @@ void add_common(CommandLine& app, CommonOptions& options) {
   app.add_option("--seed", options.seed, "Seed of every random choice except keys, 0 to 2^64 - 1")
       ->group("Common")
       ->type_name("N");
-  app.add_option("--threads", options.threads, "Threads, 1 to 1024 (all that the machine offers)")
+  app.add_option("--threads", options.threads, "Threads to use, 1 to 1024; default: all cores")
       ->range(1, 1024)
       ->group("Common")
       ->type_name("N")
       ->default_str("");
-  app.add_option("--json", options.json, "Results as JSON into FILE, - for standard output")
+  app.add_option("--json", options.json, "File to write, the results as JSON; - for standard output")
       ->group("Common")
       ->type_name("FILE");
-  app.add_option("--report", options.report, "Results with command, commit and machine as Markdown into FILE")
+  app.add_option("--report", options.report,
+                 "File to write, the results with command, commit and machine as Markdown")
       ->group("Common")
       ->type_name("FILE");
 }

@@ -14,40 +14,37 @@ namespace fieldmark::cli {
 
 using Json = nlohmann::ordered_json;
 
-/// JSON knows neither infinity nor NaN: the PSNR of equal images, or of an object that is not there, is
-/// null.
+/// Null for infinity and NaN, which JSON lacks: the PSNR of equal images, or of an empty foreground.
 inline Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 /// Options that every command has.
 struct CommonOptions {
   std::uint64_t seed = 1;  ///< of every random choice, except keys
-  int threads = 0;         ///< 0: all that the machine offers
-  std::string json{};      ///< file for the results, "-" for standard output, empty for none
-  std::string report{};    ///< Markdown file for the results with their protocol, empty for none
+  int threads = 0;         ///< 0: all cores
+  std::string json{};      ///< file to write, "-": standard output, empty: none
+  std::string report{};    ///< Markdown file to write, empty: none
 };
 void add_common(CommandLine& app, CommonOptions& options);
 
-/// @throws IoError if no file can be made under this name; what is there stays
+/// Leaves an existing file untouched. @throws IoError if the file cannot be written
 void check_writable(const std::string& path);
 
-/// What a command gets besides its own options: where to write and how to report.
+/// The environment of a command: common options, output streams, progress and results.
 class Context {
  public:
-  /// Checks at once that the files for results can be written, so that hours of work are not lost for a wrong
-  /// name.
+  /// Checks that the result files can be written, so that a wrong name does not cost hours of work.
   /// @throws IoError if they cannot
   Context(const CommonOptions& options, std::vector<std::string> command_line, std::ostream& out,
           std::ostream& err);
 
   const CommonOptions& options() const { return options_; }
   std::uint64_t seed() const { return options_.seed; }
-  /// For people: standard output, or standard error when the results take standard output.
+  /// Text for people: standard output, or standard error if --json takes standard output.
   std::ostream& text() { return text_; }
-  /// What people should know of a run's input: printed at once, and in the results under "notes"; each text
-  /// once.
+  /// Prints a remark on the input and adds it to "notes" of the results; each text once.
   void note(const std::string& text);
   Progress progress(std::string what) { return Progress(err_, std::move(what)); }
-  /// Since the command was called.
+  /// Seconds since the command was called.
   double seconds() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
   /// Writes the results to --json and --report. @throws IoError if a file cannot be written
   void result(const Json& found);

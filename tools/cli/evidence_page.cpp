@@ -88,12 +88,12 @@ std::string verdict(const EvidenceRecord& r) {
       r.images.size() == 1 ? "the image" : "the " + std::to_string(r.images.size()) + " images together";
   if (r.found())
     return "<p class=\"verdict found\"><strong>The mark was found</strong> in " + count +
-           ". If the owner's key had nothing to do with them, evidence this strong would come up with a "
+           ". If the owner's key had nothing to do with them, evidence this strong would occur with a "
            "probability of at most " +
-           one_in(r.together.p_value) + " (asked for: " + one_in(r.fpr) + ").</p>\n";
+           one_in(r.together.p_value) + " (required: " + one_in(r.fpr) + ").</p>\n";
   return "<p class=\"verdict missing\"><strong>The mark was not found</strong> in " + count +
-         ". Evidence as strong as theirs comes up by chance with a probability of up to " +
-         one_in(r.together.p_value) + "; what was asked for is " + one_in(r.fpr) + ".</p>\n";
+         ". Evidence this strong occurs by chance with a probability of up to " + one_in(r.together.p_value) +
+         "; at most " + one_in(r.fpr) + " was required.</p>\n";
 }
 
 std::string controls_verdict(const EvidenceRecord& r) {
@@ -102,20 +102,21 @@ std::string controls_verdict(const EvidenceRecord& r) {
     if (control.together.p_value <= r.fpr) loud += (loud.empty() ? "" : ", ") + escaped_markup(control.name);
   if (r.controls.empty()) return "<p>No controls were tested.</p>\n";
   if (loud.empty())
-    return "<p>The same test found nothing in any of the controls, images that do not hold the mark.</p>\n";
-  return "<p><strong>The test also answered to controls: " + loud +
-         ".</strong> Either they hold the mark after all, or the test cannot be relied on here.</p>\n";
+    return "<p>The same test found nothing in any control, that is, in images without the mark.</p>\n";
+  return "<p><strong>The test also responded to controls: " + loud +
+         ".</strong> Either they hold the mark, or the test is not reliable here.</p>\n";
 }
 
 constexpr char kLimits[] = R"(<h2>What this does not prove</h2>
 <ul>
-<li><strong>It counts only if the commitment below was fixed before the field or its pictures were published</strong>, by a
-time-stamp or by publishing it. Afterwards anybody can make up a mark that fits given pictures.</li>
-<li>It says that the pictures carry this owner's mark. It does not say who made them, who copied what, or who has which rights.</li>
-<li>The probabilities hold for pictures that were not selected by the result. Of a thousand tests, one reaches 0.001 by chance.</li>
-<li>Where no mark is found, that does not prove that there was none: a mark can be damaged.</li>
+<li><strong>It counts only if the commitment below was published or time-stamped before the field and its images were
+published.</strong> Afterwards anybody can make up a mark that fits given images.</li>
+<li>It says that the images carry this owner's mark. It does not say who made them, who copied from whom, or who holds which rights.</li>
+<li>The probabilities hold for images that were not selected by their result. One of a thousand tests reaches 0.001 by chance.</li>
+<li>A mark that was not found may still have been there: a mark can be damaged.</li>
+<li>A p-value is not the probability that the mark is absent. It is a bound on how often a random key gives evidence this strong.</li>
 <li>The signature shows that the holder of the key wrote these figures and that nobody changed them since. It does not show that
-they were computed honestly: whoever has the OWNER file can repeat the test.</li>
+they were computed honestly. Whoever holds the OWNER file can repeat the test.</li>
 </ul>
 )";
 
@@ -128,7 +129,7 @@ std::string figures(const EvidenceRecord& r) {
   return "<h2>Figures</h2>\n<table><caption>All images together</caption>\n" +
          row("Message looked for",
              code(to_hex(r.message)) + ", " + std::to_string(r.message.size()) + " bits") +
-         row("Bits read, wrong ones underlined", marked_bits(s, r.message)) +
+         row("Bits read; those that differ are underlined", marked_bits(s, r.message)) +
          row("p-value of the key", text_of(s.p_value) + " one-sided, " + text_of(s.p_value_two_sided) +
                                        " two-sided; a bound for any image, over " + std::to_string(r.cells) +
                                        " cells of the scene, T = " + text_of(s.statistic, "%.2f")) +
@@ -136,11 +137,11 @@ std::string figures(const EvidenceRecord& r) {
                                                  text_of(s.p_value_bits_two_sided) + " two-sided; " +
                                                  std::to_string(s.match.matching) + " of " +
                                                  std::to_string(s.match.decided) + " decided bits match") +
-         row("Rate of false alarms asked for", text_of(r.fpr)) +
-         row("Reading",
-             escaped_markup(r.reading) +
-                 (r.reading == "blind" ? ": image and extractor only; key and message had no part in it"
-                                       : "")) +
+         row("False-positive rate required", text_of(r.fpr)) +
+         row("Detection",
+             escaped_markup(r.reading) + (r.reading == "blind"
+                                              ? ": image and extractor alone; key and message played no part"
+                                              : "")) +
          "</table>\n";
 }
 
@@ -152,21 +153,21 @@ std::string image_plot(const EvidenceRecord& r) {
     bars.push_back({"image " + std::to_string(i + 1), -std::log10(p), "p " + text_of(p)});
     longest = std::max(longest, bars.back().value);
   }
-  bars.push_back({"asked for", -std::log10(r.fpr), "p " + text_of(r.fpr)});
+  bars.push_back({"required", -std::log10(r.fpr), "p " + text_of(r.fpr)});
   const double full = 4 * std::max(1., std::ceil(longest / 4));
   std::string more;
   if (r.images.size() > kPlottedImages)
     more = " Only the first " + std::to_string(kPlottedImages) + " are drawn.";
   return "<figure role=\"img\" aria-label=\"Bars: evidence of each image by itself\">\n" +
-         bench::bar_chart("Evidence of each image by itself: zeros of its p-value (-log10 p)", bars, full) +
-         "<figcaption>Each bar is one image alone. Together they weigh more than the longest of them." +
-         more + "</figcaption></figure>\n";
+         bench::bar_chart("Evidence of each image alone: -log10 of its p-value", bars, full) +
+         "<figcaption>Each bar is one image alone; the verdict uses all images together." + more +
+         "</figcaption></figure>\n";
 }
 
 // The beginning of a table of images and their figures.
-std::string scores_head(const char* caption, const char* picture, const char* about) {
+std::string scores_head(const char* caption, const char* image, const char* about) {
   std::string out = std::string("<table><caption>") + caption + "</caption>\n<thead><tr>";
-  for (const char* column : {picture, about, "Bits that match", "p, key", "two-sided", "p, bits"})
+  for (const char* column : {image, about, "Matching bits", "p, key", "two-sided", "p, bits"})
     out += std::string("<th scope=\"col\">") + column + "</th>";
   return out + "</tr></thead>\n<tbody>\n";
 }
@@ -179,15 +180,15 @@ std::string scores_row(const std::string& alt, const std::string& source, const 
 
 std::string images_table(const EvidenceRecord& r, const PageImages& images) {
   std::string out = "<h2>Images</h2>\n" + image_plot(r) +
-                    scores_head("Each image by itself; bits that differ from the message are underlined",
-                                "Image", "File and bits");
+                    scores_head("Each image alone; bits that differ from the message are underlined", "Image",
+                                "File and bits");
   for (std::size_t i = 0; i < r.images.size(); ++i) {
-    const auto& picture = r.images[i];
-    const std::string label = std::to_string(i + 1) + ": " + escaped_markup(picture.name);
-    out += scores_row(
-        "Image " + label, images.images.at(i),
-        label + "<br>" + marked_bits(picture.score, r.message) + "<br>SHA-256 " + code(picture.sha256),
-        picture.score);
+    const auto& image = r.images[i];
+    const std::string label = std::to_string(i + 1) + ": " + escaped_markup(image.name);
+    out +=
+        scores_row("Image " + label, images.images.at(i),
+                   label + "<br>" + marked_bits(image.score, r.message) + "<br>SHA-256 " + code(image.sha256),
+                   image.score);
   }
   return out + "</tbody></table>\n";
 }
@@ -196,16 +197,16 @@ std::string controls_table(const EvidenceRecord& r, const PageImages& images) {
   if (r.controls.empty()) return "";
   std::string out =
       "<h2>Controls</h2>\n" + controls_verdict(r) +
-      scores_head("The same key, message and test on images that do not hold the mark", "Example", "Control");
+      scores_head("The same key, message and test on images without the mark", "Example", "Control");
   for (std::size_t i = 0; i < r.controls.size(); ++i) {
     const auto& control = r.controls[i];
     const std::string name = escaped_markup(control.name);
     double least = 1;
-    for (const auto& picture : control.images) least = std::min(least, picture.score.p_value);
+    for (const auto& image : control.images) least = std::min(least, image.score.p_value);
     out += scores_row("Control " + name, images.controls.at(i),
                       "<strong>" + name + "</strong>, " + std::to_string(control.images.size()) +
                           " together<br>" + escaped_markup(control.meaning) +
-                          "<br>Least p of one alone: " + text_of(least),
+                          "<br>Smallest p of one alone: " + text_of(least),
                       control.together);
   }
   return out + "</tbody></table>\n";
@@ -218,12 +219,12 @@ std::string wrong_keys(const EvidenceRecord& r) {
   const std::string n = std::to_string(w.n);
   std::string out =
       "<h2>Wrong keys</h2>\n<p>The evidence of all images was tested under " + n +
-      " random keys that have nothing to do with them. The least p-value among them is " +
-      text_of(w.least_p) + "; the key in question has " + text_of(r.together.p_value) +
+      " random keys. The smallest p-value among them is " + text_of(w.least_p) +
+      "; the key in question has " + text_of(r.together.p_value) +
       ".</p>\n<figure role=\"img\" aria-label=\"Histogram: statistic of wrong keys, and of the key in "
       "question\">\n" +
-      bench::histogram_chart({.title = "How many of " + n + " wrong keys reach which evidence T",
-                              .x = "T: 0 on average for a key that has nothing to do with the images",
+      bench::histogram_chart({.title = "Statistic T of " + n + " wrong keys",
+                              .x = "T: 0 on average for a random key",
                               .counts = {w.histogram.begin(), w.histogram.end()},
                               .from = -Counts::kBins / 2. / Counts::kBinsPerUnit,
                               .bin = 1. / Counts::kBinsPerUnit,
@@ -243,9 +244,9 @@ std::string wrong_keys(const EvidenceRecord& r) {
 }
 
 std::string identity(const EvidenceRecord& r, const watermark::PublicKey& signer) {
-  return "<h2>What was fixed, and how to check it</h2>\n<table>\n" +
-         row("Claim (to have been time-stamped)", code(r.commitment)) +
-         row("Public key of who signed", code(to_hex(signer))) +
+  return "<h2>Commitment and verification</h2>\n<table>\n" +
+         row("Commitment (must have been time-stamped)", code(r.commitment)) +
+         row("Public key of the signer", code(to_hex(signer))) +
          row("SHA-256 of the OWNER file", code(r.owner_sha256)) +
          row("Program", code(r.commit + ", kernels x86-64-" + r.isa + ", seed " + std::to_string(r.seed))) +
          "</table>\n"
@@ -253,7 +254,7 @@ std::string identity(const EvidenceRecord& r, const watermark::PublicKey& signer
          "gives "
          "none of "
          "them away. To check that nothing here was altered:</p>\n<pre><code>fieldmark check FOLDER "
-         "PICTURES\nopenssl pkeyutl -verify -pubin -inkey public_key.pem -rawin -in evidence.json -sigfile "
+         "IMAGES\nopenssl pkeyutl -verify -pubin -inkey public_key.pem -rawin -in evidence.json -sigfile "
          "evidence.sig</code></pre>\n<p>Whoever holds the OWNER file repeats the whole test with "
          "<code>fieldmark "
          "verify</code>.</p>\n";
@@ -269,9 +270,9 @@ std::string thumbnail(const Tensor<float>& rgb) {
 }
 
 std::string evidence_page(const EvidenceRecord& record, const watermark::PublicKey& signer,
-                          const PageImages& pictures) {
+                          const PageImages& images) {
   return kHead + std::string("<h1>Evidence of a mark</h1>\n") + verdict(record) + controls_verdict(record) +
-         kLimits + figures(record) + images_table(record, pictures) + controls_table(record, pictures) +
+         kLimits + figures(record) + images_table(record, images) + controls_table(record, images) +
          wrong_keys(record) + identity(record, signer) + "</body>\n</html>\n";
 }
 

@@ -17,8 +17,8 @@ struct PageImages {
 /// @param rgb  [H, W, 3]
 std::string thumbnail(const Tensor<float>& rgb);
 
-/// A page for people: the verdict in plain words, what it does not prove, every figure, plots and images.
-/// It stands by itself, loads nothing and runs no scripts. Equal records give equal pages.
+/// A self-contained HTML page: the verdict in plain words, its limits, every figure, plots and images. It
+/// loads nothing and runs no scripts. Equal records give equal pages.
 std::string evidence_page(const watermark::EvidenceRecord& record, const watermark::PublicKey& signer,
                           const PageImages& images);
 

@@ -35,9 +35,9 @@ EvidenceControl built_in(const KeyTest& test, SuspectReader& reader, const water
   const InterruptGuard guard;
   EvidenceControl tested{control.name, control.meaning};
   std::vector<ImageEvidence> read;
-  for (const auto& picture : control.images) {
+  for (const auto& image : control.images) {
     if (guard.interrupted()) throw Interrupted("nothing was decided");
-    read.push_back(reader.read(picture, control.name + " " + std::to_string(read.size() + 1)));
+    read.push_back(reader.read(image, control.name + " " + std::to_string(read.size() + 1)));
   }
   tested.images = score_images(test, read);
   tested.together = test(total_evidence(read));
@@ -78,7 +78,7 @@ TestedControls test_controls(const KeyTest& test, SuspectReader& reader,
   for (const auto& path : given) {
     const auto read = read_images(reader, {path}, context);
     tested.controls.push_back({given_name(path),
-                               "Given as a control: images of which the user says that they are not marked.",
+                               "Given as a control: images that the user declares unmarked.",
                                score_images(test, read), test(total_evidence(read))});
     tested.thumbnails.push_back(thumbnail(read_rgb(read[0].image, background(test.owner))));
   }
@@ -129,7 +129,7 @@ void print_controls(std::ostream& out, const std::vector<EvidenceControl>& contr
     std::snprintf(text, sizeof text, "%.2g (two-sided %.2g), %lld of %lld match, images: %zu%s\n", s.p_value,
                   s.p_value_two_sided, static_cast<long long>(s.match.matching),
                   static_cast<long long>(s.match.bits), control.images.size(),
-                  s.p_value <= fpr ? ": THE TEST ANSWERS TO A CONTROL" : "");
+                  s.p_value <= fpr ? ": THE TEST RESPONDS TO A CONTROL" : "");
     out << "control " << control.name << ": p " << text;
   }
 }
@@ -138,8 +138,8 @@ void write_evidence(const std::string& folder, const watermark::EvidenceRecord& 
                     const std::vector<ImageEvidence>& images, const std::vector<std::string>& controls,
                     const watermark::Owner& owner, const watermark::Key& key) {
   PageImages small{.controls = controls};
-  for (const auto& picture : images)
-    small.images.push_back(thumbnail(read_rgb(picture.image, background(owner))));
+  for (const auto& image : images)
+    small.images.push_back(thumbnail(read_rgb(image.image, background(owner))));
   const std::string page = evidence_page(record, watermark::public_key(key), small);
   watermark::write_evidence_folder(folder, record, page, key);
 }

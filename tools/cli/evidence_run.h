@@ -12,9 +12,9 @@
 
 namespace fieldmark::cli {
 
-/// What evidence is tested for.
+/// Tests evidence for the message under the key.
 struct KeyTest {
-  const watermark::Owner& owner;      ///< whose field is asked about
+  const watermark::Owner& owner;      ///< of the field in question
   const watermark::CellCode& code;    ///< of the key in question
   const watermark::Message& message;  ///< looked for
   watermark::EvidenceScore operator()(const std::vector<double>& cells) const {
@@ -32,8 +32,8 @@ struct TestedControls {
   std::vector<std::string> thumbnails{};
 };
 
-/// The built-in controls (watermark::built_in_controls()) of the first five images, and one for each of
-/// `given`, read as they were; images or folders of which the user says that they are not marked.
+/// Tests the built-in controls (watermark::built_in_controls()) of the first five images and each image or
+/// folder of `given`, which the user declares unmarked, with the same detection.
 /// @throws IoError naming the image that cannot be read
 TestedControls test_controls(const KeyTest& test, SuspectReader& reader,
                              const std::vector<ImageEvidence>& images, const std::vector<std::string>& given,

@@ -10,23 +10,25 @@ namespace {
   const std::string steps = "after " + std::to_string(work.steps()) + " steps";
   if (!work.save) throw Interrupted(steps + ", nothing was written");
   work.save();
-  throw Interrupted(steps + ", --resume goes on from " + work.checkpoint);
+  throw Interrupted(steps + ", --resume continues from " + work.checkpoint);
 }
 
 }  // namespace
 
 void add_run_length(CommandLine& app, RunLength& length, bool checkpoint) {
-  Option steps = app.add_option("--steps", length.steps, "Length of the run in steps, 1 to 10000000")
-                     ->range(1, 10000000)
-                     ->type_name("N")
-                     ->default_str("");
+  Option steps =
+      app.add_option("--steps", length.steps, "Length of the run in steps, 1 to 10000000; default: --seconds")
+          ->range(1, 10000000)
+          ->type_name("N")
+          ->default_str("");
   app.add_option("--seconds", length.seconds,
-                 "Length of the run from the start of the command, loading included, 1 to 1000000")
+                 "Length of the run in seconds from the start of the command, 1 to 1000000")
       ->range(1.0, 1e6)
       ->excludes(steps)
       ->type_name("S");
   if (!checkpoint) return;
-  app.add_option("--checkpoint-seconds", length.checkpoint_seconds, "Time between checkpoints, 1 to 1000000")
+  app.add_option("--checkpoint-seconds", length.checkpoint_seconds,
+                 "Time between checkpoints in seconds, 1 to 1000000")
       ->range(1.0, 1e6)
       ->type_name("S");
 }

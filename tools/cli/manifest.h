@@ -21,20 +21,20 @@ struct Manifest {
   std::uintmax_t bytes() const;
 };
 
-/// The contents of data_manifests/, from when this program was built.
+/// The contents of data_manifests/, compiled into the program.
 std::vector<std::string_view> embedded_manifests();
 
 /// @param origin  named in errors   @throws IoError if the text is not JSON or not a manifest of format 1
 Manifest parse_manifest(std::string_view text, const std::string& origin);
 
-/// What is wrong with a file: missing, its size or SHA-256; empty if nothing is. @throws IoError if it cannot
-/// be read
+/// The fault of a file: missing, wrong size or wrong SHA-256; empty if it is right.
+/// @throws IoError if it cannot be read
 std::string file_fault(const Manifest::File& file, const std::filesystem::path& path);
 
 struct ManifestFault {
   std::string path, what;
 };
-/// Compares a folder with a manifest: each file's presence, size and SHA-256. Other files are not looked at.
+/// Compares a folder with a manifest: each file's presence, size and SHA-256. Other files are ignored.
 /// @param keep_going  asked before every file with the part of the bytes seen; on false the check ends early
 std::vector<ManifestFault> verify_manifest(const Manifest& manifest, const std::filesystem::path& folder,
                                            const std::function<bool(double)>& keep_going);

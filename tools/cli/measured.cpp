@@ -14,8 +14,8 @@ Json measurement_json(const watermark::Measurement& m, const std::string& camera
                 {"informed", number(accuracy.informed)},
                 {"chosen", number(accuracy.chosen)}};
   };
-  Json under = Json::object();
-  for (const auto& [name, accuracy] : m.under) under[name] = reading(accuracy);
+  Json distorted = Json::object();
+  for (const auto& [name, accuracy] : m.under) distorted[name] = reading(accuracy);
   return {{"bits", m.bits},
           {"views", m.views},
           {"cameras", cameras},
@@ -26,8 +26,8 @@ Json measurement_json(const watermark::Measurement& m, const std::string& camera
           {"psnr_base_foreground", number(m.psnr_base_foreground)},
           {"ssim_base", number(m.ssim_base)},
           {"lpips_base", number(m.lpips_base)},
-          {"psnr_photo", nullptr},
-          {"under", under},
+          {"psnr_gt", nullptr},
+          {"distorted", distorted},
           {"informed_views", m.informed_views},
           {"informed_seconds", number(m.informed_seconds)}};
 }
@@ -38,7 +38,7 @@ Json measurement_row(const watermark::Measurement& m, const std::string& cameras
   row.update(all.at("accuracy"));
   for (const char* name : {"accuracy_p5", "psnr_base", "psnr_base_foreground", "ssim_base", "lpips_base"})
     row[name] = all.at(name);
-  for (const auto& [name, reading] : all.at("under").items())
+  for (const auto& [name, reading] : all.at("distorted").items())
     for (const auto& [kind, accuracy] : reading.items()) row[name + " " + kind] = accuracy;
   return row;
 }
@@ -54,16 +54,16 @@ void print_measurement(std::ostream& out, const watermark::Measurement& m, const
   print("against unmarked     %.2f dB, foreground %.2f dB, ssim %.4f\n", m.psnr_base, m.psnr_base_foreground,
         m.ssim_base);
   if (std::isfinite(m.lpips_base)) print("                     lpips %.4f\n", m.lpips_base);
-  print("bits right, blind    %.2f%% of one view, worst 5%% of views below %.2f%%\n", 100 * m.accuracy.blind,
+  print("bit accuracy, blind  %.2f%% per view, 5th percentile %.2f%%\n", 100 * m.accuracy.blind,
         100 * m.accuracy_p5);
   if (m.informed_views > 0)
-    print("informed             %.2f%%, as chosen %.2f%%, of %lld views, %.1f s a view\n",
+    print("informed             %.2f%%, chosen %.2f%%, of %lld views, %.1f s per view\n",
           100 * m.accuracy.informed, 100 * m.accuracy.chosen, static_cast<long long>(m.informed_views),
           m.informed_seconds);
   for (const auto& [name, accuracy] : m.under) {
-    print("  under %-20s %.2f%%", name.c_str(), 100 * accuracy.blind);
+    print("  %-26s %.2f%%", name.c_str(), 100 * accuracy.blind);
     if (m.informed_views > 0)
-      print(", informed %.2f%%, as chosen %.2f%%", 100 * accuracy.informed, 100 * accuracy.chosen);
+      print(", informed %.2f%%, chosen %.2f%%", 100 * accuracy.informed, 100 * accuracy.chosen);
     out << "\n";
   }
 }

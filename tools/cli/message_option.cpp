@@ -19,13 +19,15 @@ watermark::Message encoded(const char* option, PayloadKind kind, const std::stri
 void add_message_options(CommandLine& app, MessageOption& o, const std::string& purpose) {
   Option all[] = {
       app.add_option("--message", o.message,
-                     purpose + ", hexadecimal, most significant bit first, as long as the owner's bits")
+                     purpose + " in hexadecimal, most significant bit first, as long as the owner's --bits")
           ->type_name("HEX"),
-      app.add_option("--text", o.text, "The same as UTF-8 text that is encoded so that errors are corrected")
+      app.add_option("--text", o.text, "UTF-8 text instead of --message, encoded with error correction")
           ->type_name("T"),
-      app.add_option("--uuid", o.uuid, "The same as a UUID, encoded likewise; needs some 170 bits")
+      app.add_option("--uuid", o.uuid,
+                     "UUID instead of --message, encoded with error correction; needs 147 bits or more")
           ->type_name("U"),
-      app.add_option("--payload", o.payload, "The same as 1 to 32 hexadecimal digits, encoded likewise")
+      app.add_option("--payload", o.payload,
+                     "1 to 32 hexadecimal digits instead of --message, encoded with error correction")
           ->type_name("HEX")};
   for (std::size_t i = 0; i < std::size(all); ++i)
     for (std::size_t j = i + 1; j < std::size(all); ++j) all[i]->excludes(all[j]);
@@ -60,14 +62,14 @@ Json payload_json(const std::optional<watermark::PayloadReading>& reading) {
 std::string payload_text(const std::optional<watermark::PayloadReading>& reading, Index bits) {
   if (!reading) {
     const watermark::PayloadCodec codec(bits);
-    if (codec.layouts().empty()) return "none: messages of so few bits hold no payload";
+    if (codec.layouts().empty()) return "none: a message of so few bits holds no payload";
     char text[80];
-    std::snprintf(text, sizeof text, "none (fair bits give one with a probability below %.1e)",
+    std::snprintf(text, sizeof text, "none (random bits decode to one with a probability below %.1e)",
                   codec.chance());
     return text;
   }
-  char text[80];
-  std::snprintf(text, sizeof text, ", %lld of %lld bits corrected, by chance below %.1e",
+  char text[120];
+  std::snprintf(text, sizeof text, ", %lld of %lld bits corrected, by chance with a probability below %.1e",
                 static_cast<long long>(reading->corrected), static_cast<long long>(bits), reading->chance);
   return watermark::payload_kind_name(reading->payload.kind) + std::string(" ") + reading->payload.value +
          text;

@@ -14,7 +14,7 @@ class Option;
 
 namespace fieldmark::cli {
 
-/// A message, as it is or as what it stands for; one of them.
+/// A raw message, or the payload that it encodes; at most one is given.
 struct MessageOption {
   std::string message, text, uuid, payload;
   bool given() const { return !(message.empty() && text.empty() && uuid.empty() && payload.empty()); }
@@ -27,16 +27,16 @@ void add_message_options(CommandLine& app, MessageOption& options, const std::st
 /// The message that was asked for. @throws UsageError if none is given, or it does not fit
 watermark::Message message_of(const MessageOption& options, Index bits);
 
-/// {kind, value} of a message that stands for something, else null.
+/// {kind, value} of the payload that a message encodes, or null.
 Json payload_json(const watermark::Message& message);
 
-/// The payload that logits tell, if any, see PayloadCodec::read().
+/// The payload that evidence decodes to, if any, see PayloadCodec::read().
 std::optional<watermark::PayloadReading> read_payload(const std::vector<double>& logit);
 
 /// {kind, value, corrected, chance}, or null.
 Json payload_json(const std::optional<watermark::PayloadReading>& reading);
 
-/// The same in words; why there is none where there is none.
+/// The same in words, or the reason why there is none.
 std::string payload_text(const std::optional<watermark::PayloadReading>& reading, Index bits);
 
 }  // namespace fieldmark::cli

@@ -11,8 +11,8 @@ namespace fieldmark::cli {
 
 void add_lpips_weights(CommandLine& app, std::string& file) {
   app.add_option("--lpips-weights", file,
-                 "LPIPS weights, AlexNet ($FIELDMARK_DATA/weights/lpips_alex_v0.1.safetensors);\n"
-                 "none leaves LPIPS out")
+                 "AlexNet weights of LPIPS, or none to skip LPIPS;\n"
+                 "default: $FIELDMARK_DATA/weights/lpips_alex_v0.1.safetensors")
       ->type_name("FILE")
       ->default_str("");
 }

@@ -7,7 +7,7 @@
 namespace fieldmark::cli {
 
 void add_precision(CommandLine& app, std::string& name) {
-  app.add_option("--precision", name, "Of what the networks multiply: fp32, bf16 (where the CPU has it)")
+  app.add_option("--precision", name, "Number format of network products: fp32, bf16 (on CPUs that have it)")
       ->one_of({"fp32", "bf16"})
       ->type_name("NAME");
 }

@@ -9,19 +9,17 @@ namespace fieldmark::cli {
 /// "7 s", "3 min 05 s", "2 h 07 min".
 std::string format_duration(double seconds);
 
-/// Shows how far a long piece of work is: one line that is rewritten on a terminal, elsewhere a line for
-/// every tenth.
+/// Reports progress: one updated line on a terminal, elsewhere one line per tenth.
 class Progress {
  public:
-  /// A terminal is recognised by `out` being std::cerr or std::cout connected to one. `out` must outlive
-  /// this.
+  /// A terminal is std::cerr or std::cout connected to one. `out` must outlive this.
   Progress(std::ostream& out, std::string what);
   Progress(std::ostream& out, std::string what, bool terminal);
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
-  /// Ends a line that was begun on a terminal.
+  /// Ends the line on a terminal.
   ~Progress();
-  /// @param fraction of the work that is done, in [0, 1]   @param note  shown behind it, such as a loss
+  /// @param fraction  part of the work done, in [0, 1]   @param note  shown after it, such as a loss
   void update(double fraction, std::string_view note = {});
   double seconds() const;
 
@@ -33,12 +31,12 @@ class Progress {
   bool terminal_;
   Clock::time_point begin_ = Clock::now();
   Clock::time_point shown_ = begin_;
-  int tenth_ = 0;            ///< last one told of
-  std::size_t on_line_ = 0;  ///< characters of the line that stands on the terminal
+  int tenth_ = 0;            ///< last one reported
+  std::size_t on_line_ = 0;  ///< characters of the terminal's current line
 };
 
-/// While one is alive, the first Ctrl-C only sets a flag, which work in progress is to ask for; the second
-/// one kills. Guards nest: an inner one sees what an outer one was told.
+/// While a guard is alive, the first Ctrl-C sets a flag for the work to poll, and the second kills. Guards
+/// nest: an inner guard sees the flag of an outer one.
 class InterruptGuard {
  public:
   InterruptGuard();

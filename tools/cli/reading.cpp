@@ -13,10 +13,9 @@ namespace fieldmark::cli {
 using watermark::ReadingKind;
 
 void add_reading(CommandLine& app, std::string& reading) {
-  app.add_option(
-         "--detection", reading,
-         "blind: the extractor alone; informed: find the camera, subtract the owner's unmarked view;\n"
-         "auto: informed where the image agrees with the owner's field, else blind")
+  app.add_option("--detection", reading,
+                 "blind: extractor alone; informed: find the camera and subtract the unmarked render;\n"
+                 "auto: informed if the image agrees with the owner's field, else blind")
       ->one_of({"auto", "blind", "informed"})
       ->type_name("NAME");
 }
@@ -30,14 +29,14 @@ SuspectReader::SuspectReader(const watermark::Owner& owner, const std::string& r
   if (reading != "blind" && has_cells) informed_.emplace(owner);
 }
 
-ImageEvidence SuspectReader::read(const Tensor<float>& picture, const std::string& name) {
-  ImageEvidence out{.image = name, .cells = {}, .width = picture.shape[1], .height = picture.shape[0]};
+ImageEvidence SuspectReader::read(const Tensor<float>& image, const std::string& name) {
+  ImageEvidence out{.image = name, .cells = {}, .width = image.shape[1], .height = image.shape[0]};
   try {
     if (!informed_) {
-      out.cells = blind_.evidence(picture);
+      out.cells = blind_.evidence(image);
       return out;
     }
-    const watermark::ImageReading r = informed_->read(picture);
+    const watermark::ImageReading r = informed_->read(image);
     out.agreement = r.informed.agreement;
     out.reading = forced_ && !r.informed.evidence.empty() ? ReadingKind::informed : r.chosen;
     out.cells = out.reading == ReadingKind::informed ? r.informed.evidence : r.blind;
@@ -72,8 +71,8 @@ std::string reading_used(const std::vector<ImageEvidence>& images) {
 
 std::vector<double> total_evidence(const std::vector<ImageEvidence>& images) {
   std::vector<double> sum(images.front().cells.size(), 0.0);
-  for (const auto& picture : images)
-    for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += picture.cells[c];
+  for (const auto& image : images)
+    for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += image.cells[c];
   return sum;
 }
 

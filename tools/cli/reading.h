@@ -35,7 +35,7 @@ class SuspectReader {
   SuspectReader(const watermark::Owner& owner, const std::string& reading);
   /// @param name  of the image, for the result and for errors   @throws IoError if it is too small to be
   /// read
-  ImageEvidence read(const Tensor<float>& picture, const std::string& name);
+  ImageEvidence read(const Tensor<float>& image, const std::string& name);
 
  private:
   watermark::BlindReader blind_;

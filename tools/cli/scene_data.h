@@ -8,10 +8,10 @@ namespace fieldmark::cli {
 
 class Context;
 
-/// A file or folder below $FIELDMARK_DATA; empty where the variable is unset or has none of that name.
+/// The path of a file or folder in $FIELDMARK_DATA; empty if it or the variable does not exist.
 std::filesystem::path shared_data(const std::string& path);
 
-/// nerf::load_dataset(), and the notes of what it read.
+/// nerf::load_dataset(), with its notes passed to the context.
 nerf::Dataset load_scene(const std::string& folder, const nerf::DatasetOptions& options, Context& context);
 
 }  // namespace fieldmark::cli

@@ -10,8 +10,8 @@ struct ImagePair {
   Tensor<float> first, second;  ///< [H, W, 3]
 };
 
-/// For looking at a mark: a row for each view with the first image, the second, and grey plus `gain` times
-/// their difference, all rounded to 8 bits as saved images are.
+/// A contact sheet: one row per view with the first image, the second, and grey plus `gain` times their
+/// difference, rounded to 8 bits like saved images.
 /// @throws ShapeError if the images of a pair differ in shape   @throws ValueError if there is no pair
 Tensor<float> comparison_sheet(std::span<const ImagePair> pairs, float gain = 10);
 

@@ -9,8 +9,7 @@ namespace fieldmark::cli {
 /// Source: Wagner and Fischer 1974 (Levenshtein's distance).
 std::size_t edit_distance(std::string_view a, std::string_view b);
 
-/// The word among `known` that was probably meant, or "" if none is near: at most a third of its letters
-/// differ.
+/// The known word that differs least, or "" if more than a third of its letters differ.
 std::string nearest_word(std::string_view typed, const std::vector<std::string>& known);
 
 }  // namespace fieldmark::cli

@@ -3,9 +3,9 @@
 namespace fieldmark::cli {
 
 void add_supersampling(CommandLine& app, Index& rays) {
-  app.add_option("--supersampling", rays,
-                 "Rays along each side of a pixel, 1 to 8, whose mean it is: 2 takes four times as long "
-                 "(as trained)")
+  app.add_option(
+         "--supersampling", rays,
+         "Rays per side of a pixel to average, 1 to 8; 2 takes four times as long; default: as trained")
       ->range(1, 8)
       ->type_name("N")
       ->default_str("");

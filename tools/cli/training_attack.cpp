@@ -84,22 +84,23 @@ void train(const std::string& name, nerf::Trainer& trainer, const RunLength& len
 }  // namespace
 
 void add_training_attack(CommandLine& app, TrainingAttackOptions& o) {
-  app.add_option("--data", o.data, "For finetune: data set of clean photographs")->type_name("DIR");
-  app.add_option("--owner", o.owner, "For remove: whose extractor is known; nothing else of it is used")
+  app.add_option("--data", o.data, "Data set of clean images; for finetune")->type_name("DIR");
+  app.add_option("--owner", o.owner, "Owner file whose extractor the attacker holds; for remove")
       ->type_name("OWNER");
-  app.add_option("--mark-psnr", o.mark_psnr,
-                 "Of what remove changes in an image: PSNR on the object, dB, 10 to 60")
+  app.add_option(
+         "--mark-psnr", o.mark_psnr,
+         "PSNR of the changed against the unchanged renders on the foreground in dB, 10 to 60; for remove")
       ->range(10.0, 60.0)
       ->type_name("DB");
   app.add_option("--size", o.size,
-                 "Pixels of the longer side of what is trained on, 16 to 8192 (as it is, or as in training)")
+                 "Longer side of the training images in pixels, 16 to 8192; default: original size")
       ->range(16, 8192)
       ->type_name("N")
       ->default_str("");
-  app.add_option("--views", o.views, "Views that finetune-renders, remove and retrain train on, 4 to 10000")
+  app.add_option("--views", o.views, "Views to render, 4 to 10000; for finetune-renders, remove and retrain")
       ->range(4, 10000)
       ->type_name("N");
-  app.add_option("--lr", o.lr, "First step size of finetune, finetune-renders and remove, 1e-6 to 1")
+  app.add_option("--lr", o.lr, "Initial learning rate, 1e-6 to 1; for finetune, finetune-renders and remove")
       ->range(1e-6, 1.0)
       ->type_name("F");
   add_run_length(app, o.length, false);
@@ -112,8 +113,8 @@ bool is_training_attack(const std::string& name) {
 nerf::RadianceField run_training_attack(const std::string& name, const nerf::RadianceField& field,
                                         const TrainingAttackOptions& options, Context& context,
                                         Json& result) {
-  if (name == "finetune" && options.data.empty()) throw UsageError("--distort finetune: needs --data DIR");
-  if (name == "remove" && options.owner.empty()) throw UsageError("--distort remove: needs --owner OWNER");
+  if (name == "finetune" && options.data.empty()) throw UsageError("--attack finetune: needs --data DIR");
+  if (name == "remove" && options.owner.empty()) throw UsageError("--attack remove: needs --owner OWNER");
   nerf::RadianceField out = start(name, field, context);
   const nerf::Dataset data = data_of(name, field, options, context);
   nerf::TrainOptions train_options = nerf::train_options(field.options().field.kind);
