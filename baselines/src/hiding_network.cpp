@@ -1,8 +1,8 @@
 #include "hiding_network.h"
 #include <fieldmark/engine/ops/arithmetic.h>
-#include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/engine/ops/pool.h>
 #include <fieldmark/engine/ops/rows.h>
+#include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/engine/shape_checks.h>
 
 #include <algorithm>
@@ -75,7 +75,7 @@ Var<T> HiddenNetwork<T>::encode(const Params<T>& params, Var<T> images, Var<T> m
   Var<T> x = images;
   for (int k = 0; k < kEncoderBlocks; ++k) x = encoder_[static_cast<std::size_t>(k)](params, x, pass);
   const Var<T> sent = at_every_pixel(messages, images.shape()[1], images.shape()[2]);
-  const Var<T> joined = encoder_.back()(params, concat_columns<T>({sent, x, images}), pass);
+  const Var<T> joined = encoder_.back()(params, concatenate<T>({sent, x, images}), pass);
   return add(images, (*to_colour_)(params, joined));
 }
 

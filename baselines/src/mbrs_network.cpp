@@ -1,8 +1,8 @@
 #include "mbrs_network.h"
 #include <fieldmark/engine/ops/arithmetic.h>
-#include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/engine/ops/pool.h>
 #include <fieldmark/engine/ops/resample.h>
+#include <fieldmark/engine/ops/slice.h>
 
 #include <algorithm>
 #include <string>
@@ -59,8 +59,8 @@ Var<T> MbrsNetwork<T>::encode(const Params<T>& params, Var<T> images, Var<T> mes
   for (const auto& twice : doubling_) map = twice(params, map, pass);
   map = encoder_[1](params, map, pass);
   if (map.shape()[1] != h || map.shape()[2] != w) map = upsample_to(map, h, w);
-  const Var<T> both = blocks_[of_both](params, concat_columns<T>({shown, map}), pass);
-  return add(images, (*to_colour_)(params, concat_columns<T>({both, images})));
+  const Var<T> both = blocks_[of_both](params, concatenate<T>({shown, map}), pass);
+  return add(images, (*to_colour_)(params, concatenate<T>({both, images})));
 }
 
 template <class T>

@@ -1,9 +1,9 @@
 #include "message_field.h"
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/arithmetic.h>
-#include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/engine/ops/matmul.h>
 #include <fieldmark/engine/ops/rows.h>
+#include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/nerf/composite.h>
@@ -88,7 +88,7 @@ Var<float> MessageField::changed(const Params<float>& params, Var<float> z_0, Va
   float* knots = tape.scratch(kKnots);
   for (Index k = 0; k < kKnots; ++k)
     knots[k] = 2 * static_cast<float>(k) / static_cast<float>(kKnots - 1) - 1;
-  Var<float> g = concat_columns<float>({tape.constant(knots, {kKnots, 1}), broadcast_rows(message, kKnots)});
+  Var<float> g = concatenate<float>({tape.constant(knots, {kKnots, 1}), broadcast_rows(message, kKnots)});
   for (const auto& layer : density_) g = layer(params, g);
 
   const Index n = z_0.shape()[0];
@@ -172,13 +172,13 @@ Var<float> MessageField::pixels(Tape<float>& tape, const Params<float>& params,
   if (options_.place == MessagePlace::inputs) {
     const Var<float> bits = broadcast_rows(message, r.delta.shape()[0]);
     const Var<float> z =
-        density_[1](params, density_[0](params, concat_columns<float>({r.density_features, bits})));
-    log_density = columns(z, 0, 1);
-    rgb = concat_columns<float>({z, r.colour_features, r.direction, bits});
+        density_[1](params, density_[0](params, concatenate<float>({r.density_features, bits})));
+    log_density = slice(z, 0, 1);
+    rgb = concatenate<float>({z, r.colour_features, r.direction, bits});
     for (const auto& layer : colour_) rgb = layer(params, rgb);
     rgb = sigmoid(rgb);
   } else {
-    log_density = changed(params, columns(r.z, 0, 1), message);
+    log_density = changed(params, slice(r.z, 0, 1), message);
     rgb = net.colour(Params<float>(base.params, nullptr), r.z, r.colour_features, r.direction);
   }
   const Var<float> seen = nerf::composite<float>(net.density(log_density), rgb, r.delta, r.begin);

@@ -41,7 +41,7 @@ struct Taps {
   T fx, fy;
 };
 
-// Truncation is the floor for u > -1 up to one: no call, and no undefined cast, as u is known to be in range.
+// Truncation is the floor for u > -1, up to one: no call, and no undefined cast, since u is in range.
 template <class T>
 Index floor_of(T u) {
   const int k = static_cast<int>(u);
@@ -137,8 +137,8 @@ void backward_row(const Map<T>& map, const T* x, const T* background, const T* d
   }
 }
 
-// Rows a piece of about 16k numbers has.
-Index rows_per_piece(Index row) { return 1 + (Index{1} << 14) / std::max<Index>(row, 1); }
+// Rows of a chunk of about 16k elements.
+Index rows_per_chunk(Index row) { return 1 + (Index{1} << 14) / std::max<Index>(row, 1); }
 
 }  // namespace
 
@@ -148,8 +148,9 @@ Var<T> affine_warp(Var<T> x, Var<T> matrix, WarpOptions<std::type_identity_t<T>>
   check_parameter("affine_warp", "matrix", matrix.shape(), 6);
   const Index channels = x.shape()[2];
   if (!options.background.empty() && static_cast<Index>(options.background.size()) != channels)
-    throw ShapeError("[affine_warp] background: must have one number for each channel of x, whose shape is " +
-                     x.shape().str() + ", got " + std::to_string(options.background.size()));
+    throw ShapeError(
+        "[affine_warp] background: must have one element for each channel of x, whose shape is " +
+        x.shape().str() + ", got " + std::to_string(options.background.size()));
   const auto map = make_map(matrix.value(), x.shape()[0], x.shape()[1], options.height, options.width);
   Tape<T>& tape = x.tape();
   T* background = tape.scratch(channels);
@@ -157,7 +158,7 @@ Var<T> affine_warp(Var<T> x, Var<T> matrix, WarpOptions<std::type_identity_t<T>>
   std::copy(options.background.begin(), options.background.end(), background);
   T* y = nullptr;
   const Var<T> out = tape.output({map.out_height, map.out_width, channels}, &y, {x, matrix});
-  const Index grain = rows_per_piece(map.out_width * channels);
+  const Index grain = rows_per_chunk(map.out_width * channels);
   parallel_for(map.out_height, grain, [&](Index begin, Index end) {
     (channels == 3 ? forward_rows<3, T> : forward_rows<0, T>)(map, x.value(), background, channels, begin,
                                                               end, y);
@@ -192,21 +193,21 @@ Var<T> affine_warp(Var<T> x, Var<T> matrix, WarpOptions<std::type_identity_t<T>>
   return out;
 }
 
-template <class T>
-Tensor<std::int32_t> warp_labels(const Tensor<std::int32_t>& labels, std::span<const T> matrix,
+Tensor<std::int32_t> warp_labels(const Tensor<std::int32_t>& labels, std::span<const float> matrix,
                                  std::int32_t background, Index height, Index width) {
   check_rank("warp_labels", "labels", labels.shape, 2, "[height, width]");
   if (matrix.size() != 6)
-    throw ShapeError("[warp_labels] matrix: must have 6 numbers, got " + std::to_string(matrix.size()));
+    throw ShapeError("[warp_labels] matrix: must have 6 elements, got " + std::to_string(matrix.size()));
   const auto map = make_map(matrix.data(), labels.shape[0], labels.shape[1], height, width);
   Tensor<std::int32_t> out({map.out_height, map.out_width}, background);
-  parallel_for(map.out_height, rows_per_piece(map.out_width), [&](Index begin, Index end) {
+  parallel_for(map.out_height, rows_per_chunk(map.out_width), [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       // Half a pixel on: the nearest pixel is the floor.
-      const T u0 = map.row_x(i) + T(0.5), v0 = map.row_y(i) + T(0.5);
+      const float u0 = map.row_x(i) + 0.5f, v0 = map.row_y(i) + 0.5f;
       for (Index j = 0; j < map.out_width; ++j) {
-        const T u = u0 + map.m[0] * map.column_offset(j), v = v0 + map.m[3] * map.column_offset(j);
-        if (!(u >= 0 && u < static_cast<T>(map.width) && v >= 0 && v < static_cast<T>(map.height))) continue;
+        const float u = u0 + map.m[0] * map.column_offset(j), v = v0 + map.m[3] * map.column_offset(j);
+        if (!(u >= 0 && u < static_cast<float>(map.width) && v >= 0 && v < static_cast<float>(map.height)))
+          continue;
         out[i * map.out_width + j] = labels[floor_of(v) * map.width + floor_of(u)];
       }
     }
@@ -216,9 +217,5 @@ Tensor<std::int32_t> warp_labels(const Tensor<std::int32_t>& labels, std::span<c
 
 template Var<float> affine_warp(Var<float>, Var<float>, WarpOptions<float>);
 template Var<double> affine_warp(Var<double>, Var<double>, WarpOptions<double>);
-template Tensor<std::int32_t> warp_labels(const Tensor<std::int32_t>&, std::span<const float>, std::int32_t,
-                                          Index, Index);
-template Tensor<std::int32_t> warp_labels(const Tensor<std::int32_t>&, std::span<const double>, std::int32_t,
-                                          Index, Index);
 
 }  // namespace fieldmark::distort

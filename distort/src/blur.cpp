@@ -11,13 +11,14 @@
 namespace fieldmark::distort {
 namespace {
 
-// An image with `r` columns of room on both sides for its horizontal taps: rows of `pitch` numbers, pixels
-// from `pad`.
+// An image with `r` columns of padding on both sides for its horizontal taps: rows of `pitch` elements,
+// pixels from `pad`.
 template <class T>
 struct Filter {
   Index height, width, channels, r;
-  const T *g, *dg;       // [2 r + 1] weights and their derivatives in sigma
-  const T* tail;         // [r] sum of the weights beyond i: what falls off the edge at distance i from it
+  const T *g, *dg;  // [2 r + 1] weights and their derivatives in sigma
+  const T*
+      tail;  // [r] sum of the weights beyond i: of the taps outside the image at distance i from its edge
   const Index* rows;     // [height + 2 r] where row i - r of the edge-extended image begins
   const Index* columns;  // [2 r + 1] k * channels
 
@@ -80,7 +81,7 @@ void vertical_row(const Filter<T>& f, const T* g, const T* x, Index i, T* out) {
   }
 }
 
-// d(half) of row i from dy: the taps' transpose, where what fell off an edge returns to the edge pixel.
+// d(half) of row i from dy: the transpose of the taps; those outside the image go to the edge pixel.
 // `zeros` is a row of the padded pitch.
 template <class T>
 void horizontal_backward_row(const Filter<T>& f, const T* dy, T* zeros, T* dhalf) {
@@ -145,13 +146,13 @@ Var<T> blur(Var<T> x, Var<T> sigma) {
     const bool with_sigma = sigma.needs_grad();
     parallel_for(f.height, f.grain(), [&](Index begin, Index end) {
       for (Index i = begin; i < end; ++i) {
-        T* room = spare + i * f.pitch();
-        horizontal_backward_row(f, dy + i * row, room, dhalf + i * row);
+        T* buffer = spare + i * f.pitch();
+        horizontal_backward_row(f, dy + i * row, buffer, dhalf + i * row);
         if (!with_sigma) continue;
-        kernels::weighted_taps(room, half + i * f.pitch(), f.columns, f.dg, f.taps(), row, false);
-        shares[i] = dot(dy + i * row, room, row);
-        kernels::weighted_taps(room, x.value(), f.rows + i, f.dg, f.taps(), row, false);
-        shares[i] += dot(dhalf + i * row, room, row);
+        kernels::weighted_taps(buffer, half + i * f.pitch(), f.columns, f.dg, f.taps(), row, false);
+        shares[i] = dot(dy + i * row, buffer, row);
+        kernels::weighted_taps(buffer, x.value(), f.rows + i, f.dg, f.taps(), row, false);
+        shares[i] += dot(dhalf + i * row, buffer, row);
       }
     });
     bool fresh = false;

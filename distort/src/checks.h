@@ -12,11 +12,18 @@ inline void check_image(std::string_view op, const Shape& x) {
   check_rank(op, "x", x, 3, "[height, width, channels]");
 }
 
-// A distortion's parameter is a tensor of `count` numbers, so that gradients reach it.
+// A distortion's parameter is a tensor of `count` elements, so that gradients reach it.
 inline void check_parameter(std::string_view op, std::string_view name, const Shape& got, Index count) {
   const std::string layout = "[" + std::to_string(count) + "]";
   check_rank(op, name, got, 1, layout);
   check_extent(op, name, got, 0, count, "its layout is " + layout);
+}
+
+inline void check_colours(const std::string& op, const Shape& image) {
+  check_rank(op, "image", image, 3, "[height, width, 3]");
+  check_extent(op, "image", image, 2, 3, "red, green and blue");
+  if (image.size() == 0)
+    throw ShapeError("[" + op + "] image: must have at least one pixel, got shape " + image.str());
 }
 
 // "[op] arg: must be in 0 to 1 (why), got 2". NaN fails.

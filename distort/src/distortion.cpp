@@ -112,7 +112,7 @@ struct Crop {
 Crop crop_window(const Shape& shape, double fraction, const Draws& draws) {
   const Index h = shape[0], w = shape[1];
   const Index height = scaled(h, std::sqrt(fraction));
-  // The width makes up for the height's rounding: the area is what was asked for.
+  // The width makes up for the rounding of the height, so that the area is exact.
   const Index width = std::min(w, scaled(w, fraction * static_cast<double>(h) / static_cast<double>(height)));
   return {draws.rng.below(h - height + 1, draws.index, draws.at(0)),
           draws.rng.below(w - width + 1, draws.index, draws.at(1)), height, width};
@@ -165,7 +165,7 @@ Tensor<float> scale(const Tensor<float>& x, double factor, ResizeFilter filter) 
   return resize_filtered(x, scaled(x.shape[0], factor), scaled(x.shape[1], factor), filter);
 }
 
-// Runs one of this module's ops on an image; what the tape holds goes with it.
+// Runs an op of this room on an image.
 template <class F>
 Tensor<float> run(const Tensor<float>& x, const F& op) {
   Tape<float> tape;
@@ -221,7 +221,7 @@ Tensor<float> apply(const Distortion::Step& step, const Tensor<float>& x, const 
   return x;
 }
 
-// What one step does to places. Steps that keep the size and move nothing have the identity.
+// The source positions of one step; the identity for steps that move no pixel.
 PixelMap moved(const Distortion::Step& step, const Shape& before, const Shape& after, const Draws& draws) {
   const double sy = static_cast<double>(before[0]) / static_cast<double>(after[0]),
                sx = static_cast<double>(before[1]) / static_cast<double>(after[1]);
@@ -286,12 +286,9 @@ Distortion parse_distortion(std::string_view name) {
 Tensor<float> apply_distortion(const Distortion& distortion, const Tensor<float>& image,
                                const CounterRng& rng, std::uint64_t index, std::span<const float> background,
                                PixelMap* source) {
-  check_rank("distortion", "image", image.shape, 3, "[height, width, 3]");
-  check_extent("distortion", "image", image.shape, 2, 3, "red, green and blue");
-  if (image.size() == 0)
-    throw ShapeError("[distortion] image: must have at least one pixel, got shape " + image.shape.str());
+  check_colours("distortion", image.shape);
   if (background.size() != 3)
-    throw ShapeError("[distortion] background: must have 3 numbers, got " +
+    throw ShapeError("[distortion] background: must have 3 elements, got " +
                      std::to_string(background.size()));
   const auto round = [](const Tensor<float>& x) {
     return run(x, [](auto v, auto&) { return quantize8(v); });

@@ -41,10 +41,7 @@ void to_colour(double y, double cb, double cr, float* rgb) {
 }  // namespace
 
 Tensor<float> jpeg444(const Tensor<float>& image, int quality) {
-  check_rank("jpeg444", "image", image.shape, 3, "[height, width, 3]");
-  check_extent("jpeg444", "image", image.shape, 2, 3, "red, green and blue");
-  if (image.size() == 0)
-    throw ShapeError("[jpeg444] image: must have at least one pixel, got shape " + image.shape.str());
+  check_colours("jpeg444", image.shape);
   check_range("jpeg444", "quality", quality, 1, 100, "as libjpeg counts");
   const Index h = image.shape[0], w = image.shape[1];
   const JpegBlock luma = jpeg_steps(JpegComponent::luma, quality),

@@ -19,8 +19,8 @@ Var<T> noise(Var<T> x, Var<T> mu, Var<T> sigma, std::span<const std::type_identi
   check_parameter("noise", "sigma", sigma.shape(), 1);
   check_range("noise", "sigma", static_cast<double>(sigma.value()[0]), 0, 1e6, "a standard deviation");
   if (static_cast<Index>(normal.size()) != n)
-    throw ShapeError("[noise] normal: must have one number for each of x, whose shape is " + x.shape().str() +
-                     ", got " + std::to_string(normal.size()));
+    throw ShapeError("[noise] normal: must have one element for each of x, whose shape is " +
+                     x.shape().str() + ", got " + std::to_string(normal.size()));
   T* y = nullptr;
   const Var<T> out = x.tape().output(x.shape(), &y, {x, mu, sigma});
   const T* z = normal.data();
@@ -28,7 +28,7 @@ Var<T> noise(Var<T> x, Var<T> mu, Var<T> sigma, std::span<const std::type_identi
   parallel_for(n, kGrain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) y[i] = x.value()[i] + (m + s * z[i]);
   });
-  // dx = dy, dmu = sum dy, dsigma = sum dy z. Pieces own dx; the two sums run in order, in double.
+  // dx = dy, dmu = sum dy, dsigma = sum dy z. Chunks own dx; the two sums run in order, in double.
   x.tape().on_backward(out, [x, mu, sigma, z, n](const T* dy) {
     bool fresh = false;
     if (T* dx = x.grad_acc(&fresh)) {

@@ -6,7 +6,6 @@
 #include "fieldmark/distort/affine_warp.h"
 #include "fieldmark/distort/blur.h"
 #include "fieldmark/distort/distortion.h"
-#include "fieldmark/distort/rescale.h"
 #include "fieldmark/distort/resize_area.h"
 #include "fieldmark/distort/rotate.h"
 
@@ -52,14 +51,13 @@ template <class T>
 void compare_identities(WorstError& error) {
   for (const Shape s : {Shape{1, 1, 3}, Shape{5, 8, 3}, Shape{40, 31, 1}}) {
     const auto x = scattered<T>(s, 0, 1, 1);
-    expect_bits(result([](auto v, auto a) { return rescale(v, a); }, x, 1), x, error);
     expect_bits(result([&](auto v, auto) { return resize_area(v, s[0], s[1]); }, x, 0), x, error);
     for (const double sigma : {0.0, 1e-30, 1e-6, 1e-2})
       expect_bits(result([](auto v, auto a) { return blur(v, a); }, x, sigma), x, error);
   }
 }
 
-// Attacks that ask for nothing, on an image of 8 bits.
+// Distortions of no effect, on an image of 8 bits.
 void compare_distortions(WorstError& error) {
   auto x = scattered<float>({24, 31, 3}, 0, 255, 1);
   for (float& v : x.data) v = std::round(v) / 255;
@@ -113,9 +111,9 @@ std::vector<NumericsCase> numerics_cases() {
   std::vector<NumericsCase> all;
   add_numerics(all, "rotate: 0, +-90 and +-180 degrees permute pixels", "bits", 0, 0,
                [](auto t, WorstError& e) { compare_rotations<decltype(t)>(e); });
-  add_numerics(all, "rescale, resize_area, blur: scale 1 and sigma to 0 change nothing", "bits", 0, 0,
+  add_numerics(all, "resize_area, blur: the same size and sigma to 0 change nothing", "bits", 0, 0,
                [](auto t, WorstError& e) { compare_identities<decltype(t)>(e); });
-  all.push_back({"distortion: crop of the whole image, and all that ask for nothing", "float", "bits", 0, [] {
+  all.push_back({"distortion: crop of the whole image, and all without effect", "float", "bits", 0, [] {
                    WorstError e;
                    compare_distortions(e);
                    return e;

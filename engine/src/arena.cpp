@@ -35,10 +35,6 @@ void* Arena::allocate(std::size_t bytes) {
   return p;
 }
 
-void Arena::reserve(std::size_t bytes) {
-  if (blocks_.empty() || blocks_.back().size < bytes) grow(bytes);
-}
-
 std::size_t Arena::reserved() const {
   std::size_t n = 0;
   for (const auto& b : blocks_) n += b.size;

@@ -1,12 +1,189 @@
 #include <fieldmark/engine/gradcheck_cases.h>
+#include <fieldmark/engine/nn/batch_norm.h>
+#include <fieldmark/engine/nn/conv2d.h>
+#include <fieldmark/engine/nn/dense.h>
+#include <fieldmark/engine/nn/group_norm.h>
+#include <fieldmark/engine/ops/activation.h>
+#include <fieldmark/engine/ops/arithmetic.h>
+#include <fieldmark/engine/ops/feature_distance.h>
+#include <fieldmark/engine/ops/loss.h>
+#include <fieldmark/engine/ops/matmul.h>
+#include <fieldmark/engine/ops/pool.h>
+#include <fieldmark/engine/ops/reduce.h>
+#include <fieldmark/engine/ops/resample.h>
+#include <fieldmark/engine/ops/rows.h>
+#include <fieldmark/engine/ops/slice.h>
+#include <fieldmark/engine/ops/softmax.h>
 
-#include "gradcheck_cases_parts.h"
+#include <array>
+#include <cmath>
+#include <utility>
 
 namespace fieldmark {
+namespace {
+
+using D = Tape<double>;
+using Vars = std::span<const Var<double>>;
+using Cases = std::vector<GradcheckCase>;
+
+constexpr std::array<std::int32_t, 4> kRows{2, 0, 2, 1};
+constexpr std::array<std::int32_t, 4> kLabels{2, -1, 0, 1};
+constexpr std::array<double, 12> kWeights{1, 0, 0.5, 2, 0.1, 1, 3, 0, 0.2, 0.7, 1, 1};
+constexpr std::array<double, 12> kTargets{1, 0, 0.5, 0.9, 0.1, 1, 0, 0, 0.2, 0.7, 1, 0};
+constexpr std::array<double, 5> kLin{0.3, 1.1, 0.7, 1.9, 0.2};
+constexpr std::array<double, 4> kMean{0.2, -0.1, 0.4, 0}, kVariance{1, 0.3, 0.5, 2};
+
+// Pseudorandom values in [-1.6, 1.6], none within 0.1 of 0, the kink of ReLU.
+Tensor<double> off_zero(Shape shape, double phase = 0) {
+  Tensor<double> t(shape);
+  for (Index i = 0; i < t.size(); ++i) {
+    const double s = std::sin(1 + phase + 2.7 * static_cast<double>(i));
+    t[i] = s < 0 ? 1.5 * s - 0.1 : 1.5 * s + 0.1;
+  }
+  return t;
+}
+
+// All different, at least 0.1 apart: differences must not change the largest of a window.
+Tensor<double> apart(Shape shape) {
+  Tensor<double> t(shape);
+  for (Index i = 0; i < t.size(); ++i) t[i] = 0.1 * static_cast<double>(i * 37 % 101);
+  return t;
+}
+
+GradcheckCase make(const char* name, GradcheckFn f, std::vector<Tensor<double>> inputs) {
+  return {name, [f = std::move(f), inputs = std::move(inputs)] { return gradcheck(f, inputs); }};
+}
+
+// Pseudorandom values in (-1, 1).
+Tensor<double> mixed(Shape shape, double phase) {
+  Tensor<double> t(shape);
+  for (Index i = 0; i < t.size(); ++i) t[i] = std::sin(phase + 1.7 * static_cast<double>(i * i + i));
+  return t;
+}
+
+// Biases that hold every ReLU well open or well shut: differences must not step over its kink.
+Tensor<double> biases(Index n) {
+  Tensor<double> b = mixed({n}, 3);
+  for (Index i = 0; i < n; ++i) b[i] += i % 2 == 0 ? 100 : -100;
+  return b;
+}
+
+// A module with its parameters; `build` makes the module in a store.
+template <class Build>
+GradcheckCase make_module(const char* name, const Tensor<double>& input, Build build) {
+  return {name, [=] {
+            ParamStore<double> store;
+            const auto module = build(store);
+            return gradcheck_module([&](D&, const Params<double>& p, Vars v) { return module(p, v[0]); },
+                                    store, std::span(&input, 1));
+          }};
+}
+
+Cases elementwise() {
+  const auto x = off_zero({3, 4}), y = off_zero({3, 4}, 0.5);
+  return {make("arithmetic: add", [](D&, Vars v) { return add(v[0], v[1]); }, {x, y}),
+          make("arithmetic: sub", [](D&, Vars v) { return sub(v[0], v[1]); }, {x, y}),
+          make("arithmetic: mul", [](D&, Vars v) { return mul(v[0], v[1]); }, {x, y}),
+          make("arithmetic: scale", [](D&, Vars v) { return scale(v[0], -2.5); }, {x}),
+          make("activation: relu", [](D&, Vars v) { return relu(v[0]); }, {x}),
+          make("activation: sigmoid", [](D&, Vars v) { return sigmoid(v[0]); }, {x}),
+          make("activation: tanh", [](D&, Vars v) { return tanh(v[0]); }, {x}),
+          make("activation: exp", [](D&, Vars v) { return exp(v[0]); }, {x}),
+          make("activation: truncated_exp", [](D&, Vars v) { return truncated_exp(v[0]); }, {x}),
+          make("activation: softplus", [](D&, Vars v) { return softplus(v[0]); }, {x})};
+}
+
+Cases layout() {
+  const auto x = off_zero({3, 4}), y = off_zero({3, 2}, 0.5), image = off_zero({2, 4, 6, 2});
+  return {
+      make("slice: concatenate",
+           [](D&, Vars v) {
+             return concatenate({v[0], v[1], v[0]});
+           },
+           {x, y}),
+      make("slice: slice", [](D&, Vars v) { return slice(v[0], 1, 2); }, {x}),
+      make("rows: broadcast_rows", [](D&, Vars v) { return broadcast_rows(v[0], 5); }, {off_zero({1, 4})}),
+      make("rows: gather_rows", [](D&, Vars v) { return gather_rows(v[0], kRows); }, {x}),
+      make("pool: avg_pool", [](D&, Vars v) { return avg_pool(v[0], 2); }, {off_zero({2, 3, 5, 2})}),
+      make("pool: max_pool",
+           [](D&, Vars v) { return max_pool(v[0], {.size = 3, .stride = 2, .ceil_mode = true}); },
+           {apart({2, 4, 6, 2})}),
+      make("pool: global_avg_pool", [](D&, Vars v) { return global_avg_pool(v[0]); }, {image}),
+      make("resample: upsample_nearest", [](D&, Vars v) { return upsample_nearest(v[0], 2); }, {image}),
+      make("resample: upsample_to", [](D&, Vars v) { return upsample_to(v[0], 7, 5); }, {image}),
+      make("resample: space_to_depth", [](D&, Vars v) { return space_to_depth(v[0]); }, {image})};
+}
+
+Cases losses() {
+  // Differences of 0.15 to 0.37 and of -0.88 to -0.68: either side of huber's delta of 0.5.
+  const auto x = off_zero({3, 4}), logits = off_zero({4, 3});
+  auto y = x;
+  for (Index i = 0; i < y.size(); ++i) y[i] += (i % 2 == 0 ? 0.15 : -0.9) + 0.02 * static_cast<double>(i);
+  return {
+      make("reduce: sum", [](D&, Vars v) { return sum(v[0]); }, {x}),
+      make("reduce: mean", [](D&, Vars v) { return mean(v[0]); }, {x}),
+      make("reduce: weighted_mean", [](D&, Vars v) { return weighted_mean<double>(v[0], kWeights); }, {x}),
+      make("loss: mse_loss", [](D&, Vars v) { return mse_loss<double>(v[0], v[1], kWeights); }, {x, y}),
+      make("loss: huber_loss", [](D&, Vars v) { return huber_loss<double>(v[0], v[1], 0.5, kWeights); },
+           {x, y}),
+      make("loss: bce_with_logits",
+           [](D&, Vars v) { return bce_with_logits<double>(v[0], kTargets, kWeights); }, {x}),
+      make("softmax: softmax", [](D&, Vars v) { return softmax(v[0]); }, {logits}),
+      make("softmax: softmax_cross_entropy", [](D&, Vars v) { return softmax_cross_entropy(v[0], kLabels); },
+           {logits})};
+}
+
+Cases norms() {
+  const auto x = off_zero({2, 2, 3, 4}), gamma = off_zero({4}, 1), beta = off_zero({4}, 2);
+  return {
+      make("group_norm: x, gamma, beta",
+           [](D&, Vars v) { return group_norm(v[0], v[1], v[2], {.groups = 2}); }, {x, gamma, beta}),
+      make("batch_norm: x, gamma, beta", [](D&, Vars v) { return batch_norm(v[0], v[1], v[2]); },
+           {x, gamma, beta}),
+      make("batch_norm: fixed statistics",
+           [](D&, Vars v) { return batch_norm_fixed<double>(v[0], v[1], v[2], kMean, kVariance); },
+           {x, gamma, beta}),
+      make_module("group_norm: module", x,
+                  [](auto& store) { return GroupNorm<double>(store, "norm", 4, {.groups = 2}); }),
+      make_module("batch_norm: module", x, [](auto& store) { return BatchNorm<double>(store, "norm", 4); })};
+}
+
+Cases products() {
+  const auto product = [](Activation activation) {
+    return [=](D&, Vars v) { return dense(v[0], v[1], v[2], activation); };
+  };
+  const auto convolution = [](Activation activation) {
+    return [=](D&, Vars v) { return conv2d(v[0], v[1], v[2], activation); };
+  };
+  const auto rows = mixed({4, 3}, 1), matrix = mixed({3, 5}, 2), image = mixed({2, 3, 4, 2}, 1),
+             window = mixed({3, 3, 2, 3}, 2);
+  auto a = mixed({2, 3, 2, 5}, 1), b = mixed({2, 3, 2, 5}, 2);
+  for (Tensor<double>* t : {&a, &b})
+    for (double& v : t->data) v = 0.55 + 0.45 * v;
+  return {
+      make("matmul", [](D&, Vars v) { return matmul(v[0], v[1]); }, {mixed({3, 5}, 1), mixed({5, 4}, 2)}),
+      make("feature_distance", [](D&, Vars v) { return feature_distance<double>(v[0], v[1], kLin); }, {a, b}),
+      make("dense", product(Activation::none), {rows, matrix, mixed({5}, 3)}),
+      make("dense with relu", product(Activation::relu), {rows, matrix, biases(5)}),
+      make_module("dense layer", mixed({5, 3}, 1),
+                  [](auto& store) { return Dense<double>(store, "layer", {.in = 3, .out = 4}, 5); }),
+      make("conv2d", convolution(Activation::none), {image, window, mixed({3}, 3)}),
+      make("conv2d with relu", convolution(Activation::relu), {image, window, biases(3)}),
+      make("conv2d with relu by Winograd", convolution(Activation::relu),
+           {mixed({2, 5, 7, 8}, 1), mixed({3, 3, 8, 16}, 2), biases(16)}),
+      make("conv2d with stride and padding",
+           [](D&, Vars v) { return conv2d(v[0], v[1], v[2], {.stride = 3, .padding = 2}); },
+           {mixed({2, 5, 7, 2}, 1), mixed({4, 4, 2, 3}, 2), mixed({3}, 3)}),
+      make_module("conv2d layer", mixed({1, 3, 4, 2}, 1),
+                  [](auto& store) { return Conv2d<double>(store, "layer", {.in = 2, .out = 3}, 5); })};
+}
+
+}  // namespace
 
 std::vector<GradcheckCase> gradcheck_cases() {
-  std::vector<GradcheckCase> all = gradcheck_cases_elementwise();
-  for (GradcheckCase& c : gradcheck_cases_linear()) all.push_back(std::move(c));
+  Cases all = elementwise();
+  for (const auto& part : {layout(), losses(), norms(), products()})
+    all.insert(all.end(), part.begin(), part.end());
   return all;
 }
 

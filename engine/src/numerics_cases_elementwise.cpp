@@ -11,9 +11,9 @@ namespace {
 
 using Real = long double;
 
-// From lo to hi, densely, and the same numbers near 0.
+// Dense in [lo, hi], and denser near 0.
 template <class T>
-Tensor<T> sweep(double lo, double hi) {
+Tensor<T> points(double lo, double hi) {
   Tensor<T> x(Shape{20001});
   for (Index i = 0; i < x.size(); ++i) {
     const double u = lo + (hi - lo) * static_cast<double>(i) / 20000;
@@ -22,63 +22,51 @@ Tensor<T> sweep(double lo, double hi) {
   return x;
 }
 
-// An activation against its definition y = f(x), and its slope against f'(x), each relative to itself or to
-// the scale that is given, if that is larger.
-struct Definition {
+Real exp_of(Real x) { return std::exp(x); }
+Real density(Real x) { return std::exp(std::min<Real>(x, 15)); }
+Real logistic(Real x) { return 1 / (1 + std::exp(-x)); }
+Real logistic_slope(Real x) { return logistic(x) * logistic(-x); }
+Real tanh_of(Real x) { return std::tanh(x); }
+Real tanh_slope(Real x) { return 1 / (std::cosh(x) * std::cosh(x)); }
+Real softplus_of(Real x) { return x > 60 ? x : std::log1p(std::exp(x)); }
+
+// An activation y = f(x) on [lo, hi], where float has normal results, against its definition and slope.
+// Errors are relative to the magnitude, that of the slope to slope_scale if that is larger.
+struct Sweep {
+  double lo, hi;
   Real (*value)(Real), (*slope)(Real);
   Real slope_scale;
 };
 
-template <class T, class F>
-void compare_activation(const Tensor<T>& x, const F& op, const Definition& exact, WorstError& error) {
-  const auto got = values_and_gradients<T>([&](auto&, const auto& v) { return op(v[0]); }, {x}, ones<T>);
-  for (std::size_t i = 0; i < x.data.size(); ++i) {
-    const Real at = x.data[i], y = exact.value(at), slope = exact.slope(at);
-    error.compare(got[0][i], y, size_of<T>(y));
-    error.compare(got[1][i], slope, std::max(size_of<T>(slope), exact.slope_scale));
-  }
+template <class F>
+void add_sweep(std::vector<NumericsCase>& cases, const std::string& name, const std::string& relative_to,
+               double float_limit, double double_limit, const Sweep& sweep, F op) {
+  add_numerics(cases, name, relative_to, float_limit, double_limit, [=](auto t, WorstError& error) {
+    using T = decltype(t);
+    const auto x = points<T>(sweep.lo, sweep.hi);
+    const auto got = values_and_gradients<T>([&](auto&, const auto& v) { return op(v[0]); }, {x}, ones<T>);
+    for (std::size_t i = 0; i < x.data.size(); ++i) {
+      const Real at = x.data[i], y = sweep.value(at), slope = sweep.slope(at);
+      error.compare(got[0][i], y, size_of<T>(y));
+      error.compare(got[1][i], slope, std::max(size_of<T>(slope), sweep.slope_scale));
+    }
+  });
 }
 
-Real logistic(Real x) { return 1 / (1 + std::exp(-x)); }
-constexpr Real kNone = 0;
-
-// Over the range in which float has normal results.
 void add_sweeps(std::vector<NumericsCase>& cases) {
-  const Definition exp_of{[](Real x) { return std::exp(x); }, [](Real x) { return std::exp(x); }, kNone};
-  add_numerics(cases, "activation: exp from -87.3 to 88", "value, slope", 3e-7, 3e-16,
-               [=](auto t, WorstError& e) {
-                 compare_activation(
-                     sweep<decltype(t)>(-87.3, 88), [](auto v) { return exp(v); }, exp_of, e);
-               });
-  const Definition density{[](Real x) { return std::exp(std::min<Real>(x, 15)); },
-                           [](Real x) { return std::exp(std::min<Real>(x, 15)); }, kNone};
-  add_numerics(cases, "activation: truncated_exp from -87.3 to 100", "value, slope", 3e-7, 3e-16,
-               [=](auto t, WorstError& e) {
-                 compare_activation(
-                     sweep<decltype(t)>(-87.3, 100), [](auto v) { return truncated_exp(v); }, density, e);
-               });
-  const Definition sigmoid_of{logistic, [](Real x) { return logistic(x) * logistic(-x); }, 0.25L};
-  add_numerics(cases, "activation: sigmoid from -87.3 to 100", "value, largest slope", 4e-7, 1e-15,
-               [=](auto t, WorstError& e) {
-                 compare_activation(
-                     sweep<decltype(t)>(-87.3, 100), [](auto v) { return sigmoid(v); }, sigmoid_of, e);
-               });
-  const Definition tanh_of{[](Real x) { return std::tanh(x); },
-                           [](Real x) { return 1 / (std::cosh(x) * std::cosh(x)); }, 1};
-  add_numerics(cases, "activation: tanh from -30 to 30", "value, largest slope", 4e-7, 4e-16,
-               [=](auto t, WorstError& e) {
-                 compare_activation(
-                     sweep<decltype(t)>(-30, 30), [](auto v) { return tanh(v); }, tanh_of, e);
-               });
-  const Definition softplus_of{[](Real x) { return x > 60 ? x : std::log1p(std::exp(x)); }, logistic, kNone};
-  add_numerics(cases, "activation: softplus from -87.3 to 100", "value, slope", 4e-7, 4e-16,
-               [=](auto t, WorstError& e) {
-                 compare_activation(
-                     sweep<decltype(t)>(-87.3, 100), [](auto v) { return softplus(v); }, softplus_of, e);
-               });
+  add_sweep(cases, "activation: exp from -87.3 to 88", "value, slope", 3e-7, 3e-16,
+            {-87.3, 88, exp_of, exp_of, 0}, [](auto v) { return exp(v); });
+  add_sweep(cases, "activation: truncated_exp from -87.3 to 100", "value, slope", 3e-7, 3e-16,
+            {-87.3, 100, density, density, 0}, [](auto v) { return truncated_exp(v); });
+  add_sweep(cases, "activation: sigmoid from -87.3 to 100", "value, largest slope", 4e-7, 1e-15,
+            {-87.3, 100, logistic, logistic_slope, 0.25L}, [](auto v) { return sigmoid(v); });
+  add_sweep(cases, "activation: tanh from -30 to 30", "value, largest slope", 4e-7, 4e-16,
+            {-30, 30, tanh_of, tanh_slope, 1}, [](auto v) { return tanh(v); });
+  add_sweep(cases, "activation: softplus from -87.3 to 100", "value, slope", 4e-7, 4e-16,
+            {-87.3, 100, softplus_of, logistic, 0}, [](auto v) { return softplus(v); });
 }
 
-// At the ends of the numbers each has the value that its header states.
+// At the limits of T each has the value that its header states.
 template <class T>
 void compare_limits(WorstError& error) {
   using Limits = std::numeric_limits<T>;
@@ -104,7 +92,7 @@ void compare_limits(WorstError& error) {
   check([](auto v) { return relu(v); }, {0, 0, 0, tiny, top, inf});
 }
 
-// Logits one by one: a mean would hide the small losses behind the large ones.
+// One logit at a time: a mean would hide small losses behind large ones.
 template <class T>
 void compare_bce(T target, bool relative, WorstError& error) {
   for (const double x :
@@ -121,7 +109,7 @@ void compare_bce(T target, bool relative, WorstError& error) {
   }
 }
 
-// The label is as certain as the difference of the logits says; the others share what is left.
+// One certain label; the other three share the remaining probability.
 template <class T>
 void compare_entropy(WorstError& error) {
   for (const double sure : {-1e4, -85.0, -20.0, 0.0, 1.0, 10.0, 16.0, 20.0, 40.0, 85.0, 1e4}) {
@@ -149,7 +137,7 @@ void compare_entropy(WorstError& error) {
 
 void add_elementwise_numerics(std::vector<NumericsCase>& cases) {
   add_sweeps(cases);
-  add_numerics(cases, "activation: infinities, largest and least numbers, NaN", "value", 3e-7, 3e-16,
+  add_numerics(cases, "activation: infinities, largest and least values, NaN", "value", 3e-7, 3e-16,
                [](auto t, WorstError& e) { compare_limits<decltype(t)>(e); });
   add_numerics(cases, "loss: bce_with_logits to +-1e4, certain targets", "value, slope", 2e-7, 3e-16,
                [](auto t, WorstError& e) {

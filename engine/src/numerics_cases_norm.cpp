@@ -13,7 +13,7 @@ constexpr Real kEps = 1e-5L;  // the options' default
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-// y and its gradients for the cotangent g, where set_of(i) says with which numbers x_i is normalised.
+// y and its gradients for the cotangent g; x_i is normalised over the set set_of(i).
 struct Exact {
   std::vector<Real> y, dx, dgamma, dbeta;
 };
@@ -51,7 +51,7 @@ std::vector<Tensor<T>> inputs(Shape s, double centre, double spread) {
           scattered<T>({s[3]}, -0.5, 0.5, 3)};
 }
 
-// Every number relative to the largest of its kind.
+// Errors relative to the largest magnitude of the tensor.
 template <class T>
 void compare_all(const std::vector<std::vector<T>>& got, const Exact& want, WorstError& error) {
   const std::vector<Real>* kinds[] = {&want.y, &want.dx, &want.dgamma, &want.dbeta};
@@ -63,47 +63,48 @@ void compare_all(const std::vector<std::vector<T>>& got, const Exact& want, Wors
 }
 
 constexpr Index kGroups = 2;
+const auto kGroupNorm = [](auto&, const auto& v) {
+  return group_norm(v[0], v[1], v[2], {.groups = kGroups});
+};
+const auto kBatchNorm = [](auto&, const auto& v) { return batch_norm(v[0], v[1], v[2]); };
+
+template <class T, class Op, class Set>
+void compare_norm(const std::vector<Tensor<T>>& in, const Op& op, Index sets, Set set_of, WorstError& error) {
+  const auto g = scattered<T>(in[0].shape, -1, 1, 4);
+  const auto got = values_and_gradients<T>(op, in, [&](Shape) -> const Tensor<T>& { return g; });
+  compare_all(got, exact_norm<T>(in, g, sets, set_of), error);
+}
 
 template <class T>
 void compare_group_norm(const std::vector<Tensor<T>>& in, WorstError& error) {
   const Shape s = in[0].shape;
-  const auto g = scattered<T>(s, -1, 1, 4);
-  const auto got = values_and_gradients<T>(
-      [](auto&, const auto& v) { return group_norm(v[0], v[1], v[2], {.groups = kGroups}); }, in,
-      [&](Shape) -> const Tensor<T>& { return g; });
   const Index image = s[1] * s[2] * s[3], width = s[3] / kGroups;
-  compare_all(got,
-              exact_norm<T>(in, g, s[0] * kGroups,
-                            [=](Index i) { return at(i / image * kGroups + i % s[3] / width); }),
-              error);
+  compare_norm(
+      in, kGroupNorm, s[0] * kGroups, [=](Index i) { return at(i / image * kGroups + i % s[3] / width); },
+      error);
 }
 
 template <class T>
 void compare_batch_norm(const std::vector<Tensor<T>>& in, WorstError& error) {
-  const Shape s = in[0].shape;
-  const auto g = scattered<T>(s, -1, 1, 4);
-  const auto got = values_and_gradients<T>([](auto&, const auto& v) { return batch_norm(v[0], v[1], v[2]); },
-                                           in, [&](Shape) -> const Tensor<T>& { return g; });
-  compare_all(got, exact_norm<T>(in, g, s[3], [=](Index i) { return at(i % s[3]); }), error);
+  const Index channels = in[0].shape[3];
+  compare_norm(
+      in, kBatchNorm, channels, [=](Index i) { return at(i % channels); }, error);
 }
 
-// A constant image, or a set of one number, gives beta in every bit; what flows back is finite.
+// A constant image, or a set of one element, gives beta in every bit and finite gradients.
 template <class T>
 void compare_constant(WorstError& error) {
   for (const Shape s : {Shape{1, 8, 8, 4}, Shape{2, 1, 1, 2}})
     for (const double level : {0.0, 0.1, 255.0, 1e6, -3e7}) {
       auto in = inputs<T>(s, 0, 1);
       std::fill(in[0].data.begin(), in[0].data.end(), static_cast<T>(level));
-      const auto group = values_and_gradients<T>(
-          [](auto&, const auto& v) { return group_norm(v[0], v[1], v[2], {.groups = kGroups}); }, in,
-          ones<T>);
-      const auto batch = values_and_gradients<T>(
-          [](auto&, const auto& v) { return batch_norm(v[0], v[1], v[2]); }, in, ones<T>);
+      const auto group = values_and_gradients<T>(kGroupNorm, in, ones<T>),
+                 batch = values_and_gradients<T>(kBatchNorm, in, ones<T>);
       for (const auto* got : {&group, &batch}) {
         for (std::size_t i = 0; i < (*got)[0].size(); ++i)
           error.equal((*got)[0][i], in[2].data[i % at(s[3])]);
         for (const T v : (*got)[1]) error.equal(std::isfinite(v), true);
-        for (const T v : (*got)[2]) error.equal(v, 0);  // of gamma: every normalised number is 0
+        for (const T v : (*got)[2]) error.equal(v, 0);  // of gamma: every normalised value is 0
       }
     }
 }
@@ -117,7 +118,7 @@ void add_norm_numerics(std::vector<NumericsCase>& cases) {
                [](auto t, WorstError& e) { compare_constant<decltype(t)>(e); });
   add_numerics(cases, "group_norm: 0.3 +- 1", largest, 4e-7, 1e-15,
                [=](auto t, WorstError& e) { compare_group_norm(inputs<decltype(t)>(s, 0.3, 1), e); });
-  // The mean is rounded to a double: to 1e3 and 1e6 times the least part of the spread.
+  // The mean is rounded to a double: an error of 1e3 and 1e6 ulp of the spread.
   add_numerics(cases, "group_norm: 1000 +- 1", largest, 4e-7, 1e-12,
                [=](auto t, WorstError& e) { compare_group_norm(inputs<decltype(t)>(s, 1000, 1), e); });
   add_numerics(cases, "group_norm: variance below eps, 1000 +- 1e-3", largest, 4e-7, 1e-9,

@@ -2,13 +2,20 @@
 #include <fieldmark/engine/params.h>
 
 namespace fieldmark {
+namespace {
+
+template <class T, class Entry>
+std::span<T> slice_of(std::span<T> buffer, const Entry& e) {
+  return buffer.subspan(static_cast<std::size_t>(e.offset), static_cast<std::size_t>(e.shape.size()));
+}
+
+}  // namespace
 
 template <class T>
 ParamId ParamStore<T>::add(std::string_view name, Shape shape) {
   for (const Entry& e : entries_)
     if (e.name == name) throw ValueError("[params] name '" + e.name + "' is already used");
-  // The same places for float and double, so that numbers can be copied between stores: 16 floats are a cache
-  // line.
+  // The same offsets for float and double, so that stores can be copied: 16 floats are a cache line.
   constexpr Index kLine = 16, kLarge = 4096;
   const Index offset = shape.size() >= kLarge ? (size() + kLine - 1) / kLine * kLine : size();
   entries_.push_back({std::string(name), shape, offset});
@@ -26,23 +33,17 @@ ParamId ParamStore<T>::find(std::string_view name) const {
 
 template <class T>
 std::span<T> ParamStore<T>::values(ParamId id) {
-  const Entry& e = entry(id);
-  return std::span<T>(values_).subspan(static_cast<std::size_t>(e.offset),
-                                       static_cast<std::size_t>(e.shape.size()));
+  return slice_of(values(), entry(id));
 }
 
 template <class T>
 std::span<const T> ParamStore<T>::values(ParamId id) const {
-  const Entry& e = entry(id);
-  return std::span<const T>(values_).subspan(static_cast<std::size_t>(e.offset),
-                                             static_cast<std::size_t>(e.shape.size()));
+  return slice_of(values(), entry(id));
 }
 
 template <class T>
 std::span<T> ParamStore<T>::grads(ParamId id) {
-  const Entry& e = entry(id);
-  return std::span<T>(grads_).subspan(static_cast<std::size_t>(e.offset),
-                                      static_cast<std::size_t>(e.shape.size()));
+  return slice_of(grads(), entry(id));
 }
 
 template <class T>

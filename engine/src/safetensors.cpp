@@ -46,11 +46,11 @@ struct Reader {
     if (bytes.size() < kLengthBytes)
       fail("byte 0: expected 8 bytes of header length, found a file of " + std::to_string(bytes.size()));
     std::memcpy(&header, bytes.data(), kLengthBytes);
-    const std::uint64_t room = bytes.size() - kLengthBytes;
-    if (header > room || header > kMaxHeader)
-      fail("byte 0: expected a header length of at most " + std::to_string(std::min(room, kMaxHeader)) +
+    const std::uint64_t rest = bytes.size() - kLengthBytes;
+    if (header > rest || header > kMaxHeader)
+      fail("byte 0: expected a header length of at most " + std::to_string(std::min(rest, kMaxHeader)) +
            " (the file has " + std::to_string(bytes.size()) + " bytes), found " + std::to_string(header));
-    data = room - header;
+    data = rest - header;
     return {reinterpret_cast<const char*>(bytes.data()) + kLengthBytes, static_cast<std::size_t>(header)};
   }
 
@@ -104,27 +104,14 @@ struct Reader {
     std::vector<Index> dims;
     for (const json& extent : value) {
       if (!extent.is_number_unsigned() || extent.get<std::uint64_t>() > std::uint64_t{1} << 62)
-        fail(tensor, "shape: expected whole numbers from 0 to 2^62, found " + found(value));
+        fail(tensor, "shape: expected integers from 0 to 2^62, found " + found(value));
       dims.push_back(extent.get<Index>());
     }
-    switch (dims.size()) {
-      case 0:
-        return {};
-      case 1:
-        return {dims[0]};
-      case 2:
-        return {dims[0], dims[1]};
-      case 3:
-        return {dims[0], dims[1], dims[2]};
-      case 4:
-        return {dims[0], dims[1], dims[2], dims[3]};
-      default:
-        return {dims[0], dims[1], dims[2], dims[3], dims[4]};
-    }
+    return Shape(dims);
   }
 
-  /// Bytes that a tensor of this shape takes. Every partial product is checked, so that 2^40 x 2^40 x 0 fails
-  /// too: Shape::size() must never overflow.
+  /// Bytes of a tensor of this shape. Every partial product is checked, so that 2^40 x 2^40 x 0 fails too:
+  /// Shape::size() must never overflow.
   std::uint64_t size_of(const std::string& tensor, const Shape& shape, std::uint64_t element) const {
     std::uint64_t size = element;
     for (int k = 0; k < shape.rank(); ++k)
@@ -180,7 +167,7 @@ void check_cover(const Reader& r, std::vector<Placed>& placed) {
   for (const Placed& p : placed) {
     if (p.begin != at)
       r.fail(p.entry.name, "data_offsets: expected to begin at " + std::to_string(at) +
-                               ", where the one before ends (no gap, no overlap), found " +
+                               ", the end of the one before (no gap, no overlap), found " +
                                std::to_string(p.begin));
     at = p.end;
   }
@@ -197,14 +184,14 @@ void append(SafetensorsFile& file, std::string_view name, const char* dtype, Sha
                      std::string(name));
   if (static_cast<Index>(data.size()) != shape.size())
     throw ShapeError("[SafetensorsFile::add] data of " + std::string(name) + " must have the " +
-                     std::to_string(shape.size()) + " numbers of shape " + shape.str() + ", got " +
+                     std::to_string(shape.size()) + " elements of shape " + shape.str() + ", got " +
                      std::to_string(data.size()));
   const auto bytes = std::as_bytes(data);
   file.tensors.push_back({std::string(name), dtype, shape, {bytes.begin(), bytes.end()}});
 }
 
 template <class T>
-std::vector<T> numbers(const SafetensorsFile& file, std::string_view name, std::string_view dtype) {
+std::vector<T> elements(const SafetensorsFile& file, std::string_view name, std::string_view dtype) {
   const auto& e = file.at(name);
   if (e.dtype != dtype)
     throw IoError("[safetensors] " + file.path + ": tensor \"" + e.name + "\": expected dtype " +
@@ -216,8 +203,8 @@ std::vector<T> numbers(const SafetensorsFile& file, std::string_view name, std::
 
 float widen_half(std::uint16_t h) {
   const std::uint32_t sign = static_cast<std::uint32_t>(h & 0x8000) << 16, body = h & 0x7fffu;
-  // Moved into a float's fields the exponent is 112 too small; infinities and NaN need as much again. A
-  // product of a power of 2 also normalises half's subnormals.
+  // In a float's fields the exponent is 112 too small, that of infinities and NaN 224. The product with a
+  // power of 2 also normalises half's subnormals.
   const float magnitude = body >= 0x7c00u ? std::bit_cast<float>((body << 13) + (224u << 23))
                                           : std::bit_cast<float>(body << 13) * 0x1p112f;
   return std::bit_cast<float>(std::bit_cast<std::uint32_t>(magnitude) | sign);
@@ -283,24 +270,16 @@ void SafetensorsFile::write(const std::filesystem::path& to, Access access) cons
   file.commit();
 }
 
-void SafetensorsFile::add(std::string_view name, Shape shape, std::span<const float> data) {
-  append(*this, name, "F32", shape, data);
-}
-void SafetensorsFile::add(std::string_view name, Shape shape, std::span<const double> data) {
-  append(*this, name, "F64", shape, data);
-}
-void SafetensorsFile::add(std::string_view name, Shape shape, std::span<const std::uint8_t> data) {
-  append(*this, name, "U8", shape, data);
-}
-void SafetensorsFile::add(std::string_view name, Shape shape, std::span<const std::int32_t> data) {
-  append(*this, name, "I32", shape, data);
-}
-void SafetensorsFile::add(std::string_view name, Shape shape, std::span<const std::int64_t> data) {
-  append(*this, name, "I64", shape, data);
-}
-void SafetensorsFile::add(std::string_view name, Shape shape, std::span<const std::uint64_t> data) {
-  append(*this, name, "U64", shape, data);
-}
+#define FIELDMARK_ADD(T, dtype)                                                            \
+  void SafetensorsFile::add(std::string_view name, Shape shape, std::span<const T> data) { \
+    append(*this, name, dtype, shape, data);                                               \
+  }
+FIELDMARK_ADD(float, "F32")
+FIELDMARK_ADD(double, "F64")
+FIELDMARK_ADD(std::uint8_t, "U8")
+FIELDMARK_ADD(std::int32_t, "I32")
+FIELDMARK_ADD(std::int64_t, "I64")
+FIELDMARK_ADD(std::uint64_t, "U64")
 
 bool SafetensorsFile::has(std::string_view name) const {
   return std::any_of(tensors.begin(), tensors.end(), [&](const Entry& e) { return e.name == name; });
@@ -318,9 +297,9 @@ const SafetensorsFile::Entry& SafetensorsFile::at(std::string_view name) const {
 
 Tensor<float> SafetensorsFile::f32(std::string_view name) const {
   const Entry& e = at(name);
-  if (e.dtype != "F16" && e.dtype != "BF16") return {e.shape, numbers<float>(*this, name, "F32")};
+  if (e.dtype != "F16" && e.dtype != "BF16") return {e.shape, elements<float>(*this, name, "F32")};
   Tensor<float> out(e.shape);
-  const auto halves = numbers<std::uint16_t>(*this, name, e.dtype);
+  const auto halves = elements<std::uint16_t>(*this, name, e.dtype);
   std::transform(halves.begin(), halves.end(), out.data.begin(), [&](std::uint16_t h) {
     return e.dtype == "F16" ? widen_half(h) : std::bit_cast<float>(static_cast<std::uint32_t>(h) << 16);
   });
@@ -328,19 +307,19 @@ Tensor<float> SafetensorsFile::f32(std::string_view name) const {
 }
 
 Tensor<double> SafetensorsFile::f64(std::string_view name) const {
-  return {at(name).shape, numbers<double>(*this, name, "F64")};
+  return {at(name).shape, elements<double>(*this, name, "F64")};
 }
 std::vector<std::uint8_t> SafetensorsFile::u8(std::string_view name) const {
-  return numbers<std::uint8_t>(*this, name, "U8");
+  return elements<std::uint8_t>(*this, name, "U8");
 }
 std::vector<std::int32_t> SafetensorsFile::i32(std::string_view name) const {
-  return numbers<std::int32_t>(*this, name, "I32");
+  return elements<std::int32_t>(*this, name, "I32");
 }
 std::vector<std::int64_t> SafetensorsFile::i64(std::string_view name) const {
-  return numbers<std::int64_t>(*this, name, "I64");
+  return elements<std::int64_t>(*this, name, "I64");
 }
 std::vector<std::uint64_t> SafetensorsFile::u64(std::string_view name) const {
-  return numbers<std::uint64_t>(*this, name, "U64");
+  return elements<std::uint64_t>(*this, name, "U64");
 }
 
 }  // namespace fieldmark

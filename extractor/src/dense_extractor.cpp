@@ -1,8 +1,8 @@
 #include "fieldmark/extractor/dense_extractor.h"
 
-#include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/engine/ops/pool.h>
 #include <fieldmark/engine/ops/resample.h>
+#include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/engine/shape_checks.h>
 
 #include <string>
@@ -61,7 +61,7 @@ DenseExtractor<T>::DenseExtractor(ParamStore<T>& store, std::string_view name, c
 template <class T>
 Var<T> DenseExtractor<T>::up(const Params<T>& params, Var<T> coarse, Var<T> skip, const Block& block) const {
   const Var<T> fine = upsample_to(coarse, skip.shape()[1], skip.shape()[2], Interpolation::bilinear);
-  return block(params, concat_columns({fine, skip}));
+  return block(params, concatenate({fine, skip}));
 }
 
 template <class T>

@@ -1,8 +1,8 @@
 #include "fieldmark/extractor/gradcheck_cases.h"
 
 #include <fieldmark/engine/ops/arithmetic.h>
-#include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/engine/ops/matmul.h>
+#include <fieldmark/engine/ops/slice.h>
 
 #include <algorithm>
 #include <cassert>
@@ -103,7 +103,7 @@ GradcheckReport check_dense_extractor() {
   const DenseExtractor<double> net(store, "net", {.classes = 3, .base = 8}, 5);
   return check_network(store, picture({1, 17, 18, 3}), [&](const Params<double>& params, Var<double> image) {
     const auto out = net(params, image);
-    return concat_columns({image.tape().reshape(out.sign, {out.height * out.width, 1}), out.index});
+    return concatenate({image.tape().reshape(out.sign, {out.height * out.width, 1}), out.index});
   });
 }
 

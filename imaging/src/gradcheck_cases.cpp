@@ -13,7 +13,7 @@
 namespace fieldmark::imaging {
 namespace {
 
-Tensor<double> numbers(Shape shape, double low, double high, std::uint64_t stream) {
+Tensor<double> uniform(Shape shape, double low, double high, std::uint64_t stream) {
   const CounterRng rng(7, stream);
   Tensor<double> t(shape);
   for (Index i = 0; i < t.size(); ++i)
@@ -21,7 +21,7 @@ Tensor<double> numbers(Shape shape, double low, double high, std::uint64_t strea
   return t;
 }
 
-// A weight file with random numbers, of a size that keeps signals alive through ReLUs.
+// A weight file with random values, of a magnitude that keeps signals alive through ReLUs.
 SafetensorsFile random_weights(std::span<const WeightTensor> tensors) {
   SafetensorsFile file;
   for (const WeightTensor& t : tensors) {
@@ -29,7 +29,7 @@ SafetensorsFile random_weights(std::span<const WeightTensor> tensors) {
     const Index inputs = matrix ? t.shape.size() / t.shape[0] : 0;
     const double size = matrix ? std::sqrt(6 / static_cast<double>(inputs)) : 0.5;
     const double low = t.name.starts_with("lin") || t.name == "scaling.scale" ? size / 2 : -size;
-    const auto values = numbers(t.shape, low, size, file.tensors.size());
+    const auto values = uniform(t.shape, low, size, file.tensors.size());
     file.add(t.name, t.shape,
              std::span<const float>(std::vector<float>(values.data.begin(), values.data.end())));
   }
@@ -42,9 +42,9 @@ constexpr GradcheckOptions kSmallSteps{.step = 1e-5};
 GradcheckReport check_lpips(LpipsNetwork network) {
   const Lpips<double> lpips(random_weights(lpips_tensors(network)), network);
   const Index side = lpips.smallest();
-  const auto a = numbers({1, side, side, 3}, 0, 1, 93), b = numbers({1, side, side, 3}, 0, 1, 94);
-  // Each colour of an image moves by a number.
-  const std::vector<Tensor<double>> in{numbers({1, 1, 1, 3}, 0, 0.1, 91), numbers({1, 1, 1, 3}, 0, 0.1, 92)};
+  const auto a = uniform({1, side, side, 3}, 0, 1, 93), b = uniform({1, side, side, 3}, 0, 1, 94);
+  // An input moves each colour of an image by a constant.
+  const std::vector<Tensor<double>> in{uniform({1, 1, 1, 3}, 0, 0.1, 91), uniform({1, 1, 1, 3}, 0, 0.1, 92)};
   return gradcheck(
       [&](Tape<double>& tape, auto v) {
         return lpips(add(tape.constant(a), upsample_to(v[0], side, side)),
@@ -57,7 +57,7 @@ GradcheckReport check_vgg16() {
   const auto tensors = vgg16_tensors();
   const Vgg16Features<double> vgg(random_weights(std::span(tensors).first(6)));
   constexpr std::array<std::string_view, 2> taps{"relu1_2", "relu2_1"};
-  const std::vector<Tensor<double>> in{numbers({1, 2, 1, 3}, 0, 1, 91), numbers({1, 2, 1, 3}, 0, 1, 92)};
+  const std::vector<Tensor<double>> in{uniform({1, 2, 1, 3}, 0, 1, 91), uniform({1, 2, 1, 3}, 0, 1, 92)};
   return gradcheck(
       [&](Tape<double>&, auto v) { return vgg.loss(upsample_to(v[0], 4, 5), upsample_to(v[1], 4, 5), taps); },
       in, kSmallSteps);
@@ -68,7 +68,7 @@ GradcheckReport check_pretrained_conv() {
       .in = 2, .out = 3, .kernel = 3, .stride = 2, .padding = 0, .activation = Activation::none};
   const PretrainedConv<double> conv(random_weights(pretrained_conv_tensors("conv", options)), "conv",
                                     options);
-  const std::vector<Tensor<double>> in{numbers({2, 5, 6, 2}, -1, 1, 91)};
+  const std::vector<Tensor<double>> in{uniform({2, 5, 6, 2}, -1, 1, 91)};
   return gradcheck([&](Tape<double>&, auto v) { return conv(v[0]); }, in);
 }
 

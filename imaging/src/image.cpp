@@ -41,7 +41,7 @@ struct Free {
 };
 using Pixels = std::unique_ptr<unsigned char, Free>;
 
-// One table for all who turn a byte into a number: an image read equals the image quantised.
+// The one conversion from a byte: an image that is read equals the quantised image.
 float unit(std::uint8_t byte) { return static_cast<float>(byte) / 255.0f; }
 
 std::uint8_t byte_of(float x) {
@@ -156,9 +156,9 @@ Tensor<float> quantize8(const Tensor<float>& image) {
   return out;
 }
 
-void paste(Tensor<float>& canvas, const Tensor<float>& picture, Index row, Index column) {
+void paste(Tensor<float>& canvas, const Tensor<float>& image, Index row, Index column) {
   const Shape& c = canvas.shape;
-  const Shape& p = picture.shape;
+  const Shape& p = image.shape;
   check_rank("paste", "canvas", c, 3, "[height, width, channels]");
   check_rank("paste", "image", p, 3, "[height, width, channels]");
   check_extent("paste", "image", p, 2, c[2], "the canvas has as many channels");
@@ -167,7 +167,7 @@ void paste(Tensor<float>& canvas, const Tensor<float>& picture, Index row, Index
                      ", " + std::to_string(column) + "), got shape " + p.str());
   const Index line = p[1] * p[2];
   for (Index y = 0; y < p[0]; ++y)
-    std::copy_n(picture.data.begin() + y * line, line,
+    std::copy_n(image.data.begin() + y * line, line,
                 canvas.data.begin() + ((row + y) * c[1] + column) * c[2]);
 }
 

@@ -1,7 +1,7 @@
 #include <fieldmark/engine/ops/arithmetic.h>
-#include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/engine/ops/feature_distance.h>
 #include <fieldmark/engine/ops/pool.h>
+#include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/imaging/lpips.h>
 
@@ -93,7 +93,7 @@ std::vector<WeightTensor> lpips_tensors(LpipsNetwork network) {
 template <class T>
 Lpips<T>::Lpips(const SafetensorsFile& file, LpipsNetwork network)
     : smallest_(network == LpipsNetwork::alex ? 31 : 17),
-      partial_windows_(network == LpipsNetwork::squeeze),
+      ceil_mode_(network == LpipsNetwork::squeeze),
       scaling_(scaling_of<T>(file)) {
   for (const StagePlan& plan : plan_of(network)) {
     Stage stage{.pool = plan.pool, .blocks = {}, .lin = Tensor<T>({plan.channels})};
@@ -119,10 +119,10 @@ void Lpips<T>::check(const Shape& a, const Shape& b) const {
 
 template <class T>
 Var<T> Lpips<T>::run(std::size_t stage, Var<T> x) const {
-  if (stages_[stage].pool) x = max_pool(x, {.size = 3, .stride = 2, .partial = partial_windows_});
+  if (stages_[stage].pool) x = max_pool(x, {.size = 3, .stride = 2, .ceil_mode = ceil_mode_});
   for (const Block& block : stages_[stage].blocks) {
     x = block[0](x);
-    if (block.size() > 1) x = concat_columns({block[1](x), block[2](x)});
+    if (block.size() > 1) x = concatenate({block[1](x), block[2](x)});
   }
   return x;
 }

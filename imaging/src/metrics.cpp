@@ -27,13 +27,13 @@ double pairwise(std::span<const double> x) {
   return pairwise(x.first(x.size() / 2)) + pairwise(x.subspan(x.size() / 2));
 }
 
-// Sums over [0, n), n >= 1: each piece on its own, then the pieces pairwise, so that threads change no bit
-// and the error grows with the piece, not with n.
-template <class Piece>
-double sum_pieces(Index n, Index grain, Piece piece) {
+// Sums over [0, n), n >= 1: each chunk on its own, then the chunks pairwise, so that threads change no bit
+// and the error grows with the chunk, not with n.
+template <class Chunk>
+double chunked_sum(Index n, Index grain, Chunk chunk) {
   std::vector<double> sums(static_cast<std::size_t>((n + grain - 1) / grain));
   parallel_for(n, grain, [&](Index begin, Index end) {
-    sums[static_cast<std::size_t>(begin / grain)] = piece(begin, end);
+    sums[static_cast<std::size_t>(begin / grain)] = chunk(begin, end);
   });
   return pairwise(sums);
 }
@@ -102,7 +102,7 @@ double ssim_rows(const Tensor<float>& a, const Tensor<float>& b, Index begin, In
 
 double mse(const Tensor<float>& a, const Tensor<float>& b) {
   check_pair("mse", a, b);
-  const double sum = sum_pieces(a.size(), 1024, [&](Index begin, Index end) {
+  const double sum = chunked_sum(a.size(), 1024, [&](Index begin, Index end) {
     double s = 0;
     for (Index i = begin; i < end; ++i) {
       const double d = static_cast<double>(a[i]) - static_cast<double>(b[i]);
@@ -147,7 +147,8 @@ double ssim(const Tensor<float>& a, const Tensor<float>& b) {
   if (rows < 1 || columns < 1)
     throw ShapeError("[ssim] a: height and width must be at least 11 (the window's), got shape " +
                      a.shape.str());
-  const double sum = sum_pieces(rows, 8, [&](Index begin, Index end) { return ssim_rows(a, b, begin, end); });
+  const double sum =
+      chunked_sum(rows, 8, [&](Index begin, Index end) { return ssim_rows(a, b, begin, end); });
   return sum / static_cast<double>(rows * columns * a.shape[2]);
 }
 

@@ -1,5 +1,5 @@
 #include <fieldmark/engine/ops/activation.h>
-#include <fieldmark/engine/ops/columns.h>
+#include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/nerf/field.h>
 
 #include "checks.h"
@@ -70,20 +70,20 @@ Var<T> Field<T>::geometry(const Params<T>& params, Var<T> features) const {
 
 template <class T>
 Var<T> Field<T>::density(Var<T> z) const {
-  const Var<T> log_density = columns(z, 0, 1);
+  const Var<T> log_density = slice(z, 0, 1);
   return truncated_exp(z.tape().reshape(log_density, {log_density.shape()[0]}));
 }
 
 template <class T>
 Var<T> Field<T>::encode_directions(Var<T> d) const {
   if (mlp_) return mlp_->encode_directions(d);
-  return options_.directional ? spherical_harmonics(d) : columns(d, 0, 0);
+  return options_.directional ? spherical_harmonics(d) : slice(d, 0, 0);
 }
 
 template <class T>
 Var<T> Field<T>::colour(const Params<T>& params, Var<T> z, Var<T> features, Var<T> direction) const {
   if (mlp_) return mlp_->colour(params, z, direction);
-  Var<T> h = concat_columns<T>({z, features, direction});
+  Var<T> h = concatenate<T>({z, features, direction});
   for (const auto& layer : colour_) h = layer(params, h);
   return sigmoid(h);
 }

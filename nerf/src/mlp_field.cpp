@@ -1,6 +1,6 @@
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/arithmetic.h>
-#include <fieldmark/engine/ops/columns.h>
+#include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/nerf/frequency_encoding.h>
 #include <fieldmark/nerf/mlp_field.h>
 
@@ -26,7 +26,7 @@ MlpFieldOptions checked(const MlpFieldOptions& o) {
 // p and its frequencies.
 template <class T>
 Var<T> with_frequencies(Var<T> p, int bands) {
-  return concat_columns<T>({p, frequency_encoding(p, bands)});
+  return concatenate<T>({p, frequency_encoding(p, bands)});
 }
 
 }  // namespace
@@ -85,16 +85,16 @@ template <class T>
 Var<T> MlpField<T>::geometry(const Params<T>& params, Var<T> features) const {
   Var<T> h = features;
   for (Index l = 0; l < options_.layers; ++l) {
-    if (l > 0 && l == options_.skip) h = concat_columns<T>({features, h});
+    if (l > 0 && l == options_.skip) h = concatenate<T>({features, h});
     h = density_[at(l)](params, h);
   }
-  return concat_columns<T>({density_.back()(params, h), h});
+  return concatenate<T>({density_.back()(params, h), h});
 }
 
 template <class T>
 Var<T> MlpField<T>::colour(const Params<T>& params, Var<T> z, Var<T> direction) const {
-  const Var<T> feature = colour_[0](params, columns(z, 1, options_.width));
-  const Var<T> h = colour_[1](params, concat_columns<T>({feature, direction}));
+  const Var<T> feature = colour_[0](params, slice(z, 1, options_.width));
+  const Var<T> h = colour_[1](params, concatenate<T>({feature, direction}));
   return sigmoid(colour_[2](params, h));
 }
 

@@ -104,7 +104,7 @@ TEST_CASE("affine_warp: errors") {
   Tape<double> tape;
   const Tensor<double> x({2, 2, 1}), flat({2, 2}), m({6});
   CHECK_THROWS_WITH(with_background(tape, std::vector{tape.constant(x), tape.constant(m)}),
-                    "[affine_warp] background: must have one number for each channel of x, whose shape is "
+                    "[affine_warp] background: must have one element for each channel of x, whose shape is "
                     "[2, 2, 1], got 3");
   CHECK_THROWS_WITH(affine_warp(tape.constant(flat), tape.constant(m)),
                     "[affine_warp] x must have rank 3 [height, width, channels], got shape [2, 2]");
@@ -112,7 +112,7 @@ TEST_CASE("affine_warp: errors") {
                     "[affine_warp] matrix must have rank 1 [6], got shape [2, 2]");
   const std::vector<float> five(5);
   CHECK_THROWS_WITH(warp_labels(Tensor<std::int32_t>({1, 1}), std::span<const float>(five), 0),
-                    "[warp_labels] matrix: must have 6 numbers, got 5");
+                    "[warp_labels] matrix: must have 6 elements, got 5");
   CHECK_THROWS_AS(warp_labels(Tensor<std::int32_t>({1}), std::span<const float>(five), 0), ShapeError);
 }
 

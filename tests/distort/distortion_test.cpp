@@ -11,6 +11,7 @@
 
 #include "distort/support.h"
 #include "support/catch.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using distort::apply_distortion;
@@ -81,7 +82,7 @@ TEST_CASE("distortion: errors") {
                     "[distortion] image: must have at least one pixel, got shape [0, 2, 3]");
   CHECK_THROWS_AS(distorted("blur_1", Tensor<float>({4})), ShapeError);
   CHECK_THROWS_WITH(apply_distortion(parse_distortion("blur_1"), x, kRng, 0, {}),
-                    "[distortion] background: must have 3 numbers, got 0");
+                    "[distortion] background: must have 3 elements, got 0");
 }
 
 TEST_CASE("distortion: severities of nothing leave an 8-bit image as it is") {
@@ -255,8 +256,9 @@ TEST_CASE("distortion: where pixels come from, checked on an image of coordinate
             from[1] > static_cast<double>(h) - 10 || got[2] < 0.999f)
           continue;
         inside += 1;
-        worst = std::max({worst, std::abs(255 * static_cast<double>(got[0]) - 10 - from[0]),
-                          std::abs(255 * static_cast<double>(got[1]) - 10 - from[1])});
+        for (const double e : {std::abs(255 * static_cast<double>(got[0]) - 10 - from[0]),
+                               std::abs(255 * static_cast<double>(got[1]) - 10 - from[1])})
+          raise_to(worst, e);
         const auto again = back(from[0], from[1]);
         CHECK(std::hypot(again[0] - static_cast<double>(j), again[1] - static_cast<double>(i)) < 1e-9);
       }

@@ -6,6 +6,7 @@
 
 #include "distort/support.h"
 #include "support/catch.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using distort::jpeg444;
@@ -17,7 +18,7 @@ double level(float v) { return 255 * static_cast<double>(v); }
 double worst_level(const Tensor<float>& a, const Tensor<float>& b) {
   REQUIRE(a.shape == b.shape);
   double worst = 0;
-  for (Index i = 0; i < a.size(); ++i) worst = std::max(worst, std::abs(level(a[i]) - level(b[i])));
+  for (Index i = 0; i < a.size(); ++i) raise_to(worst, std::abs(level(a[i]) - level(b[i])));
   return worst;
 }
 

@@ -36,7 +36,7 @@ TEST_CASE("noise: errors") {
                     "[noise] sigma: axis 0 must be 1 (its layout is [1]), got shape [2]");
   const Tensor<float> one({1});
   CHECK_THROWS_WITH(noise(v, tape.constant(one), few),
-                    "[noise] normal: must have one number for each of x, whose shape is [2, 1, 3], got 5");
+                    "[noise] normal: must have one element for each of x, whose shape is [2, 1, 3], got 5");
 }
 
 TEST_CASE("noise: same bits for 1 and 2 threads") {

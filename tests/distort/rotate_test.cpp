@@ -7,7 +7,6 @@
 
 using namespace fieldmark;
 using distort::rotate;
-using distort::rotate_labels;
 
 namespace {
 constexpr double kQuarter = std::numbers::pi / 2;
@@ -67,26 +66,6 @@ TEST_CASE("rotate: a linear ramp turns into the turned ramp") {
 TEST_CASE("rotate: gradient in image and angle") {
   expect_grad(turn, {uniform({5, 4, 3}, 0, 1, 1), number<double>(0.61)}, {.step = 0.02});
   expect_grad(turn, {uniform({4, 6, 1}, 0, 1, 1), number<double>(-0.4)}, {.step = 0.02});
-}
-
-TEST_CASE("rotate: labels move with the colours") {
-  const Tensor<std::int32_t> labels({2, 2}, {1, 2, 3, 4});
-  CHECK(rotate_labels(labels, kQuarter, 0).data == std::vector<std::int32_t>{2, 4, 1, 3});
-  CHECK(rotate_labels(labels, static_cast<float>(-kQuarter), 0).data ==
-        std::vector<std::int32_t>{3, 1, 4, 2});
-  // Two regions, far from their border: the label says which one the colour came from.
-  Tensor<std::int32_t> sides({31, 31});
-  Tensor<float> x({31, 31, 1});
-  for (Index i = 0; i < 31 * 31; ++i) x[i] = static_cast<float>(sides[i] = i % 31 < 15 ? 1 : 2);
-  const auto y = run_op<float>([](auto&, auto v) { return rotate(v[0], v[1]); }, {x, number<float>(0.5)});
-  const auto moved = rotate_labels(sides, 0.5f, 0);
-  int compared = 0;
-  for (Index i = 0; i < 31 * 31; ++i)
-    if (y[i] == 1.f || y[i] == 2.f) {
-      CHECK(static_cast<float>(moved[i]) == y[i]);
-      ++compared;
-    }
-  CHECK(compared > 300);
 }
 
 TEST_CASE("rotate: errors and threads") {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "support/random.h"
+#include "support/worst.h"
 
 /// Runs an op on constants and returns its result.
 template <class T, class F>
@@ -47,7 +48,7 @@ double float_error(const F& f, const std::vector<fieldmark::Tensor<float>>& inpu
   double worst = 0, largest = 1e-30;
   for (std::size_t i = 0; i < want.size(); ++i) {
     const double error = std::abs(static_cast<double>(got[i]) - want[i]);
-    worst = error <= worst ? worst : error;
+    raise_to(worst, error);
     largest = std::max(largest, std::abs(want[i]));
   }
   return worst / largest;
@@ -57,8 +58,7 @@ template <class T>
 double largest_difference(const fieldmark::Tensor<T>& a, const fieldmark::Tensor<T>& b) {
   if (!(a.shape == b.shape)) return HUGE_VAL;
   double worst = 0;
-  for (fieldmark::Index i = 0; i < a.size(); ++i)
-    worst = std::max(worst, static_cast<double>(std::abs(a[i] - b[i])));
+  for (fieldmark::Index i = 0; i < a.size(); ++i) raise_to(worst, static_cast<double>(std::abs(a[i] - b[i])));
   return worst;
 }
 

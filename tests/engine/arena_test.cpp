@@ -29,11 +29,3 @@ TEST_CASE("arena: the second round of equal requests calls the system no more") 
   }
   CHECK(arena.reserved() >= 73112);
 }
-
-TEST_CASE("arena: reserve takes one block that later requests fit in") {
-  Arena arena(64);
-  arena.reserve(std::size_t{5} << 20);
-  const auto calls = arena.system_calls();
-  arena.allocate(std::size_t{5} << 20);
-  CHECK(arena.system_calls() == calls);
-}

@@ -15,14 +15,14 @@ TEST_CASE("numerics: the worst error is relative to each number's scale, and NaN
   e.compare(1.5, 1, 2);
   CHECK(e.worst == 0.25);
   e.compare(100, 100.5, 1000);
-  CHECK((e.worst == 0.25 && e.numbers == 2));
+  CHECK((e.worst == 0.25 && e.values == 2));
   e.compare(kInfinity, kInfinity, 1);
   CHECK(e.worst == 0.25);
   e.compare(1, kInfinity, 1);
   CHECK(e.worst == kInfinity);
   e.compare(kNan, 1, 1);
   e.compare(2, 1, 1);
-  CHECK((std::isnan(e.worst) && e.numbers == 6));
+  CHECK((std::isnan(e.worst) && e.values == 6));
 }
 
 TEST_CASE("numerics: equal takes in nothing for equal numbers and two NaNs, else infinity") {
@@ -39,10 +39,10 @@ TEST_CASE("numerics: equal takes in nothing for equal numbers and two NaNs, else
 
 TEST_CASE("numerics: a case passes within its limit, not with NaN and not with nothing compared") {
   const NumericsCase c{"c", "float", "value", 1e-6, [] { return WorstError{}; }};
-  CHECK(c.ok({.worst = 1e-6, .numbers = 1}));
-  CHECK_FALSE(c.ok({.worst = 2e-6, .numbers = 1}));
-  CHECK_FALSE(c.ok({.worst = kNan, .numbers = 1}));
-  CHECK_FALSE(c.ok({.worst = 0, .numbers = 0}));
+  CHECK(c.ok({.worst = 1e-6, .values = 1}));
+  CHECK_FALSE(c.ok({.worst = 2e-6, .values = 1}));
+  CHECK_FALSE(c.ok({.worst = kNan, .values = 1}));
+  CHECK_FALSE(c.ok({.worst = 0, .values = 0}));
 }
 
 TEST_CASE("numerics: one case becomes one in float and one in double") {

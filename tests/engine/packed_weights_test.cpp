@@ -6,6 +6,7 @@
 #include "support/catch.h"
 #include "support/each_isa.h"
 #include "support/random.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 
@@ -85,7 +86,7 @@ TEST_CASE("packed_weights: in bf16 a layer's values and gradients are off by the
   const auto worst = [&](std::size_t begin, std::size_t end) {
     float error = 0, largest = 0;
     for (std::size_t i = begin; i < end; ++i) {
-      error = std::max(error, std::abs(got[i] - want[i]));
+      raise_to(error, std::abs(got[i] - want[i]));
       largest = std::max(largest, std::abs(want[i]));
     }
     return error / largest;

@@ -166,7 +166,7 @@ TEST_CASE("safetensors: wrong names, dtypes and sizes are errors") {
                     Contains("name must be new") && Contains("got none"));
   CHECK_THROWS_AS(f.add("__metadata__", {0}, std::vector<float>{}), ValueError);
   CHECK_THROWS_WITH(f.add("w", {2, 3}, std::vector<float>(5)),
-                    "[SafetensorsFile::add] data of w must have the 6 numbers of shape [2, 3], got 5");
+                    "[SafetensorsFile::add] data of w must have the 6 elements of shape [2, 3], got 5");
   const TemporaryFolder folder;
   f.metadata["bad"] = "\xff";
   CHECK_THROWS_AS(f.write(folder / "f"), ValueError);

@@ -6,6 +6,7 @@
 
 #include "support/catch.h"
 #include "support/random.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 
@@ -77,8 +78,7 @@ double worst_error(Resize resize, Reference reference) {
         if (y.shape != Shape{height, width, s[2]}) return 1e9;
         for (Index i = 0; i < y.size(); ++i) {
           const Index c = i % s[2], column = i / s[2] % width, row = i / s[2] / width;
-          worst = std::max(worst,
-                           std::abs(static_cast<double>(y[i]) - reference(x, height, width, row, column, c)));
+          raise_to(worst, std::abs(static_cast<double>(y[i]) - reference(x, height, width, row, column, c)));
         }
       }
   return worst;

@@ -10,6 +10,7 @@
 #include "support/plain_conv.h"
 #include "support/random_weights.h"
 #include "support/run_op.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 
@@ -23,14 +24,14 @@ SafetensorsFile weights(std::size_t convolutions) {
   return random_weights(std::span(all).first(2 * convolutions));
 }
 
-std::vector<PlainImage> plain_features(const Tensor<float>& picture, const SafetensorsFile& file,
+std::vector<PlainImage> plain_features(const Tensor<float>& image, const SafetensorsFile& file,
                                        std::size_t convolutions) {
   constexpr double mean[] = {0.485, 0.456, 0.406}, deviation[] = {0.229, 0.224, 0.225};
-  PlainImage x = plain_image(3, picture.shape[0], picture.shape[1]);
+  PlainImage x = plain_image(3, image.shape[0], image.shape[1]);
   for (long c = 0; c < 3; ++c)
     for (long i = 0; i < x.h * x.w; ++i)
       x.x[static_cast<std::size_t>(c * x.h * x.w + i)] =
-          (static_cast<double>(picture[i * 3 + c]) - mean[c]) / deviation[c];
+          (static_cast<double>(image[i * 3 + c]) - mean[c]) / deviation[c];
   std::vector<PlainImage> all;
   for (std::size_t k = 0; k < convolutions; ++k) {
     for (const int before : kPoolBefore)
@@ -66,7 +67,7 @@ double compare(const SafetensorsFile& file, std::size_t convolutions, const Tens
   double worst = 0;
   for (std::size_t k = 0; k < convolutions; ++k) {
     REQUIRE(found[k].shape() == Shape({1, want[k].h, want[k].w, want[k].c}));
-    worst = std::max(worst, plain_error(want[k], found[k].value()));
+    raise_to(worst, plain_error(want[k], found[k].value()));
   }
   constexpr std::string_view two[] = {"relu2_2", "relu1_2"};
   const double loss = plain_mean_square(want[1], other[1]) + plain_mean_square(want[3], other[3]);

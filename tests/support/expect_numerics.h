@@ -19,7 +19,7 @@ inline void expect_numerics(const std::vector<fieldmark::NumericsCase>& cases) {
       const fieldmark::WorstError error = c.run();
       char figures[80];
       std::snprintf(figures, sizeof figures, "worst %.3e of %lld numbers, limit %.3e", error.worst,
-                    static_cast<long long>(error.numbers), c.limit);
+                    static_cast<long long>(error.values), c.limit);
       INFO(c.name << " (" << c.type << "): " << figures << ", relative to " << c.relative_to);
       CHECK(c.ok(error));
     }

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "support/worst.h"
+
 /// Networks as the papers write them, in plain loops in double over channels-first images: nothing here is
 /// shared with the library but the file reader.
 struct PlainImage {
@@ -68,7 +70,7 @@ inline PlainImage plain_concat(PlainImage a, const PlainImage& b) {
   return a;
 }
 
-/// Largest difference in parts of the largest number. @param y  [1, H, W, C] of the library
+/// Largest difference relative to the largest magnitude. @param y  [1, H, W, C] of the library
 template <class T>
 double plain_error(const PlainImage& want, const T* y) {
   double off = 0, most = 1e-30;
@@ -76,7 +78,7 @@ double plain_error(const PlainImage& want, const T* y) {
     for (long p = 0; p < want.h * want.w; ++p) {
       const double w = want.x[static_cast<std::size_t>(c * want.h * want.w + p)];
       const double d = std::abs(static_cast<double>(y[p * want.c + c]) - w);
-      off = d <= off ? off : d;
+      raise_to(off, d);
       most = std::max(most, std::abs(w));
     }
   return off / most;

@@ -9,6 +9,7 @@
 
 #include "support/catch.h"
 #include "support/random.h"
+#include "support/worst.h"
 
 /// An op under test is a generic callable f(tape, std::span<const Var<T>>) -> Var<T>.
 /// Returns its values, then the gradient of <u, f> in each input for a fixed random cotangent u.
@@ -66,9 +67,9 @@ double float_error(const F& f, const std::vector<fieldmark::Tensor<float>>& inpu
       for (std::size_t i = 0; i < want[k].size(); ++i) {
         largest = std::max(largest, std::abs(want[k][i]));
         const double d = std::abs(static_cast<double>(got[k][i]) - want[k][i]);
-        off = d <= off ? off : d;  // a NaN stays
+        raise_to(off, d);
       }
-      worst = off / largest <= worst ? worst : off / largest;
+      raise_to(worst, off / largest);
     }
   }
   fieldmark::force_isa(before);
@@ -80,9 +81,6 @@ double float_error(const F& f, const std::vector<fieldmark::Tensor<float>>& inpu
 template <class F, class I>
 double float_error_to_130(const F& f, const I& inputs) {
   double worst = 0;
-  for (fieldmark::Index e = 1; e <= 130; ++e) {
-    const double error = float_error(f, inputs(e));
-    worst = error <= worst ? worst : error;
-  }
+  for (fieldmark::Index e = 1; e <= 130; ++e) raise_to(worst, float_error(f, inputs(e)));
   return worst;
 }

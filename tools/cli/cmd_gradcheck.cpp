@@ -148,7 +148,7 @@ Json numerics_json(const std::vector<NumericsRow>& rows, const std::vector<std::
                {"relative_to", row.check.relative_to}};
     for (std::size_t k = 0; k < levels.size(); ++k) entry[levels[k]] = number(row.errors[k].worst);
     entry["limit"] = row.check.limit;
-    entry["numbers"] = row.errors[0].numbers;
+    entry["numbers"] = row.errors[0].values;
     entry["ok"] = row.ok();
     json["cases"].push_back(std::move(entry));
   }

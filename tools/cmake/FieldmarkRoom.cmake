@@ -28,7 +28,7 @@ target_compile_options(fieldmark_warnings INTERFACE $<$<CXX_COMPILER_ID:GNU,Clan
 # HEADER_ONLY names those of the units above that have no source.
 #
 # A kernel k is src/kernels/k.h + k.cpp with its test in tests/ROOM/kernels/k_test.cpp. Its source is compiled once for
-# each instruction set in FIELDMARK_ISA_LEVELS and chosen at run time (fieldmark/engine/isa.h).
+# each instruction set in FIELDMARK_ISA_LEVELS and chosen at run time (fieldmark/engine/kernel.h).
 set(FIELDMARK_ISA_LEVELS v2 v3 v4)
 function(fieldmark_room room)
   cmake_parse_arguments(PARSE_ARGV 1 M "NOT_INSTALLED" ""

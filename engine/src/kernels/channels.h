@@ -1,23 +1,26 @@
 #pragma once
+#include <fieldmark/engine/kernel.h>
 #include <fieldmark/engine/simd.h>
 
 // For kernel files only, hence the anonymous namespace (fieldmark/engine/simd.h).
 namespace {
 
+using fieldmark::Index;
+
 // Pixels whose sums are kept in T before they join a double: 64 channels of float then fill 8 KiB of the L1
 // cache.
-constexpr std::int64_t kSegment = 32;
+constexpr Index kSegment = 32;
 
 // Calls f(V{}, c) for vectors V = Vec<T> of channels, then f(T{}, c) for each that is left over.
 template <class T, class F>
-[[gnu::always_inline]] inline void for_channels(std::int64_t channels, F f) {
-  constexpr std::int64_t lanes = simd::kLanes<T>;
-  std::int64_t c = 0;
+[[gnu::always_inline]] inline void for_channels(Index channels, F f) {
+  constexpr Index lanes = simd::kLanes<T>;
+  Index c = 0;
   for (; c + lanes <= channels; c += lanes) f(simd::Vec<T>{}, c);
   for (; c < channels; ++c) f(T{}, c);
 }
 
-// A vector, or one number, at p.
+// A vector or a scalar at p.
 template <class V, class T>
 [[gnu::always_inline]] inline V load_as(const T* p) {
   V v;
@@ -40,8 +43,8 @@ template <class T, class V>
 
 // Calls f(first, count) for segments of pixels.
 template <class F>
-[[gnu::always_inline]] inline void for_segments(std::int64_t pixels, F f) {
-  for (std::int64_t p = 0; p < pixels; p += kSegment) f(p, pixels - p < kSegment ? pixels - p : kSegment);
+[[gnu::always_inline]] inline void for_segments(Index pixels, F f) {
+  for (Index p = 0; p < pixels; p += kSegment) f(p, pixels - p < kSegment ? pixels - p : kSegment);
 }
 
 }  // namespace

@@ -93,9 +93,9 @@ struct Softplus {
 
 // Calls f on whole vectors of the arrays; the last ones are padded with zeros.
 template <class F>
-inline void for_vectors(const float* x, const float* y, const float* dy, float* out, std::int64_t n, F f) {
+inline void for_vectors(const float* x, const float* y, const float* dy, float* out, Index n, F f) {
   constexpr int lanes = simd::kLanes<float>;
-  std::int64_t i = 0;
+  Index i = 0;
   for (; i + lanes <= n; i += lanes)
     simd::store(out + i, f(simd::load(x + i), simd::load(y + i), simd::load(dy + i), simd::load(out + i)));
   if (i == n) return;
@@ -110,24 +110,24 @@ inline void for_vectors(const float* x, const float* y, const float* dy, float* 
 }
 
 template <class Op>
-void forward(const float* x, float* y, std::int64_t n) {
+void forward(const float* x, float* y, Index n) {
   for_vectors(x, x, x, y, n, [](V v, V, V, V) { return Op::value(v); });
 }
 template <class Op>
-void forward(const double* x, double* y, std::int64_t n) {
-  for (std::int64_t i = 0; i < n; ++i) y[i] = Op::value(x[i]);
+void forward(const double* x, double* y, Index n) {
+  for (Index i = 0; i < n; ++i) y[i] = Op::value(x[i]);
 }
 
 template <class Op>
-void backward(const float* x, const float* y, const float* dy, float* dx, bool add, std::int64_t n) {
+void backward(const float* x, const float* y, const float* dy, float* dx, bool add, Index n) {
   if (add)
     for_vectors(x, y, dy, dx, n, [](V v, V w, V g, V old) { return old + g * Op::slope(v, w); });
   else
     for_vectors(x, y, dy, dx, n, [](V v, V w, V g, V) { return g * Op::slope(v, w); });
 }
 template <class Op>
-void backward(const double* x, const double* y, const double* dy, double* dx, bool add, std::int64_t n) {
-  for (std::int64_t i = 0; i < n; ++i) dx[i] = (add ? dx[i] : 0) + dy[i] * Op::slope(x[i], y[i]);
+void backward(const double* x, const double* y, const double* dy, double* dx, bool add, Index n) {
+  for (Index i = 0; i < n; ++i) dx[i] = (add ? dx[i] : 0) + dy[i] * Op::slope(x[i], y[i]);
 }
 
 // Calls run(Op{}) with the operation that f names.
@@ -149,16 +149,29 @@ inline void dispatch(Unary f, Run run) {
   }
 }
 
-float sum_of_exp(const float* x, float shift, float* y, std::int64_t n) {
+}  // namespace
+
+namespace FIELDMARK_ISA_NS {
+
+template <class T>
+void unary_forward(Unary f, const T* x, T* y, Index n) {
+  dispatch(f, [=](auto op) { forward<decltype(op)>(x, y, n); });
+}
+template <class T>
+void unary_backward(Unary f, const T* x, const T* y, const T* dy, T* dx, bool add, Index n) {
+  dispatch(f, [=](auto op) { backward<decltype(op)>(x, y, dy, dx, add, n); });
+}
+template <>
+float exp_sum(const float* x, float shift, float* y, Index n) {
   constexpr int lanes = simd::kLanes<float>;
   V acc{};
-  std::int64_t i = 0;
+  Index i = 0;
   for (; i + lanes <= n; i += lanes) {
     const V e = Exp::value(simd::load(x + i) - shift);
     simd::store(y + i, e);
     acc += e;
   }
-  const std::int64_t rest = n - i;
+  const Index rest = n - i;
   V last{};
   if (rest > 0) {
     std::memcpy(&last, x + i, static_cast<std::size_t>(rest) * sizeof(float));
@@ -169,35 +182,17 @@ float sum_of_exp(const float* x, float shift, float* y, std::int64_t n) {
   for (int k = 0; k < lanes; ++k) sum += k < rest ? acc[k] + last[k] : acc[k];
   return sum;
 }
-double sum_of_exp(const double* x, double shift, double* y, std::int64_t n) {
+template <>
+double exp_sum(const double* x, double shift, double* y, Index n) {
   double sum = 0;
-  for (std::int64_t i = 0; i < n; ++i) sum += y[i] = __builtin_exp(x[i] - shift);
+  for (Index i = 0; i < n; ++i) sum += y[i] = __builtin_exp(x[i] - shift);
   return sum;
 }
 
-}  // namespace
-
-namespace FIELDMARK_ISA_NS {
-
-template <class T>
-void unary_forward(Unary f, const T* x, T* y, std::int64_t n) {
-  dispatch(f, [=](auto op) { forward<decltype(op)>(x, y, n); });
-}
-template <class T>
-void unary_backward(Unary f, const T* x, const T* y, const T* dy, T* dx, bool add, std::int64_t n) {
-  dispatch(f, [=](auto op) { backward<decltype(op)>(x, y, dy, dx, add, n); });
-}
-template <class T>
-T exp_sum(const T* x, T shift, T* y, std::int64_t n) {
-  return sum_of_exp(x, shift, y, n);
-}
-
-template void unary_forward(Unary, const float*, float*, std::int64_t);
-template void unary_forward(Unary, const double*, double*, std::int64_t);
-template void unary_backward(Unary, const float*, const float*, const float*, float*, bool, std::int64_t);
-template void unary_backward(Unary, const double*, const double*, const double*, double*, bool, std::int64_t);
-template float exp_sum(const float*, float, float*, std::int64_t);
-template double exp_sum(const double*, double, double*, std::int64_t);
+template void unary_forward(Unary, const float*, float*, Index);
+template void unary_forward(Unary, const double*, double*, Index);
+template void unary_backward(Unary, const float*, const float*, const float*, float*, bool, Index);
+template void unary_backward(Unary, const double*, const double*, const double*, double*, bool, Index);
 
 }  // namespace FIELDMARK_ISA_NS
 }  // namespace fieldmark::kernels

@@ -1,7 +1,5 @@
 #pragma once
-#include <fieldmark/engine/isa.h>
-
-#include <cstdint>
+#include <fieldmark/engine/kernel.h>
 
 namespace fieldmark::kernels {
 
@@ -10,10 +8,10 @@ enum class Unary { relu, sigmoid, tanh, exp, truncated_exp, softplus };
 constexpr double kTruncatedExpLimit = 15;
 
 // T is float or double. y[i] = f(x[i]); then dx[i] = or += dy[i] f'(x[i]).
-FIELDMARK_DECLARE_KERNEL(template <class T> void, unary_forward, (Unary f, const T* x, T* y, std::int64_t n))
+FIELDMARK_DECLARE_KERNEL(template <class T> void, unary_forward, (Unary f, const T* x, T* y, Index n))
 FIELDMARK_DECLARE_KERNEL(template <class T> void, unary_backward,
-                         (Unary f, const T* x, const T* y, const T* dy, T* dx, bool add, std::int64_t n))
+                         (Unary f, const T* x, const T* y, const T* dy, T* dx, bool add, Index n))
 // y[i] = exp(x[i] - shift); returns their sum. The order of additions depends on the instruction set.
-FIELDMARK_DECLARE_KERNEL(template <class T> T, exp_sum, (const T* x, T shift, T* y, std::int64_t n))
+FIELDMARK_DECLARE_KERNEL(template <class T> T, exp_sum, (const T* x, T shift, T* y, Index n))
 
 }  // namespace fieldmark::kernels

@@ -1,7 +1,5 @@
 #pragma once
-#include <fieldmark/engine/isa.h>
-
-#include <cstdint>
+#include <fieldmark/engine/kernel.h>
 
 namespace fieldmark::kernels {
 
@@ -10,7 +8,7 @@ struct FeaturePair {
   const T* a = nullptr;  ///< [pixels, channels]
   const T* b = nullptr;  ///< [pixels, channels]
   const T* w = nullptr;  ///< [channels]
-  std::int64_t pixels = 0, channels = 0;
+  Index pixels = 0, channels = 0;
 };
 
 // T is float or double. The sum over pixels of sum_c w_c (a_c / (|a| + 1e-10) - b_c / (|b| + 1e-10))^2.

@@ -19,14 +19,13 @@ constexpr int rows_of(int vectors) {
 template <class T>
 constexpr int kPanel = kVectors* kLanes<T>;
 
-// A block with sums this long takes a microsecond or more, and what it needs at its two ends may have left L2
-// since the block before: the numbers of C that it overwrites and those of the mask; of C that it adds to,
-// the next block's, since its own are needed at once. Asked for here, they come while it multiplies.
-constexpr std::int64_t kLongSum = 128;
+// A block with sums this long takes a microsecond or more, and its ends may have left L2 since the block
+// before. So a block prefetches the elements of C that it overwrites and those of the mask; if it adds to C,
+// those of the next block, since it needs its own at once.
+constexpr Index kLongSum = 128;
 
 template <class T, int R, int V>
-[[gnu::always_inline]] inline void ask_for_ends(const Gemm<T>& g, const T* c, std::int64_t ldc,
-                                                const T* mask) {
+[[gnu::always_inline]] inline void prefetch_ends(const Gemm<T>& g, const T* c, Index ldc, const T* mask) {
   constexpr int kToWrite = 1;
   const T* written = g.accumulate ? c + R * ldc : c;
   for (int i = 0; i < R; ++i)
@@ -38,23 +37,23 @@ template <class T, int R, int V>
 
 // One block of C in registers; B's rows are `stride` apart.
 template <class T, int R, int V>
-[[gnu::always_inline]] inline void block(const Gemm<T>& g, const T* a, const T* b, std::int64_t stride, T* c,
-                                         std::int64_t ldc, const T* bias, const T* mask) {
+[[gnu::always_inline]] inline void block(const Gemm<T>& g, const T* a, const T* b, Index stride, T* c,
+                                         Index ldc, const T* bias, const T* mask) {
   constexpr int L = kLanes<T>;
-  if (g.k >= kLongSum) ask_for_ends<T, R, V>(g, c, ldc, mask);
+  if (g.k >= kLongSum) prefetch_ends<T, R, V>(g, c, ldc, mask);
   Vec<T> acc[R][V];
   for (int i = 0; i < R; ++i)
     for (int j = 0; j < V; ++j)
       acc[i][j] = g.accumulate ? simd::load(c + i * ldc + j * L) : bias ? simd::load(bias + j * L) : Vec<T>{};
-  // One line of A is asked for in each step: the next block's, or, where A is read by columns, this block's
-  // 16 steps on. Activations of a chunk come from L3 or memory, whose latency the hardware's own prefetching
-  // does not hide.
+  // Each step prefetches one line of A: the next block's, or, where A is read by columns, this block's 16
+  // steps ahead. Activations of a chunk come from L3 or memory, and hardware prefetching does not hide that
+  // latency.
   const bool by_rows = g.a_col == 1 && g.k > 0;
   const T* ahead = by_rows ? a + R * g.a_row : a + 16 * g.a_col;
-  const std::int64_t on = by_rows ? R * g.a_row / g.k : g.a_col;
-  for (std::int64_t s = 0; s < g.segments; ++s, a += g.a_segment) {
+  const Index on = by_rows ? R * g.a_row / g.k : g.a_col;
+  for (Index s = 0; s < g.segments; ++s, a += g.a_segment) {
     const T* p = a;
-    for (std::int64_t k = 0; k < g.k; ++k, p += g.a_col, b += stride, ahead += on) {
+    for (Index k = 0; k < g.k; ++k, p += g.a_col, b += stride, ahead += on) {
       __builtin_prefetch(ahead);
       Vec<T> row[V];
       for (int j = 0; j < V; ++j) row[j] = simd::load(b + j * L);
@@ -76,7 +75,7 @@ template <class T, int R, int V>
 
 // All rows of V vectors of columns: blocks of R rows, what is left in ever smaller ones.
 template <class T, int V, int R = rows_of(V)>
-void panel(const Gemm<T>& g, const T* b, std::int64_t stride, std::int64_t column, std::int64_t i = 0) {
+void panel(const Gemm<T>& g, const T* b, Index stride, Index column, Index i = 0) {
   const T *bias = g.bias ? g.bias + column : nullptr, *mask = g.mask ? g.mask + column : nullptr;
   for (; i + R <= g.m; i += R)
     block<T, R, V>(g, g.a + i * g.a_row, b, stride, g.c + i * g.ldc + column, g.ldc, bias,
@@ -87,12 +86,12 @@ void panel(const Gemm<T>& g, const T* b, std::int64_t stride, std::int64_t colum
 
 // Columns that do not fill a vector: C passes through a block of its own.
 template <class T>
-void narrow(const Gemm<T>& g, const T* b, std::int64_t stride, std::int64_t j, int columns) {
+void narrow(const Gemm<T>& g, const T* b, Index stride, Index j, int columns) {
   constexpr int W = kLanes<T>, R = rows_of(1);
   T bias[W] = {}, c[R * W] = {};
   if (g.bias)
     for (int x = 0; x < columns; ++x) bias[x] = g.bias[j + x];
-  for (std::int64_t i = 0; i < g.m; i += R) {
+  for (Index i = 0; i < g.m; i += R) {
     const int count = static_cast<int>(g.m - i < R ? g.m - i : R);
     if (g.accumulate)
       for (int r = 0; r < count; ++r)
@@ -104,49 +103,47 @@ void narrow(const Gemm<T>& g, const T* b, std::int64_t stride, std::int64_t j, i
         block<T, 1, 1>(g, g.a + (i + r) * g.a_row, b, stride, c + r * W, W, bias, nullptr);
     for (int r = 0; r < count; ++r)
       for (int x = 0; x < columns; ++x) {
-        const std::int64_t at = (i + r) * g.ldc + j + x;
+        const Index at = (i + r) * g.ldc + j + x;
         g.c[at] = !g.mask || g.mask[at] > 0 ? c[r * W + x] : T(0);
       }
   }
 }
 
-// Row i of a full panel, read where it lies: whole vectors, without the checks that a loop over any width
-// needs.
+// Row i of a full panel in place: whole vectors, without the checks of a loop over any width.
 template <class T>
-[[gnu::always_inline]] inline void pack_full_row(const T* from, const T* mask, std::int64_t panel, T* out) {
-  for (std::int64_t x = 0; x < panel; x += kLanes<T>) {
+[[gnu::always_inline]] inline void pack_full_row(const T* from, const T* mask, Index panel, T* out) {
+  for (Index x = 0; x < panel; x += kLanes<T>) {
     const Vec<T> v = simd::load(from + x);
     simd::store(out + x, !mask ? v : simd::load(mask + x) > Vec<T>{} ? v : Vec<T>{});
   }
 }
 
-// Row i of a panel: `width` numbers, the rest of it zeros.
+// Row i of a panel: `width` elements, then zeros.
 template <class T>
-[[gnu::always_inline]] inline void pack_row(const T* from, const T* mask, std::int64_t column, int width,
-                                            std::int64_t panel, T* out) {
+[[gnu::always_inline]] inline void pack_row(const T* from, const T* mask, Index column, int width,
+                                            Index panel, T* out) {
   if (mask)
     for (int x = 0; x < width; ++x) out[x] = mask[x * column] > 0 ? from[x * column] : T(0);
   else
     for (int x = 0; x < width; ++x) out[x] = from[x * column];
-  for (std::int64_t x = width; x < panel; ++x) out[x] = 0;
+  for (Index x = width; x < panel; ++x) out[x] = 0;
 }
 
 }  // namespace
 
 template <class T>
-std::int64_t gemm_panel(std::int64_t columns) {
+Index gemm_panel(Index columns) {
   constexpr int L = kLanes<T>;
   return columns >= kPanel<T> ? kPanel<T> : columns > L ? (columns + L - 1) / L * L : L;
 }
 
 template <class T>
-void pack_panels(const T* b, std::int64_t rows, std::int64_t columns, std::int64_t row, std::int64_t column,
-                 const T* mask, T* out) {
-  const std::int64_t panel = gemm_panel<T>(columns);
-  for (std::int64_t j = 0; j < columns; j += panel) {
+void pack_panels(const T* b, Index rows, Index columns, Index row, Index column, const T* mask, T* out) {
+  const Index panel = gemm_panel<T>(columns);
+  for (Index j = 0; j < columns; j += panel) {
     const int width = static_cast<int>(columns - j < panel ? columns - j : panel);
-    for (std::int64_t i = 0; i < rows; ++i, out += panel) {
-      const std::int64_t at = i * row + j * column;
+    for (Index i = 0; i < rows; ++i, out += panel) {
+      const Index at = i * row + j * column;
       const T* m = mask ? mask + at : nullptr;
       if (column == 1 && width == panel)
         pack_full_row(b + at, m, panel, out);
@@ -159,23 +156,23 @@ void pack_panels(const T* b, std::int64_t rows, std::int64_t columns, std::int64
 }
 
 template <class T>
-void pad_rows(const T* d, std::int64_t rows, std::int64_t columns, const T* mask, std::int64_t row, T* out) {
+void pad_rows(const T* d, Index rows, Index columns, const T* mask, Index row, T* out) {
   if (row == columns) {
-    const std::int64_t n = rows * columns, whole = n / kLanes<T> * kLanes<T>;
+    const Index n = rows * columns, whole = n / kLanes<T> * kLanes<T>;
     pack_full_row(d, mask, whole, out);
     return pack_row(d + whole, mask ? mask + whole : nullptr, 1, static_cast<int>(n - whole), n - whole,
                     out + whole);
   }
-  for (std::int64_t i = 0; i < rows; ++i)
+  for (Index i = 0; i < rows; ++i)
     pack_row(d + i * columns, mask ? mask + i * columns : nullptr, 1, static_cast<int>(columns), row,
              out + i * row);
 }
 
-// Where a segment's rows of B would not stay in L1 beside those of the others, C passes over them one segment
-// at a time: every block of C's rows then finds them there. The sums are taken in the same order.
+// If a segment's rows of B do not stay in L1 beside those of the others, C passes over one segment at a time:
+// every block of rows of C then finds them there. The order of the sums is the same.
 template <class T>
-void by_segments(const Gemm<T>& g, std::int64_t stride, std::int64_t step) {
-  for (std::int64_t s = 0; s < g.segments; ++s) {
+void by_segments(const Gemm<T>& g, Index stride, Index step) {
+  for (Index s = 0; s < g.segments; ++s) {
     Gemm<T> part = g;
     const bool last = s + 1 == g.segments;
     part.segments = 1;
@@ -192,13 +189,13 @@ void by_segments(const Gemm<T>& g, std::int64_t stride, std::int64_t step) {
 template <class T>
 void gemm(const Gemm<T>& g) {
   constexpr int L = kLanes<T>;
-  constexpr std::int64_t kSegmentBytes = 8192;  // below it storing C in between costs more
-  const std::int64_t width = gemm_panel<T>(g.n), stride = g.b_row ? g.b_row : width;
-  const std::int64_t step = g.b_panel ? g.b_panel : g.segments * g.k * stride;
-  if (g.segments > 1 && g.k * width * static_cast<std::int64_t>(sizeof(T)) >= kSegmentBytes)
+  constexpr Index kSegmentBytes = 8192;  // below it storing C in between costs more
+  const Index width = gemm_panel<T>(g.n), stride = g.b_row ? g.b_row : width;
+  const Index step = g.b_panel ? g.b_panel : g.segments * g.k * stride;
+  if (g.segments > 1 && g.k * width * static_cast<Index>(sizeof(T)) >= kSegmentBytes)
     return by_segments(g, stride, step);
   const T* b = g.b;
-  for (std::int64_t j = 0; j < g.n; j += width, b += step) {
+  for (Index j = 0; j < g.n; j += width, b += step) {
     const int columns = static_cast<int>(g.n - j < width ? g.n - j : width), full = columns / L * L;
     switch (columns / L) {
       case 1:
@@ -222,10 +219,10 @@ void gemm(const Gemm<T>& g) {
 
 // One panel of V vectors; two sums each hide the latency of an addition.
 template <class T, int V>
-void panel_sums(const T* panel, std::int64_t rows, std::int64_t stride, T* out) {
+void panel_sums(const T* panel, Index rows, Index stride, T* out) {
   constexpr int L = kLanes<T>;
   Vec<T> even[V] = {}, odd[V] = {};
-  std::int64_t i = 0;
+  Index i = 0;
   for (; i + 2 <= rows; i += 2, panel += 2 * stride)
     for (int v = 0; v < V; ++v) {
       even[v] += simd::load(panel + v * L);
@@ -237,7 +234,7 @@ void panel_sums(const T* panel, std::int64_t rows, std::int64_t stride, T* out) 
 }
 
 template <class T>
-void sums_of_panel(const T* panel, std::int64_t rows, std::int64_t stride, std::int64_t vectors, T* out) {
+void sums_of_panel(const T* panel, Index rows, Index stride, Index vectors, T* out) {
   switch (vectors) {
     case 1:
       return panel_sums<T, 1>(panel, rows, stride, out);
@@ -251,28 +248,27 @@ void sums_of_panel(const T* panel, std::int64_t rows, std::int64_t stride, std::
 }
 
 template <class T>
-void column_sums(const T* b, std::int64_t rows, std::int64_t columns, std::int64_t b_row,
-                 std::int64_t b_panel, T* sums) {
-  constexpr std::int64_t kRows = 512;  // summed in T; blocks of them in double, so that long sums stay exact
-  const std::int64_t width = gemm_panel<T>(columns);
+void column_sums(const T* b, Index rows, Index columns, Index b_row, Index b_panel, T* sums) {
+  constexpr Index kRows = 512;  // summed in T; blocks of them in double, so that long sums stay exact
+  const Index width = gemm_panel<T>(columns);
   T block[kPanel<T>];
-  for (std::int64_t j = 0; j < columns; j += width, b += b_panel) {
-    const std::int64_t left = columns - j < width ? columns - j : width,
-                       vectors = (left + kLanes<T> - 1) / kLanes<T>;
+  for (Index j = 0; j < columns; j += width, b += b_panel) {
+    const Index left = columns - j < width ? columns - j : width,
+                vectors = (left + kLanes<T> - 1) / kLanes<T>;
     double total[kPanel<T>] = {};
-    for (std::int64_t i = 0; i < rows; i += kRows) {
+    for (Index i = 0; i < rows; i += kRows) {
       sums_of_panel(b + i * b_row, rows - i < kRows ? rows - i : kRows, b_row, vectors, block);
-      for (std::int64_t x = 0; x < left; ++x) total[x] += static_cast<double>(block[x]);
+      for (Index x = 0; x < left; ++x) total[x] += static_cast<double>(block[x]);
     }
-    for (std::int64_t x = 0; x < left; ++x) sums[j + x] += static_cast<T>(total[x]);
+    for (Index x = 0; x < left; ++x) sums[j + x] += static_cast<T>(total[x]);
   }
 }
 
-#define FIELDMARK_INSTANTIATE(T)                                                                             \
-  template std::int64_t gemm_panel<T>(std::int64_t);                                                         \
-  template void pack_panels(const T*, std::int64_t, std::int64_t, std::int64_t, std::int64_t, const T*, T*); \
-  template void column_sums(const T*, std::int64_t, std::int64_t, std::int64_t, std::int64_t, T*);           \
-  template void pad_rows(const T*, std::int64_t, std::int64_t, const T*, std::int64_t, T*);                  \
+#define FIELDMARK_INSTANTIATE(T)                                                 \
+  template Index gemm_panel<T>(Index);                                           \
+  template void pack_panels(const T*, Index, Index, Index, Index, const T*, T*); \
+  template void column_sums(const T*, Index, Index, Index, Index, T*);           \
+  template void pad_rows(const T*, Index, Index, const T*, Index, T*);           \
   template void gemm(const Gemm<T>&);
 FIELDMARK_INSTANTIATE(float)
 FIELDMARK_INSTANTIATE(double)

@@ -1,7 +1,5 @@
 #pragma once
-#include <fieldmark/engine/isa.h>
-
-#include <cstdint>
+#include <fieldmark/engine/kernel.h>
 
 namespace fieldmark::kernels {
 
@@ -12,14 +10,14 @@ namespace fieldmark::kernels {
 /// length, b_panel = gemm_panel(n).
 template <class T>
 struct Gemm {
-  std::int64_t m = 0, n = 0, k = 0, segments = 1;
+  Index m = 0, n = 0, k = 0, segments = 1;
   const T* a = nullptr;
-  std::int64_t a_row = 0, a_col = 1, a_segment = 0;
+  Index a_row = 0, a_col = 1, a_segment = 0;
   const T* b = nullptr;
-  std::int64_t b_row = 0;    ///< distance between rows; 0: gemm_panel(n)
-  std::int64_t b_panel = 0;  ///< distance between panels; 0: they follow each other
-  T* c = nullptr;            ///< row-major, rows ldc apart
-  std::int64_t ldc = 0;
+  Index b_row = 0;    ///< distance between rows; 0: gemm_panel(n)
+  Index b_panel = 0;  ///< distance between panels; 0: they follow each other
+  T* c = nullptr;     ///< row-major, rows ldc apart
+  Index ldc = 0;
   const T* bias = nullptr;  ///< [n]; not with accumulate
   const T* mask =
       nullptr;  ///< laid out as C, which becomes 0 where it is not positive: through a ReLU's backward
@@ -28,27 +26,25 @@ struct Gemm {
 
 /// Width of the panels of a matrix of so many columns on this instruction set: a few vectors, and no more
 /// than the columns fill.
-FIELDMARK_DECLARE_KERNEL(template <class T> std::int64_t, gemm_panel, (std::int64_t columns))
+FIELDMARK_DECLARE_KERNEL(template <class T> Index, gemm_panel, (Index columns))
 
 /// Packs B [rows, columns], read at b[i row + j column], into panels of gemm_panel(columns)
 /// columns: panel after panel, each row-major and contiguous, the last filled up with zeros. Without it the
 /// rows of one panel fall into few sets of the cache. Where `mask` (laid out as b) is given, entries at which
 /// it is not positive become 0: the backward of a ReLU.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, pack_panels,
-                         (const T* b, std::int64_t rows, std::int64_t columns, std::int64_t row,
-                          std::int64_t column, const T* mask, T* out))
+                         (const T* b, Index rows, Index columns, Index row, Index column, const T* mask,
+                          T* out))
 
-/// Copies D [rows, columns] to rows of `row` >= columns numbers, filled up with zeros; entries at which
+/// Copies D [rows, columns] to rows of `row` >= columns elements, padded with zeros; entries at which
 /// `mask` (laid out as D; null: none) is not positive become 0 too.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, pad_rows,
-                         (const T* d, std::int64_t rows, std::int64_t columns, const T* mask,
-                          std::int64_t row, T* out))
+                         (const T* d, Index rows, Index columns, const T* mask, Index row, T* out))
 
 FIELDMARK_DECLARE_KERNEL(template <class T> void, gemm, (const Gemm<T>& g))
 
 /// Adds to sums [columns] the sums of the columns of B [rows, columns], laid out as in Gemm.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, column_sums,
-                         (const T* b, std::int64_t rows, std::int64_t columns, std::int64_t b_row,
-                          std::int64_t b_panel, T* sums))
+                         (const T* b, Index rows, Index columns, Index b_row, Index b_panel, T* sums))
 
 }  // namespace fieldmark::kernels

@@ -8,9 +8,9 @@
 namespace fieldmark::kernels::FIELDMARK_ISA_NS {
 namespace {
 
-constexpr std::int64_t kRows = 32;    // of A that are rounded together
-constexpr std::int64_t kDepth = 512;  // of a row that fit beside them on the stack
-constexpr std::int64_t kWidth = 16;   // columns of a panel of B
+constexpr Index kRows = 32;    // of A that are rounded together
+constexpr Index kDepth = 512;  // of a row that fit beside them on the stack
+constexpr Index kWidth = 16;   // columns of a panel of B
 
 [[gnu::always_inline]] inline std::uint16_t rounded(float x) {
   std::uint32_t bits;
@@ -19,16 +19,16 @@ constexpr std::int64_t kWidth = 16;   // columns of a panel of B
   return static_cast<std::uint16_t>((bits + 0x7fff + ((bits >> 16) & 1)) >> 16);
 }
 
-// 32 rows of A, rounded, `depth` numbers each (a multiple of 32); what A does not fill is 0.
+// 32 rows of A, rounded, `depth` elements each (a multiple of 32), padded with zeros.
 struct Rows {
   alignas(64) std::uint16_t at[kRows * kDepth];
-  std::int64_t depth;
+  Index depth;
 
-  void load(const float* a, std::int64_t a_row, std::int64_t rows, std::int64_t k) {
+  void load(const float* a, Index a_row, Index rows, Index k) {
     depth = (k + 31) / 32 * 32;
-    for (std::int64_t i = 0; i < kRows; ++i) {
+    for (Index i = 0; i < kRows; ++i) {
       std::uint16_t* out = at + i * depth;
-      std::int64_t x = 0;
+      Index x = 0;
       if (i < rows) {
 #if defined(__AVX512BF16__)
         for (; x + 32 <= k; x += 32) {
@@ -55,13 +55,13 @@ struct alignas(64) TileShapes {
 };
 
 // Tiles 0 to 3 sum, 4 and 5 hold rows, 6 and 7 the panels: every tile that is loaded is used twice.
-void tile_products(const Rows& rows, const std::uint16_t* b, std::int64_t panel, Products& out) {
+void tile_products(const Rows& rows, const std::uint16_t* b, Index panel, Products& out) {
   _tile_zero(0);
   _tile_zero(1);
   _tile_zero(2);
   _tile_zero(3);
   const auto stride = static_cast<int>(2 * rows.depth);
-  for (std::int64_t k = 0; k < rows.depth; k += 32) {
+  for (Index k = 0; k < rows.depth; k += 32) {
     _tile_loadd(4, rows.at + k, stride);
     _tile_loadd(5, rows.at + 16 * rows.depth + k, stride);
     _tile_loadd(6, b + k * kWidth, 64);
@@ -78,11 +78,11 @@ void tile_products(const Rows& rows, const std::uint16_t* b, std::int64_t panel,
 }
 
 // Blocks of 8 rows and two panels: 16 sums hide the latency of a dot product.
-void dot_products(const Rows& rows, const std::uint16_t* b, std::int64_t panel, Products& out) {
+void dot_products(const Rows& rows, const std::uint16_t* b, Index panel, Products& out) {
   constexpr int R = 8;
-  for (std::int64_t i = 0; i < kRows; i += R) {
+  for (Index i = 0; i < kRows; i += R) {
     __m512 sum[R][2] = {};
-    for (std::int64_t k = 0; k < rows.depth; k += 2) {
+    for (Index k = 0; k < rows.depth; k += 2) {
       __m512bh column[2];
       for (int v = 0; v < 2; ++v) std::memcpy(&column[v], b + v * panel + k * kWidth, sizeof column[v]);
       for (int r = 0; r < R; ++r) {
@@ -105,12 +105,12 @@ float widened(std::uint16_t x) {
   return f;
 }
 
-void plain_products(const Rows& rows, const std::uint16_t* b, std::int64_t panel, Products& out) {
-  for (std::int64_t i = 0; i < kRows; ++i)
-    for (std::int64_t v = 0; v < 2; ++v)
-      for (std::int64_t j = 0; j < kWidth; ++j) {
+void plain_products(const Rows& rows, const std::uint16_t* b, Index panel, Products& out) {
+  for (Index i = 0; i < kRows; ++i)
+    for (Index v = 0; v < 2; ++v)
+      for (Index j = 0; j < kWidth; ++j) {
         float sum = 0;
-        for (std::int64_t k = 0; k < rows.depth; ++k)
+        for (Index k = 0; k < rows.depth; ++k)
           sum +=
               widened(rows.at[i * rows.depth + k]) * widened(b[v * panel + (k / 2 * kWidth + j) * 2 + k % 2]);
         out[i * 2 * kWidth + v * kWidth + j] = sum;
@@ -118,19 +118,18 @@ void plain_products(const Rows& rows, const std::uint16_t* b, std::int64_t panel
 }
 #endif
 
-// One number of C from its sum of products.
-[[gnu::always_inline]] inline void finish(const GemmBf16& g, std::int64_t i, std::int64_t j, float sum) {
-  const std::int64_t at = i * g.ldc + j;
+// One element of C from its sum of products.
+[[gnu::always_inline]] inline void finish(const GemmBf16& g, Index i, Index j, float sum) {
+  const Index at = i * g.ldc + j;
   float c = sum + (g.accumulate ? g.c[at] : g.bias ? g.bias[j] : 0.f);
   if (g.mask && !(g.mask[at] > 0)) c = 0;
   g.c[at] = g.relu && c < 0 ? 0 : c;
 }
 
 // The same for a whole vector.
-[[gnu::always_inline]] inline void finish_vector(const GemmBf16& g, std::int64_t i, std::int64_t j,
-                                                 const float* sums) {
+[[gnu::always_inline]] inline void finish_vector(const GemmBf16& g, Index i, Index j, const float* sums) {
   using V = simd::Vec<float>;
-  const std::int64_t at = i * g.ldc + j;
+  const Index at = i * g.ldc + j;
   V c = simd::load(sums);
   if (g.accumulate)
     c += simd::load(g.c + at);
@@ -140,11 +139,10 @@ void plain_products(const Rows& rows, const std::uint16_t* b, std::int64_t panel
   simd::store(g.c + at, g.relu ? simd::max(V{}, c) : c);
 }
 
-void finish_block(const GemmBf16& g, std::int64_t i, std::int64_t rows, std::int64_t j, std::int64_t columns,
-                  const float* products) {
-  constexpr std::int64_t L = simd::kLanes<float>;
-  for (std::int64_t r = 0; r < rows; ++r, products += 2 * kWidth) {
-    std::int64_t x = 0;
+void finish_block(const GemmBf16& g, Index i, Index rows, Index j, Index columns, const float* products) {
+  constexpr Index L = simd::kLanes<float>;
+  for (Index r = 0; r < rows; ++r, products += 2 * kWidth) {
+    Index x = 0;
     for (; x + L <= columns; x += L) finish_vector(g, i + r, j + x, products + x);
     for (; x < columns; ++x) finish(g, i + r, j + x, products[x]);
   }
@@ -152,43 +150,42 @@ void finish_block(const GemmBf16& g, std::int64_t i, std::int64_t rows, std::int
 
 }  // namespace
 
-void pack_bf16(const float* b, std::int64_t rows, std::int64_t columns, std::int64_t row, std::int64_t column,
-               std::uint16_t* out) {
-  const std::int64_t depth = (rows + 31) / 32 * 32;
-  for (std::int64_t j = 0; j < columns; j += kWidth)
-    for (std::int64_t i = 0; i < depth; i += 2)
-      for (std::int64_t x = 0; x < kWidth; ++x)
-        for (std::int64_t p = 0; p < 2; ++p)
+void pack_bf16(const float* b, Index rows, Index columns, Index row, Index column, std::uint16_t* out) {
+  const Index depth = (rows + 31) / 32 * 32;
+  for (Index j = 0; j < columns; j += kWidth)
+    for (Index i = 0; i < depth; i += 2)
+      for (Index x = 0; x < kWidth; ++x)
+        for (Index p = 0; p < 2; ++p)
           *out++ = i + p < rows && j + x < columns ? rounded(b[(i + p) * row + (j + x) * column])
                                                    : std::uint16_t{0};
 }
 
-void round_bf16(const float* x, std::int64_t n, std::uint16_t* out) {
-  for (std::int64_t i = 0; i < n; ++i) out[i] = rounded(x[i]);
+void round_bf16(const float* x, Index n, std::uint16_t* out) {
+  for (Index i = 0; i < n; ++i) out[i] = rounded(x[i]);
 }
 
 void gemm_bf16(const GemmBf16& g) {
   // The panels of B hold all of K; a part of it moves on within each.
-  const std::int64_t panel = (g.k + 31) / 32 * 32 * kWidth;
+  const Index panel = (g.k + 31) / 32 * 32 * kWidth;
 #if defined(__AVX512BF16__)
   const TileShapes shapes;
   if (g.tiles) _tile_loadconfig(&shapes);
 #endif
   Rows rows;
   alignas(64) Products products;
-  for (std::int64_t i = 0; i < g.m; i += kRows) {
-    const std::int64_t count = g.m - i < kRows ? g.m - i : kRows;
-    for (std::int64_t begin = 0; begin == 0 || begin < g.k; begin += kDepth) {
+  for (Index i = 0; i < g.m; i += kRows) {
+    const Index count = g.m - i < kRows ? g.m - i : kRows;
+    for (Index begin = 0; begin == 0 || begin < g.k; begin += kDepth) {
       GemmBf16 part = g;
       const bool last = begin + kDepth >= g.k;
       part.accumulate = g.accumulate || begin > 0;
       part.relu = g.relu && last;
       part.mask = last ? g.mask : nullptr;
       rows.load(g.a + i * g.a_row + begin, g.a_row, count, last ? g.k - begin : kDepth);
-      for (std::int64_t j = 0; j < g.n; j += 2 * kWidth) {
-        const std::int64_t columns = g.n - j < 2 * kWidth ? g.n - j : 2 * kWidth;
+      for (Index j = 0; j < g.n; j += 2 * kWidth) {
+        const Index columns = g.n - j < 2 * kWidth ? g.n - j : 2 * kWidth;
         const std::uint16_t* b = g.b + j / kWidth * panel + begin * kWidth;
-        const std::int64_t other = columns > kWidth ? panel : 0;  // the last panel may be alone
+        const Index other = columns > kWidth ? panel : 0;  // the last panel may be alone
 #if defined(__AVX512BF16__)
         (g.tiles ? tile_products : dot_products)(rows, b, other, products);
 #else

@@ -1,27 +1,25 @@
 #pragma once
-#include <fieldmark/engine/isa.h>
-
-#include <cstdint>
+#include <fieldmark/engine/kernel.h>
 
 namespace fieldmark::kernels {
 
 /// C[i, j] = start + sum_k A[i, k] B[k, j] with A and B rounded to bf16 (8 bits of mantissa, to nearest even)
 /// and sums in float. Start, bias, mask and ReLU as in Gemm. B comes from pack_bf16().
 struct GemmBf16 {
-  std::int64_t m = 0, n = 0, k = 0;
+  Index m = 0, n = 0, k = 0;
   const float* a = nullptr;
-  std::int64_t a_row = 0;
+  Index a_row = 0;
   const std::uint16_t* b = nullptr;
   float* c = nullptr;
-  std::int64_t ldc = 0;
+  Index ldc = 0;
   const float* bias = nullptr;
   const float* mask = nullptr;
   bool accumulate = false, relu = false;
   bool tiles = false;  ///< AMX; otherwise AVX-512's dot products
 };
 
-/// Numbers that pack_bf16() writes for B [rows, columns].
-constexpr std::int64_t bf16_size(std::int64_t rows, std::int64_t columns) {
+/// Elements that pack_bf16() writes for B [rows, columns].
+constexpr Index bf16_size(Index rows, Index columns) {
   return (rows + 31) / 32 * 32 * ((columns + 15) / 16 * 16);
 }
 
@@ -29,11 +27,11 @@ constexpr std::int64_t bf16_size(std::int64_t rows, std::int64_t columns) {
 /// rows lie together: out[panel][pair of rows][column][row of the pair]. Rows are filled up to a multiple of
 /// 32, columns of 16.
 FIELDMARK_DECLARE_KERNEL(void, pack_bf16,
-                         (const float* b, std::int64_t rows, std::int64_t columns, std::int64_t row,
-                          std::int64_t column, std::uint16_t* out))
+                         (const float* b, Index rows, Index columns, Index row, Index column,
+                          std::uint16_t* out))
 
-/// Rounds n numbers to bf16.
-FIELDMARK_DECLARE_KERNEL(void, round_bf16, (const float* x, std::int64_t n, std::uint16_t* out))
+/// Rounds n elements to bf16.
+FIELDMARK_DECLARE_KERNEL(void, round_bf16, (const float* x, Index n, std::uint16_t* out))
 
 /// On v4 only, and only where bf16_units() says so: the other levels compute it without special instructions,
 /// for tests.

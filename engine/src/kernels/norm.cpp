@@ -25,9 +25,9 @@ inline void join(double count, double n, V centre, V residual, V squares, double
 
 // Sum of `count` pixels, one channel vector each, in four chains: one would wait for its own additions.
 template <class V, class T, class F>
-[[gnu::always_inline]] inline V sum_pixels(const T* x, std::int64_t count, std::int64_t channels, F f) {
+[[gnu::always_inline]] inline V sum_pixels(const T* x, Index count, Index channels, F f) {
   V s[4] = {};
-  std::int64_t p = 0;
+  Index p = 0;
   for (; p + 4 <= count; p += 4)
     for (int k = 0; k < 4; ++k) s[k] += f(load_as<V>(x + (p + k) * channels));
   for (; p < count; ++p) s[0] += f(load_as<V>(x + p * channels));
@@ -36,16 +36,20 @@ template <class V, class T, class F>
 
 // (x - mean) gain + shift > 0 ? dy : 0.
 template <class V, class T>
-[[gnu::always_inline]] inline V gate(V centred, V dy, const Affine<T>& a, std::int64_t c) {
+[[gnu::always_inline]] inline V gate(V centred, V dy, const Affine<T>& a, Index c) {
   if (!a.relu) return dy;
   return centred * load_as<V>(a.gain + c) + load_as<V>(a.shift + c) > 0 ? dy : V{};
 }
 
+}  // namespace
+
+namespace FIELDMARK_ISA_NS {
+
 template <class T>
-void moments(const T* x, std::int64_t pixels, std::int64_t channels, double* mean, double* m2) {
-  for (std::int64_t c = 0; c < channels; ++c) mean[c] = m2[c] = 0;
-  for_segments(pixels, [=](std::int64_t first, std::int64_t n) {
-    for_channels<T>(channels, [=](auto zero, std::int64_t c) {
+void channel_moments(const T* x, Index pixels, Index channels, double* mean, double* m2) {
+  for (Index c = 0; c < channels; ++c) mean[c] = m2[c] = 0;
+  for_segments(pixels, [=](Index first, Index n) {
+    for_channels<T>(channels, [=](auto zero, Index c) {
       using V = decltype(zero);
       const T* p = x + first * channels + c;
       // The second pass finds the segment in the L1 cache.
@@ -59,9 +63,9 @@ void moments(const T* x, std::int64_t pixels, std::int64_t channels, double* mea
 }
 
 template <class T>
-void affine(const T* x, T* y, std::int64_t pixels, std::int64_t channels, const Affine<T>& a) {
-  for (std::int64_t p = 0; p < pixels; ++p, x += channels, y += channels)
-    for_channels<T>(channels, [=](auto zero, std::int64_t c) {
+void normalise(const T* x, T* y, Index pixels, Index channels, const Affine<T>& a) {
+  for (Index p = 0; p < pixels; ++p, x += channels, y += channels)
+    for_channels<T>(channels, [=](auto zero, Index c) {
       using V = decltype(zero);
       const V v =
           (load_as<V>(x + c) - load_as<V>(a.mean + c)) * load_as<V>(a.gain + c) + load_as<V>(a.shift + c);
@@ -70,16 +74,16 @@ void affine(const T* x, T* y, std::int64_t pixels, std::int64_t channels, const 
 }
 
 template <class T>
-void gradient_sums(const T* x, const T* dy, std::int64_t pixels, std::int64_t channels, const Affine<T>& a,
-                   double* sums, double* mixed) {
-  for (std::int64_t c = 0; c < channels; ++c) sums[c] = mixed[c] = 0;
-  for_segments(pixels, [=](std::int64_t first, std::int64_t n) {
-    for_channels<T>(channels, [=](auto zero, std::int64_t c) {
+void norm_sums(const T* x, const T* dy, Index pixels, Index channels, const Affine<T>& a, double* sums,
+               double* mixed) {
+  for (Index c = 0; c < channels; ++c) sums[c] = mixed[c] = 0;
+  for_segments(pixels, [=](Index first, Index n) {
+    for_channels<T>(channels, [=](auto zero, Index c) {
       using V = decltype(zero);
       V s[2] = {}, m[2] = {};
       const V mean = load_as<V>(a.mean + c);
-      for (std::int64_t p = 0; p < n; ++p) {
-        const std::int64_t at = (first + p) * channels + c;
+      for (Index p = 0; p < n; ++p) {
+        const Index at = (first + p) * channels + c;
         const V centred = load_as<V>(x + at) - mean, g = gate(centred, load_as<V>(dy + at), a, c);
         s[p & 1] += g;
         m[p & 1] += g * centred;
@@ -91,10 +95,10 @@ void gradient_sums(const T* x, const T* dy, std::int64_t pixels, std::int64_t ch
 }
 
 template <class T>
-void gradient(const T* x, const T* dy, T* dx, std::int64_t pixels, std::int64_t channels, const Affine<T>& a,
-              const T* offset, const T* slope, bool add) {
-  for (std::int64_t p = 0; p < pixels; ++p, x += channels, dy += channels, dx += channels)
-    for_channels<T>(channels, [=](auto zero, std::int64_t c) {
+void norm_gradient(const T* x, const T* dy, T* dx, Index pixels, Index channels, const Affine<T>& a,
+                   const T* offset, const T* slope, bool add) {
+  for (Index p = 0; p < pixels; ++p, x += channels, dy += channels, dx += channels)
+    for_channels<T>(channels, [=](auto zero, Index c) {
       using V = decltype(zero);
       const V centred = load_as<V>(x + c) - load_as<V>(a.mean + c),
               g = gate(centred, load_as<V>(dy + c), a, c);
@@ -103,36 +107,12 @@ void gradient(const T* x, const T* dy, T* dx, std::int64_t pixels, std::int64_t 
     });
 }
 
-}  // namespace
-
-namespace FIELDMARK_ISA_NS {
-
-template <class T>
-void channel_moments(const T* x, std::int64_t pixels, std::int64_t channels, double* mean, double* m2) {
-  moments(x, pixels, channels, mean, m2);
-}
-template <class T>
-void normalise(const T* x, T* y, std::int64_t pixels, std::int64_t channels, const Affine<T>& a) {
-  affine(x, y, pixels, channels, a);
-}
-template <class T>
-void norm_sums(const T* x, const T* dy, std::int64_t pixels, std::int64_t channels, const Affine<T>& a,
-               double* sums, double* mixed) {
-  gradient_sums(x, dy, pixels, channels, a, sums, mixed);
-}
-template <class T>
-void norm_gradient(const T* x, const T* dy, T* dx, std::int64_t pixels, std::int64_t channels,
-                   const Affine<T>& a, const T* offset, const T* slope, bool add) {
-  gradient(x, dy, dx, pixels, channels, a, offset, slope, add);
-}
-
-#define FIELDMARK_INSTANTIATE(T)                                                                     \
-  template void channel_moments(const T*, std::int64_t, std::int64_t, double*, double*);             \
-  template void normalise(const T*, T*, std::int64_t, std::int64_t, const Affine<T>&);               \
-  template void norm_sums(const T*, const T*, std::int64_t, std::int64_t, const Affine<T>&, double*, \
-                          double*);                                                                  \
-  template void norm_gradient(const T*, const T*, T*, std::int64_t, std::int64_t, const Affine<T>&,  \
-                              const T*, const T*, bool);
+#define FIELDMARK_INSTANTIATE(T)                                                                          \
+  template void channel_moments(const T*, Index, Index, double*, double*);                                \
+  template void normalise(const T*, T*, Index, Index, const Affine<T>&);                                  \
+  template void norm_sums(const T*, const T*, Index, Index, const Affine<T>&, double*, double*);          \
+  template void norm_gradient(const T*, const T*, T*, Index, Index, const Affine<T>&, const T*, const T*, \
+                              bool);
 FIELDMARK_INSTANTIATE(float)
 FIELDMARK_INSTANTIATE(double)
 #undef FIELDMARK_INSTANTIATE

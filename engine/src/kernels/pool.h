@@ -1,13 +1,11 @@
 #pragma once
-#include <fieldmark/engine/isa.h>
-
-#include <cstdint>
+#include <fieldmark/engine/kernel.h>
 
 namespace fieldmark::kernels {
 
-// A row of windows of size x size pixels: x has size rows of `row` numbers each, y has `windows` pixels.
+// A row of windows of size x size pixels: x has size rows of `row` elements each, y has `windows` pixels.
 struct PoolRow {
-  std::int64_t windows, size, channels, row;
+  Index windows, size, channels, row;
 };
 
 // T is float or double.
@@ -17,23 +15,22 @@ FIELDMARK_DECLARE_KERNEL(template <class T> void, pool_row_backward,
                          (const PoolRow& p, const T* dy, T* dx, bool add))
 // sums[c] = sum over pixels of x[pixel, c], of those at which `mask` is positive where it is given.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, channel_sums,
-                         (const T* x, const T* mask, std::int64_t pixels, std::int64_t channels,
-                          double* sums))
+                         (const T* x, const T* mask, Index pixels, Index channels, double* sums))
 // y[pixel, c] = or += row[c].
 FIELDMARK_DECLARE_KERNEL(template <class T> void, fill_pixels,
-                         (const T* row, std::int64_t pixels, std::int64_t channels, T* y, bool add))
+                         (const T* row, Index pixels, Index channels, T* y, bool add))
 
 // A row of overlapping windows: x has `rows` rows of `width` pixels; windows begin `stride` pixels apart, and
 // what reaches beyond the width is left out.
 struct MaxPoolRow {
-  std::int64_t windows, size, stride, rows, width, channels;
+  Index windows, size, stride, rows, width, channels;
 };
-// y[w, c] = the largest of window w, and place[w, c] the number of its pixel, u * size + v (null: not
+// y[w, c] = the maximum of window w, and place[w, c] the index of its pixel, u * size + v (null: not
 // wanted).
 FIELDMARK_DECLARE_KERNEL(template <class T> void, max_pool_row,
                          (const MaxPoolRow& p, const T* x, T* y, T* place))
 // Row u of the windows: dx[pixel, c] += dy[w, c] where that pixel was the largest of window w.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, max_pool_row_backward,
-                         (const MaxPoolRow& p, std::int64_t u, const T* dy, const T* place, T* dx))
+                         (const MaxPoolRow& p, Index u, const T* dy, const T* place, T* dx))
 
 }  // namespace fieldmark::kernels

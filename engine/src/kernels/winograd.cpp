@@ -11,8 +11,8 @@ constexpr T kP = T(0.70710678118654752440);
 template <class T>
 constexpr T kQ = T(1.41421356237309504880);
 
-// Each transform along one axis: `to` numbers from `from` numbers, rows in the order of the points 0, p, -p,
-// q, -q, infinity. V is a vector or a number of T.
+// Each transform along one axis: `from` inputs to `to` outputs, rows in the order of the points 0, p, -p,
+// q, -q, infinity. V is a vector or a scalar of T.
 
 // B^T: row i holds the coefficients of prod_{j != i} (z - a_j), the last those of the product over all
 // points.
@@ -112,28 +112,27 @@ template <class Line, class T, class V, class Load, class Store>
   }
 }
 
-// As for_channels(), with vectors of 16 bytes before single numbers: a transform of 36 numbers is dear
-// enough.
+// As for_channels(), with vectors of 16 bytes before scalars, since a transform of 36 elements is expensive.
 template <class T, class F>
-[[gnu::always_inline]] inline void for_vectors(std::int64_t channels, F f) {
+[[gnu::always_inline]] inline void for_vectors(Index channels, F f) {
   typedef T Short __attribute__((vector_size(16)));
-  constexpr std::int64_t lanes = simd::kLanes<T>, few = 16 / static_cast<std::int64_t>(sizeof(T));
-  std::int64_t c = 0;
+  constexpr Index lanes = simd::kLanes<T>, few = 16 / static_cast<Index>(sizeof(T));
+  Index c = 0;
   for (; c + lanes <= channels; c += lanes) f(simd::Vec<T>{}, c);
   for (; c + few <= channels; c += few) f(Short{}, c);
   for (; c < channels; ++c) f(T{}, c);
 }
 
-constexpr std::int64_t smaller(std::int64_t a, std::int64_t b) { return a < b ? a : b; }
+constexpr Index smaller(Index a, Index b) { return a < b ? a : b; }
 
 // Calls f(number within `count`, offset of the tile's first pixel from the image's, its row, its column,
 // and the image's first pixel).
 template <class T, class F>
 [[gnu::always_inline]] inline void for_tiles(const WinogradTiles<T>& x, F f) {
-  const std::int64_t down = (x.h + kWinogradTile - 1) / kWinogradTile,
-                     across = (x.w + kWinogradTile - 1) / kWinogradTile;
-  for (std::int64_t t = 0; t < x.count; ++t) {
-    const std::int64_t tile = x.first + t, line = tile / across;
+  const Index down = (x.h + kWinogradTile - 1) / kWinogradTile,
+              across = (x.w + kWinogradTile - 1) / kWinogradTile;
+  for (Index t = 0; t < x.count; ++t) {
+    const Index tile = x.first + t, line = tile / across;
     f(t, line / down * x.h * x.w, line % down * kWinogradTile, tile % across * kWinogradTile);
   }
 }
@@ -141,29 +140,28 @@ template <class T, class F>
 // Calls f(V{}, c, where number [row, c] of the first matrix lies) for the channels of a row of matrices in
 // panels; what the last panel has beyond them becomes 0.
 template <class T, class F>
-[[gnu::always_inline]] inline void for_row(const WinogradMatrices<T>& to, std::int64_t row,
-                                           std::int64_t channels, F f) {
+[[gnu::always_inline]] inline void for_row(const WinogradMatrices<T>& to, Index row, Index channels, F f) {
   T* at = to.data + row * to.panel;
-  for (std::int64_t first = 0; first < channels; first += to.panel, at += to.distance) {
-    const std::int64_t width = smaller(to.panel, channels - first);
-    for_vectors<T>(width, [=](auto zero, std::int64_t c) { f(zero, first + c, at + c); });
-    for (std::int64_t c = width; c < to.panel; ++c)
-      for (std::int64_t k = 0; k < kWinogradProducts; ++k) at[k * to.stride + c] = 0;
+  for (Index first = 0; first < channels; first += to.panel, at += to.distance) {
+    const Index width = smaller(to.panel, channels - first);
+    for_vectors<T>(width, [=](auto zero, Index c) { f(zero, first + c, at + c); });
+    for (Index c = width; c < to.panel; ++c)
+      for (Index k = 0; k < kWinogradProducts; ++k) at[k * to.stride + c] = 0;
   }
 }
 
 // Transforms each tile's square of Line::from pixels a side, whose first lies `border` before the tile's.
-template <class Line, std::int64_t border, class T>
+template <class Line, Index border, class T>
 void transform(const WinogradTiles<T>& x, const WinogradMatrices<T>& to) {
-  const std::int64_t pixel = x.channels, line = x.w * pixel;
-  for_tiles(x, [=](std::int64_t t, std::int64_t image, std::int64_t row, std::int64_t column) {
-    const std::int64_t top = row - border, left = column - border;
-    const std::int64_t begin = (image + top * x.w + left) * pixel;
+  const Index pixel = x.channels, line = x.w * pixel;
+  for_tiles(x, [=](Index t, Index image, Index row, Index column) {
+    const Index top = row - border, left = column - border;
+    const Index begin = (image + top * x.w + left) * pixel;
     const bool inside = top >= 0 && left >= 0 && top + Line::from <= x.h && left + Line::from <= x.w;
-    for_row(to, t, x.channels, [=](auto zero, std::int64_t c, T* at) {
+    for_row(to, t, x.channels, [=](auto zero, Index c, T* at) {
       using V = decltype(zero);
       const auto store = [=](int i, int j, V v) { store_as(at + (i * 6 + j) * to.stride, v); };
-      const std::int64_t from = begin + c;
+      const Index from = begin + c;
       if (inside && !x.mask) {
         both_axes<Line, T, V>([=](int i, int j) { return load_as<V>(x.data + from + i * line + j * pixel); },
                               store);
@@ -175,7 +173,7 @@ void transform(const WinogradTiles<T>& x, const WinogradMatrices<T>& to) {
       for (int i = 0; i < Line::from; ++i)
 #pragma GCC unroll 1
         for (int j = 0; j < Line::from; ++j) {
-          const std::int64_t k = from + i * line + j * pixel;
+          const Index k = from + i * line + j * pixel;
           if (top + i < 0 || top + i >= x.h || left + j < 0 || left + j >= x.w)
             square[i][j] = V{};
           else if (x.mask)
@@ -184,28 +182,6 @@ void transform(const WinogradTiles<T>& x, const WinogradMatrices<T>& to) {
             square[i][j] = load_as<V>(x.data + k);
         }
       both_axes<Line, T, V>([&](int i, int j) { return square[i][j]; }, store);
-    });
-  });
-}
-
-template <class T>
-void outputs(const WinogradTiles<T>& x, const WinogradMatrices<const T>& m, const WinogradOutput<T>& out) {
-  const std::int64_t pixel = x.channels, line = x.w * pixel;
-  for_tiles(x, [=](std::int64_t t, std::int64_t image, std::int64_t row, std::int64_t column) {
-    const std::int64_t rows = x.h - row, columns = x.w - column;
-    T* y = out.y + (image + row * x.w + column) * pixel;
-    for_vectors<T>(pixel, [=](auto zero, std::int64_t c) {
-      using V = decltype(zero);
-      const T* from = m.data + t * pixel + c;
-      const V bias = out.bias ? load_as<V>(out.bias + c) : V{};
-      both_axes<OutputLine, T, V>([=](int i, int j) { return load_as<V>(from + (i * 6 + j) * m.stride); },
-                                  [=](int i, int j, V v) {
-                                    if (i >= rows || j >= columns) return;
-                                    T* to = y + i * line + j * pixel + c;
-                                    v += out.accumulate ? load_as<V>(to) : bias;
-                                    // Zero comes first: NaN stays NaN.
-                                    store_as(to, out.relu ? simd::max(V{}, v) : v);
-                                  });
     });
   });
 }
@@ -225,10 +201,10 @@ void winograd_tiles(const WinogradTiles<T>& dy, const WinogradMatrices<T>& to) {
 }
 
 template <class T>
-void winograd_weights(const T* w, std::int64_t c_in, std::int64_t c_out, std::int64_t first,
-                      std::int64_t count, const WinogradMatrices<T>& to) {
-  for (std::int64_t row = first; row < first + count; ++row)
-    for_row(to, row, c_out, [=](auto zero, std::int64_t c, T* at) {
+void winograd_weights(const T* w, Index c_in, Index c_out, Index first, Index count,
+                      const WinogradMatrices<T>& to) {
+  for (Index row = first; row < first + count; ++row)
+    for_row(to, row, c_out, [=](auto zero, Index c, T* at) {
       using V = decltype(zero);
       const T* from = w + row * c_out + c;
       both_axes<WeightLine, T, V>([=](int i, int j) { return load_as<V>(from + (i * 3 + j) * c_in * c_out); },
@@ -237,16 +213,32 @@ void winograd_weights(const T* w, std::int64_t c_in, std::int64_t c_out, std::in
 }
 
 template <class T>
-void winograd_outputs(const WinogradTiles<T>& tiles, const WinogradMatrices<const T>& m,
+void winograd_outputs(const WinogradTiles<T>& x, const WinogradMatrices<const T>& m,
                       const WinogradOutput<T>& out) {
-  outputs(tiles, m, out);
+  const Index pixel = x.channels, line = x.w * pixel;
+  for_tiles(x, [=](Index t, Index image, Index row, Index column) {
+    const Index rows = x.h - row, columns = x.w - column;
+    T* y = out.y + (image + row * x.w + column) * pixel;
+    for_vectors<T>(pixel, [=](auto zero, Index c) {
+      using V = decltype(zero);
+      const T* from = m.data + t * pixel + c;
+      const V bias = out.bias ? load_as<V>(out.bias + c) : V{};
+      both_axes<OutputLine, T, V>([=](int i, int j) { return load_as<V>(from + (i * 6 + j) * m.stride); },
+                                  [=](int i, int j, V v) {
+                                    if (i >= rows || j >= columns) return;
+                                    T* to = y + i * line + j * pixel + c;
+                                    v += out.accumulate ? load_as<V>(to) : bias;
+                                    // Zero comes first: NaN stays NaN.
+                                    store_as(to, out.relu ? simd::max(V{}, v) : v);
+                                  });
+    });
+  });
 }
 
 template <class T>
-void winograd_weight_gradient(const WinogradMatrices<const T>& m, std::int64_t c_in, std::int64_t c_out,
-                              T* dw) {
-  const std::int64_t plane = c_in * c_out;
-  for_vectors<T>(plane, [=](auto zero, std::int64_t at) {
+void winograd_weight_gradient(const WinogradMatrices<const T>& m, Index c_in, Index c_out, T* dw) {
+  const Index plane = c_in * c_out;
+  for_vectors<T>(plane, [=](auto zero, Index at) {
     using V = decltype(zero);
     both_axes<GradientLine, T, V>(
         [=](int i, int j) { return load_as<V>(m.data + (i * 6 + j) * m.stride + at); },
@@ -257,14 +249,13 @@ void winograd_weight_gradient(const WinogradMatrices<const T>& m, std::int64_t c
   });
 }
 
-#define FIELDMARK_INSTANTIATE(T)                                                                   \
-  template void winograd_windows(const WinogradTiles<T>&, const WinogradMatrices<T>&);             \
-  template void winograd_tiles(const WinogradTiles<T>&, const WinogradMatrices<T>&);               \
-  template void winograd_weights(const T*, std::int64_t, std::int64_t, std::int64_t, std::int64_t, \
-                                 const WinogradMatrices<T>&);                                      \
-  template void winograd_outputs(const WinogradTiles<T>&, const WinogradMatrices<const T>&,        \
-                                 const WinogradOutput<T>&);                                        \
-  template void winograd_weight_gradient(const WinogradMatrices<const T>&, std::int64_t, std::int64_t, T*);
+#define FIELDMARK_INSTANTIATE(T)                                                                    \
+  template void winograd_windows(const WinogradTiles<T>&, const WinogradMatrices<T>&);              \
+  template void winograd_tiles(const WinogradTiles<T>&, const WinogradMatrices<T>&);                \
+  template void winograd_weights(const T*, Index, Index, Index, Index, const WinogradMatrices<T>&); \
+  template void winograd_outputs(const WinogradTiles<T>&, const WinogradMatrices<const T>&,         \
+                                 const WinogradOutput<T>&);                                         \
+  template void winograd_weight_gradient(const WinogradMatrices<const T>&, Index, Index, T*);
 FIELDMARK_INSTANTIATE(float)
 FIELDMARK_INSTANTIATE(double)
 #undef FIELDMARK_INSTANTIATE

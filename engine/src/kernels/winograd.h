@@ -1,7 +1,5 @@
 #pragma once
-#include <fieldmark/engine/isa.h>
-
-#include <cstdint>
+#include <fieldmark/engine/kernel.h>
 
 // The transforms of Winograd's convolution F(4 x 4, 3 x 3) and of its weight gradient F(3 x 3, 4 x 4): a
 // window of 6 x 6 pixels and a tile of 4 x 4 outputs meet in 36 products for each pair of channels, where the
@@ -9,15 +7,15 @@
 // and infinity instead of their 0, +-1, +-2 and infinity (ops/conv2d_winograd.cpp has the errors of both).
 namespace fieldmark::kernels {
 
-constexpr std::int64_t kWinogradTile = 4;       // outputs of a tile along an axis
-constexpr std::int64_t kWinogradProducts = 36;  // numbers of a transformed tile
+constexpr Index kWinogradTile = 4;       // outputs of a tile along an axis
+constexpr Index kWinogradProducts = 36;  // elements of a transformed tile
 
-/// 36 matrices, `stride` numbers apart, in panels as pack_panels() lays them out: number [row, column] is at
+/// 36 matrices with a stride of `stride` elements, in panels as of pack_panels(): element [row, column] is at
 /// (column / panel) distance + row panel + column % panel. One panel as wide as the matrix is row-major.
 template <class T>
 struct WinogradMatrices {
   T* data = nullptr;
-  std::int64_t stride = 0, panel = 0, distance = 0;
+  Index stride = 0, panel = 0, distance = 0;
 };
 
 /// Tiles first .. first + count of the images [n, h, w, channels], numbered image by image and row by
@@ -27,8 +25,8 @@ template <class T>
 struct WinogradTiles {
   const T* data = nullptr;
   const T* mask = nullptr;
-  std::int64_t h = 0, w = 0, channels = 0;
-  std::int64_t first = 0, count = 0;
+  Index h = 0, w = 0, channels = 0;
+  Index first = 0, count = 0;
 };
 
 /// What becomes of the outputs: y's old value or the bias is added, then they may pass through a ReLU.
@@ -47,14 +45,14 @@ FIELDMARK_DECLARE_KERNEL(template <class T> void, winograd_tiles,
                          (const WinogradTiles<T>& dy, const WinogradMatrices<T>& to))
 /// to[:, c, o] = G w[:, :, c, o] G^T for c in [first, first + count) of w [3, 3, c_in, c_out].
 FIELDMARK_DECLARE_KERNEL(template <class T> void, winograd_weights,
-                         (const T* w, std::int64_t c_in, std::int64_t c_out, std::int64_t first,
-                          std::int64_t count, const WinogradMatrices<T>& to))
+                         (const T* w, Index c_in, Index c_out, Index first, Index count,
+                          const WinogradMatrices<T>& to))
 /// y's tile = A^T m[:, tile, o] A; tiles.data is not read.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, winograd_outputs,
                          (const WinogradTiles<T>& tiles, const WinogradMatrices<const T>& m,
                           const WinogradOutput<T>& out))
 /// dw[:, :, c, o] += G^T m[:, c, o] G for dw [3, 3, c_in, c_out]; m is row-major.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, winograd_weight_gradient,
-                         (const WinogradMatrices<const T>& m, std::int64_t c_in, std::int64_t c_out, T* dw))
+                         (const WinogradMatrices<const T>& m, Index c_in, Index c_out, T* dw))
 
 }  // namespace fieldmark::kernels

@@ -26,12 +26,12 @@ Var<T> BatchNorm<T>::operator()(const Params<T>& params, Var<T> x, BatchStatisti
 
 template <class T>
 Var<T> BatchNorm<T>::evaluate(const Params<T>& params, Var<T> x) const {
-  const auto numbers = [&](ParamId id) {
+  const auto values = [&](ParamId id) {
     const Var<T> v = params.leaf(x.tape(), id);
     return std::span<const T>(v.value(), static_cast<std::size_t>(v.shape().size()));
   };
-  return batch_norm_fixed(x, params.leaf(x.tape(), gamma_), params.leaf(x.tape(), beta_), numbers(mean_),
-                          numbers(variance_), options_);
+  return batch_norm_fixed(x, params.leaf(x.tape(), gamma_), params.leaf(x.tape(), beta_), values(mean_),
+                          values(variance_), options_);
 }
 
 template <class T>

@@ -1,14 +1,14 @@
 #include <fieldmark/engine/ops/activation.h>
 
 #include "kernels/elementwise.h"
-#include "ops/pieces.h"
+#include "ops/chunks.h"
 
 namespace fieldmark {
 namespace kernels {
 namespace {
 
 // Derivation: dx = dy f'(x), with f' written in x or y, whichever is exact (kernels/elementwise.cpp).
-// A piece owns its elements of y and dx.
+// A chunk owns its elements of y and dx.
 template <class T>
 Var<T> unary(Unary f, Var<T> x) {
   const auto forward = FIELDMARK_KERNEL(unary_forward<T>);
@@ -31,44 +31,18 @@ Var<T> unary(Unary f, Var<T> x) {
 }  // namespace
 }  // namespace kernels
 
-using kernels::Unary;
-
-template <class T>
-Var<T> relu(Var<T> x) {
-  return kernels::unary(Unary::relu, x);
-}
-template <class T>
-Var<T> sigmoid(Var<T> x) {
-  return kernels::unary(Unary::sigmoid, x);
-}
-template <class T>
-Var<T> tanh(Var<T> x) {
-  return kernels::unary(Unary::tanh, x);
-}
-template <class T>
-Var<T> exp(Var<T> x) {
-  return kernels::unary(Unary::exp, x);
-}
-template <class T>
-Var<T> truncated_exp(Var<T> x) {
-  return kernels::unary(Unary::truncated_exp, x);
-}
-template <class T>
-Var<T> softplus(Var<T> x) {
-  return kernels::unary(Unary::softplus, x);
-}
-
-template Var<float> relu(Var<float>);
-template Var<double> relu(Var<double>);
-template Var<float> sigmoid(Var<float>);
-template Var<double> sigmoid(Var<double>);
-template Var<float> tanh(Var<float>);
-template Var<double> tanh(Var<double>);
-template Var<float> exp(Var<float>);
-template Var<double> exp(Var<double>);
-template Var<float> truncated_exp(Var<float>);
-template Var<double> truncated_exp(Var<double>);
-template Var<float> softplus(Var<float>);
-template Var<double> softplus(Var<double>);
+#define FIELDMARK_UNARY(f)                       \
+  template <class T>                             \
+  Var<T> f(Var<T> x) {                           \
+    return kernels::unary(kernels::Unary::f, x); \
+  }                                              \
+  template Var<float> f(Var<float>);             \
+  template Var<double> f(Var<double>);
+FIELDMARK_UNARY(relu)
+FIELDMARK_UNARY(sigmoid)
+FIELDMARK_UNARY(tanh)
+FIELDMARK_UNARY(exp)
+FIELDMARK_UNARY(truncated_exp)
+FIELDMARK_UNARY(softplus)
 
 }  // namespace fieldmark

@@ -1,7 +1,7 @@
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/shape_checks.h>
 
-#include "ops/pieces.h"
+#include "ops/chunks.h"
 
 namespace fieldmark {
 namespace {
@@ -16,7 +16,7 @@ Var<T> map(Shape shape, std::initializer_list<Var<T>> inputs, F f) {
   return out;
 }
 
-// Each backward below: every element of an input's gradient is owned by the piece that holds its index.
+// In each backward below a chunk owns its elements of the gradients.
 
 }  // namespace
 

@@ -34,7 +34,7 @@ Var<T> batch_norm_fixed(Var<T> x, Var<T> gamma, Var<T> beta, std::span<const T> 
   const Index channels = x.shape()[3];
   for (const auto& [name, values] : {std::pair{"mean", mean}, std::pair{"variance", variance}})
     if (static_cast<Index>(values.size()) != channels)
-      throw ShapeError(std::string("[batch_norm_fixed] ") + name + " must have one number for each of the " +
+      throw ShapeError(std::string("[batch_norm_fixed] ") + name + " must have one element for each of the " +
                        std::to_string(channels) + " channels of x, got " + std::to_string(values.size()));
   auto* m = x.tape().template scratch<double>(channels);
   auto* v = x.tape().template scratch<double>(channels);

@@ -2,8 +2,8 @@
 #include <fieldmark/engine/shape_checks.h>
 
 #include "kernels/pool.h"
+#include "ops/chunks.h"
 #include "ops/conv2d_parts.h"
-#include "ops/pieces.h"
 
 namespace fieldmark {
 namespace {
@@ -22,22 +22,19 @@ const T* flipped(Tape<T>& tape, const T* w, const ConvGeometry& g) {
   return out;
 }
 
-// db[o] += the sum of dY over all pixels where the mask is positive: sums of pieces, added in order.
+// db[o] += the sum of dY over all pixels where the mask is positive: sums of chunks, added in order.
 template <class T>
 void bias_gradient(Tape<T>& tape, const T* dy, const T* mask, Index pixels, Index channels, T* db) {
   using namespace kernels;
-  const Index block = detail::row_grain(channels), pieces = (pixels + block - 1) / block;
-  auto* sums = tape.template scratch<double>(pieces * channels);
+  const Index block = detail::row_grain(channels), chunks = (pixels + block - 1) / block;
+  auto* sums = tape.template scratch<double>(chunks * channels);
   const auto sum = FIELDMARK_KERNEL(channel_sums<T>);
   parallel_for(pixels, block, [&](Index begin, Index end) {
     const Index at = begin * channels;
     sum(dy + at, mask ? mask + at : nullptr, end - begin, channels, sums + begin / block * channels);
   });
-  for (Index o = 0; o < channels; ++o) {
-    double total = 0;
-    for (Index p = 0; p < pieces; ++p) total += sums[p * channels + o];
-    db[o] += static_cast<T>(total);
-  }
+  for (Index o = 0; o < channels; ++o)
+    db[o] += static_cast<T>(detail::channel_total(sums, chunks, channels, o));
 }
 
 ConvGeometry geometry(const Shape& x, const Shape& w, const Shape& b, Index stride = 1, Index padding = 0) {
@@ -67,7 +64,7 @@ Var<T> convolve(Var<T> x, Var<T> w, Var<T> b, const ConvGeometry& g, Activation 
     bordered = detail::direct_convolve(tape, g, forward);
 
   // dZ = dY through the ReLU; db sums it, dW correlates it with x, dX convolves it with the flipped weights;
-  // where windows move by steps or are not centred, dX spreads it instead.
+  // with a stride or without "same" padding, dX scatters it instead.
   tape.on_backward(out, [=](const T* dy) {
     Tape<T>& t = x.tape();
     const T* mask = relu ? y : nullptr;
@@ -107,11 +104,11 @@ Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, Activation activation, ConvMethod me
 }
 
 template <class T>
-Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, ConvSteps steps, Activation activation) {
-  if (steps.stride < 1 || steps.padding < 0)
+Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, ConvWindow window, Activation activation) {
+  if (window.stride < 1 || window.padding < 0)
     throw ValueError("[conv2d] stride must be at least 1 and padding at least 0, got stride " +
-                     std::to_string(steps.stride) + " and padding " + std::to_string(steps.padding));
-  const ConvGeometry g = geometry(x.shape(), w.shape(), b.shape(), steps.stride, steps.padding);
+                     std::to_string(window.stride) + " and padding " + std::to_string(window.padding));
+  const ConvGeometry g = geometry(x.shape(), w.shape(), b.shape(), window.stride, window.padding);
   if (std::min(g.h, g.w) + 2 * g.padding < g.k)
     throw ShapeError("[conv2d] x: height and width must be at least " + std::to_string(g.k - 2 * g.padding) +
                      " (the window's " + std::to_string(g.k) + " less two borders of " +
@@ -121,7 +118,7 @@ Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, ConvSteps steps, Activation activati
 
 template Var<float> conv2d(Var<float>, Var<float>, Var<float>, Activation, ConvMethod);
 template Var<double> conv2d(Var<double>, Var<double>, Var<double>, Activation, ConvMethod);
-template Var<float> conv2d(Var<float>, Var<float>, Var<float>, ConvSteps, Activation);
-template Var<double> conv2d(Var<double>, Var<double>, Var<double>, ConvSteps, Activation);
+template Var<float> conv2d(Var<float>, Var<float>, Var<float>, ConvWindow, Activation);
+template Var<double> conv2d(Var<double>, Var<double>, Var<double>, ConvWindow, Activation);
 
 }  // namespace fieldmark

@@ -4,13 +4,13 @@
 namespace fieldmark::detail {
 namespace {
 
-constexpr Index kDepth = 512;  // pixels that a product for dW sums over: as deep as stays in L2
+constexpr Index kDepth = 512;  // pixels that a product for dW sums over: as many as stay in L2
 
 Index rows(const ConvGeometry& g) { return g.n * g.out_h(); }
 Index padded_w(const ConvGeometry& g) { return g.w + 2 * g.padding; }
 Index padded_h(const ConvGeometry& g) { return g.h + 2 * g.padding; }
 
-// x [N, H, W, C] with a border of zeros, which every window then stays inside.
+// x [N, H, W, C] with a border of zeros, so that every window stays inside.
 template <class T>
 const T* with_border(Tape<T>& tape, const ConvGeometry& g, const T* x, const T* mask) {
   const Index row = padded_w(g) * g.c, inner = g.w * g.c, border = g.padding * g.c;
@@ -39,7 +39,7 @@ const T* with_border(Tape<T>& tape, const ConvGeometry& g, const T* x, const T* 
 
 }  // namespace
 
-// A row of the result is one product: the windows of its pixels (K segments of K * channels numbers) times
+// A row of the result is one product: the windows of its pixels (K segments of K * channels elements) times
 // the weights.
 template <class T>
 const T* direct_convolve(Tape<T>& tape, const ConvGeometry& g, const Convolution<T>& c) {
@@ -103,8 +103,8 @@ void direct_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* borde
 }
 
 // dX[i s + u - p, j s + v - p, c] += sum over o of dY[i, j, o] w[u, v, c, o]: a row of dY times w[u] gives
-// for each of its pixels the K * channels numbers that lie together in the row of dX it sees. A piece owns
-// rows of dX with its border, gathers for each all the rows of dY that see it, and leaves the border out.
+// for each of its pixels K * channels contiguous elements of a row of dX. A chunk owns rows of dX with their
+// border, gathers every row of dY that touches them, and drops the border.
 template <class T>
 void direct_input_gradient(Tape<T>& tape, const ConvGeometry& g, const T* w, const T* dy, const T* mask,
                            bool accumulate, T* dx) {
@@ -123,12 +123,12 @@ void direct_input_gradient(Tape<T>& tape, const ConvGeometry& g, const T* w, con
   for (Index u = 0; u < g.k; ++u)
     pack(w + u * run_length * g.o, g.o, run_length, Index{1}, g.o, static_cast<const T*>(nullptr),
          weights + u * panels);
-  const Index pieces = (g.n * g.h + kRows - 1) / kRows, room = line + width * run_length;
-  T* rooms = tape.scratch(pieces * room);
+  const Index chunks = (g.n * g.h + kRows - 1) / kRows, size = line + width * run_length;
+  T* buffers = tape.scratch(chunks * size);
   parallel_for(g.n * g.h, kRows, [&](Index begin, Index end) {
     using namespace kernels;
     const auto run = FIELDMARK_KERNEL(gemm<T>);
-    T *sum = rooms + begin / kRows * room, *product = sum + line;
+    T *sum = buffers + begin / kRows * size, *product = sum + line;
     for (Index row = begin; row < end; ++row) {
       const Index image = row / g.h, r = row % g.h + g.padding;
       std::fill_n(sum, line, T(0));

@@ -4,7 +4,7 @@
 #include "ops/conv2d_parts.h"
 #include "ops/product.h"
 
-// Winograd's way for windows of 3 x 3: y = A^T [(G w G^T) . (B^T x B)] A for each tile of 4 x 4 outputs,
+// Winograd's method for windows of 3 x 3: y = A^T [(G w G^T) . (B^T x B)] A for each tile of 4 x 4 outputs,
 // summed over channels between the brackets, which is 36 products of matrices [tiles, C] [C, O]
 // (kernels/winograd.h). With dY in place of y the same three matrices give the weight's gradient,
 //   dw = G^T [sum over tiles (B^T x B) . (A dY A^T)] G,
@@ -12,7 +12,8 @@
 // definition, of which the transforms leave 2.5 (64 channels, AVX-512, one core: forward 2.7, with
 // gradients 2.6).
 //
-// Worst error in parts of the largest number, uniform random images and weights, direct way in brackets:
+// Maximum absolute error relative to the largest magnitude, uniform random images and weights, direct method
+// in brackets:
 //   channels    y                    dX                   dW
 //   64          1.7e-6 (1.1e-6)      1.7e-6 (1.1e-6)      8.5e-7 (1.7e-6)
 //   256         3.0e-6 (2.1e-6)      2.6e-6 (1.9e-6)      7.5e-7 (1.9e-6)
@@ -30,17 +31,16 @@ using kernels::kWinogradTile;
 using kernels::WinogradMatrices;
 using kernels::WinogradTiles;
 
-// Tiles of a block, a multiple of the rows of register blocks (kernels/gemm.cpp): with 64 channels its
-// transformed tiles, products and the weights take 1.2 MiB, and with hundreds the weights are not read too
-// often.
+// Tiles of a block, a multiple of the rows of register blocks (kernels/gemm.cpp): with 64 channels the
+// transformed tiles, the products and the weights take 1.2 MiB, and with hundreds the weights are not read
+// too often.
 constexpr Index kBlock = 36;
 
 Index tiles_along(Index extent) { return (extent + kWinogradTile - 1) / kWinogradTile; }
 Index tiles_of(const ConvGeometry& g) { return g.n * tiles_along(g.h) * tiles_along(g.w); }
 
-// A little more than the matrices need: 36 numbers at powers of 2 from each other would share few sets of the
-// cache.
-Index padded(Index numbers) { return round_up(numbers, Index{16}) + 16; }
+// Padding: 36 elements at a stride of a power of 2 would share few sets of the cache.
+Index padded(Index elements) { return round_up(elements, Index{16}) + 16; }
 
 template <class T>
 WinogradMatrices<T> row_major(T* data, Index rows, Index columns) {
@@ -52,13 +52,13 @@ WinogradMatrices<T> in_panels(T* data, Index rows, Index columns) {
   return {data, padded(rows * round_up(columns, panel)), panel, rows * panel};
 }
 
-// Room of this thread's own, kept for the life of the thread: a block finds it in the cache, where the block
-// before left it. Only kernels run while it is in use, so no one else asks for it.
+// A buffer for the life of this thread: it stays in the cache from block to block. Only kernels run while it
+// is in use, so no call nests.
 template <class T>
-T* workspace(Index numbers) {
-  static thread_local AlignedVector<T> room;
-  if (static_cast<Index>(room.size()) < numbers) room.resize(static_cast<std::size_t>(numbers));
-  return room.data();
+T* workspace(Index elements) {
+  static thread_local AlignedVector<T> buffer;
+  if (static_cast<Index>(buffer.size()) < elements) buffer.resize(static_cast<std::size_t>(elements));
+  return buffer.data();
 }
 
 }  // namespace
@@ -66,8 +66,8 @@ T* workspace(Index numbers) {
 // Measured on one core with AVX-512: at 8 channels on both sides it takes 1.2 times as long, at 12 and 12 or
 // 8 and 64 it is 1.2 and 1.7 times faster, at 64 and 64 2.5. Fewer than 6 pixels to a tile (a row of pixels,
 // where 5 x 5 has 6.25) waste the products. Transforming the weights pays from 4 tiles on while they stay in
-// L2, else from 32 (256 channels: 1.4 times slower at 16 tiles, 1.2 times faster at 36). The number of
-// images has no say: an image alone has the same bits as in a batch.
+// L2, else from 32 (256 channels: 1.4 times slower at 16 tiles, 1.2 times faster at 36). The number of images
+// does not count: an image alone has the same bits as in a batch.
 bool winograd_pays(const ConvGeometry& g) {
   const Index tiles = tiles_along(g.h) * tiles_along(g.w);
   return g.k == 3 && g.same() && std::min(g.c, g.o) >= 8 && g.c + g.o >= 24 && g.h * g.w >= 6 * tiles &&
@@ -106,8 +106,7 @@ void winograd_convolve(Tape<T>& tape, const ConvGeometry& g, const Convolution<T
   });
 }
 
-// A shard's sums over its tiles stay in the workspace, and come back to 9 from 36 numbers before they leave
-// it.
+// A shard's sums over its tiles stay in the workspace until they shrink from 36 to 9 elements.
 template <class T>
 void winograd_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* x, const T* dy, const T* mask,
                               T* dw) {

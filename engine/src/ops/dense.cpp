@@ -7,7 +7,7 @@ namespace fieldmark {
 namespace {
 
 constexpr Index kShardRows = 4096;  // rows of a partial sum of the weights' gradient
-constexpr Index kPieceRows = 512;   // rows that pass through the backward together: they stay in L2
+constexpr Index kChunkRows = 512;   // rows that pass through the backward together: they stay in L2
 
 template <class T>
 void forward(Var<T> x, Var<T> w, Var<T> b, bool relu, T* y) {
@@ -40,23 +40,23 @@ void forward(Var<T> x, Var<T> w, Var<T> b, bool relu, T* y) {
 template <class T>
 struct Backward {
   Index in, out;
-  const T *x, *transposed, *mask;  // the ReLU's output, where dY has not passed through it
+  const T *x, *transposed, *mask;  // mask: the ReLU's output if dY is not masked yet, else null
   const std::uint16_t* transposed_bf16;
   T* dx;  // null: not wanted
   bool mask_dx, fresh;
 };
 
-// Rows [begin, end): their share of dW and db, and their dX. `room`: for dZ, rows of whole vectors, where dY
-// is not that already.
+// Rows [begin, end): their share of dW and db, and their dX. `buffer` holds dZ in rows of whole vectors; null
+// if dY is dZ in that layout.
 template <class T>
-void backward_rows(const Backward<T>& p, const T* dy, Index begin, Index end, T* room, T* dw, T* db) {
+void backward_rows(const Backward<T>& p, const T* dy, Index begin, Index end, T* buffer, T* dw, T* db) {
   using namespace kernels;
   const auto product = FIELDMARK_KERNEL(gemm<T>);
   const Index rows = end - begin, at = begin * p.out, row = detail::whole_row<T>(p.out);
   const T *d = dy + at, *x = p.x + begin * p.in;
-  if (room) {
-    FIELDMARK_KERNEL(pad_rows<T>)(d, rows, p.out, p.mask ? p.mask + at : nullptr, row, room);
-    d = room;
+  if (buffer) {
+    FIELDMARK_KERNEL(pad_rows<T>)(d, rows, p.out, p.mask ? p.mask + at : nullptr, row, buffer);
+    d = buffer;
   }
   if (dw)
     product({.m = p.in,
@@ -97,8 +97,7 @@ void backward_rows(const Backward<T>& p, const T* dy, Index begin, Index end, T*
              .accumulate = !p.fresh});
 }
 
-// Pieces of rows own their rows of dX; the sums for dW and db are kept per shard of whole pieces and added in
-// order.
+// Chunks own their rows of dX; the sums for dW and db are kept per shard of whole chunks and added in order.
 template <class T>
 void backward(Var<T> x, Var<T> w, Var<T> b, Var<T> y, const T* dy) {
   Tape<T>& tape = x.tape();
@@ -111,10 +110,10 @@ void backward(Var<T> x, Var<T> w, Var<T> b, Var<T> y, const T* dy) {
     p.transposed =
         w.packed() ? w.packed()->transposed : detail::packed(tape, w.value(), out, in, Index{1}, out);
   T *dw = w.grad_acc(), *db = b.grad_acc();
-  const Index pieces = (n + kPieceRows - 1) / kPieceRows, own = (dw ? in * out : 0) + (db ? out : 0);
+  const Index chunks = (n + kChunkRows - 1) / kChunkRows, own = (dw ? in * out : 0) + (db ? out : 0);
   const Index shards = std::min(detail::kProductShards, (n + kShardRows - 1) / kShardRows);
-  const Index room = mask || row != out ? std::min(n, kPieceRows) * row : 0;
-  T *rooms = tape.scratch(shards * room), *sums = shards > 1 ? tape.scratch(shards * own) : nullptr;
+  const Index buffer = mask || row != out ? std::min(n, kChunkRows) * row : 0;
+  T *buffers = tape.scratch(shards * buffer), *sums = shards > 1 ? tape.scratch(shards * own) : nullptr;
   parallel_for(shards, 1, [&](Index s, Index) {
     T *to_w = dw, *to_b = db;
     if (sums) {
@@ -122,9 +121,9 @@ void backward(Var<T> x, Var<T> w, Var<T> b, Var<T> y, const T* dy) {
       to_b = db ? sums + (s + 1) * own - out : nullptr;
       std::fill_n(sums + s * own, own, T(0));
     }
-    for (Index i = s * pieces / shards; i < (s + 1) * pieces / shards; ++i)
-      backward_rows(p, dy, i * kPieceRows, std::min(n, (i + 1) * kPieceRows),
-                    room ? rooms + s * room : nullptr, to_w, to_b);
+    for (Index i = s * chunks / shards; i < (s + 1) * chunks / shards; ++i)
+      backward_rows(p, dy, i * kChunkRows, std::min(n, (i + 1) * kChunkRows),
+                    buffer ? buffers + s * buffer : nullptr, to_w, to_b);
   });
   for (Index s = 0; sums && s < shards; ++s) {
     const T* from = sums + s * own;
@@ -150,8 +149,8 @@ Var<T> dense(Var<T> x, Var<T> w, Var<T> b, Activation activation) {
   forward(x, w, b, relu, y);
   if (relu) tape.mark_rectified(result);
 
-  // dZ = dY where y > 0 (all of it without a ReLU); dX = dZ W^T, dW = X^T dZ, db = column sums of dZ. Where x
-  // itself came through a ReLU its mask is laid on dX here, where x is at hand.
+  // dZ = dY where y > 0 (everywhere without a ReLU); dX = dZ W^T, dW = X^T dZ, db = column sums of dZ. If x
+  // is the output of a ReLU, its mask is applied to dX here, while x is in cache.
   tape.on_backward(result, [=](const T* dy) { backward(x, w, b, result, dy); });
   return result;
 }

@@ -2,22 +2,9 @@
 #include <fieldmark/engine/shape_checks.h>
 
 #include "kernels/feature_distance.h"
-#include "ops/pieces.h"
+#include "ops/chunks.h"
 
 namespace fieldmark {
-namespace {
-
-// Calls f(image, first, count) for the pieces of the pixels of every image.
-template <class F>
-void for_pieces(Index images, Index pixels, Index block, F f) {
-  const Index blocks = (pixels + block - 1) / block;
-  parallel_for(images * blocks, 1, [&](Index piece, Index) {
-    const Index first = piece % blocks * block;
-    f(piece / blocks, first, std::min(block, pixels - first));
-  });
-}
-
-}  // namespace
 
 template <class T>
 Var<T> feature_distance(Var<T> a, Var<T> b, std::span<const T> weights) {
@@ -36,26 +23,24 @@ Var<T> feature_distance(Var<T> a, Var<T> b, std::span<const T> weights) {
   auto* sums = tape.template scratch<double>(s[0] * blocks);
   const auto forward = FIELDMARK_KERNEL(feature_distance<T>);
   const T* w = weights.data();
-  for_pieces(s[0], pixels, block, [&](Index n, Index first, Index count) {
+  detail::for_image_chunks(s[0], pixels, block, [&](Index n, Index first, Index count) {
     const Index at = (n * pixels + first) * s[3];
     sums[n * blocks + first / block] = forward({a.value() + at, b.value() + at, w, count, s[3]});
   });
-  for (Index n = 0; n < s[0]; ++n) {
-    double total = 0;
-    for (Index k = 0; k < blocks; ++k) total += sums[n * blocks + k];
-    y[n] = static_cast<T>(total / static_cast<double>(pixels));
-  }
+  for (Index n = 0; n < s[0]; ++n)
+    y[n] =
+        static_cast<T>(detail::channel_total(sums + n * blocks, blocks, 1, 0) / static_cast<double>(pixels));
 
   // With r = |a| and s = 1 / (r + e), d = a s - b s_b and g_c = 2 w_c d_c dy / pixels:
-  //   da_c = g_c s - a_c (g . a) s^2 / r,   and db the same with a and b changed, since d only changes sign.
-  // A piece owns its pixels.
+  //   da_c = g_c s - a_c (g . a) s^2 / r,   and db with a and b swapped, since d only changes sign.
+  // A chunk owns its pixels.
   tape.on_backward(out, [=](const T* dy) {
     const auto backward = FIELDMARK_KERNEL(feature_distance_backward<T>);
     const auto run = [&](Var<T> of, Var<T> other) {
       bool fresh = false;
       T* d = of.grad_acc(&fresh);
       if (!d) return;
-      for_pieces(s[0], pixels, block, [&](Index n, Index first, Index count) {
+      detail::for_image_chunks(s[0], pixels, block, [&](Index n, Index first, Index count) {
         const Index at = (n * pixels + first) * s[3];
         backward({of.value() + at, other.value() + at, w, count, s[3]}, dy[n] / static_cast<T>(pixels),
                  !fresh, d + at);

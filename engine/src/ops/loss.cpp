@@ -37,7 +37,7 @@ Var<T> bce_with_logits(Var<T> logits, std::span<const T> targets, std::span<cons
   const Index n = logits.shape().size();
   if (static_cast<Index>(targets.size()) != n)
     throw ShapeError(
-        "[bce_with_logits] targets must have one number for each of the logits, whose shape is " +
+        "[bce_with_logits] targets must have one element for each of the logits, whose shape is " +
         logits.shape().str() + ", got " + std::to_string(targets.size()));
   for (std::size_t i = 0; i < targets.size(); ++i)
     if (!(targets[i] >= 0 && targets[i] <= 1))
@@ -47,8 +47,7 @@ Var<T> bce_with_logits(Var<T> logits, std::span<const T> targets, std::span<cons
   const auto value = [=](Index i) {
     return std::max(x[i], T(0)) - x[i] * t[i] + std::log1p(std::exp(-std::abs(x[i])));
   };
-  // dl/dx = s(x) - t. For x > 0 written as (1 - t) - s(-x), so that a right and certain bit keeps its tiny
-  // slope.
+  // dl/dx = s(x) - t; for x > 0 as (1 - t) - s(-x), so that a correct and certain bit keeps its tiny slope.
   const auto slope = [=](Index i) {
     const T e = std::exp(-std::abs(x[i])), small = e / (1 + e);
     return x[i] > 0 ? (1 - t[i]) - small : small - t[i];

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "kernels/norm.h"
-#include "ops/pieces.h"
+#include "ops/chunks.h"
 
 // What group and batch normalisation share: x is [images, pixels, channels], and statistics belong to an
 // image's group of channels. Batch normalisation is one image of all pixels with as many groups as channels.
@@ -12,30 +12,29 @@ namespace fieldmark::kernels {
 
 struct NormLayout {
   Index images, pixels, channels, groups;
-  Index block() const { return detail::row_grain(channels); }             // pixels in one piece
-  Index blocks() const { return (pixels + block() - 1) / block(); }       // pieces of one image
+  Index block() const { return detail::row_grain(channels); }             // pixels of one chunk
+  Index blocks() const { return (pixels + block() - 1) / block(); }       // chunks of one image
   Index width() const { return channels / groups; }                       // channels of one group
-  double count() const { return static_cast<double>(pixels * width()); }  // numbers of one group
+  double count() const { return static_cast<double>(pixels * width()); }  // elements of one group
 };
 
-// Calls f(image, piece, first pixel's offset into x, pixels of the piece).
+// Calls f(image, chunk, first pixel's offset into x, pixels of the chunk).
 template <class F>
 void for_blocks(const NormLayout& l, F f) {
-  parallel_for(l.images * l.blocks(), 1, [&](Index piece, Index) {
-    const Index image = piece / l.blocks(), first = piece % l.blocks() * l.block();
-    f(image, piece, (image * l.pixels + first) * l.channels, std::min(l.block(), l.pixels - first));
+  detail::for_image_chunks(l.images, l.pixels, l.block(), [&](Index image, Index first, Index count) {
+    f(image, image * l.blocks() + first / l.block(), (image * l.pixels + first) * l.channels, count);
   });
 }
 
-// mean and variance of each image's group, [images, groups]. Pieces are joined in order (Chan et al. 1983),
+// mean and variance of each image's group, [images, groups]. Chunks are joined in order (Chan et al. 1983),
 // so that nothing cancels for a nearly constant image, and a constant one has variance 0.
 template <class T>
 void group_statistics(Tape<T>& tape, const NormLayout& l, const T* x, double* mean, double* variance) {
   const Index n = l.images * l.blocks() * l.channels;
-  auto *piece_mean = tape.template scratch<double>(n), *piece_m2 = tape.template scratch<double>(n);
+  auto *chunk_mean = tape.template scratch<double>(n), *chunk_m2 = tape.template scratch<double>(n);
   const auto moments = FIELDMARK_KERNEL(channel_moments<T>);
-  for_blocks(l, [&](Index, Index piece, Index at, Index pixels) {
-    moments(x + at, pixels, l.channels, piece_mean + piece * l.channels, piece_m2 + piece * l.channels);
+  for_blocks(l, [&](Index, Index chunk, Index at, Index pixels) {
+    moments(x + at, pixels, l.channels, chunk_mean + chunk * l.channels, chunk_m2 + chunk * l.channels);
   });
   for (Index image = 0; image < l.images; ++image)
     for (Index g = 0; g < l.groups; ++g) {
@@ -44,9 +43,9 @@ void group_statistics(Tape<T>& tape, const NormLayout& l, const T* x, double* me
         for (Index c = g * l.width(); c < (g + 1) * l.width(); ++c) {
           const Index at = (image * l.blocks() + b) * l.channels + c;
           const double add = static_cast<double>(std::min(l.block(), l.pixels - b * l.block()));
-          const double delta = piece_mean[at] - m;
+          const double delta = chunk_mean[at] - m;
           m += delta * add / (count + add);
-          m2 += piece_m2[at] + delta * delta * count * add / (count + add);
+          m2 += chunk_m2[at] + delta * delta * count * add / (count + add);
           count += add;
         }
       mean[image * l.groups + g] = m;
@@ -55,9 +54,9 @@ void group_statistics(Tape<T>& tape, const NormLayout& l, const T* x, double* me
 }
 
 // With xh = (x - mean) rstd, y = gamma xh + beta and g = dy where the ReLU lets it through:
-//   dbeta = sum g,   dgamma = sum g xh,   and with n numbers to a group, d = gamma g
+//   dbeta = sum g,   dgamma = sum g xh,   and with n elements in a group, d = gamma g
 //   dx = rstd (d - sum(d) / n - xh sum(d xh) / n)      (sums over the group; the last two only if not fixed)
-// Pieces own their pixels of dx; sums are stored per piece and added in order.
+// Chunks own their pixels of dx; sums are stored per chunk and added in order.
 template <class T>
 void norm_backward(const NormLayout& l, Var<T> x, Var<T> gamma, Var<T> beta, const Affine<T>& a,
                    const double* rstd, const double* off, bool fixed, const T* dy) {
@@ -69,8 +68,8 @@ void norm_backward(const NormLayout& l, Var<T> x, Var<T> gamma, Var<T> beta, con
     return Affine<T>{a.mean + k, a.gain + k, a.shift + k, a.relu};
   };
   const auto sum = FIELDMARK_KERNEL(norm_sums<T>);
-  for_blocks(l, [&](Index image, Index piece, Index at, Index pixels) {
-    const Index k = piece * l.channels;
+  for_blocks(l, [&](Index image, Index chunk, Index at, Index pixels) {
+    const Index k = chunk * l.channels;
     sum(x.value() + at, dy + at, pixels, l.channels, part(image), sums + k, mixed + k);
   });
   T *offset = tape.scratch(rows), *slope = tape.scratch(rows), *dgamma = gamma.grad_acc(),
@@ -80,12 +79,10 @@ void norm_backward(const NormLayout& l, Var<T> x, Var<T> gamma, Var<T> beta, con
       const double r = rstd[image * l.groups + g];
       double all = 0, all_xh = 0;
       for (Index c = g * l.width(); c < (g + 1) * l.width(); ++c) {
-        double s = 0, s_xh = 0;
-        for (Index b = 0; b < l.blocks(); ++b) {
-          s += sums[(image * l.blocks() + b) * l.channels + c];
-          s_xh += mixed[(image * l.blocks() + b) * l.channels + c];
-        }
-        s_xh = r * (s_xh + off[image * l.channels + c] * s);
+        const Index first = image * l.blocks() * l.channels;
+        const double s = detail::channel_total(sums + first, l.blocks(), l.channels, c),
+                     m = detail::channel_total(mixed + first, l.blocks(), l.channels, c),
+                     s_xh = r * (m + off[image * l.channels + c] * s);
         if (dgamma) dgamma[c] += static_cast<T>(s_xh);
         if (dbeta) dbeta[c] += static_cast<T>(s);
         all += static_cast<double>(gamma.value()[c]) * s;
@@ -122,7 +119,7 @@ Var<T> apply_norm(const NormLayout& l, Var<T> x, Var<T> gamma, Var<T> beta, cons
     const Index c = i % l.channels, g = i / l.channels * l.groups + c / l.width();
     const double a = rstd[g] * static_cast<double>(gamma.value()[c]);
     m[i] = static_cast<T>(mean[g]);
-    // What rounding the mean to T has lost goes into the shift.
+    // The shift makes up for the rounding of the mean to T.
     off[i] = static_cast<double>(m[i]) - mean[g];
     gain[i] = static_cast<T>(a);
     shift[i] = static_cast<T>(static_cast<double>(beta.value()[c]) + off[i] * a);

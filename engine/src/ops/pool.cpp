@@ -2,7 +2,7 @@
 #include <fieldmark/engine/shape_checks.h>
 
 #include "kernels/pool.h"
-#include "ops/pieces.h"
+#include "ops/chunks.h"
 
 namespace fieldmark {
 namespace kernels {
@@ -22,8 +22,7 @@ Var<T> avg_pool(Var<T> x, Index size) {
       forward(p, x.value() + (r / height * s[1] + r % height * size) * row, y + r * width * s[3]);
   });
 
-  // Each pixel of a window receives dy / size^2. A piece owns its rows of windows; what fills no window gets
-  // 0.
+  // Each pixel of a window receives dy / size^2, every other pixel 0. A chunk owns its rows of windows.
   x.tape().on_backward(out, [=](const T* dy) {
     bool fresh = false;
     T* dx = x.grad_acc(&fresh);
@@ -49,36 +48,32 @@ Var<T> global_avg_pool(Var<T> x) {
   const Var<T> out = tape.output({s[0], channels}, &y, {x});
   auto* sums = tape.template scratch<double>(s[0] * blocks * channels);
   const auto add = FIELDMARK_KERNEL(channel_sums<T>);
-  parallel_for(s[0] * blocks, 1, [&](Index piece, Index) {
-    const Index first = piece % blocks * block;
-    add(x.value() + (piece / blocks * pixels + first) * channels, nullptr, std::min(block, pixels - first),
-        channels, sums + piece * channels);
+  detail::for_image_chunks(s[0], pixels, block, [&](Index n, Index first, Index count) {
+    add(x.value() + (n * pixels + first) * channels, nullptr, count, channels,
+        sums + (n * blocks + first / block) * channels);
   });
-  for (Index i = 0; i < s[0] * channels; ++i) {
-    double total = 0;
-    for (Index b = 0; b < blocks; ++b) total += sums[(i / channels * blocks + b) * channels + i % channels];
-    y[i] = static_cast<T>(total / static_cast<double>(pixels));
-  }
+  for (Index i = 0; i < s[0] * channels; ++i)
+    y[i] = static_cast<T>(
+        detail::channel_total(sums + i / channels * blocks * channels, blocks, channels, i % channels) /
+        static_cast<double>(pixels));
 
-  // Every pixel receives dy / pixels. A piece owns its pixels.
+  // Every pixel receives dy / pixels. A chunk owns its pixels.
   tape.on_backward(out, [=](const T* dy) {
     bool fresh = false;
     T *dx = x.grad_acc(&fresh), *share = x.tape().scratch(s[0] * channels);
     for (Index i = 0; i < s[0] * channels; ++i) share[i] = dy[i] / static_cast<T>(pixels);
     const auto fill = FIELDMARK_KERNEL(fill_pixels<T>);
-    parallel_for(s[0] * blocks, 1, [&](Index piece, Index) {
-      const Index n = piece / blocks, first = piece % blocks * block;
-      fill(share + n * channels, std::min(block, pixels - first), channels,
-           dx + (n * pixels + first) * channels, !fresh);
+    detail::for_image_chunks(s[0], pixels, block, [&](Index n, Index first, Index count) {
+      fill(share + n * channels, count, channels, dx + (n * pixels + first) * channels, !fresh);
     });
   });
   return out;
 }
 
 Index windows_along(Index extent, const MaxPool& m) {
-  if (extent < (m.partial ? 1 : m.size)) return 0;
+  if (extent < (m.ceil_mode ? 1 : m.size)) return 0;
   const Index last = std::max<Index>(0, extent - m.size);
-  const Index count = (m.partial ? last + m.stride - 1 : last) / m.stride + 1;
+  const Index count = (m.ceil_mode ? last + m.stride - 1 : last) / m.stride + 1;
   return (count - 1) * m.stride < extent ? count : count - 1;
 }
 
@@ -103,8 +98,8 @@ Var<T> max_pool(Var<T> x, const MaxPool& m) {
     }
   });
 
-  // The pixel that was the largest of a window receives its dy. A piece owns rows of x, and gathers from
-  // every row of windows that reaches them, in order.
+  // The largest pixel of a window receives its dy. A chunk owns rows of x and gathers from every row of
+  // windows that covers them, in order.
   tape.on_backward(out, [=](const T* dy) {
     bool fresh = false;
     T* dx = x.grad_acc(&fresh);
@@ -148,7 +143,7 @@ Var<T> max_pool(Var<T> x, MaxPool windows) {
   if (windows.size < 1 || windows.stride < 1)
     throw ValueError("[max_pool] size and stride must be at least 1, got size " +
                      std::to_string(windows.size) + " and stride " + std::to_string(windows.stride));
-  const Index least = windows.partial ? 1 : windows.size;
+  const Index least = windows.ceil_mode ? 1 : windows.size;
   if (std::min(x.shape()[1], x.shape()[2]) < least)
     throw ShapeError("[max_pool] x: height and width must be at least " + std::to_string(least) +
                      " (one window), got shape " + x.shape().str());

@@ -8,7 +8,7 @@
 
 namespace fieldmark::detail {
 
-constexpr Index kProductRows = 1024;  // rows a piece, where a product runs on several threads
+constexpr Index kProductRows = 1024;  // rows of a chunk, where a product runs on several threads
 constexpr Index kProductShards = 16;  // partial sums over rows, added in order
 
 inline Index round_up(Index n, Index to) { return (n + to - 1) / to * to; }
@@ -19,7 +19,7 @@ Index panel_width(Index columns) {
   return FIELDMARK_KERNEL(gemm_panel<T>)(columns);
 }
 
-/// Numbers in the panels of a matrix [rows, columns].
+/// Elements of the panels of a matrix [rows, columns].
 template <class T>
 Index panels_size(Index rows, Index columns) {
   return rows * round_up(columns, panel_width<T>(columns));
@@ -31,7 +31,7 @@ void pack(const T* b, Index rows, Index columns, Index row, Index column, const 
   FIELDMARK_KERNEL(pack_panels<T>)(b, rows, columns, row, column, mask, out);
 }
 
-/// B [rows, columns] at b[i row + j column] in panels; room comes from the tape.
+/// B [rows, columns] at b[i row + j column] in panels on the tape.
 template <class T>
 T* packed(Tape<T>& tape, const T* b, Index rows, Index columns, Index row, Index column,
           const T* mask = nullptr) {
@@ -40,17 +40,17 @@ T* packed(Tape<T>& tape, const T* b, Index rows, Index columns, Index row, Index
   return out;
 }
 
-/// Runs a product in pieces of rows; a row of C has one owner.
+/// Runs a product in chunks of rows; a row of C has one owner.
 template <class T>
 void product(const kernels::Gemm<T>& g) {
   using namespace kernels;
   const auto run = FIELDMARK_KERNEL(gemm<T>);
   parallel_for(g.m, kProductRows, [&](Index begin, Index end) {
-    Gemm<T> piece = g;
-    piece.m = end - begin;
-    piece.a += begin * g.a_row;
-    piece.c += begin * g.ldc;
-    run(piece);
+    Gemm<T> chunk = g;
+    chunk.m = end - begin;
+    chunk.a += begin * g.a_row;
+    chunk.c += begin * g.ldc;
+    run(chunk);
   });
 }
 
@@ -59,12 +59,12 @@ inline void product(const kernels::GemmBf16& g) {
   using namespace kernels;
   const auto run = FIELDMARK_KERNEL(gemm_bf16);
   parallel_for(g.m, kProductRows, [&](Index begin, Index end) {
-    GemmBf16 piece = g;
-    piece.m = end - begin;
-    piece.a += begin * g.a_row;
-    piece.c += begin * g.ldc;
-    piece.tiles = bf16_units() == Bf16Units::tiles;
-    run(piece);
+    GemmBf16 chunk = g;
+    chunk.m = end - begin;
+    chunk.a += begin * g.a_row;
+    chunk.c += begin * g.ldc;
+    chunk.tiles = bf16_units() == Bf16Units::tiles;
+    run(chunk);
   });
 }
 
@@ -87,14 +87,13 @@ void sharded_sum(Tape<T>& tape, Index items, Index grain, T* into, Index size, F
     for (Index i = 0; i < size; ++i) into[i] += buffers[s * size + i];
 }
 
-/// Numbers in a row of `columns` that whole vectors fill: so long must the rows of a matrix be that products
-/// read where it lies.
+/// `columns` rounded up to whole vectors: the row stride that products need to read a matrix in place.
 template <class T>
 Index whole_row(Index columns) {
   return round_up(columns, panel_width<T>(1));
 }
 
-/// into [columns] += the sums of the columns of d, whose rows are whole_row(columns) apart.
+/// into [columns] += the sums of the columns of d with the row stride whole_row(columns).
 template <class T>
 void add_column_sums(const T* d, Index rows, Index columns, T* into) {
   using namespace kernels;

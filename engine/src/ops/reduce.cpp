@@ -9,8 +9,8 @@ Var<T> sum(Var<T> x) {
   T* y = nullptr;
   const Var<T> out = x.tape().output({1}, &y, {x});
   *y = static_cast<T>(
-      detail::piece_sum(x.tape(), x.shape().size(), [v = x.value()](Index i) { return v[i]; }));
-  // dx_i = dy. A piece owns its elements.
+      detail::chunked_sum(x.tape(), x.shape().size(), [v = x.value()](Index i) { return v[i]; }));
+  // dx_i = dy. A chunk owns its elements.
   x.tape().on_backward(out, [x](const T* dy) { detail::add_gradient(x, [g = *dy](Index) { return g; }); });
   return out;
 }
@@ -24,7 +24,7 @@ Var<T> mean(Var<T> x) {
 template <class T>
 Var<T> weighted_mean(Var<T> x, std::span<const T> weights) {
   if (weights.empty() && x.shape().size() > 0)
-    throw ShapeError("[weighted_mean] weights must have one number for each of the " +
+    throw ShapeError("[weighted_mean] weights must have one element for each of the " +
                      std::to_string(x.shape().size()) + " averaged, got 0");
   return detail::mean_of<T>(
       "weighted_mean", x, nullptr, weights, [v = x.value()](Index i) { return v[i]; },

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "ops/pieces.h"
+#include "ops/chunks.h"
 
 namespace fieldmark {
 namespace {
@@ -91,7 +91,7 @@ Var<T> upsample_to(Var<T> x, Index height, Index width, Interpolation mode) {
     }
   });
 
-  // The transpose of the same weights. A piece owns rows of dx and visits the output rows that read them, in
+  // The transpose of the same weights. A chunk owns rows of dx and visits the output rows that read them, in
   // order: taps grow with i, so those rows are contiguous.
   x.tape().on_backward(out, [=](const T* dy) {
     T* dx = x.grad_acc();
@@ -132,7 +132,7 @@ Var<T> space_to_depth(Var<T> x) {
         std::copy_n(x.value() + (r * width + j) * pair, pair, y + ((r / 2 * width + j) * 2 + r % 2) * pair);
   });
 
-  // A permutation: dx takes the same places of dy. A piece owns its rows of dx.
+  // A permutation: dx reads dy at the same positions. A chunk owns its rows of dx.
   x.tape().on_backward(out, [=](const T* dy) {
     T* dx = x.grad_acc();
     parallel_for(s[0] * s[1], detail::row_grain(width * pair), [&](Index r0, Index r1) {

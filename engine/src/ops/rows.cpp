@@ -1,27 +1,23 @@
 #include <fieldmark/engine/ops/rows.h>
 #include <fieldmark/engine/shape_checks.h>
 
-#include "ops/pieces.h"
+#include "ops/chunks.h"
 
 namespace fieldmark {
 namespace {
 
-// One column sum per piece of rows, pieces added in order: the same bits for any thread count.
+// One column sum per chunk of rows, chunks added in order: the same bits for any thread count.
 template <class T>
 void add_column_sums(Tape<T>& tape, const T* dy, Index rows, Index cols, T* dx) {
-  const Index grain = detail::row_grain(cols), pieces = (rows + grain - 1) / grain;
-  auto* partial = tape.template scratch<double>(pieces * cols);
+  const Index grain = detail::row_grain(cols), chunks = (rows + grain - 1) / grain;
+  auto* partial = tape.template scratch<double>(chunks * cols);
   parallel_for(rows, grain, [&](Index r0, Index r1) {
     double* sum = partial + r0 / grain * cols;
     std::fill_n(sum, cols, 0.0);
     for (Index r = r0; r < r1; ++r)
       for (Index c = 0; c < cols; ++c) sum[c] += static_cast<double>(dy[r * cols + c]);
   });
-  for (Index c = 0; c < cols; ++c) {
-    double sum = 0;
-    for (Index p = 0; p < pieces; ++p) sum += partial[p * cols + c];
-    dx[c] += static_cast<T>(sum);
-  }
+  for (Index c = 0; c < cols; ++c) dx[c] += static_cast<T>(detail::channel_total(partial, chunks, cols, c));
 }
 
 }  // namespace
@@ -60,8 +56,8 @@ Var<T> gather_rows(Var<T> x, std::span<const std::int32_t> index) {
     for (Index i = i0; i < i1; ++i) std::copy_n(x.value() + at[i] * cols, cols, y + i * cols);
   });
 
-  // dx[r] = sum of dy[i] over the i with index[i] = r. Those are listed by a counting sort, in order;
-  // then each row of dx is owned by one piece.
+  // dx[r] = sum of dy[i] over the i with index[i] = r, which a counting sort lists in order. A chunk owns its
+  // rows of dx.
   x.tape().on_backward(out, [x, at, n, rows, cols](const T* dy) {
     T* dx = x.grad_acc();
     auto* start = x.tape().template scratch<Index>(rows + 1);

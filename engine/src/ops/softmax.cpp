@@ -52,7 +52,7 @@ Index check_columns(const char* op, const char* arg, const Shape& s) {
 
 void check_labels(Index rows, Index cols, std::span<const std::int32_t> labels) {
   if (static_cast<Index>(labels.size()) != rows)
-    throw ShapeError("[softmax_cross_entropy] labels must have one number for each of the " +
+    throw ShapeError("[softmax_cross_entropy] labels must have one element for each of the " +
                      std::to_string(rows) + " rows of logits, got " + std::to_string(labels.size()));
   for (std::size_t r = 0; r < labels.size(); ++r)
     if (labels[r] < -1 || labels[r] >= cols)
@@ -81,7 +81,7 @@ Var<T> softmax(Var<T> x) {
   const Var<T> out = x.tape().output(x.shape(), &y, {x});
   kernels::softmax_rows(x.value(), y, rows, cols, [](Index, T, T) {});
 
-  // dy_i / dx_j = y_i (delta_ij - y_j), so dx = y (dy - <dy, y>). A row is owned by one piece.
+  // dy_i / dx_j = y_i (delta_ij - y_j), so dx = y (dy - <dy, y>). A chunk owns its rows.
   x.tape().on_backward(out, [x, y, rows, cols](const T* dy) {
     T* dx = x.grad_acc();
     parallel_for(rows, detail::row_grain(cols), [&](Index r0, Index r1) {
@@ -122,12 +122,12 @@ Var<T> softmax_cross_entropy(Var<T> logits, std::span<const std::int32_t> labels
     else
       row_loss[r] = std::log1p(others(p + r * cols, cols, c) * z);  // log z loses what a certain label lacks
   });
-  *y = static_cast<T>(inverse * detail::piece_sum(tape, rows, [=](Index r) {
+  *y = static_cast<T>(inverse * detail::chunked_sum(tape, rows, [=](Index r) {
                         return w[r] > 0 ? static_cast<double>(w[r]) * static_cast<double>(row_loss[r]) : 0.0;
                       }));
 
-  // dL/dx[r, c] = w_r / sum w (p[r, c] - [c = label_r]), where p - 1 is minus the sum of the other p: so a
-  // certain label keeps its tiny slope. A row is owned by one piece.
+  // dL/dx[r, c] = w_r / sum w (p[r, c] - [c = label_r]), where p - 1 is minus the sum of the other p: a
+  // certain label keeps its tiny slope. A chunk owns its rows.
   tape.on_backward(out, [logits, p, w, label, rows, cols, inverse](const T* dy) {
     T* dx = logits.grad_acc();
     const T g = static_cast<T>(inverse * static_cast<double>(*dy));

@@ -2,7 +2,7 @@
 #include <span>
 #include <string>
 
-#include "ops/pieces.h"
+#include "ops/chunks.h"
 
 namespace fieldmark::detail {
 
@@ -12,18 +12,18 @@ template <class T>
 double inverse_total(Tape<T>& tape, const char* op, Index n, std::span<const T> weights) {
   if (weights.empty()) return n > 0 ? 1.0 / static_cast<double>(n) : 0.0;
   if (static_cast<Index>(weights.size()) != n)
-    throw ShapeError(std::string("[") + op + "] weights must have one number for each of the " +
+    throw ShapeError(std::string("[") + op + "] weights must have one element for each of the " +
                      std::to_string(n) + " averaged, got " + std::to_string(weights.size()));
   for (std::size_t i = 0; i < weights.size(); ++i)
     if (!(weights[i] >= 0))
       throw ValueError(std::string("[") + op + "] weights: entry " + std::to_string(i) +
                        " must be 0 or more, got " + std::to_string(weights[i]));
-  const double total = piece_sum(tape, n, [w = weights.data()](Index i) { return w[i]; });
+  const double total = chunked_sum(tape, n, [w = weights.data()](Index i) { return w[i]; });
   return total > 0 ? 1 / total : 0.0;
 }
 
-// y = sum_i w_i f(i) / sum w in one number, and its backward dx_i = dy w_i slope(i) / sum w for x, and minus
-// that for `other` where given. Every element is owned by its piece.
+// y = sum_i w_i f(i) / sum w, [1], and its backward dx_i = dy w_i slope(i) / sum w for x, and minus
+// that for `other` where given. A chunk owns its elements.
 template <class T, class F, class D>
 Var<T> mean_of(const char* op, Var<T> x, const Var<T>* other, std::span<const T> weights, F f, D slope) {
   Tape<T>& tape = x.tape();
@@ -32,7 +32,7 @@ Var<T> mean_of(const char* op, Var<T> x, const Var<T>* other, std::span<const T>
   const T* w = weights.empty() ? nullptr : weights.data();
   T* y = nullptr;
   const Var<T> out = tape.output({1}, &y, x.needs_grad() || (other && other->needs_grad()));
-  *y = static_cast<T>(inverse * piece_sum(tape, n, [=](Index i) {
+  *y = static_cast<T>(inverse * chunked_sum(tape, n, [=](Index i) {
                         return (w ? static_cast<double>(w[i]) : 1.0) * static_cast<double>(f(i));
                       }));
   const Var<T> second = other ? *other : x;

@@ -1,5 +1,5 @@
 #pragma once
-#include <fieldmark/engine/isa.h>
+#include <fieldmark/engine/kernel.h>
 
 #include <cstdint>
 

@@ -5,6 +5,7 @@
 
 #include "support/catch.h"
 #include "support/random.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 
@@ -29,7 +30,7 @@ double worst_error(bool add) {
           want += term;
           size += std::abs(term);
         }
-        worst = std::max(worst, static_cast<double>(std::abs(y[static_cast<std::size_t>(i)] - want) / size));
+        raise_to(worst, static_cast<double>(std::abs(y[static_cast<std::size_t>(i)] - want) / size));
       }
     }
   }

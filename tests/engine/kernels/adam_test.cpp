@@ -5,6 +5,7 @@
 
 #include "support/catch.h"
 #include "support/random.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 
@@ -62,8 +63,7 @@ double worst_error(Index n, Index offset, bool skip_zero, bool zero_grads, auto 
   if (x[size - 1] != before[size - 1] || (offset > 0 && x[offset - 1] != before[offset - 1])) return 1e9;
   double worst = 0;
   for (Index i = 0; i < n; ++i)
-    worst =
-        std::max(worst, std::abs(static_cast<double>(x[offset + i]) - want.x[static_cast<std::size_t>(i)]));
+    raise_to(worst, std::abs(static_cast<double>(x[offset + i]) - want.x[static_cast<std::size_t>(i)]));
   return worst;
 }
 
@@ -72,7 +72,7 @@ void check_level(double tolerance, auto kernel) {
   double worst = 0;
   for (Index n = 0; n <= 130; ++n)
     for (bool skip : {false, true})
-      for (bool zero : {false, true}) worst = std::max(worst, worst_error<T>(n, n % 7, skip, zero, kernel));
+      for (bool zero : {false, true}) raise_to(worst, worst_error<T>(n, n % 7, skip, zero, kernel));
   CHECK(worst < tolerance);
 }
 

@@ -5,6 +5,7 @@
 
 #include "support/each_isa.h"
 #include "support/random.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 
@@ -44,7 +45,7 @@ TEST_CASE("kernels/feature_distance: float equals a plain loop in double for eve
       FIELDMARK_KERNEL(feature_distance_backward<float>)(pair, 0.5f, true, da.data());
       double worst = 0, most = 1;
       for (std::size_t i = 0; i < da.size(); ++i) {
-        worst = std::max(worst, std::abs(static_cast<double>(da[i]) - 1 - 0.5 * gradient[i]));
+        raise_to(worst, std::abs(static_cast<double>(da[i]) - 1 - 0.5 * gradient[i]));
         most = std::max(most, std::abs(gradient[i]));
       }
       CHECK(worst < 2e-6 * most);

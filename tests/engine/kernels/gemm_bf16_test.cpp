@@ -8,6 +8,7 @@
 #include "support/catch.h"
 #include "support/each_isa.h"
 #include "support/random.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 
@@ -66,7 +67,7 @@ double worst_error(Index m, Index n, Index k, bool tiles, bool accumulate, bool 
       }
       if (mask && !(shut[i * ldc + j] > 0)) sum = 0;
       if (relu) sum = std::max(sum, 0.0);
-      worst = std::max(worst, std::abs(got - sum) / size);
+      raise_to(worst, std::abs(got - sum) / size);
     }
   return worst;
 }

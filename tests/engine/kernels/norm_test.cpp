@@ -5,6 +5,7 @@
 
 #include "support/catch.h"
 #include "support/random.h"
+#include "support/worst.h"
 
 namespace fieldmark::kernels {
 namespace {
@@ -65,13 +66,15 @@ void check_case(const Case& k, bool relu) {
     const double centred = double(k.x.data[at]) - double(k.mean.data[c]), pre = k.pre(i);
     const double g = relu && pre <= 0 ? 0 : double(k.dy.data[at]);
     const double want = g * k.gain.data[c] - k.offset.data[c] - centred * k.slope.data[c];
-    worst = std::max({worst, std::abs(y[at] - (relu ? std::max(pre, 0.0) : pre)), std::abs(dx[at] - want),
-                      std::abs(held[at] - 7 - want)});
+    for (const double e : {std::abs(y[at] - (relu ? std::max(pre, 0.0) : pre)), std::abs(dx[at] - want),
+                           std::abs(held[at] - 7 - want)})
+      raise_to(worst, e);
     want_sums[c] += g;
     want_mixed[c] += g * centred;
   }
   for (std::size_t c = 0; c < want_sums.size(); ++c)
-    worst = std::max({worst, std::abs(sums[c] - want_sums[c]), std::abs(mixed[c] - want_mixed[c])});
+    for (const double e : {std::abs(sums[c] - want_sums[c]), std::abs(mixed[c] - want_mixed[c])})
+      raise_to(worst, e);
   CAPTURE(k.pixels, k.channels, relu);
   CHECK(worst < 5e-6);  // numbers of size up to 10
   for (const auto* to : {&y, &dx, &held}) CHECK((to->front() == 7 && to->back() == 7));

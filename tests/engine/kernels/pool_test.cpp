@@ -5,6 +5,7 @@
 
 #include "support/catch.h"
 #include "support/random.h"
+#include "support/worst.h"
 
 namespace fieldmark::kernels {
 namespace {
@@ -38,13 +39,13 @@ void check_windows(std::int64_t windows, std::int64_t size, std::int64_t channel
     for (std::int64_t i = 0; i < size; ++i)
       for (std::int64_t j = 0; j < size; ++j)
         sum += x[i * p.row + (o / channels * size + j) * channels + o % channels];
-    worst = std::max(worst, std::abs(y[static_cast<std::size_t>(o)] - sum / double(size * size)));
+    raise_to(worst, std::abs(y[static_cast<std::size_t>(o)] - sum / double(size * size)));
   }
   for (std::int64_t k = 0; k < size * p.row; ++k) {
     const std::int64_t column = k % p.row / channels, window = column / size;
     const double want = window < windows ? dy[window * channels + k % channels] / double(size * size) : 0.0;
-    worst = std::max(worst, std::abs(fresh[static_cast<std::size_t>(k)] - want));
-    worst = std::max(worst, std::abs(held[static_cast<std::size_t>(k)] - 7 - want));
+    raise_to(worst, std::abs(fresh[static_cast<std::size_t>(k)] - want));
+    raise_to(worst, std::abs(held[static_cast<std::size_t>(k)] - 7 - want));
   }
   CAPTURE(windows, size, channels);
   CHECK(worst < 1e-6);

@@ -7,6 +7,7 @@
 
 #include "support/each_isa.h"
 #include "support/random.h"
+#include "support/worst.h"
 
 namespace fieldmark::kernels {
 namespace {
@@ -118,7 +119,7 @@ double worst_of_transform(Kernel run, const Matrix& line, Index border, const Si
                      : both_axes(line, static_cast<int>(k / 6), static_cast<int>(k % 6), [&](int i, int j) {
                          return s.at(x, masked ? &m : nullptr, first + t, i - border, j - border, c);
                        });
-        worst = std::max(worst, std::abs(want - room.at(k, t, c)));
+        raise_to(worst, std::abs(want - room.at(k, t, c)));
       }
   return worst;
 }
@@ -166,7 +167,7 @@ TEST_CASE("kernels/winograd: weights and their gradient are what the definition 
                     ? 0
                     : both_axes(g, static_cast<int>(k / 6), static_cast<int>(k % 6),
                                 [&](int i, int j) { return w[((i * 3 + j) * c_in + c) * c_out + o]; });
-            worst = std::max(worst, std::abs(want - room.at(k, c, o)));
+            raise_to(worst, std::abs(want - room.at(k, c, o)));
           }
       CHECK(worst < 1e-6);
 
@@ -185,7 +186,7 @@ TEST_CASE("kernels/winograd: weights and their gradient are what the definition 
             const double want = w[place] + both_axes(back, i, j, [&](int a, int b) {
                                   return values[(a * 6 + b) * c_in * c_out + at];
                                 });
-            worst = std::max(worst, std::abs(want - dw[place]));
+            raise_to(worst, std::abs(want - dw[place]));
           }
       CHECK(worst < 2e-6);
     }
@@ -221,7 +222,7 @@ TEST_CASE("kernels/winograd: outputs stay inside the image, with bias, ReLU or w
                           [&](int a, int b) { return values[((a * 6 + b) * s.tiles() + tile) * s.c + c]; });
             want += accumulate ? before[p * s.c + c] : bias[c];
             if (relu) want = std::max(want, 0.0);
-            worst = std::max(worst, std::abs(want - y[p * s.c + c]));
+            raise_to(worst, std::abs(want - y[p * s.c + c]));
           }
         CHECK(worst < 1e-5);
         CHECK(y.data.back() == kUntouched);

@@ -82,7 +82,7 @@ TEST_CASE("batch_norm: errors") {
   CHECK_THROWS_WITH(batch_norm(v(x), v(wrong), v(c)), Contains("gamma: axis 0 must be 3"));
   CHECK_THROWS_WITH(batch_norm(v(x), v(c), v(c), {.eps = -1}), Contains("eps must be above 0"));
   CHECK_THROWS_WITH(batch_norm_fixed<double>(v(x), v(c), v(c), few, kVariance),
-                    "[batch_norm_fixed] mean must have one number for each of the 3 channels of x, got 2");
+                    "[batch_norm_fixed] mean must have one element for each of the 3 channels of x, got 2");
   CHECK_THROWS_WITH(batch_norm_fixed<double>(v(x), v(c), v(c), kMean, few), Contains("] variance must have"));
   CHECK_THROWS_WITH(batch_norm_fixed<double>(v(x), v(c), v(c), kMean, negative),
                     Contains("variance: channel 1 must be 0 or more, got -1"));

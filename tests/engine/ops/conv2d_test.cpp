@@ -6,6 +6,7 @@
 
 #include "support/each_isa.h"
 #include "support/expect_grad.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 
@@ -58,14 +59,14 @@ Result plain(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>
 double error(const std::vector<float>& a, const std::vector<float>& b) {
   double worst = 0, size = 1e-30;
   for (std::size_t i = 0; i < a.size(); ++i) {
-    worst = std::max(worst, std::abs(double(a[i]) - b[i]));
+    raise_to(worst, std::abs(double(a[i]) - b[i]));
     size = std::max(size, std::abs(double(b[i])));
   }
   return worst / size;
 }
 
-// On every instruction set, the worst error of a pass in parts of the largest number, over values and
-// gradients.
+// On every instruction set, the maximum absolute error of a pass relative to the largest magnitude, over
+// values and gradients.
 void expect_close(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, Activation act,
                   double most) {
   const Result want = plain(x, w, b, act);
@@ -147,7 +148,7 @@ TEST_CASE("conv2d: a large offset, a huge pixel and zeros through Winograd's way
     for (Index p = 0; p < 900; ++p)
       if (std::max(std::abs(p / 30 - row), std::abs(p % 30 - column)) > 4)
         for (Index o = 0; o < 32; ++o)
-          worst = std::max(worst, std::abs(double(got.y[p * 32 + o]) - small.y[p * 32 + o]));
+          raise_to(worst, std::abs(double(got.y[p * 32 + o]) - small.y[p * 32 + o]));
     CHECK(worst < 3e-5);  // 2.3e-5 measured, of numbers up to 20
 
     const Result nothing = run(Tensor<float>(even.shape), w, b, Activation::none);
@@ -236,7 +237,7 @@ TEST_CASE("conv2d: an image alone has the same bits as in a batch") {
 
 namespace {
 // The definition with steps and a border, values and all gradients, in double.
-Result plain_steps(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, ConvSteps steps,
+Result plain_steps(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, ConvWindow steps,
                    Activation act) {
   const Index H = x.shape[1], W = x.shape[2], C = x.shape[3], K = w.shape[0], O = w.shape[3],
               s = steps.stride, p = steps.padding, OH = (H + 2 * p - K) / s + 1, OW = (W + 2 * p - K) / s + 1;
@@ -263,7 +264,7 @@ Result plain_steps(const Tensor<float>& x, const Tensor<float>& w, const Tensor<
   return {f(y), f(dx), f(dw), f(db)};
 }
 
-Result run_steps(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, ConvSteps steps,
+Result run_steps(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, ConvWindow steps,
                  Activation act) {
   Tape<float> tape;
   Tensor<float> dx(x.shape), dw(w.shape), db(b.shape);

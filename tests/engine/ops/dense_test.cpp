@@ -1,6 +1,6 @@
 #include <fieldmark/engine/ops/arithmetic.h>
-#include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/engine/ops/dense.h>
+#include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/engine/parallel.h>
 
 #include <algorithm>
@@ -8,6 +8,7 @@
 
 #include "support/each_isa.h"
 #include "support/expect_grad.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 
@@ -49,7 +50,7 @@ Result plain(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>
 double error(const std::vector<float>& a, const std::vector<float>& b) {
   double worst = 0, size = 1e-30;
   for (std::size_t i = 0; i < a.size(); ++i) {
-    worst = std::max(worst, std::abs(double(a[i]) - b[i]));
+    raise_to(worst, std::abs(double(a[i]) - b[i]));
     size = std::max(size, std::abs(double(b[i])));
   }
   return worst / size;
@@ -97,7 +98,7 @@ TEST_CASE("dense: gradient through layers that mask for each other, with another
         [branch](Tape<double>&, auto v) {
           const auto first = dense(v[0], v[1], v[2], Activation::relu);
           const auto last = dense(first, v[3], v[4], Activation::relu);
-          return branch ? concat_columns({last, mul(first, first)}) : last;
+          return branch ? concatenate({last, mul(first, first)}) : last;
         },
         {uniform({5, 4}, 0.2, 1, 1), alternating({4, 8}, 2), alternating({8}, 3), alternating({8, 6}, 4),
          alternating({6}, 5)});

@@ -2,6 +2,7 @@
 
 #include "support/expect_grad.h"
 #include "support/run_op.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 
@@ -77,8 +78,8 @@ TEST_CASE("pool: float against double, and the same bits for any thread count") 
 }
 
 namespace {
-constexpr MaxPool kWindows[] = {{.size = 3, .stride = 2}, {.size = 3, .stride = 2, .partial = true},
-                                {.size = 2, .stride = 2}, {.size = 2, .stride = 3, .partial = true},
+constexpr MaxPool kWindows[] = {{.size = 3, .stride = 2}, {.size = 3, .stride = 2, .ceil_mode = true},
+                                {.size = 2, .stride = 2}, {.size = 2, .stride = 3, .ceil_mode = true},
                                 {.size = 3, .stride = 1}, {.size = 1, .stride = 2}};
 
 auto max_of(const MaxPool& windows) {
@@ -88,8 +89,8 @@ auto max_of(const MaxPool& windows) {
 // PyTorch's rule for the number of windows, counted instead of computed.
 Index count_windows(Index extent, const MaxPool& m) {
   Index count = 0;
-  while (count * m.stride + m.size <= extent ||
-         (m.partial && count * m.stride < extent && (count == 0 || (count - 1) * m.stride + m.size < extent)))
+  while (count * m.stride + m.size <= extent || (m.ceil_mode && count * m.stride < extent &&
+                                                 (count == 0 || (count - 1) * m.stride + m.size < extent)))
     ++count;
   return count;
 }
@@ -100,7 +101,7 @@ TEST_CASE(
     "the edge") {
   for (const MaxPool& m : kWindows)
     for (const Shape s : {Shape{2, 7, 8, 3}, Shape{1, 3, 4, 1}, Shape{1, 10, 5, 18}, Shape{0, 4, 4, 2}}) {
-      CAPTURE(m.size, m.stride, m.partial, s.str());
+      CAPTURE(m.size, m.stride, m.ceil_mode, s.str());
       const auto x = uniform(s, -1, 1, 5);
       const Index height = count_windows(s[1], m), width = count_windows(s[2], m);
       const Shape out{s[0], height, width, s[3]};
@@ -122,8 +123,7 @@ TEST_CASE(
       CHECK(got[0] == want);
       REQUIRE(got[1].size() == gradient.size());
       double worst = 0;
-      for (std::size_t i = 0; i < gradient.size(); ++i)
-        worst = std::max(worst, std::abs(got[1][i] - gradient[i]));
+      for (std::size_t i = 0; i < gradient.size(); ++i) raise_to(worst, std::abs(got[1][i] - gradient[i]));
       CHECK(worst < 1e-15);
     }
 }
@@ -163,7 +163,7 @@ TEST_CASE("max_pool: errors") {
                     "[max_pool] size and stride must be at least 1, got size 0 and stride 2");
   CHECK_THROWS_WITH(max_pool(tape.constant(x), {.size = 3}),
                     "[max_pool] x: height and width must be at least 3 (one window), got shape [1, 2, 5, 3]");
-  CHECK_THROWS_WITH(max_pool(tape.constant(none), {.partial = true}),
+  CHECK_THROWS_WITH(max_pool(tape.constant(none), {.ceil_mode = true}),
                     Contains("must be at least 1 (one window)"));
 }
 

@@ -62,7 +62,7 @@ TEST_CASE("reduce: errors") {
   const Tensor<double> x({2, 3});
   const std::vector<double> few(5, 1.0), negative{1, 1, -2, 1, 1, 1}, nan(6, std::nan(""));
   CHECK_THROWS_WITH(weighted_mean<double>(tape.constant(x), few),
-                    "[weighted_mean] weights must have one number for each of the 6 averaged, got 5");
+                    "[weighted_mean] weights must have one element for each of the 6 averaged, got 5");
   CHECK_THROWS_WITH(weighted_mean<double>(tape.constant(x), {}), Contains("6 averaged, got 0"));
   CHECK_THROWS_WITH(weighted_mean<double>(tape.constant(x), negative),
                     Contains("[weighted_mean] weights: entry 2 must be 0 or more, got -2"));

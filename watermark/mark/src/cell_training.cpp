@@ -141,7 +141,7 @@ Tensor<std::int32_t> CellTraining::labels_at(const TrainingImage& image, const S
                                              Index width) const {
   Tensor<std::int32_t> labels = labels_[at(image.view)];
   if (image.warped)
-    labels = distort::warp_labels<float>(labels, image.warp, static_cast<std::int32_t>(owner_.cells.count()),
+    labels = distort::warp_labels(labels, image.warp, static_cast<std::int32_t>(owner_.cells.count()),
                                          shape[0], shape[1]);
   return distort::resize_labels(labels, height, width);
 }

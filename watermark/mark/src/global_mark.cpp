@@ -1,6 +1,6 @@
 #include <fieldmark/engine/ops/activation.h>
-#include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/engine/ops/rows.h>
+#include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/nerf/frequency_encoding.h>
 #include <fieldmark/watermark/mark/global_mark.h>
@@ -87,13 +87,13 @@ Var<T> GlobalMark<T>::operator()(const Params<T>& params, Var<T> x, Var<T> d, Va
   check_extent("global_mark", "message", message.shape(), 0, 1, "one message for all places");
   check_extent("global_mark", "message", message.shape(), 1, options_.bits, "bits of the mark");
   const Index n = x.shape()[0];
-  const Var<T> of_direction = concat_columns<T>({d, nerf::frequency_encoding(d, options_.direction_bands)});
+  const Var<T> of_direction = concatenate<T>({d, nerf::frequency_encoding(d, options_.direction_bands)});
   std::vector<Var<T>> inputs;  // of G, but for c
   if (options_.colour_features > 0) {
     std::vector<Var<T>> of_place{x, nerf::frequency_encoding(x, options_.position_bands)};
     if (!options_.authors_code) of_place.push_back(of_direction);
     of_place.push_back(c);
-    inputs.push_back(through(encode_, params, concat_columns<T>(of_place)));
+    inputs.push_back(through(encode_, params, concatenate<T>(of_place)));
   }
   inputs.push_back(broadcast_rows(through(message_, params, message), n));
   if (options_.authors_code) inputs.push_back(of_direction);
@@ -107,7 +107,7 @@ Var<T> GlobalMark<T>::fused(const Params<T>& params, std::vector<Var<T>> inputs,
   inputs.push_back(c);
   for (std::size_t k = 0; k < fuse_.size(); ++k) {
     if (options_.authors_code && k < 2) inputs.insert(inputs.end(), {message, c});
-    inputs = {fuse_[k](params, concat_columns<T>(inputs))};
+    inputs = {fuse_[k](params, concatenate<T>(inputs))};
   }
   return sigmoid(inputs.front());
 }

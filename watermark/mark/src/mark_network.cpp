@@ -1,7 +1,7 @@
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/arithmetic.h>
-#include <fieldmark/engine/ops/columns.h>
 #include <fieldmark/engine/ops/matmul.h>
+#include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/nerf/frequency_encoding.h>
 #include <fieldmark/watermark/mark/mark_network.h>
 
@@ -65,9 +65,9 @@ Var<T> MarkNetwork<T>::carrier(const Params<T>& params, Var<T> x, Var<T> c) cons
   T* axes = tape.scratch(9);
   const auto table = colour_axes(options_);
   for (std::size_t i = 0; i < 9; ++i) axes[i] = static_cast<T>(table[i]);
-  const Var<T> features = encode_1_(
-      params, encode_0_(params, concat_columns<T>({nerf::frequency_encoding(x, options_.bands), c})));
-  const Var<T> fused = fuse_1_(params, fuse_0_(params, concat_columns<T>({features, c})));
+  const Var<T> features =
+      encode_1_(params, encode_0_(params, concatenate<T>({nerf::frequency_encoding(x, options_.bands), c})));
+  const Var<T> fused = fuse_1_(params, fuse_0_(params, concatenate<T>({features, c})));
   const Var<T> colours = matmul(tanh(fused), tape.constant(axes, {3, 3}));
   if (options_.shading == 0) return colours;
   const Index n = c.shape().size();

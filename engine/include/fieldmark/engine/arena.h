@@ -5,19 +5,17 @@
 
 namespace fieldmark {
 
-/// Bump allocator. Blocks are 64-byte aligned (a cache line, and enough for AVX-512), at least double in
-/// size, and are kept by reset() so that the second training step allocates nothing.
-/// No destructor of anything placed here is ever run: Tape enforces that at compile time.
+/// Bump allocator. Each block is at least twice as large as the last; reset() keeps all blocks, so that the
+/// second training step allocates nothing. It runs no destructors: Tape requires trivial ones at compile
+/// time.
 class Arena {
  public:
   static constexpr std::size_t kAlign = 64;  ///< alignment of every allocation, bytes
   /// @param first_block  bytes of the first block, taken when it is first needed
   explicit Arena(std::size_t first_block = std::size_t{1} << 16) : first_block_(first_block) {}
-  /// Uninitialised room, valid until reset(). @throws std::bad_alloc
+  /// Uninitialised memory, valid until reset(). @throws std::bad_alloc
   void* allocate(std::size_t bytes);
-  /// Makes sure that `bytes` can follow without a call to the system.
-  void reserve(std::size_t bytes);
-  /// Makes all room free again; the blocks stay.
+  /// Frees all allocations and keeps the blocks.
   void reset() noexcept {
     block_ = 0;
     used_ = 0;

@@ -12,38 +12,38 @@
 
 namespace fieldmark {
 
-/// The largest error among numbers that are compared one by one, each relative to a scale of its own.
+/// The largest error of several values, each relative to a scale of its own.
 struct WorstError {
-  double worst = 0;   ///< NaN as soon as one comparison was none
-  Index numbers = 0;  ///< compared
+  double worst = 0;  ///< NaN as soon as one error is NaN
+  Index values = 0;  ///< compared
 
-  /// Takes in |value - exact| / scale; 0 where the two are equal, infinities too. @param scale  > 0
+  /// Adds the error |value - exact| / scale; 0 for equal values, infinities too. @param scale  > 0
   void compare(long double value, long double exact, long double scale) {
-    ++numbers;
+    ++values;
     const auto error = value == exact ? 0.0 : static_cast<double>(std::abs(value - exact) / scale);
     if (!(error <= worst)) worst = std::isnan(worst) ? worst : error;
   }
-  /// Takes in 0 where the two are equal or both are NaN, else infinity.
+  /// Adds the error 0 if both are equal or NaN, else infinity.
   void equal(long double value, long double exact) {
     const bool same = value == exact || (std::isnan(value) && std::isnan(exact));
     compare(same ? 0 : std::numeric_limits<long double>::infinity(), 0, 1);
   }
 };
 
-/// A case that is hard on rounding or range, for `fieldmark gradcheck --numerics` and the tests. It compares
-/// what the library computes, on the instruction set in use, with the same formula in long double.
+/// A case that is hard on rounding or range, for `fieldmark gradcheck --numerics` and the tests: compares the
+/// library's values, on the instruction set in use, with the same formula in long double.
 struct NumericsCase {
   std::string name;                 ///< begins with the unit's stem
   std::string type;                 ///< "float" or "double"
-  std::string relative_to;          ///< what the errors are relative to
-  double limit;                     ///< largest error allowed; 0: every bit
+  std::string relative_to;          ///< scale of the errors
+  double limit;                     ///< largest error allowed; 0: equal bits
   std::function<WorstError()> run;  ///< computes both and compares
 
-  /// Whether run() compared anything and no error exceeds the limit; NaN does.
-  bool ok(const WorstError& error) const { return error.numbers > 0 && error.worst <= limit; }
+  /// Whether run() compared values and no error is above the limit or NaN.
+  bool ok(const WorstError& error) const { return error.values > 0 && error.worst <= limit; }
 };
 
-/// Adds a case in float and in double. @param f  called as f(T{}, WorstError&), T the type of the numbers
+/// Adds a case in float and in double. @param f  called as f(T{}, WorstError&), T the scalar type
 template <class F>
 void add_numerics(std::vector<NumericsCase>& cases, const std::string& name, const std::string& relative_to,
                   double float_limit, double double_limit, F f) {
@@ -58,7 +58,7 @@ void add_numerics(std::vector<NumericsCase>& cases, const std::string& name, con
   cases.push_back({name, "double", relative_to, double_limit, run(0.)});
 }
 
-/// Numbers in [lo, hi) without a pattern, the same everywhere for a seed (SplitMix64).
+/// Pseudorandom values in [lo, hi) from a seed (SplitMix64).
 template <class T>
 Tensor<T> scattered(Shape shape, double lo, double hi, std::uint64_t seed) {
   Tensor<T> t(shape);
@@ -71,7 +71,7 @@ Tensor<T> scattered(Shape shape, double lo, double hi, std::uint64_t seed) {
   return t;
 }
 
-/// What one pass of an op gives: its values, then the gradient of <cotangent, op> in each input.
+/// One pass of an op: its values, then the gradient of <cotangent, op> in each input.
 /// @param f  called as f(tape, std::vector<Var<T>>)   @param cotangent  Shape -> Tensor<T>
 template <class T, class F, class C>
 std::vector<std::vector<T>> values_and_gradients(const F& f, const std::vector<Tensor<T>>& inputs,

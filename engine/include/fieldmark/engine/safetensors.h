@@ -26,24 +26,22 @@ struct SafetensorsFile {
   };
   std::map<std::string, std::string> metadata;  ///< strings by key, both UTF-8
   std::vector<Entry> tensors;                   ///< in the order of the file, or as added
-  std::string path;                             ///< where it was read, for error texts
+  std::string path;                             ///< for error texts
 
   /// Reads and checks a whole file.
-  /// @throws IoError if it cannot be read or is not valid: the text names the place, what was expected and
-  /// found
+  /// @throws IoError if it cannot be read or is not valid
   static SafetensorsFile read(const std::filesystem::path& path);
   /// As read(), from memory. @param name  stands for the path in error texts
   static SafetensorsFile parse(std::span<const std::byte> bytes, std::string_view name);
-  /// Replaces the file when it is complete (see AtomicFile). Equal contents give equal bytes: header keys are
-  /// sorted; arrays follow each other in the order added, those of wider elements first, so that each is
-  /// aligned.
+  /// Writes atomically (see AtomicFile). Equal contents give equal bytes: header keys are sorted; arrays
+  /// stand in the order added, wider elements first, so that each is aligned.
   /// @param access  secret for a file that holds a key
   /// @throws IoError if writing fails   @throws ValueError if a name or metadata is not UTF-8
   void write(const std::filesystem::path& to, Access access = Access::shared) const;
 
   /// @{
   /// Appends an array. @throws ValueError if the name is taken or "__metadata__"
-  /// @throws ShapeError unless data has shape.size() numbers
+  /// @throws ShapeError unless data has shape.size() elements
   void add(std::string_view name, Shape shape, std::span<const float> data);
   void add(std::string_view name, Shape shape, std::span<const double> data);
   void add(std::string_view name, Shape shape, std::span<const std::uint8_t> data);
@@ -54,21 +52,20 @@ struct SafetensorsFile {
 
   /// Whether there is an array of this name.
   bool has(std::string_view name) const;
-  /// @throws IoError if there is no such array: the text lists those there are
+  /// @throws IoError if there is no such array; the text lists the arrays of the file
   const Entry& at(std::string_view name) const;
   /// F32, or F16 and BF16 widened, which is exact. @throws IoError if missing or of another dtype, as all
   /// below
   Tensor<float> f32(std::string_view name) const;
-  /// The numbers of an F64 array.
+  /// An F64 array.
   Tensor<double> f64(std::string_view name) const;
-  /// The numbers of a U8 array, row-major.
+  /// @{
+  /// The elements of an array, row-major.
   std::vector<std::uint8_t> u8(std::string_view name) const;
-  /// The numbers of an I32 array, row-major.
   std::vector<std::int32_t> i32(std::string_view name) const;
-  /// The numbers of an I64 array, row-major.
   std::vector<std::int64_t> i64(std::string_view name) const;
-  /// The numbers of a U64 array, row-major.
   std::vector<std::uint64_t> u64(std::string_view name) const;
+  /// @}
 };
 
 }  // namespace fieldmark

@@ -2,23 +2,24 @@
 #include <array>
 #include <cstdint>
 #include <initializer_list>
+#include <span>
 #include <string>
 
 namespace fieldmark {
 
-/// Counts and places of elements.
+/// Counts and positions of elements.
 using Index = std::int64_t;
 
-/// Extents of a dense row-major tensor, rank 0 to 5. Trivially copyable, so that a backward
-/// closure can hold one by value.
+/// Extents of a dense row-major tensor, rank 0 to 5. Trivially copyable: a backward closure can hold one by
+/// value.
 class Shape {
  public:
   static constexpr int kMaxRank = 5;  ///< most axes a shape can have
   Shape() = default;
   /// @param dims  extents, the slowest axis first, at most kMaxRank of them (not checked)
-  Shape(std::initializer_list<Index> dims) : rank_(static_cast<int>(dims.size())) {
-    int k = 0;
-    for (Index d : dims) dims_[static_cast<std::size_t>(k++)] = d;
+  Shape(std::initializer_list<Index> dims) : Shape(std::span(dims.begin(), dims.size())) {}
+  explicit Shape(std::span<const Index> dims) : rank_(static_cast<int>(dims.size())) {
+    for (std::size_t k = 0; k < dims.size(); ++k) dims_[k] = dims[k];
   }
   /// Number of axes, 0 to kMaxRank.
   int rank() const { return rank_; }

@@ -22,14 +22,14 @@ template <class T>
 void seed_gradient(const T* seed, const T* mask, bool fresh, T* g, Index n);
 }  // namespace detail
 
-/// A matrix W [in, out] as products read it: W in panels of columns, and W^T; rounded to bf16 as well where
-/// products are to be computed so. See PackedWeights.
+/// A matrix W [in, out] in the layout of matrix products: panels of columns of W and of W^T, optionally in
+/// bf16 too. See PackedWeights.
 template <class T>
 struct PackedMatrix {
   const T* forward = nullptr;                      ///< panels of W
   const T* transposed = nullptr;                   ///< panels of W^T
-  const std::uint16_t* forward_bf16 = nullptr;     ///< W rounded; null where not asked for
-  const std::uint16_t* transposed_bf16 = nullptr;  ///< W^T rounded; null where not asked for
+  const std::uint16_t* forward_bf16 = nullptr;     ///< W rounded; or null
+  const std::uint16_t* transposed_bf16 = nullptr;  ///< W^T rounded; or null
 };
 
 /// Handle to a value on a tape: two pointers, trivially copyable, valid until Tape::reset().
@@ -42,25 +42,23 @@ class Var {
   const T* value() const { return slot_->value; }
   /// The tape it was recorded on.
   Tape<T>& tape() const { return *tape_; }
-  /// Whether a leaf is among what it was made from, so that gradients reach it.
+  /// Whether it depends on a leaf, so that gradients reach it.
   bool needs_grad() const { return slot_->needs_grad; }
-  /// The same matrix packed, where the loop that uses it has done so; else null.
+  /// The packed form of this matrix, or null.
   const PackedMatrix<T>* packed() const { return slot_->packed; }
-  /// dL/d(this) as written so far; nullptr where no gradient has arrived.
+  /// dL/d(this) accumulated so far; nullptr before the first gradient.
   const T* grad() const { return slot_->grad; }
-  /// Where a backward adds its share; nullptr if this input needs none.
-  /// The buffer is made, zeroed, on the first call.
+  /// The buffer to which a backward adds, zeroed on the first call; nullptr if this input needs no gradient.
   T* grad_acc() const;
-  /// As grad_acc(), but a buffer made by this call is left uninitialised and *fresh is set: the caller then
-  /// assigns every element instead of adding. Saves a pass over memory in ops that write all of their input's
-  /// gradient.
-  /// @param masked  the caller leaves 0 where a rectified() value is not positive
+  /// As grad_acc(), but a new buffer stays uninitialised and *fresh is set: the caller then assigns every
+  /// element instead of adding, which saves a pass over memory.
+  /// @param masked  the caller writes 0 where a rectified() value is not positive
   T* grad_acc(bool* fresh, bool masked = false) const;
-  /// True for what a ReLU has put out (Tape::mark_rectified): its gradient matters only where the value is
-  /// positive, and an op that has the value at hand anyway may mask what it adds, which spares the ReLU's own
-  /// backward a pass over memory.
+  /// True for the output of a ReLU (Tape::mark_rectified). Its gradient counts only where the value is
+  /// positive: an op that reads the value anyway may mask its gradient, which saves the ReLU's backward a
+  /// pass over memory.
   bool rectified() const { return slot_->rectified; }
-  /// True if all that was added to grad() so far was masked.
+  /// True if every gradient added so far was masked.
   bool grad_masked() const { return slot_->masked; }
 
  private:
@@ -71,8 +69,8 @@ class Var {
     Shape shape;
     bool needs_grad;
     bool rectified;  // a ReLU's output
-    bool masked;     // no gradient came unmasked
-    T* target;       // where the gradient goes once one arrives; null: to the arena
+    bool masked;     // every gradient so far was masked
+    T* target;       // buffer of the gradient; null: the arena's
     const PackedMatrix<T>* packed;
   };
   Var(Tape<T>* t, Slot* s) : tape_(t), slot_(s) {}
@@ -80,9 +78,8 @@ class Var {
   Slot* slot_;
 };
 
-/// Records operations in the order they run, and replays their backwards in reverse.
-/// Creation order is already a topological order, so backward() is one loop: no sort, no
-/// recursion. One Tape per thread; there is no global tape.
+/// Records operations in the order they run and replays their backwards in reverse. Creation order is a
+/// topological order, so backward() is one loop. One Tape per thread; there is no global tape.
 template <class T>
 class Tape {
  public:
@@ -96,22 +93,21 @@ class Tape {
   Var<T> constant(const T* value, Shape shape) { return make(value, nullptr, shape, false); }
   /// @}
   /// @{
-  /// A parameter or another input to differentiate in: the gradient is added to what `grad` already holds.
+  /// A parameter or another input to differentiate in: its gradient is added to `grad`.
   Var<T> leaf(const T* value, T* grad, Shape shape) { return make(value, grad, shape, true); }
   Var<T> leaf(const Tensor<T>& t, Tensor<T>& grad) { return leaf(t.data.data(), grad.data.data(), t.shape); }
   /// @}
-  /// As leaf(), but the gradient is written over what `grad` holds, which need not be zeroed before; where
-  /// none arrives it stays as it was.
+  /// As leaf(), but the gradient overwrites `grad`; `grad` keeps its content if no gradient arrives.
   Var<T> fresh_leaf(const T* value, T* grad, Shape shape) {
     const Var<T> v = make(value, nullptr, shape, true);
     v.slot_->target = grad;
     return v;
   }
-  /// A matrix, with its packed form beside it. @param grad  null: a constant
+  /// A matrix with its packed form. @param grad  null: a constant
   Var<T> matrix(const T* value, T* grad, Shape shape, const PackedMatrix<T>* packed) {
     return make(value, grad, shape, grad != nullptr, packed);
   }
-  /// Output of an op; *data points at the uninitialised values for the op to fill.
+  /// Output of an op; *data points at uninitialised values, which the op fills.
   Var<T> output(Shape shape, T** data, std::initializer_list<Var<T>> inputs) {
     *data = scratch(shape.size());
     return make(*data, nullptr, shape,
@@ -122,11 +118,11 @@ class Tape {
     *data = scratch(shape.size());
     return make(*data, nullptr, shape, needs_grad);
   }
-  /// Says that `out` came through a ReLU, see Var::rectified().
+  /// Marks `out` as the output of a ReLU, see Var::rectified().
   void mark_rectified(Var<T> out) { out.slot_->rectified = true; }
-  /// The same numbers under another shape of equal size; gradients flow through unchanged.
+  /// The same elements under another shape of equal size; gradients pass through unchanged.
   Var<T> reshape(Var<T> x, Shape shape);
-  /// Uninitialised room for what a backward wants to keep.
+  /// Uninitialised memory until reset(), for values that a backward reads.
   template <class U = T>
   U* scratch(Index n) {
     static_assert(std::is_trivially_destructible_v<U>);
@@ -137,7 +133,7 @@ class Tape {
   template <class F>
   void on_backward(Var<T> out, F fn) {
     static_assert(std::is_trivially_destructible_v<F> && std::is_trivially_copyable_v<F>,
-                  "a backward lives in the arena: capture Var, Shape, numbers and raw pointers only");
+                  "a backward lives in the arena: capture Var, Shape, scalars and raw pointers only");
     if (!out.needs_grad()) return;
     auto* f = new (arena_.allocate(sizeof(F))) F(fn);
     nodes_.push_back({out, f, [](void* p, const T* dout) { (*static_cast<F*>(p))(dout); }});
@@ -150,11 +146,11 @@ class Tape {
     const T one = 1;
     backward(loss, std::span<const T>(&one, 1));
   }
-  /// Seeds dL/dout = seed (row-major, as many as out has) and replays.
+  /// Seeds dL/dout = seed (row-major, one for each element of out) and replays.
   /// @throws ShapeError if the sizes differ   @throws ValueError if no input of `out` needs a gradient
   void backward(Var<T> out, std::span<const T> seed) {
     if (static_cast<Index>(seed.size()) != out.shape().size())
-      throw ShapeError("[backward] seed must have one number for each of out, whose shape is " +
+      throw ShapeError("[backward] seed must have one element for each of out, whose shape is " +
                        out.shape().str() + ", got " + std::to_string(seed.size()));
     bool fresh = false;
     T* g = out.grad() ? out.grad_acc() : out.grad_acc(&fresh, true);
@@ -162,18 +158,18 @@ class Tape {
     detail::seed_gradient(seed.data(), out.rectified() ? out.value() : nullptr, fresh, g, out.shape().size());
     replay();
   }
-  /// Replays with the gradients that Var::grad_acc() holds already: several outputs may have been seeded by
+  /// Replays from the gradients that the caller wrote to Var::grad_acc(): several outputs can be seeded by
   /// hand.
   void replay() {
     for (auto n = nodes_.rbegin(); n != nodes_.rend(); ++n)
       if (const T* dout = n->out.grad()) n->run(n->closure, dout);
   }
-  /// Forgets what was recorded and frees its memory for the next pass; every Var of it becomes invalid.
+  /// Forgets the recorded pass and keeps its memory for the next one; every Var of it becomes invalid.
   void reset() {
     nodes_.clear();
     arena_.reset();
   }
-  /// Where values, gradients and closures lie, to reserve room or to count.
+  /// The memory of values, gradients and closures, for counting.
   Arena& arena() { return arena_; }
 
  private:

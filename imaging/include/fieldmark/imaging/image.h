@@ -13,10 +13,9 @@ namespace fieldmark {
 // Images are [height, width, channels] of 1 to 4 channels, values in [0, 1] as the file has them (sRGB, no
 // gamma).
 
-/// Reads a PNG or JPEG file: a multiple of 1/255 for each number, channels as in the file (a palette becomes
-/// 3 or 4). 16-bit files lose their low byte.
-/// @throws IoError if it is missing, truncated or no image: the text gives its size and the decoder's
-/// reason
+/// Reads a PNG or JPEG file: multiples of 1/255, channels as in the file (a palette becomes 3 or 4). 16-bit
+/// files lose their low byte.
+/// @throws IoError if it is missing, truncated or no image
 Tensor<float> read_image(const std::filesystem::path& path);
 /// As read_image(), from memory. @param name  stands for the path in error texts
 Tensor<float> decode_image(std::span<const std::byte> bytes, std::string_view name);
@@ -31,22 +30,22 @@ void write_png(const std::filesystem::path& path, const Tensor<float>& image);
 /// @param quality  1 to 90: the encoder leaves chroma at full size above
 /// @throws ShapeError, ValueError
 std::vector<std::byte> encode_jpeg(const Tensor<float>& image, int quality);
-/// What is left of an image after encode_jpeg(): decoded, of the same shape.
+/// encode_jpeg() and decode; same shape.
 Tensor<float> jpeg_round_trip(const Tensor<float>& image, int quality);
 
-/// floor(255 clamp(x, 0, 1) + 1/2) for each number; 0 for NaN.
+/// floor(255 clamp(x, 0, 1) + 1/2) for each value; 0 for NaN.
 std::vector<std::uint8_t> bytes_of(const Tensor<float>& image);
-/// bytes_of() / 255: what a PNG file keeps of the image. Idempotent; any shape.
+/// bytes_of() / 255, as a PNG file holds the image. Idempotent; any shape.
 Tensor<float> quantize8(const Tensor<float>& image);
 
 /// Copies `image` into `canvas` with its upper left corner at (row, column).
 /// @throws ShapeError if channels differ or it does not fit
-void paste(Tensor<float>& canvas, const Tensor<float>& picture, Index row, Index column);
+void paste(Tensor<float>& canvas, const Tensor<float>& image, Index row, Index column);
 /// Contact sheet: images in reading order, in cells of the largest height and width, upper left in each.
-/// @param columns  at least 1   @param gap  pixels between cells, >= 0   @param background  value of what
-/// stays free
+/// @param columns  at least 1   @param gap  pixels between cells, >= 0   @param background  value of empty
+/// pixels
 /// @return [rows (H + gap) - gap, columns' (W + gap) - gap, C], columns' = min(columns, images)
-/// @throws ValueError if there is no image or a number is out of range   @throws ShapeError if channels
+/// @throws ValueError if there is no image or columns or gap is out of range   @throws ShapeError if channels
 /// differ
 Tensor<float> tile(std::span<const Tensor<float>> images, Index columns, Index gap, float background = 1);
 

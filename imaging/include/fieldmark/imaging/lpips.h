@@ -8,11 +8,11 @@ namespace fieldmark {
 /// The networks whose features lpips compares: AlexNet at 5 depths, SqueezeNet 1.1 at 7.
 enum class LpipsNetwork { alex, squeeze };
 
-/// Everything a weight file must hold for a network: convolutions, "lin<k>.weight" [1, C, 1, 1] and
+/// The tensors of a network's weight file: convolutions, "lin<k>.weight" [1, C, 1, 1] and
 /// "scaling.shift", "scaling.scale" [3].
 std::vector<WeightTensor> lpips_tensors(LpipsNetwork network);
 
-/// What Lpips::distance() found.
+/// Result of Lpips::distance().
 struct LpipsDistance {
   double value = 0;               ///< the sum over the depths, >= 0
   std::vector<double> per_layer;  ///< the share of each depth, shallowest first
@@ -22,15 +22,15 @@ struct LpipsDistance {
 ///   lpips(a, b) = sum_k feature_distance(f_k(a), f_k(b), lin_k)
 /// with f_k the features of a network trained on ImageNet, after a ReLU, at depth k, of the image
 /// ((2 x - 1) - shift) / scale. Source: Zhang et al. 2018 (The unreasonable effectiveness of deep features),
-/// eq. 1; version 0.1 of the authors' linear layers. Gradients reach the images; the weights stay.
+/// eq. 1; version 0.1 of the authors' linear layers. Gradients reach the images; the weights are fixed.
 template <class T>
 class Lpips {
  public:
   /// @throws IoError if the file lacks a tensor of lpips_tensors() or one has another shape
   Lpips(const SafetensorsFile& file, LpipsNetwork network);
 
-  /// Pixels that an image must have each way at least: 31 for AlexNet, 17 for SqueezeNet. A smaller one
-  /// leaves a pooling layer without a window.
+  /// Least height and width of an image: 31 for AlexNet, 17 for SqueezeNet. A smaller one leaves a pooling
+  /// layer without a window.
   Index smallest() const { return smallest_; }
 
   /// @param x  [N, H, W, 3] in [0, 1], RGB   @return the features at each depth, shallowest first
@@ -43,8 +43,8 @@ class Lpips {
   /// max_pool().
   Var<T> operator()(Var<T> a, Var<T> b) const;
 
-  /// The distance of two images, depth by depth: no more features than those of two depths are held, about
-  /// 2.5 kB (SqueezeNet) or 0.4 kB (AlexNet) of float for each pixel of an image.
+  /// The distance of two images, depth by depth: it holds the features of two depths at a time, in float
+  /// about 2.5 kB (SqueezeNet) or 0.4 kB (AlexNet) for each pixel of an image.
   /// @param a, b  [H, W, 3] of one shape in [0, 1], RGB   @throws ShapeError if they do not fit
   LpipsDistance distance(const Tensor<float>& a, const Tensor<float>& b) const;
 
@@ -61,7 +61,7 @@ class Lpips {
   Var<T> run(std::size_t stage, Var<T> x) const;
 
   Index smallest_;
-  bool partial_windows_;  // of the pooling layers
+  bool ceil_mode_;  // of the pooling layers
   PretrainedConv<T> scaling_;
   std::vector<Stage> stages_;
 };

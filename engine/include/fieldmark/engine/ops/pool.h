@@ -3,7 +3,7 @@
 
 namespace fieldmark {
 
-/// Average over windows of size x size pixels, side by side. Trailing rows and columns that do not fill a
+/// Average over windows of size x size pixels, stride size. Trailing rows and columns that do not fill a
 /// window are dropped: a padded average would darken the border.
 /// @param x [N, H, W, C]   @param size  side of a window in pixels, >= 1   @return [N, H / size, W / size, C]
 /// @throws ShapeError if x is not rank 4   @throws ValueError if size is below 1
@@ -20,19 +20,18 @@ Var<T> global_avg_pool(Var<T> x);
 
 /// Windows of max_pool().
 struct MaxPool {
-  Index size = 2;        ///< side of a window in pixels, >= 1
-  Index stride = 2;      ///< pixels from one window to the next, both ways, >= 1
-  bool partial = false;  ///< also windows that reach over the lower or right edge ("ceil mode"): what lies
-                         ///< inside counts
+  Index size = 2;          ///< side of a window in pixels, >= 1
+  Index stride = 2;        ///< pixels from one window to the next, both ways, >= 1
+  bool ceil_mode = false;  ///< keeps windows that cross the lower or right edge, cut off there
 };
 
-/// Largest number of each channel in windows of size x size pixels, which may overlap or leave gaps.
-/// @param x [N, H, W, C]   @return [N, H', W', C], H' = (H - size) / stride + 1 rounded down, or, with
-/// partial windows, rounded up and at least 1, less a window that would begin outside; a NaN in a window is
-/// its result
-/// @throws ShapeError if x is not rank 4 or has no window   @throws ValueError if a number is out of range
-/// Differentiable in: x, where no two numbers of a window are both the largest; else the gradient goes to the
-/// first of them in reading order.
+/// Maximum of each channel over windows of size x size pixels, which may overlap or leave gaps; NaN if a
+/// window has one.
+/// @param x [N, H, W, C]   @return [N, H', W', C], H' = (H - size) / stride + 1 rounded down; with ceil_mode
+/// rounded up, at least 1, without windows that begin outside
+/// @throws ShapeError if x is not rank 4 or has no window   @throws ValueError if size or stride is out of
+/// range Differentiable in: x, where the maximum of a window is unique; else the gradient goes to the first
+/// in reading order.
 template <class T>
 Var<T> max_pool(Var<T> x, MaxPool windows);
 

@@ -1,8 +1,9 @@
-#include <fieldmark/engine/ops/columns.h>
+#include <fieldmark/engine/ops/slice.h>
 
+#include <array>
 #include <memory>
 
-#include "ops/pieces.h"
+#include "ops/chunks.h"
 
 namespace fieldmark {
 namespace {
@@ -15,33 +16,26 @@ Index leading(const Shape& s) {
 }
 
 Shape with_last(const Shape& s, Index last) {
-  switch (s.rank()) {
-    case 1:
-      return {last};
-    case 2:
-      return {s[0], last};
-    case 3:
-      return {s[0], s[1], last};
-    case 4:
-      return {s[0], s[1], s[2], last};
-    default:
-      return {s[0], s[1], s[2], s[3], last};
-  }
+  std::array<Index, Shape::kMaxRank> extents{};
+  const auto rank = static_cast<std::size_t>(s.rank());
+  for (std::size_t k = 0; k + 1 < rank; ++k) extents[k] = s[static_cast<int>(k)];
+  extents[rank - 1] = last;
+  return Shape(std::span(extents).first(rank));
 }
 
-void check_has_columns(const char* op, const Shape& s) {
+void check_has_axis(const char* op, const Shape& s) {
   if (s.rank() == 0)
     throw ShapeError(std::string("[") + op + "] x must have rank 1 or more [.., C], got shape []");
 }
 
-// Columns of a wide row-major matrix: where they start, how many, and the matrix's own.
-struct Slice {
+// Columns [begin, begin + count) of a row-major matrix with `width` columns.
+struct Columns {
   Index begin, count, width;
 };
 
-// Adds the columns of dy to (or, if fresh, assigns) the narrow dx. A row is owned by one piece.
+// Adds the columns of dy to (or, if fresh, assigns) the narrow dx. A chunk owns its rows.
 template <class T>
-void add_columns(Index rows, Slice s, const T* dy, T* dx, bool fresh) {
+void add_columns(Index rows, Columns s, const T* dy, T* dx, bool fresh) {
   parallel_for(rows, detail::row_grain(s.count), [&](Index r0, Index r1) {
     for (Index r = r0; r < r1; ++r) {
       const T* from = dy + r * s.width + s.begin;
@@ -57,16 +51,16 @@ void add_columns(Index rows, Slice s, const T* dy, T* dx, bool fresh) {
 }  // namespace
 
 template <class T>
-Var<T> concat_columns(std::span<const Var<T>> xs) {
-  if (xs.empty()) throw ValueError("[concat_columns] xs must have at least one tensor, got 0");
+Var<T> concatenate(std::span<const Var<T>> xs) {
+  if (xs.empty()) throw ValueError("[concatenate] xs must have at least one tensor, got 0");
   Index width = 0;
   bool needs_grad = false;
   const Shape first = xs[0].shape();
   for (const Var<T>& x : xs) {
-    check_has_columns("concat_columns", x.shape());
+    check_has_axis("concatenate", x.shape());
     if (with_last(x.shape(), 0) != with_last(first, 0))
-      throw ShapeError("[concat_columns] xs: all axes but the last must be those of the first, " +
-                       first.str() + ", got shape " + x.shape().str());
+      throw ShapeError("[concatenate] xs: all axes but the last must be those of the first, " + first.str() +
+                       ", got shape " + x.shape().str());
     width += x.shape()[-1];
     needs_grad = needs_grad || x.needs_grad();
   }
@@ -86,7 +80,7 @@ Var<T> concat_columns(std::span<const Var<T>> xs) {
     }
   });
 
-  // Each input receives the gradient of its own columns.
+  // Each input receives the gradient of its columns.
   tape.on_backward(out, [kept, count, rows, width](const T* dy) {
     Index begin = 0;
     for (Index k = 0; k < count; ++k) {
@@ -100,18 +94,18 @@ Var<T> concat_columns(std::span<const Var<T>> xs) {
 }
 
 template <class T>
-Var<T> columns(Var<T> x, Index begin, Index count) {
-  check_has_columns("columns", x.shape());
+Var<T> slice(Var<T> x, Index begin, Index count) {
+  check_has_axis("slice", x.shape());
   const Index rows = leading(x.shape()), width = x.shape()[-1];
   if (begin < 0 || count < 0 || begin > width - count)
-    throw ShapeError("[columns] begin and count: columns " + std::to_string(begin) + " to " +
-                     std::to_string(begin + count) + " must lie within those of x, got shape " +
+    throw ShapeError("[slice] begin and count: entries " + std::to_string(begin) + " to " +
+                     std::to_string(begin + count) + " must lie within the last axis of x, got shape " +
                      x.shape().str());
   T* y = nullptr;
   const Var<T> out = x.tape().output(with_last(x.shape(), count), &y, {x});
   add_columns(rows, {begin, count, width}, x.value(), y, true);
 
-  // The other columns receive nothing. A row is owned by one piece.
+  // The other columns receive nothing. A chunk owns its rows.
   x.tape().on_backward(out, [x, rows, begin, count, width](const T* dy) {
     T* dx = x.grad_acc();
     parallel_for(rows, detail::row_grain(count), [&](Index r0, Index r1) {
@@ -122,9 +116,9 @@ Var<T> columns(Var<T> x, Index begin, Index count) {
   return out;
 }
 
-template Var<float> concat_columns(std::span<const Var<float>>);
-template Var<double> concat_columns(std::span<const Var<double>>);
-template Var<float> columns(Var<float>, Index, Index);
-template Var<double> columns(Var<double>, Index, Index);
+template Var<float> concatenate(std::span<const Var<float>>);
+template Var<double> concatenate(std::span<const Var<double>>);
+template Var<float> slice(Var<float>, Index, Index);
+template Var<double> slice(Var<double>, Index, Index);
 
 }  // namespace fieldmark

@@ -1,0 +1,29 @@
+#pragma once
+#include <fieldmark/engine/tape.h>
+
+#include <initializer_list>
+#include <span>
+
+namespace fieldmark {
+
+/// Concatenates tensors along their last axis: features [N, Ci], or the channels of images [N, H, W, Ci].
+/// @param xs  one or more, with the same leading axes
+/// @return    [.., C0 + C1 + ..]
+/// @throws ShapeError if the leading axes differ or a rank is 0   @throws ValueError if xs is empty
+/// Differentiable in: every x.
+template <class T>
+Var<T> concatenate(std::span<const Var<T>> xs);
+/// The same for tensors listed at the call.
+template <class T>
+Var<T> concatenate(std::initializer_list<Var<T>> xs) {
+  return concatenate(std::span<const Var<T>>(xs.begin(), xs.size()));
+}
+
+/// Entries begin .. begin + count - 1 of the last axis.
+/// @param x [.., C]   @return [.., count]
+/// @throws ShapeError if the range does not lie within C
+/// Differentiable in: x.
+template <class T>
+Var<T> slice(Var<T> x, Index begin, Index count);
+
+}  // namespace fieldmark
