@@ -37,6 +37,7 @@ constexpr Entry kCommands[] = {
     {"attack-field", "Do to a field's file what may remove a mark", add_attack_field},
     {"bench", "Measure speed and error against this machine's peak", add_bench},
     {"reproduce", "Run every system of the paper's tables, beside its figures", add_reproduce},
+    {"results", "List, measure and render the results of docs/results", add_results},
     {"gradcheck", "Check every hand-derived gradient against finite differences", add_gradcheck},
     {"info", "What a field, owner, key or other safetensors file holds", add_info},
 };
