@@ -33,7 +33,7 @@ TEST_CASE("results measures what is named, once, and renders it", "[results]") {
   INFO(page.err);
   REQUIRE(page.code == cli::kOk);
   CHECK_THAT(read_text(folder / "out/payload.md"), Contains("40 data bits in 100, 500 trials a row"));
-  CHECK_THAT(read_text(folder / "out/README.md"), Contains("| - | - "));
+  CHECK_THAT(read_text(folder / "out/README.md"), Contains("| - | [quality](quality.md) |"));
 }
 
 TEST_CASE("results lists every row with its state, and skips what has no data set", "[results]") {

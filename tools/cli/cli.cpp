@@ -12,6 +12,9 @@
 #include "cli/suggest.h"
 
 namespace fieldmark::cli {
+
+Command add_results(CommandLine& app);  // cmd_results.cpp
+
 namespace {
 
 struct Entry {

@@ -28,7 +28,6 @@ Command add_key(CommandLine& app);
 Command add_measure(CommandLine& app);
 Command add_render(CommandLine& app);
 Command add_reproduce(CommandLine& app);
-Command add_results(CommandLine& app);
 Command add_scene(CommandLine& app);
 Command add_train(CommandLine& app);
 Command add_verify(CommandLine& app);
