@@ -153,7 +153,7 @@ Command add_bench_embed(CommandLine& app) {
   auto field = add_file(app, "--field", o->field, "Unmarked field (--scene, trained for a minute)", "FIELD");
   add_file(app, "--owner", o->owner, "OWNER whose unmarked field is marked", "OWNER")->excludes(field);
   add_scene_option(app, o->scene);
-  app.option("--scene")->excludes("--field")->excludes("--owner");
+  app.option("--scene")->excludes(field)->excludes(app.option("--owner"));
   add_file(app, "--only", o->only, "Only the default and rows with TEXT in their name (all)", "TEXT");
   add_number(app, "--bits", o->bits, 1, 256, "Length of the message in bits, 1 to 256");
   add_number(app, "--seconds", o->seconds, 0.1, 86400, "Embedding time of each row in seconds, 0.1 to 86400",
