@@ -85,10 +85,10 @@ std::string format_cell(const Cell& c) {
                {"own_2d_accuracy", number(c.own_2d_accuracy)},
                {"psnr_base", number(c.psnr_base)},
                {"psnr_base_foreground", number(c.psnr_base_foreground)},
-               {"psnr_photo", number(c.psnr_photo)},
+               {"psnr_gt", number(c.psnr_photo)},
                {"ssim", number(c.ssim)},
                {"lpips", number(c.lpips)},
-               {"under", numbers(c.under)},
+               {"distorted", numbers(c.under)},
                {"commit", c.commit},
                {"more", numbers(c.more)}};
   return j.dump(2) + "\n";
@@ -96,7 +96,8 @@ std::string format_cell(const Cell& c) {
 
 Cell parse_cell(std::string_view text, std::string_view place) {
   try {
-    const Json j = Json::parse(text);
+    const Json whole = Json::parse(text);
+    const Json& j = whole.contains("result") ? whole["result"] : whole;  // a row, or the cell alone
     return {.name = {j.at("system"), j.at("scene"), j.at("field"), j.at("bits"), j.at("seed")},
             .steps = j.at("steps"),
             .seconds = read_number(j.at("seconds")),
@@ -105,10 +106,10 @@ Cell parse_cell(std::string_view text, std::string_view place) {
             .own_2d_accuracy = read_number(j.at("own_2d_accuracy")),
             .psnr_base = read_number(j.at("psnr_base")),
             .psnr_base_foreground = read_number(j.at("psnr_base_foreground")),
-            .psnr_photo = read_number(j.at("psnr_photo")),
+            .psnr_photo = read_number(j.at("psnr_gt")),
             .ssim = read_number(j.at("ssim")),
             .lpips = read_number(j.at("lpips")),
-            .under = read_numbers(j.at("under")),
+            .under = read_numbers(j.at("distorted")),
             .commit = j.at("commit"),
             .more = read_numbers(j.at("more"))};
   } catch (const Json::exception& e) {

@@ -187,7 +187,7 @@ CellRunner::Trained CellRunner::train_hiding(const CellName& name, const Scene& 
   const double seconds = 0.5 * (1 - kNetworkPart) * options_.budget;
   const auto field_of = [&](const watermark::Message& sent, const char* which) {
     const nerf::Dataset marked = marked_photographs(scene.train, *marker, sent);
-    trained.more["photographs_accuracy"] += 0.5 * accuracy_of(*marker, photographs_of(marked), sent);
+    trained.more["training_images_accuracy"] += 0.5 * accuracy_of(*marker, photographs_of(marked), sent);
     return std::make_shared<const nerf::RadianceField>(
         trained_field(name.stem() + which, marked, name, seconds));
   };
@@ -274,15 +274,15 @@ MeasuredCell CellRunner::run(const CellName& name) {
   const Tensor<float> pair[] = {nerf::Renderer(*trained.unmarked).render(camera).rgb,
                                 trained.marked.render(camera, trained.marked.message(0))};
   std::map<std::string, double> more{{"views", static_cast<double>(s.views)},
-                                     {"under_views", static_cast<double>(o.under_views)},
-                                     {"photographs", static_cast<double>(data.test.views.size())},
+                                     {"distorted_views", static_cast<double>(o.under_views)},
+                                     {"test_images", static_cast<double>(data.test.views.size())},
                                      {"width", static_cast<double>(camera.width)},
                                      {"height", static_cast<double>(camera.height)},
                                      {"budget", o.budget},
                                      {"ssim_base", s.ssim_base},
                                      {"lpips_base", s.lpips_base},
-                                     {"psnr_photo_object", s.psnr_photo_object},
-                                     {"psnr_photo_unmarked", s.psnr_photo_unmarked}};
+                                     {"psnr_gt_foreground", s.psnr_photo_object},
+                                     {"psnr_gt_unmarked", s.psnr_photo_unmarked}};
   more.insert(trained.more.begin(), trained.more.end());
   Cell cell{.name = name,
             .steps = trained.steps,
@@ -300,15 +300,6 @@ MeasuredCell CellRunner::run(const CellName& name) {
             .more = more};
   keep_curve(cell, run_curve(trained.checkpoint));
   return {.cell = cell, .image = tile(pair, 2, 0)};
-}
-
-void save_measured(const std::filesystem::path& folder, const MeasuredCell& measured) {
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  if (failed) throw IoError(folder.string() + ": cannot make the folder: " + failed.message());
-  const std::string stem = cell_path(folder, measured.cell.name).string();
-  write_png(stem + ".png", measured.image);
-  save_cell(folder, measured.cell);
 }
 
 }  // namespace fieldmark::baselines

@@ -54,8 +54,8 @@ TEST_CASE("cell: the keys that scripts read, null where nothing was measured") {
   const std::string text = format_cell(sample());
   std::size_t at = 0;
   for (const char* key : {"system", "scene", "field", "bits", "seed", "steps", "seconds", "bit_accuracy",
-                          "spread", "own_2d_accuracy", "psnr_base", "psnr_base_foreground", "psnr_photo",
-                          "ssim", "lpips", "under", "commit"}) {
+                          "spread", "own_2d_accuracy", "psnr_base", "psnr_base_foreground", "psnr_gt",
+                          "ssim", "lpips", "distorted", "commit"}) {
     const std::size_t found = text.find("\"" + std::string(key) + "\":", at);
     CAPTURE(key);
     REQUIRE(found != std::string::npos);

@@ -1,5 +1,3 @@
-#include "cli/bench_attacks.h"
-
 #include <fieldmark/core/files.h>
 
 #include "cli/cli.h"
@@ -70,7 +68,7 @@ TEST_CASE("bench attacks has a row for each attack on images and files, with dam
   CHECK_THAT(read_text(folder / "attacks.md"), Contains("## images") && Contains("## fields"));
   for (const char* plot : {"attacks.svg", "attacks-fields.svg"})
     CHECK_THAT(read_text(folder / plot),
-               Contains("class=\"curve\"") && Contains("grey levels") && Contains("as extract reads them"));
+               Contains("class=\"curve\"") && Contains("grey levels") && Contains("chosen detection"));
 }
 
 TEST_CASE("bench attacks: what is missing", "[bench]") {

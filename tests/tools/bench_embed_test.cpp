@@ -1,5 +1,3 @@
-#include "cli/bench_embed.h"
-
 #include <fieldmark/core/files.h>
 
 #include "tools/tiny_job.h"
@@ -50,29 +48,6 @@ TEST_CASE("bench embed takes an owner's field, and only the rows that are asked 
   CHECK(json["field"] == "owner.fm");
   REQUIRE(json["rows"].size() == 2);
   CHECK(json["rows"][1]["choice"] == "distances");
-}
-
-TEST_CASE("bench embed goes on with the rows that a file has", "[bench]") {
-  const TinyJob& job = TinyJob::get();
-  const TemporaryFolder folder;
-  const auto rows_of = [&](const char* only) {
-    const auto r =
-        run_command({"bench", "embed", "--field", job.field, "--seconds", "0.2", "--views", "1", "--bits",
-                     "4", "--quick", "--only", only, "--rows", folder / "rows.json", "--json", "-"});
-    INFO(r.err);
-    REQUIRE(r.code == cli::kOk);
-    return nlohmann::json::parse(r.out)["rows"];
-  };
-  const auto first = rows_of("length: half"), both = rows_of("length: ");
-  REQUIRE(first.size() == 2);
-  REQUIRE(both.size() == 4);
-  for (const char* key : {"choice", "seconds", "accuracy", "psnr_foreground", "steps", "commit"})
-    CHECK(both[0][key] == first[0][key]);  // which rows are on the front depends on the others
-  CHECK(both[2]["seconds"] == first[1]["seconds"]);
-  CHECK(both[2]["commit"] == first[1]["commit"]);
-  const auto kept = rows_of("no such row");  // all that are in the file, and nothing measured
-  REQUIRE(kept.size() == 4);
-  for (std::size_t i = 0; i < 4; ++i) CHECK(kept[i]["seconds"] == both[i]["seconds"]);
 }
 
 TEST_CASE("bench embed: what is not there", "[bench]") {

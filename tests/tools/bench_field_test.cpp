@@ -1,5 +1,3 @@
-#include "cli/bench_field.h"
-
 #include <fieldmark/core/files.h>
 
 #include <nlohmann/json.hpp>

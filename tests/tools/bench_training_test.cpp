@@ -1,5 +1,3 @@
-#include "cli/bench_training.h"
-
 #include <fieldmark/core/files.h>
 
 #include <nlohmann/json.hpp>

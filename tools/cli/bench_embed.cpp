@@ -1,19 +1,11 @@
-#include "cli/bench_embed.h"
-
-#include <fieldmark/core/files.h>
 #include <fieldmark/engine/isa.h>
-#include <fieldmark/imaging/scatter_chart.h>
 #include <fieldmark/tools/bench/embed_bench.h>
+#include <fieldmark/tools/results/charts.h>
 #include <fieldmark/watermark/mark/owner.h>
 
-#include <cstdio>
 #include <filesystem>
-#include <memory>
-#include <ostream>
 
-#include "cli/cli.h"
-#include "cli/context.h"
-#include "cli/embed_rows.h"
+#include "cli/bench.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -23,23 +15,30 @@ constexpr double kQuickFieldSeconds = 1;  // the same for tests
 constexpr std::size_t kQuickRows = 4;     // the default and the other lengths
 constexpr Index kQuickViews = 8, kQuickPatch = 48, kQuickChannels = 8, kQuickCells = 6;
 
+struct Options {
+  std::string owner, field, scene, plot, only;
+  double seconds = 90;
+  Index views = 24, bits = 16, size = 0;
+  bool quick = false;
+};
+
 struct Subject {
   std::unique_ptr<nerf::RadianceField> field;
   std::string name;
 };
 
-Subject subject_of(const BenchEmbedOptions& o, Context& context) {
+Subject subject_of(const Options& o, Context& context) {
   const auto name = [](const std::string& path) { return std::filesystem::path(path).filename().string(); };
   if (!o.owner.empty())
     return {std::make_unique<nerf::RadianceField>(watermark::Owner::load(o.owner).field), name(o.owner)};
   if (!o.field.empty())
     return {std::make_unique<nerf::RadianceField>(nerf::RadianceField::load(o.field)), name(o.field)};
-  const nerf::Dataset data = bench_split(o.scene.empty() ? lego_folder() : o.scene, "train", o.quick);
+  const nerf::Dataset data = bench_split(o.scene, "train", o.quick);
   return {trained_field(data, o.quick ? kQuickFieldSeconds : kFieldSeconds, context), data.name};
 }
 
-std::vector<bench::EmbedVariant> variants_of(const BenchEmbedOptions& o, const nerf::RadianceField& field,
-                                             const std::vector<bench::EmbedRow>& known, std::uint64_t seed) {
+std::vector<bench::EmbedVariant> variants_of(const Options& o, const nerf::RadianceField& field,
+                                             std::uint64_t seed) {
   auto all =
       bench::embed_variants({.seconds = o.seconds}, o.bits, seed, watermark::colours_for(field.space.kind));
   for (bench::EmbedVariant& v : all) {
@@ -48,8 +47,7 @@ std::vector<bench::EmbedVariant> variants_of(const BenchEmbedOptions& o, const n
     if (v.choice != "batch") v.recipe.embed.batch = watermark::batch_for(field.space.kind);
   }
   const auto wanted = [&](const bench::EmbedVariant& v) {
-    return v.choice == "default" || bench::find_row(known, v) ||
-           (v.choice + ": " + v.setting).find(o.only) != std::string::npos;
+    return v.choice == "default" || (v.choice + ": " + v.setting).find(o.only) != std::string::npos;
   };
   std::erase_if(all, [&](const auto& v) { return !wanted(v); });
   if (!o.quick) return all;
@@ -63,26 +61,35 @@ std::vector<bench::EmbedVariant> variants_of(const BenchEmbedOptions& o, const n
   return all;
 }
 
-Json row_json(const bench::EmbedRow& r, double usual, const std::string& commit) {
-  Json json{{"choice", r.variant.choice},
-            {"setting", r.variant.setting},
-            {"front", r.front},
-            {"difference", r.accuracy - usual}};
-  json.update(embed_figures(r));
-  json["commit"] = commit;
-  return json;
-}
-
-void print_row(std::ostream& out, const bench::EmbedRow& r, double usual) {
-  char line[280];
-  std::snprintf(
-      line, sizeof line,
-      "%c %-13s %-40s %6.2f%%  %+6.2f  %5.2f dB  %5.1f s  %5ld steps  closer %5.1f%%  farther %5.1f%%  "
-      "unseen %5.1f%%  sign %5.1f%%  cell %5.1f%%\n",
-      r.front ? '*' : ' ', r.variant.choice.c_str(), r.variant.setting.c_str(), 100 * r.accuracy,
-      100 * (r.accuracy - usual), r.psnr_foreground, r.seconds, static_cast<long>(r.steps), 100 * r.closer,
-      100 * r.farther, 100 * r.unseen, 100 * r.figures.sign, 100 * r.figures.index);
-  out << line;
+Json rows_json(const std::vector<bench::EmbedRow>& rows, Context& context) {
+  const double usual = rows.front().accuracy;
+  Json list = Json::array();
+  for (const bench::EmbedRow& r : rows) {
+    print_line(
+        context,
+        "%c %-13s %-40s %6.2f%%  %+6.2f  %5.2f dB  %5.1f s  %5ld steps  closer %5.1f%%  farther %5.1f%%  "
+        "extrapolated %5.1f%%  sign %5.1f%%  cell %5.1f%%\n",
+        r.front ? '*' : ' ', r.variant.choice.c_str(), r.variant.setting.c_str(), 100 * r.accuracy,
+        100 * (r.accuracy - usual), r.psnr_foreground, r.seconds, static_cast<long>(r.steps), 100 * r.closer,
+        100 * r.farther, 100 * r.extrapolated, 100 * r.figures.sign, 100 * r.figures.index);
+    list.push_back({{"choice", r.variant.choice},
+                    {"setting", r.variant.setting},
+                    {"front", r.front},
+                    {"difference", r.accuracy - usual},
+                    {"view_seconds", r.cache_seconds},
+                    {"seconds", r.seconds},
+                    {"accuracy", number(r.accuracy)},
+                    {"accuracy_p5", number(r.accuracy_p5)},
+                    {"psnr_foreground", number(r.psnr_foreground)},
+                    {"closer", number(r.closer)},
+                    {"farther", number(r.farther)},
+                    {"extrapolated", number(r.extrapolated)},
+                    {"steps", r.steps},
+                    {"sign", number(r.figures.sign)},
+                    {"cell", number(r.figures.index)},
+                    {"bits_in_training", number(r.figures.bits)}});
+  }
+  return list;
 }
 
 Json curves_json(const std::vector<bench::EmbedRow>& rows) {
@@ -97,112 +104,31 @@ Json curves_json(const std::vector<bench::EmbedRow>& rows) {
   return list;
 }
 
-std::string name_of(const bench::EmbedRow& r) {
-  return r.variant.choice == "default" ? "default" : r.variant.choice + ": " + r.variant.setting;
-}
-
-std::filesystem::path curves_path(std::filesystem::path path) {
-  return path.replace_filename(path.stem().string() + "-curves" + path.extension().string());
-}
-
-// Accuracy and strength against time: one image of where the runs ended, one of the way of those on the
-// front.
-void write_plots(const std::string& path, const std::string& name, const std::vector<bench::EmbedRow>& rows) {
-  const char* seconds = "seconds of embedding";
-  std::vector<bench::ScatterPoint> ends, ways;
-  for (const bench::EmbedRow& r : rows) {
-    const bool first = &r == rows.data();
-    char label[160];
-    std::snprintf(label, sizeof label, "%s, %.1f dB", name_of(r).c_str(), r.psnr_foreground);
-    ends.push_back({.x = r.seconds,
-                    .y = 100 * r.accuracy,
-                    .series = first                          ? "default"
-                              : r.variant.choice == "length" ? "default, other lengths"
-                              : r.front                      ? "on the front"
-                                                             : "others",
-                    .label = r.front ? label : "",
-                    .ring = first});
-    if (!first && !r.front) continue;
-    for (const bench::EmbedPoint& p : r.curve)
-      ways.push_back({.x = p.seconds, .y = 100 * p.accuracy, .series = name_of(r)});
-  }
-  const std::string y = "bits right in one view, blind, %";
-  write_file_atomically(
-      path,
-      bench::scatter_chart({.title = "Embedding in " + name + ": what is read against time",
-                            .x = std::string(seconds) + " (the ring is the default; names: on the front)",
-                            .y = y,
-                            .y_most = 100},
-                           ends));
-  write_file_atomically(curves_path(path),
-                        bench::scatter_chart({.title = "Embedding in " + name + ": the way there",
-                                              .x = seconds,
-                                              .y = y,
-                                              .curves = true,
-                                              .y_most = 100},
-                                             ways));
-}
-
-EmbedRows kept_rows(const BenchEmbedOptions& o, const std::string& field, Context& context) {
-  return {o.rows,
-          {{"field", field},
-           {"bits", o.bits},
-           {"seconds", o.seconds},
-           {"views", o.views},
-           {"size", o.size},
-           {"seed", context.seed()},
-           {"quick", o.quick}}};
-}
-
-std::vector<bench::EmbedRow> measured(const BenchEmbedOptions& o, const nerf::RadianceField& field,
-                                      EmbedRows& kept, Context& context) {
-  const auto variants = variants_of(o, field, kept.rows(), context.seed());
-  const InterruptGuard guard;
-  Progress progress = context.progress("bench");
-  return bench::run_embed_bench(
-      field, variants,
-      {.views = o.views,
-       .size = o.size,
-       .seed = context.seed(),
-       .known = kept.rows(),
-       .on_row = [&](const bench::EmbedRow& row) { kept.add(row); }},
-      [&](const std::string& what, double part) {
-        if (guard.interrupted())
-          throw Interrupted(o.rows.empty() ? "nothing was written" : "what was measured is in " + o.rows);
-        progress.update(part, what);
-      });
-}
-
 constexpr const char* kColumns =
-    "accuracy: blind, of one view, mean over novel views that were not learnt from; closer, farther, unseen: "
-    "of "
-    "a third as many views of such cameras; seconds: views, training and calibration; sign, cell, "
-    "bits_in_training: shares right under the distortions of training; curves: on the way, a third of the "
+    "accuracy: blind, of one view, mean over novel views outside the training set; closer, farther, "
+    "extrapolated: the "
+    "same for a third as many views of such cameras; seconds: rendering of views, training and calibration; "
+    "sign, "
+    "cell, bits_in_training: shares right under the distortions of training; curves: during training, a "
+    "third of the "
     "views";
 
-}  // namespace
-
-int bench_embed(const BenchEmbedOptions& options, Context& context) {
-  if (!options.plot.empty()) {
-    check_writable(options.plot);
-    check_writable(curves_path(options.plot).string());
-  }
-  if (!options.rows.empty()) check_writable(options.rows);
+int run(const Options& options, Context& context) {
+  if (!options.plot.empty())
+    for (const std::string& file : results::chart_files("embed", options.plot)) check_writable(file);
   const Subject subject = subject_of(options, context);
-  EmbedRows kept = kept_rows(options, subject.name, context);
-  auto rows = measured(options, *subject.field, kept, context);
+  const auto variants = variants_of(options, *subject.field, context.seed());
+  auto rows = with_progress(context, [&](const auto& progress) {
+    return bench::run_embed_bench(*subject.field, variants,
+                                  {.views = options.views, .size = options.size, .seed = context.seed()},
+                                  progress);
+  });
   const bench::EmbedMargin margin;
   bench::mark_front(rows, margin);
-  const double usual = rows.front().accuracy;
-  Json list = Json::array();
-  for (const bench::EmbedRow& row : rows) {
-    print_row(context.text(), row, usual);
-    list.push_back(row_json(row, usual, kept.commit_of(row)));
-  }
+  const Json list = rows_json(rows, context);
   const std::string why = bench::judgement(rows, margin);
   context.text() << why << "\n";
-  if (!options.plot.empty()) write_plots(options.plot, subject.name, rows);
-  context.result({{"field", subject.name},
+  const Json json{{"field", subject.name},
                   {"bits", options.bits},
                   {"views", options.views},
                   {"isa", isa_name()},
@@ -214,8 +140,31 @@ int bench_embed(const BenchEmbedOptions& options, Context& context) {
                   {"front_margin_accuracy", margin.accuracy},
                   {"front_margin_psnr", margin.psnr},
                   {"rows", list},
-                  {"curves", curves_json(rows)}});
+                  {"curves", curves_json(rows)}};
+  if (!options.plot.empty()) results::write_charts("embed", options.plot, json);
+  context.result(json);
   return kOk;
+}
+
+}  // namespace
+
+Command add_bench_embed(CommandLine& app) {
+  auto o = std::make_shared<Options>();
+  auto field = add_file(app, "--field", o->field, "Unmarked field (--scene, trained for a minute)", "FIELD");
+  add_file(app, "--owner", o->owner, "OWNER whose unmarked field is marked", "OWNER")->excludes(field);
+  add_scene_option(app, o->scene);
+  app.option("--scene")->excludes(field)->excludes(app.option("--owner"));
+  add_file(app, "--only", o->only, "Only the default and rows with TEXT in their name (all)", "TEXT");
+  add_number(app, "--bits", o->bits, 1, 256, "Length of the message in bits, 1 to 256");
+  add_number(app, "--seconds", o->seconds, 0.1, 86400, "Embedding time of each row in seconds, 0.1 to 86400",
+             "S");
+  add_number(app, "--views", o->views, 1, 1000, "Novel views that judge a row, 1 to 1000");
+  add_number(app, "--size", o->size, 16, 8192,
+             "Longer side of these views in pixels, 16 to 8192 (as trained)")
+      ->default_str("");
+  add_plot(app, o->plot);
+  app.add_flag("--quick", o->quick, "Four rows with small networks");
+  return [o](Context& context) { return run(*o, context); };
 }
 
 }  // namespace fieldmark::cli

@@ -1,12 +1,6 @@
-#include "cli/bench_payload.h"
-
 #include <fieldmark/tools/bench/payload_bench.h>
 
-#include <cstdio>
-#include <ostream>
-
-#include "cli/cli.h"
-#include "cli/context.h"
+#include "cli/bench.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -32,63 +26,51 @@ Json row_json(const bench::PayloadRow& r) {
   return json;
 }
 
-}  // namespace
-
-void add_bench_payload(CommandLine& app, BenchPayloadOptions& o) {
-  app.add_option("--bits", o.bits, "payload, embed: length of a message, 1 to 256")
-      ->range(1, 256)
-      ->type_name("N")
-      ->default_str("100; embed 16");
-  app.add_option("--trials", o.trials, "payload: of each row, 1 to 1000000")
-      ->range(1, 1000000)
-      ->type_name("N");
-}
-
-int bench_payload(const BenchPayloadOptions& options, Context& context) {
-  const InterruptGuard guard;
-  Progress progress = context.progress("bench");
-  const bench::PayloadBenchOptions bench{.bits = options.bits,
-                                         .trials = options.trials,
-                                         .noise_trials = kNoiseTrials * options.trials,
-                                         .seed = context.seed()};
+int run(Index bits, Index trials, Context& context) {
+  const bench::PayloadBenchOptions options{
+      .bits = bits, .trials = trials, .noise_trials = kNoiseTrials * trials, .seed = context.seed()};
   const auto result = read_option("--bits", [&] {
-    return bench::run_payload_bench(bench, [&](const std::string& what, double part) {
-      if (guard.interrupted()) throw Interrupted("nothing was written");
-      progress.update(part, what);
-    });
+    return with_progress(context,
+                         [&](const auto& progress) { return bench::run_payload_bench(options, progress); });
   });
+  const auto number = [](Index n) { return static_cast<long long>(n); };
+  print_line(context,
+             "%lld data bits in %lld, %lld trials a row\nwrong bits   promised  from signs  from strengths\n",
+             number(result.data_bits), number(bits), number(trials));
   Json layouts = Json::array(), rows = Json::array();
   for (const auto& l : result.layouts) layouts.push_back(layout_json(l));
-  char line[200];
-  std::snprintf(
-      line, sizeof line,
-      "%lld data bits in %lld, %lld trials a row\nwrong bits   promised  from signs  from strengths\n",
-      static_cast<long long>(result.data_bits), static_cast<long long>(options.bits),
-      static_cast<long long>(options.trials));
-  context.text() << line;
   for (const auto& r : result.rows) {
-    std::snprintf(line, sizeof line, "%9.0f%%  %8.2f%%  %9.2f%%  %13.2f%%\n", 100 * r.error_rate,
-                  100 * r.computed, 100 * r.signs.share(), 100 * r.strengths.share());
-    context.text() << line;
+    print_line(context, "%9.0f%%  %8.2f%%  %9.2f%%  %13.2f%%\n", 100 * r.error_rate, 100 * r.computed,
+               100 * r.signs.share(), 100 * r.strengths.share());
     rows.push_back(row_json(r));
   }
   const bench::PayloadNoise& n = result.noise;
-  std::snprintf(line, sizeof line,
-                "fair bits read as a payload: %lld of %lld from signs, %lld from strengths; at most %.2g of "
-                "them expected\n",
-                static_cast<long long>(n.signs), static_cast<long long>(n.trials),
-                static_cast<long long>(n.strengths), n.bound * static_cast<double>(n.trials));
-  context.text() << line;
+  print_line(
+      context,
+      "fair bits read as a payload: %lld of %lld from signs, %lld from strengths; at most %.2g expected\n",
+      number(n.signs), number(n.trials), number(n.strengths), n.bound * static_cast<double>(n.trials));
   context.result(
-      {{"bits", options.bits},
+      {{"bits", bits},
        {"data_bits", result.data_bits},
-       {"trials", options.trials},
+       {"trials", trials},
        {"seed", context.seed()},
        {"fair_bits",
         {{"trials", n.trials}, {"signs", n.signs}, {"strengths", n.strengths}, {"chance_bound", n.bound}}},
        {"layouts", layouts},
        {"rows", rows}});
   return kOk;
+}
+
+}  // namespace
+
+Command add_bench_payload(CommandLine& app) {
+  struct Options {
+    Index bits = 100, trials = 1000;
+  };
+  auto o = std::make_shared<Options>();
+  add_number(app, "--bits", o->bits, 1, 256, "Length of a message in bits, 1 to 256");
+  add_number(app, "--trials", o->trials, 1, 1000000, "Trials of each row, 1 to 1000000");
+  return [o](Context& context) { return run(o->bits, o->trials, context); };
 }
 
 }  // namespace fieldmark::cli

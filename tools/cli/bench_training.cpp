@@ -1,59 +1,39 @@
-#include "cli/bench_training.h"
-
 #include <fieldmark/engine/isa.h>
 #include <fieldmark/tools/bench/training_bench.h>
 
-#include <cstdio>
-#include <ostream>
-
-#include "cli/cli.h"
-#include "cli/context.h"
-#include "cli/long_run.h"
+#include "cli/bench.h"
 
 namespace fieldmark::cli {
 namespace {
 
-void print_row(std::ostream& out, const bench::TrainingRow& r, double default_psnr) {
-  char line[240];
-  std::snprintf(line, sizeof line,
-                "%-16s %-56s %6.2f dB  %+5.2f  %6ld steps  %6.1f M samples  %5.1f s  view %.3f s\n",
-                r.variant.choice.c_str(), r.variant.setting.c_str(), r.psnr, r.psnr - default_psnr,
-                static_cast<long>(r.steps), r.samples * 1e-6, r.seconds, r.seconds_per_view);
-  out << line;
-}
+struct Options {
+  std::string scene;
+  double seconds = 60;
+  bool quick = false;
+};
 
-Json row_json(const bench::TrainingRow& r, double default_psnr) {
-  return {{"choice", r.variant.choice},
-          {"setting", r.variant.setting},
-          {"psnr", r.psnr},
-          {"difference", r.psnr - default_psnr},
-          {"steps", r.steps},
-          {"samples", r.samples},
-          {"seconds", r.seconds},
-          {"seconds_per_view", r.seconds_per_view}};
-}
-
-}  // namespace
-
-int bench_training(const BenchFieldOptions& options, Context& context) {
-  const std::string folder = options.scene.empty() ? lego_folder() : options.scene;
-  const nerf::Dataset train = bench_split(folder, "train", options.quick),
-                      judge = bench_split(folder, "val", options.quick);
+int run(const Options& options, Context& context) {
+  const nerf::Dataset train = bench_split(options.scene, "train", options.quick),
+                      judge = bench_split(options.scene, "val", options.quick);
   auto variants = bench::training_variants({.seconds = options.seconds}, context.seed());
   if (options.quick) variants.resize(3);
-  const InterruptGuard guard;
-  std::vector<bench::TrainingRow> rows;
-  {
-    Progress progress = context.progress("bench");
-    rows = bench::run_training_bench(train, judge, variants, [&](const std::string& name, double part) {
-      if (guard.interrupted()) throw Interrupted("nothing was written");
-      progress.update(part, name);
-    });
-  }
+  const auto rows = with_progress(context, [&](const auto& progress) {
+    return bench::run_training_bench(train, judge, variants, progress);
+  });
   Json list = Json::array();
-  for (const bench::TrainingRow& row : rows) {
-    print_row(context.text(), row, rows.front().psnr);
-    list.push_back(row_json(row, rows.front().psnr));
+  for (const bench::TrainingRow& r : rows) {
+    const double difference = r.psnr - rows.front().psnr;
+    print_line(context, "%-16s %-56s %6.2f dB  %+5.2f  %6ld steps  %6.1f M samples  %5.1f s  view %.3f s\n",
+               r.variant.choice.c_str(), r.variant.setting.c_str(), r.psnr, difference,
+               static_cast<long>(r.steps), r.samples * 1e-6, r.seconds, r.seconds_per_view);
+    list.push_back({{"choice", r.variant.choice},
+                    {"setting", r.variant.setting},
+                    {"psnr", r.psnr},
+                    {"difference", difference},
+                    {"steps", r.steps},
+                    {"samples", r.samples},
+                    {"seconds", r.seconds},
+                    {"seconds_per_view", r.seconds_per_view}});
   }
   context.result({{"scene", train.name},
                   {"split", "val"},
@@ -64,6 +44,17 @@ int bench_training(const BenchFieldOptions& options, Context& context) {
                   {"seconds_each", options.seconds},
                   {"rows", list}});
   return kOk;
+}
+
+}  // namespace
+
+Command add_bench_training(CommandLine& app) {
+  auto o = std::make_shared<Options>();
+  add_scene_option(app, o->scene);
+  add_number(app, "--seconds", o->seconds, 0.1, 86400, "Training time of each row in seconds, 0.1 to 86400",
+             "S");
+  app.add_flag("--quick", o->quick, "Three rows, on a small built-in scene");
+  return [o](Context& context) { return run(*o, context); };
 }
 
 }  // namespace fieldmark::cli

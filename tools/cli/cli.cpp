@@ -12,6 +12,9 @@
 #include "cli/suggest.h"
 
 namespace fieldmark::cli {
+
+Command add_results(CommandLine& app);  // cmd_results.cpp
+
 namespace {
 
 struct Entry {
@@ -37,6 +40,7 @@ constexpr Entry kCommands[] = {
     {"attack-field", "Attack the mark of a field", add_attack_field},
     {"bench", "Measure speed and error against this machine's peak", add_bench},
     {"reproduce", "Train and measure the systems of the paper's tables", add_reproduce},
+    {"results", "List, measure and render the results of docs/results", add_results},
     {"gradcheck", "Check every hand-derived gradient against finite differences", add_gradcheck},
     {"info", "Print the contents of a field, owner, key or other safetensors file", add_info},
 };

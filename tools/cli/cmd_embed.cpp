@@ -20,7 +20,7 @@
 #include "cli/measured.h"
 #include "cli/message_option.h"
 #include "cli/perceptual.h"
-#include "cli/sheet.h"
+#include <fieldmark/tools/results/sheet.h>
 
 namespace fieldmark::cli {
 namespace {
@@ -80,11 +80,11 @@ void write_image(const std::string& path, const watermark::Owner& owner, std::ui
   const CounterRng rng(seed, 51);
   marked.set_recolour(owner.marking(
       watermark::cell_signs(owner.code(), watermark::random_message(owner.options().bits, rng, 0))));
-  std::vector<ImagePair> pairs;
+  std::vector<results::ImagePair> pairs;
   for (const auto& camera :
        nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, kImagedViews, 0, seed))
     pairs.push_back({plain.render(camera).rgb, marked.render(camera).rgb});
-  write_png(path, comparison_sheet(pairs));
+  write_png(path, results::comparison_sheet(pairs));
 }
 
 watermark::EmbedRecipe recipe_of(const Options& options, const nerf::RadianceField& field,

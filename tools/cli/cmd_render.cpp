@@ -14,7 +14,7 @@
 #include "cli/context.h"
 #include "cli/precision.h"
 #include "cli/scene_data.h"
-#include "cli/sheet.h"
+#include <fieldmark/tools/results/sheet.h>
 #include "cli/supersampling.h"
 
 namespace fieldmark::cli {
@@ -71,10 +71,10 @@ std::vector<NamedCamera> cameras_of(const Options& options, const nerf::Radiance
 void write_sheet(const Options& options, nerf::Renderer& renderer, const std::vector<NamedCamera>& cameras) {
   const auto other = nerf::RadianceField::load(options.against);
   nerf::Renderer against(other, {.supersampling = options.supersampling});
-  std::vector<ImagePair> pairs;
+  std::vector<results::ImagePair> pairs;
   for (std::size_t i = 0; i < std::min<std::size_t>(cameras.size(), 4); ++i)
     pairs.push_back({against.render(cameras[i].camera).rgb, renderer.render(cameras[i].camera).rgb});
-  write_png(options.sheet, comparison_sheet(pairs));
+  write_png(options.sheet, results::comparison_sheet(pairs));
 }
 
 int run(const Options& options, Context& context) {

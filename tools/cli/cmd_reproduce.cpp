@@ -1,6 +1,9 @@
 #include <fieldmark/baselines/cell_runner.h>
 #include <fieldmark/baselines/paper_plan.h>
 #include <fieldmark/core/files.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/tools/results/paper_page.h>
+#include <fieldmark/tools/results/rows.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -12,10 +15,7 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
-#include "cli/paper_figures.h"
-#include "cli/paper_page.h"
 #include "cli/perceptual.h"
-#include "cli/report.h"
 #include "cli/scene_data.h"
 
 namespace fieldmark::cli {
@@ -29,7 +29,7 @@ constexpr const char* kUnder[] = {"noise_0.1",  "rotation_30", "scale_0.75",  "b
 
 struct Options {
   std::vector<std::string> tables, scenes, systems;
-  std::string cells = "docs/results/cells", work = "reproduce_work", lpips_weights;
+  std::string cells = "docs/results/rows/paper", work = "reproduce_work", lpips_weights;
   double budget = 300, base_seconds = 0;
   Index size = 0, views = 0, photographs = 20;
   int log2_table = nerf::HashEncodingOptions{}.log2_table;
@@ -93,34 +93,40 @@ double seconds_of_a_cell(const std::vector<baselines::Cell>& cells, double budge
   return count > 0 ? sum / count : 1.5 * budget;
 }
 
-// The page, its figures and the sheet, from the cells that are there.
+// Beside the folder of cells, where --report does not name it.
 std::filesystem::path write_page(const Options& options, const Context& context) {
   std::filesystem::path folder = std::filesystem::path(options.cells).lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();  // "cells/"
-  std::filesystem::path page = context.options().report.empty()
-                                   ? folder.parent_path() / "paper.md"
-                                   : std::filesystem::path(context.options().report);
-  const auto cells = baselines::load_cells(folder);
-  const auto beside = [&](const std::string& name) { return page.parent_path() / name; };
-  std::vector<std::string> shown;
-  for (const auto& [name, svg] : paper_figures(cells)) {
-    write_file_atomically(beside(name), svg);
-    shown.push_back(name);
-  }
-  std::string notes;
-  if (std::filesystem::exists(folder / "notes.md")) notes = read_text(folder / "notes.md");
-  for (const PaperSheet& sheet : paper_sheets()) {
-    const auto stems = write_paper_sheet(sheet, cells, folder, beside(sheet.name));
-    if (stems.empty()) continue;
-    shown.push_back(sheet.name);
-    char gain[16];
-    std::snprintf(gain, sizeof gain, "%.0f", static_cast<double>(sheet.gain));
-    notes += "\nRows of " + sheet.name + " (unmarked, marked, " + gain + " times the difference):";
-    for (const auto& stem : stems) notes += " " + stem;
-    notes += "\n";
-  }
-  write_file_atomically(page, paper_page(cells, shown, notes));
+  const std::filesystem::path page = context.options().report.empty()
+                                         ? folder.parent_path() / "paper.md"
+                                         : std::filesystem::path(context.options().report);
+  results::write_paper_page(folder, page);
   return page;
+}
+
+// A cell as a row, with its image beside it.
+void save(const Options& options, const std::vector<baselines::PaperScene>& scenes,
+          const baselines::MeasuredCell& measured, double seconds) {
+  const baselines::CellName& name = measured.cell.name;
+  const auto scene =
+      std::find_if(scenes.begin(), scenes.end(), [&](const auto& s) { return s.name == name.scene; });
+  const std::string data = "scene:" + name.scene;
+  const auto file = baselines::cell_path(options.cells, name);
+  std::filesystem::create_directories(options.cells);
+  write_png(file.string() + ".png", measured.image);
+  const results::PlannedRow row{"paper/" + name.stem(), "reproduce",
+                                "reproduce --scene " + data + " --system " + name.system + " --budget " +
+                                    results::shown(options.budget)};
+  Json json = results::make_row({.id = row.id,
+                                 .kind = row.kind,
+                                 .command = row.command,
+                                 .result = Json::parse(baselines::format_cell(measured.cell)),
+                                 .inputs = {{data, results::hash_of(scene->folder)}},
+                                 .code = results::Plan::project().code(row),
+                                 .seed = name.seed,
+                                 .budget = options.budget,
+                                 .seconds = seconds});
+  write_file_atomically(file.string() + ".json", json.dump(1) + "\n");
 }
 
 class Shown {
@@ -162,14 +168,14 @@ void measure(const Options& options, const std::vector<baselines::PaperScene>& s
                                 .work = options.work,
                                 .under = {std::begin(kUnder), std::end(kUnder)},
                                 .lpips = lpips ? &*lpips : nullptr,
-                                .commit = machine().commit,
+                                .commit = results::machine().commit,
                                 .progress = std::ref(shown)});
   for (const auto& name : missing) {
     const double begun = context.seconds();
     try {
       auto measured = runner.run(name);
       measured.cell.more["total_seconds"] = context.seconds() - begun;
-      save_measured(options.cells, measured);
+      save(options, scenes, measured, context.seconds() - begun);
       write_page(options, context);
       char line[120];
       std::snprintf(line, sizeof line, "%s: %.2f%% right, %.2f dB on the object, %s\n", name.stem().c_str(),

@@ -11,7 +11,7 @@
 #include "cli/context.h"
 #include "cli/evidence_run.h"
 #include "cli/message_option.h"
-#include "cli/report.h"
+#include <fieldmark/tools/results/report.h>
 
 namespace fieldmark::cli {
 namespace {
@@ -132,8 +132,8 @@ int run(const Options& options, Context& context) {
                                    .together = test(evidence),
                                    .images = score_images(test, images),
                                    .seed = context.seed(),
-                                   .commit = machine().commit,
-                                   .isa = machine().isa};
+                                   .commit = results::machine().commit,
+                                   .isa = results::machine().isa};
   record.commitment = watermark::commitment(record.owner_sha256, key, message);
   print_views(context.text(), images, record.images);
   print_verdict(record, context);

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <ostream>
 
-#include "cli/report.h"
+#include <fieldmark/tools/results/report.h>
 
 namespace fieldmark::cli {
 
@@ -55,7 +55,7 @@ void Context::result(const Json& found) {
     write_file_atomically(options_.json, json.dump(2) + "\n");
   }
   if (!options_.report.empty())
-    write_file_atomically(options_.report, markdown_report(command_line_, machine(), json));
+    write_file_atomically(options_.report, results::markdown_report(command_line_, results::machine(), json));
 }
 
 }  // namespace fieldmark::cli

@@ -55,7 +55,7 @@ TEST_CASE("embed_bench: a mark is embedded in every way, and judged on the way a
     CHECK(r.cache_seconds > 0);
     CHECK(r.seconds > r.cache_seconds);
     CHECK(r.psnr_foreground == Approx(30).margin(1.5));
-    for (const double accuracy : {r.accuracy, r.accuracy_p5, r.closer, r.farther, r.unseen})
+    for (const double accuracy : {r.accuracy, r.accuracy_p5, r.closer, r.farther, r.extrapolated})
       CHECK((accuracy >= 0 && accuracy <= 1));
     REQUIRE(r.curve.size() == 2);
     CHECK(r.curve[0].seconds < r.curve[1].seconds);
@@ -63,27 +63,6 @@ TEST_CASE("embed_bench: a mark is embedded in every way, and judged on the way a
     CHECK(r.curve[1].accuracy == r.accuracy);
     CHECK(std::isfinite(r.curve[0].psnr_foreground));
   }
-}
-
-TEST_CASE("embed_bench: rows that are known are not measured again, and new ones are told at once") {
-  std::vector<EmbedVariant> two{tiny_variant(2), tiny_variant(2)};
-  two[1].choice = "length";
-  std::vector<std::string> told;
-  const auto rows = run_embed_bench(
-      tiny_field(), two,
-      {.views = 1, .points = 1, .known = {row("length", 60, 0.9, 36)}, .on_row = [&](const EmbedRow& r) {
-         told.push_back(r.variant.choice);
-       }});
-  // The known one's setting is another: both are run.
-  CHECK(told == std::vector<std::string>{"default", "length"});
-  told.clear();
-  const auto again = run_embed_bench(
-      tiny_field(), two, {.views = 1, .points = 1, .known = rows, .on_row = [&](const EmbedRow& r) {
-                            told.push_back(r.variant.choice);
-                          }});
-  CHECK(told.empty());
-  REQUIRE(again.size() == 2);
-  CHECK(again[1].seconds == rows[1].seconds);
 }
 
 TEST_CASE("embed_bench: the clock of embedding stands still while a mark is judged") {

@@ -131,7 +131,7 @@ EmbedRow embedded(const nerf::RadianceField& field, const EmbedVariant& v, const
   row.psnr_foreground = near.psnr_base_foreground;
   row.closer = blind(nerf::CameraSet::closer);
   row.farther = blind(nerf::CameraSet::farther);
-  row.unseen = blind(nerf::CameraSet::extrapolated);
+  row.extrapolated = blind(nerf::CameraSet::extrapolated);
   row.curve.push_back({row.seconds, row.accuracy, row.psnr_foreground});
   return row;
 }
@@ -160,21 +160,9 @@ std::vector<EmbedRow> run_embed_bench(const nerf::RadianceField& field,
         progress(v.choice + ": " + v.setting,
                  static_cast<double>(rows.size()) / static_cast<double>(variants.size()));
     };
-    if (const EmbedRow* known = find_row(options.known, v)) {
-      rows.push_back(*known);
-      continue;
-    }
     rows.push_back(embedded(field, v, caches.get(v, stop_or_go), options, stop_or_go));
-    if (options.on_row) options.on_row(rows.back());
   }
   return rows;
-}
-
-const EmbedRow* find_row(const std::vector<EmbedRow>& rows, const EmbedVariant& v) {
-  const auto row = std::find_if(rows.begin(), rows.end(), [&](const EmbedRow& r) {
-    return r.variant.choice == v.choice && r.variant.setting == v.setting;
-  });
-  return row == rows.end() ? nullptr : &*row;
 }
 
 void mark_front(std::vector<EmbedRow>& rows, const EmbedMargin& margin) {

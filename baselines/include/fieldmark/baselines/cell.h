@@ -55,7 +55,7 @@ void keep_curve(Cell& cell, std::string_view curve);
 std::vector<CurvePoint> kept_curve(const Cell& cell);
 
 /// JSON with the keys {system, scene, field, bits, seed, steps, seconds, bit_accuracy, spread,
-/// own_2d_accuracy, psnr_base, psnr_base_foreground, psnr_photo, ssim, lpips, under, commit, more}; what is
+/// own_2d_accuracy, psnr_base, psnr_base_foreground, psnr_gt, ssim, lpips, distorted, commit, more}; what is
 /// not finite is null.
 std::string format_cell(const Cell& cell);
 /// What format_cell() wrote. @param place  named in errors   @throws IoError if the text is not a cell

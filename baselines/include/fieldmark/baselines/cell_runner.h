@@ -38,8 +38,6 @@ struct MeasuredCell {
   Cell cell;            ///< the numbers
   Tensor<float> image;  ///< [H, 2 W, 3] the first test view unmarked and, beside it, marked
 };
-/// Writes STEM.png and, when it is there, STEM.json. @throws IoError
-void save_measured(const std::filesystem::path& folder, const MeasuredCell& measured);
 
 /// Trains and measures cells one after another; scenes and unmarked fields are kept between them, fields and
 /// checkpoints also between processes, in the work folder, for each budget in a folder of its own.

@@ -23,7 +23,7 @@ struct EmbedRow {
   double psnr_foreground = 0;  ///< of marked against unmarked on the object, dB, novel cameras
   double closer = 0;           ///< accuracy of a third as many closer cameras, see nerf::CameraSet
   double farther = 0;          ///< ... of farther ones
-  double unseen = 0;           ///< ... from directions the photographs never saw
+  double extrapolated = 0;     ///< ... of cameras more than 30 degrees from every training direction
   watermark::Embedder::Figures figures{};  ///< under the distortions of training, at its end
   std::vector<EmbedPoint> curve{};         ///< on the way, the end included
   bool front = false;                      ///< no other one beats it, see mark_front()
@@ -42,9 +42,6 @@ struct EmbedBenchOptions {
   Index size = 0;          ///< pixels of their longer side; 0: as the field was trained
   Index points = 4;        ///< of a curve, at least 1
   std::uint64_t seed = 1;  ///< of cameras and messages
-  /// Measured before: a variant that find_row() finds among them is not run again.
-  std::vector<EmbedRow> known{};
-  std::function<void(const EmbedRow&)> on_row{};  ///< called with each row that was measured now
 };
 
 /// Embeds a mark in every way, one after another. The clock stands still while a mark is judged. Views are
@@ -55,9 +52,6 @@ std::vector<EmbedRow> run_embed_bench(const nerf::RadianceField& field,
                                       const std::vector<EmbedVariant>& variants,
                                       const EmbedBenchOptions& options = {},
                                       const std::function<void(const std::string&, double)>& progress = {});
-
-/// The row of a variant, by its choice and setting; null where there is none.
-const EmbedRow* find_row(const std::vector<EmbedRow>& rows, const EmbedVariant& variant);
 
 /// Marks the rows that no other beats in time, accuracy and PSNR together, see pareto_front().
 void mark_front(std::vector<EmbedRow>& rows, const EmbedMargin& margin = {});

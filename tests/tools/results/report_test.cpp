@@ -1,0 +1,51 @@
+#include <fieldmark/tools/results/report.h>
+
+#include <cstdlib>
+
+#include "support/catch.h"
+
+using namespace fieldmark::results;
+using Json = nlohmann::ordered_json;
+
+TEST_CASE("markdown_table writes a header, a rule and the rows", "[report]") {
+  CHECK(markdown_table({"a", "b"}, {{"1", "2"}, {"3", "4"}}) ==
+        "| a | b |\n| --- | --- |\n| 1 | 2 |\n| 3 | 4 |\n");
+}
+
+TEST_CASE("published_command shows no folder of this machine", "[report]") {
+  const char* held = std::getenv("FIELDMARK_DATA");
+  const std::string before = held ? held : "";
+  setenv("FIELDMARK_DATA", "/some/where/data", 1);
+  CHECK(published_command({"fieldmark", "train", "--data", "/some/where/data/lego", "--out",
+                           "/tmp/x/lego.fm"}) == "fieldmark train --data $FIELDMARK_DATA/lego --out lego.fm");
+  unsetenv("FIELDMARK_DATA");
+  CHECK(published_command({"/usr/bin/fieldmark", "a/b"}) == "fieldmark a/b");
+  if (held) setenv("FIELDMARK_DATA", before.c_str(), 1);
+}
+
+TEST_CASE("markdown_report holds the protocol and every number", "[report]") {
+  const Machine machine{
+      .commit = "abc", .cpu = "Some CPU", .isa = "v3", .compiler = "GNU 12 -O2", .threads = 2};
+  const Json results{{"psnr", 30.51234567},
+                     {"lpips", nullptr},
+                     {"accuracy", {{"blind", 0.98}, {"informed", nullptr}}},
+                     {"rows", {{{"name", "x"}, {"gflops", 2}, {"inner", {1, 2}}}, {{"name", "y"}}}}};
+  const auto text = markdown_report({"fieldmark", "eval", "--size", "9"}, machine, results);
+  CHECK_THAT(text, Contains("# eval\n\n```\nfieldmark eval --size 9\n```\n"));
+  CHECK_THAT(text, Contains("| commit | abc |") && Contains("| kernels | x86-64-v3 |") &&
+                       Contains("| threads | 2 |"));
+  CHECK_THAT(
+      text,
+      Contains("| psnr | 30.5123 |\n| lpips | - |\n| accuracy.blind | 0.98 |\n| accuracy.informed | - |"));
+  CHECK_THAT(text, Contains("## rows\n\n| name | gflops |\n| --- | --- |\n| x | 2 |\n| y | - |\n"));
+  CHECK(text == markdown_report({"fieldmark", "eval", "--size", "9"}, machine, results));
+}
+
+TEST_CASE("machine() knows this one", "[report]") {
+  const auto m = machine();
+  CHECK(!m.commit.empty());
+  CHECK(!m.cpu.empty());
+  CHECK((m.isa == "v2" || m.isa == "v3" || m.isa == "v4"));
+  CHECK(m.threads >= 1);
+  CHECK(m.compiler.find("  ") == std::string::npos);
+}
