@@ -4,6 +4,7 @@
 #include <fieldmark/engine/nn/dense.h>
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/loss.h>
+#include <fieldmark/engine/schedule.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/imaging/metrics.h>
 #include <fieldmark/nerf/frequency_encoding.h>
@@ -42,19 +43,20 @@ int main(int argc, char** argv) {
   const Dense<float> first(store, "first", {.in = 4 * kBands, .out = 48, .activation = Activation::relu}, 1);
   const Dense<float> second(store, "second", {.in = 48, .out = 48, .activation = Activation::relu}, 2);
   const Dense<float> last(store, "last", {.in = 48, .out = channels}, 3);
-  Adam<float> adam(store.size(), {.lr = 5e-3, .zero_grads = true});
+  Adam<float> adam(store.size(), {.lr = 1, .zero_grads = true});
+  const Schedule schedule({.steps = 400, .lr = 5e-3, .half_after = 1e9, .cooldown = 0.9, .last = 0.1});
   const Params<float> params(store);
 
   Tape<float> tape;
   Tensor<float> result(image.shape);
-  for (int step = 0; step < 400; ++step) {
+  for (int step = 0; !schedule.done(step); ++step) {
     tape.reset();
     const Var<float> encoded = nerf::frequency_encoding(tape.constant(place), kBands);
     const Var<float> colour = sigmoid(last(params, second(params, first(params, encoded))));
     const Var<float> loss = mse_loss(colour, tape.constant(image.data.data(), {pixels, channels}));
     if (step % 100 == 0) std::printf("step %3d  loss %.5f\n", step, static_cast<double>(loss.value()[0]));
     tape.backward(loss);
-    adam.step(store.values(), store.grads(), exponential_decay(1, 0.1, step / 400.0));
+    adam.step(store.values(), store.grads(), schedule.lr(step));
     result.data.assign(colour.value(), colour.value() + colour.shape().size());
   }
   const double reached = psnr(result, image);

@@ -30,6 +30,8 @@ class CropSource {
   Tensor<float> image(Index size, std::uint64_t index) const;
   /// The same of photographs alone. @throws ValueError if there is none
   Tensor<float> photograph(Index size, std::uint64_t index) const;
+  /// As constructed.
+  const std::vector<Tensor<float>>& photographs() const { return photographs_; }
 
  private:
   std::vector<Tensor<float>> photographs_;

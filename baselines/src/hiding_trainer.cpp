@@ -1,13 +1,12 @@
 #include "hiding_trainer.h"
 #include <fieldmark/distort/quantize8.h>
-#include <fieldmark/engine/checkpoint.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/loss.h>
 #include "image_noise.h"
 
 #include <algorithm>
 #include <cmath>
-#include <string>
+#include <cstdio>
 
 namespace fieldmark::baselines {
 namespace {
@@ -21,7 +20,7 @@ constexpr double kNoiseFrom = 3;        // dB before the last strength: files an
 constexpr std::uint64_t kWhether = 50;  // draws: below it are those of a layer
 constexpr AdamOptions kAdam{.lr = 1, .beta2 = 0.999, .eps = 1e-8, .zero_grads = true};
 
-// Of numbers in [-1, 1], as a file keeps an image.
+// Rounds values in [-1, 1] to the 8 bits of a file.
 Var<float> as_file(Var<float> marked) {
   Tape<float>& tape = marked.tape();
   const Index n = marked.shape().size();
@@ -44,15 +43,13 @@ HidingTrainOptions hiding_train_options(HidingKind kind) {
 }
 
 HidingTrainer::HidingTrainer(ImageMarker& marker, const CropSource& crops, const HidingTrainOptions& options)
-    : marker_(marker),
+    : TrainingRun(options.schedule),
+      marker_(marker),
       crops_(crops),
       options_(options),
-      schedule_(options.schedule),
       message_rng_(options.seed, 81),
       noise_rng_(options.seed, 82),
-      critic_(critic_params_, marker.options(), options.seed),
-      adam_(marker.params.size(), kAdam),
-      critic_adam_(critic_params_.size(), kAdam) {
+      critic_(critic_params_, marker.options(), options.seed) {
   if (options.batch < 2 || options.crop < 16 || options.crop % 16 != 0 || options.first_crop < 16 ||
       options.first_crop % 16 != 0)
     throw ValueError("[hiding_trainer] batch must be at least 2 and both crops multiples of 16, got " +
@@ -65,16 +62,21 @@ HidingTrainer::HidingTrainer(ImageMarker& marker, const CropSource& crops, const
     throw ValueError("[hiding_trainer] noisy_part must be in [0, 1], got " +
                      std::to_string(options.noisy_part));
   if (!(options.mark_psnr >= options.first_mark_psnr))
-    throw ValueError("[hiding_trainer] strength must be at least first_mark_psnr, got " +
+    throw ValueError("[hiding_trainer] mark_psnr must be at least first_mark_psnr, got " +
                      std::to_string(options.mark_psnr) + " and " + std::to_string(options.first_mark_psnr));
   figures_.mark_psnr = options.first_mark_psnr;
+  train(marker.params, kAdam);
+  train(critic_params_, kAdam, {}, "critic/");
+  keep("bits", figures_.bits);
+  keep("mark_psnr", figures_.mark_psnr);
+  keep("crop", crop_);
 }
 
 // By steps where the run has a number of them, else by the clock; never back.
 Index HidingTrainer::crop_now(double seconds) const {
   const auto& s = options_.schedule;
   const double done =
-      s.steps > 0 ? static_cast<double>(steps_) / static_cast<double>(s.steps) : seconds / s.seconds;
+      s.steps > 0 ? static_cast<double>(steps()) / static_cast<double>(s.steps) : seconds / s.seconds;
   int last = 0, now = 0;  // doublings of the first size
   while (options_.first_crop << last < options_.crop) ++last;
   if (done >= options_.first_part)
@@ -88,7 +90,7 @@ void HidingTrainer::draw(Index size) {
   images_.resize(static_cast<std::size_t>(options_.batch * each));
   messages_.clear();
   for (Index i = 0; i < options_.batch; ++i) {
-    const auto index = static_cast<std::uint64_t>(steps_ * options_.batch + i);
+    const auto index = static_cast<std::uint64_t>(steps() * options_.batch + i);
     const Tensor<float> image = crops_.image(size, index);
     for (Index k = 0; k < each; ++k) images_[static_cast<std::size_t>(i * each + k)] = 2 * image[k] - 1;
     const auto message = watermark::random_message(bits, message_rng_, index);
@@ -96,22 +98,22 @@ void HidingTrainer::draw(Index size) {
   }
 }
 
-// Whether this step's images pass a file and a noise layer: none as long as the mark is loud.
+// Whether this step's images pass rounding and a noise layer: none while the mark is strong.
 bool HidingTrainer::noisy() const {
   const double share = (figures_.mark_psnr - options_.mark_psnr + kNoiseFrom) / kNoiseFrom;
-  return static_cast<double>(noise_rng_.uniform(static_cast<std::uint64_t>(steps_), kWhether)) <
+  return static_cast<double>(noise_rng_.uniform(static_cast<std::uint64_t>(steps()), kWhether)) <
          std::min(share, options_.noisy_part);
 }
 
 Var<float> HidingTrainer::sent_on(Var<float> marked, Var<float> plain) const {
   if (!noisy()) return marked;
-  const auto step = static_cast<std::uint64_t>(steps_);
+  const auto step = static_cast<std::uint64_t>(steps());
   const auto layers = marker_.kind() == HidingKind::mbrs ? mbrs_noise_layers() : hidden_noise_layers();
   const auto which = noise_rng_.below(static_cast<Index>(layers.size()), step);
   return apply_noise_layer(layers[static_cast<std::size_t>(which)], as_file(marked), plain, noise_rng_, step);
 }
 
-// plain + g (encoded - plain), with g of each image so that the second term has the strength of now.
+// plain + g (encoded - plain), with g of each image such that the second term has the present PSNR.
 Var<float> HidingTrainer::at_strength(Var<float> encoded, Var<float> plain) const {
   const Index n = plain.shape()[0], each = plain.shape().size() / n;
   const Var<float> residual = sub(encoded, plain);
@@ -127,7 +129,7 @@ Var<float> HidingTrainer::at_strength(Var<float> encoded, Var<float> plain) cons
   return add(plain, mul(residual, plain.tape().constant(gains, plain.shape())));
 }
 
-void HidingTrainer::train_networks(Index size) {
+double HidingTrainer::train_networks(Index size) {
   const Index n = options_.batch, bits = marker_.options().bits;
   tape_.reset();
   const Params<float> params(marker_.params);
@@ -141,19 +143,20 @@ void HidingTrainer::train_networks(Index size) {
   const Var<float> loss = add(scale(mse_loss<float>(read, sent), options_.message_weight),
                               scale(bce_with_logits<float>(verdict, as_plain), options_.adversary_weight));
   tape_.backward(loss);
-  adam_.step(marker_.params.values(), marker_.params.grads(), schedule_.lr(steps_));
+  update();
   update_statistics(marker_.params, pass);
   marked_.assign(marked.value(), marked.value() + marked.shape().size());
 
   double right = 0;
   for (Index i = 0; i < n * bits; ++i)
     right += (read.value()[i] > 0.5f) == (messages_[static_cast<std::size_t>(i)] > 0.5f);
-  const double keep = steps_ == 0 ? 0 : kKeep;
+  const double keep = steps() == 0 ? 0 : kKeep;
   figures_.bits = keep * figures_.bits + (1 - keep) * right / static_cast<double>(n * bits);
   if (figures_.bits > kRead) {
     const double by = kFainter + kFaster * std::max(0.0, figures_.bits - kSure);
     figures_.mark_psnr = std::min(figures_.mark_psnr + by, options_.mark_psnr);
   }
+  return static_cast<double>(loss.value()[0]);
 }
 
 void HidingTrainer::train_discriminator(Index size) {
@@ -167,69 +170,41 @@ void HidingTrainer::train_discriminator(Index size) {
   const Var<float> verdict =
       critic_(Params<float>(critic_params_), tape_.constant(both.data(), {2 * n, size, size, 3}), pass);
   tape_.backward(bce_with_logits<float>(verdict, targets));
-  critic_adam_.step(critic_params_.values(), critic_params_.grads(), schedule_.lr(steps_));
+  update(1);
   update_statistics(critic_params_, pass);
 }
 
-void HidingTrainer::step(double seconds) {
-  schedule_.observe(steps_, seconds);
-  const Index size = crop_now(seconds);
-  crop_ = size;
-  draw(size);
-  train_networks(size);
-  train_discriminator(size);
-  ++steps_;
+double HidingTrainer::take_step(double seconds) {
+  crop_ = crop_now(seconds);
+  draw(crop_);
+  const double loss = train_networks(crop_);
+  train_discriminator(crop_);
+  return loss;
 }
 
-std::string HidingTrainer::fingerprint() const {
-  const auto& o = options_;
-  return std::string(hiding_name(marker_.kind())) + ", " + std::to_string(marker_.options().bits) +
-         " bits, " + std::to_string(marker_.options().channels) + " channels, batch " +
-         std::to_string(o.batch) + ", crops " + std::to_string(o.first_crop) + " and " +
-         std::to_string(o.crop) + " after " + std::to_string(o.first_part) + ", weights " +
-         std::to_string(o.message_weight) + " " + std::to_string(o.adversary_weight) + ", strength " +
-         std::to_string(o.first_mark_psnr) + " to " + std::to_string(o.mark_psnr) + ", noisy " +
-         std::to_string(o.noisy_part) + ", lr " + std::to_string(o.schedule.lr) + ", half after " +
-         std::to_string(o.schedule.half_after) + ", cooldown " + std::to_string(o.schedule.cooldown) +
-         " to " + std::to_string(o.schedule.last) + ", seed " + std::to_string(o.seed);
+std::string HidingTrainer::status() const {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.1f%% of bits at %.1f dB", 100 * figures_.bits, figures_.mark_psnr);
+  return text;
 }
 
-void HidingTrainer::save(const std::filesystem::path& path) const {
-  SafetensorsFile file = new_checkpoint(fingerprint());
-  const Index n = marker_.params.size(), c = critic_params_.size();
-  const ParamStore<float>& net = marker_.params;
-  file.add("values", {n}, net.values());
-  file.add("mean", {n}, adam_.mean());
-  file.add("mean_square", {n}, adam_.mean_square());
-  file.add("critic/values", {c}, critic_params_.values());
-  file.add("critic/mean", {c}, critic_adam_.mean());
-  file.add("critic/mean_square", {c}, critic_adam_.mean_square());
-  const std::int64_t counts[] = {steps_, schedule_.total(), crop_};
-  const double figures[] = {figures_.bits, figures_.mark_psnr};
-  file.add("counts", {3}, counts);
-  file.add("figures", {2}, figures);
-  file.write(path);
-}
-
-void HidingTrainer::restore(const std::filesystem::path& path) {
-  const SafetensorsFile file = read_checkpoint(path, fingerprint());
-  restore_numbers(file, "values", marker_.params.values());
-  restore_numbers(file, "mean", adam_.mean());
-  restore_numbers(file, "mean_square", adam_.mean_square());
-  restore_numbers(file, "critic/values", critic_params_.values());
-  restore_numbers(file, "critic/mean", critic_adam_.mean());
-  restore_numbers(file, "critic/mean_square", critic_adam_.mean_square());
-  const auto counts = file.i64("counts");
-  const auto figures = file.f64("figures").data;
-  if (counts.size() != 3 || figures.size() != 2)
-    throw IoError(path.string() + ": expected 3 counts and 2 figures, found " +
-                  std::to_string(counts.size()) + " and " + std::to_string(figures.size()));
-  steps_ = counts[0];
-  schedule_.resume(counts[1]);
-  crop_ = counts[2];
-  adam_.set_steps(steps_);
-  critic_adam_.set_steps(steps_);
-  figures_ = {figures[0], figures[1]};
+void HidingTrainer::describe(RunFingerprint& f) const {
+  const HidingTrainOptions& o = options_;
+  f.option("run", hiding_name(marker_.kind()));
+  f.option("bits", marker_.options().bits);
+  f.option("channels", marker_.options().channels);
+  f.option("batch", o.batch);
+  f.option("crop", o.crop);
+  f.option("first_crop", o.first_crop);
+  f.option("first_part", o.first_part);
+  f.option("first_mark_psnr", o.first_mark_psnr);
+  f.option("mark_psnr", o.mark_psnr);
+  f.option("message_weight", o.message_weight);
+  f.option("adversary_weight", o.adversary_weight);
+  f.option("noisy_part", o.noisy_part);
+  f.option("seed", o.seed);
+  for (std::size_t i = 0; i < crops_.photographs().size(); ++i)
+    f.input("image " + std::to_string(i), crops_.photographs()[i].data);
 }
 
 }  // namespace fieldmark::baselines

@@ -2,7 +2,6 @@
 #include <fieldmark/engine/adam.h>
 #include <fieldmark/engine/parallel.h>
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -33,7 +32,7 @@ void check_option(const char* name, double value, bool ok, const char* want) {
 void check_size(const char* name, std::size_t got, std::size_t want) {
   if (got != want)
     throw ShapeError("[Adam::step] " + std::string(name) + " must have " + std::to_string(want) +
-                     " numbers (the optimiser was made for them), got " + std::to_string(got));
+                     " elements, as the optimiser, got " + std::to_string(got));
 }
 
 }  // namespace
@@ -113,12 +112,5 @@ void Adam<T>::set_steps(Index steps) {
 
 template class Adam<float>;
 template class Adam<double>;
-
-double exponential_decay(double lr0, double lr1, double fraction) {
-  if (!(lr0 > 0) || !(lr1 > 0))
-    throw ValueError("[exponential_decay] lr0 and lr1 must be positive, got " + std::to_string(lr0) +
-                     " and " + std::to_string(lr1));
-  return lr0 * std::pow(lr1 / lr0, std::clamp(fraction, 0.0, 1.0));
-}
 
 }  // namespace fieldmark

@@ -1,4 +1,4 @@
-#include <fieldmark/engine/checkpoint.h>
+#include <fieldmark/core/digest.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/pool.h>
 #include <fieldmark/engine/parallel.h>
@@ -12,6 +12,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
+#include <iterator>
 #include <numeric>
 
 #include "trainer_shard.h"
@@ -26,13 +28,17 @@ constexpr Index kOccupancyPeriod = 16;  // steps
 constexpr Index kMostRays = 1 << 16;
 constexpr Index kShortSteps = 8000, kLongSteps = 20000;  // of a run, see field_options()
 constexpr double kShortSeconds = 120, kLongSeconds = 400;
-constexpr const char* kAfterField = " data ";  // in the words of a checkpoint
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 AdamOptions adam_options(const RadianceField& field) {
   if (field.coarse) return {.lr = 1, .beta2 = 0.999, .eps = 1e-8, .zero_grads = true};
   return {.lr = 1, .zero_grads = true};
+}
+
+// Parameters whose gradients are summed by the loop: all of an mlp field, the networks of a hash field.
+Index loop_size(const RadianceField& field) {
+  return field.coarse ? field.params.size() : field.field.network_size();
 }
 
 // Places of samples along their rays, from the positions of both ends of each way between them.
@@ -97,24 +103,25 @@ RadianceFieldOptions field_options(const ScheduleOptions& length) {
 }
 
 Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& options)
-    : field_(field),
+    : TrainingRun(options.schedule),
+      field_(field),
       data_(data),
       options_(options),
-      schedule_(options.schedule),
       pixel_rng_(options.seed, 1),
       background_rng_(options.seed, 2),
       occupancy_rng_(options.seed, 3),
       second_rng_(options.seed, 4),
       place_rng_(options.seed, 5),
       packed_(field.params, {.precision = options.precision}),
-      loop_(field.coarse ? kMlpShards : kShards,
-            field.coarse ? field.params.size() : field.field.network_size()),
-      adam_(field.params.size(), adam_options(field)),
+      loop_(field.coarse ? kMlpShards : kShards, loop_size(field)),
       shards_(at(loop_.shards())),
       rays_per_step_(options.least_rays) {
   check(options, field);
   if (data.views.empty()) throw ValueError("[trainer] data must have at least one view");
+  // The table of a hash field takes its steps level by level, see backward_table().
+  train(field.params, adam_options(field), {{.end = loop_size(field)}}, {}, !field.coarse);
   if (options.keep) {
+    start_ = sha256_hex(std::as_bytes(field.params.values()));
     const std::vector<std::uint8_t> bits(field_.grid.bits().begin(), field_.grid.bits().end());
     field_.grid.restrict_to(bits);
   } else {
@@ -129,6 +136,9 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
     s.samples.reserve(at(kMostRays / kRays / kShards + 1));
     if (!tile_errors_.empty()) s.errors.reserve(at(kMostRays / kShards + kRays));
   }
+  keep("rays_per_step", rays_per_step_);
+  keep("samples", samples_);
+  if (!tile_errors_.empty()) keep("tile_errors", tile_errors_);
 }
 
 Trainer::~Trainer() { std::ranges::fill(field_.params.grads(), 0.f); }
@@ -185,8 +195,8 @@ double Trainer::run_chunk(Index index, Shard& shard, Tape<float>& tape, float* g
   if (const Index k = rays_along_pixel(); k > 1)
     rays = tape.reshape(avg_pool(tape.reshape(rays, {kRays / (k * k), k, k, 4}), k), {kRays / (k * k), 4});
   const double share = static_cast<double>(kRays) / static_cast<double>(rays_per_step_);
-  const Var<float> loss = photometric_loss<float>(rays, shard.photograph, shard.background,
-                                                  {.huber = options_.huber, .scale = share});
+  const Var<float> loss =
+      photometric_loss<float>(rays, shard.truth, shard.background, {.huber = options_.huber, .scale = share});
   const double value = static_cast<double>(loss.value()[0]);
   if (!tile_errors_.empty()) note_errors(rays, shard);
   if (options_.distortion > 0) {
@@ -204,7 +214,7 @@ double Trainer::run_chunk(Index index, Shard& shard, Tape<float>& tape, float* g
 
 double Trainer::wanted_samples() const {
   const double most = static_cast<double>(options_.samples_per_step);
-  const double grown = std::max(1.0, static_cast<double>(steps_) / options_.grow_after);
+  const double grown = std::max(1.0, static_cast<double>(steps()) / options_.grow_after);
   return std::min(most, static_cast<double>(options_.first_samples) * grown);
 }
 
@@ -214,8 +224,8 @@ double Trainer::wanted_samples() const {
 bool Trainer::level_steps(int level) const {
   const auto period =
       std::max<Index>(1, std::lround(static_cast<double>(options_.samples_per_step) / wanted_samples()));
-  return field_.field.encoding().mask(level) == 0 || steps_ + 1 == schedule_.total() ||
-         (steps_ + level) % period == 0;
+  return field_.field.encoding().mask(level) == 0 || steps() + 1 == planned() ||
+         (steps() + level) % period == 0;
 }
 
 // A level owns its rows of the table; shards, and in them chunks, are added in order. Its rows take their
@@ -235,28 +245,24 @@ void Trainer::backward_table() {
       }
     }
     if (!level_steps(level)) return;
-    adam_.extend_step(field_.params.values(), field_.params.grads(),
-                      {.begin = table + encoding.first_row(level) * entry,
-                       .end = table + encoding.first_row(level + 1) * entry,
-                       .lr_factor = schedule_.lr(steps_),
-                       .skip_zero = true,
-                       .weight_decay = steps_ < options_.decay_after ? 0 : options_.table_decay});
+    extend_update({.begin = table + encoding.first_row(level) * entry,
+                   .end = table + encoding.first_row(level + 1) * entry,
+                   .skip_zero = true,
+                   .weight_decay = steps() < options_.decay_after ? 0 : options_.table_decay});
   });
 }
 
-void Trainer::step(double seconds) {
-  schedule_.observe(steps_, seconds);
+double Trainer::take_step(double) {
   packed_.update();
   for (Shard& s : shards_) s.begin_step();
   const double loss = field_.coarse ? step_mlp() : step_hash();
   for (const Shard& s : shards_)
     samples_ += static_cast<double>(std::accumulate(s.samples.begin(), s.samples.end(), Index{0}));
-  smoothed_loss_ = smoothed_loss_ < 0 ? loss : 0.98 * smoothed_loss_ + 0.02 * loss;
-  ++steps_;
+  return loss;
 }
 
 double Trainer::step_hash() {
-  if (steps_ % kOccupancyPeriod == 0) refresh_occupancy();
+  if (steps() % kOccupancyPeriod == 0) refresh_occupancy();
   const Index network = field_.field.network_size();
   const double loss = loop_.run(
       rays_per_step_ / kRays,
@@ -264,8 +270,7 @@ double Trainer::step_hash() {
         return run_chunk(c, shards_[at(shard)], tape, grads);
       },
       field_.params.grads().first(at(network)));
-  const AdamRange networks{.begin = 0, .end = network, .lr_factor = schedule_.lr(steps_)};
-  adam_.step(field_.params.values(), field_.params.grads(), std::span(&networks, 1));
+  update();
   backward_table();
 
   for (const Shard& s : shards_)
@@ -288,7 +293,7 @@ double Trainer::train_psnr() const {
   const double pixels =
       static_cast<double>(data_.views.size()) * static_cast<double>(camera.width * camera.height);
   const double share = pixels_.empty() ? 1 : static_cast<double>(pixels_.size()) / pixels;
-  return -10 * std::log10(std::max(2 * share * smoothed_loss_, 1e-10));
+  return -10 * std::log10(std::max(2 * share * loss(), 1e-10));
 }
 
 void Trainer::refresh_occupancy() {
@@ -304,82 +309,66 @@ void Trainer::refresh_occupancy() {
                                                tape.constant(features, {n, encoding.width()}));
     std::copy_n(field_.field.density(z).value(), n, sigma);
   };
-  const bool warm = steps_ >= options_.warm_up;
+  const bool warm = steps() >= options_.warm_up;
   field_.grid.update(density, occupancy_rng_,
                      {.decay = 0.5f,  // half of it is forgotten at a look: 0.95 kept fog for a thousand steps
                                       // (21 samples a ray, not 7)
                       .step = field_.step(),
                       .threshold = warm ? 0.01f : -1.f,  // below zero: every candidate stays
-                      .fraction = steps_ < 2 * options_.warm_up ? 1 : 4,
-                      .round = static_cast<std::uint64_t>(steps_ / kOccupancyPeriod)});
+                      .fraction = steps() < 2 * options_.warm_up ? 1 : 4,
+                      .round = static_cast<std::uint64_t>(steps() / kOccupancyPeriod)});
 }
 
-std::string Trainer::fingerprint() const {
-  const ScheduleOptions& schedule = options_.schedule;
-  return field_.configuration() + kAfterField + data_.name + " " + std::to_string(data_.views.size()) +
-         " views " + std::to_string(data_.views.front().camera.width) + "x" +
-         std::to_string(data_.views.front().camera.height) + " seed " + std::to_string(options_.seed) +
-         " steps " + std::to_string(schedule.steps) + " samples " +
-         std::to_string(options_.samples_per_step) + " from " + std::to_string(options_.first_samples) +
-         " after " + std::to_string(options_.grow_after) + " rays " + std::to_string(options_.least_rays) +
-         " distortion " + std::to_string(options_.distortion) + " hard pixels " +
-         std::to_string(options_.hard_pixels) + " huber " + std::to_string(options_.huber) + " stop " +
-         std::to_string(options_.stop) + " table decay " + std::to_string(options_.table_decay) + " after " +
-         std::to_string(options_.decay_after) + " supersampled after " +
-         std::to_string(options_.supersample_after) + " warm-up " + std::to_string(options_.warm_up) +
-         " lr " + std::to_string(schedule.lr) + " half after " + std::to_string(schedule.half_after) +
-         " cooldown " + std::to_string(schedule.cooldown) + " last " + std::to_string(schedule.last) +
-         (options_.precision == Precision::bf16 ? " bf16" : "") + (options_.carve ? "" : " not carved") +
-         (options_.keep ? " kept" : "");
+std::string Trainer::status() const {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.2f dB on the rays trained", train_psnr());
+  return text;
+}
+
+void Trainer::describe(RunFingerprint& f) const {
+  const TrainOptions& o = options_;
+  f.option("run", "field");
+  f.options("field", field_.configuration());
+  f.option("samples_per_step", o.samples_per_step);
+  f.option("first_samples", o.first_samples);
+  f.option("least_rays", o.least_rays);
+  f.option("grow_after", o.grow_after);
+  f.option("huber", o.huber);
+  f.option("stop", o.stop);
+  f.option("distortion", o.distortion);
+  f.option("hard_pixels", o.hard_pixels);
+  f.option("table_decay", o.table_decay);
+  f.option("decay_after", o.decay_after);
+  f.option("supersample_after", o.supersample_after);
+  f.option("warm_up", o.warm_up);
+  f.option("seed", o.seed);
+  f.option("precision", o.precision == Precision::bf16 ? "bf16" : "fp32");
+  f.option("carve", o.carve);
+  f.option("keep", o.keep);
+  if (o.keep) f.input_digest("field", start_);
+  std::vector<double> cameras;
+  for (const View& v : data_.views) std::ranges::copy(v.camera.parameters(), std::back_inserter(cameras));
+  f.input("cameras", cameras);
+  std::vector<std::string> images(data_.views.size());
+  parallel_for(std::ssize(images), 1, [&](Index i, Index) {
+    images[at(i)] = sha256_hex(std::as_bytes(std::span(data_.views[at(i)].rgba.data)));
+  });
+  for (std::size_t i = 0; i < images.size(); ++i) f.input_digest("image " + std::to_string(i), images[i]);
+}
+
+void Trainer::save_more(SafetensorsFile& file) const {
+  file.add("run/densities", {field_.grid.cells()}, field_.grid.densities());
+  file.add("run/occupied", {field_.grid.cells()}, field_.grid.bits());
+}
+
+void Trainer::restore_more(const SafetensorsFile& file) {
+  field_.grid.restore(file.f32("run/densities").data, file.u8("run/occupied"));
 }
 
 RadianceFieldOptions checkpointed_field(const std::filesystem::path& path) {
-  const SafetensorsFile file = SafetensorsFile::read(path);
-  const auto of = file.metadata.find("of");
-  if (of == file.metadata.end())
-    throw IoError(path.string() +
-                  ": expected a checkpoint of a field's training, found another kind of file");
-  return RadianceField::from_configuration(of->second.substr(0, of->second.find(kAfterField)),
-                                           path.string() + ": metadata 'of'")
+  return RadianceField::from_configuration(RunFingerprint::options_of(SafetensorsFile::read(path), "field"),
+                                           path.string() + ": options")
       .options();
-}
-
-void Trainer::save(const std::filesystem::path& path) const {
-  SafetensorsFile file = new_checkpoint(fingerprint());
-  const Index n = field_.params.size();
-  file.add("values", {n}, field_.params.values());
-  file.add("mean", {n}, adam_.mean());
-  file.add("mean_square", {n}, adam_.mean_square());
-  if (!field_.coarse) file.add("gradients", {n}, field_.params.grads());  // of levels that wait
-  if (!tile_errors_.empty()) file.add("tile_errors", {static_cast<Index>(tile_errors_.size())}, tile_errors_);
-  file.add("densities", {field_.grid.cells()}, field_.grid.densities());
-  file.add("bits", {field_.grid.cells()}, field_.grid.bits());
-  const std::int64_t counts[] = {steps_, rays_per_step_, schedule_.total()};
-  const double sums[] = {samples_, smoothed_loss_};
-  file.add("counts", {3}, counts);
-  file.add("sums", {2}, sums);
-  file.write(path);
-}
-
-void Trainer::restore(const std::filesystem::path& path) {
-  const SafetensorsFile file = read_checkpoint(path, fingerprint());
-  restore_numbers(file, "values", field_.params.values());
-  restore_numbers(file, "mean", adam_.mean());
-  restore_numbers(file, "mean_square", adam_.mean_square());
-  if (!field_.coarse) restore_numbers(file, "gradients", field_.params.grads());
-  if (!tile_errors_.empty()) restore_numbers(file, "tile_errors", tile_errors_);
-  field_.grid.restore(file.f32("densities").data, file.u8("bits"));
-  const auto counts = file.i64("counts");
-  const auto sums = file.f64("sums").data;
-  if (counts.size() != 3 || sums.size() != 2)
-    throw IoError(path.string() + ": expected 3 counts and 2 sums, found " + std::to_string(counts.size()) +
-                  " and " + std::to_string(sums.size()));
-  steps_ = counts[0];
-  rays_per_step_ = counts[1];
-  schedule_.resume(counts[2]);
-  samples_ = sums[0];
-  smoothed_loss_ = sums[1];
-  adam_.set_steps(steps_);
 }
 
 }  // namespace fieldmark::nerf

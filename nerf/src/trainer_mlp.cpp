@@ -43,7 +43,7 @@ Index Trainer::mlp_rays() const {
   return std::max<Index>(1, options_.samples_per_step / samples / kRays) * kRays;
 }
 
-// Both networks learn the same photographs: the coarse one from its own points, the fine one from all.
+// Both networks see the same pixels: the coarse one from its own points, the fine one from all.
 double Trainer::run_mlp_chunk(Index index, Shard& shard, Tape<float>& tape, float* grads) {
   choose_rays(index * kRays, kRays, shard);
   const RayBatch rays = shard.rays.batch(field_.space);
@@ -53,8 +53,7 @@ double Trainer::run_mlp_chunk(Index index, Shard& shard, Tape<float>& tape, floa
     shard.samples.push_back(samples.size());
     const double share = static_cast<double>(kRays) / static_cast<double>(rays_per_step_);
     return photometric_loss<float>(look(net, field_.params, params, shard.rays.seen_from, samples, tape),
-                                   shard.photograph, shard.background,
-                                   {.huber = options_.huber, .scale = share});
+                                   shard.truth, shard.background, {.huber = options_.huber, .scale = share});
   };
   const bool refined = points.importance > 0;
   RaySamples& first = refined ? shard.first : shard.found;
@@ -80,7 +79,7 @@ double Trainer::step_mlp() {
         return run_mlp_chunk(c, shards_[at(shard)], tape, grads);
       },
       field_.params.grads());
-  adam_.step(field_.params.values(), field_.params.grads(), schedule_.lr(steps_));
+  update();
   return loss;
 }
 

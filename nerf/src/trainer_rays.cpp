@@ -5,7 +5,7 @@
 
 #include "trainer_shard.h"
 
-// Which pixels of which photographs a step's rays go through.
+// Chooses the pixels that the rays of a step go through.
 
 namespace fieldmark::nerf {
 namespace {
@@ -28,7 +28,7 @@ Index Trainer::all_pixels() const {
   return static_cast<Index>(data_.views.size()) * camera.width * camera.height;
 }
 
-// Tiles of all photographs one after another, for the pixel at `place` of all photographs one after another.
+// Tiles of all images one after another, for the pixel at `place` of all images one after another.
 Index Trainer::tile_of(Index place) const {
   const Index width = data_.views[0].camera.width, height = data_.views[0].camera.height;
   const Index across = (width + kTile - 1) / kTile, down = (height + kTile - 1) / kTile;
@@ -41,7 +41,7 @@ void Trainer::prefer_hard(Index first, Index count, std::span<Index> place) cons
   const auto choices = static_cast<Index>(pixels_.size());
   for (Index i = 0; i < count; ++i) {
     const auto u =
-        second_rng_.uniform4(static_cast<std::uint64_t>(steps_), static_cast<std::uint64_t>(first + i));
+        second_rng_.uniform4(static_cast<std::uint64_t>(steps()), static_cast<std::uint64_t>(first + i));
     if (static_cast<double>(u[2]) >= options_.hard_pixels) continue;
     const Index other =
         pixels_.empty() ? pick(u[0], u[1], all_pixels()) : pixels_[at(pick(u[0], u[1], choices))];
@@ -51,7 +51,7 @@ void Trainer::prefer_hard(Index first, Index count, std::span<Index> place) cons
 
 void Trainer::note_errors(Var<float> rays, Shard& c) const {
   for (Index r = 0; r < static_cast<Index>(c.places.size()); ++r) {
-    const float *y = rays.value() + 4 * r, *p = &c.photograph[at(4 * r)], *b = &c.background[at(3 * r)];
+    const float *y = rays.value() + 4 * r, *p = &c.truth[at(4 * r)], *b = &c.background[at(3 * r)];
     float sum = 0;
     for (Index k = 0; k < 3; ++k) {
       const float e = photometric_residual(y, p, b, k);
@@ -62,12 +62,12 @@ void Trainer::note_errors(Var<float> rays, Shard& c) const {
 }
 
 Index Trainer::rays_along_pixel() const {
-  return steps_ < options_.supersample_after ? 1 : field_.options().supersampling;
+  return steps() < options_.supersample_after ? 1 : field_.options().supersampling;
 }
 
 // One ray through the centre of each pixel, or one anywhere in each of its parts, row by row.
 void Trainer::aim(Index first, Shard& c) const {
-  const auto step = static_cast<std::uint64_t>(steps_);
+  const auto step = static_cast<std::uint64_t>(steps());
   const Index k = rays_along_pixel();
   const Index width = data_.views[0].camera.width, size = width * data_.views[0].camera.height;
   std::array<float, 2 * kMostParts> xy{};
@@ -89,12 +89,12 @@ void Trainer::aim(Index first, Shard& c) const {
 }
 
 void Trainer::choose_rays(Index first, Index rays, Shard& c) const {
-  const auto step = static_cast<std::uint64_t>(steps_);
+  const auto step = static_cast<std::uint64_t>(steps());
   const Index along = rays_along_pixel(), count = rays / (along * along);
   first /= along * along;
   c.rays.resize(rays);
   for (auto [buffer, numbers] :
-       {std::pair{&c.jitter, rays}, {&c.photograph, 4 * count}, {&c.background, 3 * count}})
+       {std::pair{&c.jitter, rays}, {&c.truth, 4 * count}, {&c.background, 3 * count}})
     buffer->resize(at(numbers));
   c.places.resize(at(count));
   std::vector<Index>& place = c.places;
@@ -114,7 +114,7 @@ void Trainer::choose_rays(Index first, Index rays, Shard& c) const {
   for (const Index p : place) __builtin_prefetch(data_.views[at(p / size)].rgba.data.data() + 4 * (p % size));
   for (Index i = 0; i < count; ++i) {
     const View& view = data_.views[at(place[at(i)] / size)];
-    std::copy_n(view.rgba.data.data() + 4 * (place[at(i)] % size), 4, &c.photograph[at(4 * i)]);
+    std::copy_n(view.rgba.data.data() + 4 * (place[at(i)] % size), 4, &c.truth[at(4 * i)]);
     const auto b = background_rng_.uniform4(step, static_cast<std::uint64_t>(first + i));
     std::copy_n(b.data(), 3, &c.background[at(3 * i)]);
   }

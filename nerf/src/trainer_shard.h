@@ -17,8 +17,8 @@ struct Trainer::Shard {
       return numbers.data() + begin;
     }
   };
-  CubeRays rays;                                      // of a chunk
-  std::vector<float> jitter, photograph, background;  // the same
+  CubeRays rays;                                 // of a chunk
+  std::vector<float> jitter, truth, background;  // the same
   RaySampler sampler;
   RaySamples found;
   // Of an mlp field.
@@ -28,7 +28,7 @@ struct Trainer::Shard {
   // Of all chunks of a step, in their order; gradients of the features level by level in each.
   std::vector<Index> samples;
   Buffer position, dfeatures;
-  std::vector<Index> places;                    // of the pixels of a chunk's rays in all photographs
+  std::vector<Index> places;                    // of the pixels of a chunk's rays in all images
   std::vector<std::pair<Index, float>> errors;  // of the rays of all chunks: tile and mean square
 
   void begin_step() {

@@ -84,7 +84,7 @@ TEST_CASE("hiding_trainer: the authors' weights, and errors") {
   options = tiny(2);
   options.mark_psnr = 10;
   CHECK_THROWS_WITH(HidingTrainer(marker, crops, options),
-                    Contains("[hiding_trainer] strength must be at least first_mark_psnr, got 10"));
+                    Contains("[hiding_trainer] mark_psnr must be at least first_mark_psnr, got 10"));
   options = tiny(2);
   options.noisy_part = 1.5;
   CHECK_THROWS_WITH(HidingTrainer(marker, crops, options),
@@ -94,5 +94,5 @@ TEST_CASE("hiding_trainer: the authors' weights, and errors") {
   ImageMarker other = tiny_marker(HidingKind::mbrs);
   HidingTrainer of_other(other, crops, tiny(2));
   CHECK_THROWS_WITH(of_other.restore(folder / "c"),
-                    Contains("expected a checkpoint of this run (mbrs, 2 bits") && Contains("found hidden"));
+                    Contains("option 'run' \"hidden\", this run has \"mbrs\""));
 }

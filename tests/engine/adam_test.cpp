@@ -118,7 +118,7 @@ TEST_CASE("adam: a resumed optimiser continues with the same bits, on any number
         adam = resumed;
       }
       auto g = grads(t);
-      adam.step(x, g, exponential_decay(1, 0.1, t / 6.0));
+      adam.step(x, g, std::pow(0.1, t / 6.0));
     }
     return x;
   };
@@ -135,7 +135,7 @@ TEST_CASE("adam: empty, and errors") {
   Adam<float> adam(2);
   std::vector<float> two(2), three(3);
   CHECK_THROWS_WITH(adam.step(two, three),
-                    "[Adam::step] grads must have 2 numbers (the optimiser was made for them), got 3");
+                    "[Adam::step] grads must have 2 elements, as the optimiser, got 3");
   CHECK_THROWS_AS(adam.step(three, two), ShapeError);
   const std::vector<AdamRange> outside{{.begin = 1, .end = 3}};
   CHECK_THROWS_WITH(adam.step(two, two, outside),
@@ -145,13 +145,4 @@ TEST_CASE("adam: empty, and errors") {
   CHECK_THROWS_WITH(Adam<float>(-1), Contains("n must be at least 0"));
   CHECK_THROWS_WITH(Adam<double>(1, {.lr = std::nan("")}), Contains("lr must be positive"));
   CHECK_THROWS_WITH(adam.set_steps(-1), Contains("steps must be at least 0, got -1"));
-}
-
-TEST_CASE("adam: exponential decay") {
-  CHECK(exponential_decay(2e-2, 2e-4, 0) == 2e-2);
-  CHECK(std::abs(exponential_decay(2e-2, 2e-4, 0.5) - 2e-3) < 1e-17);
-  CHECK(std::abs(exponential_decay(2e-2, 2e-4, 1) - 2e-4) < 1e-18);
-  CHECK(exponential_decay(2e-2, 2e-4, 7) == exponential_decay(2e-2, 2e-4, 1));
-  CHECK(exponential_decay(2e-2, 2e-4, -1) == 2e-2);
-  CHECK_THROWS_WITH(exponential_decay(1, 0, 0.5), Contains("must be positive, got 1.000000 and 0.000000"));
 }

@@ -186,7 +186,7 @@ TEST_CASE("trainer: sets bounds, background and cameras of the field from the da
   CHECK(field.grid.occupied_cells() < field.grid.cells());
 }
 
-TEST_CASE("trainer: opaque photographs leave bounds and cells alone") {
+TEST_CASE("trainer: opaque images leave bounds and cells alone") {
   Dataset opaque = scene();
   for (View& v : opaque.views)
     for (Index i = 3; i < v.rgba.size(); i += 4) v.rgba[i] = 1;
@@ -241,7 +241,7 @@ TEST_CASE("trainer: a timed run's steps, given as a number, give the same bytes"
   CHECK(outcome(field, trainer) == run(trainer.planned()));
 }
 
-TEST_CASE("trainer: a checkpoint of another run is refused, with both runs named") {
+TEST_CASE("trainer: a checkpoint of another run is refused by the name of the option or input") {
   const TemporaryFolder folder;
   RadianceField field(trainable_field_options());
   Trainer trainer(field, scene(), train_options(10));
@@ -251,14 +251,20 @@ TEST_CASE("trainer: a checkpoint of another run is refused, with both runs named
   TrainOptions options = train_options(10);
   options.seed = 7;
   Trainer different(other, scene(), options);
-  CHECK_THROWS_WITH(different.restore(folder / "checkpoint"), Contains("seed 7") && Contains("seed 0"));
+  CHECK_THROWS_WITH(
+      different.restore(folder / "checkpoint"),
+      (folder / "checkpoint").string() + ": this checkpoint was made with option 'seed' 0, this run has 7");
   options = train_options(10);
   options.schedule.lr = 0.5;
   Trainer faster(other, scene(), options);
-  CHECK_THROWS_WITH(faster.restore(folder / "checkpoint"), Contains("lr 0.5"));
+  CHECK_THROWS_WITH(faster.restore(folder / "checkpoint"), Contains("option 'lr'") && Contains("has 0.5"));
+  Dataset changed = scene();
+  changed.views[3].rgba[7] += 0.25f;
+  Trainer of_other_images(other, changed, train_options(10));
+  CHECK_THROWS_WITH(of_other_images.restore(folder / "checkpoint"), Contains("of another input 'image 3'"));
   field.save(folder / "field");
   CHECK_THROWS_WITH(trainer.restore(folder / "field"),
-                    Contains("expected a checkpoint of this run") && Contains("another kind of file"));
+                    Contains("expected a CHECKPOINT file (kind 'checkpoint'), found kind 'field'"));
   CHECK_THROWS_AS(trainer.restore(folder / "missing"), IoError);
 }
 
@@ -392,5 +398,5 @@ TEST_CASE("trainer: a checkpoint knows the sizes of its field") {
   second.restore(folder / "checkpoint");
   field.save(folder / "field.fm");
   CHECK_THROWS_WITH(checkpointed_field(folder / "field.fm"),
-                    Contains("field.fm: expected a checkpoint of a field's training"));
+                    Contains("field.fm: expected a CHECKPOINT file"));
 }

@@ -232,3 +232,24 @@ TEST_CASE("baker: options outside their ranges are refused") {
   CHECK_THROWS_WITH(Baker(owner, kMessage, none),
                     "[baker] cameras must be at least 1 and around at least 0, got 0 and 130");
 }
+
+TEST_CASE("baker: a run that is saved and restored ends as an uninterrupted one, of its own message alone") {
+  const TemporaryFolder folder;
+  const Owner owner = owner_with_gain();
+  Baker whole(owner, kMessage, options(8)), first(owner, kMessage, options(8)),
+      later(owner, kMessage, options(8));
+  whole.drive({});
+  for (int i = 0; i < 3; ++i) first.step(0);
+  first.save(folder / "c");
+  later.restore(folder / "c");
+  CHECK(later.steps() == 3);
+  later.drive({});
+  CHECK(std::ranges::equal(later.field().params.values(), whole.field().params.values()));
+  CHECK(later.psnr() == whole.psnr());
+  Baker other(owner, kOther, options(8));
+  CHECK_THROWS_WITH(other.restore(folder / "c"), Contains("of another input 'message'"));
+  Owner louder = owner;
+  louder.gain = 0.3;
+  CHECK_THROWS_WITH(Baker(louder, kMessage, options(8)).restore(folder / "c"),
+                    Contains("option 'gain' 0.15, this run has 0.3"));
+}

@@ -43,7 +43,7 @@ struct Run {
   }
   double part() const {
     if (trainer->done()) return 1;
-    const nerf::ScheduleOptions& length = variant.train.schedule;
+    const ScheduleOptions& length = variant.train.schedule;
     return length.steps > 0 ? static_cast<double>(trainer->steps()) / static_cast<double>(length.steps)
                             : std::min(1.0, seconds / length.seconds);
   }
@@ -67,7 +67,7 @@ double mean_part(const std::vector<std::unique_ptr<Run>>& runs) {
 
 }  // namespace
 
-std::vector<TrainingVariant> training_variants(const nerf::ScheduleOptions& schedule, std::uint64_t seed) {
+std::vector<TrainingVariant> training_variants(const ScheduleOptions& schedule, std::uint64_t seed) {
   TrainingVariant base{
       "default", "as trained", nerf::field_options(schedule), {.schedule = schedule, .seed = seed}};
   base.field.seed = seed;

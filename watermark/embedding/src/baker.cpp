@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include <fieldmark/watermark/mark/cameras_around.h>
 
@@ -19,9 +20,9 @@ constexpr float kOfSamples = 0.1f;  // weight of the samples' own colours beside
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
-// The numbers of the colour side's networks, which lie together.
-AdamRange colour_range(const ParamStore<float>& params) {
-  AdamRange range{.begin = params.size()};
+// The parameters of the colour networks, which lie together.
+AdamRange colour_range(const ParamStore<float>& params, double lr_factor) {
+  AdamRange range{.begin = params.size(), .lr_factor = lr_factor};
   for (const auto& e : params.entries())
     if (nerf::Field<float>::is_colour(e.name)) {
       range.begin = std::min(range.begin, e.offset);
@@ -44,13 +45,13 @@ struct Baker::Chunk {
 };
 
 Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& options)
-    : owner_(owner),
+    : TrainingRun(options.schedule),
+      owner_(owner),
       options_(options),
-      schedule_(options.schedule),
+      message_(message),
       rng_(options.seed, 21),
       field_(owner.field),
       loop_(kShards, owner.field.field.network_size()),
-      adam_(owner.field.params.size(), {.lr = 1, .zero_grads = true}),
       chunks_(kChunks),
       samplers_(kShards),
       samples_(kShards) {
@@ -63,12 +64,18 @@ Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& opti
   marking_ = owner.marking(cell_signs(owner.code(), message));
   // Colours that no ray asks for go astray: without those around, lego's underside changes by 29 dB.
   cameras_ = cameras_around(owner.field, options.cameras, options.around, 0, options.seed + 31);
+  // Density's parameters get no gradient: its networks are outside the ranges, and its features are left
+  // alone where the gradient is 0.
+  std::vector<AdamRange> ranges = {colour_range(field_.params, field_.field.has_table() ? 0.2 : 0.05)};
+  if (field_.field.has_table())
+    ranges.push_back({.begin = field_.field.network_size(), .end = field_.params.size(), .skip_zero = true});
+  train(field_.params, {.lr = 1, .zero_grads = true}, std::move(ranges));
 }
 
 Baker::~Baker() = default;
 
 void Baker::choose_rays(Index chunk, Chunk& c) const {
-  const auto step = static_cast<std::uint64_t>(steps_);
+  const auto step = static_cast<std::uint64_t>(steps());
   c.rays.resize(kRays);
   c.jitter.resize(at(kRays));
   for (Index i = 0; i < kRays; ++i) {
@@ -166,24 +173,35 @@ void Baker::backward_table() {
   });
 }
 
-void Baker::step(double seconds) {
-  schedule_.observe(steps_, seconds);
+double Baker::take_step(double) {
   const Index network = field_.field.network_size();
   const double loss = loop_.run(
       kChunks,
       [&](Index c, Index shard, Tape<float>& tape, float* grads) { return run_chunk(c, shard, tape, grads); },
       field_.params.grads().first(at(network)));
   if (field_.field.has_table()) backward_table();
-  // Density's numbers get no gradient: its networks are outside the range, its features are left alone where
-  // it is 0.
-  AdamRange ranges[] = {
-      colour_range(field_.params),
-      {.begin = network, .end = field_.params.size(), .lr_factor = schedule_.lr(steps_), .skip_zero = true}};
-  ranges[0].lr_factor = (field_.field.has_table() ? 0.2 : 0.05) * schedule_.lr(steps_);
-  adam_.step(field_.params.values(), field_.params.grads(),
-             std::span<const AdamRange>(ranges, field_.field.has_table() ? 2 : 1));
-  smoothed_ = smoothed_ < 0 ? loss / kChunks : 0.98 * smoothed_ + 0.02 * loss / kChunks;
-  ++steps_;
+  update();
+  return loss / kChunks;
+}
+
+void Baker::describe(RunFingerprint& f) const {
+  f.option("run", "bake");
+  f.options("field", owner_.field.configuration());
+  f.option("cameras", options_.cameras);
+  f.option("around", options_.around);
+  f.option("seed", options_.seed);
+  f.option("gain", owner_.gain);
+  f.input("field", owner_.field.params.values());
+  f.input("occupancy", owner_.field.grid.bits());
+  f.input("mark", owner_.params.values());
+  f.input("cells", owner_.cells.numbers());
+  f.input("message", cell_signs(owner_.code(), message_));
+}
+
+std::string Baker::status() const {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.2f dB to the marked colours", psnr());
+  return text;
 }
 
 double Baker::mark_psnr(const MarkPsnrViews& views) const {
@@ -223,6 +241,6 @@ Baker::MarkPsnr Baker::scale_to(double target, const MarkPsnrViews& views) {
   return found;
 }
 
-double Baker::psnr() const { return -10 * std::log10(std::max(smoothed_, 1e-10)); }
+double Baker::psnr() const { return -10 * std::log10(std::max(loss(), 1e-10)); }
 
 }  // namespace fieldmark::watermark

@@ -12,14 +12,14 @@ struct AdamOptions {
   double beta1 = 0.9;       ///< in [0, 1), decay of the gradient's mean
   double beta2 = 0.99;      ///< in [0, 1), decay of the squared gradient's mean
   double eps = 1e-15;       ///< > 0, added to the root; small because a table's gradients are
-  bool skip_zero = false;   ///< leave alone, moments too, what has a gradient of exactly 0: tables need it
+  bool skip_zero = false;   ///< leaves entries with a gradient of exactly 0 alone, and their moments: for tables
   double weight_decay = 0;  ///< >= 0, decoupled: x -= lr weight_decay x
-  bool zero_grads = false;  ///< also set the gradients read to 0, in the same pass over memory
+  bool zero_grads = false;  ///< also sets the gradients to 0, in the same pass over memory
 };
 
 /// A part of the parameters with a step size and rules of its own.
 struct AdamRange {
-  Index begin = 0;          ///< first of its numbers
+  Index begin = 0;          ///< its first element
   Index end = 0;            ///< one past its last
   double lr_factor = 1;     ///< multiplies AdamOptions::lr
   bool skip_zero = false;   ///< in place of AdamOptions::skip_zero
@@ -29,10 +29,10 @@ struct AdamRange {
 /// Adam on a flat array of parameters.
 ///   m = b1 m + (1 - b1) g,   v = b2 v + (1 - b2) g^2,
 ///   x -= lr (m / (1 - b1^t) / (sqrt(v / (1 - b2^t)) + eps) + weight_decay x)
-/// Source: Kingma and Ba 2015, algorithm 1; the decay as Loshchilov and Hutter 2019, algorithm 2. Departure:
-/// entries that skip_zero leaves alone still share t, so that a rarely touched one has no bias correction
-/// left (as in Mueller et al. 2022, section 4). A gradient that is not finite makes its own entry not finite
-/// and no other.
+/// Source: Kingma and Ba 2015, algorithm 1; the decay: Loshchilov and Hutter 2019, algorithm 2. Departure:
+/// entries that skip_zero leaves alone share t with the others, so that a rarely touched entry has no bias
+/// correction left (as in Mueller et al. 2022, section 4). A gradient that is not finite spoils its own entry
+/// alone.
 template <class T>
 class Adam {
  public:
@@ -40,19 +40,19 @@ class Adam {
   explicit Adam(Index n, AdamOptions options = {});
 
   /// One step over everything, with the options' skip_zero and weight_decay.
-  /// @param values, grads  [n]   @param lr_factor  multiplies the options' lr, see exponential_decay()
-  /// @throws ShapeError unless both have n numbers
+  /// @param values, grads  [n]   @param lr_factor  multiplies the options' lr
+  /// @throws ShapeError unless both have n elements
   void step(std::span<T> values, std::span<T> grads, double lr_factor = 1);
-  /// One step over the given ranges, which must not overlap; what is in none of them stays, gradients too.
-  /// @throws ShapeError unless both have n numbers   @throws ValueError if a range is not within [0, n]
+  /// One step over the given ranges, which must not overlap; entries outside stay, and so do their gradients.
+  /// @throws ShapeError unless both have n elements   @throws ValueError if a range is not within [0, n]
   void step(std::span<T> values, std::span<T> grads, std::span<const AdamRange> ranges);
 
-  /// The step that was taken last over one more range, for gradients that are complete piece by piece. Ranges
-  /// of one step must not overlap; calls for different ranges may run at the same time.
+  /// Extends the last step to one more range, for gradients that are complete range by range. Ranges of one
+  /// step must not overlap; calls for different ranges may run at the same time.
   /// @throws as step(), and ValueError before the first step
   void extend_step(std::span<T> values, std::span<T> grads, const AdamRange& range);
 
-  /// Steps taken: with the two moments, all that a checkpoint must hold.
+  /// Steps taken; a checkpoint holds them and the two moments.
   Index steps() const { return steps_; }
   /// @throws ValueError if negative
   void set_steps(Index steps);
@@ -76,10 +76,5 @@ class Adam {
   AlignedVector<T> mean_, mean_square_;
   Index steps_ = 0;
 };
-
-/// lr0 (lr1 / lr0)^fraction: falls from lr0 to lr1, both > 0, while the fraction goes from 0 to 1; constant
-/// outside.
-/// @throws ValueError unless both are positive
-double exponential_decay(double lr0, double lr1, double fraction);
 
 }  // namespace fieldmark

@@ -6,15 +6,14 @@
 
 namespace fieldmark {
 
-/// What the metadata entry `fieldmark` says of a file: JSON {"format": 1, "kind": KIND, "config": {...}}. It
-/// holds no times, host names or paths, so that equal runs give equal bytes.
+/// The metadata entry `fieldmark` of a file: JSON {"format": 1, "kind": KIND, "config": {...}}. It holds no
+/// times, host names or paths, so that equal runs give equal bytes.
 struct ModelInfo {
   std::string kind;           ///< "field", "owner", "key", ...
   std::string config = "{}";  ///< a JSON object
 };
 
-/// Sets the entry; an empty config is left out. Equal objects give equal text, whatever their spaces and
-/// order of keys.
+/// Sets the entry; an empty config is left out. Equal objects give equal text, whatever the order of keys.
 /// @throws ValueError if the kind is empty or the config is not a JSON object
 void set_model_info(SafetensorsFile& file, const ModelInfo& info);
 

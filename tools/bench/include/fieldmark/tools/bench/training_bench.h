@@ -19,7 +19,7 @@ struct TrainingVariant {
 
 /// The default first, then every choice that trainings of this project make, switched off or set otherwise.
 /// @param schedule  of all of them; its steps and seconds are kept
-std::vector<TrainingVariant> training_variants(const nerf::ScheduleOptions& schedule, std::uint64_t seed);
+std::vector<TrainingVariant> training_variants(const ScheduleOptions& schedule, std::uint64_t seed);
 
 /// What a variant reached.
 struct TrainingRow {

@@ -1,8 +1,7 @@
 #pragma once
-#include <fieldmark/engine/adam.h>
 #include <fieldmark/engine/sharded_loop.h>
+#include <fieldmark/engine/training_run.h>
 #include <fieldmark/nerf/field_sampler.h>
-#include <fieldmark/nerf/schedule.h>
 #include <fieldmark/watermark/embedding/mark_psnr_meter.h>
 #include <fieldmark/watermark/mark/owner.h>
 
@@ -11,8 +10,7 @@ namespace fieldmark::watermark {
 /// How a message is baked.
 struct BakeOptions {
   /// Length of the run and step sizes.
-  nerf::ScheduleOptions schedule{
-      .seconds = 45, .lr = 1e-2, .half_after = 4000, .cooldown = 0.6, .last = 0.02};
+  ScheduleOptions schedule{.seconds = 45, .lr = 1e-2, .half_after = 4000, .cooldown = 0.6, .last = 0.02};
   Index cameras = 400;     ///< novel cameras whose rays are used, >= 1
   Index around = 130;      ///< more in every direction, of an object that has no surroundings (a cube), >= 0
   std::uint64_t seed = 0;  ///< of cameras and rays
@@ -26,22 +24,16 @@ struct BakeOptions {
 /// behind one another from making up for each other. Only the colour network and the colour features of the
 /// table move; whatever density depends on keeps its bytes. The result has the tensor names, shapes and
 /// metadata of the unmarked field, and holds neither network, extractor, key nor message.
-class Baker {
+class Baker final : public TrainingRun {
  public:
   /// The owner must outlive it. @throws ValueError if the message has another length than the owner's, or an
   /// option is out of range
   Baker(const Owner& owner, const Message& message, const BakeOptions& options);
-  ~Baker();
-  /// Takes one step. @param seconds  since the start of the run, for a schedule that ends at a time
-  void step(double seconds);
-  /// Whether the run has all its steps.
-  bool done() const { return schedule_.done(steps_); }
-  /// Steps taken.
-  Index steps() const { return steps_; }
-  /// Steps that the run will have in all; 0 until a timed run knows.
-  Index planned() const { return schedule_.total(); }
+  ~Baker() override;
   /// Running mean of the distance between what rays of the baked and of the marked field show, as a PSNR.
   double psnr() const;
+  double figure() const override { return psnr(); }
+  std::string status() const override;
   /// How strong the mark is in the baked field, dB as options().strength of the owner counts.
   struct MarkPsnr {
     double learnt = 0;  ///< as the steps left it, infinity where nothing differs
@@ -63,6 +55,8 @@ class Baker {
 
  private:
   struct Chunk;
+  double take_step(double seconds) override;
+  void describe(RunFingerprint& fingerprint) const override;
   void choose_rays(Index chunk, Chunk& c) const;
   void select(const nerf::RaySamples& samples, Chunk& c) const;
   double run_chunk(Index index, Index shard, Tape<float>& tape, float* grads);
@@ -71,18 +65,15 @@ class Baker {
 
   const Owner& owner_;
   BakeOptions options_;
-  nerf::Schedule schedule_;
+  Message message_;
   CounterRng rng_;
   nerf::RadianceField field_;
   std::vector<nerf::Camera> cameras_;
   nerf::Renderer::Recolour marking_;
   ShardedLoop<float> loop_;
-  Adam<float> adam_;
   std::vector<Chunk> chunks_;
   std::vector<nerf::FieldSampler> samplers_;
   std::vector<nerf::RaySamples> samples_;
-  Index steps_ = 0;
-  double smoothed_ = -1;
 };
 
 }  // namespace fieldmark::watermark

@@ -1,14 +1,14 @@
 #include <fieldmark/core/error.h>
-#include <fieldmark/nerf/schedule.h>
+#include <fieldmark/engine/schedule.h>
 
 #include <algorithm>
 #include <cmath>
 
-namespace fieldmark::nerf {
+namespace fieldmark {
 namespace {
-constexpr double kReserve = 0.965;  // of the time: the last part may turn out slower than the pace before it
-constexpr double kEarly = 0.95, kLate = 1.02;  // of the time: a run that would end outside is planned anew
-constexpr double kNewest = 0.014;              // weight of a step in the pace: a memory of some 70 steps
+constexpr double kReserve = 0.965;             // of the time: steps of the cooldown may be slower
+constexpr double kEarly = 0.95, kLate = 1.02;  // of the time: a run that would end outside gets a new total
+constexpr double kNewest = 0.014;              // weight of a step in step_seconds_: a memory of some 70 steps
 }  // namespace
 
 Schedule::Schedule(const ScheduleOptions& o) : options_(o), total_(o.steps), fixed_(o.steps > 0) {
@@ -26,18 +26,18 @@ Schedule::Schedule(const ScheduleOptions& o) : options_(o), total_(o.steps), fix
 void Schedule::observe(Index n, double seconds) {
   if (fixed_) return;
   if (last_step_ >= 0 && n > last_step_) {
-    const double pace = (seconds - last_seconds_) / static_cast<double>(n - last_step_);
-    pace_ += (pace - pace_) * std::max(kNewest, 1 / static_cast<double>(++timed_steps_));
+    const double newest = (seconds - last_seconds_) / static_cast<double>(n - last_step_);
+    step_seconds_ += (newest - step_seconds_) * std::max(kNewest, 1 / static_cast<double>(++timed_steps_));
   }
   last_step_ = n;
   last_seconds_ = seconds;
   if (timed_steps_ == 0) return;
-  const auto end = [&](Index total) { return seconds + pace_ * static_cast<double>(total - n); };
+  const auto end = [&](Index total) { return seconds + step_seconds_ * static_cast<double>(total - n); };
   if (total_ == 0) {
     const auto total = static_cast<Index>(std::ceil(static_cast<double>(n) / (1 - options_.cooldown)));
     if (end(total) >= kReserve * options_.seconds) total_ = total;
   } else if (end(total_) > kLate * options_.seconds || end(total_) < kEarly * options_.seconds) {
-    const double left = (kReserve * options_.seconds - seconds) / std::max(pace_, 1e-9);
+    const double left = (kReserve * options_.seconds - seconds) / std::max(step_seconds_, 1e-9);
     total_ = n + static_cast<Index>(std::clamp(left, 1.0, 1e12));
     replanned_ = true;
   }
@@ -58,4 +58,4 @@ void Schedule::resume(Index total) {
   fixed_ = total > 0;
 }
 
-}  // namespace fieldmark::nerf
+}  // namespace fieldmark

@@ -1,0 +1,165 @@
+#include <fieldmark/core/error.h>
+#include <fieldmark/engine/training_run.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+
+namespace fieldmark {
+namespace {
+
+constexpr double kKeep = 0.98, kNewest = 0.02;  // of the running loss
+
+template <class T>
+void load(const SafetensorsFile& file, const std::string& name, std::span<T> to) {
+  const char* dtype = std::is_same_v<T, float> ? "F32" : std::is_same_v<T, double> ? "F64" : "I64";
+  const SafetensorsFile::Entry& e = file.at(name);
+  if (e.dtype != dtype || e.data.size() != to.size_bytes())
+    throw IoError(file.path + ": tensor '" + name + "': expected " + std::to_string(to.size()) +
+                  " elements of " + dtype + ", found shape " + e.shape.str() + " of " + e.dtype);
+  std::memcpy(to.data(), e.data.data(), e.data.size());
+}
+
+// Calls visit(name, elements, shape) for the arrays of trained parameters: values, moments, gradients.
+template <class TrainedParams, class F>
+void visit_arrays(TrainedParams& t, F visit) {
+  for (const auto& e : t.params->entries()) {
+    const auto part = [&](auto all) {
+      return all.subspan(static_cast<std::size_t>(e.offset), static_cast<std::size_t>(e.shape.size()));
+    };
+    const std::string name = t.prefix + e.name;
+    visit(name, part(t.params->values()), e.shape);
+    visit(name + ".mean", part(t.adam.mean()), e.shape);
+    visit(name + ".mean_square", part(t.adam.mean_square()), e.shape);
+    if (t.gradients) visit(name + ".gradient", part(t.params->grads()), e.shape);
+  }
+}
+
+}  // namespace
+
+TrainingRun::TrainingRun(const ScheduleOptions& schedule) : schedule_(schedule) {
+  keep("steps", steps_);
+  keep("loss", loss_);
+  keep("seconds", seconds_);
+}
+
+void TrainingRun::train(ParamStore<float>& params, const AdamOptions& adam, std::vector<AdamRange> ranges,
+                        std::string prefix, bool gradients) {
+  if (ranges.empty())
+    ranges = {{.end = params.size(), .skip_zero = adam.skip_zero, .weight_decay = adam.weight_decay}};
+  trained_.push_back(
+      {&params, Adam<float>(params.size(), adam), ranges, ranges, std::move(prefix), gradients});
+}
+
+void TrainingRun::update(std::size_t store) {
+  Trained& t = trained_[store];
+  for (std::size_t i = 0; i < t.ranges.size(); ++i) t.scaled[i].lr_factor = t.ranges[i].lr_factor * lr();
+  t.adam.step(t.params->values(), t.params->grads(), t.scaled);
+}
+
+void TrainingRun::extend_update(AdamRange range) {
+  range.lr_factor *= lr();
+  Trained& t = trained_.front();
+  t.adam.extend_step(t.params->values(), t.params->grads(), range);
+}
+
+void TrainingRun::step(double seconds) {
+  schedule_.observe(steps_, seconds);
+  const double loss = take_step(seconds);
+  loss_ = loss_ < 0 ? loss : kKeep * loss_ + kNewest * loss;
+  ++steps_;
+}
+
+bool TrainingRun::drive(const DriveOptions& o) {
+  const auto begin = std::chrono::steady_clock::now();
+  const double before = seconds_;
+  const auto trained = [&] {
+    return before + std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  };
+  const auto note = [&] { curve_.insert(curve_.end(), {seconds_, static_cast<double>(steps_), figure()}); };
+  double saved = before, drawn = before;
+  while (!done() && !(o.enough && o.enough())) {
+    const bool stop = o.proceed && !o.proceed();
+    if (!o.checkpoint.empty() && (stop || seconds_ - saved > o.checkpoint_seconds)) {
+      save(o.checkpoint);
+      saved = seconds_;
+    }
+    if (stop) return false;
+    const double now = o.clock ? o.clock() : trained();
+    step(now);
+    seconds_ = trained();
+    if (o.curve_seconds > 0 && seconds_ - drawn >= o.curve_seconds) {
+      note();
+      drawn = seconds_;
+    }
+    if (o.after) o.after(now);
+  }
+  if (o.curve_seconds > 0 && steps_ > 0 && (curve_.empty() || curve_.end()[-2] < static_cast<double>(steps_)))
+    note();
+  return true;
+}
+
+std::string TrainingRun::curve() const {
+  std::string text = "seconds,steps,figure\n";
+  for (std::size_t i = 0; i < curve_.size(); i += 3) {
+    char line[80];
+    std::snprintf(line, sizeof line, "%.1f,%.0f,%.4f\n", curve_[i], curve_[i + 1], curve_[i + 2]);
+    text += line;
+  }
+  return text;
+}
+
+const RunFingerprint& TrainingRun::fingerprint() const {
+  if (!fingerprint_) {
+    RunFingerprint f;
+    const ScheduleOptions& s = schedule_.options();
+    f.option("steps", s.steps);
+    f.option("lr", s.lr);
+    f.option("half_after", s.half_after);
+    f.option("cooldown", s.cooldown);
+    f.option("last", s.last);
+    describe(f);
+    fingerprint_ = std::move(f);
+  }
+  return *fingerprint_;
+}
+
+void TrainingRun::save(const std::filesystem::path& path) const {
+  SafetensorsFile file;
+  fingerprint().write(file);
+  for (const Trained& t : trained_)
+    visit_arrays(t, [&](const std::string& name, std::span<const float> elements, const Shape& shape) {
+      file.add(name, shape, elements);
+    });
+  for (const auto& [name, kept] : kept_)
+    std::visit(
+        [&, in_file = "run/" + name](auto figures) {
+          using Figure = std::add_const_t<typename decltype(figures)::element_type>;
+          file.add(in_file, {std::ssize(figures)}, std::span<Figure>(figures));
+        },
+        kept);
+  const Index planned = schedule_.total();
+  file.add("run/planned", {1}, std::span(&planned, 1));
+  file.add("run/curve", {std::ssize(curve_) / 3, 3}, std::span<const double>(curve_));
+  save_more(file);
+  write(file, path);
+}
+
+void TrainingRun::restore(const std::filesystem::path& path) {
+  const SafetensorsFile file = SafetensorsFile::read(path);
+  fingerprint().require(file);
+  restore_more(file);  // first: it may refuse the file
+  for (Trained& t : trained_)
+    visit_arrays(t, [&](const std::string& name, std::span<float> elements, const Shape&) {
+      load(file, name, elements);
+    });
+  for (const auto& [name, kept] : kept_)
+    std::visit([&, in_file = "run/" + name](auto figures) { load(file, in_file, figures); }, kept);
+  Index planned = 0;
+  load(file, "run/planned", std::span(&planned, 1));
+  schedule_.resume(planned);
+  curve_ = file.f64("run/curve").data;
+  for (Trained& t : trained_) t.adam.set_steps(steps_);
+}
+
+}  // namespace fieldmark

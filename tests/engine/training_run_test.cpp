@@ -1,0 +1,185 @@
+#include <fieldmark/core/error.h>
+#include <fieldmark/engine/training_run.h>
+
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+
+using namespace fieldmark;
+
+namespace {
+
+// Moves x to 1 and y to its target, by gradients of squares.
+struct Fit final : TrainingRun {
+  explicit Fit(ScheduleOptions schedule, float to = 2, double weight = 1)
+      : TrainingRun(schedule), target(to), weight_of_y(weight) {
+    x = store.add("x", {3});
+    y = other.add("y", {});
+    train(store, {.lr = 1, .zero_grads = true}, {{.begin = 0, .end = 2, .lr_factor = 0.5}}, {}, true);
+    train(other, {.lr = 1, .zero_grads = true}, {}, "other/");
+    keep("count", count);
+    keep("seen", seen);
+    keep("best", best);
+  }
+  double figure() const override { return loss(); }
+  std::string status() const override { return "fitting"; }
+  double take_step(double seconds) override {
+    times.push_back(seconds);
+    double sum = 0;
+    for (Index i = 0; i < 3; ++i) {
+      const float e = store.values()[static_cast<std::size_t>(i)] - 1;
+      store.grads()[static_cast<std::size_t>(i)] += 2 * e;
+      sum += static_cast<double>(e * e);
+    }
+    const float e = other.values()[0] - target;
+    other.grads()[0] += static_cast<float>(weight_of_y) * 2 * e;
+    update();
+    update(1);
+    if (steps() % 2 == 1) extend_update({.begin = 2, .end = 3});
+    ++count;
+    best = sum;
+    seen[0] = e;
+    return sum + static_cast<double>(e * e);
+  }
+  void describe(RunFingerprint& f) const override {
+    f.option("weight_of_y", weight_of_y);
+    f.input("target", std::span(&target, 1));
+  }
+  void save_more(SafetensorsFile& file) const override {
+    const std::uint8_t bits[] = {1, 2};
+    file.add("bits", {2}, bits);
+  }
+  void restore_more(const SafetensorsFile& file) override { restored_bits = file.u8("bits"); }
+  std::vector<float> values() const {
+    std::vector<float> all(store.values().begin(), store.values().end());
+    all.push_back(other.values()[0]);
+    return all;
+  }
+
+  float target;
+  double weight_of_y;
+  ParamStore<float> store, other;
+  ParamId x, y;
+  Index count = 0;
+  double best = 0;
+  std::vector<float> seen = {0};
+  std::vector<std::uint8_t> restored_bits;
+  std::vector<double> times;
+};
+
+const ScheduleOptions kTen{.steps = 10, .lr = 0.1};
+
+}  // namespace
+
+TEST_CASE("training_run: steps are Adam's, with the schedule's step size times a range's factor") {
+  Fit run(kTen);
+  run.step(0);
+  // The first step of Adam is the step size, against the sign of the gradient.
+  CHECK(std::abs(run.store.values()[0] - 0.05f) < 1e-6f);
+  CHECK(run.store.values()[2] == 0);  // its turn comes at every second step
+  CHECK(std::abs(run.other.values()[0] - 0.1f) < 1e-6f);
+  CHECK(run.figure() == 3 + 4);
+  run.step(0);
+  CHECK(run.store.values()[2] > 0);
+  while (!run.done()) run.step(0);
+  CHECK(run.steps() == 10);
+  CHECK(run.planned() == 10);
+}
+
+TEST_CASE("training_run: a run that is saved and restored ends with the same bits") {
+  const TemporaryFolder folder;
+  Fit whole(kTen);
+  whole.drive({});
+  Fit first(kTen);
+  for (int i = 0; i < 5; ++i) first.step(i);
+  first.save(folder / "c");
+  const SafetensorsFile file = SafetensorsFile::read(folder / "c");
+  for (const char* name :
+       {"x", "x.mean", "x.mean_square", "x.gradient", "other/y", "other/y.mean", "run/steps", "run/count",
+        "run/seen", "run/best", "run/planned", "run/curve", "bits"})
+    CHECK(file.has(name));
+  CHECK(file.f32("x.gradient")[2] != 0);  // waits for its turn
+  CHECK_FALSE(file.has("other/y.gradient"));
+  Fit second(kTen);
+  second.restore(folder / "c");
+  CHECK(second.steps() == 5);
+  CHECK(second.count == 5);
+  CHECK(second.best == first.best);
+  CHECK(second.seen == first.seen);
+  CHECK(second.figure() == first.figure());
+  CHECK(second.restored_bits == std::vector<std::uint8_t>{1, 2});
+  second.drive({});
+  CHECK(second.values() == whole.values());
+  CHECK(second.figure() == whole.figure());
+}
+
+TEST_CASE("training_run: a timed run keeps the total of its checkpoint") {
+  const TemporaryFolder folder;
+  Fit first({.seconds = 10, .lr = 0.1});
+  for (int i = 0; first.planned() == 0; ++i) first.step(0.5 * i);
+  first.save(folder / "c");
+  Fit second({.seconds = 20, .lr = 0.1});
+  second.restore(folder / "c");
+  CHECK(second.planned() == first.planned());
+}
+
+TEST_CASE("training_run: a checkpoint of another run is refused by the name of the option or input") {
+  const TemporaryFolder folder;
+  const auto path = folder / "c";
+  Fit(kTen).save(path);
+  Fit longer({.steps = 11, .lr = 0.1});
+  CHECK_THROWS_WITH(longer.restore(path), path.string() +
+                                              ": this checkpoint was made with option 'steps' 10, this "
+                                              "run has 11");
+  Fit faster({.steps = 10, .lr = 0.5});
+  CHECK_THROWS_WITH(faster.restore(path), Contains("option 'lr' 0.1, this run has 0.5"));
+  Fit other_weight(kTen, 2, 3);
+  CHECK_THROWS_WITH(other_weight.restore(path), Contains("option 'weight_of_y' 1, this run has 3"));
+  Fit other_target(kTen, 3);
+  CHECK_THROWS_WITH(other_target.restore(path),
+                    path.string() + ": this checkpoint was made of another input 'target'");
+  CHECK_THROWS_AS(Fit(kTen).restore(folder / "none"), IoError);
+
+  SafetensorsFile file = SafetensorsFile::read(path);
+  for (auto& e : file.tensors)
+    if (e.name == "x.mean") e.shape = {2}, e.data.resize(8);
+  file.write(path);
+  CHECK_THROWS_WITH(Fit(kTen).restore(path),
+                    path.string() + ": tensor 'x.mean': expected 3 elements of F32, found shape [2] of F32");
+}
+
+TEST_CASE(
+    "training_run: drive writes checkpoints, stops where it is told, and a later one goes on with its "
+    "clock") {
+  const TemporaryFolder folder;
+  const auto checkpoint = folder / "c";
+  Fit first(kTen);
+  CHECK_FALSE(first.drive(
+      {.checkpoint = checkpoint, .curve_seconds = 1e-9, .proceed = [&] { return first.steps() < 4; }}));
+  CHECK(first.steps() == 4);
+  Fit second(kTen);
+  second.restore(checkpoint);
+  std::vector<double> told;
+  CHECK(second.drive({.curve_seconds = 1e-9, .after = [&](double now) { told.push_back(now); }}));
+  CHECK(second.times.size() == 6);
+  CHECK(second.times == told);
+  CHECK(second.times.front() >= first.seconds());
+  CHECK(second.seconds() >= second.times.back());
+  CHECK_THAT(second.curve(), Contains("seconds,steps,figure\n") && Contains(",1,") && Contains(",10,"));
+  CHECK(second.drive({}));  // has all its steps
+  CHECK(second.times.size() == 6);
+}
+
+TEST_CASE("training_run: drive takes the caller's clock, ends early, and saves now and then") {
+  const TemporaryFolder folder;
+  Fit run(kTen);
+  double now = 100;
+  CHECK(run.drive({.checkpoint = folder / "c",
+                   .checkpoint_seconds = 1e-9,
+                   .clock = [&] { return ++now; },
+                   .enough = [&] { return run.steps() == 3; }}));
+  CHECK(run.times == std::vector<double>{101, 102, 103});
+  Fit later(kTen);
+  later.restore(folder / "c");
+  CHECK(later.steps() == 2);
+  CHECK(run.curve() == "seconds,steps,figure\n");
+}
