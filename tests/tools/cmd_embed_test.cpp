@@ -25,8 +25,7 @@ TEST_CASE("embed writes an owner, an image and the figures that scripts read", "
 
 TEST_CASE("embed gives the same bytes for the same seed and key", "[embed]") {
   const TinyJob& job = TinyJob::get();
-  const std::string key = job.folder / "repeat.key";
-  REQUIRE(run_command({"key", "--out", key}).code == 0);
+  const std::string key = test_key_file(job.folder, 7);
   for (const char* threads : {"1", "2"})
     REQUIRE(tiny_embed(job.field, job.folder / (std::string("again") + threads),
                        {"--key", key, "--measured-views", "1", "--threads", threads})

@@ -4,20 +4,27 @@
 #include <unistd.h>
 
 #include <fieldmark/core/files.h>
+
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "tools/test_key_file.h"
 #include "tools/tiny_scene.h"
 
-/// Embeds messages of 4 bits in a field in two steps: too few to read anything.
+/// Embeds messages of 4 bits in a field in two steps: too few to read anything. The key is a known one, so
+/// that the owner is the same in every run.
 inline Outcome tiny_embed(const std::string& field, const std::string& owner,
                           const std::vector<std::string>& more) {
   std::vector<std::string> words{"embed", "--field",       field, "--out",   owner, "--bits",  "4", "--cells",
                                  "6",     "--reader-size", "32",  "--steps", "2",   "--views", "8"};
   words.insert(words.end(), more.begin(), more.end());
+  const TemporaryFolder folder;
+  if (std::find(more.begin(), more.end(), "--key") == more.end())
+    words.insert(words.end(), {"--key", test_key_file(folder)});
   return run_command(words);
 }
 

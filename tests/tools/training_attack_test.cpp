@@ -72,8 +72,9 @@ TEST_CASE("a second mark goes on top of a baked field", "[attack-field]") {
   REQUIRE(
       run_command({"bake", "--owner", job.owner, "--message", "5", "--out", first, "--steps", "2"}).code ==
       cli::kOk);
-  REQUIRE(run_command({"embed", "--field", first, "--out", owner, "--bits", "4", "--cells", "6",
-                       "--reader-size", "32", "--steps", "2", "--views", "8", "--measured-views", "1"})
+  REQUIRE(run_command({"embed", "--field", first, "--out", owner, "--key", test_key_file(folder), "--bits",
+                       "4", "--cells", "6", "--reader-size", "32", "--steps", "2", "--views", "8",
+                       "--measured-views", "1"})
               .code == cli::kOk);
   REQUIRE(run_command({"bake", "--owner", owner, "--message", "a", "--out", both, "--steps", "2"}).code ==
           cli::kOk);
