@@ -68,10 +68,10 @@ struct CellRunner::Trained {
 
 CellRunner::CellRunner(CellRunnerOptions options) : options_(std::move(options)) {
   if (options_.scenes.empty()) throw ValueError("[cell_runner] scenes must not be empty");
-  if (!(options_.budget > 0) || options_.views < 1 || options_.photographs < 1)
-    throw ValueError("[cell_runner] budget, views and photographs must be positive, got " +
+  if (!(options_.budget > 0) || options_.views < 1 || options_.ground_truth < 1)
+    throw ValueError("[cell_runner] budget, views and ground truth must be positive, got " +
                      std::to_string(options_.budget) + ", " + std::to_string(options_.views) + " and " +
-                     std::to_string(options_.photographs));
+                     std::to_string(options_.ground_truth));
   // What another budget left is of no use.
   char of_budget[80];
   std::snprintf(of_budget, sizeof of_budget, "%gs-%gs", options_.budget, options_.base_seconds);
@@ -104,13 +104,13 @@ const CellRunner::Scene& CellRunner::scene(const CellName& name) {
     tell("reading " + name.scene, 0, "");
     scene_ = std::make_unique<Scene>(
         Scene{name.scene, size, split_of(*found, size, "train"), split_of(*found, size, "test")});
-    thin_out(scene_->test, options_.photographs);
+    thin_out(scene_->test, options_.ground_truth);
   }
   return *scene_;
 }
 
-// A field of photographs, once: a later call or process finds it in the work folder.
-nerf::RadianceField CellRunner::trained_field(const std::string& stem, const nerf::Dataset& photographs,
+// A field of ground_truth, once: a later call or process finds it in the work folder.
+nerf::RadianceField CellRunner::trained_field(const std::string& stem, const nerf::Dataset& ground_truth,
                                               const CellName& name, double seconds) {
   const auto path = options_.work / (stem + ".field"), checkpoint = options_.work / (stem + ".checkpoint");
   if (std::filesystem::exists(path)) return nerf::RadianceField::load(path);
@@ -121,7 +121,7 @@ nerf::RadianceField CellRunner::trained_field(const std::string& stem, const ner
   auto options = nerf::train_options(sizes.field.kind);
   options.schedule.seconds = seconds;
   options.seed = name.seed;
-  nerf::Trainer trainer(field, photographs, options);
+  nerf::Trainer trainer(field, ground_truth, options);
   timed_run({.what = stem,
              .seconds = seconds,
              .done = [&] { return trainer.done(); },
@@ -146,8 +146,8 @@ nerf::RadianceField CellRunner::base_field(const CellName& name, const Scene& sc
                        scene.train, name, seconds);
 }
 
-// The 2-D network, shared by the cells that mark photographs and renders with it, then two fields of marked
-// photographs: four fifths of the budget for the network, the rest for the fields.
+// The 2-D network, shared by the cells that mark training images and renders with it, then two fields of
+// marked training images: four fifths of the budget for the network, the rest for the fields.
 CellRunner::Trained CellRunner::train_hiding(const CellName& name, const Scene& scene,
                                              const std::shared_ptr<const nerf::RadianceField>& unmarked) {
   const HidingSystem system = *hiding_system(name.system);
@@ -186,7 +186,7 @@ CellRunner::Trained CellRunner::train_hiding(const CellName& name, const Scene& 
   const auto message = message_of_view(name.bits, name.seed, kFixedMessage);
   const double seconds = 0.5 * (1 - kNetworkPart) * options_.budget;
   const auto field_of = [&](const watermark::Message& sent, const char* which) {
-    const nerf::Dataset marked = marked_photographs(scene.train, *marker, sent);
+    const nerf::Dataset marked = marked_images(scene.train, *marker, sent);
     trained.more["training_images_accuracy"] += 0.5 * accuracy_of(*marker, photographs_of(marked), sent);
     return std::make_shared<const nerf::RadianceField>(
         trained_field(name.stem() + which, marked, name, seconds));
@@ -261,7 +261,7 @@ MeasuredCell CellRunner::run(const CellName& name) {
                   .under = name.bits == 16 ? o.under : std::vector<std::string>{},
                   .under_views = o.under_views,
                   .seconds = o.budget,
-                  .photographs = &data.test,
+                  .ground_truth = &data.test,
                   .seed = name.seed,
                   .lpips = o.lpips,
                   .progress = [&](double part) {
@@ -281,8 +281,8 @@ MeasuredCell CellRunner::run(const CellName& name) {
                                      {"budget", o.budget},
                                      {"ssim_base", s.ssim_base},
                                      {"lpips_base", s.lpips_base},
-                                     {"psnr_gt_foreground", s.psnr_photo_object},
-                                     {"psnr_gt_unmarked", s.psnr_photo_unmarked}};
+                                     {"psnr_gt_foreground", s.psnr_gt_object},
+                                     {"psnr_gt_unmarked", s.psnr_gt_unmarked}};
   more.insert(trained.more.begin(), trained.more.end());
   Cell cell{.name = name,
             .steps = trained.steps,
@@ -292,9 +292,9 @@ MeasuredCell CellRunner::run(const CellName& name) {
             .own_2d_accuracy = trained.own_2d_accuracy,
             .psnr_base = s.psnr_base,
             .psnr_base_foreground = s.psnr_base_foreground,
-            .psnr_photo = s.psnr_photo,
-            .ssim = s.ssim_photo,
-            .lpips = s.lpips_photo,
+            .psnr_gt = s.psnr_gt,
+            .ssim = s.ssim_gt,
+            .lpips = s.lpips_gt,
             .under = s.under,
             .commit = o.commit,
             .more = more};

@@ -73,20 +73,20 @@ Tensor<float> generated_texture(Index size, const CounterRng& rng, std::uint64_t
   return image;
 }
 
-CropSource::CropSource(std::vector<Tensor<float>> photographs, std::uint64_t seed)
-    : photographs_(std::move(photographs)), rng_(seed, 71) {
-  for (const auto& photograph : photographs_) {
-    check_rank("crop_source", "photographs", photograph.shape, 3, "[height, width, 3]");
-    check_extent("crop_source", "photographs", photograph.shape, 2, 3, "red, green, blue");
+CropSource::CropSource(std::vector<Tensor<float>> images, std::uint64_t seed)
+    : images_(std::move(images)), rng_(seed, 71) {
+  for (const auto& image : images_) {
+    check_rank("crop_source", "images", image.shape, 3, "[height, width, 3]");
+    check_extent("crop_source", "images", image.shape, 2, 3, "red, green, blue");
   }
 }
 
-Tensor<float> CropSource::photograph(Index size, std::uint64_t index) const {
-  if (photographs_.empty()) throw ValueError("[crop_source] photographs must not be empty");
+Tensor<float> CropSource::crop(Index size, std::uint64_t index) const {
+  if (images_.empty()) throw ValueError("[crop_source] images must not be empty");
   Tensor<float> window;
   for (std::uint64_t attempt = 0; attempt < kTries; ++attempt) {
-    const auto which = rng_.below(static_cast<Index>(photographs_.size()), index, 3 * attempt + 100);
-    const Tensor<float>& from = photographs_[static_cast<std::size_t>(which)];
+    const auto which = rng_.below(static_cast<Index>(images_.size()), index, 3 * attempt + 100);
+    const Tensor<float>& from = images_[static_cast<std::size_t>(which)];
     const Index h = from.shape[0], w = from.shape[1];
     const Index top = rng_.below(std::max<Index>(h - size, 0) + 1, index, 3 * attempt + 101);
     const Index left = rng_.below(std::max<Index>(w - size, 0) + 1, index, 3 * attempt + 102);
@@ -97,8 +97,8 @@ Tensor<float> CropSource::photograph(Index size, std::uint64_t index) const {
 }
 
 Tensor<float> CropSource::image(Index size, std::uint64_t index) const {
-  if (photographs_.empty() || rng_.uniform(index, 99) < 0.5f) return generated_texture(size, rng_, index);
-  return photograph(size, index);
+  if (images_.empty() || rng_.uniform(index, 99) < 0.5f) return generated_texture(size, rng_, index);
+  return crop(size, index);
 }
 
 }  // namespace fieldmark::baselines

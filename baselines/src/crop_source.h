@@ -17,24 +17,24 @@ Tensor<float> window_of(const Tensor<float>& image, Index top, Index left, const
 /// @param index  one image for each   @return [size, size, 3] in [0, 1]   @throws ValueError if size < 1
 Tensor<float> generated_texture(Index size, const CounterRng& rng, std::uint64_t index);
 
-/// Training images of 2-D networks: windows of photographs at random places and, one in two, generated
+/// Training images of 2-D networks: windows of images at random places and, one in two, generated
 /// textures.
 class CropSource {
  public:
-  /// @param photographs  [H, W, 3] in [0, 1] of any sizes; none: textures alone
+  /// @param images  [H, W, 3] in [0, 1] of any sizes; none: textures alone
   /// @throws ShapeError if one is not
-  CropSource(std::vector<Tensor<float>> photographs, std::uint64_t seed);
-  /// Of a photograph smaller than `size`, what there is, repeated at its edges. A window that shows hardly
+  CropSource(std::vector<Tensor<float>> images, std::uint64_t seed);
+  /// Of an image smaller than `size`, what there is, repeated at its edges. A window that shows hardly
   /// anything is drawn anew, up to 8 times: a network learns nothing from a white background.
   /// @param index  one image for each   @return [size, size, 3] in [0, 1]
   Tensor<float> image(Index size, std::uint64_t index) const;
-  /// The same of photographs alone. @throws ValueError if there is none
-  Tensor<float> photograph(Index size, std::uint64_t index) const;
+  /// The same of images alone. @throws ValueError if there is none
+  Tensor<float> crop(Index size, std::uint64_t index) const;
   /// As constructed.
-  const std::vector<Tensor<float>>& photographs() const { return photographs_; }
+  const std::vector<Tensor<float>>& images() const { return images_; }
 
  private:
-  std::vector<Tensor<float>> photographs_;
+  std::vector<Tensor<float>> images_;
   CounterRng rng_;
 };
 

@@ -15,14 +15,14 @@ std::optional<HidingSystem> hiding_system(std::string_view system) {
   return std::nullopt;
 }
 
-std::vector<Tensor<float>> photographs_of(const nerf::Dataset& data) {
+std::vector<Tensor<float>> images_of(const nerf::Dataset& data) {
   std::vector<Tensor<float>> images;
   for (const nerf::View& view : data.views) images.push_back(nerf::composited(view, data.background));
   return images;
 }
 
-nerf::Dataset marked_photographs(const nerf::Dataset& data, const ImageMarker& marker,
-                                 const watermark::Message& message, double mark_psnr) {
+nerf::Dataset marked_images(const nerf::Dataset& data, const ImageMarker& marker,
+                            const watermark::Message& message, double mark_psnr) {
   nerf::Dataset marked = data;
   const float level = nerf::background_value(data.background);
   for (nerf::View& view : marked.views) {
@@ -44,14 +44,14 @@ double accuracy_of(const ImageMarker& marker, const std::vector<Tensor<float>>& 
   return sum / static_cast<double>(images.size());
 }
 
-OwnScores own_scores(const ImageMarker& marker, const CropSource& photographs, Index count, Index size,
+OwnScores own_scores(const ImageMarker& marker, const CropSource& images, Index count, Index size,
                      std::uint64_t seed, double mark_psnr) {
   if (count < 1) throw ValueError("[own_scores] count must be at least 1, got " + std::to_string(count));
   const CounterRng messages(seed, 43);
   OwnScores scores;
   for (Index i = 0; i < count; ++i) {
     const auto index = static_cast<std::uint64_t>(i);
-    const Tensor<float> image = photographs.photograph(size, index);
+    const Tensor<float> image = images.crop(size, index);
     const auto sent = watermark::random_message(marker.options().bits, messages, index);
     const Tensor<float> marked = marker.mark(image, sent, mark_psnr);
     scores.accuracy += marker.accuracy(marked, sent);

@@ -203,8 +203,8 @@ void HidingTrainer::describe(RunFingerprint& f) const {
   f.option("adversary_weight", o.adversary_weight);
   f.option("noisy_part", o.noisy_part);
   f.option("seed", o.seed);
-  for (std::size_t i = 0; i < crops_.photographs().size(); ++i)
-    f.input("image " + std::to_string(i), crops_.photographs()[i].data);
+  for (std::size_t i = 0; i < crops_.images().size(); ++i)
+    f.input("image " + std::to_string(i), crops_.images()[i].data);
 }
 
 }  // namespace fieldmark::baselines

@@ -13,25 +13,24 @@
 namespace fieldmark::baselines {
 namespace {
 
-void check_image(const Tensor<float>& picture) {
-  check_rank("image_marker", "image", picture.shape, 3, "[height, width, 3]");
-  check_extent("image_marker", "image", picture.shape, 2, 3, "red, green, blue");
+void check_image(const Tensor<float>& cover) {
+  check_rank("image_marker", "image", cover.shape, 3, "[height, width, 3]");
+  check_extent("image_marker", "image", cover.shape, 2, 3, "red, green, blue");
 }
 
 // Where an image's tiles begin, and how large they are: a side shorter than a tile has one of its own
 // length, and the last of a side may reach beyond it.
 struct Tiles {
-  Tiles(const Shape& picture, Index tile)
-      : height(std::min(tile, picture[0])), width(std::min(tile, picture[1])) {
-    for (Index y = 0; y < picture[0]; y += height)
-      for (Index x = 0; x < picture[1]; x += width) corners.push_back({y, x});
+  Tiles(const Shape& cover, Index tile) : height(std::min(tile, cover[0])), width(std::min(tile, cover[1])) {
+    for (Index y = 0; y < cover[0]; y += height)
+      for (Index x = 0; x < cover[1]; x += width) corners.push_back({y, x});
   }
   Index height, width;
   std::vector<std::array<Index, 2>> corners;
 };
 
-Tensor<float> tile_of(const Tensor<float>& picture, const Tiles& tiles, const std::array<Index, 2>& corner) {
-  return window_of(picture, corner[0], corner[1], {tiles.height, tiles.width, 3});
+Tensor<float> tile_of(const Tensor<float>& cover, const Tiles& tiles, const std::array<Index, 2>& corner) {
+  return window_of(cover, corner[0], corner[1], {tiles.height, tiles.width, 3});
 }
 
 // As the networks have images: [1, H, W, 3] in [-1, 1].
@@ -44,23 +43,23 @@ Tensor<float> centred(const Tensor<float>& tile) {
 constexpr int kGainRounds = 8;
 constexpr double kNear = 0.01;  // dB
 
-Tensor<float> added(const Tensor<float>& picture, const Tensor<float>& residual, double gain) {
-  Tensor<float> out(picture.shape);
-  for (Index i = 0; i < out.size(); ++i) out[i] = picture[i] + static_cast<float>(gain) * residual[i];
+Tensor<float> added(const Tensor<float>& cover, const Tensor<float>& residual, double gain) {
+  Tensor<float> out(cover.shape);
+  for (Index i = 0; i < out.size(); ++i) out[i] = cover[i] + static_cast<float>(gain) * residual[i];
   return quantize8(out);
 }
 
 // With the gain at which the file has the strength: black and white take a part of the residual away.
-Tensor<float> added_at(const Tensor<float>& picture, const Tensor<float>& residual, double mark_psnr) {
+Tensor<float> added_at(const Tensor<float>& cover, const Tensor<float>& residual, double mark_psnr) {
   const double square = mse(residual, Tensor<float>(residual.shape));
-  if (square <= 0) return quantize8(picture);
+  if (square <= 0) return quantize8(cover);
   double gain = std::pow(10.0, -mark_psnr / 20) / std::sqrt(square);
-  Tensor<float> out = added(picture, residual, gain);
+  Tensor<float> out = added(cover, residual, gain);
   for (int k = 0; k < kGainRounds; ++k) {
-    const double miss = psnr(out, picture) - mark_psnr;
+    const double miss = psnr(out, cover) - mark_psnr;
     if (!std::isfinite(miss) || std::abs(miss) < kNear) break;
     gain *= std::pow(10.0, miss / 20);
-    out = added(picture, residual, gain);
+    out = added(cover, residual, gain);
   }
   return out;
 }
@@ -79,18 +78,18 @@ ImageMarker::ImageMarker(HidingKind kind, const HidingOptions& options, std::uin
     network_ = std::make_unique<HiddenNetwork<float>>(params, options, seed);
 }
 
-Tensor<float> ImageMarker::mark(const Tensor<float>& picture, const watermark::Message& message,
+Tensor<float> ImageMarker::mark(const Tensor<float>& cover, const watermark::Message& message,
                                 double mark_psnr) const {
   if (message.size() != options_.bits)
     throw ValueError("[image_marker] message must have the network's " + std::to_string(options_.bits) +
                      " bits, got " + std::to_string(message.size()));
-  check_image(picture);
+  check_image(cover);
   const std::vector<float> bits(message.bits.begin(), message.bits.end());
-  const Index h = picture.shape[0], w = picture.shape[1];
-  const Tiles tiles(picture.shape, options_.tile);
-  Tensor<float> residual(picture.shape);
+  const Index h = cover.shape[0], w = cover.shape[1];
+  const Tiles tiles(cover.shape, options_.tile);
+  Tensor<float> residual(cover.shape);
   for (const auto& corner : tiles.corners) {
-    const Tensor<float> x = centred(tile_of(picture, tiles, corner));
+    const Tensor<float> x = centred(tile_of(cover, tiles, corner));
     Tape<float> tape;
     NormPass<float> pass{.running = true};
     const Var<float> marked = network_->encode(Params<float>(params, nullptr), tape.constant(x),
@@ -101,16 +100,16 @@ Tensor<float> ImageMarker::mark(const Tensor<float>& picture, const watermark::M
         residual[((corner[0] + y) * w + corner[1]) * 3 + k] = 0.5f * (marked.value()[i] - x[i]);
       }
   }
-  return mark_psnr > 0 ? added_at(picture, residual, mark_psnr) : added(picture, residual, 1);
+  return mark_psnr > 0 ? added_at(cover, residual, mark_psnr) : added(cover, residual, 1);
 }
 
-watermark::Message ImageMarker::read(const Tensor<float>& picture) const {
-  check_image(picture);
-  const Tiles tiles(picture.shape, options_.tile);
+watermark::Message ImageMarker::read(const Tensor<float>& cover) const {
+  check_image(cover);
+  const Tiles tiles(cover.shape, options_.tile);
   std::vector<Tensor<float>> whole, shown;
   for (const auto& corner : tiles.corners) {
-    if (corner[0] + tiles.height > picture.shape[0] || corner[1] + tiles.width > picture.shape[1]) continue;
-    whole.push_back(tile_of(picture, tiles, corner));
+    if (corner[0] + tiles.height > cover.shape[0] || corner[1] + tiles.width > cover.shape[1]) continue;
+    whole.push_back(tile_of(cover, tiles, corner));
     if (shows_something(whole.back())) shown.push_back(whole.back());
   }
   const auto& asked = shown.empty() ? whole : shown;
@@ -127,8 +126,8 @@ watermark::Message ImageMarker::read(const Tensor<float>& picture) const {
   return message;
 }
 
-double ImageMarker::accuracy(const Tensor<float>& picture, const watermark::Message& sent) const {
-  const watermark::Message found = read(picture);
+double ImageMarker::accuracy(const Tensor<float>& cover, const watermark::Message& sent) const {
+  const watermark::Message found = read(cover);
   double right = 0;
   for (std::size_t b = 0; b < found.bits.size(); ++b) right += found.bits[b] == sent.bits.at(b);
   return right / static_cast<double>(found.size());

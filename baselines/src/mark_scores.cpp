@@ -49,7 +49,7 @@ class Scorer {
         level_(nerf::background_value(unmarked.background)),
         rng_(options.seed, 42) {
     for (const std::string& name : options.under) attacks_.push_back(distort::parse_distortion(name));
-    total_ = options.cameras.size() + (options.photographs ? options.photographs->views.size() : 0);
+    total_ = options.cameras.size() + (options.ground_truth ? options.ground_truth->views.size() : 0);
   }
 
   void read_views(MarkScores& scores) {
@@ -64,15 +64,15 @@ class Scorer {
         break;
       scores.views = static_cast<Index>(i) + 1;
       const watermark::Message sent = marked_.message(static_cast<Index>(i));
-      const Tensor<float> picture = quantize8(marked_.render(options_.cameras[i], sent));
+      const Tensor<float> rendered = quantize8(marked_.render(options_.cameras[i], sent));
       const nerf::Rendering plain = plain_.render(options_.cameras[i]);
-      accuracy.add(marked_.accuracy(picture, sent));
-      if (i < under_views) read_under(i, picture, sent, under);
+      accuracy.add(marked_.accuracy(rendered, sent));
+      if (i < under_views) read_under(i, rendered, sent, under);
       const Tensor<float> base = quantize8(plain.rgb);
-      whole.add(psnr(picture, base));
-      object.add(psnr_masked(picture, base, plain.opacity));
-      similar.add(ssim_or_nan(picture, base));
-      perceptual.add(lpips_or_nan(options_.lpips, picture, base));
+      whole.add(psnr(rendered, base));
+      object.add(psnr_masked(rendered, base, plain.opacity));
+      similar.add(ssim_or_nan(rendered, base));
+      perceptual.add(lpips_or_nan(options_.lpips, rendered, base));
       tell();
     }
     scores.accuracy = accuracy.value();
@@ -84,35 +84,35 @@ class Scorer {
     for (std::size_t a = 0; a < attacks_.size(); ++a) scores.under[options_.under[a]] = under[a].value();
   }
 
-  void compare_photographs(MarkScores& scores) {
+  void compare_ground_truth(MarkScores& scores) {
     Mean whole, object, similar, perceptual, unmarked;
     Index i = 0;
-    const nerf::Dataset none, &photographs = options_.photographs ? *options_.photographs : none;
-    for (const nerf::View& view : photographs.views) {
-      const Tensor<float> photo = nerf::composited(view, photographs.background);
-      const Tensor<float> picture = quantize8(marked_.render(view.camera, marked_.message(i++)));
+    const nerf::Dataset none, &ground_truth = options_.ground_truth ? *options_.ground_truth : none;
+    for (const nerf::View& view : ground_truth.views) {
+      const Tensor<float> truth = nerf::composited(view, ground_truth.background);
+      const Tensor<float> rendered = quantize8(marked_.render(view.camera, marked_.message(i++)));
       const nerf::Rendering plain = plain_.render(view.camera);
-      whole.add(psnr(picture, photo));
-      object.add(psnr_masked(picture, photo, plain.opacity));
-      similar.add(ssim_or_nan(picture, photo));
-      perceptual.add(lpips_or_nan(options_.lpips, picture, quantize8(photo)));
-      unmarked.add(psnr(plain.rgb, photo));
+      whole.add(psnr(rendered, truth));
+      object.add(psnr_masked(rendered, truth, plain.opacity));
+      similar.add(ssim_or_nan(rendered, truth));
+      perceptual.add(lpips_or_nan(options_.lpips, rendered, quantize8(truth)));
+      unmarked.add(psnr(plain.rgb, truth));
       tell();
     }
-    scores.psnr_photo = whole.value();
-    scores.psnr_photo_object = object.value();
-    scores.ssim_photo = similar.value();
-    scores.lpips_photo = perceptual.value();
-    scores.psnr_photo_unmarked = unmarked.value();
+    scores.psnr_gt = whole.value();
+    scores.psnr_gt_object = object.value();
+    scores.ssim_gt = similar.value();
+    scores.lpips_gt = perceptual.value();
+    scores.psnr_gt_unmarked = unmarked.value();
   }
 
  private:
-  void read_under(std::size_t i, const Tensor<float>& picture, const watermark::Message& sent,
+  void read_under(std::size_t i, const Tensor<float>& rendered, const watermark::Message& sent,
                   std::vector<Mean>& under) {
     const float background[3] = {level_, level_, level_};
     for (std::size_t a = 0; a < attacks_.size(); ++a)
       under[a].add(marked_.accuracy(
-          distort::apply_distortion(attacks_[a], picture, rng_, i * attacks_.size() + a, background), sent));
+          distort::apply_distortion(attacks_[a], rendered, rng_, i * attacks_.size() + a, background), sent));
   }
 
   void tell() {
@@ -146,7 +146,7 @@ MarkScores score_mark(const nerf::RadianceField& unmarked, const MarkedScene& ma
   MarkScores scores;
   Scorer scorer(unmarked, marked, options);
   scorer.read_views(scores);
-  scorer.compare_photographs(scores);
+  scorer.compare_ground_truth(scores);
   return scores;
 }
 

@@ -17,11 +17,11 @@ const std::array kSystems{
                 "the same with the networks, step sizes and images of the authors' code"},
     PaperSystem{
         "hidden_nerf", "HiDDeN + NeRF",
-        "photographs marked by HiDDeN (32 channels) at 30 dB, a field trained on them, its renders read",
+        "training images marked by HiDDeN (32 channels) at 30 dB, a field trained on them, its renders read",
         false},
     PaperSystem{
         "mbrs_nerf", "MBRS + NeRF",
-        "photographs marked by MBRS (32 channels) at 30 dB, a field trained on them, its renders read",
+        "training images marked by MBRS (32 channels) at 30 dB, a field trained on them, its renders read",
         false},
     PaperSystem{
         "nerf_message", "NeRF with message",

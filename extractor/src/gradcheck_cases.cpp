@@ -28,7 +28,7 @@ Tensor<double> numbers(Shape shape, double phase) {
   return t;
 }
 
-Tensor<double> picture(Shape shape) {
+Tensor<double> view_image(Shape shape) {
   Tensor<double> t = numbers(shape, 1);
   for (double& v : t.data) v = 0.5 + 0.5 * v;
   return t;
@@ -101,10 +101,11 @@ GradcheckReport check_network(ParamStore<double>& store, const Tensor<double>& i
 GradcheckReport check_dense_extractor() {
   ParamStore<double> store;
   const DenseExtractor<double> net(store, "net", {.classes = 3, .base = 8}, 5);
-  return check_network(store, picture({1, 17, 18, 3}), [&](const Params<double>& params, Var<double> image) {
-    const auto out = net(params, image);
-    return concatenate({image.tape().reshape(out.sign, {out.height * out.width, 1}), out.index});
-  });
+  return check_network(
+      store, view_image({1, 17, 18, 3}), [&](const Params<double>& params, Var<double> image) {
+        const auto out = net(params, image);
+        return concatenate({image.tape().reshape(out.sign, {out.height * out.width, 1}), out.index});
+      });
 }
 
 GradcheckReport check_pooled_extractor(bool running) {
@@ -113,13 +114,14 @@ GradcheckReport check_pooled_extractor(bool running) {
   // Wide enough that what is normalised by it stays below keep_from_kinks().
   for (const auto& e : store.entries())
     if (e.name.ends_with("running_variance")) std::ranges::fill(store.values(store.find(e.name)), 1e4);
-  return check_network(store, picture({2, 5, 4, 3}), [&](const Params<double>& params, Var<double> images) {
-    return running ? net.evaluate(params, images) : net(params, images);
-  });
+  return check_network(store, view_image({2, 5, 4, 3}),
+                       [&](const Params<double>& params, Var<double> images) {
+                         return running ? net.evaluate(params, images) : net(params, images);
+                       });
 }
 
 GradcheckReport check_centred_image() {
-  const std::vector<Tensor<double>> in{picture({2, 3, 5, 3})};
+  const std::vector<Tensor<double>> in{view_image({2, 3, 5, 3})};
   return gradcheck([](Tape<double>&, auto v) { return centred_image(v[0], 2); }, in);
 }
 

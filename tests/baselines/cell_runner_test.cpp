@@ -19,7 +19,7 @@ CellRunnerOptions tiny(const TemporaryFolder& folder) {
           .size = 32,
           .views = 2,
           .under_views = 1,
-          .photographs = 2,
+          .ground_truth = 2,
           .work = folder / "work",
           .under = {"noise_0.1"},
           .commit = "abc"};
@@ -44,7 +44,7 @@ TEST_CASE("cell_runner: a cell of the built-in scene, from training to files") {
   CHECK(measured.cell.under.contains("noise_0.1"));
   CHECK(measured.cell.psnr_base_foreground == Approx(34).margin(3));
   CHECK(std::isnan(measured.cell.own_2d_accuracy));
-  CHECK(measured.cell.psnr_photo > 5);
+  CHECK(measured.cell.psnr_gt > 5);
   CHECK(measured.cell.more.at("test_images") == 2);
   CHECK(measured.cell.commit == "abc");
   CHECK(measured.image.shape == Shape{32, 64, 3});
@@ -68,7 +68,7 @@ TEST_CASE("cell_runner: errors") {
                     Contains("[paper_system] name must be one of") && Contains("got other"));
   options.budget = 0;
   CHECK_THROWS_WITH(CellRunner(options),
-                    "[cell_runner] budget, views and photographs must be positive, got 0.000000, 2 and 2");
+                    "[cell_runner] budget, views and ground truth must be positive, got 0.000000, 2 and 2");
   options.scenes.clear();
   CHECK_THROWS_WITH(CellRunner(options), "[cell_runner] scenes must not be empty");
 }

@@ -20,7 +20,7 @@ Cell sample() {
           .own_2d_accuracy = 0.98,
           .psnr_base = 31.25,
           .psnr_base_foreground = 26,
-          .psnr_photo = 27,
+          .psnr_gt = 27,
           .ssim = 0.9,
           .lpips = std::nan(""),
           .under = {{"noise_0.1", 0.5}, {"blur_1", 0.25}},
@@ -54,8 +54,8 @@ TEST_CASE("cell: the keys that scripts read, null where nothing was measured") {
   const std::string text = format_cell(sample());
   std::size_t at = 0;
   for (const char* key : {"system", "scene", "field", "bits", "seed", "steps", "seconds", "bit_accuracy",
-                          "spread", "own_2d_accuracy", "psnr_base", "psnr_base_foreground", "psnr_gt",
-                          "ssim", "lpips", "distorted", "commit"}) {
+                          "spread", "own_2d_accuracy", "psnr_base", "psnr_base_foreground", "psnr_gt", "ssim",
+                          "lpips", "distorted", "commit"}) {
     const std::size_t found = text.find("\"" + std::string(key) + "\":", at);
     CAPTURE(key);
     REQUIRE(found != std::string::npos);

@@ -22,11 +22,11 @@ TEST_CASE("hiding_system: which systems have a 2-D network") {
   CHECK(!hiding_system("ours"));
 }
 
-TEST_CASE("hiding_system: marked photographs keep what is transparent, and their mark's strength") {
+TEST_CASE("hiding_system: marked images keep what is transparent, and their mark PSNR") {
   const nerf::Dataset data = nerf::make_scene({.size = 32, .views = 2});
   const auto net = marker();
   const watermark::Message message{{1, 0, 1, 1, 0, 0}};
-  const nerf::Dataset marked = marked_photographs(data, *net, message, 26);
+  const nerf::Dataset marked = marked_images(data, *net, message, 26);
   REQUIRE(marked.views.size() == data.views.size());
   for (std::size_t v = 0; v < data.views.size(); ++v) {
     const auto& before = data.views[v].rgba;
@@ -74,7 +74,7 @@ TEST_CASE("hiding_system: marks on renders, and on its own images") {
   double by_hand = 0;
   for (std::uint64_t i = 0; i < 3; ++i) {
     const auto sent = watermark::random_message(6, CounterRng(1, 43), i);
-    by_hand += accuracy_of(*net, {net->mark(crops.photograph(16, i), sent, 28)}, sent) / 3;
+    by_hand += accuracy_of(*net, {net->mark(crops.crop(16, i), sent, 28)}, sent) / 3;
   }
   CHECK(own.accuracy == Approx(by_hand));
   const auto read = net->read(render);

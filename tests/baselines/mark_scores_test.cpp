@@ -35,7 +35,7 @@ nerf::Dataset photographs_of(const nerf::RadianceField& field) {
     Tensor<float> rgba({camera.height, camera.width, 4}, 1);
     for (Index p = 0; p < camera.height * camera.width; ++p)
       for (Index c = 0; c < 3; ++c) rgba[4 * p + c] = 0.9f * rgb[3 * p + c];
-    data.views.push_back({camera, rgba, "photo"});
+    data.views.push_back({camera, rgba, "truth"});
   }
   return data;
 }
@@ -57,16 +57,16 @@ TEST_CASE("mark_scores: an owner's figures are those of measure") {
   CHECK(scores.psnr_base_foreground == Approx(measured.psnr_base_foreground).epsilon(1e-9));
   CHECK(scores.ssim_base == Approx(measured.ssim_base).epsilon(1e-9));
   CHECK(scores.psnr_base < 60);  // there is a mark
-  CHECK(std::isnan(scores.psnr_photo));
+  CHECK(std::isnan(scores.psnr_gt));
   CHECK(std::isnan(scores.lpips_base));
 }
 
 TEST_CASE(
-    "mark_scores: a scene that is not marked, against photographs, is what evaluate says of its field") {
+    "mark_scores: a scene that is not marked, against ground_truth, is what evaluate says of its field") {
   const nerf::RadianceField field = small_field();
-  const nerf::Dataset photographs = photographs_of(field);
+  const nerf::Dataset ground_truth = photographs_of(field);
   nerf::Renderer renderer(field), plain(field);
-  const auto expected = nerf::evaluate(renderer, photographs);
+  const auto expected = nerf::evaluate(renderer, ground_truth);
   const MarkedScene marked{.bits = 4,
                            .message = [](Index view) { return message_of_view(4, 0, view); },
                            .render = [&](const nerf::Camera& camera,
@@ -75,12 +75,13 @@ TEST_CASE(
                                [](const Tensor<float>&, const watermark::Message& sent) {
                                  return sent.bits[0] ? 1.0 : 0.5;  // of messages 0, 1, 2, 3: half each
                                }};
-  const auto scores = score_mark(field, marked, {.cameras = cameras_of(field), .photographs = &photographs});
-  CHECK(scores.psnr_photo == Approx(expected.psnr).epsilon(1e-9));
-  CHECK(scores.psnr_photo_unmarked == Approx(expected.psnr).epsilon(1e-9));
-  CHECK(scores.psnr_photo_object == Approx(expected.psnr_foreground).epsilon(1e-9));
+  const auto scores =
+      score_mark(field, marked, {.cameras = cameras_of(field), .ground_truth = &ground_truth});
+  CHECK(scores.psnr_gt == Approx(expected.psnr).epsilon(1e-9));
+  CHECK(scores.psnr_gt_unmarked == Approx(expected.psnr).epsilon(1e-9));
+  CHECK(scores.psnr_gt_object == Approx(expected.psnr_foreground).epsilon(1e-9));
   // evaluate() does not round before ssim(): 2e-4 here
-  CHECK(scores.ssim_photo == Approx(expected.ssim).margin(1e-3));
+  CHECK(scores.ssim_gt == Approx(expected.ssim).margin(1e-3));
   CHECK(std::isnan(scores.psnr_base));  // equal images
   CHECK(scores.accuracy == Approx(0.75));
   CHECK(scores.spread == Approx(0.25));

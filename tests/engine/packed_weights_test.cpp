@@ -84,15 +84,15 @@ TEST_CASE("packed_weights: in bf16 a layer's values and gradients are off by the
              want = pass(layer, store, static_cast<PackedWeights<float>*>(nullptr), x);
   const std::size_t y = 70 * 40, dx = y + 70 * 33;
   const auto worst = [&](std::size_t begin, std::size_t end) {
-    float error = 0, largest = 0;
+    double error = 0, largest = 0;
     for (std::size_t i = begin; i < end; ++i) {
-      raise_to(error, std::abs(got[i] - want[i]));
-      largest = std::max(largest, std::abs(want[i]));
+      raise_to(error, static_cast<double>(std::abs(got[i] - want[i])));
+      largest = std::max(largest, std::abs(static_cast<double>(want[i])));
     }
     return error / largest;
   };
-  CHECK(worst(0, y) > 1e-5f);  // it was rounded at all
-  CHECK(worst(0, y) < 4e-3f);
+  CHECK(worst(0, y) > 1e-5);  // it was rounded at all
+  CHECK(worst(0, y) < 4e-3);
   CHECK(worst(y, dx) < 4e-3f);
   CHECK(worst(dx, want.size()) == 0);  // dW comes from float numbers
 }

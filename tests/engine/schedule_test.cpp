@@ -39,11 +39,11 @@ TEST_CASE("schedule: the step size by its formula") {
 
 TEST_CASE("schedule: a timed run's total, given as steps, has the same step size at every step") {
   for (const double cooldown : {0.1, 0.3, 0.4, 0.5, 0.77})
-    for (const double pace : {0.011, 0.0507, 0.31}) {
-      CAPTURE(cooldown, pace);
+    for (const double step_time : {0.011, 0.0507, 0.31}) {
+      CAPTURE(cooldown, step_time);
       const ScheduleOptions options{.seconds = 60, .cooldown = cooldown};
-      const auto [lr, total] =
-          timed_run(options, [&](Index n) { return pace * (1 + 0.3 * std::sin(static_cast<double>(n))); });
+      const auto [lr, total] = timed_run(
+          options, [&](Index n) { return step_time * (1 + 0.3 * std::sin(static_cast<double>(n))); });
       REQUIRE(static_cast<Index>(lr.size()) == total);
       ScheduleOptions fixed = options;
       fixed.steps = total;
@@ -52,7 +52,7 @@ TEST_CASE("schedule: a timed run's total, given as steps, has the same step size
     }
 }
 
-TEST_CASE("schedule: a timed run ends within 5% of its time, also where the pace drifts") {
+TEST_CASE("schedule: a timed run ends within 5% of its time, also where the step_time drifts") {
   for (const double drift : {-0.3, 0.0, 0.3}) {
     double end = 0;
     timed_run({.seconds = 60}, [&](Index n) {
@@ -66,7 +66,7 @@ TEST_CASE("schedule: a timed run ends within 5% of its time, also where the pace
   }
 }
 
-TEST_CASE("schedule: a timed run is planned anew where the pace changes after its total was fixed") {
+TEST_CASE("schedule: a timed run is planned anew where the step_time changes after its total was fixed") {
   // An mlp field's total is fixed after a tenth of the time.
   for (const double cooldown : {0.3, 0.9})
     for (const double slower : {0.25, 0.5, 1.0, 2.0, 5.0})
@@ -93,12 +93,12 @@ TEST_CASE("schedule: a timed run is planned anew where the pace changes after it
 }
 
 TEST_CASE("schedule: a timed run of few slow steps ends at its time, at the latest after the step begun") {
-  for (const double pace : {0.7, 3.0, 25.0}) {
+  for (const double step_time : {0.7, 3.0, 25.0}) {
     double end = 0;
-    const auto [lr, total] = timed_run({.seconds = 60}, [&](Index) { return end += pace, pace; });
-    CAPTURE(pace, total, end);
-    CHECK(end < 60 * 1.02 + pace);
-    CHECK(end > 60 * 0.9 - pace);
+    const auto [lr, total] = timed_run({.seconds = 60}, [&](Index) { return end += step_time, step_time; });
+    CAPTURE(step_time, total, end);
+    CHECK(end < 60 * 1.02 + step_time);
+    CHECK(end > 60 * 0.9 - step_time);
   }
 }
 

@@ -58,14 +58,14 @@ TEST_CASE("pooled_extractor: running statistics follow the batch's, then an imag
   ParamStore<double> store;
   const PooledExtractor<double> net(store, "h", {.n_bits = 3, .channels = 4, .layers = 2}, 1);
   const Params<double> params(store, nullptr);
-  const auto pictures = uniform({2, 6, 5, 3}, 0, 1, 1);
-  const Tensor<double> first({1, 6, 5, 3}, {pictures.data.begin(), pictures.data.begin() + 90});
+  const auto view_images = uniform({2, 6, 5, 3}, 0, 1, 1);
+  const Tensor<double> first({1, 6, 5, 3}, {view_images.data.begin(), view_images.data.begin() + 90});
   Tape<double> tape;
   std::vector<BatchStatistics> seen;
-  const auto batch = net(params, tape.constant(pictures), &seen);
+  const auto batch = net(params, tape.constant(view_images), &seen);
   CHECK(seen.size() == 2);
   net.update(store, seen, 1);
-  const auto running = net.evaluate(params, tape.constant(pictures));
+  const auto running = net.evaluate(params, tape.constant(view_images));
   const auto alone = net.evaluate(params, tape.constant(first));
   const auto own = net(params, tape.constant(first));
   for (std::size_t b = 0; b < 3; ++b) {

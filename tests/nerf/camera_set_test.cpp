@@ -129,7 +129,7 @@ TEST_CASE("camera_set: extrapolated cameras look from where no training camera w
     CHECK(off_axis(c, s.centre) < 1e-6);
     widest = std::max(widest, nearest(c));
   }
-  CHECK(widest > 90);  // the whole cap below is unseen
+  CHECK(widest > 90);  // the whole cap below is hidden
   // Cameras all around leave no such direction: the farthest of those that were drawn.
   CameraSpan all = s;
   all.directions.clear();

@@ -1,4 +1,4 @@
-// The layouts of photographs, which load_dataset() reads besides Blender's.
+// The layouts of images, which load_dataset() reads besides Blender's.
 #include <fieldmark/core/error.h>
 #include <fieldmark/core/files.h>
 #include <fieldmark/imaging/image.h>
@@ -22,11 +22,11 @@ using Json = nlohmann::json;
 namespace {
 void write_image(const fs::path& path, Index width, Index height, std::uint64_t seed = 1) {
   fs::create_directories(path.parent_path());
-  const auto picture = quantize8(uniform<float>({height, width, 3}, 0, 1, seed));
+  const auto view_image = quantize8(uniform<float>({height, width, 3}, 0, 1, seed));
   if (path.extension() == ".png")
-    write_png(path, picture);
+    write_png(path, view_image);
   else
-    write_file_atomically(path, encode_jpeg(picture, 90));
+    write_file_atomically(path, encode_jpeg(view_image, 90));
 }
 
 // A transforms.json of ten frames of 12 x 8 pixels, the last name first.
@@ -39,9 +39,9 @@ Json ten_frames() {
           {"w", 12},    {"h", 8},     {"aabb_scale", 4}, {"frames", frames}};
 }
 
-struct Photographs : TemporaryFolder {
+struct TrainingImages : TemporaryFolder {
   Json json = ten_frames();
-  Photographs() {
+  TrainingImages() {
     for (int i = 0; i < 10; ++i) write_image(image(i), 12, 8);
     write();
   }
@@ -61,7 +61,7 @@ std::string names(const Dataset& set) {
 }  // namespace
 
 TEST_CASE("dataset: one transforms.json holds out every 8th of the sorted names") {
-  const Photographs scene;
+  const TrainingImages scene;
   const Dataset train = load_dataset(scene.path), test = load_dataset(scene.path, {.split = "test"});
   CHECK(names(train) == "1 2 3 4 5 6 7 9 ");
   CHECK(names(test) == "0 8 ");
@@ -78,7 +78,7 @@ TEST_CASE("dataset: one transforms.json holds out every 8th of the sorted names"
 }
 
 TEST_CASE("dataset: frames without an image are left out and told of, all missing is an error") {
-  Photographs scene;
+  TrainingImages scene;
   fs::remove(scene.image(3));
   fs::remove(scene.image(8));
   const Dataset train = load_dataset(scene.path);
@@ -96,7 +96,7 @@ TEST_CASE("dataset: frames without an image are left out and told of, all missin
 }
 
 TEST_CASE("dataset: JPEG, names without extension, and intrinsics of a frame of its own") {
-  Photographs scene;
+  TrainingImages scene;
   fs::remove(scene.image(1));
   write_image(scene.path / "images/1.jpg", 12, 8);
   for (auto& frame : scene.json["frames"])
@@ -111,7 +111,7 @@ TEST_CASE("dataset: JPEG, names without extension, and intrinsics of a frame of 
 }
 
 TEST_CASE("dataset: distorted images are cut to what every lens covers, and keep their scale") {
-  Photographs scene;
+  TrainingImages scene;
   scene.json["k1"] = 2;
   scene.json["frames"][4]["k1"] = 4;
   scene.write();
@@ -139,7 +139,7 @@ TEST_CASE("dataset: distorted images are cut to what every lens covers, and keep
 }
 
 TEST_CASE("dataset: images of another size than stated or than the first are refused") {
-  Photographs scene;
+  TrainingImages scene;
   write_image(scene.image(2), 24, 16);
   scene.expect_error("frames[7].file_path: expected an image of 12 x 8 pixels as frames[8], got 24 x 16");
   scene.json["k1"] = 0.1;
@@ -264,9 +264,9 @@ TEST_CASE("dataset: errors of COLMAP models name file and image") {
   expect("expected images to train on, got none: all 2 are missing, the first is ");
 }
 
-TEST_CASE("dataset: the photographs of fox and fern") {
-  const auto fox = data_or_skip("fox", "dataset: the photographs of fox");
-  const auto fern = data_or_skip("nerf_llff/fern", "dataset: the photographs of fern");
+TEST_CASE("dataset: the training images of fox and fern") {
+  const auto fox = data_or_skip("fox", "dataset: the training images of fox");
+  const auto fern = data_or_skip("nerf_llff/fern", "dataset: the training images of fern");
   if (!fox || !fern) return;
   const Dataset train = load_dataset(*fox), test = load_dataset(*fox, {.split = "test", .size = 120});
   CHECK((train.views.size() == 58 && test.views.size() == 9));

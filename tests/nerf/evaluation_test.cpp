@@ -14,8 +14,8 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-// Photographs of the field itself, with its opacity as alpha, brightened by `error`.
-Dataset photographs(const RadianceField& field, int views, float error, Index height = 16) {
+// TrainingImages of the field itself, with its opacity as alpha, brightened by `error`.
+Dataset images(const RadianceField& field, int views, float error, Index height = 16) {
   Dataset data{.name = "self", .split = "test", .background = field.background, .views = {}};
   Renderer renderer(field);
   for (int v = 0; v < views; ++v) {
@@ -36,10 +36,10 @@ Dataset photographs(const RadianceField& field, int views, float error, Index he
 }
 }  // namespace
 
-TEST_CASE("evaluation: photographs of the field itself are nearly perfect") {
+TEST_CASE("evaluation: training images of the field itself are nearly perfect") {
   const RadianceField field = small_field();
   Renderer renderer(field);
-  const Evaluation e = evaluate(renderer, photographs(field, 3, 0));
+  const Evaluation e = evaluate(renderer, images(field, 3, 0));
   CHECK(e.views == 3);
   CHECK(e.per_view.size() == 3);
   CHECK(e.psnr > 48);  // at most a rounding step of 1/255 apart
@@ -50,17 +50,17 @@ TEST_CASE("evaluation: photographs of the field itself are nearly perfect") {
 TEST_CASE("evaluation: scores are those of the metrics, and means are over the views") {
   const RadianceField field = small_field();
   Renderer renderer(field);
-  const Dataset data = photographs(field, 3, 0.1f);
+  const Dataset data = images(field, 3, 0.1f);
   const Evaluation e = evaluate(renderer, data);
   double sum[3] = {0, 0, 0};
   for (std::size_t v = 0; v < 3; ++v) {
     const Rendering r = renderer.render(data.views[v].camera);
-    const Tensor<float> photo = composited(data.views[v], data.background);
+    const Tensor<float> truth = composited(data.views[v], data.background);
     Tensor<float> mask(Shape{16, 20});
     for (Index i = 0; i < 320; ++i) mask[i] = data.views[v].rgba[4 * i + 3];
-    CHECK(e.per_view[v].psnr == psnr(r.rgb, photo));
-    CHECK(e.per_view[v].psnr_foreground == psnr_masked(r.rgb, photo, mask));
-    CHECK(e.per_view[v].ssim == ssim(r.rgb, photo));
+    CHECK(e.per_view[v].psnr == psnr(r.rgb, truth));
+    CHECK(e.per_view[v].psnr_foreground == psnr_masked(r.rgb, truth, mask));
+    CHECK(e.per_view[v].ssim == ssim(r.rgb, truth));
     sum[0] += e.per_view[v].psnr, sum[1] += e.per_view[v].psnr_foreground, sum[2] += e.per_view[v].ssim;
   }
   CHECK(std::abs(e.psnr - sum[0] / 3) < 1e-12);
@@ -73,26 +73,26 @@ TEST_CASE(
     "evaluation: LPIPS of images rounded to 8 bits where there is a network and they are large enough") {
   const RadianceField field = small_field();
   Renderer renderer(field);
-  const Dataset data = photographs(field, 2, 0.1f, 18);
+  const Dataset data = images(field, 2, 0.1f, 18);
   const Lpips<float> lpips(random_weights(lpips_tensors(LpipsNetwork::squeeze)), LpipsNetwork::squeeze);
   const Evaluation e = evaluate(renderer, data, {}, &lpips);
   double sum = 0;
   for (std::size_t v = 0; v < 2; ++v) {
     const Tensor<float> rendered = quantize8(renderer.render(data.views[v].camera).rgb),
-                        photo = quantize8(composited(data.views[v], data.background));
-    CHECK(e.per_view[v].lpips == lpips.distance(rendered, photo).value);
+                        truth = quantize8(composited(data.views[v], data.background));
+    CHECK(e.per_view[v].lpips == lpips.distance(rendered, truth).value);
     CHECK(e.per_view[v].lpips > 0);
     sum += e.per_view[v].lpips;
   }
   CHECK(e.lpips == Approx(sum / 2).epsilon(1e-12));
   CHECK(std::isnan(evaluate(renderer, data).lpips));
-  CHECK(std::isnan(evaluate(renderer, photographs(field, 1, 0.1f), {}, &lpips).lpips));  // 16 rows: too few
+  CHECK(std::isnan(evaluate(renderer, images(field, 1, 0.1f), {}, &lpips).lpips));  // 16 rows: too few
 }
 
 TEST_CASE("evaluation: without alpha the object is where the rendering is opaque") {
   const RadianceField field = small_field();
   Renderer renderer(field);
-  Dataset data = photographs(field, 1, 0);
+  Dataset data = images(field, 1, 0);
   const Tensor<float> before = composited(data.views[0], data.background);
   for (Index i = 0; i < 320; ++i) {
     for (Index k = 0; k < 3; ++k) data.views[0].rgba[4 * i + k] = 0.9f * before[3 * i + k];
@@ -106,7 +106,7 @@ TEST_CASE("evaluation: without alpha the object is where the rendering is opaque
 TEST_CASE("evaluation: a view without the object and a tiny image are left out of their means") {
   const RadianceField field = small_field();
   Renderer renderer(field);
-  Dataset data = photographs(field, 2, 0.1f);
+  Dataset data = images(field, 2, 0.1f);
   for (Index i = 0; i < 320; ++i) data.views[1].rgba[4 * i + 3] = 0;
   const Evaluation e = evaluate(renderer, data);
   CHECK(std::isnan(e.per_view[1].psnr_foreground));
@@ -120,7 +120,7 @@ TEST_CASE("evaluation: a view without the object and a tiny image are left out o
 TEST_CASE("evaluation: progress counts views and can end it") {
   const RadianceField field = small_field();
   Renderer renderer(field);
-  const Dataset data = photographs(field, 3, 0);
+  const Dataset data = images(field, 3, 0);
   std::vector<Index> seen;
   const Evaluation e = evaluate(renderer, data, [&](Index done, Index total) {
     CHECK(total == 3);

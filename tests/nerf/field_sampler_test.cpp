@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sampler.h"
 #include "small_field.h"
 #include "some_rays.h"
 #include "support/catch.h"

@@ -87,14 +87,14 @@ TEST_CASE("field_sizing: ended before tables have been compared, the field is as
 }
 
 TEST_CASE("field_sizing: without bounds, what is empty is found once, not by each training") {
-  Dataset photographs = sphere();
-  photographs.layout = Layout::transforms;
-  for (View& v : photographs.views)
+  Dataset images = sphere();
+  images.layout = Layout::transforms;
+  for (View& v : images.views)
     for (Index i = 3; i < v.rgba.size(); i += 4) v.rgba[i] = 1;
-  const FieldSizing sizing = size_field(photographs, {}, kShort);
+  const FieldSizing sizing = size_field(images, {}, kShort);
   REQUIRE(sizing.compared);
   RadianceField alone(sizing.trials[0].field);
-  Trainer trainer(alone, photographs,
+  Trainer trainer(alone, images,
                   {.schedule = {.steps = kShort.steps},
                    .samples_per_step = kShort.samples_per_step,
                    .least_rays = 128,

@@ -40,7 +40,7 @@ TEST_CASE("scene_space: rendered scenes and silhouettes are in a cube") {
   CHECK(space.bounds.side == 4);
 }
 
-TEST_CASE("scene_space: photographs from around are contracted about what they show") {
+TEST_CASE("scene_space: training images from around are contracted about what they show") {
   for (const Layout layout : {Layout::transforms, Layout::colmap, Layout::llff}) {
     const Space space = scene_space(around(layout));
     CHECK(space.kind == SpaceKind::contracted);

@@ -1,7 +1,7 @@
 #include <fieldmark/core/error.h>
 #include <fieldmark/engine/parallel.h>
-#include "marching.h"
 #include <fieldmark/nerf/space.h>
+#include "marching.h"
 
 #include <algorithm>
 #include <cmath>
@@ -128,11 +128,11 @@ TEST_CASE("space: seen cells are those of an image's cone, the same for every th
     CHECK(seen == seen_cells(two, space, 12));
     set_threads(before);
     const auto first = seen_cells(std::span(two, 1), space, 12);
-    Index more = 0, unseen = 0;
+    Index more = 0, hidden = 0;
     for (std::size_t c = 0; c < seen.size(); ++c) {
       REQUIRE(seen[c] >= first[c]);
       more += seen[c] > first[c];
-      unseen += !seen[c];
+      hidden += !seen[c];
       // A cell whose middle is in the image, by the camera's own rays.
       const auto cell = static_cast<Index>(c);
       const auto middle = [](Index i) { return (static_cast<double>(i) + 0.5) / 12; };
@@ -147,7 +147,7 @@ TEST_CASE("space: seen cells are those of an image's cone, the same for every th
         CHECK(first[c] == 0);  // outer cells reach to infinity
     }
     CHECK(more > 0);
-    CHECK(unseen > 0);
+    CHECK(hidden > 0);
   }
 }
 

@@ -19,7 +19,7 @@ namespace {
 
 constexpr Index kSize = 24, kParts = 8;
 
-// Photographs whose pixels are the means of kParts x kParts of the scene's, colours by alpha.
+// TrainingImages whose pixels are the means of kParts x kParts of the scene's, colours by alpha.
 Dataset blurred_scene(Index views = 12, const char* split = "train") {
   Dataset data = make_scene({.size = kSize * kParts, .views = views}, split);
   for (View& v : data.views) {
@@ -62,7 +62,7 @@ std::vector<float> trained(const Dataset& data, Index supersampling, Index after
 }  // namespace
 
 TEST_CASE(
-    "trainer_rays: a field taught with means over pixels is nearer to photographs that are such means") {
+    "trainer_rays: a field taught with means over pixels is nearer to training images that are such means") {
   const Dataset data = blurred_scene(40), judge = blurred_scene(6, "val");  // of rays that nothing learnt
   const auto psnr = [&](Index taught, Index shown) {
     RadianceField field(field_options(taught));
@@ -112,7 +112,7 @@ TEST_CASE("trainer_rays: supersampled steps give the same bytes for any thread c
 }
 
 TEST_CASE("trainer_rays: hard pixels are sought where the error is") {
-  // A scene that is learnt within the run, but for a patch of noise that differs between photographs.
+  // A scene that is learnt within the run, but for a patch of noise that differs between images.
   Dataset data = make_scene({.kind = SceneKind::sphere, .size = 48, .views = 8});
   const CounterRng rng(1);
   for (std::size_t v = 0; v < data.views.size(); ++v)

@@ -25,7 +25,7 @@ TEST_CASE("reproduce measures what is missing on the built-in scene, once", "[re
                                       "32",
                                       "--views",
                                       "1",
-                                      "--photographs",
+                                      "--truth-images",
                                       "1",
                                       "--base-seconds",
                                       "0.3",

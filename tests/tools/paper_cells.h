@@ -16,7 +16,7 @@ inline std::vector<fieldmark::baselines::Cell> paper_cells() {
                      .own_2d_accuracy = std::nan(""),
                      .psnr_base = 38.5,
                      .psnr_base_foreground = 34.25,
-                     .psnr_photo = 30,
+                     .psnr_gt = 30,
                      .ssim = 0.75,
                      .lpips = std::nan(""),
                      .under = {{"noise_0.1", accuracy - 0.125}, {"noise_0.05", accuracy - 0.03125}},

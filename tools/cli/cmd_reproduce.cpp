@@ -31,7 +31,7 @@ struct Options {
   std::vector<std::string> tables, scenes, systems;
   std::string cells = "docs/results/rows/paper", work = "reproduce_work", lpips_weights;
   double budget = 300, base_seconds = 0;
-  Index size = 0, views = 0, photographs = 20;
+  Index size = 0, views = 0, ground_truth = 20;
   int log2_table = nerf::HashEncodingOptions{}.log2_table;
   bool full = false, report_only = false;
 };
@@ -164,7 +164,7 @@ void measure(const Options& options, const std::vector<baselines::PaperScene>& s
                                 .size = options.size,
                                 .views = views,
                                 .under_views = std::max<Index>(1, views / 5),
-                                .photographs = options.photographs,
+                                .ground_truth = options.ground_truth,
                                 .work = options.work,
                                 .under = {std::begin(kUnder), std::end(kUnder)},
                                 .lpips = lpips ? &*lpips : nullptr,
@@ -229,7 +229,7 @@ void add_measuring_options(CommandLine& app, Options& o) {
       ->type_name("S")
       ->default_str("");
   app.add_option("--size", o.size,
-                 "Pixels of the images' longer side, 16 to 8192 (as the released code: 160, photographs "
+                 "Pixels of the images' longer side, 16 to 8192 (160 as the released code; a place "
                  "252, field mlp 100)")
       ->range(16, 8192)
       ->type_name("N")
@@ -243,7 +243,7 @@ void add_measuring_options(CommandLine& app, Options& o) {
       ->range(1, 100000)
       ->type_name("N")
       ->default_str("");
-  app.add_option("--photographs", o.photographs, "Test photographs to compare with, 1 to 100000")
+  app.add_option("--truth-images", o.ground_truth, "Test images to compare with, 1 to 100000")
       ->range(1, 100000)
       ->type_name("N");
 }

@@ -185,7 +185,7 @@ std::vector<MarchRay> contracted_rays() {
   return rays;
 }
 
-std::vector<float> walked(const Grid& grid, MarchRay ray, std::int64_t piece) {
+std::vector<float> walked_contracted(const Grid& grid, MarchRay ray, std::int64_t piece) {
   std::vector<float> all, t(static_cast<std::size_t>(piece) + 1, -7.f),
       x(static_cast<std::size_t>(3 * piece) + 1, -7.f);
   for (std::int64_t count = piece; count == piece;) {
@@ -210,8 +210,8 @@ TEST_CASE(
     for (int c = 0; c < kSide * kSide * kSide; ++c)
       full.fill(c % kSide, c / kSide % kSide, c / kSide / kSide);
     for (const MarchRay& ray : contracted_rays()) {
-      const auto got = walked(full, ray, 4000);
-      for (const std::int64_t piece : {1, 5, 16}) REQUIRE(walked(full, ray, piece) == got);
+      const auto got = walked_contracted(full, ray, 4000);
+      for (const std::int64_t piece : {1, 5, 16}) REQUIRE(walked_contracted(full, ray, piece) == got);
       double t = static_cast<double>(ray.near);
       std::size_t k = 0;
       for (; placed(ray, t).scale < static_cast<double>(kMarchFarthest); ++k) {
@@ -247,11 +247,11 @@ TEST_CASE(
         CHECK((rays.k[i] == kMarchMost && rays.near[i] == r.near));
         continue;
       }
-      const auto want = walked(grid, r, 1000);
+      const auto want = walked_contracted(grid, r, 1000);
       jumped += rays.k[i] > 0;
       r.near = rays.near[i];
       r.k = rays.k[i];
-      CHECK(walked(grid, r, 1000) == want);
+      CHECK(walked_contracted(grid, r, 1000) == want);
       const Placed p = placed(r, static_cast<double>(r.near));
       std::size_t block = 0;
       for (int a = 2; a >= 0; --a) block = block * kBlocks + static_cast<std::size_t>(p.x[a] * kBlocks);

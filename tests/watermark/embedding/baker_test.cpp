@@ -81,7 +81,7 @@ TEST_CASE("baker: baked colours approach the marked ones, by its own figure and 
   CHECK(after > before + 2);
 }
 
-TEST_CASE("baker: a mark's strength in the file comes near the owner's as it is learnt") {
+TEST_CASE("baker: a mark PSNR in the file comes near the owner's as it is learnt") {
   const Owner owner = owner_with_gain();
   const auto strength_after = [&](Index steps) {
     Baker baker(owner, kMessage, options(300));
@@ -104,9 +104,9 @@ TEST_CASE("baker: a mark's strength in the file comes near the owner's as it is 
   CHECK(early > late + 1);
 }
 
-TEST_CASE("baker: an object keeps its likeness in directions that the photographs never saw") {
+TEST_CASE("baker: an object keeps its likeness in directions that no training image shows") {
   const Owner owner = owner_with_gain();
-  const auto unseen = [&](Index around) {
+  const auto extrapolated = [&](Index around) {
     BakeOptions o = options(150);
     o.around = around;
     Baker baker(owner, kMessage, o);
@@ -119,7 +119,7 @@ TEST_CASE("baker: an object keeps its likeness in directions that the photograph
       sum += psnr(baked.render(camera).rgb, marked.render(camera).rgb);
     return sum / 6;
   };
-  const double without = unseen(0), with = unseen(20);
+  const double without = extrapolated(0), with = extrapolated(20);
   CAPTURE(without, with);
   CHECK(with > without + 1);
 }

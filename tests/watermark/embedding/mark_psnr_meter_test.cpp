@@ -23,7 +23,7 @@ nerf::Renderer::Recolour darker_by(float step) {
 TEST_CASE(
     "mark_psnr_meter: the mean over novel views of what psnr_masked says of each, called view by view") {
   const Owner owner = tiny_owner();
-  const MarkPsnrViews views{.count = 5, .side = 1000, .seed = 9};  // no larger than the photographs
+  const MarkPsnrViews views{.count = 5, .side = 1000, .seed = 9};  // no larger than the training images
   nerf::Renderer plain(owner.field), marked(owner.field);
   double sum = 0;
   const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, 5, 0, 9);

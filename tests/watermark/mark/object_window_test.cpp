@@ -41,25 +41,26 @@ TEST_CASE("object_window: finds a disc on white and on black to a pixel, with it
 }
 
 TEST_CASE("object_window: moves and shrinks with the object") {
-  const Tensor<float> picture = disc(160, 200, 90, 70, 40);
-  const Window w = object_window(picture, 1);
+  const Tensor<float> view_image = disc(160, 200, 90, 70, 40);
+  const Window w = object_window(view_image, 1);
   const Window moved = object_window(disc(160, 200, 97, 64, 40), 1);
   CHECK(moved.x - w.x == Approx(7).margin(1e-9));
   CHECK(moved.y - w.y == Approx(-6).margin(1e-9));
   CHECK(moved.width == Approx(w.width).margin(1e-9));
-  const Window smaller = object_window(resize_area(picture, 120, 150), 1);
+  const Window smaller = object_window(resize_area(view_image, 120, 150), 1);
   CHECK(middle_x(smaller) == Approx(0.75 * middle_x(w)).margin(1));
   CHECK(middle_y(smaller) == Approx(0.75 * middle_y(w)).margin(1));
   CHECK(smaller.width == Approx(0.75 * w.width).margin(2.2));
 }
 
 TEST_CASE("object_window: does not take noise of deviation 0.1 for the object") {
-  Tensor<float> picture = disc(160, 200, 90, 70, 40);
-  const Window w = object_window(picture, 1);
+  Tensor<float> view_image = disc(160, 200, 90, 70, 40);
+  const Window w = object_window(view_image, 1);
   const CounterRng rng(3);
-  for (Index i = 0; i < picture.size(); ++i)
-    picture[i] = std::clamp(picture[i] + 0.1f * rng.normal4(static_cast<std::uint64_t>(i))[0], 0.f, 1.f);
-  const Window noisy = object_window(picture, 1);
+  for (Index i = 0; i < view_image.size(); ++i)
+    view_image[i] =
+        std::clamp(view_image[i] + 0.1f * rng.normal4(static_cast<std::uint64_t>(i))[0], 0.f, 1.f);
+  const Window noisy = object_window(view_image, 1);
   CHECK(middle_x(noisy) == Approx(middle_x(w)).margin(1));
   CHECK(middle_y(noisy) == Approx(middle_y(w)).margin(1));
   CHECK(noisy.width == Approx(w.width).margin(2.2));
@@ -76,9 +77,9 @@ TEST_CASE("object_window: nothing and everything in sight give the square around
 }
 
 TEST_CASE("object_window: a window of another shape is the least around the object or the image") {
-  const Tensor<float> picture = disc(160, 200, 90, 70, 30);
-  const Window square = object_window(picture, 1), flat = object_window(picture, 1, 1.6),
-               upright = object_window(picture, 1, 0.5);
+  const Tensor<float> view_image = disc(160, 200, 90, 70, 30);
+  const Window square = object_window(view_image, 1), flat = object_window(view_image, 1, 1.6),
+               upright = object_window(view_image, 1, 0.5);
   CHECK(flat.height == Approx(square.height));
   CHECK(flat.width == Approx(1.6 * square.height));
   CHECK(upright.width == Approx(square.width));
@@ -95,12 +96,12 @@ TEST_CASE("object_window: a window of another shape is the least around the obje
 }
 
 TEST_CASE("object_window: a window is cut pixel for pixel, with background outside the image") {
-  Tensor<float> picture({6, 8, 3});
-  for (Index i = 0; i < picture.size(); ++i) picture[i] = static_cast<float>(i) / 200;
+  Tensor<float> view_image({6, 8, 3});
+  for (Index i = 0; i < view_image.size(); ++i) view_image[i] = static_cast<float>(i) / 200;
   const auto pixel = [&](Index y, Index x, Index c) {
-    return y < 0 || y >= 6 || x < 0 || x >= 8 ? 0.75f : picture[(y * 8 + x) * 3 + c];
+    return y < 0 || y >= 6 || x < 0 || x >= 8 ? 0.75f : view_image[(y * 8 + x) * 3 + c];
   };
-  const Tensor<float> part = cut_window(picture, {-2, 3, 5, 5}, square_patch(5), 0.75f);
+  const Tensor<float> part = cut_window(view_image, {-2, 3, 5, 5}, square_patch(5), 0.75f);
   REQUIRE(part.shape == Shape{5, 5, 3});
   bool same = true;
   for (Index y = 0; y < 5; ++y)
@@ -108,14 +109,14 @@ TEST_CASE("object_window: a window is cut pixel for pixel, with background outsi
       for (Index c = 0; c < 3; ++c) same = same && part[(y * 5 + x) * 3 + c] == pixel(y + 3, x - 2, c);
   CHECK(same);
   // Half the size: means of 2 x 2 pixels.
-  const Tensor<float> half = cut_window(picture, {1, 1, 4, 4}, square_patch(2), 0.75f);
+  const Tensor<float> half = cut_window(view_image, {1, 1, 4, 4}, square_patch(2), 0.75f);
   const float mean = (pixel(1, 1, 0) + pixel(1, 2, 0) + pixel(2, 1, 0) + pixel(2, 2, 0)) / 4;
   CHECK(half[0] == Approx(mean).margin(1e-6));
-  CHECK(cut_window(picture, {1, 1, 4, 4}, square_patch(9), 0.75f).shape == Shape{9, 9, 3});
+  CHECK(cut_window(view_image, {1, 1, 4, 4}, square_patch(9), 0.75f).shape == Shape{9, 9, 3});
   CHECK(cut_window(Tensor<float>({6, 8, 3}, 0.5f), {1, 1, 4, 4}, square_patch(9), 0.75f).data ==
         std::vector<float>(243, 0.5f));
   // Twice as wide as high, at half the size.
-  const Tensor<float> flat = cut_window(picture, {1, 2, 4, 2}, {1, 2}, 0.75f);
+  const Tensor<float> flat = cut_window(view_image, {1, 2, 4, 2}, {1, 2}, 0.75f);
   REQUIRE(flat.shape == Shape{1, 2, 3});
   for (Index x = 0; x < 2; ++x)
     CHECK(flat[3 * x] == Approx((pixel(2, 1 + 2 * x, 0) + pixel(2, 2 + 2 * x, 0) + pixel(3, 1 + 2 * x, 0) +
@@ -159,11 +160,11 @@ TEST_CASE("object_window: errors name what is wrong") {
   CHECK_THROWS_AS(object_window(Tensor<float>({5, 5, 4}), 1), ShapeError);
   CHECK_THROWS_WITH(object_window(Tensor<float>({5, 5}), 1),
                     "[object_window] rgb must have rank 3 [H, W, 3], got shape [5, 5]");
-  const Tensor<float> picture({5, 5, 3});
-  CHECK_THROWS_WITH(object_window(picture, 1, 0), "[object_window] aspect must be positive, got 0.000000");
-  CHECK_THROWS_AS(object_window(picture, 1, std::nan("")), ValueError);
-  CHECK_THROWS_AS(cut_window(picture, {0, 0, 0, 4}, square_patch(4), 1), ValueError);
-  CHECK_THROWS_AS(cut_window(picture, {0, 0, 4, std::nan("")}, square_patch(4), 1), ValueError);
-  CHECK_THROWS_WITH(cut_window(picture, {0, 0, 2, 3}, {0, 4}, 1),
+  const Tensor<float> view_image({5, 5, 3});
+  CHECK_THROWS_WITH(object_window(view_image, 1, 0), "[object_window] aspect must be positive, got 0.000000");
+  CHECK_THROWS_AS(object_window(view_image, 1, std::nan("")), ValueError);
+  CHECK_THROWS_AS(cut_window(view_image, {0, 0, 0, 4}, square_patch(4), 1), ValueError);
+  CHECK_THROWS_AS(cut_window(view_image, {0, 0, 4, std::nan("")}, square_patch(4), 1), ValueError);
+  CHECK_THROWS_WITH(cut_window(view_image, {0, 0, 2, 3}, {0, 4}, 1),
                     "[cut_window] window and size must be positive, got 2.000000 x 3.000000 and 4 x 0");
 }

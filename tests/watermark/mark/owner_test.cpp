@@ -164,7 +164,7 @@ TEST_CASE("owner: the patch keeps its longer side in another shape, and is kept 
   CHECK(Owner::load(folder / "a").options().patch() == o.patch());
 }
 
-TEST_CASE("owner: photographs without a background are seen in their shape, objects in a square") {
+TEST_CASE("owner: images without a background are seen in their shape, objects in a square") {
   nerf::RadianceField field = small_field();
   REQUIRE(field.cameras.width == 24);
   REQUIRE(field.cameras.height == 18);
@@ -175,7 +175,7 @@ TEST_CASE("owner: photographs without a background are seen in their shape, obje
     CHECK(reader_aspect(field) == Approx(4. / 3));
     field.cameras.height = 5;
     CHECK(reader_aspect(field) == 4);
-    field.cameras.height = 0;  // of a field without photographs
+    field.cameras.height = 0;  // of a field without training images
     CHECK(reader_aspect(field) == 1);
   }
 }

@@ -124,7 +124,7 @@ class Dense:
         return found
 
 
-class Pictures:
+class Images:
     """A 3 x 3 convolution, or the decoder: convolutions with batch norm and ReLU, the average, a linear layer."""
 
     gap = float("inf")  # least distance of a sum from a ReLU's kink, in standard deviations, where it is wanted
@@ -133,8 +133,8 @@ class Pictures:
     def __init__(self, case, names, decoder, layout):
         self.decoder, self.layout, self.name = decoder, layout, layout
         self.format = torch.channels_last if layout == "channels last" else torch.contiguous_format
-        self.x = leaf(self.pictures(case["x"]))
-        self.u = case["u"] if decoder else self.pictures(case["u"])
+        self.x = leaf(self.images(case["x"]))
+        self.u = case["u"] if decoder else self.images(case["u"])
         self.parameters = {}
         for name in names:
             value = case["value/" + name]
@@ -148,7 +148,7 @@ class Pictures:
     def blocked(self):
         return self.layout == "oneDNN blocked"
 
-    def pictures(self, nhwc):
+    def images(self, nhwc):
         nchw = nhwc.permute(0, 3, 1, 2).contiguous(memory_format=self.format)
         return nchw.to_mkldnn() if self.blocked() and not self.decoder else nchw
 
@@ -201,7 +201,7 @@ def variants(metadata, case):
                 yield lambda: Dense(case, names, product, size)
     else:
         for layout in ("channels last", "oneDNN blocked", "planes"):
-            yield lambda: Pictures(case, names, metadata["network"] == "decoder", layout)
+            yield lambda: Images(case, names, metadata["network"] == "decoder", layout)
 
 
 def seconds(step):
@@ -258,7 +258,7 @@ def compared(best, metadata, case):
         prefix = "draw%d/" % d
         draw = {name[len(prefix):]: value for name, value in case.items() if name.startswith(prefix)}
         draw.update({name: value for name, value in case.items() if name.startswith("value/")})
-        small = Pictures(draw, list(best.parameters), best.decoder, best.layout)
+        small = Images(draw, list(best.parameters), best.decoder, best.layout)
         draws.append((small.results(), draw, small.gap))
     if not draws:
         return differences(found, case, largest), {}

@@ -16,7 +16,7 @@ using watermark::CachedView;
 using watermark::Owner;
 using Say = std::function<void(const std::string&, double)>;
 
-constexpr Index kOnTheWay = 24;  // views that set the strength of a mark before it is judged on the way
+constexpr Index kOnTheWay = 24;  // views that set the mark PSNR before it is judged on the way
 
 // Runs on from a time, and can be stopped for a while.
 class Clock {

@@ -45,7 +45,7 @@ std::vector<T> numbers(Index n, std::uint64_t seed) {
   return out;
 }
 
-// Worst |a - b| in parts of the largest |b|; NaN counts as infinitely far.
+// Worst |a - b| relative to the largest magnitude |b|; NaN counts as infinitely far.
 template <class A, class B>
 double relative_error(const A& a, const B& b) {
   double worst = 0, largest = 0;

@@ -156,11 +156,11 @@ std::vector<std::string> write_paper_sheet(const PaperSheet& sheet, const std::v
   std::vector<ImagePair> pairs;
   std::vector<std::string> stems;
   for (const Cell& c : cells) {
-    const std::string picture = cell_path(folder, c.name).string() + ".png";
-    if (c.name.bits != kBits || !std::filesystem::exists(picture) ||
+    const std::string view_image = cell_path(folder, c.name).string() + ".png";
+    if (c.name.bits != kBits || !std::filesystem::exists(view_image) ||
         std::find(sheet.systems.begin(), sheet.systems.end(), c.name.system) == sheet.systems.end())
       continue;
-    const Tensor<float> both = read_image(picture);
+    const Tensor<float> both = read_image(view_image);
     const Index h = both.shape[0], w = both.shape[1] / 2, channels = both.shape[2];
     ImagePair pair{Tensor<float>({h, w, channels}), Tensor<float>({h, w, channels})};
     for (Index y = 0; y < h; ++y) {

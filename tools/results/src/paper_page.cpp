@@ -121,7 +121,7 @@ std::string quality_table(const std::vector<Group>& groups) {
         {g.title, g.scene, g.field, accuracy_of(g) + " (" + of_paper("quality", g.system, "accuracy") + ")",
          percent(mean(g.cells, &Cell::own_2d_accuracy)), fixed(mean(g.cells, &Cell::psnr_base), 2),
          fixed(mean(g.cells, &Cell::psnr_base_foreground), 2), fixed(mean_more(g.cells, "ssim_base"), 3),
-         fixed(mean_more(g.cells, "lpips_base"), 3), both(mean(g.cells, &Cell::psnr_photo), "psnr", 2),
+         fixed(mean_more(g.cells, "lpips_base"), 3), both(mean(g.cells, &Cell::psnr_gt), "psnr", 2),
          fixed(mean_more(g.cells, "psnr_gt_unmarked"), 2), both(mean(g.cells, &Cell::ssim), "ssim", 3),
          both(mean(g.cells, &Cell::lpips), "lpips", 3)});
   }
@@ -187,7 +187,7 @@ std::string ablation_table(const std::vector<Group>& groups) {
     };
     rows.push_back(
         {g.title, g.scene, accuracy_of(g) + " (" + of_paper("ablation", g.system, "accuracy") + ")",
-         fixed(mean(g.cells, &Cell::psnr_base), 2), both(mean(g.cells, &Cell::psnr_photo), "psnr", 2),
+         fixed(mean(g.cells, &Cell::psnr_base), 2), both(mean(g.cells, &Cell::psnr_gt), "psnr", 2),
          both(mean(g.cells, &Cell::ssim), "ssim", 3), both(mean(g.cells, &Cell::lpips), "lpips", 3)});
   }
   return markdown_table({"system", "scene", "bits right, % (published)", "PSNR to the unmarked render",

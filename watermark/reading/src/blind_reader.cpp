@@ -8,30 +8,30 @@ constexpr Index kLeastSide = 16;
 
 }  // namespace
 
-Tensor<float> opaque_image(const Tensor<float>& picture, float background) {
-  check_rank("blind_reader", "image", picture.shape, 3, "[H, W, C]");
-  const Index h = picture.shape[0], w = picture.shape[1], channels = picture.shape[2];
+Tensor<float> opaque_image(const Tensor<float>& view_image, float background) {
+  check_rank("blind_reader", "image", view_image.shape, 3, "[H, W, C]");
+  const Index h = view_image.shape[0], w = view_image.shape[1], channels = view_image.shape[2];
   if (channels < 1 || channels > 4 || h < kLeastSide || w < kLeastSide)
     throw ShapeError("[blind_reader] image must be [H, W, 1 to 4] with sides of at least " +
-                     std::to_string(kLeastSide) + ", got shape " + picture.shape.str());
-  if (channels == 3) return picture;
+                     std::to_string(kLeastSide) + ", got shape " + view_image.shape.str());
+  if (channels == 3) return view_image;
   Tensor<float> out({h, w, 3});
   const bool colour = channels >= 3, alpha = channels % 2 == 0;
   for (Index p = 0; p < h * w; ++p) {
-    const float* from = picture.data.data() + p * channels;
+    const float* from = view_image.data.data() + p * channels;
     const float a = alpha ? from[channels - 1] : 1.f;
     for (Index c = 0; c < 3; ++c) out[3 * p + c] = a * from[colour ? c : 0] + (1 - a) * background;
   }
   return out;
 }
 
-std::vector<double> BlindReader::evidence(const Tensor<float>& picture) const {
-  return evidence(picture, nullptr);
+std::vector<double> BlindReader::evidence(const Tensor<float>& view_image) const {
+  return evidence(view_image, nullptr);
 }
 
-std::vector<double> BlindReader::evidence(const Tensor<float>& picture, SeenPlaces* places) const {
+std::vector<double> BlindReader::evidence(const Tensor<float>& view_image, SeenPlaces* places) const {
   const float background = nerf::background_value(owner_.field.background);
-  const Tensor<float> whole = opaque_image(picture, background);
+  const Tensor<float> whole = opaque_image(view_image, background);
   const PatchSize size = owner_.options().patch();
   const Window window = object_window(whole, background, size.aspect());
   const Tensor<float> image = cut_window(whole, window, size, background);

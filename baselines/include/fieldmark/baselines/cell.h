@@ -34,9 +34,9 @@ struct Cell {
   double own_2d_accuracy;               ///< of a 2-D network on the images that it marked itself
   double psnr_base = 0;                 ///< marked against unmarked render, dB, mean over views
   double psnr_base_foreground = 0;      ///< the same over the object's pixels
-  double psnr_photo = 0;                ///< marked render against photographs of the test split, dB
-  double ssim = 0;                      ///< marked render against photographs
-  double lpips = 0;                     ///< marked render against photographs (AlexNet)
+  double psnr_gt = 0;                   ///< marked render against ground truth of the test split, dB
+  double ssim = 0;                      ///< marked render against ground truth
+  double lpips = 0;                     ///< marked render against ground truth (AlexNet)
   std::map<std::string, double> under;  ///< bit accuracy under distortions, sampling and noise on weights
   std::string commit;                   ///< of the sources that measured it
   std::map<std::string, double> more;   ///< the protocol in numbers, and figures beside those above

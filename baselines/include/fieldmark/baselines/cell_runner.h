@@ -25,7 +25,7 @@ struct CellRunnerOptions {
   /// take longer than `budget`.
   Index views = 200;
   Index under_views = 50;               ///< of them under each distortion and sampling
-  Index photographs = 20;               ///< of the test split, evenly spread
+  Index ground_truth = 20;              ///< of the test split, evenly spread
   std::filesystem::path work;           ///< folder of checkpoints and unmarked fields
   std::vector<std::string> under;       ///< distortions of cells of 16 bits, names of parse_distortion()
   const Lpips<float>* lpips = nullptr;  ///< AlexNet, or null
@@ -54,7 +54,7 @@ class CellRunner {
   struct Trained;
   const Scene& scene(const CellName& name);
   nerf::RadianceField base_field(const CellName& name, const Scene& scene);
-  nerf::RadianceField trained_field(const std::string& stem, const nerf::Dataset& photographs,
+  nerf::RadianceField trained_field(const std::string& stem, const nerf::Dataset& ground_truth,
                                     const CellName& name, double seconds);
   Trained train(const CellName& name, const Scene& scene);
   Trained train_hiding(const CellName& name, const Scene& scene,

@@ -33,9 +33,9 @@ struct ScoreOptions {
   /// After so many seconds, and `under_views` views, no further view is read: large networks take long for
   /// each. 0: all are read.
   double seconds = 0;
-  const nerf::Dataset* photographs = nullptr;  ///< whose views are compared with; null: none
-  std::uint64_t seed = 0;                      ///< of the distortions
-  const Lpips<float>* lpips = nullptr;         ///< AlexNet; null: lpips are NaN
+  const nerf::Dataset* ground_truth = nullptr;  ///< whose views are compared with; null: none
+  std::uint64_t seed = 0;                       ///< of the distortions
+  const Lpips<float>* lpips = nullptr;          ///< AlexNet; null: lpips are NaN
   /// Told how far it is, from 0 to 1; false stops it, which throws Error.
   std::function<bool(double part)> progress = {};
 };
@@ -49,16 +49,16 @@ struct MarkScores {
   double psnr_base_foreground = 0;      ///< the same over pixels whose unmarked opacity exceeds 0.5
   double ssim_base = 0;                 ///< against the unmarked render
   double lpips_base = 0;                ///< against the unmarked render
-  double psnr_photo = 0;                ///< against photographs, dB, over the whole image
-  double psnr_photo_object = 0;         ///< the same over the object's pixels
-  double ssim_photo = 0;                ///< against photographs
-  double lpips_photo = 0;               ///< against photographs
-  double psnr_photo_unmarked = 0;       ///< of the unmarked field against photographs
+  double psnr_gt = 0;                   ///< against ground_truth, dB, over the whole image
+  double psnr_gt_object = 0;            ///< the same over the object's pixels
+  double ssim_gt = 0;                   ///< against ground truth
+  double lpips_gt = 0;                  ///< against ground truth
+  double psnr_gt_unmarked = 0;          ///< of the unmarked field against ground truth
   std::map<std::string, double> under;  ///< accuracy under each distortion
 };
 
 /// Measures a marked scene beside its unmarked field: bits and the difference to the unmarked render on the
-/// given cameras, the difference to photographs on the photographs' cameras. Images are rounded to 8 bits.
+/// given cameras, the difference to ground truth on the ground truth' cameras. Images are rounded to 8 bits.
 /// @throws ValueError if there is no camera, or the name of a distortion is wrong
 MarkScores score_mark(const nerf::RadianceField& unmarked, const MarkedScene& marked,
                       const ScoreOptions& options);

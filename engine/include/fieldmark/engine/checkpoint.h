@@ -3,7 +3,7 @@
 
 namespace fieldmark {
 
-/// The file of a run that can be gone on with later, without arrays yet.
+/// The file of a run that can be resumed, without arrays yet.
 /// @param run  all that the run depends on, in words
 SafetensorsFile new_checkpoint(std::string run);
 

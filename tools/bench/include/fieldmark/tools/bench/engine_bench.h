@@ -26,7 +26,7 @@ struct EngineRow {
   double ratio_to_peak = 0;  ///< over the peak measured around each run, median; 0 for look-ups
   double rate = 0;           ///< samples, points or images a second
   double speedup = 0;        ///< over the plain scalar loop in the same run; 0 where there is none
-  /// Worst |float - double| over values and all gradients, in parts of the largest of each. For the
+  /// Worst |float - double| over values and all gradients, relative to the largest magnitude of each. For the
   /// convolution the worst, for the decoder the median of five sets of images.
   double error = 0;
   double megabytes = 0;           ///< most memory of the process so far

@@ -30,11 +30,12 @@ class Peer {
     bool tuned = false;          ///< the fastest ran in tuned_environment(), else in the environment as it is
     double seconds = 0;          ///< of the fastest, when it was tried
     double untuned_seconds = 0;  ///< of the fastest in the environment as it is
-    double value_difference = 0;     ///< worst |theirs - ours|, in parts of the largest
+    double value_difference = 0;     ///< worst |theirs - ours|, relative to the largest magnitude
     double gradient_difference = 0;  ///< the same, the worst tensor; in works with draws of one of those
     double kink_difference = 0;      ///< in works with draws: of the whole work, in parts of the norm
   };
-  /// Largest difference of a value or gradient that rounding explains, in parts of the largest of its tensor.
+  /// Largest difference of a value or gradient that rounding explains, relative to the largest magnitude of
+  /// its tensor.
   static constexpr double kTolerance = 1e-4;
   /// The same for gradients of a whole work with draws, in parts of the norm: there sums of either program
   /// fall on different sides of a ReLU's kink.

@@ -27,7 +27,7 @@ struct TrainingRow {
   Index steps = 0;              ///< taken
   double samples = 0;           ///< through the networks
   double seconds = 0;           ///< of its own training, the silhouettes included
-  double psnr = 0;              ///< mean over the views of `judge`, against their photographs, dB
+  double psnr = 0;              ///< mean over the views of `judge`, against the ground truth, dB
   double seconds_per_view = 0;  ///< of rendering them
 };
 

@@ -7,9 +7,9 @@
 
 namespace fieldmark::watermark {
 
-/// Which views a MarkPsnrMeter looks at: near ones, no larger than the photographs. Every pixel is one ray,
-/// so that views of few pixels have the mean that large ones have, and many of them come closer to the mean
-/// over all views than a few large ones that take as long.
+/// Which views a MarkPsnrMeter looks at: near ones, no larger than the training images. Every pixel is one
+/// ray, so that views of few pixels have the mean that large ones have, and many of them come closer to the
+/// mean over all views than a few large ones that take as long.
 struct MarkPsnrViews {
   Index count = 256;       ///< >= 1
   Index side = 80;         ///< pixels of the longer side at most, >= 1
@@ -20,7 +20,7 @@ struct MarkPsnrViews {
 /// large pixel would hide a part of the mark.
 inline nerf::RenderOptions mark_psnr_rendering() { return {.supersampling = 1}; }
 
-/// Measures the strength of marks of one field: the mean over views of psnr_masked() of the marked against
+/// Measures the mark PSNRs of one field: the mean over views of psnr_masked() of the marked against
 /// the unmarked view, dB. It keeps the unmarked views.
 class MarkPsnrMeter {
  public:

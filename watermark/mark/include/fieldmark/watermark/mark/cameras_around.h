@@ -7,8 +7,8 @@
 namespace fieldmark::watermark {
 
 /// Novel cameras and, of an object that has no surroundings (a cube), `around` more in every direction: what
-/// its field shows from where no photograph was taken is as firm as the rest, while other scenes show blur
-/// there.
+/// its field shows from where no training image was taken is as firm as the rest, while other scenes show
+/// blur there.
 /// @param size  as nerf::make_cameras()
 inline std::vector<nerf::Camera> cameras_around(const nerf::RadianceField& field, Index near, Index around,
                                                 Index size, std::uint64_t seed) {

@@ -9,7 +9,7 @@ namespace fieldmark::watermark {
 ///   y = x * target / rms,   rms^2 = sum_p m_p |x_p|^2 / (C sum_p m_p) + 1e-12
 /// @param x  [P, C] residual of the pixels   @param mask  [P] weights m, >= 0 (1 on the object); must outlive
 /// the pass
-/// @param target  root mean square wanted, > 0: 10^(-dB / 20) for a strength in dB
+/// @param target  root mean square wanted, > 0: 10^(-dB / 20) for a mark PSNR in dB
 /// @return [P, C], 0 where the mask is empty   @throws ShapeError if mask has another size   @throws
 /// ValueError if target is not positive Differentiable in: x.
 template <class T>
