@@ -156,7 +156,7 @@ CellRunner::Trained CellRunner::train_hiding(const CellName& name, const Scene& 
   const auto marker = std::make_shared<ImageMarker>(
       system.kind, HidingOptions{.bits = name.bits, .channels = kNetworkChannels, .tile = options.crop},
       name.seed);
-  const CropSource crops(photographs_of(scene.train), name.seed);
+  const CropSource crops(images_of(scene.train), name.seed);
   options.seed = name.seed;
   HidingTrainer trainer(*marker, crops, options);
   Trained trained;
@@ -176,7 +176,7 @@ CellRunner::Trained CellRunner::train_hiding(const CellName& name, const Scene& 
                               options_.progress);
   trained.steps = trainer.steps();
   const OwnScores own =
-      own_scores(*marker, CropSource(photographs_of(scene.test), name.seed), kOwnImages, kOwnSize, name.seed);
+      own_scores(*marker, CropSource(images_of(scene.test), name.seed), kOwnImages, kOwnSize, name.seed);
   trained.own_2d_accuracy = own.accuracy;
   trained.more = {{"own_2d_psnr", own.psnr}, {"network_seconds", trained.seconds}};
   if (system.renders) {
@@ -187,7 +187,7 @@ CellRunner::Trained CellRunner::train_hiding(const CellName& name, const Scene& 
   const double seconds = 0.5 * (1 - kNetworkPart) * options_.budget;
   const auto field_of = [&](const watermark::Message& sent, const char* which) {
     const nerf::Dataset marked = marked_images(scene.train, *marker, sent);
-    trained.more["training_images_accuracy"] += 0.5 * accuracy_of(*marker, photographs_of(marked), sent);
+    trained.more["training_images_accuracy"] += 0.5 * accuracy_of(*marker, images_of(marked), sent);
     return std::make_shared<const nerf::RadianceField>(
         trained_field(name.stem() + which, marked, name, seconds));
   };
