@@ -34,12 +34,12 @@ TEST_CASE("crop_source: half of the images are textures, and hardly any image is
   const CropSource crops({image}, 1);
   int blank = 0, whole = 0;
   for (std::uint64_t k = 0; k < 60; ++k) {
-    const auto image = crops.image(16, k);
-    const auto [low, high] = std::minmax_element(image.data.begin(), image.data.end());
+    const auto crop = crops.image(16, k);
+    const auto [low, high] = std::minmax_element(crop.data.begin(), crop.data.end());
     CHECK(*low >= 0);
     CHECK(*high <= 1);
     blank += *low == *high;
-    whole += std::ranges::all_of(image.data, [](float v) { return v == 0 || v == 1; });
+    whole += std::ranges::all_of(crop.data, [](float v) { return v == 0 || v == 1; });
   }
   CHECK(blank <= 6);
   CHECK(whole >= 18);

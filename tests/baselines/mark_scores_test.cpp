@@ -48,7 +48,7 @@ TEST_CASE("mark_scores: an owner's figures are those of measure") {
   const auto cameras = cameras_of(owner.field);
   const auto measured =
       watermark::measure(owner, nullptr, nullptr, {.cameras = cameras, .under = {"noise_0.1"}, .seed = 7});
-  const TrainedOwner trained{.owner = owner, .field = {}};
+  const TrainedOwner trained{.owner = owner};
   const auto scores = score_mark(owner.field, marked_scene(trained, 7),
                                  {.cameras = cameras, .under = {"noise_0.1"}, .seed = 7});
   CHECK(scores.accuracy == Approx(measured.accuracy.blind).epsilon(1e-12));

@@ -138,8 +138,8 @@ TEST_CASE("safetensors: a tensor that does not fit its bytes is an error") {
   CHECK_THAT(error(kF32, "[2]", "[-8,0]"), Contains("found [-8,0]"));
   CHECK_THAT(error(kF32, "[2]", "[0,8,8]"), Contains("expected [begin, end]"));
   CHECK_THAT(error(kF32, "[3]", "[0,8]"), Contains("expected 12 bytes for F32 [3], found 8"));
-  CHECK_THAT(error(kF32, "[2.0]", "[0,8]"), Contains("expected whole numbers"));
-  CHECK_THAT(error(kF32, "[-2]", "[0,8]"), Contains("expected whole numbers"));
+  CHECK_THAT(error(kF32, "[2.0]", "[0,8]"), Contains("expected integers"));
+  CHECK_THAT(error(kF32, "[-2]", "[0,8]"), Contains("expected integers"));
   CHECK_THAT(error(kF32, "2", "[0,8]"), Contains("expected an array of at most 5 extents, found 2"));
   CHECK_THAT(error(kF32, "[1,1,1,1,1,2]", "[0,8]"), Contains("at most 5 extents"));
   // 2^62 elements of 4 bytes are 0 modulo 2^64, as are 2^32 * 2^32.

@@ -82,7 +82,7 @@ TEST_CASE("image: files that are no image are errors with path, size and reason"
   CHECK_THROWS_WITH(read_image(path), "[read] " + path + ": open failed: No such file or directory");
   write_file_atomically(path, "not an image");
   CHECK_THROWS_WITH(read_image(path), "[read_image] " + path +
-                                          ": expected a PNG or JPEG image, found 13 bytes that do "
+                                          ": expected a PNG or JPEG image, found 12 bytes that do "
                                           "not decode: unknown image type");
   write_file_atomically(path, "");
   CHECK_THROWS_WITH(read_image(path), Contains("found 0 bytes"));

@@ -89,5 +89,5 @@ TEST_CASE("camera: errors name argument and value") {
                     Contains("[look_at] eye and target must be finite and apart"));
   CHECK_THROWS_AS(look_at({nan, 2, 3}, {1, 2, 3}, {0, 0, 1}), ValueError);
   float out[3];
-  CHECK_THROWS_WITH(camera_rays(c, std::vector<float>{1, 2, 3}, out, out), Contains("got 3 numbers"));
+  CHECK_THROWS_WITH(camera_rays(c, std::vector<float>{1, 2, 3}, out, out), Contains("got 3 elements"));
 }

@@ -52,7 +52,7 @@ TEST_CASE("result_chart: fields and embeddings, the default with a ring") {
   CHECK_THAT(result_chart("embed-curves", embed), Contains(">default<") && !Contains("patch"));
 }
 
-TEST_CASE("write_charts writes the companion beside the chart; an unknown chart is refused") {
+TEST_CASE("write_charts writes the companion beside the chart, and an unknown chart is refused") {
   const TemporaryFolder folder;
   CHECK(chart_files("attacks", folder / "a.svg") == Words{folder / "a.svg", folder / "a-fields.svg"});
   CHECK(chart_files("field", "a.svg") == Words{"a.svg"});
