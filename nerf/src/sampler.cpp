@@ -15,14 +15,16 @@ constexpr Index kLeastWave = 4, kMostWave = 16, kWaveSamples = 192;
 }  // namespace
 
 void check_rays(const char* op, const RayBatch& rays, std::span<const float> jitter, float step) {
-  const std::string where = "[" + std::string(op) + "] ";
-  if (!(step > 0)) throw ValueError(where + "step must be positive, got " + std::to_string(step));
+  const auto where = [op] {
+    return "[" + std::string(op) + "] ";
+  };  // only for an error: steps allocate nothing
+  if (!(step > 0)) throw ValueError(where() + "step must be positive, got " + std::to_string(step));
   if (rays.origins.size() != rays.directions.size() || rays.origins.size() % 3 != 0)
-    throw ShapeError(where + "origins and directions must both be [R, 3], got " +
+    throw ShapeError(where() + "origins and directions must both be [R, 3], got " +
                      std::to_string(rays.origins.size()) + " and " + std::to_string(rays.directions.size()) +
                      " elements");
   if (!jitter.empty() && static_cast<Index>(jitter.size()) != rays.size())
-    throw ShapeError(where + "jitter must have one element a ray (" + std::to_string(rays.size()) +
+    throw ShapeError(where() + "jitter must have one element a ray (" + std::to_string(rays.size()) +
                      "), got " + std::to_string(jitter.size()));
 }
 

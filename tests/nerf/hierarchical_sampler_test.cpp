@@ -149,5 +149,5 @@ TEST_CASE("hierarchical_sampler: errors name argument and what came") {
   CHECK_THROWS_WITH(sampler.spread(grid, rays.batch(), {}, 0, {}, out), Contains("step must be positive"));
   const RaySamples first = spread(sampler, grid, {.average = 4});
   CHECK_THROWS_WITH(sampler.refine(rays.batch(), first, std::vector<float>(3), out),
-                    Contains("must be of the 12 samples that spread() gave, got 12 and 3"));
+                    Contains("must be of the 12 samples of spread(), got 12 and 3"));
 }

@@ -83,6 +83,6 @@ TEST_CASE("importance_points: errors name sizes") {
       importance_points<double>(edge, weight, u, out),
       Contains("[importance_points] edge must have one element more than weight") && Contains("got 3 and 3"));
   CHECK_THROWS_WITH(importance_points<double>(edge, std::span(weight).first(2), u, out),
-                    "[importance_points] out must have the 2 numbers of u, got 1");
+                    "[importance_points] out must have the 2 elements of u, got 1");
   CHECK_THROWS_AS(importance_points<double>(std::span(edge).first(1), {}, {}, {}), ShapeError);
 }

@@ -136,5 +136,5 @@ TEST_CASE("sampler: errors name argument and what came") {
   Rays odd = rays;
   odd.directions.pop_back();
   CHECK_THROWS_WITH(sample(f, odd, {}),
-                    "[sampler] origins and directions must both be [R, 3], got 6 and 5 numbers");
+                    "[sampler] origins and directions must both be [R, 3], got 6 and 5 elements");
 }

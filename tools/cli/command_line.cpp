@@ -14,6 +14,10 @@ std::string fault_of_number(const std::string& text) {
   return "";
 }
 
+std::string fault_of_unsigned(const std::string& text) {
+  return text.starts_with('-') ? "expected a whole number from 0, got " + text : "";
+}
+
 }  // namespace
 
 Option Option::required() { return option_->required(), *this; }
@@ -48,6 +52,7 @@ Option CommandLine::add_option(const std::string& name, T& value, const std::str
   Option option(app_->add_option(name, value, help));
   constexpr bool texts = std::is_same_v<T, std::string> || std::is_same_v<T, std::vector<std::string>>;
   if constexpr (!texts) option.check(fault_of_number);
+  if constexpr (std::is_unsigned_v<T>) option.check(fault_of_unsigned);
   return option;
 }
 template Option CommandLine::add_option(const std::string&, std::string&, const std::string&);

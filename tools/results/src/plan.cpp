@@ -46,7 +46,6 @@ void expand(const Words& lines, std::size_t begin, std::size_t end, Words& out) 
       if (values.size() != names.size())
         throw ValueError("[expanded] loop: expected " + std::to_string(names.size()) + " values a turn in '" +
                          lines[i] + "', got '" + turn + "'");
-      for (std::string& value : values) std::ranges::replace(value, '~', ' ');
       Words body(lines.begin() + static_cast<std::ptrdiff_t>(i) + 1,
                  lines.begin() + static_cast<std::ptrdiff_t>(close));
       for (std::string& line : body)
@@ -66,6 +65,7 @@ Words expanded(std::string_view text) {
   std::istringstream in{std::string(text)};
   for (std::string line; std::getline(in, line);) lines.push_back(line);
   expand(lines, 0, lines.size(), out);
+  for (std::string& line : out) std::ranges::replace(line, '~', ' ');
   return out;
 }
 
