@@ -75,7 +75,7 @@ TEST_CASE("extractor_attack: images of a field are novel views that differ on th
   CHECK(data.views[0].rgba.data != data.views[1].rgba.data);
   CHECK_THROWS_WITH(
       renders_against_extractor(owner, owner.field, 2, options, [](Index, Index) { return false; }),
-      Contains("stopped while images were turned"));
+      Contains("stopped while attacking the extractor"));
 }
 
 TEST_CASE("extractor_attack: the same bits for any thread count") {

@@ -53,8 +53,8 @@ TEST_CASE("evidence_record: the members of the text are these") {
   for (const auto& [key, value] : json.items()) names += key + " ";
   CHECK(
       names ==
-      "cells commitment commit controls files format found fpr isa message message_bits owner_sha256 images "
-      "public_key reading seed together wrong_keys ");
+      "cells commit commitment controls files format found fpr images isa message message_bits owner_sha256 "
+        "public_key reading seed together wrong_keys ");
   names = "";
   for (const auto& [key, value] : json["images"][0].items()) names += key + " ";
   CHECK(names ==

@@ -20,7 +20,11 @@ double number(const Json& row, const char* key) {
   return found == row.end() || found->is_null() ? std::nan("") : found->get<double>();
 }
 
-std::string text(const Json& row, const char* key) { return row.at(key).get<std::string>(); }
+// A setting may be a word or a number.
+std::string text(const Json& row, const char* key) {
+  const Json& value = row.at(key);
+  return value.is_string() ? value.get<std::string>() : value.dump();
+}
 
 template <class... T>
 std::string printed(const char* format, T... values) {
