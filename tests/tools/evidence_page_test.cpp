@@ -43,7 +43,7 @@ TEST_CASE("evidence_page: verdict, limits, figures and images, in tags that clos
   CHECK(page == small_page());
   CHECK(open_tags(page).empty());
   for (const char* text :
-       {"The mark was found", "What this does not prove", "fixed before the field", "view_0.png",
+       {"The mark was found", "What this does not prove", "time-stamped before the field", "view_0.png",
         "view_1.png", "Wrong keys", "class=\"mark\"", "fieldmark check", "lang=\"en\"", "scope=\"col\""}) {
     CHECK_THAT(page, Contains(text));
   }

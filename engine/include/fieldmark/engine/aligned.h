@@ -13,8 +13,9 @@ void free_aligned(void* p) noexcept;
 /// allocate_aligned() for containers.
 template <class T>
 struct AlignedAllocator {
-  using value_type = T;
+  using value_type = T;  ///< of the elements
   AlignedAllocator() = default;
+  /// Allocators of all types are alike.
   template <class U>
   AlignedAllocator(const AlignedAllocator<U>&) noexcept {}
   /// Uninitialised memory for n objects. @throws std::bad_alloc

@@ -18,6 +18,7 @@ class Shape {
   Shape() = default;
   /// @param dims  extents, the slowest axis first, at most kMaxRank of them (not checked)
   Shape(std::initializer_list<Index> dims) : Shape(std::span(dims.begin(), dims.size())) {}
+  /// The same of a list whose length is known only when the program runs.
   explicit Shape(std::span<const Index> dims) : rank_(static_cast<int>(dims.size())) {
     for (std::size_t k = 0; k < dims.size(); ++k) dims_[k] = dims[k];
   }

@@ -63,6 +63,7 @@ class TrainingRun {
   void restore(const std::filesystem::path& path);
 
  protected:
+  /// @throws ValueError if an option is out of range
   explicit TrainingRun(const ScheduleOptions& schedule);
   /// Trains the parameters of a store, which must outlive the run and get no more of them.
   /// @param adam  with a step size of 1: the schedule has the step sizes   @param prefix  of their names in

@@ -38,6 +38,7 @@ struct FieldSamplingOptions {
 class FieldSampler {
  public:
   FieldSampler();
+  /// Takes the buffers of another sampler.
   FieldSampler(FieldSampler&&) noexcept;
   ~FieldSampler();
 

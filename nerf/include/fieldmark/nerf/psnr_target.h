@@ -7,7 +7,8 @@ namespace fieldmark::nerf {
 /// Stops a training early, once its field reaches a PSNR.
 class PsnrTarget {
  public:
-  static constexpr Index kViews = 4, kEvery = 250;  ///< held-out views that count; steps between evaluations
+  static constexpr Index kViews = 4;    ///< held-out views that count
+  static constexpr Index kEvery = 250;  ///< steps between evaluations
   /// @param psnr  dB; 0 never stops   @param held_out  views to evaluate; none: the PSNR of the training rays
   /// counts
   PsnrTarget(const RadianceField& field, double psnr, std::optional<Dataset> held_out);

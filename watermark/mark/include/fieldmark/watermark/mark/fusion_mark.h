@@ -37,6 +37,7 @@ class PooledMark : public Mark {
   const extractor::PooledExtractor<float>& reader() const { return reader_; }
 
  protected:
+  /// @param reader  network that reads the message   @param training  weights of the loss
   PooledMark(extractor::PooledExtractor<float> reader, const PooledTrainingOptions& training)
       : reader_(std::move(reader)), training_(training) {}
   /// Prepares the training images of the views, which must outlive the result, like the owner.
