@@ -89,7 +89,7 @@ TEST_CASE("gradcheck --numerics: every hard case within its limit, on each instr
     CHECK(row["numbers"].get<long>() > 0);
     CHECK(row.contains("v3") == (isa_supported() >= Isa::v3));
   }
-  CHECK(modules == std::set<std::string>{"distort", "engine", "extractor", "nerf", "watermark"});
+  CHECK(modules == std::set<std::string>{"distort", "engine", "extractor", "imaging", "nerf", "watermark"});
   CHECK_THAT(read_text(folder / "numerics.md"), Contains("composite: a last interval of 1e10"));
   CHECK(run_command({"gradcheck", "--numerics", "--only", "no such case"}).code == cli::kUsage);
 }
