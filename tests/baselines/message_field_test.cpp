@@ -9,6 +9,7 @@
 
 #include "nerf/small_field.h"
 #include "support/catch.h"
+#include "support/worst.h"
 #include "watermark/dense_by_loops.h"
 
 using namespace fieldmark;
@@ -46,8 +47,7 @@ struct Made {
 double worst(const std::vector<float>& a, const std::vector<float>& b) {
   REQUIRE(a.size() == b.size());
   double most = 0;
-  for (std::size_t i = 0; i < a.size(); ++i)
-    most = std::max(most, std::abs(static_cast<double>(a[i] - b[i])));
+  for (std::size_t i = 0; i < a.size(); ++i) raise_to(most, std::abs(static_cast<double>(a[i] - b[i])));
   return most;
 }
 

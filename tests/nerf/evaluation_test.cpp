@@ -14,7 +14,7 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-// TrainingImages of the field itself, with its opacity as alpha, brightened by `error`.
+// Images of the field itself, with its opacity as alpha, brightened by `error`.
 Dataset images(const RadianceField& field, int views, float error, Index height = 16) {
   Dataset data{.name = "self", .split = "test", .background = field.background, .views = {}};
   Renderer renderer(field);

@@ -10,6 +10,7 @@
 #include "some_rays.h"
 #include "support/catch.h"
 #include "support/each_isa.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using namespace fieldmark::nerf;
@@ -70,7 +71,7 @@ TEST_CASE(
     const Seen want = look(f, s.position, directions_of(rays, s));
     double worst = 0;
     for (std::size_t i = 0; i < want.sigma.size(); ++i)
-      worst = std::max(worst, std::abs(static_cast<double>(s.sigma[i]) / want.sigma[i] - 1));
+      raise_to(worst, std::abs(static_cast<double>(s.sigma[i]) / want.sigma[i] - 1));
     CHECK(worst < 1e-4);
   });
 }
@@ -135,8 +136,7 @@ TEST_CASE("field_sampler: an image of an mlp field is the quadrature in double, 
                   std::span<const Index>(s.ray_begin));
     double worst = 0;
     for (Index i = 0; i < 600; ++i)
-      worst =
-          std::max(worst, std::abs(static_cast<double>(got[static_cast<std::size_t>(i)]) - want.value()[i]));
+      raise_to(worst, std::abs(static_cast<double>(got[static_cast<std::size_t>(i)]) - want.value()[i]));
     CHECK(worst < 1e-4);
   }
 }

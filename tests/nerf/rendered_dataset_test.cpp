@@ -6,6 +6,7 @@
 
 #include "nerf/small_field.h"
 #include "support/catch.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using namespace fieldmark::nerf;
@@ -27,7 +28,7 @@ TEST_CASE("rendered_dataset: over the background its images are the field's") {
       const Tensor<float> again = composited(v, background);
       double worst = 0;
       for (Index k = 0; k < again.size(); ++k)
-        worst = std::max(worst, std::abs(static_cast<double>(again[k] - r.rgb[k])));
+        raise_to(worst, std::abs(static_cast<double>(again[k] - r.rgb[k])));
       // Half a level of the colour, half a level of alpha times a difference of at most 1.
       CHECK(worst < 1.01 / 255);
       for (Index p = 0; p < r.opacity.size(); ++p)

@@ -8,6 +8,7 @@
 #include "small_field.h"
 #include "support/catch.h"
 #include "support/each_isa.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using namespace fieldmark::nerf;
@@ -62,10 +63,10 @@ double worst_error(const RadianceField& f, const Rendering& view, const Camera& 
     for (Index x = 0; x < camera.width; ++x) {
       const auto want = reference.trace(pixel_ray(camera, static_cast<double>(x), static_cast<double>(y)));
       const Index pixel = y * camera.width + x;
-      worst = std::max(worst, std::abs(static_cast<double>(view.opacity[pixel]) - want[3]));
+      raise_to(worst, std::abs(static_cast<double>(view.opacity[pixel]) - want[3]));
       for (Index k = 0; k < 3; ++k)
-        worst = std::max(worst, std::abs(static_cast<double>(view.rgb[3 * pixel + k]) -
-                                         (want[static_cast<std::size_t>(k)] + (1 - want[3]) * background)));
+        raise_to(worst, std::abs(static_cast<double>(view.rgb[3 * pixel + k]) -
+                                 (want[static_cast<std::size_t>(k)] + (1 - want[3]) * background)));
     }
   return worst;
 }
@@ -104,14 +105,13 @@ TEST_CASE("renderer: a pixel of several rays is the mean of what they see, in do
         for (std::size_t k = 0; k < 4; ++k) mean[k] += seen[k] / (kRays * kRays);
       }
       const Index pixel = y * camera.width + x;
-      worst = std::max(worst, std::abs(static_cast<double>(view.opacity[pixel]) - mean[3]));
+      raise_to(worst, std::abs(static_cast<double>(view.opacity[pixel]) - mean[3]));
       for (Index k = 0; k < 3; ++k)
-        worst = std::max(worst, std::abs(static_cast<double>(view.rgb[3 * pixel + k]) -
-                                         (mean[static_cast<std::size_t>(k)] + (1 - mean[3]))));
+        raise_to(worst, std::abs(static_cast<double>(view.rgb[3 * pixel + k]) -
+                                 (mean[static_cast<std::size_t>(k)] + (1 - mean[3]))));
     }
   CHECK(worst < 1e-4);
-  CHECK_THROWS_WITH(Renderer(f, {.supersampling = -1}),
-                    "[renderer] supersampling must be 0 to 8, got -1");
+  CHECK_THROWS_WITH(Renderer(f, {.supersampling = -1}), "[renderer] supersampling must be 0 to 8, got -1");
   CHECK_THROWS_AS(Renderer(f, {.supersampling = 9}), ValueError);
 }
 
@@ -133,8 +133,8 @@ TEST_CASE("renderer: bf16 shows the same image within its rounding") {
   }
   Renderer rounded(f, {.precision = Precision::bf16});
   const auto a = plain.render(camera).rgb.data, b = rounded.render(camera).rgb.data;
-  float worst = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) worst = std::max(worst, std::abs(a[i] - b[i]));
+  double worst = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) raise_to(worst, std::abs(a[i] - b[i]));
   CHECK(worst > 0);
   CHECK(worst < 0.01f);
 }
@@ -174,8 +174,8 @@ TEST_CASE("renderer: finer steps come closer to the integral") {
   const auto want = exact.render(camera).rgb.data;
   const auto worst = [&](Renderer& renderer) {
     const auto got = renderer.render(camera).rgb.data;
-    float error = 0;
-    for (std::size_t i = 0; i < want.size(); ++i) error = std::max(error, std::abs(got[i] - want[i]));
+    double error = 0;
+    for (std::size_t i = 0; i < want.size(); ++i) raise_to(error, std::abs(got[i] - want[i]));
     return error;
   };
   CHECK(worst(usual) < 0.7f * worst(coarse));

@@ -7,6 +7,7 @@
 #include "some_rays.h"
 #include "support/catch.h"
 #include "support/each_isa.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using namespace fieldmark::nerf;
@@ -64,7 +65,7 @@ TEST_CASE("sampler: densities equal the field's in double within 1e-4, on each i
     REQUIRE(s.size() > 500);
     double worst = 0;
     for (std::size_t i = 0; i < want.size(); ++i)
-      worst = std::max(worst, std::abs(static_cast<double>(s.sigma[i]) / want[i] - 1));
+      raise_to(worst, std::abs(static_cast<double>(s.sigma[i]) / want[i] - 1));
     CHECK(worst < 1e-4);
   });
 }

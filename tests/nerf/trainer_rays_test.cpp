@@ -19,7 +19,7 @@ namespace {
 
 constexpr Index kSize = 24, kParts = 8;
 
-// TrainingImages whose pixels are the means of kParts x kParts of the scene's, colours by alpha.
+// Training images whose pixels are the means of kParts x kParts of the scene's, colours by alpha.
 Dataset blurred_scene(Index views = 12, const char* split = "train") {
   Dataset data = make_scene({.size = kSize * kParts, .views = views}, split);
   for (View& v : data.views) {
@@ -155,4 +155,21 @@ TEST_CASE("trainer_rays: errors name option and value") {
   RadianceField original(mlp);
   CHECK_THROWS_WITH(Trainer(original, data, train_options(1, 0)),
                     "[trainer] field must be a hash field to have supersampling, got an mlp field");
+}
+
+TEST_CASE("trainer_rays: a step has the least rays however many samples they have") {
+  // All cells occupied: a ray has so many samples that 1024 of them are a few rays.
+  const Dataset data = make_scene({.size = 48, .views = 12});
+  const auto samples_of = [&](Index least) {
+    RadianceField field(small_field_options());
+    Trainer trainer(
+        field, data,
+        {.schedule = {.steps = 1}, .samples_per_step = 1024, .first_samples = 1024, .least_rays = least});
+    trainer.step(0);
+    return trainer.samples();
+  };
+  const double few = samples_of(64), many = samples_of(256);
+  CHECK(few > 0);
+  CHECK(many > 3 * few);
+  CHECK(many < 5 * few);
 }

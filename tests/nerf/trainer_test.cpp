@@ -351,23 +351,6 @@ TEST_CASE("trainer: errors name option and value") {
                     "[trainer] data must have at least one view");
 }
 
-TEST_CASE("trainer: a step has the least rays however many samples they have") {
-  // All cells occupied: a ray has so many samples that 1024 of them are a few rays.
-  const auto samples_of = [](Index least) {
-    RadianceField field(small_field_options());
-    TrainOptions options = train_options(1);
-    options.samples_per_step = options.first_samples = 1024;
-    options.least_rays = least;
-    Trainer trainer(field, scene(), options);
-    trainer.step(0);
-    return trainer.samples();
-  };
-  const double few = samples_of(64), many = samples_of(256);
-  CHECK(few > 0);
-  CHECK(many > 3 * few);
-  CHECK(many < 5 * few);
-}
-
 TEST_CASE("trainer: a run gets a field that it can fill") {
   using Case = std::tuple<ScheduleOptions, int, double, Index>;
   const HashEncodingOptions middle{};

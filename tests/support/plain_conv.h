@@ -79,7 +79,7 @@ double plain_error(const PlainImage& want, const T* y) {
       const double w = want.x[static_cast<std::size_t>(c * want.h * want.w + p)];
       const double d = std::abs(static_cast<double>(y[p * want.c + c]) - w);
       raise_to(off, d);
-      most = std::max(most, std::abs(w));
+      raise_to(most, std::abs(w));
     }
   return off / most;
 }

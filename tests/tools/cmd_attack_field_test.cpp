@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/cli.h"
+#include "support/worst.h"
 #include "tools/tiny_scene.h"
 
 using namespace fieldmark;
@@ -54,8 +55,7 @@ TEST_CASE("attack-field with other fields, and their absence", "[attack-field]")
   const auto plain = nerf::RadianceField::load(field), undone = nerf::RadianceField::load(out);
   double worst = 0;
   for (std::size_t i = 0; i < plain.params.values().size(); ++i)
-    worst =
-        std::max(worst, std::abs(static_cast<double>(plain.params.values()[i] - undone.params.values()[i])));
+    raise_to(worst, std::abs(static_cast<double>(plain.params.values()[i] - undone.params.values()[i])));
   CHECK(worst < 1e-6);
   REQUIRE(run({"--attack", "average_0.5", "--other", field}).code == cli::kOk);
   for (const auto& words : std::vector<std::vector<std::string>>{{"--attack", "average_0.5"},

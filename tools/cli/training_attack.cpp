@@ -53,7 +53,7 @@ nerf::RadianceField start(const std::string& name, const nerf::RadianceField& fi
   if (name != "retrain") return field;
   if (field.space.kind == nerf::SpaceKind::ndc)
     throw UsageError(
-        "--distort retrain: a forward-facing field's images do not say how near its scene begins");
+        "--attack retrain: a forward-facing field's images do not say how near its scene begins");
   nerf::RadianceFieldOptions sizes = field.options();
   sizes.seed = context.seed() + 62;
   return nerf::RadianceField(sizes);

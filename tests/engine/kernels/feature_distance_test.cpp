@@ -46,7 +46,7 @@ TEST_CASE("kernels/feature_distance: float equals a plain loop in double for eve
       double worst = 0, most = 1;
       for (std::size_t i = 0; i < da.size(); ++i) {
         raise_to(worst, std::abs(static_cast<double>(da[i]) - 1 - 0.5 * gradient[i]));
-        most = std::max(most, std::abs(gradient[i]));
+        raise_to(most, std::abs(gradient[i]));
       }
       CHECK(worst < 2e-6 * most);
     });

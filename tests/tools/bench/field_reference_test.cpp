@@ -7,6 +7,7 @@
 
 #include "nerf/small_field.h"
 #include "support/catch.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using namespace fieldmark::bench;
@@ -83,7 +84,7 @@ TEST_CASE(
                                                       static_cast<double>(p / camera.width)),
                                       90, occupancy);
         for (std::size_t a = 0; a < 4; ++a)
-          worst = std::max(worst, std::abs(got[static_cast<std::size_t>(4 * p) + a] - want[a]));
+          raise_to(worst, std::abs(got[static_cast<std::size_t>(4 * p) + a] - want[a]));
         opacity = std::max(opacity, want[3]);
       }
       CHECK(worst < 1e-11);

@@ -8,6 +8,7 @@
 
 #include "nerf/small_field.h"
 #include "support/catch.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using namespace fieldmark::nerf;
@@ -154,8 +155,8 @@ TEST_CASE("field_attack: whole numbers are the nearest multiples, one scale a te
       for (std::size_t i = begin; i < end; ++i) largest = std::max(largest, std::abs(double(w[i])));
       const double scale = largest / most;
       for (std::size_t i = begin; i < end; ++i) {
-        worst = std::max(worst, std::abs(double(q[i]) - double(w[i])));
-        off = std::max(off, std::abs(double(q[i]) / scale - std::round(double(q[i]) / scale)));
+        raise_to(worst, std::abs(double(q[i]) - double(w[i])));
+        raise_to(off, std::abs(double(q[i]) / scale - std::round(double(q[i]) / scale)));
       }
       CHECK(worst <= 0.5000001 * scale);
       CHECK(off < 1e-5);  // 127 with the rounding of a float

@@ -8,6 +8,7 @@
 
 #include "nerf/small_field.h"
 #include "support/catch.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using namespace fieldmark::watermark;
@@ -67,7 +68,7 @@ TEST_CASE("embed_views: novel cameras, each through the object's window, nothing
     CHECK(v.camera.width == size.width);
     double worst = 0;
     for (Index k = 0; k < v.base.size(); ++k)
-      worst = std::max(worst, static_cast<double>(std::abs(v.base[k] - want.rgb[k])));
+      raise_to(worst, static_cast<double>(std::abs(v.base[k] - want.rgb[k])));
     CHECK(worst < 1e-5);
     for (Index p = 0; p < v.opacity.size(); ++p) {
       CAPTURE(i, p);

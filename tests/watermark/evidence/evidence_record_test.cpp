@@ -51,18 +51,17 @@ TEST_CASE("evidence_record: the members of the text are these") {
   const Json json = Json::parse(small_text());
   std::string names;
   for (const auto& [key, value] : json.items()) names += key + " ";
-  CHECK(
-      names ==
-      "cells commit commitment controls files format found fpr images isa message message_bits owner_sha256 "
+  CHECK(names ==
+        "cells claim commit controls files format found fpr isa message message_bits owner_sha256 pictures "
         "public_key reading seed together wrong_keys ");
   names = "";
-  for (const auto& [key, value] : json["images"][0].items()) names += key + " ";
+  for (const auto& [key, value] : json["pictures"][0].items()) names += key + " ";
   CHECK(names ==
         "bits confidences decided_bits height logits matching_bits name p_value p_value_bits "
         "p_value_bits_two_sided p_value_two_sided sha256 statistic width ");
   CHECK(json["format"] == "fieldmark evidence 1");
   CHECK(json["message"] == "b");
-  CHECK(json["images"][0]["bits"] == "1011");
+  CHECK(json["pictures"][0]["bits"] == "1011");
   CHECK(json["wrong_keys"]["n"] == 200);
   CHECK(json["wrong_keys"]["counts"].size() == 8);
   CHECK(json["wrong_keys"]["intervals_99"]["1e-1"] == Json{10, 32});  // Python's fractions
@@ -89,9 +88,9 @@ TEST_CASE("evidence_record: figures that do not follow from each other are refus
   refused("/fpr", 1e-9, "the decision does not follow");
   refused("/together/p_value", 1e-9, "p_value does not follow");
   refused("/together/statistic", 2.0, "p_value does not follow");
-  refused("/images/1/p_value_two_sided", 0.5, "p_value_two_sided does not follow");
+  refused("/pictures/1/p_value_two_sided", 0.5, "p_value_two_sided does not follow");
   refused("/controls/0/together/p_value_bits", 1e-3, "p_value_bits does not follow");
-  refused("/controls/1/images/0/p_value_bits_two_sided", 1e-3, "p_value_bits_two_sided does not follow");
+  refused("/controls/1/pictures/0/p_value_bits_two_sided", 1e-3, "p_value_bits_two_sided does not follow");
   refused("/together/matching_bits", 3, "matching bits does not follow");
   refused("/together/bits", "10", "as many bits");
   refused("/format", "something", "expected the format");
@@ -100,7 +99,7 @@ TEST_CASE("evidence_record: figures that do not follow from each other are refus
   refused("/message_bits", 4.5, "expected a whole number");
   refused("/message_bits", std::numeric_limits<std::int64_t>::max(), "expected a whole number");
   refused("/together/decided_bits", -1, "expected a whole number");
-  refused("/images", 5, "expected evidence");
+  refused("/pictures", 5, "expected evidence");
   refused("/files", "report.html", "expected evidence");
 }
 

@@ -7,6 +7,7 @@
 
 #include "support/catch.h"
 #include "support/random.h"
+#include "support/worst.h"
 #include "watermark/test_key.h"
 
 using namespace fieldmark;
@@ -143,9 +144,9 @@ TEST_CASE("evidence: p-value of matching bits, against Pascal's triangle and exa
   double worst = 0;
   for (Index n : {0, 1, 2, 7, 16, 48, 64, 255}) {
     for (Index k = 0; k <= n; ++k) {
-      worst = std::max(worst, std::abs(p_value_bits(k, n) / static_cast<double>(tail(k, n)) - 1));
+      raise_to(worst, std::abs(p_value_bits(k, n) / static_cast<double>(tail(k, n)) - 1));
       const auto both = 2 * k == n ? 1.0 : static_cast<double>(2 * tail(std::max(k, n - k), n));
-      worst = std::max(worst, std::abs(p_value_bits_two_sided(k, n) / both - 1));
+      raise_to(worst, std::abs(p_value_bits_two_sided(k, n) / both - 1));
     }
   }
   CHECK(worst < 1e-15);

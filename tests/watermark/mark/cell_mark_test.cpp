@@ -8,18 +8,12 @@
 #include "support/catch.h"
 #include "support/random.h"
 #include "support/temporary_folder.h"
+#include "support/worst.h"
+#include "watermark/marked_colours.h"
 #include "watermark/small_owner.h"
 
 using namespace fieldmark;
 using namespace fieldmark::watermark;
-
-namespace {
-std::vector<float> marked(const Owner& owner, const std::vector<std::int8_t>& signs, const Tensor<float>& x,
-                          std::vector<float> rgb) {
-  owner.marking(signs)(x.data.data(), x.data.data(), x.shape[0], rgb.data());
-  return rgb;
-}
-}  // namespace
 
 TEST_CASE("cell_mark: it adds g s P to colours, which stay in their range") {
   const Owner owner = small_owner();
@@ -36,8 +30,8 @@ TEST_CASE("cell_mark: it adds g s P to colours, which stay in their range") {
   for (Index i = 0; i < 3 * n; ++i) {
     const float want =
         std::clamp(rgb[i] + 0.05f * s[static_cast<std::size_t>(i / 3)] * p.value()[i], 0.f, 1.f);
-    worst = std::max(worst, std::abs(static_cast<double>(want - got[static_cast<std::size_t>(i)])));
-    most = std::max(most, std::abs(static_cast<double>(rgb[i] - got[static_cast<std::size_t>(i)])));
+    raise_to(worst, std::abs(static_cast<double>(want - got[static_cast<std::size_t>(i)])));
+    raise_to(most, std::abs(static_cast<double>(rgb[i] - got[static_cast<std::size_t>(i)])));
   }
   CHECK(worst < 1e-6);
   CHECK(most > 1e-3);

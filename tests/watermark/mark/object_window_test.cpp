@@ -9,6 +9,7 @@
 
 #include "nerf/small_field.h"
 #include "support/catch.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using namespace fieldmark::watermark;
@@ -138,8 +139,8 @@ TEST_CASE("object_window: the window's camera renders the pixels that are cut") 
   const Tensor<float> seen = renderer.render(inside).rgb;
   double worst = 0, spread = 0;
   for (Index i = 3 * 24 * 3; i < seen.size(); ++i) {  // the first three rows lie above the image
-    worst = std::max(worst, static_cast<double>(std::abs(seen[i] - cut[i])));
-    spread = std::max(spread, static_cast<double>(std::abs(seen[i] - seen[3 * 24 * 3])));
+    raise_to(worst, static_cast<double>(std::abs(seen[i] - cut[i])));
+    raise_to(spread, static_cast<double>(std::abs(seen[i] - seen[3 * 24 * 3])));
   }
   CHECK(worst < 1e-4);
   CHECK(spread > 0.05);
@@ -152,7 +153,7 @@ TEST_CASE("object_window: the window's camera renders the pixels that are cut") 
   const Tensor<float> rows = renderer.render(flat).rgb;
   REQUIRE(rows.shape == Shape{12, 24, 3});
   for (Index i = 0; i < rows.size(); ++i)
-    worst = std::max(worst, static_cast<double>(std::abs(rows[i] - seen[8 * 24 * 3 + i])));
+    raise_to(worst, static_cast<double>(std::abs(rows[i] - seen[8 * 24 * 3 + i])));
   CHECK(worst < 1e-4);
 }
 

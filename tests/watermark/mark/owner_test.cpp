@@ -10,18 +10,11 @@
 #include "support/catch.h"
 #include "support/random.h"
 #include "support/temporary_folder.h"
+#include "watermark/marked_colours.h"
 #include "watermark/small_owner.h"
 
 using namespace fieldmark;
 using namespace fieldmark::watermark;
-
-namespace {
-std::vector<float> marked(const Owner& owner, const std::vector<std::int8_t>& signs, const Tensor<float>& x,
-                          std::vector<float> rgb) {
-  owner.marking(signs)(x.data.data(), x.data.data(), x.shape[0], rgb.data());
-  return rgb;
-}
-}  // namespace
 
 TEST_CASE("owner: 20 dB fainter is a tenth of the amplitude, and presets without gain refuse") {
   Owner owner = small_owner();

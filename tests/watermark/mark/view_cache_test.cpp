@@ -6,6 +6,7 @@
 
 #include "nerf/small_field.h"
 #include "support/catch.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using namespace fieldmark::watermark;
@@ -41,16 +42,16 @@ TEST_CASE("view_cache: base and opacity are the renderer's, and samples put the 
   double base = 0, opacity = 0, composed = 0;
   Index empty = 0, seen = 0;
   for (Index p = 0; p < 23 * 18; ++p) {
-    opacity = std::max(opacity, std::abs(static_cast<double>(view.opacity[p] - want.opacity[p])));
+    raise_to(opacity, std::abs(static_cast<double>(view.opacity[p] - want.opacity[p])));
     const auto k = static_cast<std::size_t>(view.sample_begin[static_cast<std::size_t>(p)]);
     const bool some = view.sample_begin[static_cast<std::size_t>(p) + 1] > static_cast<std::int32_t>(k);
     CHECK(some == (want.opacity[p] >= 0.02f));
     ++(some ? seen : empty);
     for (Index a = 0; a < 3; ++a) {
-      base = std::max(base, std::abs(static_cast<double>(view.base[3 * p + a] - want.rgb[3 * p + a])));
+      raise_to(base, std::abs(static_cast<double>(view.base[3 * p + a] - want.rgb[3 * p + a])));
       if (!some) continue;
       const float w = view.weight[k], c = view.colour[3 * k + static_cast<std::size_t>(a)];
-      composed = std::max(composed, std::abs(static_cast<double>(w * c + (1 - w) - view.base[3 * p + a])));
+      raise_to(composed, std::abs(static_cast<double>(w * c + (1 - w) - view.base[3 * p + a])));
     }
   }
   CHECK(base < 1e-5);
@@ -111,12 +112,12 @@ TEST_CASE("view_cache: several samples of a ray are its heaviest parts, and few 
       double c = 1 - share(all);
       for (auto k = all.sample_begin[at(p)]; k < all.sample_begin[at(p + 1)]; ++k)
         c += static_cast<double>(all.weight[at(k)] * all.colour[at(3 * k + a)]);
-      composed = std::max(composed, std::abs(c - static_cast<double>(all.base[3 * p + a])));
+      raise_to(composed, std::abs(c - static_cast<double>(all.base[3 * p + a])));
       double mean = 0;
       for (auto k = all.sample_begin[at(p)]; k < all.sample_begin[at(p + 1)]; ++k)
         mean += static_cast<double>(all.weight[at(k)] * all.position[at(3 * k + a)]) / share(all);
       const auto only = 3 * Index{one.sample_begin[at(p)]} + a;
-      moved = std::max(moved, std::abs(mean - static_cast<double>(one.position[at(only)])));
+      raise_to(moved, std::abs(mean - static_cast<double>(one.position[at(only)])));
     }
   }
   CHECK(more > 20);

@@ -102,7 +102,7 @@ EmbedRow embedded(const nerf::RadianceField& field, const EmbedVariant& v, const
   Clock clock(cache.seconds);
   Owner owner = v.recipe.make(field, bench_key(), cache.views);
   watermark::Embedder embedder(owner, cache.views, v.recipe.embed);
-  const nerf::ScheduleOptions& length = v.recipe.embed.schedule;
+  const ScheduleOptions& length = v.recipe.embed.schedule;
   for (Index next = 1; !embedder.done();) {
     stop_or_go();
     embedder.step(clock.seconds());

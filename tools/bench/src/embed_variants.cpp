@@ -11,8 +11,7 @@ using watermark::MarkColours;
 
 constexpr Index kCells = 16;  // per axis, of every scene, so that rows of several scenes compare
 
-EmbedVariant base_variant(const char* preset, const nerf::ScheduleOptions& length, Index bits,
-                          std::uint64_t seed) {
+EmbedVariant base_variant(const char* preset, const ScheduleOptions& length, Index bits, std::uint64_t seed) {
   EmbedVariant v{.choice = "default",
                  .setting = "as embed does",
                  .recipe = watermark::embed_recipe(preset),
@@ -51,7 +50,7 @@ void lengths(Variants& all) {
   for (const auto& [name, factor] :
        {std::pair{"a quarter", 0.25}, std::pair{"half", 0.5}, std::pair{"twice", 2.0}})
     all.vary("length", name, [f = factor](EmbedVariant& v) {
-      nerf::ScheduleOptions& s = v.recipe.embed.schedule;
+      ScheduleOptions& s = v.recipe.embed.schedule;
       s.seconds *= f;
       s.steps = std::lround(f * static_cast<double>(s.steps));
     });
@@ -128,7 +127,7 @@ void training(Variants& all) {
 
 }  // namespace
 
-std::vector<EmbedVariant> embed_variants(const nerf::ScheduleOptions& length, Index bits, std::uint64_t seed,
+std::vector<EmbedVariant> embed_variants(const ScheduleOptions& length, Index bits, std::uint64_t seed,
                                          MarkColours colours) {
   EmbedVariant usual = base_variant("fast", length, bits, seed);
   watermark::use_colours(colours, usual.recipe.cell());

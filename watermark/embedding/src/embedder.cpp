@@ -201,7 +201,7 @@ std::string Embedder::fingerprint() const {
   const auto add = [&](const char* name, double value) {
     text += ", " + std::string(name) + " " + std::to_string(value);
   };
-  const nerf::ScheduleOptions& s = options_.schedule;
+  const ScheduleOptions& s = options_.schedule;
   add("lr", s.lr);
   add("half after", s.half_after);
   add("cooldown", s.cooldown);

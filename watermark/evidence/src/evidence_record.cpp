@@ -11,6 +11,8 @@ namespace {
 
 using Json = nlohmann::json;
 constexpr char kFormat[] = "fieldmark evidence 1";
+// Signed records keep the keys of version 0.1, so that old evidence still checks.
+constexpr char kCommitment[] = "claim", kImages[] = "pictures";
 
 Json score_json(const EvidenceScore& s) {
   std::vector<double> confidences;  // the format's name for 1 - p of each bit
@@ -45,7 +47,7 @@ Json controls_json(const std::vector<EvidenceControl>& controls) {
   for (const auto& control : controls)
     list.push_back({{"name", control.name},
                     {"meaning", control.meaning},
-                    {"images", images_json(control.images)},
+                    {kImages, images_json(control.images)},
                     {"together", score_json(control.together)}});
   return list;
 }
@@ -121,7 +123,7 @@ EvidenceSummary summary(const Json& j, std::string_view name) {
   EvidenceSummary s;
   s.signer = public_key_from_hex(j.at("public_key").get<std::string>());
   s.owner_sha256 = j.at("owner_sha256").get<std::string>();
-  s.commitment = j.at("commitment").get<std::string>();
+  s.commitment = j.at(kCommitment).get<std::string>();
   s.message = message_from_hex(j.at("message").get<std::string>(), whole_number(j.at("message_bits"), name));
   s.found = j.at("found").get<bool>();
   s.fpr = j.at("fpr").get<double>();
@@ -130,10 +132,10 @@ EvidenceSummary summary(const Json& j, std::string_view name) {
   s.p_value = j.at("together").at("p_value").get<double>();
   if (s.found != (s.p_value <= s.fpr) && !is_near(s.p_value, s.fpr))
     refuse(name, "the decision does not follow from the p-value");
-  s.images = checked_images(j.at("images"), s.message, name);
+  s.images = checked_images(j.at(kImages), s.message, name);
   for (const Json& control : j.at("controls")) {
     check_score(control.at("together"), s.message, name);
-    const auto more = checked_images(control.at("images"), s.message, name);
+    const auto more = checked_images(control.at(kImages), s.message, name);
     s.controls.insert(s.controls.end(), more.begin(), more.end());
   }
   return s;
@@ -146,7 +148,7 @@ std::string evidence_json(const EvidenceRecord& record, const PublicKey& signer,
   const Json json{{"format", kFormat},
                   {"public_key", to_hex(signer)},
                   {"owner_sha256", record.owner_sha256},
-                  {"commitment", record.commitment},
+                  {kCommitment, record.commitment},
                   {"message", to_hex(record.message)},
                   {"message_bits", record.message.size()},
                   {"reading", record.reading},
@@ -154,7 +156,7 @@ std::string evidence_json(const EvidenceRecord& record, const PublicKey& signer,
                   {"fpr", record.fpr},
                   {"cells", record.cells},
                   {"together", score_json(record.together)},
-                  {"images", images_json(record.images)},
+                  {kImages, images_json(record.images)},
                   {"controls", controls_json(record.controls)},
                   {"wrong_keys", record.wrong_keys ? wrong_keys_json(*record.wrong_keys) : Json(nullptr)},
                   {"seed", record.seed},

@@ -21,11 +21,11 @@ std::string packed_bits(const Message& message) {
 }  // namespace
 
 std::string soft_binding_json(const Message& message, std::string_view commitment) {
-  const Json parameters{{"bits", message.size()}, {"commitment", commitment}};
+  const Json parameters{{"bits", message.size()}, {"claim", commitment}};  // the key of version 0.1
   const Json block{{"scope", Json::object()}, {"value", base64_of(packed_bits(message))}};
   const Json data{
       {"alg", kSoftBindingAlgorithm},
-      {"name", "Message in the colours of a radiance field, read from its rendered images"},
+      {"name", "Message in the colours of a radiance field, read from its rendered pictures"},
       {"blocks", Json::array({block})},
       {"alg-params", base64_of(parameters.dump())},
       {"bindingMetadata",

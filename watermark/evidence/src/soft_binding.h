@@ -15,7 +15,7 @@ inline constexpr std::string_view kSoftBindingAlgorithm = "org.fieldmark.keyed-c
 ///   {"label": "c2pa.soft-binding", "data": {"alg", "name", "blocks": [{"scope": {}, "value"}], "alg-params",
 ///   "bindingMetadata": {"description"}}}
 /// value is base64 of the message's bits, most significant first, padded with zeros; alg-params is base64 of
-/// {"bits": N, "commitment": HEX}; the empty scope means the whole image. It holds neither key nor owner.
+/// {"bits": N, "claim": COMMITMENT}; the empty scope means the whole image. It holds neither key nor owner.
 /// Source: C2PA Technical Specification 2.x, section "Soft Binding".
 /// @param commitment  commitment()   @return canonical_json()
 std::string soft_binding_json(const Message& message, std::string_view commitment);

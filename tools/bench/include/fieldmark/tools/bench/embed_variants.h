@@ -19,7 +19,7 @@ struct EmbedVariant {
 /// set otherwise.
 /// @param length  of a run: its steps and seconds are kept   @param bits  of a message
 /// @param colours  that the scene's default is, see watermark::colours_for()
-std::vector<EmbedVariant> embed_variants(const nerf::ScheduleOptions& length, Index bits, std::uint64_t seed,
+std::vector<EmbedVariant> embed_variants(const ScheduleOptions& length, Index bits, std::uint64_t seed,
                                          watermark::MarkColours colours = watermark::MarkColours::blue);
 
 }  // namespace fieldmark::bench

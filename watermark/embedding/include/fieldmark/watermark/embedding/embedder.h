@@ -1,7 +1,7 @@
 #pragma once
 #include <fieldmark/engine/adam.h>
+#include <fieldmark/engine/schedule.h>
 #include <fieldmark/engine/sharded_loop.h>
-#include <fieldmark/nerf/schedule.h>
 #include <fieldmark/watermark/embedding/mark_psnr_meter.h>
 #include <fieldmark/watermark/mark/owner.h>
 
@@ -21,8 +21,7 @@ struct EmbedDistortions {
 /// Options of training that every kind of mark shares.
 struct EmbedOptions {
   /// Length of the run and step sizes.
-  nerf::ScheduleOptions schedule{
-      .seconds = 900, .lr = 2e-3, .half_after = 8000, .cooldown = 0.5, .last = 0.05};
+  ScheduleOptions schedule{.seconds = 900, .lr = 2e-3, .half_after = 8000, .cooldown = 0.5, .last = 0.05};
   Index batch = 4;                    ///< images a step, 1 to 64
   double extractor_lr = 1;            ///< step size of the extractor relative to the mark's, > 0
   EmbedDistortions distortions = {};  ///< of training images
@@ -77,7 +76,7 @@ class Embedder {
   Owner& owner_;
   std::span<const CachedView> views_;
   EmbedOptions options_;
-  nerf::Schedule schedule_;
+  Schedule schedule_;
   CounterRng choice_rng_, message_rng_, noise_rng_, shift_rng_;
   CellCode code_;
   std::unique_ptr<MarkTraining> training_;
