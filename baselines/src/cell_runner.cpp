@@ -62,7 +62,7 @@ struct CellRunner::Trained {
   std::shared_ptr<const nerf::RadianceField> unmarked;
   std::shared_ptr<const TrainedOwner> owner;
   MarkedScene marked;
-  std::filesystem::path checkpoint;    // of the run whose curve is shown
+  std::string curve;                   // of the network or mark, see TrainingRun::curve()
   std::map<std::string, double> more;  // for Cell::more
 };
 
@@ -109,8 +109,8 @@ const CellRunner::Scene& CellRunner::scene(const CellName& name) {
   return *scene_;
 }
 
-// A field of ground_truth, once: a later call or process finds it in the work folder.
-nerf::RadianceField CellRunner::trained_field(const std::string& stem, const nerf::Dataset& ground_truth,
+// A field of training images, once: a later call or process finds it in the work folder.
+nerf::RadianceField CellRunner::trained_field(const std::string& stem, const nerf::Dataset& images,
                                               const CellName& name, double seconds) {
   const auto path = options_.work / (stem + ".field"), checkpoint = options_.work / (stem + ".checkpoint");
   if (std::filesystem::exists(path)) return nerf::RadianceField::load(path);
@@ -121,19 +121,10 @@ nerf::RadianceField CellRunner::trained_field(const std::string& stem, const ner
   auto options = nerf::train_options(sizes.field.kind);
   options.schedule.seconds = seconds;
   options.seed = name.seed;
-  nerf::Trainer trainer(field, ground_truth, options);
-  timed_run({.what = stem,
-             .seconds = seconds,
-             .done = [&] { return trainer.done(); },
-             .step = [&](double now) { trainer.step(now); },
-             .steps = [&] { return trainer.steps(); },
-             .figure = [&] { return trainer.train_psnr(); },
-             .save = [&](const auto& to) { trainer.save(to); },
-             .restore = [&](const auto& from) { trainer.restore(from); },
-             .checkpoint = checkpoint},
-            options_.progress);
+  nerf::Trainer trainer(field, images, options);
+  timed_run(trainer, stem, seconds, checkpoint, options_.progress);
   field.save(path);
-  remove_run_files(checkpoint);
+  std::filesystem::remove(checkpoint);
   return nerf::RadianceField::load(path);  // as a later process will find it
 }
 
@@ -161,19 +152,12 @@ CellRunner::Trained CellRunner::train_hiding(const CellName& name, const Scene& 
   HidingTrainer trainer(*marker, crops, options);
   Trained trained;
   trained.unmarked = unmarked;
-  trained.checkpoint = options_.work / (std::string(hiding_name(system.kind)) + "-" + name.scene + "-" +
-                                        std::to_string(scene.size) + "-" + std::to_string(name.bits) + "-" +
-                                        std::to_string(name.seed) + ".checkpoint");
-  trained.seconds = timed_run({.what = trained.checkpoint.stem().string(),
-                               .seconds = options.schedule.seconds,
-                               .done = [&] { return trainer.done(); },
-                               .step = [&](double now) { trainer.step(now); },
-                               .steps = [&] { return trainer.steps(); },
-                               .figure = [&] { return trainer.figures().bits; },
-                               .save = [&](const auto& to) { trainer.save(to); },
-                               .restore = [&](const auto& from) { trainer.restore(from); },
-                               .checkpoint = trained.checkpoint},
+  const std::string stem = std::string(hiding_name(system.kind)) + "-" + name.scene + "-" +
+                           std::to_string(scene.size) + "-" + std::to_string(name.bits) + "-" +
+                           std::to_string(name.seed);
+  trained.seconds = timed_run(trainer, stem, options.schedule.seconds, options_.work / (stem + ".checkpoint"),
                               options_.progress);
+  trained.curve = trainer.curve();
   trained.steps = trainer.steps();
   const OwnScores own =
       own_scores(*marker, CropSource(images_of(scene.test), name.seed), kOwnImages, kOwnSize, name.seed);
@@ -211,9 +195,9 @@ CellRunner::Trained CellRunner::train(const CellName& name, const Scene& scene) 
   trained.steps = owned.steps;
   trained.seconds = owned.seconds;
   trained.unmarked = field;
+  trained.curve = owned.curve;
   trained.owner = std::make_shared<const TrainedOwner>(std::move(owned));
   trained.marked = marked_scene(*trained.owner, name.seed);
-  trained.checkpoint = checkpoint;
   return trained;
 }
 
@@ -298,7 +282,7 @@ MeasuredCell CellRunner::run(const CellName& name) {
             .under = s.under,
             .commit = o.commit,
             .more = more};
-  keep_curve(cell, run_curve(trained.checkpoint));
+  keep_curve(cell, trained.curve);
   return {.cell = cell, .image = tile(pair, 2, 0)};
 }
 

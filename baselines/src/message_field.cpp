@@ -21,8 +21,6 @@ constexpr Index kBlock = 256;     // rays of an image that is not recorded, at a
 constexpr float kTrainFiner = 1;  // samples as the base field was trained with
 constexpr const char* kName = "mark/";
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 MessageFieldOptions checked(const MessageFieldOptions& o, const nerf::RadianceField& base) {
   if (o.bits < 1 || o.width < 2)
     throw ValueError("[message_field] bits must be at least 1 and width at least 2, got " +

@@ -74,7 +74,12 @@ class MessageMark : public watermark::PooledMark {
   MessageMark(MessageField field, extractor::PooledExtractor<float> reader)
       : PooledMark(std::move(reader), {}), field_(std::move(field)) {}
   std::string preset() const override { return "message_field"; }
-  std::string configuration() const override { throw Error("[owner_system] a message field is not stored"); }
+  std::string configuration() const override {
+    const MessageFieldOptions& o = field_.options();
+    return std::string(R"({"bits":)") + std::to_string(o.bits) + R"(,"place":")" +
+           (o.place == MessagePlace::inputs ? "inputs" : "density") + R"(","width":)" +
+           std::to_string(o.width) + "}";
+  }
   nerf::Renderer::Recolour recolour(const Owner&, Signs) const override {
     throw ValueError("[owner_system] a message field marks more than colours");
   }
@@ -195,19 +200,12 @@ TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name,
       .owner = {field, recipe.owner, measuring_key(name.seed), recipe.grid(field, views), mark_maker(system)},
       .test_shift = system.test_shift};
   auto options = recipe.embed;
-  options.schedule.steps = 0;
+  options.schedule.steps = training.steps;
   options.schedule.seconds = training.seconds;
   watermark::Embedder embedder(trained.owner, views, options);
-  trained.seconds = timed_run({.what = trained_as(name).stem(),
-                               .seconds = training.seconds,
-                               .done = [&] { return embedder.done(); },
-                               .step = [&](double seconds) { embedder.step(seconds); },
-                               .steps = [&] { return embedder.steps(); },
-                               .figure = [&] { return embedder.figures().bits; },
-                               .save = [&](const auto& path) { embedder.save(path); },
-                               .restore = [&](const auto& path) { embedder.restore(path); },
-                               .checkpoint = training.checkpoint},
-                              training.progress);
+  trained.seconds =
+      timed_run(embedder, trained_as(name).stem(), training.seconds, training.checkpoint, training.progress);
+  trained.curve = embedder.curve();
   embedder.calibrate();
   trained.steps = embedder.steps();
   return trained;

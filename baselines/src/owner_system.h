@@ -45,8 +45,9 @@ watermark::Key measuring_key(std::uint64_t seed);
 
 /// Where and how long an owner is trained.
 struct OwnerTraining {
-  double seconds = 300;              ///< of training, without the views' rendering
-  std::filesystem::path checkpoint;  ///< see TimedRun
+  double seconds = 300;              ///< of training, without the views' rendering; where steps is 0
+  Index steps = 0;                   ///< of training, 0: by time
+  std::filesystem::path checkpoint;  ///< see timed_run()
   Index views = 200;                 ///< novel views to learn from
   RunProgress progress = {};         ///< may be empty
 };
@@ -57,12 +58,13 @@ struct TrainedOwner {
   double test_shift = 0;   ///< see OwnerSystem
   Index steps = 0;         ///< of training
   double seconds = 0;      ///< of training
+  std::string curve = {};  ///< see TrainingRun::curve()
 };
 
 /// The cell whose training a system's is: drs trains as copyrnerf_paper does.
 CellName trained_as(const CellName& name);
 
-/// Renders views, trains mark and extractor and calibrates the strength; goes on from a checkpoint.
+/// Renders views, trains mark and extractor and calibrates the mark PSNR; resumes from a checkpoint.
 /// @throws Stopped after saving   @throws as Embedder
 TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name, const OwnerSystem& system,
                          const OwnerTraining& training);

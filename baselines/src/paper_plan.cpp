@@ -49,7 +49,7 @@ const std::array kSystems{
 constexpr std::array<std::string_view, 6> kTables{"bits",     "quality",  "distortion",
                                                   "ablation", "sampling", "weights"};
 constexpr std::array<Index, 5> kLengths{4, 8, 16, 32, 48};
-constexpr Index kBits = 16, kWeightsBits = 8;
+constexpr Index kBits = 16, kWeightBits = 8;
 
 class Plan {
  public:
@@ -77,7 +77,7 @@ constexpr std::initializer_list<const char*> kAll{"ours",        "copyrnerf_pape
                                                   "nerf_hidden", "nerf_mbrs"};
 
 void plan_scene(PaperTable table, const std::string& scene, bool first, bool full, Plan& plan) {
-  const std::span<const Index> one(&kBits, 1), weights(&kWeightsBits, 1);
+  const std::span<const Index> one(&kBits, 1), weights(&kWeightBits, 1);
   const auto main = first || full ? kAll : kMain;
   switch (table) {
     case PaperTable::bits:

@@ -9,7 +9,7 @@
 namespace fieldmark::distort {
 
 namespace {
-constexpr Index kGrain = Index{1} << 14;
+constexpr Index kNoiseGrain = Index{1} << 14;
 }
 
 template <class T>
@@ -25,14 +25,14 @@ Var<T> noise(Var<T> x, Var<T> mu, Var<T> sigma, std::span<const std::type_identi
   const Var<T> out = x.tape().output(x.shape(), &y, {x, mu, sigma});
   const T* z = normal.data();
   const T m = mu.value()[0], s = sigma.value()[0];
-  parallel_for(n, kGrain, [&](Index begin, Index end) {
+  parallel_for(n, kNoiseGrain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) y[i] = x.value()[i] + (m + s * z[i]);
   });
   // dx = dy, dmu = sum dy, dsigma = sum dy z. Chunks own dx; the two sums run in order, in double.
   x.tape().on_backward(out, [x, mu, sigma, z, n](const T* dy) {
     bool fresh = false;
     if (T* dx = x.grad_acc(&fresh)) {
-      parallel_for(n, kGrain, [=](Index begin, Index end) {
+      parallel_for(n, kNoiseGrain, [=](Index begin, Index end) {
         for (Index i = begin; i < end; ++i) dx[i] = fresh ? dy[i] : dx[i] + dy[i];
       });
     }

@@ -5,7 +5,7 @@
 namespace fieldmark::distort {
 
 namespace {
-constexpr Index kGrain = Index{1} << 14;
+constexpr Index kQuantizeGrain = Index{1} << 14;
 }
 
 template <class T>
@@ -13,7 +13,7 @@ Var<T> quantize8(Var<T> x) {
   const Index n = x.shape().size();
   T* y = nullptr;
   const Var<T> out = x.tape().output(x.shape(), &y, {x});
-  parallel_for(n, kGrain, [=](Index begin, Index end) {
+  parallel_for(n, kQuantizeGrain, [=](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       const T v = x.value()[i] * 255;
       // Adding a half and truncating: std::round is a call on x86-64-v1.
@@ -23,7 +23,7 @@ Var<T> quantize8(Var<T> x) {
   // dx = dy inside [0, 1]; chunks own their dx.
   x.tape().on_backward(out, [x, n](const T* dy) {
     T* dx = x.grad_acc();
-    parallel_for(n, kGrain, [=](Index begin, Index end) {
+    parallel_for(n, kQuantizeGrain, [=](Index begin, Index end) {
       for (Index i = begin; i < end; ++i)
         if (x.value()[i] >= 0 && x.value()[i] <= 1) dx[i] += dy[i];
     });

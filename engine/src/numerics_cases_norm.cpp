@@ -11,8 +11,6 @@ namespace {
 using Real = long double;
 constexpr Real kEps = 1e-5L;  // the options' default
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 // y and its gradients for the cotangent g; x_i is normalised over the set set_of(i).
 struct Exact {
   std::vector<Real> y, dx, dgamma, dbeta;

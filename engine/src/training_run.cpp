@@ -146,8 +146,11 @@ void TrainingRun::save(const std::filesystem::path& path) const {
 }
 
 void TrainingRun::restore(const std::filesystem::path& path) {
-  const SafetensorsFile file = SafetensorsFile::read(path);
+  SafetensorsFile file = SafetensorsFile::read(path);
+  auto present = converted(file);
+  if (present) file = std::move(*present);
   fingerprint().require(file);
+  earlier_ = present.has_value();
   restore_more(file);  // first: it may refuse the file
   for (Trained& t : trained_)
     visit_arrays(t, [&](const std::string& name, std::span<float> elements, const Shape&) {

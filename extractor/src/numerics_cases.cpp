@@ -6,11 +6,11 @@ namespace fieldmark::extractor {
 namespace {
 
 using Real = long double;
-constexpr Index kPlaces = 700, kCells = 12, kBits = 3;
+constexpr Index kCasePlaces = 700, kCells = 12, kBits = 3;
 
 template <class T>
 struct Places {
-  Tensor<T> sign{Shape{kPlaces}}, index{Shape{kPlaces, kCells + 1}};
+  Tensor<T> sign{Shape{kCasePlaces}}, index{Shape{kCasePlaces, kCells + 1}};
 };
 
 // Places that are sure of what they show, and of its sign, by logits of this size; all but every fifth show
@@ -19,7 +19,7 @@ template <class T>
 Places<T> sure_places(double logit) {
   Places<T> p;
   const auto noise = scattered<T>(p.index.shape, -1, 1, 1);
-  for (Index i = 0; i < kPlaces; ++i) {
+  for (Index i = 0; i < kCasePlaces; ++i) {
     p.sign[i] = static_cast<T>((i % 3 == 0 ? -1 : 1) * logit);
     for (Index c = 0; c <= kCells; ++c) p.index[i * (kCells + 1) + c] = noise[i * (kCells + 1) + c];
     p.index[i * (kCells + 1) + (i % 5 == 0 ? i % kCells : kCells)] = static_cast<T>(logit);
@@ -31,7 +31,7 @@ Places<T> sure_places(double logit) {
 template <class T>
 std::vector<Real> exact_sums(const Places<T>& p) {
   std::vector<Real> sums(2 * kCells + 1);
-  for (Index i = 0; i < kPlaces; ++i) {
+  for (Index i = 0; i < kCasePlaces; ++i) {
     const T* row = &p.index[i * (kCells + 1)];
     Real most = row[0], total = 0;
     for (Index c = 1; c <= kCells; ++c) most = std::max<Real>(most, row[c]);
@@ -66,7 +66,7 @@ void compare_pool(double logit, WorstError& error) {
 void compare_evidence(double logit, WorstError& error) {
   const auto p = sure_places<float>(logit);
   std::vector<double> got(kCells);
-  cell_evidence(p.sign.data.data(), p.index.data.data(), kPlaces, kCells, got.data());
+  cell_evidence(p.sign.data.data(), p.index.data.data(), kCasePlaces, kCells, got.data());
   const auto sums = exact_sums(p);
   for (std::size_t c = 0; c < kCells; ++c)
     error.compare(got[c], sums[c] / std::pow(sums[kCells + 1 + c] + 0.25L, 0.3L), sums[kCells]);

@@ -7,8 +7,6 @@
 
 namespace fieldmark::nerf {
 
-inline std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 /// @throws ValueError "[op] name must be least to most, got value" unless value is in that range
 inline void check_range(std::string_view op, std::string_view name, Index value, Index least, Index most) {
   if (value < least || value > most)

@@ -8,7 +8,7 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kGrain = 256;  // rays of a chunk
+constexpr Index kRayGrain = 256;  // rays of a chunk
 
 void check_offsets(std::span<const Index> ray_begin, Index samples) {
   if (ray_begin.empty() || ray_begin.back() != samples)
@@ -39,7 +39,7 @@ Var<T> composite(Var<T> sigma, Var<T> rgb, Var<T> delta, std::span<const Index> 
   const Var<T> out = tape.output({rays, 4}, &y, {sigma, rgb, delta});
   T* weight = tape.scratch(samples);
   T* after = tape.scratch(samples);  // T_{i+1}
-  parallel_for(rays, kGrain, [&](Index first, Index last) {
+  parallel_for(rays, kRayGrain, [&](Index first, Index last) {
     for (Index r = first; r < last; ++r) {
       T t = 1, c[4] = {0, 0, 0, 0};
       for (Index i = begin[r]; i < begin[r + 1]; ++i) {
@@ -62,7 +62,7 @@ Var<T> composite(Var<T> sigma, Var<T> rgb, Var<T> delta, std::span<const Index> 
   // 0/0 at a saturated sample. A ray owns its samples.
   tape.on_backward(out, [=](const T* dy) {
     T *ds = sigma.grad_acc(), *dc = rgb.grad_acc(), *dd = delta.grad_acc();
-    parallel_for(rays, kGrain, [&](Index first, Index last) {
+    parallel_for(rays, kRayGrain, [&](Index first, Index last) {
       for (Index r = first; r < last; ++r) {
         const T* g = dy + 4 * r;
         T suffix = 0;

@@ -6,7 +6,7 @@
 
 namespace fieldmark::nerf {
 namespace {
-constexpr Index kGrain = 1024;  // rows of a chunk
+constexpr Index kFrequencyGrain = 1024;  // rows of a chunk
 }
 
 template <class T>
@@ -25,14 +25,14 @@ Var<T> frequency_encoding(Var<T> x, int bands) {
   const Index n = x.shape()[0], dims = x.shape()[1], row = 2 * bands * dims;
   T* y = nullptr;
   const Var<T> out = x.tape().output({n, row}, &y, {x});
-  parallel_for(n, kGrain, [&](Index begin, Index end) {
+  parallel_for(n, kFrequencyGrain, [&](Index begin, Index end) {
     frequency_values(x.value() + begin * dims, end - begin, dims, bands, y + begin * row);
   });
 
   // d sin(k x) = k cos(k x), d cos(k x) = -k sin(k x), k = 2^b pi: both are in y. A row of dx has one owner.
   x.tape().on_backward(out, [x, y, n, dims, row, bands](const T* dy) {
     T* dx = x.grad_acc();
-    parallel_for(n, kGrain, [&](Index begin, Index end) {
+    parallel_for(n, kFrequencyGrain, [&](Index begin, Index end) {
       for (Index i = begin; i < end; ++i)
         for (Index a = 0; a < dims; ++a) {
           T sum = 0, k = static_cast<T>(3.14159265358979323846);

@@ -43,7 +43,7 @@ GradcheckReport check_op(F f, const std::vector<Tensor<double>>& inputs,
   return gradcheck([&](Tape<double>&, auto v) { return f(v); }, inputs, options);
 }
 
-GradcheckReport check_rays() {
+GradcheckReport check_rays_op() {
   Camera camera = make_camera(look_at({1.5, -3, 2}, {0.1, 0, 0.2}, {0, 0, 1}), 0.7, 40, 30);
   camera.fy *= 1.1;
   const auto p = camera.parameters();
@@ -131,7 +131,7 @@ std::vector<GradcheckCase> gradcheck_cases() {
       {"mlp_field colour", [] { return check_mlp_field(true); }},
       {"photometric_loss square", [] { return check_photometric_loss(10, 0); }},
       {"photometric_loss huber", [] { return check_photometric_loss(0.01, 2); }},
-      {"rays", check_rays},
+      {"rays", check_rays_op},
       {"spherical_harmonics",
        [] {
          return check_op([](auto v) { return spherical_harmonics(v[0]); }, {scatter({6, 3}, -1, 1, 1)});

@@ -10,7 +10,7 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kGrain = 1024;  // points of a chunk
+constexpr Index kPointGrain = 1024;  // points of a chunk
 
 void check(const HashEncodingOptions& o) {
   check_range("hash_encoding", "levels", o.levels, 1, 32);
@@ -57,7 +57,7 @@ template <class T>
 void HashEncoding<T>::encode(std::span<const T> table, const T* x, Index n, T* density, T* colour) const {
   using namespace kernels;
   const auto forward = FIELDMARK_KERNEL(hash_forward<T>);
-  parallel_for(n, kGrain, [&](Index begin, Index end) {
+  parallel_for(n, kPointGrain, [&](Index begin, Index end) {
     forward(raw(levels_), levels(), features_, x + 3 * begin, end - begin, table.data(),
             density + begin * width(), colour + begin * width());
   });
@@ -68,7 +68,7 @@ void HashEncoding<T>::encode(const std::uint16_t* table, const float* x, Index n
                              float* colour) const requires std::is_same_v<T, float> {
   using namespace kernels;
   const auto forward = FIELDMARK_KERNEL(hash_forward_bf16);
-  parallel_for(n, kGrain, [&](Index begin, Index end) {
+  parallel_for(n, kPointGrain, [&](Index begin, Index end) {
     forward(raw(levels_), levels(), features_, x + 3 * begin, end - begin, table, density + begin * width(),
             colour + begin * width());
   });
@@ -78,7 +78,7 @@ template <class T>
 void HashEncoding<T>::deal_to_levels(Index n, const T* ddensity, const T* dcolour, T* out) const {
   using namespace kernels;
   const auto deal = FIELDMARK_KERNEL(hash_by_level<T>);
-  parallel_for(n, kGrain,
+  parallel_for(n, kPointGrain,
                [&](Index b, Index e) { deal(levels(), features_, ddensity, dcolour, b, e, n, out); });
 }
 
@@ -119,7 +119,7 @@ Var<T> HashEncoding<T>::operator()(const Params<T>& params, Var<T> x, Part part)
     const T *dd = density ? dy : nullptr, *dc = density ? nullptr : dy;
     if (T* dx = x.grad_acc()) {
       const auto backward = FIELDMARK_KERNEL(hash_backward_x<T>);
-      parallel_for(n, kGrain, [&](Index b, Index e) {
+      parallel_for(n, kPointGrain, [&](Index b, Index e) {
         backward(raw(levels_), levels(), features_, x.value() + 3 * b, e - b, table.value(),
                  dd ? dd + b * width() : dd, dc ? dc + b * width() : dc, dx + 3 * b);
       });

@@ -12,7 +12,7 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kBlock = 32, kMostBands = 20;
+constexpr Index kMlpBlock = 32, kMostBands = 20;
 
 MlpFieldOptions checked(const MlpFieldOptions& o) {
   check_range("mlp_field", "layers", o.layers, 1, 16);
@@ -62,10 +62,10 @@ Var<T> MlpField<T>::encode(Var<T> x) const {
 template <class T>
 void MlpField<T>::encode(const T* x, Index n, T* features) const {
   const Index bands = 6 * options_.position_bands, row = feature_width();
-  std::array<T, 3 * kBlock> p;
-  std::array<T, 6 * kMostBands * kBlock> waves;
-  for (Index begin = 0; begin < n; begin += kBlock) {
-    const Index count = std::min(kBlock, n - begin);
+  std::array<T, 3 * kMlpBlock> p;
+  std::array<T, 6 * kMostBands * kMlpBlock> waves;
+  for (Index begin = 0; begin < n; begin += kMlpBlock) {
+    const Index count = std::min(kMlpBlock, n - begin);
     for (Index i = 0; i < 3 * count; ++i) p[static_cast<std::size_t>(i)] = 2 * x[3 * begin + i] - 1;
     frequency_values(p.data(), count, 3, options_.position_bands, waves.data());
     for (Index i = 0; i < count; ++i) {

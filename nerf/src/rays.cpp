@@ -7,7 +7,7 @@
 
 namespace fieldmark::nerf {
 namespace {
-constexpr Index kGrain = 1024;  // pixels of a chunk, which has a partial camera gradient of 16 elements
+constexpr Index kPixelGrain = 1024;  // pixels of a chunk, which has a partial camera gradient of 16 elements
 
 // The terms of one ray that forward and backward share.
 template <class T>
@@ -68,7 +68,7 @@ Var<T> rays(Var<T> camera, Var<T> pixels) {
   T* y = nullptr;
   Tape<T>& tape = camera.tape();
   Var<T> out = tape.output({n, 6}, &y, {camera, pixels});
-  parallel_for(n, kGrain, [=](Index begin, Index end) {
+  parallel_for(n, kPixelGrain, [=](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       const T* c = camera.value() + i * stride;
       const Projection<T> p(c, pixels.value() + 2 * i);
@@ -86,13 +86,13 @@ Var<T> rays(Var<T> camera, Var<T> pixels) {
   tape.on_backward(out, [=](const T* dy) {
     T* dc = camera.grad_acc();
     T* dp = pixels.grad_acc();
-    const Index chunks = (n + kGrain - 1) / kGrain;
+    const Index chunks = (n + kPixelGrain - 1) / kPixelGrain;
     T* partial = shared && dc ? camera.tape().template scratch<T>(chunks * 16) : nullptr;
     if (partial) std::fill_n(partial, chunks * 16, T(0));
-    parallel_for(n, kGrain, [=](Index begin, Index end) {
+    parallel_for(n, kPixelGrain, [=](Index begin, Index end) {
       for (Index i = begin; i < end; ++i)
         add_ray(camera.value() + i * stride, pixels.value() + 2 * i, dy + 6 * i,
-                partial ? partial + begin / kGrain * 16 : (dc ? dc + i * stride : nullptr),
+                partial ? partial + begin / kPixelGrain * 16 : (dc ? dc + i * stride : nullptr),
                 dp ? dp + 2 * i : nullptr);
     });
     for (Index i = 0; partial && i < chunks * 16; ++i) dc[i % 16] += partial[i];

@@ -7,7 +7,7 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kGrain = 4096;
+constexpr Index kDirectionGrain = 4096;
 // Normalisation constants: sqrt(1 / 4 pi), sqrt(3 / 4 pi), sqrt(15 / 4 pi), sqrt(5 / 16 pi), sqrt(15 / 16
 // pi), sqrt(35 / 32 pi), sqrt(105 / 4 pi), sqrt(21 / 32 pi), sqrt(7 / 16 pi), sqrt(105 / 16 pi).
 constexpr double k0 = 0.28209479177387814, k1 = 0.48860251190291992, k2a = 1.0925484305920792,
@@ -67,7 +67,7 @@ Var<T> spherical_harmonics(Var<T> d) {
   const Index n = d.shape()[0];
   T* y = nullptr;
   const Var<T> out = d.tape().output({n, kSphericalHarmonics}, &y, {d});
-  parallel_for(n, kGrain, [&](Index begin, Index end) {
+  parallel_for(n, kDirectionGrain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       const T* p = d.value() + 3 * i;
       values(p[0], p[1], p[2], y + i * kSphericalHarmonics);
@@ -77,7 +77,7 @@ Var<T> spherical_harmonics(Var<T> d) {
   // dd_a = sum_i dy_i dY_i/da. A direction owns its row of dd.
   d.tape().on_backward(out, [d, n](const T* dy) {
     T* dd = d.grad_acc();
-    parallel_for(n, kGrain, [&](Index begin, Index end) {
+    parallel_for(n, kDirectionGrain, [&](Index begin, Index end) {
       T grad[kSphericalHarmonics][3];
       for (Index i = begin; i < end; ++i) {
         const T* p = d.value() + 3 * i;

@@ -17,6 +17,7 @@
 #include <numeric>
 
 #include "trainer_shard.h"
+#include "trainer_version_0_1.h"
 
 namespace fieldmark::nerf {
 namespace {
@@ -28,8 +29,6 @@ constexpr Index kOccupancyPeriod = 16;  // steps
 constexpr Index kMostRays = 1 << 16;
 constexpr Index kShortSteps = 8000, kLongSteps = 20000;  // of a run, see field_options()
 constexpr double kShortSeconds = 120, kLongSeconds = 400;
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 AdamOptions adam_options(const RadianceField& field) {
   if (field.coarse) return {.lr = 1, .beta2 = 0.999, .eps = 1e-8, .zero_grads = true};
@@ -366,7 +365,9 @@ void Trainer::restore_more(const SafetensorsFile& file) {
 }
 
 RadianceFieldOptions checkpointed_field(const std::filesystem::path& path) {
-  return RadianceField::from_configuration(RunFingerprint::options_of(SafetensorsFile::read(path), "field"),
+  const SafetensorsFile file = SafetensorsFile::read(path);
+  const std::string old = configuration_of_version_0_1(file);
+  return RadianceField::from_configuration(old.empty() ? RunFingerprint::options_of(file, "field") : old,
                                            path.string() + ": options")
       .options();
 }

@@ -11,9 +11,7 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kRays = 4;  // of a chunk: 128 rows for the coarse network, 256 for the fine one
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+constexpr Index kMlpRays = 4;  // of a chunk: 128 rows for the coarse network, 256 for the fine one
 
 // Colour and opacity of rays at given samples, whose densities are left in samples.sigma.
 Var<float> look(const Field<float>& net, const ParamStore<float>& store, const Params<float>& params,
@@ -40,18 +38,18 @@ Var<float> look(const Field<float>& net, const ParamStore<float>& store, const P
 Index Trainer::mlp_rays() const {
   const RayPoints& points = field_.options().points;
   const Index samples = points.total() + (points.importance > 0 ? points.first() : 0);
-  return std::max<Index>(1, options_.samples_per_step / samples / kRays) * kRays;
+  return std::max<Index>(1, options_.samples_per_step / samples / kMlpRays) * kMlpRays;
 }
 
 // Both networks see the same pixels: the coarse one from its own points, the fine one from all.
 double Trainer::run_mlp_chunk(Index index, Shard& shard, Tape<float>& tape, float* grads) {
-  choose_rays(index * kRays, kRays, shard);
+  choose_rays(index * kMlpRays, kMlpRays, shard);
   const RayBatch rays = shard.rays.batch(field_.space);
   const RayPoints& points = field_.options().points;
   const Params<float> params(field_.params, grads, packed_);
   const auto loss_of = [&](const Field<float>& net, RaySamples& samples) {
     shard.samples.push_back(samples.size());
-    const double share = static_cast<double>(kRays) / static_cast<double>(rays_per_step_);
+    const double share = static_cast<double>(kMlpRays) / static_cast<double>(rays_per_step_);
     return photometric_loss<float>(look(net, field_.params, params, shard.rays.seen_from, samples, tape),
                                    shard.truth, shard.background, {.huber = options_.huber, .scale = share});
   };
@@ -74,7 +72,7 @@ double Trainer::run_mlp_chunk(Index index, Shard& shard, Tape<float>& tape, floa
 
 double Trainer::step_mlp() {
   const double loss = loop_.run(
-      rays_per_step_ / kRays,
+      rays_per_step_ / kMlpRays,
       [this](Index c, Index shard, Tape<float>& tape, float* grads) {
         return run_mlp_chunk(c, shards_[at(shard)], tape, grads);
       },

@@ -10,10 +10,8 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kTile = 8;                                             // pixels along a side, see hard_pixels
+constexpr Index kErrorTile = 8;                                        // pixels along a side, see hard_pixels
 constexpr Index kMostParts = kMostSupersampling * kMostSupersampling;  // of a pixel
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 // One of n things, from two uniform numbers: one has 24 bits only.
 Index pick(float u, float v, Index n) {
@@ -31,9 +29,9 @@ Index Trainer::all_pixels() const {
 // Tiles of all images one after another, for the pixel at `place` of all images one after another.
 Index Trainer::tile_of(Index place) const {
   const Index width = data_.views[0].camera.width, height = data_.views[0].camera.height;
-  const Index across = (width + kTile - 1) / kTile, down = (height + kTile - 1) / kTile;
+  const Index across = (width + kErrorTile - 1) / kErrorTile, down = (height + kErrorTile - 1) / kErrorTile;
   const Index view = place / (width * height), pixel = place % (width * height);
-  return (view * down + pixel / width / kTile) * across + pixel % width / kTile;
+  return (view * down + pixel / width / kErrorTile) * across + pixel % width / kErrorTile;
 }
 
 // As choose_rays() has it without a preference; with one, a part of the rays takes the harder of two pixels.

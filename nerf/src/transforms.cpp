@@ -10,7 +10,7 @@ namespace fieldmark::nerf {
 namespace {
 using Json = nlohmann::json;
 
-std::string short_number(double x) {
+std::string four_digits(double x) {
   char text[32];
   std::snprintf(text, sizeof text, "%.4g", x);
   return text;
@@ -20,7 +20,7 @@ void refuse_other_lenses(const JsonPlace& from) {
   for (const char* key : {"k3", "k4"})
     if (from.has(key) && from[key].number() != 0)
       from[key].fail("0 (of radial distortion, k1 and k2 only are known here)",
-                     short_number(from[key].number()));
+                     four_digits(from[key].number()));
   if (from.has("is_fisheye") && !from["is_fisheye"].is_false())
     from["is_fisheye"].fail("false (fisheye lenses are not known here)", "something else");
   if (!from.has("camera_model")) return;
@@ -64,7 +64,7 @@ Pose parse_pose(const JsonPlace& matrix) {
       pose, [&](const std::string& found) { matrix.fail("a rotation in the upper left 3x3", found); });
   for (std::size_t c = 0; c < 4; ++c)
     if (std::abs(m[12 + c] - (c == 3 ? 1 : 0)) > 1e-6)
-      matrix.at(3).fail("the row 0 0 0 1", short_number(m[12 + c]) + " in column " + std::to_string(c));
+      matrix.at(3).fail("the row 0 0 0 1", four_digits(m[12 + c]) + " in column " + std::to_string(c));
   return pose;
 }
 

@@ -12,7 +12,7 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-double dot3(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+double dot_product(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 Vec3 column(const Pose& p, std::size_t k) { return {p[k], p[4 + k], p[8 + k]}; }
 void check_near(const Vec3& a, const Vec3& b, double tolerance) {
   for (std::size_t k = 0; k < 3; ++k) CHECK(std::abs(a[k] - b[k]) <= tolerance);
@@ -37,13 +37,13 @@ TEST_CASE("camera: look_at gives a rotation that looks at the target with up upw
     const Pose p = look_at(eye, target, {0, 0, 2});
     for (std::size_t a = 0; a < 3; ++a)
       for (std::size_t b = 0; b < 3; ++b)
-        CHECK(std::abs(dot3(column(p, a), column(p, b)) - (a == b ? 1 : 0)) < 1e-14);
+        CHECK(std::abs(dot_product(column(p, a), column(p, b)) - (a == b ? 1 : 0)) < 1e-14);
     const Vec3 x = column(p, 0), y = column(p, 1), z = column(p, 2);
-    CHECK(dot3({x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]}, z) ==
+    CHECK(dot_product({x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]}, z) ==
           Approx(1));
     const Camera c = make_camera(p, 0.7, 10, 10);
     const Vec3 to{target[0] - eye[0], target[1] - eye[1], target[2] - eye[2]};
-    CHECK(std::abs(dot3(c.forward(), to) - std::sqrt(dot3(to, to))) < 1e-13);
+    CHECK(std::abs(dot_product(c.forward(), to) - std::sqrt(dot_product(to, to))) < 1e-13);
     check_near(c.position(), eye, 0);
     CHECK(y[2] >= -1e-14);  // straight up or down: no upwards is left, and any will do
   }

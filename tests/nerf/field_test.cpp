@@ -12,7 +12,7 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-constexpr FieldOptions kSmall{
+constexpr FieldOptions kSmallField{
     .encoding = {.levels = 2, .features = 2, .log2_table = 6, .base_resolution = 2, .finest_resolution = 5},
     .width = 5,
     .geometry = 3};
@@ -46,7 +46,7 @@ Row reference(const ParamStore<double>& store, const Field<double>& field, const
 
 TEST_CASE("field: equal to plain loops over its named parameters, within 1e-14") {
   ParamStore<double> store;
-  const Field<double> field(store, kSmall, 1);
+  const Field<double> field(store, kSmallField, 1);
   randomise(store, 3);
   const auto x = uniform({20, 3}, 0, 1, 4), d = unit_directions(20, 5);
   Tape<double> tape;
@@ -63,7 +63,7 @@ TEST_CASE("field: equal to plain loops over its named parameters, within 1e-14")
 
 TEST_CASE("field: colour features and colour layers do not reach the density") {
   ParamStore<double> store;
-  const Field<double> field(store, kSmall, 1);
+  const Field<double> field(store, kSmallField, 1);
   randomise(store, 3);
   const auto x = uniform({20, 3}, 0, 1, 4), d = unit_directions(20, 5);
   const auto sigma = [&] {
@@ -83,7 +83,7 @@ TEST_CASE("field: colour features and colour layers do not reach the density") {
 
 TEST_CASE("field: the store holds the networks first and the table last") {
   ParamStore<float> store;
-  const Field<float> field(store, kSmall, 1);
+  const Field<float> field(store, kSmallField, 1);
   std::vector<std::string> names;
   for (const auto& e : store.entries()) names.push_back(e.name);
   CHECK(names == std::vector<std::string>{"density/0/weight", "density/0/bias", "density/1/weight",
@@ -97,7 +97,7 @@ TEST_CASE("field: the store holds the networks first and the table last") {
 
 TEST_CASE("field: gradient in positions, directions and all parameters") {
   ParamStore<double> store;
-  const Field<double> field(store, kSmall, 1);
+  const Field<double> field(store, kSmallField, 1);
   // Weights and biases that hold every ReLU open: differences must not step over its kink.
   const auto random = uniform({store.size()}, 0.05, 0.3, 3);
   std::copy(random.data.begin(), random.data.end(), store.values().begin());
@@ -121,7 +121,7 @@ TEST_CASE("field: gradient in positions, directions and all parameters") {
 
 TEST_CASE("field: densities stay finite at any parameter size") {
   ParamStore<float> store;
-  const Field<float> field(store, kSmall, 1);
+  const Field<float> field(store, kSmallField, 1);
   for (float& v : store.values()) v = 1e4f;
   const auto x = uniform<float>({5, 3}, 0, 1, 4);
   Tape<float> tape;
@@ -135,8 +135,8 @@ TEST_CASE("field: errors name option and shape") {
   CHECK_THROWS_WITH(build({.width = 0}), "[field] width must be 1 to 256, got 0");
   CHECK_THROWS_WITH(build({.geometry = 257}), "[field] geometry must be 1 to 256, got 257");
   CHECK_THROWS_AS(build({.encoding = {.levels = 0}}), ValueError);
-  const Field<float> field(store, kSmall, 1);
-  CHECK_THROWS_AS(build(kSmall), ValueError);  // names are taken
+  const Field<float> field(store, kSmallField, 1);
+  CHECK_THROWS_AS(build(kSmallField), ValueError);  // names are taken
   Tape<float> tape;
   const Tensor<float> x(Shape{2, 3}), wide(Shape{2, 4});
   CHECK_THROWS_WITH(field(Params<float>(store), tape.constant(wide), tape.constant(x)),
@@ -147,7 +147,7 @@ TEST_CASE("field: errors name option and shape") {
 
 TEST_CASE("field: the same bits for one and two threads") {
   ParamStore<float> store;
-  const Field<float> field(store, kSmall, 1);
+  const Field<float> field(store, kSmallField, 1);
   randomise(store, 3);
   expect_same_for_threads(store, field);
 }

@@ -10,14 +10,14 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-auto op(int bands) {
+auto frequency_op(int bands) {
   return [bands](auto&, auto v) { return frequency_encoding(v[0], bands); };
 }
 }  // namespace
 
 TEST_CASE("frequency_encoding: sin then cos of each band for all dimensions") {
   const Tensor<double> x(Shape{2, 2}, {0.1, -0.3, 0.7, 1.9});
-  const auto y = op_values<double>(op(3), {x});
+  const auto y = op_values<double>(frequency_op(3), {x});
   REQUIRE(y.size() == 24);
   for (std::size_t i = 0; i < 2; ++i)
     for (std::size_t b = 0; b < 3; ++b)
@@ -31,14 +31,15 @@ TEST_CASE("frequency_encoding: sin then cos of each band for all dimensions") {
 TEST_CASE("frequency_encoding: gradient") {
   // The steps of the differences must be small against a turn of the highest band: 2^3 pi, 2^9 pi a unit.
   for (const Index n : {0, 1, 4})
-    for (const Index dims : {1, 3}) expect_grad(op(4), {uniform({n, dims}, -1, 1, 2)}, {.step = 0.3});
-  expect_grad(op(10), {uniform({3, 3}, -1, 1, 3)}, {.rtol = 1e-6, .step = 1e-2});
+    for (const Index dims : {1, 3})
+      expect_grad(frequency_op(4), {uniform({n, dims}, -1, 1, 2)}, {.step = 0.3});
+  expect_grad(frequency_op(10), {uniform({3, 3}, -1, 1, 3)}, {.rtol = 1e-6, .step = 1e-2});
 }
 
 TEST_CASE("frequency_encoding: float within 3e-7 of double, gradients relative to the largest") {
-  CHECK(float_error(op(10), {uniform<float>({300, 3}, -1, 1, 4)}) < 3e-7);
-  CHECK(float_error(op(16), {uniform<float>({300, 3}, 1000, 1001, 5)}) < 3e-7);
-  CHECK(float_error_to_130(op(5), [](Index e) {
+  CHECK(float_error(frequency_op(10), {uniform<float>({300, 3}, -1, 1, 4)}) < 3e-7);
+  CHECK(float_error(frequency_op(16), {uniform<float>({300, 3}, 1000, 1001, 5)}) < 3e-7);
+  CHECK(float_error_to_130(frequency_op(5), [](Index e) {
           return std::vector{uniform<float>({e, 3}, -1, 1, 6)};
         }) < 3e-7);
 }
@@ -57,5 +58,5 @@ TEST_CASE("frequency_encoding: errors name argument and value") {
 }
 
 TEST_CASE("frequency_encoding: the same bits for one and two threads") {
-  expect_same_bits(op(10), {uniform<float>({3000, 3}, -1, 1, 6)});
+  expect_same_bits(frequency_op(10), {uniform<float>({3000, 3}, -1, 1, 6)});
 }

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "hash_reference.h"
+#include "nerf/plain_field.h"
 #include "support/each_isa.h"
 #include "support/expect_grad.h"
 #include "support/run_op.h"
@@ -15,12 +16,6 @@ namespace {
 using Part = HashEncoding<double>::Part;
 constexpr HashEncodingOptions kSmall{
     .levels = 3, .features = 2, .log2_table = 6, .base_resolution = 2, .finest_resolution = 8};
-
-template <class T>
-void randomise(ParamStore<T>& store, unsigned seed) {
-  const auto random = uniform<T>({store.size()}, -1, 1, seed);
-  std::copy(random.data.begin(), random.data.end(), store.values().begin());
-}
 
 // Both parts at one position, straight from the paper's formulas.
 std::vector<double> reference(const HashEncoding<double>& encoding, std::span<const double> table,

@@ -14,7 +14,7 @@ namespace {
 constexpr float kStep = 1.f / 256;
 
 // Rays along x through the cube, at various heights, the last beside it.
-struct Rays {
+struct RaysAlongX {
   std::vector<float> origins{-1, 0.5f, 0.5f, -1, 0.1f, 0.9f, 0.25f, 0.5f, 0.5f, -1, 1.5f, 0.5f},
       directions{1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0};
   RayBatch batch() const { return {origins, directions, directions}; }
@@ -22,7 +22,7 @@ struct Rays {
 
 RaySamples spread(HierarchicalSampler& sampler, const OccupancyGrid& grid, const RayPoints& points,
                   std::span<const float> jitter = {}) {
-  const Rays rays;
+  const RaysAlongX rays;
   RaySamples out;
   sampler.spread(grid, rays.batch(), jitter, kStep, points, out);
   return out;
@@ -99,7 +99,7 @@ TEST_CASE("hierarchical_sampler: all points lie in occupied cells, and deltas me
 
 TEST_CASE("hierarchical_sampler: importance points go where the weights are, among the first points") {
   HierarchicalSampler sampler;
-  const Rays rays;
+  const RaysAlongX rays;
   const RaySamples first = spread(sampler, OccupancyGrid(16), {.average = 8, .importance = 24});
   std::vector<float> weights(first.t.size());
   weights[3] = 1;      // the first ray: its fourth part
@@ -137,7 +137,7 @@ TEST_CASE("hierarchical_sampler: random points without jitter depend on the ray 
 TEST_CASE("hierarchical_sampler: errors name argument and what came") {
   HierarchicalSampler sampler;
   const OccupancyGrid grid(16);
-  const Rays rays;
+  const RaysAlongX rays;
   RaySamples out;
   CHECK_THROWS_WITH(spread(sampler, grid, {.average = -1}),
                     "[hierarchical_sampler] average must be 0 to 1024, got -1");

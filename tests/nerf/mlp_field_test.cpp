@@ -11,9 +11,9 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-constexpr MlpFieldOptions kSmall{
+constexpr MlpFieldOptions kSmallMlp{
     .layers = 3, .width = 6, .skip = 2, .position_bands = 3, .direction_bands = 2};
-constexpr FieldOptions kField{.kind = FieldKind::mlp, .mlp = kSmall};
+constexpr FieldOptions kField{.kind = FieldKind::mlp, .mlp = kSmallMlp};
 
 Row gamma(const Row& p, int bands) {
   Row y = p;
@@ -62,7 +62,7 @@ TEST_CASE("mlp_field: equal to plain loops over its named parameters, within 1e-
 
 TEST_CASE("mlp_field: its encoding of a block of positions equals the recorded op, bit by bit") {
   ParamStore<float> store;
-  const MlpField<float> field(store, "", kSmall, 1);
+  const MlpField<float> field(store, "", kSmallMlp, 1);
   for (const Index n : {0, 1, 31, 32, 33, 100}) {
     const auto x = uniform<float>({n, 3}, 0, 1, 4);
     std::vector<float> got(static_cast<std::size_t>(n * field.feature_width()));

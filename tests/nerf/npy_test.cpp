@@ -10,7 +10,7 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-void expect_error(const std::string& bytes, const std::string& message) {
+void expect_npy_error(const std::string& bytes, const std::string& message) {
   CHECK_THROWS_WITH(parse_npy(bytes, "a.npy"), Contains("a.npy: byte ") && Contains(message));
   CHECK_THROWS_AS(parse_npy(bytes, "a.npy"), IoError);
 }
@@ -39,37 +39,37 @@ TEST_CASE("npy: formats 1 to 3, floats of 4 and 8 bytes, keys in any order") {
 }
 
 TEST_CASE("npy: what is not read is named") {
-  expect_error("hello world, hello", "expected an .npy file");
-  expect_error("\x93NUMPY\x01", "expected 12 bytes at least");
-  expect_error(npy_file(kHeader, kSix, 4), "expected format 1, 2 or 3, got 4");
-  expect_error(with_header("{'descr': '>f8', 'fortran_order': False, 'shape': (2, 3), }"),
-               "expected descr '<f4' or '<f8' (little-endian floats), got \">f8\"");
-  expect_error(with_header("{'descr': '<f8', 'fortran_order': True, 'shape': (2, 3), }"),
-               "expected fortran_order False (C order), got true");
-  expect_error(with_header("{'descr': '<f8', 'fortran_order': False}"), "none called shape");
-  expect_error(with_header("{'descr': [('a', '<f8')], 'fortran_order': False, 'shape': (6,)}"),
-               "expected descr '<f4' or '<f8' (little-endian floats), got [[\"a\",\"<f8\"]]");
+  expect_npy_error("hello world, hello", "expected an .npy file");
+  expect_npy_error("\x93NUMPY\x01", "expected 12 bytes at least");
+  expect_npy_error(npy_file(kHeader, kSix, 4), "expected format 1, 2 or 3, got 4");
+  expect_npy_error(with_header("{'descr': '>f8', 'fortran_order': False, 'shape': (2, 3), }"),
+                   "expected descr '<f4' or '<f8' (little-endian floats), got \">f8\"");
+  expect_npy_error(with_header("{'descr': '<f8', 'fortran_order': True, 'shape': (2, 3), }"),
+                   "expected fortran_order False (C order), got true");
+  expect_npy_error(with_header("{'descr': '<f8', 'fortran_order': False}"), "none called shape");
+  expect_npy_error(with_header("{'descr': [('a', '<f8')], 'fortran_order': False, 'shape': (6,)}"),
+                   "expected descr '<f4' or '<f8' (little-endian floats), got [[\"a\",\"<f8\"]]");
   for (const char* shape : {"(2, -3)", "(2, 3.5)", "(2, 'x')", "(99999999999999999999,)"})
-    expect_error(
+    expect_npy_error(
         with_header("{'descr': '<f8', 'fortran_order': False, 'shape': " + std::string(shape) + ", }"),
         "expected whole numbers from 0 for shape, got [");
-  expect_error(with_header("{'descr': '<f8', 'fortran_order': False, 'shape': 6}"),
-               "expected a tuple for shape, got 6");
+  expect_npy_error(with_header("{'descr': '<f8', 'fortran_order': False, 'shape': 6}"),
+                   "expected a tuple for shape, got 6");
   for (const std::string& header :
        {std::string("{'descr': '<f8'"), kHeader + "x", std::string("[1]"), std::string()})
-    expect_error(with_header(header), "expected a Python dictionary, got something else");
+    expect_npy_error(with_header(header), "expected a Python dictionary, got something else");
 }
 
 TEST_CASE("npy: sizes that do not fit are refused before anything is allocated") {
-  expect_error(npy_file(kHeader, kSix.substr(0, 47)),
-               "expected 48 bytes of elements for the shape in the header, got 47");
-  expect_error(npy_file(kHeader, kSix + "x"), "got 49 bytes");
+  expect_npy_error(npy_file(kHeader, kSix.substr(0, 47)),
+                   "expected 48 bytes of elements for the shape in the header, got 47");
+  expect_npy_error(npy_file(kHeader, kSix + "x"), "got 49 bytes");
   for (const char* shape :
        {"(999999999999999999, 999999999999999999)", "(2, 999999999999999999)", "(4294967296, 4294967296, 2)"})
-    expect_error(
+    expect_npy_error(
         with_header("{'descr': '<f8', 'fortran_order': False, 'shape': " + std::string(shape) + ", }"),
         "expected more elements than the file has bytes for the shape in the header, got 48 bytes");
   std::string long_header = with_header(kHeader);
   long_header[9] = '\x7F';
-  expect_error(long_header, "expected a header of at most 108 bytes, got 32572");
+  expect_npy_error(long_header, "expected a header of at most 108 bytes, got 32572");
 }

@@ -11,7 +11,7 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-Tensor<double> test_camera(double eye_x = 1.5) {
+Tensor<double> camera_tensor(double eye_x = 1.5) {
   Camera c = make_camera(look_at({eye_x, -3, 2}, {0.1, 0, 0.2}, {0, 0, 1}), 0.7, 40, 30);
   c.fy *= 1.1;
   const auto p = c.parameters();
@@ -20,12 +20,12 @@ Tensor<double> test_camera(double eye_x = 1.5) {
 Tensor<double> stacked_cameras(Index n) {
   Tensor<double> t(Shape{n, 16});
   for (Index i = 0; i < n; ++i) {
-    const auto c = test_camera(1.5 + 0.4 * static_cast<double>(i));
+    const auto c = camera_tensor(1.5 + 0.4 * static_cast<double>(i));
     std::copy(c.data.begin(), c.data.end(), t.data.begin() + i * 16);
   }
   return t;
 }
-Var<double> op(Tape<double>&, std::span<const Var<double>> v) { return rays(v[0], v[1]); }
+Var<double> rays_op(Tape<double>&, std::span<const Var<double>> v) { return rays(v[0], v[1]); }
 }  // namespace
 
 TEST_CASE("rays: equal to pixel_ray, for one camera and for one a pixel") {
@@ -52,13 +52,13 @@ TEST_CASE("rays: equal to pixel_ray, for one camera and for one a pixel") {
 
 TEST_CASE("rays: gradient in camera and pixels") {
   for (Index n : {0, 1, 4}) {
-    expect_grad(op, {test_camera(), uniform({n, 2}, -10, 50, 2)});
-    expect_grad(op, {stacked_cameras(n), uniform({n, 2}, -10, 50, 3)});
+    expect_grad(rays_op, {camera_tensor(), uniform({n, 2}, -10, 50, 2)});
+    expect_grad(rays_op, {stacked_cameras(n), uniform({n, 2}, -10, 50, 3)});
   }
 }
 
 TEST_CASE("rays: gradient where only one input needs it") {
-  const auto camera = test_camera();
+  const auto camera = camera_tensor();
   const auto pixels = uniform({3, 2}, 0, 40, 4);
   expect_grad([&](Tape<double>& t, auto v) { return rays(v[0], t.constant(pixels)); }, {camera});
   expect_grad([&](Tape<double>& t, auto v) { return rays(t.constant(camera), v[0]); }, {pixels});
@@ -77,7 +77,7 @@ TEST_CASE("rays: errors name argument and shape") {
 }
 
 TEST_CASE("rays: the same bits for one and two threads") {
-  const auto camera = test_camera();
+  const auto camera = camera_tensor();
   const auto pixels = uniform({5000, 2}, 0, 40, 5);
   const auto seed = uniform({5000, 6}, -1, 1, 6);
   const auto run = [&](int n) {

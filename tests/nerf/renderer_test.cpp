@@ -19,11 +19,11 @@ Camera test_camera(Index width = 23, Index height = 18) {
 }
 
 // Every pixel's samples one after another through the Field op, all in double, nothing skipped or stopped.
-struct Reference {
+struct ReferenceRenderer {
   ParamStore<double> store;
   Field<double> field;
   const RadianceField& f;
-  explicit Reference(const RadianceField& rf) : field(store, rf.options().field, 0), f(rf) {
+  explicit ReferenceRenderer(const RadianceField& rf) : field(store, rf.options().field, 0), f(rf) {
     std::copy(rf.params.values().begin(), rf.params.values().end(), store.values().begin());
   }
 
@@ -56,7 +56,7 @@ struct Reference {
 
 // Largest difference of a rendering from the reference, over colour and opacity.
 double worst_error(const RadianceField& f, const Rendering& view, const Camera& camera) {
-  const Reference reference(f);
+  const ReferenceRenderer reference(f);
   const auto background = static_cast<double>(background_value(f.background));
   double worst = 0;
   for (Index y = 0; y < camera.height; ++y)
@@ -88,7 +88,7 @@ TEST_CASE(
 TEST_CASE("renderer: a pixel of several rays is the mean of what they see, in double, within 1e-4") {
   const RadianceField f = small_field();
   const Camera camera = test_camera(9, 7);
-  const Reference reference(f);
+  const ReferenceRenderer reference(f);
   constexpr Index kRays = 3;
   Renderer renderer(f, {.finer = 1, .stop = 0, .least_weight = 0, .supersampling = kRays});
   const Rendering view = renderer.render(camera);

@@ -14,7 +14,7 @@ using namespace fieldmark::nerf;
 
 namespace {
 constexpr double kRadius = 0.6;
-constexpr Vec3 kCentre{0.3, -0.2, 0.1};
+constexpr Vec3 kSphereCentre{0.3, -0.2, 0.1};
 
 // Opaque where the ray through the pixel meets the ball.
 Tensor<float> image_of_ball(const Camera& camera) {
@@ -24,7 +24,7 @@ Tensor<float> image_of_ball(const Camera& camera) {
       const Ray ray = pixel_ray(camera, static_cast<double>(x), static_cast<double>(y));
       double along = 0, square = 0;
       for (std::size_t a = 0; a < 3; ++a) {
-        const double to = kCentre[a] - ray.origin[a];
+        const double to = kSphereCentre[a] - ray.origin[a];
         along += to * ray.direction[a];
         square += to * to;
       }
@@ -51,7 +51,7 @@ double distance_of_cell(const Bounds& b, Index n, Index c) {
   const Index p[3] = {c % n, c / n % n, c / (n * n)};
   double square = 0;
   for (std::size_t a = 0; a < 3; ++a) {
-    const double d = b.corner[a] + (static_cast<double>(p[a]) + 0.5) * cell - kCentre[a];
+    const double d = b.corner[a] + (static_cast<double>(p[a]) + 0.5) * cell - kSphereCentre[a];
     square += d * d;
   }
   return std::sqrt(square);
@@ -114,8 +114,8 @@ TEST_CASE("silhouettes: tighten gives the smallest cube with two cells around") 
   CHECK(tight.side < bounds.side);
   CHECK(tight.side < 2 * kRadius + 0.6);
   for (std::size_t a = 0; a < 3; ++a) {
-    CHECK(tight.corner[a] < kCentre[a] - kRadius);
-    CHECK(tight.corner[a] + tight.side > kCentre[a] + kRadius);
+    CHECK(tight.corner[a] < kSphereCentre[a] - kRadius);
+    CHECK(tight.corner[a] + tight.side > kSphereCentre[a] + kRadius);
   }
   std::vector<std::uint8_t> one(512, 0);
   one[3 + 8 * (4 + 8 * 5)] = 1;

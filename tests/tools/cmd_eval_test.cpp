@@ -10,7 +10,6 @@
 #include "tools/tiny_scene.h"
 
 using namespace fieldmark;
-using Json = nlohmann::json;
 
 TEST_CASE("eval compares with the images of the split, one row each", "[eval]") {
   const TemporaryFolder folder;
@@ -18,7 +17,7 @@ TEST_CASE("eval compares with the images of the split, one row each", "[eval]") 
   const auto r = run_command({"eval", "--field", field, "--data", scene, "--split", "train", "--json", "-"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
-  const Json json = Json::parse(r.out);
+  const nlohmann::json json = nlohmann::json::parse(r.out);
   CHECK(json["views"] == 4);
   CHECK(json["lpips_alex"].is_null());  // 16 pixels are too few for AlexNet
   double sum = 0;
@@ -28,8 +27,8 @@ TEST_CASE("eval compares with the images of the split, one row each", "[eval]") 
   const auto finer = run_command(
       {"eval", "--field", field, "--data", scene, "--split", "train", "--supersampling", "2", "--json", "-"});
   REQUIRE(finer.code == cli::kOk);
-  CHECK(Json::parse(finer.out)["supersampling"] == 2);
-  CHECK(Json::parse(finer.out)["psnr"] != json["psnr"]);
+  CHECK(nlohmann::json::parse(finer.out)["supersampling"] == 2);
+  CHECK(nlohmann::json::parse(finer.out)["psnr"] != json["psnr"]);
 }
 
 TEST_CASE("eval gives LPIPS where there are weights, for each view and their mean", "[eval]") {
@@ -43,7 +42,7 @@ TEST_CASE("eval gives LPIPS where there are weights, for each view and their mea
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
   CHECK_THAT(r.err, Contains("lpips"));
-  const Json json = Json::parse(r.out);
+  const nlohmann::json json = nlohmann::json::parse(r.out);
   double sum = 0;
   for (const auto& view : json["per_view"]) sum += view["lpips_alex"].get<double>();
   CHECK(json["lpips_alex"].get<double>() == Approx(sum / 4));

@@ -11,13 +11,12 @@
 #include "tools/run_command.h"
 
 using namespace fieldmark;
-using Json = nlohmann::json;
 
 TEST_CASE("gradcheck passes for every registered op and says which is the worst", "[gradcheck]") {
   const auto r = run_command({"gradcheck", "--json", "-"});
   INFO(r.err);
   CHECK(r.code == cli::kOk);
-  const Json json = Json::parse(r.out);
+  const nlohmann::json json = nlohmann::json::parse(r.out);
   CHECK(json["ok"] == true);
   CHECK(json["worst"].get<double>() <= 1e-7);
   CHECK_THAT(r.err, Contains("worst relative error") && Contains(json["worst_case"].get<std::string>()));
@@ -38,7 +37,7 @@ TEST_CASE("gradcheck --only runs what has the text in its name", "[gradcheck]") 
   const std::string path = folder / "g.json";
   const auto r = run_command({"gradcheck", "--only", "rays", "--json", path});
   CHECK(r.code == cli::kOk);
-  const Json json = Json::parse(read_text(path));
+  const nlohmann::json json = nlohmann::json::parse(read_text(path));
   CHECK(json["cases"].size() >= 1);
   for (const auto& row : json["cases"]) CHECK_THAT(row["name"].get<std::string>(), Contains("rays"));
 }
@@ -53,7 +52,7 @@ TEST_CASE("gradcheck --only with an unknown text is a usage error", "[gradcheck]
 
 TEST_CASE("Every unit that is documented as differentiable has a check that begins with its stem",
           "[gradcheck]") {
-  const Json cases = Json::parse(run_command({"gradcheck", "--json", "-"}).out)["cases"];
+  const nlohmann::json cases = nlohmann::json::parse(run_command({"gradcheck", "--json", "-"}).out)["cases"];
   int units = 0;
   for (const char* module : {"engine", "imaging", "nerf", "distort", "extractor", "watermark", "baselines"}) {
     const std::filesystem::path headers = source_dir() + "/" + module;
@@ -64,7 +63,7 @@ TEST_CASE("Every unit that is documented as differentiable has a check that begi
         continue;
       const std::string stem = file.path().stem().string();
       INFO(module << "/" << stem << " has no entry in gradcheck_cases()");
-      CHECK(std::any_of(cases.begin(), cases.end(), [&](const Json& row) {
+      CHECK(std::any_of(cases.begin(), cases.end(), [&](const nlohmann::json& row) {
         return row["module"] == module && row["name"].get<std::string>().starts_with(stem);
       }));
       ++units;
@@ -79,7 +78,7 @@ TEST_CASE("gradcheck --numerics: every hard case within its limit, on each instr
   const auto r = run_command({"gradcheck", "--numerics", "--json", "-", "--report", folder / "numerics.md"});
   INFO(r.err);
   CHECK(r.code == cli::kOk);
-  const Json json = Json::parse(r.out);
+  const nlohmann::json json = nlohmann::json::parse(r.out);
   CHECK(json["ok"] == true);
   std::set<std::string> modules;
   for (const auto& row : json["cases"]) {

@@ -9,7 +9,6 @@
 #include "tools/run_command.h"
 
 using namespace fieldmark;
-using Json = nlohmann::json;
 
 TEST_CASE("info shows metadata and tensors", "[info]") {
   const TemporaryFolder folder;
@@ -25,7 +24,7 @@ TEST_CASE("info shows metadata and tensors", "[info]") {
   CHECK(r.code == cli::kOk);
   CHECK_THAT(r.err, Contains("weight") && Contains("[2, 3]") && Contains("F32") &&
                         Contains("2 tensors, 11 numbers"));
-  const Json json = Json::parse(r.out);
+  const nlohmann::json json = nlohmann::json::parse(r.out);
   CHECK(json["metadata"]["fieldmark"]["kind"] == "field");
   CHECK(json["metadata"]["note"] == "not { JSON");
   CHECK(json["numbers"] == 11);
@@ -34,7 +33,8 @@ TEST_CASE("info shows metadata and tensors", "[info]") {
   REQUIRE(json["tensors"].size() == 2);
   for (const auto& tensor : json["tensors"])
     if (tensor["name"] == "weight")
-      CHECK(tensor == Json::parse(R"({"name": "weight", "dtype": "F32", "shape": [2, 3], "bytes": 24})"));
+      CHECK(tensor ==
+            nlohmann::json::parse(R"({"name": "weight", "dtype": "F32", "shape": [2, 3], "bytes": 24})"));
 }
 
 TEST_CASE("info of what is not safetensors fails in one line that names the file", "[info]") {

@@ -9,7 +9,6 @@
 #include "tools/tiny_scene.h"
 
 using namespace fieldmark;
-using Json = nlohmann::json;
 
 TEST_CASE("render draws cameras from the field alone, or takes a data set's", "[render]") {
   const TemporaryFolder folder;
@@ -19,7 +18,7 @@ TEST_CASE("render draws cameras from the field alone, or takes a data set's", "[
                                 "--count", "2", "--size", "12", "--json", "-"});
     INFO(r.err);
     REQUIRE(r.code == cli::kOk);
-    const Json json = Json::parse(r.out);
+    const nlohmann::json json = nlohmann::json::parse(r.out);
     CHECK(json["views"] == 2);
     REQUIRE(json["images"].size() == 2);
     CHECK(read_image(json["images"][1].get<std::string>()).shape == Shape{12, 12, 3});

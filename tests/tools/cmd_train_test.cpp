@@ -12,7 +12,6 @@
 #include "tools/tiny_scene.h"
 
 using namespace fieldmark;
-using Json = nlohmann::json;
 
 TEST_CASE("train writes a field, its figures, and the same bytes for one and two threads", "[train]") {
   const TemporaryFolder folder;
@@ -24,7 +23,7 @@ TEST_CASE("train writes a field, its figures, and the same bytes for one and two
   const auto r = train("a.fm", "1");
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
-  const Json json = Json::parse(r.out);
+  const nlohmann::json json = nlohmann::json::parse(r.out);
   for (const char* key :
        {"test_psnr", "train_seconds", "steps", "samples_per_second", "parameters", "file_bytes"})
     CHECK(json.at(key).is_number());
@@ -46,10 +45,10 @@ TEST_CASE("train --supersampling makes a field that is rendered so", "[train]") 
   const auto eval = [&](std::vector<std::string> more) {
     std::vector<std::string> words{"eval", "--field", out, "--data", scene, "--json", "-"};
     words.insert(words.end(), more.begin(), more.end());
-    return Json::parse(run_command(words).out);
+    return nlohmann::json::parse(run_command(words).out);
   };
-  const Json as_trained = eval({}), finer = eval({"--supersampling", "2"}),
-             centres = eval({"--supersampling", "1"});
+  const nlohmann::json as_trained = eval({}), finer = eval({"--supersampling", "2"}),
+                       centres = eval({"--supersampling", "1"});
   CHECK(as_trained["supersampling"] == 2);
   CHECK(as_trained["psnr"] == finer["psnr"]);
   CHECK(as_trained["psnr"] != centres["psnr"]);
@@ -68,7 +67,7 @@ TEST_CASE("train --preset mlp writes a field whose points a ray render can choos
       run_command({"train", "--data", scene, "--out", out, "--preset", "mlp", "--steps", "1", "--json", "-"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
-  CHECK(Json::parse(r.out)["parameters"] == 2 * 595844);
+  CHECK(nlohmann::json::parse(r.out)["parameters"] == 2 * 595844);
   const auto info = run_command({"info", out});
   CHECK_THAT(info.out, Contains("\"kind\": \"mlp\"") && Contains("coarse/density/0/weight"));
   const auto render = [&](const std::string& field, const char* to, std::vector<std::string> more) {
@@ -119,7 +118,7 @@ TEST_CASE(
                               "--steps", "2000", "--target-psnr", "12", "--json", "-"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
-  const Json json = Json::parse(r.out);
+  const nlohmann::json json = nlohmann::json::parse(r.out);
   CHECK(json["steps"] == 250);  // the first look at the held-out views
   REQUIRE(json["sizing"]["trials"].size() >= 3);
   CHECK(json["sizing"]["trials"][0]["taken"] == true);
@@ -133,7 +132,7 @@ TEST_CASE(
                                       "sized", "--seconds", "1", "--json", "-"});
   INFO(short_run.err);
   REQUIRE(short_run.code == cli::kOk);
-  const Json unknown = Json::parse(short_run.out)["sizing"];
+  const nlohmann::json unknown = nlohmann::json::parse(short_run.out)["sizing"];
   CHECK(unknown["trials"].size() <= 2);
   CHECK(unknown["log2_table"] == nerf::field_options({.seconds = 1}).field.encoding.log2_table);
 }
@@ -155,6 +154,6 @@ TEST_CASE("train --model sized goes on with the sizes of its checkpoint", "[trai
                               "--resume", "--steps", "4", "--json", "-"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
-  CHECK(Json::parse(r.out)["parameters"] == field.params.parameters());
-  CHECK(!Json::parse(r.out).contains("sizing"));
+  CHECK(nlohmann::json::parse(r.out)["parameters"] == field.params.parameters());
+  CHECK(!nlohmann::json::parse(r.out).contains("sizing"));
 }

@@ -10,7 +10,6 @@
 
 using namespace fieldmark;
 using cli::Context;
-using cli::Json;
 
 TEST_CASE("Results on standard output send the text for people to standard error", "[context]") {
   std::ostringstream out, err;
@@ -18,7 +17,7 @@ TEST_CASE("Results on standard output send the text for people to standard error
   both.text() << "text";
   both.result({{"a", 1}});
   CHECK(err.str() == "text");
-  CHECK(Json::parse(out.str()) == Json{{"a", 1}});
+  CHECK(cli::Json::parse(out.str()) == cli::Json{{"a", 1}});
 }
 
 TEST_CASE("Results go to the files named, and the text stays on standard output", "[context]") {
@@ -30,7 +29,7 @@ TEST_CASE("Results go to the files named, and the text stays on standard output"
   context.text() << "text";
   context.result({{"psnr", 30.5}});
   CHECK(out.str() == "text");
-  CHECK(Json::parse(read_text(json)) == Json{{"psnr", 30.5}});
+  CHECK(cli::Json::parse(read_text(json)) == cli::Json{{"psnr", 30.5}});
   CHECK_THAT(read_text(report), Contains("# x") && Contains("| psnr | 30.5 |"));
 }
 

@@ -11,13 +11,12 @@
 #include "tools/tiny_scene.h"
 
 using namespace fieldmark;
-using Json = nlohmann::json;
 
 TEST_CASE("a scene of one transforms.json trains on its own split, and its notes are told once",
           "[scene_data]") {
   const TemporaryFolder folder;
   const std::filesystem::path scene = tiny_scene(folder);
-  Json json = Json::parse(read_text(scene / "transforms_train.json"));
+  nlohmann::json json = nlohmann::json::parse(read_text(scene / "transforms_train.json"));
   json["frames"].push_back(json["frames"][0]);
   json["frames"][4]["file_path"] = "train/zz_missing.png";
   write_file_atomically(scene / "transforms.json", json.dump());
@@ -27,7 +26,7 @@ TEST_CASE("a scene of one transforms.json trains on its own split, and its notes
       {"train", "--data", scene, "--out", folder / "f.fm", "--steps", "2", "--json", folder / "r.json"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
-  const Json result = Json::parse(read_text(folder / "r.json"));
+  const nlohmann::json result = nlohmann::json::parse(read_text(folder / "r.json"));
   REQUIRE(result.at("notes").size() == 2);
   CHECK(result["notes"][0] == "every 8th of 5 images is held out for val and test");
   CHECK_THAT(result["notes"][1].get<std::string>(),

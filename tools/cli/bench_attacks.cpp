@@ -15,7 +15,7 @@ namespace {
 using watermark::AttackRow;
 using Names = std::vector<std::string>;
 
-struct Options {
+struct BenchAttacksArguments {
   std::string owner, field, other, onto, cameras = "novel", plot;
   MessageOption message;  // baked into the field
   Names attacked;         // files made from the field by other means
@@ -25,7 +25,7 @@ struct Options {
 
 class Bench {
  public:
-  Bench(const Options& options, Context& context)
+  Bench(const BenchAttacksArguments& options, Context& context)
       : options_(options),
         context_(context),
         owner_(watermark::Owner::load(options.owner)),
@@ -91,7 +91,7 @@ class Bench {
             {"kept", number(row.kept)}};
   }
 
-  const Options& options_;
+  const BenchAttacksArguments& options_;
   Context& context_;
   const InterruptGuard guard_;
   watermark::Owner owner_;
@@ -111,7 +111,7 @@ constexpr const char* kDamage =
     "extract "
     "chooses there, by agreement alone";
 
-void check(const Options& o) {
+void check(const BenchAttacksArguments& o) {
   for (const std::string& path : o.attacked)
     if (!std::filesystem::exists(path)) throw IoError(path + ": no such file");
   if (o.plot.empty()) return;
@@ -121,7 +121,7 @@ void check(const Options& o) {
 // The severities of a curve, or its middle one.
 Names used(const Names& names, bool quick) { return quick ? Names{names[names.size() / 2]} : names; }
 
-int run(const Options& options, Context& context) {
+int run_bench_attacks(const BenchAttacksArguments& options, Context& context) {
   check(options);
   std::optional<nerf::RadianceField> other, onto;
   if (!options.other.empty()) other.emplace(nerf::RadianceField::load(options.other));
@@ -159,7 +159,7 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_bench_attacks(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<BenchAttacksArguments>();
   add_file(app, "--field", o->field, "Baked field", "FIELD")->required();
   add_file(app, "--owner", o->owner, "Its OWNER, as `fieldmark embed` wrote it", "OWNER")->required();
   add_message_options(app, o->message, "Message baked into --field");
@@ -182,7 +182,7 @@ Command add_bench_attacks(CommandLine& app) {
   app.add_flag("--quick", o->quick, "One severity of each attack");
   return [o](Context& context) {
     if (!o->message.given()) throw UsageError("bench attacks: needs the --message baked into --field");
-    return run(*o, context);
+    return run_bench_attacks(*o, context);
   };
 }
 

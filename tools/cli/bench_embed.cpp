@@ -15,19 +15,19 @@ constexpr double kQuickFieldSeconds = 1;  // the same for tests
 constexpr std::size_t kQuickRows = 4;     // the default and the other lengths
 constexpr Index kQuickViews = 8, kQuickPatch = 48, kQuickChannels = 8, kQuickCells = 6;
 
-struct Options {
+struct BenchEmbedArguments {
   std::string owner, field, scene, plot, only;
   double seconds = 90;
   Index views = 24, bits = 16, size = 0;
   bool quick = false;
 };
 
-struct Subject {
+struct EmbedSubject {
   std::unique_ptr<nerf::RadianceField> field;
   std::string name;
 };
 
-Subject subject_of(const Options& o, Context& context) {
+EmbedSubject embed_subject(const BenchEmbedArguments& o, Context& context) {
   const auto name = [](const std::string& path) { return std::filesystem::path(path).filename().string(); };
   if (!o.owner.empty())
     return {std::make_unique<nerf::RadianceField>(watermark::Owner::load(o.owner).field), name(o.owner)};
@@ -37,7 +37,7 @@ Subject subject_of(const Options& o, Context& context) {
   return {trained_field(data, o.quick ? kQuickFieldSeconds : kFieldSeconds, context), data.name};
 }
 
-std::vector<bench::EmbedVariant> variants_of(const Options& o, const nerf::RadianceField& field,
+std::vector<bench::EmbedVariant> variants_of(const BenchEmbedArguments& o, const nerf::RadianceField& field,
                                              std::uint64_t seed) {
   auto all =
       bench::embed_variants({.seconds = o.seconds}, o.bits, seed, watermark::colours_for(field.space.kind));
@@ -61,7 +61,7 @@ std::vector<bench::EmbedVariant> variants_of(const Options& o, const nerf::Radia
   return all;
 }
 
-Json rows_json(const std::vector<bench::EmbedRow>& rows, Context& context) {
+Json embed_rows_json(const std::vector<bench::EmbedRow>& rows, Context& context) {
   const double usual = rows.front().accuracy;
   Json list = Json::array();
   for (const bench::EmbedRow& r : rows) {
@@ -113,10 +113,10 @@ constexpr const char* kColumns =
     "third of the "
     "views";
 
-int run(const Options& options, Context& context) {
+int run_bench_embed(const BenchEmbedArguments& options, Context& context) {
   if (!options.plot.empty())
     for (const std::string& file : results::chart_files("embed", options.plot)) check_writable(file);
-  const Subject subject = subject_of(options, context);
+  const EmbedSubject subject = embed_subject(options, context);
   const auto variants = variants_of(options, *subject.field, context.seed());
   auto rows = with_progress(context, [&](const auto& progress) {
     return bench::run_embed_bench(*subject.field, variants,
@@ -125,7 +125,7 @@ int run(const Options& options, Context& context) {
   });
   const bench::EmbedMargin margin;
   bench::mark_front(rows, margin);
-  const Json list = rows_json(rows, context);
+  const Json list = embed_rows_json(rows, context);
   const std::string why = bench::judgement(rows, margin);
   context.text() << why << "\n";
   const Json json{{"field", subject.name},
@@ -149,7 +149,7 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_bench_embed(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<BenchEmbedArguments>();
   auto field = add_file(app, "--field", o->field, "Unmarked field (--scene, trained for a minute)", "FIELD");
   add_file(app, "--owner", o->owner, "OWNER whose unmarked field is marked", "OWNER")->excludes(field);
   add_scene_option(app, o->scene);
@@ -164,7 +164,7 @@ Command add_bench_embed(CommandLine& app) {
       ->default_str("");
   add_plot(app, o->plot);
   app.add_flag("--quick", o->quick, "Four rows with small networks");
-  return [o](Context& context) { return run(*o, context); };
+  return [o](Context& context) { return run_bench_embed(*o, context); };
 }
 
 }  // namespace fieldmark::cli

@@ -12,7 +12,7 @@
 namespace fieldmark::cli {
 namespace {
 
-struct Options {
+struct BenchEngineArguments {
   std::string scene, plot, peer;
   bool precision = false;
   bench::PeerOptions python;
@@ -49,7 +49,7 @@ Json row_json(const bench::EngineRow& r, bool with_peer) {
 }
 
 // What the peers' figures depend on; the same for all rows.
-Json peer_json(const bench::EngineBench& result, const Options& options) {
+Json peer_json(const bench::EngineBench& result, const BenchEngineArguments& options) {
   for (const auto& row : result.rows)
     if (row.peer) {
       const bench::Peer::Found& found = row.peer->found;
@@ -82,7 +82,7 @@ struct Scene {
 };
 
 // The data set of --scene, or else lego where FIELDMARK_DATA has it; read only for rows that train.
-Scene scene_of(const Options& options) {
+Scene scene_of(const BenchEngineArguments& options) {
   const std::filesystem::path folder =
       options.scene.empty() ? shared_data("nerf_synthetic/lego") : std::filesystem::path(options.scene);
   Scene scene;
@@ -94,7 +94,7 @@ Scene scene_of(const Options& options) {
 }
 
 // Ctrl-C ends a peer too, whose failure is then an interruption.
-bench::EngineBench measured(const Options& options, Context& context) {
+bench::EngineBench measured(const BenchEngineArguments& options, Context& context) {
   const InterruptGuard guard;
   try {
     return read_option("bench engine", [&] {
@@ -117,7 +117,7 @@ Json precision_json(const bench::PrecisionRow& r) {
           {"measure", r.measure}};
 }
 
-Json precision(const Options& options, const Scene& scene, Context& context) {
+Json precision(const BenchEngineArguments& options, const Scene& scene, Context& context) {
   Progress progress = context.progress("precision");
   double part = 0;
   const auto rows = bench::run_precision_bench({.runs = options.engine.runs,
@@ -137,7 +137,7 @@ Json precision(const Options& options, const Scene& scene, Context& context) {
   return json;
 }
 
-int run(Options options, Context& context) {
+int run_bench_engine(BenchEngineArguments options, Context& context) {
   if (!options.plot.empty()) check_writable(options.plot);
   const Scene scene = scene_of(options);
   if (scene.train) options.engine.scene = &*scene.train;
@@ -161,7 +161,7 @@ int run(Options options, Context& context) {
 }  // namespace
 
 Command add_bench_engine(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<BenchEngineArguments>();
   add_number(app, "--runs", o->engine.runs, 1, 1000, "Runs of each row; their median counts, 1 to 1000");
   add_number(app, "--scale", o->engine.scale, 1e-6, 1, "Factor on the numbers of samples, above 0 to 1", "F");
   add_file(app, "--only", o->engine.only, "Only rows with TEXT in their name (all)", "TEXT");
@@ -179,7 +179,7 @@ Command add_bench_engine(CommandLine& app) {
   add_number(app, "--peer-limit", o->python.limit_seconds, 0.1, 86400,
              "Time limit of each answer of the peer in seconds, 0.1 to 86400", "S")
       ->needs(peer);
-  return [o](Context& context) { return run(*o, context); };
+  return [o](Context& context) { return run_bench_engine(*o, context); };
 }
 
 }  // namespace fieldmark::cli

@@ -10,7 +10,7 @@
 namespace fieldmark::cli {
 namespace {
 
-struct Options {
+struct BenchFieldArguments {
   std::string field, scene, plot;
   Index size = 400, views = 3;
   double seconds = 60;
@@ -18,15 +18,15 @@ struct Options {
   bool quick = false;
 };
 
-struct Subject {
+struct FieldSubject {
   std::unique_ptr<nerf::RadianceField> field;
   std::vector<nerf::Camera> cameras;
   std::string name;
 };
 
 // Views spread evenly over the test split; without a data set, drawn around the training cameras.
-Subject subject_of(const Options& options, Context& context) {
-  Subject subject;
+FieldSubject field_subject(const BenchFieldArguments& options, Context& context) {
+  FieldSubject subject;
   const bool stored = !options.field.empty();
   if (stored) {
     subject.field = std::make_unique<nerf::RadianceField>(nerf::RadianceField::load(options.field));
@@ -58,7 +58,7 @@ constexpr const char* kOccupancy =
     "trained "
     "outside the silhouettes, so a grid that follows them loses nothing there";
 
-Json rows_json(const bench::FieldBench& result, Context& context) {
+Json field_rows_json(const bench::FieldBench& result, Context& context) {
   Json rows = Json::array();
   for (const bench::FieldRow& r : result.rows) {
     print_line(context,
@@ -79,14 +79,14 @@ Json rows_json(const bench::FieldBench& result, Context& context) {
   return rows;
 }
 
-int run(const Options& options, Context& context) {
+int run_bench_field(const BenchFieldArguments& options, Context& context) {
   if (!options.plot.empty()) check_writable(options.plot);
-  const Subject subject = subject_of(options, context);
+  const FieldSubject subject = field_subject(options, context);
   const bench::FieldBenchOptions bench{.runs = options.runs, .seed = context.seed(), .quick = options.quick};
   const bench::FieldBench result = with_progress(context, [&](const auto& progress) {
     return bench::run_field_bench(*subject.field, subject.cameras, bench, progress);
   });
-  const Json rows = rows_json(result, context);
+  const Json rows = field_rows_json(result, context);
   const std::string why = bench::judgement(result);
   context.text() << why << "\n";
   const nerf::Camera& camera = subject.cameras.front();
@@ -119,7 +119,7 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_bench_field(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<BenchFieldArguments>();
   auto field = add_file(app, "--field", o->field, "Field that is rendered (trained for --seconds)", "FIELD");
   add_scene_option(app, o->scene);
   add_number(app, "--seconds", o->seconds, 0.1, 86400, "Training time without --field, seconds, 0.1 to 86400",
@@ -130,7 +130,7 @@ Command add_bench_field(CommandLine& app) {
   add_number(app, "--runs", o->runs, 1, 1000, "Runs of each row; their median counts, 1 to 1000");
   add_plot(app, o->plot);
   app.add_flag("--quick", o->quick, "One setting of each kind");
-  return [o](Context& context) { return run(*o, context); };
+  return [o](Context& context) { return run_bench_field(*o, context); };
 }
 
 }  // namespace fieldmark::cli

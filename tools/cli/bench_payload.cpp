@@ -12,7 +12,7 @@ Json layout_json(const watermark::PayloadLayout& l) {
           {"spare_bits", l.spare_bits}, {"corrects", l.corrects},     {"chance", l.chance}};
 }
 
-Json row_json(const bench::PayloadRow& r) {
+Json payload_row_json(const bench::PayloadRow& r) {
   Json json{{"error_rate", r.error_rate}, {"computed", r.computed}};
   const auto add = [&](const std::string& name, const watermark::PayloadAccuracy& a) {
     const auto [low, high] = watermark::wilson_interval(a.exact, a.trials);
@@ -26,7 +26,7 @@ Json row_json(const bench::PayloadRow& r) {
   return json;
 }
 
-int run(Index bits, Index trials, Context& context) {
+int run_bench_payload(Index bits, Index trials, Context& context) {
   const bench::PayloadBenchOptions options{
       .bits = bits, .trials = trials, .noise_trials = kNoiseTrials * trials, .seed = context.seed()};
   const auto result = read_option("--bits", [&] {
@@ -42,7 +42,7 @@ int run(Index bits, Index trials, Context& context) {
   for (const auto& r : result.rows) {
     print_line(context, "%9.0f%%  %8.2f%%  %9.2f%%  %13.2f%%\n", 100 * r.error_rate, 100 * r.computed,
                100 * r.signs.share(), 100 * r.strengths.share());
-    rows.push_back(row_json(r));
+    rows.push_back(payload_row_json(r));
   }
   const bench::PayloadNoise& n = result.noise;
   print_line(
@@ -70,7 +70,7 @@ Command add_bench_payload(CommandLine& app) {
   auto o = std::make_shared<Options>();
   add_number(app, "--bits", o->bits, 1, 256, "Length of a message in bits, 1 to 256");
   add_number(app, "--trials", o->trials, 1, 1000000, "Trials of each row, 1 to 1000000");
-  return [o](Context& context) { return run(o->bits, o->trials, context); };
+  return [o](Context& context) { return run_bench_payload(o->bits, o->trials, context); };
 }
 
 }  // namespace fieldmark::cli

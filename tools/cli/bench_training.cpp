@@ -6,13 +6,13 @@
 namespace fieldmark::cli {
 namespace {
 
-struct Options {
+struct BenchTrainingArguments {
   std::string scene;
   double seconds = 60;
   bool quick = false;
 };
 
-int run(const Options& options, Context& context) {
+int run_bench_training(const BenchTrainingArguments& options, Context& context) {
   const nerf::Dataset train = bench_split(options.scene, "train", options.quick),
                       judge = bench_split(options.scene, "val", options.quick);
   auto variants = bench::training_variants({.seconds = options.seconds}, context.seed());
@@ -49,12 +49,12 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_bench_training(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<BenchTrainingArguments>();
   add_scene_option(app, o->scene);
   add_number(app, "--seconds", o->seconds, 0.1, 86400, "Training time of each row in seconds, 0.1 to 86400",
              "S");
   app.add_flag("--quick", o->quick, "Three rows, on a small built-in scene");
-  return [o](Context& context) { return run(*o, context); };
+  return [o](Context& context) { return run_bench_training(*o, context); };
 }
 
 }  // namespace fieldmark::cli

@@ -16,7 +16,7 @@ namespace {
 
 using watermark::FieldAttackKind;
 
-struct Options {
+struct AttackFieldArguments {
   std::string field, out, attack;
   std::string other, unmarked, marked;
   TrainingAttackOptions training;
@@ -36,7 +36,7 @@ class Input {
   std::optional<nerf::RadianceField> field_;
 };
 
-void check_out(const Options& options) {
+void check_out(const AttackFieldArguments& options) {
   for (const std::string& input : {options.field, options.other, options.unmarked, options.marked})
     if (!input.empty() && std::filesystem::exists(options.out) && std::filesystem::exists(input) &&
         std::filesystem::equivalent(options.out, input))
@@ -44,7 +44,7 @@ void check_out(const Options& options) {
   check_writable(options.out);
 }
 
-nerf::RadianceField changed_weights(const Options& options, Context& context) {
+nerf::RadianceField changed_weights(const AttackFieldArguments& options, Context& context) {
   const auto attack = read_option("--attack", [&] { return watermark::parse_field_attack(options.attack); });
   const bool copy = attack.has(FieldAttackKind::copy);
   const Input other(options.other, "--other", attack.has(FieldAttackKind::average)),
@@ -70,7 +70,7 @@ void refuse_unused(CommandLine& app, const std::string& attack) {
       throw UsageError(std::string(name) + ": --attack " + attack + " does not use it");
 }
 
-int run(const Options& options, Context& context) {
+int run_attack_field(const AttackFieldArguments& options, Context& context) {
   check_out(options);
   Json json{{"attack", options.attack}, {"field", options.field}, {"out", options.out}};
   const InterruptGuard until_saved;  // between the last step and the file, Ctrl-C waits
@@ -88,7 +88,7 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_attack_field(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<AttackFieldArguments>();
   app.add_option("field", o->field, "Field to attack, of `fieldmark bake` or `fieldmark train`")
       ->required()
       ->type_name("FIELD")
@@ -125,7 +125,7 @@ Command add_attack_field(CommandLine& app) {
   add_training_attack(app, o->training);
   return [o, app](Context& context) mutable {
     refuse_unused(app, o->attack);
-    return run(*o, context);
+    return run_attack_field(*o, context);
   };
 }
 

@@ -21,11 +21,12 @@ namespace {
 
 constexpr double kMuchFainter = 2;  // dB: what learning usually loses is 1.3
 
-struct Options {
+struct BakeArguments {
   std::string owner, out;
   std::optional<double> mark_psnr;
   MessageOption message;
   RunLength length{.seconds = watermark::BakeOptions{}.schedule.seconds};
+  bool resume = false;
 };
 
 watermark::Baker::MarkPsnr scaled_to(const watermark::Owner& owner, watermark::Baker& baker) {
@@ -56,7 +57,8 @@ void say_strength(const watermark::Owner& owner, const watermark::Baker::MarkPsn
   context.note(line);
 }
 
-int run(const Options& options, Context& context) {
+int run_bake(const BakeArguments& options, Context& context) {
+  const std::string checkpoint = options.out + ".checkpoint";
   if (std::filesystem::exists(options.out) && std::filesystem::equivalent(options.out, options.owner))
     throw UsageError("--out: " + options.out + " is the owner's file");
   check_writable(options.out);
@@ -73,22 +75,11 @@ int run(const Options& options, Context& context) {
   bake_options.schedule.seconds = options.length.seconds;
   watermark::Baker baker(owner, message, bake_options);
   const InterruptGuard until_saved;  // between the last step and the file, Ctrl-C waits
-  const double seconds =
-      run_long({.what = "bake",
-                .done = [&] { return baker.done(); },
-                .step = [&](double now) { baker.step(now); },
-                .steps = [&] { return baker.steps(); },
-                .note =
-                    [&] {
-                      char note[64];
-                      std::snprintf(note, sizeof note, "%.2f dB to the marked colours", baker.psnr());
-                      return std::string(note);
-                    },
-                .save = {},
-                .checkpoint = {}},
-               options.length, context);
+  if (options.resume) baker.restore(checkpoint);
+  const double seconds = run_long(baker, "bake", options.length, context, checkpoint);
   const auto mark_psnr = scaled_to(owner, baker);
   baker.field().save(options.out);
+  std::filesystem::remove(checkpoint);
 
   const auto owner_sha256 = sha256_file_hex(options.owner);
   const auto commitment = watermark::commitment(owner_sha256, owner.key, message);
@@ -118,16 +109,19 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_bake(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<BakeArguments>();
   app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
   add_message_options(app, o->message, "Message to bake");
-  app.add_option("--out", o->out, "File to write, the field to publish")->required()->type_name("FIELD");
+  app.add_option("--out", o->out, "File to write, the field to publish; FIELD.checkpoint during baking")
+      ->required()
+      ->type_name("FIELD");
   app.add_option("--mark-psnr", o->mark_psnr,
                  "Mark PSNR on the foreground in dB, 20 to 60; higher is fainter; default: that of embed")
       ->range(20.0, 60.0)
       ->type_name("DB");
-  add_run_length(app, o->length, false);
-  return [o](Context& context) { return run(*o, context); };
+  add_run_length(app, o->length, true);
+  app.add_flag("--resume", o->resume, "Resume from FIELD.checkpoint, with the options of that run");
+  return [o](Context& context) { return run_bake(*o, context); };
 }
 
 }  // namespace fieldmark::cli

@@ -30,8 +30,7 @@ constexpr Subject kSubjects[] = {
 
 }  // namespace
 
-Option add_file(CommandLine& app, const char* name, std::string& value, const char* help,
-                      const char* type) {
+Option add_file(CommandLine& app, const char* name, std::string& value, const char* help, const char* type) {
   return app.add_option(name, value, help)->type_name(type)->default_str("");
 }
 
@@ -59,14 +58,7 @@ std::unique_ptr<nerf::RadianceField> trained_field(const nerf::Dataset& data, do
   auto field = std::make_unique<nerf::RadianceField>(sizes);
   const double begin = context.seconds();
   nerf::Trainer trainer(*field, data, {.schedule = {.seconds = seconds}, .seed = context.seed()});
-  run_long({.what = "train",
-            .done = [&] { return trainer.done(); },
-            .step = [&](double now) { trainer.step(now - begin); },
-            .steps = [&] { return trainer.steps(); },
-            .note = [] { return std::string(); },
-            .save = {},
-            .checkpoint = {}},
-           {.steps = 0, .seconds = seconds}, context);
+  run_long(trainer, "train", {.seconds = seconds, .from = begin}, context);
   return field;
 }
 

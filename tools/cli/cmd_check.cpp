@@ -11,7 +11,7 @@
 namespace fieldmark::cli {
 namespace {
 
-struct Options {
+struct CheckArguments {
   std::string folder, public_key;
   std::vector<std::string> images;
 };
@@ -32,7 +32,7 @@ Json result(const watermark::EvidenceCheck& check, std::size_t given) {
   return json;
 }
 
-int run(const Options& options, Context& context) {
+int run_check(const CheckArguments& options, Context& context) {
   std::optional<watermark::PublicKey> signer;
   if (!options.public_key.empty())
     signer = read_option("--public-key", [&] { return watermark::public_key_from_hex(options.public_key); });
@@ -57,7 +57,7 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_check(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<CheckArguments>();
   app.add_option("folder", o->folder, "Evidence folder of `fieldmark verify`")->required()->type_name("DIR");
   app.add_option("images", o->images,
                  "Images, or folders of them, to compare by SHA-256 with those of the evidence")
@@ -67,7 +67,7 @@ Command add_check(CommandLine& app) {
                  "Public key of the signer, 64 digits, as `key`, `embed` and `bake` print it; default: any")
       ->type_name("HEX")
       ->default_str("");
-  return [o](Context& context) { return run(*o, context); };
+  return [o](Context& context) { return run_check(*o, context); };
 }
 
 }  // namespace fieldmark::cli

@@ -24,7 +24,7 @@ namespace {
 constexpr Index kSsimWindow = 11;
 constexpr double kReferenceBar = 1e-4;  // most that LPIPS may be off
 
-struct Options {
+struct CompareArguments {
   std::vector<std::string> paths;
   std::string alex, squeeze;
   bool reference = false;
@@ -57,7 +57,7 @@ Json json_of(const Scores& s) {
           {"lpips_squeeze", number(s.squeeze)}};
 }
 
-int compare(const Options& options, const Networks& networks, Context& context) {
+int compare(const CompareArguments& options, const Networks& networks, Context& context) {
   const auto left = list_images({options.paths[0]}), right = list_images({options.paths[1]});
   if (left.size() != right.size())
     throw IoError(options.paths[1] + ": expected " + std::to_string(left.size()) + " images, as " +
@@ -87,7 +87,7 @@ int compare(const Options& options, const Networks& networks, Context& context) 
   return kOk;
 }
 
-std::filesystem::path reference_folder(const Options& options) {
+std::filesystem::path reference_folder(const CompareArguments& options) {
   if (!options.paths.empty()) return options.paths[0];
   auto folder = shared_data("lpips_reference");
   if (folder.empty()) throw UsageError("--reference: needs a folder, or FIELDMARK_DATA");
@@ -124,7 +124,7 @@ Json reference_row(const Json& pair, const char* name, const Lpips<float>& lpips
           {"ssim", ssim(a, b)}};
 }
 
-int compare_with_reference(const Options& options, const Networks& networks, Context& context) {
+int compare_with_reference(const CompareArguments& options, const Networks& networks, Context& context) {
   if (!networks.alex || !networks.squeeze)
     throw UsageError("--reference: needs both networks' weights, see --lpips-weights and --squeeze-weights");
   const auto folder = reference_folder(options);
@@ -164,7 +164,7 @@ int compare_with_reference(const Options& options, const Networks& networks, Con
   return worst <= kReferenceBar ? kOk : kFailed;
 }
 
-int run(const Options& options, Context& context) {
+int run_compare(const CompareArguments& options, Context& context) {
   if (!options.reference && options.paths.size() != 2)
     throw UsageError("expected two images or folders, got " + std::to_string(options.paths.size()));
   if (options.reference && options.paths.size() > 1)
@@ -178,7 +178,7 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_compare(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<CompareArguments>();
   app.add_option("images", o->paths,
                  "Two images, or two folders whose images are paired in order (PNG, JPEG)")
       ->type_name("IMAGE|DIR")
@@ -192,7 +192,7 @@ Command add_compare(CommandLine& app) {
       "--reference", o->reference,
       "Instead compare LPIPS with the reference values in a folder\n($FIELDMARK_DATA/lpips_reference); "
       "fails where one is off by more than 1e-4");
-  return [o](Context& context) { return run(*o, context); };
+  return [o](Context& context) { return run_compare(*o, context); };
 }
 
 }  // namespace fieldmark::cli

@@ -15,7 +15,7 @@
 namespace fieldmark::cli {
 namespace {
 
-struct Options {
+struct DataArguments {
   std::string name, folder, base_url;
 };
 
@@ -57,7 +57,7 @@ Manifest find(const std::string& name) {
                    (near.empty() ? "" : "; did you mean " + near + "?") + " (fieldmark data list names all)");
 }
 
-int verify(const Options& options, Context& context) {
+int verify(const DataArguments& options, Context& context) {
   const Manifest m = find(options.name);
   if (!std::filesystem::is_directory(options.folder)) throw IoError(options.folder + ": expected a folder");
   const InterruptGuard guard;
@@ -81,7 +81,7 @@ int verify(const Options& options, Context& context) {
   return faults.empty() ? kOk : kFailed;
 }
 
-int fetch(const Options& options, Context& context) {
+int fetch(const DataArguments& options, Context& context) {
   Manifest m = find(options.name);
   if (!options.base_url.empty()) m.base_url = options.base_url;
   const InterruptGuard guard;
@@ -105,7 +105,7 @@ int fetch(const Options& options, Context& context) {
   return kOk;
 }
 
-void add_name_and_folder(CommandLine& app, Options& options, const char* folder) {
+void add_name_and_folder(CommandLine& app, DataArguments& options, const char* folder) {
   app.add_option("name", options.name, "Data set to use, a name of `fieldmark data list`")
       ->required()
       ->type_name("NAME");
@@ -115,7 +115,7 @@ void add_name_and_folder(CommandLine& app, Options& options, const char* folder)
 }  // namespace
 
 Command add_data(CommandLine& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DataArguments>();
   CommandLine lists = app.add_subcommand("list", "List every data set with size, licence and source");
   CommandLine verifies =
       app.add_subcommand("verify", "Compare size and SHA-256 of each file with the manifest");

@@ -14,7 +14,7 @@
 namespace fieldmark::cli {
 namespace {
 
-struct Options {
+struct DistortArguments {
   std::vector<std::string> inputs;
   std::string out, distort;
   std::string background = "white";
@@ -35,7 +35,7 @@ std::vector<std::filesystem::path> outputs_of(const std::vector<std::filesystem:
   return outputs;
 }
 
-int run(const Options& options, Context& context) {
+int run_distort(const DistortArguments& options, Context& context) {
   const auto distortion =
       read_option("--distort", [&] { return distort::parse_distortion(options.distort); });
   const auto images = list_images(options.inputs);
@@ -65,7 +65,7 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_distort(CommandLine& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DistortArguments>();
   app.add_option("images", options->inputs, "Images to distort, or folders of them; PNG or JPEG")
       ->required()
       ->type_name("IMAGE|DIR")
@@ -93,7 +93,7 @@ Command add_distort(CommandLine& app) {
                  "Colour behind transparent pixels and in the corners of rotations: white, black")
       ->one_of({"white", "black"})
       ->type_name("COLOUR");
-  return [options](Context& context) { return run(*options, context); };
+  return [options](Context& context) { return run_distort(*options, context); };
 }
 
 }  // namespace fieldmark::cli

@@ -13,6 +13,7 @@
 #include <ostream>
 #include <span>
 
+#include <fieldmark/tools/results/sheet.h>
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
@@ -20,14 +21,13 @@
 #include "cli/measured.h"
 #include "cli/message_option.h"
 #include "cli/perceptual.h"
-#include <fieldmark/tools/results/sheet.h>
 
 namespace fieldmark::cli {
 namespace {
 
 constexpr Index kImagedViews = 4;
 
-struct Options {
+struct EmbedArguments {
   std::string field, out, key, image, lpips_weights;
   std::string preset = "fast", distances = "novel";
   Index bits = watermark::OwnerOptions{}.bits;
@@ -43,13 +43,14 @@ struct Options {
 };
 
 // A run that was begun without --key made one, and its checkpoint has it.
-watermark::Key key_of(const Options& options, const std::string& checkpoint) {
+watermark::Key key_of(const EmbedArguments& options, const std::string& checkpoint) {
   if (!options.key.empty()) return watermark::load_key(options.key);
   if (options.resume) return watermark::Embedder::checkpoint_key(checkpoint);
   return watermark::random_key();
 }
 
-std::vector<watermark::CachedView> cached_views(const Options& options, const nerf::RadianceField& field,
+std::vector<watermark::CachedView> cached_views(const EmbedArguments& options,
+                                                const nerf::RadianceField& field,
                                                 const watermark::PatchSize& patch, Context& context) {
   const InterruptGuard guard;
   Progress progress = context.progress("views");
@@ -61,18 +62,6 @@ std::vector<watermark::CachedView> cached_views(const Options& options, const ne
     progress.update(static_cast<double>(done) / static_cast<double>(total));
     return true;
   });
-}
-
-double embed(const Options& options, watermark::Embedder& embedder, const std::string& checkpoint,
-             Context& context) {
-  return run_long({.what = "embed",
-                   .done = [&] { return embedder.done(); },
-                   .step = [&](double seconds) { embedder.step(seconds); },
-                   .steps = [&] { return embedder.steps(); },
-                   .note = [&] { return embedder.note(); },
-                   .save = [&] { embedder.save(checkpoint); },
-                   .checkpoint = checkpoint},
-                  options.length, context);
 }
 
 void write_image(const std::string& path, const watermark::Owner& owner, std::uint64_t seed) {
@@ -87,7 +76,7 @@ void write_image(const std::string& path, const watermark::Owner& owner, std::ui
   write_png(path, results::comparison_sheet(pairs));
 }
 
-watermark::EmbedRecipe recipe_of(const Options& options, const nerf::RadianceField& field,
+watermark::EmbedRecipe recipe_of(const EmbedArguments& options, const nerf::RadianceField& field,
                                  std::uint64_t seed) {
   auto recipe = watermark::embed_recipe(options.preset);
   recipe.suit(field);
@@ -121,7 +110,7 @@ void say_cells(const watermark::Owner& owner, std::span<const watermark::CachedV
 }
 
 // From views that the owner has not learnt from.
-Json measure_owner(const Options& options, const watermark::Owner& owner, const Lpips<float>* lpips,
+Json measure_owner(const EmbedArguments& options, const watermark::Owner& owner, const Lpips<float>* lpips,
                    Context& context) {
   const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, options.measured_views,
                                           0, context.seed() + 1);
@@ -133,7 +122,7 @@ Json measure_owner(const Options& options, const watermark::Owner& owner, const 
   return measurement_json(measured, "novel");
 }
 
-int run(const Options& options, Context& context) {
+int run_embed(const EmbedArguments& options, Context& context) {
   const std::string checkpoint = options.out + ".checkpoint";
   const std::string image = options.image.empty() ? options.out + ".png" : options.image;
   if (std::filesystem::exists(options.out) && std::filesystem::equivalent(options.out, options.field))
@@ -155,7 +144,7 @@ int run(const Options& options, Context& context) {
   if (options.resume) embedder.restore(checkpoint);
 
   const InterruptGuard until_saved;  // between the last step and the file, Ctrl-C waits
-  const double seconds = embed(options, embedder, checkpoint, context);
+  const double seconds = run_long(embedder, "embed", options.length, context, checkpoint);
   embedder.calibrate();
   owner.save(options.out);
   std::filesystem::remove(checkpoint);
@@ -183,7 +172,7 @@ int run(const Options& options, Context& context) {
   return kOk;
 }
 
-void add_view_options(CommandLine& app, Options& o) {
+void add_view_options(CommandLine& app, EmbedArguments& o) {
   app.add_option("--views", o.views, "Views to learn from, 8 to 10000")->range(8, 10000)->type_name("N");
   app.add_option("--distances", o.distances,
                  "novel: novel cameras, the object always as large as the extractor sees it;\n"
@@ -205,7 +194,7 @@ void add_view_options(CommandLine& app, Options& o) {
 }  // namespace
 
 Command add_embed(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<EmbedArguments>();
   app.add_option("--field", o->field, "Trained field; it stays as it is")->required()->type_name("FIELD");
   app.add_option("--out", o->out, "File for the owner; OWNER.checkpoint while it trains")
       ->required()
@@ -259,7 +248,7 @@ Command add_embed(CommandLine& app) {
   add_lpips_weights(app, o->lpips_weights);
   app.add_flag("--resume", o->resume,
                "Go on from OWNER.checkpoint, with the options of the run that left it");
-  return [o](Context& context) { return run(*o, context); };
+  return [o](Context& context) { return run_embed(*o, context); };
 }
 
 }  // namespace fieldmark::cli

@@ -14,13 +14,13 @@
 namespace fieldmark::cli {
 namespace {
 
-struct Options {
+struct EvalArguments {
   std::string field, data, lpips_weights;
   std::string split = "test";
   Index size = 0, supersampling = 0;
 };
 
-int run(const Options& options, Context& context) {
+int run_eval(const EvalArguments& options, Context& context) {
   const auto field = nerf::RadianceField::load(options.field);
   const auto data = load_scene(
       options.data, {.split = options.split, .size = options.size, .background = field.background}, context);
@@ -79,7 +79,7 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_eval(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<EvalArguments>();
   app.add_option("--field", o->field, "Field to evaluate")->required()->type_name("FIELD");
   app.add_option("--data", o->data, "Data set to compare with, as in train")->required()->type_name("DIR");
   app.add_option("--split", o->split, "Part of the data set: train, val, test")
@@ -91,7 +91,7 @@ Command add_eval(CommandLine& app) {
       ->default_str("");
   add_supersampling(app, o->supersampling);
   add_lpips_weights(app, o->lpips_weights);
-  return [o](Context& context) { return run(*o, context); };
+  return [o](Context& context) { return run_eval(*o, context); };
 }
 
 }  // namespace fieldmark::cli

@@ -10,12 +10,12 @@
 namespace fieldmark::cli {
 namespace {
 
-struct Options {
+struct ExtractArguments {
   std::string owner, reading = "auto";
   std::vector<std::string> images;
 };
 
-int run(const Options& options, Context& context) {
+int run_extract(const ExtractArguments& options, Context& context) {
   const auto owner = watermark::Owner::load(options.owner);
   SuspectReader reader(owner, options.reading);
   const auto images = read_images(reader, options.images, context);
@@ -51,14 +51,14 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_extract(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<ExtractArguments>();
   app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
   add_reading(app, o->reading);
   app.add_option("images", o->images, "Images to read, or folders of them; PNG or JPEG")
       ->required()
       ->type_name("IMAGE|DIR")
       ->default_str("");
-  return [o](Context& context) { return run(*o, context); };
+  return [o](Context& context) { return run_extract(*o, context); };
 }
 
 }  // namespace fieldmark::cli

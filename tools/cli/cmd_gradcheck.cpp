@@ -26,7 +26,7 @@
 namespace fieldmark::cli {
 namespace {
 
-struct Options {
+struct GradcheckArguments {
   std::string only;
   bool numerics = false;
 };
@@ -39,7 +39,7 @@ struct Row {
 
 // The cases of all modules that have the text in their name. @throws UsageError if there are none
 template <class R, class Case>
-std::vector<R> collect(const Options& options,
+std::vector<R> collect(const GradcheckArguments& options,
                        std::initializer_list<std::pair<const char*, std::vector<Case>>> modules) {
   std::vector<R> rows;
   for (const auto& [module, cases] : modules)
@@ -72,7 +72,7 @@ Json to_json(const std::vector<Row>& rows, const Row& worst, Index entries, bool
   return json;
 }
 
-int run_gradients(const Options& options, Context& context) {
+int run_gradients(const GradcheckArguments& options, Context& context) {
   auto rows = collect<Row, GradcheckCase>(options, {{"engine", gradcheck_cases()},
                                                     {"imaging", imaging::gradcheck_cases()},
                                                     {"distort", distort::gradcheck_cases()},
@@ -155,7 +155,7 @@ Json numerics_json(const std::vector<NumericsRow>& rows, const std::vector<std::
   return json;
 }
 
-int run_numerics(const Options& options, Context& context) {
+int run_numerics(const GradcheckArguments& options, Context& context) {
   auto rows = collect<NumericsRow, NumericsCase>(options, {{"engine", numerics_cases()},
                                                            {"imaging", imaging::numerics_cases()},
                                                            {"distort", distort::numerics_cases()},
@@ -182,7 +182,7 @@ int run_numerics(const Options& options, Context& context) {
 }  // namespace
 
 Command add_gradcheck(CommandLine& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<GradcheckArguments>();
   app.add_option("--only", options->only, "Text that the names of the checks contain")
       ->type_name("TEXT")
       ->default_str("all");

@@ -13,7 +13,7 @@
 namespace fieldmark::cli {
 namespace {
 
-struct Options {
+struct InfoArguments {
   std::string file;
 };
 
@@ -27,7 +27,7 @@ Json metadata_json(const SafetensorsFile& file) {
   return json;
 }
 
-int run(const Options& options, Context& context) {
+int run_info(const InfoArguments& options, Context& context) {
   const auto file = SafetensorsFile::read(options.file);
   const std::string sha256 = sha256_file_hex(options.file);
   const Json metadata = metadata_json(file);
@@ -60,11 +60,11 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_info(CommandLine& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<InfoArguments>();
   app.add_option("file", options->file, "A field, owner, key or any other safetensors file")
       ->required()
       ->type_name("FILE");
-  return [options](Context& context) { return run(*options, context); };
+  return [options](Context& context) { return run_info(*options, context); };
 }
 
 }  // namespace fieldmark::cli

@@ -12,12 +12,12 @@
 namespace fieldmark::cli {
 namespace {
 
-struct Options {
+struct KeyArguments {
   std::string out;
   bool force = false;
 };
 
-int run(const Options& options, Context& context) {
+int run_key(const KeyArguments& options, Context& context) {
   // A lost key is a lost proof: it is replaced only on demand.
   if (std::filesystem::exists(options.out) && !options.force)
     throw IoError(options.out +
@@ -35,10 +35,10 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_key(CommandLine& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<KeyArguments>();
   app.add_option("--out", options->out, "File to write, the key")->required()->type_name("KEY");
   app.add_flag("--force", options->force, "Replace an existing key");
-  return [options](Context& context) { return run(*options, context); };
+  return [options](Context& context) { return run_key(*options, context); };
 }
 
 }  // namespace fieldmark::cli

@@ -19,7 +19,7 @@
 namespace fieldmark::cli {
 namespace {
 
-struct Options {
+struct MeasureArguments {
   std::string owner, field, data, lpips_weights;
   MessageOption message;
   std::vector<std::string> cameras{"novel"};
@@ -28,8 +28,8 @@ struct Options {
   std::vector<std::string> under;
 };
 
-std::vector<nerf::Camera> cameras_of(const std::string& set, const Options& options,
-                                     const watermark::Owner& owner, Context& context) {
+std::vector<nerf::Camera> measured_cameras(const std::string& set, const MeasureArguments& options,
+                                           const watermark::Owner& owner, Context& context) {
   if (set != "test")
     return nerf::make_cameras(owner.field.cameras, nerf::parse_camera_set(set), options.count, options.size,
                               context.seed());
@@ -41,7 +41,7 @@ std::vector<nerf::Camera> cameras_of(const std::string& set, const Options& opti
 }
 
 // Against the ground truth, apart from the figures against the unmarked field.
-nerf::Evaluation against_ground_truth(const Options& options, const nerf::RadianceField& field,
+nerf::Evaluation against_ground_truth(const MeasureArguments& options, const nerf::RadianceField& field,
                                       const char* what, Context& context) {
   const auto data = load_scene(
       options.data, {.split = "test", .size = options.size, .background = field.background}, context);
@@ -100,7 +100,7 @@ class PayloadCounts {
 };
 
 // Random payloads in place of random messages, one for each group of views.
-std::function<watermark::Message(Index)> messages_of(const Options& options,
+std::function<watermark::Message(Index)> messages_of(const MeasureArguments& options,
                                                      const watermark::PayloadCodec& codec,
                                                      std::uint64_t seed) {
   if (!options.payloads) return {};
@@ -113,7 +113,7 @@ std::function<watermark::Message(Index)> messages_of(const Options& options,
   return message;
 }
 
-struct Subject {
+struct MeasureSubject {
   watermark::Owner owner;
   std::optional<nerf::RadianceField> baked;
   std::optional<watermark::Message> message;
@@ -124,8 +124,9 @@ struct Measured {
   Json json, row;
 };
 
-Measured measured_on(const std::string& set, const std::vector<nerf::Camera>& cameras, const Options& options,
-                     const Subject& subject, const Lpips<float>* lpips, Context& context) {
+Measured measured_on(const std::string& set, const std::vector<nerf::Camera>& cameras,
+                     const MeasureArguments& options, const MeasureSubject& subject,
+                     const Lpips<float>* lpips, Context& context) {
   const Index bits = subject.owner.options().bits;
   if (options.together > static_cast<Index>(cameras.size()))
     throw UsageError("--together: there are " + std::to_string(cameras.size()) + " views");
@@ -150,7 +151,8 @@ Measured measured_on(const std::string& set, const std::vector<nerf::Camera>& ca
   return {json, measurement_row(measured, set)};
 }
 
-void add_ground_truth(const Options& options, const Subject& subject, Json& json, Context& context) {
+void add_ground_truth(const MeasureArguments& options, const MeasureSubject& subject, Json& json,
+                      Context& context) {
   const double marked = against_ground_truth(options, *subject.baked, "ground truth", context).psnr;
   const double unmarked =
       against_ground_truth(options, subject.owner.field, "ground truth, unmarked", context).psnr;
@@ -162,7 +164,7 @@ void add_ground_truth(const Options& options, const Subject& subject, Json& json
   json["psnr_gt_unmarked"] = number(unmarked);
 }
 
-int run(const Options& options, Context& context) {
+int run_measure(const MeasureArguments& options, Context& context) {
   if (options.message.given() == options.field.empty())
     throw UsageError("--field and a message: one needs the other");
   const bool test = std::ranges::count(options.cameras, "test") > 0;
@@ -173,13 +175,14 @@ int run(const Options& options, Context& context) {
   for (const auto& name : options.under)
     read_option("--distort", [&] { return distort::parse_distortion(name); });
   const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
-  Subject subject{watermark::Owner::load(options.owner), {}, {}};
+  MeasureSubject subject{watermark::Owner::load(options.owner), {}, {}};
   if (!options.field.empty()) {
     subject.message = message_of(options.message, subject.owner.options().bits);
     subject.baked.emplace(nerf::RadianceField::load(options.field));
   }
   std::vector<std::vector<nerf::Camera>> cameras;
-  for (const auto& set : options.cameras) cameras.push_back(cameras_of(set, options, subject.owner, context));
+  for (const auto& set : options.cameras)
+    cameras.push_back(measured_cameras(set, options, subject.owner, context));
   Json json, rows = Json::array();
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const Measured on =
@@ -196,7 +199,7 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_measure(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<MeasureArguments>();
   app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
   app.add_option("--field", o->field, "Baked field to measure; default: the mark as trained")
       ->type_name("BAKED")
@@ -243,7 +246,7 @@ Command add_measure(CommandLine& app) {
   add_lpips_weights(app, o->lpips_weights);
   return [o, count](Context& context) {
     o->count_given = count.count() > 0;
-    return run(*o, context);
+    return run_measure(*o, context);
   };
 }
 

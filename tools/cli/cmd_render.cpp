@@ -9,18 +9,18 @@
 #include <optional>
 #include <ostream>
 
+#include <fieldmark/tools/results/sheet.h>
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/precision.h"
 #include "cli/scene_data.h"
-#include <fieldmark/tools/results/sheet.h>
 #include "cli/supersampling.h"
 
 namespace fieldmark::cli {
 namespace {
 
-struct Options {
+struct RenderArguments {
   std::string field, out, data;
   std::string split = "test", cameras = "novel", precision = "fp32";
   std::string against, sheet;
@@ -30,7 +30,7 @@ struct Options {
 };
 
 // The samples of a ray if any were given, with those of the field for the rest.
-std::optional<nerf::RayPoints> points_of(const Options& options, const nerf::RadianceField& field) {
+std::optional<nerf::RayPoints> points_of(const RenderArguments& options, const nerf::RadianceField& field) {
   if (!options.average && !options.importance && !options.random) return {};
   if (!field.coarse)
     throw UsageError("--average, --importance, --random: only for fields trained with --preset mlp, which " +
@@ -49,7 +49,7 @@ struct NamedCamera {
   nerf::Camera camera;
 };
 
-std::vector<NamedCamera> cameras_of(const Options& options, const nerf::RadianceField& field,
+std::vector<NamedCamera> cameras_of(const RenderArguments& options, const nerf::RadianceField& field,
                                     Context& context) {
   std::vector<NamedCamera> cameras;
   if (!options.data.empty() || options.cameras == "test") {
@@ -68,7 +68,8 @@ std::vector<NamedCamera> cameras_of(const Options& options, const nerf::Radiance
 }
 
 // The views of both fields side by side, for the first few cameras.
-void write_sheet(const Options& options, nerf::Renderer& renderer, const std::vector<NamedCamera>& cameras) {
+void write_sheet(const RenderArguments& options, nerf::Renderer& renderer,
+                 const std::vector<NamedCamera>& cameras) {
   const auto other = nerf::RadianceField::load(options.against);
   nerf::Renderer against(other, {.supersampling = options.supersampling});
   std::vector<results::ImagePair> pairs;
@@ -77,7 +78,7 @@ void write_sheet(const Options& options, nerf::Renderer& renderer, const std::ve
   write_png(options.sheet, results::comparison_sheet(pairs));
 }
 
-int run(const Options& options, Context& context) {
+int run_render(const RenderArguments& options, Context& context) {
   if (options.cameras_given && !options.data.empty() && options.cameras != "test")
     throw UsageError("--cameras " + options.cameras + ": --data has cameras of its own");
   const auto field = nerf::RadianceField::load(options.field);
@@ -118,7 +119,7 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_render(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<RenderArguments>();
   app.add_option("--field", o->field, "Field to render")->required()->type_name("FIELD");
   app.add_option("--out", o->out, "Folder to write, one PNG per view")->required()->type_name("DIR");
   Option data = app.add_option("--data", o->data, "Data set whose cameras to use")->type_name("DIR");
@@ -163,7 +164,7 @@ Command add_render(CommandLine& app) {
   sheet->needs(against);
   return [o, cameras](Context& context) {
     o->cameras_given = cameras.count() > 0;
-    return run(*o, context);
+    return run_render(*o, context);
   };
 }
 

@@ -27,7 +27,7 @@ constexpr const char* kUnder[] = {"noise_0.1",  "rotation_30", "scale_0.75",  "b
                                   "noise_0.05", "noise_0.2",   "rotation_10", "rotation_60", "scale_0.5",
                                   "blur_0.5",   "blur_1",      "blur_2"};
 
-struct Options {
+struct ReproduceArguments {
   std::vector<std::string> tables, scenes, systems;
   std::string cells = "docs/results/rows/paper", work = "reproduce_work", lpips_weights;
   double budget = 300, base_seconds = 0;
@@ -36,7 +36,7 @@ struct Options {
   bool full = false, report_only = false;
 };
 
-std::vector<baselines::PaperScene> scenes_of(const Options& options) {
+std::vector<baselines::PaperScene> scenes_of(const ReproduceArguments& options) {
   std::vector<baselines::PaperScene> scenes;
   for (const std::string& given : options.scenes) {
     const std::filesystem::path folder = std::filesystem::path(given).lexically_normal();
@@ -53,9 +53,9 @@ std::vector<baselines::PaperScene> scenes_of(const Options& options) {
   return scenes;
 }
 
-std::vector<baselines::CellName> planned(const Options& options,
-                                         const std::vector<baselines::PaperScene>& scenes,
-                                         std::uint64_t seed) {
+std::vector<baselines::CellName> planned_cells(const ReproduceArguments& options,
+                                               const std::vector<baselines::PaperScene>& scenes,
+                                               std::uint64_t seed) {
   baselines::PlanOptions plan{.scenes = {}, .seed = seed, .full = options.full};
   for (const auto& scene : scenes) plan.scenes.push_back(scene.name);
   std::vector<std::string> tables = options.tables;
@@ -94,7 +94,7 @@ double seconds_of_a_cell(const std::vector<baselines::Cell>& cells, double budge
 }
 
 // Beside the folder of cells, where --report does not name it.
-std::filesystem::path write_page(const Options& options, const Context& context) {
+std::filesystem::path write_page(const ReproduceArguments& options, const Context& context) {
   std::filesystem::path folder = std::filesystem::path(options.cells).lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();  // "cells/"
   const std::filesystem::path page = context.options().report.empty()
@@ -105,7 +105,7 @@ std::filesystem::path write_page(const Options& options, const Context& context)
 }
 
 // A cell as a row, with its image beside it.
-void save(const Options& options, const std::vector<baselines::PaperScene>& scenes,
+void save(const ReproduceArguments& options, const std::vector<baselines::PaperScene>& scenes,
           const baselines::MeasuredCell& measured, double seconds) {
   const baselines::CellName& name = measured.cell.name;
   const auto scene =
@@ -149,7 +149,7 @@ class Shown {
   std::unique_ptr<Progress> progress_;
 };
 
-void measure(const Options& options, const std::vector<baselines::PaperScene>& scenes,
+void measure(const ReproduceArguments& options, const std::vector<baselines::PaperScene>& scenes,
              const std::vector<baselines::CellName>& missing, Context& context) {
   const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
   Shown shown(context);
@@ -188,13 +188,13 @@ void measure(const Options& options, const std::vector<baselines::PaperScene>& s
   }
 }
 
-int run(const Options& options, Context& context) {
+int run_reproduce(const ReproduceArguments& options, Context& context) {
   for (const auto& table : options.tables)
     read_option("--table", [&] { return baselines::parse_paper_table(table); });
   for (const auto& system : options.systems)
     read_option("--system", [&] { return baselines::paper_system(system).name; });
   const auto scenes = scenes_of(options);
-  const auto cells = planned(options, scenes, context.seed());
+  const auto cells = planned_cells(options, scenes, context.seed());
   std::filesystem::create_directories(options.cells);
   auto missing = missing_of(cells, options.cells);
   const double each = seconds_of_a_cell(baselines::load_cells(options.cells), options.budget);
@@ -217,7 +217,7 @@ int run(const Options& options, Context& context) {
   return kOk;
 }
 
-void add_measuring_options(CommandLine& app, Options& o) {
+void add_measuring_options(CommandLine& app, ReproduceArguments& o) {
   app.add_option("--budget", o.budget,
                  "Seconds of training for each cell, 0.1 to 86400; cells of other budgets that are there "
                  "stay: give them another --cells")
@@ -251,7 +251,7 @@ void add_measuring_options(CommandLine& app, Options& o) {
 }  // namespace
 
 Command add_reproduce(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<ReproduceArguments>();
   app.add_option("--table", o->tables,
                  "bits, quality, distortion, ablation, sampling or weights, several times (all)")
       ->type_name("NAME")
@@ -275,7 +275,7 @@ Command add_reproduce(CommandLine& app) {
   app.add_flag("--report-only", o->report_only,
                "Measure nothing: list what is missing and write the page (--report, or paper.md beside the "
                "folder of cells) and its figures");
-  return [o](Context& context) { return run(*o, context); };
+  return [o](Context& context) { return run_reproduce(*o, context); };
 }
 
 }  // namespace fieldmark::cli

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 using results::Plan;
 using results::PlannedRow;
 
-struct Options {
+struct ResultsArguments {
   std::string rows = "docs/results/rows", out = "docs/results", work = "results_work";
   std::vector<std::string> run;
   double budget = 86400;
@@ -37,7 +37,7 @@ PlannedRow planned(const Plan& plan, const std::string& id, const Json& row) {
 
 class Runner {
  public:
-  Runner(const Options& options, Context& context)
+  Runner(const ResultsArguments& options, Context& context)
       : options_(options),
         context_(context),
         rows_(results::load_rows(options.rows)),
@@ -139,7 +139,7 @@ class Runner {
     return code;
   }
 
-  const Options& options_;
+  const ResultsArguments& options_;
   Context& context_;
   const Plan& plan_ = Plan::project();
   const int threads_ = threads();
@@ -149,7 +149,7 @@ class Runner {
   Json counts_ = Json::object();
 };
 
-std::vector<PlannedRow> selected(const Options& options, const Runner& runner) {
+std::vector<PlannedRow> selected(const ResultsArguments& options, const Runner& runner) {
   std::vector<PlannedRow> rows;
   std::vector<std::string> unknown = options.run;
   for (const PlannedRow& row : Plan::project().rows()) {
@@ -174,7 +174,7 @@ Json age_in_days(const Json& row) {
   return (today - std::chrono::sys_days(date)).count();
 }
 
-Json list(const Runner& runner, Context& context) {
+Json list_rows(const Runner& runner, Context& context) {
   std::vector<std::string> ids;
   for (const PlannedRow& row : Plan::project().rows()) ids.push_back(row.id);
   for (const auto& [id, row] : runner.rows())
@@ -205,7 +205,7 @@ Json list(const Runner& runner, Context& context) {
   return listed;
 }
 
-void render(const Options& options, const Runner& runner, Context& context) {
+void render(const ResultsArguments& options, const Runner& runner, Context& context) {
   fs::create_directories(options.out);
   const auto pages = results::render_pages(results::project_pages(), runner.rows(),
                                            [&](const std::string& id) { return runner.stale(id); });
@@ -214,7 +214,7 @@ void render(const Options& options, const Runner& runner, Context& context) {
   context.text() << options.out << ": " << pages.size() + 1 << " pages and charts written\n";
 }
 
-int run(Options options, Context& context) {
+int run_results(ResultsArguments options, Context& context) {
   const bool runs = options.stale || !options.run.empty();
   if (options.draft) options.rows = (fs::path(options.work) / "rows").string();
   const std::string commit = results::machine().commit;
@@ -226,7 +226,7 @@ int run(Options options, Context& context) {
     runner.ensure(row);
   if (options.render) render(options, runner, context);
   Json json = runner.counts();
-  if (!runs && !options.render) json["rows"] = list(runner, context);
+  if (!runs && !options.render) json["rows"] = list_rows(runner, context);
   context.result(json);
   return json.contains("failed") ? kFailed : kOk;
 }
@@ -234,23 +234,23 @@ int run(Options options, Context& context) {
 }  // namespace
 
 Command add_results(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<ResultsArguments>();
   app.add_option("--rows", o->rows, "Folder of the rows, one JSON file each")->type_name("DIR");
   app.add_option("--out", o->out, "Folder of the pages, for --render")->type_name("DIR");
   app.add_option("--work", o->work, "Folder of fields, owners and logs that runs make")->type_name("DIR");
   auto named = app.add_option("--run", o->run,
-                               "Measure these rows and those they need; a folder names all in it. "
-                               "Fresh rows are skipped")
-                    ->delimiter(',')
-                    ->type_name("ID[,ID...]")
-                    ->default_str("");
+                              "Measure these rows and those they need; a folder names all in it. "
+                              "Fresh rows are skipped")
+                   ->delimiter(',')
+                   ->type_name("ID[,ID...]")
+                   ->default_str("");
   app.add_flag("--stale", o->stale, "Measure every row that is stale or missing")->excludes(named);
   app.add_option("--budget", o->budget, "Start no row that would end after so many seconds, 1 to 10000000")
       ->range(1.0, 1e7)
       ->type_name("S");
   app.add_flag("--draft", o->draft, "Keep rows in WORK/rows, also from changed sources");
   app.add_flag("--render", o->render, "Write all pages of docs/results from the rows alone");
-  return [o](Context& context) { return run(*o, context); };
+  return [o](Context& context) { return run_results(*o, context); };
 }
 
 }  // namespace fieldmark::cli

@@ -10,14 +10,14 @@
 namespace fieldmark::cli {
 namespace {
 
-struct Options {
+struct SceneArguments {
   std::string out;
   std::string kind = "objects";
   Index size = 200;
   Index views = 100;
 };
 
-int run(const Options& options, Context& context) {
+int run_scene(const SceneArguments& options, Context& context) {
   const nerf::SceneOptions scene{
       .kind = options.kind == "sphere" ? nerf::SceneKind::sphere : nerf::SceneKind::objects,
       .size = options.size,
@@ -46,7 +46,7 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_scene(CommandLine& app) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SceneArguments>();
   app.add_option("--out", options->out, "Folder to write, a data set in Blender layout")
       ->required()
       ->type_name("DIR");
@@ -61,7 +61,7 @@ Command add_scene(CommandLine& app) {
                  "Training images, 1 to 100000; val gets a tenth of that, test a quarter")
       ->range(1, 100000)
       ->type_name("N");
-  return [options](Context& context) { return run(*options, context); };
+  return [options](Context& context) { return run_scene(*options, context); };
 }
 
 }  // namespace fieldmark::cli

@@ -22,7 +22,7 @@ namespace {
 
 constexpr double kSizing = 1. / 3;  // of --seconds, at most
 
-struct Options {
+struct TrainArguments {
   std::string data, out;
   std::string preset = "hash", model = "fixed", background, precision = "fp32";
   Index size = 0, supersampling = 1;
@@ -87,7 +87,8 @@ nerf::RadianceFieldOptions sized(const nerf::RadianceFieldOptions& start, const 
   return sizing.field;
 }
 
-nerf::PsnrTarget psnr_target(const Options& options, const nerf::RadianceField& field, Context& context) {
+nerf::PsnrTarget psnr_target(const TrainArguments& options, const nerf::RadianceField& field,
+                             Context& context) {
   std::optional<nerf::Dataset> held_out;
   if (options.target_psnr > 0 && nerf::has_split(options.data, "val"))
     held_out = load_scene(
@@ -96,26 +97,8 @@ nerf::PsnrTarget psnr_target(const Options& options, const nerf::RadianceField& 
   return {field, options.target_psnr, std::move(held_out)};
 }
 
-double train(const Options& options, nerf::Trainer& trainer, nerf::PsnrTarget& target,
-             const std::string& checkpoint, Context& context) {
-  return run_long(
-      {.what = "train",
-       .done = [&] { return trainer.done() || target.reached(trainer.steps(), trainer.train_psnr()); },
-       .step = [&](double seconds) { trainer.step(seconds); },
-       .steps = [&] { return trainer.steps(); },
-       .note =
-           [&] {
-             char note[64];
-             std::snprintf(note, sizeof note, "%.2f dB on the rays trained", trainer.train_psnr());
-             return std::string(note);
-           },
-       .save = [&] { trainer.save(checkpoint); },
-       .checkpoint = checkpoint},
-      options.length, context);
-}
-
 // Of the data set's test views, after everything is saved; null where there are none.
-Json test_psnr(const Options& options, const nerf::RadianceField& field, Context& context) {
+Json test_psnr(const TrainArguments& options, const nerf::RadianceField& field, Context& context) {
   if (!nerf::has_split(options.data, "test")) return nullptr;
   const auto data = load_scene(
       options.data, {.split = "test", .size = options.size, .background = background_of(options.background)},
@@ -131,7 +114,7 @@ Json test_psnr(const Options& options, const nerf::RadianceField& field, Context
   return evaluation.psnr;
 }
 
-int run(const Options& options, Context& context) {
+int run_train(const TrainArguments& options, Context& context) {
   const std::string checkpoint = options.out + ".checkpoint";
   if (options.model == "sized" && options.preset == "mlp")
     throw UsageError("--model sized: the mlp preset has one size");
@@ -165,11 +148,15 @@ int run(const Options& options, Context& context) {
   train_options.carve = !options.no_carve;
   nerf::Trainer trainer(field, data, train_options);
   if (options.resume) trainer.restore(checkpoint);
+  if (trainer.from_earlier_version())
+    context.note(checkpoint +
+                 ": a checkpoint of version 0.1, which knows its data set by name and size alone");
 
   nerf::PsnrTarget target = psnr_target(options, field, context);
   const double begun = context.seconds(), samples_before = trainer.samples();
   const InterruptGuard until_saved;  // between the last step and the file, Ctrl-C waits
-  const double seconds = train(options, trainer, target, checkpoint, context);
+  const double seconds = run_long(trainer, "train", options.length, context, checkpoint,
+                                  [&] { return target.reached(trainer.steps(), trainer.train_psnr()); });
   field.save(options.out);
   std::filesystem::remove(checkpoint);
 
@@ -199,7 +186,7 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_train(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<TrainArguments>();
   app.add_option(
          "--data", o->data,
          "Data set to train on: folder with transforms_*.json, transforms.json, poses_bounds.npy or a COLMAP "
@@ -252,7 +239,7 @@ Command add_train(CommandLine& app) {
   app.add_flag("--no-carve", o->no_carve, "Keep samples outside the silhouettes");
   app.add_flag("--resume", o->resume,
                "Resume from FIELD.checkpoint, with the options of the interrupted run");
-  return [o](Context& context) { return run(*o, context); };
+  return [o](Context& context) { return run_train(*o, context); };
 }
 
 }  // namespace fieldmark::cli

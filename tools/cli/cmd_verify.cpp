@@ -6,19 +6,19 @@
 #include <memory>
 #include <ostream>
 
+#include <fieldmark/tools/results/report.h>
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/evidence_run.h"
 #include "cli/message_option.h"
-#include <fieldmark/tools/results/report.h>
 
 namespace fieldmark::cli {
 namespace {
 
 constexpr Index kEvidenceKeys = 100000;
 
-struct Options {
+struct VerifyArguments {
   std::string owner, key, evidence, reading = "auto";
   MessageOption message;
   double fpr = 1e-6;
@@ -104,7 +104,7 @@ Json result_json(const watermark::EvidenceRecord& record, const std::string& sig
           {"controls", controls_json(record.controls, record.fpr)}};
 }
 
-int run(const Options& options, Context& context) {
+int run_verify(const VerifyArguments& options, Context& context) {
   const auto owner = watermark::Owner::load(options.owner);
   const Index bits = owner.options().bits;
   const auto message = message_of(options.message, bits);
@@ -162,7 +162,7 @@ int run(const Options& options, Context& context) {
 }  // namespace
 
 Command add_verify(CommandLine& app) {
-  auto o = std::make_shared<Options>();
+  auto o = std::make_shared<VerifyArguments>();
   app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
   add_message_options(app, o->message, "Message to look for");
   app.add_option("--fpr", o->fpr, "False-positive rate at which a mark counts as found, above 0 to 1")
@@ -190,7 +190,7 @@ Command add_verify(CommandLine& app) {
       ->required()
       ->type_name("IMAGE|DIR")
       ->default_str("");
-  return [o](Context& context) { return run(*o, context); };
+  return [o](Context& context) { return run_verify(*o, context); };
 }
 
 }  // namespace fieldmark::cli

@@ -212,7 +212,7 @@ std::string controls_table(const EvidenceRecord& r, const PageImages& images) {
   return out + "</tbody></table>\n";
 }
 
-std::string wrong_keys(const EvidenceRecord& r) {
+std::string wrong_keys_section(const EvidenceRecord& r) {
   if (!r.wrong_keys) return "";
   const auto& w = *r.wrong_keys;
   using Counts = watermark::WrongKeyCounts;
@@ -273,7 +273,7 @@ std::string evidence_page(const EvidenceRecord& record, const watermark::PublicK
                           const PageImages& images) {
   return kHead + std::string("<h1>Evidence of a mark</h1>\n") + verdict(record) + controls_verdict(record) +
          kLimits + figures(record) + images_table(record, images) + controls_table(record, images) +
-         wrong_keys(record) + identity(record, signer) + "</body>\n</html>\n";
+         wrong_keys_section(record) + identity(record, signer) + "</body>\n</html>\n";
 }
 
 }  // namespace fieldmark::cli

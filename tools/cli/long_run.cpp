@@ -4,16 +4,6 @@
 #include "cli/context.h"
 
 namespace fieldmark::cli {
-namespace {
-
-[[noreturn]] void interrupt(const Work& work) {
-  const std::string steps = "after " + std::to_string(work.steps()) + " steps";
-  if (!work.save) throw Interrupted(steps + ", nothing was written");
-  work.save();
-  throw Interrupted(steps + ", --resume continues from " + work.checkpoint);
-}
-
-}  // namespace
 
 void add_run_length(CommandLine& app, RunLength& length, bool checkpoint) {
   Option steps =
@@ -33,24 +23,26 @@ void add_run_length(CommandLine& app, RunLength& length, bool checkpoint) {
       ->type_name("S");
 }
 
-double run_long(const Work& work, const RunLength& length, Context& context) {
+double run_long(TrainingRun& run, const std::string& what, const RunLength& length, Context& context,
+                const std::string& checkpoint, std::function<bool()> enough) {
   const InterruptGuard guard;
-  Progress progress = context.progress(work.what);
-  double saved = context.seconds();
-  while (!work.done()) {
-    if (guard.interrupted()) interrupt(work);
-    const double now = context.seconds();
-    if (work.save && now - saved > length.checkpoint_seconds) {
-      work.save();
-      saved = context.seconds();
-    }
-    work.step(now);
+  Progress progress = context.progress(what);
+  const auto tell = [&](double now) {
     const double part = length.steps > 0
-                            ? static_cast<double>(work.steps()) / static_cast<double>(length.steps)
+                            ? static_cast<double>(run.steps()) / static_cast<double>(length.steps)
                             : now / length.seconds;
-    progress.update(part, "step " + std::to_string(work.steps()) + "  " + work.note());
-  }
-  return context.seconds();
+    progress.update(part, "step " + std::to_string(run.steps()) + "  " + run.status());
+  };
+  const bool complete = run.drive({.checkpoint = checkpoint,
+                                   .checkpoint_seconds = length.checkpoint_seconds,
+                                   .clock = [&] { return context.seconds() - length.from; },
+                                   .enough = std::move(enough),
+                                   .proceed = [&] { return !guard.interrupted(); },
+                                   .after = tell});
+  if (complete) return context.seconds();
+  throw Interrupted(
+      "after " + std::to_string(run.steps()) + " steps" +
+      (checkpoint.empty() ? ", nothing was written" : ", --resume continues from " + checkpoint));
 }
 
 }  // namespace fieldmark::cli

@@ -1,8 +1,5 @@
 #pragma once
-#include <fieldmark/engine/shape.h>
-
-#include <functional>
-#include <string>
+#include <fieldmark/engine/training_run.h>
 
 #include "cli/command_line.h"
 
@@ -15,23 +12,16 @@ struct RunLength {
   Index steps = 0;  ///< 0: by time
   double seconds = 60;
   double checkpoint_seconds = 60;
+  double from = 0;  ///< seconds of the command at which the run's clock starts
 };
 /// Adds --steps and --seconds, and with `checkpoint` --checkpoint-seconds.
 void add_run_length(CommandLine& app, RunLength& length, bool checkpoint);
 
-/// Work in steps, as the library's trainers offer it.
-struct Work {
-  std::string what;                   ///< shown before the progress
-  std::function<bool()> done;         ///< whether it is at its end
-  std::function<void(double)> step;   ///< takes one step, given the seconds since the command began
-  std::function<Index()> steps;       ///< taken so far
-  std::function<std::string()> note;  ///< shown behind the progress
-  std::function<void()> save;         ///< writes `checkpoint`; empty where the work cannot be resumed
-  std::string checkpoint;
-};
-
-/// Takes steps until the work is done, shows progress, saves now and then and when the user presses Ctrl-C.
+/// Drives a run to its end, shows progress, and saves it from time to time and at Ctrl-C.
+/// @param what  shown before the progress   @param checkpoint  its file; empty: the run is not saved
+/// @param enough  ends the run early, see DriveOptions
 /// @return seconds since the command began   @throws Interrupted after saving
-double run_long(const Work& work, const RunLength& length, Context& context);
+double run_long(TrainingRun& run, const std::string& what, const RunLength& length, Context& context,
+                const std::string& checkpoint = {}, std::function<bool()> enough = {});
 
 }  // namespace fieldmark::cli

@@ -9,8 +9,6 @@
 namespace fieldmark::cli {
 namespace {
 
-using Json = nlohmann::json;
-
 bool is_sha256(const std::string& text) {
   return text.size() == 64 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
@@ -20,7 +18,7 @@ bool stays_below(const std::filesystem::path& path) {
   return !path.empty() && path.is_relative() && std::find(path.begin(), path.end(), "..") == path.end();
 }
 
-Manifest from_json(const Json& json) {
+Manifest from_json(const nlohmann::json& json) {
   if (json.at("format") != 1) throw IoError("format: expected 1, found " + json.at("format").dump());
   Manifest m{.name = json.at("name"),
              .kind = json.at("kind"),
@@ -61,7 +59,7 @@ std::uintmax_t Manifest::bytes() const {
 
 Manifest parse_manifest(std::string_view text, const std::string& origin) {
   try {
-    return from_json(Json::parse(text));
+    return from_json(nlohmann::json::parse(text));
   } catch (const std::exception& e) {
     throw IoError(origin + ": not a manifest of a data set: " + e.what());
   }

@@ -62,20 +62,7 @@ nerf::RadianceField start(const std::string& name, const nerf::RadianceField& fi
 // Takes the steps until the run is done.
 void train(const std::string& name, nerf::Trainer& trainer, const RunLength& length, Context& context,
            Json& result) {
-  const double seconds =
-      run_long({.what = name,
-                .done = [&] { return trainer.done(); },
-                .step = [&](double now) { trainer.step(now); },
-                .steps = [&] { return trainer.steps(); },
-                .note =
-                    [&] {
-                      char note[64];
-                      std::snprintf(note, sizeof note, "%.2f dB on the rays trained", trainer.train_psnr());
-                      return std::string(note);
-                    },
-                .save = {},
-                .checkpoint = {}},
-               length, context);
+  const double seconds = run_long(trainer, name, length, context);
   result["steps"] = trainer.steps();
   result["seconds"] = seconds;
   result["psnr_trained"] = number(trainer.train_psnr());

@@ -8,13 +8,15 @@ target_compile_options(fieldmark_common_warnings INTERFACE
      $<$<BOOL:${FIELDMARK_WERROR}>:-Werror>>
   # GCC 12 warns of the standard library inlined at -O3, std::string first of all (its bug 105651).
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:
-     -Wno-restrict -Wno-stringop-overflow -Wno-stringop-overread>)
+     -Wno-restrict -Wno-stringop-overflow -Wno-stringop-overread>
+  # In a unity build every source is included, and an anonymous namespace looks like that of a header.
+  $<$<AND:$<CXX_COMPILER_ID:GNU>,$<BOOL:${CMAKE_UNITY_BUILD}>>:-Wno-subobject-linkage>)
 add_library(fieldmark_warnings INTERFACE)
 target_link_libraries(fieldmark_warnings INTERFACE fieldmark_common_warnings)
 target_compile_options(fieldmark_warnings INTERFACE $<$<CXX_COMPILER_ID:GNU,Clang>:-Wconversion -Wsign-conversion>)
 
 # fieldmark_room(<room> [MAY_USE <room>...] [UNITS <unit>...] [INTERNAL <unit>...] [PRIVATE <unit>...]
-#                [HEADER_ONLY <unit>...] [KERNELS <unit>...] [PARTS <source>...] [TESTS <test>...]
+#                [HEADER_ONLY <unit>...] [KERNELS <unit>...] [PARTS <source>...] [ALONE <unit>...] [TESTS <test>...]
 #                [LIBRARIES <private target>...] [NOT_INSTALLED])
 #
 # A room is a folder with a target of its own: room a/b is the target fieldmark_a_b, alias fieldmark::a_b. It sees the
@@ -25,14 +27,15 @@ target_compile_options(fieldmark_warnings INTERFACE $<$<CXX_COMPILER_ID:GNU,Clan
 #   INTERNAL  the same, not installed: for other rooms of this project alone
 #   PRIVATE   the header is src/u.h: for this room alone
 #   PARTS     sources in src/ that share a unit's header; TESTS: further tests in tests/ROOM/
-# HEADER_ONLY names those of the units above that have no source.
+# HEADER_ONLY names those of the units above that have no source; ALONE those whose source is never compiled together with
+# others in a unity build (CMAKE_UNITY_BUILD, which halves the time of a build from scratch).
 #
 # A kernel k is src/kernels/k.h + k.cpp with its test in tests/ROOM/kernels/k_test.cpp. Its source is compiled once for
 # each instruction set in FIELDMARK_ISA_LEVELS and chosen at run time (fieldmark/engine/kernel.h).
 set(FIELDMARK_ISA_LEVELS v2 v3 v4)
 function(fieldmark_room room)
   cmake_parse_arguments(PARSE_ARGV 1 M "NOT_INSTALLED" ""
-    "MAY_USE;UNITS;INTERNAL;PRIVATE;HEADER_ONLY;KERNELS;PARTS;TESTS;LIBRARIES")
+    "MAY_USE;UNITS;INTERNAL;PRIVATE;HEADER_ONLY;ALONE;KERNELS;PARTS;TESTS;LIBRARIES")
   string(REPLACE / _ name ${room})
   set(target fieldmark_${name})
   fieldmark_room_tests(${room})
@@ -43,6 +46,8 @@ function(fieldmark_room room)
       list(APPEND sources src/${unit}.cpp)
     endif()
   endforeach()
+  list(TRANSFORM M_ALONE REPLACE "(.+)" "src/\\1.cpp" OUTPUT_VARIABLE alone)
+  set_source_files_properties(${alone} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   list(TRANSFORM M_UNITS REPLACE "(.+)" "include/fieldmark/${room}/\\1.h" OUTPUT_VARIABLE installed)
   fieldmark_kernels(${target} "${M_KERNELS}" kernels)
 
@@ -101,7 +106,7 @@ function(fieldmark_kernels target kernels result)
       target_compile_features(${object} PRIVATE cxx_std_20)
       target_include_directories(${object} PRIVATE src include ${PROJECT_SOURCE_DIR}/engine/include)
       target_link_libraries(${object} PRIVATE fieldmark_common_warnings)
-      set_target_properties(${object} PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_EXTENSIONS OFF)
+      set_target_properties(${object} PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_EXTENSIONS OFF UNITY_BUILD OFF)
       list(APPEND objects $<TARGET_OBJECTS:${object}>)
     endforeach()
   endforeach()

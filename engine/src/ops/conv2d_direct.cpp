@@ -159,5 +159,6 @@ void direct_input_gradient(Tape<T>& tape, const ConvGeometry& g, const T* w, con
   template void direct_input_gradient(Tape<T>&, const ConvGeometry&, const T*, const T*, const T*, bool, T*);
 FIELDMARK_INSTANTIATE(float)
 FIELDMARK_INSTANTIATE(double)
+#undef FIELDMARK_INSTANTIATE
 
 }  // namespace fieldmark::detail

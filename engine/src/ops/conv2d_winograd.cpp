@@ -147,5 +147,6 @@ void winograd_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* x, 
   template void winograd_weight_gradient(Tape<T>&, const ConvGeometry&, const T*, const T*, const T*, T*);
 FIELDMARK_INSTANTIATE(float)
 FIELDMARK_INSTANTIATE(double)
+#undef FIELDMARK_INSTANTIATE
 
 }  // namespace fieldmark::detail

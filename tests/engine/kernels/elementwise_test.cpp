@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "support/catch.h"
+#include "support/each_isa.h"
 #include "support/random.h"
 #include "support/worst.h"
 
@@ -47,23 +48,10 @@ double reference_slope(Unary f, double x) {
   }
 }
 
-// Runs `check` at every instruction set of this CPU.
-template <class F>
-void for_levels(F check) {
-  const Isa before = isa();
-  for (Isa level : {Isa::v2, Isa::v3, Isa::v4}) {
-    if (level > isa_supported()) continue;
-    force_isa(level);
-    INFO("level " << isa_name());
-    check();
-  }
-  force_isa(before);
-}
-
 }  // namespace
 
 TEST_CASE("kernels/elementwise: every length and an odd offset, forward and backward") {
-  for_levels([] {
+  each_isa([] {
     for (Unary f : kAll)
       for (std::int64_t n = 0; n <= 130; ++n) {
         const auto x = uniform<float>({n + 1}, -6, 6, 1), dy = uniform<float>({n + 1}, -1, 1, 2);
@@ -92,7 +80,7 @@ TEST_CASE("kernels/elementwise: relative error of the float path against double"
     Unary f;
     double lo, hi, bound;
   };
-  for_levels([] {
+  each_isa([] {
     for (const Range r :
          {Range{Unary::sigmoid, -87.3, 100, 4e-7}, Range{Unary::tanh, -30, 30, 3e-7},
           Range{Unary::tanh, -1e-3, 1e-3, 3e-7}, Range{Unary::exp, -87.3, 88, 3e-7},
@@ -117,7 +105,7 @@ TEST_CASE("kernels/elementwise: the float limits, infinities and NaN") {
   const std::vector<std::vector<float>> want{
       {0, 0, 0, 0, 88, 100, inf},  {0, 0, 0, 0.5f, 1, 1, 1},    {-1, -1, -1, 0, 1, 1, 1},
       {0, 0, 0, 1, top, top, top}, {0, 0, 0, 1, e15, e15, e15}, {0, 0, 0, 0.69314718f, 88, 100, inf}};
-  for_levels([&] {
+  each_isa([&] {
     for (Unary f : kAll) {
       std::vector<float> y(x.size());
       FIELDMARK_KERNEL(unary_forward<float>)(f, x.data(), y.data(), static_cast<std::int64_t>(x.size()));
@@ -131,7 +119,7 @@ TEST_CASE("kernels/elementwise: the float limits, infinities and NaN") {
 }
 
 TEST_CASE("kernels/elementwise: sum of exponentials") {
-  for_levels([] {
+  each_isa([] {
     for (std::int64_t n = 0; n <= 130; ++n) {
       const auto x = uniform<float>({n + 1}, -20, 3, 5);
       std::vector<float> y(static_cast<std::size_t>(n) + 2, 7.f);

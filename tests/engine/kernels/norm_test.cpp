@@ -4,24 +4,12 @@
 #include <vector>
 
 #include "support/catch.h"
+#include "support/each_isa.h"
 #include "support/random.h"
 #include "support/worst.h"
 
 namespace fieldmark::kernels {
 namespace {
-
-// Runs `check` at every instruction set of this CPU.
-template <class F>
-void for_levels(F check) {
-  const Isa before = isa();
-  for (Isa level : {Isa::v2, Isa::v3, Isa::v4}) {
-    if (level > isa_supported()) continue;
-    force_isa(level);
-    INFO("level " << isa_name());
-    check();
-  }
-  force_isa(before);
-}
 
 // One case with its plain double answer. Pixels begin one number into their buffers: at no address of a
 // vector.
@@ -84,7 +72,7 @@ void check_case(const Case& k, bool relu) {
 }  // namespace
 
 TEST_CASE("kernels/norm: every number of channels, and pixels that do and do not fill a segment") {
-  for_levels([] {
+  each_isa([] {
     for (std::int64_t c = 1; c <= 130; ++c)
       for (std::int64_t p : {1, 31, 37}) {
         const Case k(p, c);
@@ -98,7 +86,7 @@ TEST_CASE("kernels/norm: every number of channels, and pixels that do and do not
 
 TEST_CASE("kernels/norm: moments of pixels far from 0") {
   // 1000 +- 1e-3: a sum of squares in float would keep no digit of the variance.
-  for_levels([] {
+  each_isa([] {
     for (std::int64_t channels = 1; channels <= 130; ++channels) {
       const std::int64_t pixels = channels % 50 == 1 ? 1001 : 131 - channels % 64;
       const auto noise = uniform<float>({pixels * channels}, -1e-3, 1e-3, 9);
@@ -121,7 +109,7 @@ TEST_CASE("kernels/norm: moments of pixels far from 0") {
 }
 
 TEST_CASE("kernels/norm: moments of constant pixels are exact") {
-  for_levels([] {
+  each_isa([] {
     for (float v : {0.f, 0.1f, 1234.567f, -3e7f}) {
       const std::vector<float> x(1003 * 11, v);
       std::vector<double> mean(11), m2(11);

@@ -4,24 +4,12 @@
 #include <vector>
 
 #include "support/catch.h"
+#include "support/each_isa.h"
 #include "support/random.h"
 #include "support/worst.h"
 
 namespace fieldmark::kernels {
 namespace {
-
-// Runs `check` at every instruction set of this CPU.
-template <class F>
-void for_levels(F check) {
-  const Isa before = isa();
-  for (Isa level : {Isa::v2, Isa::v3, Isa::v4}) {
-    if (level > isa_supported()) continue;
-    force_isa(level);
-    INFO("level " << isa_name());
-    check();
-  }
-  force_isa(before);
-}
 
 // Windows of size x size, one pixel left over at the end of each row.
 void check_windows(std::int64_t windows, std::int64_t size, std::int64_t channels) {
@@ -55,7 +43,7 @@ void check_windows(std::int64_t windows, std::int64_t size, std::int64_t channel
 }  // namespace
 
 TEST_CASE("kernels/pool: windows, for every number of channels") {
-  for_levels([] {
+  each_isa([] {
     for (std::int64_t channels = 1; channels <= 130; ++channels) check_windows(3, 2, channels);
     for (std::int64_t size : {1, 3, 5}) check_windows(4, size, 17);
     check_windows(0, 2, 5);
@@ -63,7 +51,7 @@ TEST_CASE("kernels/pool: windows, for every number of channels") {
 }
 
 TEST_CASE("kernels/pool: sums over pixels and their transpose, for every number of channels") {
-  for_levels([] {
+  each_isa([] {
     for (std::int64_t channels = 1; channels <= 130; ++channels) {
       const std::int64_t pixels = 131 - channels;
       const auto x = uniform<float>({pixels * channels}, -1, 1, 1);

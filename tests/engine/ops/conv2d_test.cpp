@@ -11,12 +11,12 @@
 using namespace fieldmark;
 
 namespace {
-struct Result {
+struct Conv2dResult {
   std::vector<float> y, dx, dw, db;
-  bool operator==(const Result&) const = default;
+  bool operator==(const Conv2dResult&) const = default;
 };
 
-Result run(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, Activation act) {
+Conv2dResult run(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, Activation act) {
   Tape<float> tape;
   Tensor<float> dx(x.shape), dw(w.shape), db(b.shape);
   const auto y = conv2d(tape.leaf(x, dx), tape.leaf(w, dw), tape.leaf(b, db), act);
@@ -26,7 +26,8 @@ Result run(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& 
 }
 
 // The definition, in double.
-Result plain(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, Activation act) {
+Conv2dResult plain_conv2d(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b,
+                          Activation act) {
   const Index N = x.shape[0], H = x.shape[1], W = x.shape[2], C = x.shape[3], K = w.shape[0], O = w.shape[3],
               r = K / 2;
   std::vector<double> y(N * H * W * O), dx(x.size()), dw(w.size()), db(O);
@@ -69,9 +70,9 @@ double error(const std::vector<float>& a, const std::vector<float>& b) {
 // values and gradients.
 void expect_close(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, Activation act,
                   double most) {
-  const Result want = plain(x, w, b, act);
+  const Conv2dResult want = plain_conv2d(x, w, b, act);
   each_isa([&] {
-    const Result got = run(x, w, b, act);
+    const Conv2dResult got = run(x, w, b, act);
     CHECK(error(got.y, want.y) < most);
     CHECK(error(got.dx, want.dx) < most);
     CHECK(error(got.dw, want.dw) < most);
@@ -95,7 +96,7 @@ TEST_CASE("conv2d: the float path, forward and all gradients, against the defini
         CAPTURE(N, H, W, C, O, K);
         const auto x = uniform<float>({N, H, W, C}, -1, 1, 1), w = uniform<float>({K, K, C, O}, -1, 1, 2),
                    b = uniform<float>({O}, -1, 1, 3);
-        const Result got = run(x, w, b, act), want = plain(x, w, b, act);
+        const Conv2dResult got = run(x, w, b, act), want = plain_conv2d(x, w, b, act);
         CHECK(error(got.y, want.y) < 1e-6);
         CHECK(error(got.dx, want.dx) < 1e-6);
         CHECK(error(got.dw, want.dw) < 3e-6);  // a sum over up to 1,240 pixels: 1.5e-6 measured
@@ -140,10 +141,10 @@ TEST_CASE("conv2d: a large offset, a huge pixel and zeros through Winograd's way
   const Index row = 14, column = 17;
   spot[(row * 30 + column) * 24 + 5] = 1e6f;
   expect_close(spot, w, b, Activation::none, 4e-6);  // 2.8e-6 measured
-  const Result small = plain(even, w, b, Activation::none);
+  const Conv2dResult small = plain_conv2d(even, w, b, Activation::none);
   each_isa([&] {
     // Outputs more than 4 pixels away do not feel it.
-    const Result got = run(spot, w, b, Activation::none);
+    const Conv2dResult got = run(spot, w, b, Activation::none);
     double worst = 0;
     for (Index p = 0; p < 900; ++p)
       if (std::max(std::abs(p / 30 - row), std::abs(p % 30 - column)) > 4)
@@ -151,7 +152,7 @@ TEST_CASE("conv2d: a large offset, a huge pixel and zeros through Winograd's way
           raise_to(worst, std::abs(double(got.y[p * 32 + o]) - small.y[p * 32 + o]));
     CHECK(worst < 3e-5);  // 2.3e-5 measured, of numbers up to 20
 
-    const Result nothing = run(Tensor<float>(even.shape), w, b, Activation::none);
+    const Conv2dResult nothing = run(Tensor<float>(even.shape), w, b, Activation::none);
     for (Index i = 0; i < 900 * 32; ++i)
       if (nothing.y[i] != b[i % 32]) FAIL("output " << i << " is not the bias");
     for (float v : nothing.dw)
@@ -167,7 +168,7 @@ TEST_CASE("conv2d: NaN in an image reaches every output that sees it and none mo
       for (Index column = 0; column < side; ++column) {
         auto x = uniform<float>({1, side, side, c}, -1, 1, 1);
         x[(row * side + column) * c + 3] = std::nanf("");
-        const Result got = run(x, w, b, act);
+        const Conv2dResult got = run(x, w, b, act);
         for (Index i = 0; i < side * side * c; ++i) {
           const Index p = i / c, far = std::max(std::abs(p / side - row), std::abs(p % side - column));
           if (far <= 1 && !std::isnan(got.y[i]))
@@ -213,7 +214,7 @@ TEST_CASE("conv2d: same bits for 1 and 2 threads, also where the sum over pixels
                  b = uniform<float>({O}, -1, 1, 3);
       const int before = threads();
       set_threads(1);
-      const Result one = run(x, w, b, Activation::relu);
+      const Conv2dResult one = run(x, w, b, Activation::relu);
       set_threads(2);
       CHECK(one == run(x, w, b, Activation::relu));
       set_threads(before);
@@ -228,7 +229,7 @@ TEST_CASE("conv2d: an image alone has the same bits as in a batch") {
                  w = uniform<float>({3, 3, c, 64}, -1, 1, 2), b = uniform<float>({64}, -1, 1, 3);
       Tensor<float> last({1, side, side, c});
       std::copy(x.data.end() - last.size(), x.data.end(), last.data.begin());
-      const Result all = run(x, w, b, Activation::relu), alone = run(last, w, b, Activation::relu);
+      const Conv2dResult all = run(x, w, b, Activation::relu), alone = run(last, w, b, Activation::relu);
       CAPTURE(side, c);
       CHECK(std::equal(alone.y.begin(), alone.y.end(), all.y.end() - static_cast<Index>(alone.y.size())));
       CHECK(std::equal(alone.dx.begin(), alone.dx.end(), all.dx.end() - static_cast<Index>(alone.dx.size())));
@@ -237,8 +238,8 @@ TEST_CASE("conv2d: an image alone has the same bits as in a batch") {
 
 namespace {
 // The definition with steps and a border, values and all gradients, in double.
-Result plain_steps(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, ConvWindow steps,
-                   Activation act) {
+Conv2dResult plain_steps(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b,
+                         ConvWindow steps, Activation act) {
   const Index H = x.shape[1], W = x.shape[2], C = x.shape[3], K = w.shape[0], O = w.shape[3],
               s = steps.stride, p = steps.padding, OH = (H + 2 * p - K) / s + 1, OW = (W + 2 * p - K) / s + 1;
   std::vector<double> y(x.shape[0] * OH * OW * O), dx(x.size()), dw(w.size()), db(O);
@@ -264,8 +265,8 @@ Result plain_steps(const Tensor<float>& x, const Tensor<float>& w, const Tensor<
   return {f(y), f(dx), f(dw), f(db)};
 }
 
-Result run_steps(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, ConvWindow steps,
-                 Activation act) {
+Conv2dResult run_steps(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b,
+                       ConvWindow steps, Activation act) {
   Tape<float> tape;
   Tensor<float> dx(x.shape), dw(w.shape), db(b.shape);
   const auto y = conv2d(tape.leaf(x, dx), tape.leaf(w, dw), tape.leaf(b, db), steps, act);
@@ -289,9 +290,9 @@ TEST_CASE("conv2d: steps and borders, forward and all gradients, against the def
       CAPTURE(N, H, W, C, O, K, s, p);
       const auto x = uniform<float>({N, H, W, C}, -1, 1, 1), w = uniform<float>({K, K, C, O}, -1, 1, 2),
                  b = uniform<float>({O}, -1, 1, 3);
-      const Result want = plain_steps(x, w, b, {.stride = s, .padding = p}, act);
+      const Conv2dResult want = plain_steps(x, w, b, {.stride = s, .padding = p}, act);
       each_isa([&] {
-        const Result got = run_steps(x, w, b, {.stride = s, .padding = p}, act);
+        const Conv2dResult got = run_steps(x, w, b, {.stride = s, .padding = p}, act);
         REQUIRE(got.y.size() == want.y.size());
         CHECK(error(got.y, want.y) < 2e-6);  // 1.04e-6 measured, sums of 2,080 terms
         CHECK(error(got.dx, want.dx) < 1e-6);
@@ -328,7 +329,7 @@ TEST_CASE("conv2d: errors of steps and borders, and the same bits for any thread
              weights = uniform<float>({11, 11, 3, 64}, -1, 1, 2), bias = uniform<float>({64}, -1, 1, 3);
   const int before = threads();
   set_threads(1);
-  const Result one = run_steps(image, weights, bias, {.stride = 4, .padding = 2}, Activation::relu);
+  const Conv2dResult one = run_steps(image, weights, bias, {.stride = 4, .padding = 2}, Activation::relu);
   set_threads(2);
   CHECK(one == run_steps(image, weights, bias, {.stride = 4, .padding = 2}, Activation::relu));
   set_threads(before);

@@ -13,12 +13,12 @@
 using namespace fieldmark;
 
 namespace {
-struct Result {
+struct DenseResult {
   std::vector<float> y, dx, dw, db;
-  bool operator==(const Result&) const = default;
+  bool operator==(const DenseResult&) const = default;
 };
 
-Result run(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, Activation act) {
+DenseResult run(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, Activation act) {
   Tape<float> tape;
   Tensor<float> dx(x.shape), dw(w.shape), db(b.shape);
   const auto y = dense(tape.leaf(x, dx), tape.leaf(w, dw), tape.leaf(b, db), act);
@@ -28,7 +28,8 @@ Result run(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& 
 }
 
 // The same in double, by loops.
-Result plain(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, Activation act) {
+DenseResult plain_dense(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b,
+                        Activation act) {
   const Index n = x.shape[0], in = x.shape[1], out = w.shape[1];
   std::vector<double> y(n * out), dx(n * in), dw(in * out), db(out);
   for (Index i = 0; i < n; ++i)
@@ -66,8 +67,8 @@ TEST_CASE("dense: the float path, forward and all gradients, against double loop
                    b = uniform<float>({19}, -1, 1, 3);
         const auto x2 = uniform<float>({41, e}, -1, 1, 1), w2 = uniform<float>({e, 131 - e}, -1, 1, 2),
                    b2 = uniform<float>({131 - e}, -1, 1, 3);
-        for (const auto& [got, want] : {std::pair{run(x, w, b, act), plain(x, w, b, act)},
-                                        std::pair{run(x2, w2, b2, act), plain(x2, w2, b2, act)}}) {
+        for (const auto& [got, want] : {std::pair{run(x, w, b, act), plain_dense(x, w, b, act)},
+                                        std::pair{run(x2, w2, b2, act), plain_dense(x2, w2, b2, act)}}) {
           CHECK(error(got.y, want.y) < 1e-6);
           CHECK(error(got.dx, want.dx) < 1e-6);
           CHECK(error(got.dw, want.dw) < 1e-6);
@@ -119,7 +120,7 @@ TEST_CASE("dense: same bits for 1 and 2 threads, also where the rows are split")
              b = uniform<float>({24}, -1, 1, 3);
   const int before = threads();
   set_threads(1);
-  const Result one = run(x, w, b, Activation::relu);
+  const DenseResult one = run(x, w, b, Activation::relu);
   set_threads(2);
   CHECK(one == run(x, w, b, Activation::relu));
   set_threads(before);

@@ -6,7 +6,7 @@
 using namespace fieldmark;
 
 namespace {
-const std::vector<double> kWeights{0, 1, 0.5, 2.5};
+const std::vector<double> kLossWeights{0, 1, 0.5, 2.5};
 const auto f_mse = [](auto&, auto v) { return mse_loss(v[0], v[1]); };
 const auto f_huber = [](auto&, auto v) { return huber_loss(v[0], v[1], 0.5); };
 
@@ -31,7 +31,7 @@ TEST_CASE("loss: values") {
   const std::vector<Tensor<double>> in{{{4}, {1, 2, 3, 4}}, {{4}, {1, 2.25, 5, 3}}};
   CHECK(op_values(f_mse, in)[0] == (0.0625 + 4 + 1) / 4);
   CHECK(op_values(f_huber, in)[0] == (0.03125 + 0.5 * 1.75 + 0.5 * 0.75) / 4);
-  const auto weighted = [](auto&, auto v) { return mse_loss<double>(v[0], v[1], kWeights); };
+  const auto weighted = [](auto&, auto v) { return mse_loss<double>(v[0], v[1], kLossWeights); };
   CHECK(op_values(weighted, in)[0] == (0.0625 + 2 + 2.5) / 4);
   const std::vector<double> t{0, 1, 0.25, 0.5};
   const std::vector<Tensor<double>> x{{{4}, {0, 2, -1, 3}}};
@@ -65,9 +65,10 @@ TEST_CASE("loss: gradient") {
   }
   const auto a = uniform({4}, -1, 1, 1), b = away_from_kink(a, 2), t = uniform({4}, 0, 1, 3);
   using Vars = std::span<const Var<double>>;
-  expect_grad([](Tape<double>&, Vars v) { return mse_loss<double>(v[0], v[1], kWeights); }, {a, b});
-  expect_grad([](Tape<double>&, Vars v) { return huber_loss<double>(v[0], v[1], 0.5, kWeights); }, {a, b});
-  expect_grad(bce(t.data, kWeights), {a});
+  expect_grad([](Tape<double>&, Vars v) { return mse_loss<double>(v[0], v[1], kLossWeights); }, {a, b});
+  expect_grad([](Tape<double>&, Vars v) { return huber_loss<double>(v[0], v[1], 0.5, kLossWeights); },
+              {a, b});
+  expect_grad(bce(t.data, kLossWeights), {a});
 }
 
 TEST_CASE("loss: bce at logits of +-100 keeps value and slope to one rounding") {
@@ -96,9 +97,9 @@ TEST_CASE("loss: errors") {
   CHECK_THROWS_WITH(mse_loss(x, y), "[mse_loss] b must have the shape of a, [2, 3], got shape [3, 2]");
   CHECK_THROWS_WITH(huber_loss(x, y, 1), "[huber_loss] b must have the shape of a, [2, 3], got shape [3, 2]");
   CHECK_THROWS_WITH(huber_loss(x, x, 0), Contains("[huber_loss] delta must be above 0, got 0"));
-  CHECK_THROWS_WITH(mse_loss<double>(x, x, kWeights),
+  CHECK_THROWS_WITH(mse_loss<double>(x, x, kLossWeights),
                     Contains("[mse_loss] weights must have") && Contains("got 4"));
-  CHECK_THROWS_WITH(bce_with_logits<double>(x, kWeights), Contains("whose shape is [2, 3], got 4"));
+  CHECK_THROWS_WITH(bce_with_logits<double>(x, kLossWeights), Contains("whose shape is [2, 3], got 4"));
   const std::vector<double> outside{0, 0, 0, 1.5, 0, 0};
   CHECK_THROWS_WITH(bce_with_logits<double>(x, outside),
                     Contains("[bce_with_logits] targets: entry 3 must be in [0, 1], got 1.5"));

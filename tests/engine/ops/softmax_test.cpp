@@ -7,11 +7,11 @@ using namespace fieldmark;
 
 namespace {
 const std::vector<std::int32_t> kLabels{2, -1, 0, 1};
-const std::vector<double> kWeights{1, 3, 0, 0.5};
+const std::vector<double> kSoftmaxWeights{1, 3, 0, 0.5};
 const auto f_softmax = [](auto&, auto v) { return softmax(v[0]); };
 const auto f_entropy = [](auto&, auto v) { return softmax_cross_entropy(v[0], kLabels); };
 const auto f_weighted = [](Tape<double>&, std::span<const Var<double>> v) {
-  return softmax_cross_entropy<double>(v[0], kLabels, kWeights);
+  return softmax_cross_entropy<double>(v[0], kLabels, kSoftmaxWeights);
 };
 
 // -log softmax by its definition, for logits of moderate size.

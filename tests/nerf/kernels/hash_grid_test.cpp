@@ -16,8 +16,6 @@ namespace {
 constexpr HashLevel kLevels[] = {{3, 0, 0}, {16, 63, 64}};
 constexpr Index kRows = 128;
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 // What the three kernels compute, in long double from the definition. Entry = 2 part features.
 struct Reference {
   std::vector<long double> density, colour, table_gradient, dx;

@@ -20,7 +20,7 @@ std::vector<nerf::Camera> test_cameras() {
   return cameras;
 }
 
-FieldRow row(const std::string& name, double seconds, double psnr, bool front) {
+FieldRow field_row(const std::string& name, double seconds, double psnr, bool front) {
   return {.variant = {name, "x"}, .seconds = seconds, .psnr = psnr, .front = front};
 }
 }  // namespace
@@ -89,22 +89,23 @@ TEST_CASE("field_bench: what the grid leaves out is counted") {
 
 TEST_CASE("field_bench: the judgement names what is faster and what is better") {
   FieldBench bench;
-  bench.rows = {row("default", 1, 40, true), row("a", 0.5, 30, true), row("b", 0.8, 35, true),
-                row("c", 2, 50, true),       row("d", 3, 60, true),   row("e", 0.99, 20, false)};
+  bench.rows = {field_row("default", 1, 40, true), field_row("a", 0.5, 30, true),
+                field_row("b", 0.8, 35, true),     field_row("c", 2, 50, true),
+                field_row("d", 3, 60, true),       field_row("e", 0.99, 20, false)};
   const std::string text = judgement(bench);
   CHECK_THAT(text, Contains("It is on the front") &&
                        Contains("b x, takes 0.80 of its time and is 5.0 dB below") &&
                        Contains("c x, takes 2.00 times as long for 10.0 dB more"));
-  bench.rows = {row("default", 1, 40, false), row("a", 0.5, 41, true)};
+  bench.rows = {field_row("default", 1, 40, false), field_row("a", 0.5, 41, true)};
   CHECK_THAT(judgement(bench), Contains("It is not on the front") && Contains("1.0 dB above it"));
-  bench.rows = {row("default", 1, 40, true), row("a", 0.5, 40, true)};
+  bench.rows = {field_row("default", 1, 40, true), field_row("a", 0.5, 40, true)};
   bench.rows[0].grid_bytes = 100;
   bench.rows[1].grid_bytes = 800;
   CHECK_THAT(judgement(bench),
              Contains("takes 0.50 of its time and is 0.0 dB above it, with 8 times the grid;"));
-  bench.rows = {row("default", 1, 40, true)};
+  bench.rows = {field_row("default", 1, 40, true)};
   CHECK_THAT(judgement(bench), Contains("nothing is more than 4% faster; nothing is more exact."));
-  CHECK_THROWS_AS(judgement({}), ValueError);
+  CHECK_THROWS_AS(judgement(FieldBench{}), ValueError);
 }
 
 TEST_CASE("field_bench: errors") {

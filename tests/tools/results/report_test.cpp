@@ -5,7 +5,6 @@
 #include "support/catch.h"
 
 using namespace fieldmark::results;
-using Json = nlohmann::ordered_json;
 
 TEST_CASE("markdown_table writes a header, a rule and the rows", "[report]") {
   CHECK(markdown_table({"a", "b"}, {{"1", "2"}, {"3", "4"}}) ==
@@ -26,10 +25,11 @@ TEST_CASE("published_command shows no folder of this machine", "[report]") {
 TEST_CASE("markdown_report holds the protocol and every number", "[report]") {
   const Machine machine{
       .commit = "abc", .cpu = "Some CPU", .isa = "v3", .compiler = "GNU 12 -O2", .threads = 2};
-  const Json results{{"psnr", 30.51234567},
-                     {"lpips", nullptr},
-                     {"accuracy", {{"blind", 0.98}, {"informed", nullptr}}},
-                     {"rows", {{{"name", "x"}, {"gflops", 2}, {"inner", {1, 2}}}, {{"name", "y"}}}}};
+  const nlohmann::ordered_json results{
+      {"psnr", 30.51234567},
+      {"lpips", nullptr},
+      {"accuracy", {{"blind", 0.98}, {"informed", nullptr}}},
+      {"rows", {{{"name", "x"}, {"gflops", 2}, {"inner", {1, 2}}}, {{"name", "y"}}}}};
   const auto text = markdown_report({"fieldmark", "eval", "--size", "9"}, machine, results);
   CHECK_THAT(text, Contains("# eval\n\n```\nfieldmark eval --size 9\n```\n"));
   CHECK_THAT(text, Contains("| commit | abc |") && Contains("| kernels | x86-64-v3 |") &&

@@ -14,7 +14,7 @@ using namespace fieldmark::watermark;
 
 namespace {
 
-const Message kMessage{{1, 0, 1}};
+const Message kMeteredMessage{{1, 0, 1}};
 
 AttackMeterOptions options(Index views, const Owner& owner) {
   return {.cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, views, 32, 3),
@@ -45,9 +45,9 @@ void check_row(const AttackRow& row, const Owner& owner, const std::vector<Tenso
     auto sum = reader.evidence(images[i]);
     const auto second = reader.evidence(images[i + 1]);
     for (const auto& e : {sum, second})
-      accuracy += match_bits(read_bits(e, owner.code(), 3), kMessage).accuracy();
+      accuracy += match_bits(read_bits(e, owner.code(), 3), kMeteredMessage).accuracy();
     for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += second[c];
-    p.push_back(keyed_p_value(keyed_statistic(sum, owner.code(), kMessage)));
+    p.push_back(keyed_p_value(keyed_statistic(sum, owner.code(), kMeteredMessage)));
   }
   CHECK(row.accuracy.blind == Approx(accuracy / static_cast<double>(images.size())));
   CHECK((std::isnan(row.accuracy.informed) && row.chosen() == row.accuracy.blind));
@@ -63,7 +63,7 @@ TEST_CASE("attack_meter: rows are what reader, evidence and PSNR say of the same
   const nerf::RadianceField marked = watermark::apply_field_attack(
       watermark::parse_field_attack("weights_noise_0.1"), owner.field, CounterRng(1));
   const auto o = options(6, owner);
-  const AttackMeter meter(owner, marked, kMessage, o);
+  const AttackMeter meter(owner, marked, kMeteredMessage, o);
   const Images before = render(marked, o);
 
   const AttackRow none = meter.none();
@@ -103,7 +103,7 @@ TEST_CASE("attack_meter: rows are what reader, evidence and PSNR say of the same
 TEST_CASE("attack_meter: an attack that only moves pixels does no damage but to what it cuts off") {
   const Owner owner = small_owner();
   const auto o = options(4, owner);
-  const AttackMeter meter(owner, owner.field, kMessage, o);
+  const AttackMeter meter(owner, owner.field, kMeteredMessage, o);
   const AttackRow crop = meter.image("crop_0.5");
   CHECK(std::isnan(crop.psnr_foreground));
   CHECK((crop.kept > 0.2 && crop.kept < 1));
@@ -149,13 +149,14 @@ TEST_CASE("attack_meter: damage is of the object's pixels that still show, where
 TEST_CASE("attack_meter: of the first views informed is read too, as the tool would choose") {
   const Owner owner = small_owner();
   auto o = options(2, owner);
-  CHECK(AttackMeter(owner, owner.field, kMessage, o).informed_views() == 0);
+  CHECK(AttackMeter(owner, owner.field, kMeteredMessage, o).informed_views() == 0);
   o.informed_views = 1;
-  const AttackMeter meter(owner, owner.field, kMessage, o);
+  const AttackMeter meter(owner, owner.field, kMeteredMessage, o);
   CHECK(meter.informed_views() == 1);
   InformedReader reader(owner);
   const auto share = [&](const std::vector<double>& evidence) {
-    return evidence.empty() ? 0.5 : match_bits(read_bits(evidence, owner.code(), 3), kMessage).accuracy();
+    return evidence.empty() ? 0.5
+                            : match_bits(read_bits(evidence, owner.code(), 3), kMeteredMessage).accuracy();
   };
   const float white[3] = {1, 1, 1};
   const Tensor<float> first = render(owner.field, o).rgb[0];
@@ -172,7 +173,7 @@ TEST_CASE("attack_meter: of the first views informed is read too, as the tool wo
   const AttackRow unreadable = meter.image("scale_0.2");
   CHECK((unreadable.accuracy.informed == 0.5 && unreadable.chosen() == 0.5));
   o.informed_views = -1;
-  CHECK_THROWS_WITH(AttackMeter(owner, owner.field, kMessage, o),
+  CHECK_THROWS_WITH(AttackMeter(owner, owner.field, kMeteredMessage, o),
                     "[attack_meter] informed_views must not be negative, got -1");
 }
 
@@ -181,11 +182,11 @@ TEST_CASE("attack_meter: errors, progress and threads") {
   auto o = options(2, owner);
   CHECK_THROWS_WITH(AttackMeter(owner, owner.field, Message{{1}}, o),
                     "[attack_meter] message must have the owner's 3 bits, got 1");
-  CHECK_THROWS_WITH(AttackMeter(owner, owner.field, kMessage, {}),
+  CHECK_THROWS_WITH(AttackMeter(owner, owner.field, kMeteredMessage, {}),
                     "[attack_meter] cameras must not be empty");
   AttackMeterOptions no_group = o;
   no_group.group = 0;
-  CHECK_THROWS_WITH(AttackMeter(owner, owner.field, kMessage, no_group),
+  CHECK_THROWS_WITH(AttackMeter(owner, owner.field, kMeteredMessage, no_group),
                     "[attack_meter] group must be at least 1, got 0");
   Index seen = 0;
   o.progress = [&](Index done, Index total) {
@@ -193,7 +194,7 @@ TEST_CASE("attack_meter: errors, progress and threads") {
     seen += done;
     return true;
   };
-  const AttackMeter meter(owner, owner.field, kMessage, o);
+  const AttackMeter meter(owner, owner.field, kMeteredMessage, o);
   CHECK(seen == 3);
   CHECK_THROWS_AS(meter.image("sharpen_1"), ValueError);
   const int before = threads();
@@ -205,5 +206,6 @@ TEST_CASE("attack_meter: errors, progress and threads") {
   CHECK((one.psnr_foreground == two.psnr_foreground && one.p_value == two.p_value && one.kept == two.kept));
   AttackMeterOptions stop = options(2, owner);
   stop.progress = [](Index, Index) { return false; };
-  CHECK_THROWS_WITH(AttackMeter(owner, owner.field, kMessage, stop), "stopped while measuring attacks");
+  CHECK_THROWS_WITH(AttackMeter(owner, owner.field, kMeteredMessage, stop),
+                    "stopped while measuring attacks");
 }

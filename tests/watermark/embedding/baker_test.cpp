@@ -15,7 +15,7 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
-const Message kMessage{{1, 0, 1, 1}}, kOther{{0, 1, 1, 0}};
+const Message kBakedMessage{{1, 0, 1, 1}}, kOther{{0, 1, 1, 0}};
 
 Owner owner_with_gain() {
   Owner owner = tiny_owner();
@@ -42,10 +42,10 @@ Owner mlp_owner() {
   return owner;
 }
 
-BakeOptions options(Index steps) { return {.schedule = {.steps = steps, .lr = 1e-2}, .cameras = 20}; }
+BakeOptions bake_options(Index steps) { return {.schedule = {.steps = steps, .lr = 1e-2}, .cameras = 20}; }
 
 nerf::RadianceField bake(const Owner& owner, const Message& message, Index steps) {
-  Baker baker(owner, message, options(steps));
+  Baker baker(owner, message, bake_options(steps));
   while (!baker.done()) baker.step(0);
   baker.scale_to(baker.mark_psnr() - 1);
   return baker.field();
@@ -67,14 +67,14 @@ double mean_psnr(nerf::Renderer& a, nerf::Renderer& b, const Owner& owner) {
 
 TEST_CASE("baker: baked colours approach the marked ones, by its own figure and in images") {
   const Owner owner = owner_with_gain();
-  Baker baker(owner, kMessage, options(60));
+  Baker baker(owner, kBakedMessage, bake_options(60));
   baker.step(0);
   const double first = baker.psnr();
   while (!baker.done()) baker.step(0);
   CHECK(baker.steps() == 60);
   CHECK(baker.planned() == 60);
   nerf::Renderer plain(owner.field), marked(owner.field), baked(baker.field());
-  marked.set_recolour(owner.marking(cell_signs(owner.code(), kMessage)));
+  marked.set_recolour(owner.marking(cell_signs(owner.code(), kBakedMessage)));
   const double before = mean_psnr(plain, marked, owner), after = mean_psnr(baked, marked, owner);
   CAPTURE(first, baker.psnr(), before, after);
   CHECK(baker.psnr() > first + 1);
@@ -84,7 +84,7 @@ TEST_CASE("baker: baked colours approach the marked ones, by its own figure and 
 TEST_CASE("baker: a mark PSNR in the file comes near the owner's as it is learnt") {
   const Owner owner = owner_with_gain();
   const auto strength_after = [&](Index steps) {
-    Baker baker(owner, kMessage, options(300));
+    Baker baker(owner, kBakedMessage, bake_options(300));
     while (baker.steps() < steps) baker.step(0);
     return baker.mark_psnr({.count = 4, .seed = 32});
   };
@@ -94,7 +94,7 @@ TEST_CASE("baker: a mark PSNR in the file comes near the owner's as it is learnt
   for (const auto& camera : nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, 4, 0, 32)) {
     renderer.set_recolour({});
     const nerf::Rendering plain = renderer.render(camera);
-    renderer.set_recolour(owner.marking(cell_signs(owner.code(), kMessage)));
+    renderer.set_recolour(owner.marking(cell_signs(owner.code(), kBakedMessage)));
     marked += psnr_masked(renderer.render(camera).rgb, plain.rgb, plain.opacity) / 4;
   }
   const double early = strength_after(5), late = strength_after(300);
@@ -107,12 +107,12 @@ TEST_CASE("baker: a mark PSNR in the file comes near the owner's as it is learnt
 TEST_CASE("baker: an object keeps its likeness in directions that no training image shows") {
   const Owner owner = owner_with_gain();
   const auto extrapolated = [&](Index around) {
-    BakeOptions o = options(150);
+    BakeOptions o = bake_options(150);
     o.around = around;
-    Baker baker(owner, kMessage, o);
+    Baker baker(owner, kBakedMessage, o);
     while (!baker.done()) baker.step(0);
     nerf::Renderer marked(owner.field), baked(baker.field());
-    marked.set_recolour(owner.marking(cell_signs(owner.code(), kMessage)));
+    marked.set_recolour(owner.marking(cell_signs(owner.code(), kBakedMessage)));
     double sum = 0;
     for (const auto& camera :
          nerf::make_cameras(owner.field.cameras, nerf::CameraSet::extrapolated, 6, 0, 44))
@@ -126,7 +126,7 @@ TEST_CASE("baker: an object keeps its likeness in directions that no training im
 
 TEST_CASE("baker: scaling gives the file the strength asked for, on other views too") {
   const Owner owner = owner_with_gain();
-  Baker baker(owner, kMessage, options(60));
+  Baker baker(owner, kBakedMessage, bake_options(60));
   while (!baker.done()) baker.step(0);
   const MarkPsnrViews other{.count = 96, .seed = 500};
   const double learnt = baker.mark_psnr();
@@ -144,7 +144,7 @@ TEST_CASE("baker: scaling gives the file the strength asked for, on other views 
 
 TEST_CASE("baker: scaling goes no further than its bound, and finds nothing to scale before the first step") {
   const Owner owner = owner_with_gain();
-  Baker baker(owner, kMessage, options(20));
+  Baker baker(owner, kBakedMessage, bake_options(20));
   const auto nothing = baker.scale_to(30);
   CHECK(std::isinf(nothing.learnt));
   CHECK(std::isinf(nothing.scaled));
@@ -160,7 +160,7 @@ TEST_CASE("baker: scaling goes no further than its bound, and finds nothing to s
 
 TEST_CASE("baker: a baked file is an unmarked one with other colours, density to the byte the same") {
   const Owner owner = owner_with_gain();
-  const SafetensorsFile plain = file_of(owner.field), baked = file_of(bake(owner, kMessage, 5));
+  const SafetensorsFile plain = file_of(owner.field), baked = file_of(bake(owner, kBakedMessage, 5));
   CHECK(baked.metadata == plain.metadata);
   REQUIRE(baked.tensors.size() == plain.tensors.size());
   int density = 0, colour = 0;
@@ -180,7 +180,7 @@ TEST_CASE("baker: a baked file is an unmarked one with other colours, density to
 
 TEST_CASE("baker: an mlp field is marked and baked, both its densities to the byte the same") {
   const Owner owner = mlp_owner();
-  Baker baker(owner, kMessage, options(80));
+  Baker baker(owner, kBakedMessage, bake_options(80));
   baker.step(0);
   const double first = baker.psnr();
   while (!baker.done()) baker.step(0);
@@ -200,8 +200,8 @@ TEST_CASE("baker: an mlp field is marked and baked, both its densities to the by
 
 TEST_CASE("baker: two messages give different colours, the same one the same") {
   const Owner owner = owner_with_gain();
-  const auto a = file_of(bake(owner, kMessage, 3)), b = file_of(bake(owner, kOther, 3)),
-             again = file_of(bake(owner, kMessage, 3));
+  const auto a = file_of(bake(owner, kBakedMessage, 3)), b = file_of(bake(owner, kOther, 3)),
+             again = file_of(bake(owner, kBakedMessage, 3));
   for (const char* name : {"hash/colour_features", "colour/0/weight", "colour/2/bias"}) {
     CAPTURE(name);
     CHECK(a.at(name).data != b.at(name).data);
@@ -214,9 +214,9 @@ TEST_CASE("baker: one and two threads give the same bits") {
   const Owner owner = owner_with_gain();
   const int before = threads();
   set_threads(1);
-  const auto one = bake(owner, kMessage, 3);
+  const auto one = bake(owner, kBakedMessage, 3);
   set_threads(2);
-  const auto two = bake(owner, kMessage, 3);
+  const auto two = bake(owner, kBakedMessage, 3);
   set_threads(before);
   CHECK(std::equal(one.params.values().begin(), one.params.values().end(), two.params.values().begin()));
 }
@@ -224,20 +224,21 @@ TEST_CASE("baker: one and two threads give the same bits") {
 TEST_CASE("baker: options outside their ranges are refused") {
   const Owner owner = owner_with_gain();
   const Message brief{{1, 0, 1}};
-  CHECK_THROWS_AS(Baker(owner, brief, options(1)), ValueError);
-  CHECK_THROWS_WITH(Baker(owner, brief, options(1)), "[baker] message must have the owner's 4 bits, got 3");
-  BakeOptions none = options(1);
+  CHECK_THROWS_AS(Baker(owner, brief, bake_options(1)), ValueError);
+  CHECK_THROWS_WITH(Baker(owner, brief, bake_options(1)),
+                    "[baker] message must have the owner's 4 bits, got 3");
+  BakeOptions none = bake_options(1);
   none.cameras = 0;
-  CHECK_THROWS_AS(Baker(owner, kMessage, none), ValueError);
-  CHECK_THROWS_WITH(Baker(owner, kMessage, none),
+  CHECK_THROWS_AS(Baker(owner, kBakedMessage, none), ValueError);
+  CHECK_THROWS_WITH(Baker(owner, kBakedMessage, none),
                     "[baker] cameras must be at least 1 and around at least 0, got 0 and 130");
 }
 
 TEST_CASE("baker: a run that is saved and restored ends as an uninterrupted one, of its own message alone") {
   const TemporaryFolder folder;
   const Owner owner = owner_with_gain();
-  Baker whole(owner, kMessage, options(8)), first(owner, kMessage, options(8)),
-      later(owner, kMessage, options(8));
+  Baker whole(owner, kBakedMessage, bake_options(8)), first(owner, kBakedMessage, bake_options(8)),
+      later(owner, kBakedMessage, bake_options(8));
   whole.drive({});
   for (int i = 0; i < 3; ++i) first.step(0);
   first.save(folder / "c");
@@ -246,10 +247,10 @@ TEST_CASE("baker: a run that is saved and restored ends as an uninterrupted one,
   later.drive({});
   CHECK(std::ranges::equal(later.field().params.values(), whole.field().params.values()));
   CHECK(later.psnr() == whole.psnr());
-  Baker other(owner, kOther, options(8));
+  Baker other(owner, kOther, bake_options(8));
   CHECK_THROWS_WITH(other.restore(folder / "c"), Contains("of another input 'message'"));
   Owner louder = owner;
   louder.gain = 0.3;
-  CHECK_THROWS_WITH(Baker(louder, kMessage, options(8)).restore(folder / "c"),
+  CHECK_THROWS_WITH(Baker(louder, kBakedMessage, bake_options(8)).restore(folder / "c"),
                     Contains("option 'gain' 0.15, this run has 0.3"));
 }

@@ -91,7 +91,7 @@ TEST_CASE("embedder: preset paper learns the colours of the field, then its cont
   }
   CAPTURE(first, embedder.figures().loss);
   CHECK(embedder.figures().loss < 0.3 * first);
-  CHECK_THAT(embedder.note(), Contains("right: bits") && Contains("loss"));
+  CHECK_THAT(embedder.status(), Contains("right: bits") && Contains("loss"));
   embedder.calibrate();
   CHECK(owner.gain == 0);
 }
@@ -172,7 +172,7 @@ TEST_CASE("embedder: a checkpoint of another run is refused") {
   using std::filesystem::perms;
   CHECK(std::filesystem::status(path).permissions() == (perms::owner_read | perms::owner_write));
   CHECK(Embedder::checkpoint_key(path) == owner.key);
-  refused(path, owner, options(7), "expected a checkpoint of this run");
+  refused(path, owner, options(7), "option 'steps' 6, this run has 7");
   Owner other_key = tiny_owner();
   other_key.key = test_key(6);
   refused(path, other_key, options(6), "found one under another");
@@ -180,7 +180,7 @@ TEST_CASE("embedder: a checkpoint of another run is refused") {
   write_file_atomically(path, std::span(bytes).first(bytes.size() - 1));
   refused(path, owner, options(6), "");
   owner.save(path);
-  refused(path, owner, options(6), "another kind of file");
+  refused(path, owner, options(6), "expected a CHECKPOINT file");
   owner.field.save(path);
   CHECK_THROWS_AS(Embedder::checkpoint_key(path), IoError);
   CHECK_THROWS_WITH(Embedder::checkpoint_key(path),
@@ -196,50 +196,55 @@ TEST_CASE("embedder: a checkpoint of another run is refused") {
 TEST_CASE("embedder: a checkpoint of other weights, distortions or step sizes is refused") {
   struct Change {
     void (*make)(EmbedOptions&);
-    const char* text;  // how the run that was asked for names it
+    const char* option;  // its name and value in the run that was asked for
   };
   const Change both[] = {{[](EmbedOptions& o) { o.schedule.lr = 0.125; }, "lr 0.125"},
-                         {[](EmbedOptions& o) { o.schedule.half_after = 5; }, "half after 5.0"},
+                         {[](EmbedOptions& o) { o.schedule.half_after = 5; }, "half_after 5"},
                          {[](EmbedOptions& o) { o.schedule.cooldown = 0.25; }, "cooldown 0.25"},
                          {[](EmbedOptions& o) { o.schedule.last = 0.75; }, "last 0.75"},
                          {[](EmbedOptions& o) { o.distortions.noise = 0.125; }, "noise 0.125"},
-                         {[](EmbedOptions& o) { o.distortions.rotation = 7; }, "rotation 7.0"},
-                         {[](EmbedOptions& o) { o.distortions.zoom_out = 0.5; }, "zoom out 0.5"},
-                         {[](EmbedOptions& o) { o.distortions.zoom_in = 1.5; }, "zoom in 1.5"},
+                         {[](EmbedOptions& o) { o.distortions.rotation = 7; }, "rotation 7"},
+                         {[](EmbedOptions& o) { o.distortions.zoom_out = 0.5; }, "zoom_out 0.5"},
+                         {[](EmbedOptions& o) { o.distortions.zoom_in = 1.5; }, "zoom_in 1.5"},
                          {[](EmbedOptions& o) { o.distortions.blur = 0.5; }, "blur 0.5"},
-                         {[](EmbedOptions& o) { o.distortions.sample_shift = 0.5; }, "sample shift 0.5"},
-                         {[](EmbedOptions& o) { o.distortions.mixed = false; }, "mixed 0.0"},
-                         {[](EmbedOptions& o) { o.extractor_lr = 2; }, "extractor 2.0"}};
+                         {[](EmbedOptions& o) { o.distortions.sample_shift = 0.5; }, "sample_shift 0.5"},
+                         {[](EmbedOptions& o) { o.distortions.mixed = false; }, "mixed false"},
+                         {[](EmbedOptions& o) { o.extractor_lr = 2; }, "extractor_lr 2"}};
   struct CellChange {
     CellTrainingOptions options;
-    const char* text;
+    const char* option;
   };
-  const CellChange cells[] = {{{.first_mark_psnr = 25, .anneal = 20}, "first mark PSNR 25.0"},
-                              {{.anneal = 21}, "anneal 21.0"},
-                              {{.anneal = 20, .sign_weight = 2}, "sign 2.0"},
-                              {{.anneal = 20, .index_weight = 2}, "index 2.0"},
-                              {{.anneal = 20, .bits_weight = 2}, "bits 2.0"},
-                              {{.anneal = 20, .smooth_weight = 2}, "smooth 2.0"},
-                              {{.anneal = 20, .flat_weight = 2}, "flat 2.0"}};
+  const CellChange cells[] = {{{.first_mark_psnr = 25, .anneal = 20}, "first_mark_psnr 25"},
+                              {{.anneal = 21}, "anneal 21"},
+                              {{.anneal = 20, .sign_weight = 2}, "sign_weight 2"},
+                              {{.anneal = 20, .index_weight = 2}, "index_weight 2"},
+                              {{.anneal = 20, .bits_weight = 2}, "bits_weight 2"},
+                              {{.anneal = 20, .smooth_weight = 2}, "smooth_weight 2"},
+                              {{.anneal = 20, .flat_weight = 2}, "flat_weight 2"}};
   const TemporaryFolder folder;
   const auto path = folder / "checkpoint";
+  const auto other_option = [&](Owner& owner, const EmbedOptions& o, const std::string& option) {
+    const auto space = option.find(' ');
+    refused(path, owner, o, "option '" + option.substr(0, space) + "' ");
+    refused(path, owner, o, "this run has " + option.substr(space + 1));
+  };
   for (const bool is_paper : {false, true}) {
     Owner owner = is_paper ? tiny_paper_owner() : tiny_owner();
     Embedder(owner, tiny_views(), options(6)).save(path);
     for (const Change& c : both) {
       EmbedOptions o = options(6);
       c.make(o);
-      refused(path, owner, o, c.text);
+      other_option(owner, o, c.option);
     }
     if (is_paper) {
       Owner content = tiny_paper_owner({.content_weight = 2}),
             message = tiny_paper_owner({.message_weight = 2});
-      refused(path, content, options(6), "content 2.0");
-      refused(path, message, options(6), "message 2.0");
+      other_option(content, options(6), "content_weight 2");
+      other_option(message, options(6), "message_weight 2");
     } else {
       for (const CellChange& c : cells) {
         Owner changed = tiny_owner(30, c.options);
-        refused(path, changed, options(6), c.text);
+        other_option(changed, options(6), c.option);
       }
     }
   }

@@ -78,7 +78,7 @@ TEST_CASE("evidence: the least p is reached by the evidence that agrees everywhe
   CHECK_THROWS_WITH(least_p(-1), "[least_p] carriers must be at least 0, got -1");
 }
 
-TEST_CASE("evidence: under random keys small p-values are as rare as they commitment, whatever the image") {
+TEST_CASE("evidence: under random keys small p-values are as rare as they should be, whatever the image") {
   constexpr Index kCells = 200;
   constexpr unsigned kKeys = 4000;
   const CellDealer dealer(std::vector<double>(kCells, 1.0), 16);

@@ -12,7 +12,7 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
-nerf::Camera camera() {
+nerf::Camera view_camera() {
   return nerf::make_camera(nerf::look_at({2.2, -3.1, 1.7}, {0.1, 0.2, 0}, {0, 0, 1}), 0.9, 23, 18);
 }
 
@@ -27,7 +27,7 @@ nerf::RadianceField half_field() {
 
 CachedView view_of(const nerf::RadianceField& field) {
   nerf::Renderer renderer(field);
-  return cache_view(renderer, field, camera());
+  return cache_view(renderer, field, view_camera());
 }
 }  // namespace
 
@@ -35,7 +35,7 @@ TEST_CASE("view_cache: base and opacity are the renderer's, and samples put the 
   const nerf::RadianceField field = half_field();
   const CachedView view = view_of(field);
   nerf::Renderer renderer(field);
-  const nerf::Rendering want = renderer.render(camera());
+  const nerf::Rendering want = renderer.render(view_camera());
   REQUIRE(view.base.shape == want.rgb.shape);
   REQUIRE(view.opacity.shape == want.opacity.shape);
   REQUIRE(view.sample_begin.size() == 23 * 18 + 1);
@@ -69,7 +69,8 @@ TEST_CASE("view_cache: a sample lies on its pixel's ray, inside the cube") {
   for (Index p = 0; p < 23 * 18; ++p) {
     const auto k = static_cast<std::size_t>(view.sample_begin[static_cast<std::size_t>(p)]);
     if (view.sample_begin[static_cast<std::size_t>(p) + 1] == static_cast<std::int32_t>(k)) continue;
-    const nerf::Ray ray = nerf::pixel_ray(camera(), static_cast<double>(p % 23), static_cast<double>(p / 23));
+    const nerf::Ray ray =
+        nerf::pixel_ray(view_camera(), static_cast<double>(p % 23), static_cast<double>(p / 23));
     double to[3], along = 0, square = 0;
     for (std::size_t a = 0; a < 3; ++a) {
       const double x = static_cast<double>(view.position[3 * k + a]);
@@ -88,9 +89,9 @@ TEST_CASE("view_cache: a sample lies on its pixel's ray, inside the cube") {
 TEST_CASE("view_cache: several samples of a ray are its heaviest parts, and few leave the pixel's weight") {
   const nerf::RadianceField field = half_field();
   nerf::Renderer renderer(field);
-  const CachedView one = cache_view(renderer, field, camera()),
-                   two = cache_view(renderer, field, camera(), 2),
-                   all = cache_view(renderer, field, camera(), 1000);
+  const CachedView one = cache_view(renderer, field, view_camera()),
+                   two = cache_view(renderer, field, view_camera(), 2),
+                   all = cache_view(renderer, field, view_camera(), 1000);
   double worst = 0, composed = 0, moved = 0;
   Index more = 0;
   for (Index p = 0; p < 23 * 18; ++p) {
@@ -124,15 +125,15 @@ TEST_CASE("view_cache: several samples of a ray are its heaviest parts, and few 
   CHECK(worst < 1e-5);
   CHECK(composed < 1e-5);
   CHECK(moved < 1e-5);
-  CHECK_THROWS_WITH(cache_view(renderer, field, camera(), 0),
+  CHECK_THROWS_WITH(cache_view(renderer, field, view_camera(), 0),
                     "[cache_view] samples must be at least 1, got 0");
 }
 
 TEST_CASE("view_cache: what lies together on a ray is one part, and parts lie apart") {
   const nerf::RadianceField field = half_field();
   nerf::Renderer fine(field, {.finer = 8}), coarse(field, {.finer = 2});
-  const CachedView many = cache_view(fine, field, camera(), 1000),
-                   few = cache_view(coarse, field, camera(), 1000);
+  const CachedView many = cache_view(fine, field, view_camera(), 1000),
+                   few = cache_view(coarse, field, view_camera(), 1000);
   // Four times as many samples are 1.33 times as many parts (measured).
   CHECK(many.weight.size() < few.weight.size() * 3 / 2);
   Index pairs = 0;

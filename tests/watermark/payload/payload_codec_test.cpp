@@ -13,7 +13,7 @@ using namespace fieldmark::watermark;
 
 namespace {
 
-constexpr const char* kUuid = "01234567-89ab-cdef-0123-456789abcdef";
+constexpr const char* kCodecUuid = "01234567-89ab-cdef-0123-456789abcdef";
 
 std::vector<double> logits_of(const Message& message) {
   std::vector<double> logits;
@@ -78,7 +78,7 @@ TEST_CASE("payload_codec: payloads come back through as many wrong bits as are p
       {48, {PayloadKind::hex, "beef"}},       {48, {PayloadKind::text, "ok"}},
       {64, {PayloadKind::text, "\xc3\xa9t"}}, {100, {PayloadKind::hex, "0123456789"}},
       {100, {PayloadKind::text, "hello"}},    {128, {PayloadKind::text, "marked!!"}},
-      {255, {PayloadKind::uuid, kUuid}},      {256, {PayloadKind::text, "0123456789abcdef"}},
+      {255, {PayloadKind::uuid, kCodecUuid}}, {256, {PayloadKind::text, "0123456789abcdef"}},
       {256, {PayloadKind::hex, "1f"}}};
   for (const auto& [n, payload] : payloads) {
     const PayloadCodec codec(n);
@@ -187,7 +187,7 @@ TEST_CASE("payload_codec: what does not fit is named") {
   CHECK_THROWS_WITH(PayloadCodec(16).encode({PayloadKind::hex, "1"}),
                     "[PayloadCodec::encode] payload: has 4 bits, a message of 16 bits can hold no payload");
   CHECK_THROWS_WITH(
-      PayloadCodec(100).encode({PayloadKind::uuid, kUuid}),
+      PayloadCodec(100).encode({PayloadKind::uuid, kCodecUuid}),
       "[PayloadCodec::encode] payload: has 128 bits, a message of 100 bits can hold at most 64");
   CHECK_THROWS_AS(PayloadCodec(100).encode({PayloadKind::text, "\xff"}), ValueError);
   const PayloadCodec codec(48);

@@ -12,19 +12,19 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
-nerf::Camera camera() {
+nerf::Camera carrier_camera() {
   return nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::novel, 1, 64, 3).front();
 }
 
 CachedView view_of(const Owner& owner, Index samples) {
   nerf::Renderer renderer(owner.field, {.finer = 1});
-  return cache_view(renderer, owner.field, camera(), samples);
+  return cache_view(renderer, owner.field, carrier_camera(), samples);
 }
 
 Tensor<float> rendered(const Owner& owner, const std::vector<std::int8_t>& signs) {
   nerf::Renderer renderer(owner.field, {.finer = 1});
   renderer.set_recolour(owner.marking(signs));
-  return renderer.render(camera()).rgb;
+  return renderer.render(carrier_camera()).rgb;
 }
 
 // Root mean square of what carriers leave of a marked view's difference, and of all of it.

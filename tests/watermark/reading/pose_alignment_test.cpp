@@ -18,7 +18,7 @@ namespace {
 constexpr AlignmentStage kStages[] = {{.size = 32, .blur = 1.5, .steps = 10},
                                       {.size = 64, .blur = 1, .steps = 8}};
 
-nerf::Camera near_camera(std::uint64_t seed) {
+nerf::Camera aligned_camera(std::uint64_t seed) {
   return nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::novel, 1, 64, seed).front();
 }
 
@@ -35,7 +35,7 @@ Alignment align(const Tensor<float>& view_image, const nerf::Camera& start) {
 
 TEST_CASE("pose_alignment: a disturbed camera comes back to a tenth of a pixel") {
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
-    const nerf::Camera camera = near_camera(seed);
+    const nerf::Camera camera = aligned_camera(seed);
     const nerf::Camera start =
         moved(camera, {0, 0, 0}, {0.04, -0.05, 0.06, 0.03, -0.02, 0.04, 0.03, -0.02, 0.01});
     CAPTURE(seed);
@@ -74,7 +74,7 @@ TEST_CASE("pose_alignment: plain corners do not count where the scene fills its 
 }
 
 TEST_CASE("pose_alignment: a turned and cut image with other tones is met by roll, focal length and cut") {
-  const nerf::Camera camera = near_camera(4);
+  const nerf::Camera camera = aligned_camera(4);
   nerf::Camera part = moved(camera, {0, 0, 0}, {0, 0, 0.3, 0, 0, 0, std::log(1.3)});
   part.cx -= 4;
   part.height = 56;
@@ -90,10 +90,10 @@ TEST_CASE("pose_alignment: a turned and cut image with other tones is met by rol
 }
 
 TEST_CASE("pose_alignment: images of something else do not agree") {
-  const nerf::Camera camera = near_camera(5);
+  const nerf::Camera camera = aligned_camera(5);
   CHECK(align(uniform<float>({64, 64, 3}, 0, 1, 3), camera).agreement < 0.3);
   // The scene from another side.
-  CHECK(align(image_of(near_camera(6)), camera).agreement < 0.75);
+  CHECK(align(image_of(aligned_camera(6)), camera).agreement < 0.75);
   CHECK(align(Tensor<float>({64, 64, 3}, 1), camera).agreement < 0.1);
   nerf::Camera away = camera;
   for (std::size_t k : {2u, 6u, 10u}) away.pose[k] *= -1;
@@ -101,7 +101,7 @@ TEST_CASE("pose_alignment: images of something else do not agree") {
 }
 
 TEST_CASE("pose_alignment: one and two threads give the same bits") {
-  const nerf::Camera camera = near_camera(7);
+  const nerf::Camera camera = aligned_camera(7);
   const Tensor<float> view_image = image_of(camera);
   const nerf::Camera start = moved(camera, {0, 0, 0}, {0.02, -0.03, 0.02});
   const int before = threads();
@@ -117,7 +117,7 @@ TEST_CASE("pose_alignment: one and two threads give the same bits") {
 
 TEST_CASE("pose_alignment: errors name what is wrong") {
   PoseAligner aligner(tiny_field());
-  const nerf::Camera camera = near_camera(8);
+  const nerf::Camera camera = aligned_camera(8);
   CHECK_THROWS_AS(aligner.align(Tensor<float>({20, 20}), camera, kStages), ShapeError);
   CHECK_THROWS_AS(aligner.align(Tensor<float>({20, 20, 1}), camera, kStages), ShapeError);
   CHECK_THROWS_WITH(aligner.align(Tensor<float>({20, 20, 3}), camera, {}),

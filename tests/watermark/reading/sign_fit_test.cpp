@@ -11,15 +11,15 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
-constexpr Index kSide = 40, kPixels = kSide * kSide, kCells = 25;
+constexpr Index kPlane = 40, kPixels = kPlane * kPlane, kCells = 25;
 
 // Cells of 8 x 8 pixels, each seen through another one: a pixel's mark is of two cells, the second one
 // fainter or stronger.
 Carriers overlapping(float second) {
   const auto u = uniform({kPixels, 6}, 0.5, 1, 1);
-  Carriers c{Tensor<float>({kSide, kSide, 3}), {0}, {}, {}};
+  Carriers c{Tensor<float>({kPlane, kPlane, 3}), {0}, {}, {}};
   for (Index p = 0; p < kPixels; ++p) {
-    const Index cell = p % kSide / 8 + 5 * (p / kSide / 8);
+    const Index cell = p % kPlane / 8 + 5 * (p / kPlane / 8);
     for (Index k = 0; k < 2; ++k) {
       c.cell.push_back(static_cast<std::int32_t>((cell + 7 * k) % kCells));
       for (Index a = 0; a < 3; ++a) {

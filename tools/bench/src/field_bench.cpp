@@ -18,10 +18,6 @@ using Cameras = std::vector<nerf::Camera>;
 using Say = std::function<void(const std::string&, double)>;
 constexpr double kSlow = 6;  // variants this much slower than the default are timed once
 
-double now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
 // Differences of images from the reference, summed over views.
 struct Errors {
   double squares = 0, worst = 0, dropped = 0, dropped_most = 0, colours = 0, pixels = 0;

@@ -15,8 +15,6 @@ namespace {
 constexpr Index kLanes = 16, kRays = 8;  // rays of a piece: their samples stay within a few megabytes
 constexpr double kLeastWeight = 1e-12;
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 // Where a ray is inside the unit cube; empty (near >= far) if nowhere.
 std::array<double, 2> span_of(const nerf::Vec3& o, const nerf::Vec3& d) {
   double near = 0, far = std::numeric_limits<double>::infinity();

@@ -15,8 +15,6 @@ constexpr Index kPlaces = 3;         // along each axis of a cell that is looked
 constexpr float kThreshold = 0.01f;  // as in training
 constexpr Index kChunk = 64;         // coarse cells whose parts are looked at together
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 std::string number(float value) {
   char text[40];
   std::snprintf(text, sizeof text, "%g", static_cast<double>(value));

@@ -14,15 +14,13 @@
 #include <cstring>
 #include <thread>
 
+#include "timing.h"
+
 namespace fieldmark::bench {
 namespace {
 
 constexpr std::size_t kLastLines = 5;
 constexpr std::size_t kLongestLine = 1 << 20;  // characters: what answers without an end is stopped
-
-double now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 std::string_view name_of(std::string_view entry) { return entry.substr(0, entry.find('=')); }
 

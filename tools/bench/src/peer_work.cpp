@@ -10,7 +10,7 @@ namespace fieldmark::bench {
 namespace {
 
 constexpr float kNearKink = 1e-5f;  // sums are of size 1 and their rounding is below 1e-6
-constexpr Index kChunk = 1024;      // samples
+constexpr Index kPeerChunk = 1024;  // samples
 
 // Calls f(entry, its first number, how many) for every parameter that a pass reads.
 template <class F>
@@ -56,7 +56,7 @@ void add_draw(SafetensorsFile& file, ParamStore<float>& store, const PeerPass& p
 void leave_out_kinks(const ParamStore<float>& store, Shape shape, std::span<const float> x,
                      std::span<float> u) {
   const Index samples = shape[0], width = shape[1];
-  parallel_for(samples, kChunk, [&](Index begin, Index end) {
+  parallel_for(samples, kPeerChunk, [&](Index begin, Index end) {
     Tape<float> tape;
     const Params<float> params(store, nullptr);
     const Index n = end - begin;

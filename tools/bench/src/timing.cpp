@@ -14,13 +14,13 @@
 namespace fieldmark::bench {
 namespace {
 
-double now() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
 constexpr double kBurst = 3e-4;  // seconds; the clock keeps still for longer than that
 
 }  // namespace
+
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 double median(std::vector<double> numbers) {
   if (numbers.empty()) throw ValueError("[median] numbers must not be empty");

@@ -12,6 +12,9 @@ struct Timing {
   double peak_operations = 0;  ///< that the machine's peak would have done meanwhile, median over the runs
 };
 
+/// Seconds of a clock that is never set, from some moment on.
+double now();
+
 /// Calls `body` once to warm up, then `runs` times; where a call is shorter than `least_seconds`, a run is as
 /// many calls as take that long, and counts as their mean. The peak is measured in bursts of 0.3 ms right
 /// before and after each run, because a shared machine's speed drifts within minutes, and the clock also

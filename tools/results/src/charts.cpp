@@ -77,7 +77,7 @@ std::string field_chart(const Json& result) {
                  points);
 }
 
-constexpr const char* kBits = "bits right in one view, blind, %";
+constexpr const char* kChartBits = "bits right in one view, blind, %";
 
 std::string variant(const Json& row) {
   return text(row, "choice") == "default" ? "default" : text(row, "choice") + ": " + text(row, "setting");
@@ -99,7 +99,7 @@ std::string embed_chart(const Json& result) {
   }
   return scatter({.title = "Embedding in " + text(result, "field") + ": accuracy against time",
                   .x = "seconds of embedding (ring: the default; names: on the front)",
-                  .y = kBits,
+                  .y = kChartBits,
                   .y_most = 100},
                  points);
 }
@@ -115,7 +115,7 @@ std::string embed_curves(const Json& result) {
       points.push_back({.x = number(p, "seconds"), .y = 100 * number(p, "accuracy"), .series = variant(p)});
   return scatter({.title = "Embedding in " + text(result, "field") + ": accuracy while it trains",
                   .x = "seconds of embedding",
-                  .y = kBits,
+                  .y = kChartBits,
                   .curves = true,
                   .y_most = 100},
                  points);

@@ -11,8 +11,6 @@
 namespace fieldmark::watermark {
 namespace {
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 void check(const Tensor<float>& view_image, const Tensor<float>& object, const ExtractorAttackOptions& o) {
   check_rank("extractor_attack", "image", view_image.shape, 3, "[H, W, 3]");
   if (view_image.shape[2] != 3 || object.shape != Shape{view_image.shape[0], view_image.shape[1]})

@@ -18,8 +18,6 @@ constexpr Index kRays = 64, kChunks = 32;  // of a chunk, of a step
 constexpr float kLeastWeight = 1e-3f;
 constexpr float kOfSamples = 0.1f;  // weight of the samples' own colours beside what rays show
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 // The parameters of the colour networks, which lie together.
 AdamRange colour_range(const ParamStore<float>& params, double lr_factor) {
   AdamRange range{.begin = params.size(), .lr_factor = lr_factor};
@@ -187,6 +185,7 @@ double Baker::take_step(double) {
 void Baker::describe(RunFingerprint& f) const {
   f.option("run", "bake");
   f.options("field", owner_.field.configuration());
+  f.options("mark", owner_.mark().configuration());
   f.option("cameras", options_.cameras);
   f.option("around", options_.around);
   f.option("seed", options_.seed);

@@ -3,7 +3,6 @@
 #include <fieldmark/distort/noise.h>
 #include <fieldmark/distort/quantize8.h>
 #include <fieldmark/distort/similarity.h>
-#include <fieldmark/engine/checkpoint.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/watermark/embedding/embedder.h>
 
@@ -13,40 +12,56 @@
 namespace fieldmark::watermark {
 namespace {
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 constexpr std::uint64_t kOfBatch = 8 * 64;  // place of what a whole batch draws: after those of 64 images
+
+// The extractor's parameters follow one another in the store, and have a step size of their own.
+std::vector<AdamRange> ranges(const ParamStore<float>& params, double extractor_lr) {
+  Index begin = params.size(), end = 0;
+  for (const auto& e : params.entries())
+    if (e.name.starts_with("extractor/")) {
+      begin = std::min(begin, e.offset);
+      end = std::max(end, e.offset + e.shape.size());
+    }
+  return {{.begin = 0, .end = begin},
+          {.begin = begin, .end = end, .lr_factor = extractor_lr},
+          {.begin = end, .end = params.size()}};
+}
 
 double blend(double from, double to, double fraction) { return from + (to - from) * fraction; }
 
 }  // namespace
 
 Embedder::Embedder(Owner& owner, std::span<const CachedView> views, const EmbedOptions& options)
-    : owner_(owner),
+    : TrainingRun(options.schedule),
+      owner_(owner),
       views_(views),
       options_(options),
-      schedule_(options.schedule),
       choice_rng_(options.seed, 11),
       message_rng_(options.seed, 12),
       noise_rng_(options.seed, 13),
       shift_rng_(options.seed, 14),
       code_(owner.code()),
-      loop_(static_cast<int>(std::clamp<Index>(options.batch, 1, 64)), owner.params.size()),
-      adam_(owner.params.size(), {.lr = 1, .beta2 = 0.99, .eps = 1e-8, .zero_grads = true}) {
+      loop_(static_cast<int>(std::clamp<Index>(options.batch, 1, 64)), owner.params.size()) {
   if (options.batch < 1 || options.batch > 64)
     throw ValueError("[embedder] batch must be 1 to 64, got " + std::to_string(options.batch));
   if (views.empty()) throw ValueError("[embedder] views must not be empty");
   if (!(options.extractor_lr > 0))
     throw ValueError("[embedder] extractor_lr must be positive, got " + std::to_string(options.extractor_lr));
   training_ = owner.mark().training(owner, views);
+  train(owner.params, {.lr = 1, .beta2 = 0.99, .eps = 1e-8, .zero_grads = true},
+        ranges(owner.params, options.extractor_lr));
+  keep("sign", figures_.sign);
+  keep("index", figures_.index);
+  keep("bits", figures_.bits);
+  keep("image_loss", figures_.loss);
 }
 
 TrainingImage Embedder::draw(Index image, Tape<float>& tape) const {
-  const auto step = static_cast<std::uint64_t>(steps_), i = static_cast<std::uint64_t>(image);
+  const auto step = static_cast<std::uint64_t>(steps()), i = static_cast<std::uint64_t>(image);
   const EmbedDistortions& d = options_.distortions;
   const auto u = [&](std::uint64_t k) { return choice_rng_.uniform4(step, 8 * i + k); };
   const auto a = u(0), b = u(1), c = u(2);
-  TrainingImage p{.step = steps_};
+  TrainingImage p{.step = steps()};
   p.view = std::min(static_cast<Index>(a[0] * static_cast<float>(views_.size())),
                     static_cast<Index>(views_.size()) - 1);
   const std::uint64_t place = step * static_cast<std::uint64_t>(options_.batch) + i;
@@ -134,8 +149,7 @@ double Embedder::run_image(Index image, Tape<float>& tape, float* grads, Figures
   return value;
 }
 
-void Embedder::step(double seconds) {
-  schedule_.observe(steps_, seconds);
+double Embedder::take_step(double) {
   std::vector<Figures> figures(at(options_.batch));
   const double loss = loop_.run(
       options_.batch,
@@ -143,8 +157,8 @@ void Embedder::step(double seconds) {
         return run_image(image, tape, grads, figures[at(image)]);
       },
       owner_.params.grads());
-  step_parameters();
-  const double keep = steps_ == 0 ? 0 : 0.98, each = (1 - keep) / static_cast<double>(options_.batch);
+  update();
+  const double keep = steps() == 0 ? 0 : 0.98, each = (1 - keep) / static_cast<double>(options_.batch);
   figures_ = {keep * figures_.sign, keep * figures_.index, keep * figures_.bits,
               keep * figures_.loss + (1 - keep) * loss};
   for (const Figures& f : figures) {
@@ -152,22 +166,7 @@ void Embedder::step(double seconds) {
     figures_.index += each * f.index;
     figures_.bits += each * f.bits;
   }
-  ++steps_;
-}
-
-// The extractor's parameters follow one another in the store.
-void Embedder::step_parameters() {
-  const double lr = schedule_.lr(steps_);
-  Index begin = owner_.params.size(), end = 0;
-  for (const auto& e : owner_.params.entries())
-    if (e.name.starts_with("extractor/")) {
-      begin = std::min(begin, e.offset);
-      end = std::max(end, e.offset + e.shape.size());
-    }
-  const AdamRange ranges[] = {{.begin = 0, .end = begin, .lr_factor = lr},
-                              {.begin = begin, .end = end, .lr_factor = lr * options_.extractor_lr},
-                              {.begin = end, .end = owner_.params.size(), .lr_factor = lr}};
-  adam_.step(owner_.params.values(), owner_.params.grads(), ranges);
+  return loss;
 }
 
 void Embedder::calibrate(Index views) {
@@ -188,67 +187,40 @@ void Embedder::calibrate(Index views) {
   }
 }
 
-std::string Embedder::fingerprint() const {
-  const OwnerOptions& o = owner_.options();
-  std::size_t samples = 0;  // tells views of other cameras and sizes apart
-  for (const CachedView& v : views_) samples += v.weight.size();
-  std::string text = owner_.mark().preset() + ", " + std::to_string(o.bits) + " bits, " +
-                     std::to_string(owner_.cells.count()) + " cells, seed " + std::to_string(options_.seed) +
-                     ", steps " + std::to_string(options_.schedule.steps) + ", batch " +
-                     std::to_string(options_.batch) + ", views " + std::to_string(views_.size()) + " with " +
-                     std::to_string(samples) + " samples" + ", parameters " +
-                     std::to_string(owner_.params.size());
-  const auto add = [&](const char* name, double value) {
-    text += ", " + std::string(name) + " " + std::to_string(value);
-  };
-  const ScheduleOptions& s = options_.schedule;
-  add("lr", s.lr);
-  add("half after", s.half_after);
-  add("cooldown", s.cooldown);
-  add("last", s.last);
-  add("extractor", options_.extractor_lr);
-  text += ", " + training_->fingerprint();
+void Embedder::describe(RunFingerprint& f) const {
+  f.option("run", "embed");
+  f.options("field", owner_.field.configuration());
+  f.options("mark", owner_.mark().configuration());
+  training_->describe(f);
+  f.option("bits", owner_.options().bits);
+  f.option("reader_size", owner_.options().reader_size);
+  f.option("reader_aspect", owner_.options().reader_aspect);
+  f.option("initial_seed", owner_.options().seed);
+  f.option("seed", options_.seed);
+  f.option("batch", options_.batch);
+  f.option("extractor_lr", options_.extractor_lr);
   const EmbedDistortions& d = options_.distortions;
-  add("noise", d.noise);
-  add("rotation", d.rotation);
-  add("zoom out", d.zoom_out);
-  add("zoom in", d.zoom_in);
-  add("blur", d.blur);
-  add("sample shift", d.sample_shift);
-  add("mixed", d.mixed);
-  return text;
+  f.option("noise", d.noise);
+  f.option("rotation", d.rotation);
+  f.option("zoom_out", d.zoom_out);
+  f.option("zoom_in", d.zoom_in);
+  f.option("blur", d.blur);
+  f.option("sample_shift", d.sample_shift);
+  f.option("mixed", d.mixed);
+  f.option("views", std::ssize(views_));
+  f.input("field", owner_.field.params.values());
+  f.input("occupancy", owner_.field.grid.bits());
+  f.input("cells", owner_.cells.numbers());
+  for (std::size_t i = 0; i < views_.size(); ++i) f.input("view " + std::to_string(i), views_[i].position);
 }
 
-void Embedder::save(const std::filesystem::path& path) const {
-  SafetensorsFile file = new_checkpoint(fingerprint());
-  const Index n = owner_.params.size();
-  file.add("values", {n}, owner_.params.values());
-  file.add("mean", {n}, adam_.mean());
-  file.add("mean_square", {n}, adam_.mean_square());
-  const std::int64_t counts[] = {steps_, schedule_.total()};
-  const double figures[] = {figures_.sign, figures_.index, figures_.bits, figures_.loss};
-  file.add("counts", {2}, counts);
-  file.add("figures", {4}, figures);
+void Embedder::save_more(SafetensorsFile& file) const {
   file.add("key", {32}, std::span<const std::uint8_t>(owner_.key.bytes));
-  file.write(path, Access::secret);
 }
 
-void Embedder::restore(const std::filesystem::path& path) {
-  const SafetensorsFile file = read_checkpoint(path, fingerprint());
+void Embedder::restore_more(const SafetensorsFile& file) {
   if (file.u8("key") != std::vector<std::uint8_t>(owner_.key.bytes.begin(), owner_.key.bytes.end()))
-    throw IoError(path.string() + ": expected a checkpoint under this key, found one under another");
-  restore_numbers(file, "values", owner_.params.values());
-  restore_numbers(file, "mean", adam_.mean());
-  restore_numbers(file, "mean_square", adam_.mean_square());
-  const auto counts = file.i64("counts");
-  const auto figures = file.f64("figures").data;
-  if (counts.size() != 2 || figures.size() != 4)
-    throw IoError(path.string() + ": expected 2 counts and 4 figures, found " +
-                  std::to_string(counts.size()) + " and " + std::to_string(figures.size()));
-  steps_ = counts[0];
-  schedule_.resume(counts[1]);
-  adam_.set_steps(steps_);
-  figures_ = {figures[0], figures[1], figures[2], figures[3]};
+    throw IoError(file.path + ": expected a checkpoint under this key, found one under another");
 }
 
 Key Embedder::checkpoint_key(const std::filesystem::path& path) {

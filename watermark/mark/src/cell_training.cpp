@@ -22,8 +22,6 @@ constexpr Index kCoarse = 8;                    // pixels a side that eyes avera
 constexpr double kReadable = 0.7, kSafe = 0.8;  // shares of right signs between which the mark learns to hide
 constexpr float kBitScale = 6;                  // pooled evidence lies in [-1, 1]: this makes it a logit
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 // How flat the base image is around each pixel of the foreground: exp(-(s / 0.03)^2), s the standard
 // deviation of the green channel in 5 x 5 pixels; the same for the three channels.
 std::vector<float> flatness(const CachedView& v, const std::vector<float>& foreground) {
@@ -52,7 +50,7 @@ class CellTraining : public MarkTraining {
   Var<float> loss(Tape<float>& tape, const Params<float>& params, const TrainingImage& image,
                   const TrainingFigures& running, TrainingFigures& figures) const override;
   std::string note(const TrainingFigures& f) const override;
-  std::string fingerprint() const override;
+  void describe(RunFingerprint& f) const override;
 
  private:
   double target(const TrainingImage& image) const {
@@ -142,7 +140,7 @@ Tensor<std::int32_t> CellTraining::labels_at(const TrainingImage& image, const S
   Tensor<std::int32_t> labels = labels_[at(image.view)];
   if (image.warped)
     labels = distort::warp_labels(labels, image.warp, static_cast<std::int32_t>(owner_.cells.count()),
-                                         shape[0], shape[1]);
+                                  shape[0], shape[1]);
   return distort::resize_labels(labels, height, width);
 }
 
@@ -197,22 +195,16 @@ std::string CellTraining::note(const TrainingFigures& f) const {
   return note;
 }
 
-std::string CellTraining::fingerprint() const {
-  const MarkNetworkOptions& n = mark_.options().network;
-  std::string text = std::to_string(owner_.options().mark_psnr) + " dB";
-  for (const auto& [name, value] : {std::pair{"first mark PSNR", options_.first_mark_psnr},
+void CellTraining::describe(RunFingerprint& f) const {
+  f.option("mark_psnr", owner_.options().mark_psnr);
+  for (const auto& [name, value] : {std::pair{"first_mark_psnr", options_.first_mark_psnr},
                                     {"anneal", options_.anneal},
-                                    {"sign", options_.sign_weight},
-                                    {"index", options_.index_weight},
-                                    {"bits", options_.bits_weight},
-                                    {"smooth", options_.smooth_weight},
-                                    {"flat", options_.flat_weight},
-                                    {"tilt", n.tilt},
-                                    {"shading", n.shading},
-                                    {"red-green", n.red_green},
-                                    {"luminance", n.luminance}})
-    text += std::string(", ") + name + " " + std::to_string(value);
-  return text;
+                                    {"sign_weight", options_.sign_weight},
+                                    {"index_weight", options_.index_weight},
+                                    {"bits_weight", options_.bits_weight},
+                                    {"smooth_weight", options_.smooth_weight},
+                                    {"flat_weight", options_.flat_weight}})
+    f.option(name, value);
 }
 
 }  // namespace

@@ -15,8 +15,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 // Switches of version 0.1 that preset code sets.
 Json code_fusion() { return Json::array({"late_direction", "raw_colour", "repeated"}); }
 

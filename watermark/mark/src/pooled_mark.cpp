@@ -9,8 +9,6 @@
 namespace fieldmark::watermark {
 namespace {
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 Var<float> logits(const extractor::PooledExtractor<float>& reader, const Params<float>& params,
                   Var<float> image, const Shape& size) {
   const Var<float> out = reader(params, image.tape().reshape(image, {1, size[0], size[1], 3}));
@@ -48,11 +46,10 @@ class PooledTraining : public MarkTraining {
     std::snprintf(note, sizeof note, "right: bits %.1f%%  loss %.4f", 100 * f.bits, f.loss);
     return note;
   }
-  std::string fingerprint() const override {
-    std::string text = "content " + std::to_string(options_.content_weight) + ", message " +
-                       std::to_string(options_.message_weight);
-    if (owner_.mark().has_gain()) text += ", " + std::to_string(owner_.options().mark_psnr) + " dB";
-    return text;
+  void describe(RunFingerprint& f) const override {
+    f.option("content_weight", options_.content_weight);
+    f.option("message_weight", options_.message_weight);
+    if (owner_.mark().has_gain()) f.option("mark_psnr", owner_.options().mark_psnr);
   }
 
  private:

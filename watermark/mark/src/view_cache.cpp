@@ -11,8 +11,6 @@ namespace {
 constexpr float kLeastOpacity = 0.02f;  // a ray that sees less is background
 constexpr float kPart = 1.f / 128;      // cube sides, half of the finest cell: what lies so near is one part
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 // Calls trace(lane, row, rays) for the rays of every row of pixels; directions [P, 3] are written.
 template <class F>
 void for_rows(const nerf::RadianceField& field, const nerf::Camera& camera, std::vector<float>& direction,

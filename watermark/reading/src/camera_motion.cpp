@@ -5,40 +5,40 @@
 namespace fieldmark::watermark {
 namespace {
 
-using Matrix = Eigen::Matrix3d;
-using Vector = Eigen::Vector3d;
+using Matrix3 = Eigen::Matrix3d;
+using Vector3 = Eigen::Vector3d;
 
-Matrix rotation(const nerf::Camera& c) {
+Matrix3 rotation(const nerf::Camera& c) {
   return Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(c.pose.data()).leftCols<3>();
 }
 
-Vector vector(const nerf::Vec3& v) { return {v[0], v[1], v[2]}; }
+Vector3 vector(const nerf::Vec3& v) { return {v[0], v[1], v[2]}; }
 
-Vector in_axes(const nerf::Camera& c, const nerf::Vec3& p) {
+Vector3 in_axes(const nerf::Camera& c, const nerf::Vec3& p) {
   return rotation(c).transpose() * (vector(p) - vector(c.position()));
 }
 
-Matrix turned(const Vector& turn) {
+Matrix3 turned(const Vector3& turn) {
   const double angle = turn.norm();
-  if (angle < 1e-12) return Matrix::Identity();
+  if (angle < 1e-12) return Matrix3::Identity();
   return Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
 }
 
 }  // namespace
 
 Projection project(const nerf::Camera& camera, const nerf::Vec3& point) {
-  const Vector q = in_axes(camera, point);
+  const Vector3 q = in_axes(camera, point);
   return {camera.cx - camera.fx * q.x() / q.z(), camera.cy + camera.fy * q.y() / q.z(), -q.z()};
 }
 
 nerf::Camera moved(const nerf::Camera& camera, const nerf::Vec3& pivot, const CameraMotion& motion) {
-  const Matrix r = rotation(camera);
-  const Vector m = in_axes(camera, pivot);
+  const Matrix3 r = rotation(camera);
+  const Vector3 m = in_axes(camera, pivot);
   // q' = E q + b in the old camera's axes makes R' = R E^T and t' = t - R' b.
-  const Matrix e = turned({motion[0], motion[1], motion[2]});
-  const Vector b = m - e * m - m.z() * Vector(motion[3], motion[4], motion[5]);
-  const Matrix turned_r = r * e.transpose();
-  const Vector position = vector(camera.position()) - turned_r * b;
+  const Matrix3 e = turned({motion[0], motion[1], motion[2]});
+  const Vector3 b = m - e * m - m.z() * Vector3(motion[3], motion[4], motion[5]);
+  const Matrix3 turned_r = r * e.transpose();
+  const Vector3 position = vector(camera.position()) - turned_r * b;
   nerf::Camera out = camera;
   Eigen::Map<Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> pose(out.pose.data());
   pose.leftCols<3>() = turned_r;
@@ -52,13 +52,13 @@ nerf::Camera moved(const nerf::Camera& camera, const nerf::Vec3& pivot, const Ca
 
 std::array<CameraMotion, 2> motion_gradient(const nerf::Camera& camera, const nerf::Vec3& pivot,
                                             const nerf::Vec3& point) {
-  const Vector q = in_axes(camera, point), m = in_axes(camera, pivot), arm = q - m;
+  const Vector3 q = in_axes(camera, point), m = in_axes(camera, pivot), arm = q - m;
   const double u = -q.x() / q.z(), v = -q.y() / q.z();  // tangents; x = cx + fx u, y = cy - fy v
   // dq of each motion: e_k x arm for a turn, -m_z e_k for a shift; du = -(dq_x + u dq_z) / q_z, dv alike.
   std::array<CameraMotion, 2> gradient{};
   for (int k = 0; k < 6; ++k) {
-    const Vector axis = Vector::Unit(k % 3);
-    const Vector dq = k < 3 ? Vector(axis.cross(arm)) : Vector(-m.z() * axis);
+    const Vector3 axis = Vector3::Unit(k % 3);
+    const Vector3 dq = k < 3 ? Vector3(axis.cross(arm)) : Vector3(-m.z() * axis);
     gradient[0][static_cast<std::size_t>(k)] = -camera.fx * (dq.x() + u * dq.z()) / q.z();
     gradient[1][static_cast<std::size_t>(k)] = camera.fy * (dq.y() + v * dq.z()) / q.z();
   }

@@ -30,8 +30,6 @@ constexpr Index kParts = 12;    // grid of a cropped image and of the windows it
 constexpr std::array kSides{0.5, 0.57, 0.64, 0.72, 0.81, 0.92};  // share of the render's longer side
 constexpr double kStride = 0.04;                                 // between windows, the same share
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 // Subtracts the mean and scales to length 1; a constant vector becomes 0.
 void make_unit(std::span<float> v) {
   double mean = 0, square = 0;

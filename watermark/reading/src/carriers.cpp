@@ -8,8 +8,6 @@ namespace {
 
 constexpr Index kBlock = 4096;  // samples
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 // The entry of a cell among those of the last pixel, added where there is none.
 std::size_t entry_of(Carriers& c, std::int32_t cell) {
   const auto entry = std::find(c.cell.begin() + c.begin.back(), c.cell.end(), cell);

@@ -28,8 +28,6 @@ constexpr double kBlurs[] = {0, 0.4, 0.6, 0.8, 1, 1.25, 1.5, 2, 2.5, 3};  // sta
 constexpr double kAround = 4;           // standard deviation of the window for the local power, pixels
 constexpr float kLeastNoise = 1.2e-6f;  // variance of rounding to 8 bits
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 // The unmarked render in the image's blur and tones, and the residual.
 struct Shown {
   Tensor<float> render, rest;

@@ -23,8 +23,6 @@ constexpr int kDeviations = 13;
 constexpr std::array kFactors{0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0};
 constexpr double kOnObject = 32;  // least foreground pixels of a block that counts for its band
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 // One component of an image, in levels, chroma perhaps at half size.
 struct Plane {
   Index height = 0, width = 0;

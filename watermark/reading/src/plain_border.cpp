@@ -9,11 +9,9 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr double kBlurs[] = {0.5, 3};  // deviations, pixels
-constexpr Index kAround = 6;           // pixels
-constexpr float kAlike = 0.06f;        // of every channel
-
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+constexpr double kBorderBlurs[] = {0.5, 3};  // deviations, pixels
+constexpr Index kBorderAround = 6;           // pixels
+constexpr float kAlike = 0.06f;              // of every channel
 
 // Flood fill from a corner.
 std::vector<Index> region(const Tensor<float>& image, Index corner) {
@@ -49,12 +47,12 @@ std::vector<std::uint8_t> plain_border(const Tensor<float>& image) {
   const Index h = image.shape[0], w = image.shape[1];
   std::vector<std::uint8_t> border(at(h * w));
   if (h * w == 0) return border;
-  for (const double blur : kBlurs) {
+  for (const double blur : kBorderBlurs) {
     const Tensor<float> soft = blurred(image, blur);
     for (const Index corner : {Index{0}, w - 1, (h - 1) * w, h * w - 1})
       for (const Index p : region(soft, corner)) border[at(p)] = 1;
   }
-  return border_at(border, h, w, h, w, kAround);
+  return border_at(border, h, w, h, w, kBorderAround);
 }
 
 std::vector<std::uint8_t> border_of(const nerf::RadianceField& field, const Tensor<float>& image) {

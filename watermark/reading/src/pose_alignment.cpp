@@ -22,8 +22,6 @@ constexpr double kStill = 0.01;        // pixels: a smaller motion ends the stag
 constexpr int kMostFailures = 3;
 constexpr double kDamping = 1e-3;
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 using Matrix = Eigen::Matrix<double, kParameters, kParameters>;
 using Vector = Eigen::Matrix<double, kParameters, 1>;
 

@@ -13,8 +13,6 @@ constexpr Index kElsewhere[][2] = {{11, 7}, {-7, 11}, {-11, -7}, {7, -11}};  // 
 constexpr int kSteps = 10;
 constexpr double kRest = 1e-4;  // relative residual at which the iteration ends
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 using Values = std::vector<double>;
 
 double dot(const Values& a, const Values& b) {

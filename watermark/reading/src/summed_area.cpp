@@ -9,8 +9,6 @@ namespace {
 
 constexpr double kRounding = 1e-9;  // pixels by which a rectangle may leave the image
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-
 }  // namespace
 
 SummedArea::SummedArea(const Tensor<float>& image) {

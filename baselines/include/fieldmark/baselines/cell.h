@@ -48,8 +48,8 @@ struct CurvePoint {
   double steps = 0;    ///< taken
   double figure = 0;   ///< what the curve follows: of systems with a message, the share of bits right
 };
-/// Keeps the course of a run, as run_curve() has it, in Cell::more: at most 50 points, evenly spread, the
-/// last among them, under names "learning SECONDS STEPS". @throws IoError if a line is no point
+/// Keeps the course of a run, as TrainingRun::curve() writes it, in Cell::more: at most 50 points, evenly
+/// spread, the last among them, under names "learning SECONDS STEPS". @throws IoError if a line is no point
 void keep_curve(Cell& cell, std::string_view curve);
 /// What keep_curve() kept, in order of time; none where nothing was kept.
 std::vector<CurvePoint> kept_curve(const Cell& cell);

@@ -54,7 +54,7 @@ class CellRunner {
   struct Trained;
   const Scene& scene(const CellName& name);
   nerf::RadianceField base_field(const CellName& name, const Scene& scene);
-  nerf::RadianceField trained_field(const std::string& stem, const nerf::Dataset& ground_truth,
+  nerf::RadianceField trained_field(const std::string& stem, const nerf::Dataset& images,
                                     const CellName& name, double seconds);
   Trained train(const CellName& name, const Scene& scene);
   Trained train_hiding(const CellName& name, const Scene& scene,

@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <initializer_list>
 #include <span>
@@ -9,6 +10,8 @@ namespace fieldmark {
 
 /// Counts and positions of elements.
 using Index = std::int64_t;
+/// A position as the standard containers index it; not below 0 (not checked).
+inline std::size_t at(Index i) { return static_cast<std::size_t>(i); }
 
 /// Extents of a dense row-major tensor, rank 0 to 5. Trivially copyable: a backward closure can hold one by
 /// value.

@@ -61,6 +61,8 @@ class TrainingRun {
   /// Resumes from a checkpoint.
   /// @throws IoError if the file is not a checkpoint of the same options and inputs, see RunFingerprint
   void restore(const std::filesystem::path& path);
+  /// Whether the run resumed from a checkpoint of an earlier version.
+  bool from_earlier_version() const { return earlier_; }
 
  protected:
   /// @throws ValueError if an option is out of range
@@ -83,6 +85,8 @@ class TrainingRun {
   void update(std::size_t store = 0);
   /// Adam's step for one more range of the first store, see Adam::extend_step(); lr_factor multiplies lr().
   void extend_update(AdamRange range);
+  /// Everything that decides the result of this run; the first call hashes the inputs.
+  const RunFingerprint& fingerprint() const;
   /// Running mean of the loss of the last fifty steps or so; negative before the first.
   double loss() const { return loss_; }
 
@@ -105,11 +109,12 @@ class TrainingRun {
   virtual void save_more(SafetensorsFile&) const {}
   virtual void restore_more(const SafetensorsFile&) {}
   /// @}
+  /// A checkpoint of an earlier version in the present form; none if the file is not one.
+  virtual std::optional<SafetensorsFile> converted(const SafetensorsFile&) const { return {}; }
   /// Writes the file of a checkpoint; for trainers whose checkpoints hold secrets.
   virtual void write(const SafetensorsFile& file, const std::filesystem::path& path) const {
     file.write(path);
   }
-  const RunFingerprint& fingerprint() const;
 
   Schedule schedule_;
   std::vector<Trained> trained_;
@@ -117,6 +122,7 @@ class TrainingRun {
   mutable std::optional<RunFingerprint> fingerprint_;  // hashing inputs takes seconds
   Index steps_ = 0;
   double loss_ = -1, seconds_ = 0;
+  bool earlier_ = false;
   std::vector<double> curve_;  // seconds, steps, figure of each point
 };
 

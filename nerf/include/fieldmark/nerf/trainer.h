@@ -92,6 +92,7 @@ class Trainer final : public TrainingRun {
   void describe(RunFingerprint& fingerprint) const override;
   void save_more(SafetensorsFile& file) const override;
   void restore_more(const SafetensorsFile& file) override;
+  std::optional<SafetensorsFile> converted(const SafetensorsFile& file) const override;
   void lay_out_space();
   void carve();
   Index all_pixels() const;

@@ -1,7 +1,6 @@
 #pragma once
-#include <fieldmark/engine/adam.h>
-#include <fieldmark/engine/schedule.h>
 #include <fieldmark/engine/sharded_loop.h>
+#include <fieldmark/engine/training_run.h>
 #include <fieldmark/watermark/embedding/mark_psnr_meter.h>
 #include <fieldmark/watermark/mark/owner.h>
 
@@ -33,57 +32,48 @@ struct EmbedOptions {
 /// Adam minimises the mean over a batch. An image of fewer pixels than the extractor's is enlarged with its
 /// mark, as the reader enlarges a small image. Same seed and number of steps: same bytes, for any thread
 /// count and across save() and restore().   Source: Luo et al. 2023 (CopyRNeRF), section 3.4.
-class Embedder {
+class Embedder final : public TrainingRun {
  public:
   /// Owner and views must outlive the embedder.
   /// @param views  see cache_embed_views()
   /// @throws ValueError if an option is out of range
   Embedder(Owner& owner, std::span<const CachedView> views, const EmbedOptions& options);
-  /// Takes one step. @param seconds  since the start of the run, for a schedule that ends at a time
-  void step(double seconds);
-  /// Whether the run has all its steps.
-  bool done() const { return schedule_.done(steps_); }
-  /// Steps taken, those before a restore() included.
-  Index steps() const { return steps_; }
-  /// Steps that the run will have in all; 0 until a timed run knows.
-  Index planned() const { return schedule_.total(); }
   /// Running means over the last images.
   using Figures = TrainingFigures;
   /// Running means over the last images.
   const Figures& figures() const { return figures_; }
-  /// The running means for a progress line.
-  std::string note() const { return training_->note(figures_); }
+  double figure() const override { return figures_.bits; }
+  std::string status() const override { return training_->note(figures_); }
   /// Sets the owner's gain to reach its mark PSNR on novel views, each with a random message, see
   /// MarkPsnrMeter. Does nothing for a mark without a gain.
   void calibrate(Index views = MarkPsnrViews{}.count);
 
-  /// @throws IoError
-  void save(const std::filesystem::path& path) const;
-  /// @throws IoError if the file is not a checkpoint of the same configuration
-  void restore(const std::filesystem::path& path);
   /// The key of a checkpoint's owner, which a run that goes on must use. @throws IoError
   static Key checkpoint_key(const std::filesystem::path& path);
 
  private:
+  double take_step(double seconds) override;
+  void describe(RunFingerprint& fingerprint) const override;
+  // A checkpoint holds the owner's key: it is secret, and refused under another key.
+  void save_more(SafetensorsFile& file) const override;
+  void restore_more(const SafetensorsFile& file) override;
+  void write(const SafetensorsFile& file, const std::filesystem::path& path) const override {
+    file.write(path, Access::secret);
+  }
   TrainingImage draw(Index image, Tape<float>& tape) const;
   float* shifted_positions(Tape<float>& tape, Index view, std::uint64_t place) const;
   Var<float> distorted(Var<float> image, std::uint64_t place, bool warped, const std::array<float, 6>& warp,
                        float blur, float noise) const;
   double run_image(Index image, Tape<float>& tape, float* grads, Figures& figures) const;
-  void step_parameters();
-  std::string fingerprint() const;
 
   Owner& owner_;
   std::span<const CachedView> views_;
   EmbedOptions options_;
-  Schedule schedule_;
   CounterRng choice_rng_, message_rng_, noise_rng_, shift_rng_;
   CellCode code_;
   std::unique_ptr<MarkTraining> training_;
   ShardedLoop<float> loop_;
-  Adam<float> adam_;
   Figures figures_;
-  Index steps_ = 0;
 };
 
 }  // namespace fieldmark::watermark

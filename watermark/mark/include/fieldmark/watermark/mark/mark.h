@@ -1,4 +1,5 @@
 #pragma once
+#include <fieldmark/engine/run_fingerprint.h>
 #include <fieldmark/nerf/renderer.h>
 #include <fieldmark/watermark/mark/cell_code.h>
 #include <fieldmark/watermark/mark/cell_grid.h>
@@ -55,8 +56,8 @@ class MarkTraining {
                           const TrainingFigures& running, TrainingFigures& figures) const = 0;
   /// Running means for a progress line.
   virtual std::string note(const TrainingFigures& running) const = 0;
-  /// Every option of this kind, so that a checkpoint of other options is refused.
-  virtual std::string fingerprint() const = 0;
+  /// Notes every option of training of this kind, so that a checkpoint of other options is refused.
+  virtual void describe(RunFingerprint& fingerprint) const = 0;
 };
 
 /// A kind of mark: how a message changes colours, how an image is read, how both are trained and stored.
