@@ -6,7 +6,7 @@
 #include "tools/run_command.h"
 #include "tools/test_key_file.h"
 
-// The whole job through the command, on a scene of 64 x 64 pixels: from the data set to the verdict. Keys,
+// The whole job through the command, on a scene of 48 x 48 pixels: from the data set to the verdict. Keys,
 // seeds and steps are fixed, so every run gives the same p-values on one instruction set.
 
 namespace {
@@ -19,8 +19,8 @@ struct EndToEnd {
   std::string owner = folder / "owner", marked = folder / "marked", unmarked = folder / "unmarked";
 
   EndToEnd() {
-    run({"scene", "--out", folder / "scene", "--size", "64", "--views", "40"});
-    run({"train", "--data", folder / "scene", "--out", folder / "field", "--steps", "300", "--max-megabytes",
+    run({"scene", "--out", folder / "scene", "--size", "48", "--views", "40"});
+    run({"train", "--data", folder / "scene", "--out", folder / "field", "--steps", "200", "--max-megabytes",
          "1"});
     run({"embed",
          "--field",
@@ -36,18 +36,18 @@ struct EndToEnd {
          "--cells",
          "6",
          "--reader-size",
-         "64",
+         "48",
          "--steps",
-         "150",
+         "80",
          "--views",
          "12",
          "--measured-views",
          "1"});
-    run({"bake", "--owner", owner, "--message", "a6", "--out", folder / "baked", "--steps", "60"});
+    run({"bake", "--owner", owner, "--message", "a6", "--out", folder / "baked", "--steps", "30"});
     for (const auto& [field, views] :
          std::map<std::string, std::string>{{"baked", marked}, {"field", unmarked}})
-      run({"render", "--field", folder / field, "--out", views, "--cameras", "novel", "--count", "10",
-           "--seed", "99", "--size", "64"});
+      run({"render", "--field", folder / field, "--out", views, "--cameras", "novel", "--count", "6",
+           "--seed", "99", "--size", "48"});
   }
 
   static Outcome run(const std::vector<std::string>& words) {
@@ -68,7 +68,7 @@ struct EndToEnd {
     REQUIRE(outcome.code == code);
     const auto json = nlohmann::json::parse(outcome.out);
     CHECK(json.at("found") == (code == kFound));
-    CHECK(json.at("views") == 10);
+    CHECK(json.at("views") == 6);
     return json.at("p_value");
   }
 };

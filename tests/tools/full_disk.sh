@@ -35,8 +35,8 @@ refuses() {
 }
 
 small=(--steps 2 --views 8 --measured-views 1 --reader-size 32 --bits 4 --cells 6)
-"$fieldmark" scene --out scene --kind sphere --size 16 --views 4 >/dev/null 2>&1
-"$fieldmark" train --data scene --out field.fm --steps 100 >/dev/null 2>&1
+"$fieldmark" scene --out scene --kind sphere --size 16 --views 16 >/dev/null 2>&1
+"$fieldmark" train --data scene --out field.fm --steps 100 --max-megabytes 1 >/dev/null 2>&1
 "$fieldmark" embed --field field.fm --out owner.fm "${small[@]}" >/dev/null 2>&1
 "$fieldmark" render --field field.fm --out views --count 1 --size 32 >/dev/null 2>&1
 

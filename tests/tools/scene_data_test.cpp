@@ -15,7 +15,7 @@ using namespace fieldmark;
 TEST_CASE("a scene of one transforms.json trains on its own split, and its notes are told once",
           "[scene_data]") {
   const TemporaryFolder folder;
-  const std::filesystem::path scene = tiny_scene(folder);
+  const std::filesystem::path scene = tiny_scene(folder, "4");
   nlohmann::json json = nlohmann::json::parse(read_text(scene / "transforms_train.json"));
   json["frames"].push_back(json["frames"][0]);
   json["frames"][4]["file_path"] = "train/zz_missing.png";

@@ -15,6 +15,7 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
+constexpr MarkPsnrViews kFewViews{.count = 32};  // where no agreement on other views is asked for
 const Message kBakedMessage{{1, 0, 1, 1}}, kOther{{0, 1, 1, 0}};
 
 Owner owner_with_gain() {
@@ -47,7 +48,7 @@ BakeOptions bake_options(Index steps) { return {.schedule = {.steps = steps, .lr
 nerf::RadianceField bake(const Owner& owner, const Message& message, Index steps) {
   Baker baker(owner, message, bake_options(steps));
   while (!baker.done()) baker.step(0);
-  baker.scale_to(baker.mark_psnr() - 1);
+  baker.scale_to(baker.mark_psnr(kFewViews) - 1, kFewViews);
   return baker.field();
 }
 
@@ -145,16 +146,16 @@ TEST_CASE("baker: scaling gives the file the strength asked for, on other views 
 TEST_CASE("baker: scaling goes no further than its bound, and finds nothing to scale before the first step") {
   const Owner owner = owner_with_gain();
   Baker baker(owner, kBakedMessage, bake_options(20));
-  const auto nothing = baker.scale_to(30);
+  const auto nothing = baker.scale_to(30, kFewViews);
   CHECK(std::isinf(nothing.learnt));
   CHECK(std::isinf(nothing.scaled));
   CHECK(nothing.scale == 1);
   while (!baker.done()) baker.step(0);
-  const double learnt = baker.mark_psnr();
-  const auto most = baker.scale_to(learnt - 20);
+  const double learnt = baker.mark_psnr(kFewViews);
+  const auto most = baker.scale_to(learnt - 20, kFewViews);
   CHECK(most.scale == Baker::kLargestScale);
   CHECK(most.scaled == Approx(learnt - 6).margin(0.5));
-  const auto least = baker.scale_to(learnt + 20);
+  const auto least = baker.scale_to(learnt + 20, kFewViews);
   CHECK(least.scale == 1 / Baker::kLargestScale);
 }
 
