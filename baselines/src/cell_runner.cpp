@@ -30,7 +30,7 @@ constexpr Index kWeightsBits = 8;  // as the paper's noise of 0.01 on the weight
 constexpr double kWeightsNoise = 0.01;
 constexpr std::uint64_t kCamerasSeed = 1000;  // views that are measured are not those learnt from
 
-// Of a split, evenly spread.
+// Keeps at most that many views of a split, evenly spread.
 void thin_out(nerf::Dataset& data, Index most) {
   const auto n = static_cast<Index>(data.views.size());
   if (n <= most) return;

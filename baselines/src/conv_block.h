@@ -7,10 +7,10 @@
 
 namespace fieldmark::baselines {
 
-/// How batch normalisation works in a pass through a network, and what it saw.
+/// Mode of batch normalisation in one pass through a network, and the statistics of that pass.
 template <class T>
 struct NormPass {
-  /// With the running statistics, so that no image depends on another; else with the batch's own.
+  /// Normalises by the running statistics, so that no image depends on another, instead of the batch's.
   bool running = false;
   /// The statistics of each normalisation, in the order they were met, for update_statistics().
   std::vector<std::pair<const BatchNorm<T>*, BatchStatistics>> seen = {};

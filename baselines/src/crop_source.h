@@ -24,13 +24,13 @@ class CropSource {
   /// @param images  [H, W, 3] in [0, 1] of any sizes; none: textures alone
   /// @throws ShapeError if one is not
   CropSource(std::vector<Tensor<float>> images, std::uint64_t seed);
-  /// Of an image smaller than `size`, what there is, repeated at its edges. A window that shows hardly
-  /// anything is drawn anew, up to 8 times: a network learns nothing from a white background.
+  /// Draws a random window of an image, or a texture. An image smaller than `size` is extended by its edge
+  /// pixels. A window that shows hardly anything is drawn again, up to 8 times.
   /// @param index  one image for each   @return [size, size, 3] in [0, 1]
   Tensor<float> image(Index size, std::uint64_t index) const;
   /// The same of images alone. @throws ValueError if there is none
   Tensor<float> crop(Index size, std::uint64_t index) const;
-  /// As constructed.
+  /// The options given to the constructor.
   const std::vector<Tensor<float>>& images() const { return images_; }
 
  private:

@@ -36,9 +36,9 @@ class ImageMarker {
   /// Share of the bits of `sent` that are read right.
   double accuracy(const Tensor<float>& image, const watermark::Message& sent) const;
 
-  /// As constructed.
+  /// The options given to the constructor.
   HidingKind kind() const { return kind_; }
-  /// As constructed.
+  /// The options given to the constructor.
   const HidingOptions& options() const { return options_; }
   /// The network, to be trained.
   const HidingNetwork<float>& network() const { return *network_; }

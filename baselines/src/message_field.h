@@ -50,7 +50,7 @@ class MessageField {
   Tensor<float> render(const ParamStore<float>& store, const nerf::RadianceField& base,
                        const nerf::Camera& camera, std::span<const std::int8_t> signs,
                        const nerf::RenderOptions& options = {}) const;
-  /// As constructed.
+  /// The options given to the constructor.
   const MessageFieldOptions& options() const { return options_; }
 
  private:

@@ -128,7 +128,7 @@ void cell_evidence(const float* sign, const float* index, Index places, Index ce
   if (places < 0 || cells < 0)
     throw ValueError("[cell_evidence] places and cells must not be negative, got " + std::to_string(places) +
                      " and " + std::to_string(cells));
-  // Of each piece the cells' sums of q tanh(s / 2), then those of q.
+  // Each piece holds the cells' sums of q tanh(s / 2), then those of q.
   const Index pieces = (places + kPlaces - 1) / kPlaces;
   std::vector<double> parts(static_cast<std::size_t>(pieces * 2 * cells));
   parallel_for(places, kPlaces, [&](Index begin, Index end) {

@@ -13,7 +13,7 @@ namespace {
 constexpr Index kErrorTile = 8;                                        // pixels along a side, see hard_pixels
 constexpr Index kMostParts = kMostSupersampling * kMostSupersampling;  // of a pixel
 
-// One of n things, from two uniform numbers: one has 24 bits only.
+// A uniform integer below n from two uniform floats, since one has 24 bits only.
 Index pick(float u, float v, Index n) {
   const double x = (static_cast<double>(u) + static_cast<double>(v) * 0x1.0p-24) * static_cast<double>(n);
   return std::min(static_cast<Index>(x), n - 1);
@@ -26,7 +26,7 @@ Index Trainer::all_pixels() const {
   return static_cast<Index>(data_.views.size()) * camera.width * camera.height;
 }
 
-// Tiles of all images one after another, for the pixel at `place` of all images one after another.
+// Index of the tile that holds a pixel; tiles and pixels are counted through all images.
 Index Trainer::tile_of(Index place) const {
   const Index width = data_.views[0].camera.width, height = data_.views[0].camera.height;
   const Index across = (width + kErrorTile - 1) / kErrorTile, down = (height + kErrorTile - 1) / kErrorTile;
@@ -34,7 +34,7 @@ Index Trainer::tile_of(Index place) const {
   return (view * down + pixel / width / kErrorTile) * across + pixel % width / kErrorTile;
 }
 
-// As choose_rays() has it without a preference; with one, a part of the rays takes the harder of two pixels.
+// Replaces a share of the pixels, see TrainOptions::hard_pixels, by the harder of two.
 void Trainer::prefer_hard(Index first, Index count, std::span<Index> place) const {
   const auto choices = static_cast<Index>(pixels_.size());
   for (Index i = 0; i < count; ++i) {

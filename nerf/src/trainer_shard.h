@@ -21,11 +21,11 @@ struct Trainer::Shard {
   std::vector<float> jitter, truth, background;  // the same
   RaySampler sampler;
   RaySamples found;
-  // Of an mlp field.
+  // For an mlp field alone.
   HierarchicalSampler hierarchical;
   RaySamples first;
   std::vector<float> weights;
-  // Of all chunks of a step, in their order; gradients of the features level by level in each.
+  // All chunks of a step in order; within a chunk, feature gradients go level by level.
   std::vector<Index> samples;
   Buffer position, dfeatures;
   std::vector<Index> places;                    // of the pixels of a chunk's rays in all images

@@ -81,13 +81,13 @@ TEST_CASE("bake gives the file the strength asked for", "[bake]") {
     return nlohmann::json::parse(r.out);
   };
   for (const char* mark_psnr : {"30", "38"}) {
-    const auto bake = json_of({"bake", "--owner", job.owner, "--message", "5", "--out", out, "--steps", "300",
+    const auto bake = json_of({"bake", "--owner", job.owner, "--message", "5", "--out", out, "--steps", "200",
                                "--mark-psnr", mark_psnr, "--json", "-"});
     CAPTURE(bake);
     CHECK(bake["mark_psnr"].get<double>() == Approx(std::stod(mark_psnr)).margin(0.03));
     CHECK(bake.count("notes") == 0);
     const auto measured = json_of({"measure", "--informed-count", "0", "--owner", job.owner, "--field", out,
-                                   "--message", "5", "--count", "40", "--json", "-"});
+                                   "--message", "5", "--count", "20", "--json", "-"});
     CHECK(measured["psnr_base_foreground"].get<double>() == Approx(std::stod(mark_psnr)).margin(0.4));
   }
 }

@@ -37,8 +37,8 @@ void add_scene_option(CommandLine& app, std::string& scene);
 void add_plot(CommandLine& app, std::string& plot);
 /// @}
 
-/// A split of a data set; without a folder that of lego in FIELDMARK_DATA, or else of the built-in scene,
-/// which `quick` makes small.
+/// A split of the data set in a folder; without a folder, of lego in FIELDMARK_DATA or else of the built-in
+/// scene, which `quick` makes small.
 nerf::Dataset bench_split(const std::string& folder, const std::string& split, bool quick);
 
 /// A field trained on a data set for a time, with progress. @throws Interrupted on Ctrl-C

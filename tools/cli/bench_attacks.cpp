@@ -41,7 +41,7 @@ class Bench {
   Json image(const std::string& name) {
     return add(name, [&] { return meter_.image(name); });
   }
-  // Of the marked field; or of what is put onto another one, whose damage counts.
+  // Adds the row of an attack on the marked field; with `onto`, damage is measured against that field.
   Json field(const std::string& name, const watermark::FieldAttackInputs& inputs,
              const nerf::RadianceField* onto = nullptr) {
     return add(name, [&] {

@@ -97,7 +97,7 @@ nerf::PsnrTarget psnr_target(const TrainArguments& options, const nerf::Radiance
   return {field, options.target_psnr, std::move(held_out)};
 }
 
-// Of the data set's test views, after everything is saved; null where there are none.
+// PSNR on the data set's test views, measured after everything is saved; null where there are none.
 Json test_psnr(const TrainArguments& options, const nerf::RadianceField& field, Context& context) {
   if (!nerf::has_split(options.data, "test")) return nullptr;
   const auto data = load_scene(

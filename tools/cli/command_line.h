@@ -28,7 +28,7 @@ class Option {
   /// The default that help texts show in place of the variable's value; empty: none.
   Option default_str(const std::string& text);
   Option group(const std::string& name);
-  /// Refuses numbers outside low to high; both whole: also those that are not whole.
+  /// Refuses numbers outside [low, high], and fractions if both bounds are integers.
   template <class T>
   Option range(T low, T high) {
     if constexpr (std::is_integral_v<T>)

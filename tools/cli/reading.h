@@ -50,7 +50,7 @@ std::vector<ImageEvidence> read_images(SuspectReader& reader, const std::vector<
 /// The readings used: "blind", "informed", or "mixed" where images differ.
 std::string reading_used(const std::vector<ImageEvidence>& images);
 
-/// Of all images together: views of one field are not independent trials, so their evidence is added.
+/// Sum of the evidence of all images: views of one field are not independent trials.
 std::vector<double> total_evidence(const std::vector<ImageEvidence>& images);
 
 }  // namespace fieldmark::cli

@@ -93,7 +93,7 @@ Index whole_row(Index columns) {
   return round_up(columns, panel_width<T>(1));
 }
 
-/// into [columns] += the sums of the columns of d with the row stride whole_row(columns).
+/// Adds the sums of the columns of d, whose row stride is whole_row(columns), to into [columns].
 template <class T>
 void add_column_sums(const T* d, Index rows, Index columns, T* into) {
   using namespace kernels;

@@ -1,8 +1,7 @@
 #include <fieldmark/tools/results/report.h>
 
-#include <cstdlib>
-
 #include "support/catch.h"
+#include "tools/environment.h"
 
 using namespace fieldmark::results;
 
@@ -12,14 +11,14 @@ TEST_CASE("markdown_table writes a header, a rule and the rows", "[report]") {
 }
 
 TEST_CASE("published_command shows no folder of this machine", "[report]") {
-  const char* held = std::getenv("FIELDMARK_DATA");
-  const std::string before = held ? held : "";
-  setenv("FIELDMARK_DATA", "/some/where/data", 1);
-  CHECK(published_command({"fieldmark", "train", "--data", "/some/where/data/lego", "--out",
-                           "/tmp/x/lego.fm"}) == "fieldmark train --data $FIELDMARK_DATA/lego --out lego.fm");
-  unsetenv("FIELDMARK_DATA");
+  {
+    const EnvironmentVariable data("FIELDMARK_DATA", "/some/where/data");
+    CHECK(published_command(
+              {"fieldmark", "train", "--data", "/some/where/data/lego", "--out", "/tmp/x/lego.fm"}) ==
+          "fieldmark train --data $FIELDMARK_DATA/lego --out lego.fm");
+  }
+  const EnvironmentVariable none("FIELDMARK_DATA", nullptr);
   CHECK(published_command({"/usr/bin/fieldmark", "a/b"}) == "fieldmark a/b");
-  if (held) setenv("FIELDMARK_DATA", before.c_str(), 1);
 }
 
 TEST_CASE("markdown_report holds the protocol and every number", "[report]") {

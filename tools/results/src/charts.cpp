@@ -57,7 +57,7 @@ std::string engine_chart(const Json& result) {
 }
 
 std::string field_chart(const Json& result) {
-  // Of the points in sight, without a margin: a line that rises.
+  // The front of the points in sight, without a margin, so that the line rises.
   std::vector<bench::SpeedQuality> seen;
   for (const Json& row : result.at("rows")) seen.push_back({number(row, "seconds"), number(row, "psnr")});
   const std::vector<bool> line = bench::pareto_front(seen, {.time = 0, .psnr = 0});

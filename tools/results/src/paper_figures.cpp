@@ -52,7 +52,7 @@ LineSeries& line_of(std::vector<LineSeries>& lines, const std::string& name, boo
   return lines.back();
 }
 
-// Of systems of which two lengths or more are there.
+// One line for each system that was measured at two lengths or more.
 std::vector<LineSeries> lines_of_lengths(const std::vector<Cell>& cells) {
   std::vector<LineSeries> lines;
   for (const auto& system : baselines::paper_systems())
@@ -89,7 +89,7 @@ std::vector<LineSeries> lines_of_severity(const std::vector<Cell>& cells, const 
   return lines;
 }
 
-// Of the systems themselves, or of the full models and what is left without a part.
+// Curves of the systems, or of the full models and their ablations.
 std::vector<LineSeries> learning_curves(const std::vector<Cell>& cells, bool ablation) {
   std::vector<LineSeries> lines;
   for (const auto& system : baselines::paper_systems()) {

@@ -36,7 +36,7 @@ std::string of_paper(const char* table, const std::string& system, const std::st
   return value ? fixed(*value, digits) : "-";
 }
 
-// Of one cell or, over several seeds, the mean.
+// Mean of a figure over the seeds of a cell.
 double mean(const std::vector<const Cell*>& cells, double Cell::*member) {
   double sum = 0;
   for (const Cell* c : cells) sum += c->*member;

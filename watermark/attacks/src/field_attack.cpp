@@ -89,7 +89,7 @@ void prune(std::span<float> w, double fraction) {
   if (count == 0) return;
   std::vector<std::size_t> order(w.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  // Of equal sizes the first go, so that the result is the same everywhere.
+  // Ties go by position, so that the result is the same everywhere.
   const auto less = [&](std::size_t a, std::size_t b) {
     const float x = std::abs(w[a]), y = std::abs(w[b]);
     return x < y || (x == y && a < b);

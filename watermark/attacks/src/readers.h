@@ -37,7 +37,7 @@ class Readers {
     accuracy.chosen = share(reading.evidence(), sent);
     return accuracy;
   }
-  // Of one image informed and blindly, mean; NaN without one.
+  // Mean time of reading one image, informed and blindly; NaN without images.
   double seconds() const { return finite_mean(seconds_); }
 
  private:

@@ -66,7 +66,7 @@ class Adam {
   std::span<T> mean_square() { return mean_square_; }
   std::span<const T> mean_square() const { return mean_square_; }
   /// @}
-  /// As constructed.
+  /// The options given to the constructor.
   const AdamOptions& options() const { return options_; }
 
  private:

@@ -37,7 +37,7 @@ class Schedule {
   /// Resumes a run. A total that is fixed stays, since the clock of the earlier process is not known.
   /// @param total  0: not fixed
   void resume(Index total);
-  /// As constructed.
+  /// The options given to the constructor.
   const ScheduleOptions& options() const { return options_; }
 
  private:

@@ -74,7 +74,7 @@ class Field {
     return mlp_ ? mlp_->direction_width() : options_.directional ? kSphericalHarmonics : 0;
   }
 
-  /// As constructed.
+  /// The options given to the constructor.
   const FieldOptions& options() const { return options_; }
   /// Whether there is a hash table.
   bool has_table() const { return encoding_.has_value(); }

@@ -53,7 +53,7 @@ class RadianceField {
   /// @param place  named in errors   @throws IoError if the text is no configuration
   static RadianceField from_configuration(std::string_view text, std::string_view place);
 
-  /// As constructed.
+  /// The options given to the constructor.
   const RadianceFieldOptions& options() const { return options_; }
 
   ParamStore<float> params;                   ///< of the networks and the table

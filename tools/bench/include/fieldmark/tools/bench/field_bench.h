@@ -11,8 +11,8 @@ namespace fieldmark::bench {
 /// A variant beside the reference.
 struct FieldRow {
   FieldVariant variant;  ///< how it was rendered
-  /// Of a view: the median over the runs of its ratio to the default right before it, times the default's
-  /// median. Of the mean over the views.
+  /// Seconds a view, mean over the views. The time of a view is its ratio to the default timed right before
+  /// it, median over the runs, times the default's median.
   double seconds = 0;
   double spread = 0;        ///< (largest - smallest) / median of that ratio over the runs
   double psnr = 0;          ///< of all views together, numbers not rounded to 8 bits, dB

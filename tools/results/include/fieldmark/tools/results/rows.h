@@ -3,7 +3,7 @@
 
 namespace fieldmark::results {
 
-/// Of the rows' files; a row of another version is stale.
+/// Version of the files of rows; a row of another version is stale.
 constexpr int kSchema = 1;
 
 /// Rows by their ids. A row is a JSON object {schema, id, kind, command, commit, date, cpu, isa, threads,

@@ -55,7 +55,7 @@ std::vector<double> visible_area(std::span<const CachedView> views, Index side);
 /// How many cells a view shows, of which slivers count little: (sum a)^2 / sum a^2 over the cells' visible
 /// areas a; 0 if it shows nothing.
 double cells_shown(const CachedView& view, Index side);
-/// Of several views: as many as nine of ten show at least; 0 without views.
+/// The 10th percentile of cells_shown() over several views; 0 without views.
 double cells_shown(std::span<const CachedView> views, Index side);
 
 /// Cells an axis so that one view shows the whole message: the least of 16, 22, 28 ... 64 at which

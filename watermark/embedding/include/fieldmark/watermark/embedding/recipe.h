@@ -35,7 +35,7 @@ void use_colours(MarkColours colours, CellMarkOptions& mark);
 /// else four.
 Index batch_for(nerf::SpaceKind space);
 
-/// All options of one preset, to be changed before an owner is made.
+/// The options of a preset; change them before you make an owner.
 struct EmbedRecipe {
   OwnerOptions owner{};                                   ///< which OWNER stores
   EmbedOptions embed{};                                   ///< of training

@@ -53,7 +53,7 @@ class CellMark : public Mark {
                                          std::span<const CachedView> views) const override;
   /// Reads the mark.
   const extractor::DenseExtractor<float>& reader() const { return reader_; }
-  /// As constructed.
+  /// The options given to the constructor.
   const CellMarkOptions& options() const { return options_; }
 
  private:

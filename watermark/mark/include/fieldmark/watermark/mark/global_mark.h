@@ -38,7 +38,7 @@ class GlobalMark {
   Var<T> operator()(const Params<T>& params, Var<T> x, Var<T> d, Var<T> c, Var<T> message) const;
   /// Columns of c.
   Index colour_inputs() const { return options_.authors_code ? 4 : 3; }
-  /// As constructed.
+  /// The options given to the constructor.
   const GlobalMarkOptions& options() const { return options_; }
 
  private:

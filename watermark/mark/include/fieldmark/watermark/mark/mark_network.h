@@ -35,7 +35,7 @@ class MarkNetwork {
   /// P at positions. @param x [N, 3] unit cube   @param c [N, 3] colour of the base field   @return [N, 3]
   /// Differentiable in: x, c and the parameters.
   Var<T> carrier(const Params<T>& params, Var<T> x, Var<T> c) const;
-  /// As constructed.
+  /// The options given to the constructor.
   const MarkNetworkOptions& options() const { return options_; }
 
  private:
