@@ -40,7 +40,7 @@ std::string line_of(const RadianceField& field, const Dataset& data, const Train
          (o.keep ? " kept" : "");
 }
 
-// Names the first difference in words; fields are lines of JSON, too long to show.
+// Shows the options of both runs, not the fields, whose JSON is too long to read in an error.
 void require_line(const std::string& found, const std::string& wanted, const std::string& path) {
   if (found == wanted) return;
   const auto options = [](const std::string& line) { return line.substr(line.find(kAfterField) + 1); };

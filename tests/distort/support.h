@@ -49,7 +49,7 @@ double float_error(const F& f, const std::vector<fieldmark::Tensor<float>>& inpu
   for (std::size_t i = 0; i < want.size(); ++i) {
     const double error = std::abs(static_cast<double>(got[i]) - want[i]);
     raise_to(worst, error);
-    largest = std::max(largest, std::abs(want[i]));
+    raise_to(largest, std::abs(want[i]));
   }
   return worst / largest;
 }

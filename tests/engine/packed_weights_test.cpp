@@ -87,7 +87,7 @@ TEST_CASE("packed_weights: in bf16 a layer's values and gradients are off by the
     double error = 0, largest = 0;
     for (std::size_t i = begin; i < end; ++i) {
       raise_to(error, static_cast<double>(std::abs(got[i] - want[i])));
-      largest = std::max(largest, std::abs(static_cast<double>(want[i])));
+      raise_to(largest, std::abs(static_cast<double>(want[i])));
     }
     return error / largest;
   };

@@ -8,6 +8,7 @@
 #include "support/each_isa.h"
 #include "support/expect_grad.h"
 #include "support/run_op.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using namespace fieldmark::nerf;
@@ -52,7 +53,7 @@ double worst_error(const HashEncodingOptions& options, const Tensor<double>& x) 
                                   {x[3 * i], x[3 * i + 1], x[3 * i + 2]}, colour);
       for (std::size_t k = 0; k < want.size(); ++k) {
         const double error = std::abs(y.value()[i * encoding.width() + static_cast<Index>(k)] - want[k]);
-        worst = error <= worst ? worst : error;
+        raise_to(worst, error);
       }
     }
   }

@@ -5,6 +5,7 @@
 
 #include "support/catch.h"
 #include "support/random.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using namespace fieldmark::nerf;
@@ -105,8 +106,8 @@ TEST_CASE("lens: an undistorted image has at each pixel what the lens put elsewh
                    py = static_cast<double>(part.top + y) + 0.5;
       const Vec2 p = lens.distorted({(px - 19) / 40, (py - 16) / 41});
       const float* got = out.data.data() + 4 * (y * part.width + x);
-      worst = std::max({worst, std::abs(got[0] - (p[0] * 40 + 19 - 0.5) / 40),
-                        std::abs(got[1] - (p[1] * 41 + 16 - 0.5) / 30)});
+      raise_to(worst, std::abs(got[0] - (p[0] * 40 + 19 - 0.5) / 40));
+      raise_to(worst, std::abs(got[1] - (p[1] * 41 + 16 - 0.5) / 30));
       CHECK(got[2] == Approx(0.5));
       CHECK(got[3] == 1);
     }

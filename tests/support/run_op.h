@@ -65,7 +65,7 @@ double float_error(const F& f, const std::vector<fieldmark::Tensor<float>>& inpu
     for (std::size_t k = 0; k < want.size(); ++k) {
       double largest = 1e-30, off = 0;
       for (std::size_t i = 0; i < want[k].size(); ++i) {
-        largest = std::max(largest, std::abs(want[k][i]));
+        raise_to(largest, std::abs(want[k][i]));
         const double d = std::abs(static_cast<double>(got[k][i]) - want[k][i]);
         raise_to(off, d);
       }

@@ -8,6 +8,7 @@
 #include "support/catch.h"
 #include "support/source_dir.h"
 #include "support/temporary_folder.h"
+#include "support/worst.h"
 #include "tools/run_command.h"
 
 using namespace fieldmark;
@@ -26,7 +27,7 @@ TEST_CASE("gradcheck passes for every registered op and says which is the worst"
     CHECK(row["ok"] == true);
     CHECK_THAT(r.err, Contains(row["name"].get<std::string>()));
     entries += row["entries"].get<long>();
-    worst = std::max(worst, row["worst"].get<double>());
+    raise_to(worst, row["worst"].get<double>());
   }
   CHECK(entries == json["entries"].get<long>());
   CHECK(worst == json["worst"].get<double>());

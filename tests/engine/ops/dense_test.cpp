@@ -52,7 +52,7 @@ double error(const std::vector<float>& a, const std::vector<float>& b) {
   double worst = 0, size = 1e-30;
   for (std::size_t i = 0; i < a.size(); ++i) {
     raise_to(worst, std::abs(double(a[i]) - b[i]));
-    size = std::max(size, std::abs(double(b[i])));
+    raise_to(size, std::abs(double(b[i])));
   }
   return worst / size;
 }

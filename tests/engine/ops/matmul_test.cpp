@@ -6,6 +6,7 @@
 
 #include "support/each_isa.h"
 #include "support/expect_grad.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 
@@ -48,8 +49,8 @@ double worst_error(Index m, Index k, Index n) {
     double worst = 0, largest = 1e-30;
     for (std::size_t i = 0; i < exact.size(); ++i) {
       const double d = std::abs(static_cast<double>(got[i]) - exact[i]);
-      worst = d <= worst ? worst : d;
-      largest = std::max(largest, std::abs(exact[i]));
+      raise_to(worst, d);
+      raise_to(largest, std::abs(exact[i]));
     }
     return worst / largest;
   };

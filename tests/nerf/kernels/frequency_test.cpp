@@ -6,6 +6,7 @@
 
 #include "support/each_isa.h"
 #include "support/random.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using namespace fieldmark::kernels;
@@ -28,7 +29,7 @@ double worst_error(const Tensor<T>& x, int dims, int bands) {
         const T* got = y.data() + i * row + 2 * b * dims + a;
         const auto s = static_cast<double>(std::abs(static_cast<long double>(got[0]) - std::sin(angle)));
         const auto c = static_cast<double>(std::abs(static_cast<long double>(got[dims]) - std::cos(angle)));
-        for (const double e : {s, c}) worst = e <= worst ? worst : e;
+        for (const double e : {s, c}) raise_to(worst, e);
       }
   return worst;
 }

@@ -7,6 +7,7 @@
 
 #include "nerf/small_field.h"
 #include "support/catch.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using namespace fieldmark::bench;
@@ -49,7 +50,7 @@ TEST_CASE("field_bench: figures of the default are those of its images and the r
       for (Index a = 0; a < 3; ++a) {
         const double off = std::abs(static_cast<double>(view.rgb[3 * p + a]) - w[a]);
         squares += off * off;
-        worst = std::max(worst, off);
+        raise_to(worst, off);
       }
       const double missing = std::max(0.0, w[3] - static_cast<double>(view.opacity[p]));
       dropped += missing;

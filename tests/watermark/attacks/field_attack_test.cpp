@@ -152,7 +152,7 @@ TEST_CASE("field_attack: whole numbers are the nearest multiples, one scale a te
     const auto expect = [&](const std::vector<float>& w, const std::vector<float>& q, std::size_t begin,
                             std::size_t end) {
       double largest = 0, worst = 0, off = 0;
-      for (std::size_t i = begin; i < end; ++i) largest = std::max(largest, std::abs(double(w[i])));
+      for (std::size_t i = begin; i < end; ++i) raise_to(largest, std::abs(double(w[i])));
       const double scale = largest / most;
       for (std::size_t i = begin; i < end; ++i) {
         raise_to(worst, std::abs(double(q[i]) - double(w[i])));
@@ -228,9 +228,9 @@ TEST_CASE("field_attack: average, sign flip and copy add the fields' numbers") {
   double worst = 0;
   for (std::size_t i = 0; i < a.params.values().size(); ++i) {
     const double x = a.params.values()[i], y = b.params.values()[i], z = c.params.values()[i];
-    worst = std::max({worst, std::abs(average.params.values()[i] - (0.75 * x + 0.25 * y)),
-                      std::abs(flip.params.values()[i] - (2 * y - x)),
-                      std::abs(copy.params.values()[i] - (x + 1.5 * (z - y)))});
+    raise_to(worst, std::abs(average.params.values()[i] - (0.75 * x + 0.25 * y)));
+    raise_to(worst, std::abs(flip.params.values()[i] - (2 * y - x)));
+    raise_to(worst, std::abs(copy.params.values()[i] - (x + 1.5 * (z - y))));
   }
   CHECK(worst < 5e-7);  // numbers up to 4, rounded once
   CHECK_THROWS_WITH(attacked("average_0.5", a), "[field_attack] other: must be given for this attack");

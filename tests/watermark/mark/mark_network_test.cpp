@@ -8,6 +8,7 @@
 
 #include "support/catch.h"
 #include "support/run_op.h"
+#include "support/worst.h"
 #include "watermark/dense_by_loops.h"
 
 using namespace fieldmark;
@@ -72,7 +73,7 @@ TEST_CASE("mark_network: without luminance the carrier has no luma, and it is ne
   double largest = 0;
   for (std::size_t i = 0; i < y.size(); i += 3) {
     CHECK(std::abs(0.299 * y[i] + 0.587 * y[i + 1] + 0.114 * y[i + 2]) < 1e-12);
-    largest = std::max(largest, std::hypot(y[i], y[i + 1], y[i + 2]));
+    raise_to(largest, std::hypot(y[i], y[i + 1], y[i + 2]));
   }
   CHECK(largest <=
         std::sqrt(2 + 2 * 0.05535));  // the two axes are not quite at right angles: their product is -0.0553

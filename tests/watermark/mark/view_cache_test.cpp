@@ -81,7 +81,7 @@ TEST_CASE("view_cache: a sample lies on its pixel's ray, inside the cube") {
     }
     CHECK(along > 0);
     for (std::size_t a = 0; a < 3; ++a) square += std::pow(to[a] - along * ray.direction[a], 2);
-    off = std::max(off, std::sqrt(square));
+    raise_to(off, std::sqrt(square));
   }
   CHECK(off < 1e-5);
 }
@@ -95,7 +95,6 @@ TEST_CASE("view_cache: several samples of a ray are its heaviest parts, and few 
   double worst = 0, composed = 0, moved = 0;
   Index more = 0;
   for (Index p = 0; p < 23 * 18; ++p) {
-    const auto at = [](Index i) { return static_cast<std::size_t>(i); };
     const auto share = [&](const CachedView& v) {
       double sum = 0;
       for (auto k = v.sample_begin[at(p)]; k < v.sample_begin[at(p + 1)]; ++k)
@@ -106,7 +105,7 @@ TEST_CASE("view_cache: several samples of a ray are its heaviest parts, and few 
     CHECK((count(one) == 0) == (count(all) == 0));
     CHECK(count(two) == std::min(2, count(all)));
     more += count(all) > 2;
-    worst = std::max({worst, std::abs(share(two) - share(one)), std::abs(share(all) - share(one))});
+    for (const CachedView* v : {&two, &all}) raise_to(worst, std::abs(share(*v) - share(one)));
     for (auto k = all.sample_begin[at(p)]; k + 1 < all.sample_begin[at(p + 1)]; ++k)
       CHECK(all.weight[at(k)] >= all.weight[at(k) + 1]);
     for (Index a = 0; a < 3 && count(all) > 0; ++a) {
