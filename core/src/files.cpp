@@ -17,17 +17,25 @@ namespace {
 
 std::string errno_text(int error) { return std::generic_category().message(error); }
 
-fs::path resolve(const fs::path& path) {
-  std::error_code error;
-  if (!fs::is_symlink(path, error)) return path;
-  const fs::path target = fs::canonical(path, error);
-  return error ? path : target;
-}
-
 bool is_device(const fs::path& path) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
+}
+
+// Where symbolic links lead, also to a file that does not exist yet.
+fs::path resolve(const fs::path& path) {
+  constexpr int kMostLinks = 40;
+  if (is_device(path)) return path;  // the link of a pipe names no file
+  std::error_code error;
+  fs::path target = path;
+  for (int links = 0; fs::is_symlink(target, error); ++links) {
+    const fs::path next = fs::read_symlink(target, error);
+    if (error || links == kMostLinks)
+      throw IoError("[write] " + path.string() + ": a symbolic link that leads nowhere; name another file");
+    target = target.parent_path() / next;  // an absolute one stays as it is
+  }
+  return target;
 }
 
 // Unlike mkstemp, which ignores the umask. The pid and a counter keep writers apart.
@@ -79,6 +87,9 @@ AtomicFile::AtomicFile(const fs::path& path, Access access) : path_(path), targe
     if (fd_ < 0) fail("open", errno);
     return;
   }
+  std::error_code unknown;
+  if (fs::is_directory(target_, unknown))
+    throw IoError("[write] " + path.string() + ": expected a file to write, found a folder; name a file");
   fd_ = open_temporary(target_, access == Access::secret ? 0600 : 0666, &temporary_);
   if (fd_ >= 0) return;
   const int error = errno;

@@ -8,6 +8,8 @@
 #include <memory>
 #include <string>
 
+#include "jpeg_segments.h"
+
 // Static, and in this file only: a program that brings its own stb does not collide with ours.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wall"
@@ -37,7 +39,7 @@ namespace fieldmark {
 namespace {
 
 struct Free {
-  void operator()(unsigned char* p) const { std::free(p); }
+  void operator()(void* p) const { std::free(p); }
 };
 using Pixels = std::unique_ptr<unsigned char, Free>;
 
@@ -61,35 +63,78 @@ void check_image(const char* op, const Tensor<float>& image, Index max_side) {
                      s.str());
 }
 
-bool is_marker(std::span<const std::byte> bytes, std::size_t at, int code) {
-  return bytes[at] == std::byte{0xff} && bytes[at + 1] == static_cast<std::byte>(code);
+constexpr std::size_t kMaxBytes = std::numeric_limits<int>::max();
+constexpr int kScan = 0xda, kRestartInterval = 0xdd;
+
+const unsigned char* data_of(std::span<const std::byte> bytes) {
+  return reinterpret_cast<const unsigned char*>(bytes.data());
 }
 
-// stb fills what is missing of a JPEG with grey and reports success. A whole one has an end marker (FF D9)
-// behind its last scan (FF DA); neither pair can occur inside a scan's data.
-bool is_truncated_jpeg(std::span<const std::byte> bytes) {
-  if (bytes.size() < 4 || !is_marker(bytes, 0, 0xd8)) return false;
-  for (std::size_t at = bytes.size() - 1; at-- > 0;) {
-    if (is_marker(bytes, at, 0xd9)) return false;
-    if (is_marker(bytes, at, 0xda)) return true;
+// The pixels of a file, or none, with stb's reason.
+Tensor<float> pixels_of(std::span<const std::byte> bytes, int want_channels) {
+  const int size = static_cast<int>(bytes.size());
+  int width = 0, height = 0, channels = 0;
+  Tensor<float> image;
+  const auto store = [&](const auto* values, auto to_unit) {
+    if (!values) return;
+    image = Tensor<float>(Shape{height, width, want_channels ? want_channels : channels});
+    std::transform(values, values + image.size(), image.data.begin(), to_unit);
+  };
+  if (stbi_is_16_bit_from_memory(data_of(bytes), size)) {
+    const std::unique_ptr<stbi_us, Free> values(
+        stbi_load_16_from_memory(data_of(bytes), size, &width, &height, &channels, want_channels));
+    store(values.get(), [](stbi_us x) { return static_cast<float>(x) / 65535.0f; });
+  } else {
+    const Pixels values(
+        stbi_load_from_memory(data_of(bytes), size, &width, &height, &channels, want_channels));
+    store(values.get(), unit);
   }
-  return true;
+  return image;
+}
+
+// A JPEG file with other data in the place of its end. stb reads zeros behind what is left and reports
+// success, so only an image that does not depend on what follows is complete.
+Tensor<float> continued(std::span<const std::byte> bytes, std::byte filler, int want_channels) {
+  constexpr std::size_t kFillers = 256;
+  while (!bytes.empty() && bytes.back() == std::byte{0xff}) bytes = bytes.first(bytes.size() - 1);
+  std::vector<std::byte> file(bytes.begin(), bytes.end());
+  file.insert(file.end(), kFillers, filler);
+  file.insert(file.end(), {std::byte{0xff}, std::byte{0xd9}});
+  return pixels_of(file, want_channels);
+}
+
+// The pixels of a JPEG file without an end marker, or none if some of the image is missing.
+Tensor<float> unended(std::span<const std::byte> bytes, const JpegSegments& parts, int want_channels) {
+  // At a restart that is missing stb stops, and what it leaves is not even defined.
+  const auto restarts = [](const JpegSegment& s) { return s.marker == kRestartInterval; };
+  if (!parts.sends_every_coefficient() || std::ranges::any_of(parts.segments, restarts)) return {};
+  // A block of 8 x 8 pixels takes at least one bit.
+  int width = 0, height = 0, channels = 0;
+  if (!stbi_info_from_memory(data_of(bytes), static_cast<int>(bytes.size()), &width, &height, &channels) ||
+      static_cast<double>(width) * height > 512.0 * static_cast<double>(bytes.size()))
+    return {};
+  Tensor<float> image = continued(bytes, std::byte{0}, want_channels);
+  for (const int filler : {0x55, 0xaa, 0x37})
+    if (continued(bytes, static_cast<std::byte>(filler), want_channels).data != image.data) return {};
+  return image;
 }
 
 Tensor<float> decode(std::span<const std::byte> bytes, std::string_view name, int want_channels) {
-  auto fail = [&](const std::string& reason) {
+  const auto fail = [&](const std::string& reason) {
     throw IoError("[read_image] " + std::string(name) + ": expected a PNG or JPEG image, found " +
                   std::to_string(bytes.size()) + " bytes that do not decode: " + reason);
   };
-  if (bytes.size() > std::numeric_limits<int>::max()) fail("more than 2^31 bytes");
-  if (is_truncated_jpeg(bytes)) fail("no end marker, truncated");
-  int width = 0, height = 0, channels = 0;
-  const Pixels pixels(stbi_load_from_memory(reinterpret_cast<const unsigned char*>(bytes.data()),
-                                            static_cast<int>(bytes.size()), &width, &height, &channels,
-                                            want_channels));
-  if (!pixels) fail(stbi_failure_reason());
-  Tensor<float> image(Shape{height, width, want_channels ? want_channels : channels});
-  std::transform(pixels.get(), pixels.get() + image.size(), image.data.begin(), unit);
+  if (bytes.size() > kMaxBytes - 1024) fail("more than 2^31 bytes");
+  JpegSegments parts{.end = bytes.size(), .complete = true};
+  if (is_jpeg(bytes)) {
+    parts = jpeg_segments(bytes);
+    // stb would return memory that nothing was written to.
+    if (std::ranges::none_of(parts.segments, [](const JpegSegment& s) { return s.marker == kScan; }))
+      fail("a JPEG file without an image, truncated");
+  }
+  Tensor<float> image =
+      parts.complete ? pixels_of(bytes, want_channels) : unended(bytes, parts, want_channels);
+  if (image.data.empty()) fail(parts.complete ? stbi_failure_reason() : "no end marker, truncated");
   return image;
 }
 

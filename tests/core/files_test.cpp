@@ -102,8 +102,7 @@ TEST_CASE("files: errors name the path and the system's reason") {
   CHECK_THROWS_WITH(write_file_atomically(missing, "x"),
                     Contains(missing) && Contains("No such file or directory"));
   fs::create_directory(folder / "b");
-  CHECK_THROWS_WITH(write_file_atomically(folder / "b", "x"),
-                    Contains("rename failed at byte 1: Is a directory"));
+  CHECK_THROWS_WITH(AtomicFile(folder / "b"), Contains("expected a file to write, found a folder"));
   CHECK(folder.entries() == 1);
 }
 
@@ -114,6 +113,16 @@ TEST_CASE("files: links are followed, permissions are the umask's, pipes and dev
   write_file_atomically(folder / "link", "new");
   CHECK(fs::is_symlink(folder / "link"));
   CHECK(read_text(folder / "target") == "new");
+  fs::create_symlink("later", folder / "second");  // to a file that is not there yet
+  fs::create_symlink(folder / "second", folder / "first");
+  write_file_atomically(folder / "first", "made");
+  CHECK(fs::is_symlink(folder / "first"));
+  CHECK(fs::is_symlink(folder / "second"));
+  CHECK(read_text(folder / "later") == "made");
+  fs::create_symlink("circle", folder / "circle");
+  CHECK_THROWS_WITH(write_file_atomically(folder / "circle", "x"),
+                    Contains("a symbolic link that leads nowhere"));
+  CHECK(fs::is_symlink(folder / "circle"));
   const mode_t mask = ::umask(0027);
   write_file_atomically(folder / "masked", "x");
   ::umask(mask);

@@ -6,6 +6,7 @@
 #include <fieldmark/core/files.h>
 #include <fieldmark/engine/safetensors.h>
 #include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/jpeg_file.h>
 #include <fieldmark/watermark/embedding/embedder.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
@@ -23,6 +24,7 @@
 
 #include "canonical_json.h"
 #include "colmap.h"
+#include "imaging/jpeg_bytes.h"
 #include "lens.h"
 #include "llff.h"
 #include "nerf/format_samples.h"
@@ -106,6 +108,10 @@ std::string jpeg(Index channels, int quality) {
   return text_of(encode_jpeg(Tensor<float>(Shape{20, 18, channels}, 0.4f), quality));
 }
 
+std::string turned(int orientation, bool big) {
+  return text_of(with_orientation(encode_jpeg(Tensor<float>(Shape{4, 4, 3}, 0.4f), 50), orientation, big));
+}
+
 // A run of embed that a checkpoint is read for.
 struct EmbedRun {
   watermark::Owner owner = small_owner();
@@ -183,6 +189,13 @@ std::vector<Format> formats() {
        {png(1), png(2), png(3), png(4)},
        [](const std::string& b) { decode_image(bytes_of(b), "input"); }},
       {"jpeg", {jpeg(1, 50), jpeg(3, 90)}, [](const std::string& b) { decode_image(bytes_of(b), "input"); }},
+      {"exif",
+       {turned(3, false), turned(8, true)},
+       [](const std::string& b) {
+         jpeg_oddity(bytes_of(b));
+         const int orientation = exif_orientation(bytes_of(b));
+         if (orientation < 1 || orientation > 8) throw std::logic_error("no orientation");
+       }},
       // Brought to its canonical form first: otherwise nearly every mutation would end there.
       {"evidence.json",
        {watermark::evidence_json(small_evidence(), watermark::public_key(test_key(5)),

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "imaging/jpeg_bytes.h"
 #include "support/catch.h"
 #include "support/random.h"
 #include "support/temporary_folder.h"
@@ -16,11 +17,6 @@ using namespace fieldmark;
 
 namespace {
 
-std::vector<std::byte> bytes(std::initializer_list<int> values) {
-  std::vector<std::byte> out;
-  for (int v : values) out.push_back(static_cast<std::byte>(v));
-  return out;
-}
 double rms(const Tensor<float>& a, const Tensor<float>& b, Index channel) {
   double sum = 0;
   for (Index i = channel; i < a.size(); i += a.shape[2]) sum += std::pow(static_cast<double>(a[i] - b[i]), 2);
@@ -56,7 +52,7 @@ TEST_CASE("image: every byte and channel count survives a PNG file") {
 
 // Two grey pixels, 0x12 and 0xef, in an uncompressed deflate block, put together with Python's zlib.
 TEST_CASE("image: a PNG that another program wrote") {
-  const auto png = bytes(
+  const auto png = bytes_from(
       {0x89, 0x50, 0x4e, 0x47, 0xd,  0xa,  0x1a, 0xa, 0, 0,    0,    0xd,  0x49, 0x48, 0x44, 0x52, 0,    0,
        0,    2,    0,    0,    0,    1,    8,    0,   0, 0,    0,    0xd1, 0x49, 0x20, 0x56, 0,    0,    0,
        0xe,  0x49, 0x44, 0x41, 0x54, 0x78, 1,    1,   3, 0,    0xfc, 0xff, 0,    0x12, 0xef, 1,    0x16, 1,
@@ -92,8 +88,38 @@ TEST_CASE("image: files that are no image are errors with path, size and reason"
   for (const auto* file : {&png, &jpeg})
     for (std::size_t size = 1; size + 12 < file->size(); ++size)
       CHECK_THROWS_AS(decode_image(std::span(*file).first(size), "cut"), IoError);
-  CHECK_THROWS_WITH(decode_image(std::span(jpeg).first(jpeg.size() - 2), "cut"),
+  CHECK_THROWS_WITH(decode_image(std::span(jpeg).first(jpeg.size() - 20), "cut"),
                     Contains("no end marker, truncated"));
+  CHECK_THROWS_WITH(decode_image(bytes_from({0xff, 0xd8, 0xff, 0xd9}), "empty"),
+                    Contains("without an image"));
+}
+
+TEST_CASE("image: a JPEG file is read without its end marker, and with other data behind it") {
+  const auto x = uniform<float>({40, 33, 3}, 0, 1, 5);
+  for (const int quality : {10, 90}) {
+    const auto jpeg = encode_jpeg(x, quality);
+    const auto whole = decode_image(jpeg, "whole");
+    for (const std::size_t cut : {1u, 2u})
+      CHECK(decode_image(std::span(jpeg).first(jpeg.size() - cut), "cut").data == whole.data);
+    for (std::size_t cut = 8; cut < 60; ++cut)
+      CHECK_THROWS_AS(decode_image(std::span(jpeg).first(jpeg.size() - cut), "cut"), IoError);
+    auto video = jpeg;  // what looks like a scan, and bytes that stand for a film
+    append(video, bytes_from({0xff, 0xda, 0, 0, 0, 24, 'f', 't', 'y', 'p', 0xff, 0xda, 1}));
+    CHECK(decode_image(video, "phone.jpg").data == whole.data);
+  }
+}
+
+// Values 0x1234 and 0xfffe, put together with Python's zlib.
+TEST_CASE("image: a PNG of 16 bits keeps both bytes") {
+  const auto x = decode_image(
+      bytes_from({0x89, 0x50, 0x4e, 0x47, 0xd,  0xa,  0x1a, 0xa,  0,    0,    0,    0xd,  0x49, 0x48, 0x44,
+                  0x52, 0,    0,    0,    2,    0,    0,    0,    1,    0x10, 0,    0,    0,    0,    0x81,
+                  0xd9, 0xfc, 0x15, 0,    0,    0,    0x10, 0x49, 0x44, 0x41, 0x54, 0x78, 1,    1,    5,
+                  0,    0xfa, 0xff, 0,    0x12, 0x34, 0xff, 0xfe, 3,    0xe5, 2,    0x44, 0x9a, 0xdd, 0xcf,
+                  0xc,  0,    0,    0,    0,    0x49, 0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82}),
+      "deep.png");
+  CHECK(x.shape == Shape{1, 2, 1});
+  CHECK(x.data == std::vector<float>{0x1234 / 65535.0f, 0xfffe / 65535.0f});
 }
 
 TEST_CASE("image: shapes that no file can hold are errors") {

@@ -19,7 +19,7 @@ enum class Access {
 /// file and no temporary file. A symbolic link is followed; a device or pipe is written directly.
 class AtomicFile {
  public:
-  /// @throws IoError if no file can be made in the folder of `path`
+  /// @throws IoError if `path` is a folder, or no file can be made in its folder
   explicit AtomicFile(const std::filesystem::path& path, Access access = Access::shared);
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;

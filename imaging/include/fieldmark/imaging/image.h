@@ -13,8 +13,8 @@ namespace fieldmark {
 // Images are [height, width, channels] of 1 to 4 channels, values in [0, 1] as the file has them (sRGB, no
 // gamma).
 
-/// Reads a PNG or JPEG file: multiples of 1/255, channels as in the file (a palette becomes 3 or 4). 16-bit
-/// files lose their low byte.
+/// Reads a PNG or JPEG file: multiples of 1/255 (of 1/65535 for 16 bits), channels as in the file (a palette
+/// becomes 3 or 4). A JPEG file may lack its end marker or have other data behind it, see jpeg_oddity().
 /// @throws IoError if it is missing, truncated or no image
 Tensor<float> read_image(const std::filesystem::path& path);
 /// As read_image(), from memory. @param name  stands for the path in error texts

@@ -1,0 +1,79 @@
+#include "jpeg_segments.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+
+namespace fieldmark {
+namespace {
+
+constexpr int kStart = 0xd8, kEnd = 0xd9, kScan = 0xda, kProgressive = 0xc2, kTemporary = 0x01;
+constexpr std::size_t kCoefficients = 64;
+
+using Bytes = std::span<const std::byte>;
+
+int at(Bytes bytes, std::size_t i) { return std::to_integer<int>(bytes[i]); }
+
+bool is_restart(int marker) { return marker >= 0xd0 && marker <= 0xd7; }
+bool is_frame(int marker) {
+  return marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
+}
+
+// Where the next marker begins; the size where there is none. In the data of a scan FF is followed by 00, and
+// before a marker FF may stand several times. Other bytes between segments are passed over, as stb does.
+std::size_t next_marker(Bytes bytes, std::size_t i) {
+  for (; i + 1 < bytes.size(); ++i)
+    if (at(bytes, i) == 0xff && at(bytes, i + 1) != 0 && at(bytes, i + 1) != 0xff) return i;
+  return bytes.size();
+}
+
+}  // namespace
+
+bool is_jpeg(Bytes bytes) { return bytes.size() >= 2 && at(bytes, 0) == 0xff && at(bytes, 1) == kStart; }
+
+JpegSegments jpeg_segments(Bytes bytes) {
+  JpegSegments found{.end = bytes.size()};
+  std::size_t i = 0;
+  for (;;) {
+    i = next_marker(bytes, i);
+    if (i >= bytes.size()) return found;
+    const int marker = at(bytes, i + 1);
+    i += 2;
+    if (marker == kStart || marker == kTemporary || is_restart(marker)) continue;
+    if (marker == kEnd) {
+      found.end = i;
+      found.complete = true;
+      return found;
+    }
+    if (i + 2 > bytes.size()) return found;
+    const auto length = static_cast<std::size_t>(at(bytes, i) << 8 | at(bytes, i + 1));
+    if (length < 2 || length > bytes.size() - i) return found;
+    found.segments.push_back({marker, bytes.subspan(i + 2, length - 2)});
+    i += length;
+  }
+}
+
+bool JpegSegments::sends_every_coefficient() const {
+  std::map<int, std::array<bool, kCoefficients>> sent;  // by component
+  bool progressive = false;
+  for (const auto& [marker, payload] : segments) {
+    if (is_frame(marker)) {
+      progressive = marker == kProgressive;
+      for (std::size_t c = 6; c + 2 < payload.size(); c += 3) sent[at(payload, c)];
+    }
+    if (marker != kScan || payload.empty()) continue;
+    const auto components = static_cast<std::size_t>(at(payload, 0));
+    if (payload.size() != 4 + 2 * components) continue;
+    const Bytes last = payload.last(3);
+    if (progressive && (at(last, 2) & 15) != 0) continue;  // lower bits follow in another scan
+    const int from = progressive ? at(last, 0) : 0, to = progressive ? at(last, 1) : 63;
+    for (std::size_t c = 0; c < components; ++c)
+      for (int k = from; k <= std::min(to, 63); ++k)
+        sent[at(payload, 1 + 2 * c)][static_cast<std::size_t>(k)] = true;
+  }
+  return !sent.empty() && std::ranges::all_of(sent, [](const auto& component) {
+    return std::ranges::all_of(component.second, [](bool b) { return b; });
+  });
+}
+
+}  // namespace fieldmark

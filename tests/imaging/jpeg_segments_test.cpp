@@ -1,0 +1,62 @@
+#include "jpeg_segments.h"
+
+#include <fieldmark/imaging/image.h>
+
+#include "imaging/jpeg_bytes.h"
+#include "support/catch.h"
+
+using namespace fieldmark;
+
+namespace {
+// A frame of one component, number 7.
+std::vector<std::byte> head(int frame) {
+  return bytes_from({0xff, 0xd8, 0xff, frame, 0, 11, 8, 0, 8, 0, 8, 1, 7, 0x11, 0});
+}
+// A scan of it: coefficients first to last, to a bit.
+std::vector<std::byte> scan(int first, int last, int bit) {
+  return bytes_from({0xff, 0xda, 0, 8, 1, 7, 0, first, last, bit, 0x12, 0xff, 0, 0x34});
+}
+}  // namespace
+
+TEST_CASE("jpeg_segments: markers in order, to the end marker and no further") {
+  auto file = encode_jpeg(Tensor<float>({20, 20, 3}, 0.4f), 80);
+  const std::size_t size = file.size();
+  append(file, bytes_from({0, 1, 0xff, 0xda, 0xff, 0xd9, 2}));
+  const auto found = jpeg_segments(file);
+  CHECK(is_jpeg(file));
+  CHECK(found.complete);
+  CHECK(found.end == size);
+  CHECK(found.segments.front().marker == 0xe0);
+  CHECK(found.segments.front().payload.size() == 14);
+  CHECK(found.segments.back().marker == 0xda);
+  CHECK(found.sends_every_coefficient());
+  CHECK(!is_jpeg(bytes_from({0xff})));
+  CHECK(!is_jpeg(bytes_from({0x89, 0x50})));
+}
+
+TEST_CASE("jpeg_segments: fill bytes, stuffed bytes, restarts and padding are no markers") {
+  auto file = head(0xc0);
+  append(file, bytes_from({0, 0xff}));  // padding, then a marker with a fill byte
+  append(file, scan(0, 63, 0));
+  append(file, bytes_from({0xff, 0xd0, 0x56, 0xff, 0, 0xff, 0xd7, 0xff, 0xff, 0xd9}));
+  const auto found = jpeg_segments(file);
+  REQUIRE(found.segments.size() == 2);
+  CHECK(found.complete);
+  CHECK(found.end == file.size());
+  for (std::size_t size = 0; size < file.size(); ++size)
+    CHECK(!jpeg_segments(std::span(file).first(size)).complete);
+}
+
+TEST_CASE("jpeg_segments: a progressive file is whole when each coefficient has its last bit") {
+  auto file = head(0xc2);
+  CHECK(!jpeg_segments(file).sends_every_coefficient());
+  append(file, scan(0, 0, 0x01));
+  append(file, scan(1, 63, 0x00));
+  CHECK(!jpeg_segments(file).sends_every_coefficient());  // the lowest bit of the mean is to come
+  append(file, scan(0, 0, 0x10));
+  CHECK(jpeg_segments(file).sends_every_coefficient());
+  auto baseline = head(0xc0);
+  CHECK(!jpeg_segments(baseline).sends_every_coefficient());
+  append(baseline, scan(0, 0, 0));  // some writers leave the numbers of a baseline scan empty
+  CHECK(jpeg_segments(baseline).sends_every_coefficient());
+}
