@@ -32,18 +32,31 @@ Vec3 solve(Mat3 m, const Vec3& b, double ridge) {
   return (1 / dot(m[0], a)) * (b[0] * a + b[1] * c + b[2] * d);
 }
 
+// The mean camera where the cameras stand far from the origin for their distance from each other, else the
+// origin.
+Vec3 local_origin(std::span<const Camera> cameras) {
+  constexpr double kSpreads = 1000;  // the ridge of look_at_point() pulls by a billionth of the distance
+  Vec3 mean{};
+  for (const Camera& c : cameras) mean = mean + (1 / static_cast<double>(cameras.size())) * c.position();
+  double spread = 0;
+  for (const Camera& c : cameras) spread = std::max(spread, norm(c.position() - mean));
+  return spread > 0 && norm(mean) > kSpreads * spread ? mean : Vec3{};
+}
+
 // The point with the least sum of squared distances to the viewing axes: sum (I - f f^T) (p - o) = 0.
-// Parallel axes leave it open along them; the ridge then picks the point next to the origin.
+// Parallel axes leave it open along them; the ridge then picks the point next to the local origin.
 Vec3 look_at_point(std::span<const Camera> cameras) {
+  const Vec3 origin = local_origin(cameras);
   Mat3 m{};
   Vec3 b{};
   for (const Camera& c : cameras) {
-    const Vec3 f = normalised(c.forward()), o = c.position();
+    const Vec3 f = normalised(c.forward()), o = c.position() - origin;
     for (std::size_t i = 0; i < 3; ++i) m[i][i] += 1;
     add_outer(m, -1, f);
     b = b + o - dot(f, o) * f;
   }
-  return solve(m, b, 1e-9 * static_cast<double>(cameras.size()));
+  const Vec3 point = solve(m, b, 1e-9 * static_cast<double>(cameras.size()));
+  return origin == Vec3{} ? point : origin + point;
 }
 
 // One step of inverse iteration on sum x x^T from the mean y axis: the direction most nearly perpendicular to

@@ -11,6 +11,7 @@ namespace fieldmark::nerf {
 namespace {
 
 constexpr double kQuarter = 0.25;
+constexpr double kFar = 64;  // cube sides from the origin up to which a float holds a position well enough
 constexpr std::array<const char*, 3> kNames{"cube", "ndc", "contracted"};
 
 double largest(const Vec3& y) { return std::max({std::abs(y[0]), std::abs(y[1]), std::abs(y[2])}); }
@@ -110,8 +111,13 @@ void CubeRays::set(const Space& space, Index first, const Camera& camera, std::s
   }
   std::copy_n(world, n, d);
   const double side = unit(space), corner = space.kind == SpaceKind::contracted ? 0.25 : 0;
+  // Georeferenced cameras are millions of sides from the origin: a float would round their positions before
+  // the corner is subtracted.
+  const Vec3 eye = camera.position();
+  const bool far = largest(eye) > kFar * side;
   for (std::size_t i = 0; i < n; ++i)
-    o[i] = static_cast<float>(corner + (static_cast<double>(o[i]) - space.bounds.corner[i % 3]) / side);
+    o[i] = static_cast<float>(
+        corner + ((far ? eye[i % 3] : static_cast<double>(o[i])) - space.bounds.corner[i % 3]) / side);
 }
 
 RayBatch CubeRays::batch(const Space& space) const {

@@ -35,6 +35,25 @@ double off_axis(const Camera& c, const Vec3& p) {
 }
 }  // namespace
 
+TEST_CASE("camera_set: the span of cameras far from the origin is that of cameras near it, moved") {
+  const auto near = cap(30);
+  const CameraSpan here = camera_span(near, Background::black);
+  for (const double shift : {5e5, 1e7}) {
+    const Vec3 moved{shift, -0.5 * shift, 2 * shift};
+    auto far = near;
+    for (Camera& c : far)
+      for (std::size_t a = 0; a < 3; ++a) c.pose[4 * a + 3] += moved[a];
+    const CameraSpan there = camera_span(far, Background::black);
+    for (std::size_t a = 0; a < 3; ++a) {
+      CHECK(std::abs(there.centre[a] - moved[a] - here.centre[a]) < 1e-6);
+      CHECK(std::abs(there.up[a] - here.up[a]) < 1e-9);
+    }
+    CHECK(std::abs(there.half_size - here.half_size) < 1e-6);
+    for (std::size_t i = 0; i < near.size(); ++i)
+      CHECK(std::abs(there.distances[i] - here.distances[i]) < 1e-6);
+  }
+}
+
 TEST_CASE("camera_set: the span finds centre, up and distances of the cameras it is given") {
   const auto cameras = cap(30);
   const CameraSpan s = camera_span(cameras, Background::black);

@@ -35,6 +35,21 @@ CubeRays rays_of(const Space& space, const Camera& camera) {
 }
 }  // namespace
 
+TEST_CASE("space: rays of cameras far from the origin are those of cameras near it") {
+  for (const Space& space : {kCube, kContracted})
+    for (const double shift : {5e5, 1e7}) {
+      const Vec3 eye{3, 4, 5}, target{1, 2, 3}, moved{shift, -shift, 0.5 * shift};
+      Space there = space;
+      for (std::size_t a = 0; a < 3; ++a) there.bounds.corner[a] += moved[a];
+      const CubeRays near = rays_of(space, camera_at(eye, target)),
+                     far = rays_of(there, camera_at(eye + moved, target + moved));
+      for (std::size_t i = 0; i < near.origins.size(); ++i) {
+        CHECK(std::abs(far.origins[i] - near.origins[i]) < 1e-6f);
+        CHECK(std::abs(far.directions[i] - near.directions[i]) < 1e-6f);
+      }
+    }
+}
+
 TEST_CASE("space: points by hand") {
   CHECK(kCube.to_cube({1, 1, 1}) == Vec3{0.5, 0.25, -0.25});
   CHECK(kNdc.to_cube({0, 0, -1.25}) == Vec3{0.5, 0.5, 0});                // the plane
