@@ -1,13 +1,11 @@
 #include "capture.h"
 
 #include <fieldmark/core/files.h>
-#include <fieldmark/imaging/image.h>
 
 #include <algorithm>
-#include <limits>
-#include <regex>
+#include <map>
 
-#include "colmap.h"
+#include "image_files.h"
 #include "llff.h"
 #include "rotation.h"
 #include "transforms.h"
@@ -16,10 +14,54 @@ namespace fieldmark::nerf {
 namespace {
 namespace fs = std::filesystem;
 
+// Fills in Shot::in_split from the file's lists of names. A list that lacks is the rest: val and test stand
+// in for one another, and train has what neither of them has.
+void apply_lists(const Transforms& t, const std::string& file, Capture& capture) {
+  std::map<fs::path, std::size_t> numbers;
+  for (std::size_t i = 0; i < t.frames.size(); ++i) numbers.emplace(with_slashes(t.frames[i].file_path), i);
+  std::array<std::size_t, 3> sizes{};
+  for (std::size_t s = 0; s < kSplitNames.size(); ++s) {
+    const std::string list = std::string(kSplitNames[s]) + "_filenames";
+    std::size_t unknown = 0;
+    std::string first_unknown;
+    for (const std::string& name : t.splits[s]) {
+      const auto number = numbers.find(with_slashes(name));
+      if (number != numbers.end())
+        capture.shots[number->second].in_split[s] = true;
+      else if (unknown++ == 0)
+        first_unknown = name;
+    }
+    if (unknown > 0 && unknown == t.splits[s].size())
+      throw IoError(file + ": " + list + ": expected names that frames have as their file_path, got none, " +
+                    "the first is \"" + first_unknown + "\"");
+    if (unknown > 0)
+      capture.notes.push_back(std::to_string(unknown) + " names of " + list +
+                              " are those of no frame and left out, the first is " + first_unknown);
+  }
+  std::size_t shared = 0;
+  for (Shot& shot : capture.shots) {
+    auto& [train, val, test] = shot.in_split;
+    const bool none_held_out = t.splits[1].empty() && t.splits[2].empty();
+    if (none_held_out) val = test = !train;
+    if (t.splits[1].empty()) val = test;
+    if (t.splits[2].empty()) test = val;
+    if (t.splits[0].empty()) train = !val && !test;
+    shared += train && (val || test);
+    for (std::size_t s = 0; s < 3; ++s) sizes[s] += shot.in_split[s];
+  }
+  capture.listed = true;
+  capture.notes.push_back("the file's own split: " + std::to_string(sizes[0]) + " images to train, " +
+                          std::to_string(sizes[1]) + " to val, " + std::to_string(sizes[2]) + " to test");
+  if (shared > 0)
+    capture.notes.push_back(std::to_string(shared) +
+                            " images are both trained on and held out, so their PSNR flatters");
+}
+
 // A file of the transforms layouts.
-Capture read_json(const fs::path& folder, const fs::path& file) {
+// @param all_splits  whether the file has those of all splits, by its own lists or by number
+Capture read_json(const fs::path& folder, const fs::path& file, bool all_splits) {
   const Transforms t = parse_transforms(read_text(file), file.string());
-  Capture capture;
+  Capture capture{.notes = t.notes};
   for (const auto& frame : t.frames) {
     const std::string label = "frames[" + std::to_string(capture.shots.size()) + "]";
     capture.shots.push_back({.image = (folder / frame.file_path).lexically_normal(),
@@ -27,30 +69,12 @@ Capture read_json(const fs::path& folder, const fs::path& file) {
                              .place = file.string() + ": " + label + ".file_path",
                              .pose = frame.pose,
                              .intrinsics = frame.intrinsics});
+    if (!frame.mask_path.empty()) capture.shots.back().mask = folder / frame.mask_path;
   }
+  capture.all_splits = all_splits;
+  if (all_splits && std::any_of(t.splits.begin(), t.splits.end(), [](const auto& l) { return !l.empty(); }))
+    apply_lists(t, file.string(), capture);
   return capture;
-}
-
-// The folder images or images_N that fits `size`, see load_dataset(); empty where there is none.
-fs::path image_folder(const fs::path& folder, Index size) {
-  static const std::regex name("images(_[0-9]{0,8}[1-9][0-9]{0,8})?");
-  std::vector<fs::path> folders;
-  for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.is_directory() && std::regex_match(entry.path().filename().string(), name))
-      folders.push_back(entry.path());
-  std::sort(folders.begin(), folders.end());
-  fs::path best;
-  Index best_side = 0;
-  const Index wanted = size > 0 ? size : std::numeric_limits<Index>::max();
-  for (const auto& f : folders) {
-    const auto images = images_in(f);
-    if (images.empty()) continue;
-    const Tensor<float> first = read_image(images.front());
-    const Index side = std::max(first.shape[0], first.shape[1]);
-    const bool better = best_side < wanted ? side > best_side : side >= wanted && side < best_side;
-    if (better) best = f, best_side = side;
-  }
-  return best;
 }
 
 bool faces_forward(const std::vector<LlffView>& views) {
@@ -62,33 +86,13 @@ bool faces_forward(const std::vector<LlffView>& views) {
 }
 }  // namespace
 
-std::vector<fs::path> images_in(const fs::path& folder) {
-  std::vector<fs::path> found;
-  std::error_code none;
-  if (!fs::is_directory(folder, none)) return found;
-  static const std::regex extension("\\.(png|jpe?g)", std::regex::icase);
-  for (const auto& entry : fs::directory_iterator(folder))
-    if (std::regex_match(entry.path().extension().string(), extension)) found.push_back(entry.path());
-  std::sort(found.begin(), found.end());
-  return found;
-}
-
-fs::path image_file(const Shot& shot) {
-  for (const char* extension : {"", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"}) {
-    fs::path file = shot.image.string() + extension;
-    std::error_code ignored;
-    if (fs::is_regular_file(file, ignored)) return file;
-  }
-  return {};
-}
-
 Capture read_blender(const fs::path& folder, const std::string& split) {
-  return read_json(folder, folder / ("transforms_" + split + ".json"));
+  return read_json(folder, folder / ("transforms_" + split + ".json"), false);
 }
 
 Capture read_transforms(const fs::path& folder) {
-  Capture capture = read_json(folder, folder / "transforms.json");
-  capture.all_splits = capture.may_miss = true;
+  Capture capture = read_json(folder, folder / "transforms.json", true);
+  capture.may_miss = true;
   std::stable_sort(capture.shots.begin(), capture.shots.end(),
                    [](const Shot& a, const Shot& b) { return a.image.native() < b.image.native(); });
   return capture;
@@ -115,48 +119,8 @@ Capture read_llff(const fs::path& folder, Index size) {
                              .place = file.string() + ": row " + std::to_string(i),
                              .pose = views[i].pose,
                              .intrinsics = views[i].intrinsics,
-                             .depth = views[i].depth});
-  return capture;
-}
-
-fs::path colmap_folder(const fs::path& folder) {
-  for (const fs::path& model : {folder / "sparse" / "0", folder / "sparse", folder})
-    for (const char* file : {"cameras.bin", "cameras.txt"})
-      if (std::error_code ignored; fs::is_regular_file(model / file, ignored)) return model;
-  return {};
-}
-
-Capture read_colmap(const fs::path& folder, Index size) {
-  const fs::path model = colmap_folder(folder);
-  const bool binary = fs::exists(model / "cameras.bin");
-  const ColmapFormat format = binary ? ColmapFormat::binary : ColmapFormat::text;
-  const auto file = [&](const char* stem) {
-    return (model / (std::string(stem) + (binary ? ".bin" : ".txt"))).string();
-  };
-  const std::string list = file("images"), cameras = file("cameras");
-  const auto intrinsics = parse_colmap_cameras(read_text(cameras), format, cameras);
-  auto views = parse_colmap_images(read_text(list), format, list);
-
-  // `folder` may be that of the model, below the folder of the images.
-  fs::path images;
-  for (const fs::path& base : {folder, model / "..", model / ".." / ".."})
-    if (images.empty()) images = image_folder(base, size);
-  if (images.empty()) images = folder / "images";
-  images = images.lexically_normal();
-  Capture capture{.all_splits = true, .may_miss = true, .notes = {"images of " + images.filename().string()}};
-  std::sort(views.begin(), views.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
-  for (const ColmapImage& view : views) {
-    const std::string place = list + ": " + view.name;
-    const auto camera = intrinsics.find(view.camera);
-    if (camera == intrinsics.end())
-      throw IoError(place + ": expected a camera of " + cameras + ", got number " +
-                    std::to_string(view.camera));
-    capture.shots.push_back({.image = images / view.name,
-                             .label = "the first",
-                             .place = place,
-                             .pose = view.pose,
-                             .intrinsics = camera->second});
-  }
+                             .depth = views[i].depth,
+                             .as_stored = true});
   return capture;
 }
 

@@ -3,13 +3,18 @@
 #include <fieldmark/core/error.h>
 #include <fieldmark/nerf/dataset.h>
 
+#include <array>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "lens.h"
 
 namespace fieldmark::nerf {
+
+/// The splits, in the order of Shot::in_split.
+inline constexpr std::array<std::string_view, 3> kSplitNames{"train", "val", "test"};
 
 /// An image that a file names, and its camera.
 struct Shot {
@@ -19,11 +24,15 @@ struct Shot {
   Pose pose{};
   Intrinsics intrinsics{};
   std::optional<DepthRange> depth{};
+  std::filesystem::path mask{};    ///< of mask_path; empty: none is named
+  bool as_stored = false;          ///< whether the pose holds for pixels as stored, whatever their EXIF says
+  std::array<bool, 3> in_split{};  ///< train, val, test: whether the file's own split has it
 };
 
 struct Capture {
   std::vector<Shot> shots{};  ///< of one split (blender), or of all
   bool all_splits = false;    ///< whether every 8th is yet to be held out
+  bool listed = false;        ///< whether Shot::in_split decides the splits
   bool may_miss = false;      ///< whether a missing image is left out
   bool forward_facing = false;
   std::vector<std::string> notes{};
@@ -34,14 +43,13 @@ Capture read_transforms(const std::filesystem::path& folder);
 /// @param size  wanted pixels of the longer side, 0: the largest there are
 Capture read_llff(const std::filesystem::path& folder, Index size);
 
-/// The folder of a COLMAP model: sparse/0, sparse or the folder itself; empty where there is none.
-std::filesystem::path colmap_folder(const std::filesystem::path& folder);
+/// The folder of the COLMAP model with the most images, of those side by side in the first of these places
+/// that has one: sparse/*, sparse, the folder itself, the same in colmap, in dense and in dense/*, and *.
+/// Empty where there is none.
+/// @param choice  is told of the models side by side, if it is given
+std::filesystem::path colmap_folder(const std::filesystem::path& folder,
+                                    std::vector<std::string>* choice = nullptr);
 Capture read_colmap(const std::filesystem::path& folder, Index size);
-
-/// The image files of a folder, sorted by name; none where there is no folder.
-std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder);
-/// The file of a shot's image, with .png, .jpg or .jpeg where its name has no extension; empty: none.
-std::filesystem::path image_file(const Shot& shot);
 
 /// The result of make(), whose errors become IoErrors that begin with `place`.
 auto at_place(const std::string& place, const auto& make) {

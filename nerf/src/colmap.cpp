@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <span>
 
 #include "vec3.h"
 
@@ -76,6 +77,20 @@ class Lines {
     at_ = end + 1, ++number_;
     return true;
   }
+  // Skips the next line if it has the points of an image: x, y and a key, as often as there are points. It
+  // may be empty, and a model written by hand may lack it.
+  void skip_points() {
+    Lines ahead = *this;
+    if (!ahead.next()) return;
+    std::size_t words = 0;
+    for (; !ahead.at_end(); ++words) {
+      double x = 0;
+      const std::string_view w = ahead.word("a point");
+      const auto [stop, error] = std::from_chars(w.data(), w.data() + w.size(), x);
+      if (error != std::errc() || stop != w.data() + w.size()) return;
+    }
+    if (words % 3 == 0) next();
+  }
   // Goes to the next line that is neither empty nor a comment.
   bool next_record() {
     while (next())
@@ -133,22 +148,33 @@ double number(auto& in, const char* what) {
   return x;
 }
 
+using Coefficient = double Lens::*;
+// FULL_OPENCV's, whose first are OPENCV's, RADIAL's and SIMPLE_RADIAL's; and OPENCV_FISHEYE's.
+constexpr std::array<Coefficient, 8> kOpencv{&Lens::k1, &Lens::k2, &Lens::p1, &Lens::p2,
+                                             &Lens::k3, &Lens::k4, &Lens::k5, &Lens::k6};
+constexpr std::array<Coefficient, 4> kFisheye{&Lens::k1, &Lens::k2, &Lens::k3, &Lens::k4};
+
 struct Model {
   std::string_view name;
-  std::size_t parameters;  // 0: unsupported
+  bool known;
+  std::size_t lengths;                          // focal lengths
+  std::span<const Coefficient> coefficients{};  // in the order of the file
+  LensModel lens = LensModel::polynomial;
 };
+
 // In the order of COLMAP's numbers.
-constexpr Model kModels[] = {{"SIMPLE_PINHOLE", 3},
-                             {"PINHOLE", 4},
-                             {"SIMPLE_RADIAL", 4},
-                             {"RADIAL", 5},
-                             {"OPENCV", 8},
-                             {"OPENCV_FISHEYE", 0},
-                             {"FULL_OPENCV", 0},
-                             {"FOV", 0},
-                             {"SIMPLE_RADIAL_FISHEYE", 0},
-                             {"RADIAL_FISHEYE", 0},
-                             {"THIN_PRISM_FISHEYE", 0}};
+constexpr Model kModels[] = {
+    {"SIMPLE_PINHOLE", true, 1},
+    {"PINHOLE", true, 2},
+    {"SIMPLE_RADIAL", true, 1, std::span(kOpencv).first(1)},
+    {"RADIAL", true, 1, std::span(kOpencv).first(2)},
+    {"OPENCV", true, 2, std::span(kOpencv).first(4)},
+    {"OPENCV_FISHEYE", true, 2, kFisheye, LensModel::fisheye},
+    {"FULL_OPENCV", true, 2, kOpencv, LensModel::rational},
+    {"FOV", false, 2},
+    {"SIMPLE_RADIAL_FISHEYE", true, 1, std::span(kFisheye).first(1), LensModel::fisheye},
+    {"RADIAL_FISHEYE", true, 1, std::span(kFisheye).first(2), LensModel::fisheye},
+    {"THIN_PRISM_FISHEYE", false, 2}};
 
 template <class Reader>
 const Model& read_model(Reader& in) {
@@ -160,12 +186,17 @@ const Model& read_model(Reader& in) {
     found = model == end ? "number " + std::to_string(index) : std::string(model->name);
   } else {
     const std::string_view word = in.word("a camera model");
-    model = std::find_if(std::begin(kModels), end, [&](const Model& m) { return m.name == word; });
+    const auto same = [](char a, char b) { return a == (b >= 'a' && b <= 'z' ? b - 'a' + 'A' : b); };
+    model = std::find_if(std::begin(kModels), end,
+                         [&](const Model& m) { return std::ranges::equal(m.name, word, same); });
     found = "'" + std::string(word.substr(0, 40)) + "'";
   }
-  if (model == end || model->parameters == 0)
-    in.fail("a camera model SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL or OPENCV", found);
-  return *model;
+  if (model != end && model->known) return *model;
+  std::string names;
+  for (const Model& m : kModels)
+    if (m.known) names += (names.empty() ? "" : ", ") + std::string(m.name);
+  in.fail("a camera model of " + names, found + "; undistort the images, for example with COLMAP's " +
+                                            "image_undistorter, and give its result");
 }
 
 Intrinsics read_camera(auto& in) {
@@ -183,15 +214,15 @@ Intrinsics read_camera(auto& in) {
   Intrinsics c;
   c.width = side("a width"), c.height = side("a height");
   c.fl_x = c.fl_y = focal();
-  const bool two = model.name == "PINHOLE" || model.name == "OPENCV";
-  if (two) c.fl_y = focal();
+  if (model.lengths == 2) c.fl_y = focal();
   c.cx = number(in, "a principal point"), c.cy = number(in, "a principal point");
-  double* const coefficients[] = {&c.lens.k1, &c.lens.k2, &c.lens.p1, &c.lens.p2};
-  for (std::size_t i = 0; i < model.parameters - (two ? 4 : 3); ++i)
-    *coefficients[i] = number(in, "a distortion coefficient");
+  for (const Coefficient k : model.coefficients) c.lens.*k = number(in, "a distortion coefficient");
+  c.lens.model = model.lens;
   if constexpr (!std::remove_reference_t<decltype(in)>::kBinary)
     if (!in.at_end())
-      in.fail(std::to_string(model.parameters) + " parameters of " + std::string(model.name), "more");
+      in.fail(std::to_string(model.lengths + 2 + model.coefficients.size()) + " parameters of " +
+                  std::string(model.name),
+              "more");
   return c;
 }
 
@@ -214,7 +245,7 @@ Pose pose_of(std::array<double, 4> q, const Vec3& t, const auto& reader) {
 }
 
 template <class Reader>
-ColmapImage read_image(Reader& in) {
+ColmapImage read_model_image(Reader& in) {
   in.template get<std::uint32_t>("the key of an image");
   std::array<double, 4> q{};
   Vec3 t{};
@@ -226,11 +257,11 @@ ColmapImage read_image(Reader& in) {
   image.name = in.text("the name of an image");
   if (image.name.empty() || image.name.find('\0') != std::string::npos)
     in.fail("the name of an image", "an empty text or one with a NUL");
-  // The points that the image shows are skipped; in text, a line that may be empty, or lack at the end.
+  // The points that the image shows are skipped.
   if constexpr (Reader::kBinary)
     in.skip(24 * in.count(8 + 8 + 8, "a count of places in the image"));
   else
-    in.next();
+    in.skip_points();
   return image;
 }
 
@@ -255,7 +286,7 @@ std::vector<ColmapImage> parse_colmap_images(std::string_view bytes, ColmapForma
                                              std::string_view name) {
   std::vector<ColmapImage> images;
   each_record(bytes, format, name, 4 + 7 * 8 + 4 + 1 + 8, "a count of images",
-              [&](auto& in) { images.push_back(read_image(in)); });
+              [&](auto& in) { images.push_back(read_model_image(in)); });
   check_some(images, name, "image");
   return images;
 }

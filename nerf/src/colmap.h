@@ -25,8 +25,9 @@ struct ColmapImage {
 
 /// @{
 /// Reads a file of a COLMAP sparse model.
-/// Source: COLMAP's documentation, "Output format". Camera models: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL,
-/// RADIAL, OPENCV. Quaternions of a length within 1e-2 of 1 are normalised. Points are skipped.
+/// Source: COLMAP's documentation, "Output format". Camera models, in any case: SIMPLE_PINHOLE, PINHOLE,
+/// SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE.
+/// Quaternions of a length within 1e-2 of 1 are normalised. Points are skipped; the lines for them may lack.
 /// @param name  stands for the path in errors
 /// @throws IoError  naming line or byte, the expectation and the find: an end too early, a count that the
 /// bytes

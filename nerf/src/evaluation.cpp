@@ -7,6 +7,9 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <utility>
+
+#include "checks.h"
 
 namespace fieldmark::nerf {
 namespace {
@@ -19,6 +22,33 @@ Tensor<float> foreground_mask(const View& view, const Rendering& rendering) {
   for (Index i = 0; i < alpha.size(); ++i) alpha[i] = view.rgba[4 * i + 3];
   const bool opaque = std::all_of(alpha.data.begin(), alpha.data.end(), [](float a) { return a >= 1; });
   return opaque ? rendering.opacity : alpha;
+}
+
+// [H, W], 1 on valid pixels; empty: all are.
+Tensor<float> valid_mask(const View& view) {
+  if (view.valid.empty()) return {};
+  Tensor<float> mask({view.rgba.shape[0], view.rgba.shape[1]});
+  for (Index i = 0; i < mask.size(); ++i) mask[i] = view.valid[at(i)] ? 1.f : 0.f;
+  return mask;
+}
+
+ViewScore score(const View& view, Rendering rendering, Background background, const Lpips<float>* lpips) {
+  const Tensor<float> valid = valid_mask(view);
+  Tensor<float> truth = composited(view, background);
+  Tensor<float> foreground = foreground_mask(view, rendering);
+  for (Index i = 0; i < valid.size(); ++i) {
+    if (valid[i] > 0) continue;
+    foreground[i] = 0;
+    for (Tensor<float>* image : {&truth, &rendering.rgb}) std::fill_n(&(*image)[3 * i], 3, 0.f);
+  }
+  const Index side = std::min(view.camera.width, view.camera.height);
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  return {.psnr = view.valid.empty() ? psnr(rendering.rgb, truth) : psnr_masked(rendering.rgb, truth, valid),
+          .psnr_foreground = psnr_masked(rendering.rgb, truth, foreground),
+          .ssim = side >= kSsimWindow ? ssim(rendering.rgb, truth) : none,
+          .lpips = lpips && side >= lpips->smallest()
+                       ? lpips->distance(quantize8(rendering.rgb), quantize8(truth)).value
+                       : none};
 }
 
 double mean(const std::vector<ViewScore>& scores, double ViewScore::*number) {
@@ -42,18 +72,9 @@ Evaluation evaluate(Renderer& renderer, const Dataset& dataset,
   double seconds = 0;
   for (const View& view : dataset.views) {
     const auto start = Clock::now();
-    const Rendering rendering = renderer.render(view.camera);
+    Rendering rendering = renderer.render(view.camera);
     seconds += std::chrono::duration<double>(Clock::now() - start).count();
-    const Tensor<float> truth = composited(view, dataset.background);
-    const Index side = std::min(view.camera.width, view.camera.height);
-    const double none = std::numeric_limits<double>::quiet_NaN();
-    result.per_view.push_back(
-        {.psnr = psnr(rendering.rgb, truth),
-         .psnr_foreground = psnr_masked(rendering.rgb, truth, foreground_mask(view, rendering)),
-         .ssim = side >= kSsimWindow ? ssim(rendering.rgb, truth) : none,
-         .lpips = lpips && side >= lpips->smallest()
-                      ? lpips->distance(quantize8(rendering.rgb), quantize8(truth)).value
-                      : none});
+    result.per_view.push_back(score(view, std::move(rendering), dataset.background, lpips));
     ++result.views;
     if (progress && !progress(result.views, static_cast<Index>(dataset.views.size()))) break;
   }

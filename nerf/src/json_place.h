@@ -50,6 +50,8 @@ class JsonPlace {
     if (!value_->is_string()) fail("text", kind());
     return value_->get<std::string>();
   }
+  bool is_zero() const { return value_->is_number() && value_->get<double>() == 0; }
+  bool is_null() const { return value_->is_null(); }
   bool is_false() const { return value_->is_boolean() && !value_->get<bool>(); }
   Vec3 vec3() const {
     if (array_size() != 3) fail("3 numbers", std::to_string(array_size()));

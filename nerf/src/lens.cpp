@@ -9,10 +9,37 @@
 namespace fieldmark::nerf {
 namespace {
 
+// The radial factor a of a lens and da / d(r^2).
+struct Radial {
+  double a, slope;
+};
+
+Radial fisheye_radial(const Lens& l, double r2) {
+  // Nearer to the axis the quotients below lose their digits: t / r = 1 - r^2 / 3 + O(r^4).
+  if (r2 < 1e-8) return {1 + r2 * (l.k1 - 1.0 / 3), l.k1 - 1.0 / 3};
+  const double r = std::sqrt(r2), t = std::atan(r), t2 = t * t;
+  const double seen = t * (1 + t2 * (l.k1 + t2 * (l.k2 + t2 * (l.k3 + t2 * l.k4))));
+  const double along = (1 + t2 * (3 * l.k1 + t2 * (5 * l.k2 + t2 * (7 * l.k3 + t2 * 9 * l.k4)))) / (1 + r2);
+  return {seen / r, (along - seen / r) / (2 * r2)};
+}
+
+Radial radial(const Lens& l, double r2) {
+  if (l.model == LensModel::fisheye) return fisheye_radial(l, r2);
+  if (l.model == LensModel::polynomial)
+    return {1 + r2 * (l.k1 + r2 * (l.k2 + r2 * (l.k3 + r2 * l.k4))),
+            l.k1 + r2 * (2 * l.k2 + r2 * (3 * l.k3 + r2 * 4 * l.k4))};
+  const double above = 1 + r2 * (l.k1 + r2 * (l.k2 + r2 * l.k3)),
+               below = 1 + r2 * (l.k4 + r2 * (l.k5 + r2 * l.k6));
+  const double rise = l.k1 + r2 * (2 * l.k2 + r2 * 3 * l.k3), fall = l.k4 + r2 * (2 * l.k5 + r2 * 3 * l.k6);
+  // Behind a pole the lens has no image; NaN is neither regular nor inside of one.
+  if (!(below > 0)) return {std::nan(""), std::nan("")};
+  return {above / below, (rise * below - above * fall) / (below * below)};
+}
+
 // The derivative of distorted(), a symmetric 2x2 matrix: xx, xy, yy.
 std::array<double, 3> derivative(const Lens& l, const Vec2& q) {
-  const double x = q[0], y = q[1], r2 = x * x + y * y;
-  const double a = 1 + r2 * (l.k1 + r2 * l.k2), slope = l.k1 + 2 * l.k2 * r2;  // a and da / d(r^2)
+  const double x = q[0], y = q[1];
+  const auto [a, slope] = radial(l, x * x + y * y);
   return {a + 2 * x * x * slope + 2 * l.p1 * y + 6 * l.p2 * x,
           2 * x * y * slope + 2 * l.p1 * x + 2 * l.p2 * y,
           a + 2 * y * y * slope + 6 * l.p1 * y + 2 * l.p2 * x};
@@ -39,6 +66,25 @@ void check_invertible(const Camera& c, const Lens& lens) {
                          lens.text() + ", which has none at pixel (" + short_number(x) + ", " +
                          short_number(y) + ") of " + std::to_string(c.width) + " x " +
                          std::to_string(c.height));
+    }
+}
+
+// The inverse of the lens over a part of the pinhole's image, which the lens's image is resampled to.
+void check_inverse(const Camera& c, const Lens& lens, const Crop& part) {
+  constexpr int kSteps = 32;
+  constexpr double kPixels = 1e-6;
+  for (int i = 0; i <= kSteps; ++i)
+    for (int j = 0; j <= kSteps; ++j) {
+      const double x =
+          static_cast<double>(part.left) + 0.5 + static_cast<double>(part.width - 1) * j / kSteps;
+      const double y =
+          static_cast<double>(part.top) + 0.5 + static_cast<double>(part.height - 1) * i / kSteps;
+      const Vec2 q = on_plane(c, x, y);
+      const auto back = lens.undistorted(lens.distorted(q));
+      if (!back || !(std::hypot((*back)[0] - q[0], (*back)[1] - q[1]) * std::max(c.fx, c.fy) < kPixels))
+        throw ValueError("[covered_part] lens: must have an inverse to 1e-6 pixels, got " + lens.text() +
+                         ", which has none at pixel (" + short_number(x) + ", " + short_number(y) + ") of " +
+                         std::to_string(c.width) + " x " + std::to_string(c.height));
     }
 }
 
@@ -86,12 +132,16 @@ void sample(const Tensor<float>& rgba, const Vec2& at, float* out) {
 }  // namespace
 
 std::string Lens::text() const {
-  return "k1 " + short_number(k1) + " k2 " + short_number(k2) + " p1 " + short_number(p1) + " p2 " +
-         short_number(p2);
+  std::string text = model == LensModel::fisheye ? "fisheye " : "";
+  text += "k1 " + short_number(k1) + " k2 " + short_number(k2) + " p1 " + short_number(p1) + " p2 " +
+          short_number(p2);
+  for (const auto& [name, value] : {std::pair{" k3 ", k3}, {" k4 ", k4}, {" k5 ", k5}, {" k6 ", k6}})
+    if (value != 0) text += name + short_number(value);
+  return text;
 }
 
 Vec2 Lens::distorted(const Vec2& point) const {
-  const double x = point[0], y = point[1], r2 = x * x + y * y, a = 1 + r2 * (k1 + r2 * k2);
+  const double x = point[0], y = point[1], r2 = x * x + y * y, a = radial(*this, r2).a;
   return {x * a + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * a + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y};
 }
 
@@ -157,13 +207,17 @@ Camera Intrinsics::camera(const Pose& pose, Index image_width, Index image_heigh
 Crop covered_part(const Camera& camera, const Lens& lens) {
   Crop r{.left = 0, .top = 0, .width = camera.width, .height = camera.height};
   if (lens.is_pinhole()) return r;
-  check_invertible(camera, lens);
+  // Corners of a fisheye may see 90 degrees from the axis and more, where no pinhole sees.
+  if (lens.model != LensModel::fisheye) check_invertible(camera, lens);
   while (r.width > 0 && r.height > 0) {
     int worst = 0;
     double most = 0;
     for (int side = 0; side < 4; ++side)
       if (const double share = missing_share(camera, lens, r, side); share > most) most = share, worst = side;
-    if (most == 0) return r;
+    if (most == 0) {
+      check_inverse(camera, lens, r);
+      return r;
+    }
     if (worst == 0) ++r.left;
     if (worst == 2) ++r.top;
     (worst < 2 ? r.width : r.height) -= 1;

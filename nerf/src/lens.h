@@ -10,20 +10,33 @@ namespace fieldmark::nerf {
 /// A point of the plane at distance 1 in front of the camera: x right, y down, in tangents of angles.
 using Vec2 = std::array<double, 2>;
 
+/// The formulas of Lens.
+enum class LensModel {
+  polynomial,  ///< a = 1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8 (nerfstudio, Metashape)
+  rational,    ///< a = (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6) (FULL_OPENCV)
+  fisheye      ///< a = t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8) / r, t = atan r (OPENCV_FISHEYE)
+};
+
 /// Radial and tangential distortion of a lens, from a pinhole's image of a point to the lens's:
-///   x' = x (1 + k1 r^2 + k2 r^4) + 2 p1 x y + p2 (r^2 + 2 x^2)
-///   y' = y (1 + k1 r^2 + k2 r^4) + p1 (r^2 + 2 y^2) + 2 p2 x y,   r^2 = x^2 + y^2
-/// Source: Brown 1966, in the signs and order of OpenCV, COLMAP and instant-ngp.
+///   x' = x a + 2 p1 x y + p2 (r^2 + 2 x^2)
+///   y' = y a + p1 (r^2 + 2 y^2) + 2 p2 x y,   r^2 = x^2 + y^2, and a as LensModel says
+/// Source: Brown 1966 and Kannala and Brandt 2006 (fisheye), in the signs and order of OpenCV, COLMAP and
+/// instant-ngp.
 struct Lens {
-  double k1 = 0;  ///< radial, of r^2
-  double k2 = 0;  ///< radial, of r^4
-  double p1 = 0;  ///< tangential
-  double p2 = 0;  ///< tangential
+  double k1 = 0;                            ///< radial
+  double k2 = 0;                            ///< radial
+  double p1 = 0;                            ///< tangential; not of a fisheye
+  double p2 = 0;                            ///< tangential; not of a fisheye
+  double k3 = 0;                            ///< radial
+  double k4 = 0;                            ///< radial
+  double k5 = 0;                            ///< of the rational model alone
+  double k6 = 0;                            ///< of the rational model alone
+  LensModel model = LensModel::polynomial;  ///< which of the formulas
 
   bool operator==(const Lens&) const = default;  ///< equal in every coefficient
-  /// Whether all coefficients are 0.
-  bool is_pinhole() const { return *this == Lens{}; }
-  /// "k1 0.1 k2 0 p1 0 p2 0"
+  /// Whether it leaves every point where it is: all coefficients are 0, and it is no fisheye.
+  bool is_pinhole() const { return *this == Lens{.model = model} && model != LensModel::fisheye; }
+  /// "k1 0.1 k2 0 p1 0 p2 0", further coefficients where they are not 0, "fisheye" before them
   std::string text() const;
   /// The lens's image of a pinhole's point.
   Vec2 distorted(const Vec2& point) const;
@@ -65,7 +78,8 @@ struct Crop {
 /// The part of a pinhole's image that a lens's image of the same size and intrinsics covers: removes, one at
 /// a time, the outermost row or column with the greatest share of pixels without a source.
 /// @throws ValueError  if the distortion cannot be inverted at one of 33 x 33 places spread over the lens's
-///                     image, corners included, or no pixel is left
+///                     image, corners included (of a fisheye, which may see more than any pinhole: of the
+///                     part), to 1e-6 pixels, or no pixel is left
 Crop covered_part(const Camera& camera, const Lens& lens);
 
 /// The camera of a part of its image. @throws ValueError unless the part is within the image

@@ -33,6 +33,19 @@ std::vector<double> numbers(const char* from, std::size_t count) {
   if (count > 0) std::memcpy(read.data(), from, count * sizeof(T));
   return {read.begin(), read.end()};
 }
+// The elements of an array whose first index runs fastest, with the last one fastest.
+std::vector<double> in_c_order(const NpyArray& array) {
+  std::vector<double> ordered(array.numbers.size());
+  for (std::size_t i = 0; i < ordered.size(); ++i) {
+    std::size_t rest = i, place = 0;
+    for (const Index extent : array.shape) {
+      place = place * static_cast<std::size_t>(extent) + rest % static_cast<std::size_t>(extent);
+      rest /= static_cast<std::size_t>(extent);
+    }
+    ordered[place] = array.numbers[i];
+  }
+  return ordered;
+}
 }  // namespace
 
 NpyArray parse_npy(std::string_view bytes, std::string_view name) {
@@ -60,7 +73,8 @@ NpyArray parse_npy(std::string_view bytes, std::string_view name) {
   };
   if (header["descr"] != "<f4" && header["descr"] != "<f8")
     fail(begin, "descr '<f4' or '<f8' (little-endian floats)", found("descr"));
-  if (header["fortran_order"] != false) fail(begin, "fortran_order False (C order)", found("fortran_order"));
+  if (!header["fortran_order"].is_boolean())
+    fail(begin, "fortran_order True or False", found("fortran_order"));
 
   const std::size_t data = begin + length, left = bytes.size() - data,
                     each = header["descr"] == "<f4" ? 4 : 8;
@@ -82,6 +96,7 @@ NpyArray parse_npy(std::string_view bytes, std::string_view name) {
          std::to_string(left) + " bytes");
   array.numbers =
       each == 4 ? numbers<float>(bytes.data() + data, count) : numbers<double>(bytes.data() + data, count);
+  if (header["fortran_order"] == true) array.numbers = in_c_order(array);
   return array;
 }
 

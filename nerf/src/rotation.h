@@ -35,6 +35,13 @@ inline Pose with_rotation(Pose p) {
   return p;
 }
 
+/// The length of the three columns where it is the same to 0.1%, else 0.
+inline double common_scale(const Pose& p) {
+  const double x = norm(pose_column(p, 0)), y = norm(pose_column(p, 1)), z = norm(pose_column(p, 2));
+  const double least = std::min({x, y, z}), most = std::max({x, y, z});
+  return least > 1e-9 && most <= 1.001 * least ? std::cbrt(x * y * z) : 0;
+}
+
 // Poses in single precision with six digits are 1e-6 off; they are kept.
 inline constexpr double kRotationExact = 1e-5, kRotationTolerance = 1e-2;
 
@@ -47,7 +54,11 @@ Pose checked_rotation(const Pose& pose, Fail fail) {
   if (!(error <= kRotationTolerance)) {
     char text[32];
     std::snprintf(text, sizeof text, "%.4g", error);
-    fail(std::string("columns that are off orthonormal by ") + text);
+    const Vec3 x = pose_column(pose, 0), y = pose_column(pose, 1), z = pose_column(pose, 2);
+    char more[96];
+    std::snprintf(more, sizeof more, ": they are of lengths %.4g, %.4g and %.4g, with a determinant of %.4g",
+                  norm(x), norm(y), norm(z), dot(cross(x, y), z));
+    fail(std::string("columns that are off orthonormal by ") + text + more);
   }
   return with_rotation(pose);
 }

@@ -11,7 +11,12 @@
 namespace fieldmark::nerf {
 namespace {
 
-// Counts of pixels with alpha > 0 left of and above each, so that four look-ups test any rectangle.
+bool is_valid(const View& v, Index pixel) { return v.valid.empty() || v.valid[at(pixel)] != 0; }
+
+// Whether the scene may be behind a pixel: a mask may hide it.
+bool may_show(const View& v, Index pixel) { return v.rgba[4 * pixel + 3] > 0 || !is_valid(v, pixel); }
+
+// Counts of pixels that may show the scene, left of and above each, so that four look-ups test any rectangle.
 struct Coverage {
   Camera camera;
   Index width, height;
@@ -23,7 +28,7 @@ struct Coverage {
       for (Index x = 0; x < width; ++x)
         sum[at((y + 1) * (width + 1) + x + 1)] =
             sum[at(y * (width + 1) + x + 1)] + sum[at((y + 1) * (width + 1) + x)] -
-            sum[at(y * (width + 1) + x)] + (v.rgba[4 * (y * width + x) + 3] > 0 ? 1 : 0);
+            sum[at(y * (width + 1) + x)] + (may_show(v, y * width + x) ? 1 : 0);
   }
 
   bool may_contain(const double p[3], double radius) const {
@@ -72,7 +77,7 @@ void dilate(const std::uint8_t* in, Index n, Index stride, Index margin, std::ui
 std::vector<std::uint8_t> near_alpha(const View& view, Index margin) {
   const Index h = view.camera.height, w = view.camera.width;
   std::vector<std::uint8_t> mask(at(h * w)), rows(at(h * w));
-  for (Index p = 0; p < h * w; ++p) mask[at(p)] = view.rgba[4 * p + 3] > 0;
+  for (Index p = 0; p < h * w; ++p) mask[at(p)] = may_show(view, p);
   for (Index y = 0; y < h; ++y) dilate(&mask[at(y * w)], w, 1, margin, &rows[at(y * w)]);
   for (Index x = 0; x < w; ++x) dilate(&rows[at(x)], h, w, margin, &mask[at(x)]);
   return mask;
@@ -145,9 +150,9 @@ Index hull_margin(std::span<const View> views, const Bounds& bounds, Index resol
   return static_cast<Index>(std::ceil(widest)) + 4;
 }
 
-std::vector<std::uint32_t> training_pixels(std::span<const View> views, Index margin) {
-  if (margin < 0)
-    throw ValueError("[training_pixels] margin must not be negative, got " + std::to_string(margin));
+std::vector<std::uint32_t> training_pixels(std::span<const View> views, std::optional<Index> margin) {
+  if (margin && *margin < 0)
+    throw ValueError("[training_pixels] margin must not be negative, got " + std::to_string(*margin));
   const Index count = static_cast<Index>(views.size());
   const Index size = count > 0 ? views[0].camera.height * views[0].camera.width : 0;
   if (count * size > Index{std::numeric_limits<std::uint32_t>::max()})
@@ -155,9 +160,11 @@ std::vector<std::uint32_t> training_pixels(std::span<const View> views, Index ma
                      std::to_string(count * size));
   std::vector<std::vector<std::uint32_t>> of_view(at(count));
   parallel_for(count, 1, [&](Index v, Index) {
-    const auto mask = near_alpha(views[at(v)], margin);
+    const View& view = views[at(v)];
+    const auto mask = margin ? near_alpha(view, *margin) : std::vector<std::uint8_t>(at(size), 1);
     for (Index p = 0; p < size; ++p)
-      if (mask[at(p)]) of_view[at(v)].push_back(static_cast<std::uint32_t>(v * size + p));
+      if (mask[at(p)] && is_valid(view, p))
+        of_view[at(v)].push_back(static_cast<std::uint32_t>(v * size + p));
   });
   std::vector<std::uint32_t> all;
   for (const auto& pixels : of_view) all.insert(all.end(), pixels.begin(), pixels.end());

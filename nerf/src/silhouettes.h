@@ -3,6 +3,7 @@
 #include <fieldmark/nerf/space.h>
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -10,7 +11,7 @@ namespace fieldmark::nerf {
 
 /// The visual hull (Laurentini 1994): the cells of a grid over `bounds` that no silhouette rules out. A view
 /// rules a cell out only if the cell's projection, enlarged to the circle around its corners, lies in the
-/// image and meets no pixel with alpha > 0.
+/// image and meets no pixel with alpha > 0 and none that is not valid.
 /// @param resolution  cells per axis, a multiple of 4, at most 512   @return [cells] x fastest, 1 for the
 /// hull
 /// @throws ShapeError if an image is not [H, W, 4]   @throws ValueError if resolution is out of range
@@ -24,10 +25,11 @@ Bounds tighten(const Bounds& bounds, std::span<const std::uint8_t> hull, Index r
 /// @param resolution  cells per axis, at least 1
 Index hull_margin(std::span<const View> views, const Bounds& bounds, Index resolution);
 
-/// The pixels worth a training ray: those within a square of `margin` pixels around one with alpha > 0. Rays
-/// through the others pass only cells outside the hull (except where the scene leaves the image).
+/// The pixels worth a training ray: the valid ones within a square of `margin` pixels around one with alpha >
+/// 0 or one that is not valid; without a margin, all valid ones. Rays through the others pass only cells
+/// outside the hull (except where the scene leaves the image).
 /// @return [n] view * height * width + y * width + x, rising   @throws ValueError if margin is negative or
 /// the views have too many pixels for 32 bits
-std::vector<std::uint32_t> training_pixels(std::span<const View> views, Index margin);
+std::vector<std::uint32_t> training_pixels(std::span<const View> views, std::optional<Index> margin);
 
 }  // namespace fieldmark::nerf

@@ -128,6 +128,7 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
     field_.cameras = camera_span(data);
     lay_out_space();
   }
+  choose_pixels();
   if (field.coarse) rays_per_step_ = mlp_rays();
   // As if every tile were at its worst, so that what was never seen is preferred.
   if (options.hard_pixels > 0 && !field.coarse) tile_errors_.assign(at(tile_of(all_pixels() - 1) + 1), 1.f);
@@ -162,6 +163,16 @@ void Trainer::carve() {
   field_.space.bounds = tighten(field_.space.bounds, visual_hull(data_.views, field_.space.bounds, n), n);
   field_.grid.restrict_to(visual_hull(data_.views, field_.space.bounds, n));
   pixels_ = training_pixels(data_.views, hull_margin(data_.views, field_.space.bounds, n));
+}
+
+// Rays go through valid pixels alone.
+void Trainer::choose_pixels() {
+  for (const View& v : data_.views)
+    valid_pixels_ += v.valid.empty() ? v.camera.width * v.camera.height : std::ranges::count(v.valid, 1);
+  if (valid_pixels_ == all_pixels() || !pixels_.empty()) return;
+  pixels_ = training_pixels(data_.views, std::nullopt);
+  if (pixels_.empty())
+    throw ValueError("[trainer] data must have a valid pixel, got none: masks exclude all");
 }
 
 double Trainer::run_chunk(Index index, Shard& shard, Tape<float>& tape, float* grads) {
@@ -288,10 +299,8 @@ double Trainer::step_hash() {
 }
 
 double Trainer::train_psnr() const {
-  const Camera& camera = data_.views.front().camera;
-  const double pixels =
-      static_cast<double>(data_.views.size()) * static_cast<double>(camera.width * camera.height);
-  const double share = pixels_.empty() ? 1 : static_cast<double>(pixels_.size()) / pixels;
+  const double share =
+      pixels_.empty() ? 1 : static_cast<double>(pixels_.size()) / static_cast<double>(valid_pixels_);
   return -10 * std::log10(std::max(2 * share * loss(), 1e-10));
 }
 
@@ -353,6 +362,9 @@ void Trainer::describe(RunFingerprint& f) const {
     images[at(i)] = sha256_hex(std::as_bytes(std::span(data_.views[at(i)].rgba.data)));
   });
   for (std::size_t i = 0; i < images.size(); ++i) f.input_digest("image " + std::to_string(i), images[i]);
+  for (std::size_t i = 0; i < images.size(); ++i)
+    if (const auto& valid = data_.views[i].valid; !valid.empty())
+      f.input_digest("mask " + std::to_string(i), sha256_hex(std::as_bytes(std::span(valid))));
 }
 
 void Trainer::save_more(SafetensorsFile& file) const {

@@ -47,8 +47,9 @@ const std::string kTransforms =
  "p1": -0.00098, "p2": 0.00016, "cx": 138.6, "cy": 241.3, "w": 270.0, "h": 480.0, "aabb_scale": 4, "frames": [
  {"file_path": "images/0001.png", "sharpness": 31.75, "transform_matrix": [[0.6, -0.8, 0, 3.1], [0.8, 0.6, 0, -5.4],
   [0, 0, 1, -0.97], [0.0, 0.0, 0.0, 1.0]]},
- {"file_path": "./b", "fl_x": 300, "k3": 0, "is_fisheye": false, "camera_model": "OPENCV", "transform_matrix":
-  [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}]})";
+ {"file_path": "./b", "fl_x": 300, "k3": 0.01, "k6": 0.02, "is_fisheye": 0, "camera_model": "FULL_OPENCV",
+  "mask_path": "m.png", "transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}],
+ "train_filenames": ["b"]})";
 
 std::string safetensors_file() {
   const std::string header =

@@ -58,15 +58,42 @@ TEST_CASE("colmap: each model's parameters go where they belong") {
   CHECK((a.fl_x == 7 && a.fl_y == 7 && *a.cx == 4 && *a.cy == 3 && a.lens.is_pinhole()));
   CHECK((b.fl_x == 7 && b.fl_y == 9 && *b.cx == 4 && *b.cy == 3 && b.lens.is_pinhole()));
   CHECK(c.lens == Lens{.k1 = 0.1, .k2 = 0.2});
+  CHECK(one("1 FULL_OPENCV 8 6 7 9 4 3 1 2 3 4 5 6 7 8").lens == Lens{.k1 = 1,
+                                                                      .k2 = 2,
+                                                                      .p1 = 3,
+                                                                      .p2 = 4,
+                                                                      .k3 = 5,
+                                                                      .k4 = 6,
+                                                                      .k5 = 7,
+                                                                      .k6 = 8,
+                                                                      .model = LensModel::rational});
+  const Intrinsics f = one("1 opencv_fisheye 8 6 7 9 4 3 1 2 3 4");
+  CHECK((f.fl_y == 9 && *f.cy == 3));
+  CHECK(f.lens == Lens{.k1 = 1, .k2 = 2, .k3 = 3, .k4 = 4, .model = LensModel::fisheye});
+  CHECK(one("1 Simple_Radial_Fisheye 8 6 7 4 3 1").lens == Lens{.k1 = 1, .model = LensModel::fisheye});
+  CHECK(one("1 RADIAL_FISHEYE 8 6 7 4 3 1 2").lens == Lens{.k1 = 1, .k2 = 2, .model = LensModel::fisheye});
+  CHECK(one("1 FULL_OPENCV 8 6 7 9 4 3 0 0 0 0 0 0 0 0").lens.is_pinhole());
+}
+
+TEST_CASE("colmap: images without their lines of points, or with some") {
+  const std::string a = "1 1 0 0 0 0 0 0 1 a.png\n", b = "2 1 0 0 0 0 0 0 1 my b.png\n",
+                    c = "3 1 0 0 0 0 0 0 1 7\n", points = "1 2 3 4.5 5 -1\n";
+  for (const std::string& model :
+       {a + b + c, a + points + b + c, a + b + points + c + points, a + "\n" + b + "\n" + c + "\n",
+        a + "\n\n" + b + c, a + points + b + "\n# c\n" + c}) {
+    const auto images = parse_colmap_images(model, kText, "i");
+    REQUIRE(images.size() == 3);
+    CHECK((images[0].name == "a.png" && images[1].name == "my b.png" && images[2].name == "7"));
+  }
 }
 
 TEST_CASE("colmap: errors of text name the line") {
   expect_camera_error("", kText, "expected at least one camera, got none");
   expect_camera_error("# only\n\n", kText, "expected at least one camera, got none");
   expect_camera_error(
-      "\n1 OPENCV_FISHEYE 8 6 7 7 4 3 0 0 0 0", kText,
-      "line 2: expected a camera model SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL or OPENCV, "
-      "got 'OPENCV_FISHEYE'");
+      "\n1 FOV 8 6 7 7 4 3 0.5", kText,
+      "line 2: expected a camera model of SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, "
+      "OPENCV_FISHEYE, FULL_OPENCV, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, got 'FOV'; undistort the images");
   expect_camera_error("1 PINHOLE 8 6 7 7 4", kText,
                       "line 1: expected a principal point, got the end of the line");
   expect_camera_error("1 PINHOLE 8 6 7 7 4 3 9", kText, "line 1: expected 4 parameters of PINHOLE, got more");
@@ -104,10 +131,11 @@ TEST_CASE("colmap: errors of bytes name the byte, and a count never allocates wh
   places.replace(at, 8, many);
   expect_image_error(places, kBinary, "byte " + std::to_string(at + 8) + ": expected a count of places");
   std::string model = cameras;
-  model[12] = 5;
+  model[12] = 7;
   expect_camera_error(model, kBinary,
-                      "byte 16: expected a camera model SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, "
-                      "RADIAL or OPENCV, got OPENCV_FISHEYE");
+                      "byte 16: expected a camera model of SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, "
+                      "RADIAL, OPENCV, OPENCV_FISHEYE, FULL_OPENCV, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, "
+                      "got FOV");
   model[12] = 77;
   expect_camera_error(model, kBinary, "byte 16: expected a camera model");
   expect_image_error(

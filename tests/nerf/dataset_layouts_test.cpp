@@ -1,64 +1,20 @@
 // The layouts of images, which load_dataset() reads besides Blender's.
 #include <fieldmark/core/error.h>
 #include <fieldmark/core/files.h>
-#include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/camera_set.h>
 #include <fieldmark/nerf/dataset.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "nerf/format_samples.h"
+#include "nerf/training_images.h"
 #include "support/catch.h"
 #include "support/data.h"
-#include "support/random.h"
-#include "support/temporary_folder.h"
 
 using namespace fieldmark;
 using namespace fieldmark::nerf;
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
-
-namespace {
-void write_image(const fs::path& path, Index width, Index height, std::uint64_t seed = 1) {
-  fs::create_directories(path.parent_path());
-  const auto view_image = quantize8(uniform<float>({height, width, 3}, 0, 1, seed));
-  if (path.extension() == ".png")
-    write_png(path, view_image);
-  else
-    write_file_atomically(path, encode_jpeg(view_image, 90));
-}
-
-// A transforms.json of ten frames of 12 x 8 pixels, the last name first.
-Json ten_frames() {
-  Json frames = Json::array();
-  for (int i = 9; i >= 0; --i)
-    frames.push_back({{"file_path", "images/" + std::to_string(i) + ".png"},
-                      {"transform_matrix", {{1, 0, 0, i}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}}});
-  return {{"fl_x", 20}, {"fl_y", 21}, {"cx", 6.5},       {"cy", 4.5},
-          {"w", 12},    {"h", 8},     {"aabb_scale", 4}, {"frames", frames}};
-}
-
-struct TrainingImages : TemporaryFolder {
-  Json json = ten_frames();
-  TrainingImages() {
-    for (int i = 0; i < 10; ++i) write_image(image(i), 12, 8);
-    write();
-  }
-  fs::path image(int i) const { return path / "images" / (std::to_string(i) + ".png"); }
-  void write() const { write_file_atomically(path / "transforms.json", json.dump()); }
-  void expect_error(const std::string& message, const std::string& split = "train") const {
-    CHECK_THROWS_WITH(load_dataset(path, {.split = split}), Contains(message));
-    CHECK_THROWS_AS(load_dataset(path, {.split = split}), IoError);
-  }
-};
-
-std::string names(const Dataset& set) {
-  std::string all;
-  for (const View& v : set.views) all += v.name + " ";
-  return all;
-}
-}  // namespace
 
 TEST_CASE("dataset: one transforms.json holds out every 8th of the sorted names") {
   const TrainingImages scene;

@@ -89,6 +89,34 @@ TEST_CASE(
   CHECK(std::isnan(evaluate(renderer, images(field, 1, 0.1f), {}, &lpips).lpips));  // 16 rows: too few
 }
 
+TEST_CASE("evaluation: pixels that are not valid count in no PSNR") {
+  const RadianceField field = small_field();
+  Renderer renderer(field);
+  Dataset data = images(field, 2, 0.1f), wrong = data;
+  const Evaluation whole = evaluate(renderer, data);
+  for (std::size_t v = 0; v < 2; ++v) {
+    data.views[v].valid.assign(320, 1);
+    for (Index i = 0; i < 320; ++i)
+      if (i % 20 < 8) {
+        data.views[v].valid[static_cast<std::size_t>(i)] = 0;
+        for (Index k = 0; k < 3; ++k) wrong.views[v].rgba[4 * i + k] = 1 - wrong.views[v].rgba[4 * i + k];
+      }
+    wrong.views[v].valid = data.views[v].valid;
+  }
+  const Evaluation masked = evaluate(renderer, data), other = evaluate(renderer, wrong);
+  CHECK(masked.psnr == other.psnr);
+  CHECK(masked.psnr_foreground == other.psnr_foreground);
+  CHECK(masked.psnr != whole.psnr);
+  const Rendering r = renderer.render(data.views[0].camera);
+  Tensor<float> mask(Shape{16, 20});
+  for (Index i = 0; i < 320; ++i) mask[i] = i % 20 < 8 ? 0.f : 1.f;
+  CHECK(masked.per_view[0].psnr == psnr_masked(r.rgb, composited(data.views[0], data.background), mask));
+  CHECK(masked.ssim == other.ssim);
+  CHECK(masked.ssim != whole.ssim);
+  for (View& v : data.views) std::fill(v.valid.begin(), v.valid.end(), std::uint8_t{1});
+  CHECK(evaluate(renderer, data).psnr == whole.psnr);
+}
+
 TEST_CASE("evaluation: without alpha the object is where the rendering is opaque") {
   const RadianceField field = small_field();
   Renderer renderer(field);

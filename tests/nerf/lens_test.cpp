@@ -31,6 +31,78 @@ TEST_CASE("lens: distortion by the formula, one coefficient at a time") {
   CHECK(!kFox.is_pinhole());
 }
 
+TEST_CASE("lens: further coefficients by the formulas of their models") {
+  const double x = 0.6, y = -0.8;  // r = 1
+  const auto factor = [&](const Lens& lens) {
+    const Vec2 p = lens.distorted({x, y});
+    CHECK(std::abs(p[1] / y - p[0] / x) < 1e-14);
+    return p[0] / x;
+  };
+  CHECK(factor({.k1 = 0.1, .k2 = 0.2, .k3 = 0.3, .k4 = 0.4}) == Approx(2.0));
+  CHECK(Lens{.k4 = 0.5}.distorted({0.5, 0})[0] == Approx(0.5 * (1 + 0.5 * std::pow(0.5, 8))));
+  const Lens rational{
+      .k1 = 0.1, .k2 = 0.2, .k3 = 0.3, .k4 = 0.4, .k5 = 0.5, .k6 = 0.6, .model = LensModel::rational};
+  CHECK(factor(rational) == Approx(1.6 / 2.5));
+  // An equidistant fisheye images an angle t at a distance t.
+  const Lens equidistant{.model = LensModel::fisheye};
+  CHECK(!equidistant.is_pinhole());
+  for (const double t : {1e-5, 1e-4, 0.3, 1.2, 1.5})
+    CHECK(std::abs(equidistant.distorted({std::tan(t), 0})[0] - t) < 1e-14);
+  const Lens fisheye{.k1 = 0.1, .k2 = -0.02, .k3 = 0.003, .k4 = -0.0004, .model = LensModel::fisheye};
+  const double t = 0.9, t2 = t * t;
+  CHECK(fisheye.distorted({0, std::tan(t)})[1] ==
+        Approx(t * (1 + t2 * (0.1 + t2 * (-0.02 + t2 * (0.003 - t2 * 0.0004))))).epsilon(1e-14));
+  CHECK(fisheye.distorted({0, 0}) == Vec2{0, 0});
+  CHECK(Lens{.model = LensModel::rational}.is_pinhole());
+  CHECK(fisheye.text() == "fisheye k1 0.1 k2 -0.02 p1 0 p2 0 k3 0.003 k4 -0.0004");
+}
+
+TEST_CASE(
+    "lens: each model is inverted to far less than 1e-6 pixels of an image 4000 pixels wide, or not at all") {
+  const Lens lenses[] = {{.k1 = 0.05, .k2 = -0.03, .k3 = 0.02, .k4 = -0.001},
+                         {.k1 = 0.3,
+                          .k2 = 0.1,
+                          .p1 = 0.001,
+                          .p2 = -0.002,
+                          .k3 = 0.02,
+                          .k4 = 0.35,
+                          .k5 = 0.15,
+                          .k6 = 0.01,
+                          .model = LensModel::rational},
+                         {.model = LensModel::fisheye},
+                         {.k1 = -0.03, .k2 = 0.01, .k3 = -0.004, .k4 = 0.0005, .model = LensModel::fisheye},
+                         {.k1 = 0.06, .k2 = 0.02, .model = LensModel::fisheye}};
+  for (const Lens& lens : lenses) {
+    const bool fisheye = lens.model == LensModel::fisheye;
+    const double reach = fisheye ? 4 : 1;  // 76 and 45 degrees from the axis
+    for (int i = -20; i <= 20; ++i)
+      for (int j = -20; j <= 20; ++j) {
+        const Vec2 q{reach * i / 20, reach * j / 20};
+        const auto back = lens.undistorted(lens.distorted(q));
+        REQUIRE(back);
+        const double focal = 4000 / (2 * reach);
+        CHECK(std::hypot((*back)[0] - q[0], (*back)[1] - q[1]) * focal < 1e-7);
+      }
+  }
+  // Behind its pole a rational lens has no image.
+  const Lens pole{.k4 = -1, .model = LensModel::rational};
+  CHECK(!pole.is_regular({1.2, 0}));
+  CHECK(pole.is_regular({0.5, 0}));
+}
+
+TEST_CASE("lens: a fisheye keeps all of the pinhole's image, or what it sees of it") {
+  const Camera wide{
+      .fx = 12, .fy = 12, .cx = 20, .cy = 15, .width = 40, .height = 30};  // corners at 119 degrees
+  CHECK(covered_part(wide, {.model = LensModel::fisheye}) == Crop{0, 0, 40, 30});
+  const Lens folding{.k1 = -0.5, .model = LensModel::fisheye};  // t - t^3 / 2 falls from t = 0.82 on
+  const Crop part = covered_part(wide, folding);
+  CHECK((part.width < 40 && part.height < 30 && part.width > 10));
+  for (const Index x : {part.left, part.left + part.width - 1})
+    for (const Index y : {part.top, part.top + part.height - 1})
+      CHECK(folding.is_regular(
+          {(static_cast<double>(x) + 0.5 - 20) / 12, (static_cast<double>(y) + 0.5 - 15) / 12}));
+}
+
 TEST_CASE("lens: undistorted inverts distorted") {
   for (const Lens& lens : {kFox, Lens{.k1 = -0.2, .k2 = 0.03}, Lens{.k1 = 0.3, .p1 = 0.01, .p2 = -0.02}})
     for (double x = -0.8; x <= 0.8; x += 0.1)

@@ -38,14 +38,29 @@ TEST_CASE("npy: formats 1 to 3, floats of 4 and 8 bytes, keys in any order") {
             .numbers.empty());
 }
 
+TEST_CASE("npy: Fortran order is turned into C order") {
+  const NpyArray a =
+      parse_npy(with_header("{'descr': '<f8', 'fortran_order': True, 'shape': (2, 3), }"), "a");
+  CHECK(a.shape == std::vector<Index>{2, 3});
+  CHECK(a.numbers == std::vector<double>{1, 3, 5, 2, 4, 6});
+  std::vector<double> many(24);
+  for (std::size_t i = 0; i < 24; ++i) many[i] = static_cast<double>(i);
+  const NpyArray b =
+      parse_npy(npy_file("{'descr': '<f8', 'fortran_order': True, 'shape': (2, 3, 4), }", packed(many)), "b");
+  for (std::size_t x = 0; x < 2; ++x)
+    for (std::size_t y = 0; y < 3; ++y)
+      for (std::size_t z = 0; z < 4; ++z)
+        CHECK(b.numbers[(x * 3 + y) * 4 + z] == static_cast<double>(x + 2 * (y + 3 * z)));
+}
+
 TEST_CASE("npy: what is not read is named") {
   expect_npy_error("hello world, hello", "expected an .npy file");
   expect_npy_error("\x93NUMPY\x01", "expected 12 bytes at least");
   expect_npy_error(npy_file(kHeader, kSix, 4), "expected format 1, 2 or 3, got 4");
   expect_npy_error(with_header("{'descr': '>f8', 'fortran_order': False, 'shape': (2, 3), }"),
                    "expected descr '<f4' or '<f8' (little-endian floats), got \">f8\"");
-  expect_npy_error(with_header("{'descr': '<f8', 'fortran_order': True, 'shape': (2, 3), }"),
-                   "expected fortran_order False (C order), got true");
+  expect_npy_error(with_header("{'descr': '<f8', 'fortran_order': 1, 'shape': (2, 3), }"),
+                   "expected fortran_order True or False, got 1");
   expect_npy_error(with_header("{'descr': '<f8', 'fortran_order': False}"), "none called shape");
   expect_npy_error(with_header("{'descr': [('a', '<f8')], 'fortran_order': False, 'shape': (6,)}"),
                    "expected descr '<f4' or '<f8' (little-endian floats), got [[\"a\",\"<f8\"]]");

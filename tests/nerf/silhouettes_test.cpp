@@ -100,6 +100,27 @@ TEST_CASE("silhouettes: cells out of the image or behind the camera are kept") {
   CHECK(at(1, 8, 8) == 0);   // seen to be empty
 }
 
+TEST_CASE("silhouettes: where a mask hides the object nothing is ruled out, and no ray is worth it") {
+  Scene scene(40, 4);
+  const Index n = 32;
+  const auto before = visual_hull(scene.views, {}, n);
+  // A mask over the left half of the ball, whose alpha the mask's object has cut to 0 there.
+  for (View& v : scene.views) {
+    v.valid.assign(80 * 64, 1);
+    for (Index p = 0; p < 80 * 64; ++p)
+      if (p % 80 < 40) v.valid[static_cast<std::size_t>(p)] = 0, v.rgba[4 * p + 3] = 0;
+  }
+  const auto hull = visual_hull(scene.views, {}, n);
+  for (std::size_t c = 0; c < hull.size(); ++c)
+    if (before[c]) REQUIRE(hull[c] == 1);
+  for (const auto margin : {std::optional<Index>(3), std::optional<Index>()}) {
+    const auto pixels = training_pixels(scene.views, margin);
+    CHECK(!pixels.empty());
+    for (const auto p : pixels) REQUIRE(p % 80 >= 40);
+    if (!margin) CHECK(pixels.size() == 40 * 40 * 64);
+  }
+}
+
 TEST_CASE("silhouettes: without views nothing is ruled out") {
   const auto hull = visual_hull({}, {}, 8);
   CHECK(std::count(hull.begin(), hull.end(), 1) == 512);

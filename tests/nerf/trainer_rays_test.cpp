@@ -138,6 +138,52 @@ TEST_CASE("trainer_rays: hard pixels are sought where the error is") {
   CHECK(all < half - 0.5);
 }
 
+TEST_CASE("trainer_rays: what masks exclude is not learnt, carved or not") {
+  Dataset data = blurred_scene();
+  for (View& v : data.views) {
+    v.valid.assign(kSize * kSize, 1);
+    for (Index p = 0; p < kSize * kSize; ++p)
+      if (p % kSize < kSize / 3) v.valid[static_cast<std::size_t>(p)] = 0;
+  }
+  Dataset other = data, whole = data;
+  for (View& v : other.views)
+    for (Index p = 0; p < kSize * kSize; ++p)
+      if (p % kSize < kSize / 3) std::fill_n(&v.rgba[4 * p], 4, 1.f);
+  for (View& v : whole.views) v.valid.clear();
+  for (const bool carve : {true, false}) {
+    const auto learnt = [&](const Dataset& from) {
+      RadianceField field(field_options(1));
+      TrainOptions options = train_options(12, 100);
+      options.carve = carve;
+      Trainer trainer(field, from, options);
+      while (!trainer.done()) trainer.step(0);
+      return numbers(field);
+    };
+    const auto masked = learnt(data);
+    CHECK(learnt(other) == masked);
+    CHECK(learnt(whole) != masked);
+  }
+  for (View& v : data.views) std::ranges::fill(v.valid, 0);
+  RadianceField field(field_options(1));
+  CHECK_THROWS_WITH(Trainer(field, data, train_options(1, 0)),
+                    "[trainer] data must have a valid pixel, got none: masks exclude all");
+}
+
+TEST_CASE("trainer_rays: a checkpoint knows the masks that it was trained with") {
+  Dataset data = blurred_scene();
+  const TemporaryFolder folder;
+  {
+    RadianceField field(field_options(1));
+    Trainer trainer(field, data, train_options(4, 0));
+    trainer.save(folder / "checkpoint");
+  }
+  data.views[2].valid.assign(kSize * kSize, 1);
+  data.views[2].valid[5] = 0;
+  RadianceField field(field_options(1));
+  Trainer trainer(field, data, train_options(4, 0));
+  CHECK_THROWS_WITH(trainer.restore(folder / "checkpoint"), Contains("mask 2"));
+}
+
 TEST_CASE("trainer_rays: errors name option and value") {
   const Dataset data = blurred_scene();
   RadianceField field(field_options(2));

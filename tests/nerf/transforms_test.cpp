@@ -72,16 +72,72 @@ TEST_CASE("transforms: errors of content name place, expectation and find") {
 TEST_CASE("transforms: errors of matrices name row and column") {
   const std::string at = "frames[1].transform_matrix";
   const std::string last = ", [0, 0, 1, 4], [0, 0, 0, 1]";
-  expect_error(with(last, ", [0, 0, 0, 1]"), at + ": expected 4x4 numbers, got 3 rows");
+  expect_error(with("[0.6, -0.8, 0, 1], [0.8, 0.6, 0, 2]" + last, "[0, 0, 0, 1]"),
+               at + ": expected 4x4 or 3x4 numbers, got 1 rows");
+  expect_error(with(last, ", [0, 0, 0, 1]"),
+               at + ": expected a rotation");  // 3x4, the last row for the third
   expect_error(with(last, ", [0, 0, 1], [0, 0, 0, 1]"), at + "[2]: expected 4 numbers, got 3");
   expect_error(with(last, ", 5, [0, 0, 0, 1]"), at + "[2]: expected an array, got number");
   expect_error(with(last, ", [0, null, 1, 4], [0, 0, 0, 1]"), at + "[2][1]: expected a number, got null");
   expect_error(
       with(last, ", [0, 0, 1.01, 4], [0, 0, 0, 1]"),
       at + ": expected a rotation in the upper left 3x3, got columns that are off orthonormal by 0.0201");
-  expect_error(with(last, ", [0, 0, -1, 4], [0, 0, 0, 1]"), at + ": expected a rotation");  // a mirror
-  expect_error(with(last, ", [0, 0, 1, 4], [0, 0, 0, 2]"),
-               at + "[3]: expected the row 0 0 0 1, got 2 in column 3");
+  expect_error(
+      with(last, ", [0, 0, -1, 4], [0, 0, 0, 1]"),
+      at + ": expected a rotation in the upper left 3x3, got a mirror, determinant -1, as in 1 of 2 frames");
+  expect_error(
+      with(last, ", [0, 0, 2, 4], [0, 0, 0, 1]"),
+      at + ": expected a rotation in the upper left 3x3, got columns that are off orthonormal by 3: they "
+           "are of lengths 1, 1 and 2, with a determinant of 2");
+  expect_error(with(last, ", [0, 0, 1, 4], [0, 0.5, 0, 1]"),
+               at + "[3]: expected the row 0 0 0 1, got 0.5 in column 1");
+  expect_error(with(last, ", [0, 0, 1, 4], [0, 0, 0, 0]"),
+               at + "[3]: expected the row 0 0 0 1, got 0 in column 3");
+}
+
+TEST_CASE("transforms: scaled, homogeneous, mirrored and 3x4 matrices are the poses that they mean") {
+  const Transforms plain = parse_transforms(kGood, "t.json");
+  const std::string second = "[[0.6, -0.8, 0, 1], [0.8, 0.6, 0, 2], [0, 0, 1, 4], [0, 0, 0, 1]]";
+  const auto expect = [&](const std::string& by, const std::string& note) {
+    const Transforms t = parse_transforms(with(second, by), "t.json");
+    for (std::size_t k = 0; k < 12; ++k)
+      CHECK(std::abs(t.frames[1].pose[k] - plain.frames[1].pose[k]) < 1e-15);
+    CHECK(t.frames[0].pose == plain.frames[0].pose);
+    CHECK(t.notes == (note.empty() ? std::vector<std::string>{} : std::vector<std::string>{note}));
+  };
+  expect("[[0.6, -0.8, 0, 1], [0.8, 0.6, 0, 2], [0, 0, 1, 4]]", "");
+  expect("[[1.2, -1.6, 0, 1], [1.6, 1.2, 0, 2], [0, 0, 2, 4], [0, 0, 0, 1]]",
+         "1 of 2 poses have a scale, the first 2, which is taken out of their rotations");
+  expect("[[-1.2, 1.6, 0, -2], [-1.6, -1.2, 0, -4], [0, 0, -2, -8], [0, 0, 0, -2]]",
+         "1 of 2 poses are divided by the last number of their fourth row");
+  // A mirrored world: the rays of both frames are mirrored, and nothing else.
+  std::string both = with(second, "[[-0.6, 0.8, 0, -1], [0.8, 0.6, 0, 2], [0, 0, 1, 4], [0, 0, 0, 1]]");
+  both.replace(both.find("[[1, 0, 0, 0.5]"), 15, "[[-1, 0, 0, -0.5]");
+  const Transforms mirrored = parse_transforms(both, "t.json");
+  for (std::size_t f = 0; f < 2; ++f) CHECK(mirrored.frames[f].pose == plain.frames[f].pose);
+  CHECK(mirrored.notes ==
+        std::vector<std::string>{"all poses are those of a mirrored world, which is mirrored back along x"});
+}
+
+TEST_CASE("transforms: what is not used is told of, once") {
+  const auto notes = [](const std::string& keys, const std::string& of_frame = "") {
+    std::string text = with("\"camera_angle_x\": 0.7,", "\"camera_angle_x\": 0.7, " + keys);
+    text.replace(text.find("\"file_path\": \"b.png\","), 21, "\"file_path\": \"b.png\"," + of_frame);
+    return parse_transforms(text, "t.json").notes;
+  };
+  using Notes = std::vector<std::string>;
+  CHECK(notes("\"aabb_scale\": 4,", "\"sharpness\": 3,").empty());
+  CHECK(notes("\"wobble\": 4, \"k7\": 1,", "\"wobble\": 4, \"exposure\": 1,") ==
+        Notes{"keys that are not known and not used: exposure, k7, wobble"});
+  CHECK(notes("", "\"time\": 0.5,") ==
+        Notes{"frames have a time, which is not used: a scene that moves is taken as still"});
+  CHECK(notes("\"rolling_shutter\": [0, 0, 0, 0],").empty());
+  CHECK(notes("\"rolling_shutter\": [0, 0.1, 0, 0],") ==
+        Notes{"rolling_shutter is not known and not used: each image is taken as one moment"});
+  const Notes share = notes("\"cx\": 0.5, \"cy\": 0.48, \"w\": 800, \"h\": 600,");
+  REQUIRE(share.size() == 1);
+  CHECK_THAT(share[0], Contains("cx 0.5 and cy 0.48 of ./train/r_0 are taken as pixels") &&
+                           Contains("if they are shares of width and height, multiply them by these"));
 }
 
 TEST_CASE("transforms: intrinsics of the file, each replaced where a frame has its own") {
@@ -110,16 +166,34 @@ TEST_CASE("transforms: intrinsics of the file, each replaced where a frame has i
   CHECK((angle.frames[1].intrinsics.angle_x == 0.6 && angle.frames[1].intrinsics.fl_x == 0));
 }
 
+TEST_CASE("transforms: models of lenses, by name in any case, by is_fisheye and by k5 and k6") {
+  const auto lens = [](const std::string& keys, const std::string& of_frame = "") {
+    std::string text = with("\"camera_angle_x\": 0.7,", "\"camera_angle_x\": 0.7, " + keys);
+    text.replace(text.find("\"file_path\": \"b.png\","), 21, "\"file_path\": \"b.png\"," + of_frame);
+    return parse_transforms(text, "t.json").frames[1].intrinsics.lens;
+  };
+  CHECK(lens("\"camera_model\": \"opencv\", \"k3\": 0.1, \"k4\": 0.2,") == Lens{.k3 = 0.1, .k4 = 0.2});
+  CHECK(lens("\"k1\": 0.5, \"k6\": 0.1,") == Lens{.k1 = 0.5, .k6 = 0.1, .model = LensModel::rational});
+  CHECK(lens("\"camera_model\": \"FULL_OPENCV\", \"k4\": 0.1,") ==
+        Lens{.k4 = 0.1, .model = LensModel::rational});
+  CHECK(lens("\"camera_model\": \"OPENCV_FISHEYE\",", "\"k1\": 0.1,") ==
+        Lens{.k1 = 0.1, .model = LensModel::fisheye});
+  CHECK(lens("\"is_fisheye\": true, \"k4\": 0.1,") == Lens{.k4 = 0.1, .model = LensModel::fisheye});
+  for (const char* no : {"0", "false", "null", "0.0"})
+    CHECK(lens("\"is_fisheye\": " + std::string(no) + ",").is_pinhole());
+}
+
 TEST_CASE("transforms: lenses and sizes that are not known are refused by name") {
   const auto expect = [](const std::string& keys, const std::string& message) {
     expect_error(with("\"camera_angle_x\": 0.7,", "\"camera_angle_x\": 0.7, " + keys + ","), message);
   };
-  expect("\"k3\": 0.01", "k3: expected 0 (of radial distortion, k1 and k2 only are known here), got 0.01");
-  expect("\"k4\": -1", "k4: expected 0");
-  expect("\"is_fisheye\": true", "is_fisheye: expected false (fisheye lenses are not known here)");
-  expect("\"camera_model\": \"OPENCV_FISHEYE\"",
-         "camera_model: expected OPENCV, PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL or RADIAL, got "
-         "\"OPENCV_FISHEYE\"");
+  expect("\"is_fisheye\": true, \"p1\": 0.1",
+         "frames[0]: expected a fisheye of k1 to k4, got p1, p2, k5 or k6");
+  expect("\"camera_model\": \"EQUIRECTANGULAR\"",
+         "camera_model: expected one of OPENCV, PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL, PERSPECTIVE, "
+         "FULL_OPENCV, OPENCV_FISHEYE, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE, got \"EQUIRECTANGULAR\"; "
+         "undistort");
+  expect("\"ftheta_p0\": 0.1", "ftheta_p0: expected a lens of k1 to k6, p1 and p2");
   expect("\"fl_x\": 0", "fl_x: expected a number in (0.001, 1e9) pixels, got 0");
   expect("\"cx\": \"left\"", "cx: expected a number, got string");
   expect("\"w\": 0, \"h\": 8", "w: expected a number in 1 to 65536, got 0");

@@ -35,6 +35,18 @@ TEST_CASE("train writes a field, its figures, and the same bytes for one and two
   CHECK(read_bytes(folder / "a.fm") == read_bytes(folder / "b.fm"));
 }
 
+TEST_CASE("train tells that there are no test images, and writes the field", "[train]") {
+  const TemporaryFolder folder;
+  const std::string scene = tiny_scene(folder);
+  std::filesystem::remove_all(std::filesystem::path(scene) / "test");  // the JSON stays, as of BlenderNeRF
+  const auto r = run_command(
+      {"train", "--data", scene, "--out", folder / "f.fm", "--steps", "1", "--json", folder / "f.json"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  CHECK_THAT(r.out + r.err, Contains("has no test images, so no PSNR is measured on them"));
+  CHECK(nlohmann::json::parse(read_text(folder / "f.json"))["test_psnr"].is_null());
+}
+
 TEST_CASE("train --supersampling makes a field that is rendered so", "[train]") {
   const TemporaryFolder folder;
   const std::string scene = tiny_scene(folder), out = folder / "f.fm";

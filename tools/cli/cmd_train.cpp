@@ -99,7 +99,10 @@ nerf::PsnrTarget psnr_target(const TrainArguments& options, const nerf::Radiance
 
 // PSNR on the data set's test views, measured after everything is saved; null where there are none.
 Json test_psnr(const TrainArguments& options, const nerf::RadianceField& field, Context& context) {
-  if (!nerf::has_split(options.data, "test")) return nullptr;
+  if (!nerf::has_split(options.data, "test")) {
+    context.note(options.data + " has no test images, so no PSNR is measured on them");
+    return nullptr;
+  }
   const auto data = load_scene(
       options.data, {.split = "test", .size = options.size, .background = background_of(options.background)},
       context);

@@ -2,6 +2,7 @@
 #include <fieldmark/engine/tensor.h>
 #include <fieldmark/nerf/camera.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -33,6 +34,9 @@ struct View {
   Tensor<float> rgba;                 ///< [height, width, 4] in [0, 1], straight (not premultiplied) alpha
   std::string name;                   ///< of the file, without folder and extension: "r_12"
   std::optional<DepthRange> depth{};  ///< of layout llff
+  /// [height * width] 0 where a mask excludes the pixel or there is none, to be neither learnt nor counted,
+  /// else 1; empty: all are valid
+  std::vector<std::uint8_t> valid{};
 };
 
 /// One split of a data set in memory.
@@ -60,14 +64,18 @@ struct DatasetOptions {
 /// Reads one split of a data set. The layout is the first whose file the folder has: transforms_train.json
 /// (or _val, _test), transforms.json, poses_bounds.npy, cameras.bin or cameras.txt (in sparse/0, sparse or
 /// the folder itself). All layouts but blender hold out every 8th image (0, 8, 16, ... of the sorted names)
-/// as val and test, and have the others in train. Images without alpha are opaque.
+/// as val and test, and have the others in train. Images without alpha are opaque. Images are also found
+/// under names with backslashes, in another case or with another extension.
 ///
-/// transforms: see parse_transforms(). Frames without an image are left out, with a note. Distorted images
-/// become those of a pinhole (undistorted_image()), cut to the part that every lens of the file covers. llff:
-/// see parse_poses_bounds(); recentre_llff() recentres and rescales the poses. Images are those of the folder
-/// images or images_N whose longer side is the smallest that reaches `size` (else the largest). colmap: see
-/// parse_colmap_cameras(). World axes are COLMAP's. Images as for llff, lenses and missing images as for
-/// transforms.
+/// Masks: the file that a frame's mask_path names, where black excludes, or dynamic_mask_NAME.png beside the
+/// image NAME, where black keeps; see View::valid.
+/// transforms: see parse_transforms(). Where train_filenames, val_filenames or test_filenames list frames,
+/// these are the splits: val and test stand in for one another, and train has what they leave. Frames without
+/// an image are left out, with a note. Distorted images become those of a pinhole (undistorted_image()), cut
+/// to the part that every lens of the file covers. llff: see parse_poses_bounds(); recentre_llff() recentres
+/// and rescales the poses. Images are those of the folder images or images_N whose longer side is the
+/// smallest that reaches `size` (else the largest). colmap: see parse_colmap_cameras(). World axes are
+/// COLMAP's. Images as for llff, lenses and missing images as for transforms.
 /// @throws ValueError  if an option is outside its range
 /// @throws IoError     naming file and place: folder, JSON or an image missing, unreadable or malformed, no
 ///                     views, images of differing sizes, a distortion that has no inverse, none of the
@@ -76,8 +84,9 @@ Dataset load_dataset(const std::filesystem::path& folder, const DatasetOptions& 
 
 /// The layout that load_dataset() finds. @throws IoError if there is no folder or none of the layouts' files
 Layout find_layout(const std::filesystem::path& folder);
-/// Whether the data set has this split: the layout blender has a file for each, the others hold out views.
-/// @throws IoError as find_layout()
+/// Whether the data set has an image of this split. The layouts llff and colmap hold out views and always do.
+/// @throws ValueError unless split is train, val or test   @throws IoError as find_layout(), or where a JSON
+/// is malformed
 bool has_split(const std::filesystem::path& folder, std::string_view split);
 
 /// A view in front of a background: rgb * alpha + background * (1 - alpha), [height, width, 3].

@@ -28,7 +28,8 @@ struct Evaluation {
 
 /// Renders every view of a data set and compares it with the ground truth over the data set's background. The
 /// foreground is the pixels whose alpha exceeds 0.5 in the ground truth; in the render where the ground truth
-/// is opaque.
+/// is opaque. Pixels that are not valid (View::valid) count in no PSNR; SSIM and LPIPS, which need whole
+/// images, see black there in both.
 /// @param progress  called after each view; false ends the evaluation with the views so far. May be empty
 /// @param lpips     the network of ViewScore::lpips, or null
 /// @throws ValueError if there are no views

@@ -61,8 +61,8 @@ RadianceFieldOptions field_options(const ScheduleOptions& length);
 RadianceFieldOptions checkpointed_field(const std::filesystem::path& path);
 
 /// Trains a radiance field (Mildenhall et al. 2020, sec. 5; Mueller et al. 2022): random rays of all training
-/// images (with alpha: of the silhouettes and a margin), random backgrounds behind alpha, Adam, occupancy
-/// refreshed as densities form.
+/// images' valid pixels (with alpha: of the silhouettes and a margin), random backgrounds behind alpha, Adam,
+/// occupancy refreshed as densities form.
 ///
 /// A step is a parallel loop over chunks of 64 rays (ShardedLoop). The gradient at the encoding's output is
 /// kept for the whole batch, and one pass over the levels, each owned by one thread, adds it to the table. An
@@ -95,6 +95,7 @@ class Trainer final : public TrainingRun {
   std::optional<SafetensorsFile> converted(const SafetensorsFile& file) const override;
   void lay_out_space();
   void carve();
+  void choose_pixels();
   Index all_pixels() const;
   Index tile_of(Index place) const;
   void prefer_hard(Index first, Index count, std::span<Index> place) const;
@@ -119,6 +120,7 @@ class Trainer final : public TrainingRun {
   PackedWeights<float> packed_;
   ShardedLoop<float> loop_;
   std::vector<std::uint32_t> pixels_;  // worth a ray; empty: all are
+  Index valid_pixels_ = 0;             // of all training images
   std::vector<float> tile_errors_;  // last mean squares of the tiles of all training images, see hard_pixels
   std::vector<Shard> shards_;
   std::string start_;  // SHA-256 of a field that is kept

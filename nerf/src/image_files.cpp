@@ -1,0 +1,137 @@
+#include "image_files.h"
+
+#include <fieldmark/imaging/image.h>
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <regex>
+
+namespace fieldmark::nerf {
+namespace {
+namespace fs = std::filesystem;
+
+// ASCII alone: the names that differ by case come from extensions and cameras.
+std::string lower_case(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
+bool is_image_name(const fs::path& file) {
+  const std::string extension = lower_case(file.extension().string());
+  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+}
+
+bool is_folder(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_directory(path, ignored);
+}
+
+// The file of this very name, or with an extension behind it.
+fs::path spelled_so(const fs::path& named) {
+  for (const char* extension : {"", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"}) {
+    fs::path file = named.string() + extension;
+    std::error_code ignored;
+    if (fs::is_regular_file(file, ignored)) return file;
+  }
+  return {};
+}
+
+// The folder, or one whose name differs by case; empty: none.
+fs::path folder_alike(const fs::path& folder) {
+  if (folder.empty()) return ".";
+  if (is_folder(folder)) return folder;
+  if (!folder.has_filename() || folder.parent_path() == folder) return {};
+  const fs::path parent = folder_alike(folder.parent_path());
+  if (parent.empty()) return {};
+  const std::string wanted = lower_case(folder.filename().string());
+  std::vector<fs::path> found;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(parent, ignored))
+    if (lower_case(entry.path().filename().string()) == wanted && is_folder(entry.path()))
+      found.push_back(entry.path());
+  return found.empty() ? fs::path{} : *std::min_element(found.begin(), found.end());
+}
+}  // namespace
+
+fs::path with_slashes(const fs::path& path) {
+  std::string text = path.string();
+  std::replace(text.begin(), text.end(), '\\', '/');
+  return fs::path(text).lexically_normal();
+}
+
+std::vector<fs::path> images_in(const fs::path& folder) {
+  std::vector<fs::path> found;
+  if (!is_folder(folder)) return found;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (is_image_name(name) && !name.starts_with('.') && !name.starts_with("dynamic_mask_"))
+      found.push_back(entry.path());
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+fs::path image_folder(const fs::path& folder, Index size) {
+  if (!is_folder(folder)) return {};
+  static const std::regex name("images(_[0-9]{0,8}[1-9][0-9]{0,8})?");
+  std::vector<fs::path> folders;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.is_directory() && std::regex_match(entry.path().filename().string(), name))
+      folders.push_back(entry.path());
+  std::sort(folders.begin(), folders.end());
+  fs::path best;
+  Index best_side = 0;
+  const Index wanted = size > 0 ? size : std::numeric_limits<Index>::max();
+  for (const auto& f : folders) {
+    const auto images = images_in(f);
+    if (images.empty()) continue;
+    const Tensor<float> first = read_image(images.front());
+    const Index side = std::max(first.shape[0], first.shape[1]);
+    const bool better = best_side < wanted ? side > best_side : side >= wanted && side < best_side;
+    if (better) best = f, best_side = side;
+  }
+  if (best.empty() && !images_in(folder / "input").empty()) best = folder / "input";
+  return best;
+}
+
+const ImageFinder::Listing& ImageFinder::listing(const fs::path& folder) {
+  const auto [place, is_new] = listings_.try_emplace(folder);
+  if (!is_new) return place->second;
+  const fs::path real = folder_alike(folder);
+  if (real.empty()) return place->second;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(real, ignored))
+    if (is_image_name(entry.path()) && entry.is_regular_file(ignored))
+      place->second.emplace(lower_case(entry.path().stem().string()), entry.path());
+  return place->second;
+}
+
+// Among the files alike, the one of the same name but for case comes before one of the same stem, and names
+// of equal rank are ordered: the choice does not depend on the folder's order.
+fs::path ImageFinder::alike(const fs::path& named) {
+  const Listing& files = listing(named.parent_path());
+  const std::string name = named.filename().string(), stem = named.stem().string();
+  std::optional<std::pair<int, fs::path>> best;
+  const auto consider = [&](const std::string& of_stem) {
+    const auto [begin, end] = files.equal_range(lower_case(of_stem));
+    for (auto file = begin; file != end; ++file) {
+      const bool same_name = lower_case(file->second.filename().string()) == lower_case(name);
+      const int rank = same_name ? 0 : file->second.stem().string() == of_stem ? 1 : 2;
+      if (std::pair found{rank, file->second}; !best || found < *best) best = found;
+    }
+  };
+  consider(name);
+  if (is_image_name(named)) consider(stem);
+  return best ? best->second : fs::path{};
+}
+
+fs::path ImageFinder::find(const fs::path& named) {
+  if (fs::path file = spelled_so(named); !file.empty()) return file;
+  const fs::path slashed = with_slashes(named);
+  if (fs::path file = spelled_so(slashed); !file.empty()) return file;
+  return alike(slashed);
+}
+
+}  // namespace fieldmark::nerf
