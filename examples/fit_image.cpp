@@ -37,13 +37,13 @@ int main(int argc, char** argv) {
     place[2 * p + 1] = static_cast<float>(p / width) / static_cast<float>(height);
   }
 
-  // Layers register their parameters in a store; the optimiser sees one flat array.
+  // Layers register their parameters in a store; the optimiser moves those that are trained.
   constexpr int kBands = 5;
   ParamStore<float> store;
   const Dense<float> first(store, "first", {.in = 4 * kBands, .out = 48, .activation = Activation::relu}, 1);
   const Dense<float> second(store, "second", {.in = 48, .out = 48, .activation = Activation::relu}, 2);
   const Dense<float> last(store, "last", {.in = 48, .out = channels}, 3);
-  Adam<float> adam(store.size(), {.lr = 1, .zero_grads = true});
+  Adam<float> adam(store, {.lr = 1, .zero_grads = true});
   const Schedule schedule({.steps = 400, .lr = 5e-3, .half_after = 1e9, .cooldown = 0.9, .last = 0.1});
   const Params<float> params(store);
 

@@ -2,6 +2,7 @@
 #include <fieldmark/engine/adam.h>
 #include <fieldmark/engine/parallel.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -50,6 +51,12 @@ Adam<T>::Adam(Index n, AdamOptions o) : options_(o) {
 }
 
 template <class T>
+Adam<T>::Adam(const ParamStore<T>& store, AdamOptions o) : Adam(store.size(), o) {
+  for (const auto& e : store.entries())
+    if (e.role == ParamRole::running) running_.emplace_back(e.offset, e.offset + e.shape.size());
+}
+
+template <class T>
 void Adam<T>::step(std::span<T> values, std::span<T> grads, double lr_factor) {
   const AdamRange all{.begin = 0,
                       .end = static_cast<Index>(mean_.size()),
@@ -86,6 +93,19 @@ void Adam<T>::extend_step(std::span<T> values, std::span<T> grads, const AdamRan
 
 template <class T>
 void Adam<T>::update(std::span<T> values, std::span<T> grads, const AdamRange& r) {
+  AdamRange part = r;
+  for (const auto& [begin, end] : running_) {
+    if (end <= part.begin || begin >= r.end) continue;
+    part.end = std::max(begin, part.begin);
+    update_trained(values, grads, part);
+    part.begin = std::min(end, r.end);
+  }
+  part.end = r.end;
+  update_trained(values, grads, part);
+}
+
+template <class T>
+void Adam<T>::update_trained(std::span<T> values, std::span<T> grads, const AdamRange& r) {
   const double t = static_cast<double>(steps_), lr = options_.lr * r.lr_factor;
   const kernels::AdamScalars<T> scalars{
       .beta1 = static_cast<T>(options_.beta1),

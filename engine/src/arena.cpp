@@ -1,13 +1,30 @@
 #include <fieldmark/engine/aligned.h>
 #include <fieldmark/engine/arena.h>
 
+#include <sanitizer/asan_interface.h>
+
 #include <algorithm>
+#include <cstring>
+#include <limits>
+#include <new>
 
 namespace fieldmark {
 namespace {
+
+#if defined(__SANITIZE_ADDRESS__)
+constexpr std::size_t kGap = Arena::kAlign;  // after each allocation, poisoned
+#else
+constexpr std::size_t kGap = 0;
+#endif
+
+constexpr int kSpoilt = 0xff;
+
+// More than half of the address space is a negative size that was converted.
 std::size_t round_up(std::size_t bytes, std::size_t to) {
+  if (bytes > std::numeric_limits<std::size_t>::max() / 2) throw std::bad_alloc();
   return (std::max<std::size_t>(bytes, 1) + to - 1) / to * to;
 }
+
 }  // namespace
 
 void Arena::Free::operator()(std::byte* p) const { free_aligned(p); }
@@ -17,22 +34,42 @@ void Arena::grow(std::size_t bytes) {
   const std::size_t size = round_up(wanted, kAlign);
   blocks_.push_back(
       {std::unique_ptr<std::byte[], Free>(static_cast<std::byte*>(allocate_aligned(size))), size});
+  if (spoils_) std::memset(blocks_.back().data.get(), kSpoilt, size);
+  ASAN_POISON_MEMORY_REGION(blocks_.back().data.get(), size);
   ++grown_;
 }
 
 void* Arena::allocate(std::size_t bytes) {
-  bytes = round_up(bytes, kAlign);
-  while (block_ < blocks_.size() && used_ + bytes > blocks_[block_].size) {
+  const std::size_t taken = round_up(bytes, kAlign) + kGap;
+  while (block_ < blocks_.size() && used_ + taken > blocks_[block_].size) {
     ++block_;
     used_ = 0;
   }
   if (block_ == blocks_.size()) {
-    grow(bytes);
+    grow(taken);
     used_ = 0;
   }
   void* p = blocks_[block_].data.get() + used_;
-  used_ += bytes;
+  used_ += taken;
+  ASAN_UNPOISON_MEMORY_REGION(p, bytes);
   return p;
+}
+
+void Arena::reset() noexcept {
+  for (const auto& b : blocks_) ASAN_POISON_MEMORY_REGION(b.data.get(), b.size);
+  block_ = 0;
+  used_ = 0;
+}
+
+void Arena::spoil() noexcept {
+  spoils_ = true;
+  for (std::size_t k = block_; k < blocks_.size(); ++k) {
+    const std::size_t from = k == block_ ? used_ : 0;
+    std::byte* begin = blocks_[k].data.get() + from;
+    ASAN_UNPOISON_MEMORY_REGION(begin, blocks_[k].size - from);
+    std::memset(begin, kSpoilt, blocks_[k].size - from);
+    ASAN_POISON_MEMORY_REGION(begin, blocks_[k].size - from);
+  }
 }
 
 std::size_t Arena::reserved() const {

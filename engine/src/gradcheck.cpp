@@ -1,118 +1,198 @@
 #include <fieldmark/engine/gradcheck.h>
+#include <fieldmark/engine/random.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <limits>
-#include <random>
 
 namespace fieldmark {
 namespace {
 
 constexpr double kHeld = 0.5;  // what the gradient buffers hold before: a backward must add, never assign
 
-std::vector<double> run_plain(const GradcheckFn& f, std::span<const Tensor<double>> inputs) {
-  Tape<double> tape;
-  std::vector<Var<double>> vars;
-  for (const auto& t : inputs) vars.push_back(tape.constant(t));
-  const Var<double> y = f(tape, vars);
-  return {y.value(), y.value() + y.shape().size()};
+// How an input reaches the function. Its own leaf's buffer holds kHeld, so that a backward that assigns is
+// noticed. As the output of an op before, as in a network, its buffer is made by the tape and holds NaN until
+// somebody fills it.
+enum class Way { constant, leaf, intermediate };
+
+// Gradients of every input on one way, and what to call it in a report.
+struct Pass {
+  std::vector<Way> ways;
+  int backwards = 1;  // on one tape
+  std::string name;
+};
+
+std::string list_of(const std::vector<Way>& ways) {
+  std::string list;
+  for (std::size_t k = 0; k < ways.size(); ++k)
+    if (ways[k] != Way::constant) list += (list.empty() ? "" : ", ") + std::to_string(k);
+  return list;
 }
 
-double dot(const std::vector<double>& a, const std::vector<double>& b) {
+// All inputs as leaves, once and twice, and as intermediates; then every subset of them, of more than kMost
+// inputs each alone and all but each.
+std::vector<Pass> passes(std::size_t inputs) {
+  constexpr std::size_t kMost = 6;
+  std::vector<Pass> all{{std::vector<Way>(inputs, Way::leaf), 1, ""},
+                        {std::vector<Way>(inputs, Way::leaf), 2, "backward() twice on one tape"},
+                        {std::vector<Way>(inputs, Way::intermediate), 2, "inputs that are outputs of an op"}};
+  const auto add = [&](std::vector<Way> ways) {
+    all.push_back({ways, 1, "gradients for these inputs only: " + list_of(ways)});
+  };
+  if (inputs < 2) return all;
+  if (inputs > kMost) {
+    for (std::size_t k = 0; k < inputs; ++k) {
+      std::vector<Way> alone(inputs, Way::constant), others(inputs, Way::intermediate);
+      std::swap(alone[k], others[k]);
+      add(alone);
+      add(others);
+    }
+    return all;
+  }
+  for (std::size_t set = 1; set + 1 < std::size_t{1} << inputs; ++set) {
+    std::vector<Way> ways(inputs, Way::constant);
+    for (std::size_t k = 0; k < inputs; ++k)
+      if (set >> k & 1) ways[k] = Way::intermediate;
+    add(ways);
+  }
+  return all;
+}
+
+double dot(const std::vector<double>& a, const double* b) {
   double s = 0;
   for (std::size_t i = 0; i < a.size(); ++i) s += a[i] * b[i];
   return s;
 }
 
-struct Checker {
-  const GradcheckFn& f;
-  const GradcheckOptions& options;
-  std::vector<double> cotangent;
-  double rounding = 0;  // of the function's value, summed with the cotangent
-  GradcheckReport report;
-
-  void fail(const std::string& line) {
-    report.ok = false;
-    report.table += line + "\n";
+class Checker {
+ public:
+  Checker(const GradcheckFn& f, std::span<const Tensor<double>> inputs, const GradcheckOptions& options)
+      : f_(f), inputs_(inputs.begin(), inputs.end()), options_(options) {
+    const Var<double> y = run_plain();
+    plain_.assign(y.value(), y.value() + y.shape().size());
+    const CounterRng rng(options.seed);
+    for (std::size_t i = 0; i < plain_.size(); ++i) {
+      cotangent_.push_back(static_cast<double>(rng.normal2(i)[0]));
+      rounding_ += std::abs(cotangent_[i] * plain_[i]);
+    }
   }
 
-  std::vector<Tensor<double>> analytic(std::span<const Tensor<double>> inputs,
-                                       const std::vector<double>& plain) {
-    Tape<double> tape;
-    std::vector<Tensor<double>> grads;
-    for (const auto& t : inputs) grads.emplace_back(t.shape, kHeld);
-    std::vector<Var<double>> vars;
-    for (std::size_t k = 0; k < inputs.size(); ++k) vars.push_back(tape.leaf(inputs[k], grads[k]));
-    const Var<double> y = f(tape, vars);
-    if (y.shape().size() != static_cast<Index>(plain.size())) {
-      fail("the output has another size when gradients are recorded");
-      return grads;
+  GradcheckReport run() {
+    const auto numeric = all_numeric();
+    bool first = true;
+    for (const Pass& pass : passes(inputs_.size())) {
+      const auto grads = analytic(pass);
+      for (std::size_t k = 0; k < inputs_.size(); ++k) {
+        if (pass.ways[k] != Way::constant) compare(pass, k, grads[k].data, numeric[k]);
+        if (first) report_.entries += inputs_[k].size();
+      }
+      first = false;
+      if (!report_.ok) break;  // the same entries would fail again
     }
-    for (std::size_t i = 0; i < plain.size(); ++i)
-      if (!(y.value()[i] == plain[i]))
-        fail("value " + std::to_string(i) + " changes when gradients are recorded");
-    if (y.needs_grad()) tape.backward(y, cotangent);
+    return report_;
+  }
+
+ private:
+  void fail(const std::string& line) {
+    report_.ok = false;
+    report_.table += line + "\n";
+  }
+
+  Var<double> run_plain() {
+    tape_.reset();
+    std::vector<Var<double>> vars;
+    for (const auto& t : inputs_) vars.push_back(tape_.constant(t));
+    return f_(tape_, vars);
+  }
+
+  std::vector<Tensor<double>> analytic(const Pass& pass) {
+    tape_.reset();
+    tape_.arena().spoil();
+    std::vector<Tensor<double>> grads;
+    for (const auto& t : inputs_) grads.emplace_back(t.shape, kHeld);
+    std::vector<Var<double>> vars;
+    for (std::size_t k = 0; k < inputs_.size(); ++k) {
+      const Tensor<double>& t = inputs_[k];
+      vars.push_back(pass.ways[k] == Way::constant ? tape_.constant(t) : tape_.leaf(t, grads[k]));
+      if (pass.ways[k] == Way::intermediate) vars[k] = tape_.reshape(vars[k], t.shape);
+    }
+    const Var<double> y = f_(tape_, vars);
+    check_values(y);
+    if (report_.ok && y.needs_grad())
+      for (int i = 0; i < pass.backwards; ++i) tape_.backward(y, cotangent_);
+    for (auto& g : grads)
+      for (double& v : g.data) v = (v - kHeld) / pass.backwards;
     return grads;
   }
 
+  void check_values(const Var<double>& y) {
+    if (y.shape().size() != static_cast<Index>(plain_.size()))
+      return fail("the output has another size when gradients are recorded");
+    for (std::size_t i = 0; i < plain_.size(); ++i)
+      if (!(y.value()[i] == plain_[i]))
+        fail("value " + std::to_string(i) + " changes when gradients are recorded");
+  }
+
+  std::vector<std::vector<double>> all_numeric() {
+    const double step = relative_step();
+    std::vector<std::vector<double>> all;
+    for (auto& x : inputs_) {
+      all.emplace_back(x.data.size());
+      for (std::size_t i = 0; i < x.data.size(); ++i)
+        all.back()[i] = numeric(x.data[i], step * std::max(1.0, std::abs(x.data[i])));
+    }
+    return all;
+  }
+
+  double relative_step() const {
+    return std::pow(std::numeric_limits<double>::epsilon(), 1.0 / 7.0) * options_.step;
+  }
+
   // (45 (f(h) - f(-h)) - 9 (f(2h) - f(-2h)) + f(3h) - f(-3h)) / 60 h, exact for polynomials of degree 6.
-  double numeric(std::vector<Tensor<double>>& x, std::size_t k, std::size_t i, double h) const {
-    const double x0 = x[k].data[i];
+  double numeric(double& x, double h) {
+    const double x0 = x;
     const auto at = [&](double d) {
-      x[k].data[i] = x0 + d;
-      return dot(cotangent, run_plain(f, x));
+      x = x0 + d;
+      return dot(cotangent_, run_plain().value());
     };
     const double n =
         (45 * (at(h) - at(-h)) - 9 * (at(2 * h) - at(-2 * h)) + (at(3 * h) - at(-3 * h))) / (60 * h);
-    x[k].data[i] = x0;
+    x = x0;
     return n;
   }
 
-  void compare(const Tensor<double>& x, std::size_t k, const std::vector<double>& a,
-               const std::vector<double>& n, double step) {
+  void compare(const Pass& pass, std::size_t k, const std::vector<double>& a, const std::vector<double>& n) {
     double largest = std::numeric_limits<double>::min();
     for (std::size_t i = 0; i < a.size(); ++i) largest = std::max({largest, std::abs(a[i]), std::abs(n[i])});
     const double floor =
-        64 * std::numeric_limits<double>::epsilon() * (kHeld + rounding) / (step * options.rtol);
+        64 * std::numeric_limits<double>::epsilon() * (kHeld + rounding_) / (relative_step() * options_.rtol);
     for (std::size_t i = 0; i < a.size(); ++i) {
       const double scale = std::max({std::abs(a[i]), std::abs(n[i]), 1e-3 * largest, floor});
       const double err = std::abs(a[i] - n[i]) / scale;
-      report.worst = std::isnan(err) ? err : std::max(report.worst, err);
-      ++report.entries;
-      if (err <= options.rtol) continue;  // written so that NaN fails
+      report_.worst = std::isnan(err) ? err : std::max(report_.worst, err);
+      if (err <= options_.rtol) continue;  // written so that NaN fails
       char line[200];
       std::snprintf(line, sizeof line, "input %zu [%zu]  x=%.6g  analytic=%.10g  numeric=%.10g  err=%.2e", k,
-                    i, x.data[i], a[i], n[i], err);
-      fail(line);
+                    i, inputs_[k].data[i], a[i], n[i], err);
+      fail(line + (pass.name.empty() ? "" : "  (" + pass.name + ")"));
     }
   }
+
+  const GradcheckFn& f_;
+  std::vector<Tensor<double>> inputs_;
+  const GradcheckOptions& options_;
+  Tape<double> tape_;
+  std::vector<double> plain_, cotangent_;
+  double rounding_ = 0;  // of the function's value, summed with the cotangent
+  GradcheckReport report_;
 };
 
 }  // namespace
 
 GradcheckReport gradcheck(const GradcheckFn& f, std::span<const Tensor<double>> inputs,
                           const GradcheckOptions& options) {
-  std::mt19937_64 rng(options.seed);
-  std::normal_distribution<double> normal;
-  const std::vector<double> plain = run_plain(f, inputs);
-  Checker check{f, options, std::vector<double>(plain.size()), 0, {}};
-  for (std::size_t i = 0; i < plain.size(); ++i) {
-    check.cotangent[i] = normal(rng);
-    check.rounding += std::abs(check.cotangent[i] * plain[i]);
-  }
-  const auto grads = check.analytic(inputs, plain);
-
-  std::vector<Tensor<double>> x(inputs.begin(), inputs.end());
-  const double step = std::pow(std::numeric_limits<double>::epsilon(), 1.0 / 7.0) * options.step;
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    std::vector<double> a(x[k].data.size()), n(x[k].data.size());
-    for (std::size_t i = 0; i < x[k].data.size(); ++i) {
-      n[i] = check.numeric(x, k, i, step * std::max(1.0, std::abs(x[k].data[i])));
-      a[i] = grads[k].data[i] - kHeld;
-    }
-    check.compare(x[k], k, a, n, step);
-  }
-  return check.report;
+  return Checker(f, inputs, options).run();
 }
 
 GradcheckReport gradcheck_module(const ModuleGradcheckFn& f, const ParamStore<double>& store,
@@ -120,9 +200,7 @@ GradcheckReport gradcheck_module(const ModuleGradcheckFn& f, const ParamStore<do
   std::vector<Tensor<double>> all(inputs.begin(), inputs.end());
   all.emplace_back(Shape{store.size()}, std::vector<double>(store.values().begin(), store.values().end()));
   const GradcheckFn with_params = [&](Tape<double>& tape, std::span<const Var<double>> v) {
-    const Var<double>& p = v.back();
-    return f(tape, Params<double>(store, p.value(), p.needs_grad() ? p.grad_acc() : nullptr),
-             v.first(v.size() - 1));
+    return f(tape, Params<double>(store, v.back()), v.first(v.size() - 1));
   };
   return gradcheck(with_params, all, options);
 }

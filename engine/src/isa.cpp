@@ -58,6 +58,9 @@ void force_isa(Isa level) {
   current = static_cast<int>(level);
 }
 
+ScopedIsa::ScopedIsa(Isa level) : before_(isa()) { force_isa(level); }
+ScopedIsa::~ScopedIsa() { current = static_cast<int>(before_); }
+
 Bf16Units bf16_units() {
   static const Bf16Units best = [] {
     unsigned a = 0, b = 0, c = 0, d = 0;

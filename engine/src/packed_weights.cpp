@@ -1,5 +1,7 @@
 #include <fieldmark/engine/packed_weights.h>
 
+#include <cstring>
+
 #include "kernels/gemm_bf16.h"
 #include "ops/product.h"
 
@@ -22,7 +24,11 @@ bool is_table(const Entry& e) {
 
 template <class T>
 PackedWeights<T>::PackedWeights(const ParamStore<T>& store, const PackOptions& options)
-    : store_(&store), options_(options), matrices_(store.entries().size()), tables_(matrices_.size()) {
+    : store_(&store),
+      options_(options),
+      matrices_(store.entries().size()),
+      tables_(matrices_.size()),
+      witnesses_(matrices_.size()) {
   if (options.precision == Precision::fp32) return;
   if (std::is_same_v<T, double>)
     throw ValueError("[packed_weights] precision: bf16 stands in for float, not for double");
@@ -34,6 +40,10 @@ PackedWeights<T>::PackedWeights(const ParamStore<T>& store, const PackOptions& o
 
 template <class T>
 void PackedWeights<T>::update() {
+  if (matrices_.size() != store_->entries().size())
+    throw ValueError("[packed_weights] the store has " + std::to_string(store_->entries().size()) +
+                     " parameters, it had " + std::to_string(matrices_.size()) +
+                     " when its weights were first packed: make PackedWeights after the last add()");
   const bool bf16 = options_.precision == Precision::bf16;
   Index size = 0, rounded = 0;
   for (const auto& e : store_->entries()) {
@@ -60,6 +70,56 @@ void PackedWeights<T>::update() {
   }
   if constexpr (std::is_same_v<T, float>)
     if (bf16) update_rounded();
+  for (std::size_t i = 0; i < matrices_.size(); ++i)
+    if (matrices_[i].forward || tables_[i]) witnesses_[i] = witnesses(i);
+  isa_ = isa();
+}
+
+template <class T>
+const PackedMatrix<T>* PackedWeights<T>::find(ParamId id) const {
+  const std::size_t i = place(id);
+  if (!matrices_[i].forward) return nullptr;
+  check_current(i);
+  return &matrices_[i];
+}
+
+template <class T>
+const std::uint16_t* PackedWeights<T>::table(ParamId id) const {
+  const std::size_t i = place(id);
+  if (tables_[i]) check_current(i);
+  return tables_[i];
+}
+
+template <class T>
+std::size_t PackedWeights<T>::place(ParamId id) const {
+  if (id.index < 0 || at(id.index) >= matrices_.size())
+    throw ValueError("[packed_weights] id must be one of the " + std::to_string(matrices_.size()) +
+                     " parameters that the store had when its weights were first packed, got " +
+                     std::to_string(id.index));
+  return at(id.index);
+}
+
+// Evenly over the parameter, the first and the last number among them.
+template <class T>
+typename PackedWeights<T>::Witnesses PackedWeights<T>::witnesses(std::size_t i) const {
+  const auto& e = store_->entries()[i];
+  const T* values = store_->values().data() + e.offset;
+  Witnesses seen{};
+  for (std::size_t k = 0; k < kWitnesses && e.shape.size() > 0; ++k)
+    seen[k] = values[static_cast<Index>(k) * (e.shape.size() - 1) / static_cast<Index>(kWitnesses - 1)];
+  return seen;
+}
+
+template <class T>
+void PackedWeights<T>::check_current(std::size_t i) const {
+  if (isa_ != isa())
+    throw ValueError(std::string("[packed_weights] weights were packed for another instruction set than ") +
+                     isa_name() + ": call update() after a change of it");
+  // By bits: a NaN is equal to itself.
+  const Witnesses now = witnesses(i);
+  if (std::memcmp(now.data(), witnesses_[i].data(), sizeof now) != 0)
+    throw ValueError("[packed_weights] '" + store_->entries()[i].name +
+                     "' has other values than when it was packed: call update() after every step");
 }
 
 template <class T>

@@ -2,11 +2,12 @@
 #include <fieldmark/engine/parallel.h>
 #include <omp.h>
 
+#include <atomic>
 #include <exception>
 
 namespace fieldmark {
 namespace {
-int thread_count = 0;  // 0: not chosen yet
+std::atomic<int> thread_count{0};  // 0: not chosen yet
 }
 
 void set_threads(int n) {
@@ -14,15 +15,22 @@ void set_threads(int n) {
   thread_count = n;
 }
 
-int threads() { return thread_count > 0 ? thread_count : omp_get_max_threads(); }
+int threads() {
+  const int n = thread_count.load(std::memory_order_relaxed);
+  return n > 0 ? n : omp_get_max_threads();
+}
+
+ScopedThreads::ScopedThreads(int n) : before_(thread_count) { set_threads(n); }
+ScopedThreads::~ScopedThreads() { thread_count = before_; }
 
 void detail::parallel_chunks(Index chunks, void* context, void (*run)(void*, Index chunk)) {
-  if (chunks == 1 || threads() == 1 || omp_in_parallel()) {
+  const int n = threads();
+  if (chunks == 1 || n == 1 || omp_in_parallel()) {
     for (Index c = 0; c < chunks; ++c) run(context, c);
     return;
   }
   std::exception_ptr error;
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads())
+#pragma omp parallel for schedule(dynamic, 1) num_threads(n)
   for (Index c = 0; c < chunks; ++c) {
     try {
       run(context, c);

@@ -12,13 +12,13 @@ std::span<T> slice_of(std::span<T> buffer, const Entry& e) {
 }  // namespace
 
 template <class T>
-ParamId ParamStore<T>::add(std::string_view name, Shape shape) {
+ParamId ParamStore<T>::add(std::string_view name, Shape shape, ParamRole role) {
   for (const Entry& e : entries_)
     if (e.name == name) throw ValueError("[params] name '" + e.name + "' is already used");
   // The same offsets for float and double, so that stores can be copied: 16 floats are a cache line.
   constexpr Index kLine = 16, kLarge = 4096;
   const Index offset = shape.size() >= kLarge ? (size() + kLine - 1) / kLine * kLine : size();
-  entries_.push_back({std::string(name), shape, offset});
+  entries_.push_back({std::string(name), shape, offset, role});
   values_.resize(static_cast<std::size_t>(offset + shape.size()));
   grads_.resize(values_.size());
   return {static_cast<int>(entries_.size()) - 1};
@@ -59,9 +59,19 @@ void ParamStore<T>::zero_grad() {
 }
 
 template <class T>
+Params<T>::Params(const ParamStore<T>& layout, Var<T> all) : Params(layout, nullptr) {
+  if (all.shape().size() != layout.size())
+    throw ShapeError("[params] all must have the " + std::to_string(layout.size()) +
+                     " elements of the store, got shape " + all.shape().str());
+  all_ = all;
+}
+
+template <class T>
 Var<T> Params<T>::leaf(Tape<T>& tape, ParamId id) const {
   const auto& e = layout_->entry(id);
-  return tape.matrix(values_ + e.offset, grads_ ? grads_ + e.offset : nullptr, e.shape,
+  const bool trained = e.role == ParamRole::trained;
+  if (all_ && trained) return tape.part(*all_, e.offset, e.shape);
+  return tape.matrix(values_ + e.offset, grads_ && trained ? grads_ + e.offset : nullptr, e.shape,
                      packed_ ? packed_->find(id) : nullptr);
 }
 

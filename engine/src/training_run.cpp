@@ -47,8 +47,7 @@ void TrainingRun::train(ParamStore<float>& params, const AdamOptions& adam, std:
                         std::string prefix, bool gradients) {
   if (ranges.empty())
     ranges = {{.end = params.size(), .skip_zero = adam.skip_zero, .weight_decay = adam.weight_decay}};
-  trained_.push_back(
-      {&params, Adam<float>(params.size(), adam), ranges, ranges, std::move(prefix), gradients});
+  trained_.push_back({&params, Adam<float>(params, adam), ranges, ranges, std::move(prefix), gradients});
 }
 
 void TrainingRun::update(std::size_t store) {

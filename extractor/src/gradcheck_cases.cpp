@@ -43,7 +43,7 @@ void keep_from_kinks(ParamStore<double>& store) {
   }
 }
 
-bool trained(const ParamStore<double>::Entry& e) { return e.name.find("/running_") == std::string::npos; }
+bool trained(const ParamStore<double>::Entry& e) { return e.role == ParamRole::trained; }
 
 // theta = theta_0 + t_k d on the k-th tensor, d a fixed direction: one number to differentiate in for each
 // tensor, where a number for each of 50,000 parameters would take minutes.
@@ -57,11 +57,9 @@ Params<double> along_directions(const ParamStore<double>& store, const Tensor<do
     for (Index i = e.offset; i < e.offset + e.shape.size(); ++i)
       theta[i] = store.values()[static_cast<std::size_t>(i)] + (trained(e) ? t.value()[k] * direction[i] : 0);
   }
-  // dt_k = <d, dtheta> on the k-th tensor. The buffer is made here: parameters write to it without the tape's
-  // knowing.
+  // dt_k = <d, dtheta> on the k-th tensor.
   const ParamStore<double>* layout = &store;
   const double* d = direction.data.data();
-  double* dall = all.grad_acc();
   tape.on_backward(all, [t, layout, d](const double* dtheta) {
     double* dt = t.grad_acc();
     assert(dt);  // a backward runs only where its one input needs a gradient
@@ -70,7 +68,7 @@ Params<double> along_directions(const ParamStore<double>& store, const Tensor<do
       ++dt;
     }
   });
-  return {store, theta, dall};
+  return {store, all};
 }
 
 // base + sum_k t_k d_k, d_k fixed directions.

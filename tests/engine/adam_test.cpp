@@ -101,9 +101,40 @@ TEST_CASE("adam: a step taken range by range is the step taken at once") {
   CHECK_THROWS_WITH(parts.extend_step(y, dy, {.begin = 3, .end = 201}), Contains("within [0, 200]"));
 }
 
+TEST_CASE("adam: made for a store, no step changes its running values, whatever the decay") {
+  ParamStore<float> store;
+  store.add("first", {3});
+  const auto mean = store.add("mean", {5}, ParamRole::running), last = store.add("last", {40}),
+             variance = store.add("variance", {2}, ParamRole::running);
+  const AdamOptions options{.lr = 0.1, .weight_decay = 0.5, .zero_grads = true};
+  Adam<float> adam(store, options), flat(store.size(), options);
+  std::vector<float> all(at(store.size())), grads;
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = store.values()[i] = 1 + 0.1f * static_cast<float>(i);
+  const std::vector<float> before = all;
+  const auto fill = [&](std::span<float> g) {
+    for (std::size_t i = 0; i < g.size(); ++i) g[i] = std::sin(static_cast<float>(i));
+  };
+  const AdamRange parts[] = {{.begin = 0, .end = 6, .lr_factor = 0.5, .weight_decay = 0.5},
+                             {.begin = 6, .end = 50, .weight_decay = 0.5}};
+  for (int step = 0; step < 3; ++step) {
+    grads.resize(all.size());
+    fill(store.grads());
+    fill(grads);
+    step == 1 ? adam.step(store.values(), store.grads(), parts) : adam.step(store.values(), store.grads());
+    step == 1 ? flat.step(all, grads, parts) : flat.step(all, grads);
+  }
+  for (const auto& e : store.entries())
+    for (Index i = e.offset; i < e.offset + e.shape.size(); ++i) {
+      CAPTURE(e.name, i);
+      CHECK(store.values()[at(i)] == (e.role == ParamRole::running ? before : all)[at(i)]);
+    }
+  CHECK(store.values(last)[0] != before[8]);
+  CHECK((store.values(mean)[4] == before[7] && store.values(variance)[1] == before[49]));
+}
+
 TEST_CASE("adam: a resumed optimiser continues with the same bits, on any number of threads") {
   const Index n = 50001;
-  const int before = threads();
+  const ScopedThreads before(threads());
   auto grads = [&](int t) { return uniform<float>({n}, -1, 1, static_cast<unsigned>(t)).data; };
   auto run = [&](int n_threads, int stop) {
     set_threads(n_threads);
@@ -125,7 +156,6 @@ TEST_CASE("adam: a resumed optimiser continues with the same bits, on any number
   const auto want = run(1, -1);
   CHECK(run(2, -1) == want);
   CHECK(run(2, 3) == want);
-  set_threads(before);
 }
 
 TEST_CASE("adam: empty, and errors") {

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <cstring>
+#include <limits>
+#include <new>
 
 #include "support/catch.h"
 
@@ -17,6 +19,26 @@ TEST_CASE("arena: blocks are aligned and do not overlap") {
     std::memset(p, 1, n);
     last = p;
   }
+}
+
+TEST_CASE("arena: a negative or overflowing size is an error, not an empty block") {
+  Arena arena;
+  const auto most = std::numeric_limits<std::size_t>::max();
+  for (const std::size_t bytes : {most, most - 10, most / 2 + 1, static_cast<std::size_t>(-64)})
+    CHECK_THROWS_AS(arena.allocate(bytes), std::bad_alloc);
+  CHECK(arena.reserved() == 0);
+}
+
+TEST_CASE("arena: free memory and later blocks are spoilt on request, what is in use is not") {
+  Arena arena(256);
+  auto* used = static_cast<unsigned char*>(arena.allocate(64));
+  used[63] = 1;
+  arena.spoil();
+  CHECK(used[63] == 1);
+  const auto* next = static_cast<unsigned char*>(arena.allocate(64));
+  const auto* grown = static_cast<unsigned char*>(arena.allocate(1000));
+  CHECK((next[0] == 0xff && next[63] == 0xff));
+  CHECK((grown[0] == 0xff && grown[999] == 0xff));
 }
 
 TEST_CASE("arena: the second round of equal requests calls the system no more") {

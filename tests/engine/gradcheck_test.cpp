@@ -8,7 +8,7 @@
 using namespace fieldmark;
 
 namespace {
-enum class Wrong { none, factor, tiny, sign_of_one, assigns, nan, value };
+enum class Wrong { none, factor, tiny, sign_of_one, assigns, nan, value, fresh, unfilled, spends };
 
 // y = exp(x) * scale, with a backward that is wrong in a chosen way: the checker itself is under test.
 Var<double> exp_with(Var<double> x, Wrong wrong, double scale = 1) {
@@ -18,17 +18,21 @@ Var<double> exp_with(Var<double> x, Wrong wrong, double scale = 1) {
   for (Index i = 0; i < n; ++i) y[i] = scale * std::exp(x.value()[i]);
   if (wrong == Wrong::value && x.needs_grad()) y[0] += 1e-3;
   x.tape().on_backward(out, [=](const double* dy) {
-    double* dx = x.grad_acc();
+    bool fresh = false;
+    double* dx = wrong == Wrong::fresh || wrong == Wrong::unfilled ? x.grad_acc(&fresh) : x.grad_acc();
     for (Index i = 0; i < n; ++i) {
       double d = dy[i] * y[i];
+      if (wrong == Wrong::fresh && fresh) d = -d;
+      if (wrong == Wrong::unfilled && fresh && i == 3) continue;
       if (wrong == Wrong::factor) d *= 1 + 1e-6;
       if (wrong == Wrong::tiny) d = 0;
       if (wrong == Wrong::sign_of_one && i == 2) d = -d;
       if (wrong == Wrong::nan && i == 1) d = std::numeric_limits<double>::quiet_NaN();
-      if (wrong == Wrong::assigns)
+      if (wrong == Wrong::assigns || fresh)
         dx[i] = d;
       else
         dx[i] += d;
+      if (wrong == Wrong::spends) y[i] = 0;  // what the backward needs once more
     }
   });
   return out;
@@ -44,8 +48,60 @@ bool passes(Wrong wrong, double scale = 1) {
 
 TEST_CASE("gradcheck: passes a right backward and fails every wrong one") {
   CHECK(passes(Wrong::none));
-  for (Wrong w : {Wrong::factor, Wrong::tiny, Wrong::sign_of_one, Wrong::assigns, Wrong::nan, Wrong::value})
+  for (Wrong w : {Wrong::factor, Wrong::tiny, Wrong::sign_of_one, Wrong::assigns, Wrong::nan, Wrong::value,
+                  Wrong::fresh, Wrong::unfilled, Wrong::spends}) {
+    CAPTURE(static_cast<int>(w));
     CHECK_FALSE(passes(w));
+  }
+}
+
+namespace {
+enum class Subset { right, forgets_second, leaves_buffer };
+
+// y = a b, with a mistake that shows only where one of the two needs no gradient.
+Var<double> product(Var<double> a, Var<double> b, Subset wrong) {
+  const Index n = a.shape().size();
+  double* y = nullptr;
+  Var<double> out = wrong == Subset::forgets_second ? a.tape().output(a.shape(), &y, {a})
+                                                    : a.tape().output(a.shape(), &y, {a, b});
+  for (Index i = 0; i < n; ++i) y[i] = a.value()[i] * b.value()[i];
+  a.tape().on_backward(out, [=](const double* dy) {
+    double *da = a.grad_acc(), *db = b.grad_acc();
+    for (Index i = 0; da && i < n; ++i) da[i] += dy[i] * b.value()[i];
+    if (wrong == Subset::leaves_buffer && !da) return;
+    for (Index i = 0; db && i < n; ++i) db[i] += dy[i] * a.value()[i];
+  });
+  return out;
+}
+}  // namespace
+
+TEST_CASE("gradcheck: takes every subset of the inputs that needs gradients, and names it") {
+  const std::vector<Tensor<double>> in{uniform({3}, -1, 1, 3), uniform({3}, -1, 1, 4)};
+  const auto check = [&](Subset wrong) {
+    return gradcheck([=](Tape<double>&, auto v) { return product(v[0], v[1], wrong); }, in);
+  };
+  CHECK(check(Subset::right).ok);
+  CHECK(check(Subset::right).entries == 6);
+  for (Subset wrong : {Subset::forgets_second, Subset::leaves_buffer}) {
+    const auto r = check(wrong);
+    CHECK_FALSE(r.ok);
+    CHECK_THAT(r.table, Contains("input 1 [0]") && Contains("(gradients for these inputs only: 1)"));
+  }
+}
+
+TEST_CASE("gradcheck: of many inputs each alone and all but each") {
+  const std::vector<Tensor<double>> in(8, uniform({1}, 0.5, 1, 3));
+  const auto check = [&](Subset wrong) {
+    return gradcheck(
+        [=](Tape<double>&, auto v) {
+          Var<double> y = v[0];
+          for (std::size_t k = 1; k < v.size(); ++k) y = product(y, v[k], k == 7 ? wrong : Subset::right);
+          return y;
+        },
+        in);
+  };
+  CHECK(check(Subset::right).ok);
+  CHECK_THAT(check(Subset::forgets_second).table, Contains("only: 7)"));
 }
 
 TEST_CASE("gradcheck: small gradients are judged against their own size") {

@@ -7,8 +7,20 @@
 
 using namespace fieldmark;
 
-TEST_CASE("isa: every level up to the CPU's can be forced, none above") {
+TEST_CASE("isa: a scope's level ends with it, also by an exception") {
   const Isa before = isa();
+  CHECK_THROWS_AS(
+      [] {
+        const ScopedIsa scope(Isa::v2);
+        CHECK(isa() == Isa::v2);
+        throw ValueError("out");
+      }(),
+      ValueError);
+  CHECK(isa() == before);
+}
+
+TEST_CASE("isa: every level up to the CPU's can be forced, none above") {
+  const ScopedIsa before(isa());
   for (Isa level : {Isa::v2, Isa::v3, Isa::v4}) {
     if (level <= isa_supported()) {
       force_isa(level);
@@ -18,5 +30,4 @@ TEST_CASE("isa: every level up to the CPU's can be forced, none above") {
       CHECK_THROWS_WITH(force_isa(level), Contains("this CPU has at most"));
     }
   }
-  force_isa(before);
 }

@@ -63,10 +63,34 @@ TEST_CASE("packed_weights: update takes the present values, for matrices of laye
   const auto x = uniform<float>({3, 5}, -1, 1, 4);
   const auto before = pass(layer, store, &packed, x);
   for (float& v : store.values()) v *= 2;
-  CHECK(pass(layer, store, &packed, x) != pass<float>(layer, store, nullptr, x));
+  CHECK_THROWS_WITH(pass(layer, store, &packed, x),
+                    "[packed_weights] 'layer/weight' has other values than when it was packed: call update() "
+                    "after every step");
   packed.update();
   CHECK(pass(layer, store, &packed, x) == pass<float>(layer, store, nullptr, x));
   CHECK(pass(layer, store, &packed, x) != before);
+}
+
+TEST_CASE("packed_weights: another instruction set and parameters added later are errors") {
+  ParamStore<float> store;
+  const Dense<float> layer(store, "layer", {.in = 5, .out = 6}, 3);
+  PackedWeights<float> packed(store);
+  CHECK(packed.find(store.find("layer/weight")) == nullptr);  // nothing is packed yet
+  packed.update();
+  if (isa() != Isa::v2) {
+    const ScopedIsa scope(Isa::v2);
+    CHECK_THROWS_WITH(packed.find(store.find("layer/weight")),
+                      "[packed_weights] weights were packed for another instruction set than v2: call "
+                      "update() after a change of it");
+  }
+  CHECK(packed.find(store.find("layer/weight")) != nullptr);
+  const ParamId late = store.add("late/weight", {2, 2});
+  CHECK_THROWS_WITH(packed.find(late),
+                    "[packed_weights] id must be one of the 2 parameters that the store had when its weights "
+                    "were first packed, got 2");
+  CHECK_THROWS_AS(packed.table(late), ValueError);
+  CHECK_THROWS_AS(packed.find(ParamId{}), ValueError);
+  CHECK_THROWS_WITH(packed.update(), Contains("the store has 3 parameters, it had 2"));
 }
 
 TEST_CASE("packed_weights: in bf16 a layer's values and gradients are off by the rounding, dW by less") {
@@ -110,6 +134,8 @@ TEST_CASE("packed_weights: tables are rounded on request") {
   REQUIRE(packed.table(table));
   CHECK(packed.table(table)[5] == 0x3f80);
   CHECK(packed.table(table)[4] == 0);
+  store.values(table)[11] = 2;
+  CHECK_THROWS_WITH(packed.table(table), Contains("'hash/table' has other values"));
   ParamStore<double> exact;
   CHECK_THROWS_WITH((PackedWeights<double>(exact, {.precision = Precision::bf16})),
                     Contains("not for double"));

@@ -9,7 +9,7 @@
 using namespace fieldmark;
 
 TEST_CASE("parallel: every index once, in chunks that do not depend on the thread count") {
-  const int before = threads();
+  const ScopedThreads before(threads());
   for (int n_threads : {1, 2, 3}) {
     set_threads(n_threads);
     for (Index n : {0, 1, 7, 8, 9, 1000}) {
@@ -21,7 +21,20 @@ TEST_CASE("parallel: every index once, in chunks that do not depend on the threa
       CHECK(std::accumulate(seen.begin(), seen.end(), 0) == n);
     }
   }
-  set_threads(before);
+}
+
+TEST_CASE("parallel: a scope's number of threads ends with it, also by an exception") {
+  const int before = threads();
+  CHECK_THROWS_AS(
+      [&] {
+        const ScopedThreads scope(before + 3);
+        CHECK(threads() == before + 3);
+        throw ValueError("out");
+      }(),
+      ValueError);
+  CHECK(threads() == before);
+  CHECK_THROWS_WITH(ScopedThreads(0), Contains("n must be at least 1, got 0"));
+  CHECK(threads() == before);
 }
 
 TEST_CASE("parallel: an exception of a chunk reaches the caller, nested loops are serial") {

@@ -1,3 +1,4 @@
+#include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/params.h>
 
 #include "support/catch.h"
@@ -30,6 +31,40 @@ TEST_CASE("params: gradients go to the store, to a shard, or nowhere") {
   CHECK_FALSE(Params<float>(store, nullptr).leaf(tape, b).needs_grad());
   store.zero_grad();
   CHECK(store.grads()[2] == 0);
+}
+
+TEST_CASE("params: running values are read, and get no gradient") {
+  ParamStore<float> store;
+  const auto weight = store.add("w", {2}), mean = store.add("mean", {2}, ParamRole::running);
+  CHECK(store.entry(weight).role == ParamRole::trained);
+  CHECK(store.entry(mean).role == ParamRole::running);
+  Tape<float> tape;
+  CHECK(Params<float>(store).leaf(tape, weight).needs_grad());
+  const Var<float> v = Params<float>(store).leaf(tape, mean);
+  CHECK_FALSE(v.needs_grad());
+  CHECK(v.value() == store.values(mean).data());
+}
+
+TEST_CASE("params: computed parameters pass gradients on, in each backward; running ones stay the store's") {
+  ParamStore<double> store;
+  const auto a = store.add("a", {2}), mean = store.add("mean", {1}, ParamRole::running),
+             b = store.add("b", {1});
+  store.values(mean)[0] = 5;
+  const Tensor<double> theta({4}, std::vector<double>{1, 2, 3, 4});
+  Tensor<double> g({4});
+  Tape<double> tape;
+  const Var<double> all = tape.reshape(tape.leaf(theta, g), {4});
+  const Params<double> params(store, all);
+  const Var<double> y = mul(params.leaf(tape, a), params.leaf(tape, a)), z = params.leaf(tape, b);
+  CHECK(params.leaf(tape, mean).value()[0] == 5);
+  CHECK(z.value()[0] == 4);
+  for (int times : {1, 2}) {
+    tape.backward(y, std::vector<double>{1, 1});
+    tape.backward(z);
+    CHECK(g.data == std::vector<double>{2. * times, 4. * times, 0, 1. * times});
+  }
+  CHECK_THROWS_WITH(Params<double>(store, z),
+                    "[params] all must have the 4 elements of the store, got shape [1]");
 }
 
 namespace {

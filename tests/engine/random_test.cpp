@@ -143,7 +143,7 @@ TEST_CASE("random: a permutation holds every number once, and places are uniform
 }
 
 TEST_CASE("random: the thread count changes nothing") {
-  const int before = threads();
+  const ScopedThreads before(threads());
   const CounterRng rng(13, 4);
   auto draw = [&](int n_threads) {
     set_threads(n_threads);
@@ -155,5 +155,4 @@ TEST_CASE("random: the thread count changes nothing") {
     return x;
   };
   CHECK(draw(1) == draw(2));
-  set_threads(before);
 }

@@ -1,6 +1,7 @@
 #include <fieldmark/engine/shape.h>
 
 #include <type_traits>
+#include <vector>
 
 #include "support/catch.h"
 
@@ -22,6 +23,13 @@ TEST_CASE("shape: a scalar has rank 0 and one element, an extent of 0 none") {
   CHECK(Shape{}.str() == "[]");
   CHECK(Shape{4, 0, 7}.size() == 0);
   CHECK(Shape{1 << 20, 1 << 20}.size() == Index{1} << 40);
+}
+
+TEST_CASE("shape: more axes than it holds are an error") {
+  CHECK(Shape{1, 2, 3, 4, 5}.rank() == 5);
+  CHECK_THROWS_WITH((Shape{1, 2, 3, 4, 5, 6}), "[shape] a shape has at most 5 axes, got 6");
+  const std::vector<Index> many(9, 1);
+  CHECK_THROWS_AS(Shape(std::span<const Index>(many)), ShapeError);
 }
 
 TEST_CASE("shape: equal only in rank and every extent") {

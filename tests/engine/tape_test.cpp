@@ -1,4 +1,9 @@
+#include <fieldmark/engine/ops/arithmetic.h>
+#include <fieldmark/engine/ops/loss.h>
+#include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/engine/tape.h>
+
+#include <utility>
 
 #include "support/catch.h"
 
@@ -28,6 +33,108 @@ TEST_CASE("tape: gradients go through a chain, a fan-out and onto what the leaf 
   tape.backward(y);
   CHECK(y.value()[0] == 81);
   CHECK(g[0] == 100 + 4 * 27);
+}
+
+TEST_CASE("tape: a second backward begins anew for intermediates and adds to leaves") {
+  Tape<double> tape;
+  const Tensor<double> x({1}, 3.0);
+  Tensor<double> g({1});
+  const auto v = tape.leaf(x, g), shared = square(v);
+  const auto first = square(shared), second = square(shared);
+  tape.backward(first);
+  CHECK(g[0] == 4 * 27);
+  CHECK(shared.grad()[0] == 2 * 9);
+  tape.backward(first);
+  CHECK(g[0] == 2 * 4 * 27);
+  tape.backward(second);
+  CHECK(g[0] == 3 * 4 * 27);
+  CHECK(shared.grad()[0] == 2 * 9);
+  CHECK(first.grad() == nullptr);
+  tape.backward(square(second));  // recorded after a backward: x^8
+  CHECK(g[0] == 3 * 4 * 27 + 8 * 2187);
+  tape.replay();  // no seed: no gradient
+  CHECK(g[0] == 3 * 4 * 27 + 8 * 2187);
+}
+
+TEST_CASE("tape: seeds written by hand count for one replay, and a fresh leaf holds the last backward's") {
+  Tape<double> tape;
+  const Tensor<double> x({1}, 3.0);
+  Tensor<double> g({1}, 100.0);
+  const auto v = tape.fresh_leaf(x.data.data(), g.data.data(), {1});
+  const auto y = square(v);
+  for (double seed : {1., 10.}) {
+    y.grad_acc()[0] += seed;
+    tape.replay();
+    CHECK(g[0] == 6 * seed);
+  }
+}
+
+TEST_CASE("tape: a backward that threw leaves nothing for the next") {
+  Tape<double> tape;
+  const Tensor<double> x({1}, 3.0);
+  Tensor<double> g({1});
+  static bool fails;
+  fails = true;
+  const auto inner = square(tape.leaf(x, g));
+  double* y = nullptr;
+  const auto out = tape.output({1}, &y, {inner});
+  *y = inner.value()[0];
+  tape.on_backward(out, [inner](const double* dy) {
+    inner.grad_acc()[0] += *dy;
+    if (fails) throw ValueError("half done");
+  });
+  CHECK_THROWS_WITH(tape.backward(out), "half done");
+  fails = false;
+  tape.backward(out);
+  CHECK(g[0] == 6);
+}
+
+namespace {
+template <class V>
+concept IsConstant = requires(Tape<double>& tape, V&& v) {
+  tape.constant(std::forward<V>(v));
+};
+template <class V>
+concept IsLeaf = requires(Tape<double>& tape, V&& v, Tensor<double>& g) {
+  tape.leaf(std::forward<V>(v), g);
+};
+}  // namespace
+
+TEST_CASE("tape: a temporary, which would die before the pass, does not compile") {
+  STATIC_REQUIRE((IsConstant<Tensor<double>&> && IsConstant<const Tensor<double>&>));
+  STATIC_REQUIRE((IsLeaf<Tensor<double>&> && IsLeaf<const Tensor<double>&>));
+  STATIC_REQUIRE_FALSE((IsConstant<Tensor<double>> || IsConstant<const Tensor<double>>));
+  STATIC_REQUIRE_FALSE((IsLeaf<Tensor<double>> || IsLeaf<const Tensor<double>>));
+}
+
+TEST_CASE("tape: values of two tapes do not mix") {
+  Tape<double> tape, other;
+  const Tensor<double> x({1}, 3.0);
+  Tensor<double> g({1});
+  const auto mine = tape.leaf(x, g), theirs = other.leaf(x, g);
+  double* y = nullptr;
+  CHECK_THROWS_WITH(tape.output({1}, &y, {mine, theirs}),
+                    "[tape] the input of an op was recorded on another tape: record all that belongs "
+                    "together on one");
+  CHECK_THROWS_AS(mul(mine, theirs), ValueError);
+  CHECK_THROWS_AS(concatenate({mine, theirs}), ValueError);
+  CHECK_THROWS_AS(mse_loss(mine, theirs), ValueError);
+  CHECK_THROWS_AS(tape.reshape(theirs, {1, 1}), ValueError);
+  CHECK_THROWS_AS(tape.on_backward(theirs, [](const double*) {}), ValueError);
+  CHECK_THROWS_WITH(tape.backward(theirs), Contains("the value to differentiate was recorded on another"));
+}
+
+TEST_CASE("tape: part reads a range and passes its gradients on") {
+  Tape<double> tape;
+  const Tensor<double> x({2, 3}, std::vector<double>{1, 2, 3, 4, 5, 6});
+  Tensor<double> g({2, 3}, 1.0);
+  const auto v = tape.leaf(x, g);
+  const auto y = square(tape.part(v, 2, {1, 3}));
+  CHECK(std::vector<double>(y.value(), y.value() + 3) == std::vector<double>{9, 16, 25});
+  tape.backward(y, std::vector<double>{1, 10, 100});
+  CHECK(g.data == std::vector<double>{1, 1, 7, 81, 1001, 1});
+  CHECK_THROWS_WITH(tape.part(v, 4, {3}), "[part] elements 4 to 7 must lie within x, got shape [2, 3]");
+  CHECK_THROWS_AS(tape.part(v, -1, {3}), ShapeError);
 }
 
 TEST_CASE("tape: constants record nothing, unreached branches are skipped") {
@@ -103,6 +210,20 @@ TEST_CASE("tape: errors") {
   CHECK_THROWS_WITH(tape.backward(square(tape.constant(x)), seed), Contains("nothing to differentiate"));
   CHECK_THROWS_WITH(tape.backward(square(tape.leaf(x, g)), std::span<const double>(seed, 1)),
                     Contains("got 1"));
+}
+
+TEST_CASE("tape: sizes that do not fit are errors") {
+  Tape<double> tape;
+  const Tensor<double> x({2}, 3.0), unfilled(Shape{2}, std::vector<double>{1});
+  Tensor<double> shorter({1});
+  CHECK_THROWS_WITH(tape.leaf(x, shorter), "[leaf] grad must have the 2 elements of t, got 1");
+  CHECK_THROWS_WITH(tape.leaf(unfilled, shorter), "[leaf] t must have the elements of its shape [2], got 1");
+  CHECK_THROWS_WITH(tape.constant(unfilled), Contains("[constant] t must have the elements"));
+  CHECK_THROWS_WITH(tape.scratch(-3),
+                    "[tape] a buffer must have 0 elements or more and fit into memory, got -3");
+  CHECK_THROWS_AS(tape.scratch(Index{1} << 61), ValueError);
+  double* y = nullptr;
+  CHECK_THROWS_AS(tape.output({-1}, &y, {tape.constant(x)}), ValueError);
 }
 
 TEST_CASE("tape: a repeated step takes nothing from the system") {

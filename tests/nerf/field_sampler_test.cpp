@@ -44,10 +44,10 @@ Seen look(const RadianceField& f, const std::vector<float>& position, const std:
   const Field<double> coarse(store, f.options().field, 0, "coarse/");
   std::copy(f.params.values().begin(), f.params.values().end(), store.values().begin());
   const Index n = std::ssize(position) / 3;
+  const Tensor<double> x({n, 3}, {position.begin(), position.end()});
   Tape<double> tape;
-  const auto out = field(Params<double>(store, nullptr),
-                         tape.constant(Tensor<double>({n, 3}, {position.begin(), position.end()})),
-                         tape.constant(direction.data(), {n, 3}));
+  const auto out =
+      field(Params<double>(store, nullptr), tape.constant(x), tape.constant(direction.data(), {n, 3}));
   return {{out.sigma.value(), out.sigma.value() + n}, {out.rgb.value(), out.rgb.value() + 3 * n}};
 }
 
@@ -129,11 +129,11 @@ TEST_CASE("field_sampler: an image of an mlp field is the quadrature in double, 
     renderer.trace(rays.batch(), 0, got.data());
     const RaySamples s = sample(f, rays, {.stop = 0, .points = points});
     const Seen seen = look(f, s.position, directions_of(rays, s));
+    const Tensor<double> delta({s.size()}, {s.delta.begin(), s.delta.end()});
     Tape<double> tape;
     const auto want =
         composite(tape.constant(seen.sigma.data(), {s.size()}), tape.constant(seen.rgb.data(), {s.size(), 3}),
-                  tape.constant(Tensor<double>({s.size()}, {s.delta.begin(), s.delta.end()})),
-                  std::span<const Index>(s.ray_begin));
+                  tape.constant(delta), std::span<const Index>(s.ray_begin));
     double worst = 0;
     for (Index i = 0; i < 600; ++i)
       raise_to(worst, std::abs(static_cast<double>(got[static_cast<std::size_t>(i)]) - want.value()[i]));

@@ -81,13 +81,12 @@ long allocations_in(int steps, F step) {
 
 template <class F>
 void for_threads(F check) {
-  const int before = threads();
+  const ScopedThreads before(threads());
   for (const int n : {1, 2}) {
     set_threads(n);
     INFO(n << " threads");
     check();
   }
-  set_threads(before);
 }
 
 }  // namespace

@@ -12,14 +12,17 @@
 #include "support/worst.h"
 
 /// An op under test is a generic callable f(tape, std::span<const Var<T>>) -> Var<T>.
-/// Returns its values, then the gradient of <u, f> in each input for a fixed random cotangent u.
+/// Returns its values, then the gradient of <u, f> in each input for a fixed random cotangent u. The inputs
+/// are outputs of an op before, as in a network, and memory holds NaN until it is filled.
 template <class T, class F>
 std::vector<std::vector<T>> run_op(const F& f, const std::vector<fieldmark::Tensor<T>>& inputs) {
   fieldmark::Tape<T> tape;
+  tape.arena().spoil();
   std::vector<fieldmark::Tensor<T>> grads;
   for (const auto& x : inputs) grads.emplace_back(x.shape);
   std::vector<fieldmark::Var<T>> vars;
-  for (std::size_t k = 0; k < inputs.size(); ++k) vars.push_back(tape.leaf(inputs[k], grads[k]));
+  for (std::size_t k = 0; k < inputs.size(); ++k)
+    vars.push_back(tape.reshape(tape.leaf(inputs[k], grads[k]), inputs[k].shape));
   const fieldmark::Var<T> y = f(tape, std::span<const fieldmark::Var<T>>(vars));
   tape.backward(y, uniform<T>(y.shape(), -1, 1, 99).data);
   std::vector<std::vector<T>> result{{y.value(), y.value() + y.shape().size()}};
@@ -40,13 +43,11 @@ std::vector<T> op_values(const F& f, const std::vector<fieldmark::Tensor<T>>& in
 /// Fails unless values and gradients in float have the same bits on one and on two threads.
 template <class F>
 void expect_same_bits(const F& f, const std::vector<fieldmark::Tensor<float>>& inputs) {
-  const int before = fieldmark::threads();
-  fieldmark::set_threads(1);
-  const auto one = run_op(f, inputs);
-  fieldmark::set_threads(2);
-  const auto two = run_op(f, inputs);
-  fieldmark::set_threads(before);
-  CHECK(one == two);
+  const auto on = [&](int threads) {
+    const fieldmark::ScopedThreads scope(threads);
+    return run_op(f, inputs);
+  };
+  CHECK(on(1) == on(2));
 }
 
 /// Largest |float - double| over the values and each gradient, relative to the largest number among them; the
@@ -56,11 +57,10 @@ double float_error(const F& f, const std::vector<fieldmark::Tensor<float>>& inpu
   std::vector<fieldmark::Tensor<double>> exact;
   for (const auto& x : inputs) exact.emplace_back(x.shape, std::vector<double>(x.data.begin(), x.data.end()));
   const auto want = run_op(f, exact);
-  const fieldmark::Isa before = fieldmark::isa();
   double worst = 0;
   for (auto level : {fieldmark::Isa::v2, fieldmark::Isa::v3, fieldmark::Isa::v4}) {
     if (level > fieldmark::isa_supported()) continue;
-    fieldmark::force_isa(level);
+    const fieldmark::ScopedIsa scope(level);
     const auto got = run_op(f, inputs);
     for (std::size_t k = 0; k < want.size(); ++k) {
       double largest = 1e-30, off = 0;
@@ -72,7 +72,6 @@ double float_error(const F& f, const std::vector<fieldmark::Tensor<float>>& inpu
       raise_to(worst, off / largest);
     }
   }
-  fieldmark::force_isa(before);
   return worst;
 }
 

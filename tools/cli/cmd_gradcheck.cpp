@@ -125,17 +125,15 @@ struct NumericsRow {
 // Every case on every instruction set of this CPU; returns their names.
 std::vector<std::string> run_on_each_isa(std::vector<NumericsRow>& rows) {
   std::vector<std::string> levels;
-  const Isa before = isa();
   for (const Isa level : {Isa::v2, Isa::v3, Isa::v4}) {
     if (level > isa_supported()) break;
-    force_isa(level);
+    const ScopedIsa scope(level);
     levels.emplace_back(isa_name());
     parallel_for(static_cast<Index>(rows.size()), 1, [&](Index i, Index) {
       NumericsRow& row = rows[static_cast<std::size_t>(i)];
       row.errors.push_back(row.check.run());
     });
   }
-  force_isa(before);
   return levels;
 }
 

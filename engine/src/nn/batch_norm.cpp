@@ -13,8 +13,8 @@ BatchNorm<T>::BatchNorm(ParamStore<T>& store, std::string_view name, Index chann
   const std::string prefix(name);
   gamma_ = store.add(prefix + "/gamma", {channels});
   beta_ = store.add(prefix + "/beta", {channels});
-  mean_ = store.add(prefix + "/running_mean", {channels});
-  variance_ = store.add(prefix + "/running_variance", {channels});
+  mean_ = store.add(prefix + "/running_mean", {channels}, ParamRole::running);
+  variance_ = store.add(prefix + "/running_variance", {channels}, ParamRole::running);
   std::ranges::fill(store.values(gamma_), T(1));
   std::ranges::fill(store.values(variance_), T(1));
 }

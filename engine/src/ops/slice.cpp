@@ -54,7 +54,6 @@ template <class T>
 Var<T> concatenate(std::span<const Var<T>> xs) {
   if (xs.empty()) throw ValueError("[concatenate] xs must have at least one tensor, got 0");
   Index width = 0;
-  bool needs_grad = false;
   const Shape first = xs[0].shape();
   for (const Var<T>& x : xs) {
     check_has_axis("concatenate", x.shape());
@@ -62,12 +61,11 @@ Var<T> concatenate(std::span<const Var<T>> xs) {
       throw ShapeError("[concatenate] xs: all axes but the last must be those of the first, " + first.str() +
                        ", got shape " + x.shape().str());
     width += x.shape()[-1];
-    needs_grad = needs_grad || x.needs_grad();
   }
   const Index rows = leading(first), count = static_cast<Index>(xs.size());
   Tape<T>& tape = xs[0].tape();
   T* y = nullptr;
-  const Var<T> out = tape.output(with_last(first, width), &y, needs_grad);
+  const Var<T> out = tape.output(with_last(first, width), &y, xs);
   auto* kept = tape.template scratch<Var<T>>(count);
   std::uninitialized_copy(xs.begin(), xs.end(), kept);
   parallel_for(rows, detail::row_grain(width), [&](Index r0, Index r1) {

@@ -31,11 +31,11 @@ Var<T> mean_of(const char* op, Var<T> x, const Var<T>* other, std::span<const T>
   const double inverse = inverse_total(tape, op, n, weights);
   const T* w = weights.empty() ? nullptr : weights.data();
   T* y = nullptr;
-  const Var<T> out = tape.output({1}, &y, x.needs_grad() || (other && other->needs_grad()));
+  const Var<T> second = other ? *other : x;
+  const Var<T> out = tape.output({1}, &y, {x, second});
   *y = static_cast<T>(inverse * chunked_sum(tape, n, [=](Index i) {
                         return (w ? static_cast<double>(w[i]) : 1.0) * static_cast<double>(f(i));
                       }));
-  const Var<T> second = other ? *other : x;
   tape.on_backward(out, [x, second, two = other != nullptr, w, inverse, slope](const T* dy) {
     const T g = static_cast<T>(inverse * static_cast<double>(*dy));
     add_gradient(x, [=](Index i) { return (w ? g * w[i] : g) * slope(i); });

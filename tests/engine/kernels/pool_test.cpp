@@ -69,7 +69,8 @@ TEST_CASE("kernels/pool: sums over pixels and their transpose, for every number 
         const float row = x[i % channels];
         want[static_cast<std::size_t>(i % channels)] += x[i];
         want_part[static_cast<std::size_t>(i % channels)] += mask[i] > 0 ? x[i] : 0;
-        worst = std::max<double>({worst, std::abs(fresh[i] - row), std::abs(held[i] - (x[i] + row))});
+        raise_to(worst, std::abs(static_cast<double>(fresh[i] - row)));
+        raise_to(worst, std::abs(static_cast<double>(held[i] - (x[i] + row))));
       }
       CAPTURE(channels);
       CHECK(worst == 0);

@@ -1,3 +1,4 @@
+#include <fieldmark/engine/adam.h>
 #include <fieldmark/engine/nn/batch_norm.h>
 
 #include "support/expect_grad.h"
@@ -20,6 +21,15 @@ TEST_CASE("nn/batch_norm: running statistics lead from the initial ones to the b
   norm.update(store, seen, 1);
   const auto tested = norm.evaluate(Params<double>(store), tape.constant(x));
   for (Index i = 0; i < x.size(); ++i) CHECK(tested.value()[i] == trained.value()[i]);
+}
+
+TEST_CASE("nn/batch_norm: the running statistics are not trained: weight decay leaves them alone") {
+  ParamStore<float> store;
+  const BatchNorm<float> norm(store, "n", 2);
+  Adam<float> adam(store, {.lr = 0.1, .weight_decay = 1});
+  adam.step(store.values(), store.grads());
+  CHECK(store.values(store.find("n/gamma"))[0] == Approx(0.9));
+  CHECK(store.values(store.find("n/running_variance"))[0] == 1);
 }
 
 TEST_CASE("nn/batch_norm: gradient") {

@@ -212,12 +212,11 @@ TEST_CASE("conv2d: same bits for 1 and 2 threads, also where the sum over pixels
     for (const auto& [C, O] : {std::array<Index, 2>{5, 9}, {24, 40}}) {
       const auto x = uniform<float>({2, 80, 33, C}, -1, 1, 1), w = uniform<float>({3, 3, C, O}, -1, 1, 2),
                  b = uniform<float>({O}, -1, 1, 3);
-      const int before = threads();
+      const ScopedThreads before(threads());
       set_threads(1);
       const Conv2dResult one = run(x, w, b, Activation::relu);
       set_threads(2);
       CHECK(one == run(x, w, b, Activation::relu));
-      set_threads(before);
     }
   });
 }
@@ -327,10 +326,9 @@ TEST_CASE("conv2d: errors of steps and borders, and the same bits for any thread
                     "got shape [1, 9, 4, 3]");
   const auto image = uniform<float>({2, 83, 90, 3}, -1, 1, 1),
              weights = uniform<float>({11, 11, 3, 64}, -1, 1, 2), bias = uniform<float>({64}, -1, 1, 3);
-  const int before = threads();
+  const ScopedThreads before(threads());
   set_threads(1);
   const Conv2dResult one = run_steps(image, weights, bias, {.stride = 4, .padding = 2}, Activation::relu);
   set_threads(2);
   CHECK(one == run_steps(image, weights, bias, {.stride = 4, .padding = 2}, Activation::relu));
-  set_threads(before);
 }

@@ -91,7 +91,6 @@ TEST_CASE("matmul: same bits for 1 and 2 threads") {
     da.data.insert(da.data.end(), db.data.begin(), db.data.end());
     return da.data;
   };
-  const int before = threads();
+  const ScopedThreads before(threads());
   CHECK(run(1) == run(2));
-  set_threads(before);
 }

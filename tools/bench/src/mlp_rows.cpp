@@ -62,11 +62,8 @@ EngineRow whole_batch(Index depth, Index width, Index samples, const RowOptions&
 
 // The same with AVX2, against AVX2's peak.
 EngineRow with_avx2(const std::function<EngineRow()>& row) {
-  const Isa before = isa();
-  force_isa(Isa::v3);
-  EngineRow result = row();
-  force_isa(before);
-  return result;
+  const ScopedIsa scope(Isa::v3);
+  return row();
 }
 
 }  // namespace

@@ -1,8 +1,11 @@
 #pragma once
 #include <fieldmark/engine/aligned.h>
+#include <fieldmark/engine/params.h>
 #include <fieldmark/engine/shape.h>
 
 #include <span>
+#include <utility>
+#include <vector>
 
 namespace fieldmark {
 
@@ -36,8 +39,13 @@ struct AdamRange {
 template <class T>
 class Adam {
  public:
+  /// For n numbers that are all trained.
   /// @throws ValueError if n is negative or an option is out of range
   explicit Adam(Index n, AdamOptions options = {});
+  /// For the parameters of a store: no step changes its running ones, whatever the decay. The store gets no
+  /// more of them afterwards.
+  /// @throws ValueError if an option is out of range
+  explicit Adam(const ParamStore<T>& store, AdamOptions options = {});
 
   /// One step over everything, with the options' skip_zero and weight_decay.
   /// @param values, grads  [n]   @param lr_factor  multiplies the options' lr
@@ -72,7 +80,9 @@ class Adam {
  private:
   void check(std::span<T> values, std::span<T> grads, std::span<const AdamRange> ranges) const;
   void update(std::span<T> values, std::span<T> grads, const AdamRange& range);
+  void update_trained(std::span<T> values, std::span<T> grads, const AdamRange& range);
   AdamOptions options_;
+  std::vector<std::pair<Index, Index>> running_;  // [begin, end) of values that no step changes, ascending
   AlignedVector<T> mean_, mean_square_;
   Index steps_ = 0;
 };

@@ -19,7 +19,7 @@ struct GradcheckReport {
   bool ok = true;     ///< no entry is bad
   double worst = 0;   ///< largest relative error
   Index entries = 0;  ///< compared
-  std::string table;  ///< one line per bad entry: input, index, x, analytic, numeric, error
+  std::string table;  ///< one line per bad entry: input, index, x, analytic, numeric, error, way
 };
 /// The function under test: records ops on the tape and returns one output of any shape.
 using GradcheckFn = std::function<Var<double>(Tape<double>&, std::span<const Var<double>>)>;
@@ -31,6 +31,10 @@ using GradcheckFn = std::function<Var<double>(Tape<double>&, std::span<const Var
 /// its input, and the rounding error of the difference. Against 1, a wrong gradient of 1e-8 would pass. The
 /// check also fails if the values of f change when gradients are off, if the gradient overwrites the caller's
 /// buffer (which holds 0.5) instead of adding to it, or if a compared value is not finite.
+///
+/// Gradients are compared with the inputs as leaves, after one and two calls of backward(); as outputs of an
+/// op before, as in a network, where buffers hold NaN until they are filled; and for every subset of the
+/// inputs, the others constant (of more than six inputs: each alone, and all but each).
 /// @throws whatever f throws
 GradcheckReport gradcheck(const GradcheckFn& f, std::span<const Tensor<double>> inputs,
                           const GradcheckOptions& options = {});
@@ -39,7 +43,8 @@ GradcheckReport gradcheck(const GradcheckFn& f, std::span<const Tensor<double>> 
 /// differentiates them.
 using ModuleGradcheckFn =
     std::function<Var<double>(Tape<double>&, const Params<double>&, std::span<const Var<double>>)>;
-/// As gradcheck(); the parameters are the last input of the report, laid out as store.values().
+/// As gradcheck(); the parameters are the last input of the report, laid out as store.values(). Running ones
+/// stay as they are and have no gradient.
 GradcheckReport gradcheck_module(const ModuleGradcheckFn& f, const ParamStore<double>& store,
                                  std::span<const Tensor<double>> inputs,
                                  const GradcheckOptions& options = {});

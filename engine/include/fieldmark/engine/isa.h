@@ -17,6 +17,19 @@ Isa isa_supported();
 /// it
 void force_isa(Isa level);
 
+/// force_isa() until the end of the scope, also if an exception ends it.
+class ScopedIsa {
+ public:
+  /// @throws ValueError if the CPU lacks it
+  explicit ScopedIsa(Isa level);
+  ScopedIsa(const ScopedIsa&) = delete;
+  ScopedIsa& operator=(const ScopedIsa&) = delete;
+  ~ScopedIsa();
+
+ private:
+  Isa before_;
+};
+
 /// Instructions that multiply bf16: AVX-512's dot products (vdpbf16ps), or AMX's tiles.
 enum class Bf16Units { none, dot, tiles };
 /// The best of this CPU and system; none where isa() is below v4. The first call requests the tile registers.

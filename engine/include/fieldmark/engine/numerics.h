@@ -71,17 +71,20 @@ Tensor<T> scattered(Shape shape, double lo, double hi, std::uint64_t seed) {
   return t;
 }
 
-/// One pass of an op: its values, then the gradient of <cotangent, op> in each input.
+/// One pass of an op: its values, then the gradient of <cotangent, op> in each input. The inputs are outputs
+/// of an op before, as in a network, and memory holds NaN until it is filled.
 /// @param f  called as f(tape, std::vector<Var<T>>)   @param cotangent  Shape -> Tensor<T>
 template <class T, class F, class C>
 std::vector<std::vector<T>> values_and_gradients(const F& f, const std::vector<Tensor<T>>& inputs,
                                                  const C& cotangent) {
   Tape<T> tape;
+  tape.arena().spoil();
   std::vector<Tensor<T>> grads;
   grads.reserve(inputs.size());
   for (const auto& x : inputs) grads.emplace_back(x.shape);
   std::vector<Var<T>> vars;
-  for (std::size_t k = 0; k < inputs.size(); ++k) vars.push_back(tape.leaf(inputs[k], grads[k]));
+  for (std::size_t k = 0; k < inputs.size(); ++k)
+    vars.push_back(tape.reshape(tape.leaf(inputs[k], grads[k]), inputs[k].shape));
   const Var<T> y = f(tape, vars);
   tape.backward(y, cotangent(y.shape()).data);
   std::vector<std::vector<T>> result{{y.value(), y.value() + y.shape().size()}};

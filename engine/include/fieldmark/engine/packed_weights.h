@@ -1,5 +1,10 @@
 #pragma once
+#include <fieldmark/engine/isa.h>
 #include <fieldmark/engine/params.h>
+
+#include <array>
+#include <cstdint>
+#include <vector>
 
 namespace fieldmark {
 
@@ -15,7 +20,8 @@ struct PackOptions {
 
 /// The matrices of a store's dense layers in the layout of matrix products, plain and transposed: a training
 /// step packs each once instead of once a chunk. Pass it to Params that read the values of the last update()
-/// only.
+/// only. Eight numbers of each matrix are kept to notice other values: a step of an optimiser changes some of
+/// them, a change by hand of a few numbers may miss them all.
 template <class T>
 class PackedWeights {
  public:
@@ -24,21 +30,30 @@ class PackedWeights {
   /// @throws ValueError for bf16 where bf16_units() has none, or T is double
   explicit PackedWeights(const ParamStore<T>& store, const PackOptions& options = {});
   /// Packs the current values for the instruction set in use. Call it after every change of either.
+  /// @throws ValueError if the store got more parameters since the constructor
   void update();
-  /// The packed matrix, or null.
-  const PackedMatrix<T>* find(ParamId id) const {
-    const PackedMatrix<T>& m = matrices_[static_cast<std::size_t>(id.index)];
-    return m.forward ? &m : nullptr;
-  }
-  /// A table rounded to bf16, row-major, or null.
-  const std::uint16_t* table(ParamId id) const { return tables_[static_cast<std::size_t>(id.index)]; }
+  /// @{
+  /// The packed matrix, or a table rounded to bf16, row-major; null if this parameter is none, or before the
+  /// first update().
+  /// @throws ValueError if the store's values or the instruction set changed since the last update(), or the
+  /// parameter was added after the constructor
+  const PackedMatrix<T>* find(ParamId id) const;
+  const std::uint16_t* table(ParamId id) const;
+  /// @}
 
  private:
+  static constexpr std::size_t kWitnesses = 8;
+  using Witnesses = std::array<T, kWitnesses>;
   void update_rounded();
+  std::size_t place(ParamId id) const;
+  Witnesses witnesses(std::size_t i) const;
+  void check_current(std::size_t i) const;
   const ParamStore<T>* store_;
   PackOptions options_;
   std::vector<PackedMatrix<T>> matrices_;  // one for each parameter
   std::vector<const std::uint16_t*> tables_;
+  std::vector<Witnesses> witnesses_;  // numbers of each matrix and table at the last update()
+  Isa isa_ = Isa::v2;                 // of the last update()
   AlignedVector<T> panels_;
   AlignedVector<std::uint16_t> rounded_;
 };

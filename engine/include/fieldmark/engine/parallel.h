@@ -11,6 +11,19 @@ void set_threads(int n);
 /// The number of threads in use.
 int threads();
 
+/// set_threads() until the end of the scope, also if an exception ends it: for tests and benchmarks.
+class ScopedThreads {
+ public:
+  /// @param n  at least 1   @throws ValueError otherwise
+  explicit ScopedThreads(int n);
+  ScopedThreads(const ScopedThreads&) = delete;
+  ScopedThreads& operator=(const ScopedThreads&) = delete;
+  ~ScopedThreads();
+
+ private:
+  int before_;
+};
+
 namespace detail {
 void parallel_chunks(Index chunks, void* context, void (*run)(void*, Index chunk));
 }  // namespace detail

@@ -2,6 +2,7 @@
 #include <fieldmark/engine/aligned.h>
 #include <fieldmark/engine/tape.h>
 
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -14,6 +15,10 @@ struct ParamId {
   int index = -1;  ///< position among the entries; -1: none
 };
 
+/// What a tensor of a ParamStore is for. Only trained ones get gradients and are moved by an optimiser;
+/// running ones, such as the statistics of a batch norm, are values that a model keeps.
+enum class ParamRole { trained, running };
+
 /// All parameters of a model in one flat buffer, their gradients in a second one of equal length: an
 /// optimiser step, a checkpoint and zero_grad() are each one loop. Tensors of 4096 elements or more start on
 /// a cache line; the gap before them stays zero.
@@ -22,12 +27,13 @@ class ParamStore {
  public:
   /// Where a tensor lies in the flat buffers.
   struct Entry {
-    std::string name;  ///< unique, slash separated: "field/density/weight"
-    Shape shape;       ///< row-major
-    Index offset;      ///< of the first element in values()
+    std::string name;                     ///< unique, slash separated: "field/density/weight"
+    Shape shape;                          ///< row-major
+    Index offset;                         ///< of the first element in values()
+    ParamRole role = ParamRole::trained;  ///< as declared to add()
   };
   /// Appends a tensor of zeros. @throws ValueError if the name is taken
-  ParamId add(std::string_view name, Shape shape);
+  ParamId add(std::string_view name, Shape shape, ParamRole role = ParamRole::trained);
   /// @throws ValueError if there is no such name
   ParamId find(std::string_view name) const;
   /// @{
@@ -69,16 +75,18 @@ template <class T>
 class Params {
  public:
   /// Reads the store, adds gradients to the store.
-  explicit Params(ParamStore<T>& store) : Params(store, store.values().data(), store.grads().data()) {}
+  explicit Params(ParamStore<T>& store) : Params(store, store.grads().data()) {}
   /// Reads the store; gradients, laid out as the store's, go to `grads`, or are not computed if it is null.
-  Params(const ParamStore<T>& store, T* grads) : Params(store, store.values().data(), grads) {}
+  Params(const ParamStore<T>& store, T* grads)
+      : layout_(&store), values_(store.values().data()), grads_(grads) {}
   /// The same with the store's matrices packed: `packed` holds its present values and outlives the pass.
   Params(const ParamStore<T>& store, T* grads, const PackedWeights<T>& packed) : Params(store, grads) {
     packed_ = &packed;
   }
-  /// Reads `values`, laid out as the store's: gradcheck_module() treats parameters as an input.
-  Params(const ParamStore<T>& layout, const T* values, T* grads)
-      : layout_(&layout), values_(values), grads_(grads) {}
+  /// Reads `all` [store.size()], laid out as the store's values, and passes gradients on to it: for
+  /// parameters that are themselves computed. Running ones are read from the store.
+  /// @throws ShapeError if `all` has another number of elements
+  Params(const ParamStore<T>& layout, Var<T> all);
 
   /// A parameter on the tape: a leaf, or a constant where gradients are not computed.
   Var<T> leaf(Tape<T>& tape, ParamId id) const;
@@ -88,6 +96,7 @@ class Params {
   const T* values_;
   T* grads_;
   const PackedWeights<T>* packed_ = nullptr;
+  std::optional<Var<T>> all_ = {};  // computed parameters
 };
 
 }  // namespace fieldmark

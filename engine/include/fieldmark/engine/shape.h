@@ -1,4 +1,6 @@
 #pragma once
+#include <fieldmark/core/error.h>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -19,10 +21,13 @@ class Shape {
  public:
   static constexpr int kMaxRank = 5;  ///< most axes a shape can have
   Shape() = default;
-  /// @param dims  extents, the slowest axis first, at most kMaxRank of them (not checked)
+  /// @param dims  extents, the slowest axis first   @throws ShapeError if there are more than kMaxRank
   Shape(std::initializer_list<Index> dims) : Shape(std::span(dims.begin(), dims.size())) {}
   /// The same of a list whose length is known only when the program runs.
   explicit Shape(std::span<const Index> dims) : rank_(static_cast<int>(dims.size())) {
+    if (dims.size() > kMaxRank) [[unlikely]]
+      throw ShapeError("[shape] a shape has at most " + std::to_string(kMaxRank) + " axes, got " +
+                       std::to_string(dims.size()));
     for (std::size_t k = 0; k < dims.size(); ++k) dims_[k] = dims[k];
   }
   /// Number of axes, 0 to kMaxRank.

@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <new>
 #include <span>
+#include <string>
 #include <type_traits>
 #include <vector>
 
@@ -46,9 +48,11 @@ class Var {
   bool needs_grad() const { return slot_->needs_grad; }
   /// The packed form of this matrix, or null.
   const PackedMatrix<T>* packed() const { return slot_->packed; }
-  /// dL/d(this) accumulated so far; nullptr before the first gradient.
+  /// dL/d(this) accumulated so far; nullptr before the first gradient. After a backward it is that backward's
+  /// until the next one begins; a leaf's buffer goes on adding up.
   const T* grad() const { return slot_->grad; }
   /// The buffer to which a backward adds, zeroed on the first call; nullptr if this input needs no gradient.
+  /// Written by hand, it seeds the next replay(): gradients of an earlier one are forgotten.
   T* grad_acc() const;
   /// As grad_acc(), but a new buffer stays uninitialised and *fresh is set: the caller then assigns every
   /// element instead of adding, which saves a pass over memory.
@@ -88,58 +92,84 @@ class Tape {
   Tape& operator=(const Tape&) = delete;
 
   /// @{
-  /// A value that needs no gradient. The data must outlive the pass.
-  Var<T> constant(const Tensor<T>& t) { return make(t.data.data(), nullptr, t.shape, false); }
+  /// A value that needs no gradient. The data must outlive the pass, so a temporary does not compile.
+  /// @throws ShapeError unless the tensor has as many elements as its shape
+  Var<T> constant(const Tensor<T>& t) { return constant(filled(t, "constant"), t.shape); }
+  Var<T> constant(const Tensor<T>&& t) = delete;
   Var<T> constant(const T* value, Shape shape) { return make(value, nullptr, shape, false); }
   /// @}
   /// @{
   /// A parameter or another input to differentiate in: its gradient is added to `grad`.
+  /// @throws ShapeError unless `grad` and the shape have as many elements as the tensor
   Var<T> leaf(const T* value, T* grad, Shape shape) { return make(value, grad, shape, true); }
-  Var<T> leaf(const Tensor<T>& t, Tensor<T>& grad) { return leaf(t.data.data(), grad.data.data(), t.shape); }
+  Var<T> leaf(const Tensor<T>& t, Tensor<T>& grad) {
+    if (grad.size() != t.size())
+      throw ShapeError("[leaf] grad must have the " + std::to_string(t.size()) + " elements of t, got " +
+                       std::to_string(grad.size()));
+    return leaf(filled(t, "leaf"), grad.data.data(), t.shape);
+  }
+  Var<T> leaf(const Tensor<T>&& t, Tensor<T>& grad) = delete;
   /// @}
-  /// As leaf(), but the gradient overwrites `grad`; `grad` keeps its content if no gradient arrives.
+  /// As leaf(), but the gradient of each backward overwrites `grad`; `grad` keeps its content if none
+  /// arrives.
   Var<T> fresh_leaf(const T* value, T* grad, Shape shape) {
     const Var<T> v = make(value, nullptr, shape, true);
     v.slot_->target = grad;
+    fresh_.push_back(v);
     return v;
   }
   /// A matrix with its packed form. @param grad  null: a constant
   Var<T> matrix(const T* value, T* grad, Shape shape, const PackedMatrix<T>* packed) {
     return make(value, grad, shape, grad != nullptr, packed);
   }
+  /// @{
   /// Output of an op; *data points at uninitialised values, which the op fills.
+  /// @throws ValueError if an input was recorded on another tape
   Var<T> output(Shape shape, T** data, std::initializer_list<Var<T>> inputs) {
-    *data = scratch(shape.size());
-    return make(*data, nullptr, shape,
-                std::any_of(inputs.begin(), inputs.end(), [](const Var<T>& v) { return v.needs_grad(); }));
+    return output(shape, data, std::span(inputs.begin(), inputs.size()));
   }
-  /// Output of an op that takes any number of inputs.
-  Var<T> output(Shape shape, T** data, bool needs_grad) {
+  Var<T> output(Shape shape, T** data, std::span<const Var<T>> inputs) {
+    bool needs_grad = false;
+    for (const Var<T>& v : inputs) {
+      check_own(v, "the input of an op");
+      needs_grad = needs_grad || v.needs_grad();
+    }
     *data = scratch(shape.size());
     return make(*data, nullptr, shape, needs_grad);
   }
+  /// @}
   /// Marks `out` as the output of a ReLU, see Var::rectified().
   void mark_rectified(Var<T> out) { out.slot_->rectified = true; }
   /// The same elements under another shape of equal size; gradients pass through unchanged.
   Var<T> reshape(Var<T> x, Shape shape);
+  /// The elements of x from `begin` on under a shape of their own; gradients pass through unchanged.
+  /// @throws ShapeError if they do not lie within x
+  Var<T> part(Var<T> x, Index begin, Shape shape);
   /// Uninitialised memory until reset(), for values that a backward reads.
+  /// @throws ValueError if n is negative or so large that its bytes cannot be counted
   template <class U = T>
   U* scratch(Index n) {
     static_assert(std::is_trivially_destructible_v<U>);
+    if (n < 0 || n > std::numeric_limits<Index>::max() / static_cast<Index>(sizeof(U))) [[unlikely]]
+      throw ValueError("[tape] a buffer must have 0 elements or more and fit into memory, got " +
+                       std::to_string(n));
     return static_cast<U*>(arena_.allocate(static_cast<std::size_t>(n) * sizeof(U)));
   }
 
-  /// Registers `fn(const T* dout)`, called only if a gradient reached `out`.
+  /// Registers `fn(const T* dout)`, called once a backward, only if a gradient reached `out`. It leaves what
+  /// it captured as it was: a second backward calls it again.
   template <class F>
   void on_backward(Var<T> out, F fn) {
     static_assert(std::is_trivially_destructible_v<F> && std::is_trivially_copyable_v<F>,
                   "a backward lives in the arena: capture Var, Shape, scalars and raw pointers only");
+    check_own(out, "the output of an op");
     if (!out.needs_grad()) return;
     auto* f = new (arena_.allocate(sizeof(F))) F(fn);
     nodes_.push_back({out, f, [](void* p, const T* dout) { (*static_cast<F*>(p))(dout); }});
   }
 
-  /// Seeds dL/dloss = 1 and replays. @throws ShapeError unless `loss` has exactly one element
+  /// Seeds dL/dloss = 1 and replays. Leaves add up over several calls; gradients of all other values begin
+  /// anew in each. @throws ShapeError unless `loss` has exactly one element
   void backward(Var<T> loss) {
     if (loss.shape().size() != 1)
       throw ShapeError("[backward] loss must have one element, got shape " + loss.shape().str());
@@ -147,12 +177,15 @@ class Tape {
     backward(loss, std::span<const T>(&one, 1));
   }
   /// Seeds dL/dout = seed (row-major, one for each element of out) and replays.
-  /// @throws ShapeError if the sizes differ   @throws ValueError if no input of `out` needs a gradient
+  /// @throws ShapeError if the sizes differ   @throws ValueError if no input of `out` needs a gradient, or it
+  /// was recorded on another tape
   void backward(Var<T> out, std::span<const T> seed) {
+    check_own(out, "the value to differentiate");
     if (static_cast<Index>(seed.size()) != out.shape().size())
       throw ShapeError("[backward] seed must have one element for each of out, whose shape is " +
                        out.shape().str() + ", got " + std::to_string(seed.size()));
     bool fresh = false;
+    begin_pass();
     T* g = out.grad() ? out.grad_acc() : out.grad_acc(&fresh, true);
     if (!g) throw ValueError("[backward] nothing to differentiate: no input of this value needs a gradient");
     detail::seed_gradient(seed.data(), out.rectified() ? out.value() : nullptr, fresh, g, out.shape().size());
@@ -161,23 +194,60 @@ class Tape {
   /// Replays from the gradients that the caller wrote to Var::grad_acc(): several outputs can be seeded by
   /// hand.
   void replay() {
+    begin_pass();
+    const Replaying replaying(phase_);
     for (auto n = nodes_.rbegin(); n != nodes_.rend(); ++n)
       if (const T* dout = n->out.grad()) n->run(n->closure, dout);
   }
   /// Forgets the recorded pass and keeps its memory for the next one; every Var of it becomes invalid.
   void reset() {
     nodes_.clear();
+    fresh_.clear();
+    phase_ = Phase::recording;
     arena_.reset();
   }
   /// The memory of values, gradients and closures, for counting.
   Arena& arena() { return arena_; }
 
  private:
+  friend class Var<T>;
+  enum class Phase : std::uint8_t { recording, replaying, replayed };
+  // Ends with `replayed` even if a backward throws: what it left half done must not be added to.
+  struct Replaying {
+    explicit Replaying(Phase& p) : phase(p) { phase = Phase::replaying; }
+    Replaying(const Replaying&) = delete;
+    Replaying& operator=(const Replaying&) = delete;
+    ~Replaying() { phase = Phase::replayed; }
+    Phase& phase;
+  };
   struct Node {
     Var<T> out;
     void* closure;
     void (*run)(void*, const T*);
   };
+  // After a replay: gradients that are not a leaf's begin anew, in the buffers that they have.
+  void begin_pass() {
+    if (phase_ != Phase::replayed) return;
+    phase_ = Phase::recording;
+    for (const Node& n : nodes_) forget_gradient(*n.out.slot_);
+    for (const Var<T>& v : fresh_) forget_gradient(*v.slot_);
+  }
+  static void forget_gradient(typename Var<T>::Slot& slot) {
+    if (slot.grad) slot.target = slot.grad;
+    slot.grad = nullptr;
+    slot.masked = true;
+  }
+  void check_own(const Var<T>& v, const char* what) const {
+    if (v.tape_ != this) [[unlikely]]
+      throw ValueError(std::string("[tape] ") + what +
+                       " was recorded on another tape: record all that belongs together on one");
+  }
+  static const T* filled(const Tensor<T>& t, const char* where) {
+    if (t.size() != t.shape.size())
+      throw ShapeError("[" + std::string(where) + "] t must have the elements of its shape " + t.shape.str() +
+                       ", got " + std::to_string(t.size()));
+    return t.data.data();
+  }
   Var<T> make(const T* value, T* grad, Shape shape, bool needs, const PackedMatrix<T>* packed = nullptr) {
     using Slot = typename Var<T>::Slot;
     return Var<T>(this, new (arena_.allocate(sizeof(Slot)))
@@ -185,6 +255,8 @@ class Tape {
   }
   Arena arena_;
   std::vector<Node> nodes_;
+  std::vector<Var<T>> fresh_;
+  Phase phase_ = Phase::recording;
 };
 
 template <class T>
@@ -199,6 +271,7 @@ template <class T>
 T* Var<T>::grad_acc(bool* fresh, bool masked) const {
   *fresh = false;
   if (!slot_->needs_grad) return nullptr;
+  tape_->begin_pass();
   if (!slot_->grad) {
     slot_->grad = slot_->target ? slot_->target : tape_->scratch(slot_->shape.size());
     *fresh = true;
@@ -212,10 +285,19 @@ Var<T> Tape<T>::reshape(Var<T> x, Shape shape) {
   if (shape.size() != x.shape().size())
     throw ShapeError("[reshape] shape must have the " + std::to_string(x.shape().size()) +
                      " elements of x, got shape " + shape.str());
-  Var<T> out = make(x.value(), nullptr, shape, x.needs_grad());
+  return part(x, 0, shape);
+}
+
+template <class T>
+Var<T> Tape<T>::part(Var<T> x, Index begin, Shape shape) {
   const Index n = shape.size();
-  on_backward(out, [x, n](const T* dy) {
-    T* dx = x.grad_acc();
+  if (begin < 0 || n > x.shape().size() - begin)
+    throw ShapeError("[part] elements " + std::to_string(begin) + " to " + std::to_string(begin + n) +
+                     " must lie within x, got shape " + x.shape().str());
+  check_own(x, "the input of an op");
+  Var<T> out = make(x.value() + begin, nullptr, shape, x.needs_grad());
+  on_backward(out, [x, begin, n](const T* dy) {
+    T* dx = x.grad_acc() + begin;
     for (Index i = 0; i < n; ++i) dx[i] += dy[i];
   });
   return out;

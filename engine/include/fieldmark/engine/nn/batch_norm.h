@@ -8,8 +8,8 @@ namespace fieldmark {
 
 /// Batch normalisation layer with the parameters "<name>/gamma" [C], initially 1, and "<name>/beta" [C],
 /// initially 0, and the running statistics "<name>/running_mean" [C], initially 0, and
-/// "<name>/running_variance" [C], initially 1. The store holds the statistics too, for checkpoints; their
-/// gradient is always 0, and weight decay must not touch them.
+/// "<name>/running_variance" [C], initially 1. The store holds the statistics too, for checkpoints, as
+/// ParamRole::running: they get no gradient, and an Adam made for the store leaves them alone.
 template <class T>
 class BatchNorm {
  public:
