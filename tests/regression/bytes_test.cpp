@@ -80,7 +80,7 @@ void add_mark(Hashes& hashes, const TemporaryFolder& folder, const std::string& 
   hashes[preset + " baked field"] = sha256_file_hex(baked);
   run({"render", "--field", baked, "--out", views, "--count", "1", "--size", "32"}, threads);
   hashes[preset + " renders"] = folder_hash(views);
-  run({"extract", "--owner", owner, views, "--json", read}, threads);
+  run({"extract", "--owner", owner, views, "--fpr", "1", "--json", read}, threads);
   hashes[preset + " logits"] = logits_hash(read);
 }
 

@@ -134,7 +134,7 @@ TEST_CASE("bake encodes payloads, and the other commands know them and their com
   CHECK(json_of({"verify", "--detection", "blind", "--owner", owner, "--payload", "c0fe",
                  images})["commitment"] != bake["commitment"]);
   // Nothing was learnt, so there is nothing to be read.
-  const auto extracted = json_of({"extract", "--owner", owner, images});
+  const auto extracted = json_of({"extract", "--fpr", "1", "--owner", owner, images});
   CHECK(extracted["payload"].is_null());
   CHECK(extracted["views"][0]["payload"].is_null());
   const auto of_baked = json_of({"measure", "--informed-count", "0", "--owner", owner, "--field", baked,

@@ -1,3 +1,4 @@
+#include <fieldmark/core/files.h>
 #include <fieldmark/imaging/image.h>
 
 #include <nlohmann/json.hpp>
@@ -9,6 +10,19 @@
 #include "tools/run_command.h"
 
 using namespace fieldmark;
+
+TEST_CASE("distort leaves out a broken image and goes on", "[attack]") {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "in");
+  write_png(folder / "in/a.png", Tensor<float>({8, 8, 3}, 0.5f));
+  write_file_atomically(folder / "in/b.png", std::string_view("no image"));
+  write_png(folder / "in/c.png", Tensor<float>({8, 8, 3}, 0.5f));
+  const auto r = run_command({"distort", folder / "in", "--out", folder / "out", "--distort", "greyscale"});
+  CHECK(r.code == cli::kFailed);
+  CHECK_THAT(r.out, Contains("left out") && Contains("b.png") && Contains(": 2 images after greyscale"));
+  CHECK(std::filesystem::exists(folder / "out/a.png"));
+  CHECK(std::filesystem::exists(folder / "out/c.png"));
+}
 
 TEST_CASE("attack writes one image for each, the same for the same seed", "[attack]") {
   const TemporaryFolder folder;

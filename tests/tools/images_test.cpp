@@ -1,8 +1,12 @@
 #include "cli/images.h"
 
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/files.h>
 #include <fieldmark/imaging/image.h>
 
+#include <sstream>
+
+#include "cli/context.h"
 #include "support/catch.h"
 #include "support/temporary_folder.h"
 
@@ -27,15 +31,54 @@ TEST_CASE("list_images opens folders and keeps the order of what is named", "[im
   for (const char* name : {"r_10.png", "r_2.PNG", "r_1.jpg"})
     write_png(folder / name, Tensor<float>({1, 1, 3}));
   write_png(folder / "notes.txt", Tensor<float>({1, 1, 3}));
-  const auto all = list_images({(folder / "r_10.png").string(), folder.path.string()});
+  std::ostringstream out, err;
+  Context context({}, {"fieldmark", "x"}, out, err);
+  const auto all = list_images({(folder / "r_10.png").string(), folder.path.string()}, context);
   REQUIRE(all.size() == 4);
   CHECK(all[0].filename() == "r_10.png");
   CHECK(all[1].filename() == "r_1.jpg");
   CHECK(all[2].filename() == "r_2.PNG");
   CHECK(all[3].filename() == "r_10.png");
   std::filesystem::create_directory(folder / "empty");
-  CHECK_THROWS_WITH(list_images({(folder / "empty").string()}), Contains("empty: expected PNG or JPEG"));
-  CHECK_THROWS_WITH(list_images({"/no/such"}), Contains("/no/such: no such file or folder"));
+  CHECK_THROWS_WITH(list_images({(folder / "empty").string()}, context),
+                    Contains("empty: expected PNG or JPEG"));
+  CHECK_THROWS_WITH(list_images({"/no/such"}, context), Contains("/no/such: no such file or folder"));
+}
+
+TEST_CASE("list_images skips hidden and foreign files and counts them", "[images]") {
+  const TemporaryFolder folder;
+  for (const char* name :
+       {"a.png", "._a.png", ".hidden.jpg", "b.WEBP", "c.webp", "d.heic", "README", "e.jpeg"})
+    write_file_atomically(folder / name, "x");
+  std::ostringstream out, err;
+  Context context({}, {"fieldmark", "x"}, out, err);
+  const auto images = list_images({folder.path.string()}, context);
+  REQUIRE(images.size() == 2);
+  CHECK(images[0].filename() == "a.png");
+  CHECK(images[1].filename() == "e.jpeg");
+  CHECK(out.str() ==
+        "note: " + folder.path.string() +
+            ": 6 files that are hidden or not PNG or JPEG are skipped: 1 .heic, 2 .webp, 2 hidden, 1 "
+            "without extension\n");
+  CHECK(!context.left_out());
+  std::filesystem::create_directory(folder / "f");
+  write_file_atomically(folder / "f/x.heic", "x");
+  CHECK_THROWS_WITH(list_images({(folder / "f").string()}, context),
+                    Contains("found none; 1 files") && Contains("1 .heic"));
+}
+
+TEST_CASE("ReadFaults leaves out what cannot be read, unless that is all", "[images]") {
+  std::ostringstream out, err;
+  Context context({}, {"fieldmark", "x"}, out, err);
+  ReadFaults faults{.warnings = {"odd.jpg: odd"}};
+  CHECK(faults.try_read("a.png", [] {}));
+  CHECK(!faults.try_read("b.png", [] { throw IoError("b.png: broken"); }));
+  CHECK_THROWS_AS(faults.try_read("c.png", [] { throw ValueError("c"); }), ValueError);
+  CHECK_THROWS_WITH(faults.tell(1, context), "b.png: broken");
+  CHECK(!context.left_out());
+  faults.tell(2, context);
+  CHECK(context.left_out());
+  CHECK(out.str() == "note: odd.jpg: odd\nnote: left out, b.png: broken\n");
 }
 
 TEST_CASE("read_rgb repeats grey and shows the background through", "[images]") {

@@ -115,7 +115,7 @@ void check(const BenchAttacksArguments& o) {
   for (const std::string& path : o.attacked)
     if (!std::filesystem::exists(path)) throw IoError(path + ": no such file");
   if (o.plot.empty()) return;
-  for (const std::string& file : results::chart_files("attacks", o.plot)) check_writable(file);
+  for (const std::string& file : results::chart_files("attacks", o.plot)) check_writable_page(file);
 }
 
 // The severities of a curve, or its middle one.

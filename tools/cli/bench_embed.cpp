@@ -115,7 +115,7 @@ constexpr const char* kColumns =
 
 int run_bench_embed(const BenchEmbedArguments& options, Context& context) {
   if (!options.plot.empty())
-    for (const std::string& file : results::chart_files("embed", options.plot)) check_writable(file);
+    for (const std::string& file : results::chart_files("embed", options.plot)) check_writable_page(file);
   const EmbedSubject subject = embed_subject(options, context);
   const auto variants = variants_of(options, *subject.field, context.seed());
   auto rows = with_progress(context, [&](const auto& progress) {

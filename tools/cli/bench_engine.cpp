@@ -138,7 +138,7 @@ Json precision(const BenchEngineArguments& options, const Scene& scene, Context&
 }
 
 int run_bench_engine(BenchEngineArguments options, Context& context) {
-  if (!options.plot.empty()) check_writable(options.plot);
+  if (!options.plot.empty()) check_writable_page(options.plot);
   const Scene scene = scene_of(options);
   if (scene.train) options.engine.scene = &*scene.train;
   if (!options.peer.empty()) options.engine.peer = options.python;

@@ -80,7 +80,7 @@ Json field_rows_json(const bench::FieldBench& result, Context& context) {
 }
 
 int run_bench_field(const BenchFieldArguments& options, Context& context) {
-  if (!options.plot.empty()) check_writable(options.plot);
+  if (!options.plot.empty()) check_writable_page(options.plot);
   const FieldSubject subject = field_subject(options, context);
   const bench::FieldBenchOptions bench{.runs = options.runs, .seed = context.seed(), .quick = options.quick};
   const bench::FieldBench result = with_progress(context, [&](const auto& progress) {

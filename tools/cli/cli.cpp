@@ -82,7 +82,8 @@ class Program {
     for (auto& [sub, command] : subcommands_) {
       if (!sub->parsed()) continue;
       Context context(common_, line, out_, err_);
-      return command(context);
+      const int code = command(context);
+      return context.left_out() ? kFailed : code;
     }
     return kUsage;
   }
@@ -115,6 +116,9 @@ class Program {
         for (const auto& name : option->get_lnames()) names.push_back("--" + name);
     for (std::size_t i = 2; i < line.size() && line[i] != "--"; ++i) {
       const std::string word = line[i].substr(0, line[i].find('='));
+      // CLI11 would take the next word for the value.
+      if (word.starts_with("--") && line[i].size() == word.size() + 1)
+        return word + ": expected a value behind =, got an empty one";
       if (!word.starts_with("--") || std::find(names.begin(), names.end(), word) != names.end()) continue;
       return line[1] + " has no option " + word + did_you_mean(word, names);
     }

@@ -62,6 +62,7 @@ int run_bake(const BakeArguments& options, Context& context) {
   if (std::filesystem::exists(options.out) && std::filesystem::equivalent(options.out, options.owner))
     throw UsageError("--out: " + options.out + " is the owner's file");
   check_writable(options.out);
+  if (!options.resume) check_writable(checkpoint);  // that of embed holds a key
   auto owner = watermark::Owner::load(options.owner);
   if (options.mark_psnr) {
     if (!owner.mark().has_gain())

@@ -37,7 +37,7 @@ int run_check(const CheckArguments& options, Context& context) {
   if (!options.public_key.empty())
     signer = read_option("--public-key", [&] { return watermark::public_key_from_hex(options.public_key); });
   const auto images =
-      options.images.empty() ? std::vector<std::filesystem::path>{} : list_images(options.images);
+      options.images.empty() ? std::vector<std::filesystem::path>{} : list_images(options.images, context);
   const auto check = watermark::check_evidence_folder(options.folder, images, signer);
   auto& out = context.text();
   for (const auto& fault : check.faults) out << fault << "\n";

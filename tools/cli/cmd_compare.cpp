@@ -58,7 +58,8 @@ Json json_of(const Scores& s) {
 }
 
 int compare(const CompareArguments& options, const Networks& networks, Context& context) {
-  const auto left = list_images({options.paths[0]}), right = list_images({options.paths[1]});
+  const auto left = list_images({options.paths[0]}, context),
+             right = list_images({options.paths[1]}, context);
   if (left.size() != right.size())
     throw IoError(options.paths[1] + ": expected " + std::to_string(left.size()) + " images, as " +
                   options.paths[0] + " has, found " + std::to_string(right.size()));

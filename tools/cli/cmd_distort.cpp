@@ -1,3 +1,4 @@
+#include <fieldmark/core/files.h>
 #include <fieldmark/distort/distortion.h>
 #include <fieldmark/imaging/image.h>
 
@@ -38,26 +39,31 @@ std::vector<std::filesystem::path> outputs_of(const std::vector<std::filesystem:
 int run_distort(const DistortArguments& options, Context& context) {
   const auto distortion =
       read_option("--distort", [&] { return distort::parse_distortion(options.distort); });
-  const auto images = list_images(options.inputs);
+  const auto images = list_images(options.inputs, context);
   const auto outputs = outputs_of(images, options.out);
-  std::filesystem::create_directories(options.out);
+  prepare_folder(options.out);
   const float value = options.background == "white" ? 1.f : 0.f;
   const float background[3] = {value, value, value};
   const CounterRng rng(context.seed());
 
   const InterruptGuard guard;
   Json list = Json::array();
+  ReadFaults faults;
   {
     Progress progress = context.progress("distort");
     for (std::size_t i = 0; i < images.size(); ++i) {
       if (guard.interrupted()) throw Interrupted(std::to_string(i) + " images were written");
-      write_png(outputs[i],
-                distort::apply_distortion(distortion, read_rgb(images[i], value), rng, i, background));
-      list.push_back({{"image", images[i].string()}, {"out", outputs[i].string()}});
+      Tensor<float> image;
+      if (faults.try_read(images[i], [&] { image = read_rgb(images[i], value); })) {
+        faults.check(images[i], read_bytes(images[i]));
+        write_png(outputs[i], distort::apply_distortion(distortion, image, rng, i, background));
+        list.push_back({{"image", images[i].string()}, {"out", outputs[i].string()}});
+      }
       progress.update(static_cast<double>(i + 1) / static_cast<double>(images.size()));
     }
   }
-  context.text() << options.out << ": " << images.size() << " images after " << options.distort << "\n";
+  faults.tell(images.size(), context);
+  context.text() << options.out << ": " << list.size() << " images after " << options.distort << "\n";
   context.result({{"distort", options.distort}, {"images", list}});
   return kOk;
 }

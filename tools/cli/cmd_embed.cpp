@@ -128,7 +128,7 @@ int run_embed(const EmbedArguments& options, Context& context) {
   if (std::filesystem::exists(options.out) && std::filesystem::equivalent(options.out, options.field))
     throw UsageError("--out: " + options.out + " is the field that is to be marked");
   check_writable(options.out);
-  check_writable(image);
+  check_writable_page(image);
   for (const auto& name : options.under)
     read_option("--distort", [&] { return distort::parse_distortion(name); });
   std::optional<watermark::Message> intended;

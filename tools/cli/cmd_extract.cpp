@@ -1,3 +1,7 @@
+#include <fieldmark/watermark/evidence/noise.h>
+
+#include <algorithm>
+#include <cstdio>
 #include <memory>
 #include <ostream>
 
@@ -10,42 +14,86 @@
 namespace fieldmark::cli {
 namespace {
 
+constexpr double kWeakBit = 0.05;  // p-value above which a bit by itself says nothing
+constexpr double kTrace = 0.01;    // p-value of noise below which there is something to look for
+
 struct ExtractArguments {
-  std::string owner, reading = "auto";
+  std::string owner, key, reading = "auto";
+  double fpr = 1e-6;
   std::vector<std::string> images;
 };
 
+Json bits_json(const watermark::BitReading& reading) {
+  return {{"bits", to_bits(reading.message)},
+          {"payload", payload_json(read_payload(reading.sum))},
+          {"p_noise", watermark::noise_p_value(reading)},
+          {"bit_p_values", watermark::bit_p_values(reading)},
+          {"logits", reading.logit}};
+}
+
+void print_view(const ImageEvidence& image, const watermark::BitReading& reading, Context& context) {
+  char p[60];
+  std::snprintf(p, sizeof p, ", noise with p %.1e\n", watermark::noise_p_value(reading));
+  context.text() << to_bits(reading.message) << "  " << image.image << "  "
+                 << watermark::reading_name(image.reading) << p;
+}
+
+// How sure it is that the bits of all images together are a message.
+std::string certainty(const watermark::BitReading& reading, double fpr) {
+  const double p = watermark::noise_p_value(reading);
+  const auto p_values = watermark::bit_p_values(reading);
+  const auto weak = std::ranges::count_if(p_values, [](double bit) { return bit > kWeakBit; });
+  char text[300];
+  if (p <= fpr)
+    std::snprintf(text, sizeof text,
+                  "READ at a false-positive rate of %g: unmarked images give such bits with p %.1e\n"
+                  "%lld of %zu bits are weak: by themselves they may be wrong (p above %g)\n",
+                  fpr, p, static_cast<long long>(weak), p_values.size(), kWeakBit);
+  else
+    std::snprintf(
+        text, sizeof text,
+        "NOTHING READ at a false-positive rate of %g: unmarked images give such bits with p %.1e\n%s\n", fpr,
+        p,
+        p <= kTrace ? "there may be a mark, too faint to be sure: more images of the field tell"
+                    : "the bits above are guesses, not a message");
+  return text;
+}
+
 int run_extract(const ExtractArguments& options, Context& context) {
   const auto owner = watermark::Owner::load(options.owner);
+  const auto code = options.key.empty() ? owner.code() : owner.code(watermark::load_key(options.key));
+  const Index bits = owner.options().bits;
+  const double least = watermark::least_noise_p(code.carriers(), bits);
+  const bool can_tell = least < 1;  // a bit of one cell looks the same in noise
+  if (can_tell) check_rate(options.fpr, least, code.carriers());
   SuspectReader reader(owner, options.reading);
   const auto images = read_images(reader, options.images, context);
-  const auto code = owner.code();
-  const Index bits = owner.options().bits;
   Json views = Json::array();
   for (const auto& image : images) {
     const auto reading = watermark::read_bits(image.cells, code, bits);
-    const char* how = watermark::reading_name(image.reading);
-    context.text() << to_bits(reading.message) << "  " << image.image << "  " << how << "\n";
-    views.push_back({{"image", image.image},
-                     {"bits", to_bits(reading.message)},
-                     {"detection", how},
-                     {"agreement", number(image.agreement)},
-                     {"payload", payload_json(read_payload(reading.sum))},
-                     {"p_noise", watermark::bit_p_values(reading)},
-                     {"logits", reading.logit}});
+    print_view(image, reading, context);
+    Json view{{"image", image.image},
+              {"detection", watermark::reading_name(image.reading)},
+              {"agreement", number(image.agreement)}};
+    view.update(bits_json(reading));
+    views.push_back(view);
   }
   const auto reading = watermark::read_bits(total_evidence(images), code, bits);
-  const auto payload = read_payload(reading.sum);
-  context.text() << to_bits(reading.message) << "  all together: " << to_hex(reading.message)
-                 << "\npayload: " << payload_text(payload, bits) << "\n";
-  context.result({{"message", to_hex(reading.message)},
-                  {"bits", to_bits(reading.message)},
-                  {"payload", payload_json(payload)},
-                  {"detection", reading_used(images)},
-                  {"p_noise", watermark::bit_p_values(reading)},
-                  {"logits", reading.logit},
-                  {"views", views}});
-  return kOk;
+  const bool read = watermark::noise_p_value(reading) <= options.fpr;
+  context.text() << to_bits(reading.message) << "  all together: " << to_hex(reading.message) << "\n"
+                 << (can_tell || read
+                         ? certainty(reading, options.fpr)
+                         : "NOTHING READ: this owner has one cell for each bit, so bits alone do not "
+                           "tell a message from noise; verify does, with the message\n")
+                 << "payload: " << payload_text(read_payload(reading.sum), bits) << "\n";
+  Json json{{"read", read},
+            {"fpr", options.fpr},
+            {"message", to_hex(reading.message)},
+            {"detection", reading_used(images)}};
+  json.update(bits_json(reading));
+  json["views"] = views;
+  context.result(json);
+  return read ? kOk : kNotFound;
 }
 
 }  // namespace
@@ -53,6 +101,8 @@ int run_extract(const ExtractArguments& options, Context& context) {
 Command add_extract(CommandLine& app) {
   auto o = std::make_shared<ExtractArguments>();
   app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
+  app.add_option("--key", o->key, "Key to read with instead of the owner's")->type_name("KEY");
+  add_rate(app, o->fpr, "a message counts as read");
   add_reading(app, o->reading);
   app.add_option("images", o->images, "Images to read, or folders of them; PNG or JPEG")
       ->required()

@@ -1,4 +1,5 @@
 #include <fieldmark/core/digest.h>
+#include <fieldmark/core/files.h>
 #include <fieldmark/watermark/keys/signing.h>
 
 #include <filesystem>
@@ -22,6 +23,8 @@ int run_key(const KeyArguments& options, Context& context) {
   if (std::filesystem::exists(options.out) && !options.force)
     throw IoError(options.out +
                   ": exists already; --force replaces it, and proofs with the old key are lost");
+  AtomicFile{options.out};
+  if (std::filesystem::exists(options.out)) watermark::load_key(options.out);  // and no other file
   const auto key = watermark::random_key();
   watermark::save_key(options.out, key);
   const std::string open = to_hex(watermark::public_key(key));
@@ -37,7 +40,7 @@ int run_key(const KeyArguments& options, Context& context) {
 Command add_key(CommandLine& app) {
   auto options = std::make_shared<KeyArguments>();
   app.add_option("--out", options->out, "File to write, the key")->required()->type_name("KEY");
-  app.add_flag("--force", options->force, "Replace an existing key");
+  app.add_flag("--force", options->force, "Replace an existing key, and no other file");
   return [options](Context& context) { return run_key(*options, context); };
 }
 

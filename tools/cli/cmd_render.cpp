@@ -13,6 +13,7 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/images.h"
 #include "cli/precision.h"
 #include "cli/scene_data.h"
 #include "cli/supersampling.h"
@@ -20,11 +21,13 @@
 namespace fieldmark::cli {
 namespace {
 
+constexpr char kViewPrefix[] = "view_";
+
 struct RenderArguments {
   std::string field, out, data;
   std::string split = "test", cameras = "novel", precision = "fp32";
   std::string against, sheet;
-  bool cameras_given = false;
+  bool cameras_given = false, overwrite = false;
   Index count = 10, size = 0, supersampling = 0;
   std::optional<Index> average, importance, random;
 };
@@ -61,7 +64,7 @@ std::vector<NamedCamera> cameras_of(const RenderArguments& options, const nerf::
   for (const auto& camera : nerf::make_cameras(field.cameras, nerf::parse_camera_set(options.cameras),
                                                options.count, options.size, context.seed())) {
     char name[32];
-    std::snprintf(name, sizeof name, "view_%03zu", cameras.size());
+    std::snprintf(name, sizeof name, "%s%03zu", kViewPrefix, cameras.size());
     cameras.push_back({name, camera});
   }
   return cameras;
@@ -78,12 +81,38 @@ void write_sheet(const RenderArguments& options, nerf::Renderer& renderer,
   write_png(options.sheet, results::comparison_sheet(pairs));
 }
 
+// Older views beside new ones would be taken for one run's, by verify above all. --overwrite removes those
+// that this command named; what others named stays.
+void clear_older_views(const RenderArguments& options, const std::vector<NamedCamera>& cameras,
+                       Context& context) {
+  std::vector<std::filesystem::path> older, others;
+  for (const auto& path : images_in(options.out)) {
+    const std::string stem = path.stem().string();
+    const bool ours = path.extension() == ".png" && stem.starts_with(kViewPrefix) &&
+                      std::ranges::all_of(stem.substr(std::size(kViewPrefix) - 1), is_digit);
+    (ours ? older : others).push_back(path);
+  }
+  if (older.empty() && others.empty()) return;
+  if (!options.overwrite)
+    throw IoError(options.out + ": expected a folder without images, found " +
+                  std::to_string(older.size() + others.size()) +
+                  " of another run; name another folder, or --overwrite");
+  for (const auto& path : older) std::filesystem::remove(path);
+  for (const auto& [name, camera] : cameras)
+    std::erase(others, std::filesystem::path(options.out) / (name + ".png"));
+  if (!others.empty())
+    context.note(options.out +
+                 ": images of other names stay beside the new views: " + std::to_string(others.size()));
+}
+
 int run_render(const RenderArguments& options, Context& context) {
   if (options.cameras_given && !options.data.empty() && options.cameras != "test")
     throw UsageError("--cameras " + options.cameras + ": --data has cameras of its own");
+  if (!options.sheet.empty()) check_writable_page(options.sheet);
   const auto field = nerf::RadianceField::load(options.field);
+  prepare_folder(options.out);
   const auto cameras = cameras_of(options, field, context);
-  std::filesystem::create_directories(options.out);
+  clear_older_views(options, cameras, context);
   nerf::Renderer renderer(field, {.precision = precision_of(options.precision),
                                   .points = points_of(options, field),
                                   .supersampling = options.supersampling});
@@ -134,6 +163,8 @@ Command add_render(CommandLine& app) {
                      "extrapolated (over 30 degrees from every training direction), closer, farther")
           ->one_of(nerf::camera_set_names())
           ->type_name("SET");
+  app.add_flag("--overwrite", o->overwrite,
+               "Write to a folder that has images, and remove the views of earlier runs, view_N.png");
   add_precision(app, o->precision);
   add_supersampling(app, o->supersampling);
   app.add_option("--count", o->count, "Cameras to draw, 1 to 100000")

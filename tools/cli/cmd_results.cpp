@@ -94,6 +94,8 @@ class Runner {
     const fs::path log = places_.work / "logs" / (row.id + ".log"),
                    json = places_.work / "logs" / (row.id + ".json");
     fs::create_directories(log.parent_path());
+    // Of a row that is stale: embed replaces no owner, and render adds to no views.
+    if (!row.output().empty()) fs::remove_all(results::path_of(plan_, row.output(), places_));
     const double begun = context_.seconds();
     const int code = call(command_line(row, json.string(), m), log);
     if (code == kInterrupted) throw Interrupted("rows that are done are kept");

@@ -110,15 +110,7 @@ int run_verify(const VerifyArguments& options, Context& context) {
   const auto message = message_of(options.message, bits);
   const auto key = options.key.empty() ? owner.key : watermark::load_key(options.key);
   const auto code = owner.code(key);
-  const double least = watermark::least_p(code.carriers());
-  if (least > options.fpr) {
-    char text[120];
-    std::snprintf(text, sizeof text,
-                  "--fpr: with %lld cells no image can reach %g, the smallest p-value is %.1e",
-                  static_cast<long long>(code.carriers()), options.fpr, least);
-    throw UsageError(text);
-  }
-
+  check_rate(options.fpr, watermark::least_p(code.carriers()), code.carriers());
   if (!options.evidence.empty()) watermark::prepare_evidence_folder(options.evidence);
   SuspectReader reader(owner, options.reading);
   const auto images = read_images(reader, options.images, context);
@@ -165,9 +157,7 @@ Command add_verify(CommandLine& app) {
   auto o = std::make_shared<VerifyArguments>();
   app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
   add_message_options(app, o->message, "Message to look for");
-  app.add_option("--fpr", o->fpr, "False-positive rate at which a mark counts as found, above 0 to 1")
-      ->range(1e-300, 1.0)
-      ->type_name("P");
+  add_rate(app, o->fpr, "a mark counts as found");
   app.add_option("--key", o->key, "Key to test instead of the owner's")->type_name("KEY");
   app.add_option("--wrong-keys", o->wrong_keys,
                  "Random keys to test as well, 0 to 10000000; default: 0, with --evidence 100000")

@@ -1,8 +1,11 @@
 #include "cli/command_line.h"
 
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <cmath>
+#include <limits>
 #include <optional>
+#include <system_error>
 
 namespace fieldmark::cli {
 namespace {
@@ -14,9 +17,31 @@ std::string fault_of_number(const std::string& text) {
   return "";
 }
 
-std::string fault_of_unsigned(const std::string& text) {
-  return text.starts_with('-') ? "expected a whole number from 0, got " + text : "";
+// CLI11 takes 010 for 8, 0x10 for 16, and cuts off what is beyond the type's range.
+template <class T>
+std::string fault_of_whole(const std::string& text) {
+  T value{};
+  const std::size_t first = text.starts_with('-') ? 1 : 0;
+  const bool octal = text.size() > first + 1 && text[first] == '0';
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error == std::errc{} && end == text.data() + text.size() && !octal) return "";
+  return "expected a whole number" + std::string(std::is_unsigned_v<T> ? " from 0" : "") + " to " +
+         std::to_string(std::numeric_limits<T>::max()) + " in decimal digits, got " + text;
 }
+
+std::string fault_of_empty(const std::string& text) {
+  return text.empty() ? "expected a value, got an empty one" : "";
+}
+
+// What an option holds, without the optional around it.
+template <class T>
+struct Held {
+  using type = T;
+};
+template <class T>
+struct Held<std::optional<T>> {
+  using type = T;
+};
 
 }  // namespace
 
@@ -50,9 +75,10 @@ std::size_t Option::count() const { return option_->count(); }
 template <class T>
 Option CommandLine::add_option(const std::string& name, T& value, const std::string& help) {
   Option option(app_->add_option(name, value, help));
-  constexpr bool texts = std::is_same_v<T, std::string> || std::is_same_v<T, std::vector<std::string>>;
-  if constexpr (!texts) option.check(fault_of_number);
-  if constexpr (std::is_unsigned_v<T>) option.check(fault_of_unsigned);
+  using Value = typename Held<T>::type;
+  option.check(fault_of_empty);
+  if constexpr (std::is_floating_point_v<Value>) option.check(fault_of_number);
+  if constexpr (std::is_integral_v<Value>) option.check(fault_of_whole<Value>);
   return option;
 }
 template Option CommandLine::add_option(const std::string&, std::string&, const std::string&);

@@ -56,7 +56,8 @@ class Option {
   CLI::Option* option_;
 };
 
-/// The options that a command accepts. Infinity and NaN are refused wherever a number is expected.
+/// The options that a command accepts. One rule for all of them: no value is empty, no number is NaN or
+/// infinite, and a whole number is written in decimal digits and fits its type.
 class CommandLine {
  public:
   explicit CommandLine(CLI::App& app) : app_(&app) {}

@@ -6,6 +6,8 @@
 #include <ostream>
 
 #include <fieldmark/tools/results/report.h>
+#include "cli/cli.h"
+#include "cli/outputs.h"
 
 namespace fieldmark::cli {
 
@@ -27,8 +29,6 @@ void add_common(CommandLine& app, CommonOptions& options) {
       ->type_name("FILE");
 }
 
-void check_writable(const std::string& path) { AtomicFile{path}; }
-
 Context::Context(const CommonOptions& options, std::vector<std::string> command_line, std::ostream& out,
                  std::ostream& err)
     : options_(options),
@@ -37,7 +37,9 @@ Context::Context(const CommonOptions& options, std::vector<std::string> command_
       err_(err),
       text_(options.json == "-" ? err : out) {
   for (const auto& path : {options.json, options.report})
-    if (!path.empty() && path != "-") check_writable(path);
+    if (!path.empty() && path != "-") check_writable_page(path);
+  if (!options.json.empty() && options.json == options.report)
+    throw UsageError("--report: " + options.report + " is the file of --json");
 }
 
 void Context::note(const std::string& text) {
@@ -46,16 +48,27 @@ void Context::note(const std::string& text) {
   notes_.push_back(text);
 }
 
+void Context::leave_out(const std::string& input, const std::string& reason) {
+  note("left out, " + reason);
+  left_out_.push_back({{"image", input}, {"reason", reason}});
+}
+
 void Context::result(const Json& found) {
   Json json = found;
   if (!notes_.empty()) json["notes"] = notes_;
+  if (left_out()) json["left_out"] = left_out_;
+  // A name that is not UTF-8 has U+FFFD in the place of its foreign bytes.
+  const std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
   if (options_.json == "-") {
-    out_ << json.dump(2) << "\n";
+    out_ << text;
   } else if (!options_.json.empty()) {
-    write_file_atomically(options_.json, json.dump(2) + "\n");
+    check_writable_page(options_.json);  // the command may have made a field of this name
+    write_file_atomically(options_.json, text);
   }
-  if (!options_.report.empty())
+  if (!options_.report.empty()) {
+    check_writable_page(options_.report);
     write_file_atomically(options_.report, results::markdown_report(command_line_, results::machine(), json));
+  }
 }
 
 }  // namespace fieldmark::cli

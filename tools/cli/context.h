@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cli/command_line.h"
+#include "cli/outputs.h"
 #include "cli/progress.h"
 
 namespace fieldmark::cli {
@@ -26,9 +27,6 @@ struct CommonOptions {
 };
 void add_common(CommandLine& app, CommonOptions& options);
 
-/// Leaves an existing file untouched. @throws IoError if the file cannot be written
-void check_writable(const std::string& path);
-
 /// The environment of a command: common options, output streams, progress and results.
 class Context {
  public:
@@ -43,6 +41,11 @@ class Context {
   std::ostream& text() { return text_; }
   /// Prints a remark on the input and adds it to "notes" of the results; each text once.
   void note(const std::string& text);
+  /// Names an input that cannot be read while the others are: a note, an entry of "left_out" of the results,
+  /// and exit code 1 in place of the command's own.
+  void leave_out(const std::string& input, const std::string& reason);
+  /// Whether any was.
+  bool left_out() const { return !left_out_.empty(); }
   Progress progress(std::string what) { return Progress(err_, std::move(what)); }
   /// Seconds since the command was called.
   double seconds() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
@@ -56,6 +59,7 @@ class Context {
   std::vector<std::string> command_line_;
   std::ostream &out_, &err_, &text_;
   std::vector<std::string> notes_;
+  Json left_out_ = Json::array();
 };
 
 }  // namespace fieldmark::cli

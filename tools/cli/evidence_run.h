@@ -34,7 +34,7 @@ struct TestedControls {
 
 /// Tests the built-in controls (watermark::built_in_controls()) of the first five images and each image or
 /// folder of `given`, which the user declares unmarked, with the same detection.
-/// @throws IoError naming the image that cannot be read
+/// @throws IoError as read_images()
 TestedControls test_controls(const KeyTest& test, SuspectReader& reader,
                              const std::vector<ImageEvidence>& images, const std::vector<std::string>& given,
                              Context& context);

@@ -2,14 +2,18 @@
 
 #include <fieldmark/core/error.h>
 #include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/jpeg_file.h>
 
 #include <algorithm>
 #include <cctype>
+#include <map>
+
+#include "cli/context.h"
 
 namespace fieldmark::cli {
 namespace {
 
-bool is_digit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
+namespace fs = std::filesystem;
 
 std::string digits_at(const std::string& s, std::size_t i) {
   std::size_t end = i;
@@ -17,13 +21,51 @@ std::string digits_at(const std::string& s, std::size_t i) {
   return s.substr(i, end - i);
 }
 
-bool is_image(const std::filesystem::path& path) {
+std::string lower_extension(const fs::path& path) {
   std::string extension = path.extension().string();
   for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+  return extension;
+}
+
+struct Listing {
+  std::vector<fs::path> images;
+  std::map<std::string, std::size_t> others;  // files that are not read, by kind
+};
+
+Listing list_folder(const fs::path& folder) {
+  Listing found;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (!entry.is_regular_file()) continue;
+    const std::string extension = lower_extension(entry.path());
+    if (entry.path().filename().string().starts_with('.'))
+      ++found.others["hidden"];
+    else if (extension == ".png" || extension == ".jpg" || extension == ".jpeg")
+      found.images.push_back(entry.path());
+    else
+      ++found.others[extension.empty() ? "without extension" : extension];
+  }
+  std::ranges::sort(found.images, [](const auto& a, const auto& b) {
+    return natural_less(a.filename().string(), b.filename().string());
+  });
+  return found;
+}
+
+// "3 files that are not PNG or JPEG are skipped: 1 hidden, 2 .webp", or nothing.
+std::string skipped(const Listing& listing) {
+  std::size_t count = 0;
+  std::string kinds;
+  for (const auto& [kind, files] : listing.others) {
+    count += files;
+    kinds += (kinds.empty() ? "" : ", ") + std::to_string(files) + " " + kind;
+  }
+  return count == 0
+             ? ""
+             : std::to_string(count) + " files that are hidden or not PNG or JPEG are skipped: " + kinds;
 }
 
 }  // namespace
+
+bool is_digit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
 
 bool natural_less(const std::string& a, const std::string& b) {
   std::size_t i = 0, j = 0;
@@ -46,28 +88,28 @@ bool natural_less(const std::string& a, const std::string& b) {
   return a.size() - i < b.size() - j;
 }
 
-std::vector<std::filesystem::path> list_images(const std::vector<std::string>& paths) {
-  std::vector<std::filesystem::path> images;
-  for (const std::filesystem::path path : paths) {
-    if (!std::filesystem::exists(path)) throw IoError(path.string() + ": no such file or folder");
-    if (!std::filesystem::is_directory(path)) {
+std::vector<fs::path> images_in(const fs::path& folder) { return list_folder(folder).images; }
+
+std::vector<fs::path> list_images(const std::vector<std::string>& paths, Context& context) {
+  std::vector<fs::path> images;
+  for (const fs::path path : paths) {
+    if (!fs::exists(path)) throw IoError(path.string() + ": no such file or folder");
+    if (!fs::is_directory(path)) {
       images.push_back(path);
       continue;
     }
-    std::vector<std::filesystem::path> inside;
-    for (const auto& entry : std::filesystem::directory_iterator(path))
-      if (entry.is_regular_file() && is_image(entry.path())) inside.push_back(entry.path());
-    if (inside.empty())
-      throw IoError(path.string() + ": expected PNG or JPEG files in the folder, found none");
-    std::sort(inside.begin(), inside.end(), [](const auto& a, const auto& b) {
-      return natural_less(a.filename().string(), b.filename().string());
-    });
-    images.insert(images.end(), inside.begin(), inside.end());
+    const Listing inside = list_folder(path);
+    const std::string others = skipped(inside);
+    if (inside.images.empty())
+      throw IoError(path.string() + ": expected PNG or JPEG files in the folder, found none" +
+                    (others.empty() ? "" : "; " + others));
+    if (!others.empty()) context.note(path.string() + ": " + others);
+    images.insert(images.end(), inside.images.begin(), inside.images.end());
   }
   return images;
 }
 
-Tensor<float> read_rgb(const std::filesystem::path& path, float background) {
+Tensor<float> read_rgb(const fs::path& path, float background) {
   Tensor<float> image = read_image(path);
   const Index channels = image.shape[2], pixels = image.shape[0] * image.shape[1];
   if (channels == 3) return image;
@@ -79,6 +121,17 @@ Tensor<float> read_rgb(const std::filesystem::path& path, float background) {
       rgb[i * 3 + c] = alpha * image[i * channels + (channels < 3 ? 0 : c)] + (1 - alpha) * background;
   }
   return quantize8(rgb);
+}
+
+void ReadFaults::check(const fs::path& image, std::span<const std::byte> bytes) {
+  if (const std::string odd = jpeg_oddity(bytes); !odd.empty())
+    warnings.push_back(image.string() + ": " + odd);
+}
+
+void ReadFaults::tell(std::size_t images, Context& context) const {
+  if (images > 0 && unreadable.size() == images) throw IoError(unreadable.front().second);
+  for (const auto& warning : warnings) context.note(warning);
+  for (const auto& [image, reason] : unreadable) context.leave_out(image, reason);
 }
 
 }  // namespace fieldmark::cli

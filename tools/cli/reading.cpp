@@ -4,6 +4,8 @@
 #include <fieldmark/core/files.h>
 #include <fieldmark/imaging/image.h>
 
+#include <cstdio>
+
 #include "cli/cli.h"
 #include "cli/context.h"
 #include "cli/images.h"
@@ -18,6 +20,21 @@ void add_reading(CommandLine& app, std::string& reading) {
                  "auto: informed if the image agrees with the owner's field, else blind")
       ->one_of({"auto", "blind", "informed"})
       ->type_name("NAME");
+}
+
+void add_rate(CommandLine& app, double& rate, const std::string& what) {
+  app.add_option("--fpr", rate, "False-positive rate at which " + what + ", above 0 to 1")
+      ->range(1e-300, 1.0)
+      ->type_name("P");
+}
+
+void check_rate(double rate, double least, Index cells) {
+  if (least <= rate) return;
+  char text[120];
+  std::snprintf(text, sizeof text,
+                "--fpr: with %lld cells no image can reach %g, the smallest p-value is %.1e",
+                static_cast<long long>(cells), rate, least);
+  throw UsageError(text);
 }
 
 SuspectReader::SuspectReader(const watermark::Owner& owner, const std::string& reading)
@@ -48,17 +65,23 @@ ImageEvidence SuspectReader::read(const Tensor<float>& image, const std::string&
 
 std::vector<ImageEvidence> read_images(SuspectReader& reader, const std::vector<std::string>& paths,
                                        Context& context) {
-  const auto images = list_images(paths);
+  const auto images = list_images(paths, context);
   const InterruptGuard guard;
   Progress progress = context.progress("read");
   std::vector<ImageEvidence> read;
-  for (const auto& path : images) {
+  ReadFaults faults;
+  for (std::size_t i = 0; i < images.size(); ++i) {
     if (guard.interrupted()) throw Interrupted("nothing was decided");
-    const auto bytes = read_bytes(path);
-    read.push_back(reader.read(decode_image(bytes, path.string()), path.string()));
-    read.back().sha256 = sha256_hex(bytes);
-    progress.update(static_cast<double>(read.size()) / static_cast<double>(images.size()));
+    faults.try_read(images[i], [&] {
+      const std::string name = images[i].string();
+      const auto bytes = read_bytes(images[i]);
+      read.push_back(reader.read(decode_image(bytes, name), name));
+      read.back().sha256 = sha256_hex(bytes);
+      faults.check(images[i], bytes);
+    });
+    progress.update(static_cast<double>(i + 1) / static_cast<double>(images.size()));
   }
+  faults.tell(images.size(), context);
   return read;
 }
 

@@ -26,6 +26,12 @@ struct ImageEvidence {
 /// --detection auto|blind|informed.
 void add_reading(CommandLine& app, std::string& reading);
 
+/// --fpr. @param what  happens at this rate: "a mark counts as found"
+void add_rate(CommandLine& app, double& rate, const std::string& what);
+
+/// Refuses a rate that no image can reach. @param least  p-value with so many cells   @throws UsageError
+void check_rate(double rate, double least, Index cells);
+
 /// Reads images in the way that --detection names.
 class SuspectReader {
  public:
@@ -43,7 +49,9 @@ class SuspectReader {
   bool forced_;
 };
 
-/// Reads the images that IMAGE|DIR... names. @throws IoError naming the image that cannot be read
+/// Reads the images that IMAGE|DIR... names and leaves out those that cannot be read, see
+/// Context::leave_out().
+/// @throws IoError if none can be read, naming the first
 std::vector<ImageEvidence> read_images(SuspectReader& reader, const std::vector<std::string>& paths,
                                        Context& context);
 

@@ -126,6 +126,25 @@ TEST_CASE("object_window: a window is cut pixel for pixel, with background outsi
                              .margin(1e-6));
 }
 
+// A window around a wide image is cut by columns where it is far higher than the patch: 200 lines for 4.
+TEST_CASE("object_window: a window far larger than a wide or tall image has the bits of one cut whole") {
+  const CounterRng rng(3);
+  for (const Shape& shape : {Shape{5, 200, 3}, Shape{200, 5, 3}}) {
+    Tensor<float> image(shape);
+    for (Index i = 0; i < image.size(); ++i)
+      image[i] = static_cast<float>(rng.bits(static_cast<std::uint64_t>(i))[0] % 256) / 255;
+    const Index y0 = (200 - shape[0]) / 2, x0 = (200 - shape[1]) / 2;
+    Tensor<float> whole({200, 200, 3}, 0.75f);
+    for (Index y = 0; y < shape[0]; ++y)
+      for (Index x = 0; x < shape[1]; ++x)
+        for (Index c = 0; c < 3; ++c)
+          whole[((y + y0) * 200 + x + x0) * 3 + c] = image[(y * shape[1] + x) * 3 + c];
+    const Window window{static_cast<double>(-x0), static_cast<double>(-y0), 200, 200};
+    for (const PatchSize& size : {square_patch(4), PatchSize{3, 7}})
+      CHECK(cut_window(image, window, size, 0.75f).data == resize_area(whole, size.height, size.width).data);
+  }
+}
+
 TEST_CASE("object_window: the window's camera renders the pixels that are cut") {
   const nerf::RadianceField field = small_field();
   nerf::Renderer renderer(field);

@@ -179,16 +179,39 @@ TEST_CASE("payload_codec: the bound on chance agreement holds, and is near where
   CHECK(log_chance_of_agreement(mixed, most) == Approx(-5 * std::log(2.0)).epsilon(1e-3));
 }
 
+TEST_CASE("payload_codec: the length that is named is the least that holds the payload") {
+  const Payload text{PayloadKind::text, "hello"};
+  std::string what;
+  try {
+    PayloadCodec(48).encode(text);
+  } catch (const ValueError& e) {
+    what = e.what();
+  }
+  Index least = 49;
+  const auto fits = [&] {
+    try {
+      PayloadCodec(least).encode(text);
+      return true;
+    } catch (const ValueError&) {
+      return false;
+    }
+  };
+  while (least <= 256 && !fits()) ++least;
+  CHECK_THAT(what, Contains("it needs a message of " + std::to_string(least) + " bits"));
+  CHECK_THROWS_WITH(PayloadCodec(256).encode({PayloadKind::text, std::string(17, 'a')}), Contains("17"));
+}
+
 TEST_CASE("payload_codec: what does not fit is named") {
   CHECK_THROWS_WITH(PayloadCodec(0), "[PayloadCodec] raw_bits must be 1 to 256, got 0");
   CHECK_THROWS_WITH(PayloadCodec(257), "[PayloadCodec] raw_bits must be 1 to 256, got 257");
   CHECK_THROWS_WITH(PayloadCodec(48).encode({PayloadKind::text, "too long"}),
-                    "[PayloadCodec::encode] payload: has 64 bits, a message of 48 bits can hold at most 32");
+                    Contains("payload: has 64 bits, a message of 48 bits can hold at most 32; it needs"));
   CHECK_THROWS_WITH(PayloadCodec(16).encode({PayloadKind::hex, "1"}),
-                    "[PayloadCodec::encode] payload: has 4 bits, a message of 16 bits can hold no payload");
+                    Contains("payload: has 4 bits, a message of 16 bits can hold no payload; it needs"));
   CHECK_THROWS_WITH(
       PayloadCodec(100).encode({PayloadKind::uuid, kCodecUuid}),
-      "[PayloadCodec::encode] payload: has 128 bits, a message of 100 bits can hold at most 64");
+      "[PayloadCodec::encode] payload: has 128 bits, a message of 100 bits can hold at most 64; it needs a "
+      "message of 147 bits");
   CHECK_THROWS_AS(PayloadCodec(100).encode({PayloadKind::text, "\xff"}), ValueError);
   const PayloadCodec codec(48);
   CHECK_FALSE(codec.payload(message_from_hex("123456789abc", 48)));

@@ -63,7 +63,7 @@ std::string code_hash(const Words& rooms) {
 std::string shown(const Json& value) {
   if (value.is_null()) return "-";
   if (value.is_string()) return value.get<std::string>();
-  if (!value.is_number_float()) return value.dump();
+  if (!value.is_number_float()) return value.dump(-1, ' ', false, Json::error_handler_t::replace);
   char text[32];
   std::snprintf(text, sizeof text, "%.6g", value.get<double>());
   return text;

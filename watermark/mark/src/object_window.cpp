@@ -1,4 +1,5 @@
 #include <fieldmark/engine/shape_checks.h>
+#include <fieldmark/imaging/image.h>
 #include <fieldmark/imaging/resize.h>
 #include <fieldmark/watermark/mark/object_window.h>
 
@@ -10,9 +11,11 @@ namespace fieldmark::watermark {
 namespace {
 
 constexpr float kStandsOut = 0.08f;
-constexpr Index kReach = 2;       // of the 5 x 5 mean
-constexpr double kMargin = 0.04;  // of the object's longer side, on each side
-constexpr double kFull = 0.98;    // of both sides of the image: there is no plain background
+constexpr Index kReach = 2;          // of the 5 x 5 mean
+constexpr double kMargin = 0.04;     // of the object's longer side, on each side
+constexpr double kFull = 0.98;       // of both sides of the image: there is no plain background
+constexpr Index kLargestWhole = 16;  // times as high as the patch: above, a window is cut by columns
+constexpr Index kColumns = 64;
 
 // Mean over up to 2 kReach + 1 neighbours along one axis.
 std::vector<float> box_mean(const std::vector<float>& x, Index lines, Index length, Index line, Index step) {
@@ -25,6 +28,17 @@ std::vector<float> box_mean(const std::vector<float>& x, Index lines, Index leng
       out[static_cast<std::size_t>(l * line + i * step)] = sum / static_cast<float>(to - from);
     }
   return out;
+}
+
+// Those outside the image are background.
+Tensor<float> pixels_around(const Tensor<float>& rgb, Index left, Index top, Index height, Index width,
+                            float background) {
+  const Index h = rgb.shape[0], w = rgb.shape[1];
+  Tensor<float> part({height, width, 3}, background);
+  for (Index y = std::max<Index>(0, -top); y < std::min(height, h - top); ++y)
+    for (Index x = std::max<Index>(0, -left); x < std::min(width, w - left); ++x)
+      for (Index c = 0; c < 3; ++c) part[(y * width + x) * 3 + c] = rgb[((y + top) * w + x + left) * 3 + c];
+  return part;
 }
 
 }  // namespace
@@ -69,15 +83,23 @@ Tensor<float> cut_window(const Tensor<float>& rgb, const Window& window, const P
                      std::to_string(size.height));
   // Whole pixels around the window first, then one resize of exactly the window by sampling between them.
   const auto whole = [](double extent) { return std::max<Index>(1, std::lround(extent)); };
-  const Index h = rgb.shape[0], w = rgb.shape[1], height = whole(window.height), width = whole(window.width);
+  const Index height = whole(window.height), width = whole(window.width);
   const Index left = std::lround(window.x), top = std::lround(window.y);
-  Tensor<float> part({height, width, 3}, background);
-  for (Index y = std::max<Index>(0, -top); y < std::min(height, h - top); ++y)
-    for (Index x = std::max<Index>(0, -left); x < std::min(width, w - left); ++x)
-      for (Index c = 0; c < 3; ++c) part[(y * width + x) * 3 + c] = rgb[((y + top) * w + x + left) * 3 + c];
-  if (height == size.height && width == size.width) return part;
-  return height > size.height ? resize_area(part, size.height, size.width)
-                              : resize_bilinear(part, size.height, size.width);
+  if (height <= kLargestWhole * size.height) {
+    const Tensor<float> part = pixels_around(rgb, left, top, height, width, background);
+    if (height == size.height && width == size.width) return part;
+    return height > size.height ? resize_area(part, size.height, size.width)
+                                : resize_bilinear(part, size.height, size.width);
+  }
+  // The window of a very wide or tall image is far larger than the image. Columns shrink one by one, so a few
+  // at a time give the same bits.
+  Tensor<float> rows({size.height, width, 3});
+  for (Index begin = 0; begin < width; begin += kColumns) {
+    const Index columns = std::min(kColumns, width - begin);
+    const Tensor<float> part = pixels_around(rgb, left + begin, top, height, columns, background);
+    paste(rows, resize_area(part, size.height, columns), 0, begin);
+  }
+  return resize_area(rows, size.height, size.width);
 }
 
 nerf::Camera window_camera(const nerf::Camera& camera, const Window& window, const PatchSize& size) {

@@ -10,7 +10,7 @@ namespace {
 
 using Bits = std::vector<std::uint8_t>;
 
-constexpr Index kVersionBits = 4, kDataBits[] = {16, 24, 32, 40, 64, 128};
+constexpr Index kMostRawBits = 256, kVersionBits = 4, kDataBits[] = {16, 24, 32, 40, 64, 128};
 constexpr unsigned kHexVersion = 1, kTextVersion = 7, kUuidVersion = 13;
 constexpr int kLeastField = 4, kMostField = 8;
 
@@ -92,7 +92,7 @@ std::optional<PayloadCodec::Code> PayloadCodec::make_code(Index raw_bits, Index 
 }
 
 PayloadCodec::PayloadCodec(Index raw_bits) : raw_bits_(raw_bits) {
-  if (raw_bits < 1 || raw_bits > 256)
+  if (raw_bits < 1 || raw_bits > kMostRawBits)
     throw ValueError("[PayloadCodec] raw_bits must be 1 to 256, got " + std::to_string(raw_bits));
   for (Index data_bits : kDataBits)
     if (auto code = make_code(raw_bits, data_bits)) codes_.push_back(std::move(*code));
@@ -125,8 +125,15 @@ Message PayloadCodec::encode(const Payload& payload) const {
   }
   const std::string most =
       codes_.empty() ? "no payload" : "at most " + std::to_string(codes_.back().layout.data_bits);
-  throw ValueError("[PayloadCodec::encode] payload: has " + std::to_string(bits) + " bits, a message of " +
-                   std::to_string(raw_bits_) + " bits can hold " + most);
+  Index needed = raw_bits_ + 1;  // the shortest message that holds the payload
+  const auto holds = [&](Index data_bits) {
+    return data_bits >= bits && payload_count(checked.kind, data_bits) > 0 && make_code(needed, data_bits);
+  };
+  while (needed <= kMostRawBits && std::ranges::none_of(kDataBits, holds)) ++needed;
+  throw ValueError(
+      "[PayloadCodec::encode] payload: has " + std::to_string(bits) + " bits, a message of " +
+      std::to_string(raw_bits_) + " bits can hold " + most + "; it needs a message of " +
+      (needed <= kMostRawBits ? std::to_string(needed) + " bits" : "more than 256 bits, which there is not"));
 }
 
 std::optional<Payload> PayloadCodec::payload_of(const Code& code, std::span<const std::uint8_t> codeword) {

@@ -1,0 +1,68 @@
+#include "cli/outputs.h"
+
+#include <fieldmark/core/error.h>
+#include <fieldmark/core/files.h>
+#include <fieldmark/engine/model_file.h>
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <optional>
+
+namespace fieldmark::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Model {
+  std::string kind;
+  bool secret = false;
+};
+
+// The Fieldmark file at a path, or nothing.
+std::optional<Model> model_at(const std::string& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return std::nullopt;
+  try {
+    const auto file = SafetensorsFile::read(path);
+    const std::string kind = model_info(file).kind;
+    // A checkpoint of embed holds the owner's key.
+    return Model{kind, kind == "owner" || file.has("key")};
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+std::string upper(std::string text) {
+  std::ranges::transform(text, text.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  return text;
+}
+
+void refuse(const std::string& path, const Model& model) {
+  throw IoError(path + ": exists already, and its " + upper(model.kind) +
+                " would be lost; name another file, or move this one away");
+}
+
+}  // namespace
+
+void check_writable(const std::string& path) {
+  AtomicFile{path};
+  if (const auto model = model_at(path); model && model->secret) refuse(path, *model);
+}
+
+void check_writable_page(const std::string& path) {
+  AtomicFile{path};
+  if (const auto model = model_at(path)) refuse(path, *model);
+}
+
+void prepare_folder(const std::string& path) {
+  std::error_code error;
+  if (fs::exists(path, error) && !fs::is_directory(path, error))
+    throw IoError(path + ": expected a folder to write to, found a file; name another folder");
+  fs::create_directories(path, error);
+  if (error) throw IoError(path + ": the folder cannot be made: " + error.message());
+  AtomicFile{fs::path(path) / "fieldmark"};
+}
+
+}  // namespace fieldmark::cli
