@@ -13,6 +13,7 @@
 #include <numbers>
 
 #include "checks.h"
+#include "composition.h"
 #include "fieldmark/distort/blur.h"
 #include "fieldmark/distort/jpeg444.h"
 #include "fieldmark/distort/noise.h"
@@ -29,7 +30,7 @@ struct Kind {
   DistortionKind kind;
   double low, high;
 };
-constexpr std::array<Kind, 15> kKinds{{{"noise", DistortionKind::noise, 0, 1},
+constexpr std::array<Kind, 16> kKinds{{{"noise", DistortionKind::noise, 0, 1},
                                        {"rotation", DistortionKind::rotation, 0, 180},
                                        {"scale", DistortionKind::scale, 0.01, 4},
                                        {"scale-nearest", DistortionKind::scale_nearest, 0.01, 4},
@@ -43,7 +44,25 @@ constexpr std::array<Kind, 15> kKinds{{{"noise", DistortionKind::noise, 0, 1},
                                        {"gamma", DistortionKind::gamma, 0.01, 10},
                                        {"brightness", DistortionKind::brightness, 0, 10},
                                        {"contrast", DistortionKind::contrast, 0, 10},
-                                       {"hue", DistortionKind::hue, -360, 360}}};
+                                       {"hue", DistortionKind::hue, -360, 360},
+                                       {"stretch", DistortionKind::stretch, 0.25, 4}}};
+// Without a severity.
+struct PlainKind {
+  std::string_view name;
+  DistortionKind kind;
+};
+constexpr std::array<PlainKind, 12> kPlainKinds{{{"greyscale", DistortionKind::greyscale},
+                                                 {"sepia", DistortionKind::sepia},
+                                                 {"mirror", DistortionKind::mirror},
+                                                 {"pillarbox", DistortionKind::pillarbox},
+                                                 {"letterbox", DistortionKind::letterbox},
+                                                 {"background_black", DistortionKind::background_black},
+                                                 {"background_white", DistortionKind::background_white},
+                                                 {"background_grey", DistortionKind::background_grey},
+                                                 {"background_green", DistortionKind::background_green},
+                                                 {"background_noise", DistortionKind::background_noise},
+                                                 {"caption", DistortionKind::caption},
+                                                 {"collage", DistortionKind::collage}}};
 // Names that stand for a chain.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kChains{
     {{"combined", "noise_0.10,crop_0.40,jpeg_50"},
@@ -59,13 +78,15 @@ bool is_whole(DistortionKind kind) { return kind == DistortionKind::jpeg || kind
     text += " " + std::string(k.name) + range;
     text.pop_back();
   }
-  text += " greyscale";
+  for (const PlainKind& k : kPlainKinds) text += " " + std::string(k.name) + ",";
+  text.pop_back();
   for (const auto& chain : kChains) text += ", " + std::string(chain.first);
   throw ValueError(text + ", got '" + std::string(name) + "'");
 }
 
 Distortion::Step parse_step(std::string_view name) {
-  if (name == "greyscale") return {DistortionKind::greyscale, 0};
+  for (const PlainKind& plain : kPlainKinds)
+    if (name == plain.name) return {plain.kind, 0};
   const std::size_t line = name.find('_');
   const auto kind = std::find_if(kKinds.begin(), kKinds.end(),
                                  [&](const Kind& k) { return k.name == name.substr(0, line); });
@@ -213,8 +234,36 @@ Tensor<float> apply(const Distortion::Step& step, const Tensor<float>& x, const 
       return map_values(x, [a](float v) { return v * a; });
     case DistortionKind::contrast:
       return map_values(x, [a](float v) { return 0.5f + a * (v - 0.5f); });
+    case DistortionKind::stretch:
+      return run(x,
+                 [&](auto v, auto&) { return resize_area(v, x.shape[0], scaled(x.shape[1], step.amount)); });
     case DistortionKind::greyscale:
       return grey(x);
+    case DistortionKind::sepia:
+      return sepia(x);
+    case DistortionKind::mirror:
+      return mirrored(x);
+    case DistortionKind::pillarbox:
+      return pillarboxed(x).image;
+    case DistortionKind::letterbox:
+      return letterboxed(x).image;
+    case DistortionKind::background_black:
+      return before_another(x, background, [](Index) { return std::array{0.f, 0.f, 0.f}; });
+    case DistortionKind::background_white:
+      return before_another(x, background, [](Index) { return std::array{1.f, 1.f, 1.f}; });
+    case DistortionKind::background_grey:
+      return before_another(x, background, [](Index) { return std::array{0.5f, 0.5f, 0.5f}; });
+    case DistortionKind::background_green:
+      return before_another(x, background, [](Index) { return std::array{0.1f, 0.7f, 0.2f}; });
+    case DistortionKind::background_noise:
+      return before_another(x, background, [&](Index p) {
+        const auto u = draws.rng.uniform4(draws.index, draws.at(p));
+        return std::array{u[0], u[1], u[2]};
+      });
+    case DistortionKind::caption:
+      return captioned(x);
+    case DistortionKind::collage:
+      return collage(x);
     case DistortionKind::hue:
       return turn_hue(x, step.amount);
   }
@@ -237,6 +286,13 @@ PixelMap moved(const Distortion::Step& step, const Shape& before, const Shape& a
     map.numbers[5] += y - centre[1];
     return map;
   }
+  if (step.kind == DistortionKind::mirror) return {{-1, 0, static_cast<double>(before[1] - 1), 0, 1, 0}};
+  if (step.kind == DistortionKind::pillarbox || step.kind == DistortionKind::letterbox) {
+    const Index left = (after[1] - before[1]) / 2, top = (after[0] - before[0]) / 2;
+    return {{1, 0, -static_cast<double>(left), 0, 1, -static_cast<double>(top)}};
+  }
+  // Of the upper left of the four.
+  if (step.kind == DistortionKind::collage) return {{2, 0, 0.5, 0, 2, 0.5}};
   return {{sx, 0, sx / 2 - 0.5, 0, sy, sy / 2 - 0.5}};
 }
 

@@ -65,7 +65,9 @@ TEST_CASE("distortion: wrong names list the right ones") {
       "scale-bicubic_A (0.01 to 4), scale-lanczos_A (0.01 to 4), "
       "blur_A (0 to 100), crop_A (0.0001 to 1), jpeg_A (1 to 90, whole), jpeg444_A (1 to 100, "
       "whole), gamma_A (0.01 to 10), brightness_A (0 to 10), contrast_A (0 to 10), "
-      "hue_A (-360 to 360), greyscale, combined, screenshot, got 'sharpen_1'");
+      "hue_A (-360 to 360), stretch_A (0.25 to 4), greyscale, sepia, mirror, pillarbox, letterbox, "
+      "background_black, background_white, background_grey, background_green, background_noise, caption, "
+      "collage, combined, screenshot, got 'sharpen_1'");
   for (const char* bad : {"",           "noise",       "noise_",        "noise_0.1x",        "noise_-1",
                           "noise_nan",  "noise_inf",   "jpeg_0",        "jpeg_91",           "jpeg_50.5",
                           "crop_0",     "noise_0.1,",  ",noise_0.1",    "noise_0.1,,blur_1", "Noise_0.1",
@@ -99,10 +101,29 @@ TEST_CASE("distortion: severities of nothing leave an 8-bit image as it is") {
 
 TEST_CASE("distortion: every result is of 8 bits and depends on the seed and the index alone") {
   const auto x = image({30, 40, 3});
-  for (const char* name :
-       {"noise_0.05", "rotation_30", "scale_0.75", "blur_1", "crop_0.40", "jpeg_50", "gamma_2.2",
-        "brightness_1.5", "hue_90", "combined", "scale-nearest_0.75", "scale-bilinear_1.3",
-        "scale-bicubic_0.75", "scale-lanczos_0.5", "jpeg444_50", "contrast_1.5", "greyscale", "screenshot"}) {
+  for (const char* name : {"noise_0.05",
+                           "rotation_30",
+                           "scale_0.75",
+                           "blur_1",
+                           "crop_0.40",
+                           "jpeg_50",
+                           "gamma_2.2",
+                           "brightness_1.5",
+                           "hue_90",
+                           "combined",
+                           "scale-nearest_0.75",
+                           "scale-bilinear_1.3",
+                           "scale-bicubic_0.75",
+                           "scale-lanczos_0.5",
+                           "jpeg444_50",
+                           "contrast_1.5",
+                           "greyscale",
+                           "screenshot",
+                           "sepia",
+                           "mirror",
+                           "caption",
+                           "collage",
+                           "background_noise"}) {
     INFO(name);
     const auto y = distorted(name, x, 3);
     CHECK(y.data == rounded(y).data);

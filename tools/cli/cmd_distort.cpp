@@ -90,13 +90,22 @@ Command add_distort(CommandLine& app) {
                  "brightness_A  factor A, 0 to 10\n"
                  "contrast_A    factor A about 1/2, 0 to 10\n"
                  "hue_A         hue rotation by A degrees, -360 to 360\n"
-                 "greyscale     luma in all three channels\n"
+                 "stretch_A     A times as wide, 0.25 to 4\n"
+                 "greyscale     luma in all three channels; sepia: its matrix\n"
+                 "mirror        left and right exchanged\n"
+                 "pillarbox     black bars left and right to 16:9; letterbox: above and below\n"
+                 "background_black, _white, _grey, _green, _noise\n"
+                 "              another background behind the pixels that differ from --background\n"
+                 "caption       opaque bar over the middle fifth of the height\n"
+                 "collage       four of half the size\n"
                  "combined      noise_0.10,crop_0.40,jpeg_50\n"
                  "screenshot    scale-bicubic_1.25,blur_0.5,gamma_1.1,scale-lanczos_0.8,jpeg_80")
       ->required()
       ->type_name("NAME[,NAME...]");
-  app.add_option("--background", options->background,
-                 "Colour behind transparent pixels and in the corners of rotations: white, black")
+  app.add_option(
+         "--background", options->background,
+         "Colour behind transparent pixels and in the corners of rotations, which background_X replaces: "
+         "white, black")
       ->one_of({"white", "black"})
       ->type_name("COLOUR");
   return [options](Context& context) { return run_distort(*options, context); };

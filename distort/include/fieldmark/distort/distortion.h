@@ -28,7 +28,19 @@ enum class DistortionKind {
   brightness,
   contrast,
   hue,
-  greyscale
+  stretch,
+  greyscale,
+  sepia,
+  mirror,
+  pillarbox,
+  letterbox,
+  background_black,
+  background_white,
+  background_grey,
+  background_green,
+  background_noise,
+  caption,
+  collage
 };
 
 /// A chain of distortions of an image, from a name such as "rotation_30" or "noise_0.1,jpeg_50".
@@ -36,7 +48,7 @@ struct Distortion {
   /// One distortion of the chain.
   struct Step {
     DistortionKind kind;  ///< of the distortion
-    double amount;        ///< severity in the unit of parse_distortion(); 0 for greyscale
+    double amount;        ///< severity in the unit of parse_distortion(); 0 where it has none
   };
   std::string name;         ///< as it was given
   std::vector<Step> steps;  ///< from left to right
@@ -56,7 +68,14 @@ struct Distortion {
 ///   brightness_A  value times A, 0 to 10
 ///   contrast_A    distance from 1/2 times A, 0 to 10
 ///   hue_A         hue (of hue, saturation, value) turned by A degrees, -360 to 360
+///   stretch_A     A times as wide, an area filter, 0.25 to 4
 ///   greyscale     0.299 red + 0.587 green + 0.114 blue in all three
+///   sepia         the matrix of W3C's filter effects
+///   mirror        left and right exchanged
+///   pillarbox, letterbox   black bars left and right, above and below, to 16 : 9
+///   background_black, _white, _grey, _green, _noise   pixels that have exactly the background take another
+///   caption       an opaque bar with lines over the middle fifth of the height
+///   collage       four of half the size, two by two
 ///   combined      noise_0.10,crop_0.40,jpeg_50
 ///   screenshot    scale-bicubic_1.25,blur_0.5,gamma_1.1,scale-lanczos_0.8,jpeg_80: shown on a screen at
 ///                 another size, captured, brought back and sent on
@@ -79,7 +98,7 @@ struct PixelMap {
 /// @param image       [height, width, 3] in [0, 1], at least one pixel
 /// @param rng         source of noise, angles and windows
 /// @param index       of the image: rng's counter, so that results depend on nothing else
-/// @param background  [3] colour of the corners that a rotation opens
+/// @param background  [3] colour of the corners that a rotation opens, and which background_X replaces
 /// @param source      unless null, receives the source positions: rotation, scale and crop of all steps
 /// together
 /// @return [height', width', 3], multiples of 1/255

@@ -1,0 +1,102 @@
+#include "composition.h"
+
+#include <fieldmark/distort/distortion.h>
+
+#include <cmath>
+#include <set>
+
+#include "support/catch.h"
+#include "support/random.h"
+
+using namespace fieldmark;
+using namespace fieldmark::distort;
+
+namespace {
+const std::vector<float> kWhite(3, 1.f);
+
+Tensor<float> distorted_by(const char* name, const Tensor<float>& x, PixelMap* source = nullptr) {
+  return apply_distortion(parse_distortion(name), x, CounterRng(1, 1), 0, kWhite, source);
+}
+
+// Of a distortion that only moves whole pixels: each is that of its source position.
+void check_moved(const char* name, const Tensor<float>& x, Index moved) {
+  CAPTURE(name);
+  PixelMap source;
+  const Tensor<float> y = distorted_by(name, x, &source);
+  Index compared = 0;
+  for (Index v = 0; v < y.shape[0]; ++v)
+    for (Index u = 0; u < y.shape[1]; ++u) {
+      const auto from = source(static_cast<double>(u), static_cast<double>(v));
+      const Index column = std::lround(from[0]), row = std::lround(from[1]);
+      if (column < 0 || row < 0 || column >= x.shape[1] || row >= x.shape[0]) {
+        CHECK(y[3 * (v * y.shape[1] + u)] == 0);  // a bar
+        continue;
+      }
+      for (Index c = 0; c < 3; ++c)
+        REQUIRE(y[3 * (v * y.shape[1] + u) + c] ==
+                Approx(x[3 * (row * x.shape[1] + column) + c]).margin(0.002));
+      ++compared;
+    }
+  CHECK(compared == moved);
+}
+}  // namespace
+
+TEST_CASE("composition: mirror and bars move whole pixels to where they say") {
+  const Tensor<float> x = uniform<float>({18, 22, 3}, 0.1, 1, 1);
+  check_moved("mirror", x, 18 * 22);
+  check_moved("pillarbox", x, 18 * 22);
+  check_moved("letterbox", x, 18 * 22);
+  CHECK(pillarboxed(x).image.shape == Shape{18, 32, 3});
+  CHECK(pillarboxed(x).left == 5);
+  CHECK(letterboxed(Tensor<float>({10, 48, 3})).image.shape == Shape{85, 48, 3});
+  CHECK(distorted_by("mirror,mirror", x).data == distorted_by("noise_0", x).data);
+}
+
+TEST_CASE("composition: a stretched image is wider, and back it is nearly the same") {
+  const Tensor<float> x = uniform<float>({10, 12, 3}, 0, 1, 2);
+  const Tensor<float> wide = distorted_by("stretch_1.5", x);
+  CHECK(wide.shape == Shape{10, 18, 3});
+  CHECK(distorted_by("stretch_2,stretch_0.5", x).data == distorted_by("noise_0", x).data);
+}
+
+TEST_CASE("composition: another background goes behind the pixels that differ from the old one") {
+  Tensor<float> x({4, 5, 3}, 1.f);
+  for (Index c = 0; c < 3; ++c) x[3 * 7 + c] = 0.25f;
+  x[3 * 8] = 0.99f;  // an edge: two levels and a half from white
+  const Tensor<float> black = distorted_by("background_black", x),
+                      noise = distorted_by("background_noise", x);
+  std::set<float> values(noise.data.begin(), noise.data.end());
+  CHECK(values.size() > 20);
+  for (Index p = 0; p < 20; ++p) {
+    const bool object = p == 7 || p == 8;
+    for (Index c = 0; c < 3; ++c)
+      CHECK(black[3 * p + c] == (object ? Approx(x[3 * p + c]).margin(0.002) : Approx(0)));
+  }
+  CHECK(distorted_by("background_white", x).data == distorted_by("noise_0", x).data);
+  CHECK(distorted_by("background_green", x)[0] == Approx(0.1).margin(0.002));
+  CHECK(distorted_by("background_grey", x)[0] == Approx(0.5).margin(0.002));
+}
+
+TEST_CASE("composition: a caption covers the middle fifth, a collage holds four of half the size") {
+  const Tensor<float> x({50, 40, 3}, 0.5f);
+  const Tensor<float> caption = captioned(x);
+  Index covered = 0;
+  for (Index p = 0; p < 50 * 40; ++p) covered += caption[3 * p] != 0.5f;
+  CHECK(covered == 10 * 40);
+  CHECK(caption[3 * 20 * 40] == 0);
+  CHECK(caption[3 * 19 * 40] == 0.5f);
+  const Tensor<float> y = uniform<float>({20, 30, 3}, 0, 1, 3), four = collage(y);
+  CHECK(four.shape == y.shape);
+  double mean = 0, quarter = 0;
+  for (const float v : y.data) mean += static_cast<double>(v) / static_cast<double>(y.size());
+  for (Index row = 10; row < 20; ++row)
+    for (Index i = 45; i < 90; ++i) quarter += static_cast<double>(four[row * 90 + i]) / 450;
+  CHECK(quarter == Approx(mean).epsilon(1e-5));
+}
+
+TEST_CASE("composition: sepia of grey is grey times the rows' sums, cut off at white") {
+  const Tensor<float> y = distorted_by("sepia", Tensor<float>({1, 1, 3}, 0.4f));
+  CHECK(y[0] == Approx(0.4 * 1.351).margin(0.002));
+  CHECK(y[1] == Approx(0.4 * 1.203).margin(0.002));
+  CHECK(y[2] == Approx(0.4 * 0.937).margin(0.002));
+}
