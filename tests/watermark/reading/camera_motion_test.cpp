@@ -54,7 +54,7 @@ TEST_CASE("camera_motion: no motion leaves a camera, and what each motion does")
 
 TEST_CASE("camera_motion: the gradient is that of the moved camera's projection") {
   const auto gradient = motion_gradient(camera(), kPivot, kPoint);
-  for (std::size_t k = 0; k < 9; ++k) {
+  for (std::size_t k = 0; k < gradient[0].size(); ++k) {
     CameraMotion up{}, down{};
     up[k] = 1e-5;
     down[k] = -1e-5;

@@ -97,3 +97,30 @@ TEST_CASE("carriers: an owner whose message is in networks has none") {
   CHECK_THROWS_WITH(carriers(paper, view_of(paper, 1)),
                     "[carriers] owner must have cells in space, got one of preset paper");
 }
+
+TEST_CASE("carriers: after a change of colour they are what the change does to a marked view") {
+  const Owner owner = marking_owner(0.02);
+  const CachedView view = view_of(owner, 4);
+  Carriers c = carriers(owner, view);
+  const Carriers before = c;
+  ToneFit tones;
+  tones.terms = {
+      {{0.1, 0.3, 0.5, 0.1, 0, 0, 0}, {0, 0.3, 0.5, 0.1, 0.2, 0, 0}, {0, 0.1, 0.2, 0.3, 0, 0.4, 0.1}}};
+  change_colours(c, view.base, tones);
+  Index compared = 0;
+  for (std::size_t p = 0; p + 1 < c.begin.size(); ++p) {
+    if (c.begin[p] == c.begin[p + 1]) continue;
+    const auto slope = tones.slope(&view.base.data[3 * p]);
+    for (std::size_t a = 0; a < 3; ++a) {
+      double want = 0, part = 0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        want += slope[a][k] * static_cast<double>(before.whole.data[3 * p + k]);
+        part += slope[a][k] * static_cast<double>(before.part[3 * static_cast<std::size_t>(c.begin[p]) + k]);
+      }
+      CHECK(c.whole.data[3 * p + a] == Approx(want).margin(1e-6));
+      CHECK(c.part[3 * static_cast<std::size_t>(c.begin[p]) + a] == Approx(part).margin(1e-6));
+      ++compared;
+    }
+  }
+  CHECK(compared > 100);
+}

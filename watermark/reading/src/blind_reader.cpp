@@ -1,5 +1,6 @@
 #include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/watermark/reading/blind_reader.h>
+#include "surround.h"
 
 namespace fieldmark::watermark {
 namespace {
@@ -31,11 +32,16 @@ std::vector<double> BlindReader::evidence(const Tensor<float>& view_image) const
 
 std::vector<double> BlindReader::evidence(const Tensor<float>& view_image, SeenPlaces* places) const {
   const float background = nerf::background_value(owner_.field.background);
-  const Tensor<float> whole = opaque_image(view_image, background);
+  const bool object = owner_.field.space.kind == nerf::SpaceKind::cube;
+  const Surround cleared = clear_surround(opaque_image(view_image, background), background, object);
   const PatchSize size = owner_.options().patch();
-  const Window window = object_window(whole, background, size.aspect());
-  const Tensor<float> image = cut_window(whole, window, size, background);
-  if (places) *places = {.window = window};
+  const Window window = object_window(cleared.image, background, size.aspect());
+  const Tensor<float> image = cut_window(cleared.image, window, size, background);
+  if (places) {
+    *places = {.window = window};
+    places->window.x += static_cast<double>(cleared.left);
+    places->window.y += static_cast<double>(cleared.top);
+  }
   return owner_.mark().evidence(owner_, image, places);
 }
 

@@ -43,7 +43,7 @@ nerf::Camera moved(const nerf::Camera& camera, const nerf::Vec3& pivot, const Ca
   Eigen::Map<Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> pose(out.pose.data());
   pose.leftCols<3>() = turned_r;
   pose.col(3) = position;
-  out.fx *= std::exp(motion[6]);
+  out.fx *= std::exp(motion[6] + motion[9]);
   out.fy *= std::exp(motion[6]);
   out.cx += motion[7] * static_cast<double>(camera.width);
   out.cy += motion[8] * static_cast<double>(camera.width);
@@ -62,7 +62,7 @@ std::array<CameraMotion, 2> motion_gradient(const nerf::Camera& camera, const ne
     gradient[0][static_cast<std::size_t>(k)] = -camera.fx * (dq.x() + u * dq.z()) / q.z();
     gradient[1][static_cast<std::size_t>(k)] = camera.fy * (dq.y() + v * dq.z()) / q.z();
   }
-  gradient[0][6] = camera.fx * u;
+  gradient[0][6] = gradient[0][9] = camera.fx * u;
   gradient[1][6] = -camera.fy * v;
   gradient[0][7] = gradient[1][8] = static_cast<double>(camera.width);
   return gradient;

@@ -18,9 +18,10 @@ Projection project(const nerf::Camera& camera, const nerf::Vec3& point);
 
 /// Small motion of a camera, including crop and scale of its image: rotation about its three axes, radians;
 /// translation along them, in depths of the pivot; logarithm of a factor of both focal lengths; shift of the
-/// principal point right and down, in widths of the image. All are of the order of the relative displacement
-/// in the image.
-using CameraMotion = std::array<double, 9>;
+/// principal point right and down, in widths of the image; logarithm of a factor of the horizontal focal
+/// length alone, for an image that was stretched. All are of the order of the relative displacement in the
+/// image.
+using CameraMotion = std::array<double, 10>;
 
 /// The camera after a motion: in its axes a point q goes to exp(turn) (q - m) + m + d shift, where m is the
 /// pivot and d its depth.   @param pivot  in the world, at a positive depth

@@ -235,8 +235,8 @@ nerf::Camera CameraSearch::fitted(const Proposal& proposal, const std::vector<Ma
                                   double tolerance, Index height, Index width) const {
   const SmallView& view = views_[proposal.view];
   nerf::Camera camera = proposed(proposal, height, width);
-  using Matrix = Eigen::Matrix<double, 9, 9>;
-  using Vector = Eigen::Matrix<double, 9, 1>;
+  using Matrix = Eigen::Matrix<double, 10, 10>;
+  using Vector = Eigen::Matrix<double, 10, 1>;
   nerf::Vec3 pivot{};
   for (const SeenCell& s : view.seen)
     for (std::size_t a = 0; a < 3; ++a) pivot[a] += s.point[a] / static_cast<double>(view.seen.size());
@@ -256,6 +256,10 @@ nerf::Camera CameraSearch::fitted(const Proposal& proposal, const std::vector<Ma
       h += w * (jx * jx.transpose() + jy * jy.transpose());
       g += w * (dx * jx + dy * jy);
     }
+    // The image is not taken to be stretched.
+    h.row(9).setZero();
+    h.col(9).setZero();
+    g[9] = 0;
     h.diagonal() = h.diagonal() * 1.02 + Vector::Constant(1e-3 * h.diagonal().maxCoeff());
     const Vector m = h.ldlt().solve(g);
     if (!m.allFinite()) break;
@@ -294,7 +298,7 @@ std::vector<nerf::Camera> CameraSearch::find(const SeenPlaces& places, Index hei
                       [&](const Proposal& p) { return fitted(p, matches, tolerance, height, width); });
 }
 
-std::vector<nerf::Camera> CameraSearch::find(const Tensor<float>& image, Index count) const {
+std::vector<CameraSearch::Proposal> CameraSearch::by_content(const Tensor<float>& image) const {
   const float background = nerf::background_value(owner_.field.background);
   const Index h = image.shape[0], w = image.shape[1];
   const double zoom = std::min(1.0, static_cast<double>(kReduced) / static_cast<double>(std::max(h, w)));
@@ -318,7 +322,19 @@ std::vector<nerf::Camera> CameraSearch::find(const Tensor<float>& image, Index c
       best[v] = {v, a / zoom, b / zoom, score};
     }
   }
-  return best_cameras(best, count, [&](const Proposal& p) { return proposed(p, h, w); });
+  return best;
+}
+
+std::vector<nerf::Camera> CameraSearch::find(const Tensor<float>& image, Index count) const {
+  std::vector<Proposal> proposals = by_content(image);
+  return best_cameras(proposals, count,
+                      [&](const Proposal& p) { return proposed(p, image.shape[0], image.shape[1]); });
+}
+
+double CameraSearch::likeness(const Tensor<float>& image) const {
+  double most = -1;
+  for (const Proposal& p : by_content(image)) most = std::max(most, p.score);
+  return most;
 }
 
 CameraSearch::Proposal CameraSearch::best_part(std::size_t number, std::span<const float> image,

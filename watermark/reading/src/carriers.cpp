@@ -2,6 +2,7 @@
 #include <fieldmark/core/error.h>
 
 #include <algorithm>
+#include <array>
 
 namespace fieldmark::watermark {
 namespace {
@@ -17,6 +18,13 @@ std::size_t entry_of(Carriers& c, std::int32_t cell) {
     c.part.insert(c.part.end(), 3, 0.f);
   }
   return number;
+}
+
+// y = slope x, in place.
+void times(const std::array<std::array<double, 3>, 3>& slope, float* x) {
+  const double from[] = {static_cast<double>(x[0]), static_cast<double>(x[1]), static_cast<double>(x[2])};
+  for (std::size_t c = 0; c < 3; ++c)
+    x[c] = static_cast<float>(slope[c][0] * from[0] + slope[c][1] * from[1] + slope[c][2] * from[2]);
 }
 
 // [S, 3] of all samples, by blocks: what the network keeps of a block stays in cache.
@@ -59,6 +67,15 @@ Carriers carriers(const Owner& owner, const CachedView& v) {
     out.begin.push_back(static_cast<std::int32_t>(out.cell.size()));
   }
   return out;
+}
+
+void change_colours(Carriers& mark, const Tensor<float>& base, const ToneFit& tones) {
+  for (std::size_t p = 0; p + 1 < mark.begin.size(); ++p) {
+    if (mark.begin[p] == mark.begin[p + 1]) continue;
+    const auto slope = tones.slope(&base.data[3 * p]);
+    times(slope, &mark.whole.data[3 * p]);
+    for (std::int32_t e = mark.begin[p]; e < mark.begin[p + 1]; ++e) times(slope, &mark.part[3 * at(e)]);
+  }
 }
 
 }  // namespace fieldmark::watermark

@@ -1,6 +1,7 @@
 #pragma once
 #include <fieldmark/watermark/mark/owner.h>
 #include <fieldmark/watermark/mark/view_cache.h>
+#include "tone_fit.h"
 
 namespace fieldmark::watermark {
 
@@ -19,5 +20,9 @@ struct Carriers {
 /// @param owner  of preset fast   @param view  of its field; with few samples of a ray parts are rough
 /// @throws ValueError if the owner has no mark network
 Carriers carriers(const Owner& owner, const CachedView& view);
+
+/// What the mark adds after a change of colour: each number of a pixel times the change's slope at the pixel.
+/// @param base  [H, W, 3] of the view
+void change_colours(Carriers& mark, const Tensor<float>& base, const ToneFit& tones);
 
 }  // namespace fieldmark::watermark

@@ -5,6 +5,7 @@
 #include "plain_border.h"
 #include "pose_alignment.h"
 #include "sign_fit.h"
+#include "surround.h"
 #include "tone_fit.h"
 
 #include <algorithm>
@@ -19,8 +20,15 @@ namespace {
 
 constexpr Index kByPlaces = 3, kByImage = 3, kByPart = 6;  // candidate cameras
 constexpr AlignmentStage kCoarse[] = {{.size = 48, .blur = 1.5, .steps = 6, .quick = true}};
+constexpr double kStretches[] = {1.5, 1 / 1.5, 1.25, 0.8};  // of the width
+constexpr AlignmentStage kCoarseStretched[] = {
+    {.size = 64, .blur = 1.5, .steps = 10, .stretched = true, .quick = true}};
+constexpr AlignmentStage kFineStretched[] = {
+    {.size = 96, .blur = 1.2, .steps = 10, .stretched = true, .quick = true},
+    {.size = 200, .blur = 1.2, .steps = 6, .stretched = true}};
 constexpr AlignmentStage kFine[] = {{.size = 96, .blur = 1.2, .steps = 10, .quick = true},
                                     {.size = 200, .blur = 1.2, .steps = 6}};
+constexpr Index kBesideCover = 2;      // pixels beside a bar that do not count
 constexpr Index kSamples = 4;          // of a ray
 constexpr Index kLargest = 512;        // longer side at which evidence is taken, pixels
 constexpr double kFarFromLeast = 1.2;  // of the least residual: the search for a blur ends beyond
@@ -32,14 +40,15 @@ constexpr float kLeastNoise = 1.2e-6f;  // variance of rounding to 8 bits
 struct Shown {
   Tensor<float> render, rest;
   double blur = 0, left = 0;
+  ToneFit tones{};
 };
 
 Shown shown_with(const Tensor<float>& image, const Tensor<float>& base, const std::vector<double>& object,
                  double blur) {
-  Shown s{.render = blurred(base, blur), .rest = Tensor<float>(image.shape), .blur = blur};
-  const ToneFit tones = fit_tones(s.render, image, object);
+  const Tensor<float> soft = blurred(base, blur);
+  const ToneFit tones = fit_tones(soft, image, object);
+  Shown s{.render = tones(soft), .rest = Tensor<float>(image.shape), .blur = blur, .tones = tones};
   for (Index i = 0; i < s.rest.size(); ++i) {
-    s.render[i] = static_cast<float>(tones.at(i % 3, static_cast<double>(s.render[i])));
     s.rest[i] = image[i] - s.render[i];
     s.left += object[at(i / 3)] * static_cast<double>(s.rest[i] * s.rest[i]);
   }
@@ -82,7 +91,8 @@ void use_jpeg(JpegScore&& jpeg, const Tensor<float>& mark, MarkScore& s) {
   }
 }
 
-MarkScore score_of(const Tensor<float>& image, const CachedView& view, const Tensor<float>& mark,
+// Also brings the mark to the image's colours.
+MarkScore score_of(const Tensor<float>& image, const CachedView& view, Carriers& carriers,
                    const std::vector<std::uint8_t>& border, const std::optional<JpegTrace>& jpeg) {
   MarkScore s{.score = Tensor<float>(image.shape), .precision = Tensor<float>(image.shape), .on_object = {}};
   for (const float opacity : view.opacity.data) s.on_object.push_back(opacity > 0.5f ? 1 : 0);
@@ -90,6 +100,8 @@ MarkScore score_of(const Tensor<float>& image, const CachedView& view, const Ten
     if (border[p]) s.on_object[p] = 0;
   const Shown seen = shown(image, view.base, s.on_object);
   s.blur = seen.blur;
+  change_colours(carriers, view.base, seen.tones);
+  const Tensor<float>& mark = carriers.whole;
   if (!jpeg) {
     score_differences(seen.rest, s);
     return s;
@@ -109,9 +121,30 @@ MarkScore score_of(const Tensor<float>& image, const CachedView& view, const Ten
   return s;
 }
 
+Tensor<float> mirror(const Tensor<float>& image) {
+  const Index w = image.shape[1];
+  Tensor<float> out(image.shape);
+  for (Index p = 0; p < image.size() / 3; ++p)
+    std::copy_n(&image[3 * p], 3, &out[3 * (p - p % w + w - 1 - p % w)]);
+  return out;
+}
+
+// An image that was made wider by a factor, as it was.
+Tensor<float> narrowed(const Tensor<float>& image, double factor) {
+  if (factor == 1) return image;
+  const double width = static_cast<double>(image.shape[1]) / factor;
+  return resize_area(image, image.shape[0], std::max<Index>(1, std::lround(width)));
+}
+
 }  // namespace
 
 const char* reading_name(ReadingKind kind) { return kind == ReadingKind::informed ? "informed" : "blind"; }
+
+// What was done to a view before it is read.
+struct InformedReader::Change {
+  bool mirrored = false;
+  double stretch = 1;  // of the width
+};
 
 struct InformedReader::Parts {
   CameraSearch search;
@@ -126,39 +159,89 @@ InformedReader::InformedReader(const Owner& owner, const CameraSearchOptions& se
 InformedReader::~InformedReader() = default;
 
 std::vector<double> InformedReader::evidence_at(const Tensor<float>& image, const nerf::Camera& camera) {
+  return evidence_at({.image = image, .plain = {}}, camera);
+}
+
+std::vector<double> InformedReader::evidence_at(const Surround& seen, const nerf::Camera& camera) {
   const CachedView view = cache_view(parts_->renderer, owner_.field, camera, kSamples);
-  const Carriers mark = carriers(owner_, view);
-  const MarkScore score = score_of(image, view, mark.whole, border_of(owner_.field, image), find_jpeg(image));
+  Carriers mark = carriers(owner_, view);
+  const bool replaced = seen.plain.size() > 0;
+  const Tensor<float> image = replaced ? before_background(seen.plain, view.opacity, seen.colour,
+                                                           nerf::background_value(owner_.field.background))
+                                       : seen.image;
+  // The coefficients of a JPEG image are those of its own background.
+  const auto jpeg = replaced ? std::nullopt : find_jpeg(image);
+  const auto border = seen.covered.empty() ? border_of(owner_.field, image) : seen.covered;
+  const MarkScore score = score_of(image, view, mark, border, jpeg);
   return fit_signs(mark, score, owner_.cells.count()).sign;
 }
 
-ImageReading InformedReader::read(const Tensor<float>& image) {
-  ImageReading reading;
-  SeenPlaces places;
-  reading.blind = blind_.evidence(image, &places);
-  const Tensor<float> whole = opaque_image(image, nerf::background_value(owner_.field.background));
-  const Index h = whole.shape[0], w = whole.shape[1];
-  InformedReading& g = reading.informed;
-  std::vector<nerf::Camera> starts = parts_->search.find(places, h, w, kByPlaces);
-  const std::vector<nerf::Camera> others = parts_->search.find(whole, kByImage);
-  starts.insert(starts.end(), others.begin(), others.end());
+// Candidate cameras of an image that was changed, in the frame of the changed image.
+std::vector<nerf::Camera> InformedReader::starts(const Tensor<float>& image, const Change& change,
+                                                 const SeenPlaces& places) {
+  const Index h = image.shape[0], w = image.shape[1];
+  if (change.stretch == 1) {
+    std::vector<nerf::Camera> cameras = parts_->search.find(places, h, w, kByPlaces);
+    const std::vector<nerf::Camera> others = parts_->search.find(image, kByImage);
+    cameras.insert(cameras.end(), others.begin(), others.end());
+    return cameras;
+  }
+  std::vector<nerf::Camera> cameras = parts_->search.find(narrowed(image, change.stretch), kByImage);
+  for (nerf::Camera& camera : cameras) {
+    const double back = static_cast<double>(w) / static_cast<double>(camera.width);
+    camera.fx *= back;
+    camera.cx *= back;
+    camera.width = w;
+  }
+  return cameras;
+}
+
+// The best alignment of an image without its surround, coarse, then fine.
+InformedReading InformedReader::aligned(const Surround& seen, const Change& change,
+                                        const SeenPlaces& places) {
+  const Tensor<float>& image = seen.image;
+  const bool stretched = change.stretch != 1;
+  InformedReading best;
   const auto try_all = [&](const std::vector<nerf::Camera>& cameras) {
     for (const nerf::Camera& start : cameras) {
-      const Alignment a = parts_->aligner.align(whole, start, kCoarse);
-      if (a.agreement > g.agreement) {
-        g.agreement = a.agreement;
-        g.camera = a.camera;
+      const Alignment a = parts_->aligner.align(
+          image, start, stretched ? std::span(kCoarseStretched) : kCoarse, seen.covered);
+      if (a.agreement > best.agreement) {
+        best.agreement = a.agreement;
+        best.camera = a.camera;
       }
     }
   };
-  try_all(starts);
-  if (g.agreement < kLeastAgreement) try_all(parts_->search.find_part(whole, kByPart));
+  try_all(starts(image, change, places));
+  if (!stretched && best.agreement < kLeastAgreement) try_all(parts_->search.find_part(image, kByPart));
+  if (best.agreement < 0) return best;
+  const Alignment a =
+      parts_->aligner.align(image, best.camera, stretched ? std::span(kFineStretched) : kFine, seen.covered);
+  best.camera = a.camera;
+  best.agreement = a.agreement;
+  return best;
+}
+
+ImageReading InformedReader::read_as(const Tensor<float>& whole, const Change& change) {
+  ImageReading reading;
+  reading.mirrored = change.mirrored;
+  SeenPlaces places;
+  reading.blind = blind_.evidence(whole, &places);
+  const Surround seen = cleared(whole);
+  places.window.x -= static_cast<double>(seen.left);
+  places.window.y -= static_cast<double>(seen.top);
+  InformedReading& g = reading.informed;
+  g = aligned(seen, change, places);
   if (g.agreement < 0) return reading;
-  const Alignment a = parts_->aligner.align(whole, g.camera, kFine);
-  g.camera = a.camera;
-  g.agreement = a.agreement;
+  const Index h = seen.image.shape[0], w = seen.image.shape[1];
   const nerf::Camera used = g.camera.scaled(std::min(kLargest, std::max(h, w)));
-  g.evidence = evidence_at(resize_area(whole, used.height, used.width), used);
+  const auto at_size = [&](const Tensor<float>& x) {
+    return x.size() > 0 ? resize_area(x, used.height, used.width) : x;
+  };
+  Surround sized{.image = at_size(seen.image), .plain = at_size(seen.plain), .colour = seen.colour};
+  if (!seen.covered.empty())
+    sized.covered = border_at(seen.covered, h, w, used.height, used.width, kBesideCover);
+  g.evidence = evidence_at(sized, used);
   double ours = 0, theirs = 0;
   for (std::size_t c = 0; c < g.evidence.size(); ++c) {
     ours += g.evidence[c] * g.evidence[c];
@@ -167,7 +250,43 @@ ImageReading InformedReader::read(const Tensor<float>& image) {
   if (ours > 0 && theirs > 0)
     for (double& s : g.evidence) s *= std::sqrt(theirs / ours);
   if (g.agreement >= kLeastAgreement) reading.chosen = ReadingKind::informed;
+  // Back to the whole image.
+  g.camera.cx += static_cast<double>(seen.left);
+  g.camera.cy += static_cast<double>(seen.top);
+  g.camera.width = whole.shape[1];
+  g.camera.height = whole.shape[0];
   return reading;
+}
+
+Surround InformedReader::cleared(const Tensor<float>& whole) const {
+  return clear_surround(whole, nerf::background_value(owner_.field.background),
+                        owner_.field.space.kind == nerf::SpaceKind::cube);
+}
+
+ImageReading InformedReader::read(const Tensor<float>& image) {
+  const Tensor<float> whole = opaque_image(image, nerf::background_value(owner_.field.background));
+  ImageReading reading = read_as(whole, {});
+  if (reading.chosen == ReadingKind::informed) return reading;
+  for (const Change& change : changes(cleared(whole).image)) {
+    ImageReading changed = read_as(change.mirrored ? mirror(whole) : whole, change);
+    if (changed.chosen == ReadingKind::informed) return changed;
+  }
+  return reading;
+}
+
+// What may have been done to an image: a mirror, and the stretch after which it looks most like the field, if
+// it then looks more like it than as it is.
+std::vector<InformedReader::Change> InformedReader::changes(const Tensor<float>& seen) const {
+  std::vector<Change> changes{{.mirrored = true}};
+  double most = parts_->search.likeness(seen), stretch = 1;
+  for (const double tried : kStretches) {
+    const double likeness = parts_->search.likeness(narrowed(seen, tried));
+    if (likeness <= most) continue;
+    most = likeness;
+    stretch = tried;
+  }
+  if (stretch != 1) changes.push_back({.stretch = stretch});
+  return changes;
 }
 
 }  // namespace fieldmark::watermark

@@ -15,7 +15,7 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr Index kParameters = 9;
+constexpr Index kParameters = 10;
 constexpr double kCauchy = 2.385;      // deviations at which a residual counts half (95% efficiency)
 constexpr double kLeastSpread = 2e-3;  // of residuals: half a grey level
 constexpr double kStill = 0.01;        // pixels: a smaller motion ends the stage
@@ -29,6 +29,7 @@ using Vector = Eigen::Matrix<double, kParameters, 1>;
 struct Look {
   nerf::Camera camera;
   Tensor<float> render;            // blurred
+  Tensor<float> toned;             // the render in the image's colours
   std::vector<std::int32_t> seen;  // [P] sample of the pixel or of its nearest neighbour; -1: none
   std::vector<nerf::Vec3> points;  // [samples] world
   nerf::Vec3 pivot{};
@@ -113,18 +114,17 @@ class Stage {
     return l;
   }
 
-  // Residuals [P, 3] of image and render in the image's tones; sets the look's spread and cost. Costs compare
-  // only under the spread of one look.
-  std::vector<double> differ(Look& l, ToneFit& tones, double spread = 0) const {
+  // Residuals [P, 3] of image and render in the image's colours; sets these, and the look's spread and cost.
+  // Costs compare only under the spread of one look.
+  std::vector<double> differ(Look& l, double spread = 0) const {
     std::vector<double> weight(l.seen.size());
     for (std::size_t p = 0; p < weight.size(); ++p) weight[p] = l.seen[p] >= 0 ? 1 : 0;
     std::vector<double> r(3 * weight.size());
     for (int pass = 0; pass < 2; ++pass) {
-      tones = fit_tones(l.render, image_, weight);
+      l.toned = fit_tones(l.render, image_, weight)(l.render);
       std::vector<double> sizes;
       for (std::size_t i = 0; i < r.size(); ++i) {
-        r[i] = static_cast<double>(image_.data[i]) -
-               tones.at(static_cast<Index>(i % 3), static_cast<double>(l.render.data[i]));
+        r[i] = static_cast<double>(image_.data[i]) - static_cast<double>(l.toned.data[i]);
         if (l.seen[i / 3] >= 0) sizes.push_back(std::abs(r[i]));
       }
       if (sizes.empty()) return r;
@@ -149,10 +149,9 @@ class Stage {
     return r;
   }
 
-  // Gauss-Newton: with a = t'(B) grad B . dx/dmotion, the render after a motion m is B - a m, so that
+  // Gauss-Newton: with a = grad B . dx/dmotion, the toned render after a motion m is B - a m, so that
   // sum w a a^T m = -sum w a r.
-  void normal_equations(const Look& l, const ToneFit& tones, const std::vector<double>& r, Matrix& h,
-                        Vector& g) const {
+  void normal_equations(const Look& l, const std::vector<double>& r, Matrix& h, Vector& g) const {
     h.setZero();
     g.setZero();
     const Index width = image_.shape[1];
@@ -165,9 +164,8 @@ class Stage {
       for (Index c = 0; c < 3; ++c) {
         const double difference = r[at(3 * p + c)];
         const double w = 1 / (1 + std::pow(difference / (kCauchy * l.spread), 2));
-        const double t = tones.slope(c, static_cast<double>(l.render[3 * p + c]));
-        const double bx = t * slope_x(l.render, p / width, p % width, c),
-                     by = t * slope_y(l.render, p / width, p % width, c);
+        const double bx = slope_x(l.toned, p / width, p % width, c),
+                     by = slope_y(l.toned, p / width, p % width, c);
         xx += w * bx * bx;
         xy += w * bx * by;
         yy += w * by * by;
@@ -180,21 +178,28 @@ class Stage {
     }
     if (!options_.lens)  // zoom and slide stand for distance and aim
       for (const int k : {3, 4, 5}) hold(h, g, k);
+    if (!options_.stretched) hold(h, g, 9);
   }
 
+  // What lies over the view, such as a caption, differs by far more than the rest and hardly counts.
   double agreement(const Look& l) const {
     double ab = 0, aa = 0, bb = 0;
     const Index width = image_.shape[1];
+    const double far = std::pow(kCauchy * l.spread, 2);
     for (Index p = 0; p < static_cast<Index>(l.seen.size()); ++p) {
       if (l.seen[at(p)] < 0) continue;
+      double difference = 0;
+      for (Index c = 0; c < 3; ++c)
+        difference += std::pow(static_cast<double>(image_[3 * p + c] - l.toned[3 * p + c]), 2) / 3;
+      const double weight = 1 / (1 + difference / far);
       for (Index c = 0; c < 3; ++c) {
         const double ax = slope_x(image_, p / width, p % width, c),
                      ay = slope_y(image_, p / width, p % width, c),
-                     bx = slope_x(l.render, p / width, p % width, c),
-                     by = slope_y(l.render, p / width, p % width, c);
-        ab += ax * bx + ay * by;
-        aa += ax * ax + ay * ay;
-        bb += bx * bx + by * by;
+                     bx = slope_x(l.toned, p / width, p % width, c),
+                     by = slope_y(l.toned, p / width, p % width, c);
+        ab += weight * (ax * bx + ay * by);
+        aa += weight * (ax * ax + ay * ay);
+        bb += weight * (bx * bx + by * by);
       }
     }
     return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : -1;
@@ -202,14 +207,13 @@ class Stage {
 
   Alignment run(const nerf::Camera& start) {
     Look best = look(start);
-    ToneFit tones;
-    std::vector<double> r = differ(best, tones);
+    std::vector<double> r = differ(best);
     double damping = kDamping;
     int failures = 0;
     for (int step = 0; step < options_.steps && !best.points.empty() && failures < kMostFailures; ++step) {
       Matrix h;
       Vector g;
-      normal_equations(best, tones, r, h, g);
+      normal_equations(best, r, h, g);
       const double ridge = 1e-6 * h.diagonal().maxCoeff();
       h.diagonal() = (1 + damping) * h.diagonal().array() + ridge;
       const Vector m = h.ldlt().solve(g);
@@ -218,15 +222,14 @@ class Stage {
       Eigen::Map<Vector>(motion.data()) = m.cwiseMax(-0.3).cwiseMin(0.3);
       if (furthest(best, motion) < kStill) break;
       Look next = look(moved(best.camera, best.pivot, motion));
-      ToneFit next_tones;
-      differ(next, next_tones, best.spread);
+      differ(next, best.spread);
       if (next.points.empty() || !(next.cost < best.cost)) {
         damping *= 10;
         ++failures;
         continue;
       }
       best = std::move(next);
-      r = differ(best, tones);
+      r = differ(best);
       damping = std::max(1e-6, damping / 4);
       failures = 0;
     }
@@ -268,7 +271,8 @@ PoseAligner::PoseAligner(const nerf::RadianceField& field)
     : field_(field), renderer_(field, {.finer = 1}), quick_(field, {.finer = 0.5f}) {}
 
 Alignment PoseAligner::align(const Tensor<float>& image, const nerf::Camera& start,
-                             std::span<const AlignmentStage> stages) {
+                             std::span<const AlignmentStage> stages,
+                             const std::vector<std::uint8_t>& covered) {
   check_rank("pose_aligner", "image", image.shape, 3, "[H, W, 3]");
   check_extent("pose_aligner", "image", image.shape, 2, 3, "red, green, blue");
   if (stages.empty()) throw ValueError("[pose_aligner] stages must not be empty");
@@ -276,7 +280,7 @@ Alignment PoseAligner::align(const Tensor<float>& image, const nerf::Camera& sta
     if (stage.size < 16)
       throw ValueError("[pose_aligner] stages must be of at least 16 pixels, got " +
                        std::to_string(stage.size));
-  const auto border = border_of(field_, image);
+  const auto border = covered.empty() ? border_of(field_, image) : covered;
   Alignment out{start, -1};
   for (const AlignmentStage& stage : stages)
     out = Stage(stage.quick ? quick_ : renderer_, field_, image, border, stage).run(out.camera);

@@ -7,24 +7,25 @@ namespace fieldmark::watermark {
 
 /// One stage of a coarse-to-fine alignment.
 struct AlignmentStage {
-  Index size = 64;     ///< longer side, pixels; at most the image's own
-  double blur = 1;     ///< standard deviation of the Gaussian on image and render, pixels of this size
-  int steps = 8;       ///< at most; a stage ends once nothing moves
-  bool lens = true;    ///< whether position moves besides focal length and principal point
-  bool quick = false;  ///< whether ray steps are twice as long: coarse stages need no more
+  Index size = 64;         ///< longer side, pixels; at most the image's own
+  double blur = 1;         ///< standard deviation of the Gaussian on image and render, pixels of this size
+  int steps = 8;           ///< at most; a stage ends once nothing moves
+  bool lens = true;        ///< whether position moves besides focal length and principal point
+  bool stretched = false;  ///< whether the aspect of pixels is free, too
+  bool quick = false;      ///< whether ray steps are twice as long: coarse stages need no more
 };
 
 /// A camera and how well its view of the field agrees with an image.
 struct Alignment {
   nerf::Camera camera;  ///< of the image's size
-  /// Correlation of the gradients of image and render on the foreground after the last stage, in [-1, 1]: 1
-  /// if they differ by gain and offset alone.
+  /// Correlation of the gradients of the image and of the render in its colours on the foreground after the
+  /// last stage, in [-1, 1]: 1 if they differ by a change of colour alone.
   double agreement = -1;
 };
 
 /// Refines a camera until the field's render agrees with an image.
 ///
-/// Each step renders the field, fits gain, offset and gamma of each channel, and solves for the motion that
+/// Each step renders the field, fits the image's colours (see tone_fit.h), and solves for the motion that
 /// reduces the residual (Lucas and Kanade 1981 with the field's depth; Levenberg-Marquardt damping; Cauchy
 /// weights). A rolled camera, another focal length or another principal point explains an image that was
 /// rotated, scaled or cropped. Where the scene fills its images, the plain corners that a rotation leaves do
@@ -35,10 +36,11 @@ class PoseAligner {
   /// @param field  must outlive this and not change
   explicit PoseAligner(const nerf::RadianceField& field);
   /// @param image  [H, W, 3], sides of at least 16   @param start  first guess, of any size
+  /// @param covered  [H W] 1 where something covers the view, or empty
   /// @return the best camera; agreement -1 if it does not show the field
   /// @throws ShapeError for another rank   @throws ValueError without stages or for a size below 16
   Alignment align(const Tensor<float>& image, const nerf::Camera& start,
-                  std::span<const AlignmentStage> stages);
+                  std::span<const AlignmentStage> stages, const std::vector<std::uint8_t>& covered = {});
 
  private:
   const nerf::RadianceField& field_;

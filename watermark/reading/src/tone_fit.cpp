@@ -2,55 +2,108 @@
 #include <fieldmark/engine/shape_checks.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
 namespace fieldmark::watermark {
 namespace {
 
-constexpr double kHold = 0.01;  // weight of the identity, relative to all pixels
+constexpr double kHold = 1e-4;  // weight of the identity, relative to all pixels
 constexpr double kDark = 0.02;  // the slope of v ln v diverges at 0
+constexpr int kMax = 4, kMin = 5, kBent = 6;
 
-std::size_t at_(Index i) { return static_cast<std::size_t>(i); }
+using Matrix = Eigen::Matrix<double, ToneFit::kTerms, ToneFit::kTerms>;
+using Vector = Eigen::Matrix<double, ToneFit::kTerms, 1>;
 
 double bent(double v) { return v > 0 ? v * std::log(v) : 0; }
 
-}  // namespace
-
-double ToneFit::at(Index channel, double v) const {
-  const auto c = at_(channel);
-  return offset[c] + gain[c] * v + bend[c] * bent(v);
+// The terms that all channels share; the last, v ln v, stays 0.
+Vector shared_terms(const float* v) {
+  Vector t;
+  t << 1, static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2]),
+      static_cast<double>(std::max({v[0], v[1], v[2]})), static_cast<double>(std::min({v[0], v[1], v[2]})), 0;
+  return t;
 }
 
-double ToneFit::slope(Index channel, double v) const {
-  const auto c = at_(channel);
-  return gain[c] + bend[c] * (1 + std::log(std::max(v, kDark)));
+// What all pixels say: the normal equations of each channel.
+struct Sums {
+  Matrix shared = Matrix::Zero();
+  std::array<Vector, 3> bends{Vector::Zero(), Vector::Zero(), Vector::Zero()};    // last column of the matrix
+  std::array<Vector, 3> changes{Vector::Zero(), Vector::Zero(), Vector::Zero()};  // right-hand side
+  double total = 0;
+
+  void add(double weight, const float* render, const float* image) {
+    const Vector t = shared_terms(render);
+    shared.selfadjointView<Eigen::Lower>().rankUpdate(t, weight);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double v = static_cast<double>(render[c]), b = bent(v),
+                   change = static_cast<double>(image[c]) - v;
+      bends[c] += weight * b * t;
+      bends[c][kBent] += weight * b * b;
+      changes[c] += weight * change * t;
+      changes[c][kBent] += weight * change * b;
+    }
+    total += weight;
+  }
+
+  Vector solve(std::size_t channel) const {
+    Matrix normal = shared.selfadjointView<Eigen::Lower>();
+    normal.row(kBent) = bends[channel].transpose();
+    normal.col(kBent) = bends[channel];
+    normal.diagonal().array() += kHold * total;
+    return normal.ldlt().solve(changes[channel]);
+  }
+};
+
+}  // namespace
+
+std::array<double, 3> ToneFit::at(const float* v) const {
+  const Vector t = shared_terms(v);
+  std::array<double, 3> out{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t k = 0; k + 1 < kTerms; ++k) out[c] += terms[c][k] * t[static_cast<int>(k)];
+    out[c] += terms[c][kBent] * bent(static_cast<double>(v[c]));
+  }
+  return out;
+}
+
+std::array<std::array<double, 3>, 3> ToneFit::slope(const float* v) const {
+  const auto most = static_cast<std::size_t>(std::max_element(v, v + 3) - v),
+             least = static_cast<std::size_t>(std::min_element(v, v + 3) - v);
+  std::array<std::array<double, 3>, 3> out{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t k = 0; k < 3; ++k) out[c][k] = terms[c][k + 1];
+    out[c][most] += terms[c][kMax];
+    out[c][least] += terms[c][kMin];
+    out[c][c] += terms[c][kBent] * (1 + std::log(std::max(static_cast<double>(v[c]), kDark)));
+  }
+  return out;
+}
+
+Tensor<float> ToneFit::operator()(const Tensor<float>& image) const {
+  Tensor<float> out(image.shape);
+  for (Index i = 0; i < image.size(); i += 3) {
+    const std::array<double, 3> t = at(&image.data[static_cast<std::size_t>(i)]);
+    for (std::size_t c = 0; c < 3; ++c) out[i + static_cast<Index>(c)] = static_cast<float>(t[c]);
+  }
+  return out;
 }
 
 ToneFit fit_tones(const Tensor<float>& render, const Tensor<float>& image, std::span<const double> weight) {
   check_rank("fit_tones", "render", render.shape, 3, "[H, W, 3]");
   check_extent("fit_tones", "render", render.shape, 2, 3, "red, green, blue");
-  if (image.shape != render.shape || static_cast<Index>(weight.size()) * 3 != render.size())
+  if (image.shape != render.shape || std::ssize(weight) * 3 != render.size())
     throw ShapeError("[fit_tones] image and weight must fit the render " + render.shape.str() +
                      ", got shape " + image.shape.str() + " and " + std::to_string(weight.size()) +
                      " weights");
+  Sums sums;
+  for (std::size_t p = 0; p < weight.size(); ++p)
+    if (weight[p] > 0) sums.add(weight[p], &render.data[3 * p], &image.data[3 * p]);
   ToneFit fit;
-  for (Index c = 0; c < 3; ++c) {
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    double total = 0;
-    for (Index p = 0; p < static_cast<Index>(weight.size()); ++p) {
-      const double w = weight[at_(p)], v = static_cast<double>(render[3 * p + c]);
-      const Eigen::Vector3d row(1, v, bent(v));
-      normal += w * row * row.transpose();
-      right += w * (static_cast<double>(image[3 * p + c]) - v) * row;
-      total += w;
-    }
-    if (!(total > 0)) continue;
-    normal.diagonal().array() += kHold * total;
-    const Eigen::Vector3d change = normal.ldlt().solve(right);
-    fit.offset[at_(c)] = change[0];
-    fit.gain[at_(c)] = 1 + change[1];
-    fit.bend[at_(c)] = change[2];
+  if (!(sums.total > 0)) return fit;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const Vector change = sums.solve(c);
+    for (std::size_t k = 0; k < ToneFit::kTerms; ++k) fit.terms[c][k] += change[static_cast<int>(k)];
   }
   return fit;
 }

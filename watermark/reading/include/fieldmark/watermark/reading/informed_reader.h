@@ -32,17 +32,22 @@ struct ImageReading {
   std::vector<double> blind;                ///< [cells] of BlindReader
   InformedReading informed;                 ///< without evidence if no camera was found
   ReadingKind chosen = ReadingKind::blind;  ///< by the alignment's agreement alone
+  bool mirrored = false;                    ///< all of it is of the mirrored image, which alone agrees
   /// [cells] of the chosen detector.
   const std::vector<double>& evidence() const {
     return chosen == ReadingKind::informed ? informed.evidence : blind;
   }
 };
 
+struct Surround;
+
 /// Informed detection: finds the camera of an image, subtracts the owner's unmarked render and compares the
 /// residual with the carriers of all cells. Like the blind detector, it knows neither key nor message, so its
 /// evidence may be tested against any.
 ///
-///   - Candidate cameras are aligned coarse to fine; the best agreement wins.
+///   - Bars are cut off, and an object's other plain background is replaced by the field's.
+///   - Candidate cameras are aligned coarse to fine; the best agreement wins. If none agrees, the mirrored
+///     image is tried, and one that was stretched to where it looks most like the field.
 ///   - The blur that leaves the smallest residual is kept; gain, offset and gamma are fitted.
 ///   - With the residual R and its power V around each pixel, R / V is the score and 1 / V the precision. In
 ///   a
@@ -65,6 +70,14 @@ class InformedReader {
 
  private:
   struct Parts;
+  struct Change;
+  std::vector<Change> changes(const Tensor<float>& seen) const;
+  std::vector<nerf::Camera> starts(const Tensor<float>& image, const Change& change,
+                                   const SeenPlaces& places);
+  InformedReading aligned(const Surround& seen, const Change& change, const SeenPlaces& places);
+  ImageReading read_as(const Tensor<float>& whole, const Change& change);
+  Surround cleared(const Tensor<float>& whole) const;
+  std::vector<double> evidence_at(const Surround& seen, const nerf::Camera& camera);
   const Owner& owner_;
   BlindReader blind_;
   std::unique_ptr<Parts> parts_;

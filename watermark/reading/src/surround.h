@@ -1,0 +1,36 @@
+#pragma once
+#include <fieldmark/engine/tensor.h>
+#include <fieldmark/nerf/radiance_field.h>
+
+#include <array>
+#include <vector>
+
+namespace fieldmark::watermark {
+
+/// An image without what other hands put around a view: bars, and another background behind an object.
+struct Surround {
+  Tensor<float> image;  ///< [H, W, 3] without bars, the plain background replaced by the field's
+  Tensor<float> plain;  ///< [H, W, 3] without bars, the background as it is; empty if nothing was replaced
+  Index left = 0;       ///< columns cut off at the left edge
+  Index top = 0;        ///< rows cut off at the upper edge
+  std::array<float, 3> colour{};  ///< of the background in `plain`
+  /// [H W] 1 where a bar covers the view, else 0; empty if none does. `image` has the background there.
+  std::vector<std::uint8_t> covered{};
+};
+
+/// Rows or columns of one colour at opposite edges, another than the field's background, are bars and are cut
+/// off. In what is left of an object's image, the background is the colour of most pixels at the edges (0.06
+/// in every channel), or of bars on all four sides; pixels connected to the edges in that colour take the
+/// field's background. A bar of one colour from edge to edge, such as a caption's, covers the object. An
+/// image that already has the field's background is not changed.
+/// @param image  [H, W, 3] in [0, 1]   @param background  of the field
+/// @param object  whether the field shows an object before a plain background
+Surround clear_surround(const Tensor<float>& image, float background, bool object);
+
+/// The image before the field's background, by the opacity of a render of the same view: exact at edges, too.
+///   y = x + (1 - opacity) (background - colour)
+/// @param plain  [H, W, 3]   @param opacity  [H, W]   @throws ShapeError if these do not fit
+Tensor<float> before_background(const Tensor<float>& plain, const Tensor<float>& opacity,
+                                const std::array<float, 3>& colour, float background);
+
+}  // namespace fieldmark::watermark
