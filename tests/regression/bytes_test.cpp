@@ -9,15 +9,16 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "regression/bytes_of_version_0_1.h"
+#include "regression/recorded_bytes.h"
 #include "support/catch.h"
 #include "support/temporary_folder.h"
 #include "tools/run_command.h"
 #include "watermark/test_key.h"
 
-// Every file that the command writes for a fixed seed, key and number of steps has the bytes that version 0.1
-// wrote with two threads, here for one and for two. The hashes were recorded at commit 07c747b; a change that
-// is meant to change results says so and records them anew from the test's own output.
+// Every file that the command writes for a fixed seed, key and number of steps has recorded bytes, for one
+// thread and for two: those of version 0.1 for scene and fields, and for owners, baked fields, renders and
+// logits those of the commit that made the networks independent of the key. A change that is meant to change
+// results says so and records them anew from the test's own output.
 using namespace fieldmark;
 
 namespace {
@@ -103,7 +104,7 @@ Hashes written(const std::string& threads) {
 
 void check_bytes(Isa level, const Hashes& expected, const std::string& threads) {
   if (isa_supported() < level) {
-    std::cout << "SKIPPED: bytes of version 0.1 needs a CPU with another instruction set\n";
+    std::cout << "SKIPPED: recorded bytes needs a CPU with another instruction set\n";
     return;
   }
   const Isa before = isa();
@@ -121,9 +122,7 @@ void check_bytes(Isa level, const Hashes& expected, const std::string& threads) 
 }  // namespace
 
 // Cases of their own run side by side.
-TEST_CASE("bytes: all files are those of version 0.1 on x86-64-v2, one thread") {
+TEST_CASE("bytes: all files are as recorded on x86-64-v2, one thread") {
   check_bytes(Isa::v2, kBytesV2, "1");
 }
-TEST_CASE("bytes: all files are those of version 0.1 on AVX2, two threads") {
-  check_bytes(Isa::v3, kBytesV3, "2");
-}
+TEST_CASE("bytes: all files are as recorded on AVX2, two threads") { check_bytes(Isa::v3, kBytesV3, "2"); }

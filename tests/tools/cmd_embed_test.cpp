@@ -69,7 +69,7 @@ TEST_CASE("embed has cells as fine as its views and message need, unless they ar
   CHECK(cells_of("100", {"--cells", "14"}) == 14);
 }
 
-TEST_CASE("embed marks an object in blue, unless another look is asked for", "[embed]") {
+TEST_CASE("embed marks an object in fine detail, unless another look is asked for", "[embed]") {
   const TinyJob& job = TinyJob::get();
   const auto shading = [](const std::string& file) {
     return dynamic_cast<const watermark::CellMark&>(watermark::Owner::load(file).mark())

@@ -50,7 +50,10 @@ TEST_CASE("verify refuses a rate that no image can reach, and messages that do n
       run_command({"verify", "--owner", job.owner, "--message", "5", "--fpr", "1e-100", images});
   CHECK(rate.code == cli::kUsage);
   CHECK_THAT(rate.err, Contains("--fpr"));
-  CHECK(run_command({"verify", "--owner", job.owner, "--message", "123", images}).code == cli::kUsage);
+  const auto long_message =
+      run_command({"verify", "--owner", job.owner, "--message", std::string(1000, 'a'), images});
+  CHECK(long_message.code == cli::kUsage);
+  CHECK_THAT(long_message.err, Contains("--message") && Contains("one for each cell, got 4000"));
   CHECK(run_command({"verify", "--owner", job.field, "--message", "5", images}).code == cli::kFailed);
 }
 

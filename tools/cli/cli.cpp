@@ -35,6 +35,8 @@ constexpr Entry kCommands[] = {
     {"measure", "Measure bit accuracy and quality of a mark", add_measure},
     {"extract", "Read the message from images", add_extract},
     {"verify", "Decide whether images show a message, with p-values", add_verify},
+    {"trace", "Find whose copy images come from", add_trace},
+    {"null", "Test the key on unmarked images: counts beside their bounds", add_null},
     {"check", "Check evidence of verify for alterations", add_check},
     {"distort", "Distort images: noise, rotation, JPEG and more", add_distort},
     {"attack-field", "Attack the mark of a field", add_attack_field},

@@ -11,10 +11,10 @@
 #include <ostream>
 
 #include "cli/cli.h"
+#include "cli/code_option.h"
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/long_run.h"
-#include "cli/message_option.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -25,6 +25,7 @@ struct BakeArguments {
   std::string owner, out;
   std::optional<double> mark_psnr;
   MessageOption message;
+  CodeOption code;
   RunLength length{.seconds = watermark::BakeOptions{}.schedule.seconds};
   bool resume = false;
 };
@@ -70,6 +71,7 @@ int run_bake(const BakeArguments& options, Context& context) {
                        " has no mark PSNR to set, its networks decide it");
     owner.set_mark_psnr(*options.mark_psnr);
   }
+  const auto key = choose_code(options.code, options.message, owner, context);
   const auto message = message_of(options.message, owner.options().bits);
   watermark::BakeOptions bake_options{.seed = context.seed()};
   bake_options.schedule.steps = options.length.steps;
@@ -83,8 +85,8 @@ int run_bake(const BakeArguments& options, Context& context) {
   std::filesystem::remove(checkpoint);
 
   const auto owner_sha256 = sha256_file_hex(options.owner);
-  const auto commitment = watermark::commitment(owner_sha256, owner.key, message);
-  const auto open = to_hex(watermark::public_key(owner.key));
+  const auto commitment = watermark::commitment(owner_sha256, key, message);
+  const auto open = to_hex(watermark::public_key(key));
   const auto bytes = std::filesystem::file_size(options.out);
   context.text() << options.out << ": " << baker.steps() << " steps in " << format_duration(seconds)
                  << "\ncommitment " << commitment
@@ -94,6 +96,7 @@ int run_bake(const BakeArguments& options, Context& context) {
   context.result({{"message", to_hex(message)},
                   {"payload", payload_json(message)},
                   {"bits", message.size()},
+                  {"copy", options.code.copy.empty() ? Json(nullptr) : Json(options.code.copy)},
                   {"seconds", seconds},
                   {"steps", baker.steps()},
                   {"psnr_colours", number(baker.psnr())},
@@ -113,6 +116,8 @@ Command add_bake(CommandLine& app) {
   auto o = std::make_shared<BakeArguments>();
   app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
   add_message_options(app, o->message, "Message to bake");
+  add_code_options(app, o->code);
+  add_copy_option(app, o->code, "Recipient whose own copy this is, see trace");
   app.add_option("--out", o->out, "File to write, the field to publish; FIELD.checkpoint during baking")
       ->required()
       ->type_name("FIELD");

@@ -227,10 +227,12 @@ Command add_embed(CommandLine& app) {
       ->range(32, 1024)
       ->type_name("N")
       ->default_str("");
-  app.add_option("--colours", o->colours,
-                 "Preset fast: light, like an uneven light, least visible; blue, blue and yellow, read "
-                 "sooner (blue for an object before a background, else light)")
-      ->one_of({"light", "blue"})
+  app.add_option(
+         "--colours", o->colours,
+         "Preset fast: light, like an uneven light, least visible; mixed, blue and yellow "
+         "with some grey, read sooner;\nblue, without grey, lost in greyscale (mixed for an object before a "
+         "background, else light)")
+      ->one_of({"light", "blue", "mixed"})
       ->type_name("NAME")
       ->default_str("");
   add_view_options(app, *o);

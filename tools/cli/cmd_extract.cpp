@@ -6,9 +6,9 @@
 #include <ostream>
 
 #include "cli/cli.h"
+#include "cli/code_option.h"
 #include "cli/commands.h"
 #include "cli/context.h"
-#include "cli/message_option.h"
 #include "cli/reading.h"
 
 namespace fieldmark::cli {
@@ -18,7 +18,8 @@ constexpr double kWeakBit = 0.05;  // p-value above which a bit by itself says n
 constexpr double kTrace = 0.01;    // p-value of noise below which there is something to look for
 
 struct ExtractArguments {
-  std::string owner, key, reading = "auto";
+  std::string owner, reading = "auto";
+  CodeOption code;
   double fpr = 1e-6;
   std::vector<std::string> images;
 };
@@ -60,8 +61,9 @@ std::string certainty(const watermark::BitReading& reading, double fpr) {
 }
 
 int run_extract(const ExtractArguments& options, Context& context) {
-  const auto owner = watermark::Owner::load(options.owner);
-  const auto code = options.key.empty() ? owner.code() : owner.code(watermark::load_key(options.key));
+  auto owner = watermark::Owner::load(options.owner);
+  choose_code(options.code, {}, owner, context);
+  const auto code = owner.code();
   const Index bits = owner.options().bits;
   const double least = watermark::least_noise_p(code.carriers(), bits);
   const bool can_tell = least < 1;  // a bit of one cell looks the same in noise
@@ -101,7 +103,8 @@ int run_extract(const ExtractArguments& options, Context& context) {
 Command add_extract(CommandLine& app) {
   auto o = std::make_shared<ExtractArguments>();
   app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
-  app.add_option("--key", o->key, "Key to read with instead of the owner's")->type_name("KEY");
+  add_code_options(app, o->code);
+  add_copy_option(app, o->code, "Recipient whose copy to read");
   add_rate(app, o->fpr, "a message counts as read");
   add_reading(app, o->reading);
   app.add_option("images", o->images, "Images to read, or folders of them; PNG or JPEG")

@@ -9,10 +9,10 @@
 #include <span>
 
 #include "cli/cli.h"
+#include "cli/code_option.h"
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/measured.h"
-#include "cli/message_option.h"
 #include "cli/perceptual.h"
 #include "cli/scene_data.h"
 
@@ -22,6 +22,7 @@ namespace {
 struct MeasureArguments {
   std::string owner, field, data, lpips_weights;
   MessageOption message;
+  CodeOption code;
   std::vector<std::string> cameras{"novel"};
   Index count = 200, informed_count = 20, size = 0, together = 1;
   bool payloads = false, count_given = false;
@@ -176,6 +177,7 @@ int run_measure(const MeasureArguments& options, Context& context) {
     read_option("--distort", [&] { return distort::parse_distortion(name); });
   const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
   MeasureSubject subject{watermark::Owner::load(options.owner), {}, {}};
+  choose_code(options.code, options.message, subject.owner, context);
   if (!options.field.empty()) {
     subject.message = message_of(options.message, subject.owner.options().bits);
     subject.baked.emplace(nerf::RadianceField::load(options.field));
@@ -205,6 +207,8 @@ Command add_measure(CommandLine& app) {
       ->type_name("BAKED")
       ->default_str("");
   add_message_options(app, o->message, "Message of the baked field");
+  add_code_options(app, o->code);
+  add_copy_option(app, o->code, "Recipient of the baked copy");
   app.add_option("--cameras", o->cameras,
                  "Cameras to measure from, separated by commas, one row each:\n"
                  "novel (from the span of the training cameras),\n"

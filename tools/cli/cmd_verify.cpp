@@ -8,10 +8,10 @@
 
 #include <fieldmark/tools/results/report.h>
 #include "cli/cli.h"
+#include "cli/code_option.h"
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/evidence_run.h"
-#include "cli/message_option.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -19,8 +19,9 @@ namespace {
 constexpr Index kEvidenceKeys = 100000;
 
 struct VerifyArguments {
-  std::string owner, key, evidence, reading = "auto";
+  std::string owner, evidence, reading = "auto";
   MessageOption message;
+  CodeOption code;
   double fpr = 1e-6;
   Index wrong_keys = 0;
   std::vector<std::string> images, controls;
@@ -36,37 +37,6 @@ watermark::WrongKeyCounts count_keys(const KeyTest& test, const std::vector<doub
         progress.update(static_cast<double>(done) / static_cast<double>(total));
         return true;
       });
-}
-
-// How often random keys reach each p-value, beside the bounds of chance.
-Json wrong_keys(const watermark::WrongKeyCounts& found, Context& context) {
-  Json counts = Json::object(), bounds = Json::object(), intervals = Json::object();
-  double p = 1;
-  for (int i = 0; i < watermark::WrongKeyCounts::kThresholds; ++i) {
-    p /= 10;
-    const std::string name = "1e-" + std::to_string(i + 1);
-    const Index count = found.counts[static_cast<std::size_t>(i)],
-                bound = watermark::binomial_upper(found.n, p);
-    const auto interval = watermark::binomial_interval(found.n, p);
-    counts[name] = count;
-    bounds[name] = bound;
-    intervals[name] = {interval.low, interval.high};
-    char line[160];
-    std::snprintf(line, sizeof line,
-                  "wrong keys at p <= %s   %lld of %lld, 99%% bound %lld (99%% interval %lld to %lld)\n",
-                  name.c_str(), static_cast<long long>(count), static_cast<long long>(found.n),
-                  static_cast<long long>(bound), static_cast<long long>(interval.low),
-                  static_cast<long long>(interval.high));
-    context.text() << line;
-  }
-  char least[80];
-  std::snprintf(least, sizeof least, "wrong keys, smallest p   %.2e\n", found.least_p);
-  context.text() << least;
-  return {{"n", found.n},
-          {"counts", counts},
-          {"bounds_99", bounds},
-          {"intervals_99", intervals},
-          {"least_p", found.least_p}};
 }
 
 void print_verdict(const watermark::EvidenceRecord& record, Context& context) {
@@ -100,16 +70,16 @@ Json result_json(const watermark::EvidenceRecord& record, const std::string& sig
           {"fpr", record.fpr},
           {"owner_sha256", record.owner_sha256},
           {"commitment", record.commitment},
+          {"copy", record.copy.empty() ? Json(nullptr) : Json(record.copy)},
           {"public_key", signer},
           {"controls", controls_json(record.controls, record.fpr)}};
 }
 
 int run_verify(const VerifyArguments& options, Context& context) {
-  const auto owner = watermark::Owner::load(options.owner);
-  const Index bits = owner.options().bits;
-  const auto message = message_of(options.message, bits);
-  const auto key = options.key.empty() ? owner.key : watermark::load_key(options.key);
-  const auto code = owner.code(key);
+  auto owner = watermark::Owner::load(options.owner);
+  const auto key = choose_code(options.code, options.message, owner, context);
+  const auto message = message_of(options.message, owner.options().bits);
+  const auto code = owner.code();
   check_rate(options.fpr, watermark::least_p(code.carriers()), code.carriers());
   if (!options.evidence.empty()) watermark::prepare_evidence_folder(options.evidence);
   SuspectReader reader(owner, options.reading);
@@ -119,6 +89,7 @@ int run_verify(const VerifyArguments& options, Context& context) {
   watermark::EvidenceRecord record{.reading = reading_used(images),
                                    .owner_sha256 = sha256_file_hex(options.owner),
                                    .message = message,
+                                   .copy = options.code.copy,
                                    .fpr = options.fpr,
                                    .cells = code.carriers(),
                                    .together = test(evidence),
@@ -137,7 +108,8 @@ int run_verify(const VerifyArguments& options, Context& context) {
   const Index keys =
       options.wrong_keys == 0 && !options.evidence.empty() ? kEvidenceKeys : options.wrong_keys;
   if (keys > 0) record.wrong_keys = count_keys(test, evidence, keys, context);
-  const Json wrong = record.wrong_keys ? wrong_keys(*record.wrong_keys, context) : Json(nullptr);
+  const Json wrong =
+      record.wrong_keys ? key_counts(*record.wrong_keys, "wrong keys", context) : Json(nullptr);
   const std::string signer = to_hex(watermark::public_key(key));
   if (!options.evidence.empty()) {
     write_evidence(options.evidence, record, images, controls.thumbnails, owner, key);
@@ -158,7 +130,8 @@ Command add_verify(CommandLine& app) {
   app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
   add_message_options(app, o->message, "Message to look for");
   add_rate(app, o->fpr, "a mark counts as found");
-  app.add_option("--key", o->key, "Key to test instead of the owner's")->type_name("KEY");
+  add_code_options(app, o->code);
+  add_copy_option(app, o->code, "Recipient whose copy to look for");
   app.add_option("--wrong-keys", o->wrong_keys,
                  "Random keys to test as well, 0 to 10000000; default: 0, with --evidence 100000")
       ->range(0, 10000000)

@@ -26,9 +26,11 @@ Command add_gradcheck(CommandLine& app);
 Command add_info(CommandLine& app);
 Command add_key(CommandLine& app);
 Command add_measure(CommandLine& app);
+Command add_null(CommandLine& app);
 Command add_render(CommandLine& app);
 Command add_reproduce(CommandLine& app);
 Command add_scene(CommandLine& app);
+Command add_trace(CommandLine& app);
 Command add_train(CommandLine& app);
 Command add_verify(CommandLine& app);
 

@@ -137,6 +137,7 @@ std::string figures(const EvidenceRecord& r) {
                                                  text_of(s.p_value_bits_two_sided) + " two-sided; " +
                                                  std::to_string(s.match.matching) + " of " +
                                                  std::to_string(s.match.decided) + " decided bits match") +
+         (r.copy.empty() ? "" : row("Recipient of the copy", escaped_markup(r.copy))) +
          row("False-positive rate required", text_of(r.fpr)) +
          row("Detection",
              escaped_markup(r.reading) + (r.reading == "blind"

@@ -122,6 +122,35 @@ void print_views(std::ostream& out, const std::vector<ImageEvidence>& images,
   }
 }
 
+Json key_counts(const watermark::WrongKeyCounts& found, const std::string& of, Context& context) {
+  Json counts = Json::object(), bounds = Json::object(), intervals = Json::object();
+  double p = 1;
+  for (int i = 0; i < watermark::WrongKeyCounts::kThresholds; ++i) {
+    p /= 10;
+    const std::string name = "1e-" + std::to_string(i + 1);
+    const Index count = found.counts[at(i)], bound = watermark::binomial_upper(found.n, p);
+    const auto interval = watermark::binomial_interval(found.n, p);
+    counts[name] = count;
+    bounds[name] = bound;
+    intervals[name] = {interval.low, interval.high};
+    char line[160];
+    std::snprintf(line, sizeof line,
+                  "%s at p <= %s   %lld of %lld, 99%% bound %lld (99%% interval %lld to %lld)\n", of.c_str(),
+                  name.c_str(), static_cast<long long>(count), static_cast<long long>(found.n),
+                  static_cast<long long>(bound), static_cast<long long>(interval.low),
+                  static_cast<long long>(interval.high));
+    context.text() << line;
+  }
+  char least[80];
+  std::snprintf(least, sizeof least, "%s, smallest p   %.2e\n", of.c_str(), found.least_p);
+  context.text() << least;
+  return {{"n", found.n},
+          {"counts", counts},
+          {"bounds_99", bounds},
+          {"intervals_99", intervals},
+          {"least_p", found.least_p}};
+}
+
 void print_controls(std::ostream& out, const std::vector<EvidenceControl>& controls, double fpr) {
   for (const auto& control : controls) {
     const EvidenceScore& s = control.together;

@@ -50,6 +50,11 @@ Json per_view_json(const std::vector<ImageEvidence>& images,
 void print_views(std::ostream& out, const std::vector<ImageEvidence>& images,
                  const std::vector<watermark::EvidenceImage>& scores);
 
+/// How often keys reach each p-value, beside the bounds of chance: printed, a line a threshold, and for
+/// --json.
+/// @param of  what was counted, "wrong keys"
+Json key_counts(const watermark::WrongKeyCounts& found, const std::string& of, Context& context);
+
 /// A line for each control.
 void print_controls(std::ostream& out, const std::vector<watermark::EvidenceControl>& controls, double fpr);
 

@@ -3,6 +3,7 @@
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/imaging/metrics.h>
 #include <fieldmark/watermark/embedding/embedder.h>
+#include <fieldmark/watermark/keys/keyed_hash.h>
 
 #include <algorithm>
 #include <cmath>
@@ -36,14 +37,16 @@ Outcome run(Index steps, Owner owner = tiny_owner()) {
   return outcome(owner, embedder);
 }
 
-// dB on the object, mean over 16 novel views with a message each.
-double measured_strength(const Owner& owner, std::uint64_t view_seed, const CounterRng& messages) {
+// dB on the object, mean over 16 novel views with a code and a message each.
+double measured_strength(const Owner& owner, std::uint64_t view_seed, const CounterRng& messages,
+                         std::uint64_t code_seed) {
   nerf::Renderer plain(owner.field), marked(owner.field);
   double sum = 0;
   const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, 16, 0, view_seed);
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const Message sent = random_message(4, messages, ~std::uint64_t{i});
-    marked.set_recolour(owner.marking(cell_signs(owner.code(), sent)));
+    const Key key = derive_key(key_of_seed(code_seed), "fieldmark training code", ~std::uint64_t{i});
+    marked.set_recolour(owner.marking(cell_signs(owner.code(key), sent)));
     const nerf::Rendering base = plain.render(cameras[i]);
     sum += psnr_masked(marked.render(cameras[i]).rgb, base.rgb, base.opacity);
   }
@@ -78,6 +81,19 @@ TEST_CASE("embedder: in 300 steps the losses fall, places are told apart and bit
   CHECK(last.bits > 0.6);
   CHECK(std::ranges::all_of(owner.params.values(), [](float v) { return std::isfinite(v); }));
   CHECK(field == std::vector<float>(owner.field.params.values().begin(), owner.field.params.values().end()));
+}
+
+TEST_CASE(
+    "embedder: equal options train equal networks and the same gain under any key, for every kind of mark") {
+  const auto trained = [](Owner owner, const Key& key) {
+    owner.set_code(key, owner.options().bits);
+    Embedder embedder(owner, tiny_views(), options(4));
+    embedder.drive({});
+    embedder.calibrate(4);
+    return std::pair{outcome(owner, embedder), owner.gain};
+  };
+  CHECK(trained(tiny_owner(), test_key(1)) == trained(tiny_owner(), test_key(77)));
+  CHECK(trained(tiny_paper_owner({}), test_key(1)) == trained(tiny_paper_owner({}), test_key(77)));
 }
 
 TEST_CASE("embedder: preset paper learns the colours of the field, then its content loss is small") {
@@ -255,9 +271,9 @@ TEST_CASE("embedder: calibration gives views the owner's strength") {
     Owner owner = tiny_owner(mark_psnr);
     Embedder(owner, tiny_views(), options(1)).calibrate(16);
     // Exactly on the views and messages it looked at; others are so few and small that they differ.
-    CHECK(measured_strength(owner, options(1).seed + 77, CounterRng(options(1).seed, 12)) ==
+    CHECK(measured_strength(owner, options(1).seed + 77, CounterRng(options(1).seed, 12), options(1).seed) ==
           Approx(mark_psnr).margin(0.03));
-    CHECK(measured_strength(owner, 1234, CounterRng(5)) == Approx(mark_psnr).margin(0.5));
+    CHECK(measured_strength(owner, 1234, CounterRng(5), 8) == Approx(mark_psnr).margin(0.5));
   }
 }
 

@@ -40,6 +40,11 @@ TEST_CASE(
   });
   CHECK(mark_psnr == Approx(sum / 5).epsilon(1e-12));
   CHECK(called == std::vector<Index>{0, 1, 2, 3, 4});
+  called.clear();
+  MarkPsnrMeter(owner.field, views)(
+      renderer, [&](Index i) { called.push_back(i); }, 2);
+  CHECK(called == std::vector<Index>{0, 2, 4});
+  CHECK(MarkPsnrMeter(owner.field, views).guess_step() == 1);
 }
 
 TEST_CASE("mark_psnr_meter: views of fewer pixels say the same of a mark as large ones") {

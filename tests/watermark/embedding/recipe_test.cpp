@@ -8,14 +8,14 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 TEST_CASE("recipe: names of colours there and back, others are refused") {
-  for (const MarkColours c : {MarkColours::blue, MarkColours::light})
+  for (const MarkColours c : {MarkColours::blue, MarkColours::light, MarkColours::mixed})
     CHECK(parse_mark_colours(mark_colours_name(c)) == c);
   CHECK_THROWS_AS(parse_mark_colours("grey"), ValueError);
-  CHECK_THROWS_WITH(parse_mark_colours("grey"), "[mark_colours] expected blue or light, got 'grey'");
+  CHECK_THROWS_WITH(parse_mark_colours("grey"), "[mark_colours] expected blue, light or mixed, got 'grey'");
 }
 
 TEST_CASE("recipe: what suits a scene") {
-  CHECK(colours_for(nerf::SpaceKind::cube) == MarkColours::blue);
+  CHECK(colours_for(nerf::SpaceKind::cube) == MarkColours::mixed);
   CHECK(colours_for(nerf::SpaceKind::contracted) == MarkColours::light);
   CHECK(colours_for(nerf::SpaceKind::ndc) == MarkColours::light);
   CHECK(batch_for(nerf::SpaceKind::cube) == EmbedOptions{}.batch);
@@ -32,6 +32,10 @@ TEST_CASE("recipe: blue is the default, light is smooth, tilted and shaded") {
   CHECK((mark.network.shading > 0 && mark.network.shading <= 1));
   CHECK(mark.training.smooth_weight == 0);
   CHECK(mark.training.flat_weight > usual.training.flat_weight);
+  use_colours(MarkColours::mixed, mark);
+  CHECK((mark.network.tilt > 0 && mark.network.tilt < 45));
+  CHECK(mark.network.bands == usual.network.bands);
+  CHECK(mark.network.shading == 0);
   use_colours(MarkColours::blue, mark);
   CHECK(mark.network.bands == usual.network.bands);
   CHECK(mark.network.tilt == 0);

@@ -118,3 +118,21 @@ TEST_CASE("wrong_keys: binomial bound, against exact fractions and the normal li
   CHECK_THROWS_WITH(binomial_upper(1, 1.5), Contains("p must be in [0, 1], got 1.5"));
   CHECK_THROWS_WITH(binomial_upper(1, 0.5, 1), Contains("level must be in (0, 1), got 1"));
 }
+
+TEST_CASE("wrong_keys: counts add up, statistic by statistic and sum by sum") {
+  WrongKeyCounts one, two;
+  for (const double t : {0.0, 2.5, 4.0}) one.add(t);  // p 1, 0.044, 3.4e-4
+  two.add(-30.0);                                     // p 1, below the histogram
+  two.add(7.0);                                       // p 2.3e-11
+  CHECK(one.n == 3);
+  CHECK(one.counts == std::array<Index, 8>{2, 1, 1, 0, 0, 0, 0, 0});
+  CHECK(one.least_p == std::exp(-8.0));
+  CHECK(one.histogram[40] == 1);
+  CHECK(one.histogram[50] == 1);
+  one.add(two);
+  CHECK(one.n == 5);
+  CHECK(one.counts == std::array<Index, 8>{3, 2, 2, 1, 1, 1, 1, 1});
+  CHECK(one.least_p == std::exp(-24.5));
+  CHECK(one.histogram[0] == 1);
+  CHECK_THROWS_AS(one.add(std::nan("")), ValueError);
+}

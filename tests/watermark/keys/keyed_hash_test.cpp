@@ -66,3 +66,9 @@ TEST_CASE("keyed_hash: signs are fair and independent") {
   CHECK(std::abs(sum) < 4 * std::sqrt(100000.0));
   CHECK(std::abs(pairs) < 4 * std::sqrt(100000.0));
 }
+
+TEST_CASE("keyed_hash: the key of a seed has the seed's bytes, little-endian, and zeros") {
+  const Key key = key_of_seed(0x0102030405060708u);
+  for (std::size_t k = 0; k < 8; ++k) CHECK(key.bytes[k] == 8 - k);
+  for (std::size_t k = 8; k < key.bytes.size(); ++k) CHECK(key.bytes[k] == 0);
+}

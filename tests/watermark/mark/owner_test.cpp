@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <nlohmann/json.hpp>
 
 #include "support/catch.h"
 #include "support/random.h"
@@ -36,6 +37,41 @@ TEST_CASE("owner: the code deals the cells under the key asked for") {
   CHECK(owner.code().sign == want.sign);
   CHECK(owner.code(test_key(1)).bit == want.bit);
   CHECK(owner.code(test_key(2)).sign != want.sign);
+}
+
+TEST_CASE("owner: it takes another key and messages of any length up to one bit a cell") {
+  Owner owner = small_owner();
+  REQUIRE(owner.most_bits() == owner.cells.count());
+  for (const Index bits : {Index{1}, Index{7}, owner.most_bits()}) {
+    owner.set_code(test_key(9), bits);
+    const CellCode want = deal_cells(test_key(9), owner.cells.area(), bits);
+    CHECK(owner.code().bit == want.bit);
+    CHECK(owner.code().sign == want.sign);
+    CHECK(owner.options().bits == bits);
+  }
+  const std::string most = std::to_string(owner.most_bits());
+  CHECK_THROWS_WITH(owner.set_code(test_key(1), owner.most_bits() + 1),
+                    Contains("bits must be 1 to " + most + ", one for each cell, got"));
+  CHECK_THROWS_AS(owner.set_code(test_key(1), 0), ValueError);
+  CHECK(owner.key == test_key(9));
+  Owner paper = small_paper_owner();
+  paper.set_code(test_key(2), 3);
+  CHECK(paper.key == test_key(2));
+  CHECK_THROWS_WITH(paper.set_code(test_key(2), 4), "[owner] bits must be 3 with preset paper, got 4");
+}
+
+TEST_CASE("owner: a file says whether its networks know no key, one that does not say is of version 0.1") {
+  const TemporaryFolder folder;
+  const Owner owner = small_owner();
+  CHECK(owner.key_free());
+  owner.save(folder / "a");
+  CHECK(Owner::load(folder / "a").key_free());
+  SafetensorsFile file = SafetensorsFile::read(folder / "a");
+  auto config = nlohmann::json::parse(require_kind(file, "owner").config);
+  config.erase("key_free");
+  set_model_info(file, {"owner", config.dump()});
+  file.write(folder / "b");
+  CHECK_FALSE(Owner::load(folder / "b").key_free());
 }
 
 TEST_CASE("owner: saved and loaded it is the same to the byte, and marks the same") {

@@ -99,10 +99,10 @@ void marks(Variants& all, MarkColours colours) {
   all.vary("hiding", "off", [](EmbedVariant& v) {
     v.recipe.cell().training.smooth_weight = v.recipe.cell().training.flat_weight = 0;
   });
-  all.vary("colours", "grey too", [](EmbedVariant& v) { v.recipe.cell().network.luminance = 1; });
-  const MarkColours other = colours == MarkColours::light ? MarkColours::blue : MarkColours::light;
-  all.vary("colours", watermark::mark_colours_name(other),
-           [=](EmbedVariant& v) { watermark::use_colours(other, v.recipe.cell()); });
+  for (const MarkColours other : {MarkColours::blue, MarkColours::light, MarkColours::mixed})
+    if (other != colours)
+      all.vary("colours", watermark::mark_colours_name(other),
+               [=](EmbedVariant& v) { watermark::use_colours(other, v.recipe.cell()); });
 }
 
 // How it is learnt.

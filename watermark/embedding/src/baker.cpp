@@ -16,6 +16,8 @@ namespace {
 constexpr int kShards = 16;
 constexpr Index kRays = 64, kChunks = 32;  // of a chunk, of a step
 constexpr float kLeastWeight = 1e-3f;
+constexpr int kRounds = 4;          // of scale_to(), each confirmed by all views
+constexpr double kNear = 0.02;      // dB from the mark PSNR asked for
 constexpr float kOfSamples = 0.1f;  // weight of the samples' own colours beside what rays show
 
 // The parameters of the colour networks, which lie together.
@@ -217,27 +219,44 @@ void Baker::set_scale(double scale, std::span<const float> learnt) {
     values[i] = learnt[i] == unmarked[i] ? unmarked[i] : unmarked[i] + s * (learnt[i] - unmarked[i]);
 }
 
+// Where a scale takes the mark PSNR is sought on some of the views, whose mean differs from that of all by a
+// bias that hardly depends on the scale; all views confirm it.
 Baker::MarkPsnr Baker::scale_to(double target, const MarkPsnrViews& views) {
   const MarkPsnrMeter meter(owner_.field, views);
   nerf::Renderer marked(field_, mark_psnr_rendering());
   MarkPsnr found{.learnt = meter(marked)};
   found.scaled = found.learnt;
   const std::vector<float> learnt(field_.params.values().begin(), field_.params.values().end());
-  // Secants of strength over log scale; the first is that of a change twice as large, 6 dB stronger, which
-  // rounding and colours at the ends of their range bend.
+  const Index every = meter.guess_step();
+  double bias = every > 1 ? found.scaled - meter(marked, {}, every) : 0;
+  for (int round = 0; round < kRounds && std::abs(found.scaled - target) > kNear; ++round) {
+    const double before = found.scale;
+    seek(
+        target, learnt, [&] { return meter(marked, {}, every) + bias; }, found);
+    if (every == 1 || !std::isfinite(found.scaled) || found.scale == before) break;
+    const double guess = found.scaled - bias;
+    found.scaled = meter(marked);
+    bias = found.scaled - guess;
+  }
+  return found;
+}
+
+// Secants of mark PSNR over log scale; the first is that of a change twice as large, 6 dB stronger, which
+// rounding and colours at the ends of their range bend.
+void Baker::seek(double target, std::span<const float> learnt, const std::function<double()>& measure,
+                 MarkPsnr& found) {
   double slope = -1;
-  for (int round = 0; round < 6 && std::abs(found.scaled - target) > 0.02; ++round) {
+  for (int round = 0; round < 6 && std::abs(found.scaled - target) > kNear; ++round) {
     const double scale = std::clamp(found.scale * std::pow(10.0, (target - found.scaled) / slope / 20),
                                     1 / kLargestScale, kLargestScale);
     if (!std::isfinite(found.scaled) || scale == found.scale) break;
     set_scale(scale, learnt);
-    const double scaled = meter(marked),
+    const double scaled = measure(),
                  secant = (scaled - found.scaled) / (20 * std::log10(scale / found.scale));
     if (secant < -0.2) slope = secant;
     found.scale = scale;
     found.scaled = scaled;
   }
-  return found;
 }
 
 double Baker::psnr() const { return -10 * std::log10(std::max(loss(), 1e-10)); }

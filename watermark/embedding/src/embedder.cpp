@@ -5,6 +5,7 @@
 #include <fieldmark/distort/similarity.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/watermark/embedding/embedder.h>
+#include <fieldmark/watermark/keys/keyed_hash.h>
 
 #include <algorithm>
 #include <cmath>
@@ -40,7 +41,6 @@ Embedder::Embedder(Owner& owner, std::span<const CachedView> views, const EmbedO
       message_rng_(options.seed, 12),
       noise_rng_(options.seed, 13),
       shift_rng_(options.seed, 14),
-      code_(owner.code()),
       loop_(static_cast<int>(std::clamp<Index>(options.batch, 1, 64)), owner.params.size()) {
   if (options.batch < 1 || options.batch > 64)
     throw ValueError("[embedder] batch must be 1 to 64, got " + std::to_string(options.batch));
@@ -56,6 +56,11 @@ Embedder::Embedder(Owner& owner, std::span<const CachedView> views, const EmbedO
   keep("image_loss", figures_.loss);
 }
 
+// Networks that never see the owner's code carry no trace of its key.
+CellCode Embedder::fresh_code(std::uint64_t place) const {
+  return owner_.code(derive_key(key_of_seed(options_.seed), "fieldmark training code", place));
+}
+
 TrainingImage Embedder::draw(Index image, Tape<float>& tape) const {
   const auto step = static_cast<std::uint64_t>(steps()), i = static_cast<std::uint64_t>(image);
   const EmbedDistortions& d = options_.distortions;
@@ -66,7 +71,8 @@ TrainingImage Embedder::draw(Index image, Tape<float>& tape) const {
                     static_cast<Index>(views_.size()) - 1);
   const std::uint64_t place = step * static_cast<std::uint64_t>(options_.batch) + i;
   p.message = random_message(owner_.options().bits, message_rng_, place);
-  p.signs = cell_signs(code_, p.message);
+  p.code = fresh_code(place);
+  p.signs = cell_signs(p.code, p.message);
   const auto often = [](float x) { return x < 2.f / 3; };
   // Unless they are mixed, one of none, rotation, zoom, blur and noise for the whole batch.
   const int only = d.mixed ? 0 : static_cast<int>(5 * choice_rng_.uniform4(step, kOfBatch)[0]);
@@ -175,13 +181,17 @@ void Embedder::calibrate(Index views) {
   const double target = owner_.options().mark_psnr;
   owner_.gain = std::pow(10.0, -target / 20);
   nerf::Renderer renderer(owner_.field, mark_psnr_rendering());
-  // Three rounds: the first sets the size, the others what clamping and rounding to 8 bits change.
+  // Three rounds: the first sets the size, the others what clamping and rounding to 8 bits change. All views
+  // are needed by the last alone.
   for (int round = 0; round < 3; ++round) {
-    const double mark_psnr = meter(renderer, [&](Index i) {
-      const auto message =
-          random_message(owner_.options().bits, message_rng_, ~static_cast<std::uint64_t>(i));
-      renderer.set_recolour(owner_.marking(cell_signs(code_, message)));
-    });
+    const double mark_psnr = meter(
+        renderer,
+        [&](Index i) {
+          const auto place = ~static_cast<std::uint64_t>(i);
+          const auto message = random_message(owner_.options().bits, message_rng_, place);
+          renderer.set_recolour(owner_.marking(cell_signs(fresh_code(place), message)));
+        },
+        round < 2 ? meter.guess_step() : 1);
     if (!std::isfinite(mark_psnr)) return;
     owner_.gain *= std::pow(10.0, (mark_psnr - target) / 20);
   }
@@ -196,6 +206,7 @@ void Embedder::describe(RunFingerprint& f) const {
   f.option("reader_size", owner_.options().reader_size);
   f.option("reader_aspect", owner_.options().reader_aspect);
   f.option("initial_seed", owner_.options().seed);
+  f.option("codes", "fresh for each image");
   f.option("seed", options_.seed);
   f.option("batch", options_.batch);
   f.option("extractor_lr", options_.extractor_lr);

@@ -22,10 +22,10 @@ MarkPsnrMeter::MarkPsnrMeter(const nerf::RadianceField& unmarked, const MarkPsnr
   for (const nerf::Camera& camera : cameras_) unmarked_.push_back(renderer.render(camera));
 }
 
-double MarkPsnrMeter::operator()(nerf::Renderer& marked,
-                                 const std::function<void(Index view)>& before) const {
+double MarkPsnrMeter::operator()(nerf::Renderer& marked, const std::function<void(Index view)>& before,
+                                 Index every) const {
   std::vector<double> psnr;
-  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+  for (std::size_t i = 0; i < cameras_.size(); i += static_cast<std::size_t>(every)) {
     if (before) before(static_cast<Index>(i));
     const nerf::Rendering& plain = unmarked_[i];
     psnr.push_back(psnr_masked(marked.render(cameras_[i]).rgb, plain.rgb, plain.opacity));

@@ -10,17 +10,25 @@ constexpr Index kPaperPatch = 150;            // pixels
 }  // namespace
 
 const char* mark_colours_name(MarkColours colours) {
-  return colours == MarkColours::light ? "light" : "blue";
+  switch (colours) {
+    case MarkColours::light:
+      return "light";
+    case MarkColours::mixed:
+      return "mixed";
+    case MarkColours::blue:
+      break;
+  }
+  return "blue";
 }
 
 MarkColours parse_mark_colours(std::string_view name) {
-  for (const MarkColours c : {MarkColours::blue, MarkColours::light})
+  for (const MarkColours c : {MarkColours::blue, MarkColours::light, MarkColours::mixed})
     if (name == mark_colours_name(c)) return c;
-  throw ValueError("[mark_colours] expected blue or light, got '" + std::string(name) + "'");
+  throw ValueError("[mark_colours] expected blue, light or mixed, got '" + std::string(name) + "'");
 }
 
 MarkColours colours_for(nerf::SpaceKind space) {
-  return space == nerf::SpaceKind::cube ? MarkColours::blue : MarkColours::light;
+  return space == nerf::SpaceKind::cube ? MarkColours::mixed : MarkColours::light;
 }
 
 void use_colours(MarkColours colours, CellMarkOptions& mark) {
@@ -28,7 +36,7 @@ void use_colours(MarkColours colours, CellMarkOptions& mark) {
   const bool light = colours == MarkColours::light;
   mark.network.bands =
       light ? 5 : usual.network.bands;  // finer detail than a cell costs likeness for nothing
-  mark.network.tilt = light ? 50 : usual.network.tilt;
+  mark.network.tilt = light ? 50 : colours == MarkColours::mixed ? 30 : usual.network.tilt;
   mark.network.shading = light ? 0.97 : usual.network.shading;
   mark.training.smooth_weight = light ? 0 : usual.training.smooth_weight;  // light is smooth
   mark.training.flat_weight = light ? 0.8 : usual.training.flat_weight;    // and shows most on walls

@@ -145,24 +145,25 @@ EvidenceSummary summary(const Json& j, std::string_view name) {
 
 std::string evidence_json(const EvidenceRecord& record, const PublicKey& signer,
                           const std::map<std::string, std::string>& files) {
-  const Json json{{"format", kFormat},
-                  {"public_key", to_hex(signer)},
-                  {"owner_sha256", record.owner_sha256},
-                  {kCommitment, record.commitment},
-                  {"message", to_hex(record.message)},
-                  {"message_bits", record.message.size()},
-                  {"reading", record.reading},
-                  {"found", record.found()},
-                  {"fpr", record.fpr},
-                  {"cells", record.cells},
-                  {"together", score_json(record.together)},
-                  {kImages, images_json(record.images)},
-                  {"controls", controls_json(record.controls)},
-                  {"wrong_keys", record.wrong_keys ? wrong_keys_json(*record.wrong_keys) : Json(nullptr)},
-                  {"seed", record.seed},
-                  {"commit", record.commit},
-                  {"isa", record.isa},
-                  {"files", files}};
+  Json json{{"format", kFormat},
+            {"public_key", to_hex(signer)},
+            {"owner_sha256", record.owner_sha256},
+            {kCommitment, record.commitment},
+            {"message", to_hex(record.message)},
+            {"message_bits", record.message.size()},
+            {"reading", record.reading},
+            {"found", record.found()},
+            {"fpr", record.fpr},
+            {"cells", record.cells},
+            {"together", score_json(record.together)},
+            {kImages, images_json(record.images)},
+            {"controls", controls_json(record.controls)},
+            {"wrong_keys", record.wrong_keys ? wrong_keys_json(*record.wrong_keys) : Json(nullptr)},
+            {"seed", record.seed},
+            {"commit", record.commit},
+            {"isa", record.isa},
+            {"files", files}};
+  if (!record.copy.empty()) json["copy"] = record.copy;
   return canonical_json(json.dump(-1, ' ', false, Json::error_handler_t::replace), "evidence");
 }
 

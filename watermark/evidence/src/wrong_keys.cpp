@@ -14,30 +14,8 @@ namespace fieldmark::watermark {
 namespace {
 constexpr Index kKeysPerChunk = 128, kChunksPerRound = 64;
 
-Key root_key(std::uint64_t seed) {
-  Key root;
-  for (std::size_t k = 0; k < sizeof(seed); ++k) root.bytes[k] = static_cast<std::uint8_t>(seed >> (8 * k));
-  return root;
-}
-
 constexpr std::array<double, WrongKeyCounts::kThresholds> kThresholdValues{1e-1, 1e-2, 1e-3, 1e-4,
                                                                            1e-5, 1e-6, 1e-7, 1e-8};
-
-void add_statistic(double t, WrongKeyCounts& to) {
-  const double p = keyed_p_value(t);
-  for (std::size_t i = 0; i < to.counts.size(); ++i) to.counts[i] += p <= kThresholdValues[i];
-  to.least_p = std::min(to.least_p, p);
-  constexpr int kPerUnit = WrongKeyCounts::kBinsPerUnit, kBins = WrongKeyCounts::kBins, kZero = kBins / 2;
-  ++to.histogram[static_cast<std::size_t>(std::clamp(std::floor(t * kPerUnit) + kZero, 0., kBins - 1.))];
-  ++to.n;
-}
-
-void add_counts(const WrongKeyCounts& from, WrongKeyCounts& to) {
-  to.n += from.n;
-  for (std::size_t i = 0; i < from.counts.size(); ++i) to.counts[i] += from.counts[i];
-  for (std::size_t i = 0; i < from.histogram.size(); ++i) to.histogram[i] += from.histogram[i];
-  to.least_p = std::min(to.least_p, from.least_p);
-}
 
 // P(X = k + 1) / P(X = k) of a binomial with odds p / (1 - p).
 long double rise(Index k, Index n, long double odds) {
@@ -53,12 +31,29 @@ void check_binomial(Index n, double p, double level) {
 }
 }  // namespace
 
+void WrongKeyCounts::add(double statistic) {
+  const double p = keyed_p_value(statistic);
+  for (std::size_t i = 0; i < counts.size(); ++i) counts[i] += p <= kThresholdValues[i];
+  least_p = std::min(least_p, p);
+  constexpr int kZero = kBins / 2;
+  ++histogram[static_cast<std::size_t>(
+      std::clamp(std::floor(statistic * kBinsPerUnit) + kZero, 0., kBins - 1.))];
+  ++n;
+}
+
+void WrongKeyCounts::add(const WrongKeyCounts& other) {
+  n += other.n;
+  for (std::size_t i = 0; i < counts.size(); ++i) counts[i] += other.counts[i];
+  for (std::size_t i = 0; i < histogram.size(); ++i) histogram[i] += other.histogram[i];
+  least_p = std::min(least_p, other.least_p);
+}
+
 WrongKeyCounts count_wrong_keys(std::span<const double> evidence, std::span<const double> area,
                                 const Message& message, Index n, std::uint64_t seed,
                                 const std::function<bool(Index, Index)>& progress) {
   if (n < 0) throw ValueError("[count_wrong_keys] n must be at least 0, got " + std::to_string(n));
   const CellDealer dealer(area, message.size());
-  const Key root = root_key(seed);
+  const Key root = key_of_seed(seed);
   WrongKeyCounts total;
   while (total.n < n) {
     const Index first = total.n, round = std::min(n - first, kKeysPerChunk * kChunksPerRound);
@@ -68,10 +63,10 @@ WrongKeyCounts count_wrong_keys(std::span<const double> evidence, std::span<cons
       WrongKeyCounts& chunk = chunks[static_cast<std::size_t>(begin / kKeysPerChunk)];
       for (Index i = first + begin; i < first + end; ++i) {
         dealer.deal(derive_key(root, "fieldmark wrong key", static_cast<std::uint64_t>(i)), code);
-        add_statistic(keyed_statistic(evidence, code, message), chunk);
+        chunk.add(keyed_statistic(evidence, code, message));
       }
     });
-    for (const WrongKeyCounts& chunk : chunks) add_counts(chunk, total);
+    for (const WrongKeyCounts& chunk : chunks) total.add(chunk);
     if (progress && !progress(total.n, n)) throw Error("[count_wrong_keys] stopped");
   }
   return total;

@@ -62,4 +62,10 @@ Key derive_key(const Key& key, std::string_view domain, std::uint64_t index) {
   return derived;
 }
 
+Key key_of_seed(std::uint64_t seed) {
+  Key key;
+  for (std::size_t k = 0; k < sizeof(seed); ++k) key.bytes[k] = static_cast<std::uint8_t>(seed >> (8 * k));
+  return key;
+}
+
 }  // namespace fieldmark::watermark

@@ -44,6 +44,16 @@ std::vector<float> flatness(const CachedView& v, const std::vector<float>& foreg
   return flat;
 }
 
+// [cells, bits] the sign of each cell in the column of its bit, 0 elsewhere.
+std::span<const float> code_matrix(Tape<float>& tape, const CellCode& code, Index bits) {
+  const Index cells = std::ssize(code.bit);
+  float* matrix = tape.scratch(cells * bits);
+  std::fill_n(matrix, cells * bits, 0.f);
+  for (Index c = 0; c < cells; ++c)
+    if (code.bit[at(c)] >= 0) matrix[c * bits + code.bit[at(c)]] = static_cast<float>(code.sign[at(c)]);
+  return {matrix, at(cells * bits)};
+}
+
 class CellTraining : public MarkTraining {
  public:
   CellTraining(const CellMark& mark, const Owner& owner, std::span<const CachedView> views);
@@ -65,7 +75,6 @@ class CellTraining : public MarkTraining {
   const CellTrainingOptions& options_;
   const Owner& owner_;
   std::span<const CachedView> views_;
-  std::vector<float> code_matrix_;              // [cells, bits]
   std::vector<Tensor<std::int32_t>> labels_;    // cell of every pixel of every view; count() is background
   std::vector<std::vector<float>> foreground_;  // of every view
   std::vector<std::vector<float>> flat_;        // [pixels, 3] of every view
@@ -73,12 +82,7 @@ class CellTraining : public MarkTraining {
 
 CellTraining::CellTraining(const CellMark& mark, const Owner& owner, std::span<const CachedView> views)
     : mark_(mark), options_(mark.options().training), owner_(owner), views_(views) {
-  const Index cells = owner.cells.count(), bits = owner.options().bits;
-  const CellCode code = owner.code();
-  code_matrix_.assign(at(cells * bits), 0.f);
-  for (Index c = 0; c < cells; ++c)
-    if (code.bit[at(c)] >= 0)
-      code_matrix_[at(c * bits + code.bit[at(c)])] = static_cast<float>(code.sign[at(c)]);
+  const Index cells = owner.cells.count();
   for (const CachedView& v : views) {
     const std::vector<float>& foreground = foreground_.emplace_back(foreground_mask(v));
     Tensor<std::int32_t> label({v.height, v.width}, static_cast<std::int32_t>(cells));
@@ -165,7 +169,8 @@ Var<float> CellTraining::loss(Tape<float>& tape, const Params<float>& params, co
     foreground[i] = sign != 0 ? 1.f : 0.f;
   }
   const Var<float> pooled =
-      scale(extractor::pooled_bits<float>(out.sign, out.index, code_matrix_, bits), kBitScale);
+      scale(extractor::pooled_bits<float>(out.sign, out.index, code_matrix(tape, image.code, bits), bits),
+            kBitScale);
   const auto all = [](const auto* from, Index n) { return std::span(from, at(n)); };
   const Var<float> sign_loss =
       bce_with_logits<float>(out.sign, all(positive, places), all(foreground, places));

@@ -34,6 +34,7 @@ std::string configuration(const Owner& owner) {
          {"reader_aspect", o.reader_aspect},
          {"seed", o.seed},
          {"gain", owner.gain},
+         {"key_free", owner.key_free()},
          {"field", Json::parse(owner.field.configuration())},
          // Switches of version 0.1 for ablations.
          {"colours", true},
@@ -77,6 +78,17 @@ Owner::Owner(nerf::RadianceField base, const OwnerOptions& options, const Key& o
       options_(checked(options)),
       mark_(make({params, field, cells, options.bits, options.seed})) {}
 
+void Owner::set_code(const Key& other, Index bits) {
+  const bool any_length = mark_->has_cells();
+  if (bits < 1 || bits > most_bits() || (!any_length && bits != options_.bits))
+    throw ValueError("[owner] bits must be " +
+                     (any_length ? "1 to " + std::to_string(most_bits()) + ", one for each cell"
+                                 : std::to_string(options_.bits) + " with preset " + mark_->preset()) +
+                     ", got " + std::to_string(bits));
+  key = other;
+  options_.bits = bits;
+}
+
 // The mark's amplitude is in proportion to its gain while colours are not cut off at 0 and 1.
 void Owner::set_mark_psnr(double mark_psnr) {
   if (!mark_->has_gain())
@@ -114,6 +126,7 @@ Owner Owner::load(const std::filesystem::path& path) {
                 CellGrid::from_numbers(j.at("cells"), file.i32("cells/numbers"), file.f64("cells/area").data),
                 stored_mark(info.config));
     owner.gain = j.at("gain");
+    owner.key_free_ = j.value("key_free", false);
     for (const auto& e : owner.params.entries()) {
       const Tensor<float> t = file.f32(e.name);
       if (t.shape != e.shape)

@@ -61,6 +61,8 @@ class Baker final : public TrainingRun {
   void select(const nerf::RaySamples& samples, Chunk& c) const;
   double run_chunk(Index index, Index shard, Tape<float>& tape, float* grads);
   void backward_table();
+  void seek(double target, std::span<const float> learnt, const std::function<double()>& measure,
+            MarkPsnr& found);
   void set_scale(double scale, std::span<const float> learnt);
 
   const Owner& owner_;

@@ -28,10 +28,12 @@ struct EmbedOptions {
 };
 
 /// Trains mark and extractor together on a frozen field.
-/// Each image draws a message, a view and distortions; the mark gives its loss (see Mark::training()), and
-/// Adam minimises the mean over a batch. An image of fewer pixels than the extractor's is enlarged with its
-/// mark, as the reader enlarges a small image. Same seed and number of steps: same bytes, for any thread
-/// count and across save() and restore().   Source: Luo et al. 2023 (CopyRNeRF), section 3.4.
+/// Each image draws a code of the cells, a message, a view and distortions; the mark gives its loss (see
+/// Mark::training()), and Adam minimises the mean over a batch. The owner's key takes no part: equal options
+/// train equal networks under any key, and the evidence that they find is independent of it. An image of
+/// fewer pixels than the extractor's is enlarged with its mark, as the reader enlarges a small image. Same
+/// seed and number of steps: same bytes, for any thread count and across save() and restore(). Source: Luo et
+/// al. 2023 (CopyRNeRF), section 3.4.
 class Embedder final : public TrainingRun {
  public:
   /// Owner and views must outlive the embedder.
@@ -60,6 +62,7 @@ class Embedder final : public TrainingRun {
   void write(const SafetensorsFile& file, const std::filesystem::path& path) const override {
     file.write(path, Access::secret);
   }
+  CellCode fresh_code(std::uint64_t place) const;
   TrainingImage draw(Index image, Tape<float>& tape) const;
   float* shifted_positions(Tape<float>& tape, Index view, std::uint64_t place) const;
   Var<float> distorted(Var<float> image, std::uint64_t place, bool warped, const std::array<float, 6>& warp,
@@ -70,7 +73,6 @@ class Embedder final : public TrainingRun {
   std::span<const CachedView> views_;
   EmbedOptions options_;
   CounterRng choice_rng_, message_rng_, noise_rng_, shift_rng_;
-  CellCode code_;
   std::unique_ptr<MarkTraining> training_;
   ShardedLoop<float> loop_;
   Figures figures_;

@@ -28,8 +28,12 @@ class MarkPsnrMeter {
   explicit MarkPsnrMeter(const nerf::RadianceField& unmarked, const MarkPsnrViews& views = {});
   /// @param marked  renders the marked field, made with mark_psnr_rendering()   @param before  called with
   /// each view's number before it is rendered, or empty
+  /// @param every  1: all views; n: every nth of them, for a first guess
   /// @return mean over the views that have an object and differ, dB; infinity where there is none
-  double operator()(nerf::Renderer& marked, const std::function<void(Index view)>& before = {}) const;
+  double operator()(nerf::Renderer& marked, const std::function<void(Index view)>& before = {},
+                    Index every = 1) const;
+  /// A step for first guesses: 8 where that leaves 8 views or more, else 1.
+  Index guess_step() const { return std::ssize(cameras_) >= 64 ? 8 : 1; }
 
  private:
   std::vector<nerf::Camera> cameras_;

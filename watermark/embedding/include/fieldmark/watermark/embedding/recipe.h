@@ -18,17 +18,18 @@ inline constexpr std::array<const char*, 3> kPresets{"fast", "paper", "code"};
 
 /// Appearance of a cell mark.
 enum class MarkColours {
-  blue,   ///< blue and yellow without luma, in fine detail: read soonest on objects before a background
+  blue,   ///< blue and yellow without luma, in fine detail: lost in greyscale
   light,  ///< like an uneven light: smooth, between blue and grey, fainter on dark colours
+  mixed,  ///< blue with a quarter of its power in grey: outlives a change of colours, greyscale too
 };
-/// "blue" or "light".
+/// "blue", "light" or "mixed".
 const char* mark_colours_name(MarkColours colours);
-/// @throws ValueError if the name is neither
+/// @throws ValueError if the name is none of these
 MarkColours parse_mark_colours(std::string_view name);
-/// Colours that suit a scene: blue for an object in a cube, else light, because the scene then fills its
+/// Colours that suit a scene: mixed for an object in a cube, else light, because the scene then fills its
 /// images and shows the mark everywhere.
 MarkColours colours_for(nerf::SpaceKind space);
-/// Sets bands, tilt and shading of the network and the weights against visibility.
+/// Sets bands, axes and shading of the network and the weights against visibility.
 void use_colours(MarkColours colours, CellMarkOptions& mark);
 
 /// Images a step of preset fast: two where space is contracted, whose thousands of cells need more steps;

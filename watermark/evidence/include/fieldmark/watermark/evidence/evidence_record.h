@@ -34,6 +34,7 @@ struct EvidenceRecord {
   std::string owner_sha256{};                  ///< of the OWNER file
   std::string commitment{};                    ///< commitment()
   Message message{};                           ///< looked for
+  std::string copy{};                          ///< recipient whose copy was looked for; empty: none
   double fpr = 1e-6;                           ///< rate of false alarms at which a mark counts as found
   Index cells = 0;                             ///< that carry a bit
   EvidenceScore together{};                    ///< summed evidence of all images

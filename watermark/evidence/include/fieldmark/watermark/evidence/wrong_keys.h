@@ -19,6 +19,10 @@ struct WrongKeyCounts {
   static constexpr int kBinsPerUnit = 4;  ///< so it spans T from -10 to 10
   /// histogram[i] keys gave a statistic T with i <= 4 (T + 10) < i + 1; the end bins include outliers.
   std::array<Index, kBins> histogram{};
+  /// Counts one more key.   @param statistic  T   @throws ValueError if it is NaN
+  void add(double statistic);
+  /// Counts those of another as well.
+  void add(const WrongKeyCounts& other);
   /// Equal in everything.
   friend bool operator==(const WrongKeyCounts&, const WrongKeyCounts&) = default;
 };

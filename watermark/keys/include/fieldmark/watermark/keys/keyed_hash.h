@@ -21,4 +21,8 @@ void keyed_signs(const Key& key, std::string_view domain, std::span<std::int8_t>
 /// Whoever holds the key can derive it; nobody can go back.
 Key derive_key(const Key& key, std::string_view domain, std::uint64_t index);
 
+/// A key for simulations: little-endian bytes of the seed, then zeros. Never a secret: whoever knows the seed
+/// knows it.
+Key key_of_seed(std::uint64_t seed);
+
 }  // namespace fieldmark::watermark

@@ -36,6 +36,7 @@ struct TrainingFigures {
 struct TrainingImage {
   Index view = 0;                    ///< of the cached views
   Index step = 0;                    ///< of the run
+  CellCode code{};                   ///< of a key drawn for this image, so that training learns none
   Message message{};                 ///< embedded
   std::vector<std::int8_t> signs{};  ///< of the cells, see cell_signs()
   const float* positions = nullptr;  ///< [S, 3] samples of the view, shifted at random

@@ -7,7 +7,7 @@ namespace fieldmark::watermark {
 
 /// Options of an owner that every kind of mark shares, stored in OWNER.
 struct OwnerOptions {
-  Index bits = 16;           ///< length of a message, 1 to 256
+  Index bits = 16;           ///< usual length of a message, that of training, 1 to 256
   double mark_psnr = 36.5;   ///< of marks with a gain, dB, mean over novel views, 20 to 60
   Index reader_size = 160;   ///< longer side of the extractor's images, pixels, >= 32
   double reader_aspect = 1;  ///< width over height of the extractor's images, 1/4 to 4, see reader_aspect()
@@ -35,6 +35,15 @@ class Owner {
   CellCode code() const { return code(key); }
   /// Bits and signs of the cells under another key.
   CellCode code(const Key& other) const { return mark_->code(cells, other, options_.bits); }
+  /// Takes another key and another length of messages, for the life of this object: the networks of a
+  /// key-free owner serve any.
+  /// @param bits  1 to most_bits()   @throws ValueError otherwise
+  void set_code(const Key& other, Index bits);
+  /// Longest message: one bit for every cell; the trained length for a mark without cells.
+  Index most_bits() const { return mark_->has_cells() ? cells.count() : options_.bits; }
+  /// Whether the networks were trained under fresh random codes and so know no key: only then is the bound of
+  /// keyed_p_value() proven for the owner's own key. False for owners of version 0.1.
+  bool key_free() const { return key_free_; }
   /// How a message changes colours, and how an image is read.
   const Mark& mark() const { return *mark_; }
   /// Colours of the marked field, see Mark::recolour(). The owner must outlive them.
@@ -52,7 +61,7 @@ class Owner {
   /// configuration
   static Owner load(const std::filesystem::path& path);
 
-  /// As constructed, but for set_mark_psnr().
+  /// As constructed, but for set_mark_psnr() and set_code().
   const OwnerOptions& options() const { return options_; }
 
   nerf::RadianceField field;  ///< unmarked
@@ -63,6 +72,7 @@ class Owner {
 
  private:
   OwnerOptions options_;
+  bool key_free_ = true;
   std::shared_ptr<const Mark> mark_;  // immutable, so copies of an owner share it
 };
 

@@ -1,0 +1,63 @@
+#include <fieldmark/core/files.h>
+
+#include "cli/cli.h"
+#include "tools/tiny_job.h"
+
+using namespace fieldmark;
+
+TEST_CASE("trace answers for every recipient, and with exit code 3 where nobody is found", "[trace]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string names = job.folder / "names.txt";
+  write_file_atomically(names, "Anna\nBertil\nCecilia\n");
+  const auto r = run_command({"trace", "--owner", job.owner, "--message", "5", "--copies", names,
+                              "--detection", "blind", job.images(), "--json", "-"});
+  INFO(r.err);
+  CHECK(r.code == cli::kNotFound);
+  CHECK_THAT(r.err, Contains("NOT FOUND: 0 of 3 recipients"));
+  const auto json = nlohmann::json::parse(r.out);
+  CHECK(json["tested"] == 3);
+  CHECK(json["views"] == 2);
+  REQUIRE(json["recipients"].size() == 3);
+  double last = 0;
+  for (const auto& recipient : json["recipients"]) {
+    CHECK(recipient["found"] == false);
+    CHECK(recipient["p_value"] >= last);
+    CHECK(recipient["p_corrected"] >= recipient["p_value"]);
+    last = recipient["p_value"];
+  }
+}
+
+TEST_CASE("trace finds at a rate of 1 whomever it tests, verify and bake take one copy", "[trace]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string names = job.folder / "one.txt", images = job.images(), baked = job.folder / "anna.fm";
+  write_file_atomically(names, "Anna\n");
+  CHECK(run_command({"trace", "--owner", job.owner, "--message", "5", "--copies", names, "--fpr", "1",
+                     "--detection", "blind", images})
+            .code == cli::kOk);
+  const auto bake = run_command({"bake", "--owner", job.owner, "--message", "5", "--copy", "Anna", "--out",
+                                 baked, "--steps", "1", "--json", "-"});
+  INFO(bake.err);
+  REQUIRE(bake.code == cli::kOk);
+  CHECK(nlohmann::json::parse(bake.out)["copy"] == "Anna");
+  const auto statistic = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"verify", "--owner", job.owner, "--message", "5", "--detection", "blind"});
+    more.insert(more.end(), {images, "--json", "-"});
+    return nlohmann::json::parse(run_command(more).out)["statistic"].get<double>();
+  };
+  const auto traced =
+      nlohmann::json::parse(run_command({"trace", "--owner", job.owner, "--message", "5", "--copies", names,
+                                         "--detection", "blind", images, "--json", "-"})
+                                .out);
+  CHECK(traced["recipients"][0]["statistic"] == statistic({"--copy", "Anna"}));
+  CHECK(statistic({"--copy", "Anna"}) != statistic({}));
+}
+
+TEST_CASE("trace refuses lists that name nobody or one twice", "[trace]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string names = job.folder / "twice.txt";
+  write_file_atomically(names, "Anna\nAnna\n");
+  const auto r =
+      run_command({"trace", "--owner", job.owner, "--message", "5", "--copies", names, job.images()});
+  CHECK(r.code == cli::kFailed);
+  CHECK_THAT(r.err, Contains("twice.txt: line 2: expected each recipient once"));
+}

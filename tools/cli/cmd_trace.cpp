@@ -1,0 +1,110 @@
+#include <fieldmark/watermark/tracing/copies.h>
+#include <fieldmark/watermark/tracing/trace.h>
+
+#include <cstdio>
+#include <memory>
+#include <ostream>
+
+#include "cli/cli.h"
+#include "cli/code_option.h"
+#include "cli/commands.h"
+#include "cli/context.h"
+#include "cli/reading.h"
+
+namespace fieldmark::cli {
+namespace {
+
+constexpr std::size_t kShown = 10;  // recipients in the text who were not found; JSON has all
+
+struct TraceArguments {
+  std::string owner, copies, reading = "auto";
+  MessageOption message;
+  CodeOption code;
+  double fpr = 1e-6;
+  std::vector<std::string> images;
+};
+
+std::vector<watermark::TracedCopy> traced(const watermark::Owner& owner, const watermark::Key& key,
+                                          const watermark::Message& message,
+                                          const std::vector<std::string>& names,
+                                          const std::vector<double>& evidence, Context& context) {
+  const InterruptGuard guard;
+  Progress progress = context.progress("recipients");
+  return watermark::trace_copies(evidence, owner.cells.area(), key, message, names,
+                                 [&](Index done, Index total) {
+                                   if (guard.interrupted()) throw Interrupted("nothing was decided");
+                                   progress.update(static_cast<double>(done) / static_cast<double>(total));
+                                   return true;
+                                 });
+}
+
+void print_recipients(const std::vector<watermark::TracedCopy>& copies, std::size_t found, double fpr,
+                      Context& context) {
+  char line[120];
+  std::snprintf(line, sizeof line, "%zu of %zu recipients found at a corrected p of %g\n", found,
+                copies.size(), fpr);
+  context.text() << (found > 0 ? "FOUND: " : "NOT FOUND: ") << line;
+  for (std::size_t i = 0; i < std::min(copies.size(), found + kShown); ++i) {
+    std::snprintf(line, sizeof line, "%-9s corrected p %.2e, p %.2e  ", i < found ? "found" : "not found",
+                  copies[i].p_corrected, copies[i].p_value);
+    context.text() << line << copies[i].name << "\n";
+  }
+}
+
+int run_trace(const TraceArguments& options, Context& context) {
+  auto owner = watermark::Owner::load(options.owner);
+  if (!owner.mark().has_cells())
+    throw UsageError("--owner: an owner of preset " + owner.mark().preset() +
+                     " has no cells, so its copies have no codes of their own");
+  const auto key = choose_code(options.code, options.message, owner, context);
+  const auto message = message_of(options.message, owner.options().bits);
+  const auto names = watermark::read_recipients(options.copies);
+  SuspectReader reader(owner, options.reading);
+  const auto images = read_images(reader, options.images, context);
+  const auto copies = traced(owner, key, message, names, total_evidence(images), context);
+  std::size_t found = 0;
+  Json recipients = Json::array();
+  for (const auto& copy : copies) {
+    const bool is_found = copy.p_corrected <= options.fpr;
+    found += is_found;
+    recipients.push_back({{"name", copy.name},
+                          {"p_value", copy.p_value},
+                          {"p_corrected", copy.p_corrected},
+                          {"statistic", copy.statistic},
+                          {"found", is_found}});
+  }
+  print_recipients(copies, found, options.fpr, context);
+  context.result({{"recipients", recipients},
+                  {"tested", names.size()},
+                  {"found", found},
+                  {"fpr", options.fpr},
+                  {"views", images.size()},
+                  {"detection", reading_used(images)}});
+  return found > 0 ? kOk : kNotFound;
+}
+
+}  // namespace
+
+Command add_trace(CommandLine& app) {
+  auto o = std::make_shared<TraceArguments>();
+  app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
+  add_message_options(app, o->message, "Message of the copies");
+  app.add_option("--copies", o->copies, "Text file with the NAME of each `bake --copy`, one a line")
+      ->required()
+      ->type_name("FILE");
+  app.add_option(
+         "--fpr", o->fpr,
+         "Probability of naming any innocent recipient, at most, above 0 to 1: the corrected p-value at "
+         "which one counts as found")
+      ->range(1e-300, 1.0)
+      ->type_name("P");
+  add_code_options(app, o->code);
+  add_reading(app, o->reading);
+  app.add_option("images", o->images, "Images of one field, or folders of them; PNG or JPEG")
+      ->required()
+      ->type_name("IMAGE|DIR")
+      ->default_str("");
+  return [o](Context& context) { return run_trace(*o, context); };
+}
+
+}  // namespace fieldmark::cli

@@ -1,0 +1,54 @@
+#include "cli/code_option.h"
+
+#include <fieldmark/watermark/tracing/copies.h>
+
+#include "cli/cli.h"
+
+namespace fieldmark::cli {
+namespace {
+
+constexpr Index kDigitBits = 4;
+constexpr Index kMostBits = 4096;  // cells hold fewer; the owner says how many
+
+Index message_bits(const CodeOption& options, const std::string& hex, const watermark::Owner& owner,
+                   Context& context) {
+  const Index usual = owner.options().bits, digits = std::ssize(hex);
+  if (options.bits > 0) return options.bits;
+  const bool fits = hex.empty() || digits == (usual + kDigitBits - 1) / kDigitBits;
+  if (fits || !owner.mark().has_cells()) return usual;
+  context.note("--message has " + std::to_string(digits * kDigitBits) + " bits, the owner was embedded for " +
+               std::to_string(usual));
+  return digits * kDigitBits;
+}
+
+}  // namespace
+
+void add_code_options(CommandLine& app, CodeOption& o) {
+  app.add_option("--key", o.key, "Key of `fieldmark key` instead of the owner's")->type_name("KEY");
+  app.add_option("--bits", o.bits,
+                 "Length of the message, 1 to the number of cells; default: the digits of --message, else as "
+                 "embedded")
+      ->range(Index{1}, kMostBits)
+      ->type_name("N")
+      ->default_str("");
+}
+
+void add_copy_option(CommandLine& app, CodeOption& o, const std::string& purpose) {
+  app.add_option("--copy", o.copy, purpose + ", any text; default: no recipient")->type_name("NAME");
+}
+
+watermark::Key choose_code(const CodeOption& options, const MessageOption& message, watermark::Owner& owner,
+                           Context& context) {
+  const watermark::Key key = options.key.empty() ? owner.key : watermark::load_key(options.key);
+  const Index bits = message_bits(options, message.message, owner, context);
+  read_option(options.bits > 0 ? "--bits" : "--message", [&] {
+    owner.set_code(options.copy.empty() ? key : watermark::copy_key(key, options.copy), bits);
+  });
+  if (!owner.key_free())
+    context.note(
+        "the networks of this owner file were trained under its own key (version 0.1), so the bound of its "
+        "p-values is not proven; embed it anew for one that is");
+  return key;
+}
+
+}  // namespace fieldmark::cli

@@ -1,0 +1,36 @@
+#include <fieldmark/core/error.h>
+#include <fieldmark/core/files.h>
+#include <fieldmark/watermark/keys/keyed_hash.h>
+#include <fieldmark/watermark/tracing/copies.h>
+
+#include <map>
+#include <sstream>
+
+namespace fieldmark::watermark {
+
+Key copy_key(const Key& key, std::string_view name) {
+  if (name.empty()) throw ValueError("[copy_key] name must not be empty");
+  return derive_key(key, "fieldmark copy " + std::string(name), 0);
+}
+
+std::vector<std::string> read_recipients(const std::filesystem::path& path) {
+  std::istringstream lines(read_text(path));
+  std::vector<std::string> names;
+  std::map<std::string, std::size_t> line_of;
+  std::size_t number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    const auto first = line.find_first_not_of(" \t\r");
+    if (first == std::string::npos) continue;
+    names.push_back(line.substr(first, line.find_last_not_of(" \t\r") - first + 1));
+    const auto [known, is_new] = line_of.emplace(names.back(), number);
+    if (!is_new)
+      throw IoError(path.string() + ": line " + std::to_string(number) +
+                    ": expected each recipient once, found '" + names.back() + "' of line " +
+                    std::to_string(known->second) + " again");
+  }
+  if (names.empty()) throw IoError(path.string() + ": expected one recipient a line, found none");
+  return names;
+}
+
+}  // namespace fieldmark::watermark
