@@ -26,7 +26,7 @@ Chosen choose(const cli::CodeOption& options, const std::string& hex, Owner& own
   cli::Context context({}, {}, out, err);
   const Key key =
       cli::choose_code(options, {.message = hex, .text = "", .uuid = "", .payload = ""}, owner, context);
-  return {key, err.str()};
+  return {key, out.str() + err.str()};
 }
 
 }  // namespace

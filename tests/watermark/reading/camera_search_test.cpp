@@ -1,5 +1,6 @@
 #include "camera_search.h"
 #include <fieldmark/core/error.h>
+#include <fieldmark/distort/distortion.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/engine/random.h>
 #include "camera_motion.h"
@@ -82,6 +83,25 @@ TEST_CASE("camera_search: the whole object in an image leads to the camera, turn
     close += one_is_close(found, camera);
   }
   CHECK(close >= 3);  // 60 renders are some 15 degrees apart
+}
+
+TEST_CASE("camera_search: lightness leads to the camera whatever the hue, and likeness knows the scene") {
+  const Owner owner = tiny_owner();
+  const CameraSearch search(owner, kOptions);
+  nerf::Renderer renderer(owner.field);
+  const std::vector<float> white(3, 1.f);
+  const auto turn = distort::parse_distortion("hue_180"), wide = distort::parse_distortion("stretch_1.5");
+  Index close = 0;
+  for (const std::uint64_t seed : {11u, 13u, 14u}) {
+    const nerf::Camera camera = near_camera(owner, 96, seed);
+    const Tensor<float> view = renderer.render(camera).rgb;
+    const Tensor<float> turned = distort::apply_distortion(turn, view, CounterRng(1), 0, white);
+    close += one_is_close(search.find_by_lightness(turned, 3), camera);
+    const double likeness = search.likeness(view);
+    CHECK(likeness > 0.9);
+    CHECK(likeness > search.likeness(distort::apply_distortion(wide, view, CounterRng(1), 0, white)));
+  }
+  CHECK(close >= 2);
 }
 
 TEST_CASE("camera_search: an object is found from below, where no training image was taken") {

@@ -51,6 +51,16 @@ std::vector<float> small_window(const Tensor<float>& image, const Window& window
   return v;
 }
 
+// (max + min) / 2 of each pixel, in all channels.
+Tensor<float> lightness(const Tensor<float>& image) {
+  Tensor<float> out(image.shape);
+  for (Index i = 0; i < image.size(); i += 3) {
+    const auto [least, most] = std::minmax({image[i], image[i + 1], image[i + 2]});
+    std::fill_n(&out[i], 3, 0.5f * (least + most));
+  }
+  return out;
+}
+
 Tensor<float> turned(const Tensor<float>& image, double angle, float background) {
   Tape<float> tape;
   const auto a = static_cast<float>(angle);
@@ -114,7 +124,7 @@ CameraSearch::CameraSearch(const Owner& owner, const CameraSearchOptions& option
        cameras_around(owner.field, options.views, options.around, 0, options.seed)) {
     const nerf::Camera camera = reduced(whole, options.size);
     const CachedView v = cache_view(renderer, owner.field, camera);
-    SmallView view{camera, std::vector<std::int32_t>(at(owner.cells.count()), -1), {}, {}, {}, {}};
+    SmallView view{camera, std::vector<std::int32_t>(at(owner.cells.count()), -1), {}, {}, {}, {}, {}};
     std::vector<double> weight;
     for (Index p = 0; p < v.height * v.width; ++p)
       for (std::int32_t k = v.sample_begin[at(p)]; k < v.sample_begin[at(p + 1)]; ++k) {
@@ -145,6 +155,7 @@ CameraSearch::CameraSearch(const Owner& owner, const CameraSearchOptions& option
     const float background = nerf::background_value(owner.field.background);
     view.window = object_window(v.base, background);
     view.small = small_window(v.base, view.window, background);
+    view.light = small_window(lightness(v.base), view.window, background);
     view.area = SummedArea(v.base);
     views_.push_back(std::move(view));
   }
@@ -298,7 +309,8 @@ std::vector<nerf::Camera> CameraSearch::find(const SeenPlaces& places, Index hei
                       [&](const Proposal& p) { return fitted(p, matches, tolerance, height, width); });
 }
 
-std::vector<CameraSearch::Proposal> CameraSearch::by_content(const Tensor<float>& image) const {
+std::vector<CameraSearch::Proposal> CameraSearch::by_content(const Tensor<float>& image,
+                                                             std::vector<float> SmallView::*content) const {
   const float background = nerf::background_value(owner_.field.background);
   const Index h = image.shape[0], w = image.shape[1];
   const double zoom = std::min(1.0, static_cast<double>(kReduced) / static_cast<double>(std::max(h, w)));
@@ -312,7 +324,7 @@ std::vector<CameraSearch::Proposal> CameraSearch::by_content(const Tensor<float>
     const Window window = object_window(upright, background);
     const std::vector<float> small = small_window(upright, window, background);
     for (std::size_t v = 0; v < views_.size(); ++v) {
-      const double score = correlation(small, views_[v].small);
+      const double score = correlation(small, views_[v].*content);
       if (score <= best[v].score) continue;
       // Pixel u of the render is (u - middle) width / width' + middle' in the rotated image, which shows
       // pixel q of the image at e^(-i angle) (q - centre) + centre, since y points down.
@@ -326,14 +338,20 @@ std::vector<CameraSearch::Proposal> CameraSearch::by_content(const Tensor<float>
 }
 
 std::vector<nerf::Camera> CameraSearch::find(const Tensor<float>& image, Index count) const {
-  std::vector<Proposal> proposals = by_content(image);
+  std::vector<Proposal> proposals = by_content(image, &SmallView::small);
+  return best_cameras(proposals, count,
+                      [&](const Proposal& p) { return proposed(p, image.shape[0], image.shape[1]); });
+}
+
+std::vector<nerf::Camera> CameraSearch::find_by_lightness(const Tensor<float>& image, Index count) const {
+  std::vector<Proposal> proposals = by_content(lightness(image), &SmallView::light);
   return best_cameras(proposals, count,
                       [&](const Proposal& p) { return proposed(p, image.shape[0], image.shape[1]); });
 }
 
 double CameraSearch::likeness(const Tensor<float>& image) const {
   double most = -1;
-  for (const Proposal& p : by_content(image)) most = std::max(most, p.score);
+  for (const Proposal& p : by_content(image, &SmallView::small)) most = std::max(most, p.score);
   return most;
 }
 

@@ -25,6 +25,8 @@ class CameraSearch {
   std::vector<nerf::Camera> find(const SeenPlaces& places, Index height, Index width, Index count) const;
   /// At most `count` cameras by content, best first, each from another render.   @param image  [H, W, 3]
   std::vector<nerf::Camera> find(const Tensor<float>& image, Index count) const;
+  /// The same by lightness, (max + min) / 2 of a pixel's channels, which a turn of hue leaves alone.
+  std::vector<nerf::Camera> find_by_lightness(const Tensor<float>& image, Index count) const;
   /// Largest correlation by content, in [-1, 1].   @param image  [H, W, 3]
   double likeness(const Tensor<float>& image) const;
   /// At most `count` cameras by a part, best first, each from another render.   @param image  [H, W, 3]
@@ -41,13 +43,14 @@ class CameraSearch {
     std::vector<SeenCell> seen;
     Window window;             // of the object in the small render
     std::vector<float> small;  // its content, see small_window()
+    std::vector<float> light;  // the same of its lightness
     SummedArea area;           // of the whole small render
   };
   struct Match;
   struct Proposal;
   Proposal propose(const SmallView& view, std::size_t number, const std::vector<Match>& matches,
                    double tolerance) const;
-  std::vector<Proposal> by_content(const Tensor<float>& image) const;
+  std::vector<Proposal> by_content(const Tensor<float>& image, std::vector<float> SmallView::*content) const;
   Proposal best_part(std::size_t number, std::span<const float> image, double height_to_width) const;
   nerf::Camera proposed(const Proposal& proposal, Index height, Index width) const;
   nerf::Camera fitted(const Proposal& proposal, const std::vector<Match>& matches, double tolerance,

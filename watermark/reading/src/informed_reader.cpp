@@ -20,6 +20,7 @@ namespace {
 
 constexpr Index kByPlaces = 3, kByImage = 3, kByPart = 6;  // candidate cameras
 constexpr AlignmentStage kCoarse[] = {{.size = 48, .blur = 1.5, .steps = 6, .quick = true}};
+constexpr double kSure = 0.95;  // agreement: a symmetric object agrees with its mirror image, but less
 constexpr double kStretches[] = {1.5, 1 / 1.5, 1.25, 0.8};  // of the width
 constexpr AlignmentStage kCoarseStretched[] = {
     {.size = 64, .blur = 1.5, .steps = 10, .stretched = true, .quick = true}};
@@ -213,6 +214,7 @@ InformedReading InformedReader::aligned(const Surround& seen, const Change& chan
     }
   };
   try_all(starts(image, change, places));
+  if (best.agreement < kLeastAgreement) try_all(parts_->search.find_by_lightness(image, kByImage));
   if (!stretched && best.agreement < kLeastAgreement) try_all(parts_->search.find_part(image, kByPart));
   if (best.agreement < 0) return best;
   const Alignment a =
@@ -265,13 +267,14 @@ Surround InformedReader::cleared(const Tensor<float>& whole) const {
 
 ImageReading InformedReader::read(const Tensor<float>& image) {
   const Tensor<float> whole = opaque_image(image, nerf::background_value(owner_.field.background));
-  ImageReading reading = read_as(whole, {});
-  if (reading.chosen == ReadingKind::informed) return reading;
+  ImageReading best = read_as(whole, {});
+  if (best.informed.agreement >= kSure) return best;
   for (const Change& change : changes(cleared(whole).image)) {
     ImageReading changed = read_as(change.mirrored ? mirror(whole) : whole, change);
-    if (changed.chosen == ReadingKind::informed) return changed;
+    if (changed.chosen == ReadingKind::informed && changed.informed.agreement > best.informed.agreement)
+      best = std::move(changed);
   }
-  return reading;
+  return best;
 }
 
 // What may have been done to an image: a mirror, and the stretch after which it looks most like the field, if

@@ -46,8 +46,8 @@ struct Surround;
 /// evidence may be tested against any.
 ///
 ///   - Bars are cut off, and an object's other plain background is replaced by the field's.
-///   - Candidate cameras are aligned coarse to fine; the best agreement wins. If none agrees, the mirrored
-///     image is tried, and one that was stretched to where it looks most like the field.
+///   - Candidate cameras are aligned coarse to fine; the best agreement wins. Unless it is sure, the mirrored
+///     image is tried, too, and one that was stretched to where it looks most like the field.
 ///   - The blur that leaves the smallest residual is kept; gain, offset and gamma are fitted.
 ///   - With the residual R and its power V around each pixel, R / V is the score and 1 / V the precision. In
 ///   a
