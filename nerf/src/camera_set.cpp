@@ -234,7 +234,7 @@ CameraSpan camera_span(std::span<const Camera> cameras, Background background) {
 CameraSpan camera_span(const Dataset& dataset) {
   std::vector<Camera> cameras;
   for (const View& v : dataset.views) cameras.push_back(v.camera);
-  if (!dataset.forward_facing) return camera_span(cameras, dataset.background);
+  if (dataset.scene != SceneType::forward) return camera_span(cameras, dataset.background);
   CameraSpan span = span_about(focus(dataset), cameras, dataset.background);
   span.forward_facing = true;
   return span;

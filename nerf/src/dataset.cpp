@@ -5,6 +5,7 @@
 
 #include "capture.h"
 #include "image_files.h"
+#include "scene_look.h"
 #include "view_files.h"
 
 namespace fieldmark::nerf {
@@ -72,6 +73,13 @@ ViewPlan plan_split(const Capture& capture, const DatasetOptions& options, const
     }
   }
   if (plan.shots.empty()) fail_without_images(capture, options.split, folder, missing, first_missing);
+  if (const auto most = static_cast<std::size_t>(options.most_views); most > 0 && most < plan.shots.size()) {
+    for (std::size_t i = 0; i < most; ++i) {
+      const std::size_t from = i * plan.shots.size() / most;
+      plan.shots[i] = plan.shots[from], plan.files[i] = plan.files[from], plan.masks[i] = plan.masks[from];
+    }
+    plan.shots.resize(most), plan.files.resize(most), plan.masks.resize(most);
+  }
   if (capture.all_splits && !capture.listed)
     notes.push_back("every 8th of " + std::to_string(capture.shots.size()) +
                     " images is held out for val and test");
@@ -131,14 +139,13 @@ Dataset load_dataset(const fs::path& folder, const DatasetOptions& options) {
   ViewPlan plan = plan_split(capture, options, folder, capture.notes);
   plan_lenses(capture.shots, plan, capture.notes);
   std::vector<View> views = read_views(plan, capture.notes);
-  return {.name = fs::absolute(folder / "x").lexically_normal().parent_path().filename().string(),
-          .split = options.split,
-          .background =
-              options.background.value_or(layout == Layout::blender ? Background::white : Background::black),
-          .views = std::move(views),
-          .layout = layout,
-          .forward_facing = capture.forward_facing,
-          .notes = std::move(capture.notes)};
+  Dataset data{.name = fs::absolute(folder / "x").lexically_normal().parent_path().filename().string(),
+               .split = options.split,
+               .views = std::move(views),
+               .layout = layout,
+               .notes = std::move(capture.notes)};
+  settle_scene(data, options, capture.forward_facing);
+  return data;
 }
 
 Tensor<float> composited(const View& view, Background background) {

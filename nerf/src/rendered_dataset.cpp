@@ -36,7 +36,8 @@ Dataset rendered_dataset(const RadianceField& field, std::span<const Camera> cam
                .split = "train",
                .background = field.background,
                .views = {},
-               .layout = cube ? Layout::blender : Layout::transforms};
+               .layout = cube ? Layout::blender : Layout::transforms,
+               .scene = cube ? SceneType::object : SceneType::place};
   Renderer renderer(field);
   for (const Camera& camera : cameras) {
     const Rendering r = renderer.render(camera);

@@ -6,12 +6,17 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "silhouettes.h"
+
 namespace fieldmark::nerf {
 namespace {
 
 constexpr double kRayStart = 0.02;  // in median distances of the cameras
 constexpr double kBefore = 0.95;    // of the nearest bound: the space in front is cut off
 constexpr double kRim = 1.02;       // of the widest ray
+constexpr double kOverhang = 0.05;  // of the bounds' side: margins of the cube that cameras see
+constexpr double kLost = 1. / 16;   // of the bounds' side: eight cells of the occupancy grid
+constexpr Index kHull = 64;         // cells per axis
 
 // The plane from the data set's bounds, and slopes that hold the rays through every image's corners, at the
 // plane and at infinity.
@@ -38,6 +43,28 @@ Space device_coordinates(const Dataset& data) {
   return space;
 }
 
+bool contains(const Bounds& outer, const Bounds& inner) {
+  for (std::size_t a = 0; a < 3; ++a)
+    if (inner.corner[a] < outer.corner[a] - kOverhang * outer.side ||
+        inner.corner[a] + inner.side > outer.corner[a] + (1 + kOverhang) * outer.side)
+      return false;
+  return true;
+}
+
+// `bounds`, unless silhouettes show that the object reaches out of them, or cameras that it is lost in them:
+// then the cube that the cameras have in view.
+Bounds around_object(const Dataset& data, const Bounds& bounds) {
+  if (!has_alpha(data)) return bounds;
+  const CameraSpan span = camera_span(data);
+  const double half = span.half_size;
+  const Vec3& c = span.centre;
+  const Bounds seen{.corner = {c[0] - half, c[1] - half, c[2] - half}, .side = 2 * half};
+  if (contains(bounds, seen)) return seen.side < kLost * bounds.side ? seen : bounds;
+  const auto hull = visual_hull(data.views, seen, kHull);
+  const bool empty = std::none_of(hull.begin(), hull.end(), [](std::uint8_t cell) { return cell != 0; });
+  return empty || contains(bounds, tighten(seen, hull, kHull)) ? bounds : seen;
+}
+
 Space around(const Dataset& data) {
   CameraSpan span = camera_span(data);
   const auto middle = span.distances.begin() + static_cast<std::ptrdiff_t>(span.distances.size() / 2);
@@ -60,9 +87,9 @@ bool has_alpha(const Dataset& data) {
 }
 
 Space scene_space(const Dataset& data, const Bounds& bounds) {
-  if (data.forward_facing) return device_coordinates(data);
-  if (data.layout == Layout::blender || has_alpha(data)) return {.bounds = bounds};
-  return around(data);
+  if (data.scene == SceneType::forward) return device_coordinates(data);
+  if (data.scene == SceneType::place) return around(data);
+  return {.bounds = around_object(data, bounds)};
 }
 
 }  // namespace fieldmark::nerf

@@ -354,6 +354,7 @@ void Trainer::describe(RunFingerprint& f) const {
   f.option("carve", o.carve);
   f.option("keep", o.keep);
   if (o.keep) f.input_digest("field", start_);
+  if (data_.scene == SceneType::plain) f.input("plain_colour", data_.plain_colour);
   std::vector<double> cameras;
   for (const View& v : data_.views) std::ranges::copy(v.camera.parameters(), std::back_inserter(cameras));
   f.input("cameras", cameras);

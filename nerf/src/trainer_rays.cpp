@@ -114,7 +114,9 @@ void Trainer::choose_rays(Index first, Index rays, Shard& c) const {
     const View& view = data_.views[at(place[at(i)] / size)];
     std::copy_n(view.rgba.data.data() + 4 * (place[at(i)] % size), 4, &c.truth[at(4 * i)]);
     const auto b = background_rng_.uniform4(step, static_cast<std::uint64_t>(first + i));
-    std::copy_n(b.data(), 3, &c.background[at(3 * i)]);
+    // What is opaque before a plain background may show it, or a part of it at an edge.
+    const bool plain = data_.scene == SceneType::plain && c.truth[at(4 * i + 3)] > 0;
+    std::copy_n(plain ? data_.plain_colour.data() : b.data(), 3, &c.background[at(3 * i)]);
   }
   aim(first, c);
 }

@@ -214,7 +214,7 @@ TEST_CASE("camera_set: errors") {
 
 TEST_CASE("camera_set: novel cameras of a forward-facing capture stand in the box of its path") {
   Dataset data;
-  data.forward_facing = true;
+  data.scene = SceneType::forward;
   const auto u = uniform({9, 3}, -1, 1, 8);
   for (Index i = 0; i < 9; ++i) {
     const Pose pose{1, 0, 0, 0.5 * u[3 * i], 0, 1, 0, 0.3 * u[3 * i + 1], 0, 0, 1, 0.1 * u[3 * i + 2]};

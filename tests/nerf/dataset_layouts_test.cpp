@@ -25,7 +25,7 @@ TEST_CASE("dataset: one transforms.json holds out every 8th of the sorted names"
   CHECK(train.layout == Layout::transforms);
   CHECK(train.background == Background::black);
   CHECK(load_dataset(scene.path, {.background = Background::white}).background == Background::white);
-  CHECK(!train.forward_facing);
+  CHECK(train.scene == SceneType::place);
   const Camera& c = test.views[1].camera;
   CHECK((c.fx == 20 && c.fy == 21 && c.cx == 6.5 && c.cy == 4.5));
   CHECK(c.position() == Vec3{8, 0, 0});
@@ -151,7 +151,7 @@ TEST_CASE("dataset: LLFF takes the folder of images that fits the size") {
   CHECK(names(test) == "p0 ");
   CHECK(names(train) == "p1 p2 ");
   CHECK(train.layout == Layout::llff);
-  CHECK(train.forward_facing);
+  CHECK(train.scene == SceneType::forward);
   REQUIRE(train.views[1].depth);
   CHECK(train.views[1].depth->near == Approx(4 / 1.5));
   CHECK(train.views[1].camera.position()[0] == Approx(1 / 1.5));
@@ -173,7 +173,7 @@ TEST_CASE("dataset: cameras all around are not forward-facing") {
   write_file_atomically(folder.path / "poses_bounds.npy", std::string_view(llff_file(rows)));
   for (const char* name : {"a", "b", "c"})
     write_image(folder.path / "images" / (std::string(name) + ".png"), 8, 6);
-  CHECK(!load_dataset(folder.path).forward_facing);
+  CHECK(load_dataset(folder.path).scene == SceneType::place);
 }
 
 TEST_CASE("dataset: COLMAP models in text and binary, in each of their places") {
@@ -232,7 +232,7 @@ TEST_CASE("dataset: the training images of fox and fern") {
   CHECK(camera_span(train).up[2] > 0.99);
   const Dataset leaves = load_dataset(*fern, {.split = "test"});
   CHECK(leaves.views.size() == 3);
-  CHECK(leaves.forward_facing);
+  CHECK(leaves.scene == SceneType::forward);
   CHECK(leaves.views[0].rgba.shape == Shape{378, 504, 4});
   CHECK(leaves.views[0].camera.fx == Approx(3260.5263 / 8));
   double near = 1e9;

@@ -88,7 +88,7 @@ TEST_CASE("field_sizing: ended before tables have been compared, the field is as
 
 TEST_CASE("field_sizing: without bounds, what is empty is found once, not by each training") {
   Dataset images = sphere();
-  images.layout = Layout::transforms;
+  images.scene = SceneType::place;
   for (View& v : images.views)
     for (Index i = 3; i < v.rgba.size(); i += 4) v.rgba[i] = 1;
   const FieldSizing sizing = size_field(images, {}, kShort);

@@ -61,5 +61,6 @@ TEST_CASE("rendered_dataset: other spaces have opaque images, and errors, progre
   field.space.kind = SpaceKind::contracted;
   const Dataset open = rendered_dataset(field, cameras);
   CHECK(open.layout == Layout::transforms);
+  CHECK(open.scene == SceneType::place);
   for (Index p = 3; p < open.views[0].rgba.size(); p += 4) CHECK(open.views[0].rgba[p] == 1);
 }

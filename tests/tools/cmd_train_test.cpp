@@ -1,4 +1,5 @@
 #include <fieldmark/core/files.h>
+#include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/dataset.h>
 #include <fieldmark/nerf/trainer.h>
 
@@ -45,6 +46,47 @@ TEST_CASE("train tells that there are no test images, and writes the field", "[t
   REQUIRE(r.code == cli::kOk);
   CHECK_THAT(r.out + r.err, Contains("has no test images, so no PSNR is measured on them"));
   CHECK(nlohmann::json::parse(read_text(folder / "f.json"))["test_psnr"].is_null());
+}
+
+TEST_CASE("train says what type of scene it sees, and takes another that is asked for", "[train]") {
+  const TemporaryFolder folder;
+  const std::string scene = tiny_scene(folder), out = folder / "f.fm";
+  const auto train = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"train", "--data", scene, "--out", out, "--steps", "2", "--json", "-"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_command(words);
+  };
+  const auto seen = train({});
+  INFO(seen.err);
+  REQUIRE(seen.code == cli::kOk);
+  CHECK_THAT(seen.err,
+             Contains("scene type object: 100% of the pixels at the images' borders are transparent; "
+                      "--scene-type overrides"));
+  const nlohmann::json json = nlohmann::json::parse(seen.out);
+  CHECK(json["scene_type"] == "object");
+  CHECK(json["scene_type_reason"] == "100% of the pixels at the images' borders are transparent");
+  const auto place = train({"--scene-type", "place"});
+  REQUIRE(place.code == cli::kOk);
+  CHECK(nlohmann::json::parse(place.out)["scene_type"] == "place");
+  CHECK_THAT(place.err, Contains("scene type place: as asked for\n"));
+  CHECK(nerf::RadianceField::load(out).space.kind == nerf::SpaceKind::contracted);
+  for (const char* wrong : {"forward", "plain", "room"}) {
+    const auto refused = train({"--scene-type", wrong});
+    CHECK(refused.code == cli::kUsage);
+    CHECK_THAT(refused.err, Contains("--scene-type"));
+  }
+}
+
+TEST_CASE("train ends with an error where there is nothing to learn, and writes no field", "[train]") {
+  const TemporaryFolder folder;
+  const std::string scene = tiny_scene(folder), out = folder / "f.fm";
+  for (const auto& image : std::filesystem::directory_iterator(std::filesystem::path(scene) / "train"))
+    write_png(image.path(), Tensor<float>({16, 16, 4}));
+  const auto r = run_command({"train", "--data", scene, "--out", out, "--steps", "500"});
+  CHECK(r.code == cli::kFailed);
+  CHECK_THAT(r.err, Contains("training collapsed after 0 steps: no cell of the scene is occupied") &&
+                        Contains("taken for type object") && Contains("--scene-type"));
+  CHECK(!std::filesystem::exists(out));
 }
 
 TEST_CASE("train --supersampling makes a field that is rendered so", "[train]") {

@@ -1,3 +1,4 @@
+#include <fieldmark/nerf/collapse_watch.h>
 #include <fieldmark/nerf/evaluation.h>
 #include <fieldmark/nerf/field_sizing.h>
 #include <fieldmark/nerf/psnr_target.h>
@@ -24,7 +25,7 @@ constexpr double kSizing = 1. / 3;  // of --seconds, at most
 
 struct TrainArguments {
   std::string data, out;
-  std::string preset = "hash", model = "fixed", background, precision = "fp32";
+  std::string preset = "hash", model = "fixed", background, precision = "fp32", scene_type;
   Index size = 0, supersampling = 1;
   RunLength length;
   double target_psnr = 0, max_megabytes = 0;
@@ -87,25 +88,70 @@ nerf::RadianceFieldOptions sized(const nerf::RadianceFieldOptions& start, const 
   return sizing.field;
 }
 
+// The training images, and the type of their scene for people.
+nerf::Dataset training_data(const TrainArguments& options, Context& context) {
+  nerf::DatasetOptions wanted{
+      .split = "train", .size = options.size, .background = background_of(options.background)};
+  if (!options.scene_type.empty()) wanted.scene = nerf::parse_scene_type(options.scene_type);
+  try {
+    nerf::Dataset data = load_scene(options.data, wanted, context);
+    context.text() << "scene type " << nerf::name_of(data.scene) << ": " << data.scene_reason
+                   << (wanted.scene ? "" : "; --scene-type overrides") << "\n";
+    return data;
+  } catch (const ValueError& e) {
+    if (!wanted.scene) throw;
+    throw UsageError("--scene-type " + options.scene_type + ": " + e.what());
+  }
+}
+
+// Images of another split, of the same scene.
+nerf::DatasetOptions other_split(const TrainArguments& options, const nerf::Dataset& train,
+                                 const char* split) {
+  return {.split = split, .size = options.size, .background = train.background, .scene = train.scene};
+}
+
 nerf::PsnrTarget psnr_target(const TrainArguments& options, const nerf::RadianceField& field,
-                             Context& context) {
+                             const nerf::Dataset& train, Context& context) {
   std::optional<nerf::Dataset> held_out;
   if (options.target_psnr > 0 && nerf::has_split(options.data, "val"))
-    held_out = load_scene(
-        options.data, {.split = "val", .size = options.size, .background = background_of(options.background)},
-        context);
+    held_out = load_scene(options.data, other_split(options, train, "val"), context);
   return {field, options.target_psnr, std::move(held_out)};
 }
 
+// A few images that are not trained on, or if there are none that can be read, training images.
+nerf::CollapseWatch collapse_watch(const TrainArguments& options, const nerf::RadianceField& field,
+                                   const nerf::Dataset& train) {
+  for (const char* split : {"val", "test"}) {
+    if (!nerf::has_split(options.data, split)) continue;
+    nerf::DatasetOptions few = other_split(options, train, split);
+    few.most_views = nerf::CollapseWatch::kViews;
+    try {
+      return {field, nerf::load_dataset(options.data, few)};
+    } catch (const Error&) {
+      continue;  // the training needs none of them
+    }
+  }
+  return {field, train};
+}
+
+void require_healthy(const std::string& fault, const nerf::Dataset& data, const nerf::Trainer& trainer) {
+  if (fault.empty()) return;
+  throw Error(
+      "training collapsed after " + std::to_string(trainer.steps()) + " steps: " + fault +
+      "; no field was written. The scene was taken for type " + nerf::name_of(data.scene) + " (" +
+      data.scene_reason +
+      "): if that is wrong, choose another with --scene-type; else check that cameras and images belong "
+      "together");
+}
+
 // PSNR on the data set's test views, measured after everything is saved; null where there are none.
-Json test_psnr(const TrainArguments& options, const nerf::RadianceField& field, Context& context) {
+Json test_psnr(const TrainArguments& options, const nerf::RadianceField& field, const nerf::Dataset& train,
+               Context& context) {
   if (!nerf::has_split(options.data, "test")) {
     context.note(options.data + " has no test images, so no PSNR is measured on them");
     return nullptr;
   }
-  const auto data = load_scene(
-      options.data, {.split = "test", .size = options.size, .background = background_of(options.background)},
-      context);
+  const auto data = load_scene(options.data, other_split(options, train, "test"), context);
   nerf::Renderer renderer(field);
   const InterruptGuard guard;
   Progress progress = context.progress("test views");
@@ -124,9 +170,7 @@ int run_train(const TrainArguments& options, Context& context) {
   if (options.supersampling > 1 && options.preset == "mlp")
     throw UsageError("--supersampling: the mlp preset trains with one ray through a pixel's centre");
   check_writable(options.out);
-  const auto data = load_scene(
-      options.data, {.split = "train", .size = options.size, .background = background_of(options.background)},
-      context);
+  const nerf::Dataset data = training_data(options, context);
   nerf::RadianceFieldOptions sizes;
   if (options.preset == "mlp")
     sizes.field.kind = nerf::FieldKind::mlp;
@@ -155,15 +199,19 @@ int run_train(const TrainArguments& options, Context& context) {
     context.note(checkpoint +
                  ": a checkpoint of version 0.1, which knows its data set by name and size alone");
 
-  nerf::PsnrTarget target = psnr_target(options, field, context);
+  nerf::PsnrTarget target = psnr_target(options, field, data, context);
+  nerf::CollapseWatch watch = collapse_watch(options, field, data);
   const double begun = context.seconds(), samples_before = trainer.samples();
   const InterruptGuard until_saved;  // between the last step and the file, Ctrl-C waits
-  const double seconds = run_long(trainer, "train", options.length, context, checkpoint,
-                                  [&] { return target.reached(trainer.steps(), trainer.train_psnr()); });
+  const double seconds = run_long(trainer, "train", options.length, context, checkpoint, [&] {
+    require_healthy(watch.look(trainer.steps(), trainer.train_psnr()), data, trainer);
+    return target.reached(trainer.steps(), trainer.train_psnr());
+  });
+  require_healthy(watch.verdict(trainer.steps()), data, trainer);
   field.save(options.out);
   std::filesystem::remove(checkpoint);
 
-  const Json psnr = test_psnr(options, field, context);
+  const Json psnr = test_psnr(options, field, data, context);
   const auto bytes = std::filesystem::file_size(options.out);
   char line[200];
   std::snprintf(line, sizeof line, "%lld steps%s in %.1f s, %.2f MB", static_cast<long long>(trainer.steps()),
@@ -175,6 +223,8 @@ int run_train(const TrainArguments& options, Context& context) {
   }
   context.text() << "\n";
   Json result{{"test_psnr", psnr},
+              {"scene_type", nerf::name_of(data.scene)},
+              {"scene_type_reason", data.scene_reason},
               {"train_seconds", seconds},
               {"steps", trainer.steps()},
               {"replanned", trainer.replanned()},
@@ -230,9 +280,17 @@ Command add_train(CommandLine& app) {
       ->default_str("");
   app.add_option(
          "--background", o->background,
-         "Colour behind transparent pixels: white, black; default: white for the Blender layout, else black")
+         "Colour behind transparent pixels: white, black; default: white for objects in the Blender layout,\n"
+         "the colour nearer to a plain background, else black")
       ->one_of({"white", "black"})
       ->type_name("COLOUR")
+      ->default_str("");
+  app.add_option("--scene-type", o->scene_type,
+                 "object: silhouettes in the images' alpha; plain: opaque object before one colour;\n"
+                 "place: scene with a background; forward: cameras that look one way, with depth bounds;\n"
+                 "default: decided from images and cameras")
+      ->one_of(nerf::scene_type_names())
+      ->type_name("TYPE")
       ->default_str("");
   app.add_option("--max-megabytes", o->max_megabytes,
                  "Largest file size of the field in MB, 0.1 to 100000; default: no limit")

@@ -1,7 +1,9 @@
 #pragma once
 #include <fieldmark/engine/tensor.h>
 #include <fieldmark/nerf/camera.h>
+#include <fieldmark/nerf/scene_type.h>
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -46,19 +48,27 @@ struct Dataset {
   Background background = Background::white;  ///< behind its views
   std::vector<View> views;                    ///< at least one; all of one size
   Layout layout = Layout::blender;            ///< of the folder
-  /// Whether it is of layout llff and every camera looks within 60 degrees of their mean axis, -z.
-  bool forward_facing = false;
+  SceneType scene = SceneType::object;        ///< as its images and cameras tell, or as asked for
+  std::string scene_reason{};                 ///< for people: why it is of this type
+  /// Of scene plain: the colour behind the opaque pixels, some of which may show it. Its transparent pixels
+  /// are background for certain.
+  std::array<float, 3> plain_colour{};
   std::vector<std::string> notes{};  ///< for people: a sentence for each omission, crop and hold-out
 };
 
-/// Split, size and background for load_dataset().
+/// Split, size, background and scene type for load_dataset().
 struct DatasetOptions {
   std::string split = "train";  ///< "train", "val" or "test"
   /// Pixels of the longer side after an area filter on premultiplied colour, before distorted images lose
   /// their rims; 0: original size.
   Index size = 0;
-  /// Behind the views; none: white for the layout blender, else black.
+  /// Behind the views; none: for scene object white in the layout blender, else black; for scene plain the
+  /// one nearer to its colour; else black.
   std::optional<Background> background{};
+  /// Type of the scene; none: as its images and cameras tell, see look_at_scene().
+  std::optional<SceneType> scene{};
+  /// Views to read, spread evenly over the split; 0: all.
+  Index most_views = 0;
 };
 
 /// Reads one split of a data set. The layout is the first whose file the folder has: transforms_train.json
@@ -76,7 +86,9 @@ struct DatasetOptions {
 /// and rescales the poses. Images are those of the folder images or images_N whose longer side is the
 /// smallest that reaches `size` (else the largest). colmap: see parse_colmap_cameras(). World axes are
 /// COLMAP's. Images as for llff, lenses and missing images as for transforms.
-/// @throws ValueError  if an option is outside its range
+/// The type of the scene is decided from the images and cameras, not from the layout. Of a plain scene, the
+/// background becomes transparent (cut_out()). Of a place, pixels that are not opaque are not valid.
+/// @throws ValueError  if an option is outside its range, or the views cannot be of the scene type asked for
 /// @throws IoError     naming file and place: folder, JSON or an image missing, unreadable or malformed, no
 ///                     views, images of differing sizes, a distortion that has no inverse, none of the
 ///                     files above

@@ -12,7 +12,7 @@ namespace fieldmark::nerf {
 /// the background b; in other spaces all images are opaque.
 /// @param cameras   at least one, all of one size
 /// @param progress  called after each view; returns false to stop, which throws Error
-/// @return split "train"; layout blender for a cube, else transforms
+/// @return split "train"; layout blender and scene object for a cube, else transforms and place
 /// @throws ValueError if there are no cameras, or of several sizes
 Dataset rendered_dataset(const RadianceField& field, std::span<const Camera> cameras,
                          const std::function<bool(Index done, Index total)>& progress = {});

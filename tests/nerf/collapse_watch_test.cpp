@@ -1,0 +1,82 @@
+#include <fieldmark/nerf/analytic_scene.h>
+#include <fieldmark/nerf/collapse_watch.h>
+#include <fieldmark/nerf/trainer.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "nerf/small_field.h"
+#include "support/catch.h"
+
+using namespace fieldmark;
+using namespace fieldmark::nerf;
+
+namespace {
+const Dataset& scene() {
+  static const Dataset data = make_scene({.size = 48, .views = 12});
+  return data;
+}
+
+// A field after some steps on the scene.
+RadianceField trained(Index steps) {
+  RadianceField field(trainable_field_options());
+  Trainer trainer(field, scene(), {.schedule = {.steps = steps}, .samples_per_step = 8192, .warm_up = 16});
+  while (!trainer.done()) trainer.step(0);
+  return field;
+}
+
+// Ends all rays in the field's background.
+RadianceField emptied(RadianceField field, Index cells_left) {
+  std::vector<std::uint8_t> bits(static_cast<std::size_t>(field.grid.cells()));
+  std::fill_n(bits.begin(), cells_left, 1);
+  field.grid.set_bits(bits);
+  return field;
+}
+}  // namespace
+
+TEST_CASE("collapse_watch: a field that learns passes, and is not touched") {
+  const RadianceField field = trained(60);
+  const std::vector<float> values(field.params.values().begin(), field.params.values().end());
+  const std::vector<std::uint8_t> bits(field.grid.bits().begin(), field.grid.bits().end());
+  CollapseWatch watch(field, scene());
+  CHECK(watch.explained() > 0.6);
+  CHECK(watch.explained() <= 1);
+  for (Index steps = 0; steps <= 4096; ++steps)
+    if (steps % 128 == 0 || steps % 100 == 0) CHECK(watch.look(steps, 20) == "");
+  CHECK(watch.verdict(4096) == "");
+  CHECK(std::ranges::equal(field.params.values(), values));
+  CHECK(std::ranges::equal(field.grid.bits(), bits));
+}
+
+TEST_CASE("collapse_watch: views of one colour are noticed at the third look, and at the end of a run") {
+  const RadianceField white = emptied(trained(1), 1);
+  CollapseWatch watch(white, scene());
+  CHECK(watch.explained() < 0);
+  CHECK(watch.look(128, 9) == "");
+  CHECK(watch.look(128, 9) == "");
+  CHECK(watch.look(200, 9) == "");
+  CHECK(watch.look(256, 9) == "");
+  CHECK_THAT(watch.look(384, 9), StartsWith("the mean square error of rendered views is ") &&
+                                     EndsWith(" times that of a constant image"));
+  CHECK(watch.verdict(383) == "");
+  CHECK(watch.verdict(384) != "");
+}
+
+TEST_CASE("collapse_watch: no cells and a loss that is no number are noticed at once") {
+  const RadianceField none = emptied(trained(1), 0), some = trained(1);
+  CHECK(CollapseWatch(none, scene()).look(0, 0) == "no cell of the scene is occupied");
+  CHECK(CollapseWatch(none, scene()).look(128, 20) == "no cell of the scene is occupied");
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  CHECK(CollapseWatch(some, scene()).look(7, nan) == "the loss is not a number");
+  CHECK(CollapseWatch(some, scene()).look(0, nan) == "");
+}
+
+TEST_CASE("collapse_watch: images of one colour tell nothing about a field") {
+  Dataset flat = scene();
+  for (View& v : flat.views) std::ranges::fill(v.rgba.data, 1.f);
+  const RadianceField field = trained(1);
+  CollapseWatch watch(field, flat);
+  for (const Index steps : {128, 256, 384, 512}) CHECK(watch.look(steps, 9) == "");
+  CHECK(watch.verdict(512) == "");
+}
