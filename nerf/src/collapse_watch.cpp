@@ -26,8 +26,7 @@ std::string worse_than_constant(double explained) {
 }  // namespace
 
 CollapseWatch::CollapseWatch(const RadianceField& field, const Dataset& images)
-    : field_(field),
-      renderer_(field, {.finer = 1, .supersampling = 1}) {
+    : field_(field), renderer_(field, {.finer = 1, .supersampling = 1}) {
   std::array<double, 3> sum{}, square{};
   Index pixels = 0;
   for (const View& view : images.views) {
@@ -85,7 +84,7 @@ std::string CollapseWatch::look(Index steps, double train_psnr) {
 }
 
 std::string CollapseWatch::verdict(Index steps) {
-  if (steps < kPatience * kPeriod || !(variance_ > kLeastVariance)) return {};
+  if (steps < kPatience * kPeriod * (field_.coarse ? kRarer : 1) || !(variance_ > kLeastVariance)) return {};
   const double now = explained();
   return now > 0 ? "" : worse_than_constant(now);
 }

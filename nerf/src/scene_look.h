@@ -18,7 +18,7 @@ struct SceneLook {
 /// Decides the type of a scene from its images and cameras.
 ///   - forward, if `forward_facing`.
 ///   - object, if at least half of the pixels at the images' borders are transparent, and the opaque ones are
-///   not a rectangle (or disc) at one place of most images: that is a frame around photographs.
+///   not a rectangle (or disc) at one place of most images: that is a frame.
 ///   - plain, if the images are opaque, the borders of 9 in 10 images have one colour, the same in all, at 4
 ///   of 5 pixels, and what differs from it is no such rectangle.
 ///   - else place.

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "silhouettes.h"
+#include "rotation.h"
 
 namespace fieldmark::nerf {
 namespace {
@@ -16,7 +16,7 @@ constexpr double kBefore = 0.95;    // of the nearest bound: the space in front 
 constexpr double kRim = 1.02;       // of the widest ray
 constexpr double kOverhang = 0.05;  // of the bounds' side: margins of the cube that cameras see
 constexpr double kLost = 1. / 16;   // of the bounds' side: eight cells of the occupancy grid
-constexpr Index kHull = 64;         // cells per axis
+constexpr Index kPoints = 32;       // per axis, of a cube that is searched for the object
 
 // The plane from the data set's bounds, and slopes that hold the rays through every image's corners, at the
 // plane and at infinity.
@@ -51,6 +51,42 @@ bool contains(const Bounds& outer, const Bounds& inner) {
   return true;
 }
 
+// Whether a point is in a view's image, and there on a pixel that is not transparent.
+struct Sight {
+  bool in_image = false, opaque = false;
+};
+Sight sight_of(const View& view, const Vec3& p) {
+  const Camera& c = view.camera;
+  const Vec3 v = p - c.position();
+  const double depth = -dot(pose_column(c.pose, 2), v);
+  if (!(depth > 0)) return {};
+  const double x = std::floor(c.cx + c.fx * dot(pose_column(c.pose, 0), v) / depth),
+               y = std::floor(c.cy - c.fy * dot(pose_column(c.pose, 1), v) / depth);
+  if (!(x >= 0 && x < static_cast<double>(c.width) && y >= 0 && y < static_cast<double>(c.height))) return {};
+  const Index pixel = static_cast<Index>(y) * c.width + static_cast<Index>(x);
+  return {.in_image = true, .opaque = view.rgba[4 * pixel + 3] > 0};
+}
+
+// Whether at least half of the views see a point of `seen` outside `bounds`, and all of those on the object.
+bool reaches_out(std::span<const View> views, const Bounds& bounds, const Bounds& seen) {
+  for (Index i = 0; i < kPoints * kPoints * kPoints; ++i) {
+    Vec3 p{};
+    for (std::size_t a = 0; Index n : {i % kPoints, i / kPoints % kPoints, i / (kPoints * kPoints)}) {
+      p[a] = seen.corner[a] + (static_cast<double>(n) + 0.5) * seen.side / kPoints;
+      ++a;
+    }
+    if (contains(bounds, {.corner = p, .side = 0})) continue;
+    Index in_image = 0;
+    const bool ruled_out = std::any_of(views.begin(), views.end(), [&](const View& view) {
+      const Sight sight = sight_of(view, p);
+      in_image += sight.in_image;
+      return sight.in_image && !sight.opaque;
+    });
+    if (!ruled_out && 2 * in_image >= std::ssize(views)) return true;
+  }
+  return false;
+}
+
 // `bounds`, unless silhouettes show that the object reaches out of them, or cameras that it is lost in them:
 // then the cube that the cameras have in view.
 Bounds around_object(const Dataset& data, const Bounds& bounds) {
@@ -60,9 +96,7 @@ Bounds around_object(const Dataset& data, const Bounds& bounds) {
   const Vec3& c = span.centre;
   const Bounds seen{.corner = {c[0] - half, c[1] - half, c[2] - half}, .side = 2 * half};
   if (contains(bounds, seen)) return seen.side < kLost * bounds.side ? seen : bounds;
-  const auto hull = visual_hull(data.views, seen, kHull);
-  const bool empty = std::none_of(hull.begin(), hull.end(), [](std::uint8_t cell) { return cell != 0; });
-  return empty || contains(bounds, tighten(seen, hull, kHull)) ? bounds : seen;
+  return reaches_out(data.views, bounds, seen) ? seen : bounds;
 }
 
 Space around(const Dataset& data) {

@@ -46,7 +46,7 @@ float texture(Index v, Index x, Index y) {
   return 0.5f + 0.45f * std::sin(static_cast<float>(x * (3 + v) + 7 * y));
 }
 
-std::array<float, 4> photograph(Index v, Index x, Index y) {
+std::array<float, 4> training_image(Index v, Index x, Index y) {
   const float t = texture(v, x, y);
   return {t, 1 - t, 0.5f * t, 1};
 }
@@ -71,11 +71,11 @@ TEST_CASE("scene_look: silhouettes in alpha are of an object") {
   CHECK(look_at_scene(views, true).type == SceneType::forward);
 }
 
-TEST_CASE("scene_look: photographs are of a place, whatever their alpha has that is no silhouette") {
-  CHECK(type_of(photograph) == SceneType::place);
+TEST_CASE("scene_look: training images are of a place, whatever their alpha has that is no silhouette") {
+  CHECK(type_of(training_image) == SceneType::place);
   const auto with_alpha = [](auto transparent) {
     return [=](Index v, Index x, Index y) {
-      auto c = photograph(v, x, y);
+      auto c = training_image(v, x, y);
       if (transparent(v, x, y)) c[3] = 0;
       return c;
     };
@@ -109,16 +109,16 @@ TEST_CASE("scene_look: opaque objects before one colour, with noise, are plain")
   CHECK_THAT(look.reason, Contains("the images' borders have one colour, 51 2"));
 }
 
-TEST_CASE("scene_look: a frame of one colour around photographs is no background") {
+TEST_CASE("scene_look: a frame of one colour around training images is no background") {
   CHECK(type_of([](Index v, Index x, Index y) {
-          return in_frame(x, y, 3) ? std::array<float, 4>{0, 0, 0, 1} : photograph(v, x, y);
+          return in_frame(x, y, 3) ? std::array<float, 4>{0, 0, 0, 1} : training_image(v, x, y);
         }) == SceneType::place);
 }
 
 TEST_CASE("scene_look: borders of another colour in each image are of a place") {
   CHECK(type_of([](Index v, Index x, Index y) {
           const float g = 0.09f * static_cast<float>(v);
-          return in_frame(x, y, 9) ? std::array<float, 4>{g, g, g, 1} : photograph(v, x, y);
+          return in_frame(x, y, 9) ? std::array<float, 4>{g, g, g, 1} : training_image(v, x, y);
         }) == SceneType::place);
 }
 
@@ -152,7 +152,7 @@ TEST_CASE("scene_look: type, background and alpha of a data set follow the image
   const auto before = [](float grey) {
     Dataset data;
     data.views = views_of([=](Index v, Index x, Index y) {
-      return on_object(v, x, y) ? photograph(v, x, y) : std::array<float, 4>{grey, grey, grey, 1};
+      return on_object(v, x, y) ? training_image(v, x, y) : std::array<float, 4>{grey, grey, grey, 1};
     });
     return data;
   };
