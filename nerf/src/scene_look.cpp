@@ -94,6 +94,8 @@ void visit_border(Index width, Index height, F visit) {
   }
 }
 
+bool is_valid(const View& view, Index pixel) { return view.valid.empty() || view.valid[at(pixel)]; }
+
 float stray(const float* rgb, const Colour& colour) {
   float most = 0;
   for (std::size_t k = 0; k < 3; ++k) most = std::max(most, std::abs(rgb[k] - colour[k]));
@@ -114,13 +116,16 @@ Borders borders_of(std::span<const View> views) {
     const Tensor<float>& rgba = views[v].rgba;
     std::array<std::vector<float>, 3> channels;
     visit_border(rgba.shape[1], rgba.shape[0], [&](Index p) {
+      if (!is_valid(views[v], p)) return;
       for (std::size_t k = 0; k < 3; ++k) channels[k].push_back(rgba[4 * p + static_cast<Index>(k)]);
       transparent += rgba[4 * p + 3] < kSeeThrough;
       ++pixels;
     });
+    if (channels[0].empty()) continue;
     for (std::size_t k = 0; k < 3; ++k) colours[v][k] = middle_of(std::move(channels[k]));
   }
-  Borders found{.transparent = static_cast<double>(transparent) / static_cast<double>(pixels)};
+  Borders found{.transparent =
+                    static_cast<double>(transparent) / static_cast<double>(std::max<Index>(pixels, 1))};
   for (std::size_t k = 0; k < 3; ++k) {
     std::vector<float> all;
     for (const Colour& c : colours) all.push_back(c[k]);
@@ -132,13 +137,14 @@ Borders borders_of(std::span<const View> views) {
     const Tensor<float>& rgba = views[v].rgba;
     Index near = 0, all = 0;
     visit_border(rgba.shape[1], rgba.shape[0], [&](Index p) {
+      if (!is_valid(views[v], p)) return;
       const float own = stray(&rgba.data[at(4 * p)], colours[v]);
       ++all;
       if (own > kOneColour) return;
       ++near;
       strays.push_back(stray(&rgba.data[at(4 * p)], found.colour));
     });
-    plain += static_cast<double>(near) >= kPlainBorder * static_cast<double>(all) &&
+    plain += all > 0 && static_cast<double>(near) >= kPlainBorder * static_cast<double>(all) &&
              stray(colours[v].data(), found.colour) <= kSameColour;
   }
   found.plain = static_cast<double>(plain) / static_cast<double>(views.size());
@@ -218,6 +224,18 @@ void cut_out(View& view, const std::array<float, 3>& colour, float tolerance) {
   }
 }
 
+namespace {
+
+// What a place's image does not show is unknown, not empty.
+void leave_out_transparent(View& view) {
+  if (is_opaque(view)) return;
+  if (view.valid.empty()) view.valid.assign(view.rgba.data.size() / 4, 1);
+  for (std::size_t p = 0; p < view.valid.size(); ++p)
+    if (view.rgba.data[4 * p + 3] < 1) view.valid[p] = 0;
+}
+
+}  // namespace
+
 void settle_scene(Dataset& data, const DatasetOptions& options, bool forward_facing) {
   const SceneLook look = look_at_scene(data.views, forward_facing);
   data.scene = options.scene.value_or(look.type);
@@ -234,6 +252,8 @@ void settle_scene(Dataset& data, const DatasetOptions& options, bool forward_fac
   const float grey = (look.colour[0] + look.colour[1] + look.colour[2]) / 3;
   const bool white = data.scene == SceneType::object ? data.layout == Layout::blender : plain && grey > 0.5f;
   data.background = options.background.value_or(white ? Background::white : Background::black);
+  if (data.scene == SceneType::place)
+    for (View& view : data.views) leave_out_transparent(view);
   if (!plain) return;
   data.plain_colour = look.colour;
   const float tolerance = look.type == SceneType::plain ? look.tolerance : kOneColour;

@@ -171,6 +171,12 @@ TEST_CASE("scene_look: type, background and alpha of a data set follow the image
   CHECK(place.scene_reason == "as asked for");
   CHECK(place.background == Background::black);
   CHECK(place.views[0].rgba[3] == 1);
+  CHECK(place.views[0].valid.empty());
+  place.views[0].rgba[4 * 7 + 3] = 0.99f;
+  settle_scene(place, {.scene = SceneType::place}, false);
+  REQUIRE(place.views[0].valid.size() == kWidth * kHeight);
+  CHECK(place.views[0].valid[7] == 0);
+  CHECK(std::count(place.views[0].valid.begin(), place.views[0].valid.end(), 0) == 1);
   Dataset lit = before(0);
   settle_scene(lit, {.background = Background::white}, false);
   CHECK(lit.background == Background::white);
