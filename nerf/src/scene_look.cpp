@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "checks.h"
+#include "silhouettes.h"
 
 namespace fieldmark::nerf {
 namespace {
@@ -93,8 +94,6 @@ void visit_border(Index width, Index height, F visit) {
     if (width > 1) visit(y * width + width - 1);
   }
 }
-
-bool is_valid(const View& view, Index pixel) { return view.valid.empty() || view.valid[at(pixel)]; }
 
 float stray(const float* rgb, const Colour& colour) {
   float most = 0;

@@ -9,9 +9,10 @@
 #include "checks.h"
 
 namespace fieldmark::nerf {
-namespace {
 
 bool is_valid(const View& v, Index pixel) { return v.valid.empty() || v.valid[at(pixel)] != 0; }
+
+namespace {
 
 // Whether the scene may be behind a pixel: a mask may hide it.
 bool may_show(const View& v, Index pixel) { return v.rgba[4 * pixel + 3] > 0 || !is_valid(v, pixel); }

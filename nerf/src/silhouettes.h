@@ -9,6 +9,9 @@
 
 namespace fieldmark::nerf {
 
+/// Whether a pixel of a view is learnt and counted, see View::valid.
+bool is_valid(const View& v, Index pixel);
+
 /// The visual hull (Laurentini 1994): the cells of a grid over `bounds` that no silhouette rules out. A view
 /// rules a cell out only if the cell's projection, enlarged to the circle around its corners, lies in the
 /// image and meets no pixel with alpha > 0 and none that is not valid.
