@@ -45,7 +45,7 @@ TEST_CASE("params: running values are read, and get no gradient") {
   CHECK(v.value() == store.values(mean).data());
 }
 
-TEST_CASE("params: computed parameters pass gradients on, in each backward; running ones stay the store's") {
+TEST_CASE("params: computed parameters pass gradients on, in each backward, running ones stay the store's") {
   ParamStore<double> store;
   const auto a = store.add("a", {2}), mean = store.add("mean", {1}, ParamRole::running),
              b = store.add("b", {1});
