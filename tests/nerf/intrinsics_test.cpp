@@ -1,5 +1,5 @@
-#include "lens.h"
 #include <fieldmark/core/error.h>
+#include "lens.h"
 
 #include <cmath>
 

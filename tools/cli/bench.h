@@ -27,12 +27,11 @@ Command add_bench_training(CommandLine& app);
 /// @{
 /// Options that several subjects have.
 template <class T>
-Option add_number(CommandLine& app, const char* name, T& value, std::type_identity_t<T> low, std::type_identity_t<T> high, const char* help,
-                        const char* type = "N") {
+Option add_number(CommandLine& app, const char* name, T& value, std::type_identity_t<T> low,
+                  std::type_identity_t<T> high, const char* help, const char* type = "N") {
   return app.add_option(name, value, help)->range(low, high)->type_name(type);
 }
-Option add_file(CommandLine& app, const char* name, std::string& value, const char* help,
-                      const char* type);
+Option add_file(CommandLine& app, const char* name, std::string& value, const char* help, const char* type);
 void add_scene_option(CommandLine& app, std::string& scene);
 void add_plot(CommandLine& app, std::string& plot);
 /// @}

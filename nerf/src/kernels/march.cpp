@@ -94,8 +94,7 @@ constexpr int kFew = 8;     // the same in a contracted space, where each waits 
 }
 
 // 0 if the next sample lies in a block with an occupied cell, or behind the end.
-[[gnu::always_inline]] inline std::int32_t empty_contracted_steps(const MarchGrid& g,
-                                                                  const MarchRay& r) {
+[[gnu::always_inline]] inline std::int32_t empty_contracted_steps(const MarchGrid& g, const MarchRay& r) {
   const auto n = static_cast<float>(g.block_side);
   const float s = scale_at(r, r.near);
   std::int32_t at = 0;
@@ -213,8 +212,7 @@ void march_contracted_to_blocks(const MarchGrid& g, MarchRays& rays) {
   rays = r;
 }
 
-std::int64_t march_contracted(const MarchGrid& g, MarchRay& ray, std::int64_t max, float* out,
-                              float* x) {
+std::int64_t march_contracted(const MarchGrid& g, MarchRay& ray, std::int64_t max, float* out, float* x) {
   MarchRay r = ray;
   const auto n = static_cast<float>(g.resolution);
   std::int64_t count = 0;

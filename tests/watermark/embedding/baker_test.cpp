@@ -129,17 +129,18 @@ TEST_CASE("baker: scaling gives the file the strength asked for, on other views 
   const Owner owner = owner_with_gain();
   Baker baker(owner, kBakedMessage, bake_options(60));
   while (!baker.done()) baker.step(0);
-  const MarkPsnrViews other{.count = 96, .seed = 500};
-  const double learnt = baker.mark_psnr();
+  // So many that a first guess takes an eighth of them.
+  const MarkPsnrViews looked_at{.count = 72, .seed = 32}, other{.count = 48, .seed = 500};
+  const double learnt = baker.mark_psnr(looked_at);
   for (const double change : {1.5, -1.5, 0.0}) {  // each from where the one before left the colours
-    const double before = baker.mark_psnr(), target = learnt + change;
-    const auto found = baker.scale_to(target);
+    const double before = baker.mark_psnr(looked_at), target = learnt + change;
+    const auto found = baker.scale_to(target, looked_at);
     CAPTURE(change, before, found.learnt, found.scaled, found.scale);
     CHECK(found.learnt == before);
     CHECK(found.scaled == Approx(target).margin(0.02));
-    CHECK(found.scaled == baker.mark_psnr());
+    CHECK(found.scaled == baker.mark_psnr(looked_at));
     CHECK(found.scale == Approx(std::pow(10.0, (before - target) / 20)).epsilon(0.1));
-    CHECK(baker.mark_psnr(other) == Approx(target).margin(0.2));
+    CHECK(baker.mark_psnr(other) == Approx(target).margin(0.3));
   }
 }
 

@@ -92,8 +92,8 @@ TEST_CASE("trace: copies cut and pasted together are named, cell by cell") {
   CHECK(found[2].p_corrected > 1e-3);
 }
 
-// The null: evidence of no copy. Trials: 400 pictures with 50 names each. A corrected p of at most a comes up
-// in at most a of the pictures: at 0.1, 40 are expected at most, and 61 are exceeded once in 5,000 times.
+// The null: evidence of no copy. Trials: 400 images with 50 names each. A corrected p of at most a comes up
+// in at most a of the images: at 0.1, 40 are expected at most, and 61 are exceeded once in 5,000 times.
 TEST_CASE("trace: innocent recipients are named no more often than the corrected p-value says") {
   const std::vector<double> area(64, 1.0);
   const auto names = recipients(50);

@@ -11,11 +11,12 @@ namespace fieldmark {
 
 /// Settings of Adam.
 struct AdamOptions {
-  double lr = 1e-3;         ///< > 0; step size before a schedule's factor
-  double beta1 = 0.9;       ///< in [0, 1), decay of the gradient's mean
-  double beta2 = 0.99;      ///< in [0, 1), decay of the squared gradient's mean
-  double eps = 1e-15;       ///< > 0, added to the root; small because a table's gradients are
-  bool skip_zero = false;   ///< leaves entries with a gradient of exactly 0 alone, and their moments: for tables
+  double lr = 1e-3;     ///< > 0; step size before a schedule's factor
+  double beta1 = 0.9;   ///< in [0, 1), decay of the gradient's mean
+  double beta2 = 0.99;  ///< in [0, 1), decay of the squared gradient's mean
+  double eps = 1e-15;   ///< > 0, added to the root; small because a table's gradients are
+  bool skip_zero =
+      false;  ///< leaves entries with a gradient of exactly 0 alone, and their moments: for tables
   double weight_decay = 0;  ///< >= 0, decoupled: x -= lr weight_decay x
   bool zero_grads = false;  ///< also sets the gradients to 0, in the same pass over memory
 };
