@@ -95,7 +95,8 @@ TEST_CASE("bake gives the file the strength asked for", "[bake]") {
 TEST_CASE("bake refuses a message that does not fit, and an owner that is none", "[bake]") {
   const TinyJob& job = TinyJob::get();
   const std::string out = job.folder / "refused.fm";
-  for (const char* message : {"", "55", "g"})
+  const std::string more_than_cells(1000, '5');
+  for (const std::string& message : {std::string(), more_than_cells, std::string("g")})
     CHECK(run_command({"bake", "--owner", job.owner, "--message", message, "--out", out, "--steps", "1"})
               .code == cli::kUsage);
   const auto kind =
