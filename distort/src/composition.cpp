@@ -2,7 +2,6 @@
 #include <fieldmark/imaging/resize.h>
 
 #include <algorithm>
-#include <cmath>
 
 namespace fieldmark::distort {
 namespace {
@@ -14,10 +13,9 @@ void put(const Tensor<float>& x, Index top, Index left, Tensor<float>& y) {
                 y.data.begin() + 3 * ((row + top) * y.shape[1] + left));
 }
 
-Placed on_black(const Tensor<float>& x, Index height, Index width) {
-  const Index top = (height - x.shape[0]) / 2, left = (width - x.shape[1]) / 2;
-  Placed out{Tensor<float>({height, width, 3}, 0.f), static_cast<double>(left), static_cast<double>(top)};
-  put(x, top, left, out.image);
+Tensor<float> on_black(const Tensor<float>& x, Index height, Index width) {
+  Tensor<float> out({height, width, 3}, 0.f);
+  put(x, (height - x.shape[0]) / 2, (width - x.shape[1]) / 2, out);
   return out;
 }
 
@@ -25,19 +23,11 @@ Index share(Index extent, Index part, Index of) { return (extent * part + of / 2
 
 }  // namespace
 
-Tensor<float> mirrored(const Tensor<float>& x) {
-  const Index w = x.shape[1];
-  Tensor<float> y(x.shape);
-  for (Index p = 0; p < x.size() / 3; ++p)
-    std::copy_n(x.data.begin() + 3 * p, 3, y.data.begin() + 3 * (p - p % w + w - 1 - p % w));
-  return y;
-}
-
-Placed pillarboxed(const Tensor<float>& x) {
+Tensor<float> pillarboxed(const Tensor<float>& x) {
   return on_black(x, x.shape[0], std::max(x.shape[1], share(x.shape[0], 16, 9)));
 }
 
-Placed letterboxed(const Tensor<float>& x) {
+Tensor<float> letterboxed(const Tensor<float>& x) {
   return on_black(x, std::max(x.shape[0], share(x.shape[1], 16, 9)), x.shape[1]);
 }
 

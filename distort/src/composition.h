@@ -1,5 +1,5 @@
 #pragma once
-// What people put an image into: a mirror, another shape, bars, another background, a caption, a collage.
+// What people put an image into: bars in its middle, another background, a caption, a collage.
 #include <fieldmark/engine/tensor.h>
 
 #include <array>
@@ -7,20 +7,11 @@
 
 namespace fieldmark::distort {
 
-/// Where the upper left pixel of an image went.
-struct Placed {
-  Tensor<float> image;  ///< [H', W', 3]
-  double left = 0;      ///< columns to the left of it, pixels of the result
-  double top = 0;       ///< rows above it
-};
-
-/// Left and right exchanged.   @param x  [H, W, 3]
-Tensor<float> mirrored(const Tensor<float>& x);
 /// Black bars left and right, or above and below, to the aspect 16 : 9; without change where the image has it
 /// or exceeds it.
-Placed pillarboxed(const Tensor<float>& x);
+Tensor<float> pillarboxed(const Tensor<float>& x);
 /// The same above and below.
-Placed letterboxed(const Tensor<float>& x);
+Tensor<float> letterboxed(const Tensor<float>& x);
 /// Pixels that have the old background to half a grey level take another.
 /// @param fill  of a pixel, in [0, 1]
 template <class F>

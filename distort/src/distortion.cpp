@@ -3,6 +3,7 @@
 #include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/engine/tape.h>
 #include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/mirror.h>
 #include <fieldmark/imaging/resize.h>
 
 #include <algorithm>
@@ -244,9 +245,9 @@ Tensor<float> apply(const Distortion::Step& step, const Tensor<float>& x, const 
     case DistortionKind::mirror:
       return mirrored(x);
     case DistortionKind::pillarbox:
-      return pillarboxed(x).image;
+      return pillarboxed(x);
     case DistortionKind::letterbox:
-      return letterboxed(x).image;
+      return letterboxed(x);
     case DistortionKind::background_black:
       return before_another(x, background, [](Index) { return std::array{0.f, 0.f, 0.f}; });
     case DistortionKind::background_white:

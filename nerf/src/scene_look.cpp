@@ -1,6 +1,7 @@
 #include "scene_look.h"
 
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/imaging/flood_fill.h>
 
 #include <algorithm>
 #include <cmath>
@@ -201,26 +202,18 @@ void cut_out(View& view, const std::array<float, 3>& colour, float tolerance) {
   std::vector<std::uint8_t> far(at(width * height)), clear(at(width * height), 1);
   for (Index p = 0; p < width * height; ++p)
     far[at(p)] = stray(&view.rgba.data[at(4 * p)], colour) > tolerance;
-  const auto visit_around = [&](Index p, auto visit) {
+  for (Index p = 0; p < width * height; ++p) {
+    if (!far[at(p)]) continue;
     const Index x = p % width, y = p / width;
     for (Index v = std::max<Index>(y - 1, 0); v <= std::min(y + 1, height - 1); ++v)
-      for (Index u = std::max<Index>(x - 1, 0); u <= std::min(x + 1, width - 1); ++u) visit(v * width + u);
-  };
-  for (Index p = 0; p < width * height; ++p)
-    if (far[at(p)]) visit_around(p, [&](Index q) { clear[at(q)] = 0; });
-  std::vector<Index> reached;
-  const auto reach = [&](Index p) {
-    if (!clear[at(p)]) return;
-    clear[at(p)] = 0;
-    view.rgba[4 * p + 3] = 0;
-    reached.push_back(p);
-  };
-  visit_border(width, height, reach);
-  while (!reached.empty()) {
-    const Index p = reached.back();
-    reached.pop_back();
-    visit_around(p, reach);
+      for (Index u = std::max<Index>(x - 1, 0); u <= std::min(x + 1, width - 1); ++u)
+        clear[at(v * width + u)] = 0;
   }
+  std::vector<Index> border;
+  visit_border(width, height, [&](Index p) { border.push_back(p); });
+  const auto is_clear = [&](Index p) { return clear[at(p)] != 0; };
+  for (const Index p : flood_fill(height, width, border, is_clear, Neighbours::eight))
+    view.rgba[4 * p + 3] = 0;
 }
 
 namespace {

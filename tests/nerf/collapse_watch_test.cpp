@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "nerf/objects_scene.h"
 #include "nerf/small_field.h"
 #include "support/catch.h"
 
@@ -13,15 +14,11 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-const Dataset& scene() {
-  static const Dataset data = make_scene({.size = 48, .views = 12});
-  return data;
-}
-
 // A field after some steps on the scene.
 RadianceField trained(Index steps) {
   RadianceField field(trainable_field_options());
-  Trainer trainer(field, scene(), {.schedule = {.steps = steps}, .samples_per_step = 8192, .warm_up = 16});
+  Trainer trainer(field, objects_scene(),
+                  {.schedule = {.steps = steps}, .samples_per_step = 8192, .warm_up = 16});
   while (!trainer.done()) trainer.step(0);
   return field;
 }
@@ -39,7 +36,7 @@ TEST_CASE("collapse_watch: a field that learns passes, and is not touched") {
   const RadianceField field = trained(60);
   const std::vector<float> values(field.params.values().begin(), field.params.values().end());
   const std::vector<std::uint8_t> bits(field.grid.bits().begin(), field.grid.bits().end());
-  CollapseWatch watch(field, scene());
+  CollapseWatch watch(field, objects_scene());
   CHECK(watch.explained() > 0.6);
   CHECK(watch.explained() <= 1);
   for (Index steps = 0; steps <= 4096; ++steps)
@@ -51,7 +48,7 @@ TEST_CASE("collapse_watch: a field that learns passes, and is not touched") {
 
 TEST_CASE("collapse_watch: views of one colour are noticed at the third look, and at the end of a run") {
   const RadianceField white = emptied(trained(1), 1);
-  CollapseWatch watch(white, scene());
+  CollapseWatch watch(white, objects_scene());
   CHECK(watch.explained() < 0);
   CHECK(watch.look(128, 9) == "");
   CHECK(watch.look(128, 9) == "");
@@ -65,15 +62,15 @@ TEST_CASE("collapse_watch: views of one colour are noticed at the third look, an
 
 TEST_CASE("collapse_watch: no cells and a loss that is no number are noticed at once") {
   const RadianceField none = emptied(trained(1), 0), some = trained(1);
-  CHECK(CollapseWatch(none, scene()).look(0, 0) == "no cell of the scene is occupied");
-  CHECK(CollapseWatch(none, scene()).look(128, 20) == "no cell of the scene is occupied");
+  CHECK(CollapseWatch(none, objects_scene()).look(0, 0) == "no cell of the scene is occupied");
+  CHECK(CollapseWatch(none, objects_scene()).look(128, 20) == "no cell of the scene is occupied");
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  CHECK(CollapseWatch(some, scene()).look(7, nan) == "the loss is not a number");
-  CHECK(CollapseWatch(some, scene()).look(0, nan) == "");
+  CHECK(CollapseWatch(some, objects_scene()).look(7, nan) == "the loss is not a number");
+  CHECK(CollapseWatch(some, objects_scene()).look(0, nan) == "");
 }
 
 TEST_CASE("collapse_watch: images of one colour tell nothing about a field") {
-  Dataset flat = scene();
+  Dataset flat = objects_scene();
   for (View& v : flat.views) std::ranges::fill(v.rgba.data, 1.f);
   const RadianceField field = trained(1);
   CollapseWatch watch(field, flat);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "nerf/objects_scene.h"
 #include "nerf/small_field.h"
 #include "support/catch.h"
 #include "support/each_isa.h"
@@ -16,11 +17,6 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-const Dataset& scene() {
-  static const Dataset data = make_scene({.size = 48, .views = 12});
-  return data;
-}
-
 // Cells may be declared empty and steps grow after 16 steps: short runs pass through everything a long one
 // does.
 TrainOptions train_options(Index steps) {
@@ -48,7 +44,7 @@ Outcome outcome(const RadianceField& f, const Trainer& t) {
 
 Outcome run(Index steps) {
   RadianceField field(trainable_field_options());
-  Trainer trainer(field, scene(), train_options(steps));
+  Trainer trainer(field, objects_scene(), train_options(steps));
   while (!trainer.done()) trainer.step(0);
   return outcome(field, trainer);
 }
@@ -63,7 +59,7 @@ TrainOptions mlp_options(Index steps) {
 
 Outcome run_mlp(Index steps) {
   RadianceField field(small_mlp_options());
-  Trainer trainer(field, scene(), mlp_options(steps));
+  Trainer trainer(field, objects_scene(), mlp_options(steps));
   while (!trainer.done()) trainer.step(0);
   return outcome(field, trainer);
 }
@@ -74,7 +70,7 @@ TEST_CASE("trainer: 100 steps on the built-in scene reach 19 dB") {
   TrainOptions options = train_options(100);
   options.first_samples = options.samples_per_step;
   options.hard_pixels = 0;  // the loss is of rays drawn evenly then
-  Trainer trainer(field, scene(), options);
+  Trainer trainer(field, objects_scene(), options);
   trainer.step(0);
   const double start = trainer.train_psnr();
   while (!trainer.done()) trainer.step(0);
@@ -90,12 +86,13 @@ TEST_CASE("trainer: 100 steps on the built-in scene reach 19 dB") {
 TEST_CASE("trainer: a field that is kept goes on from where it was, in its space and its cells") {
   RadianceField field(trainable_field_options());
   {
-    Trainer trainer(field, scene(), train_options(60));
+    Trainer trainer(field, objects_scene(), train_options(60));
     while (!trainer.done()) trainer.step(0);
   }
   const std::string configuration = field.configuration();
   const std::vector<std::uint8_t> occupied(field.grid.bits().begin(), field.grid.bits().end());
-  Dataset elsewhere = scene();  // what another data set says of cameras and background is not taken over
+  Dataset elsewhere =
+      objects_scene();  // what another data set says of cameras and background is not taken over
   elsewhere.views.resize(3);
   elsewhere.background = Background::black;
   const auto further = [&](bool keep) {
@@ -125,7 +122,7 @@ TEST_CASE("trainer: a field that is kept goes on from where it was, in its space
 TEST_CASE("trainer: 300 steps of a small mlp field reach 17 dB, and both its networks learn") {
   RadianceField field(small_mlp_options());
   const RadianceField untrained(small_mlp_options());
-  Trainer trainer(field, scene(), mlp_options(300));
+  Trainer trainer(field, objects_scene(), mlp_options(300));
   trainer.step(0);
   const double start = trainer.train_psnr();
   while (!trainer.done()) trainer.step(0);
@@ -150,12 +147,12 @@ TEST_CASE("trainer: an mlp field's bytes are the same for one and two threads, a
   CHECK(one == run_mlp(12));
   {
     RadianceField field(small_mlp_options());
-    Trainer trainer(field, scene(), mlp_options(12));
+    Trainer trainer(field, objects_scene(), mlp_options(12));
     while (trainer.steps() < 5) trainer.step(0);
     trainer.save(folder / "checkpoint");
   }
   RadianceField field(small_mlp_options());
-  Trainer trainer(field, scene(), mlp_options(12));
+  Trainer trainer(field, objects_scene(), mlp_options(12));
   trainer.restore(folder / "checkpoint");
   while (!trainer.done()) trainer.step(0);
   CHECK(outcome(field, trainer) == one);
@@ -166,7 +163,7 @@ TEST_CASE("trainer: without carving, silhouettes leave bounds and cells alone") 
   RadianceField field(small_mlp_options());
   TrainOptions options = mlp_options(2);
   options.carve = false;
-  Trainer trainer(field, scene(), options);
+  Trainer trainer(field, objects_scene(), options);
   CHECK(field.space.bounds.side == 3);
   CHECK(field.grid.occupied_cells() == field.grid.cells());
   trainer.step(0);
@@ -187,7 +184,7 @@ TEST_CASE("trainer: sets bounds, background and cameras of the field from the da
 }
 
 TEST_CASE("trainer: opaque images leave bounds and cells alone") {
-  Dataset opaque = scene();
+  Dataset opaque = objects_scene();
   for (View& v : opaque.views)
     for (Index i = 3; i < v.rgba.size(); i += 4) v.rgba[i] = 1;
   RadianceField field(trainable_field_options());
@@ -216,12 +213,12 @@ TEST_CASE("trainer: a run that is interrupted and restored gives the bytes of on
               steps = 45;  // between two looks at the occupancy, after the first cells are declared empty
   {
     RadianceField field(trainable_field_options());
-    Trainer trainer(field, scene(), train_options(steps));
+    Trainer trainer(field, objects_scene(), train_options(steps));
     while (trainer.steps() < at) trainer.step(0);
     trainer.save(folder / "checkpoint");
   }
   RadianceField field(trainable_field_options());
-  Trainer trainer(field, scene(), train_options(steps));
+  Trainer trainer(field, objects_scene(), train_options(steps));
   trainer.restore(folder / "checkpoint");
   CHECK(trainer.steps() == at);
   while (!trainer.done()) trainer.step(0);
@@ -232,7 +229,7 @@ TEST_CASE("trainer: a timed run's steps, given as a number, give the same bytes"
   RadianceField field(trainable_field_options());
   TrainOptions options = train_options(0);
   options.schedule.seconds = 1;
-  Trainer trainer(field, scene(), options);
+  Trainer trainer(field, objects_scene(), options);
   double now = 0;
   for (; !trainer.done(); now += 0.025) trainer.step(now);
   CHECK(trainer.steps() == trainer.planned());
@@ -244,21 +241,21 @@ TEST_CASE("trainer: a timed run's steps, given as a number, give the same bytes"
 TEST_CASE("trainer: a checkpoint of another run is refused by the name of the option or input") {
   const TemporaryFolder folder;
   RadianceField field(trainable_field_options());
-  Trainer trainer(field, scene(), train_options(10));
+  Trainer trainer(field, objects_scene(), train_options(10));
   trainer.step(0);
   trainer.save(folder / "checkpoint");
   RadianceField other(trainable_field_options());
   TrainOptions options = train_options(10);
   options.seed = 7;
-  Trainer different(other, scene(), options);
+  Trainer different(other, objects_scene(), options);
   CHECK_THROWS_WITH(
       different.restore(folder / "checkpoint"),
       (folder / "checkpoint").string() + ": this checkpoint was made with option 'seed' 0, this run has 7");
   options = train_options(10);
   options.schedule.lr = 0.5;
-  Trainer faster(other, scene(), options);
+  Trainer faster(other, objects_scene(), options);
   CHECK_THROWS_WITH(faster.restore(folder / "checkpoint"), Contains("option 'lr'") && Contains("has 0.5"));
-  Dataset changed = scene();
+  Dataset changed = objects_scene();
   changed.views[3].rgba[7] += 0.25f;
   Trainer of_other_images(other, changed, train_options(10));
   CHECK_THROWS_WITH(of_other_images.restore(folder / "checkpoint"), Contains("of another input 'image 3'"));
@@ -272,7 +269,7 @@ TEST_CASE("trainer: hashed levels take turns while steps are small, and the last
   RadianceField field(trainable_field_options());
   const HashEncoding<float>& encoding = field.field.encoding();
   const Index entry = 2 * encoding.features();
-  Trainer trainer(field, scene(), train_options(40));
+  Trainer trainer(field, objects_scene(), train_options(40));
   // Which levels still hold gradients after each step.
   const auto waits = [&](int level) {
     const auto grads = field.params.grads(encoding.table());
@@ -301,7 +298,7 @@ TEST_CASE("trainer: decay keeps the table small, after its steps and nothing bef
     TrainOptions options = train_options(60);
     options.table_decay = decay;
     options.decay_after = after;
-    Trainer trainer(field, scene(), options);
+    Trainer trainer(field, objects_scene(), options);
     while (!trainer.done()) trainer.step(0);
     const auto table = field.params.values(field.field.encoding().table());
     return std::vector<float>(table.begin(), table.end());
@@ -321,7 +318,7 @@ TEST_CASE("trainer: the distortion loss leaves less fog") {
     TrainOptions options = train_options(120);
     options.distortion = weight;
     options.carve = false;
-    Trainer trainer(field, scene(), options);
+    Trainer trainer(field, objects_scene(), options);
     while (!trainer.done()) trainer.step(0);
     return field.grid.occupied_cells();
   };
@@ -334,19 +331,20 @@ TEST_CASE("trainer: errors name option and value") {
   RadianceField field(trainable_field_options());
   TrainOptions options = train_options(1);
   options.samples_per_step = 10;
-  CHECK_THROWS_WITH(Trainer(field, scene(), options),
+  CHECK_THROWS_WITH(Trainer(field, objects_scene(), options),
                     "[trainer] samples_per_step must be at least 1024, got 10");
-  CHECK_THROWS_WITH(Trainer(field, scene(), {.first_samples = 10}),
+  CHECK_THROWS_WITH(Trainer(field, objects_scene(), {.first_samples = 10}),
                     "[trainer] first_samples must be at least 1024, got 10");
-  CHECK_THROWS_WITH(Trainer(field, scene(), {.distortion = -1}),
+  CHECK_THROWS_WITH(Trainer(field, objects_scene(), {.distortion = -1}),
                     "[trainer] distortion must be at least 0, got -1.000000");
-  CHECK_THROWS_WITH(Trainer(field, scene(), {.hard_pixels = 2}),
+  CHECK_THROWS_WITH(Trainer(field, objects_scene(), {.hard_pixels = 2}),
                     "[trainer] hard_pixels must be in [0, 1], got 2.000000");
-  CHECK_THROWS_WITH(Trainer(field, scene(), {.grow_after = 0}),
+  CHECK_THROWS_WITH(Trainer(field, objects_scene(), {.grow_after = 0}),
                     "[trainer] grow_after must be positive, got 0.000000");
-  CHECK_THROWS_WITH(Trainer(field, scene(), {.least_rays = 100}),
+  CHECK_THROWS_WITH(Trainer(field, objects_scene(), {.least_rays = 100}),
                     "[trainer] least_rays must be a multiple of 64, 64 to 65536, got 100");
-  CHECK_THROWS_WITH(Trainer(field, scene(), {.stop = 1}), "[trainer] stop must be in [0, 1), got 1.000000");
+  CHECK_THROWS_WITH(Trainer(field, objects_scene(), {.stop = 1}),
+                    "[trainer] stop must be in [0, 1), got 1.000000");
   CHECK_THROWS_WITH(Trainer(field, Dataset{}, train_options(1)),
                     "[trainer] data must have at least one view");
 }
@@ -373,11 +371,11 @@ TEST_CASE("trainer: a run gets a field that it can fill") {
 TEST_CASE("trainer: a checkpoint knows the sizes of its field") {
   const TemporaryFolder folder;
   RadianceField field(small_field_options());
-  Trainer trainer(field, scene(), train_options(2));
+  Trainer trainer(field, objects_scene(), train_options(2));
   trainer.save(folder / "checkpoint");
   RadianceField same(checkpointed_field(folder / "checkpoint"));
   CHECK(same.params.size() == field.params.size());
-  Trainer second(same, scene(), train_options(2));
+  Trainer second(same, objects_scene(), train_options(2));
   second.restore(folder / "checkpoint");
   field.save(folder / "field.fm");
   CHECK_THROWS_WITH(checkpointed_field(folder / "field.fm"),

@@ -44,8 +44,8 @@ old=Nehalem new=Haswell-noTSX
 ops="dense: the float*,matmul: the float*,softmax: a certain*,activation: float*,pool: float*"
 passes $old "$engine" "kernels/*,adam kernel*,gemm:*,isa*,$ops"
 passes $old "$nerf" "kernels/*,composite*,sampler: densities*,trainer: opaque*,weighted_taps*,blur*,rotate*"
-# Of the gradient checks, those of the ops whose kernels have a backward: the others take minutes here.
-for op in conv dense hash; do
+# Of the gradient checks, those of the ops with kernels: the others compose these, and take a minute here.
+for op in conv dense hash composite distortion; do
   on $old "$fieldmark" gradcheck --only "$op" || fail "gradcheck of $op on $old"
 done
 

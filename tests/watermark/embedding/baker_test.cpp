@@ -130,7 +130,7 @@ TEST_CASE("baker: scaling gives the file the strength asked for, on other views 
   Baker baker(owner, kBakedMessage, bake_options(60));
   while (!baker.done()) baker.step(0);
   // So many that a first guess takes an eighth of them.
-  const MarkPsnrViews looked_at{.count = 72, .seed = 32}, other{.count = 48, .seed = 500};
+  const MarkPsnrViews looked_at{.count = 72, .seed = 32}, other{.count = 96, .seed = 500};
   const double learnt = baker.mark_psnr(looked_at);
   for (const double change : {1.5, -1.5, 0.0}) {  // each from where the one before left the colours
     const double before = baker.mark_psnr(looked_at), target = learnt + change;
@@ -140,7 +140,7 @@ TEST_CASE("baker: scaling gives the file the strength asked for, on other views 
     CHECK(found.scaled == Approx(target).margin(0.02));
     CHECK(found.scaled == baker.mark_psnr(looked_at));
     CHECK(found.scale == Approx(std::pow(10.0, (before - target) / 20)).epsilon(0.1));
-    CHECK(baker.mark_psnr(other) == Approx(target).margin(0.3));
+    CHECK(baker.mark_psnr(other) == Approx(target).margin(0.2));
   }
 }
 

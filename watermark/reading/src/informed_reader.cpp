@@ -1,3 +1,4 @@
+#include <fieldmark/imaging/mirror.h>
 #include <fieldmark/imaging/resize.h>
 #include <fieldmark/watermark/reading/informed_reader.h>
 #include "camera_search.h"
@@ -122,14 +123,6 @@ MarkScore score_of(const Tensor<float>& image, const CachedView& view, Carriers&
   return s;
 }
 
-Tensor<float> mirror(const Tensor<float>& image) {
-  const Index w = image.shape[1];
-  Tensor<float> out(image.shape);
-  for (Index p = 0; p < image.size() / 3; ++p)
-    std::copy_n(&image[3 * p], 3, &out[3 * (p - p % w + w - 1 - p % w)]);
-  return out;
-}
-
 // An image that was made wider by a factor, as it was.
 Tensor<float> narrowed(const Tensor<float>& image, double factor) {
   if (factor == 1) return image;
@@ -228,10 +221,8 @@ ImageReading InformedReader::read_as(const Tensor<float>& whole, const Change& c
   ImageReading reading;
   reading.mirrored = change.mirrored;
   SeenPlaces places;
-  reading.blind = blind_.evidence(whole, &places);
   const Surround seen = cleared(whole);
-  places.window.x -= static_cast<double>(seen.left);
-  places.window.y -= static_cast<double>(seen.top);
+  reading.blind = blind_.evidence(seen.image, &places);
   InformedReading& g = reading.informed;
   g = aligned(seen, change, places);
   if (g.agreement < 0) return reading;
@@ -270,7 +261,7 @@ ImageReading InformedReader::read(const Tensor<float>& image) {
   ImageReading best = read_as(whole, {});
   if (best.informed.agreement >= kSure) return best;
   for (const Change& change : changes(cleared(whole).image)) {
-    ImageReading changed = read_as(change.mirrored ? mirror(whole) : whole, change);
+    ImageReading changed = read_as(change.mirrored ? mirrored(whole) : whole, change);
     if (changed.chosen == ReadingKind::informed && changed.informed.agreement > best.informed.agreement)
       best = std::move(changed);
   }

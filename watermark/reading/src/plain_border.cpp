@@ -1,5 +1,6 @@
 #include "plain_border.h"
 #include <fieldmark/engine/shape_checks.h>
+#include <fieldmark/imaging/flood_fill.h>
 
 #include <algorithm>
 #include <cmath>
@@ -21,22 +22,7 @@ std::vector<Index> region(const Tensor<float>& image, Index corner) {
       if (!(std::abs(image[3 * p + a] - image[3 * corner + a]) <= kAlike)) return false;
     return true;
   };
-  std::vector<std::uint8_t> met(at(h * w));
-  std::vector<Index> found;
-  const auto meet = [&](Index p) {
-    if (met[at(p)] || !alike(p)) return;
-    met[at(p)] = 1;
-    found.push_back(p);
-  };
-  meet(corner);
-  for (std::size_t next = 0; next < found.size(); ++next) {
-    const Index p = found[next], y = p / w, x = p % w;
-    if (x > 0) meet(p - 1);
-    if (x + 1 < w) meet(p + 1);
-    if (y > 0) meet(p - w);
-    if (y + 1 < h) meet(p + w);
-  }
-  return found;
+  return flood_fill(h, w, std::span(&corner, 1), alike);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "surround.h"
 #include <fieldmark/engine/shape_checks.h>
+#include <fieldmark/imaging/flood_fill.h>
 
 #include <algorithm>
 #include <cmath>
@@ -126,34 +127,13 @@ std::optional<Colour> edge_colour(const Tensor<float>& image, const std::vector<
   return best;
 }
 
-// Pixels connected to the edges in a colour.
-std::vector<Index> connected(const Tensor<float>& image, const std::vector<Index>& edge,
-                             const Colour& colour) {
-  const Index h = image.shape[0], w = image.shape[1];
-  std::vector<std::uint8_t> met(at(h * w));
-  std::vector<Index> found;
-  const auto meet = [&](Index p) {
-    if (met[at(p)] || !alike(&image[3 * p], colour, kBackground)) return;
-    met[at(p)] = 1;
-    found.push_back(p);
-  };
-  for (const Index p : edge) meet(p);
-  for (std::size_t next = 0; next < found.size(); ++next) {
-    const Index p = found[next], y = p / w, x = p % w;
-    if (x > 0) meet(p - 1);
-    if (x + 1 < w) meet(p + 1);
-    if (y > 0) meet(p - w);
-    if (y + 1 < h) meet(p + w);
-  }
-  return found;
-}
-
 void replace_background(const std::optional<Colour>& of_bars, const Colour& own, Surround& seen) {
   const Index h = seen.image.shape[0], w = seen.image.shape[1];
   const std::vector<Index> edge = edge_pixels(h, w);
   const std::optional<Colour> colour = of_bars ? of_bars : edge_colour(seen.image, edge);
   if (!colour || alike(colour->data(), own, kBackground)) return;
-  const std::vector<Index> behind = connected(seen.image, edge, *colour);
+  const std::vector<Index> behind =
+      flood_fill(h, w, edge, [&](Index p) { return alike(&seen.image[3 * p], *colour, kBackground); });
   if (!of_bars && static_cast<double>(behind.size()) < kLeastOfImage * static_cast<double>(h * w)) return;
   seen.plain = seen.image;
   seen.colour = *colour;
