@@ -7,24 +7,24 @@
 using namespace fieldmark;
 
 namespace {
-// Pixels from # to # of a picture in rows, in ascending order.
-std::vector<Index> filled(std::string_view picture, Index width, std::vector<Index> starts,
+// Pixels from # to # of an image in rows, in ascending order.
+std::vector<Index> filled(std::string_view image, Index width, std::vector<Index> starts,
                           Neighbours neighbours = Neighbours::four) {
   auto found = flood_fill(
-      std::ssize(picture) / width, width, starts, [&](Index p) { return picture[at(p)] == '#'; }, neighbours);
+      std::ssize(image) / width, width, starts, [&](Index p) { return image[at(p)] == '#'; }, neighbours);
   std::sort(found.begin(), found.end());
   return found;
 }
 }  // namespace
 
 TEST_CASE("flood_fill: by edges or by corners, each pixel once") {
-  constexpr std::string_view kPicture =
+  constexpr std::string_view kRows =
       "##.."
       ".#.."
       "..##";
-  CHECK(filled(kPicture, 4, {0}) == std::vector<Index>{0, 1, 5});
-  CHECK(filled(kPicture, 4, {0}, Neighbours::eight) == std::vector<Index>{0, 1, 5, 10, 11});
-  CHECK(filled(kPicture, 4, {0, 1, 11, 11}) == std::vector<Index>{0, 1, 5, 10, 11});
+  CHECK(filled(kRows, 4, {0}) == std::vector<Index>{0, 1, 5});
+  CHECK(filled(kRows, 4, {0}, Neighbours::eight) == std::vector<Index>{0, 1, 5, 10, 11});
+  CHECK(filled(kRows, 4, {0, 1, 11, 11}) == std::vector<Index>{0, 1, 5, 10, 11});
 }
 
 TEST_CASE("flood_fill: rows do not run into one another, and a start that is not accepted leads nowhere") {
