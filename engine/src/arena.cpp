@@ -72,6 +72,12 @@ void Arena::spoil() noexcept {
   }
 }
 
+std::size_t Arena::used() const {
+  std::size_t n = used_;
+  for (std::size_t k = 0; k < block_; ++k) n += blocks_[k].size;
+  return n;
+}
+
 std::size_t Arena::reserved() const {
   std::size_t n = 0;
   for (const auto& b : blocks_) n += b.size;

@@ -16,15 +16,13 @@
 #include <fieldmark/engine/ops/softmax.h>
 
 #include <array>
-#include <cmath>
-#include <utility>
+
+#include "gradcheck_cases_parts.h"
 
 namespace fieldmark {
 namespace {
 
-using D = Tape<double>;
-using Vars = std::span<const Var<double>>;
-using Cases = std::vector<GradcheckCase>;
+using namespace gradcheck_parts;
 
 constexpr std::array<std::int32_t, 4> kRows{2, 0, 2, 1};
 constexpr std::array<std::int32_t, 4> kLabels{2, -1, 0, 1};
@@ -32,34 +30,6 @@ constexpr std::array<double, 12> kWeights{1, 0, 0.5, 2, 0.1, 1, 3, 0, 0.2, 0.7, 
 constexpr std::array<double, 12> kTargets{1, 0, 0.5, 0.9, 0.1, 1, 0, 0, 0.2, 0.7, 1, 0};
 constexpr std::array<double, 5> kLin{0.3, 1.1, 0.7, 1.9, 0.2};
 constexpr std::array<double, 4> kMean{0.2, -0.1, 0.4, 0}, kVariance{1, 0.3, 0.5, 2};
-
-// Pseudorandom values in [-1.6, 1.6], none within 0.1 of 0, the kink of ReLU.
-Tensor<double> off_zero(Shape shape, double phase = 0) {
-  Tensor<double> t(shape);
-  for (Index i = 0; i < t.size(); ++i) {
-    const double s = std::sin(1 + phase + 2.7 * static_cast<double>(i));
-    t[i] = s < 0 ? 1.5 * s - 0.1 : 1.5 * s + 0.1;
-  }
-  return t;
-}
-
-// All different, at least 0.1 apart: differences must not change the largest of a window.
-Tensor<double> apart(Shape shape) {
-  Tensor<double> t(shape);
-  for (Index i = 0; i < t.size(); ++i) t[i] = 0.1 * static_cast<double>(i * 37 % 101);
-  return t;
-}
-
-GradcheckCase make(const char* name, GradcheckFn f, std::vector<Tensor<double>> inputs) {
-  return {name, [f = std::move(f), inputs = std::move(inputs)] { return gradcheck(f, inputs); }};
-}
-
-// Pseudorandom values in (-1, 1).
-Tensor<double> mixed(Shape shape, double phase) {
-  Tensor<double> t(shape);
-  for (Index i = 0; i < t.size(); ++i) t[i] = std::sin(phase + 1.7 * static_cast<double>(i * i + i));
-  return t;
-}
 
 // Biases that hold every ReLU well open or well shut: differences must not step over its kink.
 Tensor<double> biases(Index n) {
@@ -124,6 +94,7 @@ Cases losses() {
       make("reduce: mean", [](D&, Vars v) { return mean(v[0]); }, {x}),
       make("reduce: weighted_mean", [](D&, Vars v) { return weighted_mean<double>(v[0], kWeights); }, {x}),
       make("loss: mse_loss", [](D&, Vars v) { return mse_loss<double>(v[0], v[1], kWeights); }, {x, y}),
+      make("loss: l1_loss", [](D&, Vars v) { return l1_loss<double>(v[0], v[1], kWeights); }, {x, y}),
       make("loss: huber_loss", [](D&, Vars v) { return huber_loss<double>(v[0], v[1], 0.5, kWeights); },
            {x, y}),
       make("loss: bce_with_logits",
@@ -182,7 +153,7 @@ Cases products() {
 
 std::vector<GradcheckCase> gradcheck_cases() {
   Cases all = elementwise();
-  for (const auto& part : {layout(), losses(), norms(), products()})
+  for (const auto& part : {layout(), losses(), norms(), products(), tensor_gradcheck_cases()})
     all.insert(all.end(), part.begin(), part.end());
   return all;
 }

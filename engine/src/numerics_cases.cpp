@@ -9,6 +9,7 @@ std::vector<NumericsCase> numerics_cases() {
   add_elementwise_numerics(all);
   add_norm_numerics(all);
   add_sum_numerics(all);
+  add_tensor_numerics(all);
   return all;
 }
 

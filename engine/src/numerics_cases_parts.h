@@ -7,6 +7,7 @@ namespace fieldmark {
 void add_elementwise_numerics(std::vector<NumericsCase>& cases);
 void add_norm_numerics(std::vector<NumericsCase>& cases);
 void add_sum_numerics(std::vector<NumericsCase>& cases);
+void add_tensor_numerics(std::vector<NumericsCase>& cases);
 
 // A magnitude of at least the least normal number: below it rounding is absolute.
 template <class T>

@@ -38,4 +38,13 @@ void check_same(std::string_view op, std::string_view arg_a, const Shape& a, std
                    ", got shape " + b.str());
 }
 
+int check_axis(std::string_view op, std::string_view arg, int axis, const Shape& of) {
+  const int rank = of.rank();
+  if (axis >= -rank && axis < rank) return axis < 0 ? axis + rank : axis;
+  if (rank == 0)
+    throw ShapeError(head(op, arg) + " must be an axis, but shape [] has none, got " + std::to_string(axis));
+  throw ShapeError(head(op, arg) + " must be in [" + std::to_string(-rank) + ", " + std::to_string(rank - 1) +
+                   "], an axis of shape " + of.str() + ", got " + std::to_string(axis));
+}
+
 }  // namespace fieldmark

@@ -51,3 +51,17 @@ TEST_CASE("arena: the second round of equal requests calls the system no more") 
   }
   CHECK(arena.reserved() >= 73112);
 }
+
+TEST_CASE("arena: what is in use grows by every allocation, over blocks too") {
+  Arena arena(1024);
+  CHECK(arena.used() == 0);
+  std::size_t before = 0;
+  for (const std::size_t bytes : {1u, 100u, 5000u, 64u}) {
+    arena.allocate(bytes);
+    CHECK(arena.used() >= before + bytes);
+    CHECK(arena.used() <= arena.reserved());
+    before = arena.used();
+  }
+  arena.reset();
+  CHECK(arena.used() == 0);
+}

@@ -21,3 +21,13 @@ TEST_CASE("error: kinds can be told apart and share a root") {
   CHECK_THROWS_AS(throw IoError("x"), Error);
   CHECK_THROWS_AS(check_rank("op", "x", Shape{}, 1, "[n]"), ShapeError);
 }
+
+TEST_CASE("shape_checks: an axis counts from either end") {
+  const Shape s{2, 3};
+  CHECK(check_axis("op", "axis", 1, s) == 1);
+  CHECK(check_axis("op", "axis", -2, s) == 0);
+  CHECK_THROWS_WITH(check_axis("op", "axis", 2, s),
+                    "[op] axis must be in [-2, 1], an axis of shape [2, 3], got 2");
+  CHECK_THROWS_WITH(check_axis("op", "axis", 0, Shape{}),
+                    "[op] axis must be an axis, but shape [] has none, got 0");
+}

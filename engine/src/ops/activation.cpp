@@ -10,10 +10,10 @@ namespace {
 // Derivation: dx = dy f'(x), with f' written in x or y, whichever is exact (kernels/elementwise.cpp).
 // A chunk owns its elements of y and dx.
 template <class T>
-Var<T> unary(Unary f, Var<T> x) {
+Var<T> unary(Unary f, Var<T> x, std::source_location from = std::source_location::current()) {
   const auto forward = FIELDMARK_KERNEL(unary_forward<T>);
   T* y = nullptr;
-  Var<T> out = x.tape().output(x.shape(), &y, {x});
+  Var<T> out = x.tape().output(x.shape(), &y, {x}, from);
   parallel_for(x.shape().size(), detail::kGrain,
                [&](Index begin, Index end) { forward(f, x.value() + begin, y + begin, end - begin); });
 

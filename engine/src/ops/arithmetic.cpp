@@ -1,78 +1,96 @@
 #include <fieldmark/engine/ops/arithmetic.h>
-#include <fieldmark/engine/shape_checks.h>
 
-#include "ops/chunks.h"
+#include "ops/broadcast.h"
 
 namespace fieldmark {
-namespace {
 
-template <class T, class F>
-Var<T> map(Shape shape, std::initializer_list<Var<T>> inputs, F f) {
-  T* y = nullptr;
-  Var<T> out = inputs.begin()->tape().output(shape, &y, inputs);
-  parallel_for(shape.size(), detail::kGrain, [&](Index begin, Index end) {
-    for (Index i = begin; i < end; ++i) y[i] = f(i);
-  });
-  return out;
-}
-
-// In each backward below a chunk owns its elements of the gradients.
-
-}  // namespace
+// The comments give dy/da and dy/db where they are more than a factor.
 
 template <class T>
 Var<T> add(Var<T> a, Var<T> b) {
-  check_same("add", "a", a.shape(), "b", b.shape());
-  const T *av = a.value(), *bv = b.value();
-  Var<T> out = map(a.shape(), {a, b}, [=](Index i) { return av[i] + bv[i]; });
-  a.tape().on_backward(out, [a, b](const T* dy) {
-    detail::add_gradient(a, [=](Index i) { return dy[i]; });
-    detail::add_gradient(b, [=](Index i) { return dy[i]; });
-  });
-  return out;
+  return detail::binary(
+      "add", a, b, [](const auto& x, const auto& z) { return x + z; },
+      [](const auto&, const auto&, const auto& dy) { return dy; },
+      [](const auto&, const auto&, const auto& dy) { return dy; });
 }
 
 template <class T>
 Var<T> sub(Var<T> a, Var<T> b) {
-  check_same("sub", "a", a.shape(), "b", b.shape());
-  const T *av = a.value(), *bv = b.value();
-  Var<T> out = map(a.shape(), {a, b}, [=](Index i) { return av[i] - bv[i]; });
-  a.tape().on_backward(out, [a, b](const T* dy) {
-    detail::add_gradient(a, [=](Index i) { return dy[i]; });
-    detail::add_gradient(b, [=](Index i) { return -dy[i]; });
-  });
-  return out;
+  return detail::binary(
+      "sub", a, b, [](const auto& x, const auto& z) { return x - z; },
+      [](const auto&, const auto&, const auto& dy) { return dy; },
+      [](const auto&, const auto&, const auto& dy) { return -dy; });
 }
 
 template <class T>
 Var<T> mul(Var<T> a, Var<T> b) {
-  check_same("mul", "a", a.shape(), "b", b.shape());
-  const T *av = a.value(), *bv = b.value();
-  Var<T> out = map(a.shape(), {a, b}, [=](Index i) { return av[i] * bv[i]; });
-  a.tape().on_backward(out, [a, b, av, bv](const T* dy) {
-    detail::add_gradient(a, [=](Index i) { return dy[i] * bv[i]; });
-    detail::add_gradient(b, [=](Index i) { return dy[i] * av[i]; });
-  });
-  return out;
+  return detail::binary(
+      "mul", a, b, [](const auto& x, const auto& z) { return x * z; },
+      [](const auto&, const auto& z, const auto& dy) { return dy * z; },
+      [](const auto& x, const auto&, const auto& dy) { return dy * x; });
+}
+
+// 1 / b and -a / b^2; divided twice, so that b^2 cannot overflow.
+template <class T>
+Var<T> div(Var<T> a, Var<T> b) {
+  return detail::binary(
+      "div", a, b, [](const auto& x, const auto& z) { return x / z; },
+      [](const auto&, const auto& z, const auto& dy) { return dy / z; },
+      [](const auto& x, const auto& z, const auto& dy) { return -dy * (x / z) / z; });
+}
+
+// b a^(b - 1) and a^b log a, whose limits where a factor is 0 and the other infinite are 0.
+template <class T>
+Var<T> pow(Var<T> a, Var<T> b) {
+  return detail::binary(
+      "pow", a, b, [](const auto& x, const auto& z) { return Eigen::pow(x, z); },
+      [](const auto& x, const auto& z, const auto& dy) {
+        return (z == T(0)).select(T(0), dy * z * Eigen::pow(x, z - T(1)));
+      },
+      [](const auto& x, const auto& z, const auto& dy) {
+        return (x == T(0) && z >= T(0)).select(T(0), dy * Eigen::pow(x, z) * x.log());
+      });
+}
+
+// A comparison with NaN is false: the sum then makes the result NaN.
+template <class T>
+Var<T> minimum(Var<T> a, Var<T> b) {
+  const auto smaller = [](T x, T z) { return x <= z ? x : z < x ? z : x + z; };
+  return detail::binary(
+      "minimum", a, b, [=](const auto& x, const auto& z) { return x.binaryExpr(z, smaller); },
+      [](const auto& x, const auto& z, const auto& dy) { return (z < x).select(T(0), dy); },
+      [](const auto& x, const auto& z, const auto& dy) { return (z < x).select(dy, T(0)); });
+}
+
+template <class T>
+Var<T> maximum(Var<T> a, Var<T> b) {
+  const auto larger = [](T x, T z) { return x >= z ? x : z > x ? z : x + z; };
+  return detail::binary(
+      "maximum", a, b, [=](const auto& x, const auto& z) { return x.binaryExpr(z, larger); },
+      [](const auto& x, const auto& z, const auto& dy) { return (z > x).select(T(0), dy); },
+      [](const auto& x, const auto& z, const auto& dy) { return (z > x).select(dy, T(0)); });
 }
 
 template <class T>
 Var<T> scale(Var<T> x, double factor) {
-  const T* xv = x.value();
   const T f = static_cast<T>(factor);
-  Var<T> out = map(x.shape(), {x}, [=](Index i) { return f * xv[i]; });
-  x.tape().on_backward(out,
-                       [x, f](const T* dy) { detail::add_gradient(x, [=](Index i) { return f * dy[i]; }); });
-  return out;
+  return detail::elementwise(
+      x, [f](const auto& v) { return f * v; },
+      [f](const auto&, const auto&, const auto& dy) { return f * dy; });
 }
 
-template Var<float> add(Var<float>, Var<float>);
-template Var<double> add(Var<double>, Var<double>);
-template Var<float> sub(Var<float>, Var<float>);
-template Var<double> sub(Var<double>, Var<double>);
-template Var<float> mul(Var<float>, Var<float>);
-template Var<double> mul(Var<double>, Var<double>);
+#define FIELDMARK_BINARY(f)                      \
+  template Var<float> f(Var<float>, Var<float>); \
+  template Var<double> f(Var<double>, Var<double>);
+FIELDMARK_BINARY(add)
+FIELDMARK_BINARY(sub)
+FIELDMARK_BINARY(mul)
+FIELDMARK_BINARY(div)
+FIELDMARK_BINARY(pow)
+FIELDMARK_BINARY(minimum)
+FIELDMARK_BINARY(maximum)
 template Var<float> scale(Var<float>, double);
 template Var<double> scale(Var<double>, double);
+#undef FIELDMARK_BINARY
 
 }  // namespace fieldmark

@@ -19,6 +19,18 @@ Var<T> mse_loss(Var<T> a, Var<T> b, std::span<const T> weights) {
 }
 
 template <class T>
+Var<T> l1_loss(Var<T> a, Var<T> b, std::span<const T> weights) {
+  check_same("l1_loss", "a", a.shape(), "b", b.shape());
+  const T *av = a.value(), *bv = b.value();
+  return detail::mean_of(
+      "l1_loss", a, &b, weights, [=](Index i) { return std::abs(static_cast<double>(av[i] - bv[i])); },
+      [=](Index i) {
+        const T d = av[i] - bv[i];
+        return d > 0 ? T(1) : d < 0 ? T(-1) : T(0) * d;
+      });
+}
+
+template <class T>
 Var<T> huber_loss(Var<T> a, Var<T> b, double delta, std::span<const T> weights) {
   check_same("huber_loss", "a", a.shape(), "b", b.shape());
   if (!(delta > 0)) throw ValueError("[huber_loss] delta must be above 0, got " + std::to_string(delta));
@@ -57,6 +69,8 @@ Var<T> bce_with_logits(Var<T> logits, std::span<const T> targets, std::span<cons
 
 template Var<float> mse_loss(Var<float>, Var<float>, std::span<const float>);
 template Var<double> mse_loss(Var<double>, Var<double>, std::span<const double>);
+template Var<float> l1_loss(Var<float>, Var<float>, std::span<const float>);
+template Var<double> l1_loss(Var<double>, Var<double>, std::span<const double>);
 template Var<float> huber_loss(Var<float>, Var<float>, double, std::span<const float>);
 template Var<double> huber_loss(Var<double>, Var<double>, double, std::span<const double>);
 template Var<float> bce_with_logits(Var<float>, std::span<const float>, std::span<const float>);

@@ -1,7 +1,7 @@
 #include <fieldmark/engine/ops/rows.h>
 #include <fieldmark/engine/shape_checks.h>
 
-#include "ops/chunks.h"
+#include "ops/indexed.h"
 
 namespace fieldmark {
 namespace {
@@ -44,38 +44,7 @@ Var<T> broadcast_rows(Var<T> x, Index rows) {
 template <class T>
 Var<T> gather_rows(Var<T> x, std::span<const std::int32_t> index) {
   check_rank("gather_rows", "x", x.shape(), 2, "[rows, cols]");
-  const Index rows = x.shape()[0], cols = x.shape()[1], n = static_cast<Index>(index.size());
-  for (std::size_t i = 0; i < index.size(); ++i)
-    if (index[i] < 0 || index[i] >= rows)
-      throw ValueError("[gather_rows] index: entry " + std::to_string(i) + " must be in [0, " +
-                       std::to_string(rows) + ") (the rows of x), got " + std::to_string(index[i]));
-  T* y = nullptr;
-  const Var<T> out = x.tape().output({n, cols}, &y, {x});
-  const std::int32_t* at = index.data();
-  parallel_for(n, detail::row_grain(cols), [&](Index i0, Index i1) {
-    for (Index i = i0; i < i1; ++i) std::copy_n(x.value() + at[i] * cols, cols, y + i * cols);
-  });
-
-  // dx[r] = sum of dy[i] over the i with index[i] = r, which a counting sort lists in order. A chunk owns its
-  // rows of dx.
-  x.tape().on_backward(out, [x, at, n, rows, cols](const T* dy) {
-    T* dx = x.grad_acc();
-    auto* start = x.tape().template scratch<Index>(rows + 1);
-    auto* taker = x.tape().template scratch<Index>(n);
-    std::fill_n(start, rows + 1, Index{0});
-    for (Index i = 0; i < n; ++i) ++start[at[i] + 1];
-    for (Index r = 0; r < rows; ++r) start[r + 1] += start[r];
-    // Filling from the back leaves start[r + 1] at the first taker of row r.
-    for (Index i = n; i-- > 0;) taker[--start[at[i] + 1]] = i;
-    parallel_for(rows, detail::row_grain(cols), [&](Index r0, Index r1) {
-      for (Index r = r0; r < r1; ++r) {
-        const Index end = r + 1 < rows ? start[r + 2] : n;
-        for (Index k = start[r + 1]; k < end; ++k)
-          for (Index c = 0; c < cols; ++c) dx[r * cols + c] += dy[taker[k] * cols + c];
-      }
-    });
-  });
-  return out;
+  return detail::gather("gather_rows", x, 0, index, "the rows of x");
 }
 
 template Var<float> broadcast_rows(Var<float>, Index);

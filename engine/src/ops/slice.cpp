@@ -1,31 +1,22 @@
 #include <fieldmark/engine/ops/slice.h>
+#include <fieldmark/engine/shape_checks.h>
 
 #include <array>
 #include <memory>
 
-#include "ops/chunks.h"
+#include "ops/axes.h"
 
 namespace fieldmark {
 namespace {
 
-// Product of all extents but the last.
-Index leading(const Shape& s) {
-  Index n = 1;
-  for (int k = 0; k + 1 < s.rank(); ++k) n *= s[k];
-  return n;
-}
-
-Shape with_last(const Shape& s, Index last) {
-  std::array<Index, Shape::kMaxRank> extents{};
-  const auto rank = static_cast<std::size_t>(s.rank());
-  for (std::size_t k = 0; k + 1 < rank; ++k) extents[k] = s[static_cast<int>(k)];
-  extents[rank - 1] = last;
-  return Shape(std::span(extents).first(rank));
-}
-
 void check_has_axis(const char* op, const Shape& s) {
   if (s.rank() == 0)
     throw ShapeError(std::string("[") + op + "] x must have rank 1 or more [.., C], got shape []");
+}
+
+// "the last axis", or "axis 0" where another one was asked for.
+std::string axis_words(const Shape& s, int axis) {
+  return axis == s.rank() - 1 ? "the last axis" : "axis " + std::to_string(axis);
 }
 
 // Columns [begin, begin + count) of a row-major matrix with `width` columns.
@@ -52,37 +43,46 @@ void add_columns(Index rows, Columns s, const T* dy, T* dx, bool fresh) {
 
 template <class T>
 Var<T> concatenate(std::span<const Var<T>> xs) {
+  if (!xs.empty()) check_has_axis("concatenate", xs[0].shape());
+  return concatenate(xs, -1);
+}
+
+template <class T>
+Var<T> concatenate(std::span<const Var<T>> xs, int axis) {
   if (xs.empty()) throw ValueError("[concatenate] xs must have at least one tensor, got 0");
-  Index width = 0;
   const Shape first = xs[0].shape();
+  axis = check_axis("concatenate", "axis", axis, first);
+  Index joined = 0;
   for (const Var<T>& x : xs) {
-    check_has_axis("concatenate", x.shape());
-    if (with_last(x.shape(), 0) != with_last(first, 0))
-      throw ShapeError("[concatenate] xs: all axes but the last must be those of the first, " + first.str() +
-                       ", got shape " + x.shape().str());
-    width += x.shape()[-1];
+    if (x.shape().rank() != first.rank() ||
+        detail::with_extent(x.shape(), axis, 0) != detail::with_extent(first, axis, 0))
+      throw ShapeError("[concatenate] xs: all axes but " +
+                       (axis == first.rank() - 1 ? std::string("the last") : "axis " + std::to_string(axis)) +
+                       " must be those of the first, " + first.str() + ", got shape " + x.shape().str());
+    joined += x.shape()[axis];
   }
-  const Index rows = leading(first), count = static_cast<Index>(xs.size());
+  const detail::Split p = detail::split(first, axis);
+  const Index rows = p.outer, inner = p.inner, width = joined * inner, count = static_cast<Index>(xs.size());
   Tape<T>& tape = xs[0].tape();
   T* y = nullptr;
-  const Var<T> out = tape.output(with_last(first, width), &y, xs);
+  const Var<T> out = tape.output(detail::with_extent(first, axis, joined), &y, xs);
   auto* kept = tape.template scratch<Var<T>>(count);
   std::uninitialized_copy(xs.begin(), xs.end(), kept);
   parallel_for(rows, detail::row_grain(width), [&](Index r0, Index r1) {
     for (Index r = r0; r < r1; ++r) {
       T* to = y + r * width;
       for (Index k = 0; k < count; ++k) {
-        const Index c = kept[k].shape()[-1];
+        const Index c = kept[k].shape()[axis] * inner;
         to = std::copy_n(kept[k].value() + r * c, c, to);
       }
     }
   });
 
   // Each input receives the gradient of its columns.
-  tape.on_backward(out, [kept, count, rows, width](const T* dy) {
+  tape.on_backward(out, [kept, count, rows, width, axis, inner](const T* dy) {
     Index begin = 0;
     for (Index k = 0; k < count; ++k) {
-      const Index c = kept[k].shape()[-1];
+      const Index c = kept[k].shape()[axis] * inner;
       bool fresh = false;
       if (T* dx = kept[k].grad_acc(&fresh)) add_columns(rows, {begin, c, width}, dy, dx, fresh);
       begin += c;
@@ -94,29 +94,41 @@ Var<T> concatenate(std::span<const Var<T>> xs) {
 template <class T>
 Var<T> slice(Var<T> x, Index begin, Index count) {
   check_has_axis("slice", x.shape());
-  const Index rows = leading(x.shape()), width = x.shape()[-1];
-  if (begin < 0 || count < 0 || begin > width - count)
+  return slice(x, -1, begin, count);
+}
+
+template <class T>
+Var<T> slice(Var<T> x, int axis, Index begin, Index count) {
+  axis = check_axis("slice", "axis", axis, x.shape());
+  if (begin < 0 || count < 0 || begin > x.shape()[axis] - count)
     throw ShapeError("[slice] begin and count: entries " + std::to_string(begin) + " to " +
-                     std::to_string(begin + count) + " must lie within the last axis of x, got shape " +
-                     x.shape().str());
+                     std::to_string(begin + count) + " must lie within " + axis_words(x.shape(), axis) +
+                     " of x, got shape " + x.shape().str());
+  const detail::Split p = detail::split(x.shape(), axis);
+  const Index rows = p.outer;
+  const Columns s{begin * p.inner, count * p.inner, p.n * p.inner};
   T* y = nullptr;
-  const Var<T> out = x.tape().output(with_last(x.shape(), count), &y, {x});
-  add_columns(rows, {begin, count, width}, x.value(), y, true);
+  const Var<T> out = x.tape().output(detail::with_extent(x.shape(), axis, count), &y, {x});
+  add_columns(rows, s, x.value(), y, true);
 
   // The other columns receive nothing. A chunk owns its rows.
-  x.tape().on_backward(out, [x, rows, begin, count, width](const T* dy) {
+  x.tape().on_backward(out, [x, rows, s](const T* dy) {
     T* dx = x.grad_acc();
-    parallel_for(rows, detail::row_grain(count), [&](Index r0, Index r1) {
+    parallel_for(rows, detail::row_grain(s.count), [&](Index r0, Index r1) {
       for (Index r = r0; r < r1; ++r)
-        for (Index c = 0; c < count; ++c) dx[r * width + begin + c] += dy[r * count + c];
+        for (Index c = 0; c < s.count; ++c) dx[r * s.width + s.begin + c] += dy[r * s.count + c];
     });
   });
   return out;
 }
 
-template Var<float> concatenate(std::span<const Var<float>>);
-template Var<double> concatenate(std::span<const Var<double>>);
-template Var<float> slice(Var<float>, Index, Index);
-template Var<double> slice(Var<double>, Index, Index);
+#define FIELDMARK_SLICE(T)                                   \
+  template Var<T> concatenate(std::span<const Var<T>>);      \
+  template Var<T> concatenate(std::span<const Var<T>>, int); \
+  template Var<T> slice(Var<T>, Index, Index);               \
+  template Var<T> slice(Var<T>, int, Index, Index);
+FIELDMARK_SLICE(float)
+FIELDMARK_SLICE(double)
+#undef FIELDMARK_SLICE
 
 }  // namespace fieldmark

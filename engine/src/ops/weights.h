@@ -25,14 +25,15 @@ double inverse_total(Tape<T>& tape, const char* op, Index n, std::span<const T> 
 // y = sum_i w_i f(i) / sum w, [1], and its backward dx_i = dy w_i slope(i) / sum w for x, and minus
 // that for `other` where given. A chunk owns its elements.
 template <class T, class F, class D>
-Var<T> mean_of(const char* op, Var<T> x, const Var<T>* other, std::span<const T> weights, F f, D slope) {
+Var<T> mean_of(const char* op, Var<T> x, const Var<T>* other, std::span<const T> weights, F f, D slope,
+               std::source_location from = std::source_location::current()) {
   Tape<T>& tape = x.tape();
   const Index n = x.shape().size();
   const double inverse = inverse_total(tape, op, n, weights);
   const T* w = weights.empty() ? nullptr : weights.data();
   T* y = nullptr;
   const Var<T> second = other ? *other : x;
-  const Var<T> out = tape.output({1}, &y, {x, second});
+  const Var<T> out = tape.output({1}, &y, {x, second}, from);
   *y = static_cast<T>(inverse * chunked_sum(tape, n, [=](Index i) {
                         return (w ? static_cast<double>(w[i]) : 1.0) * static_cast<double>(f(i));
                       }));

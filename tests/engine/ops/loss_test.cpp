@@ -8,6 +8,7 @@ using namespace fieldmark;
 namespace {
 const std::vector<double> kLossWeights{0, 1, 0.5, 2.5};
 const auto f_mse = [](auto&, auto v) { return mse_loss(v[0], v[1]); };
+const auto f_l1 = [](auto&, auto v) { return l1_loss(v[0], v[1]); };
 const auto f_huber = [](auto&, auto v) { return huber_loss(v[0], v[1], 0.5); };
 
 // Cross-entropy against constants that outlive it.
@@ -30,6 +31,7 @@ Tensor<double> away_from_kink(const Tensor<double>& a, unsigned seed) {
 TEST_CASE("loss: values") {
   const std::vector<Tensor<double>> in{{{4}, {1, 2, 3, 4}}, {{4}, {1, 2.25, 5, 3}}};
   CHECK(op_values(f_mse, in)[0] == (0.0625 + 4 + 1) / 4);
+  CHECK(op_values(f_l1, in)[0] == (0.25 + 2 + 1) / 4);
   CHECK(op_values(f_huber, in)[0] == (0.03125 + 0.5 * 1.75 + 0.5 * 0.75) / 4);
   const auto weighted = [](auto&, auto v) { return mse_loss<double>(v[0], v[1], kLossWeights); };
   CHECK(op_values(weighted, in)[0] == (0.0625 + 2 + 2.5) / 4);
@@ -58,6 +60,7 @@ TEST_CASE("loss: gradient") {
   for (Shape s : {Shape{0, 3}, Shape{1}, Shape{3, 5}}) {
     CAPTURE(s.str());
     expect_grad(f_mse, {uniform(s, -1, 1, 1), uniform(s, -1, 1, 2)});
+    expect_grad(f_l1, {uniform(s, -1, 1, 1), uniform(s, 1.1, 2, 2)});
     const auto a = uniform(s, -1, 1, 1);
     expect_grad(f_huber, {a, away_from_kink(a, 2)});
     const auto t = uniform(s, 0, 1, 3);

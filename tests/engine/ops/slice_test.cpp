@@ -41,6 +41,25 @@ TEST_CASE("slice: float copies, forward and backward, for extents of 1 to 130") 
         }) < 6e-8);
 }
 
+TEST_CASE("slice: any axis") {
+  const std::vector<Tensor<double>> in{{{2, 2, 2}, {1, 2, 3, 4, 5, 6, 7, 8}}, {{2, 1, 2}, {10, 20, 30, 40}}};
+  CHECK(op_values([](auto&, auto v) { return slice(v[0], 1, 1, 1); }, in) == std::vector<double>{3, 4, 7, 8});
+  CHECK(op_values([](auto&, auto v) { return slice(v[0], -3, 1, 1); }, in) ==
+        std::vector<double>{5, 6, 7, 8});
+  CHECK(op_values(
+            [](auto&, auto v) {
+              return concatenate({v[1], v[0]}, 1);
+            },
+            in) == std::vector<double>{10, 20, 1, 2, 3, 4, 30, 40, 5, 6, 7, 8});
+  CHECK(op_values(
+            [](auto&, auto v) {
+              return concatenate({v[1], v[1]}, 0);
+            },
+            in) == std::vector<double>{10, 20, 30, 40, 10, 20, 30, 40});
+  expect_grad([](auto&, auto v) { return slice(v[0], 1, 0, 1); }, {in[0]});
+  expect_grad([](auto&, auto v) { return concatenate({v[0], v[1], v[0]}, 1); }, in);
+}
+
 TEST_CASE("slice: errors") {
   Tape<double> tape;
   const Tensor<double> a({2, 3}), b({3, 3}), scalar(Shape{});
@@ -51,6 +70,14 @@ TEST_CASE("slice: errors") {
   CHECK_THROWS_WITH(slice(tape.constant(a), 2, 2),
                     Contains("entries 2 to 4 must lie within") && Contains("[2, 3]"));
   CHECK_THROWS_AS(slice(tape.constant(a), -1, 2), ShapeError);
+  CHECK_THROWS_WITH(slice(tape.constant(a), 2, 0, 1),
+                    "[slice] axis must be in [-2, 1], an axis of shape [2, 3], got 2");
+  CHECK_THROWS_WITH(slice(tape.constant(a), 0, 1, 2),
+                    "[slice] begin and count: entries 1 to 3 must lie within axis 0 of x, got shape [2, 3]");
+  CHECK_THROWS_WITH(concatenate({tape.constant(a), tape.constant(scalar)}, 0),
+                    "[concatenate] xs: all axes but axis 0 must be those of the first, [2, 3], got shape []");
+  CHECK_THROWS_WITH(concatenate({tape.constant(a), tape.constant(a)}, -3),
+                    Contains("axis must be in [-2, 1]"));
   CHECK_THROWS_WITH(slice(tape.constant(scalar), 0, 1),
                     Contains("must have rank 1 or more [.., C], got shape []"));
 }

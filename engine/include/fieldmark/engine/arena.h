@@ -22,6 +22,7 @@ class Arena {
   /// check that follows notices what was left unfilled.
   void spoil() noexcept;
   std::size_t reserved() const;                        ///< bytes held from the system
+  std::size_t used() const;                            ///< bytes of them behind or in an allocation
   std::size_t system_calls() const { return grown_; }  ///< times a block was taken from the system
 
  private:

@@ -19,5 +19,8 @@ void check_rank(std::string_view op, std::string_view arg, const Shape& got, int
 /// [..]".
 void check_same(std::string_view op, std::string_view arg_a, const Shape& a, std::string_view arg_b,
                 const Shape& b);
+/// Checks an axis; negative ones count from the last. Message form: "[op] arg must be in [-2, 1], an axis of
+/// shape [2, 3], got 4". @return the axis counted from the first
+int check_axis(std::string_view op, std::string_view arg, int axis, const Shape& of);
 
 }  // namespace fieldmark

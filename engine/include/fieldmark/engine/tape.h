@@ -8,8 +8,10 @@
 #include <cstdint>
 #include <limits>
 #include <new>
+#include <source_location>
 #include <span>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -46,6 +48,8 @@ class Var {
   Tape<T>& tape() const { return *tape_; }
   /// Whether it depends on a leaf, so that gradients reach it.
   bool needs_grad() const { return slot_->needs_grad; }
+  /// Tells the values of a tape apart.
+  const void* id() const { return slot_; }
   /// The packed form of this matrix, or null.
   const PackedMatrix<T>* packed() const { return slot_->packed; }
   /// dL/d(this) accumulated so far; nullptr before the first gradient. After a backward it is that backward's
@@ -80,6 +84,26 @@ class Var {
   Var(Tape<T>* t, Slot* s) : tape_(t), slot_(s) {}
   Tape<T>* tape_;
   Slot* slot_;
+};
+
+/// Is told what a tape records and replays. TapeInspector (inspect.h) shows the graph, times and the first
+/// NaN.
+template <class T>
+class TapeObserver {
+ public:
+  virtual ~TapeObserver() = default;
+  /// An op took memory for its output. @param from  the function that called Tape::output()
+  virtual void made(Var<T> out, std::span<const Var<T>> inputs, const std::source_location& from) = 0;
+  /// An op filled its output and handed over its backward.
+  virtual void recorded(Var<T> out) = 0;
+  /// A value got a name, see Tape::name().
+  virtual void named(Var<T> v, std::string_view name) = 0;
+  /// The backward of the op that made `out` is about to run.
+  virtual void before_backward(Var<T> out) = 0;
+  /// The backward of the op that made `out` has run.
+  virtual void after_backward(Var<T> out) = 0;
+  /// The tape forgot the pass.
+  virtual void reset() = 0;
 };
 
 /// Records operations in the order they run and replays their backwards in reverse. Creation order is a
@@ -124,18 +148,24 @@ class Tape {
   }
   /// @{
   /// Output of an op; *data points at uninitialised values, which the op fills.
+  /// @param from  names the op for an observer
   /// @throws ValueError if an input was recorded on another tape
-  Var<T> output(Shape shape, T** data, std::initializer_list<Var<T>> inputs) {
-    return output(shape, data, std::span(inputs.begin(), inputs.size()));
+  Var<T> output(Shape shape, T** data, std::initializer_list<Var<T>> inputs,
+                std::source_location from = std::source_location::current()) {
+    return output(shape, data, std::span(inputs.begin(), inputs.size()), from);
   }
-  Var<T> output(Shape shape, T** data, std::span<const Var<T>> inputs) {
+  Var<T> output(Shape shape, T** data, std::span<const Var<T>> inputs,
+                std::source_location from = std::source_location::current()) {
     bool needs_grad = false;
     for (const Var<T>& v : inputs) {
       check_own(v, "the input of an op");
       needs_grad = needs_grad || v.needs_grad();
     }
     *data = scratch(shape.size());
-    return make(*data, nullptr, shape, needs_grad);
+    const Var<T> out = make(*data, nullptr, shape, needs_grad);
+    if (observer_) [[unlikely]]
+      observer_->made(out, inputs, from);
+    return out;
   }
   /// @}
   /// Marks `out` as the output of a ReLU, see Var::rectified().
@@ -163,6 +193,8 @@ class Tape {
     static_assert(std::is_trivially_destructible_v<F> && std::is_trivially_copyable_v<F>,
                   "a backward lives in the arena: capture Var, Shape, scalars and raw pointers only");
     check_own(out, "the output of an op");
+    if (observer_) [[unlikely]]
+      observer_->recorded(out);
     if (!out.needs_grad()) return;
     auto* f = new (arena_.allocate(sizeof(F))) F(fn);
     nodes_.push_back({out, f, [](void* p, const T* dout) { (*static_cast<F*>(p))(dout); }});
@@ -196,6 +228,8 @@ class Tape {
   void replay() {
     begin_pass();
     const Replaying replaying(phase_);
+    if (observer_) [[unlikely]]
+      return replay_observed();
     for (auto n = nodes_.rbegin(); n != nodes_.rend(); ++n)
       if (const T* dout = n->out.grad()) n->run(n->closure, dout);
   }
@@ -205,7 +239,19 @@ class Tape {
     fresh_.clear();
     phase_ = Phase::recording;
     arena_.reset();
+    if (observer_) [[unlikely]]
+      observer_->reset();
   }
+  /// Names a value for an observer; without one it does nothing. @return v
+  Var<T> name(Var<T> v, std::string_view name) {
+    if (observer_) [[unlikely]]
+      observer_->named(v, name);
+    return v;
+  }
+  /// Sets the observer of this tape, null: none. It must outlive the passes that it observes.
+  void observe(TapeObserver<T>* observer) { observer_ = observer; }
+  /// The observer, or null.
+  TapeObserver<T>* observer() const { return observer_; }
   /// The memory of values, gradients and closures, for counting.
   Arena& arena() { return arena_; }
 
@@ -232,6 +278,15 @@ class Tape {
     for (const Node& n : nodes_) forget_gradient(*n.out.slot_);
     for (const Var<T>& v : fresh_) forget_gradient(*v.slot_);
   }
+  void replay_observed() {
+    for (auto n = nodes_.rbegin(); n != nodes_.rend(); ++n) {
+      const T* dout = n->out.grad();
+      if (!dout) continue;
+      observer_->before_backward(n->out);
+      n->run(n->closure, dout);
+      observer_->after_backward(n->out);
+    }
+  }
   static void forget_gradient(typename Var<T>::Slot& slot) {
     if (slot.grad) slot.target = slot.grad;
     slot.grad = nullptr;
@@ -257,6 +312,7 @@ class Tape {
   std::vector<Node> nodes_;
   std::vector<Var<T>> fresh_;
   Phase phase_ = Phase::recording;
+  TapeObserver<T>* observer_ = nullptr;
 };
 
 template <class T>
@@ -296,6 +352,8 @@ Var<T> Tape<T>::part(Var<T> x, Index begin, Shape shape) {
                      " must lie within x, got shape " + x.shape().str());
   check_own(x, "the input of an op");
   Var<T> out = make(x.value() + begin, nullptr, shape, x.needs_grad());
+  if (observer_) [[unlikely]]
+    observer_->made(out, std::span(&x, 1), std::source_location::current());
   on_backward(out, [x, begin, n](const T* dy) {
     T* dx = x.grad_acc() + begin;
     for (Index i = 0; i < n; ++i) dx[i] += dy[i];

@@ -15,6 +15,11 @@ namespace fieldmark {
 template <class T>
 Var<T> mse_loss(Var<T> a, Var<T> b, std::span<const T> weights = {});
 
+/// Mean absolute error, l_i = |a_i - b_i|.
+/// Differentiable in: a, b, except where they are equal: the gradient is 0 there.
+template <class T>
+Var<T> l1_loss(Var<T> a, Var<T> b, std::span<const T> weights = {});
+
 /// Huber's loss with d = a_i - b_i: l_i = d^2 / 2 where |d| <= delta, else delta (|d| - delta / 2).
 /// Source: Huber 1964, Robust estimation of a location parameter.
 /// @param delta  where the parabola becomes a line, > 0   @throws ValueError if it is not

@@ -19,11 +19,30 @@ Var<T> concatenate(std::initializer_list<Var<T>> xs) {
   return concatenate(std::span<const Var<T>>(xs.begin(), xs.size()));
 }
 
+/// Concatenates tensors along any axis.
+/// @param xs  one or more, alike in all axes but this one   @param axis  negative: counted from the last
+/// @throws ShapeError if other axes differ or the axis is out of range   @throws ValueError if xs is empty
+/// Differentiable in: every x.
+template <class T>
+Var<T> concatenate(std::span<const Var<T>> xs, int axis);
+/// The same for tensors listed at the call.
+template <class T>
+Var<T> concatenate(std::initializer_list<Var<T>> xs, int axis) {
+  return concatenate(std::span<const Var<T>>(xs.begin(), xs.size()), axis);
+}
+
 /// Entries begin .. begin + count - 1 of the last axis.
 /// @param x [.., C]   @return [.., count]
 /// @throws ShapeError if the range does not lie within C
 /// Differentiable in: x.
 template <class T>
 Var<T> slice(Var<T> x, Index begin, Index count);
+
+/// Entries begin .. begin + count - 1 of any axis.
+/// @param axis  negative: counted from the last
+/// @throws ShapeError if the axis is out of range or the range does not lie within it
+/// Differentiable in: x.
+template <class T>
+Var<T> slice(Var<T> x, int axis, Index begin, Index count);
 
 }  // namespace fieldmark

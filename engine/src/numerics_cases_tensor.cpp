@@ -1,0 +1,204 @@
+#include <fieldmark/engine/ops/arithmetic.h>
+#include <fieldmark/engine/ops/determinant.h>
+#include <fieldmark/engine/ops/layer_norm.h>
+#include <fieldmark/engine/ops/linear_solve.h>
+#include <fieldmark/engine/ops/math.h>
+#include <fieldmark/engine/ops/reduce_axes.h>
+#include <fieldmark/engine/ops/relu_family.h>
+
+#include <algorithm>
+#include <numbers>
+
+#include "numerics_cases_parts.h"
+
+namespace fieldmark {
+namespace {
+
+using Real = long double;
+
+Real gelu_of(Real x) { return x * std::erfc(-x / std::numbers::sqrt2_v<Real>) / 2; }
+Real gelu_slope(Real x) {
+  return std::erfc(-x / std::numbers::sqrt2_v<Real>) / 2 +
+         x * std::exp(-x * x / 2) / std::sqrt(2 * std::numbers::pi_v<Real>);
+}
+Real silu_of(Real x) { return x / (1 + std::exp(-x)); }
+Real silu_slope(Real x) { return (1 + x / (1 + std::exp(x))) / (1 + std::exp(-x)); }
+Real cos_of(Real x) { return std::cos(x); }
+Real minus_sin(Real x) { return -std::sin(x); }
+Real sin_of(Real x) { return std::sin(x); }
+Real log_of(Real x) { return std::log(x); }
+Real reciprocal_of(Real x) { return 1 / x; }
+Real log1p_of(Real x) { return std::log1p(x); }
+Real log1p_slope(Real x) { return 1 / (1 + x); }
+Real expm1_of(Real x) { return std::expm1(x); }
+Real exp_value(Real x) { return std::exp(x); }
+
+// y = f(x) at 4001 points of [lo, hi] against its definition and slope, relative to the magnitude of each, at
+// least `scale`.
+struct Curve {
+  double lo, hi;
+  Real (*value)(Real), (*slope)(Real);
+  Real scale;
+};
+
+template <class F>
+void add_curve(std::vector<NumericsCase>& cases, const std::string& name, double float_limit,
+               double double_limit, const Curve& curve, F op) {
+  const std::string relative_to = curve.scale > 0 ? "1" : "value, slope";
+  add_numerics(cases, name, relative_to, float_limit, double_limit, [=](auto t, WorstError& error) {
+    using T = decltype(t);
+    const auto x = scattered<T>({4001}, curve.lo, curve.hi, 5);
+    const auto got = values_and_gradients<T>([&](auto&, const auto& v) { return op(v[0]); }, {x}, ones<T>);
+    for (std::size_t i = 0; i < x.data.size(); ++i) {
+      const Real y = curve.value(x.data[i]), slope = curve.slope(x.data[i]);
+      error.compare(got[0][i], y, std::max(size_of<T>(y), curve.scale));
+      error.compare(got[1][i], slope, std::max(size_of<T>(slope), curve.scale));
+    }
+  });
+}
+
+void add_curves(std::vector<NumericsCase>& cases) {
+  add_curve(cases, "math: log from 1e-30 to 1e6", 3e-7, 4e-16, {1e-30, 1e6, log_of, reciprocal_of, 0},
+            [](auto v) { return log(v); });
+  add_curve(cases, "math: log1p from -1e-6 to 1e-6", 2e-7, 4e-16, {-1e-6, 1e-6, log1p_of, log1p_slope, 0},
+            [](auto v) { return log1p(v); });
+  add_curve(cases, "math: expm1 from -1e-6 to 1e-6", 2e-7, 4e-16, {-1e-6, 1e-6, expm1_of, exp_value, 0},
+            [](auto v) { return expm1(v); });
+  add_curve(cases, "math: sin to +-1000", 2e-7, 4e-16, {-1000, 1000, sin_of, cos_of, 1},
+            [](auto v) { return sin(v); });
+  add_curve(cases, "math: cos to +-1000", 2e-7, 4e-16, {-1000, 1000, cos_of, minus_sin, 1},
+            [](auto v) { return cos(v); });
+  add_curve(cases, "relu_family: silu from -80 to 80", 8e-7, 2e-15, {-80, 80, silu_of, silu_slope, 1},
+            [](auto v) { return silu(v); });
+  add_curve(cases, "relu_family: gelu from -12 to 12", 8e-7, 2e-15, {-12, 12, gelu_of, gelu_slope, 1},
+            [](auto v) { return gelu(v); });
+}
+
+// Sums of 3 million values along either axis of a matrix, relative to the sums.
+template <class T>
+void compare_axis_sums(WorstError& error) {
+  constexpr Index rows = 1'000'000, columns = 3;
+  const auto x = scattered<T>({rows, columns}, 0.1, 1, 8);
+  std::vector<Real> of_columns(columns);
+  for (Index i = 0; i < x.size(); ++i) of_columns[at(i % columns)] += x[i];
+  Tape<T> tape;
+  const Var<T> tall = sum(tape.constant(x), {0}),
+               wide = sum(tape.constant(x.data.data(), {columns, rows}), {1});
+  for (Index c = 0; c < columns; ++c) {
+    error.compare(tall.value()[c], of_columns[at(c)], of_columns[at(c)]);
+    Real row = 0;
+    for (Index i = 0; i < rows; ++i) row += x[c * rows + i];
+    error.compare(wide.value()[c], row, row);
+  }
+}
+
+// Logits around +-1e4, and rows of which nothing, or all, is infinite.
+template <class T>
+void compare_logsumexp(WorstError& error) {
+  constexpr T inf = std::numeric_limits<T>::infinity();
+  const auto check = [&](std::vector<T> row, Real want, std::vector<Real> slopes) {
+    const Tensor<T> x({1, static_cast<Index>(row.size())}, row);
+    const auto got =
+        values_and_gradients<T>([](auto&, const auto& v) { return logsumexp(v[0], {1}); }, {x}, ones<T>);
+    error.compare(got[0][0], want, std::isfinite(want) ? size_of<T>(want) : 1);
+    for (std::size_t i = 0; i < slopes.size(); ++i)
+      error.compare(got[1][i], slopes[i], size_of<T>(slopes[i]));
+  };
+  const Real log2 = std::log(Real{2});
+  check({10000, 10000}, 10000 + log2, {0.5, 0.5});
+  check({-10000, -10000}, log2 - 10000, {0.5, 0.5});
+  check({-inf, 3, -inf}, 3, {0, 1, 0});
+  check({-inf, -inf}, -std::numeric_limits<Real>::infinity(), {0, 0});
+  check({inf, 0}, std::numeric_limits<Real>::infinity(), {1, 0});
+}
+
+// Rows far from 0, whose variance a sum of squares would lose; a constant row gives beta.
+template <class T>
+void compare_layer_norm(WorstError& error) {
+  constexpr Index columns = 64;
+  Tensor<T> x = scattered<T>({3, columns}, -1, 1, 4);
+  for (Index c = 0; c < columns; ++c) {
+    x[columns + c] = x[columns + c] * T(0.25) + T(1000);
+    x[2 * columns + c] = T(1e6);
+  }
+  const Tensor<T> gain = scattered<T>({columns}, 0.5, 2, 5), shift = scattered<T>({columns}, -1, 1, 6);
+  const auto got = values_and_gradients<T>([](auto&, const auto& v) { return layer_norm(v[0], v[1], v[2]); },
+                                           {x, gain, shift}, ones<T>);
+  for (Index r = 0; r < 3; ++r) {
+    Real mean = 0, square = 0;
+    for (Index c = 0; c < columns; ++c) mean += static_cast<Real>(x[r * columns + c]) / columns;
+    for (Index c = 0; c < columns; ++c) square += (x[r * columns + c] - mean) * (x[r * columns + c] - mean);
+    for (Index c = 0; c < columns; ++c)
+      error.compare(got[0][at(r * columns + c)],
+                    gain[c] * (x[r * columns + c] - mean) / std::sqrt(square / columns + 1e-5L) + shift[c],
+                    1);
+  }
+}
+
+// a x = b for Hilbert's matrix of 5 rows, whose condition number is 5e5 in the largest norm, as in double.
+template <class T>
+void compare_solve(WorstError& error) {
+  constexpr Index n = 5;
+  Tensor<T> a({n, n}), b({n, 1});
+  for (Index i = 0; i < n; ++i)
+    for (Index k = 0; k < n; ++k) {
+      a[i * n + k] = static_cast<T>(1 / static_cast<double>(i + k + 1));
+      b[i] += a[i * n + k];
+    }
+  Tape<T> tape;
+  const Var<T> x = solve(tape.constant(a), tape.constant(b));
+  for (Index i = 0; i < n; ++i) {
+    Real residual = -b[i];
+    for (Index k = 0; k < n; ++k) residual += static_cast<Real>(a[i * n + k]) * x.value()[k];
+    error.compare(residual, 0, 1);
+  }
+}
+
+// A singular matrix has determinant 0 and the gradient of its cofactors.
+template <class T>
+void compare_singular_determinant(WorstError& error) {
+  const Tensor<T> a({3, 3}, {1, 2, 3, 2, 4, 6, 1, 0, 1});
+  const auto got =
+      values_and_gradients<T>([](auto&, const auto& v) { return determinant(v[0]); }, {a}, ones<T>);
+  const std::vector<Real> cofactors{4, 4, -4, -2, -2, 2, 0, 0, 0};
+  error.compare(got[0][0], 0, 1);
+  for (std::size_t i = 0; i < cofactors.size(); ++i) error.compare(got[1][i], cofactors[i], 1);
+}
+
+// Where a factor of a slope is 0 and the other infinite, or a value is at the end of its range.
+template <class T>
+void compare_edges(WorstError& error) {
+  constexpr T nan = std::numeric_limits<T>::quiet_NaN(), top = std::numeric_limits<T>::max();
+  const auto check = [&](auto op, std::vector<T> a, std::vector<T> b, std::vector<std::vector<T>> want) {
+    const Tensor<T> x({static_cast<Index>(a.size())}, a), z({static_cast<Index>(b.size())}, b);
+    const auto got =
+        values_and_gradients<T>([&](auto&, const auto& v) { return op(v[0], v[1]); }, {x, z}, ones<T>);
+    for (std::size_t k = 0; k < want.size(); ++k)
+      for (std::size_t i = 0; i < want[k].size(); ++i) error.equal(got[k][i], want[k][i]);
+  };
+  check([](auto a, auto b) { return pow(a, b); }, {0, 0, 2, -2}, {0, 2, 0, 2}, {{1, 0, 1, 4}, {0, 0, 0, -4}});
+  check([](auto a, auto b) { return div(a, b); }, {top, 0}, {top, top},
+        {{1, 0}, {1 / top, 1 / top}, {-1 / top, 0}});
+  check([](auto a, auto b) { return maximum(a, b); }, {nan, 1, 3, 2}, {1, nan, 3, 5}, {{nan, nan, 3, 5}});
+  check([](auto a, auto b) { return minimum(a, b); }, {nan, 1, 3, 2}, {1, nan, 3, 5}, {{nan, nan, 3, 2}});
+}
+
+}  // namespace
+
+void add_tensor_numerics(std::vector<NumericsCase>& cases) {
+  add_curves(cases);
+  add_numerics(cases, "arithmetic: pow, div, maximum, minimum at the edges", "bits", 0, 0,
+               [](auto t, WorstError& e) { compare_edges<decltype(t)>(e); });
+  add_numerics(cases, "reduce_axes: three million values along either axis", "value", 6e-8, 1e-15,
+               [](auto t, WorstError& e) { compare_axis_sums<decltype(t)>(e); });
+  add_numerics(cases, "reduce_axes: logsumexp of +-1e4 and infinities", "value, slope", 1e-7, 3e-16,
+               [](auto t, WorstError& e) { compare_logsumexp<decltype(t)>(e); });
+  add_numerics(cases, "layer_norm: rows around 1000, constant rows", "1", 2e-6, 1e-12,
+               [](auto t, WorstError& e) { compare_layer_norm<decltype(t)>(e); });
+  add_numerics(cases, "linear_solve: residual of Hilbert's matrix", "1", 2e-7, 1e-15,
+               [](auto t, WorstError& e) { compare_solve<decltype(t)>(e); });
+  add_numerics(cases, "determinant: a singular matrix", "1", 1e-6, 1e-14,
+               [](auto t, WorstError& e) { compare_singular_determinant<decltype(t)>(e); });
+}
+
+}  // namespace fieldmark
