@@ -70,9 +70,10 @@ template <class T>
 Var<T> Params<T>::leaf(Tape<T>& tape, ParamId id) const {
   const auto& e = layout_->entry(id);
   const bool trained = e.role == ParamRole::trained;
-  if (all_ && trained) return tape.part(*all_, e.offset, e.shape);
-  return tape.matrix(values_ + e.offset, grads_ && trained ? grads_ + e.offset : nullptr, e.shape,
-                     packed_ ? packed_->find(id) : nullptr);
+  if (all_ && trained) return tape.name(tape.part(*all_, e.offset, e.shape), e.name);
+  const Var<T> v = tape.matrix(values_ + e.offset, grads_ && trained ? grads_ + e.offset : nullptr, e.shape,
+                               packed_ ? packed_->find(id) : nullptr);
+  return tape.name(v, e.name);
 }
 
 template class Params<float>;
