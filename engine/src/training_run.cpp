@@ -3,35 +3,22 @@
 
 #include <chrono>
 #include <cstdio>
-#include <cstring>
+
+#include "state_arrays.h"
 
 namespace fieldmark {
 namespace {
 
 constexpr double kKeep = 0.98, kNewest = 0.02;  // of the running loss
 
-template <class T>
-void load(const SafetensorsFile& file, const std::string& name, std::span<T> to) {
-  const char* dtype = std::is_same_v<T, float> ? "F32" : std::is_same_v<T, double> ? "F64" : "I64";
-  const SafetensorsFile::Entry& e = file.at(name);
-  if (e.dtype != dtype || e.data.size() != to.size_bytes())
-    throw IoError(file.path + ": tensor '" + name + "': expected " + std::to_string(to.size()) +
-                  " elements of " + dtype + ", found shape " + e.shape.str() + " of " + e.dtype);
-  std::memcpy(to.data(), e.data.data(), e.data.size());
-}
+using detail::read_array;
 
 // Calls visit(name, elements, shape) for the arrays of trained parameters: values, moments, gradients.
 template <class TrainedParams, class F>
 void visit_arrays(TrainedParams& t, F visit) {
   for (const auto& e : t.params->entries()) {
-    const auto part = [&](auto all) {
-      return all.subspan(static_cast<std::size_t>(e.offset), static_cast<std::size_t>(e.shape.size()));
-    };
-    const std::string name = t.prefix + e.name;
-    visit(name, part(t.params->values()), e.shape);
-    visit(name + ".mean", part(t.adam.mean()), e.shape);
-    visit(name + ".mean_square", part(t.adam.mean_square()), e.shape);
-    if (t.gradients) visit(name + ".gradient", part(t.params->grads()), e.shape);
+    detail::visit_adam(*t.params, t.adam, e, t.prefix, visit);
+    if (t.gradients) visit(t.prefix + e.name + ".gradient", detail::part_of(t.params->grads(), e), e.shape);
   }
 }
 
@@ -153,12 +140,12 @@ void TrainingRun::restore(const std::filesystem::path& path) {
   restore_more(file);  // first: it may refuse the file
   for (Trained& t : trained_)
     visit_arrays(t, [&](const std::string& name, std::span<float> elements, const Shape&) {
-      load(file, name, elements);
+      read_array(file, name, elements);
     });
   for (const auto& [name, kept] : kept_)
-    std::visit([&, in_file = "run/" + name](auto figures) { load(file, in_file, figures); }, kept);
+    std::visit([&, in_file = "run/" + name](auto figures) { read_array(file, in_file, figures); }, kept);
   Index planned = 0;
-  load(file, "run/planned", std::span(&planned, 1));
+  read_array(file, "run/planned", std::span(&planned, 1));
   schedule_.resume(planned);
   curve_ = file.f64("run/curve").data;
   for (Trained& t : trained_) t.adam.set_steps(steps_);

@@ -1,0 +1,130 @@
+#include <fieldmark/core/error.h>
+#include <fieldmark/engine/state_file.h>
+
+#include "state_arrays.h"
+
+namespace fieldmark {
+namespace {
+
+// No optimiser: the parameters alone.
+struct Nothing {};
+
+template <class Store, class Entry, class F>
+void visit_state(Store& store, const Nothing&, const Entry& e, const std::string& prefix, F visit) {
+  visit(prefix + e.name, detail::part_of(store.values(), e), e.shape);
+}
+template <class Store, class A, class Entry, class F>
+requires requires(A& a) { a.mean_square(); }
+void visit_state(Store& store, A& adam, const Entry& e, const std::string& prefix, F visit) {
+  detail::visit_adam(store, adam, e, prefix, visit);
+}
+template <class Store, class S, class Entry, class F>
+requires requires(S& s) { s.velocity(); }
+void visit_state(Store& store, S& sgd, const Entry& e, const std::string& prefix, F visit) {
+  visit(prefix + e.name, detail::part_of(store.values(), e), e.shape);
+  visit(prefix + e.name + ".velocity", detail::part_of(sgd.velocity(), e), e.shape);
+}
+
+Index size_of_state(const auto& optimiser) {
+  if constexpr (requires { optimiser.velocity(); })
+    return std::ssize(optimiser.velocity());
+  else
+    return std::ssize(optimiser.mean());
+}
+
+template <class T, class O>
+void check_optimiser(const char* function, const ParamStore<T>& store, const O& optimiser) {
+  if constexpr (!std::is_same_v<O, Nothing>)
+    if (const Index n = size_of_state(optimiser); n != store.size())
+      throw ShapeError(std::string("[") + function + "] optimiser must be for the " +
+                       std::to_string(store.size()) + " elements of the store, got one for " +
+                       std::to_string(n));
+}
+
+template <class T, class O>
+void save(SafetensorsFile& file, const std::string& prefix, const ParamStore<T>& store, const O& optimiser) {
+  check_optimiser("save_state", store, optimiser);
+  for (const auto& e : store.entries())
+    visit_state(store, optimiser, e, prefix,
+                [&](const std::string& name, std::span<const T> elements, const Shape& shape) {
+                  file.add(name, shape, elements);
+                });
+}
+
+// Everything is checked before anything changes.
+template <class T, class O>
+void load(const SafetensorsFile& file, const std::string& prefix, ParamStore<T>& store, O& optimiser) {
+  check_optimiser("load_state", store, optimiser);
+  const auto each = [&](auto visit) {
+    for (const auto& e : store.entries()) visit_state(store, optimiser, e, prefix, visit);
+  };
+  each([&](const std::string& name, std::span<T>, const Shape& shape) {
+    const auto& e = file.at(name);
+    if (e.shape != shape || e.dtype != detail::dtype_of<T>())
+      throw IoError(file.path + ": tensor '" + name + "': expected shape " + shape.str() + " of " +
+                    detail::dtype_of<T>() + ", found shape " + e.shape.str() + " of " + e.dtype);
+  });
+  each([&](const std::string& name, std::span<T> elements, const Shape&) {
+    detail::read_array(file, name, elements);
+  });
+}
+
+std::string steps_name(std::string_view prefix) { return std::string(prefix) + "adam/steps"; }
+
+}  // namespace
+
+template <class T>
+void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore<T>& store) {
+  save(file, std::string(prefix), store, Nothing{});
+}
+
+template <class T>
+void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore<T>& store,
+                const Adam<T>& optimiser) {
+  save(file, std::string(prefix), store, optimiser);
+  const std::int64_t steps = optimiser.steps();
+  file.add(steps_name(prefix), {1}, std::span(&steps, 1));
+}
+
+template <class T>
+void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore<T>& store,
+                const Sgd<T>& optimiser) {
+  save(file, std::string(prefix), store, optimiser);
+}
+
+template <class T>
+void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore<T>& store) {
+  Nothing nothing;
+  load(file, std::string(prefix), store, nothing);
+}
+
+template <class T>
+void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore<T>& store,
+                Adam<T>& optimiser) {
+  std::int64_t steps = 0;
+  detail::read_array(file, steps_name(prefix), std::span(&steps, 1));
+  if (steps < 0)
+    throw IoError(file.path + ": tensor '" + steps_name(prefix) + "': expected 0 steps or more, found " +
+                  std::to_string(steps));
+  load(file, std::string(prefix), store, optimiser);
+  optimiser.set_steps(steps);
+}
+
+template <class T>
+void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore<T>& store,
+                Sgd<T>& optimiser) {
+  load(file, std::string(prefix), store, optimiser);
+}
+
+#define FIELDMARK_STATE(T)                                                                            \
+  template void save_state(SafetensorsFile&, std::string_view, const ParamStore<T>&);                 \
+  template void save_state(SafetensorsFile&, std::string_view, const ParamStore<T>&, const Adam<T>&); \
+  template void save_state(SafetensorsFile&, std::string_view, const ParamStore<T>&, const Sgd<T>&);  \
+  template void load_state(const SafetensorsFile&, std::string_view, ParamStore<T>&);                 \
+  template void load_state(const SafetensorsFile&, std::string_view, ParamStore<T>&, Adam<T>&);       \
+  template void load_state(const SafetensorsFile&, std::string_view, ParamStore<T>&, Sgd<T>&);
+FIELDMARK_STATE(float)
+FIELDMARK_STATE(double)
+#undef FIELDMARK_STATE
+
+}  // namespace fieldmark
