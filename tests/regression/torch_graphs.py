@@ -1,0 +1,183 @@
+"""Random graphs of the engine's ops, and ten steps of its optimisers, in PyTorch.
+
+python3 torch_graphs.py FILE: FILE is a safetensors file. Its metadata `graphs` lists graphs, each a list of steps
+{"op", "in", args..}; tensors G/inN are the inputs of graph G, G/u its cotangent, G/y the value and G/dN the gradients that
+Fieldmark found. `training` lists optimisers with the names of tensors of an MLP and ten losses. Prints a line for each graph
+and optimiser: its number or name, and the worst relative error of the value, of the gradients, and of the losses.
+"""
+import json
+import struct
+import sys
+
+import numpy
+import torch
+import torch.nn.functional as F
+
+torch.set_num_threads(1)  # small tensors: threads would only wait for each other
+TYPES = {"F64": "<f8", "I32": "<i4"}
+
+
+def read_safetensors(path):
+    """Tensors by name, and the file's metadata."""
+    with open(path, "rb") as file:
+        (length,) = struct.unpack("<Q", file.read(8))
+        header = json.loads(file.read(length))
+        data = file.read()
+    metadata = header.pop("__metadata__", {})
+    tensors = {}
+    for name, entry in header.items():
+        begin, end = entry["data_offsets"]
+        numbers = numpy.frombuffer(data[begin:end], TYPES[entry["dtype"]]).reshape(entry["shape"])
+        tensors[name] = torch.from_numpy(numbers.astype("f8" if entry["dtype"][0] == "F" else "i8"))
+    return tensors, metadata
+
+
+def index(args):
+    return torch.tensor(args["index"])
+
+
+def scatter_add(x, a):
+    shape = list(x.shape)
+    shape[a["axis"]] = a["extent"]
+    return torch.zeros(shape, dtype=x.dtype).index_add(a["axis"], index(a), x)
+
+
+def triangular_solve(x, b, a):
+    triangle = x.triu() if a["upper"] else x.tril()
+    if a["transposed"]:
+        triangle = triangle.transpose(-1, -2)
+    return torch.linalg.solve_triangular(triangle, b, upper=a["upper"] != a["transposed"])
+
+
+def pad(x, a):
+    widths = [0, 0] * (x.dim() - 1 - a["axis"]) + [a["before"], a["after"]]
+    return F.pad(x, widths, value=a["value"])
+
+
+OPS = {
+    "add": lambda v, a: v[0] + v[1],
+    "sub": lambda v, a: v[0] - v[1],
+    "mul": lambda v, a: v[0] * v[1],
+    "div": lambda v, a: v[0] / v[1],
+    "pow": lambda v, a: v[0] ** v[1],
+    "minimum": lambda v, a: torch.minimum(v[0], v[1]),
+    "maximum": lambda v, a: torch.maximum(v[0], v[1]),
+    "where": lambda v, a: torch.where(v[0] > v[1], v[0], v[2]),
+    "scale": lambda v, a: v[0] * a["factor"],
+    "affine": lambda v, a: v[0] * a["factor"] + a["offset"],
+    "power": lambda v, a: v[0] ** a["p"],
+    "negate": lambda v, a: -v[0],
+    "reciprocal": lambda v, a: 1 / v[0],
+    "abs": lambda v, a: v[0].abs(),
+    "square": lambda v, a: v[0] ** 2,
+    "sqrt": lambda v, a: v[0].sqrt(),
+    "log": lambda v, a: v[0].log(),
+    "log1p": lambda v, a: v[0].log1p(),
+    "expm1": lambda v, a: v[0].expm1(),
+    "sin": lambda v, a: v[0].sin(),
+    "cos": lambda v, a: v[0].cos(),
+    "clamp": lambda v, a: v[0].clamp(a["low"], a["high"]),
+    "exp": lambda v, a: v[0].exp(),
+    "tanh": lambda v, a: v[0].tanh(),
+    "sigmoid": lambda v, a: v[0].sigmoid(),
+    "softplus": lambda v, a: torch.logaddexp(v[0], torch.zeros_like(v[0])),
+    "relu": lambda v, a: v[0].relu(),
+    "leaky_relu": lambda v, a: F.leaky_relu(v[0], a["slope"]),
+    "elu": lambda v, a: F.elu(v[0], a["alpha"]),
+    "silu": lambda v, a: F.silu(v[0]),
+    "gelu": lambda v, a: F.gelu(v[0]),
+    "sum": lambda v, a: v[0].sum(a["axes"], keepdim=a["keep"]),
+    "mean": lambda v, a: v[0].mean(a["axes"], keepdim=a["keep"]),
+    "variance": lambda v, a: v[0].var(a["axes"], unbiased=False, keepdim=a["keep"]),
+    "max": lambda v, a: v[0].amax(a["axes"], keepdim=a["keep"]),
+    "logsumexp": lambda v, a: v[0].logsumexp(a["axes"], keepdim=a["keep"]),
+    "softmax": lambda v, a: v[0].softmax(a["axis"]),
+    "reshape": lambda v, a: v[0].reshape(a["shape"]),
+    "permute": lambda v, a: v[0].permute(a["order"]),
+    "transpose": lambda v, a: v[0].transpose(-2, -1),
+    "broadcast_to": lambda v, a: v[0].expand(a["shape"]),
+    "pad": lambda v, a: pad(v[0], a),
+    "cumsum": lambda v, a: v[0].cumsum(a["axis"]),
+    "slice": lambda v, a: v[0].narrow(a["axis"], a["begin"], a["count"]),
+    "concatenate": lambda v, a: torch.cat(v, a["axis"]),
+    "gather": lambda v, a: v[0].index_select(a["axis"], index(a)),
+    "scatter_add": lambda v, a: scatter_add(v[0], a),
+    "batched_matmul": lambda v, a: v[0] @ v[1],
+    "layer_norm": lambda v, a: F.layer_norm(v[0], v[0].shape[-1:], v[1], v[2]),
+    "l1_loss": lambda v, a: F.l1_loss(v[0], v[1]).reshape(1),
+    "mse_loss": lambda v, a: F.mse_loss(v[0], v[1]).reshape(1),
+    "huber_loss": lambda v, a: F.huber_loss(v[0], v[1], delta=a["delta"]).reshape(1),
+    "cross_entropy": lambda v, a: F.cross_entropy(v[0].reshape(-1, v[0].shape[-1]), index(a)).reshape(1),
+    "triangular_solve": lambda v, a: triangular_solve(v[0], v[1], a),
+    "solve": lambda v, a: torch.linalg.solve(v[0], v[1]),
+    "inverse": lambda v, a: torch.linalg.inv(v[0]),
+    "determinant": lambda v, a: torch.linalg.det(v[0]),
+    "log_determinant": lambda v, a: torch.linalg.slogdet(v[0])[1],
+    "cholesky": lambda v, a: torch.linalg.cholesky(v[0]),
+    "symmetric_eigenvalues": lambda v, a: torch.linalg.eigvalsh(v[0]),
+}
+
+
+def error(got, want):
+    """Largest difference relative to the largest magnitude; infinity for another shape or a NaN."""
+    if got.shape != want.shape:
+        return float("inf")
+    if want.numel() == 0:
+        return 0.0
+    worst = ((got - want).abs().max() / want.abs().max().clamp(min=1e-3)).item()
+    return worst if worst == worst else float("inf")
+
+
+def run_graph(number, steps, tensors):
+    values, inputs = [], []
+    for step in steps:
+        if step["op"] == "input":
+            inputs.append(tensors[f"{number}/in{len(inputs)}"].clone().requires_grad_())
+            values.append(inputs[-1])
+        else:
+            values.append(OPS[step["op"]]([values[i] for i in step["in"]], step))
+    y = values[-1]
+    grads = torch.autograd.grad(y, inputs, tensors[f"{number}/u"], allow_unused=True)
+    worst = 0.0
+    for i, grad in enumerate(grads):
+        want = torch.zeros_like(inputs[i]) if grad is None else grad
+        worst = max(worst, error(tensors[f"{number}/d{i}"], want))
+    return error(tensors[f"{number}/y"], y.detach()), worst
+
+
+def train(run, tensors):
+    parameters = [tensors[f"{run['name']}/{p}"].clone().requires_grad_() for p in run["parameters"]]
+    kind, options = run["optimiser"], run["options"]
+    if "betas" in options:
+        options["betas"] = tuple(options["betas"])
+    optimiser = getattr(torch.optim, kind)(parameters, **options)
+    losses = []
+    for _ in range(len(run["losses"])):
+        h = tensors["x"]
+        for layer in range(0, len(parameters), 2):
+            h = h @ parameters[layer] + parameters[layer + 1]
+            if layer + 2 < len(parameters):
+                h = torch.relu(h)
+        loss = F.mse_loss(h, tensors["target"])
+        optimiser.zero_grad()
+        loss.backward()
+        if "clip" in run:
+            # PyTorch's own clip_grad_norm_ adds 1e-6 to the norm.
+            norm = torch.sqrt(sum((p.grad**2).sum() for p in parameters))
+            for p in parameters:
+                p.grad *= run["clip"] / max(norm, run["clip"])
+        optimiser.step()
+        losses.append(loss.item())
+    return max(abs(a - b) / abs(b) for a, b in zip(run["losses"], losses))
+
+
+def main():
+    tensors, metadata = read_safetensors(sys.argv[1])
+    for number, steps in enumerate(json.loads(metadata["graphs"])):
+        value, gradient = run_graph(number, steps, tensors)
+        print(f"graph{number} {value:.3e} {gradient:.3e}")
+    for run in json.loads(metadata["training"]):
+        print(f"{run['name']} {train(run, tensors):.3e} 0")
+
+
+main()
