@@ -1,0 +1,79 @@
+// Tells two spirals apart: layers, operators, AdamW with a schedule and clipping, a saved state. Public
+// headers only.
+#include <fieldmark/engine/clip.h>
+#include <fieldmark/engine/decay.h>
+#include <fieldmark/engine/nn/dense.h>
+#include <fieldmark/engine/ops/comparison.h>
+#include <fieldmark/engine/ops/layer_norm.h>
+#include <fieldmark/engine/ops/operators.h>
+#include <fieldmark/engine/ops/relu_family.h>
+#include <fieldmark/engine/ops/slice.h>
+#include <fieldmark/engine/ops/softmax.h>
+#include <fieldmark/engine/state_file.h>
+#include <fieldmark/engine/values.h>
+
+#include <cmath>
+#include <cstdio>
+
+using namespace fieldmark;
+
+namespace {
+
+// A dense layer, a norm and GELU, added to what came in.
+struct Block {
+  Dense<float> dense;
+  ParamId gamma, beta;
+  Block(ParamStore<float>& store, const std::string& name, Index width, std::uint64_t seed)
+      : dense(store, name + "/dense", {.in = width, .out = width}, seed),
+        gamma(store.add(name + "/gamma", {width})),
+        beta(store.add(name + "/beta", {width})) {
+    for (float& g : store.values(gamma)) g = 1;
+  }
+  Var<float> operator()(const Params<float>& p, Var<float> x) const {
+    const Var<float> h = layer_norm(dense(p, x), p.leaf(x.tape(), gamma), p.leaf(x.tape(), beta));
+    return x + gelu(h);
+  }
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  constexpr Index kPoints = 400;
+  Tensor<float> x({kPoints, 2});
+  std::vector<std::int32_t> labels;
+  for (Index i = 0; i < kPoints; ++i) {
+    const float r = 0.1f + 0.9f * static_cast<float>(i / 2) / (kPoints / 2),
+                angle = 9 * r + (i % 2 ? 3.14159f : 0.f);
+    x[2 * i] = r * std::cos(angle);
+    x[2 * i + 1] = r * std::sin(angle);
+    labels.push_back(i % 2);
+  }
+
+  ParamStore<float> store;
+  const Dense<float> in(store, "in", {.in = 2, .out = 32}, 1), out(store, "out", {.in = 32, .out = 2}, 4);
+  const Block first(store, "first", 32, 2), second(store, "second", 32, 3);
+  Adam<float> adam(store, {.lr = 0.01, .beta2 = 0.999, .eps = 1e-8, .weight_decay = 0.01});
+  const Params<float> params(store);
+  Tape<float> tape;
+  double right = 0;
+  for (int step = 0; step < 300; ++step) {
+    tape.reset();
+    store.zero_grad();
+    const Var<float> logits = out(params, second(params, first(params, in(params, 4 * tape.constant(x)))));
+    const Var<float> loss = softmax_cross_entropy(logits, labels);
+    tape.backward(loss);
+    clip_grad_norm(store, 1);
+    adam.step(store.values(), store.grads(), warm_up(step, 20) * cosine_decay(step, 300));
+    const Tensor<float> says = to_tensor(greater(slice(logits, 1, 1), slice(logits, 0, 1)));
+    right = 0;
+    for (Index i = 0; i < kPoints; ++i) right += (says[i] > 0) == (labels[static_cast<std::size_t>(i)] == 1);
+    if (step % 100 == 0) std::printf("step %3d  loss %.4f\n", step, static_cast<double>(item(loss)));
+  }
+  std::printf("%.1f%% right\n", 100 * right / kPoints);
+  if (argc > 1) {
+    SafetensorsFile file;
+    save_state(file, "classifier/", store, adam);
+    file.write(argv[1]);
+  }
+  return right > 0.98 * kPoints ? 0 : 1;
+}
