@@ -26,12 +26,13 @@ struct OpCost {
 /// Looks at what a tape records: its graph as text or DOT, time and memory by op, and the op that made the
 /// first NaN or infinity. A tape without an inspector pays nothing for it.
 ///
-///   Tape<float> tape;
-///   TapeInspector<float> inspector(tape, {.stop_at_nonfinite = true});
-///   tape.name(x, "input");
-///   tape.backward(loss);               // throws "[inspect] backward of log (math.cpp:95), value 7 ..."
-///   std::puts(inspector.dot().c_str());
-///
+/// @code
+/// Tape<float> tape;
+/// TapeInspector<float> inspector(tape, {.stop_at_nonfinite = true});
+/// tape.name(x, "input");
+/// tape.backward(loss);  // throws "[inspect] the backward of log (math.cpp:95) made the first NaN ..."
+/// std::puts(inspector.dot().c_str());
+/// @endcode
 /// An op is called after the function that called Tape::output(); parameters after their names in the store.
 template <class T>
 class TapeInspector : private TapeObserver<T> {
