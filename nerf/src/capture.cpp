@@ -62,15 +62,28 @@ void apply_lists(const Transforms& t, const std::string& file, Capture& capture)
 Capture read_json(const fs::path& folder, const fs::path& file, bool all_splits) {
   const Transforms t = parse_transforms(read_text(file), file.string());
   Capture capture{.notes = t.notes};
+  ImageFinder finder;
+  std::size_t moved = 0;
+  const auto path_of = [&](const std::string& named) {
+    const fs::path path = (folder / named).lexically_normal();
+    if (!finder.find(path).empty()) return path;
+    const fs::path here = finder.find_below(folder, named);
+    moved += !here.empty();
+    return here.empty() ? path : here;
+  };
   for (const auto& frame : t.frames) {
     const std::string label = "frames[" + std::to_string(capture.shots.size()) + "]";
-    capture.shots.push_back({.image = (folder / frame.file_path).lexically_normal(),
+    capture.shots.push_back({.image = path_of(frame.file_path),
                              .label = label,
                              .place = file.string() + ": " + label + ".file_path",
                              .pose = frame.pose,
                              .intrinsics = frame.intrinsics});
-    if (!frame.mask_path.empty()) capture.shots.back().mask = folder / frame.mask_path;
+    if (!frame.mask_path.empty()) capture.shots.back().mask = path_of(frame.mask_path);
   }
+  if (moved > 0)
+    capture.notes.push_back(std::to_string(moved) +
+                            " files are named by a path that is not there, and found by its end in " +
+                            folder.string());
   capture.all_splits = all_splits;
   if (all_splits && std::any_of(t.splits.begin(), t.splits.end(), [](const auto& l) { return !l.empty(); }))
     apply_lists(t, file.string(), capture);
@@ -85,6 +98,25 @@ bool faces_forward(const std::vector<LlffView>& views) {
          });
 }
 }  // namespace
+
+std::size_t split_number(std::string_view split) {
+  const auto found = std::find(kSplitNames.begin(), kSplitNames.end(), split);
+  if (found == kSplitNames.end())
+    throw ValueError("[load_dataset] split must be train, val or test, got \"" + std::string(split) + "\"");
+  return static_cast<std::size_t>(found - kSplitNames.begin());
+}
+
+bool belongs(const Capture& capture, std::size_t i, std::size_t split) {
+  constexpr std::size_t kHeldOut = 8;
+  if (capture.listed) return capture.shots[i].in_split[split];
+  return !capture.all_splits || (split == 0) == (i % kHeldOut != 0);
+}
+
+Capture read_capture(const fs::path& folder, Layout layout, const std::string& split, Index size) {
+  if (layout == Layout::blender) return read_blender(folder, split);
+  if (layout == Layout::transforms) return read_transforms(folder);
+  return layout == Layout::llff ? read_llff(folder, size) : read_colmap(folder, size);
+}
 
 Capture read_blender(const fs::path& folder, const std::string& split) {
   return read_json(folder, folder / ("transforms_" + split + ".json"), false);

@@ -38,6 +38,14 @@ struct Capture {
   std::vector<std::string> notes{};
 };
 
+/// The place of a split in kSplitNames. @throws ValueError if it is none of them
+std::size_t split_number(std::string_view split);
+/// Whether a split has shot i.
+bool belongs(const Capture& capture, std::size_t i, std::size_t split);
+
+/// The shots of a folder of this layout. @param split  of layout blender   @param size  as read_llff()'s
+Capture read_capture(const std::filesystem::path& folder, Layout layout, const std::string& split,
+                     Index size);
 Capture read_blender(const std::filesystem::path& folder, const std::string& split);
 Capture read_transforms(const std::filesystem::path& folder);
 /// @param size  wanted pixels of the longer side, 0: the largest there are

@@ -17,11 +17,13 @@ bool has_file(const fs::path& path) {
   return fs::is_regular_file(path, ignored);
 }
 
-std::size_t split_number(std::string_view split) {
-  const auto found = std::find(kSplitNames.begin(), kSplitNames.end(), split);
-  if (found == kSplitNames.end())
-    throw ValueError("[load_dataset] split must be train, val or test, got \"" + std::string(split) + "\"");
-  return static_cast<std::size_t>(found - kSplitNames.begin());
+std::optional<Layout> layout_of(const fs::path& folder) {
+  for (const std::string_view split : kSplitNames)
+    if (has_file(folder / ("transforms_" + std::string(split) + ".json"))) return Layout::blender;
+  if (has_file(folder / "transforms.json")) return Layout::transforms;
+  if (has_file(folder / "poses_bounds.npy")) return Layout::llff;
+  if (!colmap_folder(folder).empty()) return Layout::colmap;
+  return std::nullopt;
 }
 
 // The file of a shot's mask; empty: none.
@@ -34,12 +36,6 @@ fs::path mask_file(const Shot& shot, const fs::path& image, ImageFinder& finder)
   if (mask.empty())
     throw IoError(shot.place + ": expected the mask of its mask_path, got no file " + shot.mask.string());
   return mask;
-}
-
-bool belongs(const Capture& capture, std::size_t i, std::size_t split) {
-  constexpr std::size_t kHeldOut = 8;
-  if (capture.listed) return capture.shots[i].in_split[split];
-  return !capture.all_splits || (split == 0) == (i % kHeldOut != 0);
 }
 
 [[noreturn]] void fail_without_images(const Capture& capture, const std::string& split,
@@ -89,12 +85,6 @@ ViewPlan plan_split(const Capture& capture, const DatasetOptions& options, const
   return plan;
 }
 
-Capture read_capture(const fs::path& folder, Layout layout, const DatasetOptions& options) {
-  if (layout == Layout::blender) return read_blender(folder, options.split);
-  if (layout == Layout::transforms) return read_transforms(folder);
-  return layout == Layout::llff ? read_llff(folder, options.size) : read_colmap(folder, options.size);
-}
-
 }  // namespace
 
 float background_value(Background background) { return background == Background::white ? 1.0f : 0.0f; }
@@ -106,15 +96,17 @@ Layout find_layout(const fs::path& folder) {
                   (fs::exists(folder, error) ? "something else"
                    : error                   ? error.message()
                                              : "nothing of that name"));
-  for (const std::string_view split : kSplitNames)
-    if (has_file(folder / ("transforms_" + std::string(split) + ".json"))) return Layout::blender;
-  if (has_file(folder / "transforms.json")) return Layout::transforms;
-  if (has_file(folder / "poses_bounds.npy")) return Layout::llff;
-  if (!colmap_folder(folder).empty()) return Layout::colmap;
+  if (const auto layout = layout_of(folder)) return *layout;
+  std::string below;
+  for (const auto& entry : fs::directory_iterator(folder, error))
+    if (const std::string name = entry.path().string();
+        entry.is_directory(error) && layout_of(entry.path()) && (below.empty() || name < below))
+      below = name;
   throw IoError(folder.string() +
                 ": expected a data set: transforms_train.json (Blender), transforms.json (instant-ngp, "
                 "nerfstudio), poses_bounds.npy (LLFF), or cameras.bin or cameras.txt (COLMAP) in it, or in "
-                "sparse, colmap or dense below it; got none of these files");
+                "sparse, colmap or dense below it; got none of these files" +
+                (below.empty() ? "" : "; " + below + " is a data set"));
 }
 
 bool has_split(const fs::path& folder, std::string_view split) {
@@ -123,7 +115,7 @@ bool has_split(const fs::path& folder, std::string_view split) {
   if (layout == Layout::llff || layout == Layout::colmap) return true;
   if (layout == Layout::blender && !has_file(folder / ("transforms_" + std::string(split) + ".json")))
     return false;
-  const Capture capture = read_capture(folder, layout, {.split = std::string(split)});
+  const Capture capture = read_capture(folder, layout, std::string(split), 0);
   ImageFinder finder;
   for (std::size_t i = 0; i < capture.shots.size(); ++i)
     if (belongs(capture, i, number) && !finder.find(capture.shots[i].image).empty()) return true;
@@ -135,7 +127,7 @@ Dataset load_dataset(const fs::path& folder, const DatasetOptions& options) {
   if (options.size < 0 || options.size > 65536)
     throw ValueError("[load_dataset] size must be 0 to 65536 pixels, got " + std::to_string(options.size));
   const Layout layout = find_layout(folder);
-  Capture capture = read_capture(folder, layout, options);
+  Capture capture = read_capture(folder, layout, options.split, options.size);
   ViewPlan plan = plan_split(capture, options, folder, capture.notes);
   plan_lenses(capture.shots, plan, capture.notes);
   std::vector<View> views = read_views(plan, capture.notes);

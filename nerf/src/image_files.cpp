@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 #include <regex>
+#include <string_view>
 
 namespace fieldmark::nerf {
 namespace {
@@ -21,6 +22,15 @@ std::string lower_case(std::string text) {
 bool is_image_name(const fs::path& file) {
   const std::string extension = lower_case(file.extension().string());
   return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+}
+
+// A name that another program gave to an image which may stand here as PNG or JPEG.
+bool is_foreign_name(const fs::path& file) {
+  constexpr std::string_view kForeign[] = {".webp", ".avif", ".heic", ".heif", ".tif", ".tiff",
+                                           ".bmp",  ".tga",  ".gif",  ".jp2",  ".exr", ".hdr",
+                                           ".dng",  ".cr2",  ".nef",  ".arw"};
+  const std::string extension = lower_case(file.extension().string());
+  return std::ranges::find(kForeign, extension) != std::end(kForeign);
 }
 
 bool is_folder(const fs::path& path) {
@@ -123,8 +133,21 @@ fs::path ImageFinder::alike(const fs::path& named) {
     }
   };
   consider(name);
-  if (is_image_name(named)) consider(stem);
+  if (is_image_name(named) || is_foreign_name(named)) consider(stem);
   return best ? best->second : fs::path{};
+}
+
+fs::path ImageFinder::find_below(const fs::path& folder, const fs::path& named) {
+  const fs::path path = with_slashes(named);
+  const std::string text = path.string();
+  const bool has_drive = text.size() > 2 && text[1] == ':' && text[2] == '/';
+  if (!has_drive && !text.starts_with('/')) return {};
+  for (auto first = std::next(path.begin()); first != path.end(); ++first) {
+    fs::path end;
+    for (auto part = first; part != path.end(); ++part) end /= *part;
+    if (!find(folder / end).empty()) return (folder / end).lexically_normal();
+  }
+  return {};
 }
 
 fs::path ImageFinder::find(const fs::path& named) {

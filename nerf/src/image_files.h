@@ -24,8 +24,12 @@ std::filesystem::path image_folder(const std::filesystem::path& folder, Index si
 class ImageFinder {
  public:
   /// The file of an image: under its name; with .png, .jpg or .jpeg behind it; with slashes for backslashes;
-  /// in another case, of folders too; with another of these extensions. Empty: none.
+  /// in another case, of folders too; with another of these extensions, also in place of that of another
+  /// format, such as .webp. Empty: none.
   std::filesystem::path find(const std::filesystem::path& named);
+  /// The longest end of an absolute path, of any system, that find() finds in `folder`, behind this folder:
+  /// data sets move from one computer to another. Empty: none, or the path is not absolute.
+  std::filesystem::path find_below(const std::filesystem::path& folder, const std::filesystem::path& named);
 
  private:
   using Listing = std::multimap<std::string, std::filesystem::path>;  // by stem in lower case

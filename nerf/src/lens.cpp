@@ -55,6 +55,13 @@ std::string short_number(double x) {
   return text;
 }
 
+// What a camera without an inverse says of itself: lengths that are no pixels are a frequent cause.
+std::string camera_text(const Camera& c) {
+  return std::to_string(c.width) + " x " + std::to_string(c.height) + " with focal length " +
+         short_number(c.fx) + " and principal point (" + short_number(c.cx) + ", " + short_number(c.cy) +
+         "); check that these are pixels, and that the distortion belongs to them";
+}
+
 void check_invertible(const Camera& c, const Lens& lens) {
   constexpr int kSteps = 32;
   for (int i = 0; i <= kSteps; ++i)
@@ -64,8 +71,7 @@ void check_invertible(const Camera& c, const Lens& lens) {
       if (!lens.undistorted(on_plane(c, x, y)))
         throw ValueError("[covered_part] lens: must have an inverse everywhere in the image, got " +
                          lens.text() + ", which has none at pixel (" + short_number(x) + ", " +
-                         short_number(y) + ") of " + std::to_string(c.width) + " x " +
-                         std::to_string(c.height));
+                         short_number(y) + ") of " + camera_text(c));
     }
 }
 
@@ -84,7 +90,7 @@ void check_inverse(const Camera& c, const Lens& lens, const Crop& part) {
       if (!back || !(std::hypot((*back)[0] - q[0], (*back)[1] - q[1]) * std::max(c.fx, c.fy) < kPixels))
         throw ValueError("[covered_part] lens: must have an inverse to 1e-6 pixels, got " + lens.text() +
                          ", which has none at pixel (" + short_number(x) + ", " + short_number(y) + ") of " +
-                         std::to_string(c.width) + " x " + std::to_string(c.height));
+                         camera_text(c));
     }
 }
 

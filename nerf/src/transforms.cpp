@@ -235,20 +235,6 @@ void tell_of_keys(const Json& json, Transforms& t) {
   t.notes.push_back("keys that are not known and not used: " + names);
 }
 
-// A principal point as a share of the width lies in the corner of the image.
-void tell_of_shares(Transforms& t) {
-  for (const auto& frame : t.frames) {
-    const Intrinsics& i = frame.intrinsics;
-    const auto is_share = [](const std::optional<double>& c) { return c && *c > 0 && *c <= 1; };
-    if (!is_share(i.cx) || !is_share(i.cy) || (i.width > 0 && i.width < 16)) continue;
-    t.notes.push_back("cx " + four_digits(*i.cx) + " and cy " + four_digits(*i.cy) + " of " +
-                      frame.file_path +
-                      " are taken as pixels, which puts the principal point into the image's corner; if they "
-                      "are shares of width and height, multiply them by these");
-    return;
-  }
-}
-
 Transforms::Frame parse_frame(const JsonPlace& frame, const JsonPlace& root, const Intrinsics& all,
                               Repairs& repairs, std::size_t number) {
   const JsonPlace file = frame["file_path"];
@@ -282,7 +268,6 @@ Transforms parse_transforms(std::string_view text, std::string_view path) {
   for (std::size_t i = 0; i < count; ++i) t.frames[i] = parse_frame(frames.at(i), root, all, repairs, i);
   tell_of_repairs(frames, repairs, t);
   tell_of_keys(json, t);
-  tell_of_shares(t);
   constexpr const char* kLists[] = {"train_filenames", "val_filenames", "test_filenames"};
   for (std::size_t i = 0; i < t.splits.size(); ++i) {
     if (!root.has(kLists[i]) || root[kLists[i]].is_null()) continue;

@@ -141,6 +141,7 @@ View read_view(const ViewPlan& plan, std::size_t i) {
   View view{.camera = {}, .rgba = {}, .name = path.stem().string(), .depth = shot.depth};
   view.rgba = to_rgba(at_place(shot.place, [&] { return image_of(shot, path); }));
   const Index width = view.rgba.shape[1], height = view.rgba.shape[0];
+  view.file_width = width, view.file_height = height;
   const Camera whole = at_place(shot.place, [&] { return shot.intrinsics.camera(shot.pose, width, height); });
   Camera scaled = whole.scaled(plan.size);
   view.camera = whole;
@@ -166,6 +167,7 @@ View read_view(const ViewPlan& plan, std::size_t i) {
     for (Index p = 0; p < std::ssize(view.valid); ++p) view.valid[at(p)] = clear[4 * p] > 0.999f;
   }
   view.rgba = shaped(std::move(view.rgba));
+  view.own_width = scaled.width, view.own_height = scaled.height;
   return view;
 }
 

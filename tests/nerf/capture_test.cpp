@@ -1,6 +1,8 @@
 // The splits that a file lists, and the choice among COLMAP models.
 #include "capture.h"
 
+#include <algorithm>
+
 #include "nerf/format_samples.h"
 #include "nerf/training_images.h"
 
@@ -146,4 +148,20 @@ TEST_CASE("capture: COLMAP images under another extension than the model's") {
   const Dataset half = load_dataset(scene.path, {.size = 6});
   CHECK(names(half) == "1 2 3 4 5 6 7 ");
   CHECK(half.views[0].camera.fx == 10);
+}
+
+TEST_CASE("capture: images and masks named by the paths of another computer are found, with a note") {
+  TrainingImages scene;
+  scene.frame(1)["file_path"] = "/home/me/scene/images/1.png";
+  scene.frame(2)["file_path"] = "C:\\scene\\images\\2.png";
+  fs::create_directories(scene.path / "masks");
+  write_png(scene.path / "masks/3.png", Tensor<float>(Shape{8, 12, 3}, 1.f));
+  scene.frame(3)["mask_path"] = "/home/me/scene/masks/3.png";
+  scene.write();
+  const Dataset data = load_dataset(scene.path);
+  CHECK(names(data) == "1 2 3 4 5 6 7 9 ");
+  CHECK(std::ranges::count(data.notes,
+                           "3 files are named by a path that is not there, and found by its end in " +
+                               scene.path.string()) == 1);
+  CHECK(load_dataset(scene.path, {.split = "test"}).views.size() == 2);
 }

@@ -118,6 +118,11 @@ TEST_CASE("dataset: a folder that is no data set names what was looked for") {
       Contains("expected a data set: transforms_train.json (Blender), transforms.json (instant-ngp, "
                "nerfstudio), poses_bounds.npy (LLFF), or cameras.bin or cameras.txt (COLMAP)"));
   CHECK_THROWS_AS(find_layout(folder.path), IoError);
+  fs::create_directories(folder.path / "scene");
+  write_file_atomically(folder.path / "scene/transforms.json", "");
+  CHECK_THROWS_WITH(find_layout(folder.path), Contains("got none of these files; " +
+                                                       (folder.path / "scene").string() + " is a data set"));
+  fs::remove_all(folder.path / "scene");
   write_file_atomically(folder.path / "poses_bounds.npy", "");
   CHECK(find_layout(folder.path) == Layout::llff);
   write_file_atomically(folder.path / "transforms.json", "");

@@ -52,6 +52,30 @@ TEST_CASE("image files: another name is not taken, and of several alike the near
   CHECK(files.found("images/z.png") == "");
 }
 
+TEST_CASE("image files: PNG and JPEG files stand in for those of other formats, not for any extension") {
+  const Files files({"images/0001.jpg", "images/r_0.png"});
+  CHECK(files.found("images/0001.webp") == "images/0001.jpg");
+  CHECK(files.found("images/0001.TIFF") == "images/0001.jpg");
+  CHECK(files.found("images/0002.webp") == "");
+  CHECK(files.found("images/r_0.5") == "");
+}
+
+TEST_CASE("image files: an absolute path of another computer is found by its longest end") {
+  const Files files({"images/1.png", "scene/images/1.png", "1.png"});
+  const auto found = [&](const std::string& named) {
+    const fs::path file = ImageFinder().find_below(files.path, named);
+    return file.empty() ? "" : file.lexically_relative(files.path).string();
+  };
+  CHECK(found("/home/me/scene/images/1.png") == "scene/images/1.png");
+  CHECK(found("/data/images/1.png") == "images/1.png");
+  CHECK(found("C:\\Users\\me\\images\\1.PNG") == "images/1.PNG");
+  CHECK(found("D:/1.png") == "1.png");
+  CHECK(found("/home/me/2.png") == "");
+  CHECK(found("images/1.png") == "");
+  CHECK(found("/") == "");
+  CHECK(found("") == "");
+}
+
 TEST_CASE("image files: a folder's images are without hidden files and masks") {
   const Files files({"b.png", "a.JPEG", "._a.JPEG", "dynamic_mask_a.png", "notes.txt"});
   std::vector<fs::path> found;

@@ -134,10 +134,6 @@ TEST_CASE("transforms: what is not used is told of, once") {
   CHECK(notes("\"rolling_shutter\": [0, 0, 0, 0],").empty());
   CHECK(notes("\"rolling_shutter\": [0, 0.1, 0, 0],") ==
         Notes{"rolling_shutter is not known and not used: each image is taken as one moment"});
-  const Notes share = notes("\"cx\": 0.5, \"cy\": 0.48, \"w\": 800, \"h\": 600,");
-  REQUIRE(share.size() == 1);
-  CHECK_THAT(share[0], Contains("cx 0.5 and cy 0.48 of ./train/r_0 are taken as pixels") &&
-                           Contains("if they are shares of width and height, multiply them by these"));
 }
 
 TEST_CASE("transforms: intrinsics of the file, each replaced where a frame has its own") {

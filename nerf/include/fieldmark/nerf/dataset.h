@@ -39,6 +39,10 @@ struct View {
   /// [height * width] 0 where a mask excludes the pixel or there is none, to be neither learnt nor counted,
   /// else 1; empty: all are valid
   std::vector<std::uint8_t> valid{};
+  Index file_width = 0;   ///< of the image file, pixels; 0: there is none
+  Index file_height = 0;  ///< of the image file, pixels; 0: there is none
+  Index own_width = 0;    ///< pixels at the left that show the image, the others fill it up; 0: all
+  Index own_height = 0;   ///< pixels at the top that show the image, the others fill it up; 0: all
 };
 
 /// One split of a data set in memory.
@@ -75,7 +79,8 @@ struct DatasetOptions {
 /// (or _val, _test), transforms.json, poses_bounds.npy, cameras.bin or cameras.txt (in sparse/0, sparse or
 /// the folder itself). All layouts but blender hold out every 8th image (0, 8, 16, ... of the sorted names)
 /// as val and test, and have the others in train. Images without alpha are opaque. Images are also found
-/// under names with backslashes, in another case or with another extension.
+/// under names with backslashes, in another case or with another extension, and those of transforms by the
+/// end of an absolute path of another computer.
 ///
 /// Masks: the file that a frame's mask_path names, where black excludes, or dynamic_mask_NAME.png beside the
 /// image NAME, where black keeps; see View::valid.
