@@ -24,7 +24,7 @@ struct Entry {
 };
 constexpr Entry kCommands[] = {
     {"scene", "Make a data set of a built-in scene", add_scene},
-    {"data", "List, verify and fetch public data sets", add_data},
+    {"data", "Check a data set; list, verify and fetch public ones", add_data},
     {"train", "Train a field on images", add_train},
     {"eval", "Compare a field with the ground truth", add_eval},
     {"compare", "Compare images: PSNR, SSIM, LPIPS", add_compare},

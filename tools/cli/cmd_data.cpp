@@ -8,6 +8,7 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/data_check.h"
 #include "cli/fetch.h"
 #include "cli/manifest.h"
 #include "cli/suggest.h"
@@ -131,8 +132,13 @@ Command add_data(CommandLine& app) {
                    : "expected http:// or https://, got " + url;
       })
       ->type_name("URL");
-  return [options, lists, fetches](Context& context) {
+  auto examined = std::make_shared<DataCheckArguments>();
+  CommandLine checks =
+      app.add_subcommand("check", "Tell what a data set holds and what is odd about it, with remedies");
+  add_data_check(checks, *examined);
+  return [options, examined, lists, fetches, checks](Context& context) {
     if (lists.parsed()) return list(context);
+    if (checks.parsed()) return run_data_check(*examined, context);
     return fetches.parsed() ? fetch(*options, context) : verify(*options, context);
   };
 }

@@ -145,13 +145,15 @@ void require_healthy(const std::string& fault, const nerf::Dataset& data, const 
 }
 
 // PSNR on the data set's test views, measured after everything is saved; null where there are none.
+// @param surveyed  the training views, of which none should be a test view
 Json test_psnr(const TrainArguments& options, const nerf::RadianceField& field, const nerf::Dataset& train,
-               Context& context) {
+               const std::vector<nerf::SurveyedView>& surveyed, Json& warnings, Context& context) {
   if (!nerf::has_split(options.data, "test")) {
     context.note(options.data + " has no test images, so no PSNR is measured on them");
     return nullptr;
   }
   const auto data = load_scene(options.data, other_split(options, train, "test"), context);
+  warn_of(nerf::twins(surveyed, nerf::survey_views(data)), warnings, context);
   nerf::Renderer renderer(field);
   const InterruptGuard guard;
   Progress progress = context.progress("test views");
@@ -171,6 +173,10 @@ int run_train(const TrainArguments& options, Context& context) {
     throw UsageError("--supersampling: the mlp preset trains with one ray through a pixel's centre");
   check_writable(options.out);
   const nerf::Dataset data = training_data(options, context);
+  const std::vector<nerf::SurveyedView> surveyed = nerf::survey_views(data);
+  Json warnings = Json::array();
+  warn_of(nerf::odd_views(surveyed, data.scene), warnings, context);
+  warn_of(nerf::odd_files(options.data, options.size), warnings, context);
   nerf::RadianceFieldOptions sizes;
   if (options.preset == "mlp")
     sizes.field.kind = nerf::FieldKind::mlp;
@@ -211,7 +217,7 @@ int run_train(const TrainArguments& options, Context& context) {
   field.save(options.out);
   std::filesystem::remove(checkpoint);
 
-  const Json psnr = test_psnr(options, field, data, context);
+  const Json psnr = test_psnr(options, field, data, surveyed, warnings, context);
   const auto bytes = std::filesystem::file_size(options.out);
   char line[200];
   std::snprintf(line, sizeof line, "%lld steps%s in %.1f s, %.2f MB", static_cast<long long>(trainer.steps()),
@@ -230,7 +236,8 @@ int run_train(const TrainArguments& options, Context& context) {
               {"replanned", trainer.replanned()},
               {"samples_per_second", (trainer.samples() - samples_before) / (seconds - begun)},
               {"parameters", field.params.parameters()},
-              {"file_bytes", bytes}};
+              {"file_bytes", bytes},
+              {"warnings", warnings}};
   if (!sizing.is_null()) result["sizing"] = sizing;
   context.result(result);
   return kOk;

@@ -1,17 +1,25 @@
 #pragma once
+#include <fieldmark/nerf/data_survey.h>
 #include <fieldmark/nerf/dataset.h>
 
 #include <filesystem>
 #include <string>
+#include <vector>
+
+#include "cli/context.h"
 
 namespace fieldmark::cli {
-
-class Context;
 
 /// The path of a file or folder in $FIELDMARK_DATA; empty if it or the variable does not exist.
 std::filesystem::path shared_data(const std::string& path);
 
 /// nerf::load_dataset(), with its notes passed to the context.
 nerf::Dataset load_scene(const std::string& folder, const nerf::DatasetOptions& options, Context& context);
+
+/// An entry of "warnings" of the results: kind, count, text, remedy, images and partners.
+Json warning_of(const nerf::Oddity& oddity);
+
+/// Prints what is odd about a data set, a line each, and adds it to `warnings`.
+void warn_of(const std::vector<nerf::Oddity>& oddities, Json& warnings, Context& context);
 
 }  // namespace fieldmark::cli
