@@ -98,7 +98,8 @@ std::vector<Oddity> odd_views(std::span<const SurveyedView> views, SceneType sce
 std::vector<Oddity> twins(std::span<const SurveyedView> train, std::span<const SurveyedView> held_out) {
   std::vector<double> from_middle = distances_from_middle(train);
   std::ranges::sort(from_middle);
-  const double scale = from_middle.empty() ? 0 : from_middle[from_middle.size() / 2];
+  // Not the median: of many duplicates it is 0.
+  const double scale = from_middle.empty() ? 0 : from_middle[(from_middle.size() - 1) * 9 / 10];
   Oddity found{.kind = "twins",
                .remedy =
                    "hold out other images, or remove the training images that show the same: until then "
