@@ -117,11 +117,37 @@ void put_broadcast_gradient(const Broadcast& p, const Broadcast::Operand& o, Var
   if (!o.whole) put_sums(x.tape(), to, p.summed(o), 1, dx, fresh);
 }
 
+// binary() of equal shapes, which need no plan: small ops would take twice as long with one.
+template <class T, class F, class A, class B>
+Var<T> binary_of_equal(Var<T> a, Var<T> b, F f, A slope_a, B slope_b, std::source_location from) {
+  T* y = nullptr;
+  const Var<T> out = a.tape().output(a.shape(), &y, {a, b}, from);
+  parallel_for(a.shape().size(), kGrain, [&](Index begin, Index end) {
+    const Index n = end - begin;
+    Out<T>(y + begin, n) = f(In<T>(a.value() + begin, n), In<T>(b.value() + begin, n));
+  });
+  a.tape().on_backward(out, [a, b, slope_a, slope_b](const T* dy) {
+    const auto put_gradient = [&](Var<T> x, auto slope) {
+      bool fresh = false;
+      T* dx = x.grad_acc(&fresh);
+      if (!dx) return;
+      parallel_for(x.shape().size(), kGrain, [&](Index begin, Index end) {
+        const auto part = [&](const T* p) { return In<T>(p + begin, end - begin); };
+        put(Out<T>(dx + begin, end - begin), slope(part(a.value()), part(b.value()), part(dy)), fresh);
+      });
+    };
+    put_gradient(a, slope_a);
+    put_gradient(b, slope_b);
+  });
+  return out;
+}
+
 // y = f(a, b) and its backwards da = slope_a(a, b, dy), db = slope_b(a, b, dy), expressions of arrays. A
 // chunk owns its elements; sums over repeated elements run in double.
 template <class T, class F, class A, class B>
 Var<T> binary(const char* op, Var<T> a, Var<T> b, F f, A slope_a, B slope_b,
               std::source_location from = std::source_location::current()) {
+  if (a.shape() == b.shape()) return binary_of_equal(a, b, f, slope_a, slope_b, from);
   const Broadcast p(op, a.shape(), b.shape());
   T* y = nullptr;
   const Var<T> out = a.tape().output(p.shape, &y, {a, b}, from);
