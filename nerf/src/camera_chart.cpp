@@ -14,7 +14,7 @@ namespace {
 
 // Pixels.
 constexpr Index kWidth = 1240, kHeight = 700;
-constexpr double kPanel = 580, kTop = 90, kGap = 20, kMargin = 30, kTitle = 66;
+constexpr double kPanel = 580, kPanelTop = 90, kGap = 20, kMargin = 30, kTitle = 66;
 constexpr double kPyramid = 0.06;  // depth of a camera's, of the side of a panel
 constexpr double kRoom = 1.12;     // of the cameras in a panel
 
@@ -38,11 +38,11 @@ struct Frame {
 CanvasPoint place(const Panel& panel, const Frame& frame, const Vec3& p) {
   const Vec3 from = p - frame.middle;
   return {panel.left + kPanel / 2 + frame.scale * dot(panel.right, from),
-          kTop + kPanel / 2 - frame.scale * dot(panel.up, from)};
+          kPanelTop + kPanel / 2 - frame.scale * dot(panel.up, from)};
 }
 
 bool is_inside(const Panel& panel, const CanvasPoint& p) {
-  return p.x >= panel.left && p.x <= panel.left + kPanel && p.y >= kTop && p.y <= kTop + kPanel;
+  return p.x >= panel.left && p.x <= panel.left + kPanel && p.y >= kPanelTop && p.y <= kPanelTop + kPanel;
 }
 
 // Upwards, the mean viewing direction across it, and what is to its right.
@@ -113,7 +113,7 @@ void draw_camera(Canvas& canvas, const Panel& panel, const Frame& frame, const R
 void draw_beyond(Canvas& canvas, const Panel& panel, CanvasPoint at, const ReportedCamera& camera,
                  double times) {
   at.x = std::clamp(at.x, panel.left + 8, panel.left + kPanel - 8);
-  at.y = std::clamp(at.y, kTop + 8, kTop + kPanel - 8);
+  at.y = std::clamp(at.y, kPanelTop + 8, kPanelTop + kPanel - 8);
   canvas.line(at, at, 10, kOutlying);
   char text[32];
   std::snprintf(text, sizeof text, ", %.3g away", times);
@@ -127,7 +127,7 @@ void draw_beyond(Canvas& canvas, const Panel& panel, CanvasPoint at, const Repor
 void draw_scale(Canvas& canvas, const Panel& panel, const Frame& frame) {
   const double most = 0.3 * kPanel / frame.scale, power = std::pow(10, std::floor(std::log10(most)));
   const double length = power * (most >= 5 * power ? 5 : most >= 2 * power ? 2 : 1);
-  const double y = kTop + kPanel - 14, x = panel.left + 14, end = x + length * frame.scale;
+  const double y = kPanelTop + kPanel - 14, x = panel.left + 14, end = x + length * frame.scale;
   canvas.line({x, y}, {end, y}, 2, kText);
   for (const double at : {x, end}) canvas.line({at, y - 4}, {at, y + 4}, 2, kText);
   char text[32];
@@ -137,7 +137,7 @@ void draw_scale(Canvas& canvas, const Panel& panel, const Frame& frame) {
 
 // The axes of the world as they lie in the panel, at the lower right.
 void draw_axes(Canvas& canvas, const Panel& panel) {
-  const CanvasPoint origin{panel.left + kPanel - 50, kTop + kPanel - 46};
+  const CanvasPoint origin{panel.left + kPanel - 50, kPanelTop + kPanel - 46};
   for (std::size_t a = 0; a < 3; ++a) {
     Vec3 axis{};
     axis[a] = 1;
@@ -150,7 +150,7 @@ void draw_axes(Canvas& canvas, const Panel& panel) {
 }
 
 void draw_panel(Canvas& canvas, const Panel& panel, const Frame& frame, const DataReport& report) {
-  const double l = panel.left, r = l + kPanel, t = kTop, b = kTop + kPanel;
+  const double l = panel.left, r = l + kPanel, t = kPanelTop, b = kPanelTop + kPanel;
   for (const auto& [from, to] : {std::pair{CanvasPoint{l, t}, CanvasPoint{r, t}},
                                  {{r, t}, {r, b}},
                                  {{r, b}, {l, b}},
