@@ -13,7 +13,7 @@ namespace {
 constexpr Canvas::Ink kBlack{0, 0, 0};
 
 // Covered pixels, in fractions.
-double area(const Canvas& canvas) {
+double covered_area(const Canvas& canvas) {
   double sum = 0;
   for (const float v : canvas.image().data) sum += 1 - static_cast<double>(v);
   return sum / 3;
@@ -22,15 +22,15 @@ double area(const Canvas& canvas) {
 
 TEST_CASE("canvas: a disc and a line have their areas, and lie where they were drawn") {
   Canvas disc(40, 60);
-  CHECK(area(disc) == 0);
+  CHECK(covered_area(disc) == 0);
   CHECK(disc.image().shape == Shape{40, 60, 3});
   disc.line({30, 20}, {30, 20}, 20, kBlack);
-  CHECK(area(disc) == Approx(std::numbers::pi * 100).epsilon(0.01));
+  CHECK(covered_area(disc) == Approx(std::numbers::pi * 100).epsilon(0.01));
   CHECK(disc.image()[3 * (20 * 60 + 30)] == 0);
   CHECK(disc.image()[3 * (20 * 60 + 41)] == 1);
   Canvas slanted(40, 60);
   slanted.line({10, 10}, {40, 30}, 3, kBlack);
-  CHECK(area(slanted) == Approx(3 * std::hypot(30, 20) + std::numbers::pi * 1.5 * 1.5).epsilon(0.01));
+  CHECK(covered_area(slanted) == Approx(3 * std::hypot(30, 20) + std::numbers::pi * 1.5 * 1.5).epsilon(0.01));
   // Along the middle of a row: one pixel thick, half of none beside it.
   Canvas row(5, 9);
   row.line({2.5, 2.5}, {6.5, 2.5}, 1, {0.25f, 0.5f, 0.75f});
@@ -47,17 +47,17 @@ TEST_CASE("canvas: shapes outside it and without a place leave it white") {
   canvas.line({1, 4}, {inf, 4}, 2, kBlack);
   canvas.line({1, 4}, {3, 4}, nan, kBlack);
   canvas.text({100, -200}, "far", 2, kBlack);
-  CHECK(area(canvas) == 0);
+  CHECK(covered_area(canvas) == 0);
   canvas.line({-1e9, 4.5}, {1e9, 4.5}, 1, kBlack);
-  CHECK(area(canvas) == Approx(8));
+  CHECK(covered_area(canvas) == Approx(8));
 }
 
 TEST_CASE("canvas: text has its width, grows with its scale and survives any byte") {
   Canvas one(20, 200), two(40, 400);
   one.text({3, 2}, "fern_2", 1, kBlack);
   two.text({6, 4}, "fern_2", 2, kBlack);
-  CHECK(area(one) > 40);
-  CHECK(area(two) == 4 * area(one));
+  CHECK(covered_area(one) > 40);
+  CHECK(covered_area(two) == 4 * covered_area(one));
   for (Index y = 0; y < 40; ++y)
     for (Index x = 0; x < 400; ++x)
       REQUIRE(two.image()[3 * (y * 400 + x)] == one.image()[3 * (y / 2 * 200 + x / 2)]);
@@ -70,7 +70,7 @@ TEST_CASE("canvas: text has its width, grows with its scale and survives any byt
   for (int c = 0; c < 256; ++c) all += static_cast<char>(c);
   Canvas any(20, 3000), marks(20, 3000);
   any.text({0, 0}, all, 1, kBlack);
-  CHECK(area(any) > 1000);
+  CHECK(covered_area(any) > 1000);
   any = Canvas(20, 3000);
   any.text({0, 0}, "\xff\n", 1, kBlack), marks.text({0, 0}, "??", 1, kBlack);
   CHECK(any.image().data == marks.image().data);
