@@ -181,7 +181,7 @@ void RandomGraph::add_layout(Table& t) {
     const std::size_t x = g.any(1), y = g.input(g.vars_[x].shape());
     const int axis = g.axis_of(x);
     g.emit("concatenate", {x, y, x}, {{"axis", axis}},
-           concatenate({g.vars_[x], g.vars_[y], g.vars_[x]}, axis));
+           fieldmark::concatenate({g.vars_[x], g.vars_[y], g.vars_[x]}, axis));
   };
 }
 

@@ -18,7 +18,8 @@ struct DenseResult {
   bool operator==(const DenseResult&) const = default;
 };
 
-DenseResult run(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, Activation act) {
+DenseResult run_dense(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b,
+                      Activation act) {
   Tape<float> tape;
   Tensor<float> dx(x.shape), dw(w.shape), db(b.shape);
   const auto y = dense(tape.leaf(x, dx), tape.leaf(w, dw), tape.leaf(b, db), act);
@@ -48,7 +49,7 @@ DenseResult plain_dense(const Tensor<float>& x, const Tensor<float>& w, const Te
   return {f(y), f(dx), f(dw), f(db)};
 }
 
-double error(const std::vector<float>& a, const std::vector<float>& b) {
+double dense_error(const std::vector<float>& a, const std::vector<float>& b) {
   double worst = 0, size = 1e-30;
   for (std::size_t i = 0; i < a.size(); ++i) {
     raise_to(worst, std::abs(double(a[i]) - b[i]));
@@ -67,12 +68,13 @@ TEST_CASE("dense: the float path, forward and all gradients, against double loop
                    b = uniform<float>({19}, -1, 1, 3);
         const auto x2 = uniform<float>({41, e}, -1, 1, 1), w2 = uniform<float>({e, 131 - e}, -1, 1, 2),
                    b2 = uniform<float>({131 - e}, -1, 1, 3);
-        for (const auto& [got, want] : {std::pair{run(x, w, b, act), plain_dense(x, w, b, act)},
-                                        std::pair{run(x2, w2, b2, act), plain_dense(x2, w2, b2, act)}}) {
-          CHECK(error(got.y, want.y) < 1e-6);
-          CHECK(error(got.dx, want.dx) < 1e-6);
-          CHECK(error(got.dw, want.dw) < 1e-6);
-          CHECK(error(got.db, want.db) < 1e-6);
+        for (const auto& [got, want] :
+             {std::pair{run_dense(x, w, b, act), plain_dense(x, w, b, act)},
+              std::pair{run_dense(x2, w2, b2, act), plain_dense(x2, w2, b2, act)}}) {
+          CHECK(dense_error(got.y, want.y) < 1e-6);
+          CHECK(dense_error(got.dx, want.dx) < 1e-6);
+          CHECK(dense_error(got.dw, want.dw) < 1e-6);
+          CHECK(dense_error(got.db, want.db) < 1e-6);
         }
       }
   });
@@ -120,7 +122,7 @@ TEST_CASE("dense: same bits for 1 and 2 threads, also where the rows are split")
              b = uniform<float>({24}, -1, 1, 3);
   const ScopedThreads before(threads());
   set_threads(1);
-  const DenseResult one = run(x, w, b, Activation::relu);
+  const DenseResult one = run_dense(x, w, b, Activation::relu);
   set_threads(2);
-  CHECK(one == run(x, w, b, Activation::relu));
+  CHECK(one == run_dense(x, w, b, Activation::relu));
 }
