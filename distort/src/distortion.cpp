@@ -31,7 +31,7 @@ struct Kind {
   DistortionKind kind;
   double low, high;
 };
-constexpr std::array<Kind, 16> kKinds{{{"noise", DistortionKind::noise, 0, 1},
+constexpr std::array<Kind, 18> kKinds{{{"noise", DistortionKind::noise, 0, 1},
                                        {"rotation", DistortionKind::rotation, 0, 180},
                                        {"scale", DistortionKind::scale, 0.01, 4},
                                        {"scale-nearest", DistortionKind::scale_nearest, 0.01, 4},
@@ -40,8 +40,10 @@ constexpr std::array<Kind, 16> kKinds{{{"noise", DistortionKind::noise, 0, 1},
                                        {"scale-lanczos", DistortionKind::scale_lanczos, 0.01, 4},
                                        {"blur", DistortionKind::blur, 0, 100},
                                        {"crop", DistortionKind::crop, 0.0001, 1},
-                                       {"jpeg", DistortionKind::jpeg, 1, 90},
+                                       {"jpeg", DistortionKind::jpeg, 1, 100},
                                        {"jpeg444", DistortionKind::jpeg444, 1, 100},
+                                       {"webp", DistortionKind::webp, 1, 100},
+                                       {"h264", DistortionKind::h264, 0, 51},
                                        {"gamma", DistortionKind::gamma, 0.01, 10},
                                        {"brightness", DistortionKind::brightness, 0, 10},
                                        {"contrast", DistortionKind::contrast, 0, 10},
@@ -69,7 +71,17 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kChains{
     {{"combined", "noise_0.10,crop_0.40,jpeg_50"},
      {"screenshot", "scale-bicubic_1.25,blur_0.5,gamma_1.1,scale-lanczos_0.8,jpeg_80"}}};
 
-bool is_whole(DistortionKind kind) { return kind == DistortionKind::jpeg || kind == DistortionKind::jpeg444; }
+bool is_whole(DistortionKind kind) {
+  using enum DistortionKind;
+  return kind == jpeg || kind == jpeg444 || kind == webp || kind == h264;
+}
+
+// A chain that this build cannot apply is refused before the work begins. Any image tells.
+void check_library(const Distortion::Step& step) {
+  const Tensor<float> pixel({1, 1, 3});
+  if (step.kind == DistortionKind::webp) encode_webp(pixel, static_cast<int>(step.amount));
+  if (step.kind == DistortionKind::jpeg) encode_jpeg(pixel, static_cast<int>(step.amount));
+}
 
 [[noreturn]] void fail(std::string_view name) {
   std::string text = "[distortion] name: must be a chain, separated by commas, of";
@@ -85,6 +97,12 @@ bool is_whole(DistortionKind kind) { return kind == DistortionKind::jpeg || kind
   throw ValueError(text + ", got '" + std::string(name) + "'");
 }
 
+void refuse_clip(const Distortion& distortion) {
+  if (needs_clip(distortion))
+    throw ValueError("[distortion] name: h264 needs a clip, images in order, where '" + distortion.name +
+                     "' is for single images; `fieldmark distort` applies it to a folder");
+}
+
 Distortion::Step parse_step(std::string_view name) {
   for (const PlainKind& plain : kPlainKinds)
     if (name == plain.name) return {plain.kind, 0};
@@ -98,7 +116,9 @@ Distortion::Step parse_step(std::string_view name) {
   // Written so that nan fails.
   if (error != std::errc() || stop != end || !(amount >= kind->low && amount <= kind->high)) fail(name);
   if (is_whole(kind->kind) && amount != std::floor(amount)) fail(name);
-  return {kind->kind, amount};
+  const Distortion::Step step{kind->kind, amount};
+  check_library(step);
+  return step;
 }
 
 // Counters of one step for one image: (index, step << 40 | i).
@@ -229,6 +249,10 @@ Tensor<float> apply(const Distortion::Step& step, const Tensor<float>& x, const 
       return jpeg_round_trip(x, static_cast<int>(step.amount));
     case DistortionKind::jpeg444:
       return jpeg444(x, static_cast<int>(step.amount));
+    case DistortionKind::webp:
+      return webp_round_trip(x, static_cast<int>(step.amount));
+    case DistortionKind::h264:
+      break;  // refused by apply_distortion()
     case DistortionKind::gamma:
       return map_values(x, [a](float v) { return std::pow(std::max(v, 0.f), a); });
     case DistortionKind::brightness:
@@ -321,8 +345,19 @@ PixelMap PixelMap::inverse() const {
   return back;
 }
 
+bool needs_clip(const Distortion& distortion) {
+  return std::ranges::any_of(distortion.steps,
+                             [](const auto& step) { return step.kind == DistortionKind::h264; });
+}
+
 Distortion parse_distortion(std::string_view name) {
-  Distortion distortion{std::string(name), {}};
+  Distortion distortion = parse_clip_distortion(name);
+  refuse_clip(distortion);
+  return distortion;
+}
+
+Distortion parse_clip_distortion(std::string_view name) {
+  Distortion distortion{.name = std::string(name), .steps = {}};
   std::string_view rest = name;
   for (bool more = true; more;) {
     const std::size_t comma = rest.find(',');
@@ -330,7 +365,7 @@ Distortion parse_distortion(std::string_view name) {
     const auto chain =
         std::find_if(kChains.begin(), kChains.end(), [&](const auto& c) { return c.first == step; });
     if (chain != kChains.end()) {
-      for (const auto& s : parse_distortion(chain->second).steps) distortion.steps.push_back(s);
+      for (const auto& s : parse_clip_distortion(chain->second).steps) distortion.steps.push_back(s);
     } else {
       distortion.steps.push_back(parse_step(step));
     }
@@ -340,6 +375,19 @@ Distortion parse_distortion(std::string_view name) {
   return distortion;
 }
 
+std::vector<Distortion> clip_stages(const Distortion& distortion) {
+  std::vector<Distortion> stages;
+  bool alone = true;  // the last stage takes no more steps
+  for (std::size_t i = 0; i < distortion.steps.size(); ++i) {
+    const bool clip = distortion.steps[i].kind == DistortionKind::h264;
+    if (clip || alone)
+      stages.push_back({.name = distortion.name, .steps = {}, .first = distortion.first + i});
+    stages.back().steps.push_back(distortion.steps[i]);
+    alone = clip;
+  }
+  return stages;
+}
+
 Tensor<float> apply_distortion(const Distortion& distortion, const Tensor<float>& image,
                                const CounterRng& rng, std::uint64_t index, std::span<const float> background,
                                PixelMap* source) {
@@ -347,12 +395,13 @@ Tensor<float> apply_distortion(const Distortion& distortion, const Tensor<float>
   if (background.size() != 3)
     throw ShapeError("[distortion] background: must have 3 elements, got " +
                      std::to_string(background.size()));
+  refuse_clip(distortion);
   const auto round = [](const Tensor<float>& x) {
     return run(x, [](auto v, auto&) { return quantize8(v); });
   };
   Tensor<float> x = image;
   PixelMap map;
-  std::uint64_t base = 0;
+  std::uint64_t base = std::uint64_t{distortion.first} << 40;
   for (const auto& step : distortion.steps) {
     const Draws draws{rng, index, base};
     const Shape before = x.shape;

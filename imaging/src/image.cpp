@@ -4,11 +4,19 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <string>
 
+#include "avif_file.h"
+#include "decoding.h"
+#include "fieldmark/imaging/image_format.h"
+#include "heic_file.h"
 #include "jpeg_segments.h"
+#include "jpeg_turbo.h"
+#include "png_chunks.h"
+#include "webp_file.h"
 
 // Static, and in this file only: a program that brings its own stb does not collide with ours.
 #pragma GCC diagnostic push
@@ -119,23 +127,76 @@ Tensor<float> unended(std::span<const std::byte> bytes, const JpegSegments& part
   return image;
 }
 
-Tensor<float> decode(std::span<const std::byte> bytes, std::string_view name, int want_channels) {
-  const auto fail = [&](const std::string& reason) {
-    throw IoError("[read_image] " + std::string(name) + ": expected a PNG or JPEG image, found " +
-                  std::to_string(bytes.size()) + " bytes that do not decode: " + reason);
+// The pixels of a PNG file without an end chunk, or none if some of the image is missing: what stands behind
+// the end of its compressed data is never read.
+Tensor<float> unended(std::span<const std::byte> bytes, const PngChunks& chunks, int want_channels) {
+  constexpr std::size_t kFillers = 64;
+  if (!chunks.has_data) return {};
+  const auto continued_by = [&](std::byte filler) {
+    std::vector<std::byte> file(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(chunks.end));
+    std::fill_n(std::back_inserter(file), chunks.lacks, std::byte{0});
+    const auto add = [&](std::string_view kind, std::size_t size) {
+      file.insert(file.end(), {std::byte{0}, std::byte{0}, std::byte{0}, static_cast<std::byte>(size)});
+      for (const char c : kind) file.push_back(static_cast<std::byte>(c));
+      std::fill_n(std::back_inserter(file), size + 4, filler);
+    };
+    add("IDAT", kFillers);
+    add("IEND", 0);
+    return pixels_of(file, want_channels);
   };
-  if (bytes.size() > kMaxBytes - 1024) fail("more than 2^31 bytes");
-  JpegSegments parts{.end = bytes.size(), .complete = true};
+  Tensor<float> image = continued_by(std::byte{0});
+  for (const int filler : {0x55, 0xaa, 0xff})
+    if (continued_by(static_cast<std::byte>(filler)).data != image.data) return {};
+  return image;
+}
+
+// A file that stb reads. It reads beyond the end of a JPEG file, and no PNG file without one.
+Tensor<float> decode_by_stb(std::span<const std::byte> bytes, int want_channels) {
+  if (bytes.size() > kMaxBytes - 1024) throw Undecodable("more than 2^31 bytes");
+  int width = 0, height = 0, channels = 0;
+  if (stbi_info_from_memory(data_of(bytes), static_cast<int>(bytes.size()), &width, &height, &channels))
+    check_area(width, height, bytes.size());
+  bool complete = true;
+  Tensor<float> image;
   if (is_jpeg(bytes)) {
-    parts = jpeg_segments(bytes);
+    const JpegSegments parts = jpeg_segments(bytes);
     // stb would return memory that nothing was written to.
     if (std::ranges::none_of(parts.segments, [](const JpegSegment& s) { return s.marker == kScan; }))
-      fail("a JPEG file without an image, truncated");
+      throw Undecodable("a JPEG file without an image, truncated");
+    complete = parts.complete;
+    image = complete ? pixels_of(bytes, want_channels) : unended(bytes, parts, want_channels);
+  } else {
+    const PngChunks chunks = png_chunks(bytes);
+    complete = chunks.complete;
+    image = complete ? pixels_of(bytes, want_channels) : unended(bytes, chunks, want_channels);
   }
-  Tensor<float> image =
-      parts.complete ? pixels_of(bytes, want_channels) : unended(bytes, parts, want_channels);
-  if (image.data.empty()) fail(parts.complete ? stbi_failure_reason() : "no end marker, truncated");
+  if (image.data.empty()) throw Undecodable(complete ? stbi_failure_reason() : "no end marker, truncated");
   return image;
+}
+
+Tensor<float> decode(std::span<const std::byte> bytes, std::string_view name, int want_channels) {
+  try {
+    switch (image_format(bytes)) {
+      case ImageFormat::png:
+      case ImageFormat::jpeg:
+        return decode_by_stb(bytes, want_channels);
+      case ImageFormat::webp:
+        return decode_webp(bytes);
+      case ImageFormat::avif:
+        return decode_avif(bytes);
+      case ImageFormat::heic:
+        return decode_heic(bytes);
+      case ImageFormat::video:
+        throw Undecodable("a video, whose frames extract, verify, trace and null read");
+      case ImageFormat::unknown:
+        break;
+    }
+    throw Undecodable("unknown image type");
+  } catch (const Undecodable& e) {
+    throw IoError("[read_image] " + std::string(name) +
+                  ": expected a PNG, JPEG, WebP, AVIF or HEIC image, found " + std::to_string(bytes.size()) +
+                  " bytes that do not decode: " + e.what());
+  }
 }
 
 }  // namespace
@@ -160,16 +221,18 @@ void write_png(const std::filesystem::path& path, const Tensor<float>& image) {
   write_file_atomically(path, std::as_bytes(std::span(png.get(), static_cast<std::size_t>(size))));
 }
 
-std::vector<std::byte> encode_jpeg(const Tensor<float>& image, int quality) {
+std::vector<std::byte> encode_jpeg(const Tensor<float>& image, int quality, Chroma chroma) {
   check_image("encode_jpeg", image, 65535);
   if (image.shape[2] == 2 || image.shape[2] == 4)
     throw ShapeError("[encode_jpeg] image: channels must be 1 or 3 (JPEG has no alpha), got shape " +
                      image.shape.str());
-  if (quality < 1 || quality > 90)
-    throw ValueError(
-        "[encode_jpeg] quality must be from 1 to 90 (above 90 the encoder does not halve chroma), got " +
-        std::to_string(quality));
+  if (quality < 1 || quality > 100)
+    throw ValueError("[encode_jpeg] quality must be from 1 to 100, got " + std::to_string(quality));
   const auto pixels = bytes_of(image);
+  // stb halves chroma up to this quality and never above.
+  if (constexpr int kHalvedByStb = 90; quality > kHalvedByStb || chroma == Chroma::full)
+    return encode_jpeg_turbo(pixels, static_cast<int>(image.shape[0]), static_cast<int>(image.shape[1]),
+                             static_cast<int>(image.shape[2]), quality, chroma == Chroma::full);
   std::vector<std::byte> out;
   auto append = [](void* context, void* data, int size) {
     const auto* bytes = static_cast<const std::byte*>(data);
@@ -183,8 +246,8 @@ std::vector<std::byte> encode_jpeg(const Tensor<float>& image, int quality) {
   return out;
 }
 
-Tensor<float> jpeg_round_trip(const Tensor<float>& image, int quality) {
-  const auto file = encode_jpeg(image, quality);
+Tensor<float> jpeg_round_trip(const Tensor<float>& image, int quality, Chroma chroma) {
+  const auto file = encode_jpeg(image, quality, chroma);
   return decode(file, "JPEG in memory", static_cast<int>(image.shape[2]));
 }
 

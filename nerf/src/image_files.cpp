@@ -1,6 +1,7 @@
 #include "image_files.h"
 
 #include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/image_format.h>
 
 #include <algorithm>
 #include <limits>
@@ -19,16 +20,17 @@ std::string lower_case(std::string text) {
   return text;
 }
 
-bool is_image_name(const fs::path& file) {
-  const std::string extension = lower_case(file.extension().string());
-  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+std::string upper_case(std::string_view text) {
+  std::string upper(text);
+  for (char& c : upper)
+    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
+  return upper;
 }
 
-// A name that another program gave to an image which may stand here as PNG or JPEG.
+// A name that another program gave to an image which may stand here in a format that is read.
 bool is_foreign_name(const fs::path& file) {
-  constexpr std::string_view kForeign[] = {".webp", ".avif", ".heic", ".heif", ".tif", ".tiff",
-                                           ".bmp",  ".tga",  ".gif",  ".jp2",  ".exr", ".hdr",
-                                           ".dng",  ".cr2",  ".nef",  ".arw"};
+  constexpr std::string_view kForeign[] = {".tif", ".tiff", ".bmp", ".tga", ".gif", ".jp2",
+                                           ".exr", ".hdr",  ".dng", ".cr2", ".nef", ".arw"};
   const std::string extension = lower_case(file.extension().string());
   return std::ranges::find(kForeign, extension) != std::end(kForeign);
 }
@@ -40,8 +42,11 @@ bool is_folder(const fs::path& path) {
 
 // The file of this very name, or with an extension behind it.
 fs::path spelled_so(const fs::path& named) {
-  for (const char* extension : {"", ".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"}) {
-    fs::path file = named.string() + extension;
+  std::vector<std::string> endings{""};
+  for (const std::string_view extension : image_extensions()) endings.emplace_back(extension);
+  for (const std::string_view extension : image_extensions()) endings.push_back(upper_case(extension));
+  for (const std::string& ending : endings) {
+    fs::path file = named.string() + ending;
     std::error_code ignored;
     if (fs::is_regular_file(file, ignored)) return file;
   }
@@ -76,7 +81,7 @@ std::vector<fs::path> images_in(const fs::path& folder) {
   if (!is_folder(folder)) return found;
   for (const auto& entry : fs::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
-    if (is_image_name(name) && !name.starts_with('.') && !name.starts_with("dynamic_mask_"))
+    if (has_image_extension(name) && !name.starts_with('.') && !name.starts_with("dynamic_mask_"))
       found.push_back(entry.path());
   }
   std::sort(found.begin(), found.end());
@@ -113,7 +118,7 @@ const ImageFinder::Listing& ImageFinder::listing(const fs::path& folder) {
   if (real.empty()) return place->second;
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(real, ignored))
-    if (is_image_name(entry.path()) && entry.is_regular_file(ignored))
+    if (has_image_extension(entry.path()) && entry.is_regular_file(ignored))
       place->second.emplace(lower_case(entry.path().stem().string()), entry.path());
   return place->second;
 }
@@ -133,7 +138,7 @@ fs::path ImageFinder::alike(const fs::path& named) {
     }
   };
   consider(name);
-  if (is_image_name(named) || is_foreign_name(named)) consider(stem);
+  if (has_image_extension(named) || is_foreign_name(named)) consider(stem);
   return best ? best->second : fs::path{};
 }
 

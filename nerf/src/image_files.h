@@ -12,7 +12,7 @@ namespace fieldmark::nerf {
 /// A path with slashes for backslashes, normalised. Files from Windows have backslashes.
 std::filesystem::path with_slashes(const std::filesystem::path& path);
 
-/// The image files of a folder (.png, .jpg, .jpeg in any case), sorted by name, without hidden files and
+/// The image files of a folder (see has_image_extension()), sorted by name, without hidden files and
 /// masks (dynamic_mask_NAME.png); none where there is no folder.
 std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder);
 
@@ -23,9 +23,9 @@ std::filesystem::path image_folder(const std::filesystem::path& folder, Index si
 /// Finds files by name; lists each folder once.
 class ImageFinder {
  public:
-  /// The file of an image: under its name; with .png, .jpg or .jpeg behind it; with slashes for backslashes;
-  /// in another case, of folders too; with another of these extensions, also in place of that of another
-  /// format, such as .webp. Empty: none.
+  /// The file of an image: under its name; with one of image_extensions() behind it; with slashes for
+  /// backslashes; in another case, of folders too; with another of these extensions, also in place of that of
+  /// another format, such as .tif. Empty: none.
   std::filesystem::path find(const std::filesystem::path& named);
   /// The longest end of an absolute path, of any system, that find() finds in `folder`, behind this folder:
   /// data sets move from one computer to another. Empty: none, or the path is not absolute.

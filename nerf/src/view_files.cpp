@@ -2,8 +2,8 @@
 
 #include <fieldmark/core/files.h>
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/imaging/exif.h>
 #include <fieldmark/imaging/image.h>
-#include <fieldmark/imaging/jpeg_file.h>
 #include <fieldmark/imaging/resize.h>
 
 #include <algorithm>
@@ -66,22 +66,6 @@ const LensPart* part_of(const ViewPlan& plan, const Shot& shot) {
   for (const LensPart& p : plan.parts)
     if (p.stated_width == shot.intrinsics.width && p.stated_height == shot.intrinsics.height) return &p;
   return nullptr;
-}
-
-// The image as exif_orientation() asks for it.
-Tensor<float> turned(const Tensor<float>& image, int orientation) {
-  const Index h = image.shape[0], w = image.shape[1], channels = image.shape[2];
-  const bool across = orientation >= 5;
-  Tensor<float> out(across ? Shape{w, h, channels} : Shape{h, w, channels});
-  for (Index y = 0; y < out.shape[0]; ++y)
-    for (Index x = 0; x < out.shape[1]; ++x) {
-      Index row = across ? x : y, column = across ? y : x;
-      if (orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7) row = h - 1 - row;
-      if (orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8)
-        column = w - 1 - column;
-      std::copy_n(&image[(row * w + column) * channels], channels, &out[(y * out.shape[1] + x) * channels]);
-    }
-  return out;
 }
 
 bool has_proportions(const Intrinsics& stated, Index width, Index height) {

@@ -4,13 +4,16 @@
 #include <fieldmark/distort/quantize8.h>
 #include <fieldmark/distort/resize_area.h>
 #include <fieldmark/distort/rotate.h>
+#include <fieldmark/imaging/image_format.h>
 #include <fieldmark/imaging/resize.h>
 
+#include <cmath>
 #include <numbers>
 #include <set>
 
 #include "distort/support.h"
 #include "support/catch.h"
+#include "support/library.h"
 #include "support/worst.h"
 
 using namespace fieldmark;
@@ -63,13 +66,14 @@ TEST_CASE("distortion: wrong names list the right ones") {
       "[distortion] name: must be a chain, separated by commas, of noise_A (0 to 1), rotation_A (0 "
       "to 180), scale_A (0.01 to 4), scale-nearest_A (0.01 to 4), scale-bilinear_A (0.01 to 4), "
       "scale-bicubic_A (0.01 to 4), scale-lanczos_A (0.01 to 4), "
-      "blur_A (0 to 100), crop_A (0.0001 to 1), jpeg_A (1 to 90, whole), jpeg444_A (1 to 100, "
-      "whole), gamma_A (0.01 to 10), brightness_A (0 to 10), contrast_A (0 to 10), "
+      "blur_A (0 to 100), crop_A (0.0001 to 1), jpeg_A (1 to 100, whole), jpeg444_A (1 to 100, "
+      "whole), webp_A (1 to 100, whole), h264_A (0 to 51, whole), gamma_A (0.01 to 10), brightness_A (0 to "
+      "10), contrast_A (0 to 10), "
       "hue_A (-360 to 360), stretch_A (0.25 to 4), greyscale, sepia, mirror, pillarbox, letterbox, "
       "background_black, background_white, background_grey, background_green, background_noise, caption, "
       "collage, combined, screenshot, got 'sharpen_1'");
   for (const char* bad : {"",           "noise",       "noise_",        "noise_0.1x",        "noise_-1",
-                          "noise_nan",  "noise_inf",   "jpeg_0",        "jpeg_91",           "jpeg_50.5",
+                          "noise_nan",  "noise_inf",   "jpeg_0",        "jpeg_101",          "jpeg_50.5",
                           "crop_0",     "noise_0.1,",  ",noise_0.1",    "noise_0.1,,blur_1", "Noise_0.1",
                           "combined_1", "greyscale_1", "scale-box_0.5", "scale-_0.5",        "jpeg444_0.5",
                           "contrast_-1"})
@@ -333,4 +337,48 @@ TEST_CASE("distortion: gamma, brightness and hue") {
     }
   const auto grey = distorted("hue_77", Tensor<float>({1, 1, 3}, 0.6f));
   CHECK(grey.data == std::vector<float>(3, 0.6f));
+}
+
+TEST_CASE("distortion: webp costs more at a lower quality, and without its library names the package") {
+  const auto x = image({40, 33, 3});
+  if (!is_built_in(ImageFormat::webp)) {
+    CHECK_THROWS_WITH(parse_distortion("webp_50"), Contains("install libwebp-dev and build again"));
+    library_or_skip(false, "the test of webp_A", "libwebp-dev");
+    return;
+  }
+  const auto loss = [&](const char* name) {
+    const auto y = distorted(name, x);
+    CHECK(y.shape == x.shape);
+    CHECK(rounded(y).data == y.data);
+    double sum = 0;
+    for (Index i = 0; i < x.size(); ++i) sum += std::pow(static_cast<double>(x[i] - y[i]), 2);
+    return sum;
+  };
+  CHECK(loss("webp_95") < loss("webp_50"));
+  CHECK(loss("webp_50") < loss("webp_5"));
+  CHECK(distorted("webp_50,blur_1", x).data == distorted("blur_1", distorted("webp_50", x)).data);
+}
+
+TEST_CASE("distortion: a clip is apart from single images") {
+  CHECK_THROWS_WITH(
+      parse_distortion("blur_1,h264_28"),
+      Contains("h264 needs a clip, images in order") && Contains("'blur_1,h264_28' is for single images"));
+  const auto chain = distort::parse_clip_distortion("noise_0.1,blur_1,h264_28,h264_0,noise_0.1");
+  CHECK(distort::needs_clip(chain));
+  CHECK_THROWS_AS(apply_distortion(chain, image({8, 8, 3}), kRng, 0, kWhite), ValueError);
+  const auto stages = distort::clip_stages(chain);
+  REQUIRE(stages.size() == 4);
+  const std::size_t sizes[] = {2, 1, 1, 1}, first[] = {0, 2, 3, 4};
+  for (std::size_t i = 0; i < 4; ++i) {
+    CHECK(stages[i].steps.size() == sizes[i]);
+    CHECK(stages[i].first == first[i]);
+    CHECK(distort::needs_clip(stages[i]) == (i == 1 || i == 2));
+  }
+  CHECK(distort::clip_stages(parse_distortion("combined")).size() == 1);
+  // The last step alone draws what it draws in the chain.
+  const auto x = image({16, 12, 3});
+  const distort::Distortion both = parse_distortion("noise_0,noise_0.1");
+  const distort::Distortion second{.name = both.name, .steps = {both.steps[1]}, .first = 1};
+  CHECK(apply_distortion(second, x, kRng, 3, kWhite).data == apply_distortion(both, x, kRng, 3, kWhite).data);
+  CHECK(apply_distortion(second, x, kRng, 3, kWhite).data != distorted("noise_0.1", x, 3).data);
 }

@@ -5,8 +5,11 @@
 #include <fieldmark/core/error.h>
 #include <fieldmark/core/files.h>
 #include <fieldmark/engine/safetensors.h>
+#include <fieldmark/imaging/exif.h>
 #include <fieldmark/imaging/image.h>
-#include <fieldmark/imaging/jpeg_file.h>
+#include <fieldmark/imaging/image_format.h>
+#include <fieldmark/imaging/video/video_reader.h>
+#include <fieldmark/imaging/video/video_writer.h>
 #include <fieldmark/watermark/embedding/embedder.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
@@ -25,6 +28,7 @@
 #include "canonical_json.h"
 #include "colmap.h"
 #include "imaging/jpeg_bytes.h"
+#include "imaging/media_samples.h"
 #include "lens.h"
 #include "llff.h"
 #include "nerf/format_samples.h"
@@ -113,6 +117,16 @@ std::string turned(int orientation, bool big) {
   return text_of(with_orientation(encode_jpeg(Tensor<float>(Shape{4, 4, 3}, 0.4f), 50), orientation, big));
 }
 
+std::string webp(Index channels, int quality) {
+  return text_of(encode_webp(Tensor<float>(Shape{20, 18, channels}, 0.4f), quality));
+}
+
+std::string mp4() {
+  VideoWriter writer(32, 16, {.crf = 20, .frames_per_second = 10});
+  for (int k = 0; k < 3; ++k) writer.add(clip_frame(k));
+  return text_of(writer.finish());
+}
+
 // A run of embed that a checkpoint is read for.
 struct EmbedRun {
   watermark::Owner owner = small_owner();
@@ -133,6 +147,30 @@ std::function<void(const std::string&)> both(Parse parse, ColmapFormat format) {
   return [=](const std::string& bytes) { parse(bytes, format, "input"); };
 }
 
+// Formats whose libraries this build has.
+std::vector<Format> media_formats() {
+  const auto image = [](const std::string& b) { decode_image(bytes_of(b), "input"); };
+  std::vector<Format> formats;
+  if (is_built_in(ImageFormat::webp)) formats.push_back({"webp", {webp(3, 50), webp(4, 90)}, image});
+  if (is_built_in(ImageFormat::avif))
+    formats.push_back({"avif",
+                       {text_of(from_base64(kAvif)), text_of(from_base64(kAvifTurned)),
+                        text_of(from_base64(kAvifDeep)), text_of(from_base64(kAvifAlpha))},
+                       image});
+  if (is_built_in(ImageFormat::heic))
+    formats.push_back({"heic", {text_of(from_base64(kHeic)), text_of(from_base64(kHeicDeep))}, image});
+  if (has_video())
+    formats.push_back({"video",
+                       {mp4(), text_of(from_base64(kWebm)), text_of(from_base64(kMovTurned)),
+                        text_of(from_base64(kMovVariable))},
+                       [](const std::string& b) {
+                         VideoReader video(bytes_of(b), "input");
+                         for (const double time : video.sample_times(3)) video.read_at(time);
+                         video.oddity();
+                       }});
+  return formats;
+}
+
 std::vector<Format> formats() {
   constexpr auto kText = ColmapFormat::text, kBinary = ColmapFormat::binary;
   const auto cameras = [](const std::string& bytes, ColmapFormat format, const char* name) {
@@ -145,7 +183,7 @@ std::vector<Format> formats() {
   const auto run = std::make_shared<EmbedRun>();
   const std::string npy = npy_file("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }",
                                    packed<float>({1, 2, 3, 4, 5, 6}), 2);
-  return {
+  std::vector<Format> all{
       {"npy", {npy, llff_file(llff_rows(1))}, [](const std::string& b) { parse_npy(b, "input"); }},
       {"poses_bounds.npy",
        {llff_file(llff_rows(2)), llff_file(llff_rows(3))},
@@ -193,7 +231,7 @@ std::vector<Format> formats() {
       {"exif",
        {turned(3, false), turned(8, true)},
        [](const std::string& b) {
-         jpeg_oddity(bytes_of(b));
+         image_oddity(bytes_of(b));
          const int orientation = exif_orientation(bytes_of(b));
          if (orientation < 1 || orientation > 8) throw std::logic_error("no orientation");
        }},
@@ -205,6 +243,8 @@ std::vector<Format> formats() {
          watermark::parse_evidence(watermark::canonical_json(b, "input"), "input");
        }},
   };
+  for (auto& format : media_formats()) all.push_back(std::move(format));
+  return all;
 }
 
 std::string number(Random& random) {

@@ -77,16 +77,17 @@ TEST_CASE("image: files that are no image are errors with path, size and reason"
   const std::string path = (folder / "a.png").string();
   CHECK_THROWS_WITH(read_image(path), "[read] " + path + ": open failed: No such file or directory");
   write_file_atomically(path, "not an image");
-  CHECK_THROWS_WITH(read_image(path), "[read_image] " + path +
-                                          ": expected a PNG or JPEG image, found 12 bytes that do "
-                                          "not decode: unknown image type");
+  CHECK_THROWS_WITH(read_image(path),
+                    "[read_image] " + path +
+                        ": expected a PNG, JPEG, WebP, AVIF or HEIC image, found 12 bytes that do "
+                        "not decode: unknown image type");
   write_file_atomically(path, "");
   CHECK_THROWS_WITH(read_image(path), Contains("found 0 bytes"));
   write_png(path, gradient(20, 20, 3));
   const auto png = read_bytes(path);
   const auto jpeg = encode_jpeg(gradient(20, 20, 3), 80);
   for (const auto* file : {&png, &jpeg})
-    for (std::size_t size = 1; size + 12 < file->size(); ++size)
+    for (std::size_t size = 1; size + 16 < file->size(); ++size)
       CHECK_THROWS_AS(decode_image(std::span(*file).first(size), "cut"), IoError);
   CHECK_THROWS_WITH(decode_image(std::span(jpeg).first(jpeg.size() - 20), "cut"),
                     Contains("no end marker, truncated"));
@@ -107,6 +108,31 @@ TEST_CASE("image: a JPEG file is read without its end marker, and with other dat
     append(video, bytes_from({0xff, 0xda, 0, 0, 0, 24, 'f', 't', 'y', 'p', 0xff, 0xda, 1}));
     CHECK(decode_image(video, "phone.jpg").data == whole.data);
   }
+}
+
+TEST_CASE("image: a PNG file is read without its end chunk, and with other data behind it") {
+  const TemporaryFolder folder;
+  const auto x = quantize8(uniform<float>({40, 33, 3}, 0, 1, 5));
+  write_png(folder / "a.png", x);
+  const auto png = read_bytes(folder / "a.png");
+  // The end chunk takes 12 bytes, the checksum before it 4.
+  for (std::size_t cut = 1; cut <= 16; ++cut)
+    CHECK(decode_image(std::span(png).first(png.size() - cut), "cut").data == x.data);
+  for (std::size_t cut = 17; cut < 80; ++cut)
+    CHECK_THROWS_WITH(decode_image(std::span(png).first(png.size() - cut), "cut"),
+                      Contains("no end marker, truncated"));
+  auto junk = png;
+  append(junk, bytes_from({0, 0, 0, 24, 'f', 't', 'y', 'p', 0xff}));
+  CHECK(decode_image(junk, "junk").data == x.data);
+}
+
+TEST_CASE("image: a header alone does not take gigabytes") {
+  auto jpeg = encode_jpeg(Tensor<float>({8, 8, 3}, 0.5f), 80);
+  for (std::size_t i = 0; i + 8 < jpeg.size(); ++i)
+    if (jpeg[i] == std::byte{0xff} && jpeg[i + 1] == std::byte{0xc0})
+      for (const std::size_t k : {5, 7}) jpeg[i + k] = std::byte{0x40};  // height and width of 16384 and more
+  CHECK_THROWS_WITH(decode_image(jpeg, "wide"),
+                    Contains("wide: expected") && Contains("16392 x 16392 pixels; at most"));
 }
 
 // Values 0x1234 and 0xfffe, put together with Python's zlib.
@@ -130,7 +156,7 @@ TEST_CASE("image: shapes that no file can hold are errors") {
   CHECK_THROWS_WITH(write_png("/nowhere/a.png", Tensor<float>({1, 1, 3})),
                     Contains("[write] /nowhere/a.png"));
   const Tensor<float> x({2, 2, 3});
-  CHECK_THROWS_WITH(encode_jpeg(x, 91), Contains("quality must be from 1 to 90") && Contains("got 91"));
+  CHECK_THROWS_WITH(encode_jpeg(x, 101), Contains("quality must be from 1 to 100") && Contains("got 101"));
   CHECK_THROWS_AS(encode_jpeg(x, 0), ValueError);
   CHECK_THROWS_WITH(encode_jpeg(Tensor<float>({2, 2, 4}), 50), Contains("channels must be 1 or 3"));
 }

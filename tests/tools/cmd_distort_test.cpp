@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/cli.h"
+#include "imaging/video/video_samples.h"
 #include "support/catch.h"
 #include "support/random.h"
 #include "support/temporary_folder.h"
@@ -69,4 +70,33 @@ TEST_CASE("attack never overwrites what it reads, nor one result with another", 
   const auto missing =
       run_command({"distort", "/no/such.png", "--out", folder / "out", "--distort", "blur_1"});
   CHECK(missing.code == cli::kFailed);
+}
+
+TEST_CASE("distort takes the images of a folder as a clip for h264", "[attack]") {
+  if (!video_or_skip()) return;
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "in");
+  for (int k = 0; k < 4; ++k) write_png(folder / ("in/r_" + std::to_string(k) + ".png"), clip_frame(k));
+  write_file_atomically(folder / "in/r_2b.png", std::string_view("no image"));
+  const auto distort = [&](const std::string& out, const std::string& name) {
+    return run_command({"distort", folder / "in", "--out", folder / out, "--distort", name, "--json", "-"});
+  };
+  const auto r = distort("a", "noise_0,h264_5,noise_0.1,h264_0,noise_0");
+  INFO(r.err);
+  CHECK(r.code == cli::kFailed);  // of the broken one
+  const auto json = nlohmann::json::parse(r.out);
+  REQUIRE(json["images"].size() == 4);
+  CHECK(json["images"][3]["out"] == (folder / "a/r_3.png").string());
+  distort("b", "h264_5");
+  for (int k = 0; k < 4; ++k)
+    CHECK(part_difference(read_image(folder / ("b/r_" + std::to_string(k) + ".png")), clip_frame(k)) < 0.04);
+  // Draws of a chain go by the place of the step, whether a clip is among them or not.
+  distort("c", "h264_0,noise_0.1"), distort("d", "noise_0,noise_0.1");
+  const auto c = read_image(folder / "c/r_1.png"), d = read_image(folder / "d/r_1.png");
+  CHECK(part_difference(c, d) < 0.03);
+  write_png(folder / "in/r_9.png", Tensor<float>({8, 8, 3}, 0.5f));
+  const auto mixed = distort("e", "h264_20");
+  CHECK(mixed.code == cli::kFailed);
+  CHECK_THAT(mixed.err, Contains("r_9.png: expected an image of 32 x 16 pixels"));
+  CHECK(std::filesystem::is_empty(folder / "e"));
 }

@@ -1,6 +1,8 @@
 #include <fieldmark/core/files.h>
 
+#include <fieldmark/imaging/image.h>
 #include "cli/cli.h"
+#include "imaging/video/video_samples.h"
 #include "tools/tiny_job.h"
 
 using namespace fieldmark;
@@ -92,4 +94,38 @@ TEST_CASE("extract refuses a rate that no image can reach, and takes another key
     return nlohmann::json::parse(run_command(words).out)["logits"];
   };
   CHECK(read({}) != read({"--key", key}));
+}
+
+TEST_CASE("extract reads frames of a video, evenly over its time", "[extract]") {
+  if (!video_or_skip()) return;
+  const TinyJob& job = TinyJob::get();
+  const TemporaryFolder folder;
+  const std::string images = job.images(), clip = folder / "clip.bin";  // the content decides
+  VideoWriter writer(32, 32, {.crf = 5, .frames_per_second = 10});
+  for (int k = 0; k < 10; ++k) writer.add(read_image(images + (k < 5 ? "/view_000.png" : "/view_001.png")));
+  write_file_atomically(clip, std::span<const std::byte>(writer.finish()));
+  const auto extract = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"extract", "--owner", job.owner, "--detection", "blind", "--fpr",
+                                   "1",       "--json",  "-"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_command(words);
+  };
+  const auto r = extract({clip, images + "/view_000.png", "--frames", "2"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  const auto views = nlohmann::json::parse(r.out)["views"];
+  REQUIRE(views.size() == 3);
+  CHECK(views[0]["image"] == clip + "@0.200s");
+  CHECK(views[1]["image"] == clip + "@0.700s");
+  CHECK(views[1]["time"].get<double>() == Approx(0.7).margin(0.001));
+  CHECK(views[2]["time"].is_null());
+  CHECK(nlohmann::json::parse(extract({clip}).out)["views"].size() == 10);  // each of the ten frames once
+  const auto none = extract({images, "--frames", "2"});
+  CHECK(none.code == cli::kUsage);
+  CHECK_THAT(none.err, Contains("--frames: there is no video among the images"));
+  write_file_atomically(folder / "sound.mp4", std::span<const std::byte>(from_base64(kAudio)));
+  const auto sound = extract({folder / "sound.mp4", images});
+  CHECK(sound.code == cli::kFailed);
+  CHECK(nlohmann::json::parse(sound.out)["left_out"].size() == 1);
+  CHECK_THAT(sound.err, Contains("sound.mp4: expected a video, found a file without: only audio"));
 }

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "cli/cli.h"
+#include "imaging/video/video_samples.h"
 #include "tools/tiny_job.h"
 
 using namespace fieldmark;
@@ -117,4 +118,24 @@ TEST_CASE("verify writes equal evidence for equal work, and spares folders of ot
   CHECK(refused.code == cli::kFailed);
   CHECK_THAT(refused.err, Contains("found letter.txt"));
   CHECK(read_text(folder + "/evidence.json") == evidence);
+}
+
+TEST_CASE("verify takes a video, and its evidence holds the frames and the hash of the file", "[verify]") {
+  if (!video_or_skip()) return;
+  const TinyJob& job = TinyJob::get();
+  const TemporaryFolder folder;
+  const std::string images = job.images(), clip = folder / "clip.mp4", proof = folder / "proof";
+  VideoWriter writer(32, 32, {.frames_per_second = 2});
+  for (const char* view : {"/view_000.png", "/view_001.png"}) writer.add(read_image(images + view));
+  write_file_atomically(clip, std::span<const std::byte>(writer.finish()));
+  const auto r = run_command({"verify", "--detection", "blind", "--owner", job.owner, "--message", "5",
+                              "--evidence", proof, "--wrong-keys", "200", clip, "--json", "-"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kNotFound);
+  const auto json = nlohmann::json::parse(r.out);
+  CHECK(json["views"] == 2);
+  CHECK(json["per_view"][1]["image"] == clip + "@0.500s");
+  CHECK(json["per_view"][1]["time"] == 0.5);
+  CHECK_THAT(read_text(proof + "/evidence.json"), Contains("\"name\": \"clip.mp4@0.500s\""));
+  CHECK_THAT(run_command({"check", proof, clip}).out, Contains("INTACT"));
 }

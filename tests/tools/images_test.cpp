@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "cli/context.h"
+#include "imaging/jpeg_bytes.h"
 #include "support/catch.h"
 #include "support/temporary_folder.h"
 
@@ -40,31 +41,33 @@ TEST_CASE("list_images opens folders and keeps the order of what is named", "[im
   CHECK(all[2].filename() == "r_2.PNG");
   CHECK(all[3].filename() == "r_10.png");
   std::filesystem::create_directory(folder / "empty");
-  CHECK_THROWS_WITH(list_images({(folder / "empty").string()}, context),
-                    Contains("empty: expected PNG or JPEG"));
+  CHECK_THROWS_WITH(
+      list_images({(folder / "empty").string()}, context),
+      Contains("empty: expected PNG, JPEG, WebP, AVIF or HEIC files in the folder, found none"));
   CHECK_THROWS_WITH(list_images({"/no/such"}, context), Contains("/no/such: no such file or folder"));
 }
 
 TEST_CASE("list_images skips hidden and foreign files and counts them", "[images]") {
   const TemporaryFolder folder;
   for (const char* name :
-       {"a.png", "._a.png", ".hidden.jpg", "b.WEBP", "c.webp", "d.heic", "README", "e.jpeg"})
+       {"a.png", "._a.png", ".hidden.jpg", "b.GIF", "c.gif", "d.mp4", "README", "e.jpeg", "f.HEIC", "g.webp"})
     write_file_atomically(folder / name, "x");
   std::ostringstream out, err;
   Context context({}, {"fieldmark", "x"}, out, err);
   const auto images = list_images({folder.path.string()}, context);
-  REQUIRE(images.size() == 2);
+  REQUIRE(images.size() == 4);
   CHECK(images[0].filename() == "a.png");
   CHECK(images[1].filename() == "e.jpeg");
-  CHECK(out.str() ==
-        "note: " + folder.path.string() +
-            ": 6 files that are hidden or not PNG or JPEG are skipped: 1 .heic, 2 .webp, 2 hidden, 1 "
-            "without extension\n");
+  CHECK(images[3].filename() == "g.webp");
+  CHECK(out.str() == "note: " + folder.path.string() +
+                         ": 6 files that are hidden or no images are skipped: 2 .gif, 1 .mp4, 2 hidden, 1 "
+                         "without extension\n");
   CHECK(!context.left_out());
   std::filesystem::create_directory(folder / "f");
-  write_file_atomically(folder / "f/x.heic", "x");
+  CHECK(list_images({folder.path.string()}, context, Videos::read).size() == 5);
+  write_file_atomically(folder / "f/x.tiff", "x");
   CHECK_THROWS_WITH(list_images({(folder / "f").string()}, context),
-                    Contains("found none; 1 files") && Contains("1 .heic"));
+                    Contains("found none; 1 files") && Contains("1 .tiff"));
 }
 
 TEST_CASE("ReadFaults leaves out what cannot be read, unless that is all", "[images]") {
@@ -74,9 +77,9 @@ TEST_CASE("ReadFaults leaves out what cannot be read, unless that is all", "[ima
   CHECK(faults.try_read("a.png", [] {}));
   CHECK(!faults.try_read("b.png", [] { throw IoError("b.png: broken"); }));
   CHECK_THROWS_AS(faults.try_read("c.png", [] { throw ValueError("c"); }), ValueError);
-  CHECK_THROWS_WITH(faults.tell(1, context), "b.png: broken");
+  CHECK_THROWS_WITH(faults.tell(false, context), "b.png: broken");
   CHECK(!context.left_out());
-  faults.tell(2, context);
+  faults.tell(true, context);
   CHECK(context.left_out());
   CHECK(out.str() == "note: odd.jpg: odd\nnote: left out, b.png: broken\n");
 }
@@ -94,4 +97,15 @@ TEST_CASE("read_rgb repeats grey and shows the background through", "[images]") 
   expect(read_rgb(folder / "grey_alpha.png", 1), {0.64, 0.64, 0.64});
   expect(read_rgb(folder / "rgba.png", 1), {1, 0.8, 0.88});
   expect(read_rgb(folder / "rgba.png", 0), {0.2, 0, 0.08});
+}
+
+TEST_CASE("read_rgb turns an image as its EXIF tag asks for it", "[images]") {
+  const TemporaryFolder folder;
+  Tensor<float> wide({8, 16, 3}, 0.f);
+  for (Index i = 0; i < wide.size(); ++i) wide[i] = i / 3 % 16 < 8 ? 1.f : 0.f;  // bright at the left
+  write_file_atomically(folder / "a.jpg", with_orientation(encode_jpeg(wide, 90), 6, true));
+  const auto image = read_rgb(folder / "a.jpg", 1);
+  REQUIRE(image.shape == Shape{16, 8, 3});  // clockwise: bright above
+  CHECK(image[0] > 0.9f);
+  CHECK(image[image.size() - 1] < 0.1f);
 }

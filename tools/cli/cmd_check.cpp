@@ -36,8 +36,8 @@ int run_check(const CheckArguments& options, Context& context) {
   std::optional<watermark::PublicKey> signer;
   if (!options.public_key.empty())
     signer = read_option("--public-key", [&] { return watermark::public_key_from_hex(options.public_key); });
-  const auto images =
-      options.images.empty() ? std::vector<std::filesystem::path>{} : list_images(options.images, context);
+  const auto images = options.images.empty() ? std::vector<std::filesystem::path>{}
+                                             : list_images(options.images, context, Videos::read);
   const auto check = watermark::check_evidence_folder(options.folder, images, signer);
   auto& out = context.text();
   for (const auto& fault : check.faults) out << fault << "\n";
@@ -60,8 +60,8 @@ Command add_check(CommandLine& app) {
   auto o = std::make_shared<CheckArguments>();
   app.add_option("folder", o->folder, "Evidence folder of `fieldmark verify`")->required()->type_name("DIR");
   app.add_option("images", o->images,
-                 "Images, or folders of them, to compare by SHA-256 with those of the evidence")
-      ->type_name("IMAGE|DIR")
+                 "Images or videos, or folders of them, to compare by SHA-256 with those of the evidence")
+      ->type_name("IMAGE|VIDEO|DIR")
       ->default_str("");
   app.add_option("--public-key", o->public_key,
                  "Public key of the signer, 64 digits, as `key`, `embed` and `bake` print it; default: any")

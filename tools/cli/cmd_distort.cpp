@@ -4,12 +4,15 @@
 
 #include <filesystem>
 #include <memory>
+#include <numeric>
+#include <optional>
 #include <ostream>
 #include <set>
 
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/h264_clip.h"
 #include "cli/images.h"
 
 namespace fieldmark::cli {
@@ -36,9 +39,45 @@ std::vector<std::filesystem::path> outputs_of(const std::vector<std::filesystem:
   return outputs;
 }
 
+// What is done in one go through the images: a chain for each, perhaps none, and a clip made of the results.
+struct DistortPass {
+  std::optional<distort::Distortion> chain{};
+  std::optional<int> crf{};
+};
+
+std::vector<DistortPass> distort_passes(const distort::Distortion& distortion) {
+  std::vector<DistortPass> passes(1);
+  for (auto& stage : distort::clip_stages(distortion)) {
+    if (distort::needs_clip(stage)) {
+      passes.back().crf = static_cast<int>(stage.steps.front().amount);
+      passes.emplace_back();
+    } else {
+      passes.back().chain = std::move(stage);
+    }
+  }
+  return passes;
+}
+
+distort::Distortion parse_chain(const std::string& name) {
+  auto distortion = distort::parse_clip_distortion(name);
+  for (const DistortPass& pass : distort_passes(distortion))
+    if (pass.crf) H264Clip{*pass.crf};  // says if this build has none
+  return distortion;
+}
+
+// Nothing where the image cannot be read.
+std::optional<Tensor<float>> read_undistorted(const std::filesystem::path& path, float background,
+                                              ReadFaults& faults) {
+  std::optional<Tensor<float>> image;
+  faults.try_read(path, [&] {
+    image = read_rgb(path, background);
+    faults.check(path, read_bytes(path));
+  });
+  return image;
+}
+
 int run_distort(const DistortArguments& options, Context& context) {
-  const auto distortion =
-      read_option("--distort", [&] { return distort::parse_distortion(options.distort); });
+  const auto distortion = read_option("--distort", [&] { return parse_chain(options.distort); });
   const auto images = list_images(options.inputs, context);
   const auto outputs = outputs_of(images, options.out);
   prepare_folder(options.out);
@@ -49,20 +88,36 @@ int run_distort(const DistortArguments& options, Context& context) {
   const InterruptGuard guard;
   Json list = Json::array();
   ReadFaults faults;
+  const auto passes = distort_passes(distortion);
+  std::vector<std::size_t> left(images.size());  // images that were read
+  std::iota(left.begin(), left.end(), std::size_t{0});
+  std::unique_ptr<H264Clip> from, to;
   {
     Progress progress = context.progress("distort");
-    for (std::size_t i = 0; i < images.size(); ++i) {
-      if (guard.interrupted()) throw Interrupted(std::to_string(i) + " images were written");
-      Tensor<float> image;
-      if (faults.try_read(images[i], [&] { image = read_rgb(images[i], value); })) {
-        faults.check(images[i], read_bytes(images[i]));
-        write_png(outputs[i], distort::apply_distortion(distortion, image, rng, i, background));
+    double done = 0;
+    const double all = static_cast<double>(passes.size() * images.size());
+    for (const DistortPass& pass : passes) {
+      if (pass.crf) to = std::make_unique<H264Clip>(*pass.crf);
+      std::vector<std::size_t> went;
+      for (const std::size_t i : left) {
+        if (guard.interrupted()) throw Interrupted(std::to_string(list.size()) + " images were written");
+        auto image = from ? from->next() : read_undistorted(images[i], value, faults);
+        progress.update(++done / all);
+        if (!image) continue;
+        went.push_back(i);
+        if (pass.chain) image = distort::apply_distortion(*pass.chain, *image, rng, i, background);
+        if (to) {
+          to->add(*image, images[i].string());
+          continue;
+        }
+        write_png(outputs[i], *image);
         list.push_back({{"image", images[i].string()}, {"out", outputs[i].string()}});
       }
-      progress.update(static_cast<double>(i + 1) / static_cast<double>(images.size()));
+      left = std::move(went);
+      from = std::move(to);
     }
   }
-  faults.tell(images.size(), context);
+  faults.tell(!left.empty(), context);
   context.text() << options.out << ": " << list.size() << " images after " << options.distort << "\n";
   context.result({{"distort", options.distort}, {"images", list}});
   return kOk;
@@ -72,7 +127,8 @@ int run_distort(const DistortArguments& options, Context& context) {
 
 Command add_distort(CommandLine& app) {
   auto options = std::make_shared<DistortArguments>();
-  app.add_option("images", options->inputs, "Images to distort, or folders of them; PNG or JPEG")
+  app.add_option("images", options->inputs,
+                 "Images to distort, or folders of them; PNG, JPEG, WebP, AVIF, HEIC")
       ->required()
       ->type_name("IMAGE|DIR")
       ->default_str("");
@@ -85,7 +141,9 @@ Command add_distort(CommandLine& app) {
                  "              scale-bilinear_A, scale-bicubic_A, scale-lanczos_A: other filters\n"
                  "blur_A        Gaussian blur of sigma A, 0 to 100 pixels\n"
                  "crop_A        random window with the fraction A of the area, 0.0001 to 1\n"
-                 "jpeg_A        JPEG of quality A, 1 to 90, 4:2:0 chroma; jpeg444_A: 4:4:4, 1 to 100\n"
+                 "jpeg_A        JPEG of quality A, 1 to 100, 4:2:0 chroma; jpeg444_A: 4:4:4\n"
+                 "webp_A        lossy WebP of quality A, 1 to 100\n"
+                 "h264_A        H.264 video of constant rate factor A, 0 to 51, of the images in order\n"
                  "gamma_A       power A, 0.01 to 10\n"
                  "brightness_A  factor A, 0 to 10\n"
                  "contrast_A    factor A about 1/2, 0 to 10\n"

@@ -21,7 +21,7 @@ struct ExtractArguments {
   std::string owner, reading = "auto";
   CodeOption code;
   double fpr = 1e-6;
-  std::vector<std::string> images;
+  Suspects suspects;
 };
 
 Json bits_json(const watermark::BitReading& reading) {
@@ -69,12 +69,13 @@ int run_extract(const ExtractArguments& options, Context& context) {
   const bool can_tell = least < 1;  // a bit of one cell looks the same in noise
   if (can_tell) check_rate(options.fpr, least, code.carriers());
   SuspectReader reader(owner, options.reading);
-  const auto images = read_images(reader, options.images, context);
+  const auto images = read_images(reader, options.suspects, context);
   Json views = Json::array();
   for (const auto& image : images) {
     const auto reading = watermark::read_bits(image.cells, code, bits);
     print_view(image, reading, context);
     Json view{{"image", image.image},
+              {"time", number(image.time)},
               {"detection", watermark::reading_name(image.reading)},
               {"agreement", number(image.agreement)}};
     view.update(bits_json(reading));
@@ -107,10 +108,7 @@ Command add_extract(CommandLine& app) {
   add_copy_option(app, o->code, "Recipient whose copy to read");
   add_rate(app, o->fpr, "a message counts as read");
   add_reading(app, o->reading);
-  app.add_option("images", o->images, "Images to read, or folders of them; PNG or JPEG")
-      ->required()
-      ->type_name("IMAGE|DIR")
-      ->default_str("");
+  add_suspects(app, o->suspects, "Images to read")->required();
   return [o](Context& context) { return run_extract(*o, context); };
 }
 

@@ -19,7 +19,7 @@ struct NullArguments {
   MessageOption message;
   CodeOption code;
   Index keys = 20, novel = 0;
-  std::vector<std::string> images;
+  Suspects suspects;
 };
 
 // Unmarked novel views of the owner's own field.
@@ -37,7 +37,7 @@ void read_novel(SuspectReader& reader, const watermark::Owner& owner, Index coun
 }
 
 int run_null(const NullArguments& options, Context& context) {
-  if (options.images.empty() && options.novel == 0)
+  if (options.suspects.paths.empty() && options.novel == 0)
     throw UsageError(
         "images: none given; name unmarked images, or ask for views of the unmarked field by --novel");
   auto owner = watermark::Owner::load(options.owner);
@@ -49,8 +49,8 @@ int run_null(const NullArguments& options, Context& context) {
   SuspectReader reader(owner, options.reading);
   std::vector<ImageEvidence> read;
   read_novel(reader, owner, options.novel, read, context);
-  if (!options.images.empty())
-    for (auto& image : read_images(reader, options.images, context)) read.push_back(std::move(image));
+  if (!options.suspects.paths.empty())
+    for (auto& image : read_images(reader, options.suspects, context)) read.push_back(std::move(image));
 
   const auto code = owner.code();
   watermark::WrongKeyCounts right, random;
@@ -85,9 +85,7 @@ Command add_null(CommandLine& app) {
       ->range(0, 100000)
       ->type_name("N");
   add_reading(app, o->reading);
-  app.add_option("images", o->images, "Images that do not show the mark, or folders of them; PNG or JPEG")
-      ->type_name("IMAGE|DIR")
-      ->default_str("");
+  add_suspects(app, o->suspects, "Images that do not show the mark");
   return [o](Context& context) { return run_null(*o, context); };
 }
 

@@ -21,7 +21,7 @@ struct TraceArguments {
   MessageOption message;
   CodeOption code;
   double fpr = 1e-6;
-  std::vector<std::string> images;
+  Suspects suspects;
 };
 
 std::vector<watermark::TracedCopy> traced(const watermark::Owner& owner, const watermark::Key& key,
@@ -60,7 +60,7 @@ int run_trace(const TraceArguments& options, Context& context) {
   const auto message = message_of(options.message, owner.options().bits);
   const auto names = watermark::read_recipients(options.copies);
   SuspectReader reader(owner, options.reading);
-  const auto images = read_images(reader, options.images, context);
+  const auto images = read_images(reader, options.suspects, context);
   const auto copies = traced(owner, key, message, names, total_evidence(images), context);
   std::size_t found = 0;
   Json recipients = Json::array();
@@ -100,10 +100,7 @@ Command add_trace(CommandLine& app) {
       ->type_name("P");
   add_code_options(app, o->code);
   add_reading(app, o->reading);
-  app.add_option("images", o->images, "Images of one field, or folders of them; PNG or JPEG")
-      ->required()
-      ->type_name("IMAGE|DIR")
-      ->default_str("");
+  add_suspects(app, o->suspects, "Images of one field")->required();
   return [o](Context& context) { return run_trace(*o, context); };
 }
 

@@ -24,7 +24,8 @@ struct VerifyArguments {
   CodeOption code;
   double fpr = 1e-6;
   Index wrong_keys = 0;
-  std::vector<std::string> images, controls;
+  std::vector<std::string> controls;
+  Suspects suspects;
 };
 
 watermark::WrongKeyCounts count_keys(const KeyTest& test, const std::vector<double>& evidence, Index n,
@@ -83,7 +84,7 @@ int run_verify(const VerifyArguments& options, Context& context) {
   check_rate(options.fpr, watermark::least_p(code.carriers()), code.carriers());
   if (!options.evidence.empty()) watermark::prepare_evidence_folder(options.evidence);
   SuspectReader reader(owner, options.reading);
-  const auto images = read_images(reader, options.images, context);
+  const auto images = read_images(reader, options.suspects, context);
   const auto evidence = total_evidence(images);
   const KeyTest test{owner, code, message};
   watermark::EvidenceRecord record{.reading = reading_used(images),
@@ -149,10 +150,7 @@ Command add_verify(CommandLine& app) {
       ->type_name("DIR")
       ->default_str("");
   add_reading(app, o->reading);
-  app.add_option("images", o->images, "Images of one field, or folders of them, for one verdict; PNG or JPEG")
-      ->required()
-      ->type_name("IMAGE|DIR")
-      ->default_str("");
+  add_suspects(app, o->suspects, "Images of one field, for one verdict")->required();
   return [o](Context& context) { return run_verify(*o, context); };
 }
 

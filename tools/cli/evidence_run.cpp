@@ -11,7 +11,6 @@
 
 #include "cli/cli.h"
 #include "cli/context.h"
-#include "cli/images.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -69,18 +68,18 @@ TestedControls test_controls(const KeyTest& test, SuspectReader& reader,
   std::vector<Tensor<float>> questioned;
   for (const auto& p : images)
     if (static_cast<Index>(questioned.size()) < kControlViews)
-      questioned.push_back(read_rgb(p.image, background(test.owner)));
+      questioned.push_back(read_again(p, background(test.owner)));
   const auto controls = watermark::built_in_controls(test.owner, questioned, kControlViews, context.seed());
   for (const auto& control : controls) {
     tested.controls.push_back(built_in(test, reader, control));
     tested.thumbnails.push_back(thumbnail(control.images[0]));
   }
   for (const auto& path : given) {
-    const auto read = read_images(reader, {path}, context);
+    const auto read = read_images(reader, {.paths = {path}}, context);
     tested.controls.push_back({given_name(path),
                                "Given as a control: images that the user declares unmarked.",
                                score_images(test, read), test(total_evidence(read))});
-    tested.thumbnails.push_back(thumbnail(read_rgb(read[0].image, background(test.owner))));
+    tested.thumbnails.push_back(thumbnail(read_again(read[0], background(test.owner))));
   }
   return tested;
 }
@@ -100,7 +99,8 @@ Json per_view_json(const std::vector<ImageEvidence>& images, const std::vector<E
   Json list = Json::array();
   for (std::size_t i = 0; i < scores.size(); ++i) {
     const auto& reading = scores[i].score.reading;
-    Json entry{{"image", images[i].image}, {"bits", to_bits(reading.message)}};
+    Json entry{
+        {"image", images[i].image}, {"time", number(images[i].time)}, {"bits", to_bits(reading.message)}};
     entry.update(score_json(scores[i].score));
     entry["logits"] = reading.logit;
     entry["bit_p_values"] = watermark::bit_p_values(reading);
@@ -167,8 +167,7 @@ void write_evidence(const std::string& folder, const watermark::EvidenceRecord& 
                     const std::vector<ImageEvidence>& images, const std::vector<std::string>& controls,
                     const watermark::Owner& owner, const watermark::Key& key) {
   PageImages small{.controls = controls};
-  for (const auto& image : images)
-    small.images.push_back(thumbnail(read_rgb(image.image, background(owner))));
+  for (const auto& image : images) small.images.push_back(thumbnail(read_again(image, background(owner))));
   const std::string page = evidence_page(record, watermark::public_key(key), small);
   watermark::write_evidence_folder(folder, record, page, key);
 }

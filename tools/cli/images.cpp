@@ -1,10 +1,13 @@
 #include "cli/images.h"
 
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/files.h>
+#include <fieldmark/imaging/exif.h>
 #include <fieldmark/imaging/image.h>
-#include <fieldmark/imaging/jpeg_file.h>
+#include <fieldmark/imaging/image_format.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <map>
 
@@ -32,14 +35,20 @@ struct Listing {
   std::map<std::string, std::size_t> others;  // files that are not read, by kind
 };
 
-Listing list_folder(const fs::path& folder) {
+bool has_video_extension(const fs::path& path) {
+  constexpr std::array<std::string_view, 6> kExtensions{".mp4", ".m4v", ".mov", ".webm", ".mkv", ".3gp"};
+  return std::ranges::find(kExtensions, lower_extension(path)) != kExtensions.end();
+}
+
+Listing list_folder(const fs::path& folder, Videos videos) {
   Listing found;
   for (const auto& entry : fs::directory_iterator(folder)) {
     if (!entry.is_regular_file()) continue;
     const std::string extension = lower_extension(entry.path());
     if (entry.path().filename().string().starts_with('.'))
       ++found.others["hidden"];
-    else if (extension == ".png" || extension == ".jpg" || extension == ".jpeg")
+    else if (has_image_extension(entry.path()) ||
+             (videos == Videos::read && has_video_extension(entry.path())))
       found.images.push_back(entry.path());
     else
       ++found.others[extension.empty() ? "without extension" : extension];
@@ -50,7 +59,7 @@ Listing list_folder(const fs::path& folder) {
   return found;
 }
 
-// "3 files that are not PNG or JPEG are skipped: 1 hidden, 2 .webp", or nothing.
+// "3 files that are hidden or no images are skipped: 1 hidden, 2 .txt", or nothing.
 std::string skipped(const Listing& listing) {
   std::size_t count = 0;
   std::string kinds;
@@ -58,9 +67,8 @@ std::string skipped(const Listing& listing) {
     count += files;
     kinds += (kinds.empty() ? "" : ", ") + std::to_string(files) + " " + kind;
   }
-  return count == 0
-             ? ""
-             : std::to_string(count) + " files that are hidden or not PNG or JPEG are skipped: " + kinds;
+  return count == 0 ? ""
+                    : std::to_string(count) + " files that are hidden or no images are skipped: " + kinds;
 }
 
 }  // namespace
@@ -88,9 +96,11 @@ bool natural_less(const std::string& a, const std::string& b) {
   return a.size() - i < b.size() - j;
 }
 
-std::vector<fs::path> images_in(const fs::path& folder) { return list_folder(folder).images; }
+std::vector<fs::path> images_in(const fs::path& folder) {
+  return list_folder(folder, Videos::refused).images;
+}
 
-std::vector<fs::path> list_images(const std::vector<std::string>& paths, Context& context) {
+std::vector<fs::path> list_images(const std::vector<std::string>& paths, Context& context, Videos videos) {
   std::vector<fs::path> images;
   for (const fs::path path : paths) {
     if (!fs::exists(path)) throw IoError(path.string() + ": no such file or folder");
@@ -98,10 +108,11 @@ std::vector<fs::path> list_images(const std::vector<std::string>& paths, Context
       images.push_back(path);
       continue;
     }
-    const Listing inside = list_folder(path);
+    const Listing inside = list_folder(path, videos);
     const std::string others = skipped(inside);
     if (inside.images.empty())
-      throw IoError(path.string() + ": expected PNG or JPEG files in the folder, found none" +
+      throw IoError(path.string() + ": expected PNG, JPEG, WebP, AVIF or HEIC files" +
+                    (videos == Videos::read ? ", or MP4, MOV or WebM," : "") + " in the folder, found none" +
                     (others.empty() ? "" : "; " + others));
     if (!others.empty()) context.note(path.string() + ": " + others);
     images.insert(images.end(), inside.images.begin(), inside.images.end());
@@ -109,8 +120,14 @@ std::vector<fs::path> list_images(const std::vector<std::string>& paths, Context
   return images;
 }
 
+Tensor<float> decode_upright(std::span<const std::byte> bytes, const std::string& name) {
+  Tensor<float> image = decode_image(bytes, name);
+  const int orientation = exif_orientation(bytes);
+  return orientation == 1 ? image : turned(image, orientation);
+}
+
 Tensor<float> read_rgb(const fs::path& path, float background) {
-  Tensor<float> image = read_image(path);
+  Tensor<float> image = decode_upright(read_bytes(path), path.string());
   const Index channels = image.shape[2], pixels = image.shape[0] * image.shape[1];
   if (channels == 3) return image;
   const bool has_alpha = channels % 2 == 0;
@@ -124,12 +141,12 @@ Tensor<float> read_rgb(const fs::path& path, float background) {
 }
 
 void ReadFaults::check(const fs::path& image, std::span<const std::byte> bytes) {
-  if (const std::string odd = jpeg_oddity(bytes); !odd.empty())
+  if (const std::string odd = image_oddity(bytes); !odd.empty())
     warnings.push_back(image.string() + ": " + odd);
 }
 
-void ReadFaults::tell(std::size_t images, Context& context) const {
-  if (images > 0 && unreadable.size() == images) throw IoError(unreadable.front().second);
+void ReadFaults::tell(bool any_read, Context& context) const {
+  if (!any_read && !unreadable.empty()) throw IoError(unreadable.front().second);
   for (const auto& warning : warnings) context.note(warning);
   for (const auto& [image, reason] : unreadable) context.leave_out(image, reason);
 }

@@ -18,14 +18,22 @@ bool is_digit(char c);
 /// "r_2" before "r_10": runs of digits compare as numbers.
 bool natural_less(const std::string& a, const std::string& b);
 
-/// The PNG and JPEG files of a folder that are not hidden, in natural order.
+/// The image files of a folder that are not hidden, see has_image_extension(), in natural order.
 std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder);
 
-/// The images of IMAGE|DIR...: files as given, and images_in() folders; a note counts what else is there.
-/// @throws IoError if a path is missing or a folder holds no image
-std::vector<std::filesystem::path> list_images(const std::vector<std::string>& paths, Context& context);
+/// Whether a command reads videos as well as images.
+enum class Videos { refused, read };
 
-/// Reads an image as [H, W, 3]; grey is repeated, and `background` in [0, 1] fills transparent pixels.
+/// The images of IMAGE|DIR...: files as given, and of folders what images_in() lists, with videos if they are
+/// read; a note counts what else is there.
+/// @throws IoError if a path is missing or a folder holds no image
+std::vector<std::filesystem::path> list_images(const std::vector<std::string>& paths, Context& context,
+                                               Videos videos = Videos::refused);
+
+/// decode_image(), turned as exif_orientation() asks for it.
+Tensor<float> decode_upright(std::span<const std::byte> bytes, const std::string& name);
+/// Reads an image as [H, W, 3], upright; grey is repeated, and `background` in [0, 1] fills transparent
+/// pixels.
 /// @throws IoError as read_image()
 Tensor<float> read_rgb(const std::filesystem::path& path, float background);
 
@@ -34,7 +42,7 @@ struct ReadFaults {
   std::vector<std::string> warnings{};
   std::vector<std::pair<std::string, std::string>> unreadable{};  ///< image and reason
 
-  /// Keeps what is odd about an image that is read, see jpeg_oddity().
+  /// Keeps what is odd about an image that is read, see image_oddity().
   void check(const std::filesystem::path& image, std::span<const std::byte> bytes);
   /// Calls read(); an IoError is kept. @return whether there was none
   template <class F>
@@ -46,8 +54,8 @@ struct ReadFaults {
     return false;
   }
   /// Notes the warnings, and leaves out what is unreadable, see Context::leave_out().
-  /// @param images  that were tried   @throws IoError if none of them could be read, with the first reason
-  void tell(std::size_t images, Context& context) const;
+  /// @param any_read  whether an image could be read   @throws IoError if none could, with the first reason
+  void tell(bool any_read, Context& context) const;
 };
 
 }  // namespace fieldmark::cli

@@ -2,8 +2,10 @@
 
 #include <fieldmark/core/digest.h>
 #include <fieldmark/core/files.h>
-#include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/image_format.h>
+#include <fieldmark/imaging/video/video_reader.h>
 
+#include <algorithm>
 #include <cstdio>
 
 #include "cli/cli.h"
@@ -13,6 +15,8 @@
 namespace fieldmark::cli {
 
 using watermark::ReadingKind;
+
+constexpr Index kFrames = 16;  // of a video
 
 void add_reading(CommandLine& app, std::string& reading) {
   app.add_option("--detection", reading,
@@ -63,26 +67,95 @@ ImageEvidence SuspectReader::read(const Tensor<float>& image, const std::string&
   }
 }
 
-std::vector<ImageEvidence> read_images(SuspectReader& reader, const std::vector<std::string>& paths,
-                                       Context& context) {
-  const auto images = list_images(paths, context);
+Option add_suspects(CommandLine& app, Suspects& suspects, const std::string& what) {
+  app.add_option("--frames", suspects.frames,
+                 "Frames to sample of each video, evenly over its duration, 1 to 100000; default: 16")
+      ->range(1, 100000)
+      ->type_name("N")
+      ->default_str("");
+  return app
+      .add_option("images", suspects.paths,
+                  what + ", or folders of them; PNG, JPEG, WebP, AVIF, HEIC; videos MP4, MOV, WebM")
+      ->type_name("IMAGE|VIDEO|DIR")
+      ->default_str("");
+}
+
+namespace {
+
+ImageEvidence read_still(SuspectReader& reader, const std::filesystem::path& file, ReadFaults& faults) {
+  const std::string name = file.string();
+  const auto bytes = read_bytes(file);
+  ImageEvidence read = reader.read(decode_upright(bytes, name), name);
+  read.sha256 = sha256_hex(bytes);
+  read.file = file;
+  faults.check(file, bytes);
+  return read;
+}
+
+// Frames until one cannot be read.
+template <class F>
+void read_video(SuspectReader& reader, const std::filesystem::path& file, Index count, ReadFaults& faults,
+                std::vector<ImageEvidence>& read, const F& progress) {
+  const std::string name = file.string(), hash = sha256_file_hex(name);
+  VideoReader video(file);
+  if (const std::string odd = video.oddity(); !odd.empty()) faults.warnings.push_back(name + ": " + odd);
+  const auto times = video.sample_times(count);
+  double last = -1;
+  std::size_t frames = 0, damaged = 0;
+  for (std::size_t k = 0; k < times.size(); ++k) {
+    const VideoFrame frame = video.read_at(times[k]);
+    // In place of a frame that cannot be decoded comes another, perhaps one that was read.
+    if (frame.time > last) {
+      char at[40];
+      std::snprintf(at, sizeof at, "@%.3fs", frame.time);
+      read.push_back(reader.read(frame.image, name + at));
+      read.back().sha256 = hash, read.back().file = file, read.back().time = frame.time;
+      ++frames, damaged += frame.damaged;
+      last = frame.time;
+    }
+    progress(static_cast<double>(k + 1) / static_cast<double>(times.size()));
+  }
+  if (damaged > 0)
+    faults.warnings.push_back(name + ": " + std::to_string(damaged) + " of " + std::to_string(frames) +
+                              " frames are damaged; the decoder made up what the file lacks");
+}
+
+bool is_video(const std::filesystem::path& file) {
+  std::error_code ignored;
+  return std::filesystem::is_regular_file(file, ignored) && image_format(file) == ImageFormat::video;
+}
+
+}  // namespace
+
+std::vector<ImageEvidence> read_images(SuspectReader& reader, const Suspects& suspects, Context& context) {
+  const auto files = list_images(suspects.paths, context, Videos::read);
+  if (suspects.frames && std::ranges::none_of(files, is_video))
+    throw UsageError("--frames: there is no video among the images");
   const InterruptGuard guard;
   Progress progress = context.progress("read");
   std::vector<ImageEvidence> read;
   ReadFaults faults;
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    if (guard.interrupted()) throw Interrupted("nothing was decided");
-    faults.try_read(images[i], [&] {
-      const std::string name = images[i].string();
-      const auto bytes = read_bytes(images[i]);
-      read.push_back(reader.read(decode_image(bytes, name), name));
-      read.back().sha256 = sha256_hex(bytes);
-      faults.check(images[i], bytes);
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const auto done = [&](double share) {
+      progress.update((static_cast<double>(i) + share) / static_cast<double>(files.size()));
+      if (guard.interrupted()) throw Interrupted("nothing was decided");
+    };
+    done(0);
+    faults.try_read(files[i], [&] {
+      if (is_video(files[i]))
+        read_video(reader, files[i], suspects.frames.value_or(kFrames), faults, read, done);
+      else
+        read.push_back(read_still(reader, files[i], faults));
     });
-    progress.update(static_cast<double>(i + 1) / static_cast<double>(images.size()));
+    done(1);
   }
-  faults.tell(images.size(), context);
+  faults.tell(!read.empty(), context);
   return read;
+}
+
+Tensor<float> read_again(const ImageEvidence& image, float background) {
+  return std::isnan(image.time) ? read_rgb(image.file, background)
+                                : VideoReader(image.file).read_at(image.time).image;
 }
 
 std::string reading_used(const std::vector<ImageEvidence>& images) {

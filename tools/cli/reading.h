@@ -2,6 +2,7 @@
 #include <fieldmark/watermark/reading/informed_reader.h>
 
 #include <cmath>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,16 +12,18 @@
 
 namespace fieldmark::cli {
 
-/// What one image shows.
+/// What one image or one frame of a video shows.
 struct ImageEvidence {
-  std::string image;
+  std::string image;                                               ///< name; of a frame "clip.mp4@1.234s"
   std::vector<double> cells;                                       ///< sign evidence S_c
   watermark::ReadingKind reading = watermark::ReadingKind::blind;  ///< where it comes from
   double agreement =
-      std::nan("");      ///< of the image with the owner's field; NaN where it was not laid over it
-  std::string sha256{};  ///< of the file's bytes
-  Index width = 0;       ///< pixels
-  Index height = 0;      ///< pixels
+      std::nan("");              ///< of the image with the owner's field; NaN where it was not laid over it
+  std::string sha256{};          ///< of the file's bytes
+  Index width = 0;               ///< pixels
+  Index height = 0;              ///< pixels
+  std::filesystem::path file{};  ///< that it was read from
+  double time = std::nan("");    ///< of a frame, seconds; NaN for an image
 };
 
 /// --detection auto|blind|informed.
@@ -49,11 +52,22 @@ class SuspectReader {
   bool forced_;
 };
 
-/// Reads the images that IMAGE|DIR... names and leaves out those that cannot be read, see
-/// Context::leave_out().
-/// @throws IoError if none can be read, naming the first
-std::vector<ImageEvidence> read_images(SuspectReader& reader, const std::vector<std::string>& paths,
-                                       Context& context);
+/// IMAGE|VIDEO|DIR... and the frames to sample of a video.
+struct Suspects {
+  std::vector<std::string> paths{};
+  std::optional<Index> frames{};  ///< --frames if it was given
+};
+
+/// The positional images and --frames. @param what  "Images to read"   @return the positional argument
+Option add_suspects(CommandLine& app, Suspects& suspects, const std::string& what);
+
+/// Reads the images and frames of videos that IMAGE|VIDEO|DIR... names, one at a time, and leaves out those
+/// that cannot be read, see Context::leave_out().
+/// @throws IoError if none can be read, naming the first   @throws UsageError for --frames without a video
+std::vector<ImageEvidence> read_images(SuspectReader& reader, const Suspects& suspects, Context& context);
+
+/// The image or frame once more, as read_rgb(). @throws IoError
+Tensor<float> read_again(const ImageEvidence& image, float background);
 
 /// The readings used: "blind", "informed", or "mixed" where images differ.
 std::string reading_used(const std::vector<ImageEvidence>& images);

@@ -75,6 +75,27 @@ function(fieldmark_room room)
   endif()
 endfunction()
 
+# fieldmark_optional(<room> <NAME> <Debian packages> <pkg-config module>...)
+#
+# Lets a room use libraries that a machine may lack. Where they are installed, and unless FIELDMARK_WITH_<NAME> is off, the
+# room's sources see FIELDMARK_WITH_<NAME>; elsewhere they name the packages. Packages are one word, joined by spaces.
+function(fieldmark_optional room name packages)
+  string(REPLACE / _ target fieldmark_${room})
+  option(FIELDMARK_WITH_${name} "Use ${packages} where installed" ON)
+  if(FIELDMARK_WITH_${name})
+    pkg_check_modules(fieldmark_${name} QUIET IMPORTED_TARGET GLOBAL ${ARGN})
+  endif()
+  if(NOT FIELDMARK_WITH_${name} OR NOT fieldmark_${name}_FOUND)
+    message(STATUS "Fieldmark without ${packages}")
+    return()
+  endif()
+  target_compile_definitions(${target} PRIVATE FIELDMARK_WITH_${name})
+  target_link_libraries(${target} PRIVATE PkgConfig::fieldmark_${name})
+  # What links an installed static library needs the optional ones too.
+  set_property(GLOBAL APPEND_STRING PROPERTY FIELDMARK_OPTIONAL_PACKAGES
+    "fieldmark_optional_package(fieldmark_${name} \"${packages}\" ${ARGN})\n")
+endfunction()
+
 # Notes the tests of a room's units, and where they find its private headers, for the test program of its house: the
 # first word of the room.
 macro(fieldmark_room_tests room)
@@ -115,6 +136,7 @@ endfunction()
 
 function(fieldmark_install_package)
   set(dir ${CMAKE_INSTALL_LIBDIR}/cmake/fieldmark)
+  get_property(fieldmark_optional_packages GLOBAL PROPERTY FIELDMARK_OPTIONAL_PACKAGES)
   configure_package_config_file(${PROJECT_SOURCE_DIR}/tools/cmake/fieldmarkConfig.cmake.in
     ${PROJECT_BINARY_DIR}/fieldmarkConfig.cmake INSTALL_DESTINATION ${dir})
   write_basic_package_version_file(${PROJECT_BINARY_DIR}/fieldmarkConfigVersion.cmake COMPATIBILITY SameMinorVersion)

@@ -3,6 +3,7 @@
 #include <fieldmark/engine/tensor.h>
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -24,6 +25,8 @@ enum class DistortionKind {
   crop,
   jpeg,
   jpeg444,
+  webp,
+  h264,
   gamma,
   brightness,
   contrast,
@@ -52,6 +55,8 @@ struct Distortion {
   };
   std::string name;         ///< as it was given
   std::vector<Step> steps;  ///< from left to right
+  std::size_t first =
+      0;  ///< place of the first step in the chain that this is a part of: random draws go by it
 };
 
 /// Reads a name, or names separated by commas. Deviations are on the scale of [0, 1], sigma is in pixels.
@@ -62,8 +67,10 @@ struct Distortion {
 ///                 resize_filtered()
 ///   blur_A        Gaussian of sigma A pixels, 0 to 100
 ///   crop_A        a random window of the image's aspect that keeps the fraction A of the area, 0.0001 to 1
-///   jpeg_A        quality A, 4:2:0 chroma, an integer 1 to 90 (see encode_jpeg)
+///   jpeg_A        quality A, 4:2:0 chroma, an integer 1 to 100 (see encode_jpeg), above 90 by libjpeg-turbo
 ///   jpeg444_A     the same with chroma at full size, 1 to 100 (see jpeg444)
+///   webp_A        lossy WebP of quality A, an integer 1 to 100 (see encode_webp)
+///   h264_A        H.264 video with constant rate factor A, an integer 0 to 51; of a clip alone
 ///   gamma_A       value to the power A, 0.01 to 10
 ///   brightness_A  value times A, 0 to 10
 ///   contrast_A    distance from 1/2 times A, 0 to 10
@@ -79,8 +86,19 @@ struct Distortion {
 ///   combined      noise_0.10,crop_0.40,jpeg_50
 ///   screenshot    scale-bicubic_1.25,blur_0.5,gamma_1.1,scale-lanczos_0.8,jpeg_80: shown on a screen at
 ///                 another size, captured, brought back and sent on
-/// @throws ValueError on any other name or an amount outside its range; the text lists all of these
+/// @throws ValueError on any other name or an amount outside its range, with a text that lists all of these,
+/// and where this build lacks the library of webp_A or of jpeg_A above 90. On h264_A: it needs
+/// parse_clip_distortion()
 Distortion parse_distortion(std::string_view name);
+/// As parse_distortion(), but takes h264_A too, which distorts a clip, the images in order, in place of an
+/// image.
+Distortion parse_clip_distortion(std::string_view name);
+
+/// Whether a step of the chain needs a clip: h264_A.
+bool needs_clip(const Distortion& distortion);
+/// The parts of a chain: those for single images, as they are, and each step that needs a clip by itself. One
+/// part after another gives what the chain gives.
+std::vector<Distortion> clip_stages(const Distortion& distortion);
 
 /// Source position of a pixel of a distorted image, in pixels of the original, centres at integers, x right
 /// and y down:
@@ -102,7 +120,7 @@ struct PixelMap {
 /// @param source      unless null, receives the source positions: rotation, scale and crop of all steps
 /// together
 /// @return [height', width', 3], multiples of 1/255
-/// @throws ShapeError if the image or the background has another shape
+/// @throws ShapeError if the image or the background has another shape   @throws ValueError if needs_clip()
 Tensor<float> apply_distortion(const Distortion& distortion, const Tensor<float>& image,
                                const CounterRng& rng, std::uint64_t index, std::span<const float> background,
                                PixelMap* source = nullptr);

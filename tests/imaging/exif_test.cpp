@@ -1,12 +1,12 @@
+#include <fieldmark/imaging/exif.h>
 #include <fieldmark/imaging/image.h>
-#include <fieldmark/imaging/jpeg_file.h>
 
 #include "imaging/jpeg_bytes.h"
 #include "support/catch.h"
 
 using namespace fieldmark;
 
-TEST_CASE("jpeg_file: the orientation of a JPEG file, in both orders of bytes") {
+TEST_CASE("exif: the orientation of a JPEG file, in both orders of bytes") {
   const auto plain = encode_jpeg(Tensor<float>({8, 8, 3}, 0.5f), 80);
   CHECK(exif_orientation(plain) == 1);
   for (const bool big : {false, true})
@@ -17,7 +17,7 @@ TEST_CASE("jpeg_file: the orientation of a JPEG file, in both orders of bytes") 
     }
 }
 
-TEST_CASE("jpeg_file: what does not say is upright") {
+TEST_CASE("exif: what does not say is upright") {
   const auto plain = encode_jpeg(Tensor<float>({8, 8, 3}, 0.5f), 80);
   for (const int orientation : {0, 9, 255})
     CHECK(exif_orientation(with_orientation(plain, orientation, true)) == 1);
@@ -36,13 +36,19 @@ TEST_CASE("jpeg_file: what does not say is upright") {
   CHECK(exif_orientation(far) == 1);
 }
 
-TEST_CASE("jpeg_file: data behind the end and a missing end are told") {
-  const auto jpeg = encode_jpeg(Tensor<float>({8, 8, 3}, 0.5f), 80);
-  CHECK(jpeg_oddity(jpeg).empty());
-  CHECK(jpeg_oddity(bytes_from({0x89, 'P', 'N', 'G'})).empty());
-  CHECK(jpeg_oddity(std::span(jpeg).first(jpeg.size() - 2)) ==
-        "the JPEG file has no end marker; its image is complete");
-  auto phone = jpeg;
-  append(phone, bytes_from({0, 0, 0, 24, 'f', 't', 'y', 'p', 0xff, 0xda, 1}));
-  CHECK(jpeg_oddity(phone) == "11 bytes behind the end of the JPEG file are ignored");
+TEST_CASE("exif: an image is turned as the orientation says") {
+  // 1 2 3 above 4 5 6, two channels.
+  Tensor<float> x({2, 3, 2});
+  for (Index i = 0; i < x.size(); ++i)
+    x[i] = static_cast<float>(i / 2 + 1) + 0.5f * static_cast<float>(i % 2);
+  const std::vector<std::vector<float>> expected{{1, 2, 3, 4, 5, 6}, {3, 2, 1, 6, 5, 4}, {6, 5, 4, 3, 2, 1},
+                                                 {4, 5, 6, 1, 2, 3}, {1, 4, 2, 5, 3, 6}, {4, 1, 5, 2, 6, 3},
+                                                 {6, 3, 5, 2, 4, 1}, {3, 6, 2, 5, 1, 4}};
+  for (int orientation = 1; orientation <= 8; ++orientation) {
+    const auto y = turned(x, orientation);
+    CHECK(y.shape == (orientation < 5 ? Shape{2, 3, 2} : Shape{3, 2, 2}));
+    for (Index i = 0; i < y.size(); ++i)
+      CHECK(y[i] == expected[static_cast<std::size_t>(orientation - 1)][static_cast<std::size_t>(i / 2)] +
+                        0.5f * static_cast<float>(i % 2));
+  }
 }

@@ -1,9 +1,11 @@
-#include <fieldmark/imaging/jpeg_file.h>
+#include "fieldmark/imaging/exif.h"
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <optional>
 
+#include "fieldmark/imaging/image_format.h"
 #include "jpeg_segments.h"
 
 namespace fieldmark {
@@ -49,25 +51,52 @@ std::optional<int> orientation(std::span<const std::byte> tiff_bytes) {
   return std::nullopt;
 }
 
+// The chunk EXIF of a WebP file; nothing where there is none. Some writers put the name of JPEG's segment
+// before it. Source: RFC 9649, 2.3 and 2.7.1.5.
+std::span<const std::byte> exif_of_webp(std::span<const std::byte> bytes) {
+  constexpr std::size_t kFile = 12, kHead = 8;
+  for (std::size_t at = kFile; at + kHead <= bytes.size();) {
+    std::size_t size = 0;
+    for (std::size_t i = 0; i < 4; ++i) size |= std::to_integer<std::size_t>(bytes[at + 4 + i]) << 8 * i;
+    if (size > bytes.size() - at - kHead) return {};
+    if (std::memcmp(bytes.data() + at, "EXIF", 4) == 0) return bytes.subspan(at + kHead, size);
+    at += kHead + size + size % 2;
+  }
+  return {};
+}
+
 }  // namespace
 
 int exif_orientation(std::span<const std::byte> bytes) {
   constexpr char kName[] = "Exif\0";  // and the 0 that ends the literal
   const auto name = std::as_bytes(std::span(kName));
+  const auto is_named = [&](std::span<const std::byte> payload) {
+    return payload.size() > name.size() && std::ranges::equal(payload.first(name.size()), name);
+  };
+  if (image_format(bytes) == ImageFormat::webp) {
+    const auto exif = exif_of_webp(bytes);
+    return orientation(is_named(exif) ? exif.subspan(name.size()) : exif).value_or(kUpright);
+  }
   if (!is_jpeg(bytes)) return kUpright;
   for (const auto& [marker, payload] : jpeg_segments(bytes).segments)
-    if (marker == kApp1 && payload.size() > name.size() &&
-        std::ranges::equal(payload.first(name.size()), name))
+    if (marker == kApp1 && is_named(payload))
       return orientation(payload.subspan(name.size())).value_or(kUpright);
   return kUpright;
 }
 
-std::string jpeg_oddity(std::span<const std::byte> bytes) {
-  if (!is_jpeg(bytes)) return "";
-  const JpegSegments parts = jpeg_segments(bytes);
-  if (!parts.complete) return "the JPEG file has no end marker; its image is complete";
-  if (parts.end == bytes.size()) return "";
-  return std::to_string(bytes.size() - parts.end) + " bytes behind the end of the JPEG file are ignored";
+Tensor<float> turned(const Tensor<float>& image, int orientation) {
+  const Index h = image.shape[0], w = image.shape[1], channels = image.shape[2];
+  const bool across = orientation >= 5;
+  Tensor<float> out(across ? Shape{w, h, channels} : Shape{h, w, channels});
+  for (Index y = 0; y < out.shape[0]; ++y)
+    for (Index x = 0; x < out.shape[1]; ++x) {
+      Index row = across ? x : y, column = across ? y : x;
+      if (orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7) row = h - 1 - row;
+      if (orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8)
+        column = w - 1 - column;
+      std::copy_n(&image[(row * w + column) * channels], channels, &out[(y * out.shape[1] + x) * channels]);
+    }
+  return out;
 }
 
 }  // namespace fieldmark
