@@ -17,9 +17,9 @@
 namespace fieldmark::baselines {
 namespace {
 
-constexpr double kMarkPsnr = 34;                                  // dB
-constexpr Index kCells = 16;                                      // per axis
-constexpr Index kOurPatch = 128, kPaperPatch = 150, kLeast = 32;  // pixels
+constexpr double kMarkPsnr = 34;               // dB
+constexpr Index kCells = 16;                   // per axis
+constexpr Index kOurPatch = 128, kLeast = 32;  // pixels
 
 using watermark::Owner;
 using Signs = std::vector<std::int8_t>;
@@ -72,7 +72,7 @@ class BudgetMark : public watermark::FusionMark {
 class MessageMark : public watermark::PooledMark {
  public:
   MessageMark(MessageField field, extractor::PooledExtractor<float> reader)
-      : PooledMark(std::move(reader), {}), field_(std::move(field)) {}
+      : PooledMark(std::move(reader), watermark::paper_options().training, true), field_(std::move(field)) {}
   std::string preset() const override { return "message_field"; }
   std::string configuration() const override {
     const MessageFieldOptions& o = field_.options();
@@ -126,7 +126,7 @@ OwnerSystem owner_system(const CellName& name, Index image) {
   r.owner.bits = name.bits;
   r.owner.mark_psnr = kMarkPsnr;
   r.owner.seed = r.embed.seed = name.seed;
-  r.owner.reader_size = std::clamp(image, kLeast, ours ? kOurPatch : kPaperPatch);
+  r.owner.reader_size = std::clamp(image, kLeast, ours ? kOurPatch : r.owner.reader_size);
   r.cells = kCells;
   if (system == "ours_without_dense") r.cell().training.sign_weight = r.cell().training.index_weight = 0;
   if (system == "ours_without_cells") {  // no content loss

@@ -3,6 +3,7 @@
 #include <fieldmark/engine/ops/pool.h>
 #include <fieldmark/engine/shape_checks.h>
 
+#include <algorithm>
 #include <string>
 
 #include "fieldmark/extractor/centred_image.h"
@@ -10,9 +11,28 @@
 
 namespace fieldmark::extractor {
 
+namespace {
+
+constexpr double kMeanOfRelu = 0.3989;  // of a standard normal number: what a block gives on average at first
+
+// Bit b is read from channel b: logit = 2 N_b (mean - kMeanOfRelu). If each bit holds a part 1 / N_b of an
+// image, a channel that tells its values apart there moves the logit by about one.
+template <class T>
+void read_own_channel(ParamStore<T>& store, const std::string& linear, Index bits) {
+  const double gain = 2 * static_cast<double>(bits);
+  const std::span<T> weight = store.values(store.find(linear + "/weight")),
+                     bias = store.values(store.find(linear + "/bias"));
+  std::ranges::fill(weight, T(0));
+  for (Index b = 0; b < bits; ++b) weight[at(b * bits + b)] = static_cast<T>(gain);
+  std::ranges::fill(bias, static_cast<T>(-gain * kMeanOfRelu));
+}
+
+}  // namespace
+
 template <class T>
 PooledExtractor<T>::PooledExtractor(ParamStore<T>& store, std::string_view name,
-                                    const PooledExtractorOptions& o, std::uint64_t seed) {
+                                    const PooledExtractorOptions& o, std::uint64_t seed)
+    : channels_(o.channels) {
   if (o.n_bits < 1 || o.channels < 1 || o.layers < 1)
     throw ValueError("[PooledExtractor] n_bits, channels and layers must be at least 1, got " +
                      std::to_string(o.n_bits) + ", " + std::to_string(o.channels) + " and " +
@@ -26,30 +46,55 @@ PooledExtractor<T>::PooledExtractor(ParamStore<T>& store, std::string_view name,
   }
   linear_.emplace_back(store, std::string(name) + "/linear", DenseOptions{.in = o.n_bits, .out = o.n_bits},
                        seeds.next());
+  read_own_channel(store, std::string(name) + "/linear", o.n_bits);
 }
 
 template <class T>
 template <class Norm>
-Var<T> PooledExtractor<T>::run(const Params<T>& params, Var<T> images, Norm norm) const {
+typename PooledExtractor<T>::Blocks PooledExtractor<T>::blocks(const Params<T>& params, Var<T> images,
+                                                               Norm norm) const {
   check_rank("PooledExtractor", "images", images.shape(), 4, "[images, height, width, 3]");
   check_extent("PooledExtractor", "images", images.shape(), 3, 3, "red, green, blue");
-  Var<T> x = centred_image(images);
-  for (std::size_t k = 0; k < convs_.size(); ++k) x = norm(k, convs_[k](params, x));
-  return linear_[0](params, global_avg_pool(x));
+  const Var<T> centred = centred_image(images);
+  Blocks x{.before = centred, .last = centred};
+  for (std::size_t k = 0; k < convs_.size(); ++k)
+    x = {.before = x.last, .last = norm(k, convs_[k](params, x.last))};
+  return x;
 }
 
 template <class T>
-Var<T> PooledExtractor<T>::operator()(const Params<T>& params, Var<T> images,
-                                      std::vector<BatchStatistics>* statistics) const {
+typename PooledExtractor<T>::Blocks PooledExtractor<T>::trained_blocks(
+    const Params<T>& params, Var<T> images, std::vector<BatchStatistics>* statistics) const {
   if (statistics) statistics->resize(norms_.size());
-  return run(params, images, [&](std::size_t k, Var<T> x) {
+  return blocks(params, images, [&](std::size_t k, Var<T> x) {
     return norms_[k](params, x, statistics ? &(*statistics)[k] : nullptr);
   });
 }
 
 template <class T>
+Var<T> PooledExtractor<T>::operator()(const Params<T>& params, Var<T> images,
+                                      std::vector<BatchStatistics>* statistics) const {
+  return linear_[0](params, global_avg_pool(trained_blocks(params, images, statistics).last));
+}
+
+template <class T>
+typename PooledExtractor<T>::Places PooledExtractor<T>::places(
+    const Params<T>& params, Var<T> images, std::vector<BatchStatistics>* statistics) const {
+  const Blocks x = trained_blocks(params, images, statistics);
+  const auto rows = [](Var<T> map) {
+    const Index channels = map.shape()[3];
+    return map.tape().reshape(map, {map.shape().size() / channels, channels});
+  };
+  return {.features = rows(x.before),
+          .pixels = linear_[0](params, rows(x.last)),
+          .images = linear_[0](params, global_avg_pool(x.last))};
+}
+
+template <class T>
 Var<T> PooledExtractor<T>::evaluate(const Params<T>& params, Var<T> images) const {
-  return run(params, images, [&](std::size_t k, Var<T> x) { return norms_[k].evaluate(params, x); });
+  const Blocks x =
+      blocks(params, images, [&](std::size_t k, Var<T> y) { return norms_[k].evaluate(params, y); });
+  return linear_[0](params, global_avg_pool(x.last));
 }
 
 template <class T>

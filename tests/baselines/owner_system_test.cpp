@@ -40,9 +40,9 @@ TEST_CASE("owner_system: what each system is") {
   CHECK(ours.recipe.owner.reader_size == 128);
   const auto paper = owner_system({"copyrnerf_paper", "lego", "hash", 16, 1}, 160);
   CHECK(std::holds_alternative<watermark::FusionMarkOptions>(paper.recipe.mark));
-  CHECK(paper.recipe.owner.reader_size == 150);
+  CHECK(paper.recipe.owner.reader_size == 80);
   CHECK(paper.recipe.embed.distortions.rotation == 30);
-  CHECK(owner_system({"copyrnerf_paper", "lego", "mlp", 16, 1}, 100).recipe.owner.reader_size == 100);
+  CHECK(owner_system({"copyrnerf_paper", "lego", "mlp", 16, 1}, 64).recipe.owner.reader_size == 64);
   CHECK(owner_system(kOurs, 16).recipe.owner.reader_size == 32);
   const auto plain = owner_system({"without_drr", "lego", "hash", 16, 1}, 160);
   CHECK(plain.recipe.embed.distortions.rotation == 0);
@@ -76,7 +76,7 @@ TEST_CASE("owner_system: each ablation takes away its part and nothing else") {
   CHECK(fusion(code).authors_code);
   CHECK(fusion(code).message_features == 128);
   CHECK(code.recipe.embed.extractor_lr == 2);
-  CHECK(code.recipe.owner.reader_size == 150);
+  CHECK(code.recipe.owner.reader_size == 80);
   CHECK(!fusion(paper).authors_code);
 
   const auto& usual = ours.recipe.cell().training;

@@ -54,6 +54,27 @@ TEST_CASE("pooled_extractor: any patch size, a batch or one image") {
   }
 }
 
+TEST_CASE("pooled_extractor: the mean of the pixels' logits is the image's") {
+  ParamStore<double> store;
+  const PooledExtractor<double> net(store, "h", {.n_bits = 3, .channels = 4, .layers = 2}, 1);
+  CHECK(net.channels() == 4);
+  const auto images = uniform({2, 6, 5, 3}, 0, 1, 1);
+  Tape<double> tape;
+  const Params<double> params(store, nullptr);
+  const auto places = net.places(params, tape.constant(images));
+  const auto want = net(params, tape.constant(images));
+  CHECK(places.features.shape() == Shape{60, 4});
+  REQUIRE(places.pixels.shape() == Shape{60, 3});
+  REQUIRE(places.images.shape() == want.shape());
+  for (Index i = 0; i < 2; ++i)
+    for (Index b = 0; b < 3; ++b) {
+      double mean = 0;
+      for (Index p = 0; p < 30; ++p) mean += places.pixels.value()[(30 * i + p) * 3 + b] / 30;
+      CHECK(mean == Approx(want.value()[3 * i + b]).epsilon(1e-12));
+      CHECK(places.images.value()[3 * i + b] == want.value()[3 * i + b]);
+    }
+}
+
 TEST_CASE("pooled_extractor: running statistics follow the batch's, then an image is read alone") {
   ParamStore<double> store;
   const PooledExtractor<double> net(store, "h", {.n_bits = 3, .channels = 4, .layers = 2}, 1);

@@ -223,7 +223,7 @@ Command add_embed(CommandLine& app) {
       ->default_str("");
   app.add_option(
          "--reader-size", o->reader_size,
-         "Longer side of the extractor's images, pixels, 32 to 1024 (160; presets paper and code: 150)")
+         "Longer side of the extractor's images, pixels, 32 to 1024 (160; presets paper and code: 80)")
       ->range(32, 1024)
       ->type_name("N")
       ->default_str("");

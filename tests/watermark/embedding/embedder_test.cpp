@@ -322,3 +322,40 @@ TEST_CASE("embedder: options outside their ranges are refused") {
   CHECK_THROWS_AS(Embedder(owner, {}, options(1)), ValueError);
   CHECK_THROWS_WITH(Embedder(owner, {}, options(1)), "[embedder] views must not be empty");
 }
+
+TEST_CASE("embedder: a warm start paints and reads carriers, is resumed bit by bit, and leaves no helpers") {
+  const PooledTrainingOptions training{.content_weight = 60, .warm_steps = 6};
+  const auto owner_of = [&] {
+    return Owner(tiny_field(), {.bits = 4, .reader_size = 48}, test_key(5), message_slots(4),
+                 fusion_mark({.width = 16, .channels = 8, .running_norm = true, .training = training}));
+  };
+  const TemporaryFolder folder;
+  Owner whole = owner_of(), resumed = owner_of(), two_threads = owner_of();
+  Embedder embedder(whole, tiny_views(), options(9));
+  embedder.step(0);
+  const double first = embedder.figures().loss;
+  while (!embedder.done()) embedder.step(0);
+  CHECK(std::isfinite(first));
+  {
+    Embedder begun(resumed, tiny_views(), options(9));
+    for (int k = 0; k < 4; ++k) begun.step(0);
+    begun.save(folder / "checkpoint");
+  }
+  resumed = owner_of();
+  Embedder rest(resumed, tiny_views(), options(9));
+  rest.restore(folder / "checkpoint");
+  while (!rest.done()) rest.step(0);
+  CHECK(outcome(whole, embedder) == outcome(resumed, rest));
+  const int before = threads();
+  set_threads(2);
+  Embedder on_two(two_threads, tiny_views(), options(9));
+  while (!on_two.done()) on_two.step(0);
+  set_threads(before);
+  CHECK(outcome(whole, embedder) == outcome(two_threads, on_two));
+  for (const auto& e : whole.params.entries())
+    CHECK((e.name.starts_with("mark/") || e.name.starts_with("extractor/")));
+  whole.save(folder / "owner");
+  const Owner again = Owner::load(folder / "owner");
+  const Tensor<float>& image = tiny_views().front().base;
+  CHECK(again.mark().evidence(again, image, nullptr) == whole.mark().evidence(whole, image, nullptr));
+}

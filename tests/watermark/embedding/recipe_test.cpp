@@ -54,7 +54,7 @@ TEST_CASE("recipe: each preset makes its kind of mark, and refuses the options o
     CHECK(owner.mark().preset() == preset);
     CHECK(owner.mark().has_cells() == (preset == "fast"));
     CHECK(owner.mark().has_gain() == (preset == "fast"));
-    CHECK(owner.options().reader_size == (preset == "fast" ? 160 : 150));
+    CHECK(owner.options().reader_size == (preset == "fast" ? 160 : 80));
     if (preset == "fast")
       CHECK(owner.cells.side() == cells_for_message(tiny_views(), 4, tiny_field().space.kind));
     else
@@ -68,12 +68,17 @@ TEST_CASE("recipe: each preset makes its kind of mark, and refuses the options o
 
 TEST_CASE("recipe: presets paper and code train as the paper and its authors' code") {
   const EmbedRecipe paper = embed_recipe("paper"), code = embed_recipe("code");
-  CHECK(paper.embed.schedule.lr == 5e-4);
   CHECK(paper.embed.extractor_lr == 1);
+  CHECK(paper.embed.batch == 8);
   CHECK(paper.embed.distortions.rotation == 30);
-  CHECK(code.embed.schedule.lr == 5e-4);
+  CHECK(paper.embed.distortions.zoom_in == 1);
+  const auto& networks = std::get<FusionMarkOptions>(paper.mark);
+  CHECK(networks.message_features == 256);
+  CHECK(networks.running_norm);
+  CHECK(networks.training.warm_steps > 0);
   CHECK(code.embed.extractor_lr == 2);
   CHECK(code.embed.distortions.noise == 0);
   CHECK(code.embed.distortions.sample_shift == Approx(8.248e-4).epsilon(1e-3));
   CHECK(std::get<FusionMarkOptions>(code.mark).message_features == 128);
+  CHECK_FALSE(std::get<FusionMarkOptions>(code.mark).running_norm);
 }

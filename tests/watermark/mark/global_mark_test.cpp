@@ -151,5 +151,24 @@ TEST_CASE("global_mark: errors name what is wrong") {
     op_values(colour(net, store), std::vector{few, few, few, message});
   };
   CHECK_THROWS_AS(with(Tensor<double>({1, 4}, 1)), ShapeError);
-  CHECK_THROWS_WITH(with(Tensor<double>({2, 3}, 1)), Contains("[global_mark] message") && Contains("[2, 3]"));
+  CHECK_THROWS_WITH(with(Tensor<double>({3, 3}, 1)), Contains("[global_mark] message") && Contains("[3, 3]"));
+  CHECK_THROWS_AS(with(Tensor<double>({0, 3}, 1)), ShapeError);
+}
+
+TEST_CASE("global_mark: each of several messages marks its own samples, as it would alone") {
+  ParamStore<double> store;
+  const GlobalMark<double> net(store, "mark", kSmall, 7);
+  const auto x = uniform({6, 3}, 0, 1, 1), d = uniform({6, 3}, -1, 1, 2), c = uniform({6, 3}, 0, 1, 3);
+  const Tensor<double> messages({2, 3}, {1, -1, 1, -1, -1, 1});
+  const auto both = op_values(colour(net, store), std::vector{x, d, c, messages});
+  for (std::size_t m = 0; m < 2; ++m) {
+    const auto half = [m](const Tensor<double>& t) {
+      return Tensor<double>({3, 3}, {t.data.begin() + 9 * static_cast<Index>(m),
+                                     t.data.begin() + 9 * static_cast<Index>(m + 1)});
+    };
+    const Tensor<double> message({1, 3}, {messages.data.begin() + 3 * static_cast<Index>(m),
+                                          messages.data.begin() + 3 * static_cast<Index>(m + 1)});
+    const auto alone = op_values(colour(net, store), std::vector{half(x), half(d), half(c), message});
+    for (std::size_t i = 0; i < 9; ++i) CHECK(both[9 * m + i] == Approx(alone[i]).epsilon(1e-12));
+  }
 }

@@ -129,15 +129,6 @@ std::vector<CachedView> cache_novel_views(const nerf::RadianceField& field, cons
   return cache_embed_views(field, patch, {.count = count, .samples = 1}, seed, progress);
 }
 
-std::vector<double> visible_area(std::span<const CachedView> views, Index side) {
-  std::vector<double> area(static_cast<std::size_t>(side * side * side));
-  for (const CachedView& view : views)
-    for (std::size_t k = 0; k < view.weight.size(); ++k)
-      area[static_cast<std::size_t>(CellGrid::place(side, &view.position[3 * k]))] +=
-          static_cast<double>(view.weight[k]);
-  return area;
-}
-
 double cells_shown(const CachedView& view, Index side) {
   double sum = 0, squares = 0;
   for (const double a : visible_area({&view, 1}, side)) {

@@ -50,6 +50,8 @@ Embedder::Embedder(Owner& owner, std::span<const CachedView> views, const EmbedO
   training_ = owner.mark().training(owner, views);
   train(owner.params, {.lr = 1, .beta2 = 0.99, .eps = 1e-8, .zero_grads = true},
         ranges(owner.params, options.extractor_lr));
+  if (ParamStore<float>* helpers = training_->helpers())
+    train(*helpers, {.lr = 1, .beta2 = 0.99, .eps = 1e-8, .zero_grads = true}, {}, "helpers/");
   keep("sign", figures_.sign);
   keep("index", figures_.index);
   keep("bits", figures_.bits);
@@ -148,23 +150,37 @@ Var<float> Embedder::distorted(Var<float> image, std::uint64_t place, bool warpe
 double Embedder::run_image(Index image, Tape<float>& tape, float* grads, Figures& figures) const {
   const TrainingImage p = draw(image, tape);
   const Var<float> loss =
-      scale(training_->loss(tape, Params<float>(owner_.params, grads), p, figures_, figures),
+      scale(training_->loss(tape, Params<float>(owner_.params, grads), {&p, 1}, figures_, figures),
             1.0 / static_cast<double>(options_.batch));
   const double value = static_cast<double>(loss.value()[0]);
   tape.backward(loss);
   return value;
 }
 
+double Embedder::run_batch(Figures& figures) {
+  Tape<float>& tape = loop_.tape(0);
+  tape.reset();
+  std::vector<TrainingImage> images;
+  for (Index i = 0; i < options_.batch; ++i) images.push_back(draw(i, tape));
+  const Var<float> loss = training_->loss(tape, Params<float>(owner_.params), images, figures_, figures);
+  tape.backward(loss);
+  return static_cast<double>(loss.value()[0]);
+}
+
 double Embedder::take_step(double) {
-  std::vector<Figures> figures(at(options_.batch));
-  const double loss = loop_.run(
-      options_.batch,
-      [&](Index image, Index, Tape<float>& tape, float* grads) {
-        return run_image(image, tape, grads, figures[at(image)]);
-      },
-      owner_.params.grads());
+  std::vector<Figures> figures(training_->whole_batch() ? 1 : at(options_.batch));
+  const double loss = training_->whole_batch()
+                          ? run_batch(figures[0])
+                          : loop_.run(
+                                options_.batch,
+                                [&](Index image, Index, Tape<float>& tape, float* grads) {
+                                  return run_image(image, tape, grads, figures[at(image)]);
+                                },
+                                owner_.params.grads());
   update();
-  const double keep = steps() == 0 ? 0 : 0.98, each = (1 - keep) / static_cast<double>(options_.batch);
+  if (training_->helpers()) update(1);
+  training_->finish_step(owner_.params);
+  const double keep = steps() == 0 ? 0 : 0.98, each = (1 - keep) / static_cast<double>(figures.size());
   figures_ = {keep * figures_.sign, keep * figures_.index, keep * figures_.bits,
               keep * figures_.loss + (1 - keep) * loss};
   for (const Figures& f : figures) {

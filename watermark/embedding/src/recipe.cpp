@@ -5,7 +5,8 @@ namespace fieldmark::watermark {
 namespace {
 
 constexpr double kSpacing = 1.7320508 / 420;  // of samples, cube sides: a field's by default
-constexpr Index kPaperPatch = 150;            // pixels
+constexpr Index kPaperPatch = 80;             // pixels
+constexpr Index kPaperBatch = 8;              // images a step, whose statistics normalise the extractor
 
 }  // namespace
 
@@ -50,12 +51,11 @@ EmbedRecipe embed_recipe(std::string_view preset) {
   EmbedRecipe r;
   if (preset == "fast") return r;
   r.owner.reader_size = kPaperPatch;
-  r.embed.schedule.lr = 5e-4;
+  r.embed.schedule = {.seconds = 2400, .lr = 1.5e-3, .half_after = 5000, .cooldown = 0.4, .last = 0.05};
+  r.embed.batch = kPaperBatch;
   if (preset == "paper") {
-    r.mark = FusionMarkOptions{};
-    r.embed.distortions.noise = 0.1;
-    r.embed.distortions.rotation = 30;
-    r.embed.distortions.blur = 0.1;
+    r.mark = paper_options();
+    r.embed.distortions = {.noise = 0.02, .rotation = 30, .zoom_out = 0.75, .zoom_in = 1, .blur = 0.1};
   } else if (preset == "code") {
     r.mark = code_options();
     r.embed.extractor_lr = 2;

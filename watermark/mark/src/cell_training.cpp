@@ -57,8 +57,8 @@ std::span<const float> code_matrix(Tape<float>& tape, const CellCode& code, Inde
 class CellTraining : public MarkTraining {
  public:
   CellTraining(const CellMark& mark, const Owner& owner, std::span<const CachedView> views);
-  Var<float> loss(Tape<float>& tape, const Params<float>& params, const TrainingImage& image,
-                  const TrainingFigures& running, TrainingFigures& figures) const override;
+  Var<float> loss(Tape<float>& tape, const Params<float>& params, std::span<const TrainingImage> images,
+                  const TrainingFigures& running, TrainingFigures& figures) override;
   std::string note(const TrainingFigures& f) const override;
   void describe(RunFingerprint& f) const override;
 
@@ -148,8 +148,10 @@ Tensor<std::int32_t> CellTraining::labels_at(const TrainingImage& image, const S
   return distort::resize_labels(labels, height, width);
 }
 
-Var<float> CellTraining::loss(Tape<float>& tape, const Params<float>& params, const TrainingImage& image,
-                              const TrainingFigures& running, TrainingFigures& figures) const {
+Var<float> CellTraining::loss(Tape<float>& tape, const Params<float>& params,
+                              std::span<const TrainingImage> images, const TrainingFigures& running,
+                              TrainingFigures& figures) {
+  const TrainingImage& image = images.front();
   const CachedView& view = views_[at(image.view)];
   const Var<float> added = residual(tape, params, image);
   const Var<float> marked = add(tape.constant(view.base.data.data(), {view.height * view.width, 3}), added);

@@ -1,4 +1,7 @@
 #include <fieldmark/engine/ops/arithmetic.h>
+#include <fieldmark/engine/ops/loss.h>
+#include <fieldmark/engine/ops/slice.h>
+#include <fieldmark/engine/random.h>
 #include <fieldmark/watermark/mark/fusion_mark.h>
 #include <fieldmark/watermark/mark/mark_network.h>
 #include <fieldmark/watermark/mark/owner.h>
@@ -8,6 +11,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "fixed_carriers.h"
 #include "in_blocks.h"
 
 namespace fieldmark::watermark {
@@ -15,12 +19,23 @@ namespace {
 
 using Json = nlohmann::json;
 
+// The squared norm of the content loss is a sum over the patch in the paper, a mean here.
+constexpr PooledTrainingOptions kWarm{.content_weight = 60, .warm_steps = 1500};
+constexpr Index kLessonMessages = 16, kLessonSamples = 512;  // of a step: messages, and samples of each
+constexpr double kColourLesson = 30;  // weight of the squared error of colours beside that of features
+
 // Switches of version 0.1 that preset code sets.
 Json code_fusion() { return Json::array({"late_direction", "raw_colour", "repeated"}); }
 
 }  // namespace
 
-FusionMarkOptions code_options() { return {.message_features = 128, .authors_code = true}; }
+FusionMarkOptions paper_options() {
+  return {.width = 128, .message_features = 256, .channels = 32, .running_norm = true, .training = kWarm};
+}
+
+FusionMarkOptions code_options() {
+  return {.message_features = 128, .authors_code = true, .training = kWarm};
+}
 
 GlobalMarkOptions network_options(const FusionMarkOptions& o, Index bits) {
   return {.bits = bits,
@@ -44,6 +59,7 @@ std::string FusionMark::configuration() const {
               {"message_features", options_.message_features},
               {"fusion", options_.authors_code ? code_fusion() : Json::array()},
               {"channels", options_.channels},
+              {"running_norm", options_.running_norm},
               // Keys of version 0.1 for the other kind.
               {"bands", other.bands},
               {"features", other.features},
@@ -61,6 +77,7 @@ FusionMarkOptions stored_fusion_mark(const std::string& configuration) {
   o.width = j.value("width", o.width);
   o.channels = j.value("channels", o.channels);
   o.message_features = j.value("message_features", o.message_features);
+  o.running_norm = j.value("running_norm", o.running_norm);  // which older owners lack
   const Json fusion = j.value("fusion", Json::array());
   if (fusion != (o.authors_code ? code_fusion() : Json::array()))
     throw ValueError("[owner] fusion must be that of its preset, got an ablation of version 0.1: " +
@@ -123,6 +140,72 @@ PooledMark::Painter FusionMark::painter(const Owner& owner, std::span<const Cach
     return add(weighted_segments<float>(colour, v.sample_begin, v.weight),
                tape.constant(behind, {pixels, 3}));
   };
+}
+
+// Samples of a step of the warm start, drawn from all views.
+struct FusionMark::Lesson {
+  float *position, *direction, *colour, *input, *marked, *carried, *message;
+};
+
+// The networks regress to the carriers' colours. The first N_b colour features regress to the texture of the
+// bit that a place carries: what is left to the fusion is to multiply them with the message.
+PooledMark::Learner FusionMark::learner(const Owner& owner, std::span<const CachedView> views) const {
+  std::vector<Index> shown;
+  for (std::size_t v = 0; v < views.size(); ++v)
+    if (!views[v].weight.empty()) shown.push_back(static_cast<Index>(v));
+  if (shown.empty()) return {};
+  return [this, &owner, views, shown = std::move(shown)](Tape<float>& tape, const Params<float>& params,
+                                                         const FixedCarriers& carriers, Index step) {
+    const Index bits = network_.options().bits, inputs = network_.colour_inputs(),
+                n = kLessonMessages * kLessonSamples;
+    const Lesson l = lesson(tape, owner, views, shown, carriers, step);
+    const auto out = network_.with_features(
+        params, tape.constant(l.position, {n, 3}), tape.constant(l.direction, {n, 3}),
+        tape.constant(l.input, {n, inputs}), tape.constant(l.message, {kLessonMessages, bits}));
+    const Var<float> colours =
+        scale(mse_loss<float>(out.colour, tape.constant(l.marked, {n, 3})), kColourLesson);
+    if (!out.features || out.features->shape()[1] < bits) return colours;
+    return add(colours, mse_loss<float>(slice(*out.features, 0, bits), tape.constant(l.carried, {n, bits})));
+  };
+}
+
+FusionMark::Lesson FusionMark::lesson(Tape<float>& tape, const Owner& owner,
+                                      std::span<const CachedView> views, std::span<const Index> shown,
+                                      const FixedCarriers& carriers, Index step) const {
+  const Index bits = network_.options().bits, inputs = network_.colour_inputs(),
+              n = kLessonMessages * kLessonSamples;
+  const Lesson l{tape.scratch(3 * n),
+                 tape.scratch(3 * n),
+                 tape.scratch(3 * n),
+                 tape.scratch(inputs * n),
+                 tape.scratch(3 * n),
+                 tape.scratch(bits * n),
+                 tape.scratch(bits * kLessonMessages)};
+  const CounterRng rng(owner.options().seed, 16);
+  const auto one_of = [](std::uint32_t number, Index count) { return static_cast<Index>(number) % count; };
+  std::fill_n(l.carried, bits * n, 0.f);
+  for (Index i = 0; i < n; ++i) {
+    const auto drawn = rng.bits(static_cast<std::uint64_t>(step * n + i));
+    const CachedView& v = views[at(shown[at(one_of(drawn[0], std::ssize(shown)))])];
+    const Index k = one_of(drawn[1], std::ssize(v.weight));
+    std::copy_n(&v.position[at(3 * k)], 3, l.position + 3 * i);
+    std::copy_n(&v.direction[at(3 * k)], 3, l.direction + 3 * i);
+    std::copy_n(&v.colour[at(3 * k)], 3, l.colour + 3 * i);
+    const auto carried = carriers.carried(l.position + 3 * i);
+    if (carried.bit >= 0) l.carried[bits * i + carried.bit] = carried.wave;
+  }
+  const CounterRng messages(owner.options().seed, 17);
+  for (Index m = 0; m < kLessonMessages; ++m) {
+    const Message sent =
+        random_message(bits, messages, static_cast<std::uint64_t>(step * kLessonMessages + m));
+    for (Index b = 0; b < bits; ++b) l.message[m * bits + b] = sent.bits[at(b)] ? 1.f : -1.f;
+    const Index first = 3 * m * kLessonSamples;
+    carriers.mark({l.message + m * bits, at(bits)}, l.position + first, l.colour + first, kLessonSamples,
+                  l.marked + first);
+  }
+  const std::vector<float> read = network_colours(owner.field, l.position, l.colour, n);
+  std::copy(read.begin(), read.end(), l.input);
+  return l;
 }
 
 }  // namespace fieldmark::watermark

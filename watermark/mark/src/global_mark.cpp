@@ -5,6 +5,7 @@
 #include <fieldmark/nerf/frequency_encoding.h>
 #include <fieldmark/watermark/mark/global_mark.h>
 
+#include <cstdint>
 #include <string>
 
 namespace fieldmark::watermark {
@@ -81,12 +82,20 @@ void GlobalMark<T>::register_fusion(ParamStore<T>& store, const std::string& nam
 }
 
 template <class T>
-Var<T> GlobalMark<T>::operator()(const Params<T>& params, Var<T> x, Var<T> d, Var<T> c,
-                                 Var<T> message) const {
-  check_rank("global_mark", "message", message.shape(), 2, "[1, N_b]");
-  check_extent("global_mark", "message", message.shape(), 0, 1, "one message for all places");
+typename GlobalMark<T>::Output GlobalMark<T>::with_features(const Params<T>& params, Var<T> x, Var<T> d,
+                                                            Var<T> c, Var<T> message) const {
+  check_rank("global_mark", "message", message.shape(), 2, "[messages, N_b]");
   check_extent("global_mark", "message", message.shape(), 1, options_.bits, "bits of the mark");
-  const Index n = x.shape()[0];
+  const Index n = x.shape()[0], messages = message.shape()[0];
+  if (messages < 1 || n % messages != 0)
+    throw ShapeError("[global_mark] message must have as many rows as divide the " + std::to_string(n) +
+                     " samples, got shape " + message.shape().str());
+  const auto of_samples = [&](Var<T> rows) {
+    if (messages == 1) return broadcast_rows(rows, n);
+    auto* row = x.tape().template scratch<std::int32_t>(n);
+    for (Index i = 0; i < n; ++i) row[i] = static_cast<std::int32_t>(i * messages / n);
+    return gather_rows<T>(rows, {row, static_cast<std::size_t>(n)});
+  };
   const Var<T> of_direction = concatenate<T>({d, nerf::frequency_encoding(d, options_.direction_bands)});
   std::vector<Var<T>> inputs;  // of G, but for c
   if (options_.colour_features > 0) {
@@ -95,9 +104,10 @@ Var<T> GlobalMark<T>::operator()(const Params<T>& params, Var<T> x, Var<T> d, Va
     of_place.push_back(c);
     inputs.push_back(through(encode_, params, concatenate<T>(of_place)));
   }
-  inputs.push_back(broadcast_rows(through(message_, params, message), n));
+  const std::optional<Var<T>> features = inputs.empty() ? std::nullopt : std::optional(inputs.front());
+  inputs.push_back(of_samples(through(message_, params, message)));
   if (options_.authors_code) inputs.push_back(of_direction);
-  return fused(params, std::move(inputs), c, broadcast_rows(message, n));
+  return {.colour = fused(params, std::move(inputs), c, of_samples(message)), .features = features};
 }
 
 // c_m = sigmoid(G(inputs, c)); in the authors' code M and c enter each hidden layer once more.

@@ -1,5 +1,6 @@
 #include <fieldmark/core/error.h>
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/watermark/mark/cell_grid.h>
 #include <fieldmark/watermark/mark/view_cache.h>
 
 #include <algorithm>
@@ -155,6 +156,15 @@ std::vector<float> foreground_mask(const CachedView& v) {
   for (Index p = 0; p < v.height * v.width; ++p)
     if (v.opacity[p] > 0.5f && v.sample_begin[at(p)] != v.sample_begin[at(p + 1)]) mask[at(p)] = 1;
   return mask;
+}
+
+std::vector<double> visible_area(std::span<const CachedView> views, Index side) {
+  std::vector<double> area(static_cast<std::size_t>(side * side * side));
+  for (const CachedView& view : views)
+    for (std::size_t k = 0; k < view.weight.size(); ++k)
+      area[static_cast<std::size_t>(CellGrid::place(side, &view.position[3 * k]))] +=
+          static_cast<double>(view.weight[k]);
+  return area;
 }
 
 }  // namespace fieldmark::watermark

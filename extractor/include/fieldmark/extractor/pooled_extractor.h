@@ -20,7 +20,9 @@ struct PooledExtractorOptions {
 /// CopyRNeRF's extractor H: convolutions with batch normalisation and ReLU, an average over all pixels, one
 /// linear layer.
 ///   logits = W mean_ij(block_9(.. block_1(2 x - 1))) + b,   block = relu(batch_norm(conv 3 x 3, stride 1))
-/// Source: Luo et al. 2023 (CopyRNeRF), section 3.3; number and width of the layers as in the authors' code.
+/// W starts at 2 N_b times the identity, and b so that the logits of noise start at 0: bit i is read from
+/// channel i. Source: Luo et al. 2023 (CopyRNeRF), section 3.3; number and width of the layers as in the
+/// authors' code.
 template <class T>
 class PooledExtractor {
  public:
@@ -37,16 +39,35 @@ class PooledExtractor {
   /// Differentiable in: images and the parameters; kinks of the ReLUs.
   Var<T> operator()(const Params<T>& params, Var<T> images,
                     std::vector<BatchStatistics>* statistics = nullptr) const;
-  /// The same with the running statistics: no image depends on another.
+  /// What the network finds before the average, for losses that supervise each pixel. The mean of the pixels'
+  /// logits over an image is the logit of that image: the average and the linear layer commute.
+  struct Places {
+    Var<T> features;  ///< [N H W, C] before the last block
+    Var<T> pixels;    ///< [N H W, N_b] logits
+    Var<T> images;    ///< [N, N_b] logits, as operator() returns them
+  };
+  /// As operator(), before and after the average.
+  Places places(const Params<T>& params, Var<T> images,
+                std::vector<BatchStatistics>* statistics = nullptr) const;
+  /// The same as operator() with the running statistics: no image depends on another.
   Var<T> evaluate(const Params<T>& params, Var<T> images) const;
+  /// Channels of all convolutions but the last.
+  Index channels() const { return channels_; }
   /// Moves the running statistics towards a batch's, see BatchNorm::update().
   /// @throws ShapeError unless there is one entry for each layer   @throws as BatchNorm::update()
   void update(ParamStore<T>& store, std::span<const BatchStatistics> batch, double momentum = 0.1) const;
 
  private:
+  // The output of the last block, and of that before it.
+  struct Blocks {
+    Var<T> before, last;
+  };
   template <class Norm>
-  Var<T> run(const Params<T>& params, Var<T> images, Norm norm) const;
+  Blocks blocks(const Params<T>& params, Var<T> images, Norm norm) const;
+  Blocks trained_blocks(const Params<T>& params, Var<T> images,
+                        std::vector<BatchStatistics>* statistics) const;
 
+  Index channels_;
   std::vector<Conv2d<T>> convs_;
   std::vector<BatchNorm<T>> norms_;
   std::vector<Dense<T>> linear_;  // one

@@ -49,9 +49,6 @@ std::vector<CachedView> cache_novel_views(const nerf::RadianceField& field, cons
                                           Index count, std::uint64_t seed,
                                           const std::function<bool(Index, Index)>& progress = {});
 
-/// Visible area of the cells of a grid over the cube, summed over views. @return [side^3]
-std::vector<double> visible_area(std::span<const CachedView> views, Index side);
-
 /// How many cells a view shows, of which slivers count little: (sum a)^2 / sum a^2 over the cells' visible
 /// areas a; 0 if it shows nothing.
 double cells_shown(const CachedView& view, Index side);

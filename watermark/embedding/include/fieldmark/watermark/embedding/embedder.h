@@ -68,6 +68,7 @@ class Embedder final : public TrainingRun {
   Var<float> distorted(Var<float> image, std::uint64_t place, bool warped, const std::array<float, 6>& warp,
                        float blur, float noise) const;
   double run_image(Index image, Tape<float>& tape, float* grads, Figures& figures) const;
+  double run_batch(Figures& figures);
 
   Owner& owner_;
   std::span<const CachedView> views_;

@@ -10,9 +10,12 @@ namespace fieldmark::watermark {
 
 /// Presets of `embed`.
 ///   fast   every cell of the scene carries one bit: trains in minutes
-///   paper  one message for all places. Source: Luo et al. 2023 (CopyRNeRF), section 4.1: images of 150
-///          pixels, step size 5e-4, distortions of at most noise 0.1, 30 degrees, scale 0.75, blur 0.1
-///   code   preset paper as in its authors' code: the extractor's step size is 1e-3, no distortions, samples
+///   paper  one message for all places, after a warm start. Source: Luo et al. 2023 (CopyRNeRF), sections 3
+///   and
+///          4.1: distortions of at most 30 degrees, scale 0.75, blur 0.1. Departures: images of 80 pixels in
+///          place of 150, eight a step, noise of at most 0.02, and those of PooledTrainingOptions
+///   code   preset paper as in its authors' code: the extractor has twice the step size, no distortions,
+///   samples
 ///          move by 0.2 of their spacing, N_m is 128, and GlobalMarkOptions::authors_code
 inline constexpr std::array<const char*, 3> kPresets{"fast", "paper", "code"};
 

@@ -9,21 +9,29 @@ namespace fieldmark::watermark {
 struct PooledTrainingOptions {
   double content_weight = 1;  ///< gamma_1
   double message_weight = 5;  ///< gamma_2
+  Index warm_steps = 0;       ///< first steps, in which all networks learn fixed carriers, >= 0
 };
 
 /// Slots without a place that stand for cells, one for each bit, of equal area: the key deals order and signs
 /// of the bits also where there are no cells.   @param bits  at least 1
 CellGrid message_slots(Index bits);
 
+class FixedCarriers;
+
 /// Mark with one message for all places, which PooledExtractor reads from a whole image: the base of
 /// FusionMark. Its evidence is the logit of every slot. Training minimises
 ///   L = gamma_1 mean |marked - base|^2 + gamma_2 BCE(bits, M)
-/// Source: Luo et al. 2023 (CopyRNeRF), section 3.4, without the perceptual term.
+/// after a warm start, if it has one: the extractor learns to read fixed carriers, pixel by pixel, and the
+/// mark's networks to paint them.
+/// Source: Luo et al. 2023 (CopyRNeRF), section 3.4, without the perceptual term and with a warm start.
 class PooledMark : public Mark {
  public:
   /// Makes the marked image [pixels, 3] of a training image.   @param message  [1, N_b], -1 or 1
   using Painter = std::function<Var<float>(Tape<float>& tape, const Params<float>& params,
                                            const TrainingImage& image, Var<float> message)>;
+  /// Loss [1] of the mark's networks against carriers, on samples drawn for a step.
+  using Learner = std::function<Var<float>(Tape<float>& tape, const Params<float>& params,
+                                           const FixedCarriers& carriers, Index step)>;
 
   bool has_gain() const override { return false; }
   bool has_cells() const override { return false; }
@@ -38,14 +46,19 @@ class PooledMark : public Mark {
 
  protected:
   /// @param reader  network that reads the message   @param training  weights of the loss
-  PooledMark(extractor::PooledExtractor<float> reader, const PooledTrainingOptions& training)
-      : reader_(std::move(reader)), training_(training) {}
+  /// @param running_norm  whether an image is read with the running statistics of training, or with its own
+  PooledMark(extractor::PooledExtractor<float> reader, const PooledTrainingOptions& training,
+             bool running_norm)
+      : reader_(std::move(reader)), training_(training), running_norm_(running_norm) {}
   /// Prepares the training images of the views, which must outlive the result, like the owner.
   virtual Painter painter(const Owner& owner, std::span<const CachedView> views) const = 0;
+  /// Prepares the warm start of the mark's networks; empty: they have none. As painter().
+  virtual Learner learner(const Owner&, std::span<const CachedView>) const { return {}; }
 
  private:
   extractor::PooledExtractor<float> reader_;
   PooledTrainingOptions training_;
+  bool running_norm_;
 };
 
 /// How a fusion mark is made and trained.
@@ -54,9 +67,14 @@ struct FusionMarkOptions {
   Index message_features = 0;  ///< N_m; 0: width
   Index channels = 64;         ///< of the extractor, see PooledExtractorOptions
   bool authors_code = false;   ///< see GlobalMarkOptions
+  /// Whether an image is read with the running statistics of training, in place of its own.
+  bool running_norm = false;
   /// Not stored in OWNER.
   PooledTrainingOptions training{};
 };
+/// Options of preset paper: N_m = 256, the only size that the paper gives; 128 units and 32 channels
+/// elsewhere.
+FusionMarkOptions paper_options();
 /// Options of preset code: the networks of the authors' code, with N_m = 128.
 FusionMarkOptions code_options();
 
@@ -66,7 +84,9 @@ class FusionMark : public PooledMark {
   /// @param network  of the mark   @param reader  of images
   FusionMark(GlobalMark<float> network, extractor::PooledExtractor<float> reader,
              const FusionMarkOptions& options)
-      : PooledMark(std::move(reader), options.training), network_(std::move(network)), options_(options) {}
+      : PooledMark(std::move(reader), options.training, options.running_norm),
+        network_(std::move(network)),
+        options_(options) {}
   std::string preset() const override { return options_.authors_code ? "code" : "paper"; }
   std::string configuration() const override;
   nerf::Renderer::Recolour recolour(const Owner& owner, std::vector<std::int8_t> signs) const override;
@@ -80,8 +100,13 @@ class FusionMark : public PooledMark {
 
  protected:
   Painter painter(const Owner& owner, std::span<const CachedView> views) const override;
+  Learner learner(const Owner& owner, std::span<const CachedView> views) const override;
 
  private:
+  struct Lesson;
+  Lesson lesson(Tape<float>& tape, const Owner& owner, std::span<const CachedView> views,
+                std::span<const Index> shown, const FixedCarriers& carriers, Index step) const;
+
   GlobalMark<float> network_;
   FusionMarkOptions options_;
 };

@@ -1,6 +1,7 @@
 #pragma once
 #include <fieldmark/engine/nn/dense.h>
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,9 +34,19 @@ class GlobalMark {
              std::uint64_t seed);
   /// @param x  [N, 3] unit cube   @param d  [N, 3] unit directions
   /// @param c  [N, 3] base colours; of the authors' code [N, 4], log(c / (1 - c)) and log sigma / 16
-  /// @param message  [1, N_b], -1 or 1   @return c_m [N, 3] in (0, 1)   @throws ShapeError if they do not fit
+  /// @param message  [R, N_b], -1 or 1: row r is the message of samples r N / R to (r + 1) N / R - 1
+  /// @return c_m [N, 3] in (0, 1)   @throws ShapeError if they do not fit, or R does not divide N
   /// Differentiable in: x, d, c, message and the parameters; kinks of the ReLUs.
-  Var<T> operator()(const Params<T>& params, Var<T> x, Var<T> d, Var<T> c, Var<T> message) const;
+  Var<T> operator()(const Params<T>& params, Var<T> x, Var<T> d, Var<T> c, Var<T> message) const {
+    return with_features(params, x, d, c, message).colour;
+  }
+  /// What the network makes of samples.
+  struct Output {
+    Var<T> colour;                   ///< c_m [N, 3]
+    std::optional<Var<T>> features;  ///< f_c [N, N_c]; none without E
+  };
+  /// As operator(), with the colour features.
+  Output with_features(const Params<T>& params, Var<T> x, Var<T> d, Var<T> c, Var<T> message) const;
   /// Columns of c.
   Index colour_inputs() const { return options_.authors_code ? 4 : 3; }
   /// The options given to the constructor.

@@ -50,11 +50,19 @@ struct TrainingImage {
 class MarkTraining {
  public:
   virtual ~MarkTraining() = default;
-  /// Loss [1] of one image: marks it, distorts it, reads it. Several threads call it at once.
+  /// Whether loss() takes all images of a step at once, because what one image gives depends on the others.
+  virtual bool whole_batch() const { return false; }
+  /// Loss [1], mean over images: marks them, distorts them, reads them. Several threads call it at once, each
+  /// for one image, unless whole_batch().
   /// @param params  of the owner   @param running  means over the run so far
-  /// @param figures  written: those of this image, without the loss
-  virtual Var<float> loss(Tape<float>& tape, const Params<float>& params, const TrainingImage& image,
-                          const TrainingFigures& running, TrainingFigures& figures) const = 0;
+  /// @param figures  written: those of these images, without the loss
+  virtual Var<float> loss(Tape<float>& tape, const Params<float>& params,
+                          std::span<const TrainingImage> images, const TrainingFigures& running,
+                          TrainingFigures& figures) = 0;
+  /// Parameters of networks that training needs and the owner does not keep; null: none.
+  virtual ParamStore<float>* helpers() { return nullptr; }
+  /// Sets what no gradient moves, such as running statistics, after each step. @param params  of the owner
+  virtual void finish_step(ParamStore<float>&) {}
   /// Running means for a progress line.
   virtual std::string note(const TrainingFigures& running) const = 0;
   /// Notes every option of training of this kind, so that a checkpoint of other options is refused.

@@ -30,4 +30,7 @@ CachedView cache_view(nerf::Renderer& renderer, const nerf::RadianceField& field
 /// 1 where a pixel's opacity exceeds 0.5 and the pixel has a sample, else 0. @return [height width]
 std::vector<float> foreground_mask(const CachedView& view);
 
+/// Visible area of the cells of a grid over the cube, summed over views. @return [side^3]
+std::vector<double> visible_area(std::span<const CachedView> views, Index side);
+
 }  // namespace fieldmark::watermark
