@@ -3,24 +3,19 @@
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/analytic_scene.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 
 #include "support/catch.h"
+#include "support/temporary_folder.h"
 
 using namespace fieldmark;
 using namespace fieldmark::nerf;
 namespace fs = std::filesystem;
 
 namespace {
-struct TemporaryFolder {
-  fs::path path = fs::temp_directory_path() / ("fieldmark_scene_" + std::to_string(::getpid()));
-  TemporaryFolder() { fs::remove_all(path); }
-  ~TemporaryFolder() { fs::remove_all(path); }
-};
 Camera from(const Vec3& eye, Index size) {
   return make_camera(look_at(eye, {0, 0, 0}, {0, 0, 1}), 0.6911, size, size);
 }
