@@ -81,15 +81,16 @@ TEST_CASE("analytic_scene: splits have their sizes and their own cameras on the 
 
 TEST_CASE("analytic_scene: what is written is what is made in memory") {
   const TemporaryFolder folder;
+  const fs::path scene = folder / "scene";
   const SceneOptions options{.size = 16, .views = 9, .seed = 3};
   std::vector<Index> steps;
-  write_scene(options, folder.path, [&](Index done, Index total) {
+  write_scene(options, scene, [&](Index done, Index total) {
     CHECK(total == 12);
     steps.push_back(done);
   });
   CHECK(steps == std::vector<Index>{8, 9, 10, 12});
   for (const char* split : {"train", "val", "test"}) {
-    const Dataset made = make_scene(options, split), read = load_dataset(folder.path, {.split = split});
+    const Dataset made = make_scene(options, split), read = load_dataset(scene, {.split = split});
     REQUIRE(read.views.size() == made.views.size());
     for (std::size_t i = 0; i < made.views.size(); ++i) {
       CHECK(read.views[i].rgba.data == made.views[i].rgba.data);
@@ -116,10 +117,11 @@ TEST_CASE("analytic_scene: errors") {
   CHECK_THROWS_WITH(make_scene({.size = 1}, "dev"),
                     Contains("split must be \"train\", \"val\" or \"test\", got \"dev\""));
   const TemporaryFolder folder;
-  write_file_atomically(folder.path, "a file");
-  CHECK_THROWS_WITH(write_scene({.size = 1, .views = 1}, folder.path), Contains("cannot make the folder"));
-  fs::remove(folder.path);
+  const fs::path scene = folder / "scene";
+  write_file_atomically(scene, "a file");
+  CHECK_THROWS_WITH(write_scene({.size = 1, .views = 1}, scene), Contains("cannot make the folder"));
+  fs::remove(scene);
   const auto stop = [](Index, Index) { throw ValueError("stopped"); };
-  CHECK_THROWS_WITH(write_scene({.size = 1, .views = 1}, folder.path, stop), "stopped");
-  CHECK_FALSE(fs::exists(folder.path / "transforms_train.json"));
+  CHECK_THROWS_WITH(write_scene({.size = 1, .views = 1}, scene, stop), "stopped");
+  CHECK_FALSE(fs::exists(scene / "transforms_train.json"));
 }
