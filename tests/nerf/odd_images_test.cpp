@@ -19,7 +19,7 @@ TEST_CASE("odd_images: enough views of different images of one size are not odd"
   CHECK(odd_images({}, SceneType::place).empty());
 }
 
-TEST_CASE("odd_images: equal images to train on, each with its first; blank ones are told of as such") {
+TEST_CASE("odd_images: equal images to train on, each with its first, and blank ones are told of as such") {
   auto views = ring_of_views(14);
   views[3].thumbnail = views[9].thumbnail = views[1].thumbnail;
   views[12].thumbnail = views[2].thumbnail, views[12].split = "test";

@@ -37,7 +37,7 @@ TEST_CASE("data check tells what a data set holds, and draws its cameras", "[dat
   CHECK(json["sizes"][0]["images"] == 21);
 }
 
-TEST_CASE("data check names each oddity with its remedy and ends with 0; train tells the same in short",
+TEST_CASE("data check names each oddity with its remedy and ends with 0, and train tells the same in short",
           "[data]") {
   const TemporaryFolder folder;
   const std::string scene = tiny_scene(folder);
