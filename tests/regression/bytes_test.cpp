@@ -17,7 +17,8 @@
 
 // Every file that the command writes for a fixed seed, key and number of steps has recorded bytes, for one
 // thread and for two: those of version 0.1 for scene and fields, and for owners, baked fields, renders and
-// logits those of the commit that made the networks independent of the key. A change that is meant to change
+// logits those of the commit that made the networks independent of the key or, of presets paper and code, of
+// that which gave them a warm start. A change that is meant to change
 // results says so and records them anew from the test's own output.
 using namespace fieldmark;
 
