@@ -61,7 +61,7 @@ class MarkTraining {
                           TrainingFigures& figures) = 0;
   /// Parameters of networks that training needs and the owner does not keep; null: none.
   virtual ParamStore<float>* helpers() { return nullptr; }
-  /// Sets what no gradient moves, such as running statistics, after each step. @param params  of the owner
+  /// Sets what no gradient moves, such as running statistics of the owner, after each step.
   virtual void finish_step(ParamStore<float>&) {}
   /// Running means for a progress line.
   virtual std::string note(const TrainingFigures& running) const = 0;
