@@ -13,6 +13,7 @@
 #include "support/catch.h"
 #include "support/library.h"
 #include "support/random.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 
@@ -20,7 +21,7 @@ namespace {
 bool has_webp() { return library_or_skip(is_built_in(ImageFormat::webp), "the test of WebP", "libwebp-dev"); }
 double worst(const Tensor<float>& a, const Tensor<float>& b) {
   double most = 0;
-  for (Index i = 0; i < a.size(); ++i) most = std::max(most, std::abs(static_cast<double>(a[i] - b[i])));
+  for (Index i = 0; i < a.size(); ++i) raise_to(most, std::abs(static_cast<double>(a[i] - b[i])));
   return most;
 }
 void put(std::vector<std::byte>& bytes, std::size_t value, int size) {

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "support/random.h"
+#include "support/worst.h"
 
 /// A random graph of the engine's ops in double, recorded on a tape and described in JSON for another
 /// program. Before an op with a narrow domain stand ops that lead into it; numbers that grow are scaled down.
@@ -95,8 +96,7 @@ class RandomGraph {
     vars_.push_back(v);
     read_.push_back(false);
     double largest = 0;
-    for (fieldmark::Index i = 0; i < v.shape().size(); ++i)
-      largest = std::max(largest, std::abs(v.value()[i]));
+    for (fieldmark::Index i = 0; i < v.shape().size(); ++i) raise_to(largest, std::abs(v.value()[i]));
     if (largest > 3) return scaled(vars_.size() - 1, std::round(1024 / largest) / 1024);
     return vars_.size() - 1;
   }

@@ -7,6 +7,7 @@
 
 #include "imaging/media_samples.h"
 #include "support/library.h"
+#include "support/worst.h"
 
 inline bool video_or_skip() {
   return library_or_skip(fieldmark::has_video(), "the test of videos",
@@ -26,7 +27,6 @@ inline double part_difference(const fieldmark::Tensor<float>& a, const fieldmark
   for (const int x : {4, 8, 12, 20, 24, 28})
     for (const int y : {2, 4, 11, 13})
       for (int c = 0; c < 3; ++c)
-        most =
-            std::max(most, std::abs(static_cast<double>(a[(y * 32 + x) * 3 + c] - b[(y * 32 + x) * 3 + c])));
+        raise_to(most, std::abs(static_cast<double>(a[(y * 32 + x) * 3 + c] - b[(y * 32 + x) * 3 + c])));
   return most;
 }
