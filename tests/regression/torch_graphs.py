@@ -6,30 +6,14 @@ Fieldmark found. `training` lists optimisers with the names of tensors of an MLP
 and optimiser: its number or name, and the worst relative error of the value, of the gradients, and of the losses.
 """
 import json
-import struct
 import sys
 
-import numpy
 import torch
 import torch.nn.functional as F
 
+from safetensors_file import read_safetensors
+
 torch.set_num_threads(1)  # small tensors: threads would only wait for each other
-TYPES = {"F64": "<f8", "I32": "<i4"}
-
-
-def read_safetensors(path):
-    """Tensors by name, and the file's metadata."""
-    with open(path, "rb") as file:
-        (length,) = struct.unpack("<Q", file.read(8))
-        header = json.loads(file.read(length))
-        data = file.read()
-    metadata = header.pop("__metadata__", {})
-    tensors = {}
-    for name, entry in header.items():
-        begin, end = entry["data_offsets"]
-        numbers = numpy.frombuffer(data[begin:end], TYPES[entry["dtype"]]).reshape(entry["shape"])
-        tensors[name] = torch.from_numpy(numbers.astype("f8" if entry["dtype"][0] == "F" else "i8"))
-    return tensors, metadata
 
 
 def index(args):
