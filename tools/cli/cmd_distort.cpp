@@ -70,8 +70,9 @@ std::optional<Tensor<float>> read_undistorted(const std::filesystem::path& path,
                                               ReadFaults& faults) {
   std::optional<Tensor<float>> image;
   faults.try_read(path, [&] {
-    image = read_rgb(path, background);
-    faults.check(path, read_bytes(path));
+    const auto bytes = read_bytes(path);
+    image = decode_rgb(bytes, path.string(), background);
+    faults.check(path, bytes);
   });
   return image;
 }

@@ -127,7 +127,11 @@ Tensor<float> decode_upright(std::span<const std::byte> bytes, const std::string
 }
 
 Tensor<float> read_rgb(const fs::path& path, float background) {
-  Tensor<float> image = decode_upright(read_bytes(path), path.string());
+  return decode_rgb(read_bytes(path), path.string(), background);
+}
+
+Tensor<float> decode_rgb(std::span<const std::byte> bytes, const std::string& name, float background) {
+  Tensor<float> image = decode_upright(bytes, name);
   const Index channels = image.shape[2], pixels = image.shape[0] * image.shape[1];
   if (channels == 3) return image;
   const bool has_alpha = channels % 2 == 0;

@@ -32,9 +32,11 @@ std::vector<std::filesystem::path> list_images(const std::vector<std::string>& p
 
 /// decode_image(), turned as exif_orientation() asks for it.
 Tensor<float> decode_upright(std::span<const std::byte> bytes, const std::string& name);
-/// Reads an image as [H, W, 3], upright; grey is repeated, and `background` in [0, 1] fills transparent
-/// pixels.
-/// @throws IoError as read_image()
+/// An image file's bytes as [H, W, 3], upright; grey is repeated, and `background` in [0, 1] fills
+/// transparent pixels.
+/// @throws IoError as decode_image(), with the name
+Tensor<float> decode_rgb(std::span<const std::byte> bytes, const std::string& name, float background);
+/// decode_rgb() of a file. @throws IoError also if it cannot be read
 Tensor<float> read_rgb(const std::filesystem::path& path, float background);
 
 /// What was odd about several images, to be told when all are read: a line amid the progress would be lost.
