@@ -153,7 +153,8 @@ bool same_image(const SurveyedView& a, const SurveyedView& b) {
 }
 
 std::vector<std::size_t> neighbours(std::span<const SurveyedView> views) {
-  constexpr double kFarTurn = 0.2;  // radians
+  constexpr double kFarTurn = 0.2;    // radians
+  constexpr double kSamePose = 1e-6;  // rounding: equal poses are an oddity of their own
   std::vector<double> from_middle = distances_from_middle(views);
   std::ranges::sort(from_middle);
   const double scale = std::max(from_middle[from_middle.size() / 2], 1e-300);
@@ -166,7 +167,7 @@ std::vector<std::size_t> neighbours(std::span<const SurveyedView> views) {
       const double turn = std::acos(std::clamp(dot(axis, normalised(views[j].camera.forward())), -1., 1.));
       if (j == i || turn > kFarTurn) continue;
       const double apart = norm(views[i].camera.position() - views[j].camera.position()) / scale + turn;
-      if (apart < least) least = apart, next[i] = j;
+      if (apart > kSamePose && apart < least) least = apart, next[i] = j;
     }
   }
   return next;

@@ -16,7 +16,7 @@ std::string full_name(const SurveyedView& view);
 bool same_image(const SurveyedView& a, const SurveyedView& b);
 
 /// Of each view, the number of the one whose camera is next to its own, by distance and angle; its own number
-/// where there is no other within 0.2 radians.
+/// where there is no other within 0.2 radians and of another pose.
 std::vector<std::size_t> neighbours(std::span<const SurveyedView> views);
 
 }  // namespace fieldmark::nerf

@@ -39,16 +39,13 @@ std::vector<SurveyedView> survey_views(const Dataset& data);
 /// the split train alone is told.
 ///   - duplicates: thumbnails with the same bits.
 ///   - blank_images: thumbnails of one colour to 1/255.
-///   - exposures: images that are brighter than that of the camera next to theirs, within 0.2 radians, by
-///   more
-///     than 15% (of an object 25%) at each quartile of the thumbnail's luminance, or darker.
+///   - exposures: at each quartile of the thumbnail's luminance 15% (of an object 25%) brighter, or darker,
+///     than the image of the next camera, within 0.2 radians and of another pose.
 ///   - masks: less than a tenth of the pixels is valid.
 ///   - outlying_cameras: further from the median position than 5/2 of the distance that 9 in 10 keep, and
-///   than
-///     four times it less three times the median distance.
-///   - cameras_look_away: the point next to all viewing axes is not in the image; in a place, if it is behind
-///   95
-///     of 100 cameras; not in a forward-facing scene.
+///     than four times it less three times the median distance.
+///   - cameras_look_away: the point next to all viewing axes is not in the image; in a place, if it is
+///     behind 95 of 100 cameras; not in a forward-facing scene.
 ///   - focal_lengths: a horizontal field of view outside 2 to 150 degrees.
 ///   - principal_points: outside the image, or within a 16th of its sides from the upper left corner.
 ///   - few_views: less than 12 to train on; of a forward-facing scene less than 6.
