@@ -94,6 +94,7 @@ TEST_CASE("embed --preset paper and code give an owner that bakes and reads like
                                 "--measured-views", "1", "--json", "-"});
     INFO(r.err);
     REQUIRE(r.code == cli::kOk);
+    CHECK_THAT(r.err, Contains("training ended in its warm start of 1500 steps"));
     CHECK(nlohmann::json::parse(r.out)["accuracy"]["blind"].is_number());
     REQUIRE(run_command({"bake", "--owner", owner, "--message", "6", "--out", baked, "--steps", "2"}).code ==
             cli::kOk);

@@ -146,6 +146,9 @@ int run_embed(const EmbedArguments& options, Context& context) {
   const InterruptGuard until_saved;  // between the last step and the file, Ctrl-C waits
   const double seconds = run_long(embedder, "embed", options.length, context, checkpoint);
   embedder.calibrate();
+  if (embedder.steps() <= embedder.warm_steps())
+    context.note("training ended in its warm start of " + std::to_string(embedder.warm_steps()) +
+                 " steps: the mark is strong and hardly read; give it more --seconds");
   owner.save(options.out);
   std::filesystem::remove(checkpoint);
   write_image(image, owner, context.seed());

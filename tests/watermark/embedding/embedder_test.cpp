@@ -336,6 +336,7 @@ TEST_CASE("embedder: a warm start paints and reads carriers, is resumed bit by b
   const double first = embedder.figures().loss;
   while (!embedder.done()) embedder.step(0);
   CHECK(std::isfinite(first));
+  CHECK(embedder.warm_steps() == 6);
   {
     Embedder begun(resumed, tiny_views(), options(9));
     for (int k = 0; k < 4; ++k) begun.step(0);
@@ -358,4 +359,21 @@ TEST_CASE("embedder: a warm start paints and reads carriers, is resumed bit by b
   const Owner again = Owner::load(folder / "owner");
   const Tensor<float>& image = tiny_views().front().base;
   CHECK(again.mark().evidence(again, image, nullptr) == whole.mark().evidence(whole, image, nullptr));
+}
+
+TEST_CASE("embedder: in 150 steps of a warm start the extractor begins to read the carriers") {
+  Owner owner(
+      tiny_field(), {.bits = 4, .reader_size = 48}, test_key(5), message_slots(4),
+      fusion_mark({.width = 16, .channels = 8, .running_norm = true, .training = {.warm_steps = 200}}));
+  Embedder embedder(owner, tiny_views(),
+                    {.schedule = {.steps = 150, .lr = 4e-3},
+                     .batch = 4,
+                     .distortions = {.noise = 0, .rotation = 0, .zoom_out = 1, .zoom_in = 1, .blur = 0},
+                     .seed = 4});
+  embedder.step(0);
+  const double first = embedder.figures().loss;
+  while (!embedder.done()) embedder.step(0);
+  CAPTURE(first, embedder.figures().loss, embedder.figures().bits);
+  CHECK(embedder.figures().loss < 0.8 * first);
+  CHECK(embedder.figures().bits > 0.57);
 }

@@ -13,6 +13,7 @@
 namespace fieldmark::watermark {
 namespace {
 
+constexpr AdamOptions kAdam{.lr = 1, .beta2 = 0.99, .eps = 1e-8, .zero_grads = true};
 constexpr std::uint64_t kOfBatch = 8 * 64;  // place of what a whole batch draws: after those of 64 images
 
 // The extractor's parameters follow one another in the store, and have a step size of their own.
@@ -48,10 +49,8 @@ Embedder::Embedder(Owner& owner, std::span<const CachedView> views, const EmbedO
   if (!(options.extractor_lr > 0))
     throw ValueError("[embedder] extractor_lr must be positive, got " + std::to_string(options.extractor_lr));
   training_ = owner.mark().training(owner, views);
-  train(owner.params, {.lr = 1, .beta2 = 0.99, .eps = 1e-8, .zero_grads = true},
-        ranges(owner.params, options.extractor_lr));
-  if (ParamStore<float>* helpers = training_->helpers())
-    train(*helpers, {.lr = 1, .beta2 = 0.99, .eps = 1e-8, .zero_grads = true}, {}, "helpers/");
+  train(owner.params, kAdam, ranges(owner.params, options.extractor_lr));
+  if (ParamStore<float>* helpers = training_->helpers()) train(*helpers, kAdam, {}, "helpers/");
   keep("sign", figures_.sign);
   keep("index", figures_.index);
   keep("bits", figures_.bits);

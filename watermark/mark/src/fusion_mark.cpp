@@ -153,7 +153,6 @@ PooledMark::Learner FusionMark::learner(const Owner& owner, std::span<const Cach
   std::vector<Index> shown;
   for (std::size_t v = 0; v < views.size(); ++v)
     if (!views[v].weight.empty()) shown.push_back(static_cast<Index>(v));
-  if (shown.empty()) return {};
   return [this, &owner, views, shown = std::move(shown)](Tape<float>& tape, const Params<float>& params,
                                                          const FixedCarriers& carriers, Index step) {
     const Index bits = network_.options().bits, inputs = network_.colour_inputs(),

@@ -44,6 +44,8 @@ class Embedder final : public TrainingRun {
   using Figures = TrainingFigures;
   /// Running means over the last images.
   const Figures& figures() const { return figures_; }
+  /// First steps of a warm start; a shorter run has not trained on the mark's own loss.
+  Index warm_steps() const { return training_->warm_steps(); }
   double figure() const override { return figures_.bits; }
   std::string status() const override { return training_->note(figures_); }
   /// Sets the owner's gain to reach its mark PSNR on novel views, each with a random message, see

@@ -59,6 +59,8 @@ class MarkTraining {
   virtual Var<float> loss(Tape<float>& tape, const Params<float>& params,
                           std::span<const TrainingImage> images, const TrainingFigures& running,
                           TrainingFigures& figures) = 0;
+  /// First steps that prepare the networks and are not yet on the mark's own loss.
+  virtual Index warm_steps() const { return 0; }
   /// Parameters of networks that training needs and the owner does not keep; null: none.
   virtual ParamStore<float>* helpers() { return nullptr; }
   /// Sets what no gradient moves, such as running statistics of the owner, after each step.
