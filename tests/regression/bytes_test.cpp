@@ -16,10 +16,12 @@
 #include "watermark/test_key.h"
 
 // Every file that the command writes for a fixed seed, key and number of steps has recorded bytes, for one
-// thread and for two: those of version 0.1 for scene and fields, and for owners, baked fields, renders and
-// logits those of the commit that made the networks independent of the key or, of presets paper and code, of
-// that which gave them a warm start. A change that is meant to change
-// results says so and records them anew from the test's own output.
+// thread and for two. A change that is meant to change results says so and records them anew from the test's
+// own output. They come from:
+//   - scene and fields: version 0.1;
+//   - owners, baked fields and renders: the commit that made the networks independent of the key; of presets
+//     paper and code, the one that gave them a warm start;
+//   - logits of preset fast: the commit that compares an image with few renders first.
 using namespace fieldmark;
 
 namespace {

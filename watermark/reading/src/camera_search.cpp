@@ -119,7 +119,7 @@ CameraSearch::CameraSearch(const Owner& owner, const CameraSearchOptions& option
     throw ValueError("[camera_search] views, around and size must be at least 1, 0 and 16, got " +
                      std::to_string(options.views) + ", " + std::to_string(options.around) + " and " +
                      std::to_string(options.size));
-  nerf::Renderer renderer(owner.field, {.finer = 1});
+  nerf::Renderer renderer(owner.field, {.finer = 0.75f});  // pixels are large
   for (const nerf::Camera& whole :
        cameras_around(owner.field, options.views, options.around, 0, options.seed)) {
     const nerf::Camera camera = reduced(whole, options.size);

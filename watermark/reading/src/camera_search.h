@@ -10,11 +10,10 @@ namespace fieldmark::watermark {
 ///   - By cells: pairs of places that the extractor recognised propose a similarity transform for each render
 ///     (RANSAC, Fischler and Bolles 1981). The best few cameras are refined by least squares.
 ///   - By content: the object's window (see object_window.h), rotated in steps of 15 degrees and reduced to
-///   24
-///     pixels, is correlated with the windows of the renders. The image must show the whole object, or the
+///     24 pixels, is correlated with the windows of the renders. The image must show the whole object, or the
 ///     field must fill its images.
 ///   - By a part: an upright image that was cropped is correlated with windows of several sizes in the
-///   renders.
+///     renders.
 class CameraSearch {
  public:
   /// @param owner  of preset fast; must outlive the search

@@ -40,18 +40,19 @@ struct ImageReading {
 };
 
 struct Surround;
+class CameraSearch;
 
 /// Informed detection: finds the camera of an image, subtracts the owner's unmarked render and compares the
 /// residual with the carriers of all cells. Like the blind detector, it knows neither key nor message, so its
 /// evidence may be tested against any.
 ///
 ///   - Bars are cut off, and an object's other plain background is replaced by the field's.
-///   - Candidate cameras are aligned coarse to fine; the best agreement wins. Unless it is sure, the mirrored
-///     image is tried, too, and one that was stretched to where it looks most like the field.
+///   - Candidate cameras are aligned coarse to fine; the best agreement wins. The first come from 64 renders.
+///     Unless their agreement is sure, all renders are compared, then the mirrored image, and one that was
+///     stretched to where it looks most like the field.
 ///   - The blur that leaves the smallest residual is kept; gain, offset and gamma are fitted.
-///   - With the residual R and its power V around each pixel, R / V is the score and 1 / V the precision. In
-///   a
-///     JPEG image both come from the quantised coefficients.
+///   - With the residual R and its power V around each pixel, R / V is the score and 1 / V the precision.
+///     For a JPEG image both come from the quantised coefficients.
 ///   - S_c are the signs that explain the whole residual by linear least squares, since a ray passes several
 ///     cells.
 class InformedReader {
@@ -71,9 +72,13 @@ class InformedReader {
  private:
   struct Parts;
   struct Change;
-  std::vector<Change> changes(const Tensor<float>& seen) const;
-  std::vector<nerf::Camera> starts(const Tensor<float>& image, const Change& change,
-                                   const SeenPlaces& places);
+  const CameraSearch& all_views();
+  std::vector<Change> changes(const Tensor<float>& seen);
+  static std::vector<nerf::Camera> starts(const CameraSearch& search, const Tensor<float>& image,
+                                          const Change& change, const SeenPlaces& places);
+  void try_all(const Surround& seen, const Change& change, const std::vector<nerf::Camera>& cameras,
+               InformedReading& best);
+  void refine(const Surround& seen, const Change& change, InformedReading& found);
   InformedReading aligned(const Surround& seen, const Change& change, const SeenPlaces& places);
   ImageReading read_as(const Tensor<float>& whole, const Change& change);
   Surround cleared(const Tensor<float>& whole) const;
