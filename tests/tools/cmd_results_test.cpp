@@ -11,16 +11,16 @@ using namespace fieldmark;
 
 TEST_CASE("results measures what is named, once, and renders it", "[results]") {
   const TemporaryFolder folder;
-  const std::vector<std::string> line{"results", "--run",         "bench/payload", "--draft",
-                                      "--work",  folder / "work", "--json",        "-"};
+  const std::vector<std::string> line{"results", "--run",         "bench/numerics", "--draft",
+                                      "--work",  folder / "work", "--json",         "-"};
   const auto first = run_command(line);
   INFO(first.err);
   REQUIRE(first.code == cli::kOk);
   CHECK(nlohmann::json::parse(first.out)["measured"] == 1);
-  const std::string file = folder / "work/rows/bench/payload.json", row = read_text(file);
+  const std::string file = folder / "work/rows/bench/numerics.json", row = read_text(file);
   const auto json = nlohmann::json::parse(row);
-  CHECK(json["command"] == "bench payload --bits 100 --trials 500");
-  CHECK(json["result"]["data_bits"] == 40);
+  CHECK(json["command"] == "gradcheck --numerics");
+  CHECK(json["result"]["ok"] == true);
   CHECK(json["code"].get<std::string>().size() == 64);
   for (const char* key :
        {"schema", "commit", "cpu", "isa", "threads", "compiler", "seed", "seconds", "inputs"})
@@ -33,7 +33,7 @@ TEST_CASE("results measures what is named, once, and renders it", "[results]") {
       run_command({"results", "--render", "--rows", folder / "work/rows", "--out", folder / "out"});
   INFO(page.err);
   REQUIRE(page.code == cli::kOk);
-  CHECK_THAT(read_text(folder / "out/payload.md"), Contains("40 data bits in 100, 500 trials a row"));
+  CHECK_THAT(read_text(folder / "out/numerics.md"), Contains("exp from -87.3 to 88"));
   CHECK_THAT(read_text(folder / "out/README.md"), Contains("| - | [quality](quality.md) |"));
 }
 

@@ -105,8 +105,10 @@ TEST_CASE("embed_variants: lengths are parts of the run's, and the paper's prese
       CHECK(v.recipe.embed.schedule.seconds == 15);
     }
     if (v.choice == "preset") {
-      CHECK(v.recipe.owner.reader_size == 150);
-      CHECK(v.recipe.embed.schedule.lr == 5e-4);
+      const watermark::EmbedRecipe own = watermark::embed_recipe(v.setting);
+      CHECK(v.recipe.owner.reader_size == own.owner.reader_size);
+      CHECK(v.recipe.embed.schedule.lr == own.embed.schedule.lr);
+      CHECK(v.recipe.embed.batch == own.embed.batch);
       CHECK(v.recipe.embed.schedule.steps == 40);
     }
   }
