@@ -22,10 +22,11 @@ namespace fieldmark::cli {
 namespace {
 
 constexpr const char* kBuiltIn = "objects";
-// Printed severities first, then those on the way to where reading ends.
-constexpr const char* kUnder[] = {"noise_0.1",  "rotation_30", "scale_0.75",  "blur_0.1",    "noise_0.02",
-                                  "noise_0.05", "noise_0.2",   "rotation_10", "rotation_60", "scale_0.5",
-                                  "blur_0.5",   "blur_1",      "blur_2"};
+// Printed severities first (the authors' code squares that of noise), then those on the way to
+// where reading ends.
+constexpr const char* kUnder[] = {"noise_0.1",  "rotation_30", "scale_0.75", "blur_0.1",    "noise_0.01",
+                                  "noise_0.02", "noise_0.05",  "noise_0.2",  "rotation_10", "rotation_60",
+                                  "scale_0.5",  "blur_0.5",    "blur_1",     "blur_2"};
 
 struct ReproduceArguments {
   std::vector<std::string> tables, scenes, systems;
