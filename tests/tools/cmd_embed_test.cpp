@@ -134,3 +134,15 @@ TEST_CASE("embed says what is wrong, and leaves no file", "[embed]") {
         cli::kFailed);
   CHECK(!std::filesystem::exists(out));
 }
+
+TEST_CASE("embed leaves the checkpoint of an interrupted run, and its key, alone", "[embed]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string out = job.folder / "begun.fm", checkpoint = out + ".checkpoint";
+  std::filesystem::copy(test_key_file(job.folder, 3), checkpoint);
+  const auto before = read_bytes(checkpoint);
+  const auto r = tiny_embed(job.field, out, {});
+  CHECK(r.code == cli::kFailed);
+  CHECK_THAT(r.err, Contains(checkpoint + ": exists already"));
+  CHECK(read_bytes(checkpoint) == before);
+  CHECK(!std::filesystem::exists(out));
+}

@@ -128,6 +128,7 @@ int run_embed(const EmbedArguments& options, Context& context) {
   if (std::filesystem::exists(options.out) && std::filesystem::equivalent(options.out, options.field))
     throw UsageError("--out: " + options.out + " is the field that is to be marked");
   check_writable(options.out);
+  if (!options.resume) check_writable(checkpoint);  // an interrupted run's, and its key
   check_writable_page(image);
   for (const auto& name : options.under)
     read_option("--distort", [&] { return distort::parse_distortion(name); });
