@@ -1,0 +1,95 @@
+#pragma once
+// numpy arrays as the engine sees them. Nothing is copied.
+#include <fieldmark/core/error.h>
+#include <fieldmark/engine/shape.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <string>
+
+namespace fieldmark::python {
+
+namespace py = pybind11;
+
+template <class T>
+const char* dtype_name() {
+  return std::is_same_v<T, float> ? "float32" : std::is_same_v<T, double> ? "float64" : "int32";
+}
+
+/// A numpy array of T in row-major order: its elements are borrowed, not copied.
+/// @param where  "function: argument", for errors
+/// @throws TypeError for another type of element   @throws ValueError for another layout
+template <class T>
+py::array borrowed(const std::string& where, const py::object& object) {
+  const std::string wanted = dtype_name<T>();
+  if (!py::isinstance<py::array>(object))
+    throw py::type_error("[" + where + "] must be a numpy array of " + wanted + ", got " +
+                         py::str(py::type::of(object).attr("__name__")).cast<std::string>());
+  const auto array = py::reinterpret_borrow<py::array>(object);
+  if (!array.dtype().is(py::dtype::of<T>()) && !array.dtype().equal(py::dtype::of<T>()))
+    throw py::type_error("[" + where + "] must be of " + wanted + ", got " +
+                         py::str(array.dtype()).cast<std::string>() + ": convert it with x.astype('" +
+                         wanted + "')");
+  if (!(array.flags() & py::array::c_style))
+    throw py::value_error("[" + where +
+                          "] must be contiguous in row-major order: pass numpy.ascontiguousarray(x)");
+  return array;
+}
+
+inline Shape shape_of(const py::array& array) {
+  std::vector<Index> extents(array.shape(), array.shape() + array.ndim());
+  return Shape(std::span<const Index>(extents));
+}
+
+inline std::vector<py::ssize_t> extents_of(const Shape& shape) {
+  std::vector<py::ssize_t> extents;
+  for (int k = 0; k < shape.rank(); ++k) extents.push_back(shape[k]);
+  return extents;
+}
+
+template <class T>
+std::span<const T> elements(const py::array& array) {
+  return {static_cast<const T*>(array.data()), static_cast<std::size_t>(array.size())};
+}
+
+/// A count of things that must stay where they are; each lease is a Python object.
+class Leases {
+ public:
+  /// Keeps `owner` alive, and counts, until the object dies.
+  template <class Owner>
+  py::capsule lend(std::shared_ptr<Owner> owner) {
+    struct Lease {
+      std::shared_ptr<Owner> owner;
+      std::shared_ptr<int> count;
+      ~Lease() { --*count; }
+    };
+    ++*count_;
+    return py::capsule(new Lease{std::move(owner), count_}, [](void* p) { delete static_cast<Lease*>(p); });
+  }
+  int count() const { return *count_; }
+
+ private:
+  std::shared_ptr<int> count_ = std::make_shared<int>(0);
+};
+
+/// An array over memory that `owner` keeps; while it lives, `leases` counts it.
+template <class T, class Owner>
+py::array_t<T> view(T* elements, const Shape& shape, std::shared_ptr<Owner> owner, Leases& leases) {
+  py::array_t<T> array(extents_of(shape), elements, leases.lend(std::move(owner)));
+  return array;
+}
+
+/// The same, which Python cannot write to.
+template <class T, class Owner>
+py::array_t<T> read_only_view(const T* elements, const Shape& shape, std::shared_ptr<Owner> owner,
+                              Leases& leases) {
+  py::array_t<T> array = view(const_cast<T*>(elements), shape, std::move(owner), leases);
+  py::detail::array_proxy(array.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
+  return array;
+}
+
+void bind_engine(py::module_& module);
+void bind_fields(py::module_& module);
+void bind_marks(py::module_& module);
+
+}  // namespace fieldmark::python

@@ -1,0 +1,174 @@
+"""Arrays in and out, gradients beside numpy's arithmetic, and the errors of what dies or does not fit."""
+
+import gc
+
+import numpy as np
+import pytest
+
+import fieldmark as fm
+from fieldmark import engine
+
+
+def random(*shape, dtype="float64", seed=0):
+    return np.random.default_rng(seed).standard_normal(shape).astype(dtype)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_values_and_gradients_are_those_of_numpy(dtype):
+    tape = engine.Tape(dtype)
+    a, b = random(3, 4, dtype=dtype), random(4, dtype=dtype, seed=1)
+    x, y = tape.leaf(a), tape.leaf(b)
+    z = engine.mean((x * y - 0.5) ** 2.0 / 3.0)
+    assert z.item() == pytest.approx(np.mean((a * b - 0.5) ** 2 / 3), rel=1e-5)
+    z.backward()
+    slope = 2 * (a * b - 0.5) / 3 / a.size
+    np.testing.assert_allclose(x.grad, slope * b, rtol=1e-4)
+    np.testing.assert_allclose(y.grad, (slope * a).sum(0), rtol=1e-4)
+
+
+def test_arrays_are_neither_copied_in_nor_out():
+    tape = engine.Tape("float64")
+    a = random(5)
+    x = tape.constant(a)
+    assert np.shares_memory(x.numpy(), a)
+    y = (x + 1.0).numpy()
+    assert not y.flags.writeable and not y.flags.owndata
+
+
+def test_gradients_are_added_to_the_array_given():
+    tape, a, grad = engine.Tape("float64"), random(3), np.ones(3)
+    engine.sum(engine.square(tape.leaf(a, grad))).backward()
+    np.testing.assert_allclose(grad, 1 + 2 * a)
+
+
+def test_reset_refuses_while_an_array_shows_the_pass():
+    tape = engine.Tape("float64")
+    shown = engine.exp(tape.constant(random(3))).numpy()
+    with pytest.raises(BufferError, match="1 arrays show values of this pass"):
+        tape.reset()
+    kept = np.array(shown)
+    del shown
+    gc.collect()
+    tape.reset()
+    assert np.isfinite(kept).all()
+
+
+def test_a_value_of_a_forgotten_pass_is_refused():
+    tape = engine.Tape("float64")
+    x = tape.leaf(random(3))
+    tape.reset()
+    with pytest.raises(ValueError, match="forgotten"):
+        x + 1.0
+
+
+def test_an_array_outlives_its_tape():
+    shown = engine.square(engine.Tape("float64").constant(np.arange(4.0))).numpy()
+    gc.collect()
+    np.testing.assert_array_equal(shown, [0, 1, 4, 9])
+
+
+def test_an_input_that_dies_early_is_kept():
+    tape = engine.Tape("float64")
+    x = tape.leaf(np.full(1000, 2.0))
+    gc.collect()
+    np.random.rand(1000)
+    engine.sum(engine.square(x)).backward()
+    np.testing.assert_array_equal(x.grad, np.full(1000, 4.0))
+
+
+@pytest.mark.parametrize("given, error, text", [
+    (np.ones(3, "float32"), TypeError, r"must be of float64, got float32: convert it with x.astype"),
+    (np.ones((4, 4))[:, ::2], ValueError, "must be contiguous in row-major order"),
+    (np.ones((4, 3)).T, ValueError, "must be contiguous in row-major order"),
+    ([1.0, 2.0], TypeError, "must be a numpy array of float64, got list"),
+    (np.ones((1,) * 6), fm.ShapeError, "at most 5 axes, got 6"),
+])
+def test_arrays_that_do_not_fit_are_refused(given, error, text):
+    with pytest.raises(error, match=text):
+        engine.Tape("float64").constant(given)
+
+
+def test_shapes_that_do_not_fit_are_refused():
+    tape = engine.Tape("float64")
+    a, b = tape.constant(random(3, 4)), tape.constant(random(3))
+    with pytest.raises(fm.ShapeError, match="must broadcast"):
+        a + b
+    with pytest.raises(fm.ShapeError, match=r"\[sum\]"):
+        engine.sum(a, axis=2)
+    with pytest.raises(fm.ShapeError, match="nothing|elements to reduce"):
+        engine.mean(tape.constant(np.ones((0, 3))))
+    with pytest.raises(ValueError, match="singular"):
+        engine.solve(tape.constant(np.zeros((2, 2))), tape.constant(np.ones((2, 1))))
+    with pytest.raises(ValueError, match="another tape"):
+        a + engine.Tape("float64").constant(random(3, 4))
+
+
+def test_types_are_not_mixed():
+    with pytest.raises(TypeError):
+        engine.Tape("float64").constant(random(3)) + engine.Tape("float32").constant(random(3, dtype="float32"))
+    with pytest.raises(TypeError, match="float32 or float64, got int32"):
+        engine.Tape("int32")
+
+
+def test_ops_have_the_gradients_of_differences():
+    a, b = random(2, 3, 3, seed=1), random(2, 3, 2, seed=2)
+    spd = a @ a.transpose(0, 2, 1) + 3 * np.eye(3)
+    index = np.array([2, 0], "int32")
+    for f, inputs in [
+        (lambda x: engine.softmax(engine.logsumexp(x, axis=1), axis=-1), [a]),
+        (lambda x, y: engine.solve(x, y), [spd, b]),
+        (lambda x: engine.log_determinant(x), [spd]),
+        (lambda x: engine.gather(x, 1, index), [a]),
+        (lambda x, y: x @ y, [a, b]),
+        (lambda x, y: engine.concatenate([x, y], axis=2), [a, b]),
+        (lambda x, gamma, beta: engine.gelu(engine.layer_norm(x, gamma, beta)), [a, random(3, seed=3), random(3)]),
+    ]:
+        report = engine.gradcheck(f, inputs)
+        assert report.ok, report.table
+
+
+def test_gradcheck_finds_a_wrong_gradient_and_forgets_its_tape():
+    kept = []
+
+    def wrong(x):
+        kept.append(x)
+        return x * engine.detach(x)
+
+    report = engine.gradcheck(wrong, [random(3)])
+    assert not report.ok and report.table
+    with pytest.raises(ValueError, match="forgotten"):
+        kept[0].numpy()
+
+
+def test_a_line_is_fitted():
+    x = random(64, 3, dtype="float32")
+    y = x @ np.array([[1], [-2], [0.5]], "float32") + 3
+    model = engine.Parameters()
+    model.add("w", np.zeros((3, 1), "float32"))
+    model.add("b", np.zeros(1, "float32"))
+    adam, tape = engine.Adam(model, lr=0.05), engine.Tape()
+    for _ in range(400):
+        w, b = model.leaf(tape, "w"), model.leaf(tape, "b")
+        loss = engine.mse_loss(engine.dense(tape.constant(x), w, b), tape.constant(y))
+        loss.backward()
+        last = loss.item()
+        adam.step()
+        model.zero_grad()
+        tape.reset()
+    assert last < 1e-4
+    np.testing.assert_allclose(model.values("w").ravel(), [1, -2, 0.5], atol=0.02)
+
+
+def test_parameters_refuse_more_while_memory_is_referred_to():
+    model = engine.Parameters("float64")
+    model.add("w", np.ones(3))
+    shown = model.values("w")
+    with pytest.raises(BufferError, match="add all of them first"):
+        model.add("b", np.ones(1))
+    shown[:] = 2
+    del shown
+    gc.collect()
+    model.add("b", np.ones(1))
+    np.testing.assert_array_equal(model.values("w"), [2, 2, 2])
+    with pytest.raises(ValueError):
+        model.add("w", np.ones(1))
