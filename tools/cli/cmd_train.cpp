@@ -165,18 +165,16 @@ Json test_psnr(const TrainArguments& options, const nerf::RadianceField& field, 
   return evaluation.psnr;
 }
 
-int run_train(const TrainArguments& options, Context& context) {
-  const std::string checkpoint = options.out + ".checkpoint";
-  if (options.model == "sized" && options.preset == "mlp")
-    throw UsageError("--model sized: the mlp preset has one size");
-  if (options.supersampling > 1 && options.preset == "mlp")
+void check_preset(const TrainArguments& options) {
+  if (options.preset != "mlp") return;
+  if (options.model == "sized") throw UsageError("--model sized: the mlp preset has one size");
+  if (options.supersampling > 1)
     throw UsageError("--supersampling: the mlp preset trains with one ray through a pixel's centre");
-  check_writable(options.out);
-  const nerf::Dataset data = training_data(options, context);
-  const std::vector<nerf::SurveyedView> surveyed = nerf::survey_views(data);
-  Json warnings = Json::array();
-  warn_of(nerf::odd_views(surveyed, data.scene), warnings, context);
-  warn_of(nerf::odd_files(options.data, options.size), warnings, context);
+}
+
+// Sizes of the field; `sizing` becomes what was tried for --model sized.
+nerf::RadianceFieldOptions field_sizes(const TrainArguments& options, const nerf::Dataset& data,
+                                       const std::string& checkpoint, Json& sizing, Context& context) {
   nerf::RadianceFieldOptions sizes;
   if (options.preset == "mlp")
     sizes.field.kind = nerf::FieldKind::mlp;
@@ -184,7 +182,6 @@ int run_train(const TrainArguments& options, Context& context) {
     sizes = nerf::field_options({.steps = options.length.steps, .seconds = options.length.seconds});
   sizes.seed = context.seed();
   sizes = fitted(sizes, options.max_megabytes);
-  Json sizing;
   if (options.model == "sized") {
     sizes = options.resume
                 ? nerf::checkpointed_field(checkpoint)
@@ -192,14 +189,46 @@ int run_train(const TrainArguments& options, Context& context) {
     sizes.seed = context.seed();
   }
   sizes.supersampling = options.supersampling;
-  nerf::RadianceField field(sizes);
-  nerf::TrainOptions train_options = nerf::train_options(field.options().field.kind);
-  train_options.schedule.steps = options.length.steps;
-  train_options.schedule.seconds = options.length.seconds;
-  train_options.seed = context.seed();
-  train_options.precision = precision_of(options.precision);
-  train_options.carve = !options.no_carve;
-  nerf::Trainer trainer(field, data, train_options);
+  return sizes;
+}
+
+nerf::TrainOptions training_options(const TrainArguments& options, const nerf::RadianceField& field,
+                                    const Context& context) {
+  nerf::TrainOptions o = nerf::train_options(field.options().field.kind);
+  o.schedule.steps = options.length.steps;
+  o.schedule.seconds = options.length.seconds;
+  o.seed = context.seed();
+  o.precision = precision_of(options.precision);
+  o.carve = !options.no_carve;
+  return o;
+}
+
+void say_trained(const std::string& out, const nerf::Trainer& trainer, double seconds, const Json& psnr,
+                 Context& context) {
+  char line[200];
+  std::snprintf(line, sizeof line, ": %lld steps%s in %.1f s, %.2f MB",
+                static_cast<long long>(trainer.steps()), trainer.replanned() ? " (schedule revised)" : "",
+                seconds, static_cast<double>(std::filesystem::file_size(out)) / 1e6);
+  context.text() << out << line;
+  if (!psnr.is_null()) {
+    std::snprintf(line, sizeof line, ", %.2f dB on the test views", psnr.get<double>());
+    context.text() << line;
+  }
+  context.text() << "\n";
+}
+
+int run_train(const TrainArguments& options, Context& context) {
+  const std::string checkpoint = options.out + ".checkpoint";
+  check_preset(options);
+  check_writable(options.out);
+  const nerf::Dataset data = training_data(options, context);
+  const std::vector<nerf::SurveyedView> surveyed = nerf::survey_views(data);
+  Json warnings = Json::array();
+  warn_of(nerf::odd_views(surveyed, data.scene), warnings, context);
+  warn_of(nerf::odd_files(options.data, options.size), warnings, context);
+  Json sizing;
+  nerf::RadianceField field(field_sizes(options, data, checkpoint, sizing, context));
+  nerf::Trainer trainer(field, data, training_options(options, field, context));
   if (options.resume) trainer.restore(checkpoint);
   if (trainer.from_earlier_version())
     context.note(checkpoint +
@@ -218,16 +247,7 @@ int run_train(const TrainArguments& options, Context& context) {
   std::filesystem::remove(checkpoint);
 
   const Json psnr = test_psnr(options, field, data, surveyed, warnings, context);
-  const auto bytes = std::filesystem::file_size(options.out);
-  char line[200];
-  std::snprintf(line, sizeof line, "%lld steps%s in %.1f s, %.2f MB", static_cast<long long>(trainer.steps()),
-                trainer.replanned() ? " (schedule revised)" : "", seconds, static_cast<double>(bytes) / 1e6);
-  context.text() << options.out << ": " << line;
-  if (!psnr.is_null()) {
-    std::snprintf(line, sizeof line, ", %.2f dB on the test views", psnr.get<double>());
-    context.text() << line;
-  }
-  context.text() << "\n";
+  say_trained(options.out, trainer, seconds, psnr, context);
   Json result{{"test_psnr", psnr},
               {"scene_type", nerf::name_of(data.scene)},
               {"scene_type_reason", data.scene_reason},
@@ -236,7 +256,7 @@ int run_train(const TrainArguments& options, Context& context) {
               {"replanned", trainer.replanned()},
               {"samples_per_second", (trainer.samples() - samples_before) / (seconds - begun)},
               {"parameters", field.params.parameters()},
-              {"file_bytes", bytes},
+              {"file_bytes", std::filesystem::file_size(options.out)},
               {"warnings", warnings}};
   if (!sizing.is_null()) result["sizing"] = sizing;
   context.result(result);
