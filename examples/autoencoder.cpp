@@ -64,12 +64,12 @@ int main() {
     if (step % 100 == 0) std::printf("step %3d  loss %.5f\n", static_cast<int>(step), item(loss));
   }
   tape.reset();
-  const Tensor<float> unseen = discs(kSteps);
-  const double left = static_cast<double>(item(error(unseen)));
+  const Tensor<float> others = discs(kSteps);
+  const double left = static_cast<double>(item(error(others)));
   double mean = 0, variance = 0;
-  for (const float v : unseen.data) mean += static_cast<double>(v) / static_cast<double>(unseen.size());
-  for (const float v : unseen.data)
-    variance += std::pow(static_cast<double>(v) - mean, 2) / static_cast<double>(unseen.size());
-  std::printf("unseen discs: %.1f%% of their variance is left\n", 100 * left / variance);
+  for (const float v : others.data) mean += static_cast<double>(v) / static_cast<double>(others.size());
+  for (const float v : others.data)
+    variance += std::pow(static_cast<double>(v) - mean, 2) / static_cast<double>(others.size());
+  std::printf("other discs: %.1f%% of their variance is left\n", 100 * left / variance);
   return left < 0.05 * variance ? 0 : 1;
 }

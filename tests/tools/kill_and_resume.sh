@@ -55,5 +55,5 @@ survives() {
 survives train field.fm --data scene --steps 120 --max-megabytes 1
 survives embed owner.fm --field field.fm --key secret.key --bits 4 --cells 6 --reader-size 32 --steps 40 --views 8 \
   --measured-views 1
-survives bake baked.fm --owner owner.fm --message a --steps 60
+survives bake baked.fm --owner owner.fm --message a --steps 40
 echo "train, embed and bake: interrupted, killed and resumed, the same bytes"
