@@ -1,6 +1,7 @@
 """Watermarked radiance fields on a CPU, and the autodiff engine below them.
 
-Arrays go in and out as numpy arrays without copies: float32 and float64, in row-major order.
+Arrays are numpy's, float32 or float64 in row-major order. The engine borrows them, and renders are handed over, both
+without copies; images that are read for a mark are copied once.
 
     import fieldmark as fm
     field = fm.train("lego", seconds=60)
@@ -14,9 +15,7 @@ Arrays go in and out as numpy arrays without copies: float32 and float64, in row
 from __future__ import annotations
 
 import os
-from typing import Callable, Literal, Optional, Sequence, Union
-
-import numpy as np
+from typing import Callable, Optional, Union
 
 from . import _fieldmark, engine
 from ._fieldmark import Camera, Error, Field, IoError, Key, Owner, ShapeError, set_threads, threads

@@ -89,6 +89,9 @@ py::array_t<T> read_only_view(const T* elements, const Shape& shape, std::shared
 }
 
 void bind_engine(py::module_& module);
+/// Ops of float or double values.
+template <class T>
+void bind_ops(py::module_& module);
 void bind_fields(py::module_& module);
 void bind_marks(py::module_& module);
 

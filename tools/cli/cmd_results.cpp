@@ -103,7 +103,7 @@ class Runner {
       return count("failed",
                    row.id + ": failed with exit code " + std::to_string(code) + ", see " + log.string());
     m.seconds = context_.seconds() - begun;
-    m.result = Json::parse(read_text(json));
+    m.result = results::with_names(Json::parse(read_text(json)), places_);
     if (!row.output().empty()) m.output = results::hash_of(results::path_of(plan_, row.output(), places_));
     rows_[row.id] = results::make_row(m);
     results::save_row(options_.rows, rows_[row.id]);

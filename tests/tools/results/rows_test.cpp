@@ -48,6 +48,18 @@ TEST_CASE("rows: a row comes back from its file, and a file that is none is name
   CHECK_THROWS_WITH(load_rows(folder.path), Contains("z.json: expected the row of this name"));
 }
 
+TEST_CASE("with_names: paths below the places become names, and nothing else changes") {
+  const Places places{.data = "/there/data", .work = "/here/work"};
+  const Json result{{"image", "/here/work/views/0.png"},
+                    {"images", {"/here/work/views/1.png", "/there/data/lego/r_0.png"}},
+                    {"other", {{"path", "/here/worker/a"}, {"psnr", 30.5}, {"none", nullptr}}}};
+  CHECK(with_names(result, places) ==
+        Json{{"image", "@views/0.png"},
+             {"images", {"@views/1.png", "data/lego/r_0.png"}},
+             {"other", {{"path", "/here/worker/a"}, {"psnr", 30.5}, {"none", nullptr}}}});
+  CHECK(with_names(Json("/there/data/a"), {.data = {}, .work = "/here"}) == "/there/data/a");
+}
+
 TEST_CASE("hash_of: files by their bytes, folders by names and bytes") {
   const TemporaryFolder folder;
   CHECK(hash_of(folder / "nothing").is_null());

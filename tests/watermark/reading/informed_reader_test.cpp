@@ -84,6 +84,20 @@ TEST_CASE("informed_reader: the camera is found from the image, and the reading 
   CHECK(wrong.evidence() == wrong.blind);
 }
 
+TEST_CASE("informed_reader: what an image gives does not depend on those read before it") {
+  const Owner owner = marking_owner();
+  const CameraSearchOptions many{.views = 80, .size = 32};  // more than are compared first
+  const Tensor<float> image = image_of(owner, camera_near(4), true);
+  InformedReader fresh(owner, many), used(owner, many);
+  const ImageReading alone = fresh.read(image);
+  REQUIRE(alone.informed.agreement > 0.95);  // found among the first
+  const nerf::Dataset other = nerf::make_scene({.size = 96, .views = 1, .seed = 9});
+  REQUIRE(used.read(other.views.front().rgba).informed.agreement < 0.95);  // looked for among all
+  const ImageReading after = used.read(image);
+  CHECK(after.informed.agreement == alone.informed.agreement);
+  CHECK(after.evidence() == alone.evidence());
+}
+
 Tensor<float> distorted(const char* name, const Tensor<float>& image) {
   const std::vector<float> white(3, 1.f);
   return distort::apply_distortion(distort::parse_distortion(name), image, CounterRng(1, 1), 0, white);

@@ -62,6 +62,20 @@ fs::path path_of(const Plan& plan, const std::string& word, const Places& places
   return places.data.empty() || folder.empty() ? fs::path() : places.data / folder;
 }
 
+Json with_names(Json result, const Places& places) {
+  if (result.is_structured()) {
+    for (Json& part : result) part = with_names(std::move(part), places);
+    return result;
+  }
+  if (!result.is_string()) return result;
+  const std::string text = result.get<std::string>();
+  for (const auto& [folder, name] : {std::pair{places.work, "@"}, std::pair{places.data, "data/"}}) {
+    const std::string below = folder.generic_string() + "/";
+    if (!folder.empty() && text.starts_with(below)) return name + text.substr(below.size());
+  }
+  return result;
+}
+
 Json hash_of(const fs::path& path) {
   if (path.empty() || !fs::exists(path)) return nullptr;
   if (!fs::is_directory(path)) return sha256_file_hex(path);

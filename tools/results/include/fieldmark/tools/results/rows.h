@@ -34,6 +34,9 @@ struct Places {
 };
 /// The path that a word "scene:NAME" or "@FILE" stands for.
 std::filesystem::path path_of(const Plan& plan, const std::string& word, const Places& places);
+/// The inverse for every string in a result that is a path below one of the places: "@FILE" of the work
+/// folder, "data/FILE" of the data sets. Results name files, not where they lay.
+Json with_names(Json result, const Places& places);
 /// SHA-256 of a file, or of the names and contents of a folder's files; null where there is nothing.
 Json hash_of(const std::filesystem::path& path);
 
