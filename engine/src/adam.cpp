@@ -53,7 +53,7 @@ Adam<T>::Adam(Index n, AdamOptions o) : options_(o) {
 template <class T>
 Adam<T>::Adam(const ParamStore<T>& store, AdamOptions o) : Adam(store.size(), o) {
   for (const auto& e : store.entries())
-    if (e.role == ParamRole::running) running_.emplace_back(e.offset, e.offset + e.shape.size());
+    if (!is_trained(e.role)) running_.emplace_back(e.offset, e.offset + e.shape.size());
 }
 
 template <class T>

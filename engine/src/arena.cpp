@@ -39,41 +39,44 @@ void Arena::grow(std::size_t bytes) {
   ++grown_;
 }
 
-void* Arena::allocate(std::size_t bytes) {
+void Arena::begin_block(std::size_t k) {
+  block_ = k;
+  next_ = blocks_[k].data.get();
+  room_ = blocks_[k].size;
+}
+
+void* Arena::allocate_slowly(std::size_t bytes) {
   const std::size_t taken = round_up(bytes, kAlign) + kGap;
-  while (block_ < blocks_.size() && used_ + taken > blocks_[block_].size) {
-    ++block_;
-    used_ = 0;
+  while (room_ < taken) {
+    if (!next_ || block_ + 1 == blocks_.size()) grow(taken);
+    begin_block(next_ ? block_ + 1 : 0);
   }
-  if (block_ == blocks_.size()) {
-    grow(taken);
-    used_ = 0;
-  }
-  void* p = blocks_[block_].data.get() + used_;
-  used_ += taken;
+  std::byte* p = next_;
+  next_ += taken;
+  room_ -= taken;
   ASAN_UNPOISON_MEMORY_REGION(p, bytes);
   return p;
 }
 
 void Arena::reset() noexcept {
   for (const auto& b : blocks_) ASAN_POISON_MEMORY_REGION(b.data.get(), b.size);
-  block_ = 0;
-  used_ = 0;
+  if (!blocks_.empty()) begin_block(0);
 }
 
 void Arena::spoil() noexcept {
   spoils_ = true;
   for (std::size_t k = block_; k < blocks_.size(); ++k) {
-    const std::size_t from = k == block_ ? used_ : 0;
-    std::byte* begin = blocks_[k].data.get() + from;
-    ASAN_UNPOISON_MEMORY_REGION(begin, blocks_[k].size - from);
-    std::memset(begin, kSpoilt, blocks_[k].size - from);
-    ASAN_POISON_MEMORY_REGION(begin, blocks_[k].size - from);
+    std::byte* begin = k == block_ ? next_ : blocks_[k].data.get();
+    const std::size_t bytes = k == block_ ? room_ : blocks_[k].size;
+    ASAN_UNPOISON_MEMORY_REGION(begin, bytes);
+    std::memset(begin, kSpoilt, bytes);
+    ASAN_POISON_MEMORY_REGION(begin, bytes);
   }
 }
 
 std::size_t Arena::used() const {
-  std::size_t n = used_;
+  if (blocks_.empty()) return 0;
+  std::size_t n = blocks_[block_].size - room_;
   for (std::size_t k = 0; k < block_; ++k) n += blocks_[k].size;
   return n;
 }

@@ -8,17 +8,8 @@
 namespace fieldmark {
 namespace {
 
-bool ends(const std::string& name, std::string_view end) {
-  return name.size() >= end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0;
-}
-template <class Entry>
-bool is_matrix(const Entry& e) {
-  return e.shape.rank() == 2 && ends(e.name, "/weight");
-}
-template <class Entry>
-bool is_table(const Entry& e) {
-  return e.shape.rank() == 2 && ends(e.name, "/table");
-}
+bool is_matrix(const auto& entry) { return entry.role == ParamRole::matrix; }
+bool is_table(const auto& entry) { return entry.role == ParamRole::table; }
 
 }  // namespace
 

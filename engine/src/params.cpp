@@ -1,6 +1,8 @@
 #include <fieldmark/engine/packed_weights.h>
 #include <fieldmark/engine/params.h>
 
+#include "shortcuts.h"
+
 namespace fieldmark {
 namespace {
 
@@ -15,6 +17,9 @@ template <class T>
 ParamId ParamStore<T>::add(std::string_view name, Shape shape, ParamRole role) {
   for (const Entry& e : entries_)
     if (e.name == name) throw ValueError("[params] name '" + e.name + "' is already used");
+  if ((role == ParamRole::matrix || role == ParamRole::table) && shape.rank() != 2)
+    throw ShapeError("[params] '" + std::string(name) +
+                     "' must have two axes to be a matrix or a table, got shape " + shape.str());
   // The same offsets for float and double, so that stores can be copied: 16 floats are a cache line.
   constexpr Index kLine = 16, kLarge = 4096;
   const Index offset = shape.size() >= kLarge ? (size() + kLine - 1) / kLine * kLine : size();
@@ -69,10 +74,11 @@ Params<T>::Params(const ParamStore<T>& layout, Var<T> all) : Params(layout, null
 template <class T>
 Var<T> Params<T>::leaf(Tape<T>& tape, ParamId id) const {
   const auto& e = layout_->entry(id);
-  const bool trained = e.role == ParamRole::trained;
+  const bool trained = is_trained(e.role);
   if (all_ && trained) return tape.name(tape.part(*all_, e.offset, e.shape), e.name);
-  const Var<T> v = tape.matrix(values_ + e.offset, grads_ && trained ? grads_ + e.offset : nullptr, e.shape,
-                               packed_ ? packed_->find(id) : nullptr);
+  const Var<T> v =
+      detail::Shortcuts<T>::matrix(tape, values_ + e.offset, grads_ && trained ? grads_ + e.offset : nullptr,
+                                   e.shape, packed_ ? packed_->find(id) : nullptr);
   return tape.name(v, e.name);
 }
 

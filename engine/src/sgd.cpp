@@ -33,7 +33,7 @@ template <class T>
 Sgd<T>::Sgd(const ParamStore<T>& store, SgdOptions o) : Sgd(store.size(), o) {
   trained_.clear();
   for (const auto& e : store.entries())
-    if (e.role == ParamRole::trained) trained_.emplace_back(e.offset, e.offset + e.shape.size());
+    if (is_trained(e.role)) trained_.emplace_back(e.offset, e.offset + e.shape.size());
 }
 
 template <class T>

@@ -43,7 +43,7 @@ void keep_from_kinks(ParamStore<double>& store) {
   }
 }
 
-bool trained(const ParamStore<double>::Entry& e) { return e.role == ParamRole::trained; }
+bool trained(const ParamStore<double>::Entry& e) { return is_trained(e.role); }
 
 // theta = theta_0 + t_k d on the k-th tensor, d a fixed direction: one number to differentiate in for each
 // tensor, where a number for each of 50,000 parameters would take minutes.

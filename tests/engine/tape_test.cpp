@@ -1,7 +1,9 @@
 #include <fieldmark/engine/ops/arithmetic.h>
+#include <fieldmark/engine/ops/dense.h>
 #include <fieldmark/engine/ops/loss.h>
 #include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/engine/tape.h>
+#include <fieldmark/engine/values.h>
 
 #include <utility>
 
@@ -186,18 +188,43 @@ TEST_CASE("tape: the gradient of a fresh leaf replaces what was there, and stays
   CHECK(untouched[0] == 7);
 }
 
-TEST_CASE("tape: the seed of a rectified output is masked, and what was added unmasked is known") {
-  Tape<double> tape;
-  const Tensor<double> x({3}, std::vector<double>{-1, 0, 2});
-  Tensor<double> g({3});
-  const auto v = tape.reshape(tape.leaf(x, g), {3});
-  tape.mark_rectified(v);
-  const std::vector<double> seed{5, 6, 7};
-  tape.backward(v, seed);
-  CHECK(v.grad_masked());
-  CHECK(g.data == std::vector<double>{0, 0, 7});
-  v.grad_acc()[0] += 1;
-  CHECK_FALSE(v.grad_masked());
+TEST_CASE(
+    "tape: the gradient of a ReLU layer's output is an error unless it was asked for, then it is whole") {
+  const Tensor<double> x({1, 2}, std::vector<double>{1, 2}), b({2}),
+      w({2, 2}, std::vector<double>{1, -1, 1, -1}), v({2, 1}, std::vector<double>{3, 5}), c({1});
+  for (const bool kept : {false, true}) {
+    CAPTURE(kept);
+    Tape<double> tape;
+    Tensor<double> dx({1, 2});
+    const auto hidden = dense(tape.leaf(x, dx), tape.constant(w), tape.constant(b), Activation::relu);
+    const auto y = dense(hidden, tape.constant(v), tape.constant(c));
+    CHECK(hidden.grad() == nullptr);
+    if (kept) tape.keep_grad(hidden);
+    tape.backward(y);
+    CHECK(dx.data == std::vector<double>{3, 3});
+    if (kept)
+      CHECK(grad_to_tensor(hidden).data == std::vector<double>{3, 5});
+    else
+      CHECK_THROWS_WITH(hidden.grad(), Contains("keep_grad()"));
+  }
+}
+
+TEST_CASE("tape: the seed of a ReLU layer's output counts only where the output is positive") {
+  const Tensor<double> x({1, 3}, std::vector<double>{-1, 0, 2}),
+      w({3, 3}, std::vector<double>{1, 0, 0, 0, 1, 0, 0, 0, 1}), b({3});
+  for (const bool kept : {false, true}) {
+    CAPTURE(kept);
+    Tape<double> tape;
+    Tensor<double> g({1, 3});
+    const auto y = dense(tape.leaf(x, g), tape.constant(w), tape.constant(b), Activation::relu);
+    if (kept) tape.keep_grad(y);
+    tape.backward(y, std::vector<double>{5, 6, 7});
+    CHECK(g.data == std::vector<double>{0, 0, 7});
+    y.grad_acc()[0] += 1;
+    y.grad_acc()[2] += 1;
+    tape.replay();
+    CHECK(g.data == std::vector<double>{0, 0, 8});
+  }
 }
 
 TEST_CASE("tape: errors") {

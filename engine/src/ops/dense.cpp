@@ -2,6 +2,7 @@
 #include <fieldmark/engine/shape_checks.h>
 
 #include "ops/product.h"
+#include "shortcuts.h"
 
 namespace fieldmark {
 namespace {
@@ -12,14 +13,15 @@ constexpr Index kChunkRows = 512;   // rows that pass through the backward toget
 template <class T>
 void forward(Var<T> x, Var<T> w, Var<T> b, bool relu, T* y) {
   const Index n = x.shape()[0], in = w.shape()[0], out = w.shape()[1];
+  const PackedMatrix<T>* packed = detail::Shortcuts<T>::packed(w);
   if constexpr (std::is_same_v<T, float>)
-    if (w.packed() && w.packed()->forward_bf16)
+    if (packed && packed->forward_bf16)
       return detail::product(kernels::GemmBf16{.m = n,
                                                .n = out,
                                                .k = in,
                                                .a = x.value(),
                                                .a_row = in,
-                                               .b = w.packed()->forward_bf16,
+                                               .b = packed->forward_bf16,
                                                .c = y,
                                                .ldc = out,
                                                .bias = b.value(),
@@ -30,7 +32,7 @@ void forward(Var<T> x, Var<T> w, Var<T> b, bool relu, T* y) {
        .k = in,
        .a = x.value(),
        .a_row = in,
-       .b = w.packed() ? w.packed()->forward : detail::packed(x.tape(), w.value(), in, out, out, Index{1}),
+       .b = packed ? packed->forward : detail::packed(x.tape(), w.value(), in, out, out, Index{1}),
        .c = y,
        .ldc = out,
        .bias = b.value(),
@@ -99,16 +101,17 @@ void backward_rows(const Backward<T>& p, const T* dy, Index begin, Index end, T*
 
 // Chunks own their rows of dX; the sums for dW and db are kept per shard of whole chunks and added in order.
 template <class T>
-void backward(Var<T> x, Var<T> w, Var<T> b, Var<T> y, const T* dy) {
+void backward(Var<T> x, Var<T> w, Var<T> b, bool relu, Var<T> y, const T* dy) {
+  using Shortcuts = detail::Shortcuts<T>;
   Tape<T>& tape = x.tape();
   const Index n = x.shape()[0], in = w.shape()[0], out = w.shape()[1], row = detail::whole_row<T>(out);
-  const T* mask = y.rectified() && !y.grad_masked() ? y.value() : nullptr;
-  Backward<T> p{in, out, x.value(), nullptr, mask, nullptr, nullptr, x.rectified(), false};
-  if (w.packed()) p.transposed_bf16 = w.packed()->transposed_bf16;
-  p.dx = x.grad_acc(&p.fresh, p.mask_dx);
+  const PackedMatrix<T>* packed = Shortcuts::packed(w);
+  const T* mask = relu && !(Shortcuts::rectified(y) && Shortcuts::grad_masked(y)) ? y.value() : nullptr;
+  Backward<T> p{in, out, x.value(), nullptr, mask, nullptr, nullptr, Shortcuts::rectified(x), false};
+  if (packed) p.transposed_bf16 = packed->transposed_bf16;
+  p.dx = Shortcuts::grad_acc(x, &p.fresh, p.mask_dx);
   if (p.dx)
-    p.transposed =
-        w.packed() ? w.packed()->transposed : detail::packed(tape, w.value(), out, in, Index{1}, out);
+    p.transposed = packed ? packed->transposed : detail::packed(tape, w.value(), out, in, Index{1}, out);
   T *dw = w.grad_acc(), *db = b.grad_acc();
   const Index chunks = (n + kChunkRows - 1) / kChunkRows, own = (dw ? in * out : 0) + (db ? out : 0);
   const Index shards = std::min(detail::kProductShards, (n + kShardRows - 1) / kShardRows);
@@ -147,11 +150,11 @@ Var<T> dense(Var<T> x, Var<T> w, Var<T> b, Activation activation) {
   T* y = nullptr;
   const Var<T> result = tape.output({n, out}, &y, {x, w, b});
   forward(x, w, b, relu, y);
-  if (relu) tape.mark_rectified(result);
+  if (relu) detail::Shortcuts<T>::mark_rectified(result);
 
   // dZ = dY where y > 0 (everywhere without a ReLU); dX = dZ W^T, dW = X^T dZ, db = column sums of dZ. If x
   // is the output of a ReLU, its mask is applied to dX here, while x is in cache.
-  tape.on_backward(result, [=](const T* dy) { backward(x, w, b, result, dy); });
+  tape.on_backward(result, [=](const T* dy) { backward(x, w, b, relu, result, dy); });
   return result;
 }
 

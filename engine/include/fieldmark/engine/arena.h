@@ -15,7 +15,15 @@ class Arena {
   /// @param first_block  bytes of the first block, taken when it is first needed
   explicit Arena(std::size_t first_block = std::size_t{1} << 16) : first_block_(first_block) {}
   /// Uninitialised memory, valid until reset(). @throws std::bad_alloc
-  void* allocate(std::size_t bytes);
+  void* allocate(std::size_t bytes) {
+    if (kSanitized || bytes - 1 >= room_) [[unlikely]]
+      return allocate_slowly(bytes);
+    std::byte* p = next_;
+    const std::size_t taken = (bytes + kAlign - 1) & ~(kAlign - 1);
+    next_ += taken;
+    room_ -= taken;
+    return p;
+  }
   /// Frees all allocations and keeps the blocks.
   void reset() noexcept;
   /// Overwrites free memory, and blocks that are taken later, with bytes of 0xff, a NaN in floating point: a
@@ -33,9 +41,18 @@ class Arena {
     std::unique_ptr<std::byte[], Free> data;
     std::size_t size = 0;
   };
+#if defined(__SANITIZE_ADDRESS__)
+  static constexpr bool kSanitized = true;
+#else
+  static constexpr bool kSanitized = false;
+#endif
+  void* allocate_slowly(std::size_t bytes);
   void grow(std::size_t bytes);
+  void begin_block(std::size_t k);
   std::vector<Block> blocks_;
-  std::size_t first_block_, block_ = 0, used_ = 0, grown_ = 0;
+  std::size_t first_block_, block_ = 0, grown_ = 0;
+  std::byte* next_ = nullptr;  // free memory of block block_
+  std::size_t room_ = 0;       // its bytes, a multiple of kAlign
   bool spoils_ = false;
 };
 

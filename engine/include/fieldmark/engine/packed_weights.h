@@ -12,10 +12,20 @@ namespace fieldmark {
 /// float; the parameters themselves stay float.
 enum class Precision { fp32, bf16 };
 
+/// A matrix W [in, out] in the layout of matrix products: panels of columns of W and of W^T, optionally in
+/// bf16 too.
+template <class T>
+struct PackedMatrix {
+  const T* forward = nullptr;                      ///< panels of W
+  const T* transposed = nullptr;                   ///< panels of W^T
+  const std::uint16_t* forward_bf16 = nullptr;     ///< W rounded; or null
+  const std::uint16_t* transposed_bf16 = nullptr;  ///< W^T rounded; or null
+};
+
 /// Options of PackedWeights.
 struct PackOptions {
   Precision precision = Precision::fp32;  ///< of the packed matrices
-  bool tables = false;  ///< with bf16: also parameters of rank 2 whose name ends in "/table"
+  bool tables = false;                    ///< with bf16: also parameters of ParamRole::table
 };
 
 /// The matrices of a store's dense layers in the layout of matrix products, plain and transposed: a training
@@ -25,8 +35,7 @@ struct PackOptions {
 template <class T>
 class PackedWeights {
  public:
-  /// Packs parameters of rank 2 whose name ends in "/weight". The store must outlive it and stay of one
-  /// layout.
+  /// Packs parameters of ParamRole::matrix. The store must outlive it and stay of one layout.
   /// @throws ValueError for bf16 where bf16_units() has none, or T is double
   explicit PackedWeights(const ParamStore<T>& store, const PackOptions& options = {});
   /// Packs the current values for the instruction set in use. Call it after every change of either.

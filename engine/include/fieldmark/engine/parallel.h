@@ -34,6 +34,7 @@ void parallel_chunks(Index chunks, void* context, void (*run)(void*, Index chunk
 template <class F>
 void parallel_for(Index n, Index grain, F&& f) {
   if (n <= 0) return;
+  if (n <= grain) return static_cast<void>(f(Index{0}, n));
   struct Context {
     std::remove_reference_t<F>* f;
     Index n, grain;

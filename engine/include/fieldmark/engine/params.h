@@ -15,9 +15,15 @@ struct ParamId {
   int index = -1;  ///< position among the entries; -1: none
 };
 
-/// What a tensor of a ParamStore is for. Only trained ones get gradients and are moved by an optimiser;
-/// running ones, such as the statistics of a batch norm, are values that a model keeps.
-enum class ParamRole { trained, running };
+/// What a tensor of a ParamStore is for.
+enum class ParamRole {
+  trained,  ///< gets gradients, and optimisers move it
+  matrix,   ///< trained; weights [in, out] of products, which PackedWeights packs
+  table,    ///< trained; rows [entries, features] that are looked up, which PackedWeights can round
+  running   ///< a value that the model keeps, such as the statistics of a batch norm: no gradient, no steps
+};
+/// Whether tensors of this role get gradients.
+constexpr bool is_trained(ParamRole role) { return role != ParamRole::running; }
 
 /// All parameters of a model in one flat buffer, their gradients in a second one of equal length: an
 /// optimiser step, a checkpoint and zero_grad() are each one loop. Tensors of 4096 elements or more start on
@@ -33,6 +39,7 @@ class ParamStore {
     ParamRole role = ParamRole::trained;  ///< as declared to add()
   };
   /// Appends a tensor of zeros. @throws ValueError if the name is taken
+  /// @throws ShapeError if a matrix or a table has not two axes
   ParamId add(std::string_view name, Shape shape, ParamRole role = ParamRole::trained);
   /// @throws ValueError if there is no such name
   ParamId find(std::string_view name) const;

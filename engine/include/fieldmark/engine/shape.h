@@ -28,18 +28,17 @@ class Shape {
     if (dims.size() > kMaxRank) [[unlikely]]
       throw ShapeError("[shape] a shape has at most " + std::to_string(kMaxRank) + " axes, got " +
                        std::to_string(dims.size()));
-    for (std::size_t k = 0; k < dims.size(); ++k) dims_[k] = dims[k];
+    for (std::size_t k = 0; k < dims.size(); ++k) {
+      dims_[k] = dims[k];
+      size_ *= dims[k];
+    }
   }
   /// Number of axes, 0 to kMaxRank.
   int rank() const { return rank_; }
   /// Extent of an axis; negative axes count from the last.
   Index operator[](int axis) const { return dims_[static_cast<std::size_t>(axis < 0 ? axis + rank_ : axis)]; }
   /// Number of elements; 1 for rank 0.
-  Index size() const {
-    Index n = 1;
-    for (int k = 0; k < rank_; ++k) n *= (*this)[k];
-    return n;
-  }
+  Index size() const { return size_; }
   /// Equal in rank and every extent.
   friend bool operator==(const Shape&, const Shape&) = default;
   /// As in error texts: "[2, 3]".
@@ -51,6 +50,7 @@ class Shape {
 
  private:
   std::array<Index, kMaxRank> dims_{};
+  Index size_ = 1;
   int rank_ = 0;
 };
 

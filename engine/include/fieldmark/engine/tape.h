@@ -24,17 +24,12 @@ namespace detail {
 // g[i] = or += seed[i], or 0 where mask (null: none) is not positive.
 template <class T>
 void seed_gradient(const T* seed, const T* mask, bool fresh, T* g, Index n);
+template <class T>
+struct Shortcuts;
 }  // namespace detail
 
-/// A matrix W [in, out] in the layout of matrix products: panels of columns of W and of W^T, optionally in
-/// bf16 too. See PackedWeights.
 template <class T>
-struct PackedMatrix {
-  const T* forward = nullptr;                      ///< panels of W
-  const T* transposed = nullptr;                   ///< panels of W^T
-  const std::uint16_t* forward_bf16 = nullptr;     ///< W rounded; or null
-  const std::uint16_t* transposed_bf16 = nullptr;  ///< W^T rounded; or null
-};
+struct PackedMatrix;
 
 /// Handle to a value on a tape: two pointers, trivially copyable, valid until Tape::reset().
 template <class T>
@@ -50,38 +45,40 @@ class Var {
   bool needs_grad() const { return slot_->needs_grad; }
   /// Tells the values of a tape apart.
   const void* id() const { return slot_; }
-  /// The packed form of this matrix, or null.
-  const PackedMatrix<T>* packed() const { return slot_->packed; }
   /// dL/d(this) accumulated so far; nullptr before the first gradient. After a backward it is that backward's
   /// until the next one begins; a leaf's buffer goes on adding up.
-  const T* grad() const { return slot_->grad; }
+  /// @throws ValueError for the output of a layer with a ReLU, unless Tape::keep_grad() asked for it before
+  /// the backward: without that, only the gradient in front of the ReLU is computed
+  const T* grad() const {
+    if (slot_->rectified && slot_->grad) [[unlikely]]
+      throw ValueError(
+          "[grad] the gradient behind a ReLU is computed only if Tape::keep_grad() asked for it before the "
+          "backward");
+    return slot_->grad;
+  }
   /// The buffer to which a backward adds, zeroed on the first call; nullptr if this input needs no gradient.
   /// Written by hand, it seeds the next replay(): gradients of an earlier one are forgotten.
   T* grad_acc() const;
   /// As grad_acc(), but a new buffer stays uninitialised and *fresh is set: the caller then assigns every
   /// element instead of adding, which saves a pass over memory.
-  /// @param masked  the caller writes 0 where a rectified() value is not positive
-  T* grad_acc(bool* fresh, bool masked = false) const;
-  /// True for the output of a ReLU (Tape::mark_rectified). Its gradient counts only where the value is
-  /// positive: an op that reads the value anyway may mask its gradient, which saves the ReLU's backward a
-  /// pass over memory.
-  bool rectified() const { return slot_->rectified; }
-  /// True if every gradient added so far was masked.
-  bool grad_masked() const { return slot_->masked; }
+  T* grad_acc(bool* fresh) const;
 
  private:
   friend class Tape<T>;
+  friend struct detail::Shortcuts<T>;
   struct Slot {
     const T* value;
     T* grad;
     Shape shape;
     bool needs_grad;
-    bool rectified;  // a ReLU's output
+    bool rectified;  // a ReLU's output, whose gradient may be masked: 0 where the value is not positive
     bool masked;     // every gradient so far was masked
     T* target;       // buffer of the gradient; null: the arena's
     const PackedMatrix<T>* packed;
   };
   Var(Tape<T>* t, Slot* s) : tape_(t), slot_(s) {}
+  // grad_acc(); masked: the caller writes 0 where a rectified value is not positive.
+  T* grad_buffer(bool* fresh, bool masked) const;
   Tape<T>* tape_;
   Slot* slot_;
 };
@@ -142,10 +139,6 @@ class Tape {
     fresh_.push_back(v);
     return v;
   }
-  /// A matrix with its packed form. @param grad  null: a constant
-  Var<T> matrix(const T* value, T* grad, Shape shape, const PackedMatrix<T>* packed) {
-    return make(value, grad, shape, grad != nullptr, packed);
-  }
   /// @{
   /// Output of an op; *data points at uninitialised values, which the op fills.
   /// @param from  names the op for an observer
@@ -168,8 +161,12 @@ class Tape {
     return out;
   }
   /// @}
-  /// Marks `out` as the output of a ReLU, see Var::rectified().
-  void mark_rectified(Var<T> out) { out.slot_->rectified = true; }
+  /// Has the next backward compute dL/dv for Var::grad(), also where v is the output of a layer with a ReLU.
+  /// Costs such a layer a pass over its output. @return v
+  Var<T> keep_grad(Var<T> v) {
+    v.slot_->rectified = false;
+    return v;
+  }
   /// The same elements under another shape of equal size; gradients pass through unchanged.
   Var<T> reshape(Var<T> x, Shape shape);
   /// The elements of x from `begin` on under a shape of their own; gradients pass through unchanged.
@@ -218,9 +215,10 @@ class Tape {
                        out.shape().str() + ", got " + std::to_string(seed.size()));
     bool fresh = false;
     begin_pass();
-    T* g = out.grad() ? out.grad_acc() : out.grad_acc(&fresh, true);
+    T* g = out.grad_buffer(&fresh, out.slot_->grad == nullptr);
     if (!g) throw ValueError("[backward] nothing to differentiate: no input of this value needs a gradient");
-    detail::seed_gradient(seed.data(), out.rectified() ? out.value() : nullptr, fresh, g, out.shape().size());
+    const T* mask = fresh && out.slot_->rectified ? out.value() : nullptr;
+    detail::seed_gradient(seed.data(), mask, fresh, g, out.shape().size());
     replay();
   }
   /// Replays from the gradients that the caller wrote to Var::grad_acc(): several outputs can be seeded by
@@ -231,7 +229,7 @@ class Tape {
     if (observer_) [[unlikely]]
       return replay_observed();
     for (auto n = nodes_.rbegin(); n != nodes_.rend(); ++n)
-      if (const T* dout = n->out.grad()) n->run(n->closure, dout);
+      if (const T* dout = n->out.slot_->grad) n->run(n->closure, dout);
   }
   /// Forgets the recorded pass and keeps its memory for the next one; every Var of it becomes invalid.
   void reset() {
@@ -257,6 +255,7 @@ class Tape {
 
  private:
   friend class Var<T>;
+  friend struct detail::Shortcuts<T>;
   enum class Phase : std::uint8_t { recording, replaying, replayed };
   // Ends with `replayed` even if a backward throws: what it left half done must not be added to.
   struct Replaying {
@@ -280,7 +279,7 @@ class Tape {
   }
   void replay_observed() {
     for (auto n = nodes_.rbegin(); n != nodes_.rend(); ++n) {
-      const T* dout = n->out.grad();
+      const T* dout = n->out.slot_->grad;
       if (!dout) continue;
       observer_->before_backward(n->out);
       n->run(n->closure, dout);
@@ -324,7 +323,12 @@ T* Var<T>::grad_acc() const {
 }
 
 template <class T>
-T* Var<T>::grad_acc(bool* fresh, bool masked) const {
+T* Var<T>::grad_acc(bool* fresh) const {
+  return grad_buffer(fresh, false);
+}
+
+template <class T>
+T* Var<T>::grad_buffer(bool* fresh, bool masked) const {
   *fresh = false;
   if (!slot_->needs_grad) return nullptr;
   tape_->begin_pass();
