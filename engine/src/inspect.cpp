@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "shortcuts.h"
+
 namespace fieldmark {
 namespace {
 
@@ -60,6 +62,21 @@ std::string quoted(const std::string& text) {
 std::string padded(std::string text, std::size_t width) {
   text.resize(std::max(text.size() + 1, width), ' ');
   return text;
+}
+
+// The statistics of this name, new ones at the end.
+TensorStats& stats_of(std::vector<TensorStats>& all, std::string_view name) {
+  const auto found =
+      std::find_if(all.begin(), all.end(), [&](const TensorStats& s) { return s.name == name; });
+  if (found != all.end()) return *found;
+  all.push_back({.name = std::string(name)});
+  return all.back();
+}
+
+// The gradient as the layers keep it: masked, and so not Var::grad(), behind a ReLU that nobody asks for.
+template <class T>
+const T* kept_gradient(Var<T> v) {
+  return detail::Shortcuts<T>::grad(v);
 }
 
 constexpr const char* kInput = "input";  // stands for the op of a constant or a leaf
@@ -120,14 +137,20 @@ void TapeInspector<T>::recorded(Var<T> out) {
 template <class T>
 void TapeInspector<T>::named(Var<T> v, std::string_view name) {
   nodes_[number(v)].name = name;
+  if (!options_.statistics) return;
+  tape_.keep_grad(v);
+  stats_of(gradients_, name);  // keeps the order of the names
+  stats_of(values_, name).merge(tensor_stats<T>("", {v.value(), at(v.shape().size())}));
 }
 
 template <class T>
 void TapeInspector<T>::before_backward(Var<T> out) {
+  measure_gradient(nodes_[number(out)]);
   if (options_.stop_at_nonfinite) {
-    const Index n = out.shape().size(), bad = first_nonfinite(out.grad(), n);
+    const T* grad = kept_gradient(out);
+    const Index n = out.shape().size(), bad = first_nonfinite(grad, n);
     if (bad < n)
-      throw ValueError("[inspect] the backward began with " + kind(out.grad()[bad]) + " in the gradient of " +
+      throw ValueError("[inspect] the backward began with " + kind(grad[bad]) + " in the gradient of " +
                        value(number(out)) + " at element " + std::to_string(bad));
   }
   used_ = tape_.arena().used();
@@ -141,13 +164,16 @@ void TapeInspector<T>::after_backward(Var<T> out) {
   OpCost& c = cost(node.op);
   c.backward_seconds += seconds;
   c.backward_bytes += static_cast<Index>(tape_.arena().used() - used_);
+  for (const std::size_t i : node.inputs)
+    if (nodes_[i].inputs.empty()) measure_gradient(nodes_[i]);  // of an op's output it is not complete yet
   if (!options_.stop_at_nonfinite) return;
   for (const std::size_t i : node.inputs) {
     const Var<T>& v = nodes_[i].v;
-    if (!v.grad()) continue;
-    const Index n = v.shape().size(), bad = first_nonfinite(v.grad(), n);
+    const T* grad = kept_gradient(v);
+    if (!grad) continue;
+    const Index n = v.shape().size(), bad = first_nonfinite(grad, n);
     if (bad < n)
-      throw ValueError("[inspect] the backward of " + maker(node) + " made the first " + kind(v.grad()[bad]) +
+      throw ValueError("[inspect] the backward of " + maker(node) + " made the first " + kind(grad[bad]) +
                        ", in the gradient of " + value(i) + " at element " + std::to_string(bad));
   }
 }
@@ -156,6 +182,30 @@ template <class T>
 void TapeInspector<T>::reset() {
   nodes_.clear();
   numbers_.clear();
+  for (const auto& [buffer, stats] : pass_gradients_) stats_of(gradients_, stats.name).merge(stats);
+  pass_gradients_.clear();
+}
+
+template <class T>
+void TapeInspector<T>::measure_gradient(const Node& n) {
+  if (!options_.statistics || n.name.empty()) return;
+  const T* grad = n.v.grad();
+  if (!grad) return;
+  TensorStats stats = tensor_stats<T>(n.name, {grad, at(n.v.shape().size())});
+  for (auto& [buffer, earlier] : pass_gradients_)
+    if (buffer == grad && earlier.name == n.name) {
+      earlier = std::move(stats);
+      return;
+    }
+  pass_gradients_.emplace_back(grad, std::move(stats));
+}
+
+template <class T>
+std::vector<TensorStats> TapeInspector<T>::gradient_stats() const {
+  std::vector<TensorStats> all = gradients_;
+  for (const auto& [buffer, stats] : pass_gradients_) stats_of(all, stats.name).merge(stats);
+  std::erase_if(all, [](const TensorStats& s) { return s.count == 0; });
+  return all;
 }
 
 // Whether a value is a part of an input, as of a reshape.
@@ -198,10 +248,11 @@ void TapeInspector<T>::check_forward(std::size_t i) const {
 template <class T>
 void TapeInspector<T>::check_leaf_gradient(std::size_t i) const {
   const Var<T>& v = nodes_[i].v;
-  if (!v.grad()) return;
-  const Index n = v.shape().size(), bad = first_nonfinite(v.grad(), n);
+  const T* grad = kept_gradient(v);
+  if (!grad) return;
+  const Index n = v.shape().size(), bad = first_nonfinite(grad, n);
   if (bad < n)
-    throw ValueError("[inspect] the gradient buffer of " + value(i) + " holds " + kind(v.grad()[bad]) +
+    throw ValueError("[inspect] the gradient buffer of " + value(i) + " holds " + kind(grad[bad]) +
                      " at element " + std::to_string(bad) + " before the backward");
 }
 

@@ -5,6 +5,7 @@
 #include <fieldmark/engine/ops/batched_matmul.h>
 #include <fieldmark/engine/ops/operators.h>
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/tensor_stats.h>
 #include <pybind11/functional.h>
 #include <pybind11/stl.h>
 
@@ -121,6 +122,15 @@ void bind_value(py::module_& module, const std::string& suffix) {
   bind_operators(value);
 }
 
+// name -> {"count": ..., "mean": ...}
+py::dict as_dict(const std::vector<TensorStats>& all) {
+  py::dict named;
+  for (const TensorStats& s : all)
+    named[py::str(s.name)] = py::dict("count"_a = s.count, "zeros"_a = s.zeros, "nonfinite"_a = s.nonfinite,
+                                      "mean"_a = s.mean, "rms"_a = s.rms, "largest"_a = s.largest);
+  return named;
+}
+
 template <class T>
 void bind_parameters(py::module_& module, const std::string& suffix) {
   using Store = StoreHandle<T>;
@@ -161,6 +171,13 @@ void bind_parameters(py::module_& module, const std::string& suffix) {
           },
           "tape"_a, "name"_a, "A parameter on a tape.")
       .def("zero_grad", [](Store& s) { s.store.zero_grad(); })
+      .def(
+          "gradient_stats", [](Store& s) { return as_dict(gradient_stats(s.store)); },
+          "Statistics of each gradient by name: count, zeros, nonfinite, and mean, rms and largest magnitude "
+          "of what is finite.")
+      .def(
+          "value_stats", [](const Store& s) { return as_dict(value_stats(s.store)); },
+          "The same statistics of the values.")
       .def(
           "clip_grad_norm", [](Store& s, double limit) { return clip_grad_norm(s.store, limit); }, "limit"_a,
           "Scales all gradients down to this norm; returns the norm that they had.");

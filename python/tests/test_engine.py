@@ -110,6 +110,20 @@ def test_types_are_not_mixed():
         engine.Tape("int32")
 
 
+def test_statistics_of_gradients_and_values_by_name():
+    model, tape = engine.Parameters("float64"), engine.Tape("float64")
+    model.add("net/w", np.array([3.0, -4.0, 0.0, 0.0]))
+    model.add("net/b", np.array([np.nan, 2.0]))
+    engine.sum(engine.square(model.leaf(tape, "net/w"))).backward()
+    model.grads("net/b")[:] = [np.inf, 0.0]
+    stats = model.gradient_stats()
+    assert list(stats) == ["net/w", "net/b"]
+    assert stats["net/w"] == {"count": 4, "zeros": 2, "nonfinite": 0, "mean": -0.5, "rms": 5.0, "largest": 8.0}
+    assert stats["net/b"] == {"count": 2, "zeros": 1, "nonfinite": 1, "mean": 0.0, "rms": 0.0, "largest": 0.0}
+    values = model.value_stats()
+    assert values["net/w"]["rms"] == 2.5 and values["net/b"]["mean"] == 2.0 and values["net/b"]["nonfinite"] == 1
+
+
 def test_ops_have_the_gradients_of_differences():
     a, b = random(2, 3, 3, seed=1), random(2, 3, 2, seed=2)
     spd = a @ a.transpose(0, 2, 1) + 3 * np.eye(3)

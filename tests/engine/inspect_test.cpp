@@ -122,6 +122,86 @@ TEST_CASE("inspect: time and memory by op") {
   CHECK_THAT(inspector.cost_table(), Contains("dense ") && Contains("sum "));
 }
 
+TEST_CASE("inspect: statistics of named values and gradients, over passes") {
+  Tape<double> tape;
+  TapeInspector<double> inspector(tape, {.statistics = true});
+  ParamStore<double> store;
+  const ParamId w = store.add("w", {2}), unused = store.add("unused", {3});
+  store.values(w)[0] = 3;
+  store.values(w)[1] = -4;
+  const Tensor<double> x({2}, {0, 2});
+  for (int pass = 0; pass < 2; ++pass) {
+    tape.reset();
+    store.zero_grad();
+    const Params<double> params(store);
+    const auto weights = params.leaf(tape, w);
+    params.leaf(tape, unused);
+    // w serves two ops, whose gradients arrive one after the other: x and 1 times what reaches y.
+    const auto y = tape.name(weights * tape.name(tape.constant(x), "x") + weights, "y");
+    tape.backward(sum(y * y));
+  }
+  const auto grads = inspector.gradient_stats();
+  INFO(stats_table(grads));
+  REQUIRE(grads.size() == 2);  // none of a constant, and none that did not arrive
+  // y = (3, -12), dL/dy = 2 y = (6, -24), dL/dw = dL/dy (x + 1) = (6, -72).
+  CHECK((grads[0].name == "w" && grads[0].count == 4 && grads[0].mean == -33 && grads[0].largest == 72));
+  CHECK(grads[0].rms == Approx(std::sqrt(2610.0)).epsilon(1e-15));
+  CHECK((grads[1].name == "y" && grads[1].count == 4 && grads[1].mean == -9 && grads[1].largest == 24));
+  const auto values = inspector.value_stats();
+  REQUIRE(values.size() == 4);
+  CHECK((values[0].name == "w" && values[0].count == 4 && values[0].mean == -0.5 && values[0].largest == 4));
+  CHECK((values[1].name == "unused" && values[1].count == 6 && values[1].zero_fraction() == 1));
+  CHECK((values[2].name == "x" && values[2].zero_fraction() == 0.5));
+  CHECK((values[3].name == "y" && values[3].largest == 12));
+}
+
+TEST_CASE("inspect: of several backwards in a pass the last counts, and NaN are only counted") {
+  Tape<double> tape;
+  TapeInspector<double> inspector(tape, {.statistics = true});
+  Tensor<double> g({2, 2});
+  const auto x = tape.name(tape.leaf(kSmall, g), "x");
+  const auto y = tape.name(broken(x), "y");
+  const auto total = sum(y);
+  tape.backward(total);
+  tape.backward(total);
+  const auto grads = inspector.gradient_stats();
+  REQUIRE(grads.size() == 2);
+  CHECK((grads[0].name == "x" && grads[0].count == 4 && grads[0].nonfinite == 1 && grads[0].mean == 2));
+  CHECK((grads[1].name == "y" && grads[1].count == 4 && grads[1].mean == 1));
+  tape.reset();
+  CHECK(inspector.gradient_stats()[0].count == 4);  // kept after the pass
+}
+
+TEST_CASE("inspect: layers with a ReLU, whose gradients are masked unless statistics ask for them") {
+  const Tensor<double> x({1, 2}, {1, 1}), w({2, 2}, {1, -1, 2, -2}), b({2});
+  const auto run = [&](InspectOptions options) {
+    Tape<double> tape;
+    TapeInspector<double> inspector(tape, options);
+    Tensor<double> dw({2, 2});
+    const auto hidden =
+        tape.name(dense(tape.constant(x), tape.leaf(w, dw), tape.constant(b), Activation::relu), "hidden");
+    const auto out = dense(hidden, tape.constant(w), tape.constant(b));
+    tape.backward(sum(out));
+    tape.backward(out, std::vector<double>{1, 2});
+    return std::pair(dw.data, inspector.gradient_stats());
+  };
+  const auto [plain, none] = run({.stop_at_nonfinite = true});
+  const auto [inspected, stats] = run({.stop_at_nonfinite = true, .statistics = true});
+  CHECK(plain == inspected);
+  CHECK(none.empty());
+  REQUIRE(stats.size() == 1);
+  // hidden = relu(3, -3); dL/dhidden = w (1, 2) = (-1, -2) in front of the next layer, not (-1, 0).
+  CHECK((stats[0].name == "hidden" && stats[0].mean == -1.5 && stats[0].zeros == 0));
+}
+
+TEST_CASE("inspect: without the option no statistics are gathered") {
+  Tape<double> tape;
+  TapeInspector<double> inspector(tape);
+  Tensor<double> g({2, 2});
+  tape.backward(sum(tape.name(tape.leaf(kSmall, g), "x")));
+  CHECK((inspector.gradient_stats().empty() && inspector.value_stats().empty()));
+}
+
 TEST_CASE("inspect: errors and lifetime") {
   Tape<double> tape;
   {

@@ -1,9 +1,11 @@
 #pragma once
 #include <fieldmark/engine/tape.h>
+#include <fieldmark/engine/tensor_stats.h>
 
 #include <chrono>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 namespace fieldmark {
@@ -11,6 +13,7 @@ namespace fieldmark {
 /// Settings of a TapeInspector.
 struct InspectOptions {
   bool stop_at_nonfinite = false;  ///< throws where the first NaN or infinity arises
+  bool statistics = false;         ///< gathers value_stats() and gradient_stats(): each reads all elements
 };
 
 /// What the ops of one name cost together.
@@ -23,8 +26,9 @@ struct OpCost {
   Index backward_bytes = 0;     ///< of the tape: new gradients and scratch
 };
 
-/// Looks at what a tape records: its graph as text or DOT, time and memory by op, and the op that made the
-/// first NaN or infinity. A tape without an inspector pays nothing for it.
+/// Looks at what a tape records: its graph as text or DOT, time and memory by op, statistics of values and
+/// gradients, and the op that made the first NaN or infinity. A tape without an inspector pays nothing for
+/// it.
 ///
 /// @code
 /// Tape<float> tape;
@@ -53,6 +57,13 @@ class TapeInspector : private TapeObserver<T> {
   std::vector<OpCost> costs() const;
   /// costs() as a table.
   std::string cost_table() const;
+  /// The gradient of each named value that got one, parameters included, over all passes with `statistics`,
+  /// in the order named. Of several backwards in a pass the last counts. A leaf's gradient is what its buffer
+  /// holds then: without zero_grad() between passes, the sum so far.
+  /// @see stats_table()
+  std::vector<TensorStats> gradient_stats() const;
+  /// The elements of each named value at the time it was named, over all passes with `statistics`.
+  std::vector<TensorStats> value_stats() const { return values_; }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -78,14 +89,18 @@ class TapeInspector : private TapeObserver<T> {
   std::string value(std::size_t i) const;
   void check_forward(std::size_t i) const;
   void check_leaf_gradient(std::size_t i) const;
+  // Gathers the gradient of a named value, in place of an earlier one of this pass.
+  void measure_gradient(const Node& n);
 
   Tape<T>& tape_;
   InspectOptions options_;
   std::vector<Node> nodes_;                               // of this pass, in the order met
   std::unordered_map<const void*, std::size_t> numbers_;  // of nodes_, by Var::id()
   std::vector<OpCost> costs_;
-  Clock::time_point begun_;  // of the backward that runs
-  std::size_t used_ = 0;     // bytes of the tape then
+  std::vector<TensorStats> values_, gradients_;                   // by name, in the order named
+  std::vector<std::pair<const T*, TensorStats>> pass_gradients_;  // of this pass, by buffer
+  Clock::time_point begun_;                                       // of the backward that runs
+  std::size_t used_ = 0;                                          // bytes of the tape then
 };
 
 }  // namespace fieldmark
