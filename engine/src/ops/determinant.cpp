@@ -59,6 +59,7 @@ Var<T> determinant(Var<T> a) {
       cofactors);
 }
 
+// d log |det a| = tr(a^-1 da).
 template <class T>
 Var<T> log_determinant(Var<T> a) {
   return of_each(
