@@ -46,7 +46,7 @@ int main() {
       d1(store, "d1", {.in = 2, .out = 16, .activation = relu}, 4),
       d2(store, "d2", {.in = 16, .out = 8, .activation = relu}, 5),
       image(store, "image", {.in = 8, .out = 1}, 6);
-  Adam<float> adam(store, {.lr = 4e-3, .beta2 = 0.999, .eps = 1e-8});
+  Adam<float> adam(store, {.lr = 4e-3});
   const Params<float> p(store);
   Tape<float> tape;
   const auto error = [&](const Tensor<float>& images) {

@@ -52,7 +52,7 @@ int main(int argc, char** argv) {
   ParamStore<float> store;
   const Dense<float> in(store, "in", {.in = 2, .out = 32}, 1), out(store, "out", {.in = 32, .out = 2}, 4);
   const Block first(store, "first", 32, 2), second(store, "second", 32, 3);
-  Adam<float> adam(store, {.lr = 0.01, .beta2 = 0.999, .eps = 1e-8, .weight_decay = 0.01});
+  Adam<float> adam(store, {.lr = 0.01, .weight_decay = 0.01});
   const Params<float> params(store);
   Tape<float> tape;
   double right = 0;

@@ -79,7 +79,7 @@ int main() {
   const Tensor<float> wanted = numbers_of(truth), eye({3, 3}, {1, 0, 0, 0, 1, 0, 0, 0, 1});
   const Tensor<float> image = to_tensor(render(tape.constant(wanted), pixels, depths, ray_begin));
   Tensor<float> found = numbers_of(start), slope({16});
-  Adam<float> adam(12, {.lr = 0.05, .beta2 = 0.99, .eps = 1e-8});  // of the pose; the lens is known
+  Adam<float> adam(12, {.lr = 0.05, .beta2 = 0.99});  // of the pose; the lens is known
   std::printf("at first  %.2f degrees apart\n", degrees_apart(found, wanted));
   for (int step = 0; step < 300; ++step) {
     tape.reset();

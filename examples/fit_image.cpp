@@ -43,7 +43,7 @@ int main(int argc, char** argv) {
   const Dense<float> first(store, "first", {.in = 4 * kBands, .out = 48, .activation = Activation::relu}, 1);
   const Dense<float> second(store, "second", {.in = 48, .out = 48, .activation = Activation::relu}, 2);
   const Dense<float> last(store, "last", {.in = 48, .out = channels}, 3);
-  Adam<float> adam(store, {.lr = 1, .zero_grads = true});
+  Adam<float> adam(store, {.lr = 1, .beta2 = 0.99, .zero_grads = true});
   const Schedule schedule({.steps = 400, .lr = 5e-3, .half_after = 1e9, .cooldown = 0.9, .last = 0.1});
   const Params<float> params(store);
 

@@ -58,7 +58,7 @@ int main() {
   const ParamId log_blur = store.add("log_blur", {1}), log_noise = store.add("log_noise", {1});
   store.values(log_noise)[0] = std::log(0.2);
   const Params<double> p(store);
-  Adam<double> adam(store, {.lr = 0.05, .beta2 = 0.999, .eps = 1e-8});
+  Adam<double> adam(store, {.lr = 0.05});
   Tensor<double> sharp;
   for (int step = 0; step < 200; ++step) {
     tape.reset();

@@ -71,7 +71,7 @@ int main() {
     return out(p, x + narrow(p, gelu(wide(p, h))));
   };
 
-  Adam<float> adam(store, {.lr = 1e-2, .beta2 = 0.99, .eps = 1e-8});
+  Adam<float> adam(store, {.lr = 1e-2, .beta2 = 0.99});
   Tape<float> tape;
   double loss = 0;
   for (Index step = 0; step < kSteps; ++step) {

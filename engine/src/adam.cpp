@@ -1,6 +1,7 @@
 #include <fieldmark/core/error.h>
 #include <fieldmark/engine/adam.h>
 #include <fieldmark/engine/parallel.h>
+#include <fnmatch.h>
 
 #include <algorithm>
 #include <cmath>
@@ -34,6 +35,14 @@ void check_size(const char* name, std::size_t got, std::size_t want) {
   if (got != want)
     throw ShapeError("[Adam::step] " + std::string(name) + " must have " + std::to_string(want) +
                      " elements, as the optimiser, got " + std::to_string(got));
+}
+
+bool matches(const AdamGroup& group, const std::string& name) {
+  return ::fnmatch(group.names.c_str(), name.c_str(), FNM_NOESCAPE) == 0;
+}
+
+bool same_settings(const AdamRange& a, const AdamRange& b) {
+  return a.lr_factor == b.lr_factor && a.skip_zero == b.skip_zero && a.weight_decay == b.weight_decay;
 }
 
 }  // namespace
@@ -130,7 +139,31 @@ void Adam<T>::set_steps(Index steps) {
   steps_ = steps;
 }
 
+template <class T>
+std::vector<AdamRange> adam_ranges(const ParamStore<T>& store, const std::vector<AdamGroup>& groups) {
+  const auto entries = store.entries();
+  for (const AdamGroup& g : groups)
+    if (std::ranges::none_of(
+            entries, [&](const auto& e) { return is_trained(e.role) && matches(g, e.name); }))
+      throw ValueError("[adam_ranges] no trained parameter of the store has a name like '" + g.names + "'");
+  std::vector<AdamRange> ranges;
+  bool joins = false;  // the entry before is the end of the last range
+  for (const auto& e : entries) {
+    const auto group = std::ranges::find_if(groups, [&](const AdamGroup& g) { return matches(g, e.name); });
+    const bool trained = is_trained(e.role) && group != groups.end();
+    if (trained && !(joins && same_settings(ranges.back(), group->settings))) {
+      ranges.push_back(group->settings);
+      ranges.back().begin = e.offset;
+    }
+    if (trained) ranges.back().end = e.offset + e.shape.size();
+    joins = trained;
+  }
+  return ranges;
+}
+
 template class Adam<float>;
 template class Adam<double>;
+template std::vector<AdamRange> adam_ranges(const ParamStore<float>&, const std::vector<AdamGroup>&);
+template std::vector<AdamRange> adam_ranges(const ParamStore<double>&, const std::vector<AdamGroup>&);
 
 }  // namespace fieldmark

@@ -82,7 +82,7 @@ template <class T>
 void compare_adam(WorstError& error) {
   const std::vector<double> gradients{0, 1e-30, 1e-18, 1e-15, 1e-12, 1e-6, 1, 1e6, 1e12, 1e18};
   const auto n = static_cast<Index>(gradients.size());
-  const AdamOptions o{.lr = 1e-3};
+  const AdamOptions o{.lr = 1e-3, .beta2 = 0.99, .eps = 1e-15};
   Adam<T> adam(n, o);
   Tensor<T> x({n}, T(0));
   std::vector<Real> want(gradients.size()), m = want, v = want;

@@ -32,7 +32,7 @@ constexpr double kShortSeconds = 120, kLongSeconds = 400;
 
 AdamOptions adam_options(const RadianceField& field) {
   if (field.coarse) return {.lr = 1, .beta2 = 0.999, .eps = 1e-8, .zero_grads = true};
-  return {.lr = 1, .zero_grads = true};
+  return {.lr = 1, .beta2 = 0.99, .eps = 1e-15, .zero_grads = true};  // as Mueller et al. 2022 for tables
 }
 
 // Parameters whose gradients are summed by the loop: all of an mlp field, the networks of a hash field.

@@ -186,7 +186,7 @@ TEST_CASE("message_field: in 40 steps it learns to look like the base field") {
   for (const MessagePlace place : {MessagePlace::inputs, MessagePlace::density}) {
     Made made(place);
     const Tensor<float> want = nerf::Renderer(made.base).render(camera()).rgb;
-    Adam<float> adam(made.store.size(), {.lr = 0.01, .zero_grads = true});
+    Adam<float> adam(made.store.size(), {.lr = 0.01, .beta2 = 0.99, .eps = 1e-15, .zero_grads = true});
     std::vector<double> losses;
     for (int step = 0; step < 40; ++step) {
       Tape<float> tape;

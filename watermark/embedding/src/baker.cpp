@@ -69,7 +69,7 @@ Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& opti
   std::vector<AdamRange> ranges = {colour_range(field_.params, field_.field.has_table() ? 0.2 : 0.05)};
   if (field_.field.has_table())
     ranges.push_back({.begin = field_.field.network_size(), .end = field_.params.size(), .skip_zero = true});
-  train(field_.params, {.lr = 1, .zero_grads = true}, std::move(ranges));
+  train(field_.params, {.lr = 1, .beta2 = 0.99, .eps = 1e-15, .zero_grads = true}, std::move(ranges));
 }
 
 Baker::~Baker() = default;

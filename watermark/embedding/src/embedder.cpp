@@ -16,19 +16,6 @@ namespace {
 constexpr AdamOptions kAdam{.lr = 1, .beta2 = 0.99, .eps = 1e-8, .zero_grads = true};
 constexpr std::uint64_t kOfBatch = 8 * 64;  // place of what a whole batch draws: after those of 64 images
 
-// The extractor's parameters follow one another in the store, and have a step size of their own.
-std::vector<AdamRange> ranges(const ParamStore<float>& params, double extractor_lr) {
-  Index begin = params.size(), end = 0;
-  for (const auto& e : params.entries())
-    if (e.name.starts_with("extractor/")) {
-      begin = std::min(begin, e.offset);
-      end = std::max(end, e.offset + e.shape.size());
-    }
-  return {{.begin = 0, .end = begin},
-          {.begin = begin, .end = end, .lr_factor = extractor_lr},
-          {.begin = end, .end = params.size()}};
-}
-
 double blend(double from, double to, double fraction) { return from + (to - from) * fraction; }
 
 }  // namespace
@@ -49,7 +36,8 @@ Embedder::Embedder(Owner& owner, std::span<const CachedView> views, const EmbedO
   if (!(options.extractor_lr > 0))
     throw ValueError("[embedder] extractor_lr must be positive, got " + std::to_string(options.extractor_lr));
   training_ = owner.mark().training(owner, views);
-  train(owner.params, kAdam, ranges(owner.params, options.extractor_lr));
+  train(owner.params, kAdam,
+        adam_ranges(owner.params, {{"extractor/*", {.lr_factor = options.extractor_lr}}, {"*"}}));
   if (ParamStore<float>* helpers = training_->helpers()) train(*helpers, kAdam, {}, "helpers/");
   keep("sign", figures_.sign);
   keep("index", figures_.index);

@@ -4,17 +4,18 @@
 #include <fieldmark/engine/shape.h>
 
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
 namespace fieldmark {
 
-/// Settings of Adam.
+/// Settings of Adam. The defaults are those of the paper and of PyTorch.
 struct AdamOptions {
-  double lr = 1e-3;     ///< > 0; step size before a schedule's factor
-  double beta1 = 0.9;   ///< in [0, 1), decay of the gradient's mean
-  double beta2 = 0.99;  ///< in [0, 1), decay of the squared gradient's mean
-  double eps = 1e-15;   ///< > 0, added to the root; small because a table's gradients are
+  double lr = 1e-3;      ///< > 0; step size before a schedule's factor
+  double beta1 = 0.9;    ///< in [0, 1), decay of the gradient's mean
+  double beta2 = 0.999;  ///< in [0, 1), decay of the squared gradient's mean
+  double eps = 1e-8;     ///< > 0, added to the root; tables, whose gradients are tiny, want 1e-15
   bool skip_zero =
       false;  ///< leaves entries with a gradient of exactly 0 alone, and their moments: for tables
   double weight_decay = 0;  ///< >= 0, decoupled: x -= lr weight_decay x
@@ -87,5 +88,19 @@ class Adam {
   AlignedVector<T> mean_, mean_square_;
   Index steps_ = 0;
 };
+
+/// Parameters that share a step size and rules.
+struct AdamGroup {
+  std::string names;  ///< of its parameters; * stands for any characters, as in "extractor*" or "*bias"
+  AdamRange settings = {};  ///< all but begin and end
+};
+
+/// The trained parameters of a store in ranges for Adam::step(), each with the settings of the first group
+/// whose names match its own. A parameter of no group is in no range, so that no step changes it.
+///   const auto ranges = adam_ranges(store, {{"*bias"}, {"*", {.weight_decay = 0.01}}});
+///   adam.step(store.values(), store.grads(), ranges);
+/// @throws ValueError if the names of a group match no trained parameter
+template <class T>
+std::vector<AdamRange> adam_ranges(const ParamStore<T>& store, const std::vector<AdamGroup>& groups);
 
 }  // namespace fieldmark
