@@ -17,7 +17,8 @@
 #include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/engine/ops/softmax.h>
 
-void RandomGraph::add_functions(Table& t) {
+template <class T>
+void RandomGraph<T>::add_functions(Table& t) {
   const auto one = [&t](const std::string& name, auto f, bool domain = false) {
     t[name] = [name, f, domain](RandomGraph& g) {
       const std::size_t x = domain ? g.positive(g.any()) : g.any();
@@ -70,7 +71,8 @@ void RandomGraph::add_functions(Table& t) {
   };
 }
 
-void RandomGraph::add_binary(Table& t) {
+template <class T>
+void RandomGraph<T>::add_binary(Table& t) {
   const auto two = [&t](const std::string& name, auto f, bool positive_a = false, bool positive_b = false) {
     t[name] = [=](RandomGraph& g) {
       const std::size_t any = g.any(), a = positive_a ? g.positive(any) : any;
@@ -94,7 +96,8 @@ void RandomGraph::add_binary(Table& t) {
   };
 }
 
-void RandomGraph::add_axes(Table& t) {
+template <class T>
+void RandomGraph<T>::add_axes(Table& t) {
   const auto reduce = [&t](const std::string& name, auto f) {
     t[name] = [name, f](RandomGraph& g) {
       std::size_t x = g.any(1);
@@ -138,7 +141,8 @@ void RandomGraph::add_axes(Table& t) {
   };
 }
 
-void RandomGraph::add_layout(Table& t) {
+template <class T>
+void RandomGraph<T>::add_layout(Table& t) {
   t["reshape"] = [](RandomGraph& g) {
     const std::size_t x = g.any();
     const fieldmark::Shape s{g.vars_[x].shape().size(), 1};
@@ -185,7 +189,8 @@ void RandomGraph::add_layout(Table& t) {
   };
 }
 
-void RandomGraph::add_losses(Table& t) {
+template <class T>
+void RandomGraph<T>::add_losses(Table& t) {
   const auto loss = [&t](const std::string& name, Json args, auto f) {
     t[name] = [=](RandomGraph& g) {
       const std::size_t a = g.any(), b = g.input(g.vars_[a].shape());
@@ -211,7 +216,8 @@ void RandomGraph::add_losses(Table& t) {
   };
 }
 
-void RandomGraph::add_matrices(Table& t) {
+template <class T>
+void RandomGraph<T>::add_matrices(Table& t) {
   t["batched_matmul"] = [](RandomGraph& g) {
     const std::size_t a = g.any(2);
     const fieldmark::Index k = g.vars_[a].shape()[-1];
@@ -249,7 +255,8 @@ void RandomGraph::add_matrices(Table& t) {
   };
 }
 
-const RandomGraph::Table& RandomGraph::table() {
+template <class T>
+const typename RandomGraph<T>::Table& RandomGraph<T>::table() {
   static const Table all = [] {
     Table t;
     add_functions(t);
@@ -262,3 +269,6 @@ const RandomGraph::Table& RandomGraph::table() {
   }();
   return all;
 }
+
+template class RandomGraph<float>;
+template class RandomGraph<double>;

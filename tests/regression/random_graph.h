@@ -17,16 +17,17 @@
 #include "support/random.h"
 #include "support/worst.h"
 
-/// A random graph of the engine's ops in double, recorded on a tape and described in JSON for another
-/// program. Before an op with a narrow domain stand ops that lead into it; numbers that grow are scaled down.
+/// A random graph of the engine's ops, recorded on a tape and described in JSON for another program. Before
+/// an op with a narrow domain stand ops that lead into it; numbers that grow are scaled down.
+template <class T>
 class RandomGraph {
  public:
   using Json = nlohmann::json;
 
-  RandomGraph(fieldmark::Tape<double>& tape, std::uint64_t seed) : tape_(tape), rng_(seed), seed_(seed) {}
+  RandomGraph(fieldmark::Tape<T>& tape, std::uint64_t seed) : tape_(tape), rng_(seed), seed_(seed) {}
 
   /// Some twelve ops, and the mean of every value that none of them reads.
-  fieldmark::Var<double> build() {
+  fieldmark::Var<T> build() {
     input({2, 3, 4});
     input({3, 4});
     input({4});
@@ -55,11 +56,11 @@ class RandomGraph {
     return names;
   }
   /// Runs the backward and adds inputs, cotangent, value and gradients to a file.
-  void save(fieldmark::SafetensorsFile& file, const std::string& prefix, fieldmark::Var<double> y) {
-    const auto u = uniform(y.shape(), 0.5, 1.5, 7);
+  void save(fieldmark::SafetensorsFile& file, const std::string& prefix, fieldmark::Var<T> y) {
+    const auto u = uniform<T>(y.shape(), 0.5, 1.5, 7);
     tape_.backward(y, u.data);
-    const auto add = [&](const std::string& name, const fieldmark::Shape& s, const double* p) {
-      file.add(prefix + name, s, std::span<const double>(p, static_cast<std::size_t>(s.size())));
+    const auto add = [&](const std::string& name, const fieldmark::Shape& s, const T* p) {
+      file.add(prefix + name, s, std::span<const T>(p, static_cast<std::size_t>(s.size())));
     };
     for (std::size_t i = 0; i < inputs_.size(); ++i) {
       add("in" + std::to_string(i), inputs_[i].shape, inputs_[i].data.data());
@@ -70,7 +71,7 @@ class RandomGraph {
   }
 
  private:
-  using V = fieldmark::Var<double>;
+  using V = fieldmark::Var<T>;
   using Table = std::map<std::string, std::function<void(RandomGraph&)>>;
 
   std::size_t below(std::size_t n) {
@@ -79,7 +80,7 @@ class RandomGraph {
   double number(double lo, double hi) { return lo + (hi - lo) * rng_.uniform_double(++drawn_); }
 
   std::size_t input(const fieldmark::Shape& shape, double lo = -1, double hi = 1) {
-    inputs_.push_back(uniform(shape, lo, hi, static_cast<unsigned>(++drawn_)));
+    inputs_.push_back(uniform<T>(shape, lo, hi, static_cast<unsigned>(++drawn_)));
     return leaf();
   }
   // The last of inputs_ as a leaf.
@@ -96,7 +97,8 @@ class RandomGraph {
     vars_.push_back(v);
     read_.push_back(false);
     double largest = 0;
-    for (fieldmark::Index i = 0; i < v.shape().size(); ++i) raise_to(largest, std::abs(v.value()[i]));
+    for (fieldmark::Index i = 0; i < v.shape().size(); ++i)
+      raise_to(largest, std::abs(static_cast<double>(v.value()[i])));
     if (largest > 3) return scaled(vars_.size() - 1, std::round(1024 / largest) / 1024);
     return vars_.size() - 1;
   }
@@ -129,8 +131,8 @@ class RandomGraph {
   std::size_t matrices() {
     const auto n = static_cast<fieldmark::Index>(2 + below(3));
     const std::size_t x = below(2) == 0 ? input({n, n}, -0.3, 0.3) : input({2, n, n}, -0.3, 0.3);
-    fieldmark::Tensor<double> d({n, n});
-    for (fieldmark::Index k = 0; k < n; ++k) d[k * n + k] = 1 + 0.4 * static_cast<double>(k);
+    fieldmark::Tensor<T> d({n, n});
+    for (fieldmark::Index k = 0; k < n; ++k) d[k * n + k] = 1 + T(0.4) * static_cast<T>(k);
     inputs_.push_back(d);
     const std::size_t diagonal = leaf();
     return emit("add", {x, diagonal}, {}, vars_[x] + vars_[diagonal]);
@@ -145,7 +147,7 @@ class RandomGraph {
     const fieldmark::Index n = vars_[a].shape()[-1];
     const std::size_t t = emit("transpose", {a}, {}, transpose(vars_[a]));
     const std::size_t p = emit("batched_matmul", {a, t}, {}, batched_matmul(vars_[a], vars_[t]));
-    fieldmark::Tensor<double> d({n, n});
+    fieldmark::Tensor<T> d({n, n});
     for (fieldmark::Index k = 0; k < n; ++k) d[k * n + k] = 0.5;
     inputs_.push_back(d);
     const std::size_t half = leaf();
@@ -192,11 +194,11 @@ class RandomGraph {
   static void add_losses(Table& t);
   static void add_matrices(Table& t);
 
-  fieldmark::Tape<double>& tape_;
+  fieldmark::Tape<T>& tape_;
   fieldmark::CounterRng rng_;
   std::uint64_t seed_;
   std::uint64_t drawn_ = 0;
-  std::deque<fieldmark::Tensor<double>> inputs_, grads_;
+  std::deque<fieldmark::Tensor<T>> inputs_, grads_;
   std::deque<std::vector<std::int32_t>> indices_;
   std::vector<V> vars_;
   std::vector<bool> read_;
