@@ -51,7 +51,7 @@ template <class T>
 std::vector<TensorStats> gradient_stats(ParamStore<T>& store) {
   std::vector<TensorStats> stats;
   for (const auto& e : store.entries())
-    if (e.role == ParamRole::trained)
+    if (is_trained(e.role))
       stats.push_back(tensor_stats(e.name, std::span<const T>(store.grads(store.find(e.name)))));
   return stats;
 }
