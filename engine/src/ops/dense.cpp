@@ -9,6 +9,7 @@ namespace {
 
 constexpr Index kShardRows = 4096;  // rows of a partial sum of the weights' gradient
 constexpr Index kChunkRows = 512;   // rows that pass through the backward together: they stay in L2
+constexpr Index kWeightRows = 24;   // rows of the weights' gradient in a chunk: whole register blocks
 
 template <class T>
 void forward(Var<T> x, Var<T> w, Var<T> b, bool relu, T* y) {
@@ -48,55 +49,98 @@ struct Backward {
   bool mask_dx, fresh;
 };
 
-// Rows [begin, end): their share of dW and db, and their dX. `buffer` holds dZ in rows of whole vectors; null
-// if dY is dZ in that layout.
+// dW[first, first + count) += X^T dZ over rows from `begin` on, whose dZ is d in rows of whole vectors.
+template <class T>
+void add_weight_rows(const Backward<T>& p, const T* d, Index begin, Index rows, Index first, Index count,
+                     T* dw) {
+  using namespace kernels;
+  FIELDMARK_KERNEL(gemm<T>)
+  ({.m = count,
+    .n = p.out,
+    .k = rows,
+    .a = p.x + begin * p.in + first,
+    .a_row = 1,
+    .a_col = p.in,
+    .b = d,
+    .b_row = detail::whole_row<T>(p.out),
+    .b_panel = detail::panel_width<T>(p.out),
+    .c = dw + first * p.out,
+    .ldc = p.out,
+    .accumulate = true});
+}
+
+// dX = or += dZ W^T in rows from `begin` on.
+template <class T>
+void put_input_rows(const Backward<T>& p, const T* d, Index begin, Index rows) {
+  using namespace kernels;
+  const Index row = detail::whole_row<T>(p.out);
+  const T* mask = p.mask_dx ? p.x + begin * p.in : nullptr;
+  if constexpr (std::is_same_v<T, float>)
+    if (p.transposed_bf16)
+      return detail::product(GemmBf16{.m = rows,
+                                      .n = p.in,
+                                      .k = p.out,
+                                      .a = d,
+                                      .a_row = row,
+                                      .b = p.transposed_bf16,
+                                      .c = p.dx + begin * p.in,
+                                      .ldc = p.in,
+                                      .mask = mask,
+                                      .accumulate = !p.fresh});
+  FIELDMARK_KERNEL(gemm<T>)
+  ({.m = rows,
+    .n = p.in,
+    .k = p.out,
+    .a = d,
+    .a_row = row,
+    .b = p.transposed,
+    .c = p.dx + begin * p.in,
+    .ldc = p.in,
+    .mask = mask,
+    .accumulate = !p.fresh});
+}
+
+// dZ of rows [begin, end) in rows of whole vectors: in `buffer`, or dY itself if that is null.
+template <class T>
+const T* masked_rows(const Backward<T>& p, const T* dy, Index begin, Index end, T* buffer) {
+  using namespace kernels;
+  const Index at = begin * p.out;
+  if (!buffer) return dy + at;
+  FIELDMARK_KERNEL(pad_rows<T>)
+  (dy + at, end - begin, p.out, p.mask ? p.mask + at : nullptr, detail::whole_row<T>(p.out), buffer);
+  return buffer;
+}
+
+// Rows [begin, end): their share of dW and db, and their dX.
 template <class T>
 void backward_rows(const Backward<T>& p, const T* dy, Index begin, Index end, T* buffer, T* dw, T* db) {
-  using namespace kernels;
-  const auto product = FIELDMARK_KERNEL(gemm<T>);
-  const Index rows = end - begin, at = begin * p.out, row = detail::whole_row<T>(p.out);
-  const T *d = dy + at, *x = p.x + begin * p.in;
-  if (buffer) {
-    FIELDMARK_KERNEL(pad_rows<T>)(d, rows, p.out, p.mask ? p.mask + at : nullptr, row, buffer);
-    d = buffer;
-  }
+  const T* d = masked_rows(p, dy, begin, end, buffer);
+  if (dw) add_weight_rows(p, d, begin, end - begin, 0, p.in, dw);
+  if (db) detail::add_column_sums(d, end - begin, p.out, db);
+  if (p.dx) put_input_rows(p, d, begin, end - begin);
+}
+
+// Several chunks of rows, too few for shards: threads own rows of dZ and dX, then rows of dW. Each element is
+// summed in the order of backward_rows(). @param buffer  of all rows, or null
+template <class T>
+void backward_of_few(const Backward<T>& p, const T* dy, Index n, T* buffer, T* dw, T* db) {
+  const Index row = detail::whole_row<T>(p.out);
+  parallel_for(n, detail::product_rows(n, p.in, p.out), [&](Index begin, Index end) {
+    const T* d = masked_rows(p, dy, begin, end, buffer ? buffer + begin * row : nullptr);
+    if (p.dx) put_input_rows(p, d, begin, end - begin);
+  });
+  const T* d = buffer ? buffer : dy;
+  const auto for_chunks = [&](auto f) {
+    for (Index i = 0; i < n; i += kChunkRows) f(d + i * row, i, std::min(kChunkRows, n - i));
+  };
   if (dw)
-    product({.m = p.in,
-             .n = p.out,
-             .k = rows,
-             .a = x,
-             .a_row = 1,
-             .a_col = p.in,
-             .b = d,
-             .b_row = row,
-             .b_panel = detail::panel_width<T>(p.out),
-             .c = dw,
-             .ldc = p.out,
-             .accumulate = true});
-  if (db) detail::add_column_sums(d, rows, p.out, db);
-  if constexpr (std::is_same_v<T, float>)
-    if (p.dx && p.transposed_bf16)
-      return detail::product(kernels::GemmBf16{.m = rows,
-                                               .n = p.in,
-                                               .k = p.out,
-                                               .a = d,
-                                               .a_row = row,
-                                               .b = p.transposed_bf16,
-                                               .c = p.dx + begin * p.in,
-                                               .ldc = p.in,
-                                               .mask = p.mask_dx ? x : nullptr,
-                                               .accumulate = !p.fresh});
-  if (p.dx)
-    product({.m = rows,
-             .n = p.in,
-             .k = p.out,
-             .a = d,
-             .a_row = row,
-             .b = p.transposed,
-             .c = p.dx + begin * p.in,
-             .ldc = p.in,
-             .mask = p.mask_dx ? x : nullptr,
-             .accumulate = !p.fresh});
+    parallel_for(p.in, kWeightRows, [&](Index begin, Index end) {
+      for_chunks([&](const T* rows, Index first, Index count) {
+        add_weight_rows(p, rows, first, count, begin, end - begin, dw);
+      });
+    });
+  if (db)
+    for_chunks([&](const T* rows, Index, Index count) { detail::add_column_sums(rows, count, p.out, db); });
 }
 
 // Chunks own their rows of dX; the sums for dW and db are kept per shard of whole chunks and added in order.
@@ -115,7 +159,10 @@ void backward(Var<T> x, Var<T> w, Var<T> b, bool relu, Var<T> y, const T* dy) {
   T *dw = w.grad_acc(), *db = b.grad_acc();
   const Index chunks = (n + kChunkRows - 1) / kChunkRows, own = (dw ? in * out : 0) + (db ? out : 0);
   const Index shards = std::min(detail::kProductShards, (n + kShardRows - 1) / kShardRows);
-  const Index buffer = mask || row != out ? std::min(n, kChunkRows) * row : 0;
+  const bool copies = mask || row != out;
+  if (shards == 1 && chunks > 1)
+    return backward_of_few(p, dy, n, copies ? tape.scratch(n * row) : nullptr, dw, db);
+  const Index buffer = copies ? std::min(n, kChunkRows) * row : 0;
   T *buffers = tape.scratch(shards * buffer), *sums = shards > 1 ? tape.scratch(shards * own) : nullptr;
   parallel_for(shards, 1, [&](Index s, Index) {
     T *to_w = dw, *to_b = db;

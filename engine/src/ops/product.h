@@ -3,15 +3,28 @@
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/engine/tape.h>
 
+#include <algorithm>
+
 #include "kernels/gemm.h"
 #include "kernels/gemm_bf16.h"
 
 namespace fieldmark::detail {
 
-constexpr Index kProductRows = 1024;  // rows of a chunk, where a product runs on several threads
+constexpr Index kProductRows = 1024;  // most rows of a chunk, where a product runs on several threads
+constexpr Index kBlockRows = 96;      // a multiple of the rows of every kernel's register block
 constexpr Index kProductShards = 16;  // partial sums over rows, added in order
 
 inline Index round_up(Index n, Index to) { return (n + to - 1) / to * to; }
+
+/// Rows of a chunk of a product of m rows: two million multiplications, well above the cost of waking a
+/// thread, and whole register blocks. Few rows, as a training loop over chunks has them, stay together. An
+/// element's sum does not depend on the chunk that it is in.
+inline Index product_rows(Index m, Index n, Index k) {
+  constexpr Index kWork = Index{1} << 21, kFew = 256;
+  if (m <= kFew) return kFew;
+  const Index rows = kWork / std::max<Index>(1, n * k);
+  return rows >= kProductRows ? kProductRows : std::max(kBlockRows, rows / kBlockRows * kBlockRows);
+}
 
 template <class T>
 Index panel_width(Index columns) {
@@ -45,7 +58,7 @@ template <class T>
 void product(const kernels::Gemm<T>& g) {
   using namespace kernels;
   const auto run = FIELDMARK_KERNEL(gemm<T>);
-  parallel_for(g.m, kProductRows, [&](Index begin, Index end) {
+  parallel_for(g.m, product_rows(g.m, g.n, g.k * g.segments), [&](Index begin, Index end) {
     Gemm<T> chunk = g;
     chunk.m = end - begin;
     chunk.a += begin * g.a_row;

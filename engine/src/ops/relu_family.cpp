@@ -1,11 +1,36 @@
 #include <fieldmark/engine/ops/relu_family.h>
 
 #include <cmath>
-#include <numbers>
 
+#include "kernels/gelu.h"
 #include "ops/elementwise.h"
 
 namespace fieldmark {
+namespace kernels {
+namespace {
+
+// dx = dy (P(x) + x p(x)) with the normal distribution and its density. A chunk owns its elements.
+template <class T>
+Var<T> gelu(Var<T> x, std::source_location from = std::source_location::current()) {
+  const auto forward = FIELDMARK_KERNEL(gelu_forward<T>);
+  T* y = nullptr;
+  const Var<T> out = x.tape().output(x.shape(), &y, {x}, from);
+  parallel_for(x.shape().size(), detail::kGrain,
+               [&](Index begin, Index end) { forward(x.value() + begin, y + begin, end - begin); });
+  x.tape().on_backward(out, [x](const T* dy) {
+    const auto backward = FIELDMARK_KERNEL(gelu_backward<T>);
+    bool fresh = false;
+    T* dx = x.grad_acc(&fresh);
+    parallel_for(x.shape().size(), detail::kGrain, [&](Index begin, Index end) {
+      backward(x.value() + begin, dy + begin, dx + begin, !fresh, end - begin);
+    });
+  });
+  return out;
+}
+
+}  // namespace
+}  // namespace kernels
+
 namespace {
 
 // 1 / (1 + e^-x) by e^-|x|, so that nothing overflows and the small tail keeps its relative accuracy.
@@ -13,12 +38,6 @@ template <class T>
 T logistic(T x) {
   const T e = std::exp(-std::abs(x));
   return (x < 0 ? e : T(1)) / (1 + e);
-}
-
-// (1 + erf(x / sqrt 2)) / 2; by erfc, which does not cancel far below 0.
-template <class T>
-T normal_cdf(T x) {
-  return std::erfc(-x / std::numbers::sqrt2_v<T>) / 2;
 }
 
 // y = f(x), dx = dy slope(x), functions of one element.
@@ -54,10 +73,7 @@ Var<T> silu(Var<T> x) {
 
 template <class T>
 Var<T> gelu(Var<T> x) {
-  constexpr T kDensity = std::numbers::inv_sqrtpi_v<T> / std::numbers::sqrt2_v<T>;
-  return each(
-      x, [](T v) { return v * normal_cdf(v); },
-      [](T v) { return normal_cdf(v) + v * kDensity * std::exp(-v * v / 2); });
+  return kernels::gelu(x);
 }
 
 template Var<float> leaky_relu(Var<float>, double);

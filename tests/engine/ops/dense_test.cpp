@@ -59,6 +59,32 @@ double dense_error(const std::vector<float>& a, const std::vector<float>& b) {
 }
 }  // namespace
 
+TEST_CASE("dense: a batch of a few chunks has the bits of its chunks one after the other, on every isa") {
+  each_isa([] {
+    for (const Index out : {40, 64}) {  // rows that are padded, and whole vectors in place
+      const Index n = 1100, in = 50;
+      const auto x = uniform<float>({n, in}, -1, 1, 1), w = uniform<float>({in, out}, -1, 1, 2),
+                 b = uniform<float>({out}, -1, 1, 3);
+      const DenseResult whole = run_dense(x, w, b, Activation::relu);
+      DenseResult parts{{}, {}, std::vector<float>(w.data.size()), std::vector<float>(b.data.size())};
+      for (Index first = 0; first < n; first += 512) {
+        const Index rows = std::min<Index>(512, n - first);
+        Tape<float> tape;
+        std::vector<float> dx(static_cast<std::size_t>(rows * in));
+        const auto y = dense(tape.leaf(x.data.data() + first * in, dx.data(), {rows, in}),
+                             tape.leaf(w.data.data(), parts.dw.data(), w.shape),
+                             tape.leaf(b.data.data(), parts.db.data(), b.shape), Activation::relu);
+        const std::vector<float> values(y.value(), y.value() + y.shape().size());
+        tape.backward(y, values);
+        parts.y.insert(parts.y.end(), values.begin(), values.end());
+        parts.dx.insert(parts.dx.end(), dx.begin(), dx.end());
+      }
+      CAPTURE(out);
+      CHECK(whole == parts);
+    }
+  });
+}
+
 TEST_CASE("dense: the float path, forward and all gradients, against double loops to 1e-6 of the largest") {
   each_isa([] {
     for (Index e = 1; e <= 130; ++e)
