@@ -1,3 +1,4 @@
+#include <fieldmark/core/worst.h>
 #include <fieldmark/engine/gradcheck.h>
 #include <fieldmark/engine/random.h>
 
@@ -170,7 +171,7 @@ class Checker {
     for (std::size_t i = 0; i < a.size(); ++i) {
       const double scale = std::max({std::abs(a[i]), std::abs(n[i]), 1e-3 * largest, floor});
       const double err = std::abs(a[i] - n[i]) / scale;
-      report_.worst = std::isnan(err) ? err : std::max(report_.worst, err);
+      raise_to(report_.worst, err);
       if (err <= options_.rtol) continue;  // written so that NaN fails
       char line[200];
       std::snprintf(line, sizeof line, "input %zu [%zu]  x=%.6g  analytic=%.10g  numeric=%.10g  err=%.2e", k,

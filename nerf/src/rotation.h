@@ -1,5 +1,7 @@
 #pragma once
 // The distance of a pose from a rotation, and the nearest rotation.
+#include <fieldmark/core/worst.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -18,7 +20,7 @@ inline double rotation_error(const Pose& p) {
   double worst = std::abs(dot(cross(x, y), z) - 1);
   for (const auto& [a, b, want] :
        {std::tuple{x, x, 1.0}, {y, y, 1.0}, {z, z, 1.0}, {x, y, 0.0}, {x, z, 0.0}, {y, z, 0.0}})
-    worst = std::max(worst, std::abs(dot(a, b) - want));
+    raise_to(worst, std::abs(dot(a, b) - want));
   return worst;
 }
 

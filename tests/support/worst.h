@@ -1,7 +1,4 @@
 #pragma once
-#include <cmath>
+#include <fieldmark/core/worst.h>
 
-/// Raises `worst` to `error` if that is larger; a NaN stays, so that a comparison with a limit fails.
-inline void raise_to(double& worst, double error) {
-  if (!(error <= worst) && !std::isnan(worst)) worst = error;
-}
+using fieldmark::raise_to;

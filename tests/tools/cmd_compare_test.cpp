@@ -83,7 +83,7 @@ TEST_CASE("compare refuses what cannot be paired", "[compare]") {
   CHECK(nlohmann::json::parse(none.out)["lpips_squeeze"].is_null());
 }
 
-TEST_CASE("compare --reference holds LPIPS against the values in a folder, and fails where one is off",
+TEST_CASE("compare --reference holds LPIPS against the values in a folder, and fails where one is off or missing",
           "[compare]") {
   const auto folder = data_or_skip("lpips_reference", "compare --reference");
   if (!folder || !data_or_skip("weights", "compare --reference")) return;
@@ -111,4 +111,10 @@ TEST_CASE("compare --reference holds LPIPS against the values in a folder, and f
   const auto off = run_command({"compare", "--reference", changed.path.string(), "--json", "-"});
   CHECK(off.code == cli::kFailed);
   CHECK(nlohmann::json::parse(off.out)["worst_error"].get<double>() == Approx(2e-4).epsilon(0.01));
+  // A layer less: its error is not a number, which is the worst of all.
+  value = value.get<double>() - 2e-4;
+  auto& layers = reference["pairs"][0]["alex"]["per_layer_f32"];
+  layers.erase(layers.begin());
+  std::ofstream(changed / "lpips_reference.json") << reference;
+  CHECK(run_command({"compare", "--reference", changed.path.string()}).code == cli::kFailed);
 }

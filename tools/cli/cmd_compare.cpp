@@ -1,5 +1,6 @@
 #include <fieldmark/core/error.h>
 #include <fieldmark/core/files.h>
+#include <fieldmark/core/worst.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/imaging/metrics.h>
 
@@ -112,7 +113,7 @@ Json reference_row(const Json& pair, const char* name, const Lpips<float>& lpips
   const auto layers = want.at("per_layer_f32").get<std::vector<double>>();
   double off = layers.size() == d.per_layer.size() ? 0 : std::nan("");
   for (std::size_t k = 0; k < std::min(layers.size(), d.per_layer.size()); ++k)
-    off = std::max(off, std::abs(d.per_layer[k] - layers[k]));
+    raise_to(off, std::abs(d.per_layer[k] - layers[k]));
   const double value = want.at("value_f64");
   return {{"pair", pair.at("name")},
           {"network", name},
@@ -146,7 +147,7 @@ int compare_with_reference(const CompareArguments& options, const Networks& netw
   Json json{{"reference", reference.value("convention", "not stated")}, {"bar", kReferenceBar}};
   for (const char* key : {"error", "worst_layer_error", "psnr_error"}) {
     double worst = 0;
-    for (const Json& row : rows) worst = std::max(worst, row[key].get<double>());
+    for (const Json& row : rows) raise_to(worst, row[key].get<double>());
     json[std::string(key) == "worst_layer_error" ? key : "worst_" + std::string(key)] = worst;
   }
   json["pairs"] = rows;
@@ -157,7 +158,8 @@ int compare_with_reference(const CompareArguments& options, const Networks& netw
                   row["lpips"].get<double>(), row["reference"].get<double>(), row["error"].get<double>());
     context.text() << line;
   }
-  const double worst = std::max(json["worst_error"].get<double>(), json["worst_layer_error"].get<double>());
+  double worst = json["worst_error"].get<double>();
+  raise_to(worst, json["worst_layer_error"].get<double>());
   std::snprintf(line, sizeof line, "worst error, whole or of a layer: %.1e, at most %.0e is asked\n", worst,
                 kReferenceBar);
   context.text() << line;

@@ -1,4 +1,5 @@
 #include <fieldmark/baselines/gradcheck_cases.h>
+#include <fieldmark/core/worst.h>
 #include <fieldmark/distort/gradcheck_cases.h>
 #include <fieldmark/distort/numerics_cases.h>
 #include <fieldmark/engine/gradcheck_cases.h>
@@ -116,8 +117,7 @@ struct NumericsRow {
   }
   double worst() const {
     double worst = 0;
-    for (const auto& e : errors)
-      if (!(e.worst <= worst)) worst = std::isnan(worst) ? worst : e.worst;
+    for (const auto& e : errors) raise_to(worst, e.worst);
     return worst;
   }
 };

@@ -1,6 +1,7 @@
 #include <fieldmark/core/error.h>
 #include <fieldmark/engine/random.h>
 #include <fieldmark/tools/bench/field_bench.h>
+#include "field_errors.h"
 #include "field_reference.h"
 #include "timing.h"
 
@@ -18,25 +19,7 @@ using Cameras = std::vector<nerf::Camera>;
 using Say = std::function<void(const std::string&, double)>;
 constexpr double kSlow = 6;  // variants this much slower than the default are timed once
 
-// Differences of images from the reference, summed over views.
-struct Errors {
-  double squares = 0, worst = 0, dropped = 0, dropped_most = 0, colours = 0, pixels = 0;
-  void add(double difference) {
-    squares += difference * difference;
-    worst = std::max(worst, std::abs(difference));
-    ++colours;
-  }
-  void drop(double opacity) {
-    dropped += std::max(0.0, opacity);
-    dropped_most = std::max(dropped_most, opacity);
-    ++pixels;
-  }
-  double psnr() const {
-    return squares > 0 ? -10 * std::log10(squares / colours) : std::numeric_limits<double>::infinity();
-  }
-};
-
-void compare(const nerf::Rendering& view, const std::vector<double>& want, Errors& errors) {
+void compare(const nerf::Rendering& view, const std::vector<double>& want, FieldErrors& errors) {
   for (Index p = 0; p < view.opacity.size(); ++p) {
     const double* w = &want[static_cast<std::size_t>(4 * p)];
     for (Index a = 0; a < 3; ++a) errors.add(static_cast<double>(view.rgb[3 * p + a]) - w[a]);
@@ -46,7 +29,7 @@ void compare(const nerf::Rendering& view, const std::vector<double>& want, Error
 
 // Mean time of the views in one variant; with `errors`, also how far they are off.
 double render_views(const nerf::RadianceField& field, const Cameras& cameras, const FieldVariant& variant,
-                    const std::vector<std::vector<double>>& want, Errors* errors) {
+                    const std::vector<std::vector<double>>& want, FieldErrors* errors) {
   std::unique_ptr<nerf::RadianceField> other;
   if (variant.occupancy > 0 || !variant.skip_empty)
     other = std::make_unique<nerf::RadianceField>(with_variant(field, variant));
@@ -67,7 +50,7 @@ OccupancyCost occupancy_cost(const nerf::RadianceField& field, const Cameras& ca
                              const Say& say) {
   FieldReference without(field, {.samples = options.samples, .occupancy = false});
   const CounterRng rng(options.seed);
-  Errors errors;
+  FieldErrors errors;
   for (std::size_t v = 0; v < cameras.size(); ++v) {
     say("reference without occupancy", 0);
     const Index all = cameras[v].width * cameras[v].height;
@@ -96,7 +79,7 @@ void time_variants(const nerf::RadianceField& field, const Cameras& cameras,
       if (run > 0 && ratios[i].front() > kSlow) continue;
       say(row.variant.knob + " " + row.variant.setting,
           (static_cast<double>(run) + static_cast<double>(i) / static_cast<double>(rows.size())) / runs);
-      Errors errors;
+      FieldErrors errors;
       usual.push_back(render_views(field, cameras, rows.front().variant, want, nullptr));
       ratios[i].push_back(render_views(field, cameras, row.variant, want, run == 0 ? &errors : nullptr) /
                           usual.back());

@@ -1,3 +1,4 @@
+#include <fieldmark/core/worst.h>
 #include <fieldmark/engine/isa.h>
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/conv2d.h>
@@ -79,7 +80,7 @@ void add_exp(Rows& rows, const PrecisionBenchOptions& o) {
     double error = 0;
     for (std::size_t i = 0; i < x.size(); ++i) {
       const double want = std::exp(static_cast<double>(x[i]));
-      error = std::max(error, std::abs(static_cast<double>(got[i]) - want) / want);
+      raise_to(error, std::abs(static_cast<double>(got[i]) - want) / want);
     }
     return error;
   };

@@ -1,4 +1,5 @@
 #pragma once
+#include <fieldmark/core/worst.h>
 #include <fieldmark/engine/tape.h>
 #include <fieldmark/engine/tensor.h>
 
@@ -20,8 +21,7 @@ struct WorstError {
   /// Adds the error |value - exact| / scale; 0 for equal values, infinities too. @param scale  > 0
   void compare(long double value, long double exact, long double scale) {
     ++values;
-    const auto error = value == exact ? 0.0 : static_cast<double>(std::abs(value - exact) / scale);
-    if (!(error <= worst)) worst = std::isnan(worst) ? worst : error;
+    raise_to(worst, value == exact ? 0.0 : static_cast<double>(std::abs(value - exact) / scale));
   }
   /// Adds the error 0 if both are equal or NaN, else infinity.
   void equal(long double value, long double exact) {

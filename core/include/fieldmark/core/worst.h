@@ -1,0 +1,12 @@
+#pragma once
+#include <cmath>
+
+namespace fieldmark {
+
+/// Raises `worst` to `error` if that is larger; a NaN stays, so that a comparison with a limit fails.
+/// std::max would pass over it: every comparison with NaN is false.
+inline void raise_to(double& worst, double error) {
+  if (!(error <= worst) && !std::isnan(worst)) worst = error;
+}
+
+}  // namespace fieldmark
