@@ -18,6 +18,7 @@ TEST_CASE("engine_bench: every row of the contract runs, and float is near doubl
   REQUIRE(begun.size() == bench.rows.size());
   for (const char* name :
        {"mlp_4x64_fb_f32", "mlp_8x256_fb_f32", "conv3x3_64_fb_f32", "hidden_decoder_fb_f32",
+        "transformer_step", "transformer_wide_step", "autoencoder_step", "autoencoder_wide_step",
         "hash_2e17_forward", "hash_2e17_backward", "nerf_step", "nerf_step_first"})
     CHECK(std::count(begun.begin(), begun.end(), name) == 1);
   for (const EngineRow& row : bench.rows) {
@@ -54,6 +55,20 @@ TEST_CASE("engine_bench: PyTorch computes the same values and gradients") {
           0);  // two programs do not round alike: 0 would mean nothing was compared
     CHECK(found.gradient_difference < Peer::kTolerance);
     CHECK((found.kink_difference > 0) == (row.name == "hidden_decoder_fb_f32"));
+  }
+}
+
+TEST_CASE("engine_bench: PyTorch takes the same training steps of models") {
+  if (!torch_or_skip("the peer of the training steps of engine_bench")) return;
+  for (const char* name : {"transformer_step", "autoencoder_step"}) {
+    const EngineBench bench =
+        run_engine_bench({.runs = 1, .scale = 0.1, .only = name, .peer = PeerOptions{}});
+    REQUIRE((bench.rows.size() == 1 && bench.rows[0].peer));
+    const Peer::Found& found = bench.rows[0].peer->found;
+    CAPTURE(name, found.variant, found.value_difference, found.gradient_difference);
+    CHECK(found.value_difference < 1e-5);
+    CHECK(found.gradient_difference > 0);
+    CHECK(found.gradient_difference < Peer::kTolerance);
   }
 }
 

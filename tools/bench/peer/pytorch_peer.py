@@ -8,6 +8,7 @@ standard input:
   {"seconds"}  of a run: as many calls as take 0.1 s, or one
 or only {"missing": REASON} where PyTorch cannot be loaded.
 """
+import itertools
 import json
 import os
 import sys
@@ -29,6 +30,7 @@ try:
 except ImportError as error:
     answer({"missing": str(error)})
     sys.exit(0)
+from pytorch_models import MODELS, leaf
 
 RUN_SECONDS = 0.1
 MICRO_BATCHES = (4096, 16384)  # samples
@@ -48,10 +50,6 @@ def read_case(path):
         numbers = numpy.frombuffer(raw[begin + first:begin + last], dtype="<f4")
         arrays[name] = torch.from_numpy(numbers.reshape(entry["shape"]).copy())
     return metadata, arrays
-
-
-def leaf(tensor):
-    return tensor.detach().clone().requires_grad_()
 
 
 class Dense:
@@ -199,6 +197,10 @@ def variants(metadata, case):
         for product in ("1x1 convolution (oneDNN)", "linear (oneDNN)", "addmm (BLAS)"):
             for size in sizes:
                 yield lambda: Dense(case, names, product, size)
+    elif metadata["network"] in MODELS:
+        model, layouts = MODELS[metadata["network"]]
+        for layout, foreach, traced in itertools.product(layouts, (False, True), (False, True)):
+            yield lambda: model(metadata, case, names, layout, foreach, traced)
     else:
         for layout in ("channels last", "oneDNN blocked", "planes"):
             yield lambda: Images(case, names, metadata["network"] == "decoder", layout)

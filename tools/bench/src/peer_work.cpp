@@ -26,15 +26,12 @@ void add_pass(SafetensorsFile& file, const std::string& prefix, ParamStore<float
   file.add(prefix + "u", pass.y_shape, pass.u);
   file.add(prefix + "y", pass.y_shape, pass.y);
   file.add(prefix + "dx", pass.x_shape, pass.dx);
-  const std::span<const float> grads = store.grads();
-  each_parameter(store, [&](const auto& entry, std::size_t begin, std::size_t size) {
-    file.add(prefix + "grad/" + entry.name, entry.shape, grads.subspan(begin, size));
-  });
+  add_gradients(file, prefix, store, store.grads());
 }
 
 }  // namespace
 
-SafetensorsFile peer_work(const std::string& network, ParamStore<float>& store, const PeerPass& pass) {
+SafetensorsFile parameters_work(const std::string& network, const ParamStore<float>& store) {
   SafetensorsFile file;
   std::string names;
   const std::span<const float> values = store.values();
@@ -43,6 +40,18 @@ SafetensorsFile peer_work(const std::string& network, ParamStore<float>& store, 
     names += (names.empty() ? "" : ",") + entry.name;
   });
   file.metadata = {{"network", network}, {"parameters", names}, {"draws", "0"}};
+  return file;
+}
+
+void add_gradients(SafetensorsFile& file, const std::string& prefix, const ParamStore<float>& store,
+                   std::span<const float> grads) {
+  each_parameter(store, [&](const auto& entry, std::size_t begin, std::size_t size) {
+    file.add(prefix + "grad/" + entry.name, entry.shape, grads.subspan(begin, size));
+  });
+}
+
+SafetensorsFile peer_work(const std::string& network, ParamStore<float>& store, const PeerPass& pass) {
+  SafetensorsFile file = parameters_work(network, store);
   add_pass(file, "", store, pass);
   return file;
 }

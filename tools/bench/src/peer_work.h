@@ -11,6 +11,13 @@ struct PeerPass {
   std::span<const float> x, u, y, dx;
 };
 
+// Metadata and the parameters as Peer wants them, without results.
+SafetensorsFile parameters_work(const std::string& network, const ParamStore<float>& store);
+
+// Adds PREFIXgrad/NAME for every parameter. @param grads  laid out as the store's
+void add_gradients(SafetensorsFile& file, const std::string& prefix, const ParamStore<float>& store,
+                   std::span<const float> grads);
+
 // Metadata and arrays as Peer wants them. Running statistics are left out: no pass of the benchmark reads
 // them.
 SafetensorsFile peer_work(const std::string& network, ParamStore<float>& store, const PeerPass& pass);

@@ -20,6 +20,7 @@ struct RowSpec {
 
 std::vector<RowSpec> mlp_rows();
 std::vector<RowSpec> conv_rows();
+std::vector<RowSpec> model_rows();
 std::vector<RowSpec> hash_rows();
 std::vector<RowSpec> nerf_rows();
 

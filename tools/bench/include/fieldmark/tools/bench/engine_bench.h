@@ -27,7 +27,8 @@ struct EngineRow {
   double rate = 0;           ///< samples, points or images a second
   double speedup = 0;        ///< over the plain scalar loop in the same run; 0 where there is none
   /// Worst |float - double| over values and all gradients, relative to the largest magnitude of each. For the
-  /// convolution the worst, for the decoder the median of five sets of images.
+  /// convolution the worst, for the decoder the median of five sets of images; for training steps of models
+  /// over the first three losses and the first gradients.
   double error = 0;
   double megabytes = 0;           ///< most memory of the process so far
   std::optional<PeerRow> peer{};  ///< where a peer did the row too
@@ -56,15 +57,19 @@ struct EngineBench {
 /// - mlp_8x256_fb_f32: 8 of 256, 32,768 samples
 /// - conv3x3_64_fb_f32: 3 x 3, 64 to 64 channels, 4 images of 128 x 128
 /// - hidden_decoder_fb_f32: 3 to 64, 7 x 64, batch norm, ReLU, average, linear, 4 images of 128 x 128
+/// - transformer_step: a training step (forward, backward, Adam) of the model of examples/transformer.cpp;
+///   _wide: of width 128 on 16 texts of 64 letters
+/// - autoencoder_step: the same of examples/autoencoder.cpp; _wide: of 16 and 32 channels, images of 64 x 64
 /// - hash_2e17_*: 16 levels of 2 + 2 features, 2^17 entries, 16 to 512 cells; points along rays in the order
 ///   of image tiles, and at random
 /// - nerf_step: a training step of the default field once it has taken shape, everything included, with the
 ///   samples that a run's steps have after growing (TrainOptions::samples_per_step, from 4,000 steps on);
 ///   _first: with the fewer that its first have (first_samples)
 /// @param progress  called before each row with its name and the part of the rows that is done
-/// With a peer, the rows mlp_4x64_fb_f32, mlp_8x256_fb_f32, conv3x3_64_fb_f32 and hidden_decoder_fb_f32 are
-/// done by PyTorch too, a run of ours and a run of its by turns; first its results are compared with ours, on
-/// the same shapes and with numbers that keep ReLUs away from their kinks.
+/// With a peer, the rows mlp_4x64_fb_f32, mlp_8x256_fb_f32, conv3x3_64_fb_f32, hidden_decoder_fb_f32 and
+/// those of training steps of models are done by PyTorch too, a run of ours and a run of its by turns; first
+/// its results are compared with ours, on the same shapes and with numbers that keep ReLUs away from their
+/// kinks.
 /// @throws ValueError if an option is out of range, or a peer is asked for and no row has one
 /// @throws IoError, Error  as Peer
 EngineBench run_engine_bench(const EngineBenchOptions& options,

@@ -46,7 +46,8 @@ class Peer {
   /// @param work  metadata "network", "parameters" (names in the order of use, commas between) and "draws"
   /// (their
   ///              number), arrays "value/NAME" of each parameter, "x", "u", "y", "dx" and "grad/NAME", and
-  ///              the latter five behind "draw0/", "draw1/" ... of each draw
+  ///              the latter five behind "draw0/", "draw1/" ... of each draw; for steps of training the data
+  ///              of the network, "y" (the losses of the first steps) and "grad/NAME" (of the first)
   /// @throws IoError if the interpreter or PyTorch is missing, fails, hangs or answers nonsense
   /// @throws Error if results differ by more than kTolerance or kKinkTolerance: wrong work is not timed
   Peer(const std::string& row, const SafetensorsFile& work, const PeerOptions& options);
