@@ -7,6 +7,7 @@ namespace fieldmark {
 std::vector<NumericsCase> numerics_cases() {
   std::vector<NumericsCase> all;
   add_elementwise_numerics(all);
+  add_matrix_numerics(all);
   add_norm_numerics(all);
   add_sum_numerics(all);
   add_tensor_numerics(all);

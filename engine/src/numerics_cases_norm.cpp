@@ -1,5 +1,6 @@
 #include <fieldmark/engine/ops/batch_norm.h>
 #include <fieldmark/engine/ops/group_norm.h>
+#include <fieldmark/engine/ops/layer_norm.h>
 
 #include <algorithm>
 
@@ -45,8 +46,8 @@ Exact exact_norm(const std::vector<Tensor<T>>& in, const Tensor<T>& g, Index set
 
 template <class T>
 std::vector<Tensor<T>> inputs(Shape s, double centre, double spread) {
-  return {scattered<T>(s, centre - spread, centre + spread, 1), scattered<T>({s[3]}, 0.5, 1.5, 2),
-          scattered<T>({s[3]}, -0.5, 0.5, 3)};
+  return {scattered<T>(s, centre - spread, centre + spread, 1), scattered<T>({s[-1]}, 0.5, 1.5, 2),
+          scattered<T>({s[-1]}, -0.5, 0.5, 3)};
 }
 
 // Errors relative to the largest magnitude of the tensor.
@@ -89,6 +90,14 @@ void compare_batch_norm(const std::vector<Tensor<T>>& in, WorstError& error) {
       in, kBatchNorm, channels, [=](Index i) { return at(i % channels); }, error);
 }
 
+template <class T>
+void compare_layer_norm(const std::vector<Tensor<T>>& in, WorstError& error) {
+  const Index columns = in[0].shape[-1];
+  compare_norm(
+      in, [](auto&, const auto& v) { return layer_norm(v[0], v[1], v[2]); }, in[0].size() / columns,
+      [=](Index i) { return at(i / columns); }, error);
+}
+
 // A constant image, or a set of one element, gives beta in every bit and finite gradients.
 template <class T>
 void compare_constant(WorstError& error) {
@@ -123,6 +132,12 @@ void add_norm_numerics(std::vector<NumericsCase>& cases) {
                [=](auto t, WorstError& e) { compare_group_norm(inputs<decltype(t)>(s, 1000, 1e-3), e); });
   add_numerics(cases, "batch_norm: 1000 +- 1e-3", largest, 4e-7, 1e-9,
                [=](auto t, WorstError& e) { compare_batch_norm(inputs<decltype(t)>(s, 1000, 1e-3), e); });
+  // The mean is a sum of 257 values in double: an error of up to 257 / 4 u 1000, over the spread.
+  const Shape rows{40, 257};
+  add_numerics(cases, "layer_norm: 1000 +- 1, gradients", largest, 4e-7, 1e-12,
+               [=](auto t, WorstError& e) { compare_layer_norm(inputs<decltype(t)>(rows, 1000, 1), e); });
+  add_numerics(cases, "layer_norm: variance below eps, 1000 +- 1e-3, gradients", largest, 4e-7, 1e-9,
+               [=](auto t, WorstError& e) { compare_layer_norm(inputs<decltype(t)>(rows, 1000, 1e-3), e); });
 }
 
 }  // namespace fieldmark

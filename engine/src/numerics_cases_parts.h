@@ -5,6 +5,7 @@ namespace fieldmark {
 
 // The parts that numerics_cases() is assembled from.
 void add_elementwise_numerics(std::vector<NumericsCase>& cases);
+void add_matrix_numerics(std::vector<NumericsCase>& cases);
 void add_norm_numerics(std::vector<NumericsCase>& cases);
 void add_sum_numerics(std::vector<NumericsCase>& cases);
 void add_tensor_numerics(std::vector<NumericsCase>& cases);

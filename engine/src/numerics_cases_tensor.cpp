@@ -1,7 +1,7 @@
 #include <fieldmark/engine/ops/arithmetic.h>
-#include <fieldmark/engine/ops/determinant.h>
+#include <fieldmark/engine/ops/gather.h>
 #include <fieldmark/engine/ops/layer_norm.h>
-#include <fieldmark/engine/ops/linear_solve.h>
+#include <fieldmark/engine/ops/layout.h>
 #include <fieldmark/engine/ops/math.h>
 #include <fieldmark/engine/ops/reduce_axes.h>
 #include <fieldmark/engine/ops/relu_family.h>
@@ -31,6 +31,11 @@ Real reciprocal_of(Real x) { return 1 / x; }
 Real log1p_of(Real x) { return std::log1p(x); }
 Real log1p_slope(Real x) { return 1 / (1 + x); }
 Real expm1_of(Real x) { return std::expm1(x); }
+Real sqrt_of(Real x) { return std::sqrt(x); }
+Real sqrt_slope(Real x) { return 1 / (2 * std::sqrt(x)); }
+Real reciprocal_slope(Real x) { return -1 / (x * x); }
+Real elu_of(Real x) { return x > 0 ? x : std::expm1(x); }
+Real elu_slope(Real x) { return x > 0 ? 1 : std::exp(x); }
 Real exp_value(Real x) { return std::exp(x); }
 
 // y = f(x) at 4001 points of [lo, hi] against its definition and slope, relative to the magnitude of each, at
@@ -47,7 +52,11 @@ void add_curve(std::vector<NumericsCase>& cases, const std::string& name, double
   const std::string relative_to = curve.scale > 0 ? "1" : "value, slope";
   add_numerics(cases, name, relative_to, float_limit, double_limit, [=](auto t, WorstError& error) {
     using T = decltype(t);
-    const auto x = scattered<T>({4001}, curve.lo, curve.hi, 5);
+    const bool spread = curve.lo > 0;  // over the orders of magnitude
+    auto x = scattered<T>({4001}, spread ? std::log(curve.lo) : curve.lo,
+                          spread ? std::log(curve.hi) : curve.hi, 5);
+    if (spread)
+      for (T& v : x.data) v = static_cast<T>(std::exp(static_cast<double>(v)));
     const auto got = values_and_gradients<T>([&](auto&, const auto& v) { return op(v[0]); }, {x}, ones<T>);
     for (std::size_t i = 0; i < x.data.size(); ++i) {
       const Real y = curve.value(x.data[i]), slope = curve.slope(x.data[i]);
@@ -64,10 +73,17 @@ void add_curves(std::vector<NumericsCase>& cases) {
             [](auto v) { return log1p(v); });
   add_curve(cases, "math: expm1 from -1e-6 to 1e-6", 2e-7, 4e-16, {-1e-6, 1e-6, expm1_of, exp_value, 0},
             [](auto v) { return expm1(v); });
+  // Eigen's root in float has 2 ulp.
+  add_curve(cases, "math: sqrt from 1e-37 to 1e37", 2.4e-7, 3e-16, {1e-37, 1e37, sqrt_of, sqrt_slope, 0},
+            [](auto v) { return sqrt(v); });
+  add_curve(cases, "math: reciprocal from 1e-18 to 1e18", 2e-7, 4e-16,
+            {1e-18, 1e18, reciprocal_of, reciprocal_slope, 0}, [](auto v) { return reciprocal(v); });
   add_curve(cases, "math: sin to +-1000", 2e-7, 4e-16, {-1000, 1000, sin_of, cos_of, 1},
             [](auto v) { return sin(v); });
   add_curve(cases, "math: cos to +-1000", 2e-7, 4e-16, {-1000, 1000, cos_of, minus_sin, 1},
             [](auto v) { return cos(v); });
+  add_curve(cases, "relu_family: elu from -1e-3 to 1e-3", 2e-7, 4e-16, {-1e-3, 1e-3, elu_of, elu_slope, 0},
+            [](auto v) { return elu(v); });
   add_curve(cases, "relu_family: silu from -80 to 80", 8e-7, 2e-15, {-80, 80, silu_of, silu_slope, 1},
             [](auto v) { return silu(v); });
   add_curve(cases, "relu_family: gelu from -12 to 12", 8e-7, 2e-15, {-12, 12, gelu_of, gelu_slope, 1},
@@ -135,34 +151,97 @@ void compare_layer_norm(WorstError& error) {
   }
 }
 
-// a x = b for Hilbert's matrix of 5 rows, whose condition number is 5e5 in the largest norm, as in double.
+// Along either axis, pairs of 1e6 and 1/16 - 1e6: exact in double sums, lost in float ones.
 template <class T>
-void compare_solve(WorstError& error) {
-  constexpr Index n = 5;
-  Tensor<T> a({n, n}), b({n, 1});
-  for (Index i = 0; i < n; ++i)
-    for (Index k = 0; k < n; ++k) {
-      a[i * n + k] = static_cast<T>(1 / static_cast<double>(i + k + 1));
-      b[i] += a[i * n + k];
-    }
+void compare_cancelling_axes(WorstError& error) {
+  constexpr Index pairs = 100'000, columns = 3;
+  Tensor<T> tall({2 * pairs, columns}), wide({columns, 2 * pairs});
+  for (Index i = 0; i < tall.size(); ++i) {
+    tall[i] = i / columns % 2 == 0 ? T(1e6) : T(0.0625 - 1e6);
+    wide[i] = i % 2 == 0 ? T(1e6) : T(0.0625 - 1e6);
+  }
   Tape<T> tape;
-  const Var<T> x = solve(tape.constant(a), tape.constant(b));
-  for (Index i = 0; i < n; ++i) {
-    Real residual = -b[i];
-    for (Index k = 0; k < n; ++k) residual += static_cast<Real>(a[i * n + k]) * x.value()[k];
-    error.compare(residual, 0, 1);
+  const Var<T> down = sum(tape.constant(tall), {0}), across = sum(tape.constant(wide), {1});
+  for (Index c = 0; c < columns; ++c) {
+    error.equal(down.value()[c], Real{0.0625} * pairs);
+    error.equal(across.value()[c], Real{0.0625} * pairs);
   }
 }
 
-// A singular matrix has determinant 0 and the gradient of its cofactors.
+// Rows around 1e4, of which E[x^2] - E[x]^2 would keep no digit in float.
 template <class T>
-void compare_singular_determinant(WorstError& error) {
-  const Tensor<T> a({3, 3}, {1, 2, 3, 2, 4, 6, 1, 0, 1});
+void compare_variance(WorstError& error) {
+  constexpr Index rows = 4, columns = 1000;
+  const Tensor<T> x = scattered<T>({rows, columns}, 9999, 10001, 7);
   const auto got =
-      values_and_gradients<T>([](auto&, const auto& v) { return determinant(v[0]); }, {a}, ones<T>);
-  const std::vector<Real> cofactors{4, 4, -4, -2, -2, 2, 0, 0, 0};
-  error.compare(got[0][0], 0, 1);
-  for (std::size_t i = 0; i < cofactors.size(); ++i) error.compare(got[1][i], cofactors[i], 1);
+      values_and_gradients<T>([](auto&, const auto& v) { return variance(v[0], {1}); }, {x}, ones<T>);
+  for (Index r = 0; r < rows; ++r) {
+    std::vector<Real> off(columns);  // from 1e4, exact: a mean of 1e4 would be rounded in long double too
+    Real mean = 0, square = 0;
+    for (Index c = 0; c < columns; ++c) mean += (off[at(c)] = x[r * columns + c] - Real{1e4}) / columns;
+    for (Real& o : off) square += (o - mean) * (o - mean);
+    error.compare(got[0][at(r)], square / columns, square / columns);
+    for (Index c = 0; c < columns; ++c)
+      error.compare(got[1][at(r * columns + c)], 2 * (off[at(c)] - mean) / columns, Real{2} / columns);
+  }
+}
+
+// Sums of a million values of both signs, forward and from the end, relative to the sums of magnitudes.
+template <class T>
+void compare_cumsum(WorstError& error) {
+  constexpr Index n = 1'000'000;
+  const Tensor<T> x = scattered<T>({n, 1}, -1, 1, 8), g = scattered<T>({n, 1}, -1, 1, 9);
+  const auto got = values_and_gradients<T>([](auto&, const auto& v) { return cumsum(v[0], 0); }, {x},
+                                           [&](Shape) -> const Tensor<T>& { return g; });
+  const auto check = [&](const std::vector<T>& sums, const Tensor<T>& terms, bool backwards) {
+    Real sum = 0, magnitude = 0;
+    for (Index k = 0; k < n; ++k) {
+      const Index i = backwards ? n - 1 - k : k;
+      sum += terms[i];
+      magnitude += std::abs(terms[i]);
+      error.compare(sums[at(i)], sum, size_of<T>(magnitude));
+    }
+  };
+  check(got[0], x, false);
+  check(got[1], g, true);
+}
+
+// The gradient of one entry that 100,000 others are: added in T.
+template <class T>
+void compare_gather(WorstError& error) {
+  constexpr Index n = 100'000;
+  const std::vector<std::int32_t> index(at(n), 1);
+  const Tensor<T> x({2}, {3, 5}), g = scattered<T>({n}, -1, 1, 3);
+  const auto got = values_and_gradients<T>(
+      [&](auto&, const auto& v) { return gather(v[0], 0, std::span<const std::int32_t>(index)); }, {x},
+      [&](Shape) -> const Tensor<T>& { return g; });
+  Real sum = 0, magnitude = 0;
+  for (const T v : g.data) {
+    sum += v;
+    magnitude += std::abs(v);
+  }
+  error.compare(got[1][1], sum, magnitude);
+  error.equal(got[1][0], 0);
+}
+
+// a^b and both slopes b a^(b - 1) and a^b log a, from 1e-30 to 1e30 and next to 1 with large exponents. The
+// rounding of b - 1 costs the first slope |log a| units.
+template <class T>
+void compare_pow(bool near_one, WorstError& error) {
+  constexpr Index n = 4001;
+  Tensor<T> a = near_one ? scattered<T>({n}, 0.999, 1.001, 10) : scattered<T>({n}, -30, 30, 10);
+  const Tensor<T> b = near_one ? scattered<T>({n}, -1e4, 1e4, 11) : scattered<T>({n}, -0.2, 1.2, 11);
+  if (!near_one)
+    for (T& v : a.data) v = static_cast<T>(std::pow(10.0, static_cast<double>(v)));
+  const auto got =
+      values_and_gradients<T>([](auto&, const auto& v) { return pow(v[0], v[1]); }, {a, b}, ones<T>);
+  for (Index i = 0; i < n; ++i) {
+    const Real x = a[i], p = b[i], y = std::pow(x, p);
+    const Real slope = p * std::pow(x, p - 1), log_slope = y * std::log(x);
+    error.compare(got[0][at(i)], y, size_of<T>(y));
+    error.compare(got[1][at(i)], slope, size_of<T>(slope) * (1 + std::abs(std::log(x))));
+    error.compare(got[2][at(i)], log_slope, size_of<T>(log_slope));
+  }
 }
 
 // Where a factor of a slope is 0 and the other infinite, or a value is at the end of its range.
@@ -195,10 +274,22 @@ void add_tensor_numerics(std::vector<NumericsCase>& cases) {
                [](auto t, WorstError& e) { compare_logsumexp<decltype(t)>(e); });
   add_numerics(cases, "layer_norm: rows around 1000, constant rows", "1", 2e-6, 1e-12,
                [](auto t, WorstError& e) { compare_layer_norm<decltype(t)>(e); });
-  add_numerics(cases, "linear_solve: residual of Hilbert's matrix", "1", 2e-7, 1e-15,
-               [](auto t, WorstError& e) { compare_solve<decltype(t)>(e); });
-  add_numerics(cases, "determinant: a singular matrix", "1", 1e-6, 1e-14,
-               [](auto t, WorstError& e) { compare_singular_determinant<decltype(t)>(e); });
+  add_numerics(cases, "reduce_axes: pairs that cancel along either axis", "bits", 0, 0,
+               [](auto t, WorstError& e) { compare_cancelling_axes<decltype(t)>(e); });
+  // The mean is rounded to T: its error of at most 1e4 u squared, over the variance of 1/3.
+  add_numerics(cases, "reduce_axes: variance of 10000 +- 1, gradient", "value, largest slope", 2e-6, 1e-15,
+               [](auto t, WorstError& e) { compare_variance<decltype(t)>(e); });
+  // Running sums in double, whose roundings stay near u beside the sum of sizes; in float one rounding.
+  add_numerics(cases, "layout: cumsum of a million values, gradient", "sum of sizes", 6e-8, 6e-16,
+               [](auto t, WorstError& e) { compare_cumsum<decltype(t)>(e); });
+  // Added in T: roundings of sums that stay small beside the sum of sizes, measured 5e-8 and 1e-16.
+  add_numerics(cases, "gather: gradient of an entry taken 100,000 times", "sum of sizes", 2e-7, 5e-16,
+               [](auto t, WorstError& e) { compare_gather<decltype(t)>(e); });
+  // A power of 2 u and three products of u each.
+  add_numerics(cases, "arithmetic: pow from 1e-30 to 1e30", "value, slopes, |log a|", 3e-7, 6e-16,
+               [](auto t, WorstError& e) { compare_pow<decltype(t)>(false, e); });
+  add_numerics(cases, "arithmetic: pow next to 1, exponents to 1e4", "value, slopes, |log a|", 3e-7, 6e-16,
+               [](auto t, WorstError& e) { compare_pow<decltype(t)>(true, e); });
 }
 
 }  // namespace fieldmark

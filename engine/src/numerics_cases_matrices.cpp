@@ -1,0 +1,286 @@
+#include <fieldmark/engine/ops/cholesky.h>
+#include <fieldmark/engine/ops/determinant.h>
+#include <fieldmark/engine/ops/eigenvalues.h>
+#include <fieldmark/engine/ops/linear_solve.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+
+#include "numerics_cases_parts.h"
+
+// The ops compute in double and round results to T once. So an error is at most u_T |exact| for the rounding,
+// plus n u_double times what the condition of the matrix makes of it; "condition" in the tables below is that
+// amplified size, scaled by kToType so that one limit in units of u_T bounds both.
+namespace fieldmark {
+namespace {
+
+using Real = long double;
+using Exact = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
+
+template <class T>
+constexpr Real kToType = static_cast<Real>(std::numeric_limits<double>::epsilon()) /
+                         static_cast<Real>(std::numeric_limits<T>::epsilon());
+
+template <class T>
+Exact exact(const std::vector<T>& values, Index rows, Index columns) {
+  using RowMajor = Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  return Eigen::Map<const RowMajor>(values.data(), rows, columns).template cast<Real>();
+}
+
+template <class T>
+Tensor<T> rounded(const Exact& m) {
+  Tensor<T> t({m.rows(), m.cols()});
+  for (Index i = 0; i < t.size(); ++i) t[i] = static_cast<T>(m(i / m.cols(), i % m.cols()));
+  return t;
+}
+
+Exact size(const Exact& m) { return m.cwiseAbs(); }
+Exact lower(const Exact& m) { return m.triangularView<Eigen::Lower>(); }
+
+// Errors of a matrix, each relative to its entry of `scale`.
+template <class T>
+void compare_matrix(const std::vector<T>& got, const Exact& want, const Exact& scale, WorstError& error) {
+  for (std::size_t i = 0; i < got.size(); ++i) {
+    const Index r = static_cast<Index>(i) / want.cols(), c = static_cast<Index>(i) % want.cols();
+    error.compare(got[i], want(r, c), size_of<T>(scale(r, c)));
+  }
+}
+
+template <class T>
+void compare_matrix(const std::vector<T>& got, const Exact& want, Real scale, WorstError& error) {
+  compare_matrix(got, want, Exact::Constant(want.rows(), want.cols(), scale), error);
+}
+
+// 1 / (i + k + 1) in T: condition 9e5 of 5 rows, 4e13 of 10, near what float and double can hold.
+template <class T>
+Tensor<T> hilbert(Index n) {
+  Tensor<T> a({n, n});
+  for (Index i = 0; i < n * n; ++i) a[i] = static_cast<T>(1 / static_cast<double>(i / n + i % n + 1));
+  return a;
+}
+template <class T>
+constexpr Index kHardest = sizeof(T) == 4 ? 5 : 10;
+
+// a x = b for Hilbert's matrix of 5 rows: the residual stays small whatever the condition is.
+template <class T>
+void compare_residual(WorstError& error) {
+  constexpr Index n = 5;
+  const Tensor<T> a = hilbert<T>(n);
+  Tensor<T> b({n, 1});
+  for (Index i = 0; i < n * n; ++i) b[i / n] += a[i];
+  Tape<T> tape;
+  const Var<T> x = solve(tape.constant(a), tape.constant(b));
+  for (Index i = 0; i < n; ++i) {
+    Real residual = -b[i];
+    for (Index k = 0; k < n; ++k) residual += static_cast<Real>(a[i * n + k]) * x.value()[k];
+    error.compare(residual, 0, 1);
+  }
+}
+
+// x and both gradients of m x = b, where an error of a solve is n u |m^-1| |m| |x| (Higham 2002, section 9.3,
+// with |L||U| of the size of |m|), and da = -db x^T where a is read, its transpose if m is a^T. `lu` solves
+// with m in long double, `lu_t` with m^T.
+template <class T, class Solver, class Transposed>
+void compare_solution(const std::vector<std::vector<T>>& got, const Exact& m, const Solver& lu,
+                      const Transposed& lu_t, const Exact& b, const Exact& cotangent, bool transposed,
+                      const Exact& read, WorstError& error) {
+  const Exact inverse = lu.solve(Exact(Exact::Identity(m.rows(), m.rows()))),
+              spread = size(inverse) * size(m);
+  const Exact x = lu.solve(b), g = lu_t.solve(cotangent);
+  const Exact off_x = kToType<T> * spread * size(x),
+              off_g = kToType<T> * size(inverse).transpose() * size(m).transpose() * size(g);
+  compare_matrix(got[0], x, size(x) + off_x, error);
+  compare_matrix(got[2], g, size(g) + off_g, error);
+  Exact da = -g * x.transpose(),
+        scale = size(g) * size(x).transpose() + off_g * size(x).transpose() + size(g) * off_x.transpose();
+  if (transposed) {
+    da.transposeInPlace();
+    scale.transposeInPlace();
+  }
+  compare_matrix(got[1], da.cwiseProduct(read), scale.cwiseProduct(read), error);
+}
+
+template <class T>
+void compare_solve(WorstError& error) {
+  constexpr Index n = kHardest<T>, k = 2;
+  const Tensor<T> a = hilbert<T>(n), b = scattered<T>({n, k}, -1, 1, 1), g = scattered<T>({n, k}, -1, 1, 2);
+  const auto got = values_and_gradients<T>([](auto&, const auto& v) { return solve(v[0], v[1]); }, {a, b},
+                                           [&](Shape) -> const Tensor<T>& { return g; });
+  const Exact m = exact(a.data, n, n), mt = m.transpose();
+  compare_solution(got, m, Eigen::PartialPivLU<Exact>(m), Eigen::PartialPivLU<Exact>(mt), exact(b.data, n, k),
+                   exact(g.data, n, k), false, Exact::Ones(n, n), error);
+}
+
+// Triangles with a diagonal from 1 to 3e-4 and entries up to 1 beside it, NaN on the side that is not read.
+template <class T>
+void compare_triangular_solve(WorstError& error) {
+  constexpr Index n = 8, k = 2;
+  const Tensor<T> b = scattered<T>({n, k}, -1, 1, 1), g = scattered<T>({n, k}, -1, 1, 2);
+  for (const bool upper : {false, true})
+    for (const bool transposed : {false, true}) {
+      Tensor<T> a = scattered<T>({n, n}, -1, 1, 3);
+      Exact m = Exact::Zero(n, n), read = m;
+      for (Index i = 0; i < n; ++i) {
+        a[i * n + i] = static_cast<T>(std::pow(10.0, -0.5 * static_cast<double>(i)));
+        for (Index c = 0; c < n; ++c) {
+          read(i, c) = (upper ? c >= i : c <= i) ? 1 : 0;
+          if (read(i, c) == 1)
+            m(i, c) = a[i * n + c];
+          else
+            a[i * n + c] = std::numeric_limits<T>::quiet_NaN();
+        }
+      }
+      const auto got = values_and_gradients<T>(
+          [=](auto&, const auto& v) {
+            return triangular_solve(v[0], v[1], {.upper = upper, .transposed = transposed});
+          },
+          {a, b}, [&](Shape) -> const Tensor<T>& { return g; });
+      const Exact used = transposed ? Exact(m.transpose()) : m, back = used.transpose();
+      const auto compare = [&](const auto& lu, const auto& lu_t) {
+        compare_solution(got, used, lu, lu_t, exact(b.data, n, k), exact(g.data, n, k), transposed, read,
+                         error);
+      };
+      if (upper != transposed)
+        compare(used.triangularView<Eigen::Upper>(), back.triangularView<Eigen::Lower>());
+      else
+        compare(used.triangularView<Eigen::Lower>(), back.triangularView<Eigen::Upper>());
+    }
+}
+
+// y = a^-1 with errors |y| |a| |y|, and da = -y^T dy y^T, where y is rounded to T in between.
+template <class T>
+void compare_inverse(WorstError& error) {
+  constexpr Index n = kHardest<T>;
+  const Tensor<T> a = hilbert<T>(n), g = scattered<T>({n, n}, -1, 1, 2);
+  const auto got = values_and_gradients<T>([](auto&, const auto& v) { return inverse(v[0]); }, {a},
+                                           [&](Shape) -> const Tensor<T>& { return g; });
+  const Exact m = exact(a.data, n, n), y = m.partialPivLu().inverse(), dy = exact(g.data, n, n);
+  const Exact off = size(y) + kToType<T> * size(y) * size(m) * size(y);
+  compare_matrix(got[0], y, off, error);
+  const Exact yt = y.transpose(), off_t = off.transpose();
+  compare_matrix(got[1], -yt * dy * yt, off_t * size(dy) * size(yt) + size(yt) * size(dy) * off_t, error);
+}
+
+// Of Hilbert's matrix of 5 rows. An error of L reaches the gradient through two solves with L, whose
+// condition is 700.
+template <class T>
+void compare_cholesky(bool gradient, WorstError& error) {
+  constexpr Index n = 5;
+  const Tensor<T> a = hilbert<T>(n), g = scattered<T>({n, n}, -1, 1, 2);
+  const auto got = values_and_gradients<T>([](auto&, const auto& v) { return cholesky(v[0]); }, {a},
+                                           [&](Shape) -> const Tensor<T>& { return g; });
+  const Exact m = exact(a.data, n, n), l = Eigen::LLT<Exact>(m).matrixL(),
+              inverse = l.partialPivLu().inverse();
+  if (!gradient) return compare_matrix(got[0], l, size(l).maxCoeff(), error);
+  Exact p = lower(l.transpose() * lower(exact(g.data, n, n)));
+  p.diagonal() /= 2;
+  const Exact s = inverse.transpose() * p * inverse, want = (s + s.transpose()) / 2;
+  compare_matrix(got[1], want, size(want).maxCoeff(), error);
+}
+
+// A singular matrix has determinant 0 and the gradient of its cofactors.
+template <class T>
+void compare_singular_determinant(WorstError& error) {
+  const Tensor<T> a({3, 3}, {1, 2, 3, 2, 4, 6, 1, 0, 1});
+  const auto got =
+      values_and_gradients<T>([](auto&, const auto& v) { return determinant(v[0]); }, {a}, ones<T>);
+  const std::vector<Real> cofactors{4, 4, -4, -2, -2, 2, 0, 0, 0};
+  error.compare(got[0][0], 0, 1);
+  for (std::size_t i = 0; i < cofactors.size(); ++i) error.compare(got[1][i], cofactors[i], 1);
+}
+
+// Determinants far beyond the range of double; the logarithm relative to those of the pivots.
+template <class T>
+void compare_log_determinant(WorstError& error) {
+  constexpr Index n = 40;
+  for (const double level : {1e-12, 1e12}) {
+    const Tensor<T> a = scattered<T>({n, n}, -level, level, 5);
+    const auto got =
+        values_and_gradients<T>([](auto&, const auto& v) { return log_determinant(v[0]); }, {a}, ones<T>);
+    const Exact m = exact(a.data, n, n), y = m.partialPivLu().inverse();
+    const Eigen::PartialPivLU<Exact> lu(m);
+    const Eigen::Array<Real, Eigen::Dynamic, 1> logs = lu.matrixLU().diagonal().array().abs().log();
+    error.compare(got[0][0], logs.sum(), logs.abs().sum());
+    const Exact scale = size(y) + kToType<T> * size(y) * size(m) * size(y);
+    compare_matrix(got[1], y.transpose(), scale.transpose(), error);
+  }
+}
+
+// Three eigenvalues that differ by some units of rounding, a pair 1e-3 apart and one far away.
+template <class T>
+Tensor<T> clustered(double level) {
+  constexpr Index n = 6;
+  const Real close = 512 * static_cast<Real>(std::numeric_limits<T>::epsilon());
+  Eigen::Matrix<Real, n, 1> values;
+  values << -3, 1, 1 + close, 1 + 2 * close, 2, 2.001L;
+  const Exact q =
+      Eigen::HouseholderQR<Exact>(exact(scattered<double>({n, n}, -1, 1, 6).data, n, n)).householderQ();
+  const Exact m = static_cast<Real>(level) * q * values.asDiagonal() * q.transpose();
+  return rounded<T>((m + m.transpose()) / 2);
+}
+
+// Eigenvalues relative to the largest (Weyl), at three magnitudes.
+template <class T>
+void compare_eigenvalues(WorstError& error) {
+  for (const double level : {1.0, 1e30, 1e-30}) {
+    const Tensor<T> a = clustered<T>(level);
+    const auto got = values_and_gradients<T>([](auto&, const auto& v) { return symmetric_eigenvalues(v[0]); },
+                                             {a}, ones<T>);
+    const Eigen::SelfAdjointEigenSolver<Exact> solver(exact(a.data, 6, 6), Eigen::EigenvaluesOnly);
+    compare_matrix(got[0], solver.eigenvalues(), size(solver.eigenvalues()).maxCoeff(), error);
+  }
+}
+
+// Near-equal eigenvalues have no vectors of their own, but the gradient of what treats them alike is well
+// defined: the projector on their space. One eigenvalue alone has an error of |a| / gap.
+template <class T>
+void compare_eigenvalue_gradients(WorstError& error) {
+  constexpr Index n = 6;
+  const Tensor<T> a = clustered<T>(1);
+  const Eigen::SelfAdjointEigenSolver<Exact> solver(exact(a.data, n, n));
+  const Exact v = solver.eigenvectors();
+  const auto check = [&](std::vector<T> cotangent, Real scale) {
+    const Tensor<T> g({n}, cotangent);
+    const auto got = values_and_gradients<T>([](auto&, const auto& x) { return symmetric_eigenvalues(x[0]); },
+                                             {a}, [&](Shape) -> const Tensor<T>& { return g; });
+    const Exact d = exact(cotangent, n, 1);
+    compare_matrix(got[1], v * d.col(0).asDiagonal() * v.transpose(), scale, error);
+  };
+  check({1, 1, 1, 1, 1, 1}, 1);
+  check({0, 1, 1, 1, 0, 0}, 3);
+  check({2, 0, 0, 0, -1, -1}, 3);
+  check({0, 0, 0, 0, 1, 0}, 1 + kToType<T> * 3 / 1e-3L);
+}
+
+}  // namespace
+
+void add_matrix_numerics(std::vector<NumericsCase>& cases) {
+  add_numerics(cases, "linear_solve: residual of Hilbert's matrix", "1", 2e-7, 1e-15,
+               [](auto t, WorstError& e) { compare_residual<decltype(t)>(e); });
+  // 2 n u of the elimination with n = 10; in float the rounding to it, u, and for da two such factors.
+  add_numerics(cases, "linear_solve: solve with Hilbert's matrix, gradients", "value, condition", 1.2e-7,
+               2e-15, [](auto t, WorstError& e) { compare_solve<decltype(t)>(e); });
+  // n u with n = 8.
+  add_numerics(cases, "linear_solve: graded triangles, gradients", "value, condition", 1.2e-7, 9e-16,
+               [](auto t, WorstError& e) { compare_triangular_solve<decltype(t)>(e); });
+  add_numerics(cases, "linear_solve: inverse of Hilbert's matrix, gradient", "value, condition", 1.2e-7,
+               2e-15, [](auto t, WorstError& e) { compare_inverse<decltype(t)>(e); });
+  // Bounds are n u times the condition 9e5 of a, 5e-10, and in float one rounding, in the gradient times 2 *
+  // 700. Errors measured are far below: 5e-15 and 1e-12, in float 9e-8 of the gradient.
+  add_numerics(cases, "cholesky: of Hilbert's matrix", "largest", 6e-8, 2e-14,
+               [](auto t, WorstError& e) { compare_cholesky<decltype(t)>(false, e); });
+  add_numerics(cases, "cholesky: gradient at Hilbert's matrix", "largest", 4e-7, 4e-12,
+               [](auto t, WorstError& e) { compare_cholesky<decltype(t)>(true, e); });
+  add_numerics(cases, "determinant: a singular matrix", "1", 1e-6, 1e-14,
+               [](auto t, WorstError& e) { compare_singular_determinant<decltype(t)>(e); });
+  // n u with n = 40; in float one rounding.
+  add_numerics(cases, "determinant: logarithms of 1e-480 and 1e480", "pivots, condition", 6e-8, 5e-15,
+               [](auto t, WorstError& e) { compare_log_determinant<decltype(t)>(e); });
+  // A few n u with n = 6; in float one rounding.
+  add_numerics(cases, "eigenvalues: near-equal ones at 1e-30, 1 and 1e30", "largest", 6e-8, 3e-15,
+               [](auto t, WorstError& e) { compare_eigenvalues<decltype(t)>(e); });
+  add_numerics(cases, "eigenvalues: gradients of near-equal ones", "1, size / gap", 6e-8, 3e-15,
+               [](auto t, WorstError& e) { compare_eigenvalue_gradients<decltype(t)>(e); });
+}
+
+}  // namespace fieldmark
