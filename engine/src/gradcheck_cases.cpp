@@ -1,3 +1,10 @@
+#include <fieldmark/engine/dual/arithmetic.h>
+#include <fieldmark/engine/dual/layout.h>
+#include <fieldmark/engine/dual/loss.h>
+#include <fieldmark/engine/dual/math.h>
+#include <fieldmark/engine/dual/matrices.h>
+#include <fieldmark/engine/dual/norm.h>
+#include <fieldmark/engine/dual/reduce.h>
 #include <fieldmark/engine/gradcheck_cases.h>
 #include <fieldmark/engine/nn/batch_norm.h>
 #include <fieldmark/engine/nn/conv2d.h>
@@ -40,48 +47,49 @@ Tensor<double> biases(Index n) {
 
 // A module with its parameters; `build` makes the module in a store.
 template <class Build>
-GradcheckCase make_module(const char* name, const Tensor<double>& input, Build build) {
-  return {name, [=] {
-            ParamStore<double> store;
-            const auto module = build(store);
-            return gradcheck_module([&](D&, const Params<double>& p, Vars v) { return module(p, v[0]); },
-                                    store, std::span(&input, 1));
-          }};
+Cases make_module(const char* name, const Tensor<double>& input, Build build) {
+  return {{name, [=] {
+             ParamStore<double> store;
+             const auto module = build(store);
+             return gradcheck_module([&](D&, const Params<double>& p, Vars v) { return module(p, v[0]); },
+                                     store, std::span(&input, 1));
+           }}};
 }
 
 Cases elementwise() {
   const auto x = off_zero({3, 4}), y = off_zero({3, 4}, 0.5);
-  return {make("arithmetic: add", [](D&, Vars v) { return add(v[0], v[1]); }, {x, y}),
-          make("arithmetic: sub", [](D&, Vars v) { return sub(v[0], v[1]); }, {x, y}),
-          make("arithmetic: mul", [](D&, Vars v) { return mul(v[0], v[1]); }, {x, y}),
-          make("arithmetic: scale", [](D&, Vars v) { return scale(v[0], -2.5); }, {x}),
-          make("activation: relu", [](D&, Vars v) { return relu(v[0]); }, {x}),
-          make("activation: sigmoid", [](D&, Vars v) { return sigmoid(v[0]); }, {x}),
-          make("activation: tanh", [](D&, Vars v) { return tanh(v[0]); }, {x}),
-          make("activation: exp", [](D&, Vars v) { return exp(v[0]); }, {x}),
-          make("activation: truncated_exp", [](D&, Vars v) { return truncated_exp(v[0]); }, {x}),
-          make("activation: softplus", [](D&, Vars v) { return softplus(v[0]); }, {x})};
+  return join({make("arithmetic: add", [](auto&, auto v) { return add(v[0], v[1]); }, {x, y}),
+               make("arithmetic: sub", [](auto&, auto v) { return sub(v[0], v[1]); }, {x, y}),
+               make("arithmetic: mul", [](auto&, auto v) { return mul(v[0], v[1]); }, {x, y}),
+               make("arithmetic: scale", [](auto&, auto v) { return scale(v[0], -2.5); }, {x}),
+               make("activation: relu", [](auto&, auto v) { return relu(v[0]); }, {x}),
+               make("activation: sigmoid", [](auto&, auto v) { return sigmoid(v[0]); }, {x}),
+               make("activation: tanh", [](auto&, auto v) { return tanh(v[0]); }, {x}),
+               make("activation: exp", [](auto&, auto v) { return exp(v[0]); }, {x}),
+               make("activation: truncated_exp", [](auto&, auto v) { return truncated_exp(v[0]); }, {x}),
+               make("activation: softplus", [](auto&, auto v) { return softplus(v[0]); }, {x})});
 }
 
 Cases layout() {
   const auto x = off_zero({3, 4}), y = off_zero({3, 2}, 0.5), image = off_zero({2, 4, 6, 2});
-  return {
-      make("slice: concatenate",
-           [](D&, Vars v) {
-             return concatenate({v[0], v[1], v[0]});
-           },
-           {x, y}),
-      make("slice: slice", [](D&, Vars v) { return slice(v[0], 1, 2); }, {x}),
-      make("rows: broadcast_rows", [](D&, Vars v) { return broadcast_rows(v[0], 5); }, {off_zero({1, 4})}),
-      make("rows: gather_rows", [](D&, Vars v) { return gather_rows(v[0], kRows); }, {x}),
-      make("pool: avg_pool", [](D&, Vars v) { return avg_pool(v[0], 2); }, {off_zero({2, 3, 5, 2})}),
-      make("pool: max_pool",
-           [](D&, Vars v) { return max_pool(v[0], {.size = 3, .stride = 2, .ceil_mode = true}); },
-           {apart({2, 4, 6, 2})}),
-      make("pool: global_avg_pool", [](D&, Vars v) { return global_avg_pool(v[0]); }, {image}),
-      make("resample: upsample_nearest", [](D&, Vars v) { return upsample_nearest(v[0], 2); }, {image}),
-      make("resample: upsample_to", [](D&, Vars v) { return upsample_to(v[0], 7, 5); }, {image}),
-      make("resample: space_to_depth", [](D&, Vars v) { return space_to_depth(v[0]); }, {image})};
+  return join(
+      {make("slice: concatenate",
+            [](auto&, auto v) {
+              return concatenate({v[0], v[1], v[0]});
+            },
+            {x, y}),
+       make("slice: slice", [](auto&, auto v) { return slice(v[0], 1, 2); }, {x}),
+       make("rows: broadcast_rows", [](auto&, auto v) { return broadcast_rows(v[0], 5); },
+            {off_zero({1, 4})}),
+       make("rows: gather_rows", [](auto&, auto v) { return gather_rows(v[0], kRows); }, {x}),
+       make("pool: avg_pool", [](auto&, auto v) { return avg_pool(v[0], 2); }, {off_zero({2, 3, 5, 2})}),
+       make("pool: max_pool",
+            [](D&, Vars v) { return max_pool(v[0], {.size = 3, .stride = 2, .ceil_mode = true}); },
+            {apart({2, 4, 6, 2})}),
+       make("pool: global_avg_pool", [](auto&, auto v) { return global_avg_pool(v[0]); }, {image}),
+       make("resample: upsample_nearest", [](auto&, auto v) { return upsample_nearest(v[0], 2); }, {image}),
+       make("resample: upsample_to", [](auto&, auto v) { return upsample_to(v[0], 7, 5); }, {image}),
+       make("resample: space_to_depth", [](auto&, auto v) { return space_to_depth(v[0]); }, {image})});
 }
 
 Cases losses() {
@@ -89,73 +97,73 @@ Cases losses() {
   const auto x = off_zero({3, 4}), logits = off_zero({4, 3});
   auto y = x;
   for (Index i = 0; i < y.size(); ++i) y[i] += (i % 2 == 0 ? 0.15 : -0.9) + 0.02 * static_cast<double>(i);
-  return {
-      make("reduce: sum", [](D&, Vars v) { return sum(v[0]); }, {x}),
-      make("reduce: mean", [](D&, Vars v) { return mean(v[0]); }, {x}),
-      make("reduce: weighted_mean", [](D&, Vars v) { return weighted_mean<double>(v[0], kWeights); }, {x}),
-      make("loss: mse_loss", [](D&, Vars v) { return mse_loss<double>(v[0], v[1], kWeights); }, {x, y}),
-      make("loss: l1_loss", [](D&, Vars v) { return l1_loss<double>(v[0], v[1], kWeights); }, {x, y}),
-      make("loss: huber_loss", [](D&, Vars v) { return huber_loss<double>(v[0], v[1], 0.5, kWeights); },
-           {x, y}),
-      make("loss: bce_with_logits",
-           [](D&, Vars v) { return bce_with_logits<double>(v[0], kTargets, kWeights); }, {x}),
-      make("softmax: softmax", [](D&, Vars v) { return softmax(v[0]); }, {logits}),
-      make("softmax: softmax_cross_entropy", [](D&, Vars v) { return softmax_cross_entropy(v[0], kLabels); },
-           {logits})};
+  return join(
+      {make("reduce: sum", [](auto&, auto v) { return sum(v[0]); }, {x}),
+       make("reduce: mean", [](auto&, auto v) { return mean(v[0]); }, {x}),
+       make("reduce: weighted_mean", [](auto&, auto v) { return weighted_mean<double>(v[0], kWeights); },
+            {x}),
+       make("loss: mse_loss", [](auto&, auto v) { return mse_loss<double>(v[0], v[1], kWeights); }, {x, y}),
+       make("loss: l1_loss", [](auto&, auto v) { return l1_loss<double>(v[0], v[1], kWeights); }, {x, y}),
+       make("loss: huber_loss", [](auto&, auto v) { return huber_loss<double>(v[0], v[1], 0.5, kWeights); },
+            {x, y}),
+       make("loss: bce_with_logits",
+            [](auto&, auto v) { return bce_with_logits<double>(v[0], kTargets, kWeights); }, {x}),
+       make("softmax: softmax", [](auto&, auto v) { return softmax(v[0]); }, {logits}),
+       make("softmax: softmax_cross_entropy",
+            [](auto&, auto v) { return softmax_cross_entropy(v[0], kLabels); }, {logits})});
 }
 
 Cases norms() {
   const auto x = off_zero({2, 2, 3, 4}), gamma = off_zero({4}, 1), beta = off_zero({4}, 2);
-  return {
-      make("group_norm: x, gamma, beta",
-           [](D&, Vars v) { return group_norm(v[0], v[1], v[2], {.groups = 2}); }, {x, gamma, beta}),
-      make("batch_norm: x, gamma, beta", [](D&, Vars v) { return batch_norm(v[0], v[1], v[2]); },
-           {x, gamma, beta}),
-      make("batch_norm: fixed statistics",
-           [](D&, Vars v) { return batch_norm_fixed<double>(v[0], v[1], v[2], kMean, kVariance); },
-           {x, gamma, beta}),
-      make_module("group_norm: module", x,
-                  [](auto& store) { return GroupNorm<double>(store, "norm", 4, {.groups = 2}); }),
-      make_module("batch_norm: module", x, [](auto& store) { return BatchNorm<double>(store, "norm", 4); })};
+  return join(
+      {make("group_norm: x, gamma, beta",
+            [](auto&, auto v) { return group_norm(v[0], v[1], v[2], {.groups = 2}); }, {x, gamma, beta}),
+       make("batch_norm: x, gamma, beta", [](auto&, auto v) { return batch_norm(v[0], v[1], v[2]); },
+            {x, gamma, beta}),
+       make("batch_norm: fixed statistics",
+            [](auto&, auto v) { return batch_norm_fixed<double>(v[0], v[1], v[2], kMean, kVariance); },
+            {x, gamma, beta}),
+       make_module("group_norm: module", x,
+                   [](auto& store) { return GroupNorm<double>(store, "norm", 4, {.groups = 2}); }),
+       make_module("batch_norm: module", x,
+                   [](auto& store) { return BatchNorm<double>(store, "norm", 4); })});
 }
 
 Cases products() {
   const auto product = [](Activation activation) {
-    return [=](D&, Vars v) { return dense(v[0], v[1], v[2], activation); };
+    return [=](auto&, auto v) { return dense(v[0], v[1], v[2], activation); };
   };
   const auto convolution = [](Activation activation) {
-    return [=](D&, Vars v) { return conv2d(v[0], v[1], v[2], activation); };
+    return [=](auto&, auto v) { return conv2d(v[0], v[1], v[2], activation); };
   };
   const auto rows = mixed({4, 3}, 1), matrix = mixed({3, 5}, 2), image = mixed({2, 3, 4, 2}, 1),
              window = mixed({3, 3, 2, 3}, 2);
   auto a = mixed({2, 3, 2, 5}, 1), b = mixed({2, 3, 2, 5}, 2);
   for (Tensor<double>* t : {&a, &b})
     for (double& v : t->data) v = 0.55 + 0.45 * v;
-  return {
-      make("matmul", [](D&, Vars v) { return matmul(v[0], v[1]); }, {mixed({3, 5}, 1), mixed({5, 4}, 2)}),
-      make("feature_distance", [](D&, Vars v) { return feature_distance<double>(v[0], v[1], kLin); }, {a, b}),
-      make("dense", product(Activation::none), {rows, matrix, mixed({5}, 3)}),
-      make("dense with relu", product(Activation::relu), {rows, matrix, biases(5)}),
-      make_module("dense layer", mixed({5, 3}, 1),
-                  [](auto& store) { return Dense<double>(store, "layer", {.in = 3, .out = 4}, 5); }),
-      make("conv2d", convolution(Activation::none), {image, window, mixed({3}, 3)}),
-      make("conv2d with relu", convolution(Activation::relu), {image, window, biases(3)}),
-      make("conv2d with relu by Winograd", convolution(Activation::relu),
-           {mixed({2, 5, 7, 8}, 1), mixed({3, 3, 8, 16}, 2), biases(16)}),
-      make("conv2d with stride and padding",
-           [](D&, Vars v) { return conv2d(v[0], v[1], v[2], {.stride = 3, .padding = 2}); },
-           {mixed({2, 5, 7, 2}, 1), mixed({4, 4, 2, 3}, 2), mixed({3}, 3)}),
-      make_module("conv2d layer", mixed({1, 3, 4, 2}, 1),
-                  [](auto& store) { return Conv2d<double>(store, "layer", {.in = 2, .out = 3}, 5); })};
+  return join(
+      {make("matmul", [](auto&, auto v) { return matmul(v[0], v[1]); }, {mixed({3, 5}, 1), mixed({5, 4}, 2)}),
+       make("feature_distance", [](auto&, auto v) { return feature_distance<double>(v[0], v[1], kLin); },
+            {a, b}),
+       make("dense", product(Activation::none), {rows, matrix, mixed({5}, 3)}),
+       make("dense with relu", product(Activation::relu), {rows, matrix, biases(5)}),
+       make_module("dense layer", mixed({5, 3}, 1),
+                   [](auto& store) { return Dense<double>(store, "layer", {.in = 3, .out = 4}, 5); }),
+       make("conv2d", convolution(Activation::none), {image, window, mixed({3}, 3)}),
+       make("conv2d with relu", convolution(Activation::relu), {image, window, biases(3)}),
+       make("conv2d with relu by Winograd", convolution(Activation::relu),
+            {mixed({2, 5, 7, 8}, 1), mixed({3, 3, 8, 16}, 2), biases(16)}),
+       make("conv2d with stride and padding",
+            [](auto&, auto v) { return conv2d(v[0], v[1], v[2], {.stride = 3, .padding = 2}); },
+            {mixed({2, 5, 7, 2}, 1), mixed({4, 4, 2, 3}, 2), mixed({3}, 3)}),
+       make_module("conv2d layer", mixed({1, 3, 4, 2}, 1),
+                   [](auto& store) { return Conv2d<double>(store, "layer", {.in = 2, .out = 3}, 5); })});
 }
 
 }  // namespace
 
 std::vector<GradcheckCase> gradcheck_cases() {
-  Cases all = elementwise();
-  for (const auto& part : {layout(), losses(), norms(), products(), tensor_gradcheck_cases()})
-    all.insert(all.end(), part.begin(), part.end());
-  return all;
+  return join({elementwise(), layout(), losses(), norms(), products(), tensor_gradcheck_cases()});
 }
 
 }  // namespace fieldmark

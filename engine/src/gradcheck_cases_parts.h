@@ -1,7 +1,9 @@
 #pragma once
 #include <fieldmark/engine/gradcheck_cases.h>
+#include <fieldmark/engine/gradcheck_second_order.h>
 
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 // What the parts of gradcheck_cases() share.
@@ -32,8 +34,19 @@ inline Tensor<double> apart(Shape shape) {
   return t;
 }
 
-inline GradcheckCase make(const char* name, GradcheckFn f, std::vector<Tensor<double>> inputs) {
-  return {name, [f = std::move(f), inputs = std::move(inputs)] { return gradcheck(f, inputs); }};
+// The check of an op; a generic lambda, which runs on Duals too, is also checked to second order.
+template <class F>
+Cases make(const std::string& name, F f, std::vector<Tensor<double>> inputs) {
+  Cases cases{{name, [=] { return gradcheck(f, inputs); }}};
+  if constexpr (std::is_convertible_v<F, DualFunction<double>>)
+    cases.push_back({name + ", second order", [=] { return gradcheck_second_order(f, inputs); }});
+  return cases;
+}
+
+inline Cases join(std::initializer_list<Cases> parts) {
+  Cases all;
+  for (const Cases& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
 }
 
 // Pseudorandom values in (-1, 1).

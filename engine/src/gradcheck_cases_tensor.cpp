@@ -1,3 +1,9 @@
+#include <fieldmark/engine/dual/arithmetic.h>
+#include <fieldmark/engine/dual/layout.h>
+#include <fieldmark/engine/dual/math.h>
+#include <fieldmark/engine/dual/matrices.h>
+#include <fieldmark/engine/dual/norm.h>
+#include <fieldmark/engine/dual/reduce.h>
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/batched_matmul.h>
@@ -51,125 +57,126 @@ Cases broadcast_cases() {
   const auto a = off_zero({2, 3, 4}), row = off_zero({4}, 0.5), column = off_zero({3, 1}, 1),
              one = off_zero({}, 2);
   const auto base = positive({2, 3, 4}), base_row = positive({4}, 0.5);
-  return {make("arithmetic: add of a row", [](D&, Vars v) { return add(v[0], v[1]); }, {a, row}),
-          make("arithmetic: sub of a column and a row", [](D&, Vars v) { return sub(v[0], v[1]); },
-               {column, row}),
-          make("arithmetic: mul with one element", [](D&, Vars v) { return mul(v[0], v[1]); }, {one, a}),
-          make("arithmetic: div", [](D&, Vars v) { return div(v[0], v[1]); }, {a, base}),
-          make("arithmetic: div by a row", [](D&, Vars v) { return div(v[0], v[1]); }, {a, base_row}),
-          make("arithmetic: pow", [](D&, Vars v) { return pow(v[0], v[1]); }, {base, row}),
-          make("arithmetic: minimum", [](D&, Vars v) { return minimum(v[0], v[1]); },
-               {stepped({2, 3, 4}, 0), stepped({2, 3, 4}, 1, 0.1)}),
-          make("arithmetic: maximum of a column", [](D&, Vars v) { return maximum(v[0], v[1]); },
-               {stepped({2, 3, 4}, 0), stepped({3, 1}, 1, 0.1)}),
-          make("comparison: where", [](D&, Vars v) { return where(greater(v[0], v[1]), v[0], square(v[1])); },
-               {stepped({2, 3, 4}, 0), stepped({3, 1}, 1, 0.1)})};
+  return join(
+      {make("arithmetic: add of a row", [](auto&, auto v) { return add(v[0], v[1]); }, {a, row}),
+       make("arithmetic: sub of a column and a row", [](auto&, auto v) { return sub(v[0], v[1]); },
+            {column, row}),
+       make("arithmetic: mul with one element", [](auto&, auto v) { return mul(v[0], v[1]); }, {one, a}),
+       make("arithmetic: div", [](auto&, auto v) { return div(v[0], v[1]); }, {a, base}),
+       make("arithmetic: div by a row", [](auto&, auto v) { return div(v[0], v[1]); }, {a, base_row}),
+       make("arithmetic: pow", [](auto&, auto v) { return pow(v[0], v[1]); }, {base, row}),
+       make("arithmetic: minimum", [](auto&, auto v) { return minimum(v[0], v[1]); },
+            {stepped({2, 3, 4}, 0), stepped({2, 3, 4}, 1, 0.1)}),
+       make("arithmetic: maximum of a column", [](auto&, auto v) { return maximum(v[0], v[1]); },
+            {stepped({2, 3, 4}, 0), stepped({3, 1}, 1, 0.1)}),
+       make("comparison: where", [](auto&, auto v) { return where(greater(v[0], v[1]), v[0], square(v[1])); },
+            {stepped({2, 3, 4}, 0), stepped({3, 1}, 1, 0.1)})});
 }
 
 Cases function_cases() {
   const auto x = off_zero({3, 4}), p = positive({3, 4});
-  return {make("math: negate", [](D&, Vars v) { return negate(v[0]); }, {x}),
-          make("math: affine", [](D&, Vars v) { return affine(v[0], -2.5, 3); }, {x}),
-          make("math: div by a number", [](D&, Vars v) { return div(v[0], -2.5); }, {x}),
-          make("math: reciprocal", [](D&, Vars v) { return reciprocal(v[0]); }, {regular(1, 1)}),
-          make("math: abs", [](D&, Vars v) { return abs(v[0]); }, {x}),
-          make("math: square", [](D&, Vars v) { return square(v[0]); }, {x}),
-          make("math: sqrt", [](D&, Vars v) { return sqrt(affine(v[0], 1, 1)); }, {p}),
-          make("math: pow", [](D&, Vars v) { return pow(affine(v[0], 1, 1), -1.5); }, {p}),
-          make("math: pow of negative numbers", [](D&, Vars v) { return pow(v[0], 3); }, {x}),
-          make("math: log", [](D&, Vars v) { return log(affine(v[0], 1, 1)); }, {p}),
-          make("math: log1p", [](D&, Vars v) { return log1p(v[0]); }, {p}),
-          make("math: expm1", [](D&, Vars v) { return expm1(v[0]); }, {x}),
-          make("math: sin", [](D&, Vars v) { return sin(v[0]); }, {x}),
-          make("math: cos", [](D&, Vars v) { return cos(v[0]); }, {x}),
-          make("math: clamp", [](D&, Vars v) { return clamp(v[0], -0.5, 0.5); }, {stepped({3, 4}, 0)}),
-          make("relu_family: leaky_relu", [](D&, Vars v) { return leaky_relu(v[0], 0.2); }, {x}),
-          make("relu_family: elu", [](D&, Vars v) { return elu(v[0], 0.7); }, {x}),
-          make("relu_family: silu", [](D&, Vars v) { return silu(v[0]); }, {x}),
-          make("relu_family: gelu", [](D&, Vars v) { return gelu(v[0]); }, {x})};
+  return join(
+      {make("math: negate", [](auto&, auto v) { return negate(v[0]); }, {x}),
+       make("math: affine", [](auto&, auto v) { return affine(v[0], -2.5, 3); }, {x}),
+       make("math: div by a number", [](auto&, auto v) { return div(v[0], -2.5); }, {x}),
+       make("math: reciprocal", [](auto&, auto v) { return reciprocal(v[0]); }, {regular(1, 1)}),
+       make("math: abs", [](auto&, auto v) { return abs(v[0]); }, {x}),
+       make("math: square", [](auto&, auto v) { return square(v[0]); }, {x}),
+       make("math: sqrt", [](auto&, auto v) { return sqrt(affine(v[0], 1, 1)); }, {p}),
+       make("math: pow", [](auto&, auto v) { return pow(affine(v[0], 1, 1), -1.5); }, {p}),
+       make("math: pow of negative numbers", [](auto&, auto v) { return pow(v[0], 3); }, {x}),
+       make("math: log", [](auto&, auto v) { return log(affine(v[0], 1, 1)); }, {p}),
+       make("math: log1p", [](auto&, auto v) { return log1p(v[0]); }, {p}),
+       make("math: expm1", [](auto&, auto v) { return expm1(v[0]); }, {x}),
+       make("math: sin", [](auto&, auto v) { return sin(v[0]); }, {x}),
+       make("math: cos", [](auto&, auto v) { return cos(v[0]); }, {x}),
+       make("math: clamp", [](auto&, auto v) { return clamp(v[0], -0.5, 0.5); }, {stepped({3, 4}, 0)}),
+       make("relu_family: leaky_relu", [](auto&, auto v) { return leaky_relu(v[0], 0.2); }, {x}),
+       make("relu_family: elu", [](auto&, auto v) { return elu(v[0], 0.7); }, {x}),
+       make("relu_family: silu", [](auto&, auto v) { return silu(v[0]); }, {x}),
+       make("relu_family: gelu", [](auto&, auto v) { return gelu(v[0]); }, {x}),
+       make("relu_family: normal_cdf", [](auto&, auto v) { return normal_cdf(v[0]); }, {x})});
 }
 
 Cases axis_cases() {
   const auto x = off_zero({2, 3, 4}), y = off_zero({2, 2, 4}, 0.5);
-  return {make("reduce_axes: sum",
-               [](D&, Vars v) {
-                 return sum(v[0], {0, 2});
-               },
-               {x}),
-          make("reduce_axes: sum, mul by what it came from",
-               [](D&, Vars v) { return mul(v[0], sum(v[0], {1}, KeepAxes::yes)); }, {x}),
-          make("reduce_axes: mean", [](D&, Vars v) { return mean(v[0], {1}); }, {x}),
-          make("reduce_axes: variance",
-               [](D&, Vars v) {
-                 return variance(v[0], {0, -1});
-               },
-               {x}),
-          make("reduce_axes: max",
-               [](D&, Vars v) {
-                 return max(v[0], {0, 1}, KeepAxes::yes);
-               },
-               {apart({2, 3, 4})}),
-          make("reduce_axes: logsumexp", [](D&, Vars v) { return logsumexp(v[0], {1}); }, {x}),
-          make("reduce_axes: softmax", [](D&, Vars v) { return softmax(v[0], 1); }, {x}),
-          make("layout: reshape",
-               [](D&, Vars v) {
-                 return reshape(v[0], {4, 6});
-               },
-               {x}),
-          make("layout: permute",
-               [](D&, Vars v) {
-                 return permute(v[0], {2, 0, 1});
-               },
-               {x}),
-          make("layout: transpose", [](D&, Vars v) { return transpose(v[0]); }, {x}),
-          make("layout: broadcast_to",
-               [](D&, Vars v) {
-                 return broadcast_to(v[0], {2, 3, 4});
-               },
-               {off_zero({3, 1})}),
-          make("layout: pad", [](D&, Vars v) { return pad(v[0], 1, 2, 1, 0.5); }, {x}),
-          make("layout: cumsum", [](D&, Vars v) { return cumsum(v[0], 1); }, {x}),
-          make("slice: slice of an inner axis", [](D&, Vars v) { return slice(v[0], 1, 1, 2); }, {x}),
-          make("slice: concatenate along an inner axis",
-               [](D&, Vars v) {
-                 return concatenate({v[0], v[1], v[0]}, 1);
-               },
-               {x, y}),
-          make("gather: gather", [](D&, Vars v) { return gather(v[0], 1, kPicks); }, {x}),
-          make("gather: scatter_add", [](D&, Vars v) { return scatter_add(v[0], 1, kPicks, 4); },
-               {off_zero({2, 5, 3})})};
+  return join({make("reduce_axes: sum",
+                    [](auto&, auto v) {
+                      return sum(v[0], {0, 2});
+                    },
+                    {x}),
+               make("reduce_axes: sum, mul by what it came from",
+                    [](auto&, auto v) { return mul(v[0], sum(v[0], {1}, KeepAxes::yes)); }, {x}),
+               make("reduce_axes: mean", [](auto&, auto v) { return mean(v[0], {1}); }, {x}),
+               make("reduce_axes: variance",
+                    [](auto&, auto v) {
+                      return variance(v[0], {0, -1});
+                    },
+                    {x}),
+               make("reduce_axes: max",
+                    [](auto&, auto v) {
+                      return max(v[0], {0, 1}, KeepAxes::yes);
+                    },
+                    {apart({2, 3, 4})}),
+               make("reduce_axes: logsumexp", [](auto&, auto v) { return logsumexp(v[0], {1}); }, {x}),
+               make("reduce_axes: softmax", [](auto&, auto v) { return softmax(v[0], 1); }, {x}),
+               make("layout: reshape",
+                    [](auto&, auto v) {
+                      return reshape(v[0], {4, 6});
+                    },
+                    {x}),
+               make("layout: permute",
+                    [](auto&, auto v) {
+                      return permute(v[0], {2, 0, 1});
+                    },
+                    {x}),
+               make("layout: transpose", [](auto&, auto v) { return transpose(v[0]); }, {x}),
+               make("layout: broadcast_to",
+                    [](auto&, auto v) {
+                      return broadcast_to(v[0], {2, 3, 4});
+                    },
+                    {off_zero({3, 1})}),
+               make("layout: pad", [](auto&, auto v) { return pad(v[0], 1, 2, 1, 0.5); }, {x}),
+               make("layout: cumsum", [](auto&, auto v) { return cumsum(v[0], 1); }, {x}),
+               make("slice: slice of an inner axis", [](auto&, auto v) { return slice(v[0], 1, 1, 2); }, {x}),
+               make("slice: concatenate along an inner axis",
+                    [](auto&, auto v) {
+                      return concatenate({v[0], v[1], v[0]}, 1);
+                    },
+                    {x, y}),
+               make("gather: gather", [](auto&, auto v) { return gather(v[0], 1, kPicks); }, {x}),
+               make("gather: scatter_add", [](auto&, auto v) { return scatter_add(v[0], 1, kPicks, 4); },
+                    {off_zero({2, 5, 3})})});
 }
 
 Cases matrix_cases() {
   const auto a = regular(2, 3), b = mixed({2, 3, 2}, 2);
-  return {
-      make("batched_matmul: a, b", [](D&, Vars v) { return batched_matmul(v[0], v[1]); }, {a, b}),
-      make("batched_matmul: one b for all", [](D&, Vars v) { return batched_matmul(v[0], v[1]); },
-           {a, mixed({3, 4}, 3)}),
-      make("batched_matmul: one a for all", [](D&, Vars v) { return batched_matmul(v[0], v[1]); },
-           {mixed({4, 3}, 3), b}),
-      make("layer_norm: x, gamma, beta", [](D&, Vars v) { return layer_norm(v[0], v[1], v[2]); },
-           {off_zero({2, 3, 4}), off_zero({4}, 1), off_zero({4}, 2)}),
-      make("linear_solve: triangular_solve", [](D&, Vars v) { return triangular_solve(v[0], v[1]); }, {a, b}),
-      make("linear_solve: triangular_solve, upper, transposed",
-           [](D&, Vars v) { return triangular_solve(v[0], v[1], {.upper = true, .transposed = true}); },
-           {a, b}),
-      make("linear_solve: solve", [](D&, Vars v) { return solve(v[0], v[1]); }, {a, b}),
-      make("linear_solve: inverse", [](D&, Vars v) { return inverse(v[0]); }, {a}),
-      make("determinant: determinant", [](D&, Vars v) { return determinant(v[0]); }, {a}),
-      make("determinant: log_determinant", [](D&, Vars v) { return log_determinant(v[0]); }, {a}),
-      make("cholesky: of symmetric parts", [](D&, Vars v) { return cholesky(v[0]); }, {a}),
-      make("eigenvalues: symmetric_eigenvalues", [](D&, Vars v) { return symmetric_eigenvalues(v[0]); },
-           {a})};
+  return join(
+      {make("batched_matmul: a, b", [](auto&, auto v) { return batched_matmul(v[0], v[1]); }, {a, b}),
+       make("batched_matmul: one b for all", [](auto&, auto v) { return batched_matmul(v[0], v[1]); },
+            {a, mixed({3, 4}, 3)}),
+       make("batched_matmul: one a for all", [](auto&, auto v) { return batched_matmul(v[0], v[1]); },
+            {mixed({4, 3}, 3), b}),
+       make("layer_norm: x, gamma, beta", [](auto&, auto v) { return layer_norm(v[0], v[1], v[2]); },
+            {off_zero({2, 3, 4}), off_zero({4}, 1), off_zero({4}, 2)}),
+       make("linear_solve: triangular_solve", [](auto&, auto v) { return triangular_solve(v[0], v[1]); },
+            {a, b}),
+       make("linear_solve: triangular_solve, upper, transposed",
+            [](auto&, auto v) { return triangular_solve(v[0], v[1], {.upper = true, .transposed = true}); },
+            {a, b}),
+       make("linear_solve: solve", [](auto&, auto v) { return solve(v[0], v[1]); }, {a, b}),
+       make("linear_solve: inverse", [](auto&, auto v) { return inverse(v[0]); }, {a}),
+       make("determinant: determinant", [](auto&, auto v) { return determinant(v[0]); }, {a}),
+       make("determinant: log_determinant", [](auto&, auto v) { return log_determinant(v[0]); }, {a}),
+       make("cholesky: of symmetric parts", [](auto&, auto v) { return cholesky(v[0]); }, {a}),
+       make("eigenvalues: symmetric_eigenvalues", [](D&, Vars v) { return symmetric_eigenvalues(v[0]); },
+            {a})});
 }
 
 }  // namespace
 
 std::vector<GradcheckCase> tensor_gradcheck_cases() {
-  Cases all = broadcast_cases();
-  for (const auto& part : {function_cases(), axis_cases(), matrix_cases()})
-    all.insert(all.end(), part.begin(), part.end());
-  return all;
+  return join({broadcast_cases(), function_cases(), axis_cases(), matrix_cases()});
 }
 
 }  // namespace fieldmark

@@ -1,6 +1,7 @@
 #include <fieldmark/engine/ops/relu_family.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "kernels/gelu.h"
 #include "ops/elementwise.h"
@@ -40,6 +41,17 @@ T logistic(T x) {
   return (x < 0 ? e : T(1)) / (1 + e);
 }
 
+// (1 + erf(x / sqrt 2)) / 2; by erfc, which does not cancel far below 0.
+template <class T>
+T cdf(T x) {
+  return std::erfc(-x / std::numbers::sqrt2_v<T>) / 2;
+}
+
+template <class T>
+T cdf_slope(T x) {
+  return std::numbers::inv_sqrtpi_v<T> / std::numbers::sqrt2_v<T> * std::exp(-x * x / 2);
+}
+
 // y = f(x), dx = dy slope(x), functions of one element.
 template <class T, class F, class D>
 Var<T> each(Var<T> x, F f, D slope, std::source_location from = std::source_location::current()) {
@@ -76,6 +88,12 @@ Var<T> gelu(Var<T> x) {
   return kernels::gelu(x);
 }
 
+template <class T>
+Var<T> normal_cdf(Var<T> x) {
+  return each(
+      x, [](T v) { return cdf(v); }, [](T v) { return cdf_slope(v); });
+}
+
 template Var<float> leaky_relu(Var<float>, double);
 template Var<double> leaky_relu(Var<double>, double);
 template Var<float> elu(Var<float>, double);
@@ -84,5 +102,7 @@ template Var<float> silu(Var<float>);
 template Var<double> silu(Var<double>);
 template Var<float> gelu(Var<float>);
 template Var<double> gelu(Var<double>);
+template Var<float> normal_cdf(Var<float>);
+template Var<double> normal_cdf(Var<double>);
 
 }  // namespace fieldmark

@@ -27,4 +27,9 @@ Var<T> silu(Var<T> x);
 template <class T>
 Var<T> gelu(Var<T> x);
 
+/// Distribution function P of the standard normal: y = (1 + erf(x / sqrt 2)) / 2, without cancellation far
+/// below 0.      Differentiable in: x; dy/dx = exp(-x^2 / 2) / sqrt(2 pi).
+template <class T>
+Var<T> normal_cdf(Var<T> x);
+
 }  // namespace fieldmark

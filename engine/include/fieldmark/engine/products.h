@@ -1,0 +1,84 @@
+#pragma once
+#include <fieldmark/engine/dual.h>
+#include <fieldmark/engine/tensor.h>
+
+#include <functional>
+#include <initializer_list>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+namespace fieldmark {
+
+// Products with the Jacobian J = df/dx and the Hessian H of a function f, without the matrices. f takes a
+// tape and its inputs, as for gradcheck(). A generic lambda serves all:
+//   const auto f = [&](auto& tape, auto x) { return sum(tanh(matmul(x[0], tape.constant(w)))); };
+// For jvp() and hvp() include the ops of Duals that f needs, from engine/dual/. An input that f does not use
+// gives zeros.
+
+/// f of Vars.
+template <class T>
+using VarFunction = std::function<Var<T>(Tape<T>&, std::span<const Var<T>>)>;
+/// f of Duals.
+template <class T>
+using DualFunction = std::function<Dual<T>(Tape<T>&, std::span<const Dual<T>>)>;
+
+/// Result of jvp().
+template <class T>
+struct Jvp {
+  Tensor<T> value;    ///< f(x)
+  Tensor<T> product;  ///< J v, of its shape
+};
+/// Result of vjp() and hvp().
+template <class T>
+struct InputProducts {
+  Tensor<T> value;                  ///< f(x)
+  std::vector<Tensor<T>> products;  ///< one for each input, of its shape
+};
+
+/// @{
+/// Jacobian-vector product, in forward mode: J v = d/ds f(x + s v) at s = 0, for some three times the work of
+/// f.
+/// @param tangents  v, one for each input, of its shape
+/// @throws ShapeError if a shape differs   @throws ValueError if the numbers of inputs and tangents do
+template <class T>
+Jvp<T> jvp(const std::type_identity_t<DualFunction<T>>& f, std::span<const Tensor<T>> inputs,
+           std::span<const Tensor<T>> tangents);
+template <class T>
+Jvp<T> jvp(const std::type_identity_t<DualFunction<T>>& f, std::initializer_list<Tensor<T>> inputs,
+           std::initializer_list<Tensor<T>> tangents) {
+  return jvp<T>(f, std::span(inputs.begin(), inputs.size()), std::span(tangents.begin(), tangents.size()));
+}
+/// @}
+
+/// @{
+/// Vector-Jacobian products, in reverse mode: J^T u for each input.
+/// @param cotangent  u, of the shape of f(x)   @throws ShapeError if it has another
+template <class T>
+InputProducts<T> vjp(const std::type_identity_t<VarFunction<T>>& f, std::span<const Tensor<T>> inputs,
+                     const Tensor<T>& cotangent);
+template <class T>
+InputProducts<T> vjp(const std::type_identity_t<VarFunction<T>>& f, std::initializer_list<Tensor<T>> inputs,
+                     const Tensor<T>& cotangent) {
+  return vjp<T>(f, std::span(inputs.begin(), inputs.size()), cotangent);
+}
+/// @}
+
+/// @{
+/// Hessian-vector products of an f with one element, by a backward from its tangent:
+///   (H v)_i = sum_j d^2 f / dx_i dx_j v_j
+/// @param directions  v, one for each input, of its shape
+/// @throws ShapeError if a shape differs or f(x) has more than one element
+/// @throws ValueError if the numbers of inputs and directions differ
+template <class T>
+InputProducts<T> hvp(const std::type_identity_t<DualFunction<T>>& f, std::span<const Tensor<T>> inputs,
+                     std::span<const Tensor<T>> directions);
+template <class T>
+InputProducts<T> hvp(const std::type_identity_t<DualFunction<T>>& f, std::initializer_list<Tensor<T>> inputs,
+                     std::initializer_list<Tensor<T>> directions) {
+  return hvp<T>(f, std::span(inputs.begin(), inputs.size()),
+                std::span(directions.begin(), directions.size()));
+}
+/// @}
+
+}  // namespace fieldmark
