@@ -159,26 +159,20 @@ void bind_layout(py::module_& module) {
       "xs"_a, "axis"_a = -1);
 }
 
-// The indices outlive the pass: gather's backward reads them.
-template <class T>
-std::span<const std::int32_t> kept_indices(const char* where, const Value<T>& x, const py::object& given) {
-  const py::array array = borrowed<std::int32_t>(where, given);
-  x.tape->inputs.push_back(array);
-  return elements<std::int32_t>(array);
-}
-
 template <class T>
 void bind_indexing(py::module_& module) {
   module.def(
       "gather",
       [](const Value<T>& x, int axis, const py::object& index) {
-        return x.with(gather(x.get(), axis, kept_indices("gather: index", x, index)));
+        const py::array array = borrowed<std::int32_t>("gather: index", index);
+        return x.with(gather(x.get(), axis, elements<std::int32_t>(array)));
       },
       "x"_a, "axis"_a, "index"_a);
   module.def(
       "scatter_add",
       [](const Value<T>& x, int axis, const py::object& index, Index extent) {
-        return x.with(scatter_add(x.get(), axis, kept_indices("scatter_add: index", x, index), extent));
+        const py::array array = borrowed<std::int32_t>("scatter_add: index", index);
+        return x.with(scatter_add(x.get(), axis, elements<std::int32_t>(array), extent));
       },
       "x"_a, "axis"_a, "index"_a, "extent"_a);
   module.def(
@@ -234,8 +228,8 @@ void bind_layers(py::module_& module) {
   module.def(
       "softmax_cross_entropy",
       [](V logits, const py::object& labels) {
-        return logits.with(softmax_cross_entropy(
-            logits.get(), kept_indices("softmax_cross_entropy: labels", logits, labels)));
+        const py::array array = borrowed<std::int32_t>("softmax_cross_entropy: labels", labels);
+        return logits.with(softmax_cross_entropy(logits.get(), elements<std::int32_t>(array)));
       },
       "logits"_a, "labels"_a);
 }

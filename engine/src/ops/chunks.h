@@ -10,6 +10,14 @@ constexpr Index kGrain = Index{1} << 15;
 // Rows of `width` elements in one chunk of a loop over rows.
 inline Index row_grain(Index width) { return std::max<Index>(1, kGrain / std::max<Index>(1, width)); }
 
+// A copy on the tape of what a backward will read: the caller's numbers may be gone by then.
+template <class T, class U>
+const U* kept(Tape<T>& tape, std::span<const U> from) {
+  U* to = tape.template scratch<U>(std::ssize(from));
+  std::copy(from.begin(), from.end(), to);
+  return to;
+}
+
 // Calls f(image, first, count) for chunks of `grain` of the pixels of every image.
 template <class F>
 void for_image_chunks(Index images, Index pixels, Index grain, F f) {

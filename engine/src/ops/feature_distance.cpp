@@ -22,7 +22,7 @@ Var<T> feature_distance(Var<T> a, Var<T> b, std::span<const T> weights) {
   const Var<T> out = tape.output({s[0]}, &y, {a, b});
   auto* sums = tape.template scratch<double>(s[0] * blocks);
   const auto forward = FIELDMARK_KERNEL(feature_distance<T>);
-  const T* w = weights.data();
+  const T* w = detail::kept(tape, weights);
   detail::for_image_chunks(s[0], pixels, block, [&](Index n, Index first, Index count) {
     const Index at = (n * pixels + first) * s[3];
     sums[n * blocks + first / block] = forward({a.value() + at, b.value() + at, w, count, s[3]});

@@ -27,11 +27,12 @@ Var<T> scatter_add(Var<T> x, int axis, std::span<const std::int32_t> index, Inde
   const detail::Split p = detail::split(shape, axis);
   T* y = nullptr;
   const Var<T> out = x.tape().output(shape, &y, {x});
+  const std::int32_t* i = detail::kept(x.tape(), index);
   std::fill_n(y, shape.size(), T(0));
-  detail::add_taken(x.tape(), x.value(), p, index.data(), n, y);
+  detail::add_taken(x.tape(), x.value(), p, i, n, y);
 
   // dx[o, i] = dy[o, index[i]]. A chunk owns its entries.
-  x.tape().on_backward(out, [x, p, n, i = index.data()](const T* dy) {
+  x.tape().on_backward(out, [x, p, n, i](const T* dy) {
     bool fresh = false;
     T* dx = x.grad_acc(&fresh);
     detail::take(dy, p, i, n, dx, fresh);

@@ -59,11 +59,11 @@ Var<T> gather(const char* op, Var<T> x, int axis, std::span<const std::int32_t> 
   const auto n = static_cast<Index>(index.size());
   T* y = nullptr;
   const Var<T> out = x.tape().output(with_extent(x.shape(), axis, n), &y, {x}, from);
-  take(x.value(), p, index.data(), n, y, true);
+  const std::int32_t* i = kept(x.tape(), index);
+  take(x.value(), p, i, n, y, true);
 
   // dx[o, r] = the sum of dy[o, i] over the i with index[i] = r.
-  x.tape().on_backward(
-      out, [x, p, n, i = index.data()](const T* dy) { add_taken(x.tape(), dy, p, i, n, x.grad_acc()); });
+  x.tape().on_backward(out, [x, p, n, i](const T* dy) { add_taken(x.tape(), dy, p, i, n, x.grad_acc()); });
   return out;
 }
 

@@ -55,7 +55,7 @@ Var<T> bce_with_logits(Var<T> logits, std::span<const T> targets, std::span<cons
     if (!(targets[i] >= 0 && targets[i] <= 1))
       throw ValueError("[bce_with_logits] targets: entry " + std::to_string(i) + " must be in [0, 1], got " +
                        std::to_string(targets[i]));
-  const T *x = logits.value(), *t = targets.data();
+  const T *x = logits.value(), *t = detail::kept(logits.tape(), targets);
   const auto value = [=](Index i) {
     return std::max(x[i], T(0)) - x[i] * t[i] + std::log1p(std::exp(-std::abs(x[i])));
   };

@@ -100,18 +100,24 @@ Var<T> softmax_cross_entropy(Var<T> logits, std::span<const std::int32_t> labels
                              std::span<const T> weights) {
   const Index rows = check_columns("softmax_cross_entropy", "logits", logits.shape()),
               cols = logits.shape()[-1];
+  if (rows == 0)
+    throw ShapeError("[softmax_cross_entropy] logits must have at least one row [.., C], got shape " +
+                     logits.shape().str());
   check_labels(rows, cols, labels);
+  detail::check_weights("softmax_cross_entropy", rows, weights);
   Tape<T>& tape = logits.tape();
-  detail::inverse_total(tape, "softmax_cross_entropy", rows, weights);  // checks them
-  T* w = tape.scratch(rows);                                            // 0 where a row is ignored
+  T* w = tape.scratch(rows);  // 0 where a row is ignored
   for (std::size_t r = 0; r < labels.size(); ++r)
     w[r] = labels[r] < 0 ? T(0) : weights.empty() ? T(1) : weights[r];
-  const double inverse = detail::inverse_total(tape, "softmax_cross_entropy", rows,
-                                               std::span<const T>(w, static_cast<std::size_t>(rows)));
+  const double total = detail::chunked_sum(tape, rows, [w](Index r) { return w[r]; });
+  if (total == 0)
+    throw ValueError("[softmax_cross_entropy] labels: at least one row must count, got " +
+                     std::to_string(rows) + " rows whose label is -1 or whose weight is 0");
+  const double inverse = 1 / total;
 
   T *y = nullptr, *p = tape.scratch(rows * cols), *row_loss = tape.scratch(rows);
   const Var<T> out = tape.output({1}, &y, {logits});
-  const std::int32_t* label = labels.data();
+  const std::int32_t* label = detail::kept(tape, labels);
   kernels::softmax_rows(logits.value(), p, rows, cols, [&](Index r, T m, T z) {
     const Index c = label[r];
     const T* row = logits.value() + r * cols;

@@ -6,11 +6,10 @@
 
 namespace fieldmark::detail {
 
-// Checks a mean's optional weights (empty: all 1) and returns the reciprocal of their sum, 0 where there is
-// nothing to average.
+// Checks a mean's optional weights (empty: all 1), one for each of n elements.
 template <class T>
-double inverse_total(Tape<T>& tape, const char* op, Index n, std::span<const T> weights) {
-  if (weights.empty()) return n > 0 ? 1.0 / static_cast<double>(n) : 0.0;
+void check_weights(const char* op, Index n, std::span<const T> weights) {
+  if (weights.empty()) return;
   if (static_cast<Index>(weights.size()) != n)
     throw ShapeError(std::string("[") + op + "] weights must have one element for each of the " +
                      std::to_string(n) + " averaged, got " + std::to_string(weights.size()));
@@ -18,8 +17,21 @@ double inverse_total(Tape<T>& tape, const char* op, Index n, std::span<const T> 
     if (!(weights[i] >= 0))
       throw ValueError(std::string("[") + op + "] weights: entry " + std::to_string(i) +
                        " must be 0 or more, got " + std::to_string(weights[i]));
+}
+
+// Checks what a mean is over and returns the reciprocal of the sum of its weights.
+template <class T>
+double inverse_total(Tape<T>& tape, const char* op, const Shape& s, std::span<const T> weights) {
+  const Index n = s.size();
+  if (n == 0)
+    throw ShapeError(std::string("[") + op + "] there must be at least one element to average, got shape " +
+                     s.str());
+  check_weights(op, n, weights);
+  if (weights.empty()) return 1 / static_cast<double>(n);
   const double total = chunked_sum(tape, n, [w = weights.data()](Index i) { return w[i]; });
-  return total > 0 ? 1 / total : 0.0;
+  if (total == 0)
+    throw ValueError(std::string("[") + op + "] weights: at least one must be above 0, got only zeros");
+  return 1 / total;
 }
 
 // y = sum_i w_i f(i) / sum w, [1], and its backward dx_i = dy w_i slope(i) / sum w for x, and minus
@@ -29,8 +41,8 @@ Var<T> mean_of(const char* op, Var<T> x, const Var<T>* other, std::span<const T>
                std::source_location from = std::source_location::current()) {
   Tape<T>& tape = x.tape();
   const Index n = x.shape().size();
-  const double inverse = inverse_total(tape, op, n, weights);
-  const T* w = weights.empty() ? nullptr : weights.data();
+  const double inverse = inverse_total(tape, op, x.shape(), weights);
+  const T* w = weights.empty() ? nullptr : kept(tape, weights);
   T* y = nullptr;
   const Var<T> second = other ? *other : x;
   const Var<T> out = tape.output({1}, &y, {x, second}, from);

@@ -110,3 +110,15 @@ TEST_CASE("feature_distance: float against double, and the same bits for any thr
   }
   CHECK(worst < 2e-6);
 }
+
+TEST_CASE("feature_distance: weights may change or be gone when the backward runs") {
+  const std::vector<Tensor<double>> in{uniform({1, 2, 2, 3}, 0.1, 1, 1), uniform({1, 2, 2, 3}, 0.1, 1, 2)};
+  const auto w = uniform({3}, 0, 1, 3).data;
+  const auto gone = [&](auto&, auto v) {
+    std::vector<double> weights = w;
+    const auto y = feature_distance<double>(v[0], v[1], weights);
+    std::ranges::fill(weights, NAN);
+    return y;
+  };
+  CHECK(run_op(gone, in) == run_op(with(w), in));
+}

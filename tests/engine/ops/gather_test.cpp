@@ -52,3 +52,18 @@ TEST_CASE("gather: same bits for any thread count") {
   expect_same_bits([&](auto&, auto v) { return gather(v[0], 1, index); }, {x});
   expect_same_bits([&](auto&, auto v) { return scatter_add(v[0], 0, index, 37); }, {y});
 }
+
+TEST_CASE("gather: an index may change or be gone when the backward runs") {
+  const auto gone = [](auto op) {
+    return [=](auto&, auto v) {
+      std::vector<std::int32_t> index = kPicked;
+      const auto y = op(v[0], index);
+      std::ranges::fill(index, 1 << 30);
+      return y;
+    };
+  };
+  const std::vector<Tensor<double>> in{uniform({2, 3}, -1, 1, 1)};
+  CHECK(run_op(gone([](auto x, const auto& i) { return gather(x, 1, i); }), in) == run_op(f_gather_axis, in));
+  CHECK(run_op(gone([](auto x, const auto& i) { return scatter_add(x, -1, i, 4); }), in) ==
+        run_op(f_scatter, in));
+}

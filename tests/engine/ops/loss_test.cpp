@@ -45,19 +45,25 @@ TEST_CASE("loss: values") {
   CHECK(std::abs(op_values(bce(t), x)[0] - want / 4) < 1e-15);
 }
 
-TEST_CASE("loss: nothing to average is 0") {
-  const std::vector<Tensor<double>> none{Tensor<double>({0, 3}), Tensor<double>({0, 3})};
-  CHECK(op_values(f_mse, none)[0] == 0);
-  CHECK(op_values(bce(std::vector<double>{}), none)[0] == 0);
+TEST_CASE("loss: nothing to average is an error") {
+  Tape<double> tape;
+  const Tensor<double> empty({0, 3}), some({4}, 0.5);
+  const auto none = tape.constant(empty), x = tape.constant(some);
+  CHECK_THROWS_WITH(mse_loss(none, none),
+                    "[mse_loss] there must be at least one element to average, got shape [0, 3]");
+  CHECK_THROWS_AS(l1_loss(none, none), ShapeError);
+  CHECK_THROWS_AS(huber_loss(none, none, 1), ShapeError);
+  CHECK_THROWS_AS(bce_with_logits<double>(none, {}), ShapeError);
   const std::vector<double> zeros(4);
-  const auto unweighted = [&](auto&, auto v) { return huber_loss<double>(v[0], v[1], 1, zeros); };
-  const auto r = run_op(unweighted, std::vector{uniform({4}, -1, 1, 1), uniform({4}, -1, 1, 2)});
-  CHECK(r[0][0] == 0);
-  CHECK(r[1] == zeros);
+  CHECK_THROWS_WITH(huber_loss<double>(x, x, 1, zeros),
+                    "[huber_loss] weights: at least one must be above 0, got only zeros");
+  CHECK_THROWS_AS(mse_loss<double>(x, x, zeros), ValueError);
+  CHECK_THROWS_AS(l1_loss<double>(x, x, zeros), ValueError);
+  CHECK_THROWS_AS(bce_with_logits<double>(x, zeros, zeros), ValueError);
 }
 
 TEST_CASE("loss: gradient") {
-  for (Shape s : {Shape{0, 3}, Shape{1}, Shape{3, 5}}) {
+  for (Shape s : {Shape{1}, Shape{3, 5}}) {
     CAPTURE(s.str());
     expect_grad(f_mse, {uniform(s, -1, 1, 1), uniform(s, -1, 1, 2)});
     expect_grad(f_l1, {uniform(s, -1, 1, 1), uniform(s, 1.1, 2, 2)});
@@ -128,4 +134,24 @@ TEST_CASE("loss: float against double, and the same bits for any thread count") 
   CHECK(float_error(f_mse, {a, b}) < 2e-7);  // measured 8.5e-8
   CHECK(float_error(f_huber, {a, b}) < 2e-7);
   CHECK(float_error(f, {a}) < 3e-7);  // measured 1.6e-7
+}
+
+TEST_CASE("loss: weights and targets may change or be gone when the backward runs") {
+  const auto a = uniform({4}, -1, 1, 1), b = uniform({4}, -1, 1, 2), t = uniform({4}, 0, 1, 3);
+  const auto gone = [&](auto op) {
+    return [=](auto&, auto v) {
+      std::vector<double> targets = t.data, weights = kLossWeights;
+      const auto y = op(v, targets, weights);
+      std::ranges::fill(targets, NAN);
+      std::ranges::fill(weights, NAN);
+      return y;
+    };
+  };
+  using Vars = std::span<const Var<double>>;
+  CHECK(run_op(gone([](Vars v, const auto&, const auto& w) { return mse_loss<double>(v[0], v[1], w); }),
+               std::vector{a, b}) ==
+        run_op([](auto&, Vars v) { return mse_loss<double>(v[0], v[1], kLossWeights); }, std::vector{a, b}));
+  CHECK(
+      run_op(gone([](Vars v, const auto& to, const auto& w) { return bce_with_logits<double>(v[0], to, w); }),
+             std::vector{a}) == run_op(bce(t.data, kLossWeights), std::vector{a}));
 }

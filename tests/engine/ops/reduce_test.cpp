@@ -14,18 +14,15 @@ static const auto f_weighted = [](Tape<double>&, std::span<const Var<double>> v)
 
 TEST_CASE("reduce: values") {
   const std::vector<Tensor<double>> in{{{2, 3}, {1, 2, 4, 8, 16, 32}}}, none{Tensor<double>({0, 3})};
+  CHECK(op_values(f_sum, none) == std::vector<double>{0});
   CHECK(op_values(f_sum, in) == std::vector<double>{63});
   CHECK(op_values(f_mean, in) == std::vector<double>{10.5});
   CHECK(op_values(f_weighted, in) == std::vector<double>{(2 + 2 + 20 + 128) / 8.0});
-  CHECK(op_values(f_sum, none) == std::vector<double>{0});
-  CHECK(op_values(f_mean, none) == std::vector<double>{0});
-  const std::vector<double> zeros(6);
-  CHECK(op_values([&](auto&, auto v) { return weighted_mean<double>(v[0], zeros); }, in) ==
-        std::vector<double>{0});
 }
 
 TEST_CASE("reduce: gradient") {
-  for (Shape s : {Shape{0}, Shape{1}, Shape{3, 5}}) {
+  expect_grad(f_sum, {Tensor<double>({0})});
+  for (Shape s : {Shape{1}, Shape{3, 5}}) {
     CAPTURE(s.str());
     expect_grad(f_sum, {uniform(s, -1, 1, 1)});
     expect_grad(f_mean, {uniform(s, -1, 1, 1)});
@@ -60,13 +57,19 @@ TEST_CASE("reduce: float against double for extents of 1 to 130") {
 TEST_CASE("reduce: errors") {
   Tape<double> tape;
   const Tensor<double> x({2, 3});
-  const std::vector<double> few(5, 1.0), negative{1, 1, -2, 1, 1, 1}, nan(6, std::nan(""));
+  const std::vector<double> few(5, 1.0), negative{1, 1, -2, 1, 1, 1}, nan(6, std::nan("")), zeros(6);
   CHECK_THROWS_WITH(weighted_mean<double>(tape.constant(x), few),
                     "[weighted_mean] weights must have one element for each of the 6 averaged, got 5");
   CHECK_THROWS_WITH(weighted_mean<double>(tape.constant(x), {}), Contains("6 averaged, got 0"));
   CHECK_THROWS_WITH(weighted_mean<double>(tape.constant(x), negative),
                     Contains("[weighted_mean] weights: entry 2 must be 0 or more, got -2"));
   CHECK_THROWS_AS(weighted_mean<double>(tape.constant(x), nan), ValueError);
+  CHECK_THROWS_WITH(weighted_mean<double>(tape.constant(x), zeros),
+                    "[weighted_mean] weights: at least one must be above 0, got only zeros");
+  const Tensor<double> none({0, 3});
+  CHECK_THROWS_WITH(mean(tape.constant(none)),
+                    "[mean] there must be at least one element to average, got shape [0, 3]");
+  CHECK_THROWS_AS(weighted_mean<double>(tape.constant(none), {}), ShapeError);
 }
 
 TEST_CASE("reduce: same bits for any thread count") {
@@ -74,4 +77,15 @@ TEST_CASE("reduce: same bits for any thread count") {
   expect_same_bits(f_sum, {x});
   expect_same_bits(f_mean, {x});
   expect_same_bits([&](auto&, auto v) { return weighted_mean<float>(v[0], w.data); }, {x});
+}
+
+TEST_CASE("reduce: weights may change or be gone when the backward runs") {
+  const std::vector<Tensor<double>> in{uniform({6}, -1, 1, 1)};
+  const auto gone = [](auto&, auto v) {
+    std::vector<double> weights = kWeights;
+    const auto y = weighted_mean<double>(v[0], weights);
+    std::ranges::fill(weights, NAN);
+    return y;
+  };
+  CHECK(run_op(gone, in) == run_op(f_weighted, in));
 }

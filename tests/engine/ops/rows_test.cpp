@@ -59,3 +59,14 @@ TEST_CASE("rows: same bits for any thread count") {
   expect_same_bits([](auto&, auto v) { return broadcast_rows(v[0], 50000); },
                    {uniform<float>({1, 5}, -1, 1, 1)});
 }
+
+TEST_CASE("rows: an index may change or be gone when the backward runs") {
+  const std::vector<Tensor<double>> in{uniform({4, 2}, -1, 1, 1)};
+  const auto gone = [](auto&, auto v) {
+    std::vector<std::int32_t> index = kIndex;
+    const auto y = gather_rows(v[0], index);
+    std::ranges::fill(index, 1 << 30);
+    return y;
+  };
+  CHECK(run_op(gone, in) == run_op(f_gather, in));
+}

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "in_blocks.h"
+#include "optional_term.h"
 
 namespace fieldmark::watermark {
 namespace {
@@ -128,8 +129,10 @@ std::function<Var<float>(Var<float>)> CellMark::confirmation(const Owner& owner,
   return [this, params, shape, positive = std::move(positive), foreground = std::move(foreground),
           cell = std::move(cell)](Var<float> other) {
     const auto seen = reader_(params, other.tape().reshape(other, shape));
-    return add(bce_with_logits<float>(seen.sign, positive, foreground),
-               softmax_cross_entropy<float>(seen.index, cell, foreground));
+    return term_or_zero(other, foreground, [&] {
+      return add(bce_with_logits<float>(seen.sign, positive, foreground),
+                 softmax_cross_entropy<float>(seen.index, cell, foreground));
+    });
   };
 }
 

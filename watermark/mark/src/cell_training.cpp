@@ -14,6 +14,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "optional_term.h"
+
 // Training of a CellMark: local messages under dense supervision.
 namespace fieldmark::watermark {
 namespace {
@@ -121,7 +123,9 @@ Var<float> CellTraining::visibility(Var<float> residual, const TrainingImage& im
   const auto power = [&](Var<float> x, std::span<const float> weights) {
     float* zeros = tape.scratch(x.shape().size());
     std::fill_n(zeros, x.shape().size(), 0.f);
-    return scale(mse_loss<float>(x, tape.constant(zeros, x.shape()), weights), 1 / (rms * rms));
+    return term_or_zero(x, weights, [&] {
+      return scale(mse_loss<float>(x, tape.constant(zeros, x.shape()), weights), 1 / (rms * rms));
+    });
   };
   const Var<float> coarse = avg_pool(tape.reshape(residual, {1, v.height, v.width, 3}), kCoarse);
   const Index places = coarse.shape().size() / 3, columns = coarse.shape()[2];
@@ -174,8 +178,9 @@ Var<float> CellTraining::loss(Tape<float>& tape, const Params<float>& params,
       scale(extractor::pooled_bits<float>(out.sign, out.index, code_matrix(tape, image.code, bits), bits),
             kBitScale);
   const auto all = [](const auto* from, Index n) { return std::span(from, at(n)); };
-  const Var<float> sign_loss =
-      bce_with_logits<float>(out.sign, all(positive, places), all(foreground, places));
+  const Var<float> sign_loss = term_or_zero(out.sign, all(foreground, places), [&] {
+    return bce_with_logits<float>(out.sign, all(positive, places), all(foreground, places));
+  });
   const Var<float> index_loss = softmax_cross_entropy<float>(out.index, all(label, places));
   const Var<float> bits_loss = bce_with_logits<float>(pooled, all(sent, bits));
 

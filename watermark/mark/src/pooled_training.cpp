@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "optional_term.h"
+
 namespace fieldmark::watermark {
 namespace {
 
@@ -159,8 +161,11 @@ Var<float> PooledTraining::reading_lesson(Tape<float>& tape, const Params<float>
   }
   const auto all = [n](const float* from) { return std::span(from, at(n)); };
   const Var<float> pixels = scale(logits.pixels, 1 / (kPixelsABit * static_cast<double>(bits)));
-  const Var<float> shown = bce_with_logits<float>(pixels, all(target), all(own));
-  const Var<float> silent = mse_loss<float>(pixels, tape.constant(zeros, pixels.shape()), all(other));
+  const Var<float> shown =
+      term_or_zero(pixels, all(own), [&] { return bce_with_logits<float>(pixels, all(target), all(own)); });
+  const Var<float> silent = term_or_zero(pixels, all(other), [&] {
+    return mse_loss<float>(pixels, tape.constant(zeros, pixels.shape()), all(other));
+  });
   const double ramp = std::clamp((static_cast<double>(images.front().step) - kValues) / kRise, 0.0, 1.0);
   const Var<float> index =
       softmax_cross_entropy<float>(recognise_[0](Params<float>(helpers_), logits.features),

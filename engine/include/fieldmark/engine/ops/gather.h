@@ -8,7 +8,7 @@ namespace fieldmark {
 
 /// Entries of an axis by index: y[.., i, ..] = x[.., index[i], ..].
 /// @param x  axis `axis` of extent R; a negative axis counts from the last
-/// @param index  [N] in [0, R), in any order, repeats allowed; must outlive the pass
+/// @param index  [N] in [0, R), in any order, repeats allowed
 /// @return the shape of x with N in place of R
 /// @throws ShapeError if the axis is out of range   @throws ValueError if an index is
 /// Differentiable in: x. An entry's gradient sums in the order of index, for any thread count.
@@ -17,7 +17,7 @@ Var<T> gather(Var<T> x, int axis, std::span<const std::int32_t> index);
 
 /// Adds the entries of an axis where an index says: y[.., r, ..] = sum of x[.., i, ..] over the i with
 /// index[i] = r, in their order; 0 where there are none. The transpose of gather().
-/// @param index  [N] in [0, extent), one for each of the N entries of x on the axis; must outlive the pass
+/// @param index  [N] in [0, extent), one for each of the N entries of x on the axis
 /// @return the shape of x with `extent` in place of N
 /// @throws ShapeError if the axis is out of range or index has another length
 /// @throws ValueError if an index is out of range      Differentiable in: x.

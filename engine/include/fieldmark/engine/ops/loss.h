@@ -5,10 +5,10 @@
 
 namespace fieldmark {
 
-// Each loss is a mean over elements, sum_i w_i l_i / sum_i w_i, of shape [1]; 0 if all weights are 0.
-// `weights` is empty (all 1) or has one value >= 0 for each element, and must outlive the pass. Sums run in
-// double.
-// @throws ShapeError if shapes or sizes differ   @throws ValueError if a weight is negative or NaN
+// Each loss is a mean over elements, sum_i w_i l_i / sum_i w_i, of shape [1].
+// `weights` is empty (all 1) or has one value >= 0 for each element. Sums run in double.
+// @throws ShapeError if shapes or sizes differ, or there is no element
+// @throws ValueError if a weight is negative or NaN, or all are 0
 
 /// Mean squared error, l_i = (a_i - b_i)^2.
 /// Differentiable in: a, b.
@@ -30,7 +30,7 @@ Var<T> huber_loss(Var<T> a, Var<T> b, double delta, std::span<const T> weights =
 /// Binary cross-entropy of logits x against targets t,
 ///   l = -t log s(x) - (1 - t) log(1 - s(x)) = max(x, 0) - x t + log(1 + exp(-|x|)),   s the sigmoid.
 /// The second form neither overflows nor cancels: at x = +-100 it is exact to rounding.
-/// @param targets  one in [0, 1] for each logit; must outlive the pass   @throws ValueError if one is outside
+/// @param targets  one in [0, 1] for each logit   @throws ValueError if one is outside
 /// Differentiable in: logits.
 template <class T>
 Var<T> bce_with_logits(Var<T> logits, std::span<const T> targets, std::span<const T> weights = {});

@@ -16,15 +16,16 @@ template <class T>
 Var<T> sum(Var<T> x);
 
 /// Mean of all elements.
-/// @param x  any shape   @return [1]; 0 if x is empty
+/// @param x  any shape   @return [1]   @throws ShapeError if x is empty
 /// Differentiable in: x.
 template <class T>
 Var<T> mean(Var<T> x);
 
 /// Weighted mean of all elements: sum_i w_i x_i / sum_i w_i.
-/// @param weights  one for each element of x, >= 0; must outlive the pass
-/// @return [1]; 0 if all weights are 0
-/// @throws ShapeError if the sizes differ   @throws ValueError if a weight is negative or NaN
+/// @param weights  one for each element of x, >= 0
+/// @return [1]
+/// @throws ShapeError if x is empty or the sizes differ   @throws ValueError if a weight is negative or NaN,
+/// or all are 0
 /// Differentiable in: x.
 template <class T>
 Var<T> weighted_mean(Var<T> x, std::span<const T> weights);

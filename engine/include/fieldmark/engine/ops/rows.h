@@ -14,7 +14,7 @@ template <class T>
 Var<T> broadcast_rows(Var<T> x, Index rows);
 
 /// Rows of x by index: y[i] = x[index[i]].
-/// @param x [R, C]   @param index  [N] in [0, R), in any order, repeats allowed; must outlive the pass
+/// @param x [R, C]   @param index  [N] in [0, R), in any order, repeats allowed
 /// @return [N, C]
 /// @throws ShapeError if x is not rank 2   @throws ValueError if an index is outside
 /// Differentiable in: x. A row's gradient sums in the order of index, for any thread count.
