@@ -37,6 +37,14 @@ ParamId ParamStore<T>::find(std::string_view name) const {
 }
 
 template <class T>
+auto ParamStore<T>::entry(ParamId id) const -> const Entry& {
+  if (id.index < 0 || static_cast<std::size_t>(id.index) >= entries_.size()) [[unlikely]]
+    throw ValueError("[params] an id must be below the " + std::to_string(entries_.size()) +
+                     " parameters of the store, got " + std::to_string(id.index));
+  return entries_[static_cast<std::size_t>(id.index)];
+}
+
+template <class T>
 std::span<T> ParamStore<T>::values(ParamId id) {
   return slice_of(values(), entry(id));
 }
@@ -73,6 +81,10 @@ Params<T>::Params(const ParamStore<T>& layout, Var<T> all) : Params(layout, null
 
 template <class T>
 Var<T> Params<T>::leaf(Tape<T>& tape, ParamId id) const {
+  if (layout_->entries().size() != entries_ || layout_->values().data() != values_) [[unlikely]]
+    throw ValueError(
+        "[params] the store has other buffers than when these Params were made: make them after the last "
+        "add()");
   const auto& e = layout_->entry(id);
   const bool trained = is_trained(e.role);
   if (all_ && trained) return tape.name(tape.part(*all_, e.offset, e.shape), e.name);

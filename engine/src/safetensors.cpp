@@ -107,17 +107,19 @@ struct Reader {
         fail(tensor, "shape: expected integers from 0 to 2^62, found " + found(value));
       dims.push_back(extent.get<Index>());
     }
-    return Shape(dims);
+    try {
+      return Shape(dims);
+    } catch (const ShapeError&) {  // a product that overflows
+      fail(tensor, "shape: expected at most 2^62 bytes, found " + found(value));
+    }
   }
 
-  /// Bytes of a tensor of this shape. Every partial product is checked, so that 2^40 x 2^40 x 0 fails too:
-  /// Shape::size() must never overflow.
+  /// Bytes of a tensor of this shape.
   std::uint64_t size_of(const std::string& tensor, const Shape& shape, std::uint64_t element) const {
-    std::uint64_t size = element;
-    for (int k = 0; k < shape.rank(); ++k)
-      if (__builtin_mul_overflow(size, static_cast<std::uint64_t>(shape[k]), &size) || size > std::uint64_t{1}
-                                                                                                  << 62)
-        fail(tensor, "shape: expected at most 2^62 bytes, found " + shape.str());
+    std::uint64_t size = 0;
+    if (__builtin_mul_overflow(static_cast<std::uint64_t>(shape.size()), element, &size) ||
+        size > std::uint64_t{1} << 62)
+      fail(tensor, "shape: expected at most 2^62 bytes, found " + shape.str());
     return size;
   }
 };

@@ -67,6 +67,35 @@ TEST_CASE("params: computed parameters pass gradients on, in each backward, runn
                     "[params] all must have the 4 elements of the store, got shape [1]");
 }
 
+TEST_CASE("params: a store that grew refuses Params of before, whose pointers dangle") {
+  ParamStore<float> store;
+  const auto a = store.add("a", {2});
+  Tape<float> tape;
+  const Params<float> params(store), inference(store, nullptr);
+  CHECK(params.leaf(tape, a).shape() == Shape{2});
+  const auto b = store.add("b", {0});
+  for (const Params<float>& p : {params, inference})
+    for (const ParamId id : {a, b})
+      CHECK_THROWS_WITH(
+          p.leaf(tape, id),
+          "[params] the store has other buffers than when these Params were made: make them after "
+          "the last add()");
+  CHECK(Params<float>(store).leaf(tape, b).shape() == Shape{0});
+  const Params<float> again(store);
+  store = ParamStore<float>(store);
+  CHECK_THROWS_AS(again.leaf(tape, a), ValueError);
+}
+
+TEST_CASE("params: ids that the store has not are errors") {
+  ParamStore<double> store;
+  store.add("a", {2});
+  CHECK_THROWS_WITH(store.entry({1}), "[params] an id must be below the 1 parameters of the store, got 1");
+  CHECK_THROWS_WITH(store.values({-1}), Contains("got -1"));
+  CHECK_THROWS_AS(store.grads({7}), ValueError);
+  Tape<double> tape;
+  CHECK_THROWS_AS(Params<double>(store).leaf(tape, ParamId{}), ValueError);
+}
+
 namespace {
 template <class T>
 void check_gap() {

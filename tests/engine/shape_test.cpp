@@ -32,6 +32,18 @@ TEST_CASE("shape: more axes than it holds are an error") {
   CHECK_THROWS_AS(Shape(std::span<const Index>(many)), ShapeError);
 }
 
+TEST_CASE("shape: negative extents and more elements than can be counted are errors") {
+  CHECK_THROWS_WITH((Shape{-2, -3}),
+                    "[shape] extents must be 0 or more, and their product below 2^63, got [-2, -3]");
+  CHECK_THROWS_AS((Shape{0, -1}), ShapeError);
+  const Index large = Index{1} << 32;
+  CHECK(Shape{large, large / 4}.size() == Index{1} << 62);
+  CHECK_THROWS_WITH((Shape{large, large / 2}), Contains("got [4294967296, 2147483648]"));
+  for (const Shape& s : {Shape{0, large}, Shape{large, 0}}) CHECK(s.size() == 0);
+  CHECK_THROWS_AS((Shape{0, large, large}), ShapeError);
+  CHECK_THROWS_AS((Shape{large, large, 0}), ShapeError);
+}
+
 TEST_CASE("shape: equal only in rank and every extent") {
   CHECK(Shape{2, 3} == Shape{2, 3});
   CHECK_FALSE(Shape{2, 3} == Shape{3, 2});

@@ -38,17 +38,18 @@ class ParamStore {
     Index offset;                         ///< of the first element in values()
     ParamRole role = ParamRole::trained;  ///< as declared to add()
   };
-  /// Appends a tensor of zeros. @throws ValueError if the name is taken
+  /// Appends a tensor of zeros. Values that Params::leaf() put on a tape before are no longer valid.
+  /// @throws ValueError if the name is taken
   /// @throws ShapeError if a matrix or a table has not two axes
   ParamId add(std::string_view name, Shape shape, ParamRole role = ParamRole::trained);
   /// @throws ValueError if there is no such name
   ParamId find(std::string_view name) const;
   /// @{
-  /// The elements of one tensor; valid until the next add().
+  /// The elements of one tensor; valid until the next add(). @throws ValueError if there is no such id
   std::span<T> values(ParamId id);
   std::span<const T> values(ParamId id) const;
   /// @}
-  /// The gradients of one tensor; valid until the next add().
+  /// The gradients of one tensor; valid until the next add(). @throws ValueError if there is no such id
   std::span<T> grads(ParamId id);
   /// @{
   /// The whole buffer of values [size()]; valid until the next add().
@@ -59,8 +60,8 @@ class ParamStore {
   std::span<T> grads() { return grads_; }
   /// All tensors in the order added.
   std::span<const Entry> entries() const { return entries_; }
-  /// The entry of an id of this store; other ids are not checked.
-  const Entry& entry(ParamId id) const { return entries_[static_cast<std::size_t>(id.index)]; }
+  /// The entry of an id of this store. @throws ValueError if it has no such id
+  const Entry& entry(ParamId id) const;
   /// Length of the buffers, with the gaps between tensors.
   Index size() const { return static_cast<Index>(values_.size()); }
   /// Elements of all tensors.
@@ -85,7 +86,7 @@ class Params {
   explicit Params(ParamStore<T>& store) : Params(store, store.grads().data()) {}
   /// Reads the store; gradients, laid out as the store's, go to `grads`, or are not computed if it is null.
   Params(const ParamStore<T>& store, T* grads)
-      : layout_(&store), values_(store.values().data()), grads_(grads) {}
+      : layout_(&store), values_(store.values().data()), entries_(store.entries().size()), grads_(grads) {}
   /// The same with the store's matrices packed: `packed` holds its present values and outlives the pass.
   Params(const ParamStore<T>& store, T* grads, const PackedWeights<T>& packed) : Params(store, grads) {
     packed_ = &packed;
@@ -96,11 +97,13 @@ class Params {
   Params(const ParamStore<T>& layout, Var<T> all);
 
   /// A parameter on the tape: a leaf, or a constant where gradients are not computed.
+  /// @throws ValueError if the store got more parameters since the constructor, or has no such id
   Var<T> leaf(Tape<T>& tape, ParamId id) const;
 
  private:
   const ParamStore<T>* layout_;
   const T* values_;
+  std::size_t entries_;  // of the store at first: with more of them it has other buffers
   T* grads_;
   const PackedWeights<T>* packed_ = nullptr;
   std::optional<Var<T>> all_ = {};  // computed parameters

@@ -21,34 +21,44 @@ class Shape {
  public:
   static constexpr int kMaxRank = 5;  ///< most axes a shape can have
   Shape() = default;
-  /// @param dims  extents, the slowest axis first   @throws ShapeError if there are more than kMaxRank
+  /// @param dims  extents, 0 or more, the slowest axis first
+  /// @throws ShapeError if there are more than kMaxRank, one is negative, or so many elements cannot be
+  /// counted
   Shape(std::initializer_list<Index> dims) : Shape(std::span(dims.begin(), dims.size())) {}
   /// The same of a list whose length is known only when the program runs.
   explicit Shape(std::span<const Index> dims) : rank_(static_cast<int>(dims.size())) {
     if (dims.size() > kMaxRank) [[unlikely]]
       throw ShapeError("[shape] a shape has at most " + std::to_string(kMaxRank) + " axes, got " +
                        std::to_string(dims.size()));
+    Index all = 1;  // with every 0 taken as 1: the product of any of the extents is no larger
     for (std::size_t k = 0; k < dims.size(); ++k) {
-      dims_[k] = dims[k];
-      size_ *= dims[k];
+      const Index n = dims[k];
+      if (n < 0 || __builtin_mul_overflow(all, n > 0 ? n : 1, &all)) [[unlikely]]
+        refuse(dims);
+      dims_[k] = n;
+      size_ *= n;
     }
   }
   /// Number of axes, 0 to kMaxRank.
   int rank() const { return rank_; }
-  /// Extent of an axis; negative axes count from the last.
+  /// Extent of an axis, in [-rank, rank) (not checked, see check_axis()); negative axes count from the last.
   Index operator[](int axis) const { return dims_[static_cast<std::size_t>(axis < 0 ? axis + rank_ : axis)]; }
   /// Number of elements; 1 for rank 0.
   Index size() const { return size_; }
   /// Equal in rank and every extent.
   friend bool operator==(const Shape&, const Shape&) = default;
   /// As in error texts: "[2, 3]".
-  std::string str() const {
-    std::string s = "[";
-    for (int k = 0; k < rank_; ++k) s += (k ? ", " : "") + std::to_string((*this)[k]);
-    return s + "]";
-  }
+  std::string str() const { return listed(std::span(dims_).first(static_cast<std::size_t>(rank_))); }
 
  private:
+  static std::string listed(std::span<const Index> dims) {
+    std::string s = "[";
+    for (std::size_t k = 0; k < dims.size(); ++k) s += (k ? ", " : "") + std::to_string(dims[k]);
+    return s + "]";
+  }
+  [[noreturn, gnu::cold]] static void refuse(std::span<const Index> dims) {
+    throw ShapeError("[shape] extents must be 0 or more, and their product below 2^63, got " + listed(dims));
+  }
   std::array<Index, kMaxRank> dims_{};
   Index size_ = 1;
   int rank_ = 0;
