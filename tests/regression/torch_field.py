@@ -51,7 +51,7 @@ def main():
     networks = Networks(sys.argv[1])
     rays, _ = read_safetensors(sys.argv[2])
     begin = rays["ray_begin"]
-    worst = 0.0
+    worst = torch.zeros((), dtype=torch.float64)
     for first in range(0, len(begin) - 1, RAYS_TOGETHER):
         ends = begin[first:first + RAYS_TOGETHER + 1]
         here, counts = slice(int(ends[0]), int(ends[-1])), ends[1:] - ends[:-1]
@@ -61,8 +61,8 @@ def main():
         for r, (depth, colours) in enumerate(zip(depths, rgb.split(counts.tolist())), first):
             weight = torch.exp(depth - torch.cumsum(depth, 0)) * -torch.expm1(-depth)
             rgba = torch.cat([weight @ colours, weight.sum().reshape(1)])
-            worst = max(worst, float((rgba - rays["rgba"][r]).abs().max()))
-    print(len(begin) - 1, worst)
+            worst = torch.maximum(worst, (rgba - rays["rgba"][r]).abs().max())  # which keeps a NaN
+    print(len(begin) - 1, float(worst))
 
 
 if __name__ == "__main__":

@@ -52,9 +52,10 @@ TEST_CASE("field_bench: figures of the default are those of its images and the r
         squares += off * off;
         raise_to(worst, off);
       }
-      const double missing = std::max(0.0, w[3] - static_cast<double>(view.opacity[p]));
+      double missing = 0;
+      raise_to(missing, w[3] - static_cast<double>(view.opacity[p]));
       dropped += missing;
-      most = std::max(most, missing);
+      raise_to(most, missing);
     }
   }
   const FieldRow& first = bench.rows.front();

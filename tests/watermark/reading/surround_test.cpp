@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "support/catch.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using namespace fieldmark::watermark;
@@ -73,11 +74,12 @@ TEST_CASE("surround: another background behind an object becomes the field's, ba
     for (Index i = 0; i < 3; ++i) CHECK(seen.image[i] == 1);
     // Bars of the background's own colour are its edges: the disc stays, wherever the cut is.
     const Index h = seen.image.shape[0], w = seen.image.shape[1];
-    float worst = 0;
+    double worst = 0;
     for (Index y = 0; y < h; ++y)
-      for (Index x = 0; x < 3 * w; ++x)
-        worst = std::max(
-            worst, std::abs(seen.image[3 * y * w + x] - want[3 * ((y + seen.top) * 80 + seen.left) + x]));
+      for (Index x = 0; x < 3 * w; ++x) {
+        const float off = seen.image[3 * y * w + x] - want[3 * ((y + seen.top) * 80 + seen.left) + x];
+        raise_to(worst, std::abs(static_cast<double>(off)));
+      }
     CHECK(worst == 0);
     CHECK(clear_surround(image, 1, false).plain.size() == 0);
   }
