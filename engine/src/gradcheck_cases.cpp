@@ -9,9 +9,13 @@
 #include <fieldmark/engine/nn/batch_norm.h>
 #include <fieldmark/engine/nn/conv2d.h>
 #include <fieldmark/engine/nn/dense.h>
+#include <fieldmark/engine/nn/embedding.h>
 #include <fieldmark/engine/nn/group_norm.h>
+#include <fieldmark/engine/nn/layer_norm.h>
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/arithmetic.h>
+#include <fieldmark/engine/ops/conv_transpose2d.h>
+#include <fieldmark/engine/ops/dropout.h>
 #include <fieldmark/engine/ops/feature_distance.h>
 #include <fieldmark/engine/ops/loss.h>
 #include <fieldmark/engine/ops/matmul.h>
@@ -34,6 +38,7 @@ using namespace gradcheck_parts;
 constexpr std::array<std::int32_t, 4> kRows{2, 0, 2, 1};
 constexpr std::array<std::int32_t, 4> kLabels{2, -1, 0, 1};
 constexpr std::array<double, 12> kWeights{1, 0, 0.5, 2, 0.1, 1, 3, 0, 0.2, 0.7, 1, 1};
+constexpr std::array<double, 4> kRowWeights{0.5, 2, 0, 3};
 constexpr std::array<double, 12> kTargets{1, 0, 0.5, 0.9, 0.1, 1, 0, 0, 0.2, 0.7, 1, 0};
 constexpr std::array<double, 5> kLin{0.3, 1.1, 0.7, 1.9, 0.2};
 constexpr std::array<double, 4> kMean{0.2, -0.1, 0.4, 0}, kVariance{1, 0.3, 0.5, 2};
@@ -56,6 +61,15 @@ Cases make_module(const char* name, const Tensor<double>& input, Build build) {
            }}};
 }
 
+Cases embedding() {
+  return {{"embedding", [] {
+             ParamStore<double> store;
+             const Embedding<double> rows(store, "rows", {.count = 3, .width = 2}, 5);
+             return gradcheck_module(
+                 [&](D& tape, const Params<double>& p, Vars) { return rows(tape, p, kRows); }, store, {});
+           }}};
+}
+
 Cases elementwise() {
   const auto x = off_zero({3, 4}), y = off_zero({3, 4}, 0.5);
   return join({make("arithmetic: add", [](auto&, auto v) { return add(v[0], v[1]); }, {x, y}),
@@ -67,7 +81,8 @@ Cases elementwise() {
                make("activation: tanh", [](auto&, auto v) { return tanh(v[0]); }, {x}),
                make("activation: exp", [](auto&, auto v) { return exp(v[0]); }, {x}),
                make("activation: truncated_exp", [](auto&, auto v) { return truncated_exp(v[0]); }, {x}),
-               make("activation: softplus", [](auto&, auto v) { return softplus(v[0]); }, {x})});
+               make("activation: softplus", [](auto&, auto v) { return softplus(v[0]); }, {x}),
+               make("dropout", [](D&, Vars v) { return dropout(v[0], 0.4, CounterRng(1), 2); }, {x})});
 }
 
 Cases layout() {
@@ -89,6 +104,13 @@ Cases layout() {
        make("pool: global_avg_pool", [](auto&, auto v) { return global_avg_pool(v[0]); }, {image}),
        make("resample: upsample_nearest", [](auto&, auto v) { return upsample_nearest(v[0], 2); }, {image}),
        make("resample: upsample_to", [](auto&, auto v) { return upsample_to(v[0], 7, 5); }, {image}),
+       make("resample: upsample_to, nearest",
+            [](D&, Vars v) { return upsample_to(v[0], 7, 5, Interpolation::nearest); }, {image}),
+       make("tape: part of a value",
+            [](D& tape, Vars v) {
+              return mul(tape.part(v[0], 2, {3, 2}), tape.part(v[0], 6, {3, 2}));
+            },
+            {x}),
        make("resample: space_to_depth", [](auto&, auto v) { return space_to_depth(v[0]); }, {image})});
 }
 
@@ -110,7 +132,9 @@ Cases losses() {
             [](auto&, auto v) { return bce_with_logits<double>(v[0], kTargets, kWeights); }, {x}),
        make("softmax: softmax", [](auto&, auto v) { return softmax(v[0]); }, {logits}),
        make("softmax: softmax_cross_entropy",
-            [](auto&, auto v) { return softmax_cross_entropy(v[0], kLabels); }, {logits})});
+            [](auto&, auto v) { return softmax_cross_entropy(v[0], kLabels); }, {logits}),
+       make("softmax: softmax_cross_entropy, weighted",
+            [](D&, Vars v) { return softmax_cross_entropy<double>(v[0], kLabels, kRowWeights); }, {logits})});
 }
 
 Cases norms() {
@@ -123,6 +147,17 @@ Cases norms() {
        make("batch_norm: fixed statistics",
             [](auto&, auto v) { return batch_norm_fixed<double>(v[0], v[1], v[2], kMean, kVariance); },
             {x, gamma, beta}),
+       make("group_norm: with relu",
+            [](D&, Vars v) { return group_norm(v[0], v[1], v[2], {.groups = 2, .relu = true}); },
+            {x, gamma, biases(4)}),
+       make("batch_norm: with relu", [](D&, Vars v) { return batch_norm(v[0], v[1], v[2], {.relu = true}); },
+            {x, gamma, biases(4)}),
+       make("batch_norm: fixed statistics, with relu",
+            [](D&, Vars v) {
+              return batch_norm_fixed<double>(v[0], v[1], v[2], kMean, kVariance, {.relu = true});
+            },
+            {x, gamma, biases(4)}),
+       make_module("layer_norm: module", x, [](auto& store) { return LayerNorm<double>(store, "norm", 4); }),
        make_module("group_norm: module", x,
                    [](auto& store) { return GroupNorm<double>(store, "norm", 4, {.groups = 2}); }),
        make_module("batch_norm: module", x,
@@ -156,6 +191,18 @@ Cases products() {
        make("conv2d with stride and padding",
             [](auto&, auto v) { return conv2d(v[0], v[1], v[2], {.stride = 3, .padding = 2}); },
             {mixed({2, 5, 7, 2}, 1), mixed({4, 4, 2, 3}, 2), mixed({3}, 3)}),
+       make("conv2d with dilation and groups",
+            [](D&, Vars v) { return conv2d(v[0], v[1], v[2], {.padding = 1, .dilation = 2, .groups = 2}); },
+            {mixed({1, 3, 4, 4}, 1), mixed({2, 2, 2, 4}, 2), mixed({4}, 3)}),
+       make("conv_transpose2d",
+            [](D&, Vars v) { return conv_transpose2d(v[0], v[1], v[2], {.stride = 2, .padding = 1}); },
+            {mixed({2, 3, 4, 2}, 1), mixed({3, 3, 5, 2}, 2), mixed({5}, 3)}),
+       embedding(),
+       make_module("conv2d layer without a bias, with stride", mixed({1, 4, 5, 2}, 1),
+                   [](auto& store) {
+                     return Conv2d<double>(store, "layer", {.in = 2, .out = 3, .stride = 2, .bias = false},
+                                           5);
+                   }),
        make_module("conv2d layer", mixed({1, 3, 4, 2}, 1),
                    [](auto& store) { return Conv2d<double>(store, "layer", {.in = 2, .out = 3}, 5); })});
 }

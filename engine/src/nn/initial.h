@@ -1,10 +1,11 @@
 #pragma once
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <random>
 #include <span>
 
-#include <fieldmark/engine/shape.h>
+#include <fieldmark/engine/params.h>
 
 namespace fieldmark::detail {
 
@@ -14,6 +15,15 @@ void he_uniform(std::span<T> weights, Index fan_in, std::uint64_t seed) {
   std::mt19937_64 rng(seed);
   const double bound = std::sqrt(6.0 / static_cast<double>(fan_in));
   for (T& w : weights) w = static_cast<T>(bound * (2 * static_cast<double>(rng() >> 11) * 0x1.0p-53 - 1));
+}
+
+/// A layer's bias on the tape: its parameter, or zeros [n] where it has none.
+template <class T>
+Var<T> bias_or_zeros(Tape<T>& tape, const Params<T>& params, ParamId bias, Index n) {
+  if (bias.index >= 0) return params.leaf(tape, bias);
+  T* zeros = tape.scratch(n);
+  std::fill_n(zeros, n, T(0));
+  return tape.constant(zeros, {n});
 }
 
 }  // namespace fieldmark::detail

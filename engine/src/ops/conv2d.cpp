@@ -1,7 +1,10 @@
 #include <fieldmark/engine/ops/conv2d.h>
+#include <fieldmark/engine/ops/gather.h>
+#include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/engine/shape_checks.h>
 
-#include "kernels/pool.h"
+#include <vector>
+
 #include "ops/chunks.h"
 #include "ops/conv2d_parts.h"
 
@@ -22,21 +25,6 @@ const T* flipped(Tape<T>& tape, const T* w, const ConvGeometry& g) {
   return out;
 }
 
-// db[o] += the sum of dY over all pixels where the mask is positive: sums of chunks, added in order.
-template <class T>
-void bias_gradient(Tape<T>& tape, const T* dy, const T* mask, Index pixels, Index channels, T* db) {
-  using namespace kernels;
-  const Index block = detail::row_grain(channels), chunks = (pixels + block - 1) / block;
-  auto* sums = tape.template scratch<double>(chunks * channels);
-  const auto sum = FIELDMARK_KERNEL(channel_sums<T>);
-  parallel_for(pixels, block, [&](Index begin, Index end) {
-    const Index at = begin * channels;
-    sum(dy + at, mask ? mask + at : nullptr, end - begin, channels, sums + begin / block * channels);
-  });
-  for (Index o = 0; o < channels; ++o)
-    db[o] += static_cast<T>(detail::channel_total(sums, chunks, channels, o));
-}
-
 ConvGeometry geometry(const Shape& x, const Shape& w, const Shape& b, Index stride = 1, Index padding = 0) {
   check_rank("conv2d", "x", x, 4, "[N, H, W, C]");
   check_rank("conv2d", "w", w, 4, "[K, K, C, O]");
@@ -45,6 +33,29 @@ ConvGeometry geometry(const Shape& x, const Shape& w, const Shape& b, Index stri
   check_extent("conv2d", "w", w, 2, x[3], "the channels of x, whose shape is " + x.str());
   check_extent("conv2d", "b", b, 0, w[3], "the outputs of w, whose shape is " + w.str());
   return {x[0], x[1], x[2], x[3], w[3], w[0], stride, padding};
+}
+
+// w [K, K, C, O] with its elements d pixels apart and zeros between.
+template <class T>
+Var<T> dilated(Var<T> w, Index d) {
+  const Index k = w.shape()[0];
+  std::vector<std::int32_t> place(at(k));
+  for (Index u = 0; u < k; ++u) place[at(u)] = static_cast<std::int32_t>(u * d);
+  for (const int axis : {0, 1}) w = scatter_add(w, axis, place, (k - 1) * d + 1);
+  return w;
+}
+
+void check_window(const ConvWindow& window, const Shape& x, const Shape& w) {
+  if (window.stride < 1 || window.padding < 0 || window.dilation < 1 || window.groups < 1)
+    throw ValueError(
+        "[conv2d] stride, dilation and groups must be at least 1 and padding at least 0, got stride " +
+        std::to_string(window.stride) + ", dilation " + std::to_string(window.dilation) + ", groups " +
+        std::to_string(window.groups) + " and padding " + std::to_string(window.padding));
+  check_rank("conv2d", "x", x, 4, "[N, H, W, C]");
+  check_rank("conv2d", "w", w, 4, "[K, K, C / groups, O]");
+  if (x[3] % window.groups != 0 || w[3] % window.groups != 0)
+    throw ValueError("[conv2d] groups must divide the channels of x and of w, got " +
+                     std::to_string(window.groups) + " for shapes " + x.str() + " and " + w.str());
 }
 
 template <class T>
@@ -68,7 +79,7 @@ Var<T> convolve(Var<T> x, Var<T> w, Var<T> b, const ConvGeometry& g, Activation 
   tape.on_backward(out, [=](const T* dy) {
     Tape<T>& t = x.tape();
     const T* mask = relu ? y : nullptr;
-    if (T* db = b.grad_acc()) bias_gradient(t, dy, mask, g.pixels(), g.o, db);
+    if (T* db = b.grad_acc()) detail::bias_gradient(t, dy, mask, g.pixels(), g.o, db);
     if (T* dw = w.grad_acc()) {
       if (winograd)
         detail::winograd_weight_gradient(t, g, x.value(), dy, mask, dw);
@@ -105,9 +116,24 @@ Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, Activation activation, ConvMethod me
 
 template <class T>
 Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, ConvWindow window, Activation activation) {
-  if (window.stride < 1 || window.padding < 0)
-    throw ValueError("[conv2d] stride must be at least 1 and padding at least 0, got stride " +
-                     std::to_string(window.stride) + " and padding " + std::to_string(window.padding));
+  check_window(window, x.shape(), w.shape());
+  if (const Index groups = window.groups; groups > 1) {
+    window.groups = 1;
+    const auto group = [=](Var<T> v, Index k) {
+      const Index each = v.shape()[-1] / groups;
+      return slice(v, k * each, each);
+    };
+    check_extent("conv2d", "w", w.shape(), 2, x.shape()[3] / groups,
+                 "channels of x a group, of " + x.shape().str());
+    check_rank("conv2d", "b", b.shape(), 1, "[O]");
+    check_extent("conv2d", "b", b.shape(), 0, w.shape()[3],
+                 "the outputs of w, whose shape is " + w.shape().str());
+    std::vector<Var<T>> parts;
+    for (Index k = 0; k < groups; ++k)
+      parts.push_back(conv2d(group(x, k), group(w, k), group(b, k), window, activation));
+    return concatenate(std::span<const Var<T>>(parts));
+  }
+  if (window.dilation > 1) w = dilated(w, window.dilation);
   const ConvGeometry g = geometry(x.shape(), w.shape(), b.shape(), window.stride, window.padding);
   if (std::min(g.h, g.w) + 2 * g.padding < g.k)
     throw ShapeError("[conv2d] x: height and width must be at least " + std::to_string(g.k - 2 * g.padding) +

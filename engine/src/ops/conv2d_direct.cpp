@@ -1,3 +1,5 @@
+#include "kernels/pool.h"
+#include "ops/chunks.h"
 #include "ops/conv2d_parts.h"
 #include "ops/product.h"
 
@@ -10,7 +12,21 @@ Index rows(const ConvGeometry& g) { return g.n * g.out_h(); }
 Index padded_w(const ConvGeometry& g) { return g.w + 2 * g.padding; }
 Index padded_h(const ConvGeometry& g) { return g.h + 2 * g.padding; }
 
-// x [N, H, W, C] with a border of zeros, so that every window stays inside.
+}  // namespace
+
+template <class T>
+void bias_gradient(Tape<T>& tape, const T* dy, const T* mask, Index pixels, Index channels, T* db) {
+  using namespace kernels;
+  const Index block = row_grain(channels), chunks = (pixels + block - 1) / block;
+  auto* sums = tape.template scratch<double>(chunks * channels);
+  const auto sum = FIELDMARK_KERNEL(channel_sums<T>);
+  parallel_for(pixels, block, [&](Index begin, Index end) {
+    const Index at = begin * channels;
+    sum(dy + at, mask ? mask + at : nullptr, end - begin, channels, sums + begin / block * channels);
+  });
+  for (Index o = 0; o < channels; ++o) db[o] += static_cast<T>(channel_total(sums, chunks, channels, o));
+}
+
 template <class T>
 const T* with_border(Tape<T>& tape, const ConvGeometry& g, const T* x, const T* mask) {
   const Index row = padded_w(g) * g.c, inner = g.w * g.c, border = g.padding * g.c;
@@ -37,14 +53,11 @@ const T* with_border(Tape<T>& tape, const ConvGeometry& g, const T* x, const T* 
   return out;
 }
 
-}  // namespace
-
 // A row of the result is one product: the windows of its pixels (K segments of K * channels elements) times
 // the weights.
 template <class T>
-const T* direct_convolve(Tape<T>& tape, const ConvGeometry& g, const Convolution<T>& c) {
+void direct_products(Tape<T>& tape, const ConvGeometry& g, const T* padded, const Convolution<T>& c) {
   using namespace kernels;
-  const T* padded = with_border(tape, g, c.x, c.mask);
   const T* weights = packed(tape, c.w, g.k * g.k * g.c, g.o, g.o, Index{1});
   const auto run = FIELDMARK_KERNEL(gemm<T>);
   parallel_for(rows(g), 4, [&](Index begin, Index end) {
@@ -65,6 +78,12 @@ const T* direct_convolve(Tape<T>& tape, const ConvGeometry& g, const Convolution
            .relu = c.relu});
     }
   });
+}
+
+template <class T>
+const T* direct_convolve(Tape<T>& tape, const ConvGeometry& g, const Convolution<T>& c) {
+  const T* padded = with_border(tape, g, c.x, c.mask);
+  direct_products(tape, g, padded, c);
   return padded;
 }
 
@@ -154,6 +173,9 @@ void direct_input_gradient(Tape<T>& tape, const ConvGeometry& g, const T* w, con
 }
 
 #define FIELDMARK_INSTANTIATE(T)                                                                         \
+  template void bias_gradient(Tape<T>&, const T*, const T*, Index, Index, T*);                           \
+  template const T* with_border(Tape<T>&, const ConvGeometry&, const T*, const T*);                      \
+  template void direct_products(Tape<T>&, const ConvGeometry&, const T*, const Convolution<T>&);         \
   template const T* direct_convolve(Tape<T>&, const ConvGeometry&, const Convolution<T>&);               \
   template void direct_weight_gradient(Tape<T>&, const ConvGeometry&, const T*, const T*, const T*, T*); \
   template void direct_input_gradient(Tape<T>&, const ConvGeometry&, const T*, const T*, const T*, bool, T*);

@@ -28,10 +28,21 @@ struct Convolution {
   T* y = nullptr;  ///< [n, h, w, o]
 };
 
-/// Returns x with a border of zeros (x itself where it needs none) for direct_weight_gradient().
+/// db[c] += the sum of dy [pixels, channels] where the mask is positive: sums of chunks, added in order.
+template <class T>
+void bias_gradient(Tape<T>& tape, const T* dy, const T* mask, Index pixels, Index channels, T* db);
+
+/// x [n, h, w, c], 0 where the mask is not positive, with a border of zeros, so that every window stays
+/// inside; x itself where it needs neither.
+template <class T>
+const T* with_border(Tape<T>& tape, const ConvGeometry& g, const T* x, const T* mask);
+/// The convolution of what with_border() returned.
+template <class T>
+void direct_products(Tape<T>& tape, const ConvGeometry& g, const T* bordered, const Convolution<T>& c);
+/// Both. Returns the bordered x for direct_weight_gradient().
 template <class T>
 const T* direct_convolve(Tape<T>& tape, const ConvGeometry& g, const Convolution<T>& c);
-/// dw += the correlation of x with dy, dy masked. @param bordered  what direct_convolve() returned
+/// dw += the correlation of x with dy, dy masked. @param bordered  what with_border() returned for x
 template <class T>
 void direct_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* bordered, const T* dy,
                             const T* mask, T* dw);

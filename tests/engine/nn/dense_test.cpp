@@ -30,6 +30,21 @@ TEST_CASE("nn dense: gradient in input and parameters") {
   CHECK(r.entries == 15 + 16);
 }
 
+TEST_CASE("nn dense: without a bias it is a product") {
+  ParamStore<double> store;
+  const Dense<double> layer(store, "a", {.in = 2, .out = 3, .bias = false}, 5);
+  CHECK(store.entries().size() == 1);
+  const std::vector<Tensor<double>> x{uniform({5, 2}, -1, 1, 1)};
+  const auto w = store.values();
+  Tape<double> tape;
+  const auto y = layer(Params<double>(store), tape.constant(x[0]));
+  for (Index i = 0; i < 15; ++i)
+    CHECK(y.value()[i] == Approx(x[0][i / 3 * 2] * w[at(i % 3)] + x[0][i / 3 * 2 + 1] * w[at(3 + i % 3)]));
+  const auto r = gradcheck_module([&](auto&, const auto& p, auto v) { return layer(p, v[0]); }, store, x);
+  INFO(r.table);
+  CHECK(r.ok);
+}
+
 TEST_CASE("nn dense: errors") {
   ParamStore<float> store;
   CHECK_THROWS_WITH((Dense<float>(store, "a", {.in = 0, .out = 4}, 1)),

@@ -212,10 +212,9 @@ TEST_CASE("conv2d: same bits for 1 and 2 threads, also where the sum over pixels
     for (const auto& [C, O] : {std::array<Index, 2>{5, 9}, {24, 40}}) {
       const auto x = uniform<float>({2, 80, 33, C}, -1, 1, 1), w = uniform<float>({3, 3, C, O}, -1, 1, 2),
                  b = uniform<float>({O}, -1, 1, 3);
-      const ScopedThreads before(threads());
-      set_threads(1);
+      const ScopedThreads serial(1);
       const Conv2dResult one = run(x, w, b, Activation::relu);
-      set_threads(2);
+      const ScopedThreads parallel(2);
       CHECK(one == run(x, w, b, Activation::relu));
     }
   });
@@ -319,16 +318,17 @@ TEST_CASE("conv2d: errors of steps and borders, and the same bits for any thread
   Tape<float> tape;
   const Tensor<float> x({1, 9, 4, 3}), w({7, 7, 3, 5}), b({5});
   const auto vx = tape.constant(x), vw = tape.constant(w), vb = tape.constant(b);
-  CHECK_THROWS_WITH(conv2d(vx, vw, vb, {.stride = 0}),
-                    "[conv2d] stride must be at least 1 and padding at least 0, got stride 0 and padding 0");
+  CHECK_THROWS_WITH(
+      conv2d(vx, vw, vb, {.stride = 0}),
+      "[conv2d] stride, dilation and groups must be at least 1 and padding at least 0, got stride 0, "
+      "dilation 1, groups 1 and padding 0");
   CHECK_THROWS_WITH(conv2d(vx, vw, vb, {.stride = 2, .padding = 1}),
                     "[conv2d] x: height and width must be at least 5 (the window's 7 less two borders of 1), "
                     "got shape [1, 9, 4, 3]");
   const auto image = uniform<float>({2, 83, 90, 3}, -1, 1, 1),
              weights = uniform<float>({11, 11, 3, 64}, -1, 1, 2), bias = uniform<float>({64}, -1, 1, 3);
-  const ScopedThreads before(threads());
-  set_threads(1);
+  const ScopedThreads serial(1);
   const Conv2dResult one = run_steps(image, weights, bias, {.stride = 4, .padding = 2}, Activation::relu);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   CHECK(one == run_steps(image, weights, bias, {.stride = 4, .padding = 2}, Activation::relu));
 }

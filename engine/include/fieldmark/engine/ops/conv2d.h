@@ -19,18 +19,22 @@ template <class T>
 Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, Activation activation = Activation::none,
               ConvMethod method = ConvMethod::fastest);
 
-/// Stride and padding of conv2d().
+/// How the windows of conv2d() lie.
 struct ConvWindow {
-  Index stride = 1;   ///< pixels from one window to the next, both ways, >= 1
-  Index padding = 0;  ///< pixels of zeros around the image, >= 0
+  Index stride = 1;    ///< pixels from one window to the next, both ways, >= 1
+  Index padding = 0;   ///< pixels of zeros around the image, >= 0
+  Index dilation = 1;  ///< pixels from one element of a window to the next, both ways, >= 1
+  Index groups = 1;    ///< of channels, which divide C and O: each group of outputs sees one of inputs
 };
 
-/// The same with a stride s and a padding p.
-///   y[n, i, j, o] = act(b[o] + sum_{u, v, c} x[n, i s + u - p, j s + v - p, c] w[u, v, c, o])
-/// @param x  [N, H, W, C]   @param w  [K, K, C, O], any K   @param b  [O]
-/// @return [N, (H + 2 p - K) / s + 1, (W + 2 p - K) / s + 1, O], rounded down
+/// The same with a stride s, a padding p, a dilation d and G groups, for the channels c of the group of o:
+///   y[n, i, j, o] = act(b[o] + sum_{u, v, c} x[n, i s + u d - p, j s + v d - p, c] w[u, v, c mod C / G, o])
+/// The window covers L = (K - 1) d + 1 pixels. A dilated one takes as long as one of L x L elements; groups
+/// run one after another.
+/// @param x  [N, H, W, C]   @param w  [K, K, C / G, O], any K   @param b  [O]
+/// @return [N, (H + 2 p - L) / s + 1, (W + 2 p - L) / s + 1, O], rounded down
 /// @throws ShapeError if they do not fit or the image with its border is smaller than the window
-/// @throws ValueError if stride or padding is out of range
+/// @throws ValueError if stride, padding, dilation or groups is out of range
 /// Differentiable in: x, w, b. With relu: a kink where the sum is 0, gradient 0 there.
 template <class T>
 Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, ConvWindow steps, Activation activation = Activation::none);

@@ -1,0 +1,33 @@
+#pragma once
+#include <fieldmark/engine/params.h>
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+namespace fieldmark {
+
+/// Extents of an Embedding.
+struct EmbeddingOptions {
+  Index count = 0;  ///< things that have a row, >= 1
+  Index width = 0;  ///< numbers of a row, >= 1
+};
+
+/// A learnt row of numbers for each of `count` things: letters, places, categories. The store holds the
+/// parameter "<name>/table" [count, width], which starts with independent standard normal numbers.
+template <class T>
+class Embedding {
+ public:
+  /// @throws ValueError  if an extent is below 1, or the name is taken in the store
+  Embedding(ParamStore<T>& store, std::string_view name, const EmbeddingOptions& options, std::uint64_t seed);
+
+  /// The rows of some things, see gather_rows().
+  /// @param index  [N] in [0, count)   @return  [N, width]   @throws ValueError  if an index is outside
+  /// Differentiable in: the parameters.
+  Var<T> operator()(Tape<T>& tape, const Params<T>& params, std::span<const std::int32_t> index) const;
+
+ private:
+  ParamId table_;
+};
+
+}  // namespace fieldmark

@@ -1,0 +1,74 @@
+#include <fieldmark/engine/ops/conv_transpose2d.h>
+#include <fieldmark/engine/shape_checks.h>
+
+#include "ops/chunks.h"
+#include "ops/conv2d_parts.h"
+
+namespace fieldmark {
+namespace {
+
+// The convolution, from the result to x, that this is the transpose of.
+detail::ConvGeometry transposed_geometry(const Shape& x, const Shape& w, const Shape& b,
+                                         const ConvWindow& window) {
+  const char* op = "conv_transpose2d";
+  check_rank(op, "x", x, 4, "[N, H, W, C]");
+  check_rank(op, "w", w, 4, "[K, K, O, C]");
+  check_rank(op, "b", b, 1, "[O]");
+  check_extent(op, "w", w, 1, w[0], "a square window");
+  check_extent(op, "w", w, 3, x[3], "the channels of x, whose shape is " + x.str());
+  check_extent(op, "b", b, 0, w[2], "the outputs of w, whose shape is " + w.str());
+  if (window.stride < 1 || window.padding < 0 || window.dilation != 1 || window.groups != 1)
+    throw ValueError(
+        "[conv_transpose2d] stride must be at least 1, padding at least 0, and dilation and groups 1, got "
+        "stride " +
+        std::to_string(window.stride) + ", padding " + std::to_string(window.padding) + ", dilation " +
+        std::to_string(window.dilation) + " and groups " + std::to_string(window.groups));
+  if (x[1] < 1 || x[2] < 1)
+    throw ShapeError("[conv_transpose2d] x must have at least one pixel, got shape " + x.str());
+  const auto extent = [&](Index n) { return (n - 1) * window.stride + w[0] - 2 * window.padding; };
+  if (extent(std::min(x[1], x[2])) < 1)
+    throw ShapeError("[conv_transpose2d] x: a padding of " + std::to_string(window.padding) +
+                     " leaves no pixel of the result, got shape " + x.str());
+  return {x[0], extent(x[1]), extent(x[2]), w[2], w[3], w[0], window.stride, window.padding};
+}
+
+// y = b at every pixel.
+template <class T>
+void fill_with_bias(const T* b, Index pixels, Index channels, T* y) {
+  parallel_for(pixels, detail::row_grain(channels), [=](Index begin, Index end) {
+    for (Index p = begin; p < end; ++p) std::copy_n(b, channels, y + p * channels);
+  });
+}
+
+}  // namespace
+
+template <class T>
+Var<T> conv_transpose2d(Var<T> x, Var<T> w, Var<T> b, ConvWindow window) {
+  const detail::ConvGeometry g = transposed_geometry(x.shape(), w.shape(), b.shape(), window);
+  const Index pixels = g.n * g.h * g.w;
+  Tape<T>& tape = x.tape();
+  T* y = nullptr;
+  const Var<T> out = tape.output({g.n, g.h, g.w, g.c}, &y, {x, w, b});
+  fill_with_bias(b.value(), pixels, g.c, y);
+  detail::direct_input_gradient(tape, g, w.value(), x.value(), static_cast<const T*>(nullptr), true, y);
+
+  // y is linear in x and in w: with C the convolution, <dy, y> = <C(dy, w), x>. So dx = C(dy, w), dw is the
+  // weight gradient of C at dy for the cotangent x, and db sums dy over the pixels.
+  tape.on_backward(out, [=](const T* dy) {
+    Tape<T>& t = x.tape();
+    const T* none = nullptr;
+    if (T* db = b.grad_acc()) detail::bias_gradient(t, dy, none, pixels, g.c, db);
+    const T* bordered = detail::with_border(t, g, dy, none);
+    if (T* dw = w.grad_acc()) detail::direct_weight_gradient(t, g, bordered, x.value(), none, dw);
+    bool fresh = false;
+    if (T* dx = x.grad_acc(&fresh))
+      detail::direct_products(t, g, bordered,
+                              detail::Convolution<T>{.w = w.value(), .accumulate = !fresh, .y = dx});
+  });
+  return out;
+}
+
+template Var<float> conv_transpose2d(Var<float>, Var<float>, Var<float>, ConvWindow);
+template Var<double> conv_transpose2d(Var<double>, Var<double>, Var<double>, ConvWindow);
+
+}  // namespace fieldmark
