@@ -32,11 +32,10 @@ TEST_CASE("hiding_trainer: the same numbers for any threads and across a checkpo
   for (const HidingKind kind : {HidingKind::hidden, HidingKind::mbrs}) {
     CAPTURE(hiding_name(kind));
     ImageMarker one = tiny_marker(kind), two = tiny_marker(kind);
-    const int before = threads();
-    set_threads(1);
+    const ScopedThreads serial(1);
     HidingTrainer straight(one, crops, tiny(6));
     while (!straight.done()) straight.step(0);
-    set_threads(2);
+    const ScopedThreads parallel(2);
     {
       ImageMarker begun = tiny_marker(kind);
       HidingTrainer first(begun, crops, tiny(6));
@@ -47,7 +46,6 @@ TEST_CASE("hiding_trainer: the same numbers for any threads and across a checkpo
     second.restore(folder / "c");
     CHECK(second.steps() == 4);
     while (!second.done()) second.step(0);
-    set_threads(before);
     CHECK(std::ranges::equal(one.params.values(), two.params.values()));
     CHECK(second.figures().bits == straight.figures().bits);
     CHECK(second.steps() == 6);

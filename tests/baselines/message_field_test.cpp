@@ -203,18 +203,16 @@ TEST_CASE("message_field: in 40 steps it learns to look like the base field") {
 }
 
 TEST_CASE("message_field: rendered as recorded, with the same bits on one and two threads") {
-  const int before = threads();
   for (const MessagePlace place : {MessagePlace::inputs, MessagePlace::density}) {
     Made made(place);
     const auto render = [&](int count) {
-      set_threads(count);
+      const ScopedThreads scope(count);
       return made.field.render(made.store, made.base, camera(40, 30), kSigns, {.finer = 1});
     };
     CHECK(render(1).data == render(2).data);
     CHECK(worst(made.field.render(made.store, made.base, camera(), kSigns, {.finer = 1}).data,
                 made.image().data) < 1e-6);
   }
-  set_threads(before);
 }
 
 TEST_CASE("message_field: an mlp field takes a message in its density") {

@@ -131,10 +131,8 @@ TEST_CASE("distortion: every result is of 8 bits and depends on the seed and the
     INFO(name);
     const auto y = distorted(name, x, 3);
     CHECK(y.data == rounded(y).data);
-    const int before = threads();
-    set_threads(before == 1 ? 2 : 1);
+    const ScopedThreads scope(threads() == 1 ? 2 : 1);
     CHECK(y.data == distorted(name, x, 3).data);
-    set_threads(before);
     CHECK(distorted(name, image({1, 1, 3})).shape == Shape{1, 1, 3});
   }
   for (const char* name : {"noise_0.05", "rotation_30", "crop_0.40"})

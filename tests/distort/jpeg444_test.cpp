@@ -104,12 +104,10 @@ TEST_CASE("jpeg444: even images, quality, thread count and errors") {
   // At 100 every table entry is 1: rounding of coefficients, components and colours.
   CHECK(worst_level(jpeg444(x, 100), x) <= 5);
   CHECK(jpeg444(quantize8(uniform<float>({1, 1, 3}, 0, 1, 2)), 50).shape == Shape{1, 1, 3});
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const auto one = jpeg444(x, 50);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   CHECK(jpeg444(x, 50).data == one.data);
-  set_threads(before);
   CHECK_THROWS_WITH(jpeg444(Tensor<float>({2, 2, 1}), 50),
                     "[jpeg444] image: axis 2 must be 3 (red, green and blue), got shape [2, 2, 1]");
   CHECK_THROWS_WITH(jpeg444(Tensor<float>({0, 2, 3}), 50),

@@ -23,8 +23,7 @@ fieldmark::Tensor<T> run_op(const F& f, const std::vector<fieldmark::Tensor<T>>&
 /// Result and all gradients, for a cotangent that varies, as one list: to compare bits between thread counts.
 template <class T, class F>
 std::vector<T> run_with_grads(const F& f, const std::vector<fieldmark::Tensor<T>>& inputs, int threads) {
-  const int before = fieldmark::threads();
-  fieldmark::set_threads(threads);
+  const fieldmark::ScopedThreads scope(threads);
   fieldmark::Tape<T> tape;
   std::vector<fieldmark::Tensor<T>> grads;
   for (const auto& t : inputs) grads.emplace_back(t.shape);
@@ -34,7 +33,6 @@ std::vector<T> run_with_grads(const F& f, const std::vector<fieldmark::Tensor<T>
   tape.backward(y, uniform<T>(y.shape(), -1, 1, 99).data);
   std::vector<T> all(y.value(), y.value() + y.shape().size());
   for (const auto& g : grads) all.insert(all.end(), g.data.begin(), g.data.end());
-  fieldmark::set_threads(before);
   return all;
 }
 

@@ -150,10 +150,9 @@ TEST_CASE("adam: made for a store, no step changes its running values, whatever 
 
 TEST_CASE("adam: a resumed optimiser continues with the same bits, on any number of threads") {
   const Index n = 50001;
-  const ScopedThreads before(threads());
   auto grads = [&](int t) { return uniform<float>({n}, -1, 1, static_cast<unsigned>(t)).data; };
   auto run = [&](int n_threads, int stop) {
-    set_threads(n_threads);
+    const ScopedThreads scope(n_threads);
     std::vector<float> x(static_cast<std::size_t>(n), 1.0f);
     Adam<float> adam(n, {.skip_zero = true, .zero_grads = true});
     for (int t = 0; t < 6; ++t) {

@@ -9,9 +9,8 @@
 using namespace fieldmark;
 
 TEST_CASE("parallel: every index once, in chunks that do not depend on the thread count") {
-  const ScopedThreads before(threads());
   for (int n_threads : {1, 2, 3}) {
-    set_threads(n_threads);
+    const ScopedThreads scope(n_threads);
     for (Index n : {0, 1, 7, 8, 9, 1000}) {
       std::vector<int> seen(static_cast<std::size_t>(n));
       parallel_for(n, 8, [&](Index begin, Index end) {

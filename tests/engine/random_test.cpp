@@ -143,10 +143,9 @@ TEST_CASE("random: a permutation holds every number once, and places are uniform
 }
 
 TEST_CASE("random: the thread count changes nothing") {
-  const ScopedThreads before(threads());
   const CounterRng rng(13, 4);
   auto draw = [&](int n_threads) {
-    set_threads(n_threads);
+    const ScopedThreads scope(n_threads);
     std::vector<float> x(1000);
     parallel_for(1000, 10, [&](Index begin, Index end) {
       for (Index i = begin; i < end; ++i)

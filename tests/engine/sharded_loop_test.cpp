@@ -11,7 +11,7 @@ using namespace fieldmark;
 namespace {
 // A body whose sum in float depends on the order of additions.
 std::vector<float> run(int n_threads, Index chunks) {
-  set_threads(n_threads);
+  const ScopedThreads scope(n_threads);
   ShardedLoop<float> loop(16, 3);
   std::vector<float> into(3, 1.f);
   std::vector<Index> shards(at(chunks), -1);
@@ -31,7 +31,6 @@ std::vector<float> run(int n_threads, Index chunks) {
 }  // namespace
 
 TEST_CASE("sharded_loop: same bits for 1, 2 and 3 threads and adds onto what was there") {
-  const ScopedThreads before(threads());
   for (Index chunks : {0, 1, 5, 16, 1001}) {
     const auto one = run(1, chunks);
     CHECK(one == run(2, chunks));

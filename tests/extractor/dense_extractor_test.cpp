@@ -99,17 +99,15 @@ TEST_CASE("dense_extractor: the same bits alone, beside another image, on one an
   const DenseExtractor<float> net(store, "net", {.classes = 40, .base = 16}, 3);
   const std::array<Tensor<float>, 2> images{uniform<float>({1, 100, 90, 3}, 0, 1, 1),
                                             uniform<float>({1, 61, 70, 3}, 0, 1, 2)};
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const std::array<Reading, 2> one{read(net, store, images[0]), read(net, store, images[1])};
-  set_threads(2);
+  const ScopedThreads parallel(2);
   CHECK(read(net, store, images[0]) == one[0]);
   std::array<Reading, 2> together;
   parallel_for(2, 1, [&](Index i, Index) {
     const auto k = static_cast<std::size_t>(i);
     together[k] = read(net, store, images[k]);
   });
-  set_threads(before);
   CHECK(together == one);
 }
 

@@ -159,13 +159,11 @@ TEST_CASE("evidence_pool: the same bits on one and two threads") {
   const auto index = uniform<float>({1500, 61}, -5, 5, 2);
   const auto code = code_for<float>(60, 8);
   expect_same_bits([&](auto&, auto v) { return pooled_bits(v[0], v[1], code, 8); }, {sign, index});
-  const int before = threads();
   std::vector<double> one(60), two(60);
-  set_threads(1);
+  const ScopedThreads serial(1);
   cell_evidence(sign.data.data(), index.data.data(), 1500, 60, one.data());
-  set_threads(2);
+  const ScopedThreads parallel(2);
   cell_evidence(sign.data.data(), index.data.data(), 1500, 60, two.data());
-  set_threads(before);
   CHECK(one == two);
 }
 

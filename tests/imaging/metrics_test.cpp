@@ -130,14 +130,12 @@ TEST_CASE("metrics: ssim of constant and opposite images") {
 }
 
 TEST_CASE("metrics: thread count and errors") {
-  const int before = threads();
   const auto a = uniform<float>({200, 100, 3}, 0, 1, 1), b = uniform<float>({200, 100, 3}, 0, 1, 2);
-  set_threads(1);
+  const ScopedThreads serial(1);
   const double m = mse(a, b), s = ssim(a, b);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   CHECK(mse(a, b) == m);
   CHECK(ssim(a, b) == s);
-  set_threads(before);
   CHECK_THROWS_WITH(psnr(a, Tensor<float>({2, 2, 3})),
                     "[psnr] b must have the shape of a, [200, 100, 3], got shape [2, 2, 3]");
   CHECK_THROWS_WITH(mse(Tensor<float>(), Tensor<float>()), Contains("[mse] a must not be empty"));

@@ -139,13 +139,11 @@ TEST_CASE("resize: one pixel from millions is their mean") {
 }
 
 TEST_CASE("resize: thread count and errors") {
-  const int before = threads();
   const auto x = uniform<float>({300, 200, 3}, 0, 1, 4);
-  set_threads(1);
+  const ScopedThreads serial(1);
   const auto one = resize_area(x, 111, 333);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   CHECK(resize_area(x, 111, 333).data == one.data);
-  set_threads(before);
   CHECK_THROWS_WITH(resize_area(Tensor<float>({2, 2}), 1, 1),
                     Contains("[resize_area] image must have rank 3"));
   CHECK_THROWS_WITH(resize_bilinear(Tensor<float>({0, 2, 3}), 1, 1),

@@ -103,7 +103,7 @@ TEST_CASE("analytic_scene: what is written is what is made in memory") {
 
 TEST_CASE("analytic_scene: equal for one and two threads, different for another seed") {
   const auto pixels = [](int n, std::uint64_t seed) {
-    set_threads(n);
+    const ScopedThreads scope(n);
     return make_scene({.size = 24, .views = 1, .seed = seed}).views[0].rgba.data;
   };
   const auto one = pixels(1, 0), two = pixels(2, 0);

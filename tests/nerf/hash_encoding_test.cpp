@@ -177,13 +177,11 @@ TEST_CASE("hash_encoding: the same bits for one and two threads") {
     return encoding(params, v[0], HashEncoding<float>::Part::colour);
   };
   const auto table_gradient = [&](int threads) {
-    set_threads(threads);
+    const ScopedThreads scope(threads);
     store.zero_grad();
     const auto result = run_op<float>(op, {uniform<float>({5000, 3}, 0, 1, 9)});
     return std::pair{result, std::vector<float>(store.grads().begin(), store.grads().end())};
   };
-  const int before = threads();
   const auto one = table_gradient(1), two = table_gradient(2);
-  set_threads(before);
   CHECK(one == two);
 }

@@ -162,10 +162,9 @@ TEST_CASE("occupancy_grid: errors name argument and value") {
 }
 
 TEST_CASE("occupancy_grid: the same bits for one and two threads") {
-  const int before = threads();
   std::vector<float> densities[2];
   for (int n = 1; n <= 2; ++n) {
-    set_threads(n);
+    const ScopedThreads scope(n);
     OccupancyGrid grid(32);
     const auto smooth = [](Index, const float* x, Index count, float* sigma) {
       for (Index i = 0; i < count; ++i) sigma[i] = x[3 * i] * x[3 * i + 1] + x[3 * i + 2];
@@ -173,6 +172,5 @@ TEST_CASE("occupancy_grid: the same bits for one and two threads") {
     grid.update(smooth, CounterRng(5), {.fraction = 3, .round = 2});
     densities[n - 1].assign(grid.densities().begin(), grid.densities().end());
   }
-  set_threads(before);
   CHECK(densities[0] == densities[1]);
 }

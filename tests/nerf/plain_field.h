@@ -40,15 +40,13 @@ inline void expect_same_for_threads(fieldmark::ParamStore<float>& store,
   using namespace fieldmark;
   std::vector<float> grads[2];
   std::vector<std::vector<float>> results[2];
-  const int before = threads();
   for (int n = 1; n <= 2; ++n) {
-    set_threads(n);
+    const ScopedThreads scope(n);
     store.zero_grad();
     results[n - 1] = run_op<float>([&](auto&, auto v) { return field(Params<float>(store), v[0], v[1]).rgb; },
                                    {uniform<float>({3000, 3}, 0, 1, 4), uniform<float>({3000, 3}, -1, 1, 5)});
     grads[n - 1].assign(store.grads().begin(), store.grads().end());
   }
-  set_threads(before);
   CHECK(results[0] == results[1]);
   CHECK(grads[0] == grads[1]);
 }

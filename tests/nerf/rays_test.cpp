@@ -81,7 +81,7 @@ TEST_CASE("rays: the same bits for one and two threads") {
   const auto pixels = uniform({5000, 2}, 0, 40, 5);
   const auto seed = uniform({5000, 6}, -1, 1, 6);
   const auto run = [&](int n) {
-    set_threads(n);
+    const ScopedThreads scope(n);
     Tensor<double> dc(camera.shape), dp(pixels.shape);
     Tape<double> t;
     t.backward(rays(t.leaf(camera, dc), t.leaf(pixels, dp)), seed.data);

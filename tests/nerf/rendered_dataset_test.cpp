@@ -40,12 +40,10 @@ TEST_CASE("rendered_dataset: over the background its images are the field's") {
 TEST_CASE("rendered_dataset: other spaces have opaque images, and errors, progress and threads") {
   RadianceField field = small_field();
   const auto cameras = make_cameras(field.cameras, CameraSet::novel, 2, 24, 1);
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const Dataset one = rendered_dataset(field, cameras);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   CHECK(rendered_dataset(field, cameras).views[1].rgba.data == one.views[1].rgba.data);
-  set_threads(before);
   CHECK_THROWS_WITH(rendered_dataset(field, {}), "[rendered_dataset] cameras must be at least one, got 0");
   CHECK_THROWS_WITH(rendered_dataset(field, std::vector<Camera>{cameras[0], cameras[1].scaled(20)}),
                     "[rendered_dataset] cameras must be of one size, 24 x 18, got 20 x 15");

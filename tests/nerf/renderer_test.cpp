@@ -277,12 +277,10 @@ TEST_CASE("renderer: the same bits for one and two threads") {
   const RadianceField f = small_field();
   Renderer renderer(f);
   const Camera camera = test_camera(50, 37);
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const Rendering one = renderer.render(camera);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   const Rendering two = renderer.render(camera);
-  set_threads(before);
   CHECK(one.rgb.data == two.rgb.data);
   CHECK(one.opacity.data == two.opacity.data);
 }

@@ -164,12 +164,10 @@ TEST_CASE("silhouettes: errors name image and shape") {
 
 TEST_CASE("silhouettes: the same for one and two threads") {
   const Scene scene(5, 4);
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const auto one = visual_hull(scene.views, {}, 32);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   const auto two = visual_hull(scene.views, {}, 32);
-  set_threads(before);
   CHECK(one == two);
 }
 
@@ -233,11 +231,9 @@ TEST_CASE("silhouettes: no ray outside the margin meets a cell of the hull") {
 
 TEST_CASE("silhouettes: same for any thread count, and the errors say what came") {
   const std::vector<View> views{sparse_view(20, 20, 1), sparse_view(20, 20, 2), sparse_view(20, 20, 3)};
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const auto one = training_pixels(views, 2);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   CHECK(training_pixels(views, 2) == one);
-  set_threads(before);
   CHECK_THROWS_WITH(training_pixels(views, -1), "[training_pixels] margin must not be negative, got -1");
 }

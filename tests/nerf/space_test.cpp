@@ -136,12 +136,10 @@ TEST_CASE("space: seen cells are those of an image's cone, the same for every th
   const Camera camera = camera_at({3, 2, 14}, {1, 2, 4}, 0.2);
   const Camera two[] = {camera, camera_at({9, 2, 4}, {1, 2, 4}, 0.2)};
   for (const Space& space : {kCube, kContracted}) {
-    const int before = threads();
-    set_threads(1);
+    const ScopedThreads serial(1);
     const auto seen = seen_cells(two, space, 12);
-    set_threads(2);
+    const ScopedThreads parallel(2);
     CHECK(seen == seen_cells(two, space, 12));
-    set_threads(before);
     const auto first = seen_cells(std::span(two, 1), space, 12);
     Index more = 0, hidden = 0;
     for (std::size_t c = 0; c < seen.size(); ++c) {

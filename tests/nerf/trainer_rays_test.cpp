@@ -87,12 +87,10 @@ TEST_CASE("trainer_rays: supersampling begins after its steps, and only then") {
 
 TEST_CASE("trainer_rays: supersampled steps give the same bytes for any thread count and across a restore") {
   const Dataset data = blurred_scene();
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const std::vector<float> one = trained(data, 2, 8, 24);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   CHECK(trained(data, 2, 8, 24) == one);
-  set_threads(before);
 
   const TemporaryFolder folder;
   {

@@ -140,10 +140,9 @@ TEST_CASE("trainer: 300 steps of a small mlp field reach 17 dB, and both its net
 
 TEST_CASE("trainer: an mlp field's bytes are the same for one and two threads, and across a restore") {
   const TemporaryFolder folder;
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const Outcome one = run_mlp(12);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   CHECK(one == run_mlp(12));
   {
     RadianceField field(small_mlp_options());
@@ -156,7 +155,6 @@ TEST_CASE("trainer: an mlp field's bytes are the same for one and two threads, a
   trainer.restore(folder / "checkpoint");
   while (!trainer.done()) trainer.step(0);
   CHECK(outcome(field, trainer) == one);
-  set_threads(before);
 }
 
 TEST_CASE("trainer: without carving, silhouettes leave bounds and cells alone") {
@@ -196,15 +194,13 @@ TEST_CASE("trainer: opaque images leave bounds and cells alone") {
 }
 
 TEST_CASE("trainer: the same bytes for one and two threads, on each instruction set") {
-  const int before = threads();
   each_isa([] {
-    set_threads(1);
+    const ScopedThreads serial(1);
     const Outcome one = run(20);
-    set_threads(2);
+    const ScopedThreads parallel(2);
     const Outcome two = run(20);
     CHECK(one == two);
   });
-  set_threads(before);
 }
 
 TEST_CASE("trainer: a run that is interrupted and restored gives the bytes of one that is not") {

@@ -81,9 +81,8 @@ long allocations_in(int steps, F step) {
 
 template <class F>
 void for_threads(F check) {
-  const ScopedThreads before(threads());
   for (const int n : {1, 2}) {
-    set_threads(n);
+    const ScopedThreads scope(n);
     INFO(n << " threads");
     check();
   }

@@ -110,10 +110,8 @@ void check_bytes(Isa level, const Hashes& expected, const std::string& threads) 
     std::cout << "SKIPPED: recorded bytes needs a CPU with another instruction set\n";
     return;
   }
-  const Isa before = isa();
-  force_isa(level);
+  const ScopedIsa scope(level);
   const Hashes got = written(threads);
-  force_isa(before);
   for (const auto& [name, hash] : got) {
     INFO("{\"" << name << "\", \"" << hash << "\"},");
     const auto found = expected.find(name);

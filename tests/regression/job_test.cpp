@@ -63,10 +63,8 @@ TEST_CASE("regression: 300 steps of a field, to a millionth at fixed steps on on
     std::cout << "SKIPPED: the regression of a field needs a CPU with AVX2\n";
     return;
   }
-  const Isa before = isa();
-  force_isa(Isa::v3);
+  const ScopedIsa scope(Isa::v3);
   const auto& got = trained().psnr;
-  force_isa(before);
   // To be renewed, from the failure's own text, by a change that is meant to change results.
   const double want[] = {21.1122255475, 23.6176396472, 28.0437947284, 30.8719738051};
   REQUIRE(got.size() == 4);

@@ -17,21 +17,10 @@ std::filesystem::path kept(const char* name) {
   return std::filesystem::path(source_dir()) / "tests/regression/version_0_1" / name;
 }
 
-// Kernels of the level on which version 0.1 wrote the expected numbers, for the life of this object.
-class OldestIsa {
- public:
-  OldestIsa() { force_isa(Isa::v2); }
-  OldestIsa(const OldestIsa&) = delete;
-  OldestIsa& operator=(const OldestIsa&) = delete;
-  ~OldestIsa() { force_isa(before_); }
-
- private:
-  Isa before_ = isa();
-};
 }  // namespace
 
 TEST_CASE("version 0.1: a FIELD renders the same numbers") {
-  const OldestIsa oldest;
+  const ScopedIsa oldest(Isa::v2);  // on which version 0.1 wrote the expected numbers
   const auto field = nerf::RadianceField::load(kept("field.fm"));
   nerf::Renderer renderer(field);
   const auto shown =
@@ -76,7 +65,7 @@ TEST_CASE("version 0.1: a FIELD renders the same numbers") {
 }
 
 TEST_CASE("version 0.1: an OWNER reads the same evidence") {
-  const OldestIsa oldest;
+  const ScopedIsa oldest(Isa::v2);  // on which version 0.1 wrote the expected numbers
   const auto owner = watermark::Owner::load(kept("owner.fm"));
   CHECK(owner.key == test_key(5));
   CHECK(owner.gain == 0.17546171356724755);

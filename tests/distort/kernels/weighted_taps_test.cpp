@@ -1,5 +1,7 @@
 #include "kernels/weighted_taps.h"
 
+#include <fieldmark/engine/isa.h>
+
 #include <cmath>
 #include <vector>
 
@@ -39,15 +41,13 @@ double worst_error(bool add) {
 }  // namespace
 
 TEST_CASE("weighted_taps: every length on every instruction set, within 3 ulp of long double") {
-  const Isa before = isa();
   for (Isa level : {Isa::v2, Isa::v3, Isa::v4}) {
     if (level > isa_supported()) continue;
-    force_isa(level);
+    const ScopedIsa scope(level);
     INFO("isa " << isa_name());
     for (bool add : {false, true}) {
       CHECK(worst_error<float>(add) < 3 * 1.2e-7);
       CHECK(worst_error<double>(add) < 3 * 2.3e-16);
     }
   }
-  force_isa(before);
 }

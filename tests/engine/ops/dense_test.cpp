@@ -146,9 +146,8 @@ TEST_CASE("dense: errors") {
 TEST_CASE("dense: same bits for 1 and 2 threads, also where the rows are split") {
   const auto x = uniform<float>({20000, 16}, -1, 1, 1), w = uniform<float>({16, 24}, -1, 1, 2),
              b = uniform<float>({24}, -1, 1, 3);
-  const ScopedThreads before(threads());
-  set_threads(1);
+  const ScopedThreads serial(1);
   const DenseResult one = run_dense(x, w, b, Activation::relu);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   CHECK(one == run_dense(x, w, b, Activation::relu));
 }

@@ -96,14 +96,12 @@ TEST_CASE("field_reference: some pixels are those of the whole, for any number o
   const nerf::RadianceField f = small_field();
   const nerf::Camera camera = test_camera(13, 11);
   FieldReference reference(f, {.samples = 40});
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const std::vector<double> whole = reference.render(camera);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   const std::vector<Index> pixels{140, 3, 77, 3};
   const std::vector<double> some = reference.trace(camera, pixels);
   CHECK(reference.render(camera) == whole);
-  set_threads(before);
   for (std::size_t i = 0; i < pixels.size(); ++i)
     for (std::size_t a = 0; a < 4; ++a)
       CHECK(some[4 * i + a] == whole[4 * static_cast<std::size_t>(pixels[i]) + a]);

@@ -45,12 +45,10 @@ TEST_CASE("payload_bench: fewer payloads are exact as more bits are wrong, and s
 
 TEST_CASE("payload_bench: equal for one and two threads, and errors are named") {
   const PayloadBenchOptions options{.bits = 40, .trials = 40, .noise_trials = 40, .error_rates = {0.08}};
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const PayloadBench one = run_payload_bench(options);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   const PayloadBench two = run_payload_bench(options);
-  set_threads(before);
   CHECK(one.rows[0].signs.exact == two.rows[0].signs.exact);
   CHECK(one.rows[0].strengths.exact == two.rows[0].strengths.exact);
   CHECK(one.rows[0].strengths.corrected == two.rows[0].strengths.corrected);

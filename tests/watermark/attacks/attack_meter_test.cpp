@@ -197,12 +197,10 @@ TEST_CASE("attack_meter: errors, progress and threads") {
   const AttackMeter meter(owner, owner.field, kMeteredMessage, o);
   CHECK(seen == 3);
   CHECK_THROWS_AS(meter.image("sharpen_1"), ValueError);
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const AttackRow one = meter.image("combined");
-  set_threads(2);
+  const ScopedThreads parallel(2);
   const AttackRow two = meter.image("combined");
-  set_threads(before);
   CHECK((one.psnr_foreground == two.psnr_foreground && one.p_value == two.p_value && one.kept == two.kept));
   AttackMeterOptions stop = options(2, owner);
   stop.progress = [](Index, Index) { return false; };

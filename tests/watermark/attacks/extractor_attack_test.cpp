@@ -82,12 +82,10 @@ TEST_CASE("extractor_attack: the same bits for any thread count") {
   const Owner owner = tiny_owner();
   const CachedView& view = tiny_views()[1];
   const auto run = [&] { return against_extractor(owner, view.base, view.opacity, {.steps = 2}).data; };
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const auto one = run();
-  set_threads(2);
+  const ScopedThreads parallel(2);
   CHECK(run() == one);
-  set_threads(before);
 }
 
 TEST_CASE("extractor_attack: errors name what is wrong") {

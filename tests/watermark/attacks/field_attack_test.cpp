@@ -245,12 +245,10 @@ TEST_CASE("field_attack: average, sign flip and copy add the fields' numbers") {
 TEST_CASE("field_attack: a chain is its steps, and threads change nothing") {
   const RadianceField field = small_field();
   CHECK(same_numbers(attacked("prune_0.2,int6", field), attacked("int6", attacked("prune_0.2", field))));
-  const int before = threads();
   for (const char* name : {"weights_noise_0.1", "float16", "int4", "int4-blocks", "prune_0.5", "hue_40"}) {
-    set_threads(1);
+    const ScopedThreads serial(1);
     const auto one = attacked(name, field);
-    set_threads(2);
+    const ScopedThreads parallel(2);
     CHECK(same_numbers(attacked(name, field), one));
   }
-  set_threads(before);
 }

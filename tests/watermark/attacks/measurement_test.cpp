@@ -66,12 +66,10 @@ TEST_CASE("measurement: figures are the means over the views, view by view") {
 TEST_CASE("measurement: distortions are measured each under its name, on the same bits for any threads") {
   const Owner owner = marking_owner();
   const MeasureOptions options{.cameras = cameras(3), .under = {"noise_0", "blur_2", "crop_0.5"}, .seed = 6};
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const Measurement one = measure(owner, nullptr, nullptr, options);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   const Measurement two = measure(owner, nullptr, nullptr, options);
-  set_threads(before);
   REQUIRE(one.under.size() == 3);
   CHECK(one.under.at("noise_0").blind == one.accuracy.blind);
   for (const auto& [name, value] : one.under) {

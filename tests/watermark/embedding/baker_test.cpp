@@ -214,12 +214,10 @@ TEST_CASE("baker: two messages give different colours, the same one the same") {
 
 TEST_CASE("baker: one and two threads give the same bits") {
   const Owner owner = owner_with_gain();
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const auto one = bake(owner, kBakedMessage, 3);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   const auto two = bake(owner, kBakedMessage, 3);
-  set_threads(before);
   CHECK(std::equal(one.params.values().begin(), one.params.values().end(), two.params.values().begin()));
 }
 

@@ -150,16 +150,14 @@ TEST_CASE("embedder: distortions that are not mixed, and no loss of signs, train
 }
 
 TEST_CASE("embedder: one and two threads give the same bits") {
-  const int before = threads();
   for (const bool paper : {false, true}) {
     const auto owner = [&] { return paper ? tiny_paper_owner() : tiny_owner(); };
-    set_threads(1);
+    const ScopedThreads serial(1);
     const Outcome one = run(4, owner());
-    set_threads(2);
+    const ScopedThreads parallel(2);
     const Outcome two = run(4, owner());
     CHECK(one == two);
   }
-  set_threads(before);
 }
 
 TEST_CASE("embedder: a run that is saved and restored ends as an uninterrupted one") {
@@ -347,11 +345,9 @@ TEST_CASE("embedder: a warm start paints and reads carriers, is resumed bit by b
   rest.restore(folder / "checkpoint");
   while (!rest.done()) rest.step(0);
   CHECK(outcome(whole, embedder) == outcome(resumed, rest));
-  const int before = threads();
-  set_threads(2);
+  const ScopedThreads scope(2);
   Embedder on_two(two_threads, tiny_views(), options(9));
   while (!on_two.done()) on_two.step(0);
-  set_threads(before);
   CHECK(outcome(whole, embedder) == outcome(two_threads, on_two));
   for (const auto& e : whole.params.entries())
     CHECK((e.name.starts_with("mark/") || e.name.starts_with("extractor/")));

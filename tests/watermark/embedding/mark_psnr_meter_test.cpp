@@ -91,12 +91,10 @@ TEST_CASE("mark_psnr_meter: infinity where nothing differs, and the same for any
   nerf::Renderer renderer(owner.field);
   CHECK(std::isinf(meter(renderer)));
   renderer.set_recolour(darker_by(0.02f));
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const double one = meter(renderer);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   CHECK(meter(renderer) == one);
-  set_threads(before);
 }
 
 TEST_CASE("mark_psnr_meter: no views and no pixels are refused") {

@@ -45,12 +45,10 @@ TEST_CASE("wrong_keys: counts equal a plain loop over the same keys") {
 TEST_CASE("wrong_keys: a marked image stays within the binomial bound, for any number of threads") {
   const auto signs = cell_signs(deal_cells(test_key(0), kArea, kMessage.size()), kMessage);
   const std::vector<double> evidence(signs.begin(), signs.end());
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const WrongKeyCounts one = count_wrong_keys(evidence, kArea, kMessage, 10000, 0);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   const WrongKeyCounts two = count_wrong_keys(evidence, kArea, kMessage, 10000, 0);
-  set_threads(before);
   CHECK(one == two);
   for (std::size_t k = 0; k < 8; ++k) {
     CHECK(one.counts[k] <= binomial_upper(10000, std::pow(10.0, -1 - static_cast<double>(k)), 0.9999));

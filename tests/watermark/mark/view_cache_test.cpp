@@ -154,12 +154,10 @@ TEST_CASE("view_cache: what lies together on a ray is one part, and parts lie ap
 
 TEST_CASE("view_cache: one and two threads give the same bits") {
   const nerf::RadianceField field = half_field();
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const CachedView one = view_of(field);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   const CachedView two = view_of(field);
-  set_threads(before);
   CHECK(one.base.data == two.base.data);
   CHECK(one.opacity.data == two.opacity.data);
   CHECK(one.sample_begin == two.sample_begin);

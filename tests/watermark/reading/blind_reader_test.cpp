@@ -106,12 +106,10 @@ TEST_CASE("blind_reader: what surrounds the object does not matter") {
 TEST_CASE("blind_reader: one and two threads give the same bits") {
   const Owner owner = small_owner();
   const BlindReader reader(owner);
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const auto one = reader.evidence(block(3));
-  set_threads(2);
+  const ScopedThreads parallel(2);
   const auto two = reader.evidence(block(3));
-  set_threads(before);
   CHECK(one == two);
 }
 

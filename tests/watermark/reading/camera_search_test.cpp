@@ -175,14 +175,12 @@ TEST_CASE("camera_search: one and two threads find the same") {
   const Owner owner = tiny_owner();
   const nerf::Camera camera = near_camera(owner, 48, 14);
   const SeenPlaces places = places_of(owner, camera);
-  const int before = threads();
   std::vector<std::array<double, 16>> found[2];
   for (int n : {1, 2}) {
-    set_threads(n);
+    const ScopedThreads scope(n);
     for (const nerf::Camera& c : CameraSearch(owner, {.views = 20, .size = 32}).find(places, 48, 48, 4))
       found[n - 1].push_back(c.parameters());
   }
-  set_threads(before);
   CHECK(!found[0].empty());
   CHECK(found[0] == found[1]);
 }

@@ -149,14 +149,12 @@ TEST_CASE("informed_reader: other backgrounds, bars, mirror, stretch, caption an
 TEST_CASE("informed_reader: one and two threads give the same bits") {
   const Owner owner = marking_owner();
   const Tensor<float> view_image = image_of(owner, camera_near(5), true);
-  const int before = threads();
   std::vector<double> evidence[2];
   for (const int n : {1, 2}) {
-    set_threads(n);
+    const ScopedThreads scope(n);
     InformedReader reader(owner, {.views = 10, .size = 32});
     evidence[n - 1] = reader.read(view_image).informed.evidence;
   }
-  set_threads(before);
   CHECK(!evidence[0].empty());
   CHECK(evidence[0] == evidence[1]);
 }

@@ -140,13 +140,11 @@ TEST_CASE("jpeg_score: says nothing off the object, and the same for one and two
   for (std::size_t p = 0; p < object.size(); ++p)
     if (p % kWidth < 64) object[p] = 1;
   const JpegTrace trace{.quality = 40, .subsampled = true};
-  const int before = threads();
   Tensor<float> scores[2];
   for (const int n : {1, 2}) {
-    set_threads(n);
+    const ScopedThreads scope(n);
     scores[n - 1] = jpeg_score(seen, base, mark, object, trace).score;
   }
-  set_threads(before);
   CHECK(scores[0].data == scores[1].data);
   double left = 0, right = 0;
   for (Index i = 0; i < seen.size(); ++i)

@@ -104,12 +104,10 @@ TEST_CASE("pose_alignment: one and two threads give the same bits") {
   const nerf::Camera camera = aligned_camera(7);
   const Tensor<float> view_image = image_of(camera);
   const nerf::Camera start = moved(camera, {0, 0, 0}, {0.02, -0.03, 0.02});
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const Alignment one = align(view_image, start);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   const Alignment two = align(view_image, start);
-  set_threads(before);
   CHECK(one.camera.pose == two.camera.pose);
   CHECK(one.camera.parameters() == two.camera.parameters());
   CHECK(one.agreement == two.agreement);

@@ -112,17 +112,15 @@ TEST_CASE("trace: the same for any number of threads, progress counts up and can
   const std::vector<double> area(30, 1.0);
   const auto names = recipients(5000);
   const auto evidence = average(test_key(1), area, {names[9]}, 1.f, 2);
-  const int before = threads();
-  set_threads(1);
+  const ScopedThreads serial(1);
   const auto one = trace_copies(evidence, area, test_key(1), kMessage, names);
-  set_threads(2);
+  const ScopedThreads parallel(2);
   std::vector<Index> done;
   const auto two = trace_copies(evidence, area, test_key(1), kMessage, names, [&](Index d, Index total) {
     CHECK(total == 5000);
     done.push_back(d);
     return true;
   });
-  set_threads(before);
   REQUIRE(one.size() == two.size());
   for (std::size_t i = 0; i < one.size(); ++i) {
     CHECK(one[i].name == two[i].name);
