@@ -47,13 +47,14 @@ void Arena::begin_block(std::size_t k) {
 
 void* Arena::allocate_slowly(std::size_t bytes) {
   const std::size_t taken = round_up(bytes, kAlign) + kGap;
-  while (room_ < taken) {
+  const auto gap = [&] { return -reinterpret_cast<std::uintptr_t>(next_) & (kAlign - 1); };
+  while (!next_ || room_ < taken + gap()) {
     if (!next_ || block_ + 1 == blocks_.size()) grow(taken);
     begin_block(next_ ? block_ + 1 : 0);
   }
-  std::byte* p = next_;
-  next_ += taken;
-  room_ -= taken;
+  std::byte* p = next_ + gap();
+  room_ -= taken + gap();
+  next_ = p + taken;
   ASAN_UNPOISON_MEMORY_REGION(p, bytes);
   return p;
 }

@@ -210,7 +210,8 @@ Cases products() {
 }  // namespace
 
 std::vector<GradcheckCase> gradcheck_cases() {
-  return join({elementwise(), layout(), losses(), norms(), products(), tensor_gradcheck_cases()});
+  return join({elementwise(), layout(), losses(), norms(), products(), fused_gradcheck_cases(),
+               tensor_gradcheck_cases()});
 }
 
 }  // namespace fieldmark

@@ -9,6 +9,7 @@
 // What the parts of gradcheck_cases() share.
 namespace fieldmark {
 
+std::vector<GradcheckCase> fused_gradcheck_cases();
 std::vector<GradcheckCase> tensor_gradcheck_cases();
 
 namespace gradcheck_parts {

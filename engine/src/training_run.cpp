@@ -9,7 +9,7 @@
 namespace fieldmark {
 namespace {
 
-constexpr double kKeep = 0.98, kNewest = 0.02;  // of the running loss
+constexpr double kKeptLoss = 0.98, kNewestLoss = 0.02;  // of the running loss
 
 using detail::read_array;
 
@@ -52,7 +52,7 @@ void TrainingRun::extend_update(AdamRange range) {
 void TrainingRun::step(double seconds) {
   schedule_.observe(steps_, seconds);
   const double loss = take_step(seconds);
-  loss_ = loss_ < 0 ? loss : kKeep * loss_ + kNewest * loss;
+  loss_ = loss_ < 0 ? loss : kKeptLoss * loss_ + kNewestLoss * loss;
   ++steps_;
 }
 

@@ -28,6 +28,8 @@ Json row_json(const bench::EngineRow& r, bool with_peer) {
            {"gflops", where(r.gflops)},
            {"ratio_to_peak", where(r.ratio_to_peak)},
            {"items_per_second", r.rate},
+           {"gigabytes_per_second", where(r.gigabytes)},
+           {"ratio_to_memory", where(r.ratio_to_memory)},
            {"ratio_to_scalar", where(r.speedup)},
            {"error", where(r.error)},
            {"peak_megabytes", r.megabytes},

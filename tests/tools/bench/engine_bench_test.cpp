@@ -19,7 +19,8 @@ TEST_CASE("engine_bench: every row of the contract runs, and float is near doubl
   for (const char* name :
        {"mlp_4x64_fb_f32", "mlp_8x256_fb_f32", "conv3x3_64_fb_f32", "hidden_decoder_fb_f32",
         "transformer_step", "transformer_wide_step", "autoencoder_step", "autoencoder_wide_step",
-        "hash_2e17_forward", "hash_2e17_backward", "nerf_step", "nerf_step_first"})
+        "chain_swish_fb_f32", "chain_arithmetic_fb_f32", "node_16_fb_f32", "hash_2e17_forward",
+        "hash_2e17_backward", "nerf_step", "nerf_step_first"})
     CHECK(std::count(begun.begin(), begun.end(), name) == 1);
   for (const EngineRow& row : bench.rows) {
     CAPTURE(row.name, row.error);
@@ -27,6 +28,8 @@ TEST_CASE("engine_bench: every row of the contract runs, and float is near doubl
     CHECK(row.rate > 0);
     CHECK(row.megabytes > 0);
     CHECK((row.gflops > 0) == (row.ratio_to_peak > 0));
+    CHECK((row.gigabytes > 0) == row.name.starts_with("chain_"));
+    CHECK((row.gigabytes > 0) == (row.ratio_to_memory > 0));
     if (row.name.starts_with("nerf_step")) continue;
     CHECK(row.error >
           0);  // float cannot agree with double to the last bit: 0 would mean nothing was compared
@@ -43,7 +46,8 @@ TEST_CASE("engine_bench: PyTorch computes the same values and gradients") {
   for (const EngineRow& row : bench.rows) {
     CAPTURE(row.name);
     const bool asked = row.name == "mlp_4x64_fb_f32" || row.name == "mlp_8x256_fb_f32" ||
-                       row.name == "conv3x3_64_fb_f32" || row.name == "hidden_decoder_fb_f32";
+                       row.name == "conv3x3_64_fb_f32" || row.name == "hidden_decoder_fb_f32" ||
+                       row.name.starts_with("chain_");
     REQUIRE(row.peer.has_value() == asked);
     if (!asked) continue;
     const Peer::Found& found = row.peer->found;

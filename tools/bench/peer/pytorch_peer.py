@@ -189,8 +189,43 @@ class Images:
         return found
 
 
+def swish(x, w, b):
+    return x * torch.sigmoid(x * w + b)
+
+
+def arithmetic(x, w, b):
+    return 0.5 * torch.relu(x * w + b) + (x - w) * (x - b)
+
+
+class Chain:
+    """A chain of elementwise steps, step by step or compiled."""
+
+    def __init__(self, case, names, chain, compiled):
+        self.x, self.u = leaf(case["x"]), case["u"]
+        self.parameters = {name: leaf(case["value/" + name]) for name in names}
+        self.name = "compiled" if compiled else "step by step"
+        self.chain = torch.jit.script(chain) if compiled else chain
+
+    def step(self):
+        inputs = [self.x, *self.parameters.values()]
+        y = self.chain(*inputs)
+        return y, torch.autograd.grad(y, inputs, self.u)
+
+    def probe(self):
+        return 0
+
+    def results(self):
+        y, grads = self.step()
+        return dict(zip(["y", "dx", *self.parameters], [y.detach(), *grads]))
+
+
 def variants(metadata, case):
     names = metadata["parameters"].split(",")
+    chains = {"swish": swish, "arithmetic": arithmetic}
+    if metadata["network"] in chains:
+        for compiled in (False, True):
+            yield lambda: Chain(case, names, chains[metadata["network"]], compiled)
+        return
     if metadata["network"] == "dense":
         samples = case["x"].shape[0]
         sizes = [size for size in MICRO_BATCHES if size < samples] + [samples]

@@ -35,7 +35,7 @@ EngineBench run_engine_bench(const EngineBenchOptions& options,
     throw ValueError("[engine_bench] runs must be at least 1 and scale in (0, 1], got " +
                      std::to_string(options.runs) + " and " + std::to_string(options.scale));
   std::vector<RowSpec> specs;
-  for (auto list : {mlp_rows(), conv_rows(), model_rows(), hash_rows(), nerf_rows()})
+  for (auto list : {mlp_rows(), conv_rows(), model_rows(), chain_rows(), hash_rows(), nerf_rows()})
     for (RowSpec& spec : list)
       if (spec.name.find(options.only) != std::string::npos) specs.push_back(std::move(spec));
   if (specs.empty()) throw ValueError("[engine_bench] only: no row has '" + options.only + "' in its name");

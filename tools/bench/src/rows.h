@@ -18,6 +18,7 @@ struct RowSpec {
   std::function<SafetensorsFile(const RowOptions&)> work{};  // for a peer, see peer_work(); none: no peer
 };
 
+std::vector<RowSpec> chain_rows();
 std::vector<RowSpec> mlp_rows();
 std::vector<RowSpec> conv_rows();
 std::vector<RowSpec> model_rows();

@@ -155,7 +155,11 @@ std::string attacks_chart(const Json& result, const char* key, const char* title
 std::string engine_speed(const Json& row) {
   if (number(row, "gflops") > 0)
     return printed("%.2f of peak, %.1f GFLOP/s", number(row, "ratio_to_peak"), number(row, "gflops"));
+  if (number(row, "ratio_to_memory") > 0)
+    return printed("%.2f of memory's speed, %.1f GB/s", number(row, "ratio_to_memory"),
+                   number(row, "gigabytes_per_second"));
   const double rate = number(row, "items_per_second");
+  if (text(row, "name").starts_with("node_")) return printed("%.1f ns an op", 1e9 / rate);
   if (number(row, "ratio_to_scalar") > 0)
     return printed("%.1f ns a point, %.2f x scalar", 1e9 / rate, number(row, "ratio_to_scalar"));
   return printed("%.3f million samples/s", rate * 1e-6);

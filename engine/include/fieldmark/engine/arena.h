@@ -1,5 +1,6 @@
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -11,19 +12,15 @@ namespace fieldmark {
 /// allocation.
 class Arena {
  public:
-  static constexpr std::size_t kAlign = 64;  ///< alignment of every allocation, bytes
+  static constexpr std::size_t kAlign = 64;       ///< alignment of allocate(), bytes
+  static constexpr std::size_t kSmallAlign = 16;  ///< alignment of allocate_small(), bytes
   /// @param first_block  bytes of the first block, taken when it is first needed
   explicit Arena(std::size_t first_block = std::size_t{1} << 16) : first_block_(first_block) {}
   /// Uninitialised memory, valid until reset(). @throws std::bad_alloc
-  void* allocate(std::size_t bytes) {
-    if (kSanitized || bytes - 1 >= room_) [[unlikely]]
-      return allocate_slowly(bytes);
-    std::byte* p = next_;
-    const std::size_t taken = (bytes + kAlign - 1) & ~(kAlign - 1);
-    next_ += taken;
-    room_ -= taken;
-    return p;
-  }
+  void* allocate(std::size_t bytes) { return take(bytes, kAlign); }
+  /// The same for a few numbers and pointers: aligned to kSmallAlign only, so that several share a cache
+  /// line.
+  void* allocate_small(std::size_t bytes) { return take(bytes, kSmallAlign); }
   /// Frees all allocations and keeps the blocks.
   void reset() noexcept;
   /// Overwrites free memory, and blocks that are taken later, with bytes of 0xff, a NaN in floating point: a
@@ -46,13 +43,22 @@ class Arena {
 #else
   static constexpr bool kSanitized = false;
 #endif
+  void* take(std::size_t bytes, std::size_t align) {
+    const std::size_t gap = -reinterpret_cast<std::uintptr_t>(next_) & (align - 1);
+    if (kSanitized || gap > room_ || bytes - 1 >= room_ - gap) [[unlikely]]
+      return allocate_slowly(bytes);
+    std::byte* p = next_ + gap;
+    next_ = p + bytes;
+    room_ -= gap + bytes;
+    return p;
+  }
   void* allocate_slowly(std::size_t bytes);
   void grow(std::size_t bytes);
   void begin_block(std::size_t k);
   std::vector<Block> blocks_;
   std::size_t first_block_, block_ = 0, grown_ = 0;
   std::byte* next_ = nullptr;  // free memory of block block_
-  std::size_t room_ = 0;       // its bytes, a multiple of kAlign
+  std::size_t room_ = 0;       // its bytes
   bool spoils_ = false;
 };
 

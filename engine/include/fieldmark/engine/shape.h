@@ -46,7 +46,11 @@ class Shape {
   /// Number of elements; 1 for rank 0.
   Index size() const { return size_; }
   /// Equal in rank and every extent.
-  friend bool operator==(const Shape&, const Shape&) = default;
+  friend bool operator==(const Shape& a, const Shape& b) {
+    bool equal = a.rank_ == b.rank_;
+    for (std::size_t k = 0; k < kMaxRank; ++k) equal &= a.dims_[k] == b.dims_[k];
+    return equal;
+  }
   /// As in error texts: "[2, 3]".
   std::string str() const { return listed(std::span(dims_).first(static_cast<std::size_t>(rank_))); }
 

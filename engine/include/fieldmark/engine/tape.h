@@ -189,12 +189,16 @@ class Tape {
   void on_backward(Var<T> out, F fn) {
     static_assert(std::is_trivially_destructible_v<F> && std::is_trivially_copyable_v<F>,
                   "a backward lives in the arena: capture Var, Shape, scalars and raw pointers only");
+    static_assert(alignof(F) <= Arena::kSmallAlign);
     check_own(out, "the output of an op");
     if (observer_) [[unlikely]]
       observer_->recorded(out);
     if (!out.needs_grad()) return;
-    auto* f = new (arena_.allocate(sizeof(F))) F(fn);
-    nodes_.push_back({out, f, [](void* p, const T* dout) { (*static_cast<F*>(p))(dout); }});
+    struct Closure : Node {
+      F fn;
+    };
+    const auto run = [](const Node* n, const T* dout) { static_cast<const Closure*>(n)->fn(dout); };
+    last_ = new (arena_.allocate_small(sizeof(Closure))) Closure{{last_, out, run}, fn};
   }
 
   /// Seeds dL/dloss = 1 and replays. Leaves add up over several calls; gradients of all other values begin
@@ -228,12 +232,12 @@ class Tape {
     const Replaying replaying(phase_);
     if (observer_) [[unlikely]]
       return replay_observed();
-    for (auto n = nodes_.rbegin(); n != nodes_.rend(); ++n)
-      if (const T* dout = n->out.slot_->grad) n->run(n->closure, dout);
+    for (const Node* n = last_; n; n = n->before)
+      if (const T* dout = n->out.slot_->grad) n->run(n, dout);
   }
   /// Forgets the recorded pass and keeps its memory for the next one; every Var of it becomes invalid.
   void reset() {
-    nodes_.clear();
+    last_ = nullptr;
     fresh_.clear();
     phase_ = Phase::recording;
     arena_.reset();
@@ -265,24 +269,25 @@ class Tape {
     ~Replaying() { phase = Phase::replayed; }
     Phase& phase;
   };
+  // A recorded backward, in front of what its function captured.
   struct Node {
+    const Node* before;  // the one recorded before, or null
     Var<T> out;
-    void* closure;
-    void (*run)(void*, const T*);
+    void (*run)(const Node*, const T* dout);
   };
   // After a replay: gradients that are not a leaf's begin anew, in the buffers that they have.
   void begin_pass() {
     if (phase_ != Phase::replayed) return;
     phase_ = Phase::recording;
-    for (const Node& n : nodes_) forget_gradient(*n.out.slot_);
+    for (const Node* n = last_; n; n = n->before) forget_gradient(*n->out.slot_);
     for (const Var<T>& v : fresh_) forget_gradient(*v.slot_);
   }
   void replay_observed() {
-    for (auto n = nodes_.rbegin(); n != nodes_.rend(); ++n) {
+    for (const Node* n = last_; n; n = n->before) {
       const T* dout = n->out.slot_->grad;
       if (!dout) continue;
       observer_->before_backward(n->out);
-      n->run(n->closure, dout);
+      n->run(n, dout);
       observer_->after_backward(n->out);
     }
   }
@@ -304,11 +309,11 @@ class Tape {
   }
   Var<T> make(const T* value, T* grad, Shape shape, bool needs, const PackedMatrix<T>* packed = nullptr) {
     using Slot = typename Var<T>::Slot;
-    return Var<T>(this, new (arena_.allocate(sizeof(Slot)))
+    return Var<T>(this, new (arena_.allocate_small(sizeof(Slot)))
                             Slot{value, grad, shape, needs, false, true, nullptr, packed});
   }
   Arena arena_;
-  std::vector<Node> nodes_;
+  const Node* last_ = nullptr;  // recorded last
   std::vector<Var<T>> fresh_;
   Phase phase_ = Phase::recording;
   TapeObserver<T>* observer_ = nullptr;

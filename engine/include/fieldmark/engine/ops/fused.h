@@ -1,0 +1,39 @@
+#pragma once
+#include <fieldmark/engine/chain.h>
+#include <fieldmark/engine/tape.h>
+
+#include <array>
+#include <utility>
+
+namespace fieldmark {
+
+namespace detail {
+template <class T>
+Var<T> run_chain(const Chain& chain, std::span<const Var<T>> inputs, std::source_location from);
+}  // namespace detail
+
+/// f of each element in one pass over memory, forward and backward, however many steps f has:
+///   y[i] = f(x_0[i], x_1[i], ...)
+/// The result is recorded as one op. Blocks of elements stay in first-level cache from step to step; the
+/// backward computes intermediate values again instead of reading them.
+///
+/// @code
+/// auto y = fused([](auto x, auto gain, auto bias) { return x * sigmoid(gain * x + bias); }, x, gain, bias);
+/// @endcode
+/// @param f       is called once, with a Lane for each input, and returns a Lane: see chain.h for what it may
+///                do. A generic lambda serves Lane and Var alike.
+/// @param inputs  1 to Chain::kMaxInputs values, whose shapes broadcast
+/// @throws ShapeError if they do not   @throws ValueError if f has too many steps, or an input was recorded
+/// on another tape
+template <class T, class F, class... Rest>
+Var<T> fused(F f, Var<T> first, Rest... rest) {
+  constexpr std::size_t n = 1 + sizeof...(Rest);
+  static_assert(n <= Chain::kMaxInputs, "fused: too many inputs");
+  const std::array<Var<T>, n> inputs{first, rest...};
+  Chain chain(static_cast<int>(n));
+  [&]<std::size_t... k>(std::index_sequence<k...>) { chain.finish(f(chain.input(static_cast<int>(k))...)); }
+  (std::make_index_sequence<n>{});
+  return detail::run_chain<T>(chain, inputs, std::source_location::current());
+}
+
+}  // namespace fieldmark
