@@ -15,31 +15,32 @@ namespace fieldmark {
 namespace {
 
 using Real = long double;
-using Exact = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
+using ExactMatrix = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
 
 template <class T>
 constexpr Real kToType = static_cast<Real>(std::numeric_limits<double>::epsilon()) /
                          static_cast<Real>(std::numeric_limits<T>::epsilon());
 
 template <class T>
-Exact exact(const std::vector<T>& values, Index rows, Index columns) {
+ExactMatrix exact(const std::vector<T>& values, Index rows, Index columns) {
   using RowMajor = Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   return Eigen::Map<const RowMajor>(values.data(), rows, columns).template cast<Real>();
 }
 
 template <class T>
-Tensor<T> rounded(const Exact& m) {
+Tensor<T> rounded(const ExactMatrix& m) {
   Tensor<T> t({m.rows(), m.cols()});
   for (Index i = 0; i < t.size(); ++i) t[i] = static_cast<T>(m(i / m.cols(), i % m.cols()));
   return t;
 }
 
-Exact size(const Exact& m) { return m.cwiseAbs(); }
-Exact lower(const Exact& m) { return m.triangularView<Eigen::Lower>(); }
+ExactMatrix size(const ExactMatrix& m) { return m.cwiseAbs(); }
+ExactMatrix lower(const ExactMatrix& m) { return m.triangularView<Eigen::Lower>(); }
 
 // Errors of a matrix, each relative to its entry of `scale`.
 template <class T>
-void compare_matrix(const std::vector<T>& got, const Exact& want, const Exact& scale, WorstError& error) {
+void compare_matrix(const std::vector<T>& got, const ExactMatrix& want, const ExactMatrix& scale,
+                    WorstError& error) {
   for (std::size_t i = 0; i < got.size(); ++i) {
     const Index r = static_cast<Index>(i) / want.cols(), c = static_cast<Index>(i) % want.cols();
     error.compare(got[i], want(r, c), size_of<T>(scale(r, c)));
@@ -47,8 +48,8 @@ void compare_matrix(const std::vector<T>& got, const Exact& want, const Exact& s
 }
 
 template <class T>
-void compare_matrix(const std::vector<T>& got, const Exact& want, Real scale, WorstError& error) {
-  compare_matrix(got, want, Exact::Constant(want.rows(), want.cols(), scale), error);
+void compare_matrix(const std::vector<T>& got, const ExactMatrix& want, Real scale, WorstError& error) {
+  compare_matrix(got, want, ExactMatrix::Constant(want.rows(), want.cols(), scale), error);
 }
 
 // 1 / (i + k + 1) in T: condition 9e5 of 5 rows, 4e13 of 10, near what float and double can hold.
@@ -81,18 +82,18 @@ void compare_residual(WorstError& error) {
 // with |L||U| of the size of |m|), and da = -db x^T where a is read, its transpose if m is a^T. `lu` solves
 // with m in long double, `lu_t` with m^T.
 template <class T, class Solver, class Transposed>
-void compare_solution(const std::vector<std::vector<T>>& got, const Exact& m, const Solver& lu,
-                      const Transposed& lu_t, const Exact& b, const Exact& cotangent, bool transposed,
-                      const Exact& read, WorstError& error) {
-  const Exact inverse = lu.solve(Exact(Exact::Identity(m.rows(), m.rows()))),
-              spread = size(inverse) * size(m);
-  const Exact x = lu.solve(b), g = lu_t.solve(cotangent);
-  const Exact off_x = kToType<T> * spread * size(x),
-              off_g = kToType<T> * size(inverse).transpose() * size(m).transpose() * size(g);
+void compare_solution(const std::vector<std::vector<T>>& got, const ExactMatrix& m, const Solver& lu,
+                      const Transposed& lu_t, const ExactMatrix& b, const ExactMatrix& cotangent,
+                      bool transposed, const ExactMatrix& read, WorstError& error) {
+  const ExactMatrix inverse = lu.solve(ExactMatrix(ExactMatrix::Identity(m.rows(), m.rows()))),
+                    spread = size(inverse) * size(m);
+  const ExactMatrix x = lu.solve(b), g = lu_t.solve(cotangent);
+  const ExactMatrix off_x = kToType<T> * spread * size(x),
+                    off_g = kToType<T> * size(inverse).transpose() * size(m).transpose() * size(g);
   compare_matrix(got[0], x, size(x) + off_x, error);
   compare_matrix(got[2], g, size(g) + off_g, error);
-  Exact da = -g * x.transpose(),
-        scale = size(g) * size(x).transpose() + off_g * size(x).transpose() + size(g) * off_x.transpose();
+  ExactMatrix da = -g * x.transpose(), scale = size(g) * size(x).transpose() + off_g * size(x).transpose() +
+                                               size(g) * off_x.transpose();
   if (transposed) {
     da.transposeInPlace();
     scale.transposeInPlace();
@@ -106,9 +107,9 @@ void compare_solve(WorstError& error) {
   const Tensor<T> a = hilbert<T>(n), b = scattered<T>({n, k}, -1, 1, 1), g = scattered<T>({n, k}, -1, 1, 2);
   const auto got = values_and_gradients<T>([](auto&, const auto& v) { return solve(v[0], v[1]); }, {a, b},
                                            [&](Shape) -> const Tensor<T>& { return g; });
-  const Exact m = exact(a.data, n, n), mt = m.transpose();
-  compare_solution(got, m, Eigen::PartialPivLU<Exact>(m), Eigen::PartialPivLU<Exact>(mt), exact(b.data, n, k),
-                   exact(g.data, n, k), false, Exact::Ones(n, n), error);
+  const ExactMatrix m = exact(a.data, n, n), mt = m.transpose();
+  compare_solution(got, m, Eigen::PartialPivLU<ExactMatrix>(m), Eigen::PartialPivLU<ExactMatrix>(mt),
+                   exact(b.data, n, k), exact(g.data, n, k), false, ExactMatrix::Ones(n, n), error);
 }
 
 // Triangles with a diagonal from 1 to 3e-4 and entries up to 1 beside it, NaN on the side that is not read.
@@ -119,7 +120,7 @@ void compare_triangular_solve(WorstError& error) {
   for (const bool upper : {false, true})
     for (const bool transposed : {false, true}) {
       Tensor<T> a = scattered<T>({n, n}, -1, 1, 3);
-      Exact m = Exact::Zero(n, n), read = m;
+      ExactMatrix m = ExactMatrix::Zero(n, n), read = m;
       for (Index i = 0; i < n; ++i) {
         a[i * n + i] = static_cast<T>(std::pow(10.0, -0.5 * static_cast<double>(i)));
         for (Index c = 0; c < n; ++c) {
@@ -135,7 +136,7 @@ void compare_triangular_solve(WorstError& error) {
             return triangular_solve(v[0], v[1], {.upper = upper, .transposed = transposed});
           },
           {a, b}, [&](Shape) -> const Tensor<T>& { return g; });
-      const Exact used = transposed ? Exact(m.transpose()) : m, back = used.transpose();
+      const ExactMatrix used = transposed ? ExactMatrix(m.transpose()) : m, back = used.transpose();
       const auto compare = [&](const auto& lu, const auto& lu_t) {
         compare_solution(got, used, lu, lu_t, exact(b.data, n, k), exact(g.data, n, k), transposed, read,
                          error);
@@ -154,10 +155,10 @@ void compare_inverse(WorstError& error) {
   const Tensor<T> a = hilbert<T>(n), g = scattered<T>({n, n}, -1, 1, 2);
   const auto got = values_and_gradients<T>([](auto&, const auto& v) { return inverse(v[0]); }, {a},
                                            [&](Shape) -> const Tensor<T>& { return g; });
-  const Exact m = exact(a.data, n, n), y = m.partialPivLu().inverse(), dy = exact(g.data, n, n);
-  const Exact off = size(y) + kToType<T> * size(y) * size(m) * size(y);
+  const ExactMatrix m = exact(a.data, n, n), y = m.partialPivLu().inverse(), dy = exact(g.data, n, n);
+  const ExactMatrix off = size(y) + kToType<T> * size(y) * size(m) * size(y);
   compare_matrix(got[0], y, off, error);
-  const Exact yt = y.transpose(), off_t = off.transpose();
+  const ExactMatrix yt = y.transpose(), off_t = off.transpose();
   compare_matrix(got[1], -yt * dy * yt, off_t * size(dy) * size(yt) + size(yt) * size(dy) * off_t, error);
 }
 
@@ -169,12 +170,12 @@ void compare_cholesky(bool gradient, WorstError& error) {
   const Tensor<T> a = hilbert<T>(n), g = scattered<T>({n, n}, -1, 1, 2);
   const auto got = values_and_gradients<T>([](auto&, const auto& v) { return cholesky(v[0]); }, {a},
                                            [&](Shape) -> const Tensor<T>& { return g; });
-  const Exact m = exact(a.data, n, n), l = Eigen::LLT<Exact>(m).matrixL(),
-              inverse = l.partialPivLu().inverse();
+  const ExactMatrix m = exact(a.data, n, n), l = Eigen::LLT<ExactMatrix>(m).matrixL(),
+                    inverse = l.partialPivLu().inverse();
   if (!gradient) return compare_matrix(got[0], l, size(l).maxCoeff(), error);
-  Exact p = lower(l.transpose() * lower(exact(g.data, n, n)));
+  ExactMatrix p = lower(l.transpose() * lower(exact(g.data, n, n)));
   p.diagonal() /= 2;
-  const Exact s = inverse.transpose() * p * inverse, want = (s + s.transpose()) / 2;
+  const ExactMatrix s = inverse.transpose() * p * inverse, want = (s + s.transpose()) / 2;
   compare_matrix(got[1], want, size(want).maxCoeff(), error);
 }
 
@@ -197,11 +198,11 @@ void compare_log_determinant(WorstError& error) {
     const Tensor<T> a = scattered<T>({n, n}, -level, level, 5);
     const auto got =
         values_and_gradients<T>([](auto&, const auto& v) { return log_determinant(v[0]); }, {a}, ones<T>);
-    const Exact m = exact(a.data, n, n), y = m.partialPivLu().inverse();
-    const Eigen::PartialPivLU<Exact> lu(m);
+    const ExactMatrix m = exact(a.data, n, n), y = m.partialPivLu().inverse();
+    const Eigen::PartialPivLU<ExactMatrix> lu(m);
     const Eigen::Array<Real, Eigen::Dynamic, 1> logs = lu.matrixLU().diagonal().array().abs().log();
     error.compare(got[0][0], logs.sum(), logs.abs().sum());
-    const Exact scale = size(y) + kToType<T> * size(y) * size(m) * size(y);
+    const ExactMatrix scale = size(y) + kToType<T> * size(y) * size(m) * size(y);
     compare_matrix(got[1], y.transpose(), scale.transpose(), error);
   }
 }
@@ -213,9 +214,9 @@ Tensor<T> clustered(double level) {
   const Real close = 512 * static_cast<Real>(std::numeric_limits<T>::epsilon());
   Eigen::Matrix<Real, n, 1> values;
   values << -3, 1, 1 + close, 1 + 2 * close, 2, 2.001L;
-  const Exact q =
-      Eigen::HouseholderQR<Exact>(exact(scattered<double>({n, n}, -1, 1, 6).data, n, n)).householderQ();
-  const Exact m = static_cast<Real>(level) * q * values.asDiagonal() * q.transpose();
+  const ExactMatrix q =
+      Eigen::HouseholderQR<ExactMatrix>(exact(scattered<double>({n, n}, -1, 1, 6).data, n, n)).householderQ();
+  const ExactMatrix m = static_cast<Real>(level) * q * values.asDiagonal() * q.transpose();
   return rounded<T>((m + m.transpose()) / 2);
 }
 
@@ -226,7 +227,7 @@ void compare_eigenvalues(WorstError& error) {
     const Tensor<T> a = clustered<T>(level);
     const auto got = values_and_gradients<T>([](auto&, const auto& v) { return symmetric_eigenvalues(v[0]); },
                                              {a}, ones<T>);
-    const Eigen::SelfAdjointEigenSolver<Exact> solver(exact(a.data, 6, 6), Eigen::EigenvaluesOnly);
+    const Eigen::SelfAdjointEigenSolver<ExactMatrix> solver(exact(a.data, 6, 6), Eigen::EigenvaluesOnly);
     compare_matrix(got[0], solver.eigenvalues(), size(solver.eigenvalues()).maxCoeff(), error);
   }
 }
@@ -237,13 +238,13 @@ template <class T>
 void compare_eigenvalue_gradients(WorstError& error) {
   constexpr Index n = 6;
   const Tensor<T> a = clustered<T>(1);
-  const Eigen::SelfAdjointEigenSolver<Exact> solver(exact(a.data, n, n));
-  const Exact v = solver.eigenvectors();
+  const Eigen::SelfAdjointEigenSolver<ExactMatrix> solver(exact(a.data, n, n));
+  const ExactMatrix v = solver.eigenvectors();
   const auto check = [&](std::vector<T> cotangent, Real scale) {
     const Tensor<T> g({n}, cotangent);
     const auto got = values_and_gradients<T>([](auto&, const auto& x) { return symmetric_eigenvalues(x[0]); },
                                              {a}, [&](Shape) -> const Tensor<T>& { return g; });
-    const Exact d = exact(cotangent, n, 1);
+    const ExactMatrix d = exact(cotangent, n, 1);
     compare_matrix(got[1], v * d.col(0).asDiagonal() * v.transpose(), scale, error);
   };
   check({1, 1, 1, 1, 1, 1}, 1);

@@ -206,6 +206,7 @@ TEST_CASE(
       CHECK(grad_to_tensor(hidden).data == std::vector<double>{3, 5});
     else
       CHECK_THROWS_WITH(hidden.grad(), Contains("keep_grad()"));
+    if (!kept) CHECK_THROWS_WITH(tape.keep_grad(hidden), Contains("must be called before the backward"));
   }
 }
 

@@ -163,7 +163,10 @@ class Tape {
   /// @}
   /// Has the next backward compute dL/dv for Var::grad(), also where v is the output of a layer with a ReLU.
   /// Costs such a layer a pass over its output. @return v
+  /// @throws ValueError if a backward came before
   Var<T> keep_grad(Var<T> v) {
+    if (v.slot_->rectified && v.slot_->grad)
+      throw ValueError("[keep_grad] must be called before the backward that computes the gradient");
     v.slot_->rectified = false;
     return v;
   }

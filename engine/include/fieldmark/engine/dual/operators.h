@@ -1,6 +1,7 @@
 #pragma once
 #include <fieldmark/engine/dual/arithmetic.h>
 #include <fieldmark/engine/dual/math.h>
+#include <fieldmark/engine/ops/fused.h>
 #include <fieldmark/engine/ops/operators.h>
 
 namespace fieldmark {
@@ -62,5 +63,10 @@ Dual<T> operator/(std::type_identity_t<T> number, const Dual<T>& a) {
   return scale(reciprocal(a), static_cast<double>(number));
 }
 /// @}
+
+/// f of Duals, op by op: see ops/fused.h.
+template <class F, class First, class... Rest>
+requires detail::AnyDual<First, Rest...>
+auto fused(F f, const First& first, const Rest&... rest) { return f(first, rest...); }
 
 }  // namespace fieldmark

@@ -3,6 +3,7 @@
 #include <fieldmark/engine/tape.h>
 
 #include <array>
+#include <type_traits>
 #include <utility>
 
 namespace fieldmark {
@@ -26,7 +27,7 @@ Var<T> run_chain(const Chain& chain, std::span<const Var<T>> inputs, std::source
 /// @throws ShapeError if they do not   @throws ValueError if f has too many steps, or an input was recorded
 /// on another tape
 template <class T, class F, class... Rest>
-Var<T> fused(F f, Var<T> first, Rest... rest) {
+requires(std::is_same_v<Rest, Var<T>>&&...) Var<T> fused(F f, Var<T> first, Rest... rest) {
   constexpr std::size_t n = 1 + sizeof...(Rest);
   static_assert(n <= Chain::kMaxInputs, "fused: too many inputs");
   const std::array<Var<T>, n> inputs{first, rest...};
