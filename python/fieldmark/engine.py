@@ -7,63 +7,193 @@
     x.grad
 
 A value holds until ``tape.reset()``. Arrays that ``numpy()`` and ``grad`` give show the tape's own memory;
-while one of them lives, the tape refuses to be reset.
+while one of them lives, the tape refuses to be reset. Arrays that a tape reads are read-only until then.
 """
 
 from __future__ import annotations
 
-from typing import Callable, Sequence, Union
+from typing import Any, Callable, Literal, Sequence, Type, Union, overload
 
 import numpy as np
+import numpy.typing as npt
 
 from . import _fieldmark
-from ._fieldmark import (  # noqa: F401
-    GradcheckReport, abs, broadcast_to, cholesky, clamp, concatenate, conv2d, cos, cumsum, dense, detach,
-    determinant, equal, exp, expm1, gather, gelu, global_avg_pool, greater, huber_loss, inverse, l1_loss,
-    layer_norm, less, log, log1p, log_determinant, logsumexp, matmul, max, max_pool, maximum, mean, minimum,
-    mse_loss, negate, pad, permute, reciprocal, relu, reshape, scatter_add, sigmoid, silu, sin, slice, softmax,
-    softmax_cross_entropy, softplus, solve, sqrt, square, sum, symmetric_eigenvalues, tanh, transpose,
-    upsample_nearest, variance, where)
+from ._fieldmark import (
+    Adam_float32, Adam_float64, BatchNorm_float32, BatchNorm_float64, BatchStatistics, Conv2d_float32,
+    Conv2d_float64, Dense_float32, Dense_float64, GradcheckReport, GroupNorm_float32, GroupNorm_float64,
+    Inspector_float32, Inspector_float64, OpCost, Parameters_float32, Parameters_float64, SafetensorsFile,
+    Sgd_float32, Sgd_float64, Tape_float32, Tape_float64, Value_float32, Value_float64,
+    abs, affine, avg_pool, batch_norm, batch_norm_fixed, bce_with_logits, broadcast_to, cholesky, clamp,
+    concatenate, conv2d, cos, cosine_decay, cumsum, dense, detach, determinant, elu, equal, exp, expm1,
+    exponential_decay, feature_distance, gather, gelu, global_avg_pool, greater, group_norm, huber_loss, inverse,
+    l1_loss, layer_norm, leaky_relu, less, load_state, log, log1p, log_determinant, logsumexp, matmul, max,
+    max_pool, maximum, mean, minimum, mse_loss, negate, pad, permute, reciprocal, relu, reshape, save_state,
+    scatter_add, sigmoid, silu, sin, slice, softmax, softmax_cross_entropy, softplus, solve, space_to_depth, sqrt,
+    square, step_decay, sum, symmetric_eigenvalues, tanh, transpose, triangular_solve, truncated_exp,
+    upsample_nearest, upsample_to, variance, warm_up, weighted_mean, where)
 
-Value = Union[_fieldmark.Value_float32, _fieldmark.Value_float64]
+__all__ = [
+    "Adam", "Adam_float32", "Adam_float64", "BatchNorm", "BatchNorm_float32", "BatchNorm_float64",
+    "BatchStatistics", "Conv2d", "Conv2d_float32", "Conv2d_float64", "Dense", "Dense_float32", "Dense_float64",
+    "GradcheckReport", "GroupNorm", "GroupNorm_float32", "GroupNorm_float64", "Inspector", "Inspector_float32",
+    "Inspector_float64", "OpCost", "Parameters", "Parameters_float32", "Parameters_float64", "SafetensorsFile",
+    "Sgd", "Sgd_float32", "Sgd_float64", "Tape", "Tape_float32", "Tape_float64", "Value", "Value_float32",
+    "Value_float64", "abs", "affine", "avg_pool", "batch_norm", "batch_norm_fixed", "bce_with_logits",
+    "broadcast_to", "cholesky", "clamp", "concatenate", "conv2d", "cos", "cosine_decay", "cumsum", "dense",
+    "detach", "determinant", "elu", "equal", "exp", "expm1", "exponential_decay", "feature_distance", "gather",
+    "gelu", "global_avg_pool", "gradcheck", "greater", "group_norm", "huber_loss", "inverse", "l1_loss",
+    "layer_norm", "leaky_relu", "less", "load_state", "log", "log1p", "log_determinant", "logsumexp", "matmul",
+    "max", "max_pool", "maximum", "mean", "minimum", "mse_loss", "negate", "pad", "permute", "reciprocal",
+    "relu", "reshape", "save_state", "scatter_add", "sigmoid", "silu", "sin", "slice", "softmax",
+    "softmax_cross_entropy", "softplus", "solve", "space_to_depth", "sqrt", "square", "step_decay", "sum",
+    "symmetric_eigenvalues", "tanh", "transpose", "triangular_solve", "truncated_exp", "upsample_nearest",
+    "upsample_to", "variance", "warm_up", "weighted_mean", "where",
+]
+
+Value = Union[Value_float32, Value_float64]
+Float32 = Union[Literal["float32"], Type[np.float32]]
+Float64 = Union[Literal["float64"], Type[np.float64]]
 
 
-def _of(name: str, dtype: object):
-    kind = np.dtype(dtype).name
+def _of(name: str, dtype: object) -> Any:
+    kind = np.dtype(dtype).name  # type: ignore[call-overload]
     if kind not in ("float32", "float64"):
         raise TypeError(f"[{name}] dtype must be float32 or float64, got {kind}")
     return getattr(_fieldmark, f"{name}_{kind}")
 
 
-def Tape(dtype: object = "float32") -> Union[_fieldmark.Tape_float32, _fieldmark.Tape_float64]:
+def _like(name: str, what: str, given: object) -> Any:
+    """The class for the scalar type of what it is made for: a tape or parameters."""
+    for kind in ("float32", "float64"):
+        if isinstance(given, getattr(_fieldmark, f"{what}_{kind}")):
+            return getattr(_fieldmark, f"{name}_{kind}")
+    raise TypeError(f"[{name}] {what.lower()} must be {what}(), got {type(given).__name__}")
+
+
+@overload
+def Tape(dtype: Float32 = "float32") -> Tape_float32: ...  # type: ignore[misc]
+@overload
+def Tape(dtype: Float64) -> Tape_float64: ...
+def Tape(dtype: object = "float32") -> Any:
     """A tape that records operations on arrays of one type."""
     return _of("Tape", dtype)()
 
 
-def Parameters(dtype: object = "float32") -> Union[_fieldmark.Parameters_float32, _fieldmark.Parameters_float64]:
+@overload
+def Parameters(dtype: Float32 = "float32") -> Parameters_float32: ...  # type: ignore[misc]
+@overload
+def Parameters(dtype: Float64) -> Parameters_float64: ...
+def Parameters(dtype: object = "float32") -> Any:
     """All parameters of a model in one buffer, with their gradients in another."""
     return _of("Parameters", dtype)()
 
 
-def _optimiser(name: str, parameters, options):
-    kind = "float64" if isinstance(parameters, _fieldmark.Parameters_float64) else "float32"
-    return getattr(_fieldmark, f"{name}_{kind}")(parameters, **options)
-
-
-def Adam(parameters, *, lr: float = 1e-3, beta1: float = 0.9, beta2: float = 0.999, eps: float = 1e-8,
-         weight_decay: float = 0.0):
+@overload
+def Adam(parameters: Parameters_float32, *, lr: float = ..., beta1: float = ..., beta2: float = ...,
+         eps: float = ..., weight_decay: float = ...) -> Adam_float32: ...
+@overload
+def Adam(parameters: Parameters_float64, *, lr: float = ..., beta1: float = ..., beta2: float = ...,
+         eps: float = ..., weight_decay: float = ...) -> Adam_float64: ...
+def Adam(parameters: Any, *, lr: float = 1e-3, beta1: float = 0.9, beta2: float = 0.999, eps: float = 1e-8,
+         weight_decay: float = 0.0) -> Any:
     """Adam (Kingma and Ba 2015); its weight decay is decoupled, as AdamW's (Loshchilov and Hutter 2019)."""
-    return _optimiser("Adam", parameters,
-                      {"lr": lr, "beta1": beta1, "beta2": beta2, "eps": eps, "weight_decay": weight_decay})
+    return _like("Adam", "Parameters", parameters)(parameters, lr, beta1, beta2, eps, weight_decay)
 
 
-def Sgd(parameters, *, lr: float = 1e-2, momentum: float = 0.0, nesterov: bool = False, weight_decay: float = 0.0):
+@overload
+def Sgd(parameters: Parameters_float32, *, lr: float = ..., momentum: float = ..., nesterov: bool = ...,
+        weight_decay: float = ...) -> Sgd_float32: ...
+@overload
+def Sgd(parameters: Parameters_float64, *, lr: float = ..., momentum: float = ..., nesterov: bool = ...,
+        weight_decay: float = ...) -> Sgd_float64: ...
+def Sgd(parameters: Any, *, lr: float = 1e-2, momentum: float = 0.0, nesterov: bool = False,
+        weight_decay: float = 0.0) -> Any:
     """Stochastic gradient descent with momentum."""
-    return _optimiser("Sgd", parameters,
-                      {"lr": lr, "momentum": momentum, "nesterov": nesterov, "weight_decay": weight_decay})
+    return _like("Sgd", "Parameters", parameters)(parameters, lr, momentum, nesterov, weight_decay)
 
 
-def gradcheck(f: Callable[..., Value], inputs: Sequence[np.ndarray], rtol: float = 1e-7) -> GradcheckReport:
+@overload
+def Dense(parameters: Parameters_float32, name: str, inputs: int, outputs: int, *, seed: int,
+          relu: bool = ...) -> Dense_float32: ...
+@overload
+def Dense(parameters: Parameters_float64, name: str, inputs: int, outputs: int, *, seed: int,
+          relu: bool = ...) -> Dense_float64: ...
+def Dense(parameters: Any, name: str, inputs: int, outputs: int, *, seed: int, relu: bool = False) -> Any:
+    """An affine layer: ``layer(x)`` is x W + b of rows x [N, inputs], with ``relu`` max(x W + b, 0).
+
+    Its parameters are NAME/weight [inputs, outputs], uniform in +-sqrt(6 / inputs) at first (He et al. 2015), and
+    NAME/bias [outputs], 0 at first.
+    """
+    return _like("Dense", "Parameters", parameters)(parameters, name, inputs, outputs, relu, seed)
+
+
+@overload
+def Conv2d(parameters: Parameters_float32, name: str, inputs: int, outputs: int, *, seed: int, kernel: int = ...,
+           relu: bool = ...) -> Conv2d_float32: ...
+@overload
+def Conv2d(parameters: Parameters_float64, name: str, inputs: int, outputs: int, *, seed: int, kernel: int = ...,
+           relu: bool = ...) -> Conv2d_float64: ...
+def Conv2d(parameters: Any, name: str, inputs: int, outputs: int, *, seed: int, kernel: int = 3,
+           relu: bool = False) -> Any:
+    """A convolution of images [N, H, W, inputs] that keeps their size: ``layer(x)``.
+
+    Its parameters are NAME/weight [kernel, kernel, inputs, outputs], uniform in +-sqrt(6 / (kernel^2 inputs)) at
+    first (He et al. 2015), and NAME/bias [outputs], 0 at first.
+
+    :param kernel: side of the window, odd
+    """
+    return _like("Conv2d", "Parameters", parameters)(parameters, name, inputs, outputs, kernel, relu, seed)
+
+
+@overload
+def BatchNorm(parameters: Parameters_float32, name: str, channels: int, *, eps: float = ...,
+              relu: bool = ...) -> BatchNorm_float32: ...
+@overload
+def BatchNorm(parameters: Parameters_float64, name: str, channels: int, *, eps: float = ...,
+              relu: bool = ...) -> BatchNorm_float64: ...
+def BatchNorm(parameters: Any, name: str, channels: int, *, eps: float = 1e-5, relu: bool = False) -> Any:
+    """Batch normalisation of images [N, H, W, channels].
+
+        statistics = engine.BatchStatistics()
+        y = layer(x, statistics)      # with the statistics of the batch
+        layer.update(statistics)      # running averages
+        y = layer.evaluate(x)         # with the running averages
+
+    Its parameters are NAME/gamma, NAME/beta, and the running NAME/running_mean and NAME/running_variance.
+    """
+    return _like("BatchNorm", "Parameters", parameters)(parameters, name, channels, eps, relu)
+
+
+@overload
+def GroupNorm(parameters: Parameters_float32, name: str, channels: int, *, groups: int = ..., eps: float = ...,
+              relu: bool = ...) -> GroupNorm_float32: ...
+@overload
+def GroupNorm(parameters: Parameters_float64, name: str, channels: int, *, groups: int = ..., eps: float = ...,
+              relu: bool = ...) -> GroupNorm_float64: ...
+def GroupNorm(parameters: Any, name: str, channels: int, *, groups: int = 8, eps: float = 1e-5,
+              relu: bool = False) -> Any:
+    """Group normalisation of images [N, H, W, channels]: ``layer(x)``. Its parameters are NAME/gamma and NAME/beta."""
+    return _like("GroupNorm", "Parameters", parameters)(parameters, name, channels, groups, eps, relu)
+
+
+@overload
+def Inspector(tape: Tape_float32, *, stop_at_nonfinite: bool = ...) -> Inspector_float32: ...
+@overload
+def Inspector(tape: Tape_float64, *, stop_at_nonfinite: bool = ...) -> Inspector_float64: ...
+def Inspector(tape: Any, *, stop_at_nonfinite: bool = False) -> Any:
+    """Looks at what a tape records, until ``close()`` or the end of a ``with`` block.
+
+        with engine.Inspector(tape, stop_at_nonfinite=True) as inspector:
+            ...
+            print(inspector.cost_table())
+
+    :param stop_at_nonfinite: raises ValueError where the first NaN or infinity arises, forward or backward
+    """
+    return _like("Inspector", "Tape", tape)(tape, stop_at_nonfinite)
+
+
+def gradcheck(f: Callable[..., Value_float64], inputs: Sequence[npt.NDArray[np.float64]],
+              rtol: float = 1e-7) -> GradcheckReport:
     """Compares gradients with finite differences, in float64.
 
     :param f: takes a value for each input and returns one

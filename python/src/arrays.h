@@ -5,7 +5,10 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include <memory>
+#include <span>
 #include <string>
+#include <vector>
 
 namespace fieldmark::python {
 
@@ -16,16 +19,22 @@ const char* dtype_name() {
   return std::is_same_v<T, float> ? "float32" : std::is_same_v<T, double> ? "float64" : "int32";
 }
 
+/// The name of an object's type, for errors.
+inline std::string type_name(const py::handle& object) {
+  return py::str(py::type::of(object).attr("__name__")).cast<std::string>();
+}
+
 /// A numpy array of T in row-major order: its elements are borrowed, not copied.
 /// @param where  "function: argument", for errors
-/// @throws TypeError for another type of element   @throws ValueError for another layout
+/// @throws TypeError for another type of element, or a mask   @throws ValueError for another layout
 template <class T>
 py::array borrowed(const std::string& where, const py::object& object) {
   const std::string wanted = dtype_name<T>();
   if (!py::isinstance<py::array>(object))
-    throw py::type_error("[" + where + "] must be a numpy array of " + wanted + ", got " +
-                         py::str(py::type::of(object).attr("__name__")).cast<std::string>());
+    throw py::type_error("[" + where + "] must be a numpy array of " + wanted + ", got " + type_name(object));
   const auto array = py::reinterpret_borrow<py::array>(object);
+  if (py::hasattr(object, "mask"))  // a masked array is an array whose elements do not all count
+    throw py::type_error("[" + where + "] must not be masked: pass x.filled(value)");
   if (!array.dtype().is(py::dtype::of<T>()) && !array.dtype().equal(py::dtype::of<T>()))
     throw py::type_error("[" + where + "] must be of " + wanted + ", got " +
                          py::str(array.dtype()).cast<std::string>() + ": convert it with x.astype('" +
@@ -33,6 +42,9 @@ py::array borrowed(const std::string& where, const py::object& object) {
   if (!(array.flags() & py::array::c_style))
     throw py::value_error("[" + where +
                           "] must be contiguous in row-major order: pass numpy.ascontiguousarray(x)");
+  if (!(array.flags() & py::detail::npy_api::NPY_ARRAY_ALIGNED_))
+    throw py::value_error("[" + where + "] must be aligned to the " + std::to_string(sizeof(T)) +
+                          " bytes of its elements: pass x.copy()");
   return array;
 }
 
@@ -58,17 +70,27 @@ class Leases {
   /// Keeps `owner` alive, and counts, until the object dies.
   template <class Owner>
   py::capsule lend(std::shared_ptr<Owner> owner) {
-    struct Lease {
-      std::shared_ptr<Owner> owner;
-      std::shared_ptr<int> count;
-      ~Lease() { --*count; }
-    };
     ++*count_;
-    return py::capsule(new Lease{std::move(owner), count_}, [](void* p) { delete static_cast<Lease*>(p); });
+    return py::capsule(new Lease{std::move(owner), count_}, kName, [](PyObject* capsule) {
+      delete static_cast<Lease*>(PyCapsule_GetPointer(capsule, kName));
+    });
   }
   int count() const { return *count_; }
+  /// Whose memory an array shows, if it is a lease's or shows a part of an array that is; else null.
+  static const void* owner(py::array array) {
+    py::object base = array.base();
+    while (base && py::isinstance<py::array>(base)) base = py::reinterpret_borrow<py::array>(base).base();
+    if (!base || !PyCapsule_IsValid(base.ptr(), kName)) return nullptr;
+    return static_cast<Lease*>(PyCapsule_GetPointer(base.ptr(), kName))->owner.get();
+  }
 
  private:
+  static constexpr const char* kName = "fieldmark lease";
+  struct Lease {
+    std::shared_ptr<void> owner;
+    std::shared_ptr<int> count;
+    ~Lease() { --*count; }
+  };
   std::shared_ptr<int> count_ = std::make_shared<int>(0);
 };
 
@@ -89,9 +111,6 @@ py::array_t<T> read_only_view(const T* elements, const Shape& shape, std::shared
 }
 
 void bind_engine(py::module_& module);
-/// Ops of float or double values.
-template <class T>
-void bind_ops(py::module_& module);
 void bind_fields(py::module_& module);
 void bind_marks(py::module_& module);
 

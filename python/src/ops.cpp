@@ -1,18 +1,14 @@
-// The ops that are functions: name(x), name(a, b), with their options.
+// The ops of elements, matrices and axes: name(x), name(a, b), with their options.
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/batched_matmul.h>
 #include <fieldmark/engine/ops/cholesky.h>
 #include <fieldmark/engine/ops/comparison.h>
-#include <fieldmark/engine/ops/conv2d.h>
-#include <fieldmark/engine/ops/dense.h>
 #include <fieldmark/engine/ops/determinant.h>
 #include <fieldmark/engine/ops/eigenvalues.h>
 #include <fieldmark/engine/ops/gather.h>
-#include <fieldmark/engine/ops/layer_norm.h>
 #include <fieldmark/engine/ops/layout.h>
 #include <fieldmark/engine/ops/linear_solve.h>
-#include <fieldmark/engine/ops/loss.h>
 #include <fieldmark/engine/ops/math.h>
 #include <fieldmark/engine/ops/pool.h>
 #include <fieldmark/engine/ops/reduce.h>
@@ -23,6 +19,8 @@
 #include <fieldmark/engine/ops/softmax.h>
 #include <pybind11/stl.h>
 
+#include <limits>
+
 #include "tape_value.h"
 
 namespace fieldmark::python {
@@ -30,84 +28,162 @@ namespace {
 
 using namespace py::literals;
 
-std::vector<int> axes_of(const py::object& axes) {
-  if (py::isinstance<py::int_>(axes)) return {axes.cast<int>()};
-  return axes.cast<std::vector<int>>();
+// None: all axes of x.
+template <class T>
+std::vector<int> axes_of(const char* op, const Value<T>& x, const py::object& axis) {
+  std::vector<int> axes;
+  if (axis.is_none()) {
+    for (int k = 0; k < x.get().shape().rank(); ++k) axes.push_back(k);
+    return axes;
+  }
+  const bool one = PyIndex_Check(axis.ptr()) && !py::isinstance<py::array>(axis);
+  try {
+    return one ? std::vector<int>{axis.cast<int>()} : axis.cast<std::vector<int>>();
+  } catch (const py::cast_error&) {
+    throw py::type_error("[" + std::string(op) +
+                         "] axis must be None, an integer or a sequence of integers, got " +
+                         py::repr(axis).cast<std::string>());
+  }
 }
 
-Shape shape_from(const std::vector<Index>& extents) { return Shape(std::span<const Index>(extents)); }
+// @throws ShapeError unless all extents are 0 or more and their product can be counted
+Shape shape_from(const char* op, const std::vector<Index>& extents) {
+  const Shape shape{std::span<const Index>(extents)};
+  Index size = 1;
+  for (const Index extent : extents)
+    if (extent < 0 || (extent > 0 && size > std::numeric_limits<Index>::max() / extent))
+      throw ShapeError("[" + std::string(op) +
+                       "] shape must have extents of 0 or more that fit into memory, got " + shape.str());
+    else
+      size *= std::max<Index>(extent, 1);
+  return shape;
+}
 
 // name(x) for ops of one value without options.
 template <class T>
 void bind_maps(py::module_& module) {
-  using Map = Var<T> (*)(Var<T>);
-  const std::pair<const char*, Map> maps[] = {{"relu", relu<T>},
-                                              {"sigmoid", sigmoid<T>},
-                                              {"tanh", tanh<T>},
-                                              {"exp", exp<T>},
-                                              {"softplus", softplus<T>},
-                                              {"silu", silu<T>},
-                                              {"gelu", gelu<T>},
-                                              {"negate", negate<T>},
-                                              {"reciprocal", reciprocal<T>},
-                                              {"abs", abs<T>},
-                                              {"square", square<T>},
-                                              {"sqrt", sqrt<T>},
-                                              {"log", log<T>},
-                                              {"log1p", log1p<T>},
-                                              {"expm1", expm1<T>},
-                                              {"sin", sin<T>},
-                                              {"cos", cos<T>},
-                                              {"inverse", inverse<T>},
-                                              {"cholesky", cholesky<T>},
-                                              {"determinant", determinant<T>},
-                                              {"log_determinant", log_determinant<T>},
-                                              {"symmetric_eigenvalues", symmetric_eigenvalues<T>},
-                                              {"global_avg_pool", global_avg_pool<T>},
-                                              {"detach", detach<T>}};
-  for (const auto& [name, map] : maps)
+  struct Map {
+    const char* name;
+    Var<T> (*map)(Var<T>);
+    const char* text;
+  };
+  const Map maps[] = {
+      {"relu", relu<T>, "max(x, 0); the gradient at 0 is 0."},
+      {"sigmoid", sigmoid<T>, "1 / (1 + exp(-x)), without overflow."},
+      {"tanh", tanh<T>, "The hyperbolic tangent."},
+      {"exp", exp<T>, "exp(x); in float32 it stays finite, at most exp(88)."},
+      {"truncated_exp", truncated_exp<T>, "exp(min(x, 15)), for densities; its gradient is y everywhere."},
+      {"softplus", softplus<T>, "log(1 + exp(x)), without overflow."},
+      {"silu", silu<T>, "x / (1 + exp(-x)), also called swish."},
+      {"gelu", gelu<T>, "x P(x), P the distribution function of the standard normal."},
+      {"negate", negate<T>, "-x."},
+      {"reciprocal", reciprocal<T>, "1 / x."},
+      {"abs", abs<T>, "|x|; the gradient at 0 is 0."},
+      {"square", square<T>, "x^2."},
+      {"sqrt", sqrt<T>, "The square root; NaN below 0."},
+      {"log", log<T>, "The natural logarithm; -infinity at 0, NaN below."},
+      {"log1p", log1p<T>, "log(1 + x), exact also for small x."},
+      {"expm1", expm1<T>, "exp(x) - 1, exact also for small x."},
+      {"sin", sin<T>, "The sine of x in radians."},
+      {"cos", cos<T>, "The cosine of x in radians."},
+      {"inverse", inverse<T>, "Inverses of matrices [.., n, n]. ValueError if one is singular."},
+      {"cholesky", cholesky<T>,
+       "The lower triangular L with L L^T = x of matrices [.., n, n]. ValueError if one is not positive "
+       "definite."},
+      {"determinant", determinant<T>, "Determinants [..] of matrices [.., n, n], singular ones too."},
+      {"log_determinant", log_determinant<T>,
+       "log |det x| [..] of matrices [.., n, n]. ValueError if one is singular."},
+      {"symmetric_eigenvalues", symmetric_eigenvalues<T>,
+       "Eigenvalues [.., n] of symmetric matrices [.., n, n], ascending."},
+      {"global_avg_pool", global_avg_pool<T>, "The mean [N, C] over the pixels of images [N, H, W, C]."},
+      {"space_to_depth", space_to_depth<T>,
+       "Moves blocks of 2 x 2 pixels into channels: [N, H, W, C] to [N, H / 2, W / 2, 4 C]."},
+      {"detach", detach<T>, "The values of x as a constant: no gradient passes."}};
+  for (const Map& m : maps)
     module.def(
-        name, [map = map](const Value<T>& x) { return x.with(map(x.get())); }, "x"_a);
+        m.name, [map = m.map](const Value<T>& x) { return x.with(map(x.get())); }, "x"_a, once<T>(m.text));
 }
 
 // name(a, b).
 template <class T>
 void bind_pairs(py::module_& module) {
-  using Pair = Var<T> (*)(Var<T>, Var<T>);
-  const std::pair<const char*, Pair> pairs[] = {
-      {"minimum", minimum<T>}, {"maximum", maximum<T>},       {"greater", greater<T>}, {"less", less<T>},
-      {"equal", equal<T>},     {"matmul", batched_matmul<T>}, {"solve", solve<T>}};
-  for (const auto& [name, pair] : pairs)
+  struct Pair {
+    const char* name;
+    Var<T> (*pair)(Var<T>, Var<T>);
+    const char* text;
+  };
+  const Pair pairs[] = {
+      {"minimum", minimum<T>, "The smaller of a and b, which broadcast; NaN where either is."},
+      {"maximum", maximum<T>, "The larger of a and b, which broadcast; NaN where either is."},
+      {"greater", greater<T>, "1 where a > b, else 0; no gradient passes."},
+      {"less", less<T>, "1 where a < b, else 0; no gradient passes."},
+      {"equal", equal<T>, "1 where a = b, else 0; no gradient passes."},
+      {"matmul", batched_matmul<T>, "Products [.., m, n] of matrices [.., m, k] and [.., k, n], also a @ b."},
+      {"solve", solve<T>, "x of a x = b, a [.., n, n], b [.., n, k]. ValueError if a matrix is singular."}};
+  for (const Pair& p : pairs)
     module.def(
-        name, [pair = pair](const Value<T>& a, const Value<T>& b) { return a.with(pair(a.get(), b.get())); },
-        "a"_a, "b"_a);
+        p.name,
+        [pair = p.pair](const Value<T>& a, const Value<T>& b) { return a.with(pair(a.get(), b.get())); },
+        "a"_a, "b"_a, once<T>(p.text));
+}
+
+// Maps and pairs with numbers.
+template <class T>
+void bind_maps_with_options(py::module_& module) {
+  using V = const Value<T>&;
+  module.def(
+      "leaky_relu", [](V x, double slope) { return x.with(leaky_relu(x.get(), slope)); }, "x"_a,
+      "slope"_a = 0.01, once<T>("x where x > 0, else slope x."));
+  module.def(
+      "elu", [](V x, double alpha) { return x.with(elu(x.get(), alpha)); }, "x"_a, "alpha"_a = 1.0,
+      once<T>("x where x > 0, else alpha (exp(x) - 1)."));
+  module.def(
+      "affine", [](V x, double factor, double offset) { return x.with(affine(x.get(), factor, offset)); },
+      "x"_a, "factor"_a, "offset"_a, once<T>("factor x + offset."));
+  module.def(
+      "clamp", [](V x, double low, double high) { return x.with(clamp(x.get(), low, high)); }, "x"_a, "low"_a,
+      "high"_a, once<T>("min(max(x, low), high); the gradient passes where low <= x <= high."));
+  module.def(
+      "triangular_solve",
+      [](V a, V b, bool upper, bool transposed) {
+        return a.with(triangular_solve(a.get(), b.get(), Triangle{.upper = upper, .transposed = transposed}));
+      },
+      "a"_a, "b"_a, "upper"_a = false, "transposed"_a = false,
+      once<T>(
+          "x of T x = b, T a triangle of a [.., n, n], or its transpose; b [.., n, k]. ValueError if T is\n"
+          "singular."));
+  module.def(
+      "where", [](V mask, V a, V b) { return a.with(where(mask.get(), a.get(), b.get())); }, "mask"_a, "a"_a,
+      "b"_a, once<T>("a where the mask is not 0, b where it is; the mask broadcasts."));
 }
 
 // Reductions over all elements, or over some axes.
 template <class T>
 void bind_reductions(py::module_& module) {
-  using Reduce = Var<T> (*)(Var<T>, const Axes&, KeepAxes);
-  const std::pair<const char*, Reduce> reductions[] = {{"sum", sum<T>},
-                                                       {"mean", mean<T>},
-                                                       {"variance", variance<T>},
-                                                       {"max", max<T>},
-                                                       {"logsumexp", logsumexp<T>}};
-  for (const auto& [name, reduce] : reductions)
+  struct Reduction {
+    const char* name;
+    Var<T> (*reduce)(Var<T>, const Axes&, KeepAxes);
+    const char* text;
+  };
+  const Reduction reductions[] = {
+      {"sum", sum<T>, "The sum over some axes, or over all; 0 of nothing."},
+      {"mean", mean<T>, "The mean over some axes, or over all. ShapeError of nothing."},
+      {"variance", variance<T>,
+       "The mean of (x - mean)^2 over some axes, or over all. ShapeError of nothing."},
+      {"max", max<T>, "The largest element over some axes, or over all. ShapeError of nothing."},
+      {"logsumexp", logsumexp<T>, "log sum exp(x) over some axes, or over all. ShapeError of nothing."}};
+  for (const Reduction& r : reductions)
     module.def(
-        name,
-        [reduce = reduce](const Value<T>& x, const py::object& axis, bool keepdims) {
-          std::vector<int> axes;
-          if (axis.is_none())
-            for (int k = 0; k < x.get().shape().rank(); ++k) axes.push_back(k);
-          else
-            axes = axes_of(axis);
+        r.name,
+        [r](const Value<T>& x, const py::object& axis, bool keepdims) {
+          const std::vector<int> axes = axes_of(r.name, x, axis);
           return x.with(
-              reduce(x.get(), Axes(std::span<const int>(axes)), keepdims ? KeepAxes::yes : KeepAxes::no));
+              r.reduce(x.get(), Axes(std::span<const int>(axes)), keepdims ? KeepAxes::yes : KeepAxes::no));
         },
-        "x"_a, "axis"_a = py::none(), "keepdims"_a = false);
+        "x"_a, "axis"_a = py::none(), "keepdims"_a = false, once<T>(r.text));
   module.def(
       "softmax", [](const Value<T>& x, int axis) { return x.with(softmax(x.get(), axis)); }, "x"_a,
-      "axis"_a = -1);
+      "axis"_a = -1, once<T>("exp(x) / sum exp(x) over one axis, shifted so that nothing overflows."));
 }
 
 template <class T>
@@ -115,39 +191,41 @@ void bind_layout(py::module_& module) {
   module.def(
       "reshape",
       [](const Value<T>& x, const std::vector<Index>& shape) {
-        return x.with(reshape(x.get(), shape_from(shape)));
+        return x.with(reshape(x.get(), shape_from("reshape", shape)));
       },
-      "x"_a, "shape"_a);
+      "x"_a, "shape"_a, once<T>("The same elements, row-major, under another shape."));
   module.def(
       "broadcast_to",
       [](const Value<T>& x, const std::vector<Index>& shape) {
-        return x.with(broadcast_to(x.get(), shape_from(shape)));
+        return x.with(broadcast_to(x.get(), shape_from("broadcast_to", shape)));
       },
-      "x"_a, "shape"_a);
+      "x"_a, "shape"_a, once<T>("Repeats x along axes of extent 1 and along new axes in front."));
   module.def(
       "permute",
       [](const Value<T>& x, const std::vector<int>& order) {
         return x.with(permute(x.get(), std::span<const int>(order)));
       },
-      "x"_a, "order"_a);
+      "x"_a, "order"_a,
+      once<T>("Puts the axes into another order: axis k of the result is axis order[k] of x."));
   module.def(
       "transpose", [](const Value<T>& x, int a, int b) { return x.with(transpose(x.get(), a, b)); }, "x"_a,
-      "a"_a = -2, "b"_a = -1);
+      "a"_a = -2, "b"_a = -1, once<T>("Exchanges two axes; by default the last two."));
   module.def(
       "pad",
       [](const Value<T>& x, int axis, Index before, Index after, double value) {
         return x.with(pad(x.get(), axis, before, after, value));
       },
-      "x"_a, "axis"_a, "before"_a, "after"_a, "value"_a = 0.0);
+      "x"_a, "axis"_a, "before"_a, "after"_a, "value"_a = 0.0,
+      once<T>("Adds constant elements before and after those of an axis."));
   module.def(
       "cumsum", [](const Value<T>& x, int axis) { return x.with(cumsum(x.get(), axis)); }, "x"_a,
-      "axis"_a = -1);
+      "axis"_a = -1, once<T>("Running sums along an axis."));
   module.def(
       "slice",
       [](const Value<T>& x, int axis, Index begin, Index count) {
         return x.with(slice(x.get(), axis, begin, count));
       },
-      "x"_a, "axis"_a, "begin"_a, "count"_a);
+      "x"_a, "axis"_a, "begin"_a, "count"_a, once<T>("Entries begin .. begin + count - 1 of an axis."));
   module.def(
       "concatenate",
       [](const std::vector<Value<T>>& xs, int axis) {
@@ -156,21 +234,40 @@ void bind_layout(py::module_& module) {
         for (const auto& x : xs) vars.push_back(x.get());
         return xs.front().with(concatenate(std::span<const Var<T>>(vars), axis));
       },
-      "xs"_a, "axis"_a = -1);
+      "xs"_a, "axis"_a = -1, once<T>("Joins values along an axis; their other axes are alike."));
 }
 
+<<<<<<< HEAD
+=======
+// The indices outlive the pass: gather's backward reads them.
+template <class T>
+Reading<std::int32_t> indices(const char* where, const Value<T>& x, const py::object& given) {
+  const py::array index = x.tape->template reads<std::int32_t>(where, given);
+  if (index.ndim() != 1)
+    throw ShapeError("[" + std::string(where) + "] must have one axis, got shape " + shape_of(index).str());
+  return {index, elements<std::int32_t>(index)};
+}
+
+>>>>>>> origin/h6-python
 template <class T>
 void bind_indexing(py::module_& module) {
   module.def(
       "gather",
       [](const Value<T>& x, int axis, const py::object& index) {
+<<<<<<< HEAD
         const py::array array = borrowed<std::int32_t>("gather: index", index);
         return x.with(gather(x.get(), axis, elements<std::int32_t>(array)));
+=======
+        const auto read = indices("gather: index", x, index);
+        return x.with(gather(x.get(), axis, read.elements), read);
+>>>>>>> origin/h6-python
       },
-      "x"_a, "axis"_a, "index"_a);
+      "x"_a, "axis"_a, "index"_a,
+      once<T>("Entries of an axis by an index [N] of int32 in [0, extent), repeats allowed."));
   module.def(
       "scatter_add",
       [](const Value<T>& x, int axis, const py::object& index, Index extent) {
+<<<<<<< HEAD
         const py::array array = borrowed<std::int32_t>("scatter_add: index", index);
         return x.with(scatter_add(x.get(), axis, elements<std::int32_t>(array), extent));
       },
@@ -232,6 +329,14 @@ void bind_layers(py::module_& module) {
         return logits.with(softmax_cross_entropy(logits.get(), elements<std::int32_t>(array)));
       },
       "logits"_a, "labels"_a);
+=======
+        const auto read = indices("scatter_add: index", x, index);
+        return x.with(scatter_add(x.get(), axis, read.elements, extent), read);
+      },
+      "x"_a, "axis"_a, "index"_a, "extent"_a,
+      once<T>("Adds entry i of an axis to entry index[i] of one with this extent; index [N] of int32 in [0, "
+              "extent)."));
+>>>>>>> origin/h6-python
 }
 
 }  // namespace
@@ -240,10 +345,10 @@ template <class T>
 void bind_ops(py::module_& module) {
   bind_maps<T>(module);
   bind_pairs<T>(module);
+  bind_maps_with_options<T>(module);
   bind_reductions<T>(module);
   bind_layout<T>(module);
   bind_indexing<T>(module);
-  bind_layers<T>(module);
 }
 template void bind_ops<float>(py::module_&);
 template void bind_ops<double>(py::module_&);

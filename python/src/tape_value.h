@@ -1,26 +1,86 @@
 #pragma once
-// The tape and its values as Python holds them.
-#include <fieldmark/engine/adam.h>
+// Tapes, their values and stores of parameters as Python holds them.
 #include <fieldmark/engine/params.h>
-#include <fieldmark/engine/sgd.h>
 #include <fieldmark/engine/tape.h>
 
-#include "arrays.h"
+#include <algorithm>
+#include <string_view>
+
+#include "held_arrays.h"
 
 namespace fieldmark::python {
 
-/// A tape, the arrays that its pass reads, and a count of the arrays that show its memory.
+/// A store of parameters; while a pass, an array or an optimiser refers to its memory, it takes no more.
+template <class T>
+struct StoreHandle {
+  ParamStore<T> store;
+  Leases leases;
+  std::uint64_t changes = 0;  // of values, by steps and by files
+
+  /// The store, to add parameters to.
+  /// @param where  for errors   @throws BufferError if its memory is referred to
+  ParamStore<T>& open(std::string_view where) {
+    if (leases.count() > 0)
+      throw py::buffer_error("[" + std::string(where) + "] " + std::to_string(leases.count()) +
+                             " arrays, passes or optimisers refer to the parameters: add all of them first");
+    return store;
+  }
+};
+
+/// A tape, what its pass reads, and a count of the arrays that show its memory.
 template <class T>
 struct TapeHandle {
   std::unique_ptr<Tape<T>> own;  // null: the tape is another's
   Tape<T>& tape;
   std::uint64_t pass = 0;
-  std::vector<py::object> inputs;
   Leases views;
 
   TapeHandle() : own(std::make_unique<Tape<T>>()), tape(*own) {}
   explicit TapeHandle(Tape<T>& others) : tape(others) {}
 
+  /// An array of U for an op to read; once the op is recorded, keep() it.
+  /// @throws ValueError if this pass adds gradients to it, or it shows a value of this pass, which would keep
+  /// the array, and the array the pass
+  template <class U = T>
+  py::array reads(const char* where, const py::object& given) const {
+    py::array array = borrowed<U>(where, given);
+    if (Leases::owner(array) == this)
+      throw py::value_error(std::string("[") + where +
+                            "] shows a value of the same tape: pass x.copy(), or use engine.detach(value)");
+    memory_.check_read(where, memory_of(array));
+    return array;
+  }
+  /// Holds what the pass reads until it ends.
+  void keep(const py::array& array) {
+    memory_.add_read(memory_of(array));
+    held_.hold(array);
+  }
+  /// The same of a leaf, whose gradient is added to another array.
+  /// @throws ValueError if `grads` is an array that the pass reads
+  void keep(const py::array& values, const py::array& grads) {
+    memory_.check_leaf("leaf", memory_of(values), memory_of(grads));
+    memory_.add_leaf(memory_of(values), memory_of(grads));
+    held_.hold(values);
+    grads_.push_back(grads);
+  }
+  /// Parameters of a pass read a store, and its gradients are added to.
+  void reads(const std::shared_ptr<StoreHandle<T>>& store) {
+    for (const Read& r : stores_)
+      if (r.store == store) return;
+    const auto values = store->store.values(), grads = store->store.grads();
+    const Memory read{values.data(), values.size_bytes()}, added_to{grads.data(), grads.size_bytes()};
+    memory_.check_leaf("parameters", read, added_to);
+    memory_.add_leaf(read, added_to);
+    stores_.push_back({store, store->leases.lend(store), store->changes});
+  }
+  /// @throws ValueError if a step or a file has changed parameters since the pass read them
+  void check_unchanged() const {
+    for (const Read& r : stores_)
+      if (r.store->changes != r.changes)
+        throw py::value_error(
+            "[backward] the parameters have changed since this pass read them: record it again");
+  }
+  /// Ends the pass. @throws BufferError while arrays show its values
   void reset() {
     if (!own) throw py::value_error("[reset] the tape of a gradient check is not yours to reset");
     if (views.count() > 0)
@@ -28,9 +88,34 @@ struct TapeHandle {
           "[reset] " + std::to_string(views.count()) +
           " arrays show values of this pass: copy them with numpy.array(x), or delete them");
     tape.reset();
-    inputs.clear();
-    ++pass;
+    forget();
   }
+  /// Invalidates the values of the pass and lets go of what it reads.
+  void forget() {
+    ++pass;
+    held_.release();
+    memory_.forget();
+    grads_.clear();
+    stores_.clear();
+  }
+
+ private:
+  struct Read {
+    std::shared_ptr<StoreHandle<T>> store;
+    py::capsule lease;
+    std::uint64_t changes;
+  };
+  HeldArrays held_;
+  PassMemory memory_;
+  std::vector<py::array> grads_;
+  std::vector<Read> stores_;
+};
+
+/// An array that an op reads; none: the op does without.
+template <class U>
+struct Reading {
+  py::object array = py::none();
+  std::span<const U> elements = {};
 };
 
 /// A value of one pass.
@@ -47,24 +132,41 @@ struct Value {
       throw py::value_error("[value] it belongs to a pass that Tape.reset() has forgotten");
     return var;
   }
-  Value with(Var<T> v) const { return Value(tape, v); }
-};
+  /// A value of the same pass, and the arrays that its op reads.
+  template <class... U>
+  Value with(Var<T> v, const Reading<U>&... read) const {
+    (keep(read.array), ...);
+    return Value(tape, v);
+  }
 
-/// A store of parameters; while a pass or an array refers to its memory, it takes no more of them.
-template <class T>
-struct StoreHandle {
-  ParamStore<T> store;
-  Leases leases;
-
-  ParamId add(const std::string& name, const py::object& given) {
-    if (leases.count() > 0)
-      throw py::buffer_error("[Parameters.add] " + std::to_string(leases.count()) +
-                             " arrays or values of a pass refer to the parameters: add all of them first");
-    const py::array array = borrowed<T>("Parameters.add: values", given);
-    const ParamId id = store.add(name, shape_of(array));
-    std::ranges::copy(elements<T>(array), store.values(id).begin());
-    return id;
+ private:
+  void keep(const py::object& array) const {
+    if (!array.is_none()) tape->keep(py::reinterpret_borrow<py::array>(array));
   }
 };
+
+/// Documentation that an op of both scalar types shows once.
+template <class T>
+const char* once(const char* text) {
+  return std::is_same_v<T, float> ? text : "";
+}
+
+template <class T>
+void bind_tape(py::module_& module, const std::string& suffix);
+/// Stores, optimisers and files of their state.
+template <class T>
+void bind_parameters(py::module_& module, const std::string& suffix);
+/// Layers that register their parameters in a store.
+template <class T>
+void bind_layers(py::module_& module, const std::string& suffix);
+template <class T>
+void bind_inspector(py::module_& module, const std::string& suffix);
+/// @{
+/// Ops of float or double values: of single elements and axes; of images, rows and losses.
+template <class T>
+void bind_ops(py::module_& module);
+template <class T>
+void bind_network_ops(py::module_& module);
+/// @}
 
 }  // namespace fieldmark::python

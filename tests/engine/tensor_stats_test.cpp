@@ -98,7 +98,7 @@ TEST_CASE("tensor_stats: merged, they are those of all elements") {
   CHECK((nothing.count == 0 && nothing.mean == 0 && nothing.rms == 0));
 }
 
-TEST_CASE("tensor_stats: a store's tensors by name; running ones have no gradient") {
+TEST_CASE("tensor_stats: a store's tensors by name, of which running ones have no gradient") {
   ParamStore<float> store;
   const ParamId w = store.add("net/w", {2, 2}), m = store.add("net/mean", {2}, ParamRole::running),
                 b = store.add("net/b", {3});

@@ -72,7 +72,9 @@ template <class T>
 Eigen::PartialPivLU<Matrix> decompose(const char* op, Index which, const Matrix& m) {
   check_finite(op, which, m);
   Eigen::PartialPivLU<Matrix> lu(m);
-  const double rcond = m.rows() == 0 ? 1 : lu.rcond();
+  // Eigen's estimate divides by the pivots: one of 0 makes NaN, which it can lose.
+  const bool zero_pivot = (lu.matrixLU().diagonal().array() == 0).any();
+  const double rcond = zero_pivot ? 0 : m.rows() == 0 ? 1 : lu.rcond();
   if (!(rcond >= static_cast<double>(std::numeric_limits<T>::epsilon()))) {
     char text[80];
     std::snprintf(text, sizeof text, "must not be singular, got the reciprocal condition number %.2g", rcond);

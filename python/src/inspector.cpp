@@ -1,0 +1,54 @@
+// The inspector of a tape: its graph, its costs, the first NaN.
+#include <fieldmark/engine/inspect.h>
+#include <pybind11/stl.h>
+
+#include <optional>
+
+#include "tape_value.h"
+
+namespace fieldmark::python {
+namespace {
+
+using namespace py::literals;
+
+// An inspector and the tape that it watches, until it is closed.
+template <class T>
+struct InspectorHandle {
+  std::shared_ptr<TapeHandle<T>> tape;
+  std::optional<TapeInspector<T>> inspector;
+
+  InspectorHandle(std::shared_ptr<TapeHandle<T>> t, bool stop_at_nonfinite) : tape(std::move(t)) {
+    inspector.emplace(tape->tape, InspectOptions{.stop_at_nonfinite = stop_at_nonfinite});
+  }
+  const TapeInspector<T>& open() const {
+    if (!inspector) throw py::value_error("[Inspector] it is closed");
+    return *inspector;
+  }
+};
+
+}  // namespace
+
+template <class T>
+void bind_inspector(py::module_& module, const std::string& suffix) {
+  using Handle = InspectorHandle<T>;
+  py::class_<Handle>(module, ("Inspector_" + suffix).c_str())
+      .def(py::init<std::shared_ptr<TapeHandle<T>>, bool>(), "tape"_a, "stop_at_nonfinite"_a)
+      .def(
+          "text", [](const Handle& h) { return h.open().text(); },
+          "The graph of this pass, one line for each value.")
+      .def(
+          "dot", [](const Handle& h) { return h.open().dot(); }, "The same in the language of Graphviz.")
+      .def(
+          "costs", [](const Handle& h) { return h.open().costs(); },
+          "Time and memory by op since the inspector was made; the most expensive first.")
+      .def(
+          "cost_table", [](const Handle& h) { return h.open().cost_table(); }, "costs() as a table.")
+      .def(
+          "close", [](Handle& h) { h.inspector.reset(); }, "Stops watching the tape.")
+      .def("__enter__", [](py::object self) { return self; })
+      .def("__exit__", [](Handle& h, const py::args&) { h.inspector.reset(); });
+}
+template void bind_inspector<float>(py::module_&, const std::string&);
+template void bind_inspector<double>(py::module_&, const std::string&);
+
+}  // namespace fieldmark::python

@@ -1,0 +1,119 @@
+// Layers: they register their parameters by name and read them in each pass.
+#include <fieldmark/engine/nn/batch_norm.h>
+#include <fieldmark/engine/nn/conv2d.h>
+#include <fieldmark/engine/nn/dense.h>
+#include <fieldmark/engine/nn/group_norm.h>
+#include <pybind11/stl.h>
+
+#include "tape_value.h"
+
+namespace fieldmark::python {
+namespace {
+
+using namespace py::literals;
+
+template <class T>
+using StorePtr = std::shared_ptr<StoreHandle<T>>;
+
+// A layer and the store of its parameters.
+template <class T, class L>
+struct LayerHandle {
+  StorePtr<T> store;
+  L layer;
+
+  // @param kind  for errors
+  template <class... A>
+  static LayerHandle* make(const char* kind, const StorePtr<T>& s, const std::string& name, A&&... options) {
+    return new LayerHandle{s, L(s->open(kind), name, std::forward<A>(options)...)};
+  }
+  // f(layer, parameters of this pass, x)
+  template <class F>
+  Value<T> apply(const Value<T>& x, F f) const {
+    const Var<T> var = x.get();
+    x.tape->reads(store);
+    return x.with(f(layer, Params<T>(store->store), var));
+  }
+  Value<T> operator()(const Value<T>& x) const {
+    return apply(x, [](const L& l, const Params<T>& p, Var<T> v) { return l(p, v); });
+  }
+};
+
+constexpr Activation activation(bool relu) { return relu ? Activation::relu : Activation::none; }
+
+template <class T>
+void bind_products(py::module_& module, const std::string& suffix) {
+  using DenseHandle = LayerHandle<T, Dense<T>>;
+  using Conv2dHandle = LayerHandle<T, Conv2d<T>>;
+  py::class_<DenseHandle>(module, ("Dense_" + suffix).c_str())
+      .def(py::init([](const StorePtr<T>& s, const std::string& name, Index inputs, Index outputs, bool relu,
+                       std::uint64_t seed) {
+             return DenseHandle::make(
+                 "Dense", s, name, DenseOptions{.in = inputs, .out = outputs, .activation = activation(relu)},
+                 seed);
+           }),
+           "parameters"_a, "name"_a, "inputs"_a, "outputs"_a, "relu"_a, "seed"_a)
+      .def("__call__", &DenseHandle::operator(), "x"_a, "x [N, inputs] to [N, outputs].");
+  py::class_<Conv2dHandle>(module, ("Conv2d_" + suffix).c_str())
+      .def(
+          py::init([](const StorePtr<T>& s, const std::string& name, Index inputs, Index outputs,
+                      Index kernel, bool relu, std::uint64_t seed) {
+            return Conv2dHandle::make(
+                "Conv2d", s, name,
+                Conv2dOptions{.in = inputs, .out = outputs, .kernel = kernel, .activation = activation(relu)},
+                seed);
+          }),
+          "parameters"_a, "name"_a, "inputs"_a, "outputs"_a, "kernel"_a, "relu"_a, "seed"_a)
+      .def("__call__", &Conv2dHandle::operator(), "x"_a, "x [N, H, W, inputs] to [N, H, W, outputs].");
+}
+
+template <class T>
+void bind_norms(py::module_& module, const std::string& suffix) {
+  using BatchHandle = LayerHandle<T, BatchNorm<T>>;
+  using GroupHandle = LayerHandle<T, GroupNorm<T>>;
+  py::class_<BatchHandle>(module, ("BatchNorm_" + suffix).c_str())
+      .def(py::init([](const StorePtr<T>& s, const std::string& name, Index channels, double eps, bool relu) {
+             return BatchHandle::make("BatchNorm", s, name, channels,
+                                      BatchNormOptions{.eps = eps, .relu = relu});
+           }),
+           "parameters"_a, "name"_a, "channels"_a, "eps"_a, "relu"_a)
+      .def(
+          "__call__",
+          [](const BatchHandle& b, const Value<T>& x, BatchStatistics* statistics) {
+            return b.apply(x,
+                           [&](const auto& l, const Params<T>& p, Var<T> v) { return l(p, v, statistics); });
+          },
+          "x"_a, "statistics"_a = nullptr,
+          "Normalises x [N, H, W, C] with the statistics of the batch, which go to `statistics` too.")
+      .def(
+          "evaluate",
+          [](const BatchHandle& b, const Value<T>& x) {
+            return b.apply(x, [](const auto& l, const Params<T>& p, Var<T> v) { return l.evaluate(p, v); });
+          },
+          "x"_a, "Normalises with the running statistics.")
+      .def(
+          "update",
+          [](const BatchHandle& b, const BatchStatistics& statistics, double momentum) {
+            b.layer.update(b.store->store, statistics, momentum);
+          },
+          "statistics"_a, "momentum"_a = 0.1, "running = (1 - momentum) running + momentum batch.");
+  py::class_<GroupHandle>(module, ("GroupNorm_" + suffix).c_str())
+      .def(py::init([](const StorePtr<T>& s, const std::string& name, Index channels, Index groups,
+                       double eps, bool relu) {
+             return GroupHandle::make("GroupNorm", s, name, channels,
+                                      GroupNormOptions{.groups = groups, .eps = eps, .relu = relu});
+           }),
+           "parameters"_a, "name"_a, "channels"_a, "groups"_a, "eps"_a, "relu"_a)
+      .def("__call__", &GroupHandle::operator(), "x"_a, "x [N, H, W, C] to the same shape.");
+}
+
+}  // namespace
+
+template <class T>
+void bind_layers(py::module_& module, const std::string& suffix) {
+  bind_products<T>(module, suffix);
+  bind_norms<T>(module, suffix);
+}
+template void bind_layers<float>(py::module_&, const std::string&);
+template void bind_layers<double>(py::module_&, const std::string&);
+
+}  // namespace fieldmark::python

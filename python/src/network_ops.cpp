@@ -1,0 +1,235 @@
+// The ops of networks: affine maps, convolutions, norms, pooling, losses.
+#include <fieldmark/engine/ops/batch_norm.h>
+#include <fieldmark/engine/ops/conv2d.h>
+#include <fieldmark/engine/ops/dense.h>
+#include <fieldmark/engine/ops/feature_distance.h>
+#include <fieldmark/engine/ops/group_norm.h>
+#include <fieldmark/engine/ops/layer_norm.h>
+#include <fieldmark/engine/ops/loss.h>
+#include <fieldmark/engine/ops/pool.h>
+#include <fieldmark/engine/ops/reduce.h>
+#include <fieldmark/engine/ops/resample.h>
+#include <fieldmark/engine/ops/softmax.h>
+
+#include "tape_value.h"
+
+namespace fieldmark::python {
+namespace {
+
+using namespace py::literals;
+
+constexpr Activation activation(bool relu) { return relu ? Activation::relu : Activation::none; }
+
+template <class T>
+void bind_products(py::module_& module) {
+  using V = const Value<T>&;
+  module.def(
+      "dense",
+      [](V x, V w, V b, bool relu) { return x.with(dense(x.get(), w.get(), b.get(), activation(relu))); },
+      "x"_a, "w"_a, "b"_a, "relu"_a = false, once<T>("x w + b of rows x [N, in], w [in, out], b [out]."));
+  module.def(
+      "conv2d",
+      [](V x, V w, V b, Index stride, Index padding, bool relu) {
+        return x.with(conv2d(x.get(), w.get(), b.get(), ConvWindow{.stride = stride, .padding = padding},
+                             activation(relu)));
+      },
+      "x"_a, "w"_a, "b"_a, "stride"_a = 1, "padding"_a = 0, "relu"_a = false,
+      once<T>("Convolution of images x [N, H, W, C] with w [K, K, C, O] and b [O]; `padding` pixels of zeros "
+              "are\n"
+              "around the image."));
+}
+
+template <class T>
+void bind_norms(py::module_& module) {
+  using V = const Value<T>&;
+  module.def(
+      "layer_norm",
+      [](V x, V gamma, V beta, double eps) {
+        return x.with(layer_norm(x.get(), gamma.get(), beta.get(), eps));
+      },
+      "x"_a, "gamma"_a, "beta"_a, "eps"_a = 1e-5,
+      once<T>("gamma (x - mean) / sqrt(var + eps) + beta with the statistics of each row of the last axis."));
+  module.def(
+      "group_norm",
+      [](V x, V gamma, V beta, Index groups, double eps, bool relu) {
+        return x.with(group_norm(x.get(), gamma.get(), beta.get(),
+                                 GroupNormOptions{.groups = groups, .eps = eps, .relu = relu}));
+      },
+      "x"_a, "gamma"_a, "beta"_a, "groups"_a = 8, "eps"_a = 1e-5, "relu"_a = false,
+      once<T>("gamma (x - mean) / sqrt(var + eps) + beta of images [N, H, W, C], with the statistics of each "
+              "image's\n"
+              "groups of neighbouring channels."));
+  module.def(
+      "batch_norm",
+      [](V x, V gamma, V beta, double eps, bool relu, BatchStatistics* statistics) {
+        return x.with(batch_norm(x.get(), gamma.get(), beta.get(), BatchNormOptions{.eps = eps, .relu = relu},
+                                 statistics));
+      },
+      "x"_a, "gamma"_a, "beta"_a, "eps"_a = 1e-5, "relu"_a = false, "statistics"_a = nullptr,
+      once<T>("gamma (x - mean) / sqrt(var + eps) + beta of images [N, H, W, C], with the statistics of the "
+              "batch,\n"
+              "which go to `statistics` too."));
+  module.def(
+      "batch_norm_fixed",
+      [](V x, V gamma, V beta, const py::object& mean, const py::object& variance, double eps, bool relu) {
+        const py::array m = borrowed<T>("batch_norm_fixed: mean", mean),
+                        v = borrowed<T>("batch_norm_fixed: variance", variance);
+        return x.with(batch_norm_fixed(x.get(), gamma.get(), beta.get(), elements<T>(m), elements<T>(v),
+                                       BatchNormOptions{.eps = eps, .relu = relu}));
+      },
+      "x"_a, "gamma"_a, "beta"_a, "mean"_a, "variance"_a, "eps"_a = 1e-5, "relu"_a = false,
+      once<T>("The same with given statistics [C], which are copied."));
+}
+
+Interpolation interpolation_of(const std::string& name) {
+  if (name == "bilinear") return Interpolation::bilinear;
+  if (name == "nearest") return Interpolation::nearest;
+  throw ValueError("[upsample_to] mode must be bilinear or nearest, got '" + name + "'");
+}
+
+template <class T>
+void bind_resampling(py::module_& module) {
+  using V = const Value<T>&;
+  module.def(
+      "max_pool",
+      [](V x, Index size, Index stride, bool ceil_mode) {
+        return x.with(max_pool(x.get(), MaxPool{.size = size, .stride = stride, .ceil_mode = ceil_mode}));
+      },
+      "x"_a, "size"_a = 2, "stride"_a = 2, "ceil_mode"_a = false,
+      once<T>("The largest of each channel over windows of images [N, H, W, C]; ceil_mode keeps windows that "
+              "cross\n"
+              "the lower or right edge."));
+  module.def(
+      "avg_pool", [](V x, Index size) { return x.with(avg_pool(x.get(), size)); }, "x"_a, "size"_a,
+      once<T>("The mean over windows of size x size pixels: [N, H, W, C] to [N, H / size, W / size, C]."));
+  module.def(
+      "upsample_nearest", [](V x, Index factor) { return x.with(upsample_nearest(x.get(), factor)); }, "x"_a,
+      "factor"_a, once<T>("Repeats every pixel of images [N, H, W, C] factor x factor times."));
+  module.def(
+      "upsample_to",
+      [](V x, Index height, Index width, const std::string& mode) {
+        return x.with(upsample_to(x.get(), height, width, interpolation_of(mode)));
+      },
+      "x"_a, "height"_a, "width"_a, "mode"_a = "bilinear",
+      once<T>("Resamples images [N, H, W, C] to [N, height, width, C], bilinear or nearest; the corners "
+              "coincide."));
+}
+
+// An array of a given shape, which the backward reads.
+template <class U, class T>
+Reading<U> matching(const char* where, const Value<T>& x, const Shape& shape, const py::object& given) {
+  const py::array array = x.tape->template reads<U>(where, given);
+  if (shape_of(array) != shape)
+    throw ShapeError("[" + std::string(where) + "] must have shape " + shape.str() + ", got " +
+                     shape_of(array).str());
+  return {array, elements<U>(array)};
+}
+
+// The weights of a mean; None: all 1.
+template <class T>
+Reading<T> weights_of(const char* where, const Value<T>& x, const Shape& shape, const py::object& given) {
+  if (given.is_none()) return {};
+  return matching<T>(where, x, shape, given);
+}
+
+Shape rows_of(const Shape& logits) {
+  std::vector<Index> rows;
+  for (int k = 0; k + 1 < logits.rank(); ++k) rows.push_back(logits[k]);
+  return Shape(std::span<const Index>(rows));
+}
+
+template <class T>
+void bind_losses(py::module_& module) {
+  using V = const Value<T>&;
+  using Object = const py::object&;
+  module.def(
+      "mse_loss",
+      [](V a, V b, Object weights) {
+        const auto w = weights_of("mse_loss: weights", a, a.get().shape(), weights);
+        return a.with(mse_loss(a.get(), b.get(), w.elements), w);
+      },
+      "a"_a, "b"_a, "weights"_a = py::none(),
+      once<T>(
+          "The mean of (a - b)^2; `weights`, an array >= 0 of the shape of a, makes it sum w d^2 / sum w."));
+  module.def(
+      "l1_loss",
+      [](V a, V b, Object weights) {
+        const auto w = weights_of("l1_loss: weights", a, a.get().shape(), weights);
+        return a.with(l1_loss(a.get(), b.get(), w.elements), w);
+      },
+      "a"_a, "b"_a, "weights"_a = py::none(), once<T>("The mean of |a - b|; weights as for mse_loss."));
+  module.def(
+      "huber_loss",
+      [](V a, V b, double delta, Object weights) {
+        const auto w = weights_of("huber_loss: weights", a, a.get().shape(), weights);
+        return a.with(huber_loss(a.get(), b.get(), delta, w.elements), w);
+      },
+      "a"_a, "b"_a, "delta"_a, "weights"_a = py::none(),
+      once<T>("The mean of d^2 / 2 where |d| = |a - b| <= delta, else of delta (|d| - delta / 2); weights as "
+              "for\n"
+              "mse_loss."));
+  module.def(
+      "bce_with_logits",
+      [](V logits, Object targets, Object weights) {
+        const Shape shape = logits.get().shape();
+        const auto t = matching<T>("bce_with_logits: targets", logits, shape, targets);
+        const auto w = weights_of("bce_with_logits: weights", logits, shape, weights);
+        return logits.with(bce_with_logits(logits.get(), t.elements, w.elements), t, w);
+      },
+      "logits"_a, "targets"_a, "weights"_a = py::none(),
+      once<T>(
+          "The mean cross-entropy of logits against targets, an array in [0, 1]; weights as for mse_loss."));
+  module.def(
+      "softmax_cross_entropy",
+      [](V logits, Object labels, Object weights) {
+        const Shape rows = rows_of(logits.get().shape());
+        const auto l = matching<std::int32_t>("softmax_cross_entropy: labels", logits, rows, labels);
+        const auto w = weights_of("softmax_cross_entropy: weights", logits, rows, weights);
+        return logits.with(softmax_cross_entropy(logits.get(), l.elements, w.elements), l, w);
+      },
+      "logits"_a, "labels"_a, "weights"_a = py::none(),
+      once<T>(
+          "The mean cross-entropy of logits [.., C] against labels [..] of int32 in [-1, C), -1: ignored;\n"
+          "weights [..] >= 0."));
+}
+
+template <class T>
+void bind_weighted_means(py::module_& module) {
+  using V = const Value<T>&;
+  using Object = const py::object&;
+  module.def(
+      "weighted_mean",
+      [](V x, Object weights) {
+        const auto w = matching<T>("weighted_mean: weights", x, x.get().shape(), weights);
+        return x.with(weighted_mean(x.get(), w.elements), w);
+      },
+      "x"_a, "weights"_a,
+      once<T>("sum w x / sum w of all elements, w an array >= 0 of the shape of x; 0 if all are 0."));
+  module.def(
+      "feature_distance",
+      [](V a, V b, Object weights) {
+        const Shape shape = a.get().shape();
+        const Shape channels = shape.rank() == 0 ? shape : Shape{shape[-1]};
+        const auto w = matching<T>("feature_distance: weights", a, channels, weights);
+        return a.with(feature_distance(a.get(), b.get(), w.elements), w);
+      },
+      "a"_a, "b"_a, "weights"_a,
+      once<T>("The distance [N] of LPIPS: features [N, H, W, C] scaled to length 1 at each pixel, squared "
+              "differences\n"
+              "weighted by channel [C], averaged over pixels."));
+}
+
+}  // namespace
+
+template <class T>
+void bind_network_ops(py::module_& module) {
+  bind_products<T>(module);
+  bind_norms<T>(module);
+  bind_resampling<T>(module);
+  bind_losses<T>(module);
+  bind_weighted_means<T>(module);
+}
+template void bind_network_ops<float>(py::module_&);
+template void bind_network_ops<double>(py::module_&);
+
+}  // namespace fieldmark::python

@@ -1,0 +1,214 @@
+// Stores of parameters, optimisers, and files of their state.
+#include <fieldmark/engine/adam.h>
+#include <fieldmark/engine/clip.h>
+#include <fieldmark/engine/sgd.h>
+#include <fieldmark/engine/state_file.h>
+#include <fieldmark/engine/tensor_stats.h>
+#include <pybind11/stl.h>
+
+#include "tape_value.h"
+
+namespace fieldmark::python {
+namespace {
+
+using namespace py::literals;
+
+template <class T>
+using StorePtr = std::shared_ptr<StoreHandle<T>>;
+
+constexpr std::pair<const char*, ParamRole> kRoles[] = {{"trained", ParamRole::trained},
+                                                        {"matrix", ParamRole::matrix},
+                                                        {"table", ParamRole::table},
+                                                        {"running", ParamRole::running}};
+
+ParamRole role_of(const std::string& wanted) {
+  for (const auto& [name, role] : kRoles)
+    if (name == wanted) return role;
+  throw ValueError("[Parameters.add] role must be trained, matrix, table or running, got '" + wanted + "'");
+}
+
+template <class T>
+void add(StoreHandle<T>& s, const std::string& name, const py::object& given, const std::string& role) {
+  const py::array array = borrowed<T>("Parameters.add: values", given);
+  ParamStore<T>& store = s.open("Parameters.add");
+  const ParamId id = store.add(name, shape_of(array), role_of(role));
+  std::ranges::copy(elements<T>(array), store.values(id).begin());
+}
+
+template <class T>
+std::vector<std::string> names(const StoreHandle<T>& s) {
+  std::vector<std::string> names;
+  for (const auto& e : s.store.entries()) names.push_back(e.name);
+  return names;
+}
+
+template <class T>
+std::string role(const StoreHandle<T>& s, const std::string& name) {
+  const ParamRole wanted = s.store.entry(s.store.find(name)).role;
+  return std::ranges::find(kRoles, wanted, &std::pair<const char*, ParamRole>::second)->first;
+}
+
+// name -> {"count": ..., "mean": ...}
+py::dict as_dict(const std::vector<TensorStats>& all) {
+  py::dict named;
+  for (const TensorStats& s : all)
+    named[py::str(s.name)] = py::dict("count"_a = s.count, "zeros"_a = s.zeros, "nonfinite"_a = s.nonfinite,
+                                      "mean"_a = s.mean, "rms"_a = s.rms, "largest"_a = s.largest);
+  return named;
+}
+
+template <class T>
+void bind_store(py::module_& module, const std::string& suffix) {
+  using Store = StoreHandle<T>;
+  py::class_<Store, StorePtr<T>>(module, ("Parameters_" + suffix).c_str(),
+                                 "All parameters of a model in one buffer, with their gradients in another.")
+      .def(py::init<>())
+      .def("add", &add<T>, "name"_a, "values"_a, "role"_a = "trained",
+           "Adds a tensor with these values, which are copied. Running ones get no gradients, and no step "
+           "changes\n"
+           "them.")
+      .def("names", &names<T>, "All names in the order added.")
+      .def("role", &role<T>, "name"_a, "As declared to add(): trained, matrix, table or running.")
+      .def(
+          "values",
+          [](StorePtr<T> s, const std::string& name) {
+            const ParamId id = s->store.find(name);
+            return view(s->store.values(id).data(), s->store.entry(id).shape, s, s->leases);
+          },
+          "name"_a, "The values of a tensor, not copied; writing changes the model.")
+      .def(
+          "grads",
+          [](StorePtr<T> s, const std::string& name) {
+            const ParamId id = s->store.find(name);
+            return view(s->store.grads(id).data(), s->store.entry(id).shape, s, s->leases);
+          },
+          "name"_a, "The gradients of a tensor, not copied.")
+      .def(
+          "leaf",
+          [](StorePtr<T> s, std::shared_ptr<TapeHandle<T>> tape, const std::string& name) {
+            const ParamId id = s->store.find(name);
+            tape->reads(s);
+            return Value<T>(tape, Params<T>(s->store).leaf(tape->tape, id));
+          },
+          "tape"_a, "name"_a, "A parameter on a tape; a running one is a constant.")
+      .def(
+          "zero_grad", [](Store& s) { s.store.zero_grad(); }, "Sets all gradients to 0.")
+      .def(
+          "gradient_stats", [](Store& s) { return as_dict(gradient_stats(s.store)); },
+          "Statistics of each gradient by name: count, zeros, nonfinite, and mean, rms and largest magnitude "
+          "of what is finite.")
+      .def(
+          "value_stats", [](const Store& s) { return as_dict(value_stats(s.store)); },
+          "The same statistics of the values.")
+      .def(
+          "grad_norm", [](Store& s) { return grad_norm(std::span<const T>(s.store.grads())); },
+          "The Euclidean norm of all gradients together.")
+      .def(
+          "clip_grad_norm", [](Store& s, double limit) { return clip_grad_norm(s.store, limit); }, "limit"_a,
+          "Scales all gradients down to this norm; returns the norm that they had. ValueError if one is NaN "
+          "or\n"
+          "infinite.");
+}
+
+// An optimiser and the store that it moves.
+template <class T, class O>
+struct OptimiserHandle {
+  StorePtr<T> store;
+  py::capsule lease;  // the store takes no more parameters
+  O optimiser;
+  void step(double factor) {
+    optimiser.step(store->store.values(), store->store.grads(), factor);
+    ++store->changes;
+  }
+};
+
+template <class T>
+using AdamHandle = OptimiserHandle<T, Adam<T>>;
+template <class T>
+using SgdHandle = OptimiserHandle<T, Sgd<T>>;
+
+template <class T>
+void bind_optimisers(py::module_& module, const std::string& suffix) {
+  py::class_<AdamHandle<T>>(module, ("Adam_" + suffix).c_str())
+      .def(
+          py::init([](StorePtr<T> s, double lr, double beta1, double beta2, double eps, double weight_decay) {
+            return new AdamHandle<T>{
+                s, s->leases.lend(s),
+                Adam<T>(
+                    s->store,
+                    {.lr = lr, .beta1 = beta1, .beta2 = beta2, .eps = eps, .weight_decay = weight_decay})};
+          }),
+          "parameters"_a, "lr"_a = 1e-3, "beta1"_a = 0.9, "beta2"_a = 0.999, "eps"_a = 1e-8,
+          "weight_decay"_a = 0.0)
+      .def("step", &AdamHandle<T>::step, "lr_factor"_a = 1.0, "One step; lr_factor multiplies lr.")
+      .def_property_readonly(
+          "steps", [](const AdamHandle<T>& a) { return a.optimiser.steps(); },
+          "Steps taken, those before load_state() included.");
+  py::class_<SgdHandle<T>>(module, ("Sgd_" + suffix).c_str())
+      .def(
+          py::init([](StorePtr<T> s, double lr, double momentum, bool nesterov, double weight_decay) {
+            return new SgdHandle<T>{
+                s, s->leases.lend(s),
+                Sgd<T>(s->store,
+                       {.lr = lr, .momentum = momentum, .nesterov = nesterov, .weight_decay = weight_decay})};
+          }),
+          "parameters"_a, "lr"_a = 1e-2, "momentum"_a = 0.0, "nesterov"_a = false, "weight_decay"_a = 0.0)
+      .def("step", &SgdHandle<T>::step, "lr_factor"_a = 1.0, "One step; lr_factor multiplies lr.");
+}
+
+// Applies f to what an optimiser given from Python keeps; None: to nothing.
+template <class T, class F>
+void with_optimiser(const char* function, const StorePtr<T>& s, const py::object& given, F f) {
+  const auto of = [&](auto& handle) {
+    if (handle.store != s)
+      throw py::value_error("[" + std::string(function) + "] the optimiser is one of other parameters");
+    f(handle.optimiser);
+  };
+  if (given.is_none()) return f();
+  if (py::isinstance<AdamHandle<T>>(given)) return of(given.cast<AdamHandle<T>&>());
+  if (py::isinstance<SgdHandle<T>>(given)) return of(given.cast<SgdHandle<T>&>());
+  throw py::type_error("[" + std::string(function) + "] optimiser must be Adam or Sgd of " + dtype_name<T>() +
+                       " parameters, or None, got " + type_name(given));
+}
+
+template <class T>
+void bind_state(py::module_& module) {
+  module.def(
+      "save_state",
+      [](SafetensorsFile& file, const std::string& prefix, const StorePtr<T>& s,
+         const py::object& optimiser) {
+        SafetensorsFile next = file;  // a name that is taken leaves the file as it was
+        with_optimiser<T>("save_state", s, optimiser,
+                          [&](const auto&... o) { save_state(next, prefix, std::as_const(s->store), o...); });
+        file = std::move(next);
+      },
+      "file"_a, "prefix"_a, "parameters"_a, "optimiser"_a = py::none(),
+      once<T>("Adds the parameters as PREFIX + NAME, and what the optimiser keeps for them. ValueError if a "
+              "name is\n"
+              "taken."));
+  module.def(
+      "load_state",
+      [](const SafetensorsFile& file, const std::string& prefix, const StorePtr<T>& s,
+         const py::object& optimiser) {
+        with_optimiser<T>("load_state", s, optimiser,
+                          [&](auto&... o) { load_state(file, prefix, s->store, o...); });
+        ++s->changes;
+      },
+      "file"_a, "prefix"_a, "parameters"_a, "optimiser"_a = py::none(),
+      once<T>(
+          "Reads what save_state() added; training then goes on with the same bits. IoError if an array is\n"
+          "missing or has another shape or type; nothing is changed then."));
+}
+
+}  // namespace
+
+template <class T>
+void bind_parameters(py::module_& module, const std::string& suffix) {
+  bind_store<T>(module, suffix);
+  bind_optimisers<T>(module, suffix);
+  bind_state<T>(module);
+}
+template void bind_parameters<float>(py::module_&, const std::string&);
+template void bind_parameters<double>(py::module_&, const std::string&);
+
+}  // namespace fieldmark::python

@@ -1,0 +1,318 @@
+"""One clear error for each input that does not fit, and nothing wrong in silence."""
+
+import gc
+import re
+
+import numpy as np
+import pytest
+
+import fieldmark as fm
+from fieldmark import engine
+
+OTHER_LAYOUTS = [
+    (np.ones((4, 6), "float32"), TypeError, r"must be of float64, got float32: convert it with x.astype\('float64'\)"),
+    (np.ones((4, 6), ">f8"), TypeError, r"must be of float64, got >f8"),
+    (np.ones((4, 12))[:, ::2], ValueError, r"must be contiguous in row-major order: pass numpy.ascontiguousarray\(x\)"),
+    (np.ones((6, 4)).T, ValueError, "must be contiguous in row-major order"),
+    (np.frombuffer(bytearray(8 * 24 + 1), "float64", 24, 1).reshape(4, 6), ValueError,
+     r"must be aligned to the 8 bytes of its elements: pass x.copy\(\)"),
+    (np.ma.masked_array(np.ones((4, 6)), False), TypeError, r"must not be masked: pass x.filled\(value\)"),
+    ([[1.0]], TypeError, "must be a numpy array of float64, got list"),
+    (None, TypeError, "must be a numpy array of float64, got NoneType"),
+]
+INDICES = [
+    (np.array([0, 1]), TypeError, r"must be of int32, got int64: convert it with x.astype\('int32'\)"),
+    (np.array([0.0, 1.0]), TypeError, "must be of int32, got float64"),
+    (np.array([0, 1], "uint32"), TypeError, "must be of int32, got uint32"),
+    (np.arange(4, dtype="int32")[::2], ValueError, "must be contiguous"),
+    (np.frombuffer(bytearray(9), "int32", 2, 1), ValueError, "must be aligned to the 4 bytes"),
+    ([0, 1], TypeError, "must be a numpy array of int32, got list"),
+    (np.zeros((1, 2), "int32"), fm.ShapeError, "must have"),
+]
+
+
+@pytest.fixture
+def tape():
+    return engine.Tape("float64")
+
+
+@pytest.fixture
+def x(tape):
+    return tape.leaf(np.random.default_rng(0).standard_normal((4, 6)))
+
+
+@pytest.mark.parametrize("array, error, text", OTHER_LAYOUTS)
+def test_every_place_that_takes_an_array_checks_it(tape, x, array, error, text):
+    places = {
+        "constant: array": lambda: tape.constant(array),
+        "leaf: array": lambda: tape.leaf(array),
+        "mse_loss: weights": lambda: engine.mse_loss(x, x, array),
+        "weighted_mean: weights": lambda: engine.weighted_mean(x, array),
+        "bce_with_logits: targets": lambda: engine.bce_with_logits(x, array),
+        "Parameters.add: values": lambda: engine.Parameters("float64").add("w", array),
+        "gradcheck: inputs: each": lambda: engine.gradcheck(engine.sum, [array]),
+        "batch_norm_fixed: mean": lambda: engine.batch_norm_fixed(x, x, x, array, array),
+        "leaf: grad": lambda: tape.leaf(np.ones((4, 6)), array),
+        "backward: seed": lambda: x.backward(array),
+    }
+    if array is None:  # these have a default
+        for name in ("mse_loss: weights", "leaf: grad", "backward: seed"):
+            del places[name]
+    for name, call in places.items():
+        with pytest.raises(error, match=rf"^\[{name}\] {text}"):
+            call()
+
+
+@pytest.mark.parametrize("array, error, text", INDICES)
+def test_indices_and_labels_are_int32(x, array, error, text):
+    rows = engine.slice(x, 0, 0, 2)
+    for name, call in {
+        "gather: index": lambda: engine.gather(x, 0, array),
+        "scatter_add: index": lambda: engine.scatter_add(rows, 0, array, 4),
+        "softmax_cross_entropy: labels": lambda: engine.softmax_cross_entropy(rows, array),
+    }.items():
+        with pytest.raises(error, match=rf"^\[{name}\] {text}"):
+            call()
+
+
+def test_indices_out_of_range_are_refused_and_can_be_mended(x):
+    index = np.array([0, 4], "int32")
+    with pytest.raises(ValueError, match=r"\[gather\].*4"):
+        engine.gather(x, 0, index)
+    index[1] = 3  # an op that failed holds nothing
+    engine.gather(x, 0, index)
+    with pytest.raises(ValueError, match=r"\[scatter_add\]"):
+        engine.scatter_add(engine.slice(x, 0, 0, 2), 0, index, 2)
+    with pytest.raises(ValueError, match=r"\[softmax_cross_entropy\].*6"):
+        engine.softmax_cross_entropy(x, np.array([0, 1, 2, 6], "int32"))
+
+
+@pytest.mark.parametrize("axis", [2, -3])
+def test_axes_out_of_range_are_refused(x, axis):
+    index = np.array([0], "int32")
+    for name, call in {
+        "softmax": lambda: engine.softmax(x, axis),
+        "slice": lambda: engine.slice(x, axis, 0, 1),
+        "permute": lambda: engine.permute(x, (0, axis)),
+        "gather": lambda: engine.gather(x, axis, index),
+        "scatter_add": lambda: engine.scatter_add(x, axis, index, 4),
+        "pad": lambda: engine.pad(x, axis, 1, 1),
+        "cumsum": lambda: engine.cumsum(x, axis),
+        "transpose": lambda: engine.transpose(x, 0, axis),
+        "concatenate": lambda: engine.concatenate([x, x], axis),
+        "max": lambda: engine.max(x, axis),
+        "logsumexp": lambda: engine.logsumexp(x, (0, axis)),
+    }.items():
+        with pytest.raises(fm.ShapeError, match=rf"^\[{name}\].*{axis}"):
+            call()
+
+
+@pytest.mark.parametrize("axis", ["x", 1.5, [0, "y"], np.array([0.5])])
+def test_axes_that_are_no_integers_are_refused(x, axis):
+    with pytest.raises(TypeError, match=r"^\[sum\] axis must be None, an integer or a sequence of integers, got "):
+        engine.sum(x, axis)
+
+
+def test_axes_named_twice_are_refused(x):
+    with pytest.raises(ValueError, match=r"^\[sum\]"):
+        engine.sum(x, (0, -2))
+    with pytest.raises(ValueError, match=r"^\[permute\]"):
+        engine.permute(x, (0, 0))
+
+
+def test_reductions_of_nothing_are_refused(tape):
+    nothing = tape.leaf(np.ones((0, 3)))
+    for name in ("mean", "max", "variance", "logsumexp"):
+        with pytest.raises(fm.ShapeError, match=rf"^\[{name}\]"):
+            getattr(engine, name)(nothing)
+        with pytest.raises(fm.ShapeError, match=rf"^\[{name}\]"):
+            getattr(engine, name)(nothing, axis=0)
+    with pytest.raises(fm.ShapeError, match=r"^\[softmax\]"):
+        engine.softmax(nothing, 0)
+    assert engine.sum(nothing).item() == 0
+
+
+@pytest.mark.parametrize("shape", [(-4, -6), (-1, 6), (2 ** 32, 2 ** 32), (2, 3)])
+def test_shapes_that_cannot_be_are_refused(tape, x, shape):
+    with pytest.raises(fm.ShapeError, match=r"^\[reshape\]"):
+        engine.reshape(x, shape)
+    with pytest.raises(fm.ShapeError, match=r"^\[broadcast_to\]"):
+        engine.broadcast_to(x, shape)
+
+
+@pytest.mark.parametrize("name", ["inverse", "cholesky", "log_determinant"])
+@pytest.mark.parametrize("matrix", [np.zeros((2, 2)), np.ones((3, 3)), np.array([[np.nan, 0], [0, 1]])])
+def test_singular_matrices_are_refused(tape, name, matrix):
+    with pytest.raises(ValueError, match=rf"^\[{name}\]"):
+        getattr(engine, name)(tape.leaf(matrix))
+
+
+def test_singular_matrices_are_refused_by_solvers(tape):
+    a, b = tape.constant(np.diag([1.0, 0.0])), tape.constant(np.ones((2, 1)))
+    for name in ("solve", "triangular_solve"):
+        with pytest.raises(ValueError, match=rf"^\[{name}\].*singular"):
+            getattr(engine, name)(a, b)
+    with pytest.raises(fm.ShapeError, match=r"^\[inverse\]"):
+        engine.inverse(b)
+
+
+def test_a_gradient_must_be_writeable_and_of_its_own(tape):
+    a, grad = np.ones(3), np.zeros(3)
+    grad.flags.writeable = False
+    with pytest.raises(ValueError, match=r"^\[leaf: grad\] must be writeable, since backward adds to it"):
+        tape.leaf(a, grad)
+    with pytest.raises(ValueError, match=r"^\[leaf\] grad shares memory with an array that this pass reads"):
+        tape.leaf(a, a)
+    a[0] = 2  # what was refused is not held
+    both = np.ones(5)
+    with pytest.raises(ValueError, match="shares memory"):
+        tape.leaf(both[:3], both[2:])
+    tape.leaf(both[:2], both[2:4])
+    with pytest.raises(ValueError, match=r"^\[constant: array\] shares memory with a gradient of this pass"):
+        tape.constant(both[3:])
+    with pytest.raises(fm.ShapeError, match=r"grad must have the shape of the array, \[3\], got \[1, 3\]"):
+        tape.leaf(np.ones(3), np.zeros((1, 3)))
+
+
+def test_a_gradient_is_not_a_parameter_that_the_pass_reads(tape):
+    model = engine.Parameters("float64")
+    model.add("w", np.ones(3))
+    model.leaf(tape, "w")
+    with pytest.raises(ValueError, match="shares memory with an array that this pass reads"):
+        tape.leaf(np.ones(3), model.values("w"))
+    tape.leaf(np.ones(3), model.grads("w"))  # adds up
+    with pytest.raises(ValueError, match="shares memory with a gradient"):
+        tape.constant(model.grads("w"))
+
+
+def test_a_seed_has_the_shape_of_its_value(x):
+    with pytest.raises(fm.ShapeError, match=r"seed must have the shape of the value, \[4, 6\], got \[6, 4\]"):
+        x.backward(np.ones((6, 4)))
+    with pytest.raises(fm.ShapeError, match=r"\[backward\] loss must have one element, got shape \[4, 6\]"):
+        x.backward()
+
+
+def test_weights_have_the_shape_of_what_they_weigh(x):
+    for call in (lambda: engine.mse_loss(x, x, np.ones((6, 4))), lambda: engine.weighted_mean(x, np.ones(24)),
+                 lambda: engine.bce_with_logits(x, np.ones(24)),
+                 lambda: engine.softmax_cross_entropy(x, np.zeros(4, "int32"), np.ones((4, 1)))):
+        with pytest.raises(fm.ShapeError, match=r"must have shape \[4(, 6)?\], got"):
+            call()
+    with pytest.raises(ValueError, match="weight"):
+        engine.mse_loss(x, x, np.full((4, 6), -1.0))
+    with pytest.raises(ValueError, match="mode must be bilinear or nearest, got 'cubic'"):
+        engine.upsample_to(x, 2, 2, mode="cubic")
+
+
+def test_arrays_of_a_pass_are_read_only_until_reset(tape):
+    data = np.ones((4, 3))
+    part, index, weights = data[:2], np.array([1, 0], "int32"), np.ones((2, 3))
+    x = tape.leaf(part)
+    y = engine.mse_loss(engine.gather(x, 0, index), tape.constant(np.zeros((2, 3))), weights)
+    for array in (data, part, index, weights):
+        with pytest.raises(ValueError, match="read-only"):
+            array[:] = 0
+    y.backward()
+    tape.reset()
+    for array in (data, part, index, weights):
+        array[:] = 0
+
+
+def test_an_array_of_two_tapes_is_read_only_until_both_let_go():
+    a, b, array = engine.Tape(), engine.Tape(), np.ones(3, "float32")
+    a.constant(array), a.constant(array), b.constant(array)
+    a.reset()
+    assert not array.flags.writeable
+    del b
+    gc.collect()
+    assert array.flags.writeable
+
+
+def test_arrays_that_were_read_only_stay_so(tape):
+    array = np.ones(3)
+    array.flags.writeable = False
+    tape.constant(array)
+    tape.reset()
+    assert not array.flags.writeable
+
+
+def test_indices_labels_and_weights_that_die_early_are_kept(tape, x):
+    losses = [engine.softmax_cross_entropy(engine.gather(x, 0, np.array([2, 0], "int32")),
+                                           np.array([1, 5], "int32"), np.array([1.0, 3.0])),
+              engine.mse_loss(x, tape.constant(np.zeros((4, 6))), np.full((4, 6), 2.0))]
+    gc.collect()
+    rubbish = [np.full(n, 7, "int32") for n in (2, 2, 4, 48)] * 50
+    engine.sum(losses[0]).backward()
+    rows = x.numpy()[[2, 0]]
+    slope = np.exp(rows) / np.exp(rows).sum(-1, keepdims=True) - np.eye(6)[[1, 5]]
+    np.testing.assert_allclose(x.grad[[2, 0]], slope * [[0.25], [0.75]])
+    assert rubbish and np.isfinite(losses[1].item())
+
+
+def test_a_tape_does_not_read_its_own_values(tape, x):
+    shown = engine.exp(x).numpy()
+    with pytest.raises(ValueError, match=r"shows a value of the same tape: pass x.copy\(\), or use engine.detach"):
+        tape.constant(shown)
+    with pytest.raises(ValueError, match="shows a value of the same tape"):
+        tape.constant(shown[1:])
+    other = engine.Tape("float64")
+    other.constant(shown)
+    del shown
+    with pytest.raises(BufferError):
+        tape.reset()
+    other.reset()
+    gc.collect()
+    tape.reset()
+
+
+def test_backward_refuses_parameters_that_have_changed(tape):
+    model = engine.Parameters("float64")
+    model.add("w", np.ones(3))
+    sgd = engine.Sgd(model, lr=0.1)
+    loss = engine.sum(engine.square(model.leaf(tape, "w")))
+    loss.backward()
+    sgd.step()
+    with pytest.raises(ValueError, match="the parameters have changed since this pass read them: record it again"):
+        loss.backward()
+
+
+@pytest.mark.parametrize("other, got", [
+    (np.ones(3), r"got ndarray: pass it as tape.constant\(x\)"), (np.ones(1), "got ndarray"), ("x", "got str"),
+    (None, "got NoneType"), (engine.Tape().constant(np.ones(3, "float32")), "got Value_float32")])
+def test_operators_take_values_and_numbers(tape, other, got):
+    x = tape.constant(np.ones(3))
+    for name, call in {"+": lambda: x + other, "-": lambda: x - other, "*": lambda: x * other,
+                       "/": lambda: x / other, "**": lambda: x ** other}.items():
+        with pytest.raises(TypeError, match=rf"^\[{re.escape(name)}\] must be a value of float64 or a number, {got}"):
+            call()
+    with pytest.raises(TypeError):
+        other + x
+    with pytest.raises(TypeError, match=r"^\[@\] must be a value of float64, got"):
+        x @ other
+
+
+def test_numbers_of_numpy_are_numbers(tape):
+    x = tape.constant(np.full(3, 3.0))
+    for y in (x + np.float32(1), np.float64(1) + x, 7 - x, x * np.int64(2) - 2, 12 / x, x ** 2 - np.float64(5)):
+        np.testing.assert_array_equal(y.numpy(), 4)
+
+
+def test_gradcheck_wants_a_value():
+    with pytest.raises(TypeError, match=r"\[gradcheck\] f must return a value of float64, got float"):
+        engine.gradcheck(lambda x: 1.0, [np.ones(3)])
+
+
+def test_parameters_are_known_by_name():
+    model = engine.Parameters("float64")
+    model.add("w", np.ones(3))
+    with pytest.raises(ValueError, match="v"):
+        model.values("v")
+    with pytest.raises(ValueError, match="limit"):
+        model.clip_grad_norm(0)
+    model.grads("w")[:] = [3, 4, 0]
+    assert model.grad_norm() == model.clip_grad_norm(1) == 5
+    model.grads("w")[1] = np.nan
+    with pytest.raises(ValueError, match="w"):
+        model.clip_grad_norm(1)
+    with pytest.raises(TypeError, match=r"\[Adam\] parameters must be Parameters\(\), got list"):
+        engine.Adam([])

@@ -1,0 +1,209 @@
+"""Layers, roles, schedules, files of state, and the inspector."""
+
+import gc
+
+import numpy as np
+import pytest
+
+import fieldmark as fm
+from fieldmark import engine
+
+
+def random(*shape, dtype="float64", seed=0):
+    return np.random.default_rng(seed).standard_normal(shape).astype(dtype)
+
+
+@pytest.mark.parametrize("dtype, rtol", [("float32", 1e-4), ("float64", 1e-12)])
+def test_a_dense_layer_is_a_product_with_its_parameters(dtype, rtol):
+    model, tape = engine.Parameters(dtype), engine.Tape(dtype)
+    layer = engine.Dense(model, "a", 4, 3, seed=1, relu=True)
+    assert model.names() == ["a/weight", "a/bias"] and model.role("a/weight") == "matrix"
+    w = model.values("a/weight")
+    assert w.shape == (4, 3) and 0 < np.abs(w).max() <= np.sqrt(6 / 4)
+    x = random(5, 4, dtype=dtype)
+    y = layer(tape.constant(x))
+    np.testing.assert_allclose(y.numpy(), np.maximum(x @ w, 0), rtol=rtol, atol=rtol)
+    engine.sum(y).backward()
+    np.testing.assert_allclose(model.grads("a/weight"), x.T @ (x @ w > 0), rtol=rtol)
+
+
+def test_seeds_tell_layers_apart_and_are_required():
+    model = engine.Parameters()
+    for name, seed in [("a", 1), ("b", 1), ("c", 2)]:
+        engine.Dense(model, name, 3, 2, seed=seed)
+    a, b, c = (model.values(name + "/weight") for name in "abc")
+    assert (a == b).all() and (a != c).any()
+    with pytest.raises(TypeError, match="seed"):
+        engine.Dense(model, "d", 3, 2)
+
+
+def test_a_convolution_sums_its_window():
+    model, tape = engine.Parameters("float64"), engine.Tape("float64")
+    layer = engine.Conv2d(model, "c", 2, 3, seed=1)
+    x, w = random(1, 5, 4, 2), model.values("c/weight")
+    padded = np.pad(x, ((0, 0), (1, 1), (1, 1), (0, 0)))
+    windows = np.lib.stride_tricks.sliding_window_view(padded, (3, 3), axis=(1, 2))
+    np.testing.assert_allclose(layer(tape.constant(x)).numpy(), np.einsum("nijcuv,uvco->nijo", windows, w),
+                               atol=1e-12)
+
+
+def test_a_group_norm_has_the_statistics_of_its_groups():
+    model, tape = engine.Parameters("float64"), engine.Tape("float64")
+    layer = engine.GroupNorm(model, "g", 4, groups=2)
+    y = layer(tape.constant(random(2, 3, 3, 4))).numpy().reshape(2, 9, 2, 2)
+    np.testing.assert_allclose(y.mean((1, 3)), 0, atol=1e-12)
+    np.testing.assert_allclose(y.var((1, 3)), 1, rtol=1e-3)
+
+
+def test_a_batch_norm_keeps_running_statistics_that_no_step_changes():
+    model, tape = engine.Parameters("float64"), engine.Tape("float64")
+    layer = engine.BatchNorm(model, "b", 2)
+    adam = engine.Adam(model, lr=0.1, weight_decay=0.5)
+    assert [model.role("b/" + name) for name in ("gamma", "running_mean")] == ["trained", "running"]
+    x, statistics = random(3, 4, 4, 2) * 3 + 1, engine.BatchStatistics()
+    layer(tape.constant(x), statistics)
+    np.testing.assert_allclose(statistics.mean, x.mean((0, 1, 2)))
+    np.testing.assert_allclose(statistics.variance, x.var((0, 1, 2)))
+    layer.update(statistics, momentum=1)
+    adam.step()
+    np.testing.assert_array_equal(model.values("b/running_variance"), statistics.variance)
+    np.testing.assert_array_equal(model.values("b/gamma"), 1 - 0.1 * 0.5)
+    tape.reset()
+    y = layer.evaluate(tape.constant(x)).numpy()
+    np.testing.assert_allclose(y.std((0, 1, 2)), 0.95, rtol=1e-4)
+    with pytest.raises(fm.ShapeError):
+        layer.update(engine.BatchStatistics())
+
+
+def test_a_running_parameter_is_a_constant():
+    model, tape = engine.Parameters("float64"), engine.Tape("float64")
+    model.add("mean", np.ones(2), role="running")
+    assert not model.leaf(tape, "mean").needs_grad
+    with pytest.raises(ValueError, match="role must be trained, matrix, table or running, got 'frozen'"):
+        engine.Parameters("float64").add("other", np.ones(2), role="frozen")
+
+
+def test_layers_are_added_before_memory_is_referred_to():
+    model = engine.Parameters()
+    engine.Dense(model, "a", 2, 2, seed=1)
+    adam = engine.Adam(model)
+    with pytest.raises(BufferError, match=r"\[Dense\] 1 arrays, passes or optimisers refer to the parameters"):
+        engine.Dense(model, "b", 2, 2, seed=1)
+    del adam
+    gc.collect()
+    with pytest.raises(ValueError, match="a/weight"):
+        engine.Dense(model, "a", 2, 2, seed=1)
+    with pytest.raises(TypeError, match=r"\[Dense\] parameters must be Parameters\(\), got dict"):
+        engine.Dense({}, "a", 2, 2, seed=1)
+
+
+def test_the_gradient_behind_a_relu_is_kept_on_request():
+    model, tape = engine.Parameters("float64"), engine.Tape("float64")
+    layer = engine.Dense(model, "a", 3, 3, seed=1, relu=True)
+    x = random(4, 3)
+    h = layer(tape.constant(x))
+    engine.sum(engine.square(h)).backward()
+    with pytest.raises(ValueError, match="keep_grad"):
+        h.grad
+    with pytest.raises(ValueError, match="before the backward"):
+        tape.keep_grad(h)
+    tape.reset()
+    h = tape.keep_grad(layer(tape.constant(x)))
+    engine.sum(h * 2 + 1).backward()
+    np.testing.assert_array_equal(h.grad, np.full((4, 3), 2.0))
+
+
+def test_schedules():
+    assert [engine.cosine_decay(n, 4, 0.5) for n in (0, 2, 4, 9)] == pytest.approx([1, 0.75, 0.5, 0.5])
+    assert [engine.step_decay(n, 10) for n in (9, 10, 20)] == pytest.approx([1, 0.1, 0.01])
+    assert engine.exponential_decay(3, 0.5) == 0.125
+    assert [engine.warm_up(n, 4) for n in (0, 1, 3, 8)] == [0.25, 0.5, 1, 1]
+    with pytest.raises(ValueError, match="steps"):
+        engine.cosine_decay(1, 0)
+
+
+def take_step(model, optimiser, tape):
+    tape.reset()
+    model.zero_grad()
+    engine.sum(engine.square(model.leaf(tape, "w") - 1)).backward()
+    optimiser.step()
+
+
+@pytest.mark.parametrize("make", [lambda m: engine.Adam(m, lr=0.1), lambda m: engine.Sgd(m, lr=0.1, momentum=0.9)])
+def test_a_saved_state_goes_on_with_the_same_bits(make, tmp_path):
+    def begin():
+        model = engine.Parameters("float64")
+        model.add("w", random(5))
+        return model, make(model), engine.Tape("float64")
+
+    model, optimiser, tape = begin()
+    for _ in range(3):
+        take_step(model, optimiser, tape)
+    file = engine.SafetensorsFile()
+    engine.save_state(file, "model/", model, optimiser)
+    file.write(tmp_path / "state")
+    take_step(model, optimiser, tape)
+
+    again, other, tape = begin()
+    file = engine.SafetensorsFile.read(tmp_path / "state")
+    assert "model/w" in file.names()
+    engine.load_state(file, "model/", again, other)
+    assert getattr(other, "steps", 3) == 3
+    take_step(again, other, tape)
+    np.testing.assert_array_equal(again.values("w"), model.values("w"))
+
+
+def test_states_that_do_not_fit_are_refused_and_change_nothing(tmp_path):
+    model, other, file = engine.Parameters(), engine.Parameters(), engine.SafetensorsFile()
+    model.add("w", np.ones(3, "float32"))
+    other.add("w", np.zeros(2, "float32"))
+    adam = engine.Adam(model)
+    engine.save_state(file, "", model)
+    names = file.names()
+    with pytest.raises(ValueError, match="w"):
+        engine.save_state(file, "", model, adam)
+    assert file.names() == names
+    with pytest.raises(fm.IoError, match="w"):
+        engine.load_state(file, "", other)
+    with pytest.raises(fm.IoError, match="adam/steps"):
+        engine.load_state(file, "", model, adam)
+    with pytest.raises(ValueError, match="the optimiser is one of other parameters"):
+        engine.load_state(file, "", other, adam)
+    with pytest.raises(TypeError, match="optimiser must be Adam or Sgd of float32 parameters, or None, got int"):
+        engine.save_state(file, "b/", model, 3)
+    assert (other.values("w") == 0).all() and (model.values("w") == 1).all()
+    with pytest.raises(fm.IoError, match="nowhere"):
+        engine.SafetensorsFile.read(tmp_path / "nowhere")
+    with pytest.raises(fm.IoError):
+        file.write(tmp_path / "nowhere" / "state")
+
+
+def test_the_inspector_shows_graph_and_costs():
+    tape = engine.Tape()
+    with engine.Inspector(tape) as inspector:
+        x = tape.name(tape.leaf(np.ones((2, 3), "float32")), "input")
+        engine.sum(engine.square(x)).backward()
+        text, dot = inspector.text(), inspector.dot()
+        assert "input" in text and "square" in text and "[2, 3]" in text
+        assert dot.startswith("digraph") and "square" in dot
+        cost = {c.op: c for c in inspector.costs()}["square"]
+        assert cost.calls == 1 and cost.forward_bytes >= 24 and cost.forward_seconds >= 0
+        assert cost.backward_bytes >= 0 and cost.backward_seconds >= 0
+        assert "square" in inspector.cost_table()
+        with pytest.raises(ValueError, match="inspector"):
+            engine.Inspector(tape)
+    with pytest.raises(ValueError, match="closed"):
+        inspector.text()
+    engine.Inspector(tape).close()
+    with pytest.raises(ValueError, match="another tape"):
+        engine.Tape().name(x, "x")
+    with pytest.raises(TypeError, match=r"tape must be Tape\(\), got int"):
+        engine.Inspector(3)
+
+
+@pytest.mark.parametrize("f, way", [(lambda x: engine.log(x), "log"), (lambda x: engine.sqrt(x), "backward of sqrt")])
+def test_the_inspector_stops_at_the_first_nan(f, way):
+    tape = engine.Tape("float64")
+    with engine.Inspector(tape, stop_at_nonfinite=True):
+        with pytest.raises(ValueError, match=way + r".* made the first"):
+            engine.sum(f(tape.leaf(np.array([1.0, 0.0])))).backward()
