@@ -105,7 +105,7 @@ Cases layout() {
        make("resample: upsample_nearest", [](auto&, auto v) { return upsample_nearest(v[0], 2); }, {image}),
        make("resample: upsample_to", [](auto&, auto v) { return upsample_to(v[0], 7, 5); }, {image}),
        make("resample: upsample_to, nearest",
-            [](D&, Vars v) { return upsample_to(v[0], 7, 5, Interpolation::nearest); }, {image}),
+            [](auto&, auto v) { return upsample_to(v[0], 7, 5, Interpolation::nearest); }, {image}),
        make("tape: part of a value",
             [](D& tape, Vars v) {
               return mul(tape.part(v[0], 2, {3, 2}), tape.part(v[0], 6, {3, 2}));
@@ -134,7 +134,8 @@ Cases losses() {
        make("softmax: softmax_cross_entropy",
             [](auto&, auto v) { return softmax_cross_entropy(v[0], kLabels); }, {logits}),
        make("softmax: softmax_cross_entropy, weighted",
-            [](D&, Vars v) { return softmax_cross_entropy<double>(v[0], kLabels, kRowWeights); }, {logits})});
+            [](auto&, auto v) { return softmax_cross_entropy<double>(v[0], kLabels, kRowWeights); },
+            {logits})});
 }
 
 Cases norms() {
@@ -148,12 +149,13 @@ Cases norms() {
             [](auto&, auto v) { return batch_norm_fixed<double>(v[0], v[1], v[2], kMean, kVariance); },
             {x, gamma, beta}),
        make("group_norm: with relu",
-            [](D&, Vars v) { return group_norm(v[0], v[1], v[2], {.groups = 2, .relu = true}); },
+            [](auto&, auto v) { return group_norm(v[0], v[1], v[2], {.groups = 2, .relu = true}); },
             {x, gamma, biases(4)}),
-       make("batch_norm: with relu", [](D&, Vars v) { return batch_norm(v[0], v[1], v[2], {.relu = true}); },
+       make("batch_norm: with relu",
+            [](auto&, auto v) { return batch_norm(v[0], v[1], v[2], {.relu = true}); },
             {x, gamma, biases(4)}),
        make("batch_norm: fixed statistics, with relu",
-            [](D&, Vars v) {
+            [](auto&, auto v) {
               return batch_norm_fixed<double>(v[0], v[1], v[2], kMean, kVariance, {.relu = true});
             },
             {x, gamma, biases(4)}),
@@ -191,9 +193,10 @@ Cases products() {
        make("conv2d with stride and padding",
             [](auto&, auto v) { return conv2d(v[0], v[1], v[2], {.stride = 3, .padding = 2}); },
             {mixed({2, 5, 7, 2}, 1), mixed({4, 4, 2, 3}, 2), mixed({3}, 3)}),
-       make("conv2d with dilation and groups",
-            [](D&, Vars v) { return conv2d(v[0], v[1], v[2], {.padding = 1, .dilation = 2, .groups = 2}); },
-            {mixed({1, 3, 4, 4}, 1), mixed({2, 2, 2, 4}, 2), mixed({4}, 3)}),
+       make(
+           "conv2d with dilation and groups",
+           [](auto&, auto v) { return conv2d(v[0], v[1], v[2], {.padding = 1, .dilation = 2, .groups = 2}); },
+           {mixed({1, 3, 4, 4}, 1), mixed({2, 2, 2, 4}, 2), mixed({4}, 3)}),
        make("conv_transpose2d",
             [](D&, Vars v) { return conv_transpose2d(v[0], v[1], v[2], {.stride = 2, .padding = 1}); },
             {mixed({2, 3, 4, 2}, 1), mixed({3, 3, 5, 2}, 2), mixed({5}, 3)}),

@@ -237,8 +237,6 @@ void bind_layout(py::module_& module) {
       "xs"_a, "axis"_a = -1, once<T>("Joins values along an axis; their other axes are alike."));
 }
 
-<<<<<<< HEAD
-=======
 // The indices outlive the pass: gather's backward reads them.
 template <class T>
 Reading<std::int32_t> indices(const char* where, const Value<T>& x, const py::object& given) {
@@ -248,95 +246,25 @@ Reading<std::int32_t> indices(const char* where, const Value<T>& x, const py::ob
   return {index, elements<std::int32_t>(index)};
 }
 
->>>>>>> origin/h6-python
 template <class T>
 void bind_indexing(py::module_& module) {
   module.def(
       "gather",
       [](const Value<T>& x, int axis, const py::object& index) {
-<<<<<<< HEAD
-        const py::array array = borrowed<std::int32_t>("gather: index", index);
-        return x.with(gather(x.get(), axis, elements<std::int32_t>(array)));
-=======
         const auto read = indices("gather: index", x, index);
         return x.with(gather(x.get(), axis, read.elements), read);
->>>>>>> origin/h6-python
       },
       "x"_a, "axis"_a, "index"_a,
       once<T>("Entries of an axis by an index [N] of int32 in [0, extent), repeats allowed."));
   module.def(
       "scatter_add",
       [](const Value<T>& x, int axis, const py::object& index, Index extent) {
-<<<<<<< HEAD
-        const py::array array = borrowed<std::int32_t>("scatter_add: index", index);
-        return x.with(scatter_add(x.get(), axis, elements<std::int32_t>(array), extent));
-      },
-      "x"_a, "axis"_a, "index"_a, "extent"_a);
-  module.def(
-      "where",
-      [](const Value<T>& mask, const Value<T>& a, const Value<T>& b) {
-        return a.with(where(mask.get(), a.get(), b.get()));
-      },
-      "mask"_a, "a"_a, "b"_a);
-  module.def(
-      "clamp", [](const Value<T>& x, double low, double high) { return x.with(clamp(x.get(), low, high)); },
-      "x"_a, "low"_a, "high"_a);
-}
-
-template <class T>
-void bind_layers(py::module_& module) {
-  using V = const Value<T>&;
-  module.def(
-      "dense",
-      [](V x, V w, V b, bool with_relu) {
-        return x.with(dense(x.get(), w.get(), b.get(), with_relu ? Activation::relu : Activation::none));
-      },
-      "x"_a, "w"_a, "b"_a, "relu"_a = false, "x w + b of rows x [n, in], w [in, out], b [out].");
-  module.def(
-      "conv2d",
-      [](V x, V w, V b, Index stride, Index padding, bool with_relu) {
-        return x.with(conv2d(x.get(), w.get(), b.get(), ConvWindow{.stride = stride, .padding = padding},
-                             with_relu ? Activation::relu : Activation::none));
-      },
-      "x"_a, "w"_a, "b"_a, "stride"_a = 1, "padding"_a = 0, "relu"_a = false,
-      "Convolution of images x [n, h, w, channels], see ops/conv2d.h.");
-  module.def(
-      "layer_norm",
-      [](V x, V gamma, V beta, double eps) {
-        return x.with(layer_norm(x.get(), gamma.get(), beta.get(), eps));
-      },
-      "x"_a, "gamma"_a, "beta"_a, "eps"_a = 1e-5);
-  module.def(
-      "max_pool",
-      [](V x, Index size, Index stride) {
-        return x.with(max_pool(x.get(), MaxPool{.size = size, .stride = stride}));
-      },
-      "x"_a, "size"_a = 2, "stride"_a = 2);
-  module.def(
-      "upsample_nearest", [](V x, Index factor) { return x.with(upsample_nearest(x.get(), factor)); }, "x"_a,
-      "factor"_a);
-  module.def(
-      "mse_loss", [](V a, V b) { return a.with(mse_loss(a.get(), b.get())); }, "a"_a, "b"_a);
-  module.def(
-      "l1_loss", [](V a, V b) { return a.with(l1_loss(a.get(), b.get())); }, "a"_a, "b"_a);
-  module.def(
-      "huber_loss", [](V a, V b, double delta) { return a.with(huber_loss(a.get(), b.get(), delta)); }, "a"_a,
-      "b"_a, "delta"_a);
-  module.def(
-      "softmax_cross_entropy",
-      [](V logits, const py::object& labels) {
-        const py::array array = borrowed<std::int32_t>("softmax_cross_entropy: labels", labels);
-        return logits.with(softmax_cross_entropy(logits.get(), elements<std::int32_t>(array)));
-      },
-      "logits"_a, "labels"_a);
-=======
         const auto read = indices("scatter_add: index", x, index);
         return x.with(scatter_add(x.get(), axis, read.elements, extent), read);
       },
       "x"_a, "axis"_a, "index"_a, "extent"_a,
       once<T>("Adds entry i of an axis to entry index[i] of one with this extent; index [N] of int32 in [0, "
               "extent)."));
->>>>>>> origin/h6-python
 }
 
 }  // namespace

@@ -251,7 +251,7 @@ TEST_CASE("tape: sizes that do not fit are errors") {
                     "[tape] a buffer must have 0 elements or more and fit into memory, got -3");
   CHECK_THROWS_AS(tape.scratch(Index{1} << 61), ValueError);
   double* y = nullptr;
-  CHECK_THROWS_AS(tape.output({-1}, &y, {tape.constant(x)}), ValueError);
+  CHECK_THROWS_AS(tape.output({Index{1} << 61}, &y, {tape.constant(x)}), ValueError);
 }
 
 TEST_CASE("tape: a repeated step takes nothing from the system") {

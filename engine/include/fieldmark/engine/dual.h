@@ -15,7 +15,7 @@ namespace fieldmark {
 /// backward from it gives second derivatives. products.h does both for whole functions.
 ///
 /// Where an op has a kink, the tangent follows the backward: a mask is a constant. Ops without a tangent do
-/// not compile with Duals: max_pool and symmetric_eigenvalues, and the layers of nn/.
+/// not compile with Duals: max_pool, conv_transpose2d, dropout, symmetric_eigenvalues, and the layers of nn/.
 template <class T>
 class Dual {
  public:
