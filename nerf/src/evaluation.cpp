@@ -1,6 +1,7 @@
 #include <fieldmark/core/error.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/imaging/metrics.h>
+#include <fieldmark/nerf/colour_fit.h>
 #include <fieldmark/nerf/evaluation.h>
 
 #include <algorithm>
@@ -36,15 +37,20 @@ ViewScore score(const View& view, Rendering rendering, Background background, co
   const Tensor<float> valid = valid_mask(view);
   Tensor<float> truth = composited(view, background);
   Tensor<float> foreground = foreground_mask(view, rendering);
+  Tensor<float> fitted = colour_fitted(rendering, view, background);
   for (Index i = 0; i < valid.size(); ++i) {
     if (valid[i] > 0) continue;
     foreground[i] = 0;
-    for (Tensor<float>* image : {&truth, &rendering.rgb}) std::fill_n(&(*image)[3 * i], 3, 0.f);
+    for (Tensor<float>* image : {&truth, &rendering.rgb, &fitted}) std::fill_n(&(*image)[3 * i], 3, 0.f);
   }
   const Index side = std::min(view.camera.width, view.camera.height);
   const double none = std::numeric_limits<double>::quiet_NaN();
-  return {.psnr = view.valid.empty() ? psnr(rendering.rgb, truth) : psnr_masked(rendering.rgb, truth, valid),
+  const auto over_valid = [&](const Tensor<float>& image) {
+    return view.valid.empty() ? psnr(image, truth) : psnr_masked(image, truth, valid);
+  };
+  return {.psnr = over_valid(rendering.rgb),
           .psnr_foreground = psnr_masked(rendering.rgb, truth, foreground),
+          .psnr_colour_fitted = over_valid(fitted),
           .ssim = side >= kSsimWindow ? ssim(rendering.rgb, truth) : none,
           .lpips = lpips && side >= lpips->smallest()
                        ? lpips->distance(quantize8(rendering.rgb), quantize8(truth)).value
@@ -80,6 +86,7 @@ Evaluation evaluate(Renderer& renderer, const Dataset& dataset,
   }
   result.psnr = mean(result.per_view, &ViewScore::psnr);
   result.psnr_foreground = mean(result.per_view, &ViewScore::psnr_foreground);
+  result.psnr_colour_fitted = mean(result.per_view, &ViewScore::psnr_colour_fitted);
   result.ssim = mean(result.per_view, &ViewScore::ssim);
   result.lpips = mean(result.per_view, &ViewScore::lpips);
   result.seconds_per_view = seconds / static_cast<double>(result.views);

@@ -1,4 +1,5 @@
 #include <fieldmark/nerf/camera.h>
+#include <fieldmark/nerf/colour_affine.h>
 #include <fieldmark/nerf/composite.h>
 #include <fieldmark/nerf/distortion_loss.h>
 #include <fieldmark/nerf/field.h>
@@ -60,6 +61,12 @@ GradcheckReport check_hash_encoding(HashEncoding<double>::Part part) {
                           store, in);
 }
 
+GradcheckReport check_colour_affine() {
+  const std::vector<Index> image{1, 0, 1, 2, 1};
+  return check_op([&](auto v) { return colour_affine(v[0], v[1], std::span<const Index>(image)); },
+                  {scatter({5, 4}, 0, 1, 1), scatter({3, 12}, -0.5, 0.5, 2)});
+}
+
 GradcheckReport check_composite() {
   const std::vector<Index> ray_begin{0, 3, 3, 8};
   return check_op([&](auto v) { return composite(v[0], v[1], v[2], std::span<const Index>(ray_begin)); },
@@ -116,6 +123,7 @@ GradcheckReport check_mlp_field(bool colour) {
 std::vector<GradcheckCase> gradcheck_cases() {
   using Part = HashEncoding<double>::Part;
   return {
+      {"colour_affine", check_colour_affine},
       {"composite", check_composite},
       {"distortion_loss", check_distortion_loss},
       {"field density", [] { return check_hash_field(false); }},

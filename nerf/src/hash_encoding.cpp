@@ -99,6 +99,18 @@ void HashEncoding<T>::backward(const T* x, Index n, const T* ddensity, const T* 
 }
 
 template <class T>
+void HashEncoding<T>::backward_positions(std::span<const T> table, const T* x, Index n, const T* ddensity,
+                                         const T* dcolour, T* dx) const {
+  using namespace kernels;
+  const auto kernel = FIELDMARK_KERNEL(hash_backward_x<T>);
+  parallel_for(n, kPointGrain, [&](Index b, Index e) {
+    kernel(raw(levels_), levels(), features_, x + 3 * b, e - b, table.data(),
+           ddensity ? ddensity + b * width() : nullptr, dcolour ? dcolour + b * width() : nullptr,
+           dx + 3 * b);
+  });
+}
+
+template <class T>
 Var<T> HashEncoding<T>::operator()(const Params<T>& params, Var<T> x, Part part) const {
   check_rank("hash_encoding", "x", x.shape(), 2, "[N, 3]");
   check_extent("hash_encoding", "x", x.shape(), 1, 3, "x, y, z");
@@ -115,18 +127,11 @@ Var<T> HashEncoding<T>::operator()(const Params<T>& params, Var<T> x, Part part)
   // A position owns its row of dx, so chunks of positions run in parallel. Positions share rows of the table,
   // so there levels run in parallel: each owns its rows.
   tape.on_backward(out, [this, x, table, n, density](const T* dy) {
-    using namespace kernels;
     const T *dd = density ? dy : nullptr, *dc = density ? nullptr : dy;
-    if (T* dx = x.grad_acc()) {
-      const auto backward = FIELDMARK_KERNEL(hash_backward_x<T>);
-      parallel_for(n, kPointGrain, [&](Index b, Index e) {
-        backward(raw(levels_), levels(), features_, x.value() + 3 * b, e - b, table.value(),
-                 dd ? dd + b * width() : dd, dc ? dc + b * width() : dc, dx + 3 * b);
-      });
-    }
+    const auto size = static_cast<std::size_t>(table.shape().size());
+    if (T* dx = x.grad_acc()) backward_positions({table.value(), size}, x.value(), n, dd, dc, dx);
     if (T* dt = table.grad_acc())
-      backward(x.value(), n, dd, dc, {dt, static_cast<std::size_t>(table.shape().size())},
-               x.tape().scratch(2 * n * width()));
+      backward(x.value(), n, dd, dc, {dt, size}, x.tape().scratch(2 * n * width()));
   });
   return out;
 }

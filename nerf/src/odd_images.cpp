@@ -124,8 +124,8 @@ double brighter(const SurveyedView& a, const SurveyedView& b) {
 Oddity exposures(std::span<const SurveyedView> views, SceneType scene, double& most) {
   Oddity found{.kind = "exposures",
                .remedy =
-                   "fix exposure and white balance when you take the images, or even them out before the "
-                   "training"};
+                   "train with --exposure auto, which learns an exposure of each image if that helps on "
+                   "validation images, or fix exposure and white balance when you take the images"};
   const bool is_object = scene == SceneType::object || scene == SceneType::plain;
   const std::vector<std::size_t> next = neighbours(views);
   most = 1;

@@ -92,6 +92,28 @@ Vec3 Space::to_world(const Vec3& x) const {
   return y;
 }
 
+// Contracted, with k(s) = (2 - 1/s) / s:  dx_i/dy_j = k / 4 if i = j, and where s = |y_m| > 1, on top of it
+// k'(s) / 4 y_i sign(y_m) if j = m, with k'(s) = 2 (1 - s) / s^3.
+Vec3 Space::gradient_in_world(const Vec3& p, const Vec3& g) const {
+  if (kind == SpaceKind::ndc)
+    return {-slope_x / p[2] * g[0], -slope_y / p[2] * g[1],
+            (slope_x * p[0] * g[0] + slope_y * p[1] * g[1] - near * g[2]) / (p[2] * p[2])};
+  if (kind == SpaceKind::cube) return (1 / bounds.side) * g;
+  Vec3 y;
+  for (std::size_t a = 0; a < 3; ++a) y[a] = 2 * (p[a] - bounds.corner[a]) / bounds.side - 1;
+  const double s = largest(y), k = s <= 1 ? 1 : (2 - 1 / s) / s;
+  Vec3 out = k * g;
+  if (s > 1) {
+    const double along = 2 * (1 - s) / (s * s * s) * dot(y, g);
+    for (std::size_t a = 0; a < 3; ++a)
+      if (std::abs(y[a]) == s) {
+        out[a] += y[a] > 0 ? along : -along;
+        break;
+      }
+  }
+  return (2 * kQuarter / bounds.side) * out;
+}
+
 RayBatch RayBatch::part(Index begin, Index n) const {
   const auto rows = [&](std::span<const float> all) { return all.subspan(at(3 * begin), at(3 * n)); };
   return {rows(origins), rows(directions), rows(seen_from), contracted, near};

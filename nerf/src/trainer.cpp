@@ -13,11 +13,10 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <iterator>
 #include <numeric>
 
+#include "image_corrections.h"
 #include "trainer_shard.h"
-#include "trainer_version_0_1.h"
 
 namespace fieldmark::nerf {
 namespace {
@@ -27,6 +26,7 @@ constexpr int kMlpShards = 8;           // each has the gradients of two large n
 constexpr Index kRays = 64;             // of a chunk
 constexpr Index kOccupancyPeriod = 16;  // steps
 constexpr Index kMostRays = 1 << 16;
+constexpr Index kPosesAfter = 100;  // steps: a field that shows nothing yet leads cameras astray
 constexpr Index kShortSteps = 8000, kLongSteps = 20000;  // of a run, see field_options()
 constexpr double kShortSeconds = 120, kLongSeconds = 400;
 
@@ -72,6 +72,11 @@ void check(const TrainOptions& o, const RadianceField& field) {
   must(o.hard_pixels >= 0 && o.hard_pixels <= 1, "hard_pixels must be in [0, 1]", o.hard_pixels);
   if (field.coarse && field.options().supersampling > 1)
     throw ValueError("[trainer] field must be a hash field to have supersampling, got an mlp field");
+  if (field.coarse && (o.refine_poses || o.freeze))
+    throw ValueError(
+        "[trainer] field must be a hash field to refine poses or to be frozen, got an mlp field");
+  if (o.freeze && !(o.keep && (o.image_colours || o.refine_poses)))
+    throw ValueError("[trainer] freeze needs keep, and image_colours or refine_poses to learn");
 }
 
 }  // namespace
@@ -129,6 +134,7 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
     lay_out_space();
   }
   choose_pixels();
+  prepare_images();
   if (field.coarse) rays_per_step_ = mlp_rays();
   // As if every tile were at its worst, so that what was never seen is preferred.
   if (options.hard_pixels > 0 && !field.coarse) tile_errors_.assign(at(tile_of(all_pixels() - 1) + 1), 1.f);
@@ -150,7 +156,7 @@ void Trainer::lay_out_space() {
         "[trainer] field must be a hash field where a scene has no bounds (points of mlp fields are "
         "spread over straight rays), got an mlp field");
   if (field_.space.kind == SpaceKind::cube) {
-    if (options_.carve && has_alpha(data_)) carve();
+    if (options_.carve && !options_.refine_poses && has_alpha(data_)) carve();
     return;
   }
   std::vector<Camera> cameras;
@@ -185,7 +191,7 @@ double Trainer::run_chunk(Index index, Shard& shard, Tape<float>& tape, float* g
   std::copy(s.position.begin(), s.position.end(), shard.position.append(3 * n));
 
   // The features were looked up by the sampler; as leaves they collect what the table is owed.
-  const Params<float> params(field_.params, grads, packed_);
+  const Params<float> params(field_.params, options_.freeze ? nullptr : grads, packed_);
   const Var<float> density_features = tape.fresh_leaf(s.density_features.data(), nullptr, {n, width});
   const Var<float> colour_features = tape.fresh_leaf(s.colour_features.data(), nullptr, {n, width});
   const Var<float> of_ray =
@@ -204,6 +210,7 @@ double Trainer::run_chunk(Index index, Shard& shard, Tape<float>& tape, float* g
   Var<float> rays = composite(sigma, rgb, tape.constant(delta, {n}), s.ray_begin);
   if (const Index k = rays_along_pixel(); k > 1)
     rays = tape.reshape(avg_pool(tape.reshape(rays, {kRays / (k * k), k, k, 4}), k), {kRays / (k * k), 4});
+  rays = coloured(rays, shard);
   const double share = static_cast<double>(kRays) / static_cast<double>(rays_per_step_);
   const Var<float> loss =
       photometric_loss<float>(rays, shard.truth, shard.background, {.huber = options_.huber, .scale = share});
@@ -217,8 +224,11 @@ double Trainer::run_chunk(Index index, Shard& shard, Tape<float>& tape, float* g
   } else {
     tape.backward(loss);
   }
-  field_.field.encoding().deal_to_levels(n, density_features.grad(), colour_features.grad(),
-                                         shard.dfeatures.append(2 * n * width));
+  if (options_.refine_poses && (options_.freeze || steps() >= kPosesAfter))
+    add_motions(density_features.grad(), colour_features.grad(), shard);
+  if (!options_.freeze)
+    field_.field.encoding().deal_to_levels(n, density_features.grad(), colour_features.grad(),
+                                           shard.dfeatures.append(2 * n * width));
   return value;
 }
 
@@ -265,6 +275,7 @@ void Trainer::backward_table() {
 double Trainer::take_step(double) {
   packed_.update();
   for (Shard& s : shards_) s.begin_step();
+  place_cameras();
   const double loss = field_.coarse ? step_mlp() : step_hash();
   for (const Shard& s : shards_)
     samples_ += static_cast<double>(std::accumulate(s.samples.begin(), s.samples.end(), Index{0}));
@@ -272,7 +283,7 @@ double Trainer::take_step(double) {
 }
 
 double Trainer::step_hash() {
-  if (steps() % kOccupancyPeriod == 0) refresh_occupancy();
+  if (steps() % kOccupancyPeriod == 0 && !options_.freeze) refresh_occupancy();
   const Index network = field_.field.network_size();
   const double loss = loop_.run(
       rays_per_step_ / kRays,
@@ -280,8 +291,11 @@ double Trainer::step_hash() {
         return run_chunk(c, shards_[at(shard)], tape, grads);
       },
       field_.params.grads().first(at(network)));
-  update();
-  backward_table();
+  if (!options_.freeze) {
+    update();
+    backward_table();
+  }
+  step_images();
 
   for (const Shard& s : shards_)
     for (const auto& [tile, error] : s.errors)
@@ -331,58 +345,6 @@ std::string Trainer::status() const {
   char text[64];
   std::snprintf(text, sizeof text, "%.2f dB on the rays trained", train_psnr());
   return text;
-}
-
-void Trainer::describe(RunFingerprint& f) const {
-  const TrainOptions& o = options_;
-  f.option("run", "field");
-  f.options("field", field_.configuration());
-  f.option("samples_per_step", o.samples_per_step);
-  f.option("first_samples", o.first_samples);
-  f.option("least_rays", o.least_rays);
-  f.option("grow_after", o.grow_after);
-  f.option("huber", o.huber);
-  f.option("stop", o.stop);
-  f.option("distortion", o.distortion);
-  f.option("hard_pixels", o.hard_pixels);
-  f.option("table_decay", o.table_decay);
-  f.option("decay_after", o.decay_after);
-  f.option("supersample_after", o.supersample_after);
-  f.option("warm_up", o.warm_up);
-  f.option("seed", o.seed);
-  f.option("precision", o.precision == Precision::bf16 ? "bf16" : "fp32");
-  f.option("carve", o.carve);
-  f.option("keep", o.keep);
-  if (o.keep) f.input_digest("field", start_);
-  if (data_.scene == SceneType::plain) f.input("plain_colour", data_.plain_colour);
-  std::vector<double> cameras;
-  for (const View& v : data_.views) std::ranges::copy(v.camera.parameters(), std::back_inserter(cameras));
-  f.input("cameras", cameras);
-  std::vector<std::string> images(data_.views.size());
-  parallel_for(std::ssize(images), 1, [&](Index i, Index) {
-    images[at(i)] = sha256_hex(std::as_bytes(std::span(data_.views[at(i)].rgba.data)));
-  });
-  for (std::size_t i = 0; i < images.size(); ++i) f.input_digest("image " + std::to_string(i), images[i]);
-  for (std::size_t i = 0; i < images.size(); ++i)
-    if (const auto& valid = data_.views[i].valid; !valid.empty())
-      f.input_digest("mask " + std::to_string(i), sha256_hex(std::as_bytes(std::span(valid))));
-}
-
-void Trainer::save_more(SafetensorsFile& file) const {
-  file.add("run/densities", {field_.grid.cells()}, field_.grid.densities());
-  file.add("run/occupied", {field_.grid.cells()}, field_.grid.bits());
-}
-
-void Trainer::restore_more(const SafetensorsFile& file) {
-  field_.grid.restore(file.f32("run/densities").data, file.u8("run/occupied"));
-}
-
-RadianceFieldOptions checkpointed_field(const std::filesystem::path& path) {
-  const SafetensorsFile file = SafetensorsFile::read(path);
-  const std::string old = configuration_of_version_0_1(file);
-  return RadianceField::from_configuration(old.empty() ? RunFingerprint::options_of(file, "field") : old,
-                                           path.string() + ": options")
-      .options();
 }
 
 }  // namespace fieldmark::nerf

@@ -50,8 +50,9 @@ double Trainer::run_mlp_chunk(Index index, Shard& shard, Tape<float>& tape, floa
   const auto loss_of = [&](const Field<float>& net, RaySamples& samples) {
     shard.samples.push_back(samples.size());
     const double share = static_cast<double>(kMlpRays) / static_cast<double>(rays_per_step_);
-    return photometric_loss<float>(look(net, field_.params, params, shard.rays.seen_from, samples, tape),
-                                   shard.truth, shard.background, {.huber = options_.huber, .scale = share});
+    const Var<float> seen = look(net, field_.params, params, shard.rays.seen_from, samples, tape);
+    return photometric_loss<float>(coloured(seen, shard), shard.truth, shard.background,
+                                   {.huber = options_.huber, .scale = share});
   };
   const bool refined = points.importance > 0;
   RaySamples& first = refined ? shard.first : shard.found;
@@ -78,6 +79,7 @@ double Trainer::step_mlp() {
       },
       field_.params.grads());
   update();
+  step_images();
   return loss;
 }
 

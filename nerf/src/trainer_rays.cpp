@@ -81,8 +81,7 @@ void Trainer::aim(Index first, Shard& c) const {
       xy[at(2 * part + 1)] = static_cast<float>(row) + within(part / k, u[1]);
       if (k > 1) c.jitter[at(i * k * k + part)] = u[2];
     }
-    c.rays.set(field_.space, i * k * k, data_.views[at(c.places[at(i)] / size)].camera,
-               std::span(xy).first(at(2 * k * k)));
+    c.rays.set(field_.space, i * k * k, cameras_[at(c.images[at(i)])], std::span(xy).first(at(2 * k * k)));
   }
 }
 
@@ -95,6 +94,7 @@ void Trainer::choose_rays(Index first, Index rays, Shard& c) const {
        {std::pair{&c.jitter, rays}, {&c.truth, 4 * count}, {&c.background, 3 * count}})
     buffer->resize(at(numbers));
   c.places.resize(at(count));
+  c.images.resize(at(count));
   std::vector<Index>& place = c.places;
   const Index width = data_.views[0].camera.width, size = width * data_.views[0].camera.height;
   // Where a pixel lies in memory is random: all are asked for before the first is used, and so are the places
@@ -111,7 +111,8 @@ void Trainer::choose_rays(Index first, Index rays, Shard& c) const {
   if (!tile_errors_.empty()) prefer_hard(first, count, place);
   for (const Index p : place) __builtin_prefetch(data_.views[at(p / size)].rgba.data.data() + 4 * (p % size));
   for (Index i = 0; i < count; ++i) {
-    const View& view = data_.views[at(place[at(i)] / size)];
+    c.images[at(i)] = place[at(i)] / size;
+    const View& view = data_.views[at(c.images[at(i)])];
     std::copy_n(view.rgba.data.data() + 4 * (place[at(i)] % size), 4, &c.truth[at(4 * i)]);
     const auto b = background_rng_.uniform4(step, static_cast<std::uint64_t>(first + i));
     // What is opaque before a plain background may show it, or a part of it at an edge.

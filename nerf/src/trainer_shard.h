@@ -1,5 +1,8 @@
 #pragma once
 #include <fieldmark/nerf/trainer.h>
+
+#include <algorithm>
+
 #include "hierarchical_sampler.h"
 
 namespace fieldmark::nerf {
@@ -29,11 +32,15 @@ struct Trainer::Shard {
   std::vector<Index> samples;
   Buffer position, dfeatures;
   std::vector<Index> places;                    // of the pixels of a chunk's rays in all images
+  std::vector<Index> images;                    // that hold these pixels
+  std::vector<float> dposition;                 // of a chunk's samples, where cameras are refined
+  std::vector<float> image_grads;               // of all chunks, laid out as ImageCorrections::params
   std::vector<std::pair<Index, float>> errors;  // of the rays of all chunks: tile and mean square
 
   void begin_step() {
     samples.clear();
     errors.clear();
+    std::fill(image_grads.begin(), image_grads.end(), 0.f);
     position.used = dfeatures.used = 0;
   }
 };

@@ -1,6 +1,7 @@
 #include <fieldmark/core/error.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/imaging/metrics.h>
+#include <fieldmark/nerf/colour_fit.h>
 #include <fieldmark/nerf/evaluation.h>
 
 #include <algorithm>
@@ -60,6 +61,8 @@ TEST_CASE("evaluation: scores are those of the metrics, and means are over the v
     for (Index i = 0; i < 320; ++i) mask[i] = data.views[v].rgba[4 * i + 3];
     CHECK(e.per_view[v].psnr == psnr(r.rgb, truth));
     CHECK(e.per_view[v].psnr_foreground == psnr_masked(r.rgb, truth, mask));
+    CHECK(e.per_view[v].psnr_colour_fitted == psnr(colour_fitted(r, data.views[v], data.background), truth));
+    CHECK(e.per_view[v].psnr_colour_fitted > e.per_view[v].psnr + 3);
     CHECK(e.per_view[v].ssim == ssim(r.rgb, truth));
     sum[0] += e.per_view[v].psnr, sum[1] += e.per_view[v].psnr_foreground, sum[2] += e.per_view[v].ssim;
   }
@@ -106,6 +109,7 @@ TEST_CASE("evaluation: pixels that are not valid count in no PSNR") {
   const Evaluation masked = evaluate(renderer, data), other = evaluate(renderer, wrong);
   CHECK(masked.psnr == other.psnr);
   CHECK(masked.psnr_foreground == other.psnr_foreground);
+  CHECK(masked.psnr_colour_fitted == other.psnr_colour_fitted);
   CHECK(masked.psnr != whole.psnr);
   const Rendering r = renderer.render(data.views[0].camera);
   Tensor<float> mask(Shape{16, 20});

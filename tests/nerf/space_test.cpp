@@ -164,6 +164,25 @@ TEST_CASE("space: seen cells are those of an image's cone, the same for every th
   }
 }
 
+TEST_CASE("space: gradients come back to the world as differences say") {
+  for (const Space& space : {kCube, kNdc, kContracted}) {
+    CAPTURE(name_of(space.kind));
+    const auto inside = uniform({40, 3}, 0.05, 0.95, 5), g = uniform({40, 3}, -1, 1, 6);
+    for (Index i = 0; i < 40; ++i) {
+      const Vec3 p = space.to_world({inside[3 * i], inside[3 * i + 1], inside[3 * i + 2]});
+      const Vec3 slope = space.gradient_in_world(p, {g[3 * i], g[3 * i + 1], g[3 * i + 2]});
+      for (std::size_t a = 0; a < 3; ++a) {
+        const double h = 1e-5 * std::max(1., norm(p));
+        Vec3 up = p, down = p;
+        up[a] += h, down[a] -= h;
+        const Vec3 change = (1 / (2 * h)) * (space.to_cube(up) - space.to_cube(down));
+        const double want = change[0] * g[3 * i] + change[1] * g[3 * i + 1] + change[2] * g[3 * i + 2];
+        CHECK(std::abs(slope[a] - want) < 1e-6 * std::max(norm(slope), 1e-3));
+      }
+    }
+  }
+}
+
 TEST_CASE("space: kinds have names") {
   for (const SpaceKind kind : {SpaceKind::cube, SpaceKind::ndc, SpaceKind::contracted})
     CHECK(parse_space_kind(name_of(kind)) == kind);

@@ -8,6 +8,7 @@
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/perceptual.h"
+#include "cli/refinement.h"
 #include "cli/scene_data.h"
 #include "cli/supersampling.h"
 
@@ -18,12 +19,14 @@ struct EvalArguments {
   std::string field, data, lpips_weights;
   std::string split = "test";
   Index size = 0, supersampling = 0;
+  bool refine_poses = false;
 };
 
 int run_eval(const EvalArguments& options, Context& context) {
   const auto field = nerf::RadianceField::load(options.field);
-  const auto data = load_scene(
+  auto data = load_scene(
       options.data, {.split = options.split, .size = options.size, .background = field.background}, context);
+  const Json motion = options.refine_poses ? fit_cameras(field, data, context) : Json();
   const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
   const Index rays = options.supersampling > 0 ? options.supersampling : field.options().supersampling;
   nerf::Renderer renderer(field, {.supersampling = rays});
@@ -41,11 +44,11 @@ int run_eval(const EvalArguments& options, Context& context) {
   }
   if (guard.interrupted()) throw Interrupted("nothing was written");
   Json views = Json::array();
-  const auto add = [&](const std::string& name, double psnr, double foreground, double ssim,
+  const auto add = [&](const std::string& name, double psnr, double foreground, double fitted, double ssim,
                        double distance) {
     char line[160];
-    std::snprintf(line, sizeof line, "%-16s %6.2f dB  foreground %6.2f dB  ssim %.4f", name.c_str(), psnr,
-                  foreground, ssim);
+    std::snprintf(line, sizeof line, "%-16s %6.2f dB  foreground %6.2f dB  colour-fitted %6.2f dB  ssim %.4f",
+                  name.c_str(), psnr, foreground, fitted, ssim);
     context.text() << line;
     if (lpips) {
       std::snprintf(line, sizeof line, "  lpips %.4f", distance);
@@ -55,16 +58,21 @@ int run_eval(const EvalArguments& options, Context& context) {
   };
   for (std::size_t i = 0; i < evaluation.per_view.size(); ++i) {
     const nerf::ViewScore& score = evaluation.per_view[i];
-    add(data.views[i].name, score.psnr, score.psnr_foreground, score.ssim, score.lpips);
+    add(data.views[i].name, score.psnr, score.psnr_foreground, score.psnr_colour_fitted, score.ssim,
+        score.lpips);
     views.push_back({{"image", data.views[i].name},
                      {"psnr", number(score.psnr)},
                      {"psnr_foreground", number(score.psnr_foreground)},
+                     {"psnr_colour_fitted", number(score.psnr_colour_fitted)},
                      {"ssim", number(score.ssim)},
                      {"lpips_alex", number(score.lpips)}});
   }
-  add("mean", evaluation.psnr, evaluation.psnr_foreground, evaluation.ssim, evaluation.lpips);
+  add("mean", evaluation.psnr, evaluation.psnr_foreground, evaluation.psnr_colour_fitted, evaluation.ssim,
+      evaluation.lpips);
   context.result({{"psnr", number(evaluation.psnr)},
                   {"psnr_foreground", number(evaluation.psnr_foreground)},
+                  {"psnr_colour_fitted", number(evaluation.psnr_colour_fitted)},
+                  {"camera_motion", motion},
                   {"ssim", number(evaluation.ssim)},
                   {"lpips_alex", number(evaluation.lpips)},
                   {"views", evaluation.views},
@@ -89,6 +97,8 @@ Command add_eval(CommandLine& app) {
       ->range(16, 8192)
       ->type_name("N")
       ->default_str("");
+  app.add_flag("--refine-poses", o->refine_poses,
+               "Fit the cameras to the images before a field that stays as it is");
   add_supersampling(app, o->supersampling);
   add_lpips_weights(app, o->lpips_weights);
   return [o](Context& context) { return run_eval(*o, context); };

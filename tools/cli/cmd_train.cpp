@@ -16,6 +16,7 @@
 #include "cli/context.h"
 #include "cli/long_run.h"
 #include "cli/precision.h"
+#include "cli/refinement.h"
 #include "cli/scene_data.h"
 
 namespace fieldmark::cli {
@@ -29,6 +30,7 @@ struct TrainArguments {
   Index size = 0, supersampling = 1;
   RunLength length;
   double target_psnr = 0, max_megabytes = 0;
+  Refinement refinement;
   bool resume = false, no_carve = false;
 };
 
@@ -145,15 +147,11 @@ void require_healthy(const std::string& fault, const nerf::Dataset& data, const 
 }
 
 // PSNR on the data set's test views, measured after everything is saved; null where there are none.
-// @param surveyed  the training views, of which none should be a test view
-Json test_psnr(const TrainArguments& options, const nerf::RadianceField& field, const nerf::Dataset& train,
-               const std::vector<nerf::SurveyedView>& surveyed, Json& warnings, Context& context) {
-  if (!nerf::has_split(options.data, "test")) {
-    context.note(options.data + " has no test images, so no PSNR is measured on them");
-    return nullptr;
-  }
-  const auto data = load_scene(options.data, other_split(options, train, "test"), context);
-  warn_of(nerf::twins(surveyed, nerf::survey_views(data)), warnings, context);
+struct TestScores {
+  Json psnr, colour_fitted, pose_fitted;
+};
+
+nerf::Evaluation evaluated(const nerf::RadianceField& field, const nerf::Dataset& data, Context& context) {
   nerf::Renderer renderer(field);
   const InterruptGuard guard;
   Progress progress = context.progress("test views");
@@ -162,10 +160,32 @@ Json test_psnr(const TrainArguments& options, const nerf::RadianceField& field, 
     return !guard.interrupted();
   });
   if (guard.interrupted()) throw Interrupted("the field is complete, its test views are not");
-  return evaluation.psnr;
+  return evaluation;
+}
+
+// @param surveyed  the training views, of which none should be a test view
+TestScores test_scores(const TrainArguments& options, const nerf::RadianceField& field,
+                       const nerf::Dataset& train, const std::vector<nerf::SurveyedView>& surveyed,
+                       Json& warnings, Context& context) {
+  if (!nerf::has_split(options.data, "test")) {
+    context.note(options.data + " has no test images, so no PSNR is measured on them");
+    return {};
+  }
+  auto data = load_scene(options.data, other_split(options, train, "test"), context);
+  warn_of(nerf::twins(surveyed, nerf::survey_views(data)), warnings, context);
+  const nerf::Evaluation plain = evaluated(field, data, context);
+  TestScores scores{.psnr = plain.psnr, .colour_fitted = plain.psnr_colour_fitted, .pose_fitted = {}};
+  if (options.refinement.poses) {
+    fit_cameras(field, data, context);
+    const nerf::Evaluation fitted = evaluated(field, data, context);
+    scores.colour_fitted = fitted.psnr_colour_fitted;
+    scores.pose_fitted = fitted.psnr;
+  }
+  return scores;
 }
 
 void check_preset(const TrainArguments& options) {
+  check_refinement(options.refinement, options.preset);
   if (options.preset != "mlp") return;
   if (options.model == "sized") throw UsageError("--model sized: the mlp preset has one size");
   if (options.supersampling > 1)
@@ -193,13 +213,15 @@ nerf::RadianceFieldOptions field_sizes(const TrainArguments& options, const nerf
 }
 
 nerf::TrainOptions training_options(const TrainArguments& options, const nerf::RadianceField& field,
-                                    const Context& context) {
+                                    bool exposures, const Context& context) {
   nerf::TrainOptions o = nerf::train_options(field.options().field.kind);
   o.schedule.steps = options.length.steps;
   o.schedule.seconds = options.length.seconds;
   o.seed = context.seed();
   o.precision = precision_of(options.precision);
   o.carve = !options.no_carve;
+  o.image_colours = exposures;
+  o.refine_poses = options.refinement.poses;
   return o;
 }
 
@@ -221,14 +243,21 @@ int run_train(const TrainArguments& options, Context& context) {
   const std::string checkpoint = options.out + ".checkpoint";
   check_preset(options);
   check_writable(options.out);
+  if (options.refinement.poses) check_writable_page(cameras_file(options.out));
   const nerf::Dataset data = training_data(options, context);
   const std::vector<nerf::SurveyedView> surveyed = nerf::survey_views(data);
   Json warnings = Json::array();
   warn_of(nerf::odd_views(surveyed, data.scene), warnings, context);
   warn_of(nerf::odd_files(options.data, options.size), warnings, context);
-  Json sizing;
+  Json sizing, exposure;
   nerf::RadianceField field(field_sizes(options, data, checkpoint, sizing, context));
-  nerf::Trainer trainer(field, data, training_options(options, field, context));
+  const auto held_out = [&]() -> std::optional<nerf::Dataset> {
+    if (!nerf::has_split(options.data, "val")) return {};
+    return load_scene(options.data, other_split(options, data, "val"), context);
+  };
+  const bool exposures = wants_exposures(options.refinement, data, held_out, field.options(),
+                                         options.resume ? checkpoint : "", exposure, context);
+  nerf::Trainer trainer(field, data, training_options(options, field, exposures, context));
   if (options.resume) trainer.restore(checkpoint);
   if (trainer.from_earlier_version())
     context.note(checkpoint +
@@ -244,11 +273,15 @@ int run_train(const TrainArguments& options, Context& context) {
   });
   require_healthy(watch.verdict(trainer.steps()), data, trainer);
   field.save(options.out);
+  Json motion;
+  if (options.refinement.poses) motion = save_cameras(options.out, data, trainer.cameras(), context);
   std::filesystem::remove(checkpoint);
 
-  const Json psnr = test_psnr(options, field, data, surveyed, warnings, context);
-  say_trained(options.out, trainer, seconds, psnr, context);
-  Json result{{"test_psnr", psnr},
+  const TestScores scores = test_scores(options, field, data, surveyed, warnings, context);
+  say_trained(options.out, trainer, seconds, scores.psnr, context);
+  Json result{{"test_psnr", scores.psnr},
+              {"test_psnr_colour_fitted", scores.colour_fitted},
+              {"exposure", exposures ? "on" : "off"},
               {"scene_type", nerf::name_of(data.scene)},
               {"scene_type_reason", data.scene_reason},
               {"train_seconds", seconds},
@@ -259,6 +292,11 @@ int run_train(const TrainArguments& options, Context& context) {
               {"file_bytes", std::filesystem::file_size(options.out)},
               {"warnings", warnings}};
   if (!sizing.is_null()) result["sizing"] = sizing;
+  if (!exposure.is_null()) result["exposure_trial"] = exposure;
+  if (options.refinement.poses) {
+    result["test_psnr_pose_fitted"] = scores.pose_fitted;
+    result["camera_motion"] = motion;
+  }
   context.result(result);
   return kOk;
 }
@@ -324,6 +362,7 @@ Command add_train(CommandLine& app) {
       ->range(0.1, 1e5)
       ->type_name("M")
       ->default_str("");
+  add_refinement(app, o->refinement);
   app.add_flag("--no-carve", o->no_carve, "Keep samples outside the silhouettes");
   app.add_flag("--resume", o->resume,
                "Resume from FIELD.checkpoint, with the options of the interrupted run");

@@ -9,16 +9,18 @@ namespace fieldmark::nerf {
 
 /// Metrics of one render against ground truth.
 struct ViewScore {
-  double psnr;             ///< over the whole image, dB
-  double psnr_foreground;  ///< over the foreground, dB; NaN if it is empty
-  double ssim;             ///< in [-1, 1]; NaN for an image smaller than the window of ssim()
-  double lpips;            ///< of both rounded to 8 bits; NaN without a network or for too small an image
+  double psnr;                ///< over the whole image, dB
+  double psnr_foreground;     ///< over the foreground, dB; NaN if it is empty
+  double psnr_colour_fitted;  ///< over the whole image, of colour_fitted(), dB
+  double ssim;                ///< in [-1, 1]; NaN for an image smaller than the window of ssim()
+  double lpips;               ///< of both rounded to 8 bits; NaN without a network or for too small an image
 };
 
 /// Means over the views of a data set; each leaves out the views where its metric is NaN.
 struct Evaluation {
   double psnr = 0;                  ///< mean of ViewScore::psnr
   double psnr_foreground = 0;       ///< mean of ViewScore::psnr_foreground
+  double psnr_colour_fitted = 0;    ///< mean of ViewScore::psnr_colour_fitted
   double ssim = 0;                  ///< mean of ViewScore::ssim
   double lpips = 0;                 ///< mean of ViewScore::lpips
   Index views = 0;                  ///< rendered

@@ -66,6 +66,10 @@ class HashEncoding {
   void backward_level(int level, const T* x, Index n, const T* d, std::span<T> grad) const;
   /// @}
 
+  /// Adds the gradient in the positions to dx [n, 3]. @param ddensity, dcolour  as for backward()
+  void backward_positions(std::span<const T> table, const T* x, Index n, const T* ddensity, const T* dcolour,
+                          T* dx) const;
+
   Index width() const { return Index{features_} * levels(); }      ///< F L, features of a part
   int features() const { return features_; }                       ///< F, features per level of a part
   int levels() const { return static_cast<int>(levels_.size()); }  ///< L

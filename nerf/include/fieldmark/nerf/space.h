@@ -48,6 +48,8 @@ struct Space {
   Vec3 to_cube(const Vec3& p) const;
   /// The point with the image x. @param x  in the open unit cube
   Vec3 to_world(const Vec3& x) const;
+  /// dL/dp of a point whose image has the gradient dL/dx = g: the transposed Jacobian of to_cube() times g.
+  Vec3 gradient_in_world(const Vec3& p, const Vec3& g) const;
 };
 
 /// The rays of a field's samplers. cube and ndc: origin + t direction is in the unit cube. contracted: it is

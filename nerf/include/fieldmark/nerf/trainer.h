@@ -3,7 +3,11 @@
 #include <fieldmark/engine/training_run.h>
 #include <fieldmark/nerf/radiance_field.h>
 
+#include <memory>
+
 namespace fieldmark::nerf {
+
+class ImageCorrections;
 
 /// How a field is trained.
 struct TrainOptions {
@@ -43,6 +47,17 @@ struct TrainOptions {
   /// Goes on with a trained field: its cameras, background, bounds and space stay, and only its occupied
   /// cells are looked at again. Nothing is carved.
   bool keep = false;
+  /// Learns the exposure and white balance of each training image, one colour_affine() in front of the loss.
+  /// Their mean stays the identity: the field keeps the mean exposure.
+  bool image_colours = false;
+  /// Learns a small motion of each training camera (about degrees, and hundredths of its distance), together
+  /// with the field from its step 100 on. Their means stay zero. Nothing is carved, since silhouettes of
+  /// displaced cameras would cut the object. The colour's change with the viewing direction adds nothing to
+  /// its gradient, as in Tancik et al. 2023 (Nerfstudio). Of hash fields.
+  bool refine_poses = false;
+  /// Learns image_colours and refine_poses alone, before a field that stays as it is; their means are free.
+  /// Needs keep. Of hash fields.
+  bool freeze = false;
 };
 
 /// Defaults for a kind of field. mlp: Adam with 5e-4, falling exponentially over the last nine tenths of the
@@ -81,6 +96,10 @@ class Trainer final : public TrainingRun {
   /// Running mean of the loss over whole training images, as a PSNR; of the chosen rays, which hard_pixels
   /// makes harder than the others.
   double train_psnr() const;
+  /// The cameras of the training images, as refined so far with TrainOptions::refine_poses.
+  std::vector<Camera> cameras() const;
+  /// With TrainOptions::image_colours, what was learnt so far: [V, 12], see colour_affine(). Else empty.
+  std::span<const float> image_colours() const;
   /// Samples that passed through the networks so far.
   double samples() const { return samples_; }
   double figure() const override { return train_psnr(); }
@@ -103,6 +122,11 @@ class Trainer final : public TrainingRun {
   void choose_rays(Index first, Index rays, Shard& c) const;
   void aim(Index first, Shard& c) const;
   void note_errors(Var<float> rays, Shard& c) const;
+  void prepare_images();
+  void place_cameras();
+  Var<float> coloured(Var<float> pixels, Shard& c) const;
+  void add_motions(const float* ddensity, const float* dcolour, Shard& c) const;
+  void step_images();
   double step_hash();
   double run_chunk(Index index, Shard& shard, Tape<float>& tape, float* grads);
   Index mlp_rays() const;
@@ -123,7 +147,9 @@ class Trainer final : public TrainingRun {
   Index valid_pixels_ = 0;             // of all training images
   std::vector<float> tile_errors_;  // last mean squares of the tiles of all training images, see hard_pixels
   std::vector<Shard> shards_;
-  std::string start_;  // SHA-256 of a field that is kept
+  std::unique_ptr<ImageCorrections> images_;  // null: nothing is learnt of them
+  std::vector<Camera> cameras_;               // of the training images, at the present step
+  std::string start_;                         // SHA-256 of a field that is kept
   Index rays_per_step_;
   double samples_ = 0;
 };

@@ -1,0 +1,33 @@
+#pragma once
+#include <fieldmark/nerf/trainer.h>
+
+#include <functional>
+#include <optional>
+
+namespace fieldmark::nerf {
+
+/// Budget and criterion of try_exposures().
+struct ExposureTrialOptions {
+  Index steps = 512;              ///< of each short training, >= 64
+  Index samples_per_step = 8192;  ///< of each short training, see TrainOptions
+  double worth = 0.1;             ///< dB that exposures must gain on the held-out images
+  std::uint64_t seed = 0;         ///< of fields and trainings
+};
+
+/// The result of try_exposures().
+struct ExposureTrial {
+  double psnr_without = 0;  ///< dB, see Evaluation::psnr_colour_fitted
+  double psnr_with = 0;     ///< the same of a field trained with TrainOptions::image_colours
+  bool helps = false;       ///< whether exposures gain what they must
+};
+
+/// Finds whether a hash field learns a scene better with an exposure for each training image, by two short
+/// trainings that are compared on held-out images, both under colour_fitted().
+/// @param progress  called during each training; false stops. May be empty   @return none if stopped
+/// @throws ValueError if an option is out of range or there are no held-out views
+std::optional<ExposureTrial> try_exposures(const Dataset& train, const Dataset& held_out,
+                                           const RadianceFieldOptions& field,
+                                           const ExposureTrialOptions& options,
+                                           const std::function<bool(Index done, Index total)>& progress = {});
+
+}  // namespace fieldmark::nerf

@@ -1,0 +1,47 @@
+#include <fieldmark/core/error.h>
+#include <fieldmark/nerf/evaluation.h>
+#include <fieldmark/nerf/exposure_trial.h>
+
+namespace fieldmark::nerf {
+namespace {
+
+constexpr Index kTrialAsked = 16;  // steps between two calls of progress
+constexpr Index kTrialRays = 128;  // of a step: scenes without bounds have hundreds of samples a ray at first
+
+}  // namespace
+
+std::optional<ExposureTrial> try_exposures(const Dataset& train, const Dataset& held_out,
+                                           const RadianceFieldOptions& field,
+                                           const ExposureTrialOptions& options,
+                                           const std::function<bool(Index done, Index total)>& progress) {
+  if (options.steps < 64)
+    throw ValueError("[exposure_trial] steps must be at least 64, got " + std::to_string(options.steps));
+  Index before = 0;
+  const auto trained = [&](bool colours) -> std::optional<double> {
+    RadianceField trial(field);
+    TrainOptions run;
+    run.schedule.steps = options.steps;
+    run.samples_per_step = options.samples_per_step;
+    run.least_rays = kTrialRays;
+    run.seed = options.seed;
+    run.image_colours = colours;
+    Trainer trainer(trial, train, run);
+    while (!trainer.done()) {
+      trainer.step(0);
+      if (trainer.steps() % kTrialAsked == 0 && progress &&
+          !progress(before + trainer.steps(), 2 * options.steps))
+        return {};
+    }
+    before += trainer.steps();
+    Renderer renderer(trial);
+    return evaluate(renderer, held_out).psnr_colour_fitted;
+  };
+  const auto without = trained(false);
+  if (!without) return {};
+  const auto with = trained(true);
+  if (!with) return {};
+  return ExposureTrial{
+      .psnr_without = *without, .psnr_with = *with, .helps = *with >= *without + options.worth};
+}
+
+}  // namespace fieldmark::nerf
