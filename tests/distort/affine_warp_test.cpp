@@ -47,7 +47,7 @@ TEST_CASE("affine_warp: equals the hat-function sum, within 1e-14") {
     const auto x = uniform({6, 5, channels}, 0, 1, 1);
     for (unsigned seed = 2; seed < 12; ++seed) {
       const auto m = uniform({6}, -1.5, 1.5, seed);
-      const auto y = run_op<double>(
+      const auto y = op_result<double>(
           [&](auto&, auto v) {
             return affine_warp(
                 v[0], v[1],
@@ -66,14 +66,14 @@ TEST_CASE("affine_warp: whole shifts copy pixels, far and undefined positions re
   const auto f = [](auto&, auto v) {
     return affine_warp(v[0], v[1], {.background = std::vector<float>{0.25f}});
   };
-  const auto y = run_op<float>(f, {x, Tensor<float>({6}, {1, 0, 1, 0, 1, -1})});
+  const auto y = op_result<float>(f, {x, Tensor<float>({6}, {1, 0, 1, 0, 1, -1})});
   for (Index i = 0; i < 3; ++i)
     for (Index j = 0; j < 4; ++j) CHECK(y[i * 4 + j] == (i > 0 && j < 3 ? x[(i - 1) * 4 + j + 1] : 0.25f));
   for (float bad : {std::nanf(""), 1e38f, -1e38f, std::numeric_limits<float>::infinity()})
     for (Index k = 0; k < 6; ++k) {
       Tensor<float> m({6}, {1, 0, 0, 0, 1, 0});
       m[k] = bad;
-      const auto z = run_op<float>(f, {Tensor<float>({2, 2, 1}, 7.f), m});
+      const auto z = op_result<float>(f, {Tensor<float>({2, 2, 1}, 7.f), m});
       CHECK(z.data == std::vector<float>(4, 0.25f));
     }
 }

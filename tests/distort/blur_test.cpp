@@ -38,7 +38,7 @@ TEST_CASE("blur: equals the two-dimensional Gaussian sum, within 1e-14") {
   for (Shape s : {Shape{9, 7, 3}, Shape{1, 1, 3}, Shape{1, 6, 1}, Shape{4, 1, 2}})
     for (double sigma : {0.3, 1.0, 2.6}) {
       const auto x = uniform(s, 0, 1, 1);
-      CHECK(largest_difference(run_op<double>(soften, {x, number<double>(sigma)}), brute_force(x, sigma)) <
+      CHECK(largest_difference(op_result<double>(soften, {x, number<double>(sigma)}), brute_force(x, sigma)) <
             1e-14);
     }
 }
@@ -46,7 +46,7 @@ TEST_CASE("blur: equals the two-dimensional Gaussian sum, within 1e-14") {
 TEST_CASE("blur: sigma to 0 is the exact identity with a finite gradient") {
   const auto x = uniform<float>({6, 5, 3}, 0, 1, 1);
   for (double sigma : {0.0, 1e-30, 1e-6, 1e-2}) {
-    CHECK(run_op<float>(soften, {x, number<float>(sigma)}).data == x.data);
+    CHECK(op_result<float>(soften, {x, number<float>(sigma)}).data == x.data);
     for (float v : run_with_grads<float>(soften, {x, number<float>(sigma)}, 1)) CHECK(std::isfinite(v));
     const auto grads = run_with_grads<float>(soften, {x, number<float>(sigma)}, 1);
     CHECK(grads.back() == 0);
@@ -55,7 +55,7 @@ TEST_CASE("blur: sigma to 0 is the exact identity with a finite gradient") {
 
 TEST_CASE("blur: constant images stay constant, edges too") {
   for (double sigma : {0.4, 1.0, 20.0}) {
-    const auto y = run_op<float>(soften, {Tensor<float>({33, 20, 3}, 0.3f), number<float>(sigma)});
+    const auto y = op_result<float>(soften, {Tensor<float>({33, 20, 3}, 0.3f), number<float>(sigma)});
     for (float v : y.data) CHECK(std::abs(v - 0.3f) < 5e-7f);
   }
 }
@@ -71,7 +71,8 @@ TEST_CASE("blur: float against double, result and gradients, for widths of 1 to 
   each_isa([] {
     for (Index w = 1; w <= 130; ++w) {
       CAPTURE(w);
-      CHECK(float_error(soften, {uniform<float>({3, w, 1 + w % 3}, 0, 1, 1), number<float>(0.8)}) < 1e-6);
+      CHECK(distortion_error(soften, {uniform<float>({3, w, 1 + w % 3}, 0, 1, 1), number<float>(0.8)}) <
+            1e-6);
     }
   });
 }

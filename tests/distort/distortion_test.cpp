@@ -30,7 +30,7 @@ Tensor<float> distorted(const char* name, const Tensor<float>& x, std::uint64_t 
 }
 
 Tensor<float> rounded(const Tensor<float>& x) {
-  return run_op<float>([](auto&, auto v) { return distort::quantize8(v[0]); }, {x});
+  return op_result<float>([](auto&, auto v) { return distort::quantize8(v[0]); }, {x});
 }
 
 Tensor<float> image(Shape shape, unsigned seed = 1) { return rounded(uniform<float>(shape, 0, 1, seed)); }
@@ -228,10 +228,11 @@ TEST_CASE("distortion: scale and blur are the layer's, rounded") {
   const auto x = image({40, 31, 3});
   const auto scaled = distorted("scale_0.75", x);
   CHECK(scaled.shape == Shape{30, 23, 3});
-  CHECK(scaled.data ==
-        rounded(run_op<float>([](auto&, auto v) { return distort::resize_area(v[0], 30, 23); }, {x})).data);
+  CHECK(
+      scaled.data ==
+      rounded(op_result<float>([](auto&, auto v) { return distort::resize_area(v[0], 30, 23); }, {x})).data);
   const auto soft =
-      run_op<float>([](auto&, auto v) { return distort::blur(v[0], v[1]); }, {x, number<float>(1)});
+      op_result<float>([](auto&, auto v) { return distort::blur(v[0], v[1]); }, {x, number<float>(1)});
   CHECK(distorted("blur_1", x).data == rounded(soft).data);
 }
 

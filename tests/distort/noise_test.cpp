@@ -9,11 +9,11 @@ using distort::noise;
 TEST_CASE("noise: adds mu + sigma n") {
   const std::vector<double> n{1, -2, 0.5};
   const Tensor<double> x({1, 1, 3}, {0.2, 0.4, 0.9});
-  const auto y = run_op<double>([&](auto&, auto v) { return noise(v[0], v[1], v[2], n); },
-                                {x, number<double>(0.25), number<double>(0.5)});
+  const auto y = op_result<double>([&](auto&, auto v) { return noise(v[0], v[1], v[2], n); },
+                                   {x, number<double>(0.25), number<double>(0.5)});
   CHECK(y.data == std::vector<double>{0.2 + 0.75, 0.4 - 0.75, 0.9 + 0.5});
   const auto plain =
-      run_op<double>([&](auto&, auto v) { return noise(v[0], v[1], n); }, {x, number<double>(0)});
+      op_result<double>([&](auto&, auto v) { return noise(v[0], v[1], n); }, {x, number<double>(0)});
   CHECK(plain.data == x.data);
 }
 

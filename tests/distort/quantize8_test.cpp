@@ -12,10 +12,10 @@ TEST_CASE("quantize8: clamps and rounds as llround does") {
   x[1] = 1;
   x[2] = HUGE_VAL;
   x[3] = -HUGE_VAL;
-  const auto y = run_op<double>([](auto&, auto v) { return quantize8(v[0]); }, {x});
+  const auto y = op_result<double>([](auto&, auto v) { return quantize8(v[0]); }, {x});
   for (Index i = 0; i < x.size(); ++i)
     CHECK(y[i] == static_cast<double>(std::llround(std::clamp(x[i], 0.0, 1.0) * 255)) / 255);
-  const auto again = run_op<double>([](auto&, auto v) { return quantize8(v[0]); }, {y});
+  const auto again = op_result<double>([](auto&, auto v) { return quantize8(v[0]); }, {y});
   CHECK(again.data == y.data);
 }
 

@@ -26,7 +26,7 @@ TEST_CASE("resize_area: equals the mean over each new pixel's area, any ratio, w
   const auto x = uniform({7, 10, 3}, 0, 1, 1);
   for (Index height : {1, 3, 5, 7, 9, 14})
     for (Index width : {1, 4, 5, 10, 13}) {
-      const auto y = run_op<double>([&](auto&, auto v) { return resize_area(v[0], height, width); }, {x});
+      const auto y = op_result<double>([&](auto&, auto v) { return resize_area(v[0], height, width); }, {x});
       CHECK(largest_difference(y, brute_force(x, height, width)) < 1e-14);
     }
 }
@@ -34,10 +34,10 @@ TEST_CASE("resize_area: equals the mean over each new pixel's area, any ratio, w
 TEST_CASE("resize_area: the same size is the exact identity, a constant stays constant") {
   for (Shape s : {Shape{1, 1, 3}, Shape{5, 8, 3}}) {
     const auto x = uniform<float>(s, 0, 1, 1);
-    CHECK(run_op<float>([&](auto&, auto v) { return resize_area(v[0], s[0], s[1]); }, {x}).data == x.data);
+    CHECK(op_result<float>([&](auto&, auto v) { return resize_area(v[0], s[0], s[1]); }, {x}).data == x.data);
   }
-  const auto y = run_op<float>([](auto&, auto v) { return resize_area(v[0], 75, 31); },
-                               {Tensor<float>({100, 90, 3}, 0.3f)});
+  const auto y = op_result<float>([](auto&, auto v) { return resize_area(v[0], 75, 31); },
+                                  {Tensor<float>({100, 90, 3}, 0.3f)});
   for (float v : y.data) CHECK(std::abs(v - 0.3f) < 1e-7f);
 }
 
@@ -62,7 +62,7 @@ TEST_CASE("resize_area: float against double, result and gradient, for widths of
     for (Index w = 1; w <= 130; ++w) {
       CAPTURE(w);
       const auto x = uniform<float>({5, w, 1 + w % 3}, 0, 1, 1);
-      CHECK(float_error([](auto&, auto v) { return resize_area(v[0], 3, 17); }, {x}) < 1e-6);
+      CHECK(distortion_error([](auto&, auto v) { return resize_area(v[0], 3, 17); }, {x}) < 1e-6);
     }
   });
 }

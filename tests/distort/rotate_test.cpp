@@ -16,10 +16,10 @@ template <class T>
 void check_quarter_turns() {
   for (Index n : {1, 4, 7}) {
     const auto x = uniform<T>({n, n, 3}, 0, 1, 1);
-    CHECK(run_op<T>(turn, {x, number<T>(0)}).data == x.data);
-    const auto left = run_op<T>(turn, {x, number<T>(kQuarter)});
-    const auto right = run_op<T>(turn, {x, number<T>(-kQuarter)});
-    const auto half = run_op<T>(turn, {x, number<T>(2 * kQuarter)});
+    CHECK(op_result<T>(turn, {x, number<T>(0)}).data == x.data);
+    const auto left = op_result<T>(turn, {x, number<T>(kQuarter)});
+    const auto right = op_result<T>(turn, {x, number<T>(-kQuarter)});
+    const auto half = op_result<T>(turn, {x, number<T>(2 * kQuarter)});
     for (Index i = 0; i < n; ++i)
       for (Index j = 0; j < n; ++j)
         for (Index c = 0; c < 3; ++c) {
@@ -39,8 +39,8 @@ TEST_CASE("rotate: quarter turns permute the pixels exactly, 0 changes nothing")
 
 TEST_CASE("rotate: a constant image stays constant inside, corners take the background") {
   const std::vector<float> grey{0.5f, 0.6f, 0.7f};
-  const auto y = run_op<float>([&](auto&, auto v) { return rotate(v[0], v[1], grey); },
-                               {Tensor<float>({41, 41, 3}, 0.3f), number<float>(kQuarter / 3)});
+  const auto y = op_result<float>([&](auto&, auto v) { return rotate(v[0], v[1], grey); },
+                                  {Tensor<float>({41, 41, 3}, 0.3f), number<float>(kQuarter / 3)});
   for (Index i = 0; i < 41; ++i)
     for (Index j = 0; j < 41; ++j)
       if (std::hypot(static_cast<double>(i - 20), static_cast<double>(j - 20)) < 20)
@@ -54,7 +54,7 @@ TEST_CASE("rotate: a linear ramp turns into the turned ramp") {
     for (Index j = 0; j < 21; ++j)
       x[i * 21 + j] = 0.03 * static_cast<double>(j - 10) + 0.01 * static_cast<double>(i - 10);
   const double a = 0.35;
-  const auto y = run_op<double>(turn, {x, number<double>(a)});
+  const auto y = op_result<double>(turn, {x, number<double>(a)});
   for (Index i = 5; i < 16; ++i)
     for (Index j = 5; j < 16; ++j) {
       const double dx = static_cast<double>(j - 10), dy = static_cast<double>(i - 10);

@@ -39,7 +39,7 @@ TEST_CASE("similarity: the op gives the function's numbers, and its gradient") {
   const auto f = [](auto&, auto v) { return similarity(v[0], v[1], v[2]); };
   const std::vector<Tensor<double>> in{number<double>(-0.3), number<double>(0.6),
                                        Tensor<double>({2}, {1.5, -4})};
-  const auto y = run_op<double>(f, in);
+  const auto y = op_result<double>(f, in);
   const auto want = similarity_matrix(-0.3, 0.6, 1.5, -4.);
   CHECK(std::equal(want.begin(), want.end(), y.data.begin()));
   expect_grad(f, in);

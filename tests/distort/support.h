@@ -12,7 +12,7 @@
 
 /// Runs an op on constants and returns its result.
 template <class T, class F>
-fieldmark::Tensor<T> run_op(const F& f, const std::vector<fieldmark::Tensor<T>>& inputs) {
+fieldmark::Tensor<T> op_result(const F& f, const std::vector<fieldmark::Tensor<T>>& inputs) {
   fieldmark::Tape<T> tape;
   std::vector<fieldmark::Var<T>> vars;
   for (const auto& t : inputs) vars.push_back(tape.constant(t));
@@ -38,7 +38,7 @@ std::vector<T> run_with_grads(const F& f, const std::vector<fieldmark::Tensor<T>
 
 /// Largest |float - double| over the result and all gradients, relative to the largest of them.
 template <class F>
-double float_error(const F& f, const std::vector<fieldmark::Tensor<float>>& inputs) {
+double distortion_error(const F& f, const std::vector<fieldmark::Tensor<float>>& inputs) {
   std::vector<fieldmark::Tensor<double>> exact;
   for (const auto& x : inputs) exact.emplace_back(x.shape, std::vector<double>(x.data.begin(), x.data.end()));
   const auto got = run_with_grads<float>(f, inputs, fieldmark::threads());
