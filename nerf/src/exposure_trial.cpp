@@ -2,11 +2,24 @@
 #include <fieldmark/nerf/evaluation.h>
 #include <fieldmark/nerf/exposure_trial.h>
 
+#include <cmath>
+
 namespace fieldmark::nerf {
 namespace {
 
 constexpr Index kTrialAsked = 16;  // steps between two calls of progress
 constexpr Index kTrialRays = 128;  // of a step: scenes without bounds have hundreds of samples a ray at first
+
+// Root mean square over images of what becomes of mid grey, relative to it.
+double spread_of(std::span<const float> colours) {
+  double sum = 0;
+  for (std::size_t row = 0; row < colours.size(); row += 4) {
+    const double change = static_cast<double>(colours[row] + colours[row + 1] + colours[row + 2]) +
+                          static_cast<double>(colours[row + 3]) / 0.5;
+    sum += change * change;
+  }
+  return std::sqrt(4 * sum / static_cast<double>(colours.size()));
+}
 
 }  // namespace
 
@@ -17,6 +30,7 @@ std::optional<ExposureTrial> try_exposures(const Dataset& train, const Dataset& 
   if (options.steps < 64)
     throw ValueError("[exposure_trial] steps must be at least 64, got " + std::to_string(options.steps));
   Index before = 0;
+  double spread = 0;
   const auto trained = [&](bool colours) -> std::optional<double> {
     RadianceField trial(field);
     TrainOptions run;
@@ -33,6 +47,7 @@ std::optional<ExposureTrial> try_exposures(const Dataset& train, const Dataset& 
         return {};
     }
     before += trainer.steps();
+    if (colours) spread = spread_of(trainer.image_colours());
     Renderer renderer(trial);
     return evaluate(renderer, held_out).psnr_colour_fitted;
   };
@@ -40,8 +55,10 @@ std::optional<ExposureTrial> try_exposures(const Dataset& train, const Dataset& 
   if (!without) return {};
   const auto with = trained(true);
   if (!with) return {};
-  return ExposureTrial{
-      .psnr_without = *without, .psnr_with = *with, .helps = *with >= *without + options.worth};
+  return ExposureTrial{.psnr_without = *without,
+                       .psnr_with = *with,
+                       .spread = spread,
+                       .helps = *with >= *without + options.worth && spread >= options.least_spread};
 }
 
 }  // namespace fieldmark::nerf

@@ -31,14 +31,15 @@ TEST_CASE("exposure_trial: exposures are taken where images are mixed, and not w
                                      return true;
                                    });
   REQUIRE(mixed);
-  CAPTURE(mixed->psnr_without, mixed->psnr_with);
+  CAPTURE(mixed->psnr_without, mixed->psnr_with, mixed->spread);
   CHECK(mixed->helps);
   CHECK(mixed->psnr_with > mixed->psnr_without + 0.1);
   CHECK(calls == 12);
   CHECK(last == 192);
   const auto alike = try_exposures(objects_scene(), held_out(), trainable_field_options(), options);
   REQUIRE(alike);
-  CAPTURE(alike->psnr_without, alike->psnr_with);
+  CAPTURE(alike->psnr_without, alike->psnr_with, alike->spread);
+  CHECK(mixed->spread > 2 * alike->spread);
   CHECK_FALSE(alike->helps);
 }
 

@@ -53,6 +53,7 @@ TEST_CASE("refinement: train --exposure auto tries both, and leaves exposures of
   CHECK(json["exposure"] == "off");
   CHECK(json["exposure_trial"]["psnr_with"].is_number());
   CHECK(json["exposure_trial"]["psnr_without"].is_number());
+  CHECK(json["exposure_trial"]["spread"].is_number());
 
   std::filesystem::remove_all(std::filesystem::path(scene) / "val");
   const auto alone = train(scene, folder / "b.fm", {"--steps", "4", "--exposure", "auto"});

@@ -67,14 +67,16 @@ bool wants_exposures(const Refinement& refinement, const nerf::Dataset& train,
     });
   }
   if (!trial) throw Interrupted("while exposures were tried, nothing was written");
-  char line[160];
+  char line[200];
   std::snprintf(
       line, sizeof line,
-      "exposure %s: %.2f dB with, %.2f dB without on %lld validation images after short trainings\n",
-      trial->helps ? "on" : "off", trial->psnr_with, trial->psnr_without,
+      "exposure %s: images differ by %.1f%%; %.2f dB with, %.2f dB without on %lld validation images after "
+      "short trainings\n",
+      trial->helps ? "on" : "off", 100 * trial->spread, trial->psnr_with, trial->psnr_without,
       static_cast<long long>(images->views.size()));
   context.text() << line;
-  report = {{"psnr_with", trial->psnr_with}, {"psnr_without", trial->psnr_without}};
+  report = {
+      {"psnr_with", trial->psnr_with}, {"psnr_without", trial->psnr_without}, {"spread", trial->spread}};
   return trial->helps;
 }
 

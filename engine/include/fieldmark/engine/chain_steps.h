@@ -31,16 +31,18 @@ enum class ChainOp : std::uint8_t {
 
 /// One step. Operands are numbered: inputs first, then the results of the steps; b is a where there is one.
 struct ChainStep {
-  ChainOp op;
-  std::uint8_t a, b;
-  double p, q;
+  ChainOp op;      ///< what it computes
+  std::uint8_t a;  ///< number of its first operand
+  std::uint8_t b;  ///< number of its second operand
+  double p;        ///< first number
+  double q;        ///< second number
 };
 
 /// A chain whose result is that of its last step.
 struct ChainSteps {
-  int inputs;
-  int count;
-  ChainStep step[kChainSteps];
+  int inputs;                   ///< how many inputs
+  int count;                    ///< how many steps
+  ChainStep step[kChainSteps];  ///< in the order of computation
 };
 
 }  // namespace fieldmark::detail

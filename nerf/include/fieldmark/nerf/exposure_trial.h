@@ -11,6 +11,7 @@ struct ExposureTrialOptions {
   Index steps = 512;              ///< of each short training, >= 64
   Index samples_per_step = 8192;  ///< of each short training, see TrainOptions
   double worth = 0.1;             ///< dB that exposures must gain on the held-out images
+  double least_spread = 0.05;     ///< of exposures that are worth their numbers, see ExposureTrial::spread
   std::uint64_t seed = 0;         ///< of fields and trainings
 };
 
@@ -18,7 +19,9 @@ struct ExposureTrialOptions {
 struct ExposureTrial {
   double psnr_without = 0;  ///< dB, see Evaluation::psnr_colour_fitted
   double psnr_with = 0;     ///< the same of a field trained with TrainOptions::image_colours
-  bool helps = false;       ///< whether exposures gain what they must
+  double spread = 0;        ///< root mean square over images of the change of mid grey, relative to it
+  bool helps = false;       ///< whether exposures gain what they must and differ enough: a field of few steps
+                            ///< gains by colours of its images even where all are exposed alike
 };
 
 /// Finds whether a hash field learns a scene better with an exposure for each training image, by two short

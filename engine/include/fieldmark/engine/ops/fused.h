@@ -21,9 +21,9 @@ Var<T> run_chain(const Chain& chain, std::span<const Var<T>> inputs, std::source
 /// @code
 /// auto y = fused([](auto x, auto gain, auto bias) { return x * sigmoid(gain * x + bias); }, x, gain, bias);
 /// @endcode
-/// @param f       is called once, with a Lane for each input, and returns a Lane: see chain.h for what it may
-///                do. A generic lambda serves Lane and Var alike.
-/// @param inputs  1 to Chain::kMaxInputs values, whose shapes broadcast
+/// @param f  is called once, with a Lane for each input, and returns a Lane: see chain.h for what it may do.
+/// A generic lambda serves Lane and Var alike.
+/// @param first, rest  1 to Chain::kMaxInputs inputs, whose shapes broadcast
 /// @throws ShapeError if they do not   @throws ValueError if f has too many steps, or an input was recorded
 /// on another tape
 template <class T, class F, class... Rest>
