@@ -3,8 +3,6 @@
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/conv2d.h>
 #include <fieldmark/engine/ops/fused.h>
-#include <fieldmark/engine/ops/layout.h>
-#include <fieldmark/engine/ops/linear_solve.h>
 #include <fieldmark/engine/ops/loss.h>
 #include <fieldmark/engine/ops/operators.h>
 #include <fieldmark/engine/ops/reduce.h>
@@ -121,25 +119,23 @@ TEST_CASE("allocations: what allocates is counted") {
         }) == 1);
 }
 
-TEST_CASE("allocations: chains, reductions, convolutions and solves allocate nothing after the first pass") {
+TEST_CASE("allocations: chains, reductions and convolutions allocate nothing after the first pass") {
   if (!counts()) return;
   for_threads([] {
     const auto x = uniform<float>({2, 8, 8, 4}, -1, 1, 1), row = uniform<float>({4}, -1, 1, 2),
-               w = uniform<float>({3, 3, 4, 4}, -1, 1, 3), a = uniform<float>({4, 4}, 4, 5, 4);
-    Tensor<float> dx(x.shape), drow(row.shape), dw(w.shape), da(a.shape);
+               w = uniform<float>({3, 3, 4, 4}, -1, 1, 3);
+    Tensor<float> dx(x.shape), drow(row.shape), dw(w.shape);
     Tape<float> tape;
     const auto pass = [&] {
       tape.reset();
       const auto bias = tape.leaf(row, drow);
       const auto y = conv2d(tape.leaf(x, dx), tape.leaf(w, dw), bias);
       const auto z = fused([](auto v, auto b) { return v * sigmoid(v + b); }, y, bias) + tanh(y) * bias;
-      const auto columns = reshape(mean(z, {0, 1, 2}), {4, 1});
-      const auto spread = tape.leaf(a, da) + scale(tape.constant(a), 0.1);
-      tape.backward(sum(square(solve(spread, columns))));
+      tape.backward(sum(square(mean(z, {0, 1, 2}))));
     };
     pass();
     CHECK(allocations_in(5, pass) == 0);
-    CHECK(std::isfinite(da[0]));
+    CHECK(std::isfinite(dw[0]));
   });
 }
 

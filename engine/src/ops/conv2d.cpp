@@ -30,8 +30,8 @@ ConvGeometry geometry(const Shape& x, const Shape& w, const Shape& b, Index stri
   check_rank("conv2d", "w", w, 4, "[K, K, C, O]");
   check_rank("conv2d", "b", b, 1, "[O]");
   check_extent("conv2d", "w", w, 1, w[0], "a square window");
-  check_extent("conv2d", "w", w, 2, x[3], "the channels of x, whose shape is " + x.str());
-  check_extent("conv2d", "b", b, 0, w[3], "the outputs of w, whose shape is " + w.str());
+  check_extent("conv2d", "w", w, 2, x[3], "the channels of x", x);
+  check_extent("conv2d", "b", b, 0, w[3], "the outputs of w", w);
   return {x[0], x[1], x[2], x[3], w[3], w[0], stride, padding};
 }
 
@@ -126,8 +126,7 @@ Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, ConvWindow window, Activation activa
     check_extent("conv2d", "w", w.shape(), 2, x.shape()[3] / groups,
                  "channels of x a group, of " + x.shape().str());
     check_rank("conv2d", "b", b.shape(), 1, "[O]");
-    check_extent("conv2d", "b", b.shape(), 0, w.shape()[3],
-                 "the outputs of w, whose shape is " + w.shape().str());
+    check_extent("conv2d", "b", b.shape(), 0, w.shape()[3], "the outputs of w", w.shape());
     std::vector<Var<T>> parts;
     for (Index k = 0; k < groups; ++k)
       parts.push_back(conv2d(group(x, k), group(w, k), group(b, k), window, activation));

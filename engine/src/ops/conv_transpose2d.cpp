@@ -15,8 +15,8 @@ detail::ConvGeometry transposed_geometry(const Shape& x, const Shape& w, const S
   check_rank(op, "w", w, 4, "[K, K, O, C]");
   check_rank(op, "b", b, 1, "[O]");
   check_extent(op, "w", w, 1, w[0], "a square window");
-  check_extent(op, "w", w, 3, x[3], "the channels of x, whose shape is " + x.str());
-  check_extent(op, "b", b, 0, w[2], "the outputs of w, whose shape is " + w.str());
+  check_extent(op, "w", w, 3, x[3], "the channels of x", x);
+  check_extent(op, "b", b, 0, w[2], "the outputs of w", w);
   if (window.stride < 1 || window.padding < 0 || window.dilation != 1 || window.groups != 1)
     throw ValueError(
         "[conv_transpose2d] stride must be at least 1, padding at least 0, and dilation and groups 1, got "
