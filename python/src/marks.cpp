@@ -96,7 +96,8 @@ void bind_marks(py::module_& module) {
       .def(
           "save", [](const Key& key, const std::filesystem::path& path) { watermark::save_key(path, key); },
           "path"_a, "Writes a KEY file that only its owner can read.")
-      .def("__eq__", [](const Key& a, const Key& b) { return a == b; })
+      .def(
+          "__eq__", [](const Key& a, const Key& b) { return a == b; }, "other"_a)
       .def("__repr__", [](const Key&) { return "<fieldmark key, secret>"; });
   py::class_<Owner, std::shared_ptr<Owner>>(module, "Owner")
       .def_static(

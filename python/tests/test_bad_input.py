@@ -134,9 +134,9 @@ def test_reductions_of_nothing_are_refused(tape):
 
 @pytest.mark.parametrize("shape", [(-4, -6), (-1, 6), (2 ** 32, 2 ** 32), (2, 3)])
 def test_shapes_that_cannot_be_are_refused(tape, x, shape):
-    with pytest.raises(fm.ShapeError, match=r"^\[reshape\]"):
+    with pytest.raises(fm.ShapeError, match=r"^\[(reshape|shape)\]"):
         engine.reshape(x, shape)
-    with pytest.raises(fm.ShapeError, match=r"^\[broadcast_to\]"):
+    with pytest.raises(fm.ShapeError, match=r"^\[(broadcast_to|shape)\]"):
         engine.broadcast_to(x, shape)
 
 

@@ -72,7 +72,7 @@ CASES = {
                               lambda x: cross_entropy(x, WEIGHTS[:, 0]), [ROWS]),
     "feature_distance": (lambda a, b: engine.feature_distance(a, b, np.abs(GAIN)),
                          lambda a, b: (np.abs(GAIN) * (unit(a) - unit(b)) ** 2).sum(-1).mean((1, 2)),
-                         [IMAGES[:1, :2, :2], random(1, 2, 2, 3, seed=4)]),
+                         [np.ascontiguousarray(IMAGES[:1, :2, :2]), random(1, 2, 2, 3, seed=4)]),
 }
 
 

@@ -11,7 +11,7 @@ struct ExposureTrialOptions {
   Index steps = 512;              ///< of each short training, >= 64
   Index samples_per_step = 8192;  ///< of each short training, see TrainOptions
   double worth = 0.1;             ///< dB that exposures must gain on the held-out images
-  double least_spread = 0.05;     ///< of exposures that are worth their numbers, see ExposureTrial::spread
+  double least_spread = 0.1;      ///< of exposures that are worth their numbers, see ExposureTrial::spread
   std::uint64_t seed = 0;         ///< of fields and trainings
 };
 
