@@ -23,9 +23,11 @@ int threads() {
 ScopedThreads::ScopedThreads(int n) : before_(thread_count) { set_threads(n); }
 ScopedThreads::~ScopedThreads() { thread_count = before_; }
 
+bool detail::runs_on_one_thread() { return threads() == 1 || omp_in_parallel(); }
+
 void detail::parallel_chunks(Index chunks, void* context, void (*run)(void*, Index chunk)) {
   const int n = threads();
-  if (chunks == 1 || n == 1 || omp_in_parallel()) {
+  if (chunks == 1 || runs_on_one_thread()) {
     for (Index c = 0; c < chunks; ++c) run(context, c);
     return;
   }

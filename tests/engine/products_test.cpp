@@ -8,6 +8,7 @@
 
 #include "support/catch.h"
 #include "support/random.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 
@@ -104,7 +105,7 @@ TEST_CASE("products: a mean over thousands of rows, in float as in double") {
                         {wide(x)}, {wide(v)});
   double worst = 0;
   for (Index i = 0; i < want.products[0].size(); ++i)
-    worst = std::max(worst, std::abs(static_cast<double>(got.products[0][i]) - want.products[0][i]));
+    raise_to(worst, std::abs(static_cast<double>(got.products[0][i]) - want.products[0][i]));
   CHECK(worst < 1e-5);
 }
 

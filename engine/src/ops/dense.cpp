@@ -120,8 +120,9 @@ void backward_rows(const Backward<T>& p, const T* dy, Index begin, Index end, T*
   if (p.dx) put_input_rows(p, d, begin, end - begin);
 }
 
-// Several chunks of rows, too few for shards: threads own rows of dZ and dX, then rows of dW. Each element is
-// summed in the order of backward_rows(). @param buffer  of all rows, or null
+// Several chunks of rows, too few for shards, on several threads: these own rows of dZ and dX, then rows of
+// dW. Each element is summed in the order of backward_rows(), which keeps a chunk in cache where one thread
+// does all. @param buffer  of all rows, or null
 template <class T>
 void backward_of_few(const Backward<T>& p, const T* dy, Index n, T* buffer, T* dw, T* db) {
   const Index row = detail::whole_row<T>(p.out);
@@ -160,7 +161,7 @@ void backward(Var<T> x, Var<T> w, Var<T> b, bool relu, Var<T> y, const T* dy) {
   const Index chunks = (n + kChunkRows - 1) / kChunkRows, own = (dw ? in * out : 0) + (db ? out : 0);
   const Index shards = std::min(detail::kProductShards, (n + kShardRows - 1) / kShardRows);
   const bool copies = mask || row != out;
-  if (shards == 1 && chunks > 1)
+  if (shards == 1 && chunks > 1 && !detail::runs_on_one_thread())
     return backward_of_few(p, dy, n, copies ? tape.scratch(n * row) : nullptr, dw, db);
   const Index buffer = copies ? std::min(n, kChunkRows) * row : 0;
   T *buffers = tape.scratch(shards * buffer), *sums = shards > 1 ? tape.scratch(shards * own) : nullptr;

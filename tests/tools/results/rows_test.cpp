@@ -49,14 +49,14 @@ TEST_CASE("rows: a row comes back from its file, and a file that is none is name
 }
 
 TEST_CASE("with_names: paths below the places become names, and nothing else changes") {
-  const Places places{.data = "/there/data", .work = "/here/work"};
-  const Json result{{"image", "/here/work/views/0.png"},
-                    {"images", {"/here/work/views/1.png", "/there/data/lego/r_0.png"}},
-                    {"other", {{"path", "/here/worker/a"}, {"psnr", 30.5}, {"none", nullptr}}}};
+  const Places places{.data = "/there/data", .work = "/here/made"};
+  const Json result{{"image", "/here/made/views/0.png"},
+                    {"images", {"/here/made/views/1.png", "/there/data/lego/r_0.png"}},
+                    {"other", {{"path", "/here/madeer/a"}, {"psnr", 30.5}, {"none", nullptr}}}};
   CHECK(with_names(result, places) ==
         Json{{"image", "@views/0.png"},
              {"images", {"@views/1.png", "data/lego/r_0.png"}},
-             {"other", {{"path", "/here/worker/a"}, {"psnr", 30.5}, {"none", nullptr}}}});
+             {"other", {{"path", "/here/madeer/a"}, {"psnr", 30.5}, {"none", nullptr}}}});
   CHECK(with_names(Json("/there/data/a"), {.data = {}, .work = "/here"}) == "/there/data/a");
 }
 

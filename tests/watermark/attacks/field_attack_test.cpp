@@ -181,6 +181,7 @@ TEST_CASE("field_attack: pruning takes the least of each tensor") {
     std::size_t zeros = 0;
     float largest_gone = 0, least_kept = 1e9f;
     for (std::size_t i = 0; i < w.size(); ++i) {
+      REQUIRE(std::isfinite(w[i]));
       if (p[i] == 0) {
         ++zeros;
         largest_gone = std::max(largest_gone, std::abs(w[i]));

@@ -26,6 +26,9 @@ class ScopedThreads {
 
 namespace detail {
 void parallel_chunks(Index chunks, void* context, void (*run)(void*, Index chunk));
+/// Whether a parallel loop started here would have one thread: another one runs already, or there is no
+/// other.
+bool runs_on_one_thread();
 }  // namespace detail
 
 /// Calls f(begin, end) over [0, n) in chunks of `grain`, on several threads; serial inside another parallel
