@@ -35,6 +35,8 @@ Tensor<T> rounded(const ExactMatrix& m) {
 }
 
 ExactMatrix size(const ExactMatrix& m) { return m.cwiseAbs(); }
+ExactMatrix solved(const ExactMatrix& m, const ExactMatrix& b) { return m.partialPivLu().solve(b); }
+ExactMatrix inverted(const ExactMatrix& m) { return solved(m, ExactMatrix::Identity(m.rows(), m.rows())); }
 ExactMatrix lower(const ExactMatrix& m) { return m.triangularView<Eigen::Lower>(); }
 
 // Errors of a matrix, each relative to its entry of `scale`.
@@ -79,15 +81,13 @@ void compare_residual(WorstError& error) {
 }
 
 // x and both gradients of m x = b, where an error of a solve is n u |m^-1| |m| |x| (Higham 2002, section 9.3,
-// with |L||U| of the size of |m|), and da = -db x^T where a is read, its transpose if m is a^T. `lu` solves
-// with m in long double, `lu_t` with m^T.
-template <class T, class Solver, class Transposed>
-void compare_solution(const std::vector<std::vector<T>>& got, const ExactMatrix& m, const Solver& lu,
-                      const Transposed& lu_t, const ExactMatrix& b, const ExactMatrix& cotangent,
-                      bool transposed, const ExactMatrix& read, WorstError& error) {
-  const ExactMatrix inverse = lu.solve(ExactMatrix(ExactMatrix::Identity(m.rows(), m.rows()))),
-                    spread = size(inverse) * size(m);
-  const ExactMatrix x = lu.solve(b), g = lu_t.solve(cotangent);
+// with |L||U| of the size of |m|), and da = -db x^T where a is read, its transpose if m is a^T.
+template <class T>
+void compare_solution(const std::vector<std::vector<T>>& got, const ExactMatrix& m, const ExactMatrix& b,
+                      const ExactMatrix& cotangent, bool transposed, const ExactMatrix& read,
+                      WorstError& error) {
+  const ExactMatrix inverse = inverted(m), spread = size(inverse) * size(m);
+  const ExactMatrix x = solved(m, b), g = solved(m.transpose(), cotangent);
   const ExactMatrix off_x = kToType<T> * spread * size(x),
                     off_g = kToType<T> * size(inverse).transpose() * size(m).transpose() * size(g);
   compare_matrix(got[0], x, size(x) + off_x, error);
@@ -107,9 +107,8 @@ void compare_solve(WorstError& error) {
   const Tensor<T> a = hilbert<T>(n), b = scattered<T>({n, k}, -1, 1, 1), g = scattered<T>({n, k}, -1, 1, 2);
   const auto got = values_and_gradients<T>([](auto&, const auto& v) { return solve(v[0], v[1]); }, {a, b},
                                            [&](Shape) -> const Tensor<T>& { return g; });
-  const ExactMatrix m = exact(a.data, n, n), mt = m.transpose();
-  compare_solution(got, m, Eigen::PartialPivLU<ExactMatrix>(m), Eigen::PartialPivLU<ExactMatrix>(mt),
-                   exact(b.data, n, k), exact(g.data, n, k), false, ExactMatrix::Ones(n, n), error);
+  const ExactMatrix m = exact(a.data, n, n);
+  compare_solution(got, m, exact(b.data, n, k), exact(g.data, n, k), false, ExactMatrix::Ones(n, n), error);
 }
 
 // Triangles with a diagonal from 1 to 3e-4 and entries up to 1 beside it, NaN on the side that is not read.
@@ -136,15 +135,8 @@ void compare_triangular_solve(WorstError& error) {
             return triangular_solve(v[0], v[1], {.upper = upper, .transposed = transposed});
           },
           {a, b}, [&](Shape) -> const Tensor<T>& { return g; });
-      const ExactMatrix used = transposed ? ExactMatrix(m.transpose()) : m, back = used.transpose();
-      const auto compare = [&](const auto& lu, const auto& lu_t) {
-        compare_solution(got, used, lu, lu_t, exact(b.data, n, k), exact(g.data, n, k), transposed, read,
-                         error);
-      };
-      if (upper != transposed)
-        compare(used.triangularView<Eigen::Upper>(), back.triangularView<Eigen::Lower>());
-      else
-        compare(used.triangularView<Eigen::Lower>(), back.triangularView<Eigen::Upper>());
+      compare_solution(got, transposed ? ExactMatrix(m.transpose()) : m, exact(b.data, n, k),
+                       exact(g.data, n, k), transposed, read, error);
     }
 }
 
@@ -155,7 +147,7 @@ void compare_inverse(WorstError& error) {
   const Tensor<T> a = hilbert<T>(n), g = scattered<T>({n, n}, -1, 1, 2);
   const auto got = values_and_gradients<T>([](auto&, const auto& v) { return inverse(v[0]); }, {a},
                                            [&](Shape) -> const Tensor<T>& { return g; });
-  const ExactMatrix m = exact(a.data, n, n), y = m.partialPivLu().inverse(), dy = exact(g.data, n, n);
+  const ExactMatrix m = exact(a.data, n, n), y = inverted(m), dy = exact(g.data, n, n);
   const ExactMatrix off = size(y) + kToType<T> * size(y) * size(m) * size(y);
   compare_matrix(got[0], y, off, error);
   const ExactMatrix yt = y.transpose(), off_t = off.transpose();
@@ -170,8 +162,7 @@ void compare_cholesky(bool gradient, WorstError& error) {
   const Tensor<T> a = hilbert<T>(n), g = scattered<T>({n, n}, -1, 1, 2);
   const auto got = values_and_gradients<T>([](auto&, const auto& v) { return cholesky(v[0]); }, {a},
                                            [&](Shape) -> const Tensor<T>& { return g; });
-  const ExactMatrix m = exact(a.data, n, n), l = Eigen::LLT<ExactMatrix>(m).matrixL(),
-                    inverse = l.partialPivLu().inverse();
+  const ExactMatrix m = exact(a.data, n, n), l = Eigen::LLT<ExactMatrix>(m).matrixL(), inverse = inverted(l);
   if (!gradient) return compare_matrix(got[0], l, size(l).maxCoeff(), error);
   ExactMatrix p = lower(l.transpose() * lower(exact(g.data, n, n)));
   p.diagonal() /= 2;
@@ -198,7 +189,7 @@ void compare_log_determinant(WorstError& error) {
     const Tensor<T> a = scattered<T>({n, n}, -level, level, 5);
     const auto got =
         values_and_gradients<T>([](auto&, const auto& v) { return log_determinant(v[0]); }, {a}, ones<T>);
-    const ExactMatrix m = exact(a.data, n, n), y = m.partialPivLu().inverse();
+    const ExactMatrix m = exact(a.data, n, n), y = inverted(m);
     const Eigen::PartialPivLU<ExactMatrix> lu(m);
     const Eigen::Array<Real, Eigen::Dynamic, 1> logs = lu.matrixLU().diagonal().array().abs().log();
     error.compare(got[0][0], logs.sum(), logs.abs().sum());

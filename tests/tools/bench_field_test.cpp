@@ -8,7 +8,7 @@ using namespace fieldmark;
 
 TEST_CASE("bench field renders a stored field in every way, and says where the default stands", "[bench]") {
   const TemporaryFolder folder;
-  const std::string scene = tiny_scene(folder), field = tiny_field(folder, scene, "40");
+  const std::string scene = tiny_scene(folder), field = tiny_field(folder, scene);
   const auto r = run_command({"bench", "field", "--field", field, "--size", "24", "--views", "2", "--runs",
                               "1", "--quick", "--json", "-", "--report", folder / "field.md", "--plot",
                               folder / "field.svg"});

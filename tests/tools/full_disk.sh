@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # Every command that writes, where nothing can be written: exit code 1, a line that names the file, no file left behind.
 # A limit on the size of files takes the place of a full disk: no root is needed for it.
-#   full_disk.sh FIELDMARK
+#   full_disk.sh FIELDMARK FIELD
 set -euo pipefail
-fieldmark=$(realpath "$1")
+fieldmark=$(realpath "$1") field=$(realpath "$2")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work"
@@ -36,7 +36,7 @@ refuses() {
 
 small=(--steps 2 --views 8 --measured-views 1 --reader-size 32 --bits 4 --cells 6)
 "$fieldmark" scene --out scene --kind sphere --size 16 --views 16 >/dev/null 2>&1
-"$fieldmark" train --data scene --out field.fm --steps 100 --max-megabytes 1 >/dev/null 2>&1
+cp "$field" field.fm
 "$fieldmark" embed --field field.fm --out owner.fm "${small[@]}" >/dev/null 2>&1
 "$fieldmark" render --field field.fm --out views --count 1 --size 32 >/dev/null 2>&1
 

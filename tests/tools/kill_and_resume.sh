@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Long runs that are interrupted and killed, then resumed, end with the bytes of an undisturbed run.
-#   kill_and_resume.sh FIELDMARK
+#   kill_and_resume.sh FIELDMARK FIELD
+# FIELD is the one to mark: smaller and quicker to render than what `train` makes here.
 set -euo pipefail
-fieldmark=$(realpath "$1")
+fieldmark=$(realpath "$1") field=$(realpath "$2")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work"
@@ -53,7 +54,7 @@ survives() {
 "$fieldmark" scene --out scene --kind sphere --size 32 --views 8 >scene.log 2>&1
 "$fieldmark" key --out secret.key >key.log 2>&1
 survives train field.fm --data scene --steps 120 --max-megabytes 1
-survives embed owner.fm --field field.fm --key secret.key --bits 4 --cells 6 --reader-size 32 --steps 40 --views 8 \
+survives embed owner.fm --field "$field" --key secret.key --bits 4 --cells 6 --reader-size 32 --steps 40 --views 8 \
   --measured-views 1
 survives bake baked.fm --owner owner.fm --message a --steps 40
 echo "train, embed and bake: interrupted, killed and resumed, the same bytes"

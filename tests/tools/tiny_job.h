@@ -28,8 +28,8 @@ inline Outcome tiny_embed(const std::string& field, const std::string& owner,
   return run_command(words);
 }
 
-/// A field and an owner of 4-bit messages, made once by the commands themselves: too little training to read
-/// anything, enough to run every path. Tests run as processes of their own, so where FIELDMARK_TINY_JOB names
+/// A field and an owner of 4-bit messages, made once: too little training to read anything, enough to run
+/// every path. Tests run as processes of their own, so where FIELDMARK_TINY_JOB names
 /// a folder, the first process of this program keeps the files there and the others copy them.
 struct TinyJob {
   TemporaryFolder folder;
@@ -91,7 +91,7 @@ struct TinyJob {
            std::to_string(std::filesystem::last_write_time(self).time_since_epoch().count());
   }
   void make() const {
-    tiny_field(folder, tiny_scene(folder), "100");
+    tiny_field(folder, tiny_scene(folder));
     const auto r = tiny_embed(
         field, owner, {"--measured-views", "2", "--distort", "blur_1", "--json", folder / "embedded.json"});
     INFO(r.err);

@@ -17,7 +17,7 @@ target_compile_options(fieldmark_warnings INTERFACE $<$<CXX_COMPILER_ID:GNU,Clan
 
 # fieldmark_room(<room> [MAY_USE <room>...] [UNITS <unit>...] [INTERNAL <unit>...] [PRIVATE <unit>...]
 #                [HEADER_ONLY <unit>...] [KERNELS <unit>...] [PARTS <source>...] [ALONE <unit>...] [TESTS <test>...]
-#                [LIBRARIES <private target>...] [NOT_INSTALLED])
+#                [COLD <unit>...] [LIBRARIES <private target>...] [NOT_INSTALLED])
 #
 # A room is a folder with a target of its own: room a/b is the target fieldmark_a_b, alias fieldmark::a_b. It sees the
 # headers of the rooms that it MAY_USE, and of those that they use in their headers; any other header is not found.
@@ -28,21 +28,25 @@ target_compile_options(fieldmark_warnings INTERFACE $<$<CXX_COMPILER_ID:GNU,Clan
 #   PRIVATE   the header is src/u.h: for this room alone
 #   PARTS     sources in src/ that share a unit's header; TESTS: further tests in tests/ROOM/
 # HEADER_ONLY names those of the units above that have no source; ALONE those whose source is never compiled together with
-# others in a unity build (CMAKE_UNITY_BUILD, which halves the time of a build from scratch).
+# others in a unity build (CMAKE_UNITY_BUILD, which halves the time of a build from scratch); COLD those that compute little,
+# where the optimiser's higher levels take a third of the compile time and gain nothing.
 #
 # A kernel k is src/kernels/k.h + k.cpp with its test in tests/ROOM/kernels/k_test.cpp. Its source is compiled once for
 # each instruction set in FIELDMARK_ISA_LEVELS and chosen at run time (fieldmark/engine/kernel.h).
 set(FIELDMARK_ISA_LEVELS v2 v3 v4)
 function(fieldmark_room room)
   cmake_parse_arguments(PARSE_ARGV 1 M "NOT_INSTALLED" ""
-    "MAY_USE;UNITS;INTERNAL;PRIVATE;HEADER_ONLY;ALONE;KERNELS;PARTS;TESTS;LIBRARIES")
+    "MAY_USE;UNITS;INTERNAL;PRIVATE;HEADER_ONLY;ALONE;COLD;KERNELS;PARTS;TESTS;LIBRARIES")
   string(REPLACE / _ name ${room})
   set(target fieldmark_${name})
   fieldmark_room_tests(${room})
 
   set(sources)
+  set(cold)
   foreach(unit IN LISTS M_UNITS M_INTERNAL M_PRIVATE M_PARTS)
-    if(NOT unit IN_LIST M_HEADER_ONLY)
+    if(unit IN_LIST M_COLD)
+      list(APPEND cold src/${unit}.cpp)
+    elseif(NOT unit IN_LIST M_HEADER_ONLY)
       list(APPEND sources src/${unit}.cpp)
     endif()
   endforeach()
@@ -64,6 +68,9 @@ function(fieldmark_room room)
   list(TRANSFORM M_LIBRARIES REPLACE "(.+)" "$<BUILD_INTERFACE:\\1>")
   target_link_libraries(${target} PUBLIC ${uses}
     PRIVATE $<BUILD_INTERFACE:fieldmark_warnings> ${M_LIBRARIES} OpenMP::OpenMP_CXX)
+  if(cold)
+    fieldmark_cold(${target} "${cold}" ${uses} ${M_LIBRARIES} fieldmark_warnings OpenMP::OpenMP_CXX)
+  endif()
   if(M_NOT_INSTALLED)
     return()
   endif()
@@ -113,6 +120,20 @@ macro(fieldmark_room_tests room)
   set_property(GLOBAL APPEND PROPERTY FIELDMARK_TESTS_${house} ${tests})
   set_property(GLOBAL APPEND PROPERTY FIELDMARK_PRIVATE_${house} ${CMAKE_CURRENT_SOURCE_DIR}/src)
 endmacro()
+
+# Objects of sources that are compiled as the target is, but for the level of the optimiser.
+# fieldmark_cold(<target> <sources> <library>...)
+function(fieldmark_cold target sources)
+  set(cold ${target}_cold)
+  add_library(${cold} OBJECT ${sources})
+  target_link_libraries(${cold} PRIVATE ${ARGN})
+  target_compile_features(${cold} PRIVATE cxx_std_20)
+  target_include_directories(${cold} PRIVATE $<TARGET_PROPERTY:${target},INCLUDE_DIRECTORIES>)
+  target_compile_definitions(${cold} PRIVATE $<TARGET_PROPERTY:${target},COMPILE_DEFINITIONS>)
+  target_compile_options(${cold} PRIVATE $<TARGET_PROPERTY:${target},COMPILE_OPTIONS> $<$<CXX_COMPILER_ID:GNU,Clang>:-O1>)
+  set_target_properties(${cold} PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_EXTENSIONS OFF)
+  target_sources(${target} PRIVATE $<TARGET_OBJECTS:${cold}>)
+endfunction()
 
 # Objects of each kernel, one for each instruction set.
 function(fieldmark_kernels target kernels result)
