@@ -2,13 +2,8 @@
 // headers only.
 #include <fieldmark/engine/clip.h>
 #include <fieldmark/engine/decay.h>
-#include <fieldmark/engine/nn/dense.h>
-#include <fieldmark/engine/ops/comparison.h>
-#include <fieldmark/engine/ops/layer_norm.h>
-#include <fieldmark/engine/ops/operators.h>
-#include <fieldmark/engine/ops/relu_family.h>
-#include <fieldmark/engine/ops/slice.h>
-#include <fieldmark/engine/ops/softmax.h>
+#include <fieldmark/engine/nn.h>
+#include <fieldmark/engine/ops.h>
 #include <fieldmark/engine/state_file.h>
 #include <fieldmark/engine/values.h>
 
@@ -22,17 +17,11 @@ namespace {
 // A dense layer, a norm and GELU, added to what came in.
 struct Block {
   Dense<float> dense;
-  ParamId gamma, beta;
+  LayerNorm<float> norm;
   Block(ParamStore<float>& store, const std::string& name, Index width, std::uint64_t seed)
       : dense(store, name + "/dense", {.in = width, .out = width}, seed),
-        gamma(store.add(name + "/gamma", {width})),
-        beta(store.add(name + "/beta", {width})) {
-    for (float& g : store.values(gamma)) g = 1;
-  }
-  Var<float> operator()(const Params<float>& p, Var<float> x) const {
-    const Var<float> h = layer_norm(dense(p, x), p.leaf(x.tape(), gamma), p.leaf(x.tape(), beta));
-    return x + gelu(h);
-  }
+        norm(store, name + "/norm", width) {}
+  Var<float> operator()(const Params<float>& p, Var<float> x) const { return x + gelu(norm(p, dense(p, x))); }
 };
 
 }  // namespace

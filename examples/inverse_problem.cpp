@@ -1,14 +1,7 @@
 // Sharpens a blurred signal whose blur and noise are unknown: both maximise the likelihood of what was seen,
 // by gradients through a Cholesky factor. Public headers only.
 #include <fieldmark/engine/adam.h>
-#include <fieldmark/engine/ops/activation.h>
-#include <fieldmark/engine/ops/batched_matmul.h>
-#include <fieldmark/engine/ops/cholesky.h>
-#include <fieldmark/engine/ops/layout.h>
-#include <fieldmark/engine/ops/linear_solve.h>
-#include <fieldmark/engine/ops/operators.h>
-#include <fieldmark/engine/ops/reduce.h>
-#include <fieldmark/engine/ops/reduce_axes.h>
+#include <fieldmark/engine/ops.h>
 #include <fieldmark/engine/random.h>
 #include <fieldmark/engine/values.h>
 
@@ -22,37 +15,32 @@ namespace {
 constexpr Index kPoints = 60;
 constexpr double kBlur = 2, kNoise = 0.02;  // what shall be found
 
-// Covariance of the signal as it is before it is seen: a random walk whose steps have variance 0.05.
-Tensor<double> walk_covariance() {
-  Tensor<double> c({kPoints, kPoints});
-  for (Index i = 0; i < c.size(); ++i)
-    c[i] = 0.05 * static_cast<double>(std::min(i % kPoints, i / kPoints) + 1);
-  return c;
-}
-
 // Blur of a width [1]: rows exp(-d^2 / 2 width^2) that sum to 1.
-Var<double> blur(Var<double> width, const Tensor<double>& square_distance) {
-  const Var<double> rows = exp(width.tape().constant(square_distance) / (width * width * -2.0));
+Var<double> blur(Var<double> width, const Tensor<double>& square_apart) {
+  const Var<double> rows = exp(width.tape().constant(square_apart) / (width * width * -2.0));
   return rows / sum(rows, {1}, KeepAxes::yes);
 }
 
 }  // namespace
 
 int main() {
-  Tensor<double> distance({kPoints, kPoints}), eye({kPoints, kPoints}), truth({kPoints, 1}),
-      noise({kPoints, 1});
+  // The signal is a random walk whose steps have variance 0.05.
+  Tensor<double> apart({kPoints, kPoints}), walk = apart, eye = apart, truth({kPoints, 1}), noise = truth;
   const CounterRng rng(4, 0);
   for (Index i = 0; i < kPoints; ++i) {
-    for (Index j = 0; j < kPoints; ++j) distance[i * kPoints + j] = static_cast<double>((i - j) * (i - j));
+    for (Index j = 0; j < kPoints; ++j) {
+      apart[i * kPoints + j] = static_cast<double>((i - j) * (i - j));
+      walk[i * kPoints + j] = 0.05 * static_cast<double>(std::min(i, j) + 1);
+    }
     eye[i * kPoints + i] = 1;
     truth[i] = (i > 0 ? truth[i - 1] : 0) +
                std::sqrt(0.05) * static_cast<double>(rng.normal2(static_cast<std::uint64_t>(i))[0]);
     noise[i] = kNoise * static_cast<double>(rng.normal2(static_cast<std::uint64_t>(i))[1]);
   }
-  const Tensor<double> covariance = walk_covariance(), one({1}, {kBlur});
+  const Tensor<double> one({1}, {kBlur});
   Tape<double> tape;
-  const Tensor<double> seen = to_tensor(
-      batched_matmul(blur(tape.constant(one), distance), tape.constant(truth)) + tape.constant(noise));
+  const Tensor<double> seen =
+      to_tensor(batched_matmul(blur(tape.constant(one), apart), tape.constant(truth)) + tape.constant(noise));
 
   ParamStore<double> store;
   const ParamId log_blur = store.add("log_blur", {1}), log_noise = store.add("log_noise", {1});
@@ -63,7 +51,7 @@ int main() {
   for (int step = 0; step < 200; ++step) {
     tape.reset();
     store.zero_grad();
-    const Var<double> a = blur(exp(p.leaf(tape, log_blur)), distance), c = tape.constant(covariance);
+    const Var<double> a = blur(exp(p.leaf(tape, log_blur)), apart), c = tape.constant(walk);
     const Var<double> deviation = exp(p.leaf(tape, log_noise)), identity = tape.constant(eye);
     const Var<double> ca = batched_matmul(c, transpose(a));
     const Var<double> l = cholesky(batched_matmul(a, ca) + deviation * deviation * identity);
@@ -76,9 +64,7 @@ int main() {
     if (step % 50 == 0) std::printf("step %3d  cost %8.3f\n", step, item(cost));
   }
   const auto error = [&](const Tensor<double>& x) {
-    double square = 0;
-    for (Index i = 0; i < kPoints; ++i) square += std::pow(x[i] - truth[i], 2) / static_cast<double>(kPoints);
-    return std::sqrt(square);
+    return std::sqrt(item(mse_loss(tape.constant(x), tape.constant(truth))));
   };
   const double width = std::exp(store.values(log_blur)[0]), deviation = std::exp(store.values(log_noise)[0]);
   std::printf("blur %.2f (2), noise %.3f (0.02); error %.3f as seen, %.3f sharpened\n", width, deviation,

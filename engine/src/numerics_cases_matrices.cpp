@@ -37,6 +37,19 @@ Tensor<T> rounded(const ExactMatrix& m) {
 ExactMatrix size(const ExactMatrix& m) { return m.cwiseAbs(); }
 ExactMatrix solved(const ExactMatrix& m, const ExactMatrix& b) { return m.partialPivLu().solve(b); }
 ExactMatrix inverted(const ExactMatrix& m) { return solved(m, ExactMatrix::Identity(m.rows(), m.rows())); }
+
+// The same of a triangle, by substitution: pivots would mix rows of different size.
+ExactMatrix substituted(const ExactMatrix& m, const ExactMatrix& b) {
+  const Index n = m.rows();
+  const bool upper = m.isUpperTriangular();
+  ExactMatrix x = b;
+  for (Index k = 0; k < n; ++k) {
+    const Index i = upper ? n - 1 - k : k;
+    for (Index c = upper ? i + 1 : 0; c < (upper ? n : i); ++c) x.row(i) -= m(i, c) * x.row(c);
+    x.row(i) /= m(i, i);
+  }
+  return x;
+}
 ExactMatrix lower(const ExactMatrix& m) { return m.triangularView<Eigen::Lower>(); }
 
 // Errors of a matrix, each relative to its entry of `scale`.
@@ -81,13 +94,16 @@ void compare_residual(WorstError& error) {
 }
 
 // x and both gradients of m x = b, where an error of a solve is n u |m^-1| |m| |x| (Higham 2002, section 9.3,
-// with |L||U| of the size of |m|), and da = -db x^T where a is read, its transpose if m is a^T.
+// with |L||U| of the size of |m|), and da = -db x^T where a is read, its transpose if m is a^T. `solve` gives
+// the exact solutions.
 template <class T>
-void compare_solution(const std::vector<std::vector<T>>& got, const ExactMatrix& m, const ExactMatrix& b,
+void compare_solution(const std::vector<std::vector<T>>& got, const ExactMatrix& m,
+                      ExactMatrix (*solve)(const ExactMatrix&, const ExactMatrix&), const ExactMatrix& b,
                       const ExactMatrix& cotangent, bool transposed, const ExactMatrix& read,
                       WorstError& error) {
-  const ExactMatrix inverse = inverted(m), spread = size(inverse) * size(m);
-  const ExactMatrix x = solved(m, b), g = solved(m.transpose(), cotangent);
+  const ExactMatrix inverse = solve(m, ExactMatrix::Identity(m.rows(), m.rows())),
+                    spread = size(inverse) * size(m);
+  const ExactMatrix x = solve(m, b), g = solve(m.transpose(), cotangent);
   const ExactMatrix off_x = kToType<T> * spread * size(x),
                     off_g = kToType<T> * size(inverse).transpose() * size(m).transpose() * size(g);
   compare_matrix(got[0], x, size(x) + off_x, error);
@@ -108,7 +124,8 @@ void compare_solve(WorstError& error) {
   const auto got = values_and_gradients<T>([](auto&, const auto& v) { return solve(v[0], v[1]); }, {a, b},
                                            [&](Shape) -> const Tensor<T>& { return g; });
   const ExactMatrix m = exact(a.data, n, n);
-  compare_solution(got, m, exact(b.data, n, k), exact(g.data, n, k), false, ExactMatrix::Ones(n, n), error);
+  compare_solution(got, m, solved, exact(b.data, n, k), exact(g.data, n, k), false, ExactMatrix::Ones(n, n),
+                   error);
 }
 
 // Triangles with a diagonal from 1 to 3e-4 and entries up to 1 beside it, NaN on the side that is not read.
@@ -135,7 +152,7 @@ void compare_triangular_solve(WorstError& error) {
             return triangular_solve(v[0], v[1], {.upper = upper, .transposed = transposed});
           },
           {a, b}, [&](Shape) -> const Tensor<T>& { return g; });
-      compare_solution(got, transposed ? ExactMatrix(m.transpose()) : m, exact(b.data, n, k),
+      compare_solution(got, transposed ? ExactMatrix(m.transpose()) : m, substituted, exact(b.data, n, k),
                        exact(g.data, n, k), transposed, read, error);
     }
 }
@@ -179,6 +196,21 @@ void compare_singular_determinant(WorstError& error) {
   const std::vector<Real> cofactors{4, 4, -4, -2, -2, 2, 0, 0, 0};
   error.compare(got[0][0], 0, 1);
   for (std::size_t i = 0; i < cofactors.size(); ++i) error.compare(got[1][i], cofactors[i], 1);
+}
+
+// Rows from 1e-12 to 1e12 in size: each row of the gradient relative to its own largest.
+template <class T>
+void compare_scaled_determinant(WorstError& error) {
+  constexpr Index n = 5;
+  Tensor<T> a = scattered<T>({n, n}, -1, 1, 7);
+  for (Index i = 0; i < a.size(); ++i) a[i] *= static_cast<T>(std::pow(10.0, 6 * (i / n - 2)));
+  const auto got =
+      values_and_gradients<T>([](auto&, const auto& v) { return determinant(v[0]); }, {a}, ones<T>);
+  const ExactMatrix m = exact(a.data, n, n), y = inverted(m);
+  const Real det = m.determinant();
+  error.compare(got[0][0], det, std::abs(det));
+  const ExactMatrix want = det * y.transpose();
+  compare_matrix(got[1], want, size(want).rowwise().maxCoeff() * ExactMatrix::Ones(1, n), error);
 }
 
 // Determinants far beyond the range of double; the logarithm relative to those of the pivots.
@@ -265,6 +297,9 @@ void add_matrix_numerics(std::vector<NumericsCase>& cases) {
                [](auto t, WorstError& e) { compare_cholesky<decltype(t)>(true, e); });
   add_numerics(cases, "determinant: a singular matrix", "1", 1e-6, 1e-14,
                [](auto t, WorstError& e) { compare_singular_determinant<decltype(t)>(e); });
+  // A few n u with n = 5; in float one rounding.
+  add_numerics(cases, "determinant: rows from 1e-12 to 1e12, gradient", "row", 6e-8, 5e-15,
+               [](auto t, WorstError& e) { compare_scaled_determinant<decltype(t)>(e); });
   // n u with n = 40; in float one rounding.
   add_numerics(cases, "determinant: logarithms of 1e-480 and 1e480", "pivots, condition", 6e-8, 5e-15,
                [](auto t, WorstError& e) { compare_log_determinant<decltype(t)>(e); });

@@ -1,6 +1,8 @@
 #include <fieldmark/engine/ops/determinant.h>
 
 #include <cmath>
+#include <numeric>
+#include <vector>
 
 #include "ops/matrices.h"
 
@@ -9,11 +11,26 @@ namespace {
 
 using detail::Matrix;
 
+// Powers of two that bring the largest entry of each row into [1, 2); 0 for a row of zeros.
+std::vector<int> row_exponents(const Matrix& a) {
+  std::vector<int> exponents;
+  for (Index i = 0; i < a.rows(); ++i) {
+    const double largest = a.row(i).cwiseAbs().maxCoeff();
+    exponents.push_back(largest > 0 ? -std::ilogb(largest) : 0);
+  }
+  return exponents;
+}
+
+void scale_rows(Matrix& a, const std::vector<int>& exponents) {
+  for (Index i = 0; i < a.rows(); ++i)
+    for (Index j = 0; j < a.cols(); ++j)
+      a(i, j) = std::ldexp(a(i, j), exponents[static_cast<std::size_t>(i)]);
+}
+
 // d det(a) / da, the transposed adjugate. With a = U diag(s) V^T it is det(U) det(V) U diag(p) V^T, where p_i
 // is the product of the other s.
-Matrix cofactors(const Matrix& a) {
+Matrix cofactors_by_svd(const Matrix& a) {
   const Index n = a.rows();
-  if (n == 0) return a;
   const Eigen::JacobiSVD<Matrix> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::VectorXd others(n);
   for (Index i = 0; i < n; ++i) {
@@ -23,6 +40,27 @@ Matrix cofactors(const Matrix& a) {
   }
   const double sign = svd.matrixU().determinant() * svd.matrixV().determinant() > 0 ? 1 : -1;
   return sign * svd.matrixU() * others.asDiagonal() * svd.matrixV().transpose();
+}
+
+// The same of b = diag(2^e) a diag(2^f), whose rows and columns are of one size: small rows would drown in
+// the SVD's error. The cofactor of a_ij is that of b_ij times 2^(e_i + f_j), over the product of all powers.
+Matrix cofactors(const Matrix& a) {
+  if (a.rows() == 0) return a;
+  Matrix b = a;
+  std::vector<int> rows = row_exponents(b);
+  scale_rows(b, rows);
+  b.transposeInPlace();
+  std::vector<int> columns = row_exponents(b);
+  scale_rows(b, columns);
+  b.transposeInPlace();
+  const int all =
+      std::accumulate(rows.begin(), rows.end(), std::accumulate(columns.begin(), columns.end(), 0));
+  for (int& e : rows) e -= all;
+  Matrix c = cofactors_by_svd(b);
+  for (Index i = 0; i < c.rows(); ++i)
+    for (Index j = 0; j < c.cols(); ++j)
+      c(i, j) = std::ldexp(c(i, j), rows[static_cast<std::size_t>(i)] + columns[static_cast<std::size_t>(j)]);
+  return c;
 }
 
 // y[i] = value(i, a_i), da_i = dy[i] slope(a_i).

@@ -10,7 +10,7 @@ const std::vector<std::int32_t> kLabels{2, -1, 0, 1};
 const std::vector<double> kSoftmaxWeights{1, 3, 0, 0.5};
 const auto f_softmax = [](auto&, auto v) { return softmax(v[0]); };
 const auto f_entropy = [](auto&, auto v) { return softmax_cross_entropy(v[0], kLabels); };
-const auto f_weighted = [](Tape<double>&, std::span<const Var<double>> v) {
+const auto f_softmax_weighted = [](Tape<double>&, std::span<const Var<double>> v) {
   return softmax_cross_entropy<double>(v[0], kLabels, kSoftmaxWeights);
 };
 
@@ -32,7 +32,7 @@ TEST_CASE("softmax: values") {
   const auto x = uniform({4, 3}, -2, 2, 1);
   const double r0 = entropy(x, 0, 2), r2 = entropy(x, 2, 0), r3 = entropy(x, 3, 1);
   CHECK(std::abs(op_values(f_entropy, std::vector{x})[0] - (r0 + r2 + r3) / 3) < 1e-15);
-  CHECK(std::abs(op_values(f_weighted, std::vector{x})[0] - (r0 + 0.5 * r3) / 1.5) < 1e-15);
+  CHECK(std::abs(op_values(f_softmax_weighted, std::vector{x})[0] - (r0 + 0.5 * r3) / 1.5) < 1e-15);
 }
 
 TEST_CASE("softmax: gradient") {
@@ -42,7 +42,7 @@ TEST_CASE("softmax: gradient") {
   }
   expect_grad(f_entropy, {uniform({4, 3}, -3, 3, 7)});
   expect_grad(f_entropy, {uniform({2, 2, 3}, -3, 3, 7)});
-  expect_grad(f_weighted, {uniform({4, 5}, -3, 3, 7)});
+  expect_grad(f_softmax_weighted, {uniform({4, 5}, -3, 3, 7)});
 }
 
 TEST_CASE("softmax: cross-entropy of logits that overflow exp") {
@@ -128,5 +128,5 @@ TEST_CASE("softmax: labels and weights may change or be gone when the backward r
     std::ranges::fill(weights, NAN);
     return y;
   };
-  CHECK(run_op(gone, x) == run_op(f_weighted, x));
+  CHECK(run_op(gone, x) == run_op(f_softmax_weighted, x));
 }

@@ -1,0 +1,9 @@
+#pragma once
+/// @file
+/// All layers, for programs that would rather not list them.
+#include <fieldmark/engine/nn/batch_norm.h>
+#include <fieldmark/engine/nn/conv2d.h>
+#include <fieldmark/engine/nn/dense.h>
+#include <fieldmark/engine/nn/embedding.h>
+#include <fieldmark/engine/nn/group_norm.h>
+#include <fieldmark/engine/nn/layer_norm.h>
