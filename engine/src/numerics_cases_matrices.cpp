@@ -34,6 +34,14 @@ Tensor<T> rounded(const ExactMatrix& m) {
   return t;
 }
 
+ExactMatrix product(const ExactMatrix& a, const ExactMatrix& b) {
+  ExactMatrix c = ExactMatrix::Zero(a.rows(), b.cols());
+  for (Index i = 0; i < a.rows(); ++i)
+    for (Index k = 0; k < a.cols(); ++k)
+      for (Index j = 0; j < b.cols(); ++j) c(i, j) += a(i, k) * b(k, j);
+  return c;
+}
+
 ExactMatrix size(const ExactMatrix& m) { return m.cwiseAbs(); }
 ExactMatrix solved(const ExactMatrix& m, const ExactMatrix& b) { return m.partialPivLu().solve(b); }
 ExactMatrix inverted(const ExactMatrix& m) { return solved(m, ExactMatrix::Identity(m.rows(), m.rows())); }
@@ -102,14 +110,15 @@ void compare_solution(const std::vector<std::vector<T>>& got, const ExactMatrix&
                       const ExactMatrix& cotangent, bool transposed, const ExactMatrix& read,
                       WorstError& error) {
   const ExactMatrix inverse = solve(m, ExactMatrix::Identity(m.rows(), m.rows())),
-                    spread = size(inverse) * size(m);
+                    spread = product(size(inverse), size(m)),
+                    spread_t = product(size(inverse).transpose(), size(m).transpose());
   const ExactMatrix x = solve(m, b), g = solve(m.transpose(), cotangent);
-  const ExactMatrix off_x = kToType<T> * spread * size(x),
-                    off_g = kToType<T> * size(inverse).transpose() * size(m).transpose() * size(g);
+  const ExactMatrix off_x = kToType<T> * product(spread, size(x)),
+                    off_g = kToType<T> * product(spread_t, size(g));
   compare_matrix(got[0], x, size(x) + off_x, error);
   compare_matrix(got[2], g, size(g) + off_g, error);
-  ExactMatrix da = -g * x.transpose(), scale = size(g) * size(x).transpose() + off_g * size(x).transpose() +
-                                               size(g) * off_x.transpose();
+  ExactMatrix da = -product(g, x.transpose()),
+              scale = product(size(g) + off_g, size(x).transpose()) + product(size(g), off_x.transpose());
   if (transposed) {
     da.transposeInPlace();
     scale.transposeInPlace();
@@ -165,10 +174,12 @@ void compare_inverse(WorstError& error) {
   const auto got = values_and_gradients<T>([](auto&, const auto& v) { return inverse(v[0]); }, {a},
                                            [&](Shape) -> const Tensor<T>& { return g; });
   const ExactMatrix m = exact(a.data, n, n), y = inverted(m), dy = exact(g.data, n, n);
-  const ExactMatrix off = size(y) + kToType<T> * size(y) * size(m) * size(y);
+  const ExactMatrix off = size(y) + kToType<T> * product(product(size(y), size(m)), size(y));
   compare_matrix(got[0], y, off, error);
   const ExactMatrix yt = y.transpose(), off_t = off.transpose();
-  compare_matrix(got[1], -yt * dy * yt, off_t * size(dy) * size(yt) + size(yt) * size(dy) * off_t, error);
+  compare_matrix(got[1], -product(product(yt, dy), yt),
+                 product(product(off_t, size(dy)), size(yt)) + product(product(size(yt), size(dy)), off_t),
+                 error);
 }
 
 // Of Hilbert's matrix of 5 rows. An error of L reaches the gradient through two solves with L, whose
@@ -181,9 +192,9 @@ void compare_cholesky(bool gradient, WorstError& error) {
                                            [&](Shape) -> const Tensor<T>& { return g; });
   const ExactMatrix m = exact(a.data, n, n), l = Eigen::LLT<ExactMatrix>(m).matrixL(), inverse = inverted(l);
   if (!gradient) return compare_matrix(got[0], l, size(l).maxCoeff(), error);
-  ExactMatrix p = lower(l.transpose() * lower(exact(g.data, n, n)));
+  ExactMatrix p = lower(product(l.transpose(), lower(exact(g.data, n, n))));
   p.diagonal() /= 2;
-  const ExactMatrix s = inverse.transpose() * p * inverse, want = (s + s.transpose()) / 2;
+  const ExactMatrix s = product(product(inverse.transpose(), p), inverse), want = (s + s.transpose()) / 2;
   compare_matrix(got[1], want, size(want).maxCoeff(), error);
 }
 
@@ -210,7 +221,7 @@ void compare_scaled_determinant(WorstError& error) {
   const Real det = m.determinant();
   error.compare(got[0][0], det, std::abs(det));
   const ExactMatrix want = det * y.transpose();
-  compare_matrix(got[1], want, size(want).rowwise().maxCoeff() * ExactMatrix::Ones(1, n), error);
+  compare_matrix(got[1], want, product(size(want).rowwise().maxCoeff(), ExactMatrix::Ones(1, n)), error);
 }
 
 // Determinants far beyond the range of double; the logarithm relative to those of the pivots.
@@ -225,7 +236,7 @@ void compare_log_determinant(WorstError& error) {
     const Eigen::PartialPivLU<ExactMatrix> lu(m);
     const Eigen::Array<Real, Eigen::Dynamic, 1> logs = lu.matrixLU().diagonal().array().abs().log();
     error.compare(got[0][0], logs.sum(), logs.abs().sum());
-    const ExactMatrix scale = size(y) + kToType<T> * size(y) * size(m) * size(y);
+    const ExactMatrix scale = size(y) + kToType<T> * product(product(size(y), size(m)), size(y));
     compare_matrix(got[1], y.transpose(), scale.transpose(), error);
   }
 }
@@ -239,7 +250,7 @@ Tensor<T> clustered(double level) {
   values << -3, 1, 1 + close, 1 + 2 * close, 2, 2.001L;
   const ExactMatrix q =
       Eigen::HouseholderQR<ExactMatrix>(exact(scattered<double>({n, n}, -1, 1, 6).data, n, n)).householderQ();
-  const ExactMatrix m = static_cast<Real>(level) * q * values.asDiagonal() * q.transpose();
+  const ExactMatrix m = static_cast<Real>(level) * product(product(q, values.asDiagonal()), q.transpose());
   return rounded<T>((m + m.transpose()) / 2);
 }
 
@@ -268,7 +279,7 @@ void compare_eigenvalue_gradients(WorstError& error) {
     const auto got = values_and_gradients<T>([](auto&, const auto& x) { return symmetric_eigenvalues(x[0]); },
                                              {a}, [&](Shape) -> const Tensor<T>& { return g; });
     const ExactMatrix d = exact(cotangent, n, 1);
-    compare_matrix(got[1], v * d.col(0).asDiagonal() * v.transpose(), scale, error);
+    compare_matrix(got[1], product(product(v, d.col(0).asDiagonal()), v.transpose()), scale, error);
   };
   check({1, 1, 1, 1, 1, 1}, 1);
   check({0, 1, 1, 1, 0, 0}, 3);

@@ -20,7 +20,7 @@ struct Run {
   Context context{CommonOptions{}, {"fieldmark", "verify"}, out, err};
   std::string folder = TinyJob::get().images();
   SuspectReader reader{owner, "blind"};
-  std::vector<ImageEvidence> images = read_images(reader, {.paths = {folder}}, context);
+  std::vector<ImageEvidence> images = read_images(reader, {.paths = {folder}}, {}, context);
 };
 }  // namespace
 

@@ -69,7 +69,7 @@ int run_extract(const ExtractArguments& options, Context& context) {
   const bool can_tell = least < 1;  // a bit of one cell looks the same in noise
   if (can_tell) check_rate(options.fpr, least, code.carriers());
   SuspectReader reader(owner, options.reading);
-  const auto images = read_images(reader, options.suspects, context);
+  const auto images = read_images(reader, options.suspects, options.owner, context);
   Json views = Json::array();
   for (const auto& image : images) {
     const auto reading = watermark::read_bits(image.cells, code, bits);

@@ -50,7 +50,8 @@ int run_null(const NullArguments& options, Context& context) {
   std::vector<ImageEvidence> read;
   read_novel(reader, owner, options.novel, read, context);
   if (!options.suspects.paths.empty())
-    for (auto& image : read_images(reader, options.suspects, context)) read.push_back(std::move(image));
+    for (auto& image : read_images(reader, options.suspects, options.owner, context))
+      read.push_back(std::move(image));
 
   const auto code = owner.code();
   watermark::WrongKeyCounts right, random;

@@ -60,7 +60,7 @@ int run_trace(const TraceArguments& options, Context& context) {
   const auto message = message_of(options.message, owner.options().bits);
   const auto names = watermark::read_recipients(options.copies);
   SuspectReader reader(owner, options.reading);
-  const auto images = read_images(reader, options.suspects, context);
+  const auto images = read_images(reader, options.suspects, options.owner, context);
   const auto copies = traced(owner, key, message, names, total_evidence(images), context);
   std::size_t found = 0;
   Json recipients = Json::array();

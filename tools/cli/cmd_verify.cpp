@@ -84,7 +84,7 @@ int run_verify(const VerifyArguments& options, Context& context) {
   check_rate(options.fpr, watermark::least_p(code.carriers()), code.carriers());
   if (!options.evidence.empty()) watermark::prepare_evidence_folder(options.evidence);
   SuspectReader reader(owner, options.reading);
-  const auto images = read_images(reader, options.suspects, context);
+  const auto images = read_images(reader, options.suspects, options.owner, context);
   const auto evidence = total_evidence(images);
   const KeyTest test{owner, code, message};
   watermark::EvidenceRecord record{.reading = reading_used(images),

@@ -75,7 +75,7 @@ TestedControls test_controls(const KeyTest& test, SuspectReader& reader,
     tested.thumbnails.push_back(thumbnail(control.images[0]));
   }
   for (const auto& path : given) {
-    const auto read = read_images(reader, {.paths = {path}}, context);
+    const auto read = read_images(reader, {.paths = {path}}, {}, context);
     tested.controls.push_back({given_name(path),
                                "Given as a control: images that the user declares unmarked.",
                                score_images(test, read), test(total_evidence(read))});

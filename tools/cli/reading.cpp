@@ -7,10 +7,12 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <ostream>
 
 #include "cli/cli.h"
 #include "cli/context.h"
 #include "cli/images.h"
+#include "cli/kept_readings.h"
 
 namespace fieldmark::cli {
 
@@ -42,7 +44,7 @@ void check_rate(double rate, double least, Index cells) {
 }
 
 SuspectReader::SuspectReader(const watermark::Owner& owner, const std::string& reading)
-    : blind_(owner), forced_(reading == "informed") {
+    : detection_(reading), blind_(owner), forced_(reading == "informed") {
   const bool has_cells = owner.mark().has_cells();
   if (forced_ && !has_cells)
     throw UsageError("--detection informed: an owner of preset " + owner.mark().preset() +
@@ -73,6 +75,11 @@ Option add_suspects(CommandLine& app, Suspects& suspects, const std::string& wha
       ->range(1, 100000)
       ->type_name("N")
       ->default_str("");
+  app.add_option(
+         "--readings", suspects.readings,
+         "File to keep what each image shows, so that a run that was stopped goes on from it; default: none")
+      ->type_name("FILE")
+      ->default_str("");
   return app
       .add_option("images", suspects.paths,
                   what + ", or folders of them; PNG, JPEG, WebP, AVIF, HEIC; videos MP4, MOV, WebM")
@@ -82,12 +89,18 @@ Option add_suspects(CommandLine& app, Suspects& suspects, const std::string& wha
 
 namespace {
 
-ImageEvidence read_still(SuspectReader& reader, const std::filesystem::path& file, ReadFaults& faults) {
+ImageEvidence read_still(SuspectReader& reader, const std::filesystem::path& file,
+                         std::optional<KeptReadings>& kept, ReadFaults& faults) {
   const std::string name = file.string();
   const auto bytes = read_bytes(file);
-  ImageEvidence read = reader.read(decode_upright(bytes, name), name);
-  read.sha256 = sha256_hex(bytes);
+  const std::string hash = sha256_hex(bytes);
+  std::optional<ImageEvidence> known;
+  if (kept) known = kept->find(hash);
+  ImageEvidence read = known ? *known : reader.read(decode_upright(bytes, name), name);
+  read.sha256 = hash;
+  read.image = name;
   read.file = file;
+  if (kept && !known) kept->add(read);
   faults.check(file, bytes);
   return read;
 }
@@ -127,10 +140,16 @@ bool is_video(const std::filesystem::path& file) {
 
 }  // namespace
 
-std::vector<ImageEvidence> read_images(SuspectReader& reader, const Suspects& suspects, Context& context) {
+std::vector<ImageEvidence> read_images(SuspectReader& reader, const Suspects& suspects,
+                                       const std::filesystem::path& owner, Context& context) {
   const auto files = list_images(suspects.paths, context, Videos::read);
   if (suspects.frames && std::ranges::none_of(files, is_video))
     throw UsageError("--frames: there is no video among the images");
+  std::optional<KeptReadings> kept;
+  if (!suspects.readings.empty())
+    kept.emplace(suspects.readings, sha256_file_hex(owner.string()), reader.detection());
+  if (kept && kept->size() > 0)
+    context.text() << suspects.readings << ": readings of " << kept->size() << " images\n";
   const InterruptGuard guard;
   Progress progress = context.progress("read");
   std::vector<ImageEvidence> read;
@@ -138,14 +157,17 @@ std::vector<ImageEvidence> read_images(SuspectReader& reader, const Suspects& su
   for (std::size_t i = 0; i < files.size(); ++i) {
     const auto done = [&](double share) {
       progress.update((static_cast<double>(i) + share) / static_cast<double>(files.size()));
-      if (guard.interrupted()) throw Interrupted("nothing was decided");
+      if (guard.interrupted())
+        throw Interrupted(kept ? suspects.readings + " has readings of " + std::to_string(kept->size()) +
+                                     " images; the same command goes on from there"
+                               : "nothing was decided; --readings FILE lets a run go on");
     };
     done(0);
     faults.try_read(files[i], [&] {
       if (is_video(files[i]))
         read_video(reader, files[i], suspects.frames.value_or(kFrames), faults, read, done);
       else
-        read.push_back(read_still(reader, files[i], faults));
+        read.push_back(read_still(reader, files[i], kept, faults));
     });
     done(1);
   }

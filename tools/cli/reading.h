@@ -14,8 +14,8 @@ namespace fieldmark::cli {
 
 /// What one image or one frame of a video shows.
 struct ImageEvidence {
-  std::string image;                                               ///< name; of a frame "clip.mp4@1.234s"
-  std::vector<double> cells;                                       ///< sign evidence S_c
+  std::string image{};                                             ///< name; of a frame "clip.mp4@1.234s"
+  std::vector<double> cells{};                                     ///< sign evidence S_c
   watermark::ReadingKind reading = watermark::ReadingKind::blind;  ///< where it comes from
   double agreement =
       std::nan("");              ///< of the image with the owner's field; NaN where it was not laid over it
@@ -45,26 +45,34 @@ class SuspectReader {
   /// @param name  of the image, for the result and for errors   @throws IoError if it is too small to be
   /// read
   ImageEvidence read(const Tensor<float>& image, const std::string& name);
+  /// As given: "auto", "blind" or "informed".
+  const std::string& detection() const { return detection_; }
 
  private:
+  std::string detection_;
   watermark::BlindReader blind_;
   std::optional<watermark::InformedReader> informed_;
   bool forced_;
 };
 
-/// IMAGE|VIDEO|DIR... and the frames to sample of a video.
+/// IMAGE|VIDEO|DIR..., the frames to sample of a video, and where readings are kept.
 struct Suspects {
   std::vector<std::string> paths{};
   std::optional<Index> frames{};  ///< --frames if it was given
+  std::string readings{};         ///< --readings: a file of KeptReadings; empty: none
 };
 
-/// The positional images and --frames. @param what  "Images to read"   @return the positional argument
+/// The positional images, --frames and --readings. @param what  "Images to read"   @return the positional
+/// argument
 Option add_suspects(CommandLine& app, Suspects& suspects, const std::string& what);
 
 /// Reads the images and frames of videos that IMAGE|VIDEO|DIR... names, one at a time, and leaves out those
-/// that cannot be read, see Context::leave_out().
+/// that cannot be read, see Context::leave_out(). Images whose readings are kept are not read again; of
+/// videos none are kept.
+/// @param owner  the reader's file, for readings that are kept
 /// @throws IoError if none can be read, naming the first   @throws UsageError for --frames without a video
-std::vector<ImageEvidence> read_images(SuspectReader& reader, const Suspects& suspects, Context& context);
+std::vector<ImageEvidence> read_images(SuspectReader& reader, const Suspects& suspects,
+                                       const std::filesystem::path& owner, Context& context);
 
 /// The image or frame once more, as read_rgb(). @throws IoError
 Tensor<float> read_again(const ImageEvidence& image, float background);
