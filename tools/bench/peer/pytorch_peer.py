@@ -283,21 +283,29 @@ def differences(found, case, size):
     return parts
 
 
-def exact_case(exact):
-    """Results under the names that they have in a case."""
-    return {name if name in ("y", "dx") else "grad/" + name: value for name, value in exact.items()}
-
-
 def largest(tensor):
     return tensor.abs().max()
+
+
+def in_double(case, best):
+    """The decoder of a case in double."""
+    return Images({name: value.double() for name, value in case.items()}, list(best.parameters), best.decoder, "planes")
+
+
+def require_rounding(best, found, exact):
+    """Wants a variant's results in float near its own in double."""
+    ours = {name if name in ("y", "dx") else "grad/" + name: value for name, value in exact.items()}
+    for name, part in differences(found, ours, largest).items():
+        if not part <= ROUNDING:
+            raise ValueError("%s: %s in float is %g of its largest from itself in double" % (name, best.name, part))
 
 
 def compared(best, metadata, case):
     """Differences of a variant's results; where there are small draws, gradients are compared on the one that is
     farthest from a kink, and on the whole work by their norms, which single kinks move little.
 
-    On a draw ours are held against PyTorch's in double: on some CPUs its own in float are farther from these than
-    ours are. The variant itself must be within ROUNDING of them.
+    There ours are held against PyTorch's in double: on some CPUs its own in float are farther from these than ours
+    are. The variant itself must be within ROUNDING of them.
     """
     found = best.results()
     draws = []
@@ -310,13 +318,16 @@ def compared(best, metadata, case):
     if not draws:
         return differences(found, case, largest), {}
     results, draw, _ = max(draws, key=lambda entry: entry[2])
-    exact = Images({name: value.double() for name, value in draw.items()}, list(best.parameters), best.decoder, "planes")
-    exact = exact.results()
-    for name, part in differences(results, exact_case(exact), largest).items():
-        if not part <= ROUNDING:
-            raise ValueError("%s: %s in float is %g of its largest from itself in double" % (name, best.name, part))
+    exact = in_double(draw, best).results()
+    require_rounding(best, results, exact)
     strict = differences(exact, draw, largest)
-    strict["y"] = max(strict["y"], differences(found, case, largest)["y"])
+    whole = {name: value for name, value in case.items() if not name.startswith("draw")}
+    with torch.no_grad():
+        values = in_double(whole, best).forward()
+    largest_value = largest(values)
+    if not largest(found["y"] - values) <= ROUNDING * largest_value:
+        raise ValueError("values of %s in float are more than %g from its own in double" % (best.name, ROUNDING))
+    strict["y"] = max(strict["y"], float(largest(values - case["y"]) / largest_value))
     return strict, differences(found, case, torch.linalg.vector_norm)
 
 
