@@ -30,11 +30,11 @@ TEST_CASE("kept_readings: what was added is there again, digit for digit") {
   const TemporaryFolder folder;
   const std::string file = folder / "readings";
   {
-    KeptReadings kept(file, "owner", "auto");
+    KeptReadings kept(file, "owner", "auto", 3);
     kept.add(informed_of_three_cells());
-    kept.add({.cells = {2}, .sha256 = "def"});
+    kept.add({.cells = {2, 0, 1}, .sha256 = "def"});
   }
-  const KeptReadings again(file, "owner", "auto");
+  const KeptReadings again(file, "owner", "auto", 3);
   CHECK(again.size() == 2);
   CHECK(!again.find("other"));
   const auto informed = again.find("abc"), blind = again.find("def");
@@ -51,31 +51,33 @@ TEST_CASE(
     "kept_readings: a line that was cut off is dropped, and the file goes on behind the last whole one") {
   const TemporaryFolder folder;
   const std::string file = folder / "readings";
-  KeptReadings(file, "owner", "blind").add({.cells = {2}, .sha256 = "def"});
+  KeptReadings(file, "owner", "blind", 3).add({.cells = {2, 0, 1}, .sha256 = "def"});
   const std::string whole = read_text(file);
   write_file_atomically(file, whole + R"({"sha256": "abc", "cel)");
-  KeptReadings kept(file, "owner", "blind");
+  KeptReadings kept(file, "owner", "blind", 3);
   CHECK(kept.size() == 1);
   CHECK(read_text(file) == whole);
   kept.add(informed_of_three_cells());
-  CHECK(KeptReadings(file, "owner", "blind").size() == 2);
+  CHECK(KeptReadings(file, "owner", "blind", 3).size() == 2);
 }
 
 TEST_CASE("kept_readings: other files stay as they are, and other runs are refused") {
   const TemporaryFolder folder;
   const std::string file = folder / "readings";
-  KeptReadings(file, "owner", "blind").add({.cells = {2}, .sha256 = "def"});
-  CHECK_THROWS_WITH(KeptReadings(file, "another", "blind"), Contains(file) && Contains("owner_sha256"));
-  CHECK_THROWS_WITH(KeptReadings(file, "owner", "auto"), Contains("detection"));
+  KeptReadings(file, "owner", "blind", 3).add({.cells = {2, 0, 1}, .sha256 = "def"});
+  CHECK_THROWS_WITH(KeptReadings(file, "another", "blind", 3), Contains(file) && Contains("owner_sha256"));
+  CHECK_THROWS_WITH(KeptReadings(file, "owner", "auto", 3), Contains("detection"));
   for (const char* text : {"secret", "secret\n", "{\"readings\": 2}\n", "[]\n"}) {
     write_file_atomically(file, std::string_view(text));
-    CHECK_THROWS_AS(KeptReadings(file, "owner", "blind"), IoError);
+    CHECK_THROWS_AS(KeptReadings(file, "owner", "blind", 3), IoError);
     CHECK(read_text(file) == text);
   }
-  KeptReadings(folder / "new", "owner", "blind");
+  KeptReadings(folder / "new", "owner", "blind", 3);
   write_file_atomically(folder / "new", read_text(folder / "new") + "{\"sha256\": 5}\n");
-  CHECK_THROWS_WITH(KeptReadings(folder / "new", "owner", "blind"), Contains("line 2"));
-  CHECK_THROWS_AS(KeptReadings(folder / "no" / "folder", "owner", "blind"), IoError);
+  CHECK_THROWS_WITH(KeptReadings(folder / "new", "owner", "blind", 3), Contains("line 2"));
+  KeptReadings(folder / "short", "owner", "blind", 1).add({.cells = {2}, .sha256 = "def"});
+  CHECK_THROWS_WITH(KeptReadings(folder / "short", "owner", "blind", 3), Contains("1 cells, the owner 3"));
+  CHECK_THROWS_AS(KeptReadings(folder / "no" / "folder", "owner", "blind", 3), IoError);
 }
 
 TEST_CASE("kept_readings: a run that was stopped goes on, with the results of an undisturbed one") {
@@ -101,4 +103,8 @@ TEST_CASE("kept_readings: a run that was stopped goes on, with the results of an
       {"extract", "--owner", job.owner, "--fpr", "1", images, "--readings", file, "--detection", "blind"});
   CHECK(other.code == cli::kUsage);
   CHECK_THAT(other.err, Contains("detection"));
+  const auto record = run_command({"verify", "--owner", job.owner, "--message", "a", images, "--readings",
+                                   file, "--evidence", job.folder / "evidence"});
+  CHECK(record.code == cli::kUsage);
+  CHECK(!std::filesystem::exists(job.folder / "evidence"));
 }

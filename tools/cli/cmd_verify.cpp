@@ -82,7 +82,13 @@ int run_verify(const VerifyArguments& options, Context& context) {
   const auto message = message_of(options.message, owner.options().bits);
   const auto code = owner.code();
   check_rate(options.fpr, watermark::least_p(code.carriers()), code.carriers());
-  if (!options.evidence.empty()) watermark::prepare_evidence_folder(options.evidence);
+  if (!options.evidence.empty()) {
+    if (!options.suspects.readings.empty())
+      throw UsageError(
+          "--readings: a signed record is of images that were read for it; leave out --evidence or "
+          "--readings");
+    watermark::prepare_evidence_folder(options.evidence);
+  }
   SuspectReader reader(owner, options.reading);
   const auto images = read_images(reader, options.suspects, options.owner, context);
   const auto evidence = total_evidence(images);

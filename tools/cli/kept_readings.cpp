@@ -22,7 +22,7 @@ Json line_of(const ImageEvidence& read) {
           {"cells", read.cells}};
 }
 
-ImageEvidence evidence_of(const Json& line) {
+ImageEvidence evidence_of(const Json& line, Index cells) {
   ImageEvidence read;
   read.sha256 = line.at("sha256").get<std::string>();
   const auto kind = line.at("detection").get<std::string>();
@@ -31,6 +31,9 @@ ImageEvidence evidence_of(const Json& line) {
   read.width = line.at("width").get<Index>();
   read.height = line.at("height").get<Index>();
   read.cells = line.at("cells").get<std::vector<double>>();
+  if (std::ssize(read.cells) != cells)
+    throw ValueError("it has " + std::to_string(read.cells.size()) + " cells, the owner " +
+                     std::to_string(cells));
   return read;
 }
 
@@ -56,7 +59,7 @@ void check_header(const std::string& file, const Json& found, const Json& wanted
 }  // namespace
 
 KeptReadings::KeptReadings(const std::filesystem::path& file, const std::string& owner_sha256,
-                           const std::string& detection)
+                           const std::string& detection, Index cells)
     : file_(file) {
   const Json wanted = header_of(owner_sha256, detection);
   const std::string text = std::filesystem::exists(file) ? read_text(file) : "";
@@ -68,9 +71,9 @@ KeptReadings::KeptReadings(const std::filesystem::path& file, const std::string&
   std::string line;
   check_header(file.string(), std::getline(whole, line) ? parsed(line) : Json(), wanted);
   for (int number = 2; std::getline(whole, line); ++number) try {
-      ImageEvidence read = evidence_of(parsed(line));
+      ImageEvidence read = evidence_of(parsed(line), cells);
       readings_[read.sha256] = std::move(read);
-    } catch (const Json::exception& e) {
+    } catch (const std::exception& e) {
       throw IoError(file.string() + ", line " + std::to_string(number) +
                     ": expected the reading of an image, got something else (" + e.what() + ")");
     }

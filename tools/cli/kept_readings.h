@@ -14,11 +14,11 @@ namespace fieldmark::cli {
 /// its bytes. A last line that was cut off is dropped.
 class KeptReadings {
  public:
-  /// Reads the file, or begins it. Nothing is written to a file that is something else.
+  /// Reads the file, or begins it with the owner's number of cells. Nothing is written to a file that is something else.
   /// @throws IoError     if it cannot be read or written, or is no such file
   /// @throws UsageError  if it is of another owner, detection or instruction set
   KeptReadings(const std::filesystem::path& file, const std::string& owner_sha256,
-               const std::string& detection);
+               const std::string& detection, Index cells);
 
   /// What an image of these bytes showed, without its name and file; none if it has not been read.
   std::optional<ImageEvidence> find(const std::string& sha256) const;

@@ -44,7 +44,7 @@ void check_rate(double rate, double least, Index cells) {
 }
 
 SuspectReader::SuspectReader(const watermark::Owner& owner, const std::string& reading)
-    : detection_(reading), blind_(owner), forced_(reading == "informed") {
+    : detection_(reading), cells_(owner.cells.count()), blind_(owner), forced_(reading == "informed") {
   const bool has_cells = owner.mark().has_cells();
   if (forced_ && !has_cells)
     throw UsageError("--detection informed: an owner of preset " + owner.mark().preset() +
@@ -147,7 +147,7 @@ std::vector<ImageEvidence> read_images(SuspectReader& reader, const Suspects& su
     throw UsageError("--frames: there is no video among the images");
   std::optional<KeptReadings> kept;
   if (!suspects.readings.empty())
-    kept.emplace(suspects.readings, sha256_file_hex(owner.string()), reader.detection());
+    kept.emplace(suspects.readings, sha256_file_hex(owner.string()), reader.detection(), reader.cells());
   if (kept && kept->size() > 0)
     context.text() << suspects.readings << ": readings of " << kept->size() << " images\n";
   const InterruptGuard guard;

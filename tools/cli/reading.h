@@ -47,9 +47,12 @@ class SuspectReader {
   ImageEvidence read(const Tensor<float>& image, const std::string& name);
   /// As given: "auto", "blind" or "informed".
   const std::string& detection() const { return detection_; }
+  /// Of the owner: the length of ImageEvidence::cells.
+  Index cells() const { return cells_; }
 
  private:
   std::string detection_;
+  Index cells_;
   watermark::BlindReader blind_;
   std::optional<watermark::InformedReader> informed_;
   bool forced_;
