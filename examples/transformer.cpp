@@ -13,33 +13,36 @@
 using namespace fieldmark;
 
 const std::string kText = "one for the rook, one for the crow, one to rot and one to grow. one for the rook";
-constexpr Index kContext = 24, kWidth = 32, kHeads = 4, kSteps = 600, kLetters = 128;
+constexpr Index kContext = 24, kWidth = 32, kHeads = 4, kSteps = 1000, kLetters = 128;
 
 struct Transformer {
   ParamStore<float> store;
   Embedding<float> letter{store, "letter", {kLetters, kWidth}, 1};
-  Dense<float> place{store, "place", {kContext, kWidth}, 2}, qkv{store, "qkv", {kWidth, 3 * kWidth}, 3},
-      wide{store, "wide", {kWidth, 4 * kWidth}, 4}, narrow{store, "narrow", {4 * kWidth, kWidth}, 5},
-      out{store, "out", {kWidth, kLetters}, 6};
+  ParamId place = store.add("place", {kContext, kWidth});
+  Dense<float> qkv{store, "qkv", {kWidth, 3 * kWidth}, 3}, wide{store, "wide", {kWidth, 4 * kWidth}, 4},
+      narrow{store, "narrow", {4 * kWidth, kWidth}, 5}, out{store, "out", {kWidth, kLetters}, 6};
   LayerNorm<float> norm{store, "norm", kWidth};
-  Params<float> p{store};  // after the last layer
+  Params<float> p{store};                    // after the last layer
+  Tensor<float> mask{{kContext, kContext}};  // constants live as long as a pass
+
+  Transformer() {
+    for (Index i = 0; i < mask.size(); ++i) mask[i] = i % kContext > i / kContext ? -1e9f : 0;
+  }
 
   // Attention of every place to those before it: softmax(Q K^T / sqrt(w) + mask) V in each head.
-  Var<float> attend(Var<float> x, Var<float> mask) const {
+  Var<float> attend(Var<float> x) const {
     constexpr Index w = kWidth / kHeads;
     const auto heads = [rows = qkv(p, x)](Index part) {
       return permute(reshape(slice(rows, part * kWidth, kWidth), {kContext, kHeads, w}), {1, 0, 2});
     };
-    const auto scores = batched_matmul(heads(0), transpose(heads(1))) / std::sqrt(float{w}) + mask;
+    const auto scores =
+        batched_matmul(heads(0), transpose(heads(1))) / std::sqrt(float{w}) + x.tape().constant(mask);
     return reshape(permute(batched_matmul(softmax(scores), heads(2)), {1, 0, 2}), {kContext, kWidth});
   }
   // Logits [24, 128] of the letter after each of 24.
   Var<float> operator()(Tape<float>& tape, const std::vector<std::int32_t>& seen) const {
-    Tensor<float> mask({kContext, kContext}), places = mask;
-    for (Index i = 0; i < mask.size(); ++i) mask[i] = i % kContext > i / kContext ? -1e9f : 0;
-    for (Index i = 0; i < kContext; ++i) places[i * kContext + i] = 1;
-    const auto x = letter(tape, p, seen) + place(p, tape.constant(places));
-    const auto y = x + attend(x, tape.constant(mask));
+    const auto x = letter(tape, p, seen) + p.leaf(tape, place);
+    const auto y = x + attend(x);
     return out(p, y + narrow(p, gelu(wide(p, norm(p, y)))));
   }
 };
