@@ -179,15 +179,15 @@ TEST_CASE("field_attack: pruning takes the least of each tensor") {
     INFO(name);
     const auto& p = after.at(name);
     std::size_t zeros = 0;
-    float largest_gone = 0, least_kept = 1e9f;
+    double largest_gone = 0, least_kept = 1e9;
     for (std::size_t i = 0; i < w.size(); ++i) {
       REQUIRE(std::isfinite(w[i]));
       if (p[i] == 0) {
         ++zeros;
-        largest_gone = std::max(largest_gone, std::abs(w[i]));
+        raise_to(largest_gone, std::abs(double{w[i]}));
       } else {
         CHECK(p[i] == w[i]);
-        least_kept = std::min(least_kept, std::abs(w[i]));
+        least_kept = std::min(least_kept, std::abs(double{w[i]}));
       }
     }
     CHECK(zeros == static_cast<std::size_t>(0.3 * static_cast<double>(w.size())));
