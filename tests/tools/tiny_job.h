@@ -1,17 +1,13 @@
 #pragma once
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
 #include <fieldmark/core/files.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "support/kept_folder.h"
 #include "tools/test_key_file.h"
 #include "tools/tiny_scene.h"
 
@@ -29,8 +25,7 @@ inline Outcome tiny_embed(const std::string& field, const std::string& owner,
 }
 
 /// A field and an owner of 4-bit messages, made once: too little training to read anything, enough to run
-/// every path. Tests run as processes of their own, so where FIELDMARK_TINY_JOB names
-/// a folder, the first process of this program keeps the files there and the others copy them.
+/// every path.
 struct TinyJob {
   TemporaryFolder folder;
   std::string scene = folder / "scene", field = folder / "field.fm", owner = folder / "owner.fm";
@@ -51,44 +46,10 @@ struct TinyJob {
   }
 
  private:
-  // Held by one process at a time, and let go when it ends.
-  struct Lock {
-    explicit Lock(const std::filesystem::path& path) : file(::open(path.c_str(), O_CREAT | O_RDWR, 0600)) {
-      REQUIRE(file >= 0);
-      REQUIRE(::flock(file, LOCK_EX) == 0);
-    }
-    Lock(const Lock&) = delete;
-    Lock& operator=(const Lock&) = delete;
-    ~Lock() { ::close(file); }
-    int file;
-  };
-
   TinyJob() {
-    namespace fs = std::filesystem;
-    if (const char* name = std::getenv("FIELDMARK_TINY_JOB")) {
-      const fs::path kept = name, done = kept / "of";
-      fs::create_directories(kept.parent_path());
-      const Lock lock(kept.string() + ".lock");
-      if (!fs::exists(done) || fieldmark::read_text(done) != program()) {
-        fs::remove_all(kept);
-        make();
-        fs::copy(folder.path, kept, fs::copy_options::recursive);
-        fieldmark::write_file_atomically(done, program());
-      } else {
-        fs::copy(kept, folder.path, fs::copy_options::recursive);
-        fs::remove(folder / "of");
-      }
-    } else {
-      make();
-    }
+    kept_files("tiny_job", folder.path, [this] { make(); });
     embedded = nlohmann::json::parse(fieldmark::read_text(folder / "embedded.json"));
     std::filesystem::remove(folder / "embedded.json");
-  }
-  // Changes whenever the program is built anew.
-  static std::string program() {
-    const auto self = std::filesystem::read_symlink("/proc/self/exe");
-    return self.string() + " " + std::to_string(std::filesystem::file_size(self)) + " " +
-           std::to_string(std::filesystem::last_write_time(self).time_since_epoch().count());
   }
   void make() const {
     tiny_field(folder, tiny_scene(folder));

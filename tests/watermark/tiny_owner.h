@@ -7,17 +7,24 @@
 #include <fieldmark/watermark/mark/owner.h>
 
 #include "nerf/small_field.h"
+#include "support/kept_folder.h"
+#include "support/temporary_folder.h"
 #include "watermark/test_key.h"
 
-/// The built-in scene at 48 x 48 pixels, learnt for 150 steps by a field of small tables; once a program.
+/// The built-in scene at 48 x 48 pixels, learnt for 150 steps by a field of small tables.
 inline const fieldmark::nerf::RadianceField& tiny_field() {
   using namespace fieldmark;
   static const nerf::RadianceField field = [] {
-    const nerf::Dataset data = nerf::make_scene({.size = 48, .views = 20});
-    nerf::RadianceField f(trainable_field_options());
-    nerf::Trainer trainer(f, data, {.schedule = {.steps = 150}, .samples_per_step = 8192, .warm_up = 16});
-    while (!trainer.done()) trainer.step(0);
-    return f;
+    const TemporaryFolder folder;
+    const std::string path = folder / "field.fm";
+    kept_files("tiny_field", folder.path, [&] {
+      const nerf::Dataset data = nerf::make_scene({.size = 48, .views = 20});
+      nerf::RadianceField f(trainable_field_options());
+      nerf::Trainer trainer(f, data, {.schedule = {.steps = 150}, .samples_per_step = 8192, .warm_up = 16});
+      while (!trainer.done()) trainer.step(0);
+      f.save(path);
+    });
+    return nerf::RadianceField::load(path);
   }();
   return field;
 }

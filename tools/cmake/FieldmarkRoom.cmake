@@ -82,25 +82,32 @@ function(fieldmark_room room)
   endif()
 endfunction()
 
-# fieldmark_optional(<room> <NAME> <Debian packages> <pkg-config module>...)
+# fieldmark_optional(<room> <NAME> <Debian packages> [LOADED] <pkg-config module>...)
 #
 # Lets a room use libraries that a machine may lack. Where they are installed, and unless FIELDMARK_WITH_<NAME> is off, the
-# room's sources see FIELDMARK_WITH_<NAME>; elsewhere they name the packages. Packages are one word, joined by spaces.
+# room's sources see FIELDMARK_WITH_<NAME>; elsewhere they name the packages. Packages are one word, joined by spaces. The
+# libraries are linked, unless the sources load them when they need them (LOADED).
 function(fieldmark_optional room name packages)
+  cmake_parse_arguments(M "LOADED" "" "" ${ARGN})
   string(REPLACE / _ target fieldmark_${room})
   option(FIELDMARK_WITH_${name} "Use ${packages} where installed" ON)
   if(FIELDMARK_WITH_${name})
-    pkg_check_modules(fieldmark_${name} QUIET IMPORTED_TARGET GLOBAL ${ARGN})
+    pkg_check_modules(fieldmark_${name} QUIET IMPORTED_TARGET GLOBAL ${M_UNPARSED_ARGUMENTS})
   endif()
   if(NOT FIELDMARK_WITH_${name} OR NOT fieldmark_${name}_FOUND)
     message(STATUS "Fieldmark without ${packages}")
     return()
   endif()
   target_compile_definitions(${target} PRIVATE FIELDMARK_WITH_${name})
+  if(M_LOADED)
+    target_include_directories(${target} SYSTEM PRIVATE $<TARGET_PROPERTY:PkgConfig::fieldmark_${name},INTERFACE_INCLUDE_DIRECTORIES>)
+    target_link_libraries(${target} PRIVATE ${CMAKE_DL_LIBS})
+    return()
+  endif()
   target_link_libraries(${target} PRIVATE PkgConfig::fieldmark_${name})
   # What links an installed static library needs the optional ones too.
   set_property(GLOBAL APPEND_STRING PROPERTY FIELDMARK_OPTIONAL_PACKAGES
-    "fieldmark_optional_package(fieldmark_${name} \"${packages}\" ${ARGN})\n")
+    "fieldmark_optional_package(fieldmark_${name} \"${packages}\" ${M_UNPARSED_ARGUMENTS})\n")
 endfunction()
 
 # Notes the tests of a room's units, and where they find its private headers, for the test program of its house: the

@@ -1,12 +1,8 @@
 #pragma once
 // FFmpeg's objects with owners, and its errors as texts.
-#ifdef FIELDMARK_WITH_VIDEO
-extern "C" {
-#include <libavcodec/avcodec.h>
-#include <libavformat/avformat.h>
-#include <libswscale/swscale.h>
-}
+#include "ffmpeg_functions.h"
 
+#ifdef FIELDMARK_WITH_VIDEO
 #include <cstdint>
 #include <memory>
 #include <string>

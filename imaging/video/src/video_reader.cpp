@@ -2,7 +2,6 @@
 
 #include <fieldmark/core/error.h>
 #include <fieldmark/imaging/exif.h>
-#include <fieldmark/imaging/image_format.h>
 
 #include "ffmpeg.h"
 
@@ -16,11 +15,18 @@
 #endif
 
 namespace fieldmark {
+namespace {
+void need_video(const std::string& name) {
+  if (const std::string lack = ffmpeg::lack(); !lack.empty()) throw IoError(name + ": " + lack);
+}
+}  // namespace
+
+bool has_video() { return ffmpeg::lack().empty(); }
 
 #ifdef FIELDMARK_WITH_VIDEO
 namespace {
 
-using ffmpeg::Owned;
+using namespace ffmpeg;
 
 constexpr std::int64_t kNever = AV_NOPTS_VALUE;
 constexpr std::int64_t kMaxFrame = 1 << 25;  // pixels: 8K, and a limit to what a few bytes can ask for
@@ -312,12 +318,10 @@ struct VideoReader::Impl {
   bool ended = false, faulty = false, from_start = false;
 };
 
-bool has_video() { return true; }
-
 VideoReader::VideoReader(const std::filesystem::path& path)
-    : impl_(std::make_unique<Impl>(opened(path), path.string())) {}
+    : impl_((need_video(path.string()), std::make_unique<Impl>(opened(path), path.string()))) {}
 VideoReader::VideoReader(std::span<const std::byte> bytes, const std::string& name)
-    : impl_(std::make_unique<Impl>(in_memory(bytes, name), name)) {}
+    : impl_((need_video(name), std::make_unique<Impl>(in_memory(bytes, name), name))) {}
 VideoReader::~VideoReader() = default;
 
 double VideoReader::seconds() const { return impl_->seconds_of(impl_->end); }
@@ -359,16 +363,8 @@ std::string VideoReader::oddity() const {
 #else
 
 struct VideoReader::Impl {};
-namespace {
-std::unique_ptr<int> refuse(const std::string& name) {
-  throw IoError(
-      name + ": " +
-      missing_library("videos", "FFmpeg's libraries", "libavformat-dev libavcodec-dev libswscale-dev"));
-}
-}  // namespace
-bool has_video() { return false; }
-VideoReader::VideoReader(const std::filesystem::path& path) { refuse(path.string()); }
-VideoReader::VideoReader(std::span<const std::byte>, const std::string& name) { refuse(name); }
+VideoReader::VideoReader(const std::filesystem::path& path) { need_video(path.string()); }
+VideoReader::VideoReader(std::span<const std::byte>, const std::string& name) { need_video(name); }
 VideoReader::~VideoReader() = default;
 double VideoReader::seconds() const { return 0; }
 std::vector<double> VideoReader::sample_times(Index) const { return {}; }

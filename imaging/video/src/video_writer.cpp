@@ -2,25 +2,18 @@
 
 #include <fieldmark/core/error.h>
 #include <fieldmark/imaging/image.h>
-#include <fieldmark/imaging/image_format.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "ffmpeg.h"
 
-#ifdef FIELDMARK_WITH_VIDEO
-extern "C" {
-#include <libavutil/opt.h>
-}
-#endif
-
 namespace fieldmark {
 
 #ifdef FIELDMARK_WITH_VIDEO
 namespace {
 
-using ffmpeg::Owned;
+using namespace ffmpeg;
 
 void need(int result) {
   if (result < 0) throw Error("[video_writer] FFmpeg: " + ffmpeg::reason(result));
@@ -119,6 +112,7 @@ struct VideoWriter::Impl {
 };
 
 VideoWriter::VideoWriter(Index width, Index height, const VideoOptions& options) {
+  if (const std::string lack = ffmpeg::lack(); !lack.empty()) throw ValueError("[video_writer] " + lack);
   constexpr Index kMaxSide = 8192;
   if (width < 2 || height < 2 || width > kMaxSide || height > kMaxSide)
     throw ValueError("[video_writer] width and height must be from 2 to " + std::to_string(kMaxSide) +
@@ -164,8 +158,7 @@ std::vector<std::byte> VideoWriter::finish() {
 
 struct VideoWriter::Impl {};
 VideoWriter::VideoWriter(Index, Index, const VideoOptions&) {
-  throw ValueError("[video_writer] " + missing_library("videos", "FFmpeg's libraries",
-                                                       "libavformat-dev libavcodec-dev libswscale-dev"));
+  throw ValueError("[video_writer] " + ffmpeg::lack());
 }
 VideoWriter::~VideoWriter() = default;
 void VideoWriter::add(const Tensor<float>&) {}

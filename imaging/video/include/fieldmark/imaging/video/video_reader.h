@@ -11,7 +11,8 @@
 
 namespace fieldmark {
 
-/// Whether this build reads and writes videos: it needs libavformat, libavcodec and libswscale.
+/// Whether videos can be read and written: Fieldmark was built with libavformat, libavcodec and libswscale,
+/// and they can be loaded. The first call loads them.
 bool has_video();
 
 /// One frame of a video.
