@@ -5,6 +5,7 @@
 #include <fieldmark/engine/nn/group_norm.h>
 #include <pybind11/stl.h>
 
+#include "relu_argument.h"
 #include "tape_value.h"
 
 namespace fieldmark::python {
@@ -37,8 +38,6 @@ struct LayerHandle {
     return apply(x, [](const L& l, const Params<T>& p, Var<T> v) { return l(p, v); });
   }
 };
-
-constexpr Activation activation(bool relu) { return relu ? Activation::relu : Activation::none; }
 
 template <class T>
 void bind_products(py::module_& module, const std::string& suffix) {

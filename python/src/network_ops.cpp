@@ -11,14 +11,13 @@
 #include <fieldmark/engine/ops/resample.h>
 #include <fieldmark/engine/ops/softmax.h>
 
+#include "relu_argument.h"
 #include "tape_value.h"
 
 namespace fieldmark::python {
 namespace {
 
 using namespace py::literals;
-
-constexpr Activation activation(bool relu) { return relu ? Activation::relu : Activation::none; }
 
 template <class T>
 void bind_products(py::module_& module) {

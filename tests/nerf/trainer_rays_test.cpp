@@ -64,18 +64,22 @@ std::vector<float> trained(const Dataset& data, Index supersampling, Index after
 TEST_CASE(
     "trainer_rays: a field taught with means over pixels is nearer to training images that are such means") {
   const Dataset data = blurred_scene(40), judge = blurred_scene(6, "val");  // of rays that nothing learnt
-  const auto psnr = [&](Index taught, Index shown) {
-    RadianceField field(field_options(taught));
+  const auto taught_with = [&](Index rays) {
+    RadianceField field(field_options(rays));
     Trainer trainer(field, data, train_options(400, 100));
     while (!trainer.done()) trainer.step(0);
-    Renderer renderer(field, {.supersampling = shown});
+    return field;
+  };
+  const auto psnr = [&](const RadianceField& field, Index rays) {
+    Renderer renderer(field, {.supersampling = rays});
     return evaluate(renderer, judge).psnr;
   };
-  const double centres = psnr(1, 1), shown = psnr(1, 2), taught = psnr(2, 2);
+  const RadianceField by_centres = taught_with(1), by_means = taught_with(2);
+  const double centres = psnr(by_centres, 1), shown = psnr(by_centres, 2), taught = psnr(by_means, 2);
   CAPTURE(centres, shown, taught);
   CHECK(taught > shown + 0.5);
   CHECK(taught > centres + 0.5);
-  CHECK(psnr(2, 0) == taught);
+  CHECK(psnr(by_means, 0) == taught);
 }
 
 TEST_CASE("trainer_rays: supersampling begins after its steps, and only then") {

@@ -40,6 +40,17 @@ TEST_CASE("markdown_report holds the protocol and every number", "[report]") {
   CHECK(text == markdown_report({"fieldmark", "eval", "--size", "9"}, machine, results));
 }
 
+TEST_CASE("code_hash is of a room without those in it, or of all rooms of a house", "[report]") {
+  const std::string imaging = code_hash({"imaging"});
+  CHECK(imaging.size() == 64);
+  CHECK(imaging == code_hash({"imaging"}));
+  if (machine().commit == "unknown") return;  // outside of git no tree is known
+  CHECK(imaging != code_hash({"imaging/video"}));
+  CHECK(imaging != code_hash({"imaging", "imaging/video"}));
+  CHECK(code_hash({"watermark"}) != code_hash({"watermark/keys"}));
+  CHECK_THROWS_WITH(code_hash({"imag"}), "[code_hash] rooms: no sources in 'imag'");
+}
+
 TEST_CASE("machine() knows this one", "[report]") {
   const auto m = machine();
   CHECK(!m.commit.empty());
