@@ -5,6 +5,7 @@
 #include <fieldmark/engine/isa.h>
 #include <fieldmark/engine/parallel.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -48,13 +49,21 @@ Machine machine() {
 }
 
 std::string code_hash(const Words& rooms) {
-  std::string found;
-  for (const std::string& room : rooms) {
-    const std::size_t before = found.size();
+  // The lines of the trees that begin with one of the words.
+  const auto lines_of = [](const Words& beginnings) {
+    std::string lines;
     std::istringstream trees(FIELDMARK_TREES);
     for (std::string line; std::getline(trees, line);)
-      if (line.starts_with(room + "/")) found += line + "\n";
-    if (found.size() == before && *FIELDMARK_TREES)
+      if (std::ranges::any_of(beginnings, [&](const std::string& b) { return line.starts_with(b); }))
+        lines += line + "\n";
+    return lines;
+  };
+  std::string found;
+  for (const std::string& room : rooms) {
+    std::string lines = lines_of({room + "/include ", room + "/src "});
+    if (lines.empty()) lines = lines_of({room + "/"});
+    found += lines;
+    if (lines.empty() && *FIELDMARK_TREES)
       throw ValueError("[code_hash] rooms: no sources in '" + room + "'");
   }
   return sha256_hex(found);

@@ -19,8 +19,8 @@ struct Machine {
 Machine machine();
 
 /// SHA-256 of the sources of some rooms at the commit of this build, so that a result expires with its code.
-/// @param rooms  folders; "watermark" stands for all rooms in it   @throws ValueError for a folder without
-/// sources
+/// @param rooms  folders; one without sources of its own, such as "watermark", stands for all rooms in it
+/// @throws ValueError for a folder without sources
 std::string code_hash(const Words& rooms);
 
 /// The command line without private paths: files below $FIELDMARK_DATA are shown so, other absolute paths by
