@@ -12,121 +12,23 @@
 #include <vector>
 
 #include "checks.h"
-#include "solids.h"
+#include "scene_solids.h"
 #include "transforms.h"
 #include "vec3.h"
 
 namespace fieldmark::nerf {
 namespace {
-constexpr double kTop = -0.35;                                   // the slab's upper side
 constexpr double kRadius = 4.0311, kAngle = 0.6911112070083618;  // of the Blender scenes' cameras
 constexpr int kSide = 4;                                         // samples along a pixel's side
 const std::array<std::string, 3> kSplits{"train", "val", "test"};
 
-// A sphere inside a solid that casts its shadow.
-struct Shade {
-  Vec3 centre;
-  double radius;
-};
-struct Object {
-  Solid solid;
-  SolidTexture texture;
-  std::vector<Shade> shades;
-};
-
-// Spheres stacked along z, or around the ring of a torus, that fill the solid.
-std::vector<Shade> shades_of(const Solid& s) {
-  std::vector<Shade> shades;
-  if (s.kind == SolidKind::sphere) return {{s.centre, s.size[0]}};
-  if (s.kind == SolidKind::torus) {
-    for (int k = 0; k < 8; ++k) {
-      const double a = k * std::numbers::pi / 4;
-      shades.push_back({s.centre + s.size[0] * Vec3{std::cos(a), std::sin(a), 0}, s.size[1]});
-    }
-    return shades;
-  }
-  const double height = s.kind == SolidKind::box ? s.size[2] : s.size[1];
-  const double wide = s.kind == SolidKind::box ? 1.1 * std::min(s.size[0], s.size[1]) : s.size[0];
-  const int count = 1 + static_cast<int>(std::ceil(height / wide));
-  for (int k = 0; k < count; ++k) {
-    const double up = (k + 0.5) / count;  // cone: thinner towards the apex
-    const double radius = s.kind == SolidKind::cone ? wide * (1 - up) : wide;
-    shades.push_back({s.centre + Vec3{0, 0, (2 * up - 1) * height}, radius});
-  }
-  return shades;
-}
-
-std::vector<Vec3> shuffled_palette(const CounterRng& rng) {
-  const std::vector<Vec3> palette{{0.80, 0.27, 0.22}, {0.95, 0.77, 0.32}, {0.24, 0.46, 0.68},
-                                  {0.86, 0.88, 0.86}, {0.33, 0.60, 0.36}, {0.93, 0.89, 0.72},
-                                  {0.50, 0.32, 0.58}, {0.88, 0.62, 0.66}, {0.22, 0.27, 0.33},
-                                  {0.74, 0.79, 0.55}, {0.85, 0.49, 0.25}, {0.45, 0.71, 0.75}};
-  std::vector<Vec3> colours;
-  for (const Index i : permutation(static_cast<Index>(palette.size()), rng, 1))
-    colours.push_back(palette[static_cast<std::size_t>(i)]);
-  return colours;
-}
-
-std::vector<Object> make_objects(const SceneOptions& options) {
-  const CounterRng rng(options.seed, 0);
-  const auto colours = shuffled_palette(rng);
-  std::vector<Object> objects;
-  const auto add = [&](const Solid& solid, TextureKind kind, double scale) {
-    const std::size_t i = 2 * objects.size();
-    objects.push_back({solid,
-                       {.kind = kind,
-                        .a = colours[i % colours.size()],
-                        .b = colours[(i + 1) % colours.size()],
-                        .scale = scale,
-                        .seed = static_cast<std::uint32_t>(i)},
-                       shades_of(solid)});
-  };
-  if (options.kind == SceneKind::sphere) {
-    add({.kind = SolidKind::sphere, .size = {0.8, 0, 0}}, TextureKind::flat, 1);
-    return objects;
-  }
-  const double turn = 2 * std::numbers::pi * rng.uniform_double(2);
-  const auto place = [&](int slot, double height) {
-    const double angle =
-        turn +
-        (slot + 0.1 * (rng.uniform_double(3, static_cast<std::uint64_t>(slot)) - 0.5)) * std::numbers::pi / 3;
-    return Vec3{0.68 * std::cos(angle), 0.68 * std::sin(angle), kTop + height};
-  };
-  add({.kind = SolidKind::sphere, .centre = place(0, 0.28), .size = {0.28, 0, 0}}, TextureKind::marble, 0.28);
-  add({.kind = SolidKind::box,
-       .centre = place(1, 0.34),
-       .turn = {std::cos(turn + 0.5), std::sin(turn + 0.5)},
-       .size = {0.19, 0.22, 0.34}},
-      TextureKind::checker, 0.22);
-  add({.kind = SolidKind::torus, .centre = place(2, 0.1), .size = {0.22, 0.1, 0}}, TextureKind::stripes, 0.2);
-  add({.kind = SolidKind::cylinder,
-       .centre = place(3, 0.4),
-       .turn = {std::cos(turn), std::sin(turn)},
-       .size = {0.15, 0.4, 0}},
-      TextureKind::stripes, 0.12);
-  add({.kind = SolidKind::cone, .centre = place(4, 0.36), .size = {0.25, 0.36, 0}}, TextureKind::rings, 0.13);
-  add({.kind = SolidKind::sphere, .centre = place(5, 0.19), .size = {0.19, 0, 0}}, TextureKind::flat, 1);
-  add({.kind = SolidKind::cylinder, .centre = {0, 0, kTop + 0.25}, .size = {0.13, 0.25, 0}},
-      TextureKind::noise, 0.1);
-  add({.kind = SolidKind::box,
-       .centre = {0, 0, kTop + 0.68},
-       .turn = {std::cos(turn), std::sin(turn)},
-       .size = {0.18, 0.18, 0.18}},
-      TextureKind::noise, 0.2);
-  objects.push_back(
-      {{.kind = SolidKind::cylinder, .centre = {0, 0, kTop - 0.06}, .size = {1.1, 0.06, 0}},
-       {.kind = TextureKind::checker, .a = {0.83, 0.80, 0.74}, .b = {0.52, 0.55, 0.55}, .scale = 0.36},
-       {}});  // the slab lies under everything and shades nothing
-  return objects;
-}
-
 // Shares of sun and sky that other objects do not occlude at a point.
-std::array<double, 2> light_left(const std::vector<Object>& objects, const Object& self, const Vec3& p,
-                                 const Vec3& n, const Vec3& sun) {
+std::array<double, 2> light_left(const std::vector<SceneSolid>& objects, const SceneSolid& self,
+                                 const Vec3& p, const Vec3& n, const Vec3& sun) {
   constexpr double kSoft = 0.35;  // width of the sun's penumbra, per distance
   const bool lit = dot(n, sun) > 0;
   double direct = 1, sky = 1;
-  for (const Object& other : objects) {
+  for (const SceneSolid& other : objects) {
     if (&other == &self) continue;
     for (const Shade& s : other.shades) {
       const Vec3 to = s.centre - p;
@@ -145,12 +47,22 @@ std::array<double, 2> light_left(const std::vector<Object>& objects, const Objec
   return {direct, sky};
 }
 
+// The colour of a surface that reflects the sun, as a lobe, and a sky that is brighter above.
+Vec3 glossy(const Vec3& diffuse, double gloss, const Vec3& direction, const Vec3& n, const Vec3& sun,
+            double direct) {
+  constexpr double kSharpness = 40, kSun = 0.8, kHorizon = 0.25, kSky = 0.45;
+  const Vec3 mirrored = direction + (-2 * dot(direction, n)) * n;
+  const double lobe = kSun * direct * std::pow(std::max(0.0, dot(mirrored, sun)), kSharpness);
+  const double reflected = lobe + kHorizon + kSky * std::max(0.0, mirrored[2]);
+  return (1 - gloss) * diffuse + gloss * Vec3{reflected, reflected, reflected};
+}
+
 // Colour at the first intersection; false if there is none.
-bool trace(const std::vector<Object>& objects, const std::vector<const Object*>& candidates, const Ray& ray,
-           Vec3* colour) {
-  const Object* object = nullptr;
+bool trace(const std::vector<SceneSolid>& objects, const std::vector<const SceneSolid*>& candidates,
+           const Ray& ray, Vec3* colour) {
+  const SceneSolid* object = nullptr;
   SolidHit nearest;
-  for (const Object* o : candidates)
+  for (const SceneSolid* o : candidates)
     if (const auto hit = intersect(o->solid, ray); hit && (!object || hit->t < nearest.t)) {
       object = o;
       nearest = *hit;
@@ -161,16 +73,17 @@ bool trace(const std::vector<Object>& objects, const std::vector<const Object*>&
   const auto [direct, sky] = light_left(objects, *object, ray.origin + nearest.t * ray.direction, n, sun);
   const double light = (0.42 + 0.16 * n[2]) * sky + 0.55 * direct * std::max(0.0, dot(n, sun));
   *colour = light * texture_colour(object->texture, nearest.local);
+  if (object->gloss > 0) *colour = glossy(*colour, object->gloss, ray.direction, n, sun, direct);
   return true;
 }
 
 // Objects whose bounding spheres a sample of the pixel may meet: samples are within an angle of 0.75 / focal
 // of the pixel's middle.
-void find_candidates(const std::vector<Object>& objects, const Camera& camera, const Ray& middle,
-                     std::vector<const Object*>* candidates) {
+void find_candidates(const std::vector<SceneSolid>& objects, const Camera& camera, const Ray& middle,
+                     std::vector<const SceneSolid*>* candidates) {
   candidates->clear();
   const double spread = 0.75 / std::min(camera.fx, camera.fy);
-  for (const Object& o : objects) {
+  for (const SceneSolid& o : objects) {
     const Vec3 to = o.solid.centre - middle.origin;
     const double square = dot(to, to), along = dot(to, middle.direction);
     const double reach = bounding_radius(o.solid) + spread * std::sqrt(square);
@@ -178,8 +91,8 @@ void find_candidates(const std::vector<Object>& objects, const Camera& camera, c
   }
 }
 
-void render_pixel(const std::vector<Object>& objects, const Camera& camera, double x, double y,
-                  std::vector<const Object*>* candidates, float* rgba) {
+void render_pixel(const std::vector<SceneSolid>& objects, const Camera& camera, double x, double y,
+                  std::vector<const SceneSolid*>* candidates, float* rgba) {
   Vec3 sum{};
   int covered = 0;
   find_candidates(objects, camera, pixel_ray(camera, x, y), candidates);
@@ -198,10 +111,10 @@ void render_pixel(const std::vector<Object>& objects, const Camera& camera, doub
   rgba[3] = byte(static_cast<double>(covered) / (kSide * kSide));
 }
 
-Tensor<float> render(const std::vector<Object>& objects, const Camera& camera) {
+Tensor<float> render(const std::vector<SceneSolid>& objects, const Camera& camera) {
   Tensor<float> image(Shape{camera.height, camera.width, 4});
   parallel_for(camera.height, 8, [&](Index begin, Index end) {
-    std::vector<const Object*> candidates;
+    std::vector<const SceneSolid*> candidates;
     for (Index y = begin; y < end; ++y)
       for (Index x = 0; x < camera.width; ++x)
         render_pixel(objects, camera, static_cast<double>(x), static_cast<double>(y), &candidates,
@@ -239,18 +152,37 @@ std::vector<Camera> split_cameras(const SceneOptions& options, const std::string
 }
 }  // namespace
 
+const char* scene_kind_name(SceneKind kind) {
+  switch (kind) {
+    case SceneKind::sphere:
+      return "sphere";
+    case SceneKind::wires:
+      return "wires";
+    case SceneKind::plain:
+      return "plain";
+    case SceneKind::glossy:
+      return "glossy";
+    default:
+      return "objects";
+  }
+}
+
+SceneKind parse_scene_kind(std::string_view name) {
+  for (const SceneKind kind : kSceneKinds)
+    if (name == scene_kind_name(kind)) return kind;
+  throw ValueError("[scene] kind must be objects, sphere, wires, plain or glossy, got \"" +
+                   std::string(name) + "\"");
+}
+
 Tensor<float> render_scene(const SceneOptions& options, const Camera& camera) {
   check_options(options);
-  return render(make_objects(options), camera);
+  return render(scene_solids(options.kind, options.seed), camera);
 }
 
 Dataset make_scene(const SceneOptions& options, const std::string& split, Background background) {
   check_options(options);
-  const auto objects = make_objects(options);
-  Dataset set{.name = options.kind == SceneKind::sphere ? "sphere" : "objects",
-              .split = split,
-              .background = background,
-              .views = {}};
+  const auto objects = scene_solids(options.kind, options.seed);
+  Dataset set{.name = scene_kind_name(options.kind), .split = split, .background = background, .views = {}};
   for (const Camera& camera : split_cameras(options, split))
     set.views.push_back({camera, render(objects, camera), "r_" + std::to_string(set.views.size())});
   return set;
@@ -259,7 +191,7 @@ Dataset make_scene(const SceneOptions& options, const std::string& split, Backgr
 void write_scene(const SceneOptions& options, const std::filesystem::path& folder,
                  const SceneProgress& progress) {
   check_options(options);
-  const auto objects = make_objects(options);
+  const auto objects = scene_solids(options.kind, options.seed);
   Index total = 0, done = 0;
   for (const std::string& split : kSplits) total += static_cast<Index>(split_cameras(options, split).size());
   for (const std::string& split : kSplits) {

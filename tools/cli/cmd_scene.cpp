@@ -18,11 +18,10 @@ struct SceneArguments {
 };
 
 int run_scene(const SceneArguments& options, Context& context) {
-  const nerf::SceneOptions scene{
-      .kind = options.kind == "sphere" ? nerf::SceneKind::sphere : nerf::SceneKind::objects,
-      .size = options.size,
-      .views = options.views,
-      .seed = context.seed()};
+  const nerf::SceneOptions scene{.kind = nerf::parse_scene_kind(options.kind),
+                                 .size = options.size,
+                                 .views = options.views,
+                                 .seed = context.seed()};
   const InterruptGuard guard;
   Index images = 0;
   {
@@ -50,9 +49,12 @@ Command add_scene(CommandLine& app) {
   app.add_option("--out", options->out, "Folder to write, a data set in Blender layout")
       ->required()
       ->type_name("DIR");
-  app.add_option("--kind", options->kind,
-                 "Scene to render: objects, textured solids on a slab; sphere, one shaded sphere")
-      ->one_of({"objects", "sphere"})
+  app.add_option(
+         "--kind", options->kind,
+         "objects: textured solids on a slab; sphere: one shaded sphere;\nwires: a stand of thin rods, rings "
+         "and cables; plain: large solids of one colour each;\nglossy: solids whose colours depend on the "
+         "view")
+      ->one_of({"objects", "sphere", "wires", "plain", "glossy"})
       ->type_name("KIND");
   app.add_option("--size", options->size, "Width and height of the images in pixels, 1 to 8192")
       ->range(1, 8192)

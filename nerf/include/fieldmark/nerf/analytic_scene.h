@@ -5,14 +5,25 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <string_view>
 
 namespace fieldmark::nerf {
 
 /// The built-in scenes.
 enum class SceneKind {
   objects,  ///< textured solids of every kind on a round slab, with soft shadows
-  sphere    ///< one sphere of one colour, shaded
+  sphere,   ///< one sphere of one colour, shaded
+  wires,    ///< a stand of thin rods, rings and hanging cables
+  plain,    ///< large solids of one colour each
+  glossy    ///< solids that mirror the sun and the sky, so that their colours depend on the view
 };
+constexpr SceneKind kSceneKinds[] = {SceneKind::objects, SceneKind::sphere, SceneKind::wires,
+                                     SceneKind::plain, SceneKind::glossy};
+
+/// "objects", "sphere", "wires", "plain" or "glossy".
+const char* scene_kind_name(SceneKind kind);
+/// The inverse of scene_kind_name(). @throws ValueError for another name
+SceneKind parse_scene_kind(std::string_view name);
 
 /// A built-in scene, within 1.2 of the origin, and cameras like those of the Blender scenes: on the upper
 /// half of a sphere of radius 4.0311, looking at the origin, camera_angle_x 0.6911.
@@ -25,7 +36,7 @@ struct SceneOptions {
 
 /// Ray-traces one view with 4 x 4 samples a pixel; alpha is the covered share of a pixel. Surfaces are
 /// diffuse under a sky and a soft sun, both occluded by spheres inside the solids (sun: the angle to the
-/// sphere; sky: (r / d)^2), so a point has one colour from all sides.
+/// sphere; sky: (r / d)^2), so a point has one colour from all sides, but in the scene glossy.
 /// @return  [height, width, 4] straight alpha, rounded to 8 bits   @throws ValueError if an option is out of
 /// range
 Tensor<float> render_scene(const SceneOptions& options, const Camera& camera);
