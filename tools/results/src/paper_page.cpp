@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
 #include <optional>
 #include <set>
 
@@ -30,10 +31,11 @@ std::string fixed(double value, int digits) {
 
 std::string percent(double share) { return fixed(100 * share, 2); }
 
-std::string of_paper(const char* table, const std::string& system, const std::string& column,
-                     int digits = 2) {
+// Our figure, and the paper's in brackets where it has one.
+std::string beside(const std::string& ours, const char* table, const std::string& system,
+                   const std::string& column, int digits = 2) {
   const auto value = published(table, system, column);
-  return value ? fixed(*value, digits) : "-";
+  return value ? ours + " (" + fixed(*value, digits) + ")" : ours;
 }
 
 // Mean of a figure over the seeds of a cell.
@@ -81,17 +83,61 @@ std::vector<Group> groups_of(const std::vector<Cell>& cells) {
   return groups;
 }
 
+// Of the mean bit accuracy: over seeds where there are several, else over the views of the one run.
+double standard_error(const Group& g) {
+  const double count = static_cast<double>(g.cells.size());
+  if (g.cells.size() == 1) return g.cells[0]->spread / std::sqrt(mean_more(g.cells, "views"));
+  const double middle = mean(g.cells, &Cell::bit_accuracy);
+  double squares = 0;
+  for (const Cell* c : g.cells) squares += std::pow(c->bit_accuracy - middle, 2);
+  return std::sqrt(squares / (count - 1) / count);
+}
+
 std::string accuracy_of(const Group& g) {
-  std::string text =
-      percent(mean(g.cells, &Cell::bit_accuracy)) + " ± " + percent(mean(g.cells, &Cell::spread));
-  return g.cells.size() > 1 ? text + " (" + std::to_string(g.cells.size()) + " seeds)" : text;
+  std::string text = percent(mean(g.cells, &Cell::bit_accuracy)) + " ± " + percent(standard_error(g));
+  return g.cells.size() > 1 ? text + ", " + std::to_string(g.cells.size()) + " seeds" : text;
+}
+
+std::string steps_of(const Group& g) {
+  double sum = 0;
+  for (const Cell* c : g.cells) sum += static_cast<double>(c->steps);
+  return fixed(sum / static_cast<double>(g.cells.size()), 0);
+}
+
+// No figure stands without the steps that it took.
+const Row kStart{"system", "scene", "field", "steps"};
+Row start_of(const Group& g) { return {g.title, g.scene, g.field, steps_of(g)}; }
+
+// The scene with most systems at 16 bits on the hash field.
+std::string main_scene(const std::vector<Group>& groups) {
+  std::map<std::string, int> systems;
+  for (const Group& g : groups)
+    if (g.bits == 16 && g.field == "hash") ++systems[g.scene];
+  const auto most = std::ranges::max_element(systems, {}, [](const auto& entry) { return entry.second; });
+  return most == systems.end() ? "" : most->first;
+}
+
+std::string first_table(const std::vector<Group>& groups) {
+  const std::string scene = main_scene(groups);
+  std::vector<Row> rows;
+  for (const Group& g : groups)
+    if (g.bits == 16 && g.field == "hash" && g.scene == scene)
+      rows.push_back({g.title, beside(accuracy_of(g), "quality", g.system, "accuracy"),
+                      beside(fixed(mean(g.cells, &Cell::psnr_gt), 2), "quality", g.system, "psnr"),
+                      fixed(mean(g.cells, &Cell::psnr_base), 2), steps_of(g),
+                      fixed(mean(g.cells, &Cell::seconds) / 60, 1)});
+  if (rows.empty()) return "No cell has been measured.\n";
+  return "16 bits, " + scene + ", hash field.\n\n" +
+         markdown_table({"system", "bits right, %", "PSNR to ground truth", "PSNR to the unmarked render",
+                         "steps", "minutes of training"},
+                        rows);
 }
 
 const std::vector<Index> kLengths{4, 8, 16, 32, 48};
 
 std::string bits_table(const std::vector<Group>& groups) {
   Row header{"system", "scene", "field"};
-  for (const Index n : kLengths) header.push_back(std::to_string(n) + " bits (published)");
+  for (const Index n : kLengths) header.push_back(std::to_string(n) + " bits: % right, steps");
   std::vector<Row> rows;
   std::set<std::string> seen;
   for (const Group& g : groups) {
@@ -102,8 +148,9 @@ std::string bits_table(const std::vector<Group>& groups) {
         return other.system == g.system && other.scene == g.scene && other.field == g.field &&
                other.bits == n;
       });
-      row.push_back((found == groups.end() ? "-" : accuracy_of(*found)) + " (" +
-                    of_paper("bits", g.system, std::to_string(n)) + ")");
+      row.push_back(found == groups.end() ? "-"
+                                          : beside(accuracy_of(*found), "bits", g.system, std::to_string(n)) +
+                                                ", " + steps_of(*found));
     }
     rows.push_back(row);
   }
@@ -115,22 +162,25 @@ std::string quality_table(const std::vector<Group>& groups) {
   for (const Group& g : groups) {
     if (g.bits != 16) continue;
     const auto both = [&](double ours, const char* column, int digits) {
-      return fixed(ours, digits) + " (" + of_paper("quality", g.system, column, digits) + ")";
+      return beside(fixed(ours, digits), "quality", g.system, column, digits);
     };
-    rows.push_back(
-        {g.title, g.scene, g.field, accuracy_of(g) + " (" + of_paper("quality", g.system, "accuracy") + ")",
+    Row row = start_of(g);
+    row.insert(
+        row.end(),
+        {beside(accuracy_of(g), "quality", g.system, "accuracy"),
          percent(mean(g.cells, &Cell::own_2d_accuracy)), fixed(mean(g.cells, &Cell::psnr_base), 2),
          fixed(mean(g.cells, &Cell::psnr_base_foreground), 2), fixed(mean_more(g.cells, "ssim_base"), 3),
          fixed(mean_more(g.cells, "lpips_base"), 3), both(mean(g.cells, &Cell::psnr_gt), "psnr", 2),
          fixed(mean_more(g.cells, "psnr_gt_unmarked"), 2), both(mean(g.cells, &Cell::ssim), "ssim", 3),
          both(mean(g.cells, &Cell::lpips), "lpips", 3)});
+    rows.push_back(row);
   }
-  return markdown_table(
-      {"system", "scene", "field", "bits right, % (published)", "2-D network on its own images, %",
-       "PSNR to the unmarked render", "the same on the foreground", "SSIM to it", "LPIPS to it",
-       "PSNR to ground truth (published)", "of the unmarked field", "SSIM to ground truth (published)",
-       "LPIPS to ground truth (published)"},
-      rows);
+  Row header = kStart;
+  header.insert(header.end(),
+                {"bits right, %", "2-D network on its own images, %", "PSNR to the unmarked render",
+                 "the same on the foreground", "SSIM to it", "LPIPS to it", "PSNR to ground truth",
+                 "of the unmarked field", "SSIM to ground truth", "LPIPS to ground truth"});
+  return markdown_table(header, rows);
 }
 
 // Names of distortions in order of kind, then severity.
@@ -160,17 +210,16 @@ std::vector<Severity> severities(const std::vector<Group>& groups) {
 
 std::string distortion_table(const std::vector<Group>& groups) {
   const auto under = severities(groups);
-  Row header{"system", "scene", "field", "none (published)"};
-  for (const Severity& s : under) header.push_back(s.name + " (published)");
+  Row header = kStart;
+  header.push_back("none");
+  for (const Severity& s : under) header.push_back(s.name);
   std::vector<Row> rows;
   for (const Group& g : groups) {
     if (g.bits != 16 || g.cells.front()->under.empty()) continue;
-    Row row{
-        g.title, g.scene, g.field,
-        percent(mean(g.cells, &Cell::bit_accuracy)) + " (" + of_paper("distortion", g.system, "none") + ")"};
+    Row row = start_of(g);
+    row.push_back(beside(percent(mean(g.cells, &Cell::bit_accuracy)), "distortion", g.system, "none"));
     for (const Severity& s : under)
-      row.push_back(percent(mean_under(g.cells, s.name)) + " (" + of_paper("distortion", g.system, s.name) +
-                    ")");
+      row.push_back(beside(percent(mean_under(g.cells, s.name)), "distortion", g.system, s.name));
     rows.push_back(row);
   }
   return markdown_table(header, rows);
@@ -183,17 +232,19 @@ std::string ablation_table(const std::vector<Group>& groups) {
                          g.system.starts_with("without_") || g.system.starts_with("ours");
     if (g.bits != 16 || g.field != "hash" || !ablated) continue;
     const auto both = [&](double ours, const char* column, int digits) {
-      return fixed(ours, digits) + " (" + of_paper("ablation", g.system, column, digits) + ")";
+      return beside(fixed(ours, digits), "ablation", g.system, column, digits);
     };
-    rows.push_back(
-        {g.title, g.scene, accuracy_of(g) + " (" + of_paper("ablation", g.system, "accuracy") + ")",
-         fixed(mean(g.cells, &Cell::psnr_base), 2), both(mean(g.cells, &Cell::psnr_gt), "psnr", 2),
-         both(mean(g.cells, &Cell::ssim), "ssim", 3), both(mean(g.cells, &Cell::lpips), "lpips", 3)});
+    Row row = start_of(g);
+    row.insert(row.end(),
+               {beside(accuracy_of(g), "ablation", g.system, "accuracy"),
+                fixed(mean(g.cells, &Cell::psnr_base), 2), both(mean(g.cells, &Cell::psnr_gt), "psnr", 2),
+                both(mean(g.cells, &Cell::ssim), "ssim", 3), both(mean(g.cells, &Cell::lpips), "lpips", 3)});
+    rows.push_back(row);
   }
-  return markdown_table({"system", "scene", "bits right, % (published)", "PSNR to the unmarked render",
-                         "PSNR to ground truth (published)", "SSIM to ground truth (published)",
-                         "LPIPS to ground truth (published)"},
-                        rows);
+  Row header = kStart;
+  header.insert(header.end(), {"bits right, %", "PSNR to the unmarked render", "PSNR to ground truth",
+                               "SSIM to ground truth", "LPIPS to ground truth"});
+  return markdown_table(header, rows);
 }
 
 // One column for each name of `under` that begins with the prefix, beside the published figures of a table.
@@ -204,17 +255,19 @@ std::string named_table(const std::vector<Group>& groups, const char* table, con
       for (const auto& [name, value] : c->under)
         if (name.starts_with(prefix)) names.insert(name);
   if (names.empty()) return "No cell has been measured.\n";
-  Row header{"system", "scene", "field", "bits", "as trained"};
-  for (const auto& name : names) header.push_back(name + " (published)");
+  Row header = kStart;
+  header.insert(header.end(), {"bits", "as trained"});
+  header.insert(header.end(), names.begin(), names.end());
   std::vector<Row> rows;
   for (const Group& g : groups) {
-    Row row{g.title, g.scene, g.field, std::to_string(g.bits), percent(mean(g.cells, &Cell::bit_accuracy))};
+    Row row = start_of(g);
+    row.insert(row.end(), {std::to_string(g.bits), percent(mean(g.cells, &Cell::bit_accuracy))});
     bool any = false;
     for (const auto& name : names) {
       const double value = mean_under(g.cells, name);
       any = any || std::isfinite(value);
       const std::string column = prefix == "sampling_" ? name.substr(prefix.size()) : name;
-      row.push_back(percent(value) + " (" + of_paper(table, g.system, column) + ")");
+      row.push_back(beside(percent(value), table, g.system, column));
     }
     if (any) rows.push_back(row);
   }
@@ -231,13 +284,15 @@ std::string order_of_rows(const std::vector<Group>& groups) {
           a.field != b.field)
         continue;
       const double ours_a = mean(a.cells, &Cell::bit_accuracy), ours_b = mean(b.cells, &Cell::bit_accuracy);
-      if (ours_a >= ours_b) continue;
-      text += "- " + a.scene + ", " + a.field + " field: " + a.title + " (" + percent(ours_a) +
-              "%) stands below " + b.title + " (" + percent(ours_b) + "%); the paper has " + fixed(*pa, 2) +
-              "% above " + fixed(*pb, 2) + "%\n";
+      const double error = std::hypot(standard_error(a), standard_error(b));
+      if (!(ours_b - ours_a > 2 * error)) continue;
+      text += "- " + a.scene + ", " + a.field + " field: " + a.title + " (" + percent(ours_a) + "%, " +
+              steps_of(a) + " steps) stands below " + b.title + " (" + percent(ours_b) + "%, " + steps_of(b) +
+              " steps); the paper has " + fixed(*pa, 2) + "% above " + fixed(*pb, 2) + "%\n";
     }
-  return text.empty() ? "No two systems with figures in both stand in another order than the paper's.\n"
-                      : text;
+  return text.empty()
+             ? "No two systems with figures in both stand in another order than the paper's.\n"
+             : "Two systems are listed where they are more than two standard errors apart.\n\n" + text;
 }
 
 std::string protocol_table(const std::vector<Cell>& cells) {
@@ -286,15 +341,19 @@ std::string paper_page(const std::vector<Cell>& cells, const std::vector<std::st
                        const std::string& notes) {
   const auto groups = groups_of(cells);
   std::string text =
-      "# The paper's tables\n\nWritten by `fieldmark reproduce` from the cells alone. Published figures, in "
-      "brackets: " +
+      "# The paper's tables\n\nWritten by `fieldmark reproduce` from the cells alone. Published figures "
+      "stand "
+      "in brackets: " +
       std::string(baselines::kPublishedSource) +
-      ". Bit accuracy: of one view, mean over random novel views with a message each (at 4 bits all 16 in "
-      "turns), ± its standard deviation over views. Differences to the unmarked render and to the ground "
-      "truth are "
-      "separate columns, never to be compared with each other; the published PSNR is almost certainly "
-      "against the "
-      "ground truth.\n\n| system | what is trained |\n| --- | --- |\n";
+      ". Bit accuracy is of one view: the mean over random novel views with a message each (at 4 bits all 16 "
+      "in "
+      "turns), ± its standard error, over views in one run and over seeds in several. A system that reads "
+      "half "
+      "of the bits has learnt nothing in its steps; that says nothing of its method. Differences to the "
+      "unmarked render and to the ground truth are separate columns, never to be compared with each other; "
+      "the "
+      "published PSNR is almost certainly against the ground truth.\n\n## In one table\n\n" +
+      first_table(groups) + "\n## Systems\n\n| system | what is trained |\n| --- | --- |\n";
   for (const auto& s : baselines::paper_systems()) text += "| " + s.title + " | " + s.what + " |\n";
   text += "\n## Length of the message\n\n" + bits_table(groups) + "\n## Quality at 16 bits\n\n" +
           quality_table(groups) +
