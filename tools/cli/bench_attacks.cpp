@@ -160,26 +160,28 @@ int run_bench_attacks(const BenchAttacksArguments& options, Context& context) {
 
 Command add_bench_attacks(CommandLine& app) {
   auto o = std::make_shared<BenchAttacksArguments>();
-  add_file(app, "--field", o->field, "Baked field", "FIELD")->required();
-  add_file(app, "--owner", o->owner, "Its OWNER, as `fieldmark embed` wrote it", "OWNER")->required();
+  add_file(app, "--field", o->field, "Baked field to attack", "FIELD")->required();
+  add_file(app, "--owner", o->owner, "Owner file of `fieldmark embed`", "OWNER")->required();
   add_message_options(app, o->message, "Message baked into --field");
-  add_file(app, "--other", o->other, "Field baked with another message, for the average of both (none)",
+  add_file(app, "--other", o->other,
+           "Field baked with another message, to average with; default: no such row", "FIELD");
+  add_file(app, "--onto", o->onto, "Field of another scene, to copy the mark onto; default: no such row",
            "FIELD");
-  add_file(app, "--onto", o->onto, "Field of another scene, onto which the mark is copied (none)", "FIELD");
-  app.add_option("--attacked", o->attacked,
-                 "File made from --field by other means, a row each, several times")
+  app.add_option("--attacked", o->attacked, "Attacked field made by other means, one row each; repeatable")
       ->type_name("FIELD")
       ->default_str("");
-  app.add_option("--cameras", o->cameras, "novel, ring or sphere (see measure)")
+  app.add_option("--cameras", o->cameras,
+                 "Cameras of the views: novel, ring or sphere, see `fieldmark measure --help`")
       ->one_of({"novel", "ring", "sphere"})
       ->type_name("SET");
-  add_number(app, "--count", o->count, 1, 1000, "Views, 1 to 1000");
+  add_number(app, "--count", o->count, 1, 1000, "Views to read in each row, 1 to 1000");
   add_number(app, "--informed-count", o->informed_count, 0, 1000,
-             "Views that informed detection reads too, 0 to 1000; seconds a view and row");
-  add_number(app, "--size", o->size, 16, 8192, "Longer side of the views in pixels, 16 to 8192 (as trained)")
+             "Views to read informed too, 0 to 1000; takes seconds per view and row");
+  add_number(app, "--size", o->size, 16, 8192,
+             "Longer side of the views in pixels, 16 to 8192; default: as trained")
       ->default_str("");
   add_plot(app, o->plot);
-  app.add_flag("--quick", o->quick, "One severity of each attack");
+  app.add_flag("--quick", o->quick, "Measure one severity of each attack");
   return [o](Context& context) {
     if (!o->message.given()) throw UsageError("bench attacks: needs the --message baked into --field");
     return run_bench_attacks(*o, context);

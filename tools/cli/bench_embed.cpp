@@ -150,20 +150,22 @@ int run_bench_embed(const BenchEmbedArguments& options, Context& context) {
 
 Command add_bench_embed(CommandLine& app) {
   auto o = std::make_shared<BenchEmbedArguments>();
-  auto field = add_file(app, "--field", o->field, "Unmarked field (--scene, trained for a minute)", "FIELD");
-  add_file(app, "--owner", o->owner, "OWNER whose unmarked field is marked", "OWNER")->excludes(field);
+  auto field = add_file(app, "--field", o->field,
+                        "Unmarked field to mark; default: one trained on --scene for a minute", "FIELD");
+  add_file(app, "--owner", o->owner, "Owner file whose unmarked field is marked", "OWNER")->excludes(field);
   add_scene_option(app, o->scene);
   app.option("--scene")->excludes(field)->excludes(app.option("--owner"));
-  add_file(app, "--only", o->only, "Only the default and rows with TEXT in their name (all)", "TEXT");
+  add_file(app, "--only", o->only,
+           "Rows to measure beside the default, those with TEXT in their name; default: all", "TEXT");
   add_number(app, "--bits", o->bits, 1, 256, "Length of the message in bits, 1 to 256");
   add_number(app, "--seconds", o->seconds, 0.1, 86400, "Embedding time of each row in seconds, 0.1 to 86400",
              "S");
-  add_number(app, "--views", o->views, 1, 1000, "Novel views that judge a row, 1 to 1000");
+  add_number(app, "--views", o->views, 1, 1000, "Novel views to measure in each row, 1 to 1000");
   add_number(app, "--size", o->size, 16, 8192,
-             "Longer side of these views in pixels, 16 to 8192 (as trained)")
+             "Longer side of the views in pixels, 16 to 8192; default: as trained")
       ->default_str("");
   add_plot(app, o->plot);
-  app.add_flag("--quick", o->quick, "Four rows with small networks");
+  app.add_flag("--quick", o->quick, "Measure four rows with small networks");
   return [o](Context& context) { return run_bench_embed(*o, context); };
 }
 

@@ -164,22 +164,24 @@ int run_bench_engine(BenchEngineArguments options, Context& context) {
 
 Command add_bench_engine(CommandLine& app) {
   auto o = std::make_shared<BenchEngineArguments>();
-  add_number(app, "--runs", o->engine.runs, 1, 1000, "Runs of each row; their median counts, 1 to 1000");
-  add_number(app, "--scale", o->engine.scale, 1e-6, 1, "Factor on the numbers of samples, above 0 to 1", "F");
-  add_file(app, "--only", o->engine.only, "Only rows with TEXT in their name (all)", "TEXT");
+  add_number(app, "--runs", o->engine.runs, 1, 1000, "Runs of each row, 1 to 1000; their median counts");
+  add_number(app, "--scale", o->engine.scale, 1e-6, 1,
+             "Factor on the number of samples of each row, above 0 to 1", "F");
+  add_file(app, "--only", o->engine.only, "Rows to measure, those with TEXT in their name; default: all",
+           "TEXT");
   add_scene_option(app, o->scene);
   app.add_flag("--precision", o->precision,
-               "Also speed against error of double, float, bf16 and of each approximation in use");
+               "Measure speed against error of double, float, bf16 and of each approximation as well");
   add_plot(app, o->plot);
   auto peer =
       add_file(app, "--peer", o->peer,
-               "pytorch: also the ratio to PyTorch, timed by turns, gradients compared (none)", "NAME")
+               "Peer to compare speed and gradients with, timed by turns: pytorch; default: none", "NAME")
           ->one_of({"pytorch"});
-  app.add_option("--python", o->python.python, "Interpreter with torch, for --peer")
+  app.add_option("--python", o->python.python, "Python interpreter that has torch; for --peer")
       ->type_name("FILE")
       ->needs(peer);
   add_number(app, "--peer-limit", o->python.limit_seconds, 0.1, 86400,
-             "Time limit of each answer of the peer in seconds, 0.1 to 86400", "S")
+             "Time limit for each answer of the peer in seconds, 0.1 to 86400", "S")
       ->needs(peer);
   return [o](Context& context) { return run_bench_engine(*o, context); };
 }

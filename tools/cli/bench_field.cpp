@@ -120,16 +120,17 @@ int run_bench_field(const BenchFieldArguments& options, Context& context) {
 
 Command add_bench_field(CommandLine& app) {
   auto o = std::make_shared<BenchFieldArguments>();
-  auto field = add_file(app, "--field", o->field, "Field that is rendered (trained for --seconds)", "FIELD");
+  auto field = add_file(app, "--field", o->field,
+                        "Field to render; default: one trained on --scene for --seconds", "FIELD");
   add_scene_option(app, o->scene);
-  add_number(app, "--seconds", o->seconds, 0.1, 86400, "Training time without --field, seconds, 0.1 to 86400",
+  add_number(app, "--seconds", o->seconds, 0.1, 86400, "Training time of the field in seconds, 0.1 to 86400",
              "S")
       ->excludes(field);
   add_number(app, "--size", o->size, 16, 8192, "Longer side of the views in pixels, 16 to 8192");
-  add_number(app, "--views", o->views, 1, 1000, "Number of views, 1 to 1000");
-  add_number(app, "--runs", o->runs, 1, 1000, "Runs of each row; their median counts, 1 to 1000");
+  add_number(app, "--views", o->views, 1, 1000, "Views to render in each row, 1 to 1000");
+  add_number(app, "--runs", o->runs, 1, 1000, "Runs of each row, 1 to 1000; their median counts");
   add_plot(app, o->plot);
-  app.add_flag("--quick", o->quick, "One setting of each kind");
+  app.add_flag("--quick", o->quick, "Measure one setting of each kind");
   return [o](Context& context) { return run_bench_field(*o, context); };
 }
 

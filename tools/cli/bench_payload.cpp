@@ -68,7 +68,7 @@ Command add_bench_payload(CommandLine& app) {
     Index bits = 100, trials = 1000;
   };
   auto o = std::make_shared<Options>();
-  add_number(app, "--bits", o->bits, 1, 256, "Length of a message in bits, 1 to 256");
+  add_number(app, "--bits", o->bits, 1, 256, "Length of the message in bits, 1 to 256");
   add_number(app, "--trials", o->trials, 1, 1000000, "Trials of each row, 1 to 1000000");
   return [o](Context& context) { return run_bench_payload(o->bits, o->trials, context); };
 }

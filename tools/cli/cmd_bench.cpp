@@ -18,14 +18,15 @@ struct Subject {
   Command (*add)(CommandLine&);
 };
 constexpr Subject kSubjects[] = {
-    {"engine", "Kernels and training steps against the peak of this machine", add_bench_engine},
-    {"field", "Rendering with other settings: speed against error", add_bench_field},
-    {"training", "Each choice of training switched off and on, for the same time", add_bench_training},
-    {"embed", "Embedding with other settings, for the same time: accuracy against mark PSNR",
+    {"engine", "Measure kernels and training steps against the peak of this machine", add_bench_engine},
+    {"field", "Measure speed against error of rendering with other settings", add_bench_field},
+    {"training", "Measure each choice of training, switched off and on for the same time",
+     add_bench_training},
+    {"embed", "Measure accuracy against mark PSNR of embedding with other settings for the same time",
      add_bench_embed},
-    {"payload", "How often payloads are exact at rates of wrong bits, and how often noise is one",
+    {"payload", "Measure how often payloads are read exactly, and how often noise passes for one",
      add_bench_payload},
-    {"attacks", "A baked mark under attacks on images and on the field: accuracy against damage",
+    {"attacks", "Measure accuracy against damage of a baked mark under attacks on images and fields",
      add_bench_attacks}};
 
 }  // namespace
@@ -35,13 +36,13 @@ Option add_file(CommandLine& app, const char* name, std::string& value, const ch
 }
 
 void add_scene_option(CommandLine& app, std::string& scene) {
-  app.add_option("--scene", scene, "Data set")
+  app.add_option("--scene", scene, "Data set to measure on")
       ->type_name("DIR")
       ->default_str("lego of FIELDMARK_DATA, else the built-in scene");
 }
 
 void add_plot(CommandLine& app, std::string& plot) {
-  add_file(app, "--plot", plot, "SVG chart of the rows (none)", "FILE");
+  add_file(app, "--plot", plot, "File to write, SVG chart of the rows; default: none", "FILE");
 }
 
 nerf::Dataset bench_split(const std::string& folder, const std::string& split, bool quick) {

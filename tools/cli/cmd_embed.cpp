@@ -177,19 +177,23 @@ int run_embed(const EmbedArguments& options, Context& context) {
 }
 
 void add_view_options(CommandLine& app, EmbedArguments& o) {
-  app.add_option("--views", o.views, "Views to learn from, 8 to 10000")->range(8, 10000)->type_name("N");
-  app.add_option("--distances", o.distances,
-                 "novel: novel cameras, the object always as large as the extractor sees it;\n"
-                 "native: only as large as their images have it; several: also closer and farther cameras")
+  app.add_option("--views", o.views, "Views of the field to train on, 8 to 10000")
+      ->range(8, 10000)
+      ->type_name("N");
+  app.add_option(
+         "--distances", o.distances,
+         "Distances of the training views. novel: novel cameras, the object as large as the extractor's "
+         "image;\nnative: no larger than in the training images; several: also closer and farther cameras")
       ->one_of({"novel", "native", "several"})
       ->type_name("NAME");
-  app.add_option("--samples", o.samples,
-                 "Parts of a ray that the mark of a pixel is the sum of, 1 to 64 (1; 4 in scenes without "
-                 "bounds)")
+  app.add_option(
+         "--samples", o.samples,
+         "Samples per ray whose marks add up in a pixel, 1 to 64; default: 1, in scenes without bounds 4")
       ->range(1, 64)
       ->type_name("N")
       ->default_str("");
-  app.add_option("--batch", o.batch, "Preset fast: images a step, 1 to 64 (4; 2 in scenes without bounds)")
+  app.add_option("--batch", o.batch,
+                 "Images per step, 1 to 64; default: 4, in scenes without bounds 2; for preset fast")
       ->range(1, 64)
       ->type_name("N")
       ->default_str("");
@@ -199,61 +203,67 @@ void add_view_options(CommandLine& app, EmbedArguments& o) {
 
 Command add_embed(CommandLine& app) {
   auto o = std::make_shared<EmbedArguments>();
-  app.add_option("--field", o->field, "Trained field; it stays as it is")->required()->type_name("FIELD");
-  app.add_option("--out", o->out, "File for the owner; OWNER.checkpoint while it trains")
+  app.add_option("--field", o->field, "Trained field to mark; the file is not changed")
+      ->required()
+      ->type_name("FIELD");
+  app.add_option("--out", o->out, "File to write, the owner; OWNER.checkpoint during training")
       ->required()
       ->type_name("OWNER");
-  app.add_option("--key", o->key, "Key of `fieldmark key` (a new one, inside OWNER)")
+  app.add_option("--key", o->key, "Key of `fieldmark key`; default: a new one, kept in OWNER")
       ->type_name("KEY")
       ->default_str("");
-  app.add_option("--bits", o->bits, "Length of a message, 1 to 256")->range(1, 256)->type_name("N");
-  add_message_options(app, o->intended, "Message that is going to be baked, to print its commitment at once");
-  app.add_option(
-         "--preset", o->preset,
-         "fast: one bit per cell of the scene, trains in minutes;\npaper: one message for all places, as in "
-         "CopyRNeRF (Luo et al. 2023);\ncode: the same with the settings of its authors' code")
+  app.add_option("--bits", o->bits, "Length of the message, 1 to 256")->range(1, 256)->type_name("N");
+  add_message_options(app, o->intended, "Message to print the commitment of");
+  app.add_option("--preset", o->preset,
+                 "fast: one bit per cell of the scene, trains in minutes;\npaper: one message everywhere, as "
+                 "in CopyRNeRF "
+                 "(Luo et al. 2023);\ncode: the same with the settings of the authors' code")
       ->one_of({"fast", "paper", "code"})
       ->type_name("NAME");
-  app.add_option("--mark-psnr", o->mark_psnr,
-                 "Preset fast: PSNR of the mark on the foreground, dB, 20 to 60 (36.5); higher is fainter")
+  app.add_option(
+         "--mark-psnr", o->mark_psnr,
+         "Mark PSNR on the foreground in dB, 20 to 60; higher is fainter; default: 36.5; for preset fast")
       ->range(20.0, 60.0)
       ->type_name("DB")
       ->default_str("");
-  app.add_option("--cells", o->cells,
-                 "Preset fast: cells per axis of the scene's cube, 2 to 64 (enough for one view to show the "
-                 "whole message)")
+  app.add_option(
+         "--cells", o->cells,
+         "Cells per axis of the scene's cube, 2 to 64; default: as many as one view needs to show the whole "
+         "message; for preset fast")
       ->range(2, 64)
       ->type_name("N")
       ->default_str("");
-  app.add_option(
-         "--reader-size", o->reader_size,
-         "Longer side of the extractor's images, pixels, 32 to 1024 (160; presets paper and code: 80)")
+  app.add_option("--reader-size", o->reader_size,
+                 "Longer side of the extractor's images in pixels, 32 to 1024; default: 160, for presets "
+                 "paper and code 80")
       ->range(32, 1024)
       ->type_name("N")
       ->default_str("");
-  app.add_option(
-         "--colours", o->colours,
-         "Preset fast: light, like an uneven light, least visible; mixed, blue and yellow "
-         "with some grey, read sooner;\nblue, without grey, lost in greyscale (mixed for an object before a "
-         "background, else light)")
+  app.add_option("--colours", o->colours,
+                 "light: brightness, like uneven lighting, least visible;\nmixed: blue and yellow with some "
+                 "grey, read "
+                 "after less training;\nblue: blue and yellow, lost in greyscale images;\ndefault: mixed for "
+                 "objects, else "
+                 "light; for preset fast")
       ->one_of({"light", "blue", "mixed"})
       ->type_name("NAME")
       ->default_str("");
   add_view_options(app, *o);
   add_run_length(app, o->length, true);
-  app.add_option("--measured-views", o->measured_views, "Novel views to measure on at the end, 1 to 100000")
+  app.add_option("--measured-views", o->measured_views, "Novel views to measure at the end, 1 to 100000")
       ->range(1, 100000)
       ->type_name("N");
   app.add_option("--distort", o->under,
-                 "Distortions to measure under besides none (see attack), several times")
+                 "Distortion to measure as well, see `fieldmark distort --help`; repeatable")
       ->type_name("NAME")
       ->default_str("");
-  app.add_option("--image", o->image, "PNG with four views unmarked, marked, and the difference (OWNER.png)")
+  app.add_option("--image", o->image,
+                 "File to write, PNG of four views unmarked, marked, and ten times the difference; default: "
+                 "OWNER.png")
       ->type_name("FILE")
       ->default_str("");
   add_lpips_weights(app, o->lpips_weights);
-  app.add_flag("--resume", o->resume,
-               "Go on from OWNER.checkpoint, with the options of the run that left it");
+  app.add_flag("--resume", o->resume, "Resume from OWNER.checkpoint, with the options of that run");
   return [o](Context& context) { return run_embed(*o, context); };
 }
 

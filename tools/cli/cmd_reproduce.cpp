@@ -219,32 +219,38 @@ int run_reproduce(const ReproduceArguments& options, Context& context) {
 }
 
 void add_measuring_options(CommandLine& app, ReproduceArguments& o) {
-  app.add_option("--budget", o.budget,
-                 "Seconds of training for each cell, 0.1 to 86400; cells of other budgets that are there "
-                 "stay: give them another --cells")
+  app.add_option(
+         "--budget", o.budget,
+         "Training time of each cell in seconds, 0.1 to 86400; cells of other budgets need a folder of their "
+         "own, see --cells")
       ->range(0.1, 86400.0)
       ->type_name("S");
-  app.add_option("--base-seconds", o.base_seconds,
-                 "Seconds of training for an unmarked field, 0.1 to 86400 (the budget, at most 60 for hash)")
+  app.add_option(
+         "--base-seconds", o.base_seconds,
+         "Training time of an unmarked field in seconds, 0.1 to 86400; default: the budget, at most 60 for "
+         "hash fields")
       ->range(0.1, 86400.0)
       ->type_name("S")
       ->default_str("");
   app.add_option("--size", o.size,
-                 "Pixels of the images' longer side, 16 to 8192 (160 as the released code; a place "
-                 "252, field mlp 100)")
+                 "Longer side of the images in pixels, 16 to 8192; default: 160 as in the released code, 252 "
+                 "for scenes "
+                 "with a background, 100 for mlp fields")
       ->range(16, 8192)
       ->type_name("N")
       ->default_str("");
-  app.add_option("--log2-table", o.log2_table, "Rows of a hash field's table, as a power of two, 9 to 24")
+  app.add_option("--log2-table", o.log2_table,
+                 "Base-2 logarithm of the rows of a hash field's table, 9 to 24")
       ->range(9, 24)
       ->type_name("N");
-  app.add_option("--views", o.views,
-                 "Novel views that are read in each cell, 1 to 100000 (as many as seconds of --budget, 20 to "
-                 "200), a fifth of them under distortion; reading ends after --budget seconds and that fifth")
+  app.add_option(
+         "--views", o.views,
+         "Novel views to read in each cell, 1 to 100000, a fifth of them under distortion; default: one per "
+         "second of --budget, 20 to 200; reading ends after --budget seconds")
       ->range(1, 100000)
       ->type_name("N")
       ->default_str("");
-  app.add_option("--truth-images", o.ground_truth, "Test images to compare with, 1 to 100000")
+  app.add_option("--truth-images", o.ground_truth, "Test images to compare renders with, 1 to 100000")
       ->range(1, 100000)
       ->type_name("N");
 }
@@ -253,24 +259,26 @@ void add_measuring_options(CommandLine& app, ReproduceArguments& o) {
 
 Command add_reproduce(CommandLine& app) {
   auto o = std::make_shared<ReproduceArguments>();
-  app.add_option("--table", o->tables,
-                 "bits, quality, distortion, ablation, sampling or weights, several times (all)")
+  app.add_option(
+         "--table", o->tables,
+         "Table to measure: bits, quality, distortion, ablation, sampling, weights; repeatable; default: all")
       ->type_name("NAME")
       ->default_str("");
   app.add_option("--scene", o->scenes,
-                 "Data set, several times; the first has every system. objects is the built-in scene\n"
-                 "(lego, chair and fern of $FIELDMARK_DATA, or objects)")
+                 "Data set, or objects for the built-in scene; repeatable, the first gets every system;\n"
+                 "default: lego, chair and fern of $FIELDMARK_DATA, or objects")
       ->type_name("DIR")
       ->default_str("");
-  app.add_option("--system", o->systems,
-                 "Only this row, by its name in the cells (ours, copyrnerf_paper, hidden_nerf ...), several "
-                 "times (all)")
+  app.add_option(
+         "--system", o->systems,
+         "System to measure, by its name in the cells: ours, copyrnerf_paper, hidden_nerf ...; repeatable; "
+         "default: all")
       ->type_name("NAME")
       ->default_str("");
   add_measuring_options(app, *o);
-  app.add_option("--cells", o->cells, "Folder of the cells; those that are there are not measured again")
+  app.add_option("--cells", o->cells, "Folder of the cells; cells in it are not measured again")
       ->type_name("DIR");
-  app.add_option("--work", o->work, "Folder of checkpoints and unmarked fields")->type_name("DIR");
+  app.add_option("--work", o->work, "Folder for checkpoints and unmarked fields")->type_name("DIR");
   add_lpips_weights(app, o->lpips_weights);
   app.add_flag("--full", o->full, "Every length and system on every scene, with three seeds");
   app.add_flag("--report-only", o->report_only,
