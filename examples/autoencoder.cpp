@@ -1,4 +1,4 @@
-// Squeezes images of discs through 32 numbers with convolutions, and draws them again. Public headers only.
+// Compresses images of discs to 32 numbers with convolutions and reconstructs them. Public headers only.
 #include <fieldmark/engine/adam.h>
 #include <fieldmark/engine/decay.h>
 #include <fieldmark/engine/nn.h>
@@ -15,7 +15,7 @@ namespace {
 
 constexpr Index kSide = 16, kImages = 32, kSteps = 300;
 
-// Discs [N, 16, 16, 1] with soft rims, of random place and size.
+// Draws discs [N, 16, 16, 1] with soft edges, of random position and size.
 Tensor<float> discs(std::uint64_t draw) {
   const CounterRng rng(1, 0);
   Tensor<float> images({kImages, kSide, kSide, 1});

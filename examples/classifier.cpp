@@ -1,5 +1,5 @@
-// Tells two spirals apart: layers, operators, AdamW with a schedule and clipping, a saved state. Public
-// headers only.
+// Separates two spirals: layers, operators, AdamW with schedule and clipping, saved state. Public headers
+// only.
 #include <fieldmark/engine/clip.h>
 #include <fieldmark/engine/decay.h>
 #include <fieldmark/engine/nn.h>
@@ -14,7 +14,7 @@ using namespace fieldmark;
 
 namespace {
 
-// A dense layer, a norm and GELU, added to what came in.
+// A dense layer, a norm and GELU, with a residual connection.
 struct Block {
   Dense<float> dense;
   LayerNorm<float> norm;

@@ -1,4 +1,4 @@
-// Finds the pose of an image's camera by gradients through volume rendering. Public headers only.
+// Recovers the camera pose of an image by gradients through volume rendering. Public headers only.
 #include <fieldmark/engine/adam.h>
 #include <fieldmark/engine/decay.h>
 #include <fieldmark/engine/ops.h>
@@ -14,7 +14,7 @@ using namespace fieldmark;
 
 constexpr Index kSide = 24, kPixels = kSide * kSide, kSamples = 32;
 
-// Four soft balls of light, by place and colour, seen along the rays of 24 x 24 pixels in 32 steps.
+// Four soft glowing balls with positions and colours, rendered along the rays of 24 x 24 pixels in 32 steps.
 struct Scene {
   Tensor<float> places{{4, 3}, {-0.7f, 0.1f, 0.2f, 0.6f, -0.4f, 0.1f, 0.1f, 0.7f, -0.3f, 0, -0.2f, 0.8f}},
       colours{{4, 3}, {1, 0.2f, 0.1f, 0.1f, 0.9f, 0.2f, 0.2f, 0.3f, 1, 0.9f, 0.8f, 0.1f}};
@@ -27,7 +27,7 @@ struct Scene {
       pixels[i] = static_cast<float>(i % 2 == 0 ? i / 2 % kSide : i / 2 / kSide);
     for (Index i = 1; i <= kPixels; ++i) ray_begin.push_back(i * kSamples);
   }
-  // The image [pixels, 4] from a camera [16].
+  // Renders the image [pixels, 4] of a camera [16].
   Var<float> operator()(Var<float> camera) const {
     Tape<float>& tape = camera.tape();
     const auto r = reshape(nerf::rays(camera, tape.constant(pixels)), {kPixels, 1, 6});
@@ -55,7 +55,7 @@ int main() {
   Tape<float> tape;
   const Tensor<float> seen = to_tensor(render(tape.constant(truth))),
                       eye({3, 3}, {1, 0, 0, 0, 1, 0, 0, 0, 1});
-  Adam<float> adam(12, {.lr = 0.05, .beta2 = 0.99, .zero_grads = true});  // of the pose; the lens is known
+  Adam<float> adam(12, {.lr = 0.05, .beta2 = 0.99, .zero_grads = true});  // the pose; the lens is known
   for (int step = 0; step < 300; ++step, tape.reset()) {
     if (step % 100 == 0) std::printf("step %3d  %.2f degrees apart\n", step, degrees_apart());
     const auto camera = tape.leaf(found, slope);

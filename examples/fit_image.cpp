@@ -43,7 +43,7 @@ int main(int argc, char** argv) {
   Tape<float> tape;
   const Tensor<float> encoded = to_tensor(nerf::frequency_encoding(tape.constant(place), kBands));
 
-  // Layers register their parameters in a store; the optimiser moves those that are trained.
+  // Layers register their parameters in a store; the optimiser updates them.
   ParamStore<float> store;
   const Dense<float> first(store, "first", {.in = 4 * kBands, .out = 48, .activation = Activation::relu}, 1);
   const Dense<float> second(store, "second", {.in = 48, .out = 48, .activation = Activation::relu}, 2);

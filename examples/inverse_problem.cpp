@@ -1,5 +1,5 @@
-// Sharpens a blurred signal whose blur and noise are unknown: both maximise the likelihood of what was seen,
-// by gradients through a Cholesky factor. Public headers only.
+// Deblurs a signal whose blur and noise are unknown: both are estimated by maximum likelihood, with gradients
+// through a Cholesky factor. Public headers only.
 #include <fieldmark/engine/adam.h>
 #include <fieldmark/engine/ops.h>
 #include <fieldmark/engine/random.h>
@@ -13,9 +13,9 @@ using namespace fieldmark;
 namespace {
 
 constexpr Index kPoints = 60;
-constexpr double kBlur = 2, kNoise = 0.02;  // what shall be found
+constexpr double kBlur = 2, kNoise = 0.02;  // the values to find
 
-// Blur of a width [1]: rows exp(-d^2 / 2 width^2) that sum to 1.
+// Blur matrix of a width [1]: rows exp(-d^2 / 2 width^2) that sum to 1.
 Var<double> blur(Var<double> width, const Tensor<double>& square_apart) {
   const Var<double> rows = exp(width.tape().constant(square_apart) / (width * width * -2.0));
   return rows / sum(rows, {1}, KeepAxes::yes);

@@ -9,20 +9,20 @@ using namespace fieldmark;
 
 namespace {
 
-// Swish (Ramachandran et al. 2017) of every element: y = x / (1 + exp(-x)).
+// Applies Swish (Ramachandran et al. 2017) to every element: y = x / (1 + exp(-x)).
 template <class T>
 Var<T> swish(Var<T> x) {
   T* y = nullptr;
   const Var<T> out = x.tape().output(x.shape(), &y, {x});  // memory on the tape; needs a gradient if x does
   const Index n = x.shape().size();
   const T* in = x.value();
-  constexpr Index kGrain = 1 << 14;  // chunks do not depend on the threads, so neither do the bits
+  constexpr Index kGrain = 1 << 14;  // chunks do not depend on the thread count, so neither do the bits
   parallel_for(n, kGrain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) y[i] = in[i] / (1 + std::exp(-in[i]));
   });
 
-  // With s = 1 / (1 + exp(-x)):   dx = dy (s + x s (1 - s)). A chunk owns its elements. A backward adds:
-  // other ops may read x too.
+  // With s = 1 / (1 + exp(-x)):   dx = dy (s + x s (1 - s)). A chunk owns its elements. Backward accumulates,
+  // because other ops may read x too.
   x.tape().on_backward(out, [=](const T* dy) {
     T* dx = x.grad_acc();
     parallel_for(n, kGrain, [&](Index begin, Index end) {

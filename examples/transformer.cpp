@@ -22,14 +22,14 @@ struct Transformer {
   Dense<float> qkv{store, "qkv", {kWidth, 3 * kWidth}, 3}, wide{store, "wide", {kWidth, 4 * kWidth}, 4},
       narrow{store, "narrow", {4 * kWidth, kWidth}, 5}, out{store, "out", {kWidth, kLetters}, 6};
   LayerNorm<float> norm{store, "norm", kWidth};
-  Params<float> p{store};                    // after the last layer
-  Tensor<float> mask{{kContext, kContext}};  // constants live as long as a pass
+  Params<float> p{store};                    // must follow the last layer
+  Tensor<float> mask{{kContext, kContext}};  // constants must live as long as a pass
 
   Transformer() {
     for (Index i = 0; i < mask.size(); ++i) mask[i] = i % kContext > i / kContext ? -1e9f : 0;
   }
 
-  // Attention of every place to those before it: softmax(Q K^T / sqrt(w) + mask) V in each head.
+  // Attention of every position to itself and earlier ones: softmax(Q K^T / sqrt(w) + mask) V in each head.
   Var<float> attend(Var<float> x) const {
     constexpr Index w = kWidth / kHeads;
     const auto heads = [rows = qkv(p, x)](Index part) {
@@ -39,7 +39,7 @@ struct Transformer {
         batched_matmul(heads(0), transpose(heads(1))) / std::sqrt(float{w}) + x.tape().constant(mask);
     return reshape(permute(batched_matmul(softmax(scores), heads(2)), {1, 0, 2}), {kContext, kWidth});
   }
-  // Logits [24, 128] of the letter after each of 24.
+  // Returns the logits [24, 128] of the letter after each of 24.
   Var<float> operator()(Tape<float>& tape, const std::vector<std::int32_t>& seen) const {
     const auto x = letter(tape, p, seen) + p.leaf(tape, place);
     const auto y = x + attend(x);

@@ -19,18 +19,18 @@ namespace fieldmark::baselines {
 namespace {
 
 constexpr Index kBlenderSize = 160, kPhotographSize = 252, kMlpSize = 100;  // METHOD: as in the released code
-constexpr double kHashSeconds = 60;       // more does not show at these sizes
-constexpr double kViewsASecond = 1;       // to learn from, for each second of the budget
-constexpr double kMlpViewsASecond = 0.2;  // of an mlp field, where making one takes seconds
+constexpr double kHashSeconds = 60;       // longer training brings no visible gain at these sizes
+constexpr double kViewsASecond = 1;       // training views per second of the budget
+constexpr double kMlpViewsASecond = 0.2;  // of an mlp field, which takes seconds to render one
 constexpr Index kFewestViews = 8, kMostViews = 200;
 constexpr double kNetworkPart = 0.8;    // of the budget, for a 2-D network; the rest for fields
-constexpr Index kNetworkChannels = 32;  // a quarter of the work of a step with the authors' 64
+constexpr Index kNetworkChannels = 32;  // a quarter of the authors' work per step, with 64
 constexpr Index kOwnImages = 200, kOwnSize = 64, kFixedMessage = 5;
 constexpr Index kWeightsBits = 8;  // as the paper's noise of 0.01 on the weights
 constexpr double kWeightsNoise = 0.01;
-constexpr std::uint64_t kCamerasSeed = 1000;  // views that are measured are not those learnt from
+constexpr std::uint64_t kCamerasSeed = 1000;  // measured views differ from training views
 
-// Keeps at most that many views of a split, evenly spread.
+// Keeps at most `most` views of a split, evenly spread.
 void thin_out(nerf::Dataset& data, Index most) {
   const auto n = static_cast<Index>(data.views.size());
   if (n <= most) return;
@@ -55,7 +55,7 @@ struct CellRunner::Scene {
   nerf::Dataset train, test;
 };
 
-// A system after its training: how it is measured, and what keeps it alive.
+// A trained system: how it is measured, and the objects that it needs.
 struct CellRunner::Trained {
   Index steps = 0;
   double seconds = 0, own_2d_accuracy = std::nan("");
@@ -72,7 +72,7 @@ CellRunner::CellRunner(CellRunnerOptions options) : options_(std::move(options))
     throw ValueError("[cell_runner] budget, views and ground truth must be positive, got " +
                      std::to_string(options_.budget) + ", " + std::to_string(options_.views) + " and " +
                      std::to_string(options_.ground_truth));
-  // What another budget left is of no use.
+  // Fields and checkpoints of another budget cannot be reused.
   char of_budget[80];
   std::snprintf(of_budget, sizeof of_budget, "%gs-%gs", options_.budget, options_.base_seconds);
   options_.work /= of_budget;
@@ -109,7 +109,7 @@ const CellRunner::Scene& CellRunner::scene(const CellName& name) {
   return *scene_;
 }
 
-// A field of training images, once: a later call or process finds it in the work folder.
+// Trains a field on images once; later calls and processes load it from the work folder.
 nerf::RadianceField CellRunner::trained_field(const std::string& stem, const nerf::Dataset& images,
                                               const CellName& name, double seconds) {
   const auto path = options_.work / (stem + ".field"), checkpoint = options_.work / (stem + ".checkpoint");
@@ -125,10 +125,10 @@ nerf::RadianceField CellRunner::trained_field(const std::string& stem, const ner
   timed_run(trainer, stem, seconds, checkpoint, options_.progress);
   field.save(path);
   std::filesystem::remove(checkpoint);
-  return nerf::RadianceField::load(path);  // as a later process will find it
+  return nerf::RadianceField::load(path);  // as a later process will load it
 }
 
-// The unmarked field of a scene, the same for all systems of one seed.
+// Returns the unmarked field of a scene, shared by all systems of one seed.
 nerf::RadianceField CellRunner::base_field(const CellName& name, const Scene& scene) {
   double seconds = options_.base_seconds;
   if (seconds <= 0) seconds = is_mlp(name) ? options_.budget : std::min(options_.budget, kHashSeconds);
@@ -137,8 +137,8 @@ nerf::RadianceField CellRunner::base_field(const CellName& name, const Scene& sc
                        scene.train, name, seconds);
 }
 
-// The 2-D network, shared by the cells that mark training images and renders with it, then two fields of
-// marked training images: four fifths of the budget for the network, the rest for the fields.
+// Trains the 2-D network, shared by the cells that mark training images and renders with it, and then two
+// fields on marked training images: four fifths of the budget for the network, the rest for the fields.
 CellRunner::Trained CellRunner::train_hiding(const CellName& name, const Scene& scene,
                                              const std::shared_ptr<const nerf::RadianceField>& unmarked) {
   const HidingSystem system = *hiding_system(name.system);
@@ -201,8 +201,8 @@ CellRunner::Trained CellRunner::train(const CellName& name, const Scene& scene) 
   return trained;
 }
 
-// What single tables ask of an owner: other points along the rays of an mlp field of 16 bits, noise on the
-// weights at 8 bits, the cameras of the authors' code for the preset that follows it.
+// Measures what single tables need from an owner: other points along the rays of an mlp field of 16 bits,
+// noise on the weights at 8 bits, and the cameras of the authors' code for the preset that follows it.
 void CellRunner::read_variants(const CellName& name, const Trained& trained,
                                std::map<std::string, double>& under) const {
   if (!trained.owner) return;
@@ -234,7 +234,7 @@ void CellRunner::read_variants(const CellName& name, const Trained& trained,
 }
 
 MeasuredCell CellRunner::run(const CellName& name) {
-  paper_system(name.system);  // before a scene is read in vain
+  paper_system(name.system);  // fails before a scene is read
   const Scene& data = scene(name);
   const Trained trained = train(name, data);
   const auto& o = options_;

@@ -10,22 +10,22 @@ namespace fieldmark::baselines {
 /// Mode of batch normalisation in one pass through a network, and the statistics of that pass.
 template <class T>
 struct NormPass {
-  /// Normalises by the running statistics, so that no image depends on another, instead of the batch's.
+  /// True: normalises with the running statistics, so that no image depends on another; false: the batch's.
   bool running = false;
-  /// The statistics of each normalisation, in the order they were met, for update_statistics().
+  /// The statistics of each normalisation, in order of evaluation, for update_statistics().
   std::vector<std::pair<const BatchNorm<T>*, BatchStatistics>> seen = {};
 };
 
-/// Moves the running statistics of all normalisations that a pass met towards the batch's.
+/// Moves the running statistics of all normalisations in a pass towards those of the batch.
 /// @param momentum  see BatchNorm::update()
 template <class T>
 void update_statistics(ParamStore<T>& store, const NormPass<T>& pass, double momentum = 0.1);
 
-/// Convolution 3 x 3, batch normalisation and ReLU, "<name>/conv" and "<name>/norm" in the store.
+/// 3 x 3 convolution, batch normalisation and ReLU; "<name>/conv" and "<name>/norm" in the store.
 template <class T>
 class ConvBlock {
  public:
-  /// @param relu  without it, the block ends after the normalisation
+  /// @param relu  false: the block ends after the normalisation
   /// @throws ValueError if an extent is below 1 or a name is taken
   ConvBlock(ParamStore<T>& store, std::string_view name, Index in, Index out, std::uint64_t seed,
             bool relu = true);

@@ -13,7 +13,7 @@ constexpr Index kOctaves = 4;
 constexpr std::uint64_t kTries = 8;
 constexpr double kLeastDeviation = 0.03;  // of a window that shows something
 
-// Smooth noise with `cells` cells a side at (u, v) in [0, 1): bilinear between random numbers, eased.
+// Smooth noise with `cells` cells per side at (u, v) in [0, 1): random numbers, bilinear with easing.
 float value_noise(const CounterRng& rng, std::uint64_t index, Index octave, Index cells, float u, float v) {
   const float x = u * static_cast<float>(cells), y = v * static_cast<float>(cells);
   const auto i = static_cast<Index>(x), j = static_cast<Index>(y);

@@ -17,14 +17,14 @@ Var<T> depth_to_space(Var<T> x) {
   const Index width = s[2], pair = s[3] / 2;  // two neighbours of a row are adjacent in both layouts
   T* y = nullptr;
   const Var<T> out = x.tape().output({s[0], 2 * s[1], 2 * width, s[3] / 4}, &y, {x});
-  // Row r of the result holds half a = r % 2 of the channels of row r / 2.
+  // Row r of the result holds one half, a = r % 2, of the channels of row r / 2.
   parallel_for(2 * s[0] * s[1], 8, [&](Index r0, Index r1) {
     for (Index r = r0; r < r1; ++r)
       for (Index j = 0; j < width; ++j)
         std::copy_n(x.value() + ((r / 2 * width + j) * 2 + r % 2) * pair, pair, y + (r * width + j) * pair);
   });
 
-  // A permutation: dx takes the same places of dy. A piece owns its places of dx.
+  // A permutation: dx takes the same elements of dy. A chunk owns its elements of dx.
   x.tape().on_backward(out, [=](const T* dy) {
     T* dx = x.grad_acc();
     parallel_for(2 * s[0] * s[1], 8, [&](Index r0, Index r1) {

@@ -4,16 +4,16 @@
 
 namespace fieldmark::baselines {
 
-/// Spreads channels over blocks of 2 x 2 pixels, the inverse of space_to_depth().
+/// Rearranges channels into blocks of 2 x 2 pixels, the inverse of space_to_depth().
 ///   y[n, 2 i + a, 2 j + b, c] = x[n, i, j, (2 a + b) C + c]
 /// @param x [N, H, W, 4 C]   @return [N, 2 H, 2 W, C]   @throws ShapeError if x is not
 /// Differentiable in: x.
 template <class T>
 Var<T> depth_to_space(Var<T> x);
 
-/// Transposed convolution of 2 x 2 with stride 2, batch normalisation and ReLU: an image of twice the size.
-/// With the stride as large as the window no two windows meet, so it is a linear layer from each pixel to
-/// 2 x 2 pixels.
+/// 2 x 2 transposed convolution with stride 2, batch normalisation and ReLU: doubles the size of an image.
+/// Since the stride equals the window, windows do not overlap, so it is a linear layer from each pixel to 2 x
+/// 2 pixels.
 template <class T>
 class DoublingConv {
  public:

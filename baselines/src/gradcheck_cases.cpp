@@ -12,15 +12,15 @@
 namespace fieldmark::baselines {
 namespace {
 
-// Fixed numbers in (-1, 1) without a pattern.
+// Fixed pattern-free numbers in (-1, 1).
 Tensor<double> numbers(Shape shape, double phase) {
   Tensor<double> t(shape);
   for (Index i = 0; i < t.size(); ++i) t[i] = std::sin(phase + 1.7 * static_cast<double>(i * i + i));
   return t;
 }
 
-// Every ReLU well open: differences must not step over a kink. What bends is the normalisation, by the
-// batch's own statistics: the running ones are no parameters.
+// Keeps every ReLU clearly open, so that differences do not cross a kink. The batch statistics of the
+// normalisation keep the function nonlinear; the running ones are not parameters.
 void open_relus(ParamStore<double>& store) {
   for (const auto& e : store.entries()) {
     const bool shift = e.name.ends_with("norm/beta") || e.name.ends_with("squeeze/bias");
@@ -56,7 +56,7 @@ GradcheckReport check_squeeze_excite() {
   const SqueezeExciteBlock<double> block(store, "b", 2, 1);
   open_relus(store);
   Tensor<double> x = numbers({2, 3, 2, 2}, 1);
-  for (double& v : x.data) v += 4;  // the sum behind the block stays positive
+  for (double& v : x.data) v += 4;  // the sum after the block stays positive
   const std::vector<Tensor<double>> in{x};
   return gradcheck_module(
       [&](Tape<double>&, const Params<double>& params, auto v) {

@@ -30,7 +30,7 @@ void add_blocks(std::vector<ConvBlock<T>>& blocks, ParamStore<T>& store, const s
   }
 }
 
-// Every message [N, L] at each of its image's pixels: [N, H, W, L].
+// Repeats each message [N, L] at every pixel of its image: [N, H, W, L].
 template <class T>
 Var<T> at_every_pixel(Var<T> messages, Index height, Index width) {
   Tape<T>& tape = messages.tape();

@@ -57,7 +57,7 @@ OwnScores own_scores(const ImageMarker& marker, const CropSource& images, Index 
     scores.accuracy += marker.accuracy(marked, sent);
     scores.psnr += psnr(marked, image);
   }
-  // Divided once: a sum of parts may exceed 1.
+  // Divides once: a sum of quotients may exceed 1.
   scores.accuracy /= static_cast<double>(count);
   scores.psnr /= static_cast<double>(count);
   return scores;
@@ -98,7 +98,7 @@ MarkedScene marked_renders(const std::shared_ptr<const ImageMarker>& marker,
           .message = [=](Index view) { return message_of_view(bits, seed, view); },
           .render =
               [=](const nerf::Camera& camera, const watermark::Message& sent) {
-                (void)field;  // held for the renderer
+                (void)field;  // kept alive for the renderer
                 return marker->mark(renderer->render(camera).rgb, sent, mark_psnr);
               },
           .accuracy = [=](const Tensor<float>& image,

@@ -11,16 +11,16 @@
 namespace fieldmark::baselines {
 namespace {
 
-constexpr double kKeep = 0.95;               // of a running mean
-constexpr double kRead = 0.93;               // share of bits at which the mark becomes fainter
-constexpr double kFainter = 0.015;           // dB a step
-constexpr double kSure = 0.96, kFaster = 2;  // from there, dB a step more for each unit of that share
+constexpr double kKeep = 0.95;               // decay of a running mean
+constexpr double kRead = 0.93;               // fraction of bits above which the mark becomes fainter
+constexpr double kFainter = 0.015;           // dB per step
+constexpr double kSure = 0.96, kFaster = 2;  // above kSure, extra dB per step per unit of the fraction
 constexpr double kLeastRms = 1e-6;
-constexpr double kNoiseFrom = 3;        // dB before the last strength: files and noise layers come in
-constexpr std::uint64_t kWhether = 50;  // draws: below it are those of a layer
+constexpr double kNoiseFrom = 3;        // dB before the final strength: rounding and noise layers begin
+constexpr std::uint64_t kWhether = 50;  // counter of its draws; those of a layer are below
 constexpr AdamOptions kAdam{.lr = 1, .beta2 = 0.999, .eps = 1e-8, .zero_grads = true};
 
-// Rounds values in [-1, 1] to the 8 bits of a file.
+// Rounds values in [-1, 1] to 8 bits, as a file does.
 Var<float> as_file(Var<float> marked) {
   Tape<float>& tape = marked.tape();
   const Index n = marked.shape().size();
@@ -72,7 +72,7 @@ HidingTrainer::HidingTrainer(ImageMarker& marker, const CropSource& crops, const
   keep("crop", crop_);
 }
 
-// By steps where the run has a number of them, else by the clock; never back.
+// Follows the steps if the run has a number of them, else the clock; never decreases.
 Index HidingTrainer::crop_now(double seconds) const {
   const auto& s = options_.schedule;
   const double done =
@@ -98,7 +98,7 @@ void HidingTrainer::draw(Index size) {
   }
 }
 
-// Whether this step's images pass rounding and a noise layer: none while the mark is strong.
+// True if the images of this step pass rounding and a noise layer: never while the mark is strong.
 bool HidingTrainer::noisy() const {
   const double share = (figures_.mark_psnr - options_.mark_psnr + kNoiseFrom) / kNoiseFrom;
   return static_cast<double>(noise_rng_.uniform(static_cast<std::uint64_t>(steps()), kWhether)) <
@@ -113,7 +113,7 @@ Var<float> HidingTrainer::sent_on(Var<float> marked, Var<float> plain) const {
   return apply_noise_layer(layers[static_cast<std::size_t>(which)], as_file(marked), plain, noise_rng_, step);
 }
 
-// plain + g (encoded - plain), with g of each image such that the second term has the present PSNR.
+// plain + g (encoded - plain), where g gives each image's second term the current PSNR.
 Var<float> HidingTrainer::at_strength(Var<float> encoded, Var<float> plain) const {
   const Index n = plain.shape()[0], each = plain.shape().size() / n;
   const Var<float> residual = sub(encoded, plain);

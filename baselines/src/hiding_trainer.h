@@ -5,43 +5,43 @@
 
 namespace fieldmark::baselines {
 
-/// How a 2-D network is trained.
+/// Options for training a 2-D network.
 struct HidingTrainOptions {
   ScheduleOptions schedule{.seconds = 180, .lr = 1e-3, .half_after = 1e6, .cooldown = 0.3, .last = 0.1};
-  Index batch = 12;         ///< images a step, >= 2
+  Index batch = 12;         ///< images per step, >= 2
   Index crop = 64;          ///< side of the images, pixels, a multiple of 16: the tile of an ImageMarker
-  Index first_crop = 16;    ///< side in the first part of the run, whose steps are the fastest
-  double first_part = 0.4;  ///< of the run, in [0, 1); then the side doubles after equal parts, up to crop
+  Index first_crop = 16;    ///< side during the first part of the run, where steps are fastest
+  double first_part = 0.4;  ///< of the run, in [0, 1); then the side doubles at equal intervals, up to crop
   double first_mark_psnr = 14;     ///< at the first step, dB
   double mark_psnr = 30;           ///< at the end, dB, >= first_mark_psnr
-  double message_weight = 1;       ///< of the message's mean squared error
-  double adversary_weight = 1e-3;  ///< of the discriminator's verdict
-  double noisy_part = 1;           ///< of the steps at mark_psnr that pass a noise layer, in [0, 1]
-  std::uint64_t seed = 0;          ///< of crops, messages and noise
+  double message_weight = 1;       ///< weight of the message's mean squared error
+  double adversary_weight = 1e-3;  ///< weight of the discriminator's loss
+  double noisy_part = 1;           ///< fraction of the steps at mark_psnr that use a noise layer, in [0, 1]
+  std::uint64_t seed = 0;          ///< seed of crops, messages and noise
 };
-/// The authors' weights: HiDDeN 1 and 1e-3; MBRS 10 and 1e-4, and crops of one size, that of its map. HiDDeN,
-/// whose networks see a few pixels around each, takes crops of 16 for four fifths of the run, then 32; a step
-/// size of 3e-3; and noise layers on half of the steps.
+/// Returns the authors' weights: HiDDeN 1 and 1e-3; MBRS 10 and 1e-4, with crops of a single size, that of
+/// its map. HiDDeN, whose receptive field is small, uses crops of 16 for four fifths of the run and then 32,
+/// a step size of 3e-3, and noise layers on half of the steps.
 HidingTrainOptions hiding_train_options(HidingKind kind);
 
-/// Trains encoder and decoder together, against a discriminator, through a random noise layer a batch:
+/// Trains encoder and decoder jointly against a discriminator, with one random noise layer per batch:
 ///   L = w_m |M' - M|^2 + w_a BCE(discriminator(marked), "plain"),   marked = plain + g (encoded - plain)
 /// Source: Zhu et al. 2018 (HiDDeN), section 3.3; Jia et al. 2021 (MBRS), section 3.4 for its weights.
-/// Departure: the authors add w_i |marked - plain|^2 and train for epochs on a GPU. Here g, a constant to the
+/// Departure: the authors add w_i |marked - plain|^2 and train for epochs on a GPU. Here g, constant for the
 /// gradients, scales the residual of each image to a PSNR that rises from first_mark_psnr to mark_psnr: by
-/// 0.015 dB a step while 93% of the bits are right, and faster near 100%. Rounding to 8 bits, clamping and
-/// noise layers come in over the last 3 dB, up to noisy_part of the steps. So the networks learn a message
-/// before it has to be invisible or robust. Equal bytes for any number of threads.
+/// 0.015 dB per step while 93% of the bits are right, and faster near 100%. Rounding to 8 bits, clamping and
+/// noise layers phase in over the last 3 dB, up to noisy_part of the steps. The networks thus learn a message
+/// before it has to be invisible or robust. The result has equal bytes for any number of threads.
 class HidingTrainer final : public TrainingRun {
  public:
   /// Marker and crops must outlive the trainer. @throws ValueError if an option is out of range
   HidingTrainer(ImageMarker& marker, const CropSource& crops, const HidingTrainOptions& options);
   /// State of training.
   struct Figures {
-    double bits = 0.5;      ///< running mean of the share of bits that are right, behind the noise layer
-    double mark_psnr = 14;  ///< of the present step, dB
+    double bits = 0.5;      ///< running mean of the fraction of correct bits, after the noise layer
+    double mark_psnr = 14;  ///< of the current step, dB
   };
-  /// As of the last step.
+  /// Returns the figures after the last step.
   const Figures& figures() const { return figures_; }
   double figure() const override { return figures_.bits; }
   std::string status() const override;

@@ -18,8 +18,8 @@ void check_image(const Tensor<float>& cover) {
   check_extent("image_marker", "image", cover.shape, 2, 3, "red, green, blue");
 }
 
-// Where an image's tiles begin, and how large they are: a side shorter than a tile has one of its own
-// length, and the last of a side may reach beyond it.
+// Positions and size of an image's tiles. If a side is shorter than a tile, the tile has that length; the
+// last tile of a side may extend beyond it.
 struct Tiles {
   Tiles(const Shape& cover, Index tile) : height(std::min(tile, cover[0])), width(std::min(tile, cover[1])) {
     for (Index y = 0; y < cover[0]; y += height)
@@ -33,7 +33,7 @@ Tensor<float> tile_of(const Tensor<float>& cover, const Tiles& tiles, const std:
   return window_of(cover, corner[0], corner[1], {tiles.height, tiles.width, 3});
 }
 
-// As the networks have images: [1, H, W, 3] in [-1, 1].
+// Converts to the range of the networks: [1, H, W, 3] in [-1, 1].
 Tensor<float> centred(const Tensor<float>& tile) {
   Tensor<float> x({1, tile.shape[0], tile.shape[1], 3});
   for (Index i = 0; i < x.size(); ++i) x[i] = 2 * tile[i] - 1;
@@ -49,7 +49,7 @@ Tensor<float> added(const Tensor<float>& cover, const Tensor<float>& residual, d
   return quantize8(out);
 }
 
-// With the gain at which the file has the strength: black and white take a part of the residual away.
+// Adds the residual with the gain that gives the file this PSNR; clamping weakens the residual.
 Tensor<float> added_at(const Tensor<float>& cover, const Tensor<float>& residual, double mark_psnr) {
   const double square = mse(residual, Tensor<float>(residual.shape));
   if (square <= 0) return quantize8(cover);

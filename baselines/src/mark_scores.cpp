@@ -14,9 +14,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr Index kWindow = 11;      // of ssim()
-constexpr Index kAllMessages = 4;  // bits up to which every message has its turn
+constexpr Index kAllMessages = 4;  // number of bits up to which all messages are cycled through
 
-// Mean and deviation of the finite numbers: equal images have no PSNR, a view of the background no object.
+// Mean and deviation of the finite values: equal images have no PSNR, a view of the background no object.
 struct Mean {
   double sum = 0, squares = 0, count = 0;
   void add(double v) {

@@ -71,7 +71,7 @@ Var<T> MbrsNetwork<T>::decode(const Params<T>& params, Var<T> images, NormPass<T
                      images.shape().str());
   Var<T> x = blocks_[first_read](params, images, pass);
   for (const auto& block : decoder_) x = avg_pool(block(params, x, pass), 2);
-  // To s x s places: first as many pixels as make whole averages, then those.
+  // Resizes to s x s places: upsamples to a multiple of s, then averages.
   const Shape s = x.shape();
   if (s[1] != side_ || s[2] != side_) {
     const Index up = (std::max(s[1], s[2]) + side_ - 1) / side_;

@@ -17,8 +17,8 @@ namespace {
 
 constexpr Index kKnots = 513;     // of G ...
 constexpr float kRange = 16;      // ... from -kRange to kRange
-constexpr Index kBlock = 256;     // rays of an image that is not recorded, at a time
-constexpr float kTrainFiner = 1;  // samples as the base field was trained with
+constexpr Index kBlock = 256;     // rays of an unrecorded image at a time
+constexpr float kTrainFiner = 1;  // samples as in the training of the base field
 constexpr const char* kName = "mark/";
 
 MessageFieldOptions checked(const MessageFieldOptions& o, const nerf::RadianceField& base) {
@@ -31,8 +31,7 @@ MessageFieldOptions checked(const MessageFieldOptions& o, const nerf::RadianceFi
   return o;
 }
 
-// A layer of the base field with `more` inputs behind its own, whose weights are the base field's where it
-// has them.
+// A layer of the base field with `more` extra inputs, initialised with the base field's weights if any.
 Dense<float> widened(ParamStore<float>& store, const nerf::RadianceField& base, const std::string& name,
                      Index more, Activation activation, std::uint64_t seed) {
   const ParamStore<float>& from = base.params;
@@ -48,13 +47,13 @@ Dense<float> widened(ParamStore<float>& store, const nerf::RadianceField& base, 
 
 }  // namespace
 
-// What some rays of the base field meet, in memory of the tape: what was sampled does not outlive the pass.
+// Samples of the base field along some rays, in memory of the tape: the samples do not outlive the pass.
 struct MessageField::Rays {
   std::span<const Index> begin;  // R + 1 offsets
-  Var<float> density_features;   // [S, density_width()]; of an mlp field none
+  Var<float> density_features;   // [S, density_width()]; empty for an mlp field
   Var<float> colour_features;    // [S, colour_width()]
   Var<float> direction;          // [S, direction_width()]
-  Var<float> z;                  // [S, geometry_width()] of the base field; of place inputs none
+  Var<float> z;                  // [S, geometry_width()] of the base field; empty for `inputs`
   Var<float> delta;              // [S]
 };
 
@@ -157,7 +156,7 @@ MessageField::Rays MessageField::march(Tape<float>& tape, const nerf::RadianceFi
           .delta = kept(s.delta, {n})};
 }
 
-// Colours [pixels, 3] of pixels begin to end - 1.
+// Computes the colours [pixels, 3] of pixels begin to end - 1.
 Var<float> MessageField::pixels(Tape<float>& tape, const Params<float>& params,
                                 const nerf::RadianceField& base, const nerf::Camera& camera, Index begin,
                                 Index end, const nerf::RenderOptions& options, Var<float> message) const {
@@ -180,7 +179,7 @@ Var<float> MessageField::pixels(Tape<float>& tape, const Params<float>& params,
     rgb = net.colour(Params<float>(base.params, nullptr), r.z, r.colour_features, r.direction);
   }
   const Var<float> seen = nerf::composite<float>(net.density(log_density), rgb, r.delta, r.begin);
-  // C + (1 - A) background, as C and A times a matrix.
+  // C + (1 - A) background, with C and A multiplied by a matrix.
   const float level = nerf::background_value(base.background);
   float *over = tape.scratch(12), *behind = tape.scratch(3 * (end - begin));
   for (int i = 0; i < 12; ++i) over[i] = i >= 9 ? -level : (i % 4 == 0 ? 1.f : 0.f);

@@ -7,50 +7,49 @@
 
 namespace fieldmark::baselines {
 
-/// Where a MessageField takes its message in.
+/// Where a MessageField receives its message.
 enum class MessagePlace {
-  inputs,  ///< "NeRF with message": beside the inputs of both networks
+  inputs,  ///< "NeRF with message": concatenated with the inputs of both networks
   density  ///< "CopyRNeRF in geometry": fused into the density alone
 };
 
-/// Sizes of a MessageField.
+/// Options of a MessageField.
 struct MessageFieldOptions {
   MessagePlace place = MessagePlace::inputs;  ///< which of the two systems
   Index bits = 16;                            ///< N_b, at least 1
-  Index width = 256;       ///< density: units of the first hidden layer, at least 2; half as many in the next
-  std::uint64_t seed = 0;  ///< of the initial numbers
+  Index width = 256;       ///< density: units of the first hidden layer, at least 2; the second has half
+  std::uint64_t seed = 0;  ///< seed of the initial weights
 };
 
 /// A field whose densities depend on a message, as in two systems of the paper's tables; h, Theta and Y are
 /// those of nerf::Field.
 ///   inputs:   z = Theta'_sigma(h_sigma(x), M),   sigma = exp(z_0),   c = Theta'_c(z, h_c(x), Y(d), M)
-///   density:  sigma = exp(z_0 + G(z_0 / 16, M)),   c as the base field has it
+///   density:  sigma = exp(z_0 + G(z_0 / 16, M)),   c as in the base field
 /// Source: Luo et al. 2023 (CopyRNeRF), section 4.1; G as in the authors' code, two hidden layers of 256 and
-/// 128 with ReLU. Departures, all so that minutes of training say something: Theta' start from the base
-/// field's numbers and h stays as it is; G adds to the logarithm of the density, where theirs puts another
-/// density in its place; M enters as -1 and 1, z_0 as a number of its size; where the base field is empty no
-/// message puts anything. G depends on one number for each message, so that it is evaluated at 513 values of
-/// z_0 from -16 to 16 and linear between.
+/// 128 with ReLU. Departures, so that minutes of training are informative: Theta' start from the base field's
+/// weights and h is unchanged; G adds to the logarithm of the density, where theirs replaces the density; M
+/// enters as -1 and 1, and z_0 scaled to that size; no message adds density where the base field is empty.
+/// For a message, G depends on one number only, so it is evaluated at 513 values of z_0 from -16 to 16 and
+/// interpolated linearly.
 class MessageField {
  public:
-  /// Registers "mark/..." in a store and sets their initial numbers.
+  /// Registers "mark/..." in a store and initialises the weights.
   /// @throws ValueError if an option is out of range, a name is taken, or place is inputs and the base field
   /// has no table
   MessageField(ParamStore<float>& store, const nerf::RadianceField& base, const MessageFieldOptions& options);
 
-  /// The image of a camera [pixels, 3] over the base field's background, at the samples it was trained
-  /// with.
+  /// Renders a camera's image [pixels, 3] over the base field's background, with the samples of its training.
   /// @param message  [1, N_b], -1 or 1   @throws ShapeError if it has another shape
   /// Gradients reach the message and the parameters.
   Var<float> image(Tape<float>& tape, const Params<float>& params, const nerf::RadianceField& base,
                    const nerf::Camera& camera, Var<float> message) const;
-  /// The same [height, width, 3] in [0, 1], not recorded.
-  /// @param store  with the field's numbers   @param signs  [N_b], -1 or 1   @param options  of which
-  /// `finer`, `stop` and `points` are heeded
+  /// Renders the same image [height, width, 3] in [0, 1] without recording it.
+  /// @param store  holds the field's weights   @param signs  [N_b], -1 or 1   @param options  only `finer`,
+  /// `stop` and `points` are used
   Tensor<float> render(const ParamStore<float>& store, const nerf::RadianceField& base,
                        const nerf::Camera& camera, std::span<const std::int8_t> signs,
                        const nerf::RenderOptions& options = {}) const;
-  /// The options given to the constructor.
+  /// Returns the options given to the constructor.
   const MessageFieldOptions& options() const { return options_; }
 
  private:

@@ -24,7 +24,7 @@ constexpr Index kOurPatch = 128, kLeast = 32;  // pixels
 using watermark::Owner;
 using Signs = std::vector<std::int8_t>;
 
-// Cells that show the bit as it is, whatever the key.
+// Cells that show the bit unchanged, whatever the key.
 struct UnkeyedMark : watermark::CellMark {
   using CellMark::CellMark;
   watermark::CellCode code(const watermark::CellGrid& cells, const watermark::Key& key,
@@ -35,7 +35,7 @@ struct UnkeyedMark : watermark::CellMark {
   }
 };
 
-// c + g (c_m - c) in place of c_m, trained under a power budget in place of the content loss.
+// c + g (c_m - c) instead of c_m, trained with a power budget instead of the content loss.
 class BudgetMark : public watermark::FusionMark {
  public:
   using FusionMark::FusionMark;
@@ -98,7 +98,7 @@ class MessageMark : public watermark::PooledMark {
   MessageField field_;
 };
 
-// A mark of the paper's networks, of which `change` leaves something out.
+// A mark of the paper's networks from which `change` removes a part.
 template <class Mark, class Change>
 watermark::MarkMaker paper_mark(const watermark::FusionMarkOptions& options, Change change) {
   return [=](const watermark::MarkSite& site) {
@@ -231,7 +231,7 @@ watermark::Owner with_noisy_weights(const watermark::Owner& owner, double deviat
 
 namespace {
 
-// Positions moved as EmbedDistortions::sample_shift moves them, each by numbers that depend on where it is.
+// Shifts positions as EmbedDistortions::sample_shift does, by random numbers that depend on the position.
 std::vector<float> moved(const float* x, Index n, double shift, const CounterRng& rng) {
   std::vector<float> y(x, x + 3 * n);
   for (std::size_t k = 0; k < y.size(); k += 3) {

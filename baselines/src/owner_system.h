@@ -6,53 +6,53 @@
 
 namespace fieldmark::baselines {
 
-/// A part of a system that an ablation takes away or replaces.
+/// A part of a system that an ablation removes or replaces.
 enum class Ablation {
   none,
-  unkeyed_signs,        ///< cells: each shows its bit as it is
-  no_message_features,  ///< fusion: no D, the message itself enters G
-  no_colour_features,   ///< fusion: no E, the colour alone enters G
-  power_budget,         ///< fusion: the residual has our power budget in place of the content loss
+  unkeyed_signs,        ///< cells: each shows its bit unchanged
+  no_message_features,  ///< fusion: no D; G receives the message itself
+  no_colour_features,   ///< fusion: no E; G receives the colour alone
+  power_budget,         ///< fusion: our power budget on the residual instead of the content loss
   message_in_inputs,    ///< a MessageField with MessagePlace::inputs
   message_in_density    ///< a MessageField with MessagePlace::density
 };
 
-/// How a system with an Owner is trained.
+/// Options for training a system with an Owner.
 struct OwnerSystem {
-  watermark::EmbedRecipe recipe;       ///< options, without the length of the run
+  watermark::EmbedRecipe recipe;       ///< options without the run length
   Ablation ablation = Ablation::none;  ///< of the recipe's mark
-  double test_shift = 0;  ///< DRS: samples are moved so far at test too, see EmbedDistortions::sample_shift
+  double test_shift = 0;  ///< DRS: shift of the samples at test time, see EmbedDistortions::sample_shift
 };
-/// Makes the system's mark.
+/// Returns the factory of the system's mark.
 watermark::MarkMaker mark_maker(const OwnerSystem& system);
 
-/// Whether a system of paper_systems() is trained through an Owner.
+/// True if a system of paper_systems() is trained through an Owner.
 bool has_owner(std::string_view system);
-/// The options of such a system: ours at 34 dB on the object, read at up to 128 pixels; the paper's at up to
-/// 150. Systems without one of their parts:
-///   ours_without_dense: signs and cells of places cost nothing, the pooled bits alone do
+/// Returns the options of such a system: ours at 34 dB on the object, read at up to 128 pixels; the paper's
+/// at up to 150. Systems with a part removed:
+///   ours_without_dense: no loss on signs and cells of places, only on the pooled bits
 ///   ours_without_cells: preset paper's networks under our power budget, distortions and step sizes; without
-///   cells there is nothing dense to supervise
+///   cells there is no dense supervision
 ///   ours_without_signs, without_mff, without_cff, nerf_message, geometry: see Ablation
-///   without_drr: neither distortions nor moved samples
-///   drs: the full method, with the samples moved at test as in training
-/// @param image  pixels of the views' longer side; the reader sees no more, and at least 32
-/// @throws ValueError if the system has none
+///   without_drr: neither distortions nor shifted samples
+///   drs: the full method, with the samples shifted at test time as in training
+/// @param image  longer side of the views in pixels; the reader sees at most that, and at least 32
+/// @throws ValueError if the system has no Owner
 OwnerSystem owner_system(const CellName& name, Index image);
 
-/// A key for measurements, a function of the seed: not secret, so that equal runs give equal cells.
+/// Returns a key for measurements, derived from the seed: not secret, so that equal runs give equal cells.
 watermark::Key measuring_key(std::uint64_t seed);
 
-/// Where and how long an owner is trained.
+/// Data and duration of an owner's training.
 struct OwnerTraining {
-  double seconds = 300;              ///< of training, without the views' rendering; where steps is 0
-  Index steps = 0;                   ///< of training, 0: by time
+  double seconds = 300;              ///< of training, without rendering the views; used if steps is 0
+  Index steps = 0;                   ///< of training; 0: by time
   std::filesystem::path checkpoint;  ///< see timed_run()
-  Index views = 200;                 ///< novel views to learn from
+  Index views = 200;                 ///< novel views to train on
   RunProgress progress = {};         ///< may be empty
 };
 
-/// An owner that has been trained.
+/// A trained owner.
 struct TrainedOwner {
   watermark::Owner owner;  ///< calibrated
   double test_shift = 0;   ///< see OwnerSystem
@@ -61,20 +61,20 @@ struct TrainedOwner {
   std::string curve = {};  ///< see TrainingRun::curve()
 };
 
-/// The cell whose training a system's is: drs trains as copyrnerf_paper does.
+/// Returns the cell whose training a system uses: drs trains as copyrnerf_paper does.
 CellName trained_as(const CellName& name);
 
-/// Renders views, trains mark and extractor and calibrates the mark PSNR; resumes from a checkpoint.
+/// Renders views, trains mark and extractor, and calibrates the mark PSNR; resumes from a checkpoint.
 /// @throws Stopped after saving   @throws as Embedder
 TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name, const OwnerSystem& system,
                          const OwnerTraining& training);
 
-/// An owner's mark with a message of its own in every view, see message_of_view(). `marked` must outlive it.
+/// Marks every view with its own message, see message_of_view(). `marked` must outlive the result.
 MarkedScene marked_scene(const TrainedOwner& marked, std::uint64_t seed,
                          const nerf::RenderOptions& options = {});
 
-/// The owner with Gaussian noise on every weight of the field's networks and table and of the mark's
-/// networks; the extractor stays.
+/// Returns the owner with Gaussian noise on every weight of the field's networks and table and of the mark's
+/// networks; the extractor is unchanged.
 /// @param deviation  of the noise, >= 0   @throws ValueError if it is negative
 watermark::Owner with_noisy_weights(const watermark::Owner& owner, double deviation, std::uint64_t seed);
 

@@ -8,8 +8,8 @@ struct Figure {
   double value;
 };
 
-// Bit accuracy by length, quality at 16 bits, accuracy at 16 bits under distortion, ablation (the length is
-// not stated), sampling at test with 16 bits, noise of deviation 0.01 on the weights with 8 bits.
+// Bit accuracy by length, quality at 16 bits, accuracy at 16 bits under distortion, ablation (length not
+// stated), sampling at test time with 16 bits, noise of deviation 0.01 on the weights with 8 bits.
 constexpr Figure kFigures[] = {
     {"bits", "copyrnerf_paper", "4", 100},
     {"bits", "copyrnerf_paper", "8", 100},

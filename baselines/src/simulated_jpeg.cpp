@@ -11,7 +11,7 @@ namespace fieldmark::baselines {
 namespace {
 
 constexpr Index kJpegBlock = 8;
-// ITU-R BT.601 as JPEG files use it; rows Y, Cb, Cr.
+// ITU-R BT.601 as in JPEG files; rows Y, Cb, Cr.
 constexpr double kToYcc[9] = {0.299, 0.587, 0.114,        -0.168735892, -0.331264108,
                               0.5,   0.5,   -0.418687589, -0.081312411};
 
@@ -29,8 +29,8 @@ Matrix3 inverse(const double* a) {
 
 Matrix3 transposed(const Matrix3& m) { return {m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]}; }
 
-// P = D_k^T D_k, the projection of 8 numbers onto their k lowest frequencies: low-passing rows and columns of
-// a block by P is the same as masking its coefficients.
+// P = D_k^T D_k, the projection of 8 numbers onto their k lowest frequencies: filtering the rows and columns
+// of a block with P equals masking its coefficients.
 using Projection = std::array<double, 64>;
 Projection projection(Index kept) {
   Projection p{};
@@ -46,11 +46,11 @@ Projection projection(Index kept) {
 }
 
 struct JpegPlan {
-  Matrix3 in, out;  // before and behind the transform
+  Matrix3 in, out;  // before and after the transform
   Projection luma, chroma;
 };
 
-// y = or += out (P (in x) P) over one block; x and y at the block's first pixel, `row` numbers a row apart.
+// y = or += out (P (in x) P) over one block; x and y point to its first pixel, `row` numbers per row.
 template <class T>
 void filter_block(const JpegPlan& plan, const T* x, T* y, Index row, bool add) {
   double plane[3][64], half[64];
@@ -120,7 +120,7 @@ Var<T> simulated_jpeg(Var<T> x, KeptFrequencies kept) {
   const Var<T> out = x.tape().output(s, &y, {x});
   filter(plan, x.value(), y, s, false);
 
-  // dx = (C^-1 F C)^T dy = C^T F C^-T dy: F, the filter by P = P^T on both sides, is symmetric. A piece owns
+  // dx = (C^-1 F C)^T dy = C^T F C^-T dy: F, the filter by P = P^T on both sides, is symmetric. A chunk owns
   // its rows of blocks.
   x.tape().on_backward(out, [x, s, plan](const T* dy) {
     const JpegPlan back{transposed(plan.out), transposed(plan.in), plan.luma, plan.chroma};

@@ -30,7 +30,7 @@ Var<T> scale_channels(Var<T> x, Var<T> s) {
         y[p * channels + c] = x.value()[p * channels + c] * s.value()[p / pixels * channels + c];
   });
 
-  // dx = dy s, ds = sum over pixels of dy x, in double. A piece owns its images of dx and rows of ds.
+  // dx = dy s, ds = sum over pixels of dy x, in double. A chunk owns its images of dx and rows of ds.
   x.tape().on_backward(out, [=](const T* dy) {
     T* dx = x.grad_acc();
     T* ds = s.grad_acc();

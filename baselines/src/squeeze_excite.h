@@ -4,15 +4,15 @@
 
 namespace fieldmark::baselines {
 
-/// Each channel of each image times a number of its own.   y[n, i, j, c] = x[n, i, j, c] s[n, c]
+/// Scales each channel of each image.   y[n, i, j, c] = x[n, i, j, c] s[n, c]
 /// @param x [N, H, W, C]   @param s [N, C]   @return [N, H, W, C]   @throws ShapeError if they do not fit
 /// Differentiable in: x, s.
 template <class T>
 Var<T> scale_channels(Var<T> x, Var<T> s);
 
-/// A residual block whose channels are weighed by what the whole image shows:
+/// A residual block that weights its channels by the content of the whole image:
 ///   y = relu(x + s(b) b),   b = block_1(block_0(x)),   s(b) = sigmoid(W1 relu(W0 mean_ij b))
-/// with two convolutions 3 x 3, each with batch normalisation, and an eighth of the channels between W0 and
+/// with two 3 x 3 convolutions, each with batch normalisation, and an eighth of the channels between W0 and
 /// W1. Source: Hu et al. 2018 (squeeze-and-excitation networks), section 3; as in Jia et al. 2021 (MBRS).
 template <class T>
 class SqueezeExciteBlock {

@@ -23,7 +23,7 @@ bool is_device(const fs::path& path) {
   return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
 }
 
-// Where symbolic links lead, also to a file that does not exist yet.
+// Resolves symbolic links, even to a file that does not exist yet.
 fs::path resolve(const fs::path& path) {
   constexpr int kMostLinks = 40;
   if (is_device(path)) return path;  // the link of a pipe names no file
@@ -33,12 +33,12 @@ fs::path resolve(const fs::path& path) {
     const fs::path next = fs::read_symlink(target, error);
     if (error || links == kMostLinks)
       throw IoError("[write] " + path.string() + ": a symbolic link that leads nowhere; name another file");
-    target = target.parent_path() / next;  // an absolute one stays as it is
+    target = target.parent_path() / next;  // keeps absolute targets
   }
   return target;
 }
 
-// Unlike mkstemp, which ignores the umask. The pid and a counter keep writers apart.
+// Unlike mkstemp, respects the umask. The pid and a counter keep concurrent writers apart.
 int open_temporary(const fs::path& target, mode_t mode, fs::path* temporary) {
   static std::atomic<unsigned> counter{0};
   for (;;) {
@@ -64,7 +64,7 @@ Buffer read_all(const fs::path& path) {
   struct stat status {};
   if (::fstat(file.fd, &status) != 0) fail("stat", errno);
   Buffer buffer;
-  // One byte more than the file has shows the end without another growth; a pipe has size 0 and grows.
+  // One byte more than the file has reveals its end without another resize; a pipe has size 0 and grows.
   buffer.resize(static_cast<std::size_t>(status.st_size) + 1);
   std::size_t used = 0;
   for (;;) {
@@ -124,7 +124,7 @@ void AtomicFile::commit() {
   if (temporary_.empty()) return;
   if (std::rename(temporary_.c_str(), target_.c_str()) != 0) fail("rename", errno);
   temporary_.clear();
-  // Flushing the folder puts the rename on the disk. Some file systems cannot: then it follows later.
+  // Flushing the folder makes the rename durable. Some file systems do not support this and flush it later.
   const fs::path folder = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
   const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (fd < 0) return;

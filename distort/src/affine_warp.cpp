@@ -41,7 +41,8 @@ struct Taps {
   T fx, fy;
 };
 
-// Truncation is the floor for u > -1, up to one: no call, and no undefined cast, since u is in range.
+// For u > -1, truncation equals the floor up to an offset of one: no function call, and no undefined cast,
+// since u is in range.
 template <class T>
 Index floor_of(T u) {
   const int k = static_cast<int>(u);
@@ -64,7 +65,7 @@ bool locate(const Map<T>& map, T u, T v, Index channels, Taps<T>& taps) {
   return true;
 }
 
-// kChannels fixed for colour and grey images: the inner loop is then unrolled, twice as fast for 3.
+// kChannels is fixed for colour and grey images, so that the inner loop is unrolled: twice as fast for 3.
 template <int kChannels, class T>
 void forward_rows(const Map<T>& map, const T* x, const T* background, Index any_channels, Index begin,
                   Index end, T* y) {
@@ -89,8 +90,8 @@ void forward_rows(const Map<T>& map, const T* x, const T* background, Index any_
   }
 }
 
-// Scatters dy into dx; taps outside the image write to `sink` [channels]. One thread: rows of dy share rows
-// of dx.
+// Scatters dy into dx; taps outside the image write to `sink` [channels]. Single-threaded, because rows of dy
+// share rows of dx.
 template <int kChannels, class T>
 void backward_image(const Map<T>& map, const T* dy, Index any_channels, T* dx, T* sink) {
   const Index channels = kChannels ? kChannels : any_channels;
@@ -137,7 +138,7 @@ void backward_row(const Map<T>& map, const T* x, const T* background, const T* d
   }
 }
 
-// Rows of a chunk of about 16k elements.
+// Rows in a chunk of about 16k elements.
 Index rows_per_chunk(Index row) { return 1 + (Index{1} << 14) / std::max<Index>(row, 1); }
 
 }  // namespace
@@ -202,7 +203,7 @@ Tensor<std::int32_t> warp_labels(const Tensor<std::int32_t>& labels, std::span<c
   Tensor<std::int32_t> out({map.out_height, map.out_width}, background);
   parallel_for(map.out_height, rows_per_chunk(map.out_width), [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
-      // Half a pixel on: the nearest pixel is the floor.
+      // With half a pixel added, the floor is the nearest pixel.
       const float u0 = map.row_x(i) + 0.5f, v0 = map.row_y(i) + 0.5f;
       for (Index j = 0; j < map.out_width; ++j) {
         const float u = u0 + map.m[0] * map.column_offset(j), v = v0 + map.m[3] * map.column_offset(j);

@@ -29,8 +29,7 @@ struct Filter {
   Index grain() const { return 1 + (Index{1} << 14) / std::max<Index>(row(), 1); }
 };
 
-// g_k and dg_k/dsigma = g_k (k^2 - <k^2>) / sigma^3, in double. Where g_k has underflowed so has its
-// derivative.
+// g_k and dg_k/dsigma = g_k (k^2 - <k^2>) / sigma^3, in double. Where g_k underflows, so does its derivative.
 template <class T>
 void fill_weights(double sigma, Index r, T* g, T* dg, T* tail) {
   double sum = 0, second = 0;
@@ -71,7 +70,7 @@ Filter<T> make_filter(Tape<T>& tape, const Shape& x, T sigma) {
   return f;
 }
 
-// Row i of the vertical pass with weights g, its edge pixels repeated into the padding of `out`.
+// Row i of the vertical pass with weights g; its edge pixels are repeated into the padding of `out`.
 template <class T>
 void vertical_row(const Filter<T>& f, const T* g, const T* x, Index i, T* out) {
   kernels::weighted_taps(out + f.pad(), x, f.rows + i, g, f.taps(), f.row(), false);
@@ -81,8 +80,8 @@ void vertical_row(const Filter<T>& f, const T* g, const T* x, Index i, T* out) {
   }
 }
 
-// d(half) of row i from dy: the transpose of the taps; those outside the image go to the edge pixel.
-// `zeros` is a row of the padded pitch.
+// d(half) of row i from dy: the transpose of the taps; taps outside the image add to the edge pixel. `zeros`
+// is a row of the padded pitch.
 template <class T>
 void horizontal_backward_row(const Filter<T>& f, const T* dy, T* zeros, T* dhalf) {
   std::fill_n(zeros, f.pitch(), T(0));
@@ -136,7 +135,7 @@ Var<T> blur(Var<T> x, Var<T> sigma) {
   });
   // y = V x H with V, H the weights along columns and rows. dhalf = dy H^T, dx = V^T dhalf, and
   //   dsigma = <dy, (V x) H'> + <dhalf, V' x>,   ' the derivative in sigma.
-  // Rows own dhalf, dx and a share of dsigma; the shares are added in row order.
+  // Rows own dhalf, dx and a share of dsigma; shares are added in row order.
   tape.on_backward(out, [x, sigma, f, half](const T* dy) {
     Tape<T>& t = x.tape();
     const Index row = f.row();

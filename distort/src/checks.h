@@ -12,7 +12,7 @@ inline void check_image(std::string_view op, const Shape& x) {
   check_rank(op, "x", x, 3, "[height, width, channels]");
 }
 
-// A distortion's parameter is a tensor of `count` elements, so that gradients reach it.
+// Checks that a distortion's parameter has `count` elements; it is a tensor so that gradients reach it.
 inline void check_parameter(std::string_view op, std::string_view name, const Shape& got, Index count) {
   const std::string layout = "[" + std::to_string(count) + "]";
   check_rank(op, name, got, 1, layout);
@@ -26,7 +26,7 @@ inline void check_colours(const std::string& op, const Shape& image) {
     throw ShapeError("[" + op + "] image: must have at least one pixel, got shape " + image.str());
 }
 
-// "[op] arg: must be in 0 to 1 (why), got 2". NaN fails.
+// Throws "[op] arg: must be in 0 to 1 (why), got 2". NaN fails.
 inline void check_range(std::string_view op, std::string_view arg, double value, double low, double high,
                         std::string_view why) {
   if (value >= low && value <= high) return;

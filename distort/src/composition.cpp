@@ -6,7 +6,7 @@
 namespace fieldmark::distort {
 namespace {
 
-// Copies x into y at a place inside.
+// Copies x into y at a position inside y.
 void put(const Tensor<float>& x, Index top, Index left, Tensor<float>& y) {
   for (Index row = 0; row < x.shape[0]; ++row)
     std::copy_n(x.data.begin() + 3 * row * x.shape[1], 3 * x.shape[1],

@@ -1,5 +1,5 @@
 #pragma once
-// What people put an image into: bars in its middle, another background, a caption, a collage.
+// What people put an image into: bars, a different background, a caption, a collage.
 #include <fieldmark/engine/tensor.h>
 
 #include <array>
@@ -7,13 +7,12 @@
 
 namespace fieldmark::distort {
 
-/// Black bars left and right, or above and below, to the aspect 16 : 9; without change where the image has it
-/// or exceeds it.
+/// Adds black bars left and right up to the aspect 16 : 9; unchanged if the image already has it or is wider.
 Tensor<float> pillarboxed(const Tensor<float>& x);
-/// The same above and below.
+/// Adds black bars above and below up to the aspect 16 : 9; unchanged if the image has it or is taller.
 Tensor<float> letterboxed(const Tensor<float>& x);
-/// Pixels that have the old background to half a grey level take another.
-/// @param fill  of a pixel, in [0, 1]
+/// Replaces pixels that equal the background to within half a grey level.
+/// @param fill  returns the value of a pixel, in [0, 1]
 template <class F>
 Tensor<float> before_another(const Tensor<float>& x, std::span<const float> background, F fill) {
   Tensor<float> y = x;
@@ -29,11 +28,11 @@ Tensor<float> before_another(const Tensor<float>& x, std::span<const float> back
   }
   return y;
 }
-/// An opaque black bar with white lines, like text, over the middle fifth of the height.
+/// Draws an opaque black bar with white lines, like text, over the middle fifth of the height.
 Tensor<float> captioned(const Tensor<float>& x);
-/// Four of the image at half its size, two by two, on a canvas of its size.
+/// Tiles four copies of the image at half size, two by two, on a canvas of its size.
 Tensor<float> collage(const Tensor<float>& x);
-/// The usual sepia matrix of W3C's filter effects.
+/// Applies the sepia matrix of the W3C filter effects.
 Tensor<float> sepia(const Tensor<float>& x);
 
 }  // namespace fieldmark::distort

@@ -25,7 +25,7 @@
 namespace fieldmark::distort {
 namespace {
 
-// Counters of one step for one image: (index, step << 40 | i).
+// RNG counters of one step for one image: (index, step << 40 | i).
 struct Draws {
   const CounterRng& rng;
   std::uint64_t index, base;
@@ -58,7 +58,7 @@ struct Crop {
 Crop crop_window(const Shape& shape, double fraction, const Draws& draws) {
   const Index h = shape[0], w = shape[1];
   const Index height = scaled(h, std::sqrt(fraction));
-  // The width makes up for the rounding of the height, so that the area is exact.
+  // The width compensates for the rounding of the height, so that the area is exact.
   const Index width = std::min(w, scaled(w, fraction * static_cast<double>(h) / static_cast<double>(height)));
   return {draws.rng.below(h - height + 1, draws.index, draws.at(0)),
           draws.rng.below(w - width + 1, draws.index, draws.at(1)), height, width};
@@ -76,8 +76,8 @@ double angle(double amount, const Draws& draws) {
   return amount * (2 * draws.rng.uniform_double(draws.index, draws.base) - 1) * std::numbers::pi / 180;
 }
 
-// Hue, saturation and value of Smith 1978, hue turned: channel n = v - v s max(0, min(k, 4 - k, 1)), k = n +
-// hue/60.
+// Hue, saturation and value of Smith 1978 with hue rotated:
+// channel n = v - v s max(0, min(k, 4 - k, 1)), k = n + hue/60.
 Tensor<float> turn_hue(const Tensor<float>& x, double degrees) {
   Tensor<float> y(x.shape);
   const double turn = degrees / 60 + 12;
@@ -111,7 +111,7 @@ Tensor<float> scale(const Tensor<float>& x, double factor, ResizeFilter filter) 
   return resize_filtered(x, scaled(x.shape[0], factor), scaled(x.shape[1], factor), filter);
 }
 
-// Runs an op of this room on an image.
+// Runs a distortion op on an image.
 template <class F>
 Tensor<float> run(const Tensor<float>& x, const F& op) {
   Tape<float> tape;
@@ -156,7 +156,7 @@ Tensor<float> apply(const Distortion::Step& step, const Tensor<float>& x, const 
     case DistortionKind::webp:
       return webp_round_trip(x, static_cast<int>(step.amount));
     case DistortionKind::h264:
-      break;  // refused by apply_distortion()
+      break;  // rejected by apply_distortion()
     case DistortionKind::gamma:
       return map_values(x, [a](float v) { return std::pow(std::max(v, 0.f), a); });
     case DistortionKind::brightness:
@@ -199,7 +199,7 @@ Tensor<float> apply(const Distortion::Step& step, const Tensor<float>& x, const 
   return x;
 }
 
-// The source positions of one step; the identity for steps that move no pixel.
+// Returns the source positions of one step; the identity for steps that move no pixel.
 PixelMap moved(const Distortion::Step& step, const Shape& before, const Shape& after, const Draws& draws) {
   const double sy = static_cast<double>(before[0]) / static_cast<double>(after[0]),
                sx = static_cast<double>(before[1]) / static_cast<double>(after[1]);
@@ -220,7 +220,7 @@ PixelMap moved(const Distortion::Step& step, const Shape& before, const Shape& a
     const Index left = (after[1] - before[1]) / 2, top = (after[0] - before[0]) / 2;
     return {{1, 0, -static_cast<double>(left), 0, 1, -static_cast<double>(top)}};
   }
-  // Of the upper left of the four.
+  // The map of the upper left copy.
   if (step.kind == DistortionKind::collage) return {{2, 0, 0.5, 0, 2, 0.5}};
   return {{sx, 0, sx / 2 - 0.5, 0, sy, sy / 2 - 0.5}};
 }

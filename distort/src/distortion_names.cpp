@@ -8,7 +8,7 @@
 #include <cmath>
 #include <cstdio>
 
-// Names of distortions and of their chains.
+// Names of distortions and chains.
 namespace fieldmark::distort {
 namespace {
 
@@ -35,7 +35,7 @@ constexpr std::array<Kind, 18> kKinds{{{"noise", DistortionKind::noise, 0, 1},
                                        {"contrast", DistortionKind::contrast, 0, 10},
                                        {"hue", DistortionKind::hue, -360, 360},
                                        {"stretch", DistortionKind::stretch, 0.25, 4}}};
-// Without a severity.
+// A kind without a severity.
 struct PlainKind {
   std::string_view name;
   DistortionKind kind;
@@ -52,7 +52,7 @@ constexpr std::array<PlainKind, 12> kPlainKinds{{{"greyscale", DistortionKind::g
                                                  {"background_noise", DistortionKind::background_noise},
                                                  {"caption", DistortionKind::caption},
                                                  {"collage", DistortionKind::collage}}};
-// Names that stand for a chain.
+// Names that expand to a chain.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kChains{
     {{"combined", "noise_0.10,crop_0.40,jpeg_50"},
      {"screenshot", "scale-bicubic_1.25,blur_0.5,gamma_1.1,scale-lanczos_0.8,jpeg_80"}}};
@@ -62,7 +62,7 @@ bool is_whole(DistortionKind kind) {
   return kind == jpeg || kind == jpeg444 || kind == webp || kind == h264;
 }
 
-// A chain that this build cannot apply is refused before the work begins. Any image tells.
+// Rejects a chain that this build cannot apply before the work begins, by trying it on an arbitrary image.
 void check_library(const Distortion::Step& step) {
   const Tensor<float> pixel({1, 1, 3});
   if (step.kind == DistortionKind::webp) encode_webp(pixel, static_cast<int>(step.amount));
@@ -93,7 +93,7 @@ Distortion::Step parse_step(std::string_view name) {
   const char *begin = name.data() + line + 1, *end = name.data() + name.size();
   double amount = 0;
   const auto [stop, error] = std::from_chars(begin, end, amount);
-  // Written so that nan fails.
+  // Written so that NaN fails.
   if (error != std::errc() || stop != end || !(amount >= kind->low && amount <= kind->high)) fail(name);
   if (is_whole(kind->kind) && amount != std::floor(amount)) fail(name);
   const Distortion::Step step{kind->kind, amount};
@@ -141,7 +141,7 @@ Distortion parse_clip_distortion(std::string_view name) {
 
 std::vector<Distortion> clip_stages(const Distortion& distortion) {
   std::vector<Distortion> stages;
-  bool alone = true;  // the last stage takes no more steps
+  bool alone = true;  // true if the last stage accepts no more steps
   for (std::size_t i = 0; i < distortion.steps.size(); ++i) {
     const bool clip = distortion.steps[i].kind == DistortionKind::h264;
     if (clip || alone)

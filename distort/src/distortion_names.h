@@ -3,7 +3,7 @@
 
 namespace fieldmark::distort {
 
-/// @throws ValueError if the distortion needs a clip
+/// Rejects clip distortions. @throws ValueError if the distortion needs a clip
 void refuse_clip(const Distortion& distortion);
 
 }  // namespace fieldmark::distort

@@ -20,8 +20,8 @@ using Vars = std::span<const Var<double>>;
 constexpr std::array<double, 3> kBackground{0.9, 0.2, 0.6};
 constexpr std::array<double, 24> kNormal{0.3,  -1.2, 0.7, 1.9, -0.4, 0.1, -2.2, 0.8,  0.5, -0.6, 1.1, -0.9,
                                          -1.5, 0.2,  0.4, 0.9, -0.1, 1.3, 0.6,  -0.7, 2.1, -1.0, 0.0, 0.5};
-// Bilinear weights have a kink at whole positions: the warps' cases keep 0.01 pixel away from them, further
-// than the differences reach with this step, whose own rounding is about 1e-11.
+// Bilinear weights have kinks at integer positions. The warp cases stay 0.01 pixels away from them, further
+// than the finite differences reach with this step, whose rounding error is about 1e-11.
 constexpr double kSmallStep = 0.02;
 
 Tensor<double> image(Shape shape) {

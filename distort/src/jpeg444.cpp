@@ -22,7 +22,7 @@ void quantise(JpegBlock& block, const JpegBlock& table) {
   for (double& v : block) v = std::clamp(std::round(v + 128), 0.0, 255.0);
 }
 
-// JFIF: Y, Cb and Cr of bytes, and back.
+// JFIF: converts RGB bytes to Y, Cb and Cr, and back.
 std::array<double, 3> to_components(const float* rgb) {
   std::array<double, 3> out{0, 128, 128};
   for (int k = 0; k < 3; ++k) {

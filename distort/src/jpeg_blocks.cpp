@@ -19,7 +19,7 @@ constexpr std::array<int, 64> kChroma{17, 18, 24, 47, 99, 99, 99, 99, 18, 21, 26
                                       99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99,
                                       99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99};
 
-// Rows are the cosines.
+// The rows are the cosines.
 const JpegBlock& cosines() {
   static const JpegBlock rows = [] {
     JpegBlock a;
@@ -33,7 +33,7 @@ const JpegBlock& cosines() {
   return rows;
 }
 
-// a b a^T, or a^T b a where a is transposed.
+// Computes a b a^T, or a^T b a if `transposed`.
 JpegBlock transformed(const JpegBlock& b, bool transposed) {
   const JpegBlock& a = cosines();
   const auto at = [&](std::size_t i, std::size_t k) { return transposed ? a[8 * k + i] : a[8 * i + k]; };

@@ -28,7 +28,7 @@ Var<T> noise(Var<T> x, Var<T> mu, Var<T> sigma, std::span<const std::type_identi
   parallel_for(n, kNoiseGrain, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) y[i] = x.value()[i] + (m + s * z[i]);
   });
-  // dx = dy, dmu = sum dy, dsigma = sum dy z. Chunks own dx; the two sums run in order, in double.
+  // dx = dy, dmu = sum dy, dsigma = sum dy z. Chunks own dx; both sums run in order, in double.
   x.tape().on_backward(out, [x, mu, sigma, z, n](const T* dy) {
     bool fresh = false;
     if (T* dx = x.grad_acc(&fresh)) {

@@ -28,7 +28,7 @@ void expect_bits(const Tensor<T>& got, const Tensor<T>& want, WorstError& error)
   for (Index i = 0; i < std::min(got.size(), want.size()); ++i) error.equal(got[i], want[i]);
 }
 
-// Quarter turns of square images: pixel (i, j) comes from where the turn says.
+// Quarter turns of square images must permute the pixels.
 template <class T>
 void compare_rotations(WorstError& error) {
   const auto turn = [](auto x, auto a) { return rotate(x, a); };
@@ -57,7 +57,7 @@ void compare_identities(WorstError& error) {
   }
 }
 
-// Distortions of no effect, on an image of 8 bits.
+// Distortions that must not change an 8-bit image.
 void compare_distortions(WorstError& error) {
   auto x = scattered<float>({24, 31, 3}, 0, 255, 1);
   for (float& v : x.data) v = std::round(v) / 255;
@@ -67,7 +67,7 @@ void compare_distortions(WorstError& error) {
     expect_bits(apply_distortion(parse_distortion(name), x, CounterRng(7), 0, background), x, error);
 }
 
-// Positions far outside and undefined ones read the background.
+// Positions far outside and non-finite ones read the background.
 template <class T>
 void compare_far_warps(WorstError& error) {
   const std::vector<T> background{T(0.25)};
@@ -82,7 +82,7 @@ void compare_far_warps(WorstError& error) {
     }
 }
 
-// The two-dimensional sum, relative to 1, the largest value.
+// Compares with the two-dimensional sum, relative to 1, the largest value.
 template <class T>
 void compare_blur(double sigma, WorstError& error) {
   const Index h = 33, w = 20;

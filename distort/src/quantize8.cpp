@@ -16,7 +16,7 @@ Var<T> quantize8(Var<T> x) {
   parallel_for(n, kQuantizeGrain, [=](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       const T v = x.value()[i] * 255;
-      // Adding a half and truncating: std::round is a call on x86-64-v1.
+      // Adds a half and truncates: std::round is a function call on x86-64-v1.
       y[i] = v >= 255 ? T(1) : v > 0 ? static_cast<T>(static_cast<int>(v + T(0.5))) / 255 : T(0);
     }
   });

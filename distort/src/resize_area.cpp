@@ -11,17 +11,17 @@
 namespace fieldmark::distort {
 namespace {
 
-// For each of n cells of an axis, the cells of the other axis that it overlaps: indices at[start[i] ..
-// start[i + 1]) and their weights.
+// For each of the n cells of an axis, the overlapping cells of the other axis: indices at[start[i] .. start[i
+// + 1]) and their weights.
 template <class T>
 struct Overlaps {
   const Index *start, *at;
   const T* weight;
 };
 
-// Lengths in units of which an axis has n * m: a cell of n has length m, a cell of m length n. The weight is
-// the overlap over the length of a pixel of the resized axis, so that the transposed table has the same
-// values.
+// Lengths are in units of which the axis has n * m: one of n cells has length m, one of m cells length n. The
+// weight is the overlap over the length of a pixel of the resized axis, so that the transposed table has the
+// same values.
 template <class T>
 Overlaps<T> overlaps(Tape<T>& tape, Index n, Index m, Index length, Index stride) {
   auto* start = tape.template scratch<Index>(n + 1);
@@ -89,7 +89,7 @@ Var<T> resize_area(Var<T> x, Index height, Index width) {
   T* half = tape.scratch(height * w * c);
   apply_rows(overlaps(tape, height, h, h, w * c), x.value(), height, w * c, half, false);
   apply_columns(overlaps(tape, width, w, w, c), half, height, w * c, width, c, y);
-  // Linear: dx = a^T dy b. The transposed tables are gathers too, so every row has one owner.
+  // Linear: dx = a^T dy b. The transposed tables also gather, so every row has one owner.
   tape.on_backward(out, [x, half, height, width, h, w, c](const T* dy) {
     Tape<T>& t = x.tape();
     bool fresh = false;

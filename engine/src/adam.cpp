@@ -23,7 +23,7 @@ void adam(double* x, double* g, double* m, double* v, Index n, const AdamScalars
 
 namespace {
 
-// 16k floats of four arrays are 256 KiB: a piece that fits a core's second level of cache.
+// 16k floats of four arrays are 256 KiB, which fits a core's L2 cache.
 constexpr Index kGrain = 16384;
 
 void check_option(const char* name, double value, bool ok, const char* want) {
@@ -147,7 +147,7 @@ std::vector<AdamRange> adam_ranges(const ParamStore<T>& store, const std::vector
             entries, [&](const auto& e) { return is_trained(e.role) && matches(g, e.name); }))
       throw ValueError("[adam_ranges] no trained parameter of the store has a name like '" + g.names + "'");
   std::vector<AdamRange> ranges;
-  bool joins = false;  // the entry before is the end of the last range
+  bool joins = false;  // the previous entry ends the last range
   for (const auto& e : entries) {
     const auto group = std::ranges::find_if(groups, [&](const AdamGroup& g) { return matches(g, e.name); });
     const bool trained = is_trained(e.role) && group != groups.end();

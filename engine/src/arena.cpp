@@ -19,7 +19,7 @@ constexpr std::size_t kGap = 0;
 
 constexpr int kSpoilt = 0xff;
 
-// More than half of the address space is a negative size that was converted.
+// A size above half of the address space comes from a converted negative number.
 std::size_t round_up(std::size_t bytes, std::size_t to) {
   if (bytes > std::numeric_limits<std::size_t>::max() / 2) throw std::bad_alloc();
   return (std::max<std::size_t>(bytes, 1) + to - 1) / to * to;

@@ -10,14 +10,14 @@
 namespace fieldmark {
 namespace {
 
-constexpr double kHeld = 0.5;  // what the gradient buffers hold before: a backward must add, never assign
+constexpr double kHeld = 0.5;  // initial content of the gradient buffers: a backward must add, never assign
 
-// How an input reaches the function. Its own leaf's buffer holds kHeld, so that a backward that assigns is
-// noticed. As the output of an op before, as in a network, its buffer is made by the tape and holds NaN until
-// somebody fills it.
+// How an input reaches the function. The buffer of a leaf holds kHeld, which reveals a backward that assigns.
+// An intermediate is the output of a preceding op, as in a network: the tape makes its buffer, which holds
+// NaN until it is filled.
 enum class Way { constant, leaf, intermediate };
 
-// Gradients of every input on one way, and what to call it in a report.
+// How each input reaches the function in one pass, and the name of the pass in a report.
 struct Pass {
   std::vector<Way> ways;
   int backwards = 1;  // on one tape
@@ -31,8 +31,8 @@ std::string list_of(const std::vector<Way>& ways) {
   return list;
 }
 
-// All inputs as leaves, once and twice, and as intermediates; then every subset of them, of more than kMost
-// inputs each alone and all but each.
+// All inputs as leaves, once and twice, and as intermediates; then every subset of the inputs, or, for more
+// than kMost inputs, each alone and all but each.
 std::vector<Pass> passes(std::size_t inputs) {
   constexpr std::size_t kMost = 6;
   std::vector<Pass> all{{std::vector<Way>(inputs, Way::leaf), 1, ""},
@@ -185,7 +185,7 @@ class Checker {
   const GradcheckOptions& options_;
   Tape<double> tape_;
   std::vector<double> plain_, cotangent_;
-  double rounding_ = 0;  // of the function's value, summed with the cotangent
+  double rounding_ = 0;  // rounding error of the function's value, summed with the cotangent
   GradcheckReport report_;
 };
 

@@ -43,7 +43,7 @@ constexpr std::array<double, 12> kTargets{1, 0, 0.5, 0.9, 0.1, 1, 0, 0, 0.2, 0.7
 constexpr std::array<double, 5> kLin{0.3, 1.1, 0.7, 1.9, 0.2};
 constexpr std::array<double, 4> kMean{0.2, -0.1, 0.4, 0}, kVariance{1, 0.3, 0.5, 2};
 
-// Biases that hold every ReLU well open or well shut: differences must not step over its kink.
+// Biases that keep every ReLU clearly active or inactive: differences must not step over its kink.
 Tensor<double> biases(Index n) {
   Tensor<double> b = mixed({n}, 3);
   for (Index i = 0; i < n; ++i) b[i] += i % 2 == 0 ? 100 : -100;
@@ -115,7 +115,7 @@ Cases layout() {
 }
 
 Cases losses() {
-  // Differences of 0.15 to 0.37 and of -0.88 to -0.68: either side of huber's delta of 0.5.
+  // Differences of 0.15 to 0.37 and of -0.88 to -0.68, on either side of huber_loss's delta of 0.5.
   const auto x = off_zero({3, 4}), logits = off_zero({4, 3});
   auto y = x;
   for (Index i = 0; i < y.size(); ++i) y[i] += (i % 2 == 0 ? 0.15 : -0.9) + 0.02 * static_cast<double>(i);

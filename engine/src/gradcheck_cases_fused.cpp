@@ -8,7 +8,7 @@ namespace fieldmark {
 using namespace gradcheck_parts;
 
 namespace {
-// Of size 1 to 2.5, where 1 / x is smooth enough for differences.
+// Magnitudes from 1 to 2.5, where 1 / x is smooth enough for differences.
 Tensor<double> far_from_zero(Shape shape, double phase) {
   Tensor<double> t = off_zero(shape, phase);
   for (double& v : t.data) v += v < 0 ? -0.9 : 0.9;

@@ -6,7 +6,7 @@
 #include <type_traits>
 #include <utility>
 
-// What the parts of gradcheck_cases() share.
+// Helpers shared by the parts of gradcheck_cases().
 namespace fieldmark {
 
 std::vector<GradcheckCase> fused_gradcheck_cases();
@@ -28,14 +28,14 @@ inline Tensor<double> off_zero(Shape shape, double phase = 0) {
   return t;
 }
 
-// All different, at least 0.1 apart: differences must not change the largest of a window.
+// Values at least 0.1 apart: differences must not change the largest of a window.
 inline Tensor<double> apart(Shape shape) {
   Tensor<double> t(shape);
   for (Index i = 0; i < t.size(); ++i) t[i] = 0.1 * static_cast<double>(i * 37 % 101);
   return t;
 }
 
-// The check of an op; a generic lambda, which runs on Duals too, is also checked to second order.
+// Checks an op. A generic lambda, which runs on Duals too, is also checked to second order.
 template <class F>
 Cases make(const std::string& name, F f, std::vector<Tensor<double>> inputs) {
   Cases cases{{name, [=] { return gradcheck(f, inputs); }}};

@@ -38,7 +38,7 @@ Tensor<double> positive(Shape shape, double phase = 0) {
   return t;
 }
 
-// Multiples of a fifth, plus an offset: differences must not step over kinks a tenth away.
+// Multiples of 1/5 plus an offset: differences must not step over kinks 1/10 away.
 Tensor<double> stepped(Shape shape, double phase, double offset = 0) {
   Tensor<double> t = off_zero(shape, phase);
   for (double& v : t.data) v = std::round(5 * v) / 5 + offset;

@@ -12,7 +12,7 @@
 namespace fieldmark {
 namespace {
 
-// fused() rounds in another order than its steps one by one.
+// fused() rounds in another order than its steps run one by one.
 constexpr double kSameValue = 1e-14;
 
 using Tensors = std::vector<Tensor<double>>;
@@ -44,7 +44,7 @@ class SecondOrderChecker {
   }
 
  private:
-  // In [-1, 1], different for each tensor.
+  // Returns values in [-1, 1] that differ from tensor to tensor.
   Tensor<double> random(Shape shape, std::size_t which) const {
     const CounterRng rng(options_.seed, which);
     Tensor<double> t(shape);
@@ -91,7 +91,7 @@ class SecondOrderChecker {
         fail("value " + std::to_string(i) + " of Duals is another than of Vars");
   }
 
-  // `differentiated`: the size of what the differences come from, whose rounding they magnify.
+  // `differentiated`: the magnitude of the differenced values, whose rounding the differences amplify.
   void compare(const std::string& what, const Tensor<double>& product, const Tensor<double>& numeric,
                double differentiated) {
     const double floor =

@@ -9,8 +9,9 @@
 namespace fieldmark {
 namespace {
 
-// "add" of "fieldmark::Var<T> fieldmark::add(fieldmark::Var<T>, fieldmark::Var<T>) [with T = float]": the
-// last name before the list of parameters, without template arguments; of a call operator its class.
+// Returns "add" for "fieldmark::Var<T> fieldmark::add(fieldmark::Var<T>, fieldmark::Var<T>) [with T =
+// float]": the last name before the parameter list, without template arguments; for a call operator, its
+// class.
 std::string short_name(std::string_view function) {
   int depth = 0;
   std::size_t begin = 0, before = 0, end = function.size();
@@ -22,7 +23,7 @@ std::string short_name(std::string_view function) {
       if (i == 0 || function[i - 1] != ':') before = begin;
       begin = i + 1;
     }
-    // "(anonymous namespace)" is no list of parameters.
+    // "(anonymous namespace)" is not a parameter list.
     if (c == '(' && function.compare(i, 6, "(anony") != 0) end = i;
   }
   if (function.compare(begin, 10, "operator()") == 0) begin = before;
@@ -35,7 +36,7 @@ std::string place_of(const std::source_location& from) {
   return std::string(file.substr(file.rfind('/') + 1)) + ":" + std::to_string(from.line());
 }
 
-// The first element that is not finite, or n.
+// Index of the first non-finite element, or n.
 template <class T>
 Index first_nonfinite(const T* p, Index n) {
   return std::find_if(p, p + n, [](T x) { return !std::isfinite(x); }) - p;
@@ -64,7 +65,7 @@ std::string padded(std::string text, std::size_t width) {
   return text;
 }
 
-// The statistics of this name, new ones at the end.
+// Finds the statistics of this name, or appends new ones.
 TensorStats& stats_of(std::vector<TensorStats>& all, std::string_view name) {
   const auto found =
       std::find_if(all.begin(), all.end(), [&](const TensorStats& s) { return s.name == name; });
@@ -73,13 +74,13 @@ TensorStats& stats_of(std::vector<TensorStats>& all, std::string_view name) {
   return all.back();
 }
 
-// The gradient as the layers keep it: masked, and so not Var::grad(), behind a ReLU that nobody asks for.
+// The gradient as the layers hold it: unlike Var::grad(), it may be masked behind a ReLU.
 template <class T>
 const T* kept_gradient(Var<T> v) {
   return detail::Shortcuts<T>::grad(v);
 }
 
-constexpr const char* kInput = "input";  // stands for the op of a constant or a leaf
+constexpr const char* kInput = "input";  // the op name of a constant or a leaf
 
 }  // namespace
 
@@ -124,7 +125,7 @@ void TapeInspector<T>::made(Var<T> out, std::span<const Var<T>> inputs, const st
 template <class T>
 void TapeInspector<T>::recorded(Var<T> out) {
   const auto found = numbers_.find(out.id());
-  if (found == numbers_.end()) return;  // made before the inspector was
+  if (found == numbers_.end()) return;  // made before the inspector
   const Node& node = nodes_[found->second];
   OpCost& c = cost(node.op);
   ++c.calls;
@@ -165,7 +166,7 @@ void TapeInspector<T>::after_backward(Var<T> out) {
   c.backward_seconds += seconds;
   c.backward_bytes += static_cast<Index>(tape_.arena().used() - used_);
   for (const std::size_t i : node.inputs)
-    if (nodes_[i].inputs.empty()) measure_gradient(nodes_[i]);  // of an op's output it is not complete yet
+    if (nodes_[i].inputs.empty()) measure_gradient(nodes_[i]);  // that of an op's output is not complete yet
   if (!options_.stop_at_nonfinite) return;
   for (const std::size_t i : node.inputs) {
     const Var<T>& v = nodes_[i].v;
@@ -208,7 +209,7 @@ std::vector<TensorStats> TapeInspector<T>::gradient_stats() const {
   return all;
 }
 
-// Whether a value is a part of an input, as of a reshape.
+// True if a value shares the memory of an input, as after a reshape.
 template <class T>
 bool TapeInspector<T>::shares_memory(const Node& n) const {
   return std::any_of(n.inputs.begin(), n.inputs.end(), [&](std::size_t i) {

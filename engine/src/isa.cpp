@@ -67,7 +67,7 @@ Bf16Units bf16_units() {
     // Intel's manual, volume 2A, CPUID: leaf 7.1 EAX bit 5 is AVX512_BF16, leaf 7.0 EDX bits 22 and 24 AMX's.
     const bool dot = isa_supported() == Isa::v4 && __get_cpuid_count(7, 1, &a, &b, &c, &d) && (a >> 5 & 1);
     const bool tiles = dot && __get_cpuid_count(7, 0, &a, &b, &c, &d) && (d >> 22 & 1) && (d >> 24 & 1);
-    // Linux saves the tile registers on request only (5.16: ARCH_REQ_XCOMP_PERM, 18).
+    // Linux saves the tile registers only on request (5.16: ARCH_REQ_XCOMP_PERM, 18).
     if (tiles && syscall(SYS_arch_prctl, 0x1023, 18) == 0) return Bf16Units::tiles;
     return dot ? Bf16Units::dot : Bf16Units::none;
   }();

@@ -24,7 +24,7 @@ std::string entry_names(const SafetensorsFile& file) {
   return names.empty() ? "none" : names;
 }
 
-// "a FIELD", "an OWNER": as the command line calls them.
+// "a FIELD", "an OWNER", as in the command line.
 std::string with_article(std::string_view kind) {
   std::string upper(kind);
   for (char& c : upper) c = c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
@@ -55,7 +55,7 @@ ModelInfo model_info(const SafetensorsFile& file) {
   const json entry = json::parse(text->second, nullptr, false);
   if (!entry.is_object())
     fail(file, where + "expected a JSON object, found '" + text->second.substr(0, 60) + "'");
-  // Before all else: another format may have other keys.
+  // Checked first, because another format may have other keys.
   if (!entry.contains("format") || entry["format"] != kFormat) {
     fail(file, where + "expected format " + std::to_string(kFormat) + ", found " + found(entry, "format"));
   }

@@ -11,7 +11,7 @@ namespace {
 
 using Real = long double;
 
-// Dense in [lo, hi], and denser near 0.
+// Samples [lo, hi] densely, and more densely near 0.
 template <class T>
 Tensor<T> points(double lo, double hi) {
   Tensor<T> x(Shape{20001});
@@ -30,8 +30,8 @@ Real tanh_of(Real x) { return std::tanh(x); }
 Real tanh_slope(Real x) { return 1 / (std::cosh(x) * std::cosh(x)); }
 Real softplus_of(Real x) { return x > 60 ? x : std::log1p(std::exp(x)); }
 
-// An activation y = f(x) on [lo, hi], where float has normal results, against its definition and slope.
-// Errors are relative to the magnitude, that of the slope to slope_scale if that is larger.
+// Compares an activation y = f(x) with its definition and slope on [lo, hi], where float has normal results.
+// Errors are relative to the magnitude; those of the slope to slope_scale if that is larger.
 struct Sweep {
   double lo, hi;
   Real (*value)(Real), (*slope)(Real);
@@ -66,7 +66,7 @@ void add_sweeps(std::vector<NumericsCase>& cases) {
             {-87.3, 100, softplus_of, logistic, 0}, [](auto v) { return softplus(v); });
 }
 
-// At the limits of T each has the value that its header states.
+// At the limits of T, each function has the value that its header states.
 template <class T>
 void compare_limits(WorstError& error) {
   using Limits = std::numeric_limits<T>;
@@ -109,7 +109,7 @@ void compare_bce(T target, bool relative, WorstError& error) {
   }
 }
 
-// One certain label; the other three share the remaining probability.
+// One near-certain label; the other three share the remaining probability.
 template <class T>
 void compare_entropy(WorstError& error) {
   for (const double sure : {-1e4, -85.0, -20.0, 0.0, 1.0, 10.0, 16.0, 20.0, 40.0, 85.0, 1e4}) {
@@ -133,7 +133,7 @@ void compare_entropy(WorstError& error) {
   }
 }
 
-// Logits of +-1e30 and a vocabulary of 200,000, labels likely and not.
+// Logits of +-1e30 and a vocabulary of 200,000, with likely and unlikely labels.
 template <class T>
 void compare_large_entropy(WorstError& error) {
   const auto check = [&](const Tensor<T>& x, std::int32_t label) {
@@ -170,8 +170,8 @@ void add_elementwise_numerics(std::vector<NumericsCase>& cases) {
                [](auto t, WorstError& e) { compare_bce(static_cast<decltype(t)>(0.3), false, e); });
   add_numerics(cases, "softmax: cross-entropy of labels certain to 1e4", "value, slope", 5e-7, 5e-16,
                [](auto t, WorstError& e) { compare_entropy<decltype(t)>(e); });
-  // The exponentials are added in T in 4 to 16 parts, at worst with n / 4 u = 3e-3 in float. Measured: 4e-5
-  // in 4 parts, 2e-5 in 8.
+  // The exponentials are added in T in 4 to 16 partial sums, with an error of at most n / 4 u = 3e-3 in
+  // float. Measured: 4e-5 with 4 partial sums, 2e-5 with 8.
   add_numerics(cases, "softmax: cross-entropy of +-1e30 and of 200,000 columns", "value, slope", 1e-4, 5e-14,
                [](auto t, WorstError& e) { compare_large_entropy<decltype(t)>(e); });
 }

@@ -8,9 +8,9 @@
 
 #include "numerics_cases_parts.h"
 
-// The ops compute in double and round results to T once. So an error is at most u_T |exact| for the rounding,
-// plus n u_double times what the condition of the matrix makes of it; "condition" in the tables below is that
-// amplified size, scaled by kToType so that one limit in units of u_T bounds both.
+// The ops compute in double and round results to T once. An error is thus at most u_T |exact| for the
+// rounding, plus n u_double amplified by the condition of the matrix. "condition" in the tables below is the
+// amplified magnitude, scaled by kToType so that one limit in units of u_T bounds both.
 namespace fieldmark {
 namespace {
 
@@ -46,7 +46,7 @@ ExactMatrix size(const ExactMatrix& m) { return m.cwiseAbs(); }
 ExactMatrix solved(const ExactMatrix& m, const ExactMatrix& b) { return m.partialPivLu().solve(b); }
 ExactMatrix inverted(const ExactMatrix& m) { return solved(m, ExactMatrix::Identity(m.rows(), m.rows())); }
 
-// The same of a triangle, by substitution: pivots would mix rows of different size.
+// The same for a triangle, by substitution: pivoting would mix rows of different magnitude.
 ExactMatrix substituted(const ExactMatrix& m, const ExactMatrix& b) {
   const Index n = m.rows();
   const bool upper = m.isUpperTriangular();
@@ -75,7 +75,7 @@ void compare_matrix(const std::vector<T>& got, const ExactMatrix& want, Real sca
   compare_matrix(got, want, ExactMatrix::Constant(want.rows(), want.cols(), scale), error);
 }
 
-// 1 / (i + k + 1) in T: condition 9e5 of 5 rows, 4e13 of 10, near what float and double can hold.
+// 1 / (i + k + 1) in T: condition 9e5 for 5 rows and 4e13 for 10, near the limits of float and double.
 template <class T>
 Tensor<T> hilbert(Index n) {
   Tensor<T> a({n, n});
@@ -85,7 +85,7 @@ Tensor<T> hilbert(Index n) {
 template <class T>
 constexpr Index kHardest = sizeof(T) == 4 ? 5 : 10;
 
-// a x = b for Hilbert's matrix of 5 rows: the residual stays small whatever the condition is.
+// a x = b for Hilbert's matrix of 5 rows: the residual stays small whatever the condition.
 template <class T>
 void compare_residual(WorstError& error) {
   constexpr Index n = 5;
@@ -101,9 +101,9 @@ void compare_residual(WorstError& error) {
   }
 }
 
-// x and both gradients of m x = b, where an error of a solve is n u |m^-1| |m| |x| (Higham 2002, section 9.3,
-// with |L||U| of the size of |m|), and da = -db x^T where a is read, its transpose if m is a^T. `solve` gives
-// the exact solutions.
+// x and both gradients of m x = b. The error of a solve is n u |m^-1| |m| |x| (Higham 2002, section 9.3, with
+// |L||U| as large as |m|), and da = -db x^T where a is read, or its transpose if m is a^T. `solve` gives the
+// exact solutions.
 template <class T>
 void compare_solution(const std::vector<std::vector<T>>& got, const ExactMatrix& m,
                       ExactMatrix (*solve)(const ExactMatrix&, const ExactMatrix&), const ExactMatrix& b,
@@ -137,7 +137,8 @@ void compare_solve(WorstError& error) {
                    error);
 }
 
-// Triangles with a diagonal from 1 to 3e-4 and entries up to 1 beside it, NaN on the side that is not read.
+// Triangles with a diagonal from 1 to 3e-4, off-diagonal entries up to 1, and NaN on the side that is not
+// read.
 template <class T>
 void compare_triangular_solve(WorstError& error) {
   constexpr Index n = 8, k = 2;
@@ -182,7 +183,7 @@ void compare_inverse(WorstError& error) {
                  error);
 }
 
-// Of Hilbert's matrix of 5 rows. An error of L reaches the gradient through two solves with L, whose
+// For Hilbert's matrix of 5 rows. An error of L reaches the gradient through two solves with L, whose
 // condition is 700.
 template <class T>
 void compare_cholesky(bool gradient, WorstError& error) {
@@ -209,7 +210,7 @@ void compare_singular_determinant(WorstError& error) {
   for (std::size_t i = 0; i < cofactors.size(); ++i) error.compare(got[1][i], cofactors[i], 1);
 }
 
-// Rows from 1e-12 to 1e12 in size: each row of the gradient relative to its own largest.
+// Rows with magnitudes from 1e-12 to 1e12: each row of the gradient is relative to its own largest entry.
 template <class T>
 void compare_scaled_determinant(WorstError& error) {
   constexpr Index n = 5;
@@ -224,7 +225,7 @@ void compare_scaled_determinant(WorstError& error) {
   compare_matrix(got[1], want, product(size(want).rowwise().maxCoeff(), ExactMatrix::Ones(1, n)), error);
 }
 
-// Determinants far beyond the range of double; the logarithm relative to those of the pivots.
+// Determinants far beyond the range of double; the logarithm is relative to those of the pivots.
 template <class T>
 void compare_log_determinant(WorstError& error) {
   constexpr Index n = 40;
@@ -241,7 +242,7 @@ void compare_log_determinant(WorstError& error) {
   }
 }
 
-// Three eigenvalues that differ by some units of rounding, a pair 1e-3 apart and one far away.
+// Three eigenvalues that differ by 512 units of rounding, a pair 1e-3 apart and one far away.
 template <class T>
 Tensor<T> clustered(double level) {
   constexpr Index n = 6;
@@ -266,8 +267,8 @@ void compare_eigenvalues(WorstError& error) {
   }
 }
 
-// Near-equal eigenvalues have no vectors of their own, but the gradient of what treats them alike is well
-// defined: the projector on their space. One eigenvalue alone has an error of |a| / gap.
+// Near-equal eigenvalues have no eigenvectors of their own, but the gradient of a function that treats them
+// alike is well defined: the projector onto their space. A single eigenvalue has an error of |a| / gap.
 template <class T>
 void compare_eigenvalue_gradients(WorstError& error) {
   constexpr Index n = 6;
@@ -292,7 +293,8 @@ void compare_eigenvalue_gradients(WorstError& error) {
 void add_matrix_numerics(std::vector<NumericsCase>& cases) {
   add_numerics(cases, "linear_solve: residual of Hilbert's matrix", "1", 2e-7, 1e-15,
                [](auto t, WorstError& e) { compare_residual<decltype(t)>(e); });
-  // 2 n u of the elimination with n = 10; in float the rounding to it, u, and for da two such factors.
+  // 2 n u from the elimination with n = 10; in float, u from the rounding to float, and two such factors for
+  // da.
   add_numerics(cases, "linear_solve: solve with Hilbert's matrix, gradients", "value, condition", 1.2e-7,
                2e-15, [](auto t, WorstError& e) { compare_solve<decltype(t)>(e); });
   // n u with n = 8.
@@ -300,8 +302,8 @@ void add_matrix_numerics(std::vector<NumericsCase>& cases) {
                [](auto t, WorstError& e) { compare_triangular_solve<decltype(t)>(e); });
   add_numerics(cases, "linear_solve: inverse of Hilbert's matrix, gradient", "value, condition", 1.2e-7,
                2e-15, [](auto t, WorstError& e) { compare_inverse<decltype(t)>(e); });
-  // Bounds are n u times the condition 9e5 of a, 5e-10, and in float one rounding, in the gradient times 2 *
-  // 700. Errors measured are far below: 5e-15 and 1e-12, in float 9e-8 of the gradient.
+  // Bounds: n u times the condition 9e5 of a, 5e-10; in float one rounding, times 2 * 700 in the gradient.
+  // The measured errors are far below: 5e-15 and 1e-12, and 9e-8 for the gradient in float.
   add_numerics(cases, "cholesky: of Hilbert's matrix", "largest", 6e-8, 2e-14,
                [](auto t, WorstError& e) { compare_cholesky<decltype(t)>(false, e); });
   add_numerics(cases, "cholesky: gradient at Hilbert's matrix", "largest", 4e-7, 4e-12,

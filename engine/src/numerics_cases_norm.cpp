@@ -10,7 +10,7 @@ namespace fieldmark {
 namespace {
 
 using Real = long double;
-constexpr Real kEps = 1e-5L;  // the options' default
+constexpr Real kEps = 1e-5L;  // default of the options
 
 // y and its gradients for the cotangent g; x_i is normalised over the set set_of(i).
 struct Exact {
@@ -50,7 +50,7 @@ std::vector<Tensor<T>> inputs(Shape s, double centre, double spread) {
           scattered<T>({s[-1]}, -0.5, 0.5, 3)};
 }
 
-// Errors relative to the largest magnitude of the tensor.
+// Errors are relative to the largest magnitude of the tensor.
 template <class T>
 void compare_all(const std::vector<std::vector<T>>& got, const Exact& want, WorstError& error) {
   const std::vector<Real>* kinds[] = {&want.y, &want.dx, &want.dgamma, &want.dbeta};
@@ -98,7 +98,7 @@ void compare_layer_norm(const std::vector<Tensor<T>>& in, WorstError& error) {
       [=](Index i) { return at(i / columns); }, error);
 }
 
-// A constant image, or a set of one element, gives beta in every bit and finite gradients.
+// A constant image, or a set of one element, gives exactly beta and finite gradients.
 template <class T>
 void compare_constant(WorstError& error) {
   for (const Shape s : {Shape{1, 8, 8, 4}, Shape{2, 1, 1, 2}})
@@ -111,7 +111,7 @@ void compare_constant(WorstError& error) {
         for (std::size_t i = 0; i < (*got)[0].size(); ++i)
           error.equal((*got)[0][i], in[2].data[i % at(s[3])]);
         for (const T v : (*got)[1]) error.equal(std::isfinite(v), true);
-        for (const T v : (*got)[2]) error.equal(v, 0);  // of gamma: every normalised value is 0
+        for (const T v : (*got)[2]) error.equal(v, 0);  // gradient of gamma: every normalised value is 0
       }
     }
 }

@@ -10,7 +10,7 @@ void add_norm_numerics(std::vector<NumericsCase>& cases);
 void add_sum_numerics(std::vector<NumericsCase>& cases);
 void add_tensor_numerics(std::vector<NumericsCase>& cases);
 
-// A magnitude of at least the least normal number: below it rounding is absolute.
+// Raises a magnitude to at least the smallest normal number, below which rounding is absolute.
 template <class T>
 long double size_of(long double exact) {
   return std::max(std::abs(exact), static_cast<long double>(std::numeric_limits<T>::min()));

@@ -37,7 +37,7 @@ void compare_sums(WorstError& error) {
   check(one_value<T>([&](auto v) { return mse_loss(v, v.tape().constant(zero)); }, x), squares / kPixels);
 }
 
-// Pairs of 1e6 and 1/16 - 1e6: exact in double sums, lost in float ones.
+// Pairs of 1e6 and 1/16 - 1e6: exact in double sums, lost in float sums.
 template <class T>
 void compare_cancelling_sum(WorstError& error) {
   Tensor<T> x({kPixels});
@@ -53,7 +53,7 @@ void compare_equal_pixels(WorstError& error) {
   error.compare(got, x[0], x[0]);
 }
 
-// Gradients of a layer over many rows, relative to the sum of the terms' magnitudes.
+// Gradients of a layer over many rows, relative to the sum of the magnitudes of the terms.
 template <class T>
 void compare_long_gradients(WorstError& error) {
   constexpr Index rows = 300'000, in = 3, out = 5;
@@ -100,7 +100,7 @@ void compare_adam(WorstError& error) {
   for (std::size_t i = 0; i < want.size(); ++i) error.compare(x.data[i], want[i], o.lr);
 }
 
-// Without a gradient nothing moves; with skip_zero no moment decays either.
+// Without a gradient no parameter moves; with skip_zero no moment decays either.
 template <class T>
 void compare_adam_at_rest(WorstError& error) {
   for (const bool skip : {false, true}) {

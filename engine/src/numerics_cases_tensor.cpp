@@ -38,8 +38,8 @@ Real elu_of(Real x) { return x > 0 ? x : std::expm1(x); }
 Real elu_slope(Real x) { return x > 0 ? 1 : std::exp(x); }
 Real exp_value(Real x) { return std::exp(x); }
 
-// y = f(x) at 4001 points of [lo, hi] against its definition and slope, relative to the magnitude of each, at
-// least `scale`.
+// Compares y = f(x) at 4001 points of [lo, hi] with its definition and slope, relative to the magnitude of
+// each but at least `scale`.
 struct Curve {
   double lo, hi;
   Real (*value)(Real), (*slope)(Real);
@@ -108,7 +108,7 @@ void compare_axis_sums(WorstError& error) {
   }
 }
 
-// Logits around +-1e4, and rows of which nothing, or all, is infinite.
+// Logits around +-1e4, and rows with infinite elements, one of them all -infinity.
 template <class T>
 void compare_logsumexp(WorstError& error) {
   constexpr T inf = std::numeric_limits<T>::infinity();
@@ -128,7 +128,7 @@ void compare_logsumexp(WorstError& error) {
   check({inf, 0}, std::numeric_limits<Real>::infinity(), {1, 0});
 }
 
-// Rows far from 0, whose variance a sum of squares would lose; a constant row gives beta.
+// Rows far from 0, whose variance would be lost in a sum of squares; a constant row gives beta.
 template <class T>
 void compare_layer_norm(WorstError& error) {
   constexpr Index columns = 64;
@@ -151,7 +151,7 @@ void compare_layer_norm(WorstError& error) {
   }
 }
 
-// Along either axis, pairs of 1e6 and 1/16 - 1e6: exact in double sums, lost in float ones.
+// Along either axis, pairs of 1e6 and 1/16 - 1e6: exact in double sums, lost in float sums.
 template <class T>
 void compare_cancelling_axes(WorstError& error) {
   constexpr Index pairs = 100'000, columns = 3;
@@ -168,7 +168,7 @@ void compare_cancelling_axes(WorstError& error) {
   }
 }
 
-// Rows around 1e4, of which E[x^2] - E[x]^2 would keep no digit in float.
+// Rows around 1e4, for which E[x^2] - E[x]^2 would keep no digit in float.
 template <class T>
 void compare_variance(WorstError& error) {
   constexpr Index rows = 4, columns = 1000;
@@ -176,7 +176,7 @@ void compare_variance(WorstError& error) {
   const auto got =
       values_and_gradients<T>([](auto&, const auto& v) { return variance(v[0], {1}); }, {x}, ones<T>);
   for (Index r = 0; r < rows; ++r) {
-    std::vector<Real> off(columns);  // from 1e4, exact: a mean of 1e4 would be rounded in long double too
+    std::vector<Real> off(columns);  // from 1e4, exact: a mean of 1e4 would be rounded even in long double
     Real mean = 0, square = 0;
     for (Index c = 0; c < columns; ++c) mean += (off[at(c)] = x[r * columns + c] - Real{1e4}) / columns;
     for (Real& o : off) square += (o - mean) * (o - mean);
@@ -206,7 +206,7 @@ void compare_cumsum(WorstError& error) {
   check(got[1], g, true);
 }
 
-// The gradient of one entry that 100,000 others are: added in T.
+// The gradient of one entry that is gathered 100,000 times, added in T.
 template <class T>
 void compare_gather(WorstError& error) {
   constexpr Index n = 100'000;
@@ -244,7 +244,7 @@ void compare_pow(bool near_one, WorstError& error) {
   }
 }
 
-// Where a factor of a slope is 0 and the other infinite, or a value is at the end of its range.
+// Slopes with one factor 0 and the other infinite, and values at the ends of the range.
 template <class T>
 void compare_edges(WorstError& error) {
   constexpr T nan = std::numeric_limits<T>::quiet_NaN(), top = std::numeric_limits<T>::max();
@@ -276,16 +276,18 @@ void add_tensor_numerics(std::vector<NumericsCase>& cases) {
                [](auto t, WorstError& e) { compare_layer_norm<decltype(t)>(e); });
   add_numerics(cases, "reduce_axes: pairs that cancel along either axis", "bits", 0, 0,
                [](auto t, WorstError& e) { compare_cancelling_axes<decltype(t)>(e); });
-  // The mean is rounded to T: its error of at most 1e4 u squared, over the variance of 1/3.
+  // The mean is rounded to T: the square of its error, at most 1e4 u, over the variance of 1/3.
   add_numerics(cases, "reduce_axes: variance of 10000 +- 1, gradient", "value, largest slope", 2e-6, 1e-15,
                [](auto t, WorstError& e) { compare_variance<decltype(t)>(e); });
-  // Running sums in double, whose roundings stay near u beside the sum of sizes; in float one rounding.
+  // Running sums in double, whose rounding errors stay near u relative to the sum of sizes; in float, one
+  // rounding.
   add_numerics(cases, "layout: cumsum of a million values, gradient", "sum of sizes", 6e-8, 6e-16,
                [](auto t, WorstError& e) { compare_cumsum<decltype(t)>(e); });
-  // Added in T: roundings of sums that stay small beside the sum of sizes, measured 5e-8 and 1e-16.
+  // Added in T: the sums stay small relative to the sum of sizes, and so do their rounding errors; measured
+  // 5e-8 and 1e-16.
   add_numerics(cases, "gather: gradient of an entry taken 100,000 times", "sum of sizes", 2e-7, 5e-16,
                [](auto t, WorstError& e) { compare_gather<decltype(t)>(e); });
-  // A power of 2 u and three products of u each.
+  // 2 u from the power and u from each of three products.
   add_numerics(cases, "arithmetic: pow from 1e-30 to 1e30", "value, slopes, |log a|", 3e-7, 6e-16,
                [](auto t, WorstError& e) { compare_pow<decltype(t)>(false, e); });
   add_numerics(cases, "arithmetic: pow next to 1, exponents to 1e4", "value, slopes, |log a|", 3e-7, 6e-16,

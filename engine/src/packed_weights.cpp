@@ -90,7 +90,7 @@ std::size_t PackedWeights<T>::place(ParamId id) const {
   return at(id.index);
 }
 
-// Evenly over the parameter, the first and the last number among them.
+// Samples elements evenly over the parameter, including the first and the last.
 template <class T>
 typename PackedWeights<T>::Witnesses PackedWeights<T>::witnesses(std::size_t i) const {
   const auto& e = store_->entries()[i];
@@ -106,7 +106,7 @@ void PackedWeights<T>::check_current(std::size_t i) const {
   if (isa_ != isa())
     throw ValueError(std::string("[packed_weights] weights were packed for another instruction set than ") +
                      isa_name() + ": call update() after a change of it");
-  // By bits: a NaN is equal to itself.
+  // Compares bits, so that a NaN equals itself.
   const Witnesses now = witnesses(i);
   if (std::memcmp(now.data(), witnesses_[i].data(), sizeof now) != 0)
     throw ValueError("[packed_weights] '" + store_->entries()[i].name +

@@ -20,7 +20,7 @@ ParamId ParamStore<T>::add(std::string_view name, Shape shape, ParamRole role) {
   if ((role == ParamRole::matrix || role == ParamRole::table) && shape.rank() != 2)
     throw ShapeError("[params] '" + std::string(name) +
                      "' must have two axes to be a matrix or a table, got shape " + shape.str());
-  // The same offsets for float and double, so that stores can be copied: 16 floats are a cache line.
+  // Offsets are the same for float and double, so that stores can be copied. 16 floats are a cache line.
   constexpr Index kLine = 16, kLarge = 4096;
   const Index offset = shape.size() >= kLarge ? (size() + kLine - 1) / kLine * kLine : size();
   entries_.push_back({std::string(name), shape, offset, role});

@@ -4,7 +4,7 @@
 namespace fieldmark {
 namespace {
 
-// One tensor for each input, of its shape.
+// Makes one tensor per input, of its shape.
 template <class T>
 void check_directions(const std::string& product, const std::string& name, std::span<const Tensor<T>> inputs,
                       std::span<const Tensor<T>> directions) {

@@ -38,7 +38,8 @@ std::pair<float, float> box_muller(std::uint32_t radius, std::uint32_t angle) {
 
 CounterRng::CounterRng(std::uint64_t seed, std::uint64_t stream) : key_{low(seed), high(seed)} {
   if (stream == 0) return;
-  // The second half of the counter keeps this block away from the small (a, b) that stream 0 is asked for.
+  // The second half of the counter keeps this block apart from the small (a, b) that callers request of
+  // stream 0.
   const auto block = philox(stream, ~std::uint64_t{0}, key_);
   key_ = {block[0], block[1]};
 }
@@ -75,8 +76,8 @@ std::array<float, 4> CounterRng::normal4(std::uint64_t a, std::uint64_t b) const
 Index CounterRng::below(Index n, std::uint64_t a, std::uint64_t b) const {
   if (n < 1) throw ValueError("[CounterRng::below] n must be at least 1, got " + std::to_string(n));
   const auto w = bits(a, b);
-  // High word of the 128-bit product: Lemire 2019 (Fast random integer generation in an interval), without
-  // rejection.
+  // High word of the 128-bit product, as in Lemire 2019 (Fast random integer generation in an interval), but
+  // without rejection.
   return static_cast<Index>(static_cast<Wide>(join(w[0], w[1])) * static_cast<Wide>(n) >> 64);
 }
 

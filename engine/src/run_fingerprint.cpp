@@ -10,7 +10,7 @@ namespace {
 
 using nlohmann::json;
 
-// Objects become names with slashes; an array is one value.
+// Flattens objects to names with slashes; an array is one value.
 void flatten(const std::string& name, const json& value, json& to) {
   if (!value.is_object()) {
     to[name] = value;
@@ -29,7 +29,7 @@ json read(const SafetensorsFile& file, const char* key) {
   return object;
 }
 
-// The first name whose values differ, or an empty one.
+// Returns the first name whose values differ, or an empty string.
 std::string difference(const json& a, const json& b) {
   for (const auto* object : {&a, &b})
     for (const auto& [name, value] : object->items())

@@ -16,7 +16,7 @@ using nlohmann::json;
 static_assert(std::endian::native == std::endian::little, "arrays are copied as they lie in memory");
 
 constexpr std::size_t kLengthBytes = 8;
-// The limit of the reference reader: a wrong length must not allocate the machine's memory.
+// The limit of the reference reader: a wrong length must not allocate all memory of the machine.
 constexpr std::uint64_t kMaxHeader = 100'000'000;
 constexpr char kMetadata[] = "__metadata__";
 
@@ -24,7 +24,7 @@ constexpr std::pair<std::string_view, std::uint64_t> kDtypes[] = {
     {"BOOL", 1}, {"U8", 1},  {"I8", 1},  {"F8_E5M2", 1}, {"F8_E4M3", 1}, {"U16", 2}, {"I16", 2}, {"F16", 2},
     {"BF16", 2}, {"U32", 4}, {"I32", 4}, {"F32", 4},     {"U64", 8},     {"I64", 8}, {"F64", 8}};
 
-/// Bytes of one element, 0 for an unknown dtype.
+/// Returns the bytes of one element, or 0 for an unknown dtype.
 std::uint64_t element_bytes(std::string_view dtype) {
   for (const auto& [name, bytes] : kDtypes)
     if (name == dtype) return bytes;
@@ -57,7 +57,7 @@ struct Reader {
   json parse_header(std::string_view text) const {
     if (text.empty() || text.front() != '{') fail("byte 8: expected '{', the start of the JSON header");
     std::set<std::string> names;
-    // Of two equal keys the parser keeps one and says nothing.
+    // The parser silently keeps one of two equal keys.
     const auto no_twins = [&](int depth, json::parse_event_t event, json& value) {
       if (event == json::parse_event_t::key && depth == 1 && !names.insert(value.get<std::string>()).second)
         fail(value.get<std::string>(), "expected once in the header, found twice");
@@ -114,7 +114,7 @@ struct Reader {
     }
   }
 
-  /// Bytes of a tensor of this shape.
+  /// Returns the bytes of a tensor of this shape.
   std::uint64_t size_of(const std::string& tensor, const Shape& shape, std::uint64_t element) const {
     std::uint64_t size = 0;
     if (__builtin_mul_overflow(static_cast<std::uint64_t>(shape.size()), element, &size) ||
@@ -160,7 +160,7 @@ Placed read_entry(const Reader& r, const std::string& name, const json& value) {
   return p;
 }
 
-/// Orders the tensors by place and requires that they cover the data without gap or overlap.
+/// Sorts the tensors by position and requires that they cover the data without gap or overlap.
 void check_cover(const Reader& r, std::vector<Placed>& placed) {
   std::stable_sort(placed.begin(), placed.end(), [](const Placed& a, const Placed& b) {
     return std::pair(a.begin, a.end) < std::pair(b.begin, b.end);
@@ -205,8 +205,8 @@ std::vector<T> elements(const SafetensorsFile& file, std::string_view name, std:
 
 float widen_half(std::uint16_t h) {
   const std::uint32_t sign = static_cast<std::uint32_t>(h & 0x8000) << 16, body = h & 0x7fffu;
-  // In a float's fields the exponent is 112 too small, that of infinities and NaN 224. The product with a
-  // power of 2 also normalises half's subnormals.
+  // In the fields of a float, the exponent is 112 too small, or 224 for infinities and NaN. The product with
+  // a power of 2 also normalises the subnormals of half.
   const float magnitude = body >= 0x7c00u ? std::bit_cast<float>((body << 13) + (224u << 23))
                                           : std::bit_cast<float>(body << 13) * 0x1p112f;
   return std::bit_cast<float>(std::bit_cast<std::uint32_t>(magnitude) | sign);

@@ -6,9 +6,9 @@
 
 namespace fieldmark {
 namespace {
-constexpr double kReserve = 0.965;             // of the time: steps of the cooldown may be slower
-constexpr double kEarly = 0.95, kLate = 1.02;  // of the time: a run that would end outside gets a new total
-constexpr double kNewest = 0.014;              // weight of a step in step_seconds_: a memory of some 70 steps
+constexpr double kReserve = 0.965;             // of the time: cooldown steps may be slower
+constexpr double kEarly = 0.95, kLate = 1.02;  // of the time; a run that would end outside gets a new total
+constexpr double kNewest = 0.014;              // weight of a step in step_seconds_: averages about 70 steps
 }  // namespace
 
 Schedule::Schedule(const ScheduleOptions& o) : options_(o), total_(o.steps), fixed_(o.steps > 0) {

@@ -5,7 +5,7 @@
 namespace fieldmark {
 namespace {
 std::string head(std::string_view op, std::string_view arg) {
-  std::string text = "[";  // not as one sum: GCC 12 warns of an overlap there that cannot be
+  std::string text = "[";  // not one expression: GCC 12 would warn of an impossible overlap
   text.append(op).append("] ").append(arg);
   return text;
 }

@@ -32,7 +32,7 @@ double ShardedLoop<T>::run_chunks(Index chunks, void* context, Body body, std::s
       losses_[static_cast<std::size_t>(c)] = body(context, c, s, tape, grads.data());
     }
   });
-  // Each number is summed over the shards by one thread, in shard order.
+  // One thread sums each element over the shards, in shard order.
   parallel_for(static_cast<Index>(into.size()), 8192, [&](Index begin, Index end) {
     for (const auto& grads : buffers_)
       for (Index i = begin; i < end; ++i)

@@ -14,7 +14,7 @@ constexpr const char* dtype_of() {
   return std::is_same_v<T, float> ? "F32" : std::is_same_v<T, double> ? "F64" : "I64";
 }
 
-// Copies an array of a file, whose type and number of elements must be those of `to`.
+// Copies an array of a file to `to`, whose type and number of elements must match.
 template <class T>
 void read_array(const SafetensorsFile& file, const std::string& name, std::span<T> to) {
   const SafetensorsFile::Entry& e = file.at(name);
@@ -24,7 +24,7 @@ void read_array(const SafetensorsFile& file, const std::string& name, std::span<
   std::memcpy(to.data(), e.data.data(), e.data.size());
 }
 
-// The elements of one parameter in a flat array.
+// Returns the elements of one parameter in a flat array.
 template <class T, class Entry>
 std::span<T> part_of(std::span<T> all, const Entry& e) {
   return all.subspan(at(e.offset), at(e.shape.size()));

@@ -51,7 +51,7 @@ void save(SafetensorsFile& file, const std::string& prefix, const ParamStore<T>&
                 });
 }
 
-// Everything is checked before anything changes.
+// Checks everything before changing anything.
 template <class T, class O>
 void load(const SafetensorsFile& file, const std::string& prefix, ParamStore<T>& store, O& optimiser) {
   check_optimiser("load_state", store, optimiser);

@@ -10,7 +10,7 @@ void TensorStats::merge(const TensorStats& other) {
   const auto mine = static_cast<double>(count - nonfinite);
   const auto theirs = static_cast<double>(other.count - other.nonfinite);
   if (theirs > 0) {
-    // Weights before sums: neither a sum nor a square of values near the end of the range may overflow.
+    // Weighted before summing: neither sums nor squares of values near the end of the range may overflow.
     const double w = mine / (mine + theirs), v = theirs / (mine + theirs);
     mean = w * mean + v * other.mean;
     rms = std::hypot(std::sqrt(w) * rms, std::sqrt(v) * other.rms);
@@ -33,7 +33,7 @@ TensorStats tensor_stats(std::string name, std::span<const T> elements) {
     s.largest = std::max(s.largest, std::abs(static_cast<double>(x)));
   }
   if (s.largest == 0) return s;
-  // Relative to the largest magnitude, so that sums and squares neither overflow nor vanish.
+  // Scaled by the largest magnitude, so that sums and squares neither overflow nor vanish.
   double sum = 0, squares = 0;
   for (const T x : elements) {
     if (!std::isfinite(x)) continue;

@@ -9,7 +9,7 @@
 namespace fieldmark {
 namespace {
 
-constexpr double kKeptLoss = 0.98, kNewestLoss = 0.02;  // of the running loss
+constexpr double kKeptLoss = 0.98, kNewestLoss = 0.02;  // weights of the running loss
 
 using detail::read_array;
 
@@ -137,7 +137,7 @@ void TrainingRun::restore(const std::filesystem::path& path) {
   if (present) file = std::move(*present);
   fingerprint().require(file);
   earlier_ = present.has_value();
-  restore_more(file);  // first: it may refuse the file
+  restore_more(file);  // first, because it may reject the file
   for (Trained& t : trained_)
     visit_arrays(t, [&](const std::string& name, std::span<float> elements, const Shape&) {
       read_array(file, name, elements);

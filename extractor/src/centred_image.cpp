@@ -6,7 +6,7 @@
 namespace fieldmark::extractor {
 namespace {
 
-constexpr Index kRows = 64;  // of one image in a piece
+constexpr Index kRows = 64;  // of one image in a chunk
 
 }  // namespace
 
@@ -18,7 +18,7 @@ Var<T> centred_image(Var<T> x, Index multiple) {
     throw ValueError("[centred_image] multiple must be at least 1, got " + std::to_string(multiple));
   const Index height = from[1] - from[1] % multiple, width = from[2] - from[2] % multiple;
   const Index rows = from[0] * height, wide = from[2] * from[3], kept = width * from[3];
-  // Row r of the result begins here in x.
+  // Offset in x of row r of the result.
   const auto start = [=](Index r) { return (r / height * from[1] + r % height) * wide; };
   T* y = nullptr;
   const Var<T> out = x.tape().output({from[0], height, width, from[3]}, &y, {x});
@@ -28,7 +28,7 @@ Var<T> centred_image(Var<T> x, Index multiple) {
       for (Index i = 0; i < kept; ++i) y[r * kept + i] = 2 * xv[start(r) + i] - 1;
   });
 
-  // dy/dx = 2 where a pixel is kept. A row of x has one owner.
+  // dy/dx = 2 for kept pixels. Each row of x has one owner.
   x.tape().on_backward(out, [x, rows, kept, start](const T* dy) {
     T* dx = x.grad_acc();
     parallel_for(rows, kRows, [=](Index begin, Index end) {

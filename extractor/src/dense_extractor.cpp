@@ -78,7 +78,7 @@ typename DenseExtractor<T>::Output DenseExtractor<T>::operator()(const Params<T>
   x = up(params, x, levels[2], up_[0]);
   x = up(params, x, levels[1], up_[1]);
 
-  // A 1 x 1 convolution is a dense layer on the places.
+  // A 1 x 1 convolution is a dense layer over the places.
   const Index height = x.shape()[1], width = x.shape()[2], places = height * width;
   const Var<T> features = x.tape().reshape(x, {places, x.shape()[3]});
   const Var<T> sign = x.tape().reshape(heads_[0](params, features), {places});

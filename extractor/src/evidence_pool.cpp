@@ -9,10 +9,10 @@
 namespace fieldmark::extractor {
 namespace {
 
-constexpr Index kPlaces = 256;             // in a piece
-constexpr double kLeastForeground = 1e-3;  // places a bit: an empty image has no evidence instead of noise
-constexpr double kSliver = 0.25;           // places: what a cell has to show to count
-constexpr double kTogether = 0.3;          // power of a cell's places that its evidence is divided by
+constexpr Index kPlaces = 256;             // per chunk
+constexpr double kLeastForeground = 1e-3;  // places per bit: an empty image has no evidence instead of noise
+constexpr double kSliver = 0.25;           // places: what a cell must show to count
+constexpr double kTogether = 0.3;          // exponent of a cell's places that its evidence is divided by
 
 template <class T>
 void check_pool(Var<T> sign, Var<T> index, std::span<const T> code, Index n_bits) {
@@ -29,8 +29,7 @@ void check_pool(Var<T> sign, Var<T> index, std::span<const T> code, Index n_bits
                      " numbers (cells x bits), got " + std::to_string(code.size()));
 }
 
-// sums[c] = sum_p tau_p q_c(p) for c < cells, and sum_p (1 - q_cells(p)) in sums[cells]; pieces added in
-// order.
+// sums[c] = sum_p tau_p q_c(p) for c < cells, and sum_p (1 - q_cells(p)) in sums[cells]; chunks add in order.
 template <class T>
 double* sums_over_places(Tape<T>& tape, const T* tau, const T* q, Index places, Index cells) {
   const Index pieces = (places + kPlaces - 1) / kPlaces, columns = cells + 1;
@@ -51,7 +50,7 @@ double* sums_over_places(Tape<T>& tape, const T* tau, const T* q, Index places, 
   return sums;
 }
 
-// Eight sums, so that the loop vectorises.
+// Eight partial sums, so that the loop vectorises.
 template <class T>
 T dot(const T* a, const T* b, Index n) {
   T acc[8] = {};
@@ -62,7 +61,7 @@ T dot(const T* a, const T* b, Index n) {
   return ((acc[0] + acc[1]) + (acc[2] + acc[3])) + ((acc[4] + acc[5]) + (acc[6] + acc[7]));
 }
 
-// What a pass over the places needs to turn the gradient of the sums into those of sign and index.
+// The coefficients for turning the gradient of the sums into those of sign and index.
 template <class T>
 struct PoolGradient {
   const T *tau, *q;
@@ -111,7 +110,7 @@ Var<T> pooled_bits(Var<T> sign, Var<T> index, std::span<const std::type_identity
   // With A_c = sum_p tau_p q_c(p), D = sum_p (1 - q_C(p)) / N_b + 1e-3 and L_b = sum_c A_c code[c, b] / D:
   //   v_c = dL/dA_c = sum_b dL_b code[c, b] / D,   u = dL/dq_C(p) = sum_b dL_b L_b / (D N_b),
   //   dq_c = tau_p v_c,   dtau_p = sum_c q_c v_c = m_p,   ds_p = m_p (1 - tau_p^2) / 2,
-  // and by the softmax dx_c = q_c (dq_c - sum_k q_k dq_k) with sum_k q_k dq_k = tau_p m_p + q_C u.
+  // and through the softmax dx_c = q_c (dq_c - sum_k q_k dq_k) with sum_k q_k dq_k = tau_p m_p + q_C u.
   T* v = tape.scratch(cells);
   tape.on_backward(out, [=](const T* dy) {
     double u = 0;
@@ -128,7 +127,7 @@ void cell_evidence(const float* sign, const float* index, Index places, Index ce
   if (places < 0 || cells < 0)
     throw ValueError("[cell_evidence] places and cells must not be negative, got " + std::to_string(places) +
                      " and " + std::to_string(cells));
-  // Each piece holds the cells' sums of q tanh(s / 2), then those of q.
+  // Each chunk holds the cells' sums of q tanh(s / 2), then those of q.
   const Index pieces = (places + kPlaces - 1) / kPlaces;
   std::vector<double> parts(static_cast<std::size_t>(pieces * 2 * cells));
   parallel_for(places, kPlaces, [&](Index begin, Index end) {

@@ -16,12 +16,12 @@
 namespace fieldmark::extractor {
 namespace {
 
-// Size of a direction's entries. Thousands of weights move together, so that the differences' step must be
-// smaller than for one number.
+// Size of a direction's entries. Thousands of weights move together, so the finite-difference step must be
+// smaller than for a single number.
 constexpr double kDirection = 0.02;
 constexpr Index kImageDirections = 6;
 
-// Fixed numbers in (-1, 1) without a pattern.
+// Fixed pattern-free numbers in (-1, 1).
 Tensor<double> numbers(Shape shape, double phase) {
   Tensor<double> t(shape);
   for (Index i = 0; i < t.size(); ++i) t[i] = std::sin(phase + 1.7 * static_cast<double>(i * i + i));
@@ -34,7 +34,7 @@ Tensor<double> view_image(Shape shape) {
   return t;
 }
 
-// Holds every ReLU well open or well shut, in turns: differences must not step over its kink.
+// Keeps every ReLU clearly open or closed, alternating, so that differences do not cross a kink.
 void keep_from_kinks(ParamStore<double>& store) {
   for (const auto& e : store.entries()) {
     const double size = e.name.ends_with("norm/beta") ? 20 : e.name.ends_with("hidden/bias") ? 400 : 0;
@@ -45,8 +45,8 @@ void keep_from_kinks(ParamStore<double>& store) {
 
 bool trained(const ParamStore<double>::Entry& e) { return is_trained(e.role); }
 
-// theta = theta_0 + t_k d on the k-th tensor, d a fixed direction: one number to differentiate in for each
-// tensor, where a number for each of 50,000 parameters would take minutes.
+// theta = theta_0 + t_k d on the k-th tensor, with a fixed direction d. Differentiates one number per tensor;
+// one per parameter, 50,000 in all, would take minutes.
 Params<double> along_directions(const ParamStore<double>& store, const Tensor<double>& direction,
                                 Var<double> t) {
   Tape<double>& tape = t.tape();
@@ -62,7 +62,7 @@ Params<double> along_directions(const ParamStore<double>& store, const Tensor<do
   const double* d = direction.data.data();
   tape.on_backward(all, [t, layout, d](const double* dtheta) {
     double* dt = t.grad_acc();
-    assert(dt);  // a backward runs only where its one input needs a gradient
+    assert(dt);  // backward runs only if its single input needs a gradient
     for (const auto& e : layout->entries()) {
       for (Index i = e.offset; trained(e) && i < e.offset + e.shape.size(); ++i) *dt += d[i] * dtheta[i];
       ++dt;
@@ -71,7 +71,7 @@ Params<double> along_directions(const ParamStore<double>& store, const Tensor<do
   return {store, all};
 }
 
-// base + sum_k t_k d_k, d_k fixed directions.
+// base + sum_k t_k d_k with fixed directions d_k.
 Var<double> along_directions(const Tensor<double>& base, const Tensor<double>& directions, Var<double> t) {
   const Var<double> shift = matmul(t, t.tape().constant(directions));
   return add(t.tape().constant(base), t.tape().reshape(shift, base.shape));
@@ -109,7 +109,7 @@ GradcheckReport check_dense_extractor() {
 GradcheckReport check_pooled_extractor(bool running) {
   ParamStore<double> store;
   const PooledExtractor<double> net(store, "net", {.n_bits = 2, .channels = 4, .layers = 3}, 5);
-  // Wide enough that what is normalised by it stays below keep_from_kinks().
+  // Wide enough that values normalised by it stay below the bias of keep_from_kinks().
   for (const auto& e : store.entries())
     if (e.name.ends_with("running_variance")) std::ranges::fill(store.values(store.find(e.name)), 1e4);
   return check_network(store, view_image({2, 5, 4, 3}),
@@ -125,7 +125,7 @@ GradcheckReport check_centred_image() {
 
 GradcheckReport check_evidence_pool() {
   const std::vector<double> code{1, 0, 0, 0, -1, 0,
-                                 0, 0, 0, 0, 1,  0};  // 4 cells, 3 bits, one cell without, one bit without
+                                 0, 0, 0, 0, 1,  0};  // 4 cells, 3 bits; one cell and one bit are unused
   const std::vector<Tensor<double>> in{numbers({6}, 1), numbers({6, 5}, 2)};
   return gradcheck([&](Tape<double>&, auto v) { return pooled_bits(v[0], v[1], code, 3); }, in);
 }

@@ -3,7 +3,7 @@
 
 namespace fieldmark::extractor {
 
-// One seed for each layer of a network. Networks of neighbouring seeds share none, as seed + layer would.
+// Yields one seed per layer of a network. Networks with neighbouring seeds share none, as seed + layer would.
 class LayerSeeds {
  public:
   explicit LayerSeeds(std::uint64_t seed) : rng_(seed) {}

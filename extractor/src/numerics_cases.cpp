@@ -13,8 +13,7 @@ struct Places {
   Tensor<T> sign{Shape{kCasePlaces}}, index{Shape{kCasePlaces, kCells + 1}};
 };
 
-// Places that are sure of what they show, and of its sign, by logits of this size; all but every fifth show
-// the background.
+// Places certain of their cell and its sign, with logits of this size; all but every fifth show background.
 template <class T>
 Places<T> sure_places(double logit) {
   Places<T> p;

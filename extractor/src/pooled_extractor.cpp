@@ -13,10 +13,10 @@ namespace fieldmark::extractor {
 
 namespace {
 
-constexpr double kMeanOfRelu = 0.3989;  // of a standard normal number: what a block gives on average at first
+constexpr double kMeanOfRelu = 0.3989;  // of a standard normal number: the initial mean output of a block
 
-// Bit b is read from channel b: logit = 2 N_b (mean - kMeanOfRelu). If each bit holds a part 1 / N_b of an
-// image, a channel that tells its values apart there moves the logit by about one.
+// Channel b gives bit b: logit = 2 N_b (mean - kMeanOfRelu). If each bit has a share 1 / N_b of an image, a
+// channel that separates its values there moves the logit by about one.
 template <class T>
 void read_own_channel(ParamStore<T>& store, const std::string& linear, Index bits) {
   const double gain = 2 * static_cast<double>(bits);

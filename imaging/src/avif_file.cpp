@@ -17,7 +17,7 @@ namespace fieldmark {
 #ifdef FIELDMARK_WITH_AVIF
 namespace {
 
-// As ISO/IEC 23008-12 orders it: turned first, then mirrored.
+// In the order of ISO/IEC 23008-12: rotated first, then mirrored.
 Tensor<float> as_asked(Tensor<float> image, const avifImage& from) {
   constexpr int kCounterclockwise[] = {1, 8, 3, 6};  // EXIF orientations by quarter turns
   if (from.transformFlags & AVIF_TRANSFORM_IROT)
@@ -34,9 +34,9 @@ Tensor<float> decode_avif(std::span<const std::byte> bytes) {
   if (!decoder) throw Undecodable("no memory");
   decoder->imageSizeLimit = static_cast<std::uint32_t>(
       std::min<std::int64_t>(max_area(bytes.size()), AVIF_DEFAULT_IMAGE_SIZE_LIMIT));
-  decoder->strictFlags = AVIF_STRICT_ENABLED & ~AVIF_STRICT_PIXI_REQUIRED;  // many encoders leave it out
+  decoder->strictFlags = AVIF_STRICT_ENABLED & ~AVIF_STRICT_PIXI_REQUIRED;  // many encoders omit it
   decoder->ignoreExif = decoder->ignoreXMP = AVIF_TRUE;
-  // dav1d writes to standard error of what is damaged.
+  // dav1d reports damage on standard error.
   if (avifCodecName(AVIF_CODEC_CHOICE_AOM, AVIF_CODEC_FLAG_CAN_DECODE))
     decoder->codecChoice = AVIF_CODEC_CHOICE_AOM;
   const auto need = [&](avifResult result) {

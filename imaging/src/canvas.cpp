@@ -19,7 +19,7 @@ namespace {
 
 constexpr Index kMostSide = 16384;
 
-// What stb's font has. It takes a mutable text with an end.
+// Returns the characters that stb's font supports, mutable and null-terminated as stb requires.
 std::vector<char> printable(std::string_view text) {
   std::vector<char> out;
   for (const char c : text) out.push_back(c >= ' ' && c <= '~' ? c : '?');
@@ -73,7 +73,7 @@ void Canvas::line(const CanvasPoint& from, const CanvasPoint& to, double thickne
 
 void Canvas::text(const CanvasPoint& corner, std::string_view text, int scale, const Ink& ink) {
   std::vector<char> letters = printable(text);
-  constexpr std::size_t kStrokes = 32;  // of a letter, more than any has; four vertices each
+  constexpr std::size_t kStrokes = 32;  // per letter, more than any has; four vertices each
   std::vector<Vertex> vertices(4 * kStrokes * letters.size());
   const int quads = stb_easy_font_print(0, 0, letters.data(), nullptr, vertices.data(),
                                         static_cast<int>(vertices.size() * sizeof(Vertex)));

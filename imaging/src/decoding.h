@@ -1,5 +1,5 @@
 #pragma once
-// What the decoders of all formats share.
+// Code shared by the decoders of all formats.
 #include <fieldmark/core/error.h>
 #include <fieldmark/engine/tensor.h>
 
@@ -9,12 +9,12 @@
 
 namespace fieldmark {
 
-/// Why bytes are no image that can be read; decode_image() adds the name and the number of bytes.
+/// Why bytes cannot be decoded as an image; decode_image() adds the name and the number of bytes.
 struct Undecodable : IoError {
   using IoError::IoError;
 };
 
-/// The largest area in pixels that a file of so many bytes may decode to: 2^26 + 4 bytes. A few bytes can
+/// Returns the largest area in pixels that a file of this size may decode to: 2^26 + 4 bytes. A few bytes can
 /// state any size, and 8192 x 8192 pixels take a gigabyte.
 constexpr std::int64_t max_area(std::size_t bytes) {
   return (std::int64_t{1} << 26) + 4 * static_cast<std::int64_t>(bytes);
@@ -29,8 +29,8 @@ inline void check_area(std::int64_t width, std::int64_t height, std::size_t byte
                       " are read of a file of this size");
 }
 
-/// Rows of interleaved channels as values in [0, 1].
-/// @param rows  of `stride` bytes, each with width * channels values of type T   @param max  value of 1
+/// Converts rows of interleaved channels to values in [0, 1].
+/// @param rows  of `stride` bytes, each with width * channels values of type T   @param max  represents 1
 template <class T>
 Tensor<float> from_rows(const std::uint8_t* rows, std::size_t stride, Index height, Index width,
                         Index channels, float max) {

@@ -15,12 +15,12 @@ constexpr int kApp1 = 0xe1, kUpright = 1;
 constexpr std::uint32_t kOrientation = 0x0112, kShort = 3;
 constexpr std::size_t kEntry = 12;
 
-// The numbers of a TIFF structure, whose first two bytes tell their order.
+// Reads numbers of a TIFF structure, whose first two bytes give the byte order.
 class Tiff {
  public:
   explicit Tiff(std::span<const std::byte> bytes)
       : bytes_(bytes), big_(!bytes.empty() && bytes[0] == std::byte{'M'}) {}
-  // Nothing beyond the end.
+  // Returns nullopt beyond the end.
   std::optional<std::uint32_t> number(std::size_t at, std::size_t size) const {
     if (at > bytes_.size() || size > bytes_.size() - at) return std::nullopt;
     std::uint32_t value = 0;
@@ -51,8 +51,8 @@ std::optional<int> orientation(std::span<const std::byte> tiff_bytes) {
   return std::nullopt;
 }
 
-// The chunk EXIF of a WebP file; nothing where there is none. Some writers put the name of JPEG's segment
-// before it. Source: RFC 9649, 2.3 and 2.7.1.5.
+// Returns the EXIF chunk of a WebP file; empty if there is none. Some writers prepend the name of JPEG's
+// segment. Source: RFC 9649, 2.3 and 2.7.1.5.
 std::span<const std::byte> exif_of_webp(std::span<const std::byte> bytes) {
   constexpr std::size_t kFile = 12, kHead = 8;
   for (std::size_t at = kFile; at + kHead <= bytes.size();) {
@@ -68,7 +68,7 @@ std::span<const std::byte> exif_of_webp(std::span<const std::byte> bytes) {
 }  // namespace
 
 int exif_orientation(std::span<const std::byte> bytes) {
-  constexpr char kName[] = "Exif\0";  // and the 0 that ends the literal
+  constexpr char kName[] = "Exif\0";  // and the 0 that terminates the literal
   const auto name = std::as_bytes(std::span(kName));
   const auto is_named = [&](std::span<const std::byte> payload) {
     return payload.size() > name.size() && std::ranges::equal(payload.first(name.size()), name);

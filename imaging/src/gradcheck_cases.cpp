@@ -21,7 +21,7 @@ Tensor<double> uniform(Shape shape, double low, double high, std::uint64_t strea
   return t;
 }
 
-// A weight file with random values, of a magnitude that keeps signals alive through ReLUs.
+// Makes a weight file with random values, large enough that signals survive the ReLUs.
 SafetensorsFile random_weights(std::span<const WeightTensor> tensors) {
   SafetensorsFile file;
   for (const WeightTensor& t : tensors) {
@@ -36,14 +36,14 @@ SafetensorsFile random_weights(std::span<const WeightTensor> tensors) {
   return file;
 }
 
-// Kinks of ReLUs and pooling windows lie close together in a network: steps are small.
+// Kinks of ReLUs and pooling windows are dense in a network, so steps are small.
 constexpr GradcheckOptions kSmallSteps{.step = 1e-5};
 
 GradcheckReport check_lpips(LpipsNetwork network) {
   const Lpips<double> lpips(random_weights(lpips_tensors(network)), network);
   const Index side = lpips.smallest();
   const auto a = uniform({1, side, side, 3}, 0, 1, 93), b = uniform({1, side, side, 3}, 0, 1, 94);
-  // An input moves each colour of an image by a constant.
+  // Each input shifts every colour of an image by a constant.
   const std::vector<Tensor<double>> in{uniform({1, 1, 1, 3}, 0, 0.1, 91), uniform({1, 1, 1, 3}, 0, 0.1, 92)};
   return gradcheck(
       [&](Tape<double>& tape, auto v) {

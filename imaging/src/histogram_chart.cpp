@@ -21,7 +21,7 @@ void check(const Histogram& h) {
     throw ValueError("[histogram_chart] counts must be at least 0");
 }
 
-// Where values and counts lie in the image.
+// Maps values and counts to pixels.
 class Axes {
  public:
   explicit Axes(const Histogram& h)
@@ -33,7 +33,7 @@ class Axes {
   int x(double value) const {
     return kLeft + static_cast<int>(std::lround(kAxis * (value - low_) / (high_ - low_)));
   }
-  // One has a height of its own: the axis begins at 0.5.
+  // The axis begins at 0.5, so that a count of one has a visible height.
   int y(double count) const {
     const double part = std::max(0., std::log10(std::max(count, 0.5) / 0.5) / (decades_ + std::log10(2.)));
     return kTop + kHeight - static_cast<int>(std::lround(kHeight * part));

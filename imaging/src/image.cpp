@@ -18,7 +18,7 @@
 #include "png_chunks.h"
 #include "webp_file.h"
 
-// Static, and in this file only: a program that brings its own stb does not collide with ours.
+// Static, private to this file: a program with its own copy of stb does not collide with ours.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wall"
 #pragma GCC diagnostic ignored "-Wextra"
@@ -28,7 +28,7 @@
 #pragma GCC diagnostic ignored "-Wshadow"
 #pragma GCC diagnostic ignored "-Wunused-function"
 #define STB_IMAGE_STATIC
-#ifdef __clang_analyzer__  // what is inside stb is not ours to mend: clang-tidy sees declarations alone
+#ifdef __clang_analyzer__  // clang-tidy sees declarations alone: warnings inside stb are not ours to fix
 static unsigned char* stbi_write_png_to_mem(const unsigned char*, int, int, int, int, int*);
 #else
 #define STB_IMAGE_IMPLEMENTATION
@@ -51,7 +51,7 @@ struct Free {
 };
 using Pixels = std::unique_ptr<unsigned char, Free>;
 
-// The one conversion from a byte: an image that is read equals the quantised image.
+// The only conversion from a byte, so that an image that is read equals the quantised image.
 float unit(std::uint8_t byte) { return static_cast<float>(byte) / 255.0f; }
 
 std::uint8_t byte_of(float x) {
@@ -78,7 +78,7 @@ const unsigned char* data_of(std::span<const std::byte> bytes) {
   return reinterpret_cast<const unsigned char*>(bytes.data());
 }
 
-// The pixels of a file, or none, with stb's reason.
+// Returns the pixels of a file, or an empty tensor; stb then holds the reason.
 Tensor<float> pixels_of(std::span<const std::byte> bytes, int want_channels) {
   const int size = static_cast<int>(bytes.size());
   int width = 0, height = 0, channels = 0;
@@ -100,8 +100,8 @@ Tensor<float> pixels_of(std::span<const std::byte> bytes, int want_channels) {
   return image;
 }
 
-// A JPEG file with other data in the place of its end. stb reads zeros behind what is left and reports
-// success, so only an image that does not depend on what follows is complete.
+// Decodes a JPEG file with other data in place of its end. stb reads zeros after the last byte and reports
+// success, so only an image that does not depend on the data appended is complete.
 Tensor<float> continued(std::span<const std::byte> bytes, std::byte filler, int want_channels) {
   constexpr std::size_t kFillers = 256;
   while (!bytes.empty() && bytes.back() == std::byte{0xff}) bytes = bytes.first(bytes.size() - 1);
@@ -111,9 +111,9 @@ Tensor<float> continued(std::span<const std::byte> bytes, std::byte filler, int 
   return pixels_of(file, want_channels);
 }
 
-// The pixels of a JPEG file without an end marker, or none if some of the image is missing.
+// Returns the pixels of a JPEG file without an end marker, or an empty tensor if some are missing.
 Tensor<float> unended(std::span<const std::byte> bytes, const JpegSegments& parts, int want_channels) {
-  // At a restart that is missing stb stops, and what it leaves is not even defined.
+  // stb stops at a missing restart marker and leaves the remaining pixels undefined.
   const auto restarts = [](const JpegSegment& s) { return s.marker == kRestartInterval; };
   if (!parts.sends_every_coefficient() || std::ranges::any_of(parts.segments, restarts)) return {};
   // A block of 8 x 8 pixels takes at least one bit.
@@ -127,8 +127,8 @@ Tensor<float> unended(std::span<const std::byte> bytes, const JpegSegments& part
   return image;
 }
 
-// The pixels of a PNG file without an end chunk, or none if some of the image is missing: what stands behind
-// the end of its compressed data is never read.
+// Returns the pixels of a PNG file without an end chunk, or an empty tensor if part of the image is missing.
+// Nothing after the end of its compressed data is read.
 Tensor<float> unended(std::span<const std::byte> bytes, const PngChunks& chunks, int want_channels) {
   constexpr std::size_t kFillers = 64;
   if (!chunks.has_data) return {};
@@ -150,7 +150,7 @@ Tensor<float> unended(std::span<const std::byte> bytes, const PngChunks& chunks,
   return image;
 }
 
-// A file that stb reads. It reads beyond the end of a JPEG file, and no PNG file without one.
+// Decodes a file with stb, which reads past the end of a JPEG file and rejects a PNG file without an end.
 Tensor<float> decode_by_stb(std::span<const std::byte> bytes, int want_channels) {
   if (bytes.size() > kMaxBytes - 1024) throw Undecodable("more than 2^31 bytes");
   int width = 0, height = 0, channels = 0;
@@ -160,7 +160,7 @@ Tensor<float> decode_by_stb(std::span<const std::byte> bytes, int want_channels)
   Tensor<float> image;
   if (is_jpeg(bytes)) {
     const JpegSegments parts = jpeg_segments(bytes);
-    // stb would return memory that nothing was written to.
+    // stb would return uninitialised memory.
     if (std::ranges::none_of(parts.segments, [](const JpegSegment& s) { return s.marker == kScan; }))
       throw Undecodable("a JPEG file without an image, truncated");
     complete = parts.complete;
@@ -229,7 +229,7 @@ std::vector<std::byte> encode_jpeg(const Tensor<float>& image, int quality, Chro
   if (quality < 1 || quality > 100)
     throw ValueError("[encode_jpeg] quality must be from 1 to 100, got " + std::to_string(quality));
   const auto pixels = bytes_of(image);
-  // stb halves chroma up to this quality and never above.
+  // stb halves chroma up to this quality, never above.
   if (constexpr int kHalvedByStb = 90; quality > kHalvedByStb || chroma == Chroma::full)
     return encode_jpeg_turbo(pixels, static_cast<int>(image.shape[0]), static_cast<int>(image.shape[1]),
                              static_cast<int>(image.shape[2]), quality, chroma == Chroma::full);

@@ -23,8 +23,8 @@ bool has_at(Bytes bytes, std::size_t at, std::string_view text) {
   return bytes.size() >= at + text.size() && std::memcmp(bytes.data() + at, text.data(), text.size()) == 0;
 }
 
-// Of ISO/IEC 14496-12: the kind stands behind the length of the first box, the brands in it. The major brand
-// may be a general one, so that the compatible ones decide.
+// ISO/IEC 14496-12: the type follows the length of the first box, and the brands are in that box. The major
+// brand may be generic, so the compatible ones decide.
 ImageFormat format_of_boxes(Bytes bytes) {
   constexpr std::array<std::string_view, 2> kAvif{"avif", "avis"};
   constexpr std::array<std::string_view, 8> kHeic{"heic", "heix", "heim", "heis",
@@ -50,7 +50,7 @@ ImageFormat image_format(Bytes bytes) {
   if (is_jpeg(bytes)) return jpeg;
   if (has_at(bytes, 0, "RIFF") && has_at(bytes, 8, "WEBP")) return webp;
   if (has_at(bytes, 4, "ftyp")) return format_of_boxes(bytes);
-  // A QuickTime film may begin without brands. Matroska, WebM: the header of EBML.
+  // A QuickTime film may begin without brands. Matroska and WebM begin with an EBML header.
   for (const std::string_view box : {"moov", "mdat", "wide", "free", "skip", "pnot"})
     if (has_at(bytes, 4, box)) return video;
   if (has_at(bytes, 0, "\x1a\x45\xdf\xa3")) return video;

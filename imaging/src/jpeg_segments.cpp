@@ -19,8 +19,8 @@ bool is_frame(int marker) {
   return marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
 }
 
-// Where the next marker begins; the size where there is none. In the data of a scan FF is followed by 00, and
-// before a marker FF may stand several times. Other bytes between segments are passed over, as stb does.
+// Returns the position of the next marker; the size if there is none. In scan data FF is followed by 00, and
+// FF may repeat before a marker. Skips other bytes between segments, as stb does.
 std::size_t next_marker(Bytes bytes, std::size_t i) {
   for (; i + 1 < bytes.size(); ++i)
     if (at(bytes, i) == 0xff && at(bytes, i + 1) != 0 && at(bytes, i + 1) != 0xff) return i;

@@ -9,7 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
-// Behind <cstdio>, which it needs.
+// Must follow <cstdio>, which it needs.
 #include <jpeglib.h>
 #endif
 
@@ -18,7 +18,7 @@ namespace fieldmark {
 #ifdef FIELDMARK_WITH_JPEG
 namespace {
 
-// libjpeg ends the program at an error unless the handler jumps away; it must not return.
+// libjpeg ends the program on an error unless the handler jumps away; the handler must not return.
 struct Failure {
   jpeg_error_mgr manager{};
   std::jmp_buf place{};
@@ -37,7 +37,7 @@ struct Work {
   unsigned long size = 0;
 };
 
-// Nothing in here has a destructor that a jump would pass over.
+// Contains no object with a destructor, which a longjmp would skip.
 bool compress(Work& work, Failure& failure, const std::uint8_t* pixels, int height, int width, int channels,
               int quality, bool full_chroma) {
   jpeg_compress_struct& codec = work.codec;

@@ -13,9 +13,9 @@ namespace {
 
 // Pixels.
 constexpr int kLeft = 60, kWidth = 560, kTop = 56, kHeight = 320, kBottom = 52, kRow = 20;
-constexpr int kMark = 46, kLetter = 8;   // of the legend: what is before a name, and room for a letter
-constexpr int kTicks = 5;                // of y, beside the lowest
-constexpr std::size_t kMostPlaces = 16;  // of x that have a line each; more of them share round numbers
+constexpr int kMark = 46, kLetter = 8;   // of the legend: room before a name, and per letter
+constexpr int kTicks = 5;                // of y, besides the lowest
+constexpr std::size_t kMostPlaces = 16;  // of x with a line each; beyond that, round numbers
 constexpr std::array<const char*, 10> kColours{"#1f6fb4", "#d9541e", "#2b8a3e", "#9036a8", "#a87b00",
                                                "#00838f", "#c2185b", "#555555", "#7cb342", "#5c4033"};
 
@@ -30,8 +30,8 @@ struct Axes {
   }
 };
 
-// Where x has its lines: at the places of the points, or at some five to ten multiples of 1, 2 or 5 times a
-// power of ten.
+// Returns the x positions of grid lines: those of the points, or about five to ten multiples of 1, 2 or 5
+// times a power of ten.
 std::set<double> ticks_of(const std::set<double>& places) {
   if (places.size() <= kMostPlaces) return places;
   const double low = *places.begin(), high = *places.rbegin();
@@ -49,7 +49,7 @@ std::set<double> ticks_of(const std::set<double>& places) {
 std::string frame(const Axes& axes, const std::set<double>& places) {
   std::string svg;
   const int foot = kTop + kHeight;
-  int last = -100;  // a number needs some room
+  int last = -100;  // leaves space for a number
   for (const double x : places) {
     svg += svg_line(axes.x(x), kTop, axes.x(x), foot, "#eee");
     if (axes.x(x) - last < 28) continue;

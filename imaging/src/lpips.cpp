@@ -30,7 +30,7 @@ BlockPlan fire(Index number, Index in, Index squeeze, Index expand) {
           {name + "expand3x3", {.in = squeeze, .out = expand}}};
 }
 
-// Krizhevsky 2014 (One weird trick), as torchvision has it.
+// Krizhevsky 2014 (One weird trick), as in torchvision.
 std::vector<StagePlan> alex_plan() {
   return {
       {false, {{{"features.0", {.in = 3, .out = 64, .kernel = 11, .stride = 4, .padding = 2}}}}, 64},
@@ -41,7 +41,7 @@ std::vector<StagePlan> alex_plan() {
   };
 }
 
-// Iandola et al. 2016 (SqueezeNet), version 1.1, as torchvision has it.
+// Iandola et al. 2016 (SqueezeNet), version 1.1, as in torchvision.
 std::vector<StagePlan> squeeze_plan() {
   return {
       {false, {{{"features.0", {.in = 3, .out = 64, .kernel = 3, .stride = 2, .padding = 0}}}}, 64},
@@ -110,7 +110,7 @@ Lpips<T>::Lpips(const SafetensorsFile& file, LpipsNetwork network)
 template <class T>
 void Lpips<T>::check(const Shape& a, const Shape& b) const {
   check_same("lpips", "a", a, "b", b);
-  const int axis = a.rank() - 3;  // of the height
+  const int axis = a.rank() - 3;  // the height
   check_extent("lpips", "a", a, axis + 2, 3, "RGB");
   if (std::min(a[axis], a[axis + 1]) < smallest_)
     throw ShapeError("[lpips] a: height and width must be at least " + std::to_string(smallest_) +
@@ -148,7 +148,7 @@ Var<T> Lpips<T>::operator()(Var<T> a, Var<T> b) const {
   return total;
 }
 
-// Both images go through together, so that the weights are transformed once for a stage.
+// Both images pass through together, so that the weights are transformed once per stage.
 template <class T>
 LpipsDistance Lpips<T>::distance(const Tensor<float>& a, const Tensor<float>& b) const {
   check_rank("lpips", "a", a.shape, 3, "[H, W, 3]");

@@ -27,8 +27,8 @@ double pairwise(std::span<const double> x) {
   return pairwise(x.first(x.size() / 2)) + pairwise(x.subspan(x.size() / 2));
 }
 
-// Sums over [0, n), n >= 1: each chunk on its own, then the chunks pairwise, so that threads change no bit
-// and the error grows with the chunk, not with n.
+// Sums over [0, n), n >= 1, chunk by chunk and then pairwise over the chunks. The result does not depend on
+// the thread count, and the error grows with the chunk instead of n.
 template <class Chunk>
 double chunked_sum(Index n, Index grain, Chunk chunk) {
   std::vector<double> sums(static_cast<std::size_t>((n + grain - 1) / grain));
@@ -64,8 +64,8 @@ std::array<double, kWindow> gaussian() {
   return w;
 }
 
-// Rows [begin, end) of window positions. The window is separable: five moments are filtered down the columns
-// for each row of positions, over all channels at once, and then along the row.
+// Rows [begin, end) of window positions. The window is separable: for each row of positions, five moments are
+// filtered down the columns over all channels at once, and then along the row.
 double ssim_rows(const Tensor<float>& a, const Tensor<float>& b, Index begin, Index end) {
   static const std::array<double, kWindow> window = gaussian();
   const Index channels = a.shape[2], line = a.shape[1] * channels,

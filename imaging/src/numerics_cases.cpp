@@ -6,7 +6,7 @@ namespace {
 
 using Real = long double;
 
-// SSIM of images without variance is (2 a b + c1) / (a^2 + b^2 + c1): what cancels in it must not count.
+// SSIM of images without variance is (2 a b + c1) / (a^2 + b^2 + c1), which tests for cancellation.
 void compare_ssim(WorstError& error) {
   constexpr Real c1 = 1e-4L;
   for (const float a : {0.f, 0.1f, 1.f})

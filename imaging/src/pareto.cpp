@@ -45,7 +45,7 @@ std::vector<bool> pareto_front(std::span<const SpeedQuality> points, const Paret
   if (!(margin.time >= 0 && margin.time < 1 && margin.psnr >= 0))
     throw ValueError("[pareto_front] margins must be at least 0, that of times below 1, got " +
                      std::to_string(margin.time) + " and " + std::to_string(margin.psnr));
-  // Parts of a time are differences of logarithms.
+  // Relative time differences are differences of logarithms.
   std::vector<Figures> figures;
   for (const SpeedQuality& p : points)
     figures.push_back({std::isfinite(p.seconds) ? -std::log(p.seconds) : std::nan(""), p.psnr, -p.bytes});

@@ -10,7 +10,7 @@ namespace fieldmark {
 namespace {
 
 constexpr std::string_view kSignature = "\x89PNG\r\n\x1a\n";
-constexpr std::size_t kHead = 8, kChecksum = 4;  // length and kind; CRC
+constexpr std::size_t kHead = 8, kChecksum = 4;  // length and type; CRC
 
 bool is_kind(std::span<const std::byte> chunk, std::string_view kind) {
   return std::memcmp(chunk.data() + 4, kind.data(), kind.size()) == 0;

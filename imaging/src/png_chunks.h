@@ -4,19 +4,19 @@
 
 namespace fieldmark {
 
-/// Where a PNG file ends.
+/// The end of a PNG file.
 /// Source: W3C, Portable Network Graphics (second edition), 5.3.
 struct PngChunks {
-  std::size_t end = 0;  ///< first byte behind the end chunk; behind the last whole chunk where there is none
-  bool complete = false;  ///< there is an end chunk
-  bool has_data = false;  ///< there is a chunk of pixels
-  std::size_t lacks = 0;  ///< bytes of the checksum of the last chunk, 0 to 4, that are behind the end
+  std::size_t end = 0;    ///< first byte after the end chunk; after the last whole chunk if there is none
+  bool complete = false;  ///< true if there is an end chunk
+  bool has_data = false;  ///< true if there is a chunk of pixels
+  std::size_t lacks = 0;  ///< bytes of the last chunk's checksum that lie beyond the end, 0 to 4
 };
 
-/// Whether the bytes begin as a PNG file does.
+/// True if the bytes start with the signature of PNG.
 bool is_png(std::span<const std::byte> bytes);
 
-/// Steps through a PNG file, never beyond its bytes. @param bytes  see is_png()
+/// Parses the chunks of a PNG file. Never reads beyond the bytes. @param bytes  see is_png()
 PngChunks png_chunks(std::span<const std::byte> bytes);
 
 }  // namespace fieldmark

@@ -11,7 +11,7 @@
 namespace fieldmark {
 namespace {
 
-/// The inputs of an output pixel along one axis.
+/// The input samples and weights of an output pixel along one axis.
 struct Taps {
   Index first = 0;
   std::vector<double> weights;
@@ -71,7 +71,7 @@ Taps kernel_taps(Index i, Index in, Index out) {
   return t;
 }
 
-// Input [outer, in, inner] to [outer, out, inner]; the sums in double.
+// Resizes [outer, in, inner] to [outer, out, inner]; sums in double.
 Tensor<float> along(const Tensor<float>& x, Index outer, Index in, Index out, Index inner, MakeTaps make,
                     Shape shape) {
   std::vector<Taps> taps;

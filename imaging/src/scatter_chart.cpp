@@ -26,7 +26,7 @@ struct Axes {
   }
 };
 
-// Whole steps of 1, 2 or 5 times a power of ten, at most ten of them.
+// Returns a step of 1, 2 or 5 times a power of ten that gives at most ten ticks.
 double tick_step(double range) {
   const double power = std::pow(10, std::floor(std::log10(range / 10)));
   for (const double times : {1.0, 2.0, 5.0})
@@ -34,8 +34,8 @@ double tick_step(double range) {
   return 10 * power;
 }
 
-// Where x has its lines: 1, 2 and 5 times the powers of ten, or whole steps where less than three of those
-// are in sight.
+// Returns the x positions of grid lines: 1, 2 and 5 times the powers of ten, or whole steps if fewer than
+// three of those are visible.
 std::vector<double> x_ticks(const Axes& axes) {
   std::vector<double> ticks;
   for (int power = static_cast<int>(std::floor(axes.x0)); power <= axes.x1; ++power)
@@ -86,7 +86,7 @@ struct Box {
   bool meets(const Box& o) const { return left < o.right && o.left < right && std::abs(y - o.y) < kLine; }
 };
 
-// The first place beside the point that no earlier label takes.
+// Places a label at the first position next to the point that no earlier label occupies.
 std::string place_label(int x, int y, const std::string& text, std::vector<Box>& taken) {
   const int wide = kLetter * static_cast<int>(text.size()), most = kLeft + kWidth + kRight;
   for (int away = 0; away < 12; ++away)
@@ -116,7 +116,7 @@ std::string polyline(const Axes& axes, std::vector<ScatterPoint> points) {
 
 const char* colour_of(std::size_t series) { return kColours[series % kColours.size()]; }
 
-// One line for each series, and its name beside the last point.
+// Draws one line per series, with its name next to the last point.
 std::string curves(const Axes& axes, const std::vector<ScatterPoint>& points, std::vector<Box>& taken) {
   std::string lines, names;
   std::vector<std::string> done;

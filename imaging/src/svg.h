@@ -1,5 +1,5 @@
 #pragma once
-// Pieces of SVG images. Private.
+// Building blocks of SVG images. Private.
 #include <fieldmark/imaging/markup.h>
 
 #include <cstdio>
@@ -7,7 +7,7 @@
 
 namespace fieldmark::bench {
 
-// White, with the title at the upper left. Ends with "</svg>\n", to be added last.
+// Returns a white canvas with the title at the upper left. The caller appends "</svg>\n" at the end.
 inline std::string svg_begin(int width, int height, const std::string& title) {
   const std::string w = std::to_string(width), h = std::to_string(height);
   return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + w + "\" height=\"" + h + "\" viewBox=\"0 0 " +
@@ -16,7 +16,7 @@ inline std::string svg_begin(int width, int height, const std::string& title) {
          "<text x=\"12\" y=\"24\" font-size=\"16\">" + escaped_markup(title) + "</text>\n";
 }
 
-// @param attributes  begin with a space, or are empty
+// @param attributes  starts with a space, or is empty
 inline std::string svg_text(int x, int y, const std::string& attributes, const std::string& text) {
   return "<text x=\"" + std::to_string(x) + "\" y=\"" + std::to_string(y) + "\"" + attributes + ">" +
          escaped_markup(text) + "</text>\n";

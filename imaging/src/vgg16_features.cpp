@@ -13,7 +13,7 @@ namespace {
 struct Layer {
   const char* name;   // in the file
   const char* depth;  // after its ReLU
-  bool pool;          // before it
+  bool pool;          // a pooling layer precedes it
   Index in, out;
 };
 constexpr std::array<Layer, 13> kLayers{{{"features.0", "relu1_1", false, 3, 64},

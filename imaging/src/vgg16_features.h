@@ -9,7 +9,8 @@
 
 namespace fieldmark {
 
-/// The convolutions of VGG-16 in torchvision's names, in order: "features.0.weight" ... "features.28.bias".
+/// Returns the tensors of VGG-16 under torchvision's names, in order: "features.0.weight" ...
+/// "features.28.bias".
 std::vector<WeightTensor> vgg16_tensors();
 
 /// Features of VGG-16 (Simonyan & Zisserman 2015, configuration D) for perceptual losses.
@@ -19,22 +20,22 @@ std::vector<WeightTensor> vgg16_tensors();
 template <class T>
 class Vgg16Features {
  public:
-  /// Reads all 13 convolutions of the file or only the first ones; ignores other tensors, such as a
-  /// classifier's.
-  /// @throws IoError if the first is missing, one is missing before another that is there, or a shape differs
+  /// Reads all 13 convolutions of the file or only the first ones; ignores other tensors (a classifier's).
+  /// @throws IoError if the first is missing, one is missing before one that is present, or a shape differs
   explicit Vgg16Features(const SafetensorsFile& file);
 
-  /// Names of the available depths, shallowest first.
+  /// Returns the names of the available depths, shallowest first.
   std::vector<std::string> depths() const;
 
-  /// @param x     [N, H, W, 3] in [0, 1], RGB; 2^k pixels each way at least for depth relu(k + 1)
+  /// @param x     [N, H, W, 3] in [0, 1], RGB; at least 2^k pixels per side for depth relu(k + 1)
   /// @param taps  names of depths, in any order; layers below the deepest are not computed
-  /// @return one for each tap, [N, H / 2^k, W / 2^k, C]; the object must outlive the pass
+  /// @return one per tap, [N, H / 2^k, W / 2^k, C]; the object must outlive the pass
   /// @throws ShapeError if x does not fit or is too small   @throws ValueError if a name is unknown or deeper
-  /// than the weights      Differentiable in: x, with the kinks of ReLU and max_pool().
+  /// than the weights
+  /// Differentiable in: x, with the kinks of ReLU and max_pool().
   std::vector<Var<T>> operator()(Var<T> x, std::span<const std::string_view> taps) const;
 
-  /// Perceptual loss: sum over taps of the mean squared difference of features, [1].
+  /// Computes a perceptual loss: the sum over taps of the mean squared difference of features, [1].
   /// Source: Johnson et al. 2016 (Perceptual losses), eq. 2, without the root.
   /// @param a, b  [N, H, W, 3] of one shape in [0, 1]   @param taps  as above, at least one
   /// @throws as above, and ShapeError if the shapes differ      Differentiable in: a, b.

@@ -6,7 +6,7 @@
 
 namespace fieldmark {
 
-/// A WebP file as [H, W, 3 or 4], multiples of 1/255.
+/// Decodes a WebP file as [H, W, 3 or 4], multiples of 1/255.
 /// @throws Undecodable if it is damaged, an animation, too large, or this build lacks libwebp
 Tensor<float> decode_webp(std::span<const std::byte> bytes);
 

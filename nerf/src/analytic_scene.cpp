@@ -22,7 +22,7 @@ constexpr double kRadius = 4.0311, kAngle = 0.6911112070083618;  // of the Blend
 constexpr int kSide = 4;                                         // samples along a pixel's side
 const std::array<std::string, 3> kSplits{"train", "val", "test"};
 
-// Shares of sun and sky that other objects do not occlude at a point.
+// Returns the shares of sun and sky at a point that other objects do not occlude.
 std::array<double, 2> light_left(const std::vector<SceneSolid>& objects, const SceneSolid& self,
                                  const Vec3& p, const Vec3& n, const Vec3& sun) {
   constexpr double kSoft = 0.35;  // width of the sun's penumbra, per distance
@@ -33,7 +33,7 @@ std::array<double, 2> light_left(const std::vector<SceneSolid>& objects, const S
     for (const Shade& s : other.shades) {
       const Vec3 to = s.centre - p;
       const double square = dot(to, to), along = dot(to, sun), facing = dot(to, n);
-      // Most spheres do not occlude the sun: this finds them without a root.
+      // Most spheres do not occlude the sun; this test finds them without a square root.
       const double aside2 = square - along * along, clear = s.radius + 0.5 * kSoft * along;
       if (along > 0 && lit && aside2 < clear * clear) {
         const double aside = std::sqrt(std::max(0.0, aside2));
@@ -47,7 +47,7 @@ std::array<double, 2> light_left(const std::vector<SceneSolid>& objects, const S
   return {direct, sky};
 }
 
-// The colour of a surface that reflects the sun, as a lobe, and a sky that is brighter above.
+// Returns the colour of a surface that reflects the sun, as a lobe, and a sky that is brighter at the top.
 Vec3 glossy(const Vec3& diffuse, double gloss, const Vec3& direction, const Vec3& n, const Vec3& sun,
             double direct) {
   constexpr double kSharpness = 40, kSun = 0.8, kHorizon = 0.25, kSky = 0.45;
@@ -57,7 +57,7 @@ Vec3 glossy(const Vec3& diffuse, double gloss, const Vec3& direction, const Vec3
   return (1 - gloss) * diffuse + gloss * Vec3{reflected, reflected, reflected};
 }
 
-// Colour at the first intersection; false if there is none.
+// Writes the colour at the first intersection; returns false if there is none.
 bool trace(const std::vector<SceneSolid>& objects, const std::vector<const SceneSolid*>& candidates,
            const Ray& ray, Vec3* colour) {
   const SceneSolid* object = nullptr;
@@ -77,8 +77,8 @@ bool trace(const std::vector<SceneSolid>& objects, const std::vector<const Scene
   return true;
 }
 
-// Objects whose bounding spheres a sample of the pixel may meet: samples are within an angle of 0.75 / focal
-// of the pixel's middle.
+// Finds the objects whose bounding spheres a sample of the pixel may hit: samples are within an angle of 0.75
+// / focal of the pixel's centre.
 void find_candidates(const std::vector<SceneSolid>& objects, const Camera& camera, const Ray& middle,
                      std::vector<const SceneSolid*>* candidates) {
   candidates->clear();
@@ -128,8 +128,7 @@ void check_options(const SceneOptions& o) {
   check_range("scene", "views", o.views, 1, 100000);
 }
 
-// Directions follow the R2 sequence (Roberts 2018), so that any number of views covers the half sphere
-// evenly.
+// Directions follow the R2 sequence (Roberts 2018), so that any number of views covers the hemisphere evenly.
 std::vector<Camera> split_cameras(const SceneOptions& options, const std::string& split) {
   const auto which = std::find(kSplits.begin(), kSplits.end(), split);
   if (which == kSplits.end())
@@ -202,7 +201,7 @@ void write_scene(const SceneOptions& options, const std::filesystem::path& folde
     Transforms transforms{.camera_angle_x = kAngle, .frames = {}};
     for (std::size_t i = 0; i < cameras.size(); ++i)
       transforms.frames.push_back({"./" + split + "/r_" + std::to_string(i), cameras[i].pose});
-    // Whole views in parallel, PNG compression included, in batches for the progress.
+    // Renders and compresses whole views in parallel, in batches, so that progress can be reported.
     constexpr Index kBatch = 8;
     const Index count = static_cast<Index>(cameras.size());
     for (Index first = 0; first < count; first += kBatch) {

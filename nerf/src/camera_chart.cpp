@@ -15,7 +15,7 @@ namespace {
 // Pixels.
 constexpr Index kWidth = 1240, kHeight = 700;
 constexpr double kPanel = 580, kPanelTop = 90, kGap = 20, kMargin = 30, kTitle = 66;
-constexpr double kPyramid = 0.06;  // depth of a camera's, of the side of a panel
+constexpr double kPyramid = 0.06;  // depth of a camera's pyramid, in panel sides
 constexpr double kRoom = 1.12;     // of the cameras in a panel
 
 constexpr Canvas::Ink kText{0.2f, 0.2f, 0.2f}, kFrame{0.8f, 0.8f, 0.8f}, kMark{0.55f, 0.55f, 0.55f},
@@ -23,7 +23,7 @@ constexpr Canvas::Ink kText{0.2f, 0.2f, 0.2f}, kFrame{0.8f, 0.8f, 0.8f}, kMark{0
 const std::map<std::string, Canvas::Ink> kSplitInks{
     {"train", {0.12f, 0.44f, 0.71f}}, {"val", {0.17f, 0.54f, 0.24f}}, {"test", {0.9f, 0.5f, 0.05f}}};
 
-// A view along an axis of the world: the directions that are to the right and upwards on it.
+// A view of the scene, given by the world directions that point right and up in it.
 struct Panel {
   std::string title;
   double left;  // pixels
@@ -32,7 +32,7 @@ struct Panel {
 
 struct Frame {
   Vec3 middle{};
-  double scale = 1;  // pixels for a length of 1
+  double scale = 1;  // pixels per unit length
 };
 
 CanvasPoint place(const Panel& panel, const Frame& frame, const Vec3& p) {
@@ -45,7 +45,7 @@ bool is_inside(const Panel& panel, const CanvasPoint& p) {
   return p.x >= panel.left && p.x <= panel.left + kPanel && p.y >= kPanelTop && p.y <= kPanelTop + kPanel;
 }
 
-// Upwards, the mean viewing direction across it, and what is to its right.
+// Returns the up direction, the mean viewing direction perpendicular to it, and the direction to its right.
 std::array<Vec3, 3> axes_of(const DataReport& report) {
   const Vec3 up = normalised(report.up);
   Vec3 ahead{};
@@ -53,7 +53,7 @@ std::array<Vec3, 3> axes_of(const DataReport& report) {
     if (!c.outlying) ahead = ahead + normalised(c.camera.forward());
   const double mean = norm(ahead) / static_cast<double>(report.cameras.size());
   ahead = ahead - dot(ahead, up) * up;
-  // Cameras all around have no common direction: an axis of the world.
+  // Cameras all around have no common direction: take an axis of the world.
   if (mean < 0.3 || norm(ahead) < 0.1 * static_cast<double>(report.cameras.size())) {
     ahead = std::abs(up[1]) < 0.7 ? Vec3{0, 1, 0} : Vec3{0, 0, -1};
     ahead = ahead - dot(ahead, up) * up;
@@ -62,7 +62,8 @@ std::array<Vec3, 3> axes_of(const DataReport& report) {
   return {up, ahead, cross(ahead, up)};
 }
 
-// Holds the cameras that are not outlying, and the point they look at unless it is far from them.
+// Returns a frame that holds the cameras that are not outlying, and the point they look at unless it is far
+// away.
 Frame frame_of(const DataReport& report, const std::array<Vec3, 3>& axes) {
   std::array<double, 3> low{}, high{};
   bool any = false;
@@ -109,7 +110,7 @@ void draw_camera(Canvas& canvas, const Panel& panel, const Frame& frame, const R
   canvas.line(apex, apex, 5, ink);
 }
 
-// A disc on the panel's edge, with name and distance.
+// Draws a disc on the panel's edge, with name and distance.
 void draw_beyond(Canvas& canvas, const Panel& panel, CanvasPoint at, const ReportedCamera& camera,
                  double times) {
   at.x = std::clamp(at.x, panel.left + 8, panel.left + kPanel - 8);
@@ -123,7 +124,7 @@ void draw_beyond(Canvas& canvas, const Panel& panel, CanvasPoint at, const Repor
   canvas.text({to_left ? at.x - 12 - wide : at.x + 12, at.y - 4}, label, 1, kOutlying);
 }
 
-// A length of 1, 2 or 5 times a power of ten with its number, at the lower left.
+// Draws a length of 1, 2 or 5 times a power of ten with its number, at the lower left.
 void draw_scale(Canvas& canvas, const Panel& panel, const Frame& frame) {
   const double most = 0.3 * kPanel / frame.scale, power = std::pow(10, std::floor(std::log10(most)));
   const double length = power * (most >= 5 * power ? 5 : most >= 2 * power ? 2 : 1);
@@ -135,7 +136,7 @@ void draw_scale(Canvas& canvas, const Panel& panel, const Frame& frame) {
   canvas.text({x + 4, y - 20}, text, 2, kText);
 }
 
-// The axes of the world as they lie in the panel, at the lower right.
+// Draws the world axes as seen in the panel, at the lower right.
 void draw_axes(Canvas& canvas, const Panel& panel) {
   const CanvasPoint origin{panel.left + kPanel - 50, kPanelTop + kPanel - 46};
   for (std::size_t a = 0; a < 3; ++a) {

@@ -25,15 +25,15 @@ void add_outer(Mat3& m, double scale, const Vec3& v) {
   for (std::size_t i = 0; i < 3; ++i) m[i] = m[i] + (scale * v[i]) * v;
 }
 
-// (m + ridge I)^-1 b by Cramer's rule; the ridge decides only where m does not.
+// Returns (m + ridge I)^-1 b by Cramer's rule; the ridge matters only where m is singular.
 Vec3 solve(Mat3 m, const Vec3& b, double ridge) {
   for (std::size_t i = 0; i < 3; ++i) m[i][i] += ridge;
   const Vec3 a = cross(m[1], m[2]), c = cross(m[2], m[0]), d = cross(m[0], m[1]);
   return (1 / dot(m[0], a)) * (b[0] * a + b[1] * c + b[2] * d);
 }
 
-// The mean camera where the cameras stand far from the origin for their distance from each other, else the
-// origin.
+// Returns the mean camera position if the cameras are far from the origin compared with their distance from
+// each other, else the origin.
 Vec3 local_origin(std::span<const Camera> cameras) {
   constexpr double kSpreads = 1000;  // the ridge of look_at_point() pulls by a billionth of the distance
   Vec3 mean{};
@@ -43,8 +43,8 @@ Vec3 local_origin(std::span<const Camera> cameras) {
   return spread > 0 && norm(mean) > kSpreads * spread ? mean : Vec3{};
 }
 
-// The point with the least sum of squared distances to the viewing axes: sum (I - f f^T) (p - o) = 0.
-// Parallel axes leave it open along them; the ridge then picks the point next to the local origin.
+// Returns the point with the least sum of squared distances to the viewing axes: sum (I - f f^T) (p - o) = 0.
+// Parallel axes leave it undetermined along them; the ridge then picks the point nearest to the local origin.
 Vec3 look_at_point(std::span<const Camera> cameras) {
   const Vec3 origin = local_origin(cameras);
   Mat3 m{};
@@ -59,8 +59,8 @@ Vec3 look_at_point(std::span<const Camera> cameras) {
   return origin == Vec3{} ? point : origin + point;
 }
 
-// One step of inverse iteration on sum x x^T from the mean y axis: the direction most nearly perpendicular to
-// the x axes.
+// Returns the direction most nearly perpendicular to the x axes, by one step of inverse iteration on sum x
+// x^T from the mean y axis.
 Vec3 common_up(std::span<const Camera> cameras) {
   Mat3 m{};
   Vec3 mean{};
@@ -72,7 +72,7 @@ Vec3 common_up(std::span<const Camera> cameras) {
   return norm(up) > 0 ? normalised(up) : Vec3{0, 0, 1};
 }
 
-// The random values of camera i of a set, one after another.
+// The sequence of random values for camera i of a set.
 class Draw {
  public:
   Draw(std::uint64_t seed, CameraSet kind, Index camera)
@@ -108,7 +108,7 @@ Vec3 novel_direction(const std::vector<Vec3>& directions, Draw& draw) {
   return norm(inside) > 1e-6 ? normalised(inside) : first;
 }
 
-// Far enough from all training directions; the farthest that was drawn if none is.
+// Draws a direction far enough from all training directions; if none is, returns the farthest drawn.
 Vec3 extrapolated_direction(const std::vector<Vec3>& directions, Draw& draw) {
   const double far_enough = std::cos(std::numbers::pi / 6);
   Vec3 best{};
@@ -126,7 +126,7 @@ Vec3 extrapolated_direction(const std::vector<Vec3>& directions, Draw& draw) {
 struct Box {
   Vec3 low, high;
 
-  // Around the positions of the training cameras.
+  // The bounding box of the training cameras' positions.
   explicit Box(const CameraSpan& span)
       : low(span.centre + span.distances[0] * span.directions[0]), high(low) {
     for (std::size_t i = 1; i < span.directions.size(); ++i) {
@@ -139,7 +139,7 @@ struct Box {
     for (std::size_t a = 0; a < 3; ++a) p[a] = draw.uniform(low[a], high[a]);
     return p;
   }
-  // Outside of the box, in one of twice its sides.
+  // Draws a point outside the box, within one of twice its side lengths.
   Vec3 point_around(Draw& draw) const {
     Box twice = *this;
     for (std::size_t a = 0; a < 3; ++a) {
@@ -213,7 +213,7 @@ CameraSpan span_about(const Vec3& centre, std::span<const Camera> cameras, Backg
   return span;
 }
 
-// The centre of a forward-facing capture, whose mean camera is at the origin.
+// Returns the centre of a forward-facing capture, whose mean camera is at the origin.
 Vec3 focus(const Dataset& data) {
   double near = 0, far = 0;
   for (const View& v : data.views) {

@@ -14,8 +14,8 @@ namespace fieldmark::nerf {
 namespace {
 namespace fs = std::filesystem;
 
-// Fills in Shot::in_split from the file's lists of names. A list that lacks is the rest: val and test stand
-// in for one another, and train has what neither of them has.
+// Fills in Shot::in_split from the file's lists of names. A missing list is the rest: val and test stand in
+// for one another, and train has what neither of them has.
 void apply_lists(const Transforms& t, const std::string& file, Capture& capture) {
   std::map<fs::path, std::size_t> numbers;
   for (std::size_t i = 0; i < t.frames.size(); ++i) numbers.emplace(with_slashes(t.frames[i].file_path), i);
@@ -57,8 +57,8 @@ void apply_lists(const Transforms& t, const std::string& file, Capture& capture)
                             " images are both trained on and held out, so their PSNR flatters");
 }
 
-// A file of the transforms layouts.
-// @param all_splits  whether the file has those of all splits, by its own lists or by number
+// Reads a file of the transforms layouts.
+// @param all_splits  true if the file holds all splits, by its own lists or by image number
 Capture read_json(const fs::path& folder, const fs::path& file, bool all_splits) {
   const Transforms t = parse_transforms(read_text(file), file.string());
   Capture capture{.notes = t.notes};

@@ -1,5 +1,5 @@
 #pragma once
-// Checks and conversions that many sources of this room need.
+// Checks and conversions that many sources of this library need.
 #include <fieldmark/engine/shape_checks.h>
 
 #include <string>

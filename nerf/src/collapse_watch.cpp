@@ -9,11 +9,11 @@ namespace fieldmark::nerf {
 namespace {
 
 constexpr Index kSmallSide = 20;         // pixels of the longer side of the views
-constexpr double kLeastVariance = 1e-5;  // of images: below, any field may fit worse than their mean
-constexpr Index kPeriod = 128;           // steps between two looks, of a hash field and early on
+constexpr double kLeastVariance = 1e-5;  // of images: below it, any field may fit worse than their mean
+constexpr Index kPeriod = 128;           // steps between two looks at a hash field, early on
 constexpr Index kEarly = 1024;           // steps after which looks become rare
-constexpr Index kRarer = 4;              // times then; of an mlp field always, whose rays cost more
-constexpr double kRising = 0.02;         // of explained(): a field that still learns is left alone
+constexpr Index kRarer = 4;              // times rarer then; mlp fields always, since their rays cost more
+constexpr double kRising = 0.02;         // rise of explained() by which a field counts as still learning
 
 std::string worse_than_constant(double explained) {
   char text[120];
@@ -35,7 +35,7 @@ CollapseWatch::CollapseWatch(const RadianceField& field, const Dataset& images)
     const Index longer = std::max(view.camera.width, view.camera.height);
     Truth truth{.camera = view.camera.scaled(std::min<Index>(kSmallSide, longer)), .rgb = {}};
     const Index width = truth.camera.width, height = truth.camera.height;
-    // The pixels nearest to those of the small view: their colours, not means, are what a ray sees.
+    // Takes the pixels nearest to those of the small view: a ray sees their colours, not means.
     for (Index y = 0; y < height; ++y)
       for (Index x = 0; x < width; ++x) {
         const Index u = (2 * x + 1) * view.camera.width / (2 * width),

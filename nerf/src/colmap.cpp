@@ -14,7 +14,7 @@
 namespace fieldmark::nerf {
 namespace {
 
-// The binary format: values in memory order, and counts that are checked against the bytes left.
+// Reads the binary format: values in memory order, with counts checked against the bytes left.
 class Bytes {
  public:
   static constexpr bool kBinary = true;
@@ -32,7 +32,7 @@ class Bytes {
     at_ += sizeof(T);
     return x;
   }
-  // A count of records that take at least `least` bytes each.
+  // Reads a count of records that take at least `least` bytes each.
   std::uint64_t count(std::size_t least, const char* what) {
     const auto n = get<std::uint64_t>(what);
     const std::size_t most = (bytes_.size() - at_) / least;
@@ -59,7 +59,7 @@ class Bytes {
   std::size_t at_ = 0;
 };
 
-// The text format: lines of words between blanks.
+// Reads the text format: lines of words separated by blanks.
 class Lines {
  public:
   static constexpr bool kBinary = false;
@@ -69,7 +69,7 @@ class Lines {
     throw IoError(std::string(name_) + ": line " + std::to_string(number_) + ": expected " + expected +
                   ", got " + got);
   }
-  // Goes to the next line; false at the end.
+  // Moves to the next line; returns false at the end.
   bool next() {
     if (at_ >= bytes_.size()) return false;
     const std::size_t end = std::min(bytes_.find('\n', at_), bytes_.size());
@@ -77,8 +77,8 @@ class Lines {
     at_ = end + 1, ++number_;
     return true;
   }
-  // Skips the next line if it has the points of an image: x, y and a key, as often as there are points. It
-  // may be empty, and a model written by hand may lack it.
+  // Skips the next line if it holds the points of an image: x, y and a key for each point. It may be empty,
+  // and a model written by hand may lack it.
   void skip_points() {
     Lines ahead = *this;
     if (!ahead.next()) return;
@@ -91,7 +91,7 @@ class Lines {
     }
     if (words % 3 == 0) next();
   }
-  // Goes to the next line that is neither empty nor a comment.
+  // Moves to the next line that is neither empty nor a comment.
   bool next_record() {
     while (next())
       if (!at_end() && line_.front() != '#') return true;
@@ -107,7 +107,7 @@ class Lines {
     line_.remove_prefix(w.size());
     return w;
   }
-  // The rest of the line.
+  // Reads the rest of the line.
   std::string text(const char* what) {
     if (at_end()) fail(what, "the end of the line");
     return std::string(line_.substr(0, line_.find_last_not_of(" \r") + 1));
@@ -143,13 +143,14 @@ void each_record(std::string_view bytes, ColmapFormat format, std::string_view n
 
 double number(auto& in, const char* what) {
   const double x = in.template get<double>(what);
-  // So small that sums and products stay finite.
+  // Bounded so that sums and products stay finite.
   if (!(std::abs(x) < 1e9)) in.fail(std::string(what) + " in (-1e9, 1e9)", std::to_string(x));
   return x;
 }
 
 using Coefficient = double Lens::*;
-// FULL_OPENCV's, whose first are OPENCV's, RADIAL's and SIMPLE_RADIAL's; and OPENCV_FISHEYE's.
+// Coefficients of FULL_OPENCV, which start with those of OPENCV, RADIAL and SIMPLE_RADIAL; and of
+// OPENCV_FISHEYE.
 constexpr std::array<Coefficient, 8> kOpencv{&Lens::k1, &Lens::k2, &Lens::p1, &Lens::p2,
                                              &Lens::k3, &Lens::k4, &Lens::k5, &Lens::k6};
 constexpr std::array<Coefficient, 4> kFisheye{&Lens::k1, &Lens::k2, &Lens::k3, &Lens::k4};
@@ -162,7 +163,7 @@ struct Model {
   LensModel lens = LensModel::polynomial;
 };
 
-// In the order of COLMAP's numbers.
+// In the order of COLMAP's model numbers.
 constexpr Model kModels[] = {
     {"SIMPLE_PINHOLE", true, 1},
     {"PINHOLE", true, 2},
@@ -257,7 +258,7 @@ ColmapImage read_model_image(Reader& in) {
   image.name = in.text("the name of an image");
   if (image.name.empty() || image.name.find('\0') != std::string::npos)
     in.fail("the name of an image", "an empty text or one with a NUL");
-  // The points that the image shows are skipped.
+  // Skips the points that the image shows.
   if constexpr (Reader::kBinary)
     in.skip(24 * in.count(8 + 8 + 8, "a count of places in the image"));
   else

@@ -30,7 +30,8 @@ std::vector<ColmapImage> images_of(const fs::path& model) {
                              list);
 }
 
-// Images of a model; 0 where they cannot be read, since another model beside it may do.
+// Returns the number of images of a model; 0 if they cannot be read, because another model next to it may be
+// readable.
 std::size_t count_images(const fs::path& model) {
   try {
     return images_of(model).size();
@@ -39,7 +40,7 @@ std::size_t count_images(const fs::path& model) {
   }
 }
 
-// The models among the folders in `parent`, those of numbers by number.
+// Returns the models among the folders in `parent`; numbered ones come in order of their numbers.
 std::vector<fs::path> models_in(const fs::path& parent) {
   std::vector<fs::path> found;
   std::error_code ignored;
@@ -52,7 +53,7 @@ std::vector<fs::path> models_in(const fs::path& parent) {
   return found;
 }
 
-// The models side by side in the first place below `folder` that has one.
+// Returns all models in the first place below `folder` that has one.
 std::vector<fs::path> models_below(const fs::path& folder) {
   const fs::path sparse = folder / "sparse";
   if (auto found = models_in(sparse); !found.empty()) return found;
@@ -64,7 +65,7 @@ std::vector<fs::path> models_below(const fs::path& folder) {
 std::vector<fs::path> models_side_by_side(const fs::path& folder) {
   for (const fs::path& place : {folder, folder / "colmap", folder / "dense"})
     if (auto found = models_below(place); !found.empty()) return found;
-  // dense/N is what COLMAP writes with the undistorted images of model N.
+  // COLMAP writes the undistorted images of model N and their model to dense/N.
   std::vector<fs::path> found;
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(folder / "dense", ignored))
@@ -73,8 +74,9 @@ std::vector<fs::path> models_side_by_side(const fs::path& folder) {
   return found.empty() ? models_in(folder) : found;
 }
 
-// The folders that may have the folder of the images, the nearest to the model first: beside dense/0/sparse
-// are the images without distortion, and above it perhaps the others. `folder` may also be that of the model.
+// Returns the folders that may contain the folder of images, nearest to the model first: next to
+// dense/0/sparse are the undistorted images, and above it perhaps the originals. `folder` may also be the
+// model's own.
 std::vector<fs::path> places_of_images(const fs::path& folder, const fs::path& model) {
   std::vector<fs::path> places;
   const fs::path below = model.lexically_relative(folder);

@@ -32,8 +32,8 @@ Var<T> colour_affine(Var<T> rays, Var<T> affine, std::span<const Index> image) {
     y[4 * r + 3] = c[3];
   }
 
-  // With c = (C, A): dL/dc = dy + D^T dy[:3] and dL/dD = dy[:3] c^T. Rays share the rows of D and are added
-  // one after another.
+  // With c = (C, A): dL/dc = dy + D^T dy[:3] and dL/dD = dy[:3] c^T. Rays share the rows of D, so they are
+  // added sequentially.
   tape.on_backward(out, [=](const T* dy) {
     T *dc = rays.grad_acc(), *dd = affine.grad_acc();
     for (Index r = 0; r < n; ++r) {

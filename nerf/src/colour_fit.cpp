@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kHold = 1e-4;  // weight of the identity, relative to the pixels
 
-// The normal equations of D, with the row D_k of channel k: (sum c c^T) D_k = sum c (t_k - c_k).
+// The normal equations of D, with row D_k for channel k: (sum c c^T) D_k = sum c (t_k - c_k).
 class AffineFit {
  public:
   void add(const Eigen::Vector4d& c, const Eigen::Vector3d& change) {

@@ -8,7 +8,7 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kRayGrain = 256;  // rays of a chunk
+constexpr Index kRayGrain = 256;  // rays per chunk
 
 void check_offsets(std::span<const Index> ray_begin, Index samples) {
   if (ray_begin.empty() || ray_begin.back() != samples)
@@ -45,7 +45,8 @@ Var<T> composite(Var<T> sigma, Var<T> rgb, Var<T> delta, std::span<const Index> 
       for (Index i = begin[r]; i < begin[r + 1]; ++i) {
         const T x = sigma.value()[i] * delta.value()[i];
         const T w = -t * std::expm1(-x);
-        // For a thin sample T - w loses nothing; for a thick one the product keeps T's relative precision.
+        // For a thin sample T - w loses no precision; for a thick one the product keeps T's relative
+        // precision.
         t = x < T(0.5) ? t - w : t * std::exp(-x);
         weight[i] = w;
         after[i] = t;
@@ -58,7 +59,7 @@ Var<T> composite(Var<T> sigma, Var<T> rgb, Var<T> delta, std::span<const Index> 
 
   // With G_i = <dC, c_i> + dA, the definition gives
   //   dL/d(sigma_i delta_i) = T_{i+1} G_i - sum_{j>i} w_j G_j,    dL/dc_i = w_i dC.
-  // The suffix sum runs far to near. Dividing by 1 - alpha_i instead, as when differentiating a product, is
+  // The suffix sum runs far to near. Dividing by 1 - alpha_i instead, as in differentiating a product, gives
   // 0/0 at a saturated sample. A ray owns its samples.
   tape.on_backward(out, [=](const T* dy) {
     T *ds = sigma.grad_acc(), *dc = rgb.grad_acc(), *dd = delta.grad_acc();

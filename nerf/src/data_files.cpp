@@ -10,7 +10,7 @@ namespace fieldmark::nerf {
 namespace {
 namespace fs = std::filesystem;
 
-// Whether a file belongs to a used image: r_0_depth.png to r_0.png.
+// Returns true if a file belongs to a used image, as r_0_depth.png to r_0.png.
 bool is_companion(const fs::path& file, const std::set<std::string>& stems) {
   const std::string stem = file.stem().string();
   for (std::size_t end = 1; end < stem.size(); ++end)
@@ -18,7 +18,7 @@ bool is_companion(const fs::path& file, const std::set<std::string>& stems) {
   return false;
 }
 
-// The images in the folders of the used ones that are not among them.
+// Returns the images in the folders of the used ones that are not themselves used.
 std::vector<fs::path> unused_beside(const std::set<fs::path>& used, const std::set<fs::path>& masks) {
   std::set<fs::path> folders;
   std::set<std::string> stems;

@@ -8,15 +8,15 @@ namespace fieldmark::nerf {
 
 /// The image files that the cameras of a data set name.
 struct DataFiles {
-  /// Those of a split.
+  /// The image files of a split.
   struct Split {
     std::string split;                           ///< "train", "val" or "test"
-    std::vector<std::filesystem::path> files{};  ///< of its images, one a camera
-    std::vector<std::string> missing{};          ///< images that cameras name and that do not exist
+    std::vector<std::filesystem::path> files{};  ///< of its images, one per camera
+    std::vector<std::string> missing{};          ///< images that cameras name but that do not exist
   };
-  std::vector<Split> splits{};  ///< those that the data set states
-  /// Image files in the folders of the others that no camera of any split has, sorted; without masks, and
-  /// without those of the name of one that is used with '_' or '.' and more behind it.
+  std::vector<Split> splits{};  ///< splits that the data set defines
+  /// Image files next to the others that no camera of any split has, sorted. Excludes masks and files whose
+  /// name is that of a used image followed by '_' or '.' and more.
   std::vector<std::filesystem::path> unused{};
 };
 

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 
-// The splits. Of held-out images that val and test share, test is read.
+// Lists the splits. If val and test share their images, test is read.
 std::vector<SplitReport> splits_of(const DataFiles& files) {
   std::vector<SplitReport> splits;
   for (std::size_t s = 0; s < files.splits.size(); ++s) {
@@ -41,7 +41,7 @@ std::vector<ImageSize> sizes_of(const std::vector<SurveyedView>& views) {
 
 double angle_between(const Vec3& a, const Vec3& b) { return std::acos(std::clamp(dot(a, b), -1., 1.)); }
 
-// @param centre  of the scene, where its type has one of its own
+// @param centre  of the scene, if its type defines one
 void describe_cameras(const std::vector<SurveyedView>& views, const std::optional<Vec3>& centre,
                       DataReport& report) {
   const std::vector<bool> far = outlying(views);
@@ -69,7 +69,7 @@ void describe_cameras(const std::vector<SurveyedView>& views, const std::optiona
   report.distances = {distances.front(), distances[distances.size() / 2], distances.back()};
 }
 
-// What is known of a data set while its splits are read.
+// What is known about a data set while its splits are read.
 struct Examination {
   DataReport report{};
   std::vector<SurveyedView> views{};
@@ -104,7 +104,7 @@ DataReport report_data(const std::filesystem::path& folder, const DatasetOptions
     if (split.same_as.empty()) all += static_cast<double>(split.images);
   DatasetOptions wanted = options;
   wanted.most_views = 0;
-  // The training images first: they tell the type of the scene.
+  // Training images come first: they determine the type of the scene.
   const auto take_in_split = [&](const std::string& split, Index images) {
     wanted.split = split;
     const Dataset data = load_dataset(folder, wanted);

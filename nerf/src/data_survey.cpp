@@ -14,12 +14,12 @@ namespace fieldmark::nerf {
 namespace {
 
 constexpr Index kCells = 32;  // of a thumbnail's side
-// Of the same image: what JPEG of quality 50 and another size leave.
+// Largest RMS difference between versions of one image, such as JPEG of quality 50 or another size.
 constexpr double kSameImage = 0.01;
-// Cameras that show nearly the same: neighbours in a film.
+// Cameras that show nearly the same, such as neighbouring video frames.
 constexpr double kSameAngle = 0.02, kSamePlace = 0.02;
 
-// Where part i of a side begins; each part has a pixel.
+// Returns where part i of a side begins; each part has at least one pixel.
 Index begin_of(Index i, Index side) { return i * side / kCells; }
 Index end_of(Index i, Index side) { return std::max(begin_of(i + 1, side), begin_of(i, side) + 1); }
 
@@ -98,7 +98,7 @@ std::vector<Oddity> odd_views(std::span<const SurveyedView> views, SceneType sce
 std::vector<Oddity> twins(std::span<const SurveyedView> train, std::span<const SurveyedView> held_out) {
   std::vector<double> from_middle = distances_from_middle(train);
   std::ranges::sort(from_middle);
-  // Not the median: of many duplicates it is 0.
+  // Not the median, which is 0 if there are many duplicates.
   const double scale = from_middle.empty() ? 0 : from_middle[(from_middle.size() - 1) * 9 / 10];
   Oddity found{.kind = "twins",
                .remedy =

@@ -26,7 +26,7 @@ std::optional<Layout> layout_of(const fs::path& folder) {
   return std::nullopt;
 }
 
-// The file of a shot's mask; empty: none.
+// Returns the file of a shot's mask; empty: none.
 fs::path mask_file(const Shot& shot, const fs::path& image, ImageFinder& finder) {
   if (shot.mask.empty()) {
     const fs::path beside = image.parent_path() / ("dynamic_mask_" + image.stem().string() + ".png");
@@ -47,7 +47,7 @@ fs::path mask_file(const Shot& shot, const fs::path& image, ImageFinder& finder)
   throw IoError(folder.string() + ": expected images to " + split + " on, got none: " + why);
 }
 
-// The shots of a split, with the files of their images.
+// Returns the shots of a split with their image files.
 ViewPlan plan_split(const Capture& capture, const DatasetOptions& options, const fs::path& folder,
                     std::vector<std::string>& notes) {
   ViewPlan plan{.size = options.size};

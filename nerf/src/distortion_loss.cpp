@@ -45,7 +45,7 @@ Var<T> distortion_loss(Var<T> sigma, std::span<const T> delta, std::span<const T
     for (Index i = begin[r]; i < begin[r + 1]; ++i) {
       const T x = sigma.value()[i] * d[i], w = -t * std::expm1(-x);
       t = x < T(0.5) ? t - w : t * std::exp(-x);
-      // Accumulated step by step: differences of products m W would cancel far away.
+      // Accumulated step by step: differences of products m W would cancel at large distances.
       if (i > begin[r]) apart += w_sum * (m[i] - m[i - 1]);
       weight[i] = w, after[i] = t, before[i] = apart;
       sum += static_cast<double>(2 * w * apart + w * w * d[i] / 3);

@@ -17,7 +17,7 @@ namespace {
 
 constexpr Index kSsimWindow = 11;
 
-// [H, W], above 0.5 on the foreground.
+// Returns [H, W], above 0.5 on the foreground.
 Tensor<float> foreground_mask(const View& view, const Rendering& rendering) {
   Tensor<float> alpha({view.rgba.shape[0], view.rgba.shape[1]});
   for (Index i = 0; i < alpha.size(); ++i) alpha[i] = view.rgba[4 * i + 3];
@@ -25,7 +25,7 @@ Tensor<float> foreground_mask(const View& view, const Rendering& rendering) {
   return opaque ? rendering.opacity : alpha;
 }
 
-// [H, W], 1 on valid pixels; empty: all are.
+// Returns [H, W], 1 on valid pixels; empty: all are valid.
 Tensor<float> valid_mask(const View& view) {
   if (view.valid.empty()) return {};
   Tensor<float> mask({view.rgba.shape[0], view.rgba.shape[1]});

@@ -8,9 +8,9 @@ namespace fieldmark::nerf {
 namespace {
 
 constexpr Index kTrialAsked = 16;  // steps between two calls of progress
-constexpr Index kTrialRays = 128;  // of a step: scenes without bounds have hundreds of samples a ray at first
+constexpr Index kTrialRays = 128;  // per step: unbounded scenes have hundreds of samples per ray at first
 
-// Root mean square over images of what becomes of mid grey, relative to it.
+// Returns the root mean square over images of the relative change of mid grey.
 double spread_of(std::span<const float> colours) {
   double sum = 0;
   for (std::size_t row = 0; row < colours.size(); row += 4) {

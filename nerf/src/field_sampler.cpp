@@ -10,8 +10,8 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kWave = 16;    // samples of a ray in a wave
-constexpr Index kBlock = 512;  // rows that pass through the network together: activations stay in cache
+constexpr Index kWave = 16;    // samples per ray in a wave
+constexpr Index kBlock = 512;  // rows that pass through the network together, to stay in cache
 
 }  // namespace
 
@@ -70,7 +70,7 @@ void FieldSampler::sample(const RadianceField& field, const RayBatch& rays, std:
   s.evaluate(field, params, options.stop, out);
 }
 
-// Densities of the samples in `rows`, and z unless out.z is empty.
+// Computes the densities of the samples in `rows`, and z unless out.z is empty.
 void FieldSampler::State::evaluate_rows(const Field<float>& net, const ParamStore<float>& store,
                                         const Params<float>& params, RaySamples& out) {
   const Index width = net.density_width(), columns = net.geometry_width();
@@ -107,7 +107,7 @@ void FieldSampler::State::evaluate(const RadianceField& field, const Params<floa
       for (Index i = from; i < std::min(from + kWave, out.ray_begin[at(r + 1)]); ++i) rows.push_back(i);
     }
     evaluate_rows(field.field, field.params, params, out);
-    // Keeps the sample that makes a ray opaque: that sample stops the light.
+    // Keeps the sample that makes a ray opaque, because it stops the light.
     std::erase_if(alive, [&](Index r) {
       const Index from = out.ray_begin[at(r)], count = out.ray_begin[at(r + 1)] - from;
       Index& done = evaluated[at(r)];
@@ -120,7 +120,7 @@ void FieldSampler::State::evaluate(const RadianceField& field, const Params<floa
   keep_evaluated(field.field.geometry_width(), out);
 }
 
-// Drops the samples behind the end of each ray.
+// Drops the samples past the end of each ray.
 void FieldSampler::State::keep_evaluated(Index width, RaySamples& out) const {
   const std::pair<std::vector<float>*, Index> columns[] = {
       {&out.t, 1}, {&out.delta, 1}, {&out.sigma, 1}, {&out.position, 3}, {&out.z, width}};

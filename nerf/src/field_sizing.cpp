@@ -12,9 +12,9 @@ namespace {
 constexpr double kGrowth = 1.75, kFiner = 1.5;
 constexpr int kFirstTable = 9, kBase = 16, kMostFinest = 2048;
 constexpr Index kMostTrials = 12;
-constexpr Index kLeastRays = 128;  // of a step: scenes without bounds have hundreds of samples a ray at first
-constexpr Index kScout = 256;      // steps at most to find empty cells
-constexpr Index kAsked = 16;       // steps between two calls of progress
+constexpr Index kLeastRays = 128;      // per step: unbounded scenes have hundreds of samples per ray at first
+constexpr Index kScout = 256;          // maximum steps for finding empty cells
+constexpr Index kAsked = 16;           // steps between two calls of progress
 constexpr double kHeaderBytes = 32e3;  // names and metadata of a file, cameras included
 
 double median(std::vector<double> values) {
@@ -23,7 +23,7 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-// Levels from kBase to the finest resolution, and the occupancy grid that goes with them.
+// Sets levels from kBase to the finest resolution, and the matching occupancy grid.
 void set_resolution(RadianceFieldOptions& field, double finest) {
   HashEncodingOptions& e = field.field.encoding;
   e.base_resolution = std::min(kBase, static_cast<int>(finest));
@@ -60,7 +60,7 @@ class Sizing {
 
   FieldSizing run() {
     RadianceField probe(found_.field);
-    Trainer scout(probe, data_, short_run());  // lays the scene into the cube
+    Trainer scout(probe, data_, short_run());  // places the scene in the cube
     if (probe.space.kind != SpaceKind::cube) find_empty(scout, probe.grid);
     found_.pixels = pixel_resolution(data_, probe.space);
     set_resolution(found_.field, std::clamp(std::floor(kFiner * found_.pixels), 16., double{kMostFinest}));
@@ -96,7 +96,8 @@ class Sizing {
     return !ended_;
   }
 
-  // Without bounds, most of a short training goes into finding empty cells: done once for all.
+  // In an unbounded scene, finding empty cells takes most of a short training, so it is done once for all
+  // trials.
   void find_empty(Trainer& scout, const OccupancyGrid& grid) {
     while (scout.steps() < std::min(kScout, options_.steps)) {
       scout.step(0);
@@ -105,7 +106,7 @@ class Sizing {
     seen_.assign(grid.bits().begin(), grid.bits().end());
   }
 
-  // Whether the training ran to its end.
+  // Returns true if the training ran to its end.
   bool attempt(const std::string& what, const RadianceFieldOptions& field) {
     if (ended_ || !goes_on()) return false;
     RadianceField trial(field);
@@ -143,7 +144,7 @@ class Sizing {
     }
   }
 
-  // Whether the smaller field was kept: it loses at most `loss` dB, or is good enough.
+  // Returns true if the smaller field was kept because it loses at most `loss` dB or is good enough.
   bool take_away(const std::string& what, const RadianceFieldOptions& next, double loss) {
     if (found_.trials.empty() || !attempt(what, next)) return false;
     SizingTrial& trial = found_.trials.back();
@@ -190,7 +191,7 @@ double pixel_resolution(const Dataset& data, const Space& space) {
     if (space.kind == SpaceKind::ndc)
       cells.push_back(v.camera.fx / space.slope_x);
     else if (space.kind == SpaceKind::contracted)
-      cells.push_back(4 * v.camera.fx);  // half a side of the inner cube away, of a cube of two sides
+      cells.push_back(4 * v.camera.fx);  // at half an inner side, in a cube of two inner sides
     else
       cells.push_back(b.side * v.camera.fx / norm(v.camera.position() - middle));
   }

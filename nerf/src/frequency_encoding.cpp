@@ -6,7 +6,7 @@
 
 namespace fieldmark::nerf {
 namespace {
-constexpr Index kFrequencyGrain = 1024;  // rows of a chunk
+constexpr Index kFrequencyGrain = 1024;  // rows per chunk
 }
 
 template <class T>

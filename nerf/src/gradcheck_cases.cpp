@@ -18,7 +18,7 @@ namespace {
 constexpr HashEncodingOptions kEncoding{
     .levels = 3, .features = 2, .log2_table = 6, .base_resolution = 2, .finest_resolution = 8};
 
-// Values in (lo, hi) without a pattern, the same in every run.
+// Returns irregular values in (lo, hi), the same in every run.
 Tensor<double> scatter(Shape shape, double lo, double hi, double phase) {
   Tensor<double> t(shape);
   for (Index i = 0; i < t.size(); ++i)
@@ -26,7 +26,8 @@ Tensor<double> scatter(Shape shape, double lo, double hi, double phase) {
   return t;
 }
 
-// Positions inside the cells of all levels (2, 4 and 8 cells an axis): differences must not step over a face.
+// Returns positions inside the cells of all levels (2, 4 and 8 cells per axis): finite differences must not
+// cross a face.
 Tensor<double> inner_positions(Index n) {
   Tensor<double> x(Shape{n, 3});
   for (Index i = 0; i < x.size(); ++i) x[i] = (static_cast<double>(i * 5 % 8) + 0.35) / 8;
@@ -37,7 +38,7 @@ void set_values(std::span<double> values, const Tensor<double>& to) {
   std::copy(to.data.begin(), to.data.end(), values.begin());
 }
 
-// Gradients of an op, called as f(variables).
+// Checks the gradients of an op, called as f(variables).
 template <class F>
 GradcheckReport check_op(F f, const std::vector<Tensor<double>>& inputs,
                          const GradcheckOptions& options = {}) {
@@ -88,8 +89,8 @@ GradcheckReport check_photometric_loss(double huber, double least) {
       {scatter({6, 4}, least, least + 1, 1)});
 }
 
-// A field with parameters in [0.02, high) and a bias that holds every ReLU open: differences must not step
-// over its kink.
+// Checks a field with parameters in [0.02, high) and a bias that keeps every ReLU active: finite differences
+// must not cross its kink.
 GradcheckReport check_field(const FieldOptions& options, double high, double bias, const Tensor<double>& x,
                             bool colour, const GradcheckOptions& step = {}) {
   ParamStore<double> store;
@@ -115,7 +116,7 @@ GradcheckReport check_mlp_field(bool colour) {
   return check_field({.kind = FieldKind::mlp,
                       .mlp = {.layers = 3, .width = 5, .skip = 1, .position_bands = 2, .direction_bands = 2}},
                      0.1, 1, scatter({3, 3}, 0, 1, 3), colour,
-                     {.step = 0.3});  // the highest band turns by 4 pi a cube side
+                     {.step = 0.3});  // the highest band turns by 4 pi per cube side
 }
 
 }  // namespace
@@ -131,7 +132,7 @@ std::vector<GradcheckCase> gradcheck_cases() {
       {"frequency_encoding",
        [] {
          return check_op([](auto v) { return frequency_encoding(v[0], 4); }, {scatter({5, 3}, -1, 1, 1)},
-                         {.step = 0.3});  // the highest band turns by 8 pi a unit
+                         {.step = 0.3});  // the highest band turns by 8 pi per unit
        }},
       {"hash_encoding density", [] { return check_hash_encoding(Part::density); }},
       {"hash_encoding colour", [] { return check_hash_encoding(Part::colour); }},

@@ -10,7 +10,7 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kPointGrain = 1024;  // points of a chunk
+constexpr Index kPointGrain = 1024;  // points per chunk
 
 void check(const HashEncodingOptions& o) {
   check_range("hash_encoding", "levels", o.levels, 1, 32);
@@ -39,7 +39,7 @@ HashEncoding<T>::HashEncoding(ParamStore<T>& store, std::string_view name, const
   const double growth =
       o.levels > 1 ? std::pow(o.finest_resolution / o.base_resolution, 1.0 / (o.levels - 1)) : 1.0;
   for (int l = 0; l < o.levels; ++l) {
-    // The small excess keeps the finest level at N_max where rounding would fall just below it.
+    // The small excess keeps the finest level at N_max if rounding falls just below it.
     const auto n = static_cast<Index>(std::floor(o.base_resolution * std::pow(growth, l) + 1e-6));
     const Index corners = (n + 1) * (n + 1) * (n + 1), cap = Index{1} << o.log2_table;
     const bool hashed = corners > cap;
@@ -124,8 +124,8 @@ Var<T> HashEncoding<T>::operator()(const Params<T>& params, Var<T> x, Part part)
   encode({table.value(), static_cast<std::size_t>(table.shape().size())}, x.value(), n, density ? y : unused,
          density ? unused : y);
 
-  // A position owns its row of dx, so chunks of positions run in parallel. Positions share rows of the table,
-  // so there levels run in parallel: each owns its rows.
+  // Each position owns its row of dx, so chunks of positions run in parallel. Positions share rows of the
+  // table, but each level owns its rows, so there levels run in parallel.
   tape.on_backward(out, [this, x, table, n, density](const T* dy) {
     const T *dd = density ? dy : nullptr, *dc = density ? nullptr : dy;
     const auto size = static_cast<std::size_t>(table.shape().size());

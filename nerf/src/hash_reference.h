@@ -4,12 +4,12 @@
 #include <cmath>
 #include <cstdint>
 
-/// One cell corner of a position at a level, by the formulas of Mueller et al. 2022 (eq. 4) in 64-bit whole
-/// numbers and long double.
+/// One cell corner of a position at a level, by the formulas of Mueller et al. 2022 (eq. 4) in 64-bit
+/// integers and long double.
 struct HashCorner {
   std::int64_t row;                     ///< within the level
   long double weight;                   ///< trilinear
-  std::array<long double, 3> gradient;  ///< of the weight in the position
+  std::array<long double, 3> gradient;  ///< of the weight with respect to the position
 };
 
 /// @param n     cells per axis   @param table  size of a hashed level, 0 for a level indexed directly

@@ -9,7 +9,7 @@ namespace fieldmark::nerf {
 namespace {
 
 constexpr double kFloor = 3e-4;  // see importance_points()
-constexpr Index kSpans = 64;     // occupied stretches of a ray that are reserved from the first call on
+constexpr Index kSpans = 64;     // occupied stretches per ray to reserve at the first call
 
 void check(const RayBatch& rays, std::span<const float> jitter, float step, const RayPoints& points) {
   check_range("hierarchical_sampler", "average", points.average, 0, 1024);
@@ -26,7 +26,7 @@ void check(const RayBatch& rays, std::span<const float> jitter, float step, cons
   check_rays("hierarchical_sampler", rays, jitter, step);
 }
 
-// A hash of a ray (FNV-1a over the words of its floats).
+// Hashes a ray (FNV-1a over the words of its floats).
 std::uint64_t ray_seed(const float* origin, const float* direction) {
   std::uint64_t h = 0xcbf29ce484222325u;
   for (const float* v : {origin, direction})
@@ -40,7 +40,7 @@ void begin(Index rays, Index points, RaySamples& out) {
   for (auto* v :
        {&out.position, &out.t, &out.delta, &out.sigma, &out.density_features, &out.colour_features, &out.z})
     v->clear();
-  // The most that these rays can have: a later call with fewer empty ones does not allocate.
+  // Reserves the maximum for these rays, so that a later call with fewer empty rays does not allocate.
   for (auto* v : {&out.t, &out.delta, &out.sigma}) v->reserve(at(rays * points));
   out.position.reserve(at(3 * rays * points));
 }
@@ -49,7 +49,7 @@ float uniform(const CounterRng& rng, std::uint64_t seed, Index i) {
   return rng.uniform4(seed, static_cast<std::uint64_t>(i / 4))[at(i % 4)];
 }
 
-// Bounds of the points' intervals: 0, the middles between neighbours, the length.
+// Returns bounds of the points' intervals: 0, the midpoints between neighbours, the length.
 float edge_before(std::span<const float> s, std::size_t i, float length) {
   if (i == 0) return 0;
   return i == s.size() ? length : 0.5f * (s[i - 1] + s[i]);
@@ -77,7 +77,7 @@ void importance_points(std::span<const T> edge, std::span<const T> weight, std::
   double total = 0;
   for (std::size_t i = 0; i < n; ++i) total += mass(i);
 
-  // Sums in double: the rest within an interval is a difference of two sums.
+  // Sums in double, because the remainder within an interval is a difference of two sums.
   std::size_t i = 0;
   double before = 0, here = mass(0);
   for (std::size_t j = 0; j < u.size(); ++j) {
@@ -97,7 +97,7 @@ template void importance_points(std::span<const float>, std::span<const float>, 
 template void importance_points(std::span<const double>, std::span<const double>, std::span<const double>,
                                 std::span<double>);
 
-// Occupied stretches of a ray, from the samples of a walk that lie next to each other. Returns their length.
+// Finds the occupied stretches of a ray from adjacent samples of a walk. Returns their total length.
 float HierarchicalSampler::find_spans(const OccupancyGrid& grid, const float* origin, const float* direction,
                                       float step) {
   constexpr Index kMost = 16;
@@ -124,7 +124,7 @@ float HierarchicalSampler::find_spans(const OccupancyGrid& grid, const float* or
   return length;
 }
 
-// Samples of a ray at rising occupied lengths s.
+// Appends samples of a ray at rising occupied lengths s.
 void HierarchicalSampler::append(const RayBatch& rays, Index ray, std::span<const float> s,
                                  RaySamples& out) const {
   const float length = length_[at(ray)];

@@ -10,8 +10,8 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr double kColourStep = 0.2, kPoseStep = 0.05;  // of the field's step size
-// Towards the identity: an image of one colour says nothing of the others.
+constexpr double kColourStep = 0.2, kPoseStep = 0.05;  // relative to the field's step size
+// Decay towards the identity: an image of one colour determines nothing about other colours.
 constexpr double kColourDecay = 0.02;
 
 // sin(a) / a, (1 - cos(a)) / a^2 and (a - sin(a)) / a^3.
@@ -19,7 +19,7 @@ struct RotationTerms {
   double a, b, c;
   explicit RotationTerms(double angle) {
     const double x = angle * angle;
-    if (angle < 1e-2) {  // the next terms are below 1e-14
+    if (angle < 1e-2) {  // the omitted terms are below 1e-14
       a = 1 - x / 6 * (1 - x / 20), b = 0.5 - x / 24 * (1 - x / 30), c = 1. / 6 - x / 120 * (1 - x / 42);
     } else {
       a = std::sin(angle) / angle, b = (1 - std::cos(angle)) / x, c = (1 - a) / x;

@@ -13,7 +13,7 @@ namespace fieldmark::nerf {
 namespace {
 namespace fs = std::filesystem;
 
-// ASCII alone: the names that differ by case come from extensions and cameras.
+// ASCII only: names that differ by case come from extensions and cameras.
 std::string lower_case(std::string text) {
   for (char& c : text)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
@@ -27,7 +27,8 @@ std::string upper_case(std::string_view text) {
   return upper;
 }
 
-// A name that another program gave to an image which may stand here in a format that is read.
+// Returns true for the name of an image in a format that is not read, of which a readable copy may exist
+// here.
 bool is_foreign_name(const fs::path& file) {
   constexpr std::string_view kForeign[] = {".tif", ".tiff", ".bmp", ".tga", ".gif", ".jp2",
                                            ".exr", ".hdr",  ".dng", ".cr2", ".nef", ".arw"};
@@ -40,7 +41,7 @@ bool is_folder(const fs::path& path) {
   return fs::is_directory(path, ignored);
 }
 
-// The file of this very name, or with an extension behind it.
+// Returns the file of exactly this name, or with an extension appended.
 fs::path spelled_so(const fs::path& named) {
   std::vector<std::string> endings{""};
   for (const std::string_view extension : image_extensions()) endings.emplace_back(extension);
@@ -53,7 +54,7 @@ fs::path spelled_so(const fs::path& named) {
   return {};
 }
 
-// The folder, or one whose name differs by case; empty: none.
+// Returns the folder, or one whose name differs only by case; empty: none.
 fs::path folder_alike(const fs::path& folder) {
   if (folder.empty()) return ".";
   if (is_folder(folder)) return folder;
@@ -123,8 +124,8 @@ const ImageFinder::Listing& ImageFinder::listing(const fs::path& folder) {
   return place->second;
 }
 
-// Among the files alike, the one of the same name but for case comes before one of the same stem, and names
-// of equal rank are ordered: the choice does not depend on the folder's order.
+// Among similar files, one whose name differs only by case comes before one with the same stem, and names of
+// equal rank are sorted, so the choice does not depend on the folder's order.
 fs::path ImageFinder::alike(const fs::path& named) {
   const Listing& files = listing(named.parent_path());
   const std::string name = named.filename().string(), stem = named.stem().string();

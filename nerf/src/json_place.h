@@ -1,5 +1,5 @@
 #pragma once
-// A value inside a JSON text with its place, which errors name.
+// A value inside a JSON text together with its place, which errors name.
 #include <fieldmark/core/error.h>
 #include <fieldmark/nerf/camera.h>
 
@@ -66,7 +66,7 @@ class JsonPlace {
   std::string file_, place_;
 };
 
-/// @throws IoError with line and byte where the text is not JSON
+/// @throws IoError with line and byte if the text is not JSON
 inline nlohmann::json parse_json(std::string_view text, std::string_view file) {
   const auto fail = [&](std::size_t byte, const std::string& found) {
     byte = std::min(byte, text.size());

@@ -9,13 +9,13 @@
 namespace fieldmark::nerf {
 namespace {
 
-// The radial factor a of a lens and da / d(r^2).
+// The radial factor a of a lens, and da / d(r^2).
 struct Radial {
   double a, slope;
 };
 
 Radial fisheye_radial(const Lens& l, double r2) {
-  // Nearer to the axis the quotients below lose their digits: t / r = 1 - r^2 / 3 + O(r^4).
+  // Close to the axis the quotients below lose precision: t / r = 1 - r^2 / 3 + O(r^4).
   if (r2 < 1e-8) return {1 + r2 * (l.k1 - 1.0 / 3), l.k1 - 1.0 / 3};
   const double r = std::sqrt(r2), t = std::atan(r), t2 = t * t;
   const double seen = t * (1 + t2 * (l.k1 + t2 * (l.k2 + t2 * (l.k3 + t2 * l.k4))));
@@ -31,12 +31,12 @@ Radial radial(const Lens& l, double r2) {
   const double above = 1 + r2 * (l.k1 + r2 * (l.k2 + r2 * l.k3)),
                below = 1 + r2 * (l.k4 + r2 * (l.k5 + r2 * l.k6));
   const double rise = l.k1 + r2 * (2 * l.k2 + r2 * 3 * l.k3), fall = l.k4 + r2 * (2 * l.k5 + r2 * 3 * l.k6);
-  // Behind a pole the lens has no image; NaN is neither regular nor inside of one.
+  // Beyond a pole the lens has no image; NaN is neither regular nor inside an image.
   if (!(below > 0)) return {std::nan(""), std::nan("")};
   return {above / below, (rise * below - above * fall) / (below * below)};
 }
 
-// The derivative of distorted(), a symmetric 2x2 matrix: xx, xy, yy.
+// Returns the derivative of distorted(), a symmetric 2x2 matrix: xx, xy, yy.
 std::array<double, 3> derivative(const Lens& l, const Vec2& q) {
   const double x = q[0], y = q[1];
   const auto [a, slope] = radial(l, x * x + y * y);
@@ -55,7 +55,7 @@ std::string short_number(double x) {
   return text;
 }
 
-// What a camera without an inverse says of itself: lengths that are no pixels are a frequent cause.
+// Describes a camera whose lens has no inverse; lengths that are not in pixels are a frequent cause.
 std::string camera_text(const Camera& c) {
   return std::to_string(c.width) + " x " + std::to_string(c.height) + " with focal length " +
          short_number(c.fx) + " and principal point (" + short_number(c.cx) + ", " + short_number(c.cy) +
@@ -75,7 +75,8 @@ void check_invertible(const Camera& c, const Lens& lens) {
     }
 }
 
-// The inverse of the lens over a part of the pinhole's image, which the lens's image is resampled to.
+// Checks that the lens can be inverted over the part of the pinhole's image to which the lens's image is
+// resampled.
 void check_inverse(const Camera& c, const Lens& lens, const Crop& part) {
   constexpr int kSteps = 32;
   constexpr double kPixels = 1e-6;
@@ -94,7 +95,7 @@ void check_inverse(const Camera& c, const Lens& lens, const Crop& part) {
     }
 }
 
-// Whether a pixel of the pinhole has a source in the lens's image.
+// Returns true if a pixel of the pinhole has a source in the lens's image.
 bool has_source(const Camera& c, const Lens& lens, Index column, Index row) {
   const Vec2 q = on_plane(c, static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5);
   const Vec2 p = on_image(c, lens.distorted(q));
@@ -114,7 +115,7 @@ double missing_share(const Camera& c, const Lens& lens, const Crop& r, int side)
   return static_cast<double>(missing) / static_cast<double>(length);
 }
 
-// Adds weight times a pixel, or the nearest one in the image, to premultiplied colour and alpha.
+// Adds weight times a pixel, clamped to the image, to premultiplied colour and alpha.
 void add_pixel(const Tensor<float>& rgba, Index column, Index row, double weight, double* sum) {
   const Index height = rgba.shape[0], width = rgba.shape[1];
   const Index y = std::clamp<Index>(row, 0, height - 1), x = std::clamp<Index>(column, 0, width - 1);
@@ -156,7 +157,7 @@ bool Lens::is_regular(const Vec2& point) const {
   for (int i = 1; i <= kPlaces; ++i) {
     const double t = static_cast<double>(i) / kPlaces;
     const auto m = derivative(*this, {t * point[0], t * point[1]});
-    // Both eigenvalues: twice folded over is folded over.
+    // Tests both eigenvalues: a map that folds over twice has a positive determinant.
     if (!(determinant(m) > 0 && m[0] + m[2] > 0)) return false;
   }
   return true;
@@ -213,7 +214,7 @@ Camera Intrinsics::camera(const Pose& pose, Index image_width, Index image_heigh
 Crop covered_part(const Camera& camera, const Lens& lens) {
   Crop r{.left = 0, .top = 0, .width = camera.width, .height = camera.height};
   if (lens.is_pinhole()) return r;
-  // Corners of a fisheye may see 90 degrees from the axis and more, where no pinhole sees.
+  // Corners of a fisheye may see 90 degrees from the axis or more, which no pinhole can.
   if (lens.model != LensModel::fisheye) check_invertible(camera, lens);
   while (r.width > 0 && r.height > 0) {
     int worst = 0;

@@ -11,7 +11,7 @@
 namespace fieldmark::nerf {
 namespace {
 constexpr std::size_t kColumns = 17;
-constexpr double kMost = 1e9;  // of any number, and of 1 / near: scaling stays far from overflow
+constexpr double kMost = 1e9;  // of any number, and of 1 / near, so that scaling stays far from overflow
 
 std::string shape_text(const std::vector<Index>& shape) {
   std::string text;

@@ -16,7 +16,7 @@ kernels::MarchGrid march_grid(const OccupancyGrid& grid) {
           .words = grid.block_halves().data()};
 }
 
-// Largest coordinate at t in half sides of the inner cube, 1 to kMarchFarthest.
+// Returns the largest coordinate at t in half sides of the inner cube, 1 to kMarchFarthest.
 float scale_at(const kernels::MarchRay& ray, float t) {
   float s = 1;
   for (int a = 0; a < 3; ++a) {
@@ -50,7 +50,7 @@ RayWalk::RayWalk(const float o[3], const float d[3], float step, float jitter) {
   for (int a = 0; a < 3; ++a) {
     ray_.o[a] = o[a];
     ray_.d[a] = d[a];
-    // Where the ray is parallel to the axis, so many steps per unit that it never leaves along it first.
+    // A ray parallel to the axis gets so many steps per unit that it never leaves along this axis first.
     ray_.steps[a] = 1 / ((d[a] == 0 ? 1e-20f : d[a]) * step);
   }
 }

@@ -14,8 +14,8 @@ static_assert(std::endian::native == std::endian::little, "elements are copied a
 using Json = nlohmann::json;
 constexpr std::string_view kMagic = "\x93NUMPY";
 
-// The header, a Python dictionary of a string, a bool and a tuple, as JSON; discarded where it is something
-// else.
+// Converts the header, a Python dictionary of a string, a bool and a tuple, to JSON; returns a discarded
+// value for anything else.
 Json header_json(std::string text) {
   for (const auto& [python, json] : {std::pair{"'", "\""},
                                      {"\\(", "["},
@@ -33,7 +33,7 @@ std::vector<double> numbers(const char* from, std::size_t count) {
   if (count > 0) std::memcpy(read.data(), from, count * sizeof(T));
   return {read.begin(), read.end()};
 }
-// The elements of an array whose first index runs fastest, with the last one fastest.
+// Reorders an array from first index fastest (Fortran) to last index fastest (C).
 std::vector<double> in_c_order(const NpyArray& array) {
   std::vector<double> ordered(array.numbers.size());
   for (std::size_t i = 0; i < ordered.size(); ++i) {
@@ -79,7 +79,7 @@ NpyArray parse_npy(std::string_view bytes, std::string_view name) {
   const std::size_t data = begin + length, left = bytes.size() - data,
                     each = header["descr"] == "<f4" ? 4 : 8;
   NpyArray array;
-  std::size_t count = 1;  // cut off above the bytes left, before it can overflow
+  std::size_t count = 1;  // capped above the bytes left, before it can overflow
   if (!header["shape"].is_array()) fail(begin, "a tuple for shape", found("shape"));
   for (const Json& n : header["shape"]) {
     if (!n.is_number_unsigned() || n > std::size_t{1} << 60)

@@ -15,7 +15,7 @@ struct NpyArray {
 /// Reads an .npy file of format 1, 2 or 3 whose elements are little-endian floats of 4 or 8 bytes, in C
 /// or Fortran order.
 /// @param name  stands for the path in errors
-/// @throws IoError  naming the byte, the expectation and the find: another format, element type
+/// @throws IoError  naming the byte, what was expected and what was found: another format, element type
 ///                  (`descr`), a header that is not the three keys or longer than 4096 bytes, an extent below
 ///                  0, more or fewer bytes than the shape needs
 NpyArray parse_npy(std::string_view bytes, std::string_view name);

@@ -16,7 +16,8 @@ namespace {
 
 using Real = long double;
 
-// sin and cos of 2^b pi x, b < 16, and the gradient in x, relative to the sum of its terms' magnitudes.
+// Checks sin and cos of 2^b pi x, b < 16, and the gradient with respect to x, relative to the sum of its
+// terms' magnitudes.
 template <class T>
 void compare_frequency(double far, WorstError& error) {
   constexpr int bands = 16;
@@ -63,8 +64,8 @@ struct Hash {
   }
 };
 
-// Values and gradients in positions and table, by the paper's formulas, relative to the sum of the terms'
-// magnitudes.
+// Checks values and gradients with respect to positions and table against the paper's formulas, relative to
+// the sum of the terms' magnitudes.
 template <class T>
 void compare_hash(const Tensor<T>& x, WorstError& error) {
   Hash<T> hash;
@@ -106,7 +107,7 @@ void compare_hash(const Tensor<T>& x, WorstError& error) {
     error.compare(hash.store.grads()[k], dt[k], std::max(dt_size[k], Real{1e-30L}));
 }
 
-// All points with the given coordinates.
+// Returns all points with the given coordinates.
 template <class T>
 Tensor<T> grid(const std::vector<double>& at) {
   Tensor<T> x(Shape{0, 3});
@@ -118,7 +119,7 @@ Tensor<T> grid(const std::vector<double>& at) {
   return x;
 }
 
-// A NaN makes its own row NaN and touches no other.
+// Checks that a NaN makes its own row NaN and affects no other.
 template <class T>
 void compare_hash_nan(WorstError& error) {
   using Limits = std::numeric_limits<T>;
@@ -142,7 +143,7 @@ void compare_hash_nan(WorstError& error) {
   }
 }
 
-// The span of a ray in the cube by the definition, in long double; empty where near >= far.
+// Returns the span of a ray in the cube by the definition, in long double; empty if near >= far.
 std::pair<Real, Real> exact_span(const float* o, const float* d) {
   Real near = 0, far = std::numeric_limits<Real>::infinity();
   for (int a = 0; a < 3; ++a) {
@@ -155,8 +156,8 @@ std::pair<Real, Real> exact_span(const float* o, const float* d) {
   return near < far && std::isfinite(far) ? std::pair{near, far} : std::pair<Real, Real>{0, 0};
 }
 
-// Origins inside, outside, on faces and one step beside them; directions parallel to faces and not. Relative
-// to the distance, at least a side of the cube.
+// Checks origins inside, outside, on faces and one step off them, with directions parallel to faces and not.
+// The error is relative to the distance, or to the cube's side if that is larger.
 void compare_spans(WorstError& error) {
   const auto origins = grid<float>({-1.5, -0x1p-24, 0, 0.25, 1, 1 + 0x1p-23, 2.5}),
              directions = grid<float>({-1, -0.3, 0, 1e-6, 0.7});
@@ -165,7 +166,8 @@ void compare_spans(WorstError& error) {
       const float *o = &origins[3 * i], *d = &directions[3 * k];
       const CubeSpan got = intersect_unit_cube(o, d);
       const auto [near, far] = exact_span(o, d);
-      // A span shorter than the rounding of its ends may be found empty, or an empty one that short.
+      // A span shorter than the rounding of its ends may come out empty, and an empty one may come out that
+      // short.
       const Real round = 3e-7L * std::max<Real>({1, near, static_cast<Real>(got.far)});
       if ((near < far) != (got.near < got.far)) {
         const Real length = near < far ? far - near : static_cast<Real>(got.far) - got.near;

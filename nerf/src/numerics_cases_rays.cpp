@@ -12,7 +12,7 @@ namespace {
 
 using Real = long double;
 
-// One ray by the definition, and how large the terms are whose difference a gradient is.
+// One ray by the definition, and the magnitudes of the terms whose difference a gradient is.
 struct Exact {
   Real out[4] = {0, 0, 0, 0};
   std::vector<Real> ds, dd;
@@ -49,7 +49,8 @@ Exact exact_ray(const Tensor<T>& sigma, const Tensor<T>& rgb, const Tensor<T>& d
   return e;
 }
 
-// Colour and opacity relative to the ray's opacity, gradients to the largest terms of their kind.
+// Compares colour and opacity relative to the ray's opacity, and gradients relative to the largest terms of
+// their kind.
 template <class T>
 void compare_ray(const Tensor<T>& sigma, const Tensor<T>& delta, WorstError& error) {
   const auto rgb = scattered<T>({sigma.size(), 3}, 0.1, 1, 5), g = scattered<T>({1, 4}, -1, 1, 6);
@@ -83,8 +84,8 @@ void compare_empty(WorstError& error) {
   for (const T v : got[1]) error.equal(std::isfinite(v), true);
 }
 
-// By the definition: the interval that holds a share u of all mass, from sums in long double. Relative to the
-// length of the ray.
+// Compares with the definition, the interval that holds a share u of all mass, from sums in long double. The
+// error is relative to the length of the ray.
 template <class T>
 void compare_points(const std::vector<T>& edge, const std::vector<T>& weight, Index points,
                     WorstError& error) {
@@ -114,7 +115,8 @@ std::vector<T> rising(std::size_t n, std::uint64_t seed) {
   return edge;
 }
 
-// Contraction of p = 1/2 + y / 4 by its formula; in double through Space, whose inner cube is [-1, 1].
+// Compares the contraction of p = 1/2 + y / 4 with its formula; in double through Space, whose inner cube is
+// [-1, 1].
 template <class T>
 void compare_contraction(Real size, std::uint64_t seed, WorstError& error) {
   const auto y = scattered<T>({60, 3}, -1, 1, seed).data;
@@ -141,8 +143,8 @@ void compare_contraction(Real size, std::uint64_t seed, WorstError& error) {
   }
 }
 
-// The direction of a ray's image: that of the difference of two points' images, from long double. The camera
-// looks along (sideways, 0, -forward) from behind the plane; rays are float whatever the precision asked for.
+// Compares the direction of a ray's image with the difference of two points' images in long double. The
+// camera looks along (sideways, 0, -forward) from behind the plane; rays are float at any precision.
 void compare_device_direction(double sideways, double forward, WorstError& error) {
   const Space space{.kind = SpaceKind::ndc, .near = 1, .slope_x = 0.6, .slope_y = 0.8};
   const Vec3 eye{0.3, -0.2, -2};

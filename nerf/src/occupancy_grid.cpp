@@ -71,7 +71,7 @@ void OccupancyGrid::update(const Density& density, const CounterRng& rng, const 
       bits_[c] = density_[c] * u.step > u.threshold;
     }
   };
-  // Chunks go to the lanes in turn; a cell has one owner.
+  // Chunks are assigned to the lanes in turn, so each cell has one owner.
   parallel_for(kLanes, 1, [&](Index lane, Index) {
     for (Index begin = lane * kChunk; begin < looked; begin += kLanes * kChunk)
       look(lane, begin, std::min(begin + kChunk, looked));
@@ -111,9 +111,9 @@ void OccupancyGrid::rebuild_blocks() {
   measure_clearance();
 }
 
-// The distance is the largest of those along the axes, so the axes can be taken one after another:
+// The distance is the largest of those along the axes, so the axes can be processed one after another:
 //   d'(i) = min over j of max(d(j), |i - j|)
-// A block further away than the best so far cannot improve on it.
+// A block farther away than the best so far cannot improve on it.
 void OccupancyGrid::measure_clearance() {
   const Index n = block_side_;
   for (Index stride : {Index{1}, n, n * n})

@@ -16,10 +16,10 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kNarrowest = 2, kWidest = 150;  // degrees
-constexpr std::size_t kLeastCameras = 5;         // cameras of which one can be outlying
+constexpr std::size_t kLeastCameras = 5;         // fewest cameras of which one can be outlying
 constexpr double kFarCamera = 2.5;
 constexpr double kNearlyAll = 0.95;
-constexpr double kCorner = 1. / 16;  // of the sides: where shares taken for pixels lie
+constexpr double kCorner = 1. / 16;  // of the sides: where principal points in shares, not pixels, lie
 
 double median_of(std::vector<double> values) {
   const auto middle = values.begin() + std::ssize(values) / 2;
@@ -37,7 +37,7 @@ double field_of_view(const Camera& c) {
   return 2 * std::atan(0.5 * static_cast<double>(c.width) / c.fx) / kDegree;
 }
 
-// Adds to `all` the views of these numbers, if there are any. @param text  behind their count
+// Adds the views of these indices to `all`, if there are any. @param text  follows their count
 void add_views(std::vector<Oddity>& all, std::span<const SurveyedView> views,
                const std::vector<std::size_t>& odd, Oddity found, const std::string& text) {
   if (odd.empty()) return;
@@ -68,7 +68,7 @@ void add_outlying(std::vector<Oddity>& all, std::span<const SurveyedView> views)
                           distances[odd.front()] / median_of(distances)));
 }
 
-// Cameras without the point that their axes come next to in their image; of a place, where cameras may look
+// Finds cameras without the point nearest to all axes in their image; in a place, where cameras may look
 // anywhere, only if nearly all have it behind them.
 void add_looking_away(std::vector<Oddity>& all, std::span<const SurveyedView> views, bool is_place) {
   const auto span = span_without(views, outlying(views));

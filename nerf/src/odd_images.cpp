@@ -12,12 +12,12 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr double kBlank = 1. / 255;  // range of a thumbnail that shows nothing
+constexpr double kBlank = 1. / 255;  // range of a blank thumbnail
 constexpr double kKept = 0.1;        // share of pixels below which masks keep too little
-// Than the neighbour's, at each quartile: captures with a fixed exposure stay below 1.07 (fox, fern);
+// Ratio to the neighbour at each quartile: captures with a fixed exposure stay below 1.07 (fox, fern);
 // objects, whose sides are lit differently, below 1.13 (lego, chair).
 constexpr double kBrighter = 1.15, kBrighterObject = 1.25;
-constexpr double kDark = 0.02;  // luminance below which ratios say nothing
+constexpr double kDark = 0.02;  // luminance below which ratios are meaningless
 constexpr Index kFewest = 12, kFewestForward = 6;
 
 bool is_blank(const SurveyedView& view) {
@@ -42,7 +42,7 @@ std::string first_of(const Oddity& o) {
   return ", the first is " + o.images.front() + (o.partners.empty() ? "" : ", as " + o.partners.front());
 }
 
-// Adds to `all` what is not nothing, with the first image behind its text.
+// Adds an oddity to `all` unless it has no images; its first image follows the text.
 void add_found(std::vector<Oddity>& all, Oddity found, const std::string& text) {
   if (found.images.empty()) return;
   found.count = std::ssize(found.images);
@@ -96,7 +96,7 @@ Oddity masked(std::span<const SurveyedView> views) {
   return found;
 }
 
-// Quartiles of the luminance of a thumbnail's opaque cells; none where there are few.
+// Returns the quartiles of the luminance of a thumbnail's opaque cells; none if there are few.
 std::optional<std::array<double, 3>> quartiles(const SurveyedView& view) {
   constexpr std::size_t kEnough = 64;
   std::vector<double> luminance;
@@ -110,7 +110,8 @@ std::optional<std::array<double, 3>> quartiles(const SurveyedView& view) {
   return std::array{luminance[quarter], luminance[2 * quarter], luminance[3 * quarter]};
 }
 
-// The ratio by which an image is brighter at each quartile than another: the least, 1 where it is not.
+// Returns the least ratio over quartiles by which one image is brighter than another; 1 if it is not brighter
+// at all of them.
 double brighter(const SurveyedView& a, const SurveyedView& b) {
   const auto mine = quartiles(a), other = quartiles(b);
   if (!mine || !other) return 1;
@@ -120,7 +121,7 @@ double brighter(const SurveyedView& a, const SurveyedView& b) {
   return std::max(least, 1.);
 }
 
-// Of images that show something.
+// Compares images that are not blank.
 Oddity exposures(std::span<const SurveyedView> views, SceneType scene, double& most) {
   Oddity found{.kind = "exposures",
                .remedy =
@@ -154,7 +155,7 @@ bool same_image(const SurveyedView& a, const SurveyedView& b) {
 
 std::vector<std::size_t> neighbours(std::span<const SurveyedView> views) {
   constexpr double kFarTurn = 0.2;    // radians
-  constexpr double kSamePose = 1e-6;  // rounding: equal poses are an oddity of their own
+  constexpr double kSamePose = 1e-6;  // rounding: equal poses are a separate oddity
   std::vector<double> from_middle = distances_from_middle(views);
   std::ranges::sort(from_middle);
   const double scale = std::max(from_middle[from_middle.size() / 2], 1e-300);

@@ -130,7 +130,7 @@ RadianceField RadianceField::from_configuration(std::string_view text, std::stri
     if (kind != "hash" && kind != "mlp")
       throw ValueError("[radiance_field] kind must be hash or mlp, got " + kind);
     o.field.kind = kind == "mlp" ? FieldKind::mlp : FieldKind::hash;
-    j.emplace("directional", true);  // files before version 0.1 may lack it
+    j.emplace("directional", true);  // may be missing in files before version 0.1
     each_size(o, [&](const char* key, auto& size) { j.at(key).get_to(size); });
     o.supersampling = j.value("supersampling", Index{1});
     RadianceField field(o);

@@ -7,9 +7,9 @@
 
 namespace fieldmark::nerf {
 namespace {
-constexpr Index kPixelGrain = 1024;  // pixels of a chunk, which has a partial camera gradient of 16 elements
+constexpr Index kPixelGrain = 1024;  // pixels per chunk, which has a partial camera gradient of 16 elements
 
-// The terms of one ray that forward and backward share.
+// Terms of one ray that forward and backward share.
 template <class T>
 struct Projection {
   T u, v, w[3], inv_norm;

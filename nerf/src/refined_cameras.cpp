@@ -20,7 +20,7 @@ void check_sizes(const char* op, std::size_t a, std::size_t b) {
                      std::to_string(a) + ", got " + std::to_string(b));
 }
 
-// From |R - S|^2 = 8 sin^2(angle / 2), which holds the small angles that a trace loses.
+// From |R - S|^2 = 8 sin^2(angle / 2), which resolves small angles that a trace loses.
 double degrees_between(const Pose& a, const Pose& b) {
   double square = 0;
   for (std::size_t c = 0; c < 3; ++c) {

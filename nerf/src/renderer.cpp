@@ -12,8 +12,8 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kMlpRays = 64;  // of an mlp field at a time: its samples keep much
-constexpr Index kTile = 16;     // pixels along a side: rays of a tile pass through the same cells
+constexpr Index kMlpRays = 64;  // of an mlp field at a time, because its samples take much memory
+constexpr Index kTile = 16;     // pixels along a side; rays of a tile pass through the same cells
 
 }  // namespace
 
@@ -86,7 +86,7 @@ void Renderer::trace_block(const RayBatch& rays, Lane& lane) {
   lane.weights.resize(at(s.size()));
   sample_weights(s, step_, lane.weights.data());
 
-  // Colours of the samples that matter, the ray's encoded direction repeated for each.
+  // Computes the colours of the samples that matter, repeating the ray's encoded direction for each.
   lane.kept.clear();
   lane.sample_ray.clear();
   lane.positions.clear();
@@ -132,7 +132,7 @@ void Renderer::Lane::accumulate(Index count, float* to, float* position) const {
     if (to[4 * (i / 3) + 3] > 0) position[i] /= to[4 * (i / 3) + 3];
 }
 
-// The pixels of a tile, row by row.
+// Lists the pixels of a tile, row by row.
 void Renderer::Lane::list_pixels(const Camera& camera, Index tile) {
   const Index columns = (camera.width + kTile - 1) / kTile;
   const Index x0 = tile % columns * kTile, y0 = tile / columns * kTile;
@@ -153,7 +153,7 @@ Rendering Renderer::render(const Camera& camera) {
   return view;
 }
 
-// One ray through the centre of every pixel.
+// Traces one ray through the centre of every pixel.
 Rendering Renderer::trace_centres(const Camera& camera) {
   Rendering view{Tensor<float>({camera.height, camera.width, 3}),
                  Tensor<float>({camera.height, camera.width})};

@@ -14,7 +14,7 @@ namespace fieldmark::nerf {
 
 inline Vec3 pose_column(const Pose& p, std::size_t c) { return {p[c], p[4 + c], p[8 + c]}; }
 
-/// Largest entry of |R^T R - I|, and the determinant against 1.
+/// Returns the larger of the largest entry of |R^T R - I| and the determinant's difference from 1.
 inline double rotation_error(const Pose& p) {
   const Vec3 x = pose_column(p, 0), y = pose_column(p, 1), z = pose_column(p, 2);
   double worst = std::abs(dot(cross(x, y), z) - 1);
@@ -24,8 +24,8 @@ inline double rotation_error(const Pose& p) {
   return worst;
 }
 
-/// The rotation nearest to a pose's (its polar factor), by R <- (R + R^-T) / 2, which squares a small error
-/// at each step.
+/// Returns a pose with its matrix replaced by the nearest rotation (its polar factor), by R <- (R + R^-T) /
+/// 2, which squares a small error at each step.
 inline Pose with_rotation(Pose p) {
   for (int step = 0; step < 8; ++step) {
     const Vec3 x = pose_column(p, 0), y = pose_column(p, 1), z = pose_column(p, 2);
@@ -37,7 +37,7 @@ inline Pose with_rotation(Pose p) {
   return p;
 }
 
-/// The length of the three columns where it is the same to 0.1%, else 0.
+/// Returns the length of the three columns if it is the same to 0.1%, else 0.
 inline double common_scale(const Pose& p) {
   const double x = norm(pose_column(p, 0)), y = norm(pose_column(p, 1)), z = norm(pose_column(p, 2));
   const double least = std::min({x, y, z}), most = std::max({x, y, z});
@@ -47,8 +47,8 @@ inline double common_scale(const Pose& p) {
 // Poses in single precision with six digits are 1e-6 off; they are kept.
 inline constexpr double kRotationExact = 1e-5, kRotationTolerance = 1e-2;
 
-/// The pose, with the nearest rotation if it is off by more than kRotationExact; calls fail(found), which
-/// throws, if it is off by more than kRotationTolerance.
+/// Returns the pose, with the nearest rotation if it is off by more than kRotationExact; calls fail(found),
+/// which throws, if it is off by more than kRotationTolerance.
 template <class Fail>
 Pose checked_rotation(const Pose& pose, Fail fail) {
   const double error = rotation_error(pose);

@@ -8,8 +8,8 @@
 namespace fieldmark::nerf {
 namespace {
 
-// Samples of a ray in a wave: few, so that few lie behind the surface; more once few rays are left, since a
-// wave has a cost of its own.
+// Samples per ray in a wave: few, so that few lie behind the surface; more once few rays are left, because
+// each wave has a fixed cost.
 constexpr Index kLeastWave = 4, kMostWave = 16, kWaveSamples = 192;
 
 }  // namespace
@@ -17,7 +17,7 @@ constexpr Index kLeastWave = 4, kMostWave = 16, kWaveSamples = 192;
 void check_rays(const char* op, const RayBatch& rays, std::span<const float> jitter, float step) {
   const auto where = [op] {
     return "[" + std::string(op) + "] ";
-  };  // only for an error: steps allocate nothing
+  };  // used only for errors: steps allocate nothing
   if (!(step > 0)) throw ValueError(where() + "step must be positive, got " + std::to_string(step));
   if (rays.origins.size() != rays.directions.size() || rays.origins.size() % 3 != 0)
     throw ShapeError(where() + "origins and directions must both be [R, 3], got " +
@@ -54,7 +54,7 @@ void RaySampler::sample(const Field<float>& field, const ParamStore<float>& para
   pack(rays.size(), field.density_width(), field.colour_width(), out);
 }
 
-// Adds a segment for each ray that is alive; rays that end leave the list.
+// Adds a segment for each live ray; rays that end leave the list.
 void RaySampler::march_wave(const OccupancyGrid& grid) {
   std::size_t kept = 0;
   RayWalk::skip_empty(grid, walks_, alive_);
@@ -74,7 +74,7 @@ void RaySampler::evaluate(const Field<float>& field, const ParamStore<float>& pa
                           const PackedWeights<float>* packed, Index first) {
   const Index n = static_cast<Index>(t_.size()) - first, width = field.density_width();
   if (n == 0) return;
-  // Never shortened: growing by a wave would fill elements that are about to be overwritten.
+  // Never shrinks: growing by a wave would fill elements that are about to be overwritten.
   const auto rows = at(first + n);
   if (sigma_.size() < rows) {
     sigma_.resize(rows);
@@ -91,8 +91,8 @@ void RaySampler::evaluate(const Field<float>& field, const ParamStore<float>& pa
   std::copy_n(field.density(z).value(), n, sigma_.data() + first);
 }
 
-// Cuts segments where the transmittance falls below the threshold. Keeps the sample that crosses it: that
-// sample stops the light.
+// Cuts segments where the transmittance falls below the threshold. Keeps the sample that crosses it, because
+// it stops the light.
 void RaySampler::stop_rays(const SamplingOptions& options, std::size_t first_segment) {
   for (std::size_t s = first_segment; s < segments_.size(); ++s) {
     Segment& segment = segments_[s];
@@ -105,8 +105,8 @@ void RaySampler::stop_rays(const SamplingOptions& options, std::size_t first_seg
   std::erase_if(alive_, [&](Index r) { return transmittance_[at(r)] < options.stop; });
 }
 
-// Waves hold segments of many rays; the packed form holds rays one after another. Counting the samples of
-// each ray gives every segment its place, in the order of the waves.
+// Waves hold segments of many rays; the packed form holds one ray after another. Counting the samples of each
+// ray gives the place of every segment, in the order of the waves.
 void RaySampler::pack(Index rays, Index density, Index colour, RaySamples& out) {
   out.ray_begin.assign(at(rays + 1), 0);
   for (const Segment& s : segments_) out.ray_begin[at(s.ray + 1)] += s.count;

@@ -17,14 +17,14 @@ struct SamplingOptions {
 
 /// Marches rays through the occupied cells of a field and drops samples behind opaque matter.
 ///
-/// Works in waves of 4 to 16 samples a ray: march, encode, evaluate the density, stop opaque rays. In a scene
-/// of surfaces most samples lie behind one and are never encoded. Reuses its buffers: after the first calls
-/// it allocates nothing. One object per thread.
+/// Works in waves of 4 to 16 samples per ray: march, encode, evaluate the density, stop opaque rays. In a
+/// scene of surfaces most samples lie behind one and are never encoded. Reuses its buffers, so it allocates
+/// nothing after the first calls. Use one object per thread.
 class RaySampler {
  public:
-  /// @param packed  the matrices of params as they are now, or null: packed in every wave
+  /// @param packed  current matrices of params, or null: they are packed in every wave
   /// @param jitter  [R] offsets of the sample positions in [0, 1), or empty for 1/2 everywhere
-  /// @throws ValueError if the step is not positive   @throws ShapeError if sizes do not fit
+  /// @throws ValueError if the step is not positive   @throws ShapeError if sizes do not match
   void sample(const Field<float>& field, const ParamStore<float>& params, const OccupancyGrid& grid,
               const RayBatch& rays, std::span<const float> jitter, const SamplingOptions& options,
               RaySamples& out, const PackedWeights<float>* packed = nullptr);
@@ -43,7 +43,7 @@ class RaySampler {
   std::vector<float> transmittance_;
   std::vector<Index> alive_, place_;
   std::vector<Segment> segments_;
-  std::vector<float> t_, x_, density_features_, colour_features_, sigma_;  // wave after wave
+  std::vector<float> t_, x_, density_features_, colour_features_, sigma_;  // wave by wave
   Tape<float> tape_;
 };
 

@@ -18,15 +18,15 @@ using Colour = std::array<float, 3>;
 
 constexpr float kSeeThrough = 0.5f;    // alpha below which a pixel is transparent
 constexpr double kObjectBorder = 0.5;  // transparent share of the borders of an object's images
-constexpr float kOneColour = 0.06f;    // most that a plain border strays in a channel: JPEG, soft light
-constexpr float kExact = 1.5f / 255;   // least that it may stray: rounding
+constexpr float kOneColour = 0.06f;    // largest deviation of a plain border in a channel: JPEG, soft light
+constexpr float kExact = 1.5f / 255;   // smallest tolerance: rounding
 constexpr float kSameColour = 0.1f;    // between the borders of two images
 constexpr double kPlainBorder = 0.8, kPlainViews = 0.9;  // shares of pixels and of images
-constexpr double kFrameFill = 0.95, kFrameDisc = 0.75;   // of a frame's rectangle that is opaque
+constexpr double kFrameFill = 0.95, kFrameDisc = 0.75;   // opaque share of a frame's rectangle
 constexpr double kFrameArea = 0.45, kFrameShift = 0.03;  // of an image, and of its sides
 constexpr double kFrameViews = 0.9;
 
-// The rectangle around the marked pixels of an image, in shares of its sides.
+// The bounding rectangle of the marked pixels of an image, relative to its sides.
 struct Extent {
   std::array<double, 4> box{};  // left, top, right, bottom
   double fill = 0;              // marked share of the rectangle; 0: no pixel is marked
@@ -59,8 +59,8 @@ T middle_of(std::vector<T> values) {
   return *middle;
 }
 
-// Whether the marked pixels are the same rectangle or disc in nearly all images: the inside of a frame. An
-// object's silhouette has another outline, or is small.
+// Returns true if the marked pixels are the same rectangle or disc in nearly all images: the inside of a
+// frame. An object's silhouette has another outline, or is small.
 bool is_framed(std::span<const View> views, const Marked& marked) {
   std::vector<Extent> extents(views.size());
   parallel_for(std::ssize(views), 1,
@@ -104,7 +104,7 @@ float stray(const float* rgb, const Colour& colour) {
 
 struct Borders {
   Colour colour{};         // the usual one
-  float tolerance = 0;     // that holds 99 of 100 plain pixels
+  float tolerance = 0;     // covers 99 of 100 plain pixels
   double transparent = 0;  // share of all border pixels
   double plain = 0;        // share of images whose border has the usual colour
 };
@@ -197,8 +197,8 @@ SceneLook look_at_scene(std::span<const View> views, bool forward_facing) {
 
 void cut_out(View& view, const std::array<float, 3>& colour, float tolerance) {
   const Index height = view.rgba.shape[0], width = view.rgba.shape[1];
-  // Pixels whose whole neighbourhood is of the colour: a fill through them does not leak through an edge that
-  // a highlight interrupts, and stays off the edges.
+  // Pixels whose whole neighbourhood has the colour: a fill through them does not leak where a highlight
+  // interrupts an edge, and keeps away from edges.
   std::vector<std::uint8_t> far(at(width * height)), clear(at(width * height), 1);
   for (Index p = 0; p < width * height; ++p)
     far[at(p)] = stray(&view.rgba.data[at(4 * p)], colour) > tolerance;
@@ -218,7 +218,7 @@ void cut_out(View& view, const std::array<float, 3>& colour, float tolerance) {
 
 namespace {
 
-// What a place's image does not show is unknown, not empty.
+// Marks transparent pixels invalid: what an image of a place does not show is unknown, not empty.
 void leave_out_transparent(View& view) {
   if (is_opaque(view)) return;
   if (view.valid.empty()) view.valid.assign(view.rgba.data.size() / 4, 1);

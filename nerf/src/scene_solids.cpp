@@ -13,7 +13,7 @@ namespace fieldmark::nerf {
 namespace {
 constexpr double kTop = -0.35;  // the slab's upper side
 
-// Spheres stacked along z, or around the ring of a torus, that fill the solid.
+// Returns spheres that fill the solid, stacked along z or around the ring of a torus.
 std::vector<Shade> shades_of(const Solid& s) {
   std::vector<Shade> shades;
   if (s.kind == SolidKind::sphere) return {{s.centre, s.size[0]}};
@@ -46,7 +46,7 @@ std::vector<Vec3> shuffled_palette(const CounterRng& rng) {
   return colours;
 }
 
-// Collects solids whose colours follow one another in a palette of the seed's.
+// Collects solids whose colours run through a palette chosen by the seed.
 class Builder {
  public:
   explicit Builder(std::uint64_t seed) : rng(seed, 0), colours_(shuffled_palette(rng)) {}
@@ -62,7 +62,7 @@ class Builder {
                       .shades = shades_of(solid),
                       .gloss = gloss});
   }
-  // The slab lies under everything and shades nothing.
+  // The slab lies under everything and casts no shadow.
   void add_slab(const SolidTexture& texture, double gloss = 0) {
     solids.push_back({{.kind = SolidKind::cylinder, .centre = {0, 0, kTop - 0.06}, .size = {1.1, 0.06, 0}},
                       texture,
@@ -119,7 +119,7 @@ void add_objects(Builder& scene) {
   scene.add_slab({.kind = TextureKind::checker, .a = kPale, .b = kGrey, .scale = 0.36});
 }
 
-// A cable: beads along a parabola that hangs by `sag` below the line between its ends.
+// Adds a cable: beads along a parabola that sags by `sag` below the line between its ends.
 void add_cable(Builder& scene, const Vec3& from, const Vec3& to, double sag, double radius) {
   constexpr int kBeads = 48;
   for (int k = 1; k < kBeads; ++k) {

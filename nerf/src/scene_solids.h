@@ -14,15 +14,15 @@ struct Shade {
   double radius;
 };
 
-/// A solid of a built-in scene, its looks and its shadow.
+/// A solid of a built-in scene, its appearance and its shadow.
 struct SceneSolid {
   Solid solid;
   SolidTexture texture;
-  std::vector<Shade> shades;  ///< none: it shades nothing
-  double gloss = 0;           ///< share of the light that is reflected as by a mirror, in [0, 1]
+  std::vector<Shade> shades;  ///< none: it casts no shadow
+  double gloss = 0;           ///< share of the light that is mirrored, in [0, 1]
 };
 
-/// The solids of a built-in scene, within 1.2 of the origin. @param seed  of placement and colours
+/// Makes the solids of a built-in scene, within 1.2 of the origin. @param seed  of placement and colours
 std::vector<SceneSolid> scene_solids(SceneKind kind, std::uint64_t seed);
 
 }  // namespace fieldmark::nerf

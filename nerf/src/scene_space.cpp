@@ -12,14 +12,14 @@ namespace fieldmark::nerf {
 namespace {
 
 constexpr double kRayStart = 0.02;  // in median distances of the cameras
-constexpr double kBefore = 0.95;    // of the nearest bound: the space in front is cut off
-constexpr double kRim = 1.02;       // of the widest ray
+constexpr double kBefore = 0.95;    // relative to the nearest bound: the space in front is cut off
+constexpr double kRim = 1.02;       // relative to the widest ray
 constexpr double kOverhang = 0.05;  // of the bounds' side: margins of the cube that cameras see
 constexpr double kLost = 1. / 16;   // of the bounds' side: eight cells of the occupancy grid
 constexpr Index kPoints = 32;       // per axis, of a cube that is searched for the object
 
-// The plane from the data set's bounds, and slopes that hold the rays through every image's corners, at the
-// plane and at infinity.
+// Takes the plane from the data set's bounds, and slopes that cover the rays through every image's corners,
+// at the plane and at infinity.
 Space device_coordinates(const Dataset& data) {
   Space space{.kind = SpaceKind::ndc};
   double near = 0;
@@ -51,7 +51,7 @@ bool contains(const Bounds& outer, const Bounds& inner) {
   return true;
 }
 
-// Whether a point is in a view's image, and there on a pixel that is not transparent.
+// Tells whether a point is in a view's image, and whether its pixel there is not transparent.
 struct Sight {
   bool in_image = false, opaque = false;
 };
@@ -67,7 +67,8 @@ Sight sight_of(const View& view, const Vec3& p) {
   return {.in_image = true, .opaque = view.rgba[4 * pixel + 3] > 0};
 }
 
-// Whether at least half of the views see a point of `seen` outside `bounds`, and all of those on the object.
+// Returns true if `seen` has a point outside `bounds` that at least half of the views have in their image,
+// all of these on the object.
 bool reaches_out(std::span<const View> views, const Bounds& bounds, const Bounds& seen) {
   for (Index i = 0; i < kPoints * kPoints * kPoints; ++i) {
     Vec3 p{};
@@ -87,8 +88,8 @@ bool reaches_out(std::span<const View> views, const Bounds& bounds, const Bounds
   return false;
 }
 
-// `bounds`, unless silhouettes show that the object reaches out of them, or cameras that it is lost in them:
-// then the cube that the cameras have in view.
+// Returns `bounds`, or the cube that the cameras have in view if silhouettes show that the object extends
+// beyond `bounds` or cameras show that it is tiny in them.
 Bounds around_object(const Dataset& data, const Bounds& bounds) {
   if (!has_alpha(data)) return bounds;
   const CameraSpan span = camera_span(data);

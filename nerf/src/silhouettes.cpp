@@ -14,10 +14,10 @@ bool is_valid(const View& v, Index pixel) { return v.valid.empty() || v.valid[at
 
 namespace {
 
-// Whether the scene may be behind a pixel: a mask may hide it.
+// Returns true if the scene may be behind a pixel; a mask may hide it.
 bool may_show(const View& v, Index pixel) { return v.rgba[4 * pixel + 3] > 0 || !is_valid(v, pixel); }
 
-// Counts of pixels that may show the scene, left of and above each, so that four look-ups test any rectangle.
+// Counts of pixels that may show the scene, left of and above each, so that four lookups test any rectangle.
 struct Coverage {
   Camera camera;
   Index width, height;
@@ -38,7 +38,7 @@ struct Coverage {
     const double x = m[0] * d[0] + m[4] * d[1] + m[8] * d[2], y = m[1] * d[0] + m[5] * d[1] + m[9] * d[2];
     const double depth = -(m[2] * d[0] + m[6] * d[1] + m[10] * d[2]);
     if (depth <= radius) return true;
-    // The ball's nearest point bounds its size in the image; one more pixel for the image's own sampling.
+    // The ball's nearest point bounds its size in the image; adds one pixel for the image's own sampling.
     const double r = std::max(camera.fx, camera.fy) * radius / (depth - radius) + 1;
     const double u = camera.cx + camera.fx * x / depth, v = camera.cy - camera.fy * y / depth;
     const auto u0 = static_cast<Index>(std::floor(u - r)), u1 = static_cast<Index>(std::ceil(u + r));
@@ -50,7 +50,7 @@ struct Coverage {
   }
 };
 
-// Whether no view rules out the cube of `cells` cells at integer position (x, y, z).
+// Returns true if no view rules out the cube of `cells` cells at integer position (x, y, z).
 bool stays(const std::vector<Coverage>& views, const Bounds& b, double cell, Index cells, Index x, Index y,
            Index z) {
   const double half = 0.5 * static_cast<double>(cells);
@@ -99,7 +99,7 @@ std::vector<std::uint8_t> visual_hull(std::span<const View> views, const Bounds&
   std::vector<std::uint8_t> hull(at(resolution * resolution * resolution), 0);
   const double cell = bounds.side / static_cast<double>(resolution);
   const Index blocks = resolution / 4;
-  // Blocks of 4 x 4 x 4 first: most of the cube goes at a 64th of the cost.
+  // Tests blocks of 4 x 4 x 4 cells first, which rules out most of the cube at a 64th of the cost.
   parallel_for(blocks, 1, [&](Index bz, Index) {
     for (Index by = 0; by < blocks; ++by)
       for (Index bx = 0; bx < blocks; ++bx) {

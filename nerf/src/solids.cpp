@@ -10,9 +10,9 @@
 namespace fieldmark::nerf {
 namespace {
 constexpr double kMiss = std::numeric_limits<double>::infinity();
-constexpr double kNear = 1e-9;  // a ray that starts on a surface does not meet it again there
+constexpr double kNear = 1e-9;  // a ray that starts on a surface does not hit it again there
 
-// std::hypot guards against overflow, which no scene needs, and takes several times as long.
+// std::hypot guards against overflow, which no scene needs, and is several times slower.
 double length2(double x, double y) { return std::sqrt(x * x + y * y); }
 
 struct Local {
@@ -149,7 +149,7 @@ double share_of_b(const SolidTexture& t, const Vec3& p) {
     case TextureKind::flat:
       return 0;
     case TextureKind::checker: {
-      // The offset keeps cell borders off the faces of solids, where rounding would decide.
+      // The offset keeps cell borders away from the faces of solids, where rounding would decide.
       const double cells =
           std::floor(2 * q[0] + 0.017) + std::floor(2 * q[1] + 0.017) + std::floor(2 * q[2] + 0.017);
       return std::fmod(std::abs(cells), 2);

@@ -6,10 +6,10 @@
 
 namespace fieldmark::nerf {
 
-/// The shapes of a Solid.
+/// Shapes of a Solid.
 enum class SolidKind { sphere, box, cylinder, cone, torus };
 
-/// A solid of the analytic scenes. Cylinder, cone and torus have z as axis.
+/// A solid of the analytic scenes. Cylinder, cone and torus have z as their axis.
 struct Solid {
   SolidKind kind = SolidKind::sphere;  ///< its shape
   Vec3 centre{};                       ///< of its extent, in the world
@@ -26,15 +26,15 @@ struct SolidHit {
   Vec3 local{};   ///< the point in the solid's own frame: centre at 0, not turned
 };
 
-/// The first point of the surface along the ray with t > 0, if any: closed forms, and for the torus sphere
-/// tracing to within 1e-7 of the surface (a ray that grazes it by less may be missed). Source: Hart 1996
-/// (Sphere tracing), for the torus.
+/// Returns the first point of the surface along the ray with t > 0, if any: in closed form, or for the torus
+/// by sphere tracing to within 1e-7 of the surface (a ray that grazes it by less may be missed). Source: Hart
+/// 1996 (Sphere tracing), for the torus.
 std::optional<SolidHit> intersect(const Solid& solid, const Ray& ray);
 
-/// Radius of a sphere about the centre that holds the solid.
+/// Returns the radius of a sphere about the centre that holds the solid.
 double bounding_radius(const Solid& solid);
 
-/// The patterns that texture_colour() lists.
+/// Patterns, see texture_colour().
 enum class TextureKind { flat, checker, stripes, rings, noise, marble };
 
 /// Colour as a function of the position in a solid.
@@ -46,7 +46,7 @@ struct SolidTexture {
   std::uint32_t seed = 0;                ///< of the noise
 };
 
-/// The colour [3] at a point; on the segment between a and b.
+/// Returns the colour [3] at a point, on the segment between a and b.
 ///   flat     a
 ///   checker  a or b by the parity of cells of edge scale / 2
 ///   stripes  a or b by the angle about z, in 12 sectors, twisted by one turn in 8 scales of height
@@ -55,7 +55,7 @@ struct SolidTexture {
 ///   marble   stripes along x + z, bent by noise
 Vec3 texture_colour(const SolidTexture& texture, const Vec3& point);
 
-/// Smooth noise in [0, 1): trilinear between hashed lattice points, with the fade 3 t^2 - 2 t^3.
+/// Returns smooth noise in [0, 1): trilinear between hashed lattice points, with the fade 3 t^2 - 2 t^3.
 /// @param point  any; coordinates beyond 2^31 repeat
 double value_noise(const Vec3& point, std::uint32_t seed);
 

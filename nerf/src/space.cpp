@@ -11,17 +11,17 @@ namespace fieldmark::nerf {
 namespace {
 
 constexpr double kQuarter = 0.25;
-constexpr double kFar = 64;  // cube sides from the origin up to which a float holds a position well enough
+constexpr double kFar = 64;  // cube sides from the origin within which a float is precise enough
 constexpr std::array<const char*, 3> kNames{"cube", "ndc", "contracted"};
 
 double largest(const Vec3& y) { return std::max({std::abs(y[0]), std::abs(y[1]), std::abs(y[2])}); }
 
-// A ray that misses the cube, for one that the space does not hold.
+// Writes a ray that misses the cube, for one that the space does not contain.
 void miss(float* o, float* d) {
   for (int a = 0; a < 3; ++a) o[a] = 2, d[a] = a == 0;
 }
 
-// The image of a line under x -> (-a x / z, -b y / z, near / z): with q = o + t d,
+// Maps a line under x -> (-a x / z, -b y / z, near / z): with q = o + t d,
 //   image(q) - image(o) = t / (o_z q_z) (-a (d_x o_z - o_x d_z), -b (d_y o_z - o_y d_z), -near d_z),
 // whose first factor is positive while both points are in front of the camera.
 void to_ndc(const Space& s, const float* origin, const float* direction, float* o, float* d) {
@@ -43,7 +43,7 @@ void to_ndc(const Space& s, const float* origin, const float* direction, float* 
   }
 }
 
-// World length of a cube side, where the map is linear.
+// Returns the world length of a cube side where the map is linear.
 double unit(const Space& s) { return s.kind == SpaceKind::contracted ? 2 * s.bounds.side : s.bounds.side; }
 
 bool sees(const Camera& c, const Vec3& p) {
@@ -133,8 +133,8 @@ void CubeRays::set(const Space& space, Index first, const Camera& camera, std::s
   }
   std::copy_n(world, n, d);
   const double side = unit(space), corner = space.kind == SpaceKind::contracted ? 0.25 : 0;
-  // Georeferenced cameras are millions of sides from the origin: a float would round their positions before
-  // the corner is subtracted.
+  // Subtracts the corner in double: georeferenced cameras are millions of sides from the origin, where a
+  // float would round their positions.
   const Vec3 eye = camera.position();
   const bool far = largest(eye) > kFar * side;
   for (std::size_t i = 0; i < n; ++i)
@@ -162,13 +162,13 @@ std::vector<std::uint8_t> seen_cells(std::span<const Camera> cameras, const Spac
   std::vector<std::uint8_t> seen(at(resolution * resolution * resolution));
   const double side = 1 / static_cast<double>(resolution);
   parallel_for(resolution, 1, [&](Index first, Index last) {
-    std::size_t likely = 0;  // the same camera sees neighbours
+    std::size_t likely = 0;  // tried first: a camera that sees a cell sees its neighbours
     for (Index z = first; z < last; ++z)
       for (Index y = 0; y < resolution; ++y)
         for (Index x = 0; x < resolution; ++x) {
           std::uint8_t& cell = seen[at(x + resolution * (y + resolution * z))];
           for (int corner = 0; corner < 9 && !cell; ++corner) {
-            // Just inside the cell: the cube's faces may lie at infinity.
+            // Slightly inside the cell, because the cube's faces may lie at infinity.
             const auto place = [&](Index i, int bit) {
               const double shift = corner == 8 ? 0.5 : (corner >> bit & 1) ? 0.999 : 0.001;
               return (static_cast<double>(i) + shift) * side;

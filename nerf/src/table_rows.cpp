@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kBeside = 1e-5;  // of the cube
 
-// First and last corner of a level's cells that touch cell c of the grid, along an axis.
+// First and last corner, along an axis, of a level's cells that touch cell c of the grid.
 struct Corners {
   Index first, last;
 };

@@ -7,9 +7,9 @@
 
 namespace fieldmark::nerf {
 
-/// The rows of a table that a position in an occupied cell can read: the corners of every level's cells that
-/// touch an occupied cell enlarged by 1e-5 of the cube (rounding may put a position beside its cell). No
-/// image depends on the others. @return [rows] 1 where a row is read
+/// Finds the table rows that a position in an occupied cell can read: the corners of every level's cells that
+/// touch an occupied cell enlarged by 1e-5 of the cube (rounding may put a position just outside its cell).
+/// No render depends on the other rows. @return [rows] 1 where a row is read
 std::vector<std::uint8_t> rows_in_use(const HashEncoding<float>& encoding, const OccupancyGrid& grid);
 
 }  // namespace fieldmark::nerf

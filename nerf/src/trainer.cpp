@@ -21,12 +21,12 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr int kShards = 32;             // the last one to finish keeps a thread waiting: a few chunks each
-constexpr int kMlpShards = 8;           // each has the gradients of two large networks
+constexpr int kShards = 32;             // a few chunks each, so that threads wait little for the last
+constexpr int kMlpShards = 8;           // few, because each holds the gradients of two large networks
 constexpr Index kRays = 64;             // of a chunk
 constexpr Index kOccupancyPeriod = 16;  // steps
 constexpr Index kMostRays = 1 << 16;
-constexpr Index kPosesAfter = 100;  // steps: a field that shows nothing yet leads cameras astray
+constexpr Index kPosesAfter = 100;  // steps: a field that shows nothing yet would mislead the cameras
 constexpr Index kShortSteps = 8000, kLongSteps = 20000;  // of a run, see field_options()
 constexpr double kShortSeconds = 120, kLongSeconds = 400;
 
@@ -35,12 +35,13 @@ AdamOptions adam_options(const RadianceField& field) {
   return {.lr = 1, .beta2 = 0.99, .eps = 1e-15, .zero_grads = true};  // as Mueller et al. 2022 for tables
 }
 
-// Parameters whose gradients are summed by the loop: all of an mlp field, the networks of a hash field.
+// Returns the number of parameters whose gradients the loop sums: all of an mlp field, the networks of a hash
+// field.
 Index loop_size(const RadianceField& field) {
   return field.coarse ? field.params.size() : field.field.network_size();
 }
 
-// Places of samples along their rays, from the positions of both ends of each way between them.
+// Computes the places of samples along their rays by summing the distances between consecutive positions.
 void fill_middles(const RaySamples& s, float* middle) {
   for (std::size_t r = 0; r + 1 < s.ray_begin.size(); ++r) {
     float way = 0;
@@ -122,7 +123,7 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
       rays_per_step_(options.least_rays) {
   check(options, field);
   if (data.views.empty()) throw ValueError("[trainer] data must have at least one view");
-  // The table of a hash field takes its steps level by level, see backward_table().
+  // The table of a hash field is stepped level by level, see backward_table().
   train(field.params, adam_options(field), {{.end = loop_size(field)}}, {}, !field.coarse);
   if (options.keep) {
     start_ = sha256_hex(std::as_bytes(field.params.values()));
@@ -136,7 +137,7 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
   choose_pixels();
   prepare_images();
   if (field.coarse) rays_per_step_ = mlp_rays();
-  // As if every tile were at its worst, so that what was never seen is preferred.
+  // Starts every tile at the worst error, so that tiles not yet seen are preferred.
   if (options.hard_pixels > 0 && !field.coarse) tile_errors_.assign(at(tile_of(all_pixels() - 1) + 1), 1.f);
   for (Shard& s : shards_) {
     s.samples.reserve(at(kMostRays / kRays / kShards + 1));
@@ -171,7 +172,7 @@ void Trainer::carve() {
   pixels_ = training_pixels(data_.views, hull_margin(data_.views, field_.space.bounds, n));
 }
 
-// Rays go through valid pixels alone.
+// Rays go only through valid pixels.
 void Trainer::choose_pixels() {
   for (const View& v : data_.views)
     valid_pixels_ += v.valid.empty() ? v.camera.width * v.camera.height : std::ranges::count(v.valid, 1);
@@ -190,7 +191,7 @@ double Trainer::run_chunk(Index index, Shard& shard, Tape<float>& tape, float* g
   shard.samples.push_back(n);
   std::copy(s.position.begin(), s.position.end(), shard.position.append(3 * n));
 
-  // The features were looked up by the sampler; as leaves they collect what the table is owed.
+  // The sampler already looked up the features; as leaves they collect the gradient for the table.
   const Params<float> params(field_.params, options_.freeze ? nullptr : grads, packed_);
   const Var<float> density_features = tape.fresh_leaf(s.density_features.data(), nullptr, {n, width});
   const Var<float> colour_features = tape.fresh_leaf(s.colour_features.data(), nullptr, {n, width});
@@ -238,9 +239,9 @@ double Trainer::wanted_samples() const {
   return std::min(most, static_cast<double>(options_.first_samples) * grown);
 }
 
-// A hashed level's step reads all its gradients and meets lines all over four arrays, which takes as long for
-// few samples as for many. They wait for samples_per_step samples, each level in another step; the run's last
-// step leaves none behind.
+// The step of a hashed level reads all its gradients and touches cache lines all over four arrays, which
+// takes as long for few samples as for many. So a level waits for samples_per_step samples, each level in a
+// different training step; the run's last step leaves none waiting.
 bool Trainer::level_steps(int level) const {
   const auto period =
       std::max<Index>(1, std::lround(static_cast<double>(options_.samples_per_step) / wanted_samples()));
@@ -248,8 +249,8 @@ bool Trainer::level_steps(int level) const {
          (steps() + level) % period == 0;
 }
 
-// A level owns its rows of the table; shards, and in them chunks, are added in order. Its rows take their
-// step, if it is their turn, at once, while their gradients are still in cache.
+// A level owns its rows of the table; shards, and chunks within them, are added in order. If a level's step
+// is due, its rows are stepped at once, while their gradients are still in cache.
 void Trainer::backward_table() {
   const HashEncoding<float>& encoding = field_.field.encoding();
   const std::span<float> grad = field_.params.grads(encoding.table());
@@ -301,7 +302,7 @@ double Trainer::step_hash() {
     for (const auto& [tile, error] : s.errors)
       tile_errors_[at(tile)] = 0.5f * (tile_errors_[at(tile)] + error);
 
-  // The next step's rays: as many as have the wanted number of samples, changing by at most a half.
+  // Sets the rays of the next step to give the wanted number of samples, changing by at most a half.
   Index samples = 0;
   for (const Shard& s : shards_) samples = std::accumulate(s.samples.begin(), s.samples.end(), samples);
   const double wanted = static_cast<double>(rays_per_step_) * wanted_samples() /
@@ -333,10 +334,10 @@ void Trainer::refresh_occupancy() {
   };
   const bool warm = steps() >= options_.warm_up;
   field_.grid.update(density, occupancy_rng_,
-                     {.decay = 0.5f,  // half of it is forgotten at a look: 0.95 kept fog for a thousand steps
-                                      // (21 samples a ray, not 7)
+                     {.decay = 0.5f,  // halved at each update: 0.95 kept fog for a thousand steps
+                                      // (21 samples per ray, not 7)
                       .step = field_.step(),
-                      .threshold = warm ? 0.01f : -1.f,  // below zero: every candidate stays
+                      .threshold = warm ? 0.01f : -1.f,  // below zero: every candidate stays occupied
                       .fraction = steps() < 2 * options_.warm_up ? 1 : 4,
                       .round = static_cast<std::uint64_t>(steps() / kOccupancyPeriod)});
 }

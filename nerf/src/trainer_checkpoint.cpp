@@ -7,7 +7,7 @@
 
 #include "trainer_version_0_1.h"
 
-// What a checkpoint of a field holds beside its parameters, and which runs it fits.
+// What a checkpoint of a field holds in addition to its parameters, and which runs it matches.
 
 namespace fieldmark::nerf {
 
@@ -31,7 +31,7 @@ void Trainer::describe(RunFingerprint& f) const {
   f.option("precision", o.precision == Precision::bf16 ? "bf16" : "fp32");
   f.option("carve", o.carve);
   f.option("keep", o.keep);
-  // Only where they are on, so that checkpoints without them still fit.
+  // Recorded only if they are on, so that checkpoints without them still match.
   if (o.image_colours) f.option("image_colours", true);
   if (o.refine_poses) f.option("refine_poses", true);
   if (o.freeze) f.option("freeze", true);

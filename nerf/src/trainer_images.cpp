@@ -3,12 +3,12 @@
 #include "image_corrections.h"
 #include "trainer_shard.h"
 
-// What a training learns of its images beside the field: exposures and motions of cameras.
+// What training learns about its images in addition to the field: exposures and camera motions.
 
 namespace fieldmark::nerf {
 namespace {
 
-// Of the field's cameras from the point that they look at.
+// Returns the median distance of the field's cameras from the point that they look at.
 double median_distance(const CameraSpan& span) {
   std::vector<double> distances = span.distances;
   const auto middle = distances.begin() + std::ssize(distances) / 2;

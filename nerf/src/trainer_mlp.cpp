@@ -11,9 +11,9 @@
 namespace fieldmark::nerf {
 namespace {
 
-constexpr Index kMlpRays = 4;  // of a chunk: 128 rows for the coarse network, 256 for the fine one
+constexpr Index kMlpRays = 4;  // per chunk: 128 rows for the coarse network, 256 for the fine one
 
-// Colour and opacity of rays at given samples, whose densities are left in samples.sigma.
+// Computes colour and opacity of rays from given samples and stores the densities in samples.sigma.
 Var<float> look(const Field<float>& net, const ParamStore<float>& store, const Params<float>& params,
                 std::span<const float> directions, RaySamples& samples, Tape<float>& tape) {
   const Index n = samples.size(), width = net.density_width(), encoded = net.direction_width(),

@@ -13,7 +13,7 @@ namespace {
 constexpr Index kErrorTile = 8;                                        // pixels along a side, see hard_pixels
 constexpr Index kMostParts = kMostSupersampling * kMostSupersampling;  // of a pixel
 
-// A uniform integer below n from two uniform floats, since one has 24 bits only.
+// Returns a uniform integer below n from two uniform floats, because one has only 24 bits.
 Index pick(float u, float v, Index n) {
   const double x = (static_cast<double>(u) + static_cast<double>(v) * 0x1.0p-24) * static_cast<double>(n);
   return std::min(static_cast<Index>(x), n - 1);
@@ -26,7 +26,7 @@ Index Trainer::all_pixels() const {
   return static_cast<Index>(data_.views.size()) * camera.width * camera.height;
 }
 
-// Index of the tile that holds a pixel; tiles and pixels are counted through all images.
+// Returns the index of the tile that holds a pixel; tiles and pixels are numbered across all images.
 Index Trainer::tile_of(Index place) const {
   const Index width = data_.views[0].camera.width, height = data_.views[0].camera.height;
   const Index across = (width + kErrorTile - 1) / kErrorTile, down = (height + kErrorTile - 1) / kErrorTile;
@@ -34,7 +34,7 @@ Index Trainer::tile_of(Index place) const {
   return (view * down + pixel / width / kErrorTile) * across + pixel % width / kErrorTile;
 }
 
-// Replaces a share of the pixels, see TrainOptions::hard_pixels, by the harder of two.
+// Replaces a share of the pixels, see TrainOptions::hard_pixels, by the harder of two candidates.
 void Trainer::prefer_hard(Index first, Index count, std::span<Index> place) const {
   const auto choices = static_cast<Index>(pixels_.size());
   for (Index i = 0; i < count; ++i) {
@@ -63,7 +63,7 @@ Index Trainer::rays_along_pixel() const {
   return steps() < options_.supersample_after ? 1 : field_.options().supersampling;
 }
 
-// One ray through the centre of each pixel, or one anywhere in each of its parts, row by row.
+// Sets one ray through the centre of each pixel, or one at random in each of its parts, row by row.
 void Trainer::aim(Index first, Shard& c) const {
   const auto step = static_cast<std::uint64_t>(steps());
   const Index k = rays_along_pixel();
@@ -97,8 +97,8 @@ void Trainer::choose_rays(Index first, Index rays, Shard& c) const {
   c.images.resize(at(count));
   std::vector<Index>& place = c.places;
   const Index width = data_.views[0].camera.width, size = width * data_.views[0].camera.height;
-  // Where a pixel lies in memory is random: all are asked for before the first is used, and so are the places
-  // of those that are listed.
+  // Pixels lie at random places in memory, so all of them are prefetched before the first is used, and so are
+  // the entries of the pixel list.
   const Index choices = pixels_.empty() ? all_pixels() : static_cast<Index>(pixels_.size());
   for (Index i = 0; i < count; ++i) {
     const auto u = pixel_rng_.uniform4(step, static_cast<std::uint64_t>(first + i));
@@ -115,7 +115,8 @@ void Trainer::choose_rays(Index first, Index rays, Shard& c) const {
     const View& view = data_.views[at(c.images[at(i)])];
     std::copy_n(view.rgba.data.data() + 4 * (place[at(i)] % size), 4, &c.truth[at(4 * i)]);
     const auto b = background_rng_.uniform4(step, static_cast<std::uint64_t>(first + i));
-    // What is opaque before a plain background may show it, or a part of it at an edge.
+    // An opaque pixel in front of a plain background may still show that background, wholly or in part at an
+    // edge.
     const bool plain = data_.scene == SceneType::plain && c.truth[at(4 * i + 3)] > 0;
     std::copy_n(plain ? data_.plain_colour.data() : b.data(), 3, &c.background[at(3 * i)]);
   }

@@ -7,9 +7,9 @@
 
 namespace fieldmark::nerf {
 
-// What the chunks of a shard use one after another, and what their samples pass back to the table.
+// What the chunks of a shard use in turn, and what their samples pass back to the table.
 struct Trainer::Shard {
-  // Grows to twice what it must hold, so that steps with a few more samples than any before do not allocate.
+  // Grows to twice the needed size, so that steps with slightly more samples than any before do not allocate.
   struct Buffer {
     std::vector<float> numbers;
     std::size_t used = 0;
@@ -24,16 +24,16 @@ struct Trainer::Shard {
   std::vector<float> jitter, truth, background;  // the same
   RaySampler sampler;
   RaySamples found;
-  // For an mlp field alone.
+  // For mlp fields only.
   HierarchicalSampler hierarchical;
   RaySamples first;
   std::vector<float> weights;
-  // All chunks of a step in order; within a chunk, feature gradients go level by level.
+  // All chunks of a step in order; within a chunk, feature gradients are stored level by level.
   std::vector<Index> samples;
   Buffer position, dfeatures;
   std::vector<Index> places;                    // of the pixels of a chunk's rays in all images
   std::vector<Index> images;                    // that hold these pixels
-  std::vector<float> dposition;                 // of a chunk's samples, where cameras are refined
+  std::vector<float> dposition;                 // of a chunk's samples, if cameras are refined
   std::vector<float> image_grads;               // of all chunks, laid out as ImageCorrections::params
   std::vector<std::pair<Index, float>> errors;  // of the rays of all chunks: tile and mean square
 

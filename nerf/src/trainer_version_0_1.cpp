@@ -3,8 +3,8 @@
 #include <fieldmark/core/error.h>
 #include <fieldmark/nerf/trainer.h>
 
-// Checkpoints of fields that version 0.1 wrote: flat arrays, and the options in one line. Their data set is
-// known by its name and size alone.
+// Field checkpoints of version 0.1: flat arrays, and the options in one line. They identify their data set
+// only by its name and size.
 namespace fieldmark::nerf {
 namespace {
 

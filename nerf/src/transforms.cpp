@@ -19,10 +19,10 @@ std::string four_digits(double x) {
   return text;
 }
 
-// Whether a key says no: nothing, false or 0.
+// Returns true if a value means no: null, false or 0.
 bool says_no(const JsonPlace& value) { return value.is_null() || value.is_false() || value.is_zero(); }
 
-// The model of a lens: as camera_model names it, and fisheye where is_fisheye says so.
+// Reads the model of a lens from camera_model, or fisheye if is_fisheye is set.
 void parse_model(const JsonPlace& from, Lens& lens) {
   if (from.has("camera_model")) {
     std::string model = from["camera_model"].text();
@@ -52,14 +52,14 @@ void parse_model(const JsonPlace& from, Lens& lens) {
       from[other].fail("a lens of k1 to k6, p1 and p2", "another one; undistort the images first");
 }
 
-// k5 and k6 belong to the rational model alone; a fisheye has k1 to k4.
+// k5 and k6 belong only to the rational model; a fisheye has k1 to k4.
 void complete_model(const JsonPlace& frame, Lens& lens) {
   if ((lens.k5 != 0 || lens.k6 != 0) && lens.model == LensModel::polynomial) lens.model = LensModel::rational;
   if (lens.model == LensModel::fisheye && (lens.p1 != 0 || lens.p2 != 0 || lens.k5 != 0 || lens.k6 != 0))
     frame.fail("a fisheye of k1 to k4", "p1, p2, k5 or k6 as well");
 }
 
-// The intrinsics at one place replace those of `to`.
+// Replaces intrinsics in `to` by those at one place.
 void parse_intrinsics(const JsonPlace& from, Intrinsics& to) {
   parse_model(from, to.lens);
   const auto read = [&](const char* key, auto& value, double low, double high, const char* range) {
@@ -68,7 +68,7 @@ void parse_intrinsics(const JsonPlace& from, Intrinsics& to) {
     return true;
   };
   const char *angles = "(0, pi) radians", *pixels = "(0.001, 1e9) pixels", *any = "(-1e9, 1e9)";
-  // Angle and length state the same thing: the one at this place overrides either from above.
+  // Angle and length state the same thing: the one at this place overrides either one from the outer level.
   if (read("camera_angle_x", to.angle_x, 0, std::numbers::pi, angles)) to.fl_x = 0;
   if (read("camera_angle_y", to.angle_y, 0, std::numbers::pi, angles)) to.fl_y = 0;
   read("fl_x", to.fl_x, 1e-3, 1e9, pixels), read("fl_y", to.fl_y, 1e-3, 1e9, pixels);
@@ -81,10 +81,10 @@ void parse_intrinsics(const JsonPlace& from, Intrinsics& to) {
   for (const auto& [key, coefficient] : coefficients) read(key, to.lens.*coefficient, -1e9, 1e9, any);
 }
 
-// The matrices of a file that were poses only after a repair.
+// The matrices of a file that became poses only after a repair.
 struct Repairs {
   std::size_t scaled = 0, divided = 0;
-  double scale = 1;                     // of the first that is scaled
+  double scale = 1;                     // of the first scaled matrix
   std::vector<std::size_t> mirrored{};  // numbers of frames
 };
 
@@ -92,9 +92,9 @@ void mirror_world(Pose& pose) {
   for (std::size_t c = 0; c < 4; ++c) pose[c] = -pose[c];
 }
 
-// Makes a pose of 3 or 4 rows of 4 numbers: divides by the last number of the fourth row (homogeneous
-// coordinates), takes a common length out of the columns, and mirrors the world where the axes are those of a
-// mirror.
+// Makes a pose from 3 or 4 rows of 4 numbers: divides by the last number of the fourth row (homogeneous
+// coordinates), divides a common length out of the columns, and mirrors the world if the axes are a
+// reflection.
 Pose repaired(const JsonPlace& matrix, std::span<const double> m, Repairs& repairs, std::size_t frame) {
   const double last = m.size() == 16 ? m[15] : 1;
   for (std::size_t c = 0; c < 3 && m.size() == 16; ++c)
@@ -154,7 +154,7 @@ void tell_of_repairs(const JsonPlace& frames, const Repairs& repairs, Transforms
   t.notes.push_back("all poses are those of a mirrored world, which is mirrored back along x");
 }
 
-// Keys that change nothing here: for people, or for what other programs do with a scene.
+// Returns true for keys without effect here: for human readers, or for other programs' use of a scene.
 bool is_idle_key(const std::string& key) {
   static const std::set<std::string> keys{"aabb_scale",
                                           "scale",

@@ -17,7 +17,7 @@ namespace fieldmark::nerf {
 namespace {
 namespace fs = std::filesystem;
 
-// Grey, grey + alpha, RGB or RGBA to RGBA.
+// Converts grey, grey + alpha, RGB or RGBA to RGBA.
 Tensor<float> to_rgba(const Tensor<float>& image) {
   const Index pixels = image.shape[0] * image.shape[1], channels = image.shape[2];
   Tensor<float> out(Shape{image.shape[0], image.shape[1], 4});
@@ -56,7 +56,7 @@ bool same_stated_size(const Shot& a, const Shot& b) {
   return a.intrinsics.width == b.intrinsics.width && a.intrinsics.height == b.intrinsics.height;
 }
 
-// The first shot of the stated size, which the others are compared with.
+// Returns the first shot of the stated size, with which the others are compared.
 const Shot& first_alike(const ViewPlan& plan, const Shot& shot) {
   return *std::find_if(plan.shots.begin(), plan.shots.end(),
                        [&](const Shot& s) { return same_stated_size(s, shot); });
@@ -74,9 +74,9 @@ bool has_proportions(const Intrinsics& stated, Index width, Index height) {
          static_cast<double>(std::max(width, height)) + std::max(w, h);
 }
 
-// An image as the pose of its shot has it. A JPEG file may ask to be turned for display; whether the pose
-// holds for its pixels as stored or as shown follows from the stated size, or from the program: COLMAP takes
-// them as stored.
+// Reads an image in the orientation of its shot's pose. A JPEG file may ask to be rotated for display;
+// whether the pose holds for its pixels as stored or as shown follows from the stated size, or from the
+// program: COLMAP uses them as stored.
 Tensor<float> image_of(const Shot& shot, const fs::path& path) {
   const std::vector<std::byte> bytes = read_bytes(path);
   Tensor<float> image = decode_image(bytes, path.string());
@@ -96,9 +96,9 @@ Tensor<float> image_of(const Shot& shot, const fs::path& path) {
       "-auto-orient FILE)");
 }
 
-// A mask as an image of the size of its view: white where pixels are valid, black where they are excluded.
-// Of mask_path, black excludes (nerfstudio); of dynamic_mask_NAME.png, all that is not black
-// (instant-ngp). Masks of 0 and 1, not 255, are known by their largest value.
+// Reads a mask as an image of the size of its view: white where pixels are valid, black where they are
+// excluded. In mask_path, black excludes (nerfstudio); in dynamic_mask_NAME.png, everything that is not black
+// excludes (instant-ngp). Masks of 0 and 1, not 255, are recognised by their largest value.
 Tensor<float> read_mask(const Shot& shot, const fs::path& file, Index height, Index width) {
   Tensor<float> mask = to_rgba(at_place(shot.place, [&] { return read_image(file); }));
   const auto w = static_cast<double>(mask.shape[1]), h = static_cast<double>(mask.shape[0]);
@@ -147,7 +147,7 @@ View read_view(const ViewPlan& plan, std::size_t i) {
   if (const fs::path& mask = plan.masks[i]; !mask.empty()) {
     const Tensor<float> clear = shaped(read_mask(shot, mask, height, width));
     view.valid.resize(at(scaled.height * scaled.width));
-    // A pixel with any share of excluded ones has their colour in it.
+    // A pixel that contains any share of an excluded pixel also contains its colour.
     for (Index p = 0; p < std::ssize(view.valid); ++p) view.valid[at(p)] = clear[4 * p] > 0.999f;
   }
   view.rgba = shaped(std::move(view.rgba));
@@ -155,7 +155,7 @@ View read_view(const ViewPlan& plan, std::size_t i) {
   return view;
 }
 
-// Fills a view up at the right and below, opaque and black, so that all are of one size.
+// Pads a view at the right and bottom, opaque and black, so that all views have the same size.
 void fill_up(View& view, Index width, Index height) {
   const Index w = view.camera.width, h = view.camera.height;
   if (w == width && h == height) return;

@@ -1,5 +1,5 @@
 #pragma once
-// The images and masks of a split: read, freed of lens distortion, resized and brought to one size.
+// Reads the images and masks of a split, removes lens distortion, resizes them and pads them to one size.
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace fieldmark::nerf {
 
-/// The part of the images of one stated size that all their lenses cover.
+/// The part that all lenses cover in the images of one stated size.
 struct LensPart {
   Index stated_width = 0;   ///< Intrinsics::width of the shots, 0: not stated
   Index stated_height = 0;  ///< Intrinsics::height of the shots, 0: not stated
@@ -21,19 +21,19 @@ struct LensPart {
 /// The views of a split before their images are read.
 struct ViewPlan {
   std::vector<Shot> shots{};
-  std::vector<std::filesystem::path> files{};  ///< of the images, one a shot
-  std::vector<std::filesystem::path> masks{};  ///< one a shot; empty: none
-  Index size = 0;                              ///< longer side before images are cut, pixels; 0: as they are
-  std::vector<LensPart> parts{};               ///< one a stated size where there are lenses, else none
+  std::vector<std::filesystem::path> files{};  ///< of the images, one per shot
+  std::vector<std::filesystem::path> masks{};  ///< one per shot; empty: none
+  Index size = 0;                              ///< longer side before images are cropped, pixels; 0: original
+  std::vector<LensPart> parts{};               ///< one per stated size if there are lenses, else none
 };
 
-/// Fills in ViewPlan::parts, and tells of them in `notes`.
+/// Fills in ViewPlan::parts and describes them in `notes`.
 /// @param all  the shots of all splits, whose parts are the same
 /// @throws IoError  naming the place of a shot whose lens has no inverse or leaves no part
 void plan_lenses(const std::vector<Shot>& all, ViewPlan& plan, std::vector<std::string>& notes);
 
-/// Reads the views in parallel. Images of one stated size must be of one size; smaller ones of other sizes
-/// are filled up at the right and below, where View::valid is then 0.
+/// Reads the views in parallel. Images of one stated size must have the same size; smaller images of other
+/// sizes are padded at the right and bottom, where View::valid is then 0.
 /// @throws IoError  naming the place of the first image, by number, that is unreadable or of another size,
 ///                  or whose mask is; or of the first image if masks exclude every pixel
 std::vector<View> read_views(const ViewPlan& plan, std::vector<std::string>& notes);

@@ -1,5 +1,5 @@
 #pragma once
-// numpy arrays as the engine sees them. Nothing is copied.
+// Zero-copy access to numpy arrays for the engine.
 #include <fieldmark/core/error.h>
 #include <fieldmark/engine/shape.h>
 #include <pybind11/numpy.h>
@@ -19,21 +19,21 @@ const char* dtype_name() {
   return std::is_same_v<T, float> ? "float32" : std::is_same_v<T, double> ? "float64" : "int32";
 }
 
-/// The name of an object's type, for errors.
+/// Returns the name of an object's type, for error messages.
 inline std::string type_name(const py::handle& object) {
   return py::str(py::type::of(object).attr("__name__")).cast<std::string>();
 }
 
-/// A numpy array of T in row-major order: its elements are borrowed, not copied.
-/// @param where  "function: argument", for errors
-/// @throws TypeError for another type of element, or a mask   @throws ValueError for another layout
+/// Borrows a numpy array of T in row-major order without copying its elements.
+/// @param where  "function: argument", for error messages
+/// @throws TypeError for another element type, or a mask   @throws ValueError for another layout
 template <class T>
 py::array borrowed(const std::string& where, const py::object& object) {
   const std::string wanted = dtype_name<T>();
   if (!py::isinstance<py::array>(object))
     throw py::type_error("[" + where + "] must be a numpy array of " + wanted + ", got " + type_name(object));
   const auto array = py::reinterpret_borrow<py::array>(object);
-  if (py::hasattr(object, "mask"))  // a masked array is an array whose elements do not all count
+  if (py::hasattr(object, "mask"))  // some elements of a masked array do not count
     throw py::type_error("[" + where + "] must not be masked: pass x.filled(value)");
   if (!array.dtype().is(py::dtype::of<T>()) && !array.dtype().equal(py::dtype::of<T>()))
     throw py::type_error("[" + where + "] must be of " + wanted + ", got " +
@@ -64,10 +64,10 @@ std::span<const T> elements(const py::array& array) {
   return {static_cast<const T*>(array.data()), static_cast<std::size_t>(array.size())};
 }
 
-/// A count of things that must stay where they are; each lease is a Python object.
+/// Counts the users of memory that must not move; each lease is a Python object.
 class Leases {
  public:
-  /// Keeps `owner` alive, and counts, until the object dies.
+  /// Keeps `owner` alive and counted until the object dies.
   template <class Owner>
   py::capsule lend(std::shared_ptr<Owner> owner) {
     ++*count_;
@@ -76,7 +76,7 @@ class Leases {
     });
   }
   int count() const { return *count_; }
-  /// Whose memory an array shows, if it is a lease's or shows a part of an array that is; else null.
+  /// Returns the owner of an array's memory if the array is a lease's or a view of one; else null.
   static const void* owner(py::array array) {
     py::object base = array.base();
     while (base && py::isinstance<py::array>(base)) base = py::reinterpret_borrow<py::array>(base).base();
@@ -94,14 +94,14 @@ class Leases {
   std::shared_ptr<int> count_ = std::make_shared<int>(0);
 };
 
-/// An array over memory that `owner` keeps; while it lives, `leases` counts it.
+/// Returns an array over memory that `owner` keeps alive; `leases` counts it while it lives.
 template <class T, class Owner>
 py::array_t<T> view(T* elements, const Shape& shape, std::shared_ptr<Owner> owner, Leases& leases) {
   py::array_t<T> array(extents_of(shape), elements, leases.lend(std::move(owner)));
   return array;
 }
 
-/// The same, which Python cannot write to.
+/// As above, but read-only for Python.
 template <class T, class Owner>
 py::array_t<T> read_only_view(const T* elements, const Shape& shape, std::shared_ptr<Owner> owner,
                               Leases& leases) {

@@ -1,4 +1,4 @@
-// The engine: what exists for each scalar type, gradient checks, schedules, files of state.
+// The engine: everything for one scalar type, gradient checks, schedules, state files.
 #include <fieldmark/engine/decay.h>
 #include <fieldmark/engine/gradcheck.h>
 #include <fieldmark/engine/inspect.h>
@@ -35,7 +35,7 @@ class CheckedFunction {
   CheckedFunction(const CheckedFunction&) = delete;
   CheckedFunction& operator=(const CheckedFunction&) = delete;
   Var<double> operator()(Tape<double>& tape, std::span<const Var<double>> xs) {
-    handles_.push_back(std::make_shared<TapeHandle<double>>(tape));  // a backward reads what it keeps
+    handles_.push_back(std::make_shared<TapeHandle<double>>(tape));  // backward reads what the handle keeps
     py::list values;
     for (const Var<double>& x : xs) values.append(Value<double>(handles_.back(), x));
     const py::object y = f_(*values);

@@ -6,7 +6,7 @@
 namespace fieldmark::python {
 
 /// Trains to the end; Ctrl-C raises KeyboardInterrupt.
-/// @param progress  None, or a function of the steps taken and of the seconds
+/// @param progress  None, or a function of the steps and seconds so far
 void run(TrainingRun& training, const py::object& progress);
 
 }  // namespace fieldmark::python

@@ -1,4 +1,4 @@
-// Radiance fields: load, train, render, compare with the truth.
+// Radiance fields: load, train, render, compare with the ground truth.
 #include <fieldmark/nerf/camera_set.h>
 #include <fieldmark/nerf/dataset.h>
 #include <fieldmark/nerf/evaluation.h>
@@ -17,7 +17,7 @@ using namespace py::literals;
 using nerf::Camera;
 using nerf::RadianceField;
 
-constexpr Index kQuiet = 25;  // steps from one look at Ctrl-C to the next
+constexpr Index kQuiet = 25;  // steps between checks for Ctrl-C
 
 Camera camera_from(const py::object& given, double fov, Index width, Index height) {
   const py::array pose = borrowed<double>("Camera: pose", given);
@@ -29,7 +29,7 @@ Camera camera_from(const py::object& given, double fov, Index width, Index heigh
   return nerf::make_camera(p, fov, width, height);
 }
 
-// The tensor's memory becomes the array's.
+// Moves the tensor's memory into an array.
 py::array_t<float> array_of(Tensor<float>&& tensor) {
   auto* kept = new Tensor<float>(std::move(tensor));
   return py::array_t<float>(extents_of(kept->shape), kept->data.data(),

@@ -1,4 +1,4 @@
-// Which arrays are read-only for the sake of passes, and whether values and gradients are apart.
+// Keeps arrays read-only during passes, and checks that values and gradients do not overlap.
 #include "held_arrays.h"
 
 #include <algorithm>
@@ -9,12 +9,12 @@ namespace fieldmark::python {
 namespace {
 
 struct Hold {
-  int count = 0;           // of passes that read the array
-  bool writeable = false;  // before
+  int count = 0;           // number of passes that read the array
+  bool writeable = false;  // before the first hold
 };
 
-// Of all tapes: one array may be read by several. It outlives the module's objects, whose order of death is
-// Python's.
+// Shared by all tapes, since several may read one array. It outlives the module's objects, whose order of
+// destruction is up to Python.
 std::unordered_map<PyObject*, Hold>& holds() {
   static auto* all = new std::unordered_map<PyObject*, Hold>;
   return *all;

@@ -1,5 +1,5 @@
 #pragma once
-// The arrays that a pass reads where they lie.
+// The arrays that a pass reads without copying.
 #include <cstddef>
 #include <vector>
 
@@ -7,9 +7,9 @@
 
 namespace fieldmark::python {
 
-/// Arrays that a pass reads, until release(): they stay alive and, with the arrays that they show a part of,
-/// read-only. A write between forward and backward would otherwise give wrong gradients in silence. Views
-/// made before can still write.
+/// Arrays that a pass reads, until release(). They stay alive and read-only, as do the arrays that they are
+/// views of: a write between forward and backward would silently give wrong gradients. Views made before can
+/// still write.
 class HeldArrays {
  public:
   HeldArrays() = default;
@@ -23,7 +23,7 @@ class HeldArrays {
   std::vector<py::object> arrays_;
 };
 
-/// Where an array lies.
+/// The memory of an array.
 struct Memory {
   const void* begin;
   std::size_t bytes;
@@ -32,13 +32,12 @@ inline Memory memory_of(const py::array& array) {
   return {array.data(), static_cast<std::size_t>(array.nbytes())};
 }
 
-/// The memory of a pass that is not the tape's own: what it reads, and gradients, which backwards change. No
-/// array is both.
+/// External memory of a pass: arrays that it reads, and gradients that backwards change. No array is both.
 class PassMemory {
  public:
-  /// @param where  "function: argument", for errors   @throws ValueError if it is a gradient
+  /// @param where  "function: argument", for error messages   @throws ValueError if it is a gradient
   void check_read(const char* where, const Memory& values) const;
-  /// @throws ValueError if the values are a gradient, or the gradient is read
+  /// @throws ValueError if the values are a gradient, or the pass reads the gradient
   void check_leaf(const char* where, const Memory& values, const Memory& grads) const;
   void add_read(const Memory& values) { read_.push_back(values); }
   void add_leaf(const Memory& values, const Memory& grads) {

@@ -1,4 +1,4 @@
-// The inspector of a tape: its graph, its costs, the first NaN.
+// The tape inspector: its graph, its costs, the first NaN.
 #include <fieldmark/engine/inspect.h>
 #include <pybind11/stl.h>
 
@@ -11,7 +11,7 @@ namespace {
 
 using namespace py::literals;
 
-// An inspector and the tape that it watches, until it is closed.
+// An inspector and the tape that it watches until closed.
 template <class T>
 struct InspectorHandle {
   std::shared_ptr<TapeHandle<T>> tape;

@@ -1,4 +1,4 @@
-// Layers: they register their parameters by name and read them in each pass.
+// Layers, which register their parameters by name and read them in each pass.
 #include <fieldmark/engine/nn/batch_norm.h>
 #include <fieldmark/engine/nn/conv2d.h>
 #include <fieldmark/engine/nn/dense.h>
@@ -16,13 +16,13 @@ using namespace py::literals;
 template <class T>
 using StorePtr = std::shared_ptr<StoreHandle<T>>;
 
-// A layer and the store of its parameters.
+// A layer and its parameter store.
 template <class T, class L>
 struct LayerHandle {
   StorePtr<T> store;
   L layer;
 
-  // @param kind  for errors
+  // @param kind  for error messages
   template <class... A>
   static LayerHandle* make(const char* kind, const StorePtr<T>& s, const std::string& name, A&&... options) {
     return new LayerHandle{s, L(s->open(kind), name, std::forward<A>(options)...)};

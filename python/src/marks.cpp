@@ -21,7 +21,7 @@ using namespace py::literals;
 using watermark::Key;
 using watermark::Owner;
 
-// Evidence of the cells, summed over images.
+// Computes the evidence of the cells, summed over images.
 std::vector<double> evidence_of(const Owner& owner, const std::vector<py::object>& images,
                                 const std::string& detection) {
   if (detection != "auto" && detection != "blind")

@@ -4,7 +4,7 @@
 namespace py = pybind11;
 
 PYBIND11_MODULE(_fieldmark, module) {
-  // Python's own families, so that `except ValueError` and `except OSError` do what people expect.
+  // Derives from Python's own exceptions, so that `except ValueError` and `except OSError` work as expected.
   py::register_exception<fieldmark::Error>(module, "Error", PyExc_RuntimeError);
   py::register_exception<fieldmark::ValueError>(module, "ValueError_", PyExc_ValueError);
   py::register_exception<fieldmark::ShapeError>(module, "ShapeError", PyExc_ValueError);

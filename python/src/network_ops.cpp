@@ -114,7 +114,7 @@ void bind_resampling(py::module_& module) {
               "coincide."));
 }
 
-// An array of a given shape, which the backward reads.
+// Returns an array of the given shape, which backward reads.
 template <class U, class T>
 Reading<U> matching(const char* where, const Value<T>& x, const Shape& shape, const py::object& given) {
   const py::array array = x.tape->template reads<U>(where, given);

@@ -1,4 +1,4 @@
-// The ops of elements, matrices and axes: name(x), name(a, b), with their options.
+// Ops on elements, matrices and axes: name(x), name(a, b), with their options.
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/batched_matmul.h>
@@ -59,7 +59,7 @@ Shape shape_from(const char* op, const std::vector<Index>& extents) {
   return shape;
 }
 
-// name(x) for ops of one value without options.
+// Binds name(x) for ops of one value without options.
 template <class T>
 void bind_maps(py::module_& module) {
   struct Map {
@@ -104,7 +104,7 @@ void bind_maps(py::module_& module) {
         m.name, [map = m.map](const Value<T>& x) { return x.with(map(x.get())); }, "x"_a, once<T>(m.text));
 }
 
-// name(a, b).
+// Binds name(a, b).
 template <class T>
 void bind_pairs(py::module_& module) {
   struct Pair {
@@ -127,7 +127,7 @@ void bind_pairs(py::module_& module) {
         "a"_a, "b"_a, once<T>(p.text));
 }
 
-// Maps and pairs with numbers.
+// Binds elementwise maps and pairs with numbers.
 template <class T>
 void bind_maps_with_options(py::module_& module) {
   using V = const Value<T>&;
@@ -157,7 +157,7 @@ void bind_maps_with_options(py::module_& module) {
       "b"_a, once<T>("a where the mask is not 0, b where it is; the mask broadcasts."));
 }
 
-// Reductions over all elements, or over some axes.
+// Binds reductions over all elements, or over some axes.
 template <class T>
 void bind_reductions(py::module_& module) {
   struct Reduction {
@@ -237,7 +237,7 @@ void bind_layout(py::module_& module) {
       "xs"_a, "axis"_a = -1, once<T>("Joins values along an axis; their other axes are alike."));
 }
 
-// The indices outlive the pass: gather's backward reads them.
+// The indices must outlive the pass: gather's backward reads them.
 template <class T>
 Reading<std::int32_t> indices(const char* where, const Value<T>& x, const py::object& given) {
   const py::array index = x.tape->template reads<std::int32_t>(where, given);

@@ -1,4 +1,4 @@
-// Stores of parameters, optimisers, and files of their state.
+// Parameter stores, optimisers, and files of their state.
 #include <fieldmark/engine/adam.h>
 #include <fieldmark/engine/clip.h>
 #include <fieldmark/engine/sgd.h>
@@ -110,11 +110,11 @@ void bind_store(py::module_& module, const std::string& suffix) {
           "infinite.");
 }
 
-// An optimiser and the store that it moves.
+// An optimiser and the store that it updates.
 template <class T, class O>
 struct OptimiserHandle {
   StorePtr<T> store;
-  py::capsule lease;  // the store takes no more parameters
+  py::capsule lease;  // blocks new parameters in the store
   O optimiser;
   void step(double factor) {
     optimiser.step(store->store.values(), store->store.grads(), factor);
@@ -156,7 +156,7 @@ void bind_optimisers(py::module_& module, const std::string& suffix) {
       .def("step", &SgdHandle<T>::step, "lr_factor"_a = 1.0, "One step; lr_factor multiplies lr.");
 }
 
-// Applies f to what an optimiser given from Python keeps; None: to nothing.
+// Applies f to the C++ optimiser of a Python object; None: does nothing.
 template <class T, class F>
 void with_optimiser(const char* function, const StorePtr<T>& s, const py::object& given, F f) {
   const auto of = [&](auto& handle) {
@@ -177,7 +177,7 @@ void bind_state(py::module_& module) {
       "save_state",
       [](SafetensorsFile& file, const std::string& prefix, const StorePtr<T>& s,
          const py::object& optimiser) {
-        SafetensorsFile next = file;  // a name that is taken leaves the file as it was
+        SafetensorsFile next = file;  // a copy: if a name is taken, the file is unchanged
         with_optimiser<T>("save_state", s, optimiser,
                           [&](const auto&... o) { save_state(next, prefix, std::as_const(s->store), o...); });
         file = std::move(next);

@@ -3,7 +3,7 @@
 
 namespace fieldmark::python {
 
-/// What follows an affine map or a convolution whose argument `relu` says so.
+/// Returns the activation after an affine map or a convolution with the argument `relu`.
 constexpr Activation activation(bool relu) { return relu ? Activation::relu : Activation::none; }
 
 }  // namespace fieldmark::python

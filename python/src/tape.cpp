@@ -17,7 +17,7 @@ using ValueClass = py::class_<Value<T>>;
 template <class T>
 using TapePtr = std::shared_ptr<TapeHandle<T>>;
 
-// A value that must be of this tape.
+// Checks that a value belongs to this tape.
 template <class T>
 Var<T> own(const TapePtr<T>& t, const char* where, const Value<T>& v) {
   if (v.tape != t)
@@ -75,7 +75,7 @@ T item(const Value<T>& v) {
   return v.var.value()[0];
 }
 
-// The other operand, if it is a number.
+// Returns the other operand if it is a number.
 template <class T>
 double number(const char* op, const py::object& b) {
   const bool array = py::isinstance<py::array>(b);
@@ -87,7 +87,7 @@ double number(const char* op, const py::object& b) {
                        type_name(b) + (array ? ": pass it as tape.constant(x)" : ""));
 }
 
-// An operator of two values, or of a value and a number.
+// Binds an operator on two values, or on a value and a number.
 template <class T, class Number = T, class F>
 auto operation(const char* op, F f) {
   return [op, f](const Value<T>& a, const py::object& b) {
@@ -119,7 +119,7 @@ void bind_operators(ValueClass<T>& value) {
             return a.with(batched_matmul(a.get(), b.cast<const Value<T>&>().get()));
           },
           "other"_a);
-  value.attr("__array_ufunc__") = py::none();  // numpy leaves array + value to __radd__
+  value.attr("__array_ufunc__") = py::none();  // numpy then defers array + value to __radd__
 }
 
 template <class T>
@@ -184,7 +184,7 @@ void bind_tape(py::module_& module, const std::string& suffix) {
           "keep_grad",
           [](const TapePtr<T>& t, const Value<T>& v) {
             const Var<T> var = own(t, "Tape.keep_grad", v);
-            static_cast<void>(var.grad());  // throws after a backward: it comes too late
+            static_cast<void>(var.grad());  // throws after a backward, when it is too late
             return v.with(t->tape.keep_grad(var));
           },
           "value"_a,

@@ -1,5 +1,5 @@
 #pragma once
-// Tapes, their values and stores of parameters as Python holds them.
+// Tapes, their values and parameter stores as Python objects.
 #include <fieldmark/engine/params.h>
 #include <fieldmark/engine/tape.h>
 
@@ -10,15 +10,15 @@
 
 namespace fieldmark::python {
 
-/// A store of parameters; while a pass, an array or an optimiser refers to its memory, it takes no more.
+/// A parameter store. It rejects new parameters while a pass, an array or an optimiser refers to its memory.
 template <class T>
 struct StoreHandle {
   ParamStore<T> store;
   Leases leases;
-  std::uint64_t changes = 0;  // of values, by steps and by files
+  std::uint64_t changes = 0;  // counts changes of values by steps and files
 
-  /// The store, to add parameters to.
-  /// @param where  for errors   @throws BufferError if its memory is referred to
+  /// Returns the store for adding parameters.
+  /// @param where  for error messages   @throws BufferError if its memory is in use
   ParamStore<T>& open(std::string_view where) {
     if (leases.count() > 0)
       throw py::buffer_error("[" + std::string(where) + "] " + std::to_string(leases.count()) +
@@ -27,10 +27,10 @@ struct StoreHandle {
   }
 };
 
-/// A tape, what its pass reads, and a count of the arrays that show its memory.
+/// A tape, the memory that its pass reads, and a count of the arrays that show its memory.
 template <class T>
 struct TapeHandle {
-  std::unique_ptr<Tape<T>> own;  // null: the tape is another's
+  std::unique_ptr<Tape<T>> own;  // null if the tape belongs to another object
   Tape<T>& tape;
   std::uint64_t pass = 0;
   Leases views;
@@ -38,9 +38,9 @@ struct TapeHandle {
   TapeHandle() : own(std::make_unique<Tape<T>>()), tape(*own) {}
   explicit TapeHandle(Tape<T>& others) : tape(others) {}
 
-  /// An array of U for an op to read; once the op is recorded, keep() it.
-  /// @throws ValueError if this pass adds gradients to it, or it shows a value of this pass, which would keep
-  /// the array, and the array the pass
+  /// Returns an array of U for an op to read; call keep() once the op is recorded.
+  /// @throws ValueError if this pass adds gradients to it, or it shows a value of this pass: array and pass
+  /// would keep each other alive
   template <class U = T>
   py::array reads(const char* where, const py::object& given) const {
     py::array array = borrowed<U>(where, given);
@@ -55,7 +55,7 @@ struct TapeHandle {
     memory_.add_read(memory_of(array));
     held_.hold(array);
   }
-  /// The same of a leaf, whose gradient is added to another array.
+  /// Overload for a leaf, whose gradient is added to another array.
   /// @throws ValueError if `grads` is an array that the pass reads
   void keep(const py::array& values, const py::array& grads) {
     memory_.check_leaf("leaf", memory_of(values), memory_of(grads));
@@ -63,7 +63,7 @@ struct TapeHandle {
     held_.hold(values);
     grads_.push_back(grads);
   }
-  /// Parameters of a pass read a store, and its gradients are added to.
+  /// Records that the pass reads a parameter store and adds to its gradients.
   void reads(const std::shared_ptr<StoreHandle<T>>& store) {
     for (const Read& r : stores_)
       if (r.store == store) return;
@@ -90,7 +90,7 @@ struct TapeHandle {
     tape.reset();
     forget();
   }
-  /// Invalidates the values of the pass and lets go of what it reads.
+  /// Invalidates the values of the pass and releases what it reads.
   void forget() {
     ++pass;
     held_.release();
@@ -111,7 +111,7 @@ struct TapeHandle {
   std::vector<Read> stores_;
 };
 
-/// An array that an op reads; none: the op does without.
+/// An optional array that an op reads.
 template <class U>
 struct Reading {
   py::object array = py::none();
@@ -132,7 +132,7 @@ struct Value {
       throw py::value_error("[value] it belongs to a pass that Tape.reset() has forgotten");
     return var;
   }
-  /// A value of the same pass, and the arrays that its op reads.
+  /// Returns a value of the same pass, and holds the arrays that its op reads.
   template <class... U>
   Value with(Var<T> v, const Reading<U>&... read) const {
     (keep(read.array), ...);
@@ -145,7 +145,7 @@ struct Value {
   }
 };
 
-/// Documentation that an op of both scalar types shows once.
+/// Documentation of an op, shown once for both scalar types.
 template <class T>
 const char* once(const char* text) {
   return std::is_same_v<T, float> ? text : "";
@@ -153,16 +153,16 @@ const char* once(const char* text) {
 
 template <class T>
 void bind_tape(py::module_& module, const std::string& suffix);
-/// Stores, optimisers and files of their state.
+/// Binds stores, optimisers and files of their state.
 template <class T>
 void bind_parameters(py::module_& module, const std::string& suffix);
-/// Layers that register their parameters in a store.
+/// Binds layers that register their parameters in a store.
 template <class T>
 void bind_layers(py::module_& module, const std::string& suffix);
 template <class T>
 void bind_inspector(py::module_& module, const std::string& suffix);
 /// @{
-/// Ops of float or double values: of single elements and axes; of images, rows and losses.
+/// Bind ops on float or double values: on elements and axes; on images, rows and losses.
 template <class T>
 void bind_ops(py::module_& module);
 template <class T>

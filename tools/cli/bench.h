@@ -25,7 +25,7 @@ Command add_bench_training(CommandLine& app);
 /// @}
 
 /// @{
-/// Options that several subjects have.
+/// Options shared by several subjects.
 template <class T>
 Option add_number(CommandLine& app, const char* name, T& value, std::type_identity_t<T> low,
                   std::type_identity_t<T> high, const char* help, const char* type = "N") {
@@ -36,15 +36,15 @@ void add_scene_option(CommandLine& app, std::string& scene);
 void add_plot(CommandLine& app, std::string& plot);
 /// @}
 
-/// A split of the data set in a folder; without a folder, of lego in FIELDMARK_DATA or else of the built-in
-/// scene, which `quick` makes small.
+/// Returns a split of the data set in a folder. Without a folder, uses lego in FIELDMARK_DATA or else the
+/// built-in scene, which `quick` makes small.
 nerf::Dataset bench_split(const std::string& folder, const std::string& split, bool quick);
 
-/// A field trained on a data set for a time, with progress. @throws Interrupted on Ctrl-C
+/// Trains a field on a data set for a given time, with progress. @throws Interrupted on Ctrl-C
 std::unique_ptr<nerf::RadianceField> trained_field(const nerf::Dataset& data, double seconds,
                                                    Context& context);
 
-/// Calls `run` with a callback (name, part done) that shows progress and ends the run on Ctrl-C.
+/// Calls `run` with a callback (name, fraction done) that shows progress and ends the run on Ctrl-C.
 template <class F>
 auto with_progress(Context& context, const F& run) {
   const InterruptGuard guard;
@@ -55,7 +55,7 @@ auto with_progress(Context& context, const F& run) {
   });
 }
 
-/// Prints a line as printf does.
+/// Prints a line in the format of printf.
 template <class... T>
 void print_line(Context& context, const char* format, T... values) {
   char line[400];

@@ -18,7 +18,7 @@ using Names = std::vector<std::string>;
 struct BenchAttacksArguments {
   std::string owner, field, other, onto, cameras = "novel", plot;
   MessageOption message;  // baked into the field
-  Names attacked;         // files made from the field by other means
+  Names attacked;         // files derived from the field by other means
   Index count = 50, informed_count = 4, size = 0;
   bool quick = false;
 };
@@ -118,7 +118,7 @@ void check(const BenchAttacksArguments& o) {
   for (const std::string& file : results::chart_files("attacks", o.plot)) check_writable_page(file);
 }
 
-// The severities of a curve, or its middle one.
+// Returns the severities of a curve, or only its middle one.
 Names used(const Names& names, bool quick) { return quick ? Names{names[names.size() / 2]} : names; }
 
 int run_bench_attacks(const BenchAttacksArguments& options, Context& context) {

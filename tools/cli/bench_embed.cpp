@@ -10,7 +10,7 @@
 namespace fieldmark::cli {
 namespace {
 
-constexpr double kFieldSeconds = 60;      // of training, where no field is given
+constexpr double kFieldSeconds = 60;      // of training, if no field is given
 constexpr double kQuickFieldSeconds = 1;  // the same for tests
 constexpr std::size_t kQuickRows = 4;     // the default and the other lengths
 constexpr Index kQuickViews = 8, kQuickPatch = 48, kQuickChannels = 8, kQuickCells = 6;

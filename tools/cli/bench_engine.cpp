@@ -50,7 +50,7 @@ Json row_json(const bench::EngineRow& r, bool with_peer) {
   return row;
 }
 
-// What the peers' figures depend on; the same for all rows.
+// The settings that the peers' figures depend on; the same for all rows.
 Json peer_json(const bench::EngineBench& result, const BenchEngineArguments& options) {
   for (const auto& row : result.rows)
     if (row.peer) {
@@ -68,7 +68,7 @@ Json peer_json(const bench::EngineBench& result, const BenchEngineArguments& opt
 }
 
 void print_row(Context& context, const bench::EngineRow& r, const Json& json) {
-  char error[16] = "      -";  // a training step is compared with nothing
+  char error[16] = "      -";  // a training step has no reference
   if (r.error > 0) std::snprintf(error, sizeof error, "%.1e", r.error);
   print_line(context, "%-26s %-32s spread %2.0f%%  error %s  %5.0f MB\n", r.name.c_str(),
              results::engine_speed(json).c_str(), 100 * r.spread, error, r.megabytes);
@@ -80,10 +80,10 @@ void print_row(Context& context, const bench::EngineRow& r, const Json& json) {
 }
 
 struct Scene {
-  std::optional<nerf::Dataset> train, test;  // none: the built-in scene
+  std::optional<nerf::Dataset> train, test;  // both empty: the built-in scene
 };
 
-// The data set of --scene, or else lego where FIELDMARK_DATA has it; read only for rows that train.
+// Loads the data set of --scene, else lego if FIELDMARK_DATA has it; read only for rows that train.
 Scene scene_of(const BenchEngineArguments& options) {
   const std::filesystem::path folder =
       options.scene.empty() ? shared_data("nerf_synthetic/lego") : std::filesystem::path(options.scene);
@@ -95,7 +95,7 @@ Scene scene_of(const BenchEngineArguments& options) {
   return scene;
 }
 
-// Ctrl-C ends a peer too, whose failure is then an interruption.
+// Ctrl-C ends a peer too; its failure then counts as an interruption.
 bench::EngineBench measured(const BenchEngineArguments& options, Context& context) {
   const InterruptGuard guard;
   try {
@@ -109,7 +109,7 @@ bench::EngineBench measured(const BenchEngineArguments& options, Context& contex
   }
 }
 
-// One digit more than is sure; "inf" is no JSON.
+// Prints one digit more than is certain; "inf" is not valid JSON.
 Json precision_json(const bench::PrecisionRow& r) {
   return {{"work", r.work},
           {"variant", r.variant},

@@ -24,7 +24,7 @@ struct FieldSubject {
   std::string name;
 };
 
-// Views spread evenly over the test split; without a data set, drawn around the training cameras.
+// Takes views spread evenly over the test split; without a data set, draws them around the training cameras.
 FieldSubject field_subject(const BenchFieldArguments& options, Context& context) {
   FieldSubject subject;
   const bool stored = !options.field.empty();

@@ -5,7 +5,7 @@
 namespace fieldmark::cli {
 namespace {
 
-constexpr Index kNoiseTrials = 10;  // of fair bits, for each trial of a row
+constexpr Index kNoiseTrials = 10;  // readings of fair bits per trial of a row
 
 Json layout_json(const watermark::PayloadLayout& l) {
   return {{"data_bits", l.data_bits},   {"check_bits", l.check_bits}, {"zero_bits", l.zero_bits},

@@ -100,7 +100,7 @@ class Program {
   }
 
  private:
-  // An unknown command or option, with the nearest known one.
+  // Describes an unknown command or option and suggests the nearest known one.
   std::string unknown_word(const std::vector<std::string>& line) {
     if (line.size() < 2 || line[1].starts_with("-")) return "";
     std::vector<std::string> names;
@@ -118,7 +118,7 @@ class Program {
         for (const auto& name : option->get_lnames()) names.push_back("--" + name);
     for (std::size_t i = 2; i < line.size() && line[i] != "--"; ++i) {
       const std::string word = line[i].substr(0, line[i].find('='));
-      // CLI11 would take the next word for the value.
+      // CLI11 would take the next word as the value.
       if (word.starts_with("--") && line[i].size() == word.size() + 1)
         return word + ": expected a value behind =, got an empty one";
       if (!word.starts_with("--") || std::find(names.begin(), names.end(), word) != names.end()) continue;

@@ -9,7 +9,7 @@ namespace fieldmark::cli {
 
 enum ExitCode { kOk = 0, kFailed = 1, kUsage = 2, kNotFound = 3, kInterrupted = 130 };
 
-/// Wrong usage that the option parser cannot detect: exit code 2.
+/// Incorrect usage that the option parser cannot detect: exit code 2.
 struct UsageError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -20,13 +20,13 @@ auto read_option(const char* option, F&& f) try {
 } catch (const ValueError& e) {
   throw UsageError(std::string(option) + ": " + e.what());
 }
-/// Thrown after Ctrl-C, when the command has saved its state: exit code 130.
+/// Thrown after Ctrl-C, once the command has saved its state: exit code 130.
 struct Interrupted : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
 /// Runs the fieldmark command; main() passes the streams of the process.
-/// @return the exit code; nothing is thrown
+/// @return the exit code; never throws
 int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err) noexcept;
 
 }  // namespace fieldmark::cli

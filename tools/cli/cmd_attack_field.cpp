@@ -22,7 +22,7 @@ struct AttackFieldArguments {
   TrainingAttackOptions training;
 };
 
-// A field that an attack needs besides the one attacked.
+// A field that an attack needs besides its target.
 class Input {
  public:
   Input(const std::string& path, const char* option, bool needed) {
@@ -55,7 +55,7 @@ nerf::RadianceField changed_weights(const AttackFieldArguments& options, Context
       {.other = other.get(), .unmarked = unmarked.get(), .marked = marked.get()});
 }
 
-// Options that this attack would ignore.
+// Rejects options that this attack would ignore.
 void refuse_unused(CommandLine& app, const std::string& attack) {
   std::vector<std::string> used{"--size", "--steps", "--seconds"};
   const auto uses = [&](std::initializer_list<std::string> names) { used.insert(used.end(), names); };
@@ -73,7 +73,7 @@ void refuse_unused(CommandLine& app, const std::string& attack) {
 int run_attack_field(const AttackFieldArguments& options, Context& context) {
   check_out(options);
   Json json{{"attack", options.attack}, {"field", options.field}, {"out", options.out}};
-  const InterruptGuard until_saved;  // between the last step and the file, Ctrl-C waits
+  const InterruptGuard until_saved;  // Ctrl-C waits between the last step and the file
   const auto result = is_training_attack(options.attack)
                           ? run_training_attack(options.attack, nerf::RadianceField::load(options.field),
                                                 options.training, context, json)

@@ -19,7 +19,7 @@
 namespace fieldmark::cli {
 namespace {
 
-constexpr double kMuchFainter = 2;  // dB: what learning usually loses is 1.3
+constexpr double kMuchFainter = 2;  // dB: the usual loss from learning is 1.3
 
 struct BakeArguments {
   std::string owner, out;
@@ -32,11 +32,11 @@ struct BakeArguments {
 
 watermark::Baker::MarkPsnr scaled_to(const watermark::Owner& owner, watermark::Baker& baker) {
   if (owner.mark().has_gain()) return baker.scale_to(owner.options().mark_psnr);
-  const double mark_psnr = baker.mark_psnr();  // the networks' own
+  const double mark_psnr = baker.mark_psnr();  // determined by the networks
   return {.learnt = mark_psnr, .scaled = mark_psnr};
 }
 
-// How strong the mark is in the file, beside what the owner asked for, and how much of it was learnt.
+// Prints the mark PSNR of the file and the one requested; notes if little of the mark was learned.
 void say_strength(const watermark::Owner& owner, const watermark::Baker::MarkPsnr& mark_psnr,
                   Context& context) {
   char line[320];
@@ -63,7 +63,7 @@ int run_bake(const BakeArguments& options, Context& context) {
   if (std::filesystem::exists(options.out) && std::filesystem::equivalent(options.out, options.owner))
     throw UsageError("--out: " + options.out + " is the owner's file");
   check_writable(options.out);
-  if (!options.resume) check_writable(checkpoint);  // that of embed holds a key
+  if (!options.resume) check_writable(checkpoint);  // a checkpoint of embed holds a key
   auto owner = watermark::Owner::load(options.owner);
   if (options.mark_psnr) {
     if (!owner.mark().has_gain())
@@ -77,7 +77,7 @@ int run_bake(const BakeArguments& options, Context& context) {
   bake_options.schedule.steps = options.length.steps;
   bake_options.schedule.seconds = options.length.seconds;
   watermark::Baker baker(owner, message, bake_options);
-  const InterruptGuard until_saved;  // between the last step and the file, Ctrl-C waits
+  const InterruptGuard until_saved;  // Ctrl-C waits between the last step and the file
   if (options.resume) baker.restore(checkpoint);
   const double seconds = run_long(baker, "bake", options.length, context, checkpoint);
   const auto mark_psnr = scaled_to(owner, baker);

@@ -23,7 +23,7 @@ namespace fieldmark::cli {
 namespace {
 
 constexpr Index kSsimWindow = 11;
-constexpr double kReferenceBar = 1e-4;  // most that LPIPS may be off
+constexpr double kReferenceBar = 1e-4;  // tolerance of LPIPS
 
 struct CompareArguments {
   std::vector<std::string> paths;
@@ -105,7 +105,7 @@ Json read_reference(const std::filesystem::path& path) {
   }
 }
 
-// One row: LPIPS of a pair by one network, beside the reference.
+// Returns one row: LPIPS of a pair by one network, next to the reference.
 Json reference_row(const Json& pair, const char* name, const Lpips<float>& lpips, const Tensor<float>& a,
                    const Tensor<float>& b) {
   const LpipsDistance d = lpips.distance(a, b);

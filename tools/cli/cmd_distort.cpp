@@ -24,7 +24,7 @@ struct DistortArguments {
   std::string background = "white";
 };
 
-// Every output has its image's name; two inputs of one name would overwrite each other.
+// Returns the output paths, named after the images; two inputs with one name would overwrite each other.
 std::vector<std::filesystem::path> outputs_of(const std::vector<std::filesystem::path>& images,
                                               const std::filesystem::path& out) {
   std::vector<std::filesystem::path> outputs;
@@ -39,7 +39,7 @@ std::vector<std::filesystem::path> outputs_of(const std::vector<std::filesystem:
   return outputs;
 }
 
-// What is done in one go through the images: a chain for each, perhaps none, and a clip made of the results.
+// One pass over the images: an optional chain for each, and an optional clip of the results.
 struct DistortPass {
   std::optional<distort::Distortion> chain{};
   std::optional<int> crf{};
@@ -61,11 +61,11 @@ std::vector<DistortPass> distort_passes(const distort::Distortion& distortion) {
 distort::Distortion parse_chain(const std::string& name) {
   auto distortion = distort::parse_clip_distortion(name);
   for (const DistortPass& pass : distort_passes(distortion))
-    if (pass.crf) H264Clip{*pass.crf};  // says if this build has none
+    if (pass.crf) H264Clip{*pass.crf};  // throws if this build lacks H.264
   return distortion;
 }
 
-// Nothing where the image cannot be read.
+// Returns nullopt if the image cannot be read.
 std::optional<Tensor<float>> read_undistorted(const std::filesystem::path& path, float background,
                                               ReadFaults& faults) {
   std::optional<Tensor<float>> image;
@@ -90,7 +90,7 @@ int run_distort(const DistortArguments& options, Context& context) {
   Json list = Json::array();
   ReadFaults faults;
   const auto passes = distort_passes(distortion);
-  std::vector<std::size_t> left(images.size());  // images that were read
+  std::vector<std::size_t> left(images.size());  // indices of the images that were read
   std::iota(left.begin(), left.end(), std::size_t{0});
   std::unique_ptr<H264Clip> from, to;
   {

@@ -31,7 +31,7 @@ struct EmbedArguments {
   std::string field, out, key, image, lpips_weights;
   std::string preset = "fast", distances = "novel";
   Index bits = watermark::OwnerOptions{}.bits;
-  // Empty or 0, which no option accepts: chosen for the preset or the scene.
+  // Empty or 0, which no option accepts: chosen by the preset or the scene.
   std::string colours;
   double mark_psnr = 0;
   Index cells = 0, batch = 0, reader_size = 0;
@@ -42,7 +42,7 @@ struct EmbedArguments {
   bool resume = false;
 };
 
-// A run that was begun without --key made one, and its checkpoint has it.
+// Returns the key. A run that started without --key made one and stored it in its checkpoint.
 watermark::Key key_of(const EmbedArguments& options, const std::string& checkpoint) {
   if (!options.key.empty()) return watermark::load_key(options.key);
   if (options.resume) return watermark::Embedder::checkpoint_key(checkpoint);
@@ -109,7 +109,7 @@ void say_cells(const watermark::Owner& owner, std::span<const watermark::CachedV
         "take fewer --bits, or read several views");
 }
 
-// From views that the owner has not learnt from.
+// Measures on views that the owner was not trained on.
 Json measure_owner(const EmbedArguments& options, const watermark::Owner& owner, const Lpips<float>* lpips,
                    Context& context) {
   const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, options.measured_views,
@@ -128,7 +128,7 @@ int run_embed(const EmbedArguments& options, Context& context) {
   if (std::filesystem::exists(options.out) && std::filesystem::equivalent(options.out, options.field))
     throw UsageError("--out: " + options.out + " is the field that is to be marked");
   check_writable(options.out);
-  if (!options.resume) check_writable(checkpoint);  // an interrupted run's, and its key
+  if (!options.resume) check_writable(checkpoint);  // that of an interrupted run, with its key
   check_writable_page(image);
   for (const auto& name : options.under)
     read_option("--distort", [&] { return distort::parse_distortion(name); });
@@ -144,7 +144,7 @@ int run_embed(const EmbedArguments& options, Context& context) {
   watermark::Embedder embedder(owner, views, recipe.embed);
   if (options.resume) embedder.restore(checkpoint);
 
-  const InterruptGuard until_saved;  // between the last step and the file, Ctrl-C waits
+  const InterruptGuard until_saved;  // Ctrl-C waits between the last step and the file
   const double seconds = run_long(embedder, "embed", options.length, context, checkpoint);
   embedder.calibrate();
   if (embedder.steps() <= embedder.warm_steps())

@@ -14,8 +14,8 @@
 namespace fieldmark::cli {
 namespace {
 
-constexpr double kWeakBit = 0.05;  // p-value above which a bit by itself says nothing
-constexpr double kTrace = 0.01;    // p-value of noise below which there is something to look for
+constexpr double kWeakBit = 0.05;  // p-value above which a single bit is inconclusive
+constexpr double kTrace = 0.01;    // p-value of noise below which something may be found
 
 struct ExtractArguments {
   std::string owner, reading = "auto";
@@ -39,7 +39,7 @@ void print_view(const ImageEvidence& image, const watermark::BitReading& reading
                  << watermark::reading_name(image.reading) << p;
 }
 
-// How sure it is that the bits of all images together are a message.
+// Describes how certain it is that the bits of all images together are a message.
 std::string certainty(const watermark::BitReading& reading, double fpr) {
   const double p = watermark::noise_p_value(reading);
   const auto p_values = watermark::bit_p_values(reading);
@@ -66,7 +66,7 @@ int run_extract(const ExtractArguments& options, Context& context) {
   const auto code = owner.code();
   const Index bits = owner.options().bits;
   const double least = watermark::least_noise_p(code.carriers(), bits);
-  const bool can_tell = least < 1;  // a bit of one cell looks the same in noise
+  const bool can_tell = least < 1;  // with one cell per bit, a mark looks like noise
   if (can_tell) check_rate(options.fpr, least, code.carriers());
   SuspectReader reader(owner, options.reading);
   const auto images = read_images(reader, options.suspects, options.owner, context);

@@ -38,7 +38,7 @@ struct Row {
   GradcheckReport report;
 };
 
-// The cases of all modules that have the text in their name. @throws UsageError if there are none
+// Returns the cases of all modules whose name contains the text. @throws UsageError if there are none
 template <class R, class Case>
 std::vector<R> collect(const GradcheckArguments& options,
                        std::initializer_list<std::pair<const char*, std::vector<Case>>> modules) {
@@ -110,7 +110,7 @@ int run_gradients(const GradcheckArguments& options, Context& context) {
 struct NumericsRow {
   std::string module;
   NumericsCase check;
-  std::vector<WorstError> errors;  // one for each instruction set
+  std::vector<WorstError> errors;  // one per instruction set
 
   bool ok() const {
     return std::all_of(errors.begin(), errors.end(), [&](const WorstError& e) { return check.ok(e); });
@@ -122,7 +122,7 @@ struct NumericsRow {
   }
 };
 
-// Every case on every instruction set of this CPU; returns their names.
+// Runs every case on every instruction set of this CPU; returns their names.
 std::vector<std::string> run_on_each_isa(std::vector<NumericsRow>& rows) {
   std::vector<std::string> levels;
   for (const Isa level : {Isa::v2, Isa::v3, Isa::v4}) {

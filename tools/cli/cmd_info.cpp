@@ -17,7 +17,7 @@ struct InfoArguments {
   std::string file;
 };
 
-// Fieldmark's own entry is JSON; what other programs write is shown as the text it is.
+// Fieldmark's own entry is JSON; entries of other programs are shown as text.
 Json metadata_json(const SafetensorsFile& file) {
   Json json = Json::object();
   for (const auto& [key, value] : file.metadata) {

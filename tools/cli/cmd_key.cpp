@@ -19,12 +19,12 @@ struct KeyArguments {
 };
 
 int run_key(const KeyArguments& options, Context& context) {
-  // A lost key is a lost proof: it is replaced only on demand.
+  // A lost key is a lost proof: replaces a key only with --force.
   if (std::filesystem::exists(options.out) && !options.force)
     throw IoError(options.out +
                   ": exists already; --force replaces it, and proofs with the old key are lost");
   AtomicFile{options.out};
-  if (std::filesystem::exists(options.out)) watermark::load_key(options.out);  // and no other file
+  if (std::filesystem::exists(options.out)) watermark::load_key(options.out);  // throws unless it is a key
   const auto key = watermark::random_key();
   watermark::save_key(options.out, key);
   const std::string open = to_hex(watermark::public_key(key));

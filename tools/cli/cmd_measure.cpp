@@ -41,7 +41,7 @@ std::vector<nerf::Camera> measured_cameras(const std::string& set, const Measure
   return cameras;
 }
 
-// Against the ground truth, apart from the figures against the unmarked field.
+// Evaluates against the ground truth, separately from the figures against the unmarked field.
 nerf::Evaluation against_ground_truth(const MeasureArguments& options, const nerf::RadianceField& field,
                                       const char* what, Context& context) {
   const auto data = load_scene(
@@ -56,7 +56,7 @@ nerf::Evaluation against_ground_truth(const MeasureArguments& options, const ner
   });
 }
 
-// Raw bits and payloads are two figures: those of a view, and what a correction makes of a group of views.
+// Reports payloads separately from raw bits: bits belong to a view, payloads to a corrected group of views.
 Json payloads_json(Index together, const watermark::PayloadViews& views, Context& context) {
   Json json = nullptr, under = Json::object();
   for (const auto& [name, a] : views.accuracies()) {
@@ -79,7 +79,7 @@ Json payloads_json(Index together, const watermark::PayloadViews& views, Context
   return json;
 }
 
-// Payloads of groups of views and, where a group has several, of each view by itself.
+// Counts payloads of groups of views and, if groups have several views, of single views too.
 class PayloadCounts {
  public:
   PayloadCounts(const watermark::CellCode& code, Index bits, Index together)
@@ -100,7 +100,7 @@ class PayloadCounts {
   watermark::PayloadViews groups_, singles_;
 };
 
-// Random payloads in place of random messages, one for each group of views.
+// Returns random payloads instead of random messages, one per group of views.
 std::function<watermark::Message(Index)> messages_of(const MeasureArguments& options,
                                                      const watermark::PayloadCodec& codec,
                                                      std::uint64_t seed) {
@@ -120,7 +120,7 @@ struct MeasureSubject {
   std::optional<watermark::Message> message;
 };
 
-// On one set of cameras: the figures, and those of a row where there are several sets.
+// Figures of one set of cameras, plus a row if there are several sets.
 struct Measured {
   Json json, row;
 };

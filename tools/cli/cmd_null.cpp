@@ -22,7 +22,7 @@ struct NullArguments {
   Suspects suspects;
 };
 
-// Unmarked novel views of the owner's own field.
+// Reads unmarked novel views of the owner's own field.
 void read_novel(SuspectReader& reader, const watermark::Owner& owner, Index count,
                 std::vector<ImageEvidence>& read, Context& context) {
   const InterruptGuard guard;
@@ -57,7 +57,7 @@ int run_null(const NullArguments& options, Context& context) {
   watermark::WrongKeyCounts right, random;
   for (std::size_t i = 0; i < read.size(); ++i) {
     right.add(watermark::keyed_statistic(read[i].cells, code, message));
-    // Keys of their own for each image, so that all trials are independent given the images.
+    // Each image has its own keys, so that all trials are independent given the images.
     random.add(watermark::count_wrong_keys(read[i].cells, owner.cells.area(), message, options.keys,
                                            context.seed() + i + 1));
   }

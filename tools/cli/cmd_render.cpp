@@ -32,7 +32,7 @@ struct RenderArguments {
   std::optional<Index> average, importance, random;
 };
 
-// The samples of a ray if any were given, with those of the field for the rest.
+// Returns the samples per ray if any were given; the field's values fill in the rest.
 std::optional<nerf::RayPoints> points_of(const RenderArguments& options, const nerf::RadianceField& field) {
   if (!options.average && !options.importance && !options.random) return {};
   if (!field.coarse)
@@ -70,7 +70,7 @@ std::vector<NamedCamera> cameras_of(const RenderArguments& options, const nerf::
   return cameras;
 }
 
-// The views of both fields side by side, for the first few cameras.
+// Writes the views of both fields side by side, for the first few cameras.
 void write_sheet(const RenderArguments& options, nerf::Renderer& renderer,
                  const std::vector<NamedCamera>& cameras) {
   const auto other = nerf::RadianceField::load(options.against);
@@ -81,8 +81,8 @@ void write_sheet(const RenderArguments& options, nerf::Renderer& renderer,
   write_png(options.sheet, results::comparison_sheet(pairs));
 }
 
-// Older views beside new ones would be taken for one run's, by verify above all. --overwrite removes those
-// that this command named; what others named stays.
+// Older views among new ones would be mistaken for the same run, above all by verify. --overwrite removes
+// files that this command named; others stay.
 void clear_older_views(const RenderArguments& options, const std::vector<NamedCamera>& cameras,
                        Context& context) {
   std::vector<std::filesystem::path> older, others;

@@ -22,8 +22,7 @@ namespace fieldmark::cli {
 namespace {
 
 constexpr const char* kBuiltIn = "objects";
-// Printed severities first (the authors' code squares that of noise), then those on the way to
-// where reading ends.
+// Published severities first (the authors' code squares that of noise), then some up to where reading fails.
 constexpr const char* kUnder[] = {"noise_0.1",  "rotation_30", "scale_0.75", "blur_0.1",    "noise_0.01",
                                   "noise_0.02", "noise_0.05",  "noise_0.2",  "rotation_10", "rotation_60",
                                   "scale_0.5",  "blur_0.5",    "blur_1",     "blur_2"};
@@ -62,7 +61,7 @@ std::vector<baselines::CellName> planned_cells(const ReproduceArguments& options
   std::vector<std::string> tables = options.tables;
   if (tables.empty())
     for (const auto name : baselines::paper_table_names()) tables.emplace_back(name);
-  // Every row once before any has its other lengths and scenes: a run that ends early shows them all.
+  // Runs every row once before other lengths and scenes, so that a run that ends early shows them all.
   std::stable_partition(tables.begin(), tables.end(), [](const std::string& name) { return name != "bits"; });
   std::vector<baselines::CellName> cells;
   for (const std::string& table : tables)
@@ -85,7 +84,7 @@ std::vector<baselines::CellName> missing_of(const std::vector<baselines::CellNam
   return missing;
 }
 
-// Seconds that a cell takes: as those did that were measured with this budget, or half as much again.
+// Estimates the seconds per cell: the mean of cells measured with this budget, or else 1.5 budgets.
 double seconds_of_a_cell(const std::vector<baselines::Cell>& cells, double budget) {
   double sum = 0, count = 0;
   for (const auto& c : cells)
@@ -94,7 +93,7 @@ double seconds_of_a_cell(const std::vector<baselines::Cell>& cells, double budge
   return count > 0 ? sum / count : 1.5 * budget;
 }
 
-// Beside the folder of cells, where --report does not name it.
+// Writes the page next to the folder of cells, unless --report names it.
 std::filesystem::path write_page(const ReproduceArguments& options, const Context& context) {
   std::filesystem::path folder = std::filesystem::path(options.cells).lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();  // "cells/"
@@ -105,7 +104,7 @@ std::filesystem::path write_page(const ReproduceArguments& options, const Contex
   return page;
 }
 
-// A cell as a row, with its image beside it.
+// Saves a cell as a row, with its image next to it.
 void save(const ReproduceArguments& options, const std::vector<baselines::PaperScene>& scenes,
           const baselines::MeasuredCell& measured, double seconds) {
   const baselines::CellName& name = measured.cell.name;
@@ -136,7 +135,7 @@ class Shown {
   bool operator()(const std::string& what, double part, const std::string& note) {
     if (what != what_) {
       progress_.reset();
-      progress_.reset(new Progress(context_.progress(what)));  // it cannot be moved
+      progress_.reset(new Progress(context_.progress(what)));  // not movable
       what_ = what;
     }
     progress_->update(part, note);
@@ -213,7 +212,7 @@ int run_reproduce(const ReproduceArguments& options, Context& context) {
   context.result({{"cells", cells.size()},
                   {"missing", left},
                   {"seconds_left", each * static_cast<double>(missing.size())}});
-  const auto page = write_page(options, context);  // in place of the page that every command can write
+  const auto page = write_page(options, context);  // replaces the page that every command can write
   context.text() << page.string() << ": written\n";
   return kOk;
 }

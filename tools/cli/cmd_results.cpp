@@ -29,7 +29,7 @@ struct ResultsArguments {
   bool stale = false, render = false, draft = false;
 };
 
-// A row of the plan, or of a command that is not planned row by row, as `reproduce`.
+// Returns a row of the plan, or of a command such as `reproduce` that is not planned row by row.
 PlannedRow planned(const Plan& plan, const std::string& id, const Json& row) {
   if (const PlannedRow* found = plan.find(id)) return *found;
   return {id, row.at("kind"), row.at("command")};
@@ -51,7 +51,7 @@ class Runner {
   }
   const Json& counts() const { return counts_; }
 
-  /// Measures a row and first those that make its inputs. @return whether it is fresh now
+  /// Measures a row after the rows that create its inputs. @return true if it is fresh now
   bool ensure(const PlannedRow& row) {
     if (const auto known = tried_.find(row.id); known != tried_.end()) return known->second;
     bool& ok = tried_[row.id] = false;
@@ -62,7 +62,7 @@ class Runner {
   }
 
  private:
-  // The file of a fresh row must be the one in the work folder.
+  // Ensures that the file in the work folder is that of the fresh row.
   bool ensure_file(const PlannedRow& row) {
     if (!ensure(row)) return false;
     const fs::path file = results::path_of(plan_, row.output(), places_);
@@ -94,7 +94,7 @@ class Runner {
     const fs::path log = places_.work / "logs" / (row.id + ".log"),
                    json = places_.work / "logs" / (row.id + ".json");
     fs::create_directories(log.parent_path());
-    // Of a row that is stale: embed replaces no owner, and render adds to no views.
+    // Removes the output of a stale row: embed does not replace an owner, and render does not add to views.
     if (!row.output().empty()) fs::remove_all(results::path_of(plan_, row.output(), places_));
     const double begun = context_.seconds();
     const int code = call(command_line(row, json.string(), m), log);
@@ -111,7 +111,7 @@ class Runner {
     return true;
   }
 
-  // The words of a command with paths in place of names; notes seed and budget.
+  // Returns the words of a command with names replaced by paths; records seed and budget.
   std::vector<std::string> command_line(const PlannedRow& row, const std::string& json,
                                         results::Measured& m) const {
     std::vector<std::string> line{"fieldmark"};

@@ -14,7 +14,7 @@
 namespace fieldmark::cli {
 namespace {
 
-constexpr std::size_t kShown = 10;  // recipients in the text who were not found; JSON has all
+constexpr std::size_t kShown = 10;  // recipients not found that the text lists; JSON has all
 
 struct TraceArguments {
   std::string owner, copies, reading = "auto";

@@ -45,8 +45,8 @@ nerf::RadianceFieldOptions fitted(const nerf::RadianceFieldOptions& field, doubl
   throw UsageError("--max-megabytes: no field is as small as " + std::to_string(max_megabytes) + " MB");
 }
 
-// As large as the scene needs: short trainings first, whose figures go into the result. A run by
-// the clock gives them kSizing of its seconds; one that is resumed has its sizes in its checkpoint.
+// Finds the size that the scene needs with short trainings, whose figures go into the result. A timed run
+// spends at most kSizing of its seconds on them; a resumed run has its sizes in its checkpoint.
 nerf::RadianceFieldOptions sized(const nerf::RadianceFieldOptions& start, const nerf::Dataset& data,
                                  const RunLength& length, Json& report, Context& context) {
   const InterruptGuard guard;
@@ -90,7 +90,7 @@ nerf::RadianceFieldOptions sized(const nerf::RadianceFieldOptions& start, const 
   return sizing.field;
 }
 
-// The training images, and the type of their scene for people.
+// Loads the training images and prints the type of their scene.
 nerf::Dataset training_data(const TrainArguments& options, Context& context) {
   nerf::DatasetOptions wanted{
       .split = "train", .size = options.size, .background = background_of(options.background)};
@@ -106,7 +106,7 @@ nerf::Dataset training_data(const TrainArguments& options, Context& context) {
   }
 }
 
-// Images of another split, of the same scene.
+// Returns the options to load another split of the same scene.
 nerf::DatasetOptions other_split(const TrainArguments& options, const nerf::Dataset& train,
                                  const char* split) {
   return {.split = split, .size = options.size, .background = train.background, .scene = train.scene};
@@ -120,7 +120,7 @@ nerf::PsnrTarget psnr_target(const TrainArguments& options, const nerf::Radiance
   return {field, options.target_psnr, std::move(held_out)};
 }
 
-// A few images that are not trained on, or if there are none that can be read, training images.
+// Takes a few images that are not trained on, or training images if there are no others.
 nerf::CollapseWatch collapse_watch(const TrainArguments& options, const nerf::RadianceField& field,
                                    const nerf::Dataset& train) {
   for (const char* split : {"val", "test"}) {
@@ -130,7 +130,7 @@ nerf::CollapseWatch collapse_watch(const TrainArguments& options, const nerf::Ra
     try {
       return {field, nerf::load_dataset(options.data, few)};
     } catch (const Error&) {
-      continue;  // the training needs none of them
+      continue;  // training does not need them
     }
   }
   return {field, train};
@@ -146,7 +146,7 @@ void require_healthy(const std::string& fault, const nerf::Dataset& data, const 
       "together");
 }
 
-// PSNR on the data set's test views, measured after everything is saved; null where there are none.
+// PSNR on the data set's test views, measured after everything is saved; null without test views.
 struct TestScores {
   Json psnr, colour_fitted, pose_fitted;
 };
@@ -163,7 +163,7 @@ nerf::Evaluation evaluated(const nerf::RadianceField& field, const nerf::Dataset
   return evaluation;
 }
 
-// @param surveyed  the training views, of which none should be a test view
+// @param surveyed  the training views, none of which should be a test view
 TestScores test_scores(const TrainArguments& options, const nerf::RadianceField& field,
                        const nerf::Dataset& train, const std::vector<nerf::SurveyedView>& surveyed,
                        Json& warnings, Context& context) {
@@ -192,7 +192,7 @@ void check_preset(const TrainArguments& options) {
     throw UsageError("--supersampling: the mlp preset trains with one ray through a pixel's centre");
 }
 
-// Sizes of the field; `sizing` becomes what was tried for --model sized.
+// Returns the sizes of the field; `sizing` receives the trials of --model sized.
 nerf::RadianceFieldOptions field_sizes(const TrainArguments& options, const nerf::Dataset& data,
                                        const std::string& checkpoint, Json& sizing, Context& context) {
   nerf::RadianceFieldOptions sizes;
@@ -266,7 +266,7 @@ int run_train(const TrainArguments& options, Context& context) {
   nerf::PsnrTarget target = psnr_target(options, field, data, context);
   nerf::CollapseWatch watch = collapse_watch(options, field, data);
   const double begun = context.seconds(), samples_before = trainer.samples();
-  const InterruptGuard until_saved;  // between the last step and the file, Ctrl-C waits
+  const InterruptGuard until_saved;  // Ctrl-C waits between the last step and the file
   const double seconds = run_long(trainer, "train", options.length, context, checkpoint, [&] {
     require_healthy(watch.look(trainer.steps(), trainer.train_psnr()), data, trainer);
     return target.reached(trainer.steps(), trainer.train_psnr());

@@ -8,7 +8,7 @@ namespace fieldmark::cli {
 namespace {
 
 constexpr Index kDigitBits = 4;
-constexpr Index kMostBits = 4096;  // cells hold fewer; the owner says how many
+constexpr Index kMostBits = 4096;  // cells hold fewer; the owner determines how many
 
 Index message_bits(const CodeOption& options, const std::string& hex, const watermark::Owner& owner,
                    Context& context) {

@@ -17,7 +17,7 @@ std::string fault_of_number(const std::string& text) {
   return "";
 }
 
-// CLI11 takes 010 for 8, 0x10 for 16, and cuts off what is beyond the type's range.
+// CLI11 reads 010 as 8 and 0x10 as 16, and truncates values beyond the range of the type.
 template <class T>
 std::string fault_of_whole(const std::string& text) {
   T value{};
@@ -33,7 +33,7 @@ std::string fault_of_empty(const std::string& text) {
   return text.empty() ? "expected a value, got an empty one" : "";
 }
 
-// What an option holds, without the optional around it.
+// Returns the value type of an option, without the optional around it.
 template <class T>
 struct Held {
   using type = T;
@@ -49,7 +49,7 @@ Option Option::required() { return option_->required(), *this; }
 Option Option::type_name(const std::string& name) { return option_->type_name(name), *this; }
 Option Option::default_str(const std::string& text) { return option_->default_str(text), *this; }
 Option Option::group(const std::string& name) { return option_->group(name), *this; }
-// The description of a check would stand twice in help texts, which name the range in words.
+// Without a description: help texts, which name the range in words, would repeat it.
 Option Option::whole(std::int64_t low, std::int64_t high) {
   return option_->check(CLI::Range(low, high).description("")), *this;
 }

@@ -6,8 +6,8 @@
 #include <type_traits>
 #include <vector>
 
-// The options of a command. They stand on CLI11, a header so large that it costs each source that includes it
-// ten seconds: only command_line.cpp and cli.cpp do.
+// The options of a command, based on CLI11. That header costs each source that includes it ten seconds of
+// compile time, so only command_line.cpp and cli.cpp include it.
 namespace CLI {
 class App;
 class Option;
@@ -15,7 +15,7 @@ class Option;
 
 namespace fieldmark::cli {
 
-/// One option or positional argument of a command; each call refines it and returns it.
+/// An option or positional argument of a command; each call refines it and returns it.
 class Option {
  public:
   explicit Option(CLI::Option* option) : option_(option) {}
@@ -23,12 +23,12 @@ class Option {
   const Option* operator->() const { return this; }
 
   Option required();
-  /// The word that stands for the value in help texts, as in `--bits N`.
+  /// Sets the placeholder of the value in help texts, as in `--bits N`.
   Option type_name(const std::string& name);
-  /// The default that help texts show in place of the variable's value; empty: none.
+  /// Sets the default shown in help texts instead of the variable's value; empty: none.
   Option default_str(const std::string& text);
   Option group(const std::string& name);
-  /// Refuses numbers outside [low, high], and fractions if both bounds are integers.
+  /// Rejects numbers outside [low, high], and fractions if both bounds are integers.
   template <class T>
   Option range(T low, T high) {
     if constexpr (std::is_integral_v<T>)
@@ -38,16 +38,16 @@ class Option {
   }
   Option one_of(const std::vector<std::string>& names);
   Option one_of(std::initializer_list<int> values);
-  /// Refuses a value of which `fault` returns a text.
+  /// Rejects values for which `fault` returns a text.
   Option check(std::function<std::string(const std::string& value)> fault);
-  /// Refuses the option without another, or with another.
+  /// Requires another option, or excludes it.
   Option needs(Option other);
   Option excludes(Option other);
   /// Splits one value at this character into several.
   Option delimiter(char character);
-  /// Takes one value each time that a list option is given, so that positional arguments may follow it.
+  /// Takes one value per occurrence of a list option, so that positional arguments may follow it.
   Option one_value();
-  /// How often the option was given.
+  /// Returns how often the option was given.
   std::size_t count() const;
 
  private:
@@ -56,22 +56,22 @@ class Option {
   CLI::Option* option_;
 };
 
-/// The options that a command accepts. One rule for all of them: no value is empty, no number is NaN or
-/// infinite, and a whole number is written in decimal digits and fits its type.
+/// The options that a command accepts. For all of them, values are not empty, numbers are finite, and
+/// integers are written in decimal digits and fit their type.
 class CommandLine {
  public:
   explicit CommandLine(CLI::App& app) : app_(&app) {}
-  /// An option whose name begins with dashes, or a positional argument. `value` is its default, and must
+  /// Adds an option whose name begins with dashes, or a positional argument. `value` is its default, and must
   /// outlive the parse. T is std::string, std::vector<std::string>, double, int, std::int64_t or
   /// std::uint64_t.
   template <class T>
   Option add_option(const std::string& name, T& value, const std::string& help);
   Option add_flag(const std::string& name, bool& value, const std::string& help);
-  /// An option that was added already.
+  /// Returns an option that was added before.
   Option option(const std::string& name);
-  /// A word after the command's own, as in `data fetch`; one of them must be given.
+  /// Adds a word that follows the command's own, as in `data fetch`; exactly one of them must be given.
   CommandLine add_subcommand(const std::string& name, const std::string& help);
-  /// Whether this command was called.
+  /// True if this command was called.
   bool parsed() const;
 
  private:

@@ -9,7 +9,7 @@ namespace fieldmark::cli {
 
 class Context;
 
-/// A subcommand after its options were added: to be called once they are parsed; returns the exit code.
+/// A subcommand whose options are registered. Call it after parsing; it returns the exit code.
 using Command = std::function<int(Context&)>;
 
 Command add_distort(CommandLine& app);

@@ -57,12 +57,12 @@ void Context::result(const Json& found) {
   Json json = found;
   if (!notes_.empty()) json["notes"] = notes_;
   if (left_out()) json["left_out"] = left_out_;
-  // A name that is not UTF-8 has U+FFFD in the place of its foreign bytes.
+  // Bytes that are not UTF-8 become U+FFFD.
   const std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
   if (options_.json == "-") {
     out_ << text;
   } else if (!options_.json.empty()) {
-    check_writable_page(options_.json);  // the command may have made a field of this name
+    check_writable_page(options_.json);  // the command may have created a field with this name
     write_file_atomically(options_.json, text);
   }
   if (!options_.report.empty()) {

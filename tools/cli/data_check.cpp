@@ -75,7 +75,7 @@ void print(const nerf::DataReport& r, std::ostream& out) {
     comma = ", ";
   }
   char line[200];
-  // Beside the cameras' distance, rounding errors are nothing.
+  // Rounding errors are negligible relative to the cameras' distance.
   const auto rounded = [&](double x) { return std::abs(x) < 1e-6 * r.distances[1] ? 0. : x; };
   std::snprintf(line, sizeof line, "around (%.4g, %.4g, %.4g) at a distance of ", rounded(r.centre[0]),
                 rounded(r.centre[1]), rounded(r.centre[2]));

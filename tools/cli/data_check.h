@@ -15,7 +15,7 @@ struct DataCheckArguments {
 };
 
 void add_data_check(CommandLine& app, DataCheckArguments& options);
-/// Examines a data set and prints what it holds and what is odd about it.
+/// Examines a data set, and prints its contents and anything odd about it.
 int run_data_check(const DataCheckArguments& options, Context& context);
 
 }  // namespace fieldmark::cli

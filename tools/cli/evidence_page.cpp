@@ -19,7 +19,7 @@ using watermark::EvidenceRecord;
 using watermark::EvidenceScore;
 constexpr Index kThumbnail = 160;           // pixels of the longer side
 constexpr int kQuality = 80;                // of its JPEG
-constexpr std::size_t kPlottedImages = 40;  // more would not fit a page
+constexpr std::size_t kPlottedImages = 40;  // more would not fit on a page
 
 constexpr char kHead[] = R"(<!doctype html>
 <html lang="en">
@@ -56,7 +56,7 @@ std::string cell(const std::string& inner) { return "<td>" + inner + "</td>"; }
 std::string number_cell(const std::string& inner) { return "<td class=\"n\">" + inner + "</td>"; }
 std::string code(const std::string& text) { return "<code>" + escaped_markup(text) + "</code>"; }
 
-// A bound on a probability in words: "1 in 10 000 000".
+// Writes a bound on a probability in words: "1 in 10 000 000".
 std::string one_in(double p) {
   const int zeros = static_cast<int>(std::floor(-std::log10(p) + 1e-9));
   if (zeros < 1) return text_of(100 * p, "%.3g") + "%";
@@ -66,7 +66,7 @@ std::string one_in(double p) {
   return "1 in " + digits;
 }
 
-// Bits that differ from the message's are underlined.
+// Underlines the bits that differ from the message.
 std::string marked_bits(const EvidenceScore& score, const watermark::Message& message) {
   std::string out;
   for (std::size_t i = 0; i < message.bits.size(); ++i) {
@@ -165,7 +165,7 @@ std::string image_plot(const EvidenceRecord& r) {
          "</figcaption></figure>\n";
 }
 
-// The beginning of a table of images and their figures.
+// Returns the beginning of a table of images and their figures.
 std::string scores_head(const char* caption, const char* image, const char* about) {
   std::string out = std::string("<table><caption>") + caption + "</caption>\n<thead><tr>";
   for (const char* column : {image, about, "Matching bits", "p, key", "two-sided", "p, bits"})

@@ -7,18 +7,18 @@
 
 namespace fieldmark::cli {
 
-/// Small copies of the images for a page, see thumbnail().
+/// Thumbnails of the images for a page, see thumbnail().
 struct PageImages {
-  std::vector<std::string> images{};    ///< of the images in question, in the record's order
+  std::vector<std::string> images{};    ///< of the suspect images, in the record's order
   std::vector<std::string> controls{};  ///< of the first image of each control
 };
 
-/// A small copy of an image as a JPEG inside a data: address.
+/// Returns a small copy of an image as a JPEG in a data: URL.
 /// @param rgb  [H, W, 3]
 std::string thumbnail(const Tensor<float>& rgb);
 
-/// A self-contained HTML page: the verdict in plain words, its limits, every figure, plots and images. It
-/// loads nothing and runs no scripts. Equal records give equal pages.
+/// Formats a self-contained HTML page: the verdict in plain words, its limits, every figure, plots and
+/// images. It loads nothing and runs no scripts. Equal records give equal pages.
 std::string evidence_page(const watermark::EvidenceRecord& record, const watermark::PublicKey& signer,
                           const PageImages& images);
 

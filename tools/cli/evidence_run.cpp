@@ -24,7 +24,7 @@ float background(const watermark::Owner& owner) { return nerf::background_value(
 
 std::string file_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
-// "views/" ends with an empty part.
+// "views/" ends with an empty component.
 std::string given_name(const std::string& path) {
   const std::string name = file_name(path);
   return name.empty() ? std::filesystem::path(path).parent_path().filename().string() : name;

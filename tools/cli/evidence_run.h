@@ -16,46 +16,46 @@ namespace fieldmark::cli {
 struct KeyTest {
   const watermark::Owner& owner;      ///< of the field in question
   const watermark::CellCode& code;    ///< of the key in question
-  const watermark::Message& message;  ///< looked for
+  const watermark::Message& message;  ///< the message to look for
   watermark::EvidenceScore operator()(const std::vector<double>& cells) const {
     return watermark::score_evidence(cells, code, message);
   }
 };
 
-/// Each image by itself.
+/// Scores each image by itself.
 std::vector<watermark::EvidenceImage> score_images(const KeyTest& test,
                                                    const std::vector<ImageEvidence>& images);
 
-/// Controls and a small copy of the first image of each.
+/// Controls and a thumbnail of the first image of each.
 struct TestedControls {
   std::vector<watermark::EvidenceControl> controls{};
   std::vector<std::string> thumbnails{};
 };
 
-/// Tests the built-in controls (watermark::built_in_controls()) of the first five images and each image or
-/// folder of `given`, which the user declares unmarked, with the same detection.
+/// Tests controls with the same detection: the built-in ones (watermark::built_in_controls()) of the first
+/// five images, and each image or folder of `given`, which the user declares unmarked.
 /// @throws IoError as read_images()
 TestedControls test_controls(const KeyTest& test, SuspectReader& reader,
                              const std::vector<ImageEvidence>& images, const std::vector<std::string>& given,
                              Context& context);
 
-/// For --json: name, figures and whether it stays above the rate of false alarms.
+/// For --json: name, figures and whether the control stays above the rate of false alarms.
 Json controls_json(const std::vector<watermark::EvidenceControl>& controls, double fpr);
 
-/// For --json: image, bits, p-value of each bit and scores of each image.
+/// For --json: name, bits, p-value of each bit and scores of each image.
 Json per_view_json(const std::vector<ImageEvidence>& images,
                    const std::vector<watermark::EvidenceImage>& scores);
 
-/// A line for each image: bits, matching bits, p-value, p-value of the weakest bit.
+/// Prints a line per image: bits, matching bits, p-value, p-value of the weakest bit.
 void print_views(std::ostream& out, const std::vector<ImageEvidence>& images,
                  const std::vector<watermark::EvidenceImage>& scores);
 
-/// How often keys reach each p-value, beside the bounds of chance: printed, a line a threshold, and for
-/// --json.
-/// @param of  what was counted, "wrong keys"
+/// Prints how often keys reach each p-value, next to the bounds of chance, one line per threshold, and
+/// returns it for --json.
+/// @param of  what was counted: "wrong keys"
 Json key_counts(const watermark::WrongKeyCounts& found, const std::string& of, Context& context);
 
-/// A line for each control.
+/// Prints a line per control.
 void print_controls(std::ostream& out, const std::vector<watermark::EvidenceControl>& controls, double fpr);
 
 /// Writes the folder of --evidence (watermark::write_evidence_folder()) with its page.

@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr long kConnectSeconds = 30, kStallSeconds = 60;
 
-// One attempt to fill a partial file.
+// One attempt to complete a partial file.
 struct Transfer {
   CURL* curl = nullptr;
   int file = -1;
@@ -36,14 +36,14 @@ bool write_all(Transfer& t, const char* data, std::size_t size) {
   return true;
 }
 
-// A return value other than the size ends the transfer.
+// Returning any value other than the size ends the transfer.
 std::size_t on_bytes(const char* data, std::size_t, std::size_t size, void* user) {
   auto& t = *static_cast<Transfer*>(user);
   if (!t.started) {
     t.started = true;
     long status = 0;
     curl_easy_getinfo(t.curl, CURLINFO_RESPONSE_CODE, &status);
-    // 206 is what was asked for; 200 is the whole file, from a server that knows no ranges.
+    // 206 is the requested range; 200 is the whole file, from a server without ranges.
     if (t.begin > 0 && status != 206) {
       if (::ftruncate(t.file, 0) != 0 || ::lseek(t.file, 0, SEEK_SET) < 0) return t.write_error = errno, 0;
       t.have = 0;
@@ -112,7 +112,7 @@ struct OpenFile {
   }
 };
 
-// Fills the part from where it ends. @return false if progress ended it
+// Continues the partial file from its end. @return false if progress stopped it
 bool fill(const std::string& url, const fs::path& part, const Manifest::File& expected,
           const FetchProgress& progress) {
   if (size_of(part) > expected.bytes) fs::remove(part);
@@ -131,7 +131,7 @@ bool fill(const std::string& url, const fs::path& part, const Manifest::File& ex
     throw IoError(url + ": expected " + std::to_string(expected.bytes) + " bytes, got more");
   }
   if (code == CURLE_HTTP_RETURNED_ERROR) {
-    // Status 416: the server's file ends before ours begins, so ours is none of its parts.
+    // Status 416: the server's file ends before ours begins, so ours is not a part of it.
     if (std::string_view(reason).ends_with("416")) fs::remove(part);
     throw IoError(url + ": " + reason);
   }
@@ -143,7 +143,7 @@ bool fill(const std::string& url, const fs::path& part, const Manifest::File& ex
   return true;
 }
 
-// base_url + path; every byte that a path of an address may not have as %XX.
+// Returns base_url + path with every byte that a URL path does not allow as %XX.
 std::string address(const std::string& base, const std::string& path) {
   constexpr std::string_view kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~/";
   std::string url = base.ends_with('/') ? base : base + "/";

@@ -33,7 +33,7 @@ std::optional<Tensor<float>> H264Clip::next() {
   if (!frame)
     throw IoError("H.264 in memory: expected " + std::to_string(left_) + " more frames, found none");
   --left_;
-  // Sides are even in the file.
+  // The sides are even in the file.
   Tensor<float> image({height_, width_, 3});
   for (Index y = 0; y < height_; ++y)
     std::copy_n(frame->image.data.begin() + 3 * y * frame->image.shape[1], 3 * width_,

@@ -9,17 +9,18 @@
 
 namespace fieldmark::cli {
 
-/// Images in order through H.264 and back: all go in, then all come out, one at a time and in their size.
+/// Sends images in order through H.264 and back. All images are added first; then they are returned one at a
+/// time in their original size.
 class H264Clip {
  public:
   /// @param crf  0 to 51   @throws ValueError if it is out of range, or this build cannot encode H.264
   explicit H264Clip(int crf);
-  /// @param image  [H, W, 3]   @param name  for errors
-  /// @throws IoError unless it has the size of the first   @throws ValueError if it is smaller than 2 x 2
-  /// pixels
+  /// @param image  [H, W, 3]   @param name  for error messages
+  /// @throws IoError unless it has the size of the first
+  /// @throws ValueError if it is smaller than 2 x 2 pixels
   void add(const Tensor<float>& image, const std::string& name);
-  /// The next image, multiples of 1/255; none after as many as went in.
-  /// @throws IoError if the decoder gives fewer
+  /// Returns the next image, multiples of 1/255; nullopt after the last.
+  /// @throws IoError if the decoder returns fewer
   std::optional<Tensor<float>> next();
 
  private:

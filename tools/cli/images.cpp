@@ -32,7 +32,7 @@ std::string lower_extension(const fs::path& path) {
 
 struct Listing {
   std::vector<fs::path> images;
-  std::map<std::string, std::size_t> others;  // files that are not read, by kind
+  std::map<std::string, std::size_t> others;  // numbers of skipped files, by kind
 };
 
 bool has_video_extension(const fs::path& path) {
@@ -59,7 +59,7 @@ Listing list_folder(const fs::path& folder, Videos videos) {
   return found;
 }
 
-// "3 files that are hidden or no images are skipped: 1 hidden, 2 .txt", or nothing.
+// Returns "3 files that are hidden or no images are skipped: 1 hidden, 2 .txt", or an empty text.
 std::string skipped(const Listing& listing) {
   std::size_t count = 0;
   std::string kinds;

@@ -17,7 +17,7 @@ using watermark::ReadingKind;
 
 Json line_of(const ImageEvidence& read) {
   return {{"sha256", read.sha256},       {"detection", watermark::reading_name(read.reading)},
-          {"agreement", read.agreement},  // null where it is NaN
+          {"agreement", read.agreement},  // NaN becomes null
           {"width", read.width},         {"height", read.height},
           {"cells", read.cells}};
 }
@@ -37,7 +37,7 @@ ImageEvidence evidence_of(const Json& line, Index cells) {
   return read;
 }
 
-// Discarded where the line is no JSON.
+// Returns a discarded value if the line is not JSON.
 Json parsed(const std::string& line) { return Json::parse(line, nullptr, false); }
 
 Json header_of(const std::string& owner_sha256, const std::string& detection) {
@@ -78,7 +78,7 @@ KeptReadings::KeptReadings(const std::filesystem::path& file, const std::string&
                     ": expected the reading of an image, got something else (" + e.what() + ")");
     }
   if (text.back() != '\n') std::filesystem::resize_file(file, text.rfind('\n') + 1);
-  append("");  // tried before the work
+  append("");  // checks that the file is writable before the work begins
 }
 
 std::optional<ImageEvidence> KeptReadings::find(const std::string& sha256) const {

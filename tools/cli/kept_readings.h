@@ -9,22 +9,22 @@
 
 namespace fieldmark::cli {
 
-/// What images showed, kept in a file, so that a command which was stopped need not read them again. The file
-/// has a line of JSON with owner, detection and instruction set, then one for each image with the SHA-256 of
-/// its bytes. A last line that was cut off is dropped.
+/// Readings of images, stored in a file so that a stopped command need not repeat them. The file has one line
+/// of JSON with owner, detection and instruction set, then one per image with the SHA-256 of its bytes. A
+/// truncated last line is dropped.
 class KeptReadings {
  public:
-  /// Reads the file, or begins it with the owner's number of cells. Nothing is written to a file that is something else.
-  /// @throws IoError     if it cannot be read or written, or is no such file
-  /// @throws UsageError  if it is of another owner, detection or instruction set
+  /// Reads the file, or starts it with the owner's number of cells. Never writes to a file of another kind.
+  /// @throws IoError     if it cannot be read or written, or is not such a file
+  /// @throws UsageError  if it belongs to another owner, detection or instruction set
   KeptReadings(const std::filesystem::path& file, const std::string& owner_sha256,
                const std::string& detection, Index cells);
 
-  /// What an image of these bytes showed, without its name and file; none if it has not been read.
+  /// Returns the reading of an image with this SHA-256, without its name and file; nullopt if there is none.
   std::optional<ImageEvidence> find(const std::string& sha256) const;
-  /// Writes what an image showed to the end of the file. @throws IoError
+  /// Appends a reading to the file. @throws IoError
   void add(const ImageEvidence& read);
-  /// Images in the file.
+  /// Returns the number of images in the file.
   std::size_t size() const { return readings_.size(); }
 
  private:

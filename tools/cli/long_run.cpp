@@ -27,7 +27,7 @@ void add_run_length(CommandLine& app, RunLength& length, bool checkpoint) {
 
 double run_long(TrainingRun& run, const std::string& what, const RunLength& length, Context& context,
                 const std::string& checkpoint, std::function<bool()> enough) {
-  if (!checkpoint.empty()) AtomicFile{checkpoint};  // found out now, not at the first save
+  if (!checkpoint.empty()) AtomicFile{checkpoint};  // fails now, not at the first save
   const InterruptGuard guard;
   Progress progress = context.progress(what);
   const auto tell = [&](double now) {

@@ -8,7 +8,7 @@
 
 namespace fieldmark::cli {
 
-/// A public data set as data_manifests/NAME.json describes it.
+/// A public data set, as described by data_manifests/NAME.json.
 struct Manifest {
   struct File {
     std::string path;  ///< below the data set's folder
@@ -16,18 +16,19 @@ struct Manifest {
     std::string sha256;  ///< 64 hexadecimal digits
   };
   std::string name, kind, title, licence, citation, url;
-  std::string base_url{};  ///< http or https; a file's address is base_url + path; empty: none is known
+  std::string base_url{};  ///< http or https; a file's URL is base_url + path; empty if unknown
   std::vector<File> files;
   std::uintmax_t bytes() const;
 };
 
-/// The contents of data_manifests/, compiled into the program.
+/// Returns the contents of data_manifests/, compiled into the program.
 std::vector<std::string_view> embedded_manifests();
 
-/// @param origin  named in errors   @throws IoError if the text is not JSON or not a manifest of format 1
+/// Parses a manifest. @param origin  named in errors   @throws IoError if the text is not JSON or not a
+/// manifest of format 1
 Manifest parse_manifest(std::string_view text, const std::string& origin);
 
-/// The fault of a file: missing, wrong size or wrong SHA-256; empty if it is right.
+/// Returns the fault of a file: missing, wrong size or wrong SHA-256; empty if it is correct.
 /// @throws IoError if it cannot be read
 std::string file_fault(const Manifest::File& file, const std::filesystem::path& path);
 
@@ -35,7 +36,7 @@ struct ManifestFault {
   std::string path, what;
 };
 /// Compares a folder with a manifest: each file's presence, size and SHA-256. Other files are ignored.
-/// @param keep_going  asked before every file with the part of the bytes seen; on false the check ends early
+/// @param keep_going  called before every file with the fraction of bytes checked; false ends the check early
 std::vector<ManifestFault> verify_manifest(const Manifest& manifest, const std::filesystem::path& folder,
                                            const std::function<bool(double)>& keep_going);
 

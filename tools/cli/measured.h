@@ -8,16 +8,16 @@
 
 namespace fieldmark::cli {
 
-/// The figures that `measure` and `embed` report. @param cameras  name of their set
+/// Returns the figures that `measure` and `embed` report. @param cameras  name of their set
 Json measurement_json(const watermark::Measurement& measured, const std::string& cameras);
 
-/// Its figures side by side, as a row of a table: those of --distort with the reading behind their names.
+/// Flattens the figures into a row of a table; figures of --distort carry the reading after their names.
 Json measurement_row(const watermark::Measurement& measured, const std::string& cameras);
 
-/// The same for people: a line a figure.
+/// Prints the same figures for people, one per line.
 void print_measurement(std::ostream& out, const watermark::Measurement& measured, const std::string& cameras);
 
-/// watermark::measure() with progress. @throws Interrupted on Ctrl-C
+/// Runs watermark::measure() with progress. @throws Interrupted on Ctrl-C
 watermark::Measurement run_measure(const watermark::Owner& owner, const nerf::RadianceField* baked,
                                    const watermark::Message* message, watermark::MeasureOptions options,
                                    Context& context);

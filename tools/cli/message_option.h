@@ -20,23 +20,23 @@ struct MessageOption {
   bool given() const { return !(message.empty() && text.empty() && uuid.empty() && payload.empty()); }
 };
 
-/// Adds --message, --text, --uuid and --payload, which exclude each other. @param purpose  what is done with
-/// the message: "Message ..."
+/// Adds --message, --text, --uuid and --payload, which exclude each other.
+/// @param purpose  begins the help text: "Message ..."
 void add_message_options(CommandLine& app, MessageOption& options, const std::string& purpose);
 
-/// The message that was asked for. @throws UsageError if none is given, or it does not fit
+/// Returns the requested message. @throws UsageError if none is given, or it does not fit
 watermark::Message message_of(const MessageOption& options, Index bits);
 
-/// {kind, value} of the payload that a message encodes, or null.
+/// Returns {kind, value} of the payload that a message encodes, or null.
 Json payload_json(const watermark::Message& message);
 
-/// The payload that evidence decodes to, if any, see PayloadCodec::read().
+/// Returns the payload that evidence decodes to, if any, see PayloadCodec::read().
 std::optional<watermark::PayloadReading> read_payload(const std::vector<double>& logit);
 
-/// {kind, value, corrected, chance}, or null.
+/// Returns {kind, value, corrected, chance}, or null.
 Json payload_json(const std::optional<watermark::PayloadReading>& reading);
 
-/// The same in words, or the reason why there is none.
+/// Returns the same in words, or the reason why there is no payload.
 std::string payload_text(const std::optional<watermark::PayloadReading>& reading, Index bits);
 
 }  // namespace fieldmark::cli

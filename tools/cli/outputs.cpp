@@ -19,7 +19,7 @@ struct Model {
   bool secret = false;
 };
 
-// The Fieldmark file at a path, or nothing.
+// Returns the kind of the Fieldmark file at a path, or nullopt.
 std::optional<Model> model_at(const std::string& path) {
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return std::nullopt;

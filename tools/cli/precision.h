@@ -7,9 +7,9 @@
 
 namespace fieldmark::cli {
 
-/// --precision fp32|bf16, stored by name.
+/// Adds --precision fp32|bf16, stored by name.
 void add_precision(CommandLine& app, std::string& name);
-/// @throws UsageError for bf16 where the CPU has no such products
+/// Parses a precision. @throws UsageError for bf16 if the CPU has no bf16 products
 Precision precision_of(const std::string& name);
 
 }  // namespace fieldmark::cli

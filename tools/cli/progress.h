@@ -6,10 +6,10 @@
 
 namespace fieldmark::cli {
 
-/// "7 s", "3 min 05 s", "2 h 07 min".
+/// Formats a duration: "7 s", "3 min 05 s", "2 h 07 min".
 std::string format_duration(double seconds);
 
-/// Reports progress: one updated line on a terminal, elsewhere one line per tenth.
+/// Reports progress: on a terminal one updated line, elsewhere one line per tenth.
 class Progress {
  public:
   /// A terminal is std::cerr or std::cout connected to one. `out` must outlive this.
@@ -19,7 +19,7 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
   /// Ends the line on a terminal.
   ~Progress();
-  /// @param fraction  part of the work done, in [0, 1]   @param note  shown after it, such as a loss
+  /// @param fraction  of the work done, in [0, 1]   @param note  shown after it, such as a loss
   void update(double fraction, std::string_view note = {});
   double seconds() const;
 
@@ -31,12 +31,12 @@ class Progress {
   bool terminal_;
   Clock::time_point begin_ = Clock::now();
   Clock::time_point shown_ = begin_;
-  int tenth_ = 0;            ///< last one reported
-  std::size_t on_line_ = 0;  ///< characters of the terminal's current line
+  int tenth_ = 0;            ///< the last one reported
+  std::size_t on_line_ = 0;  ///< characters on the terminal's current line
 };
 
-/// While a guard is alive, the first Ctrl-C sets a flag for the work to poll, and the second kills. Guards
-/// nest: an inner guard sees the flag of an outer one.
+/// While a guard is alive, the first Ctrl-C sets a flag for the work to poll, and the second kills the
+/// process. Guards nest: an inner guard sees the flag of an outer one.
 class InterruptGuard {
  public:
   InterruptGuard();

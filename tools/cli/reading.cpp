@@ -18,7 +18,7 @@ namespace fieldmark::cli {
 
 using watermark::ReadingKind;
 
-constexpr Index kFrames = 16;  // of a video
+constexpr Index kFrames = 16;  // per video
 
 void add_reading(CommandLine& app, std::string& reading) {
   app.add_option("--detection", reading,
@@ -105,7 +105,7 @@ ImageEvidence read_still(SuspectReader& reader, const std::filesystem::path& fil
   return read;
 }
 
-// Frames until one cannot be read.
+// Reads frames until one fails.
 template <class F>
 void read_video(SuspectReader& reader, const std::filesystem::path& file, Index count, ReadFaults& faults,
                 std::vector<ImageEvidence>& read, const F& progress) {
@@ -117,7 +117,7 @@ void read_video(SuspectReader& reader, const std::filesystem::path& file, Index 
   std::size_t frames = 0, damaged = 0;
   for (std::size_t k = 0; k < times.size(); ++k) {
     const VideoFrame frame = video.read_at(times[k]);
-    // In place of a frame that cannot be decoded comes another, perhaps one that was read.
+    // If a frame cannot be decoded, the reader returns another, perhaps one that was already read.
     if (frame.time > last) {
       char at[40];
       std::snprintf(at, sizeof at, "@%.3fs", frame.time);

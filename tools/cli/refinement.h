@@ -11,7 +11,7 @@
 
 namespace fieldmark::cli {
 
-/// What a training learns of its images beside the field.
+/// What training optimises per image besides the field.
 struct Refinement {
   std::string exposure = "off";  ///< off, on or auto
   bool poses = false;
@@ -19,25 +19,25 @@ struct Refinement {
 
 /// Adds --exposure and --refine-poses.
 void add_refinement(CommandLine& app, Refinement& refinement);
-/// @throws UsageError if the preset cannot do what is asked for
+/// @throws UsageError if the preset does not support the options
 void check_refinement(const Refinement& refinement, const std::string& preset);
 
-/// Decides --exposure auto by two short trainings, which it prints.
-/// @param held_out    validation images, or none: then exposures stay off
-/// @param checkpoint  of the run that resumes, which decided before; empty: none
-/// @param report      becomes what was tried, for the results   @throws Interrupted
+/// Decides --exposure auto with two short trainings, and prints their results.
+/// @param held_out    validation images; empty: exposures stay off
+/// @param checkpoint  of a resumed run, which has already decided; empty: none
+/// @param report      receives the trials, for the results   @throws Interrupted
 bool wants_exposures(const Refinement& refinement, const nerf::Dataset& train,
                      const std::function<std::optional<nerf::Dataset>()>& held_out,
                      const nerf::RadianceFieldOptions& field, const std::string& checkpoint, Json& report,
                      Context& context);
 
-/// The file beside a field that holds its training's refined cameras: FIELD.cameras.json.
+/// Returns the file next to a field that holds the refined cameras of its training: FIELD.cameras.json.
 std::string cameras_file(const std::string& field);
 /// Writes the file. @return mean motion, for the results
 Json save_cameras(const std::string& field, const nerf::Dataset& data,
                   const std::vector<nerf::Camera>& cameras, Context& context);
 
-/// Moves the cameras of a data set to where a field shows its images.
+/// Aligns the cameras of a data set with a field, so that its renders match the images.
 /// @return mean motion, for the results   @throws UsageError for an mlp field   @throws Interrupted
 Json fit_cameras(const nerf::RadianceField& field, nerf::Dataset& data, Context& context);
 

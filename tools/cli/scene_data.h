@@ -10,16 +10,16 @@
 
 namespace fieldmark::cli {
 
-/// The path of a file or folder in $FIELDMARK_DATA; empty if it or the variable does not exist.
+/// Returns the path of a file or folder in $FIELDMARK_DATA; empty if it or the variable does not exist.
 std::filesystem::path shared_data(const std::string& path);
 
-/// nerf::load_dataset(), with its notes passed to the context.
+/// Calls nerf::load_dataset() and passes its notes to the context.
 nerf::Dataset load_scene(const std::string& folder, const nerf::DatasetOptions& options, Context& context);
 
-/// An entry of "warnings" of the results: kind, count, text, remedy, images and partners.
+/// Returns an entry of "warnings" of the results: kind, count, text, remedy, images and partners.
 Json warning_of(const nerf::Oddity& oddity);
 
-/// Prints what is odd about a data set, a line each, and adds it to `warnings`.
+/// Prints what is odd about a data set, one line each, and adds it to `warnings`.
 void warn_of(const std::vector<nerf::Oddity>& oddities, Json& warnings, Context& context);
 
 }  // namespace fieldmark::cli

@@ -5,7 +5,7 @@
 
 namespace fieldmark::cli {
 
-/// --supersampling N, see RenderOptions::supersampling. @param rays  0 where it is not given
+/// Adds --supersampling N, see RenderOptions::supersampling. @param rays  0 if it is not given
 void add_supersampling(CommandLine& app, Index& rays);
 
 }  // namespace fieldmark::cli

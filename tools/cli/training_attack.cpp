@@ -12,7 +12,7 @@
 namespace fieldmark::cli {
 namespace {
 
-// Calls make(told after each view), with progress of that name.
+// Calls make(callback after each view), with progress under this name.
 template <class F>
 nerf::Dataset with_progress(const char* name, Context& context, F make) {
   const InterruptGuard guard;
@@ -59,7 +59,7 @@ nerf::RadianceField start(const std::string& name, const nerf::RadianceField& fi
   return nerf::RadianceField(sizes);
 }
 
-// Takes the steps until the run is done.
+// Trains until the run is done.
 void train(const std::string& name, nerf::Trainer& trainer, const RunLength& length, Context& context,
            Json& result) {
   const double seconds = run_long(trainer, name, length, context);

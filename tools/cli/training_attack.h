@@ -9,11 +9,11 @@
 
 namespace fieldmark::cli {
 
-/// Options of the attacks that train a field.
+/// Options of attacks that train a field.
 struct TrainingAttackOptions {
   std::string data;       ///< folder of clean images, for finetune
   std::string owner;      ///< file with the known extractor, for remove
-  double mark_psnr = 34;  ///< of the changed renders of remove, dB on the foreground
+  double mark_psnr = 34;  ///< of the modified renders of remove, dB on the foreground
   Index size = 0;         ///< longer side of the training images, pixels; 0: original size
   Index views = 100;
   double lr = 5e-3;
@@ -21,12 +21,13 @@ struct TrainingAttackOptions {
 };
 void add_training_attack(CommandLine& app, TrainingAttackOptions& options);
 
-/// "finetune", "finetune-renders", "remove" and "retrain".
+/// True for "finetune", "finetune-renders", "remove" and "retrain".
 bool is_training_attack(const std::string& name);
 
-/// finetune trains the field further on clean images, finetune-renders on its own renders, remove on renders
-/// changed against the extractor; retrain trains a new field of the same size, with another initialisation,
-/// on its renders. @param result  gets "steps", "seconds" and "psnr_trained"
+/// Runs an attack. finetune continues the field's training on clean images, finetune-renders on its own
+/// renders, and remove on renders modified against the extractor; retrain trains a new field of the same
+/// size, with another initialisation, on renders of the old one.
+/// @param result  receives "steps", "seconds" and "psnr_trained"
 nerf::RadianceField run_training_attack(const std::string& name, const nerf::RadianceField& field,
                                         const TrainingAttackOptions& options, Context& context, Json& result);
 

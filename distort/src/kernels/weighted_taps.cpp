@@ -4,7 +4,7 @@
 
 namespace fieldmark::kernels::FIELDMARK_ISA_NS {
 
-// Four registers at a time: the loop over taps is bound by loads, and y is written once.
+// Processes four registers at a time: loads bound the loop over taps, and y is written once.
 template <class T>
 void weighted_taps(T* y, const T* x, const Index* offsets, const T* weights, Index taps, Index n, bool add) {
   constexpr Index kStep = simd::kLanes<T>;

@@ -11,7 +11,7 @@ using detail::with_tangent;
 
 namespace {
 
-// y with the tangent of a where the mask holds, of b elsewhere.
+// Returns y with the tangent of a where the mask holds and of b elsewhere.
 template <class T>
 Dual<T> chosen(Var<T> y, Var<T> mask, const Dual<T>& a, const Dual<T>& b) {
   if (!a.has_tangent() && !b.has_tangent()) return y;
@@ -49,7 +49,8 @@ Dual<T> div(const Dual<T>& a, const Dual<T>& b) {
   return with_tangent<T>(y, sum ? detail::Tangent<T>(*sum / b.value()) : sum);
 }
 
-// A base of 0 is replaced by 1 where its term is 0 anyway: 0^-1 and log 0 are infinite, and 0 times that NaN.
+// Replaces a base of 0 by 1 where its term is 0 anyway: 0^-1 and log 0 are infinite, and 0 times infinity is
+// NaN.
 template <class T>
 Dual<T> pow(const Dual<T>& a, const Dual<T>& b) {
   const Var<T> x = a.value(), p = b.value(), y = pow(x, p);

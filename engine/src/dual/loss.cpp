@@ -9,7 +9,7 @@
 namespace fieldmark {
 namespace {
 
-// A loss y = sum_i w_i l(d_i) / sum_i w_i with d = a - b, from the slope l'(d).
+// Gives a loss y = sum_i w_i l(d_i) / sum_i w_i, d = a - b, its tangent from the slope l'(d).
 template <class T, class F>
 Dual<T> of_difference(Var<T> y, const Dual<T>& a, const Dual<T>& b, std::span<const T> weights, F slope) {
   const Dual<T> d = sub(a, b);
@@ -52,7 +52,7 @@ Dual<T> bce_with_logits(const Dual<T>& logits, std::span<const std::type_identit
   });
 }
 
-// Rows that do not count are replaced by zeros, since they may hold anything.
+// Replaces rows that do not count by zeros, since they may hold anything.
 template <class T>
 Dual<T> softmax_cross_entropy(const Dual<T>& logits, std::span<const std::int32_t> labels,
                               std::span<const std::type_identity_t<T>> weights) {

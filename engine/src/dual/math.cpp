@@ -141,7 +141,8 @@ Dual<T> leaky_relu(const Dual<T>& x, double slope) {
                       [&](Var<T> t) { return where(greater(x.value(), zero_of(x)), t, scale(t, slope)); });
 }
 
-// The exponential of what is not chosen must not overflow: its backward would multiply 0 by infinity.
+// The exponential of an element that is not chosen must not overflow: its backward would multiply 0 by
+// infinity.
 template <class T>
 Dual<T> elu(const Dual<T>& x, double alpha) {
   return with_tangent(elu(x.value(), alpha), x, [&](Var<T> t) {

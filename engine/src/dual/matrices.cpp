@@ -11,7 +11,7 @@ namespace {
 using detail::Tangent;
 using detail::tangent_by;
 
-// Tangent of a product that is linear in a and in b.
+// The tangent of a product that is linear in a and in b.
 template <class T, class F>
 Dual<T> bilinear(const Dual<T>& a, const Dual<T>& b, F product) {
   return detail::with_tangent(
@@ -20,7 +20,7 @@ Dual<T> bilinear(const Dual<T>& a, const Dual<T>& b, F product) {
                       tangent_by(b, [&](Var<T> t) { return product(a.value(), t); })));
 }
 
-// A layer y = act(sums(x, w, b)), sums linear in x and in w and adding the bias.
+// A layer y = act(sums(x, w, b)), where the sums are linear in x and in w and add the bias.
 template <class T, class F>
 Dual<T> layer(Var<T> y, const Dual<T>& x, const Dual<T>& w, const Dual<T>& b, Activation activation, F sums) {
   const Var<T> none = detail::filled(x.tape(), b.shape(), 0);
@@ -31,7 +31,7 @@ Dual<T> layer(Var<T> y, const Dual<T>& x, const Dual<T>& w, const Dual<T>& b, Ac
   return detail::with_tangent(y, detail::rectified(activation == Activation::relu, y, t));
 }
 
-// [n, n] with one value below, one on and one above the diagonal.
+// Returns an [n, n] matrix with one value below, one on and one above the diagonal.
 template <class T>
 Var<T> triangles(Tape<T>& tape, Index n, double below, double diagonal, double above) {
   T* mask = tape.scratch(n * n);

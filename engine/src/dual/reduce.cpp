@@ -15,7 +15,8 @@ using detail::with_tangent;
 
 namespace {
 
-// 1 where `choose` takes its elements from, 0 elsewhere: its gradient, on a tape of its own. A constant.
+// Returns a constant that is 1 at the elements that `choose` takes and 0 elsewhere: its gradient, from a
+// separate tape.
 template <class T, class F>
 Var<T> origin(Var<T> x, F choose) {
   Tape<T> tape;

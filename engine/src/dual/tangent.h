@@ -1,5 +1,5 @@
 #pragma once
-// What the ops of Duals share. Private.
+// Helpers shared by the ops of Duals. Private.
 #include <fieldmark/engine/dual.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/comparison.h>
@@ -10,11 +10,11 @@
 
 namespace fieldmark::detail {
 
-// None is a tangent of 0.
+// Without a value, the tangent is 0.
 template <class T>
 using Tangent = std::optional<Var<T>>;
 
-// f(x'), if there is one.
+// Returns f(x'), if there is a tangent.
 template <class T, class F>
 Tangent<T> tangent_by(const Dual<T>& x, F f) {
   return x.has_tangent() ? Tangent<T>(f(x.tangent())) : Tangent<T>();
@@ -26,7 +26,7 @@ Tangent<T> plus(Tangent<T> a, Tangent<T> b) {
   return add(*a, *b);
 }
 
-// y with a tangent that broadcasts to it.
+// Returns y with a tangent that broadcasts to it.
 template <class T>
 Dual<T> with_tangent(Var<T> y, Tangent<T> t) {
   if (!t) return y;
@@ -39,7 +39,7 @@ Dual<T> with_tangent(Var<T> y, const Dual<T>& x, F slope) {
   return with_tangent(y, tangent_by(x, slope));
 }
 
-// A linear op: f of the value and f of the tangent.
+// A linear op: applies f to the value and to the tangent.
 template <class T, class F>
 Dual<T> linear(const Dual<T>& x, F f) {
   return with_tangent(f(x.value()), x, f);
@@ -52,7 +52,7 @@ Var<T> filled(Tape<T>& tape, Shape shape, double value) {
   return tape.constant(data, shape);
 }
 
-// t where the mask holds, 0 elsewhere, whatever t is there.
+// Returns t where the mask holds, 0 elsewhere, whatever t is there.
 template <class T>
 Var<T> only(Var<T> mask, Var<T> t) {
   return where(mask, t, filled(t.tape(), Shape{1}, 0));

@@ -8,14 +8,14 @@ namespace {
 [[gnu::always_inline]] inline float root(float x) { return __builtin_sqrtf(x); }
 [[gnu::always_inline]] inline double root(double x) { return __builtin_sqrt(x); }
 
-// Plain loop, vectorised by the compiler: all is loaded and stored, so that skipping is a blend and not a
-// branch.
+// A plain loop that the compiler vectorises. It loads and stores everything, so that skipping is a blend and
+// not a branch.
 template <bool kSkip, bool kClear, class T>
 [[gnu::always_inline]] inline void run(T* __restrict x, T* __restrict g, T* __restrict m, T* __restrict v,
                                        std::int64_t n, const AdamScalars<T>& scalars) {
   const AdamScalars<T> s = scalars;
   const T one_less1 = 1 - s.beta1, one_less2 = 1 - s.beta2;
-#pragma GCC ivdep  // a line at a time, checks of overlap would cost as much as the work
+#pragma GCC ivdep  // for single lines, overlap checks would cost as much as the work
   for (std::int64_t i = 0; i < n; ++i) {
     const T grad = g[i], m0 = m[i], v0 = v[i], x0 = x[i];
     const T m1 = s.beta1 * m0 + one_less1 * grad;
@@ -31,13 +31,13 @@ template <bool kSkip, bool kClear, class T>
 
 constexpr std::int64_t kLine = 16;  // numbers skipped together: a cache line of floats
 
-// Where zeros are skipped, a line of them costs the reading of its gradients alone, not of three more arrays:
-// in a hash table most lines are not met in a step.
+// A skipped line of zeros costs only the read of its gradients, not of three more arrays: a step touches few
+// lines of a hash table.
 template <bool kClear, class T>
 [[gnu::always_inline]] inline void run_sparse(T* x, T* g, T* m, T* v, std::int64_t n,
                                               const AdamScalars<T>& s) {
-  // By bits: comparisons of floats became a scalar loop that took longer than the updates. A line of -0
-  // counts as work and changes nothing.
+  // Compares bits: float comparisons compiled to a scalar loop that took longer than the updates. A line of
+  // -0 counts as work and changes nothing.
   const auto any = [g](std::int64_t at) {
     std::uint64_t found = 0, word;
     for (int k = 0; k < kLine; k += 8 / static_cast<int>(sizeof(T))) {
@@ -48,8 +48,7 @@ template <bool kClear, class T>
   };
   std::int64_t i = 0;
   for (; i + kLine <= n; i += kLine) {
-    // The other arrays are asked for some lines ahead: where lines are left out, the hardware does not see a
-    // stream.
+    // Prefetches the other arrays some lines ahead: where lines are skipped, the hardware sees no stream.
     const std::int64_t ahead = i + 12 * kLine;
     if (ahead + kLine <= n && any(ahead)) {
       __builtin_prefetch(x + ahead, 1);

@@ -5,7 +5,7 @@
 
 namespace fieldmark::kernels {
 
-/// Numbers of one step that are the same for every entry.
+/// Scalars of one step, the same for every entry.
 template <class T>
 struct AdamScalars {
   T beta1, beta2, eps;
@@ -15,7 +15,7 @@ struct AdamScalars {
   bool skip_zero, zero_grads;
 };
 
-/// One pass over n entries: reads and writes x, m and v, reads g and clears it if zero_grads.
+/// Makes one pass over n entries: reads and writes x, m and v, reads g, and clears g if zero_grads.
 FIELDMARK_DECLARE_KERNEL(void, adam_f32,
                          (float* x, float* g, float* m, float* v, std::int64_t n,
                           const AdamScalars<float>& s))

@@ -9,7 +9,7 @@ using detail::ChainStep;
 using detail::kChainInputs;
 using detail::kChainSteps;
 
-// Elements of a step at a time: all values of a chain stay in the first-level cache.
+// Elements per block: all values of a chain stay in the L1 cache.
 constexpr Index kBlock = 256;
 constexpr int kValues = kChainInputs + kChainSteps;
 
@@ -37,13 +37,13 @@ inline void loop(const Arrays<T>& s, bool add, T* out, Index n, F f) {
     for (Index i = 0; i < n; i += lanes) simd::store(out + i, value(i));
 }
 
-// One block: where its values and gradients lie, by number of the value.
+// The values and gradients of one block, by number of the value.
 template <class T>
 struct Block {
   const T* value[kValues];
   T* made[kValues];  // memory of the steps' values
   const T* grad[kValues];
-  T* to[kValues];  // memory of gradients; null: not wanted
+  T* to[kValues];  // memory for gradients; null: not wanted
   Index n;         // a multiple of the lanes
 };
 
@@ -62,7 +62,7 @@ void run_forward(const ChainSteps& chain, const bool* needed, Block<T>& b) {
   }
 }
 
-// Which gradients a step adds to, and whether it is the first to: that one assigns.
+// Which gradients a step contributes to, and whether it is the first, which assigns.
 struct Route {
   bool to_a, to_b, add_a, add_b;
 };
@@ -99,7 +99,7 @@ void plan_routes(const ChainSteps& chain, const bool* wanted, bool* reached, Rou
   }
 }
 
-// Which values a backward computes again.
+// Finds the values that a backward recomputes.
 void plan_values(const ChainSteps& chain, const Route* routes, bool* needed) {
   for (int s = 0; s < chain.count; ++s) {
     if (!routes[s].to_a && !routes[s].to_b) continue;
@@ -113,7 +113,7 @@ void plan_values(const ChainSteps& chain, const Route* routes, bool* needed) {
     if (needed[chain.inputs + s]) needed[chain.step[s].a] = needed[chain.step[s].b] = true;
 }
 
-// Memory for the parts of arrays that a block shorter than whole vectors would read or write beyond.
+// Padded copies of array ends, for a last block that is not a whole number of vectors.
 template <class T>
 struct Tails {
   alignas(64) T inputs[kChainInputs][kBlock];
@@ -130,7 +130,7 @@ template <class T>
 void copy(const T* from, T* to, Index n) {
   std::memcpy(to, from, static_cast<std::size_t>(n) * sizeof(T));
 }
-// The n elements, followed by ones up to whole vectors: a harmless operand of every step.
+// Returns the n elements, padded with ones to whole vectors: 1 is a harmless operand of every step.
 template <class T>
 const T* padded(const T* from, T* to, Index n) {
   copy(from, to, n);
@@ -138,8 +138,8 @@ const T* padded(const T* from, T* to, Index n) {
   return to;
 }
 
-// Copies whole vectors past the caches, which saves reading what is overwritten; `to` must be aligned to
-// them.
+// Copies whole vectors with stores that bypass the caches, which saves reading the overwritten memory. `to`
+// must be aligned to vectors.
 template <class T>
 inline void stream(const T* from, T* to, Index n) {
   constexpr Index lanes = simd::kLanes<T>;
@@ -161,7 +161,8 @@ inline bool can_stream(const T* p) {
   return reinterpret_cast<std::uintptr_t>(p) % simd::kBytes == 0;
 }
 
-// Asks for the block after the one at i while that is computed: chains of several steps wait for memory else.
+// Prefetches the block after the one at i while that is computed: chains of several steps would otherwise
+// wait for memory.
 template <class T>
 inline void fetch_next(const T* p, Index i, Index n) {
   constexpr Index line = 64 / static_cast<Index>(sizeof(T));

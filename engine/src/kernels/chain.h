@@ -6,7 +6,7 @@ namespace fieldmark::kernels {
 
 using detail::ChainSteps;
 
-// T is float or double. large: results are written past the caches, for arrays that do not fit there.
+// T is float or double. large: results bypass the caches, for arrays that do not fit there.
 // y[i] = the chain of inputs[0][i], inputs[1][i] ...
 FIELDMARK_DECLARE_KERNEL(template <class T> void, chain_forward,
                          (const ChainSteps& chain, const T* const* inputs, T* y, Index n, bool large))

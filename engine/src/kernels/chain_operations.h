@@ -1,5 +1,5 @@
 #pragma once
-// What each step of a chain computes, forward and backward. Internal linkage, as simd.h.
+// The operations of chain steps, forward and backward. Internal linkage, like simd.h.
 #include "kernels/chain.h"
 #include "kernels/functions.h"
 
@@ -8,7 +8,7 @@ namespace {
 
 using detail::ChainOp;
 
-// x in whole vectors of float, one by one in double, whose functions come from the C library.
+// Applies f to whole vectors of float, or one by one to doubles, whose functions come from the C library.
 template <class Vector, class F>
 inline Vector each(Vector x, F f) {
   constexpr int lanes = static_cast<int>(sizeof(Vector) / sizeof(x[0]));
@@ -56,7 +56,7 @@ struct Div {
   static auto to_a(auto o) { return o.g / o.b; }
   static auto to_b(auto o) { return -o.g * o.y / o.b; }
 };
-// A comparison with NaN is false: the sum then makes the result NaN.
+// A comparison with NaN is false; the sum then makes the result NaN.
 struct Minimum {
   static auto value(auto o) { return o.a <= o.b ? o.a : (o.b < o.a ? o.b : o.a + o.b); }
   static auto to_a(auto o) { return o.b < o.a ? decltype(o.g){} : o.g; }
@@ -150,7 +150,7 @@ template <class Run>
 
 inline bool is_binary(ChainOp op) { return op <= ChainOp::maximum; }
 
-// Which values the slopes of an operation read.
+// The values that the slopes of an operation read.
 struct Reads {
   bool a = false, b = false, y = false;
 };

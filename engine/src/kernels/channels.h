@@ -7,11 +7,11 @@ namespace {
 
 using fieldmark::Index;
 
-// Pixels whose sums are kept in T before they join a double: 64 channels of float then fill 8 KiB of the L1
-// cache.
+// Pixels that are summed in T before the sum is added to a double: 64 channels of float then fill 8 KiB of
+// the L1 cache.
 constexpr Index kSegment = 32;
 
-// Calls f(V{}, c) for vectors V = Vec<T> of channels, then f(T{}, c) for each that is left over.
+// Calls f(V{}, c) for vectors V = Vec<T> of channels, then f(T{}, c) for each remaining channel.
 template <class T, class F>
 [[gnu::always_inline]] inline void for_channels(Index channels, F f) {
   constexpr Index lanes = simd::kLanes<T>;
@@ -20,7 +20,7 @@ template <class T, class F>
   for (; c < channels; ++c) f(T{}, c);
 }
 
-// A vector or a scalar at p.
+// Loads a vector or a scalar at p.
 template <class V, class T>
 [[gnu::always_inline]] inline V load_as(const T* p) {
   V v;

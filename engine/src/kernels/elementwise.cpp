@@ -5,7 +5,7 @@
 namespace fieldmark::kernels {
 namespace {
 
-// Calls f on whole vectors of the arrays; the last ones are padded with zeros.
+// Calls f on whole vectors of the arrays; the last vectors are padded with zeros.
 template <class F>
 inline void for_vectors(const float* x, const float* y, const float* dy, float* out, Index n, F f) {
   constexpr int lanes = simd::kLanes<float>;

@@ -4,7 +4,7 @@
 namespace fieldmark::kernels {
 
 enum class Unary { relu, sigmoid, tanh, exp, truncated_exp, softplus };
-/// Where truncated_exp stops: e^15 = 3.3e6.
+/// Largest exponent of truncated_exp: e^15 = 3.3e6.
 constexpr double kTruncatedExpLimit = 15;
 
 // T is float or double. y[i] = f(x[i]); then dx[i] = or += dy[i] f'(x[i]).

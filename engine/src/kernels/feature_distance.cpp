@@ -7,7 +7,7 @@ namespace {
 
 constexpr double kEpsilon = 1e-10;
 
-// sum over the channels of f(zero, c), vectors of them first.
+// Sums f(zero, c) over the channels, whole vectors first.
 template <class T, class F>
 [[gnu::always_inline]] inline double sum_channels(Index channels, F f) {
   simd::Vec<T> lanes{};
@@ -28,8 +28,8 @@ template <class T>
   }));
 }
 
-// d_c = a_c / (|a| + e) - b_c / (|b| + e) of one pixel, as (a_c - b_c) s_a + b_c (s_a - s_b): 0 where a = b,
-// whichever products are fused, and as exact as the features where they are nearly equal.
+// d_c = a_c / (|a| + e) - b_c / (|b| + e) of one pixel, as (a_c - b_c) s_a + b_c (s_a - s_b): 0 where
+// a = b, whichever products the compiler fuses, and as exact as the features where they nearly agree.
 template <class T>
 struct Difference {
   const T *a, *b;

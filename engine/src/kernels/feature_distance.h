@@ -13,7 +13,7 @@ struct FeaturePair {
 
 // T is float or double. The sum over pixels of sum_c w_c (a_c / (|a| + 1e-10) - b_c / (|b| + 1e-10))^2.
 FIELDMARK_DECLARE_KERNEL(template <class T> double, feature_distance, (const FeaturePair<T>& p))
-// da = or += `share` times the gradient of that sum in a; for b's, a and b change places.
+// da = or += `share` times the gradient of that sum in a. Swap a and b for the gradient in b.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, feature_distance_backward,
                          (const FeaturePair<T>& p, T share, bool add, T* da))
 

@@ -1,5 +1,5 @@
 #pragma once
-// Functions of one number and their slopes, for the kernels that apply them to arrays. Internal linkage, as
+// Functions of one number and their slopes, for kernels that apply them to arrays. Internal linkage, like
 // simd.h: two instruction sets must never share an inline function.
 #include <fieldmark/engine/simd.h>
 
@@ -10,7 +10,7 @@ namespace {
 
 using V = simd::Vec<float>;
 
-// Every function below returns NaN for NaN: simd::exp would hide it.
+// Every function below returns NaN for NaN, which simd::exp would hide.
 inline V keep_nan(V x, V y) { return x == x ? y : x; }
 inline V absolute(V x) { return simd::max(x, -x); }
 
@@ -41,7 +41,7 @@ struct Sigmoid {
 };
 
 // (1 - e^-2|x|) / (1 + e^-2|x|) loses digits near 0: below 0.625 an interpolating polynomial of tanh(x) / x
-// in x^2.
+// in x^2 replaces it.
 struct Tanh {
   static V value(V x) {
     const V a = absolute(x), e = simd::exp(-2 * a), big = (1 - e) / (1 + e), z = x * x;
@@ -95,7 +95,7 @@ struct Softplus {
 };
 
 // x = 2^e m with m in [sqrt(1/2), sqrt(2)): log m = 2 atanh(s), s = (m - 1) / (m + 1), whose series in s^2 <=
-// 0.0295 ends below 2e-9. Numbers below the least normal one are scaled by 2^23 first.
+// 0.0295 ends below 2e-9. Subnormal numbers are scaled by 2^23 first.
 struct Log {
   static V value(V x) {
     using simd::VecI;

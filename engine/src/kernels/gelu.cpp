@@ -9,15 +9,15 @@ using V = simd::Vec<float>;
 
 constexpr float kDensity = 0.39894228f;  // 1 / sqrt(2 pi)
 
-// What lies beyond |x| on one side of a normal distribution is bell * tail, with bell = e^(-x^2 / 2). Beyond
+// The mass of a normal distribution beyond |x| on one side is bell * tail, with bell = e^(-x^2 / 2). Beyond
 // 14 it is 0 in float.
 struct Tail {
   V a;  // |x|, at most 14
   V bell, tail;
 };
 
-// bell: a = h + d with h a multiple of 2^-8, whose square is exact, so that the rounding of a^2, which grows
-// with a, does not pass into the exponential. tail: erfcx(a / sqrt 2) / 2 as a polynomial in
+// bell: a = h + d, where h is a multiple of 2^-8 and has an exact square, so that the rounding of a^2, which
+// grows with a, does not reach the exponential. tail: erfcx(a / sqrt 2) / 2 as a polynomial in
 // t = (a - 3) / (a + 3), a minimax fit in relative terms; its own error is 8e-9, with rounding below 6e-7.
 inline Tail tail_of(V x) {
   const V a = simd::min(simd::max(x, -x), V{} + 14);
@@ -36,7 +36,7 @@ inline Tail tail_of(V x) {
   return {a, simd::exp(h * h * -0.5f) * (1 + d * (1 + d * (0.5f + d * (1.0f / 6)))), p};
 }
 
-// x P(x); on the right P is the complement of the tail.
+// x P(x); for positive x, P is the complement of the tail.
 inline V value(V x) {
   const Tail s = tail_of(x);
   const V beyond = s.a * (s.bell * s.tail);
@@ -57,7 +57,7 @@ inline double slope(double x) {
   return distribution(x) + x * 0.39894228040143267794 * __builtin_exp(-x * x / 2);
 }
 
-// out[i] = f(x[i], dy[i], out[i]); the last ones are padded with zeros.
+// out[i] = f(x[i], dy[i], out[i]); the last vector is padded with zeros.
 template <class F>
 inline void for_vectors(const float* x, const float* dy, float* out, Index n, F f) {
   constexpr int lanes = simd::kLanes<float>;

@@ -8,9 +8,9 @@ namespace {
 using simd::kLanes;
 using simd::Vec;
 
-// Vectors of a full panel, and rows of a register block V vectors wide: at most 12 accumulators of 16
-// registers, or 24 of AVX-512's 32, and at least 8 where there are rows enough, which hides the latency of a
-// multiply-add.
+// Vectors of a full panel, and rows of a register block V vectors wide. A block has at most 12 accumulators
+// in 16 registers, or 24 in AVX-512's 32, and at least 8 if there are enough rows, which hides the latency of
+// a multiply-add.
 constexpr int kVectors = simd::kBytes == 64 ? 4 : 2;
 constexpr int rows_of(int vectors) {
   const int most = simd::kBytes == 64 ? 24 : 12;
@@ -19,9 +19,9 @@ constexpr int rows_of(int vectors) {
 template <class T>
 constexpr int kPanel = kVectors* kLanes<T>;
 
-// A block with sums this long takes a microsecond or more, and its ends may have left L2 since the block
-// before. So a block prefetches the elements of C that it overwrites and those of the mask; if it adds to C,
-// those of the next block, since it needs its own at once.
+// A block with sums this long takes a microsecond or more, and its elements of C may have left L2 since the
+// previous block. So a block prefetches the elements of C that it overwrites and those of the mask. If it
+// adds to C, it prefetches those of the next block, since it needs its own at once.
 constexpr Index kLongSum = 128;
 
 template <class T, int R, int V>
@@ -35,7 +35,7 @@ template <class T, int R, int V>
     }
 }
 
-// One block of C in registers; B's rows are `stride` apart.
+// Computes one block of C in registers; the rows of B are `stride` apart.
 template <class T, int R, int V>
 [[gnu::always_inline]] inline void block(const Gemm<T>& g, const T* a, const T* b, Index stride, T* c,
                                          Index ldc, const T* bias, const T* mask) {
@@ -45,9 +45,9 @@ template <class T, int R, int V>
   for (int i = 0; i < R; ++i)
     for (int j = 0; j < V; ++j)
       acc[i][j] = g.accumulate ? simd::load(c + i * ldc + j * L) : bias ? simd::load(bias + j * L) : Vec<T>{};
-  // Each step prefetches one line of A: the next block's, or, where A is read by columns, this block's 16
-  // steps ahead. Activations of a chunk come from L3 or memory, and hardware prefetching does not hide that
-  // latency.
+  // Each step prefetches one line of A: of the next block, or, where A is read by columns, of this block 16
+  // steps ahead. The activations of a chunk come from L3 or memory, and hardware prefetching does not hide
+  // that latency.
   const bool by_rows = g.a_col == 1 && g.k > 0;
   const T* ahead = by_rows ? a + R * g.a_row : a + 16 * g.a_col;
   const Index on = by_rows ? R * g.a_row / g.k : g.a_col;
@@ -67,13 +67,13 @@ template <class T, int R, int V>
     for (int i = 0; i < R; ++i)
       for (int j = 0; j < V; ++j)
         acc[i][j] = simd::load(mask + i * ldc + j * L) > Vec<T>{} ? acc[i][j] : Vec<T>{};
-  // A comparison with NaN is false, so the sum must be what is taken then: NaN stays NaN.
+  // A comparison with NaN is false and must select the sum, so that NaN stays NaN.
   for (int i = 0; i < R; ++i)
     for (int j = 0; j < V; ++j)
       simd::store(c + i * ldc + j * L, g.relu ? simd::max(Vec<T>{}, acc[i][j]) : acc[i][j]);
 }
 
-// All rows of V vectors of columns: blocks of R rows, what is left in ever smaller ones.
+// All rows of V vectors of columns: blocks of R rows, then ever smaller blocks for the rest.
 template <class T, int V, int R = rows_of(V)>
 void panel(const Gemm<T>& g, const T* b, Index stride, Index column, Index i = 0) {
   const T *bias = g.bias ? g.bias + column : nullptr, *mask = g.mask ? g.mask + column : nullptr;
@@ -84,7 +84,7 @@ void panel(const Gemm<T>& g, const T* b, Index stride, Index column, Index i = 0
     if (i < g.m) panel<T, V, (R > 8 ? 8 : R > 4 ? 4 : R / 2)>(g, b, stride, column, i);
 }
 
-// Columns that do not fill a vector: C passes through a block of its own.
+// Columns that do not fill a vector: C passes through a separate block.
 template <class T>
 void narrow(const Gemm<T>& g, const T* b, Index stride, Index j, int columns) {
   constexpr int W = kLanes<T>, R = rows_of(1);
@@ -109,7 +109,7 @@ void narrow(const Gemm<T>& g, const T* b, Index stride, Index j, int columns) {
   }
 }
 
-// Row i of a full panel in place: whole vectors, without the checks of a loop over any width.
+// Row i of a full panel: whole vectors, without the checks of a loop over any width.
 template <class T>
 [[gnu::always_inline]] inline void pack_full_row(const T* from, const T* mask, Index panel, T* out) {
   for (Index x = 0; x < panel; x += kLanes<T>) {
@@ -168,8 +168,8 @@ void pad_rows(const T* d, Index rows, Index columns, const T* mask, Index row, T
              out + i * row);
 }
 
-// If a segment's rows of B do not stay in L1 beside those of the others, C passes over one segment at a time:
-// every block of rows of C then finds them there. The order of the sums is the same.
+// If the rows of B of all segments do not fit into L1 together, processes all of C one segment at a time, so
+// that every block of rows of C finds the segment's rows of B in L1. The order of the sums is the same.
 template <class T>
 void by_segments(const Gemm<T>& g, Index stride, Index step) {
   for (Index s = 0; s < g.segments; ++s) {
@@ -189,7 +189,7 @@ void by_segments(const Gemm<T>& g, Index stride, Index step) {
 template <class T>
 void gemm(const Gemm<T>& g) {
   constexpr int L = kLanes<T>;
-  constexpr Index kSegmentBytes = 8192;  // below it storing C in between costs more
+  constexpr Index kSegmentBytes = 8192;  // below this, storing C in between costs more
   const Index width = gemm_panel<T>(g.n), stride = g.b_row ? g.b_row : width;
   const Index step = g.b_panel ? g.b_panel : g.segments * g.k * stride;
   if (g.segments > 1 && g.k * width * static_cast<Index>(sizeof(T)) >= kSegmentBytes)
@@ -217,7 +217,7 @@ void gemm(const Gemm<T>& g) {
   }
 }
 
-// One panel of V vectors; two sums each hide the latency of an addition.
+// Sums one panel of V vectors; two sums for each hide the latency of an addition.
 template <class T, int V>
 void panel_sums(const T* panel, Index rows, Index stride, T* out) {
   constexpr int L = kLanes<T>;

@@ -5,9 +5,9 @@ namespace fieldmark::kernels {
 
 /// C[i, j] = start + sum_{s, k} A[i, s, k] B[s K + k, j], where start is C's old value, the bias or 0, and
 /// the result may pass through a ReLU. A is read at a[i a_row + s a_segment + k a_col], so that it can be a
-/// matrix, its transpose, or the windows of an image (a convolution's rows are the segments). B comes from
-/// pack_panels(), or is a row-major matrix of whole vectors of columns where it lies: b_row = its row's
-/// length, b_panel = gemm_panel(n).
+/// matrix, its transpose, or the windows of an image (the rows of a convolution are the segments). B comes
+/// from pack_panels(), or is a row-major matrix of whole vectors of columns read in place: b_row = length of
+/// its rows, b_panel = gemm_panel(n).
 template <class T>
 struct Gemm {
   Index m = 0, n = 0, k = 0, segments = 1;
@@ -19,25 +19,24 @@ struct Gemm {
   T* c = nullptr;     ///< row-major, rows ldc apart
   Index ldc = 0;
   const T* bias = nullptr;  ///< [n]; not with accumulate
-  const T* mask =
-      nullptr;  ///< laid out as C, which becomes 0 where it is not positive: through a ReLU's backward
+  const T* mask = nullptr;  ///< laid out like C, which becomes 0 where it is not positive: a ReLU's backward
   bool accumulate = false, relu = false;
 };
 
-/// Width of the panels of a matrix of so many columns on this instruction set: a few vectors, and no more
-/// than the columns fill.
+/// Returns the width of the panels of a matrix with `columns` columns on this instruction set: a few vectors,
+/// and no more than the columns fill.
 FIELDMARK_DECLARE_KERNEL(template <class T> Index, gemm_panel, (Index columns))
 
 /// Packs B [rows, columns], read at b[i row + j column], into panels of gemm_panel(columns)
-/// columns: panel after panel, each row-major and contiguous, the last filled up with zeros. Without it the
-/// rows of one panel fall into few sets of the cache. Where `mask` (laid out as b) is given, entries at which
+/// columns: panel after panel, each row-major and contiguous, the last padded with zeros. Unpacked, the rows
+/// of one panel would fall into few sets of the cache. If `mask` (laid out like b) is given, entries at which
 /// it is not positive become 0: the backward of a ReLU.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, pack_panels,
                          (const T* b, Index rows, Index columns, Index row, Index column, const T* mask,
                           T* out))
 
 /// Copies D [rows, columns] to rows of `row` >= columns elements, padded with zeros; entries at which
-/// `mask` (laid out as D; null: none) is not positive become 0 too.
+/// `mask` (laid out like D; null: none) is not positive become 0 too.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, pad_rows,
                          (const T* d, Index rows, Index columns, const T* mask, Index row, T* out))
 

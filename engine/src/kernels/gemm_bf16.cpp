@@ -8,8 +8,8 @@
 namespace fieldmark::kernels::FIELDMARK_ISA_NS {
 namespace {
 
-constexpr Index kRows = 32;    // of A that are rounded together
-constexpr Index kDepth = 512;  // of a row that fit beside them on the stack
+constexpr Index kRows = 32;    // rows of A rounded together
+constexpr Index kDepth = 512;  // elements of a row that fit on the stack
 constexpr Index kWidth = 16;   // columns of a panel of B
 
 [[gnu::always_inline]] inline std::uint16_t rounded(float x) {
@@ -54,7 +54,7 @@ struct alignas(64) TileShapes {
   std::uint8_t rows[16] = {16, 16, 16, 16, 16, 16, 16, 16};
 };
 
-// Tiles 0 to 3 sum, 4 and 5 hold rows, 6 and 7 the panels: every tile that is loaded is used twice.
+// Tiles 0 to 3 accumulate, 4 and 5 hold rows, 6 and 7 hold the panels: every loaded tile is used twice.
 void tile_products(const Rows& rows, const std::uint16_t* b, Index panel, Products& out) {
   _tile_zero(0);
   _tile_zero(1);
@@ -118,7 +118,7 @@ void plain_products(const Rows& rows, const std::uint16_t* b, Index panel, Produ
 }
 #endif
 
-// One element of C from its sum of products.
+// Writes one element of C from its sum of products.
 [[gnu::always_inline]] inline void finish(const GemmBf16& g, Index i, Index j, float sum) {
   const Index at = i * g.ldc + j;
   float c = sum + (g.accumulate ? g.c[at] : g.bias ? g.bias[j] : 0.f);
@@ -126,7 +126,7 @@ void plain_products(const Rows& rows, const std::uint16_t* b, Index panel, Produ
   g.c[at] = g.relu && c < 0 ? 0 : c;
 }
 
-// The same for a whole vector.
+// Writes a whole vector of C.
 [[gnu::always_inline]] inline void finish_vector(const GemmBf16& g, Index i, Index j, const float* sums) {
   using V = simd::Vec<float>;
   const Index at = i * g.ldc + j;
@@ -165,7 +165,7 @@ void round_bf16(const float* x, Index n, std::uint16_t* out) {
 }
 
 void gemm_bf16(const GemmBf16& g) {
-  // The panels of B hold all of K; a part of it moves on within each.
+  // The panels of B hold all of K; a part of K starts at an offset within each panel.
   const Index panel = (g.k + 31) / 32 * 32 * kWidth;
 #if defined(__AVX512BF16__)
   const TileShapes shapes;
@@ -185,7 +185,7 @@ void gemm_bf16(const GemmBf16& g) {
       for (Index j = 0; j < g.n; j += 2 * kWidth) {
         const Index columns = g.n - j < 2 * kWidth ? g.n - j : 2 * kWidth;
         const std::uint16_t* b = g.b + j / kWidth * panel + begin * kWidth;
-        const Index other = columns > kWidth ? panel : 0;  // the last panel may be alone
+        const Index other = columns > kWidth ? panel : 0;  // the last panel may have no partner
 #if defined(__AVX512BF16__)
         (g.tiles ? tile_products : dot_products)(rows, b, other, products);
 #else

@@ -18,14 +18,14 @@ struct GemmBf16 {
   bool tiles = false;  ///< AMX; otherwise AVX-512's dot products
 };
 
-/// Elements that pack_bf16() writes for B [rows, columns].
+/// Returns the number of elements that pack_bf16() writes for B [rows, columns].
 constexpr Index bf16_size(Index rows, Index columns) {
   return (rows + 31) / 32 * 32 * ((columns + 15) / 16 * 16);
 }
 
-/// Rounds B [rows, columns], read at b[i row + j column], to bf16 in panels of 16 columns, in which pairs of
-/// rows lie together: out[panel][pair of rows][column][row of the pair]. Rows are filled up to a multiple of
-/// 32, columns of 16.
+/// Rounds B [rows, columns], read at b[i row + j column], to bf16 in panels of 16 columns that interleave
+/// pairs of rows: out[panel][pair of rows][column][row of the pair]. Rows are padded to a multiple of 32,
+/// columns to a multiple of 16.
 FIELDMARK_DECLARE_KERNEL(void, pack_bf16,
                          (const float* b, Index rows, Index columns, Index row, Index column,
                           std::uint16_t* out))
@@ -33,8 +33,7 @@ FIELDMARK_DECLARE_KERNEL(void, pack_bf16,
 /// Rounds n elements to bf16.
 FIELDMARK_DECLARE_KERNEL(void, round_bf16, (const float* x, Index n, std::uint16_t* out))
 
-/// On v4 only, and only where bf16_units() says so: the other levels compute it without special instructions,
-/// for tests.
+/// For v4 with bf16_units(). The other levels compute the product without special instructions, for tests.
 FIELDMARK_DECLARE_KERNEL(void, gemm_bf16, (const GemmBf16& g))
 
 }  // namespace fieldmark::kernels

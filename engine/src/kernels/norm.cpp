@@ -5,8 +5,8 @@
 namespace fieldmark::kernels {
 namespace {
 
-// Joins a segment of n pixels with the given mean and squared deviations to the `count` before it (Chan et
-// al. 1983).
+// Merges a segment of n pixels with the given mean and squared deviations into the `count` pixels before it
+// (Chan et al. 1983).
 template <class T, class V>
 inline void join(double count, double n, V centre, V residual, V squares, double* mean, double* m2) {
   constexpr std::size_t number = sizeof(T), lanes = sizeof(V) / number;
@@ -15,7 +15,7 @@ inline void join(double count, double n, V centre, V residual, V squares, double
   std::memcpy(r, &residual, sizeof residual);
   std::memcpy(s, &squares, sizeof squares);
   for (std::size_t k = 0; k < lanes; ++k) {
-    // The centre is the mean only up to rounding; the sum of deviations from it tells by how much.
+    // The centre is the mean only up to rounding; the sum of deviations from it gives the difference.
     const double off = static_cast<double>(r[k]) / n, delta = static_cast<double>(c[k]) + off - mean[k];
     const double own = static_cast<double>(s[k]) - off * off * n;
     mean[k] += delta * n / (count + n);
@@ -23,7 +23,7 @@ inline void join(double count, double n, V centre, V residual, V squares, double
   }
 }
 
-// Sum of `count` pixels, one channel vector each, in four chains: one would wait for its own additions.
+// Sums `count` pixels, one channel vector each, in four chains: a single chain would wait for its additions.
 template <class V, class T, class F>
 [[gnu::always_inline]] inline V sum_pixels(const T* x, Index count, Index channels, F f) {
   V s[4] = {};

@@ -3,7 +3,7 @@
 
 namespace fieldmark::kernels {
 
-// One number a channel: y = (x - mean) gain + shift, then max(y, 0) if relu.
+// One number per channel: y = (x - mean) gain + shift, then max(y, 0) if relu.
 template <class T>
 struct Affine {
   const T *mean, *gain, *shift;
@@ -11,7 +11,7 @@ struct Affine {
 };
 
 // T is float or double; x, y, dy, dx are [pixels, channels]; per-channel sums are kept in double.
-// Mean and sum of squared deviations from it.
+// Computes the mean and the sum of squared deviations from it.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, channel_moments,
                          (const T* x, Index pixels, Index channels, double* mean, double* m2))
 FIELDMARK_DECLARE_KERNEL(template <class T> void, normalise,

@@ -10,18 +10,18 @@ struct PoolRow {
 
 // T is float or double.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, pool_row, (const PoolRow& p, const T* x, T* y))
-// dx = or += dy / size^2; pixels that fill no window become 0, or stay.
+// dx = or += dy / size^2; pixels outside all windows become 0, or stay.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, pool_row_backward,
                          (const PoolRow& p, const T* dy, T* dx, bool add))
-// sums[c] = sum over pixels of x[pixel, c], of those at which `mask` is positive where it is given.
+// sums[c] = sum over pixels of x[pixel, c]; with a `mask`, only where it is positive.
 FIELDMARK_DECLARE_KERNEL(template <class T> void, channel_sums,
                          (const T* x, const T* mask, Index pixels, Index channels, double* sums))
 // y[pixel, c] = or += row[c].
 FIELDMARK_DECLARE_KERNEL(template <class T> void, fill_pixels,
                          (const T* row, Index pixels, Index channels, T* y, bool add))
 
-// A row of overlapping windows: x has `rows` rows of `width` pixels; windows begin `stride` pixels apart, and
-// what reaches beyond the width is left out.
+// A row of overlapping windows: x has `rows` rows of `width` pixels. Windows begin `stride` pixels apart and
+// are cut off at the width.
 struct MaxPoolRow {
   Index windows, size, stride, rows, width, channels;
 };

@@ -11,8 +11,8 @@ constexpr T kP = T(0.70710678118654752440);
 template <class T>
 constexpr T kQ = T(1.41421356237309504880);
 
-// Each transform along one axis: `from` inputs to `to` outputs, rows in the order of the points 0, p, -p,
-// q, -q, infinity. V is a vector or a scalar of T.
+// Each transform maps `from` inputs along one axis to `to` outputs, with rows in the order of the points 0,
+// p, -p, q, -q, infinity. V is a vector or a scalar of T.
 
 // B^T: row i holds the coefficients of prod_{j != i} (z - a_j), the last those of the product over all
 // points.
@@ -31,7 +31,7 @@ struct WindowLine {
   }
 };
 
-// A: row i holds 1, a_i, a_i^2, a_i^3.
+// A: row i holds 1, a_i, a_i^2 and a_i^3.
 struct TileLine {
   static constexpr int from = 4, to = 6;
   template <class T, class V>
@@ -90,7 +90,7 @@ struct GradientLine {
   }
 };
 
-// store(i, j, (L X L^T)[i, j]) of X[i, j] = load(i, j).
+// Calls store(i, j, (L X L^T)[i, j]) for X[i, j] = load(i, j).
 template <class Line, class T, class V, class Load, class Store>
 [[gnu::always_inline]] inline void both_axes(Load load, Store store) {
   V half[Line::to][Line::from];
@@ -125,8 +125,8 @@ template <class T, class F>
 
 constexpr Index smaller(Index a, Index b) { return a < b ? a : b; }
 
-// Calls f(number within `count`, offset of the tile's first pixel from the image's, its row, its column,
-// and the image's first pixel).
+// Calls f with the number of a tile within `count`, the offset of its first pixel from that of the image, its
+// row, its column, and the first pixel of the image.
 template <class T, class F>
 [[gnu::always_inline]] inline void for_tiles(const WinogradTiles<T>& x, F f) {
   const Index down = (x.h + kWinogradTile - 1) / kWinogradTile,
@@ -137,8 +137,8 @@ template <class T, class F>
   }
 }
 
-// Calls f(V{}, c, where number [row, c] of the first matrix lies) for the channels of a row of matrices in
-// panels; what the last panel has beyond them becomes 0.
+// Calls f(V{}, c, offset of element [row, c] of the first matrix) for the channels of a row of matrices in
+// panels; fills the rest of the last panel with 0.
 template <class T, class F>
 [[gnu::always_inline]] inline void for_row(const WinogradMatrices<T>& to, Index row, Index channels, F f) {
   T* at = to.data + row * to.panel;
@@ -150,7 +150,7 @@ template <class T, class F>
   }
 }
 
-// Transforms each tile's square of Line::from pixels a side, whose first lies `border` before the tile's.
+// Transforms the square of each tile, Line::from pixels a side, which begins `border` pixels before the tile.
 template <class Line, Index border, class T>
 void transform(const WinogradTiles<T>& x, const WinogradMatrices<T>& to) {
   const Index pixel = x.channels, line = x.w * pixel;
@@ -167,7 +167,7 @@ void transform(const WinogradTiles<T>& x, const WinogradMatrices<T>& to) {
                               store);
         return;
       }
-      // Rolled loops: 36 branches in line take sanitizers minutes to compile.
+      // Rolled loops: with sanitizers, 36 inline branches take minutes to compile.
       V square[Line::from][Line::from];
 #pragma GCC unroll 1
       for (int i = 0; i < Line::from; ++i)

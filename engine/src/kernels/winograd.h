@@ -10,8 +10,9 @@ namespace fieldmark::kernels {
 constexpr Index kWinogradTile = 4;       // outputs of a tile along an axis
 constexpr Index kWinogradProducts = 36;  // elements of a transformed tile
 
-/// 36 matrices with a stride of `stride` elements, in panels as of pack_panels(): element [row, column] is at
-/// (column / panel) distance + row panel + column % panel. One panel as wide as the matrix is row-major.
+/// 36 matrices with a stride of `stride` elements, in panels like those of pack_panels(): element [row,
+/// column] is at (column / panel) distance + row panel + column % panel. One panel as wide as the matrix is
+/// row-major.
 template <class T>
 struct WinogradMatrices {
   T* data = nullptr;
@@ -19,8 +20,8 @@ struct WinogradMatrices {
 };
 
 /// Tiles first .. first + count of the images [n, h, w, channels], numbered image by image and row by
-/// row; there are ceil(h / 4) ceil(w / 4) in an image. Where `mask` (laid out as the images) is not
-/// positive, a number counts as 0.
+/// row; there are ceil(h / 4) ceil(w / 4) in an image. Where `mask` (laid out like the images) is not
+/// positive, an element counts as 0.
 template <class T>
 struct WinogradTiles {
   const T* data = nullptr;
@@ -29,10 +30,10 @@ struct WinogradTiles {
   Index first = 0, count = 0;
 };
 
-/// What becomes of the outputs: y's old value or the bias is added, then they may pass through a ReLU.
+/// Destination of the outputs: adds y's old value or the bias, then may apply a ReLU.
 template <class T>
 struct WinogradOutput {
-  T* y = nullptr;           ///< laid out as WinogradTiles says
+  T* y = nullptr;           ///< laid out as in WinogradTiles
   const T* bias = nullptr;  ///< [channels] or null; not with accumulate
   bool accumulate = false, relu = false;
 };

@@ -9,7 +9,7 @@
 
 namespace fieldmark::detail {
 
-/// Uniform in +-sqrt(6 / fan_in): He et al. 2015, eq. 10, uniform form.
+/// Fills uniformly in +-sqrt(6 / fan_in): He et al. 2015, eq. 10, uniform form.
 template <class T>
 void he_uniform(std::span<T> weights, Index fan_in, std::uint64_t seed) {
   std::mt19937_64 rng(seed);
@@ -17,7 +17,7 @@ void he_uniform(std::span<T> weights, Index fan_in, std::uint64_t seed) {
   for (T& w : weights) w = static_cast<T>(bound * (2 * static_cast<double>(rng() >> 11) * 0x1.0p-53 - 1));
 }
 
-/// A layer's bias on the tape: its parameter, or zeros [n] where it has none.
+/// Records a layer's bias on the tape: its parameter, or zeros [n] if it has none.
 template <class T>
 Var<T> bias_or_zeros(Tape<T>& tape, const Params<T>& params, ParamId bias, Index n) {
   if (bias.index >= 0) return params.leaf(tape, bias);

@@ -7,7 +7,7 @@ namespace fieldmark {
 namespace kernels {
 namespace {
 
-// Derivation: dx = dy f'(x), with f' written in x or y, whichever is exact (kernels/elementwise.cpp).
+// Derivation: dx = dy f'(x), with f' in terms of x or y, whichever is exact (kernels/elementwise.cpp).
 // A chunk owns its elements of y and dx.
 template <class T>
 Var<T> unary(Unary f, Var<T> x, std::source_location from = std::source_location::current()) {

@@ -4,7 +4,7 @@
 
 namespace fieldmark {
 
-// The comments give dy/da and dy/db where they are more than a factor.
+// Comments give dy/da and dy/db where they are more than a factor.
 
 template <class T>
 Var<T> add(Var<T> a, Var<T> b) {
@@ -30,7 +30,7 @@ Var<T> mul(Var<T> a, Var<T> b) {
       [](const auto& x, const auto&, const auto& dy) { return dy * x; });
 }
 
-// 1 / b and -a / b^2; divided twice, so that b^2 cannot overflow.
+// 1 / b and -a / b^2, dividing twice so that b^2 cannot overflow.
 template <class T>
 Var<T> div(Var<T> a, Var<T> b) {
   return detail::binary(
@@ -39,7 +39,7 @@ Var<T> div(Var<T> a, Var<T> b) {
       [](const auto& x, const auto& z, const auto& dy) { return -dy * (x / z) / z; });
 }
 
-// b a^(b - 1) and a^b log a, whose limits where a factor is 0 and the other infinite are 0.
+// b a^(b - 1) and a^b log a, whose limits are 0 where one factor is 0 and the other infinite.
 template <class T>
 Var<T> pow(Var<T> a, Var<T> b) {
   return detail::binary(
@@ -52,7 +52,7 @@ Var<T> pow(Var<T> a, Var<T> b) {
       });
 }
 
-// A comparison with NaN is false: the sum then makes the result NaN.
+// A comparison with NaN is false; the sum then makes the result NaN.
 template <class T>
 Var<T> minimum(Var<T> a, Var<T> b) {
   const auto smaller = [](T x, T z) { return x <= z ? x : z < x ? z : x + z; };

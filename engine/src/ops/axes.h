@@ -6,7 +6,7 @@
 
 namespace fieldmark::detail {
 
-// A shape around one of its axes: x[outer, n, inner].
+// A shape split at one of its axes: x[outer, n, inner].
 struct Split {
   Index outer = 1, n = 1, inner = 1;
 };
@@ -17,14 +17,14 @@ inline Split split(const Shape& s, int axis) {
   return p;
 }
 
-// The shape with another extent of one axis.
+// Returns the shape with another extent of one axis.
 inline Shape with_extent(const Shape& s, int axis, Index n) {
   std::array<Index, Shape::kMaxRank> extents{};
   for (int k = 0; k < s.rank(); ++k) extents[at(k)] = k == axis ? n : s[k];
   return Shape(std::span(extents).first(at(s.rank())));
 }
 
-// Axes of which neighbours that are alike have been joined; `summed` ones are summed over.
+// Axes, with neighbours of one kind joined; `summed` ones are summed over.
 struct SummedAxes {
   int count = 0;
   std::array<Index, Shape::kMaxRank> extent{};
@@ -41,7 +41,7 @@ struct SummedAxes {
   }
 };
 
-// y[i] = sum_k x[k, i]; of one column in eight sums, so that the loop vectorises.
+// y[i] = sum_k x[k, i]; a single column is summed in eight partial sums, so that the loop vectorises.
 template <class U>
 void sum_rows(const U* x, Index n, Index inner, Index stride, double* y) {
   if (inner == 1 && stride == 1) {
@@ -58,7 +58,7 @@ void sum_rows(const U* x, Index n, Index inner, Index stride, double* y) {
     for (Index i = 0; i < inner; ++i) y[i] += static_cast<double>(x[k * stride + i]);
 }
 
-// y[o, i] = sum_k x[o, k, i]. Chunks do not depend on the threads and are added in order.
+// y[o, i] = sum_k x[o, k, i]. Chunks do not depend on the thread count and are added in order.
 template <class T, class U>
 void sum_middle(Tape<T>& tape, const U* x, Split p, double* y) {
   constexpr Index kColumns = 4096;

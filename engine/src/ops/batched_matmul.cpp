@@ -29,7 +29,7 @@ Shape with_matrices(const Shape& batch, Index rows, Index columns) {
   return Shape(std::span(extents).first(at(batch.rank() + 2)));
 }
 
-// The matrices of one side, one after the other, each read at data[i row + j column].
+// The matrices of one operand in sequence, each read at data[i row + j column].
 template <class T>
 struct Side {
   const T* data;
@@ -42,8 +42,7 @@ void products(Tape<T>& tape, Index count, Index m, Index n, Index k, Side<T> a, 
               bool assign) {
   const Index panels = detail::panels_size<T>(k, n);
   T* packed = tape.scratch(count * panels);
-  constexpr Index kWork =
-      Index{1} << 18;  // multiplications of a chunk, well above the cost of waking a thread
+  constexpr Index kWork = Index{1} << 18;  // multiplications per chunk, enough to outweigh waking a thread
   parallel_for(count, kWork / std::max<Index>(1, m * n * k), [&](Index p0, Index p1) {
     for (Index p = p0; p < p1; ++p) {
       detail::pack<T>(b.data + p * k * n, k, n, b.row, b.column, nullptr, packed + p * panels);

@@ -7,13 +7,13 @@
 
 namespace fieldmark::detail {
 
-// How two shapes broadcast. Axes on which both behave alike are joined, so that equal shapes have one axis,
-// and the last is contiguous in an operand or repeats one element of it.
+// How two shapes broadcast. Axes on which both operands behave alike are joined, so that equal shapes have
+// one axis. The last axis is contiguous in an operand or repeats one element of it.
 struct Broadcast {
   struct Operand {
     std::array<bool, Shape::kMaxRank> repeats{};
     std::array<Index, Shape::kMaxRank> stride{};
-    bool whole = true;  // repeats nowhere
+    bool whole = true;  // no axis repeats
   };
   Shape shape;  // of the result
   int axes = 0;
@@ -37,14 +37,15 @@ struct Broadcast {
     set_strides(b);
   }
 
-  // Which axes the gradient of an operand sums over.
+  // Returns the axes that the gradient of an operand sums over.
   SummedAxes summed(const Operand& o) const {
     SummedAxes s;
     for (int k = 0; k < axes; ++k) s.add(extent[at(k)], o.repeats[at(k)]);
     return s;
   }
 
-  // Calls f(i, at in a, at in b, n) for runs of n elements along the last axis, which cover [begin, end).
+  // Calls f(i, offset in a, offset in b, n) for runs of n elements along the last axis, covering
+  // [begin, end).
   template <class F>
   void for_runs(Index begin, Index end, F f) const {
     const auto last = at(axes - 1);
@@ -102,7 +103,7 @@ void for_broadcast(const Broadcast& p, const T* a, const T* b, F f) {
   });
 }
 
-// dx = or += slope(a, b, dy), summed over the axes on which x, one of both, repeats.
+// dx = or += slope(a, b, dy), summed over the axes on which x (a or b) repeats.
 template <class T, class D>
 void put_broadcast_gradient(const Broadcast& p, const Broadcast::Operand& o, Var<T> x, Var<T> a, Var<T> b,
                             const T* dy, D slope) {
@@ -117,7 +118,7 @@ void put_broadcast_gradient(const Broadcast& p, const Broadcast::Operand& o, Var
   if (!o.whole) put_sums(x.tape(), to, p.summed(o), 1, dx, fresh);
 }
 
-// binary() of equal shapes, which need no plan: small ops would take twice as long with one.
+// binary() for equal shapes, without a Broadcast plan, which would double the time of small ops.
 template <class T, class F, class A, class B>
 Var<T> binary_of_equal(Var<T> a, Var<T> b, F f, A slope_a, B slope_b, std::source_location from) {
   T* y = nullptr;
@@ -142,7 +143,7 @@ Var<T> binary_of_equal(Var<T> a, Var<T> b, F f, A slope_a, B slope_b, std::sourc
   return out;
 }
 
-// y = f(a, b) and its backwards da = slope_a(a, b, dy), db = slope_b(a, b, dy), expressions of arrays. A
+// y = f(a, b) with the backwards da = slope_a(a, b, dy) and db = slope_b(a, b, dy), all array expressions. A
 // chunk owns its elements; sums over repeated elements run in double.
 template <class T, class F, class A, class B>
 Var<T> binary(const char* op, Var<T> a, Var<T> b, F f, A slope_a, B slope_b,

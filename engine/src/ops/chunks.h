@@ -4,13 +4,13 @@
 
 namespace fieldmark::detail {
 
-// Elements in one chunk of an elementwise loop: 128 KiB of float, well above the cost of waking a thread.
+// Elements in one chunk of an elementwise loop: 128 KiB of float, enough work to outweigh waking a thread.
 constexpr Index kGrain = Index{1} << 15;
 
-// Rows of `width` elements in one chunk of a loop over rows.
+// Returns the number of rows of `width` elements in one chunk of a loop over rows.
 inline Index row_grain(Index width) { return std::max<Index>(1, kGrain / std::max<Index>(1, width)); }
 
-// A copy on the tape of what a backward will read: the caller's numbers may be gone by then.
+// Copies what a backward will read to the tape: the caller's data may be gone by then.
 template <class T, class U>
 const U* kept(Tape<T>& tape, std::span<const U> from) {
   U* to = tape.template scratch<U>(std::ssize(from));
@@ -18,7 +18,7 @@ const U* kept(Tape<T>& tape, std::span<const U> from) {
   return to;
 }
 
-// Calls f(image, first, count) for chunks of `grain` of the pixels of every image.
+// Calls f(image, first, count) for chunks of `grain` pixels of every image.
 template <class F>
 void for_image_chunks(Index images, Index pixels, Index grain, F f) {
   const Index chunks = (pixels + grain - 1) / grain;
@@ -28,8 +28,8 @@ void for_image_chunks(Index images, Index pixels, Index grain, F f) {
   });
 }
 
-// sum of f(i) over [0, n): eight sums in double per chunk, chunks added in order, so that the bits do not
-// depend on the thread count. The relative error is below 2^-53 (kGrain / 8 + 8 + chunks) times sum |f| /
+// Sums f(i) over [0, n) with eight double sums per chunk and adds the chunks in order, so that the bits do
+// not depend on the thread count. The relative error is below 2^-53 (kGrain / 8 + 8 + chunks) times sum |f| /
 // |sum f|.
 template <class T, class F>
 double chunked_sum(Tape<T>& tape, Index n, F f) {
@@ -49,14 +49,14 @@ double chunked_sum(Tape<T>& tape, Index n, F f) {
   return sum;
 }
 
-// The sum of channel c over `chunks` partial sums [chunks, channels], in order.
+// Sums channel c over the partial sums [chunks, channels], in order.
 inline double channel_total(const double* sums, Index chunks, Index channels, Index c) {
   double total = 0;
   for (Index k = 0; k < chunks; ++k) total += sums[k * channels + c];
   return total;
 }
 
-// dx[i] = or += f(i) for all i, in parallel where it is long.
+// dx[i] = or += f(i) for all i, in parallel if dx is long.
 template <class T, class F>
 void add_gradient(Var<T> x, F f) {
   bool fresh = false;

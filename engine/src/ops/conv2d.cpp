@@ -35,7 +35,7 @@ ConvGeometry geometry(const Shape& x, const Shape& w, const Shape& b, Index stri
   return {x[0], x[1], x[2], x[3], w[3], w[0], stride, padding};
 }
 
-// w [K, K, C, O] with its elements d pixels apart and zeros between.
+// Dilates w [K, K, C, O]: its elements are d pixels apart, with zeros between them.
 template <class T>
 Var<T> dilated(Var<T> w, Index d) {
   const Index k = w.shape()[0];

@@ -6,7 +6,7 @@
 namespace fieldmark::detail {
 namespace {
 
-constexpr Index kDepth = 512;  // pixels that a product for dW sums over: as many as stay in L2
+constexpr Index kDepth = 512;  // pixels that a product for dW sums over: they fit into L2
 
 Index rows(const ConvGeometry& g) { return g.n * g.out_h(); }
 Index padded_w(const ConvGeometry& g) { return g.w + 2 * g.padding; }
@@ -87,8 +87,8 @@ const T* direct_convolve(Tape<T>& tape, const ConvGeometry& g, const Convolution
   return padded;
 }
 
-// dW[u, (v, c), o] = sum over pixels of x[pixel + (u, v), c] dY[pixel, o]: a few rows of dY at a time are
-// packed once and multiplied with the input rows that each u shifts to.
+// dW[u, (v, c), o] = sum over pixels of x[pixel + (u, v), c] dY[pixel, o]: packs a few rows of
+// dY at a time and multiplies them with the input rows that each u shifts to.
 template <class T>
 void direct_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* bordered, const T* dy,
                             const T* mask, T* dw) {
@@ -121,8 +121,8 @@ void direct_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* borde
   });
 }
 
-// dX[i s + u - p, j s + v - p, c] += sum over o of dY[i, j, o] w[u, v, c, o]: a row of dY times w[u] gives
-// for each of its pixels K * channels contiguous elements of a row of dX. A chunk owns rows of dX with their
+// dX[i s + u - p, j s + v - p, c] += sum over o of dY[i, j, o] w[u, v, c, o]: for each pixel, a row of
+// dY times w[u] gives K * channels contiguous elements of a row of dX. A chunk owns rows of dX with their
 // border, gathers every row of dY that touches them, and drops the border.
 template <class T>
 void direct_input_gradient(Tape<T>& tape, const ConvGeometry& g, const T* w, const T* dy, const T* mask,

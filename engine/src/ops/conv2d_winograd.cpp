@@ -6,11 +6,11 @@
 
 // Winograd's method for windows of 3 x 3: y = A^T [(G w G^T) . (B^T x B)] A for each tile of 4 x 4 outputs,
 // summed over channels between the brackets, which is 36 products of matrices [tiles, C] [C, O]
-// (kernels/winograd.h). With dY in place of y the same three matrices give the weight's gradient,
+// (kernels/winograd.h). With dY instead of y, the same three matrices give the gradient of the weights,
 //   dw = G^T [sum over tiles (B^T x B) . (A dY A^T)] G,
-// and dX is the convolution of dY with the flipped weights. 4 times fewer multiplications than the
-// definition, of which the transforms leave 2.5 (64 channels, AVX-512, one core: forward 2.7, with
-// gradients 2.6).
+// and dX is the convolution of dY with the flipped weights. The method needs 4 times fewer multiplications
+// than the definition; with the transforms, the speed-up is 2.5 (64 channels, AVX-512, one core: forward 2.7,
+// with gradients 2.6).
 //
 // Maximum absolute error relative to the largest magnitude, uniform random images and weights, direct method
 // in brackets:
@@ -31,15 +31,15 @@ using kernels::kWinogradTile;
 using kernels::WinogradMatrices;
 using kernels::WinogradTiles;
 
-// Tiles of a block, a multiple of the rows of register blocks (kernels/gemm.cpp): with 64 channels the
-// transformed tiles, the products and the weights take 1.2 MiB, and with hundreds the weights are not read
-// too often.
+// Tiles per block, a multiple of the rows of register blocks (kernels/gemm.cpp): with 64 channels, the
+// transformed tiles, the products and the weights take 1.2 MiB; with hundreds of channels, the weights are
+// not read too often.
 constexpr Index kBlock = 36;
 
 Index tiles_along(Index extent) { return (extent + kWinogradTile - 1) / kWinogradTile; }
 Index tiles_of(const ConvGeometry& g) { return g.n * tiles_along(g.h) * tiles_along(g.w); }
 
-// Padding: 36 elements at a stride of a power of 2 would share few sets of the cache.
+// Pads the stride: 36 elements a power of 2 apart would share few sets of the cache.
 Index padded(Index elements) { return round_up(elements, Index{16}) + 16; }
 
 template <class T>
@@ -52,8 +52,8 @@ WinogradMatrices<T> in_panels(T* data, Index rows, Index columns) {
   return {data, padded(rows * round_up(columns, panel)), panel, rows * panel};
 }
 
-// A buffer for the life of this thread: it stays in the cache from block to block. Only kernels run while it
-// is in use, so no call nests.
+// A thread-local buffer, which stays in the cache from block to block. Only kernels run while it is in use,
+// so that no call nests.
 template <class T>
 T* workspace(Index elements) {
   static thread_local AlignedVector<T> buffer;
@@ -63,11 +63,11 @@ T* workspace(Index elements) {
 
 }  // namespace
 
-// Measured on one core with AVX-512: at 8 channels on both sides it takes 1.2 times as long, at 12 and 12 or
-// 8 and 64 it is 1.2 and 1.7 times faster, at 64 and 64 2.5. Fewer than 6 pixels to a tile (a row of pixels,
-// where 5 x 5 has 6.25) waste the products. Transforming the weights pays from 4 tiles on while they stay in
-// L2, else from 32 (256 channels: 1.4 times slower at 16 tiles, 1.2 times faster at 36). The number of images
-// does not count: an image alone has the same bits as in a batch.
+// Measured on one core with AVX-512: with 8 input and 8 output channels Winograd takes 1.2 times as long;
+// with 12 and 12 or 8 and 64 it is 1.2 and 1.7 times faster, with 64 and 64 2.5 times. Fewer than 6 pixels
+// per tile (a row of pixels; 5 x 5 has 6.25) waste the products. Transforming the weights pays from 4 tiles
+// on while they stay in L2, else from 32 (256 channels: 1.4 times slower at 16 tiles, 1.2 times faster at
+// 36). The number of images is ignored, so that an image alone has the same bits as in a batch.
 bool winograd_pays(const ConvGeometry& g) {
   const Index tiles = tiles_along(g.h) * tiles_along(g.w);
   return g.k == 3 && g.same() && std::min(g.c, g.o) >= 8 && g.c + g.o >= 24 && g.h * g.w >= 6 * tiles &&

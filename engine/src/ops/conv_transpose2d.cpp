@@ -7,7 +7,7 @@
 namespace fieldmark {
 namespace {
 
-// The convolution, from the result to x, that this is the transpose of.
+// The convolution from the result to x, whose transpose this op is.
 detail::ConvGeometry transposed_geometry(const Shape& x, const Shape& w, const Shape& b,
                                          const ConvWindow& window) {
   const char* op = "conv_transpose2d";

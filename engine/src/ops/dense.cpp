@@ -7,9 +7,9 @@
 namespace fieldmark {
 namespace {
 
-constexpr Index kShardRows = 4096;  // rows of a partial sum of the weights' gradient
-constexpr Index kChunkRows = 512;   // rows that pass through the backward together: they stay in L2
-constexpr Index kWeightRows = 24;   // rows of the weights' gradient in a chunk: whole register blocks
+constexpr Index kShardRows = 4096;  // rows per partial sum of the weight gradient
+constexpr Index kChunkRows = 512;   // rows that the backward processes together: they stay in L2
+constexpr Index kWeightRows = 24;   // rows of the weight gradient per chunk: whole register blocks
 
 template <class T>
 void forward(Var<T> x, Var<T> w, Var<T> b, bool relu, T* y) {
@@ -49,7 +49,7 @@ struct Backward {
   bool mask_dx, fresh;
 };
 
-// dW[first, first + count) += X^T dZ over rows from `begin` on, whose dZ is d in rows of whole vectors.
+// dW[first, first + count) += X^T dZ over rows from `begin` on. d holds their dZ in rows of whole vectors.
 template <class T>
 void add_weight_rows(const Backward<T>& p, const T* d, Index begin, Index rows, Index first, Index count,
                      T* dw) {
@@ -69,7 +69,7 @@ void add_weight_rows(const Backward<T>& p, const T* d, Index begin, Index rows, 
     .accumulate = true});
 }
 
-// dX = or += dZ W^T in rows from `begin` on.
+// dX = or += dZ W^T for rows from `begin` on.
 template <class T>
 void put_input_rows(const Backward<T>& p, const T* d, Index begin, Index rows) {
   using namespace kernels;
@@ -100,7 +100,7 @@ void put_input_rows(const Backward<T>& p, const T* d, Index begin, Index rows) {
     .accumulate = !p.fresh});
 }
 
-// dZ of rows [begin, end) in rows of whole vectors: in `buffer`, or dY itself if that is null.
+// Returns dZ of rows [begin, end) in rows of whole vectors: in `buffer`, or dY itself if `buffer` is null.
 template <class T>
 const T* masked_rows(const Backward<T>& p, const T* dy, Index begin, Index end, T* buffer) {
   using namespace kernels;
@@ -111,7 +111,7 @@ const T* masked_rows(const Backward<T>& p, const T* dy, Index begin, Index end, 
   return buffer;
 }
 
-// Rows [begin, end): their share of dW and db, and their dX.
+// Backward of rows [begin, end): adds their share of dW and db and writes their dX.
 template <class T>
 void backward_rows(const Backward<T>& p, const T* dy, Index begin, Index end, T* buffer, T* dw, T* db) {
   const T* d = masked_rows(p, dy, begin, end, buffer);
@@ -120,9 +120,9 @@ void backward_rows(const Backward<T>& p, const T* dy, Index begin, Index end, T*
   if (p.dx) put_input_rows(p, d, begin, end - begin);
 }
 
-// Several chunks of rows, too few for shards, on several threads: these own rows of dZ and dX, then rows of
-// dW. Each element is summed in the order of backward_rows(), which keeps a chunk in cache where one thread
-// does all. @param buffer  of all rows, or null
+// Backward of several chunks of rows, too few for shards, on several threads: a thread owns rows of dZ and
+// dX, then rows of dW. Each element is summed in the order of backward_rows(), which keeps a chunk in cache
+// when one thread does all the work. @param buffer  for all rows, or null
 template <class T>
 void backward_of_few(const Backward<T>& p, const T* dy, Index n, T* buffer, T* dw, T* db) {
   const Index row = detail::whole_row<T>(p.out);

@@ -42,8 +42,9 @@ Matrix cofactors_by_svd(const Matrix& a) {
   return sign * svd.matrixU() * others.asDiagonal() * svd.matrixV().transpose();
 }
 
-// The same of b = diag(2^e) a diag(2^f), whose rows and columns are of one size: small rows would drown in
-// the SVD's error. The cofactor of a_ij is that of b_ij times 2^(e_i + f_j), over the product of all powers.
+// The same via b = diag(2^e) a diag(2^f), whose rows and columns have similar magnitudes: small rows would
+// drown in the error of the SVD. The cofactor of a_ij is that of b_ij times 2^(e_i + f_j), over the product
+// of all powers.
 Matrix cofactors(const Matrix& a) {
   if (a.rows() == 0) return a;
   Matrix b = a;

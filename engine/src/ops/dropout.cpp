@@ -8,7 +8,7 @@
 namespace fieldmark {
 namespace {
 
-// 0 or 1 / (1 - p) for each of n elements. Four share a block of random words; a chunk holds whole blocks.
+// Factors 0 or 1 / (1 - p) of n elements. Four share a block of random words; a chunk holds whole blocks.
 template <class T>
 const T* dropout_factors(Tape<T>& tape, Index n, double p, const CounterRng& rng, std::uint64_t step) {
   static_assert(detail::kGrain % 4 == 0);

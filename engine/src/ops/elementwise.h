@@ -1,5 +1,5 @@
 #pragma once
-// Elementwise work as Eigen expressions over chunks of the parallel pool. Private.
+// Elementwise work as Eigen expressions over parallel chunks. Private.
 #include <Eigen/Core>
 
 #include "ops/chunks.h"
@@ -13,7 +13,7 @@ using In = Eigen::Map<const Array<T>>;
 template <class T>
 using Out = Eigen::Map<Array<T>>;
 
-// to = or += what: a gradient that is the first to arrive is assigned.
+// to = or += what: the first gradient to arrive is assigned.
 template <class To, class Expression>
 void put(To to, const Expression& what, bool assign) {
   if (assign)
@@ -22,8 +22,8 @@ void put(To to, const Expression& what, bool assign) {
     to += what;
 }
 
-// y = f(x) and its backward dx = slope(x, y, dy), both expressions of arrays. A chunk owns its elements.
-// `from` is the op, for an observer.
+// y = f(x) with its backward dx = slope(x, y, dy), both array expressions. A chunk owns its elements. `from`
+// names the op for an observer.
 template <class T, class F, class D>
 Var<T> elementwise(Var<T> x, F f, D slope, std::source_location from = std::source_location::current()) {
   const Index size = x.shape().size();

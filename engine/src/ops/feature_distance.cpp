@@ -32,7 +32,7 @@ Var<T> feature_distance(Var<T> a, Var<T> b, std::span<const T> weights) {
         static_cast<T>(detail::channel_total(sums + n * blocks, blocks, 1, 0) / static_cast<double>(pixels));
 
   // With r = |a| and s = 1 / (r + e), d = a s - b s_b and g_c = 2 w_c d_c dy / pixels:
-  //   da_c = g_c s - a_c (g . a) s^2 / r,   and db with a and b swapped, since d only changes sign.
+  //   da_c = g_c s - a_c (g . a) s^2 / r,   and db with a and b swapped, which only flips the sign of d.
   // A chunk owns its pixels.
   tape.on_backward(out, [=](const T* dy) {
     const auto backward = FIELDMARK_KERNEL(feature_distance_backward<T>);

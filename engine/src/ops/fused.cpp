@@ -9,12 +9,12 @@
 namespace fieldmark::detail {
 namespace {
 
-constexpr Index kRun = 1024;  // elements to which inputs that repeat are expanded at a time
+constexpr Index kRun = 1024;  // elements to which repeating inputs are expanded at a time
 
 constexpr Index kLarge =
-    Index{1} << 24;  // bytes of an array that caches would not keep until it is read again
+    Index{1} << 24;  // bytes of an array too large to stay in the caches until it is read again
 
-// Which inputs the last step depends on.
+// Finds the inputs that the last step depends on.
 std::array<bool, kChainInputs> used_inputs(const ChainSteps& chain) {
   std::array<bool, kChainInputs + kChainSteps> live{};
   live[at(chain.inputs + chain.count - 1)] = true;
@@ -25,7 +25,7 @@ std::array<bool, kChainInputs> used_inputs(const ChainSteps& chain) {
   return used;
 }
 
-// The chain of different values only, which are moved to the front: an input is assigned its gradient once.
+// Joins equal inputs and moves the distinct ones to the front, so that each gradient is assigned once.
 template <class T>
 ChainSteps join_equal_inputs(ChainSteps chain, Var<T>* inputs) {
   std::array<int, kChainInputs + kChainSteps> place{};
@@ -49,7 +49,7 @@ ChainSteps join_equal_inputs(ChainSteps chain, Var<T>* inputs) {
 template <class T>
 struct Recorded {
   const ChainSteps* chain;
-  const Var<T>* inputs;  // different ones
+  const Var<T>* inputs;  // distinct
   Shape shape;           // of the result
 
   bool large() const { return shape.size() * static_cast<Index>(sizeof(T)) >= kLarge; }
@@ -61,7 +61,7 @@ struct Recorded {
   }
 };
 
-// The elements [begin, end) of the result's shape that v has or repeats.
+// Writes the elements [begin, end) of v, broadcast to the shape of the result, to `to`.
 template <class T>
 void expand(Var<T> v, const Broadcast& p, Index begin, Index end, T* to) {
   const bool constant = p.a.repeats[at(p.axes - 1)];
@@ -100,8 +100,8 @@ void for_chunks(const Recorded<T>& r, F run) {
   });
 }
 
-// dL/d(input k) = dy times its slope, which the kernel derives step by step in reverse; summed over the axes
-// on which the input repeats. A chunk owns its elements.
+// dL/d(input k) = dy times the slope of input k, which the kernel computes step by step in reverse, summed
+// over the axes on which the input repeats. A chunk owns its elements.
 template <class T>
 void backward(const Recorded<T>& r, const T* dy) {
   const int inputs = r.chain->inputs;
@@ -129,7 +129,7 @@ void backward(const Recorded<T>& r, const T* dy) {
   }
 }
 
-// A copy in the memory of the tape.
+// Copies to memory of the tape.
 template <class U, class T>
 U* keep(Tape<T>& tape, std::span<const U> from) {
   U* to = tape.template scratch<U>(static_cast<Index>(from.size()));

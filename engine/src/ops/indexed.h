@@ -15,7 +15,7 @@ inline void check_index(const char* op, std::span<const std::int32_t> index, Ind
                        std::to_string(extent) + ") (" + what + "), got " + std::to_string(index[i]));
 }
 
-// y[o, i, :] = x[o, at[i], :] for n entries of the x[outer, rows, inner]. A chunk owns its entries of y.
+// y[o, i, :] = x[o, at[i], :] for n entries of x[outer, rows, inner]. A chunk owns its entries of y.
 template <class T>
 void take(const T* x, Split p, const std::int32_t* at, Index n, T* y, bool assign) {
   parallel_for(p.outer * n, row_grain(p.inner), [=](Index begin, Index end) {
@@ -50,7 +50,7 @@ void add_taken(Tape<T>& tape, const T* y, Split p, const std::int32_t* at, Index
   });
 }
 
-// The op of gather() and gather_rows().
+// Implements gather() and gather_rows().
 template <class T>
 Var<T> gather(const char* op, Var<T> x, int axis, std::span<const std::int32_t> index,
               const std::string& what, std::source_location from = std::source_location::current()) {

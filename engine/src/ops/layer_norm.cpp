@@ -21,7 +21,7 @@ void check_layer_norm(const Var<T>& x, const Var<T>& gamma, const Var<T>& beta, 
   if (!(eps > 0)) throw ValueError("[layer_norm] eps must be above 0, got " + std::to_string(eps));
 }
 
-// sum of f(c) over a row, in double.
+// Sums f(c) over a row, in double.
 template <class F>
 double row_sum(Index columns, F f) {
   double acc[4] = {};
@@ -32,8 +32,8 @@ double row_sum(Index columns, F f) {
   return (acc[0] + acc[1]) + (acc[2] + acc[3]);
 }
 
-// With d = gamma dy, over a row: dx = rstd (d - mean(d) - xh mean(d xh)), the last two from mean and
-// variance; dbeta and dgamma sum dy and dy xh over the rows. A chunk owns its rows of dx.
+// With d = gamma dy, over a row: dx = rstd (d - mean(d) - xh mean(d xh)), where the last two terms come from
+// mean and variance; dbeta and dgamma sum dy and dy xh over the rows. A chunk owns its rows of dx.
 template <class T>
 void layer_norm_backward(Var<T> x, Var<T> gamma, Var<T> beta, const T* xh, const double* rstd, const T* dy) {
   Tape<T>& t = x.tape();

@@ -8,7 +8,7 @@
 namespace fieldmark {
 namespace {
 
-// Where the elements of a permuted tensor stand in the original, row by row of its last axis.
+// Where the elements of a permuted tensor lie in the original, for each row along its last axis.
 struct Permutation {
   Shape shape;                                  // of y
   std::array<Index, Shape::kMaxRank> stride{};  // in x, of each axis of y
@@ -66,7 +66,7 @@ Var<T> permute(Var<T> x, std::span<const int> order) {
     for (Index i = 0; i < n; ++i) y[to + i] = from[at + i * step];
   });
 
-  // Each element of dx has one of dy.
+  // Each element of dx is one of dy.
   x.tape().on_backward(out, [x, p](const T* dy) {
     bool fresh = false;
     T* dx = x.grad_acc(&fresh);

@@ -7,7 +7,7 @@ namespace {
 
 using detail::Matrix;
 
-// Rows of b, and the number of its columns.
+// Checks the rows of b and returns the number of its columns.
 Index check_sides(const char* op, const Shape& a, const Shape& b) {
   const Index n = a[-1];
   if (b.rank() != a.rank() || b[-2] != n || detail::without_last(a, 2) != detail::without_last(b, 2))
@@ -16,7 +16,7 @@ Index check_sides(const char* op, const Shape& a, const Shape& b) {
   return b[-1];
 }
 
-// x with op(T) x = b, for one of the triangles of a.
+// Solves op(T) x = b for one of the triangles of a.
 Matrix solve_triangle(const Matrix& a, const Matrix& b, bool upper, bool transposed) {
   if (transposed) return solve_triangle(a.transpose(), b, !upper, false);
   return upper ? Matrix(a.triangularView<Eigen::Upper>().solve(b))

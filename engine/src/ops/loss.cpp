@@ -59,7 +59,8 @@ Var<T> bce_with_logits(Var<T> logits, std::span<const T> targets, std::span<cons
   const auto value = [=](Index i) {
     return std::max(x[i], T(0)) - x[i] * t[i] + std::log1p(std::exp(-std::abs(x[i])));
   };
-  // dl/dx = s(x) - t; for x > 0 as (1 - t) - s(-x), so that a correct and certain bit keeps its tiny slope.
+  // dl/dx = s(x) - t, computed for x > 0 as (1 - t) - s(-x), so that a correct and confident bit keeps its
+  // tiny slope.
   const auto slope = [=](Index i) {
     const T e = std::exp(-std::abs(x[i])), small = e / (1 + e);
     return x[i] > 0 ? (1 - t[i]) - small : small - t[i];

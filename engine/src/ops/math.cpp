@@ -6,7 +6,7 @@
 #include "ops/elementwise.h"
 
 namespace fieldmark {
-// Each backward is dx = dy f'(x), with f' written in x or y, whichever is exact.
+// Each backward is dx = dy f'(x), with f' in terms of x or y, whichever is exact.
 
 template <class T>
 Var<T> negate(Var<T> x) {

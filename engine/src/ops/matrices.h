@@ -1,5 +1,5 @@
 #pragma once
-// Small matrices in batches, in double, by Eigen. Private.
+// Batches of small matrices in double, computed by Eigen. Private.
 #include <fieldmark/engine/shape_checks.h>
 
 #include <Eigen/Dense>
@@ -43,14 +43,14 @@ inline Batch square_batch(const char* op, const Shape& s) {
   return batch;
 }
 
-// The shape without its last axes.
+// Returns the shape without its last `axes` axes.
 inline Shape without_last(const Shape& s, int axes) {
   std::array<Index, Shape::kMaxRank> extents{};
   for (int k = 0; k + axes < s.rank(); ++k) extents[at(k)] = s[k];
   return Shape(std::span(extents).first(at(s.rank() - axes)));
 }
 
-// Calls f(which) for the matrices of a batch, in parallel; each call owns what belongs to its matrix.
+// Calls f(which) for the matrices of a batch, in parallel; each call owns the data of its matrix.
 template <class F>
 void for_matrices(Batch b, F f) {
   parallel_for(b.count, std::max<Index>(1, kGrain / std::max<Index>(1, b.n * b.n * b.n)),
@@ -67,12 +67,12 @@ inline void check_finite(const char* op, Index which, const Matrix& m) {
   if (!m.allFinite()) refuse_matrix(op, which, "must be finite, got a NaN or an infinity");
 }
 
-// LU of a matrix that has an inverse in the precision of T.
+// Computes the LU decomposition of a matrix that is invertible in the precision of T.
 template <class T>
 Eigen::PartialPivLU<Matrix> decompose(const char* op, Index which, const Matrix& m) {
   check_finite(op, which, m);
   Eigen::PartialPivLU<Matrix> lu(m);
-  // Eigen's estimate divides by the pivots: one of 0 makes NaN, which it can lose.
+  // Eigen's estimate divides by the pivots: a pivot of 0 gives NaN, which the estimate can lose.
   const bool zero_pivot = (lu.matrixLU().diagonal().array() == 0).any();
   const double rcond = zero_pivot ? 0 : m.rows() == 0 ? 1 : lu.rcond();
   if (!(rcond >= static_cast<double>(std::numeric_limits<T>::epsilon()))) {

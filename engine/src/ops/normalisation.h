@@ -6,8 +6,8 @@
 #include "kernels/norm.h"
 #include "ops/chunks.h"
 
-// What group and batch normalisation share: x is [images, pixels, channels], and statistics belong to an
-// image's group of channels. Batch normalisation is one image of all pixels with as many groups as channels.
+// Shared by group and batch normalisation: x is [images, pixels, channels], and statistics belong to a group
+// of channels of an image. Batch normalisation is one image of all pixels with as many groups as channels.
 namespace fieldmark::kernels {
 
 struct NormLayout {
@@ -26,8 +26,8 @@ void for_blocks(const NormLayout& l, F f) {
   });
 }
 
-// mean and variance of each image's group, [images, groups]. Chunks are joined in order (Chan et al. 1983),
-// so that nothing cancels for a nearly constant image, and a constant one has variance 0.
+// Computes the mean and variance [images, groups] of each group of an image. Merges chunks in order (Chan et
+// al. 1983), so that nothing cancels for a nearly constant image, and a constant one has variance 0.
 template <class T>
 void group_statistics(Tape<T>& tape, const NormLayout& l, const T* x, double* mean, double* variance) {
   const Index n = l.images * l.blocks() * l.channels;
@@ -106,7 +106,7 @@ void norm_backward(const NormLayout& l, Var<T> x, Var<T> gamma, Var<T> beta, con
   });
 }
 
-// Forward from given statistics, and the backward. `fixed`: the statistics do not depend on x.
+// Forward with given statistics, and the backward. `fixed`: the statistics do not depend on x.
 template <class T>
 Var<T> apply_norm(const NormLayout& l, Var<T> x, Var<T> gamma, Var<T> beta, const double* mean,
                   const double* variance, double eps, bool relu, bool fixed) {
@@ -119,7 +119,7 @@ Var<T> apply_norm(const NormLayout& l, Var<T> x, Var<T> gamma, Var<T> beta, cons
     const Index c = i % l.channels, g = i / l.channels * l.groups + c / l.width();
     const double a = rstd[g] * static_cast<double>(gamma.value()[c]);
     m[i] = static_cast<T>(mean[g]);
-    // The shift makes up for the rounding of the mean to T.
+    // The shift compensates for the rounding of the mean to T.
     off[i] = static_cast<double>(m[i]) - mean[g];
     gain[i] = static_cast<T>(a);
     shift[i] = static_cast<T>(static_cast<double>(beta.value()[c]) + off[i] * a);
@@ -137,7 +137,7 @@ Var<T> apply_norm(const NormLayout& l, Var<T> x, Var<T> gamma, Var<T> beta, cons
   return out;
 }
 
-// Shapes of gamma and beta, rank of x, and eps.
+// Checks the shapes of gamma and beta, the rank of x, and eps.
 template <class T>
 void check_norm(const char* op, Var<T> x, Var<T> gamma, Var<T> beta, double eps) {
   check_rank(op, "x", x.shape(), 4, "[images, height, width, channels]");

@@ -10,15 +10,15 @@
 
 namespace fieldmark::detail {
 
-constexpr Index kProductRows = 1024;  // most rows of a chunk, where a product runs on several threads
+constexpr Index kProductRows = 1024;  // most rows of a chunk if a product runs on several threads
 constexpr Index kBlockRows = 96;      // a multiple of the rows of every kernel's register block
 constexpr Index kProductShards = 16;  // partial sums over rows, added in order
 
 inline Index round_up(Index n, Index to) { return (n + to - 1) / to * to; }
 
-/// Rows of a chunk of a product of m rows: two million multiplications, well above the cost of waking a
-/// thread, and whole register blocks. Few rows, as a training loop over chunks has them, stay together. An
-/// element's sum does not depend on the chunk that it is in.
+/// Returns the rows per chunk of a product of m rows: two million multiplications, enough to outweigh waking
+/// a thread, in whole register blocks. Few rows, as in a training loop over chunks, stay together. The sum of
+/// an element does not depend on its chunk.
 inline Index product_rows(Index m, Index n, Index k) {
   constexpr Index kWork = Index{1} << 21, kFew = 256;
   if (m <= kFew) return kFew;
@@ -32,7 +32,7 @@ Index panel_width(Index columns) {
   return FIELDMARK_KERNEL(gemm_panel<T>)(columns);
 }
 
-/// Elements of the panels of a matrix [rows, columns].
+/// Returns the number of elements of the panels of a matrix [rows, columns].
 template <class T>
 Index panels_size(Index rows, Index columns) {
   return rows * round_up(columns, panel_width<T>(columns));
@@ -44,7 +44,7 @@ void pack(const T* b, Index rows, Index columns, Index row, Index column, const 
   FIELDMARK_KERNEL(pack_panels<T>)(b, rows, columns, row, column, mask, out);
 }
 
-/// B [rows, columns] at b[i row + j column] in panels on the tape.
+/// Packs B [rows, columns], read at b[i row + j column], into panels on the tape.
 template <class T>
 T* packed(Tape<T>& tape, const T* b, Index rows, Index columns, Index row, Index column,
           const T* mask = nullptr) {
@@ -53,7 +53,7 @@ T* packed(Tape<T>& tape, const T* b, Index rows, Index columns, Index row, Index
   return out;
 }
 
-/// Runs a product in chunks of rows; a row of C has one owner.
+/// Runs a product in chunks of rows; each row of C has one owner.
 template <class T>
 void product(const kernels::Gemm<T>& g) {
   using namespace kernels;
@@ -67,7 +67,7 @@ void product(const kernels::Gemm<T>& g) {
   });
 }
 
-/// The same with inputs rounded to bf16.
+/// Overload for inputs rounded to bf16.
 inline void product(const kernels::GemmBf16& g) {
   using namespace kernels;
   const auto run = FIELDMARK_KERNEL(gemm_bf16);
@@ -81,8 +81,8 @@ inline void product(const kernels::GemmBf16& g) {
   });
 }
 
-/// into [size] += sum over `items` of what f(begin, end, to) adds to `to`: directly where there are at most
-/// `grain` items, else in up to 16 fixed parts, each with a buffer from the tape, added in order.
+/// into [size] += the sums that f(begin, end, to) adds to `to` over all `items`: directly for at most `grain`
+/// items, else in up to 16 fixed parts, each with a buffer from the tape, added in order.
 template <class T, class F>
 void sharded_sum(Tape<T>& tape, Index items, Index grain, T* into, Index size, F&& f) {
   const Index shards = std::min(kProductShards, (items + grain - 1) / grain);
@@ -100,13 +100,13 @@ void sharded_sum(Tape<T>& tape, Index items, Index grain, T* into, Index size, F
     for (Index i = 0; i < size; ++i) into[i] += buffers[s * size + i];
 }
 
-/// `columns` rounded up to whole vectors: the row stride that products need to read a matrix in place.
+/// Rounds `columns` up to whole vectors: the row stride that products need to read a matrix in place.
 template <class T>
 Index whole_row(Index columns) {
   return round_up(columns, panel_width<T>(1));
 }
 
-/// Adds the sums of the columns of d, whose row stride is whole_row(columns), to into [columns].
+/// Adds the column sums of d, whose row stride is whole_row(columns), to into [columns].
 template <class T>
 void add_column_sums(const T* d, Index rows, Index columns, T* into) {
   using namespace kernels;

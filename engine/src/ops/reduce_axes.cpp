@@ -13,11 +13,11 @@
 namespace fieldmark {
 namespace {
 
-// Which axes of a shape are reduced, and the shapes without them and with extent 1 in their place.
+// The reduced axes of a shape, and the shapes without them and with extent 1 instead.
 struct Reduction {
   std::array<bool, Shape::kMaxRank> reduced{};
   Shape dropped, kept;
-  Index count = 1;  // elements that one of the result comes from
+  Index count = 1;  // elements reduced to one
 
   Reduction(const char* op, const Shape& s, const Axes& axes) {
     for (const int given : axes.list()) {
@@ -68,7 +68,7 @@ Var<T> scaled_sum(Var<T> x, const Reduction& r, KeepAxes keep, double factor,
   return out;
 }
 
-// x as rows [.., n] of what is reduced together, in row-major order.
+// Arranges x as rows [.., n] of the elements that are reduced together, in row-major order.
 template <class T>
 Var<T> as_rows(Var<T> x, const Reduction& r) {
   std::array<int, Shape::kMaxRank> order{};
@@ -84,7 +84,7 @@ Var<T> as_rows(Var<T> x, const Reduction& r) {
   return reshape(x, {r.dropped.size(), r.count});
 }
 
-// Position of the first largest element of a row, of the first NaN if there is one.
+// Returns the position of the first largest element of a row, or of the first NaN if there is one.
 template <class T>
 Index first_largest(const T* row, Index n) {
   Index best = 0;
@@ -154,8 +154,9 @@ Var<T> max(Var<T> x, const Axes& axes, KeepAxes keep) {
 namespace kernels {
 namespace {
 
-// e = exp(x - m) of a row and y = m + log sum e; returns the factor that makes e the softmax. An infinite
-// largest element is all that counts; where all are -infinity, so is y, and nothing has a gradient.
+// Computes e = exp(x - m) of a row and y = m + log sum e; returns the factor that turns e into the softmax.
+// If the largest element is infinite, only elements equal to it count; if all are -infinity, so is y, and no
+// element has a gradient.
 template <class T>
 T log_sum(const T* x, Index n, T* e, T* y) {
   const T m = x[first_largest(x, n)];

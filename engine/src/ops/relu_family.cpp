@@ -10,7 +10,7 @@ namespace fieldmark {
 namespace kernels {
 namespace {
 
-// dx = dy (P(x) + x p(x)) with the normal distribution and its density. A chunk owns its elements.
+// dx = dy (P(x) + x p(x)) with the normal distribution P and its density p. A chunk owns its elements.
 template <class T>
 Var<T> gelu(Var<T> x, std::source_location from = std::source_location::current()) {
   const auto forward = FIELDMARK_KERNEL(gelu_forward<T>);
@@ -34,14 +34,14 @@ Var<T> gelu(Var<T> x, std::source_location from = std::source_location::current(
 
 namespace {
 
-// 1 / (1 + e^-x) by e^-|x|, so that nothing overflows and the small tail keeps its relative accuracy.
+// 1 / (1 + e^-x), from e^-|x| so that nothing overflows and the small tail keeps its relative accuracy.
 template <class T>
 T logistic(T x) {
   const T e = std::exp(-std::abs(x));
   return (x < 0 ? e : T(1)) / (1 + e);
 }
 
-// (1 + erf(x / sqrt 2)) / 2; by erfc, which does not cancel far below 0.
+// (1 + erf(x / sqrt 2)) / 2, from erfc, which does not cancel far below 0.
 template <class T>
 T cdf(T x) {
   return std::erfc(-x / std::numbers::sqrt2_v<T>) / 2;
@@ -52,7 +52,7 @@ T cdf_slope(T x) {
   return std::numbers::inv_sqrtpi_v<T> / std::numbers::sqrt2_v<T> * std::exp(-x * x / 2);
 }
 
-// y = f(x), dx = dy slope(x), functions of one element.
+// y = f(x), dx = dy slope(x) for elementwise functions.
 template <class T, class F, class D>
 Var<T> each(Var<T> x, F f, D slope, std::source_location from = std::source_location::current()) {
   return detail::elementwise(

@@ -32,7 +32,7 @@ Tap<T>* make_taps(Tape<T>& tape, Index in, Index out, Interpolation mode) {
   return taps;
 }
 
-// The share of input line i in output line t.
+// Returns the weight of input line i in output line t.
 template <class T>
 T share(const Tap<T>& t, Index i) {
   return (t.lo == i ? 1 - t.weight : T(0)) + (t.hi == i ? t.weight : T(0));

@@ -6,7 +6,7 @@
 namespace fieldmark {
 namespace {
 
-// One column sum per chunk of rows, chunks added in order: the same bits for any thread count.
+// One column sum per chunk of rows; chunks are added in order, with the same bits for any thread count.
 template <class T>
 void add_column_sums(Tape<T>& tape, const T* dy, Index rows, Index cols, T* dx) {
   const Index grain = detail::row_grain(cols), chunks = (rows + grain - 1) / grain;

@@ -14,7 +14,7 @@ void check_has_axis(const char* op, const Shape& s) {
     throw ShapeError(std::string("[") + op + "] x must have rank 1 or more [.., C], got shape []");
 }
 
-// "the last axis", or "axis 0" where another one was asked for.
+// Returns "the last axis", or "axis 0" and so on for any other.
 std::string axis_words(const Shape& s, int axis) {
   return axis == s.rank() - 1 ? "the last axis" : "axis " + std::to_string(axis);
 }

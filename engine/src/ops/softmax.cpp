@@ -10,7 +10,8 @@ namespace fieldmark {
 namespace kernels {
 namespace {
 
-// Eight at a time, so that the loop vectorises. A NaN may be passed over: its exponential is not.
+// Takes the maximum eight elements at a time, so that the loop vectorises. It may miss a NaN, but the
+// exponential of the NaN remains.
 template <class T>
 T largest(const T* row, Index cols) {
   T most[8];
@@ -22,7 +23,8 @@ T largest(const T* row, Index cols) {
   return *std::max_element(most, most + 8);
 }
 
-// p = softmax of each row. log_sum(r, z) receives log sum_k exp x[r, k] by way of the row's maximum m and z.
+// p = softmax of each row. Calls log_sum(r, m, z) with the row's maximum m, where
+// log sum_k exp x[r, k] = m + log z.
 template <class T, class F>
 void softmax_rows(const T* x, T* p, Index rows, Index cols, F log_sum) {
   const auto exp_row = FIELDMARK_KERNEL(exp_sum<T>);
@@ -61,7 +63,7 @@ void check_labels(Index rows, Index cols, std::span<const std::int32_t> labels) 
                        std::to_string(labels[r]));
 }
 
-// Sum of a row but for column c, in eight sums so that the loop vectorises.
+// Sums a row without column c, in eight partial sums so that the loop vectorises.
 template <class T>
 T others(const T* row, Index cols, Index c) {
   T acc[8] = {};
@@ -126,14 +128,14 @@ Var<T> softmax_cross_entropy(Var<T> logits, std::span<const std::int32_t> labels
     else if (row[c] < m)
       row_loss[r] = std::log(z) + (m - row[c]);  // at least log 2
     else
-      row_loss[r] = std::log1p(others(p + r * cols, cols, c) * z);  // log z loses what a certain label lacks
+      row_loss[r] = std::log1p(others(p + r * cols, cols, c) * z);  // log z would lose small losses
   });
   *y = static_cast<T>(inverse * detail::chunked_sum(tape, rows, [=](Index r) {
                         return w[r] > 0 ? static_cast<double>(w[r]) * static_cast<double>(row_loss[r]) : 0.0;
                       }));
 
-  // dL/dx[r, c] = w_r / sum w (p[r, c] - [c = label_r]), where p - 1 is minus the sum of the other p: a
-  // certain label keeps its tiny slope. A chunk owns its rows.
+  // dL/dx[r, c] = w_r / sum w (p[r, c] - [c = label_r]), where p - 1 is minus the sum of the other p, so that
+  // a near-certain label keeps its tiny slope. A chunk owns its rows.
   tape.on_backward(out, [logits, p, w, label, rows, cols, inverse](const T* dy) {
     T* dx = logits.grad_acc();
     const T g = static_cast<T>(inverse * static_cast<double>(*dy));

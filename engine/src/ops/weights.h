@@ -6,7 +6,7 @@
 
 namespace fieldmark::detail {
 
-// Checks a mean's optional weights (empty: all 1), one for each of n elements.
+// Checks the optional weights of a mean (empty: all 1), one for each of n elements.
 template <class T>
 void check_weights(const char* op, Index n, std::span<const T> weights) {
   if (weights.empty()) return;
@@ -19,7 +19,7 @@ void check_weights(const char* op, Index n, std::span<const T> weights) {
                        " must be 0 or more, got " + std::to_string(weights[i]));
 }
 
-// Checks what a mean is over and returns the reciprocal of the sum of its weights.
+// Checks the elements and weights of a mean and returns the reciprocal of the sum of weights.
 template <class T>
 double inverse_total(Tape<T>& tape, const char* op, const Shape& s, std::span<const T> weights) {
   const Index n = s.size();
@@ -34,8 +34,8 @@ double inverse_total(Tape<T>& tape, const char* op, const Shape& s, std::span<co
   return 1 / total;
 }
 
-// y = sum_i w_i f(i) / sum w, [1], and its backward dx_i = dy w_i slope(i) / sum w for x, and minus
-// that for `other` where given. A chunk owns its elements.
+// y = sum_i w_i f(i) / sum w, [1], with its backward dx_i = dy w_i slope(i) / sum w for x, and the negative
+// of it for `other` if given. A chunk owns its elements.
 template <class T, class F, class D>
 Var<T> mean_of(const char* op, Var<T> x, const Var<T>* other, std::span<const T> weights, F f, D slope,
                std::source_location from = std::source_location::current()) {

@@ -19,7 +19,7 @@ void keep_message(void* from, int level, const char* format, va_list values) {
   int prefix = 0;
   av_log_format_line2(from, level, format, values, line, sizeof line, &prefix);
   first_message = line;
-  // "[mov,mp4,m4a,3gp,3g2,mj2 @ 0x55d0]" is no news.
+  // Drops a prefix such as "[mov,mp4,m4a,3gp,3g2,mj2 @ 0x55d0]".
   if (const auto end = first_message.find("] "); first_message.starts_with('[') && end != std::string::npos)
     first_message.erase(0, end + 2);
   while (!first_message.empty() && (first_message.back() == '\n' || first_message.back() == '.'))
@@ -86,7 +86,7 @@ std::string reason(int error) {
 }
 
 void Converter::convert(const AVFrame& from, AVFrame& to) {
-  // The side of YUV decides.
+  // The YUV side determines the matrix.
   const AVFrame& yuv = from.format == AV_PIX_FMT_RGB24 ? to : from;
   const int matrix = matrix_of(yuv), from_full = is_full_range(from), to_full = is_full_range(to);
   const int key[] = {from.width, from.height, from.format, to.width, to.height,
@@ -105,7 +105,7 @@ void Converter::convert(const AVFrame& from, AVFrame& to) {
   sws_scale(context_.get(), from.data, from.linesize, 0, from.height, to.data, to.linesize);
 }
 
-// The matrix takes (x, y) of the stored frame to (a x + c y, b x + d y) of the shown one.
+// The matrix maps (x, y) of the stored frame to (a x + c y, b x + d y) of the shown one.
 int orientation_of(const std::int32_t* matrix) {
   if (!matrix) return 1;
   const std::int64_t a = matrix[0], b = matrix[1], c = matrix[3], d = matrix[4];

@@ -1,5 +1,5 @@
 #pragma once
-// FFmpeg's objects with owners, and its errors as texts.
+// RAII owners of FFmpeg's objects, and its errors as text.
 #include "ffmpeg_functions.h"
 
 #ifdef FIELDMARK_WITH_VIDEO
@@ -18,30 +18,30 @@ struct Free {
 template <class T>
 using Owned = std::unique_ptr<T, Free>;
 
-/// Frame or packet. @throws std::bad_alloc
+/// Allocates a frame or packet. @throws std::bad_alloc
 Owned<AVFrame> make_frame();
 Owned<AVPacket> make_packet();
 
-/// Keeps FFmpeg's messages from standard error; see reason(). Forgets those of this thread.
+/// Captures FFmpeg's messages for reason() instead of standard error. Clears those of this thread.
 void take_messages();
-/// Why a call failed: FFmpeg's first message of this thread since take_messages(), else the text of the
-/// error.
+/// Returns why a call failed: FFmpeg's first message on this thread since take_messages(), else the text of
+/// the error code.
 std::string reason(int error);
 
-/// Converts between RGB and YUV with BT.709 from 720 lines on and BT.601 below, unless a frame states its
-/// matrix, and with the same bits on every CPU.
+/// Converts between RGB and YUV, with the same bits on every CPU. Uses BT.709 from 720 lines on and BT.601
+/// below, unless a frame states its matrix.
 class Converter {
  public:
-  /// Both frames have their format, size and buffers. @throws Error if FFmpeg cannot convert the formats
+  /// Both frames must have format, size and buffers. @throws Error if FFmpeg cannot convert the formats
   void convert(const AVFrame& from, AVFrame& to);
 
  private:
   Owned<SwsContext> context_;
-  int key_[9]{};  ///< sizes, formats, matrix and range that context_ is for
+  int key_[9]{};  ///< sizes, formats, matrix and range of context_
 };
 
-/// EXIF's name for the turn of a display matrix of ISO/IEC 14496-12: see exif_orientation().
-/// @param matrix  [9], null: none   @return 1 to 8; of other angles the nearest
+/// Returns the EXIF orientation of a display matrix of ISO/IEC 14496-12, see exif_orientation().
+/// @param matrix  [9], null: none   @return 1 to 8; for other angles the nearest
 int orientation_of(const std::int32_t* matrix);
 
 }  // namespace fieldmark::ffmpeg

@@ -18,7 +18,7 @@ struct Loaded {
   std::string lack;
 };
 
-// They stay until the program ends: FFmpeg's own threads and callbacks may outlive what called it.
+// The libraries stay loaded until the program ends: FFmpeg's threads and callbacks may outlive their caller.
 const Loaded& loaded() {
   static const Loaded all = [] {
     // Only this version has the layout of FFmpeg's structures that Fieldmark was compiled with.

@@ -1,6 +1,6 @@
 #pragma once
-// FFmpeg's functions under their own names, each found when it is first called. Its libraries bring a hundred
-// others, and loading them all takes longer than most commands, which meet no video.
+// FFmpeg's functions under their own names, each resolved on its first call. Its libraries pull in a hundred
+// others; loading them all takes longer than most commands, which use no video.
 #ifdef FIELDMARK_WITH_VIDEO
 extern "C" {
 #include <libavcodec/avcodec.h>
@@ -15,13 +15,13 @@ extern "C" {
 
 namespace fieldmark::ffmpeg {
 
-/// Why there are no videos: this build lacks them, or a library cannot be loaded. Empty where there are.
+/// Returns why video is not supported: this build lacks it, or a library cannot be loaded. Empty if it is.
 std::string lack();
 
 #ifdef FIELDMARK_WITH_VIDEO
 enum class Library { util, codec, format, scale };
 
-/// Address of a function of a library of the version that Fieldmark was built with.
+/// Returns the address of a function in a library of the version that Fieldmark was built with.
 /// @throws Error if the library is not installed
 void* address(Library library, const char* function);
 
@@ -45,7 +45,7 @@ class Function<Result(Arguments...)> {
   mutable std::atomic<void*> address_{nullptr};
 };
 
-// Names the type of a function without its attributes, which templates do not take. Never called.
+// Yields the type of a function without its attributes, which templates do not accept. Never called.
 template <class Result, class... Arguments>
 Function<Result(Arguments...)> like(Result (*)(Arguments...));
 

@@ -29,7 +29,7 @@ namespace {
 using namespace ffmpeg;
 
 constexpr std::int64_t kNever = AV_NOPTS_VALUE;
-constexpr std::int64_t kMaxFrame = 1 << 25;  // pixels: 8K, and a limit to what a few bytes can ask for
+constexpr std::int64_t kMaxFrame = 1 << 25;  // pixels: 8K; limits the allocation that a few bytes can request
 
 struct Close {
   void operator()(std::FILE* file) const { std::fclose(file); }
@@ -51,7 +51,7 @@ std::int64_t seek_in(void* context, std::int64_t offset, int whence) {
   return ::fseeko(file, here, SEEK_SET) == 0 ? size : AVERROR(EIO);
 }
 
-// A container that is open: FFmpeg reads through our file, so that it opens nothing by name.
+// An open container. FFmpeg reads through our file, so that it opens nothing by name.
 class Container {
  public:
   Container(File file, const std::string& name) : file_(std::move(file)) {
@@ -65,7 +65,7 @@ class Container {
     format_->max_streams = 100;
     AVDictionary* options = nullptr;
     av_dict_set(&options, "format_whitelist", "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm", 0);
-    int error = avformat_open_input(&format_, "", nullptr, &options);  // frees format_ if it fails
+    int error = avformat_open_input(&format_, "", nullptr, &options);  // frees format_ on failure
     av_dict_free(&options);
     if (error >= 0) error = avformat_find_stream_info(format_, nullptr);
     if (error >= 0) return;
@@ -99,7 +99,7 @@ File opened(const std::filesystem::path& path) {
 
 File in_memory(std::span<const std::byte> bytes, const std::string& name) {
   if (bytes.empty()) throw IoError(name + ": expected an MP4, MOV or WebM video, found an empty file");
-  // Opened for reading, fmemopen() leaves the bytes as they are.
+  // In read mode, fmemopen() does not modify the bytes.
   File file(::fmemopen(const_cast<std::byte*>(bytes.data()), bytes.size(), "rb"));
   if (!file) throw IoError(name + ": open failed: " + std::strerror(errno));
   return file;
@@ -134,7 +134,7 @@ const std::int32_t* display_matrix(const AVStream& stream) {
   return static_cast<const std::int32_t*>(data);
 }
 
-// The size with square pixels: one side grows.
+// Returns the size with square pixels; one side grows.
 std::pair<int, int> square_size(const AVFrame& frame, AVRational pixel) {
   constexpr double kMost = 4;
   const double ratio = pixel.num > 0 && pixel.den > 0 ? av_q2d(pixel) : 1;
@@ -179,9 +179,9 @@ struct VideoReader::Impl {
       fail(std::string("the decoder of ") + decoder->name + " refuses the video: " + ffmpeg::reason(error));
   }
 
-  // The times of all frames, from the packets.
+  // Collects the times of all frames from the packets.
   void scan() {
-    std::int64_t latest = 0, last = 0;  // the last time and its duration
+    std::int64_t latest = 0, last = 0;  // latest time and its duration
     while (av_read_frame(container.get(), packet.get()) >= 0) {
       const bool shown = packet->stream_index == stream->index && !(packet->flags & AV_PKT_FLAG_DISCARD);
       const std::int64_t time = packet->pts != kNever ? packet->pts : packet->dts;
@@ -206,7 +206,7 @@ struct VideoReader::Impl {
   double seconds_of(std::int64_t time) const {
     return static_cast<double>(time - times.front()) * av_q2d(stream->time_base);
   }
-  // The time of the frame that is shown: half a unit makes up for rounding.
+  // Returns the time of the frame shown; adding half a unit compensates for rounding.
   std::int64_t time_at(double seconds) const {
     const double units = seconds / av_q2d(stream->time_base) + 0.5;
     const double most = static_cast<double>(end - times.front());
@@ -229,7 +229,7 @@ struct VideoReader::Impl {
     for (;;) {
       const int received = avcodec_receive_frame(codec.get(), frame.get());
       if (received == 0) {
-        // Behind a frame without a time the order alone is known.
+        // After a frame without a time, only the order is known.
         const std::int64_t time = frame->best_effort_timestamp;
         position = time != kNever ? time : position == kNever ? times.front() : position + 1;
         return true;
@@ -247,11 +247,11 @@ struct VideoReader::Impl {
     }
   }
 
-  // Decodes from the frame before `time` on, where a seek went.
+  // Decodes up to the frame at `time`, starting where a seek went. Returns false if the seek overshot.
   bool decode_to(std::int64_t time) {
     bool any = false;
     while (decode()) {
-      // What the seek passed over is decoded from the beginning.
+      // The seek overshot: the caller then decodes from the beginning.
       if (!any && position > time && time > times.front() && !from_start) return false;
       any = true;
       if (position >= time) return true;
@@ -312,9 +312,9 @@ struct VideoReader::Impl {
   Owned<AVPacket> packet = ffmpeg::make_packet();
   Owned<AVFrame> frame = ffmpeg::make_frame(), before = ffmpeg::make_frame();
   ffmpeg::Converter converter;
-  std::vector<std::int64_t> times, keys;  // of all frames and of those that need no others, sorted
+  std::vector<std::int64_t> times, keys;  // of all frames and of keyframes, sorted
   std::int64_t end = 0;                   // of the last frame
-  std::int64_t position = kNever;         // time of the frame decoded last
+  std::int64_t position = kNever;         // time of the last decoded frame
   bool ended = false, faulty = false, from_start = false;
 };
 
@@ -349,7 +349,7 @@ std::optional<VideoFrame> VideoReader::next() {
 }
 
 std::string VideoReader::oddity() const {
-  constexpr double kTolerance = 1;  // seconds: headers round
+  constexpr double kTolerance = 1;  // seconds: headers are rounded
   const AVStream& stream = *impl_->stream;
   if (stream.duration <= 0) return "";
   const double stated = static_cast<double>(stream.duration) * av_q2d(stream.time_base);

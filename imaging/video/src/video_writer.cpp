@@ -77,7 +77,7 @@ struct VideoWriter::Impl {
     need(avformat_write_header(file, nullptr));
   }
 
-  // @param frame  null: the last frames
+  // @param frame  null: flushes the last frames
   void encode(const AVFrame* frame) {
     need(avcodec_send_frame(codec.get(), frame));
     for (;;) {

@@ -5,8 +5,8 @@ namespace {
 
 constexpr int kBlock = 64;
 
-// sin(pi r) and cos(pi r) for r in [-1/4, 1/4]: Taylor series, whose first omitted terms are below 2e-17 and
-// 3e-16 of the values (in double; the float series stop where float does).
+// Computes sin(pi r) and cos(pi r) for r in [-1/4, 1/4] by Taylor series, whose first omitted terms are below
+// 2e-17 and 3e-16 of the values (in double; the float series stop at float precision).
 [[gnu::always_inline]] inline void series(float r, float& s, float& c) {
   const float u = r * r;
   s = r * (3.14159265f + u * (-5.16771278f + u * (2.55016404f + u * (-0.599264529f + u * 0.0821458866f))));
@@ -32,7 +32,7 @@ constexpr int kBlock = 64;
                                         u * (-1.04638104924845849e-4 + u * 4.30306958703294e-6)))))));
 }
 
-// Scaling by 2^b is exact and so is the reduction modulo 2, however far x lies from the origin.
+// Scaling by 2^b and the reduction modulo 2 are exact, however far x is from the origin.
 template <class T>
 void forward(const T* x, std::int64_t n, int dims, int bands, T* y) {
   T p[kBlock], s[kBlock], c[kBlock];

@@ -5,9 +5,9 @@
 namespace fieldmark::kernels::FIELDMARK_ISA_NS {
 namespace {
 
-constexpr int kBlock = 16;  // points whose corners are found together: the loops over it vectorise
+constexpr int kBlock = 16;  // points whose corners are found together, so that loops over them vectorise
 
-// The features of one entry, density's in the lower half and colour's in the upper.
+// The features of one entry: density in the lower half, colour in the upper half.
 template <class T, int P>
 struct EntryOf {
   typedef T type __attribute__((vector_size(2 * P * sizeof(T))));
@@ -33,7 +33,7 @@ template <class T, int P>
   return e;
 }
 
-// Two parts side by side. A copy of each into one array, read back as a whole, would wait for both stores to
+// Joins two parts. Copying each into one array and reading that back as a whole would wait for both stores to
 // reach the cache.
 template <class T, int P>
 [[gnu::always_inline]] inline Entry<T, P> joined(const T* density, const T* colour) {
@@ -47,7 +47,7 @@ template <class T, int P>
     return __builtin_shufflevector(d, c, 0, 1, 2, 3, 4, 5, 6, 7);
 }
 
-// The eight corners of the cells around a block of points: place of the entry in its level and fraction along
+// The eight cell corners around each of a block of points: index of the entry in its level and fraction along
 // each axis.
 template <class T, int P>
 struct Corners {
@@ -64,7 +64,7 @@ struct Corners {
     for (int a = 0; a < 3; ++a)
       for (int i = 0; i < kBlock; ++i) {
         const T p = position[a][i] * scale;
-        // Clamped before the cast: a NaN or huge position would be undefined as an integer.
+        // Clamped before the cast, because converting a NaN or huge position to an integer is undefined.
         const T inside = p > 0 ? (p < top ? p : top) : T(0);
         const auto c = static_cast<std::int32_t>(inside);
         cell[a][i] = static_cast<std::uint32_t>(c);
@@ -82,8 +82,8 @@ struct Corners {
     }
   }
 
-  // Asks for the entries ahead of their use: they are spread over megabytes, and a core waits longer for one
-  // of them than it computes on a block.
+  // Prefetches entries before their use: they are spread over megabytes, and a core waits longer for one of
+  // them than it computes on a block.
   template <class S>
   [[gnu::always_inline]] void prefetch(const S* entries, int count) const {
     for (int i = 0; i < count; ++i)
@@ -101,7 +101,7 @@ struct Corners {
 };
 
 // Calls use(level, corners, first point, count) for blocks of points in order, level by level; each block's
-// entries are asked for one block ahead, also across levels.
+// entries are prefetched one block ahead, also across levels.
 template <class T, int P, class S, class F>
 [[gnu::always_inline]] inline void for_blocks(const HashLevel* level, int levels, const T* x, std::int64_t n,
                                               const S* table, F use) {
@@ -146,7 +146,7 @@ void forward(const HashLevel* level, int levels, const T* x, std::int64_t n, con
                    });
 }
 
-// dL/d(entry) at one point and level; either part may be absent.
+// Loads dL/d(entry) at one point and level; either part may be absent.
 template <class T, int P>
 [[gnu::always_inline]] inline Entry<T, P> cotangent(const T* ddensity, const T* dcolour, std::int64_t at) {
   const T none[P] = {};
@@ -156,7 +156,7 @@ template <class T, int P>
 template <class T, int P>
 void by_level(int levels, const T* ddensity, const T* dcolour, std::int64_t begin, std::int64_t end,
               std::int64_t n, T* out) {
-  for (std::int64_t b = begin; b < end; b += kBlock)  // so that whole lines are written at a time
+  for (std::int64_t b = begin; b < end; b += kBlock)  // so that whole cache lines are written at a time
     for (int l = 0; l < levels; ++l)
       for (std::int64_t i = b; i < end && i < b + kBlock; ++i) {
         const Entry<T, P> g = cotangent<T, P>(ddensity, dcolour, (i * levels + l) * P);
@@ -182,7 +182,7 @@ void backward_level(const HashLevel& level, const T* x, std::int64_t n, const T*
                    });
 }
 
-// y = sum_k w_k(f) e_k with f = x * resolution - cell, so dy/dx_a = resolution * sum_k dw_k/df_a e_k.
+// With y = sum_k w_k(f) e_k and f = x * resolution - cell, dy/dx_a = resolution * sum_k dw_k/df_a e_k.
 template <class T, int P>
 void backward_x(const HashLevel* level, int levels, const T* x, std::int64_t n, const T* table,
                 const T* ddensity, const T* dcolour, T* dx) {

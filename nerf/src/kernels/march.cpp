@@ -3,20 +3,20 @@
 namespace fieldmark::kernels::FIELDMARK_ISA_NS {
 namespace {
 
-constexpr int kBatch = 16;  // candidates judged together: the loops over them vectorise
-constexpr int kFew = 8;     // the same in a contracted space, where each waits for the one before
+constexpr int kBatch = 16;  // candidates judged together, so that loops over them vectorise
+constexpr int kFew = 8;     // the same in a contracted space, where each depends on the one before
 
 [[gnu::always_inline]] inline float time_of(const MarchRay& r, std::int32_t k) {
   return r.near + (static_cast<float>(k) + r.jitter) * r.step;
 }
 
 [[gnu::always_inline]] inline float clamped(float p, float top) {
-  const float above = p > 0.f ? p : 0.f;  // and where p is NaN
+  const float above = p > 0.f ? p : 0.f;  // also for NaN
   return above < top ? above : top;
 }
 
-// Whole steps until the ray leaves the empty blocks around its next sample; 0 if that lies in a block with an
-// occupied cell.
+// Returns the number of whole steps until the ray leaves the empty blocks around its next sample; 0 if that
+// sample lies in a block with an occupied cell.
 [[gnu::always_inline]] inline std::int32_t empty_steps(const MarchGrid& g, const MarchRay& r, float t) {
   const auto n = static_cast<float>(g.block_side);
   float p[3], b[3];  // in blocks
@@ -40,7 +40,7 @@ constexpr int kFew = 8;     // the same in a contracted space, where each waits 
   return steps > 1 ? steps : 1;
 }
 
-// 1 if the cell at integer coordinates is occupied.
+// Returns 1 if the cell at integer coordinates is occupied.
 [[gnu::always_inline]] inline std::int32_t occupied(const MarchGrid& g, std::int32_t x, std::int32_t y,
                                                     std::int32_t z) {
   const std::int32_t coarse = (x >> 3) + g.coarse_side * ((y >> 3) + g.coarse_side * (z >> 3));
@@ -50,7 +50,7 @@ constexpr int kFew = 8;     // the same in a contracted space, where each waits 
   return (word >> bit) & 1;
 }
 
-// Which of the next candidates are samples.
+// Decides which of the next candidates are samples.
 [[gnu::always_inline]] inline void judge(const MarchGrid& g, const MarchRay& r, float* t, std::int32_t* hit) {
   const auto n = static_cast<float>(g.resolution);
   std::int32_t c[3][kBatch];
@@ -65,8 +65,8 @@ constexpr int kFew = 8;     // the same in a contracted space, where each waits 
   }
 }
 
-// Largest coordinate of a point in inner half sides from the centre, at least 1: samples are so much further
-// apart there. kMarchFarthest from there on, and where a coordinate is NaN.
+// Returns the largest coordinate of a point in inner half sides from the centre, at least 1: the factor by
+// which samples are farther apart there. Clamped to kMarchFarthest, also returned for NaN.
 [[gnu::always_inline]] inline float scale_at(float x, float y, float z) {
   const float a = 4 * __builtin_fabsf(x - 0.5f), b = 4 * __builtin_fabsf(y - 0.5f),
               c = 4 * __builtin_fabsf(z - 0.5f);
@@ -79,13 +79,13 @@ constexpr int kFew = 8;     // the same in a contracted space, where each waits 
   return scale_at(r.o[0] + t * r.d[0], r.o[1] + t * r.d[1], r.o[2] + t * r.d[2]);
 }
 
-// By what a point at scale s is brought nearer to the centre, see contract().
+// Returns the factor by which a point at scale s moves towards the centre, see contract().
 [[gnu::always_inline]] inline float contraction(float s) { return s > 1.f ? (2 - 1 / s) / s : 1.f; }
 
-// How many samples surely stay in the empty blocks around one at scale s: a step moves the image by at most
-// `step` where space is not contracted, and by less than 4 steps elsewhere. With |dy| = s step for the
-// largest coordinate and c = (2/s - 1/s^2) y, |dc| <= (2/s - 1/s^2) |dy| + s (2/s^2 - 2/s^3) |dy| = (4 - 3/s)
-// step.
+// Returns how many samples certainly stay in the empty blocks around one at scale s. A step moves the image
+// by at most `step` where space is not contracted, and by less than 4 steps elsewhere. With |dy| = s step for
+// the largest coordinate and c = (2/s - 1/s^2) y, |dc| <= (2/s - 1/s^2) |dy| + s (2/s^2 - 2/s^3) |dy| = (4 -
+// 3/s) step.
 [[gnu::always_inline]] inline std::int32_t contracted_steps(float clearance, float side, float s,
                                                             float step) {
   const float clear = side * (clearance - 1);
@@ -93,7 +93,8 @@ constexpr int kFew = 8;     // the same in a contracted space, where each waits 
   return whole > 1 ? whole : 1;
 }
 
-// 0 if the next sample lies in a block with an occupied cell, or behind the end.
+// As empty_steps() for a contracted ray: 0 if the next sample lies in a block with an occupied cell, or past
+// the end.
 [[gnu::always_inline]] inline std::int32_t empty_contracted_steps(const MarchGrid& g, const MarchRay& r) {
   const auto n = static_cast<float>(g.block_side);
   const float s = scale_at(r, r.near);
@@ -109,8 +110,8 @@ constexpr int kFew = 8;     // the same in a contracted space, where each waits 
 
 }  // namespace
 
-// As empty_steps(), for all lanes at a time: one ray alone waits for each number in turn, and most rays of a
-// image do nothing but jump.
+// As empty_steps(), for all lanes at once: a single ray waits for each number in turn, and most rays of an
+// image only jump.
 void march_to_blocks(const MarchGrid& g, MarchRays& rays) {
   MarchRays r = rays;
   const auto n = static_cast<float>(g.block_side);

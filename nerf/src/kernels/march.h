@@ -13,8 +13,8 @@ struct MarchGrid {
 };
 
 /// A ray o + t d and how far it has been marched. Straight rays: the next sample is at near + (k + jitter)
-/// step. Contracted rays, in the linear coordinates of a contracted Space: it is at near, after k others;
-/// steps, far and jitter are not used.
+/// step. Contracted rays, in the linear coordinates of a contracted Space: the next sample, after k others,
+/// is at near; steps, far and jitter are not used.
 struct MarchRay {
   float o[3], d[3];
   float steps[3];  ///< steps per unit along each axis, signed
@@ -22,10 +22,10 @@ struct MarchRay {
   std::int32_t k;
 };
 
-constexpr int kMarchLanes = 16;  ///< rays of a MarchRays
+constexpr int kMarchLanes = 16;  ///< rays in a MarchRays
 /// Distance from the centre, in half sides of the inner cube, at which a contracted ray ends, see RayWalk.
 constexpr float kMarchFarthest = 128;
-/// Samples after which any contracted ray ends: one without a direction never leaves.
+/// Samples after which any contracted ray ends: a ray without a direction never leaves.
 constexpr std::int32_t kMarchMost = 1 << 16;
 
 /// Neighbouring rays side by side. A lane without a ray has far = -1 and k = kMarchMost.
@@ -35,7 +35,7 @@ struct MarchRays {
   std::int32_t k[kMarchLanes];
 };
 
-// Moves each ray to its first sample in a block with an occupied cell, or behind its end.
+// Moves each ray to its first sample in a block with an occupied cell, or past its end.
 FIELDMARK_DECLARE_KERNEL(void, march_to_blocks, (const MarchGrid& grid, MarchRays& rays))
 FIELDMARK_DECLARE_KERNEL(void, march_contracted_to_blocks, (const MarchGrid& grid, MarchRays& rays))
 
@@ -43,7 +43,7 @@ FIELDMARK_DECLARE_KERNEL(void, march_contracted_to_blocks, (const MarchGrid& gri
 // number.
 FIELDMARK_DECLARE_KERNEL(std::int64_t, march,
                          (const MarchGrid& grid, MarchRay& ray, std::int64_t max, float* t))
-// The same, with the contracted positions x [max, 3].
+// As march, and writes the contracted positions x [max, 3].
 FIELDMARK_DECLARE_KERNEL(std::int64_t, march_contracted,
                          (const MarchGrid& grid, MarchRay& ray, std::int64_t max, float* t, float* x))
 

@@ -37,7 +37,7 @@ struct ChainPass {
     values.assign(y.value(), y.value() + (keep ? n : 0));
     tape.backward(y, u);
   }
-  // Read and written: x, w, b, y; u and its copy, the seed; x, w, b, the seed and the gradients of x, w, b.
+  // Traffic: x, w, b, y; u and its copy, the seed; x, w, b, the seed and the gradients of x, w, b.
   double bytes() const { return (4.0 + 2 + 7) * static_cast<double>(n) * sizeof(T); }
 
   Index n;
@@ -48,7 +48,7 @@ struct ChainPass {
   bool keep = false;
 };
 
-// Seconds in which this machine adds two arrays into a third, for each byte that it reads or writes.
+// Measures the seconds that this machine takes to add two arrays into a third, per byte read or written.
 class Memory {
  public:
   explicit Memory(Index n) : a_(numbers<float>(n, 7)), b_(numbers<float>(n, 8)), sum_(a_.size()) {}
@@ -80,7 +80,7 @@ Index scaled(const RowOptions& o) {
   return std::max<Index>(kErrorElements, static_cast<Index>(kElements * o.scale));
 }
 
-// The memory's speed is measured by turns with the runs.
+// Alternates runs with measurements of memory speed.
 template <class F>
 EngineRow chain(F f, const RowOptions& o) {
   ChainPass<float> pass(scaled(o));
@@ -107,7 +107,7 @@ SafetensorsFile work(const char* network, F f, const RowOptions& o) {
   return peer_work(network, pass.store, {{pass.n}, {pass.n}, pass.x, pass.u, pass.values, pass.dx});
 }
 
-// A row of small ops, forward and backward: what an op costs besides its arithmetic.
+// A row of small ops, forward and backward: the overhead of an op besides its arithmetic.
 template <class T>
 struct NodePass {
   NodePass() : x(numbers<T>(kNodeElements, 3)), u(numbers<T>(kNodeElements, 4)), dx(x.size()) {}
@@ -125,7 +125,7 @@ struct NodePass {
 
 EngineRow nodes(const RowOptions& o) {
   NodePass<float> pass;
-  // Near 1, so that a thousand factors stay in range.
+  // Near 1, so that a product of a thousand factors stays in range.
   for (float& v : pass.x) v = 1 + v / 1024;
   NodePass<double> exact;
   std::copy(pass.x.begin(), pass.x.end(), exact.x.begin());

@@ -11,10 +11,10 @@ namespace fieldmark::bench {
 namespace {
 
 constexpr Index kImages = 4, kSide = 128, kChannels = 64;
-constexpr int kErrorImages = 5;  // sets of images for which float is compared with double
-constexpr Index kDrawSide = 16;  // pixels, where gradients are compared with a peer's
+constexpr int kErrorImages = 5;  // sets of images on which float is compared with double
+constexpr Index kDrawSide = 16;  // pixels, for comparing gradients with a peer
 
-// A network of images; the loss is <u, y> with a fixed u.
+// An image network; the loss is <u, y> with a fixed u.
 template <class T, class Net>
 struct Pass {
   Pass(Index side, Index channels, std::uint64_t seed_ = 3)
@@ -61,7 +61,7 @@ struct Decoder {
   extractor::PooledExtractor<T> h;
 };
 
-// Copies the numbers of a float pass into a double one, and compares what both give.
+// Copies the numbers of a float pass to a double pass, and compares their results.
 template <template <class> class Net>
 double error_of(Index side, Index channels, std::uint64_t seed) {
   Pass<float, Net<float>> f(side, channels, seed);
@@ -76,9 +76,9 @@ double error_of(Index side, Index channels, std::uint64_t seed) {
                    relative_error(f.store.grads(), d.store.grads())});
 }
 
-// The worst of several sets of images for the convolution alone. For the decoder the median: where the
-// argument of one ReLU in a million falls on different sides of 0 in float and double, gradients differ by
-// 1e-3 to 1e-2 however small the rounding, and at 12 x 12 pixels that is one set of images in 16.
+// Returns the worst error over several sets of images for a single convolution, and the median for the
+// decoder. Where one ReLU argument in a million has different signs in float and double, gradients differ by
+// 1e-3 to 1e-2 however small the rounding; at 12 x 12 pixels that affects one set of images in 16.
 template <template <class> class Net>
 double typical_error(Index side, Index channels) {
   constexpr int which = std::is_same_v<Net<float>, OneConv<float>> ? kErrorImages - 1 : kErrorImages / 2;
@@ -88,7 +88,7 @@ double typical_error(Index side, Index channels) {
   return errors[which];
 }
 
-// Multiplications and additions of 3 x 3 convolutions over all images, forward, dX and dW.
+// Counts multiplications and additions of 3 x 3 convolutions over all images: forward, dX and dW.
 double operations(Index side, Index in, Index out) {
   return 3.0 * 2.0 * static_cast<double>(kImages * side * side) * 9.0 * static_cast<double>(in * out);
 }
@@ -109,7 +109,7 @@ PeerPass finished(Pass<float, Net>& pass) {
   return {pass.shape, pass.y_shape, pass.x, pass.u, pass.values, pass.dx};
 }
 
-// One pass of timed(), for a peer to do the same, and `draws` on small images.
+// One pass of timed() for a peer to repeat, and `draws` on small images.
 template <template <class> class Net>
 SafetensorsFile work(const char* network, Index channels, Index side, std::uint64_t draws) {
   Pass<float, Net<float>> pass(side, channels);

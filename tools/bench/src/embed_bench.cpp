@@ -16,9 +16,9 @@ using watermark::CachedView;
 using watermark::Owner;
 using Say = std::function<void(const std::string&, double)>;
 
-constexpr Index kOnTheWay = 24;  // views that set the mark PSNR before it is judged on the way
+constexpr Index kOnTheWay = 24;  // views that calibrate the mark PSNR before an intermediate result
 
-// Runs on from a time, and can be stopped for a while.
+// A clock that starts at a given time and can be paused.
 class Clock {
  public:
   explicit Clock(double seconds = 0) : before_(seconds) {}
@@ -40,7 +40,7 @@ class Clock {
   Now::time_point begin_ = Now::now();
 };
 
-// Views that variants share.
+// Cached views, shared by variants.
 class Caches {
  public:
   struct Cache {
@@ -51,7 +51,7 @@ class Caches {
     double seconds = 0;
   };
   explicit Caches(const nerf::RadianceField& field) : field_(field) {}
-  // Those of the first variant are kept for good, of the others only the last: views are large.
+  // Keeps the views of the first variant and of the last one used: views are large.
   const Cache& get(const EmbedVariant& v, const std::function<void()>& stop_or_go) {
     for (const Cache& c : kept_)
       if (c.options.count == v.views.count && c.options.samples == v.views.samples &&
@@ -76,7 +76,7 @@ class Caches {
   std::vector<Cache> kept_;
 };
 
-// The same for every run: whose owner it is makes no difference to the figures.
+// The same key for every run: the figures do not depend on the owner.
 watermark::Key bench_key() {
   std::array<std::uint8_t, 32> bytes{};
   bytes.fill(0x5a);

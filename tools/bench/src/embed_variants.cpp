@@ -9,7 +9,7 @@ namespace {
 using watermark::EmbedDistances;
 using watermark::MarkColours;
 
-constexpr Index kCells = 16;  // per axis, of every scene, so that rows of several scenes compare
+constexpr Index kCells = 16;  // per axis, for every scene, so that rows of different scenes are comparable
 
 EmbedVariant base_variant(const char* preset, const ScheduleOptions& length, Index bits, std::uint64_t seed) {
   EmbedVariant v{.choice = "default",
@@ -27,7 +27,7 @@ EmbedVariant base_variant(const char* preset, const ScheduleOptions& length, Ind
 class Variants {
  public:
   explicit Variants(const EmbedVariant& base) : base_(base), all_{base} {}
-  // The default with one change.
+  // Adds the default with one change.
   template <class F>
   void vary(const char* choice, const std::string& setting, F change) {
     EmbedVariant v = base_;
@@ -60,7 +60,7 @@ void lengths(Variants& all) {
   });
 }
 
-// What the extractor sees, and of what.
+// The extractor's input.
 void views(Variants& all) {
   for (const Index side : {128, 200, 256})
     all.vary("patch", std::to_string(side) + " pixels",
@@ -82,7 +82,7 @@ void views(Variants& all) {
            [](EmbedVariant& v) { v.recipe.embed.distortions.mixed = false; });
 }
 
-// What carries the message, and how much it may change.
+// The carrier of the message, and its strength.
 void marks(Variants& all, MarkColours colours) {
   for (const Index side : {8, 12, 20, 24, 32})
     all.vary("cells", std::to_string(side) + " an axis", [=](EmbedVariant& v) { v.recipe.cells = side; });
@@ -105,7 +105,7 @@ void marks(Variants& all, MarkColours colours) {
                [=](EmbedVariant& v) { watermark::use_colours(other, v.recipe.cell()); });
 }
 
-// How it is learnt.
+// The training options.
 void training(Variants& all) {
   all.vary("supervision", "pooled bits alone", [](EmbedVariant& v) {
     v.recipe.cell().training.sign_weight = v.recipe.cell().training.index_weight = 0;

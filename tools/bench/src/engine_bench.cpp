@@ -14,7 +14,7 @@ EngineRow run_row(const RowSpec& spec, const EngineBenchOptions& options) {
   if (!options.peer || !spec.work) return spec.run(o);
   Peer peer(spec.name, spec.work(o), *options.peer);
   std::vector<double> seconds;
-  // Threads of either side spin for a while after their work, and would take the other's time.
+  // Threads of either side spin for a while after their work, and would slow down the other.
   const auto rest = [] { std::this_thread::sleep_for(std::chrono::milliseconds(20)); };
   o.between = [&] {
     rest();

@@ -17,7 +17,7 @@ namespace {
 
 using Cameras = std::vector<nerf::Camera>;
 using Say = std::function<void(const std::string&, double)>;
-constexpr double kSlow = 6;  // variants this much slower than the default are timed once
+constexpr double kSlow = 6;  // variants slower than the default by this factor are timed once
 
 void compare(const nerf::Rendering& view, const std::vector<double>& want, FieldErrors& errors) {
   for (Index p = 0; p < view.opacity.size(); ++p) {
@@ -27,7 +27,7 @@ void compare(const nerf::Rendering& view, const std::vector<double>& want, Field
   }
 }
 
-// Mean time of the views in one variant; with `errors`, also how far they are off.
+// Returns the mean time per view of a variant; with `errors`, also measures the errors.
 double render_views(const nerf::RadianceField& field, const Cameras& cameras, const FieldVariant& variant,
                     const std::vector<std::vector<double>>& want, FieldErrors* errors) {
   std::unique_ptr<nerf::RadianceField> other;
@@ -35,7 +35,7 @@ double render_views(const nerf::RadianceField& field, const Cameras& cameras, co
     other = std::make_unique<nerf::RadianceField>(with_variant(field, variant));
   nerf::Renderer renderer(other ? *other : field, variant.render);
   double seconds = 0;
-  renderer.render(cameras.front());  // buffers grow, caches fill
+  renderer.render(cameras.front());  // warm-up: buffers grow, caches fill
   for (std::size_t v = 0; v < cameras.size(); ++v) {
     const double begin = now();
     const nerf::Rendering view = renderer.render(cameras[v]);
@@ -67,7 +67,8 @@ OccupancyCost occupancy_cost(const nerf::RadianceField& field, const Cameras& ca
           errors.dropped_most};
 }
 
-// Each right after the default, whose time it is divided by, because a shared machine's speed drifts.
+// Times each variant right after the default and divides by the default's time, because the speed of a
+// shared machine drifts.
 void time_variants(const nerf::RadianceField& field, const Cameras& cameras,
                    const std::vector<std::vector<double>>& want, int runs, const Say& say,
                    std::vector<FieldRow>& rows) {
@@ -137,7 +138,7 @@ std::string judgement(const FieldBench& bench, const ParetoMargin& margin) {
     return std::string(text);
   };
   const auto name = [](const FieldRow& row) { return row.variant.knob + " " + row.variant.setting; };
-  // The most exact of what is faster, and the fastest of what is more exact.
+  // The most exact of the faster variants, and the fastest of the more exact ones.
   const FieldRow *faster = nullptr, *better = nullptr;
   for (const FieldRow& row : bench.rows) {
     if (row.seconds < (1 - margin.time) * usual.seconds && (!faster || row.psnr > faster->psnr))

@@ -6,15 +6,15 @@
 
 namespace fieldmark::bench {
 
-/// Differences of images from a reference, summed over views. A NaN in either makes every figure of its kind
-/// NaN.
+/// Accumulates differences between images and a reference over views. A NaN in either makes every figure of
+/// its kind NaN.
 struct FieldErrors {
-  double squares = 0;       ///< of the differences
-  double worst = 0;         ///< magnitude of a difference
-  double dropped = 0;       ///< opacity that the reference has and the images lack, over all pixels
-  double dropped_most = 0;  ///< of one pixel
-  double colours = 0;       ///< differences added
-  double pixels = 0;        ///< opacities added
+  double squares = 0;       ///< sum of squared differences
+  double worst = 0;         ///< largest absolute difference
+  double dropped = 0;       ///< missing opacity relative to the reference, over all pixels
+  double dropped_most = 0;  ///< largest of one pixel
+  double colours = 0;       ///< number of differences added
+  double pixels = 0;        ///< number of opacities added
 
   /// Adds the difference of one colour of a pixel.
   void add(double difference) {
@@ -22,13 +22,13 @@ struct FieldErrors {
     raise_to(worst, std::abs(difference));
     ++colours;
   }
-  /// Adds the opacity that a pixel lacks; one of more than the reference's counts as 0.
+  /// Adds the missing opacity of a pixel; an excess over the reference counts as 0.
   void drop(double opacity) {
     dropped += opacity < 0 ? 0 : opacity;
     raise_to(dropped_most, opacity);
     ++pixels;
   }
-  /// In dB; infinite without a difference.
+  /// Returns the PSNR in dB; infinity if all differences are 0.
   double psnr() const {
     return squares == 0 ? std::numeric_limits<double>::infinity() : -10 * std::log10(squares / colours);
   }

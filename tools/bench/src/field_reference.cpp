@@ -12,10 +12,10 @@
 namespace fieldmark::bench {
 namespace {
 
-constexpr Index kLanes = 16, kRays = 8;  // rays of a piece: their samples stay within a few megabytes
+constexpr Index kLanes = 16, kRays = 8;  // rays of a chunk: their samples stay within a few megabytes
 constexpr double kLeastWeight = 1e-12;
 
-// Where a ray is inside the unit cube; empty (near >= far) if nowhere.
+// Returns the interval of a ray inside the unit cube; empty (near >= far) if they do not meet.
 std::array<double, 2> span_of(const nerf::Vec3& o, const nerf::Vec3& d) {
   double near = 0, far = std::numeric_limits<double>::infinity();
   for (std::size_t a = 0; a < 3; ++a) {
@@ -82,7 +82,7 @@ std::vector<double> FieldReference::render(const nerf::Camera& camera) {
   return trace(camera, pixels);
 }
 
-// The samples of a ray that count.
+// Adds the samples of a ray that contribute.
 void FieldReference::add_ray(const nerf::Ray& ray, Lane& lane) const {
   nerf::Vec3 o;
   for (std::size_t a = 0; a < 3; ++a)

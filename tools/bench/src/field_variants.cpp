@@ -11,9 +11,9 @@
 namespace fieldmark::bench {
 namespace {
 
-constexpr Index kPlaces = 3;         // along each axis of a cell that is looked at
+constexpr Index kPlaces = 3;         // along each axis of an examined cell
 constexpr float kThreshold = 0.01f;  // as in training
-constexpr Index kChunk = 64;         // coarse cells whose parts are looked at together
+constexpr Index kChunk = 64;         // coarse cells examined together
 
 std::string number(float value) {
   char text[40];
@@ -21,7 +21,7 @@ std::string number(float value) {
   return text;
 }
 
-// Densities at n places of the unit cube.
+// Computes the densities at n points of the unit cube.
 void densities(const nerf::RadianceField& field, const std::vector<float>& x, Tape<float>& tape,
                std::vector<float>& sigma) {
   const nerf::Field<float>& net = field.field;
@@ -43,7 +43,7 @@ std::vector<std::uint8_t> coarser(const nerf::OccupancyGrid& grid, const nerf::O
   return bits;
 }
 
-// Looks at the parts of every occupied cell.
+// Examines the parts of every occupied cell.
 std::vector<std::uint8_t> finer(const nerf::RadianceField& field, const nerf::OccupancyGrid& to) {
   const nerf::OccupancyGrid& grid = field.grid;
   const Index n = grid.resolution(), factor = to.resolution() / n, places = factor * kPlaces;
@@ -93,7 +93,7 @@ struct Sweep {
     return samples(o.finer) + ", stop " + number(o.stop) + ", least " + number(o.least_weight);
   }
 
-  // Each on its own. @param cells  of the field's grid, per axis
+  // Varies each knob on its own. @param cells  of the field's grid, per axis
   void add_knobs(Index cells) {
     for (const float finer : {0.25f, 0.5f, 0.75f, 1.f, 1.2f, 1.5f, 2.f, 4.f})
       add("samples", samples(finer), [&](auto& v) { v.render.finer = finer; });
@@ -110,7 +110,7 @@ struct Sweep {
       add("precision", "bf16", [](auto& v) { v.render.precision = Precision::bf16; });
   }
 
-  // Coarser and finer in all at once, from quick to exact.
+  // Varies all knobs together, from quick to exact.
   void add_together() {
     for (const auto& [finer, stop, least] : {std::array{0.5f, 3e-2f, 3e-3f},
                                              {0.75f, 1e-2f, 1e-3f},

@@ -15,8 +15,8 @@ constexpr int kFeatures = 2, kEntry = 2 * kFeatures;
 constexpr nerf::HashEncodingOptions kOptions{
     .levels = 16, .features = kFeatures, .log2_table = 17, .base_resolution = 16, .finest_resolution = 512};
 
-// Rays through the cube in tiles of 16 x 16 pixels of a 64 x 64 image, 64 samples each at 1 / 512 of the
-// diagonal from a sphere's surface on.
+// Sample points on rays through the cube, in tiles of 16 x 16 pixels of a 64 x 64 image: 64 samples each,
+// spaced by 1 / 512 of the diagonal and starting on the surface of a sphere.
 std::vector<float> along_rays(Index points) {
   std::vector<float> x;
   for (Index p = 0; p < points; ++p) {
@@ -38,7 +38,7 @@ std::vector<float> at_random(Index points) {
   return x;
 }
 
-// What the kernels are compared with: one point after another, one level, one corner, one feature.
+// The scalar baseline of the kernels: one point, one level, one corner, one feature at a time.
 struct Scalar {
   explicit Scalar(const HashEncoding<float>& hash) : encoding(hash) {
     std::int64_t rows = 0;
@@ -127,7 +127,7 @@ struct Hash {
   void backward() {
     encoding.backward(x.data(), n, ddensity.data(), dcolour.data(), store.grads(), scratch.data());
   }
-  // Threads own levels, for no two may add to one row.
+  // Threads own levels, because no two may add to the same row.
   void backward_scalar() {
     const int parts = threads();
     parallel_for(parts, 1, [&](Index part, Index) {
@@ -143,7 +143,7 @@ struct Hash {
   Scalar scalar{encoding};
 };
 
-// Both against the scalar loop in double, on a part of the points.
+// Compares both with the scalar loop in double, on a part of the points.
 double error_of(Hash& h, bool forward) {
   const Index n = std::min<Index>(h.n, 4096), width = h.encoding.width();
   const auto size = static_cast<std::size_t>(n * width);

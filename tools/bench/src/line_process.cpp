@@ -20,11 +20,11 @@ namespace fieldmark::bench {
 namespace {
 
 constexpr std::size_t kLastLines = 5;
-constexpr std::size_t kLongestLine = 1 << 20;  // characters: what answers without an end is stopped
+constexpr std::size_t kLongestLine = 1 << 20;  // characters: a program that writes longer lines is stopped
 
 std::string_view name_of(std::string_view entry) { return entry.substr(0, entry.find('=')); }
 
-// This process's environment with entries replaced or added.
+// Returns this process's environment with entries replaced or added.
 std::vector<std::string> merged_environment(const std::vector<std::string>& ours) {
   std::vector<std::string> all = ours;
   for (char** e = environ; *e; ++e)
@@ -49,8 +49,7 @@ LineProcess::LineProcess(const std::vector<std::string>& command, const std::vec
   if (program_.empty() || !(limit_seconds > 0))
     throw ValueError("[LineProcess] command must not be empty and limit_seconds above 0, got '" + program_ +
                      "' and " + std::to_string(limit_seconds));
-  // One socket for both directions: unlike a pipe, it can be written to without a signal when its reader is
-  // gone.
+  // One socket for both directions: unlike a pipe, writing to it raises no signal after its reader has gone.
   std::array<int, 2> ends{-1, -1};
   errors_ = std::tmpfile();
   int error = errors_ ? 0 : errno;
@@ -122,7 +121,7 @@ std::string LineProcess::read_line() {
   }
 }
 
-// It closed its output: it has ended or is about to.
+// The program closed its output: it has ended or is about to.
 void LineProcess::fail_ended(double until) {
   int status = 0;
   pid_t ended = 0;

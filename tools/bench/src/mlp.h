@@ -15,8 +15,8 @@ constexpr Index kChunk =
     256;  // rows: 9 x 64 KiB of activations and gradients at width 64, within a core's L2
 constexpr int kShards = 16;
 
-// L dense layers of one width with bias and ReLU; the loss is <u, y> with a fixed u, so that backward starts
-// from u.
+// L dense layers of one width with bias and ReLU. The loss is <u, y> with a fixed u, so backward starts from
+// u.
 template <class T>
 struct Mlp {
   Mlp(Index depth, Index units, Index rows, Precision precision = Precision::fp32)
@@ -32,7 +32,7 @@ struct Mlp {
     packed = std::make_unique<PackedWeights<T>>(store, PackOptions{.precision = precision});
   }
 
-  // Rows [begin, begin + n) through a tape; parameters' gradients go to `grads`.
+  // Runs rows [begin, begin + n) through a tape; parameter gradients go to `grads`.
   void pass(Tape<T>& tape, T* grads, Index begin, Index n) {
     const Params<T> params(store, grads, *packed);
     const Index at = begin * width;
@@ -50,7 +50,7 @@ struct Mlp {
   Index width, samples;
   ParamStore<T> store;
   std::vector<Dense<T>> layers;
-  std::unique_ptr<PackedWeights<T>> packed;  // renewed in every pass, as after a step of the optimiser
+  std::unique_ptr<PackedWeights<T>> packed;  // repacked in every pass, as after an optimiser step
   std::vector<T> x, u, dx, y;
   bool keep = false;
 };

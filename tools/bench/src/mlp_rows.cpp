@@ -6,7 +6,7 @@
 namespace fieldmark::bench {
 namespace {
 
-// Values, dX and weight gradients of float against double on a part of the samples.
+// Compares values, dX and weight gradients in float with double on a part of the samples.
 double error_of(Index depth, Index width) {
   Mlp<float> f(depth, width, 4 * kChunk);
   Mlp<double> d(depth, width, 4 * kChunk);
@@ -35,7 +35,7 @@ EngineRow chunked(Index depth, Index width, Index samples, const RowOptions& o) 
   return row;
 }
 
-// One pass of chunked(), for a peer to do the same.
+// One pass of chunked() for a peer to repeat.
 SafetensorsFile work(Index depth, Index width, Index samples, const RowOptions& o) {
   Mlp<float> mlp(depth, width, scaled(samples, o.scale));
   const Shape shape{mlp.samples, width};
@@ -60,7 +60,7 @@ EngineRow whole_batch(Index depth, Index width, Index samples, const RowOptions&
   return row;
 }
 
-// The same with AVX2, against AVX2's peak.
+// The same row with AVX2, relative to AVX2's peak.
 EngineRow with_avx2(const std::function<EngineRow()>& row) {
   const ScopedIsa scope(Isa::v3);
   return row();

@@ -7,9 +7,9 @@
 namespace fieldmark::bench {
 namespace {
 
-constexpr int kCompared = 3;  // steps whose losses are compared: the second and third come after Adam's
+constexpr int kCompared = 3;  // steps whose losses are compared: the second and third follow Adam updates
 
-// Steps of training: forward, backward, Adam.
+// Training steps: forward, backward, Adam.
 template <class T, template <class> class Model>
 struct Training {
   explicit Training(const auto& size) : model(size), adam(model.store) {}
@@ -24,7 +24,7 @@ struct Training {
     backward();
     adam.step(model.store.values(), model.store.grads());
   }
-  // The losses of the first steps, and the gradients of the first.
+  // Compares the losses of the first steps, and the gradients of the first.
   void compare() {
     for (int i = 0; i < kCompared; ++i) {
       losses.push_back(item(backward()));
@@ -57,7 +57,7 @@ EngineRow timed(const auto& size, const RowOptions& o) {
   return row;
 }
 
-// The first steps of timed(), for a peer to take.
+// The first steps of timed() for a peer to repeat.
 template <template <class> class Model>
 SafetensorsFile work(const char* network, const auto& size) {
   Training<float, Model> training(size);

@@ -1,6 +1,6 @@
 #pragma once
 // The models whose training steps model_rows.cpp times: those of examples/transformer.cpp and
-// examples/autoencoder.cpp, with free sizes. Private.
+// examples/autoencoder.cpp, with configurable sizes. Private.
 #include <fieldmark/engine/nn/conv2d.h>
 #include <fieldmark/engine/nn/dense.h>
 #include <fieldmark/engine/ops/batched_matmul.h>
@@ -21,8 +21,8 @@
 namespace fieldmark::bench {
 
 struct TransformerSize {
-  Index texts, letters, width, heads;  // letters: of a text
-  Index kinds = 32;                    // of letters
+  Index texts, letters, width, heads;  // letters: per text
+  Index kinds = 32;                    // number of different letters
 };
 
 // One block with a causal mask on random letters; the loss is the cross-entropy of the next letter.
@@ -59,7 +59,7 @@ struct Transformer {
     return reshape(permute(batched_matmul(softmax(scores), head(2)), {0, 2, 1, 3}), x.shape());
   }
   double items() const { return static_cast<double>(size.texts * size.letters); }
-  // Multiplications and additions of the products, forward and backward.
+  // Returns the multiplications and additions of the products, forward and backward.
   double operations() const {
     const auto w = static_cast<double>(size.width);
     return 3 * 2 * items() *
@@ -99,7 +99,7 @@ inline AutoencoderSize scaled(AutoencoderSize s, double scale) {
   return s;
 }
 
-// Convolutions and pooling to a code of two channels at a quarter of the side, and back.
+// Convolutions and pooling down to a code of two channels at a quarter of the side, and back.
 template <class T>
 struct Autoencoder {
   explicit Autoencoder(const AutoencoderSize& s) : size(s), images({s.images, s.side, s.side, 1}) {

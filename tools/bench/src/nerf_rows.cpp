@@ -8,7 +8,7 @@
 namespace fieldmark::bench {
 namespace {
 
-// Samples a second once the field has taken shape. Steps differ, so the rows' runs are stretches of steps.
+// Measures samples per second once the field has taken shape. Steps differ, so a run is a stretch of steps.
 EngineRow training_steps(const RowOptions& o, const std::string& which, Index first_samples, Index warm) {
   const auto scaled = [&](Index n) {
     return std::max<Index>(8, static_cast<Index>(static_cast<double>(n) * o.scale));

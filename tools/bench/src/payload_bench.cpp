@@ -15,7 +15,7 @@ constexpr Index kTrialsAtOnce = 16;
 
 double normal_tail(double x) { return std::erfc(x / std::sqrt(2.0)) / 2; }
 
-// m with P(normal number > m) = rate, rate in (0, 1/2).
+// Returns m with P(normal number > m) = rate, for rate in (0, 1/2).
 double strength_of(double rate) {
   double low = 0, high = 40;
   for (int i = 0; i < 100; ++i) {
@@ -46,7 +46,7 @@ void add(watermark::PayloadAccuracy& sum, const watermark::PayloadAccuracy& a) {
   sum.corrected += a.corrected;
 }
 
-// f(trial, piece) over all trials, on several threads; each piece has its own result.
+// Calls f(trial, result) for all trials on several threads; each chunk of trials has its own result.
 template <class Result, class F>
 std::vector<Result> over_trials(Index trials, const Result& empty, F&& f) {
   std::vector<Result> pieces(static_cast<std::size_t>((trials + kTrialsAtOnce - 1) / kTrialsAtOnce), empty);
@@ -113,7 +113,7 @@ PayloadBench run_payload_bench(const PayloadBenchOptions& options,
     if (!(rate >= 0 && rate < 0.5))
       throw ValueError("[run_payload_bench] error_rates must be in [0, 0.5), got " + std::to_string(rate));
   const PayloadCodec codec(options.bits);
-  watermark::random_payload(codec, CounterRng(0), 0);  // throws where messages hold none
+  watermark::random_payload(codec, CounterRng(0), 0);  // throws if messages hold no payload
   PayloadBench bench{watermark::random_payload_bits(codec), codec.layouts(), {}, {}};
   const double parts = static_cast<double>(options.error_rates.size() + 1);
   for (std::size_t i = 0; i < options.error_rates.size(); ++i) {

@@ -19,13 +19,13 @@ namespace {
 using Json = nlohmann::json;
 using Environment = std::vector<std::string>;
 
-// Threads stay on their cores, and memory once taken is kept, in large pages: much of a step of small layers
-// is page faults without.
+// Pins threads to cores, and keeps memory once allocated, in large pages; without this, page faults dominate
+// steps of small layers.
 constexpr std::array kTuning{
     "OMP_PROC_BIND=true",        "MALLOC_MMAP_MAX_=0", "MALLOC_TRIM_THRESHOLD_=1099511627776",
     "MALLOC_TOP_PAD_=268435456", "MALLOC_ARENA_MAX=1", "GLIBC_TUNABLES=glibc.malloc.hugetlb=1"};
 
-// Only its owner can look into it; gone at the end of the scope.
+// A folder that only its owner can access, removed at the end of the scope.
 struct PrivateFolder {
   PrivateFolder() {
     std::string name = (std::filesystem::temp_directory_path() / "fieldmark_peer_XXXXXX").string();
@@ -56,7 +56,7 @@ double positive_seconds(const Json& json) {
   return seconds;
 }
 
-// The next answer; f reads what is in it.
+// Reads the next answer; f parses its contents.
 template <class F>
 auto answer(LineProcess& process, const std::string& python, F f) {
   const std::string line = process.read_line();
@@ -68,8 +68,7 @@ auto answer(LineProcess& process, const std::string& python, F f) {
   }
 }
 
-// Throws if one of the differences is above the limit; what the script forgot to compare would pass
-// otherwise.
+// Throws if a difference exceeds the limit, or if the script omitted a comparison.
 void judge(const std::string& row, const Json& differences, const std::set<std::string>& expected,
            double limit, const char* of_what, Peer::Found& found) {
   for (const std::string& name : expected)

@@ -9,10 +9,10 @@
 namespace fieldmark::bench {
 namespace {
 
-constexpr float kNearKink = 1e-5f;  // sums are of size 1 and their rounding is below 1e-6
+constexpr float kNearKink = 1e-5f;  // sums have size 1 and rounding errors below 1e-6
 constexpr Index kPeerChunk = 1024;  // samples
 
-// Calls f(entry, its first number, how many) for every parameter that a pass reads.
+// Calls f(entry, index of its first number, count) for every parameter that a pass reads.
 template <class F>
 void each_parameter(const ParamStore<float>& store, F f) {
   for (const auto& entry : store.entries())

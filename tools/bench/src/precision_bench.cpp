@@ -33,7 +33,7 @@ Index scaled(double n, const PrecisionBenchOptions& o, Index least) {
   return std::max(least, static_cast<Index>(n * o.scale));
 }
 
-// Root of the mean square difference, in parts of that of b.
+// Root mean square difference relative to that of b.
 template <class A, class B>
 double rms_error(const A& a, const B& b) {
   double off = 0, size = 0;
@@ -45,7 +45,7 @@ double rms_error(const A& a, const B& b) {
   return std::sqrt(off / size);
 }
 
-// The forward pass, dX and dW of one precision, all results in a row.
+// Forward pass, dX and dW in one precision, all results concatenated.
 template <class T>
 double layers(Index samples, Precision precision, int runs, std::vector<double>& results) {
   Mlp<T> mlp(4, 64, samples, precision);
@@ -175,7 +175,7 @@ void add_rendering(Rows& rows, const nerf::RadianceField& field, const nerf::Dat
   }
 }
 
-// Trains once for each variant; the first one's field is what is rendered.
+// Trains once per variant; the first variant's field is used for rendering.
 void add_training(Rows& rows, const nerf::Dataset& train, const nerf::Dataset& test,
                   const PrecisionBenchOptions& o) {
   const Index steps = scaled(600, o, 20);

@@ -1,5 +1,5 @@
 #pragma once
-// The rows of the engine's benchmark, a file for each kind. Private.
+// The rows of the engine benchmark, one file per kind. Private.
 #include <fieldmark/engine/safetensors.h>
 #include <fieldmark/engine/shape.h>
 #include <fieldmark/tools/bench/engine_bench.h>
@@ -14,8 +14,8 @@ struct RowOptions : EngineBenchOptions {
 using RowRun = std::function<EngineRow(const RowOptions&)>;
 struct RowSpec {
   std::string name, what;
-  RowRun run;  // all but name, megabytes and peer; what: the spec's if empty
-  std::function<SafetensorsFile(const RowOptions&)> work{};  // for a peer, see peer_work(); none: no peer
+  RowRun run;  // everything except name, megabytes and peer; what: the spec's if empty
+  std::function<SafetensorsFile(const RowOptions&)> work{};  // for a peer, see peer_work(); empty: no peer
 };
 
 std::vector<RowSpec> chain_rows();
@@ -35,7 +35,7 @@ inline EngineRow row_of(const Timing& t, double operations, double items) {
   return row;
 }
 
-// Fixed numbers in [-1, 1) without a pattern that a cache could use.
+// Fixed numbers in [-1, 1) without a pattern that a cache could exploit.
 template <class T>
 std::vector<T> numbers(Index n, std::uint64_t seed) {
   std::vector<T> out(static_cast<std::size_t>(n));
@@ -47,7 +47,7 @@ std::vector<T> numbers(Index n, std::uint64_t seed) {
   return out;
 }
 
-// Worst |a - b| relative to the largest magnitude |b|; NaN counts as infinitely far.
+// Worst |a - b| relative to the largest magnitude |b|; NaN counts as infinite.
 template <class A, class B>
 double relative_error(const A& a, const B& b) {
   double worst = 0, largest = 0;

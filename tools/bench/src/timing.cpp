@@ -14,7 +14,7 @@
 namespace fieldmark::bench {
 namespace {
 
-constexpr double kBurst = 3e-4;  // seconds; the clock keeps still for longer than that
+constexpr double kBurst = 3e-4;  // seconds; the clock rate is constant for longer than that
 
 }  // namespace
 

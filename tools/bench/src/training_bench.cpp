@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kTurn = 0.5;  // seconds
 
-// A variant in training, with a clock of its own.
+// A variant in training, with its own clock.
 struct Run {
   const TrainingVariant& variant;
   nerf::RadianceField field;
@@ -25,7 +25,7 @@ struct Run {
     timed([&](auto) { trainer.emplace(field, train, v.train); });
   }
   std::string name() const { return variant.choice + ": " + variant.setting; }
-  // The clock goes on while work(now) is done, now being what it shows.
+  // Runs the clock during work(now); now() returns its time.
   template <class F>
   void timed(F work) {
     const auto begin = std::chrono::steady_clock::now();

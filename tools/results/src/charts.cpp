@@ -20,7 +20,7 @@ double number(const Json& row, const char* key) {
   return found == row.end() || found->is_null() ? std::nan("") : found->get<double>();
 }
 
-// A setting may be a word or a number.
+// Returns a setting, which may be a word or a number.
 std::string text(const Json& row, const char* key) {
   const Json& value = row.at(key);
   return value.is_string() ? value.get<std::string>() : value.dump();
@@ -39,11 +39,11 @@ std::string scatter(const bench::ScatterText& about, const std::vector<ScatterPo
   return any ? bench::scatter_chart(about, points) : "";
 }
 
-// Bars are parts of the peak; look-ups and steps, which have none, show their notes alone.
+// Bars show fractions of the peak; look-ups and steps, which have none, show only their notes.
 std::string engine_chart(const Json& result) {
   std::vector<bench::Bar> bars;
   double longest =
-      1;  // Winograd's convolution takes fewer operations than it is credited for: it may pass the peak
+      1;  // Winograd's convolution takes fewer operations than counted, so it may exceed the peak
   for (const Json& row : result.at("rows")) {
     const double part = number(row, "ratio_to_peak"), ratio = number(row, "peer_ratio");
     bars.push_back({text(row, "name"), part, engine_speed(row)});
@@ -57,7 +57,7 @@ std::string engine_chart(const Json& result) {
 }
 
 std::string field_chart(const Json& result) {
-  // The front of the points in sight, without a margin, so that the line rises.
+  // Recomputes the front of the visible points without a margin, so that the line rises.
   std::vector<bench::SpeedQuality> seen;
   for (const Json& row : result.at("rows")) seen.push_back({number(row, "seconds"), number(row, "psnr")});
   const std::vector<bool> line = bench::pareto_front(seen, {.time = 0, .psnr = 0});
@@ -104,7 +104,7 @@ std::string embed_chart(const Json& result) {
                  points);
 }
 
-// The course of the default and of the variants on the front.
+// Draws the learning curves of the default and of the variants on the front.
 std::string embed_curves(const Json& result) {
   Words drawn;
   for (const Json& row : result.at("rows"))
@@ -130,7 +130,7 @@ std::string family(const std::string& attack) {
   return name;
 }
 
-// Damage as an error in grey levels: to the right is more, as severities go.
+// Draws damage as an error in grey levels, increasing to the right, as severities do.
 std::string attacks_chart(const Json& result, const char* key, const char* title) {
   std::vector<ScatterPoint> points;
   bool chosen = false;

@@ -72,7 +72,7 @@ class Page {
     return formatted((*found)["result"][path], words.size() > 2 ? words[2] : "");
   }
 
-  // The first of the results that are there, with the others' rows added to its arrays.
+  // Returns the first available result, with the rows of the others appended to its arrays.
   Json joined(const std::string& ids) {
     Json all;
     for (const std::string& id : split(ids, ',')) {

@@ -19,20 +19,20 @@ namespace {
 using baselines::Cell;
 using bench::LineSeries;
 
-constexpr double kChance = 45, kAll = 100;  // %, of the accuracies' axis
-constexpr Index kBits = 16;                 // of all figures but that of lengths
+constexpr double kChance = 45, kAll = 100;  // %, of the accuracy axis
+constexpr Index kBits = 16;                 // of all figures except that of lengths
 
 struct Kind {
   const char *name, *axis;
-  double none;  // the severity that changes nothing
+  double none;  // severity that changes nothing
 };
 constexpr std::array<Kind, 4> kKinds{{{"noise", "standard deviation, images in [0, 1]", 0},
                                       {"rotation", "largest angle, degrees", 0},
                                       {"scale", "size of the image, as a part", 1},
                                       {"blur", "sigma, pixels", 0}}};
 
-// Those that figures show, so that their lines can be told apart: of the scene with most cells, on the hash
-// field. The page's tables have the others.
+// Returns the cells that figures show, few enough to tell their lines apart: those of the scene with most
+// cells, on the hash field. The page's tables have the others.
 std::vector<Cell> drawn_cells(const std::vector<Cell>& cells) {
   std::map<std::string, int> count;
   for (const Cell& c : cells) ++count[c.name.scene];
@@ -44,7 +44,7 @@ std::vector<Cell> drawn_cells(const std::vector<Cell>& cells) {
   return drawn;
 }
 
-// The line of a name, made where there is none.
+// Returns the line of a name; creates it if needed.
 LineSeries& line_of(std::vector<LineSeries>& lines, const std::string& name, bool dashed = false) {
   const auto found = std::find_if(lines.begin(), lines.end(), [&](const auto& l) { return l.name == name; });
   if (found != lines.end()) return *found;
@@ -52,7 +52,7 @@ LineSeries& line_of(std::vector<LineSeries>& lines, const std::string& name, boo
   return lines.back();
 }
 
-// One line for each system that was measured at two lengths or more.
+// Returns a line for each system measured at two lengths or more.
 std::vector<LineSeries> lines_of_lengths(const std::vector<Cell>& cells) {
   std::vector<LineSeries> lines;
   for (const auto& system : baselines::paper_systems())
@@ -89,7 +89,7 @@ std::vector<LineSeries> lines_of_severity(const std::vector<Cell>& cells, const 
   return lines;
 }
 
-// Curves of the systems, or of the full models and their ablations.
+// Returns the curves of the systems, or of the full models and their ablations.
 std::vector<LineSeries> learning_curves(const std::vector<Cell>& cells, bool ablation) {
   std::vector<LineSeries> lines;
   for (const auto& system : baselines::paper_systems()) {

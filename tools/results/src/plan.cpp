@@ -23,7 +23,7 @@ void replace_all(std::string& text, const std::string& what, const std::string& 
     text.replace(at, what.size(), with);
 }
 
-// Lines [begin, end) with their loops expanded, at the end of `out`.
+// Appends lines [begin, end) to `out` with their loops expanded.
 void expand(const Words& lines, std::size_t begin, std::size_t end, Words& out) {
   for (std::size_t i = begin; i < end; ++i) {
     if (!lines[i].starts_with("%for ")) {

@@ -16,7 +16,7 @@
 namespace fieldmark::results {
 namespace {
 
-constexpr std::size_t kLongestTable = 200;  // rows; lists of views go on in the JSON
+constexpr std::size_t kLongestTable = 200;  // rows; longer lists of views are only in the JSON
 
 std::string cpu_model() {
   std::ifstream file("/proc/cpuinfo");
@@ -27,7 +27,7 @@ std::string cpu_model() {
 
 bool is_list_of_rows(const Json& value) { return value.is_array() && !value.empty() && value[0].is_object(); }
 
-// One row for each number; nested names are joined with a dot.
+// Adds a row per number; nested names are joined with a dot.
 void flatten(const std::string& prefix, const Json& value, std::vector<Words>& rows) {
   if (value.is_object()) {
     const std::string before = prefix.empty() ? "" : prefix + ".";
@@ -49,7 +49,7 @@ Machine machine() {
 }
 
 std::string code_hash(const Words& rooms) {
-  // The lines of the trees that begin with one of the words.
+  // Returns the lines of the trees that begin with one of the words.
   const auto lines_of = [](const Words& beginnings) {
     std::string lines;
     std::istringstream trees(FIELDMARK_TREES);

@@ -91,7 +91,7 @@ Json hash_of(const fs::path& path) {
 }
 
 Json input_hashes(const Plan& plan, const PlannedRow& row, const Rows& rows, const Places& places) {
-  static std::map<fs::path, Json> data_sets;  // hundreds of megabytes: read once
+  static std::map<fs::path, Json> data_sets;  // hundreds of megabytes: hashed once
   Json hashes = Json::object();
   for (const std::string& word : row.inputs()) {
     if (word.starts_with('@')) {

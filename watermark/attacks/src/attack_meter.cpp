@@ -11,7 +11,7 @@
 namespace fieldmark::watermark {
 namespace {
 
-// A pixel between the centres of [H, W, 3], at (x, y) inside the image or half a pixel beyond.
+// Interpolates a pixel of [H, W, 3] at (x, y) inside the image or up to half a pixel beyond.
 std::array<double, 3> between(const Tensor<float>& image, double x, double y) {
   const Index h = image.shape[0], w = image.shape[1];
   x = std::clamp(x, 0.0, static_cast<double>(w - 1));
@@ -33,7 +33,7 @@ std::array<double, 3> between(const Tensor<float>& image, double x, double y) {
 double median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   const std::size_t n = values.size();
-  // Between two p-values the geometric mean: they span many powers of ten.
+  // Takes the geometric mean of the two middle p-values, because they span many powers of ten.
   return n % 2 ? values[n / 2] : std::sqrt(values[n / 2 - 1]) * std::sqrt(values[n / 2]);
 }
 
@@ -67,7 +67,7 @@ AttackDamage attack_damage(const Tensor<float>& before, const Tensor<float>& opa
   return {.psnr = shown > 0 ? -10 * std::log10(squares / (3 * shown)) : std::nan(""), .kept = shown / object};
 }
 
-// Gathers what the views of one attack say.
+// Collects the results of all views under one attack.
 class AttackMeter::Row {
  public:
   Row(const AttackMeter& meter, std::string name) : meter_(meter) { row_.name = std::move(name); }
@@ -92,7 +92,7 @@ class AttackMeter::Row {
   }
 
  private:
-  // What is too small to be read says nothing.
+  // Images too small to read count as unreadable: accuracy 0.5 and no evidence.
   ReadingAccuracy read(const Tensor<float>& view_image, bool with_informed) {
     try {
       return meter_.readers_->read(view_image, meter_.message_, with_informed, [this](const auto& evidence) {

@@ -24,7 +24,7 @@ void check(const Tensor<float>& view_image, const Tensor<float>& object, const E
     throw ValueError("[extractor_attack] step must be above 0 and at most 1, got " + std::to_string(o.step));
 }
 
-// Adds `factor` times the unit vector; adds 0 for 0.
+// Adds `factor` times the unit vector of `from`; a zero vector adds nothing.
 void add_direction(const std::vector<float>& from, double factor, std::vector<float>& to) {
   double squares = 0;
   for (const float x : from) squares += static_cast<double>(x) * static_cast<double>(x);
@@ -32,7 +32,7 @@ void add_direction(const std::vector<float>& from, double factor, std::vector<fl
   for (std::size_t i = 0; i < to.size(); ++i) to[i] += scale * from[i];
 }
 
-// Normal random numbers on the foreground.
+// Draws normal random numbers on the foreground.
 std::vector<float> first_residual(const Tensor<float>& object, const CounterRng& rng) {
   std::vector<float> r(at(3 * object.size()), 0.f);
   for (Index p = 0; p < object.size(); ++p)
@@ -90,7 +90,7 @@ nerf::Dataset renders_against_extractor(const Owner& owner, const nerf::Radiance
     for (Index p = 0; p < object.size(); ++p) object[p] = rgba[4 * p + 3];
     const Tensor<float> changed =
         against_extractor(owner, nerf::composited(view, field.background), object, of_view);
-    // Back to straight alpha: the change of a composited pixel is opacity times that of its colour.
+    // Converts back to straight alpha: a composited pixel changes by opacity times the change of its colour.
     for (Index p = 0; p < object.size(); ++p)
       for (Index c = 0; c < 3 && object[p] > 0.5f; ++c)
         rgba[4 * p + c] =

@@ -16,8 +16,8 @@ namespace {
 
 using Kind = FieldAttackKind;
 
-constexpr Index kBlock = 32;       // numbers with one scale
-constexpr Index kChunk = 1 << 14;  // numbers of a thread's turn
+constexpr Index kBlock = 32;       // elements per scale
+constexpr Index kChunk = 1 << 14;  // elements that a thread processes at a time
 constexpr std::array<double, 3> kLuma{0.299, 0.587, 0.114};
 
 struct Named {
@@ -60,13 +60,13 @@ FieldAttack::Step parse_step(std::string_view name) {
   const char *begin = name.data() + line + 1, *end = name.data() + name.size();
   double amount = 0;
   const auto [stop, error] = std::from_chars(begin, end, amount);
-  // Written so that nan fails.
+  // Written so that NaN fails.
   if (error != std::errc() || stop != end || !(amount >= kind->low && amount <= kind->high)) fail(name);
   return {kind->kind, amount};
 }
 
-// Half precision has 11 bits of mantissa and exponents from -14: a whole number of quanta, which are powers
-// of two.
+// Rounds to half precision, which has 11 bits of mantissa and exponents from -14: the result is a whole
+// number of quanta, which are powers of two.
 float to_half(float w) {
   constexpr float kLargest = 65504;
   if (!(std::abs(w) < kLargest)) return std::copysign(kLargest, w);
@@ -89,7 +89,7 @@ void prune(std::span<float> w, double fraction) {
   if (count == 0) return;
   std::vector<std::size_t> order(w.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  // Ties go by position, so that the result is the same everywhere.
+  // Breaks ties by position, so that the result is the same everywhere.
   const auto less = [&](std::size_t a, std::size_t b) {
     const float x = std::abs(w[a]), y = std::abs(w[b]);
     return x < y || (x == y && a < b);
@@ -112,7 +112,7 @@ void add_noise(std::span<float> w, double amount, const CounterRng& rng, std::ui
   });
 }
 
-// The numbers of one tensor after a step that treats each tensor alike.
+// Applies to one tensor a step that treats every tensor alike.
 void change(std::span<float> w, const FieldAttack::Step& step, const CounterRng& rng, std::uint64_t stream) {
   switch (step.kind) {
     case Kind::weights_noise:
@@ -131,7 +131,8 @@ void change(std::span<float> w, const FieldAttack::Step& step, const CounterRng&
   }
 }
 
-// By way of the tensors that a file has: the two parts of a table apart, and only the rows that are read.
+// Changes the tensors as a file stores them: the two parts of a table separately, and only the rows that are
+// read.
 void change_tensors(nerf::RadianceField& field, const FieldAttack::Step& step, const CounterRng& rng,
                     std::uint64_t place) {
   SafetensorsFile file;
@@ -148,7 +149,7 @@ void change_tensors(nerf::RadianceField& field, const FieldAttack::Step& step, c
   field.restore(file, "");
 }
 
-using Matrix = std::array<std::array<double, 3>, 3>;  // new sum i = sum_j m[i][j] sum j
+using Matrix = std::array<std::array<double, 3>, 3>;  // new logit i = sum_j m[i][j] logit j
 
 // Rodrigues' formula for the axis (1, 1, 1) / sqrt(3).
 Matrix turn_about_grey(double degrees) {
@@ -159,7 +160,7 @@ Matrix turn_about_grey(double degrees) {
            {same - cross, same + cross, c + same}}};
 }
 
-// Colours leave through a sigmoid: what can be done to them by numbers alone is done to the sums before it.
+// Colours come from a sigmoid, so changes of colour that need weights alone act on the logits before it.
 void change_colours(nerf::RadianceField& field, const Matrix& m, double shift) {
   for (const char* prefix : {"", "coarse/"}) {
     if (*prefix && !field.coarse) continue;

@@ -20,7 +20,7 @@ ShareInterval wilson_interval(Index successes, Index trials) {
   const double n = static_cast<double>(trials), p = static_cast<double>(successes) / n;
   const double middle = p + z * z / (2 * n), half = z * std::sqrt(p * (1 - p) / n + z * z / (4 * n * n)),
                scale = 1 + z * z / n;
-  // At the ends rounding would leave a little.
+  // At the ends, rounding would leave a small remainder.
   return {successes == 0 ? 0.0 : (middle - half) / scale,
           successes == trials ? 1.0 : (middle + half) / scale};
 }

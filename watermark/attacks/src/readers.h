@@ -9,16 +9,16 @@
 
 namespace fieldmark::watermark {
 
-// Both readings of images, and what they cost.
+// Reads images with both detectors, and measures the time.
 class Readers {
  public:
-  // Without cells in space there is no informed detection. Owner and code must outlive it.
+  // Without cells there is no informed detection. Owner and code must outlive the readers.
   Readers(const Owner& owner, const CellCode& code, bool informed)
       : owner_(owner), code_(code), blind_(owner) {
     if (informed && owner.mark().has_cells()) informed_.emplace(owner);
   }
   bool informed() const { return informed_.has_value(); }
-  // Only informed's numbers may be NaN. Calls tell() with the chosen reading's evidence.
+  // Only the informed and the chosen accuracy may be NaN. Calls tell() with the chosen reading's evidence.
   template <class F>
   ReadingAccuracy read(const Tensor<float>& image, const Message& sent, bool with_informed, F tell) {
     ReadingAccuracy accuracy;
@@ -37,7 +37,7 @@ class Readers {
     accuracy.chosen = share(reading.evidence(), sent);
     return accuracy;
   }
-  // Mean time of reading one image, informed and blindly; NaN without images.
+  // Mean time of reading one image with both detectors; NaN without images.
   double seconds() const { return finite_mean(seconds_); }
 
  private:

@@ -14,13 +14,13 @@ namespace fieldmark::watermark {
 namespace {
 
 constexpr int kShards = 16;
-constexpr Index kRays = 64, kChunks = 32;  // of a chunk, of a step
+constexpr Index kRays = 64, kChunks = 32;  // rays per chunk, chunks per step
 constexpr float kLeastWeight = 1e-3f;
-constexpr int kRounds = 4;          // of scale_to(), each confirmed by all views
-constexpr double kNear = 0.02;      // dB from the mark PSNR asked for
-constexpr float kOfSamples = 0.1f;  // weight of the samples' own colours beside what rays show
+constexpr int kRounds = 4;          // rounds of scale_to(), each confirmed on all views
+constexpr double kNear = 0.02;      // dB from the target mark PSNR
+constexpr float kOfSamples = 0.1f;  // weight of the samples' own colours relative to those of rays
 
-// The parameters of the colour networks, which lie together.
+// Returns the range of the colour networks' parameters, which are contiguous.
 AdamRange colour_range(const ParamStore<float>& params, double lr_factor) {
   AdamRange range{.begin = params.size(), .lr_factor = lr_factor};
   for (const auto& e : params.entries())
@@ -33,8 +33,7 @@ AdamRange colour_range(const ParamStore<float>& params, double lr_factor) {
 
 }  // namespace
 
-// The samples of a chunk that light reaches, what they look like unmarked, and what they pass back to the
-// table.
+// The visible samples of a chunk, their unmarked colours, and the gradients that they pass back to the table.
 struct Baker::Chunk {
   nerf::CubeRays rays;
   std::vector<float> jitter;
@@ -62,10 +61,10 @@ Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& opti
     throw ValueError("[baker] cameras must be at least 1 and around at least 0, got " +
                      std::to_string(options.cameras) + " and " + std::to_string(options.around));
   marking_ = owner.marking(cell_signs(owner.code(), message));
-  // Colours that no ray asks for go astray: without those around, lego's underside changes by 29 dB.
+  // Colours that no ray constrains drift: without the cameras around, lego's underside changes by 29 dB.
   cameras_ = cameras_around(owner.field, options.cameras, options.around, 0, options.seed + 31);
-  // Density's parameters get no gradient: its networks are outside the ranges, and its features are left
-  // alone where the gradient is 0.
+  // The parameters of the density get no gradient: its networks are outside the ranges, and its features do
+  // not change where the gradient is 0.
   std::vector<AdamRange> ranges = {colour_range(field_.params, field_.field.has_table() ? 0.2 : 0.05)};
   if (field_.field.has_table())
     ranges.push_back({.begin = field_.field.network_size(), .end = field_.params.size(), .skip_zero = true});
@@ -210,7 +209,7 @@ double Baker::mark_psnr(const MarkPsnrViews& views) const {
   return MarkPsnrMeter(owner_.field, views)(marked);
 }
 
-// Numbers that learning left alone keep their bytes, the sign of a zero too.
+// Parameters that training left unchanged keep their bytes, including the sign of a zero.
 void Baker::set_scale(double scale, std::span<const float> learnt) {
   const auto unmarked = owner_.field.params.values();
   const auto values = field_.params.values();
@@ -219,8 +218,8 @@ void Baker::set_scale(double scale, std::span<const float> learnt) {
     values[i] = learnt[i] == unmarked[i] ? unmarked[i] : unmarked[i] + s * (learnt[i] - unmarked[i]);
 }
 
-// Where a scale takes the mark PSNR is sought on some of the views, whose mean differs from that of all by a
-// bias that hardly depends on the scale; all views confirm it.
+// Searches the scale on a subset of the views. The mean of the subset differs from that of all views by a
+// bias that hardly depends on the scale; all views confirm the result.
 Baker::MarkPsnr Baker::scale_to(double target, const MarkPsnrViews& views) {
   const MarkPsnrMeter meter(owner_.field, views);
   nerf::Renderer marked(field_, mark_psnr_rendering());
@@ -241,8 +240,8 @@ Baker::MarkPsnr Baker::scale_to(double target, const MarkPsnrViews& views) {
   return found;
 }
 
-// Secants of mark PSNR over log scale; the first is that of a change twice as large, 6 dB stronger, which
-// rounding and colours at the ends of their range bend.
+// Secant method for the mark PSNR over log scale. The first slope is that of a linear change, 6 dB for a
+// factor of 2, from which rounding and clamped colours deviate.
 void Baker::seek(double target, std::span<const float> learnt, const std::function<double()>& measure,
                  MarkPsnr& found) {
   double slope = -1;

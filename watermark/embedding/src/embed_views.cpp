@@ -8,10 +8,10 @@
 
 namespace fieldmark::watermark {
 namespace {
-constexpr Index kWindowSize = 160;    // pixels of the small image that shows where the object is
-constexpr Index kMlpWindowSize = 80;  // of an mlp field, where larger ones would take longer than the views
-constexpr Index kCoarsest = 4;        // a side of the patch over the least of a view's
-constexpr Index kParts = 4;           // of a ray where it passes through more than a surface
+constexpr Index kWindowSize = 160;    // pixels of the small render that locates the object
+constexpr Index kMlpWindowSize = 80;  // for an mlp field: larger renders would take longer than the views
+constexpr Index kCoarsest = 4;        // side of the patch over the smallest side of a view
+constexpr Index kParts = 4;           // per ray where it passes through more than a surface
 constexpr Index kFewestCells = 16, kMostCells = 64, kMoreCells = 6;
 constexpr double kCellsABit = 2, kCellsABitOfACut = 8, kPoorViews = 0.1;
 
@@ -27,7 +27,7 @@ std::vector<nerf::Camera> cameras_of(const nerf::CameraSpan& span, const EmbedVi
   return cameras;
 }
 
-// A view as a part of a larger one of background, from a pixel on.
+// Pads a view with background to a larger one, from a given pixel.
 CachedView with_background(CachedView view, Index left, Index top, const PatchSize& size, float background) {
   const Index height = view.height, width = view.width;
   if (height == size.height && width == size.width) return view;
@@ -53,12 +53,12 @@ CachedView with_background(CachedView view, Index left, Index top, const PatchSi
   return view;
 }
 
-// The window's view as a reader has it: nothing where the window reaches beyond the image.
+// Renders the window's view as it is read: background where the window reaches beyond the image.
 CachedView view_of_window(nerf::Renderer& renderer, const nerf::RadianceField& field,
                           const nerf::Camera& image, const Window& window, const PatchSize& size,
                           Index samples) {
   const nerf::Camera camera = window_camera(image, window, size);
-  // The first pixel whose centre is not before an offset from the window's edge.
+  // Returns the first pixel whose centre is not before an offset from the window's edge.
   const auto first = [](double offset, double extent, Index pixels) {
     const double place = offset * static_cast<double>(pixels) / extent - 0.5;
     return std::clamp<Index>(static_cast<Index>(std::ceil(place)), 0, pixels);
@@ -100,10 +100,10 @@ Index samples_for(nerf::SpaceKind space) { return space == nerf::SpaceKind::cont
 std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, const PatchSize& patch,
                                           const EmbedViewOptions& options, std::uint64_t seed,
                                           const std::function<bool(Index, Index)>& progress) {
-  // The samples the field was trained with: quick images to find the object in.
+  // Renders at the training sample spacing: quick images for locating the object.
   nerf::Renderer renderer(field, {.finer = 1, .supersampling = 1});
   const float background = nerf::background_value(field.background);
-  const Index own = std::max(field.cameras.width, field.cameras.height);  // pixels of its images
+  const Index own = std::max(field.cameras.width, field.cameras.height);  // pixels of the field's images
   std::vector<CachedView> views;
   const Index seen = field.coarse ? kMlpWindowSize : kWindowSize;
   const Index samples = options.samples > 0 ? options.samples : samples_for(field.space.kind);

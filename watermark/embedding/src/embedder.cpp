@@ -14,7 +14,7 @@ namespace fieldmark::watermark {
 namespace {
 
 constexpr AdamOptions kAdam{.lr = 1, .beta2 = 0.99, .eps = 1e-8, .zero_grads = true};
-constexpr std::uint64_t kOfBatch = 8 * 64;  // place of what a whole batch draws: after those of 64 images
+constexpr std::uint64_t kOfBatch = 8 * 64;  // index of a whole batch's draws, after those of 64 images
 
 double blend(double from, double to, double fraction) { return from + (to - from) * fraction; }
 
@@ -45,7 +45,7 @@ Embedder::Embedder(Owner& owner, std::span<const CachedView> views, const EmbedO
   keep("image_loss", figures_.loss);
 }
 
-// Networks that never see the owner's code carry no trace of its key.
+// Networks that never see the owner's code hold no trace of its key.
 CellCode Embedder::fresh_code(std::uint64_t place) const {
   return owner_.code(derive_key(key_of_seed(options_.seed), "fieldmark training code", place));
 }
@@ -63,14 +63,14 @@ TrainingImage Embedder::draw(Index image, Tape<float>& tape) const {
   p.code = fresh_code(place);
   p.signs = cell_signs(p.code, p.message);
   const auto often = [](float x) { return x < 2.f / 3; };
-  // Unless they are mixed, one of none, rotation, zoom, blur and noise for the whole batch.
+  // Unless distortions are mixed, the whole batch takes one of none, rotation, zoom, blur and noise.
   const int only = d.mixed ? 0 : static_cast<int>(5 * choice_rng_.uniform4(step, kOfBatch)[0]);
   const auto through = [&](int kind, bool drawn) { return d.mixed ? drawn : kind == only; };
   const bool turned = through(1, often(a[1])), zoomed = through(2, often(a[3]));
   const double angle =
       turned ? blend(-d.rotation, d.rotation, static_cast<double>(a[2])) * 3.14159265358979 / 180 : 0;
   const double zoom = zoomed ? blend(d.zoom_out, d.zoom_in, static_cast<double>(b[0])) : 1;
-  // A window at a random place that stays inside the image; a small shift where the whole image is seen.
+  // Draws a window at a random place inside the image; a small shift where the whole image is visible.
   const PatchSize patch = owner_.options().patch();
   const auto size = static_cast<double>(patch.height),
              height = static_cast<double>(views_[at(p.view)].height);
@@ -89,7 +89,7 @@ TrainingImage Embedder::draw(Index image, Tape<float>& tape) const {
   return p;
 }
 
-// The samples of a view, each moved by a random shift.
+// Returns the samples of a view, each moved by a random shift.
 float* Embedder::shifted_positions(Tape<float>& tape, Index view, std::uint64_t place) const {
   const CachedView& v = views_[at(view)];
   const Index samples = static_cast<Index>(v.weight.size());
@@ -97,7 +97,7 @@ float* Embedder::shifted_positions(Tape<float>& tape, Index view, std::uint64_t 
   const auto beta = static_cast<float>(options_.distortions.sample_shift);
   for (Index k = 0; k < samples; ++k) {
     const auto z = shift_rng_.uniform4(place, static_cast<std::uint64_t>(k));
-    // A uniform number of variance 1 for each axis: the shape of so small a shift does not matter.
+    // Draws a uniform number of variance 1 per axis: the distribution of so small a shift does not matter.
     for (Index a = 0; a < 3; ++a)
       x[3 * k + a] = v.position[at(3 * k + a)] + beta * 3.4641f * (z[at(a)] - 0.5f);
   }
@@ -184,8 +184,8 @@ void Embedder::calibrate(Index views) {
   const double target = owner_.options().mark_psnr;
   owner_.gain = std::pow(10.0, -target / 20);
   nerf::Renderer renderer(owner_.field, mark_psnr_rendering());
-  // Three rounds: the first sets the size, the others what clamping and rounding to 8 bits change. All views
-  // are needed by the last alone.
+  // Three rounds: the first sets the scale, the others correct for clamping and rounding to 8 bits. Only the
+  // last round needs all views.
   for (int round = 0; round < 3; ++round) {
     const double mark_psnr = meter(
         renderer,

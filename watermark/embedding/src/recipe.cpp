@@ -4,9 +4,9 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr double kSpacing = 1.7320508 / 420;  // of samples, cube sides: a field's by default
+constexpr double kSpacing = 1.7320508 / 420;  // of samples by default, cube sides
 constexpr Index kPaperPatch = 80;             // pixels
-constexpr Index kPaperBatch = 8;              // images a step, whose statistics normalise the extractor
+constexpr Index kPaperBatch = 8;              // images per step, whose statistics normalise the extractor
 
 }  // namespace
 
@@ -36,11 +36,11 @@ void use_colours(MarkColours colours, CellMarkOptions& mark) {
   const CellMarkOptions usual;
   const bool light = colours == MarkColours::light;
   mark.network.bands =
-      light ? 5 : usual.network.bands;  // finer detail than a cell costs likeness for nothing
+      light ? 5 : usual.network.bands;  // detail finer than a cell costs likeness without a benefit
   mark.network.tilt = light ? 50 : colours == MarkColours::mixed ? 30 : usual.network.tilt;
   mark.network.shading = light ? 0.97 : usual.network.shading;
   mark.training.smooth_weight = light ? 0 : usual.training.smooth_weight;  // light is smooth
-  mark.training.flat_weight = light ? 0.8 : usual.training.flat_weight;    // and shows most on walls
+  mark.training.flat_weight = light ? 0.8 : usual.training.flat_weight;    // and most visible on walls
 }
 
 Index batch_for(nerf::SpaceKind space) {
@@ -59,7 +59,7 @@ EmbedRecipe embed_recipe(std::string_view preset) {
   } else if (preset == "code") {
     r.mark = code_options();
     r.embed.extractor_lr = 2;
-    // Samples move in all directions there too, and not along the ray about the lower end of their interval.
+    // Here too, samples move in all directions, not along the ray about the lower end of their interval.
     r.embed.distortions = {
         .noise = 0, .rotation = 0, .zoom_out = 1, .zoom_in = 1, .blur = 0, .sample_shift = 0.2 * kSpacing};
   } else {

@@ -10,7 +10,7 @@ namespace fieldmark::watermark {
 namespace {
 constexpr double kLeast = std::numeric_limits<double>::min();
 
-// The largest |S_c|: evidence is divided by it, so that squares neither overflow nor vanish.
+// Returns the largest |S_c|; dividing the evidence by it keeps squares from overflowing or vanishing.
 double check_evidence(std::string_view op, std::span<const double> evidence, const CellCode& code) {
   if (evidence.size() != code.bit.size() || code.sign.size() != code.bit.size()) {
     throw ValueError("[" + std::string(op) + "] evidence: must have " + std::to_string(code.bit.size()) +
@@ -33,8 +33,8 @@ void check_count(std::string_view op, Index matching, Index n) {
                    ", got " + std::to_string(matching));
 }
 
-// P(X >= k) for k >= n / 2 (0 above n): C(n, k) / 2^n times a series of falling ratios. Mantissa and exponent
-// of the product are kept apart against overflow.
+// Returns P(X >= k) for k >= n / 2 (0 above n): C(n, k) / 2^n times a series of falling ratios. Keeps
+// mantissa and exponent of the product apart to avoid overflow.
 long double upper_tail(Index k, Index n) {
   if (k > n) return 0;
   long double term = 1;
@@ -147,7 +147,7 @@ BitMatch match_bits(const BitReading& reading, const Message& message) {
 double p_value_bits(Index matching, Index n) {
   check_count("p_value_bits", matching, n);
   if (2 * matching >= n) return at_least_normal(upper_tail(matching, n));
-  // P(X >= k) = 1 - P(X <= k - 1) = 1 - P(X >= n - k + 1), and the last is at most 1/2: no cancellation.
+  // P(X >= k) = 1 - P(X <= k - 1) = 1 - P(X >= n - k + 1). The last term is at most 1/2, so nothing cancels.
   return at_least_normal(1 - upper_tail(n - matching + 1, n));
 }
 

@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::json;
 constexpr char kFormat[] = "fieldmark evidence 1";
-// Signed records keep the keys of version 0.1, so that old evidence still checks.
+// Signed records keep the JSON keys of version 0.1, so that old evidence remains valid.
 constexpr char kCommitment[] = "claim", kImages[] = "pictures";
 
 Json score_json(const EvidenceScore& s) {
@@ -83,7 +83,7 @@ Index whole_number(const Json& j, std::string_view name) {
   return j.get<Index>();
 }
 
-// Ten digits of T leave T^2 / 2 with an error of 5e-10 T^2, at most 2e-6 since T^2 is below the number of
+// With ten digits of T, T^2 / 2 has an error of 5e-10 T^2, at most 2e-6 since T^2 is below the number of
 // cells.
 void check_score(const Json& j, const Message& message, std::string_view name) {
   const double t = j.at("statistic").get<double>();

@@ -8,7 +8,7 @@ namespace {
 
 using Real = long double;
 
-// P(X >= k) of n fair bits, from Pascal's triangle, each row halved on the way.
+// P(X >= k) of n fair bits, from Pascal's triangle with each row halved.
 void compare_tails(Index n, WorstError& error) {
   std::vector<Real> row(static_cast<std::size_t>(n) + 1);
   row[0] = 1;
@@ -22,7 +22,7 @@ void compare_tails(Index n, WorstError& error) {
   }
 }
 
-// exp(-T^2 / 2) down to the least normal number: a rounding of T^2 counts T^2 / 2 times.
+// exp(-T^2 / 2) down to the least normal number: a rounding error of T^2 is amplified by T^2 / 2.
 void compare_keyed(WorstError& error) {
   for (double t = 0.01; t < 37.6; t += 0.01) {
     const Real want = std::max<Real>(std::exp(-Real{t} * t / 2), std::numeric_limits<double>::min());

@@ -21,7 +21,7 @@ std::string packed_bits(const Message& message) {
 }  // namespace
 
 std::string soft_binding_json(const Message& message, std::string_view commitment) {
-  const Json parameters{{"bits", message.size()}, {"claim", commitment}};  // the key of version 0.1
+  const Json parameters{{"bits", message.size()}, {"claim", commitment}};  // the JSON key of version 0.1
   const Json block{{"scope", Json::object()}, {"value", base64_of(packed_bits(message))}};
   const Json data{
       {"alg", kSoftBindingAlgorithm},

@@ -6,12 +6,12 @@
 
 namespace fieldmark::watermark {
 
-/// The algorithm's name in soft bindings, in the style of the C2PA soft binding algorithm list: reversed
+/// Name of the algorithm in soft bindings, in the style of the C2PA soft binding algorithm list: reversed
 /// domain, name and version. It is not on that list; a deployment registers its own.
 inline constexpr std::string_view kSoftBindingAlgorithm = "org.fieldmark.keyed-cells.1";
 
-/// A C2PA soft-binding assertion as JSON for a manifest's definition. It states that the images carry a
-/// message, by which a repository finds a stripped manifest.
+/// Returns a C2PA soft-binding assertion as JSON for a manifest's definition. It states that the images carry
+/// a message, by which a repository finds a stripped manifest.
 ///   {"label": "c2pa.soft-binding", "data": {"alg", "name", "blocks": [{"scope": {}, "value"}], "alg-params",
 ///   "bindingMetadata": {"description"}}}
 /// value is base64 of the message's bits, most significant first, padded with zeros; alg-params is base64 of

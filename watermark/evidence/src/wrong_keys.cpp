@@ -76,7 +76,8 @@ Index binomial_upper(Index n, double p, double level) {
   check_binomial(n, p, level);
   if (p == 0 || n == 0) return 0;
   if (p == 1) return n;
-  // Weights relative to the mode's, down to negligible ones: no factorials, no underflow for any n.
+  // Sums weights relative to that of the mode, down to negligible ones: no factorials, and no underflow for
+  // any n.
   const long double odds = static_cast<long double>(p) / (1 - static_cast<long double>(p));
   const auto mode = std::min(n, static_cast<Index>(static_cast<double>(n + 1) * p));
   constexpr long double kNegligible = 1e-25L;
@@ -104,7 +105,7 @@ Index binomial_upper(Index n, double p, double level) {
 }
 
 CountInterval binomial_interval(Index n, double p, double level) {
-  // n - X ~ Binomial(n, 1 - p): its upper bound is the lower one of X.
+  // n - X ~ Binomial(n, 1 - p), and its upper bound gives the lower bound of X.
   const double each = 1 - (1 - level) / 2;
   return {n - binomial_upper(n, 1 - p, each), binomial_upper(n, p, each)};
 }

@@ -14,7 +14,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little);
 constexpr std::size_t kWordBytes = sizeof(std::uint64_t);
 
-// The hashed message; only its counter changes from block to block. The length in front separates the streams
+// The hashed message; only its counter changes from block to block. The leading length separates the streams
 // of all domains.
 class HashInput {
  public:
@@ -23,7 +23,7 @@ class HashInput {
     std::memcpy(bytes_.data(), &length, kWordBytes);
     bytes_.append(domain).append(kWordBytes, '\0');
   }
-  // As many bytes as `out` has.
+  // Fills all of `out`.
   template <class Out>
   void hash(const Key& key, std::uint64_t counter, Out& out) {
     std::memcpy(bytes_.data() + bytes_.size() - kWordBytes, &counter, kWordBytes);

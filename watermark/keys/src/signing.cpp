@@ -28,7 +28,7 @@ const unsigned char* bytes_of(std::string_view text) {
   return reinterpret_cast<const unsigned char*>(text.data());
 }
 
-// RFC 8410's prefix of the 32 bytes: SEQUENCE { SEQUENCE { OID 1.3.101.112 }, BIT STRING }.
+// Prefix of the 32 bytes in RFC 8410: SEQUENCE { SEQUENCE { OID 1.3.101.112 }, BIT STRING }.
 constexpr std::array<std::uint8_t, 12> kDerHead{0x30, 0x2a, 0x30, 0x05, 0x06, 0x03,
                                                 0x2b, 0x65, 0x70, 0x03, 0x21, 0x00};
 }  // namespace

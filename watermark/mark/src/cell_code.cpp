@@ -32,7 +32,7 @@ CellDealer::CellDealer(std::span<const double> area, Index n_bits)
 }
 
 void CellDealer::deal(const Key& key, CellCode& code) const {
-  // A word for each bit of each group: where the last group is short, which bits it serves is keyed too.
+  // One word per bit of each group: in a short last group, the key also decides which bits get a cell.
   const std::size_t groups = (ranked_.size() + n_bits_ - 1) / n_bits_;
   std::vector<std::uint64_t> words(groups * n_bits_);
   keyed_words(key, "fieldmark cell order", words);

@@ -57,12 +57,12 @@ Index CellGrid::place(Index side, const float x[3]) {
   return c[0] + side * (c[1] + side * c[2]);
 }
 
-// The cells around a position with their trilinear weights, each cell once.
+// Returns the cells around a position with their trilinear weights, each cell once.
 CellGrid::Near CellGrid::near(const float* x) const {
   Index base[3];
   float f[3];
   for (int a = 0; a < 3; ++a) {
-    // As place() does, NaN goes to cell 0: the cast of NaN to an integer would be undefined.
+    // As in place(), NaN goes to cell 0: casting NaN to an integer would be undefined.
     const float inside = x[a] > 0 ? std::min(x[a], 1.f) : 0.f;
     const float p = inside * static_cast<float>(side_) - 0.5f;
     base[a] = static_cast<Index>(std::floor(p));
@@ -112,8 +112,8 @@ CellGrid::Mix CellGrid::mix(const float* x) const {
       return out;
     }
   if (cells.count == 0) return out;
-  // s[way]: what blend() gives where bit k - 1 of way is set if cell k's sign is -. The first cell's is +:
-  // all signs turned give the same products.
+  // s[way]: the output of blend() where bit k - 1 of way is set if cell k's sign is -. The first cell's sign
+  // is +, because reversing all signs gives the same products.
   std::array<float, 128> s{cells.weight[0]};
   std::size_t ways = 1;
   for (int k = 1; k < cells.count; ++k, ways *= 2)
@@ -123,7 +123,7 @@ CellGrid::Mix CellGrid::mix(const float* x) const {
     }
   for (std::size_t i = 0; i < ways; ++i)
     s[i] = std::clamp(kSteepness * s[i], -1.f, 1.f) / static_cast<float>(ways);
-  // A cell's part is the sum over its + less that over its -; then both are one for the cells before it.
+  // A cell's part is the sum over its + less the sum over its -; then both merge for the cells before it.
   for (auto k = static_cast<std::size_t>(cells.count) - 1; k > 0; --k) {
     ways /= 2;
     for (std::size_t i = 0; i < ways; ++i) {

@@ -17,7 +17,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// The likeliest class of each place and its softmax.
+// Finds the likeliest class of each place and its softmax.
 void likeliest(const float* logits, Index classes, SeenPlaces& places) {
   for (Index p = 0; p < places.height * places.width; ++p) {
     const float* row = logits + p * classes;
@@ -54,7 +54,7 @@ std::string CellMark::configuration() const {
               {"red_green", n.red_green},
               {"luminance", n.luminance},
               {"base_channels", options_.base_channels},
-              // Keys of version 0.1 for the other kind.
+              // Keys of version 0.1 for the other kind of mark.
               {"width", 256},
               {"message_features", 0},
               {"fusion", Json::array()},

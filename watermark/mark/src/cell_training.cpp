@@ -20,12 +20,12 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr Index kCoarse = 8;                    // pixels a side that eyes average at a glance
-constexpr double kReadable = 0.7, kSafe = 0.8;  // shares of right signs between which the mark learns to hide
-constexpr float kBitScale = 6;                  // pooled evidence lies in [-1, 1]: this makes it a logit
+constexpr Index kCoarse = 8;                    // pixels per side that the eye averages at a glance
+constexpr double kReadable = 0.7, kSafe = 0.8;  // shares of correct signs between which hiding phases in
+constexpr float kBitScale = 6;                  // scales pooled evidence, which lies in [-1, 1], to a logit
 
-// How flat the base image is around each pixel of the foreground: exp(-(s / 0.03)^2), s the standard
-// deviation of the green channel in 5 x 5 pixels; the same for the three channels.
+// Flatness of the base image around each pixel of the foreground: exp(-(s / 0.03)^2), where s is the standard
+// deviation of the green channel in 5 x 5 pixels; the same for all three channels.
 std::vector<float> flatness(const CachedView& v, const std::vector<float>& foreground) {
   std::vector<float> flat(3 * foreground.size(), 0.f);
   for (Index y = 0; y < v.height; ++y)
@@ -46,7 +46,7 @@ std::vector<float> flatness(const CachedView& v, const std::vector<float>& foreg
   return flat;
 }
 
-// [cells, bits] the sign of each cell in the column of its bit, 0 elsewhere.
+// Returns [cells, bits] with the sign of each cell in the column of its bit, 0 elsewhere.
 std::span<const float> code_matrix(Tape<float>& tape, const CellCode& code, Index bits) {
   const Index cells = std::ssize(code.bit);
   float* matrix = tape.scratch(cells * bits);
@@ -98,7 +98,7 @@ CellTraining::CellTraining(const CellMark& mark, const Owner& owner, std::span<c
   }
 }
 
-// Change of the image [pixels, 3]: the residual of the cached samples, at the step's power.
+// Returns the change of the image [pixels, 3]: the residual of the cached samples, at the step's power.
 Var<float> CellTraining::residual(Tape<float>& tape, const Params<float>& params,
                                   const TrainingImage& image) const {
   const CachedView& v = views_[at(image.view)];
@@ -113,8 +113,8 @@ Var<float> CellTraining::residual(Tape<float>& tape, const Params<float>& params
       foreground_[at(image.view)], target(image));
 }
 
-// Shares of the residual's power that eyes would see: the power that averaging leaves, and the power on flat
-// areas. Both are about 1 for a mark that takes no care.
+// Returns the shares of the residual's power that the eye would see: the power that remains after averaging,
+// and the power on flat areas. Both are about 1 for a mark that does not adapt.
 Var<float> CellTraining::visibility(Var<float> residual, const TrainingImage& image, double right) const {
   Tape<float>& tape = residual.tape();
   const CachedView& v = views_[at(image.view)];
@@ -142,7 +142,7 @@ Var<float> CellTraining::visibility(Var<float> residual, const TrainingImage& im
              scale(power(residual, flat_[at(image.view)]), ramp * options_.flat_weight));
 }
 
-// Labels of the extractor's places: they move with the pixels of the distorted image.
+// Returns the labels of the extractor's places, which move with the pixels of the distorted image.
 Tensor<std::int32_t> CellTraining::labels_at(const TrainingImage& image, const Shape& shape, Index height,
                                              Index width) const {
   Tensor<std::int32_t> labels = labels_[at(image.view)];

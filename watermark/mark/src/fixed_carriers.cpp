@@ -11,11 +11,11 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr Index kCellsABit = 3, kCoarsest = 4, kFinest = 24;  // the grid: cells a bit, and places an axis
-constexpr double kLeastArea = 2e-3;                           // of a cell: its share of what views show
+constexpr Index kCellsABit = 3, kCoarsest = 4, kFinest = 24;  // the grid: cells per bit, and places per axis
+constexpr double kLeastArea = 2e-3;                           // least share of a cell in the visible area
 constexpr std::array<float, 3> kOne{-0.40f, -0.40f, 0.82f}, kZero{0.71f, -0.71f, 0};  // colours of the values
-constexpr float kAmplitude = 0.154f;        // a root mean square of 21 dB
-constexpr float kWaves = 32 * 3.14159265f;  // k: a period of a sixteenth of the cube's side
+constexpr float kAmplitude = 0.154f;                                                  // an RMS of 21 dB
+constexpr float kWaves = 32 * 3.14159265f;  // k: the period is a sixteenth of the cube's side
 
 CellGrid coarse_grid(std::span<const CachedView> views, Index bits) {
   for (Index side = kCoarsest;; side += 2) {

@@ -19,10 +19,10 @@ namespace {
 
 using Json = nlohmann::json;
 
-// The squared norm of the content loss is a sum over the patch in the paper, a mean here.
+// The squared norm of the content loss is a sum over the patch in the paper and a mean here.
 constexpr PooledTrainingOptions kWarm{.content_weight = 60, .warm_steps = 1500};
-constexpr Index kLessonMessages = 16, kLessonSamples = 512;  // of a step: messages, and samples of each
-constexpr double kColourLesson = 30;  // weight of the squared error of colours beside that of features
+constexpr Index kLessonMessages = 16, kLessonSamples = 512;  // messages per step, and samples of each
+constexpr double kColourLesson = 30;  // weight of the squared error of colours relative to that of features
 
 // Switches of version 0.1 that preset code sets.
 Json code_fusion() { return Json::array({"late_direction", "raw_colour", "repeated"}); }
@@ -60,7 +60,7 @@ std::string FusionMark::configuration() const {
               {"fusion", options_.authors_code ? code_fusion() : Json::array()},
               {"channels", options_.channels},
               {"running_norm", options_.running_norm},
-              // Keys of version 0.1 for the other kind.
+              // Keys of version 0.1 for the other kind of mark.
               {"bands", other.bands},
               {"features", other.features},
               {"tilt", other.tilt},
@@ -77,7 +77,7 @@ FusionMarkOptions stored_fusion_mark(const std::string& configuration) {
   o.width = j.value("width", o.width);
   o.channels = j.value("channels", o.channels);
   o.message_features = j.value("message_features", o.message_features);
-  o.running_norm = j.value("running_norm", o.running_norm);  // which older owners lack
+  o.running_norm = j.value("running_norm", o.running_norm);  // missing in older owners
   const Json fusion = j.value("fusion", Json::array());
   if (fusion != (o.authors_code ? code_fusion() : Json::array()))
     throw ValueError("[owner] fusion must be that of its preset, got an ablation of version 0.1: " +
@@ -117,7 +117,7 @@ nerf::Renderer::Recolour FusionMark::recolour(const Owner& owner, std::vector<st
   });
 }
 
-// Colours of the message composited over the background.
+// Composites the colours of the message over the background.
 PooledMark::Painter FusionMark::painter(const Owner& owner, std::span<const CachedView> views) const {
   std::vector<std::vector<float>> colours;
   for (const CachedView& v : views)
@@ -142,13 +142,13 @@ PooledMark::Painter FusionMark::painter(const Owner& owner, std::span<const Cach
   };
 }
 
-// Samples of a step of the warm start, drawn from all views.
+// Samples for one step of the warm start, drawn from all views.
 struct FusionMark::Lesson {
   float *position, *direction, *colour, *input, *marked, *carried, *message;
 };
 
 // The networks regress to the carriers' colours. The first N_b colour features regress to the texture of the
-// bit that a place carries: what is left to the fusion is to multiply them with the message.
+// bit that a place carries, so the fusion only has to multiply them by the message.
 PooledMark::Learner FusionMark::learner(const Owner& owner, std::span<const CachedView> views) const {
   std::vector<Index> shown;
   for (std::size_t v = 0; v < views.size(); ++v)

@@ -24,7 +24,7 @@ GlobalMarkOptions checked(const GlobalMarkOptions& o) {
   return o;
 }
 
-// A network of the given widths, ReLU behind all layers but the last, and there too if asked for.
+// Makes a network of the given widths, with ReLU after all layers but the last, and there too on request.
 template <class T>
 std::vector<Dense<T>> network(ParamStore<T>& store, const std::string& name,
                               std::initializer_list<Index> widths, bool relu_at_end, std::uint64_t seed) {
@@ -97,7 +97,7 @@ typename GlobalMark<T>::Output GlobalMark<T>::with_features(const Params<T>& par
     return gather_rows<T>(rows, {row, static_cast<std::size_t>(n)});
   };
   const Var<T> of_direction = concatenate<T>({d, nerf::frequency_encoding(d, options_.direction_bands)});
-  std::vector<Var<T>> inputs;  // of G, but for c
+  std::vector<Var<T>> inputs;  // of G, except c
   if (options_.colour_features > 0) {
     std::vector<Var<T>> of_place{x, nerf::frequency_encoding(x, options_.position_bands)};
     if (!options_.authors_code) of_place.push_back(of_direction);
@@ -110,7 +110,7 @@ typename GlobalMark<T>::Output GlobalMark<T>::with_features(const Params<T>& par
   return {.colour = fused(params, std::move(inputs), c, of_samples(message)), .features = features};
 }
 
-// c_m = sigmoid(G(inputs, c)); in the authors' code M and c enter each hidden layer once more.
+// Computes c_m = sigmoid(G(inputs, c)); in the authors' code M and c enter each hidden layer once more.
 template <class T>
 Var<T> GlobalMark<T>::fused(const Params<T>& params, std::vector<Var<T>> inputs, Var<T> c,
                             Var<T> message) const {

@@ -12,7 +12,7 @@
 namespace fieldmark::watermark {
 namespace {
 
-// Fixed numbers in (0, 1) without a pattern.
+// Returns fixed, irregular numbers in (0, 1).
 Tensor<double> numbers(Shape shape, double phase) {
   Tensor<double> t(shape);
   for (Index i = 0; i < t.size(); ++i)
@@ -20,7 +20,7 @@ Tensor<double> numbers(Shape shape, double phase) {
   return t;
 }
 
-// Every ReLU of a layer well open or well shut, in turns: differences must not step over its kink.
+// Makes every ReLU of a layer clearly active or inactive, in turns: differences must not step over its kink.
 void open_and_shut(ParamStore<double>& store, const std::string& layer, double open) {
   const std::span<double> bias = store.values(store.find(layer + "/bias"));
   for (std::size_t i = 0; i < bias.size(); ++i) bias[i] = i % 2 == 0 ? open : -2 * open;
@@ -32,7 +32,7 @@ GradcheckReport check_mark_network() {
   open_and_shut(store, "mark/encode/0", 20);
   open_and_shut(store, "mark/encode/1", 4);
   open_and_shut(store, "mark/fuse/0", 2);
-  for (const char* name : {"mark/encode/1/weight", "mark/fuse/0/weight"})  // the tanh stays where it bends
+  for (const char* name : {"mark/encode/1/weight", "mark/fuse/0/weight"})  // keeps the tanh where it bends
     for (double& w : store.values(store.find(name))) w *= 0.02;
   const std::vector<Tensor<double>> in{numbers({3, 3}, 1), numbers({3, 3}, 2)};
   return gradcheck_module(
@@ -51,7 +51,7 @@ GradcheckReport check_global_mark(Index message_features, Index colour_features,
                                 .width = 4,
                                 .authors_code = authors_code},
                                3);
-  // Layers with a ReLU get weights so small that no sum of theirs reaches the bias.
+  // Gives layers with a ReLU weights so small that no weighted sum reaches the bias.
   const std::pair<const char*, double> layers[] = {
       {"encode/0", 0.05},  {"encode/1", 0.2}, {"encode/2", 0.15}, {"message/0", 0.2},
       {"message/1", 0.15}, {"fuse/0", 0.06},  {"fuse/1", 0.15}};

@@ -5,7 +5,7 @@
 
 namespace fieldmark::watermark {
 
-// A Recolour of colour(tape, x, d, n, rgb), called block by block, so that activations stay in cache.
+// Makes a Recolour from colour(tape, x, d, n, rgb), called block by block, so that activations stay in cache.
 template <class F>
 nerf::Renderer::Recolour in_blocks(F colour) {
   return [colour = std::move(colour)](const float* x, const float* d, Index n, float* rgb) {

@@ -15,7 +15,7 @@ Var<float> Mark::carrier(const Params<float>&, Var<float>, Var<float>) const {
 
 MarkMaker stored_mark(const std::string& configuration) {
   const auto j = nlohmann::json::parse(configuration);
-  // Version 0.1 could store ablations, which the product cannot make.
+  // Version 0.1 could store ablations, which this program cannot make.
   for (const auto& [name, usual] : {std::pair{"colours", true}, {"budget", false}, {"keyed_signs", true}})
     if (j.value(name, usual) != usual)
       throw ValueError(std::string("[owner] ") + name + " must be " + (usual ? "true" : "false") +

@@ -28,9 +28,9 @@ MarkNetworkOptions checked(const MarkNetworkOptions& o) {
   return o;
 }
 
-// The rows of B: blue, tilted towards grey, red-green, and grey, each of length 1 but for the last two, which
-// are scaled. Blue and red-green have no luma (0.299, 0.587, 0.114: ITU-R BT.601), so blue and grey are
-// nearly, not quite, at right angles, and what lies between is made one long.
+// Returns the rows of B: blue, tilted towards grey; red-green; and grey. The first has length 1, the last two
+// are scaled. Blue and red-green have no luma (0.299, 0.587, 0.114: ITU-R BT.601), so blue and grey are not
+// quite at right angles, and their blend is normalised.
 std::array<double, 9> colour_axes(const MarkNetworkOptions& o) {
   constexpr double kRed = 0.299, kGreen = 0.587, kBlue = 0.114;
   const double yellow = kBlue / (kRed + kGreen), blue = std::hypot(1, std::sqrt(2.) * yellow),

@@ -12,12 +12,12 @@ namespace {
 
 constexpr float kStandsOut = 0.08f;
 constexpr Index kReach = 2;          // of the 5 x 5 mean
-constexpr double kMargin = 0.04;     // of the object's longer side, on each side
-constexpr double kFull = 0.98;       // of both sides of the image: there is no plain background
-constexpr Index kLargestWhole = 16;  // times as high as the patch: above, a window is cut by columns
+constexpr double kMargin = 0.04;     // on each side, as a share of the object's longer side
+constexpr double kFull = 0.98;       // share of both sides: from here on, there is no plain background
+constexpr Index kLargestWhole = 16;  // times the patch's height: above, a window is cut by columns
 constexpr Index kColumns = 64;
 
-// Mean over up to 2 kReach + 1 neighbours along one axis.
+// Averages up to 2 kReach + 1 neighbours along one axis.
 std::vector<float> box_mean(const std::vector<float>& x, Index lines, Index length, Index line, Index step) {
   std::vector<float> out(x.size());
   for (Index l = 0; l < lines; ++l)
@@ -30,7 +30,7 @@ std::vector<float> box_mean(const std::vector<float>& x, Index lines, Index leng
   return out;
 }
 
-// Those outside the image are background.
+// Cuts a rectangle out; pixels outside the image are background.
 Tensor<float> pixels_around(const Tensor<float>& rgb, Index left, Index top, Index height, Index width,
                             float background) {
   const Index h = rgb.shape[0], w = rgb.shape[1];
@@ -81,7 +81,7 @@ Tensor<float> cut_window(const Tensor<float>& rgb, const Window& window, const P
     throw ValueError("[cut_window] window and size must be positive, got " + std::to_string(window.width) +
                      " x " + std::to_string(window.height) + " and " + std::to_string(size.width) + " x " +
                      std::to_string(size.height));
-  // Whole pixels around the window first, then one resize of exactly the window by sampling between them.
+  // Rounds the window to whole pixels, cuts it out and resizes it once.
   const auto whole = [](double extent) { return std::max<Index>(1, std::lround(extent)); };
   const Index height = whole(window.height), width = whole(window.width);
   const Index left = std::lround(window.x), top = std::lround(window.y);
@@ -91,8 +91,8 @@ Tensor<float> cut_window(const Tensor<float>& rgb, const Window& window, const P
     return height > size.height ? resize_area(part, size.height, size.width)
                                 : resize_bilinear(part, size.height, size.width);
   }
-  // The window of a very wide or tall image is far larger than the image. Columns shrink one by one, so a few
-  // at a time give the same bits.
+  // The window of a very wide or tall image is far larger than the image. Columns shrink independently, so a
+  // few at a time give the same bits.
   Tensor<float> rows({size.height, width, 3});
   for (Index begin = 0; begin < width; begin += kColumns) {
     const Index columns = std::min(kColumns, width - begin);

@@ -11,7 +11,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr double kLeastAspect = 0.25;
-constexpr double kPatchStep = 8;  // pixels: the extractor halves its images again and again
+constexpr double kPatchStep = 8;  // pixels: the extractor halves its images repeatedly
 
 OwnerOptions checked(const OwnerOptions& o) {
   if (o.bits < 1 || o.bits > 256)
@@ -36,7 +36,7 @@ std::string configuration(const Owner& owner) {
          {"gain", owner.gain},
          {"key_free", owner.key_free()},
          {"field", Json::parse(owner.field.configuration())},
-         // Switches of version 0.1 for ablations.
+         // Ablation switches of version 0.1.
          {"colours", true},
          {"budget", false},
          {"keyed_signs", true}};
@@ -49,7 +49,7 @@ OwnerOptions parse_options(const Json& j) {
   o.bits = j.at("bits");
   o.mark_psnr = j.at("strength");
   o.reader_size = j.at("reader_size");
-  o.reader_aspect = j.value("reader_aspect", o.reader_aspect);  // which older owners lack
+  o.reader_aspect = j.value("reader_aspect", o.reader_aspect);  // missing in older owners
   o.seed = j.at("seed");
   return o;
 }
@@ -89,7 +89,7 @@ void Owner::set_code(const Key& other, Index bits) {
   options_.bits = bits;
 }
 
-// The mark's amplitude is in proportion to its gain while colours are not cut off at 0 and 1.
+// The mark's amplitude is proportional to its gain while colours are not clamped at 0 and 1.
 void Owner::set_mark_psnr(double mark_psnr) {
   if (!mark_->has_gain())
     throw ValueError("[owner] mark_psnr: preset " + mark_->preset() +

@@ -7,7 +7,7 @@
 namespace fieldmark::watermark {
 namespace {
 
-// Of one image.
+// Returns the logits of one image.
 Var<float> logits(const extractor::PooledExtractor<float>& reader, bool running, const Params<float>& params,
                   Var<float> image, const Shape& size) {
   const Var<float> batch = image.tape().reshape(image, {1, size[0], size[1], 3});

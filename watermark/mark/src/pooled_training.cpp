@@ -15,15 +15,15 @@
 namespace fieldmark::watermark {
 namespace {
 
-// The warm start. Values of bits come first; then the weights of places rise.
+// The warm start: the bits' values are learnt first, then the weights of the places rise.
 constexpr double kValues = 350, kRise = 200;     // steps
-constexpr double kElsewhere = 0.3, kSilent = 2;  // of logits of bits that a pixel does not carry: first, last
-constexpr float kOfBackground = 0.3f;            // of the background's logits beside the object's
-constexpr double kIndex = 0.5;                   // of the cross-entropy of the bit that a pixel carries: last
-constexpr double kPixelsABit = 2;   // a pixel's logit over its part of the pooled one, for each bit
-constexpr double kMomentum = 0.05;  // of the running statistics
+constexpr double kElsewhere = 0.3, kSilent = 2;  // first and last weight of bits that a pixel lacks
+constexpr float kOfBackground = 0.3f;            // weight of the background's logits relative to the object's
+constexpr double kIndex = 0.5;                   // final weight of the carried bit's cross-entropy
+constexpr double kPixelsABit = 2;                // a pixel's logit over its part of the pooled one, per bit
+constexpr double kMomentum = 0.05;               // of the running statistics
 
-// Tensors one behind the other along the first axis of `shape`.
+// Stacks tensors along the first axis of `shape`.
 Var<float> stacked(std::span<const Var<float>> parts, const Shape& shape) {
   Tape<float>& tape = parts.front().tape();
   std::vector<Var<float>> rows;
@@ -76,7 +76,7 @@ Var<float> PooledTraining::loss(Tape<float>& tape, const Params<float>& params,
              scale(message_loss(read(params, seen).images, images, figures), options_.message_weight));
 }
 
-// Images [H, W, 3] of one size, normalised together or each by itself.
+// Reads images [H, W, 3] of one size, normalised together or one by one.
 PooledTraining::Places PooledTraining::read(const Params<float>& params, std::span<const Var<float>> seen) {
   const Shape& size = seen.front().shape();
   if (running_norm_)
@@ -109,7 +109,7 @@ Var<float> PooledTraining::message_loss(Var<float> logits, std::span<const Train
   return bce_with_logits<float>(logits, std::span<const float>(sent, at(n)));
 }
 
-// The extractor learns to read the carriers, the mark's networks to paint them.
+// The extractor learns to read the carriers, and the mark's networks learn to paint them.
 Var<float> PooledTraining::lesson(Tape<float>& tape, const Params<float>& params,
                                   std::span<const TrainingImage> images, TrainingFigures& figures) {
   const Var<float> reading = reading_lesson(tape, params, images, figures);
@@ -117,7 +117,7 @@ Var<float> PooledTraining::lesson(Tape<float>& tape, const Params<float>& params
   return add(reading, learner_(tape, params, *carriers_, images.front().step));
 }
 
-// Bit that each pixel of a distorted image carries; N_b: none on the object, N_b + 1: background.
+// Returns the bit that each pixel of a distorted image carries; N_b: none on the object, N_b + 1: background.
 Tensor<std::int32_t> PooledTraining::carried_bits(const TrainingImage& image, const Shape& seen) const {
   const CachedView& v = views_[at(image.view)];
   const auto none = static_cast<std::int32_t>(owner_.options().bits);
@@ -131,8 +131,8 @@ Tensor<std::int32_t> PooledTraining::carried_bits(const TrainingImage& image, co
   return image.warped ? distort::warp_labels(labels, image.warp, none + 1, seen[0], seen[1]) : labels;
 }
 
-// Each pixel shows its own bit and nothing of the others; their mean shows the message. A layer of its own,
-// which is thrown away afterwards, has to tell from the features which bit that is.
+// Each pixel shows its own bit and no other; the mean over pixels shows the message. An extra layer,
+// discarded after training, must tell that bit from the features.
 Var<float> PooledTraining::reading_lesson(Tape<float>& tape, const Params<float>& params,
                                           std::span<const TrainingImage> images, TrainingFigures& figures) {
   const Index bits = owner_.options().bits;

@@ -6,12 +6,12 @@
 
 namespace fieldmark::watermark {
 
-/// Training of a PooledMark: first from FixedCarriers, then on the paper's loss. All images of a step go into
-/// one pass, because an extractor with running statistics normalises by those of the batch.
+/// Training of a PooledMark: first on FixedCarriers, then on the paper's loss. One pass takes all images of a
+/// step, because an extractor with running statistics normalises by those of the batch.
 class PooledTraining : public MarkTraining {
  public:
-  /// @param running_norm  see FusionMarkOptions   @param painter  makes the marked images   @param learner of
-  /// the mark's networks, from carriers; may be empty
+  /// @param running_norm  see FusionMarkOptions   @param painter  makes the marked images
+  /// @param learner  loss of the mark's networks against carriers; may be empty
   PooledTraining(const extractor::PooledExtractor<float>& reader, const PooledTrainingOptions& options,
                  bool running_norm, const Owner& owner, std::span<const CachedView> views,
                  PooledMark::Painter painter, PooledMark::Learner learner);
@@ -44,7 +44,7 @@ class PooledTraining : public MarkTraining {
   PooledMark::Learner learner_;
   std::optional<FixedCarriers> carriers_;  // of a warm start
   ParamStore<float> helpers_;
-  std::vector<Dense<float>> recognise_;  // one in a warm start: which bit a pixel carries, from the features
+  std::vector<Dense<float>> recognise_;  // one layer in a warm start: finds the bit that a pixel carries
   std::vector<BatchStatistics> statistics_;
 };
 

@@ -25,12 +25,12 @@ Var<T> power_budget(Var<T> x, std::span<const T> mask, double target) {
       sum += m * v * v;
     }
   }
-  // Without a masked pixel there is no power to bring to the target: nothing is let through.
+  // Without a masked pixel there is no power to scale to the target: the output is 0.
   const double square = (count > 0 ? sum / count : 0) + 1e-12,
                scale = count > 0 ? target / std::sqrt(square) : 0;
   for (Index i = 0; i < pixels * channels; ++i) y[i] = static_cast<T>(scale) * x.value()[i];
 
-  // dy/dx = scale (I - x (m x)^T / (count rms^2)): the part along x itself changes nothing.
+  // dy/dx = scale (I - x (m x)^T / (count rms^2)): the part along x itself has no effect.
   const T* m = mask.data();
   x.tape().on_backward(out, [=](const T* dy) {
     T* dx = x.grad_acc();

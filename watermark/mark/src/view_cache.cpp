@@ -9,10 +9,10 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr float kLeastOpacity = 0.02f;  // a ray that sees less is background
-constexpr float kPart = 1.f / 128;      // cube sides, half of the finest cell: what lies so near is one part
+constexpr float kLeastOpacity = 0.02f;  // a ray with less is background
+constexpr float kPart = 1.f / 128;      // cube sides, half of the finest cell: samples so close form one part
 
-// Calls trace(lane, row, rays) for the rays of every row of pixels; directions [P, 3] are written.
+// Calls trace(lane, row, rays) for the rays of every row of pixels, and writes directions [P, 3].
 template <class F>
 void for_rows(const nerf::RadianceField& field, const nerf::Camera& camera, std::vector<float>& direction,
               F trace) {
@@ -33,8 +33,8 @@ void for_rows(const nerf::RadianceField& field, const nerf::Camera& camera, std:
   });
 }
 
-// Joins what lies together on a ray: samples from `from` on, near to far, become parts of at most kPart along
-// the ray, each at the mean place and colour of its samples by weight. Returns the end of the parts.
+// Joins neighbouring samples of a ray: samples from `from` on, near to far, become parts of at most kPart
+// along the ray, each at the weighted mean place and colour of its samples. Returns the end of the parts.
 std::vector<nerf::SeenSample>::iterator join_parts(std::vector<nerf::SeenSample>::iterator from,
                                                    std::vector<nerf::SeenSample>::iterator to) {
   auto part = from;
@@ -57,8 +57,8 @@ std::vector<nerf::SeenSample>::iterator join_parts(std::vector<nerf::SeenSample>
   return part + 1;
 }
 
-// Leaves the heaviest parts of each ray of a row, heaviest first. rgba [w, 4] is written: the image,
-// without the background.
+// Keeps the heaviest parts of each ray of a row, heaviest first. Writes rgba [w, 4], the image without the
+// background.
 void keep_heaviest(std::vector<nerf::SeenSample>& row, Index parts, float* rgba) {
   auto end = row.begin();
   for (auto from = row.begin(); from != row.end();) {

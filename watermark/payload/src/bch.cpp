@@ -11,8 +11,8 @@ namespace {
 constexpr unsigned kPrimitive[] = {0x0b, 0x13, 0x25, 0x43, 0x89, 0x11d};
 constexpr int kLeastM = 3, kMostM = 8;
 
-// Powers of alpha whose minimal polynomials make the generator: those of alpha, alpha^3, .. alpha^(2t - 1),
-// each closed under squaring.
+// Exponents of alpha whose minimal polynomials make the generator: those of alpha, alpha^3, ..
+// alpha^(2t - 1), each closed under squaring.
 std::vector<bool> roots(Index order, Index t) {
   std::vector<bool> is_root(static_cast<std::size_t>(order), false);
   for (Index odd = 1; odd < 2 * t; odd += 2)
@@ -130,8 +130,8 @@ std::vector<unsigned> Bch::syndromes(std::span<const std::uint8_t> word) const {
   return s;
 }
 
-// Berlekamp and Massey's shortest register that makes the syndromes: its connection polynomial
-// sigma(x) = prod (1 - X_i x) has the reciprocals of the errors' places X_i = alpha^i as roots.
+// Finds the shortest shift register that generates the syndromes (Berlekamp and Massey). Its connection
+// polynomial sigma(x) = prod (1 - X_i x) has the reciprocals of the error locators X_i = alpha^i as roots.
 // Lowest power first, without leading zeros.
 std::vector<unsigned> Bch::error_locator(const std::vector<unsigned>& s) const {
   std::vector<unsigned> sigma{1}, before{1};
@@ -165,7 +165,7 @@ std::optional<CorrectedWord> Bch::decode(std::span<const std::uint8_t> word) con
   if (std::all_of(s.begin(), s.end(), [](unsigned x) { return x == 0; })) return found;
   const auto sigma = error_locator(s);
   if (sigma.empty() || static_cast<Index>(sigma.size()) - 1 > corrects_) return std::nullopt;
-  // Chien's search, over the places that a shortened word has.
+  // Chien's search, over the positions of a shortened word.
   for (Index place = 0; place < length_; ++place) {
     unsigned value = 0;
     for (std::size_t i = 0; i < sigma.size(); ++i)

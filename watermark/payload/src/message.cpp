@@ -12,7 +12,7 @@ int digit_value(char c) {
   return -1;
 }
 
-// A character may be a control character or a byte of a longer UTF-8 sequence.
+// Returns a character in printable form: it may be a control character or a byte of a longer UTF-8 sequence.
 std::string quoted(char c) {
   const auto byte = static_cast<unsigned char>(c);
   if (byte >= 0x20 && byte < 0x7f) return std::string("'") + c + "'";

@@ -18,7 +18,7 @@ void add(Word& word, const Word& other) {
   for (std::size_t i = 0; i < word.size(); ++i) word[i] ^= other[i];
 }
 
-// Sum of |logit| over the set bits of a word, eight positions a look-up.
+// Sums |logit| over the set bits of a word, eight positions per look-up.
 class Disagreement {
  public:
   explicit Disagreement(std::span<const double> logits) : bytes_((logits.size() + 7) / 8) {
@@ -40,7 +40,7 @@ class Disagreement {
   std::array<std::array<double, 256>, kMostBits / 8> sums_{};
 };
 
-// The least disagreement over all sums of a word and up to `order` rows.
+// Finds the least disagreement over all sums of a word and up to `order` rows.
 struct Search {
   const std::vector<Word>& rows;
   const Disagreement& disagreement;
@@ -84,8 +84,8 @@ OrderedStatistics::OrderedStatistics(const std::vector<std::vector<std::uint8_t>
                      " that are");
 }
 
-// Rows that span the same code, each with the only bit at its pivot; pivots are the most reliable positions
-// that are independent.
+// Returns rows that span the same code, each with the only bit at its pivot; the pivots are the most reliable
+// independent positions.
 std::vector<Word> OrderedStatistics::reduced(std::span<const double> logits,
                                              std::vector<std::size_t>& pivots) const {
   std::vector<std::size_t> order(length_);
@@ -117,7 +117,7 @@ std::vector<std::uint8_t> OrderedStatistics::nearest(std::span<const double> log
     throw ValueError("[OrderedStatistics::nearest] order must be 0 to 3, got " + std::to_string(order));
   std::vector<std::size_t> pivots;
   const std::vector<Word> rows = reduced(logits, pivots);
-  // From here words are differences from what is seen.
+  // From here on, words are differences from the hard decisions.
   Word seen{};
   for (std::size_t i = 0; i < length_; ++i)
     if (logits[i] > 0) flip(seen, i);

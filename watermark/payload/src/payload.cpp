@@ -11,8 +11,8 @@ namespace {
 constexpr Index kByteBits = 8, kUuidBits = 128, kMostBytes = 16;
 constexpr std::size_t kHyphens[] = {8, 13, 18, 23}, kHyphenatedUuid = 36, kUuidDigits = 32;
 
-// Bytes of the character that begins at text[i]; 0 if none does that a payload may have.
-// Source: RFC 3629, section 4 (no surrogates, nothing longer than it need be), less control characters.
+// Returns the number of bytes of the character that begins at text[i]; 0 if no character allowed in a payload
+// begins there. Source: RFC 3629, section 4 (no surrogates, no overlong forms), without control characters.
 std::size_t character_bytes(std::string_view text, std::size_t i) {
   const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
   const unsigned first = byte(i);
@@ -29,7 +29,7 @@ std::size_t character_bytes(std::string_view text, std::size_t i) {
   return control || surrogate || code < least || code > 0x10ffff ? 0 : size;
 }
 
-// The first byte of text that is not part of a character; its size if all are.
+// Returns the index of the first byte that is not part of a character; the size of the text if all are.
 std::size_t first_wrong(std::string_view text) {
   std::size_t i = 0;
   while (i < text.size()) {
@@ -152,10 +152,10 @@ double payload_count(PayloadKind kind, Index data_bits) {
   check_bytes("payload_count", data_bits);
   if (kind == PayloadKind::uuid) return data_bits == kUuidBits ? std::ldexp(1.0, kUuidBits) : 0.0;
   if (kind == PayloadKind::hex) return std::ldexp(1.0, static_cast<int>(data_bits));
-  // Characters by their bytes: ASCII less 33 controls; to U+07FF less 32; to U+FFFF less surrogates; the
-  // rest.
+  // Counts characters by their bytes: ASCII without 33 control characters; to U+07FF without 32; to U+FFFF
+  // without surrogates; the rest.
   constexpr double kCharacters[] = {95, 1888, 61440, 1048576};
-  std::vector<double> texts{1};  // of exactly so many bytes
+  std::vector<double> texts{1};  // texts[i]: number of texts of i bytes
   double sum = 0;
   for (std::size_t bytes = 1; bytes <= static_cast<std::size_t>(data_bits / kByteBits); ++bytes) {
     texts.push_back(0);

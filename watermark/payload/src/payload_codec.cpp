@@ -14,7 +14,7 @@ constexpr Index kMostRawBits = 256, kVersionBits = 4, kDataBits[] = {16, 24, 32,
 constexpr unsigned kHexVersion = 1, kTextVersion = 7, kUuidVersion = 13;
 constexpr int kLeastField = 4, kMostField = 8;
 
-// Share of the words of n bits within a Hamming radius of one word.
+// Returns the share of the words of n bits within a Hamming radius of one word.
 double sphere(Index n, Index radius) {
   double sum = 0, term = std::ldexp(1.0, static_cast<int>(-n));
   for (Index i = 0; i <= radius; ++i) {
@@ -24,7 +24,7 @@ double sphere(Index n, Index radius) {
   return sum;
 }
 
-// The largest radius within the code's that keeps kMostChance.
+// Returns the largest radius, at most the code's, that keeps kMostChance.
 Index radius_of(const Bch& code, double payloads) {
   Index radius = code.corrects();
   while (radius > 0 && payloads * sphere(code.length(), radius) > PayloadCodec::kMostChance) --radius;
@@ -39,7 +39,7 @@ Bits information_of(unsigned version, std::span<const std::uint8_t> data, Index 
   return bits;
 }
 
-// Words of version 0 with one data bit each.
+// Returns the words of version 0 with one data bit each.
 std::vector<Bits> data_words(const Bch& bch, Index data_bits) {
   std::vector<Bits> words;
   for (Index i = 0; i < data_bits; ++i) {
@@ -66,7 +66,7 @@ std::optional<PayloadCodec::Code> PayloadCodec::make_code(Index raw_bits, Index 
   if (payload_count(PayloadKind::uuid, data_bits) > 0) versions.push_back({kUuidVersion, PayloadKind::uuid});
   double payloads = 0;
   for (const Version& v : versions) payloads += payload_count(v.kind, data_bits);
-  // A smaller field may correct more although it leaves bits unused.
+  // A code over a smaller field may correct more, although it leaves bits unused.
   std::optional<Bch> best;
   for (int m = kMostField; m >= kLeastField; --m) {
     const Index length = std::min(raw_bits, (Index{1} << m) - 1);
@@ -158,14 +158,14 @@ std::optional<Payload> PayloadCodec::payload(const Message& message) const {
   return std::nullopt;
 }
 
-// Candidate codewords of a reading.
+// Returns the candidate codewords of a reading.
 std::vector<Bits> PayloadCodec::candidates(const Code& code, std::span<const double> logit) const {
   std::vector<Bits> words;
   const auto used = logit.first(static_cast<std::size_t>(code.bch.length()));
   Bits signs;
   for (double x : used) signs.push_back(x > 0);
   if (auto word = code.bch.decode(signs)) words.push_back(std::move(word->bits));
-  // Relative to each version's offset the data words form a linear code.
+  // Relative to each version's offset, the data words form a linear code.
   const int order = code.layout.data_bits <= 40 ? 3 : 2;
   for (const Bits& offset : code.offsets) {
     std::vector<double> turned(used.begin(), used.end());

@@ -1,5 +1,5 @@
 #pragma once
-// An image under distort::blur(), without a tape. Private.
+// Applies distort::blur() to an image without a tape. Private.
 #include <fieldmark/distort/blur.h>
 #include <fieldmark/engine/tensor.h>
 

@@ -34,7 +34,7 @@ Projection project(const nerf::Camera& camera, const nerf::Vec3& point) {
 nerf::Camera moved(const nerf::Camera& camera, const nerf::Vec3& pivot, const CameraMotion& motion) {
   const Matrix3 r = rotation(camera);
   const Vector3 m = in_axes(camera, pivot);
-  // q' = E q + b in the old camera's axes makes R' = R E^T and t' = t - R' b.
+  // q' = E q + b in the old camera's axes gives R' = R E^T and t' = t - R' b.
   const Matrix3 e = turned({motion[0], motion[1], motion[2]});
   const Vector3 b = m - e * m - m.z() * Vector3(motion[3], motion[4], motion[5]);
   const Matrix3 turned_r = r * e.transpose();

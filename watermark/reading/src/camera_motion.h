@@ -12,22 +12,21 @@ struct Projection {
   double depth = 0;  ///< along the viewing direction, length; x and y are valid if positive
 };
 
-/// The inverse of pixel_ray().
+/// Projects a point: the inverse of pixel_ray().
 ///   q = R^T (p - t),   x = cx - fx q_x / q_z,   y = cy + fy q_y / q_z,   depth = -q_z
 Projection project(const nerf::Camera& camera, const nerf::Vec3& point);
 
 /// Small motion of a camera, including crop and scale of its image: rotation about its three axes, radians;
-/// translation along them, in depths of the pivot; logarithm of a factor of both focal lengths; shift of the
-/// principal point right and down, in widths of the image; logarithm of a factor of the horizontal focal
-/// length alone, for an image that was stretched. All are of the order of the relative displacement in the
-/// image.
+/// translation along them, in depths of the pivot; logarithm of a factor on both focal lengths; shift of the
+/// principal point right and down, in widths of the image; logarithm of a factor on the horizontal focal
+/// length alone, for a stretched image. All are of the order of the relative displacement in the image.
 using CameraMotion = std::array<double, 10>;
 
-/// The camera after a motion: in its axes a point q goes to exp(turn) (q - m) + m + d shift, where m is the
-/// pivot and d its depth.   @param pivot  in the world, at a positive depth
+/// Moves a camera: in its axes a point q goes to exp(turn) (q - m) + m + d shift, where m is the pivot and d
+/// its depth.   @param pivot  in the world, at a positive depth
 nerf::Camera moved(const nerf::Camera& camera, const nerf::Vec3& pivot, const CameraMotion& motion);
 
-/// Derivatives of a point's x and y, pixels, by the motion, at rest.
+/// Computes the derivatives of a point's x and y, pixels, by the motion, at rest.
 /// @param point  at a positive depth
 std::array<CameraMotion, 2> motion_gradient(const nerf::Camera& camera, const nerf::Vec3& pivot,
                                             const nerf::Vec3& point);

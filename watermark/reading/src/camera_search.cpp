@@ -20,8 +20,8 @@ using Complex = std::complex<double>;
 
 constexpr Index kMostMatches = 240;  // places compared
 constexpr std::size_t kLeastMatches = 8;
-constexpr Index kDraws = 48;         // pairs of places for each view
-constexpr double kTolerance = 0.05;  // share of the window's longer side: about a cell
+constexpr Index kDraws = 48;         // pairs of places per view
+constexpr double kTolerance = 0.05;  // share of the window's longer side: about one cell
 constexpr int kFitSteps = 12;
 constexpr Index kSmall = 24;    // pixels of a window's side
 constexpr Index kReduced = 96;  // longer side of the image before rotation
@@ -51,7 +51,7 @@ std::vector<float> small_window(const Tensor<float>& image, const Window& window
   return v;
 }
 
-// (max + min) / 2 of each pixel, in all channels.
+// Returns (max + min) / 2 of each pixel, in all channels.
 Tensor<float> lightness(const Tensor<float>& image) {
   Tensor<float> out(image.shape);
   for (Index i = 0; i < image.size(); i += 3) {
@@ -70,7 +70,7 @@ Tensor<float> turned(const Tensor<float>& image, double angle, float background)
 }
 
 // Camera::scaled() rounds both sides and so changes the aspect of pixels, which no later motion corrects.
-// This one keeps it; the right and lower edges move by up to half a pixel.
+// This function keeps it; the right and lower edges move by up to half a pixel.
 nerf::Camera reduced(const nerf::Camera& camera, Index size) {
   const double zoom = static_cast<double>(size) / static_cast<double>(std::max(camera.width, camera.height));
   nerf::Camera small = camera.scaled(size);
@@ -83,7 +83,7 @@ nerf::Camera reduced(const nerf::Camera& camera, Index size) {
 
 Complex middle(const Window& w) { return {w.x + w.width / 2, w.y + w.height / 2}; }
 
-// The cameras that `camera_of` makes of the `count` best proposals with a positive score.
+// Returns the cameras that `camera_of` makes of the `count` best proposals with a positive score.
 template <class Proposals, class F>
 std::vector<nerf::Camera> best_cameras(Proposals& proposals, Index count, F camera_of) {
   std::ranges::stable_sort(proposals, [](const auto& p, const auto& q) { return p.score > q.score; });
@@ -103,7 +103,7 @@ struct CameraSearch::Match {
   double share;
 };
 
-// Pixel u of a small view goes to a u + b in the image.
+// Maps pixel u of a small view to a u + b in the image.
 struct CameraSearch::Proposal {
   std::size_t view = 0;
   Complex a{1, 0}, b{};
@@ -189,7 +189,7 @@ CameraSearch::Proposal CameraSearch::propose(const SmallView& view, std::size_t 
     for (const Pair& pair : pairs) proposal.score += agreeing(proposal, pair);
     if (proposal.score > best.score) best = proposal;
   }
-  // Least squares over the pairs that agree.
+  // Least squares over the inlier pairs.
   for (int pass = 0; pass < 3 && best.score > 0; ++pass) {
     Complex from, to;
     double total = 0;
@@ -220,7 +220,7 @@ CameraSearch::Proposal CameraSearch::propose(const SmallView& view, std::size_t 
   return best;
 }
 
-// The small view's camera, rolled, zoomed and shifted by the proposal.
+// Returns the small view's camera, rolled, zoomed and shifted by the proposal.
 nerf::Camera CameraSearch::proposed(const Proposal& proposal, Index height, Index width) const {
   const SmallView& view = views_[proposal.view];
   nerf::Camera camera = view.camera;
@@ -241,7 +241,7 @@ nerf::Camera CameraSearch::proposed(const Proposal& proposal, Index height, Inde
   return camera;
 }
 
-// The proposed camera after Gauss-Newton on the distances of projected cells to their places.
+// Refines the proposed camera by Gauss-Newton on the distances of projected cells to their places.
 nerf::Camera CameraSearch::fitted(const Proposal& proposal, const std::vector<Match>& matches,
                                   double tolerance, Index height, Index width) const {
   const SmallView& view = views_[proposal.view];
@@ -267,7 +267,7 @@ nerf::Camera CameraSearch::fitted(const Proposal& proposal, const std::vector<Ma
       h += w * (jx * jx.transpose() + jy * jy.transpose());
       g += w * (dx * jx + dy * jy);
     }
-    // The image is not taken to be stretched.
+    // Assumes that the image is not stretched.
     h.row(9).setZero();
     h.col(9).setZero();
     g[9] = 0;

@@ -12,23 +12,26 @@ namespace fieldmark::watermark {
 ///   - By content: the object's window (see object_window.h), rotated in steps of 15 degrees and reduced to
 ///     24 pixels, is correlated with the windows of the renders. The image must show the whole object, or the
 ///     field must fill its images.
-///   - By a part: an upright image that was cropped is correlated with windows of several sizes in the
-///     renders.
+///   - By a part: an upright, cropped image is correlated with windows of several sizes in the renders.
 class CameraSearch {
  public:
   /// @param owner  of preset fast; must outlive the search
   /// @throws ValueError for another preset or an option out of range
   explicit CameraSearch(const Owner& owner, const CameraSearchOptions& options = {});
-  /// At most `count` cameras by cells, best first; none if the extractor recognised fewer than 8 places.
+  /// Returns at most `count` cameras by cells, best first; none if the extractor recognised fewer than 8
+  /// places.
   /// @param places  of an image of height x width pixels
   std::vector<nerf::Camera> find(const SeenPlaces& places, Index height, Index width, Index count) const;
-  /// At most `count` cameras by content, best first, each from another render.   @param image  [H, W, 3]
+  /// Returns at most `count` cameras by content, best first, each from another render.
+  /// @param image  [H, W, 3]
   std::vector<nerf::Camera> find(const Tensor<float>& image, Index count) const;
-  /// The same by lightness, (max + min) / 2 of a pixel's channels, which a turn of hue leaves alone.
+  /// As find() by content, but on lightness, (max + min) / 2 of a pixel's channels, which hue rotation
+  /// preserves.
   std::vector<nerf::Camera> find_by_lightness(const Tensor<float>& image, Index count) const;
-  /// Largest correlation by content, in [-1, 1].   @param image  [H, W, 3]
+  /// Returns the largest correlation by content, in [-1, 1].   @param image  [H, W, 3]
   double likeness(const Tensor<float>& image) const;
-  /// At most `count` cameras by a part, best first, each from another render.   @param image  [H, W, 3]
+  /// Returns at most `count` cameras by a part, best first, each from another render.
+  /// @param image  [H, W, 3]
   std::vector<nerf::Camera> find_part(const Tensor<float>& image, Index count) const;
 
  private:
@@ -42,7 +45,7 @@ class CameraSearch {
     std::vector<SeenCell> seen;
     Window window;             // of the object in the small render
     std::vector<float> small;  // its content, see small_window()
-    std::vector<float> light;  // the same of its lightness
+    std::vector<float> light;  // the same for its lightness
     SummedArea area;           // of the whole small render
   };
   struct Match;

@@ -9,7 +9,7 @@ namespace {
 
 constexpr Index kBlock = 4096;  // samples
 
-// The entry of a cell among those of the last pixel, added where there is none.
+// Returns the entry of a cell for the last pixel, and adds it if it is missing.
 std::size_t entry_of(Carriers& c, std::int32_t cell) {
   const auto entry = std::find(c.cell.begin() + c.begin.back(), c.cell.end(), cell);
   const auto number = static_cast<std::size_t>(entry - c.cell.begin());
@@ -20,14 +20,14 @@ std::size_t entry_of(Carriers& c, std::int32_t cell) {
   return number;
 }
 
-// y = slope x, in place.
+// Computes y = slope x, in place.
 void times(const std::array<std::array<double, 3>, 3>& slope, float* x) {
   const double from[] = {static_cast<double>(x[0]), static_cast<double>(x[1]), static_cast<double>(x[2])};
   for (std::size_t c = 0; c < 3; ++c)
     x[c] = static_cast<float>(slope[c][0] * from[0] + slope[c][1] * from[1] + slope[c][2] * from[2]);
 }
 
-// [S, 3] of all samples, by blocks: what the network keeps of a block stays in cache.
+// Returns [S, 3] for all samples, by blocks, so that the network's buffers stay in cache.
 std::vector<float> carrier_of(const Owner& owner, const CachedView& v) {
   const auto n = static_cast<Index>(v.weight.size());
   std::vector<float> out(at(3 * n));

@@ -22,7 +22,7 @@ namespace {
 constexpr Index kByPlaces = 3, kByImage = 3, kByPart = 6;  // candidate cameras
 constexpr AlignmentStage kCoarse[] = {{.size = 48, .blur = 1.5, .steps = 6, .quick = true}};
 constexpr double kSure = 0.95;   // agreement: a symmetric object agrees with its mirror image, but less
-constexpr Index kFewViews = 64;  // compared first: most images are found with them, at a seventh of the time
+constexpr Index kFewViews = 64;  // tried first: they suffice for most images, at a seventh of the time
 constexpr double kStretches[] = {1.5, 1 / 1.5, 1.25, 0.8};  // of the width
 constexpr AlignmentStage kCoarseStretched[] = {
     {.size = 64, .blur = 1.5, .steps = 10, .stretched = true, .quick = true}};
@@ -31,10 +31,10 @@ constexpr AlignmentStage kFineStretched[] = {
     {.size = 200, .blur = 1.2, .steps = 6, .stretched = true}};
 constexpr AlignmentStage kFine[] = {{.size = 96, .blur = 1.2, .steps = 10, .quick = true},
                                     {.size = 200, .blur = 1.2, .steps = 6}};
-constexpr Index kBesideCover = 2;      // pixels beside a bar that do not count
-constexpr Index kSamples = 4;          // of a ray
+constexpr Index kBesideCover = 2;      // pixels beside a bar that are ignored
+constexpr Index kSamples = 4;          // per ray
 constexpr Index kLargest = 512;        // longer side at which evidence is taken, pixels
-constexpr double kFarFromLeast = 1.2;  // of the least residual: the search for a blur ends beyond
+constexpr double kFarFromLeast = 1.2;  // of the least residual: beyond, the search for a blur ends
 constexpr double kBlurs[] = {0, 0.4, 0.6, 0.8, 1, 1.25, 1.5, 2, 2.5, 3};  // standard deviations tried, pixels
 constexpr double kAround = 4;           // standard deviation of the window for the local power, pixels
 constexpr float kLeastNoise = 1.2e-6f;  // variance of rounding to 8 bits
@@ -70,7 +70,7 @@ Shown shown(const Tensor<float>& image, const Tensor<float>& base, const std::ve
   return best;
 }
 
-// The noise is the local power of the residual, mark included.
+// Takes the local power of the residual, mark included, as the noise.
 void score_differences(const Tensor<float>& rest, MarkScore& s) {
   Tensor<float> power = rest;
   for (float& x : power.data) x *= x;
@@ -81,7 +81,7 @@ void score_differences(const Tensor<float>& rest, MarkScore& s) {
   }
 }
 
-// JpegScore's information is of a whole block, so all channels of a pixel get the same precision.
+// JpegScore's information is per block, so all channels of a pixel get the same precision.
 void use_jpeg(JpegScore&& jpeg, const Tensor<float>& mark, MarkScore& s) {
   s.score = std::move(jpeg.score);
   for (Index p = 0; p < mark.size() / 3; ++p) {
@@ -94,7 +94,7 @@ void use_jpeg(JpegScore&& jpeg, const Tensor<float>& mark, MarkScore& s) {
   }
 }
 
-// Also brings the mark to the image's colours.
+// Computes the score, and adapts the carriers to the image's colours.
 MarkScore score_of(const Tensor<float>& image, const CachedView& view, Carriers& carriers,
                    const std::vector<std::uint8_t>& border, const std::optional<JpegTrace>& jpeg) {
   MarkScore s{.score = Tensor<float>(image.shape), .precision = Tensor<float>(image.shape), .on_object = {}};
@@ -124,7 +124,7 @@ MarkScore score_of(const Tensor<float>& image, const CachedView& view, Carriers&
   return s;
 }
 
-// An image that was made wider by a factor, as it was.
+// Undoes a horizontal stretch by a factor.
 Tensor<float> narrowed(const Tensor<float>& image, double factor) {
   if (factor == 1) return image;
   const double width = static_cast<double>(image.shape[1]) / factor;
@@ -135,10 +135,10 @@ Tensor<float> narrowed(const Tensor<float>& image, double factor) {
 
 const char* reading_name(ReadingKind kind) { return kind == ReadingKind::informed ? "informed" : "blind"; }
 
-// What was done to a view before it is read.
+// Changes of a view to undo before reading.
 struct InformedReader::Change {
   bool mirrored = false;
-  double stretch = 1;  // of the width
+  double stretch = 1;  // factor on the width
 };
 
 struct InformedReader::Parts {
@@ -151,7 +151,7 @@ struct InformedReader::Parts {
       : options(o), few(owner, few_of(o)), aligner(owner.field), renderer(owner.field) {}
   static CameraSearchOptions few_of(CameraSearchOptions o) {
     o.views = std::min(o.views, kFewViews);
-    o.around = std::min<Index>(o.around, 0);  // below 0 it is refused
+    o.around = std::min<Index>(o.around, 0);  // negative values are kept and refused later
     return o;
   }
 };
@@ -176,14 +176,14 @@ std::vector<double> InformedReader::evidence_at(const Surround& seen, const nerf
   const Tensor<float> image = replaced ? before_background(seen.plain, view.opacity, seen.colour,
                                                            nerf::background_value(owner_.field.background))
                                        : seen.image;
-  // The coefficients of a JPEG image are those of its own background.
+  // The coefficients of a JPEG image belong to its own background.
   const auto jpeg = replaced ? std::nullopt : find_jpeg(image);
   const auto border = seen.covered.empty() ? border_of(owner_.field, image) : seen.covered;
   const MarkScore score = score_of(image, view, mark, border, jpeg);
   return fit_signs(mark, score, owner_.cells.count()).sign;
 }
 
-// Candidate cameras of an image that was changed, in the frame of the changed image.
+// Returns candidate cameras of a changed image, in the frame of the changed image.
 std::vector<nerf::Camera> InformedReader::starts(const CameraSearch& search, const Tensor<float>& image,
                                                  const Change& change, const SeenPlaces& places) {
   const Index h = image.shape[0], w = image.shape[1];
@@ -203,7 +203,7 @@ std::vector<nerf::Camera> InformedReader::starts(const CameraSearch& search, con
   return cameras;
 }
 
-// The best of coarse alignments from several cameras; replaces `best` where it agrees more.
+// Aligns coarsely from several cameras; replaces `best` where one agrees more.
 void InformedReader::try_all(const Surround& seen, const Change& change,
                              const std::vector<nerf::Camera>& cameras, InformedReading& best) {
   const std::span<const AlignmentStage> stages = change.stretch == 1 ? kCoarse : kCoarseStretched;
@@ -223,7 +223,7 @@ void InformedReader::refine(const Surround& seen, const Change& change, Informed
   found.agreement = a.agreement;
 }
 
-// The best alignment of an image without its surround, coarse, then fine.
+// Returns the best alignment of an image without its surround, coarse, then fine.
 InformedReading InformedReader::aligned(const Surround& seen, const Change& change,
                                         const SeenPlaces& places) {
   const Tensor<float>& image = seen.image;
@@ -271,7 +271,7 @@ ImageReading InformedReader::read_as(const Tensor<float>& whole, const Change& c
   if (ours > 0 && theirs > 0)
     for (double& s : g.evidence) s *= std::sqrt(theirs / ours);
   if (g.agreement >= kLeastAgreement) reading.chosen = ReadingKind::informed;
-  // Back to the whole image.
+  // Converts the camera to the whole image.
   g.camera.cx += static_cast<double>(seen.left);
   g.camera.cy += static_cast<double>(seen.top);
   g.camera.width = whole.shape[1];
@@ -296,8 +296,8 @@ ImageReading InformedReader::read(const Tensor<float>& image) {
   return best;
 }
 
-// What may have been done to an image: a mirror, and the stretch after which it looks most like the field, if
-// it then looks more like it than as it is.
+// Returns changes to try: a mirror, and the stretch that makes the image look most like the field, if any
+// makes it look more like it than no stretch.
 std::vector<InformedReader::Change> InformedReader::changes(const Tensor<float>& seen) {
   std::vector<Change> changes{{.mirrored = true}};
   const CameraSearch& search = all_views();

@@ -14,16 +14,16 @@ namespace {
 using distort::JpegBlock;
 using distort::JpegComponent;
 
-constexpr double kDecoding = 0.5;             // deviation of a decoder's rounding, levels
+constexpr double kDecoding = 0.5;             // standard deviation of a decoder's rounding, levels
 constexpr double kOutlier = 0.02;             // share of outlier coefficients ...
 constexpr double kOutlierWay = 512;           // ... and their range in levels
 constexpr double kLeastGain = 50;             // least log-likelihood ratio of a table
-constexpr double kFirst = 0.3, kRatio = 1.5;  // deviations tried, levels
+constexpr double kFirst = 0.3, kRatio = 1.5;  // standard deviations tried, levels
 constexpr int kDeviations = 13;
 constexpr std::array kFactors{0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0};
-constexpr double kOnObject = 32;  // least foreground pixels of a block that counts for its band
+constexpr double kOnObject = 32;  // least foreground pixels for a block to count in its band
 
-// One component of an image, in levels, chroma perhaps at half size.
+// One component of an image, in levels; chroma may have half the size.
 struct Plane {
   Index height = 0, width = 0;
   std::vector<double> level;
@@ -44,8 +44,8 @@ Plane component_of(const Tensor<float>& image, int component, Index cell) {
   return p;
 }
 
-// Inverts a decoder's chroma upsampling along one line. It makes two pixels of one with weights 3/4 and 1/4
-// (the neighbour's), whose mean has weights 1/8, 3/4, 1/8: a tridiagonal system (Thomas algorithm).
+// Inverts a decoder's chroma upsampling along one line. The decoder makes two pixels of one with weights 3/4
+// and 1/4 (the neighbour's), whose mean has weights 1/8, 3/4, 1/8: a tridiagonal system (Thomas algorithm).
 void sharpen(double* line, Index n, Index step, std::vector<double>& above) {
   if (n < 2) return;
   above.assign(at(n), 0);
@@ -68,7 +68,7 @@ Plane decoded_component(const Tensor<float>& image, int component, Index cell) {
   return p;
 }
 
-// Coefficients of every block; the last row and column are repeated to fill blocks.
+// Returns the coefficients of every block; repeats the last row and column to fill blocks.
 std::vector<JpegBlock> coefficients(const Plane& p, double middle) {
   const Index down = (p.height + 7) / 8, across = (p.width + 7) / 8;
   std::vector<JpegBlock> out(at(down * across));
@@ -84,7 +84,8 @@ std::vector<JpegBlock> coefficients(const Plane& p, double middle) {
   return out;
 }
 
-// Log-likelihood ratio of a table of steps for the nonzero coefficients, against a uniform density.
+// Returns the log-likelihood ratio of a table of steps for the nonzero coefficients, against a uniform
+// density.
 double explained(const std::vector<JpegBlock>& blocks, const JpegBlock& steps) {
   double sum = 0;
   for (const JpegBlock& c : blocks)
@@ -98,14 +99,14 @@ double explained(const std::vector<JpegBlock>& blocks, const JpegBlock& steps) {
   return sum;
 }
 
-// log P(n | b), and its slope in b.
+// log P(n | b) and its slope in b.
 struct Likelihood {
   double log_p, slope;
 };
 
 Likelihood likelihood(double n, double step, double b, double deviation) {
   const double low = ((n - 0.5) * step - b) / deviation, high = ((n + 0.5) * step - b) / deviation;
-  // The difference of two small tails, not of two numbers near 1.
+  // Subtracts two small tails instead of two numbers near 1.
   const double sign = low + high > 0 ? 1 : -1, near = sign > 0 ? low : -high, far = sign > 0 ? high : -low;
   const double p = 0.5 * (std::erfc(near / std::numbers::sqrt2) - std::erfc(far / std::numbers::sqrt2));
   const double total = (1 - kOutlier) * p + kOutlier * step / kOutlierWay;
@@ -113,7 +114,7 @@ Likelihood likelihood(double n, double step, double b, double deviation) {
   return {std::log(total), (1 - kOutlier) * bells / (std::sqrt(2 * std::numbers::pi) * deviation * total)};
 }
 
-// One component of image, render and mark in coefficients, and their deviations.
+// One component of image, render and mark as coefficients, with their standard deviations.
 class ComponentScore {
  public:
   ComponentScore(int component, const JpegTrace& trace)
@@ -151,7 +152,7 @@ class ComponentScore {
     return likelihood(std::round(image_[block][k] / steps_[k]), steps_[k], render_[block][k], deviation);
   }
 
-  // Maximum likelihood, first of bands, then of blocks.
+  // Maximum likelihood, first per band, then per block.
   void fit_deviations() {
     parallel_for(64, 1, [&](Index begin, Index end) {
       for (auto k = at(begin); k < at(end); ++k) {
@@ -216,7 +217,7 @@ class ComponentScore {
   Index cell_, height_ = 0, width_ = 0;
   JpegBlock steps_;
   std::vector<JpegBlock> image_, render_;
-  std::vector<double> on_object_, factor_;  // [blocks] pixels of the component; of the band's deviation
+  std::vector<double> on_object_, factor_;  // [blocks] foreground pixels; factor on the band's deviation
   JpegBlock deviation_{};
 };
 

@@ -12,7 +12,7 @@ struct JpegTrace {
   bool subsampled = false;  ///< chroma at half size (4:2:0)
 };
 
-/// Detects JPEG compression: under the right quantisation table the coefficients of 8 x 8 blocks are
+/// Detects JPEG compression: under the correct quantisation table, the coefficients of 8 x 8 blocks are
 /// multiples of the steps (Fan and de Queiroz 2003). Fails if the image was shifted or resized afterwards.
 /// @param image  [H, W, 3] in [0, 1], in steps of 1/255   @return nothing if no table fits
 std::optional<JpegTrace> find_jpeg(const Tensor<float>& image);
@@ -25,12 +25,12 @@ struct JpegScore {
   double log_likelihood = 0;  ///< log P(image | render) of blocks on the foreground
 };
 
-/// Locally optimal score of a mark under quantisation. With b the coefficients of the render, q the steps and
-/// n q the image's coefficients, which are known exactly,
+/// Computes the locally optimal score of a mark under quantisation. With b the coefficients of the render, q
+/// the steps and n q the image's coefficients, which are known exactly,
 ///   P(n | b) = Phi((n + 1/2) q - b) - Phi((n - 1/2) q - b),   Phi of deviation s_band f_block,
-/// and the score is d log P / d b, transformed back to pixels. A faint mark shows near a decision boundary of
-/// the quantiser only; elsewhere a plain residual would be noise. The deviations of render and image before
-/// compression are maximum-likelihood estimates.
+/// and the score is d log P / d b, transformed back to pixels. A faint mark shows only near a decision
+/// boundary of the quantiser; elsewhere a plain residual would be noise. The deviations of render and image
+/// before compression are maximum-likelihood estimates.
 /// @param render  [H, W, 3] in the image's tones   @param mark  [H, W, 3] change at sign +1
 /// @param object  [H W] 1 on the foreground, else 0   @throws ShapeError if these do not fit
 JpegScore jpeg_score(const Tensor<float>& image, const Tensor<float>& render, const Tensor<float>& mark,

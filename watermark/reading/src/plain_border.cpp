@@ -10,9 +10,9 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr double kBorderBlurs[] = {0.5, 3};  // deviations, pixels
+constexpr double kBorderBlurs[] = {0.5, 3};  // standard deviations, pixels
 constexpr Index kBorderAround = 6;           // pixels
-constexpr float kAlike = 0.06f;              // of every channel
+constexpr float kAlike = 0.06f;              // in every channel
 
 // Flood fill from a corner.
 std::vector<Index> region(const Tensor<float>& image, Index corner) {

@@ -6,15 +6,15 @@
 
 namespace fieldmark::watermark {
 
-/// [H W] 1 on the plain border that a rotation leaves in the corners, else 0. The border is the region
-/// connected to a corner with its colour to 0.06 in every channel, after a blur of 0.5 pixels (thin wedges)
-/// or 3 pixels (noise of deviation 0.1), dilated by 6 pixels. It may include plain parts of the scene, which
-/// carry little information.
+/// Returns [H W] 1 on the plain border that a rotation leaves in the corners, else 0. The border is the
+/// region connected to a corner with its colour to 0.06 in every channel, after a blur of 0.5 pixels (thin
+/// wedges) or 3 pixels (noise of standard deviation 0.1), dilated by 6 pixels. It may include plain parts of
+/// the scene, which carry little information.
 /// @param image  [H, W, 3] in [0, 1]   @throws ShapeError if it is not
 std::vector<std::uint8_t> plain_border(const Tensor<float>& image);
 
-/// The same for a field whose scene fills its images; else empty, since a plain background shows an object's
-/// silhouette.
+/// Returns plain_border() for a field whose scene fills its images; else empty, since a plain background
+/// shows an object's silhouette.
 std::vector<std::uint8_t> border_of(const nerf::RadianceField& field, const Tensor<float>& image);
 
 /// Resizes a border and dilates it by `reach` pixels.

@@ -16,7 +16,7 @@ namespace fieldmark::watermark {
 namespace {
 
 constexpr Index kParameters = 10;
-constexpr double kCauchy = 2.385;      // deviations at which a residual counts half (95% efficiency)
+constexpr double kCauchy = 2.385;      // deviations at which a residual has half the weight (95% efficiency)
 constexpr double kLeastSpread = 2e-3;  // of residuals: half a grey level
 constexpr double kStill = 0.01;        // pixels: a smaller motion ends the stage
 constexpr int kMostFailures = 3;
@@ -25,7 +25,7 @@ constexpr double kDamping = 1e-3;
 using Matrix = Eigen::Matrix<double, kParameters, kParameters>;
 using Vector = Eigen::Matrix<double, kParameters, 1>;
 
-// A camera's render beside the image, at the stage's size.
+// A camera's render and the quantities compared with the image, at the stage's size.
 struct Look {
   nerf::Camera camera;
   Tensor<float> render;            // blurred
@@ -37,7 +37,7 @@ struct Look {
   double cost = 0;
 };
 
-// Empty pixels take a sample of a neighbour, since they change where the silhouette moves.
+// Assigns to empty pixels a neighbour's sample, since they change where the silhouette moves.
 std::vector<std::int32_t> seen_or_beside(const CachedView& v, Index reach) {
   std::vector<std::int32_t> seen(at(v.height * v.width), -1);
   const auto sample = [&](Index y, Index x) {
@@ -106,7 +106,7 @@ class Stage {
       total += 1;
       depth += 1 / d;
     }
-    // Mean inverse depth, so that a far background does not carry the pivot away.
+    // Uses the mean inverse depth, so that a far background does not pull the pivot away.
     if (total > 0) {
       const nerf::Vec3 eye = l.camera.position(), ahead = l.camera.forward();
       for (std::size_t a = 0; a < 3; ++a) l.pivot[a] = eye[a] + total / depth * ahead[a];
@@ -114,8 +114,8 @@ class Stage {
     return l;
   }
 
-  // Residuals [P, 3] of image and render in the image's colours; sets these, and the look's spread and cost.
-  // Costs compare only under the spread of one look.
+  // Computes residuals [P, 3] of image and render in the image's colours; sets the toned render, and the
+  // look's spread and cost. Costs are comparable only under the spread of one look.
   std::vector<double> differ(Look& l, double spread = 0) const {
     std::vector<double> weight(l.seen.size());
     for (std::size_t p = 0; p < weight.size(); ++p) weight[p] = l.seen[p] >= 0 ? 1 : 0;
@@ -149,7 +149,7 @@ class Stage {
     return r;
   }
 
-  // Gauss-Newton: with a = grad B . dx/dmotion, the toned render after a motion m is B - a m, so that
+  // Gauss-Newton: with a = grad B . dx/dmotion, the toned render after a motion m is B - a m, so
   // sum w a a^T m = -sum w a r.
   void normal_equations(const Look& l, const std::vector<double>& r, Matrix& h, Vector& g) const {
     h.setZero();
@@ -176,12 +176,12 @@ class Stage {
            xy * (jx * jy.transpose() + jy * jx.transpose());
       g -= xr * jx + yr * jy;
     }
-    if (!options_.lens)  // zoom and slide stand for distance and aim
+    if (!options_.lens)  // zoom and slide replace distance and aim
       for (const int k : {3, 4, 5}) hold(h, g, k);
     if (!options_.stretched) hold(h, g, 9);
   }
 
-  // What lies over the view, such as a caption, differs by far more than the rest and hardly counts.
+  // Occlusions of the view, such as a caption, differ by far more than the rest and so hardly count.
   double agreement(const Look& l) const {
     double ab = 0, aa = 0, bb = 0;
     const Index width = image_.shape[1];
@@ -246,7 +246,7 @@ class Stage {
     g[k] = 0;
   }
 
-  // Largest displacement of a point under a motion, pixels.
+  // Returns the largest displacement of a point under a motion, pixels.
   static double furthest(const Look& l, const CameraMotion& motion) {
     const Eigen::Map<const Vector> m(motion.data());
     double most = 0;

@@ -9,17 +9,17 @@ namespace fieldmark::watermark {
 struct AlignmentStage {
   Index size = 64;         ///< longer side, pixels; at most the image's own
   double blur = 1;         ///< standard deviation of the Gaussian on image and render, pixels of this size
-  int steps = 8;           ///< at most; a stage ends once nothing moves
-  bool lens = true;        ///< whether position moves besides focal length and principal point
-  bool stretched = false;  ///< whether the aspect of pixels is free, too
-  bool quick = false;      ///< whether ray steps are twice as long: coarse stages need no more
+  int steps = 8;           ///< at most; a stage ends when the motion becomes negligible
+  bool lens = true;        ///< true if the position moves besides focal length and principal point
+  bool stretched = false;  ///< true if the aspect of pixels is free, too
+  bool quick = false;      ///< true if ray steps are twice as long, which suffices for coarse stages
 };
 
-/// A camera and how well its view of the field agrees with an image.
+/// A camera and the agreement of its view of the field with an image.
 struct Alignment {
   nerf::Camera camera;  ///< of the image's size
-  /// Correlation of the gradients of the image and of the render in its colours on the foreground after the
-  /// last stage, in [-1, 1]: 1 if they differ by a change of colour alone.
+  /// Correlation of the gradients of the image and of the render, in the image's colours, on the foreground
+  /// after the last stage, in [-1, 1]: 1 if they differ by a change of colour alone.
   double agreement = -1;
 };
 
@@ -27,13 +27,12 @@ struct Alignment {
 ///
 /// Each step renders the field, fits the image's colours (see tone_fit.h), and solves for the motion that
 /// reduces the residual (Lucas and Kanade 1981 with the field's depth; Levenberg-Marquardt damping; Cauchy
-/// weights). A rolled camera, another focal length or another principal point explains an image that was
-/// rotated, scaled or cropped. Where the scene fills its images, the plain corners that a rotation leaves do
-/// not count (see plain_border.h). Keeps buffers: one object per thread. Results do not depend on the number
-/// of threads.
+/// weights). A rolled camera, another focal length or another principal point explains a rotated, scaled or
+/// cropped image. Where the scene fills its images, the plain corners that a rotation leaves are ignored (see
+/// plain_border.h). Keeps buffers: use one object per thread. Results do not depend on the number of threads.
 class PoseAligner {
  public:
-  /// @param field  must outlive this and not change
+  /// @param field  must outlive this object and not change
   explicit PoseAligner(const nerf::RadianceField& field);
   /// @param image  [H, W, 3], sides of at least 16   @param start  first guess, of any size
   /// @param covered  [H W] 1 where something covers the view, or empty

@@ -9,7 +9,7 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr Index kElsewhere[][2] = {{11, 7}, {-7, 11}, {-11, -7}, {7, -11}};  // down and right, pixels
+constexpr Index kElsewhere[][2] = {{11, 7}, {-7, 11}, {-11, -7}, {7, -11}};  // shifts down and right, pixels
 constexpr int kSteps = 10;
 constexpr double kRest = 1e-4;  // relative residual at which the iteration ends
 
@@ -35,7 +35,7 @@ class Fit {
     return out;
   }
 
-  // M_c . W M_d of all c, times the values of all d.
+  // Computes M_c . W M_d for all c, times the values of all d.
   Values normal(const Values& values) const {
     Tensor<float> v(seen_.shape);
     for_entries([&](Index p, std::size_t e, std::size_t cell) {
@@ -73,7 +73,7 @@ class Fit {
       for (auto e = at(mark_.begin[at(p)]); e < at(mark_.begin[at(p + 1)]); ++e) use(p, e, at(mark_.cell[e]));
   }
 
-  // The pixel that lies `down` and `right` of p if it is on the foreground, else -1.
+  // Returns the pixel `down` and `right` of p if it is on the foreground, else -1.
   Index from(Index p, Index down, Index right) const {
     const Index h = seen_.shape[0], w = seen_.shape[1], y = p / w + down, x = p % w + right;
     return y >= 0 && y < h && x >= 0 && x < w && score_.on_object[at(y * w + x)] > 0 ? y * w + x : -1;
@@ -87,7 +87,8 @@ class Fit {
     return v;
   }
 
-  // Expected power for independent noise. Blur is taken to weaken a cell's part as it weakens the whole mark.
+  // Returns the expected power for independent noise. Assumes that blur weakens a cell's part as it weakens
+  // the whole mark.
   double expected_power(Index down, Index right) const {
     double sum = 0;
     for_entries([&](Index p, std::size_t e, std::size_t) {

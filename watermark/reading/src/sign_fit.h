@@ -17,17 +17,17 @@ struct SignFit {
   double noise = 0;          ///< lambda, see fit_signs()
 };
 
-/// Estimates the signs of all cells together, since a pixel shows several. With M_c the blurred carrier of
+/// Estimates the signs of all cells jointly, since a pixel shows several. With M_c the blurred carrier of
 /// cell c, g the score and W the precision,
 ///   s = argmin  sum_p W (g / W - sum_c s_c M_c)^2 + lambda sum_c s_c^2,
 ///   sum_d (M_c . W M_d + lambda delta_cd) s_d = M_c . g,
 /// by conjugate gradients: the linear minimum mean square error estimate of random signs (Kay 1993, ch. 12;
-/// Madhow and Honig 1994). The plain correlation M_c . g would count the carriers of neighbours as its own.
+/// Madhow and Honig 1994). Plain correlation M_c . g would attribute the neighbours' carriers to cell c.
 ///
 /// lambda corrects for residuals that are correlated between pixels: it is the power of M_c . g with the
-/// score moved elsewhere on the foreground, relative to that of independent noise of precision W. Without
-/// noise and information all signs are 0.
-/// @param mark  of the image's size   @param cells  their number
+/// score shifted to other places of the foreground, relative to that of independent noise of precision W.
+/// Without noise and information, all signs are 0.
+/// @param mark  of the image's size   @param cells  number of cells
 /// @throws ShapeError if score, precision or on_object do not fit the mark
 SignFit fit_signs(const Carriers& mark, const MarkScore& score, Index cells);
 

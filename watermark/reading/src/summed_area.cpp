@@ -7,7 +7,7 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr double kRounding = 1e-9;  // pixels by which a rectangle may leave the image
+constexpr double kRounding = 1e-9;  // pixels by which a rectangle may exceed the image
 
 }  // namespace
 
@@ -38,7 +38,7 @@ void SummedArea::means(double left, double top, double wide, double high, Index 
                      std::to_string(wide) + " x " + std::to_string(high) + " at " + std::to_string(left) +
                      ", " + std::to_string(top) + " and " + std::to_string(out.size()) + " numbers");
   const Index row = (width_ + 1) * channels_;
-  // S at a corner, interpolated.
+  // Interpolates S at a corner.
   const auto corner = [&](Index i, Index j, Index c) {
     const double y = std::clamp(top + high * static_cast<double>(i) / static_cast<double>(n), 0.0,
                                 static_cast<double>(height_)),

@@ -16,7 +16,7 @@ class SummedArea {
   explicit SummedArea(const Tensor<float>& image);
   Index height() const { return height_; }  ///< pixels
   Index width() const { return width_; }    ///< pixels
-  /// Means over the n x n parts of a rectangle.
+  /// Computes means over the n x n parts of a rectangle.
   /// @param left, top, wide, high  pixels, within the image; wide and high above 0   @param n  at least 1
   /// @param out  [n, n, C]   @throws ValueError if the rectangle leaves the image or out has another size
   void means(double left, double top, double wide, double high, Index n, std::span<float> out) const;

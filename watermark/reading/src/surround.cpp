@@ -11,12 +11,12 @@ namespace {
 
 using Colour = std::array<float, 3>;
 
-constexpr float kBar = 0.03f;           // of every channel, around a bar's colour: JPEG leaves less
+constexpr float kBar = 0.03f;           // in every channel, around a bar's colour: more than JPEG changes
 constexpr float kBackground = 0.06f;    // the same for a background
-constexpr double kMostOfEdge = 0.5;     // pixels at the edges that a background has
-constexpr double kLeastOfImage = 0.03;  // pixels that a background has
-constexpr double kLeastCover = 0.02, kMostCover = 0.4;  // of the rows that a bar covers
-constexpr Index kLeastSide = 16;                        // pixels that bars leave
+constexpr double kMostOfEdge = 0.5;     // share of the edge pixels that a background has at least
+constexpr double kLeastOfImage = 0.03;  // share of all pixels that a background has at least
+constexpr double kLeastCover = 0.02, kMostCover = 0.4;  // share of the rows that a bar covers
+constexpr Index kLeastSide = 16;                        // least side that bars leave, pixels
 
 bool alike(const float* pixel, const Colour& colour, float tolerance) {
   for (std::size_t a = 0; a < 3; ++a)
@@ -28,7 +28,7 @@ struct Box {
   Index top, bottom, left, right;  // rows and columns [top, bottom), [left, right)
 };
 
-// The mean colour of a line of pixels if all have it.
+// Returns the mean colour of a line of pixels if all have it.
 std::optional<Colour> plain_line(const Tensor<float>& image, Index first, Index step, Index count) {
   Colour mean{};
   for (Index i = 0; i < count; ++i)
@@ -39,7 +39,7 @@ std::optional<Colour> plain_line(const Tensor<float>& image, Index first, Index 
   return mean;
 }
 
-// Lines at one side that have the colour of the first, none where that is the background's.
+// Lines at one side with the colour of the first; none if that is the background's.
 struct Bar {
   Index lines = 0;
   Colour colour{};
@@ -65,7 +65,7 @@ bool is_pair(const Bar& a, const Bar& b, Index lines) {
 
 struct Bars {
   Box inside;
-  std::optional<Colour> all_around;  // their colour if they are on all four sides and agree
+  std::optional<Colour> all_around;  // their colour if all four sides have bars that agree
 };
 
 Bars find_bars(const Tensor<float>& image, const Colour& background) {
@@ -108,7 +108,7 @@ std::vector<Index> edge_pixels(Index h, Index w) {
   return edge;
 }
 
-// The colour that most pixels at the edges have, if most have one.
+// Returns the colour of most pixels at the edges, if most share one.
 std::optional<Colour> edge_colour(const Tensor<float>& image, const std::vector<Index>& edge) {
   const std::size_t stride = std::max<std::size_t>(1, edge.size() / 256);
   std::size_t most = 0;
@@ -140,7 +140,8 @@ void replace_background(const std::optional<Colour>& of_bars, const Colour& own,
   for (const Index p : behind) std::copy_n(own.data(), 3, &seen.image[3 * p]);
 }
 
-// Rows that a bar covers: both ends have one colour, the same in all rows, that is not the background's.
+// Returns the rows that a bar covers: both ends have one colour, the same in all rows, that is not the
+// background's.
 std::vector<Index> covered_rows(const Tensor<float>& image, const Colour& background) {
   const Index h = image.shape[0], w = image.shape[1];
   std::vector<Index> rows;

@@ -7,7 +7,7 @@
 
 namespace fieldmark::watermark {
 
-/// An image without what other hands put around a view: bars, and another background behind an object.
+/// An image without surroundings added by others: bars, and another background behind an object.
 struct Surround {
   Tensor<float> image;  ///< [H, W, 3] without bars, the plain background replaced by the field's
   Tensor<float> plain;  ///< [H, W, 3] without bars, the background as it is; empty if nothing was replaced
@@ -18,16 +18,17 @@ struct Surround {
   std::vector<std::uint8_t> covered{};
 };
 
-/// Rows or columns of one colour at opposite edges, another than the field's background, are bars and are cut
-/// off. In what is left of an object's image, the background is the colour of most pixels at the edges (0.06
-/// in every channel), or of bars on all four sides; pixels connected to the edges in that colour take the
-/// field's background. A bar of one colour from edge to edge, such as a caption's, covers the object. An
-/// image that already has the field's background is not changed.
+/// Removes the surround. Rows or columns of one colour at opposite edges are bars and are cut off, unless
+/// they have the field's background colour. In the rest of an object's image, the background is the colour of
+/// most pixels at the edges (within 0.03 in every channel), or of bars on all four sides. Pixels connected to
+/// the edges in that colour (within 0.06) take the field's background. A bar of one colour from edge to edge,
+/// such as a caption's, covers the object. An image that already has the field's background is unchanged.
 /// @param image  [H, W, 3] in [0, 1]   @param background  of the field
-/// @param object  whether the field shows an object before a plain background
+/// @param object  true if the field shows an object before a plain background
 Surround clear_surround(const Tensor<float>& image, float background, bool object);
 
-/// The image before the field's background, by the opacity of a render of the same view: exact at edges, too.
+/// Puts the image before the field's background, by the opacity of a render of the same view: exact at edges,
+/// too.
 ///   y = x + (1 - opacity) (background - colour)
 /// @param plain  [H, W, 3]   @param opacity  [H, W]   @throws ShapeError if these do not fit
 Tensor<float> before_background(const Tensor<float>& plain, const Tensor<float>& opacity,

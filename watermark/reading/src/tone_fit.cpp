@@ -17,7 +17,7 @@ using Vector = Eigen::Matrix<double, ToneFit::kTerms, 1>;
 
 double bent(double v) { return v > 0 ? v * std::log(v) : 0; }
 
-// The terms that all channels share; the last, v ln v, stays 0.
+// Returns the terms that all channels share; the last, v ln v, is 0.
 Vector shared_terms(const float* v) {
   Vector t;
   t << 1, static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2]),
@@ -25,7 +25,7 @@ Vector shared_terms(const float* v) {
   return t;
 }
 
-// What all pixels say: the normal equations of each channel.
+// Sums over all pixels: the normal equations of each channel.
 struct Sums {
   Matrix shared = Matrix::Zero();
   std::array<Vector, 3> bends{Vector::Zero(), Vector::Zero(), Vector::Zero()};    // last column of the matrix

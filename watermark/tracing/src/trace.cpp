@@ -12,7 +12,7 @@ namespace {
 
 constexpr Index kNamesPerChunk = 32, kNamesPerRound = 64 * kNamesPerChunk;
 
-// Holm's step-down over copies in the order of their p-values.
+// Applies Holm's step-down correction to copies sorted by p-value.
 void correct(std::vector<TracedCopy>& sorted) {
   double least = 0;
   for (std::size_t i = 0; i < sorted.size(); ++i) {
@@ -42,7 +42,7 @@ std::vector<TracedCopy> trace_copies(std::span<const double> evidence, std::span
     });
     if (progress && !progress(first + round, all)) throw Error("[trace_copies] stopped");
   }
-  // By T, which tells copies apart whose p-values are both the smallest number.
+  // Sorts by T, which distinguishes copies whose p-values are both the smallest number.
   std::stable_sort(copies.begin(), copies.end(),
                    [](const TracedCopy& a, const TracedCopy& b) { return a.statistic > b.statistic; });
   correct(copies);

@@ -11,24 +11,24 @@
 
 namespace fieldmark::baselines {
 
-/// What one measurement of the paper's tables is of.
+/// Identifies one measurement of the paper's tables.
 struct CellName {
-  std::string system;      ///< of paper_systems(): "copyrnerf_paper"
-  std::string scene;       ///< of its folder: "lego"
+  std::string system;      ///< name from paper_systems(): "copyrnerf_paper"
+  std::string scene;       ///< name of its folder: "lego"
   std::string field;       ///< "hash" or "mlp"
   Index bits = 16;         ///< length of the message
-  std::uint64_t seed = 1;  ///< of every random choice
-  /// "copyrnerf_paper-lego-hash-16-1": the file's name without its ending.
+  std::uint64_t seed = 1;  ///< seeds every random choice
+  /// Returns the file name without its extension: "copyrnerf_paper-lego-hash-16-1".
   std::string stem() const;
-  /// Equal in every part.
+  /// True if every part is equal.
   friend bool operator==(const CellName&, const CellName&) = default;
 };
 
-/// One measurement of the paper's tables; what was not measured is NaN. Accuracies are shares in [0, 1].
+/// One measurement of the paper's tables; unmeasured values are NaN. Accuracies are fractions in [0, 1].
 struct Cell {
-  CellName name;                        ///< what it is of
+  CellName name;                        ///< which measurement this is
   Index steps = 0;                      ///< of the system's own training, without the unmarked field's
-  double seconds = 0;                   ///< of the same
+  double seconds = 0;                   ///< duration of the same training
   double bit_accuracy = 0;              ///< of one view from random novel cameras, mean over views
   double spread = 0;                    ///< standard deviation of the bit accuracy over views
   double own_2d_accuracy;               ///< of a 2-D network on the images that it marked itself
@@ -38,35 +38,35 @@ struct Cell {
   double ssim = 0;                      ///< marked render against ground truth
   double lpips = 0;                     ///< marked render against ground truth (AlexNet)
   std::map<std::string, double> under;  ///< bit accuracy under distortions, sampling and noise on weights
-  std::string commit;                   ///< of the sources that measured it
-  std::map<std::string, double> more;   ///< the protocol in numbers, and figures beside those above
+  std::string commit;                   ///< commit of the sources that measured it
+  std::map<std::string, double> more;   ///< the protocol in numbers, and further figures
 };
 
-/// A point of the course of a system's training.
+/// A point of a system's learning curve.
 struct CurvePoint {
-  double seconds = 0;  ///< of training
-  double steps = 0;    ///< taken
-  double figure = 0;   ///< what the curve follows: of systems with a message, the share of bits right
+  double seconds = 0;  ///< training time so far
+  double steps = 0;    ///< steps so far
+  double figure = 0;   ///< the quantity plotted: bit accuracy for systems with a message
 };
-/// Keeps the course of a run, as TrainingRun::curve() writes it, in Cell::more: at most 50 points, evenly
-/// spread, the last among them, under names "learning SECONDS STEPS". @throws IoError if a line is no point
+/// Stores the curve of a run, as written by TrainingRun::curve(), in Cell::more: at most 50 evenly spread
+/// points, including the last, under names "learning SECONDS STEPS". @throws IoError if a line is malformed
 void keep_curve(Cell& cell, std::string_view curve);
-/// What keep_curve() kept, in order of time; none where nothing was kept.
+/// Returns the points that keep_curve() stored, in order of time; empty if it stored none.
 std::vector<CurvePoint> kept_curve(const Cell& cell);
 
-/// JSON with the keys {system, scene, field, bits, seed, steps, seconds, bit_accuracy, spread,
-/// own_2d_accuracy, psnr_base, psnr_base_foreground, psnr_gt, ssim, lpips, distorted, commit, more}; what is
-/// not finite is null.
+/// Formats a cell as JSON with the keys {system, scene, field, bits, seed, steps, seconds, bit_accuracy,
+/// spread, own_2d_accuracy, psnr_base, psnr_base_foreground, psnr_gt, ssim, lpips, distorted, commit, more}.
+/// Non-finite numbers become null.
 std::string format_cell(const Cell& cell);
-/// What format_cell() wrote. @param place  named in errors   @throws IoError if the text is not a cell
+/// Parses the output of format_cell(). @param place  named in errors   @throws IoError if it is not a cell
 Cell parse_cell(std::string_view text, std::string_view place);
 
-/// Writes FOLDER/STEM.json when it is complete; the folder is made if need be. @throws IoError
+/// Writes FOLDER/STEM.json atomically; creates the folder if needed. @throws IoError
 void save_cell(const std::filesystem::path& folder, const Cell& cell);
-/// The file of a cell in a folder, without its ending.
+/// Returns the path of a cell in a folder, without extension.
 std::filesystem::path cell_path(const std::filesystem::path& folder, const CellName& name);
-/// All *.json of a folder, by name; none where there is no folder.
-/// @throws IoError if a file is not a cell, or its name is another's
+/// Loads all *.json of a folder, sorted by name; returns an empty vector if the folder does not exist.
+/// @throws IoError if a file is not a cell, or its name belongs to another cell
 std::vector<Cell> load_cells(const std::filesystem::path& folder);
 
 }  // namespace fieldmark::baselines

@@ -8,39 +8,39 @@
 
 namespace fieldmark::baselines {
 
-/// A scene by the name that cells have.
+/// A scene under its name in cells.
 struct PaperScene {
   std::string name;              ///< "lego"
-  std::filesystem::path folder;  ///< of the data set; empty: the built-in scene
+  std::filesystem::path folder;  ///< folder of the data set; empty: the built-in scene
 };
 
-/// How cells are measured.
+/// Options for measuring cells.
 struct CellRunnerOptions {
   std::vector<PaperScene> scenes;  ///< at least one
-  double budget = 300;             ///< seconds of a system's own training, > 0
-  double base_seconds = 0;         ///< of the unmarked field's; 0: the budget, at most 60 s for a hash field
-  nerf::RadianceFieldOptions hash{};  ///< sizes of hash fields; their seed is the cell's
-  Index size = 0;  ///< pixels of the images' longer side; 0: 160 (Blender), 252 (others), 100 (mlp)
-  /// Novel cameras that are read, at least 1; fewer, but no fewer than under_views, where reading them would
-  /// take longer than `budget`.
+  double budget = 300;             ///< training time of the system itself in seconds, > 0
+  double base_seconds = 0;         ///< for the unmarked field; 0: the budget, at most 60 s for a hash field
+  nerf::RadianceFieldOptions hash{};  ///< sizes of hash fields; the seed comes from the cell
+  Index size = 0;  ///< longer side of the images in pixels; 0: 160 (Blender), 252 (others), 100 (mlp)
+  /// Number of novel cameras to read, at least 1. Reads fewer, but no fewer than under_views, if reading all
+  /// would take longer than `budget`.
   Index views = 200;
-  Index under_views = 50;               ///< of them under each distortion and sampling
-  Index ground_truth = 20;              ///< of the test split, evenly spread
-  std::filesystem::path work;           ///< folder of checkpoints and unmarked fields
-  std::vector<std::string> under;       ///< distortions of cells of 16 bits, names of parse_distortion()
+  Index under_views = 50;               ///< how many of them are read under each distortion and sampling
+  Index ground_truth = 20;              ///< views of the test split, evenly spread
+  std::filesystem::path work;           ///< folder for checkpoints and unmarked fields
+  std::vector<std::string> under;       ///< distortions for cells of 16 bits, names of parse_distortion()
   const Lpips<float>* lpips = nullptr;  ///< AlexNet, or null
-  std::string commit;                   ///< of the sources, for the cells
+  std::string commit;                   ///< commit of the sources, stored in the cells
   RunProgress progress = {};            ///< may be empty
 };
 
-/// A cell that is complete, with its images.
+/// A complete cell with its image.
 struct MeasuredCell {
   Cell cell;            ///< the numbers
-  Tensor<float> image;  ///< [H, 2 W, 3] the first test view unmarked and, beside it, marked
+  Tensor<float> image;  ///< [H, 2 W, 3] the first test view, unmarked on the left and marked on the right
 };
 
-/// Trains and measures cells one after another; scenes and unmarked fields are kept between them, fields and
-/// checkpoints also between processes, in the work folder, for each budget in a folder of its own.
+/// Trains and measures cells one after another. Scenes and unmarked fields are reused between cells. Fields
+/// and checkpoints also persist between processes, in one subfolder of the work folder per budget.
 class CellRunner {
  public:
   /// @throws ValueError if there is no scene or a number is out of range

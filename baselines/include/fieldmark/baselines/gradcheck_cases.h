@@ -5,8 +5,9 @@
 
 namespace fieldmark::baselines {
 
-/// Every differentiable op and network of this module, in its inputs and its parameters. Names begin with the
-/// unit's stem. Networks are checked in their smallest form, every parameter by itself.
+/// Returns gradient checks of every differentiable op and network of this module, for inputs and parameters.
+/// Names begin with the stem of the unit. Networks are checked in their smallest form, one parameter at a
+/// time.
 std::vector<GradcheckCase> gradcheck_cases();
 
 }  // namespace fieldmark::baselines

@@ -11,39 +11,39 @@
 
 namespace fieldmark::baselines {
 
-/// A marked scene as its measurement sees it, whatever system made it.
+/// A marked scene as seen by its measurement, whichever system made it.
 struct MarkedScene {
   Index bits = 16;  ///< length of a message
-  /// The message of a view; scenes that carry a fixed one, or two, give those.
+  /// Returns the message of a view; scenes with one or two fixed messages return those.
   std::function<watermark::Message(Index view)> message;
-  /// An image [H, W, 3] of the scene with the message.
+  /// Renders an image [H, W, 3] of the scene with the message.
   std::function<Tensor<float>(const nerf::Camera&, const watermark::Message&)> render;
-  /// Share of bits that are read right from an image of any size, 8 bits a number.
+  /// Returns the fraction of bits read correctly from an 8-bit image of any size.
   std::function<double(const Tensor<float>& image, const watermark::Message& sent)> accuracy;
 };
 
-/// Fair messages for views, from a seed; up to 4 bits all messages in turns, as the paper has it.
+/// Draws fair messages for views from a seed. Up to 4 bits, cycles through all messages, as in the paper.
 watermark::Message message_of_view(Index bits, std::uint64_t seed, Index view);
 
-/// What score_mark() looks at.
+/// Options for score_mark().
 struct ScoreOptions {
-  std::vector<nerf::Camera> cameras = {};  ///< of the views that are read
+  std::vector<nerf::Camera> cameras = {};  ///< of the views to read
   std::vector<std::string> under = {};     ///< names of parse_distortion()
-  Index under_views = 0;  ///< the first so many views are also read under distortions; 0: all
-  /// After so many seconds, and `under_views` views, no further view is read: large networks take long for
-  /// each. 0: all are read.
+  Index under_views = 0;  ///< how many views, from the first, are also read under distortions; 0: all
+  /// Time limit in seconds: once it is over and `under_views` views are read, reading stops, because large
+  /// networks take long per view. 0: reads all.
   double seconds = 0;
-  const nerf::Dataset* ground_truth = nullptr;  ///< whose views are compared with; null: none
-  std::uint64_t seed = 0;                       ///< of the distortions
-  const Lpips<float>* lpips = nullptr;          ///< AlexNet; null: lpips are NaN
-  /// Told how far it is, from 0 to 1; false stops it, which throws Error.
+  const nerf::Dataset* ground_truth = nullptr;  ///< views to compare with; null: none
+  std::uint64_t seed = 0;                       ///< seed of the distortions
+  const Lpips<float>* lpips = nullptr;          ///< AlexNet; null: LPIPS values are NaN
+  /// Called with the progress from 0 to 1; returning false stops the measurement, which throws Error.
   std::function<bool(double part)> progress = {};
 };
 
-/// How well a mark is read and what it does to images; a mean without a finite number is NaN.
+/// How reliably a mark is read and how it changes images. Means without a finite value are NaN.
 struct MarkScores {
-  Index views = 0;                      ///< that were read, see ScoreOptions::seconds
-  double accuracy = 0;                  ///< share of bits right in one view, mean over views
+  Index views = 0;                      ///< number of views read, see ScoreOptions::seconds
+  double accuracy = 0;                  ///< fraction of bits correct in one view, mean over views
   double spread = 0;                    ///< standard deviation over views
   double psnr_base = 0;                 ///< against the unmarked render, dB, mean over views
   double psnr_base_foreground = 0;      ///< the same over pixels whose unmarked opacity exceeds 0.5
@@ -57,9 +57,10 @@ struct MarkScores {
   std::map<std::string, double> under;  ///< accuracy under each distortion
 };
 
-/// Measures a marked scene beside its unmarked field: bits and the difference to the unmarked render on the
-/// given cameras, the difference to ground truth on the ground truth' cameras. Images are rounded to 8 bits.
-/// @throws ValueError if there is no camera, or the name of a distortion is wrong
+/// Compares a marked scene with its unmarked field: reads bits and measures the difference from the unmarked
+/// render on the given cameras, and from ground truth on the ground-truth cameras. Images are rounded to 8
+/// bits.
+/// @throws ValueError if there is no camera, or a distortion name is wrong
 MarkScores score_mark(const nerf::RadianceField& unmarked, const MarkedScene& marked,
                       const ScoreOptions& options);
 

@@ -3,7 +3,7 @@
 
 namespace fieldmark {
 
-/// Root of every exception this library throws on purpose.
+/// Base class of every exception that this library throws on purpose.
 struct Error : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -15,8 +15,8 @@ struct ShapeError : Error {
 struct ValueError : Error {
   using Error::Error;
 };
-/// A file or folder is missing, unreadable, malformed or cannot be written. The text names the path, the
-/// place in it, what was expected and what was found.
+/// A file or folder is missing, unreadable, malformed or not writable. The message names the path, the
+/// position in the file, what was expected and what was found.
 struct IoError : Error {
   using Error::Error;
 };

@@ -3,8 +3,8 @@
 
 namespace fieldmark {
 
-/// Raises `worst` to `error` if that is larger; a NaN stays, so that a comparison with a limit fails.
-/// std::max would pass over it: every comparison with NaN is false.
+/// Raises `worst` to `error` if that is larger. NaN is sticky, so a later comparison with a limit fails;
+/// std::max would drop it, because every comparison with NaN is false.
 inline void raise_to(double& worst, double error) {
   if (!(error <= worst) && !std::isnan(worst)) worst = error;
 }

@@ -5,7 +5,8 @@
 
 namespace fieldmark::distort {
 
-/// Every differentiable op of this module, in its image and its parameters. Names begin with the unit's stem.
+/// Returns gradient checks of every differentiable op of this module, for the image and the parameters. Names
+/// begin with the stem of the unit.
 std::vector<GradcheckCase> gradcheck_cases();
 
 }  // namespace fieldmark::distort

@@ -6,7 +6,7 @@
 
 namespace fieldmark::distort {
 
-/// Additive Gaussian noise from given standard normal values; no clamp.
+/// Adds Gaussian noise from given standard normal values; no clamp.
 ///   y_i = x_i + mu + sigma n_i
 /// Source: Luo et al. 2023 (CopyRNeRF), distortion-resistant rendering; sigma is the true standard deviation
 /// on the scale of x (the released code squares it).
@@ -15,11 +15,12 @@ namespace fieldmark::distort {
 /// @param sigma   [1] standard deviation, 0 to 1e6
 /// @param normal  one standard normal value for each element of x; must outlive the pass
 /// @return [x's shape]
-/// @throws ShapeError if mu or sigma is not [1] or `normal` has another size than x   @throws ValueError on
-/// sigma Differentiable in: x, mu, sigma.
+/// @throws ShapeError if mu or sigma is not [1] or `normal` has another size than x
+/// @throws ValueError if sigma is out of range
+/// Differentiable in: x, mu, sigma.
 template <class T>
 Var<T> noise(Var<T> x, Var<T> mu, Var<T> sigma, std::span<const std::type_identity_t<T>> normal);
-/// The same with mean 0.
+/// Overload with mean 0.
 template <class T>
 Var<T> noise(Var<T> x, Var<T> sigma, std::span<const std::type_identity_t<T>> normal);
 

@@ -5,7 +5,7 @@
 
 namespace fieldmark::distort {
 
-/// Identities, permutations of pixels and blur, each with its error limit.
+/// Returns numerical cases of identities, pixel permutations and blur, each with its error limit.
 std::vector<NumericsCase> numerics_cases();
 
 }  // namespace fieldmark::distort

@@ -8,27 +8,26 @@ namespace fieldmark {
 
 /// Bump allocator. Each block is at least twice as large as the last; reset() keeps all blocks, so that the
 /// second training step allocates nothing. It runs no destructors: Tape requires trivial ones at compile
-/// time. Under the address sanitizer memory that is not allocated is poisoned, also the gap after each
-/// allocation.
+/// time. Under AddressSanitizer, unallocated memory is poisoned, including a gap after each allocation.
 class Arena {
  public:
   static constexpr std::size_t kAlign = 64;       ///< alignment of allocate(), bytes
   static constexpr std::size_t kSmallAlign = 16;  ///< alignment of allocate_small(), bytes
-  /// @param first_block  bytes of the first block, taken when it is first needed
+  /// @param first_block  bytes of the first block, which is allocated on first use
   explicit Arena(std::size_t first_block = std::size_t{1} << 16) : first_block_(first_block) {}
-  /// Uninitialised memory, valid until reset(). @throws std::bad_alloc
+  /// Allocates uninitialised memory, valid until reset(). @throws std::bad_alloc
   void* allocate(std::size_t bytes) { return take(bytes, kAlign); }
-  /// The same for a few numbers and pointers: aligned to kSmallAlign only, so that several share a cache
-  /// line.
+  /// Like allocate(), but aligned only to kSmallAlign: for a few numbers and pointers, so that several of
+  /// them share a cache line.
   void* allocate_small(std::size_t bytes) { return take(bytes, kSmallAlign); }
   /// Frees all allocations and keeps the blocks.
   void reset() noexcept;
-  /// Overwrites free memory, and blocks that are taken later, with bytes of 0xff, a NaN in floating point: a
-  /// check that follows notices what was left unfilled.
+  /// Fills free memory and all later blocks with bytes of 0xff, a NaN in floating point, so that a subsequent
+  /// check notices unfilled values.
   void spoil() noexcept;
-  std::size_t reserved() const;                        ///< bytes held from the system
-  std::size_t used() const;                            ///< bytes of them behind or in an allocation
-  std::size_t system_calls() const { return grown_; }  ///< times a block was taken from the system
+  std::size_t reserved() const;                        ///< bytes allocated from the system
+  std::size_t used() const;                            ///< bytes of these in use, gaps included
+  std::size_t system_calls() const { return grown_; }  ///< number of blocks allocated from the system
 
  private:
   struct Free {
@@ -57,7 +56,7 @@ class Arena {
   void begin_block(std::size_t k);
   std::vector<Block> blocks_;
   std::size_t first_block_, block_ = 0, grown_ = 0;
-  std::byte* next_ = nullptr;  // free memory of block block_
+  std::byte* next_ = nullptr;  // start of the free memory in block block_
   std::size_t room_ = 0;       // its bytes
   bool spoils_ = false;
 };

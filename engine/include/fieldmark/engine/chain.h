@@ -5,7 +5,7 @@ namespace fieldmark {
 
 class Chain;
 
-/// A value within a chain of elementwise steps, see fused(). It is valid as long as its chain.
+/// A value within a chain of elementwise steps, see fused(). Valid as long as its chain.
 class Lane {
  private:
   friend class Chain;
@@ -14,31 +14,31 @@ class Lane {
   int index_;
 };
 
-/// A chain of elementwise steps, recorded once and run over blocks of elements: what fused() makes of its
-/// function. Bindings use it where the function is known only when the program runs.
+/// A chain of elementwise steps, recorded once and run over blocks of elements. fused() records its function
+/// as a Chain; bindings build one directly, because they know the function only at run time.
 class Chain {
  public:
-  static constexpr int kMaxInputs = detail::kChainInputs;  ///< most inputs
-  static constexpr int kMaxSteps = detail::kChainSteps;    ///< most steps
+  static constexpr int kMaxInputs = detail::kChainInputs;  ///< maximum number of inputs
+  static constexpr int kMaxSteps = detail::kChainSteps;    ///< maximum number of steps
 
   /// @param inputs  1 to kMaxInputs   @throws ValueError otherwise
   explicit Chain(int inputs);
   Chain(const Chain&) = delete;
   Chain& operator=(const Chain&) = delete;
-  /// Input k. @throws ValueError if there is none
+  /// Returns input k. @throws ValueError if there is none
   Lane input(int k);
   /// Declares the result; steps recorded after it are dropped.
   /// @throws ValueError if it belongs to another chain
   void finish(Lane result);
 
   /// @{
-  /// Appends a step; p and q are its numbers. For the functions below.
-  /// @throws ValueError if the chain has kMaxSteps, or a Lane belongs to another chain
+  /// Appends a step with the parameters p and q. For use by the functions below.
+  /// @throws ValueError if the chain already has kMaxSteps, or a Lane belongs to another chain
   static Lane record(detail::ChainOp op, Lane a, double p = 0, double q = 0);
   static Lane record(detail::ChainOp op, Lane a, Lane b);
   /// @}
 
-  /// The steps. @throws ValueError before finish()
+  /// Returns the steps. @throws ValueError before finish()
   const detail::ChainSteps& steps() const;
 
  private:
@@ -48,7 +48,7 @@ class Chain {
 };
 
 /// @{
-/// The operator of operators.h of the same meaning.
+/// Appends the step of the corresponding operator in operators.h.
 Lane operator+(Lane a, Lane b);
 Lane operator-(Lane a, Lane b);
 Lane operator*(Lane a, Lane b);
@@ -66,7 +66,7 @@ Lane operator/(double number, Lane a);
 /// @}
 
 /// @{
-/// The op of arithmetic.h, math.h or activation.h of the same name.
+/// Appends the step of the op with the same name in arithmetic.h, math.h or activation.h.
 Lane minimum(Lane a, Lane b);
 Lane maximum(Lane a, Lane b);
 Lane affine(Lane x, double factor, double offset);

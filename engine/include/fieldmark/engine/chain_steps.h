@@ -1,13 +1,13 @@
 #pragma once
 #include <cstdint>
 
-// The steps of a chain as kernels read them. Plain data only: two instruction sets must never share an inline
-// function.
+// The steps of a chain in the form that kernels read. Plain data only: two instruction sets must never share
+// an inline function.
 namespace fieldmark::detail {
 
 inline constexpr int kChainInputs = 8, kChainSteps = 32;
 
-/// What a step computes of its operands a and b and its numbers p and q.
+/// What a step computes from its operands a and b and its parameters p and q.
 enum class ChainOp : std::uint8_t {
   add,
   sub,
@@ -29,19 +29,19 @@ enum class ChainOp : std::uint8_t {
   relu
 };
 
-/// One step. Operands are numbered: inputs first, then the results of the steps; b is a where there is one.
+/// One step. Operands are numbered: inputs first, then the results of the steps. With one operand, b is a.
 struct ChainStep {
   ChainOp op;      ///< what it computes
   std::uint8_t a;  ///< number of its first operand
   std::uint8_t b;  ///< number of its second operand
-  double p;        ///< first number
-  double q;        ///< second number
+  double p;        ///< first parameter
+  double q;        ///< second parameter
 };
 
-/// A chain whose result is that of its last step.
+/// A chain. The result of its last step is the result of the chain.
 struct ChainSteps {
-  int inputs;                   ///< how many inputs
-  int count;                    ///< how many steps
+  int inputs;                   ///< number of inputs
+  int count;                    ///< number of steps
   ChainStep step[kChainSteps];  ///< in the order of computation
 };
 

@@ -5,15 +5,15 @@
 
 namespace fieldmark {
 
-/// The Euclidean norm of all gradients together, summed in double with the same bits for any thread count.
+/// Returns the Euclidean norm of all gradients, summed in double with the same bits for any thread count.
 template <class T>
 double grad_norm(std::span<const T> grads);
 
 /// @{
-/// Scales the gradients down to a norm of `limit` where it is larger: g *= limit / max(norm, limit).
-/// @param limit  > 0   @return the norm before
-/// @throws ValueError if the limit is not positive, or a gradient is NaN or infinite, which no scale mends;
-/// the gradients stay as they are, and the text names the first parameter that has one
+/// Scales the gradients down to a norm of `limit` if theirs is larger: g *= limit / max(norm, limit).
+/// @param limit  > 0   @return the norm before scaling
+/// @throws ValueError if the limit is not positive, or a gradient is NaN or infinite, which scaling cannot
+/// repair; the gradients are then unchanged, and the text names the first parameter that has one
 template <class T>
 double clip_grad_norm(std::span<T> grads, double limit);
 template <class T>

@@ -7,10 +7,10 @@
 
 namespace fieldmark {
 
-/// A row-major matrix of Eigen, as tensors are laid out.
+/// A row-major Eigen matrix, laid out like a tensor.
 template <class T>
 using EigenMatrix = Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-/// A column of coefficients of Eigen.
+/// An Eigen column array.
 template <class T>
 using EigenArray = Eigen::Array<T, Eigen::Dynamic, 1>;
 
@@ -23,11 +23,11 @@ inline std::array<Index, 2> matrix_extents(const Shape& s) {
 }
 }  // namespace detail
 
-// Maps share the memory of what they are made from and live no longer; of a Var, until Tape::reset().
+// A map shares the memory of its source and must not outlive it; a map of a Var is valid until Tape::reset().
 
 /// @{
-/// A tensor or a Var's values of rank 2 as a matrix, of rank 1 as a column.
-/// @throws ShapeError if the rank is another
+/// Maps a tensor or the values of a Var: rank 2 to a matrix, rank 1 to a column.
+/// @throws ShapeError for any other rank
 template <class T>
 Eigen::Map<EigenMatrix<T>> as_matrix(Tensor<T>& t) {
   const auto [rows, columns] = detail::matrix_extents(t.shape);
@@ -48,7 +48,7 @@ Eigen::Map<const EigenMatrix<T>> as_matrix(Var<T> v) {
 /// @}
 
 /// @{
-/// All elements, row-major, whatever the rank.
+/// Maps all elements in row-major order, whatever the rank.
 template <class T>
 Eigen::Map<EigenArray<T>> as_array(Tensor<T>& t) {
   return {t.data.data(), t.size()};
@@ -65,7 +65,7 @@ Eigen::Map<const EigenArray<T>> as_array(Var<T> v) {
 }
 /// @}
 
-/// A copy of a matrix of Eigen as a tensor [rows, columns], of a column as [rows].
+/// Copies an Eigen matrix to a tensor [rows, columns], or a column to [rows].
 template <class D>
 Tensor<typename D::Scalar> from_eigen(const Eigen::DenseBase<D>& m) {
   using T = typename D::Scalar;

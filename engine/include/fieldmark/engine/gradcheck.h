@@ -10,15 +10,15 @@ namespace fieldmark {
 
 /// Settings of gradcheck().
 struct GradcheckOptions {
-  double rtol = 1e-7;  ///< on the error of an entry relative to its scale, see gradcheck()
+  double rtol = 1e-7;  ///< tolerance of the error of an entry relative to its scale, see gradcheck()
   double step = 1.0;   ///< multiplies the default step eps^(1/7) * max(1, |x|)
-  unsigned seed = 1;   ///< of the random cotangent
+  unsigned seed = 1;   ///< seed of the random cotangent
 };
 /// Result of gradcheck().
 struct GradcheckReport {
-  bool ok = true;     ///< no entry is bad
+  bool ok = true;     ///< true if no entry is bad
   double worst = 0;   ///< largest relative error
-  Index entries = 0;  ///< compared
+  Index entries = 0;  ///< number of entries compared
   std::string table;  ///< one line per bad entry: input, index, x, analytic, numeric, error, way
 };
 /// The function under test: records ops on the tape and returns one output of any shape.
@@ -27,24 +27,25 @@ using GradcheckFn = std::function<Var<double>(Tape<double>&, std::span<const Var
 /// Compares the tape's gradient of <u, f(x)>, u a fixed random cotangent, with 6-point central differences
 /// (R. de Levie 2009, J. Chem. Sci. 121(5)), entry by entry, in double.
 ///
-/// The error of an entry is relative to the largest of its own size, a thousandth of the largest gradient of
-/// its input, and the rounding error of the difference. Against 1, a wrong gradient of 1e-8 would pass. The
-/// check also fails if the values of f change when gradients are off, if the gradient overwrites the caller's
-/// buffer (which holds 0.5) instead of adding to it, or if a compared value is not finite.
+/// The error of an entry is relative to the largest of its own magnitude, a thousandth of the largest
+/// gradient of its input, and the rounding error of the difference. Relative to 1, a wrong gradient of 1e-8
+/// would pass. The check also fails if the values of f change when gradients are off, if the gradient
+/// overwrites the caller's buffer (which holds 0.5) instead of adding to it, or if a compared value is not
+/// finite.
 ///
-/// Gradients are compared with the inputs as leaves, after one and two calls of backward(); as outputs of an
-/// op before, as in a network, where buffers hold NaN until they are filled; and for every subset of the
-/// inputs, the others constant (of more than six inputs: each alone, and all but each).
+/// The check runs with the inputs as leaves, after one and two calls of backward(); with the inputs as
+/// outputs of a preceding op, as in a network, where buffers hold NaN until they are filled; and for every
+/// subset of the inputs, with the others constant (for more than six inputs: each alone, and all but each).
 /// @throws whatever f throws
 GradcheckReport gradcheck(const GradcheckFn& f, std::span<const Tensor<double>> inputs,
                           const GradcheckOptions& options = {});
 
-/// As gradcheck(), with a module's parameters as one more input: f receives a Params that reads and
-/// differentiates them.
+/// The function under test of gradcheck_module(). Also receives a Params that reads and differentiates the
+/// parameters of the module.
 using ModuleGradcheckFn =
     std::function<Var<double>(Tape<double>&, const Params<double>&, std::span<const Var<double>>)>;
-/// As gradcheck(); the parameters are the last input of the report, laid out as store.values(). Running ones
-/// stay as they are and have no gradient.
+/// Like gradcheck(), with a module's parameters as one more input: the last of the report, laid out like
+/// store.values(). Running ones are unchanged and have no gradient.
 GradcheckReport gradcheck_module(const ModuleGradcheckFn& f, const ParamStore<double>& store,
                                  std::span<const Tensor<double>> inputs,
                                  const GradcheckOptions& options = {});

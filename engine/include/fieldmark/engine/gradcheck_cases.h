@@ -5,7 +5,7 @@
 
 namespace fieldmark {
 
-/// The gradient checks of every differentiable op and module of the engine.
+/// Returns the gradient checks of every differentiable op and module of the engine.
 std::vector<GradcheckCase> gradcheck_cases();
 
 }  // namespace fieldmark

@@ -12,23 +12,22 @@ namespace fieldmark {
 
 /// Settings of a TapeInspector.
 struct InspectOptions {
-  bool stop_at_nonfinite = false;  ///< throws where the first NaN or infinity arises
-  bool statistics = false;         ///< gathers value_stats() and gradient_stats(): each reads all elements
+  bool stop_at_nonfinite = false;  ///< throws at the first NaN or infinity
+  bool statistics = false;         ///< gathers value_stats() and gradient_stats(), which read all elements
 };
 
-/// What the ops of one name cost together.
+/// Total cost of all ops of one name.
 struct OpCost {
   std::string op;               ///< the function's name, such as "dense"
-  Index calls = 0;              ///< recorded
-  double forward_seconds = 0;   ///< from taking the output's memory to recording the backward
+  Index calls = 0;              ///< number of recorded calls
+  double forward_seconds = 0;   ///< from allocating the output to registering the backward
   double backward_seconds = 0;  ///< in all backwards
-  Index forward_bytes = 0;      ///< of the tape: output and what the backward needs
-  Index backward_bytes = 0;     ///< of the tape: new gradients and scratch
+  Index forward_bytes = 0;      ///< tape memory for the output and what the backward needs
+  Index backward_bytes = 0;     ///< tape memory for new gradients and scratch
 };
 
-/// Looks at what a tape records: its graph as text or DOT, time and memory by op, statistics of values and
-/// gradients, and the op that made the first NaN or infinity. A tape without an inspector pays nothing for
-/// it.
+/// Inspects what a tape records: its graph as text or DOT, time and memory by op, statistics of values and
+/// gradients, and the op that made the first NaN or infinity. A tape without an inspector has no overhead.
 ///
 /// @code
 /// Tape<float> tape;
@@ -37,32 +36,32 @@ struct OpCost {
 /// tape.backward(loss);  // throws "[inspect] the backward of log (math.cpp:95) made the first NaN ..."
 /// std::puts(inspector.dot().c_str());
 /// @endcode
-/// An op is called after the function that called Tape::output(); parameters after their names in the store.
+/// An op is named after the function that called Tape::output(), a parameter after its name in the store.
 template <class T>
 class TapeInspector : private TapeObserver<T> {
  public:
-  /// Watches the tape from now on; the tape must outlive it.
-  /// @throws ValueError if another inspector watches the tape
+  /// Watches the tape from now on; the tape must outlive the inspector.
+  /// @throws ValueError if another inspector already watches the tape
   explicit TapeInspector(Tape<T>& tape, InspectOptions options = {});
   TapeInspector(const TapeInspector&) = delete;
   TapeInspector& operator=(const TapeInspector&) = delete;
   ~TapeInspector() override;
 
-  /// The graph of this pass, one line for each value: number, name, op, shape, numbers of its inputs, and
+  /// Returns the graph of this pass, one line per value: number, name, op, shape, numbers of its inputs, and
   /// whether gradients reach it.
   std::string text() const;
-  /// The same as a graph in the language of Graphviz: `dot -Tsvg`.
+  /// Returns the same graph in the DOT language, for `dot -Tsvg`.
   std::string dot() const;
-  /// Time and memory by op since the inspector was made, over all passes; the most expensive first.
+  /// Returns time and memory by op over all passes since construction, most expensive first.
   std::vector<OpCost> costs() const;
-  /// costs() as a table.
+  /// Returns costs() as a table.
   std::string cost_table() const;
-  /// The gradient of each named value that got one, parameters included, over all passes with `statistics`,
-  /// in the order named. Of several backwards in a pass the last counts. A leaf's gradient is what its buffer
-  /// holds then: without zero_grad() between passes, the sum so far.
+  /// Returns statistics of the gradient of each named value that received one, parameters included, over all
+  /// passes with `statistics`, in the order named. If a pass has several backwards, the last one counts. The
+  /// gradient of a leaf is the content of its buffer: without zero_grad() between passes, the sum so far.
   /// @see stats_table()
   std::vector<TensorStats> gradient_stats() const;
-  /// The elements of each named value at the time it was named, over all passes with `statistics`.
+  /// Returns statistics of each named value at the time it was named, over all passes with `statistics`.
   std::vector<TensorStats> value_stats() const { return values_; }
 
  private:
@@ -89,7 +88,7 @@ class TapeInspector : private TapeObserver<T> {
   std::string value(std::size_t i) const;
   void check_forward(std::size_t i) const;
   void check_leaf_gradient(std::size_t i) const;
-  // Gathers the gradient of a named value, in place of an earlier one of this pass.
+  // Records the gradient of a named value, replacing an earlier one of this pass.
   void measure_gradient(const Node& n);
 
   Tape<T>& tape_;
@@ -99,7 +98,7 @@ class TapeInspector : private TapeObserver<T> {
   std::vector<OpCost> costs_;
   std::vector<TensorStats> values_, gradients_;                   // by name, in the order named
   std::vector<std::pair<const T*, TensorStats>> pass_gradients_;  // of this pass, by buffer
-  Clock::time_point begun_;                                       // of the backward that runs
+  Clock::time_point begun_;                                       // of the running backward
   std::size_t used_ = 0;                                          // bytes of the tape then
 };
 

@@ -13,7 +13,7 @@ struct ModelInfo {
   std::string config = "{}";  ///< a JSON object
 };
 
-/// Sets the entry; an empty config is left out. Equal objects give equal text, whatever the order of keys.
+/// Sets the entry and omits an empty config. Equal objects give equal text, whatever the order of their keys.
 /// @throws ValueError if the kind is empty or the config is not a JSON object
 void set_model_info(SafetensorsFile& file, const ModelInfo& info);
 
@@ -21,7 +21,7 @@ void set_model_info(SafetensorsFile& file, const ModelInfo& info);
 /// @throws IoError if there is none ("not a Fieldmark file"), it is malformed, or its format is not 1
 ModelInfo model_info(const SafetensorsFile& file);
 
-/// Reads the entry of a file that must be of one kind.
+/// Reads the entry of a file and requires its kind.
 /// @throws IoError as model_info, or "PATH: expected an OWNER file (kind 'owner'), found kind 'field'"
 ModelInfo require_kind(const SafetensorsFile& file, std::string_view kind);
 

@@ -1,6 +1,6 @@
 #pragma once
 /// @file
-/// All layers, for programs that would rather not list them.
+/// Includes all layers.
 #include <fieldmark/engine/nn/batch_norm.h>
 #include <fieldmark/engine/nn/conv2d.h>
 #include <fieldmark/engine/nn/dense.h>

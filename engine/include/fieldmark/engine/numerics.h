@@ -13,24 +13,24 @@
 
 namespace fieldmark {
 
-/// The largest error of several values, each relative to a scale of its own.
+/// The largest error of several values, each relative to its own scale.
 struct WorstError {
-  double worst = 0;  ///< NaN as soon as one error is NaN
-  Index values = 0;  ///< compared
+  double worst = 0;  ///< NaN if any error is NaN
+  Index values = 0;  ///< number of values compared
 
-  /// Adds the error |value - exact| / scale; 0 for equal values, infinities too. @param scale  > 0
+  /// Adds the error |value - exact| / scale; 0 for equal values, even infinite ones. @param scale  > 0
   void compare(long double value, long double exact, long double scale) {
     ++values;
     raise_to(worst, value == exact ? 0.0 : static_cast<double>(std::abs(value - exact) / scale));
   }
-  /// Adds the error 0 if both are equal or NaN, else infinity.
+  /// Adds an error of 0 if both values are equal or both NaN, else infinity.
   void equal(long double value, long double exact) {
     const bool same = value == exact || (std::isnan(value) && std::isnan(exact));
     compare(same ? 0 : std::numeric_limits<long double>::infinity(), 0, 1);
   }
 };
 
-/// A case that is hard on rounding or range, for `fieldmark gradcheck --numerics` and the tests: compares the
+/// A case that stresses rounding or range, for `fieldmark gradcheck --numerics` and the tests. Compares the
 /// library's values, on the instruction set in use, with the same formula in long double.
 struct NumericsCase {
   std::string name;                 ///< begins with the unit's stem
@@ -39,7 +39,7 @@ struct NumericsCase {
   double limit;                     ///< largest error allowed; 0: equal bits
   std::function<WorstError()> run;  ///< computes both and compares
 
-  /// Whether run() compared values and no error is above the limit or NaN.
+  /// True if run() compared values and no error is above the limit or NaN.
   bool ok(const WorstError& error) const { return error.values > 0 && error.worst <= limit; }
 };
 
@@ -58,7 +58,7 @@ void add_numerics(std::vector<NumericsCase>& cases, const std::string& name, con
   cases.push_back({name, "double", relative_to, double_limit, run(0.)});
 }
 
-/// Pseudorandom values in [lo, hi) from a seed (SplitMix64).
+/// Returns pseudorandom values in [lo, hi) from a seed (SplitMix64).
 template <class T>
 Tensor<T> scattered(Shape shape, double lo, double hi, std::uint64_t seed) {
   Tensor<T> t(shape);
@@ -71,8 +71,8 @@ Tensor<T> scattered(Shape shape, double lo, double hi, std::uint64_t seed) {
   return t;
 }
 
-/// One pass of an op: its values, then the gradient of <cotangent, op> in each input. The inputs are outputs
-/// of an op before, as in a network, and memory holds NaN until it is filled.
+/// Runs one pass of an op. Returns its values, then the gradient of <cotangent, op> in each input. The inputs
+/// are outputs of a preceding op, as in a network, and memory holds NaN until it is filled.
 /// @param f  called as f(tape, std::vector<Var<T>>)   @param cotangent  Shape -> Tensor<T>
 template <class T, class F, class C>
 std::vector<std::vector<T>> values_and_gradients(const F& f, const std::vector<Tensor<T>>& inputs,
@@ -92,7 +92,7 @@ std::vector<std::vector<T>> values_and_gradients(const F& f, const std::vector<T
   return result;
 }
 
-/// A cotangent of ones.
+/// Returns a cotangent of ones.
 template <class T>
 Tensor<T> ones(Shape shape) {
   return Tensor<T>(shape, T(1));

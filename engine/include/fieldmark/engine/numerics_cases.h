@@ -5,7 +5,7 @@
 
 namespace fieldmark {
 
-/// The hard cases of the engine's ops, norms, sums and optimiser, each with its error limit.
+/// Returns the hard cases of the engine's ops, norms, sums and optimiser, each with its error limit.
 std::vector<NumericsCase> numerics_cases();
 
 }  // namespace fieldmark

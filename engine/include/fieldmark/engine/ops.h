@@ -1,6 +1,6 @@
 #pragma once
 /// @file
-/// All ops, for programs that would rather not list them.
+/// Includes all ops.
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/batch_norm.h>

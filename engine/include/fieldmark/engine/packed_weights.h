@@ -12,8 +12,8 @@ namespace fieldmark {
 /// float; the parameters themselves stay float.
 enum class Precision { fp32, bf16 };
 
-/// A matrix W [in, out] in the layout of matrix products: panels of columns of W and of W^T, optionally in
-/// bf16 too.
+/// A matrix W [in, out] packed for matrix products: panels of columns of W and of W^T, optionally in bf16
+/// too.
 template <class T>
 struct PackedMatrix {
   const T* forward = nullptr;                      ///< panels of W
@@ -24,28 +24,28 @@ struct PackedMatrix {
 
 /// Options of PackedWeights.
 struct PackOptions {
-  Precision precision = Precision::fp32;  ///< of the packed matrices
-  bool tables = false;                    ///< with bf16: also parameters of ParamRole::table
+  Precision precision = Precision::fp32;  ///< precision of the packed matrices
+  bool tables = false;                    ///< with bf16: also rounds parameters of ParamRole::table
 };
 
-/// The matrices of a store's dense layers in the layout of matrix products, plain and transposed: a training
-/// step packs each once instead of once a chunk. Pass it to Params that read the values of the last update()
-/// only. Eight numbers of each matrix are kept to notice other values: a step of an optimiser changes some of
-/// them, a change by hand of a few numbers may miss them all.
+/// Packs the matrices of a store's dense layers for matrix products, plain and transposed, so that a training
+/// step packs each once instead of once per chunk. Pass it only to Params that read the values of the last
+/// update(). To detect stale values, it keeps eight elements of each matrix: an optimiser step changes some
+/// of them, but a manual change of a few elements may go unnoticed.
 template <class T>
 class PackedWeights {
  public:
-  /// Packs parameters of ParamRole::matrix. The store must outlive it and stay of one layout.
-  /// @throws ValueError for bf16 where bf16_units() has none, or T is double
+  /// Packs parameters of ParamRole::matrix. The store must outlive it and keep its layout.
+  /// @throws ValueError for bf16 if bf16_units() is none or T is double
   explicit PackedWeights(const ParamStore<T>& store, const PackOptions& options = {});
   /// Packs the current values for the instruction set in use. Call it after every change of either.
-  /// @throws ValueError if the store got more parameters since the constructor
+  /// @throws ValueError if parameters were added to the store since construction
   void update();
   /// @{
-  /// The packed matrix, or a table rounded to bf16, row-major; null if this parameter is none, or before the
-  /// first update().
+  /// Returns the packed matrix, or the table rounded to bf16, row-major; null before the first update() or if
+  /// the parameter is not one.
   /// @throws ValueError if the store's values or the instruction set changed since the last update(), or the
-  /// parameter was added after the constructor
+  /// parameter was added after construction
   const PackedMatrix<T>* find(ParamId id) const;
   const std::uint16_t* table(ParamId id) const;
   /// @}
@@ -61,7 +61,7 @@ class PackedWeights {
   PackOptions options_;
   std::vector<PackedMatrix<T>> matrices_;  // one for each parameter
   std::vector<const std::uint16_t*> tables_;
-  std::vector<Witnesses> witnesses_;  // numbers of each matrix and table at the last update()
+  std::vector<Witnesses> witnesses_;  // elements of each matrix and table at the last update()
   Isa isa_ = Isa::v2;                 // of the last update()
   AlignedVector<T> panels_;
   AlignedVector<std::uint16_t> rounded_;

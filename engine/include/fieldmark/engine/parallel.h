@@ -5,13 +5,13 @@
 
 namespace fieldmark {
 
-/// Sets the number of threads outside of an existing parallel region; default: all of the machine.
+/// Sets the number of threads of parallel loops; default: all of the machine. Nested loops stay serial.
 /// @param n  at least 1   @throws ValueError otherwise
 void set_threads(int n);
-/// The number of threads in use.
+/// Returns the number of threads in use.
 int threads();
 
-/// set_threads() until the end of the scope, also if an exception ends it: for tests and benchmarks.
+/// Calls set_threads() and restores the previous number at the end of the scope, for tests and benchmarks.
 class ScopedThreads {
  public:
   /// @param n  at least 1   @throws ValueError otherwise
@@ -26,14 +26,14 @@ class ScopedThreads {
 
 namespace detail {
 void parallel_chunks(Index chunks, void* context, void (*run)(void*, Index chunk));
-/// Whether a parallel loop started here would have one thread: another one runs already, or there is no
-/// other.
+/// True if a parallel loop started here would run on one thread: inside another parallel loop, or if there is
+/// only one thread.
 bool runs_on_one_thread();
 }  // namespace detail
 
-/// Calls f(begin, end) over [0, n) in chunks of `grain`, on several threads; serial inside another parallel
-/// loop and for a single chunk. Chunks do not depend on the thread count, so a result that depends only on
-/// the chunk has the same bits for any number of threads. Rethrows an exception of f.
+/// Calls f(begin, end) over [0, n) in chunks of `grain`, on several threads; runs serially inside another
+/// parallel loop and for a single chunk. Chunks do not depend on the thread count, so a result that depends
+/// only on the chunk has the same bits for any number of threads. Rethrows an exception of f.
 template <class F>
 void parallel_for(Index n, Index grain, F&& f) {
   if (n <= 0) return;

@@ -17,17 +17,17 @@ struct ParamId {
 
 /// What a tensor of a ParamStore is for.
 enum class ParamRole {
-  trained,  ///< gets gradients, and optimisers move it
-  matrix,   ///< trained; weights [in, out] of products, which PackedWeights packs
-  table,    ///< trained; rows [entries, features] that are looked up, which PackedWeights can round
-  running   ///< a value that the model keeps, such as the statistics of a batch norm: no gradient, no steps
+  trained,  ///< receives gradients; optimisers update it
+  matrix,   ///< trained; weights [in, out] of matrix products, packed by PackedWeights
+  table,    ///< trained; lookup rows [entries, features], which PackedWeights can round
+  running   ///< state without gradient or steps, such as the running statistics of a batch norm
 };
-/// Whether tensors of this role get gradients.
+/// True if tensors of this role receive gradients.
 constexpr bool is_trained(ParamRole role) { return role != ParamRole::running; }
 
-/// All parameters of a model in one flat buffer, their gradients in a second one of equal length: an
-/// optimiser step, a checkpoint and zero_grad() are each one loop. Tensors of 4096 elements or more start on
-/// a cache line; the gap before them stays zero.
+/// Holds all parameters of a model in one flat buffer and their gradients in a second one of equal length, so
+/// that an optimiser step, a checkpoint and zero_grad() are one loop each. Tensors of 4096 elements or more
+/// start on a cache line; the gap before them stays zero.
 template <class T>
 class ParamStore {
  public:
@@ -35,36 +35,36 @@ class ParamStore {
   struct Entry {
     std::string name;                     ///< unique, slash separated: "field/density/weight"
     Shape shape;                          ///< row-major
-    Index offset;                         ///< of the first element in values()
+    Index offset;                         ///< position of the first element in values()
     ParamRole role = ParamRole::trained;  ///< as declared to add()
   };
-  /// Appends a tensor of zeros. Values that Params::leaf() put on a tape before are no longer valid.
+  /// Appends a tensor of zeros. Invalidates values that Params::leaf() recorded before.
   /// @throws ValueError if the name is taken
-  /// @throws ShapeError if a matrix or a table has not two axes
+  /// @throws ShapeError if a matrix or a table does not have two axes
   ParamId add(std::string_view name, Shape shape, ParamRole role = ParamRole::trained);
-  /// @throws ValueError if there is no such name
+  /// Returns the id of a name. @throws ValueError if there is no such name
   ParamId find(std::string_view name) const;
   /// @{
-  /// The elements of one tensor; valid until the next add(). @throws ValueError if there is no such id
+  /// Returns the elements of a tensor; valid until the next add(). @throws ValueError if there is no such id
   std::span<T> values(ParamId id);
   std::span<const T> values(ParamId id) const;
   /// @}
-  /// The gradients of one tensor; valid until the next add(). @throws ValueError if there is no such id
+  /// Returns the gradients of a tensor; valid until the next add(). @throws ValueError if the id is unknown
   std::span<T> grads(ParamId id);
   /// @{
-  /// The whole buffer of values [size()]; valid until the next add().
+  /// Returns the whole buffer of values [size()]; valid until the next add().
   std::span<T> values() { return values_; }
   std::span<const T> values() const { return values_; }
   /// @}
-  /// The whole buffer of gradients [size()], laid out as values().
+  /// Returns the whole buffer of gradients [size()], laid out like values().
   std::span<T> grads() { return grads_; }
-  /// All tensors in the order added.
+  /// Returns all tensors in the order added.
   std::span<const Entry> entries() const { return entries_; }
-  /// The entry of an id of this store. @throws ValueError if it has no such id
+  /// Returns the entry of an id. @throws ValueError if this store has no such id
   const Entry& entry(ParamId id) const;
-  /// Length of the buffers, with the gaps between tensors.
+  /// Returns the length of the buffers, including the gaps between tensors.
   Index size() const { return static_cast<Index>(values_.size()); }
-  /// Elements of all tensors.
+  /// Returns the total number of elements of all tensors.
   Index parameters() const;
   /// Sets all gradients to 0.
   void zero_grad();
@@ -82,28 +82,29 @@ class PackedWeights;
 template <class T>
 class Params {
  public:
-  /// Reads the store, adds gradients to the store.
+  /// Reads the store and adds gradients to it.
   explicit Params(ParamStore<T>& store) : Params(store, store.grads().data()) {}
-  /// Reads the store; gradients, laid out as the store's, go to `grads`, or are not computed if it is null.
+  /// Reads the store and adds gradients to `grads`, laid out like the store's. If `grads` is null, no
+  /// gradients are computed.
   Params(const ParamStore<T>& store, T* grads)
       : layout_(&store), values_(store.values().data()), entries_(store.entries().size()), grads_(grads) {}
-  /// The same with the store's matrices packed: `packed` holds its present values and outlives the pass.
+  /// As above with packed matrices: `packed` must hold the store's current values and outlive the pass.
   Params(const ParamStore<T>& store, T* grads, const PackedWeights<T>& packed) : Params(store, grads) {
     packed_ = &packed;
   }
-  /// Reads `all` [store.size()], laid out as the store's values, and passes gradients on to it: for
-  /// parameters that are themselves computed. Running ones are read from the store.
+  /// Reads `all` [store.size()], laid out like the store's values, and passes gradients on to it: for
+  /// parameters that are themselves computed on the tape. Running ones are read from the store.
   /// @throws ShapeError if `all` has another number of elements
   Params(const ParamStore<T>& layout, Var<T> all);
 
-  /// A parameter on the tape: a leaf, or a constant where gradients are not computed.
-  /// @throws ValueError if the store got more parameters since the constructor, or has no such id
+  /// Records a parameter on the tape: as a leaf, or as a constant if gradients are not computed.
+  /// @throws ValueError if parameters were added to the store since construction, or it has no such id
   Var<T> leaf(Tape<T>& tape, ParamId id) const;
 
  private:
   const ParamStore<T>* layout_;
   const T* values_;
-  std::size_t entries_;  // of the store at first: with more of them it has other buffers
+  std::size_t entries_;  // of the store at construction; adding more moves its buffers
   T* grads_;
   const PackedWeights<T>* packed_ = nullptr;
   std::optional<Var<T>> all_ = {};  // computed parameters

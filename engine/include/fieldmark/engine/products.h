@@ -10,16 +10,16 @@
 
 namespace fieldmark {
 
-// Products with the Jacobian J = df/dx and the Hessian H of a function f, without the matrices. f takes a
-// tape and its inputs, as for gradcheck(). A generic lambda serves all:
+// Products with the Jacobian J = df/dx and the Hessian H of a function f, without forming the matrices. f
+// takes a tape and its inputs, as in gradcheck(). One generic lambda serves all products:
 //   const auto f = [&](auto& tape, auto x) { return sum(tanh(matmul(x[0], tape.constant(w)))); };
-// For jvp() and hvp() include the ops of Duals that f needs, from engine/dual/. An input that f does not use
+// For jvp() and hvp(), include the Dual ops that f needs from engine/dual/. An input that f does not use
 // gives zeros.
 
-/// f of Vars.
+/// A function f of Vars.
 template <class T>
 using VarFunction = std::function<Var<T>(Tape<T>&, std::span<const Var<T>>)>;
-/// f of Duals.
+/// A function f of Duals.
 template <class T>
 using DualFunction = std::function<Dual<T>(Tape<T>&, std::span<const Dual<T>>)>;
 
@@ -27,20 +27,20 @@ using DualFunction = std::function<Dual<T>(Tape<T>&, std::span<const Dual<T>>)>;
 template <class T>
 struct Jvp {
   Tensor<T> value;    ///< f(x)
-  Tensor<T> product;  ///< J v, of its shape
+  Tensor<T> product;  ///< J v, of the same shape
 };
 /// Result of vjp() and hvp().
 template <class T>
 struct InputProducts {
   Tensor<T> value;                  ///< f(x)
-  std::vector<Tensor<T>> products;  ///< one for each input, of its shape
+  std::vector<Tensor<T>> products;  ///< one per input, of its shape
 };
 
 /// @{
-/// Jacobian-vector product, in forward mode: J v = d/ds f(x + s v) at s = 0, for some three times the work of
-/// f.
-/// @param tangents  v, one for each input, of its shape
-/// @throws ShapeError if a shape differs   @throws ValueError if the numbers of inputs and tangents do
+/// Computes the Jacobian-vector product J v = d/ds f(x + s v) at s = 0 in forward mode, at about three times
+/// the cost of f.
+/// @param tangents  v, one per input, of its shape
+/// @throws ShapeError if a shape differs   @throws ValueError if the numbers of inputs and tangents differ
 template <class T>
 Jvp<T> jvp(const std::type_identity_t<DualFunction<T>>& f, std::span<const Tensor<T>> inputs,
            std::span<const Tensor<T>> tangents);
@@ -52,8 +52,8 @@ Jvp<T> jvp(const std::type_identity_t<DualFunction<T>>& f, std::initializer_list
 /// @}
 
 /// @{
-/// Vector-Jacobian products, in reverse mode: J^T u for each input.
-/// @param cotangent  u, of the shape of f(x)   @throws ShapeError if it has another
+/// Computes the vector-Jacobian product J^T u for each input, in reverse mode.
+/// @param cotangent  u, of the shape of f(x)   @throws ShapeError if its shape differs
 template <class T>
 InputProducts<T> vjp(const std::type_identity_t<VarFunction<T>>& f, std::span<const Tensor<T>> inputs,
                      const Tensor<T>& cotangent);
@@ -65,9 +65,9 @@ InputProducts<T> vjp(const std::type_identity_t<VarFunction<T>>& f, std::initial
 /// @}
 
 /// @{
-/// Hessian-vector products of an f with one element, by a backward from its tangent:
+/// Computes Hessian-vector products of a scalar f by a backward pass from its tangent:
 ///   (H v)_i = sum_j d^2 f / dx_i dx_j v_j
-/// @param directions  v, one for each input, of its shape
+/// @param directions  v, one per input, of its shape
 /// @throws ShapeError if a shape differs or f(x) has more than one element
 /// @throws ValueError if the numbers of inputs and directions differ
 template <class T>

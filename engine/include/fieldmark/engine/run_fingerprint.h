@@ -8,12 +8,12 @@
 
 namespace fieldmark {
 
-/// Everything that decides the result of a training run: its options by name and the SHA-256 of each input. A
-/// checkpoint carries the fingerprint of its run, so that no other run resumes from it.
+/// Everything that determines the result of a training run: its options by name and the SHA-256 of each
+/// input. A checkpoint carries the fingerprint of its run, so that no other run resumes from it.
 class RunFingerprint {
  public:
   /// @{
-  /// Notes the value of an option.
+  /// Records the value of an option.
   template <class T>
   requires std::is_arithmetic_v<T>
   void option(std::string_view name, T value) {
@@ -26,28 +26,28 @@ class RunFingerprint {
   }
   void option(std::string_view name, std::string_view text);
   /// @}
-  /// Notes every option of a JSON object, those of nested objects too, under the names "NAME/KEY".
+  /// Records every option of a JSON object, including those of nested objects, under the names "NAME/KEY".
   /// @throws ValueError if the text is not a JSON object
   void options(std::string_view name, std::string_view json);
 
-  /// Notes the SHA-256 of the elements of an input.
+  /// Records the SHA-256 of the elements of an input.
   template <std::ranges::contiguous_range R>
   requires std::is_arithmetic_v<std::ranges::range_value_t<R>>
   void input(std::string_view name, const R& elements) {
     hash_input(name, std::as_bytes(std::span(elements)));
   }
-  /// Notes an input whose SHA-256 is known.
+  /// Records an input whose SHA-256 is known.
   void input_digest(std::string_view name, std::string sha256) {
     inputs_[std::string(name)] = std::move(sha256);
   }
 
-  /// Writes both into the metadata of a checkpoint, as canonical JSON.
+  /// Writes options and inputs to the metadata of a checkpoint, as canonical JSON.
   void write(SafetensorsFile& file) const;
-  /// Compares with the fingerprint of a checkpoint.
+  /// Requires that the fingerprint of a checkpoint equals this one.
   /// @throws IoError if the file is not a checkpoint, or names the first option or input that differs: "PATH:
   /// this checkpoint was made with option 'NAME' 24576, this run has 12288"
   void require(const SafetensorsFile& file) const;
-  /// The options that a checkpoint notes under a name, as the JSON object given to options().
+  /// Returns the options that a checkpoint holds under a name, as the JSON object given to options().
   /// @throws IoError if the file is not a checkpoint or has none
   static std::string options_of(const SafetensorsFile& file, std::string_view name);
 

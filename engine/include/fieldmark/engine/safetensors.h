@@ -13,9 +13,10 @@
 
 namespace fieldmark {
 
-/// A safetensors file: named arrays and string metadata, for every model, checkpoint and weight file.
+/// A safetensors file of named arrays and string metadata: the format of all model, checkpoint and weight
+/// files.
 /// Source: huggingface/safetensors, format description: 8 bytes of header length N (little endian), N bytes
-/// of JSON from '{', then the arrays without gaps. Arrays have at most rank 5 here.
+/// of JSON from '{', then the arrays without gaps. Here arrays have rank 5 at most.
 struct SafetensorsFile {
   /// One array of a file.
   struct Entry {
@@ -31,10 +32,10 @@ struct SafetensorsFile {
   /// Reads and checks a whole file.
   /// @throws IoError if it cannot be read or is not valid
   static SafetensorsFile read(const std::filesystem::path& path);
-  /// As read(), from memory. @param name  stands for the path in error texts
+  /// Like read(), but from memory. @param name  stands for the path in error texts
   static SafetensorsFile parse(std::span<const std::byte> bytes, std::string_view name);
   /// Writes atomically (see AtomicFile). Equal contents give equal bytes: header keys are sorted; arrays
-  /// stand in the order added, wider elements first, so that each is aligned.
+  /// follow in the order added, wider elements first, so that each is aligned.
   /// @param access  secret for a file that holds a key
   /// @throws IoError if writing fails   @throws ValueError if a name or metadata is not UTF-8
   void write(const std::filesystem::path& to, Access access = Access::shared) const;
@@ -50,17 +51,17 @@ struct SafetensorsFile {
   void add(std::string_view name, Shape shape, std::span<const std::uint64_t> data);
   /// @}
 
-  /// Whether there is an array of this name.
+  /// True if there is an array of this name.
   bool has(std::string_view name) const;
-  /// @throws IoError if there is no such array; the text lists the arrays of the file
+  /// Returns an array. @throws IoError if there is no such array; the text lists the arrays of the file
   const Entry& at(std::string_view name) const;
-  /// F32, or F16 and BF16 widened, which is exact. @throws IoError if missing or of another dtype, as all
-  /// below
+  /// Returns an F32 array, or an F16 or BF16 array widened exactly.
+  /// @throws IoError if the array is missing or of another dtype, as do the functions below
   Tensor<float> f32(std::string_view name) const;
-  /// An F64 array.
+  /// Returns an F64 array.
   Tensor<double> f64(std::string_view name) const;
   /// @{
-  /// The elements of an array, row-major.
+  /// Returns the elements of an array, row-major.
   std::vector<std::uint8_t> u8(std::string_view name) const;
   std::vector<std::int32_t> i32(std::string_view name) const;
   std::vector<std::int64_t> i64(std::string_view name) const;

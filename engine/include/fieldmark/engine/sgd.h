@@ -16,27 +16,28 @@ struct SgdOptions {
 
 /// Stochastic gradient descent with momentum on a flat array of parameters.
 ///   g' = g + weight_decay x,   u = momentum u + g',   x -= lr u      (Nesterov: x -= lr (g' + momentum u))
-/// Source: Sutskever et al. 2013, eq. 1 to 4, in PyTorch's form, whose velocity has no step size in it.
+/// Source: Sutskever et al. 2013, eq. 1 to 4, in PyTorch's form, where the velocity excludes the step size.
 template <class T>
 class Sgd {
  public:
-  /// For n numbers that are all trained. @throws ValueError if n is negative or an option is out of range
+  /// Optimises n parameters, all of them trained. @throws ValueError if n is negative or an option is out of
+  /// range
   explicit Sgd(Index n, SgdOptions options = {});
-  /// For the parameters of a store, whose running ones no step changes. The store gets no more of them
-  /// afterwards. @throws ValueError if an option is out of range
+  /// Optimises the parameters of a store. Steps never change its running ones. No parameters may be added to
+  /// the store afterwards. @throws ValueError if an option is out of range
   explicit Sgd(const ParamStore<T>& store, SgdOptions options = {});
 
-  /// One step over everything.
+  /// Takes one step over all parameters.
   /// @param values, grads  [n]   @param lr_factor  multiplies the options' lr
   /// @throws ShapeError unless both have n elements
   void step(std::span<T> values, std::span<const T> grads, double lr_factor = 1);
 
   /// @{
-  /// u [n], for checkpoints.
+  /// Returns u [n], for checkpoints.
   std::span<T> velocity() { return velocity_; }
   std::span<const T> velocity() const { return velocity_; }
   /// @}
-  /// The options given to the constructor.
+  /// Returns the options given to the constructor.
   const SgdOptions& options() const { return options_; }
 
  private:

@@ -9,7 +9,7 @@ namespace fieldmark {
 /// Checks one extent. Message form: "[op] arg: axis 0 must be N (why), got shape [..]".
 void check_extent(std::string_view op, std::string_view arg, const Shape& got, int axis, Index want,
                   std::string_view why);
-/// As above, where the reason is the shape of another argument: "(why, whose shape is [..])".
+/// Overload whose reason is the shape of another argument: "(why, whose shape is [..])".
 void check_extent(std::string_view op, std::string_view arg, const Shape& got, int axis, Index want,
                   std::string_view why, const Shape& of);
 /// Checks the rank. Message form: "[op] arg must have rank 2 [rows, cols], got shape [..]".

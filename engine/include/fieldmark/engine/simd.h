@@ -2,9 +2,9 @@
 #include <cstdint>
 #include <cstring>
 
-// Vectors for kernel files only. Everything has internal linkage: two instruction sets must never share an
-// inline function. GCC and Clang vector extensions instead of intrinsics: one source serves SSE4, AVX2 and
-// AVX-512.
+// Vectors for kernel files only. Everything has internal linkage, because two instruction sets must never
+// share an inline function. GCC and Clang vector extensions replace intrinsics, so that one source serves
+// SSE4, AVX2 and AVX-512.
 namespace {
 namespace simd {
 
@@ -52,8 +52,9 @@ template <class V>
   return a < b ? a : b;
 }
 
-/// e^x with a relative error below 2.5e-7 for x in [-87.3, 88]; saturates outside (0 below, the value at 88
-/// above). Cody and Waite 1980: x = n log 2 + r, |r| <= log(2) / 2, and a polynomial of degree 6 for e^r.
+/// Returns e^x with a relative error below 2.5e-7 for x in [-87.3, 88]; saturates outside (0 below, the value
+/// at 88 above). Source: Cody and Waite 1980: x = n log 2 + r, |r| <= log(2) / 2, and a polynomial of degree
+/// 6 for e^r.
 [[maybe_unused, gnu::always_inline]] inline Vec<float> exp(Vec<float> x) {
   const Vec<float> below = broadcast(-87.33f);
   const Vec<float> c = min(max(x, below), broadcast(88.0f));

@@ -8,12 +8,12 @@
 
 namespace fieldmark {
 
-// The state of training in a safetensors file: parameters by name, trained and running ones, and what the
-// optimiser keeps for them. Several stores share a file under prefixes of their own.
+// The state of training in a safetensors file: trained and running parameters by name, and the optimiser's
+// state for them. Several stores can share a file, each under its own prefix.
 
 /// @{
-/// Adds the parameters as PREFIX + NAME; with Adam its moments as NAME.mean and NAME.mean_square and its
-/// steps as PREFIX + "adam/steps", with Sgd its velocity as NAME.velocity.
+/// Adds the parameters as PREFIX + NAME. Adam adds its moments as NAME.mean and NAME.mean_square and its
+/// steps as PREFIX + "adam/steps"; Sgd adds its velocity as NAME.velocity.
 /// @throws ValueError if a name is taken
 template <class T>
 void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore<T>& store);
@@ -26,9 +26,9 @@ void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore
 /// @}
 
 /// @{
-/// Reads what save_state() added; further arrays of the file are left alone. Training then goes on with the
-/// same bits.
-/// @throws IoError if an array is missing or has another shape or type; nothing is changed then
+/// Reads what save_state() added and ignores other arrays of the file. Training then continues with the same
+/// bits.
+/// @throws IoError if an array is missing or has another shape or type; nothing changes then
 /// @throws ShapeError if the optimiser is for another number of parameters
 template <class T>
 void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore<T>& store);

@@ -21,7 +21,7 @@ template <class T>
 class Tape;
 
 namespace detail {
-// g[i] = or += seed[i], or 0 where mask (null: none) is not positive.
+// g[i] = seed[i] if fresh, else g[i] += seed[i]. A fresh g becomes 0 where mask (null: none) is not positive.
 template <class T>
 void seed_gradient(const T* seed, const T* mask, bool fresh, T* g, Index n);
 template <class T>
@@ -35,20 +35,20 @@ struct PackedMatrix;
 template <class T>
 class Var {
  public:
-  /// Extents of the value.
+  /// Returns the extents of the value.
   const Shape& shape() const { return slot_->shape; }
-  /// Row-major values, shape().size() of them.
+  /// Returns the shape().size() values, row-major.
   const T* value() const { return slot_->value; }
-  /// The tape it was recorded on.
+  /// Returns the tape that holds the value.
   Tape<T>& tape() const { return *tape_; }
-  /// Whether it depends on a leaf, so that gradients reach it.
+  /// True if the value depends on a leaf, so that gradients reach it.
   bool needs_grad() const { return slot_->needs_grad; }
-  /// Tells the values of a tape apart.
+  /// Returns an identifier that is unique among the values of a tape.
   const void* id() const { return slot_; }
-  /// dL/d(this) accumulated so far; nullptr before the first gradient. After a backward it is that backward's
-  /// until the next one begins; a leaf's buffer goes on adding up.
-  /// @throws ValueError for the output of a layer with a ReLU, unless Tape::keep_grad() asked for it before
-  /// the backward: without that, only the gradient in front of the ReLU is computed
+  /// Returns dL/d(this) accumulated so far, or nullptr before the first gradient. The gradient of a backward
+  /// pass is valid until the next pass begins; the buffer of a leaf keeps accumulating.
+  /// @throws ValueError for the output of a layer with a ReLU, unless Tape::keep_grad() requested it before
+  /// the backward pass: by default only the gradient in front of the ReLU is computed
   const T* grad() const {
     if (slot_->rectified && slot_->grad) [[unlikely]]
       throw ValueError(
@@ -56,10 +56,10 @@ class Var {
           "backward");
     return slot_->grad;
   }
-  /// The buffer to which a backward adds, zeroed on the first call; nullptr if this input needs no gradient.
-  /// Written by hand, it seeds the next replay(): gradients of an earlier one are forgotten.
+  /// Returns the buffer that a backward adds to, zeroed on the first call, or nullptr if this input needs no
+  /// gradient. Values written to it seed the next replay(); gradients of an earlier replay are discarded.
   T* grad_acc() const;
-  /// As grad_acc(), but a new buffer stays uninitialised and *fresh is set: the caller then assigns every
+  /// Like grad_acc(), but leaves a new buffer uninitialised and sets *fresh: the caller then assigns every
   /// element instead of adding, which saves a pass over memory.
   T* grad_acc(bool* fresh) const;
 
@@ -73,38 +73,38 @@ class Var {
     bool needs_grad;
     bool rectified;  // a ReLU's output, whose gradient may be masked: 0 where the value is not positive
     bool masked;     // every gradient so far was masked
-    T* target;       // buffer of the gradient; null: the arena's
+    T* target;       // gradient buffer; null: from the arena
     const PackedMatrix<T>* packed;
   };
   Var(Tape<T>* t, Slot* s) : tape_(t), slot_(s) {}
-  // grad_acc(); masked: the caller writes 0 where a rectified value is not positive.
+  // As grad_acc(). masked: the caller writes 0 where a rectified value is not positive.
   T* grad_buffer(bool* fresh, bool masked) const;
   Tape<T>* tape_;
   Slot* slot_;
 };
 
-/// Is told what a tape records and replays. TapeInspector (inspect.h) shows the graph, times and the first
-/// NaN.
+/// Receives callbacks for what a tape records and replays. TapeInspector (inspect.h) uses them to show the
+/// graph, times and the first NaN.
 template <class T>
 class TapeObserver {
  public:
   virtual ~TapeObserver() = default;
-  /// An op took memory for its output. @param from  the function that called Tape::output()
+  /// Called when an op allocates its output. @param from  the function that called Tape::output()
   virtual void made(Var<T> out, std::span<const Var<T>> inputs, const std::source_location& from) = 0;
-  /// An op filled its output and handed over its backward.
+  /// Called when an op has filled its output and registers its backward.
   virtual void recorded(Var<T> out) = 0;
-  /// A value got a name, see Tape::name().
+  /// Called when a value is named, see Tape::name().
   virtual void named(Var<T> v, std::string_view name) = 0;
-  /// The backward of the op that made `out` is about to run.
+  /// Called before the backward of the op that made `out`.
   virtual void before_backward(Var<T> out) = 0;
-  /// The backward of the op that made `out` has run.
+  /// Called after the backward of the op that made `out`.
   virtual void after_backward(Var<T> out) = 0;
-  /// The tape forgot the pass.
+  /// Called when the tape discards the pass.
   virtual void reset() = 0;
 };
 
 /// Records operations in the order they run and replays their backwards in reverse. Creation order is a
-/// topological order, so backward() is one loop. One Tape per thread; there is no global tape.
+/// topological order, so backward() is one loop. Use one Tape per thread; there is no global tape.
 template <class T>
 class Tape {
  public:
@@ -113,14 +113,14 @@ class Tape {
   Tape& operator=(const Tape&) = delete;
 
   /// @{
-  /// A value that needs no gradient. The data must outlive the pass, so a temporary does not compile.
+  /// Records a value that needs no gradient. The data must outlive the pass, so a temporary does not compile.
   /// @throws ShapeError unless the tensor has as many elements as its shape
   Var<T> constant(const Tensor<T>& t) { return constant(filled(t, "constant"), t.shape); }
   Var<T> constant(const Tensor<T>&& t) = delete;
   Var<T> constant(const T* value, Shape shape) { return make(value, nullptr, shape, false); }
   /// @}
   /// @{
-  /// A parameter or another input to differentiate in: its gradient is added to `grad`.
+  /// Records a parameter or another input to differentiate with respect to. Adds its gradient to `grad`.
   /// @throws ShapeError unless `grad` and the shape have as many elements as the tensor
   Var<T> leaf(const T* value, T* grad, Shape shape) { return make(value, grad, shape, true); }
   Var<T> leaf(const Tensor<T>& t, Tensor<T>& grad) {
@@ -131,8 +131,7 @@ class Tape {
   }
   Var<T> leaf(const Tensor<T>&& t, Tensor<T>& grad) = delete;
   /// @}
-  /// As leaf(), but the gradient of each backward overwrites `grad`; `grad` keeps its content if none
-  /// arrives.
+  /// Like leaf(), but each backward pass overwrites `grad`. If no gradient arrives, `grad` is unchanged.
   Var<T> fresh_leaf(const T* value, T* grad, Shape shape) {
     const Var<T> v = make(value, nullptr, shape, true);
     v.slot_->target = grad;
@@ -140,7 +139,7 @@ class Tape {
     return v;
   }
   /// @{
-  /// Output of an op; *data points at uninitialised values, which the op fills.
+  /// Allocates the output of an op and points *data to its uninitialised values, which the op fills.
   /// @param from  names the op for an observer
   /// @throws ValueError if an input was recorded on another tape
   Var<T> output(Shape shape, T** data, std::initializer_list<Var<T>> inputs,
@@ -161,22 +160,22 @@ class Tape {
     return out;
   }
   /// @}
-  /// Has the next backward compute dL/dv for Var::grad(), also where v is the output of a layer with a ReLU.
-  /// Costs such a layer a pass over its output. @return v
-  /// @throws ValueError if a backward came before
+  /// Makes the next backward pass compute dL/dv for Var::grad() even if v is the output of a layer with a
+  /// ReLU. This costs such a layer a pass over its output. @return v
+  /// @throws ValueError if a backward pass came before
   Var<T> keep_grad(Var<T> v) {
     if (v.slot_->rectified && v.slot_->grad)
       throw ValueError("[keep_grad] must be called before the backward that computes the gradient");
     v.slot_->rectified = false;
     return v;
   }
-  /// The same elements under another shape of equal size; gradients pass through unchanged.
+  /// Views the same elements under another shape of equal size. Gradients pass through unchanged.
   Var<T> reshape(Var<T> x, Shape shape);
-  /// The elements of x from `begin` on under a shape of their own; gradients pass through unchanged.
+  /// Views the elements of x from `begin` on under the given shape. Gradients pass through unchanged.
   /// @throws ShapeError if they do not lie within x
   Var<T> part(Var<T> x, Index begin, Shape shape);
-  /// Uninitialised memory until reset(), for values that a backward reads.
-  /// @throws ValueError if n is negative or so large that its bytes cannot be counted
+  /// Allocates uninitialised memory, valid until reset(), for values that a backward reads.
+  /// @throws ValueError if n is negative or its size in bytes overflows
   template <class U = T>
   U* scratch(Index n) {
     static_assert(std::is_trivially_destructible_v<U>);
@@ -186,8 +185,8 @@ class Tape {
     return static_cast<U*>(arena_.allocate(static_cast<std::size_t>(n) * sizeof(U)));
   }
 
-  /// Registers `fn(const T* dout)`, called once a backward, only if a gradient reached `out`. It leaves what
-  /// it captured as it was: a second backward calls it again.
+  /// Registers `fn(const T* dout)`, which each backward pass calls once if a gradient reached `out`. fn must
+  /// not change what it captured, because a second backward pass calls it again.
   template <class F>
   void on_backward(Var<T> out, F fn) {
     static_assert(std::is_trivially_destructible_v<F> && std::is_trivially_copyable_v<F>,
@@ -204,8 +203,8 @@ class Tape {
     last_ = new (arena_.allocate_small(sizeof(Closure))) Closure{{last_, out, run}, fn};
   }
 
-  /// Seeds dL/dloss = 1 and replays. Leaves add up over several calls; gradients of all other values begin
-  /// anew in each. @throws ShapeError unless `loss` has exactly one element
+  /// Seeds dL/dloss = 1 and replays. Gradients of leaves accumulate over calls; those of all other values
+  /// restart with each call. @throws ShapeError unless `loss` has exactly one element
   void backward(Var<T> loss) {
     if (loss.shape().size() != 1)
       throw ShapeError("[backward] loss must have one element, got shape " + loss.shape().str());
@@ -228,8 +227,8 @@ class Tape {
     detail::seed_gradient(seed.data(), mask, fresh, g, out.shape().size());
     replay();
   }
-  /// Replays from the gradients that the caller wrote to Var::grad_acc(): several outputs can be seeded by
-  /// hand.
+  /// Replays from the gradients that the caller wrote to Var::grad_acc(), so that several outputs can be
+  /// seeded by hand.
   void replay() {
     begin_pass();
     const Replaying replaying(phase_);
@@ -238,7 +237,7 @@ class Tape {
     for (const Node* n = last_; n; n = n->before)
       if (const T* dout = n->out.slot_->grad) n->run(n, dout);
   }
-  /// Forgets the recorded pass and keeps its memory for the next one; every Var of it becomes invalid.
+  /// Discards the recorded pass and keeps its memory for the next one. Invalidates every Var of the pass.
   void reset() {
     last_ = nullptr;
     fresh_.clear();
@@ -247,24 +246,24 @@ class Tape {
     if (observer_) [[unlikely]]
       observer_->reset();
   }
-  /// Names a value for an observer; without one it does nothing. @return v
+  /// Names a value for the observer; does nothing without one. @return v
   Var<T> name(Var<T> v, std::string_view name) {
     if (observer_) [[unlikely]]
       observer_->named(v, name);
     return v;
   }
-  /// Sets the observer of this tape, null: none. It must outlive the passes that it observes.
+  /// Sets the observer of this tape; null removes it. It must outlive the passes that it observes.
   void observe(TapeObserver<T>* observer) { observer_ = observer; }
-  /// The observer, or null.
+  /// Returns the observer, or null.
   TapeObserver<T>* observer() const { return observer_; }
-  /// The memory of values, gradients and closures, for counting.
+  /// Returns the arena that holds values, gradients and closures, for memory statistics.
   Arena& arena() { return arena_; }
 
  private:
   friend class Var<T>;
   friend struct detail::Shortcuts<T>;
   enum class Phase : std::uint8_t { recording, replaying, replayed };
-  // Ends with `replayed` even if a backward throws: what it left half done must not be added to.
+  // Ends with `replayed` even if a backward throws: nothing may be added to half-finished gradients.
   struct Replaying {
     explicit Replaying(Phase& p) : phase(p) { phase = Phase::replaying; }
     Replaying(const Replaying&) = delete;
@@ -272,13 +271,13 @@ class Tape {
     ~Replaying() { phase = Phase::replayed; }
     Phase& phase;
   };
-  // A recorded backward, in front of what its function captured.
+  // A recorded backward; the captures of its function follow it in memory.
   struct Node {
-    const Node* before;  // the one recorded before, or null
+    const Node* before;  // recorded before this one, or null
     Var<T> out;
     void (*run)(const Node*, const T* dout);
   };
-  // After a replay: gradients that are not a leaf's begin anew, in the buffers that they have.
+  // After a replay, restarts the gradients of all values but leaves, in their existing buffers.
   void begin_pass() {
     if (phase_ != Phase::replayed) return;
     phase_ = Phase::recording;

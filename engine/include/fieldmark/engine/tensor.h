@@ -12,14 +12,14 @@ struct Tensor {
   Shape shape;          ///< extents; [0] for an empty tensor
   std::vector<T> data;  ///< shape.size() elements, the last axis fastest
   Tensor() : shape{0} {}
-  /// Every element is `fill`.
+  /// Makes a tensor whose elements are all `fill`.
   explicit Tensor(Shape s, T fill = T(0)) : shape(s), data(static_cast<std::size_t>(s.size()), fill) {}
   /// @param d  shape.size() elements, row-major (not checked)
   Tensor(Shape s, std::vector<T> d) : shape(s), data(std::move(d)) {}
-  /// Number of elements.
+  /// Returns the number of elements.
   Index size() const { return static_cast<Index>(data.size()); }
   /// @{
-  /// Element at a row-major index, not checked.
+  /// Returns the element at a row-major index (not checked).
   T& operator[](Index i) { return data[static_cast<std::size_t>(i)]; }
   const T& operator[](Index i) const { return data[static_cast<std::size_t>(i)]; }
   /// @}

@@ -10,21 +10,21 @@
 
 namespace fieldmark {
 
-/// How TrainingRun::drive() takes a run to its end.
+/// Options of TrainingRun::drive().
 struct DriveOptions {
-  std::filesystem::path checkpoint = {};   ///< written from time to time and when stopped; empty: never
+  std::filesystem::path checkpoint = {};   ///< written periodically and when stopped; empty: never
   double checkpoint_seconds = 60;          ///< between two checkpoints, > 0
   double curve_seconds = 0;                ///< between two points of the curve; 0: no curve
-  std::function<double()> clock = {};      ///< seconds handed to step(); empty: those of training so far
-  std::function<bool()> enough = {};       ///< asked before each step; true: the run ends early
-  std::function<bool()> proceed = {};      ///< asked before each step; false: the run stops
-  std::function<void(double)> after = {};  ///< told the seconds before each step after that step
+  std::function<double()> clock = {};      ///< seconds passed to step(); empty: training time so far
+  std::function<bool()> enough = {};       ///< called before each step; true ends the run early
+  std::function<bool()> proceed = {};      ///< called before each step; false stops the run
+  std::function<void(double)> after = {};  ///< called after each step with the seconds before it
 };
 
-/// A run of training: optimiser, schedule, counter, checkpoints and the loop around its steps. A trainer
+/// A training run: optimiser, schedule, counter, checkpoints and the loop around its steps. A trainer
 /// derives from it and adds the loss.
 ///
-/// Equal options, inputs and number of steps give equal bytes, also across save() and restore(). A checkpoint
+/// Equal options, inputs and step counts give equal bytes, even across save() and restore(). A checkpoint
 /// holds every parameter by its name, both moments as NAME.mean and NAME.mean_square, the trainer's own
 /// figures as run/NAME, and the fingerprint of the run.
 class TrainingRun {
@@ -33,27 +33,27 @@ class TrainingRun {
   TrainingRun& operator=(const TrainingRun&) = delete;
   virtual ~TrainingRun() = default;
 
-  /// Takes one step. @param seconds  since the start of the run, for a schedule that ends at a time
+  /// Takes one step. @param seconds  since the start of the run, for a timed schedule
   void step(double seconds);
-  /// Whether the run has all its steps.
+  /// True if the run has taken all its steps.
   bool done() const { return schedule_.done(steps_); }
-  /// Steps taken, those before a restore() included.
+  /// Returns the number of steps taken, including those before a restore().
   Index steps() const { return steps_; }
-  /// Steps that the run will have in all; 0 until a timed run knows.
+  /// Returns the total number of steps of the run; 0 until a timed run has fixed it.
   Index planned() const { return schedule_.total(); }
-  /// Whether a timed run changed its total on the way, see Schedule: no number of steps repeats it.
+  /// True if a timed run changed its total on the way, see Schedule: no number of steps reproduces it.
   bool replanned() const { return schedule_.replanned(); }
-  /// Seconds of training, those before a restore() included.
+  /// Returns the seconds of training, including those before a restore().
   double seconds() const { return seconds_; }
-  /// The figure that the curve follows, such as a PSNR or the share of bits right.
+  /// Returns the figure that the curve tracks, such as a PSNR or the fraction of correct bits.
   virtual double figure() const = 0;
-  /// The state of training in a few words, for progress.
+  /// Returns the state of training in a few words, for progress output.
   virtual std::string status() const = 0;
 
-  /// Takes steps until the run is done or stops; writes checkpoints.
-  /// @return false if it stopped (after a checkpoint)   @throws IoError if a checkpoint cannot be written
+  /// Takes steps until the run is done or stopped, and writes checkpoints.
+  /// @return false if it was stopped (after a checkpoint)   @throws IoError if a checkpoint cannot be written
   bool drive(const DriveOptions& options);
-  /// The course of the run as lines "seconds,steps,figure" below that heading.
+  /// Returns the curve as CSV with the header "seconds,steps,figure".
   std::string curve() const;
 
   /// Writes a checkpoint. @throws IoError
@@ -61,33 +61,35 @@ class TrainingRun {
   /// Resumes from a checkpoint.
   /// @throws IoError if the file is not a checkpoint of the same options and inputs, see RunFingerprint
   void restore(const std::filesystem::path& path);
-  /// Whether the run resumed from a checkpoint of an earlier version.
+  /// True if the run resumed from a checkpoint of an earlier version.
   bool from_earlier_version() const { return earlier_; }
 
  protected:
   /// @throws ValueError if an option is out of range
   explicit TrainingRun(const ScheduleOptions& schedule);
-  /// Trains the parameters of a store, which must outlive the run and get no more of them.
-  /// @param adam  with a step size of 1: the schedule has the step sizes   @param prefix  of their names in
-  /// checkpoints   @param gradients  whether checkpoints hold gradients, of parameters that wait for their
-  /// step
+  /// Registers the parameters of a store for training. The store must outlive the run and get no new ones.
+  /// @param adam  with a step size of 1: the schedule sets the step sizes   @param prefix  of their names in
+  /// checkpoints   @param gradients  true if checkpoints also hold gradients, for parameters whose step is
+  /// still due
   void train(ParamStore<float>& params, const AdamOptions& adam, std::vector<AdamRange> ranges = {},
              std::string prefix = {}, bool gradients = false);
   /// @{
-  /// Adds a figure of the trainer to checkpoints as run/NAME. It must outlive the run and keep its place.
+  /// Adds a figure of the trainer to checkpoints as run/NAME. It must outlive the run and not move.
   void keep(std::string_view name, std::span<float> figures) { kept_.emplace_back(name, figures); }
   void keep(std::string_view name, double& figure) { kept_.emplace_back(name, std::span(&figure, 1)); }
   void keep(std::string_view name, Index& figure) { kept_.emplace_back(name, std::span(&figure, 1)); }
   /// @}
-  /// Step size of the present step.
+  /// Returns the step size of the current step.
   double lr() const { return schedule_.lr(steps_); }
-  /// Adam's step for the ranges given to train(). @param store  in the order of train()
+  /// Takes Adam's step over the ranges given to train(). @param store  index in the order of train() calls
   void update(std::size_t store = 0);
-  /// Adam's step for one more range of the first store, see Adam::extend_step(); lr_factor multiplies lr().
+  /// Extends the step to one more range of the first store, see Adam::extend_step(). lr_factor multiplies
+  /// lr().
   void extend_update(AdamRange range);
-  /// Everything that decides the result of this run; the first call hashes the inputs.
+  /// Returns the fingerprint of everything that determines the result of this run. The first call hashes the
+  /// inputs.
   const RunFingerprint& fingerprint() const;
-  /// Running mean of the loss of the last fifty steps or so; negative before the first.
+  /// Returns the running mean of the loss over roughly the last fifty steps; negative before the first step.
   double loss() const { return loss_; }
 
  private:
@@ -100,18 +102,18 @@ class TrainingRun {
   };
   using Kept = std::variant<std::span<float>, std::span<double>, std::span<Index>>;
 
-  /// One step: gradients, update(). @return the loss
+  /// Takes one step: computes gradients and calls update(). @return the loss
   virtual double take_step(double seconds) = 0;
-  /// Notes everything that decides the result, but for the schedule.
+  /// Records everything that determines the result, except for the schedule.
   virtual void describe(RunFingerprint& fingerprint) const = 0;
   /// @{
-  /// Arrays of the trainer that keep() does not fit.
+  /// Saves and restores arrays of the trainer that keep() does not support.
   virtual void save_more(SafetensorsFile&) const {}
   virtual void restore_more(const SafetensorsFile&) {}
   /// @}
-  /// A checkpoint of an earlier version in the present form; none if the file is not one.
+  /// Converts a checkpoint of an earlier version to the current form; returns nothing if the file is not one.
   virtual std::optional<SafetensorsFile> converted(const SafetensorsFile&) const { return {}; }
-  /// Writes the file of a checkpoint; for trainers whose checkpoints hold secrets.
+  /// Writes the file of a checkpoint. Overridden by trainers whose checkpoints hold secrets.
   virtual void write(const SafetensorsFile& file, const std::filesystem::path& path) const {
     file.write(path);
   }

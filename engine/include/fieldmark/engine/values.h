@@ -3,7 +3,7 @@
 
 namespace fieldmark {
 
-/// The one element of a loss or another single value.
+/// Returns the one element of a loss or another single value.
 /// @throws ShapeError unless there is exactly one
 template <class T>
 T item(Var<T> v) {
@@ -11,13 +11,13 @@ T item(Var<T> v) {
   return v.value()[0];
 }
 
-/// A copy of the values, which outlives the pass.
+/// Returns a copy of the values, which outlives the pass.
 template <class T>
 Tensor<T> to_tensor(Var<T> v) {
   return Tensor<T>(v.shape(), std::vector<T>(v.value(), v.value() + v.shape().size()));
 }
 
-/// A copy of the gradient dL/dv of the last backward; zeros if none reached v.
+/// Returns a copy of the gradient dL/dv of the last backward pass; zeros if none reached v.
 template <class T>
 Tensor<T> grad_to_tensor(Var<T> v) {
   if (!v.grad()) return Tensor<T>(v.shape());

@@ -6,10 +6,11 @@
 
 namespace fieldmark::extractor {
 
-/// Evidence for each bit of a message in one image: average pooling weighted by where a place lies.
-///   L_b = sum_p tanh(s_p / 2) sum_c q_c(p) code[c, b] / (sum_p (1 - q_C(p)) / N_b + 1e-3),   q =
-///   softmax(index)
-/// tanh(s / 2) = 2 sigmoid(s) - 1 is the expected sign; class C is the background. Where every place shows a
+/// Computes the evidence for each bit of a message in one image: average pooling weighted by each place's
+/// cell.
+///   L_b = sum_p tanh(s_p / 2) sum_c q_c(p) code[c, b] / (sum_p (1 - q_C(p)) / N_b + 1e-3),
+///   q = softmax(index)
+/// tanh(s / 2) = 2 sigmoid(s) - 1 is the expected sign; class C is the background. If every place shows a
 /// known cell with a certain sign, and each bit has its share of places, L_b is +-1; without foreground it is
 /// 0.
 /// @param sign [P] logit that the mark is positive at each place
@@ -21,14 +22,14 @@ namespace fieldmark::extractor {
 template <class T>
 Var<T> pooled_bits(Var<T> sign, Var<T> index, std::span<const std::type_identity_t<T>> code, Index n_bits);
 
-/// Adds one image's sign evidence to each cell, for tests that need the key only later.
+/// Adds the sign evidence of one image to each cell, for tests that receive the key later.
 ///   S_c += sum_p q_c(p) tanh(s_p / 2) / (n_c + 1/4)^0.3,   n_c = sum_p q_c(p),   q = softmax(index)
-/// The sum of n places has a signal as n and, between places that err by chance and places that all err
-/// together, noise as n^(1/2) to n: the best weight falls as n^0 to n^-1. The power 0.3 reads as much as none
-/// or more from four extractors of fox (48 bits, 60 views: 93.75, 92.4, 95.6 and 96.1% instead of 93.4, 92.3,
-/// 95.5 and 95.9%); 1/2 gains on the first (94.1%) and loses on two. The quarter of a place keeps cells that
-/// hardly show from counting.
-/// Runs in double, in an order that no thread count changes.
+/// The sum of n places has signal proportional to n. Its noise grows as n^(1/2) if places err independently
+/// and as n if they all err together, so the best weight lies between n^0 and n^-1. On four extractors of fox
+/// (48 bits, 60 views) the power 0.3 reads 93.75, 92.4, 95.6 and 96.1% instead of 93.4, 92.3, 95.5 and 95.9%
+/// without weights; 1/2 gains on the first (94.1%) and loses on two. The added 1/4 keeps barely visible cells
+/// from counting.
+/// Runs in double, in an order that does not depend on the thread count.
 /// @param sign [places]   @param index [places, cells + 1], the last column the background
 /// @param evidence [cells] S, added to   @throws ValueError if places or cells is negative
 void cell_evidence(const float* sign, const float* index, Index places, Index cells, double* evidence);

@@ -6,14 +6,15 @@
 
 namespace fieldmark {
 
-/// A place on a canvas, in pixels from its upper left corner; pixel centres are at n + 1/2.
+/// A point on a canvas, in pixels from its upper left corner; pixel centres are at n + 1/2.
 struct CanvasPoint {
   double x = 0;  ///< to the right
   double y = 0;  ///< downwards
 };
 
-/// An image to draw on, white at first. Edges are smooth: a shape covers a pixel by 1/2 minus the distance of
-/// the pixel's centre from the shape, in pixels, clamped to [0, 1]. Shapes may reach out of the canvas.
+/// An image to draw on, initially white. Edges are antialiased: a shape covers a pixel by 1/2 minus the
+/// distance of the pixel's centre from the shape, in pixels, clamped to [0, 1]. Shapes may extend beyond the
+/// canvas.
 class Canvas {
  public:
   /// Red, green and blue in [0, 1].
@@ -21,17 +22,16 @@ class Canvas {
 
   /// @param height, width  pixels   @throws ValueError unless both are 1 to 16384
   Canvas(Index height, Index width);
-  /// A line with round ends; one that begins where it ends is a disc. Nothing where a coordinate is not
-  /// finite.
+  /// Draws a line with round ends, or a disc at length zero. Draws nothing if a coordinate is not finite.
   /// @param thickness  pixels, > 0
   void line(const CanvasPoint& from, const CanvasPoint& to, double thickness, const Ink& ink);
-  /// A line of text. Characters outside ASCII become question marks.
+  /// Draws a line of text. Characters outside ASCII become question marks.
   /// @param corner  its upper left, rounded to pixels   @param scale  pixels of a stroke, >= 1; capitals are
   /// seven strokes high
   void text(const CanvasPoint& corner, std::string_view text, int scale, const Ink& ink);
-  /// Pixels from the beginning of a text to its end.
+  /// Returns the width of a text in pixels.
   static Index text_width(std::string_view text, int scale);
-  /// [height, width, 3]
+  /// Returns the image [height, width, 3].
   const Tensor<float>& image() const { return image_; }
 
  private:

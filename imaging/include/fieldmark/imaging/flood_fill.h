@@ -8,11 +8,11 @@
 
 namespace fieldmark {
 
-/// Neighbours of a pixel: those that share an edge with it, or also those that share a corner.
+/// Neighbours of a pixel: those that share an edge, or those that share an edge or a corner.
 enum class Neighbours { four, eight };
 
-/// Pixels that are joined to the starts by accepted pixels, each once; a start counts if it is accepted.
-/// @param starts  y width + x   @param accept  called at most once a pixel with y width + x, returns bool
+/// Returns the pixels connected to the starts by accepted pixels, each once; a start counts only if accepted.
+/// @param starts  y width + x   @param accept  called at most once per pixel with y width + x, returns bool
 template <class Accept>
 std::vector<Index> flood_fill(Index height, Index width, std::span<const Index> starts, Accept accept,
                               Neighbours neighbours = Neighbours::four) {

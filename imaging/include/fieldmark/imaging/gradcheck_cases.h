@@ -5,7 +5,7 @@
 
 namespace fieldmark::imaging {
 
-/// The gradient checks of every differentiable op and module of the room.
+/// Returns the gradient checks of every differentiable op and module in this room.
 std::vector<GradcheckCase> gradcheck_cases();
 
 }  // namespace fieldmark::imaging

@@ -4,8 +4,8 @@
 
 namespace fieldmark::bench {
 
-/// A text that stands for itself in XML and HTML, between tags as in quoted attributes: & < > " and ' become
-/// entities, control characters but tab and line feed the sign for what cannot be shown (U+FFFD).
+/// Escapes text for XML and HTML, between tags and in quoted attributes: & < > " and ' become entities;
+/// control characters except tab and line feed become U+FFFD, the replacement character.
 std::string escaped_markup(std::string_view text);
 
 }  // namespace fieldmark::bench

@@ -5,7 +5,7 @@
 
 namespace fieldmark {
 
-/// Left and right exchanged.   @param image  [H, W, C]
+/// Mirrors an image left to right.   @param image  [H, W, C]
 inline Tensor<float> mirrored(const Tensor<float>& image) {
   const Index w = image.shape[1], channels = image.shape[2];
   Tensor<float> out(image.shape);

@@ -5,7 +5,7 @@
 
 namespace fieldmark::imaging {
 
-/// The hard cases of the metrics, each with its error limit.
+/// Returns the hard numerical cases of the metrics, each with its error limit.
 std::vector<NumericsCase> numerics_cases();
 
 }  // namespace fieldmark::imaging

@@ -7,10 +7,10 @@
 
 namespace fieldmark {
 
-/// A tensor of a weight file with PyTorch's name; the model fixes its shape.
+/// A tensor of a weight file under its PyTorch name; the model fixes its shape.
 struct WeightTensor {
   std::string name;  ///< in the file: "features.0.weight"
-  Shape shape;       ///< of convolutions [out, in, K, K]
+  Shape shape;       ///< convolutions: [out, in, K, K]
 };
 
 /// Reads a tensor of the given shape.
@@ -27,18 +27,18 @@ struct PretrainedConvOptions {
   Activation activation = Activation::relu;  ///< applied to the sums
 };
 
-/// The tensors of a convolution of this name: "<name>.weight" and "<name>.bias".
+/// Returns the tensors of the convolution `name`: "<name>.weight" and "<name>.bias".
 std::vector<WeightTensor> pretrained_conv_tensors(std::string_view name,
                                                   const PretrainedConvOptions& options);
 
-/// Convolution with fixed weights from a file of PyTorch's layout: gradients reach its input only. It holds
-/// the weights and must outlive a pass.
+/// Convolution with fixed weights read from a file in PyTorch's layout. Gradients reach its input only. The
+/// object holds the weights and must outlive a pass.
 template <class T>
 class PretrainedConv {
  public:
   /// Reads "<name>.weight" [out, in, K, K] and "<name>.bias" [out]. @throws IoError as read_weights()
   PretrainedConv(const SafetensorsFile& file, std::string_view name, const PretrainedConvOptions& options);
-  /// y_c = scale_c x_c + shift_c in every pixel. @param scale, shift  one value for each channel
+  /// Makes y_c = scale_c x_c + shift_c for every pixel. @param scale, shift  one value per channel
   /// @throws ShapeError if they differ in size
   static PretrainedConv per_channel(std::span<const double> scale, std::span<const double> shift);
 

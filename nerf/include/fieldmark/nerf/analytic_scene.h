@@ -20,28 +20,28 @@ enum class SceneKind {
 constexpr SceneKind kSceneKinds[] = {SceneKind::objects, SceneKind::sphere, SceneKind::wires,
                                      SceneKind::plain, SceneKind::glossy};
 
-/// "objects", "sphere", "wires", "plain" or "glossy".
+/// Returns "objects", "sphere", "wires", "plain" or "glossy".
 const char* scene_kind_name(SceneKind kind);
-/// The inverse of scene_kind_name(). @throws ValueError for another name
+/// Inverts scene_kind_name(). @throws ValueError for another name
 SceneKind parse_scene_kind(std::string_view name);
 
-/// A built-in scene, within 1.2 of the origin, and cameras like those of the Blender scenes: on the upper
-/// half of a sphere of radius 4.0311, looking at the origin, camera_angle_x 0.6911.
+/// A built-in scene within 1.2 of the origin, and cameras like those of the Blender scenes: on the upper half
+/// of a sphere of radius 4.0311, looking at the origin, camera_angle_x 0.6911.
 struct SceneOptions {
   SceneKind kind = SceneKind::objects;  ///< which scene
   Index size = 200;                     ///< pixels of both sides, 1 to 8192
-  Index views = 100;  ///< of the training split, 1 to 100000; val has a tenth and test a quarter, at least 1
+  Index views = 100;  ///< of the training split, 1 to 100000; val has a tenth, test a quarter, at least 1
   std::uint64_t seed = 0;  ///< of placement, colours and cameras
 };
 
-/// Ray-traces one view with 4 x 4 samples a pixel; alpha is the covered share of a pixel. Surfaces are
+/// Ray-traces one view with 4 x 4 samples per pixel; alpha is the covered share of a pixel. Surfaces are
 /// diffuse under a sky and a soft sun, both occluded by spheres inside the solids (sun: the angle to the
-/// sphere; sky: (r / d)^2), so a point has one colour from all sides, but in the scene glossy.
+/// sphere; sky: (r / d)^2), so a point has the same colour from all sides, except in the scene glossy.
 /// @return  [height, width, 4] straight alpha, rounded to 8 bits   @throws ValueError if an option is out of
 /// range
 Tensor<float> render_scene(const SceneOptions& options, const Camera& camera);
 
-/// One split in memory: the images and cameras of write_scene().
+/// Makes one split in memory: the images and cameras of write_scene().
 /// @throws ValueError  if an option is out of range or split is not "train", "val" or "test"
 Dataset make_scene(const SceneOptions& options, const std::string& split = "train",
                    Background background = Background::white);

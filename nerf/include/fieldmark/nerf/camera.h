@@ -33,25 +33,26 @@ struct Camera {
   Vec3 position() const { return {pose[3], pose[7], pose[11]}; }
   /// The viewing direction: minus the pose's third column; unit if the pose is a rotation.
   Vec3 forward() const { return {-pose[2], -pose[6], -pose[10]}; }
-  /// The same view with another number of pixels. @throws ValueError unless both are at least 1
+  /// Returns the same view at another resolution. @throws ValueError unless both are at least 1
   Camera scaled(Index new_width, Index new_height) const;
-  /// The same view with the longer side `size` pixels, the other in proportion and at least 1; 0: unchanged.
+  /// Returns the same view with a longer side of `size` pixels, the other in proportion and at least 1; 0:
+  /// unchanged.
   Camera scaled(Index size) const;
-  /// Pose, then fx, fy, cx, cy: the argument of rays().
+  /// Returns pose, fx, fy, cx, cy: the argument of rays().
   std::array<double, 16> parameters() const;
 };
 
-/// A centred camera with square pixels.
-/// @param angle_x  horizontal field of view, radians, in (0, pi)   @throws ValueError outside, or if a side
-/// is below 1
+/// Makes a centred camera with square pixels.
+/// @param angle_x  horizontal field of view, radians, in (0, pi)   @throws ValueError if outside, or if a
+/// side is below 1
 Camera make_camera(const Pose& pose, double angle_x, Index width, Index height);
 
-/// The pose at `eye` that looks at `target` with `up` upwards in the image. If the view is along `up`, the
-/// coordinate axis furthest from the view replaces it.
+/// Returns the pose at `eye` that looks at `target` with `up` upwards in the image. If the viewing direction
+/// is along `up`, the coordinate axis farthest from that direction replaces it.
 /// @throws ValueError if eye and target coincide or a coordinate is not finite
 Pose look_at(const Vec3& eye, const Vec3& target, const Vec3& up);
 
-/// The ray through the centre of pixel (x, y):
+/// Returns the ray through the centre of pixel (x, y):
 ///   d = R ((x + 1/2 - cx) / fx, -(y + 1/2 - cy) / fy, -1), normalised.
 /// @param x, y  pixels, need not be integers
 Ray pixel_ray(const Camera& camera, double x, double y);

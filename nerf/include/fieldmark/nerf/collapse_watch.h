@@ -6,24 +6,25 @@
 
 namespace fieldmark::nerf {
 
-/// Notices a training that has collapsed: a loss that is no number, no occupied cells, or views of fog or one
+/// Detects a collapsed training: a loss that is not a number, no occupied cells, or views of fog or of one
 /// colour, which fit the images worse than a constant image does.
 ///
-/// Renders a few small views of the field at certain steps, which changes nothing about the training.
+/// Renders a few small views of the field at certain steps, without affecting the training.
 class CollapseWatch {
  public:
-  static constexpr Index kViews = 4;  ///< views that are rendered
+  static constexpr Index kViews = 4;  ///< views rendered per look
   static constexpr Index kPatience =
       3;  ///< looks in a row that must find the views worse than a constant image
-  /// @param images  views to compare with, better not of the training; the first kViews of them count
+  /// @param images  views to compare with, preferably not training views; only the first kViews are used
   CollapseWatch(const RadianceField& field, const Dataset& images);
-  /// Looks at the training where its step is one of the certain ones.
+  /// Checks the training if a look is due at its step.
   /// @param steps  of the training so far   @param train_psnr  see Trainer::train_psnr()
-  /// @return what is wrong, a sentence without its end; empty: nothing is, or not for certain yet
+  /// @return what is wrong, a sentence without full stop; empty: nothing, or not yet certain
   std::string look(Index steps, double train_psnr);
-  /// The same at the end of a run, without waiting for later looks; of runs long enough to tell.
+  /// Checks at the end of a run, without waiting for further looks; empty for runs too short to tell.
   std::string verdict(Index steps);
-  /// Share of the images' variance that the field explains, at most 1; below 0 a constant image fits better.
+  /// Returns the share of the images' variance that the field explains, at most 1; below 0 a constant image
+  /// fits better.
   double explained();
 
  private:
@@ -34,7 +35,7 @@ class CollapseWatch {
   const RadianceField& field_;
   Renderer renderer_;
   std::vector<Truth> truths_;
-  double variance_ = 0;  // of all pixels, a channel
+  double variance_ = 0;  // of all pixels, per channel
   double last_ = 0;      // explained() at the last look
   Index looked_ = -1;    // steps at the last look
   Index worse_ = 0;      // looks in a row that found a constant image better

@@ -5,14 +5,15 @@
 
 namespace fieldmark::nerf {
 
-/// Colours of rays under the exposure and white balance of their images.
+/// Applies the exposure and white balance of each ray's image to its colour.
 ///   C'_r = (I + D_v[:, :3]) C_r + A_r D_v[:, 3],   A'_r = A_r,   v = image[r]
-/// D = 0 leaves all as it is. The offset counts with the opacity: the map is one of straight colours, and the
-/// background behind a ray keeps its own.
+/// D = 0 is the identity. The offset is scaled by the opacity, so the map acts on straight colours and leaves
+/// the background behind a ray unchanged.
 /// @param rays    [R, 4] colour and opacity, see composite()
 /// @param affine  [V, 12] D of each image, a 3 x 4 matrix row by row
-/// @param image   [R] the row of affine for each ray; must outlive the pass
-/// @return [R, 4]   @throws ShapeError if sizes do not fit   @throws ValueError if an image is not in [0, V)
+/// @param image   [R] row of affine for each ray; must outlive the pass
+/// @return [R, 4]   @throws ShapeError if sizes do not match   @throws ValueError if an image is not in [0,
+/// V)
 /// Differentiable in: rays and affine.
 template <class T>
 Var<T> colour_affine(Var<T> rays, Var<T> affine, std::span<const Index> image);

@@ -5,7 +5,7 @@
 
 namespace fieldmark::nerf {
 
-/// Numerical quadrature of the volume rendering integral along packed rays.
+/// Composites samples along packed rays: numerical quadrature of the volume rendering integral.
 ///
 ///   C_r = sum_i w_i c_i,   A_r = sum_i w_i,   w_i = T_i (1 - exp(-sigma_i delta_i)),
 ///   T_i = exp(-sum_{j<i} sigma_j delta_j)
@@ -19,7 +19,7 @@ namespace fieldmark::nerf {
 /// @return           [R, 4]  colour C_r and opacity A_r, background not added
 /// @throws ShapeError if the three sample counts differ or rgb is not [S, 3]
 /// @throws ValueError if ray_begin does not start at 0, decreases or does not end at S
-/// Differentiable in: sigma, rgb, delta. Finite also where a ray saturates (T -> 0).
+/// Differentiable in: sigma, rgb, delta. Finite even where a ray saturates (T -> 0).
 template <class T>
 Var<T> composite(Var<T> sigma, Var<T> rgb, Var<T> delta, std::span<const Index> ray_begin);
 

@@ -8,39 +8,39 @@
 
 namespace fieldmark::nerf {
 
-/// A size of image files and how many have it.
+/// A size of image files and the number of files that have it.
 struct ImageSize {
   Index width = 0;   ///< pixels
   Index height = 0;  ///< pixels
-  Index count = 0;   ///< of the files, >= 1
+  Index count = 0;   ///< files of this size, >= 1
 };
 
 /// A split of a data set.
 struct SplitReport {
   std::string split;      ///< "train", "val" or "test"
-  Index images = 0;       ///< that cameras have
-  Index missing = 0;      ///< that cameras name and that do not exist
-  std::string same_as{};  ///< the split whose images these are; empty: none
+  Index images = 0;       ///< images that cameras have
+  Index missing = 0;      ///< images that cameras name but that do not exist
+  std::string same_as{};  ///< the split that has the same images; empty: none
 };
 
-/// A camera as camera_chart() draws it.
+/// A camera as drawn by camera_chart().
 struct ReportedCamera {
   std::string name;       ///< as View::name
   std::string split;      ///< "train", "val" or "test"
   Camera camera;          ///< of the image as loaded
-  bool outlying = false;  ///< whether odd_views() names it so
+  bool outlying = false;  ///< true if odd_views() finds it outlying
 };
 
-/// What a data set holds, and what is odd about it.
+/// The contents of a data set and its oddities.
 struct DataReport {
   std::string name{};                         ///< of the folder
   Layout layout = Layout::blender;            ///< of the files
   SceneType scene = SceneType::object;        ///< of the training images
-  std::string scene_reason{};                 ///< for people: why it is of this type
+  std::string scene_reason{};                 ///< human-readable reason for the scene type
   Background background = Background::white;  ///< behind the views
   std::vector<ImageSize> sizes{};             ///< of all image files, the most frequent first
-  Index masked_images = 0;                    ///< of which masks exclude a pixel
-  std::vector<SplitReport> splits{};          ///< those that the data set states
+  Index masked_images = 0;                    ///< images in which masks exclude a pixel
+  std::vector<SplitReport> splits{};          ///< splits that the data set defines
   std::vector<ReportedCamera> cameras{};      ///< of all splits, each image once
   Vec3 centre{};                              ///< of the scene: the point that the cameras look at
   Vec3 up{0, 0, 1};                           ///< unit, see CameraSpan
@@ -51,15 +51,15 @@ struct DataReport {
   std::vector<std::string> notes{};           ///< of load_dataset()
 };
 
-/// Reads all splits of a data set, one after another, as load_dataset() gives them, and examines them.
+/// Loads all splits of a data set, one after another, with load_dataset() and examines them.
 /// @param options  split and most_views are not used
-/// @param progress  is called after each split with the share of images read, in [0, 1]; false ends the work,
-/// and the report is then without sizes, cameras and oddities
-/// @throws IoError, ValueError  as load_dataset(), also where there are no training images
+/// @param progress  called after each split with the share of images read, in [0, 1]; returns false to stop,
+/// and the report then has no sizes, cameras or oddities
+/// @throws IoError, ValueError  as load_dataset(), also if there are no training images
 DataReport report_data(const std::filesystem::path& folder, const DatasetOptions& options = {},
                        const std::function<bool(double)>& progress = {});
 
-/// "blender", "transforms", "llff" or "colmap".
+/// Returns "blender", "transforms", "llff" or "colmap".
 std::string name_of(Layout layout);
 
 }  // namespace fieldmark::nerf

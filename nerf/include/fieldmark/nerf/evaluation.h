@@ -13,10 +13,10 @@ struct ViewScore {
   double psnr_foreground;     ///< over the foreground, dB; NaN if it is empty
   double psnr_colour_fitted;  ///< over the whole image, of colour_fitted(), dB
   double ssim;                ///< in [-1, 1]; NaN for an image smaller than the window of ssim()
-  double lpips;               ///< of both rounded to 8 bits; NaN without a network or for too small an image
+  double lpips;               ///< of both rounded to 8 bits; NaN without a network or for an image too small
 };
 
-/// Means over the views of a data set; each leaves out the views where its metric is NaN.
+/// Means over the views of a data set; each skips the views where its metric is NaN.
 struct Evaluation {
   double psnr = 0;                  ///< mean of ViewScore::psnr
   double psnr_foreground = 0;       ///< mean of ViewScore::psnr_foreground
@@ -28,11 +28,11 @@ struct Evaluation {
   std::vector<ViewScore> per_view;  ///< [views] in the order of the data set
 };
 
-/// Renders every view of a data set and compares it with the ground truth over the data set's background. The
-/// foreground is the pixels whose alpha exceeds 0.5 in the ground truth; in the render where the ground truth
-/// is opaque. Pixels that are not valid (View::valid) count in no PSNR; SSIM and LPIPS, which need whole
-/// images, see black there in both.
-/// @param progress  called after each view; false ends the evaluation with the views so far. May be empty
+/// Renders every view of a data set and compares it with the ground truth, both over the data set's
+/// background. The foreground consists of the pixels whose alpha exceeds 0.5 in the ground truth, or in the
+/// render if the ground truth is opaque. No PSNR counts invalid pixels (View::valid); SSIM and LPIPS, which
+/// need whole images, see them as black in both.
+/// @param progress  called after each view; returns false to stop with the views so far. May be empty
 /// @param lpips     the network of ViewScore::lpips, or null
 /// @throws ValueError if there are no views
 Evaluation evaluate(Renderer& renderer, const Dataset& dataset,

@@ -5,7 +5,7 @@
 
 namespace fieldmark::nerf {
 
-/// The visible samples of some rays, packed ray after ray, with the values computed to find them.
+/// The visible samples of some rays, packed ray by ray, with the values computed to find them.
 struct RaySamples {
   std::vector<Index> ray_begin;         ///< R + 1 offsets
   std::vector<float> position;          ///< [S, 3] cube coordinates
@@ -19,8 +19,8 @@ struct RaySamples {
   Index size() const { return static_cast<Index>(t.size()); }
 };
 
-/// Weights w_i of the samples of each ray, see composite(). @param step  spacing of samples that have no
-/// delta
+/// Computes the weights w_i of the samples of each ray, see composite(). @param step  spacing of samples
+/// without delta
 /// @param weights [S] written
 void sample_weights(const RaySamples& samples, float step, float* weights);
 
@@ -28,23 +28,23 @@ void sample_weights(const RaySamples& samples, float step, float* weights);
 struct FieldSamplingOptions {
   float finer = 1;     ///< samples per sample at the field's step, > 0; mlp fields ignore it
   float stop = 1e-4f;  ///< transmittance threshold below which a ray ends; 0 never ends one early
-  RayPoints points{};  ///< of a ray of an mlp field
+  RayPoints points{};  ///< along a ray of an mlp field
 };
 
 /// Finds the visible samples of a field's rays. A hash field is marched (RaySampler). An mlp field is sampled
-/// by its coarse network (HierarchicalSampler) and evaluated in waves of 16 samples a ray, near to far, until
-/// the rays are opaque; its RaySamples hold z and delta, but no features. Reuses its buffers. One object per
-/// thread.
+/// by its coarse network (HierarchicalSampler) and evaluated in waves of 16 samples per ray, near to far,
+/// until the rays are opaque; its RaySamples hold z and delta, but no features. Reuses its buffers; use one
+/// object per thread.
 class FieldSampler {
  public:
   FieldSampler();
-  /// Takes the buffers of another sampler.
+  /// Takes over the buffers of another sampler.
   FieldSampler(FieldSampler&&) noexcept;
   ~FieldSampler();
 
-  /// @param packed  the matrices of field.params as they are now, or null
-  /// @param jitter  [R] in [0, 1), or empty: samples in the middles of their intervals
-  /// @throws ValueError or ShapeError if an argument does not fit
+  /// @param packed  current matrices of field.params, or null
+  /// @param jitter  [R] in [0, 1), or empty: samples in the middle of their intervals
+  /// @throws ValueError or ShapeError if an argument does not match
   void sample(const RadianceField& field, const RayBatch& rays, std::span<const float> jitter,
               const FieldSamplingOptions& options, RaySamples& out,
               const PackedWeights<float>* packed = nullptr);

@@ -5,7 +5,7 @@
 
 namespace fieldmark::nerf {
 
-/// The gradient checks of every differentiable op and module here, in alphabetical order.
+/// Returns the gradient checks of every differentiable op and module of this library, in alphabetical order.
 std::vector<GradcheckCase> gradcheck_cases();
 
 }  // namespace fieldmark::nerf

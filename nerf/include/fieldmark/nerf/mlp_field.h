@@ -9,7 +9,7 @@ namespace fieldmark::nerf {
 struct MlpFieldOptions {
   Index layers = 8;         ///< hidden layers of the density network, 1 to 16
   Index width = 256;        ///< units of a hidden layer, 2 to 1024; half as many before the colour
-  Index skip = 5;           ///< the layer, from 0, that reads the encoded position again; 0: none does
+  Index skip = 5;           ///< index of the layer that reads the encoded position again; 0: none
   int position_bands = 10;  ///< of the frequency encoding of positions, 1 to 20
   int direction_bands = 4;  ///< of the frequency encoding of directions, 1 to 20
 };
@@ -17,12 +17,12 @@ struct MlpFieldOptions {
 /// Numbers of samples along a ray of an mlp field. The fine network evaluates all of them, the coarse network
 /// those of first().
 struct RayPoints {
-  Index average = 32;     ///< one in each of as many equal parts of the ray, 0 to 1024
+  Index average = 32;     ///< one in each of this many equal parts of the ray, 0 to 1024
   Index importance = 32;  ///< drawn from the coarse network's weights, 0 to 1024
   Index random = 0;       ///< uniform along the ray, 0 to 1024
-  /// All samples of a ray.
+  /// Number of all samples of a ray.
   Index total() const { return average + random + importance; }
-  /// Samples that depend on no network.
+  /// Number of samples that depend on no network.
   Index first() const { return average + random; }
 };
 
@@ -43,7 +43,8 @@ class MlpField {
   /// Encodes positions, as an op. @param x [N, 3] in the unit cube   @return [N, feature_width()]
   /// Differentiable in: x.
   Var<T> encode(Var<T> x) const;
-  /// The same values, not recorded. @param x [n, 3]   @param features [n, feature_width()], written
+  /// Computes the same values without recording. @param x [n, 3]   @param features [n, feature_width()],
+  /// written
   void encode(const T* x, Index n, T* features) const;
   /// Encodes directions. @param d [N, 3]   @return [N, direction_width()]   Differentiable in: d.
   Var<T> encode_directions(Var<T> d) const;

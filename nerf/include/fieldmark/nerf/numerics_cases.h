@@ -5,7 +5,7 @@
 
 namespace fieldmark::nerf {
 
-/// The hard cases of quadrature, encodings and ray marching, each with the error that it may have.
+/// Returns hard cases of quadrature, encodings and ray marching, each with its error bound.
 std::vector<NumericsCase> numerics_cases();
 
 }  // namespace fieldmark::nerf

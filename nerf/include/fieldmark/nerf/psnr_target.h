@@ -4,15 +4,16 @@
 
 namespace fieldmark::nerf {
 
-/// Stops a training early, once its field reaches a PSNR.
+/// Stops training early once the field reaches a PSNR.
 class PsnrTarget {
  public:
   static constexpr Index kViews = 4;    ///< held-out views that count
   static constexpr Index kEvery = 250;  ///< steps between evaluations
   /// @param psnr  dB; 0 never stops   @param held_out  views to evaluate; none: the PSNR of the training rays
-  /// counts
+  /// is used
   PsnrTarget(const RadianceField& field, double psnr, std::optional<Dataset> held_out);
-  /// Whether the field reaches the target. Evaluates held-out views every kEvery steps, whatever the time.
+  /// Returns true if the field reaches the target. Evaluates held-out views every kEvery steps, however long
+  /// these take.
   /// @param steps  of the training so far   @param train_psnr  see Trainer::train_psnr()
   bool reached(Index steps, double train_psnr);
 

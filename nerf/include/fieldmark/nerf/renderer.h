@@ -9,18 +9,19 @@ namespace fieldmark::nerf {
 
 /// Precision and cost of a Renderer.
 struct RenderOptions {
-  /// Samples along a ray per sample of training, > 0. The gaps between samples cause most of an image's error
-  /// (`fieldmark bench field` measures it). Fields of kind mlp use points instead.
+  /// Samples along a ray per training sample, > 0. The gaps between samples cause most of an image's error
+  /// (`fieldmark bench field` measures it). Fields of kind mlp use `points` instead.
   float finer = 4.f / 3;
   float stop = 3e-3f;          ///< transmittance threshold below which a ray ends
   float least_weight = 1e-3f;  ///< samples of less weight get no colour
-  /// bf16 reads features from a rounded table and multiplies rounded matrices: it takes less memory and gives
-  /// 62 dB to the fp32 image. Needs bf16_units().
+  /// bf16 reads features from a rounded table and multiplies rounded matrices: this takes less memory and has
+  /// a PSNR of 62 dB against the fp32 image. Needs bf16_units().
   Precision precision = Precision::fp32;
-  /// Samples along a ray of an mlp field; none: those of its training.
+  /// Samples along a ray of an mlp field; none: as in training.
   std::optional<RayPoints> points{};
-  /// Rays along each side of a pixel, 1 to 8, at the centres of its parts; the pixel is their mean. 0:
-  /// RadianceFieldOptions::supersampling. 2 gains up to 0.3 dB against ground truth at four times the cost.
+  /// Rays along each side of a pixel, 1 to 8, through the centres of its equal parts; the pixel is their
+  /// mean. 0: RadianceFieldOptions::supersampling. 2 gains up to 0.3 dB against ground truth at four times
+  /// the cost.
   Index supersampling = 0;
 };
 
@@ -38,32 +39,31 @@ struct SeenSample {
   std::array<float, 3> colour{};    ///< as composited
 };
 
-/// Renders views of one field; keeps its buffers from view to view. The field must outlive the renderer and
-/// may change between views; callers of trace() then call refresh().
+/// Renders views of one field and reuses its buffers between views. The field must outlive the renderer and
+/// may change between views; callers of trace() must then call refresh().
 class Renderer {
  public:
   /// @param options  weights and transmittances are in [0, 1], not checked
   /// @throws ValueError for bf16 where the CPU has none, or if finer or supersampling is out of range
   explicit Renderer(const RadianceField& field, const RenderOptions& options = {});
   ~Renderer();
-  /// One ray through the centre of every pixel, or several, see RenderOptions::supersampling; samples in the
-  /// middle of their intervals.
+  /// Renders a view with one ray through the centre of every pixel, or several, see
+  /// RenderOptions::supersampling. Samples are in the middle of their intervals.
   Rendering render(const Camera& camera);
-  /// Reads the field's present parameters for trace(). render() does so by itself.
+  /// Reads the current parameters of the field for trace(). render() does this itself.
   void refresh() { packed_.update(); }
   /// Replaces colours before they are composited. Receives positions x [n, 3] in the unit cube, unit viewing
   /// directions d [n, 3] and colours rgb [n, 3]. Several threads call it at once.
   using Recolour = std::function<void(const float* x, const float* d, Index n, float* rgb)>;
-  /// Sets the function for the next images; an empty one draws the field as it is.
+  /// Sets the function for the next images; an empty one leaves colours unchanged.
   void set_recolour(Recolour recolour) { recolour_ = std::move(recolour); }
   static constexpr Index kLanes = 16;  ///< calls of trace() that may run at the same time
-  /// Colour and opacity of given rays, background not added.
+  /// Computes colour and opacity of rays, background not added.
   /// @param rays  in cube coordinates   @param lane  0 to kLanes - 1; concurrent calls have different lanes
   /// @param out  [R, 4] written   @param position  [R, 3] written unless null: mean position of the samples
-  /// by
-  ///             weight, in the unit cube; 0 for an empty ray
+  /// by weight, in the unit cube; 0 for an empty ray
   void trace(const RayBatch& rays, Index lane, float* out, float* position = nullptr);
-  /// The samples of given rays that weigh more than least_weight, ray after ray, near to far.
+  /// Writes the samples of rays that weigh more than least_weight, ray by ray, near to far.
   /// @param rays, lane  as above   @param out  overwritten
   void trace_samples(const RayBatch& rays, Index lane, std::vector<SeenSample>& out);
 

@@ -5,10 +5,9 @@
 namespace fieldmark::kernels::FIELDMARK_ISA_NS {
 namespace {
 
-constexpr int kChains = 12;  // two units of latency 4 want 8, and of 16 registers two hold the factors
+constexpr int kChains = 12;  // two units of latency 4 need 8; of 16 registers, two hold the factors
 
-// Written as instructions: from a loop in C++ the compiler took the factors out and half of the work with
-// them.
+// Inline assembly: in a C++ loop, the compiler hoisted the factors and half of the work with them.
 [[gnu::always_inline]] inline void multiply_add(simd::Vec<float>& sum, simd::Vec<float> x,
                                                 simd::Vec<float> y) {
 #if defined(__FMA__)
@@ -22,7 +21,7 @@ constexpr int kChains = 12;  // two units of latency 4 want 8, and of 16 registe
 
 double fma_peak_f32(std::int64_t rounds) {
   const simd::Vec<float> x = simd::broadcast(0.5f), y = simd::broadcast(1e-3f);
-  // Twelve names and no array: the elements of one stayed in memory, and the rate fell to a third.
+  // Twelve variables instead of an array: array elements stayed in memory, and the rate fell to a third.
   simd::Vec<float> a = x, b = x, c = x, d = x, e = x, f = x, g = x, h = x, i = x, j = x, k = x, l = x;
   for (std::int64_t r = 0; r < rounds; ++r) {
     multiply_add(a, x, y), multiply_add(b, x, y), multiply_add(c, x, y), multiply_add(d, x, y);

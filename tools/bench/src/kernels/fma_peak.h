@@ -5,8 +5,8 @@
 
 namespace fieldmark::kernels {
 
-// Multiplies and adds on registers only, as many at a time as hide their latency: nothing but arithmetic
-// limits it. Returns the floating-point operations done in `rounds` of it.
+// Multiplies and adds in registers only, with enough independent chains to hide the latency, so that only
+// arithmetic limits the speed. Returns the number of floating-point operations in `rounds` rounds.
 FIELDMARK_DECLARE_KERNEL(double, fma_peak_f32, (std::int64_t rounds))
 
 }  // namespace fieldmark::kernels

@@ -7,10 +7,11 @@
 
 namespace fieldmark {
 
-// Ops of arithmetic.h, comparison.h and operators.h for Duals, see dual.h. They broadcast and throw as these.
+// Ops of arithmetic.h, comparison.h and operators.h for Duals, see dual.h. They broadcast and throw like
+// those.
 
 /// @{
-/// The op of the same name, with its tangent; one of both operands may be a Var.
+/// Applies the op of the same name with its tangent. One of the two operands may be a Var.
 ///   add: a' + b'   sub: a' - b'   mul: a' b + a b'   div: (a' - y b') / b
 ///   pow: a' b a^(b - 1) + b' y log a   minimum, maximum: the tangent of the chosen one, a' where both are
 ///   equal
@@ -51,12 +52,12 @@ requires detail::MixedDuals<A, B>
 auto maximum(const A& a, const B& b) { return maximum(detail::as_dual(a), detail::as_dual(b)); }
 /// @}
 
-/// Every element times a constant: factor x'.
+/// Multiplies every element by a constant; the tangent is factor x'.
 template <class T>
 Dual<T> scale(const Dual<T>& x, double factor);
 
 /// @{
-/// The comparison of the values, a constant without tangent.
+/// Compares the values; the result is a constant without tangent.
 template <class A, class B>
 requires detail::AnyDual<A, B>
 auto greater(const A& a, const B& b) { return greater(detail::value_of(a), detail::value_of(b)); }
@@ -69,7 +70,7 @@ auto equal(const A& a, const B& b) { return equal(detail::value_of(a), detail::v
 /// @}
 
 /// @{
-/// Chooses values and tangents element by element; one of both may be a Var.
+/// Chooses values and tangents element by element; one of a and b may be a Var.
 template <class T>
 Dual<T> where(std::type_identity_t<Var<T>> mask, const Dual<T>& a, const Dual<T>& b);
 template <class T, class A, class B>

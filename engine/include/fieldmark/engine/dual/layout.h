@@ -13,11 +13,11 @@
 
 namespace fieldmark {
 
-// Ops that move, repeat or average elements, for Duals. They are linear: the tangent is the op of the
-// tangent.
+// Ops that move, repeat or average elements, for Duals. They are linear, so the op of the tangent is the
+// tangent of the result.
 
 /// @{
-/// The op of layout.h, with its tangent; pad() adds zeros to a tangent.
+/// Applies the op of layout.h with its tangent; pad() pads the tangent with zeros.
 template <class T>
 Dual<T> reshape(const Dual<T>& x, Shape shape);
 template <class T>
@@ -36,14 +36,14 @@ template <class T>
 Dual<T> cumsum(const Dual<T>& x, int axis = -1);
 /// @}
 
-/// The values of x as a constant, without gradient and tangent.
+/// Returns the values of x as a constant, without gradient and tangent.
 template <class T>
 Var<T> detach(const Dual<T>& x) {
   return detach(x.value());
 }
 
 /// @{
-/// The op of slice.h, with its tangent. A Var joins others as Dual<T>(v).
+/// Applies the op of slice.h with its tangent. Pass a Var as Dual<T>(v).
 template <class T>
 Dual<T> concatenate(std::span<const Dual<T>> xs);
 template <class T>
@@ -63,7 +63,7 @@ Dual<T> slice(const Dual<T>& x, int axis, Index begin, Index count);
 /// @}
 
 /// @{
-/// The op of gather.h or rows.h, with its tangent.
+/// Applies the op of gather.h or rows.h with its tangent.
 template <class T>
 Dual<T> gather(const Dual<T>& x, int axis, std::span<const std::int32_t> index);
 template <class T>
@@ -75,7 +75,7 @@ Dual<T> gather_rows(const Dual<T>& x, std::span<const std::int32_t> index);
 /// @}
 
 /// @{
-/// The op of pool.h or resample.h, with its tangent.
+/// Applies the op of pool.h or resample.h with its tangent.
 template <class T>
 Dual<T> avg_pool(const Dual<T>& x, Index size);
 template <class T>

@@ -13,7 +13,7 @@ namespace fieldmark {
 // Losses for Duals. Weights and targets are constants that must outlive the pass.
 
 /// @{
-/// The loss of loss.h, with its tangent; one of a and b may be a Var. With d = a - b:
+/// Computes the loss of loss.h with its tangent; one of a and b may be a Var. With d = a - b:
 ///   mse_loss: mean 2 d d'   l1_loss: mean sign(d) d'   huber_loss: mean clamp(d, -delta, delta) d'
 template <class T>
 Dual<T> mse_loss(const Dual<T>& a, const Dual<T>& b, std::span<const std::type_identity_t<T>> weights = {});
@@ -41,7 +41,7 @@ auto huber_loss(const A& a, const B& b, double delta,
 /// @}
 
 /// @{
-/// The cross-entropy of loss.h or softmax.h, with its tangent.
+/// Computes the cross-entropy of loss.h or softmax.h with its tangent.
 ///   bce_with_logits: mean (s(x) - t) x'   softmax_cross_entropy: mean over rows of sum (softmax(x) -
 ///   1_label) x'
 template <class T>
@@ -53,7 +53,7 @@ Dual<T> softmax_cross_entropy(const Dual<T>& logits, std::span<const std::int32_
 /// @}
 
 /// @{
-/// The distance of feature_distance.h, with its tangent; one of a and b may be a Var.
+/// Computes the distance of feature_distance.h with its tangent; one of a and b may be a Var.
 ///   mean_p sum_c 2 w_c d d',   d the difference of the scaled features; 0 from a pixel whose features are
 ///   all 0
 template <class T>

@@ -6,11 +6,11 @@
 
 namespace fieldmark {
 
-// Functions of one element, of activation.h, math.h and relu_family.h, for Duals: y' = f'(x) x', with the f'
-// of their backward, also at kinks.
+// The elementwise functions of activation.h, math.h and relu_family.h for Duals: y' = f'(x) x', with the f'
+// of their backward, even at kinks.
 
 /// @{
-/// The function of math.h, with its tangent.
+/// Applies the function of math.h with its tangent.
 template <class T>
 Dual<T> negate(const Dual<T>& x);
 template <class T>
@@ -42,7 +42,7 @@ Dual<T> clamp(const Dual<T>& x, double low, double high);
 /// @}
 
 /// @{
-/// The function of activation.h, with its tangent.
+/// Applies the function of activation.h with its tangent.
 template <class T>
 Dual<T> relu(const Dual<T>& x);
 template <class T>
@@ -58,7 +58,7 @@ Dual<T> softplus(const Dual<T>& x);
 /// @}
 
 /// @{
-/// The function of relu_family.h, with its tangent.
+/// Applies the function of relu_family.h with its tangent.
 template <class T>
 Dual<T> leaky_relu(const Dual<T>& x, double slope = 0.01);
 template <class T>

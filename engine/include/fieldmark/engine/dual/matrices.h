@@ -11,7 +11,8 @@
 namespace fieldmark {
 
 /// @{
-/// The product of matmul.h or batched_matmul.h, with its tangent a' b + a b'; one of both may be a Var.
+/// Computes the product of matmul.h or batched_matmul.h with its tangent a' b + a b'. One of a and b may be a
+/// Var.
 template <class T>
 Dual<T> matmul(const Dual<T>& a, const Dual<T>& b);
 template <class T>
@@ -25,8 +26,8 @@ auto batched_matmul(const A& a, const B& b) { return batched_matmul(detail::as_d
 /// @}
 
 /// @{
-/// The layer of dense.h or conv2d.h, with its tangent; some operands may be Vars. Products are linear in x
-/// and in w: y' = x' w + x w' + b', 0 where a ReLU shuts.
+/// Applies the layer of dense.h or conv2d.h with its tangent; some operands may be Vars. Products are linear
+/// in x and in w: y' = x' w + x w' + b', 0 where a ReLU is inactive.
 template <class T>
 Dual<T> dense(const Dual<T>& x, const Dual<T>& w, const Dual<T>& b, Activation activation = Activation::none);
 template <class T>
@@ -54,7 +55,7 @@ auto conv2d(const A& x, const B& w, const C& b, ConvWindow steps, Activation act
 /// @}
 
 /// @{
-/// The solution of linear_solve.h, with its tangent; one of both operands may be a Var.
+/// Applies the op of linear_solve.h with its tangent; one of the two operands may be a Var.
 ///   triangular_solve: T^-1 (b' - T' x)   solve: a^-1 (b' - a' x)   inverse: -y a' y
 template <class T>
 Dual<T> triangular_solve(const Dual<T>& a, const Dual<T>& b, Triangle triangle = {});
@@ -72,18 +73,18 @@ requires detail::MixedDuals<A, B>
 auto solve(const A& a, const B& b) { return solve(detail::as_dual(a), detail::as_dual(b)); }
 /// @}
 
-/// The factor of cholesky.h, with its tangent.
+/// Computes the factor of cholesky.h with its tangent.
 ///   L' = L P(L^-1 (a' + a'^T) / 2 L^-T),   P: the lower triangle with half of the diagonal
 /// Source: Murray 2016, eq. 8.
 template <class T>
 Dual<T> cholesky(const Dual<T>& a);
 
-/// The determinant of determinant.h, with its tangent y tr(a^-1 a').
+/// Computes the determinant of determinant.h with its tangent y tr(a^-1 a').
 /// @throws ValueError if a matrix is singular and has a tangent
 template <class T>
 Dual<T> determinant(const Dual<T>& a);
 
-/// The logarithm of determinant.h, with its tangent tr(a^-1 a').
+/// Computes the logarithm of determinant.h with its tangent tr(a^-1 a').
 template <class T>
 Dual<T> log_determinant(const Dual<T>& a);
 

@@ -10,8 +10,8 @@
 namespace fieldmark {
 
 /// @{
-/// The norm of layer_norm.h, group_norm.h or batch_norm.h, with its tangent; some operands may be Vars. With
-/// n = (x - mean) / s and s = sqrt(var + eps),
+/// Applies the norm of layer_norm.h, group_norm.h or batch_norm.h with its tangent; some operands may be
+/// Vars. With n = (x - mean) / s and s = sqrt(var + eps),
 ///   y' = gamma' n + gamma n' + beta',   n' = (c - n mean(n c)) / s,   c = x' - mean(x')
 /// and n' = x' / s for fixed statistics. With relu, y' is 0 where y is.
 template <class T>

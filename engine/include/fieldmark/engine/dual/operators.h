@@ -6,10 +6,10 @@
 
 namespace fieldmark {
 
-// a * b + 1.0f with Duals, see ops/operators.h.
+// Operators for Duals, as in a * b + 1.0f; see ops/operators.h.
 
 /// @{
-/// The op of the same meaning; one of both operands may be a Var.
+/// Applies the corresponding op; one of the two operands may be a Var.
 template <class A, class B>
 requires detail::AnyDual<A, B>
 auto operator+(const A& a, const B& b) { return add(a, b); }
@@ -29,7 +29,7 @@ Dual<T> operator-(const Dual<T>& a) {
 /// @}
 
 /// @{
-/// Every element with a number.
+/// Combines every element with a number.
 template <class T>
 Dual<T> operator+(const Dual<T>& a, std::type_identity_t<T> number) {
   return affine(a, 1, static_cast<double>(number));
@@ -64,7 +64,7 @@ Dual<T> operator/(std::type_identity_t<T> number, const Dual<T>& a) {
 }
 /// @}
 
-/// f of Duals, op by op: see ops/fused.h.
+/// Applies f to Duals op by op, see ops/fused.h.
 template <class F, class First, class... Rest>
 requires detail::AnyDual<First, Rest...>
 auto fused(F f, const First& first, const Rest&... rest) { return f(first, rest...); }

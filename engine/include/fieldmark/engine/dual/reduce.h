@@ -10,7 +10,7 @@
 namespace fieldmark {
 
 /// @{
-/// The op of reduce.h, with its tangent, the op of the tangent.
+/// Applies the op of reduce.h; its tangent is the op of the tangent.
 template <class T>
 Dual<T> sum(const Dual<T>& x);
 template <class T>
@@ -20,8 +20,8 @@ Dual<T> weighted_mean(const Dual<T>& x, std::span<const std::type_identity_t<T>>
 /// @}
 
 /// @{
-/// The op of reduce_axes.h, with its tangent.
-///   sum, mean: of x'   variance: 2 mean((x - mean) x')   max: x' where the largest is
+/// Applies the op of reduce_axes.h with its tangent.
+///   sum, mean: of x'   variance: 2 mean((x - mean) x')   max: x' at the largest element
 ///   logsumexp: sum exp(x - y) x'   softmax: y (x' - sum y x')
 template <class T>
 Dual<T> sum(const Dual<T>& x, const Axes& axes, KeepAxes keep = KeepAxes::no);

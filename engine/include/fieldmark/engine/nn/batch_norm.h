@@ -9,7 +9,7 @@ namespace fieldmark {
 /// Batch normalisation layer with the parameters "<name>/gamma" [C], initially 1, and "<name>/beta" [C],
 /// initially 0, and the running statistics "<name>/running_mean" [C], initially 0, and
 /// "<name>/running_variance" [C], initially 1. The store holds the statistics too, for checkpoints, as
-/// ParamRole::running: they get no gradient, and an Adam made for the store leaves them alone.
+/// ParamRole::running: they get no gradient, and Adam does not change them.
 template <class T>
 class BatchNorm {
  public:
@@ -18,12 +18,12 @@ class BatchNorm {
             const BatchNormOptions& options = {});
 
   /// Normalises with the batch's own statistics, see batch_norm().
-  /// @param statistics  where not null, receives them for update()
+  /// @param statistics  if not null, receives them for update()
   /// Differentiable in: x and the parameters.
   Var<T> operator()(const Params<T>& params, Var<T> x, BatchStatistics* statistics = nullptr) const;
   /// Normalises with the running statistics, see batch_norm_fixed().
   Var<T> evaluate(const Params<T>& params, Var<T> x) const;
-  /// running = (1 - momentum) running + momentum batch.
+  /// Updates the statistics: running = (1 - momentum) running + momentum batch.
   /// @param momentum  in [0, 1]   @throws ValueError if it is not   @throws ShapeError unless C channels are
   /// given
   void update(ParamStore<T>& store, const BatchStatistics& batch, double momentum = 0.1) const;

@@ -11,11 +11,11 @@ namespace fieldmark {
 struct Conv2dOptions {
   Index in = 0;                              ///< channels of the input, >= 1
   Index out = 0;                             ///< channels of the output, >= 1
-  Index kernel = 3;                          ///< side of the window, >= 1; odd where padding is not given
+  Index kernel = 3;                          ///< side of the window, >= 1; odd unless padding is given
   Activation activation = Activation::none;  ///< applied to the sums, in the same pass
   Index stride = 1;                          ///< pixels from one window to the next, >= 1
   std::optional<Index> padding = {};  ///< pixels of zeros around the image, >= 0; default (kernel - 1) / 2
-  bool bias = true;                   ///< false: b is 0 and no parameter
+  bool bias = true;                   ///< false: b is 0 and not a parameter
 };
 
 /// Convolution layer, see conv2d(). Weights start uniform in +-sqrt(6 / (kernel^2 in)) (He et al. 2015), the

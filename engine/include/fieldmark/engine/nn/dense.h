@@ -11,7 +11,7 @@ struct DenseOptions {
   Index in = 0;                              ///< features of an input row, >= 1
   Index out = 0;                             ///< features of an output row, >= 1
   Activation activation = Activation::none;  ///< applied to the sums, in the same pass
-  bool bias = true;                          ///< false: b is 0 and no parameter
+  bool bias = true;                          ///< false: b is 0 and not a parameter
 };
 
 /// Affine layer y = act(x W + b). W starts uniform in +-sqrt(6 / in) (He et al. 2015, eq. 10, uniform form),

@@ -9,11 +9,11 @@ namespace fieldmark {
 
 /// Extents of an Embedding.
 struct EmbeddingOptions {
-  Index count = 0;  ///< things that have a row, >= 1
-  Index width = 0;  ///< numbers of a row, >= 1
+  Index count = 0;  ///< number of rows, >= 1
+  Index width = 0;  ///< elements per row, >= 1
 };
 
-/// A learnt row of numbers for each of `count` things: letters, places, categories. The store holds the
+/// A learnt vector for each of `count` items, such as letters, places or categories. The store holds the
 /// parameter "<name>/table" [count, width], which starts with independent standard normal numbers.
 template <class T>
 class Embedding {
@@ -21,7 +21,7 @@ class Embedding {
   /// @throws ValueError  if an extent is below 1, or the name is taken in the store
   Embedding(ParamStore<T>& store, std::string_view name, const EmbeddingOptions& options, std::uint64_t seed);
 
-  /// The rows of some things, see gather_rows().
+  /// Looks up rows by index, see gather_rows().
   /// @param index  [N] in [0, count)   @return  [N, width]   @throws ValueError  if an index is outside
   /// Differentiable in: the parameters.
   Var<T> operator()(Tape<T>& tape, const Params<T>& params, std::span<const std::int32_t> index) const;

@@ -15,8 +15,8 @@ class GroupNorm {
   GroupNorm(ParamStore<T>& store, std::string_view name, Index channels,
             const GroupNormOptions& options = {});
 
-  /// See group_norm().   @param x [N, H, W, C]   @return [N, H, W, C]   Differentiable in: x and the
-  /// parameters.
+  /// Applies group_norm().   @param x [N, H, W, C]   @return [N, H, W, C]
+  /// Differentiable in: x and the parameters.
   Var<T> operator()(const Params<T>& params, Var<T> x) const;
 
  private:

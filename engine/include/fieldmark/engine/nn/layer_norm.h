@@ -15,7 +15,7 @@ class LayerNorm {
   /// @throws ValueError if one is out of range, or a name is taken
   LayerNorm(ParamStore<T>& store, std::string_view name, Index channels, double eps = 1e-5);
 
-  /// See layer_norm().   @param x [.., C]   @return [.., C]   @throws ShapeError if x does not fit
+  /// Applies layer_norm().   @param x [.., C]   @return [.., C]   @throws ShapeError if x does not fit
   /// Differentiable in: x and the parameters.
   Var<T> operator()(const Params<T>& params, Var<T> x) const;
 

@@ -3,8 +3,8 @@
 
 namespace fieldmark {
 
-// All take any shape and return the same; NaN stays NaN. The stated errors are those of the float path,
-// measured in its test against double; the double path is the C library's.
+// All functions accept any shape and return the same shape; NaN stays NaN. The stated errors are those of the
+// float path, which its test measures against double; the double path uses the C library.
 
 /// y = max(x, 0); the gradient at 0 is 0.
 /// Differentiable in: x, except at 0.
@@ -25,14 +25,16 @@ Var<T> tanh(Var<T> x);
 
 /// y = exp x.
 /// Float: relative error below 3e-7 for x in [-87.3, 88]; 0 below, and 1.65e38 = exp(88) above instead of
-/// infinity. Differentiable in: x; dy/dx = y, also where the float path saturates.
+/// infinity.
+/// Differentiable in: x; dy/dx = y, even where the float path saturates.
 template <class T>
 Var<T> exp(Var<T> x);
 
-/// Exponential for densities: y = exp(min(x, 15)), so that one step too far cannot overflow a training run.
-/// The backward uses dy/dx = y also above 15, where the true derivative is 0: a density stuck there can come
-/// down. Source: Mueller et al. 2022 (Instant NGP), density activation, whose code clamps only the gradient,
-/// at 15. Error as of exp.      Differentiable in: x; straight through above 15.
+/// Exponential for densities: y = exp(min(x, 15)), so that one oversized step cannot overflow a training run.
+/// The backward uses dy/dx = y even above 15, where the true derivative is 0, so that a density stuck there
+/// can come down. Same error as exp.
+/// Source: Mueller et al. 2022 (Instant NGP), density activation, whose code clamps only the gradient, at 15.
+/// Differentiable in: x; straight through above 15.
 template <class T>
 Var<T> truncated_exp(Var<T> x);
 

@@ -3,11 +3,11 @@
 
 namespace fieldmark {
 
-/// Transposed two-dimensional convolution, which enlarges images: the gradient of conv2d() in its input, plus
-/// a bias. With stride s and padding p, each element of x adds a window of weights to the result:
+/// Computes a transposed two-dimensional convolution, which enlarges images: the gradient of conv2d() in its
+/// input, plus a bias. With stride s and padding p, each element of x adds a window of weights to the result:
 ///   y[n, i s + u - p, j s + v - p, o] += sum_c x[n, i, j, c] w[u, v, o, c],   from y = b
 /// @param x  [N, H, W, C]   @param w  [K, K, O, C], the weights of a convolution from O channels to C
-/// @param b  [O]   @param window  stride and padding alone
+/// @param b  [O]   @param window  stride and padding only
 /// @return [N, (H - 1) s + K - 2 p, (W - 1) s + K - 2 p, O]
 /// @throws ShapeError if they do not fit, x has no pixel, or the padding leaves nothing of the result
 /// @throws ValueError if stride or padding is out of range, or dilation or groups are not 1

@@ -6,7 +6,7 @@ namespace fieldmark {
 /// Activation that an op applies to its sums.
 enum class Activation { none, relu };
 
-/// Affine map of rows, with its activation.
+/// Applies an affine map and an activation to rows.
 ///   y = act(x W + b)
 /// @param x  [N, in]   @param w  [in, out]   @param b  [out]   @return [N, out]
 /// @throws ShapeError if they do not fit

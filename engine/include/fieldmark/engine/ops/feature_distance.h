@@ -5,7 +5,8 @@
 
 namespace fieldmark {
 
-/// Weighted squared distance of features scaled to unit length at every pixel, averaged over the pixels.
+/// Computes the weighted squared distance of features scaled to unit length at every pixel, averaged over the
+/// pixels.
 ///   y[n] = mean_p sum_c w_c (a[n, p, c] / (|a[n, p]| + e) - b[n, p, c] / (|b[n, p]| + e))^2,   e = 1e-10
 /// Source: Zhang et al. 2018 (LPIPS), eq. 1, with the e of the authors' code.
 /// @param a, b     [N, H, W, C] of one shape, H and W at least 1

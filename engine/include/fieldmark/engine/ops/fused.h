@@ -13,16 +13,16 @@ template <class T>
 Var<T> run_chain(const Chain& chain, std::span<const Var<T>> inputs, std::source_location from);
 }  // namespace detail
 
-/// f of each element in one pass over memory, forward and backward, however many steps f has:
+/// Applies f to each element in one pass over memory, forward and backward, however many steps f has:
 ///   y[i] = f(x_0[i], x_1[i], ...)
-/// The result is recorded as one op. Blocks of elements stay in first-level cache from step to step; the
-/// backward computes intermediate values again instead of reading them.
+/// The result is recorded as one op. Blocks of elements stay in the L1 cache from step to step; the backward
+/// recomputes intermediate values instead of reading them.
 ///
 /// @code
 /// auto y = fused([](auto x, auto gain, auto bias) { return x * sigmoid(gain * x + bias); }, x, gain, bias);
 /// @endcode
-/// @param f  is called once, with a Lane for each input, and returns a Lane: see chain.h for what it may do.
-/// A generic lambda serves Lane and Var alike.
+/// @param f  called once with a Lane for each input; returns a Lane. See chain.h for what it may do. A
+/// generic lambda serves Lane and Var alike.
 /// @param first, rest  1 to Chain::kMaxInputs inputs, whose shapes broadcast
 /// @throws ShapeError if they do not   @throws ValueError if f has too many steps, or an input was recorded
 /// on another tape

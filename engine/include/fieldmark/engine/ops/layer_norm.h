@@ -3,7 +3,8 @@
 
 namespace fieldmark {
 
-/// Layer normalisation: each row of the last axis gets mean 0 and variance 1, then a gain and a shift.
+/// Applies layer normalisation: scales each row of the last axis to mean 0 and variance 1, then applies a
+/// gain and a shift.
 ///   y = gamma (x - mean) / sqrt(var + eps) + beta,   var = E[(x - mean)^2]
 /// Source: Ba et al. 2016, eq. 4. A constant row gives beta exactly; statistics are kept in double.
 /// @param x [.., C], C >= 1   @param gamma [C]   @param beta [C]   @param eps  > 0   @return [.., C]

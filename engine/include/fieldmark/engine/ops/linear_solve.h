@@ -3,10 +3,10 @@
 
 namespace fieldmark {
 
-// Matrices of up to some hundred rows, in batches: the axes before the last two count them. Work runs in
-// double through Eigen.
-// @throws ShapeError if the shapes do not fit   @throws ValueError if a matrix is singular, also to the
-// working precision of the scalar type, or holds a NaN or an infinity
+// Batches of matrices of up to some hundred rows; the axes before the last two index the batch. Eigen does
+// the work, in double.
+// @throws ShapeError if the shapes do not fit   @throws ValueError if a matrix is singular, even if only to
+// the working precision of the scalar type, or holds a NaN or an infinity
 
 /// Which triangle of a matrix triangular_solve() reads, and how.
 struct Triangle {
@@ -14,7 +14,7 @@ struct Triangle {
   bool transposed = false;  ///< solves with the triangle's transpose
 };
 
-/// Solves T x = b, T a triangle of a with its diagonal; the other triangle is not read.
+/// Solves T x = b, where T is a triangle of a with its diagonal. The other triangle is not read.
 ///   db = T^-T dx,   da = the triangle of -db x^T (transposed: of -x db^T)
 /// @param a [.., n, n]   @param b [.., n, k]   @return x [.., n, k]
 /// Differentiable in: a, b.
@@ -28,7 +28,7 @@ Var<T> triangular_solve(Var<T> a, Var<T> b, Triangle triangle = {});
 template <class T>
 Var<T> solve(Var<T> a, Var<T> b);
 
-/// Inverse matrices y = a^-1.
+/// Computes the inverse matrices y = a^-1.
 ///   da = -y^T dy y^T
 /// @param a [.., n, n]   @return [.., n, n]
 /// Differentiable in: a.

@@ -3,14 +3,14 @@
 
 namespace fieldmark {
 
-// All take any shape and return the same. Outside of its domain a function is NaN, at a pole infinite, as in
-// the C library.
+// All functions accept any shape and return the same shape. As in the C library, a function is NaN outside
+// its domain and infinite at a pole.
 
 /// y = -x.      Differentiable in: x.
 template <class T>
 Var<T> negate(Var<T> x);
 
-/// y = factor x + offset, one pass over memory.      Differentiable in: x.
+/// y = factor x + offset, in one pass over memory.      Differentiable in: x.
 template <class T>
 Var<T> affine(Var<T> x, double factor, double offset);
 
@@ -35,7 +35,7 @@ Var<T> square(Var<T> x);
 template <class T>
 Var<T> sqrt(Var<T> x);
 
-/// y = x^p for a constant power, NaN where x is negative and p no integer.
+/// y = x^p for a constant power, NaN where x is negative and p is not an integer.
 /// @param p  any finite number
 /// Differentiable in: x, except at 0 for p < 1; dy/dx = p x^(p - 1), 0 for p = 0.
 template <class T>
@@ -45,11 +45,11 @@ Var<T> pow(Var<T> x, double p);
 template <class T>
 Var<T> log(Var<T> x);
 
-/// y = log(1 + x), exact also for small x.      Differentiable in: x > -1.
+/// y = log(1 + x), accurate even for small x.      Differentiable in: x > -1.
 template <class T>
 Var<T> log1p(Var<T> x);
 
-/// y = exp(x) - 1, exact also for small x.      Differentiable in: x.
+/// y = exp(x) - 1, accurate even for small x.      Differentiable in: x.
 template <class T>
 Var<T> expm1(Var<T> x);
 

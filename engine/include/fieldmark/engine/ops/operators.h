@@ -6,11 +6,11 @@
 
 namespace fieldmark {
 
-// Arithmetic as it is written: a * b + 1.0f. Operands broadcast as the ops of arithmetic.h; one of both may
+// Arithmetic operators, as in a * b + 1.0f. Operands broadcast like those of arithmetic.h; one of the two may
 // be a number.
 
 /// @{
-/// The op of arithmetic.h of the same meaning. @throws ShapeError if the shapes do not broadcast
+/// Applies the corresponding op of arithmetic.h. @throws ShapeError if the shapes do not broadcast
 template <class T>
 Var<T> operator+(Var<T> a, Var<T> b) {
   return add(a, b);
@@ -34,7 +34,7 @@ Var<T> operator-(Var<T> a) {
 /// @}
 
 /// @{
-/// Every element with a number.
+/// Combines every element with a number.
 template <class T>
 Var<T> operator+(Var<T> a, std::type_identity_t<T> number) {
   return affine(a, 1, static_cast<double>(number));

@@ -3,7 +3,7 @@
 
 namespace fieldmark {
 
-/// Average over windows of size x size pixels, stride size. Trailing rows and columns that do not fill a
+/// Averages over windows of size x size pixels with stride size. Trailing rows and columns that do not fill a
 /// window are dropped: a padded average would darken the border.
 /// @param x [N, H, W, C]   @param size  side of a window in pixels, >= 1   @return [N, H / size, W / size, C]
 /// @throws ShapeError if x is not rank 4   @throws ValueError if size is below 1
@@ -11,7 +11,7 @@ namespace fieldmark {
 template <class T>
 Var<T> avg_pool(Var<T> x, Index size);
 
-/// Average over all pixels of each image; long sums run in double.
+/// Averages over all pixels of each image; long sums run in double.
 /// @param x [N, H, W, C], H and W at least 1   @return [N, C]
 /// @throws ShapeError if x is not rank 4 or has images without pixels
 /// Differentiable in: x.
@@ -25,13 +25,14 @@ struct MaxPool {
   bool ceil_mode = false;  ///< keeps windows that cross the lower or right edge, cut off there
 };
 
-/// Maximum of each channel over windows of size x size pixels, which may overlap or leave gaps; NaN if a
-/// window has one.
+/// Takes the maximum of each channel over windows of size x size pixels, which may overlap or leave gaps; NaN
+/// if a window has one.
 /// @param x [N, H, W, C]   @return [N, H', W', C], H' = (H - size) / stride + 1 rounded down; with ceil_mode
 /// rounded up, at least 1, without windows that begin outside
-/// @throws ShapeError if x is not rank 4 or has no window   @throws ValueError if size or stride is out of
-/// range Differentiable in: x, where the maximum of a window is unique; else the gradient goes to the first
-/// in reading order.
+/// @throws ShapeError if x is not rank 4 or has no window
+/// @throws ValueError if size or stride is out of range
+/// Differentiable in: x, where the maximum of a window is unique; else the gradient goes to the first in
+/// reading order.
 template <class T>
 Var<T> max_pool(Var<T> x, MaxPool windows);
 

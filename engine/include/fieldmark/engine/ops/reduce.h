@@ -6,22 +6,22 @@
 namespace fieldmark {
 
 // Sums run in double over fixed chunks of 32768 elements: they have the same bits for any thread count, and a
-// float sum over millions of elements has the error of its final rounding only (measured: 6e-8 of the sum of
+// float sum over millions of elements has only the error of its final rounding (measured: 6e-8 of the sum of
 // magnitudes).
 
-/// Sum of all elements.
+/// Computes the sum of all elements.
 /// @param x  any shape   @return [1]; 0 if x is empty
 /// Differentiable in: x.
 template <class T>
 Var<T> sum(Var<T> x);
 
-/// Mean of all elements.
+/// Computes the mean of all elements.
 /// @param x  any shape   @return [1]   @throws ShapeError if x is empty
 /// Differentiable in: x.
 template <class T>
 Var<T> mean(Var<T> x);
 
-/// Weighted mean of all elements: sum_i w_i x_i / sum_i w_i.
+/// Computes the weighted mean of all elements: sum_i w_i x_i / sum_i w_i.
 /// @param weights  one for each element of x, >= 0
 /// @return [1]
 /// @throws ShapeError if x is empty or the sizes differ   @throws ValueError if a weight is negative or NaN,

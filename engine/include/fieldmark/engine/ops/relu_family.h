@@ -3,7 +3,7 @@
 
 namespace fieldmark {
 
-// Relatives of relu(): any shape, and the same comes back. NaN stays NaN.
+// Relatives of relu(). All functions accept any shape and return the same shape; NaN stays NaN.
 
 /// y = x where x > 0, else slope x.
 /// @param slope  any finite number      Differentiable in: x, except at 0, where the gradient is slope.
@@ -22,7 +22,7 @@ template <class T>
 Var<T> silu(Var<T> x);
 
 /// Gaussian error linear unit: y = x P(x), P the distribution function of the standard normal.
-/// Source: Hendrycks and Gimpel 2016, section 2; exact, not by their approximation with tanh.
+/// Source: Hendrycks and Gimpel 2016, section 2; exact, without their tanh approximation.
 /// Differentiable in: x; dy/dx = P(x) + x exp(-x^2 / 2) / sqrt(2 pi).
 template <class T>
 Var<T> gelu(Var<T> x);

@@ -13,33 +13,33 @@ namespace fieldmark {
 /// Differentiable in: every x.
 template <class T>
 Var<T> concatenate(std::span<const Var<T>> xs);
-/// The same for tensors listed at the call.
+/// Overload for a braced list of tensors.
 template <class T>
 Var<T> concatenate(std::initializer_list<Var<T>> xs) {
   return concatenate(std::span<const Var<T>>(xs.begin(), xs.size()));
 }
 
 /// Concatenates tensors along any axis.
-/// @param xs  one or more, alike in all axes but this one   @param axis  negative: counted from the last
+/// @param xs  one or more, equal in all axes but this one   @param axis  negative: counts from the last
 /// @throws ShapeError if other axes differ or the axis is out of range   @throws ValueError if xs is empty
 /// Differentiable in: every x.
 template <class T>
 Var<T> concatenate(std::span<const Var<T>> xs, int axis);
-/// The same for tensors listed at the call.
+/// Overload for a braced list of tensors.
 template <class T>
 Var<T> concatenate(std::initializer_list<Var<T>> xs, int axis) {
   return concatenate(std::span<const Var<T>>(xs.begin(), xs.size()), axis);
 }
 
-/// Entries begin .. begin + count - 1 of the last axis.
+/// Returns entries begin .. begin + count - 1 of the last axis.
 /// @param x [.., C]   @return [.., count]
 /// @throws ShapeError if the range does not lie within C
 /// Differentiable in: x.
 template <class T>
 Var<T> slice(Var<T> x, Index begin, Index count);
 
-/// Entries begin .. begin + count - 1 of any axis.
-/// @param axis  negative: counted from the last
+/// Returns entries begin .. begin + count - 1 of any axis.
+/// @param axis  negative: counts from the last
 /// @throws ShapeError if the axis is out of range or the range does not lie within it
 /// Differentiable in: x.
 template <class T>

@@ -13,9 +13,9 @@ struct VideoOptions {
   double frames_per_second = 24;  ///< above 0, at most 1000
 };
 
-/// Encodes images as H.264 with 4:2:0 chroma in an MP4 file, by x264 with its default preset and one thread:
-/// equal images give equal bytes. Sides are filled up to even numbers with the last row and column. BT.709
-/// from 720 lines on, else BT.601.
+/// Encodes images as H.264 with 4:2:0 chroma in an MP4 file. Uses x264 with its default preset and one
+/// thread, so that equal images give equal bytes. Odd sides are padded to even ones by repeating the last row
+/// or column. The colour matrix is BT.709 from 720 lines on, else BT.601.
 class VideoWriter {
  public:
   /// @param width, height  of the images, pixels, 2 to 8192   @throws ValueError if a number is out of range,
@@ -26,7 +26,7 @@ class VideoWriter {
   ~VideoWriter();
   /// Appends a frame. @param image  [height, width, 3], rounded to 8 bits   @throws ShapeError
   void add(const Tensor<float>& image);
-  /// The file; the last call. @throws ValueError if there is no frame
+  /// Returns the file; must be the last call. @throws ValueError if there is no frame
   std::vector<std::byte> finish();
 
  private:

@@ -7,18 +7,17 @@
 
 namespace fieldmark::bench {
 
-/// One way of embedding a mark: what differs from the default, and the settings themselves.
+/// One way of embedding a mark: its difference from the default, and the settings themselves.
 struct EmbedVariant {
-  std::string choice;                 ///< what is chosen: "patch", "cells", ...; "default" for the default
-  std::string setting;                ///< how, for people
-  watermark::EmbedRecipe recipe;      ///< options of owner, mark and training, the seed included
-  watermark::EmbedViewOptions views;  ///< what it is trained on
+  std::string choice;                 ///< the option varied: "patch", "cells", ...; "default" for the default
+  std::string setting;                ///< its value, for display
+  watermark::EmbedRecipe recipe;      ///< options of owner, mark and training, including the seed
+  watermark::EmbedViewOptions views;  ///< views that it is trained on
 };
 
-/// The default first, then other lengths of the run, then every choice that embedding makes, switched off or
-/// set otherwise.
-/// @param length  of a run: its steps and seconds are kept   @param bits  of a message
-/// @param colours  that the scene's default is, see watermark::colours_for()
+/// Returns the default first, then other run lengths, then each choice in embedding, switched off or changed.
+/// @param length  of a run: its steps and seconds are kept   @param bits  length of a message
+/// @param colours  the scene's default, see watermark::colours_for()
 std::vector<EmbedVariant> embed_variants(const ScheduleOptions& length, Index bits, std::uint64_t seed,
                                          watermark::MarkColours colours = watermark::MarkColours::blue);
 

@@ -8,21 +8,21 @@ namespace fieldmark::results {
 /// Files of docs/results by name: Markdown pages and their charts.
 using Pages = std::map<std::string, std::string>;
 
-/// Renders pages from rows alone. The template is Markdown with
-///   %page FILE            the lines that follow are this page
+/// Renders pages from rows alone. The template is Markdown with these directives:
+///   %page FILE            starts the page FILE
 ///   %for, %end            see expanded()
-///   [[ID PATH FORMAT]]    a figure of a row: PATH as "accuracy/blind", FORMAT "%" for percent, ".2" for
-///   decimals, "g2"
-///                         for significant digits, none for the value as it is; "-" where there is none
+///   [[ID PATH FORMAT]]    a figure of a row: PATH as in "accuracy/blind", FORMAT "%" for percent, ".2" for
+///                         decimals, "g2" for significant digits, omitted for the raw value; "-" if it is
+///                         missing
 ///   [[ID status]]         "fresh", or "stale"
-///   %list ID[,ID] KEY [COLUMN...]   a table of the results' arrays KEY
-///   %chart FILE NAME ID[,ID]        result_chart() of the results, their arrays joined, and a link to it
-///   %provenance           commit, date, machine and state of every row that the page names
-/// @param stale  why a row must be measured again, empty if it is fresh   @throws ValueError in a bad
-/// template
+///   %list ID[,ID] KEY [COLUMN...]   a table of the array KEY of the results
+///   %chart FILE NAME ID[,ID]        result_chart() of the results, with arrays joined, and a link to it
+///   %provenance           commit, date, machine and state of every row that the page uses
+/// @param stale  returns why a row must be measured again, empty if it is fresh
+/// @throws ValueError if the template is malformed
 Pages render_pages(std::string_view text, const Rows& rows,
                    const std::function<std::string(const std::string&)>& stale);
-/// The template of this project (tools/results/pages.md).
+/// Returns the template of this project (tools/results/pages.md).
 std::string_view project_pages();
 
 }  // namespace fieldmark::results

@@ -6,15 +6,16 @@
 
 namespace fieldmark::results {
 
-/// The page of the paper's tables, ours beside the published, from cells alone: equal cells give equal pages.
+/// Formats the page of the paper's tables, our figures next to the published ones, from cells alone: equal
+/// cells give equal pages.
 /// @param figures  file names of paper_figures() and write_paper_sheet(), which the page shows
-/// @param notes    Markdown that is added as it is
+/// @param notes    Markdown inserted unchanged
 std::string paper_page(const std::vector<baselines::Cell>& cells, const std::vector<std::string>& figures,
                        const std::string& notes);
 
-/// Writes the page of the cells in a folder, with its figures and sheets beside it; nothing where there is no
-/// cell.
-/// @param folder  of the rows of `fieldmark reproduce`   @throws IoError
+/// Writes the page of the cells in a folder, with its figures and sheets next to it. Writes nothing if there
+/// is no cell.
+/// @param folder  holds the rows of `fieldmark reproduce`   @throws IoError
 void write_paper_page(const std::filesystem::path& folder, const std::filesystem::path& page);
 
 }  // namespace fieldmark::results

@@ -8,9 +8,9 @@ namespace fieldmark::results {
 using Json = nlohmann::ordered_json;
 using Words = std::vector<std::string>;
 
-/// Everything that a measured figure depends on besides the command and its inputs.
+/// Everything besides the command and its inputs that a measured figure depends on.
 struct Machine {
-  std::string commit;    ///< of the sources, with "+ changes" after a dirty build; "unknown" outside of git
+  std::string commit;    ///< of the sources, plus "+ changes" if they were modified; "unknown" outside of git
   std::string cpu;       ///< model name
   std::string isa;       ///< "v2", "v3" or "v4": the kernels in use
   std::string compiler;  ///< name, version and flags
@@ -18,25 +18,27 @@ struct Machine {
 };
 Machine machine();
 
-/// SHA-256 of the sources of some rooms at the commit of this build, so that a result expires with its code.
+/// Returns the SHA-256 of the sources of some rooms at the commit of this build, so that a result expires
+/// with its code.
 /// @param rooms  folders; one without sources of its own, such as "watermark", stands for all rooms in it
 /// @throws ValueError for a folder without sources
 std::string code_hash(const Words& rooms);
 
-/// The command line without private paths: files below $FIELDMARK_DATA are shown so, other absolute paths by
-/// their last part.
+/// Strips private paths from a command line: files below $FIELDMARK_DATA are shown relative to it, other
+/// absolute paths by their last component.
 std::string published_command(const Words& command_line);
 
-/// A number or word of a result: six significant digits, "-" for null.
+/// Formats a number or word of a result: six significant digits, "-" for null.
 std::string shown(const Json& value);
 
-/// A Markdown table. Every row has as many cells as the header.
+/// Formats a Markdown table. Every row has as many cells as the header.
 std::string markdown_table(const Words& header, const std::vector<Words>& rows);
 
-/// A Markdown table of an array of objects. @param keys  its columns; empty: those of the first object
+/// Formats an array of objects as a Markdown table. @param keys  columns; empty: the keys of the first object
 std::string markdown_list(const Json& list, Words keys = {});
 
-/// A page with the protocol and every figure of a result. Equal results give equal pages: no date, no host.
+/// Formats a page with the protocol and every figure of a result. Equal results give equal pages, without
+/// date or host name.
 std::string markdown_report(const Words& command_line, const Machine& machine, const Json& result);
 
 }  // namespace fieldmark::results

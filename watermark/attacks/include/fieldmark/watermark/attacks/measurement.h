@@ -13,9 +13,9 @@ namespace fieldmark::watermark {
 /// Bit accuracies of the detectors; NaN for one that was not used.
 struct ReadingAccuracy {
   double blind = 0;  ///< blind detection
-  /// Informed detection of the first informed_views views; a view without a camera counts 0.5.
+  /// Informed detection on the first informed_views views; a view whose camera is not found counts as 0.5.
   double informed = std::numeric_limits<double>::quiet_NaN();
-  /// The detection that InformedReader chooses, over the same views.
+  /// Detection as chosen by InformedReader, on the same views.
   double chosen = std::numeric_limits<double>::quiet_NaN();
 };
 
@@ -25,12 +25,12 @@ struct MeasureOptions {
   std::vector<std::string> under = {};     ///< names of parse_distortion(), besides none
   Index informed_views = 0;                ///< first views that are also read informed; 0 for preset paper
   std::uint64_t seed = 0;                  ///< of messages and distortions
-  std::function<Message(Index view)> messages = {};  ///< in place of random messages if none is baked
+  std::function<Message(Index view)> messages = {};  ///< messages to embed unless one is baked; empty: random
   /// Called with the chosen evidence of each image; `under` is the distortion, empty for none.
   std::function<void(Index view, const std::string& under, const std::vector<double>& evidence,
                      const Message& sent)>
       on_reading = {};
-  const Lpips<float>* lpips = nullptr;  ///< network of Measurement::lpips_base; null: it is NaN
+  const Lpips<float>* lpips = nullptr;  ///< network of Measurement::lpips_base; null: lpips_base is NaN
   std::function<bool(Index done, Index total)> progress = {};  ///< returns false to stop, which throws Error
 };
 
@@ -38,8 +38,8 @@ struct MeasureOptions {
 struct Measurement {
   Index bits = 0;      ///< length of the message
   Index views = 0;     ///< measured
-  bool baked = false;  ///< whether a baked field was measured
-  /// Share of correct bits in a view, mean over views; an undecided bit counts 0.5.
+  bool baked = false;  ///< true if a baked field was measured
+  /// Share of correct bits in a view, mean over views; an undecided bit counts as 0.5.
   ReadingAccuracy accuracy;
   double accuracy_p5 = 0;           ///< 5th percentile over views of the blind accuracy
   double psnr_base = 0;             ///< marked against unmarked, dB, both rounded to 8 bits, mean over views
@@ -52,7 +52,7 @@ struct Measurement {
       0;  ///< of reading one image with both detectors, mean; NaN without informed views
 };
 
-/// Measures an owner's mark: each view has its own random message or that of the baked field.
+/// Measures an owner's mark: each view carries its own random message, or all carry that of the baked field.
 /// @param baked, message  both or neither   @throws ValueError if only one is given or a distortion is
 /// unknown
 Measurement measure(const Owner& owner, const nerf::RadianceField* baked, const Message* message,

@@ -7,50 +7,50 @@
 
 namespace fieldmark::watermark {
 
-/// How a message is baked.
+/// Options for baking a message.
 struct BakeOptions {
   /// Length of the run and step sizes.
   ScheduleOptions schedule{.seconds = 45, .lr = 1e-2, .half_after = 4000, .cooldown = 0.6, .last = 0.02};
   Index cameras = 400;     ///< novel cameras whose rays are used, >= 1
-  Index around = 130;      ///< more in every direction, of an object that has no surroundings (a cube), >= 0
+  Index around = 130;      ///< more in every direction for an object without surroundings (a cube), >= 0
   std::uint64_t seed = 0;  ///< of cameras and rays
 };
 
 /// Distils the marked colours of one message into the colour side of a plain field:
 ///   minimise mean_r |sum_{i in r} w_i e_i|^2 + sum_i w_i |e_i|^2 / (10 sum_i w_i),
 ///   e_i = c(x_i, d_i) - c_m(x_i, d_i)
-/// over samples i of rays r of novel cameras and, of an object, of cameras in every direction, w_i their
-/// weights, both divided by the three channels. The first is what images show, the second keeps colours
-/// behind one another from making up for each other. Only the colour network and the colour features of the
-/// table move; whatever density depends on keeps its bytes. The result has the tensor names, shapes and
-/// metadata of the unmarked field, and holds neither network, extractor, key nor message.
+/// over samples i of rays r of novel cameras and, for an object, of cameras in every direction; w_i are their
+/// weights, and both terms are divided by the three channels. The first term is what images show; the second
+/// keeps colours behind one another from compensating each other. Only the colour network and the colour
+/// features of the table move; everything that density depends on keeps its bytes. The result has the tensor
+/// names, shapes and metadata of the unmarked field, and holds neither network, extractor, key nor message.
 class Baker final : public TrainingRun {
  public:
-  /// The owner must outlive it. @throws ValueError if the message has another length than the owner's, or an
-  /// option is out of range
+  /// The owner must outlive the baker. @throws ValueError if the length of the message is not the owner's, or
+  /// an option is out of range
   Baker(const Owner& owner, const Message& message, const BakeOptions& options);
   ~Baker() override;
-  /// Running mean of the distance between what rays of the baked and of the marked field show, as a PSNR.
+  /// Returns the running mean of the squared error between rays of the baked and the marked field, as a PSNR.
   double psnr() const;
   double figure() const override { return psnr(); }
   std::string status() const override;
-  /// How strong the mark is in the baked field, dB as options().strength of the owner counts.
+  /// Mark PSNR of the baked field, dB, to compare with options().mark_psnr of the owner.
   struct MarkPsnr {
-    double learnt = 0;  ///< as the steps left it, infinity where nothing differs
+    double learnt = 0;  ///< after the last step; infinity where nothing differs
     double scaled = 0;  ///< after scale_to()
-    double scale = 1;   ///< what scale_to() multiplied the learnt change of the colour numbers by
+    double scale = 1;   ///< factor by which scale_to() multiplied the learnt change of the colour parameters
   };
-  /// Moves the colour numbers along the line from the unmarked to the learnt ones to where the mark has the
-  /// strength asked for, by secants until it is within 0.02 dB on the views it looks at. Colours
-  /// learn a mark some 1.3 dB fainter than the owner's; more if the run was short or the field has no room
-  /// for it. What they learnt wrong is scaled, too. For after the last step.
-  /// @param target  dB   @return what came of it; the scale stays within 1/kLargestScale to kLargestScale
+  /// Moves the colour parameters along the line from the unmarked to the learnt ones until the mark PSNR is
+  /// within 0.02 dB of the target on the given views (secant method). A baked mark is some 1.3 dB fainter
+  /// than the owner's; more if the run was short or the field lacks capacity. Errors of the learnt
+  /// colours are scaled, too. Call after the last step.
+  /// @param target  dB   @return the result; the scale stays within 1/kLargestScale to kLargestScale
   MarkPsnr scale_to(double target, const MarkPsnrViews& views = {.seed = 32});
   /// Bound of the scale: 6 dB.
   static constexpr double kLargestScale = 2;
-  /// The strength as far as it is, see MarkPsnrMeter.
+  /// Measures the mark PSNR of the baked field so far, see MarkPsnrMeter.
   double mark_psnr(const MarkPsnrViews& views = {.seed = 32}) const;
-  /// The baked field as far as it is.
+  /// Returns the baked field so far.
   const nerf::RadianceField& field() const { return field_; }
 
  private:

@@ -8,35 +8,34 @@
 
 namespace fieldmark::watermark {
 
-/// Where the cameras of the views to embed in stand, and how fine their images are.
+/// Camera distances and image resolution of the views to embed in.
 enum class EmbedDistances {
-  novel,   ///< novel cameras, the object always at the reader's size
-  native,  ///< novel cameras, the object with no more pixels than their images would have of it
+  novel,   ///< novel cameras, the object always at the extractor's size
+  native,  ///< novel cameras, the object at no more pixels than it has in their images
   several  ///< native, but a quarter of the views closer and a quarter farther, see nerf::CameraSet
 };
-/// "novel", "native" or "several".
+/// Returns "novel", "native" or "several".
 const char* distances_name(EmbedDistances distances);
-/// @throws ValueError if the name is none of these
+/// Parses a name.   @throws ValueError if it is none of these
 EmbedDistances parse_distances(std::string_view name);
 
-/// Samples of a ray, see cache_view(), that the mark of a pixel has to be the sum of: one of an object's,
-/// whose surfaces are hard, and of forward-facing scenes, four where space is contracted. Rays of fox
-/// have 6.3 parts on average, in several cells: learnt from marks at their mean places, images of it were
-/// read to 92.1% blindly, from four parts to 94.3% (48 bits, 60 new views, as embedded, 1,200 steps, one run
-/// each).
+/// Returns the samples per ray, see cache_view(), whose sum a pixel's mark must be: one for objects, whose
+/// surfaces are hard, and for forward-facing scenes; four where space is contracted. Rays of fox have 6.3
+/// parts on average, in several cells: a mark learnt at their mean places was read blindly to 92.1%, one
+/// learnt at four parts to 94.3% (48 bits, 60 new views, as embedded, 1,200 steps, one run each).
 Index samples_for(nerf::SpaceKind space);
 
-/// The views to embed in.
+/// Options for the views to embed in.
 struct EmbedViewOptions {
-  Index count = 200;                                 ///< of them, >= 1
-  Index samples = 0;                                 ///< kept of a ray, see cache_view(); 0: samples_for()
+  Index count = 200;                                 ///< views, >= 1
+  Index samples = 0;                                 ///< per ray, see cache_view(); 0: samples_for()
   EmbedDistances distances = EmbedDistances::novel;  ///< of their cameras
 };
 
-/// Renders and caches the views to embed in, each cut to the object's window as the reader will cut an image
-/// (see object_window.h), with background where the window reaches beyond it, as large as the extractor's
-/// patch; from native on smaller where an image of the field's size has fewer pixels, though no less than a
-/// quarter a side: the embedder enlarges those as the reader would.
+/// Renders and caches the views to embed in. Each is cut to the object's window, as for reading (see
+/// object_window.h), with background where the window reaches beyond the image, and has the size of the
+/// extractor's patch. With native and several, a view is smaller where an image of the field's size has fewer
+/// pixels, but at least a quarter per side; the embedder enlarges it as for reading.
 /// @param patch  see OwnerOptions::patch()
 /// @param progress  called after each view with (done, total); returns false to stop, which throws Error
 /// @throws ValueError as cache_view()
@@ -44,21 +43,21 @@ std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, cons
                                           const EmbedViewOptions& options, std::uint64_t seed,
                                           const std::function<bool(Index, Index)>& progress = {});
 
-/// The same of novel cameras, with one sample of a ray.
+/// Caches views of novel cameras with one sample per ray.
 std::vector<CachedView> cache_novel_views(const nerf::RadianceField& field, const PatchSize& patch,
                                           Index count, std::uint64_t seed,
                                           const std::function<bool(Index, Index)>& progress = {});
 
-/// How many cells a view shows, of which slivers count little: (sum a)^2 / sum a^2 over the cells' visible
-/// areas a; 0 if it shows nothing.
+/// Returns the effective number of cells that a view shows, in which slivers count little:
+/// (sum a)^2 / sum a^2 over the cells' visible areas a; 0 if it shows nothing.
 double cells_shown(const CachedView& view, Index side);
-/// The 10th percentile of cells_shown() over several views; 0 without views.
+/// Returns the 10th percentile of cells_shown() over several views; 0 without views.
 double cells_shown(std::span<const CachedView> views, Index side);
 
-/// Cells an axis so that one view shows the whole message: the least of 16, 22, 28 ... 64 at which
-/// cells_shown() is two or more for each bit, or 64 if none is. Fewer are easier to recognise; a bit that a
-/// view does not show cannot be read from it. Images of a scene without bounds are cuts of it, and may be
-/// cut again: eight or more for each bit, so that two in five of an image still show three.
+/// Returns the cells per axis at which one view shows the whole message: the least of 16, 22, 28 ... 64 at
+/// which cells_shown() is at least two per bit, or 64 if none is. Fewer cells are easier to recognise; a bit
+/// that a view does not show cannot be read from it. Where space is contracted, images are crops of the scene
+/// and may be cropped again: at least eight per bit, so that two fifths of an image still show three.
 /// @param bits  length of the message, at least 1   @param space  of the field
 Index cells_for_message(std::span<const CachedView> views, Index bits, nerf::SpaceKind space);
 

@@ -8,32 +8,32 @@ namespace fieldmark::watermark {
 
 /// Distortions of training images, drawn anew for every image.
 struct EmbedDistortions {
-  double noise = 0.08;         ///< largest standard deviation, on two images of three
-  double rotation = 35;        ///< largest angle, degrees, on two of three
-  double zoom_out = 0.75;      ///< smallest scale of the image, on two of three ...
+  double noise = 0.08;         ///< largest standard deviation, on two of three images
+  double rotation = 35;        ///< largest angle, degrees, on two of three images
+  double zoom_out = 0.75;      ///< smallest scale, on two of three images ...
   double zoom_in = 1.25;       ///< ... and largest: above 1 the image is cut at a random place
-  double blur = 1.3;           ///< largest sigma, pixels of the extractor's image, on one of three
+  double blur = 1.3;           ///< largest sigma, pixels of the extractor's image, on one of three images
   double sample_shift = 1e-3;  ///< beta of x + z, z ~ N(0, beta^2), cube sides
-  bool mixed = true;           ///< an image takes several kinds; false: one kind or none for a whole batch
+  bool mixed = true;           ///< an image takes several kinds; false: a whole batch takes one kind or none
 };
 
-/// Options of training that every kind of mark shares.
+/// Training options shared by every kind of mark.
 struct EmbedOptions {
   /// Length of the run and step sizes.
   ScheduleOptions schedule{.seconds = 900, .lr = 2e-3, .half_after = 8000, .cooldown = 0.5, .last = 0.05};
-  Index batch = 4;                    ///< images a step, 1 to 64
-  double extractor_lr = 1;            ///< step size of the extractor relative to the mark's, > 0
+  Index batch = 4;                    ///< images per step, 1 to 64
+  double extractor_lr = 1;            ///< learning rate of the extractor relative to the mark's, > 0
   EmbedDistortions distortions = {};  ///< of training images
   std::uint64_t seed = 0;             ///< of messages, views and distortions
 };
 
 /// Trains mark and extractor together on a frozen field.
-/// Each image draws a code of the cells, a message, a view and distortions; the mark gives its loss (see
+/// Each image draws a code of the cells, a message, a view and distortions; the mark computes its loss (see
 /// Mark::training()), and Adam minimises the mean over a batch. The owner's key takes no part: equal options
-/// train equal networks under any key, and the evidence that they find is independent of it. An image of
-/// fewer pixels than the extractor's is enlarged with its mark, as the reader enlarges a small image. Same
-/// seed and number of steps: same bytes, for any thread count and across save() and restore(). Source: Luo et
-/// al. 2023 (CopyRNeRF), section 3.4.
+/// train equal networks under any key, and the evidence that they find is independent of it. An image with
+/// fewer pixels than the extractor's is enlarged with its mark, as small images are for reading. The same
+/// seed and number of steps give the same bytes, for any thread count and across save() and restore().
+/// Source: Luo et al. 2023 (CopyRNeRF), section 3.4.
 class Embedder final : public TrainingRun {
  public:
   /// Owner and views must outlive the embedder.
@@ -44,21 +44,21 @@ class Embedder final : public TrainingRun {
   using Figures = TrainingFigures;
   /// Running means over the last images.
   const Figures& figures() const { return figures_; }
-  /// First steps of a warm start; a shorter run has not trained on the mark's own loss.
+  /// Number of warm-up steps; a shorter run has not trained on the mark's own loss.
   Index warm_steps() const { return training_->warm_steps(); }
   double figure() const override { return figures_.bits; }
   std::string status() const override { return training_->note(figures_); }
-  /// Sets the owner's gain to reach its mark PSNR on novel views, each with a random message, see
-  /// MarkPsnrMeter. Does nothing for a mark without a gain.
+  /// Sets the owner's gain so that novel views, each with a random message, have its mark PSNR (see
+  /// MarkPsnrMeter). Does nothing for a mark without a gain.
   void calibrate(Index views = MarkPsnrViews{}.count);
 
-  /// The key of a checkpoint's owner, which a run that goes on must use. @throws IoError
+  /// Returns the key of a checkpoint's owner, which a resumed run must use. @throws IoError
   static Key checkpoint_key(const std::filesystem::path& path);
 
  private:
   double take_step(double seconds) override;
   void describe(RunFingerprint& fingerprint) const override;
-  // A checkpoint holds the owner's key: it is secret, and refused under another key.
+  // A checkpoint holds the owner's key: the file is secret, and restoring under another key fails.
   void save_more(SafetensorsFile& file) const override;
   void restore_more(const SafetensorsFile& file) override;
   void write(const SafetensorsFile& file, const std::filesystem::path& path) const override {

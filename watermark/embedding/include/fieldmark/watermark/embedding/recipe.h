@@ -12,45 +12,45 @@ namespace fieldmark::watermark {
 ///   fast   every cell of the scene carries one bit: trains in minutes
 ///   paper  one message for all places, after a warm start; distortions of at most 30 degrees, scale 0.75 and
 ///          blur 0.1. Source: Luo et al. 2023 (CopyRNeRF), sections 3 and 4.1. Departures: images of 80
-///          pixels in place of 150, eight a step, noise of at most 0.02, and those of PooledTrainingOptions
-///   code   preset paper as in its authors' code: the extractor has twice the step size, no distortions,
+///          pixels instead of 150, eight per step, noise of at most 0.02, and those of PooledTrainingOptions
+///   code   preset paper as in its authors' code: the extractor has twice the learning rate, no distortions,
 ///          samples move by 0.2 of their spacing, N_m is 128, and GlobalMarkOptions::authors_code
 inline constexpr std::array<const char*, 3> kPresets{"fast", "paper", "code"};
 
 /// Appearance of a cell mark.
 enum class MarkColours {
   blue,   ///< blue and yellow without luma, in fine detail: lost in greyscale
-  light,  ///< like an uneven light: smooth, between blue and grey, fainter on dark colours
-  mixed,  ///< blue with a quarter of its power in grey: outlives a change of colours, greyscale too
+  light,  ///< like uneven lighting: smooth, between blue and grey, fainter on dark colours
+  mixed,  ///< blue with a quarter of its power in grey: survives colour changes, including greyscale
 };
-/// "blue", "light" or "mixed".
+/// Returns "blue", "light" or "mixed".
 const char* mark_colours_name(MarkColours colours);
-/// @throws ValueError if the name is none of these
+/// Parses a name.   @throws ValueError if it is none of these
 MarkColours parse_mark_colours(std::string_view name);
-/// Colours that suit a scene: mixed for an object in a cube, else light, because the scene then fills its
-/// images and shows the mark everywhere.
+/// Returns the colours that suit a scene: mixed for an object in a cube; else light, because such a scene
+/// fills its images and shows the mark everywhere.
 MarkColours colours_for(nerf::SpaceKind space);
-/// Sets bands, axes and shading of the network and the weights against visibility.
+/// Sets bands, axes and shading of the network, and the loss weights against visibility.
 void use_colours(MarkColours colours, CellMarkOptions& mark);
 
-/// Images a step of preset fast: two where space is contracted, whose thousands of cells need more steps;
-/// else four.
+/// Returns the images per step of preset fast: two where space is contracted, because thousands of cells need
+/// more steps; else four.
 Index batch_for(nerf::SpaceKind space);
 
-/// The options of a preset; change them before you make an owner.
+/// The options of a preset; change them before making an owner.
 struct EmbedRecipe {
-  OwnerOptions owner{};                                   ///< which OWNER stores
+  OwnerOptions owner{};                                   ///< stored in OWNER
   EmbedOptions embed{};                                   ///< of training
-  std::variant<CellMarkOptions, FusionMarkOptions> mark;  ///< of the preset's kind of mark
+  std::variant<CellMarkOptions, FusionMarkOptions> mark;  ///< for the preset's kind of mark
   Index cells = 0;  ///< per axis of the scene's cube, 2 to 64; 0: cells_for_message(); unused without cells
 
-  /// Options that only preset fast has.   @throws ValueError for another preset, which it names
+  /// Returns the options that only preset fast has.   @throws ValueError naming the preset if it is another
   CellMarkOptions& cell();
-  /// Suits the options of preset fast to a scene: shape of the extractor's images, colours, batch.
+  /// Adapts the options of preset fast to a scene: shape of the extractor's images, colours, batch.
   void suit(const nerf::RadianceField& field);
-  /// Cells that the views show, or slots.
+  /// Makes the grid: cells that the views show, or slots.
   CellGrid grid(const nerf::RadianceField& field, std::span<const CachedView> views) const;
-  /// Makes the mark.
+  /// Returns the function that makes the mark.
   MarkMaker maker() const;
   /// Makes the owner whose mark the views will train.
   Owner make(const nerf::RadianceField& field, const Key& key, std::span<const CachedView> views) const {
@@ -58,7 +58,7 @@ struct EmbedRecipe {
   }
 };
 
-/// The recipe of a preset.   @throws ValueError if the name is not in kPresets
+/// Returns the recipe of a preset.   @throws ValueError if the name is not in kPresets
 EmbedRecipe embed_recipe(std::string_view preset);
 
 }  // namespace fieldmark::watermark

@@ -7,9 +7,9 @@
 
 namespace fieldmark::watermark {
 
-/// The commitment that an owner publishes or time-stamps before the field. It fixes OWNER, key and message
-/// without revealing them: the SHA-256 of this text, each line ended by a line feed, as `sha256sum` computes
-/// it:
+/// Returns the commitment that an owner publishes or time-stamps before the field. It fixes OWNER, key and
+/// message without revealing them: it is the SHA-256 of this text, in which a line feed ends each line, as
+/// `sha256sum` computes it:
 ///   fieldmark claim 1
 ///   owner SHA-256-OF-THE-OWNER-FILE
 ///   key 64-DIGITS

@@ -14,14 +14,14 @@ struct Control {
   std::vector<Tensor<float>> images;  ///< [H, W, 3] each
 };
 
-/// Shuffles equal squares of an image, `across` of them along its shorter side. Colours and fine detail stay,
-/// the scene is gone. Left-over rows and columns are dropped.
+/// Shuffles equal squares of an image, `across` of them along its shorter side. Keeps colours and fine detail
+/// but destroys the scene. Drops left-over rows and columns.
 /// @param image  [H, W, C], both sides at least `across`   @param across  at least 1
-/// @throws ShapeError if it is no image or too small   @throws ValueError if across is below 1
+/// @throws ShapeError if it is not an image or is too small   @throws ValueError if across is below 1
 Tensor<float> shuffled_blocks(const Tensor<float>& image, Index across, const CounterRng& rng,
                               std::uint64_t index);
 
-/// Three controls that every owner has:
+/// Makes the three controls that are available for every owner:
 ///   blank     an image of the background's colour: the bias of key and extractor
 ///   unmarked  novel views of the owner's unmarked field: the scene without the mark
 ///   shuffled  the given images in 16 blocks across (shuffled_blocks()): their colours without the scene

@@ -21,7 +21,8 @@ inline constexpr std::array<std::string_view, 5> kEvidenceFiles{
 };
 
 /// Creates the folder for evidence; earlier evidence in it may be replaced.
-/// @throws IoError if it is no folder, cannot be made, or holds other files than kEvidenceFiles, which stay
+/// @throws IoError if it is not a folder, cannot be created, or holds files other than kEvidenceFiles, which
+/// are kept
 void prepare_evidence_folder(const std::filesystem::path& folder);
 
 /// Writes kEvidenceFiles atomically, the signature last, so that an unfinished folder fails
@@ -38,11 +39,11 @@ struct EvidenceCheck {
   Index images = 0;                          ///< given images that the evidence covers
 };
 
-/// Checks the signature of evidence.json by the key in it, the SHA-256 of the other files and of images, and
-/// that its figures are consistent.
-/// @param images  that the evidence should cover (tested images or controls)
-/// @param signer  the expected signer; anybody if absent
-/// @throws IoError without a folder or for an unreadable image
+/// Checks the signature of evidence.json by the key in it, the SHA-256 of the other files and of the images,
+/// and the consistency of its figures.
+/// @param images  images that the evidence should cover (tested images or controls)
+/// @param signer  the expected signer; any signer if absent
+/// @throws IoError if there is no folder or an image cannot be read
 EvidenceCheck check_evidence_folder(const std::filesystem::path& folder,
                                     std::span<const std::filesystem::path> images,
                                     const std::optional<PublicKey>& signer);

@@ -24,32 +24,32 @@ struct EvidenceImage {
 struct EvidenceControl {
   std::string name;                     ///< one word, or the given file or folder
   std::string meaning;                  ///< a sentence for readers
-  std::vector<EvidenceImage> images{};  ///< each by itself
+  std::vector<EvidenceImage> images{};  ///< scored one by one
   EvidenceScore together{};             ///< their summed evidence
 };
 
-/// Result of testing images for a message, with all that is needed to repeat it except the OWNER.
+/// Result of testing images for a message, with all that is needed to repeat the test except the OWNER.
 struct EvidenceRecord {
   std::string reading = "blind";               ///< detector: "blind", "informed" or "mixed"
   std::string owner_sha256{};                  ///< of the OWNER file
   std::string commitment{};                    ///< commitment()
-  Message message{};                           ///< looked for
-  std::string copy{};                          ///< recipient whose copy was looked for; empty: none
+  Message message{};                           ///< the message tested for
+  std::string copy{};                          ///< recipient whose copy was tested for; empty: none
   double fpr = 1e-6;                           ///< rate of false alarms at which a mark counts as found
-  Index cells = 0;                             ///< that carry a bit
+  Index cells = 0;                             ///< cells that carry a bit
   EvidenceScore together{};                    ///< summed evidence of all images
-  std::vector<EvidenceImage> images{};         ///< each by itself
-  std::vector<EvidenceControl> controls{};     ///< may be none
-  std::optional<WrongKeyCounts> wrong_keys{};  ///< of the evidence of all images, if they were counted
+  std::vector<EvidenceImage> images{};         ///< scored one by one
+  std::vector<EvidenceControl> controls{};     ///< may be empty
+  std::optional<WrongKeyCounts> wrong_keys{};  ///< for the summed evidence; empty if not counted
   std::uint64_t seed = 0;                      ///< of wrong keys and controls
-  std::string commit{};                        ///< of the program
+  std::string commit{};                        ///< of the program's source
   std::string isa{};                           ///< kernels in use
-  /// Whether the keyed p-value of all images is at most fpr.
+  /// True if the keyed p-value of all images is at most fpr.
   bool found() const { return together.p_value <= fpr; }
 };
 
-/// Serialises a record for signing, see canonical_json(): equal records give equal bytes. It holds no time,
-/// host, path or key. Invalid UTF-8 in file names becomes U+FFFD.
+/// Serialises a record for signing, see canonical_json(): equal records give equal bytes. The text holds no
+/// time, host, path or key. Invalid UTF-8 in file names becomes U+FFFD.
 /// @param signer  of the signature file   @param files  SHA-256 of the other files in the folder, by name
 std::string evidence_json(const EvidenceRecord& record, const PublicKey& signer,
                           const std::map<std::string, std::string>& files);
@@ -61,10 +61,10 @@ struct EvidenceSummary {
     std::string name;    ///< of the file
     std::string sha256;  ///< of its bytes; empty for a generated control
   };
-  PublicKey signer{};                          ///< named signer
+  PublicKey signer{};                          ///< signer that the text names
   std::string owner_sha256;                    ///< of the OWNER file
   std::string commitment;                      ///< commitment()
-  Message message{};                           ///< looked for
+  Message message{};                           ///< the message tested for
   bool found = false;                          ///< the decision
   double fpr = 1;                              ///< rate of false alarms of the decision
   double p_value = 1;                          ///< of all images together
@@ -75,8 +75,8 @@ struct EvidenceSummary {
 
 /// Parses the text of evidence_json() and recomputes all derived figures: p-values, matching bits, the
 /// decision.
-/// @param name  stands for the file in error texts
-/// @throws IoError if it is no evidence, not canonical, or inconsistent
+/// @param name  stands for the file in error messages
+/// @throws IoError if the text is not evidence, not canonical, or inconsistent
 EvidenceSummary parse_evidence(std::string_view text, std::string_view name);
 
 }  // namespace fieldmark::watermark

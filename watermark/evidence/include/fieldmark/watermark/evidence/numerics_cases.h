@@ -5,7 +5,7 @@
 
 namespace fieldmark::watermark {
 
-/// Hard cases of p-values, weighted segments and residual budgets, each with its error bound.
+/// Returns hard cases of p-values, weighted segments and residual budgets, each with its error bound.
 std::vector<NumericsCase> numerics_cases();
 
 }  // namespace fieldmark::watermark

@@ -8,37 +8,37 @@
 
 namespace fieldmark::watermark {
 
-/// How often keys independent of an image reach a p-value.
+/// Counts of keys, independent of an image, that reach a p-value.
 struct WrongKeyCounts {
-  static constexpr int kThresholds = 8;  ///< least p-value counted is 10^-kThresholds
+  static constexpr int kThresholds = 8;  ///< the least p-value counted is 10^-kThresholds
   Index n = 0;                           ///< keys tried
   /// counts[i] keys reached p <= 10^-(i + 1).
   std::array<Index, kThresholds> counts{};
-  double least_p = 1;                     ///< the least p-value of all keys, 1 without keys
+  double least_p = 1;                     ///< least p-value over all keys; 1 without keys
   static constexpr int kBins = 80;        ///< of the histogram
-  static constexpr int kBinsPerUnit = 4;  ///< so it spans T from -10 to 10
+  static constexpr int kBinsPerUnit = 4;  ///< the histogram spans T from -10 to 10
   /// histogram[i] keys gave a statistic T with i <= 4 (T + 10) < i + 1; the end bins include outliers.
   std::array<Index, kBins> histogram{};
   /// Counts one more key.   @param statistic  T   @throws ValueError if it is NaN
   void add(double statistic);
-  /// Counts those of another as well.
+  /// Adds the counts of another object.
   void add(const WrongKeyCounts& other);
   /// Equal in everything.
   friend bool operator==(const WrongKeyCounts&, const WrongKeyCounts&) = default;
 };
 
-/// Tests the same evidence under n wrong keys (see keyed_statistic, keyed_p_value). Keys are BLAKE2b of the
-/// seed, independent of any random_key(). Counts do not depend on the number of threads. 10^4 keys on 500
+/// Tests the same evidence under n wrong keys (see keyed_statistic, keyed_p_value). The keys are BLAKE2b of
+/// the seed, independent of any random_key(). Counts do not depend on the number of threads. 10^4 keys on 500
 /// cells take 0.4 s on one core.
 /// @param evidence  [cells] summed sign evidence   @param area  [cells] as for deal_cells
 /// @param n         number of keys, >= 0
-/// @param progress  called now and then with (done, total); returns false to stop, which throws Error
+/// @param progress  called from time to time with (done, total); returns false to stop, which throws Error
 /// @throws ValueError as deal_cells and keyed_statistic, or if n < 0
 WrongKeyCounts count_wrong_keys(std::span<const double> evidence, std::span<const double> area,
                                 const Message& message, Index n, std::uint64_t seed,
                                 const std::function<bool(Index, Index)>& progress = {});
 
-/// Quantile of the binomial distribution: the least k with P(X <= k) >= level, X ~ Binomial(n, p).
+/// Returns a quantile of the binomial distribution: the least k with P(X <= k) >= level, X ~ Binomial(n, p).
 /// @param n  >= 0   @param p  in [0, 1]   @param level  in (0, 1)   @throws ValueError otherwise
 Index binomial_upper(Index n, double p, double level = 0.99);
 
@@ -50,7 +50,8 @@ struct CountInterval {
   friend bool operator==(const CountInterval&, const CountInterval&) = default;
 };
 
-/// The narrowest interval with a probability of at most (1 - level) / 2 on either side, X ~ Binomial(n, p).
+/// Returns the narrowest interval with a probability of at most (1 - level) / 2 on either side,
+/// X ~ Binomial(n, p).
 /// @param n  >= 0   @param p  in [0, 1]   @param level  in (0, 1)   @throws ValueError otherwise
 CountInterval binomial_interval(Index n, double p, double level = 0.99);
 

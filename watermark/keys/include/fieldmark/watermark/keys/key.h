@@ -7,7 +7,7 @@
 
 namespace fieldmark::watermark {
 
-/// The owner's secret of 256 bits. Without it nobody can tell the sign that a cell should show.
+/// The owner's 256-bit secret. Without it, nobody can tell which sign a cell should show.
 struct Key {
   std::array<std::uint8_t, 32> bytes{};  ///< never logged or reported
   /// Not constant-time.
@@ -18,11 +18,11 @@ struct Key {
 /// @throws Error if libsodium cannot start
 Key random_key();
 
-/// A key from known bytes, for tests and for keys kept elsewhere.
+/// Makes a key from known bytes, for tests and for keys kept elsewhere.
 /// @param bytes  [32]   @throws ValueError for another size
 Key key_from_bytes(std::span<const std::uint8_t> bytes);
 
-/// 64 lower-case hexadecimal digits.
+/// Returns 64 lower-case hexadecimal digits.
 std::string to_hex(const Key& key);
 
 /// Writes a KEY file: safetensors with an array "key" of 32 bytes and the kind "key" (see ModelInfo), secret

@@ -6,9 +6,9 @@
 
 namespace fieldmark::watermark {
 
-/// Novel cameras and, of an object that has no surroundings (a cube), `around` more in every direction: what
-/// its field shows from where no training image was taken is as firm as the rest, while other scenes show
-/// blur there.
+/// Makes novel cameras and, for an object without surroundings (a cube), `around` more in every direction.
+/// The field of such an object is as reliable from directions without training images as from others, while
+/// other scenes show blur there.
 /// @param size  as nerf::make_cameras()
 inline std::vector<nerf::Camera> cameras_around(const nerf::RadianceField& field, Index near, Index around,
                                                 Index size, std::uint64_t seed) {

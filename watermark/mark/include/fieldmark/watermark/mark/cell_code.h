@@ -21,17 +21,17 @@ struct CellCode {
 
 /// Deals the cells of one scene to the bits of a message, for any number of keys.
 /// Cells are ranked by visible area, largest first (ties: lower index first), and cut into groups of n_bits;
-/// in each group a keyed permutation gives every bit one cell, so totals of area differ by little and no bit
-/// is without cells. The signs are a second stream of the key, so they are fair and independent whatever the
-/// image. Ranks compare areas exactly: store the areas (or the code), do not compute them anew on another
-/// machine.
+/// in each group a keyed permutation gives every bit one cell, so total areas differ little between bits and
+/// no bit is without cells. The signs are a second stream of the key, so they are fair and independent
+/// whatever the image. Ranks compare areas exactly: store the areas (or the code) instead of recomputing them
+/// on another machine.
 class CellDealer {
  public:
   /// @param area    [cells] visible area, any unit, finite and >= 0; a cell of area 0 gets no bit
   /// @param n_bits  1 to the number of cells of positive area
   /// @throws ValueError otherwise
   CellDealer(std::span<const double> area, Index n_bits);
-  /// Overwrites code; its storage is reused.
+  /// Overwrites code and reuses its storage.
   void deal(const Key& key, CellCode& code) const;
 
  private:
@@ -42,7 +42,7 @@ class CellDealer {
 /// CellDealer for a single key.   @throws ValueError as CellDealer does
 CellCode deal_cells(const Key& key, std::span<const double> area, Index n_bits);
 
-/// The sign that each cell shows for a message.
+/// Returns the sign that each cell shows for a message.
 ///   s_c = (2 M[bit_c] - 1) sign_c, 0 for a cell that carries no bit
 /// @return [cells]   @throws ValueError if a cell's bit lies outside the message
 std::vector<std::int8_t> cell_signs(const CellCode& code, const Message& message);

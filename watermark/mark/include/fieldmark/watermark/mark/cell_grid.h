@@ -8,13 +8,13 @@
 
 namespace fieldmark::watermark {
 
-/// The cells of a scene that can carry a bit: a regular grid over the field's cube, of which those count that
-/// views show. Cells are geometry, not secret: which bit a cell carries, and with which sign, is the key's
+/// The cells of a scene that can carry a bit: those places of a regular grid over the field's cube that views
+/// show. Cells are geometry and not secret; the key decides which bit a cell carries, and with which sign
 /// (see CellCode).
 class CellGrid {
  public:
-  /// @param side  cells per axis, 2 to 64   @param area  [side^3] visible area of every cell, x fastest, >=
-  /// 0; those above `least` of the total become cells, numbered in the order of the grid
+  /// @param side  cells per axis, 2 to 64   @param area  [side^3] visible area of every place, x fastest, >=
+  /// 0; places above `least` of the total become cells, numbered in the order of the grid
   /// @throws ValueError if side is out of range or no cell is visible   @throws ShapeError if the area has
   /// another size
   CellGrid(Index side, std::span<const double> area, double least = 1e-5);
@@ -23,33 +23,33 @@ class CellGrid {
   Index side() const { return side_; }
   /// Number of cells.
   Index count() const { return static_cast<Index>(area_.size()); }
-  /// [count] visible area of the cells, as a part of all.
+  /// [count] visible area of each cell, as a fraction of the total.
   std::span<const double> area() const { return area_; }
-  /// [side^3] number of the cell at a place of the grid, -1 where there is none.
+  /// [side^3] number of the cell at each place of the grid, -1 where there is none.
   std::span<const std::int32_t> numbers() const { return numbers_; }
-  /// From stored numbers and areas. @throws ValueError if they do not fit each other
+  /// Makes a grid from stored numbers and areas. @throws ValueError if they do not fit each other
   static CellGrid from_numbers(Index side, std::span<const std::int32_t> numbers,
                                std::span<const double> area);
 
-  /// Place in the grid of a position in the unit cube, clamped to it.
+  /// Returns the place in the grid of a position in the unit cube; positions outside are clamped.
   static Index place(Index side, const float x[3]);
-  /// Cell that contains a position, -1 if none.
+  /// Returns the cell that contains a position, -1 if none.
   std::int32_t at(const float x[3]) const { return numbers_[static_cast<std::size_t>(place(side_, x))]; }
 
-  /// The signs of cells as a continuous field: trilinear between the cells' centres over those neighbours
-  /// that are cells, steepened by 3 and clamped to [-1, 1], so that it is +-1 inside a cell and crosses 0 at
-  /// a face only where the sign changes there. @param signs [count]  @param x [n, 3]  @param s [n] written; 0
-  /// where no cell is near
+  /// Blends the signs of cells into a continuous field: trilinear between the centres of neighbouring cells,
+  /// steepened by 3 and clamped to [-1, 1], so it is +-1 inside a cell and crosses 0 at a face only where the
+  /// sign changes there. @param signs [count]  @param x [n, 3]  @param s [n] written; 0 where no cell is near
   void blend(std::span<const std::int8_t> signs, const float* x, Index n, float* s) const;
 
-  /// Cells that blend() mixes at one position, and how much of the mark there is of each.
+  /// The cells that blend() mixes at one position, and each cell's part of the mark there.
   struct Mix {
     Index count = 0;                     ///< at most 8
     std::array<std::int32_t, 8> cell{};  ///< [count] each once
     std::array<float, 8> part{};         ///< [count] in [0, 1]
   };
-  /// part_c is the mean, over all signs that the cells could have, of c's sign times what blend() gives: the
-  /// weights of the best linear guess of it, since signs are independent. Inside a cell its part is 1.
+  /// Returns the weights of the best linear estimate of what blend() gives. Since signs are independent,
+  /// part_c is the mean, over all signs that the cells could have, of c's sign times what blend() gives.
+  /// Inside a cell, its part is 1.
   /// @param x  [3]
   Mix mix(const float* x) const;
 

@@ -7,19 +7,20 @@ namespace fieldmark::watermark {
 
 /// Weights of a cell mark's losses.
 struct CellTrainingOptions {
-  double first_mark_psnr = 28;  ///< dB at the first step, from where it approaches the owner's mark PSNR ...
+  double first_mark_psnr = 28;  ///< dB at the first step; from there it approaches the owner's mark PSNR ...
   double anneal = 200;          ///< ... with this time constant, steps
-  double sign_weight = 1;       ///< of the cross-entropy of the signs, place by place
-  double index_weight = 0.5;    ///< of the cross-entropy of the cells, place by place
+  double sign_weight = 1;       ///< of the cross-entropy of the signs, per place
+  double index_weight = 0.5;    ///< of the cross-entropy of the cells, per place
   double bits_weight = 0.5;     ///< of the cross-entropy of the pooled bits
-  double smooth_weight = 0.4;   ///< of the share of the residual's power that is left after 8 x 8 pixel means
+  double smooth_weight = 0.4;   ///< of the share of the residual's power that remains after 8 x 8 pixel means
   double flat_weight = 0.4;     ///< of the share of the residual's power where the base image is flat
 };
 
-/// Root mean square of the residual at a step: falls from that of first_mark_psnr to that of mark_psnr, dB.
+/// Returns the target RMS of the residual at a step, which falls from that of first_mark_psnr to that of
+/// mark_psnr, dB.
 double residual_rms(const CellTrainingOptions& options, double mark_psnr, Index step);
 
-/// How a cell mark is made and trained.
+/// Options for making and training a cell mark.
 struct CellMarkOptions {
   MarkNetworkOptions network{};    ///< of the carrier
   Index base_channels = 32;        ///< of the extractor, see DenseExtractorOptions
@@ -32,8 +33,8 @@ struct CellMarkOptions {
 /// it. Training minimises
 ///   BCE(sign, s) on the foreground + 0.5 CE(index, cell) + 0.5 BCE(pooled bits, M)
 ///     + u (0.4 |mean of 8 x 8 pixels of r|^2 / |r|^2 + 0.4 |r on flat areas|^2 / |r|^2)
-/// where power_budget() fixes the power of the residual r in place of a content loss. u rises from 0 to 1
-/// while the share of right signs rises from 0.7 to 0.8: a mark must be readable before it can hide.
+/// where power_budget() fixes the power of the residual r instead of a content loss. u rises from 0 to 1
+/// while the share of correct signs rises from 0.7 to 0.8: a mark must be readable before it can hide.
 /// Source: Luo et al. 2023 (CopyRNeRF), sections 3.3 and 3.4, with local messages and dense supervision.
 class CellMark : public Mark {
  public:
@@ -51,7 +52,7 @@ class CellMark : public Mark {
                                                      const Tensor<float>& image) const override;
   std::unique_ptr<MarkTraining> training(const Owner& owner,
                                          std::span<const CachedView> views) const override;
-  /// Reads the mark.
+  /// The extractor that reads the mark.
   const extractor::DenseExtractor<float>& reader() const { return reader_; }
   /// The options given to the constructor.
   const CellMarkOptions& options() const { return options_; }
@@ -62,9 +63,9 @@ class CellMark : public Mark {
   extractor::DenseExtractor<float> reader_;
 };
 
-/// Makes a CellMark.
+/// Returns the function that makes a CellMark.
 MarkMaker cell_mark(const CellMarkOptions& options = {});
-/// Options from a configuration of OWNER.   @throws nlohmann::json::exception if it lacks one
+/// Parses options from a configuration of OWNER.   @throws nlohmann::json::exception if an option is missing
 CellMarkOptions stored_cell_mark(const std::string& configuration);
 
 }  // namespace fieldmark::watermark

@@ -9,11 +9,11 @@ namespace fieldmark::watermark {
 struct PooledTrainingOptions {
   double content_weight = 1;  ///< gamma_1
   double message_weight = 5;  ///< gamma_2
-  Index warm_steps = 0;       ///< first steps, in which all networks learn fixed carriers, >= 0
+  Index warm_steps = 0;       ///< warm-up steps, in which all networks learn fixed carriers, >= 0
 };
 
-/// Slots without a place that stand for cells, one for each bit, of equal area: the key deals order and signs
-/// of the bits also where there are no cells.   @param bits  at least 1
+/// Makes slots that stand in for cells in a mark without cells: one per bit, of equal area and without a
+/// place. The key deals order and signs of the bits to them as it does to cells.   @param bits  at least 1
 CellGrid message_slots(Index bits);
 
 class FixedCarriers;
@@ -21,15 +21,15 @@ class FixedCarriers;
 /// Mark with one message for all places, which PooledExtractor reads from a whole image: the base of
 /// FusionMark. Its evidence is the logit of every slot. Training minimises
 ///   L = gamma_1 mean |marked - base|^2 + gamma_2 BCE(bits, M)
-/// after a warm start, if it has one: the extractor learns to read fixed carriers, pixel by pixel, and the
-/// mark's networks to paint them.
+/// after an optional warm start, in which the extractor learns to read fixed carriers, pixel by pixel, and
+/// the mark's networks learn to paint them.
 /// Source: Luo et al. 2023 (CopyRNeRF), section 3.4, without the perceptual term and with a warm start.
 class PooledMark : public Mark {
  public:
-  /// Makes the marked image [pixels, 3] of a training image.   @param message  [1, N_b], -1 or 1
+  /// Computes the marked image [pixels, 3] of a training image.   @param message  [1, N_b], -1 or 1
   using Painter = std::function<Var<float>(Tape<float>& tape, const Params<float>& params,
                                            const TrainingImage& image, Var<float> message)>;
-  /// Loss [1] of the mark's networks against carriers, on samples drawn for a step.
+  /// Computes the loss [1] of the mark's networks against carriers, on samples drawn for a step.
   using Learner = std::function<Var<float>(Tape<float>& tape, const Params<float>& params,
                                            const FixedCarriers& carriers, Index step)>;
 
@@ -41,18 +41,19 @@ class PooledMark : public Mark {
                                                      const Tensor<float>& image) const override;
   std::unique_ptr<MarkTraining> training(const Owner& owner,
                                          std::span<const CachedView> views) const override;
-  /// Reads the mark.
+  /// The extractor that reads the mark.
   const extractor::PooledExtractor<float>& reader() const { return reader_; }
 
  protected:
   /// @param reader  network that reads the message   @param training  weights of the loss
-  /// @param running_norm  whether an image is read with the running statistics of training, or with its own
+  /// @param running_norm  true: images are read with the running statistics of training; false: with their
+  /// own
   PooledMark(extractor::PooledExtractor<float> reader, const PooledTrainingOptions& training,
              bool running_norm)
       : reader_(std::move(reader)), training_(training), running_norm_(running_norm) {}
   /// Prepares the training images of the views, which must outlive the result, like the owner.
   virtual Painter painter(const Owner& owner, std::span<const CachedView> views) const = 0;
-  /// Prepares the warm start of the mark's networks; empty: they have none. As painter().
+  /// Prepares the warm start of the mark's networks, with the lifetimes of painter(); empty: none.
   virtual Learner learner(const Owner&, std::span<const CachedView>) const { return {}; }
 
  private:
@@ -61,27 +62,27 @@ class PooledMark : public Mark {
   bool running_norm_;
 };
 
-/// How a fusion mark is made and trained.
+/// Options for making and training a fusion mark.
 struct FusionMarkOptions {
   Index width = 256;           ///< units of E and G, and N_c, see GlobalMarkOptions
   Index message_features = 0;  ///< N_m; 0: width
   Index channels = 64;         ///< of the extractor, see PooledExtractorOptions
   bool authors_code = false;   ///< see GlobalMarkOptions
-  /// Whether an image is read with the running statistics of training, in place of its own.
+  /// True: images are read with the running statistics of training; false: with their own.
   bool running_norm = false;
   /// Not stored in OWNER.
   PooledTrainingOptions training{};
 };
-/// Options of preset paper: N_m = 256, the only size that the paper gives; 128 units and 32 channels
-/// elsewhere.
+/// Returns the options of preset paper: N_m = 256, the only size that the paper gives; 128 units and 32
+/// channels elsewhere.
 FusionMarkOptions paper_options();
-/// Options of preset code: the networks of the authors' code, with N_m = 128.
+/// Returns the options of preset code: the networks of the authors' code, with N_m = 128.
 FusionMarkOptions code_options();
 
-/// Mark of presets paper and code: GlobalMark puts c_m in place of each colour.
+/// Mark of presets paper and code: GlobalMark replaces each colour by c_m.
 class FusionMark : public PooledMark {
  public:
-  /// @param network  of the mark   @param reader  of images
+  /// @param network  makes the mark   @param reader  reads images
   FusionMark(GlobalMark<float> network, extractor::PooledExtractor<float> reader,
              const FusionMarkOptions& options)
       : PooledMark(std::move(reader), options.training, options.running_norm),
@@ -90,12 +91,12 @@ class FusionMark : public PooledMark {
   std::string preset() const override { return options_.authors_code ? "code" : "paper"; }
   std::string configuration() const override;
   nerf::Renderer::Recolour recolour(const Owner& owner, std::vector<std::int8_t> signs) const override;
-  /// Colours as the network reads them: the colours themselves or, of the authors' code, the logit of each,
-  /// clamped to those of 1e-3 and 1 - 1e-3, and a sixteenth of log sigma at x.
+  /// Returns colours as the network reads them: the colours themselves or, for the authors' code, the logit
+  /// of each, clamped to those of 1e-3 and 1 - 1e-3, and log sigma / 16 at x.
   /// @param x  [n, 3]   @param rgb  [n, 3]   @return [n, 3] or [n, 4]
   std::vector<float> network_colours(const nerf::RadianceField& field, const float* x, const float* rgb,
                                      Index n) const;
-  /// Fuses message and colours.
+  /// The network that fuses message and colours.
   const GlobalMark<float>& network() const { return network_; }
 
  protected:
@@ -111,14 +112,15 @@ class FusionMark : public PooledMark {
   FusionMarkOptions options_;
 };
 
-/// Sizes of the mark's network for messages of some bits.
+/// Returns the sizes of the mark's network for messages of `bits` bits.
 GlobalMarkOptions network_options(const FusionMarkOptions& options, Index bits);
-/// Extractor of a pooled mark, whose parameters follow those of the mark in the owner's store.
+/// Makes the extractor of a pooled mark; its parameters follow those of the mark in the owner's store.
 /// @throws ValueError unless the site has one slot for each bit
 extractor::PooledExtractor<float> pooled_reader(const MarkSite& site, Index channels);
-/// Makes a FusionMark.   @throws ValueError as pooled_reader(), or if an option is out of range
+/// Returns the function that makes a FusionMark.
+/// @throws ValueError as pooled_reader(), or if an option is out of range
 MarkMaker fusion_mark(const FusionMarkOptions& options = {});
-/// Options from a configuration of OWNER.   @throws ValueError for an ablation of version 0.1
+/// Parses options from a configuration of OWNER.   @throws ValueError for an ablation of version 0.1
 FusionMarkOptions stored_fusion_mark(const std::string& configuration);
 
 }  // namespace fieldmark::watermark

@@ -5,7 +5,7 @@
 
 namespace fieldmark::watermark {
 
-/// The gradient checks of every differentiable op and module here, in alphabetical order.
+/// Returns the gradient checks of every differentiable op and module here, in alphabetical order.
 std::vector<GradcheckCase> gradcheck_cases();
 
 }  // namespace fieldmark::watermark

@@ -15,32 +15,32 @@ namespace fieldmark::watermark {
 
 class Owner;
 
-/// Where an image shows which cell.
+/// The cell that each place of an image shows.
 struct SeenPlaces {
-  Window window{};                   ///< part of the image that the places divide
+  Window window{};                   ///< part of the image that is divided into places
   Index height = 0;                  ///< in places; 0 for a mark without cells
   Index width = 0;                   ///< in places
   std::vector<std::int32_t> cell{};  ///< [height, width] likeliest cell, -1 for the background
-  std::vector<float> share{};        ///< [height, width] its probability, in [0, 1]
+  std::vector<float> share{};        ///< [height, width] probability of that cell, in [0, 1]
 };
 
-/// Means over training images, distorted as in training.
+/// Means over training images, which are distorted as in training.
 struct TrainingFigures {
-  double sign = 0;   ///< share of the foreground's places whose sign is right; 0 for a mark without cells
-  double index = 0;  ///< share of the foreground's places whose cell is right; 0 for a mark without cells
-  double bits = 0;   ///< share of bits that are right
+  double sign = 0;   ///< share of the foreground's places with the correct sign; 0 for a mark without cells
+  double index = 0;  ///< share of the foreground's places with the correct cell; 0 for a mark without cells
+  double bits = 0;   ///< share of correct bits
   double loss = 0;   ///< of one image
 };
 
 /// Everything drawn at random for one training image.
 struct TrainingImage {
-  Index view = 0;                    ///< of the cached views
+  Index view = 0;                    ///< index into the cached views
   Index step = 0;                    ///< of the run
-  CellCode code{};                   ///< of a key drawn for this image, so that training learns none
+  CellCode code{};                   ///< of a key drawn for this image, so that training learns no key
   Message message{};                 ///< embedded
   std::vector<std::int8_t> signs{};  ///< of the cells, see cell_signs()
   const float* positions = nullptr;  ///< [S, 3] samples of the view, shifted at random
-  bool warped = false;               ///< whether `distort` applies `warp`
+  bool warped = false;               ///< true if `distort` applies `warp`
   std::array<float, 6> warp{};       ///< see distort::affine_warp()
   /// Distorts a marked image [H, W, 3]; a warped image has the extractor's size.
   std::function<Var<float>(Var<float> image)> distort{};
@@ -50,67 +50,70 @@ struct TrainingImage {
 class MarkTraining {
  public:
   virtual ~MarkTraining() = default;
-  /// Whether loss() takes all images of a step at once, because what one image gives depends on the others.
+  /// True if loss() takes all images of a step at once, because one image's loss depends on the others.
   virtual bool whole_batch() const { return false; }
-  /// Loss [1], mean over images: marks them, distorts them, reads them. Several threads call it at once, each
-  /// for one image, unless whole_batch().
+  /// Computes the loss [1], mean over images: marks, distorts and reads each image. Several threads call it
+  /// at the same time with one image each, unless whole_batch().
   /// @param params  of the owner   @param running  means over the run so far
-  /// @param figures  written: those of these images, without the loss
+  /// @param figures  written: means over these images, without the loss
   virtual Var<float> loss(Tape<float>& tape, const Params<float>& params,
                           std::span<const TrainingImage> images, const TrainingFigures& running,
                           TrainingFigures& figures) = 0;
-  /// First steps that prepare the networks and are not yet on the mark's own loss.
+  /// Number of warm-up steps, which prepare the networks before training on the mark's own loss.
   virtual Index warm_steps() const { return 0; }
-  /// Parameters of networks that training needs and the owner does not keep; null: none.
+  /// Returns the parameters of networks that only training needs and the owner does not keep; null: none.
   virtual ParamStore<float>* helpers() { return nullptr; }
-  /// Sets what no gradient moves, such as running statistics of the owner, after each step.
+  /// Updates state without gradients, such as running statistics of the owner, after each step.
   virtual void finish_step(ParamStore<float>&) {}
-  /// Running means for a progress line.
+  /// Formats running means for a progress line.
   virtual std::string note(const TrainingFigures& running) const = 0;
-  /// Notes every option of training of this kind, so that a checkpoint of other options is refused.
+  /// Adds all training options of this kind to the fingerprint, so that a checkpoint with other options is
+  /// refused.
   virtual void describe(RunFingerprint& fingerprint) const = 0;
 };
 
-/// A kind of mark: how a message changes colours, how an image is read, how both are trained and stored.
-/// A mark holds networks and options, but no parameters: its owner has these and is passed to each call.
+/// A kind of mark: how a message changes colours, how an image is read, and how both are trained and stored.
+/// A mark holds networks and options but no parameters; these belong to its owner, which is passed to each
+/// call.
 class Mark {
  public:
   virtual ~Mark() = default;
-  /// Preset that makes this kind of mark, as OWNER stores it.
+  /// Returns the preset that makes this kind of mark, as stored in OWNER.
   virtual std::string preset() const = 0;
-  /// The kind's part of the configuration of OWNER: a JSON object, read by stored_mark().
+  /// Returns the kind's part of the configuration of OWNER: a JSON object, read by stored_mark().
   virtual std::string configuration() const = 0;
 
   /// Deals the cells to the bits of a message under a key, see deal_cells().
   virtual CellCode code(const CellGrid& cells, const Key& key, Index bits) const;
-  /// Colours of the marked field, see nerf::Renderer::set_recolour().
+  /// Makes the function that computes the colours of the marked field, see nerf::Renderer::set_recolour().
   /// @param owner  must outlive the function   @param signs  of the cells, see cell_signs()
   virtual nerf::Renderer::Recolour recolour(const Owner& owner, std::vector<std::int8_t> signs) const = 0;
-  /// Whether Owner::gain scales the mark; otherwise its networks alone decide the mark PSNR.
+  /// True if Owner::gain scales the mark; otherwise its networks alone determine the mark PSNR.
   virtual bool has_gain() const = 0;
-  /// Whether the message lies in cells of the scene: then evidence() finds places, and informed detection
+  /// True if the message lies in cells of the scene: then evidence() finds places, and informed detection
   /// works.
   virtual bool has_cells() const = 0;
-  /// Change of colour at sign +1 and gain 1.   @param x  [N, 3] unit cube   @param c  [N, 3] base colours
+  /// Computes the change of colour at sign +1 and gain 1.
+  /// @param x  [N, 3] unit cube   @param c  [N, 3] base colours
   /// @return [N, 3]   @throws ValueError without cells
   virtual Var<float> carrier(const Params<float>& params, Var<float> x, Var<float> c) const;
 
-  /// Blind detector reading S_c of every cell.
-  /// @param image  [H, W, 3] of the extractor's size   @param places  written unless null, but for the window
+  /// Computes the blind detector reading S_c of every cell.
+  /// @param image  [H, W, 3] of the extractor's size   @param places  written, except the window, unless null
   virtual std::vector<double> evidence(const Owner& owner, const Tensor<float>& image,
                                        SeenPlaces* places) const = 0;
-  /// Loss [1] of an image [H W, 3], least where the extractor confirms its reading of another image.
+  /// Makes a loss [1] of an image [H W, 3] that is least where the extractor confirms its reading of `image`.
   /// @param image  [H, W, 3], the other image   @param owner  must outlive the function
   virtual std::function<Var<float>(Var<float> image)> confirmation(const Owner& owner,
                                                                    const Tensor<float>& image) const = 0;
-  /// Prepares training. Owner and views must outlive the result.
+  /// Prepares training. The owner and the views must outlive the result.
   virtual std::unique_ptr<MarkTraining> training(const Owner& owner,
                                                  std::span<const CachedView> views) const = 0;
 };
 
-/// Parts of an owner in the making that its mark depends on.
+/// Parts of an owner under construction that its mark depends on.
 struct MarkSite {
-  ParamStore<float>& params;         ///< to which the mark adds "mark/..." and "extractor/..."
+  ParamStore<float>& params;         ///< store to which the mark adds "mark/..." and "extractor/..."
   const nerf::RadianceField& field;  ///< unmarked
   const CellGrid& cells;             ///< of the scene, or message_slots()
   Index bits = 0;                    ///< of a message
@@ -120,7 +123,7 @@ struct MarkSite {
 /// Makes a mark for an owner.
 using MarkMaker = std::function<std::shared_ptr<const Mark>(const MarkSite& site)>;
 
-/// Makes the kind of mark that a configuration of OWNER describes.
+/// Returns the function that makes the kind of mark that a configuration of OWNER describes.
 /// @throws ValueError if it describes none, or an ablation   @throws nlohmann::json::exception if it is not
 /// JSON
 MarkMaker stored_mark(const std::string& configuration);

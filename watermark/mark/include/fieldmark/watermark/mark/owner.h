@@ -5,20 +5,21 @@
 
 namespace fieldmark::watermark {
 
-/// Options of an owner that every kind of mark shares, stored in OWNER.
+/// Options of an owner, shared by every kind of mark and stored in OWNER.
 struct OwnerOptions {
-  Index bits = 16;           ///< usual length of a message, that of training, 1 to 256
+  Index bits = 16;           ///< length of a message in training, and by default, 1 to 256
   double mark_psnr = 36.5;   ///< of marks with a gain, dB, mean over novel views, 20 to 60
   Index reader_size = 160;   ///< longer side of the extractor's images, pixels, >= 32
   double reader_aspect = 1;  ///< width over height of the extractor's images, 1/4 to 4, see reader_aspect()
   std::uint64_t seed = 0;    ///< of the initial parameters
-  /// Size of the extractor's images: the shorter side is the multiple of 8 pixels nearest to reader_aspect,
-  /// but at least 16.
+  /// Returns the size of the extractor's images: the shorter side is the multiple of 8 pixels that comes
+  /// nearest to reader_aspect, at least 16.
   PatchSize patch() const;
 };
 
-/// Shape of the image part that suits the extractor: that of the training images, within 1/4 to 4, where a
-/// scene fills them (its space is contracted or ndc); a square for an object before a plain background.
+/// Returns the aspect of the image part that suits the extractor: for a scene that fills its images (space
+/// contracted or ndc), that of the training images, within 1/4 to 4; for an object before a plain background,
+/// a square.
 /// @return width over height
 double reader_aspect(const nerf::RadianceField& field);
 
@@ -31,22 +32,22 @@ class Owner {
   Owner(nerf::RadianceField base, const OwnerOptions& options, const Key& owner_key, CellGrid grid,
         const MarkMaker& make);
 
-  /// Bits and signs of the cells under the owner's key.
+  /// Returns bits and signs of the cells under the owner's key.
   CellCode code() const { return code(key); }
-  /// Bits and signs of the cells under another key.
+  /// Returns bits and signs of the cells under another key.
   CellCode code(const Key& other) const { return mark_->code(cells, other, options_.bits); }
-  /// Takes another key and another length of messages, for the life of this object: the networks of a
-  /// key-free owner serve any.
+  /// Sets another key and another message length for the life of this object: the networks of a key-free
+  /// owner serve any.
   /// @param bits  1 to most_bits()   @throws ValueError otherwise
   void set_code(const Key& other, Index bits);
-  /// Longest message: one bit for every cell; the trained length for a mark without cells.
+  /// Returns the longest message: one bit per cell; the trained length for a mark without cells.
   Index most_bits() const { return mark_->has_cells() ? cells.count() : options_.bits; }
-  /// Whether the networks were trained under fresh random codes and so know no key: only then is the bound of
-  /// keyed_p_value() proven for the owner's own key. False for owners of version 0.1.
+  /// True if the networks were trained under fresh random codes and so know no key. Only then does the bound
+  /// of keyed_p_value() provably hold for the owner's own key. False for owners of version 0.1.
   bool key_free() const { return key_free_; }
-  /// How a message changes colours, and how an image is read.
+  /// The mark: how a message changes colours, and how an image is read.
   const Mark& mark() const { return *mark_; }
-  /// Colours of the marked field, see Mark::recolour(). The owner must outlive them.
+  /// Returns the colours of the marked field, see Mark::recolour(). The owner must outlive them.
   nerf::Renderer::Recolour marking(std::vector<std::int8_t> signs) const {
     return mark_->recolour(*this, std::move(signs));
   }
@@ -57,11 +58,11 @@ class Owner {
 
   /// Writes an OWNER. @throws IoError
   void save(const std::filesystem::path& path) const;
-  /// @throws IoError if the file is missing, foreign, of another kind, or its tensors do not fit its
-  /// configuration
+  /// Reads an OWNER. @throws IoError if the file is missing, foreign, of another kind, or its tensors do not
+  /// fit its configuration
   static Owner load(const std::filesystem::path& path);
 
-  /// As constructed, but for set_mark_psnr() and set_code().
+  /// The options given to the constructor, as changed by set_mark_psnr() and set_code().
   const OwnerOptions& options() const { return options_; }
 
   nerf::RadianceField field;  ///< unmarked

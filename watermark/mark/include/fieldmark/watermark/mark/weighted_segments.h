@@ -5,7 +5,8 @@
 
 namespace fieldmark::watermark {
 
-/// Weighted sums over consecutive rows: what volume rendering does to colours once the weights are fixed.
+/// Computes weighted sums over consecutive rows, as volume rendering does to colours once the weights are
+/// fixed.
 ///   y[p, :] = sum_{begin[p] <= k < begin[p + 1]} weights[k] x[k, :]
 /// @param x  [S, C]   @param begin  P + 1 offsets, first 0, last S, non-decreasing   @param weights  [S];
 /// both must outlive the pass   @return [P, C]   @throws ShapeError, ValueError if they do not fit

@@ -25,26 +25,26 @@ class Bch {
   /// @throws ValueError out of range, or if no information bit is left
   Bch(int m, Index t, Index length);
 
-  /// The code that corrects most errors with `dimension` information bits.
+  /// Returns the code that corrects the most errors with `dimension` information bits.
   /// @return nothing if no code corrects one error   @throws ValueError as the constructor
   static std::optional<Bch> strongest(int m, Index length, Index dimension);
 
-  /// Bits of a codeword.
+  /// Number of bits of a codeword.
   Index length() const { return length_; }
-  /// Information bits, which come first.
+  /// Number of information bits, which come first.
   Index dimension() const { return length_ - check_bits(); }
-  /// Check bits: the generator's degree.
+  /// Number of check bits: the degree of the generator.
   Index check_bits() const { return static_cast<Index>(generator_.size()) - 1; }
-  /// Errors that are always corrected: half the number of successive powers alpha, alpha^2, ... that are
-  /// roots. It can exceed the constructor's t.
+  /// Number of errors that are always corrected: half the number of successive powers alpha, alpha^2, ...
+  /// that are roots. It can exceed the constructor's t.
   Index corrects() const { return corrects_; }
 
   /// Encodes information bits.
   /// @param information  [dimension] each 0 or 1   @return [length]   @throws ValueError otherwise
   std::vector<std::uint8_t> encode(std::span<const std::uint8_t> information) const;
 
-  /// Finds the one codeword that differs in at most corrects() bits.
-  /// @param word  [length] each 0 or 1   @return nothing if there is none   @throws ValueError otherwise
+  /// Finds the one codeword that differs from the word in at most corrects() bits.
+  /// @param word  [length] each 0 or 1   @return nothing if no codeword does   @throws ValueError otherwise
   std::optional<CorrectedWord> decode(std::span<const std::uint8_t> word) const;
 
  private:

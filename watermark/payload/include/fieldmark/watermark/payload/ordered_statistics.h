@@ -14,11 +14,11 @@ namespace fieldmark::watermark {
 class OrderedStatistics {
  public:
   /// @param generator  [k][n] linearly independent words that span the code, each bit 0 or 1; n at most 256
-  /// @throws ValueError without words, or if they differ in length, are too long or dependent
+  /// @throws ValueError if there are no words, or they differ in length, are too long or dependent
   explicit OrderedStatistics(const std::vector<std::vector<std::uint8_t>>& generator);
 
-  /// The codeword c with the largest sum_i logit_i (2 c_i - 1) found. Ties go by position; a logit of 0 is an
-  /// erasure.
+  /// Returns the codeword c with the largest sum_i logit_i (2 c_i - 1) among those tried. Ties are broken by
+  /// position; a logit of 0 is an erasure.
   /// @param logits  [n] finite; positive for a 1   @param order  0 to 3: time grows as k^order
   /// @throws ValueError otherwise
   std::vector<std::uint8_t> nearest(std::span<const double> logits, int order) const;

@@ -15,10 +15,10 @@ namespace fieldmark::watermark {
 struct PayloadLayout {
   Index data_bits = 0;   ///< 16, 24, 32, 40, 64 or 128
   Index check_bits = 0;  ///< of the BCH code
-  Index zero_bits = 0;   ///< unused information bits: 0, and checked
-  Index spare_bits = 0;  ///< bits after the codeword: 0, and not checked
-  /// Wrong bits that are always accepted, at least 1; fewer than the code corrects where kMostChance demands
-  /// it.
+  Index zero_bits = 0;   ///< unused information bits: 0, protected by the code
+  Index spare_bits = 0;  ///< bits after the codeword: 0, not protected by the code
+  /// Number of wrong bits that are always accepted, at least 1; fewer than the code corrects where
+  /// kMostChance requires it.
   Index corrects = 0;
   /// Probability that random bits decode to a payload of this layout:
   ///   payloads * sum_(i <= corrects) C(n, i) / 2^n,   n bits in a codeword
@@ -35,15 +35,15 @@ struct PayloadReading {
   double chance = 1;
 };
 
-/// Encodes payloads in messages of a given length. A version of four bits gives kind and length of the data,
-/// so that a reader needs no options:
+/// Encodes payloads in messages of a given length. A version of four bits tells kind and length of the data,
+/// so a reader needs no options:
 ///   1 to 6: hex, 7 to 12: text, of 16, 24, 32, 40, 64 or 128 bits;  13: uuid;  0, 14 and 15 are reserved
 /// Version and data are protected by the strongest BCH code over GF(2^4) to GF(2^8).
 class PayloadCodec {
  public:
-  /// Largest PayloadLayout::chance; a layout that then corrects no bit is left out.
+  /// Largest PayloadLayout::chance; layouts that then correct no bit are left out.
   static constexpr double kMostChance = 1e-3;
-  /// Largest PayloadReading::chance of a reading with more wrong bits than its layout corrects.
+  /// Largest PayloadReading::chance accepted for a reading with more wrong bits than its layout corrects.
   static constexpr double kMostSoftChance = 1e-4;
 
   /// @param raw_bits  length of a message, 1 to 256   @throws ValueError otherwise
@@ -51,16 +51,16 @@ class PayloadCodec {
 
   /// Length of a message.
   Index raw_bits() const { return raw_bits_; }
-  /// All layouts from the shortest data to the longest; none if messages are too short.
+  /// Returns all layouts from the shortest data to the longest; none if messages are too short.
   std::vector<PayloadLayout> layouts() const;
-  /// Bound on the probability that fair bits of any magnitudes decode to a payload: the sum over layouts of
+  /// Bounds the probability that fair bits of any magnitudes decode to a payload: the sum over layouts of
   /// their chance and kMostSoftChance.
   double chance() const;
 
-  /// Encodes a payload in the layout with the shortest sufficient data.
+  /// Encodes a payload in the layout with the shortest data that hold it.
   /// @throws ValueError if it does not fit
   Message encode(const Payload& payload) const;
-  /// The inverse of encode(); nothing if the message encodes no payload. Hex keeps its leading zeros.
+  /// Decodes what encode() returns; nothing if the message encodes no payload. Hex keeps its leading zeros.
   /// @throws ValueError for a message of another length
   std::optional<Payload> payload(const Message& message) const;
   /// Decodes a reading by Bch::decode() and OrderedStatistics and keeps the payload that agrees best. It is

@@ -5,24 +5,25 @@
 
 namespace fieldmark::watermark {
 
-/// Any 8-bit image as the readers take it: grey is repeated, alpha is laid over the background.
+/// Converts any 8-bit image to what the readers take: repeats grey and composites alpha over the background.
 /// @param image  [H, W, 1 to 4], sides of at least 16   @return [H, W, 3]
-/// @throws ShapeError if it is no image or too small
+/// @throws ShapeError if it is not an image or is too small
 Tensor<float> opaque_image(const Tensor<float>& image, float background);
 
-/// The blind detection: the extractor looks at an image, knowing neither key nor message nor camera.
-/// The owner must outlive it. Calls may run at the same time.
+/// Blind detection: the extractor looks at an image and knows neither key nor message nor camera. Calls may
+/// run at the same time.
 class BlindReader {
  public:
   /// @param owner  must outlive the reader
   explicit BlindReader(const Owner& owner) : owner_(owner) {}
-  /// Sign evidence S_c of every cell (without cells the logit of every slot), see evidence.h. The object's
-  /// window is cut out and brought to the reader's size first (see object_window.h).
-  /// @param image  [H, W, 1 to 4]; grey is repeated, alpha is laid over the field's background; sides of at
-  /// least 16
-  /// @return [cells]   @throws ShapeError if it is no image or too small
+  /// Computes the detector reading S_c of every cell (without cells, the logit of every slot), see
+  /// evidence.h. First cuts out the object's window and resamples it to the extractor's size (see
+  /// object_window.h).
+  /// @param image  [H, W, 1 to 4], sides of at least 16; grey is repeated, alpha is composited over the
+  /// field's background
+  /// @return [cells]   @throws ShapeError if it is not an image or is too small
   std::vector<double> evidence(const Tensor<float>& image) const;
-  /// The same, and where the extractor sees which cell.   @param places  written unless null
+  /// Overload that also tells where the extractor sees which cell.   @param places  written unless null
   std::vector<double> evidence(const Tensor<float>& image, SeenPlaces* places) const;
 
  private:

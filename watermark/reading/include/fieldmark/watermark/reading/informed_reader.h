@@ -5,7 +5,7 @@
 
 namespace fieldmark::watermark {
 
-/// How the informed detector looks for the camera of an image.
+/// Options for finding the camera of an image.
 struct CameraSearchOptions {
   Index views = 256;       ///< novel cameras to compare with, at least 1
   Index around = 192;      ///< further cameras from all directions, for an object without surroundings, >= 0
@@ -18,22 +18,22 @@ struct InformedReading {
   /// [cells] S_c, see evidence.h, on the scale of the blind reading, so that both may be added. Empty if no
   /// camera was found.
   std::vector<double> evidence;
-  nerf::Camera camera;    ///< found
+  nerf::Camera camera;    ///< camera found
   double agreement = -1;  ///< correlation of the gradients of image and aligned render, in [-1, 1]
 };
 
 /// Which detector a reading comes from.
 enum class ReadingKind { blind, informed };
-/// "blind" or "informed".
+/// Returns "blind" or "informed".
 const char* reading_name(ReadingKind kind);
 
 /// The readings of both detectors, and the choice between them.
 struct ImageReading {
   std::vector<double> blind;                ///< [cells] of BlindReader
   InformedReading informed;                 ///< without evidence if no camera was found
-  ReadingKind chosen = ReadingKind::blind;  ///< by the alignment's agreement alone
-  bool mirrored = false;                    ///< all of it is of the mirrored image, which alone agrees
-  /// [cells] of the chosen detector.
+  ReadingKind chosen = ReadingKind::blind;  ///< depends on the alignment's agreement alone
+  bool mirrored = false;                    ///< only the mirrored image agrees; then all is read from it
+  /// Evidence of the chosen detector, [cells].
   const std::vector<double>& evidence() const {
     return chosen == ReadingKind::informed ? informed.evidence : blind;
   }
@@ -43,13 +43,13 @@ struct Surround;
 class CameraSearch;
 
 /// Informed detection: finds the camera of an image, subtracts the owner's unmarked render and compares the
-/// residual with the carriers of all cells. Like the blind detector, it knows neither key nor message, so its
+/// residual with the carriers of all cells. Like blind detection, it knows neither key nor message, so its
 /// evidence may be tested against any.
 ///
-///   - Bars are cut off, and an object's other plain background is replaced by the field's.
-///   - Candidate cameras are aligned coarse to fine; the best agreement wins. The first come from 64 renders.
-///     Unless their agreement is sure, all renders are compared, then the mirrored image, and one that was
-///     stretched to where it looks most like the field.
+///   - Bars are cut off; for an object, any other plain background is replaced by the field's.
+///   - Candidate cameras are aligned coarse to fine; the best agreement wins. The first candidates come from
+///     64 renders. Unless their agreement is sure, the search goes on with all renders, then with the
+///     mirrored image and with one stretched to where it looks most like the field.
 ///   - The blur that leaves the smallest residual is kept; gain, offset and gamma are fitted.
 ///   - With the residual R and its power V around each pixel, R / V is the score and 1 / V the precision.
 ///     For a JPEG image both come from the quantised coefficients.
@@ -57,16 +57,17 @@ class CameraSearch;
 ///     cells.
 class InformedReader {
  public:
-  /// Least agreement of a trusted alignment; docs/notes/reading.md has the measurements.
+  /// Least agreement at which an alignment is trusted; docs/notes/reading.md has the measurements.
   static constexpr double kLeastAgreement = 0.85;
   /// @param owner  of preset fast; must outlive the reader
   /// @throws ValueError for another preset or an option out of range
   explicit InformedReader(const Owner& owner, const CameraSearchOptions& search = {});
   ~InformedReader();
-  /// Both readings; informed is chosen if its agreement is at least kLeastAgreement.
+  /// Reads an image with both detectors; chooses informed if its agreement is at least kLeastAgreement.
   /// @param image  as BlindReader::evidence()   @throws ShapeError as there
   ImageReading read(const Tensor<float>& image);
-  /// Evidence of an image with a known camera.   @param image  [H, W, 3]   @param camera  of its size
+  /// Computes the evidence of an image with a known camera.
+  /// @param image  [H, W, 3]   @param camera  of its size
   std::vector<double> evidence_at(const Tensor<float>& image, const nerf::Camera& camera);
 
  private:

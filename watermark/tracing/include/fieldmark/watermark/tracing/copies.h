@@ -8,13 +8,13 @@
 
 namespace fieldmark::watermark {
 
-/// The key that deals the cells of one recipient's copy.
+/// Derives the key that deals the cells of one recipient's copy.
 ///   K_r = derive_key(K, "fieldmark copy " || name, 0)
-/// Codes of two recipients are independent, and nobody without K can derive one.
-/// @param name  of the recipient, byte by byte as it stands   @throws ValueError if it is empty
+/// The codes of two recipients are independent, and nobody can derive one without K.
+/// @param name  of the recipient, used byte for byte   @throws ValueError if it is empty
 Key copy_key(const Key& key, std::string_view name);
 
-/// Recipients of a text file, one a line, UTF-8; spaces around a name and empty lines are left out.
+/// Reads recipients from a UTF-8 text file, one per line, without surrounding spaces and empty lines.
 /// @throws IoError if the file cannot be read, names nobody, or names one twice
 std::vector<std::string> read_recipients(const std::filesystem::path& path);
 
