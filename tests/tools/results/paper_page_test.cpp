@@ -14,6 +14,7 @@ TEST_CASE("The paper's page has our figures beside the published ones", "[paper_
                             "50.00 ± 0.62 (91.16), 100 | - | - |"));
   CHECK_THAT(page, Contains("| Fieldmark, preset fast | lego | hash | - | - | 98.44 ± 0.62, 100 |"));
   CHECK_THAT(page, Contains("| 38.50 | 34.25 | - | - | 30.00 (26.29) | - | 0.750 (0.910) | - (0.038) |"));
+  CHECK_THAT(page, Contains("## Departures") && Contains("| N_m | 256 | 128 | 256 | 128 |"));
   CHECK_THAT(page, Contains("| steps | none | noise_0.05 | noise_0.1 |"));
   CHECK_THAT(page, Contains("| 100 | 50.00 (91.16) | 46.88 | 37.50 (90.44) |"));
   CHECK_THAT(page,

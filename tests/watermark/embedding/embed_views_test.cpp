@@ -126,7 +126,7 @@ TEST_CASE("embed_views: at several distances, the object has no more pixels than
   for (const auto d : {EmbedDistances::novel, EmbedDistances::native, EmbedDistances::several})
     CHECK(parse_distances(distances_name(d)) == d);
   CHECK_THROWS_WITH(parse_distances("far"),
-                    "[embed_views] distances must be near, native or several, got \"far\"");
+                    "[embed_views] distances must be novel, native or several, got \"far\"");
 }
 
 TEST_CASE("embed_views: progress is told after each view and may stop") {

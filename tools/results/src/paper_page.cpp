@@ -1,5 +1,6 @@
 #include <fieldmark/tools/results/paper_page.h>
 
+#include <fieldmark/baselines/departures.h>
 #include <fieldmark/baselines/paper_plan.h>
 #include <fieldmark/baselines/published.h>
 #include <fieldmark/core/files.h>
@@ -274,6 +275,13 @@ std::string named_table(const std::vector<Group>& groups, const char* table, con
   return markdown_table(header, rows);
 }
 
+std::string departures_table() {
+  std::vector<Row> rows;
+  for (const auto& d : baselines::departures())
+    rows.push_back({d.part, d.paper, d.code, d.preset_paper, d.preset_code});
+  return markdown_table({"part", "paper", "authors' code", "preset paper", "preset code"}, rows);
+}
+
 std::string order_of_rows(const std::vector<Group>& groups) {
   std::string text;
   for (const Group& a : groups)
@@ -355,6 +363,11 @@ std::string paper_page(const std::vector<Cell>& cells, const std::vector<std::st
       "published PSNR is almost certainly against the ground truth.\n\n## In one table\n\n" +
       first_table(groups) + "\n## Systems\n\n| system | what is trained |\n| --- | --- |\n";
   for (const auto& s : baselines::paper_systems()) text += "| " + s.title + " | " + s.what + " |\n";
+  text +=
+      "\n## Departures\n\nWhat the presets take from the paper and from its authors' code, and what they do "
+      "in its place; "
+      "\"-\": not given, or as the paper. `embed` uses the values of the last two columns.\n\n" +
+      departures_table();
   text += "\n## Length of the message\n\n" + bits_table(groups) + "\n## Quality at 16 bits\n\n" +
           quality_table(groups) +
           "\n## Distortions at 16 bits\n\nSeverities are true: noise as standard "

@@ -91,7 +91,7 @@ const char* distances_name(EmbedDistances distances) {
 EmbedDistances parse_distances(std::string_view name) {
   for (const auto d : {EmbedDistances::novel, EmbedDistances::native, EmbedDistances::several})
     if (name == distances_name(d)) return d;
-  throw ValueError("[embed_views] distances must be near, native or several, got \"" + std::string(name) +
+  throw ValueError("[embed_views] distances must be novel, native or several, got \"" + std::string(name) +
                    "\"");
 }
 
