@@ -49,7 +49,7 @@ TEST_CASE("cell_runner: a cell of the built-in scene, from training to files") {
   CHECK(measured.cell.commit == "abc");
   CHECK(measured.image.shape == Shape{32, 64, 3});
   CHECK(!kept_curve(measured.cell).empty());
-  // A run of another budget neither finds this one's networks nor goes on with them.
+  // A run with another budget neither finds this run's networks nor resumes them.
   CHECK(std::filesystem::exists(folder / "work/0.2s-0.5s/ours-objects-hash-16-1.checkpoint"));
   options.budget = 0.4;
   CellRunner longer(options);

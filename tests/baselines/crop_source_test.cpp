@@ -28,7 +28,7 @@ TEST_CASE("crop_source: windows are parts of their images") {
 }
 
 TEST_CASE("crop_source: half of the images are textures, and hardly any image is blank") {
-  Tensor<float> image({64, 64, 3}, 1.f);  // white but for a corner
+  Tensor<float> image({64, 64, 3}, 1.f);  // white except for one corner
   for (Index y = 0; y < 32; ++y)
     for (Index x = 0; x < 32; ++x) image[(y * 64 + x) * 3] = static_cast<float>((x + y) % 2);
   const CropSource crops({image}, 1);

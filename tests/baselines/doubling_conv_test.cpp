@@ -14,7 +14,7 @@ TEST_CASE("doubling_conv: depth_to_space is the inverse of space_to_depth") {
   CHECK(y == x.data);
 }
 
-// A transposed convolution: each pixel times the window, added where the windows lie.
+// A transposed convolution: adds each pixel times the window at the window's position.
 TEST_CASE("doubling_conv: windows laid beside one another, then normalised") {
   ParamStore<double> store;
   const DoublingConv<double> layer(store, "d", 2, 1);
@@ -29,7 +29,7 @@ TEST_CASE("doubling_conv: windows laid beside one another, then normalised") {
             for (Index c = 0; c < 2; ++c)
               laid[((2 * i + a) * 4 + 2 * j + b) * 2 + o] +=
                   x[(i * 2 + j) * 2 + c] * w[static_cast<std::size_t>(c * 8 + (2 * a + b) * 2 + o)];
-  // Running statistics of mean 0 and variance 1 leave the sums as they are, but for eps.
+  // Running statistics of mean 0 and variance 1 leave the sums unchanged, except for eps.
   const auto y = op_values<double>(
       [&](auto&, auto v) {
         NormPass<double> pass{.running = true};

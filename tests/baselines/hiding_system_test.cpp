@@ -38,7 +38,8 @@ TEST_CASE("hiding_system: marked images keep what is transparent, and their mark
       changed += before[4 * p] != after[4 * p];
     }
     CHECK(changed > 0);
-    // Over the whole image at most as strong as asked for: the background's part is lost.
+    // Over the whole image, the mark is at most as strong as requested, because the background's part is
+    // lost.
     CHECK(psnr(nerf::composited(marked.views[v], data.background),
                nerf::composited(data.views[v], data.background)) > 25.5);
   }
@@ -55,7 +56,7 @@ TEST_CASE("hiding_system: two fields shown in turns with a message and its oppos
   const auto camera = nerf::make_cameras(field->cameras, nerf::CameraSet::novel, 1, 0, 5).front();
   CHECK(scene.render(camera, message).data == nerf::Renderer(*field).render(camera).rgb.data);
   CHECK(scene.render(camera, opposite(message)).data == nerf::Renderer(*other).render(camera).rgb.data);
-  // A constant reading is right on half of the bits of any message and its opposite together.
+  // A constant reading gets half of the bits right over a message and its opposite together.
   const Tensor<float> grey({16, 16, 3}, 0.5f);
   CHECK(scene.accuracy(grey, message) + scene.accuracy(grey, opposite(message)) == Approx(1));
 }

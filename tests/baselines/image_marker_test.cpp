@@ -58,8 +58,8 @@ TEST_CASE("image_marker: an image is marked and read tile by tile") {
   const auto cover = quantize8(uniform<float>({72, 80, 3}, 0.3f, 0.7f, 1));
   const auto marked = marker.mark(cover, message);
   CHECK(part(marked, 32, 32, 32).data == marker.mark(part(cover, 32, 32, 32), message).data);
-  CHECK(part(marked, 64, 0, 8).data != part(cover, 64, 0, 8).data);  // the rest of a side, too
-  // White tiles are not asked where another shows something.
+  CHECK(part(marked, 64, 0, 8).data != part(cover, 64, 0, 8).data);  // the remainder of a side is marked too
+  // White tiles are ignored if another tile has content.
   auto mostly_white = cover;
   std::fill(mostly_white.data.begin(), mostly_white.data.end(), 1.f);
   for (Index y = 0; y < 32; ++y)

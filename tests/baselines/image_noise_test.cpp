@@ -20,7 +20,7 @@ std::vector<float> through(NoiseLayer layer, std::uint64_t step = 3) {
       {kMarked, kPlain});
 }
 
-// Pixels that are the marked image's; the others must be the plain one's.
+// Marks the pixels that come from the marked image; all others must come from the plain one.
 std::vector<bool> marked_pixels(const std::vector<float>& y) {
   std::vector<bool> marked;
   for (std::size_t p = 0; p < y.size() / 3; ++p) {

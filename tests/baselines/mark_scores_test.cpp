@@ -42,7 +42,7 @@ nerf::Dataset photographs_of(const nerf::RadianceField& field) {
 
 }  // namespace
 
-// The same views, messages and distortions as watermark::measure(), which is a loop of its own.
+// Uses the same views, messages and distortions as watermark::measure(), which has its own loop.
 TEST_CASE("mark_scores: an owner's figures are those of measure") {
   const watermark::Owner owner = owner_of_6_bits();
   const auto cameras = cameras_of(owner.field);
@@ -73,14 +73,14 @@ TEST_CASE(
                                          const watermark::Message&) { return plain.render(camera).rgb; },
                            .accuracy =
                                [](const Tensor<float>&, const watermark::Message& sent) {
-                                 return sent.bits[0] ? 1.0 : 0.5;  // of messages 0, 1, 2, 3: half each
+                                 return sent.bits[0] ? 1.0 : 0.5;  // half of messages 0 to 3
                                }};
   const auto scores =
       score_mark(field, marked, {.cameras = cameras_of(field), .ground_truth = &ground_truth});
   CHECK(scores.psnr_gt == Approx(expected.psnr).epsilon(1e-9));
   CHECK(scores.psnr_gt_unmarked == Approx(expected.psnr).epsilon(1e-9));
   CHECK(scores.psnr_gt_object == Approx(expected.psnr_foreground).epsilon(1e-9));
-  // evaluate() does not round before ssim(): 2e-4 here
+  // evaluate() does not round before ssim(), a difference of 2e-4 here
   CHECK(scores.ssim_gt == Approx(expected.ssim).margin(1e-3));
   CHECK(std::isnan(scores.psnr_base));  // equal images
   CHECK(scores.accuracy == Approx(0.75));
@@ -109,7 +109,7 @@ TEST_CASE("mark_scores: only the first views under distortion, and stopping") {
   CHECK(score_mark(field, marked, options).views == 4);
   CHECK(read == 4 + 3 * 2);
   read = 0;
-  options.seconds = 1e-9;  // over after the views that are read under distortion
+  options.seconds = 1e-9;  // ends after the views read under distortion
   CHECK(score_mark(field, marked, options).views == 3);
   CHECK(read == 3 + 3 * 2);
   options.seconds = 1e9;

@@ -58,7 +58,7 @@ TEST_CASE("mbrs_network: a bit is spread where its place on the map lies") {
     if (y >= 48 && x >= 48) far += change;
   }
   CHECK(near > 0);
-  CHECK(far < near);  // squeeze-and-excitation reaches everywhere, the map does not
+  CHECK(far < near);  // squeeze-and-excitation is global, the map is local
 }
 
 TEST_CASE("mbrs_network: threads and errors") {

@@ -24,14 +24,14 @@ nerf::Camera camera(Index width = 9, Index height = 7) {
   return nerf::make_camera(nerf::look_at({2.2, -3.1, 1.7}, {0.1, 0.2, 0}, {0, 0, 1}), 0.9, width, height);
 }
 
-// A message field of small_field() with its numbers.
+// A message field on small_field(), with its parameters.
 struct Made {
   nerf::RadianceField base = small_field();
   ParamStore<float> store;
   MessageField field;
   explicit Made(MessagePlace place)
       : field(store, base, {.place = place, .bits = 3, .width = 8, .seed = 3}) {}
-  void silence(const std::string& name, Index first) {  // weights from row `first` on
+  void silence(const std::string& name, Index first) {  // zeroes weights from row `first` on
     const auto shape = store.entry(store.find(name + "/weight")).shape;
     auto values = store.values(store.find(name + "/weight"));
     std::fill(values.begin() + first * shape[1], values.end(), 0.f);
@@ -64,7 +64,8 @@ Row row(const std::vector<float>& all, std::size_t i, std::size_t columns) {
 
 void append(Row& to, const Row& from) { to.insert(to.end(), from.begin(), from.end()); }
 
-// The first ray that meets something, by loops: density and colours of its samples from `of_sample`.
+// Renders the first ray that hits something by loops, with density and colours of its samples from
+// `of_sample`.
 template <class F>
 Row by_loops(const nerf::RadianceField& base, Index* pixel, F of_sample) {
   std::vector<float> pixels;

@@ -143,7 +143,7 @@ TEST_CASE("owner_system: moved samples at test change images a little, in the sa
 }
 
 TEST_CASE("owner_system: each variant takes its steps and is measured") {
-  // Those that take a path of their own; the others differ in a switch that is tested where it is.
+  // Variants with a code path of their own; the others differ in a switch that is tested elsewhere.
   for (const char* name :
        {"ours_without_dense", "ours_without_cells", "drs", "copyrnerf_code", "nerf_message", "geometry"}) {
     CAPTURE(name);
@@ -154,7 +154,7 @@ TEST_CASE("owner_system: each variant takes its steps and is measured") {
     CHECK(trained.steps == 1);
     const auto cameras = nerf::make_cameras(trained.owner.field.cameras, nerf::CameraSet::novel, 2, 0, 123);
     const auto scores = score_mark(trained.owner.field, marked_scene(trained, 1), {.cameras = cameras});
-    CHECK(scores.psnr_base < 60);  // it shows, and is a number
+    CHECK(scores.psnr_base < 60);  // it is visible and finite
   }
 }
 

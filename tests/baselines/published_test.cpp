@@ -17,7 +17,7 @@ double row_sum(const char* table, const char* system, const std::vector<std::str
 }
 }  // namespace
 
-// Sums of the printed rows: a digit that is wrong shows.
+// Compares sums of the printed rows, which reveal a wrong digit.
 TEST_CASE("published: rows of the paper") {
   const std::vector<std::string> lengths{"4", "8", "16", "32", "48"};
   CHECK(row_sum("bits", "copyrnerf_paper", lengths) == Approx(429.30));

@@ -10,11 +10,11 @@ using namespace fieldmark::baselines;
 
 namespace {
 
-// Colour, cosine transform, mask and back, each written out for one block.
+// Colour transform, cosine transform, mask and the way back, written out for one block.
 std::vector<double> by_hand(const Tensor<double>& x, Index luma, Index chroma) {
   const double to[3][3] = {
       {0.299, 0.587, 0.114}, {-0.168735892, -0.331264108, 0.5}, {0.5, -0.418687589, -0.081312411}};
-  // The inverse that JFIF gives, to its six digits.
+  // JFIF's inverse, to its six digits.
   const double from[3][3] = {{1, 0, 1.402}, {1, -0.344136, -0.714136}, {1, 1.772, 0}};
   const auto basis = [](Index u, Index i) {
     return (u == 0 ? std::sqrt(0.125) : 0.5) *

@@ -14,7 +14,7 @@ using namespace fieldmark;
 namespace fs = std::filesystem;
 
 namespace {
-/// A disk that is full after `bytes`, as far as one file can tell.
+/// Simulates, for one file, a disk that is full after `bytes`.
 struct FullDisk {
   rlimit before{};
   void (*handler)(int);
@@ -113,7 +113,7 @@ TEST_CASE("files: links are followed, permissions are the umask's, pipes and dev
   write_file_atomically(folder / "link", "new");
   CHECK(fs::is_symlink(folder / "link"));
   CHECK(read_text(folder / "target") == "new");
-  fs::create_symlink("later", folder / "second");  // to a file that is not there yet
+  fs::create_symlink("later", folder / "second");  // to a file that does not exist yet
   fs::create_symlink(folder / "second", folder / "first");
   write_file_atomically(folder / "first", "made");
   CHECK(fs::is_symlink(folder / "first"));

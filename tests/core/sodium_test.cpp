@@ -10,5 +10,5 @@ TEST_CASE("sodium: several threads may initialise it, and it is initialised then
   std::thread other([] { ensure_sodium(); });
   ensure_sodium();
   other.join();
-  CHECK(sodium_init() == 1);  // 1: it was initialised already
+  CHECK(sodium_init() == 1);  // 1: already initialised
 }

@@ -12,7 +12,7 @@ using distort::warp_labels;
 namespace {
 const std::vector<double> kBackground{0.9, 0.1, 0.4};
 
-// Straight from the formula: a hat function for every pair of pixels, the background outside.
+// Straight from the formula: a hat function for every pair of pixels, with the background outside.
 Tensor<double> brute_force(const Tensor<double>& x, const std::vector<double>& m, Index height, Index width) {
   const Index h = x.shape[0], w = x.shape[1], channels = x.shape[2];
   Tensor<double> y({height, width, channels});
@@ -79,7 +79,7 @@ TEST_CASE("affine_warp: whole shifts copy pixels, far and undefined positions re
 }
 
 TEST_CASE("affine_warp: gradient in image and matrix") {
-  // A step that stays away from whole positions, where the weights have a kink.
+  // This step avoids integer positions, where the weights have a kink.
   const GradcheckOptions options{.step = 0.02};
   expect_grad(with_background,
               {uniform({5, 6, 3}, 0, 1, 1), Tensor<double>({6}, {0.83, -0.31, 0.22, 0.27, 1.12, -0.41})},

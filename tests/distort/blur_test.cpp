@@ -10,7 +10,7 @@ using distort::blur;
 namespace {
 const auto soften = [](auto&, auto v) { return blur(v[0], v[1]); };
 
-// The two-dimensional sum, not separated.
+// Computes the two-dimensional sum directly, without separating it.
 Tensor<double> brute_force(const Tensor<double>& x, double sigma) {
   const Index h = x.shape[0], w = x.shape[1], channels = x.shape[2];
   const Index r = std::max<Index>(1, static_cast<Index>(std::ceil(4 * sigma)));

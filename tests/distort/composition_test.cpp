@@ -18,7 +18,7 @@ Tensor<float> distorted_by(const char* name, const Tensor<float>& x, PixelMap* s
   return apply_distortion(parse_distortion(name), x, CounterRng(1, 1), 0, kWhite, source);
 }
 
-// Of a distortion that only moves whole pixels: each is that of its source position.
+// Checks a distortion that only moves whole pixels: each pixel equals that at its source position.
 void check_moved(const char* name, const Tensor<float>& x, Index moved) {
   CAPTURE(name);
   PixelMap source;
@@ -61,7 +61,7 @@ TEST_CASE("composition: a stretched image is wider, and back it is nearly the sa
 TEST_CASE("composition: another background goes behind the pixels that differ from the old one") {
   Tensor<float> x({4, 5, 3}, 1.f);
   for (Index c = 0; c < 3; ++c) x[3 * 7 + c] = 0.25f;
-  x[3 * 8] = 0.99f;  // an edge: two levels and a half from white
+  x[3 * 8] = 0.99f;  // an edge: two and a half levels from white
   const Tensor<float> black = distorted_by("background_black", x),
                       noise = distorted_by("background_noise", x);
   std::set<float> values(noise.data.begin(), noise.data.end());

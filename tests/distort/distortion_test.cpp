@@ -35,7 +35,7 @@ Tensor<float> rounded(const Tensor<float>& x) {
 
 Tensor<float> image(Shape shape, unsigned seed = 1) { return rounded(uniform<float>(shape, 0, 1, seed)); }
 
-// Column in red, row in green, in levels of 1/255.
+// Encodes the column in red and the row in green, in levels of 1/255.
 Tensor<float> coordinates(Index h, Index w) {
   Tensor<float> x({h, w, 3});
   for (Index i = 0; i < h * w; ++i) {
@@ -164,7 +164,7 @@ TEST_CASE("distortion: noise twice in a chain is drawn twice") {
 }
 
 TEST_CASE("distortion: rotation is uniform in +-A degrees about the centre") {
-  // A dot on the right of a black image tells the angle.
+  // A dot on the right of a black image reveals the angle.
   Tensor<float> x({101, 101, 3});
   for (Index i = 48; i <= 52; ++i)
     for (Index j = 88; j <= 92; ++j) x[(i * 101 + j) * 3] = 1;
@@ -250,13 +250,13 @@ TEST_CASE("distortion: crop keeps a window of the right area anywhere in the ima
     tops.insert(top);
     lefts.insert(left);
   }
-  // 23 and 38 places: 300 windows reach both ends and nearly all between.
+  // 23 and 38 positions: 300 windows reach both ends and nearly all positions between.
   CHECK((*tops.begin() == 0 && *tops.rbegin() == 22 && tops.size() == 23));
   CHECK((*lefts.begin() <= 1 && *lefts.rbegin() >= 36 && lefts.size() > 34));
 }
 
 TEST_CASE("distortion: where pixels come from, checked on an image of coordinates") {
-  // Smooth coordinates in red and green: bilinear reading at the source gives back what the distortion shows.
+  // Smooth coordinates in red and green: reading bilinearly at the source reproduces the distorted image.
   const Index h = 90, w = 120;
   Tensor<float> x({h, w, 3});
   for (Index p = 0; p < h * w; ++p) {
@@ -275,7 +275,7 @@ TEST_CASE("distortion: where pixels come from, checked on an image of coordinate
       for (Index j = 6; j < y.shape[1] - 6; ++j) {
         const float* got = y.data.data() + 3 * (i * y.shape[1] + j);
         const auto from = map(static_cast<double>(j), static_cast<double>(i));
-        // Corners that a rotation opened, and what is beside them, show no coordinates.
+        // Corners opened by a rotation, and pixels next to them, hold no coordinates.
         if (from[0] < 9 || from[0] > static_cast<double>(w) - 10 || from[1] < 9 ||
             from[1] > static_cast<double>(h) - 10 || got[2] < 0.999f)
           continue;
@@ -288,7 +288,7 @@ TEST_CASE("distortion: where pixels come from, checked on an image of coordinate
       }
     INFO(name);
     CHECK(inside > 500);
-    // Half a level for each step's rounding: measured 0.5 for one step, 1.11 at most for three.
+    // Half a level of rounding per step: measured 0.5 for one step, at most 1.11 for three.
     CHECK(worst < 1.3);
   }
 }
@@ -303,7 +303,7 @@ TEST_CASE("distortion: jpeg costs more at a lower quality and halves chroma's re
     for (Index i = 0; i < x.size(); ++i) errors[k] += std::pow(static_cast<double>(y[i] - x[i]), 2);
   }
   CHECK((errors[0] < errors[1] && errors[1] < errors[2]));
-  // Columns alternately red and of blue with the same luma (0.299 r = 0.114 b + 0.587 g): 4:2:0 blends their
+  // Columns alternate between red and blue of the same luma (0.299 r = 0.114 b + 0.587 g): 4:2:0 blends their
   // chroma.
   Tensor<float> stripes({32, 32, 3});
   for (Index p = 0; p < 32 * 32; ++p) {
@@ -324,7 +324,7 @@ TEST_CASE("distortion: gamma, brightness and hue") {
     CHECK(std::abs(dark[i] - x[i] * x[i]) <= 0.5001f / 255);
     CHECK(std::abs(bright[i] - std::min(1.f, 1.5f * x[i])) <= 0.5001f / 255);
   }
-  // A third of a turn moves red to green, green to blue, blue to red; back again is the inverse.
+  // A third of a turn moves red to green, green to blue, blue to red; the turn back is the inverse.
   const auto third = distorted("hue_120", x), back = distorted("hue_-120", x), half = distorted("hue_180", x);
   for (Index i = 0; i < 6; i += 3)
     for (Index c = 0; c < 3; ++c) {
@@ -374,7 +374,7 @@ TEST_CASE("distortion: a clip is apart from single images") {
     CHECK(distort::needs_clip(stages[i]) == (i == 1 || i == 2));
   }
   CHECK(distort::clip_stages(parse_distortion("combined")).size() == 1);
-  // The last step alone draws what it draws in the chain.
+  // Alone, the last step draws the same random numbers as in the chain.
   const auto x = image({16, 12, 3});
   const distort::Distortion both = parse_distortion("noise_0,noise_0.1");
   const distort::Distortion second{.name = both.name, .steps = {both.steps[1]}, .first = 1};

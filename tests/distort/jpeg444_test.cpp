@@ -22,7 +22,7 @@ double worst_level(const Tensor<float>& a, const Tensor<float>& b) {
   return worst;
 }
 
-// Luma varies smoothly with some noise, colour is one for the whole image.
+// Returns an image with smooth luma, some noise and a single colour.
 Tensor<float> one_colour(Index h, Index w, float blue, float red) {
   const auto noise = uniform<float>({h * w}, -0.05f, 0.05f, 3);
   Tensor<float> x({h, w, 3});
@@ -45,14 +45,14 @@ TEST_CASE("jpeg444: equals the encoder and decoder where chroma is even, so that
       const auto ours = jpeg444(x, quality), theirs = jpeg_round_trip(x, quality);
       for (Index i = 0; i < x.size(); ++i) squares += std::pow(level(ours[i]) - level(theirs[i]), 2);
       INFO(quality << " " << colour);
-      // The decoder's transform is in whole numbers, and a coefficient at a half may fall either way.
+      // The decoder's transform uses integers, and a coefficient at a half may round either way.
       // Measured 0.02 to 0.15 levels rms.
       CHECK(std::sqrt(squares / static_cast<double>(x.size())) < 0.3);
     }
 }
 
 TEST_CASE("jpeg444: a wave of chroma alone keeps its amplitude to the table's step") {
-  // Cb = 128 + A cos((2 x + 1) u pi / 16) in every row has one coefficient besides the mean's.
+  // Cb = 128 + A cos((2 x + 1) u pi / 16) in every row has one coefficient besides the mean.
   constexpr double kAmplitude = 30;
   for (const auto& [u, base] : {std::pair{1, 18}, {2, 24}, {3, 47}, {4, 99}}) {
     Tensor<float> x({16, 16, 3});
@@ -63,14 +63,14 @@ TEST_CASE("jpeg444: a wave of chroma alone keeps its amplitude to the table's st
       x[3 * p + 1] = static_cast<float>((128 - 0.114 * 1.772 / 0.587 * cb) / 255);
       x[3 * p + 2] = static_cast<float>((128 + 1.772 * cb) / 255);
     }
-    // Orthonormal cosines have squared length 4 for u > 0 with weight 1/2, and the even column 8 times
+    // Without its weight of 1/2, a cosine of u > 0 has squared length 4; a uniform column gives 8 times
     // sqrt(1/8): the coefficient is A * (1/2 * 4) * (8 sqrt(1/8)).
     const double coefficient = kAmplitude * 2 * std::sqrt(8.0);
     const double kept = base * std::round(coefficient / base) / coefficient;
     const auto y = jpeg444(x, 50);
     for (Index p = 0; p < 8; ++p) {
       const double cb = kAmplitude * std::cos((2 * static_cast<double>(p) + 1) * u * std::numbers::pi / 16);
-      // Blue is Y + 1.772 Cb; half a level of Cb, one of Y and the final rounding.
+      // Blue is Y + 1.772 Cb; half a level of error in Cb, one level in Y, and the final rounding.
       CHECK(level(y[3 * p + 2]) == Approx(128 + 1.772 * kept * cb).margin(2.5));
     }
   }
@@ -101,7 +101,7 @@ TEST_CASE("jpeg444: even images, quality, thread count and errors") {
     CHECK(squares < last);
     last = squares;
   }
-  // At 100 every table entry is 1: rounding of coefficients, components and colours.
+  // At quality 100 every table entry is 1: coefficients, components and colours are rounded.
   CHECK(worst_level(jpeg444(x, 100), x) <= 5);
   CHECK(jpeg444(quantize8(uniform<float>({1, 1, 3}, 0, 1, 2)), 50).shape == Shape{1, 1, 3});
   const ScopedThreads serial(1);

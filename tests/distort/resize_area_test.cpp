@@ -9,7 +9,7 @@ using distort::resize_area;
 using distort::resize_labels;
 
 namespace {
-// Every pixel cut into (height x width) equal squares: then every new pixel is the mean of whole squares.
+// Cuts every pixel into (height x width) equal squares, so that every new pixel is the mean of whole squares.
 Tensor<double> brute_force(const Tensor<double>& x, Index height, Index width) {
   const Index h = x.shape[0], w = x.shape[1], channels = x.shape[2];
   Tensor<double> y({height, width, channels});

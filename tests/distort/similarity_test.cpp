@@ -12,7 +12,7 @@ using distort::similarity_matrix;
 TEST_CASE("similarity: undoes p to scale R p + shift, counter-clockwise as seen") {
   const double angle = 0.4, scale = 1.7, sx = 3, sy = -2;
   const auto m = similarity_matrix(angle, scale, sx, sy);
-  // y points down: a positive turn moves the point on the right, (1, 0), up to (cos, -sin).
+  // y points down: a positive turn moves the point (1, 0) on the right up to (cos, -sin).
   const double c = std::cos(angle), s = std::sin(angle);
   for (const auto& p : {std::pair{1.0, 0.0}, {0.0, 1.0}, {-2.5, 0.75}}) {
     const double x = scale * (c * p.first + s * p.second) + sx,

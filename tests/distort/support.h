@@ -20,7 +20,8 @@ fieldmark::Tensor<T> op_result(const F& f, const std::vector<fieldmark::Tensor<T
   return {y.shape(), std::vector<T>(y.value(), y.value() + y.shape().size())};
 }
 
-/// Result and all gradients, for a cotangent that varies, as one list: to compare bits between thread counts.
+/// Returns the result and all gradients for a varying cotangent as one list, to compare bits between thread
+/// counts.
 template <class T, class F>
 std::vector<T> run_with_grads(const F& f, const std::vector<fieldmark::Tensor<T>>& inputs, int threads) {
   const fieldmark::ScopedThreads scope(threads);
@@ -36,7 +37,7 @@ std::vector<T> run_with_grads(const F& f, const std::vector<fieldmark::Tensor<T>
   return all;
 }
 
-/// Largest |float - double| over the result and all gradients, relative to the largest of them.
+/// Returns the largest |float - double| over the result and all gradients, relative to the largest of them.
 template <class F>
 double distortion_error(const F& f, const std::vector<fieldmark::Tensor<float>>& inputs) {
   std::vector<fieldmark::Tensor<double>> exact;

@@ -1,5 +1,5 @@
-// Uses the installed package as a stranger does: fits one parameter, checks an op of each room by its
-// gradient, reads a message and draws keys.
+// Uses the installed package as an outside program does: fits one parameter, gradient-checks an op of each
+// module, reads a message and draws keys.
 #include <fieldmark/distort/blur.h>
 #include <fieldmark/engine/gradcheck.h>
 #include <fieldmark/engine/isa.h>

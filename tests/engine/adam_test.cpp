@@ -13,7 +13,7 @@ using namespace fieldmark;
 
 namespace {
 
-// A field of two layers and a table that starts on a cache line, and an extractor with running statistics.
+// A two-layer field with a table that starts on a cache line, and an extractor with running statistics.
 ParamStore<double> some_store() {
   ParamStore<double> store;
   store.add("field/0/weight", {2, 3});
@@ -31,7 +31,7 @@ TEST_CASE("adam: the first step is lr times the gradient's sign, whatever its si
   Adam<double> adam(4, {.lr = 0.5});
   std::vector<double> x{1, 1, 1, 1}, g{1e-2, -3, 1e20, 0};
   adam.step(x, g);
-  // eps is 1e-8: a gradient of 1e-2 moves by lr / (1 + 1e-6).
+  // eps is 1e-8: a gradient of 1e-2 moves x by lr / (1 + 1e-6).
   CHECK(std::abs(x[0] - (1 - 0.5 / (1 + 1e-6))) < 1e-12);
   CHECK(std::abs(x[1] - (1 + 0.5 / (1 + 1e-8 / 3))) < 1e-12);
   CHECK(std::abs(x[2] - 0.5) < 1e-14);
@@ -53,7 +53,7 @@ TEST_CASE("adam: several steps with betas and decay of their own follow the pape
     const double lr = 0.03 / t;
     want -= lr * (m / (1 - std::pow(0.8, t)) / (std::sqrt(v / (1 - std::pow(0.999, t))) + 1e-3) + 0.2 * want);
   }
-  // Rounding of 50 steps.
+  // Rounding error of 50 steps.
   CHECK(std::abs(x[0] - want) < 1e-14);
 }
 

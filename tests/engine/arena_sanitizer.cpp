@@ -1,5 +1,5 @@
-// The arena under the address sanitizer, in every build: its sources are compiled into this program. Returns
-// the number of the first expectation that fails.
+// Tests the arena under the address sanitizer in every build: the program compiles the arena's sources
+// itself. Returns the number of the first failed expectation.
 #include <fieldmark/engine/arena.h>
 #include <sanitizer/asan_interface.h>
 
@@ -8,7 +8,7 @@ using fieldmark::Arena;
 int main() {
   Arena arena(4096);
   const auto* first = static_cast<char*>(arena.allocate(100));
-  const auto* full = static_cast<char*>(arena.allocate(Arena::kAlign));  // no slack of its own behind it
+  const auto* full = static_cast<char*>(arena.allocate(Arena::kAlign));  // no slack behind it
   const auto* last = static_cast<char*>(arena.allocate(8));
   if (__asan_region_is_poisoned(const_cast<char*>(first), 100)) return 1;
   if (!__asan_address_is_poisoned(first + 100)) return 2;

@@ -18,7 +18,7 @@ namespace {
 const auto kSecondOrderSine = [](auto&, auto x) { return sin(x[0]); };
 const double kSecondOrderNan = std::numeric_limits<double>::quiet_NaN();
 
-// sin, of Duals with a tangent of its own.
+// sin with a custom tangent for Duals.
 template <class F>
 GradcheckReport check_sine(F tangent) {
   SmoothFn f(kSecondOrderSine);

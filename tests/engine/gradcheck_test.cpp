@@ -10,7 +10,7 @@ using namespace fieldmark;
 namespace {
 enum class Wrong { none, factor, tiny, sign_of_one, assigns, nan, value, fresh, unfilled, spends };
 
-// y = exp(x) * scale, with a backward that is wrong in a chosen way: the checker itself is under test.
+// y = exp(x) * scale, with a backward that is wrong in a chosen way, to test the checker itself.
 Var<double> exp_with(Var<double> x, Wrong wrong, double scale = 1) {
   const Index n = x.shape().size();
   double* y = nullptr;
@@ -32,7 +32,7 @@ Var<double> exp_with(Var<double> x, Wrong wrong, double scale = 1) {
         dx[i] = d;
       else
         dx[i] += d;
-      if (wrong == Wrong::spends) y[i] = 0;  // what the backward needs once more
+      if (wrong == Wrong::spends) y[i] = 0;  // overwrites what the backward still needs
     }
   });
   return out;
@@ -58,7 +58,7 @@ TEST_CASE("gradcheck: passes a right backward and fails every wrong one") {
 namespace {
 enum class Subset { right, forgets_second, leaves_buffer };
 
-// y = a b, with a mistake that shows only where one of the two needs no gradient.
+// y = a b, with a mistake that shows only if one of the two needs no gradient.
 Var<double> product(Var<double> a, Var<double> b, Subset wrong) {
   const Index n = a.shape().size();
   double* y = nullptr;

@@ -16,7 +16,7 @@ namespace {
 
 const Tensor<double> kSmall({2, 2}, {1, 2, 3, 4});
 
-// An op whose backward makes an infinity, from values that are finite.
+// An op whose backward turns finite values into an infinity.
 Var<double> broken(Var<double> x) {
   double* y = nullptr;
   const Var<double> out = x.tape().output(x.shape(), &y, {x});
@@ -136,13 +136,13 @@ TEST_CASE("inspect: statistics of named values and gradients, over passes") {
     const Params<double> params(store);
     const auto weights = params.leaf(tape, w);
     params.leaf(tape, unused);
-    // w serves two ops, whose gradients arrive one after the other: x and 1 times what reaches y.
+    // w feeds two ops, whose gradients arrive one after the other: x and 1 times the gradient of y.
     const auto y = tape.name(weights * tape.name(tape.constant(x), "x") + weights, "y");
     tape.backward(sum(y * y));
   }
   const auto grads = inspector.gradient_stats();
   INFO(stats_table(grads));
-  REQUIRE(grads.size() == 2);  // none of a constant, and none that did not arrive
+  REQUIRE(grads.size() == 2);  // no gradients of constants or of unreached values
   // y = (3, -12), dL/dy = 2 y = (6, -24), dL/dw = dL/dy (x + 1) = (6, -72).
   CHECK((grads[0].name == "w" && grads[0].count == 4 && grads[0].mean == -33 && grads[0].largest == 72));
   CHECK(grads[0].rms == Approx(std::sqrt(2610.0)).epsilon(1e-15));

@@ -63,7 +63,7 @@ TEST_CASE("numerics: scattered numbers lie in their range, differ, and follow th
     CHECK((v >= -2 && v <= 3));
     mean += static_cast<double>(v) / 1000;
   }
-  CHECK(std::abs(mean - 0.5) < 0.2);  // deviation of a mean of 1000: 0.046
+  CHECK(std::abs(mean - 0.5) < 0.2);  // standard deviation of a mean of 1000: 0.046
 }
 
 TEST_CASE("numerics: values and gradients of one pass") {

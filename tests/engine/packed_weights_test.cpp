@@ -11,7 +11,7 @@
 using namespace fieldmark;
 
 namespace {
-// Values, dX and gradients of the parameters of one layer, with and without packed weights.
+// Values, dX and parameter gradients of one layer, with and without packed weights.
 template <class T>
 std::vector<T> pass(const Dense<T>& layer, const ParamStore<T>& store, const PackedWeights<T>* packed,
                     const Tensor<T>& x) {
@@ -115,10 +115,10 @@ TEST_CASE("packed_weights: in bf16 a layer's values and gradients are off by the
     }
     return error / largest;
   };
-  CHECK(worst(0, y) > 1e-5);  // it was rounded at all
+  CHECK(worst(0, y) > 1e-5);  // shows that rounding took place
   CHECK(worst(0, y) < 4e-3);
   CHECK(worst(y, dx) < 4e-3f);
-  CHECK(worst(dx, want.size()) == 0);  // dW comes from float numbers
+  CHECK(worst(dx, want.size()) == 0);  // dW is computed from float numbers
 }
 
 TEST_CASE("packed_weights: tables are rounded on request") {

@@ -18,7 +18,7 @@ const Tensor<double> kProductMatrix({2, 3}, {1, 2, 3, 4, 5, 6});
 
 // y = x M, with the Jacobian M^T.
 const auto product_map = [](auto& tape, auto x) { return matmul(x[0], tape.constant(kProductMatrix)); };
-// y = x A x^T with A = M M^T, of which the Hessian is A + A^T.
+// y = x A x^T with A = M M^T, whose Hessian is A + A^T.
 const auto product_form = [](auto& tape, auto x) {
   return sum(square(matmul(x[0], tape.constant(kProductMatrix))));
 };

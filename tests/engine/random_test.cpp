@@ -36,7 +36,7 @@ double correlation(const std::vector<double>& x, const std::vector<double>& y) {
 }
 }  // namespace
 
-// Vectors of Philox4x32-10 that its authors publish with Random123.
+// Test vectors of Philox4x32-10 that its authors publish with Random123.
 TEST_CASE("random: stream 0 is Philox4x32-10 with the seed as key") {
   CHECK(CounterRng(0).bits(0, 0) == Words{0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8});
   const std::uint64_t ones = ~std::uint64_t{0};
@@ -112,13 +112,14 @@ TEST_CASE("random: below is uniform, exact beyond 32 bits, and refuses an empty 
   const CounterRng rng(3);
   std::vector<int> counts(7);
   for (std::uint64_t i = 0; i < 70000; ++i) ++counts[static_cast<std::size_t>(rng.below(7, i))];
-  // Four deviations of a binomial count: sqrt(70000 * 6 / 49) = 92.6.
+  // Four standard deviations of a binomial count: sqrt(70000 * 6 / 49) = 92.6.
   for (int c : counts) CHECK(std::abs(c - 10000) < 4 * 92.6);
   for (std::uint64_t i = 0; i < 1000; ++i) {
     const auto w = rng.bits(i);
     const Index n = (Index{1} << 40) + 12345;
     const long double x = static_cast<long double>(w[0] | static_cast<std::uint64_t>(w[1]) << 32);
-    // A long double has 64 bits; the quotient's fraction is rounded, never its whole part but at 2^-24 odds.
+    // A long double has 64 bits: rounding affects the quotient's fraction, and its whole part only at odds of
+    // 2^-24.
     const auto want = static_cast<Index>(std::floor(std::ldexp(x * static_cast<long double>(n), -64)));
     CHECK(std::abs(rng.below(n, i) - want) <= 1);
     CHECK(rng.below(1, i) == 0);

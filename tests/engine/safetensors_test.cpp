@@ -15,7 +15,7 @@ using namespace fieldmark;
 
 namespace {
 
-// A file as the format's description has it: nothing of the writer is used.
+// Builds a file from the format's description alone, without the writer.
 std::string file_of(const std::string& header, const std::string& data) {
   std::string length(8, '\0');
   for (std::size_t i = 0; i < 8; ++i) length[i] = static_cast<char>(header.size() >> (8 * i) & 255);
@@ -84,7 +84,7 @@ TEST_CASE("safetensors: the bytes are those of the format's description, wide el
 }
 
 TEST_CASE("safetensors: half and bfloat16 widen exactly") {
-  // 1, -2, the largest, the smallest subnormal, infinity, -0 of half.
+  // 1, -2, the largest number, the smallest subnormal, infinity and -0 in half precision.
   const auto half = parse(file_of(one("\"F16\"", "[6]", "[0,12]"),
                                   std::string("\x00\x3c\x00\xc0\xff\x7b\x01\x00\x00\x7c\x00\x80", 12)))
                         .f32("x");

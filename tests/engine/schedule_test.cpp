@@ -9,7 +9,7 @@
 using namespace fieldmark;
 
 namespace {
-// Step sizes of a timed run whose steps take what `seconds_of_step` says.
+// Returns the step sizes of a timed run whose step times are given by `seconds_of_step`.
 template <class F>
 std::pair<std::vector<double>, Index> timed_run(ScheduleOptions options, F seconds_of_step) {
   Schedule schedule(options);
@@ -83,7 +83,7 @@ TEST_CASE("schedule: a timed run is planned anew where the step_time changes aft
         CHECK(now < 1.03 * options.seconds);
         CHECK(now > 0.89 * options.seconds);
         CHECK(n == schedule.total());
-        // The step size ends where that of a run by steps does.
+        // The final step size equals that of a run limited by steps.
         ScheduleOptions fixed = options;
         fixed.steps = n;
         CHECK(schedule.lr(n - 1) == Schedule(fixed).lr(n - 1));
@@ -112,7 +112,7 @@ TEST_CASE("schedule: a resumed timed run keeps its total") {
   s = Schedule({.seconds = 60});
   s.resume(0);
   for (Index n = 480; n < 483; ++n) s.observe(n, 59.0 + static_cast<double>(n - 480));
-  CHECK(s.total() == 483);  // not fixed before, and its time is over
+  CHECK(s.total() == 483);  // it was not fixed before, and the time is over
   Schedule fixed({.steps = 300});
   fixed.resume(500);
   CHECK(fixed.total() == 300);

@@ -9,7 +9,7 @@
 using namespace fieldmark;
 
 namespace {
-// A body whose sum in float depends on the order of additions.
+// A body whose float sum depends on the order of additions.
 std::vector<float> run(int n_threads, Index chunks) {
   const ScopedThreads scope(n_threads);
   ShardedLoop<float> loop(16, 3);
@@ -18,7 +18,7 @@ std::vector<float> run(int n_threads, Index chunks) {
   const double loss = loop.run(
       chunks,
       [&](Index c, Index shard, Tape<float>&, float* g) {
-        // Checks of Catch2 are not for several threads: what a chunk found is checked below.
+        // Catch2's checks are not thread-safe: the findings of a chunk are checked below.
         shards[at(c)] = shard;
         for (int k = 0; k < 3; ++k) g[k] += std::sin(static_cast<float>(c * 3 + k)) * 1e3f;
         return static_cast<double>(c);

@@ -8,7 +8,7 @@
 
 using namespace simd;
 
-// At the level that tests are compiled for; those of the kernels run every level.
+// Runs at the level that tests are compiled for; the kernel tests run every level.
 namespace {
 float exp_of(float x) {
   float lanes[kLanes<float>];

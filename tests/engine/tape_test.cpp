@@ -12,7 +12,7 @@
 using namespace fieldmark;
 
 namespace {
-// y = x^2, the smallest op there is.
+// y = x^2, the smallest possible op.
 Var<double> square(Var<double> x) {
   const Index n = x.shape().size();
   double* y = nullptr;

@@ -87,7 +87,7 @@ TEST_CASE("tensor_stats: merged, they are those of all elements") {
   CHECK(s.mean == Approx(want.mean).epsilon(1e-14));
   CHECK(s.rms == Approx(want.rms).epsilon(1e-14));
   CHECK(s.largest == 9);
-  // Nothing finite on either side leaves the other as it is.
+  // If one side has no finite numbers, the merge keeps the figures of the other.
   s.merge(of(std::vector<double>{nan}));
   CHECK((s.largest == 9 && s.rms == Approx(want.rms).epsilon(1e-14) && s.nonfinite == 4));
   TensorStats empty;

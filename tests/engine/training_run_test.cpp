@@ -8,7 +8,7 @@ using namespace fieldmark;
 
 namespace {
 
-// Moves x to 1 and y to its target, by gradients of squares.
+// Moves x to 1 and y to its target, by gradients of squared errors.
 struct Fit final : TrainingRun {
   explicit Fit(ScheduleOptions schedule, float to = 2, double weight = 1)
       : TrainingRun(schedule), target(to), weight_of_y(weight) {
@@ -73,9 +73,9 @@ const ScheduleOptions kTen{.steps = 10, .lr = 0.1};
 TEST_CASE("training_run: steps are Adam's, with the schedule's step size times a range's factor") {
   Fit run(kTen);
   run.step(0);
-  // The first step of Adam is the step size, against the sign of the gradient.
+  // Adam's first step has the length of the step size, against the gradient's sign.
   CHECK(std::abs(run.store.values()[0] - 0.05f) < 1e-6f);
-  CHECK(run.store.values()[2] == 0);  // its turn comes at every second step
+  CHECK(run.store.values()[2] == 0);  // it is updated every second step
   CHECK(std::abs(run.other.values()[0] - 0.1f) < 1e-6f);
   CHECK(run.figure() == 3 + 4);
   run.step(0);
@@ -97,7 +97,7 @@ TEST_CASE("training_run: a run that is saved and restored ends with the same bit
        {"x", "x.mean", "x.mean_square", "x.gradient", "other/y", "other/y.mean", "run/steps", "run/count",
         "run/seen", "run/best", "run/planned", "run/curve", "bits"})
     CHECK(file.has(name));
-  CHECK(file.f32("x.gradient")[2] != 0);  // waits for its turn
+  CHECK(file.f32("x.gradient")[2] != 0);  // waits for its update
   CHECK_FALSE(file.has("other/y.gradient"));
   Fit second(kTen);
   second.restore(folder / "c");
@@ -165,7 +165,7 @@ TEST_CASE(
   CHECK(second.times.front() >= first.seconds());
   CHECK(second.seconds() >= second.times.back());
   CHECK_THAT(second.curve(), Contains("seconds,steps,figure\n") && Contains(",1,") && Contains(",10,"));
-  CHECK(second.drive({}));  // has all its steps
+  CHECK(second.drive({}));  // has taken all its steps
   CHECK(second.times.size() == 6);
 }
 

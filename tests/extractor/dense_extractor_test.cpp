@@ -17,7 +17,7 @@ struct Reading {
   bool operator==(const Reading&) const = default;
 };
 
-// Forward, and the parameters' gradient from all-ones seeds.
+// Runs the forward pass, and computes the parameters' gradient from all-ones seeds.
 Reading read(const DenseExtractor<float>& net, const ParamStore<float>& store, const Tensor<float>& image) {
   Reading r;
   r.grads.resize(static_cast<std::size_t>(store.size()));
@@ -59,7 +59,7 @@ TEST_CASE("dense_extractor: an odd last row and column are not looked at") {
 }
 
 TEST_CASE("dense_extractor: a place knows where it is, near and far") {
-  // A change of one pixel moves its own place or a neighbour most, and by the coarse levels every place.
+  // Changing one pixel moves its own place or a neighbour most, and through the coarse levels every place.
   ParamStore<double> store;
   const DenseExtractor<double> net(store, "net", {.classes = 5, .base = 8}, 3);
   auto image = uniform({1, 32, 32, 3}, 0.4, 0.6, 1);
@@ -118,7 +118,7 @@ TEST_CASE("dense_extractor: seeds decide the weights") {
   DenseExtractor<float>(c, "net", {.classes = 3, .base = 8}, 4);
   CHECK(std::ranges::equal(a.values(), b.values()));
   CHECK(!std::ranges::equal(a.values(), c.values()));
-  // Layers of one shape start apart.
+  // Layers of the same shape start with different weights.
   CHECK(!std::ranges::equal(a.values(a.find("net/down6/conv/weight")),
                             a.values(a.find("net/down7/conv/weight"))));
 }

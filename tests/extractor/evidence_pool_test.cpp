@@ -11,7 +11,7 @@ using extractor::pooled_bits;
 
 namespace {
 
-// Row by row, in double: softmax, then the sums as they stand in the header.
+// Computes row by row in double: softmax, then the sums as documented in the header.
 struct Plain {
   std::vector<double> evidence, share;  // [cells]
   double foreground = 0;
@@ -75,7 +75,8 @@ TEST_CASE("evidence_pool: pooled bits are what plain loops give") {
 }
 
 TEST_CASE("evidence_pool: certain places give the bits, an empty image gives 0") {
-  // 4 places, 2 cells, 2 bits: places 0 and 1 show cell 0, places 2 and 3 cell 1, both with the sign of a 1.
+  // 4 places, 2 cells, 2 bits: places 0 and 1 show cell 0, places 2 and 3 show cell 1, both with the sign of
+  // a 1.
   const std::vector<float> code{-1, 0, 0, 1};
   const Tensor<float> sign({4}, {-90, -90, 90, 90});
   Tensor<float> index({4, 3}, -200.f);
@@ -129,7 +130,7 @@ TEST_CASE("evidence_pool: evidence of cells is what plain loops give, and is add
         CHECK(evidence[c] ==
               Approx(2 + want.evidence[c] / std::pow(want.share[c] + 0.25, 0.3)).epsilon(1e-12));
     }
-  // Logits that overflow a plain exp.
+  // Logits that would overflow a plain exp.
   const float sign[] = {1000}, index[] = {1e30f, -1e30f, 0};
   double evidence[] = {0, 0};
   cell_evidence(sign, index, 1, 2, evidence);
@@ -138,7 +139,7 @@ TEST_CASE("evidence_pool: evidence of cells is what plain loops give, and is add
 }
 
 TEST_CASE("evidence_pool: a cell of many places counts less than each of them alone, a sliver hardly") {
-  // Cell 0 shows in 100 places, cell 1 in 4, cell 2 in hardly one, all with the sign of a 1.
+  // Cell 0 shows in 100 places, cell 1 in 4, cell 2 in almost none, all with the sign of a 1.
   const Index counts[] = {100, 4, 1};
   Tensor<float> sign({105}, 60.f), index({105, 4}, -200.f);
   for (Index p = 0, cell = 0, left = counts[0]; p < 105; ++p, --left) {

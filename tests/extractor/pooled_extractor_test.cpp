@@ -20,7 +20,7 @@ TEST_CASE("pooled_extractor: the released network's layers") {
 }
 
 TEST_CASE("pooled_extractor: one layer by hand, on a patch of one size") {
-  // Weights 0 but the window's centre: each channel is normalised, cut at 0 and averaged.
+  // Weights are 0 except at the window's centre: each channel is normalised, clamped at 0 and averaged.
   ParamStore<double> store;
   const PooledExtractor<double> net(store, "h", {.n_bits = 1, .layers = 1}, 1);
   const auto w = store.values(store.find("h/0/conv/weight"));
@@ -99,7 +99,7 @@ TEST_CASE("pooled_extractor: running statistics follow the batch's, then an imag
 TEST_CASE("pooled_extractor: gradient in images and every parameter") {
   ParamStore<double> store;
   const PooledExtractor<double> net(store, "h", {.n_bits = 2, .channels = 3, .layers = 2}, 1);
-  // ReLUs well open or shut: differences must not step over a kink.
+  // ReLUs are well open or shut: finite differences must not step over a kink.
   for (const auto& e : store.entries())
     if (e.name.ends_with("/beta"))
       for (Index i = 0; i < e.shape.size(); ++i)

@@ -1,7 +1,8 @@
-// Gives the readers of foreign files mutations of valid ones: each must be read or refused with an Error.
+// Feeds mutations of valid files to the readers of foreign formats: each must be read or refused with an
+// Error.
 //   fuzz_readers [INPUTS = 20000] [SEED = 1] [FIRST = 0]
-// Input i depends on SEED and i only, so `fuzz_readers 1 SEED i` repeats one. Crashes and leaks are for the
-// sanitizers to see (preset asan).
+// Input i depends only on SEED and i, so `fuzz_readers 1 SEED i` repeats one. The sanitizers (preset asan)
+// detect crashes and leaks.
 #include <fieldmark/core/error.h>
 #include <fieldmark/core/files.h>
 #include <fieldmark/engine/safetensors.h>
@@ -44,7 +45,7 @@ using namespace fieldmark::nerf;
 namespace {
 using Random = std::mt19937_64;
 constexpr double kSecondsForOne = 2;
-constexpr rlim_t kMemory = rlim_t{2} << 30;  // a file of kilobytes may not take more
+constexpr rlim_t kMemory = rlim_t{2} << 30;  // a file of kilobytes must not need more
 
 const std::string kTransforms =
     R"({"camera_angle_x": 0.75, "fl_x": 343.88, "fl_y": 343.6, "k1": 0.0578, "k2": -0.08,
@@ -62,7 +63,7 @@ std::string safetensors_file() {
   return packed(static_cast<std::uint64_t>(header.size())) + header + std::string(33, '\x3F');
 }
 
-// A lens that was read is also used, on a small image.
+// Also uses a lens that was read, on a small image.
 void use(const Intrinsics& i) {
   const Camera c = i.camera({}, i.width, i.height).scaled(16, 12);
   const Crop part = covered_part(c, i.lens);
@@ -98,7 +99,7 @@ class MemoryFile {
   int file_;
 };
 
-// The bytes of the file that `write` leaves at a path.
+// Returns the bytes of the file that `write` writes to a path.
 template <class Write>
 std::string written(Write write) {
   const TemporaryFolder folder;
@@ -127,7 +128,7 @@ std::string mp4() {
   return text_of(writer.finish());
 }
 
-// A run of embed that a checkpoint is read for.
+// The embed run that a checkpoint is read for.
 struct EmbedRun {
   watermark::Owner owner = small_owner();
   std::vector<watermark::CachedView> views =
@@ -139,7 +140,7 @@ struct Format {
   const char* name;
   std::vector<std::string> samples;
   std::function<void(const std::string&)> read;
-  bool safetensors = false;  ///< mutations keep to the header, whose length is set anew
+  bool safetensors = false;  ///< mutate only the header, and update its length
 };
 
 template <class Parse>
@@ -147,7 +148,7 @@ std::function<void(const std::string&)> both(Parse parse, ColmapFormat format) {
   return [=](const std::string& bytes) { parse(bytes, format, "input"); };
 }
 
-// Formats whose libraries this build has.
+// Returns the formats whose libraries this build has.
 std::vector<Format> media_formats() {
   const auto image = [](const std::string& b) { decode_image(bytes_of(b), "input"); };
   std::vector<Format> formats;
@@ -235,7 +236,7 @@ std::vector<Format> formats() {
          const int orientation = exif_orientation(bytes_of(b));
          if (orientation < 1 || orientation > 8) throw std::logic_error("no orientation");
        }},
-      // Brought to its canonical form first: otherwise nearly every mutation would end there.
+      // Converted to its canonical form first: otherwise nearly every mutation would fail that check.
       {"evidence.json",
        {watermark::evidence_json(small_evidence(), watermark::public_key(test_key(5)),
                                  {{"report.html", "f"}})},
@@ -299,7 +300,7 @@ void mutate(std::string& s, const std::string& other, Random& random) {
   }
 }
 
-// Mutates the header of a safetensors file and gives it its new length, so that what follows fits.
+// Mutates the header of a safetensors file and updates its length, so that the data still fits.
 void mutate_header(std::string& s, const std::string& other, Random& random) {
   std::uint64_t length = 0;
   std::memcpy(&length, s.data(), sizeof length);
@@ -312,9 +313,9 @@ struct Outcome {
   std::size_t read = 0, refused = 0;
 };
 
-// False if something other than an Error came out, or it took too long.
+// Returns false if it threw something other than an Error, or took too long.
 bool try_one(const Format& format, const std::string& input, Outcome& outcome) {
-  const std::clock_t begin = std::clock();  // of this process: others may hold the machine
+  const std::clock_t begin = std::clock();  // time of this process: others may use the CPU
   try {
     format.read(input);
     ++outcome.read;

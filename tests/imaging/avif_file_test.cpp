@@ -27,7 +27,8 @@ TEST_CASE("avif_file: turned and mirrored as the file asks for it") {
   if (!has_avif()) return;
   const auto x = decode_image(from_base64(kAvifTurned), "x"), q = quarters();
   REQUIRE(x.shape == Shape{16, 8, 3});
-  // Counterclockwise, the right side is above; then above and below are exchanged: a transposition.
+  // After the counterclockwise turn the right side is on top; then top and bottom are exchanged: a
+  // transposition.
   for (Index y = 0; y < 16; ++y)
     for (Index column = 0; column < 8; ++column)
       for (Index c = 0; c < 3; ++c) CHECK(x[(y * 8 + column) * 3 + c] == q[(column * 16 + y) * 3 + c]);

@@ -12,7 +12,7 @@ using namespace fieldmark;
 namespace {
 constexpr Canvas::Ink kBlack{0, 0, 0};
 
-// Covered pixels, in fractions.
+// Returns the covered area in pixels, fractions included.
 double covered_area(const Canvas& canvas) {
   double sum = 0;
   for (const float v : canvas.image().data) sum += 1 - static_cast<double>(v);
@@ -31,7 +31,7 @@ TEST_CASE("canvas: a disc and a line have their areas, and lie where they were d
   Canvas slanted(40, 60);
   slanted.line({10, 10}, {40, 30}, 3, kBlack);
   CHECK(covered_area(slanted) == Approx(3 * std::hypot(30, 20) + std::numbers::pi * 1.5 * 1.5).epsilon(0.01));
-  // Along the middle of a row: one pixel thick, half of none beside it.
+  // Along the middle of a row: one pixel thick, with nothing on the neighbouring rows.
   Canvas row(5, 9);
   row.line({2.5, 2.5}, {6.5, 2.5}, 1, {0.25f, 0.5f, 0.75f});
   for (Index k = 0; k < 3; ++k)

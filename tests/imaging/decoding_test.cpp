@@ -8,7 +8,7 @@ TEST_CASE("decoding: the area that a file may ask for grows with its bytes") {
   CHECK_NOTHROW(check_area(8192, 8192, 0));
   CHECK_THROWS_WITH(check_area(8192, 8193, 0), Contains("8192 x 8193 pixels; at most 67108864 are read"));
   CHECK_NOTHROW(check_area(8192, 8193, 2048));
-  CHECK_NOTHROW(check_area(16320, 12240, 40'000'000));  // of a telephone
+  CHECK_NOTHROW(check_area(16320, 12240, 40'000'000));  // a phone's camera
   for (const std::int64_t side : {std::int64_t{0}, std::int64_t{-1}, std::int64_t{1} << 40})
     CHECK_THROWS_AS(check_area(side, 1, 100), Undecodable);
 }

@@ -3,12 +3,12 @@
 #include <string>
 #include <vector>
 
-/// Where a point of a chart was drawn.
+/// The position at which a chart's point was drawn.
 struct Place {
   int x, y;
 };
 
-/// All points of an SVG file, in its order.
+/// Returns all points of an SVG file, in file order.
 inline std::vector<Place> places(const std::string& svg) {
   std::vector<Place> found;
   const std::regex circle("<circle [^>]*>"), x("cx=\"(\\d+)\""), y("cy=\"(\\d+)\"");

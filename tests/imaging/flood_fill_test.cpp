@@ -7,7 +7,7 @@
 using namespace fieldmark;
 
 namespace {
-// Pixels from # to # of an image in rows, in ascending order.
+// Fills an image given in rows from the pixels `#`; returns the filled pixels in ascending order.
 std::vector<Index> filled(std::string_view image, Index width, std::vector<Index> starts,
                           Neighbours neighbours = Neighbours::four) {
   auto found = flood_fill(

@@ -32,7 +32,7 @@ TEST_CASE("histogram_chart: a bar for each bin that is not empty, higher by the 
   const auto found = bins(svg);
   REQUIRE(found.size() == 4);
   for (const auto& bin : found) CHECK(bin.y + bin.height == 64 + 220);
-  // The axis spans 0.5 to 1000: 220 / log10(2000) pixels for ten times.
+  // The axis spans 0.5 to 1000: 220 / log10(2000) pixels per decade.
   const double decade = 220 / std::log10(2000.);
   CHECK(found[0].height == Approx(decade * std::log10(2.)).margin(1));
   CHECK(found[2].height - found[1].height == Approx(decade).margin(1.5));

@@ -23,14 +23,14 @@ TEST_CASE("image_format: the content decides, not the name") {
   write_png(folder / "a.jpg", Tensor<float>({2, 2, 3}));
   CHECK(image_format(folder / "a.jpg") == png);
   CHECK(image_format(encode_jpeg(Tensor<float>({8, 8, 3}), 50)) == jpeg);
-  CHECK(image_format(text("RIFF\x10\0\0\0WEBPVP8 ")) == unknown);  // the literal ends at its first 0
+  CHECK(image_format(text("RIFF\x10\0\0\0WEBPVP8 ")) == unknown);  // the literal ends at its first 0 byte
   CHECK(image_format(text(std::string_view("RIFF\x10\0\0\0WEBPVP8 ", 16))) == webp);
   CHECK(image_format(from_base64(kAvif)) == avif);
   CHECK(image_format(from_base64(kHeic)) == heic);
   for (const auto sample : {kWebm, kMovTurned, kMovVariable, kAudio})
     CHECK(image_format(from_base64(sample)) == video);
   CHECK(image_format(text(std::string_view("\0\0\0\x08wide\0\0\0\0mdat", 16))) == video);
-  // A general major brand: the compatible ones tell.
+  // With a general major brand, the compatible brands decide.
   const std::string_view head(
       "\0\0\0\x18"
       "ftypmif1\0\0\0\0mif1",

@@ -22,7 +22,7 @@ double rms(const Tensor<float>& a, const Tensor<float>& b, Index channel) {
   for (Index i = channel; i < a.size(); i += a.shape[2]) sum += std::pow(static_cast<double>(a[i] - b[i]), 2);
   return std::sqrt(sum * static_cast<double>(a.shape[2]) / static_cast<double>(a.size()));
 }
-/// Smooth colours, as in a training image.
+/// Returns smooth colours, like those of a training image.
 Tensor<float> gradient(Index height, Index width, Index channels) {
   Tensor<float> x({height, width, channels});
   for (Index i = 0; i < x.size(); ++i) {
@@ -50,7 +50,7 @@ TEST_CASE("image: every byte and channel count survives a PNG file") {
   CHECK(folder.entries() == 1);
 }
 
-// Two grey pixels, 0x12 and 0xef, in an uncompressed deflate block, put together with Python's zlib.
+// Two grey pixels, 0x12 and 0xef, in an uncompressed deflate block, built with Python's zlib.
 TEST_CASE("image: a PNG that another program wrote") {
   const auto png = bytes_from(
       {0x89, 0x50, 0x4e, 0x47, 0xd,  0xa,  0x1a, 0xa, 0, 0,    0,    0xd,  0x49, 0x48, 0x44, 0x52, 0,    0,
@@ -115,7 +115,7 @@ TEST_CASE("image: a PNG file is read without its end chunk, and with other data 
   const auto x = quantize8(uniform<float>({40, 33, 3}, 0, 1, 5));
   write_png(folder / "a.png", x);
   const auto png = read_bytes(folder / "a.png");
-  // The end chunk takes 12 bytes, the checksum before it 4.
+  // The end chunk takes 12 bytes, the checksum before it takes 4.
   for (std::size_t cut = 1; cut <= 16; ++cut)
     CHECK(decode_image(std::span(png).first(png.size() - cut), "cut").data == x.data);
   for (std::size_t cut = 17; cut < 80; ++cut)
@@ -135,7 +135,7 @@ TEST_CASE("image: a header alone does not take gigabytes") {
                     Contains("wide: expected") && Contains("16392 x 16392 pixels; at most"));
 }
 
-// Values 0x1234 and 0xfffe, put together with Python's zlib.
+// Values 0x1234 and 0xfffe, built with Python's zlib.
 TEST_CASE("image: a PNG of 16 bits keeps both bytes") {
   const auto x = decode_image(
       bytes_from({0x89, 0x50, 0x4e, 0x47, 0xd,  0xa,  0x1a, 0xa,  0,    0,    0,    0xd,  0x49, 0x48, 0x44,
@@ -167,7 +167,7 @@ TEST_CASE("image: JPEG has 4:2:0 chroma and the standard tables at quality 50") 
   // SOI and APP0 take 20 bytes, then DQT: marker, length, table 0 in zigzag order.
   CHECK((byte(20) == 0xff && byte(21) == 0xdb));
   CHECK((byte(25) == 16 && byte(26) == 11 && byte(27) == 12 && byte(88) == 99));
-  // SOF0 gives the size, and sampling 2 x 2 for luminance, 1 x 1 for both chroma.
+  // SOF0 holds the size, and sampling 2 x 2 for luminance, 1 x 1 for both chroma components.
   const std::size_t sof = 20 + 2 + 132;
   CHECK((byte(sof) == 0xff && byte(sof + 1) == 0xc0));
   CHECK((byte(sof + 6) == 24 && byte(sof + 8) == 40));

@@ -14,8 +14,9 @@ inline void append(std::vector<std::byte>& to, const std::vector<std::byte>& mor
   to.insert(to.end(), more.begin(), more.end());
 }
 
-/// A JPEG file with an EXIF segment behind its start: one directory with a foreign entry and Orientation.
-/// @param big  bytes of the numbers from high to low ("MM") or from low to high ("II")
+/// Returns a JPEG file with an EXIF segment after its start: one directory with a foreign entry and
+/// Orientation.
+/// @param big  byte order of the numbers: high to low ("MM") or low to high ("II")
 inline std::vector<std::byte> with_orientation(const std::vector<std::byte>& jpeg, int orientation,
                                                bool big) {
   std::vector<std::byte> tiff =

@@ -8,11 +8,11 @@
 using namespace fieldmark;
 
 namespace {
-// A frame of one component, number 7.
+// Returns a frame with one component, number 7.
 std::vector<std::byte> head(int frame) {
   return bytes_from({0xff, 0xd8, 0xff, frame, 0, 11, 8, 0, 8, 0, 8, 1, 7, 0x11, 0});
 }
-// A scan of it: coefficients first to last, to a bit.
+// Returns a scan of that component: coefficients first to last, to a bit.
 std::vector<std::byte> scan(int first, int last, int bit) {
   return bytes_from({0xff, 0xda, 0, 8, 1, 7, 0, first, last, bit, 0x12, 0xff, 0, 0x34});
 }
@@ -52,11 +52,11 @@ TEST_CASE("jpeg_segments: a progressive file is whole when each coefficient has 
   CHECK(!jpeg_segments(file).sends_every_coefficient());
   append(file, scan(0, 0, 0x01));
   append(file, scan(1, 63, 0x00));
-  CHECK(!jpeg_segments(file).sends_every_coefficient());  // the lowest bit of the mean is to come
+  CHECK(!jpeg_segments(file).sends_every_coefficient());  // the lowest bit of the mean is still missing
   append(file, scan(0, 0, 0x10));
   CHECK(jpeg_segments(file).sends_every_coefficient());
   auto baseline = head(0xc0);
   CHECK(!jpeg_segments(baseline).sends_every_coefficient());
-  append(baseline, scan(0, 0, 0));  // some writers leave the numbers of a baseline scan empty
+  append(baseline, scan(0, 0, 0));  // some writers leave these numbers of a baseline scan empty
   CHECK(jpeg_segments(baseline).sends_every_coefficient());
 }

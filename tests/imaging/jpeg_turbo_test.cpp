@@ -17,7 +17,7 @@ bool has_jpeg() {
     CHECK_THROWS_WITH(encode_jpeg(quarters(), 95), Contains("install libjpeg62-turbo-dev and build again"));
   return library_or_skip(has_jpeg_turbo(), "the test of libjpeg-turbo", "libjpeg62-turbo-dev");
 }
-// Sampling of luma: the byte behind the first component's number in SOF0.
+// Returns the luma sampling: the byte after the first component's number in SOF0.
 int sampling(const std::vector<std::byte>& file) {
   for (std::size_t i = 0; i + 11 < file.size(); ++i)
     if (file[i] == std::byte{0xff} && file[i + 1] == std::byte{0xc0})
@@ -29,7 +29,7 @@ double rms(const Tensor<float>& a, const Tensor<float>& b) {
   for (Index i = 0; i < a.size(); ++i) sum += std::pow(static_cast<double>(a[i] - b[i]), 2);
   return std::sqrt(sum / static_cast<double>(a.size()));
 }
-// Stripes of one pixel in chroma alone, nearly.
+// Stripes of one pixel, almost in chroma alone.
 Tensor<float> stripes() {
   Tensor<float> x({32, 32, 3});
   for (Index i = 0; i < x.size(); ++i) x[i] = i / 3 % 2 == i % 3 % 2 ? 0.3f : 0.6f;

@@ -31,7 +31,7 @@ TEST_CASE("line_chart: dashes, texts that cannot break out, and points that cann
   CHECK_THAT(svg, !Contains(">empty<"));
   const auto at = places(svg);
   REQUIRE(at.size() == 2);
-  CHECK(at[1].y - at[0].y == 64);  // 30 is drawn at 50: 60 is a fifth of the height above
+  CHECK(at[1].y - at[0].y == 64);  // 30 is drawn at 50: 60 is a fifth of the height above it
 }
 
 TEST_CASE("line_chart: few places have their numbers, many share round ones, and names have room") {

@@ -38,7 +38,7 @@ PlainImage fire(const PlainImage& x, const SafetensorsFile& f, const std::string
                       plain_conv(s, f, name + ".expand3x3", 1, 1));
 }
 
-// The graphs as they are written down for the weights.
+// The networks as documented for the weights.
 std::vector<PlainImage> plain_features(PlainImage x, const SafetensorsFile& f, LpipsNetwork network) {
   std::vector<PlainImage> taps;
   const auto tap = [&](PlainImage y) { taps.push_back(x = std::move(y)); };
@@ -163,8 +163,8 @@ TEST_CASE("lpips: equal to the reference values on six pairs, whole, per layer a
 }
 
 TEST_CASE("lpips: gradient in both images") {
-  // Each colour of an image moves by a number. Steps are small: kinks of ReLUs and pooling windows lie close
-  // together.
+  // Each colour channel of an image moves by a number. Steps are small because kinks of ReLUs and pooling
+  // windows lie close together.
   for (const LpipsNetwork network : kNetworks) {
     const Lpips<double> lpips(weights_of(network), network);
     const Index side = lpips.smallest();
@@ -181,7 +181,7 @@ TEST_CASE("lpips: gradient in both images") {
 TEST_CASE("lpips: a missing or misshapen tensor is named with its file and both shapes") {
   for (const LpipsNetwork network : kNetworks)
     for (auto lacking = weights_of(network); !lacking.tensors.empty();) {
-      // From the last on, so that each is the first that is missing of those read in order.
+      // Removes tensors from the last on, so that each is the first missing one in reading order.
       const WeightTensor t = lpips_tensors(network)[lacking.tensors.size() - 1];
       lacking.tensors.pop_back();
       CHECK_THROWS_WITH(Lpips<float>(lacking, network), "[weights] random.safetensors: tensor \"" + t.name +
@@ -194,7 +194,7 @@ TEST_CASE("lpips: a missing or misshapen tensor is named with its file and both 
       Lpips<float>(wrong, LpipsNetwork::alex),
       "[weights] random.safetensors: tensor \"lin3.weight\": expected F32 [1, 256, 1, 1], found "
       "F32 [1, 255, 1, 1]");
-  // The other network's file.
+  // The other network's weight file.
   CHECK_THROWS_WITH(Lpips<float>(weights_of(LpipsNetwork::squeeze), LpipsNetwork::alex),
                     Contains("\"features.0.weight\": expected F32 [64, 3, 11, 11], found F32 [64, 3, 3, 3]"));
 }

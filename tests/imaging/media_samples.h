@@ -1,5 +1,6 @@
 #pragma once
-// Small files of formats that no writer here makes, by avifenc 0.11, heif-enc 1.15 and ffmpeg 5.1, as base64.
+// Small files in formats that this project does not write, made by avifenc 0.11, heif-enc 1.15 and ffmpeg
+// 5.1, as base64.
 #include <fieldmark/engine/tensor.h>
 
 #include <cstddef>
@@ -19,8 +20,8 @@ inline std::vector<std::byte> from_base64(std::string_view text) {
   return bytes;
 }
 
-/// The image of the still files, [8, 16, 3]: quarters of plain colours, numbered 0 upper left, 1 upper right,
-/// 2 lower left, 3 lower right.
+/// Returns the image of the still files, [8, 16, 3]: plain-coloured quarters, numbered 0 upper left, 1 upper
+/// right, 2 lower left, 3 lower right.
 inline fieldmark::Tensor<float> quarters() {
   constexpr int kColours[4][3] = {{200, 30, 40}, {20, 180, 60}, {40, 50, 220}, {250, 240, 230}};
   fieldmark::Tensor<float> image({8, 16, 3});
@@ -31,7 +32,8 @@ inline fieldmark::Tensor<float> quarters() {
   return image;
 }
 
-/// Frame k of the clips, 0 to 7, [16, 32, 3]: the left half changes, the quarters at the right do not.
+/// Returns frame k of the clips, 0 to 7, [16, 32, 3]: the left half changes, the quarters on the right do
+/// not.
 inline fieldmark::Tensor<float> clip_frame(int k) {
   const int left[] = {20 + 25 * k, 120, 200 - 20 * k};
   constexpr int kAbove[] = {250, 40, 40}, kBelow[] = {40, 220, 60};
@@ -43,7 +45,7 @@ inline fieldmark::Tensor<float> clip_frame(int k) {
   return image;
 }
 
-/// quarters(), without loss.
+/// quarters(), lossless.
 inline constexpr std::string_view kAvif =
     "AAAAIGZ0eXBhdmlmAAAAAGF2aWZtaWYxbWlhZk1BMUEAAADybWV0YQAAAAAAAAAoaGRscgAAAAAAAAAAcGljdAAAAAAAAAAAAAAA"
     "AGxpYmF2aWYAAAAADnBpdG0AAAAAAAEAAAAeaWxvYwAAAABEAAABAAEAAAABAAABGgAAAEEAAAAoaWluZgAAAAAAAQAAABppbmZl"
@@ -51,7 +53,7 @@ inline constexpr std::string_view kAvif =
     "djFDgSAAAAAAABNjb2xybmNseAABAA0AAIAAAAAXaXBtYQAAAAAAAAABAAEEAQKDBAAAAEltZGF0EgAKCDgMv7CAhoAQMjMQAADe"
     "0t/FD+Hx/czN2KhguQjhdbpg52EbtOSUTRZdRDa3e4aCNhK7uZ/dslRp6OGL6Pg=";
 
-/// The same with irot 1 and imir 0: counterclockwise by 90 degrees, then top and bottom exchanged.
+/// kAvif with irot 1 and imir 0: turned counterclockwise by 90 degrees, then top and bottom exchanged.
 inline constexpr std::string_view kAvifTurned =
     "AAAAIGZ0eXBhdmlmAAAAAGF2aWZtaWYxbWlhZk1BMUEAAAEGbWV0YQAAAAAAAAAoaGRscgAAAAAAAAAAcGljdAAAAAAAAAAAAAAA"
     "AGxpYmF2aWYAAAAADnBpdG0AAAAAAAEAAAAeaWxvYwAAAABEAAABAAEAAAABAAABLgAAAEEAAAAoaWluZgAAAAAAAQAAABppbmZl"
@@ -59,7 +61,7 @@ inline constexpr std::string_view kAvifTurned =
     "djFDgSAAAAAAABNjb2xybmNseAABAA0AAIAAAAAJaXJvdAEAAAAJaW1pcgAAAAAZaXBtYQAAAAAAAAABAAEGAQKDBIWGAAAASW1k"
     "YXQSAAoIOAy/sICGgBAyMxAAAN7S38UP4fH9zM3YqGC5COF1umDnYRu05JRNFl1ENrd7hoI2Eru5n92yVGno4Yvo+A==";
 
-/// The same in 10 bits.
+/// kAvif in 10 bits.
 inline constexpr std::string_view kAvifDeep =
     "AAAAIGZ0eXBhdmlmAAAAAGF2aWZtaWYxbWlhZk1BMUEAAADybWV0YQAAAAAAAAAoaGRscgAAAAAAAAAAcGljdAAAAAAAAAAAAAAA"
     "AGxpYmF2aWYAAAAADnBpdG0AAAAAAAEAAAAeaWxvYwAAAABEAAABAAEAAAABAAABGgAAAEcAAAAoaWluZgAAAAAAAQAAABppbmZl"
@@ -67,7 +69,7 @@ inline constexpr std::string_view kAvifDeep =
     "djFDgSBAAAAAABNjb2xybmNseAABAA0AAIAAAAAXaXBtYQAAAAAAAAABAAEEAQKDBAAAAE9tZGF0EgAKCDgMv7GAhoAQMjkQAADe"
     "0t/E7uNon9m1TRioVNvRjhdKBQDHYOO+aEk65Gx9RDYLDnxnhfC8ub+gV4/A4HfKdP4tHBI=";
 
-/// The same, the right half with alpha 51/255.
+/// kAvif with alpha 51/255 in the right half.
 inline constexpr std::string_view kAvifAlpha =
     "AAAAIGZ0eXBhdmlmAAAAAGF2aWZtaWYxbWlhZk1BMUEAAAGNbWV0YQAAAAAAAAAoaGRscgAAAAAAAAAAcGljdAAAAAAAAAAAAAAA"
     "AGxpYmF2aWYAAAAADnBpdG0AAAAAAAEAAAAsaWxvYwAAAABEAAACAAEAAAABAAABzQAAAEEAAgAAAAEAAAG1AAAAGAAAAEJpaW5m"
@@ -92,7 +94,7 @@ inline constexpr std::string_view kHeic =
     "F/Tq/UlAkI7y4ftNDd4Hu9DwIqXAAJmv0Yin5mo0+1XtfVbihXy9AAKqEV8MV3G+1zQUuz7y/+qlAdFSKV1MMn2/3Agp+BWoZm9H"
     "AANb+WOC+HI76YP5+Jsk71x4AHpZLCsSlAq62fmYH/N+p2ME1xBEIE0l6Ni393fe4SkE6CjkwA==";
 
-/// The same in 10 bits, quality 90.
+/// kHeic in 10 bits, quality 90.
 inline constexpr std::string_view kHeicDeep =
     "AAAAHGZ0eXBoZWljAAAAAG1pZjFoZWljbWlhZgAAAa5tZXRhAAAAAAAAACFoZGxyAAAAAAAAAABwaWN0AAAAAAAAAAAAAAAAAAAA"
     "AA5waXRtAAAAAAACAAAAEGlkYXQAAAAAABAACAAAADhpbG9jAQAAAERAAAIAAQAAAAAAAAHSAAEAAAAAAAAAhwACAAEAAAAAAAAA"
@@ -104,7 +106,7 @@ inline constexpr std::string_view kHeicDeep =
     "mRdVW2VZnEXDcnoQgPlsfksFwxxdNmkrY7oweZmD/5UW0ldCDMH/J1/+82wk9i63HTsagHMAcxvL47Irebmg/oEDQc0MkOlU7I9m"
     "oQ==";
 
-/// Eight frames of clip_frame(), VP9, every 0.1 s, a key frame every 0.4 s.
+/// Eight frames of clip_frame(), VP9, one every 0.1 s, a key frame every 0.4 s.
 inline constexpr std::string_view kWebm =
     "GkXfo59ChoEBQveBAULygQRC84EIQoKEd2VibUKHgQJChYECGFOAZwEAAAAAAAL0EU2bdLpNu4tTq4QVSalmU6yBoU27i1OrhBZU"
     "rmtTrIHGTbuMU6uEElTDZ1OsggETTbuMU6uEHFO7a1OsggLM7AEAAAAAAABZAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA"
@@ -118,7 +120,7 @@ inline constexpr std::string_view kWebm =
     "AECSnABKAAADYAAAHYynP//jS//6JRPAAKOegQJYAIYAQJKcAEhgAANgAAAdA///9ll///68iieAo56BArwAhgBAkpwASgAAA2AA"
     "ADBfwj///41///9YpoAcU7tro7uPs4EAt4r3gQHxggFt8IEDu5CzggGQt4r3gQHxggFt8IGz";
 
-/// The same as H.264 with a display matrix: counterclockwise by 90 degrees.
+/// kWebm as H.264 with a display matrix: turned counterclockwise by 90 degrees.
 inline constexpr std::string_view kMovTurned =
     "AAAAFGZ0eXBxdCAgAAACAHF0ICAAAAAId2lkZQAAAQRtZGF0AAAAO2WIhAAv//70Gz8CmjiVTBRHIEtoM+0pwllir5TkA/tMn3DR"
     "QGoVlKopThG/qBik4Sze8ZuQB6MLCCetAAAAGUGaImxDf+BD/14xf+C7uo7TLJcaVcxamn4AAAAOAZ5BeQr//v16PI2ZLzkAAAAS"
@@ -156,7 +158,7 @@ inline constexpr std::string_view kMovVariable =
     "AAAAAAEAAFQAAAAAHHN0c2MAAAAAAAAAAQAAAAEAAAAIAAAAAQAAADRzdHN6AAAAAAAAAAAAAAAIAAAAQgAAAB0AAAASAAAAFgAA"
     "AAwAAAAnAAAAIwAAADgAAAAUc3RjbwAAAAAAAAABAAAAJAAAACF1ZHRhAAAAGalzd3IADVXETGF2ZjU5LjI3LjEwMA==";
 
-/// MP4 with AAC and nothing else.
+/// MP4 with AAC audio only.
 inline constexpr std::string_view kAudio =
     "AAAAHGZ0eXBNNEEgAAACAE00QSBpc29taXNvMgAAAAhmcmVlAAAAJW1kYXTeAgBMYXZjNTkuMzcuMTAwAAIwQA4BGCAHARggBwAA"
     "Awdtb292AAAAbG12aGQAAAAAAAAAAAAAAAAAAAPoAAAAyAABAAABAAAAAAAAAAAAAAAAAQAAAAAAAAAAAAAAAAAAAAEAAAAAAAAA"

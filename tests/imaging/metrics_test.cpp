@@ -14,7 +14,7 @@ using namespace fieldmark;
 
 namespace {
 
-// Wang et al.'s definition with the full 11 x 11 window at every place, moments about the mean.
+// Wang et al.'s definition with the full 11 x 11 window at every position, and moments about the mean.
 double ssim_reference(const Tensor<float>& a, const Tensor<float>& b) {
   const Index h = a.shape[0], w = a.shape[1], channels = a.shape[2];
   double total = 0, weight[11][11], norm = 0, places = 0;
@@ -76,7 +76,7 @@ TEST_CASE("metrics: the mask chooses pixels, an empty one gives NaN") {
 }
 
 TEST_CASE("metrics: sums over 18 million numbers keep 14 digits") {
-  // A plain sum of as many in float would stop growing at 2^24 times the term.
+  // A plain float sum of as many terms would stop growing at 2^24 times the term.
   Tensor<float> a({6000, 3000, 1}, 0.1f), b({6000, 3000, 1});
   const double term = static_cast<double>(0.1f) * static_cast<double>(0.1f);
   // Measured: 2.4e-15; a running sum in double is off by 1.8e-10.

@@ -18,7 +18,7 @@ std::vector<bool> front(std::vector<SpeedQuality> points, const ParetoMargin& ma
 TEST_CASE("pareto: what another point beats is not on the front") {
   //          exact and slow, quick and coarse, slower and coarser than the one before, in the middle
   CHECK(front({{4, 60}, {1, 30}, {2, 29}, {2, 45}}) == std::vector<bool>{true, true, false, true});
-  CHECK(front({{1, 30}, {1, 30}}) == std::vector<bool>{true, true});  // equals do not beat each other
+  CHECK(front({{1, 30}, {1, 30}}) == std::vector<bool>{true, true});  // equal points do not beat each other
   CHECK(front({{1, 30}, {1, 31}, {0.5, 31}}) == std::vector<bool>{false, false, true});
   CHECK(front({}).empty());
 }
@@ -29,7 +29,7 @@ TEST_CASE("pareto: a lead within the margin is none") {
   CHECK(front({{1, 40}, {0.85, 40}}, margin) == std::vector<bool>{false, true});
   CHECK(front({{1, 40}, {1, 40.4}}, margin) == std::vector<bool>{true, true});
   CHECK(front({{1, 40}, {1, 40.6}}, margin) == std::vector<bool>{false, true});
-  // Much faster and hardly worse: beaten as well. Hardly slower and much better: likewise.
+  // Much faster and hardly worse also beats; so does hardly slower and much better.
   CHECK(front({{1, 40}, {0.5, 39.8}}, margin) == std::vector<bool>{false, true});
   CHECK(front({{1, 40}, {0.5, 39.4}}, margin) == std::vector<bool>{true, true});
   CHECK(front({{1, 40}, {1.05, 50}}, margin) == std::vector<bool>{false, true});

@@ -8,7 +8,7 @@
 using namespace fieldmark;
 
 namespace {
-// Signature, then a chunk of pixels of two bytes, then the end.
+// A signature, a chunk of pixels of two bytes, and the end chunk.
 std::vector<std::byte> file() {
   return bytes_from({0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n', 0, 0,   0,   2,   'I', 'D', 'A', 'T', 7,
                      7,    0,   0,   0,   0,    0,    0,    0,    0, 'I', 'E', 'N', 'D', 1,   2,   3,   4});
@@ -33,7 +33,7 @@ TEST_CASE("png_chunks: what a cut leaves") {
     INFO(size);
     CHECK(chunks.end <= size);
     CHECK(chunks.has_data == (size >= 18));
-    CHECK(chunks.complete == (size >= 30));  // the checksum of the end is nothing to miss
+    CHECK(chunks.complete == (size >= 30));  // a missing checksum of the end chunk does no harm
     if (size < 18) CHECK(chunks.end == 8);
     if (size >= 18 && size < 22) CHECK(chunks.lacks == 22 - size);
   }

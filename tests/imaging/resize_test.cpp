@@ -16,8 +16,8 @@ double pixel(const Tensor<float>& x, Index y, Index column, Index c) {
   return static_cast<double>(x[(y * x.shape[1] + column) * x.shape[2] + c]);
 }
 
-// Both images enlarged to a common grid of H H' by W W' cells: the mean over an output pixel is a plain sum
-// of cells.
+// Enlarges both images to a common grid of H H' by W W' cells, where the mean over an output pixel is a plain
+// sum of cells.
 double area(const Tensor<float>& x, Index height, Index width, Index y, Index column, Index c) {
   const Index h = x.shape[0], w = x.shape[1];
   double sum = 0;
@@ -40,7 +40,7 @@ double bilinear(const Tensor<float>& x, Index height, Index width, Index y, Inde
          fv * ((1 - fu) * at(v0 + 1, u0) + fu * at(v0 + 1, u0 + 1));
 }
 
-// The kernel's weights over all pixels, two-dimensional at once and divided by their sum.
+// The kernel's two-dimensional weights over all pixels, divided by their sum.
 template <class Kernel>
 double filtered(const Kernel& f, const Tensor<float>& x, Index height, Index width, Index y, Index column,
                 Index c) {
@@ -87,7 +87,7 @@ double worst_error(Resize resize, Reference reference) {
 }  // namespace
 
 TEST_CASE("resize: area equals the mean over a common grid, bilinear the four neighbours") {
-  // Two roundings to float of numbers below 1.
+  // Rounds numbers below 1 to float twice.
   CHECK(worst_error(resize_area, area) < 1.2e-7);
   CHECK(worst_error(resize_bilinear, bilinear) < 1.2e-7);
 }
@@ -99,7 +99,7 @@ TEST_CASE("resize: kernels equal their sums over the whole image") {
   const auto by = [](double (*f)(double)) {
     return [f](const auto&... rest) { return filtered(f, rest...); };
   };
-  // Two roundings to float; measured 5.7e-8, 7.3e-8 and 9.7e-8.
+  // Rounds to float twice; measured 5.7e-8, 7.3e-8 and 9.7e-8.
   CHECK(worst_error(with(ResizeFilter::bilinear), by(tent)) < 2e-7);
   CHECK(worst_error(with(ResizeFilter::bicubic), by(keys)) < 2e-7);
   CHECK(worst_error(with(ResizeFilter::lanczos), by(lanczos)) < 2e-7);

@@ -12,7 +12,7 @@ using namespace fieldmark;
 using namespace fieldmark::bench;
 
 namespace {
-// Every element closes, texts hold no bare bracket: one pass over the tags with a stack.
+// True if every element closes and no text holds a bare bracket: one pass over the tags with a stack.
 bool well_formed(const std::string& svg) {
   std::vector<std::string> open;
   const std::regex tag("<(/?)([a-z]+)((?: [a-zA-Z0-9-]+=\"[^\"<>]*\")*)(/?)>");
@@ -66,8 +66,8 @@ TEST_CASE("scatter_chart: points close in x have lines between them, and y ends 
   for (const char* tick : {">86<", ">90<", ">94<", ">110<"}) CHECK_THAT(open, Contains(tick));
   const auto closed = scatter_chart({.title = "t", .x = "x", .y = "y", .y_most = 100}, points);
   CHECK_THAT(closed, Contains(">100<") && !Contains(">110<"));
-  CHECK(places(closed)[1].y == 84);  // the frame's upper end
-  // No limit can take the image away.
+  CHECK(places(closed)[1].y == 84);  // the frame's top
+  // No limit makes the chart invalid.
   CHECK_THAT(scatter_chart({.title = "t", .x = "x", .y = "y", .y_most = -5}, points), !Contains("nan"));
 }
 

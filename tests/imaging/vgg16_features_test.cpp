@@ -52,7 +52,7 @@ std::vector<std::string_view> views_of(const std::vector<std::string>& names) {
   return {names.begin(), names.end()};
 }
 
-// Every depth against plain loops, and the loss of two of them; returns the worst error of a depth.
+// Compares every depth with plain loops, and the loss of two of them; returns the worst error of a depth.
 double compare(const SafetensorsFile& file, std::size_t convolutions, const Tensor<float>& a,
                const Tensor<float>& b) {
   const Vgg16Features<float> vgg(file);
@@ -104,7 +104,7 @@ TEST_CASE("vgg16_features: the first layers with torchvision's weights equal pla
 TEST_CASE("vgg16_features: gradient of the loss in both images") {
   const Vgg16Features<double> vgg(weights(3));
   constexpr std::string_view taps[] = {"relu1_2", "relu2_1"};
-  // Small steps: kinks of ReLUs and pooling windows lie close together.
+  // Small steps, because kinks of ReLUs and pooling windows lie close together.
   expect_grad(
       [&](Tape<double>&, auto v) { return vgg.loss(upsample_to(v[0], 4, 5), upsample_to(v[1], 4, 5), taps); },
       {uniform({1, 2, 1, 3}, 0, 1, 5), uniform({1, 2, 1, 3}, 0, 1, 6)}, {.step = 1e-5});

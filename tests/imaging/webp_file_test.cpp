@@ -27,7 +27,7 @@ double worst(const Tensor<float>& a, const Tensor<float>& b) {
 void put(std::vector<std::byte>& bytes, std::size_t value, int size) {
   for (int i = 0; i < size; ++i) bytes.push_back(static_cast<std::byte>(value >> 8 * i));
 }
-// The file as an extended one, with an EXIF chunk.
+// Returns the file in extended form, with an EXIF chunk.
 std::vector<std::byte> with_exif(const std::vector<std::byte>& webp, const std::vector<std::byte>& exif) {
   std::vector<std::byte> out = bytes_from({'R', 'I', 'F', 'F'});
   put(out, 4 + 18 + webp.size() - 12 + 8 + exif.size() + exif.size() % 2, 4);
@@ -67,7 +67,7 @@ TEST_CASE("webp_file: alpha comes back, and the name says nothing") {
   for (Index i = 3; i < x.size(); i += 4) x[i] = i < 100 ? 1.f : 51.f / 255.f;
   const auto y = decode_image(encode_webp(x, 80), "x.png");
   REQUIRE(y.shape == x.shape);
-  for (Index i = 3; i < x.size(); i += 4) CHECK(y[i] == x[i]);  // alpha is without loss
+  for (Index i = 3; i < x.size(); i += 4) CHECK(y[i] == x[i]);  // alpha is lossless
 }
 
 TEST_CASE("webp_file: its EXIF orientation is read") {
@@ -76,7 +76,7 @@ TEST_CASE("webp_file: its EXIF orientation is read") {
   CHECK(exif_orientation(webp) == 1);
   const auto jpeg = with_orientation(encode_jpeg(Tensor<float>({8, 8, 3}), 50), 6, true);
   for (const bool named : {false, true}) {
-    // Behind the markers, the length and the name; 36 bytes of TIFF.
+    // After the markers, the length and the name: 36 bytes of TIFF.
     const auto tiff = std::span(jpeg).subspan(named ? 6 : 12, named ? 42 : 36);
     const auto file = with_exif(webp, {tiff.begin(), tiff.end()});
     CHECK(exif_orientation(file) == 6);

@@ -9,7 +9,7 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-// Cameras at these places, looking along -z of the world with y up, in alternating splits.
+// Cameras at these positions, looking along -z of the world with y up, in alternating splits.
 DataReport report_of(const std::vector<Vec3>& places) {
   DataReport report{.name = "scene"};
   report.up = {0, 1, 0}, report.centre = {0, 0, -4}, report.distances = {4, 4, 4};
@@ -23,7 +23,8 @@ DataReport report_of(const std::vector<Vec3>& places) {
 
 enum class Ink { blue, orange, red };
 
-// Where the pixels of one colour lie on the mean, in a panel; shares of its side from its upper left corner.
+// The mean position of the pixels of one colour in a panel, as fractions of its side from the upper left
+// corner.
 struct Spot {
   double x = 0, y = 0, pixels = 0;
 };
@@ -44,16 +45,16 @@ Spot spot_of(const Tensor<float>& chart, Ink ink, int panel) {
 }  // namespace
 
 TEST_CASE("camera_chart: cameras lie where they stand, from above and from the right, at one scale") {
-  // Two to the left of the centre, higher and nearer than the one to the right.
+  // Two cameras to the left of the centre, higher and nearer than the one to the right.
   const auto chart = camera_chart(report_of({{-1, 1, 0}, {1, 0, 1}}));
   CHECK(chart.shape == Shape{700, 1240, 3});
   const Spot left = spot_of(chart, Ink::blue, 0), right = spot_of(chart, Ink::orange, 0);
   REQUIRE((left.pixels > 50 && right.pixels > 50));
   CHECK(left.x < right.x);
-  CHECK(left.y < right.y);  // nearer to the scene, which is ahead
+  CHECK(left.y < right.y);  // nearer to the scene, which lies ahead
   const Spot high = spot_of(chart, Ink::blue, 1), low = spot_of(chart, Ink::orange, 1);
   CHECK(high.y < low.y);
-  CHECK(high.x > low.x);  // ahead is to the right
+  CHECK(high.x > low.x);  // ahead is drawn to the right
   CHECK(low.y - high.y == Approx((right.x - left.x) / 2).epsilon(0.1));
   CHECK(spot_of(chart, Ink::red, 0).pixels == 0);
 }

@@ -16,7 +16,7 @@ double dot3(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a
 Vec3 minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 double length(const Vec3& a) { return std::sqrt(dot3(a, a)); }
 
-// Cameras on the cap above 20 degrees around kCentre, between 3 and 5 away.
+// Cameras on the cap above 20 degrees around kCentre, at distances from 3 to 5.
 std::vector<Camera> cap(Index count) {
   const auto r = uniform({count, 3}, 0, 1, 4);
   std::vector<Camera> cameras;
@@ -28,7 +28,7 @@ std::vector<Camera> cap(Index count) {
   }
   return cameras;
 }
-// Distance of the point from the camera's axis.
+// Returns the distance of the point from the camera's axis.
 double off_axis(const Camera& c, const Vec3& p) {
   const Vec3 to = minus(p, c.position());
   return std::sqrt(std::max(0.0, dot3(to, to) - std::pow(dot3(to, c.forward()), 2)));
@@ -88,7 +88,7 @@ TEST_CASE("camera_set: novel stays inside directions, distances and look-at of t
     nearest = std::min(nearest, length(from)), farthest = std::max(farthest, length(from));
     aside = std::max(aside, off_axis(c, s.centre));
     CHECK((c.width == 40 && c.height == 30));
-    CHECK(c.pose[9] > 0);  // up is upwards
+    CHECK(c.pose[9] > 0);  // up stays up
   }
   CHECK(nearest >= 0.8 * *low - 1e-9);
   CHECK(nearest < 1.1 * *low);
@@ -112,8 +112,8 @@ TEST_CASE("camera_set: ring and sphere") {
     const Vec3 from = minus(c.position(), s.centre);
     for (std::size_t k = 0; k < 3; ++k) sphere_mean[k] += from[k] / length(from) / 400;
   }
-  CHECK(std::hypot(mean[0], mean[1]) < 0.13);  // 3 deviations of 400 azimuths
-  CHECK(length(sphere_mean) < 0.15);           // 3 deviations of 400 directions
+  CHECK(std::hypot(mean[0], mean[1]) < 0.13);  // 3 standard deviations for 400 azimuths
+  CHECK(length(sphere_mean) < 0.15);           // 3 standard deviations for 400 directions
 }
 
 TEST_CASE("camera_set: closer and farther are novel ones at other distances") {
@@ -148,8 +148,8 @@ TEST_CASE("camera_set: extrapolated cameras look from where no training camera w
     CHECK(off_axis(c, s.centre) < 1e-6);
     widest = std::max(widest, nearest(c));
   }
-  CHECK(widest > 90);  // the whole cap below is hidden
-  // Cameras all around leave no such direction: the farthest of those that were drawn.
+  CHECK(widest > 90);  // no camera saw the cap below
+  // Cameras all around leave no such direction, so the farthest of the drawn ones are used.
   CameraSpan all = s;
   all.directions.clear();
   for (const Camera& c : make_cameras(s, CameraSet::sphere, 400, 0, 5)) {

@@ -45,7 +45,7 @@ TEST_CASE("camera: look_at gives a rotation that looks at the target with up upw
     const Vec3 to{target[0] - eye[0], target[1] - eye[1], target[2] - eye[2]};
     CHECK(std::abs(dot_product(c.forward(), to) - std::sqrt(dot_product(to, to))) < 1e-13);
     check_near(c.position(), eye, 0);
-    CHECK(y[2] >= -1e-14);  // straight up or down: no upwards is left, and any will do
+    CHECK(y[2] >= -1e-14);  // straight up or down, any direction of up will do
   }
 }
 

@@ -1,4 +1,4 @@
-// The splits that a file lists, and the choice among COLMAP models.
+// Tests the splits that a file lists, and the choice among COLMAP models.
 #include "capture.h"
 
 #include <algorithm>
@@ -15,7 +15,7 @@ std::string split_names(const fs::path& folder, const std::string& split) {
   return names(load_dataset(folder, {.split = split}));
 }
 
-// A text model of the images "0.png" to "(count - 1).png", with their points or without.
+// Writes a text model of the images "0.png" to "(count - 1).png", with or without points.
 void write_model(const fs::path& model, int count, const std::string& points = "\n") {
   fs::create_directories(model);
   std::string images = "# Image list\n";
@@ -58,7 +58,7 @@ TEST_CASE("capture: a list that lacks is what the others leave") {
   CHECK(split_names(scene.path, "train") == "0 4 ");
   CHECK(split_names(scene.path, "test") == "1 2 3 5 6 7 8 9 ");
   CHECK(split_names(scene.path, "val") == "1 2 3 5 6 7 8 9 ");
-  // Nothing held out: no split of that name, which is known before anything is trained.
+  // With nothing held out, that split does not exist, which is known before training.
   for (int i = 0; i < 10; ++i) scene.json["train_filenames"].push_back(scene.frame(i)["file_path"]);
   scene.write();
   CHECK(has_split(scene.path, "train"));
@@ -91,7 +91,7 @@ TEST_CASE("capture: a split whose images all lack is none") {
   for (const int held_out : {0, 8}) fs::remove(scene.image(held_out));
   CHECK(!has_split(scene.path, "test"));
   CHECK(has_split(scene.path, "train"));
-  // As BlenderNeRF leaves it: a file of test cameras and no images.
+  // The files that BlenderNeRF leaves: a file of test cameras and no images.
   fs::rename(scene / "transforms.json", scene / "transforms_train.json");
   scene.json["frames"] = {
       {{"file_path", "test/r_0.png"}, {"transform_matrix", scene.frame(0)["transform_matrix"]}}};
@@ -115,7 +115,7 @@ TEST_CASE("capture: of several COLMAP models side by side the one with the most 
         "sparse/2 has 4, sparse/10 has 9");
   write_file_atomically(scene / "sparse/1/images.txt", std::string_view("1 nothing\n"));
   CHECK(colmap_folder(scene.path) == scene / "sparse/10");
-  // Of one alone nothing is told.
+  // A single model needs no note.
   for (const char* other : {"sparse/1", "sparse/10", "sparse/2"}) fs::remove_all(scene / other);
   CHECK(load_dataset(scene.path).notes[0] == "images of images");
 }
@@ -130,7 +130,7 @@ TEST_CASE("capture: COLMAP models in the places where its programs leave them") 
     CHECK(names(load_dataset(scene.path)) == "1 2 3 4 5 6 7 ");
     if (std::string(model) != "0") CHECK(names(load_dataset(scene.path / model)) == "1 2 3 4 5 6 7 ");
   }
-  // Beside a model of undistorted images are these, and not the ones that they were made from.
+  // Undistorted images lie next to their model; they are read, not the images that they were made from.
   const TemporaryFolder scene;
   write_images(scene / "images", 9);
   write_images(scene / "dense/0/images", 7);

@@ -14,7 +14,7 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-// A field after some steps on the scene.
+// Returns a field trained on the scene for some steps.
 RadianceField trained(Index steps) {
   RadianceField field(trainable_field_options());
   Trainer trainer(field, objects_scene(),
@@ -23,7 +23,7 @@ RadianceField trained(Index steps) {
   return field;
 }
 
-// Ends all rays in the field's background.
+// Marks all cells but the first `cells_left` as empty, so that rays end in the background.
 RadianceField emptied(RadianceField field, Index cells_left) {
   std::vector<std::uint8_t> bits(static_cast<std::size_t>(field.grid.cells()));
   std::fill_n(bits.begin(), cells_left, 1);

@@ -26,10 +26,10 @@ void check_images(const std::vector<ColmapImage>& images) {
   CHECK(images[0].name == "b.png");
   CHECK(images[2].name == "sub/c.png");
   CHECK(images[1].camera == 2);
-  // Looking along z with y down: in OpenGL's axes y and z are turned round.
+  // The camera looks along z with y down; OpenGL's y and z axes point the other way.
   CHECK(images[0].pose == Pose{1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0});
   CHECK(images[2].pose[11] == 1);
-  // R is 90 degrees about y: x_c = z + 1, y_c = y + 2, z_c = -x + 3; the camera is where that is 0.
+  // R is 90 degrees about y: x_c = z + 1, y_c = y + 2, z_c = -x + 3; the camera is where all three are 0.
   const Pose want{0, 0, 1, 3, 0, -1, 0, -2, 1, 0, 0, -1};
   for (std::size_t k = 0; k < 12; ++k) CHECK(std::abs(images[1].pose[k] - want[k]) < 1e-15);
 }

@@ -14,7 +14,7 @@ using namespace fieldmark::nerf;
 namespace {
 constexpr Index kWidth = 20, kHeight = 12, kPixels = kWidth * kHeight;
 
-// A render with colours, opacities and gaps, over white.
+// Returns a render with colours, opacities and gaps, over white.
 Rendering some_render() {
   Rendering r{.rgb = Tensor<float>({kHeight, kWidth, 3}),
               .opacity = uniform<float>({kHeight, kWidth}, 0, 1, 2)};
@@ -24,7 +24,7 @@ Rendering some_render() {
   return r;
 }
 
-// The ground truth that shows the render with other gains and offsets in each half.
+// Returns a ground truth that shows the render with different gains and offsets in each half.
 View view_of(const Rendering& r, float left_gain, float right_gain, float offset) {
   View view{.camera = {.width = kWidth, .height = kHeight},
             .rgba = Tensor<float>({kHeight, kWidth, 4}),
@@ -53,7 +53,7 @@ TEST_CASE("colour_fit: gain and offset of the ground truth are found, and the ba
   const View view = view_of(r, 1.25f, 1.25f, 0.05f);
   const Tensor<float> truth = composited(view, Background::white);
   CHECK(worst(r.rgb, truth) > 0.1);
-  CHECK(worst(colour_fitted(r, view, Background::white), truth) < 5e-3);  // the hold of 1e-4 costs 2e-3
+  CHECK(worst(colour_fitted(r, view, Background::white), truth) < 5e-3);  // regularising by 1e-4 costs 2e-3
 }
 
 TEST_CASE("colour_fit: each half takes the colours of the other") {

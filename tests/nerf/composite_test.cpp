@@ -18,8 +18,8 @@ auto composite_op(const Offsets& ray_begin) {
 }
 }  // namespace
 
-// Rays from sigma delta = 1e-12 to saturation, of 4096 samples and with a last interval of 1e10 are compared
-// with long double, values and gradients, in numerics_cases.
+// numerics_cases compares values and gradients with long double for rays from sigma delta = 1e-12 to
+// saturation, with 4096 samples and with a last interval of 1e10.
 TEST_CASE("composite: opacity of a ray of 1e-12 is 1e-12 in float, not 0") {
   const Offsets ray_begin{0, 2};
   const auto y = op_values<float>(

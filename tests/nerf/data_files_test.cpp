@@ -29,7 +29,7 @@ TEST_CASE("data_files: each split's images, those that miss, and those that no c
   fs::remove(scene.image(8));
   write_image(scene.path / "images/b.png", 12, 8);
   write_image(scene.path / "images/a.jpg", 12, 8);
-  // Masks, hidden files, and what belongs to an image.
+  // Masks, hidden files, and files that belong to an image.
   for (const char* name : {"dynamic_mask_1.png", ".2.png", "3_depth.png", "4.mask.png", "m5.png"})
     write_image(scene.path / "images" / name, 12, 8);
   scene.frame(5)["mask_path"] = "images/m5.png";

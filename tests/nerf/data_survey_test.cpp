@@ -25,7 +25,7 @@ Dataset one_view(Tensor<float> rgba) {
   return data;
 }
 
-// Noise as of a file that loses some digits.
+// Adds noise like that of a lossy file.
 void disturb(View& view, double by) {
   const auto noise = uniform<float>(view.rgba.shape, -by, by, 9);
   for (Index i = 0; i < noise.size(); ++i) view.rgba[i] = std::clamp(view.rgba[i] + noise[i], 0.f, 1.f);
@@ -43,7 +43,7 @@ TEST_CASE("data_survey: thumbnails are an area filter's of premultiplied colour"
   for (Index i = 0; i < expected.size(); ++i)
     REQUIRE(view.thumbnail[at(i)] == Approx(expected[i]).margin(1e-5));
   CHECK((view.name == "v" && view.split == "train" && view.width == 96 && view.height == 64));
-  // Of an image smaller than the thumbnail, and at any number of threads.
+  // An image smaller than the thumbnail, with any number of threads.
   const auto small = survey_views(one_view(uniform<float>({5, 40, 4}, 0, 1, 4)));
   CHECK(small[0].thumbnail.size() == 32 * 32 * 4);
   std::vector<SurveyedView> one, two;
@@ -92,12 +92,12 @@ TEST_CASE(
   CHECK(
       same.text ==
       "1 of 3 held-out images the same as a training image, or nearly so, the first is test/b, as train/r_3");
-  // The same image in another file, of the same camera and of one a little aside.
+  // The same image in another file, from the same camera and from one slightly to the side.
   disturb(test.views[1], 0.008);
   CHECK(only(find(), "twins").images == Names{"test/b"});
   test.views[1].camera.pose[3] += 0.02;
   CHECK(only(find(), "twins").images == Names{"test/b"});
-  // Images alike of other cameras: a sphere looks the same from all sides.
+  // Similar images from other cameras: a sphere looks the same from all sides.
   test.views[1].camera.pose[3] += 2;
   CHECK(find().empty());
   test.views[1].camera.pose[3] -= 2;

@@ -1,4 +1,4 @@
-// The layouts of images, which load_dataset() reads besides Blender's.
+// Tests the image layouts that load_dataset() reads in addition to Blender's.
 #include <fieldmark/core/error.h>
 #include <fieldmark/core/files.h>
 #include <fieldmark/nerf/camera_set.h>

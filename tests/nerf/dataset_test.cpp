@@ -125,7 +125,7 @@ TEST_CASE("dataset: errors of images name JSON, place and image") {
                     b = (toy.path / "train/b.png").string();
   write_png(b, quantize8(uniform<float>({4, 5, 3}, 0, 1, 5)));
   toy.expect_error(place + "expected an image of 6 x 4 pixels as frames[0], got 5 x 4");
-  // Other sizes even where the resized images agree.
+  // Different sizes are refused even if the resized images agree.
   write_png(b, quantize8(uniform<float>({8, 12, 3}, 0, 1, 5)));
   CHECK_THROWS_WITH(load_dataset(toy.path, {.size = 3}), Contains("got 12 x 8"));
   write_file_atomically(b, "not an image");
@@ -158,6 +158,6 @@ TEST_CASE("dataset: the Blender lego scene") {
   for (const View& v : set.views) {
     CHECK(v.rgba.shape == Shape{40, 40, 4});
     CHECK(v.rgba[3] == 0);                          // a corner is empty
-    CHECK(v.rgba[4 * (20 * 40 + 20) + 3] > 0.99f);  // the middle is not
+    CHECK(v.rgba[4 * (20 * 40 + 20) + 3] > 0.99f);  // the centre is not
   }
 }

@@ -10,7 +10,7 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-// Samples packed on rays, their places sorted along each.
+// Samples packed by rays, with positions sorted along each ray.
 template <class T = double>
 struct Packed {
   std::vector<Index> begin;
@@ -30,7 +30,7 @@ struct Packed {
   }
 };
 
-// The formula's double sum, in long double.
+// Computes the formula's double sum in long double.
 template <class T>
 double reference(const Packed<T>& p, double scale) {
   long double total = 0;
@@ -67,7 +67,7 @@ TEST_CASE("distortion_loss: in float and far from the origin, to 3e-6 of the dou
     const Packed<float> p({0, 300, 1000}, offset);
     const double want = reference(p, 1);
     CAPTURE(offset, want);
-    // Measured: 4e-8 and 9e-8; products of places and sums would be off by 1e-3 at 100.
+    // Measured: 4e-8 and 9e-8; with products of positions and sums, the error at 100 would be 1e-3.
     CHECK(std::abs(static_cast<double>(op_values<float>(p.op(), {p.sigma})[0]) - want) < 3e-6 * want);
   }
 }
@@ -87,7 +87,7 @@ TEST_CASE("distortion_loss: gradient, also of saturated and empty rays") {
     expect_grad(p.op(2), {p.sigma});
   }
   Packed<> p({0, 6});
-  for (Index i = 0; i < 6; ++i) p.sigma[i] = i < 3 ? 1e4 : 2.0;  // opaque from its first sample on
+  for (Index i = 0; i < 6; ++i) p.sigma[i] = i < 3 ? 1e4 : 2.0;  // opaque from the first sample on
   Tape<double> tape;
   std::vector<double> grad(6);
   const Var<double> sigma = tape.leaf(p.sigma.data.data(), grad.data(), {6});

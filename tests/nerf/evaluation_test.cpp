@@ -15,7 +15,7 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-// Images of the field itself, with its opacity as alpha, brightened by `error`.
+// Returns images of the field itself, with its opacity as alpha, brightened by `error`.
 Dataset images(const RadianceField& field, int views, float error, Index height = 16) {
   Dataset data{.name = "self", .split = "test", .background = field.background, .views = {}};
   Renderer renderer(field);
@@ -43,7 +43,7 @@ TEST_CASE("evaluation: training images of the field itself are nearly perfect") 
   const Evaluation e = evaluate(renderer, images(field, 3, 0));
   CHECK(e.views == 3);
   CHECK(e.per_view.size() == 3);
-  CHECK(e.psnr > 48);  // at most a rounding step of 1/255 apart
+  CHECK(e.psnr > 48);  // differs by at most a rounding step of 1/255
   CHECK(e.ssim > 0.999);
   CHECK(e.seconds_per_view > 0);
 }

@@ -16,7 +16,7 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-// Networks with numbers large enough to matter.
+// Returns networks with weights large enough to matter.
 RadianceField small_mlp(double log_density) {
   RadianceField f(small_mlp_options());
   const auto numbers = uniform<float>({f.params.size()}, -0.5, 0.5, 3);
@@ -34,7 +34,7 @@ RaySamples sample(const RadianceField& f, const Rays& rays, const FieldSamplingO
   return out;
 }
 
-// Density and colour of positions by the Field op, in double.
+// Density and colour at positions from the Field op, in double.
 struct Seen {
   std::vector<double> sigma, rgb;
 };

@@ -26,7 +26,7 @@ Tensor<double> unit_directions(Index n, unsigned seed) {
   return d;
 }
 
-// sigma, red, green, blue at one position by plain loops over the named parameters.
+// Returns sigma, red, green and blue at one position by plain loops over the named parameters.
 Row reference(const ParamStore<double>& store, const Field<double>& field, const double* x, const double* d) {
   Row density(4), colour(4);
   field.encoding().encode(store.values(field.encoding().table()), x, 1, density.data(), colour.data());
@@ -98,14 +98,14 @@ TEST_CASE("field: the store holds the networks first and the table last") {
 TEST_CASE("field: gradient in positions, directions and all parameters") {
   ParamStore<double> store;
   const Field<double> field(store, kSmallField, 1);
-  // Weights and biases that hold every ReLU open: differences must not step over its kink.
+  // Weights and biases that keep every ReLU open: finite differences must not step over its kink.
   const auto random = uniform({store.size()}, 0.05, 0.3, 3);
   std::copy(random.data.begin(), random.data.end(), store.values().begin());
   for (const char* name : {"density/0/bias", "colour/0/bias", "colour/1/bias"})
     for (double& v : store.values(store.find(name))) v = 3;
   for (const Index n : {0, 1, 3}) {
     Tensor<double> x(Shape{n, 3});
-    for (Index i = 0; i < x.size(); ++i) x[i] = (static_cast<double>(i % 5) + 0.31) / 5;  // inside of cells
+    for (Index i = 0; i < x.size(); ++i) x[i] = (static_cast<double>(i % 5) + 0.31) / 5;  // inside the cells
     for (const bool colour : {false, true}) {
       const auto report = gradcheck_module(
           [&](auto&, const auto& params, auto v) {
@@ -136,7 +136,7 @@ TEST_CASE("field: errors name option and shape") {
   CHECK_THROWS_WITH(build({.geometry = 257}), "[field] geometry must be 1 to 256, got 257");
   CHECK_THROWS_AS(build({.encoding = {.levels = 0}}), ValueError);
   const Field<float> field(store, kSmallField, 1);
-  CHECK_THROWS_AS(build(kSmallField), ValueError);  // names are taken
+  CHECK_THROWS_AS(build(kSmallField), ValueError);  // the names are taken
   Tape<float> tape;
   const Tensor<float> x(Shape{2, 3}), wide(Shape{2, 4});
   CHECK_THROWS_WITH(field(Params<float>(store), tape.constant(wide), tape.constant(x)),

@@ -1,5 +1,5 @@
 #pragma once
-// Small valid files of the formats that readers take, for their tests and for the fuzzer.
+// Small valid files in the formats that readers accept, for their tests and for the fuzzer.
 #include <cstdint>
 #include <cstring>
 #include <string>
@@ -23,8 +23,8 @@ inline std::string npy_file(std::string header, const std::string& data, char ve
   return std::string("\x93NUMPY") + version + '\0' + length + header + data;
 }
 
-/// Rows of a poses_bounds.npy: cameras at (i, 0, 0) looking along -z with up y, 80 x 60 pixels, focal length
-/// 70, bounds 2 + i and 10.
+/// Returns the rows of a poses_bounds.npy: cameras at (i, 0, 0) looking along -z with up y, 80 x 60 pixels,
+/// focal length 70, bounds 2 + i and 10.
 inline std::vector<double> llff_rows(int count) {
   std::vector<double> rows;
   for (int i = 0; i < count; ++i) {
@@ -39,8 +39,8 @@ inline std::string llff_file(const std::vector<double>& rows) {
       packed(rows));
 }
 
-// A COLMAP model of two cameras and three images, in both formats. Images 1 and 3 stand at the
-// origin and see along z; image 2 is turned by 90 degrees about y.
+// A COLMAP model of two cameras and three images, in both formats. Images 1 and 3 are at the origin and look
+// along z; image 2 is rotated by 90 degrees about y.
 inline const std::string kColmapCamerasText =
     "# Camera list\n1 OPENCV 80 60 70 71 40 30 0.01 -0.002 0.0003 0.0004\n\n2 SIMPLE_RADIAL 80 60 70 40 30 "
     "0.05\n";

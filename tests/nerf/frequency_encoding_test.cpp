@@ -29,7 +29,7 @@ TEST_CASE("frequency_encoding: sin then cos of each band for all dimensions") {
 }
 
 TEST_CASE("frequency_encoding: gradient") {
-  // The steps of the differences must be small against a turn of the highest band: 2^3 pi, 2^9 pi a unit.
+  // Finite-difference steps must be small against the period of the highest band: 2^3 pi, 2^9 pi per unit.
   for (const Index n : {0, 1, 4})
     for (const Index dims : {1, 3})
       expect_grad(frequency_op(4), {uniform({n, dims}, -1, 1, 2)}, {.step = 0.3});

@@ -18,7 +18,7 @@ using Part = HashEncoding<double>::Part;
 constexpr HashEncodingOptions kSmall{
     .levels = 3, .features = 2, .log2_table = 6, .base_resolution = 2, .finest_resolution = 8};
 
-// Both parts at one position, straight from the paper's formulas.
+// Computes both parts at one position, straight from the paper's formulas.
 std::vector<double> reference(const HashEncoding<double>& encoding, std::span<const double> table,
                               Index table_size, const std::array<double, 3>& x, bool colour) {
   std::vector<double> y;
@@ -39,7 +39,7 @@ std::vector<double> reference(const HashEncoding<double>& encoding, std::span<co
   return y;
 }
 
-// Largest difference from the reference over positions x, of values up to 1.
+// Returns the largest difference from the reference over positions x, for values up to 1.
 double worst_error(const HashEncodingOptions& options, const Tensor<double>& x) {
   ParamStore<double> store;
   const HashEncoding<double> encoding(store, "e", options, 1);
@@ -116,7 +116,7 @@ TEST_CASE("hash_encoding: gradient in positions and table") {
         options.features = features;
         const HashEncoding<double> encoding(store, "e", options, 1);
         randomise(store, 5);
-        // Inside of the cells of all levels (2, 4 and 8): differences must not step over a face.
+        // Inside the cells of all levels (2, 4 and 8): finite differences must not step over a face.
         Tensor<double> x(Shape{n, 3});
         for (Index i = 0; i < x.size(); ++i) x[i] = (static_cast<double>(i * 5 % 8) + 0.35) / 8;
         const auto report =

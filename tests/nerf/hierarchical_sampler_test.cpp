@@ -13,7 +13,7 @@ using namespace fieldmark::nerf;
 namespace {
 constexpr float kStep = 1.f / 256;
 
-// Rays along x through the cube, at various heights, the last beside it.
+// Rays along x through the cube at various heights; the last one misses it.
 struct RaysAlongX {
   std::vector<float> origins{-1, 0.5f, 0.5f, -1, 0.1f, 0.9f, 0.25f, 0.5f, 0.5f, -1, 1.5f, 0.5f},
       directions{1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0};
@@ -52,7 +52,7 @@ TEST_CASE("hierarchical_sampler: average points lie in the middles of equal part
     CHECK(std::abs(s.t[k] - (1 + middle)) < 1e-6f);
     CHECK(std::abs(s.position[3 * k] - middle) < 1e-6f);
     CHECK(std::abs(s.delta[k] - 0.125f) < 1e-6f);
-    CHECK(std::abs(s.t[16 + k] - 0.75f * middle) < 1e-6f);  // it starts inside
+    CHECK(std::abs(s.t[16 + k] - 0.75f * middle) < 1e-6f);  // the ray starts inside
   }
 }
 
@@ -90,7 +90,7 @@ TEST_CASE("hierarchical_sampler: all points lie in occupied cells, and deltas me
   REQUIRE(s.ray_begin[1] == 100);
   for (std::size_t i = 0; i < 100; ++i) {
     const float x = s.position[3 * i];
-    // The ends of stretches are found to half a step.
+    // The ends of occupied stretches are found to within half a step.
     CHECK(((x > 0.25f - kStep && x < 0.5f + kStep) || (x > 0.75f - kStep && x <= 1)));
   }
   CHECK(std::count_if(s.t.begin(), s.t.begin() + 100, [](float t) { return t < 1.6f; }) == 50);
@@ -102,8 +102,8 @@ TEST_CASE("hierarchical_sampler: importance points go where the weights are, amo
   const RaysAlongX rays;
   const RaySamples first = spread(sampler, OccupancyGrid(16), {.average = 8, .importance = 24});
   std::vector<float> weights(first.t.size());
-  weights[3] = 1;      // the first ray: its fourth part
-  weights[8 + 1] = 1;  // the second: half and half
+  weights[3] = 1;      // the first ray: its fourth interval
+  weights[8 + 1] = 1;  // the second: half in each of two
   weights[8 + 6] = 1;
   RaySamples out;
   sampler.refine(rays.batch(), first, weights, out);
@@ -115,7 +115,7 @@ TEST_CASE("hierarchical_sampler: importance points go where the weights are, amo
   CHECK(within(0, 1.375f, 1.5f) == 25);
   CHECK(within(1, 1.125f, 1.25f) == 13);
   CHECK(within(1, 1.75f, 1.875f) == 13);
-  CHECK(within(2, 0.001f, 0.374f) == 16);  // no weight: uniform in the 0.75 of it
+  CHECK(within(2, 0.001f, 0.374f) == 16);  // no weight: uniform over the 0.75 of the ray
   for (std::size_t r = 0; r < 3; ++r) {
     CHECK(std::is_sorted(out.t.begin() + out.ray_begin[r], out.t.begin() + out.ray_begin[r + 1]));
     CHECK(std::abs(sum(out.delta, out.ray_begin[r], out.ray_begin[r + 1]) - (r == 2 ? 0.75f : 1)) < 1e-6f);
@@ -131,7 +131,7 @@ TEST_CASE("hierarchical_sampler: random points without jitter depend on the ray 
   CHECK(a.t == b.t);
   CHECK(a.t[0] != a.t[64]);
   const float mean = sum(a.t, 0, 64) / 64;
-  CHECK(std::abs(mean - 1.5f) < 0.15f);  // four deviations of a mean of 64
+  CHECK(std::abs(mean - 1.5f) < 0.15f);  // four standard deviations of a mean of 64
 }
 
 TEST_CASE("hierarchical_sampler: errors name argument and what came") {

@@ -22,7 +22,7 @@ std::span<float> pose_of(ImageCorrections& c, Index image) {
   return c.params.values(c.params.find("pose")).subspan(static_cast<std::size_t>(6 * image), 6);
 }
 
-// A point that moves with a camera: its place in the camera's axes.
+// Returns a point that moves with a camera: its position in the camera's axes.
 Vec3 in_camera(const Camera& c, const Vec3& p) {
   const Vec3 v = p - c.position();
   Vec3 out{};
@@ -74,7 +74,7 @@ TEST_CASE("image_corrections: the gradient of a motion is that of differences, i
       const auto pose = pose_of(c, 1);
       for (std::size_t k = 0; k < 6; ++k) pose[k] = turn * (k % 2 == 0 ? 1.f : -0.5f);
       const Camera given = camera_at({0.3, 0.2, 0.4}, {0.2, 0.1, -4}), camera = c.moved(given, 1);
-      // Samples whose images are inside the cube, and a gradient for each.
+      // Samples whose images lie inside the cube, and a gradient for each.
       const auto x = uniform<float>({12, 3}, 0.05, 0.95, 3), g = uniform<float>({12, 3}, -1, 1, 4);
       std::vector<Vec3> held;
       for (Index i = 0; i < 12; ++i)
@@ -135,7 +135,7 @@ TEST_CASE("image_corrections: means over images are taken out of each parameter"
 
 TEST_CASE("image_corrections: colours of a ray are those of its image, and rays pass without any") {
   ImageCorrections c({.images = 2, .colour = true});
-  c.params.values()[12] = 0.5f;  // of image 1: red by one and a half
+  c.params.values()[12] = 0.5f;  // of image 1: scales red by one and a half
   const Tensor<float> rays({2, 4}, {0.2f, 0.4f, 0.6f, 1, 0.2f, 0.4f, 0.6f, 1});
   const std::vector<Index> image{0, 1};
   std::vector<float> grads(24, 0.f);

@@ -14,7 +14,7 @@ struct Files : TemporaryFolder {
       write_file_atomically(path / name, "");
     }
   }
-  // The file that is found for a name, below the folder.
+  // Returns the file found for a name, relative to the folder.
   std::string found(const std::string& named) const {
     const fs::path file = ImageFinder().find(path / named);
     return file.empty() ? "" : file.lexically_relative(path).string();
@@ -34,7 +34,7 @@ TEST_CASE("image files: found by name, by extension, in another case and through
   CHECK(files.found("IMAGES/r_1") == "images/R_1.png");
   CHECK(files.found("images/frame.0003") == "images/frame.0003.jpeg");
   CHECK(files.found("images/B.jpg") == "images/b.PNG");
-  CHECK(files.found("images/a\\c.png") == "images/a\\c.png");  // a name that has a backslash
+  CHECK(files.found("images/a\\c.png") == "images/a\\c.png");  // a name with a backslash
 }
 
 TEST_CASE("image files: another name is not taken, and of several alike the nearest name is") {

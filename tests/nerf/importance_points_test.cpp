@@ -49,7 +49,7 @@ TEST_CASE("importance_points: invert the distribution, by summing it up again") 
       const double part = std::clamp((s[j] - edge[i]) / length.data[i], 0.0, 1.0);
       F += part * (weight.data[i] + 3e-4 * length.data[i] / all);
     }
-    CHECK(std::abs(F / total - u[j]) < 1e-15 * 20);  // 1e-15 seen
+    CHECK(std::abs(F / total - u[j]) < 1e-15 * 20);  // 1e-15 measured
   }
 }
 

@@ -22,7 +22,7 @@ TEST_CASE("intrinsics: lengths are scaled to the image, the middle is the defaul
   CHECK((as_is.fx == 100 && as_is.fy == 100 && as_is.cx == 30 && as_is.cy == 20));
   const Camera angles = Intrinsics{.angle_x = 0.7, .angle_y = 0.4}.camera({}, 60, 40);
   CHECK(angles.fy == Approx(20 / std::tan(0.2)));
-  // A focal length goes before an angle.
+  // A focal length takes precedence over an angle.
   CHECK(Intrinsics{.angle_x = 0.7, .fl_x = 100}.camera({}, 60, 40).fx == 100);
 }
 

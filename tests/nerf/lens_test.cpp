@@ -43,7 +43,7 @@ TEST_CASE("lens: further coefficients by the formulas of their models") {
   const Lens rational{
       .k1 = 0.1, .k2 = 0.2, .k3 = 0.3, .k4 = 0.4, .k5 = 0.5, .k6 = 0.6, .model = LensModel::rational};
   CHECK(factor(rational) == Approx(1.6 / 2.5));
-  // An equidistant fisheye images an angle t at a distance t.
+  // An equidistant fisheye images an angle t at distance t.
   const Lens equidistant{.model = LensModel::fisheye};
   CHECK(!equidistant.is_pinhole());
   for (const double t : {1e-5, 1e-4, 0.3, 1.2, 1.5})
@@ -84,7 +84,7 @@ TEST_CASE(
         CHECK(std::hypot((*back)[0] - q[0], (*back)[1] - q[1]) * focal < 1e-7);
       }
   }
-  // Behind its pole a rational lens has no image.
+  // Beyond its pole, a rational lens forms no image.
   const Lens pole{.k4 = -1, .model = LensModel::rational};
   CHECK(!pole.is_regular({1.2, 0}));
   CHECK(pole.is_regular({0.5, 0}));
@@ -119,7 +119,7 @@ TEST_CASE("lens: where the image folds over there is no inverse") {
   CHECK(lens.undistorted({0.66, 0}));
   CHECK(!lens.undistorted({0.67, 0}));
   CHECK(!lens.undistorted({-0.5, 0.5}));
-  // Seen at -2/3 by way of the second branch, r = 2, it is not the inverse either.
+  // (2, 0) reaches -2/3 on the second branch, r = 2, so it is not the inverse either.
   CHECK(!lens.is_regular({2, 0}));
   CHECK(!Lens{.k1 = std::nan("")}.undistorted({0.1, 0.1}));
 }
@@ -132,7 +132,7 @@ TEST_CASE("lens: the covered part is a rectangle of sources that no larger one c
     return u >= 0 && v >= 0 && u <= 40 && v <= 30;
   };
   CHECK(covered_part(kCamera, {}) == Crop{0, 0, 40, 30});
-  // A barrel covers all of the pinhole's image.
+  // A barrel-distorted image covers all of the pinhole's image.
   CHECK(covered_part(kCamera, {.k1 = -0.1}) == Crop{0, 0, 40, 30});
   const Lens cushion{.k1 = 0.5, .p1 = 0.01};
   const Crop part = covered_part(kCamera, cushion);

@@ -25,7 +25,7 @@ TEST_CASE("llff: recentring puts the mean camera at the origin and the nearest b
   CHECK(views[0].depth.near == Approx(4.0 / 3));
   CHECK(views[0].depth.far == Approx(10 / 1.5));
   CHECK(views[2].pose[3] == Approx(1 / 1.5));
-  // Turned and moved all together, the views come out the same.
+  // Rotating and moving all cameras together leaves the views unchanged.
   auto turned = parse_poses_bounds(llff_file(llff_rows(3)), "p.npy");
   const double c = std::cos(0.4), s = std::sin(0.4);
   for (auto& v : turned) {
@@ -59,7 +59,7 @@ TEST_CASE("llff: errors name row and number") {
                     Contains("p.npy: expected an array of N x 17, N >= 1, got 17"));
   std::vector<LlffView> none;
   CHECK_THROWS_AS(recentre_llff(none), ValueError);
-  // Two cameras that look away from each other have no mean direction.
+  // Two cameras that look in opposite directions have no mean direction.
   auto views = parse_poses_bounds(llff_file(llff_rows(2)), "p.npy");
   for (const std::size_t k : {0u, 2u}) views[1].pose[k] *= -1, views[1].pose[8 + k] *= -1;
   CHECK_THROWS_WITH(recentre_llff(views), Contains("must have a mean direction"));

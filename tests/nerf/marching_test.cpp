@@ -40,8 +40,8 @@ std::vector<float> walk(const OccupancyGrid& grid, const Line& line, float step,
   return all;
 }
 
-// Every sample of the ray, judged cell by cell in double. `doubtful` are those within 1e-4 of a cell's face
-// or of the ray's ends, which rounding may put on either side.
+// Every sample of the ray, classified cell by cell in double. `doubtful` holds those within 1e-4 of a cell's
+// face or of the ray's ends, which rounding may put on either side.
 struct Dense {
   std::vector<float> certain, doubtful;
 };
@@ -68,13 +68,13 @@ Dense dense(const OccupancyGrid& grid, const Line& line, float step, float jitte
   return result;
 }
 
-// Whether a sorted list has t, up to the rounding of a multiply-add.
+// True if a sorted list contains t, up to the rounding of a multiply-add.
 bool has(const std::vector<float>& sorted, float t) {
   const auto at = std::lower_bound(sorted.begin(), sorted.end(), t - 1e-6f);
   return at != sorted.end() && *at <= t + 1e-6f;
 }
 
-// The walk takes exactly the dense samples, up to the doubtful ones.
+// Checks that the walk takes exactly the dense samples, except for doubtful ones.
 void check_against_dense(const OccupancyGrid& grid, const Line& line, float step, float jitter) {
   const Dense want = dense(grid, line, step, jitter);
   const auto got = walk(grid, line, step, jitter);
@@ -163,8 +163,8 @@ TEST_CASE("marching: pieces of any length are the whole walk") {
 }
 
 namespace {
-// 200 walks give the same samples whether any number of them skips empty cells first or not. Of how many
-// walks there are any.
+// Checks that 200 walks give the same samples no matter how many of them skip empty cells first. Returns the
+// number of walks with any samples.
 Index seen_after_skipping(const OccupancyGrid& grid, const std::vector<RayWalk>& plain) {
   Index seen = 0;
   for (const Index count : {1, 16, 37, 200}) {
@@ -193,7 +193,7 @@ TEST_CASE("marching: skipping empty cells first changes no sample, for any numbe
   const auto u = uniform({200, 6}, -1, 1, 8);
   std::vector<RayWalk> walks;
   for (Index i = 0; i < 200; ++i) {
-    Line line = towards(u, i);  // through a place in the cube, most of them from outside
+    Line line = towards(u, i);  // through a point in the cube, mostly from outside
     for (int a = 0; a < 3; ++a)
       line.o[a] = 0.5f + 0.25f * (line.o[a] - 0.5f) - (i % 3 ? 1.5f * line.d[a] : 0);
     walks.emplace_back(line.o, line.d, i % 2 ? 0.003f : 0.02f, 0.3f);
@@ -218,11 +218,11 @@ TEST_CASE("marching: nothing is sampled in an empty grid") {
 }
 
 namespace {
-// What a contracted walk is to give, step by step in double: t and, at a distance of 1e-4 or more from a
-// cell's face, whether the cell is occupied.
+// The expected samples of a contracted walk, step by step in double: t and, at least 1e-4 away from a cell's
+// face, whether the cell is occupied.
 struct Contracted {
   std::vector<double> t;
-  std::vector<int> occupied;  // -1: too near to a face to say
+  std::vector<int> occupied;  // -1: too close to a face to tell
 };
 Contracted contracted_by_steps(const OccupancyGrid& grid, const Line& line, double step, double jitter,
                                double near) {

@@ -30,7 +30,7 @@ Row joined(Row a, const Row& b) {
   return a;
 }
 
-// sigma, red, green, blue at one position by plain loops over the named parameters.
+// Returns sigma, red, green and blue at one position by plain loops over the named parameters.
 Row reference(const ParamStore<double>& store, const double* x, const double* d) {
   const Row features = gamma({2 * x[0] - 1, 2 * x[1] - 1, 2 * x[2] - 1}, 3);
   Row h = layer(store, "density/1", layer(store, "density/0", features, true), true);
@@ -123,7 +123,7 @@ TEST_CASE("mlp_field: gradient in positions, directions and all parameters, skip
     options.mlp.position_bands = 2;
     ParamStore<double> store;
     const Field<double> field(store, options, 1);
-    // Numbers that hold every ReLU open: differences must not step over its kink.
+    // Weights that keep every ReLU open: finite differences must not step over its kink.
     const auto random = uniform({store.size()}, 0.02, 0.08, 3);
     std::copy(random.data.begin(), random.data.end(), store.values().begin());
     for (const char* name : {"density/0/bias", "density/1/bias", "density/2/bias", "colour/1/bias"})
@@ -136,7 +136,7 @@ TEST_CASE("mlp_field: gradient in positions, directions and all parameters, skip
               return colour ? out.rgb : out.sigma;
             },
             store, std::vector<Tensor<double>>{uniform({n, 3}, 0, 1, 7), uniform({n, 3}, -1, 1, 5)},
-            {.step = 0.3});  // the highest band turns by 4 pi a cube side
+            {.step = 0.3});  // the highest band turns by 4 pi per cube side
         INFO(report.worst << "\n" << report.table);
         CHECK(report.ok);
       }

@@ -11,7 +11,7 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-// Matter of density 100 where x < 0.5, nothing elsewhere.
+// Density 100 where x < 0.5, and 0 elsewhere.
 void half(Index, const float* x, Index n, float* sigma) {
   for (Index i = 0; i < n; ++i) sigma[i] = x[3 * i] < 0.5f ? 100.f : 0.f;
 }
@@ -117,7 +117,7 @@ TEST_CASE("occupancy_grid: clearance is the Chebyshev distance to the nearest bl
   const auto side = GENERATE(Index{8}, Index{20});
   OccupancyGrid grid(4 * side);
   std::vector<std::uint8_t> bits(static_cast<std::size_t>(grid.cells()));
-  const Index places[3][3] = {{0, 1, 2}, {2, 0, 3}, {1, 3, 3}};  // blocks, in one corner: the other is far
+  const Index places[3][3] = {{0, 1, 2}, {2, 0, 3}, {1, 3, 3}};  // blocks in one corner; the other is far
   for (const auto& p : places)
     bits[static_cast<std::size_t>(grid.cell(4 * p[0] + 1, 4 * p[1] + 3, 4 * p[2]))] = 1;
   grid.set_bits(bits);

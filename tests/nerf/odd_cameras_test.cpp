@@ -7,14 +7,15 @@ using namespace fieldmark::nerf;
 using Names = std::vector<std::string>;
 
 namespace {
-// The camera moved from the origin to `scale` times its place, or turned about its own x axis by 180 degrees.
+// move_out() scales the camera's distance from the origin; turn_round() rotates it by 180 degrees about its x
+// axis.
 void move_out(SurveyedView& view, double scale) {
   for (const std::size_t k : {3, 7, 11}) view.camera.pose[k] *= scale;
 }
 void turn_round(SurveyedView& view) {
   for (const std::size_t k : {1, 2, 5, 6, 9, 10}) view.camera.pose[k] *= -1;
 }
-// Cameras at these places, looking along -z.
+// Returns views of cameras at these positions, looking along -z.
 std::vector<SurveyedView> views_at(const std::vector<Vec3>& places) {
   std::vector<SurveyedView> views;
   for (const Vec3& p : places)
@@ -32,7 +33,7 @@ TEST_CASE("odd_cameras: a ring, a path and a capture with some overviews are not
     overviews.push_back({(i % 5 == 0 ? 5 : 1) * std::cos(i), (i % 5 == 0 ? 5 : 1) * std::sin(i), 0});
   CHECK(odd_cameras(views_at(path), SceneType::place).empty());
   CHECK(odd_cameras(views_at(overviews), SceneType::place).empty());
-  // Far from the origin, as georeferenced captures are.
+  // Far from the origin, like georeferenced captures.
   for (Vec3& p : path) p[0] += 5e5;
   CHECK(odd_cameras(views_at(path), SceneType::place).empty());
 }

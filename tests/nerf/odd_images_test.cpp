@@ -62,14 +62,14 @@ TEST_CASE("odd_images: exposures that differ between neighbours at every quartil
   CHECK(only(odd_images(alternating(1.2f), SceneType::place), "exposures").count == 40);
   CHECK(odd_images(alternating(1.2f), SceneType::plain).empty());
   CHECK(odd_images(alternating(1.1f), SceneType::place).empty());
-  // A quarter of an image that is bright is content, and so is another brightness far away.
+  // A bright quarter of an image is content, and so is a different brightness far away.
   auto views = ring_of_views(40);
   std::fill_n(views[0].thumbnail.begin(), 1024, 1.f);
   CHECK(odd_images(views, SceneType::place).empty());
   views = ring_of_views(14);
   brighten(views[0], 1.6f);
   CHECK(odd_images(views, SceneType::place).empty());
-  // Where all poses are equal, no camera is next to another.
+  // If all poses are equal, no camera has a neighbour.
   views = alternating(1.4f);
   for (auto& v : views) v.camera = views[0].camera;
   CHECK(odd_images(views, SceneType::place).empty());

@@ -16,7 +16,7 @@ auto op(const Tensor<double>& shot, const Tensor<double>& background, Photometri
   };
 }
 
-// The formula, written per channel as two images over one background.
+// Computes the formula per channel as two images over one background.
 double reference(const Tensor<double>& rays, const Tensor<double>& truth, const Tensor<double>& back,
                  double huber, double scale) {
   double sum = 0;
@@ -44,7 +44,7 @@ TEST_CASE("photometric_loss: equal to the formula, square and Huber") {
 }
 
 TEST_CASE("photometric_loss: zero for a perfect rendering, whatever the background") {
-  // Powers of two: premultiplying is exact.
+  // With powers of two, premultiplying is exact.
   const Tensor<double> truth(Shape{1, 4}, {0.5, 0.25, 1, 0.5}), rays(Shape{1, 4}, {0.25, 0.125, 0.5, 0.5});
   for (const double b : {0.0, 0.5, 1.0}) {
     const Tensor<double> back(Shape{1, 3}, b);

@@ -10,17 +10,17 @@
 #include "support/random.h"
 #include "support/run_op.h"
 
-/// Every number of a store at random in [-1, 1).
+/// Sets every parameter of a store to a random number in [-1, 1).
 template <class T>
 void randomise(fieldmark::ParamStore<T>& store, unsigned seed) {
   const auto random = uniform<T>({store.size()}, -1, 1, seed);
   std::copy(random.data.begin(), random.data.end(), store.values().begin());
 }
 
-/// A row of numbers that passes through a network.
+/// The activations of one sample.
 using Row = std::vector<double>;
 
-/// What a named layer makes of a row, by plain loops.
+/// Applies a named layer to a row by plain loops.
 inline Row layer(const fieldmark::ParamStore<double>& store, const std::string& name, const Row& x,
                  bool relu) {
   const auto weight = store.values(store.find(name + "/weight")),
@@ -33,8 +33,8 @@ inline Row layer(const fieldmark::ParamStore<double>& store, const std::string& 
   return y;
 }
 
-/// Colours and gradients of a field are the same bits for one and two threads. @param store  what `field` is
-/// in
+/// Checks that colours and gradients of a field have the same bits with one and two threads.
+/// @param store  what `field` is in
 inline void expect_same_for_threads(fieldmark::ParamStore<float>& store,
                                     const fieldmark::nerf::Field<float>& field) {
   using namespace fieldmark;

@@ -27,7 +27,7 @@ TEST_CASE("psnr_target: the first held-out views count, once every 250 steps") {
   CHECK_FALSE(below.reached(0, 99));
   CHECK_FALSE(below.reached(249, 99));
   CHECK(below.reached(250, 0));
-  CHECK_FALSE(below.reached(250, 0));  // evaluated already
+  CHECK_FALSE(below.reached(250, 0));  // already evaluated
   CHECK(below.reached(500, 0));
   CHECK_FALSE(above.reached(250, 99));
 }

@@ -67,7 +67,7 @@ TEST_CASE("refined_cameras: a displaced camera comes back to where a field shows
     start.push_back(v.camera);
   }
   const auto found = fit_cameras(field, data, {.steps = 100, .samples_per_step = 4096});
-  const auto seen_off = [&](const std::vector<Camera>& cameras) {  // where they look, at the scene's distance
+  const auto seen_off = [&](const std::vector<Camera>& cameras) {  // points seen at the scene's distance
     double sum = 0;
     for (std::size_t i = 0; i < cameras.size(); ++i)
       for (std::size_t a = 0; a < 3; ++a)

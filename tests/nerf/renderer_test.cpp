@@ -18,7 +18,8 @@ Camera test_camera(Index width = 23, Index height = 18) {
   return make_camera(look_at({2.2, -3.1, 1.7}, {0.1, 0.2, 0}, {0, 0, 1}), 0.9, width, height);
 }
 
-// Every pixel's samples one after another through the Field op, all in double, nothing skipped or stopped.
+// Renders by evaluating every pixel's samples one by one through the Field op in double, with nothing skipped
+// or stopped.
 struct ReferenceRenderer {
   ParamStore<double> store;
   Field<double> field;
@@ -27,7 +28,7 @@ struct ReferenceRenderer {
     std::copy(rf.params.values().begin(), rf.params.values().end(), store.values().begin());
   }
 
-  // Red, green, blue and opacity of a ray, background not added.
+  // Returns red, green, blue and opacity of a ray, without the background.
   std::array<double, 4> trace(const Ray& ray) const {
     double o[3], near = 0, far = 1e9;
     for (std::size_t a = 0; a < 3; ++a) {
@@ -54,7 +55,7 @@ struct ReferenceRenderer {
   }
 };
 
-// Largest difference of a rendering from the reference, over colour and opacity.
+// Returns the largest difference of a rendering from the reference, over colour and opacity.
 double worst_error(const RadianceField& f, const Rendering& view, const Camera& camera) {
   const ReferenceRenderer reference(f);
   const auto background = static_cast<double>(background_value(f.background));
@@ -222,10 +223,10 @@ TEST_CASE("renderer: the position of a ray is the mean of its samples by weight"
   CubeRays rays;
   rays.resize(5);
   rays.set(f.space, 0, camera, pixels);
-  rays.origins[12] = 9, rays.directions[12] = 1;  // sees nothing
+  rays.origins[12] = 9, rays.directions[12] = 1;  // misses everything
   renderer.trace(rays.batch(f.space), 0, out.data(), position.data());
 
-  // Colours that are positions: composited, they are the mean position times opacity.
+  // With positions as colours, compositing gives the mean position times the opacity.
   renderer.set_recolour(
       [](const float* x, const float*, Index n, float* rgb) { std::copy_n(x, 3 * n, rgb); });
   renderer.trace(rays.batch(f.space), 0, out.data());
@@ -237,7 +238,7 @@ TEST_CASE("renderer: the position of a ray is the mean of its samples by weight"
     }
   for (std::size_t a = 0; a < 3; ++a) CHECK(position[12 + a] == 0);
 
-  // The samples themselves, near to far, put both together again.
+  // The samples themselves, near to far, add up to both.
   std::vector<SeenSample> seen{{.ray = 3}};
   renderer.set_recolour({});
   renderer.trace(rays.batch(f.space), 0, out.data());

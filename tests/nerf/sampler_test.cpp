@@ -21,7 +21,7 @@ RaySamples sample(const RadianceField& f, const Rays& rays, const SamplingOption
   return out;
 }
 
-// The walk of one ray to its end, without any field.
+// Walks one ray to its end without a field.
 std::vector<float> walked(const RadianceField& f, const Rays& rays, Index r, float step, float jitter) {
   RayWalk walk(&rays.origins[static_cast<std::size_t>(3 * r)],
                &rays.directions[static_cast<std::size_t>(3 * r)], step, jitter);
@@ -30,7 +30,7 @@ std::vector<float> walked(const RadianceField& f, const Rays& rays, Index r, flo
   return t;
 }
 
-// Density of the sample at a position by the Field op, in double.
+// Returns the density of each sample from the Field op, in double.
 std::vector<double> densities(const RadianceField& f, const RaySamples& s) {
   ParamStore<double> store;
   const Field<double> field(store, f.options().field, 0);
@@ -48,7 +48,7 @@ TEST_CASE("sampler: without a stop, all that a walk of each ray gives") {
   const auto jitter = uniform<float>({40}, 0, 1, 3);
   const RaySamples s = sample(f, rays, {.step = 0.01f, .stop = 0}, jitter.data);
   REQUIRE(s.ray_begin.size() == 41);
-  CHECK(s.ray_begin[4] == s.ray_begin[3]);  // it misses
+  CHECK(s.ray_begin[4] == s.ray_begin[3]);  // the ray misses
   for (Index r = 0; r < 40; ++r) {
     const auto begin = s.t.begin() + s.ray_begin[static_cast<std::size_t>(r)],
                end = s.t.begin() + s.ray_begin[static_cast<std::size_t>(r + 1)];

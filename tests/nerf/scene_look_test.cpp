@@ -35,7 +35,7 @@ std::vector<View> views_of(const Paint& paint, int count = 10) {
   return views;
 }
 
-// A disc of varying place and size, as an object's silhouette.
+// True on a disc of varying position and size, like an object's silhouette.
 bool on_object(Index v, Index x, Index y) {
   const double u = static_cast<double>(x) - 22 - static_cast<double>(v % 3) * 2,
                w = static_cast<double>(y) - 20;
@@ -51,7 +51,7 @@ std::array<float, 4> training_image(Index v, Index x, Index y) {
   return {t, 1 - t, 0.5f * t, 1};
 }
 
-// Whether (x, y) is within `margin` pixels of the image's border.
+// True if (x, y) is within `margin` pixels of the image's border.
 bool in_frame(Index x, Index y, Index margin) {
   return std::min({x, y, kWidth - 1 - x, kHeight - 1 - y}) < margin;
 }
@@ -88,7 +88,7 @@ TEST_CASE("scene_look: training images are of a place, whatever their alpha has 
   CHECK(type_of(with_alpha([](Index, Index x, Index y) {
           return std::hypot((static_cast<double>(x) - 23.5) / 24, (static_cast<double>(y) - 19.5) / 20) > 1;
         })) == SceneType::place);
-  // Sky that was cut away.
+  // A sky that was cut away.
   CHECK(type_of(with_alpha([](Index v, Index, Index y) { return y < 8 + v % 2; })) == SceneType::place);
 }
 
@@ -123,7 +123,7 @@ TEST_CASE("scene_look: borders of another colour in each image are of a place") 
 }
 
 TEST_CASE("scene_look: the background is cut out up to a pixel from the object, holes and highlights stay") {
-  // A square of 20 pixels with a hole of the background's colour, and a highlight of two pixels through its
+  // A square of 20 pixels with a hole in the background's colour, and a highlight of two pixels through its
   // rim.
   View view = views_of(
       [](Index, Index x, Index y) -> std::array<float, 4> {

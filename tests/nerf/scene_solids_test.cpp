@@ -16,7 +16,8 @@ namespace {
 
 Camera eye_at(const Vec3& eye) { return make_camera(look_at(eye, {0, 0, 0}, {0, 0, 1}), 0.6911, 64, 64); }
 
-// Share of a view's opaque pixels whose colour differs from the right neighbour's by less than a step.
+// Returns the share of a view's opaque pixels whose colour differs from that of the right neighbour by less
+// than a step.
 double flat_share(SceneKind kind) {
   const Tensor<float> image = render_scene({.kind = kind, .size = 64}, eye_at({3, -1.5, 2}));
   double flat = 0, all = 0;
@@ -29,7 +30,7 @@ double flat_share(SceneKind kind) {
   return flat / all;
 }
 
-// The largest difference of one point of the top of a scene's first solid, seen from two sides.
+// Returns the largest difference in colour of a point on top of a scene's first solid, seen from two sides.
 double change_of_side(SceneKind kind) {
   const Solid first = scene_solids(kind, 0)[0].solid;
   double most = 0;

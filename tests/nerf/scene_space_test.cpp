@@ -56,7 +56,7 @@ TEST_CASE("scene_space: training images from around are contracted about what th
 
 TEST_CASE(
     "scene_space: an object that reaches out of the usual cube, or is lost in it, gets the cameras' cube") {
-  // A ball in the middle of all images, whose cube is that of the cameras.
+  // A ball in the middle of all images; its cube is that of the cameras.
   Dataset data;
   for (int i = 0; i < 12; ++i) {
     const double a = 0.6 * i;
@@ -79,7 +79,7 @@ TEST_CASE(
   CHECK(side_at(1) == usual);
   CHECK(side_at(0.1) == usual);
   CHECK(side_at(1e-3) == Approx(1e-3 * seen));
-  CHECK(side_at(1.3) == usual);  // the cameras see more, but the ball does not reach out
+  CHECK(side_at(1.3) == usual);  // the cameras see farther, but the ball ends inside
   CHECK(side_at(10) == Approx(10 * seen));
   CHECK(side_at(1e4) == Approx(1e4 * seen));
 }
@@ -110,7 +110,7 @@ TEST_CASE("scene_space: forward-facing rays enter by the near plane and leave by
       raise_to(widest, std::abs(rays.origins[i] - 0.5));
     }
   }
-  CHECK((widest > 0.45 && widest < 0.6));  // and not much room is lost
+  CHECK((widest > 0.45 && widest < 0.6));  // little room is lost
 }
 
 TEST_CASE("scene_space: without bounds the plane is at a distance of 1") {

@@ -16,7 +16,7 @@ namespace {
 constexpr double kRadius = 0.6;
 constexpr Vec3 kSphereCentre{0.3, -0.2, 0.1};
 
-// Opaque where the ray through the pixel meets the ball.
+// Returns an image that is opaque where the ray through the pixel meets the ball.
 Tensor<float> image_of_ball(const Camera& camera) {
   Tensor<float> image(Shape{camera.height, camera.width, 4});
   for (Index y = 0; y < camera.height; ++y)
@@ -87,7 +87,7 @@ TEST_CASE("silhouettes: never cuts the ball, and cuts all but a rim outside of i
 }
 
 TEST_CASE("silhouettes: cells out of the image or behind the camera are kept") {
-  // One camera inside of the cube, looking along -x at nothing.
+  // One camera inside the cube, looking along -x at nothing.
   const Camera camera = make_camera(look_at({0.5, 0, 0}, {-1, 0, 0}, {0, 0, 1}), 0.8, 32, 32);
   const View one[] = {{.camera = camera, .rgba = Tensor<float>({32, 32, 4}), .name = {}}};
   const Index n = 16;
@@ -95,8 +95,8 @@ TEST_CASE("silhouettes: cells out of the image or behind the camera are kept") {
   const auto at = [&](Index x, Index y, Index z) {
     return hull[static_cast<std::size_t>(x + n * (y + n * z))];
   };
-  CHECK(at(14, 8, 8) == 1);  // behind
-  CHECK(at(2, 0, 8) == 1);   // in front, out of the image
+  CHECK(at(14, 8, 8) == 1);  // behind the camera
+  CHECK(at(2, 0, 8) == 1);   // in front of it, outside the image
   CHECK(at(1, 8, 8) == 0);   // seen to be empty
 }
 
@@ -104,7 +104,7 @@ TEST_CASE("silhouettes: where a mask hides the object nothing is ruled out, and 
   Scene scene(40, 4);
   const Index n = 32;
   const auto before = visual_hull(scene.views, {}, n);
-  // A mask over the left half of the ball, whose alpha the mask's object has cut to 0 there.
+  // A mask over the left half of the ball, where the masked object has cut alpha to 0.
   for (View& v : scene.views) {
     v.valid.assign(80 * 64, 1);
     for (Index p = 0; p < 80 * 64; ++p)
@@ -193,7 +193,7 @@ TEST_CASE("silhouettes: no ray outside the margin meets a cell of the hull") {
     View view;
     const double angle = 1.3 * k;
     view.camera = make_camera(look_at({3 * std::cos(angle), 3 * std::sin(angle), 1.0}, {0, 0, 0}, {0, 0, 1}),
-                              1.5, 64, 64);  // sees all of the cube
+                              1.5, 64, 64);  // sees the whole cube
     view.rgba = Tensor<float>({64, 64, 4});
     for (Index y = 28; y < 36; ++y)
       for (Index x = 27; x < 38; ++x) view.rgba[4 * (64 * y + x) + 3] = 1;

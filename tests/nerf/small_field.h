@@ -5,7 +5,7 @@
 
 #include "support/random.h"
 
-/// A field small enough for a test to render by brute force.
+/// Options of a field small enough to render by brute force.
 inline fieldmark::nerf::RadianceFieldOptions small_field_options() {
   return {.field = {.encoding = {.levels = 2,
                                  .features = 2,
@@ -18,7 +18,7 @@ inline fieldmark::nerf::RadianceFieldOptions small_field_options() {
           .step = 1.f / 64};
 }
 
-/// A field that learns a scene of 48 x 48 pixels in a hundred steps of 8192 samples.
+/// Options of a field that learns a scene of 48 x 48 pixels in a hundred steps of 8192 samples.
 inline fieldmark::nerf::RadianceFieldOptions trainable_field_options() {
   return {.field = {.encoding = {.levels = 4,
                                  .features = 2,
@@ -31,7 +31,7 @@ inline fieldmark::nerf::RadianceFieldOptions trainable_field_options() {
           .step = 1.f / 128};
 }
 
-/// The original field in small: networks of 3 layers of 16, 8 + 8 points a ray.
+/// Options of a small version of the original field: networks of 3 layers of 16 units, 8 + 8 points per ray.
 inline fieldmark::nerf::RadianceFieldOptions small_mlp_options() {
   return {.field = {.kind = fieldmark::nerf::FieldKind::mlp,
                     .mlp = {.layers = 3, .width = 16, .skip = 2, .position_bands = 4, .direction_bands = 2}},
@@ -40,7 +40,8 @@ inline fieldmark::nerf::RadianceFieldOptions small_mlp_options() {
           .points = {.average = 8, .importance = 8}};
 }
 
-/// Smooth random matter: table and networks with numbers large enough to matter, cameras around the origin.
+/// Returns a smooth random field: table and networks have numbers large enough to matter, and the cameras
+/// surround the origin.
 inline fieldmark::nerf::RadianceField small_field(unsigned seed = 1) {
   using namespace fieldmark;
   nerf::RadianceField field(small_field_options());

@@ -55,7 +55,7 @@ TEST_CASE("solid_texture: noise is continuous, differs by seed and covers its ra
     sum += value_noise({std::floor(p[0] * 1e4), std::floor(p[1] * 1e4), std::floor(p[2] * 1e4)}, 7);
     values.insert(v);
   }
-  CHECK(std::abs(sum / 1000 - 0.5) < 0.04);  // deviation of the mean: sqrt(1/12/1000) = 0.009
+  CHECK(std::abs(sum / 1000 - 0.5) < 0.04);  // standard deviation of the mean: sqrt(1/12/1000) = 0.009
   CHECK(values.size() == 1000);
 }
 

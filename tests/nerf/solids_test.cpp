@@ -12,7 +12,8 @@ using namespace fieldmark::nerf;
 namespace {
 double inner(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-// Signed: negative inside. Independent of the intersections: what it means to be in the solid.
+// Returns a signed value, negative inside the solid, from its definition and independently of the
+// intersections.
 double outside(const Solid& s, const Vec3& p) {
   const double x = p[0], y = p[1], z = p[2], rho = std::hypot(x, y);
   switch (s.kind) {

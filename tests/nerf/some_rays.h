@@ -6,13 +6,13 @@
 
 #include "support/random.h"
 
-/// Rays as tests list them, seen from where they go.
+/// Rays as tests list them, whose view directions are their directions.
 struct Rays {
   std::vector<float> origins, directions;
   fieldmark::nerf::RayBatch batch() const { return {origins, directions, directions}; }
 };
 
-/// Rays at the cube from all around; every seventh misses it, unless told not to.
+/// Returns rays towards the cube from all around; every seventh misses it unless `misses` is false.
 inline Rays some_rays(fieldmark::Index n, bool misses = true) {
   using fieldmark::Index;
   const auto u = uniform({n, 6}, -1, 1, 11);

@@ -25,7 +25,7 @@ Camera camera_at(const Vec3& eye, const Vec3& target, double angle = 0.9) {
   return make_camera(look_at(eye, target, {0, 1, 0}), angle, 9, 7);
 }
 
-// The rays of some pixels in a space, and the same in the world.
+// Returns the rays of some pixels in a space, and the same rays in the world.
 CubeRays rays_of(const Space& space, const Camera& camera) {
   CubeRays rays;
   rays.resize(4);
@@ -56,7 +56,7 @@ TEST_CASE("space: points by hand") {
   CHECK(distance(kNdc.to_cube({5, -5, -5}), {0.9, -0.2, 0.75}) < 1e-15);  // -0.2: outside
   CHECK(distance(kNdc.to_cube({0, 0, -1e12}), {0.5, 0.5, 1}) < 1e-11);
   CHECK(kContracted.to_cube({2, 3, 4}) == Vec3{0.5, 0.5, 0.5});
-  CHECK(kContracted.to_cube({3, 2.5, 4}) == Vec3{0.75, 0.375, 0.5});  // on the inner cube's face: linear
+  CHECK(kContracted.to_cube({3, 2.5, 4}) == Vec3{0.75, 0.375, 0.5});  // on a face of the inner cube: linear
   CHECK(kContracted.to_cube({4, 3, 4}) == Vec3{0.875, 0.5, 0.5});     // s = 2
   CHECK(distance(kContracted.to_cube({2, 3 - 1e12, 4}), {0.5, 0, 0.5}) < 1e-11);
 }
@@ -80,7 +80,7 @@ TEST_CASE("space: rays in a cube move and scale") {
 }
 
 TEST_CASE("space: rays in device coordinates pass through the images of the world's points, within 1e-5") {
-  // In front of the plane, behind it, and one that looks along it.
+  // In front of the plane, behind it, and looking along it.
   for (const auto& [eye, target] : {std::pair{Vec3{0.3, -0.2, 0.1}, Vec3{0.1, 0, -4}},
                                     {Vec3{-0.5, 0.2, -2}, Vec3{0, 0, -6}},
                                     {Vec3{-9, 0, -6}, Vec3{0, 0, -6}}}) {
@@ -118,7 +118,7 @@ TEST_CASE(
   const CubeRays rays = rays_of(kContracted, camera_at(eye, {1, 1, 3}));
   CHECK(rays.directions == rays.seen_from);
   CHECK(rays.batch(kContracted).contracted);
-  CHECK(rays.batch(kContracted).near == 0.125f);  // of a world of 4 a side
+  CHECK(rays.batch(kContracted).near == 0.125f);  // for a world of side 4
   for (const double t : {0., 2., 6., 100.})
     for (std::size_t i = 0; i < 12; i += 3) {
       float x[3];
@@ -146,7 +146,7 @@ TEST_CASE("space: seen cells are those of an image's cone, the same for every th
       REQUIRE(seen[c] >= first[c]);
       more += seen[c] > first[c];
       hidden += !seen[c];
-      // A cell whose middle is in the image, by the camera's own rays.
+      // A cell whose centre is in the image, according to the camera's own rays.
       const auto cell = static_cast<Index>(c);
       const auto middle = [](Index i) { return (static_cast<double>(i) + 0.5) / 12; };
       const Vec3 p = space.to_world({middle(cell % 12), middle(cell / 12 % 12), middle(cell / 144)});
@@ -157,7 +157,7 @@ TEST_CASE("space: seen cells are those of an image's cone, the same for every th
           best = std::max(best, dot(pixel_ray(camera, x - 0.5, y - 0.5).direction, to));
       if (best > 0.99995) CHECK(first[c] == 1);
       if (space.kind == SpaceKind::cube && best < 0.96)
-        CHECK(first[c] == 0);  // outer cells reach to infinity
+        CHECK(first[c] == 0);  // outer cells extend to infinity
     }
     CHECK(more > 0);
     CHECK(hidden > 0);

@@ -14,7 +14,7 @@ const auto harmonics_op = [](auto&, auto v) { return spherical_harmonics(v[0]); 
 
 double factorial(int n) { return std::tgamma(n + 1.0); }
 
-// Associated Legendre function without the Condon-Shortley sign, by the recurrence in l.
+// Associated Legendre function without the Condon-Shortley phase, by the recurrence in l.
 double legendre(int l, int m, double z) {
   double before = 0, now = 1;
   for (int k = 1; k <= m; ++k) now *= (2 * k - 1) * std::sqrt(1 - z * z);
@@ -26,7 +26,7 @@ double legendre(int l, int m, double z) {
   return now;
 }
 
-// Y_lm by its definition in angles, with the Condon-Shortley sign.
+// Y_lm from its definition in angles, with the Condon-Shortley phase.
 double harmonic(int l, int m, double z, double phi) {
   const int a = std::abs(m);
   const double k = std::sqrt((2 * l + 1) / (4 * std::numbers::pi) * factorial(l - a) / factorial(l + a));
@@ -50,7 +50,7 @@ TEST_CASE("spherical_harmonics: equal to the definition in angles, within 1e-15 
 }
 
 TEST_CASE("spherical_harmonics: orthonormal on the sphere, within 1e-14") {
-  // Exact for these polynomials: 4 Gauss points in z (degree 7), 16 equal steps in the azimuth.
+  // Exact for these polynomials: 4 Gauss points in z (degree 7) and 16 equal steps in azimuth.
   const double node[] = {-0.86113631159405258, -0.33998104358485626, 0.33998104358485626,
                          0.86113631159405258};
   const double weight[] = {0.34785484513745386, 0.65214515486254614, 0.65214515486254614,

@@ -1,5 +1,5 @@
 #pragma once
-// Views as survey_views() makes them, without images: for the tests of what is odd.
+// Views as survey_views() returns them, but without images, for the tests of oddities.
 #include <fieldmark/nerf/data_survey.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 #include "support/catch.h"
 #include "support/random.h"
 
-/// A training view of a random opaque image of 40 x 30 pixels.
+/// Returns a training view of a random opaque image of 40 x 30 pixels.
 inline fieldmark::nerf::SurveyedView surveyed(const fieldmark::nerf::Pose& pose, int number) {
   fieldmark::nerf::SurveyedView view{.name = std::to_string(number),
                                      .split = "train",
@@ -24,7 +24,7 @@ inline fieldmark::nerf::SurveyedView surveyed(const fieldmark::nerf::Pose& pose,
   return view;
 }
 
-/// Views of cameras around the origin that look at it, at a distance of 4.5.
+/// Returns views of cameras around the origin that look at it from a distance of about 4.5.
 inline std::vector<fieldmark::nerf::SurveyedView> ring_of_views(int count) {
   std::vector<fieldmark::nerf::SurveyedView> views;
   for (int i = 0; i < count; ++i) {
@@ -35,7 +35,7 @@ inline std::vector<fieldmark::nerf::SurveyedView> ring_of_views(int count) {
   return views;
 }
 
-/// The only one of its kind; fails if there is none or another.
+/// Returns the only oddity found; fails if there is none, more than one or one of another kind.
 inline fieldmark::nerf::Oddity only(const std::vector<fieldmark::nerf::Oddity>& found,
                                     const std::string& kind) {
   INFO(kind);

@@ -13,7 +13,8 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-// A ball's shell of occupied cells: part of the coarse levels' rows, and of the hashed ones'.
+// Returns a grid whose occupied cells form a spherical shell: they read part of the rows of coarse and of
+// hashed levels.
 OccupancyGrid shell(Index resolution) {
   OccupancyGrid grid(resolution);
   std::vector<std::uint8_t> bits(static_cast<std::size_t>(grid.cells()));
@@ -61,8 +62,7 @@ TEST_CASE("table_rows: every row that a point of an occupied cell reads, by the 
     }
     CAPTURE(l);
     CHECK(missed == 0);
-    CHECK(10 * spare <=
-          kept);  // those that only points within 1e-5 of a face read, or that no random point found
+    CHECK(10 * spare <= kept);  // rows read only within 1e-5 of a face, or that no random point hit
     CHECK(kept < encoding.first_row(l + 1) - encoding.first_row(l));
   }
 }

@@ -37,7 +37,7 @@ Dataset mixed_exposures() {
   return data;
 }
 
-// Cameras turned by about a degree and shifted by about a hundredth of their distance.
+// Cameras rotated by about a degree and shifted by about a hundredth of their distance.
 Dataset jittered() {
   Dataset data = objects_scene();
   for (std::size_t v = 0; v < data.views.size(); ++v) {
@@ -51,8 +51,8 @@ Dataset jittered() {
   return data;
 }
 
-// Mean over views of how far what a camera looks at, at the distance of the scene, is from where it should
-// be, after the mean of all is taken out.
+// Returns the mean over views of the distance between the point that a camera looks at, at the scene's
+// distance, and its true position, after subtracting the mean displacement.
 double displacement(const std::vector<Camera>& cameras) {
   const Dataset& truth = objects_scene();
   std::vector<Vec3> off;
@@ -67,7 +67,7 @@ double displacement(const std::vector<Camera>& cameras) {
   return sum;
 }
 
-// All that a run learnt.
+// Everything that a run learned.
 using Numbers = std::vector<std::vector<float>>;
 Numbers numbers(const RadianceField& field, const Trainer& trainer) {
   Numbers all{{field.params.values().begin(), field.params.values().end()},
@@ -104,7 +104,7 @@ TEST_CASE("trainer images: gains of training images are found, and the field fit
     while (!trainer.done()) trainer.step(0);
     const auto found = trainer.image_colours();
     double dark = 0, bright = 0;
-    for (std::size_t v = 0; 12 * v < found.size(); ++v)  // what becomes of grey
+    for (std::size_t v = 0; 12 * v < found.size(); ++v)  // the result for grey
       for (std::size_t k = 0; k < 3; ++k) {
         const float* row = &found[12 * v + 4 * k];
         (v % 2 == 0 ? dark : bright) +=

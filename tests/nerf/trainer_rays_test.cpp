@@ -19,7 +19,7 @@ namespace {
 
 constexpr Index kSize = 24, kParts = 8;
 
-// Training images whose pixels are the means of kParts x kParts of the scene's, colours by alpha.
+// Training images whose pixels are means of kParts x kParts of the scene's, with colours weighted by alpha.
 Dataset blurred_scene(Index views = 12, const char* split = "train") {
   Dataset data = make_scene({.size = kSize * kParts, .views = views}, split);
   for (View& v : data.views) {
@@ -63,7 +63,7 @@ std::vector<float> trained(const Dataset& data, Index supersampling, Index after
 
 TEST_CASE(
     "trainer_rays: a field taught with means over pixels is nearer to training images that are such means") {
-  const Dataset data = blurred_scene(40), judge = blurred_scene(6, "val");  // of rays that nothing learnt
+  const Dataset data = blurred_scene(40), judge = blurred_scene(6, "val");  // of rays that nothing learned
   const auto taught_with = [&](Index rays) {
     RadianceField field(field_options(rays));
     Trainer trainer(field, data, train_options(400, 100));
@@ -114,7 +114,7 @@ TEST_CASE("trainer_rays: supersampled steps give the same bytes for any thread c
 }
 
 TEST_CASE("trainer_rays: hard pixels are sought where the error is") {
-  // A scene that is learnt within the run, but for a patch of noise that differs between images.
+  // A scene that is learned within the run, except for a patch of noise that differs between images.
   Dataset data = make_scene({.kind = SceneKind::sphere, .size = 48, .views = 8});
   const CounterRng rng(1);
   for (std::size_t v = 0; v < data.views.size(); ++v)
@@ -135,7 +135,7 @@ TEST_CASE("trainer_rays: hard pixels are sought where the error is") {
   };
   const double even = psnr(0), half = psnr(0.5), all = psnr(1);
   CAPTURE(even, half, all);
-  // The rays chosen are harder: more of them meet the noise.
+  // The chosen rays are harder: more of them hit the noise.
   CHECK(half < even - 0.5);
   CHECK(all < half - 0.5);
 }
@@ -206,7 +206,7 @@ TEST_CASE("trainer_rays: errors name option and value") {
 }
 
 TEST_CASE("trainer_rays: a step has the least rays however many samples they have") {
-  // All cells occupied: a ray has so many samples that 1024 of them are a few rays.
+  // All cells are occupied: a ray has so many samples that 1024 of them make only a few rays.
   const Dataset data = make_scene({.size = 48, .views = 12});
   const auto samples_of = [&](Index least) {
     RadianceField field(small_field_options());

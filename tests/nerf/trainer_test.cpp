@@ -17,8 +17,8 @@ using namespace fieldmark;
 using namespace fieldmark::nerf;
 
 namespace {
-// Cells may be declared empty and steps grow after 16 steps: short runs pass through everything a long one
-// does.
+// Cells may be declared empty and steps grow after 16 steps, so that short runs pass through everything that
+// a long one does.
 TrainOptions train_options(Index steps) {
   return {.schedule = {.steps = steps},
           .samples_per_step = 8192,
@@ -28,7 +28,7 @@ TrainOptions train_options(Index steps) {
           .warm_up = 16};
 }
 
-// All that training left behind.
+// Everything that training leaves behind.
 struct Outcome {
   std::vector<float> values;
   std::vector<std::uint8_t> bits;
@@ -69,7 +69,7 @@ TEST_CASE("trainer: 100 steps on the built-in scene reach 19 dB") {
   RadianceField field(trainable_field_options());
   TrainOptions options = train_options(100);
   options.first_samples = options.samples_per_step;
-  options.hard_pixels = 0;  // the loss is of rays drawn evenly then
+  options.hard_pixels = 0;  // so that the loss is that of evenly drawn rays
   Trainer trainer(field, objects_scene(), options);
   trainer.step(0);
   const double start = trainer.train_psnr();
@@ -91,15 +91,14 @@ TEST_CASE("trainer: a field that is kept goes on from where it was, in its space
   }
   const std::string configuration = field.configuration();
   const std::vector<std::uint8_t> occupied(field.grid.bits().begin(), field.grid.bits().end());
-  Dataset elsewhere =
-      objects_scene();  // what another data set says of cameras and background is not taken over
+  Dataset elsewhere = objects_scene();  // cameras and background of the other data set must not be adopted
   elsewhere.views.resize(3);
   elsewhere.background = Background::black;
   const auto further = [&](bool keep) {
     RadianceField f = field;
     TrainOptions options = train_options(30);
     options.schedule.lr = 5e-3;
-    options.hard_pixels = 0;  // the loss is of rays drawn evenly then
+    options.hard_pixels = 0;  // so that the loss is that of evenly drawn rays
     options.keep = keep;
     Trainer trainer(f, elsewhere, options);
     trainer.step(0);
@@ -172,7 +171,7 @@ TEST_CASE("trainer: sets bounds, background and cameras of the field from the da
   RadianceFieldOptions options = trainable_field_options();
   options.occupancy = 64;
   RadianceField field(options);
-  // Many cameras, for a hull well inside the first cube on all sides.
+  // Many cameras, so that the hull lies well inside the first cube on all sides.
   const Dataset sphere = make_scene({.kind = SceneKind::sphere, .size = 48, .views = 40});
   const Trainer trainer(field, sphere, train_options(10));
   CHECK(field.space.bounds.side < 2.9);
@@ -206,7 +205,7 @@ TEST_CASE("trainer: the same bytes for one and two threads, on each instruction 
 TEST_CASE("trainer: a run that is interrupted and restored gives the bytes of one that is not") {
   const TemporaryFolder folder;
   const Index at = 23,
-              steps = 45;  // between two looks at the occupancy, after the first cells are declared empty
+              steps = 45;  // between two occupancy updates, after the first cells are declared empty
   {
     RadianceField field(trainable_field_options());
     Trainer trainer(field, objects_scene(), train_options(steps));
@@ -266,7 +265,7 @@ TEST_CASE("trainer: hashed levels take turns while steps are small, and the last
   const HashEncoding<float>& encoding = field.field.encoding();
   const Index entry = 2 * encoding.features();
   Trainer trainer(field, objects_scene(), train_options(40));
-  // Which levels still hold gradients after each step.
+  // True if a level still holds gradients after the step.
   const auto waits = [&](int level) {
     const auto grads = field.params.grads(encoding.table());
     const auto rows = grads.subspan(

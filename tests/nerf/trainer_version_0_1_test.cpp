@@ -29,13 +29,13 @@ TrainOptions short_run(std::uint64_t seed = 1) {
           .seed = seed};
 }
 
-// The options of short_run() as version 0.1 put them down.
+// The options of short_run() as version 0.1 wrote them.
 constexpr const char* kOptions =
     " data objects 6 views 16x16 seed 1 steps 24 samples 4096 from 2048 after 16.000000 rays 512 distortion "
     "0.000000 hard pixels 0.750000 huber 0.100000 stop 0.010000 table decay 0.100000 after 2000 supersampled "
     "after 8000 warm-up 8 lr 0.020000 half after 8000.000000 cooldown 0.300000 last 0.030000";
 
-// A checkpoint as version 0.1 wrote it, from one of today: the arrays of all parameters behind each other.
+// Converts a checkpoint to the form of version 0.1, whose arrays each concatenate all parameters.
 SafetensorsFile in_the_old_form(const SafetensorsFile& file, const RadianceField& field) {
   SafetensorsFile old;
   old.metadata = {{"of", field.configuration() + kOptions}};

@@ -1,5 +1,5 @@
 #pragma once
-// A small data set of images that a transforms.json names, for the tests of layouts.
+// A small data set of images with a transforms.json, for the tests of layouts.
 #include <fieldmark/core/files.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/dataset.h>
@@ -22,7 +22,7 @@ inline void write_image(const std::filesystem::path& path, fieldmark::Index widt
     fieldmark::write_file_atomically(path, fieldmark::encode_jpeg(image, 90));
 }
 
-/// A transforms.json of ten frames of 12 x 8 pixels, the last name first.
+/// Returns a transforms.json of ten frames of 12 x 8 pixels, in reverse order of names.
 inline nlohmann::json ten_frames() {
   nlohmann::json frames = nlohmann::json::array();
   for (int i = 9; i >= 0; --i)
@@ -32,7 +32,7 @@ inline nlohmann::json ten_frames() {
           {"w", 12},    {"h", 8},     {"aabb_scale", 4}, {"frames", frames}};
 }
 
-/// Its folder, images included.
+/// A folder with that transforms.json and its images.
 struct TrainingImages : TemporaryFolder {
   nlohmann::json json = ten_frames();
   TrainingImages() {

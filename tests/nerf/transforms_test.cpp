@@ -18,7 +18,7 @@ const std::string kGood =
     "  {\"file_path\": \"b.png\", \"transform_matrix\": [[0.6, -0.8, 0, 1], [0.8, 0.6, 0, 2], [0, 0, 1, 4], "
     "[0, 0, 0, 1]]}]}";
 
-// kGood with one piece replaced.
+// Returns kGood with one piece replaced.
 std::string with(const std::string& piece, const std::string& by) {
   std::string text = kGood;
   const auto at = text.find(piece);
@@ -75,7 +75,7 @@ TEST_CASE("transforms: errors of matrices name row and column") {
   expect_error(with("[0.6, -0.8, 0, 1], [0.8, 0.6, 0, 2]" + last, "[0, 0, 0, 1]"),
                at + ": expected 4x4 or 3x4 numbers, got 1 rows");
   expect_error(with(last, ", [0, 0, 0, 1]"),
-               at + ": expected a rotation");  // 3x4, the last row for the third
+               at + ": expected a rotation");  // 3x4, with the last row in place of the third
   expect_error(with(last, ", [0, 0, 1], [0, 0, 0, 1]"), at + "[2]: expected 4 numbers, got 3");
   expect_error(with(last, ", 5, [0, 0, 0, 1]"), at + "[2]: expected an array, got number");
   expect_error(with(last, ", [0, null, 1, 4], [0, 0, 0, 1]"), at + "[2][1]: expected a number, got null");
@@ -110,7 +110,7 @@ TEST_CASE("transforms: scaled, homogeneous, mirrored and 3x4 matrices are the po
          "1 of 2 poses have a scale, the first 2, which is taken out of their rotations");
   expect("[[-1.2, 1.6, 0, -2], [-1.6, -1.2, 0, -4], [0, 0, -2, -8], [0, 0, 0, -2]]",
          "1 of 2 poses are divided by the last number of their fourth row");
-  // A mirrored world: the rays of both frames are mirrored, and nothing else.
+  // In a mirrored world, the rays of both frames are mirrored and nothing else changes.
   std::string both = with(second, "[[-0.6, 0.8, 0, -1], [0.8, 0.6, 0, 2], [0, 0, 1, 4], [0, 0, 0, 1]]");
   both.replace(both.find("[[1, 0, 0, 0.5]"), 15, "[[-1, 0, 0, -0.5]");
   const Transforms mirrored = parse_transforms(both, "t.json");
@@ -155,7 +155,7 @@ TEST_CASE("transforms: intrinsics of the file, each replaced where a frame has i
   CHECK((own.frames[0].intrinsics.fl_x == 0 && !own.frames[0].intrinsics.cx));
   const Intrinsics& frame = own.frames[1].intrinsics;
   CHECK((frame.fl_x == 9 && frame.angle_y == 0.5 && frame.lens.k1 == -0.1 && frame.cx == 1.0));
-  // The angle of a frame goes before the focal length of the file.
+  // A frame's angle takes precedence over the file's focal length.
   std::string text = with("\"camera_angle_x\"", "\"fl_x\"");
   text.insert(text.find("\"file_path\": \"b.png\""), "\"camera_angle_x\": 0.6, ");
   const Transforms angle = parse_transforms(text, "t.json");
@@ -198,14 +198,14 @@ TEST_CASE("transforms: lenses and sizes that are not known are refused by name")
 }
 
 TEST_CASE("transforms: a rotation that is a little off is replaced by the nearest one") {
-  // Scaled by 1.004 and sheared: off by 8e-3, and the nearest rotation is the one it was made from.
+  // Scaled by 1.004 and sheared: off by 8e-3, and the nearest rotation is the original one.
   const Transforms t =
       parse_transforms(with("[0.6, -0.8, 0, 1], [0.8, 0.6, 0, 2], [0, 0, 1, 4]",
                             "[0.6024, -0.8032, 0, 1], [0.8032, 0.6024, 0, 2], [0, 0, 1.001, 4]"),
                        "t.json");
   const Pose want{0.6, -0.8, 0, 1, 0.8, 0.6, 0, 2, 0, 0, 1, 4};
   for (std::size_t k = 0; k < 12; ++k) CHECK(std::abs(t.frames[1].pose[k] - want[k]) < 1e-12);
-  // What single precision leaves is kept as it stands.
+  // Single-precision errors are left as they are.
   const Transforms kept = parse_transforms(with("0.6, -0.8", "0.600001, -0.8"), "t.json");
   CHECK(kept.frames[1].pose[0] == 0.600001);
 }

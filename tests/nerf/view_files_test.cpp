@@ -12,7 +12,7 @@ using namespace fieldmark::nerf;
 namespace fs = std::filesystem;
 
 namespace {
-// A mask of 12 x 8 pixels, `value` in the columns from `first` on, else 1 - value.
+// Writes a mask of 12 x 8 pixels: `value` in the columns from `first` on, else 1 - value.
 void write_mask(const fs::path& path, Index first, float value, Index width = 12, Index height = 8) {
   fs::create_directories(path.parent_path());
   Tensor<float> mask(Shape{height, width, 1});
@@ -36,7 +36,7 @@ TEST_CASE("view files: black excludes in a mask of mask_path, all but black in a
   write_mask(scene / "masks/1.png", 7, 0);
   scene.frame(1)["mask_path"] = "masks\\1.png";
   write_mask(scene / "images/dynamic_mask_2.png", 9, 1);
-  // Of 0 and 1, not 255.
+  // Masks of 0 and 1 instead of 0 and 255.
   write_mask(scene / "masks/3.png", 5, 0);
   Tensor<float> faint = read_image(scene / "masks/3.png");
   for (float& x : faint.data) x /= 255;
@@ -55,7 +55,7 @@ TEST_CASE("view files: black excludes in a mask of mask_path, all but black in a
 
 TEST_CASE("view files: a pixel that is part masked is excluded, at any size and behind a lens") {
   TrainingImages scene;
-  write_mask(scene / "masks/1.png", 7, 0, 24, 16);  // twice the image: 3.5 columns
+  write_mask(scene / "masks/1.png", 7, 0, 24, 16);  // twice the image's size: 3.5 columns
   scene.frame(1)["mask_path"] = "masks/1.png";
   scene.write();
   CHECK(view_of(load_dataset(scene.path), "1").valid == columns_below(3));
@@ -68,7 +68,7 @@ TEST_CASE("view files: a pixel that is part masked is excluded, at any size and 
   const auto kept = std::ranges::count(v.valid, 1);
   CHECK(kept > 0);
   CHECK(kept < std::ssize(v.valid));
-  // Columns are as the lens has them: what a valid pixel sees was left of column 3.5.
+  // The mask's columns are those of the distorted image: valid pixels see points left of column 3.5.
   for (Index i = 0; i < std::ssize(v.valid); ++i) {
     const double x = (static_cast<double>(i % v.camera.width) + 0.5 - v.camera.cx) / v.camera.fx,
                  y = (static_cast<double>(i / v.camera.width) + 0.5 - v.camera.cy) / v.camera.fy;
@@ -142,8 +142,8 @@ TEST_CASE("view files: lenses of images of several sizes are removed size by siz
 }
 
 namespace {
-// A JPEG file of 12 x 8 pixels, darkest in the upper left corner and brightest in the lower right one, that
-// asks to be turned.
+// Writes a JPEG file of 12 x 8 pixels, darkest in the upper left corner and brightest in the lower right,
+// with an EXIF orientation.
 void write_turned(const fs::path& path, int orientation) {
   Tensor<float> image(Shape{8, 12, 3});
   for (Index i = 0; i < image.size(); ++i)
@@ -151,7 +151,7 @@ void write_turned(const fs::path& path, int orientation) {
   write_file_atomically(path, with_orientation(encode_jpeg(image, 90), orientation, true));
 }
 
-// Red in the corners: upper left, upper right, lower left, lower right.
+// Returns red in the corners: upper left, upper right, lower left, lower right.
 std::vector<float> corners(const View& v) {
   const Index w = v.camera.width, h = v.camera.height;
   std::vector<float> red;

@@ -23,14 +23,14 @@
 #include "support/catch.h"
 #include "support/random.h"
 
-// A training step allocates nothing once its buffers have grown. What is counted: every call of malloc,
-// calloc, realloc, memalign, aligned_alloc and posix_memalign by any thread of this program, hence of
-// operator new, of arenas and of OpenMP too. The C library's own functions are replaced by ones that count,
-// then call it.
+// A training step allocates nothing once its buffers have grown. The test counts every call of malloc,
+// calloc, realloc, memalign, aligned_alloc and posix_memalign by any thread of this program, which includes
+// operator new, arenas and OpenMP. It replaces the C library's functions by ones that count and then call the
+// originals.
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
 #define FIELDMARK_COUNTS_ALLOCATIONS 1
 #else
-#define FIELDMARK_COUNTS_ALLOCATIONS 0  // a sanitizer replaces them itself
+#define FIELDMARK_COUNTS_ALLOCATIONS 0  // a sanitizer replaces the functions itself
 #endif
 
 namespace {
@@ -77,7 +77,7 @@ bool counts() {
   return FIELDMARK_COUNTS_ALLOCATIONS;
 }
 
-// Allocations while `step` is called so many times.
+// Returns the number of allocations during the given number of calls of `step`.
 template <class F>
 long allocations_in(int steps, F step) {
   const long before = allocations;
@@ -98,7 +98,7 @@ void for_threads(F check) {
 
 TEST_CASE("allocations: what allocates is counted") {
   if (!counts()) return;
-  static void* volatile seen;  // what is seen cannot be optimised away
+  static void* volatile seen;  // keeps the allocation from being optimised away
   (void)seen;
   CHECK(allocations_in(3, [] {
           const auto number = std::make_unique<int>(1);
@@ -107,7 +107,7 @@ TEST_CASE("allocations: what allocates is counted") {
   CHECK(allocations_in(1, [] {
           Arena arena;
           seen = arena.allocate(1 << 20);
-        }) == 2);  // the list of blocks and the block
+        }) == 2);  // the list of blocks, and the block
   CHECK(allocations_in(2, [] {
           AlignedVector<float> numbers(100);
           seen = numbers.data();
@@ -182,9 +182,8 @@ TEST_CASE(
     Trainer trainer(
         field, data,
         {.schedule = {.steps = 260}, .samples_per_step = 8192, .first_samples = 8192, .warm_up = 16});
-    // Cells are found empty at steps 16, 32 and 48: rays have fewer samples from then on, so a step takes
-    // more of them, and the last shards are used for the first time. Hard pixels shift where samples are
-    // until about step 150.
+    // Cells become empty at steps 16, 32 and 48: rays then have fewer samples, so a step takes more rays and
+    // uses the last shards for the first time. Hard pixels shift the samples until about step 150.
     for (int i = 0; i < 200; ++i) trainer.step(0);
     CHECK(allocations_in(60, [&] { trainer.step(0); }) == 0);
     CHECK(trainer.done());

@@ -17,10 +17,10 @@
 
 // Every file that the command writes for a fixed seed, key and number of steps has recorded bytes, for one
 // thread and for two. A change that is meant to change results says so and records them anew from the test's
-// own output. They come from:
+// own output. The records come from:
 //   - scene and fields: version 0.1;
-//   - owners, baked fields and renders: the commit that made the networks independent of the key; of presets
-//     paper and code, the one that gave them a warm start;
+//   - owners, baked fields and renders: the commit that made the networks independent of the key; for presets
+//     paper and code, the commit that gave them a warm start;
 //   - logits of preset fast: the commit that compares an image with few renders first.
 using namespace fieldmark;
 
@@ -35,7 +35,7 @@ void run(std::vector<std::string> words, const std::string& threads) {
   REQUIRE(outcome.code == 0);
 }
 
-// Of all files in a folder, by name.
+// Returns a hash of all files in a folder, in order of names.
 std::string folder_hash(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> paths;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) paths.push_back(entry.path());
@@ -45,7 +45,7 @@ std::string folder_hash(const std::filesystem::path& folder) {
   return sha256_hex(lines);
 }
 
-// Of the logits of every bit in every view: the detector's reading, digit for digit.
+// Returns a hash of the logits of every bit in every view: the detector's reading, digit for digit.
 std::string logits_hash(const std::string& json_file) {
   const auto json = nlohmann::json::parse(read_text(json_file));
   std::string numbers;
@@ -53,7 +53,7 @@ std::string logits_hash(const std::string& json_file) {
   return sha256_hex(numbers);
 }
 
-// What one preset of `embed` writes, marks and reads.
+// Adds the hashes of all that one preset of `embed` writes, marks and reads.
 void add_mark(Hashes& hashes, const TemporaryFolder& folder, const std::string& preset,
               const std::string& threads) {
   const std::string owner = folder / (preset + "_owner.fm"), baked = folder / (preset + "_baked.fm"),
@@ -122,7 +122,7 @@ void check_bytes(Isa level, const Hashes& expected, const std::string& threads) 
 
 }  // namespace
 
-// Cases of their own run side by side.
+// Separate cases run in parallel.
 TEST_CASE("bytes: all files are as recorded on x86-64-v2, one thread") {
   check_bytes(Isa::v2, kBytesV2, "1");
 }

@@ -6,8 +6,8 @@
 #include "tools/run_command.h"
 #include "tools/test_key_file.h"
 
-// The whole job through the command, on a scene of 48 x 48 pixels: from the data set to the verdict. Keys,
-// seeds and steps are fixed, so every run gives the same p-values on one instruction set.
+// Runs the whole job through the command on a scene of 48 x 48 pixels, from the data set to the verdict.
+// Keys, seeds and steps are fixed, so every run on one instruction set gives the same p-values.
 
 namespace {
 
@@ -57,7 +57,7 @@ struct EndToEnd {
     return outcome;
   }
 
-  // Verifies and returns the p-value, which must fit the exit code.
+  // Verifies and returns the p-value, which must match the exit code.
   double p_value(const std::string& message, const std::string& views, int code,
                  const std::vector<std::string>& more = {}) const {
     std::vector<std::string> words{"verify", "--owner", owner, "--message", message,

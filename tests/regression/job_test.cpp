@@ -13,8 +13,8 @@
 #include "support/catch.h"
 #include "watermark/test_key.h"
 
-// The whole job on the built-in scene at 64 x 64 pixels, from the first step to the message read from
-// images of the baked field. What changes results shows here, whether it was meant to or not.
+// Runs the whole job on the built-in scene at 64 x 64 pixels, from the first step to the message read from
+// images of the baked field. Any change of results shows here, intended or not.
 using namespace fieldmark;
 using namespace fieldmark::nerf;
 using namespace fieldmark::watermark;
@@ -65,7 +65,7 @@ TEST_CASE("regression: 300 steps of a field, to a millionth at fixed steps on on
   }
   const ScopedIsa scope(Isa::v3);
   const auto& got = trained().psnr;
-  // To be renewed, from the failure's own text, by a change that is meant to change results.
+  // A change that is meant to change results updates these from the failure's output.
   const double want[] = {21.1122255475, 23.6176396472, 28.0437947284, 30.8719738051};
   REQUIRE(got.size() == 4);
   for (std::size_t i = 0; i < 4; ++i) {

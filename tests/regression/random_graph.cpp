@@ -209,7 +209,7 @@ void RandomGraph<T>::add_losses(Table& t) {
   t["layer_norm"] = [](RandomGraph& g) {
     const std::size_t x = g.any(1);
     const fieldmark::Index n = g.vars_[x].shape()[-1];
-    const std::size_t noise = g.input(g.vars_[x].shape());  // a constant row is badly conditioned
+    const std::size_t noise = g.input(g.vars_[x].shape());  // a constant row is ill-conditioned
     const std::size_t y = g.emit("add", {x, noise}, {}, g.vars_[x] + g.vars_[noise]);
     const std::size_t gamma = g.input({n}), beta = g.input({n});
     g.emit("layer_norm", {y, gamma, beta}, {}, layer_norm(g.vars_[y], g.vars_[gamma], g.vars_[beta]));

@@ -17,8 +17,8 @@
 #include "support/random.h"
 #include "support/worst.h"
 
-/// A random graph of the engine's ops, recorded on a tape and described in JSON for another program. Before
-/// an op with a narrow domain stand ops that lead into it; numbers that grow are scaled down.
+/// A random graph of the engine's ops, recorded on a tape and described in JSON for another program. Ops with
+/// a narrow domain follow ops that map into it; growing numbers are scaled down.
 template <class T>
 class RandomGraph {
  public:
@@ -26,7 +26,7 @@ class RandomGraph {
 
   RandomGraph(fieldmark::Tape<T>& tape, std::uint64_t seed) : tape_(tape), rng_(seed), seed_(seed) {}
 
-  /// Some twelve ops, and the mean of every value that none of them reads.
+  /// Records twelve random ops, and the mean of every value that none of them reads.
   fieldmark::Var<T> build() {
     input({2, 3, 4});
     input({3, 4});
@@ -34,7 +34,7 @@ class RandomGraph {
     std::vector<std::string> names;
     for (const auto& [name, f] : table()) names.push_back(name);
     for (int i = 0; i < 12; ++i) {
-      // The first of each graph goes through the table, so that no op is left out.
+      // The first op of each graph cycles through the table, so that no op is left out.
       const auto pick = i == 0 ? static_cast<std::size_t>(seed_) % names.size() : below(names.size());
       table().at(names[pick])(*this);
     }
@@ -55,7 +55,7 @@ class RandomGraph {
     for (const auto& [name, f] : table()) names.push_back(name);
     return names;
   }
-  /// Runs the backward and adds inputs, cotangent, value and gradients to a file.
+  /// Runs the backward pass and adds inputs, cotangent, value and gradients to a file.
   void save(fieldmark::SafetensorsFile& file, const std::string& prefix, fieldmark::Var<T> y) {
     const auto u = uniform<T>(y.shape(), 0.5, 1.5, 7);
     tape_.backward(y, u.data);
@@ -83,7 +83,7 @@ class RandomGraph {
     inputs_.push_back(uniform<T>(shape, lo, hi, static_cast<unsigned>(++drawn_)));
     return leaf();
   }
-  // The last of inputs_ as a leaf.
+  // Makes the last of inputs_ a leaf.
   std::size_t leaf() {
     grads_.emplace_back(inputs_.back().shape);
     return emit("input", {}, {}, tape_.leaf(inputs_.back(), grads_.back()));
@@ -105,7 +105,7 @@ class RandomGraph {
   std::size_t scaled(std::size_t i, double factor) {
     return emit("scale", {i}, {{"factor", factor}}, scale(vars_[i], factor));
   }
-  // A value with at least `rank` axes, none of them empty.
+  // Returns a value with at least `rank` axes, none of them empty.
   std::size_t any(int rank = 0) {
     const std::size_t first = below(vars_.size());
     for (std::size_t k = 0; k < vars_.size(); ++k) {
@@ -114,7 +114,7 @@ class RandomGraph {
     }
     return input({2, 3, 4});
   }
-  // A new input that broadcasts with a value: some extents 1, some leading axes missing.
+  // Adds an input that broadcasts with a value: some extents 1, some leading axes missing.
   std::size_t partner(std::size_t i, double lo = -1, double hi = 1) {
     const fieldmark::Shape s = vars_[i].shape();
     std::vector<fieldmark::Index> extents;
@@ -122,12 +122,12 @@ class RandomGraph {
       extents.push_back(below(3) == 0 ? 1 : s[k]);
     return input(fieldmark::Shape(std::span<const fieldmark::Index>(extents)), lo, hi);
   }
-  // x^2 + 0.3.
+  // Returns x^2 + 0.3.
   std::size_t positive(std::size_t i) {
     const std::size_t s = emit("square", {i}, {}, square(vars_[i]));
     return emit("affine", {s}, {{"factor", 1.0}, {"offset", 0.3}}, affine(vars_[s], 1, 0.3));
   }
-  // Square matrices from an input, with 1, 1.4, .. added to the diagonal.
+  // Returns square matrices from an input, with 1, 1.4, .. added to the diagonal.
   std::size_t matrices() {
     const auto n = static_cast<fieldmark::Index>(2 + below(3));
     const std::size_t x = below(2) == 0 ? input({n, n}, -0.3, 0.3) : input({2, n, n}, -0.3, 0.3);

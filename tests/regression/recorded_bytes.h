@@ -2,9 +2,9 @@
 #include <map>
 #include <string>
 
-// SHA-256 of what bytes_test.cpp writes, for each instruction set. Scene and fields were recorded at commit
-// 07c747b, owners and all that is made with them where `embed` began to draw a code for each image. That of
-// AVX-512 is not recorded: no machine that had it was at hand.
+// SHA-256 of the files of bytes_test.cpp, for each instruction set. Scene and fields were recorded at commit
+// 07c747b; owners and all that is made with them, at the commit where `embed` began to draw a code for each
+// image. AVX-512 is not recorded, for want of a machine that has it.
 inline const std::map<std::string, std::string> kBytesV2{
     {"code baked field", "e26442e1977fc7c12dc57999b35e56c1cd15d9031d5d016972038d9b3c728518"},
     {"code logits", "0b84bf6eeb43dc3675d6a35f0929706c938ea9179ec5fa70e14b49738a6be61e"},

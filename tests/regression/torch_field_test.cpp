@@ -13,8 +13,8 @@
 #include "support/temporary_folder.h"
 #include "support/torch.h"
 
-// Another program reads the file of an mlp field of full size and gets the same colours: what is written is
-// what the networks are.
+// Another program reads the file of a full-size mlp field and gets the same colours: the file holds the
+// actual networks.
 using namespace fieldmark;
 using namespace fieldmark::nerf;
 
@@ -22,7 +22,7 @@ namespace {
 constexpr Index kRays = 1000;
 constexpr float kBias = -3;  // of log density
 
-// Networks as they begin, with densities that make some rays opaque and leave others clear.
+// Returns untrained networks with densities that make some rays opaque and leave others clear.
 RadianceField full_field() {
   RadianceField f(RadianceFieldOptions{.field = {.kind = FieldKind::mlp}, .seed = 4});
   for (const char* name : {"density/8/weight", "coarse/density/8/weight"})
@@ -78,7 +78,7 @@ TEST_CASE("regression: PyTorch draws an mlp field of full size from its file, 10
   double worst = 1;
   Index compared = 0;
   std::ifstream answer(folder / "answer");
-  REQUIRE(static_cast<bool>(answer >> compared >> worst));  // "nan" is no number to read
+  REQUIRE(static_cast<bool>(answer >> compared >> worst));  // extraction fails on "nan"
   CAPTURE(worst);
   CHECK(compared == kRays);
   CHECK(worst < 1e-4);

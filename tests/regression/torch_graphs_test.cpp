@@ -22,8 +22,8 @@ namespace {
 
 constexpr int kGraphs = 200;
 
-// Every graph in the precision of T, with the values and gradients that it has here, and what PyTorch says:
-// for each graph the errors of value and gradients, in float also PyTorch's own.
+// Evaluates every graph in the precision of T here and in PyTorch. Returns for each graph the errors of value
+// and gradients, and in float also PyTorch's own.
 template <class T>
 std::vector<std::array<double, 4>> errors_of_graphs(const char* precision) {
   const TemporaryFolder folder;
@@ -81,8 +81,8 @@ TEST_CASE("regression: PyTorch has the values and gradients of 200 random graphs
   }
 }
 
-// The reference is PyTorch in double on the same inputs. 197 graphs are within 1e-5, the bar for well
-// conditioned ones; on the other three PyTorch in float is as far from itself in double: its errors
+// The reference is PyTorch in double on the same inputs. 197 graphs are within 1e-5, the limit for
+// well-conditioned ones; on the other three, PyTorch in float is as far from PyTorch in double: its errors
 // are 3.0e-5, 9.3e-5 and 4.4e-5 where ours are 1.9e-5, 1.1e-5 and 4.4e-5.
 TEST_CASE(
     "regression: in float 200 random graphs are within 1e-5 of PyTorch in double, or as near as its float") {

@@ -31,17 +31,17 @@
 #include "support/torch.h"
 
 // Another engine takes the same steps: optimisers on a network of dense layers, and Adam on a convolutional
-// network and on a transformer.
+// network and a transformer.
 using namespace fieldmark;
 
 namespace {
 
 using Json = nlohmann::json;
 using Labels = std::vector<std::int32_t>;
-// A step for the gradients in a store.
+// Takes a step for the gradients in a store.
 using Optimiser = std::function<void(ParamStore<double>&)>;
 
-// What torch_training.py needs to take the same steps: arrays in the file, the rest in `runs`.
+// The data that torch_training.py needs to take the same steps: arrays in the file, the rest in `runs`.
 struct Record {
   SafetensorsFile file;
   Json runs;
@@ -50,7 +50,7 @@ struct Record {
   }
 };
 
-// Ten losses of a model. @param run  the model and the optimiser for PyTorch
+// Records ten losses of a model. @param run  the model and the optimiser for PyTorch
 void train(Record& record, const std::string& name, Json run, ParamStore<double>& store,
            const Optimiser& optimise, const std::function<Var<double>(Tape<double>&)>& loss_of) {
   run["name"] = name;
@@ -71,7 +71,7 @@ void train(Record& record, const std::string& name, Json run, ParamStore<double>
   record.runs.push_back(run);
 }
 
-// Adam for the first store that it sees.
+// Returns Adam for the first store that it is called with.
 Optimiser adam(const AdamOptions& o) {
   return [o, adam = std::shared_ptr<Adam<double>>()](ParamStore<double>& store) mutable {
     if (!adam) adam = std::make_shared<Adam<double>>(store, o);
@@ -103,7 +103,7 @@ void train_dense(Record& record, const std::string& name, Json run, const Optimi
   });
 }
 
-// Two convolutions with a norm, ReLU and pooling each, and a dense layer, on 6 images of 5 kinds.
+// Two convolutions, each with a norm, ReLU and pooling, and a dense layer, on 6 images of 5 classes.
 void train_convolutional(Record& record) {
   const std::string name = "convolutional";
   const auto x = uniform({6, 8, 8, 3}, -1, 1, 7);
@@ -125,7 +125,7 @@ void train_convolutional(Record& record) {
         });
 }
 
-// A block of attention in two heads, a norm and a network with GELU, on a text of 10 letters of 7 kinds.
+// A block of attention with two heads, a norm and a network with GELU, on a text of 10 letters of 7 kinds.
 void train_transformer(Record& record) {
   const std::string name = "transformer";
   constexpr Index n = 10, width = 12, heads = 2, w = width / heads, kinds = 7;

@@ -9,7 +9,7 @@
 #include "support/source_dir.h"
 #include "watermark/test_key.h"
 
-// Files of version 0.1 still load and mean what they meant: see version_0_1/README.md.
+// Files of version 0.1 still load and keep their meaning: see version_0_1/README.md.
 using namespace fieldmark;
 
 namespace {

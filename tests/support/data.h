@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-/// A folder or file below $FIELDMARK_DATA. Where it is missing, says so in the words that tools/test counts,
-/// and the test is to return.
+/// Returns the path of a file or folder below $FIELDMARK_DATA. If it is missing, prints the message that
+/// tools/test counts and returns nothing; the test must then return.
 inline std::optional<std::filesystem::path> data_or_skip(const std::string& path, const std::string& what) {
   const char* root = std::getenv("FIELDMARK_DATA");
   if (root && *root && std::filesystem::exists(std::filesystem::path(root) / path))

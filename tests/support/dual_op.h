@@ -12,7 +12,8 @@
 
 // f is a generic callable f(tape, x) of Vars or Duals, as in support/run_op.h.
 
-/// A function of one number, its value and its first two derivatives at x by Duals, with a tangent of 1.
+/// The value and the first two derivatives of a function of one number at x, computed by Duals with a tangent
+/// of 1.
 struct Derivatives {
   double value, first, second;
 };
@@ -23,7 +24,8 @@ Derivatives derivatives(const F& f, double x) {
   return {d.value[0], d.product[0], fieldmark::hvp(f, {at}, {one}).products[0][0]};
 }
 
-/// J v, then for each input H v of the sum of cubes of f. @param v  in [-1, 1], one for each input
+/// Returns J v, then for each input the product H v for the sum of cubes of f. @param v  in [-1, 1], one for
+/// each input
 template <class T, class F>
 std::vector<fieldmark::Tensor<T>> products_of(const F& f, const std::vector<fieldmark::Tensor<float>>& inputs,
                                               const std::vector<fieldmark::Tensor<float>>& v) {
@@ -41,7 +43,7 @@ std::vector<fieldmark::Tensor<T>> products_of(const F& f, const std::vector<fiel
   return all;
 }
 
-/// The largest |float - double| of products_of(), relative to the largest number of each tensor.
+/// Returns the largest |float - double| of products_of(), relative to the largest magnitude of each tensor.
 template <class F>
 double float_products_error(const F& f, const std::vector<fieldmark::Tensor<float>>& inputs) {
   std::vector<fieldmark::Tensor<float>> v;

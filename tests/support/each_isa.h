@@ -3,7 +3,7 @@
 
 #include "support/catch.h"
 
-/// Runs a check on every instruction set this CPU has, then goes back to the one in use.
+/// Runs a check on every instruction set that this CPU supports, then restores the current one.
 template <class F>
 void each_isa(F&& check) {
   for (fieldmark::Isa level : {fieldmark::Isa::v2, fieldmark::Isa::v3, fieldmark::Isa::v4}) {

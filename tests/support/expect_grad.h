@@ -6,7 +6,7 @@
 #include "support/catch.h"
 #include "support/random.h"
 
-/// Fails the test, with the offending entries, unless f passes the public gradient check.
+/// Fails the test and lists the wrong entries unless f passes the public gradient check.
 inline void expect_grad(const fieldmark::GradcheckFn& f, std::vector<fieldmark::Tensor<double>> inputs,
                         fieldmark::GradcheckOptions options = {}) {
   const auto report = fieldmark::gradcheck(f, inputs, options);

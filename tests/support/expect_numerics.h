@@ -9,8 +9,7 @@
 
 #include "support/each_isa.h"
 
-/// Fails unless every case stays within its limit on each instruction set of this CPU, under a name of its
-/// own.
+/// Fails unless every case has a unique name and stays within its limit on each instruction set of this CPU.
 inline void expect_numerics(const std::vector<fieldmark::NumericsCase>& cases) {
   std::set<std::pair<std::string, std::string>> names;
   for (const auto& c : cases) CHECK(names.insert({c.name, c.type}).second);

@@ -14,7 +14,7 @@
 #include "support/catch.h"
 #include "support/source_dir.h"
 
-/// Every case of a module passes, under a name of its own, with a relative error of at most `worst`.
+/// Checks that every case of a module has a unique name and passes with a relative error of at most `worst`.
 inline void expect_cases_pass(const std::vector<fieldmark::GradcheckCase>& cases,
                               double worst = std::numeric_limits<double>::infinity()) {
   std::set<std::string> names;
@@ -28,8 +28,8 @@ inline void expect_cases_pass(const std::vector<fieldmark::GradcheckCase>& cases
   }
 }
 
-/// Every header below a folder of the sources that says what it is differentiable in has a case whose name
-/// begins with the header's word. @return how many say so
+/// Checks that each header below a source folder that documents its differentiability has a case whose name
+/// begins with the header's word. @return the number of such headers
 inline int expect_case_of_each_header(const std::vector<fieldmark::GradcheckCase>& cases,
                                       const std::string& folder) {
   int found = 0;

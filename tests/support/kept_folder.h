@@ -12,7 +12,7 @@
 
 #include "support/catch.h"
 
-/// Held by one process at a time, and let go when it ends.
+/// A file lock, held by one process at a time and released at the end of the scope.
 struct FileLock {
   explicit FileLock(const std::filesystem::path& path) : file(::open(path.c_str(), O_CREAT | O_RDWR, 0600)) {
     REQUIRE(file >= 0);
@@ -24,16 +24,16 @@ struct FileLock {
   int file;
 };
 
-/// Files that many tests need and that take long to make. Tests run as processes of their own, so where
-/// FIELDMARK_KEPT names a folder, the first process of a program makes the files, keeps them there below
-/// `name`, and the others copy them.
-/// @param folder  exists; gets the files   @param make  writes them into `folder`
+/// Makes files that many tests need and that take long to make. Each test runs in its own process, so if
+/// FIELDMARK_KEPT names a folder, the first process of a test program makes the files and keeps them there
+/// below `name`; the others copy them.
+/// @param folder  exists; receives the files   @param make  writes them into `folder`
 inline void kept_files(const std::string& name, const std::filesystem::path& folder,
                        const std::function<void()>& make) {
   namespace fs = std::filesystem;
   const char* all = std::getenv("FIELDMARK_KEPT");
   if (!all) return make();
-  // Changes whenever the program is built anew.
+  // Changes with every build of the program.
   const fs::path self = fs::read_symlink("/proc/self/exe");
   const std::string program = self.string() + " " + std::to_string(fs::file_size(self)) + " " +
                               std::to_string(fs::last_write_time(self).time_since_epoch().count());

@@ -2,8 +2,8 @@
 #include <iostream>
 #include <string>
 
-/// Whether this build has an optional library. Where it has not, says so in the words that tools/test counts,
-/// and the test is to return.
+/// True if this build has an optional library. If not, prints the message that tools/test counts; the test
+/// must then return.
 inline bool library_or_skip(bool has, const std::string& what, const std::string& package) {
   if (!has) std::cout << "SKIPPED: " << what << " needs " << package << "\n";
   return has;

@@ -11,8 +11,8 @@
 #include <thread>
 #include <vector>
 
-/// An HTTP server of one thread on a free port of 127.0.0.1: each connection brings one request, whose text
-/// is given to `answer`, and gets what that returns, byte for byte, before it is closed.
+/// A single-threaded HTTP server on a free port of 127.0.0.1. It reads one request per connection, passes its
+/// text to `answer`, sends the result byte for byte, and closes the connection.
 class LoopbackServer {
  public:
   explicit LoopbackServer(std::function<std::string(const std::string&)> answer)
@@ -37,7 +37,7 @@ class LoopbackServer {
     ::close(socket_);
   }
   std::string url() const { return "http://127.0.0.1:" + std::to_string(port_) + "/"; }
-  /// The requests so far.
+  /// Returns the requests so far.
   std::vector<std::string> requests() {
     const std::lock_guard lock(mutex_);
     return requests_;

@@ -1,7 +1,7 @@
 #pragma once
 #include "support/random.h"
 
-/// Square matrices [.., n, n] with a diagonal of 3, 4, .. and numbers in [-1, 1) beside it.
+/// Returns random square matrices [.., n, n] in [-1, 1), with 3, 4, .. added to the diagonal.
 template <class T = double>
 fieldmark::Tensor<T> regular(fieldmark::Shape shape, unsigned seed) {
   fieldmark::Tensor<T> t = uniform<T>(shape, -1, 1, seed);

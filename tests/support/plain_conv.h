@@ -8,8 +8,8 @@
 
 #include "support/worst.h"
 
-/// Networks as the papers write them, in plain loops in double over channels-first images: nothing here is
-/// shared with the library but the file reader.
+/// The networks of the papers as plain loops in double over channels-first images. They share only the file
+/// reader with the library.
 struct PlainImage {
   long c = 0, h = 0, w = 0;
   std::vector<double> x;
@@ -21,7 +21,7 @@ inline PlainImage plain_image(long c, long h, long w) {
   return {c, h, w, std::vector<double>(static_cast<std::size_t>(c * h * w))};
 }
 
-/// relu(conv2d), PyTorch's layout of weights [out, in, k, k].
+/// Computes relu(conv2d) with weights in PyTorch's layout [out, in, k, k].
 inline PlainImage plain_conv(const PlainImage& x, const fieldmark::SafetensorsFile& file,
                              const std::string& name, long stride, long padding) {
   const auto w = file.f32(name + ".weight"), b = file.f32(name + ".bias");
@@ -44,7 +44,7 @@ inline PlainImage plain_conv(const PlainImage& x, const fieldmark::SafetensorsFi
   return y;
 }
 
-/// Largest numbers of windows; `ceil` as PyTorch's ceil_mode.
+/// Max pooling; `ceil` is PyTorch's ceil_mode.
 inline PlainImage plain_max_pool(const PlainImage& x, long size, long stride, bool ceil) {
   const auto extent = [&](long n) {
     const double windows = static_cast<double>(n - size) / static_cast<double>(stride);
@@ -63,14 +63,14 @@ inline PlainImage plain_max_pool(const PlainImage& x, long size, long stride, bo
   return y;
 }
 
-/// The channels of a, then those of b.
+/// Concatenates the channels of a and b.
 inline PlainImage plain_concat(PlainImage a, const PlainImage& b) {
   a.c += b.c;
   a.x.insert(a.x.end(), b.x.begin(), b.x.end());
   return a;
 }
 
-/// Largest difference relative to the largest magnitude. @param y  [1, H, W, C] of the library
+/// Returns the largest difference relative to the largest magnitude. @param y  [1, H, W, C] of the library
 template <class T>
 double plain_error(const PlainImage& want, const T* y) {
   double off = 0, most = 1e-30;

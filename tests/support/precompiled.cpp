@@ -1,1 +1,1 @@
-// Only the precompiled header of this target is of use.
+// This target exists for its precompiled header alone.

@@ -3,7 +3,7 @@
 
 #include <random>
 
-/// Same numbers on every machine and run for the same seed.
+/// Returns the same numbers for the same seed on every machine.
 template <class T = double>
 fieldmark::Tensor<T> uniform(fieldmark::Shape shape, double lo, double hi, unsigned seed) {
   fieldmark::Tensor<T> t(shape);

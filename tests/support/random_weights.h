@@ -6,8 +6,9 @@
 
 #include "support/random.h"
 
-/// A weight file in memory with random numbers in every tensor, of a size that keeps signals alive through
-/// ReLUs; names that begin with `left_out` are not in it. Linear layers (lin...) and scales are positive.
+/// Returns a weight file in memory with random numbers in every tensor, scaled to keep signals alive through
+/// ReLUs. Tensors whose names begin with `left_out` are omitted. Linear layers (lin...) and scales are
+/// positive.
 inline fieldmark::SafetensorsFile random_weights(std::span<const fieldmark::WeightTensor> tensors,
                                                  const std::string& left_out = "none") {
   fieldmark::SafetensorsFile file;

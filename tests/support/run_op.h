@@ -12,8 +12,8 @@
 #include "support/worst.h"
 
 /// An op under test is a generic callable f(tape, std::span<const Var<T>>) -> Var<T>.
-/// Returns its values, then the gradient of <u, f> in each input for a fixed random cotangent u. The inputs
-/// are outputs of an op before, as in a network, and memory holds NaN until it is filled.
+/// Returns the op's values, then the gradient of <u, f> in each input for a fixed random cotangent u. As in a
+/// network, the inputs are outputs of another op, and memory holds NaN until it is filled.
 template <class T, class F>
 std::vector<std::vector<T>> run_op(const F& f, const std::vector<fieldmark::Tensor<T>>& inputs) {
   fieldmark::Tape<T> tape;
@@ -30,7 +30,7 @@ std::vector<std::vector<T>> run_op(const F& f, const std::vector<fieldmark::Tens
   return result;
 }
 
-/// The values alone, with inputs as constants.
+/// Returns the values alone, with the inputs as constants.
 template <class T, class F>
 std::vector<T> op_values(const F& f, const std::vector<fieldmark::Tensor<T>>& inputs) {
   fieldmark::Tape<T> tape;
@@ -40,7 +40,7 @@ std::vector<T> op_values(const F& f, const std::vector<fieldmark::Tensor<T>>& in
   return {y.value(), y.value() + y.shape().size()};
 }
 
-/// Fails unless values and gradients in float have the same bits on one and on two threads.
+/// Fails unless float values and gradients have the same bits on one and on two threads.
 template <class F>
 void expect_same_bits(const F& f, const std::vector<fieldmark::Tensor<float>>& inputs) {
   const auto on = [&](int threads) {
@@ -50,8 +50,8 @@ void expect_same_bits(const F& f, const std::vector<fieldmark::Tensor<float>>& i
   CHECK(on(1) == on(2));
 }
 
-/// Largest |float - double| over the values and each gradient, relative to the largest number among them; the
-/// worst of all instruction sets that this CPU has.
+/// Returns the largest |float - double| over the values and each gradient, relative to the largest magnitude
+/// of each, on the worst instruction set of this CPU.
 template <class F>
 double float_error(const F& f, const std::vector<fieldmark::Tensor<float>>& inputs) {
   std::vector<fieldmark::Tensor<double>> exact;
@@ -75,7 +75,8 @@ double float_error(const F& f, const std::vector<fieldmark::Tensor<float>>& inpu
   return worst;
 }
 
-/// The largest float_error() of an op over extents from 1 to 130, whole vectors and every remainder of them.
+/// Returns the largest float_error() of an op over extents from 1 to 130, which cover whole vectors and every
+/// remainder.
 /// @param inputs  called as inputs(extent)
 template <class F, class I>
 double float_error_to_130(const F& f, const I& inputs) {

@@ -1,5 +1,5 @@
 #pragma once
 #include <string>
 
-/// The folder of the sources that the tests were built from.
+/// Returns the source folder that the tests were built from.
 std::string source_dir();

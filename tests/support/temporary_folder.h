@@ -19,7 +19,7 @@ struct TemporaryFolder {
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
   ~TemporaryFolder() { std::filesystem::remove_all(path); }
   std::filesystem::path operator/(const std::string& name) const { return path / name; }
-  /// Number of files and folders in it: shows a temporary file that was left behind.
+  /// Returns the number of files and folders in it, which reveals temporary files left behind.
   long entries() const {
     return std::distance(std::filesystem::directory_iterator(path), std::filesystem::directory_iterator());
   }

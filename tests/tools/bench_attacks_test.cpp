@@ -78,7 +78,7 @@ TEST_CASE("bench attacks: what is missing", "[bench]") {
   CHECK_THAT(r.err, Contains("--message"));
   const auto text = run_command(
       {"bench", "attacks", "--owner", job.owner, "--field", job.field, "--text", "hello", "--count", "1"});
-  CHECK(text.code == cli::kUsage);  // 4 bits hold no payload
+  CHECK(text.code == cli::kUsage);  // 4 bits are too few for a payload
   CHECK_THAT(text.err, Contains("--text"));
   CHECK(run_command({"bench", "attacks", "--owner", job.owner, "--field", job.field, "--message", "5",
                      "--attacked", "/no/such.fm"})

@@ -36,7 +36,7 @@ TEST_CASE("attack-field writes the field that the library makes, the same for th
   CHECK(same_numbers(
       a, watermark::apply_field_attack(watermark::parse_field_attack("weights_noise_0.1,float16"), before,
                                        CounterRng(3))));
-  // What was rounded before it was written reads back as it was.
+  // Rounding numbers that are already rounded changes nothing.
   CHECK(same_numbers(
       a, watermark::apply_field_attack(watermark::parse_field_attack("float16"), a, CounterRng(3))));
 }

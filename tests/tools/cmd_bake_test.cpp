@@ -40,7 +40,7 @@ TEST_CASE("bake changes colours only, and says nothing of the message in the fil
 
 TEST_CASE("bake makes the mark fainter where it is asked to", "[bake]") {
   const TinyJob& job = TinyJob::get();
-  // A fainter mark leaves the colours that training starts from, the unmarked ones, nearer to what is wanted.
+  // Training starts from the unmarked colours; the fainter the mark, the closer they are to the target.
   const auto distance = [&](const char* mark_psnr) {
     const auto r =
         run_command({"bake", "--owner", job.owner, "--message", "5", "--out", job.folder / "fainter.fm",
@@ -60,8 +60,8 @@ TEST_CASE("bake makes the mark fainter where it is asked to", "[bake]") {
              Contains("the colours of the file learned only " + std::to_string(std::lround(taken)) +
                       "% of the mark"));
   CHECK(json["scale"] == watermark::Baker::kLargestScale);
-  // Twice the difference, four times its square. PSNR is of images in bytes: two roundings add 1/12 of a
-  // step squared each, and the owner's random key decides how much that is beside the mark.
+  // Twice the difference gives four times its square. PSNR compares 8-bit images: two roundings add 1/12 of a
+  // squared step each, and the owner's random key decides how large that is relative to the mark.
   const double rounding = 2 / 12. / (255 * 255), square = std::pow(10.0, -learnt / 10) - rounding;
   CHECK(json["mark_psnr"].get<double>() == Approx(-10 * std::log10(4 * square + rounding)).margin(0.25));
   const double strong = distance("30"), faint = distance("50");
@@ -134,7 +134,7 @@ TEST_CASE("bake encodes payloads, and the other commands know them and their com
                  images})["commitment"] == bake["commitment"]);
   CHECK(json_of({"verify", "--detection", "blind", "--owner", owner, "--payload", "c0fe",
                  images})["commitment"] != bake["commitment"]);
-  // Nothing was learnt, so there is nothing to be read.
+  // The field learned nothing, so there is nothing to read.
   const auto extracted = json_of({"extract", "--fpr", "1", "--owner", owner, images});
   CHECK(extracted["payload"].is_null());
   CHECK(extracted["views"][0]["payload"].is_null());

@@ -76,7 +76,7 @@ TEST_CASE("compare refuses what cannot be paired", "[compare]") {
   const auto size = run_command({"compare", small, p.b + "/r_0.png"});
   CHECK(size.code == cli::kFailed);
   CHECK_THAT(size.err, Contains("expected the size of") && Contains("[8, 8, 3], found [24, 20, 3]"));
-  // Too small for SSIM and LPIPS: no number, and no error.
+  // Images too small for SSIM and LPIPS give no number and no error.
   const auto none = run_command({"compare", small, small, "--squeeze-weights", p.weights, "--json", "-"});
   REQUIRE(none.code == cli::kOk);
   CHECK(nlohmann::json::parse(none.out)["ssim"].is_null());
@@ -94,10 +94,10 @@ TEST_CASE("compare --reference holds LPIPS against the values in a folder, and f
   CHECK(json["pairs"].size() == 12);
   CHECK(json["worst_error"].get<double>() < 1e-6);
   CHECK(json["worst_layer_error"].get<double>() < 1e-6);
-  // Measured 5.1e-7 dB: the reference has PSNR of the images rounded to float in [-1, 1], which in double
-  // gives its values to 4e-15; that of their bytes is exact.
+  // Measured 5.1e-7 dB: the reference computes PSNR from images rounded to float in [-1, 1]; in double, such
+  // images reproduce its values to 4e-15. The PSNR of their bytes is exact.
   CHECK(json["worst_psnr_error"].get<double>() < 1e-6);
-  // One value changed by two times the bar.
+  // One value changed by twice the limit.
   const TemporaryFolder changed;
   nlohmann::json reference = nlohmann::json::parse(std::ifstream(*folder / "lpips_reference.json"));
   reference["pairs"].erase(reference["pairs"].begin() + 1, reference["pairs"].end());
@@ -111,7 +111,7 @@ TEST_CASE("compare --reference holds LPIPS against the values in a folder, and f
   const auto off = run_command({"compare", "--reference", changed.path.string(), "--json", "-"});
   CHECK(off.code == cli::kFailed);
   CHECK(nlohmann::json::parse(off.out)["worst_error"].get<double>() == Approx(2e-4).epsilon(0.01));
-  // A layer less: its error is not a number, which is the worst of all.
+  // With a layer missing, its error is NaN, which counts as the worst.
   value = value.get<double>() - 2e-4;
   auto& layers = reference["pairs"][0]["alex"]["per_layer_f32"];
   layers.erase(layers.begin());

@@ -83,14 +83,14 @@ TEST_CASE("distort takes the images of a folder as a clip for h264", "[attack]")
   };
   const auto r = distort("a", "noise_0,h264_5,noise_0.1,h264_0,noise_0");
   INFO(r.err);
-  CHECK(r.code == cli::kFailed);  // of the broken one
+  CHECK(r.code == cli::kFailed);  // because of the broken file
   const auto json = nlohmann::json::parse(r.out);
   REQUIRE(json["images"].size() == 4);
   CHECK(json["images"][3]["out"] == (folder / "a/r_3.png").string());
   distort("b", "h264_5");
   for (int k = 0; k < 4; ++k)
     CHECK(part_difference(read_image(folder / ("b/r_" + std::to_string(k) + ".png")), clip_frame(k)) < 0.04);
-  // Draws of a chain go by the place of the step, whether a clip is among them or not.
+  // The random draws of a chain depend on the position of the step, with or without a clip among the steps.
   distort("c", "h264_0,noise_0.1"), distort("d", "noise_0,noise_0.1");
   const auto c = read_image(folder / "c/r_1.png"), d = read_image(folder / "d/r_1.png");
   CHECK(part_difference(c, d) < 0.03);

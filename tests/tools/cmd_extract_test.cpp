@@ -100,7 +100,7 @@ TEST_CASE("extract reads frames of a video, evenly over its time", "[extract]") 
   if (!video_or_skip()) return;
   const TinyJob& job = TinyJob::get();
   const TemporaryFolder folder;
-  const std::string images = job.images(), clip = folder / "clip.bin";  // the content decides
+  const std::string images = job.images(), clip = folder / "clip.bin";  // the content decides, not the name
   VideoWriter writer(32, 32, {.crf = 5, .frames_per_second = 10});
   for (int k = 0; k < 10; ++k) writer.add(read_image(images + (k < 5 ? "/view_000.png" : "/view_001.png")));
   write_file_atomically(clip, std::span<const std::byte>(writer.finish()));

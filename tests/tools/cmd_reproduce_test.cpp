@@ -39,7 +39,7 @@ TEST_CASE("reproduce measures what is missing on the built-in scene, once", "[re
                                       "-",
                                       "--lpips-weights",
                                       "none"};
-  auto there = paper_cells().front();  // of the two cells of the table one has been measured
+  auto there = paper_cells().front();  // one of the two cells of the table has been measured
   there.name = {"copyrnerf_paper", "objects", "hash", 8, 1};
   save_cell(folder / "cells", there);
   const auto first = run_command(line);

@@ -173,7 +173,7 @@ TEST_CASE(
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
   const nlohmann::json json = nlohmann::json::parse(r.out);
-  CHECK(json["steps"] == 250);  // the first look at the held-out views
+  CHECK(json["steps"] == 250);  // the first evaluation of the held-out views
   REQUIRE(json["sizing"]["trials"].size() >= 3);
   CHECK(json["sizing"]["trials"][0]["taken"] == true);
   CHECK(json["file_bytes"].get<double>() < 1e6);
@@ -181,7 +181,7 @@ TEST_CASE(
             {"train", "--data", scene, "--out", folder / "no.fm", "--model", "sized", "--preset", "mlp"})
             .code == cli::kUsage);
 
-  // A third of a second is over before tables have been compared.
+  // A third of a second ends before any tables have been compared.
   const auto short_run = run_command({"train", "--data", scene, "--out", folder / "short.fm", "--model",
                                       "sized", "--seconds", "1", "--json", "-"});
   INFO(short_run.err);

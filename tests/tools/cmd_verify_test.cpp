@@ -25,7 +25,8 @@ TEST_CASE("verify answers with numbers, and with exit code 3 where nothing is fo
   CHECK(json["wrong_keys"]["n"] == 500);
   for (const char* p : {"1e-1", "1e-2", "1e-3"})
     CHECK(json["wrong_keys"]["counts"][p] <= json["wrong_keys"]["bounds_99"][p]);
-  // Twice the one-sided where the evidence is for the message; evidence against it counts on one side only.
+  // Twice the one-sided p-value if the evidence favours the message; evidence against it counts on one side
+  // only.
   const double one = json["p_value"], two = json["p_value_two_sided"];
   CHECK((one < 1 ? two == Approx(std::min(1.0, 2 * one)) : two <= 1));
   CHECK(json.contains("p_value_bits"));

@@ -50,7 +50,7 @@ TEST_CASE("code_option: a message of other digits sets the length, and says so, 
   CHECK_THROWS_WITH(choose({.key = "", .copy = "", .bits = 1000}, "", owner),
                     Contains("--bits: [owner] bits must be 1 to"));
   Owner paper = small_paper_owner();
-  CHECK(choose({}, "a5", paper).notes.empty());  // message_of() says what is wrong with it
+  CHECK(choose({}, "a5", paper).notes.empty());  // message_of() reports what is wrong with it
   CHECK(paper.options().bits == 3);
 }
 

@@ -41,7 +41,7 @@ struct ListedOption {
   std::string name, type;
 };
 
-// The words of a help text that begin its lines behind a title.
+// Returns the first words of the lines below a title in a help text.
 std::vector<std::string> names_below(const std::string& help, const std::string& title) {
   std::vector<std::string> names;
   std::istringstream lines(help.substr(std::min(help.find(title), help.size())));
@@ -52,7 +52,7 @@ std::vector<std::string> names_below(const std::string& help, const std::string&
   return names;
 }
 
-// The options of a help text that take a value: "  --seed N=1   ...".
+// Returns the options of a help text that take a value: "  --seed N=1   ...".
 std::vector<ListedOption> options_of(const std::string& help) {
   std::vector<ListedOption> options;
   std::istringstream lines(help);
@@ -63,14 +63,14 @@ std::vector<ListedOption> options_of(const std::string& help) {
     words >> option.name;
     if (words.get() != ' ' || words.peek() == ' ' || words.peek() < 'A') continue;  // a flag
     words >> option.type;
-    if (option.type.ends_with(':')) continue;  // a flag and what it excludes
+    if (option.type.ends_with(':')) continue;  // a flag with the options it excludes
     option.type.resize(std::min(option.type.find('='), option.type.size()));
     options.push_back(option);
   }
   return options;
 }
 
-// Every command, and the words behind it where it has any: {"bench", "engine"}.
+// Returns every command with its subcommand, if it has one: {"bench", "engine"}.
 std::vector<std::vector<std::string>> all_commands() {
   std::vector<std::vector<std::string>> commands;
   for (const std::string& name : names_below(run_command({"--help"}).out, "Subcommands:")) {
@@ -89,7 +89,7 @@ bool is_number(const std::string& type) {
 
 }  // namespace
 
-// One rule for all: an option that is added tomorrow is tried too.
+// Applies one rule to all options, so that options added later are tested too.
 TEST_CASE("command_line: no option of any command takes an empty value, NaN or infinity") {
   int tried = 0, numbers = 0;
   for (const auto& command : all_commands()) {

@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-/// Sets a variable of the environment, or takes it away (null), until the end of the scope.
+/// Sets an environment variable, or unsets it (null), until the end of the scope.
 struct EnvironmentVariable {
   std::string name;
   std::optional<std::string> before;

@@ -19,7 +19,7 @@ std::string small_page(const watermark::EvidenceRecord& record = small_evidence(
   return evidence_page(record, watermark::public_key(test_key(5)), small_images());
 }
 
-// Tags that are opened and not closed, but those that need no end.
+// Returns the tags that are opened but not closed, except those that need no end tag.
 std::vector<std::string> open_tags(const std::string& html) {
   const std::set<std::string> empty{"meta", "img", "br", "rect", "line", "circle", "!doctype"};
   std::vector<std::string> open;

@@ -54,7 +54,7 @@ TEST_CASE("evidence_run: three built-in controls, and one for each path that is 
   CHECK(names == "blank unmarked shuffled clean.png views ");
   CHECK(tested.controls[0].images[0].sha256.empty());
   CHECK(tested.controls[3].images[0].sha256.size() == 64);
-  // A folder of the images in question as its own control: the same evidence.
+  // The folder of questioned images as its own control gives the same evidence.
   CHECK(tested.controls[4].together.statistic ==
         watermark::keyed_statistic(total_evidence(run.images), run.code, run.message));
   const Json json = controls_json(tested.controls, 1);

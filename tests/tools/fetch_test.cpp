@@ -31,7 +31,7 @@ std::string answer(const std::string& status, const std::string& body, const std
   return "HTTP/1.1 " + status + "\r\n" + fields + "Content-Length: " + std::to_string(body.size()) +
          "\r\nConnection: close\r\n\r\n" + body;
 }
-// The place that a request asks to begin at.
+// Returns the offset at which a request asks to begin.
 std::size_t range_of(const std::string& request) {
   const auto at = request.find("Range: bytes=");
   return at == std::string::npos ? 0 : std::stoul(request.substr(at + 13));
@@ -115,7 +115,7 @@ TEST_CASE("fetch_file names the address and the status, and keeps what was there
   CHECK_THROWS_AS(fetch_file(url, folder / "f", expected(), go_on), IoError);
   CHECK(read_text(folder / "f") == "old");
   CHECK(folder.entries() == 1);
-  // A part that is longer than what the server has is not gone on with.
+  // A partial file longer than the server's file is not resumed.
   status = "416 Range Not Satisfiable";
   write_file_atomically(folder / "f.part", std::string_view("part"));
   CHECK_THROWS_WITH(fetch_file(url, folder / "f", expected(), go_on), Contains("416"));

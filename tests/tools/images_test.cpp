@@ -102,10 +102,10 @@ TEST_CASE("read_rgb repeats grey and shows the background through", "[images]") 
 TEST_CASE("read_rgb turns an image as its EXIF tag asks for it", "[images]") {
   const TemporaryFolder folder;
   Tensor<float> wide({8, 16, 3}, 0.f);
-  for (Index i = 0; i < wide.size(); ++i) wide[i] = i / 3 % 16 < 8 ? 1.f : 0.f;  // bright at the left
+  for (Index i = 0; i < wide.size(); ++i) wide[i] = i / 3 % 16 < 8 ? 1.f : 0.f;  // bright on the left
   write_file_atomically(folder / "a.jpg", with_orientation(encode_jpeg(wide, 90), 6, true));
   const auto image = read_rgb(folder / "a.jpg", 1);
-  REQUIRE(image.shape == Shape{16, 8, 3});  // clockwise: bright above
+  REQUIRE(image.shape == Shape{16, 8, 3});  // turned clockwise: bright at the top
   CHECK(image[0] > 0.9f);
   CHECK(image[image.size() - 1] < 0.1f);
 }

@@ -45,7 +45,7 @@ TEST_CASE("measured: a row has the figures side by side", "[measured]") {
   CHECK(row["blur_1 blind"] == 0.5);
   CHECK(row["blur_1 chosen"].is_null());
   for (const auto& [key, value] : row.items())
-    CHECK_FALSE(value.is_structured());  // a report's table takes it
+    CHECK_FALSE(value.is_structured());  // fits into a report's table
 }
 
 TEST_CASE("measured: people see the accuracies in percent", "[measured]") {

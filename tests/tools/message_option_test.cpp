@@ -16,7 +16,7 @@ TEST_CASE("message options: each kind is encoded, and told again", "[message_opt
   CHECK(cli::payload_json(
             cli::message_of({.message = "", .text = "", .uuid = uuid, .payload = ""}, 147))["value"] == uuid);
   CHECK_THROWS_AS(cli::message_of({.message = "", .text = "", .uuid = uuid, .payload = ""}, 146),
-                  cli::UsageError);  // as the help says
+                  cli::UsageError);  // as the help text says
   const auto plain = cli::message_of({.message = "a5c3", .text = "", .uuid = "", .payload = ""}, 16);
   CHECK(to_hex(plain) == "a5c3");
   CHECK(cli::payload_json(plain).is_null());

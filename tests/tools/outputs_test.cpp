@@ -16,7 +16,7 @@ using namespace fieldmark::cli;
 namespace fs = std::filesystem;
 
 namespace {
-/// A file of a kind, with one array.
+/// Writes a file of the given kind with one array.
 void write_model(const fs::path& path, const char* kind, const char* array) {
   SafetensorsFile file;
   set_model_info(file, {.kind = kind});
@@ -66,7 +66,7 @@ TEST_CASE("outputs: a folder is made and tried") {
   CHECK_THROWS_AS(prepare_folder("/proc"), IoError);
 }
 
-// Each names an input that is missing: an output is tried before the inputs are read.
+// Each command names a missing input: outputs are checked before inputs are read.
 TEST_CASE("outputs: every command refuses a secret and a folder in the place of its file before it works") {
   const TemporaryFolder folder;
   const std::string key = folder / "a.key", dir = folder / "dir";

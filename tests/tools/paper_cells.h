@@ -3,7 +3,7 @@
 #include <fieldmark/core/files.h>
 #include <fieldmark/imaging/image.h>
 
-/// Two systems at two lengths, ours below the paper's at 16 bits.
+/// Returns two systems at two lengths, with ours below the paper's at 16 bits.
 inline std::vector<fieldmark::baselines::Cell> paper_cells() {
   using fieldmark::baselines::Cell;
   std::vector<Cell> cells;

@@ -11,8 +11,8 @@
 #include "tools/test_key_file.h"
 #include "tools/tiny_scene.h"
 
-/// Embeds messages of 4 bits in a field in two steps: too few to read anything. The key is a known one, so
-/// that the owner is the same in every run.
+/// Embeds messages of 4 bits in a field in two steps, too few to read anything. The key is fixed, so that the
+/// owner is the same in every run.
 inline Outcome tiny_embed(const std::string& field, const std::string& owner,
                           const std::vector<std::string>& more) {
   std::vector<std::string> words{"embed", "--field",       field, "--out",   owner, "--bits",  "4", "--cells",
@@ -24,8 +24,8 @@ inline Outcome tiny_embed(const std::string& field, const std::string& owner,
   return run_command(words);
 }
 
-/// A field and an owner of 4-bit messages, made once: too little training to read anything, enough to run
-/// every path.
+/// A field and an owner of 4-bit messages, made once. They are trained too briefly to read anything, but
+/// exercise every path.
 struct TinyJob {
   TemporaryFolder folder;
   std::string scene = folder / "scene", field = folder / "field.fm", owner = folder / "owner.fm";
@@ -35,7 +35,7 @@ struct TinyJob {
     static const TinyJob job;
     return job;
   }
-  /// Two images of the field, in a folder.
+  /// Writes two images of the field into a folder.
   std::string images() const {
     const std::string out = folder / "views";
     if (std::filesystem::exists(out)) return out;

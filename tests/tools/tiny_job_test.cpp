@@ -5,7 +5,7 @@
 
 #include "support/catch.h"
 
-// The scripts of this folder take the field from here.
+// The scripts of this folder use this field.
 TEST_CASE("tiny_job: a field and an owner of it that the commands read") {
   const TinyJob& job = TinyJob::get();
   CHECK(fieldmark::nerf::RadianceField::load(job.field).cameras.directions.size() == 16);

@@ -8,7 +8,7 @@
 #include "support/temporary_folder.h"
 #include "tools/run_command.h"
 
-/// A built-in scene of a few small images, below the folder; returns its path.
+/// Writes a built-in scene of a few small images below the folder; returns its path.
 inline std::string tiny_scene(const TemporaryFolder& folder, const char* views = "16") {
   const std::string path = folder / "scene";
   const auto r = run_command({"scene", "--out", path, "--kind", "sphere", "--size", "16", "--views", views});
@@ -16,8 +16,8 @@ inline std::string tiny_scene(const TemporaryFolder& folder, const char* views =
   return path;
 }
 
-/// A small field with long steps along its rays, trained on the scene for a moment: `train` makes larger ones,
-/// whose views take six times as long, and a command renders hundreds. Returns its path.
+/// Trains a small field with long steps along its rays on the scene for a moment; returns its path. `train`
+/// makes larger fields, whose views take six times as long, and a command renders hundreds.
 inline std::string tiny_field(const TemporaryFolder& folder, const std::string& scene) {
   using namespace fieldmark;
   const std::string path = folder / "field.fm";

@@ -29,7 +29,7 @@ TEST_CASE("attack-field trains a field further, or a new one on its images", "[a
     CHECK(json["attack"] == words[0]);
     const auto after = nerf::RadianceField::load(out);
     CHECK(!std::ranges::equal(after.params.values(), before.params.values()));
-    // Further training keeps bounds and cameras; a new field finds its own.
+    // Further training keeps bounds and cameras; a new field chooses its own.
     CHECK((after.configuration() == before.configuration()) == (words[0] != "retrain"));
     const auto again = run(words);
     CHECK(std::ranges::equal(nerf::RadianceField::load(out).params.values(), after.params.values()));

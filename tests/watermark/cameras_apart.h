@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-/// How far apart two cameras see points about the origin: the median, in pixels.
+/// Returns how far apart two cameras see points about the origin: the median in pixels.
 inline double cameras_apart(const fieldmark::nerf::Camera& a, const fieldmark::nerf::Camera& b) {
   using namespace fieldmark::watermark;
   std::vector<double> distances;

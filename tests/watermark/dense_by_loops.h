@@ -7,7 +7,7 @@
 
 using Row = std::vector<double>;
 
-// One dense layer by loops.
+// Computes one dense layer by plain loops.
 inline Row layer(const fieldmark::ParamStore<double>& store, const std::string& name, const Row& x,
                  bool relu) {
   const auto w = store.values(store.find(name + "/weight")), b = store.values(store.find(name + "/bias"));

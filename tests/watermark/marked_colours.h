@@ -4,7 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-/// Colours at [N, 3] places after the owner's mark of these signs; directions are the places.
+/// Returns the colours at positions [N, 3] after the owner's mark with these signs; the positions serve as
+/// directions too.
 inline std::vector<float> marked(const fieldmark::watermark::Owner& owner,
                                  const std::vector<std::int8_t>& signs, const fieldmark::Tensor<float>& x,
                                  std::vector<float> rgb) {

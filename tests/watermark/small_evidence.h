@@ -3,7 +3,8 @@
 
 #include "watermark/test_key.h"
 
-/// Evidence of two images for a message of four bits on twelve cells, with a control and counted keys.
+/// Returns evidence of two images for a message of four bits on twelve cells, with a control and counted
+/// keys.
 inline fieldmark::watermark::EvidenceRecord small_evidence() {
   using namespace fieldmark::watermark;
   const std::vector<double> area(12, 1.0);
@@ -12,7 +13,7 @@ inline fieldmark::watermark::EvidenceRecord small_evidence() {
   const auto signs = cell_signs(code, message);
   std::vector<double> marked(signs.begin(), signs.end()), other(12);
   for (std::size_t c = 0; c < other.size(); ++c) other[c] = c % 3 == 0 ? 1 : -0.5;
-  marked[2] *= -0.5;  // one cell is read wrongly
+  marked[2] *= -0.5;  // one cell reads wrong
   EvidenceRecord record;
   record.owner_sha256 = std::string(64, 'a');
   record.commitment = std::string(64, 'c');

@@ -20,7 +20,7 @@ inline const fieldmark::watermark::FusionMark& fusion_mark_of(const fieldmark::w
   return dynamic_cast<const fieldmark::watermark::FusionMark&>(owner.mark());
 }
 
-/// An owner of a field of random matter that nobody trained: cheap where only the owner's workings matter.
+/// Returns an owner of an untrained random field, which is cheap if only the owner's workings matter.
 inline fieldmark::watermark::Owner small_owner(
     const fieldmark::watermark::OwnerOptions& options = small_owner_options(),
     const fieldmark::watermark::CellMarkOptions& mark = small_cell_mark()) {
@@ -32,7 +32,7 @@ inline fieldmark::watermark::Owner small_owner(
   return owner;
 }
 
-/// The same under preset paper, with small networks.
+/// Returns the same owner under preset paper, with small networks.
 inline fieldmark::watermark::Owner small_paper_owner() {
   using namespace fieldmark::watermark;
   const OwnerOptions o = small_owner_options();

@@ -11,7 +11,7 @@
 #include "support/temporary_folder.h"
 #include "watermark/test_key.h"
 
-/// The built-in scene at 48 x 48 pixels, learnt for 150 steps by a field of small tables.
+/// Returns a field of small tables trained for 150 steps on the built-in scene at 48 x 48 pixels.
 inline const fieldmark::nerf::RadianceField& tiny_field() {
   using namespace fieldmark;
   static const nerf::RadianceField field = [] {
@@ -29,14 +29,14 @@ inline const fieldmark::nerf::RadianceField& tiny_field() {
   return field;
 }
 
-/// Eight novel views of it at 48 x 48 pixels.
+/// Returns eight novel views of tiny_field() at 48 x 48 pixels.
 inline const std::vector<fieldmark::watermark::CachedView>& tiny_views() {
   static const auto views =
       fieldmark::watermark::cache_novel_views(tiny_field(), fieldmark::watermark::square_patch(48), 8, 3);
   return views;
 }
 
-/// An owner of it whose networks have not learnt anything yet.
+/// Returns an owner of tiny_field() whose networks have not learned anything yet.
 inline fieldmark::watermark::Owner tiny_owner(double mark_psnr = 30,
                                               const fieldmark::watermark::CellTrainingOptions& training = {
                                                   .anneal = 20}) {
@@ -48,14 +48,14 @@ inline fieldmark::watermark::Owner tiny_owner(double mark_psnr = 30,
           cell_mark({.network = {.bands = 4, .features = 8}, .base_channels = 8, .training = training})};
 }
 
-/// The mark of networks that have not learnt anything, of some strength, so that it can be found.
+/// Returns an owner with untrained networks whose mark is strong enough to be found.
 inline fieldmark::watermark::Owner marking_owner(double gain = 0.1) {
   fieldmark::watermark::Owner owner = tiny_owner();
   owner.gain = gain;
   return owner;
 }
 
-/// An owner under preset paper, with small networks.
+/// Returns an owner under preset paper, with small networks.
 inline fieldmark::watermark::Owner tiny_paper_owner(
     const fieldmark::watermark::PooledTrainingOptions& training = {}, bool authors_code = false) {
   using namespace fieldmark::watermark;

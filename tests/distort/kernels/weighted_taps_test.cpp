@@ -12,8 +12,8 @@
 using namespace fieldmark;
 
 namespace {
-// Worst error over every row length from 0 to 130, against long double, relative to the sum of the terms'
-// sizes.
+// Returns the worst error against long double over every row length from 0 to 130, relative to the sum of the
+// absolute terms.
 template <class T>
 double worst_error(bool add) {
   const std::vector<Index> offsets{7, 0, 131, 40, 3};

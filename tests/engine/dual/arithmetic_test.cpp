@@ -11,7 +11,7 @@ using namespace fieldmark;
 
 namespace {
 
-// The tangent of f(a, b) where a' = 2 and b' = 7.
+// Returns the tangent of f(a, b) where a' = 2 and b' = 7.
 template <class F>
 double tangent_of_two(const F& f, double a, double b) {
   return jvp([&](auto&, auto x) { return f(x[0], x[1]); }, {Tensor<double>({1}, a), Tensor<double>({1}, b)},
@@ -57,7 +57,7 @@ TEST_CASE("dual/arithmetic: powers of 0") {
 TEST_CASE("dual/arithmetic: one operand may be a Var, and both broadcast") {
   const auto x = uniform({2, 3}, 0.5, 1, 1), v = uniform({2, 3}, -1, 1, 2), row = uniform({4, 1, 3}, 1, 2, 3);
   const auto expect = [&](const auto& op) {
-    // As the same op of Duals, of which one has a tangent of 0.
+    // Equals the same op of Duals with a tangent of 0 for one of them.
     const Tensor<double> zero(row.shape);
     for (const bool swapped : {false, true}) {
       const auto mixed = jvp(

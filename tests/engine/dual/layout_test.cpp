@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::array<std::int32_t, 4> kLayoutIndex{1, 0, 1, 1};
 
-// A linear op: its tangent is the op of the tangent, and its products in float are those in double.
+// Checks a linear op: its tangent is the op of the tangent, and its products in float match those in double.
 template <class F>
 void expect_linear(const F& f, Shape shape) {
   const auto x = uniform(shape, -1, 1, 1), v = uniform(shape, -1, 1, 2);
@@ -66,7 +66,7 @@ TEST_CASE("dual/layout: what pad() adds is constant, and what concatenate() join
 }
 
 TEST_CASE("dual/layout: detach() stops tangent and gradient") {
-  // d/dx of x detach(x) counts the first factor alone.
+  // d/dx of x detach(x) differentiates the first factor only.
   const auto f = [](auto&, auto q) { return mul(q[0], detach(q[0])); };
   const auto d = derivatives(f, 3);
   CHECK(d.value == 9);

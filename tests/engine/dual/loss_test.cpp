@@ -70,7 +70,7 @@ TEST_CASE("dual/loss: binary cross-entropy") {
 TEST_CASE("dual/loss: cross-entropy counts rows with a label, whatever the others hold") {
   constexpr std::array<std::int32_t, 2> both{1, 0}, second{-1, 0};
   constexpr std::array<double, 2> weights{3, 1};
-  const double p = loss_sigmoid(1);  // of the second of two columns that differ by 1
+  const double p = loss_sigmoid(1);  // of the second of two columns, whose logits differ by 1
   const double row0 = (1 - p) * 1 + (p - 1) * 10, row1 = (1 - p - 1) * 100 + p * 1000;
   const auto of = [](auto labels, std::span<const double> w = {}) {
     return [=](auto a, auto) { return softmax_cross_entropy<double>(a, labels, w); };
@@ -94,7 +94,7 @@ TEST_CASE("dual/loss: feature_distance where features are all 0 has a tangent of
   const auto f = [&](auto& tape, auto x) {
     return feature_distance<double>(x[0], tape.constant(b), weights);
   };
-  // Of the second pixel: n = (0.6, 0.8), n' = (v - n (n v)) / 5 = (0.128, -0.096), d = (0.6, -0.2).
+  // For the second pixel: n = (0.6, 0.8), n' = (v - n (n v)) / 5 = (0.128, -0.096), d = (0.6, -0.2).
   CHECK(jvp(f, {a}, {v}).product[0] == Approx((0.6 * 0.128 + 3 * 0.2 * 0.096)).epsilon(1e-9));
   const auto both = [&](auto&, auto x) { return feature_distance<double>(x[0], x[0], weights); };
   CHECK(jvp(both, {a}, {v}).product[0] == 0);

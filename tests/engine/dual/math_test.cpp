@@ -9,7 +9,7 @@ using namespace fieldmark;
 
 namespace {
 
-// f(x), f'(x) and f''(x) by Duals against closed forms.
+// Checks f(x), f'(x) and f''(x) from Duals against closed forms.
 template <class F>
 void expect_derivatives(const F& f, double x, double first, double second) {
   CAPTURE(x);

@@ -10,7 +10,7 @@ using namespace fieldmark;
 
 namespace {
 
-// Matrices far from singular: noise on a diagonal of 4.
+// Returns matrices far from singular: noise plus a diagonal of 4.
 template <class T = double>
 Tensor<T> far_from_singular(Index batch, Index n) {
   auto t = uniform<T>({batch, n, n}, -1, 1, 1);
@@ -22,7 +22,7 @@ Tensor<T> far_from_singular(Index batch, Index n) {
 const Tensor<double> kMatrixA = far_from_singular(2, 3), kMatrixB = uniform({2, 3, 2}, -1, 1, 2);
 const Tensor<double> kMatrixDa = uniform({2, 3, 3}, -1, 1, 3), kMatrixDb = uniform({2, 3, 2}, -1, 1, 4);
 
-// Largest entry of the tangent of f, which is constant by its meaning.
+// Returns the largest entry of the tangent of f, which is constant by construction.
 template <class F>
 double largest_tangent(const F& f) {
   const auto r =
@@ -35,7 +35,7 @@ double largest_tangent(const F& f) {
 }  // namespace
 
 TEST_CASE("dual/matrices: what a solution was made for holds along a tangent too") {
-  // a x - b, a y - I, L L^T - a and log det - log |det| do not move.
+  // a x - b, a y - I, L L^T - a and log det - log |det| are constant.
   CHECK(largest_tangent([](auto a, auto b) { return batched_matmul(a, solve(a, b)) - b; }) < 1e-14);
   CHECK(largest_tangent([](auto a, auto) { return batched_matmul(a, inverse(a)); }) < 1e-14);
   CHECK(largest_tangent([](auto a, auto) {
@@ -63,7 +63,7 @@ TEST_CASE("dual/matrices: a determinant of 2 x 2") {
   const Tensor<double> a({2, 2}, {3, 1, 2, 5}), v({2, 2}, {1, 10, 100, 1000});
   const auto det = [](auto&, auto x) { return determinant(x[0]); };
   CHECK(jvp(det, {a}, {v}).product[0] == Approx(5 * 1 - 2 * 10 - 1 * 100 + 3 * 1000).epsilon(1e-14));
-  const auto h = hvp(det, {a}, {v}).products[0];  // H exchanges a with d, and -b with c
+  const auto h = hvp(det, {a}, {v}).products[0];  // H swaps a with d, and -b with c
   const std::vector<double> want{1000, -100, -10, 1};
   for (Index i = 0; i < 4; ++i) CHECK(h[i] == Approx(want[at(i)]).epsilon(1e-11));
   const Tensor<double> singular({2, 2}, {1, 2, 2, 4});
@@ -74,7 +74,7 @@ TEST_CASE("dual/matrices: products and layers follow the product rule, also with
   const auto rows = uniform({4, 3}, -1, 1, 1), matrix = uniform({3, 5}, -1, 1, 2),
              bias = uniform({5}, -1, 1, 3);
   const auto image = uniform({2, 3, 4, 2}, -1, 1, 4), window = uniform({3, 3, 2, 5}, -1, 1, 5);
-  // The tangent of all operands is the sum over one at a time, the others Vars.
+  // The tangent for all operands is the sum over one operand at a time, with the others as Vars.
   const auto check = [](const auto& f, const std::vector<Tensor<double>>& x) {
     std::vector<Tensor<double>> v;
     for (const auto& t : x) v.push_back(uniform(t.shape, -1, 1, 9));
@@ -112,7 +112,7 @@ TEST_CASE("dual/matrices: operands that are Vars cost no tangent") {
     for (Index k = 0; k < x.shape().size(); ++k) raise_to(worst, std::abs(x.value()[k] - y.value()[k]));
     return worst < 1e-14;
   };
-  // A tangent equal to its value: of a product the product, of a bias the bias.
+  // With a tangent equal to the value, a product's tangent is the product, a bias's is the bias.
   CHECK(same(matmul(dual_rows, m).tangent(), matmul(r, m)));
   CHECK(same(matmul(r, dual_matrix).tangent(), matmul(r, m)));
   CHECK(same(batched_matmul(dual_rows, m).tangent(), matmul(r, m)));

@@ -19,7 +19,7 @@ const std::vector<Tensor<double>> kNormInputs{uniform({2, 3, 2, 4}, -1, 2, 1), u
 const std::vector<Tensor<double>> kNormDirections{uniform({2, 3, 2, 4}, -1, 1, 4), uniform({4}, -1, 1, 5),
                                                   uniform({4}, -1, 1, 6)};
 
-// The norm of plain ops, over some axes, whose tangent is theirs.
+// The norm composed of plain ops over some axes, as the reference for the tangent.
 template <class V>
 V plain_norm(const V& x, const V& gamma, const V& beta, const Axes& axes) {
   const V c = x - mean(x, axes, KeepAxes::yes);
@@ -48,7 +48,7 @@ TEST_CASE("dual/norm: tangents are those of the formula written with plain ops")
                       [](auto&, auto x) {
                         return relu(plain_norm(x[0], x[1], x[2], {0, 1, 2}));
                       });
-  // One group, and as many groups as channels.
+  // One group, then as many groups as channels.
   expect_same_tangent([](auto&, auto x) { return group_norm(x[0], x[1], x[2], {.groups = 1, .relu = true}); },
                       [](auto&, auto x) {
                         return relu(plain_norm(x[0], x[1], x[2], {1, 2, 3}));

@@ -15,7 +15,7 @@ struct State {
   std::vector<double> x, g, m, v;
 };
 
-// Kingma and Ba's algorithm 1 as written there, in double.
+// Kingma and Ba's algorithm 1 as published, in double.
 void reference(State& s, int t, double lr, double decay, bool skip_zero) {
   for (std::size_t i = 0; i < s.x.size(); ++i) {
     if (skip_zero && s.g[i] == 0) continue;
@@ -38,8 +38,8 @@ kernels::AdamScalars<T> scalars(int t, double lr, double decay, bool skip_zero, 
           .zero_grads = zero_grads};
 }
 
-// Largest error of x after three steps at a place `offset` floats into a buffer, relative to the largest |x|
-// = 1.
+// Returns the largest error of x after three steps at `offset` floats into a buffer, relative to the largest
+// |x| = 1.
 template <class T>
 double worst_error(Index n, Index offset, bool skip_zero, bool zero_grads, auto kernel) {
   const Index size = n + offset + 1;
@@ -79,7 +79,8 @@ void check_level(double tolerance, auto kernel) {
 }  // namespace
 
 TEST_CASE("adam kernel: every level agrees with a plain double loop, and touches nothing outside its range") {
-  // Measured: 1.2e-7 in float and 2.2e-16 in double, two roundings of numbers near 1 (AVX2: one, it fuses).
+  // Measured: 1.2e-7 in float and 2.2e-16 in double, two roundings of numbers near 1 (one with AVX2, which
+  // fuses).
   check_level<float>(2e-7, kernels::isa_v2::adam_f32);
   check_level<double>(4e-16, kernels::isa_v2::adam_f64);
   if (isa_supported() >= Isa::v3) {

@@ -15,7 +15,7 @@ namespace {
 constexpr Unary kAll[] = {Unary::relu, Unary::sigmoid,       Unary::tanh,
                           Unary::exp,  Unary::truncated_exp, Unary::softplus};
 
-// Plain definitions in double.
+// The plain definitions in double.
 double reference(Unary f, double x) {
   switch (f) {
     case Unary::relu:

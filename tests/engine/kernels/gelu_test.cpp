@@ -13,7 +13,7 @@
 namespace fieldmark::kernels {
 namespace {
 
-// Plain definitions in double.
+// The plain definitions in double.
 double distribution(double x) { return std::erfc(-x / std::numbers::sqrt2) / 2; }
 double reference(double x) { return x * distribution(x); }
 double reference_slope(double x) {

@@ -13,21 +13,22 @@
 using namespace fieldmark;
 
 namespace {
-// To the nearest with 8 bits of mantissa, by arithmetic on the value.
+// Rounds to the nearest number with 8 significant bits, by arithmetic on the value.
 double nearest(float x) {
   int exponent = 0;
   const double mantissa = std::frexp(static_cast<double>(x), &exponent);
   return std::ldexp(std::nearbyint(std::ldexp(mantissa, 8)), exponent - 8);
 }
 
-// Units to try on this level: the plain loop of v2 and v3, all that the CPU has on v4.
+// Returns the units to test at this level: the plain loop on v2 and v3, all that the CPU has on v4.
 std::vector<bool> units() {
   if (isa() != Isa::v4) return {false};
   if (bf16_units() == Bf16Units::none) return {};
   return bf16_units() == Bf16Units::tiles ? std::vector<bool>{false, true} : std::vector<bool>{false};
 }
 
-// Worst difference from a loop in double over rounded numbers, relative to the sum of absolute products.
+// Returns the worst difference from a loop in double over rounded numbers, relative to the sum of absolute
+// products.
 double worst_error(Index m, Index n, Index k, bool tiles, bool accumulate, bool bias, bool relu, bool mask) {
   using namespace kernels;
   const Index a_row = k + 3, ldc = n + 5;
@@ -56,7 +57,7 @@ double worst_error(Index m, Index n, Index k, bool tiles, bool accumulate, bool 
     for (Index j = 0; j < ldc; ++j) {
       const double got = c[static_cast<std::size_t>(i * ldc + j)];
       if (j >= n) {
-        if (got != start[i * ldc + j]) return 1;  // wrote outside
+        if (got != start[i * ldc + j]) return 1;  // wrote outside the matrix
         continue;
       }
       double sum = accumulate ? start[i * ldc + j] : bias ? row[j] : 0, size = 1;

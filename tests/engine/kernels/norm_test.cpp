@@ -11,8 +11,8 @@
 namespace fieldmark::kernels {
 namespace {
 
-// One case with its plain double answer. Pixels begin one number into their buffers: at no address of a
-// vector.
+// One case with its plain result in double. Pixels start one number into their buffers, so that no address is
+// vector-aligned.
 struct Case {
   std::int64_t pixels, channels;
   Tensor<float> x, dy, mean, gain, shift, offset, slope;
@@ -64,7 +64,7 @@ void check_case(const Case& k, bool relu) {
     for (const double e : {std::abs(sums[c] - want_sums[c]), std::abs(mixed[c] - want_mixed[c])})
       raise_to(worst, e);
   CAPTURE(k.pixels, k.channels, relu);
-  CHECK(worst < 5e-6);  // numbers of size up to 10
+  CHECK(worst < 5e-6);  // values of magnitude up to 10
   for (const auto* to : {&y, &dx, &held}) CHECK((to->front() == 7 && to->back() == 7));
   CHECK((sums.back() == 7 && mixed.back() == 7));
 }
@@ -85,7 +85,7 @@ TEST_CASE("kernels/norm: every number of channels, and pixels that do and do not
 }
 
 TEST_CASE("kernels/norm: moments of pixels far from 0") {
-  // 1000 +- 1e-3: a sum of squares in float would keep no digit of the variance.
+  // 1000 +- 1e-3: a sum of squares in float would lose every digit of the variance.
   each_isa([] {
     for (std::int64_t channels = 1; channels <= 130; ++channels) {
       const std::int64_t pixels = channels % 50 == 1 ? 1001 : 131 - channels % 64;

@@ -11,7 +11,7 @@
 namespace fieldmark::kernels {
 namespace {
 
-// Windows of size x size, one pixel left over at the end of each row.
+// Checks windows of size x size, with one pixel left over at the end of each row.
 void check_windows(std::int64_t windows, std::int64_t size, std::int64_t channels) {
   const PoolRow p{windows, size, channels, (windows * size + 1) * channels};
   const auto x = uniform<float>({size * p.row}, -1, 1, 1),

@@ -20,7 +20,7 @@ struct Size {
   Index across() const { return (w + kTile - 1) / kTile; }
   Index down() const { return (h + kTile - 1) / kTile; }
   Index tiles() const { return n * across() * down(); }
-  // x at (i, j) of a tile, from its first pixel; 0 outside.
+  // Returns x at (i, j) of a tile, counted from its first pixel; 0 outside.
   double at(const Tensor<float>& x, const Tensor<float>* mask, Index tile, Index i, Index j, Index k) const {
     const Index y = tile / across() % down() * kTile + i, z = tile % across() * kTile + j;
     if (y < 0 || y >= h || z < 0 || z >= w) return 0;
@@ -29,7 +29,7 @@ struct Size {
   }
 };
 
-// Points of evaluation, and what the definition of each matrix says, in double.
+// The points of evaluation, and each matrix from its definition, in double.
 constexpr int kFinite = 5;
 const double kPoint[kFinite] = {0, std::sqrt(0.5), -std::sqrt(0.5), std::sqrt(2.0), -std::sqrt(2.0)};
 using Matrix = std::vector<std::vector<double>>;
@@ -68,7 +68,7 @@ Matrix transposed(const Matrix& m) {
   return t;
 }
 
-// (L X L^T)[i, j] with X given by a function.
+// Returns (L X L^T)[i, j], with X given by a function.
 template <class F>
 double both_axes(const Matrix& l, int i, int j, F x) {
   double sum = 0;
@@ -79,7 +79,7 @@ double both_axes(const Matrix& l, int i, int j, F x) {
 
 Index round_up(Index n, Index to) { return (n + to - 1) / to * to; }
 
-// Matrices [rows, columns] in panels, with room behind that must stay as it is.
+// Matrices [rows, columns] in panels, followed by memory that must stay unchanged.
 struct Room {
   Room(Index rows, Index columns, Index panel_)
       : panel(panel_),
@@ -102,7 +102,8 @@ struct Room {
   std::vector<float> data;
 };
 
-// Windows or tiles of all but the first tile against the definition; columns beyond the channels are zeros.
+// Checks windows or tiles of all but the first tile against the definition; columns beyond the channels are
+// zeros.
 template <class Kernel>
 double worst_of_transform(Kernel run, const Matrix& line, Index border, const Size& s, Index panel,
                           bool masked) {
@@ -138,7 +139,7 @@ TEST_CASE("kernels/winograd: windows and tiles are what the definitions of their
     for (const Size& s : sizes())
       for (bool masked : {false, true}) {
         CAPTURE(s.n, s.h, s.w, s.c, masked);
-        // Entries reach 50; 1.1e-5 and 2.9e-6 measured.
+        // Entries reach 50; measured 1.1e-5 and 2.9e-6.
         CHECK(worst_of_transform(FIELDMARK_KERNEL(winograd_windows<float>), window_matrix(), 1, s, s.c,
                                  masked) < 2e-5);
         CHECK(worst_of_transform(FIELDMARK_KERNEL(winograd_tiles<float>), powers(4), 0, s, Index{16},

@@ -8,7 +8,7 @@ TEST_CASE("nn conv2d: registers its parameters and applies them") {
   ParamStore<double> store;
   const Conv2d<double> layer(store, "c", {.in = 2, .out = 3}, 5);
   CHECK(store.entry(store.find("c/weight")).shape == Shape{3, 3, 2, 3});
-  // A single pixel sees only the centre of the window.
+  // A single pixel sees only the window's centre.
   const auto w = store.values(store.find("c/weight"));
   Tape<double> tape;
   const Tensor<double> x({1, 1, 1, 2}, {1, 2});

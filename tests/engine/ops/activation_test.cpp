@@ -23,7 +23,7 @@ void for_all(F check) {
   check("softplus", f_softplus);
 }
 
-// Numbers between -3 and 3, none within 0.1 of relu's kink.
+// Returns numbers between -3 and 3, none within 0.1 of relu's kink.
 Tensor<double> away_from_zero(Shape s) {
   auto x = uniform(s, -2.9, 2.9, 4);
   for (double& v : x.data) v += v < 0 ? -0.1 : 0.1;
@@ -63,7 +63,7 @@ TEST_CASE("activation: gradients at special places") {
     return g[0];
   };
   CHECK(slope(f_relu, 0) == 0);
-  CHECK(slope(f_truncated_exp, 20) == std::exp(15.0));  // straight through
+  CHECK(slope(f_truncated_exp, 20) == std::exp(15.0));  // straight-through
   CHECK(slope(f_softplus, 1000) == 1);
   CHECK(slope(f_softplus, -1000) == 0);
   CHECK(slope(f_sigmoid, -1000) == 0);

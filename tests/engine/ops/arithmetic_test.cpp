@@ -45,7 +45,7 @@ TEST_CASE("arithmetic: float against double for extents of 1 to 130") {
   CHECK(float_error_to_130(f_scale, [&](Index e) { return std::vector{pairs(e)[0]}; }) < 1.2e-7);
 }
 
-// Element by element, by indices that repeat along axes of extent 1.
+// Computes element by element, with indices that repeat along axes of extent 1.
 template <class F>
 static std::vector<double> by_indices(const Tensor<double>& a, const Tensor<double>& b, const Shape& shape,
                                       F f) {
@@ -75,7 +75,7 @@ TEST_CASE("arithmetic: shapes broadcast as index by index, with gradients") {
         Pair{{1, 1}, {1}, {1, 1}}, Pair{{0, 3}, {3}, {0, 3}}, Pair{{1}, {0}, {0}},
         Pair{{2, 1, 2, 1, 2}, {3, 1, 2, 1}, {2, 3, 2, 2, 2}}}) {
     CAPTURE(sa.str(), sb.str());
-    // An eighth apart or more: differences must not step over the kinks of minimum and maximum.
+    // At least an eighth apart: finite differences must not step over the kinks of minimum and maximum.
     auto a = uniform(sa, 0.5, 2, 1), b = uniform(sb, 0.5, 2, 2);
     for (double& v : a.data) v = std::round(4 * v) / 4;
     for (double& v : b.data) v = std::round(4 * v) / 4 + 0.125;
@@ -123,7 +123,7 @@ TEST_CASE("arithmetic: same bits for any thread count") {
   expect_same_bits(f_sub, in);
   expect_same_bits(f_mul, in);
   expect_same_bits(f_scale, {in[0]});
-  // Gradients that sum over what repeats.
+  // Gradients that sum over broadcast axes.
   expect_same_bits(f_mul, {uniform<float>({3001, 33}, -1, 1, 1), uniform<float>({33}, -1, 1, 2)});
   expect_same_bits(f_mul, {uniform<float>({33, 3001}, -1, 1, 1), uniform<float>({33, 1}, -1, 1, 2)});
   expect_same_bits(f_sub, {uniform<float>({}, -1, 1, 1), uniform<float>({3, 50001}, -1, 1, 2)});

@@ -1,4 +1,4 @@
-// Dilation and groups of conv2d.
+// Tests dilation and groups of conv2d.
 #include <fieldmark/engine/ops/conv2d.h>
 
 #include "support/expect_grad.h"
@@ -8,7 +8,7 @@
 using namespace fieldmark;
 
 namespace {
-// The definition with dilation and groups, values alone, in double.
+// The definition with dilation and groups, in double; values only.
 std::vector<double> plain_groups(const std::vector<Tensor<double>>& in, const ConvWindow& g) {
   const Tensor<double>&x = in[0], &w = in[1], &b = in[2];
   const Index H = x.shape[1], W = x.shape[2], C = x.shape[3], K = w.shape[0], O = w.shape[3],

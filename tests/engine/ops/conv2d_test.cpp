@@ -66,8 +66,8 @@ double error(const std::vector<float>& a, const std::vector<float>& b) {
   return worst / size;
 }
 
-// On every instruction set, the maximum absolute error of a pass relative to the largest magnitude, over
-// values and gradients.
+// Checks, on every instruction set, the maximum absolute error of a pass over values and gradients, relative
+// to the largest magnitude.
 void expect_close(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b, Activation act,
                   double most) {
   const Conv2dResult want = plain_conv2d(x, w, b, act);
@@ -143,14 +143,14 @@ TEST_CASE("conv2d: a large offset, a huge pixel and zeros through Winograd's way
   expect_close(spot, w, b, Activation::none, 4e-6);  // 2.8e-6 measured
   const Conv2dResult small = plain_conv2d(even, w, b, Activation::none);
   each_isa([&] {
-    // Outputs more than 4 pixels away do not feel it.
+    // Outputs more than 4 pixels away are unaffected.
     const Conv2dResult got = run(spot, w, b, Activation::none);
     double worst = 0;
     for (Index p = 0; p < 900; ++p)
       if (std::max(std::abs(p / 30 - row), std::abs(p % 30 - column)) > 4)
         for (Index o = 0; o < 32; ++o)
           raise_to(worst, std::abs(double(got.y[p * 32 + o]) - small.y[p * 32 + o]));
-    CHECK(worst < 3e-5);  // 2.3e-5 measured, of numbers up to 20
+    CHECK(worst < 3e-5);  // measured 2.3e-5, for values up to 20
 
     const Conv2dResult nothing = run(Tensor<float>(even.shape), w, b, Activation::none);
     for (Index i = 0; i < 900 * 32; ++i)
@@ -183,7 +183,7 @@ TEST_CASE("conv2d: gradient through Winograd's way") {
   const auto x = uniform({2, 5, 7, 8}, -1, 1, 1), w = uniform({3, 3, 8, 16}, -1, 1, 2);
   auto b = uniform({16}, -1, 1, 3);
   expect_grad([](Tape<double>&, auto v) { return conv2d(v[0], v[1], v[2]); }, {x, w, b});
-  // Biases that hold every ReLU well open or shut: differences must not step over its kink.
+  // Biases that keep every ReLU well open or shut: finite differences must not step over its kink.
   for (Index o = 0; o < 16; ++o) b[o] += o % 2 == 0 ? 100 : -100;
   expect_grad([](Tape<double>&, auto v) { return conv2d(v[0], v[1], v[2], Activation::relu); }, {x, w, b});
 }
@@ -235,7 +235,7 @@ TEST_CASE("conv2d: an image alone has the same bits as in a batch") {
 }
 
 namespace {
-// The definition with steps and a border, values and all gradients, in double.
+// The definition with stride and padding, values and all gradients, in double.
 Conv2dResult plain_steps(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b,
                          ConvWindow steps, Activation act) {
   const Index H = x.shape[1], W = x.shape[2], C = x.shape[3], K = w.shape[0], O = w.shape[3],

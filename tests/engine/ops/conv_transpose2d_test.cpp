@@ -29,7 +29,7 @@ auto op(const Sizes& s) {
   };
 }
 
-// Windows added one by one, and the sums of the definition's gradients for the cotangent u.
+// Adds windows one by one, and sums the gradients of the definition for the cotangent u.
 std::vector<std::vector<double>> by_loops(const Sizes& s, const std::vector<Tensor<double>>& in) {
   const Index height = (s.h - 1) * s.stride + s.k - 2 * s.padding,
               width = (s.w - 1) * s.stride + s.k - 2 * s.padding;

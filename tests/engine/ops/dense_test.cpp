@@ -28,7 +28,7 @@ DenseResult run_dense(const Tensor<float>& x, const Tensor<float>& w, const Tens
   return {values, dx.data, dw.data, db.data};
 }
 
-// The same in double, by loops.
+// Computes the same in double, by loops.
 DenseResult plain_dense(const Tensor<float>& x, const Tensor<float>& w, const Tensor<float>& b,
                         Activation act) {
   const Index n = x.shape[0], in = x.shape[1], out = w.shape[1];
@@ -61,7 +61,7 @@ double dense_error(const std::vector<float>& a, const std::vector<float>& b) {
 
 TEST_CASE("dense: a batch of a few chunks has the bits of its chunks one after the other, on every isa") {
   each_isa([] {
-    for (const Index out : {40, 64}) {  // rows that are padded, and whole vectors in place
+    for (const Index out : {40, 64}) {  // padded rows, and whole vectors in place
       const Index n = 1100, in = 50;
       const auto x = uniform<float>({n, in}, -1, 1, 1), w = uniform<float>({in, out}, -1, 1, 2),
                  b = uniform<float>({out}, -1, 1, 3);
@@ -116,7 +116,7 @@ TEST_CASE("dense: gradient") {
 }
 
 TEST_CASE("dense: gradient through layers that mask for each other, with another op between") {
-  // Every other unit is shut, and all are far from their kink.
+  // Every other unit is shut, and all are far from the kink.
   const auto alternating = [](Shape shape, std::uint64_t seed) {
     Tensor<double> w = uniform(shape, 0.2, 1, seed);
     for (Index i = 1; i < shape.size(); i += 2) w[i] = -w[i];

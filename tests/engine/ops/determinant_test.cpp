@@ -29,7 +29,7 @@ TEST_CASE("determinant: gradient") {
     expect_grad(f_log_det, {regular(s, 1)});
   }
   expect_grad(f_det, {Tensor<double>({3, 3}, {1, 2, 3, 2, 4, 6, 1, 0, 1})});  // singular
-  expect_grad(f_det, {Tensor<double>({3, 3}, 1.0)});                          // of rank 1: no gradient
+  expect_grad(f_det, {Tensor<double>({3, 3}, 1.0)});                          // rank 1: no gradient
 }
 
 TEST_CASE("determinant: errors") {

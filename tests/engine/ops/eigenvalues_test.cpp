@@ -13,7 +13,7 @@ TEST_CASE("eigenvalues: values") {
   const auto y = op_values(f_eigenvalues, std::vector{Tensor<double>({2, 2, 2}, {2, 1, 1, 2, 5, 0, 0, -1})});
   const std::vector<double> want{1, 3, -1, 5};
   for (std::size_t i = 0; i < 4; ++i) CHECK(y[i] == Approx(want[i]).epsilon(1e-14));
-  // Of one that is not symmetric the symmetric part counts.
+  // Of a non-symmetric matrix, only the symmetric part counts.
   const auto part = op_values(f_eigenvalues, std::vector{Tensor<double>({2, 2}, {2, 2, 0, 2})});
   CHECK(part[0] == Approx(1).epsilon(1e-14));
   CHECK(part[1] == Approx(3).epsilon(1e-14));
@@ -22,7 +22,7 @@ TEST_CASE("eigenvalues: values") {
 TEST_CASE("eigenvalues: gradient") {
   for (Shape s : {Shape{0, 0}, Shape{1, 1}, Shape{2, 4, 4}})
     expect_grad(f_eigenvalues, {regular(s, 1)}, {.step = 0.3});
-  // The sum of equal ones is the trace.
+  // The sum of equal eigenvalues is the trace.
   Tape<double> tape;
   const Tensor<double> one({2, 2}, {3, 0, 0, 3});
   Tensor<double> g({2, 2});

@@ -13,7 +13,7 @@ auto with(const std::vector<T>& weights) {
   return [&weights](auto&, auto v) { return feature_distance<T>(v[0], v[1], weights); };
 }
 
-// Weights for either scalar, as float_error() asks for both.
+// Weights of either scalar type, because float_error() uses both.
 struct Weights {
   std::vector<float> f;
   std::vector<double> d;
@@ -60,7 +60,7 @@ TEST_CASE("feature_distance: values equal the formula, each image of a batch for
 TEST_CASE("feature_distance: pixels without features count as 0 and get no gradient") {
   Tensor<double> a({1, 1, 3, 2}), b({1, 1, 3, 2}), ga(a.shape), gb(a.shape);
   a.data = {0, 0, 0, 0, 3, 4};
-  b.data = {0, 0, 0, 2, 6, 8};  // equal, opposite a zero, and the same direction
+  b.data = {0, 0, 0, 2, 6, 8};  // equal, opposite a zero, and in the same direction
   const std::vector<double> w{2, 5};
   Tape<double> tape;
   const auto y = feature_distance<double>(tape.leaf(a, ga), tape.leaf(b, gb), w);
@@ -102,7 +102,7 @@ TEST_CASE("feature_distance: float against double, and the same bits for any thr
   double worst = 0;
   for (Index e = 1; e <= 130; ++e) {
     const Weights w(e);
-    // One channel has length 1 whatever it is: its gradient is the rounding of 0.
+    // A single channel always normalises to length 1: its gradient is the rounding error of 0.
     const double error = e == 1 ? 0
                                 : float_error(w.op(), {uniform<float>({2, 2, 3, e}, 0, 1, 1),
                                                        uniform<float>({2, 2, 3, e}, 0, 1, 2)});

@@ -10,7 +10,7 @@ using namespace fieldmark;
 
 namespace {
 
-// Chains that serve Lane and Var alike.
+// Chains that work for both Lane and Var.
 template <class F>
 void for_each_chain(F f) {
   f("arithmetic", [](auto x, auto z) { return (x * z - x / z + 2.f * x) / 3.f - (1.f - z) * (4.f / z); });
@@ -19,7 +19,7 @@ void for_each_chain(F f) {
   f("kinks", [](auto x, auto z) { return relu(x) + minimum(x, z) * maximum(x, z) - abs(z - x); });
 }
 const auto as_one = [](auto chain) { return [=](auto&, auto v) { return fused(chain, v[0], v[1]); }; };
-// Largest difference, relative to the largest magnitude.
+// Returns the largest difference, relative to the largest magnitude.
 double relative_error(const std::vector<double>& got, const std::vector<double>& want) {
   REQUIRE(got.size() == want.size());
   double off = 0, largest = 1e-30;

@@ -12,7 +12,7 @@ auto with(GroupNormOptions options) {
   return [options](auto&, auto v) { return group_norm(v[0], v[1], v[2], options); };
 }
 
-// The formula as it stands, in long double.
+// The formula as written, in long double.
 std::vector<double> reference(const Tensor<double>& x, const Tensor<double>& gamma,
                               const Tensor<double>& beta, GroupNormOptions o) {
   const Index pixels = x.shape[1] * x.shape[2], channels = x.shape[3], width = channels / o.groups;
@@ -56,7 +56,7 @@ TEST_CASE("group_norm: values") {
       const auto in = inputs({2, 5, 7, 6});
       CHECK(largest_difference(op_values(with(o), in), reference(in[0], in[1], in[2], o)) < 1e-14);
     }
-  // More than one piece of pixels to an image.
+  // Each image has more than one chunk of pixels.
   const auto large = inputs({1, 100, 41, 24});
   const GroupNormOptions o{.groups = 8};
   CHECK(largest_difference(op_values(with(o), large), reference(large[0], large[1], large[2], o)) < 1e-13);
@@ -69,7 +69,7 @@ TEST_CASE("group_norm: gradient") {
     expect_grad(with({.groups = 4}), inputs(s));
     expect_grad(with({.groups = 1}), inputs(s));
   }
-  // The ReLU's kink: no value before it lies within 0.05 of 0 for these numbers.
+  // No input of the ReLU lies within 0.05 of its kink for these numbers.
   auto in = inputs({1, 2, 2, 2});
   in[0].data = {-1, 1, 0.5, -0.7, 1.2, 0.4, -0.6, -0.9};
   in[2].data = {0.1, -0.1};
@@ -85,7 +85,7 @@ TEST_CASE("group_norm: zero variance, constant images, one element") {
       const auto r = run_op(with({.groups = 4}), in);
       for (std::size_t i = 0; i < r[0].size(); ++i) CHECK(r[0][i] == in[2].data[i % 4]);
       for (float g : r[1]) CHECK(std::isfinite(g));
-      for (float g : r[2]) CHECK(g == 0);  // dgamma: every normalised number is 0
+      for (float g : r[2]) CHECK(g == 0);  // dgamma: all normalised values are 0
     }
   }
 }

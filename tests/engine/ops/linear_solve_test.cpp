@@ -70,11 +70,11 @@ TEST_CASE("linear_solve: errors") {
   const Tensor<double> no_diagonal({2, 2, 2}, {1, 0, 0, 1, 1, 2, 2, 0});
   CHECK_THROWS_WITH(triangular_solve(tape.constant(no_diagonal), r),
                     "[triangular_solve] a: matrix 1 must not be singular, got 0 on the diagonal in row 1");
-  // A pivot of exactly 0 in the last row, which an estimate of the condition can miss.
+  // A pivot of exactly 0 in the last row, which a condition estimate can miss.
   const Tensor<double> no_pivot({2, 2}, {1, 0, 0, 0});
   CHECK_THROWS_WITH(inverse(tape.constant(no_pivot)),
                     "[inverse] a: matrix 0 must not be singular, got the reciprocal condition number 0");
-  // In float a matrix is singular that in double is not.
+  // A matrix that is singular in float but not in double.
   const Tensor<double> close({2, 2}, {1, 1, 1, 1 + 1e-9});
   const Tensor<float> rounded({2, 2}, {1, 1, 1, 1 + 6e-8f});
   Tape<float> single;

@@ -11,13 +11,13 @@ const auto f_mse = [](auto&, auto v) { return mse_loss(v[0], v[1]); };
 const auto f_l1 = [](auto&, auto v) { return l1_loss(v[0], v[1]); };
 const auto f_huber = [](auto&, auto v) { return huber_loss(v[0], v[1], 0.5); };
 
-// Cross-entropy against constants that outlive it.
+// Cross-entropy against constants that outlive the op.
 template <class T>
 auto bce(const std::vector<T>& targets, const std::vector<T>& weights = {}) {
   return [&targets, &weights](auto&, auto v) { return bce_with_logits<T>(v[0], targets, weights); };
 }
 
-// b, such that no |a - b| is near the place where huber's parabola with delta 0.5 becomes a line.
+// Returns b such that no |a - b| is near the point where huber's parabola with delta 0.5 becomes a line.
 Tensor<double> away_from_kink(const Tensor<double>& a, unsigned seed) {
   auto b = uniform(a.shape, -1, 1, seed);
   for (std::size_t i = 0; i < b.data.size(); ++i) {
@@ -90,7 +90,7 @@ TEST_CASE("loss: bce at logits of +-100 keeps value and slope to one rounding") 
     tape.backward(y);
     return std::pair{y.value()[0], g[0]};
   };
-  const float tiny = std::exp(-100.f);  // 3.8e-44, a denormal number
+  const float tiny = std::exp(-100.f);  // 3.8e-44, a subnormal number
   CHECK(run(100, 1) == std::pair{tiny, -tiny});
   CHECK(run(-100, 0) == std::pair{tiny, tiny});
   CHECK(run(100, 0) == std::pair{100.f, 1.f});

@@ -7,7 +7,7 @@ using namespace fieldmark;
 
 namespace {
 
-// The functions with what the C library has for them.
+// The functions with their counterparts in the C library.
 template <class F>
 void for_each_function(F f) {
   f(

@@ -26,8 +26,8 @@ TEST_CASE("matmul: gradient, also of empty and single extents") {
 }
 
 namespace {
-// Largest error of the float product and of its gradients, relative to the largest of their kind, against
-// loops in double.
+// Returns the largest error of the float product and of its gradients against loops in double, each relative
+// to its largest magnitude.
 double worst_error(Index m, Index k, Index n) {
   const auto a = uniform<float>({m, k}, -1, 1, 1), b = uniform<float>({k, n}, -1, 1, 2),
              g = uniform<float>({m, n}, -1, 1, 3);

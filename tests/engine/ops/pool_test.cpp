@@ -10,7 +10,7 @@ static const auto f_pool2 = [](auto&, auto v) { return avg_pool(v[0], 2); };
 static const auto f_global = [](auto&, auto v) { return global_avg_pool(v[0]); };
 
 TEST_CASE("pool: values") {
-  // Two channels, 3 x 5 pixels: the last row and column fill no window.
+  // Two channels, 3 x 5 pixels: the last row and column belong to no window.
   Tensor<double> x({2, 3, 5, 2});
   for (Index i = 0; i < x.size(); ++i) x[i] = static_cast<double>(i * i % 23);
   const auto y = op_values(f_pool2, std::vector{x}), all = op_values(f_global, std::vector{x});
@@ -41,7 +41,7 @@ TEST_CASE("pool: the gradient of dropped pixels is 0 in a buffer that the backwa
   Tape<float> tape;
   Tensor<float> x({2, 3, 5, 2}, 1.f), g(x.shape);
   const auto v = tape.leaf(x, g);
-  const auto inner = avg_pool(v, 1);  // its gradient buffer is made, not given
+  const auto inner = avg_pool(v, 1);  // its gradient buffer is allocated, not given
   const auto y = avg_pool(inner, 2);
   tape.backward(y, std::vector<float>(8, 1.f));
   for (Index i = 0; i < g.size(); ++i) {
@@ -51,7 +51,7 @@ TEST_CASE("pool: the gradient of dropped pixels is 0 in a buffer that the backwa
 }
 
 TEST_CASE("pool: mean of a million equal float pixels") {
-  // Every addition rounds to the same side, and sums in float are 16 long: measured 1.2e-7.
+  // Every addition rounds in the same direction, and float sums have 16 terms: measured 1.2e-7.
   const Tensor<float> x({1, 1000, 1000, 1}, 0.1f);
   CHECK(std::abs(op_values(f_global, std::vector{x})[0] / 0.1f - 1) < 3e-7f);
 }
@@ -86,7 +86,7 @@ auto max_of(const MaxPool& windows) {
   return [windows](auto&, auto v) { return max_pool(v[0], windows); };
 }
 
-// PyTorch's rule for the number of windows, counted instead of computed.
+// PyTorch's rule for the number of windows, by counting instead of a formula.
 Index count_windows(Index extent, const MaxPool& m) {
   Index count = 0;
   while (count * m.stride + m.size <= extent || (m.ceil_mode && count * m.stride < extent &&
@@ -131,7 +131,7 @@ TEST_CASE(
 TEST_CASE("max_pool: the first of equal numbers gets the gradient, NaN and infinities come through") {
   Tensor<float> x({1, 2, 2, 1}, 1.f), g(x.shape);
   Tape<float> tape;
-  const auto inner = avg_pool(tape.leaf(x, g), 1);  // its gradient buffer is made, not given
+  const auto inner = avg_pool(tape.leaf(x, g), 1);  // its gradient buffer is allocated, not given
   tape.backward(max_pool(inner, {.size = 2, .stride = 1}), std::vector<float>{3});
   CHECK(g.data == std::vector<float>{3, 0, 0, 0});
   for (Index at = 0; at < 4; ++at) {
@@ -146,7 +146,7 @@ TEST_CASE("max_pool: the first of equal numbers gets the gradient, NaN and infin
 }
 
 TEST_CASE("max_pool: gradient") {
-  // Numbers a tenth apart: differences of 0.02 change no winner.
+  // Numbers a tenth apart: differences of 0.02 change no maximum.
   for (const Shape s : {Shape{0, 4, 4, 2}, Shape{1, 3, 3, 1}, Shape{2, 4, 5, 2}}) {
     CAPTURE(s.str());
     Tensor<double> x(s);

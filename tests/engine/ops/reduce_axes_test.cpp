@@ -7,7 +7,7 @@ using namespace fieldmark;
 
 namespace {
 
-// Each set of axes of a shape [a, b, c] as a mask, and the element of the result that x[i] belongs to.
+// A set of axes of a shape [a, b, c] as a mask, and the element of the result that each x[i] belongs to.
 struct Reduced {
   Index size = 1;
   std::vector<Index> of;

@@ -31,7 +31,7 @@ TEST_CASE("reduce: gradient") {
 }
 
 TEST_CASE("reduce: three million pixels in float") {
-  // A running float sum of these stops growing near 2^24 * 0.1; long double is the reference.
+  // A running float sum would stop growing near 2^24 * 0.1; the reference is in long double.
   auto x = uniform<float>({3000000}, 0.1, 1, 8);
   long double want = 0;
   for (float v : x.data) want += v;
@@ -40,7 +40,7 @@ TEST_CASE("reduce: three million pixels in float") {
         6e-8 * static_cast<double>(want));  // one rounding to float
   CHECK(std::abs(average - static_cast<double>(want / 3000000)) <= 6e-8 * average);
 
-  // Almost everything cancels: 1e6, -1e6 pairs around a sum of 1e-3 a pair.
+  // Almost everything cancels: pairs 1e6, -1e6 around a sum of 1e-3 per pair.
   for (std::size_t i = 0; i < x.data.size(); i += 2) {
     x.data[i] = 1e6f;
     x.data[i + 1] = -1e6f + 0.0625f;

@@ -35,7 +35,7 @@ TEST_CASE("slice: gradient") {
 TEST_CASE("slice: float copies, forward and backward, for extents of 1 to 130") {
   CHECK(float_error_to_130(f_concat, [](Index e) {
           return std::vector{uniform<float>({3, e}, -1, 1, 1), uniform<float>({3, 131 - e}, -1, 1, 2)};
-        }) < 6e-8);  // the cotangent's own rounding
+        }) < 6e-8);  // rounding of the cotangent itself
   CHECK(float_error_to_130(f_slice, [](Index e) {
           return std::vector{uniform<float>({3, e + 2}, -1, 1, 1)};
         }) < 6e-8);

@@ -14,7 +14,7 @@ const auto f_softmax_weighted = [](Tape<double>&, std::span<const Var<double>> v
   return softmax_cross_entropy<double>(v[0], kLabels, kSoftmaxWeights);
 };
 
-// -log softmax by its definition, for logits of moderate size.
+// -log softmax from its definition, for logits of moderate size.
 double entropy(const Tensor<double>& x, std::size_t row, std::size_t label) {
   const auto cols = static_cast<std::size_t>(x.shape[1]);
   double z = 0;
@@ -54,7 +54,7 @@ TEST_CASE("softmax: cross-entropy of logits that overflow exp") {
 }
 
 TEST_CASE("softmax: a certain label keeps its tiny loss and slope") {
-  // exp(-20) = 2e-9 is lost in 1 + 2e-9, and so it was in log(sum) and in p - 1.
+  // exp(-20) = 2e-9 is lost in 1 + 2e-9, and hence in log(sum) and in p - 1.
   const std::vector<std::int32_t> label{1};
   const std::vector<Tensor<float>> x{{{1, 3}, {-20, 0, -20}}};
   const auto r = run_op([&](auto&, auto v) { return softmax_cross_entropy(v[0], label); }, x);

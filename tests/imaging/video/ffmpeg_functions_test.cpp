@@ -12,7 +12,7 @@
 using namespace fieldmark;
 
 namespace {
-// What the loader loads with a program, by name.
+// Returns the libraries that the loader loads with a program, by name.
 std::string libraries_of(const std::filesystem::path& program) {
   const std::string command = "LD_TRACE_LOADED_OBJECTS=1 '" + program.string() + "'";
   std::FILE* pipe = ::popen(command.c_str(), "r");

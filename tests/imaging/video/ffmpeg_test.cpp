@@ -9,7 +9,7 @@
 using namespace fieldmark;
 
 TEST_CASE("ffmpeg: display matrices have EXIF's names") {
-  // Columns as ISO/IEC 14496-12 has them: (x, y) to (a x + c y, b x + d y), y down.
+  // Columns as in ISO/IEC 14496-12: (x, y) to (a x + c y, b x + d y), y down.
   const auto orientation = [](int a, int b, int c, int d) {
     const std::int32_t one = 1 << 16, matrix[9] = {a * one, b * one, 0, c * one, d * one, 0, 0, 0, 1 << 30};
     return ffmpeg::orientation_of(matrix);
@@ -20,7 +20,7 @@ TEST_CASE("ffmpeg: display matrices have EXIF's names") {
   CHECK(orientation(-1, 0, 0, -1) == 3);
   CHECK(orientation(1, 0, 0, -1) == 4);
   CHECK(orientation(0, 1, 1, 0) == 5);
-  CHECK(orientation(0, 1, -1, 0) == 6);  // clockwise: the right goes down, below goes left
+  CHECK(orientation(0, 1, -1, 0) == 6);  // clockwise: right moves to the bottom, bottom to the left
   CHECK(orientation(0, -1, -1, 0) == 7);
   CHECK(orientation(0, -1, 1, 0) == 8);
 }

@@ -62,7 +62,7 @@ TEST_CASE("video_reader: samples are even over the time, each frame once") {
   close_to(even.sample_times(8), {0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7});
   close_to(even.sample_times(1000), {0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7});
   CHECK_THROWS_WITH(even.sample_times(0), Contains("count must be at least 1, got 0"));
-  // The last of its frames begins at 3.4 s: most of the time shows three of the eight frames.
+  // The last frame begins at 3.4 s: most of the time shows three of the eight frames.
   const auto variable = from_base64(kMovVariable);
   VideoReader uneven(variable, "variable.mov");
   close_to(uneven.sample_times(3), {0.4, 1.3, 2.3});
@@ -75,7 +75,7 @@ TEST_CASE("video_reader: a display matrix turns the frames") {
   VideoReader video(bytes, "turned.mov");
   const auto frame = video.read_at(0);
   REQUIRE(frame.image.shape == Shape{32, 16, 3});
-  // Counterclockwise: the right side is above.
+  // Turned counterclockwise: the right side is on top.
   const auto at = [&](Index y, Index x, Index c) { return frame.image[(y * 16 + x) * 3 + c]; };
   CHECK(at(6, 3, 0) == Approx(250 / 255.0).margin(0.06));
   CHECK(at(6, 12, 1) == Approx(220 / 255.0).margin(0.06));
@@ -99,11 +99,11 @@ TEST_CASE("video_reader: what is no video, or none any more, is one clear error"
   CHECK_THAT(fault(from_base64(kAudio)),
              Contains("x.mp4: expected a video, found a file without: only audio"));
   const auto mp4 = small_mp4();
-  // The index of an MP4 file stands at its end.
+  // An MP4 file has its index at the end.
   CHECK_THAT(fault({mp4.begin(), mp4.begin() + 300}), Contains("moov atom not found"));
   CHECK_THROWS_WITH(VideoReader(folder / "none.mp4"), Contains("none.mp4: open failed: No such file"));
   CHECK_THROWS_WITH(VideoReader(std::span<const std::byte>(), "memory"), Contains("memory: expected an MP4"));
-  // A playlist names other files: they are never opened.
+  // A playlist names other files, which are never opened.
   CHECK_THAT(fault([] {
                const std::string_view list = "#EXTM3U\n#EXTINF:1,\n/etc/passwd\n";
                const auto bytes = std::as_bytes(std::span(list.data(), list.size()));
@@ -127,7 +127,7 @@ TEST_CASE("video_reader: of a truncated file the frames that are there") {
 TEST_CASE("video_reader: a damaged frame is told, and the others are read") {
   if (!video_or_skip()) return;
   auto mp4 = small_mp4();
-  // Frames lie in mdat, behind x264's text; the last ones are overwritten.
+  // Frames are in mdat, after x264's text; the last ones are overwritten.
   const std::string_view name = "mdat";
   const auto found = std::search(mp4.begin(), mp4.end(), std::as_bytes(std::span(name)).begin(),
                                  std::as_bytes(std::span(name)).end());

@@ -14,14 +14,14 @@ inline bool video_or_skip() {
                          "libavformat-dev, libavcodec-dev, libswscale-dev");
 }
 
-/// Eight frames of clip_frame() in MP4, one every 0.1 s.
+/// Returns eight frames of clip_frame() in MP4, one every 0.1 s.
 inline std::vector<std::byte> small_mp4(int crf = 10) {
   fieldmark::VideoWriter writer(32, 16, {.crf = crf, .frames_per_second = 10});
   for (int k = 0; k < 8; ++k) writer.add(clip_frame(k));
   return writer.finish();
 }
 
-/// The largest difference of pixels in the middles of the parts, where chroma does not run over.
+/// Returns the largest pixel difference in the middles of the parts, where chroma does not bleed.
 inline double part_difference(const fieldmark::Tensor<float>& a, const fieldmark::Tensor<float>& b) {
   double most = 0;
   for (const int x : {4, 8, 12, 20, 24, 28})

@@ -12,13 +12,14 @@ using namespace fieldmark;
 using namespace fieldmark::kernels;
 
 namespace {
-// Largest absolute error of sin and cos of 2^b pi x against long double with an exactly reduced argument.
+// Returns the largest absolute error of sin and cos of 2^b pi x against long double with an exactly reduced
+// argument.
 template <class T>
 double worst_error(const Tensor<T>& x, int dims, int bands) {
   const Index n = x.size() / dims, row = 2 * bands * dims;
   std::vector<T> y(static_cast<std::size_t>(n * row) + 1, T(7));
   FIELDMARK_KERNEL(frequency_forward<T>)(x.data.data(), n, dims, bands, y.data());
-  if (y.back() != 7) return HUGE_VAL;  // wrote outside
+  if (y.back() != 7) return HUGE_VAL;  // wrote past the end
   double worst = 0;
   for (Index i = 0; i < n; ++i)
     for (Index b = 0; b < bands; ++b)

@@ -12,11 +12,11 @@ using namespace fieldmark;
 using namespace fieldmark::kernels;
 
 namespace {
-// A level indexed directly and a hashed one.
+// One directly indexed and one hashed level.
 constexpr HashLevel kLevels[] = {{3, 0, 0}, {16, 63, 64}};
 constexpr Index kRows = 128;
 
-// What the three kernels compute, in long double from the definition. Entry = 2 part features.
+// The results of the three kernels in long double, from the definition. Entry = 2 part features.
 struct Reference {
   std::vector<long double> density, colour, table_gradient, dx;
 };
@@ -63,7 +63,7 @@ void check_all(int part, Index n, double tolerance) {
   const auto as = [](const Tensor<float>& t) { return std::vector<T>(t.data.begin(), t.data.end()); };
   const auto x = as(xf), table = as(tf), dd = as(ddf), dc = as(dcf);
   const Reference want = reference(part, xf, tf, ddf, dcf);
-  // One more in each: what is not to be touched.
+  // One more element in each, which must stay untouched.
   std::vector<T> density(dd.size() + 1), colour(dd.size() + 1), dx(x.size() + 1), grad(table.size() + 1);
   FIELDMARK_KERNEL(hash_forward<T>)
   (kLevels, 2, part, x.data(), n, table.data(), density.data(), colour.data());
@@ -78,7 +78,7 @@ void check_all(int part, Index n, double tolerance) {
   CHECK(worst(density, want.density) < tolerance);
   CHECK(worst(colour, want.colour) < tolerance);
   CHECK(worst(grad, want.table_gradient) < 10 * tolerance);  // sums of up to 130 points
-  CHECK(worst(dx, want.dx) < 100 * tolerance);               // slopes of up to 16 cells, 16 terms each
+  CHECK(worst(dx, want.dx) < 100 * tolerance);               // slopes of up to 16 cells, with 16 terms each
 }
 }  // namespace
 
@@ -86,7 +86,7 @@ TEST_CASE("kernels/hash_grid: values and gradients of every count from 1 to 130,
   each_isa([] {
     for (const int part : {2, 4})
       for (Index n = 1; n <= 130; ++n) {
-        check_all<float>(part, n, 5e-6);  // 16 cells: fractions are off by up to 16 * 2^-24 = 1e-6 an axis
+        check_all<float>(part, n, 5e-6);  // 16 cells: fractions err by up to 16 * 2^-24 = 1e-6 per axis
         check_all<double>(part, n, 1e-14);
       }
   });
@@ -120,7 +120,7 @@ TEST_CASE("kernels/hash_grid: a table in bf16 gives what the rounded table gives
         const auto x = uniform<float>({n, 3}, 0, 1, 1);
         auto table = uniform<float>({kRows, 2 * part}, -1, 1, 2);
         std::vector<std::uint16_t> half;
-        for (float& v : table.data) {  // numbers that bf16 holds exactly
+        for (float& v : table.data) {  // values that bf16 represents exactly
           v = std::round(v * 128) / 128;
           std::uint32_t bits;
           std::memcpy(&bits, &v, sizeof bits);

@@ -12,7 +12,7 @@ using namespace fieldmark;
 using namespace fieldmark::kernels;
 
 namespace {
-constexpr int kSide = 12, kBlocks = 3, kCoarse = 2;  // an odd number of blocks: the last pair is half empty
+constexpr int kSide = 12, kBlocks = 3, kCoarse = 2;  // odd number of blocks: the last pair is half empty
 
 struct Grid {
   std::vector<bool> cells = std::vector<bool>(kSide * kSide * kSide);
@@ -55,7 +55,7 @@ std::vector<float> walked(const Grid& grid, MarchRay ray, std::int64_t piece) {
   std::vector<float> all, t(static_cast<std::size_t>(piece) + 1, -7.f);
   for (std::int64_t count = piece; count == piece;) {
     count = FIELDMARK_KERNEL(march)(grid.view(), ray, piece, t.data());
-    REQUIRE(t.back() == -7.f);  // nothing is written behind the samples asked for
+    REQUIRE(t.back() == -7.f);  // writes nothing past the requested samples
     all.insert(all.end(), t.begin(), t.begin() + count);
   }
   return all;
@@ -82,7 +82,7 @@ TEST_CASE("kernels/march: the samples of dense stepping in double, in pieces of 
           const float t = ray.near + (static_cast<float>(k) + ray.jitter) * ray.step;
           if (!(t < ray.far)) break;
           int cell[3];
-          bool doubtful = false;  // within rounding of a face
+          bool doubtful = false;  // within rounding error of a face
           for (int a = 0; a < 3; ++a) {
             const double p = kSide * (static_cast<double>(ray.o[a]) +
                                       static_cast<double>(t) * static_cast<double>(ray.d[a]));
@@ -156,7 +156,7 @@ TEST_CASE("kernels/march: rays side by side stop in the block of their first sam
 }
 
 namespace {
-// t and what contract() makes of o + t d, in double.
+// t and contract(o + t d), in double.
 struct Placed {
   double scale, x[3];
 };
@@ -219,7 +219,7 @@ TEST_CASE(
         REQUIRE(std::abs(static_cast<double>(got[k]) / t - 1) < 2e-5);
         t += static_cast<double>(ray.step) * placed(ray, t).scale;
       }
-      CHECK((k > 250 && k + 1 >= got.size()));  // the last may be on either side of the end
+      CHECK((k > 250 && k + 1 >= got.size()));  // the last may lie on either side of the end
     }
   });
 }
@@ -236,7 +236,7 @@ TEST_CASE(
     for (int i = 0; i < kMarchLanes; ++i) {
       const MarchRay& r = single[static_cast<std::size_t>(i)];
       for (int a = 0; a < 3; ++a) rays.o[a][i] = r.o[a], rays.d[a][i] = r.d[a];
-      rays.near[i] = r.near, rays.step[i] = r.step, rays.k[i] = i % 3 ? 0 : kMarchMost;  // or without a ray
+      rays.near[i] = r.near, rays.step[i] = r.step, rays.k[i] = i % 3 ? 0 : kMarchMost;  // or no ray
     }
     FIELDMARK_KERNEL(march_contracted_to_blocks)(grid.view(), rays);
     int jumped = 0, reached = 0, ended = 0;

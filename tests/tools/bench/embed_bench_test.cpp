@@ -71,7 +71,7 @@ TEST_CASE("embed_bench: the clock of embedding stands still while a mark is judg
   int calls = 0;
   const auto rows =
       run_embed_bench(tiny_field(), {tiny_variant(2)}, {.views = 6, .points = 1}, [&](const auto&, double) {
-        // 8 views, 2 steps, then 6 + 3 * 2 images that are judged.
+        // 8 views, 2 steps, then 6 + 3 * 2 evaluated images.
         if (++calls > 10) std::this_thread::sleep_for(std::chrono::milliseconds(50));
       });
   CHECK(calls == 8 + 2 + 12);
@@ -96,7 +96,7 @@ TEST_CASE("embed_bench: the front is of time, accuracy and PSNR together") {
   CHECK(rows[0].front);
   CHECK_THAT(judgement(rows), Contains("It is on the front"));
   mark_front(rows, {.time = 0.08, .accuracy = 0.001, .psnr = 0.01});
-  CHECK_FALSE(rows[0].front);  // of e, where so little counts
+  CHECK_FALSE(rows[0].front);  // e beats it once such small gains count
   CHECK_THROWS_WITH(judgement({}), "[judgement] rows must not be empty");
 }
 

@@ -14,7 +14,7 @@ const watermark::CellMarkOptions& cell(const EmbedVariant& v) {
 }
 
 using Differs = bool (*)(const EmbedVariant&, const EmbedVariant&);
-// What each choice may change.
+// The options that each choice may change.
 const std::map<std::string, Differs> kChoices{
     {"length",
      [](const EmbedVariant& a, const EmbedVariant& b) {
@@ -91,7 +91,7 @@ TEST_CASE("embed_variants: every variant but the first differs from the default 
     if (&v == &usual) continue;
     REQUIRE(kChoices.contains(v.choice));
     choices.insert(v.choice);
-    // The paper's preset brings settings of its own.
+    // The paper's preset brings its own settings.
     for (const auto& [choice, differs] : kChoices)
       if (v.choice != "preset" || choice == "preset") CHECK(differs(v, usual) == (choice == v.choice));
   }

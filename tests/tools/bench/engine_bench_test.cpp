@@ -32,8 +32,8 @@ TEST_CASE("engine_bench: every row of the contract runs, and float is near doubl
     CHECK((row.gigabytes > 0) == (row.ratio_to_memory > 0));
     if (row.name.starts_with("nerf_step")) continue;
     CHECK(row.error >
-          0);  // float cannot agree with double to the last bit: 0 would mean nothing was compared
-    // A look-up multiplies a position by 512 cells, and so the rounding of the product: 512 * 2^-24.
+          0);  // float and double never agree to the last bit: 0 would mean that nothing was compared
+    // A look-up multiplies a position, and its rounding error, by 512 cells: 512 * 2^-24.
     CHECK(row.error < (row.name.starts_with("hash") ? 1e-4 : 1e-5));
   }
 }
@@ -56,7 +56,7 @@ TEST_CASE("engine_bench: PyTorch computes the same values and gradients") {
     CHECK(row.peer->ratio == row.peer->seconds / row.seconds);
     CHECK(found.value_difference < 1e-5);
     CHECK(found.gradient_difference >
-          0);  // two programs do not round alike: 0 would mean nothing was compared
+          0);  // two programs round differently: 0 would mean that nothing was compared
     CHECK(found.gradient_difference < Peer::kTolerance);
     CHECK((found.kink_difference > 0) == (row.name == "hidden_decoder_fb_f32"));
   }

@@ -69,7 +69,7 @@ TEST_CASE("field_bench: figures of the default are those of its images and the r
   const double cells = static_cast<double>(f.grid.cells());
   CHECK(first.grid_bytes == cells / 8);
   CHECK(std::any_of(bench.rows.begin(), bench.rows.end(), [](const auto& r) { return r.front; }));
-  // Every cell is occupied: the grid leaves nothing out.
+  // Every cell is occupied: the grid skips nothing.
   CHECK(bench.occupancy.pixels == 100);
   CHECK(std::isinf(bench.occupancy.psnr));
   CHECK(bench.occupancy.dropped_max == 0);
@@ -82,7 +82,7 @@ TEST_CASE("field_bench: what the grid leaves out is counted") {
   f.grid.set_bits(bits);
   const FieldBench bench =
       run_field_bench(f, test_cameras(), {.runs = 1, .samples = 64, .unmasked_pixels = 1000, .quick = true});
-  CHECK(bench.occupancy.pixels == 640);  // a view has no more
+  CHECK(bench.occupancy.pixels == 640);  // a view has no more pixels
   CHECK(bench.occupancy.psnr < 60);
   CHECK(bench.occupancy.dropped_max > 0.01);
   CHECK(bench.occupancy.dropped_mean > 0);

@@ -17,7 +17,7 @@ nerf::Camera test_camera(Index width = 9, Index height = 7) {
   return nerf::make_camera(nerf::look_at({2.2, -3.1, 1.7}, {0.1, 0.2, 0}, {0, 0, 1}), 0.9, width, height);
 }
 
-// One ray's samples one after another through the Field op, in double.
+// Evaluates the samples of one ray one after another through the Field op, in double.
 struct BruteForce {
   ParamStore<double> store;
   nerf::Field<double> field;
@@ -88,7 +88,7 @@ TEST_CASE(
         opacity = std::max(opacity, want[3]);
       }
       CHECK(worst < 1e-11);
-      CHECK(opacity > 0.3);  // something is seen
+      CHECK(opacity > 0.3);  // the ray hits something
     }
 }
 

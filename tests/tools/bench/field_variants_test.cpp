@@ -14,7 +14,7 @@ using namespace fieldmark::bench;
 namespace {
 bool all_set(const nerf::OccupancyGrid& grid) { return grid.occupied_cells() == grid.cells(); }
 
-// Whether the density passes the threshold at one of 3^3 places in a cell of a grid of n.
+// True if the density exceeds the threshold at one of 3^3 positions in a cell of a grid of n cells per side.
 bool dense(const nerf::RadianceField& f, Index n, Index x, Index y, Index z) {
   for (int k = 0; k < 27; ++k) {
     const auto side = static_cast<float>(3 * n);
@@ -61,7 +61,7 @@ TEST_CASE("field_variants: a coarser grid holds every cell of the field's, and n
 
 TEST_CASE("field_variants: a finer grid holds the parts where a density passes the threshold") {
   nerf::RadianceField f = small_field();
-  f.params.values(f.params.find("density/1/bias"))[0] -= 1;  // both sides of the threshold
+  f.params.values(f.params.find("density/1/bias"))[0] -= 1;  // moves densities to both sides of the threshold
   std::vector<std::uint8_t> bits(static_cast<std::size_t>(f.grid.cells()), 0);
   const Index n = f.grid.resolution();
   for (std::size_t c = 0; c < bits.size(); c += 37) bits[c] = 1;

@@ -26,10 +26,10 @@ TEST_CASE("payload_bench: fewer payloads are exact as more bits are wrong, and s
   CHECK(result.rows[0].computed == 1);
   for (const auto& row : result.rows) {
     CHECK(row.signs.trials == 100);
-    // What the code promises is the least that is read, up to 4 deviations.
+    // The code reads at least its guaranteed share, up to 4 standard deviations.
     CHECK(row.signs.share() >= row.computed - 4 * std::sqrt(row.computed * (1 - row.computed) / 100));
   }
-  // At most 9 wrong bits of 100, by the logarithms of factorials.
+  // At most 9 wrong bits of 100, from the logarithms of factorials.
   double computed = 0;
   for (int k = 0; k <= 9; ++k)
     computed += std::exp(std::lgamma(101.0) - std::lgamma(k + 1.0) - std::lgamma(101.0 - k) +

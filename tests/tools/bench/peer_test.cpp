@@ -14,7 +14,8 @@ using namespace fieldmark::bench;
 
 namespace {
 
-// One dense layer of width 2 and what became of one sample. Numbers need not fit: the fake does not compute.
+// One dense layer of width 2 and the results for one sample. The numbers are arbitrary: the fake computes
+// nothing.
 SafetensorsFile small_work(bool with_draw) {
   ParamStore<float> store;
   store.add("0/weight", {2, 2});
@@ -26,7 +27,7 @@ SafetensorsFile small_work(bool with_draw) {
   return file;
 }
 
-// An interpreter whose answers are canned.
+// A Python interpreter with canned answers.
 struct FakePython {
   explicit FakePython(const std::string& script) {
     std::ofstream(folder / "python") << "#!/bin/sh\n" << script << "\n";
@@ -57,7 +58,8 @@ std::string ready(const std::string& seconds, const std::string& differences,
 const std::string kNear = R"({"y": 1e-7, "dx": 2e-6, "0/weight": 3e-6, "0/bias": 0})";
 const std::string kRuns = "while read -r line; do echo '{\"seconds\": 0.25}'; done\n";
 
-// Temporary folders go to one of this test's own while it lives: other tests run beside it.
+// Redirects temporary folders to a folder of this test while it lives, because other tests run at the same
+// time.
 class OwnTemporaries {
  public:
   OwnTemporaries() {

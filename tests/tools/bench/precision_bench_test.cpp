@@ -33,7 +33,7 @@ TEST_CASE("precision_bench: every variant is timed, and what is less exact is le
   CHECK(error_of("rays end at a transmittance of 1e-4") > error_of("1e-2"));
   if (bf16_units() != Bf16Units::none) {
     CHECK(error_of("bf16, dW in fp32") > 1e-4);
-    // Measured 7.7e-2: one unit in some hundred is on the other side of its ReLU's kink.
+    // Measured 7.7e-2: one unit in a few hundred lies on the other side of its ReLU's kink.
     CHECK(error_of("bf16, dW in fp32") < 0.12);
     CHECK(error_of("1e-3, networks and table in bf16") > 35);
   }

@@ -32,7 +32,7 @@ TEST_CASE("timing: the median of calls that take what they say") {
 TEST_CASE("timing: this machine multiplies and adds, and has memory") {
   CHECK(peak_gflops() > 1);
   const double before = peak_megabytes();
-  const std::vector<char> room(static_cast<std::size_t>(before + 64) << 20, 1);  // more than there ever was
+  const std::vector<char> room(static_cast<std::size_t>(before + 64) << 20, 1);  // exceeds the previous peak
   CHECK(peak_megabytes() >= before + 32);
   CHECK(room.back() == 1);
 }

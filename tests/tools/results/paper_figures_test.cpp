@@ -20,14 +20,14 @@ TEST_CASE("Lines of lengths, of the severities that were measured, and of the co
   keep_curve(cells.back(), "seconds,steps,figure\n1.5,10,0.5\n3.0,20,0.75\n");
   const auto figures = results::paper_figures(cells);
   REQUIRE(figures.size() == 4);  // nothing was rotated, scaled or blurred
-  // Two lengths of one system, and what the paper has of five lengths for the systems that can be run.
+  // Two lengths of one system, and the paper's numbers at five lengths for the systems that can be run.
   CHECK(count(figures.at("paper_bits.svg"), "class=\"point\"") % 5 == 2);
   CHECK_THAT(figures.at("paper_bits.svg"), Contains("CopyRNeRF, preset paper, published"));
   CHECK_THAT(figures.at("paper_bits.svg"), !Contains("Fieldmark"));
-  CHECK(count(figures.at("paper_noise.svg"), "class=\"point\"") == 2 * 3);  // none and two severities
+  CHECK(count(figures.at("paper_noise.svg"), "class=\"point\"") == 2 * 3);  // no noise and two severities
   CHECK(count(figures.at("paper_learning.svg"), "class=\"point\"") == 2);
   CHECK(count(figures.at("paper_learning_ablation.svg"), "class=\"point\"") == 2);
-  CHECK(results::paper_figures({}).size() == 1);  // published lengths alone
+  CHECK(results::paper_figures({}).size() == 1);  // only lengths that the paper reports
 }
 
 TEST_CASE("Figures are of the scene with most cells, and ablations are in their own", "[paper_figures]") {
@@ -43,7 +43,7 @@ TEST_CASE("Figures are of the scene with most cells, and ablations are in their 
   add("nerf_message", "chair", "hash");
   add("copyrnerf_code", "lego", "mlp");
   CHECK(results::paper_figures(cells) == before);
-  add("ours", "lego", "hash");  // another seed is no other length
+  add("ours", "lego", "hash");  // another seed is not another length
   CHECK(results::paper_figures(cells).at("paper_bits.svg") == before.at("paper_bits.svg"));
   cells.pop_back();
   add("without_drr", "lego", "hash");
@@ -71,7 +71,7 @@ TEST_CASE("The sheet has a row for each image of a cell of 16 bits", "[paper_fig
   CHECK(sheet[0] == 51 / 255.f);
   CHECK(sheet[3 * 7] == 61 / 255.f);
   CHECK(sheet[3 * 14] == Approx(0.5 + 10 * 10 / 255.0).margin(0.002));
-  // Thirty times the difference, of the 2-D networks on renders alone.
+  // Thirty times the difference, for the 2-D networks on renders alone.
   CHECK(residual.name == "paper_residual.png");
   CHECK(results::write_paper_sheet(residual, paper_cells(), folder.path, folder / "residual.png").empty());
   auto cells = paper_cells();

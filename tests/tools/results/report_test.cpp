@@ -44,7 +44,7 @@ TEST_CASE("code_hash is of a room without those in it, or of all rooms of a hous
   const std::string imaging = code_hash({"imaging"});
   CHECK(imaging.size() == 64);
   CHECK(imaging == code_hash({"imaging"}));
-  if (machine().commit == "unknown") return;  // outside of git no tree is known
+  if (machine().commit == "unknown") return;  // outside of git, the tree is unknown
   CHECK(imaging != code_hash({"imaging/video"}));
   CHECK(imaging != code_hash({"imaging", "imaging/video"}));
   CHECK(code_hash({"watermark"}) != code_hash({"watermark/keys"}));

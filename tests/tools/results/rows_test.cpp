@@ -88,7 +88,7 @@ TEST_CASE("stale_reason: each thing that a row depends on") {
   rows["a"]["inputs"]["scene:lego"] = "another";
   CHECK(why("a") == "input changed: scene:lego");
   CHECK(stale_reason(plan(), *plan().find("a"), rows, {.data = {}, .work = {}})
-            .empty());  // not there to compare
+            .empty());  // the data is not there to compare
   rows["a"]["code"] = "another";
   CHECK(why("a") == "code changed");
   rows["a"]["command"] = "another";

@@ -36,7 +36,7 @@ Images render(const nerf::RadianceField& field, const AttackMeterOptions& o) {
   return p;
 }
 
-// What the row should say of these images, from the reader and the evidence alone.
+// Checks a row against the values that the reader and the evidence alone give for these images.
 void check_row(const AttackRow& row, const Owner& owner, const std::vector<Tensor<float>>& images) {
   const BlindReader reader(owner);
   double accuracy = 0;
@@ -107,7 +107,8 @@ TEST_CASE("attack_meter: an attack that only moves pixels does no damage but to 
   const AttackRow crop = meter.image("crop_0.5");
   CHECK(std::isnan(crop.psnr_foreground));
   CHECK((crop.kept > 0.2 && crop.kept < 1));
-  // Nearest neighbours at twice the size and bilinear at the old places: each new pixel has its old colour.
+  // Nearest neighbours at twice the size, then bilinear at the old positions: each new pixel keeps its old
+  // colour.
   const AttackRow larger = meter.image("scale-nearest_2");
   CHECK(larger.kept == 1);
   CHECK((std::isnan(larger.psnr_foreground) || larger.psnr_foreground > 25));
@@ -123,14 +124,14 @@ TEST_CASE("attack_meter: damage is of the object's pixels that still show, where
   Tensor<float> before({4, 6, 3}), opacity({4, 6});
   for (Index i = 0; i < before.size(); ++i) before[i] = static_cast<float>(i % 17) / 17;
   for (Index p = 0; p < 24; ++p) opacity[p] = p % 6 < 3 ? 1.f : 0.5f;
-  // Columns 1 to 4 are left, all a tenth brighter: the object's columns 1 and 2 of 0 to 2.
+  // Columns 1 to 4 remain, all a tenth brighter: columns 1 and 2 of the object's 0 to 2.
   Tensor<float> after({4, 4, 3});
   for (Index y = 0; y < 4; ++y)
     for (Index i = 0; i < 12; ++i) after[12 * y + i] = before[18 * y + 3 + i] + 0.1f;
   const AttackDamage damage = attack_damage(before, opacity, after, {{1, 0, 1, 0, 1, 0}});
   CHECK(damage.kept == Approx(2.0 / 3));
   CHECK(damage.psnr == Approx(20).epsilon(1e-5));
-  // Turned by a right angle about the centre: x' = y, y' = 5 - x of an image of 4 x 6.
+  // Turned by a right angle about the centre: x' = y, y' = 5 - x for an image of 4 x 6.
   Tensor<float> turned({6, 4, 3});
   for (Index y = 0; y < 6; ++y)
     for (Index x = 0; x < 4; ++x)

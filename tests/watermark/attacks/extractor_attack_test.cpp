@@ -24,7 +24,7 @@ std::vector<float> signs(const Owner& owner, const Tensor<float>& view_image) {
   return {logits.value(), logits.value() + logits.shape().size()};
 }
 
-// Share of signs that differ.
+// Returns the share of signs that differ.
 double turned(const Owner& owner, const Tensor<float>& a, const Tensor<float>& b) {
   const auto before = signs(owner, a), after = signs(owner, b);
   double count = 0;
@@ -32,7 +32,7 @@ double turned(const Owner& owner, const Tensor<float>& a, const Tensor<float>& b
   return count / static_cast<double>(before.size());
 }
 
-// Of a view in the middle of the scale, so that nothing is cut off at black or white.
+// Returns the image of a view in the middle of the scale, so that nothing clips at black or white.
 Tensor<float> image_of(const CachedView& v) {
   Tensor<float> view_image = v.base;
   for (float& x : view_image.data) x = 0.25f + 0.5f * x;
@@ -51,7 +51,7 @@ TEST_CASE("extractor_attack: the extractor takes back more than after noise of t
     for (Index p = 0; p < view.opacity.size(); ++p)
       if (view.opacity[p] <= 0.5f)
         for (Index c = 0; c < 3; ++c) REQUIRE(changed[3 * p + c] == view_image[3 * p + c]);
-    // One step of next to no length leaves the noise that the ascent begins with.
+    // A single step of almost zero length leaves the noise that the ascent starts from.
     const Tensor<float> noise = against_extractor(owner, view_image, view.opacity,
                                                   {.mark_psnr = 24, .steps = 1, .step = 1e-9, .seed = 3});
     CHECK(psnr_masked(noise, view_image, view.opacity) == Approx(24).margin(0.05));

@@ -22,7 +22,7 @@ RadianceField attacked(const char* name, const RadianceField& field, const Field
   return apply_field_attack(parse_field_attack(name), field, kRng, inputs);
 }
 
-// The float tensors of a field's file by name.
+// Returns the float tensors of a field's file by name.
 std::map<std::string, std::vector<float>> tensors(const RadianceField& field) {
   SafetensorsFile file;
   field.store(file, "");
@@ -42,7 +42,7 @@ bool same_numbers(const RadianceField& a, const RadianceField& b) {
   return std::ranges::equal(a.params.values(), b.params.values());
 }
 
-// All finite halves that are not negative, from their bits.
+// Returns all finite non-negative halves, from their bits.
 std::vector<double> halves() {
   std::vector<double> all;
   for (int bits = 0; bits < 0x7c00; ++bits) {
@@ -52,7 +52,7 @@ std::vector<double> halves() {
   return all;
 }
 
-// Colours of random places seen from random directions.
+// Returns the colours at random positions seen from random directions.
 std::vector<float> colours(const RadianceField& field) {
   Tape<float> tape;
   auto x = uniform<float>({50, 3}, 0, 1, 1), d = uniform<float>({50, 3}, -1, 1, 2);
@@ -108,7 +108,7 @@ TEST_CASE("field_attack: noise has the part of each tensor's rms that its name s
     std::vector<float> noise = after.at(name);
     for (std::size_t i = 0; i < w.size(); ++i) noise[i] -= w[i];
     INFO(name);
-    // Five standard errors of a deviation from n numbers.
+    // Five standard errors of a standard deviation estimated from n numbers.
     CHECK(std::abs(rms(noise) / (0.2 * rms(w)) - 1) < 5 / std::sqrt(2 * static_cast<double>(w.size())));
   }
   CHECK(!same_numbers(attacked("weights_noise_0.2,weights_noise_0.2", field),
@@ -159,7 +159,7 @@ TEST_CASE("field_attack: whole numbers are the nearest multiples, one scale a te
         raise_to(off, std::abs(double(q[i]) / scale - std::round(double(q[i]) / scale)));
       }
       CHECK(worst <= 0.5000001 * scale);
-      CHECK(off < 1e-5);  // 127 with the rounding of a float
+      CHECK(off < 1e-5);  // 127 with float rounding
     };
     for (const auto& [name, w] : before) {
       INFO(name << " " << bits);
@@ -233,7 +233,7 @@ TEST_CASE("field_attack: average, sign flip and copy add the fields' numbers") {
     raise_to(worst, std::abs(flip.params.values()[i] - (2 * y - x)));
     raise_to(worst, std::abs(copy.params.values()[i] - (x + 1.5 * (z - y))));
   }
-  CHECK(worst < 5e-7);  // numbers up to 4, rounded once
+  CHECK(worst < 5e-7);  // values up to 4, rounded once
   CHECK_THROWS_WITH(attacked("average_0.5", a), "[field_attack] other: must be given for this attack");
   CHECK_THROWS_WITH(attacked("copy_1", a, {.marked = &b}),
                     "[field_attack] unmarked: must be given for this attack");

@@ -89,7 +89,7 @@ TEST_CASE("measurement: a baked field is looked at as it is, with the message it
   const Measurement m = measure(owner, &owner.field, &sent, {.cameras = views});
   CHECK(m.baked);
   CHECK(m.ssim_base == Approx(1).epsilon(1e-12));
-  CHECK(std::isnan(m.psnr_base));  // identical images have none
+  CHECK(std::isnan(m.psnr_base));  // undefined for identical images
   const Measurement against = measure(owner, &owner.field, &opposite, {.cameras = views});
   CHECK(m.accuracy.blind + against.accuracy.blind == Approx(1).epsilon(1e-12));
 }
@@ -125,7 +125,7 @@ TEST_CASE("measurement: messages may be chosen, and each reading is handed out")
   const double blind = measure(owner, nullptr, nullptr, options).accuracy.blind;
   CHECK(blind == Approx(right));
   CHECK(calls == std::vector<std::string>{"0", "0noise_0", "0blur_1", "1", "1noise_0", "1blur_1"});
-  // Where informed is read too, it is the reading that was chosen.
+  // Where informed detection is used too, its reading was the one chosen.
   options.informed_views = 2;
   options.under.clear();
   right = 0;

@@ -42,7 +42,7 @@ TEST_CASE("payload_trials: views of a group are added before they are read") {
   const Payload sent = random_payload(codec, CounterRng(2), 0);
   const Message message = codec.encode(sent), plain = message_from_hex("123456789abc", 48);
   REQUIRE_FALSE(codec.payload(plain));
-  // A cell a bit; of two views each shows one half of them.
+  // One cell per bit; each of two views shows one half of them.
   CellCode code;
   std::vector<double> first(48), second(48), whole(48);
   for (std::size_t i = 0; i < 48; ++i) {
@@ -58,7 +58,7 @@ TEST_CASE("payload_trials: views of a group are added before they are read") {
     one.add(view, "", first, message);
     one.add(view, "blur_1", whole, message);
   }
-  REQUIRE(two.accuracies().size() == 1);  // under the other name no payload was sent
+  REQUIRE(two.accuracies().size() == 1);  // the other name sent no payload
   CHECK(two.accuracies().at("").trials == 2);
   CHECK(two.accuracies().at("").exact == 2);
   CHECK(one.accuracies().at("").trials == 5);
@@ -69,7 +69,7 @@ TEST_CASE("payload_trials: views of a group are added before they are read") {
 }
 
 TEST_CASE("payload_trials: intervals are Wilson's") {
-  // Its ends solve (p - x)^2 = z^2 x (1 - x) / n.
+  // The ends of the interval solve (p - x)^2 = z^2 x (1 - x) / n.
   const double z = 1.959963984540054;
   for (const auto& [k, n] : {std::pair<Index, Index>{3, 10}, {0, 300}, {300, 300}, {297, 300}, {1, 1}}) {
     const auto [low, high] = wilson_interval(k, n);
@@ -89,7 +89,7 @@ TEST_CASE("payload_trials: bits that an image hardly shows do not count against 
   const PayloadCodec codec(100);
   const Payload sent = random_payload(codec, CounterRng(4), 0);
   const Message message = codec.encode(sent);
-  // A cell a bit; every third is a hundred times fainter and, half of the time, reads wrong.
+  // One cell per bit; every third is a hundred times fainter and reads wrong half of the time.
   CellCode code;
   std::vector<double> evidence;
   for (std::size_t i = 0; i < 100; ++i) {
@@ -100,7 +100,7 @@ TEST_CASE("payload_trials: bits that an image hardly shows do not count against 
   }
   const BitReading reading = read_bits(evidence, code, 100);
   REQUIRE(match_bits(reading, message).matching == 83);
-  CHECK_FALSE(codec.read(reading.logit).has_value());  // all alike: 17 errors are too many
+  CHECK_FALSE(codec.read(reading.logit).has_value());  // with equal strengths, 17 errors are too many
   PayloadViews views(code, 100, 1);
   views.add(0, "", evidence, message);
   CHECK(views.accuracies().at("").exact == 1);

@@ -15,7 +15,7 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
-constexpr MarkPsnrViews kFewViews{.count = 32};  // where no agreement on other views is asked for
+constexpr MarkPsnrViews kFewViews{.count = 32};  // for tests that need no agreement on other views
 const Message kBakedMessage{{1, 0, 1, 1}}, kOther{{0, 1, 1, 0}};
 
 Owner owner_with_gain() {
@@ -129,10 +129,10 @@ TEST_CASE("baker: scaling gives the file the strength asked for, on other views 
   const Owner owner = owner_with_gain();
   Baker baker(owner, kBakedMessage, bake_options(60));
   while (!baker.done()) baker.step(0);
-  // So many that a first guess takes an eighth of them.
+  // So many views that the first guess takes an eighth of them.
   const MarkPsnrViews looked_at{.count = 72, .seed = 32}, other{.count = 96, .seed = 500};
   const double learnt = baker.mark_psnr(looked_at);
-  for (const double change : {1.5, -1.5}) {  // each from where the one before left the colours
+  for (const double change : {1.5, -1.5}) {  // each starts from the colours that the last one left
     const double before = baker.mark_psnr(looked_at), target = learnt + change;
     const auto found = baker.scale_to(target, looked_at);
     CAPTURE(change, before, found.learnt, found.scaled, found.scale);
@@ -176,7 +176,7 @@ TEST_CASE("baker: a baked file is an unmarked one with other colours, density to
     CHECK((b.data == a.data) == of_density);
     ++(of_density ? density : colour);
   }
-  CHECK(density == 7);  // two layers, the features, which rows of them are kept, the occupancy
+  CHECK(density == 7);  // two layers, the features, the mask of kept rows, the occupancy
   CHECK(colour == 7);   // three layers, the features
 }
 

@@ -20,7 +20,7 @@ EmbedOptions options(Index steps) {
   return {.schedule = {.steps = steps, .lr = 4e-3}, .batch = 3, .seed = 4};
 }
 
-// All that some steps leave behind.
+// Everything that some steps leave behind.
 struct Outcome {
   std::vector<float> values;
   std::vector<double> figures;
@@ -37,7 +37,7 @@ Outcome run(Index steps, Owner owner = tiny_owner()) {
   return outcome(owner, embedder);
 }
 
-// dB on the object, mean over 16 novel views with a code and a message each.
+// Returns the mean mark PSNR in dB on the object over 16 novel views, each with its own code and message.
 double measured_strength(const Owner& owner, std::uint64_t view_seed, const CounterRng& messages,
                          std::uint64_t code_seed) {
   nerf::Renderer plain(owner.field), marked(owner.field);
@@ -97,7 +97,7 @@ TEST_CASE(
 }
 
 TEST_CASE("embedder: preset paper learns the colours of the field, then its content loss is small") {
-  Owner owner = tiny_paper_owner({.message_weight = 0});  // of 5 the message would be most of the loss
+  Owner owner = tiny_paper_owner({.message_weight = 0});  // at 5, the message would be most of the loss
   Embedder embedder(owner, tiny_views(), options(150));
   embedder.step(0);
   const double first = embedder.figures().loss;
@@ -210,7 +210,7 @@ TEST_CASE("embedder: a checkpoint of another run is refused") {
 TEST_CASE("embedder: a checkpoint of other weights, distortions or step sizes is refused") {
   struct Change {
     void (*make)(EmbedOptions&);
-    const char* option;  // its name and value in the run that was asked for
+    const char* option;  // its name and value in the requested run
   };
   const Change both[] = {{[](EmbedOptions& o) { o.schedule.lr = 0.125; }, "lr 0.125"},
                          {[](EmbedOptions& o) { o.schedule.half_after = 5; }, "half_after 5"},
@@ -268,7 +268,7 @@ TEST_CASE("embedder: calibration gives views the owner's strength") {
   for (double mark_psnr : {28.0, 34.5}) {
     Owner owner = tiny_owner(mark_psnr);
     Embedder(owner, tiny_views(), options(1)).calibrate(16);
-    // Exactly on the views and messages it looked at; others are so few and small that they differ.
+    // Exact on the calibration's own views and messages; others are so few and small that they differ.
     CHECK(measured_strength(owner, options(1).seed + 77, CounterRng(options(1).seed, 12), options(1).seed) ==
           Approx(mark_psnr).margin(0.03));
     CHECK(measured_strength(owner, 1234, CounterRng(5), 8) == Approx(mark_psnr).margin(0.5));

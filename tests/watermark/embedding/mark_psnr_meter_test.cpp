@@ -12,7 +12,7 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
-// Every colour darker by a known step.
+// Darkens every colour by a known step.
 nerf::Renderer::Recolour darker_by(float step) {
   return [step](const float*, const float*, Index n, float* rgb) {
     for (Index i = 0; i < 3 * n; ++i) rgb[i] -= step;
@@ -23,7 +23,7 @@ nerf::Renderer::Recolour darker_by(float step) {
 TEST_CASE(
     "mark_psnr_meter: the mean over novel views of what psnr_masked says of each, called view by view") {
   const Owner owner = tiny_owner();
-  const MarkPsnrViews views{.count = 5, .side = 1000, .seed = 9};  // no larger than the training images
+  const MarkPsnrViews views{.count = 5, .side = 1000, .seed = 9};  // capped at the training images' size
   nerf::Renderer plain(owner.field), marked(owner.field);
   double sum = 0;
   const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, 5, 0, 9);
@@ -70,7 +70,7 @@ TEST_CASE("mark_psnr_meter: a field with supersampling is measured by single ray
   several.space = single.space;
   several.cameras = single.cameras;
   several.background = single.background;
-  // A mark finer than a pixel: the mean of a pixel's rays would hide it.
+  // A mark finer than a pixel, which averaging the rays of a pixel would hide.
   const nerf::Renderer::Recolour fine = [](const float* x, const float*, Index n, float* rgb) {
     for (Index i = 0; i < n; ++i)
       for (Index a = 0; a < 3; ++a)

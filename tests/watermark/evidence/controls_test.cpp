@@ -12,7 +12,7 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 TEST_CASE("controls: shuffled blocks are the image's squares in another order") {
-  // 3 x 4 squares of 2 pixels, each of a number of its own, with a row and a column left over.
+  // 3 x 4 squares of 2 pixels, each with its own number, with a row and a column left over.
   Tensor<float> view_image({7, 9, 3});
   for (Index y = 0; y < 7; ++y)
     for (Index x = 0; x < 9; ++x)

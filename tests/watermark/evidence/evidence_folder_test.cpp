@@ -15,7 +15,7 @@ using namespace fieldmark::watermark;
 namespace fs = std::filesystem;
 
 namespace {
-// A folder of evidence about two images that are there, and a third that has nothing to do with it.
+// A folder of evidence about two existing images, and a third image that is unrelated.
 struct Case {
   TemporaryFolder folder;
   fs::path evidence = folder / "evidence";
@@ -27,7 +27,7 @@ struct Case {
     record.controls.back().images[0].sha256 = sha256_hex("second");
     write_evidence_folder(evidence, record, "<!doctype html>", test_key(5));
   }
-  // Written plainly: thousands of times.
+  // Writes the file plainly, because the tests do so thousands of times.
   void put(std::string_view name, const std::string& text) const {
     std::ofstream(evidence / name, std::ios::binary) << text;
   }
@@ -56,7 +56,7 @@ TEST_CASE("evidence_folder: every byte of every file is watched") {
   const Case c(record);
   for (const std::string_view name : kEvidenceFiles) {
     const std::string text = read_text(c.evidence / name);
-    // 0x01 keeps most letters and digits what they are, so that the JSON still reads.
+    // 0x01 keeps most letters and digits as letters and digits, so that the JSON still parses.
     for (std::size_t i = 0; i < text.size(); ++i) {
       std::string altered = text;
       altered[i] ^= 0x01;
@@ -116,7 +116,7 @@ TEST_CASE("evidence_folder: only nothing and earlier evidence are replaced") {
                     Contains("expected an empty folder or one with earlier evidence only, found letter.txt"));
   CHECK_THROWS_WITH(prepare_evidence_folder(folder / "new/inside/letter.txt"), Contains("found a file"));
   CHECK(read_text(folder / "new/inside/letter.txt") == "mine");
-  const fs::path too_long = folder / std::string(300, 'n');  // the system refuses to look for it
+  const fs::path too_long = folder / std::string(300, 'n');  // the system refuses to look it up
   CHECK_THROWS_AS(prepare_evidence_folder(too_long), IoError);
   CHECK_THROWS_AS(check_evidence_folder(too_long, {}, {}), IoError);
 }

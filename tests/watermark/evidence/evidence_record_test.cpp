@@ -17,7 +17,7 @@ const std::map<std::string, std::string> kFiles{{"report.html", std::string(64, 
 
 std::string small_text() { return evidence_json(small_evidence(), public_key(test_key(5)), kFiles); }
 
-// The text after one entry was replaced.
+// Returns the text with one entry replaced.
 std::string changed(const char* pointer, const Json& value) {
   Json json = Json::parse(small_text());
   json[Json::json_pointer(pointer)] = value;
@@ -69,7 +69,7 @@ TEST_CASE("evidence_record: the members of the text are these") {
   Index keys = 0;
   for (const Json& count : json["wrong_keys"]["histogram"]) keys += count.get<Index>();
   CHECK(keys == 200);
-  CHECK_THAT(small_text(), !Contains(to_hex(test_key(5))));  // the secret stays out
+  CHECK_THAT(small_text(), !Contains(to_hex(test_key(5))));  // the secret is left out
 }
 
 TEST_CASE("evidence_record: a file name of any bytes is text that reads back") {
@@ -108,7 +108,7 @@ TEST_CASE("evidence_record: only the canonical form is read") {
   CHECK_THROWS_WITH(parse_evidence(text + " ", "evidence.json"), Contains("expected the canonical form"));
   CHECK_THROWS_AS(parse_evidence("", "evidence.json"), IoError);
   CHECK_THROWS_WITH(parse_evidence("[]\n", "evidence.json"), Contains("expected evidence"));
-  std::string twice = text;  // a name that comes twice: which one was meant?
+  std::string twice = text;  // a duplicate name is ambiguous
   twice.insert(twice.find("\"cells\""), "\"cells\": 11,\n  ");
   CHECK_THROWS_WITH(parse_evidence(twice, "evidence.json"), Contains("expected the canonical form"));
 }

@@ -19,7 +19,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 const CellCode kCode{{0, 1, 0, 0, -1, 1, 2}, {1, -1, -1, 1, 0, 1, 1}};
 const std::vector<double> kEvidence{3, 1, -2, 0.5, 100, -1, 0};
 
-// P(X >= k) from Pascal's triangle in long double, each row halved on the way.
+// Returns P(X >= k) from Pascal's triangle in long double, with each row halved on the way.
 long double tail(Index k, Index n) {
   std::vector<long double> row{1};
   for (Index i = 0; i < n; ++i) {
@@ -31,14 +31,14 @@ long double tail(Index k, Index n) {
   return sum;
 }
 
-// Images that are as unlike a mark's as can be.
+// Returns the evidence of images that resemble a mark as little as possible.
 std::vector<std::vector<double>> adversarial_evidence(std::size_t cells) {
   std::vector<std::vector<double>> images(5, std::vector<double>(cells, 0.0));
   images[0][17] = 5;             // one-hot
-  images[1].assign(cells, 1.0);  // an extractor that says "one" everywhere
+  images[1].assign(cells, 1.0);  // an extractor that always says "one"
   for (std::size_t c = 0; c < cells; ++c) {
     images[2][c] = 1 / static_cast<double>((c + 1) * (c + 1));  // heavy tail
-    images[3][c] = c < 4 ? 1 : 1e-3;                            // four cells that outweigh the rest
+    images[3][c] = c < 4 ? 1 : 1e-3;                            // four cells outweigh the rest
   }
   images[4] = uniform({static_cast<Index>(cells)}, -1, 1, 3).data;
   return images;
@@ -195,7 +195,7 @@ TEST_CASE("evidence: sizes and values that make no sense are refused") {
 }
 
 namespace {
-// Eight cells, two for each of four bits; the last bit of the message is read wrongly, the third not at all.
+// Eight cells, two for each of four bits; the last bit of the message reads wrong, the third not at all.
 const CellCode kScoreCode{{0, 0, 1, 1, 2, 2, 3, 3}, {1, -1, 1, -1, 1, -1, 1, -1}};
 const Message kScoreMessage{{1, 0, 1, 0}};
 const std::vector<double> kScoreEvidence{2, -1, -2, 2, 0, 0, 1, 0};

@@ -28,7 +28,7 @@ TEST_CASE("noise: the p-value by hand, and the least that cells allow") {
   CHECK_THROWS_AS(least_noise_p(-1, 4), ValueError);
 }
 
-// Few cells a bit, one of which outweighs the others, and many alike.
+// Few cells per bit, one of which outweighs the others; and many equal cells.
 TEST_CASE("noise: keys reach a p-value no more often than it says, whatever the evidence") {
   constexpr Index kBits = 6, kKeys = 10000;
   for (const Index cells : {12, 96}) {

@@ -80,7 +80,7 @@ TEST_CASE("wrong_keys: progress is told after every round, and can stop the coun
 }
 
 TEST_CASE("wrong_keys: a statistic counts in the bin that it begins") {
-  // Evidence of one cell only: T is 1 or -1 exactly.
+  // Evidence from one cell only: T is exactly 1 or -1.
   std::vector<double> evidence(100, 0.0);
   evidence[3] = 1;
   const auto counts = count_wrong_keys(evidence, kArea, kMessage, 500, 0);

@@ -36,12 +36,12 @@ TEST_CASE("cell_code: each bit gets cells and nearly equal area, no cell without
     total[static_cast<std::size_t>(code.bit[c])] += area[c];
     ++count[static_cast<std::size_t>(code.bit[c])];
   }
-  CHECK(code.carriers() == 1000);  // 20 full groups, and 40 cells in the last
+  CHECK(code.carriers() == 1000);  // 20 full groups, and a last one of 40 cells
   CHECK(*std::min_element(count.begin(), count.end()) == 20);
   CHECK(*std::max_element(count.begin(), count.end()) == 21);
   const double mean = std::accumulate(total.begin(), total.end(), 0.0) / kBits;
-  // Measured: at most 10% off. Dealt at random the totals would be off by sqrt(E[a^2] / (1000 / 48)) / E[a] =
-  // 41% rms.
+  // Measured: at most 10% off. Dealing at random would put the totals off by sqrt(E[a^2] / (1000 / 48)) /
+  // E[a] = 41% rms.
   for (double t : total) CHECK(std::abs(t - mean) < 0.12 * mean);
 }
 

@@ -12,7 +12,7 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
-// All 8 cells of a grid of 2 a side, numbered as the grid is.
+// Returns all 8 cells of a grid of 2 per side, in the order of the grid.
 CellGrid full_grid() { return {2, std::vector<double>(8, 1.0)}; }
 
 float sign_at(const CellGrid& grid, const std::vector<std::int8_t>& signs, float x, float y, float z) {
@@ -27,7 +27,7 @@ TEST_CASE("cell_grid: cells are what is visible, in the grid's order, with their
   std::vector<double> area(27, 0.0);
   area[4] = 3;
   area[13] = 1;
-  area[20] = 3e-5;  // less than a hundred-thousandth of all
+  area[20] = 3e-5;  // less than a hundred-thousandth of the total
   const CellGrid grid(3, area);
   REQUIRE(grid.count() == 2);
   const double total = 4.00003;
@@ -85,7 +85,7 @@ TEST_CASE("cell_grid: blending leaves out what is no cell, and cells without a s
   area[0] = 1;
   const CellGrid lone(2, area);
   CHECK(sign_at(lone, {1}, 0.6f, 0.6f, 0.6f) == 1);
-  // At the centre of a place that is no cell, all weight lies there.
+  // At the centre of a box without a cell, all weight lies there.
   CHECK(sign_at(lone, {1}, 0.75f, 0.75f, 0.75f) == 0);
   std::vector<std::int8_t> unsigned_half{1, 0, 1, 0, 1, 0, 1, 0};
   CHECK(sign_at(full_grid(), unsigned_half, 0.75f, 0.2f, 0.2f) == 0);
@@ -139,7 +139,7 @@ TEST_CASE("cell_grid: positions outside or not numbers are blended as the neares
 }
 
 TEST_CASE("cell_grid: mix is the mean over all signs of a cell's sign times their blend") {
-  // 2 x 2 x 2 cells, all or all but one, so that every way to deal signs can be tried.
+  // 2 x 2 x 2 cells, all or all but one, few enough to try every choice of signs.
   const double fifth = GENERATE(0.0, 5.0);
   const std::vector<double> area{1, 2, 3, 4, fifth, 1, 2, 3};
   const CellGrid grid(2, area);

@@ -17,7 +17,7 @@ using namespace fieldmark::watermark;
 
 TEST_CASE("cell_mark: it adds g s P to colours, which stay in their range") {
   const Owner owner = small_owner();
-  constexpr Index n = 2500;  // samples, of several blocks, the last not a whole one
+  constexpr Index n = 2500;  // several blocks of samples, the last one partial
   const Tensor<float> x = uniform<float>({n, 3}, 0, 1, 1), rgb = uniform<float>({n, 3}, 0, 1, 2);
   const auto signs = cell_signs(owner.code(), Message{{1, 0, 1}});
   const auto got = marked(owner, signs, x, rgb.data);

@@ -38,7 +38,7 @@ TEST_CASE(
   const FixedCarriers carriers(tiny_views(), 4, 1);
   const CachedView& v = tiny_views().front();
   const Index n = std::ssize(v.weight);
-  const std::vector<float> grey(at(3 * n), 0.5f);  // of which nothing is cut off
+  const std::vector<float> grey(at(3 * n), 0.5f);  // nothing clips
   std::vector<float> ones(grey), minus(grey);
   carriers.mark(message(4, 1), v.position.data(), grey.data(), n, ones.data());
   carriers.mark(message(4, -1), v.position.data(), grey.data(), n, minus.data());
@@ -52,7 +52,7 @@ TEST_CASE(
     }
   }
   CHECK(-10 * std::log10(power / shown) == Approx(21).margin(1.5));
-  CHECK(difference > 1.2 * power);  // two axes of colour, 60 degrees apart or more
+  CHECK(difference > 1.2 * power);  // two colour axes at least 60 degrees apart
 }
 
 TEST_CASE("fixed_carriers: the image of a view is its base plus the change of its samples") {

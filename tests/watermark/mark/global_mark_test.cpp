@@ -125,7 +125,7 @@ TEST_CASE("global_mark: none and one position, one and two threads, float near d
                            uniform<float>({700, 3}, 0, 1, 3), Tensor<float>({1, 3}, 1)};
   expect_same_bits(either, inputs);
   CHECK(float_error(either, inputs) <
-        2e-3);  // the finest band multiplies what rounding does to a position by 1600
+        2e-3);  // the finest band multiplies the rounding error of a position by 1600
   for (Index n : {0, 1}) {
     const Tensor<double> few({n, 3}, 0.5);
     CHECK(op_values(either, std::vector{few, few, few, Tensor<double>({1, 3}, 1)}).size() ==

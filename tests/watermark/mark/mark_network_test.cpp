@@ -76,7 +76,7 @@ TEST_CASE("mark_network: without luminance the carrier has no luma, and it is ne
     raise_to(largest, std::hypot(y[i], y[i + 1], y[i + 2]));
   }
   CHECK(largest <=
-        std::sqrt(2 + 2 * 0.05535));  // the two axes are not quite at right angles: their product is -0.0553
+        std::sqrt(2 + 2 * 0.05535));  // the two axes are not quite orthogonal: their product is -0.0553
   CHECK(largest > 0.5);
 }
 
@@ -119,7 +119,7 @@ TEST_CASE("mark_network: none and one position, one and two threads, float near 
   };
   const std::vector inputs{uniform<float>({700, 3}, 0, 1, 1), uniform<float>({700, 3}, 0, 1, 2)};
   expect_same_bits(either, inputs);
-  CHECK(float_error(either, inputs) < 2e-4);  // the finest band multiplies what rounding does to a position
+  CHECK(float_error(either, inputs) < 2e-4);  // the finest band multiplies a position's rounding error
   for (Index n : {0, 1}) {
     const std::vector few{Tensor<double>({n, 3}, 0.5), Tensor<double>({n, 3}, 0.5)};
     CHECK(op_values(either, few).size() == static_cast<std::size_t>(3 * n));

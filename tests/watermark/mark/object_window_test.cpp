@@ -15,7 +15,7 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
-// A dark disc on a plain background; a pixel is inside where its centre is.
+// Returns a dark disc on a plain background; a pixel is inside if its centre is.
 Tensor<float> disc(Index height, Index width, double cx, double cy, double radius, float background = 1) {
   Tensor<float> image({height, width, 3}, background);
   for (Index y = 0; y < height; ++y)
@@ -34,7 +34,7 @@ TEST_CASE("object_window: finds a disc on white and on black to a pixel, with it
     const Window w = object_window(disc(160, 200, 90, 70, 30, background), background);
     CHECK(middle_x(w) == Approx(90).margin(0.51));
     CHECK(middle_y(w) == Approx(70).margin(0.51));
-    // The mean over 5 x 5 pixels sees an edge up to two pixels before it comes.
+    // The mean over 5 x 5 pixels sees an edge up to two pixels early.
     CHECK(w.width / 1.08 >= 60);
     CHECK(w.width / 1.08 <= 64);
     CHECK(w.height == w.width);
@@ -126,7 +126,7 @@ TEST_CASE("object_window: a window is cut pixel for pixel, with background outsi
                              .margin(1e-6));
 }
 
-// A window around a wide image is cut by columns where it is far higher than the patch: 200 lines for 4.
+// Windows around a wide image are cut by columns where they are far higher than the patch: 200 lines for 4.
 TEST_CASE("object_window: a window far larger than a wide or tall image has the bits of one cut whole") {
   const CounterRng rng(3);
   for (const Shape& shape : {Shape{5, 200, 3}, Shape{200, 5, 3}}) {
@@ -163,11 +163,11 @@ TEST_CASE("object_window: the window's camera renders the pixels that are cut") 
   }
   CHECK(worst < 1e-4);
   CHECK(spread > 0.05);
-  // At another size, the rays of the corners stay where they were.
+  // At another size, the corner rays stay where they were.
   const nerf::Camera finer = window_camera(camera, window, square_patch(96));
   const nerf::Ray a = nerf::pixel_ray(inside, -0.5, 23.5), b = nerf::pixel_ray(finer, -0.5, 95.5);
   for (std::size_t k = 0; k < 3; ++k) CHECK(a.direction[k] == Approx(b.direction[k]).margin(1e-12));
-  // Another shape sees the same pixels through them.
+  // Another shape sees the same pixels through the corner rays.
   const nerf::Camera flat = window_camera(camera, {7, 5, 24, 12}, {12, 24});
   const Tensor<float> rows = renderer.render(flat).rgb;
   REQUIRE(rows.shape == Shape{12, 24, 3});

@@ -77,7 +77,7 @@ TEST_CASE("owner: a file says whether its networks know no key, one that does no
 TEST_CASE("owner: saved and loaded it is the same to the byte, and marks the same") {
   const TemporaryFolder folder;
   Owner owner = small_owner();
-  owner.gain = 0.1 + 0.2;  // no short decimal
+  owner.gain = 0.1 + 0.2;  // has no short decimal form
   owner.save(folder / "a");
   using std::filesystem::perms;
   CHECK(std::filesystem::status(folder / "a").permissions() == (perms::owner_read | perms::owner_write));
@@ -136,7 +136,7 @@ TEST_CASE("owner: an owner whose parts do not fit its configuration is refused")
     text.replace(text.find(from), from.size(), to);
     return file;
   };
-  configured("\"reader_aspect\":1.0,", "").write(path);  // as owners were before
+  configured("\"reader_aspect\":1.0,", "").write(path);  // as in older owner files
   CHECK(Owner::load(path).options().patch() == square_patch(32));
   refused(configured("\"bits\":3", "\"bits\":0"), "bits must be 1 to 256, got 0");
   refused(configured("\"bits\":3", "\"bits\":\"three\""), "expected an owner's configuration, found");
@@ -186,7 +186,7 @@ TEST_CASE("owner: the patch keeps its longer side in another shape, and is kept 
           Approx(75 * std::min(aspect, 1 / aspect)).margin(4));
   }
   o.reader_size = 32;
-  CHECK(o.patch() == PatchSize{16, 32});  // the extractor takes no less
+  CHECK(o.patch() == PatchSize{16, 32});  // the extractor's minimum
   o.reader_size = 75;
   const TemporaryFolder folder;
   small_owner(o).save(folder / "a");
@@ -204,7 +204,7 @@ TEST_CASE("owner: images without a background are seen in their shape, objects i
     CHECK(reader_aspect(field) == Approx(4. / 3));
     field.cameras.height = 5;
     CHECK(reader_aspect(field) == 4);
-    field.cameras.height = 0;  // of a field without training images
+    field.cameras.height = 0;  // as in a field without training images
     CHECK(reader_aspect(field) == 1);
   }
 }

@@ -16,7 +16,7 @@ nerf::Camera view_camera() {
   return nerf::make_camera(nerf::look_at({2.2, -3.1, 1.7}, {0.1, 0.2, 0}, {0, 0, 1}), 0.9, 23, 18);
 }
 
-// The field of the other tests with only one half of it filled, so that some rays see nothing.
+// Returns the field of the other tests with only one half filled, so that some rays see nothing.
 nerf::RadianceField half_field() {
   nerf::RadianceField field = small_field();
   std::vector<std::uint8_t> keep(static_cast<std::size_t>(field.grid.cells()), 0);
@@ -133,7 +133,7 @@ TEST_CASE("view_cache: what lies together on a ray is one part, and parts lie ap
   nerf::Renderer fine(field, {.finer = 8}), coarse(field, {.finer = 2});
   const CachedView many = cache_view(fine, field, view_camera(), 1000),
                    few = cache_view(coarse, field, view_camera(), 1000);
-  // Four times as many samples are 1.33 times as many parts (measured).
+  // Four times as many samples give 1.33 times as many parts (measured).
   CHECK(many.weight.size() < few.weight.size() * 3 / 2);
   Index pairs = 0;
   for (Index p = 0; p < 23 * 18; ++p)
@@ -145,8 +145,8 @@ TEST_CASE("view_cache: what lies together on a ray is one part, and parts lie ap
           square += std::pow(static_cast<double>(many.position[3 * static_cast<std::size_t>(k) + a] -
                                                  many.position[3 * static_cast<std::size_t>(l) + a]),
                              2);
-        // Means of neighbouring runs of at most 1/128 are nearest where one ends and the other has hardly
-        // begun.
+        // The means of neighbouring runs of at most 1/128 are closest where one run ends and the next has
+        // hardly begun.
         CHECK(std::sqrt(square) > 1.0 / 512);
       }
   CHECK(pairs > 20);

@@ -12,7 +12,7 @@ namespace {
 const std::vector<std::int32_t> kBegin{0, 2, 2, 3, 6};
 const std::vector<double> kWeights{0.5, -1, 2, 0, 0.25, 1};
 
-// An op over segments with weights of the tape's type.
+// An op over segments whose weights have the tape's type.
 template <class T>
 auto over(const std::vector<std::int32_t>& begin, const std::vector<T>& weights) {
   return [&](auto&, auto v) { return weighted_segments<T>(v[0], begin, weights); };

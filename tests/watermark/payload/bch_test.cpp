@@ -28,7 +28,7 @@ unsigned value_of(const Bits& bits) {
   return value;
 }
 
-// All codewords, as numbers.
+// Returns all codewords as numbers.
 std::vector<unsigned> codewords(const Bch& code) {
   std::vector<unsigned> words;
   for (unsigned i = 0; i < 1u << code.dimension(); ++i)
@@ -43,7 +43,7 @@ Bits random_bits(Index n, const CounterRng& rng, std::uint64_t a) {
   return bits;
 }
 
-// The word with `errors` different bits flipped.
+// Returns the word with `errors` different bits flipped.
 Bits spoilt(Bits word, Index errors, const CounterRng& rng, std::uint64_t a) {
   const auto order = permutation(static_cast<Index>(word.size()), rng, a);
   for (Index i = 0; i < errors; ++i) word[static_cast<std::size_t>(order[static_cast<std::size_t>(i)])] ^= 1;
@@ -84,7 +84,7 @@ TEST_CASE("bch: small codes have the distance they promise, and keep it when sho
     const Bch code(static_cast<int>(m), t, n);
     INFO("m " << m << ", t " << t << ", length " << n);
     REQUIRE(code.corrects() >= t);
-    // Linear: the least distance is the least weight.
+    // In a linear code, the minimum distance is the minimum weight.
     Index least = n;
     for (unsigned i = 1; i < 1u << std::min<Index>(code.dimension(), 16); ++i) {
       const Bits word = code.encode(bits_of(i, code.dimension()));
@@ -157,7 +157,7 @@ TEST_CASE("bch: more errors give none, or another codeword that is near") {
           code.encode(std::span(found->bits).first(static_cast<std::size_t>(code.dimension())));
       CHECK(again == found->bits);
     }
-  CHECK(none > 0.99 * static_cast<double>(trials));  // chance is sum_(i<=9) C(127, i) / 2^56 = 2.7e-4
+  CHECK(none > 0.99 * static_cast<double>(trials));  // chance: sum_(i<=9) C(127, i) / 2^56 = 2.7e-4
 }
 
 TEST_CASE("bch: as many random words are decoded as spheres around the codewords hold") {

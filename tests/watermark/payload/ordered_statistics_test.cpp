@@ -30,7 +30,7 @@ double agreement(const Bits& word, const std::vector<double>& logits) {
   return sum;
 }
 
-// Logits of a word through noise: mean +-strength, deviation 1.
+// Returns the logits of a word with noise: mean +-strength, standard deviation 1.
 std::vector<double> seen(const Bits& word, double mark_psnr, const CounterRng& rng, std::uint64_t a) {
   std::vector<double> logits;
   for (std::size_t i = 0; i < word.size(); ++i)
@@ -60,7 +60,7 @@ TEST_CASE("ordered_statistics: the best codeword of a small code is found, as by
   }
   CHECK(better_by_order[3] == 0);
   CHECK(better_by_order[2] <= 2);
-  CHECK(better_by_order[0] > 30);  // signs of the most reliable alone: the test would notice a missing search
+  CHECK(better_by_order[0] > 30);  // signs of the most reliable bits alone: a missing search would show
 }
 
 TEST_CASE(
@@ -78,7 +78,7 @@ TEST_CASE(
     for (std::uint8_t bit : word) logits.push_back(bit ? 1.0 : -1.0);
     const auto order = permutation(100, rng, trial + 100);
     for (std::size_t i = 0; i < 18; ++i) logits[static_cast<std::size_t>(order[i])] = 0;
-    CHECK(decoder.nearest(logits, 0) == word);  // 18 erasures: the code's distance less one
+    CHECK(decoder.nearest(logits, 0) == word);  // 18 erasures: one less than the code's distance
     logits[static_cast<std::size_t>(order[50])] *= -1;
     CHECK(decoder.nearest(logits, 2) == word);
   }

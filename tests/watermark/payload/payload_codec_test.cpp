@@ -21,7 +21,7 @@ std::vector<double> logits_of(const Message& message) {
   return logits;
 }
 
-// `count` logits, chosen by rng at a, are turned.
+// Flips the sign of `count` logits, chosen by rng at a.
 void spoil(std::vector<double>& logits, Index count, Index among, const CounterRng& rng, std::uint64_t a) {
   const auto order = permutation(among, rng, a);
   for (Index i = 0; i < count; ++i)
@@ -144,8 +144,8 @@ TEST_CASE("payload_codec: random bits are seldom a payload, and as seldom as is 
   const double bound = codec.chance() * kTrials;
   CHECK(signs_read <= bound + 4 * std::sqrt(bound));
   CHECK(strengths_read <= bound + 4 * std::sqrt(bound));
-  CHECK(signs_read + strengths_read > 0);  // the test is not empty: see the bench for the rate itself
-  // What an image without evidence, an all-dark or an all-bright one may give.
+  CHECK(signs_read + strengths_read > 0);  // guards against an empty test; the bench measures the rate
+  // Logits as an image without evidence, an all-dark or an all-bright one may give them.
   for (Index n : {48, 64, 100, 128, 255, 256}) {
     const PayloadCodec other(n);
     for (double x : {0.0, 1.0, -1.0})
@@ -169,7 +169,7 @@ TEST_CASE("payload_codec: the bound on chance agreement holds, and is near where
   CHECK(log_chance_of_agreement(std::vector<double>(5, 0.0), 0) == 0);
   const std::vector<double> mixed{3, -1, 0.5, 0, 2, 1e-3};
   const double most = 6.501;
-  int at_least = 0;  // of all 64 choices of signs
+  int at_least = 0;  // among all 64 choices of signs
   for (unsigned signs = 0; signs < 64; ++signs) {
     double sum = 0;
     for (std::size_t i = 0; i < 6; ++i) sum += (signs >> i & 1 ? 1 : -1) * std::abs(mixed[i]);

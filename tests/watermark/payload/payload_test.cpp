@@ -108,7 +108,7 @@ TEST_CASE("payload: the number of payloads is that of the words that are taken, 
     }
     CHECK(payload_count(PayloadKind::text, bits) == texts);
   }
-  // Words that begin as a character of three bytes does; the others follow from those above.
+  // Words that begin like a three-byte character; the other cases follow from those above.
   Index texts = 0;
   for (std::uint64_t word = 0xe00000; word < 0xf00000; ++word)
     texts += payload_from_data(PayloadKind::text, bits_of(word, 24)).has_value();

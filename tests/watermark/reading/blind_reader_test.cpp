@@ -13,7 +13,7 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
-// A coloured block on white, so that there is something to cut out.
+// Returns a coloured block on white, so that there is something to crop.
 Tensor<float> block(Index channels) {
   Tensor<float> image({40, 50, channels}, 1);
   const auto noise = uniform<float>({40, 50, channels}, 0, 0.8, 8);
@@ -24,7 +24,7 @@ Tensor<float> block(Index channels) {
   return image;
 }
 
-// [H, W, 1 or 2] as [H, W, 3 or 4].
+// Converts [H, W, 1 or 2] to [H, W, 3 or 4].
 Tensor<float> coloured(const Tensor<float>& grey) {
   const Index in = grey.shape[2], out = in + 2;
   Tensor<float> image({grey.shape[0], grey.shape[1], out});

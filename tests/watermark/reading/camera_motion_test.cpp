@@ -39,7 +39,7 @@ TEST_CASE("camera_motion: no motion leaves a camera, and what each motion does")
   CHECK(same.fx == c.fx);
   CHECK(same.cy == c.cy);
   const Projection before = project(c, kPivot);
-  // Turns keep the pivot where it was; a shift along the axis, positive towards the camera, brings it nearer.
+  // Rotations keep the pivot in place; a shift along the axis, positive towards the camera, brings it closer.
   const Projection turned = project(moved(c, kPivot, {0.1, -0.2, 0.3}), kPivot);
   CHECK(turned.x == Approx(before.x).epsilon(1e-12));
   CHECK(turned.y == Approx(before.y).epsilon(1e-12));

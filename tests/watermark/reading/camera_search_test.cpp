@@ -27,7 +27,7 @@ bool one_is_close(const std::vector<nerf::Camera>& found, const nerf::Camera& ca
                      [&](const nerf::Camera& c) { return cameras_apart(camera, c) < 8; });
 }
 
-// What an extractor that is right in two places of three would see.
+// Returns what an extractor would see that is right in two places of three.
 SeenPlaces places_of(const Owner& owner, const nerf::Camera& camera) {
   nerf::Renderer renderer(owner.field);
   const CachedView view = cache_view(renderer, owner.field, camera);
@@ -57,14 +57,14 @@ TEST_CASE("camera_search: places that the extractor recognised lead to the camer
   for (const std::uint64_t seed : {11u, 12u, 13u}) {
     nerf::Camera camera = near_camera(owner, 48, seed);
     if (seed == 12) camera = moved(camera, {0, 0, 0}, {0, 0, 0.5, 0, 0, 0, 0.2, 0.1, 0});
-    if (seed == 13) {  // a flat image, in the middle of the square one
+    if (seed == 13) {  // a wide image, in the middle of the square one
       camera.height = 36;
       camera.cy -= 6;
     }
     const auto found = search.find(places_of(owner, camera), camera.height, 48, 3);
     REQUIRE(found.size() == 3);
     CAPTURE(seed);
-    // Cells are a sixth of the cube, 6 pixels; a camera within half of one can be aligned.
+    // Cells are a sixth of the cube, 6 pixels; alignment converges from a camera within half a cell.
     CHECK(cameras_apart(camera, found.front()) < 3);
     CHECK(found.front().width == 48);
   }
@@ -82,7 +82,7 @@ TEST_CASE("camera_search: the whole object in an image leads to the camera, turn
     REQUIRE(found.size() == 3);
     close += one_is_close(found, camera);
   }
-  CHECK(close >= 3);  // 60 renders are some 15 degrees apart
+  CHECK(close >= 3);  // 60 renders are about 15 degrees apart
 }
 
 TEST_CASE("camera_search: lightness leads to the camera whatever the hue, and likeness knows the scene") {

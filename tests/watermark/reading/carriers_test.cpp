@@ -27,7 +27,7 @@ Tensor<float> rendered(const Owner& owner, const std::vector<std::int8_t>& signs
   return renderer.render(carrier_camera()).rgb;
 }
 
-// Root mean square of what carriers leave of a marked view's difference, and of all of it.
+// Root mean square of a marked view's difference after the carriers are removed, and before.
 struct Left {
   double rest = 0, all = 0;
 };
@@ -57,7 +57,7 @@ TEST_CASE("carriers: where all signs are alike a marked view's difference is the
   const Left left =
       left_of(owner, std::vector<std::int8_t>(static_cast<std::size_t>(owner.cells.count()), 1), 64, true);
   CAPTURE(left.rest, left.all);
-  CHECK(left.rest < 0.1 * left.all);  // colours that reach 0 or 1 do not change alike both ways
+  CHECK(left.rest < 0.1 * left.all);  // colours that reach 0 or 1 change differently in the two directions
 }
 
 TEST_CASE("carriers: where signs differ it is about the sum of parts with their cells' signs") {

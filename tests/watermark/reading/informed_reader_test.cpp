@@ -51,7 +51,7 @@ TEST_CASE("informed_reader: an unmarked view is not leant to any key") {
   double p = 1;
   for (int i = 0; i < 4; ++i)
     CHECK(counts.counts[static_cast<std::size_t>(i)] <= binomial_upper(20000, p /= 10));
-  // T^2 under a wrong key has mean 1, so that it passes 1 about as often as a normal number's square does.
+  // Under a wrong key T^2 has mean 1, so it exceeds 1 about as often as the square of a normal number does.
   Index above = 0;
   for (std::uint8_t k = 0; k < 200; ++k) {
     const double t = keyed_statistic(evidence, owner.code(test_key(k)), kReadMessage);
@@ -70,7 +70,7 @@ TEST_CASE("informed_reader: the camera is found from the image, and the reading 
   CHECK(marked.informed.agreement > 0.95);
   CHECK(read_bits(marked.evidence(), owner.code(), 4).message == kReadMessage);
   CHECK(reader.read(image_of(owner, camera, false)).chosen == ReadingKind::informed);
-  // Its evidence counts as much as the blind detection's.
+  // Its evidence counts as much as that of blind detection.
   double ours = 0, theirs = 0;
   for (double s : marked.informed.evidence) ours += s * s;
   for (double s : marked.blind) theirs += s * s;
@@ -86,13 +86,13 @@ TEST_CASE("informed_reader: the camera is found from the image, and the reading 
 
 TEST_CASE("informed_reader: what an image gives does not depend on those read before it") {
   const Owner owner = marking_owner();
-  const CameraSearchOptions many{.views = 80, .size = 32};  // more than are compared first
+  const CameraSearchOptions many{.views = 80, .size = 32};  // more views than the first comparison takes
   const Tensor<float> image = image_of(owner, camera_near(4), true);
   InformedReader fresh(owner, many), used(owner, many);
   const ImageReading alone = fresh.read(image);
-  REQUIRE(alone.informed.agreement > 0.95);  // found among the first
+  REQUIRE(alone.informed.agreement > 0.95);  // found among the first views
   const nerf::Dataset other = nerf::make_scene({.size = 96, .views = 1, .seed = 9});
-  REQUIRE(used.read(other.views.front().rgba).informed.agreement < 0.95);  // looked for among all
+  REQUIRE(used.read(other.views.front().rgba).informed.agreement < 0.95);  // searched among all views
   const ImageReading after = used.read(image);
   CHECK(after.informed.agreement == alone.informed.agreement);
   CHECK(after.evidence() == alone.evidence());
@@ -103,7 +103,7 @@ Tensor<float> distorted(const char* name, const Tensor<float>& image) {
   return distort::apply_distortion(distort::parse_distortion(name), image, CounterRng(1, 1), 0, white);
 }
 
-// What others do with a view: another background behind the object, bars, a mirror.
+// Returns a view as others may present it: with another background behind the object, bars, a mirror.
 Tensor<float> before(const Owner& owner, const nerf::Camera& camera, const std::array<float, 3>& colour) {
   nerf::Renderer renderer(owner.field);
   renderer.set_recolour(owner.marking(cell_signs(owner.code(), kReadMessage)));

@@ -16,7 +16,7 @@ namespace {
 
 constexpr Index kHeight = 104, kWidth = 136;
 
-// Waves, edges and fine grain; the amplitude of the grain says how much detail there is.
+// Returns waves, edges and fine grain; the amplitude of the grain sets the amount of detail.
 Tensor<float> view_image(float grain, std::uint64_t seed) {
   const CounterRng rng(seed, 1);
   Tensor<float> x({kHeight, kWidth, 3});
@@ -31,7 +31,7 @@ Tensor<float> view_image(float grain, std::uint64_t seed) {
   return quantize8(x);
 }
 
-// A faint pattern of the size a mark has, rms amplitude.
+// Returns a faint pattern at the scale of a mark, with the given rms amplitude.
 Tensor<float> pattern(float amplitude) {
   const CounterRng rng(9, 2);
   Tensor<float> x({kHeight, kWidth, 3});
@@ -51,8 +51,8 @@ Tensor<float> sum(const Tensor<float>& a, const Tensor<float>& b, float sign) {
 
 const std::vector<double> kEverywhere(static_cast<std::size_t>(kHeight* kWidth), 1.0);
 
-// Of 8-row strips with their signs, how many the score's product with the mark gets right; and a plain
-// difference's.
+// How many 8-row strips get the right sign: from the score's product with the mark, and from a plain
+// difference.
 struct Right {
   int score = 0, difference = 0, of = 0;
 };

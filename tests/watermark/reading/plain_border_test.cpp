@@ -12,7 +12,8 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
-// Patches of 12 x 12 pixels of any colours, with corners of side 30 cut off in another one, and noise.
+// Returns 12 x 12-pixel patches of arbitrary colours, whose corners of side 30 have another colour, with
+// noise.
 Tensor<float> with_corners(double noise) {
   const auto colours = uniform({90, 3}, 0, 0.8, 1);
   const auto u = uniform({100 * 120, 3}, -1.73 * noise, 1.73 * noise, 2);
@@ -66,7 +67,7 @@ TEST_CASE(
 TEST_CASE("plain_border: an image without one has none, one that is plain has nothing else") {
   for (const std::uint8_t b : plain_border(Tensor<float>({20, 30, 3}, 0.5f))) CHECK(b == 1);
   CHECK(plain_border(Tensor<float>({0, 0, 3})).empty());
-  Tensor<float> slope({160, 200, 3});  // no two places alike: little but the corners
+  Tensor<float> slope({160, 200, 3});  // no two places are alike: only the corners are marked
   for (Index p = 0; p < 160 * 200; ++p) {
     slope[3 * p] = static_cast<float>(p % 200) / 200;
     slope[3 * p + 1] = static_cast<float>(p / 200) / 160;

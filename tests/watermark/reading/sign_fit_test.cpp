@@ -13,8 +13,8 @@ using namespace fieldmark::watermark;
 namespace {
 constexpr Index kPlane = 40, kPixels = kPlane * kPlane, kCells = 25;
 
-// Cells of 8 x 8 pixels, each seen through another one: a pixel's mark is of two cells, the second one
-// fainter or stronger.
+// Returns cells of 8 x 8 pixels, each seen through another one: a pixel's mark comes from two cells, the
+// second one fainter or stronger.
 Carriers overlapping(float second) {
   const auto u = uniform({kPixels, 6}, 0.5, 1, 1);
   Carriers c{Tensor<float>({kPlane, kPlane, 3}), {0}, {}, {}};
@@ -35,7 +35,7 @@ Carriers overlapping(float second) {
 
 double sign_of(Index cell) { return cell * cell % 11 < 5 ? 1 : -1; }
 
-// An image of that mark under a blur and noise of a deviation.
+// Returns the score of an image with that mark, a blur, and noise of a standard deviation.
 MarkScore score_of(const Carriers& c, double deviation, double blur = 0) {
   const auto noise = uniform({kPixels, 3}, -std::sqrt(3.0) * deviation, std::sqrt(3.0) * deviation, 2);
   Tensor<float> seen(c.whole.shape);
@@ -52,7 +52,7 @@ MarkScore score_of(const Carriers& c, double deviation, double blur = 0) {
   return s;
 }
 
-// [cells][3 P] pixels' marks of every cell under the blur.
+// Returns the pixel marks [cells][3 P] of every cell under the blur.
 std::vector<std::vector<double>> carriers_of(const Carriers& c, double blur) {
   std::vector<std::vector<double>> m;
   for (Index cell = 0; cell < kCells; ++cell) {
@@ -66,7 +66,7 @@ std::vector<std::vector<double>> carriers_of(const Carriers& c, double blur) {
   return m;
 }
 
-// x of A x = b, A [n, n] symmetric and positive, by elimination.
+// Solves A x = b by elimination, with A [n, n] symmetric positive definite.
 std::vector<double> solved(std::vector<std::vector<double>> a, std::vector<double> b) {
   const std::size_t n = b.size();
   for (std::size_t k = 0; k < n; ++k)
@@ -114,7 +114,7 @@ TEST_CASE("sign_fit: a cell that is seen through a stronger one keeps its sign")
   const Carriers c = overlapping(3);
   const MarkScore s = score_of(c, 0.003);
   const SignFit fit = fit_signs(c, s, kCells);
-  Index alone = 0;  // signs of a cell's own sum, in which the other's mark is nine times as large
+  Index alone = 0;  // correct signs of a cell's own sum, in which the other's mark is nine times as large
   for (Index cell = 0; cell < kCells; ++cell) {
     CAPTURE(cell);
     CHECK(fit.sign[static_cast<std::size_t>(cell)] * sign_of(cell) > 0.2);

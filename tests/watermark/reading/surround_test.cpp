@@ -12,7 +12,7 @@ using namespace fieldmark::watermark;
 
 namespace {
 
-// A disc of many colours in the middle of a background.
+// Returns a disc of many colours in the middle of a background.
 Tensor<float> disc(Index h, Index w, const std::array<float, 3>& background) {
   Tensor<float> image({h, w, 3});
   for (Index p = 0; p < h * w; ++p) {
@@ -72,7 +72,7 @@ TEST_CASE("surround: another background behind an object becomes the field's, ba
     for (std::size_t a = 0; a < 3; ++a) CHECK(seen.colour[a] == Approx(colour[a]).margin(1e-5));
     REQUIRE(seen.plain.size() == seen.image.size());
     for (Index i = 0; i < 3; ++i) CHECK(seen.image[i] == 1);
-    // Bars of the background's own colour are its edges: the disc stays, wherever the cut is.
+    // Bars of the background's own colour become its edges: the disc stays, wherever the cut is.
     const Index h = seen.image.shape[0], w = seen.image.shape[1];
     double worst = 0;
     for (Index y = 0; y < h; ++y)
@@ -89,7 +89,7 @@ TEST_CASE("surround: a bar from edge to edge covers the object, and is no backgr
   const Tensor<float> view = disc(60, 80, {1, 1, 1});
   Tensor<float> image = view;
   for (Index i = 3 * 80 * 24; i < 3 * 80 * 36; ++i) image[i] = 0;
-  for (Index x = 90; x < 120; ++x) image[3 * 80 * 30 + x] = 1;  // its letters
+  for (Index x = 90; x < 120; ++x) image[3 * 80 * 30 + x] = 1;  // letters on the bar
   const Surround seen = clear_surround(image, 1, true);
   REQUIRE(std::ssize(seen.covered) == 60 * 80);
   for (Index p = 0; p < 60 * 80; ++p) {

@@ -32,7 +32,7 @@ TEST_CASE("tone_fit: gain, offset and gamma are found where the weight is") {
     }
   }
   const ToneFit fit = fit_tones(render, image, weight);
-  CHECK(worst_of(fit(render), image, 300) < 0.02);  // of the gamma: its terms do not make a power
+  CHECK(worst_of(fit(render), image, 300) < 0.02);  // of the gamma, which the fit's terms cannot express
   CHECK(fit.terms[2][3] == Approx(1));
 }
 

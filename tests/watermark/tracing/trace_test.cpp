@@ -29,7 +29,7 @@ std::vector<std::int8_t> signs_of(const Key& key, std::span<const double> area, 
   return cell_signs(deal_cells(copy_key(key, name), area, kMessage.size()), kMessage);
 }
 
-// Evidence of an average of copies, each cell with noise of the given standard deviation.
+// Returns the evidence of an average of copies, each cell with noise of the given standard deviation.
 std::vector<double> average(const Key& key, std::span<const double> area,
                             const std::vector<std::string>& names, float noise, std::uint64_t seed) {
   std::vector<double> evidence(area.size());
@@ -92,8 +92,9 @@ TEST_CASE("trace: copies cut and pasted together are named, cell by cell") {
   CHECK(found[2].p_corrected > 1e-3);
 }
 
-// The null: evidence of no copy. Trials: 400 images with 50 names each. A corrected p of at most a comes up
-// in at most a of the images: at 0.1, 40 are expected at most, and 61 are exceeded once in 5,000 times.
+// The null: evidence of no copy. Trials: 400 images with 50 names each. A corrected p of at most a occurs in
+// at most a share a of the images: at 0.1, at most 40 are expected, and more than 61 occur once in 5,000
+// times.
 TEST_CASE("trace: innocent recipients are named no more often than the corrected p-value says") {
   const std::vector<double> area(64, 1.0);
   const auto names = recipients(50);
