@@ -72,7 +72,7 @@ TEST_CASE("reproduce --report-only writes the page from the cells that are there
   REQUIRE(r.code == cli::kOk);
   CHECK_THAT(r.out, Contains(" cells are missing, about ") && Contains("  ours-lego-hash-48-1\n") &&
                         !Contains("  ours-lego-hash-16-1\n"));
-  CHECK_THAT(read_text(folder / "page.md"), Contains("98.44 ± 6.25"));
+  CHECK_THAT(read_text(folder / "page.md"), Contains("98.44 ± 0.62"));
   CHECK(!std::filesystem::exists(folder / "work"));
 }
 
