@@ -17,6 +17,7 @@ enum class SceneKind {
   plain,    ///< large solids of one colour each
   glossy    ///< solids that mirror the sun and the sky, so that their colours depend on the view
 };
+/// All built-in scenes.
 constexpr SceneKind kSceneKinds[] = {SceneKind::objects, SceneKind::sphere, SceneKind::wires,
                                      SceneKind::plain, SceneKind::glossy};
 
