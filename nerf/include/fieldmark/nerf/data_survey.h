@@ -44,8 +44,9 @@ std::vector<SurveyedView> survey_views(const Dataset& data);
 ///   - masks: less than a tenth of the pixels are valid.
 ///   - outlying_cameras: farther from the median position than 5/2 of the 90th percentile of distances, and
 ///     than four times this percentile minus three times the median distance.
-///   - cameras_look_away: the point nearest to all viewing axes is not in the image; in a place, only if it
-///     is behind 95% of the cameras; never in a forward-facing scene.
+///   - cameras_look_away: the point nearest to all viewing axes is outside the cone about the camera's axis
+///     that holds the image; in a place, only if it is behind 95% of the cameras; never in a forward-facing
+///     scene.
 ///   - focal_lengths: a horizontal field of view outside 2 to 150 degrees.
 ///   - principal_points: outside the image, or within a 16th of its sides from the upper left corner.
 ///   - few_views: fewer than 12 training views; in a forward-facing scene fewer than 6.

@@ -10,7 +10,8 @@
 
 namespace fieldmark {
 
-// Losses for Duals. Weights and targets are constants that must outlive the pass.
+// Losses for Duals. Weights and targets are constants; keep them alive for the pass, since some losses refer
+// to them.
 
 /// @{
 /// Computes the loss of loss.h with its tangent; one of a and b may be a Var. With d = a - b:
