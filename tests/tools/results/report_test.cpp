@@ -43,7 +43,6 @@ TEST_CASE("markdown_report holds the protocol and every number", "[report]") {
 TEST_CASE("code_hash is of a room without those in it, or of all rooms of a house", "[report]") {
   const std::string imaging = code_hash({"imaging"});
   CHECK(imaging.size() == 64);
-  CHECK(imaging == code_hash({"imaging"}));
   if (machine().commit == "unknown") return;  // outside of git, the tree is unknown
   CHECK(imaging != code_hash({"imaging/video"}));
   CHECK(imaging != code_hash({"imaging", "imaging/video"}));

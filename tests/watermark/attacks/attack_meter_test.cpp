@@ -161,12 +161,16 @@ TEST_CASE("attack_meter: of the first views informed is read too, as the tool wo
   };
   const float white[3] = {1, 1, 1};
   const Tensor<float> first = render(owner.field, o).rgb[0];
-  const AttackRow row = meter.image("rotation_20");
-  const ImageReading read = reader.read(distort::apply_distortion(distort::parse_distortion("rotation_20"),
-                                                                  first, CounterRng(5, 42), 0, white));
-  CHECK(row.accuracy.informed == share(read.informed.evidence));
-  CHECK(row.accuracy.chosen == share(read.evidence()));
-  CHECK(row.chosen() == row.accuracy.chosen);
+  for (const char* name : {"", "rotation_20"}) {
+    CAPTURE(name);
+    const AttackRow row = *name ? meter.image(name) : meter.none();
+    const ImageReading read = reader.read(
+        *name ? distort::apply_distortion(distort::parse_distortion(name), first, CounterRng(5, 42), 0, white)
+              : first);
+    CHECK(row.accuracy.informed == share(read.informed.evidence));
+    CHECK(row.accuracy.chosen == share(read.evidence()));
+    CHECK(row.chosen() == row.accuracy.chosen);
+  }
   const AttackRow unreadable = meter.image("scale_0.2");
   CHECK((unreadable.accuracy.informed == 0.5 && unreadable.chosen() == 0.5));
   o.informed_views = -1;

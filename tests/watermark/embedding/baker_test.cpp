@@ -132,7 +132,7 @@ TEST_CASE("baker: scaling gives the file the strength asked for, on other views 
   // So many views that the first guess takes an eighth of them.
   const MarkPsnrViews looked_at{.count = 72, .seed = 32}, other{.count = 96, .seed = 500};
   const double learnt = baker.mark_psnr(looked_at);
-  for (const double change : {1.5, -1.5}) {  // each starts from the colours that the last one left
+  for (const double change : {1.5, -1.5, 0.0}) {  // each starts from the colours that the last one left
     const double before = baker.mark_psnr(looked_at), target = learnt + change;
     const auto found = baker.scale_to(target, looked_at);
     CAPTURE(change, before, found.learnt, found.scaled, found.scale);
