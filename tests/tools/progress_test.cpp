@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <csignal>
 #include <sstream>
+#include <thread>
 
 #include "support/catch.h"
 
@@ -28,6 +29,17 @@ TEST_CASE("Progress away from a terminal is a line for each tenth", "[progress]"
   CHECK(std::count(text.begin(), text.end(), '\n') == 10);
   CHECK(text.find('\r') == std::string::npos);
   CHECK_THAT(text, Contains("train 10%  ") && Contains(" left  loss 1\n") && Contains("train 100%  in 0 s"));
+}
+
+TEST_CASE("Progress of a resumed run estimates the time left from its own work", "[progress]") {
+  std::ostringstream out;
+  Progress progress(out, "train");
+  progress.update(0.5);
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  progress.update(0.6);
+  // 0.3 s for a tenth: 1.2 s for the rest, and not the 0.2 s of a run that did six tenths.
+  CHECK(out.str().starts_with("train 50%  \ntrain 60%  "));
+  CHECK_THAT(out.str(), Contains(" s left") && !Contains(" 0 s left"));
 }
 
 TEST_CASE("Progress on a terminal rewrites one line and ends it", "[progress]") {

@@ -51,6 +51,10 @@ double Progress::seconds() const { return std::chrono::duration<double>(Clock::n
 
 void Progress::update(double fraction, std::string_view note) {
   fraction = std::clamp(fraction, 0.0, 1.0);
+  if (first_ < 0) {
+    first_ = fraction;
+    first_seconds_ = seconds();
+  }
   if (terminal_) {
     const bool due = fraction == 1 || on_line_ == 0 || Clock::now() - shown_ > std::chrono::milliseconds(100);
     if (due) show(fraction, note);
@@ -62,6 +66,13 @@ void Progress::update(double fraction, std::string_view note) {
   show(fraction, note);
 }
 
+// The rate is that of the work since the first report, because a resumed run starts far from 0. Empty at the
+// first report.
+std::string Progress::time_left(double fraction, double elapsed) const {
+  if (fraction <= first_) return "";
+  return format_duration((elapsed - first_seconds_) * (1 - fraction) / (fraction - first_)) + " left";
+}
+
 void Progress::show(double fraction, std::string_view note) {
   shown_ = Clock::now();
   const double elapsed = seconds();
@@ -69,7 +80,7 @@ void Progress::show(double fraction, std::string_view note) {
   if (fraction >= 1)
     line += "in " + format_duration(elapsed);
   else if (fraction > 0)
-    line += format_duration(elapsed * (1 - fraction) / fraction) + " left";
+    line += time_left(fraction, elapsed);
   if (!note.empty()) line += "  " + std::string(note);
   if (terminal_) {
     const std::size_t blanks = on_line_ > line.size() ? on_line_ - line.size() : 0;

@@ -26,11 +26,14 @@ class Progress {
  private:
   using Clock = std::chrono::steady_clock;
   void show(double fraction, std::string_view note);
+  std::string time_left(double fraction, double elapsed) const;
   std::ostream& out_;
   std::string what_;
   bool terminal_;
   Clock::time_point begin_ = Clock::now();
   Clock::time_point shown_ = begin_;
+  double first_ = -1;  ///< fraction of the first report; negative before it
+  double first_seconds_ = 0;
   int tenth_ = 0;            ///< the last one reported
   std::size_t on_line_ = 0;  ///< characters on the terminal's current line
 };

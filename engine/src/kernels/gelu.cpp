@@ -51,10 +51,12 @@ inline V slope(V x) {
 }
 
 // The scalar twins serve double, through the compiler's builtins: <cmath> must not be included here.
+// Below -40, P(x) is 0 and beyond 40 it is 1, so that infinities, too, go to their limits.
 inline double distribution(double x) { return __builtin_erfc(-x / 1.4142135623730950488) / 2; }
-inline double value(double x) { return x * distribution(x); }
+inline double value(double x) { return x < -40 ? 0 : x * distribution(x); }
 inline double slope(double x) {
-  return distribution(x) + x * 0.39894228040143267794 * __builtin_exp(-x * x / 2);
+  const double a = x < -40 ? -40 : x > 40 ? 40 : x;
+  return distribution(a) + a * 0.39894228040143267794 * __builtin_exp(-a * a / 2);
 }
 
 // out[i] = f(x[i], dy[i], out[i]); the last vector is padded with zeros.

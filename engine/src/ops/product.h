@@ -63,6 +63,7 @@ void product(const kernels::Gemm<T>& g) {
     chunk.m = end - begin;
     chunk.a += begin * g.a_row;
     chunk.c += begin * g.ldc;
+    if (g.mask) chunk.mask += begin * g.ldc;
     run(chunk);
   });
 }
@@ -76,6 +77,7 @@ inline void product(const kernels::GemmBf16& g) {
     chunk.m = end - begin;
     chunk.a += begin * g.a_row;
     chunk.c += begin * g.ldc;
+    if (g.mask) chunk.mask += begin * g.ldc;
     chunk.tiles = bf16_units() == Bf16Units::tiles;
     run(chunk);
   });

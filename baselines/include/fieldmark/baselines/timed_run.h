@@ -8,7 +8,7 @@
 
 namespace fieldmark::baselines {
 
-/// The caller stopped a run; a checkpoint was saved first.
+/// The caller stopped the work. A run in training saved a checkpoint first; a measurement starts again.
 class Stopped : public Error {
  public:
   using Error::Error;

@@ -34,8 +34,9 @@ using GradcheckFn = std::function<Var<double>(Tape<double>&, std::span<const Var
 /// finite.
 ///
 /// The check runs with the inputs as leaves, after one and two calls of backward(); with the inputs as
-/// outputs of a preceding op, as in a network, where buffers hold NaN until they are filled; and for every
-/// subset of the inputs, with the others constant (for more than six inputs: each alone, and all but each).
+/// outputs of a preceding op, as in a network, where buffers hold NaN until they are filled, after two calls;
+/// and for every subset of the inputs, with the others constant (for more than six inputs: each alone, and
+/// all but each).
 /// @throws whatever f throws
 GradcheckReport gradcheck(const GradcheckFn& f, std::span<const Tensor<double>> inputs,
                           const GradcheckOptions& options = {});

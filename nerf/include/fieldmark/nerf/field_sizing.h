@@ -50,8 +50,9 @@ double pixel_resolution(const Dataset& data, const Space& space);
 ///   - the occupancy grid has a quarter of the finest level's cells per axis: 32, 64 or 128;
 ///   - the table grows fourfold from 2^9 while that gains `worth` dB and `enough` is not reached;
 ///   - the viewing direction is dropped if that gains a sixth of `worth` or `enough` is still reached;
-///   - half of the networks' width, then the finest levels one by one, are dropped if that loses at most a
-///     sixth and half of `worth`, respectively, or `enough` is still reached.
+///   - half of the networks' width with half of the geometry features, then the finest levels one by one,
+///     are dropped if that loses at most a sixth and half of `worth`, respectively, or `enough` is still
+///     reached.
 /// Space, step and seed are those of `start`. For an unbounded scene, a training of `start` first finds the
 /// empty cells, which the other trainings skip.
 /// @param progress  called before and during each training; false stops, with `start` itself while tables are

@@ -32,7 +32,8 @@ struct CameraMotion {
 /// @param from, to  of the same images   @throws ShapeError if their numbers differ
 CameraMotion mean_motion(std::span<const Camera> from, std::span<const Camera> to);
 
-/// Returns the text of a transforms.json: intrinsics and matrix of each camera, under the names of the views.
+/// Returns the text of a transforms.json: intrinsics, image size and matrix of each camera, under the names
+/// of the views.
 /// @throws ShapeError if their numbers differ
 std::string format_transforms(std::span<const View> views, std::span<const Camera> cameras);
 
