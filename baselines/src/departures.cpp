@@ -72,7 +72,12 @@ std::vector<Option> options_of_training() {
       {"gamma_2, of the message loss", "5", "-",
        [](const EmbedRecipe& r) { return text_of(fusion_of(r).training.message_weight); }},
       {"lambda, of VGG-16 features", "0.01", "-", [](const EmbedRecipe&) { return std::string("0"); }},
-      {"beta_2 of Adam", "0.999", "-", [](const EmbedRecipe&) { return std::string("0.99"); }},
+      {"optimiser of H's convolutions", "Adam", "Adam",
+       [](const EmbedRecipe& r) {
+         const double rate = fusion_of(r).training.matrix_rate;
+         return rate > 0 ? "Muon, " + text_of(rate) + " times Adam's step size" : "Adam";
+       }},
+      {"beta_2 of Adam", "0.999", "-", [](const EmbedRecipe&) { return text_of(watermark::kEmbedBeta2); }},
       {"step size", "0.0005", "0.0005, of H 0.001",
        [](const EmbedRecipe& r) {
          const std::string lr = text_of(r.embed.schedule.lr);

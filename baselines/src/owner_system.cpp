@@ -130,7 +130,8 @@ OwnerSystem owner_system(const CellName& name, Index image) {
   r.cells = kCells;
   if (system == "ours_without_dense") r.cell().training.sign_weight = r.cell().training.index_weight = 0;
   if (system == "ours_without_cells") {  // no content loss
-    r.mark = watermark::FusionMarkOptions{.training = {.content_weight = 0}};
+    const double rate = r.cell().training.matrix_rate;
+    r.mark = watermark::FusionMarkOptions{.training = {.content_weight = 0, .matrix_rate = rate}};
   }
   for (const auto& [of, ablation] : {std::pair{"ours_without_signs", Ablation::unkeyed_signs},
                                      {"ours_without_cells", Ablation::power_budget},

@@ -1,13 +1,12 @@
-#include <fieldmark/core/error.h>
 #include <fieldmark/engine/adam.h>
 #include <fieldmark/engine/parallel.h>
-#include <fnmatch.h>
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "kernels/adam.h"
+#include "optimiser_checks.h"
 
 namespace fieldmark {
 namespace kernels {
@@ -26,21 +25,6 @@ namespace {
 // 16k floats of four arrays are 256 KiB, which fits a core's L2 cache.
 constexpr Index kGrain = 16384;
 
-void check_option(const char* name, double value, bool ok, const char* want) {
-  if (!ok)
-    throw ValueError("[Adam] " + std::string(name) + " must be " + want + ", got " + std::to_string(value));
-}
-
-void check_size(const char* name, std::size_t got, std::size_t want) {
-  if (got != want)
-    throw ShapeError("[Adam::step] " + std::string(name) + " must have " + std::to_string(want) +
-                     " elements, as the optimiser, got " + std::to_string(got));
-}
-
-bool matches(const AdamGroup& group, const std::string& name) {
-  return ::fnmatch(group.names.c_str(), name.c_str(), FNM_NOESCAPE) == 0;
-}
-
 bool same_settings(const AdamRange& a, const AdamRange& b) {
   return a.lr_factor == b.lr_factor && a.skip_zero == b.skip_zero && a.weight_decay == b.weight_decay;
 }
@@ -49,12 +33,12 @@ bool same_settings(const AdamRange& a, const AdamRange& b) {
 
 template <class T>
 Adam<T>::Adam(Index n, AdamOptions o) : options_(o) {
-  check_option("n", static_cast<double>(n), n >= 0, "at least 0");
-  check_option("lr", o.lr, o.lr > 0, "positive");
-  check_option("beta1", o.beta1, o.beta1 >= 0 && o.beta1 < 1, "in [0, 1)");
-  check_option("beta2", o.beta2, o.beta2 >= 0 && o.beta2 < 1, "in [0, 1)");
-  check_option("eps", o.eps, o.eps > 0, "positive");
-  check_option("weight_decay", o.weight_decay, o.weight_decay >= 0, "at least 0");
+  detail::check_option("Adam", "n", static_cast<double>(n), n >= 0, "at least 0");
+  detail::check_option("Adam", "lr", o.lr, o.lr > 0, "positive");
+  detail::check_option("Adam", "beta1", o.beta1, o.beta1 >= 0 && o.beta1 < 1, "in [0, 1)");
+  detail::check_option("Adam", "beta2", o.beta2, o.beta2 >= 0 && o.beta2 < 1, "in [0, 1)");
+  detail::check_option("Adam", "eps", o.eps, o.eps > 0, "positive");
+  detail::check_option("Adam", "weight_decay", o.weight_decay, o.weight_decay >= 0, "at least 0");
   mean_.resize(static_cast<std::size_t>(n));
   mean_square_.resize(static_cast<std::size_t>(n));
 }
@@ -77,8 +61,8 @@ void Adam<T>::step(std::span<T> values, std::span<T> grads, double lr_factor) {
 
 template <class T>
 void Adam<T>::check(std::span<T> values, std::span<T> grads, std::span<const AdamRange> ranges) const {
-  check_size("values", values.size(), mean_.size());
-  check_size("grads", grads.size(), mean_.size());
+  detail::check_step_size("Adam", "values", values.size(), mean_.size());
+  detail::check_step_size("Adam", "grads", grads.size(), mean_.size());
   const Index n = static_cast<Index>(mean_.size());
   for (const AdamRange& r : ranges)
     if (r.begin < 0 || r.end < r.begin || r.end > n)
@@ -142,14 +126,12 @@ void Adam<T>::set_steps(Index steps) {
 template <class T>
 std::vector<AdamRange> adam_ranges(const ParamStore<T>& store, const std::vector<AdamGroup>& groups) {
   const auto entries = store.entries();
-  for (const AdamGroup& g : groups)
-    if (std::ranges::none_of(
-            entries, [&](const auto& e) { return is_trained(e.role) && matches(g, e.name); }))
-      throw ValueError("[adam_ranges] no trained parameter of the store has a name like '" + g.names + "'");
+  for (const AdamGroup& g : groups) detail::check_pattern("adam_ranges", store, g.names);
   std::vector<AdamRange> ranges;
   bool joins = false;  // the previous entry ends the last range
   for (const auto& e : entries) {
-    const auto group = std::ranges::find_if(groups, [&](const AdamGroup& g) { return matches(g, e.name); });
+    const auto group =
+        std::ranges::find_if(groups, [&](const AdamGroup& g) { return name_matches(g.names, e.name); });
     const bool trained = is_trained(e.role) && group != groups.end();
     if (trained && !(joins && same_settings(ranges.back(), group->settings))) {
       ranges.push_back(group->settings);

@@ -1,5 +1,6 @@
 #include <fieldmark/engine/packed_weights.h>
 #include <fieldmark/engine/params.h>
+#include <fnmatch.h>
 
 #include "shortcuts.h"
 
@@ -12,6 +13,10 @@ std::span<T> slice_of(std::span<T> buffer, const Entry& e) {
 }
 
 }  // namespace
+
+bool name_matches(const std::string& pattern, const std::string& name) {
+  return ::fnmatch(pattern.c_str(), name.c_str(), FNM_NOESCAPE) == 0;
+}
 
 template <class T>
 ParamId ParamStore<T>::add(std::string_view name, Shape shape, ParamRole role) {

@@ -39,4 +39,12 @@ void visit_adam(Store& store, A& adam, const Entry& e, const std::string& prefix
   visit(name + ".mean_square", part_of(adam.mean_square(), e), e.shape);
 }
 
+// Calls visit(name, elements, shape) for one parameter and its velocity.
+template <class Store, class O, class Entry, class F>
+void visit_velocity(Store& store, O& optimiser, const Entry& e, const std::string& prefix, F visit) {
+  const std::string name = prefix + e.name;
+  visit(name, part_of(store.values(), e), e.shape);
+  visit(name + ".velocity", part_of(optimiser.velocity(), e), e.shape);
+}
+
 }  // namespace fieldmark::detail

@@ -20,9 +20,8 @@ void visit_state(Store& store, A& adam, const Entry& e, const std::string& prefi
 }
 template <class Store, class S, class Entry, class F>
 requires requires(S& s) { s.velocity(); }
-void visit_state(Store& store, S& sgd, const Entry& e, const std::string& prefix, F visit) {
-  visit(prefix + e.name, detail::part_of(store.values(), e), e.shape);
-  visit(prefix + e.name + ".velocity", detail::part_of(sgd.velocity(), e), e.shape);
+void visit_state(Store& store, S& optimiser, const Entry& e, const std::string& prefix, F visit) {
+  detail::visit_velocity(store, optimiser, e, prefix, visit);
 }
 
 Index size_of_state(const auto& optimiser) {
@@ -93,6 +92,12 @@ void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore
 }
 
 template <class T>
+void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore<T>& store,
+                const Muon<T>& optimiser) {
+  save(file, std::string(prefix), store, optimiser);
+}
+
+template <class T>
 void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore<T>& store) {
   Nothing nothing;
   load(file, std::string(prefix), store, nothing);
@@ -116,13 +121,21 @@ void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore
   load(file, std::string(prefix), store, optimiser);
 }
 
+template <class T>
+void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore<T>& store,
+                Muon<T>& optimiser) {
+  load(file, std::string(prefix), store, optimiser);
+}
+
 #define FIELDMARK_STATE(T)                                                                            \
   template void save_state(SafetensorsFile&, std::string_view, const ParamStore<T>&);                 \
   template void save_state(SafetensorsFile&, std::string_view, const ParamStore<T>&, const Adam<T>&); \
   template void save_state(SafetensorsFile&, std::string_view, const ParamStore<T>&, const Sgd<T>&);  \
+  template void save_state(SafetensorsFile&, std::string_view, const ParamStore<T>&, const Muon<T>&); \
   template void load_state(const SafetensorsFile&, std::string_view, ParamStore<T>&);                 \
   template void load_state(const SafetensorsFile&, std::string_view, ParamStore<T>&, Adam<T>&);       \
-  template void load_state(const SafetensorsFile&, std::string_view, ParamStore<T>&, Sgd<T>&);
+  template void load_state(const SafetensorsFile&, std::string_view, ParamStore<T>&, Sgd<T>&);        \
+  template void load_state(const SafetensorsFile&, std::string_view, ParamStore<T>&, Muon<T>&);
 FIELDMARK_STATE(float)
 FIELDMARK_STATE(double)
 #undef FIELDMARK_STATE

@@ -1,6 +1,7 @@
 #include <fieldmark/core/error.h>
 #include <fieldmark/engine/training_run.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 
@@ -13,11 +14,34 @@ constexpr double kKeptLoss = 0.98, kNewestLoss = 0.02;  // weights of the runnin
 
 using detail::read_array;
 
-// Calls visit(name, elements, shape) for the arrays of trained parameters: values, moments, gradients.
+bool is_matrix(const Muon<float>& muon, Index begin) {
+  return std::ranges::any_of(muon.matrices(), [&](const auto& m) { return m.begin == begin; });
+}
+
+// Returns the ranges without the matrices.
+std::vector<AdamRange> without(std::vector<AdamRange> ranges, const Muon<float>& muon) {
+  for (const auto& matrix : muon.matrices()) {
+    std::vector<AdamRange> rest;
+    for (const AdamRange& r : ranges) {
+      AdamRange before = r, behind = r;
+      before.end = std::min(r.end, matrix.begin);
+      behind.begin = std::max(r.begin, matrix.end());
+      for (const AdamRange& part : {before, behind})
+        if (part.begin < part.end) rest.push_back(part);
+    }
+    ranges = std::move(rest);
+  }
+  return ranges;
+}
+
+// Calls visit(name, elements, shape) for the arrays of trained parameters: values, state, gradients.
 template <class TrainedParams, class F>
 void visit_arrays(TrainedParams& t, F visit) {
   for (const auto& e : t.params->entries()) {
-    detail::visit_adam(*t.params, t.adam, e, t.prefix, visit);
+    if (t.muon && is_matrix(*t.muon, e.offset))
+      detail::visit_velocity(*t.params, *t.muon, e, t.prefix, visit);
+    else
+      detail::visit_adam(*t.params, t.adam, e, t.prefix, visit);
     if (t.gradients) visit(t.prefix + e.name + ".gradient", detail::part_of(t.params->grads(), e), e.shape);
   }
 }
@@ -37,8 +61,16 @@ void TrainingRun::train(ParamStore<float>& params, const AdamOptions& adam, std:
   trained_.push_back({&params, Adam<float>(params, adam), ranges, ranges, std::move(prefix), gradients});
 }
 
+void TrainingRun::train_matrices(const std::vector<std::string>& names, double lr_factor, std::size_t store) {
+  Trained& t = trained_.at(store);
+  if (t.muon) throw ValueError("[train_matrices] Muon steps matrices of this store already");
+  t.muon.emplace(*t.params, names, MuonOptions{.lr = lr_factor, .zero_grads = t.adam.options().zero_grads});
+  t.ranges = t.scaled = without(t.ranges, *t.muon);
+}
+
 void TrainingRun::update(std::size_t store) {
   Trained& t = trained_[store];
+  if (t.muon) t.muon->step(t.params->values(), t.params->grads(), lr());
   for (std::size_t i = 0; i < t.ranges.size(); ++i) t.scaled[i].lr_factor = t.ranges[i].lr_factor * lr();
   t.adam.step(t.params->values(), t.params->grads(), t.scaled);
 }

@@ -19,14 +19,14 @@ from typing import Callable, Optional, Union
 
 from . import _fieldmark, engine
 from ._fieldmark import Camera, Error, Field, IoError, Key, Owner, ShapeError, set_threads, threads
-from .engine import Adam, Parameters, Sgd, Tape, gradcheck
+from .engine import Adam, Muon, Parameters, Sgd, Tape, gradcheck
 
 Path = Union[str, "os.PathLike[str]"]
 Progress = Callable[[int, float], None]
 
 __all__ = [
-    "Adam", "Camera", "Error", "Field", "IoError", "Key", "Owner", "Parameters", "Sgd", "ShapeError", "Tape",
-    "bake", "embed", "engine", "gradcheck", "set_threads", "threads", "train",
+    "Adam", "Camera", "Error", "Field", "IoError", "Key", "Muon", "Owner", "Parameters", "Sgd", "ShapeError",
+    "Tape", "bake", "embed", "engine", "gradcheck", "set_threads", "threads", "train",
 ]
 
 

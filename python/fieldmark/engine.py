@@ -21,8 +21,9 @@ from . import _fieldmark
 from ._fieldmark import (
     Adam_float32, Adam_float64, BatchNorm_float32, BatchNorm_float64, BatchStatistics, Conv2d_float32,
     Conv2d_float64, Dense_float32, Dense_float64, GradcheckReport, GroupNorm_float32, GroupNorm_float64,
-    Inspector_float32, Inspector_float64, OpCost, Parameters_float32, Parameters_float64, SafetensorsFile,
-    Sgd_float32, Sgd_float64, Tape_float32, Tape_float64, Value_float32, Value_float64,
+    Inspector_float32, Inspector_float64, Muon_float32, Muon_float64, OpCost, Parameters_float32,
+    Parameters_float64, SafetensorsFile, Sgd_float32, Sgd_float64, Tape_float32, Tape_float64, Value_float32,
+    Value_float64,
     abs, affine, avg_pool, batch_norm, batch_norm_fixed, bce_with_logits, broadcast_to, cholesky, clamp,
     concatenate, conv2d, cos, cosine_decay, cumsum, dense, detach, determinant, elu, equal, exp, expm1,
     exponential_decay, feature_distance, gather, gelu, global_avg_pool, greater, group_norm, huber_loss, inverse,
@@ -36,8 +37,9 @@ __all__ = [
     "Adam", "Adam_float32", "Adam_float64", "BatchNorm", "BatchNorm_float32", "BatchNorm_float64",
     "BatchStatistics", "Conv2d", "Conv2d_float32", "Conv2d_float64", "Dense", "Dense_float32", "Dense_float64",
     "GradcheckReport", "GroupNorm", "GroupNorm_float32", "GroupNorm_float64", "Inspector", "Inspector_float32",
-    "Inspector_float64", "OpCost", "Parameters", "Parameters_float32", "Parameters_float64", "SafetensorsFile",
-    "Sgd", "Sgd_float32", "Sgd_float64", "Tape", "Tape_float32", "Tape_float64", "Value", "Value_float32",
+    "Inspector_float64", "Muon", "Muon_float32", "Muon_float64", "OpCost", "Parameters", "Parameters_float32",
+    "Parameters_float64", "SafetensorsFile", "Sgd", "Sgd_float32", "Sgd_float64", "Tape", "Tape_float32",
+    "Tape_float64", "Value", "Value_float32",
     "Value_float64", "abs", "affine", "avg_pool", "batch_norm", "batch_norm_fixed", "bce_with_logits",
     "broadcast_to", "cholesky", "clamp", "concatenate", "conv2d", "cos", "cosine_decay", "cumsum", "dense",
     "detach", "determinant", "elu", "equal", "exp", "expm1", "exponential_decay", "feature_distance", "gather",
@@ -110,6 +112,23 @@ def Sgd(parameters: Any, *, lr: float = 1e-2, momentum: float = 0.0, nesterov: b
         weight_decay: float = 0.0) -> Any:
     """Stochastic gradient descent with momentum."""
     return _like("Sgd", "Parameters", parameters)(parameters, lr, momentum, nesterov, weight_decay)
+
+
+@overload
+def Muon(parameters: Parameters_float32, names: Sequence[str], *, lr: float = ...,
+         momentum: float = ...) -> Muon_float32: ...
+@overload
+def Muon(parameters: Parameters_float64, names: Sequence[str], *, lr: float = ...,
+         momentum: float = ...) -> Muon_float64: ...
+def Muon(parameters: Any, names: Sequence[str], *, lr: float = 1e-3, momentum: float = 0.95) -> Any:
+    """Muon on the tensors of two axes or more whose names match a pattern, as in ``["*/weight"]``.
+
+    A step sets their gradients to 0. An ``Adam`` without weight decay that steps after it then changes the other
+    tensors alone. Leave out a last layer of classes.
+    """
+    if isinstance(names, str):
+        raise TypeError("[Muon] names must be a list of patterns, got str")
+    return _like("Muon", "Parameters", parameters)(parameters, list(names), lr, momentum)
 
 
 @overload

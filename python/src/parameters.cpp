@@ -1,6 +1,7 @@
 // Parameter stores, optimisers, and files of their state.
 #include <fieldmark/engine/adam.h>
 #include <fieldmark/engine/clip.h>
+#include <fieldmark/engine/muon.h>
 #include <fieldmark/engine/sgd.h>
 #include <fieldmark/engine/state_file.h>
 #include <fieldmark/engine/tensor_stats.h>
@@ -126,6 +127,8 @@ template <class T>
 using AdamHandle = OptimiserHandle<T, Adam<T>>;
 template <class T>
 using SgdHandle = OptimiserHandle<T, Sgd<T>>;
+template <class T>
+using MuonHandle = OptimiserHandle<T, Muon<T>>;
 
 template <class T>
 void bind_optimisers(py::module_& module, const std::string& suffix) {
@@ -154,6 +157,14 @@ void bind_optimisers(py::module_& module, const std::string& suffix) {
           }),
           "parameters"_a, "lr"_a = 1e-2, "momentum"_a = 0.0, "nesterov"_a = false, "weight_decay"_a = 0.0)
       .def("step", &SgdHandle<T>::step, "lr_factor"_a = 1.0, "One step; lr_factor multiplies lr.");
+  py::class_<MuonHandle<T>>(module, ("Muon_" + suffix).c_str())
+      .def(py::init([](StorePtr<T> s, const std::vector<std::string>& names, double lr, double momentum) {
+             return new MuonHandle<T>{
+                 s, s->leases.lend(s),
+                 Muon<T>(s->store, names, {.lr = lr, .momentum = momentum, .zero_grads = true})};
+           }),
+           "parameters"_a, "names"_a, "lr"_a = 1e-3, "momentum"_a = 0.95)
+      .def("step", &MuonHandle<T>::step, "lr_factor"_a = 1.0, "One step; lr_factor multiplies lr.");
 }
 
 // Applies f to the C++ optimiser of a Python object; None: does nothing.
@@ -167,8 +178,9 @@ void with_optimiser(const char* function, const StorePtr<T>& s, const py::object
   if (given.is_none()) return f();
   if (py::isinstance<AdamHandle<T>>(given)) return of(given.cast<AdamHandle<T>&>());
   if (py::isinstance<SgdHandle<T>>(given)) return of(given.cast<SgdHandle<T>&>());
-  throw py::type_error("[" + std::string(function) + "] optimiser must be Adam or Sgd of " + dtype_name<T>() +
-                       " parameters, or None, got " + type_name(given));
+  if (py::isinstance<MuonHandle<T>>(given)) return of(given.cast<MuonHandle<T>&>());
+  throw py::type_error("[" + std::string(function) + "] optimiser must be Adam, Sgd or Muon of " +
+                       dtype_name<T>() + " parameters, or None, got " + type_name(given));
 }
 
 template <class T>

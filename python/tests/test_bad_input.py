@@ -276,6 +276,18 @@ def test_backward_refuses_parameters_that_have_changed(tape):
         loss.backward()
 
 
+def test_muon_takes_a_list_of_patterns_of_matrices():
+    model = engine.Parameters("float64")
+    model.add("w", np.ones((3, 2)))
+    model.add("b", np.ones(2))
+    with pytest.raises(TypeError, match="names must be a list of patterns, got str"):
+        engine.Muon(model, "w")
+    with pytest.raises(ValueError, match="no trained parameter of the store has a name like 'x'"):
+        engine.Muon(model, ["x"])
+    with pytest.raises(ValueError, match="'b' must have two axes or more"):
+        engine.Muon(model, ["*"])
+
+
 @pytest.mark.parametrize("other, got", [
     (np.ones(3), r"got ndarray: pass it as tape.constant\(x\)"), (np.ones(1), "got ndarray"), ("x", "got str"),
     (None, "got NoneType"), (engine.Tape().constant(np.ones(3, "float32")), "got Value_float32")])

@@ -129,11 +129,12 @@ def take_step(model, optimiser, tape):
     optimiser.step()
 
 
-@pytest.mark.parametrize("make", [lambda m: engine.Adam(m, lr=0.1), lambda m: engine.Sgd(m, lr=0.1, momentum=0.9)])
+@pytest.mark.parametrize("make", [lambda m: engine.Adam(m, lr=0.1), lambda m: engine.Sgd(m, lr=0.1, momentum=0.9),
+                                  lambda m: engine.Muon(m, ["w"], lr=0.1)])
 def test_a_saved_state_goes_on_with_the_same_bits(make, tmp_path):
     def begin():
         model = engine.Parameters("float64")
-        model.add("w", random(5))
+        model.add("w", random(5, 2))
         return model, make(model), engine.Tape("float64")
 
     model, optimiser, tape = begin()
@@ -153,6 +154,36 @@ def test_a_saved_state_goes_on_with_the_same_bits(make, tmp_path):
     np.testing.assert_array_equal(again.values("w"), model.values("w"))
 
 
+def test_muon_leaves_the_other_tensors_to_adam(tmp_path):
+    def begin():
+        model = engine.Parameters("float64")
+        model.add("w", random(5, 2))
+        model.add("b", random(2))
+        return model, engine.Muon(model, ["w"], lr=0.1), engine.Adam(model, lr=0.1), engine.Tape("float64")
+
+    def step(model, muon, adam, tape):
+        tape.reset()
+        model.zero_grad()
+        engine.sum(engine.square(model.leaf(tape, "w") + model.leaf(tape, "b"))).backward()
+        muon.step()
+        w = model.values("w").copy()
+        adam.step()
+        np.testing.assert_array_equal(model.values("w"), w)
+
+    one, two = begin(), begin()
+    for _ in range(3):
+        step(*one)
+    file = engine.SafetensorsFile()
+    engine.save_state(file, "muon/", one[0], one[1])
+    engine.save_state(file, "adam/", one[0], one[2])
+    engine.load_state(file, "muon/", two[0], two[1])
+    engine.load_state(file, "adam/", two[0], two[2])
+    for run in (one, two):
+        step(*run)
+    for name in ("w", "b"):
+        np.testing.assert_array_equal(two[0].values(name), one[0].values(name))
+
+
 def test_states_that_do_not_fit_are_refused_and_change_nothing(tmp_path):
     model, other, file = engine.Parameters(), engine.Parameters(), engine.SafetensorsFile()
     model.add("w", np.ones(3, "float32"))
@@ -169,7 +200,7 @@ def test_states_that_do_not_fit_are_refused_and_change_nothing(tmp_path):
         engine.load_state(file, "", model, adam)
     with pytest.raises(ValueError, match="the optimiser is one of other parameters"):
         engine.load_state(file, "", other, adam)
-    with pytest.raises(TypeError, match="optimiser must be Adam or Sgd of float32 parameters, or None, got int"):
+    with pytest.raises(TypeError, match="optimiser must be Adam, Sgd or Muon of float32 parameters, or None, got int"):
         engine.save_state(file, "b/", model, 3)
     assert (other.values("w") == 0).all() and (model.values("w") == 1).all()
     with pytest.raises(fm.IoError, match="nowhere"):

@@ -30,5 +30,7 @@ TEST_CASE("departures: each part once, with the values that embed uses") {
   CHECK(row("N_m").paper == "256");
   CHECK(row("noise, standard deviation").preset_paper == "up to 0.02");
   CHECK(row("noise, standard deviation").preset_code == "none");
+  CHECK(row("optimiser of H's convolutions").preset_paper == "Muon, 2 times Adam's step size");
+  CHECK(row("beta_2 of Adam").preset_paper == "0.99");
   CHECK(row("step size").preset_code == "0.0015, of H 0.003");
 }

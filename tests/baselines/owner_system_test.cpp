@@ -88,6 +88,7 @@ TEST_CASE("owner_system: each ablation takes away its part and nothing else") {
   CHECK(dense.recipe.cell().training.bits_weight == usual.bits_weight);
   CHECK(cells.ablation == Ablation::power_budget);
   CHECK(fusion(cells).training.content_weight == 0);
+  CHECK(fusion(cells).training.matrix_rate == usual.matrix_rate);
   CHECK(cells.recipe.owner.reader_size == 128);
   CHECK(cells.recipe.owner.mark_psnr == 34);
   CHECK(cells.recipe.embed.schedule.lr == ours.recipe.embed.schedule.lr);

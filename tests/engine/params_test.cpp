@@ -18,6 +18,16 @@ TEST_CASE("params: one flat buffer, found by name and id") {
   CHECK_THROWS_WITH(store.find("c"), "[params] there is no parameter 'c'");
 }
 
+TEST_CASE("params: patterns match whole names, and a star crosses slashes") {
+  CHECK(name_matches("extractor/*weight", "extractor/down0/conv/weight"));
+  CHECK(name_matches("*", ".hidden/w"));
+  CHECK(name_matches("a*", "a"));
+  CHECK(name_matches("w[01]", "w1"));
+  CHECK_FALSE(name_matches("extractor", "extractor/w"));
+  CHECK_FALSE(name_matches("*bias", "bias/w"));
+  CHECK_FALSE(name_matches("", "w"));
+}
+
 TEST_CASE("params: gradients go to the store, to a shard, or nowhere") {
   ParamStore<float> store;
   store.add("a", {2});

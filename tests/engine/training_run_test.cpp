@@ -112,6 +112,50 @@ TEST_CASE("training_run: a run that is saved and restored ends with the same bit
   CHECK(second.figure() == whole.figure());
 }
 
+// Takes a matrix to its target by Muon and a bias to its by Adam.
+struct MatrixFit final : TrainingRun {
+  using TrainingRun::train_matrices;
+  MatrixFit() : TrainingRun(kTen) {
+    store.add("in", {2});
+    store.add("w", {3, 2});
+    store.add("out", {2});
+    train(store, {.lr = 1, .zero_grads = true});
+    train_matrices({"w"}, 3);
+  }
+  double figure() const override { return loss(); }
+  std::string status() const override { return "fitting"; }
+  double take_step(double) override {
+    for (std::size_t i = 0; i < store.values().size(); ++i)
+      store.grads()[i] = store.values()[i] - static_cast<float>(i + 1);
+    update();
+    return 0;
+  }
+  void describe(RunFingerprint&) const override {}
+  ParamStore<float> store;
+};
+
+TEST_CASE("training_run: Muon steps the matrices, Adam the rest, and both resume") {
+  const TemporaryFolder folder;
+  MatrixFit whole;
+  whole.step(0);
+  CHECK(std::abs(whole.store.values()[0] - 0.1f) < 1e-6f);  // Adam
+  CHECK(std::abs(whole.store.values()[9] - 0.1f) < 1e-6f);
+  double square = 0;  // Muon: two singular values near 1, times lr 0.1, factor 3 and 0.2 sqrt(3)
+  for (std::size_t i = 2; i < 8; ++i) square += std::pow(static_cast<double>(whole.store.values()[i]), 2);
+  CHECK(std::sqrt(square / 2) == Approx(0.3 * 0.2 * std::sqrt(3.0)).epsilon(0.25));
+  whole.save(folder / "c");
+  const SafetensorsFile file = SafetensorsFile::read(folder / "c");
+  CHECK(file.has("w.velocity"));
+  CHECK_FALSE(file.has("w.mean"));
+  CHECK(file.has("in.mean"));
+  CHECK_FALSE(file.has("out.velocity"));
+  CHECK_THROWS_WITH(whole.train_matrices({"w"}, 1), Contains("steps matrices of this store already"));
+  MatrixFit second;
+  second.restore(folder / "c");
+  for (MatrixFit* run : {&whole, &second}) run->drive({});
+  CHECK(std::ranges::equal(whole.store.values(), second.store.values()));
+}
+
 TEST_CASE("training_run: a timed run keeps the total of its checkpoint") {
   const TemporaryFolder folder;
   Fit first({.seconds = 10, .lr = 0.1});

@@ -1,4 +1,5 @@
 #include <fieldmark/engine/adam.h>
+#include <fieldmark/engine/muon.h>
 #include <fieldmark/engine/nn/dense.h>
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/conv2d.h>
@@ -139,7 +140,7 @@ TEST_CASE("allocations: chains, reductions and convolutions allocate nothing aft
   });
 }
 
-TEST_CASE("allocations: a step of a network, its loop and Adam allocates nothing after the first") {
+TEST_CASE("allocations: a step of a network, its loop, Muon and Adam allocates nothing after the first") {
   if (!counts()) return;
   for_threads([] {
     ParamStore<float> store;
@@ -148,6 +149,7 @@ TEST_CASE("allocations: a step of a network, its loop and Adam allocates nothing
     PackedWeights<float> packed(store);
     ShardedLoop<float> loop(16, store.size());
     Adam<float> adam(store.size(), {.zero_grads = true});
+    Muon<float> muon(store, {"first/weight"}, {.zero_grads = true});
     const auto x = uniform<float>({40 * 128, 5}, -1, 1, 1), y = uniform<float>({40 * 128, 3}, -1, 1, 2);
     double loss = 0;
     const auto step = [&] {
@@ -163,6 +165,7 @@ TEST_CASE("allocations: a step of a network, its loop and Adam allocates nothing
             return static_cast<double>(error.value()[0]);
           },
           store.grads());
+      muon.step(store.values(), store.grads());
       adam.step(store.values(), store.grads());
     };
     step();

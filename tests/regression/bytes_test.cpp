@@ -19,9 +19,9 @@
 // thread and for two. A change that is meant to change results says so and records them anew from the test's
 // own output. The records come from:
 //   - scene and fields: version 0.1;
-//   - owners, baked fields and renders: the commit that made the networks independent of the key; for presets
-//     paper and code, the commit that gave them a warm start;
-//   - logits of preset fast: the commit that compares an image with few renders first.
+//   - owners, and what preset fast bakes, renders and reads: the commit that trains the extractor's matrices by
+//     Muon;
+//   - baked fields and renders of presets paper and code: the commit that gave them a warm start.
 using namespace fieldmark;
 
 namespace {

@@ -69,6 +69,10 @@ const std::map<std::string, Differs> kChoices{
                  const EmbedVariant& b) { return a.recipe.embed.batch != b.recipe.embed.batch; }},
     {"extractor", [](const EmbedVariant& a,
                      const EmbedVariant& b) { return cell(a).base_channels != cell(b).base_channels; }},
+    {"optimiser",
+     [](const EmbedVariant& a, const EmbedVariant& b) {
+       return cell(a).training.matrix_rate != cell(b).training.matrix_rate;
+     }},
     {"learning rate", [](const EmbedVariant& a, const EmbedVariant& b) {
        return a.recipe.embed.schedule.lr != b.recipe.embed.schedule.lr ||
               a.recipe.embed.schedule.cooldown != b.recipe.embed.schedule.cooldown;

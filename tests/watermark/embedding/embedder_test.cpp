@@ -234,7 +234,8 @@ TEST_CASE("embedder: a checkpoint of other weights, distortions or step sizes is
                               {{.anneal = 20, .index_weight = 2}, "index_weight 2"},
                               {{.anneal = 20, .bits_weight = 2}, "bits_weight 2"},
                               {{.anneal = 20, .smooth_weight = 2}, "smooth_weight 2"},
-                              {{.anneal = 20, .flat_weight = 2}, "flat_weight 2"}};
+                              {{.anneal = 20, .flat_weight = 2}, "flat_weight 2"},
+                              {{.anneal = 20, .matrix_rate = 2}, "matrix_rate 2"}};
   const TemporaryFolder folder;
   const auto path = folder / "checkpoint";
   const auto other_option = [&](Owner& owner, const EmbedOptions& o, const std::string& option) {
@@ -252,9 +253,10 @@ TEST_CASE("embedder: a checkpoint of other weights, distortions or step sizes is
     }
     if (is_paper) {
       Owner content = tiny_paper_owner({.content_weight = 2}),
-            message = tiny_paper_owner({.message_weight = 2});
+            message = tiny_paper_owner({.message_weight = 2}), muon = tiny_paper_owner({.matrix_rate = 0.5});
       other_option(content, options(6), "content_weight 2");
       other_option(message, options(6), "message_weight 2");
+      other_option(muon, options(6), "matrix_rate 0.5");
     } else {
       for (const CellChange& c : cells) {
         Owner changed = tiny_owner(30, c.options);
@@ -322,7 +324,7 @@ TEST_CASE("embedder: options outside their ranges are refused") {
 }
 
 TEST_CASE("embedder: a warm start paints and reads carriers, is resumed bit by bit, and leaves no helpers") {
-  const PooledTrainingOptions training{.content_weight = 60, .warm_steps = 6};
+  const PooledTrainingOptions training{.content_weight = 60, .matrix_rate = 2, .warm_steps = 6};
   const auto owner_of = [&] {
     return Owner(tiny_field(), {.bits = 4, .reader_size = 48}, test_key(5), message_slots(4),
                  fusion_mark({.width = 16, .channels = 8, .running_norm = true, .training = training}));
@@ -339,6 +341,10 @@ TEST_CASE("embedder: a warm start paints and reads carriers, is resumed bit by b
     Embedder begun(resumed, tiny_views(), options(9));
     for (int k = 0; k < 4; ++k) begun.step(0);
     begun.save(folder / "checkpoint");
+    const SafetensorsFile file = SafetensorsFile::read(folder / "checkpoint");
+    CHECK(file.has("extractor/0/conv/weight.velocity"));
+    CHECK_FALSE(file.has("extractor/0/conv/weight.mean"));
+    CHECK(file.has("extractor/0/conv/bias.mean"));
   }
   resumed = owner_of();
   Embedder rest(resumed, tiny_views(), options(9));

@@ -76,6 +76,7 @@ TEST_CASE("recipe: presets paper and code train as the paper and its authors' co
   CHECK(networks.message_features == 256);
   CHECK(networks.running_norm);
   CHECK(networks.training.warm_steps > 0);
+  CHECK(networks.training.matrix_rate == 2);
   CHECK(code.embed.extractor_lr == 2);
   CHECK(code.embed.distortions.noise == 0);
   CHECK(code.embed.distortions.sample_shift == Approx(8.248e-4).epsilon(1e-3));

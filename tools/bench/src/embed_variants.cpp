@@ -119,6 +119,11 @@ void training(Variants& all) {
   for (const Index channels : {16, 48})
     all.vary("extractor", std::to_string(channels) + " channels",
              [=](EmbedVariant& v) { v.recipe.cell().base_channels = channels; });
+  all.vary("optimiser", "Adam for all weights",
+           [](EmbedVariant& v) { v.recipe.cell().training.matrix_rate = 0; });
+  for (const int rate : {1, 6})
+    all.vary("optimiser", "Muon with " + std::to_string(rate) + " times Adam's step size",
+             [=](EmbedVariant& v) { v.recipe.cell().training.matrix_rate = rate; });
   all.vary("learning rate", "half", [](EmbedVariant& v) { v.recipe.embed.schedule.lr /= 2; });
   all.vary("learning rate", "twice", [](EmbedVariant& v) { v.recipe.embed.schedule.lr *= 2; });
   all.vary("learning rate", "falls over the last quarter",

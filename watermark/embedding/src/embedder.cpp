@@ -13,7 +13,7 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr AdamOptions kAdam{.lr = 1, .beta2 = 0.99, .eps = 1e-8, .zero_grads = true};
+constexpr AdamOptions kAdam{.lr = 1, .beta2 = kEmbedBeta2, .eps = 1e-8, .zero_grads = true};
 constexpr std::uint64_t kOfBatch = 8 * 64;  // index of a whole batch's draws, after those of 64 images
 
 double blend(double from, double to, double fraction) { return from + (to - from) * fraction; }
@@ -38,6 +38,8 @@ Embedder::Embedder(Owner& owner, std::span<const CachedView> views, const EmbedO
   training_ = owner.mark().training(owner, views);
   train(owner.params, kAdam,
         adam_ranges(owner.params, {{"extractor/*", {.lr_factor = options.extractor_lr}}, {"*"}}));
+  if (const MuonWeights matrices = training_->matrices(); matrices.rate > 0)
+    train_matrices(matrices.names, matrices.rate * options.extractor_lr);
   if (ParamStore<float>* helpers = training_->helpers()) train(*helpers, kAdam, {}, "helpers/");
   keep("sign", figures_.sign);
   keep("index", figures_.index);

@@ -61,6 +61,9 @@ class CellTraining : public MarkTraining {
   CellTraining(const CellMark& mark, const Owner& owner, std::span<const CachedView> views);
   Var<float> loss(Tape<float>& tape, const Params<float>& params, std::span<const TrainingImage> images,
                   const TrainingFigures& running, TrainingFigures& figures) override;
+  MuonWeights matrices() const override {
+    return {{"extractor/*conv/weight", "extractor/index_hidden/weight"}, options_.matrix_rate};
+  }
   std::string note(const TrainingFigures& f) const override;
   void describe(RunFingerprint& f) const override;
 
@@ -215,7 +218,8 @@ void CellTraining::describe(RunFingerprint& f) const {
                                     {"index_weight", options_.index_weight},
                                     {"bits_weight", options_.bits_weight},
                                     {"smooth_weight", options_.smooth_weight},
-                                    {"flat_weight", options_.flat_weight}})
+                                    {"flat_weight", options_.flat_weight},
+                                    {"matrix_rate", options_.matrix_rate}})
     f.option(name, value);
 }
 

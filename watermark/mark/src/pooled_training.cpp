@@ -187,6 +187,7 @@ std::string PooledTraining::note(const TrainingFigures& f) const {
 void PooledTraining::describe(RunFingerprint& f) const {
   f.option("content_weight", options_.content_weight);
   f.option("message_weight", options_.message_weight);
+  f.option("matrix_rate", options_.matrix_rate);
   f.option("warm_steps", options_.warm_steps);
   if (owner_.mark().has_gain()) f.option("mark_psnr", owner_.options().mark_psnr);
 }

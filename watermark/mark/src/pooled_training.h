@@ -20,6 +20,7 @@ class PooledTraining : public MarkTraining {
   Var<float> loss(Tape<float>& tape, const Params<float>& params, std::span<const TrainingImage> images,
                   const TrainingFigures& running, TrainingFigures& figures) override;
   Index warm_steps() const override { return options_.warm_steps; }
+  MuonWeights matrices() const override { return {{"extractor/*/conv/weight"}, options_.matrix_rate}; }
   ParamStore<float>* helpers() override { return carriers_ ? &helpers_ : nullptr; }
   void finish_step(ParamStore<float>& params) override;
   std::string note(const TrainingFigures& f) const override;

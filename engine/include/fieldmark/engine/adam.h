@@ -90,7 +90,7 @@ class Adam {
 
 /// A group of parameters that share a step size and rules.
 struct AdamGroup {
-  std::string names;        ///< pattern of names; * matches any characters, as in "extractor*" or "*bias"
+  std::string names;        ///< pattern of names, see name_matches()
   AdamRange settings = {};  ///< all but begin and end
 };
 

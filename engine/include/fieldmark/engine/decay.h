@@ -3,7 +3,7 @@
 
 namespace fieldmark {
 
-// Step-size factors at step n >= 0, for the lr_factor of Adam::step() and Sgd::step(). Multiply them to
+// Step-size factors at step n >= 0, for the lr_factor of an optimiser's step(). Multiply them to
 // combine them: warm_up(n, 100) * cosine_decay(n, 10000). Schedule (schedule.h) is for runs planned by time.
 // @throws ValueError if n is negative or another argument is out of range
 

@@ -25,6 +25,10 @@ enum class ParamRole {
 /// True if tensors of this role receive gradients.
 constexpr bool is_trained(ParamRole role) { return role != ParamRole::running; }
 
+/// True if a parameter's name matches a pattern, as in "extractor*" or "*bias": * stands for any characters,
+/// slashes included, ? for one, [abc] for one of these.
+bool name_matches(const std::string& pattern, const std::string& name);
+
 /// Holds all parameters of a model in one flat buffer and their gradients in a second one of equal length, so
 /// that an optimiser step, a checkpoint and zero_grad() are one loop each. Tensors of 4096 elements or more
 /// start on a cache line; the gap before them stays zero.

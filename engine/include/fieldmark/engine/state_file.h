@@ -1,5 +1,6 @@
 #pragma once
 #include <fieldmark/engine/adam.h>
+#include <fieldmark/engine/muon.h>
 #include <fieldmark/engine/params.h>
 #include <fieldmark/engine/safetensors.h>
 #include <fieldmark/engine/sgd.h>
@@ -13,7 +14,8 @@ namespace fieldmark {
 
 /// @{
 /// Adds the parameters as PREFIX + NAME. Adam adds its moments as NAME.mean and NAME.mean_square and its
-/// steps as PREFIX + "adam/steps"; Sgd adds its velocity as NAME.velocity.
+/// steps as PREFIX + "adam/steps"; Sgd and Muon add their velocity as NAME.velocity.
+/// Two optimisers of one store need two prefixes; the parameters are then stored twice.
 /// @throws ValueError if a name is taken
 template <class T>
 void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore<T>& store);
@@ -23,6 +25,9 @@ void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore
 template <class T>
 void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore<T>& store,
                 const Sgd<T>& optimiser);
+template <class T>
+void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore<T>& store,
+                const Muon<T>& optimiser);
 /// @}
 
 /// @{
@@ -38,6 +43,9 @@ void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore
 template <class T>
 void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore<T>& store,
                 Sgd<T>& optimiser);
+template <class T>
+void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore<T>& store,
+                Muon<T>& optimiser);
 /// @}
 
 }  // namespace fieldmark

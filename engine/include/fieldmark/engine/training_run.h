@@ -1,5 +1,6 @@
 #pragma once
 #include <fieldmark/engine/adam.h>
+#include <fieldmark/engine/muon.h>
 #include <fieldmark/engine/params.h>
 #include <fieldmark/engine/run_fingerprint.h>
 #include <fieldmark/engine/schedule.h>
@@ -25,8 +26,8 @@ struct DriveOptions {
 /// derives from it and adds the loss.
 ///
 /// Equal options, inputs and step counts give equal bytes, even across save() and restore(). A checkpoint
-/// holds every parameter by its name, both moments as NAME.mean and NAME.mean_square, the trainer's own
-/// figures as run/NAME, and the fingerprint of the run.
+/// holds every parameter by its name, Adam's moments as NAME.mean and NAME.mean_square or Muon's velocity as
+/// NAME.velocity, the trainer's own figures as run/NAME, and the fingerprint of the run.
 class TrainingRun {
  public:
   TrainingRun(const TrainingRun&) = delete;
@@ -73,6 +74,11 @@ class TrainingRun {
   /// still due
   void train(ParamStore<float>& params, const AdamOptions& adam, std::vector<AdamRange> ranges = {},
              std::string prefix = {}, bool gradients = false);
+  /// Lets Muon step the matrices of a registered store whose names match, in place of Adam. extend_update()
+  /// must not cover them.
+  /// @param lr_factor  multiplies the schedule's step size; the factors of ranges do not
+  /// @throws ValueError if called twice for a store, and as Muon
+  void train_matrices(const std::vector<std::string>& names, double lr_factor, std::size_t store = 0);
   /// @{
   /// Adds a figure of the trainer to checkpoints as run/NAME. It must outlive the run and not move.
   void keep(std::string_view name, std::span<float> figures) { kept_.emplace_back(name, figures); }
@@ -81,7 +87,8 @@ class TrainingRun {
   /// @}
   /// Returns the step size of the current step.
   double lr() const { return schedule_.lr(steps_); }
-  /// Takes Adam's step over the ranges given to train(). @param store  index in the order of train() calls
+  /// Takes Muon's step over the matrices and Adam's over the ranges given to train().
+  /// @param store  index in the order of train() calls
   void update(std::size_t store = 0);
   /// Extends the step to one more range of the first store, see Adam::extend_step(). lr_factor multiplies
   /// lr().
@@ -99,6 +106,7 @@ class TrainingRun {
     std::vector<AdamRange> ranges, scaled;
     std::string prefix;
     bool gradients;
+    std::optional<Muon<float>> muon = {};
   };
   using Kept = std::variant<std::span<float>, std::span<double>, std::span<Index>>;
 

@@ -9,7 +9,7 @@ namespace fieldmark {
 /// Batch normalisation layer with the parameters "<name>/gamma" [C], initially 1, and "<name>/beta" [C],
 /// initially 0, and the running statistics "<name>/running_mean" [C], initially 0, and
 /// "<name>/running_variance" [C], initially 1. The store holds the statistics too, for checkpoints, as
-/// ParamRole::running: they get no gradient, and Adam does not change them.
+/// ParamRole::running: they get no gradient, and no optimiser changes them.
 template <class T>
 class BatchNorm {
  public:

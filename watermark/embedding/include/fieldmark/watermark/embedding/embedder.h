@@ -17,6 +17,8 @@ struct EmbedDistortions {
   bool mixed = true;           ///< an image takes several kinds; false: a whole batch takes one kind or none
 };
 
+inline constexpr double kEmbedBeta2 = 0.99;  ///< beta_2 of Adam in Embedder
+
 /// Training options shared by every kind of mark.
 struct EmbedOptions {
   /// Length of the run and step sizes.
@@ -29,11 +31,12 @@ struct EmbedOptions {
 
 /// Trains mark and extractor together on a frozen field.
 /// Each image draws a code of the cells, a message, a view and distortions; the mark computes its loss (see
-/// Mark::training()), and Adam minimises the mean over a batch. The owner's key takes no part: equal options
-/// train equal networks under any key, and the evidence that they find is independent of it. An image with
-/// fewer pixels than the extractor's is enlarged with its mark, as small images are for reading. The same
-/// seed and number of steps give the same bytes, for any thread count and across save() and restore().
-/// Source: Luo et al. 2023 (CopyRNeRF), section 3.4.
+/// Mark::training()), and Adam minimises the mean over a batch, with Muon for the weights that the mark names
+/// (MarkTraining::matrices()). The owner's key takes no part: equal options train equal networks under any
+/// key, and the evidence that they find is independent of it. An image with fewer pixels than the extractor's
+/// is enlarged with its mark, as small images are for reading. The same seed and number of steps give the
+/// same bytes, for any thread count and across save() and restore(). Source: Luo et al. 2023 (CopyRNeRF),
+/// section 3.4.
 class Embedder final : public TrainingRun {
  public:
   /// Owner and views must outlive the embedder.

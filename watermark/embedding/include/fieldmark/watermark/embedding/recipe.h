@@ -12,7 +12,8 @@ namespace fieldmark::watermark {
 ///   fast   every cell of the scene carries one bit: trains in minutes
 ///   paper  one message for all places, after a warm start; distortions of at most 30 degrees, scale 0.75 and
 ///          blur 0.1. Source: Luo et al. 2023 (CopyRNeRF), sections 3 and 4.1. Departures: images of 80
-///          pixels instead of 150, eight per step, noise of at most 0.02, and those of PooledTrainingOptions
+///          pixels instead of 150, eight per step, noise of at most 0.02, Muon for the extractor's
+///          convolutions, and the weights and warm start of PooledTrainingOptions
 ///   code   preset paper as in its authors' code: the extractor has twice the learning rate, no distortions,
 ///          samples move by 0.2 of their spacing, N_m is 128, and GlobalMarkOptions::authors_code
 inline constexpr std::array<const char*, 3> kPresets{"fast", "paper", "code"};

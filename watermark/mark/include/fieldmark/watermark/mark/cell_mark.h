@@ -5,7 +5,7 @@
 
 namespace fieldmark::watermark {
 
-/// Weights of a cell mark's losses.
+/// Training options of a cell mark.
 struct CellTrainingOptions {
   double first_mark_psnr = 28;  ///< dB at the first step; from there it approaches the owner's mark PSNR ...
   double anneal = 200;          ///< ... with this time constant, steps
@@ -14,6 +14,7 @@ struct CellTrainingOptions {
   double bits_weight = 0.5;     ///< of the cross-entropy of the pooled bits
   double smooth_weight = 0.4;   ///< of the share of the residual's power that remains after 8 x 8 pixel means
   double flat_weight = 0.4;     ///< of the share of the residual's power where the base image is flat
+  double matrix_rate = 3;       ///< step size of Muon relative to Adam's; 0: Adam trains all weights
 };
 
 /// Returns the target RMS of the residual at a step, which falls from that of first_mark_psnr to that of

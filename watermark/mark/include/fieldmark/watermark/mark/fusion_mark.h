@@ -5,10 +5,11 @@
 
 namespace fieldmark::watermark {
 
-/// Weights of a pooled mark's losses.
+/// Training options of a pooled mark.
 struct PooledTrainingOptions {
   double content_weight = 1;  ///< gamma_1
   double message_weight = 5;  ///< gamma_2
+  double matrix_rate = 0;     ///< step size of Muon relative to Adam's; 0: Adam trains all weights
   Index warm_steps = 0;       ///< warm-up steps, in which all networks learn fixed carriers, >= 0
 };
 
@@ -45,7 +46,7 @@ class PooledMark : public Mark {
   const extractor::PooledExtractor<float>& reader() const { return reader_; }
 
  protected:
-  /// @param reader  network that reads the message   @param training  weights of the loss
+  /// @param reader  network that reads the message   @param training  options of training
   /// @param running_norm  true: images are read with the running statistics of training; false: with their
   /// own
   PooledMark(extractor::PooledExtractor<float> reader, const PooledTrainingOptions& training,

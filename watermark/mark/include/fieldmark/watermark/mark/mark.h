@@ -46,6 +46,12 @@ struct TrainingImage {
   std::function<Var<float>(Var<float> image)> distort{};
 };
 
+/// Weights of the extractor that Muon trains in place of Adam.
+struct MuonWeights {
+  std::vector<std::string> names{};  ///< patterns, see Muon
+  double rate = 0;                   ///< step size relative to Adam's; 0: Adam trains them
+};
+
 /// Training of one kind of mark on the cached views of one owner.
 class MarkTraining {
  public:
@@ -61,6 +67,8 @@ class MarkTraining {
                           TrainingFigures& figures) = 0;
   /// Number of warm-up steps, which prepare the networks before training on the mark's own loss.
   virtual Index warm_steps() const { return 0; }
+  /// Returns the weights that Muon trains; default: none.
+  virtual MuonWeights matrices() const { return {}; }
   /// Returns the parameters of networks that only training needs and the owner does not keep; null: none.
   virtual ParamStore<float>* helpers() { return nullptr; }
   /// Updates state without gradients, such as running statistics of the owner, after each step.

@@ -1,0 +1,94 @@
+#include <fieldmark/engine/muon.h>
+#include <fieldmark/engine/ops/arithmetic.h>
+#include <fieldmark/engine/ops/layout.h>
+#include <fieldmark/engine/ops/matmul.h>
+#include <fieldmark/engine/parallel.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+
+#include "optimiser_checks.h"
+
+namespace fieldmark {
+namespace {
+
+constexpr double kQuintic[] = {3.4445, -4.775, 2.0315};  // a, b, c
+constexpr int kIterations = 5;
+constexpr double kRmsOfAdam = 0.2;  // of a step of Adam, relative to its step size
+
+}  // namespace
+
+template <class T>
+void orthogonalise(T* d, Index rows, Index columns, Tape<T>& tape) {
+  const Index n = rows * columns;
+  double square = 0;
+  for (Index i = 0; i < n; ++i) square += static_cast<double>(d[i]) * static_cast<double>(d[i]);
+  const double norm = std::sqrt(square);
+  // Below the normal numbers, 1 / norm would be infinite. NaN stays NaN.
+  const T factor =
+      norm < static_cast<double>(std::numeric_limits<T>::min()) ? T(0) : static_cast<T>(1 / norm);
+  for (Index i = 0; i < n; ++i) d[i] *= factor;
+  const bool tall = rows > columns;  // the square products are of the smaller side
+  for (int k = 0; k < kIterations; ++k) {
+    tape.reset();
+    const Var<T> x = tape.constant(d, {rows, columns});
+    const Var<T> a = tall ? matmul(transpose(x), x) : matmul(x, transpose(x));
+    const Var<T> b = add(scale(a, kQuintic[1]), scale(matmul(a, a), kQuintic[2]));
+    const Var<T> next = add(scale(x, kQuintic[0]), tall ? matmul(x, b) : matmul(b, x));
+    std::copy_n(next.value(), n, d);
+  }
+}
+
+template <class T>
+Muon<T>::Muon(const ParamStore<T>& store, const std::vector<std::string>& names, MuonOptions o)
+    : options_(o) {
+  detail::check_option("Muon", "lr", o.lr, o.lr > 0, "positive");
+  detail::check_option("Muon", "momentum", o.momentum, o.momentum >= 0 && o.momentum < 1, "in [0, 1)");
+  for (const std::string& pattern : names) detail::check_pattern("Muon", store, pattern);
+  for (const auto& e : store.entries()) {
+    const auto matches = [&](const std::string& pattern) { return name_matches(pattern, e.name); };
+    if (!is_trained(e.role) || std::ranges::none_of(names, matches)) continue;
+    if (e.shape.rank() < 2)
+      throw ShapeError("[Muon] '" + e.name + "' must have two axes or more, got shape " + e.shape.str());
+    const Index columns = e.shape[e.shape.rank() - 1];
+    matrices_.push_back({e.offset, columns > 0 ? e.shape.size() / columns : 0, columns});
+  }
+  std::ranges::stable_sort(matrices_, std::greater(), [](const Matrix& m) { return m.rows * m.columns; });
+  for (std::size_t i = 0; i < matrices_.size(); ++i) tapes_.push_back(std::make_unique<Tape<T>>());
+  velocity_.resize(at(store.size()));
+  direction_.resize(at(store.size()));
+}
+
+template <class T>
+void Muon<T>::step(std::span<T> values, std::span<T> grads, double lr_factor) {
+  detail::check_step_size("Muon", "values", values.size(), velocity_.size());
+  detail::check_step_size("Muon", "grads", grads.size(), velocity_.size());
+  parallel_for(std::ssize(matrices_), 1, [&](Index i, Index) {
+    update(matrices_[at(i)], *tapes_[at(i)], values.data(), grads.data(), lr_factor);
+  });
+}
+
+template <class T>
+void Muon<T>::update(const Matrix& matrix, Tape<T>& tape, T* values, T* grads, double lr_factor) {
+  T *u = velocity_.data(), *d = direction_.data();
+  const T momentum = static_cast<T>(options_.momentum);
+  for (Index i = matrix.begin; i < matrix.end(); ++i) {
+    u[i] = momentum * u[i] + grads[i];
+    d[i] = grads[i] + momentum * u[i];
+  }
+  orthogonalise(d + matrix.begin, matrix.rows, matrix.columns, tape);
+  const auto side = static_cast<double>(std::max(matrix.rows, matrix.columns));
+  const T lr = static_cast<T>(options_.lr * lr_factor * kRmsOfAdam * std::sqrt(side));
+  for (Index i = matrix.begin; i < matrix.end(); ++i) values[i] -= lr * d[i];
+  if (options_.zero_grads) std::fill(grads + matrix.begin, grads + matrix.end(), T(0));
+}
+
+template class Muon<float>;
+template class Muon<double>;
+template void orthogonalise(float*, Index, Index, Tape<float>&);
+template void orthogonalise(double*, Index, Index, Tape<double>&);
+
+}  // namespace fieldmark
