@@ -38,7 +38,7 @@ struct EndToEnd {
          "--reader-size",
          "48",
          "--steps",
-         "80",
+         "50",
          "--views",
          "12",
          "--measured-views",

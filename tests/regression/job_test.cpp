@@ -91,7 +91,7 @@ TEST_CASE("regression: 8 bits embedded, baked, rendered and read") {
       cell_mark({.network = {.bands = 5, .features = 16}, .base_channels = 16, .training = {.anneal = 50}}));
   Embedder embedder(
       owner, views,
-      {.schedule = {.steps = 500, .lr = 4e-3, .half_after = 4000},
+      {.schedule = {.steps = 250, .lr = 4e-3, .half_after = 4000},
        .batch = 4,
        .distortions = {.noise = 0.02, .rotation = 5, .zoom_out = 0.95, .zoom_in = 1.05, .blur = 0.3},
        .seed = 4});
