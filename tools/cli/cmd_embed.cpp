@@ -35,8 +35,8 @@ struct EmbedArguments {
   std::string colours;
   double mark_psnr = 0;
   Index cells = 0, batch = 0, reader_size = 0;
+  RunLength length{.seconds = 0};
   MessageOption intended;
-  RunLength length{.seconds = watermark::EmbedOptions{}.schedule.seconds};
   Index views = watermark::EmbedViewOptions{}.count, samples = 0, measured_views = 200;
   std::vector<std::string> under;
   bool resume = false;
@@ -83,7 +83,7 @@ watermark::EmbedRecipe recipe_of(const EmbedArguments& options, const nerf::Radi
   recipe.owner.bits = options.bits;
   recipe.owner.seed = recipe.embed.seed = seed;
   recipe.embed.schedule.steps = options.length.steps;
-  recipe.embed.schedule.seconds = options.length.seconds;
+  if (options.length.seconds > 0) recipe.embed.schedule.seconds = options.length.seconds;
   if (options.reader_size > 0) recipe.owner.reader_size = options.reader_size;
   const auto set_cell_option = [&](const char* name, const auto& value, auto set) {
     if (value != std::decay_t<decltype(value)>{}) read_option(name, [&] { set(recipe.cell(), value); });
@@ -145,7 +145,9 @@ int run_embed(const EmbedArguments& options, Context& context) {
   if (options.resume) embedder.restore(checkpoint);
 
   const InterruptGuard until_saved;  // Ctrl-C waits between the last step and the file
-  const double seconds = run_long(embedder, "embed", options.length, context, checkpoint);
+  RunLength length = options.length;
+  length.seconds = recipe.embed.schedule.seconds;
+  const double seconds = run_long(embedder, "embed", length, context, checkpoint);
   embedder.calibrate();
   if (embedder.steps() <= embedder.warm_steps())
     context.note("training ended in its warm start of " + std::to_string(embedder.warm_steps()) +
@@ -249,7 +251,7 @@ Command add_embed(CommandLine& app) {
       ->type_name("NAME")
       ->default_str("");
   add_view_options(app, *o);
-  add_run_length(app, o->length, true);
+  add_run_length(app, o->length, true, "300, for presets paper and code 2400");
   app.add_option("--measured-views", o->measured_views, "Novel views to measure at the end, 1 to 100000")
       ->range(1, 100000)
       ->type_name("N");

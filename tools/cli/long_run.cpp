@@ -7,17 +7,17 @@
 
 namespace fieldmark::cli {
 
-void add_run_length(CommandLine& app, RunLength& length, bool checkpoint) {
+void add_run_length(CommandLine& app, RunLength& length, bool checkpoint, const std::string& seconds) {
   Option steps =
       app.add_option("--steps", length.steps, "Length of the run in steps, 1 to 10000000; default: --seconds")
           ->range(1, 10000000)
           ->type_name("N")
           ->default_str("");
-  app.add_option("--seconds", length.seconds,
-                 "Length of the run in seconds from the start of the command, 1 to 1000000")
-      ->range(1.0, 1e6)
-      ->excludes(steps)
-      ->type_name("S");
+  std::string help = "Length of the run in seconds from the start of the command, 1 to 1000000";
+  if (!seconds.empty()) help += "; default: " + seconds;
+  Option time =
+      app.add_option("--seconds", length.seconds, help)->range(1.0, 1e6)->excludes(steps)->type_name("S");
+  if (!seconds.empty()) time->default_str("");
   if (!checkpoint) return;
   app.add_option("--checkpoint-seconds", length.checkpoint_seconds,
                  "Time between checkpoints in seconds, 1 to 1000000")

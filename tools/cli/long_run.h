@@ -15,7 +15,8 @@ struct RunLength {
   double from = 0;  ///< seconds of the command at which the run's clock starts
 };
 /// Adds --steps and --seconds, and with `checkpoint` also --checkpoint-seconds.
-void add_run_length(CommandLine& app, RunLength& length, bool checkpoint);
+/// @param seconds  the default of --seconds in words, if it depends on other options; empty: length.seconds
+void add_run_length(CommandLine& app, RunLength& length, bool checkpoint, const std::string& seconds = {});
 
 /// Runs training to its end, shows progress, and saves checkpoints at intervals and on Ctrl-C.
 /// @param what  label of the progress   @param checkpoint  file name; empty: the run is not saved

@@ -70,6 +70,8 @@ TEST_CASE("recipe: presets paper and code train as the paper and its authors' co
   const EmbedRecipe paper = embed_recipe("paper"), code = embed_recipe("code");
   CHECK(paper.embed.extractor_lr == 1);
   CHECK(paper.embed.batch == 8);
+  CHECK(paper.embed.schedule.seconds == 2400);
+  CHECK(embed_recipe("fast").embed.schedule.seconds == 300);
   CHECK(paper.embed.distortions.rotation == 30);
   CHECK(paper.embed.distortions.zoom_in == 1);
   const auto& networks = std::get<FusionMarkOptions>(paper.mark);

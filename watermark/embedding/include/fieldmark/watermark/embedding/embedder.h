@@ -22,7 +22,7 @@ inline constexpr double kEmbedBeta2 = 0.99;  ///< beta_2 of Adam in Embedder
 /// Training options shared by every kind of mark.
 struct EmbedOptions {
   /// Length of the run and step sizes.
-  ScheduleOptions schedule{.seconds = 900, .lr = 2e-3, .half_after = 8000, .cooldown = 0.5, .last = 0.05};
+  ScheduleOptions schedule{.seconds = 300, .lr = 2e-3, .half_after = 8000, .cooldown = 0.5, .last = 0.05};
   Index batch = 4;                    ///< images per step, 1 to 64
   double extractor_lr = 1;            ///< learning rate of the extractor relative to the mark's, > 0
   EmbedDistortions distortions = {};  ///< of training images
