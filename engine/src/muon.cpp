@@ -24,6 +24,7 @@ constexpr double kRmsOfAdam = 0.2;  // of a step of Adam, relative to its step s
 template <class T>
 void orthogonalise(T* d, Index rows, Index columns, Tape<T>& tape) {
   const Index n = rows * columns;
+  if (n == 0) return;
   double square = 0;
   for (Index i = 0; i < n; ++i) square += static_cast<double>(d[i]) * static_cast<double>(d[i]);
   const double norm = std::sqrt(square);

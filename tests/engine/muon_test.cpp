@@ -72,6 +72,7 @@ TEST_CASE("muon: singular values end near 1, also of a matrix whose own span a f
 
 TEST_CASE("muon: no gradient means no step, and NaN stays in its matrix") {
   CHECK(orthogonal_of<float>(Matrix::Zero(4, 3)).cwiseAbs().maxCoeff() == 0);
+  CHECK(orthogonal_of<float>(Matrix(0, 3)).size() == 0);
   ParamStore<float> store;
   const ParamId a = store.add("a", {4, 3}), b = store.add("b", {3, 3});
   Muon<float> muon(store, {"*"});

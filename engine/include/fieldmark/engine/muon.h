@@ -20,10 +20,10 @@ struct MuonOptions {
 /// with small gradients learn as fast as the others.
 ///   u = momentum u + g,   d = g + momentum u,   x -= 0.2 lr sqrt(max(m, n)) orthogonalised(d)
 /// A tensor [..., n] counts as a matrix [m, n]. The factor 0.2 sqrt(max(m, n)) makes the root mean square of
-/// a step about 0.2 lr, like one of Adam. A non-finite gradient spoils its whole matrix. Source: Jordan et
-/// al. 2024 (Muon); the factor: Liu et al. 2025 (arXiv 2502.16982), section 2.2. Deviation: nothing is added
-/// to |d|, so a step is as long for tiny gradients; while a gradient is 0, the velocity goes on at full
-/// length.
+/// a step about 0.2 lr, like one of Adam. A non-finite gradient spoils its whole matrix.
+/// Source: Jordan et al. 2024 (Muon); the factor: Liu et al. 2025 (arXiv 2502.16982), section 2.2.
+/// Deviation: nothing is added to |d|, so a step is as long for tiny gradients. While a gradient is 0, the
+/// velocity goes on at full length.
 template <class T>
 class Muon {
  public:
