@@ -18,14 +18,13 @@ requires requires(A& a) { a.mean_square(); }
 void visit_state(Store& store, A& adam, const Entry& e, const std::string& prefix, F visit) {
   detail::visit_adam(store, adam, e, prefix, visit);
 }
-template <class Store, class S, class Entry, class F>
-requires requires(S& s) { s.velocity(); }
+template <class Store, HasVelocity S, class Entry, class F>
 void visit_state(Store& store, S& optimiser, const Entry& e, const std::string& prefix, F visit) {
   detail::visit_velocity(store, optimiser, e, prefix, visit);
 }
 
 Index size_of_state(const auto& optimiser) {
-  if constexpr (requires { optimiser.velocity(); })
+  if constexpr (HasVelocity<decltype(optimiser)>)
     return std::ssize(optimiser.velocity());
   else
     return std::ssize(optimiser.mean());
@@ -85,15 +84,10 @@ void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore
   file.add(steps_name(prefix), {1}, std::span(&steps, 1));
 }
 
-template <class T>
+template <class T, template <class> class Optimiser>
+requires HasVelocity<Optimiser<T>>
 void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore<T>& store,
-                const Sgd<T>& optimiser) {
-  save(file, std::string(prefix), store, optimiser);
-}
-
-template <class T>
-void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore<T>& store,
-                const Muon<T>& optimiser) {
+                const Optimiser<T>& optimiser) {
   save(file, std::string(prefix), store, optimiser);
 }
 
@@ -115,15 +109,10 @@ void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore
   optimiser.set_steps(steps);
 }
 
-template <class T>
+template <class T, template <class> class Optimiser>
+requires HasVelocity<Optimiser<T>>
 void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore<T>& store,
-                Sgd<T>& optimiser) {
-  load(file, std::string(prefix), store, optimiser);
-}
-
-template <class T>
-void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore<T>& store,
-                Muon<T>& optimiser) {
+                Optimiser<T>& optimiser) {
   load(file, std::string(prefix), store, optimiser);
 }
 

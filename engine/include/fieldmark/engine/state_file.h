@@ -12,6 +12,12 @@ namespace fieldmark {
 // The state of training in a safetensors file: trained and running parameters by name, and the optimiser's
 // state for them. Several stores can share a file, each under its own prefix.
 
+/// An optimiser whose state is a velocity: Sgd or Muon.
+template <class O>
+concept HasVelocity = requires(O& optimiser) {
+  optimiser.velocity();
+};
+
 /// @{
 /// Adds the parameters as PREFIX + NAME. Adam adds its moments as NAME.mean and NAME.mean_square and its
 /// steps as PREFIX + "adam/steps"; Sgd and Muon add their velocity as NAME.velocity.
@@ -22,12 +28,10 @@ void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore
 template <class T>
 void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore<T>& store,
                 const Adam<T>& optimiser);
-template <class T>
+template <class T, template <class> class Optimiser>
+requires HasVelocity<Optimiser<T>>
 void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore<T>& store,
-                const Sgd<T>& optimiser);
-template <class T>
-void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore<T>& store,
-                const Muon<T>& optimiser);
+                const Optimiser<T>& optimiser);
 /// @}
 
 /// @{
@@ -40,12 +44,10 @@ void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore
 template <class T>
 void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore<T>& store,
                 Adam<T>& optimiser);
-template <class T>
+template <class T, template <class> class Optimiser>
+requires HasVelocity<Optimiser<T>>
 void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore<T>& store,
-                Sgd<T>& optimiser);
-template <class T>
-void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore<T>& store,
-                Muon<T>& optimiser);
+                Optimiser<T>& optimiser);
 /// @}
 
 }  // namespace fieldmark
