@@ -108,7 +108,7 @@ Tensor<float> continued(std::span<const std::byte> bytes, std::byte filler, int 
   std::vector<std::byte> file(bytes.begin(), bytes.end());
   file.insert(file.end(), kFillers, filler);
   file.insert(file.end(), {std::byte{0xff}, std::byte{0xd9}});
-  return pixels_of(file, want_channels);
+  return huffman_tables_fit(file) ? pixels_of(file, want_channels) : Tensor<float>{};
 }
 
 // Returns the pixels of a JPEG file without an end marker, or an empty tensor if some are missing.
@@ -153,6 +153,8 @@ Tensor<float> unended(std::span<const std::byte> bytes, const PngChunks& chunks,
 // Decodes a file with stb, which reads past the end of a JPEG file and rejects a PNG file without an end.
 Tensor<float> decode_by_stb(std::span<const std::byte> bytes, int want_channels) {
   if (bytes.size() > kMaxBytes - 1024) throw Undecodable("more than 2^31 bytes");
+  if (is_jpeg(bytes) && !huffman_tables_fit(bytes))
+    throw Undecodable("a Huffman table of more than 256 symbols, damaged");
   int width = 0, height = 0, channels = 0;
   if (stbi_info_from_memory(data_of(bytes), static_cast<int>(bytes.size()), &width, &height, &channels))
     check_area(width, height, bytes.size());

@@ -7,7 +7,8 @@
 namespace fieldmark {
 namespace {
 
-constexpr int kStart = 0xd8, kEnd = 0xd9, kScan = 0xda, kProgressive = 0xc2, kTemporary = 0x01;
+constexpr int kStart = 0xd8, kEnd = 0xd9, kScan = 0xda, kProgressive = 0xc2, kTables = 0xc4,
+              kTemporary = 0x01;
 constexpr std::size_t kCoefficients = 64;
 
 using Bytes = std::span<const std::byte>;
@@ -18,6 +19,8 @@ bool is_restart(int marker) { return marker >= 0xd0 && marker <= 0xd7; }
 bool is_frame(int marker) {
   return marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
 }
+
+bool stands_alone(int marker) { return marker == kStart || marker == kTemporary || is_restart(marker); }
 
 // Returns the position of the next marker; the size if there is none. In scan data FF is followed by 00, and
 // FF may repeat before a marker. Skips other bytes between segments, as stb does.
@@ -39,7 +42,7 @@ JpegSegments jpeg_segments(Bytes bytes) {
     if (i >= bytes.size()) return found;
     const int marker = at(bytes, i + 1);
     i += 2;
-    if (marker == kStart || marker == kTemporary || is_restart(marker)) continue;
+    if (stands_alone(marker)) continue;
     if (marker == kEnd) {
       found.end = i;
       found.complete = true;
@@ -51,6 +54,28 @@ JpegSegments jpeg_segments(Bytes bytes) {
     found.segments.push_back({marker, bytes.subspan(i + 2, length - 2)});
     i += length;
   }
+}
+
+bool huffman_tables_fit(Bytes bytes) {
+  constexpr std::size_t kLengths = 16;  // of codes; a table starts with its number and their counts
+  constexpr int kSymbols = 256;
+  const auto byte = [&](std::size_t i) { return i < bytes.size() ? at(bytes, i) : 0; };
+  for (std::size_t i = next_marker(bytes, 0); i < bytes.size(); i = next_marker(bytes, i)) {
+    const int marker = at(bytes, i + 1);
+    i += 2;
+    if (stands_alone(marker)) continue;
+    const auto length = static_cast<std::size_t>(byte(i) << 8 | byte(i + 1));
+    if (marker == kEnd || length < 2) return true;
+    const std::size_t end = i + length;
+    for (std::size_t table = i + 2; marker == kTables && table < end;) {
+      int symbols = 0;
+      for (std::size_t k = 1; k <= kLengths; ++k) symbols += byte(table + k);
+      if (symbols > kSymbols) return false;
+      table += 1 + kLengths + static_cast<std::size_t>(symbols);
+    }
+    i = end;
+  }
+  return true;
 }
 
 bool JpegSegments::sends_every_coefficient() const {

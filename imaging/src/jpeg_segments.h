@@ -31,4 +31,9 @@ bool is_jpeg(std::span<const std::byte> bytes);
 /// to the end. Never reads beyond the bytes. @param bytes  see is_jpeg(); must outlive the result
 JpegSegments jpeg_segments(std::span<const std::byte> bytes);
 
+/// True if no Huffman table of a JPEG file has more than the 256 symbols that a byte can name, wherever a
+/// decoder may meet one, also in a segment longer than the remaining bytes. stb_image writes beyond its
+/// arrays otherwise.
+bool huffman_tables_fit(std::span<const std::byte> bytes);
+
 }  // namespace fieldmark

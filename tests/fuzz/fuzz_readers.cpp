@@ -1,8 +1,8 @@
 // Feeds mutations of valid files to the readers of foreign formats: each must be read or refused with an
 // Error.
-//   fuzz_readers [INPUTS = 20000] [SEED = 1] [FIRST = 0]
-// Input i depends only on SEED and i, so `fuzz_readers 1 SEED i` repeats one. The sanitizers (preset asan)
-// detect crashes and leaks.
+//   fuzz_readers [INPUTS = 20000] [SEED = 1] [FIRST = 0] [FORMAT = all of them, by turns]
+// Input i depends only on SEED, i and FORMAT, so `fuzz_readers 1 SEED i FORMAT` repeats one. The sanitizers
+// (preset asan) detect crashes and leaks.
 #include <fieldmark/core/error.h>
 #include <fieldmark/core/files.h>
 #include <fieldmark/engine/safetensors.h>
@@ -333,8 +333,14 @@ bool try_one(const Format& format, const std::string& input, Outcome& outcome) {
   return seconds <= kSecondsForOne;
 }
 
-int run(std::size_t inputs, std::uint64_t seed, std::size_t first) {
-  const std::vector<Format> all = formats();
+// only: name of a format; empty: all of them, by turns
+int run(std::size_t inputs, std::uint64_t seed, std::size_t first, const std::string& only) {
+  std::vector<Format> all = formats();
+  if (!only.empty()) std::erase_if(all, [&](const Format& f) { return f.name != only; });
+  if (all.empty()) {
+    std::cerr << only << ": no such format, or this build lacks its library\n";
+    return 2;
+  }
   std::vector<Outcome> outcomes(all.size());
   for (std::size_t k = 0; k < all.size(); ++k)
     for (const auto& sample : all[k].samples)
@@ -350,7 +356,8 @@ int run(std::size_t inputs, std::uint64_t seed, std::size_t first) {
     for (auto edits = 1 + random() % 3; edits > 0; --edits)
       (header ? mutate_header : mutate)(input, other.samples[0], random);
     if (!try_one(format, input, outcomes[k])) {
-      std::cerr << "  input " << i << ": repeat with fuzz_readers 1 " << seed << " " << i << "\n";
+      std::cerr << "  input " << i << ": repeat with fuzz_readers 1 " << seed << " " << i << " " << only
+                << "\n";
       ++failures;
     }
   }
@@ -370,5 +377,5 @@ int main(int count, char** words) {
   const auto argument = [&](int i, unsigned long long otherwise) {
     return i < count ? std::strtoull(words[i], nullptr, 10) : otherwise;
   };
-  return run(argument(1, 20000), argument(2, 1), argument(3, 0));
+  return run(argument(1, 20000), argument(2, 1), argument(3, 0), count > 4 ? words[4] : "");
 }

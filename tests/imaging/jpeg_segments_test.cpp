@@ -60,3 +60,38 @@ TEST_CASE("jpeg_segments: a progressive file is whole when each coefficient has 
   append(baseline, scan(0, 0, 0));  // some writers leave these numbers of a baseline scan empty
   CHECK(jpeg_segments(baseline).sends_every_coefficient());
 }
+
+TEST_CASE("jpeg_segments: a Huffman table of more than 256 symbols is found wherever a decoder may meet it") {
+  // A table segment with `first` codes of one length, then 16 x 17 codes in a second table.
+  const auto tables = [](int length_byte) {
+    std::vector<std::byte> all = bytes_from({0xff, 0xc4, 0, length_byte, 0, 1});
+    all.insert(all.end(), 15, std::byte{0});
+    append(all, bytes_from({5, 0x10}));
+    all.insert(all.end(), 16, std::byte{17});
+    return all;
+  };
+  const auto sound = encode_jpeg(Tensor<float>({20, 20, 3}, 0.4f), 80);
+  CHECK(huffman_tables_fit(sound));
+  CHECK(huffman_tables_fit({}));
+  CHECK(huffman_tables_fit(bytes_from({0xff})));
+  auto alone = bytes_from({0xff, 0xd8});
+  append(alone, tables(37));
+  CHECK(!huffman_tables_fit(alone));
+  CHECK(huffman_tables_fit(std::span(alone).first(alone.size() - 1)));  // 255 symbols, then nothing
+  auto longer = bytes_from({0xff, 0xd8, 1, 2, 0xff});  // other bytes and a fill byte before it
+  append(longer, tables(255));                         // a segment beyond the end
+  CHECK(!huffman_tables_fit(longer));
+  auto within = bytes_from({0xff, 0xd8, 0xff, 0xe1, 0, 60});  // in the payload of another segment
+  append(within, tables(37));
+  CHECK(huffman_tables_fit(within));
+  auto scanned = head(0xc0);
+  append(scanned, scan(0, 63, 0));
+  append(scanned, tables(37));
+  CHECK(!huffman_tables_fit(scanned));
+
+  auto damaged = bytes_from({0xff, 0xd8});
+  append(damaged, tables(37));
+  damaged.insert(damaged.end(), sound.begin() + 2, sound.end());
+  CHECK_THROWS_WITH(decode_image(damaged, "a.jpg"),
+                    Contains("a.jpg") && Contains("Huffman table of more than 256 symbols"));
+}

@@ -17,6 +17,8 @@ namespace fieldmark::cli {
 /// @{
 /// The subjects of `bench`, each with its own options.
 Command add_bench_attacks(CommandLine& app);
+Command add_bench_captures(CommandLine& app);
+Command add_bench_collapse(CommandLine& app);
 Command add_bench_embed(CommandLine& app);
 Command add_bench_engine(CommandLine& app);
 Command add_bench_field(CommandLine& app);

@@ -27,7 +27,13 @@ constexpr Subject kSubjects[] = {
     {"payload", "Measure how often payloads are read exactly, and how often noise passes for one",
      add_bench_payload},
     {"attacks", "Measure accuracy against damage of a baked mark under attacks on images and fields",
-     add_bench_attacks}};
+     add_bench_attacks},
+    {"collapse",
+     "Measure how soon collapsed trainings are noticed, and how often healthy ones are taken for such",
+     add_bench_collapse},
+    {"captures",
+     "Measure what exposures and refined poses gain on captured images, as they are and with jittered poses",
+     add_bench_captures}};
 
 }  // namespace
 

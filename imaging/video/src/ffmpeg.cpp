@@ -79,6 +79,8 @@ void take_messages() {
   av_log_set_callback(keep_message);
 }
 
+void limit_memory() { av_max_alloc(std::size_t{1} << 30); }
+
 std::string reason(int error) {
   if (!first_message.empty()) return first_message;
   char text[AV_ERROR_MAX_STRING_SIZE];

@@ -22,6 +22,8 @@ using Owned = std::unique_ptr<T, Free>;
 Owned<AVFrame> make_frame();
 Owned<AVPacket> make_packet();
 
+/// Bounds each allocation of FFmpeg by 1 GiB, because a count in a damaged file asks for any size.
+void limit_memory();
 /// Captures FFmpeg's messages for reason() instead of standard error. Clears those of this thread.
 void take_messages();
 /// Returns why a call failed: FFmpeg's first message on this thread since take_messages(), else the text of

@@ -66,6 +66,7 @@ FIELDMARK_FFMPEG(util, av_get_media_type_string);
 FIELDMARK_FFMPEG(util, av_log_format_line2);
 FIELDMARK_FFMPEG(util, av_log_set_callback);
 FIELDMARK_FFMPEG(util, av_malloc);
+FIELDMARK_FFMPEG(util, av_max_alloc);
 FIELDMARK_FFMPEG(util, av_opt_set_int);
 FIELDMARK_FFMPEG(util, av_strerror);
 FIELDMARK_FFMPEG(codec, av_packet_alloc);

@@ -150,7 +150,7 @@ std::pair<int, int> square_size(const AVFrame& frame, AVRational pixel) {
 struct VideoReader::Impl {
   Impl(File file, std::string file_name)
       : name(std::move(file_name)),
-        container((ffmpeg::take_messages(), std::move(file)), name),
+        container((ffmpeg::limit_memory(), ffmpeg::take_messages(), std::move(file)), name),
         stream(video_stream(container, name)),
         orientation(ffmpeg::orientation_of(display_matrix(*stream))) {
     for (unsigned i = 0; i < container->nb_streams; ++i)

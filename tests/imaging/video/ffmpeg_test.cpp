@@ -39,6 +39,15 @@ TEST_CASE("ffmpeg: errors have a text, FFmpeg's own message first") {
   CHECK(ffmpeg::reason(AVERROR_EOF) == "End of file");
 }
 
+TEST_CASE("ffmpeg: what a damaged file asks for is bounded") {
+  if (!video_or_skip()) return;
+  ffmpeg::limit_memory();
+  CHECK(ffmpeg::av_malloc((std::size_t{1} << 30) + 1) == nullptr);
+  void* small = ffmpeg::av_malloc(1 << 20);
+  CHECK(small != nullptr);
+  ffmpeg::av_free(small);
+}
+
 TEST_CASE("ffmpeg: grey is converted without a shift, in both ranges") {
   if (!video_or_skip()) return;
   for (const bool full : {false, true}) {

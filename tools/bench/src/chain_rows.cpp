@@ -35,10 +35,10 @@ struct ChainPass {
     };
     const Var<T> y = fused(f, tape.fresh_leaf(x.data(), dx.data(), {n}), parameter(w), parameter(b));
     values.assign(y.value(), y.value() + (keep ? n : 0));
-    tape.backward(y, u);
+    tape.backward_in_place(y, u);
   }
-  // Traffic: x, w, b, y; u and its copy, the seed; x, w, b, the seed and the gradients of x, w, b.
-  double bytes() const { return (4.0 + 2 + 7) * static_cast<double>(n) * sizeof(T); }
+  // Traffic: x, w, b, y; then x, w, b, the seed u and the gradients of x, w, b.
+  double bytes() const { return (4.0 + 7) * static_cast<double>(n) * sizeof(T); }
 
   Index n;
   ParamStore<T> store;

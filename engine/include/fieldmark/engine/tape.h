@@ -3,6 +3,7 @@
 #include <fieldmark/engine/arena.h>
 #include <fieldmark/engine/shape.h>
 #include <fieldmark/engine/tensor.h>
+#include <fieldmark/engine/var.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -17,71 +18,11 @@
 
 namespace fieldmark {
 
-template <class T>
-class Tape;
-
 namespace detail {
 // g[i] = seed[i] if fresh, else g[i] += seed[i]. A fresh g becomes 0 where mask (null: none) is not positive.
 template <class T>
 void seed_gradient(const T* seed, const T* mask, bool fresh, T* g, Index n);
-template <class T>
-struct Shortcuts;
 }  // namespace detail
-
-template <class T>
-struct PackedMatrix;
-
-/// Handle to a value on a tape: two pointers, trivially copyable, valid until Tape::reset().
-template <class T>
-class Var {
- public:
-  /// Returns the extents of the value.
-  const Shape& shape() const { return slot_->shape; }
-  /// Returns the shape().size() values, row-major.
-  const T* value() const { return slot_->value; }
-  /// Returns the tape that holds the value.
-  Tape<T>& tape() const { return *tape_; }
-  /// True if the value depends on a leaf, so that gradients reach it.
-  bool needs_grad() const { return slot_->needs_grad; }
-  /// Returns an identifier that is unique among the values of a tape.
-  const void* id() const { return slot_; }
-  /// Returns dL/d(this) accumulated so far, or nullptr before the first gradient. The gradient of a backward
-  /// pass is valid until the next pass begins; the buffer of a leaf keeps accumulating.
-  /// @throws ValueError for the output of a layer with a ReLU, unless Tape::keep_grad() requested it before
-  /// the backward pass: by default only the gradient in front of the ReLU is computed
-  const T* grad() const {
-    if (slot_->rectified && slot_->grad) [[unlikely]]
-      throw ValueError(
-          "[grad] the gradient behind a ReLU is computed only if Tape::keep_grad() asked for it before the "
-          "backward");
-    return slot_->grad;
-  }
-  /// Returns the buffer that a backward adds to, zeroed on the first call, or nullptr if this input needs no
-  /// gradient. Values written to it seed the next replay(); gradients of an earlier replay are discarded.
-  T* grad_acc() const;
-  /// Like grad_acc(), but leaves a new buffer uninitialised and sets *fresh: the caller then assigns every
-  /// element instead of adding, which saves a pass over memory.
-  T* grad_acc(bool* fresh) const;
-
- private:
-  friend class Tape<T>;
-  friend struct detail::Shortcuts<T>;
-  struct Slot {
-    const T* value;
-    T* grad;
-    Shape shape;
-    bool needs_grad;
-    bool rectified;  // a ReLU's output, whose gradient may be masked: 0 where the value is not positive
-    bool masked;     // every gradient so far was masked
-    T* target;       // gradient buffer; null: from the arena
-    const PackedMatrix<T>* packed;
-  };
-  Var(Tape<T>* t, Slot* s) : tape_(t), slot_(s) {}
-  // As grad_acc(). masked: the caller writes 0 where a rectified value is not positive.
-  T* grad_buffer(bool* fresh, bool masked) const;
-  Tape<T>* tape_;
-  Slot* slot_;
-};
 
 /// Receives callbacks for what a tape records and replays. TapeInspector (inspect.h) uses them to show the
 /// graph, times and the first NaN.
@@ -117,12 +58,12 @@ class Tape {
   /// @throws ShapeError unless the tensor has as many elements as its shape
   Var<T> constant(const Tensor<T>& t) { return constant(filled(t, "constant"), t.shape); }
   Var<T> constant(const Tensor<T>&& t) = delete;
-  Var<T> constant(const T* value, Shape shape) { return make(value, nullptr, shape, false); }
+  Var<T> constant(const T* value, const Shape& shape) { return make(value, nullptr, shape, false); }
   /// @}
   /// @{
   /// Records a parameter or another input to differentiate with respect to. Adds its gradient to `grad`.
   /// @throws ShapeError unless `grad` and the shape have as many elements as the tensor
-  Var<T> leaf(const T* value, T* grad, Shape shape) { return make(value, grad, shape, true); }
+  Var<T> leaf(const T* value, T* grad, const Shape& shape) { return make(value, grad, shape, true); }
   Var<T> leaf(const Tensor<T>& t, Tensor<T>& grad) {
     if (grad.size() != t.size())
       throw ShapeError("[leaf] grad must have the " + std::to_string(t.size()) + " elements of t, got " +
@@ -132,7 +73,7 @@ class Tape {
   Var<T> leaf(const Tensor<T>&& t, Tensor<T>& grad) = delete;
   /// @}
   /// Like leaf(), but each backward pass overwrites `grad`. If no gradient arrives, `grad` is unchanged.
-  Var<T> fresh_leaf(const T* value, T* grad, Shape shape) {
+  Var<T> fresh_leaf(const T* value, T* grad, const Shape& shape) {
     const Var<T> v = make(value, nullptr, shape, true);
     v.slot_->target = grad;
     fresh_.push_back(v);
@@ -142,11 +83,11 @@ class Tape {
   /// Allocates the output of an op and points *data to its uninitialised values, which the op fills.
   /// @param from  names the op for an observer
   /// @throws ValueError if an input was recorded on another tape
-  Var<T> output(Shape shape, T** data, std::initializer_list<Var<T>> inputs,
+  Var<T> output(const Shape& shape, T** data, std::initializer_list<Var<T>> inputs,
                 std::source_location from = std::source_location::current()) {
     return output(shape, data, std::span(inputs.begin(), inputs.size()), from);
   }
-  Var<T> output(Shape shape, T** data, std::span<const Var<T>> inputs,
+  Var<T> output(const Shape& shape, T** data, std::span<const Var<T>> inputs,
                 std::source_location from = std::source_location::current()) {
     bool needs_grad = false;
     for (const Var<T>& v : inputs) {
@@ -215,18 +156,31 @@ class Tape {
   /// @throws ShapeError if the sizes differ   @throws ValueError if no input of `out` needs a gradient, or it
   /// was recorded on another tape
   void backward(Var<T> out, std::span<const T> seed) {
-    check_own(out, "the value to differentiate");
-    if (static_cast<Index>(seed.size()) != out.shape().size())
-      throw ShapeError("[backward] seed must have one element for each of out, whose shape is " +
-                       out.shape().str() + ", got " + std::to_string(seed.size()));
+    check_seed(out, seed);
     bool fresh = false;
     begin_pass();
     T* g = out.grad_buffer(&fresh, out.slot_->grad == nullptr);
-    if (!g) throw ValueError("[backward] nothing to differentiate: no input of this value needs a gradient");
+    if (!g) throw_nothing_to_differentiate();
     const T* mask = fresh && out.slot_->rectified ? out.value() : nullptr;
     detail::seed_gradient(seed.data(), mask, fresh, g, out.shape().size());
     replay();
   }
+  /// @{
+  /// Like backward(out, seed), but reads a large seed in place rather than copying it. The seed must outlive
+  /// the pass, so a temporary vector does not compile. It is copied after all if a gradient has to be added
+  /// to it, and for leaves and the output of a layer with a ReLU.
+  void backward_in_place(Var<T> out, std::span<const T> seed) {
+    check_seed(out, seed);
+    begin_pass();
+    auto& slot = *out.slot_;
+    if (!slot.needs_grad || slot.grad || slot.target || slot.rectified) return backward(out, seed);
+    slot.grad = const_cast<T*>(seed.data());  // grad_buffer() copies it before a write
+    slot.masked = false;
+    slot.borrowed = true;
+    replay();
+  }
+  void backward_in_place(Var<T> out, std::vector<T>&& seed) = delete;
+  /// @}
   /// Replays from the gradients that the caller wrote to Var::grad_acc(), so that several outputs can be
   /// seeded by hand.
   void replay() {
@@ -294,14 +248,24 @@ class Tape {
     }
   }
   static void forget_gradient(typename Var<T>::Slot& slot) {
-    if (slot.grad) slot.target = slot.grad;
+    if (slot.grad && !slot.borrowed) slot.target = slot.grad;
     slot.grad = nullptr;
     slot.masked = true;
+    slot.borrowed = false;
   }
   void check_own(const Var<T>& v, const char* what) const {
-    if (v.tape_ != this) [[unlikely]]
+    if (&v.tape() != this) [[unlikely]]
       throw ValueError(std::string("[tape] ") + what +
                        " was recorded on another tape: record all that belongs together on one");
+  }
+  void check_seed(const Var<T>& out, std::span<const T> seed) const {
+    check_own(out, "the value to differentiate");
+    if (static_cast<Index>(seed.size()) != out.shape().size())
+      throw ShapeError("[backward] seed must have one element for each of out, whose shape is " +
+                       out.shape().str() + ", got " + std::to_string(seed.size()));
+  }
+  [[noreturn]] static void throw_nothing_to_differentiate() {
+    throw ValueError("[backward] nothing to differentiate: no input of this value needs a gradient");
   }
   static const T* filled(const Tensor<T>& t, const char* where) {
     if (t.size() != t.shape.size())
@@ -309,10 +273,11 @@ class Tape {
                        ", got " + std::to_string(t.size()));
     return t.data.data();
   }
-  Var<T> make(const T* value, T* grad, Shape shape, bool needs, const PackedMatrix<T>* packed = nullptr) {
+  Var<T> make(const T* value, T* grad, const Shape& shape, bool needs,
+              const PackedMatrix<T>* packed = nullptr) {
     using Slot = typename Var<T>::Slot;
-    return Var<T>(this, new (arena_.allocate_small(sizeof(Slot)))
-                            Slot{value, grad, shape, needs, false, true, nullptr, packed});
+    return Var<T>(new (arena_.allocate_small(sizeof(Slot)))
+                      Slot{value, grad, shape, needs, false, true, false, nullptr, packed, this});
   }
   Arena arena_;
   const Node* last_ = nullptr;  // recorded last
@@ -338,13 +303,22 @@ template <class T>
 T* Var<T>::grad_buffer(bool* fresh, bool masked) const {
   *fresh = false;
   if (!slot_->needs_grad) return nullptr;
-  tape_->begin_pass();
+  tape().begin_pass();
   if (!slot_->grad) {
-    slot_->grad = slot_->target ? slot_->target : tape_->scratch(slot_->shape.size());
+    slot_->grad = slot_->target ? slot_->target : tape().scratch(slot_->shape.size());
     *fresh = true;
+  } else if (slot_->borrowed) [[unlikely]] {
+    copy_borrowed_gradient();
   }
   if (!masked) slot_->masked = false;
   return slot_->grad;
+}
+
+template <class T>
+void Var<T>::copy_borrowed_gradient() const {
+  const Index n = slot_->shape.size();
+  slot_->grad = std::copy_n(slot_->grad, n, tape().scratch(n)) - n;
+  slot_->borrowed = false;
 }
 
 template <class T>

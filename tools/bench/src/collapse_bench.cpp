@@ -1,0 +1,157 @@
+#include <fieldmark/nerf/collapse_watch.h>
+#include <fieldmark/tools/bench/collapse_bench.h>
+
+#include <algorithm>
+#include <chrono>
+
+namespace fieldmark::bench {
+namespace {
+
+class Stopwatch {
+ public:
+  double seconds() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun_).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
+};
+
+bool is_table(const std::string& name) { return name.starts_with("hash/"); }
+
+// Multiplies the networks' parameters or the table.
+void multiply(nerf::RadianceField& field, bool table, float factor) {
+  for (const auto& entry : field.params.entries()) {
+    if (is_table(entry.name) != table) continue;
+    for (float& v : field.params.values(field.params.find(entry.name))) v *= factor;
+  }
+}
+
+// Has each image belong to the camera of the next.
+void shift_images(nerf::Dataset& data) {
+  auto& views = data.views;
+  for (std::size_t v = 0; v + 1 < views.size(); ++v) {
+    std::swap(views[v].rgba, views[v + 1].rgba);
+    std::swap(views[v].valid, views[v + 1].valid);
+  }
+}
+
+// Turns every camera by half a turn about its own upward axis.
+void turn_away(nerf::Dataset& data) {
+  for (nerf::View& view : data.views)
+    for (std::size_t row = 0; row < 3; ++row)
+      for (const std::size_t column : {std::size_t{0}, std::size_t{2}})
+        view.camera.pose[4 * row + column] *= -1;
+}
+
+WatchedTraining finished(WatchedTraining row, const nerf::Trainer& trainer, nerf::CollapseWatch& watch) {
+  row.steps = trainer.steps();
+  row.explained = watch.explained();
+  return row;
+}
+
+}  // namespace
+
+std::vector<TrainingFault> training_faults() {
+  const auto begun_with = [](const char* name, auto damage) { return TrainingFault{name, damage, {}}; };
+  const auto struck_by = [](const char* name, auto damage) { return TrainingFault{name, {}, damage}; };
+  return {
+      begun_with("step size times 1,000",
+                 [](nerf::Dataset&, nerf::TrainOptions& o) { o.schedule.lr *= 1000; }),
+      begun_with("cameras that look the other way",
+                 [](nerf::Dataset& data, nerf::TrainOptions&) { turn_away(data); }),
+      begun_with("images of one colour",
+                 [](nerf::Dataset& data, nerf::TrainOptions&) {
+                   for (nerf::View& v : data.views) std::ranges::fill(v.rgba.data, 1.f);
+                 }),
+      begun_with("each image with the camera of the next",
+                 [](nerf::Dataset& data, nerf::TrainOptions&) { shift_images(data); }),
+      struck_by("a weight that is not a number",
+                [](nerf::RadianceField& field) {
+                  multiply(field, false, std::numeric_limits<float>::quiet_NaN());
+                }),
+      struck_by("network weights times 100", [](nerf::RadianceField& field) { multiply(field, false, 100); }),
+      struck_by("all parameters 0",
+                [](nerf::RadianceField& field) { std::ranges::fill(field.params.values(), 0.f); }),
+      struck_by("table times 1,000", [](nerf::RadianceField& field) { multiply(field, true, 1000); }),
+      struck_by("no occupied cell", [](nerf::RadianceField& field) {
+        field.grid.set_bits(std::vector<std::uint8_t>(static_cast<std::size_t>(field.grid.cells())));
+      })};
+}
+
+std::vector<OrdinaryTraining> ordinary_trainings(double seconds, std::uint64_t seed) {
+  const ScheduleOptions schedule{.seconds = seconds};
+  OrdinaryTraining base{"default", nerf::field_options(schedule), {.schedule = schedule}};
+  std::vector<OrdinaryTraining> all{base};
+  const auto vary = [&](const char* name, auto change) {
+    OrdinaryTraining o = base;
+    o.name = name;
+    change(o);
+    all.push_back(std::move(o));
+  };
+  vary("cells outside the silhouettes kept", [](OrdinaryTraining& o) { o.train.carve = false; });
+  vary("exposures learnt", [](OrdinaryTraining& o) { o.train.image_colours = true; });
+  vary("poses refined", [](OrdinaryTraining& o) { o.train.refine_poses = true; });
+  vary("2 x 2 rays a pixel", [](OrdinaryTraining& o) { o.field.supersampling = 2; });
+  vary("table of 2^12 rows", [](OrdinaryTraining& o) { o.field.field.encoding.log2_table = 12; });
+  vary("half the step size", [](OrdinaryTraining& o) { o.train.schedule.lr /= 2; });
+  vary("preset mlp", [&](OrdinaryTraining& o) {
+    o.field = {};
+    o.field.field.kind = nerf::FieldKind::mlp;
+    o.train = nerf::train_options(nerf::FieldKind::mlp);
+    o.train.schedule.seconds = seconds;
+  });
+  for (OrdinaryTraining& o : all) o.field.seed = o.train.seed = seed;
+  return all;
+}
+
+WatchedTraining watch_fault(const nerf::Dataset& train, const nerf::Dataset& judge,
+                            const TrainingFault& fault, double healthy, double patience, std::uint64_t seed) {
+  OrdinaryTraining training = ordinary_trainings(healthy + patience, seed).front();
+  nerf::Dataset damaged = train;
+  if (fault.before) {
+    fault.before(damaged, training.train);
+    healthy = 0;
+  }
+  WatchedTraining row{.scene = train.name, .what = fault.name, .said = {}};
+  nerf::RadianceField field(training.field);
+  nerf::Trainer trainer(field, damaged, training.train);
+  nerf::CollapseWatch watch(field, judge);
+  const Stopwatch clock;
+  bool struck = !fault.during;
+  double struck_at = healthy;
+  while (!trainer.done()) {
+    const double now = clock.seconds();
+    if (!struck && now >= healthy) {
+      fault.during(field);
+      struck = true;
+      struck_at = now;
+    }
+    row.said = watch.look(trainer.steps(), trainer.train_psnr());
+    if (!row.said.empty()) {
+      row.noticed_after = clock.seconds() - struck_at;
+      break;
+    }
+    if (struck && now > struck_at + patience) break;
+    trainer.step(now);
+  }
+  return finished(row, trainer, watch);
+}
+
+WatchedTraining watch_ordinary(const nerf::Dataset& train, const nerf::Dataset& judge,
+                               const OrdinaryTraining& training) {
+  WatchedTraining row{.scene = train.name, .what = training.name, .said = {}};
+  nerf::RadianceField field(training.field);
+  nerf::Trainer trainer(field, train, training.train);
+  nerf::CollapseWatch watch(field, judge);
+  const Stopwatch clock;
+  while (!trainer.done() && row.said.empty()) {
+    row.said = watch.look(trainer.steps(), trainer.train_psnr());
+    trainer.step(clock.seconds());
+  }
+  if (row.said.empty()) row.said = watch.verdict(trainer.steps());
+  if (!row.said.empty()) row.noticed_after = clock.seconds();
+  return finished(row, trainer, watch);
+}
+
+}  // namespace fieldmark::bench

@@ -1,0 +1,60 @@
+#include <fieldmark/tools/bench/captures_bench.h>
+
+#include "cli/bench.h"
+
+namespace fieldmark::cli {
+namespace {
+
+struct BenchCapturesArguments {
+  std::string scene;
+  double seconds = 60, degrees = 0.5, part = 0.01;
+  bool quick = false;
+};
+
+int run_bench_captures(const BenchCapturesArguments& o, Context& context) {
+  const nerf::Dataset train = bench_split(o.scene, "train", o.quick),
+                      test = bench_split(o.scene, "test", o.quick);
+  const bench::PoseJitter jitter{.degrees = o.degrees, .part = o.part, .seed = context.seed()};
+  const auto rows = with_progress(context, [&](const auto& progress) {
+    return bench::run_captures_bench(train, test, o.seconds, jitter, progress);
+  });
+  Json list = Json::array();
+  for (const bench::CaptureRow& r : rows) {
+    print_line(context, "%-32s %6ld steps  %6.2f dB  colours fitted %6.2f dB  poses fitted %6.2f dB\n",
+               r.variant.name.c_str(), static_cast<long>(r.steps), r.psnr, r.psnr_colour_fitted,
+               r.psnr_pose_fitted);
+    list.push_back({{"variant", r.variant.name},
+                    {"steps", r.steps},
+                    {"psnr", r.psnr},
+                    {"psnr_colour_fitted", r.psnr_colour_fitted},
+                    {"psnr_pose_fitted", r.psnr_pose_fitted}});
+  }
+  const double plain = bench::recovered(rows, &bench::CaptureRow::psnr),
+               fitted = bench::recovered(rows, &bench::CaptureRow::psnr_pose_fitted);
+  print_line(context, "refined poses bring back %.0f%% of the lost dB, %.0f%% with test poses fitted\n",
+             100 * plain, 100 * fitted);
+  context.result({{"scene", train.name},
+                  {"seconds_each", o.seconds},
+                  {"degrees", o.degrees},
+                  {"part", o.part},
+                  {"test_views", test.views.size()},
+                  {"recovered", number(plain)},
+                  {"recovered_pose_fitted", number(fitted)},
+                  {"rows", list}});
+  return kOk;
+}
+
+}  // namespace
+
+Command add_bench_captures(CommandLine& app) {
+  auto o = std::make_shared<BenchCapturesArguments>();
+  add_scene_option(app, o->scene);
+  add_number(app, "--seconds", o->seconds, 0.1, 86400, "Training time of each row in seconds, 0.1 to 86400",
+             "S");
+  add_number(app, "--degrees", o->degrees, 0, 45, "Rotation of jittered cameras in degrees, 0 to 45", "A");
+  add_number(app, "--part", o->part, 0, 1, "Move of jittered cameras in distances to the scene, 0 to 1", "F");
+  app.add_flag("--quick", o->quick, "Measure on a small built-in scene if there is no --scene");
+  return [o](Context& context) { return run_bench_captures(*o, context); };
+}
+
+}  // namespace fieldmark::cli
