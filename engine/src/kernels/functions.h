@@ -10,8 +10,7 @@ namespace {
 
 using V = simd::Vec<float>;
 
-// Every function below returns NaN for NaN, which simd::exp would hide.
-inline V keep_nan(V x, V y) { return x == x ? y : x; }
+// Every function below returns NaN for NaN.
 inline V absolute(V x) { return simd::max(x, -x); }
 
 // The scalar twins serve double, through the compiler's builtins: <cmath> must not be included here.
@@ -28,7 +27,7 @@ struct Relu {
 struct Sigmoid {
   static V value(V x) {
     const V e = simd::exp(-absolute(x));
-    return keep_nan(x, (x < 0 ? e : V{} + 1) / (1 + e));
+    return (x < 0 ? e : V{} + 1) / (1 + e);
   }
   static double value(double x) {
     const double e = __builtin_exp(-__builtin_fabs(x));
@@ -49,7 +48,7 @@ struct Tanh {
     p = p * z - 0.0538507549f;
     p = p * z + 0.13332768f;
     p = p * z - 0.333333289f;
-    return keep_nan(x, a < 0.625f ? x + x * z * p : (x < 0 ? -big : big));
+    return a < 0.625f ? x + x * z * p : (x < 0 ? -big : big);
   }
   static double value(double x) { return __builtin_tanh(x); }
   template <class X>
@@ -59,7 +58,7 @@ struct Tanh {
 };
 
 struct Exp {
-  static V value(V x) { return keep_nan(x, simd::exp(x)); }
+  static V value(V x) { return simd::exp(x); }
   static double value(double x) { return __builtin_exp(x); }
   template <class X>
   static X slope(X, X y) {
@@ -68,7 +67,7 @@ struct Exp {
 };
 
 struct TruncatedExp {
-  static V value(V x) { return keep_nan(x, simd::exp(simd::min(x, V{} + float{kTruncatedExpLimit}))); }
+  static V value(V x) { return simd::exp(simd::min(V{} + float{kTruncatedExpLimit}, x)); }
   static double value(double x) { return __builtin_exp(x > kTruncatedExpLimit ? kTruncatedExpLimit : x); }
   template <class X>
   static X slope(X, X y) {
@@ -83,7 +82,7 @@ struct Softplus {
     V p = 0.268519512f * z + 0.28236532f;
     p = p * z + 0.400075655f;
     p = p * z + 0.666666403f;
-    return keep_nan(x, simd::max(x, V{}) + (2 * s + s * z * p));
+    return simd::max(x, V{}) + (2 * s + s * z * p);
   }
   static double value(double x) {
     return (x > 0 ? x : 0) + __builtin_log1p(__builtin_exp(-__builtin_fabs(x)));

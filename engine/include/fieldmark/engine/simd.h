@@ -53,11 +53,11 @@ template <class V>
 }
 
 /// Returns e^x with a relative error below 2.5e-7 for x in [-87.3, 88]; saturates outside (0 below, the value
-/// at 88 above). Source: Cody and Waite 1980: x = n log 2 + r, |r| <= log(2) / 2, and a polynomial of degree
-/// 6 for e^r.
+/// at 88 above); NaN for NaN. Source: Cody and Waite 1980: x = n log 2 + r, |r| <= log(2) / 2, and a
+/// polynomial of degree 6 for e^r.
 [[maybe_unused, gnu::always_inline]] inline Vec<float> exp(Vec<float> x) {
   const Vec<float> below = broadcast(-87.33f);
-  const Vec<float> c = min(max(x, below), broadcast(88.0f));
+  const Vec<float> c = min(broadcast(88.0f), max(below, x));  // in this order they keep a NaN
   // Adding and subtracting 1.5 * 2^23 rounds to the nearest integer.
   const Vec<float> magic = broadcast(12582912.0f);
   const Vec<float> n = (c * 1.44269504f + magic) - magic;
