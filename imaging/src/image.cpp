@@ -35,6 +35,10 @@ static unsigned char* stbi_write_png_to_mem(const unsigned char*, int, int, int,
 #define STB_IMAGE_WRITE_IMPLEMENTATION
 #endif
 #define STBI_NO_STDIO
+// Zeros, so that what a damaged file leaves unset is at least the same each time.
+#define STBI_MALLOC(size) std::calloc(1, size)
+#define STBI_REALLOC(p, size) std::realloc(p, size)
+#define STBI_FREE(p) std::free(p)
 #define STBI_ONLY_PNG
 #define STBI_ONLY_JPEG
 #include <stb/stb_image.h>
@@ -154,7 +158,7 @@ Tensor<float> unended(std::span<const std::byte> bytes, const PngChunks& chunks,
 Tensor<float> decode_by_stb(std::span<const std::byte> bytes, int want_channels) {
   if (bytes.size() > kMaxBytes - 1024) throw Undecodable("more than 2^31 bytes");
   if (is_jpeg(bytes) && !huffman_tables_fit(bytes))
-    throw Undecodable("a Huffman table of more than 256 symbols, damaged");
+    throw Undecodable("a Huffman table of more than 255 symbols, damaged");
   int width = 0, height = 0, channels = 0;
   if (stbi_info_from_memory(data_of(bytes), static_cast<int>(bytes.size()), &width, &height, &channels))
     check_area(width, height, bytes.size());
@@ -165,6 +169,8 @@ Tensor<float> decode_by_stb(std::span<const std::byte> bytes, int want_channels)
     // stb would return uninitialised memory.
     if (std::ranges::none_of(parts.segments, [](const JpegSegment& s) { return s.marker == kScan; }))
       throw Undecodable("a JPEG file without an image, truncated");
+    if (!parts.defines_tables())
+      throw Undecodable("a scan without its Huffman or quantisation table, damaged");
     complete = parts.complete;
     image = complete ? pixels_of(bytes, want_channels) : unended(bytes, parts, want_channels);
   } else {

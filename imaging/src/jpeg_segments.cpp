@@ -8,7 +8,7 @@ namespace fieldmark {
 namespace {
 
 constexpr int kStart = 0xd8, kEnd = 0xd9, kScan = 0xda, kProgressive = 0xc2, kTables = 0xc4,
-              kTemporary = 0x01;
+              kQuantisation = 0xdb, kTemporary = 0x01;
 constexpr std::size_t kCoefficients = 64;
 
 using Bytes = std::span<const std::byte>;
@@ -56,9 +56,71 @@ JpegSegments jpeg_segments(Bytes bytes) {
   }
 }
 
+namespace {
+
+// The tables that the segments so far have defined: [class][number] of Huffman tables, [number] of the
+// others.
+struct Tables {
+  std::array<std::array<bool, 16>, 2> huffman{};
+  std::array<bool, 16> quantisation{};
+
+  void add(const JpegSegment& s) {
+    for (std::size_t i = 0; i < s.payload.size();) {
+      const auto number = static_cast<std::size_t>(at(s.payload, i) & 15);
+      const int high = at(s.payload, i) >> 4;
+      if (s.marker == kQuantisation) {
+        quantisation[number] = true;
+        i += 1 + (high ? 2 : 1) * kCoefficients;
+      } else {
+        std::size_t symbols = 0;
+        for (std::size_t k = i + 1; k <= i + 16 && k < s.payload.size(); ++k)
+          symbols += static_cast<std::size_t>(at(s.payload, k));
+        huffman[high ? 1 : 0][number] = true;
+        i += 17 + symbols;
+      }
+    }
+  }
+  // True if the tables of a scan's components are there; quantised: their quantisation tables by component.
+  bool serve(Bytes scan, const std::map<int, std::size_t>& quantised, bool progressive) const {
+    const auto components = static_cast<std::size_t>(at(scan, 0));
+    if (scan.size() != 4 + 2 * components) return true;  // such a scan is refused for its size
+    const int first = at(scan, scan.size() - 3), last = at(scan, scan.size() - 2),
+              bits = at(scan, scan.size() - 1);
+    const bool dc = !progressive || (first == 0 && bits >> 4 == 0), ac = !progressive || last > 0;
+    for (std::size_t c = 0; c < components; ++c) {
+      const int tables = at(scan, 2 + 2 * c);
+      const auto found = quantised.find(at(scan, 1 + 2 * c));
+      if (found == quantised.end() || !quantisation[found->second]) return false;
+      if (dc && !huffman[0][static_cast<std::size_t>(tables >> 4)]) return false;
+      if (ac && !huffman[1][static_cast<std::size_t>(tables & 15)]) return false;
+    }
+    return true;
+  }
+};
+
+}  // namespace
+
+bool JpegSegments::defines_tables() const {
+  Tables tables;
+  std::map<int, std::size_t> quantised;
+  bool progressive = false;
+  for (const JpegSegment& s : segments) {
+    if (s.marker == kTables || s.marker == kQuantisation) tables.add(s);
+    if (is_frame(s.marker)) {
+      if (s.marker > kProgressive) return true;  // lossless or arithmetic, which stb refuses
+      progressive = s.marker == kProgressive;
+      for (std::size_t c = 6; c + 2 < s.payload.size(); c += 3)
+        quantised[at(s.payload, c)] = static_cast<std::size_t>(at(s.payload, c + 2) & 15);
+    }
+    if (s.marker == kScan && !s.payload.empty() && !tables.serve(s.payload, quantised, progressive))
+      return false;
+  }
+  return true;
+}
+
 bool huffman_tables_fit(Bytes bytes) {
   constexpr std::size_t kLengths = 16;  // of codes; a table starts with its number and their counts
-  constexpr int kSymbols = 256;
+  constexpr int kSymbols = 255;
   const auto byte = [&](std::size_t i) { return i < bytes.size() ? at(bytes, i) : 0; };
   for (std::size_t i = next_marker(bytes, 0); i < bytes.size(); i = next_marker(bytes, i)) {
     const int marker = at(bytes, i + 1);

@@ -22,6 +22,9 @@ struct JpegSegments {
   /// True if every coefficient of every component has been sent to its last bit, according to the scan
   /// headers. Progressive files spread them over several scans.
   bool sends_every_coefficient() const;
+  /// True if every scan comes after the Huffman and quantisation tables that its components name. stb_image
+  /// decodes with whatever memory holds in place of a missing one.
+  bool defines_tables() const;
 };
 
 /// True if the bytes start with the signature of JPEG.
@@ -31,9 +34,10 @@ bool is_jpeg(std::span<const std::byte> bytes);
 /// to the end. Never reads beyond the bytes. @param bytes  see is_jpeg(); must outlive the result
 JpegSegments jpeg_segments(std::span<const std::byte> bytes);
 
-/// True if no Huffman table of a JPEG file has more than the 256 symbols that a byte can name, wherever a
-/// decoder may meet one, also in a segment longer than the remaining bytes. stb_image writes beyond its
-/// arrays otherwise.
+/// True if no Huffman table of a JPEG file has more than 255 symbols, wherever a decoder may meet one up to
+/// the end marker, also in a segment longer than the remaining bytes. stb_image writes beyond its arrays for
+/// 257 symbols and takes the last of 256 for a code that its short table lacks. No encoder needs as many: an
+/// AC table of 8-bit images has at most 176.
 bool huffman_tables_fit(std::span<const std::byte> bytes);
 
 }  // namespace fieldmark

@@ -207,6 +207,22 @@ TEST_CASE("tape: a gradient that is added to a seed read in place leaves the cal
   CHECK(g.data == std::vector<double>{6 * 19, 10 * 2});
 }
 
+TEST_CASE("tape: an empty seed read in place overwrites fresh gradients as a copied one does") {
+  const Tensor<double> w({3}, 1.0);
+  for (const bool in_place : {false, true}) {
+    std::vector<double> g(3, 7.0);
+    Tape<double> tape;
+    const auto v = tape.fresh_leaf(w.data.data(), g.data(), {3});
+    const auto none = slice(v, 0, 0, 0);
+    const std::vector<double> seed;
+    if (in_place)
+      tape.backward_in_place(none, seed);
+    else
+      tape.backward(none, seed);
+    CHECK(g == std::vector<double>(3, 0.0));
+  }
+}
+
 TEST_CASE("tape: a seed read in place counts as a copied one for leaves, ReLU layers and errors") {
   const Tensor<double> x({1, 2}, std::vector<double>{-1, 2}), w({2, 2}, std::vector<double>{1, 0, 0, 1}),
       b({2});

@@ -374,6 +374,11 @@ int main(int count, char** words) {
   const rlimit memory{kMemory, kMemory};
   ::setrlimit(RLIMIT_AS, &memory);
 #endif
+  for (int i = 1; i < count && i < 4; ++i)
+    if (std::string(words[i]).find_first_not_of("0123456789") != std::string::npos) {
+      std::cerr << words[i] << ": expected a number; a format is the fourth argument\n";
+      return 2;
+    }
   const auto argument = [&](int i, unsigned long long otherwise) {
     return i < count ? std::strtoull(words[i], nullptr, 10) : otherwise;
   };

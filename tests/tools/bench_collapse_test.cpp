@@ -8,18 +8,25 @@ using namespace fieldmark;
 
 TEST_CASE("bench collapse counts what was noticed of faults, and false alarms", "[bench]") {
   const TemporaryFolder folder;
+  const std::string scene = tiny_scene(folder);
   const auto r =
-      run_command({"bench", "collapse", "--scene", tiny_scene(folder), "--seconds", "0.3", "--healthy", "0.2",
-                   "--patience", "10", "--ordinary", "2", "--quick", "--json", "-"});
+      run_command({"bench", "collapse", "--scene", scene, "--scene", scene, "--seconds", "0.3",
+                   "--fault-after", "0.2", "--patience", "10", "--ordinary", "3", "--quick", "--json", "-"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
   const auto json = nlohmann::json::parse(r.out);
-  const auto& provoked = json["provoked"];
-  CHECK(provoked["cases"] == 2);
-  CHECK(provoked["noticed"].get<int>() + provoked["recovered"].get<int>() + provoked["missed"].get<int>() ==
-        2);
-  REQUIRE(provoked["rows"].size() == 2);
-  CHECK(provoked["rows"][1]["what"] == "no occupied cell");
+  REQUIRE(json["faults"].size() == 4);
+  CHECK(json["faults"][1]["what"] == "no occupied cell");
+  int noticed = 0, missed = 0;
+  for (const auto& row : json["faults"]) {
+    const bool alarm = row["said"] != "";
+    noticed += alarm && row["noticed_after"] >= 0;
+    missed += !alarm && !(row["explained"].is_number() && row["explained"] > 0);
+  }
+  CHECK(json["provoked"]["cases"] == 4);
+  CHECK(json["provoked"]["noticed"] == noticed);
+  CHECK(json["provoked"]["missed"] == missed);
+  REQUIRE(json["runs"].size() == 2);
   CHECK(json["ordinary"]["runs"] == 2);
   CHECK(json["ordinary"]["false_alarms"] == 0);
   CHECK(json["ordinary"]["least_explained"] > 0);

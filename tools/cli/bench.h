@@ -19,6 +19,7 @@ namespace fieldmark::cli {
 Command add_bench_attacks(CommandLine& app);
 Command add_bench_captures(CommandLine& app);
 Command add_bench_collapse(CommandLine& app);
+Command add_bench_data(CommandLine& app);
 Command add_bench_embed(CommandLine& app);
 Command add_bench_engine(CommandLine& app);
 Command add_bench_field(CommandLine& app);

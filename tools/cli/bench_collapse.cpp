@@ -3,17 +3,20 @@
 #include <fieldmark/tools/bench/collapse_bench.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "cli/bench.h"
 
 namespace fieldmark::cli {
 namespace {
 
-constexpr double kBar = 10;  // seconds within which a collapse should be noticed
+constexpr double kBar = 10;      // seconds within which a collapse should be noticed
+constexpr Index kQuickRuns = 2;  // ordinary trainings
 
 struct BenchCollapseArguments {
   std::vector<std::string> scenes;
-  double seconds = 30, healthy = 5, patience = 15;
+  double seconds = 30, fault_after = 5, patience = 15;
   Index ordinary = 50;
   bool quick = false;
 };
@@ -40,79 +43,110 @@ std::vector<WatchedScene> scenes_of(const BenchCollapseArguments& o) {
   return scenes;
 }
 
-Json row_of(const bench::WatchedTraining& w, Context& context) {
-  char noticed[40] = "not noticed";
-  if (!w.said.empty()) std::snprintf(noticed, sizeof noticed, "noticed after %.1f s", w.noticed_after);
-  print_line(context, "%-10s %-42s %6ld steps  %-22s explained %8.3f%s\n", w.scene.c_str(), w.what.c_str(),
-             static_cast<long>(w.steps), noticed, w.explained, w.missed() ? "  MISSED" : "");
-  return {{"scene", w.scene}, {"what", w.what},
-          {"steps", w.steps}, {"noticed_after", number(w.noticed_after)},
-          {"said", w.said},   {"explained", number(w.explained)}};
+// What the rows of a part are counted as.
+struct Counts {
+  Index noticed = 0, in_time = 0, early = 0, missed = 0, false_alarms = 0;
+  double slowest = std::numeric_limits<double>::quiet_NaN(), least_explained = slowest;
+
+  void add(const bench::WatchedTraining& w) {
+    const bool alarm = !w.said.empty(), after = alarm && w.noticed_after >= 0;
+    noticed += after, early += alarm && !after, missed += !alarm && w.collapsed();
+    in_time += after && w.noticed_after <= kBar;
+    false_alarms += alarm && !w.collapsed();
+    if (after && !(w.noticed_after <= slowest)) slowest = w.noticed_after;
+    if (std::isnan(w.explained) || !(w.explained >= least_explained)) least_explained = w.explained;
+  }
+};
+
+void print(const std::vector<bench::WatchedTraining>& rows, Context& context) {
+  for (const auto& w : rows) {
+    char alarm[40] = "no alarm";
+    if (!w.said.empty()) std::snprintf(alarm, sizeof alarm, "alarm after %.1f s", w.noticed_after);
+    print_line(context, "%-10s %-42s %6ld steps  %-20s explained %8.3f\n", w.scene.c_str(), w.what.c_str(),
+               static_cast<long>(w.steps), alarm, w.explained);
+  }
+}
+
+Json json_of(const std::vector<bench::WatchedTraining>& rows) {
+  Json list = Json::array();
+  for (const auto& w : rows)
+    list.push_back({{"scene", w.scene},
+                    {"what", w.what},
+                    {"steps", w.steps},
+                    {"noticed_after", number(w.noticed_after)},
+                    {"said", w.said},
+                    {"explained", number(w.explained)}});
+  return list;
 }
 
 // Runs every fault on every scene.
-Json provoked(const BenchCollapseArguments& o, const std::vector<WatchedScene>& scenes, Context& context) {
-  Json rows = Json::array();
-  Index noticed = 0, in_time = 0, missed = 0;
-  double slowest = 0;
+std::vector<bench::WatchedTraining> provoked(const BenchCollapseArguments& o,
+                                             const std::vector<WatchedScene>& scenes, Context& context) {
+  std::vector<bench::WatchedTraining> rows;
   auto faults = bench::training_faults();
   if (o.quick) faults.erase(faults.begin(), faults.end() - 2);
   const auto total = static_cast<double>(faults.size() * scenes.size());
   with_progress(context, [&](const auto& progress) {
     for (const WatchedScene& scene : scenes)
-      for (const auto& fault : faults) {
-        progress(fault.name, static_cast<double>(rows.size()) / total);
-        const auto w =
-            bench::watch_fault(scene.train, scene.judge, fault, o.healthy, o.patience, context.seed());
-        noticed += !w.said.empty();
-        in_time += w.noticed_after >= 0 && w.noticed_after <= kBar;
-        missed += w.missed();
-        if (!w.said.empty()) slowest = std::max(slowest, w.noticed_after);
-        rows.push_back(row_of(w, context));
-      }
+      for (const auto& fault : faults)
+        rows.push_back(
+            bench::watch_fault(scene.train, scene.judge, fault,
+                               {.after = o.fault_after, .patience = o.patience, .seed = context.seed()},
+                               [&] { progress(fault.name, static_cast<double>(rows.size()) / total); }));
   });
-  return {{"cases", rows.size()},
-          {"noticed", noticed},
-          {"within_10_s", in_time},
-          {"slowest", slowest},
-          {"recovered", static_cast<Index>(rows.size()) - noticed - missed},
-          {"missed", missed},
-          {"rows", rows}};
+  return rows;
 }
 
-// Runs settings that people choose, scene after scene; each round of all has the next seed.
-Json ordinary(const BenchCollapseArguments& o, const std::vector<WatchedScene>& scenes, Context& context) {
-  Json rows = Json::array();
-  Index alarms = 0;
-  double least = 1;
+// Runs settings that people choose, each on every scene; each round of all has the next seed.
+std::vector<bench::WatchedTraining> ordinary(const BenchCollapseArguments& o,
+                                             const std::vector<WatchedScene>& scenes, Context& context) {
+  std::vector<bench::WatchedTraining> rows;
+  const Index runs = o.quick ? std::min<Index>(o.ordinary, kQuickRuns) : o.ordinary;
   with_progress(context, [&](const auto& progress) {
-    for (std::uint64_t round = 0; std::ssize(rows) < o.ordinary; ++round)
+    for (std::uint64_t round = 0; std::ssize(rows) < runs; ++round)
       for (const auto& training : bench::ordinary_trainings(o.seconds, context.seed() + round))
         for (const WatchedScene& scene : scenes) {
+          // An mlp field cannot have a scene without bounds.
           const bool unbounded_mlp = training.field.field.kind == nerf::FieldKind::mlp &&
                                      scene.train.scene == nerf::SceneType::place;
-          if (unbounded_mlp || std::ssize(rows) == o.ordinary) continue;
-          progress(training.name, static_cast<double>(rows.size()) / static_cast<double>(o.ordinary));
-          const auto w = bench::watch_ordinary(scene.train, scene.judge, training);
-          alarms += !w.said.empty();
-          least = std::min(least, w.explained);
-          rows.push_back(row_of(w, context));
+          if (unbounded_mlp || std::ssize(rows) == runs) continue;
+          rows.push_back(bench::watch_ordinary(scene.train, scene.judge, training, [&] {
+            progress(training.name, static_cast<double>(rows.size()) / static_cast<double>(runs));
+          }));
         }
   });
-  return {{"runs", rows.size()},
-          {"false_alarms", alarms},
-          {"least_explained", number(least)},
-          {"seconds_each", o.seconds},
-          {"rows", rows}};
+  return rows;
 }
 
 int run_bench_collapse(const BenchCollapseArguments& o, Context& context) {
   const std::vector<WatchedScene> scenes = scenes_of(o);
-  const Json faults = provoked(o, scenes, context), healthy = ordinary(o, scenes, context);
-  context.result({{"healthy_seconds", o.healthy},
+  const auto faults = provoked(o, scenes, context);
+  print(faults, context);
+  const auto runs = ordinary(o, scenes, context);
+  print(runs, context);
+  Counts of_faults, of_runs;
+  for (const auto& w : faults) of_faults.add(w);
+  for (const auto& w : runs) of_runs.add(w);
+  const auto cases = std::ssize(faults);
+  context.result({{"fault_after", o.fault_after},
                   {"patience", o.patience},
-                  {"provoked", faults},
-                  {"ordinary", healthy}});
+                  {"provoked",
+                   {{"cases", cases},
+                    {"noticed", of_faults.noticed},
+                    {"within_10_s", of_faults.in_time},
+                    {"slowest", number(of_faults.slowest)},
+                    {"alarms_before", of_faults.early},
+                    {"missed", of_faults.missed},
+                    {"not_collapsed", cases - of_faults.noticed - of_faults.early - of_faults.missed}}},
+                  {"ordinary",
+                   {{"runs", std::ssize(runs)},
+                    {"seconds_each", o.seconds},
+                    {"false_alarms", of_runs.false_alarms},
+                    {"right_alarms", of_runs.noticed - of_runs.false_alarms},
+                    {"missed", of_runs.missed},
+                    {"least_explained", number(of_runs.least_explained)}}},
+                  {"faults", json_of(faults)},
+                  {"runs", json_of(runs)}});
   return kOk;
 }
 
@@ -123,14 +157,15 @@ Command add_bench_collapse(CommandLine& app) {
   app.add_option("--scene", o->scenes, "Data set to train on; repeatable")
       ->type_name("DIR")
       ->default_str("lego of FIELDMARK_DATA, else the built-in scene");
-  add_number(app, "--ordinary", o->ordinary, 0, 10000, "Healthy trainings, 0 to 10000");
+  add_number(app, "--ordinary", o->ordinary, 0, 10000, "Ordinary trainings, 0 to 10000");
   add_number(app, "--seconds", o->seconds, 0.1, 86400,
-             "Length of each healthy training in seconds, 0.1 to 86400", "S");
-  add_number(app, "--healthy", o->healthy, 0, 86400,
+             "Length of each ordinary training in seconds, 0.1 to 86400", "S");
+  add_number(app, "--fault-after", o->fault_after, 0, 86400,
              "Training time before a fault strikes in seconds, 0 to 86400", "S");
   add_number(app, "--patience", o->patience, 0.1, 86400,
-             "Time after a fault at which a training ends unnoticed in seconds, 0.1 to 86400", "S");
-  app.add_flag("--quick", o->quick, "Measure two faults on a small built-in scene");
+             "Training time after a fault in seconds, 0.1 to 86400", "S");
+  app.add_flag("--quick", o->quick,
+               "Measure two faults and two ordinary trainings, on a small scene if no data set is found");
   return [o](Context& context) { return run_bench_collapse(*o, context); };
 }
 

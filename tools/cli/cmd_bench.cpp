@@ -33,7 +33,9 @@ constexpr Subject kSubjects[] = {
      add_bench_collapse},
     {"captures",
      "Measure what exposures and refined poses gain on captured images, as they are and with jittered poses",
-     add_bench_captures}};
+     add_bench_captures},
+    {"data", "Measure what training loses on data sets in other forms: opaque, moved, masked, behind a lens",
+     add_bench_data}};
 
 }  // namespace
 

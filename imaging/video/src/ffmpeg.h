@@ -22,7 +22,8 @@ using Owned = std::unique_ptr<T, Free>;
 Owned<AVFrame> make_frame();
 Owned<AVPacket> make_packet();
 
-/// Bounds each allocation of FFmpeg by 1 GiB, because a count in a damaged file asks for any size.
+/// Sets, for the whole process, the largest block that FFmpeg allocates to 1 GiB: a count in a damaged file
+/// may ask for any size.
 void limit_memory();
 /// Captures FFmpeg's messages for reason() instead of standard error. Clears those of this thread.
 void take_messages();

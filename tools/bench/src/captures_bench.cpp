@@ -27,31 +27,45 @@ double distance_to_scene(const nerf::View& view, const nerf::Vec3& centre) {
   return (Vector(p.data()) - Vector(centre.data())).norm();
 }
 
+struct CaptureRun {
+  double seconds;
+  std::uint64_t seed;
+};
+
 // Trains a variant; `centre` receives the middle of the scene.
 CaptureRow trained(const nerf::Dataset& train, const nerf::Dataset& test, const CaptureVariant& variant,
-                   double seconds, nerf::Vec3& centre, const std::function<void(double)>& progress) {
-  const ScheduleOptions schedule{.seconds = seconds};
-  nerf::RadianceField field(nerf::field_options(schedule));
-  const nerf::TrainOptions options{
-      .schedule = schedule, .image_colours = variant.exposures, .refine_poses = variant.refined};
+                   const CaptureRun& run, nerf::Vec3& centre, const std::function<void(double)>& progress) {
+  const ScheduleOptions schedule{.seconds = run.seconds};
+  nerf::RadianceFieldOptions sizes = nerf::field_options(schedule);
+  sizes.seed = run.seed;
+  nerf::RadianceField field(sizes);
+  const nerf::TrainOptions options{.schedule = schedule,
+                                   .seed = run.seed,
+                                   .carve = false,
+                                   .image_colours = variant.exposures,
+                                   .refine_poses = variant.refined};
   nerf::Trainer trainer(field, train, options);
   const auto begin = std::chrono::steady_clock::now();
   while (!trainer.done()) {
     const double now = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    progress(std::min(1.0, now / seconds));
+    progress(std::min(1.0, now / run.seconds));
     trainer.step(now);
   }
   const nerf::Bounds& b = field.space.bounds;
   for (std::size_t k = 0; k < 3; ++k) centre[k] = b.corner[k] + b.side / 2;
   CaptureRow row{.variant = variant, .steps = trainer.steps()};
   nerf::Renderer renderer(field);
-  const nerf::Evaluation plain = nerf::evaluate(renderer, test);
+  const auto still_there = [&](Index, Index) {
+    progress(1);
+    return true;
+  };
+  const nerf::Evaluation plain = nerf::evaluate(renderer, test, still_there);
   row.psnr = plain.psnr;
   row.psnr_colour_fitted = plain.psnr_colour_fitted;
   nerf::Dataset fitted = test;
-  const auto cameras = nerf::fit_cameras(field, test);
+  const auto cameras = nerf::fit_cameras(field, test, {.seed = run.seed}, still_there);
   for (std::size_t v = 0; v < cameras.size(); ++v) fitted.views[v].camera = cameras[v];
-  row.psnr_pose_fitted = nerf::evaluate(renderer, fitted).psnr;
+  row.psnr_pose_fitted = nerf::evaluate(renderer, fitted, still_there).psnr;
   return row;
 }
 
@@ -85,7 +99,7 @@ std::vector<CaptureVariant> capture_variants() {
 }
 
 std::vector<CaptureRow> run_captures_bench(const nerf::Dataset& train, const nerf::Dataset& test,
-                                           double seconds, const PoseJitter& jitter,
+                                           double seconds, const PoseJitter& jitter, std::uint64_t seed,
                                            const std::function<void(const std::string&, double)>& progress) {
   const auto variants = capture_variants();
   std::vector<CaptureRow> rows;
@@ -97,17 +111,20 @@ std::vector<CaptureRow> run_captures_bench(const nerf::Dataset& train, const ner
         progress(variant.name,
                  (static_cast<double>(rows.size()) + part) / static_cast<double>(variants.size()));
     };
-    rows.push_back(trained(variant.jittered ? moved : train, test, variant, seconds, centre, told));
+    rows.push_back(trained(variant.jittered ? moved : train, test, variant, {seconds, seed}, centre, told));
     if (rows.size() == 1) jitter_cameras(moved, jitter, centre);
   }
   return rows;
 }
 
+double lost(const std::vector<CaptureRow>& rows, double CaptureRow::*psnr) {
+  return row_with(rows, false, false).*psnr - row_with(rows, true, false).*psnr;
+}
+
 double recovered(const std::vector<CaptureRow>& rows, double CaptureRow::*psnr) {
-  const double whole = row_with(rows, false, false).*psnr, jittered = row_with(rows, true, false).*psnr,
-               refined = row_with(rows, true, true).*psnr;
-  if (!(whole > jittered)) return std::numeric_limits<double>::quiet_NaN();
-  return (refined - jittered) / (whole - jittered);
+  const double jittered = row_with(rows, true, false).*psnr, refined = row_with(rows, true, true).*psnr;
+  const double whole = lost(rows, psnr);
+  return whole > 0 ? (refined - jittered) / whole : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace fieldmark::bench

@@ -27,7 +27,7 @@ void multiply(nerf::RadianceField& field, bool table, float factor) {
   }
 }
 
-// Has each image belong to the camera of the next.
+// Gives each camera the image of the next.
 void shift_images(nerf::Dataset& data) {
   auto& views = data.views;
   for (std::size_t v = 0; v + 1 < views.size(); ++v) {
@@ -64,7 +64,7 @@ std::vector<TrainingFault> training_faults() {
                  [](nerf::Dataset& data, nerf::TrainOptions&) {
                    for (nerf::View& v : data.views) std::ranges::fill(v.rgba.data, 1.f);
                  }),
-      begun_with("each image with the camera of the next",
+      begun_with("each camera with the image of the next",
                  [](nerf::Dataset& data, nerf::TrainOptions&) { shift_images(data); }),
       struck_by("a weight that is not a number",
                 [](nerf::RadianceField& field) {
@@ -92,7 +92,10 @@ std::vector<OrdinaryTraining> ordinary_trainings(double seconds, std::uint64_t s
   vary("cells outside the silhouettes kept", [](OrdinaryTraining& o) { o.train.carve = false; });
   vary("exposures learnt", [](OrdinaryTraining& o) { o.train.image_colours = true; });
   vary("poses refined", [](OrdinaryTraining& o) { o.train.refine_poses = true; });
-  vary("2 x 2 rays a pixel", [](OrdinaryTraining& o) { o.field.supersampling = 2; });
+  vary("2 x 2 rays a pixel", [](OrdinaryTraining& o) {
+    o.field.supersampling = 2;
+    o.train.supersample_after = 500;
+  });
   vary("table of 2^12 rows", [](OrdinaryTraining& o) { o.field.field.encoding.log2_table = 12; });
   vary("half the step size", [](OrdinaryTraining& o) { o.train.schedule.lr /= 2; });
   vary("preset mlp", [&](OrdinaryTraining& o) {
@@ -106,51 +109,52 @@ std::vector<OrdinaryTraining> ordinary_trainings(double seconds, std::uint64_t s
 }
 
 WatchedTraining watch_fault(const nerf::Dataset& train, const nerf::Dataset& judge,
-                            const TrainingFault& fault, double healthy, double patience, std::uint64_t seed) {
-  OrdinaryTraining training = ordinary_trainings(healthy + patience, seed).front();
+                            const TrainingFault& fault, const FaultTimes& times,
+                            const std::function<void()>& tick) {
+  const double after = fault.before ? 0 : times.after;
+  OrdinaryTraining training = ordinary_trainings(after + times.patience, times.seed).front();
   nerf::Dataset damaged = train;
-  if (fault.before) {
-    fault.before(damaged, training.train);
-    healthy = 0;
-  }
+  if (fault.before) fault.before(damaged, training.train);
   WatchedTraining row{.scene = train.name, .what = fault.name, .said = {}};
   nerf::RadianceField field(training.field);
   nerf::Trainer trainer(field, damaged, training.train);
   nerf::CollapseWatch watch(field, judge);
   const Stopwatch clock;
   bool struck = !fault.during;
-  double struck_at = healthy;
-  while (!trainer.done()) {
-    const double now = clock.seconds();
-    if (!struck && now >= healthy) {
+  double struck_at = after;
+  while (row.said.empty() && !trainer.done() && !(struck && clock.seconds() > struck_at + times.patience)) {
+    if (tick) tick();
+    if (!struck && clock.seconds() >= after) {
       fault.during(field);
       struck = true;
-      struck_at = now;
+      struck_at = clock.seconds();
     }
     row.said = watch.look(trainer.steps(), trainer.train_psnr());
-    if (!row.said.empty()) {
-      row.noticed_after = clock.seconds() - struck_at;
-      break;
-    }
-    if (struck && now > struck_at + patience) break;
-    trainer.step(now);
+    if (row.said.empty()) trainer.step(clock.seconds());
   }
+  if (row.said.empty()) row.said = watch.verdict(trainer.steps());
+  if (!row.said.empty()) row.noticed_after = clock.seconds() - struck_at;
   return finished(row, trainer, watch);
 }
 
 WatchedTraining watch_ordinary(const nerf::Dataset& train, const nerf::Dataset& judge,
-                               const OrdinaryTraining& training) {
+                               const OrdinaryTraining& training, const std::function<void()>& tick) {
   WatchedTraining row{.scene = train.name, .what = training.name, .said = {}};
   nerf::RadianceField field(training.field);
   nerf::Trainer trainer(field, train, training.train);
   nerf::CollapseWatch watch(field, judge);
   const Stopwatch clock;
-  while (!trainer.done() && row.said.empty()) {
-    row.said = watch.look(trainer.steps(), trainer.train_psnr());
+  const auto heard = [&](const std::string& said) {
+    if (said.empty() || !row.said.empty()) return;
+    row.said = said;
+    row.noticed_after = clock.seconds();
+  };
+  while (!trainer.done()) {
+    if (tick) tick();
+    heard(watch.look(trainer.steps(), trainer.train_psnr()));
     trainer.step(clock.seconds());
   }
-  if (row.said.empty()) row.said = watch.verdict(trainer.steps());
-  if (!row.said.empty()) row.noticed_after = clock.seconds();
+  heard(watch.verdict(trainer.steps()));
   return finished(row, trainer, watch);
 }
 

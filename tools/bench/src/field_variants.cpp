@@ -13,7 +13,7 @@ namespace {
 
 constexpr Index kPlaces = 3;         // along each axis of an examined cell
 constexpr float kThreshold = 0.01f;  // as in training
-constexpr Index kChunk = 64;         // coarse cells examined together
+constexpr Index kCells = 64;         // coarse cells examined together
 
 std::string number(float value) {
   char text[40];
@@ -52,7 +52,7 @@ std::vector<std::uint8_t> finer(const nerf::RadianceField& field, const nerf::Oc
     if (grid.occupied(c)) cells.push_back(c);
   std::vector<std::uint8_t> bits(at(to.cells()), 0);
   const auto side = 1 / static_cast<float>(n * places);
-  parallel_for(static_cast<Index>(cells.size()), kChunk, [&](Index begin, Index end) {
+  parallel_for(static_cast<Index>(cells.size()), kCells, [&](Index begin, Index end) {
     Tape<float> tape;
     std::vector<float> x, sigma;
     for (Index i = begin; i < end; ++i) {

@@ -5,11 +5,10 @@
 #include <unistd.h>
 
 #include <array>
-#include <cerrno>
-#include <cstring>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "private_folder.h"
 #include "pytorch_models.h"
 #include "pytorch_peer.h"
 
@@ -24,22 +23,6 @@ using Environment = std::vector<std::string>;
 constexpr std::array kTuning{
     "OMP_PROC_BIND=true",        "MALLOC_MMAP_MAX_=0", "MALLOC_TRIM_THRESHOLD_=1099511627776",
     "MALLOC_TOP_PAD_=268435456", "MALLOC_ARENA_MAX=1", "GLIBC_TUNABLES=glibc.malloc.hugetlb=1"};
-
-// A folder that only its owner can access, removed at the end of the scope.
-struct PrivateFolder {
-  PrivateFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "fieldmark_peer_XXXXXX").string();
-    if (!::mkdtemp(name.data())) throw IoError(name + ": cannot be made (" + std::strerror(errno) + ")");
-    path = name;
-  }
-  PrivateFolder(const PrivateFolder&) = delete;
-  PrivateFolder& operator=(const PrivateFolder&) = delete;
-  ~PrivateFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path, ignored);
-  }
-  std::filesystem::path path;
-};
 
 Environment as_it_is() { return {"OMP_NUM_THREADS=" + std::to_string(threads())}; }
 
@@ -121,7 +104,7 @@ Peer::Found first_answer(LineProcess& process, const std::string& row, const Saf
 
 Peer::Peer(const std::string& row, const SafetensorsFile& work, const PeerOptions& options)
     : python_(options.python) {
-  const PrivateFolder folder;
+  const PrivateFolder folder("peer");
   const auto script = folder.path / "pytorch_peer.py", file = folder.path / "work.safetensors";
   write_file_atomically(script, kPyTorchPeer);
   write_file_atomically(folder.path / "pytorch_models.py", kPyTorchModels);

@@ -166,20 +166,22 @@ class Tape {
     replay();
   }
   /// @{
-  /// Like backward(out, seed), but reads a large seed in place rather than copying it. The seed must outlive
-  /// the pass, so a temporary vector does not compile. It is copied after all if a gradient has to be added
-  /// to it, and for leaves and the output of a layer with a ReLU.
+  /// Like backward(out, seed), but reads the seed in place rather than copying it, which saves two passes
+  /// over memory. The seed must live until the next backward pass or reset(), for Var::grad() shows it; a
+  /// temporary vector does not compile. It is copied after all for leaves, for the output of a layer with a
+  /// ReLU, where an earlier pass has given `out` a buffer, and when another gradient is added to it.
   void backward_in_place(Var<T> out, std::span<const T> seed) {
     check_seed(out, seed);
     begin_pass();
     auto& slot = *out.slot_;
-    if (!slot.needs_grad || slot.grad || slot.target || slot.rectified) return backward(out, seed);
+    if (!slot.needs_grad || slot.grad || slot.target || slot.rectified || seed.empty())
+      return backward(out, seed);
     slot.grad = const_cast<T*>(seed.data());  // grad_buffer() copies it before a write
     slot.masked = false;
     slot.borrowed = true;
     replay();
   }
-  void backward_in_place(Var<T> out, std::vector<T>&& seed) = delete;
+  void backward_in_place(Var<T> out, const std::vector<T>&& seed) = delete;
   /// @}
   /// Replays from the gradients that the caller wrote to Var::grad_acc(), so that several outputs can be
   /// seeded by hand.

@@ -13,7 +13,8 @@ template <class T>
 struct Shortcuts;
 }
 
-/// Handle to a value on a tape: a pointer, trivially copyable, valid until Tape::reset().
+/// Handle to a value on a tape: a pointer, trivially copyable, valid until Tape::reset() or the end of the
+/// tape. Include tape.h to use it.
 template <class T>
 class Var {
  public:

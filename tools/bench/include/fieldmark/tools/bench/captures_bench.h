@@ -15,7 +15,7 @@ struct PoseJitter {
 };
 
 /// Rotates and moves every camera, each by the full amount in a random direction. The distance to the scene
-/// is the harmonic middle of View::depth where there is one, else that to `centre`.
+/// is the harmonic mean of the bounds in View::depth where there is one, else that to `centre`.
 void jitter_cameras(nerf::Dataset& data, const PoseJitter& jitter, const nerf::Vec3& centre);
 
 /// What a training learns per image, and from which poses.
@@ -36,14 +36,16 @@ struct CaptureRow {
   double psnr_pose_fitted = 0;    ///< after fit_cameras() of the test images, dB
 };
 
-/// Trains a field of the default size with each variant, one after the other.
-/// @param progress  called with the name and the share done of all before each step and each test view
+/// Trains a field with each variant, one after the other, of the size that `train` gives a run of this
+/// length. Nothing is carved, because refined poses exclude it.
+/// @param progress  called with the name and the share done of all; may throw to stop
 std::vector<CaptureRow> run_captures_bench(const nerf::Dataset& train, const nerf::Dataset& test,
-                                           double seconds, const PoseJitter& jitter,
+                                           double seconds, const PoseJitter& jitter, std::uint64_t seed,
                                            const std::function<void(const std::string&, double)>& progress);
 
-/// Returns the share of the PSNR that jitter lost and refined poses brought back, 1 if all of it; NaN if
-/// nothing was lost. @param psnr  the PSNR that counts
+/// Returns the dB that jitter lost. @param psnr  the PSNR that counts
+double lost(const std::vector<CaptureRow>& rows, double CaptureRow::*psnr);
+/// Returns the share of the lost dB that refined poses brought back, 1 if all; NaN if nothing was lost.
 double recovered(const std::vector<CaptureRow>& rows, double CaptureRow::*psnr);
 
 }  // namespace fieldmark::bench

@@ -17,7 +17,7 @@ struct TrainingFault {
   std::function<void(nerf::RadianceField& field)> during{};
 };
 
-/// Returns faults that make a hash field's training collapse, each of another kind.
+/// Returns faults of several kinds, most of which make a hash field's training collapse.
 std::vector<TrainingFault> training_faults();
 
 /// A training that must not be taken for collapsed.
@@ -27,7 +27,8 @@ struct OrdinaryTraining {
   nerf::TrainOptions train{};
 };
 
-/// Returns the default and other settings that people choose. @param seed  of field and training
+/// Returns the settings of `train` for runs of this length and others that people choose. @param seed  of
+/// field and training
 std::vector<OrdinaryTraining> ordinary_trainings(double seconds, std::uint64_t seed);
 
 /// What nerf::CollapseWatch said of a training.
@@ -40,18 +41,25 @@ struct WatchedTraining {
   double noticed_after = std::numeric_limits<double>::quiet_NaN();
   std::string said;      ///< the word of the watch; empty: nothing
   double explained = 0;  ///< share of the validation images' variance that the field explains at the end
-  /// True if a constant image fits better than the field at the end and the watch said nothing.
-  bool missed() const { return said.empty() && !(explained > 0); }
+  /// True if a constant image fits better than the field at the end.
+  bool collapsed() const { return !(explained > 0); }
 };
 
-/// Trains a hash field, damages it and trains on until the watch notices.
-/// @param judge    images for the watch   @param healthy  seconds of training before TrainingFault::during
-/// @param patience seconds after the fault at which the training ends unnoticed
-WatchedTraining watch_fault(const nerf::Dataset& train, const nerf::Dataset& judge,
-                            const TrainingFault& fault, double healthy, double patience, std::uint64_t seed);
+/// When a fault strikes and how long it may go on.
+struct FaultTimes {
+  double after = 5;      ///< seconds of training before TrainingFault::during
+  double patience = 15;  ///< seconds from the fault to the end of the training
+  std::uint64_t seed = 0;
+};
 
-/// Trains for the seconds of the schedule, or until the watch raises an alarm.
+/// Trains a hash field, damages it and trains on until the watch notices or the time is over.
+/// @param judge  images for the watch   @param tick  called before each step; may throw to stop
+WatchedTraining watch_fault(const nerf::Dataset& train, const nerf::Dataset& judge,
+                            const TrainingFault& fault, const FaultTimes& times,
+                            const std::function<void()>& tick = {});
+
+/// Trains to the end of the schedule, also after an alarm.
 WatchedTraining watch_ordinary(const nerf::Dataset& train, const nerf::Dataset& judge,
-                               const OrdinaryTraining& training);
+                               const OrdinaryTraining& training, const std::function<void()>& tick = {});
 
 }  // namespace fieldmark::bench
