@@ -27,3 +27,13 @@ TEST_CASE("data_bench: every form takes the steps of the plain one, whose loss i
   CHECK(rows[1].type == nerf::SceneType::plain);
   CHECK(std::abs(rows[2].loss) < 1);
 }
+
+TEST_CASE("data_bench: lenses are judged before the background of their images") {
+  DataGroup group = lens_forms({.size = 32, .views = 12});
+  group.forms.resize(2);
+  for (const DataRow& row : run_data_bench(group, 1, 1, {})) {
+    CAPTURE(row.form);
+    CHECK(row.type == nerf::SceneType::object);
+    CHECK(row.psnr > 12);
+  }
+}
