@@ -13,6 +13,8 @@ constexpr double kLeastVariance = 1e-5;  // of images: below it, any field may f
 constexpr Index kPeriod = 128;           // steps between two looks at a hash field, early on
 constexpr Index kEarly = 1024;           // steps after which looks become rare
 constexpr Index kRarer = 4;              // times rarer then; mlp fields always, since their rays cost more
+constexpr double kSeconds = 2.5;         // between two looks at a hash field, if its steps are slow
+constexpr Index kLeastSteps = 24;        // between two looks: a field must have had a chance to learn
 constexpr double kRising = 0.02;         // rise of explained() by which a field counts as still learning
 
 std::string worse_than_constant(double explained) {
@@ -70,11 +72,14 @@ double CollapseWatch::explained() {
   return 1 - error / (static_cast<double>(channels) * variance_);
 }
 
-std::string CollapseWatch::look(Index steps, double train_psnr) {
+std::string CollapseWatch::look(Index steps, double train_psnr, double seconds) {
   if (steps > 0 && !std::isfinite(train_psnr)) return "the loss is not a number";
+  if (std::isnan(looked_at_)) looked_at_ = seconds;
   const Index period = field_.coarse || steps > kEarly ? kRarer * kPeriod : kPeriod;
-  if (steps % period != 0 || steps == looked_) return {};
+  const bool slow = !field_.coarse && seconds - looked_at_ >= kSeconds && steps - looked_ >= kLeastSteps;
+  if (steps > 0 && !slow && (steps % period != 0 || steps == looked_)) return {};
   looked_ = steps;
+  looked_at_ = seconds;
   if (field_.grid.occupied_cells() == 0) return "no cell of the scene is occupied";
   if (steps == 0 || !(variance_ > kLeastVariance)) return {};
   const double now = explained();

@@ -268,7 +268,7 @@ int run_train(const TrainArguments& options, Context& context) {
   const double begun = context.seconds(), samples_before = trainer.samples();
   const InterruptGuard until_saved;  // Ctrl-C waits between the last step and the file
   const double seconds = run_long(trainer, "train", options.length, context, checkpoint, [&] {
-    require_healthy(watch.look(trainer.steps(), trainer.train_psnr()), data, trainer);
+    require_healthy(watch.look(trainer.steps(), trainer.train_psnr(), context.seconds()), data, trainer);
     return target.reached(trainer.steps(), trainer.train_psnr());
   });
   require_healthy(watch.verdict(trainer.steps()), data, trainer);

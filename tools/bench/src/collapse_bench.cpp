@@ -129,7 +129,7 @@ WatchedTraining watch_fault(const nerf::Dataset& train, const nerf::Dataset& jud
       struck = true;
       struck_at = clock.seconds();
     }
-    row.said = watch.look(trainer.steps(), trainer.train_psnr());
+    row.said = watch.look(trainer.steps(), trainer.train_psnr(), clock.seconds());
     if (row.said.empty()) trainer.step(clock.seconds());
   }
   if (row.said.empty()) row.said = watch.verdict(trainer.steps());
@@ -151,7 +151,7 @@ WatchedTraining watch_ordinary(const nerf::Dataset& train, const nerf::Dataset& 
   };
   while (!trainer.done()) {
     if (tick) tick();
-    heard(watch.look(trainer.steps(), trainer.train_psnr()));
+    heard(watch.look(trainer.steps(), trainer.train_psnr(), clock.seconds()));
     trainer.step(clock.seconds());
   }
   heard(watch.verdict(trainer.steps()));
