@@ -13,7 +13,7 @@ constexpr double kLeastVariance = 1e-5;  // of images: below it, any field may f
 constexpr Index kPeriod = 128;           // steps between two looks at a hash field, early on
 constexpr Index kEarly = 1024;           // steps after which looks become rare
 constexpr Index kRarer = 4;              // times rarer then; mlp fields always, since their rays cost more
-constexpr double kSeconds = 2.5;         // between two looks at a hash field, if its steps are slow
+constexpr double kSeconds = 1.5;         // between two looks at a hash field, if its steps are slow
 constexpr Index kLeastSteps = 24;        // between two looks: a field must have had a chance to learn
 constexpr double kRising = 0.02;         // rise of explained() by which a field counts as still learning
 

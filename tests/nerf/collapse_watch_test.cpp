@@ -66,9 +66,9 @@ TEST_CASE("collapse_watch: slow steps are looked at after seconds, but not befor
   CHECK(slow.look(0, 9, 100) == "");
   CHECK(slow.look(23, 9, 110) == "");  // too few steps for a look
   CHECK(slow.look(24, 9, 110) == "");
-  CHECK(slow.look(60, 9, 112) == "");  // too soon
-  CHECK(slow.look(61, 9, 112.5) == "");
-  CHECK_THAT(slow.look(85, 9, 115), Contains("times that of a constant image"));
+  CHECK(slow.look(60, 9, 111) == "");  // too soon
+  CHECK(slow.look(61, 9, 111.5) == "");
+  CHECK_THAT(slow.look(85, 9, 113), Contains("times that of a constant image"));
   const RadianceField empty = emptied(trained(1), 0);
   CollapseWatch none(empty, objects_scene());
   CHECK(none.look(1, 9, 0) == "");
