@@ -11,7 +11,7 @@ TEST_CASE("bench captures trains with and without corrections, from given and fr
           "[bench]") {
   const TemporaryFolder folder;
   const auto r = run_command({"bench", "captures", "--scene", tiny_scene(folder), "--seconds", "0.2",
-                              "--degrees", "1", "--move", "0.02", "--json", "-"});
+                              "--degrees", "1", "--move", "0.02", "--quick", "--json", "-"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
   const auto json = nlohmann::json::parse(r.out);

@@ -11,7 +11,7 @@ TEST_CASE("bench collapse counts what was noticed of faults, and false alarms", 
   const std::string scene = tiny_scene(folder);
   const auto r =
       run_command({"bench", "collapse", "--scene", scene, "--scene", scene, "--seconds", "0.3",
-                   "--fault-after", "0.2", "--patience", "10", "--ordinary", "3", "--quick", "--json", "-"});
+                   "--fault-after", "0.2", "--patience", "1", "--ordinary", "3", "--quick", "--json", "-"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
   const auto json = nlohmann::json::parse(r.out);

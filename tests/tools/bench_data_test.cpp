@@ -8,7 +8,7 @@ TEST_CASE("bench data compares forms of a scene with the plain one", "[bench]") 
   const TemporaryFolder folder;
   const std::string scene = tiny_scene(folder);
   const auto r = run_command({"bench", "data", "--object", scene, "--place", scene, "--size", "16",
-                              "--seconds", "0.2", "--json", "-"});
+                              "--seconds", "0.1", "--json", "-"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
   const auto json = nlohmann::json::parse(r.out);

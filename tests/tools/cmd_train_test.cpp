@@ -84,7 +84,8 @@ TEST_CASE("train ends with an error where there is nothing to learn, and writes 
     write_png(image.path(), Tensor<float>({16, 16, 4}));
   const auto r = run_command({"train", "--data", scene, "--out", out, "--steps", "500"});
   CHECK(r.code == cli::kFailed);
-  CHECK_THAT(r.err, Contains("training collapsed after 128 steps: no cell of the scene is occupied") &&
+  CHECK_THAT(r.err, Contains("training collapsed after ") &&
+                        Contains(" steps: no cell of the scene is occupied") &&
                         Contains("taken for type object") && Contains("--scene-type"));
   CHECK(!std::filesystem::exists(out));
 }

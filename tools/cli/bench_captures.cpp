@@ -5,6 +5,8 @@
 namespace fieldmark::cli {
 namespace {
 
+constexpr Index kQuickFit = 5;  // steps
+
 struct BenchCapturesArguments {
   std::string scene;
   double seconds = 60, degrees = 0.5, move = 0.01;
@@ -15,8 +17,10 @@ int run_bench_captures(const BenchCapturesArguments& o, Context& context) {
   const nerf::Dataset train = bench_split(o.scene, "train", o.quick),
                       test = bench_split(o.scene, "test", o.quick);
   const bench::PoseJitter jitter{.degrees = o.degrees, .part = o.move, .seed = context.seed()};
+  bench::CaptureRun run{.seconds = o.seconds, .seed = context.seed()};
+  if (o.quick) run.fit_steps = kQuickFit;
   const auto rows = with_progress(context, [&](const auto& progress) {
-    return bench::run_captures_bench(train, test, o.seconds, jitter, context.seed(), progress);
+    return bench::run_captures_bench(train, test, run, jitter, progress);
   });
   Json list = Json::array();
   for (const bench::CaptureRow& r : rows) {
@@ -60,7 +64,8 @@ Command add_bench_captures(CommandLine& app) {
              "S");
   add_number(app, "--degrees", o->degrees, 0, 45, "Rotation of jittered cameras in degrees, 0 to 45", "A");
   add_number(app, "--move", o->move, 0, 1, "Move of jittered cameras in distances to the scene, 0 to 1", "F");
-  app.add_flag("--quick", o->quick, "Measure on a small scene if no data set is found");
+  app.add_flag("--quick", o->quick,
+               "Fit test poses for 5 steps; measure on a small scene if no data set is found");
   return [o](Context& context) { return run_bench_captures(*o, context); };
 }
 

@@ -27,11 +27,6 @@ double distance_to_scene(const nerf::View& view, const nerf::Vec3& centre) {
   return (Vector(p.data()) - Vector(centre.data())).norm();
 }
 
-struct CaptureRun {
-  double seconds;
-  std::uint64_t seed;
-};
-
 // Trains a variant; `centre` receives the middle of the scene.
 CaptureRow trained(const nerf::Dataset& train, const nerf::Dataset& test, const CaptureVariant& variant,
                    const CaptureRun& run, nerf::Vec3& centre, const std::function<void(double)>& progress) {
@@ -63,7 +58,8 @@ CaptureRow trained(const nerf::Dataset& train, const nerf::Dataset& test, const 
   row.psnr = plain.psnr;
   row.psnr_colour_fitted = plain.psnr_colour_fitted;
   nerf::Dataset fitted = test;
-  const auto cameras = nerf::fit_cameras(field, test, {.seed = run.seed}, still_there);
+  const auto cameras =
+      nerf::fit_cameras(field, test, {.steps = run.fit_steps, .seed = run.seed}, still_there);
   for (std::size_t v = 0; v < cameras.size(); ++v) fitted.views[v].camera = cameras[v];
   row.psnr_pose_fitted = nerf::evaluate(renderer, fitted, still_there).psnr;
   return row;
@@ -99,7 +95,7 @@ std::vector<CaptureVariant> capture_variants() {
 }
 
 std::vector<CaptureRow> run_captures_bench(const nerf::Dataset& train, const nerf::Dataset& test,
-                                           double seconds, const PoseJitter& jitter, std::uint64_t seed,
+                                           const CaptureRun& run, const PoseJitter& jitter,
                                            const std::function<void(const std::string&, double)>& progress) {
   const auto variants = capture_variants();
   std::vector<CaptureRow> rows;
@@ -111,7 +107,7 @@ std::vector<CaptureRow> run_captures_bench(const nerf::Dataset& train, const ner
         progress(variant.name,
                  (static_cast<double>(rows.size()) + part) / static_cast<double>(variants.size()));
     };
-    rows.push_back(trained(variant.jittered ? moved : train, test, variant, {seconds, seed}, centre, told));
+    rows.push_back(trained(variant.jittered ? moved : train, test, variant, run, centre, told));
     if (rows.size() == 1) jitter_cameras(moved, jitter, centre);
   }
   return rows;

@@ -36,11 +36,18 @@ struct CaptureRow {
   double psnr_pose_fitted = 0;    ///< after fit_cameras() of the test images, dB
 };
 
+/// How long the trainings of run_captures_bench() are.
+struct CaptureRun {
+  double seconds = 60;     ///< of each training
+  std::uint64_t seed = 0;  ///< of fields, trainings and fits
+  Index fit_steps = 300;   ///< of fitting the cameras of the test images
+};
+
 /// Trains a field with each variant, one after the other, of the size that `train` gives a run of this
 /// length. Nothing is carved, because refined poses exclude it.
 /// @param progress  called with the name and the share done of all; may throw to stop
 std::vector<CaptureRow> run_captures_bench(const nerf::Dataset& train, const nerf::Dataset& test,
-                                           double seconds, const PoseJitter& jitter, std::uint64_t seed,
+                                           const CaptureRun& run, const PoseJitter& jitter,
                                            const std::function<void(const std::string&, double)>& progress);
 
 /// Returns the dB that jitter lost. @param psnr  the PSNR that counts
