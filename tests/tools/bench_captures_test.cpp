@@ -10,7 +10,7 @@ using namespace fieldmark;
 TEST_CASE("bench captures trains with and without corrections, from given and from jittered poses",
           "[bench]") {
   const TemporaryFolder folder;
-  const auto r = run_command({"bench", "captures", "--scene", tiny_scene(folder), "--seconds", "0.2",
+  const auto r = run_command({"bench", "captures", "--scene", tiny_scene(folder), "--seconds", "0.1",
                               "--degrees", "1", "--move", "0.02", "--quick", "--json", "-"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
