@@ -9,9 +9,9 @@ using namespace fieldmark;
 TEST_CASE("bench collapse counts what was noticed of faults, and false alarms", "[bench]") {
   const TemporaryFolder folder;
   const std::string scene = tiny_scene(folder);
-  const auto r =
-      run_command({"bench", "collapse", "--scene", scene, "--scene", scene, "--seconds", "0.1",
-                   "--fault-after", "0.05", "--patience", "0.1", "--ordinary", "3", "--quick", "--json", "-"});
+  const auto r = run_command({"bench", "collapse", "--scene", scene, "--scene", scene, "--seconds", "0.1",
+                              "--fault-after", "0.05", "--patience", "0.1", "--ordinary", "3", "--quick",
+                              "--json", "-"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
   const auto json = nlohmann::json::parse(r.out);
