@@ -46,7 +46,8 @@ std::vector<WatchedScene> scenes_of(const BenchCollapseArguments& o) {
 // What the rows of a part are counted as.
 struct Counts {
   Index noticed = 0, in_time = 0, early = 0, missed = 0, false_alarms = 0;
-  double slowest = std::numeric_limits<double>::quiet_NaN(), least_explained = slowest;
+  double slowest = std::numeric_limits<double>::quiet_NaN();         // NaN: nothing was noticed
+  double least_explained = std::numeric_limits<double>::infinity();  // NaN if one is
 
   void add(const bench::WatchedTraining& w) {
     const bool alarm = !w.said.empty(), after = alarm && w.noticed_after >= 0;
@@ -54,7 +55,7 @@ struct Counts {
     in_time += after && w.noticed_after <= kBar;
     false_alarms += alarm && !w.collapsed();
     if (after && !(w.noticed_after <= slowest)) slowest = w.noticed_after;
-    if (std::isnan(w.explained) || !(w.explained >= least_explained)) least_explained = w.explained;
+    if (!std::isnan(least_explained) && !(w.explained >= least_explained)) least_explained = w.explained;
   }
 };
 

@@ -4,9 +4,10 @@
 #include <fieldmark/tools/bench/captures_bench.h>
 
 #include <Eigen/Geometry>
-#include <chrono>
 #include <limits>
 #include <numbers>
+
+#include "timing.h"
 
 namespace fieldmark::bench {
 namespace {
@@ -40,11 +41,11 @@ CaptureRow trained(const nerf::Dataset& train, const nerf::Dataset& test, const 
                                    .image_colours = variant.exposures,
                                    .refine_poses = variant.refined};
   nerf::Trainer trainer(field, train, options);
-  const auto begin = std::chrono::steady_clock::now();
+  const double begin = now();
   while (!trainer.done()) {
-    const double now = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    progress(std::min(1.0, now / run.seconds));
-    trainer.step(now);
+    const double seconds = now() - begin;
+    progress(std::min(1.0, seconds / run.seconds));
+    trainer.step(seconds);
   }
   const nerf::Bounds& b = field.space.bounds;
   for (std::size_t k = 0; k < 3; ++k) centre[k] = b.corner[k] + b.side / 2;

@@ -2,20 +2,11 @@
 #include <fieldmark/tools/bench/collapse_bench.h>
 
 #include <algorithm>
-#include <chrono>
+
+#include "timing.h"
 
 namespace fieldmark::bench {
 namespace {
-
-class Stopwatch {
- public:
-  double seconds() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun_).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
-};
 
 bool is_table(const std::string& name) { return name.starts_with("hash/"); }
 
@@ -119,21 +110,21 @@ WatchedTraining watch_fault(const nerf::Dataset& train, const nerf::Dataset& jud
   nerf::RadianceField field(training.field);
   nerf::Trainer trainer(field, damaged, training.train);
   nerf::CollapseWatch watch(field, judge);
-  const Stopwatch clock;
+  const double begin = now();
   bool struck = !fault.during;
   double struck_at = after;
-  while (row.said.empty() && !trainer.done() && !(struck && clock.seconds() > struck_at + times.patience)) {
+  while (row.said.empty() && !trainer.done() && !(struck && now() - begin > struck_at + times.patience)) {
     if (tick) tick();
-    if (!struck && clock.seconds() >= after) {
+    if (!struck && now() - begin >= after) {
       fault.during(field);
       struck = true;
-      struck_at = clock.seconds();
+      struck_at = now() - begin;
     }
-    row.said = watch.look(trainer.steps(), trainer.train_psnr(), clock.seconds());
-    if (row.said.empty()) trainer.step(clock.seconds());
+    row.said = watch.look(trainer.steps(), trainer.train_psnr(), now() - begin);
+    if (row.said.empty()) trainer.step(now() - begin);
   }
   if (row.said.empty()) row.said = watch.verdict(trainer.steps());
-  if (!row.said.empty()) row.noticed_after = clock.seconds() - struck_at;
+  if (!row.said.empty()) row.noticed_after = now() - begin - struck_at;
   return finished(row, trainer, watch);
 }
 
@@ -143,16 +134,16 @@ WatchedTraining watch_ordinary(const nerf::Dataset& train, const nerf::Dataset& 
   nerf::RadianceField field(training.field);
   nerf::Trainer trainer(field, train, training.train);
   nerf::CollapseWatch watch(field, judge);
-  const Stopwatch clock;
+  const double begin = now();
   const auto heard = [&](const std::string& said) {
     if (said.empty() || !row.said.empty()) return;
     row.said = said;
-    row.noticed_after = clock.seconds();
+    row.noticed_after = now() - begin;
   };
   while (!trainer.done()) {
     if (tick) tick();
-    heard(watch.look(trainer.steps(), trainer.train_psnr(), clock.seconds()));
-    trainer.step(clock.seconds());
+    heard(watch.look(trainer.steps(), trainer.train_psnr(), now() - begin));
+    trainer.step(now() - begin);
   }
   heard(watch.verdict(trainer.steps()));
   return finished(row, trainer, watch);

@@ -3,9 +3,8 @@
 #include <fieldmark/nerf/trainer.h>
 #include <fieldmark/tools/bench/data_bench.h>
 
-#include <chrono>
-
 #include "private_folder.h"
+#include "timing.h"
 
 namespace fieldmark::bench {
 namespace {
@@ -37,12 +36,12 @@ DataRow trained(const DataGroup& group, const DataForm& form, const std::filesys
   nerf::RadianceField field(sizes);
   nerf::Trainer trainer(field, train,
                         {.schedule = {.steps = steps, .seconds = run.seconds}, .seed = run.seed});
-  const auto begin = std::chrono::steady_clock::now();
+  const double begin = now();
   while (!trainer.done()) {
-    const double now = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    const double seconds = now() - begin;
     progress(std::min(1.0, steps > 0 ? static_cast<double>(trainer.steps()) / static_cast<double>(steps)
-                                     : now / run.seconds));
-    trainer.step(now);
+                                     : seconds / run.seconds));
+    trainer.step(seconds);
   }
   return {.scene = group.scene,
           .form = form.name,

@@ -72,33 +72,30 @@ Json written(const Path& folder, const Images& images, const nerf::Vec3& moved =
 
 void write_json(const Path& file, const Json& json) { write_file_atomically(file, json.dump(1) + "\n"); }
 
-// One transforms.json with the keys of `more` besides its frames.
-void write_one_file(const Path& folder, const Images& images, const Json& more = Json::object()) {
+// One transforms.json with the keys of `more` besides its frames, and those of `each` in every frame.
+void write_one_file(const Path& folder, const Images& images, const Json& more = Json::object(),
+                    const Json& each = Json::object()) {
   Json json = written(folder, images);
   json.update(more);
   Json& names = json["train_filenames"] = Json::array();
-  for (const Json& frame : json["frames"]) names.push_back(frame["file_path"]);
+  for (Json& frame : json["frames"]) {
+    frame.update(each);
+    names.push_back(frame["file_path"]);
+  }
   write_json(folder / "transforms.json", json);
 }
 
 void write_masked(const Path& folder, Images images) {
+  const nerf::Camera c = images.views.front().camera;
   for_pixels(images.views, [&](Index x, Index y, float* rgba) {
-    const nerf::Camera& c = images.views.front().camera;
     if (covers_obstacle(x, y, c.width, c.height)) rgba[0] = 1, rgba[1] = 0, rgba[2] = 1;
   });
-  Json json = written(folder, images);
-  const nerf::Camera& c = images.views.front().camera;
   Tensor<float> mask(Shape{c.height, c.width, 1}, 1.f);
   for (Index y = 0; y < c.height; ++y)
     for (Index x = 0; x < c.width; ++x)
       if (covers_obstacle(x, y, c.width, c.height)) mask[y * c.width + x] = 0;
   write_png(folder / "mask.png", mask);
-  Json& names = json["train_filenames"] = Json::array();
-  for (Json& frame : json["frames"]) {
-    frame["mask_path"] = "mask.png";
-    names.push_back(frame["file_path"]);
-  }
-  write_json(folder / "transforms.json", json);
+  write_one_file(folder, images, Json::object(), {{"mask_path", "mask.png"}});
 }
 
 // A test view of which the pixels count that counts(x, y, opacity) accepts.
