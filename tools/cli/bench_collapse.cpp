@@ -105,14 +105,14 @@ std::vector<bench::WatchedTraining> ordinary(const BenchCollapseArguments& o,
   const Index runs = o.quick ? std::min<Index>(o.ordinary, kQuickRuns) : o.ordinary;
   with_progress(context, [&](const auto& progress) {
     for (std::uint64_t round = 0; std::ssize(rows) < runs; ++round)
-      for (const auto& training : bench::ordinary_trainings(o.seconds, context.seed() + round))
+      for (const auto& training : bench::ordinary_trainings({.seconds = o.seconds}, context.seed() + round))
         for (const WatchedScene& scene : scenes) {
           // An mlp field cannot have a scene without bounds.
           const bool unbounded_mlp = training.field.field.kind == nerf::FieldKind::mlp &&
                                      scene.train.scene == nerf::SceneType::place;
           if (unbounded_mlp || std::ssize(rows) == runs) continue;
           rows.push_back(bench::watch_ordinary(scene.train, scene.judge, training, [&] {
-            progress(training.name, static_cast<double>(rows.size()) / static_cast<double>(runs));
+            progress(training.name(), static_cast<double>(rows.size()) / static_cast<double>(runs));
           }));
         }
   });

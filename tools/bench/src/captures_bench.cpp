@@ -7,7 +7,7 @@
 #include <limits>
 #include <numbers>
 
-#include "timing.h"
+#include "training_loop.h"
 
 namespace fieldmark::bench {
 namespace {
@@ -41,12 +41,7 @@ CaptureRow trained(const nerf::Dataset& train, const nerf::Dataset& test, const 
                                    .image_colours = variant.exposures,
                                    .refine_poses = variant.refined};
   nerf::Trainer trainer(field, train, options);
-  const double begin = now();
-  while (!trainer.done()) {
-    const double seconds = now() - begin;
-    progress(std::min(1.0, seconds / run.seconds));
-    trainer.step(seconds);
-  }
+  train_to_end(trainer, schedule, progress);
   const nerf::Bounds& b = field.space.bounds;
   for (std::size_t k = 0; k < 3; ++k) centre[k] = b.corner[k] + b.side / 2;
   CaptureRow row{.variant = variant, .steps = trainer.steps()};

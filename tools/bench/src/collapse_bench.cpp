@@ -70,40 +70,11 @@ std::vector<TrainingFault> training_faults() {
       })};
 }
 
-std::vector<OrdinaryTraining> ordinary_trainings(double seconds, std::uint64_t seed) {
-  const ScheduleOptions schedule{.seconds = seconds};
-  OrdinaryTraining base{"default", nerf::field_options(schedule), {.schedule = schedule}};
-  std::vector<OrdinaryTraining> all{base};
-  const auto vary = [&](const char* name, auto change) {
-    OrdinaryTraining o = base;
-    o.name = name;
-    change(o);
-    all.push_back(std::move(o));
-  };
-  vary("cells outside the silhouettes kept", [](OrdinaryTraining& o) { o.train.carve = false; });
-  vary("exposures learnt", [](OrdinaryTraining& o) { o.train.image_colours = true; });
-  vary("poses refined", [](OrdinaryTraining& o) { o.train.refine_poses = true; });
-  vary("2 x 2 rays a pixel", [](OrdinaryTraining& o) {
-    o.field.supersampling = 2;
-    o.train.supersample_after = 500;
-  });
-  vary("table of 2^12 rows", [](OrdinaryTraining& o) { o.field.field.encoding.log2_table = 12; });
-  vary("half the step size", [](OrdinaryTraining& o) { o.train.schedule.lr /= 2; });
-  vary("preset mlp", [&](OrdinaryTraining& o) {
-    o.field = {};
-    o.field.field.kind = nerf::FieldKind::mlp;
-    o.train = nerf::train_options(nerf::FieldKind::mlp);
-    o.train.schedule.seconds = seconds;
-  });
-  for (OrdinaryTraining& o : all) o.field.seed = o.train.seed = seed;
-  return all;
-}
-
 WatchedTraining watch_fault(const nerf::Dataset& train, const nerf::Dataset& judge,
                             const TrainingFault& fault, const FaultTimes& times,
                             const std::function<void()>& tick) {
   const double after = fault.before ? 0 : times.after;
-  OrdinaryTraining training = ordinary_trainings(after + times.patience, times.seed).front();
+  TrainingVariant training = training_variants({.seconds = after + times.patience}, times.seed).front();
   nerf::Dataset damaged = train;
   if (fault.before) fault.before(damaged, training.train);
   WatchedTraining row{.scene = train.name, .what = fault.name, .said = {}};
@@ -129,8 +100,8 @@ WatchedTraining watch_fault(const nerf::Dataset& train, const nerf::Dataset& jud
 }
 
 WatchedTraining watch_ordinary(const nerf::Dataset& train, const nerf::Dataset& judge,
-                               const OrdinaryTraining& training, const std::function<void()>& tick) {
-  WatchedTraining row{.scene = train.name, .what = training.name, .said = {}};
+                               const TrainingVariant& training, const std::function<void()>& tick) {
+  WatchedTraining row{.scene = train.name, .what = training.name(), .said = {}};
   nerf::RadianceField field(training.field);
   nerf::Trainer trainer(field, train, training.train);
   nerf::CollapseWatch watch(field, judge);

@@ -4,7 +4,7 @@
 #include <fieldmark/tools/bench/data_bench.h>
 
 #include "private_folder.h"
-#include "timing.h"
+#include "training_loop.h"
 
 namespace fieldmark::bench {
 namespace {
@@ -34,15 +34,9 @@ DataRow trained(const DataGroup& group, const DataForm& form, const std::filesys
   nerf::RadianceFieldOptions sizes = nerf::field_options({.seconds = run.seconds});
   sizes.seed = run.seed;
   nerf::RadianceField field(sizes);
-  nerf::Trainer trainer(field, train,
-                        {.schedule = {.steps = steps, .seconds = run.seconds}, .seed = run.seed});
-  const double begin = now();
-  while (!trainer.done()) {
-    const double seconds = now() - begin;
-    progress(std::min(1.0, steps > 0 ? static_cast<double>(trainer.steps()) / static_cast<double>(steps)
-                                     : seconds / run.seconds));
-    trainer.step(seconds);
-  }
+  const ScheduleOptions schedule{.steps = steps, .seconds = run.seconds};
+  nerf::Trainer trainer(field, train, {.schedule = schedule, .seed = run.seed});
+  train_to_end(trainer, schedule, progress);
   return {.scene = group.scene,
           .form = form.name,
           .type = train.scene,

@@ -1,5 +1,5 @@
 #pragma once
-#include <fieldmark/nerf/trainer.h>
+#include <fieldmark/tools/bench/training_variants.h>
 
 #include <functional>
 #include <limits>
@@ -19,17 +19,6 @@ struct TrainingFault {
 
 /// Returns faults of several kinds, most of which make a hash field's training collapse.
 std::vector<TrainingFault> training_faults();
-
-/// A training that must not be taken for collapsed.
-struct OrdinaryTraining {
-  std::string name;  ///< "preset mlp"
-  nerf::RadianceFieldOptions field{};
-  nerf::TrainOptions train{};
-};
-
-/// Returns the settings of `train` for runs of this length and others that people choose. @param seed  of
-/// field and training
-std::vector<OrdinaryTraining> ordinary_trainings(double seconds, std::uint64_t seed);
 
 /// What nerf::CollapseWatch said of a training.
 struct WatchedTraining {
@@ -60,6 +49,6 @@ WatchedTraining watch_fault(const nerf::Dataset& train, const nerf::Dataset& jud
 
 /// Trains to the end of the schedule, also after an alarm.
 WatchedTraining watch_ordinary(const nerf::Dataset& train, const nerf::Dataset& judge,
-                               const OrdinaryTraining& training, const std::function<void()>& tick = {});
+                               const TrainingVariant& training, const std::function<void()>& tick = {});
 
 }  // namespace fieldmark::bench

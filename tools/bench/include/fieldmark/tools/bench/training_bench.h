@@ -1,25 +1,9 @@
 #pragma once
-#include <fieldmark/nerf/dataset.h>
-#include <fieldmark/nerf/radiance_field.h>
-#include <fieldmark/nerf/trainer.h>
+#include <fieldmark/tools/bench/training_variants.h>
 
 #include <functional>
-#include <string>
-#include <vector>
 
 namespace fieldmark::bench {
-
-/// One setting for training a hash field; everything else is at its default.
-struct TrainingVariant {
-  std::string choice;                ///< the option that is varied: "batch", "learning rate", ...
-  std::string setting;               ///< its value
-  nerf::RadianceFieldOptions field;  ///< options of the field
-  nerf::TrainOptions train;          ///< options of training, including the seed
-};
-
-/// Returns the default first, then every choice that this project's training makes, switched off or changed.
-/// @param schedule  of all variants; its steps and seconds are kept
-std::vector<TrainingVariant> training_variants(const ScheduleOptions& schedule, std::uint64_t seed);
 
 /// Result of a variant.
 struct TrainingRow {
