@@ -77,12 +77,41 @@ bool trace(const std::vector<SceneSolid>& objects, const std::vector<const Scene
   return true;
 }
 
-// Finds the objects whose bounding spheres a sample of the pixel may hit: samples are within an angle of 0.75
-// / focal of the pixel's centre.
-void find_candidates(const std::vector<SceneSolid>& objects, const Camera& camera, const Ray& middle,
+// The rays through an image, by coordinates in pixels; an angle that the rays of one pixel are within of the
+// ray through its centre.
+struct PixelRays {
+  std::function<Ray(double x, double y)> at;
+  std::function<double(double x, double y)> spread;
+};
+
+PixelRays pinhole_rays(const Camera& camera) {
+  return {[&camera](double x, double y) { return pixel_ray(camera, x - 0.5, y - 0.5); },
+          [&camera](double, double) { return 0.75 / std::min(camera.fx, camera.fy); }};
+}
+
+PixelRays lens_rays(const Pose& pose, const ImageToPlane& to_plane) {
+  const Camera plane{.pose = pose, .fx = 1, .fy = 1, .cx = 0.5, .cy = 0.5};
+  const auto spread = [&to_plane](double x, double y) {
+    const auto middle = to_plane(x, y);
+    double most = 0;
+    for (const double dy : {-0.5, 0.5})
+      for (const double dx : {-0.5, 0.5}) {
+        const auto corner = to_plane(x + dx, y + dy);
+        most = std::max(most, std::hypot(corner[0] - middle[0], corner[1] - middle[1]));
+      }
+    return 1.06 * most;  // as 0.75 is of half a diagonal
+  };
+  return {[plane, &to_plane](double x, double y) {
+            const auto q = to_plane(x, y);
+            return pixel_ray(plane, q[0], q[1]);
+          },
+          spread};
+}
+
+// Finds the objects whose bounding spheres a ray may hit that is within an angle of another.
+void find_candidates(const std::vector<SceneSolid>& objects, const Ray& middle, double spread,
                      std::vector<const SceneSolid*>* candidates) {
   candidates->clear();
-  const double spread = 0.75 / std::min(camera.fx, camera.fy);
   for (const SceneSolid& o : objects) {
     const Vec3 to = o.solid.centre - middle.origin;
     const double square = dot(to, to), along = dot(to, middle.direction);
@@ -91,16 +120,16 @@ void find_candidates(const std::vector<SceneSolid>& objects, const Camera& camer
   }
 }
 
-void render_pixel(const std::vector<SceneSolid>& objects, const Camera& camera, double x, double y,
+void render_pixel(const std::vector<SceneSolid>& objects, const PixelRays& rays, double x, double y,
                   std::vector<const SceneSolid*>* candidates, float* rgba) {
   Vec3 sum{};
   int covered = 0;
-  find_candidates(objects, camera, pixel_ray(camera, x, y), candidates);
+  find_candidates(objects, rays.at(x + 0.5, y + 0.5), rays.spread(x + 0.5, y + 0.5), candidates);
   for (int s = 0; s < kSide * kSide && !candidates->empty(); ++s) {
     const int column = s % kSide, row = s / kSide;
-    const double dx = (column + 0.5) / kSide - 0.5, dy = (row + 0.5) / kSide - 0.5;
+    const double dx = (column + 0.5) / kSide, dy = (row + 0.5) / kSide;
     Vec3 colour;
-    if (!trace(objects, *candidates, pixel_ray(camera, x + dx, y + dy), &colour)) continue;
+    if (!trace(objects, *candidates, rays.at(x + dx, y + dy), &colour)) continue;
     sum = sum + colour;
     ++covered;
   }
@@ -111,16 +140,20 @@ void render_pixel(const std::vector<SceneSolid>& objects, const Camera& camera, 
   rgba[3] = byte(static_cast<double>(covered) / (kSide * kSide));
 }
 
-Tensor<float> render(const std::vector<SceneSolid>& objects, const Camera& camera) {
+Tensor<float> render(const std::vector<SceneSolid>& objects, const Camera& camera, const PixelRays& rays) {
   Tensor<float> image(Shape{camera.height, camera.width, 4});
   parallel_for(camera.height, 8, [&](Index begin, Index end) {
     std::vector<const SceneSolid*> candidates;
     for (Index y = begin; y < end; ++y)
       for (Index x = 0; x < camera.width; ++x)
-        render_pixel(objects, camera, static_cast<double>(x), static_cast<double>(y), &candidates,
+        render_pixel(objects, rays, static_cast<double>(x), static_cast<double>(y), &candidates,
                      image.data.data() + 4 * (y * camera.width + x));
   });
   return image;
+}
+
+Tensor<float> render(const std::vector<SceneSolid>& objects, const Camera& camera) {
+  return render(objects, camera, pinhole_rays(camera));
 }
 
 void check_options(const SceneOptions& o) {
@@ -176,6 +209,11 @@ SceneKind parse_scene_kind(std::string_view name) {
 Tensor<float> render_scene(const SceneOptions& options, const Camera& camera) {
   check_options(options);
   return render(scene_solids(options.kind, options.seed), camera);
+}
+
+Tensor<float> render_scene(const SceneOptions& options, const Camera& camera, const ImageToPlane& to_plane) {
+  check_options(options);
+  return render(scene_solids(options.kind, options.seed), camera, lens_rays(camera.pose, to_plane));
 }
 
 Dataset make_scene(const SceneOptions& options, const std::string& split, Background background) {

@@ -46,6 +46,14 @@ std::array<double, 3> derivative(const Lens& l, const Vec2& q) {
 }
 double determinant(const std::array<double, 3>& m) { return m[0] * m[2] - m[1] * m[1]; }
 
+// Returns q after a step of Newton's method towards distorted(q) = seen, where the map is regular.
+Vec2 newton_step(const Lens& l, const Vec2& q, const Vec2& seen) {
+  const Vec2 p = l.distorted(q), f{p[0] - seen[0], p[1] - seen[1]};
+  const auto m = derivative(l, q);
+  const double d = determinant(m);
+  return {q[0] - (m[2] * f[0] - m[1] * f[1]) / d, q[1] - (m[0] * f[1] - m[1] * f[0]) / d};
+}
+
 Vec2 on_plane(const Camera& c, double x, double y) { return {(x - c.cx) / c.fx, (y - c.cy) / c.fy}; }
 Vec2 on_image(const Camera& c, const Vec2& q) { return {q[0] * c.fx + c.cx, q[1] * c.fy + c.cy}; }
 
@@ -260,6 +268,29 @@ Tensor<float> undistorted_image(const Tensor<float>& rgba, const Camera& camera,
       sample(rgba, on_image(camera, lens.distorted(q)), out.data.data() + 4 * (y * part.width + x));
     }
   return out;
+}
+
+NearestPixels nearest_pixels(const Camera& seen, const Lens& lens, const Camera& pinhole) {
+  constexpr int kSteps = 2;  // of Newton's method, which start within a pixel of the solution
+  NearestPixels found;
+  found.pixels.reserve(at(pinhole.height * pinhole.width));
+  auto offsets = std::make_shared<PixelOffsets>();
+  offsets->reserve(found.pixels.capacity());
+  for (Index y = 0; y < pinhole.height; ++y)
+    for (Index x = 0; x < pinhole.width; ++x) {
+      const double px = static_cast<double>(x) + 0.5, py = static_cast<double>(y) + 0.5;
+      Vec2 q = on_plane(pinhole, px, py);
+      const Vec2 p = on_image(seen, lens.distorted(q));
+      const Index column = std::clamp<Index>(static_cast<Index>(std::floor(p[0])), 0, seen.width - 1),
+                  row = std::clamp<Index>(static_cast<Index>(std::floor(p[1])), 0, seen.height - 1);
+      found.pixels.push_back(row * seen.width + column);
+      const Vec2 centre = on_plane(seen, static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5);
+      for (int step = 0; step < kSteps; ++step) q = newton_step(lens, q, centre);
+      const Vec2 to = on_image(pinhole, q);
+      offsets->push_back({static_cast<float>(to[0] - px), static_cast<float>(to[1] - py)});
+    }
+  found.offsets = std::move(offsets);
+  return found;
 }
 
 }  // namespace fieldmark::nerf

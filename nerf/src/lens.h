@@ -1,6 +1,6 @@
 #pragma once
 #include <fieldmark/engine/tensor.h>
-#include <fieldmark/nerf/camera.h>
+#include <fieldmark/nerf/dataset.h>
 
 #include <optional>
 #include <string>
@@ -92,5 +92,17 @@ Camera cropped(const Camera& camera, const Crop& part);
 /// @return [part.height, part.width, 4]   @throws ShapeError if sizes differ
 Tensor<float> undistorted_image(const Tensor<float>& rgba, const Camera& camera, const Lens& lens,
                                 const Crop& part);
+
+/// The pixels of a lens's image that are nearest to the places of a pinhole's pixels.
+struct NearestPixels {
+  std::vector<Index> pixels{};  ///< [height * width of the pinhole] row * width + column in the lens's image
+  /// From the centre of each of the pinhole's pixels to the place where the pinhole would show the centre of
+  /// the lens's pixel.
+  std::shared_ptr<const PixelOffsets> offsets{};
+};
+
+/// Finds the nearest pixels; places outside the lens's image take one of its border.
+/// @param seen  camera of the lens's image   @param pinhole  of the same pose, see covered_part()
+NearestPixels nearest_pixels(const Camera& seen, const Lens& lens, const Camera& pinhole);
 
 }  // namespace fieldmark::nerf

@@ -48,6 +48,9 @@ void Trainer::describe(RunFingerprint& f) const {
   for (std::size_t i = 0; i < images.size(); ++i)
     if (const auto& valid = data_.views[i].valid; !valid.empty())
       f.input_digest("mask " + std::to_string(i), sha256_hex(std::as_bytes(std::span(valid))));
+  for (std::size_t i = 0; i < images.size(); ++i)
+    if (const auto& offsets = data_.views[i].offsets)
+      f.input_digest("offsets " + std::to_string(i), sha256_hex(std::as_bytes(std::span(*offsets))));
 }
 
 void Trainer::save_more(SafetensorsFile& file) const {

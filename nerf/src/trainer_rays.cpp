@@ -70,15 +70,18 @@ void Trainer::aim(Index first, Shard& c) const {
   const Index width = data_.views[0].camera.width, size = width * data_.views[0].camera.height;
   std::array<float, 2 * kMostParts> xy{};
   for (Index i = 0; i < std::ssize(c.places); ++i) {
-    const Index pixel = c.places[at(i)] % size, row = pixel / width, column = pixel % width;
+    const Index pixel = c.places[at(i)] % size;
+    float column = static_cast<float>(pixel % width), row = static_cast<float>(pixel / width);
+    if (const auto& offsets = data_.views[at(c.images[at(i)])].offsets)
+      column += (*offsets)[at(pixel)][0], row += (*offsets)[at(pixel)][1];
     for (Index part = 0; part < k * k; ++part) {
       std::array<float, 4> u{0.5f, 0.5f};
       if (k > 1) u = place_rng_.uniform4(step, static_cast<std::uint64_t>((first + i) * k * k + part));
       const auto within = [&](Index p, float v) {
         return (static_cast<float>(p) + v) / static_cast<float>(k) - 0.5f;
       };
-      xy[at(2 * part)] = static_cast<float>(column) + within(part % k, u[0]);
-      xy[at(2 * part + 1)] = static_cast<float>(row) + within(part / k, u[1]);
+      xy[at(2 * part)] = column + within(part % k, u[0]);
+      xy[at(2 * part + 1)] = row + within(part / k, u[1]);
       if (k > 1) c.jitter[at(i * k * k + part)] = u[2];
     }
     c.rays.set(field_.space, i * k * k, cameras_[at(c.images[at(i)])], std::span(xy).first(at(2 * k * k)));

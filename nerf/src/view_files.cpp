@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <mutex>
 #include <set>
 
 #include "checks.h"
@@ -119,7 +120,48 @@ Tensor<float> read_mask(const Shot& shot, const fs::path& file, Index height, In
   return resize_rgba(std::move(mask), height, width);
 }
 
-View read_view(const ViewPlan& plan, std::size_t i) {
+// The nearest pixels of the lenses of a split, each found once.
+class LensTables {
+ public:
+  NearestPixels get(const Camera& seen, const Lens& lens, const Camera& pinhole) {
+    const auto is_same = [&](const Table& t) {
+      return t.lens == lens && same_image(t.seen, seen) && same_image(t.pinhole, pinhole);
+    };
+    {
+      const std::lock_guard lock(mutex_);
+      if (const auto t = std::ranges::find_if(tables_, is_same); t != tables_.end()) return t->nearest;
+    }
+    NearestPixels nearest = nearest_pixels(seen, lens, pinhole);
+    const std::lock_guard lock(mutex_);
+    if (const auto t = std::ranges::find_if(tables_, is_same); t != tables_.end()) return t->nearest;
+    tables_.push_back({lens, seen, pinhole, nearest});
+    return nearest;
+  }
+
+ private:
+  struct Table {
+    Lens lens;
+    Camera seen, pinhole;
+    NearestPixels nearest;
+  };
+  static bool same_image(Camera a, const Camera& b) {
+    a.pose = b.pose;
+    return a.parameters() == b.parameters() && a.width == b.width && a.height == b.height;
+  }
+  std::mutex mutex_;
+  std::vector<Table> tables_;
+};
+
+// Gives each pixel of a view the colour of the nearest pixel of the lens's image.
+void take_nearest(View& view, const Camera& pinhole, const Tensor<float>& seen,
+                  const NearestPixels& nearest) {
+  view.rgba = Tensor<float>(Shape{pinhole.height, pinhole.width, 4});
+  for (std::size_t p = 0; p < nearest.pixels.size(); ++p)
+    std::copy_n(&seen.data[at(4 * nearest.pixels[p])], 4, &view.rgba.data[4 * p]);
+  view.offsets = nearest.offsets;
+}
+
+View read_view(const ViewPlan& plan, std::size_t i, LensTables& tables) {
   const Shot& shot = plan.shots[i];
   const fs::path& path = plan.files[i];
   View view{.camera = {}, .rgba = {}, .name = path.stem().string(), .depth = shot.depth};
@@ -127,7 +169,8 @@ View read_view(const ViewPlan& plan, std::size_t i) {
   const Index width = view.rgba.shape[1], height = view.rgba.shape[0];
   view.file_width = width, view.file_height = height;
   const Camera whole = at_place(shot.place, [&] { return shot.intrinsics.camera(shot.pose, width, height); });
-  Camera scaled = whole.scaled(plan.size);
+  const Camera shrunken = whole.scaled(plan.size);
+  Camera scaled = shrunken;
   view.camera = whole;
   const LensPart* lens = part_of(plan, shot);
   if (lens) {
@@ -137,8 +180,8 @@ View read_view(const ViewPlan& plan, std::size_t i) {
       return std::max<Index>(1, (2 * side * to + from) / (2 * from));
     };
     view.camera = cropped(whole, lens->part);
-    scaled = view.camera.scaled(shrunk(view.camera.width, width, scaled.width),
-                                shrunk(view.camera.height, height, scaled.height));
+    scaled = view.camera.scaled(shrunk(view.camera.width, width, shrunken.width),
+                                shrunk(view.camera.height, height, shrunken.height));
   }
   const auto shaped = [&](Tensor<float> rgba) {
     if (lens) rgba = undistorted_image(rgba, whole, shot.intrinsics.lens, lens->part);
@@ -150,7 +193,11 @@ View read_view(const ViewPlan& plan, std::size_t i) {
     // A pixel that contains any share of an excluded pixel also contains its colour.
     for (Index p = 0; p < std::ssize(view.valid); ++p) view.valid[at(p)] = clear[4 * p] > 0.999f;
   }
-  view.rgba = shaped(std::move(view.rgba));
+  if (lens && plan.unfiltered)
+    take_nearest(view, scaled, resize_rgba(std::move(view.rgba), shrunken.height, shrunken.width),
+                 tables.get(shrunken, shot.intrinsics.lens, scaled));
+  else
+    view.rgba = shaped(std::move(view.rgba));
   view.own_width = scaled.width, view.own_height = scaled.height;
   return view;
 }
@@ -166,6 +213,11 @@ void fill_up(View& view, Index width, Index height) {
     std::copy_n(view.rgba.data.data() + 4 * y * w, 4 * w, rgba.data.data() + 4 * y * width);
     for (Index x = 0; x < w; ++x)
       valid[at(y * width + x)] = view.valid.empty() ? 1 : view.valid[at(y * w + x)];
+  }
+  if (view.offsets) {
+    auto offsets = std::make_shared<PixelOffsets>(at(width * height));
+    for (Index y = 0; y < h; ++y) std::copy_n(view.offsets->begin() + y * w, w, offsets->begin() + y * width);
+    view.offsets = std::move(offsets);
   }
   view.rgba = std::move(rgba), view.valid = std::move(valid);
   view.camera.width = width, view.camera.height = height;
@@ -250,10 +302,11 @@ std::vector<View> read_views(const ViewPlan& plan, std::vector<std::string>& not
   const std::size_t count = plan.shots.size();
   std::vector<View> views(count);
   std::vector<std::exception_ptr> errors(count);
+  LensTables tables;
   parallel_for(static_cast<Index>(count), 1, [&](Index begin, Index) {
     const auto i = static_cast<std::size_t>(begin);
     try {
-      views[i] = read_view(plan, i);
+      views[i] = read_view(plan, i, tables);
     } catch (...) {
       errors[i] = std::current_exception();
     }

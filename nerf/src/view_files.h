@@ -25,6 +25,7 @@ struct ViewPlan {
   std::vector<std::filesystem::path> masks{};  ///< one per shot; empty: none
   Index size = 0;                              ///< longer side before images are cropped, pixels; 0: original
   std::vector<LensPart> parts{};               ///< one per stated size if there are lenses, else none
+  bool unfiltered = false;                     ///< see DatasetOptions
 };
 
 /// Fills in ViewPlan::parts and describes them in `notes`.

@@ -111,6 +111,24 @@ TEST_CASE("analytic_scene: equal for one and two threads, different for another 
   CHECK(pixels(2, 1) != one);
 }
 
+TEST_CASE(
+    "analytic_scene: a lens without distortion gives the pinhole's image, another shows what it maps to") {
+  const SceneOptions options{.size = 24, .views = 1};
+  const View view = make_scene(options).views[0];
+  const auto through = [&](double scale) {
+    return render_scene(options, view.camera,
+                        [&](double x, double y) -> std::array<double, 2> {
+                          return {scale * (x - view.camera.cx) / view.camera.fx,
+                                  scale * (y - view.camera.cy) / view.camera.fy};
+                        })
+        .data;
+  };
+  CHECK(through(1) == view.rgba.data);
+  Camera wide = view.camera;
+  wide.fx /= 1.5, wide.fy /= 1.5;
+  CHECK(through(1.5) == render_scene(options, wide).data);
+}
+
 TEST_CASE("analytic_scene: errors") {
   CHECK_THROWS_WITH(make_scene({.size = 0}), "[scene] size must be 1 to 8192, got 0");
   CHECK_THROWS_WITH(make_scene({.views = 0}), "[scene] views must be 1 to 100000, got 0");

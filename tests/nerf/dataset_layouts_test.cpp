@@ -94,6 +94,37 @@ TEST_CASE("dataset: distorted images are cut to what every lens covers, and keep
       "in the image, got k1 -30 k2 0 p1 0 p2 0");
 }
 
+TEST_CASE("dataset: unfiltered views have the colours of the files, and where they are of") {
+  TrainingImages scene;
+  scene.json["k1"] = 2;
+  scene.json["frames"][4]["k1"] = 4;
+  scene.write();
+  const Dataset data = load_dataset(scene.path, {.unfiltered = true});
+  const Dataset filtered = load_dataset(scene.path);
+  for (std::size_t v = 0; v < data.views.size(); ++v) {
+    const View& view = data.views[v];
+    CAPTURE(view.name);
+    CHECK(view.camera.parameters() == filtered.views[v].camera.parameters());
+    CHECK(!filtered.views[v].offsets);
+    REQUIRE(view.offsets);
+    REQUIRE(std::ssize(*view.offsets) == view.camera.width * view.camera.height);
+    const Tensor<float> file = read_image(scene / "images" / (view.name + ".png"));
+    const auto is_there = [&](const float* rgba) {
+      for (Index p = 0; p < 12 * 8; ++p)
+        if (std::equal(rgba, rgba + 3, &file.data[at(3 * p)])) return true;
+      return false;
+    };
+    for (Index p = 0; p < view.camera.width * view.camera.height; ++p)
+      CHECK(is_there(&view.rgba.data[at(4 * p)]));
+  }
+  // Nine frames have one lens, of which frame 5 has another.
+  CHECK(data.views[0].offsets == data.views[1].offsets);
+  CHECK(data.views[4].name == "5");
+  CHECK(data.views[4].offsets != data.views[0].offsets);
+  TrainingImages pinhole;
+  CHECK(!load_dataset(pinhole.path, {.unfiltered = true}).views[0].offsets);
+}
+
 TEST_CASE("dataset: images of another size than stated or than the first are refused") {
   TrainingImages scene;
   write_image(scene.image(2), 24, 16);

@@ -188,6 +188,40 @@ TEST_CASE("lens: an undistorted image has at each pixel what the lens put elsewh
   CHECK(same.data == rgba.data);
 }
 
+TEST_CASE("lens: the nearest pixels are where the lens puts the places that their offsets say") {
+  const Camera seen{.fx = 40, .fy = 41, .cx = 19, .cy = 16, .width = 40, .height = 30};
+  for (const Lens& lens : {Lens{.k1 = 0.2, .k2 = 0.05, .p1 = 0.003, .p2 = -0.002},
+                           Lens{.k1 = 0.05, .model = LensModel::fisheye}}) {
+    // Half the size of the part, as after a shrunken image.
+    const Camera pinhole = cropped(kCamera, covered_part(kCamera, lens)).scaled(21, 17);
+    const NearestPixels nearest = nearest_pixels(seen, lens, pinhole);
+    REQUIRE(std::ssize(nearest.pixels) == 21 * 17);
+    REQUIRE(std::ssize(*nearest.offsets) == 21 * 17);
+    double off = 0, longest = 0;
+    for (Index p = 0; p < 21 * 17; ++p) {
+      const auto [dx, dy] = (*nearest.offsets)[at(p)];
+      const Vec2 q = lens.distorted({(static_cast<double>(p % 21) + 0.5 + dx - pinhole.cx) / pinhole.fx,
+                                     (static_cast<double>(p / 21) + 0.5 + dy - pinhole.cy) / pinhole.fy});
+      const Index pixel = nearest.pixels[at(p)];
+      raise_to(off, std::abs(q[0] * 40 + 19 - (static_cast<double>(pixel % 40) + 0.5)));
+      raise_to(off, std::abs(q[1] * 41 + 16 - (static_cast<double>(pixel / 40) + 0.5)));
+      raise_to(longest, std::hypot(dx * 40 / pinhole.fx, dy * 41 / pinhole.fy));
+    }
+    CHECK(off < 1e-4);
+    CHECK(longest < 1);
+    CHECK(longest > 0.3);
+  }
+}
+
+TEST_CASE("lens: without distortion the nearest pixels are those of the part, without offsets") {
+  const NearestPixels nearest =
+      nearest_pixels(kCamera, {}, cropped(kCamera, {.left = 3, .top = 5, .width = 20, .height = 10}));
+  for (Index p = 0; p < 200; ++p) {
+    CHECK(nearest.pixels[at(p)] == (p / 20 + 5) * 40 + p % 20 + 3);
+    for (const float step : (*nearest.offsets)[at(p)]) CHECK(std::abs(step) < 1e-12f);
+  }
+}
+
 TEST_CASE("lens: the colour of what is transparent does not leak") {
   Tensor<float> rgba(Shape{30, 40, 4});
   for (Index i = 0; i < 1200; ++i)

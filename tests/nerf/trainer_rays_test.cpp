@@ -82,6 +82,25 @@ TEST_CASE(
   CHECK(psnr(by_means, 0) == taught);
 }
 
+TEST_CASE("trainer_rays: colours that are of places beside the centres are learnt there") {
+  const auto learnt = [&](float across, float down, double cx, double cy) {
+    Dataset data = make_scene({.size = 24, .views = 6});
+    for (View& v : data.views) {
+      v.offsets = std::make_shared<PixelOffsets>(24 * 24, std::array{across, down});
+      v.camera.cx += cx, v.camera.cy += cy;
+    }
+    TrainOptions options = train_options(20, 0);
+    options.carve = false;
+    RadianceField field(field_options(1));
+    Trainer trainer(field, data, options);
+    while (!trainer.done()) trainer.step(0);
+    return numbers(field);
+  };
+  // A principal point that is moved the other way gives the same rays.
+  CHECK(learnt(0.25f, -0.5f, 0, 0) == learnt(0, 0, -0.25, 0.5));
+  CHECK(learnt(0.25f, -0.5f, 0, 0) != learnt(0, 0, 0, 0));
+}
+
 TEST_CASE("trainer_rays: supersampling begins after its steps, and only then") {
   const Dataset data = blurred_scene();
   CHECK(trained(data, 2, 10, 10) == trained(data, 1, 0, 10));
@@ -171,7 +190,7 @@ TEST_CASE("trainer_rays: what masks exclude is not learnt, carved or not") {
                     "[trainer] data must have a valid pixel, got none: masks exclude all");
 }
 
-TEST_CASE("trainer_rays: a checkpoint knows the masks that it was trained with") {
+TEST_CASE("trainer_rays: a checkpoint knows the masks and the offsets that it was trained with") {
   Dataset data = blurred_scene();
   const TemporaryFolder folder;
   {
@@ -184,6 +203,10 @@ TEST_CASE("trainer_rays: a checkpoint knows the masks that it was trained with")
   RadianceField field(field_options(1));
   Trainer trainer(field, data, train_options(4, 0));
   CHECK_THROWS_WITH(trainer.restore(folder / "checkpoint"), Contains("mask 2"));
+  data.views[2].valid.clear();
+  data.views[3].offsets = std::make_shared<PixelOffsets>(kSize * kSize);
+  Trainer beside(field, data, train_options(4, 0));
+  CHECK_THROWS_WITH(beside.restore(folder / "checkpoint"), Contains("offsets 3"));
 }
 
 TEST_CASE("trainer_rays: errors name option and value") {

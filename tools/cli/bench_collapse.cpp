@@ -28,7 +28,7 @@ struct WatchedScene {
 
 WatchedScene scene_in(const std::string& folder) {
   const std::string split = nerf::has_split(folder, "val") ? "val" : "test";
-  nerf::Dataset train = nerf::load_dataset(folder, {.split = "train"});
+  nerf::Dataset train = nerf::load_dataset(folder, {.split = "train", .unfiltered = true});
   nerf::Dataset judge = nerf::load_dataset(folder, {.split = split,
                                                     .background = train.background,
                                                     .scene = train.scene,

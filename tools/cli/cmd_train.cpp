@@ -92,8 +92,10 @@ nerf::RadianceFieldOptions sized(const nerf::RadianceFieldOptions& start, const 
 
 // Loads the training images and prints the type of their scene.
 nerf::Dataset training_data(const TrainArguments& options, Context& context) {
-  nerf::DatasetOptions wanted{
-      .split = "train", .size = options.size, .background = background_of(options.background)};
+  nerf::DatasetOptions wanted{.split = "train",
+                              .size = options.size,
+                              .background = background_of(options.background),
+                              .unfiltered = true};
   if (!options.scene_type.empty()) wanted.scene = nerf::parse_scene_type(options.scene_type);
   try {
     nerf::Dataset data = load_scene(options.data, wanted, context);

@@ -25,8 +25,7 @@ class DistortingLens {
   double k_[6]{};
 };
 
-/// Ray-traces a built-in scene through a lens: each pixel is taken, bilinearly, from a pinhole image of twice
-/// the resolution that shows all that the lens sees.
+/// Ray-traces a built-in scene through a lens.
 /// @param camera  pose, focal length and size   @return [height, width, 4] straight alpha
 Tensor<float> distorted_image(const nerf::SceneOptions& options, const nerf::Camera& camera,
                               const DistortingLens& lens);

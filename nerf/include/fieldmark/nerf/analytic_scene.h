@@ -42,6 +42,12 @@ struct SceneOptions {
 /// range
 Tensor<float> render_scene(const SceneOptions& options, const Camera& camera);
 
+/// Maps a place in an image, in pixels from its upper left corner, to the point of the plane at distance 1 in
+/// front of the camera that is seen there: x right, y down.
+using ImageToPlane = std::function<std::array<double, 2>(double x, double y)>;
+/// Ray-traces one view through any lens. @param camera  pose and size; the lens replaces the rest
+Tensor<float> render_scene(const SceneOptions& options, const Camera& camera, const ImageToPlane& to_plane);
+
 /// Makes one split in memory: the images and cameras of write_scene().
 /// @throws ValueError  if an option is out of range or split is not "train", "val" or "test"
 Dataset make_scene(const SceneOptions& options, const std::string& split = "train",
