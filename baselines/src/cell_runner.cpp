@@ -42,8 +42,8 @@ void thin_out(nerf::Dataset& data, Index most) {
 
 nerf::Dataset split_of(const PaperScene& scene, Index size, const char* split) {
   if (scene.folder.empty()) return nerf::make_scene({.size = size}, split);
-  return nerf::load_dataset(scene.folder,
-                            {.split = split, .size = size, .unfiltered = std::string_view(split) == "train"});
+  // HiDDeN and MBRS filter whole images.
+  return nerf::load_dataset(scene.folder, {.split = split, .size = size, .resampled = true});
 }
 
 bool is_mlp(const CellName& name) { return name.field == "mlp"; }

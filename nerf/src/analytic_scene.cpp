@@ -77,8 +77,8 @@ bool trace(const std::vector<SceneSolid>& objects, const std::vector<const Scene
   return true;
 }
 
-// The rays through an image, by coordinates in pixels; an angle that the rays of one pixel are within of the
-// ray through its centre.
+// Rays by image coordinates in pixels, and a bound on the angle in radians between the rays of the pixel
+// around a point and the ray through that point.
 struct PixelRays {
   std::function<Ray(double x, double y)> at;
   std::function<double(double x, double y)> spread;
@@ -108,7 +108,7 @@ PixelRays lens_rays(const Pose& pose, const ImageToPlane& to_plane) {
           spread};
 }
 
-// Finds the objects whose bounding spheres a ray may hit that is within an angle of another.
+// Finds the objects whose bounding spheres a ray within `spread` radians of `middle` may hit.
 void find_candidates(const std::vector<SceneSolid>& objects, const Ray& middle, double spread,
                      std::vector<const SceneSolid*>* candidates) {
   candidates->clear();

@@ -129,7 +129,7 @@ Dataset load_dataset(const fs::path& folder, const DatasetOptions& options) {
   const Layout layout = find_layout(folder);
   Capture capture = read_capture(folder, layout, options.split, options.size);
   ViewPlan plan = plan_split(capture, options, folder, capture.notes);
-  plan.unfiltered = options.unfiltered;
+  plan.resampled = options.resampled;
   plan_lenses(capture.shots, plan, capture.notes);
   std::vector<View> views = read_views(plan, capture.notes);
   Dataset data{.name = fs::absolute(folder / "x").lexically_normal().parent_path().filename().string(),

@@ -78,7 +78,7 @@ Evaluation evaluate(Renderer& renderer, const Dataset& dataset,
   double seconds = 0;
   for (const View& view : dataset.views) {
     const auto start = Clock::now();
-    Rendering rendering = renderer.render(view.camera);
+    Rendering rendering = renderer.render(view.camera, view.offsets.get());
     seconds += std::chrono::duration<double>(Clock::now() - start).count();
     result.per_view.push_back(score(view, std::move(rendering), dataset.background, lpips));
     ++result.views;

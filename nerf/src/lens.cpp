@@ -46,12 +46,11 @@ std::array<double, 3> derivative(const Lens& l, const Vec2& q) {
 }
 double determinant(const std::array<double, 3>& m) { return m[0] * m[2] - m[1] * m[1]; }
 
-// Returns q after a step of Newton's method towards distorted(q) = seen, where the map is regular.
-Vec2 newton_step(const Lens& l, const Vec2& q, const Vec2& seen) {
-  const Vec2 p = l.distorted(q), f{p[0] - seen[0], p[1] - seen[1]};
-  const auto m = derivative(l, q);
+// Returns the step of Newton's method that brings distorted(q) closer by f.
+Vec2 newton_step(const std::array<double, 3>& derivative, const Vec2& f) {
+  const auto& m = derivative;
   const double d = determinant(m);
-  return {q[0] - (m[2] * f[0] - m[1] * f[1]) / d, q[1] - (m[0] * f[1] - m[1] * f[0]) / d};
+  return {(m[1] * f[1] - m[2] * f[0]) / d, (m[1] * f[0] - m[0] * f[1]) / d};
 }
 
 Vec2 on_plane(const Camera& c, double x, double y) { return {(x - c.cx) / c.fx, (y - c.cy) / c.fy}; }
@@ -123,6 +122,21 @@ double missing_share(const Camera& c, const Lens& lens, const Crop& r, int side)
   return static_cast<double>(missing) / static_cast<double>(length);
 }
 
+// Inverts distorted() from a start within a pixel of the solution; close to a fold that may fail, and then
+// Lens::undistorted() decides. @param enough  length of the remaining error
+std::optional<Vec2> undistorted_near(const Lens& lens, const Vec2& seen, Vec2 q, double enough) {
+  constexpr int kSteps = 3;
+  for (int step = 0; step < kSteps; ++step) {
+    const Vec2 p = lens.distorted(q), f{p[0] - seen[0], p[1] - seen[1]};
+    const auto m = derivative(lens, q);
+    if (!(determinant(m) > 0 && m[0] + m[2] > 0)) break;
+    if (std::hypot(f[0], f[1]) < enough) return q;
+    const Vec2 move = newton_step(m, f);
+    q = {q[0] + move[0], q[1] + move[1]};
+  }
+  return lens.undistorted(seen);
+}
+
 // Adds weight times a pixel, clamped to the image, to premultiplied colour and alpha.
 void add_pixel(const Tensor<float>& rgba, Index column, Index row, double weight, double* sum) {
   const Index height = rgba.shape[0], width = rgba.shape[1];
@@ -183,10 +197,11 @@ std::optional<Vec2> Lens::undistorted(const Vec2& seen) const {
     const auto m = derivative(*this, q);
     const double d = determinant(m);
     if (!(std::abs(d) > 1e-300)) return std::nullopt;
+    const Vec2 step_to = newton_step(m, f);
     Vec2 to = q;
     double scale = 1;
     for (int halving = 0; halving < 30; ++halving, scale /= 2) {
-      to = {q[0] - scale * (m[2] * f[0] - m[1] * f[1]) / d, q[1] - scale * (m[0] * f[1] - m[1] * f[0]) / d};
+      to = {q[0] + scale * step_to[0], q[1] + scale * step_to[1]};
       const Vec2 g = off(to);
       if (std::hypot(g[0], g[1]) < std::hypot(f[0], f[1])) break;
     }
@@ -271,25 +286,21 @@ Tensor<float> undistorted_image(const Tensor<float>& rgba, const Camera& camera,
 }
 
 NearestPixels nearest_pixels(const Camera& seen, const Lens& lens, const Camera& pinhole) {
-  constexpr int kSteps = 2;  // of Newton's method, which start within a pixel of the solution
   NearestPixels found;
   found.pixels.reserve(at(pinhole.height * pinhole.width));
-  auto offsets = std::make_shared<PixelOffsets>();
-  offsets->reserve(found.pixels.capacity());
+  found.offsets.reserve(at(pinhole.height * pinhole.width));
   for (Index y = 0; y < pinhole.height; ++y)
     for (Index x = 0; x < pinhole.width; ++x) {
       const double px = static_cast<double>(x) + 0.5, py = static_cast<double>(y) + 0.5;
-      Vec2 q = on_plane(pinhole, px, py);
-      const Vec2 p = on_image(seen, lens.distorted(q));
+      const Vec2 q = on_plane(pinhole, px, py), p = on_image(seen, lens.distorted(q));
       const Index column = std::clamp<Index>(static_cast<Index>(std::floor(p[0])), 0, seen.width - 1),
                   row = std::clamp<Index>(static_cast<Index>(std::floor(p[1])), 0, seen.height - 1);
-      found.pixels.push_back(row * seen.width + column);
       const Vec2 centre = on_plane(seen, static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5);
-      for (int step = 0; step < kSteps; ++step) q = newton_step(lens, q, centre);
-      const Vec2 to = on_image(pinhole, q);
-      offsets->push_back({static_cast<float>(to[0] - px), static_cast<float>(to[1] - py)});
+      const auto to = undistorted_near(lens, centre, q, 1e-6 / std::max(seen.fx, seen.fy));
+      found.pixels.push_back(to ? static_cast<std::int32_t>(row * seen.width + column) : -1);
+      const Vec2 place = on_image(pinhole, to.value_or(q));
+      found.offsets.push_back({static_cast<float>(place[0] - px), static_cast<float>(place[1] - py)});
     }
-  found.offsets = std::move(offsets);
   return found;
 }
 

@@ -93,15 +93,17 @@ Camera cropped(const Camera& camera, const Crop& part);
 Tensor<float> undistorted_image(const Tensor<float>& rgba, const Camera& camera, const Lens& lens,
                                 const Crop& part);
 
-/// The pixels of a lens's image that are nearest to the places of a pinhole's pixels.
+/// For each of a pinhole's pixels, the nearest pixel of a lens's image.
 struct NearestPixels {
-  std::vector<Index> pixels{};  ///< [height * width of the pinhole] row * width + column in the lens's image
-  /// From the centre of each of the pinhole's pixels to the place where the pinhole would show the centre of
-  /// the lens's pixel.
-  std::shared_ptr<const PixelOffsets> offsets{};
+  /// [height * width of the pinhole] row * width + column in the lens's image; -1 where the centre of that
+  /// pixel has no undistorted place
+  std::vector<std::int32_t> pixels{};
+  /// Displacement from each pinhole pixel's centre to the undistorted centre of the lens's pixel, in pixels
+  /// of the pinhole.
+  PixelOffsets offsets{};
 };
 
-/// Finds the nearest pixels; places outside the lens's image take one of its border.
+/// Finds the nearest pixels. Points outside the lens's image take the nearest border pixel.
 /// @param seen  camera of the lens's image   @param pinhole  of the same pose, see covered_part()
 NearestPixels nearest_pixels(const Camera& seen, const Lens& lens, const Camera& pinhole);
 

@@ -15,6 +15,18 @@ namespace {
 constexpr Index kMlpRays = 64;  // of an mlp field at a time, because its samples take much memory
 constexpr Index kTile = 16;     // pixels along a side; rays of a tile pass through the same cells
 
+// Returns the offsets of the k x k parts of each pixel, in pixels of the image that has those parts as
+// pixels.
+PixelOffsets finer_offsets(const PixelOffsets& offsets, Index width, Index k) {
+  PixelOffsets finer(offsets.size() * at(k * k));
+  for (Index p = 0; p < std::ssize(finer); ++p) {
+    const Index x = p % (k * width) / k, y = p / (k * width) / k;
+    const auto [right, down] = offsets[at(y * width + x)];
+    finer[at(p)] = {static_cast<float>(k) * right, static_cast<float>(k) * down};
+  }
+  return finer;
+}
+
 }  // namespace
 
 struct Renderer::Lane {
@@ -22,10 +34,11 @@ struct Renderer::Lane {
   RaySamples samples;
   Tape<float> tape;
   CubeRays rays;
-  std::vector<float> pixels, out, weights, positions, seen_from, colours;
+  std::vector<Index> pixels;
+  std::vector<float> places, out, weights, positions, seen_from, colours;
   std::vector<std::int32_t> sample_ray, kept;
 
-  void list_pixels(const Camera& camera, Index tile);
+  void list_pixels(const Camera& camera, Index tile, const PixelOffsets* offsets);
   void accumulate(Index count, float* out, float* position) const;
 };
 
@@ -132,29 +145,37 @@ void Renderer::Lane::accumulate(Index count, float* to, float* position) const {
     if (to[4 * (i / 3) + 3] > 0) position[i] /= to[4 * (i / 3) + 3];
 }
 
-// Lists the pixels of a tile, row by row.
-void Renderer::Lane::list_pixels(const Camera& camera, Index tile) {
+// Lists the pixels of a tile, row by row, and the places that their rays go through.
+void Renderer::Lane::list_pixels(const Camera& camera, Index tile, const PixelOffsets* offsets) {
   const Index columns = (camera.width + kTile - 1) / kTile;
   const Index x0 = tile % columns * kTile, y0 = tile / columns * kTile;
-  pixels.clear();
+  pixels.clear(), places.clear();
   for (Index y = y0; y < std::min(y0 + kTile, camera.height); ++y)
-    for (Index x = x0; x < std::min(x0 + kTile, camera.width); ++x)
-      pixels.insert(pixels.end(), {static_cast<float>(x), static_cast<float>(y)});
+    for (Index x = x0; x < std::min(x0 + kTile, camera.width); ++x) {
+      const Index pixel = y * camera.width + x;
+      const auto [right, down] = offsets ? (*offsets)[at(pixel)] : std::array{0.f, 0.f};
+      pixels.push_back(pixel);
+      places.insert(places.end(), {static_cast<float>(x) + right, static_cast<float>(y) + down});
+    }
 }
 
-Rendering Renderer::render(const Camera& camera) {
+Rendering Renderer::render(const Camera& camera, const PixelOffsets* offsets) {
   refresh();
   const Index k = options_.supersampling, height = camera.height, width = camera.width;
-  if (k == 1) return trace_centres(camera);
-  Rendering fine = trace_centres(camera.scaled(k * width, k * height));
+  if (offsets && std::ssize(*offsets) != height * width)
+    throw ValueError("[render] offsets must be of the camera's " + std::to_string(height * width) +
+                     " pixels, got " + std::to_string(offsets->size()));
+  if (k == 1) return trace_pixels(camera, offsets);
+  const PixelOffsets finer = offsets ? finer_offsets(*offsets, width, k) : PixelOffsets{};
+  Rendering fine = trace_pixels(camera.scaled(k * width, k * height), offsets ? &finer : nullptr);
   fine.opacity.shape = {k * height, k * width, 1};
   Rendering view{resize_area(fine.rgb, height, width), resize_area(fine.opacity, height, width)};
   view.opacity.shape = {height, width};
   return view;
 }
 
-// Traces one ray through the centre of every pixel.
-Rendering Renderer::trace_centres(const Camera& camera) {
+// Traces one ray a pixel.
+Rendering Renderer::trace_pixels(const Camera& camera, const PixelOffsets* offsets) {
   Rendering view{Tensor<float>({camera.height, camera.width, 3}),
                  Tensor<float>({camera.height, camera.width})};
   const Index tiles = ((camera.width + kTile - 1) / kTile) * ((camera.height + kTile - 1) / kTile);
@@ -162,15 +183,14 @@ Rendering Renderer::trace_centres(const Camera& camera) {
   parallel_for(kLanes, 1, [&](Index l, Index) {
     Lane& lane = *lanes_[at(l)];
     for (Index tile = l; tile < tiles; tile += kLanes) {
-      lane.list_pixels(camera, tile);
-      const auto n = static_cast<Index>(lane.pixels.size()) / 2;
+      lane.list_pixels(camera, tile, offsets);
+      const auto n = std::ssize(lane.pixels);
       lane.rays.resize(n);
       lane.out.resize(at(4 * n));
-      lane.rays.set(field_.space, 0, camera, lane.pixels);
+      lane.rays.set(field_.space, 0, camera, lane.places);
       trace(lane.rays.batch(field_.space), l, lane.out.data());
       for (Index i = 0; i < n; ++i) {
-        const Index pixel = static_cast<Index>(lane.pixels[at(2 * i + 1)]) * camera.width +
-                            static_cast<Index>(lane.pixels[at(2 * i)]);
+        const Index pixel = lane.pixels[at(i)];
         const float* c = &lane.out[at(4 * i)];
         for (Index a = 0; a < 3; ++a)
           view.rgb[3 * pixel + a] = std::clamp(c[a] + (1 - c[3]) * background, 0.f, 1.f);

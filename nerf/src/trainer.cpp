@@ -123,6 +123,10 @@ Trainer::Trainer(RadianceField& field, const Dataset& data, const TrainOptions& 
       rays_per_step_(options.least_rays) {
   check(options, field);
   if (data.views.empty()) throw ValueError("[trainer] data must have at least one view");
+  for (const View& v : data.views)
+    if (v.offsets && std::ssize(*v.offsets) != v.camera.width * v.camera.height)
+      throw ValueError("[trainer] data must have an offset for each pixel, got " +
+                       std::to_string(v.offsets->size()) + " for view " + v.name);
   // The table of a hash field is stepped level by level, see backward_table().
   train(field.params, adam_options(field), {{.end = loop_size(field)}}, {}, !field.coarse);
   if (options.keep) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <map>
 
 #include "trainer_version_0_1.h"
 
@@ -48,9 +49,14 @@ void Trainer::describe(RunFingerprint& f) const {
   for (std::size_t i = 0; i < images.size(); ++i)
     if (const auto& valid = data_.views[i].valid; !valid.empty())
       f.input_digest("mask " + std::to_string(i), sha256_hex(std::as_bytes(std::span(valid))));
-  for (std::size_t i = 0; i < images.size(); ++i)
-    if (const auto& offsets = data_.views[i].offsets)
-      f.input_digest("offsets " + std::to_string(i), sha256_hex(std::as_bytes(std::span(*offsets))));
+  std::map<const PixelOffsets*, std::string> digests;  // views of one lens share their offsets
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const PixelOffsets* offsets = data_.views[i].offsets.get();
+    if (!offsets) continue;
+    std::string& digest = digests[offsets];
+    if (digest.empty()) digest = sha256_hex(std::as_bytes(std::span(*offsets)));
+    f.input_digest("offsets " + std::to_string(i), digest);
+  }
 }
 
 void Trainer::save_more(SafetensorsFile& file) const {

@@ -63,7 +63,8 @@ Index Trainer::rays_along_pixel() const {
   return steps() < options_.supersample_after ? 1 : field_.options().supersampling;
 }
 
-// Sets one ray through the centre of each pixel, or one at random in each of its parts, row by row.
+// Sets one ray through the centre of each pixel, or one at random in each of its parts, row by row; each is
+// displaced by the pixel's offset.
 void Trainer::aim(Index first, Shard& c) const {
   const auto step = static_cast<std::uint64_t>(steps());
   const Index k = rays_along_pixel();

@@ -43,6 +43,10 @@ Tensor<float> resize_rgba(Tensor<float> image, Index height, Index width) {
   return out;
 }
 
+// Least value of a filtered mask for a valid pixel: one that contains any share of an excluded pixel also
+// contains its colour.
+constexpr float kClear = 0.999f;
+
 std::string size_text(Index width, Index height) {
   return std::to_string(width) + " x " + std::to_string(height);
 }
@@ -120,20 +124,13 @@ Tensor<float> read_mask(const Shot& shot, const fs::path& file, Index height, In
   return resize_rgba(std::move(mask), height, width);
 }
 
-// The nearest pixels of the lenses of a split, each found once.
+// The nearest pixels of the lenses of a split. Views of one lens share theirs.
 class LensTables {
  public:
-  NearestPixels get(const Camera& seen, const Lens& lens, const Camera& pinhole) {
-    const auto is_same = [&](const Table& t) {
-      return t.lens == lens && same_image(t.seen, seen) && same_image(t.pinhole, pinhole);
-    };
-    {
-      const std::lock_guard lock(mutex_);
-      if (const auto t = std::ranges::find_if(tables_, is_same); t != tables_.end()) return t->nearest;
-    }
-    NearestPixels nearest = nearest_pixels(seen, lens, pinhole);
+  std::shared_ptr<const NearestPixels> get(const Camera& seen, const Lens& lens, const Camera& pinhole) {
+    if (auto known = find(seen, lens, pinhole)) return known;
+    auto nearest = std::make_shared<const NearestPixels>(nearest_pixels(seen, lens, pinhole));
     const std::lock_guard lock(mutex_);
-    if (const auto t = std::ranges::find_if(tables_, is_same); t != tables_.end()) return t->nearest;
     tables_.push_back({lens, seen, pinhole, nearest});
     return nearest;
   }
@@ -142,23 +139,36 @@ class LensTables {
   struct Table {
     Lens lens;
     Camera seen, pinhole;
-    NearestPixels nearest;
+    std::shared_ptr<const NearestPixels> nearest;
   };
   static bool same_image(Camera a, const Camera& b) {
     a.pose = b.pose;
     return a.parameters() == b.parameters() && a.width == b.width && a.height == b.height;
   }
+  std::shared_ptr<const NearestPixels> find(const Camera& seen, const Lens& lens, const Camera& pinhole) {
+    const std::lock_guard lock(mutex_);
+    for (const Table& t : tables_)
+      if (t.lens == lens && same_image(t.seen, seen) && same_image(t.pinhole, pinhole)) return t.nearest;
+    return nullptr;
+  }
   std::mutex mutex_;
   std::vector<Table> tables_;
 };
 
-// Gives each pixel of a view the colour of the nearest pixel of the lens's image.
-void take_nearest(View& view, const Camera& pinhole, const Tensor<float>& seen,
-                  const NearestPixels& nearest) {
-  view.rgba = Tensor<float>(Shape{pinhole.height, pinhole.width, 4});
-  for (std::size_t p = 0; p < nearest.pixels.size(); ++p)
-    std::copy_n(&seen.data[at(4 * nearest.pixels[p])], 4, &view.rgba.data[4 * p]);
-  view.offsets = nearest.offsets;
+// Takes for each pixel of a view the nearest pixel of the lens's image and of its mask.
+// @param seen  [H, W, 4]   @param clear  the mask, of the same shape, 1 where pixels are valid; empty: none
+void take_nearest(View& view, const Camera& pinhole, const Tensor<float>& seen, const Tensor<float>& clear,
+                  const std::shared_ptr<const NearestPixels>& nearest) {
+  const std::vector<std::int32_t>& pixels = nearest->pixels;
+  const bool all = clear.size() == 0 && std::ranges::find(pixels, -1) == pixels.end();
+  view.rgba = Tensor<float>(Shape{pinhole.height, pinhole.width, 4}, 1.f);
+  if (!all) view.valid.assign(pixels.size(), 0);
+  for (std::size_t p = 0; p < pixels.size(); ++p) {
+    if (pixels[p] < 0) continue;
+    std::copy_n(&seen.data[at(4 * pixels[p])], 4, &view.rgba.data[4 * p]);
+    if (!all) view.valid[p] = clear.size() == 0 || clear[4 * pixels[p]] > kClear;
+  }
+  view.offsets = {nearest, &nearest->offsets};
 }
 
 View read_view(const ViewPlan& plan, std::size_t i, LensTables& tables) {
@@ -187,17 +197,20 @@ View read_view(const ViewPlan& plan, std::size_t i, LensTables& tables) {
     if (lens) rgba = undistorted_image(rgba, whole, shot.intrinsics.lens, lens->part);
     return resize_rgba(std::move(rgba), scaled.height, scaled.width);
   };
-  if (const fs::path& mask = plan.masks[i]; !mask.empty()) {
-    const Tensor<float> clear = shaped(read_mask(shot, mask, height, width));
-    view.valid.resize(at(scaled.height * scaled.width));
-    // A pixel that contains any share of an excluded pixel also contains its colour.
-    for (Index p = 0; p < std::ssize(view.valid); ++p) view.valid[at(p)] = clear[4 * p] > 0.999f;
-  }
-  if (lens && plan.unfiltered)
-    take_nearest(view, scaled, resize_rgba(std::move(view.rgba), shrunken.height, shrunken.width),
+  Tensor<float> clear =
+      plan.masks[i].empty() ? Tensor<float>() : read_mask(shot, plan.masks[i], height, width);
+  if (lens && !plan.resampled) {
+    const auto shrink = [&](Tensor<float>& image) {
+      return image.size() == 0 ? Tensor<float>()
+                               : resize_rgba(std::move(image), shrunken.height, shrunken.width);
+    };
+    take_nearest(view, scaled, shrink(view.rgba), shrink(clear),
                  tables.get(shrunken, shot.intrinsics.lens, scaled));
-  else
+  } else {
     view.rgba = shaped(std::move(view.rgba));
+    if (clear.size() > 0) clear = shaped(std::move(clear)), view.valid.resize(at(clear.size() / 4));
+    for (Index p = 0; p < std::ssize(view.valid); ++p) view.valid[at(p)] = clear[4 * p] > kClear;
+  }
   view.own_width = scaled.width, view.own_height = scaled.height;
   return view;
 }

@@ -1,5 +1,6 @@
 #pragma once
-// Reads the images and masks of a split, removes lens distortion, resizes them and pads them to one size.
+// Reads the images and masks of a split, brings them to pinhole cameras, resizes them and pads them to one
+// size.
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -25,7 +26,7 @@ struct ViewPlan {
   std::vector<std::filesystem::path> masks{};  ///< one per shot; empty: none
   Index size = 0;                              ///< longer side before images are cropped, pixels; 0: original
   std::vector<LensPart> parts{};               ///< one per stated size if there are lenses, else none
-  bool unfiltered = false;                     ///< see DatasetOptions
+  bool resampled = false;                      ///< see DatasetOptions
 };
 
 /// Fills in ViewPlan::parts and describes them in `notes`.

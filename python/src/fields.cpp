@@ -42,7 +42,7 @@ std::shared_ptr<RadianceField> train(const std::filesystem::path& data, double s
   options.schedule.seconds = seconds;
   options.schedule.steps = steps;
   options.seed = seed;
-  const nerf::Dataset set = nerf::load_dataset(data, {.size = size, .unfiltered = true});
+  const nerf::Dataset set = nerf::load_dataset(data, {.size = size});
   auto field = std::make_shared<RadianceField>(nerf::field_options(options.schedule));
   nerf::Trainer trainer(*field, set, options);
   run(trainer, progress);

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "lens.h"
 #include "nerf/format_samples.h"
 #include "nerf/training_images.h"
 #include "support/catch.h"
@@ -94,35 +95,41 @@ TEST_CASE("dataset: distorted images are cut to what every lens covers, and keep
       "in the image, got k1 -30 k2 0 p1 0 p2 0");
 }
 
-TEST_CASE("dataset: unfiltered views have the colours of the files, and where they are of") {
+TEST_CASE("dataset: views behind a lens keep the file's colours and say where they were seen") {
   TrainingImages scene;
+  for (int i = 0; i < 10; ++i) write_image(scene.image(i), 12, 8, static_cast<std::uint64_t>(i));
   scene.json["k1"] = 2;
   scene.json["frames"][4]["k1"] = 4;
   scene.write();
-  const Dataset data = load_dataset(scene.path, {.unfiltered = true});
-  const Dataset filtered = load_dataset(scene.path);
+  const Dataset data = load_dataset(scene.path), resampled = load_dataset(scene.path, {.resampled = true});
   for (std::size_t v = 0; v < data.views.size(); ++v) {
     const View& view = data.views[v];
+    const Camera& c = view.camera;
     CAPTURE(view.name);
-    CHECK(view.camera.parameters() == filtered.views[v].camera.parameters());
-    CHECK(!filtered.views[v].offsets);
+    CHECK(c.parameters() == resampled.views[v].camera.parameters());
+    CHECK(!resampled.views[v].offsets);
+    CHECK(view.valid.empty());
     REQUIRE(view.offsets);
-    REQUIRE(std::ssize(*view.offsets) == view.camera.width * view.camera.height);
+    REQUIRE(std::ssize(*view.offsets) == c.width * c.height);
     const Tensor<float> file = read_image(scene / "images" / (view.name + ".png"));
-    const auto is_there = [&](const float* rgba) {
-      for (Index p = 0; p < 12 * 8; ++p)
-        if (std::equal(rgba, rgba + 3, &file.data[at(3 * p)])) return true;
-      return false;
-    };
-    for (Index p = 0; p < view.camera.width * view.camera.height; ++p)
-      CHECK(is_there(&view.rgba.data[at(4 * p)]));
+    const Lens lens{.k1 = view.name == "5" ? 4. : 2.};
+    for (Index p = 0; p < c.width * c.height; ++p) {
+      const auto [right, down] = (*view.offsets)[at(p)];
+      const Vec2 seen = lens.distorted({(static_cast<double>(p % c.width) + 0.5 + right - c.cx) / c.fx,
+                                        (static_cast<double>(p / c.width) + 0.5 + down - c.cy) / c.fy});
+      const double x = 20 * seen[0] + 6.5, y = 21 * seen[1] + 4.5;  // the centre of a pixel
+      CHECK(std::abs(x - std::floor(x) - 0.5) < 1e-4);
+      CHECK(std::abs(y - std::floor(y) - 0.5) < 1e-4);
+      const Index pixel = static_cast<Index>(y) * 12 + static_cast<Index>(x);
+      CHECK(std::equal(&file.data[at(3 * pixel)], &file.data[at(3 * pixel)] + 3, &view.rgba.data[at(4 * p)]));
+    }
   }
-  // Nine frames have one lens, of which frame 5 has another.
+  // Frame 5 has its own lens; the others share one.
   CHECK(data.views[0].offsets == data.views[1].offsets);
   CHECK(data.views[4].name == "5");
   CHECK(data.views[4].offsets != data.views[0].offsets);
   TrainingImages pinhole;
-  CHECK(!load_dataset(pinhole.path, {.unfiltered = true}).views[0].offsets);
+  CHECK(!load_dataset(pinhole.path).views[0].offsets);
 }
 
 TEST_CASE("dataset: images of another size than stated or than the first are refused") {

@@ -149,6 +149,21 @@ TEST_CASE("evaluation: a view without the object and a tiny image are left out o
   CHECK(std::isnan(evaluate(renderer, data).ssim));
 }
 
+TEST_CASE("evaluation: views are compared at the offsets of their pixels") {
+  const RadianceField field = small_field();
+  Renderer renderer(field);
+  Dataset data{.name = "beside", .split = "test", .background = field.background, .views = {}};
+  Camera camera = make_camera(look_at({2.2, -3.1, 1.7}, {0.1, 0.2, 0}, {0, 0, 1}), 0.9, 23, 18);
+  const Rendering seen = renderer.render(camera);
+  Tensor<float> rgba(Shape{18, 23, 4}, 1.f);
+  for (Index i = 0; i < 18 * 23; ++i) std::copy_n(&seen.rgb.data[at(3 * i)], 3, &rgba.data[at(4 * i)]);
+  camera.cx += 0.5;
+  data.views.push_back({.camera = camera, .rgba = rgba, .name = "a"});
+  const double at_centres = evaluate(renderer, data).psnr;
+  data.views[0].offsets = std::make_shared<PixelOffsets>(18 * 23, std::array{0.5f, 0.f});
+  CHECK(evaluate(renderer, data).psnr > at_centres + 20);
+}
+
 TEST_CASE("evaluation: progress counts views and can end it") {
   const RadianceField field = small_field();
   Renderer renderer(field);

@@ -149,6 +149,30 @@ TEST_CASE("renderer: an empty field is the background") {
   CHECK(std::all_of(view.opacity.data.begin(), view.opacity.data.end(), [](float v) { return v == 0; }));
 }
 
+TEST_CASE("renderer: offsets displace the rays of pixels, and of their parts") {
+  const RadianceField field = small_field();
+  const Camera camera = test_camera();
+  Camera moved = camera;
+  moved.cx -= 0.25, moved.cy += 0.5;
+  const PixelOffsets offsets(static_cast<std::size_t>(camera.width * camera.height), {0.25f, -0.5f});
+  for (const Index rays : {1, 2}) {
+    Renderer renderer(field, {.supersampling = rays});
+    const Rendering seen = renderer.render(camera, &offsets), expected = renderer.render(moved);
+    double most = 0, from_plain = 0;
+    const Rendering plain = renderer.render(camera);
+    for (std::size_t i = 0; i < seen.rgb.data.size(); ++i) {
+      raise_to(most, std::abs(static_cast<double>(seen.rgb.data[i] - expected.rgb.data[i])));
+      raise_to(from_plain, std::abs(static_cast<double>(seen.rgb.data[i] - plain.rgb.data[i])));
+    }
+    CHECK(most < 1e-4);
+    CHECK(from_plain > 0.01);
+  }
+  Renderer renderer(field);
+  const PixelOffsets few(3);
+  CHECK_THROWS_WITH(renderer.render(camera, &few),
+                    "[render] offsets must be of the camera's 414 pixels, got 3");
+}
+
 TEST_CASE("renderer: trace gives what render shows") {
   const RadianceField f = small_field();
   const Camera camera = test_camera(3, 2);

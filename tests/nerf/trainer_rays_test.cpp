@@ -82,7 +82,7 @@ TEST_CASE(
   CHECK(psnr(by_means, 0) == taught);
 }
 
-TEST_CASE("trainer_rays: colours that are of places beside the centres are learnt there") {
+TEST_CASE("trainer_rays: colours are learnt at the offsets of their pixels") {
   const auto learnt = [&](float across, float down, double cx, double cy) {
     Dataset data = make_scene({.size = 24, .views = 6});
     for (View& v : data.views) {
@@ -99,6 +99,11 @@ TEST_CASE("trainer_rays: colours that are of places beside the centres are learn
   // A principal point that is moved the other way gives the same rays.
   CHECK(learnt(0.25f, -0.5f, 0, 0) == learnt(0, 0, -0.25, 0.5));
   CHECK(learnt(0.25f, -0.5f, 0, 0) != learnt(0, 0, 0, 0));
+  Dataset data = make_scene({.size = 24, .views = 2});
+  data.views[1].offsets = std::make_shared<PixelOffsets>(5);
+  RadianceField field(field_options(1));
+  CHECK_THROWS_WITH(Trainer(field, data, train_options(1, 0)),
+                    "[trainer] data must have an offset for each pixel, got 5 for view r_1");
 }
 
 TEST_CASE("trainer_rays: supersampling begins after its steps, and only then") {

@@ -62,20 +62,52 @@ TEST_CASE("view files: a pixel that is part masked is excluded, at any size and 
   CHECK(view_of(load_dataset(scene.path, {.size = 6}), "1").valid == columns_below(1, 6, 4));
   scene.json["k1"] = 2;
   scene.write();
+  for (const bool resampled : {false, true})
+    for (const Index size : {12, 6}) {
+      CAPTURE(resampled, size);
+      const Dataset data = load_dataset(scene.path, {.size = size, .resampled = resampled});
+      const View& v = view_of(data, "1");
+      REQUIRE(std::ssize(v.valid) == v.camera.width * v.camera.height);
+      const auto kept = std::ranges::count(v.valid, 1);
+      CHECK(kept > 0);
+      CHECK(kept < std::ssize(v.valid));
+      // The mask's columns are those of the distorted image: valid pixels see points left of column 3.5.
+      const double scale = static_cast<double>(size) / 12;
+      for (Index i = 0; i < std::ssize(v.valid); ++i) {
+        const auto at_pixel = v.offsets ? (*v.offsets)[at(i)] : std::array{0.f, 0.f};
+        const double x =
+            (static_cast<double>(i % v.camera.width) + 0.5 + at_pixel[0] - v.camera.cx) / v.camera.fx;
+        const double y =
+            (static_cast<double>(i / v.camera.width) + 0.5 + at_pixel[1] - v.camera.cy) / v.camera.fy;
+        const double seen = (Lens{.k1 = 2}.distorted({x, y})[0] * 20 + 6.5) * scale;  // pixels
+        if (v.valid[at(i)]) CHECK(seen < 3.5 * scale);
+        if (seen < 3.5 * scale - 1) CHECK(v.valid[at(i)] == 1);
+      }
+    }
+}
+
+TEST_CASE("view files: views behind lenses are filled up with their offsets") {
+  TrainingImages scene;
+  write_image(scene.image(1), 8, 12, 7);
+  scene.frame(1)["w"] = 8, scene.frame(1)["h"] = 12;
+  scene.json["k1"] = 0.1;
+  scene.write();
   const Dataset data = load_dataset(scene.path);
   const View& v = view_of(data, "1");
-  REQUIRE(std::ssize(v.valid) == v.camera.width * v.camera.height);
-  const auto kept = std::ranges::count(v.valid, 1);
-  CHECK(kept > 0);
-  CHECK(kept < std::ssize(v.valid));
-  // The mask's columns are those of the distorted image: valid pixels see points left of column 3.5.
-  for (Index i = 0; i < std::ssize(v.valid); ++i) {
-    const double x = (static_cast<double>(i % v.camera.width) + 0.5 - v.camera.cx) / v.camera.fx,
-                 y = (static_cast<double>(i / v.camera.width) + 0.5 - v.camera.cy) / v.camera.fy;
-    const double seen = Lens{.k1 = 2}.distorted({x, y})[0] * 20 + 6.5;
-    if (v.valid[static_cast<std::size_t>(i)]) CHECK(seen < 3.5);
-    if (seen < 2.5) CHECK(v.valid[static_cast<std::size_t>(i)] == 1);
-  }
+  REQUIRE(v.offsets);
+  REQUIRE(std::ssize(*v.offsets) == v.camera.width * v.camera.height);
+  CHECK(v.own_width < v.camera.width);
+  const Camera own = cropped(v.camera, {.left = 0, .top = 0, .width = v.own_width, .height = v.own_height});
+  double off = 0;
+  for (Index y = 0; y < own.height; ++y)
+    for (Index x = 0; x < own.width; ++x) {
+      const auto [right, down] = (*v.offsets)[at(y * v.camera.width + x)];
+      const Vec2 seen = Lens{.k1 = 0.1}.distorted({(static_cast<double>(x) + 0.5 + right - own.cx) / own.fx,
+                                                   (static_cast<double>(y) + 0.5 + down - own.cy) / own.fy});
+      const double column = own.fx * seen[0] + 6.5 - 0.5;  // of the file
+      off = std::max(off, std::abs(column - std::round(column)));
+    }
+  CHECK(off < 1e-4);
 }
 
 TEST_CASE("view files: errors of masks name the frame, the file and the remedy") {

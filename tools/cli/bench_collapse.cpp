@@ -28,7 +28,7 @@ struct WatchedScene {
 
 WatchedScene scene_in(const std::string& folder) {
   const std::string split = nerf::has_split(folder, "val") ? "val" : "test";
-  nerf::Dataset train = nerf::load_dataset(folder, {.split = "train", .unfiltered = true});
+  nerf::Dataset train = nerf::load_dataset(folder, {.split = "train"});
   nerf::Dataset judge = nerf::load_dataset(folder, {.split = split,
                                                     .background = train.background,
                                                     .scene = train.scene,
@@ -98,7 +98,7 @@ std::vector<bench::WatchedTraining> provoked(const BenchCollapseArguments& o,
   return rows;
 }
 
-// Runs settings that people choose, each on every scene; each round of all has the next seed.
+// Runs ordinary trainings, each on every scene; each round of all has the next seed.
 std::vector<bench::WatchedTraining> ordinary(const BenchCollapseArguments& o,
                                              const std::vector<WatchedScene>& scenes, Context& context) {
   std::vector<bench::WatchedTraining> rows;

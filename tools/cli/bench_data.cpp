@@ -21,7 +21,7 @@ std::string or_shared(const std::string& folder, const char* name) {
 // Makes the groups whose data are there.
 std::vector<bench::DataGroup> groups_of(const BenchDataArguments& o, Context& context) {
   const auto load = [&](const std::string& folder, const char* split) {
-    return nerf::load_dataset(folder, {.split = split, .size = o.size});
+    return nerf::load_dataset(folder, {.split = split, .size = o.size, .resampled = true});
   };
   std::vector<bench::DataGroup> groups;
   const std::string object = or_shared(o.object, "nerf_synthetic/lego"), place = or_shared(o.place, "fox");

@@ -90,7 +90,7 @@ Scene scene_of(const BenchEngineArguments& options) {
   Scene scene;
   const bool step = std::string("nerf_step_first").find(options.engine.only) != std::string::npos;
   if (folder.empty() || !(step || options.precision)) return scene;
-  scene.train = nerf::load_dataset(folder, {.split = "train", .unfiltered = true});
+  scene.train = nerf::load_dataset(folder);
   if (options.precision) scene.test = nerf::load_dataset(folder, {.split = "test"});
   return scene;
 }

@@ -55,7 +55,7 @@ void add_plot(CommandLine& app, std::string& plot) {
 
 nerf::Dataset bench_split(const std::string& folder, const std::string& split, bool quick) {
   const std::string path = folder.empty() ? shared_data("nerf_synthetic/lego").string() : folder;
-  if (!path.empty()) return nerf::load_dataset(path, {.split = split, .unfiltered = split == "train"});
+  if (!path.empty()) return nerf::load_dataset(path, {.split = split});
   const Index part = quick ? 8 : 1;
   return nerf::make_scene({.size = kSceneSize / part, .views = kSceneViews / part}, split);
 }

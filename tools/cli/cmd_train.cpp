@@ -92,10 +92,8 @@ nerf::RadianceFieldOptions sized(const nerf::RadianceFieldOptions& start, const 
 
 // Loads the training images and prints the type of their scene.
 nerf::Dataset training_data(const TrainArguments& options, Context& context) {
-  nerf::DatasetOptions wanted{.split = "train",
-                              .size = options.size,
-                              .background = background_of(options.background),
-                              .unfiltered = true};
+  nerf::DatasetOptions wanted{
+      .split = "train", .size = options.size, .background = background_of(options.background)};
   if (!options.scene_type.empty()) wanted.scene = nerf::parse_scene_type(options.scene_type);
   try {
     nerf::Dataset data = load_scene(options.data, wanted, context);

@@ -44,10 +44,8 @@ nerf::Dataset turned_renders(const nerf::RadianceField& field, const TrainingAtt
 nerf::Dataset data_of(const std::string& name, const nerf::RadianceField& field,
                       const TrainingAttackOptions& options, Context& context) {
   if (name == "finetune")
-    return load_scene(
-        options.data,
-        {.split = "train", .size = options.size, .background = field.background, .unfiltered = true},
-        context);
+    return load_scene(options.data, {.split = "train", .size = options.size, .background = field.background},
+                      context);
   return name == "remove" ? turned_renders(field, options, context) : renders(field, options, context);
 }
 

@@ -44,9 +44,10 @@ TEST_CASE("training_variants: ordinary trainings differ and have the length and 
     CHECK(v.train.seed == 7);
     CHECK(v.train.schedule.seconds == 3);
   }
-  CHECK(all.size() == training_variants({.seconds = 3}, 7).size() + 3);
+  CHECK(all.size() == training_variants({.seconds = 3}, 7).size() + 4);
   CHECK(all[0].name() == "default: as trained");
   CHECK(all[1].field.field.kind == nerf::FieldKind::mlp);
   CHECK(all[2].train.image_colours);
   CHECK(all[3].train.refine_poses);
+  CHECK(all[4].field.field.encoding.log2_table == 12);
 }

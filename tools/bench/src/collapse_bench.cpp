@@ -24,6 +24,7 @@ void shift_images(nerf::Dataset& data) {
   for (std::size_t v = 0; v + 1 < views.size(); ++v) {
     std::swap(views[v].rgba, views[v + 1].rgba);
     std::swap(views[v].valid, views[v + 1].valid);
+    std::swap(views[v].offsets, views[v + 1].offsets);
   }
 }
 

@@ -29,8 +29,8 @@ struct FormRun {
 // Trains on a written form. steps: 0 for a timed run.
 DataRow trained(const DataGroup& group, const DataForm& form, const std::filesystem::path& folder,
                 Index steps, const FormRun& run, const std::function<void(double)>& progress) {
-  const nerf::Dataset train = nerf::load_dataset(
-      folder, {.split = "train", .background = nerf::Background::white, .unfiltered = true});
+  const nerf::Dataset train =
+      nerf::load_dataset(folder, {.split = "train", .background = nerf::Background::white});
   nerf::RadianceFieldOptions sizes = nerf::field_options({.seconds = run.seconds});
   sizes.seed = run.seed;
   nerf::RadianceField field(sizes);

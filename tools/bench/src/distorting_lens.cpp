@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 namespace fieldmark::bench {
+
 DistortingLens DistortingLens::equidistant() {
   DistortingLens lens;
   lens.fisheye_ = true;

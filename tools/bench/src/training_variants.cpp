@@ -51,7 +51,7 @@ std::vector<TrainingVariant> training_variants(const ScheduleOptions& schedule, 
 std::vector<TrainingVariant> ordinary_trainings(const ScheduleOptions& schedule, std::uint64_t seed) {
   std::vector<TrainingVariant> all = training_variants(schedule, seed);
   const TrainingVariant base = all.front();
-  TrainingVariant mlp = base, exposures = base, poses = base;
+  TrainingVariant mlp = base, exposures = base, poses = base, small = base;
   mlp.choice = "preset", mlp.setting = "mlp";
   mlp.field = {.seed = seed};
   mlp.field.field.kind = nerf::FieldKind::mlp;
@@ -63,7 +63,9 @@ std::vector<TrainingVariant> ordinary_trainings(const ScheduleOptions& schedule,
   exposures.train.image_colours = true;
   poses.choice = "poses", poses.setting = "refined";
   poses.train.refine_poses = true;
-  all.insert(all.begin() + 1, {mlp, exposures, poses});
+  small.choice = "model", small.setting = "table of 2^12";
+  small.field.field.encoding.log2_table = 12;
+  all.insert(all.begin() + 1, {mlp, exposures, poses, small});
   return all;
 }
 

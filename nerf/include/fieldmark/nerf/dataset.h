@@ -31,7 +31,7 @@ struct DepthRange {
   double far = 0;   ///< length, > near
 };
 
-/// Steps within an image, x to the right and y down in pixels, [height * width] row by row.
+/// Displacements within an image, pixels (x right, y down), [height * width] in row order.
 using PixelOffsets = std::vector<std::array<float, 2>>;
 
 /// A ground truth image and its camera.
@@ -43,8 +43,8 @@ struct View {
   /// [height * width] 0 for pixels that a mask excludes or that do not exist, which training and metrics
   /// ignore, else 1; empty: all are valid
   std::vector<std::uint8_t> valid{};
-  /// From the centre of each pixel to the place that its colour is of; null: it is of the centre. See
-  /// DatasetOptions::unfiltered. Views of one lens share it.
+  /// Displacement from each pixel's centre to the point where its colour was seen; null: none. See
+  /// DatasetOptions::resampled.
   std::shared_ptr<const PixelOffsets> offsets{};
   Index file_width = 0;   ///< of the image file, pixels; 0: there is none
   Index file_height = 0;  ///< of the image file, pixels; 0: there is none
@@ -80,10 +80,11 @@ struct DatasetOptions {
   std::optional<SceneType> scene{};
   /// Views to read, spread evenly over the split; 0: all.
   Index most_views = 0;
-  /// For training: each pixel of a view whose lens distorts has the colour of the nearest pixel of the image,
-  /// and View::offsets say where that is. No filter softens the image, so the field is as sharp as a
-  /// pinhole's. False: undistorted_image(), for what compares whole images.
-  bool unfiltered = false;
+  /// False: where a camera's lens distorts, each pixel of a view has the colour of the nearest pixel of the
+  /// image, and View::offsets say where that was seen. Nothing is softened, but neighbours are not evenly
+  /// spaced. True: such images are interpolated, see undistorted_image(), for methods that filter whole
+  /// images.
+  bool resampled = false;
 };
 
 /// Reads one split of a data set. The layout is that of the first of these files that the folder has:
@@ -97,8 +98,8 @@ struct DatasetOptions {
 /// to image NAME, where black keeps it; see View::valid.
 /// transforms: see parse_transforms(). Where train_filenames, val_filenames or test_filenames list frames,
 /// they define the splits: val and test stand in for one another, and train has the remaining frames. Frames
-/// without an image are skipped, with a note. Distorted images are resampled to a pinhole camera
-/// (DatasetOptions::unfiltered) and cropped to the part that every lens of the file covers. llff: see
+/// without an image are skipped, with a note. Distorted images are brought to a pinhole camera
+/// (DatasetOptions::resampled) and cropped to the part that every lens of the file covers. llff: see
 /// parse_poses_bounds(); recentre_llff() recentres and rescales the poses. Images come from the folder images
 /// or images_N with the smallest longer side of at least `size` (else the largest). colmap: see
 /// parse_colmap_cameras(). World axes are COLMAP's. Images are chosen as for llff; lenses and missing images

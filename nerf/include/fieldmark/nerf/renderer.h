@@ -49,7 +49,9 @@ class Renderer {
   ~Renderer();
   /// Renders a view with one ray through the centre of every pixel, or several, see
   /// RenderOptions::supersampling. Samples are in the middle of their intervals.
-  Rendering render(const Camera& camera);
+  /// @param offsets  displacement of each pixel, see View::offsets; null: none
+  /// @throws ValueError unless there is one for each pixel
+  Rendering render(const Camera& camera, const PixelOffsets* offsets = nullptr);
   /// Reads the current parameters of the field for trace(). render() does this itself.
   void refresh() { packed_.update(); }
   /// Replaces colours before they are composited. Receives positions x [n, 3] in the unit cube, unit viewing
@@ -72,7 +74,7 @@ class Renderer {
   template <class F>
   void trace_blocks(const RayBatch& rays, Lane& lane, F use);
   void trace_block(const RayBatch& rays, Lane& lane);
-  Rendering trace_centres(const Camera& camera);
+  Rendering trace_pixels(const Camera& camera, const PixelOffsets* offsets);
   const RadianceField& field_;
   RenderOptions options_;
   float step_;  // cube sides

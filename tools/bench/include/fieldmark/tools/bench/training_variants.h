@@ -22,8 +22,8 @@ struct TrainingVariant {
 /// @param schedule  of all variants; its steps and seconds are kept   @param seed  of field and training
 std::vector<TrainingVariant> training_variants(const ScheduleOptions& schedule, std::uint64_t seed);
 
-/// Returns settings that people choose: the default first, preset mlp, what `train` learns per image, then
-/// the other training_variants().
+/// Returns settings that must not end in a collapse: the default first, preset mlp, exposures, refined poses,
+/// a small table, then the other training_variants().
 std::vector<TrainingVariant> ordinary_trainings(const ScheduleOptions& schedule, std::uint64_t seed);
 
 }  // namespace fieldmark::bench
