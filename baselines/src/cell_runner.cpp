@@ -42,7 +42,7 @@ void thin_out(nerf::Dataset& data, Index most) {
 
 nerf::Dataset split_of(const PaperScene& scene, Index size, const char* split) {
   if (scene.folder.empty()) return nerf::make_scene({.size = size}, split);
-  // HiDDeN and MBRS filter whole images.
+  // HiDDeN and MBRS filter whole images, and all systems are compared on the same ones.
   return nerf::load_dataset(scene.folder, {.split = split, .size = size, .resampled = true});
 }
 

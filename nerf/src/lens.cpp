@@ -122,11 +122,11 @@ double missing_share(const Camera& c, const Lens& lens, const Crop& r, int side)
   return static_cast<double>(missing) / static_cast<double>(length);
 }
 
-// Inverts distorted() from a start within a pixel of the solution; close to a fold that may fail, and then
-// Lens::undistorted() decides. @param enough  length of the remaining error
+// Inverts distorted() from a start that it maps to within a pixel of `seen`. Close to a fold this may fail,
+// and then Lens::undistorted() decides. @param enough  length of the remaining error
 std::optional<Vec2> undistorted_near(const Lens& lens, const Vec2& seen, Vec2 q, double enough) {
   constexpr int kSteps = 3;
-  for (int step = 0; step < kSteps; ++step) {
+  for (int step = 0; step <= kSteps; ++step) {
     const Vec2 p = lens.distorted(q), f{p[0] - seen[0], p[1] - seen[1]};
     const auto m = derivative(lens, q);
     if (!(determinant(m) > 0 && m[0] + m[2] > 0)) break;
@@ -288,19 +288,24 @@ Tensor<float> undistorted_image(const Tensor<float>& rgba, const Camera& camera,
 NearestPixels nearest_pixels(const Camera& seen, const Lens& lens, const Camera& pinhole) {
   NearestPixels found;
   found.pixels.reserve(at(pinhole.height * pinhole.width));
-  found.offsets.reserve(at(pinhole.height * pinhole.width));
+  PixelOffsets offsets;
+  offsets.reserve(at(pinhole.height * pinhole.width));
   for (Index y = 0; y < pinhole.height; ++y)
     for (Index x = 0; x < pinhole.width; ++x) {
       const double px = static_cast<double>(x) + 0.5, py = static_cast<double>(y) + 0.5;
       const Vec2 q = on_plane(pinhole, px, py), p = on_image(seen, lens.distorted(q));
-      const Index column = std::clamp<Index>(static_cast<Index>(std::floor(p[0])), 0, seen.width - 1),
-                  row = std::clamp<Index>(static_cast<Index>(std::floor(p[1])), 0, seen.height - 1);
+      // A NaN, beyond a pole, becomes 0 and has no inverse.
+      const auto nearest = [](double v, Index side) {
+        return v > 0 ? static_cast<Index>(std::min(v, static_cast<double>(side) - 0.5)) : 0;
+      };
+      const Index column = nearest(p[0], seen.width), row = nearest(p[1], seen.height);
       const Vec2 centre = on_plane(seen, static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5);
       const auto to = undistorted_near(lens, centre, q, 1e-6 / std::max(seen.fx, seen.fy));
       found.pixels.push_back(to ? static_cast<std::int32_t>(row * seen.width + column) : -1);
       const Vec2 place = on_image(pinhole, to.value_or(q));
-      found.offsets.push_back({static_cast<float>(place[0] - px), static_cast<float>(place[1] - py)});
+      offsets.push_back({static_cast<float>(place[0] - px), static_cast<float>(place[1] - py)});
     }
+  found.offsets = std::make_shared<const PixelOffsets>(std::move(offsets));
   return found;
 }
 

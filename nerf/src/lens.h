@@ -100,7 +100,7 @@ struct NearestPixels {
   std::vector<std::int32_t> pixels{};
   /// Displacement from each pinhole pixel's centre to the undistorted centre of the lens's pixel, in pixels
   /// of the pinhole.
-  PixelOffsets offsets{};
+  std::shared_ptr<const PixelOffsets> offsets{};
 };
 
 /// Finds the nearest pixels. Points outside the lens's image take the nearest border pixel.

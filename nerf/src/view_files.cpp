@@ -128,9 +128,13 @@ Tensor<float> read_mask(const Shot& shot, const fs::path& file, Index height, In
 class LensTables {
  public:
   std::shared_ptr<const NearestPixels> get(const Camera& seen, const Lens& lens, const Camera& pinhole) {
-    if (auto known = find(seen, lens, pinhole)) return known;
+    {
+      const std::lock_guard lock(mutex_);
+      if (auto known = find(seen, lens, pinhole)) return known;
+    }
     auto nearest = std::make_shared<const NearestPixels>(nearest_pixels(seen, lens, pinhole));
     const std::lock_guard lock(mutex_);
+    if (auto known = find(seen, lens, pinhole)) return known;  // of another thread, meanwhile
     tables_.push_back({lens, seen, pinhole, nearest});
     return nearest;
   }
@@ -146,7 +150,6 @@ class LensTables {
     return a.parameters() == b.parameters() && a.width == b.width && a.height == b.height;
   }
   std::shared_ptr<const NearestPixels> find(const Camera& seen, const Lens& lens, const Camera& pinhole) {
-    const std::lock_guard lock(mutex_);
     for (const Table& t : tables_)
       if (t.lens == lens && same_image(t.seen, seen) && same_image(t.pinhole, pinhole)) return t.nearest;
     return nullptr;
@@ -158,17 +161,18 @@ class LensTables {
 // Takes for each pixel of a view the nearest pixel of the lens's image and of its mask.
 // @param seen  [H, W, 4]   @param clear  the mask, of the same shape, 1 where pixels are valid; empty: none
 void take_nearest(View& view, const Camera& pinhole, const Tensor<float>& seen, const Tensor<float>& clear,
-                  const std::shared_ptr<const NearestPixels>& nearest) {
-  const std::vector<std::int32_t>& pixels = nearest->pixels;
+                  const NearestPixels& nearest) {
+  const std::vector<std::int32_t>& pixels = nearest.pixels;
   const bool all = clear.size() == 0 && std::ranges::find(pixels, -1) == pixels.end();
   view.rgba = Tensor<float>(Shape{pinhole.height, pinhole.width, 4}, 1.f);
   if (!all) view.valid.assign(pixels.size(), 0);
   for (std::size_t p = 0; p < pixels.size(); ++p) {
-    if (pixels[p] < 0) continue;
-    std::copy_n(&seen.data[at(4 * pixels[p])], 4, &view.rgba.data[4 * p]);
-    if (!all) view.valid[p] = clear.size() == 0 || clear[4 * pixels[p]] > kClear;
+    const Index pixel = pixels[p];
+    if (pixel < 0) continue;
+    std::copy_n(&seen.data[at(4 * pixel)], 4, &view.rgba.data[4 * p]);
+    if (!all) view.valid[p] = clear.size() == 0 || clear[4 * pixel] > kClear;
   }
-  view.offsets = {nearest, &nearest->offsets};
+  view.offsets = nearest.offsets;
 }
 
 View read_view(const ViewPlan& plan, std::size_t i, LensTables& tables) {
@@ -205,7 +209,7 @@ View read_view(const ViewPlan& plan, std::size_t i, LensTables& tables) {
                                : resize_rgba(std::move(image), shrunken.height, shrunken.width);
     };
     take_nearest(view, scaled, shrink(view.rgba), shrink(clear),
-                 tables.get(shrunken, shot.intrinsics.lens, scaled));
+                 *tables.get(shrunken, shot.intrinsics.lens, scaled));
   } else {
     view.rgba = shaped(std::move(view.rgba));
     if (clear.size() > 0) clear = shaped(std::move(clear)), view.valid.resize(at(clear.size() / 4));
@@ -251,13 +255,18 @@ void bring_to_one_size(std::vector<View>& views, std::vector<std::string>& notes
 }
 
 void tell_of_masks(const ViewPlan& plan, const std::vector<View>& views, std::vector<std::string>& notes) {
-  std::size_t masks = 0, excluded = 0, pixels = 0;
-  for (const View& v : views) {
+  std::size_t masks = 0, excluded = 0, pixels = 0, beyond = 0;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const View& v = views[i];
     pixels += at(v.camera.width * v.camera.height);
-    if (v.valid.empty()) continue;
-    ++masks;
-    excluded += static_cast<std::size_t>(std::count(v.valid.begin(), v.valid.end(), 0));
+    const auto without = static_cast<std::size_t>(std::ranges::count(v.valid, 0));
+    masks += !plan.masks[i].empty();
+    (plan.masks[i].empty() ? beyond : excluded) += without;
   }
+  if (beyond > 0)
+    notes.push_back(
+        std::to_string(beyond) +
+        " pixels are of places that their lens does not show; they are neither learnt nor counted");
   if (masks == 0) return;
   if (excluded == pixels)
     throw IoError(plan.shots.front().place +
@@ -305,9 +314,8 @@ void plan_lenses(const std::vector<Shot>& all, ViewPlan& plan, std::vector<std::
                           .width = width,
                           .height = height,
                           .part = {.left = left, .top = top, .width = right - left, .height = bottom - top}});
-    notes.push_back("lens distortion removed: images of " + size_text(width, height) +
-                    " pixels are cut to the " + size_text(right - left, bottom - top) +
-                    " that all of them have");
+    notes.push_back("images of " + size_text(width, height) + " pixels behind a lens are cut to the " +
+                    size_text(right - left, bottom - top) + " that every lens covers");
   }
 }
 

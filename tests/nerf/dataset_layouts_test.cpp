@@ -82,7 +82,7 @@ TEST_CASE("dataset: distorted images are cut to what every lens covers, and keep
       CHECK(v.camera.parameters()[14] == c.cx);
       CHECK(v.rgba.shape == Shape{c.height, c.width, 4});
     }
-  CHECK_THAT(train.notes.back(), Contains("lens distortion removed: images of 12 x 8 pixels are cut to the " +
+  CHECK_THAT(train.notes.back(), Contains("images of 12 x 8 pixels behind a lens are cut to the " +
                                           std::to_string(c.width) + " x " + std::to_string(c.height)));
   const Dataset half = load_dataset(scene.path, {.size = 6});
   CHECK(half.views[0].camera.width == (c.width + 1) / 2);

@@ -196,10 +196,10 @@ TEST_CASE("lens: the nearest pixels are where the lens puts the places that thei
     const Camera pinhole = cropped(kCamera, covered_part(kCamera, lens)).scaled(21, 17);
     const NearestPixels nearest = nearest_pixels(seen, lens, pinhole);
     REQUIRE(std::ssize(nearest.pixels) == 21 * 17);
-    REQUIRE(std::ssize(nearest.offsets) == 21 * 17);
+    REQUIRE(std::ssize(*nearest.offsets) == 21 * 17);
     double off = 0, longest = 0;
     for (Index p = 0; p < 21 * 17; ++p) {
-      const auto [dx, dy] = nearest.offsets[at(p)];
+      const auto [dx, dy] = (*nearest.offsets)[at(p)];
       const Vec2 q = lens.distorted({(static_cast<double>(p % 21) + 0.5 + dx - pinhole.cx) / pinhole.fx,
                                      (static_cast<double>(p / 21) + 0.5 + dy - pinhole.cy) / pinhole.fy});
       const Index pixel = nearest.pixels[at(p)];
@@ -227,8 +227,8 @@ TEST_CASE("lens: close to a fold a pixel has its true place or none") {
       ++none;
       continue;
     }
-    const Vec2 q{(static_cast<double>(p % 200) + 0.5 + nearest.offsets[at(p)][0]) / 200,
-                 (static_cast<double>(p / 200) - 3.5 + nearest.offsets[at(p)][1]) / 200};
+    const Vec2 q{(static_cast<double>(p % 200) + 0.5 + (*nearest.offsets)[at(p)][0]) / 200,
+                 (static_cast<double>(p / 200) - 3.5 + (*nearest.offsets)[at(p)][1]) / 200};
     CHECK(lens.is_regular(q));
     const Vec2 back = lens.distorted(q);
     raise_to(off, std::abs(200 * back[0] - (static_cast<double>(pixel % 140) + 0.5)));
@@ -244,7 +244,7 @@ TEST_CASE("lens: without distortion the nearest pixels are those of the part, wi
       nearest_pixels(kCamera, {}, cropped(kCamera, {.left = 3, .top = 5, .width = 20, .height = 10}));
   for (Index p = 0; p < 200; ++p) {
     CHECK(nearest.pixels[at(p)] == (p / 20 + 5) * 40 + p % 20 + 3);
-    for (const float step : nearest.offsets[at(p)]) CHECK(std::abs(step) < 1e-12f);
+    for (const float step : (*nearest.offsets)[at(p)]) CHECK(std::abs(step) < 1e-12f);
   }
 }
 

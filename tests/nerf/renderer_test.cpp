@@ -166,6 +166,18 @@ TEST_CASE("renderer: offsets displace the rays of pixels, and of their parts") {
     }
     CHECK(most < 1e-4);
     CHECK(from_plain > 0.01);
+    // Each pixel has its own: the left ones show their right neighbours, the others those above.
+    PixelOffsets of_pixels(offsets.size());
+    for (Index p = 0; p < 23 * 18; ++p)
+      of_pixels[at(p)] = p % 23 < 11 ? std::array{1.f, 0.f} : std::array{0.f, p < 23 ? 0.f : -1.f};
+    const Rendering own = renderer.render(camera, &of_pixels);
+    most = 0;
+    for (Index p = 0; p < 23 * 18; ++p) {
+      const Index from = p % 23 < 11 ? p + 1 : p < 23 ? p : p - 23;
+      for (Index k = 0; k < 3; ++k)
+        raise_to(most, std::abs(static_cast<double>(own.rgb[3 * p + k] - plain.rgb[3 * from + k])));
+    }
+    CHECK(most < 1e-4);
   }
   Renderer renderer(field);
   const PixelOffsets few(3);

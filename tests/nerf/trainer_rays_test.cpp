@@ -106,6 +106,33 @@ TEST_CASE("trainer_rays: colours are learnt at the offsets of their pixels") {
                     "[trainer] data must have an offset for each pixel, got 5 for view r_1");
 }
 
+TEST_CASE("trainer_rays: every pixel of every view has its own offset") {
+  // Half of the views show at each pixel what is three columns to the right, the others what is as far below.
+  const Dataset judge = make_scene({.size = 24, .views = 12});
+  const auto learnt = [&](bool offsets) {
+    Dataset data = judge;
+    for (std::size_t v = 0; v < data.views.size(); ++v) {
+      PixelOffsets of_pixels(24 * 24);
+      for (Index p = 0; p < 24 * 24; ++p) {
+        const Index right = v % 2 == 0 && p % 24 < 21 ? 3 : 0, below = v % 2 == 1 && p / 24 < 21 ? 3 : 0;
+        of_pixels[at(p)] = {static_cast<float>(right), static_cast<float>(below)};
+        std::copy_n(&judge.views[v].rgba[4 * (p + right + 24 * below)], 4, &data.views[v].rgba[4 * p]);
+      }
+      if (offsets) data.views[v].offsets = std::make_shared<PixelOffsets>(std::move(of_pixels));
+    }
+    TrainOptions options = train_options(150, 0);
+    options.carve = false;
+    RadianceField field(field_options(1));
+    Trainer trainer(field, data, options);
+    while (!trainer.done()) trainer.step(0);
+    Renderer renderer(field);
+    return evaluate(renderer, judge).psnr;
+  };
+  const double with = learnt(true), without = learnt(false);
+  CAPTURE(with, without);
+  CHECK(with > without + 3);
+}
+
 TEST_CASE("trainer_rays: supersampling begins after its steps, and only then") {
   const Dataset data = blurred_scene();
   CHECK(trained(data, 2, 10, 10) == trained(data, 1, 0, 10));

@@ -6,6 +6,7 @@
 
 #include "imaging/jpeg_bytes.h"
 #include "nerf/training_images.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using namespace fieldmark::nerf;
@@ -105,7 +106,9 @@ TEST_CASE("view files: views behind lenses are filled up with their offsets") {
       const Vec2 seen = Lens{.k1 = 0.1}.distorted({(static_cast<double>(x) + 0.5 + right - own.cx) / own.fx,
                                                    (static_cast<double>(y) + 0.5 + down - own.cy) / own.fy});
       const double column = own.fx * seen[0] + 6.5 - 0.5;  // of the file
-      off = std::max(off, std::abs(column - std::round(column)));
+      const double row = own.fy * seen[1] + 4.5 - 0.5;
+      raise_to(off, std::abs(column - std::round(column)));
+      raise_to(off, std::abs(row - std::round(row)));
     }
   CHECK(off < 1e-4);
 }

@@ -43,11 +43,11 @@ struct SceneOptions {
 Tensor<float> render_scene(const SceneOptions& options, const Camera& camera);
 
 /// Maps a point of an image, in pixels from its upper left corner, to the point of the plane at distance 1 in
-/// front of the camera that is seen there: x right, y down. Both must be finite, so nothing is seen at 90
-/// degrees from the axis or beyond.
+/// front of the camera that is seen there: x right, y down. Both coordinates must be finite, so nothing is
+/// seen at 90 degrees from the axis or beyond.
 using ImageToPlane = std::function<std::array<double, 2>(double x, double y)>;
 /// Ray-traces one view through a lens. @param camera  pose and size; the lens replaces the rest
-/// @param to_plane  called from several threads, also for points up to a pixel outside the image
+/// @param to_plane  called from several threads, for points of the image, its edges included
 /// @return  as above   @throws ValueError if an option is out of range
 Tensor<float> render_scene(const SceneOptions& options, const Camera& camera, const ImageToPlane& to_plane);
 

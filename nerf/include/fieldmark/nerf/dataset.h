@@ -40,11 +40,12 @@ struct View {
   Tensor<float> rgba;                 ///< [height, width, 4] in [0, 1], straight (not premultiplied) alpha
   std::string name;                   ///< file name without folder and extension: "r_12"
   std::optional<DepthRange> depth{};  ///< layout llff only
-  /// [height * width] 0 for pixels that a mask excludes or that do not exist, which training and metrics
-  /// ignore, else 1; empty: all are valid
+  /// [height * width] 0 for pixels that a mask excludes, a lens does not show or that do not exist, which
+  /// training and metrics ignore, else 1; empty: all are valid
   std::vector<std::uint8_t> valid{};
   /// Displacement from each pixel's centre to the point where its colour was seen; null: none. See
-  /// DatasetOptions::resampled.
+  /// DatasetOptions::resampled. The rays of a supersampled pixel spread over one pixel of this view around that
+  /// point.
   std::shared_ptr<const PixelOffsets> offsets{};
   Index file_width = 0;   ///< of the image file, pixels; 0: there is none
   Index file_height = 0;  ///< of the image file, pixels; 0: there is none
@@ -80,8 +81,8 @@ struct DatasetOptions {
   std::optional<SceneType> scene{};
   /// Views to read, spread evenly over the split; 0: all.
   Index most_views = 0;
-  /// False: where a camera's lens distorts, each pixel of a view has the colour of the nearest pixel of the
-  /// image, and View::offsets say where that was seen. Nothing is softened, but neighbours are not evenly
+  /// False: if a lens of the data set distorts, each pixel of a view has the colour of the nearest pixel of
+  /// the image, and View::offsets say where that was seen. Nothing is softened, but neighbours are not evenly
   /// spaced. True: such images are interpolated, see undistorted_image(), for methods that filter whole
   /// images.
   bool resampled = false;

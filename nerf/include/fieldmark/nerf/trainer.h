@@ -34,7 +34,7 @@ struct TrainOptions {
   /// so that a long run does not overfit where training images constrain little.
   double table_decay = 0.1;
   Index decay_after = 2000;  ///< first steps, >= 0, without table_decay: the table must grow first
-  /// First steps, >= 0, with one ray through the centre of a pixel; later a pixel is the mean of one ray
+  /// First steps, >= 0, with one ray a pixel; later a pixel is the mean of one ray
   /// through each of its parts (RadianceFieldOptions::supersampling). Hash fields only.
   Index supersample_after = 8000;
   Index warm_up = 32;      ///< steps before cells may be declared empty
