@@ -123,7 +123,7 @@ TEST_CASE("packed_weights: in bf16 a layer's values and gradients are off by the
 
 TEST_CASE("packed_weights: tables are rounded on request") {
   ParamStore<float> store;
-  const ParamId table = store.add("hash/table", {3, 4});
+  const ParamId table = store.add("hash/table", {3, 4}, ParamRole::table);
   store.values(table)[5] = 1.00390625f;
   PackedWeights<float> plain(store);
   plain.update();
