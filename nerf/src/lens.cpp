@@ -125,8 +125,8 @@ double missing_share(const Camera& c, const Lens& lens, const Crop& r, int side)
 // Inverts distorted() from a start that it maps to within a pixel of `seen`. Close to a fold this may fail,
 // and then Lens::undistorted() decides. @param enough  length of the remaining error
 std::optional<Vec2> undistorted_near(const Lens& lens, const Vec2& seen, Vec2 q, double enough) {
-  constexpr int kSteps = 3;
-  for (int step = 0; step <= kSteps; ++step) {
+  constexpr int kPlaces = 4;  // tried, the start among them
+  for (int place = 0; place < kPlaces; ++place) {
     const Vec2 p = lens.distorted(q), f{p[0] - seen[0], p[1] - seen[1]};
     const auto m = derivative(lens, q);
     if (!(determinant(m) > 0 && m[0] + m[2] > 0)) break;

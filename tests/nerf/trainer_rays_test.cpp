@@ -52,11 +52,21 @@ std::vector<float> numbers(const RadianceField& f) {
   return {f.params.values().begin(), f.params.values().end()};
 }
 
-std::vector<float> trained(const Dataset& data, Index supersampling, Index after, Index steps) {
+RadianceField trained_field(const Dataset& data, Index supersampling, const TrainOptions& options) {
   RadianceField field(field_options(supersampling));
-  Trainer trainer(field, data, train_options(steps, after));
+  Trainer trainer(field, data, options);
   while (!trainer.done()) trainer.step(0);
-  return numbers(field);
+  return field;
+}
+
+std::vector<float> trained(const Dataset& data, Index supersampling, Index after, Index steps) {
+  return numbers(trained_field(data, supersampling, train_options(steps, after)));
+}
+
+TrainOptions uncarved(Index steps) {
+  TrainOptions options = train_options(steps, 0);
+  options.carve = false;
+  return options;
 }
 
 }  // namespace
@@ -64,17 +74,12 @@ std::vector<float> trained(const Dataset& data, Index supersampling, Index after
 TEST_CASE(
     "trainer_rays: a field taught with means over pixels is nearer to training images that are such means") {
   const Dataset data = blurred_scene(40), judge = blurred_scene(6, "val");  // of rays that nothing learned
-  const auto taught_with = [&](Index rays) {
-    RadianceField field(field_options(rays));
-    Trainer trainer(field, data, train_options(400, 100));
-    while (!trainer.done()) trainer.step(0);
-    return field;
-  };
   const auto psnr = [&](const RadianceField& field, Index rays) {
     Renderer renderer(field, {.supersampling = rays});
     return evaluate(renderer, judge).psnr;
   };
-  const RadianceField by_centres = taught_with(1), by_means = taught_with(2);
+  const RadianceField by_centres = trained_field(data, 1, train_options(400, 100)),
+                      by_means = trained_field(data, 2, train_options(400, 100));
   const double centres = psnr(by_centres, 1), shown = psnr(by_centres, 2), taught = psnr(by_means, 2);
   CAPTURE(centres, shown, taught);
   CHECK(taught > shown + 0.5);
@@ -89,12 +94,7 @@ TEST_CASE("trainer_rays: colours are learnt at the offsets of their pixels") {
       v.offsets = std::make_shared<PixelOffsets>(24 * 24, std::array{across, down});
       v.camera.cx += cx, v.camera.cy += cy;
     }
-    TrainOptions options = train_options(20, 0);
-    options.carve = false;
-    RadianceField field(field_options(1));
-    Trainer trainer(field, data, options);
-    while (!trainer.done()) trainer.step(0);
-    return numbers(field);
+    return numbers(trained_field(data, 1, uncarved(20)));
   };
   // A principal point that is moved the other way gives the same rays.
   CHECK(learnt(0.25f, -0.5f, 0, 0) == learnt(0, 0, -0.25, 0.5));
@@ -120,11 +120,7 @@ TEST_CASE("trainer_rays: every pixel of every view has its own offset") {
       }
       if (offsets) data.views[v].offsets = std::make_shared<PixelOffsets>(std::move(of_pixels));
     }
-    TrainOptions options = train_options(150, 0);
-    options.carve = false;
-    RadianceField field(field_options(1));
-    Trainer trainer(field, data, options);
-    while (!trainer.done()) trainer.step(0);
+    const RadianceField field = trained_field(data, 1, uncarved(150));
     Renderer renderer(field);
     return evaluate(renderer, judge).psnr;
   };
@@ -205,12 +201,9 @@ TEST_CASE("trainer_rays: what masks exclude is not learnt, carved or not") {
   for (View& v : whole.views) v.valid.clear();
   for (const bool carve : {true, false}) {
     const auto learnt = [&](const Dataset& from) {
-      RadianceField field(field_options(1));
       TrainOptions options = train_options(12, 100);
       options.carve = carve;
-      Trainer trainer(field, from, options);
-      while (!trainer.done()) trainer.step(0);
-      return numbers(field);
+      return numbers(trained_field(from, 1, options));
     };
     const auto masked = learnt(data);
     CHECK(learnt(other) == masked);
