@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 
+#include "ordered_sum.h"
+
 namespace fieldmark::watermark {
 namespace {
 
@@ -43,13 +45,12 @@ std::vector<float> carrier_of(const Owner& owner, const CachedView& v) {
   return out;
 }
 
-}  // namespace
-
-Carriers carriers(const Owner& owner, const CachedView& v) {
-  Carriers out{Tensor<float>({v.height, v.width, 3}), {0}, {}, {}};
-  const std::vector<float> carrier = carrier_of(owner, v);
+// Computes the carriers of the pixels first .. last - 1.
+Carriers carriers_of_pixels(const Owner& owner, const CachedView& v, const std::vector<float>& carrier,
+                            Index first, Index last) {
+  Carriers out{Tensor<float>({last - first, 1, 3}), {0}, {}, {}};
   const auto gain = static_cast<float>(owner.gain);
-  for (Index p = 0; p < v.height * v.width; ++p) {
+  for (Index p = first; p < last; ++p) {
     for (std::int32_t k = v.sample_begin[at(p)]; k < v.sample_begin[at(p + 1)]; ++k) {
       float seen[3];
       for (std::size_t a = 0; a < 3; ++a) {
@@ -62,20 +63,43 @@ Carriers carriers(const Owner& owner, const CachedView& v) {
         const std::size_t entry = entry_of(out, mix.cell[m]);
         for (std::size_t a = 0; a < 3; ++a) out.part[3 * entry + a] += mix.part[m] * seen[a];
       }
-      for (std::size_t a = 0; a < 3; ++a) out.whole[3 * p + static_cast<Index>(a)] += seen[a];
+      for (std::size_t a = 0; a < 3; ++a) out.whole[3 * (p - first) + static_cast<Index>(a)] += seen[a];
     }
     out.begin.push_back(static_cast<std::int32_t>(out.cell.size()));
   }
   return out;
 }
 
-void change_colours(Carriers& mark, const Tensor<float>& base, const ToneFit& tones) {
-  for (std::size_t p = 0; p + 1 < mark.begin.size(); ++p) {
-    if (mark.begin[p] == mark.begin[p + 1]) continue;
-    const auto slope = tones.slope(&base.data[3 * p]);
-    times(slope, &mark.whole.data[3 * p]);
-    for (std::int32_t e = mark.begin[p]; e < mark.begin[p + 1]; ++e) times(slope, &mark.part[3 * at(e)]);
+}  // namespace
+
+Carriers carriers(const Owner& owner, const CachedView& v) {
+  const std::vector<float> carrier = carrier_of(owner, v);
+  const Index pixels = v.height * v.width;
+  std::vector<Carriers> pieces(at((pixels + kPixelChunk - 1) / kPixelChunk));
+  parallel_for(pixels, kPixelChunk, [&](Index first, Index last) {
+    pieces[at(first / kPixelChunk)] = carriers_of_pixels(owner, v, carrier, first, last);
+  });
+  Carriers out{Tensor<float>({v.height, v.width, 3}), {0}, {}, {}};
+  auto whole = out.whole.data.begin();
+  for (const Carriers& piece : pieces) {
+    const std::int32_t before = out.begin.back();
+    for (std::size_t p = 1; p < piece.begin.size(); ++p) out.begin.push_back(before + piece.begin[p]);
+    out.cell.insert(out.cell.end(), piece.cell.begin(), piece.cell.end());
+    out.part.insert(out.part.end(), piece.part.begin(), piece.part.end());
+    whole = std::ranges::copy(piece.whole.data, whole).out;
   }
+  return out;
+}
+
+void change_colours(Carriers& mark, const Tensor<float>& base, const ToneFit& tones) {
+  parallel_for(std::ssize(mark.begin) - 1, kPixelChunk, [&](Index first, Index last) {
+    for (auto p = at(first); p < at(last); ++p) {
+      if (mark.begin[p] == mark.begin[p + 1]) continue;
+      const auto slope = tones.slope(&base.data[3 * p]);
+      times(slope, &mark.whole.data[3 * p]);
+      for (std::int32_t e = mark.begin[p]; e < mark.begin[p + 1]; ++e) times(slope, &mark.part[3 * at(e)]);
+    }
+  });
 }
 
 }  // namespace fieldmark::watermark

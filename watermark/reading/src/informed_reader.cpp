@@ -15,6 +15,7 @@
 #include <span>
 
 #include "blurred.h"
+#include "ordered_sum.h"
 
 namespace fieldmark::watermark {
 namespace {
@@ -51,10 +52,12 @@ Shown shown_with(const Tensor<float>& image, const Tensor<float>& base, const st
   const Tensor<float> soft = blurred(base, blur);
   const ToneFit tones = fit_tones(soft, image, object);
   Shown s{.render = tones(soft), .rest = Tensor<float>(image.shape), .blur = blur, .tones = tones};
-  for (Index i = 0; i < s.rest.size(); ++i) {
-    s.rest[i] = image[i] - s.render[i];
-    s.left += object[at(i / 3)] * static_cast<double>(s.rest[i] * s.rest[i]);
-  }
+  s.left = ordered_sum(std::ssize(object), 0.0, [&](Index begin, Index end, double& part) {
+    for (Index i = 3 * begin; i < 3 * end; ++i) {
+      s.rest[i] = image[i] - s.render[i];
+      part += object[at(i / 3)] * static_cast<double>(s.rest[i] * s.rest[i]);
+    }
+  });
   return s;
 }
 
@@ -203,7 +206,7 @@ std::vector<nerf::Camera> InformedReader::starts(const CameraSearch& search, con
   return cameras;
 }
 
-// Aligns coarsely from several cameras; replaces `best` where one agrees more.
+// Aligns coarsely from several cameras until one agrees for sure; replaces `best` where one agrees more.
 void InformedReader::try_all(const Surround& seen, const Change& change,
                              const std::vector<nerf::Camera>& cameras, InformedReading& best) {
   const std::span<const AlignmentStage> stages = change.stretch == 1 ? kCoarse : kCoarseStretched;
@@ -212,6 +215,7 @@ void InformedReader::try_all(const Surround& seen, const Change& change,
     if (a.agreement <= best.agreement) continue;
     best.agreement = a.agreement;
     best.camera = a.camera;
+    if (best.agreement >= kSure) return;
   }
 }
 

@@ -17,6 +17,7 @@ using distort::JpegComponent;
 constexpr double kDecoding = 0.5;             // standard deviation of a decoder's rounding, levels
 constexpr double kOutlier = 0.02;             // share of outlier coefficients ...
 constexpr double kOutlierWay = 512;           // ... and their range in levels
+constexpr double kNoDensity = 9;              // deviations: the density there is below 1e-17
 constexpr double kLeastGain = 50;             // least log-likelihood ratio of a table
 constexpr double kFirst = 0.3, kRatio = 1.5;  // standard deviations tried, levels
 constexpr int kDeviations = 13;
@@ -88,14 +89,18 @@ std::vector<JpegBlock> coefficients(const Plane& p, double middle) {
 // density.
 double explained(const std::vector<JpegBlock>& blocks, const JpegBlock& steps) {
   double sum = 0;
-  for (const JpegBlock& c : blocks)
+  for (const JpegBlock& c : blocks) {
+    double ratio = 1;  // of a block: at most 63 factors between 0.02 and 200, far from the ends of double
     for (std::size_t k = 1; k < 64; ++k) {
-      const double n = std::round(c[k] / steps[k]);
-      if (n == 0) continue;
-      const double d = (c[k] - n * steps[k]) / kDecoding;
-      const double density = std::exp(-0.5 * d * d) / (kDecoding * std::sqrt(2 * std::numbers::pi));
-      sum += std::log(kOutlier + (1 - kOutlier) * steps[k] * density);
+      if (2 * std::abs(c[k]) < steps[k]) continue;
+      const double d = (c[k] - std::round(c[k] / steps[k]) * steps[k]) / kDecoding;
+      const double density = std::abs(d) < kNoDensity
+                                 ? std::exp(-0.5 * d * d) / (kDecoding * std::sqrt(2 * std::numbers::pi))
+                                 : 0;
+      ratio *= kOutlier + (1 - kOutlier) * steps[k] * density;
     }
+    sum += std::log(ratio);
+  }
   return sum;
 }
 

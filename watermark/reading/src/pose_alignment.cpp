@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "blurred.h"
+#include "ordered_sum.h"
 
 namespace fieldmark::watermark {
 namespace {
@@ -18,8 +19,10 @@ namespace {
 constexpr Index kParameters = 10;
 constexpr double kCauchy = 2.385;      // deviations at which a residual has half the weight (95% efficiency)
 constexpr double kLeastSpread = 2e-3;  // of residuals: half a grey level
-constexpr double kStill = 0.01;        // pixels: a smaller motion ends the stage
+constexpr double kStill = 0.05;        // pixels: a smaller motion ends the stage
+constexpr double kNear = 0.3;          // pixels: a smaller motion that does not help ends the stage, too
 constexpr int kMostFailures = 3;
+constexpr double kLonger = 1.5;  // factor on a motion: Gauss-Newton steps are short under new weights
 constexpr double kDamping = 1e-3;
 
 using Matrix = Eigen::Matrix<double, kParameters, kParameters>;
@@ -33,8 +36,25 @@ struct Look {
   std::vector<std::int32_t> seen;  // [P] sample of the pixel or of its nearest neighbour; -1: none
   std::vector<nerf::Vec3> points;  // [samples] world
   nerf::Vec3 pivot{};
-  double spread = 0;  // of the residuals
-  double cost = 0;
+  std::vector<double> rest;  // [P, 3] residuals of the image and the toned render
+  double spread = 0;         // of the residuals
+};
+
+// The sums of a Gauss-Newton step.
+struct NormalEquations {
+  Matrix h = Matrix::Zero();
+  Vector g = Vector::Zero();
+  NormalEquations& operator+=(const NormalEquations& other) {
+    h += other.h;
+    g += other.g;
+    return *this;
+  }
+  void hold(int k) {
+    h.row(k).setZero();
+    h.col(k).setZero();
+    h(k, k) = 1;
+    g[k] = 0;
+  }
 };
 
 // Assigns to empty pixels a neighbour's sample, since they change where the silhouette moves.
@@ -87,7 +107,7 @@ class Stage {
       border_ = border_at(border, image.shape[0], image.shape[1], image_.shape[0], image_.shape[1], reach());
   }
 
-  // Renders the field from a camera; differ() adds spread and cost.
+  // Renders the field from a camera and compares it with the image.
   Look look(const nerf::Camera& camera) {
     Look l;
     l.camera = camera.scaled(image_.shape[1], image_.shape[0]);
@@ -111,15 +131,16 @@ class Stage {
       const nerf::Vec3 eye = l.camera.position(), ahead = l.camera.forward();
       for (std::size_t a = 0; a < 3; ++a) l.pivot[a] = eye[a] + total / depth * ahead[a];
     }
+    differ(l);
     return l;
   }
 
-  // Computes residuals [P, 3] of image and render in the image's colours; sets the toned render, and the
-  // look's spread and cost. Costs are comparable only under the spread of one look.
-  std::vector<double> differ(Look& l, double spread = 0) const {
+  // Fits the image's colours, and sets the toned render, the residuals and their spread.
+  void differ(Look& l) const {
     std::vector<double> weight(l.seen.size());
     for (std::size_t p = 0; p < weight.size(); ++p) weight[p] = l.seen[p] >= 0 ? 1 : 0;
-    std::vector<double> r(3 * weight.size());
+    std::vector<double>& r = l.rest;
+    r.resize(3 * weight.size());
     for (int pass = 0; pass < 2; ++pass) {
       l.toned = fit_tones(l.render, image_, weight)(l.render);
       std::vector<double> sizes;
@@ -127,7 +148,7 @@ class Stage {
         r[i] = static_cast<double>(image_.data[i]) - static_cast<double>(l.toned.data[i]);
         if (l.seen[i / 3] >= 0) sizes.push_back(std::abs(r[i]));
       }
-      if (sizes.empty()) return r;
+      if (sizes.empty()) return;
       const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
       std::nth_element(sizes.begin(), middle, sizes.end());
       l.spread = std::max(kLeastSpread, 1.4826 * *middle);
@@ -137,48 +158,51 @@ class Stage {
           weight[p] = 1 / (1 + d2 / (3 * std::pow(kCauchy * l.spread, 2)));
         }
     }
-    const double scale = kCauchy * (spread > 0 ? spread : l.spread);
-    l.cost = 0;
-    double count = 0;
-    for (std::size_t i = 0; i < r.size(); ++i)
-      if (l.seen[i / 3] >= 0) {
-        l.cost += std::log1p(std::pow(r[i] / scale, 2));
-        count += 1;
-      }
-    l.cost /= count;
-    return r;
+  }
+
+  // Returns the mean cost of the residuals. Costs are comparable only under one spread.
+  static double cost(const Look& l, double spread) {
+    const double sum = ordered_sum(std::ssize(l.seen), 0.0, [&](Index begin, Index end, double& part) {
+      for (Index i = 3 * begin; i < 3 * end; ++i)
+        if (l.seen[at(i / 3)] >= 0) part += std::log1p(std::pow(l.rest[at(i)] / (kCauchy * spread), 2));
+    });
+    return sum / static_cast<double>(3 * std::ranges::count_if(l.seen, [](auto s) { return s >= 0; }));
   }
 
   // Gauss-Newton: with a = grad B . dx/dmotion, the toned render after a motion m is B - a m, so
   // sum w a a^T m = -sum w a r.
-  void normal_equations(const Look& l, const std::vector<double>& r, Matrix& h, Vector& g) const {
-    h.setZero();
-    g.setZero();
-    const Index width = image_.shape[1];
-    for (Index p = 0; p < static_cast<Index>(l.seen.size()); ++p) {
-      const std::int32_t s = l.seen[at(p)];
-      if (s < 0 || !(project(l.camera, l.points[at(s)]).depth > 0)) continue;
-      const auto j = motion_gradient(l.camera, l.pivot, l.points[at(s)]);
-      const Eigen::Map<const Vector> jx(j[0].data()), jy(j[1].data());
-      double xx = 0, xy = 0, yy = 0, xr = 0, yr = 0;
-      for (Index c = 0; c < 3; ++c) {
-        const double difference = r[at(3 * p + c)];
-        const double w = 1 / (1 + std::pow(difference / (kCauchy * l.spread), 2));
-        const double bx = slope_x(l.toned, p / width, p % width, c),
-                     by = slope_y(l.toned, p / width, p % width, c);
-        xx += w * bx * bx;
-        xy += w * bx * by;
-        yy += w * by * by;
-        xr += w * bx * difference;
-        yr += w * by * difference;
-      }
-      h += xx * jx * jx.transpose() + yy * jy * jy.transpose() +
-           xy * (jx * jy.transpose() + jy * jx.transpose());
-      g -= xr * jx + yr * jy;
-    }
+  NormalEquations normal_equations(const Look& l) const {
+    const auto add = [&](Index begin, Index end, NormalEquations& sums) {
+      for (Index p = begin; p < end; ++p) add_pixel(l, p, sums);
+    };
+    NormalEquations sums = ordered_sum(std::ssize(l.seen), NormalEquations{}, add);
     if (!options_.lens)  // zoom and slide replace distance and aim
-      for (const int k : {3, 4, 5}) hold(h, g, k);
-    if (!options_.stretched) hold(h, g, 9);
+      for (const int k : {3, 4, 5}) sums.hold(k);
+    if (!options_.stretched) sums.hold(9);
+    return sums;
+  }
+
+  void add_pixel(const Look& l, Index p, NormalEquations& sums) const {
+    const std::int32_t s = l.seen[at(p)];
+    if (s < 0 || !(project(l.camera, l.points[at(s)]).depth > 0)) return;
+    const Index width = image_.shape[1];
+    const auto j = motion_gradient(l.camera, l.pivot, l.points[at(s)]);
+    const Eigen::Map<const Vector> jx(j[0].data()), jy(j[1].data());
+    double xx = 0, xy = 0, yy = 0, xr = 0, yr = 0;
+    for (Index c = 0; c < 3; ++c) {
+      const double difference = l.rest[at(3 * p + c)];
+      const double w = 1 / (1 + std::pow(difference / (kCauchy * l.spread), 2));
+      const double bx = slope_x(l.toned, p / width, p % width, c),
+                   by = slope_y(l.toned, p / width, p % width, c);
+      xx += w * bx * bx;
+      xy += w * bx * by;
+      yy += w * by * by;
+      xr += w * bx * difference;
+      yr += w * by * difference;
+    }
+    sums.h += xx * jx * jx.transpose() + yy * jy * jy.transpose() +
+              xy * (jx * jy.transpose() + jy * jx.transpose());
+    sums.g -= xr * jx + yr * jy;
   }
 
   // Occlusions of the view, such as a caption, differ by far more than the rest and so hardly count.
@@ -207,29 +231,26 @@ class Stage {
 
   Alignment run(const nerf::Camera& start) {
     Look best = look(start);
-    std::vector<double> r = differ(best);
     double damping = kDamping;
     int failures = 0;
     for (int step = 0; step < options_.steps && !best.points.empty() && failures < kMostFailures; ++step) {
-      Matrix h;
-      Vector g;
-      normal_equations(best, r, h, g);
-      const double ridge = 1e-6 * h.diagonal().maxCoeff();
-      h.diagonal() = (1 + damping) * h.diagonal().array() + ridge;
-      const Vector m = h.ldlt().solve(g);
+      NormalEquations sums = normal_equations(best);
+      const double ridge = 1e-6 * sums.h.diagonal().maxCoeff();
+      sums.h.diagonal() = (1 + damping) * sums.h.diagonal().array() + ridge;
+      const Vector m = kLonger * sums.h.ldlt().solve(sums.g);
       if (!m.allFinite()) break;
       CameraMotion motion;
       Eigen::Map<Vector>(motion.data()) = m.cwiseMax(-0.3).cwiseMin(0.3);
-      if (furthest(best, motion) < kStill) break;
+      const double far = furthest(best, motion);
+      if (far < kStill) break;
       Look next = look(moved(best.camera, best.pivot, motion));
-      differ(next, best.spread);
-      if (next.points.empty() || !(next.cost < best.cost)) {
+      if (next.points.empty() || !(cost(next, best.spread) < cost(best, best.spread))) {
+        if (far < kNear) break;
         damping *= 10;
         ++failures;
         continue;
       }
       best = std::move(next);
-      r = differ(best);
       damping = std::max(1e-6, damping / 4);
       failures = 0;
     }
@@ -238,13 +259,6 @@ class Stage {
 
  private:
   Index reach() const { return static_cast<Index>(std::ceil(2 * options_.blur)); }
-
-  static void hold(Matrix& h, Vector& g, int k) {
-    h.row(k).setZero();
-    h.col(k).setZero();
-    h(k, k) = 1;
-    g[k] = 0;
-  }
 
   // Returns the largest displacement of a point under a motion, pixels.
   static double furthest(const Look& l, const CameraMotion& motion) {

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "blurred.h"
+#include "ordered_sum.h"
 
 namespace fieldmark::watermark {
 namespace {
@@ -27,20 +28,25 @@ class Fit {
   // sum_p M_c(p) v(p) = sum_p part_c(p) (blur v)(p): blur is symmetric.
   Values onto_cells(const Tensor<float>& v) const {
     const Tensor<float> soft = blurred(v, score_.blur);
-    Values out(at(cells_));
-    for_entries([&](Index p, std::size_t e, std::size_t cell) {
-      for (Index a = 0; a < 3; ++a)
-        out[cell] += static_cast<double>(mark_.part[3 * e + at(a)] * soft[3 * p + a]);
-    });
-    return out;
+    return ordered_sum(pixels(), Sums{Values(at(cells_))},
+                       [&](Index begin, Index end, Sums& part) {
+                         for_entries(begin, end, [&](Index p, std::size_t e, std::size_t cell) {
+                           for (Index a = 0; a < 3; ++a)
+                             part.values[cell] +=
+                                 static_cast<double>(mark_.part[3 * e + at(a)] * soft[3 * p + a]);
+                         });
+                       })
+        .values;
   }
 
   // Computes M_c . W M_d for all c, times the values of all d.
   Values normal(const Values& values) const {
     Tensor<float> v(seen_.shape);
-    for_entries([&](Index p, std::size_t e, std::size_t cell) {
-      for (Index a = 0; a < 3; ++a)
-        v[3 * p + a] += static_cast<float>(values[cell]) * mark_.part[3 * e + at(a)];
+    parallel_for(pixels(), kPixelChunk, [&](Index begin, Index end) {
+      for_entries(begin, end, [&](Index p, std::size_t e, std::size_t cell) {
+        for (Index a = 0; a < 3; ++a)
+          v[3 * p + a] += static_cast<float>(values[cell]) * mark_.part[3 * e + at(a)];
+      });
     });
     v = blurred(v, score_.blur);
     for (Index i = 0; i < v.size(); ++i) v[i] *= score_.precision[i] * counted(i / 3);
@@ -65,11 +71,20 @@ class Fit {
   }
 
  private:
+  struct Sums {
+    Values values;
+    Sums& operator+=(const Sums& other) {
+      for (std::size_t i = 0; i < values.size(); ++i) values[i] += other.values[i];
+      return *this;
+    }
+  };
+
+  Index pixels() const { return std::ssize(mark_.begin) - 1; }
   float counted(Index p) const { return score_.on_object[at(p)] > 0 ? 1.f : 0.f; }
 
   template <class F>
-  void for_entries(F use) const {
-    for (Index p = 0; p < std::ssize(mark_.begin) - 1; ++p)
+  void for_entries(Index begin, Index end, F use) const {
+    for (Index p = begin; p < end; ++p)
       for (auto e = at(mark_.begin[at(p)]); e < at(mark_.begin[at(p + 1)]); ++e) use(p, e, at(mark_.cell[e]));
   }
 
@@ -90,19 +105,19 @@ class Fit {
   // Returns the expected power for independent noise. Assumes that blur weakens a cell's part as it weakens
   // the whole mark.
   double expected_power(Index down, Index right) const {
-    double sum = 0;
-    for_entries([&](Index p, std::size_t e, std::size_t) {
-      const Index other = from(p, down, right);
-      for (Index a = 0; other >= 0 && a < 3; ++a) {
-        const auto part = static_cast<double>(mark_.part[3 * e + at(a)]),
-                   whole = static_cast<double>(mark_.whole[3 * p + a]),
-                   seen = static_cast<double>(seen_[3 * p + a]);
-        if (part != 0)
-          sum += part * part / std::max(part * part, whole * whole) * seen * seen *
-                 static_cast<double>(score_.precision[3 * other + a]);
-      }
+    return ordered_sum(pixels(), 0.0, [&](Index begin, Index end, double& sum) {
+      for_entries(begin, end, [&](Index p, std::size_t e, std::size_t) {
+        const Index other = from(p, down, right);
+        for (Index a = 0; other >= 0 && a < 3; ++a) {
+          const auto part = static_cast<double>(mark_.part[3 * e + at(a)]),
+                     whole = static_cast<double>(mark_.whole[3 * p + a]),
+                     seen = static_cast<double>(seen_[3 * p + a]);
+          if (part != 0)
+            sum += part * part / std::max(part * part, whole * whole) * seen * seen *
+                   static_cast<double>(score_.precision[3 * other + a]);
+        }
+      });
     });
-    return sum;
   }
 
   const Carriers& mark_;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ordered_sum.h"
+
 namespace fieldmark::watermark {
 namespace {
 
@@ -46,6 +48,16 @@ struct Sums {
     total += weight;
   }
 
+  Sums& operator+=(const Sums& other) {
+    shared += other.shared;
+    for (std::size_t c = 0; c < 3; ++c) {
+      bends[c] += other.bends[c];
+      changes[c] += other.changes[c];
+    }
+    total += other.total;
+    return *this;
+  }
+
   Vector solve(std::size_t channel) const {
     Matrix normal = shared.selfadjointView<Eigen::Lower>();
     normal.row(kBent) = bends[channel].transpose();
@@ -82,10 +94,12 @@ std::array<std::array<double, 3>, 3> ToneFit::slope(const float* v) const {
 
 Tensor<float> ToneFit::operator()(const Tensor<float>& image) const {
   Tensor<float> out(image.shape);
-  for (Index i = 0; i < image.size(); i += 3) {
-    const std::array<double, 3> t = at(&image.data[static_cast<std::size_t>(i)]);
-    for (std::size_t c = 0; c < 3; ++c) out[i + static_cast<Index>(c)] = static_cast<float>(t[c]);
-  }
+  parallel_for(image.size() / 3, kPixelChunk, [&](Index begin, Index end) {
+    for (Index i = 3 * begin; i < 3 * end; i += 3) {
+      const std::array<double, 3> t = at(&image.data[static_cast<std::size_t>(i)]);
+      for (std::size_t c = 0; c < 3; ++c) out[i + static_cast<Index>(c)] = static_cast<float>(t[c]);
+    }
+  });
   return out;
 }
 
@@ -96,9 +110,10 @@ ToneFit fit_tones(const Tensor<float>& render, const Tensor<float>& image, std::
     throw ShapeError("[fit_tones] image and weight must fit the render " + render.shape.str() +
                      ", got shape " + image.shape.str() + " and " + std::to_string(weight.size()) +
                      " weights");
-  Sums sums;
-  for (std::size_t p = 0; p < weight.size(); ++p)
-    if (weight[p] > 0) sums.add(weight[p], &render.data[3 * p], &image.data[3 * p]);
+  const Sums sums = ordered_sum(std::ssize(weight), Sums{}, [&](Index begin, Index end, Sums& part) {
+    for (auto p = static_cast<std::size_t>(begin); p < static_cast<std::size_t>(end); ++p)
+      if (weight[p] > 0) part.add(weight[p], &render.data[3 * p], &image.data[3 * p]);
+  });
   ToneFit fit;
   if (!(sums.total > 0)) return fit;
   for (std::size_t c = 0; c < 3; ++c) {
