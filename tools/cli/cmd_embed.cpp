@@ -39,7 +39,7 @@ struct EmbedArguments {
   MessageOption intended;
   Index views = watermark::EmbedViewOptions{}.count, samples = 0, measured_views = 200;
   std::vector<std::string> under;
-  bool resume = false;
+  bool all_directions = false, resume = false;
 };
 
 // Returns the key. A run that started without --key made one and stored it in its checkpoint.
@@ -56,7 +56,8 @@ std::vector<watermark::CachedView> cached_views(const EmbedArguments& options,
   Progress progress = context.progress("views");
   const watermark::EmbedViewOptions views{.count = options.views,
                                           .samples = options.samples,
-                                          .distances = watermark::parse_distances(options.distances)};
+                                          .distances = watermark::parse_distances(options.distances),
+                                          .all_directions = options.all_directions};
   return watermark::cache_embed_views(field, patch, views, context.seed(), [&](Index done, Index total) {
     if (guard.interrupted()) throw Interrupted("nothing was written");
     progress.update(static_cast<double>(done) / static_cast<double>(total));
@@ -188,6 +189,9 @@ void add_view_options(CommandLine& app, EmbedArguments& o) {
          "image;\nnative: no larger than in the training images; several: also closer and farther cameras")
       ->one_of({"novel", "native", "several"})
       ->type_name("NAME");
+  app.add_flag("--all-directions", o.all_directions,
+               "Take every second training view from a random direction, also from those without training "
+               "images; for objects");
   app.add_option(
          "--samples", o.samples,
          "Samples per ray whose marks add up in a pixel, 1 to 64; default: 1, in scenes without bounds 4")

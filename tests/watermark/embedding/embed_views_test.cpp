@@ -129,6 +129,22 @@ TEST_CASE("embed_views: at several distances, the object has no more pixels than
                     "[embed_views] distances must be novel, native or several, got \"far\"");
 }
 
+TEST_CASE("embed_views: with all_directions, every second camera looks from a random direction") {
+  nerf::RadianceField field = small_field();
+  const EmbedViewOptions options{.count = 4, .all_directions = true};
+  const auto views = cache_embed_views(field, square_patch(16), options, 5);
+  const auto novel = nerf::make_cameras(field.cameras, nerf::CameraSet::novel, 4, 160, 5),
+             around = nerf::make_cameras(field.cameras, nerf::CameraSet::sphere, 4, 160, 5);
+  for (std::size_t i = 0; i < 4; ++i) {
+    CAPTURE(i);
+    CHECK(views[i].camera.position() == (i % 2 == 0 ? around[i] : novel[i]).position());
+    CHECK(around[i].position() != novel[i].position());
+  }
+  field.space.kind = nerf::SpaceKind::contracted;
+  CHECK_THROWS_WITH(cache_embed_views(field, square_patch(16), options, 5),
+                    "[embed_views] all_directions needs an object: other fields show blur between cameras");
+}
+
 TEST_CASE("embed_views: progress is told after each view and may stop") {
   const nerf::RadianceField field = small_field();
   std::vector<std::pair<Index, Index>> calls;

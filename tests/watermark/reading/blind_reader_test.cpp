@@ -4,6 +4,7 @@
 #include <fieldmark/watermark/reading/blind_reader.h>
 
 #include <cmath>
+#include <limits>
 
 #include "support/catch.h"
 #include "support/worst.h"
@@ -117,6 +118,9 @@ TEST_CASE("blind_reader: errors name what is no image") {
   const Owner owner = small_owner();
   const BlindReader reader(owner);
   CHECK(reader.evidence(Tensor<float>({16, 16, 3}, 0.5f)).size() > 0);
+  Tensor<float> hole({40, 50, 3}, 0.5f);
+  hole[3 * (7 * 50 + 9) + 1] = std::numeric_limits<float>::quiet_NaN();
+  CHECK_THROWS_WITH(reader.evidence(hole), "[blind_reader] image must be finite, got nan in row 7, column 9");
   CHECK_THROWS_AS(reader.evidence(Tensor<float>({40, 50})), ShapeError);
   CHECK_THROWS_WITH(reader.evidence(Tensor<float>({40, 50})),
                     "[blind_reader] image must have rank 3 [H, W, C], got shape [40, 50]");

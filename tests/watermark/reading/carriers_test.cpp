@@ -1,5 +1,6 @@
 #include "carriers.h"
 #include <fieldmark/core/error.h>
+#include <fieldmark/engine/parallel.h>
 #include <fieldmark/watermark/mark/cell_code.h>
 
 #include <cmath>
@@ -90,6 +91,19 @@ TEST_CASE("carriers: a pixel's parts are of different cells, one alone is the wh
     for (Index a = 0; a < 3; ++a) CHECK(c.part[3 * from + static_cast<std::size_t>(a)] == c.whole[3 * p + a]);
   }
   CHECK((several > 20 && none > 20 && alone > 20));
+}
+
+TEST_CASE("carriers: one and two threads give the same bits") {
+  const Owner owner = marking_owner(0.02);
+  const CachedView view = view_of(owner, 4);
+  const ScopedThreads serial(1);
+  const Carriers one = carriers(owner, view);
+  const ScopedThreads parallel(2);
+  const Carriers two = carriers(owner, view);
+  CHECK(one.whole.data == two.whole.data);
+  CHECK(one.begin == two.begin);
+  CHECK(one.cell == two.cell);
+  CHECK(one.part == two.part);
 }
 
 TEST_CASE("carriers: an owner whose message is in networks has none") {

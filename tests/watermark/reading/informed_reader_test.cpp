@@ -149,14 +149,16 @@ TEST_CASE("informed_reader: other backgrounds, bars, mirror, stretch, caption an
 TEST_CASE("informed_reader: one and two threads give the same bits") {
   const Owner owner = marking_owner();
   const Tensor<float> view_image = image_of(owner, camera_near(5), true);
-  std::vector<double> evidence[2];
+  InformedReading found[2];
   for (const int n : {1, 2}) {
     const ScopedThreads scope(n);
     InformedReader reader(owner, {.views = 10, .size = 32});
-    evidence[n - 1] = reader.read(view_image).informed.evidence;
+    found[n - 1] = reader.read(view_image).informed;
   }
-  CHECK(!evidence[0].empty());
-  CHECK(evidence[0] == evidence[1]);
+  CHECK(!found[0].evidence.empty());
+  CHECK(found[0].evidence == found[1].evidence);
+  CHECK(found[0].agreement == found[1].agreement);
+  CHECK(found[0].camera.pose == found[1].camera.pose);
 }
 
 TEST_CASE("informed_reader: errors name what is wrong") {
@@ -164,6 +166,9 @@ TEST_CASE("informed_reader: errors name what is wrong") {
   CHECK_THROWS_AS(InformedReader(paper), ValueError);
   InformedReader reader(owner, {.views = 1, .size = 16});
   CHECK_THROWS_AS(reader.read(Tensor<float>({15, 50, 3})), ShapeError);
+  CHECK_THROWS_WITH(
+      reader.evidence_at(Tensor<float>({20, 30, 3}), camera_near(1)),
+      "[informed_reader] image must be of the camera's size, [96, 96, 3], got shape [20, 30, 3]");
   CHECK(std::string(reading_name(ReadingKind::blind)) == "blind");
   CHECK(std::string(reading_name(ReadingKind::informed)) == "informed");
 }

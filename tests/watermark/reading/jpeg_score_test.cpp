@@ -6,6 +6,7 @@
 #include <fieldmark/imaging/image.h>
 
 #include <cmath>
+#include <limits>
 
 #include "support/catch.h"
 
@@ -92,7 +93,7 @@ TEST_CASE("find_jpeg: names quality and chroma of what was compressed, and nothi
   for (const std::uint64_t seed : {1u, 2u}) {
     const Tensor<float> base = view_image(0.05f, seed);
     CHECK_FALSE(find_jpeg(base).has_value());
-    for (const int quality : {30, 50, 75, 90}) {
+    for (const int quality : {10, 30, 50, 75, 90}) {
       INFO(quality);
       const auto half = find_jpeg(jpeg_round_trip(base, quality));
       REQUIRE(half.has_value());
@@ -106,6 +107,7 @@ TEST_CASE("find_jpeg: names quality and chroma of what was compressed, and nothi
   }
   CHECK_FALSE(find_jpeg(Tensor<float>({40, 40, 3})).has_value());
   CHECK_FALSE(find_jpeg(Tensor<float>({0, 40, 3})).has_value());
+  CHECK_FALSE(find_jpeg(Tensor<float>({40, 40, 3}, std::numeric_limits<float>::quiet_NaN())).has_value());
 }
 
 TEST_CASE("jpeg_score: reads faint signs that a plain difference does not") {

@@ -1,5 +1,6 @@
 #include "sign_fit.h"
 #include <fieldmark/core/error.h>
+#include <fieldmark/engine/parallel.h>
 
 #include <cmath>
 
@@ -145,6 +146,17 @@ TEST_CASE("sign_fit: noise that is alike from pixel to pixel counts for what it 
   CAPTURE(one, many);
   CHECK((one > 0.4 && one < 2));
   CHECK(many > 10);
+}
+
+TEST_CASE("sign_fit: one and two threads give the same bits") {
+  const Carriers c = overlapping(0.8f);
+  const MarkScore s = score_of(c, 0.02, 1.5);
+  const ScopedThreads serial(1);
+  const SignFit one = fit_signs(c, s, kCells);
+  const ScopedThreads parallel(2);
+  const SignFit two = fit_signs(c, s, kCells);
+  CHECK(one.sign == two.sign);
+  CHECK(one.noise == two.noise);
 }
 
 TEST_CASE("sign_fit: without information and noise every sign is 0, not NaN") {

@@ -1,6 +1,7 @@
 #include "tone_fit.h"
 #include <fieldmark/core/error.h>
 #include <fieldmark/distort/distortion.h>
+#include <fieldmark/engine/parallel.h>
 
 #include <cmath>
 
@@ -82,6 +83,18 @@ TEST_CASE("tone_fit: without weight nothing changes, black included") {
   CHECK(fit.at(black) == std::array<double, 3>{0, 0, 0});
   for (std::size_t c = 0; c < 3; ++c)
     for (std::size_t k = 0; k < 3; ++k) CHECK(fit.slope(black)[c][k] == (c == k ? 1 : 0));
+}
+
+TEST_CASE("tone_fit: one and two threads give the same bits") {
+  const Tensor<float> render = uniform<float>({50, 60, 3}, 0, 1, 1),
+                      image = uniform<float>({50, 60, 3}, 0, 1, 2);
+  const std::vector<double> weight(3000, 0.7);
+  const ScopedThreads serial(1);
+  const ToneFit one = fit_tones(render, image, weight);
+  const Tensor<float> toned = one(render);
+  const ScopedThreads parallel(2);
+  CHECK(fit_tones(render, image, weight).terms == one.terms);
+  CHECK(one(render).data == toned.data);
 }
 
 TEST_CASE("tone_fit: errors name the shapes") {

@@ -21,9 +21,14 @@ std::vector<nerf::Camera> cameras_of(const nerf::CameraSpan& span, const EmbedVi
     return nerf::make_cameras(span, set, options.count, size, seed);
   };
   std::vector<nerf::Camera> cameras = draw(nerf::CameraSet::novel);
-  if (options.distances != EmbedDistances::several) return cameras;
-  const auto closer = draw(nerf::CameraSet::closer), farther = draw(nerf::CameraSet::farther);
-  for (std::size_t i = 1; i < cameras.size(); i += 2) cameras[i] = i % 4 == 1 ? closer[i] : farther[i];
+  if (options.all_directions) {
+    const auto around = draw(nerf::CameraSet::sphere);
+    for (std::size_t i = 0; i < cameras.size(); i += 2) cameras[i] = around[i];
+  }
+  if (options.distances == EmbedDistances::several) {
+    const auto closer = draw(nerf::CameraSet::closer), farther = draw(nerf::CameraSet::farther);
+    for (std::size_t i = 1; i < cameras.size(); i += 2) cameras[i] = i % 4 == 1 ? closer[i] : farther[i];
+  }
   return cameras;
 }
 
@@ -100,6 +105,8 @@ Index samples_for(nerf::SpaceKind space) { return space == nerf::SpaceKind::cont
 std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, const PatchSize& patch,
                                           const EmbedViewOptions& options, std::uint64_t seed,
                                           const std::function<bool(Index, Index)>& progress) {
+  if (options.all_directions && field.space.kind != nerf::SpaceKind::cube)
+    throw ValueError("[embed_views] all_directions needs an object: other fields show blur between cameras");
   // Renders at the training sample spacing: quick images for locating the object.
   nerf::Renderer renderer(field, {.finer = 1, .supersampling = 1});
   const float background = nerf::background_value(field.background);

@@ -2,6 +2,8 @@
 #include <fieldmark/watermark/reading/blind_reader.h>
 #include "surround.h"
 
+#include <cmath>
+
 namespace fieldmark::watermark {
 namespace {
 
@@ -15,6 +17,11 @@ Tensor<float> opaque_image(const Tensor<float>& view_image, float background) {
   if (channels < 1 || channels > 4 || h < kLeastSide || w < kLeastSide)
     throw ShapeError("[blind_reader] image must be [H, W, 1 to 4] with sides of at least " +
                      std::to_string(kLeastSide) + ", got shape " + view_image.shape.str());
+  for (Index i = 0; i < view_image.size(); ++i)
+    if (!std::isfinite(view_image[i]))
+      throw ValueError("[blind_reader] image must be finite, got " + std::to_string(view_image[i]) +
+                       " in row " + std::to_string(i / channels / w) + ", column " +
+                       std::to_string(i / channels % w));
   if (channels == 3) return view_image;
   Tensor<float> out({h, w, 3});
   const bool colour = channels >= 3, alpha = channels % 2 == 0;

@@ -75,18 +75,18 @@ Carriers carriers_of_pixels(const Owner& owner, const CachedView& v, const std::
 Carriers carriers(const Owner& owner, const CachedView& v) {
   const std::vector<float> carrier = carrier_of(owner, v);
   const Index pixels = v.height * v.width;
-  std::vector<Carriers> pieces(at((pixels + kPixelChunk - 1) / kPixelChunk));
+  std::vector<Carriers> chunks(at((pixels + kPixelChunk - 1) / kPixelChunk));
   parallel_for(pixels, kPixelChunk, [&](Index first, Index last) {
-    pieces[at(first / kPixelChunk)] = carriers_of_pixels(owner, v, carrier, first, last);
+    chunks[at(first / kPixelChunk)] = carriers_of_pixels(owner, v, carrier, first, last);
   });
   Carriers out{Tensor<float>({v.height, v.width, 3}), {0}, {}, {}};
-  auto whole = out.whole.data.begin();
-  for (const Carriers& piece : pieces) {
-    const std::int32_t before = out.begin.back();
-    for (std::size_t p = 1; p < piece.begin.size(); ++p) out.begin.push_back(before + piece.begin[p]);
-    out.cell.insert(out.cell.end(), piece.cell.begin(), piece.cell.end());
-    out.part.insert(out.part.end(), piece.part.begin(), piece.part.end());
-    whole = std::ranges::copy(piece.whole.data, whole).out;
+  auto next = out.whole.data.begin();
+  for (const Carriers& chunk : chunks) {
+    const std::int32_t offset = out.begin.back();
+    for (std::size_t p = 1; p < chunk.begin.size(); ++p) out.begin.push_back(offset + chunk.begin[p]);
+    out.cell.insert(out.cell.end(), chunk.cell.begin(), chunk.cell.end());
+    out.part.insert(out.part.end(), chunk.part.begin(), chunk.part.end());
+    next = std::ranges::copy(chunk.whole.data, next).out;
   }
   return out;
 }

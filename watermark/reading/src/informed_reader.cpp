@@ -1,3 +1,4 @@
+#include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/imaging/mirror.h>
 #include <fieldmark/imaging/resize.h>
 #include <fieldmark/watermark/reading/informed_reader.h>
@@ -23,6 +24,9 @@ namespace {
 constexpr Index kByPlaces = 3, kByImage = 3, kByPart = 6;  // candidate cameras
 constexpr AlignmentStage kCoarse[] = {{.size = 48, .blur = 1.5, .steps = 6, .quick = true}};
 constexpr double kSure = 0.95;   // agreement: a symmetric object agrees with its mirror image, but less
+constexpr double kRival =
+    0.05;  // of coarse agreement below the best: such cameras are aligned finely, too ...
+constexpr Index kMostRivals = 4;  // ... at most so many, the best included
 constexpr Index kFewViews = 64;  // tried first: they suffice for most images, at a seventh of the time
 constexpr double kStretches[] = {1.5, 1 / 1.5, 1.25, 0.8};  // of the width
 constexpr AlignmentStage kCoarseStretched[] = {
@@ -169,6 +173,11 @@ const CameraSearch& InformedReader::all_views() {
 InformedReader::~InformedReader() = default;
 
 std::vector<double> InformedReader::evidence_at(const Tensor<float>& image, const nerf::Camera& camera) {
+  check_rank("informed_reader", "image", image.shape, 3, "[H, W, 3]");
+  if (image.shape != Shape{camera.height, camera.width, 3})
+    throw ShapeError("[informed_reader] image must be of the camera's size, [" +
+                     std::to_string(camera.height) + ", " + std::to_string(camera.width) +
+                     ", 3], got shape " + image.shape.str());
   return evidence_at({.image = image, .plain = {}}, camera);
 }
 
@@ -206,25 +215,35 @@ std::vector<nerf::Camera> InformedReader::starts(const CameraSearch& search, con
   return cameras;
 }
 
-// Aligns coarsely from several cameras until one agrees for sure; replaces `best` where one agrees more.
+// Aligns coarsely from several cameras, until an agreement is `enough`, and adds the results to `found`.
 void InformedReader::try_all(const Surround& seen, const Change& change,
-                             const std::vector<nerf::Camera>& cameras, InformedReading& best) {
+                             const std::vector<nerf::Camera>& cameras, std::vector<Alignment>& found,
+                             double enough) {
   const std::span<const AlignmentStage> stages = change.stretch == 1 ? kCoarse : kCoarseStretched;
   for (const nerf::Camera& start : cameras) {
-    const Alignment a = parts_->aligner.align(seen.image, start, stages, seen.covered);
-    if (a.agreement <= best.agreement) continue;
-    best.agreement = a.agreement;
-    best.camera = a.camera;
-    if (best.agreement >= kSure) return;
+    found.push_back(parts_->aligner.align(seen.image, start, stages, seen.covered));
+    if (found.back().agreement >= enough) return;
   }
 }
 
-void InformedReader::refine(const Surround& seen, const Change& change, InformedReading& found) {
-  if (found.agreement < 0) return;
+// Aligns the best of coarse alignments finely, and returns what agrees most. A wrong camera may agree a
+// little more than the right one until both are fine.
+InformedReading InformedReader::refined(const Surround& seen, const Change& change,
+                                        std::vector<Alignment> found) {
+  InformedReading best;
+  if (found.empty()) return best;
+  std::ranges::stable_sort(found, [](const auto& a, const auto& b) { return a.agreement > b.agreement; });
+  const double least = std::max(0.0, found.front().agreement - kRival);
+  if (std::ssize(found) > kMostRivals) found.resize(at(kMostRivals));
   const std::span<const AlignmentStage> stages = change.stretch == 1 ? kFine : kFineStretched;
-  const Alignment a = parts_->aligner.align(seen.image, found.camera, stages, seen.covered);
-  found.camera = a.camera;
-  found.agreement = a.agreement;
+  for (const Alignment& coarse : found) {
+    if (coarse.agreement < least || best.agreement >= kSure) break;
+    const Alignment a = parts_->aligner.align(seen.image, coarse.camera, stages, seen.covered);
+    if (a.agreement <= best.agreement) continue;
+    best.agreement = a.agreement;
+    best.camera = a.camera;
+  }
+  return best;
 }
 
 // Returns the best alignment of an image without its surround, coarse, then fine.
@@ -232,21 +251,23 @@ InformedReading InformedReader::aligned(const Surround& seen, const Change& chan
                                         const SeenPlaces& places) {
   const Tensor<float>& image = seen.image;
   const bool stretched = change.stretch != 1;
+  InformedReading quick;
   if (!stretched && !change.mirrored) {
-    InformedReading quick;
-    try_all(seen, change, starts(parts_->few, image, change, places), quick);
-    refine(seen, change, quick);
+    std::vector<Alignment> few;
+    try_all(seen, change, starts(parts_->few, image, change, places), few, kSure);
+    quick = refined(seen, change, std::move(few));
     if (quick.agreement >= kSure) return quick;
   }
   const CameraSearch& search = all_views();
-  InformedReading best;
-  try_all(seen, change, starts(search, image, change, places), best);
-  if (best.agreement < kLeastAgreement)
-    try_all(seen, change, search.find_by_lightness(image, kByImage), best);
-  if (!stretched && best.agreement < kLeastAgreement)
-    try_all(seen, change, search.find_part(image, kByPart), best);
-  refine(seen, change, best);
-  return best;
+  std::vector<Alignment> found;
+  const auto doubtful = [&] {
+    return std::ranges::all_of(found, [](const auto& a) { return a.agreement < kLeastAgreement; });
+  };
+  try_all(seen, change, starts(search, image, change, places), found);
+  if (doubtful()) try_all(seen, change, search.find_by_lightness(image, kByImage), found);
+  if (!stretched && doubtful()) try_all(seen, change, search.find_part(image, kByPart), found);
+  const InformedReading best = refined(seen, change, std::move(found));
+  return quick.agreement > best.agreement ? quick : best;
 }
 
 ImageReading InformedReader::read_as(const Tensor<float>& whole, const Change& change) {

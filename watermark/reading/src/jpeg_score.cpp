@@ -17,7 +17,7 @@ using distort::JpegComponent;
 constexpr double kDecoding = 0.5;             // standard deviation of a decoder's rounding, levels
 constexpr double kOutlier = 0.02;             // share of outlier coefficients ...
 constexpr double kOutlierWay = 512;           // ... and their range in levels
-constexpr double kNoDensity = 9;              // deviations: the density there is below 1e-17
+constexpr double kNoDensity = 9;              // standard deviations: beyond, the density counts as 0
 constexpr double kLeastGain = 50;             // least log-likelihood ratio of a table
 constexpr double kFirst = 0.3, kRatio = 1.5;  // standard deviations tried, levels
 constexpr int kDeviations = 13;
@@ -90,7 +90,7 @@ std::vector<JpegBlock> coefficients(const Plane& p, double middle) {
 double explained(const std::vector<JpegBlock>& blocks, const JpegBlock& steps) {
   double sum = 0;
   for (const JpegBlock& c : blocks) {
-    double ratio = 1;  // of a block: at most 63 factors between 0.02 and 200, far from the ends of double
+    double ratio = 1;  // product over a block: 63 factors in [0.02, 200], so in [1e-107, 1e145]
     for (std::size_t k = 1; k < 64; ++k) {
       if (2 * std::abs(c[k]) < steps[k]) continue;
       const double d = (c[k] - std::round(c[k] / steps[k]) * steps[k]) / kDecoding;

@@ -1,20 +1,24 @@
 #pragma once
-// Sums over chunks of a loop, added in order: the same bits for any number of threads. Private.
+// Sums over pixels by chunks, added in order: the same bits for any number of threads. Private.
 #include <fieldmark/engine/parallel.h>
 
+#include <utility>
 #include <vector>
 
 namespace fieldmark::watermark {
 
-constexpr Index kPixelChunk = 4096;  // pixels of a chunk: enough work to outweigh waking a thread
+constexpr Index kPixelChunk = 1024;  // pixels: 50 us of work or more, far more than waking a thread takes
 
-/// Returns the sum of f(begin, end, part) over [0, n) in chunks of kPixelChunk. Each chunk starts from a copy
-/// of `zero`; `f` adds to it, and `+=` adds the chunks in order.
+/// Returns the sum over the chunks of [0, n) of what f(begin, end, part) adds to `part`.
+/// @param zero  additive identity, from which every chunk starts; `+=` adds the chunks
+/// @param f  called once a chunk, by several threads at a time   @param chunk  size of a chunk, at least 1
 template <class Sum, class F>
-Sum ordered_sum(Index n, const Sum& zero, F f) {
-  std::vector<Sum> parts(static_cast<std::size_t>((n + kPixelChunk - 1) / kPixelChunk), zero);
-  parallel_for(n, kPixelChunk, [&](Index begin, Index end) {
-    f(begin, end, parts[static_cast<std::size_t>(begin / kPixelChunk)]);
+Sum ordered_sum(Index n, const Sum& zero, F f, Index chunk = kPixelChunk) {
+  std::vector<Sum> parts(static_cast<std::size_t>((n + chunk - 1) / chunk));
+  parallel_for(n, chunk, [&](Index begin, Index end) {
+    Sum part = zero;  // not in `parts`, whose neighbours other threads write
+    f(begin, end, part);
+    parts[static_cast<std::size_t>(begin / chunk)] = std::move(part);
   });
   Sum sum = zero;
   for (const Sum& part : parts) sum += part;

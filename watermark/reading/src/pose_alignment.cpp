@@ -20,9 +20,9 @@ constexpr Index kParameters = 10;
 constexpr double kCauchy = 2.385;      // deviations at which a residual has half the weight (95% efficiency)
 constexpr double kLeastSpread = 2e-3;  // of residuals: half a grey level
 constexpr double kStill = 0.05;        // pixels: a smaller motion ends the stage
-constexpr double kNear = 0.3;          // pixels: a smaller motion that does not help ends the stage, too
+constexpr double kNear = 0.3;          // pixels: a smaller motion that does not reduce the cost ends it, too
 constexpr int kMostFailures = 3;
-constexpr double kLonger = 1.5;  // factor on a motion: Gauss-Newton steps are short under new weights
+constexpr double kOverRelaxation = 1.5;  // reweighting overestimates the curvature: steps fall short
 constexpr double kDamping = 1e-3;
 
 using Matrix = Eigen::Matrix<double, kParameters, kParameters>;
@@ -36,7 +36,7 @@ struct Look {
   std::vector<std::int32_t> seen;  // [P] sample of the pixel or of its nearest neighbour; -1: none
   std::vector<nerf::Vec3> points;  // [samples] world
   nerf::Vec3 pivot{};
-  std::vector<double> rest;  // [P, 3] residuals of the image and the toned render
+  std::vector<double> rest;  // [P, 3] image minus toned render
   double spread = 0;         // of the residuals
 };
 
@@ -64,21 +64,23 @@ std::vector<std::int32_t> seen_or_beside(const CachedView& v, Index reach) {
     const auto p = at(y * v.width + x);
     return v.sample_begin[p] < v.sample_begin[p + 1] ? v.sample_begin[p] : -1;
   };
-  for (Index y = 0; y < v.height; ++y)
-    for (Index x = 0; x < v.width; ++x) {
-      std::int32_t& s = seen[at(y * v.width + x)];
-      s = sample(y, x);
-      Index nearest = reach * reach + 1;
-      for (Index dy = -reach; s < 0 && dy <= reach; ++dy)
-        for (Index dx = -reach; dx <= reach; ++dx) {
-          if (y + dy < 0 || y + dy >= v.height || x + dx < 0 || x + dx >= v.width) continue;
-          const Index distance = dy * dy + dx * dx;
-          const std::int32_t other = distance < nearest ? sample(y + dy, x + dx) : -1;
-          if (other < 0) continue;
-          nearest = distance;
-          seen[at(y * v.width + x)] = other;
-        }
-    }
+  const auto nearest_to = [&](Index y, Index x) {
+    std::int32_t found = sample(y, x);
+    Index nearest = found >= 0 ? 0 : reach * reach + 1;
+    for (Index dy = -reach; nearest > 0 && dy <= reach; ++dy)
+      for (Index dx = -reach; dx <= reach; ++dx) {
+        if (y + dy < 0 || y + dy >= v.height || x + dx < 0 || x + dx >= v.width) continue;
+        const Index distance = dy * dy + dx * dx;
+        const std::int32_t other = distance < nearest ? sample(y + dy, x + dx) : -1;
+        if (other < 0) continue;
+        nearest = distance;
+        found = other;
+      }
+    return found;
+  };
+  parallel_for(std::ssize(seen), kPixelChunk, [&](Index begin, Index end) {
+    for (Index p = begin; p < end; ++p) seen[at(p)] = nearest_to(p / v.width, p % v.width);
+  });
   return seen;
 }
 
@@ -131,19 +133,21 @@ class Stage {
       const nerf::Vec3 eye = l.camera.position(), ahead = l.camera.forward();
       for (std::size_t a = 0; a < 3; ++a) l.pivot[a] = eye[a] + total / depth * ahead[a];
     }
-    differ(l);
+    compare(l);
     return l;
   }
 
   // Fits the image's colours, and sets the toned render, the residuals and their spread.
-  void differ(Look& l) const {
+  void compare(Look& l) const {
     std::vector<double> weight(l.seen.size());
     for (std::size_t p = 0; p < weight.size(); ++p) weight[p] = l.seen[p] >= 0 ? 1 : 0;
     std::vector<double>& r = l.rest;
     r.resize(3 * weight.size());
+    std::vector<double> sizes;
+    sizes.reserve(r.size());
     for (int pass = 0; pass < 2; ++pass) {
       l.toned = fit_tones(l.render, image_, weight)(l.render);
-      std::vector<double> sizes;
+      sizes.clear();
       for (std::size_t i = 0; i < r.size(); ++i) {
         r[i] = static_cast<double>(image_.data[i]) - static_cast<double>(l.toned.data[i]);
         if (l.seen[i / 3] >= 0) sizes.push_back(std::abs(r[i]));
@@ -160,7 +164,8 @@ class Stage {
     }
   }
 
-  // Returns the mean cost of the residuals. Costs are comparable only under one spread.
+  // Returns the mean cost of the residuals, NaN if the look sees nothing. Costs are comparable only under
+  // one spread.
   static double cost(const Look& l, double spread) {
     const double sum = ordered_sum(std::ssize(l.seen), 0.0, [&](Index begin, Index end, double& part) {
       for (Index i = 3 * begin; i < 3 * end; ++i)
@@ -231,13 +236,13 @@ class Stage {
 
   Alignment run(const nerf::Camera& start) {
     Look best = look(start);
-    double damping = kDamping;
+    double damping = kDamping, length = kOverRelaxation;
     int failures = 0;
     for (int step = 0; step < options_.steps && !best.points.empty() && failures < kMostFailures; ++step) {
       NormalEquations sums = normal_equations(best);
       const double ridge = 1e-6 * sums.h.diagonal().maxCoeff();
       sums.h.diagonal() = (1 + damping) * sums.h.diagonal().array() + ridge;
-      const Vector m = kLonger * sums.h.ldlt().solve(sums.g);
+      const Vector m = length * sums.h.ldlt().solve(sums.g);
       if (!m.allFinite()) break;
       CameraMotion motion;
       Eigen::Map<Vector>(motion.data()) = m.cwiseMax(-0.3).cwiseMin(0.3);
@@ -247,11 +252,13 @@ class Stage {
       if (next.points.empty() || !(cost(next, best.spread) < cost(best, best.spread))) {
         if (far < kNear) break;
         damping *= 10;
+        length = 1;
         ++failures;
         continue;
       }
       best = std::move(next);
       damping = std::max(1e-6, damping / 4);
+      length = kOverRelaxation;
       failures = 0;
     }
     return {best.camera, best.points.empty() ? -1 : agreement(best)};

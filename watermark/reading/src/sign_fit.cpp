@@ -11,6 +11,7 @@ namespace fieldmark::watermark {
 namespace {
 
 constexpr Index kElsewhere[][2] = {{11, 7}, {-7, 11}, {-11, -7}, {7, -11}};  // shifts down and right, pixels
+constexpr Index kMostChunks = 8;  // of sums over all cells, of which there can be tens of thousands
 constexpr int kSteps = 10;
 constexpr double kRest = 1e-4;  // relative residual at which the iteration ends
 
@@ -28,15 +29,14 @@ class Fit {
   // sum_p M_c(p) v(p) = sum_p part_c(p) (blur v)(p): blur is symmetric.
   Values onto_cells(const Tensor<float>& v) const {
     const Tensor<float> soft = blurred(v, score_.blur);
-    return ordered_sum(pixels(), Sums{Values(at(cells_))},
-                       [&](Index begin, Index end, Sums& part) {
-                         for_entries(begin, end, [&](Index p, std::size_t e, std::size_t cell) {
-                           for (Index a = 0; a < 3; ++a)
-                             part.values[cell] +=
-                                 static_cast<double>(mark_.part[3 * e + at(a)] * soft[3 * p + a]);
-                         });
-                       })
-        .values;
+    const auto add = [&](Index begin, Index end, Sums& part) {
+      for_entries(begin, end, [&](Index p, std::size_t e, std::size_t cell) {
+        for (Index a = 0; a < 3; ++a)
+          part.values[cell] += static_cast<double>(mark_.part[3 * e + at(a)] * soft[3 * p + a]);
+      });
+    };
+    const Index chunk = std::max(kPixelChunk, pixels() / kMostChunks + 1);
+    return ordered_sum(pixels(), Sums{Values(at(cells_))}, add, chunk).values;
   }
 
   // Computes M_c . W M_d for all c, times the values of all d.

@@ -39,6 +39,7 @@ struct ImageReading {
   }
 };
 
+struct Alignment;
 struct Surround;
 class CameraSearch;
 
@@ -47,9 +48,9 @@ class CameraSearch;
 /// evidence may be tested against any.
 ///
 ///   - Bars are cut off; for an object, any other plain background is replaced by the field's.
-///   - Candidate cameras are aligned coarse to fine; the best agreement wins. The first candidates come from
-///     64 renders. Unless their agreement is sure, the search goes on with all renders, then with the
-///     mirrored image and with one stretched to where it looks most like the field.
+///   - Candidate cameras are aligned coarsely, the best of them finely; the best agreement wins. The first
+///     candidates come from 64 renders. Below an agreement of 0.95, the search goes on with all renders, then
+///     with the mirrored image and with one stretched to where it looks most like the field.
 ///   - The blur that leaves the smallest residual is kept; gain, offset and gamma are fitted.
 ///   - With the residual R and its power V around each pixel, R / V is the score and 1 / V the precision.
 ///     For a JPEG image both come from the quantised coefficients.
@@ -67,7 +68,7 @@ class InformedReader {
   /// @param image  as BlindReader::evidence()   @throws ShapeError as there
   ImageReading read(const Tensor<float>& image);
   /// Computes the evidence of an image with a known camera.
-  /// @param image  [H, W, 3]   @param camera  of its size
+  /// @param image  [H, W, 3]   @param camera  of its size   @throws ShapeError if the sizes differ
   std::vector<double> evidence_at(const Tensor<float>& image, const nerf::Camera& camera);
 
  private:
@@ -78,8 +79,8 @@ class InformedReader {
   static std::vector<nerf::Camera> starts(const CameraSearch& search, const Tensor<float>& image,
                                           const Change& change, const SeenPlaces& places);
   void try_all(const Surround& seen, const Change& change, const std::vector<nerf::Camera>& cameras,
-               InformedReading& best);
-  void refine(const Surround& seen, const Change& change, InformedReading& found);
+               std::vector<Alignment>& found, double enough = 2);
+  InformedReading refined(const Surround& seen, const Change& change, std::vector<Alignment> found);
   InformedReading aligned(const Surround& seen, const Change& change, const SeenPlaces& places);
   ImageReading read_as(const Tensor<float>& whole, const Change& change);
   Surround cleared(const Tensor<float>& whole) const;
