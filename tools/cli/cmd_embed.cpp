@@ -137,6 +137,11 @@ int run_embed(const EmbedArguments& options, Context& context) {
   if (options.intended.given()) intended = message_of(options.intended, options.bits);
   const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
   const auto field = nerf::RadianceField::load(options.field);
+  if (options.all_directions && field.space.kind != nerf::SpaceKind::cube)
+    throw UsageError(
+        "--all-directions: only for objects (away from the training cameras, other fields are "
+        "blurred), " +
+        options.field + " has space " + nerf::name_of(field.space.kind));
   const auto key = key_of(options, checkpoint);
   const auto recipe = recipe_of(options, field, context.seed());
   const auto views = cached_views(options, field, recipe.owner.patch(), context);
@@ -190,8 +195,8 @@ void add_view_options(CommandLine& app, EmbedArguments& o) {
       ->one_of({"novel", "native", "several"})
       ->type_name("NAME");
   app.add_flag("--all-directions", o.all_directions,
-               "Take every second training view from a random direction, also from those without training "
-               "images; for objects");
+               "Draw every second view from cameras `sphere` (all directions) instead of `novel`; only for "
+               "objects; check it with `fieldmark measure --cameras sphere,extrapolated`");
   app.add_option(
          "--samples", o.samples,
          "Samples per ray whose marks add up in a pixel, 1 to 64; default: 1, in scenes without bounds 4")

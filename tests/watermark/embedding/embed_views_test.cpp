@@ -140,9 +140,19 @@ TEST_CASE("embed_views: with all_directions, every second camera looks from a ra
     CHECK(views[i].camera.position() == (i % 2 == 0 ? around[i] : novel[i]).position());
     CHECK(around[i].position() != novel[i].position());
   }
+  EmbedViewOptions several = options;
+  several.distances = EmbedDistances::several;
+  CHECK_FALSE(several == options);
+  const auto mixed = cache_embed_views(field, square_patch(16), several, 5);
+  const auto closer = nerf::make_cameras(field.cameras, nerf::CameraSet::closer, 4, 160, 5);
+  CHECK(mixed[0].camera.position() == around[0].position());
+  CHECK(mixed[1].camera.position() == closer[1].position());
+  CHECK(mixed[2].camera.position() == novel[2].position());
   field.space.kind = nerf::SpaceKind::contracted;
-  CHECK_THROWS_WITH(cache_embed_views(field, square_patch(16), options, 5),
-                    "[embed_views] all_directions needs an object: other fields show blur between cameras");
+  CHECK_THROWS_WITH(
+      cache_embed_views(field, square_patch(16), options, 5),
+      "[embed_views] all_directions must be false unless the field's space is cube (away from the "
+      "training cameras, others are blurred), got space contracted");
 }
 
 TEST_CASE("embed_views: progress is told after each view and may stop") {

@@ -54,9 +54,7 @@ class Caches {
   // Keeps the views of the first variant and of the last one used: views are large.
   const Cache& get(const EmbedVariant& v, const std::function<void()>& stop_or_go) {
     for (const Cache& c : kept_)
-      if (c.options.count == v.views.count && c.options.samples == v.views.samples &&
-          c.options.distances == v.views.distances && c.patch == v.recipe.owner.patch() &&
-          c.seed == v.recipe.embed.seed)
+      if (c.options == v.views && c.patch == v.recipe.owner.patch() && c.seed == v.recipe.embed.seed)
         return c;
     if (kept_.size() == 2) kept_.pop_back();
     kept_.reserve(2);

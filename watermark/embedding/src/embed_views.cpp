@@ -23,7 +23,8 @@ std::vector<nerf::Camera> cameras_of(const nerf::CameraSpan& span, const EmbedVi
   std::vector<nerf::Camera> cameras = draw(nerf::CameraSet::novel);
   if (options.all_directions) {
     const auto around = draw(nerf::CameraSet::sphere);
-    for (std::size_t i = 0; i < cameras.size(); i += 2) cameras[i] = around[i];
+    const std::size_t every = options.distances == EmbedDistances::several ? 4 : 2;
+    for (std::size_t i = 0; i < cameras.size(); i += every) cameras[i] = around[i];
   }
   if (options.distances == EmbedDistances::several) {
     const auto closer = draw(nerf::CameraSet::closer), farther = draw(nerf::CameraSet::farther);
@@ -106,7 +107,10 @@ std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, cons
                                           const EmbedViewOptions& options, std::uint64_t seed,
                                           const std::function<bool(Index, Index)>& progress) {
   if (options.all_directions && field.space.kind != nerf::SpaceKind::cube)
-    throw ValueError("[embed_views] all_directions needs an object: other fields show blur between cameras");
+    throw ValueError(
+        "[embed_views] all_directions must be false unless the field's space is cube (away from the "
+        "training cameras, others are blurred), got space " +
+        nerf::name_of(field.space.kind));
   // Renders at the training sample spacing: quick images for locating the object.
   nerf::Renderer renderer(field, {.finer = 1, .supersampling = 1});
   const float background = nerf::background_value(field.background);

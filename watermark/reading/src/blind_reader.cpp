@@ -11,17 +11,21 @@ constexpr Index kLeastSide = 16;
 
 }  // namespace
 
+void check_finite(const Tensor<float>& image) {
+  const Index channels = image.shape[2], w = image.shape[1];
+  for (Index i = 0; i < image.size(); ++i)
+    if (!std::isfinite(image[i]))
+      throw ValueError("[blind_reader] image must be finite, got " + std::to_string(image[i]) + " in row " +
+                       std::to_string(i / channels / w) + ", column " + std::to_string(i / channels % w));
+}
+
 Tensor<float> opaque_image(const Tensor<float>& view_image, float background) {
   check_rank("blind_reader", "image", view_image.shape, 3, "[H, W, C]");
   const Index h = view_image.shape[0], w = view_image.shape[1], channels = view_image.shape[2];
   if (channels < 1 || channels > 4 || h < kLeastSide || w < kLeastSide)
     throw ShapeError("[blind_reader] image must be [H, W, 1 to 4] with sides of at least " +
                      std::to_string(kLeastSide) + ", got shape " + view_image.shape.str());
-  for (Index i = 0; i < view_image.size(); ++i)
-    if (!std::isfinite(view_image[i]))
-      throw ValueError("[blind_reader] image must be finite, got " + std::to_string(view_image[i]) +
-                       " in row " + std::to_string(i / channels / w) + ", column " +
-                       std::to_string(i / channels % w));
+  check_finite(view_image);
   if (channels == 3) return view_image;
   Tensor<float> out({h, w, 3});
   const bool colour = channels >= 3, alpha = channels % 2 == 0;

@@ -2,6 +2,7 @@
 #include <fieldmark/imaging/mirror.h>
 #include <fieldmark/imaging/resize.h>
 #include <fieldmark/watermark/reading/informed_reader.h>
+#include "best_alignment.h"
 #include "camera_search.h"
 #include "jpeg_score.h"
 #include "plain_border.h"
@@ -24,9 +25,6 @@ namespace {
 constexpr Index kByPlaces = 3, kByImage = 3, kByPart = 6;  // candidate cameras
 constexpr AlignmentStage kCoarse[] = {{.size = 48, .blur = 1.5, .steps = 6, .quick = true}};
 constexpr double kSure = 0.95;   // agreement: a symmetric object agrees with its mirror image, but less
-constexpr double kRival =
-    0.05;  // of coarse agreement below the best: such cameras are aligned finely, too ...
-constexpr Index kMostRivals = 4;  // ... at most so many, the best included
 constexpr Index kFewViews = 64;  // tried first: they suffice for most images, at a seventh of the time
 constexpr double kStretches[] = {1.5, 1 / 1.5, 1.25, 0.8};  // of the width
 constexpr AlignmentStage kCoarseStretched[] = {
@@ -131,6 +129,13 @@ MarkScore score_of(const Tensor<float>& image, const CachedView& view, Carriers&
   return s;
 }
 
+// Returns four points of a scene that do not lie in a plane.
+std::vector<nerf::Vec3> corners_of(const nerf::CameraSpan& span) {
+  std::vector<nerf::Vec3> points(4, span.centre);
+  for (std::size_t a = 0; a < 3; ++a) points[a][a] += 0.5 * span.half_size;
+  return points;
+}
+
 // Undoes a horizontal stretch by a factor.
 Tensor<float> narrowed(const Tensor<float>& image, double factor) {
   if (factor == 1) return image;
@@ -178,6 +183,7 @@ std::vector<double> InformedReader::evidence_at(const Tensor<float>& image, cons
     throw ShapeError("[informed_reader] image must be of the camera's size, [" +
                      std::to_string(camera.height) + ", " + std::to_string(camera.width) +
                      ", 3], got shape " + image.shape.str());
+  check_finite(image);
   return evidence_at({.image = image, .plain = {}}, camera);
 }
 
@@ -226,24 +232,17 @@ void InformedReader::try_all(const Surround& seen, const Change& change,
   }
 }
 
-// Aligns the best of coarse alignments finely, and returns what agrees most. A wrong camera may agree a
-// little more than the right one until both are fine.
 InformedReading InformedReader::refined(const Surround& seen, const Change& change,
-                                        std::vector<Alignment> found) {
-  InformedReading best;
-  if (found.empty()) return best;
-  std::ranges::stable_sort(found, [](const auto& a, const auto& b) { return a.agreement > b.agreement; });
-  const double least = std::max(0.0, found.front().agreement - kRival);
-  if (std::ssize(found) > kMostRivals) found.resize(at(kMostRivals));
+                                        const std::vector<Alignment>& found) {
   const std::span<const AlignmentStage> stages = change.stretch == 1 ? kFine : kFineStretched;
-  for (const Alignment& coarse : found) {
-    if (coarse.agreement < least || best.agreement >= kSure) break;
-    const Alignment a = parts_->aligner.align(seen.image, coarse.camera, stages, seen.covered);
-    if (a.agreement <= best.agreement) continue;
-    best.agreement = a.agreement;
-    best.camera = a.camera;
-  }
-  return best;
+  const Alignment best =
+      best_alignment(found, kSure, corners_of(owner_.field.cameras), [&](const nerf::Camera& camera) {
+        return parts_->aligner.align(seen.image, camera, stages, seen.covered);
+      });
+  InformedReading reading;
+  reading.camera = best.camera;
+  reading.agreement = best.agreement;
+  return reading;
 }
 
 // Returns the best alignment of an image without its surround, coarse, then fine.
@@ -255,7 +254,7 @@ InformedReading InformedReader::aligned(const Surround& seen, const Change& chan
   if (!stretched && !change.mirrored) {
     std::vector<Alignment> few;
     try_all(seen, change, starts(parts_->few, image, change, places), few, kSure);
-    quick = refined(seen, change, std::move(few));
+    quick = refined(seen, change, few);
     if (quick.agreement >= kSure) return quick;
   }
   const CameraSearch& search = all_views();
@@ -266,7 +265,7 @@ InformedReading InformedReader::aligned(const Surround& seen, const Change& chan
   try_all(seen, change, starts(search, image, change, places), found);
   if (doubtful()) try_all(seen, change, search.find_by_lightness(image, kByImage), found);
   if (!stretched && doubtful()) try_all(seen, change, search.find_part(image, kByPart), found);
-  const InformedReading best = refined(seen, change, std::move(found));
+  const InformedReading best = refined(seen, change, found);
   return quick.agreement > best.agreement ? quick : best;
 }
 

@@ -7,16 +7,17 @@
 
 namespace fieldmark::watermark {
 
-constexpr Index kPixelChunk = 1024;  // pixels: 50 us of work or more, far more than waking a thread takes
+constexpr Index kPixelChunk = 512;  // pixels: 50 us of a tone fit, more than waking a thread takes
 
-/// Returns the sum over the chunks of [0, n) of what f(begin, end, part) adds to `part`.
-/// @param zero  additive identity, from which every chunk starts; `+=` adds the chunks
-/// @param f  called once a chunk, by several threads at a time   @param chunk  size of a chunk, at least 1
+/// Lets f(begin, end, part) add each chunk of [0, n) to a part of its own, and returns the sum of the parts
+/// in the order of the chunks.
+/// @param zero  additive identity, from which every part starts; `+=` adds parts   @param f  called by
+/// several threads at a time   @param chunk  size of a chunk, at least 1
 template <class Sum, class F>
 Sum ordered_sum(Index n, const Sum& zero, F f, Index chunk = kPixelChunk) {
   std::vector<Sum> parts(static_cast<std::size_t>((n + chunk - 1) / chunk));
   parallel_for(n, chunk, [&](Index begin, Index end) {
-    Sum part = zero;  // not in `parts`, whose neighbours other threads write
+    Sum part = zero;  // local: neighbours in `parts` share cache lines with other threads
     f(begin, end, part);
     parts[static_cast<std::size_t>(begin / chunk)] = std::move(part);
   });

@@ -3,6 +3,7 @@
 #include <fieldmark/imaging/resize.h>
 #include <fieldmark/watermark/mark/view_cache.h>
 #include "camera_motion.h"
+#include "nearest_sample.h"
 #include "plain_border.h"
 #include "tone_fit.h"
 
@@ -57,33 +58,6 @@ struct NormalEquations {
   }
 };
 
-// Assigns to empty pixels a neighbour's sample, since they change where the silhouette moves.
-std::vector<std::int32_t> seen_or_beside(const CachedView& v, Index reach) {
-  std::vector<std::int32_t> seen(at(v.height * v.width), -1);
-  const auto sample = [&](Index y, Index x) {
-    const auto p = at(y * v.width + x);
-    return v.sample_begin[p] < v.sample_begin[p + 1] ? v.sample_begin[p] : -1;
-  };
-  const auto nearest_to = [&](Index y, Index x) {
-    std::int32_t found = sample(y, x);
-    Index nearest = found >= 0 ? 0 : reach * reach + 1;
-    for (Index dy = -reach; nearest > 0 && dy <= reach; ++dy)
-      for (Index dx = -reach; dx <= reach; ++dx) {
-        if (y + dy < 0 || y + dy >= v.height || x + dx < 0 || x + dx >= v.width) continue;
-        const Index distance = dy * dy + dx * dx;
-        const std::int32_t other = distance < nearest ? sample(y + dy, x + dx) : -1;
-        if (other < 0) continue;
-        nearest = distance;
-        found = other;
-      }
-    return found;
-  };
-  parallel_for(std::ssize(seen), kPixelChunk, [&](Index begin, Index end) {
-    for (Index p = begin; p < end; ++p) seen[at(p)] = nearest_to(p / v.width, p % v.width);
-  });
-  return seen;
-}
-
 double slope_x(const Tensor<float>& t, Index y, Index x, Index c) {
   const Index w = t.shape[1], a = std::max<Index>(x - 1, 0), b = std::min(x + 1, w - 1);
   return static_cast<double>(t[(y * w + b) * 3 + c] - t[(y * w + a) * 3 + c]) / static_cast<double>(b - a);
@@ -115,7 +89,7 @@ class Stage {
     l.camera = camera.scaled(image_.shape[1], image_.shape[0]);
     const CachedView view = cache_view(renderer_, field_, l.camera);
     l.render = blurred(view.base, options_.blur);
-    l.seen = seen_or_beside(view, reach());
+    l.seen = nearest_sample(view, reach());
     for (std::size_t p = 0; p < border_.size(); ++p)
       if (border_[p]) l.seen[p] = -1;
     double total = 0, depth = 0;

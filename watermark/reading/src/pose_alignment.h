@@ -28,7 +28,8 @@ struct Alignment {
 ///
 /// Each step renders the field, fits the image's colours (see tone_fit.h), and solves for the motion that
 /// reduces the residual (Lucas and Kanade 1981 with the field's depth; Levenberg-Marquardt damping; Cauchy
-/// weights). Motions are 1.5 times as long as Gauss-Newton's, which reweighting makes fall short. A rolled
+/// weights). Motions are 1.5 Gauss-Newton steps, because reweighting makes single steps fall short; after a
+/// failed step they are one. A rolled
 /// camera, another focal length or another principal point explains a rotated, scaled or cropped image. Where
 /// the scene fills its images, the plain corners that a rotation leaves are ignored (see plain_border.h).
 /// Keeps buffers: use one object per thread. Results do not depend on the number of threads.

@@ -11,7 +11,7 @@ namespace fieldmark::watermark {
 namespace {
 
 constexpr Index kElsewhere[][2] = {{11, 7}, {-7, 11}, {-11, -7}, {7, -11}};  // shifts down and right, pixels
-constexpr Index kMostChunks = 8;  // of sums over all cells, of which there can be tens of thousands
+constexpr Index kMostChunks = 8;  // each holds a sum for every cell, of tens of thousands
 constexpr int kSteps = 10;
 constexpr double kRest = 1e-4;  // relative residual at which the iteration ends
 

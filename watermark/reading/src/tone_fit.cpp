@@ -14,14 +14,14 @@ constexpr double kHold = 1e-4;  // weight of the identity, relative to all pixel
 constexpr double kDark = 0.02;  // the slope of v ln v diverges at 0
 constexpr int kMax = 4, kMin = 5, kBent = 6;
 
-using Matrix = Eigen::Matrix<double, ToneFit::kTerms, ToneFit::kTerms>;
-using Vector = Eigen::Matrix<double, ToneFit::kTerms, 1>;
+using ToneMatrix = Eigen::Matrix<double, ToneFit::kTerms, ToneFit::kTerms>;
+using ToneVector = Eigen::Matrix<double, ToneFit::kTerms, 1>;
 
 double bent(double v) { return v > 0 ? v * std::log(v) : 0; }
 
 // Returns the terms that all channels share; the last, v ln v, is 0.
-Vector shared_terms(const float* v) {
-  Vector t;
+ToneVector shared_terms(const float* v) {
+  ToneVector t;
   t << 1, static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2]),
       static_cast<double>(std::max({v[0], v[1], v[2]})), static_cast<double>(std::min({v[0], v[1], v[2]})), 0;
   return t;
@@ -29,13 +29,15 @@ Vector shared_terms(const float* v) {
 
 // Sums over all pixels: the normal equations of each channel.
 struct Sums {
-  Matrix shared = Matrix::Zero();
-  std::array<Vector, 3> bends{Vector::Zero(), Vector::Zero(), Vector::Zero()};    // last column of the matrix
-  std::array<Vector, 3> changes{Vector::Zero(), Vector::Zero(), Vector::Zero()};  // right-hand side
+  ToneMatrix shared = ToneMatrix::Zero();
+  std::array<ToneVector, 3> bends{ToneVector::Zero(), ToneVector::Zero(),
+                                  ToneVector::Zero()};  // last column of the matrix
+  std::array<ToneVector, 3> changes{ToneVector::Zero(), ToneVector::Zero(),
+                                    ToneVector::Zero()};  // right-hand side
   double total = 0;
 
   void add(double weight, const float* render, const float* image) {
-    const Vector t = shared_terms(render);
+    const ToneVector t = shared_terms(render);
     shared.selfadjointView<Eigen::Lower>().rankUpdate(t, weight);
     for (std::size_t c = 0; c < 3; ++c) {
       const double v = static_cast<double>(render[c]), b = bent(v),
@@ -58,8 +60,8 @@ struct Sums {
     return *this;
   }
 
-  Vector solve(std::size_t channel) const {
-    Matrix normal = shared.selfadjointView<Eigen::Lower>();
+  ToneVector solve(std::size_t channel) const {
+    ToneMatrix normal = shared.selfadjointView<Eigen::Lower>();
     normal.row(kBent) = bends[channel].transpose();
     normal.col(kBent) = bends[channel];
     normal.diagonal().array() += kHold * total;
@@ -70,7 +72,7 @@ struct Sums {
 }  // namespace
 
 std::array<double, 3> ToneFit::at(const float* v) const {
-  const Vector t = shared_terms(v);
+  const ToneVector t = shared_terms(v);
   std::array<double, 3> out{};
   for (std::size_t c = 0; c < 3; ++c) {
     for (std::size_t k = 0; k + 1 < kTerms; ++k) out[c] += terms[c][k] * t[static_cast<int>(k)];
@@ -117,7 +119,7 @@ ToneFit fit_tones(const Tensor<float>& render, const Tensor<float>& image, std::
   ToneFit fit;
   if (!(sums.total > 0)) return fit;
   for (std::size_t c = 0; c < 3; ++c) {
-    const Vector change = sums.solve(c);
+    const ToneVector change = sums.solve(c);
     for (std::size_t k = 0; k < ToneFit::kTerms; ++k) fit.terms[c][k] += change[static_cast<int>(k)];
   }
   return fit;

@@ -30,7 +30,9 @@ struct EmbedViewOptions {
   Index count = 200;                                 ///< views, >= 1
   Index samples = 0;                                 ///< per ray, see cache_view(); 0: samples_for()
   EmbedDistances distances = EmbedDistances::novel;  ///< of their cameras
-  bool all_directions = false;  ///< true: every second camera looks from a random direction, for objects only
+  /// True: every second camera is of CameraSet::sphere, with several every fourth; for a field in a cube.
+  bool all_directions = false;
+  bool operator==(const EmbedViewOptions&) const = default;
 };
 
 /// Renders and caches the views to embed in. Each is cut to the object's window, as for reading (see
@@ -39,7 +41,7 @@ struct EmbedViewOptions {
 /// pixels, but at least a quarter per side; the embedder enlarges it as for reading.
 /// @param patch  see OwnerOptions::patch()
 /// @param progress  called after each view with (done, total); returns false to stop, which throws Error
-/// @throws ValueError as cache_view(), and for all_directions of a field that is no object (in a cube)
+/// @throws ValueError as cache_view(), and for all_directions if the field's space is not a cube
 std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, const PatchSize& patch,
                                           const EmbedViewOptions& options, std::uint64_t seed,
                                           const std::function<bool(Index, Index)>& progress = {});

@@ -7,8 +7,12 @@ namespace fieldmark::watermark {
 
 /// Converts any 8-bit image to what the readers take: repeats grey and composites alpha over the background.
 /// @param image  [H, W, 1 to 4], sides of at least 16   @return [H, W, 3]
-/// @throws ShapeError if it is not an image or is too small
+/// @throws ShapeError if it is not an image or is too small   @throws ValueError if a value is not finite
 Tensor<float> opaque_image(const Tensor<float>& image, float background);
+
+/// @throws ValueError naming the row and column of the first value that is not finite
+/// @param image  [H, W, C]
+void check_finite(const Tensor<float>& image);
 
 /// Blind detection: the extractor looks at an image and knows neither key nor message nor camera. Calls may
 /// run at the same time.
@@ -21,7 +25,7 @@ class BlindReader {
   /// object_window.h).
   /// @param image  [H, W, 1 to 4], sides of at least 16; grey is repeated, alpha is composited over the
   /// field's background
-  /// @return [cells]   @throws ShapeError if it is not an image or is too small
+  /// @return [cells]   @throws ShapeError, ValueError as opaque_image()
   std::vector<double> evidence(const Tensor<float>& image) const;
   /// Overload that also tells where the extractor sees which cell.   @param places  written unless null
   std::vector<double> evidence(const Tensor<float>& image, SeenPlaces* places) const;

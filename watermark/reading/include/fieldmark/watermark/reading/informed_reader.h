@@ -1,6 +1,7 @@
 #pragma once
 #include <fieldmark/watermark/reading/blind_reader.h>
 
+#include <limits>
 #include <memory>
 
 namespace fieldmark::watermark {
@@ -65,10 +66,11 @@ class InformedReader {
   explicit InformedReader(const Owner& owner, const CameraSearchOptions& search = {});
   ~InformedReader();
   /// Reads an image with both detectors; chooses informed if its agreement is at least kLeastAgreement.
-  /// @param image  as BlindReader::evidence()   @throws ShapeError as there
+  /// @param image  as BlindReader::evidence()   @throws ShapeError, ValueError as there
   ImageReading read(const Tensor<float>& image);
   /// Computes the evidence of an image with a known camera.
   /// @param image  [H, W, 3]   @param camera  of its size   @throws ShapeError if the sizes differ
+  /// @throws ValueError if a value is not finite
   std::vector<double> evidence_at(const Tensor<float>& image, const nerf::Camera& camera);
 
  private:
@@ -79,8 +81,8 @@ class InformedReader {
   static std::vector<nerf::Camera> starts(const CameraSearch& search, const Tensor<float>& image,
                                           const Change& change, const SeenPlaces& places);
   void try_all(const Surround& seen, const Change& change, const std::vector<nerf::Camera>& cameras,
-               std::vector<Alignment>& found, double enough = 2);
-  InformedReading refined(const Surround& seen, const Change& change, std::vector<Alignment> found);
+               std::vector<Alignment>& found, double enough = std::numeric_limits<double>::infinity());
+  InformedReading refined(const Surround& seen, const Change& change, const std::vector<Alignment>& found);
   InformedReading aligned(const Surround& seen, const Change& change, const SeenPlaces& places);
   ImageReading read_as(const Tensor<float>& whole, const Change& change);
   Surround cleared(const Tensor<float>& whole) const;
