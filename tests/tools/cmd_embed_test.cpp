@@ -50,22 +50,24 @@ TEST_CASE("embed learns from views at several distances, and from several sample
   CHECK(embed("native", "0").code == cli::kUsage);
 }
 
-TEST_CASE("embed --all-directions learns from other views, of objects only", "[embed]") {
+TEST_CASE("embed --directions learns from other views, all only of objects", "[embed]") {
   const TinyJob& job = TinyJob::get();
   const std::string key = test_key_file(job.folder, 7), open = job.folder / "open.fm";
   const auto embed = [&](const std::string& field, const std::string& out, std::vector<std::string> more) {
     more.insert(more.end(), {"--key", key, "--measured-views", "1"});
     return tiny_embed(field, out, more);
   };
-  REQUIRE(embed(job.field, job.folder / "near.fm", {}).code == cli::kOk);
-  REQUIRE(embed(job.field, job.folder / "around.fm", {"--all-directions"}).code == cli::kOk);
+  REQUIRE(embed(job.field, job.folder / "usual.fm", {}).code == cli::kOk);
+  REQUIRE(embed(job.field, job.folder / "near.fm", {"--directions", "novel"}).code == cli::kOk);
+  REQUIRE(embed(job.field, job.folder / "around.fm", {"--directions", "all"}).code == cli::kOk);
   CHECK(read_bytes(job.folder / "near.fm") != read_bytes(job.folder / "around.fm"));
+  CHECK(read_bytes(job.folder / "usual.fm") == read_bytes(job.folder / "around.fm"));
   auto field = nerf::RadianceField::load(job.field);
   field.space.kind = nerf::SpaceKind::contracted;
   field.save(open);
-  const auto refused = embed(open, job.folder / "none.fm", {"--all-directions"});
+  const auto refused = embed(open, job.folder / "none.fm", {"--directions", "all"});
   CHECK(refused.code == cli::kUsage);
-  CHECK_THAT(refused.err, Contains("--all-directions: only for objects"));
+  CHECK_THAT(refused.err, Contains("--directions: all is only for objects"));
   CHECK_THAT(refused.err, Contains("has space contracted"));
   CHECK(!std::filesystem::exists(job.folder / "none.fm"));
 }

@@ -32,14 +32,14 @@ struct EmbedArguments {
   std::string preset = "fast", distances = "novel";
   Index bits = watermark::OwnerOptions{}.bits;
   // Empty or 0, which no option accepts: chosen by the preset or the scene.
-  std::string colours;
+  std::string colours, directions;
   double mark_psnr = 0;
   Index cells = 0, batch = 0, reader_size = 0;
   RunLength length{.seconds = 0};
   MessageOption intended;
   Index views = watermark::EmbedViewOptions{}.count, samples = 0, measured_views = 200;
   std::vector<std::string> under;
-  bool all_directions = false, resume = false;
+  bool resume = false;
 };
 
 // Returns the key. A run that started without --key made one and stored it in its checkpoint.
@@ -54,10 +54,12 @@ std::vector<watermark::CachedView> cached_views(const EmbedArguments& options,
                                                 const watermark::PatchSize& patch, Context& context) {
   const InterruptGuard guard;
   Progress progress = context.progress("views");
-  const watermark::EmbedViewOptions views{.count = options.views,
-                                          .samples = options.samples,
-                                          .distances = watermark::parse_distances(options.distances),
-                                          .all_directions = options.all_directions};
+  const bool object = options.preset == "fast" && watermark::all_directions_for(field.space.kind);
+  const watermark::EmbedViewOptions views{
+      .count = options.views,
+      .samples = options.samples,
+      .distances = watermark::parse_distances(options.distances),
+      .all_directions = options.directions.empty() ? object : options.directions == "all"};
   return watermark::cache_embed_views(field, patch, views, context.seed(), [&](Index done, Index total) {
     if (guard.interrupted()) throw Interrupted("nothing was written");
     progress.update(static_cast<double>(done) / static_cast<double>(total));
@@ -137,9 +139,9 @@ int run_embed(const EmbedArguments& options, Context& context) {
   if (options.intended.given()) intended = message_of(options.intended, options.bits);
   const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
   const auto field = nerf::RadianceField::load(options.field);
-  if (options.all_directions && field.space.kind != nerf::SpaceKind::cube)
+  if (options.directions == "all" && !watermark::all_directions_for(field.space.kind))
     throw UsageError(
-        "--all-directions: only for objects (away from the training cameras, other fields are "
+        "--directions: all is only for objects (away from the training cameras, other fields are "
         "blurred), " +
         options.field + " has space " + nerf::name_of(field.space.kind));
   const auto key = key_of(options, checkpoint);
@@ -194,9 +196,13 @@ void add_view_options(CommandLine& app, EmbedArguments& o) {
          "image;\nnative: no larger than in the training images; several: also closer and farther cameras")
       ->one_of({"novel", "native", "several"})
       ->type_name("NAME");
-  app.add_flag("--all-directions", o.all_directions,
-               "Draw every second view from cameras `sphere` (all directions) instead of `novel`; only for "
-               "objects; check it with `fieldmark measure --cameras sphere,extrapolated`");
+  app.add_option(
+         "--directions", o.directions,
+         "Directions of the training views. all: every second view from cameras `sphere`, for objects;\n"
+         "novel: only from novel cameras; default: all for objects with preset fast, else novel")
+      ->one_of({"all", "novel"})
+      ->type_name("NAME")
+      ->default_str("");
   app.add_option(
          "--samples", o.samples,
          "Samples per ray whose marks add up in a pixel, 1 to 64; default: 1, in scenes without bounds 4")

@@ -25,6 +25,8 @@ const std::map<std::string, Differs> kChoices{
      [](const EmbedVariant& a, const EmbedVariant& b) {
        return a.recipe.embed.seed != b.recipe.embed.seed && a.recipe.owner.seed != b.recipe.owner.seed;
      }},
+    {"directions", [](const EmbedVariant& a,
+                      const EmbedVariant& b) { return a.views.all_directions != b.views.all_directions; }},
     {"preset", [](const EmbedVariant& a,
                   const EmbedVariant& b) { return a.recipe.mark.index() != b.recipe.mark.index(); }},
     {"patch", [](const EmbedVariant& a,

@@ -1,5 +1,8 @@
 #include "nearest_sample.h"
 
+#include <algorithm>
+#include <iterator>
+
 #include "support/catch.h"
 
 using namespace fieldmark;

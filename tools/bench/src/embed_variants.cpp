@@ -70,6 +70,7 @@ void views(Variants& all) {
              [=](EmbedVariant& v) { v.views.samples = kept; });
   for (const Index count : {50, 800})
     all.vary("views", std::to_string(count), [=](EmbedVariant& v) { v.views.count = count; });
+  all.vary("directions", "only novel cameras", [](EmbedVariant& v) { v.views.all_directions = false; });
   all.vary("distances", "near, at the resolution of images",
            [](EmbedVariant& v) { v.views.distances = EmbedDistances::native; });
   all.vary("distances", "half of the views closer or farther",
@@ -135,6 +136,7 @@ void training(Variants& all) {
 std::vector<EmbedVariant> embed_variants(const ScheduleOptions& length, Index bits, std::uint64_t seed,
                                          MarkColours colours) {
   EmbedVariant usual = base_variant("fast", length, bits, seed);
+  usual.views.all_directions = true;  // of an object
   watermark::use_colours(colours, usual.recipe.cell());
   Variants all(usual);
   lengths(all);

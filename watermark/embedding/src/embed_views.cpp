@@ -103,10 +103,12 @@ EmbedDistances parse_distances(std::string_view name) {
 
 Index samples_for(nerf::SpaceKind space) { return space == nerf::SpaceKind::contracted ? kParts : 1; }
 
+bool all_directions_for(nerf::SpaceKind space) { return space == nerf::SpaceKind::cube; }
+
 std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, const PatchSize& patch,
                                           const EmbedViewOptions& options, std::uint64_t seed,
                                           const std::function<bool(Index, Index)>& progress) {
-  if (options.all_directions && field.space.kind != nerf::SpaceKind::cube)
+  if (options.all_directions && !all_directions_for(field.space.kind))
     throw ValueError(
         "[embed_views] all_directions must be false unless the field's space is cube (away from the "
         "training cameras, others are blurred), got space " +

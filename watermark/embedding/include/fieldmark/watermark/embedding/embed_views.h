@@ -25,6 +25,11 @@ EmbedDistances parse_distances(std::string_view name);
 /// learnt at four parts to 94.3% (48 bits, 60 new views, as embedded, 1,200 steps, one run each).
 Index samples_for(nerf::SpaceKind space);
 
+/// Returns true for an object, whose field is as reliable from directions without training images as from
+/// others: a mark that learns from all directions is read from below, too, and not worse from above.
+/// docs/notes/embedding.md has the measurements.
+bool all_directions_for(nerf::SpaceKind space);
+
 /// Options for the views to embed in.
 struct EmbedViewOptions {
   Index count = 200;                                 ///< views, >= 1
