@@ -77,7 +77,7 @@ void add_mark(Hashes& hashes, const TemporaryFolder& folder, const std::string& 
                                  "8",
                                  "--measured-views",
                                  "1"};
-  if (preset == "fast") embed.insert(embed.end(), {"--cells", "6"});
+  if (preset == "fast") embed.insert(embed.end(), {"--cells", "6", "--directions", "novel"});
   run(embed, threads);
   hashes[preset + " owner"] = sha256_file_hex(owner);
   run({"bake", "--owner", owner, "--message", "a6", "--out", baked, "--steps", "4"}, threads);

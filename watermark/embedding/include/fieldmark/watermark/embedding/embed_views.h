@@ -37,6 +37,7 @@ struct EmbedViewOptions {
   EmbedDistances distances = EmbedDistances::novel;  ///< of their cameras
   /// True: every second camera is of CameraSet::sphere, with several every fourth; for a field in a cube.
   bool all_directions = false;
+  /// True if all options are equal.
   bool operator==(const EmbedViewOptions&) const = default;
 };
 
