@@ -26,7 +26,7 @@ EmbedDistances parse_distances(std::string_view name);
 Index samples_for(nerf::SpaceKind space);
 
 /// Returns true for an object, whose field is as reliable from directions without training images as from
-/// others: a mark that learns from all directions is read from below, too, and not worse from above.
+/// others: a mark that learns from all directions is read from below, too.
 /// docs/notes/embedding.md has the measurements.
 bool all_directions_for(nerf::SpaceKind space);
 
