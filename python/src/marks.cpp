@@ -53,9 +53,7 @@ std::shared_ptr<Owner> embed(std::shared_ptr<nerf::RadianceField> field, const K
   recipe.owner.seed = recipe.embed.seed = seed;
   recipe.embed.schedule.seconds = seconds;
   recipe.embed.schedule.steps = steps;
-  const auto cached = watermark::cache_embed_views(
-      *field, recipe.owner.patch(),
-      {.count = views, .all_directions = watermark::all_directions_for(field->space.kind)}, seed, {});
+  const auto cached = watermark::cache_embed_views(*field, recipe.owner.patch(), {.count = views}, seed, {});
   auto owner = std::make_shared<Owner>(recipe.make(*field, key, cached));
   watermark::Embedder embedder(*owner, cached, recipe.embed);
   run(embedder, progress);

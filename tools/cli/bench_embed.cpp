@@ -41,12 +41,11 @@ std::vector<bench::EmbedVariant> variants_of(const BenchEmbedArguments& o, const
                                              std::uint64_t seed) {
   auto all =
       bench::embed_variants({.seconds = o.seconds}, o.bits, seed, watermark::colours_for(field.space.kind));
-  const bool object = watermark::all_directions_for(field.space.kind);
-  if (!object) std::erase_if(all, [](const auto& v) { return v.choice == "directions"; });
+  if (!watermark::all_directions_for(field.space.kind))  // default there
+    std::erase_if(all, [](const auto& v) { return v.choice == "directions"; });
   for (bench::EmbedVariant& v : all) {
     if (v.choice == "preset") continue;
     v.recipe.owner.reader_aspect = watermark::reader_aspect(field);
-    if (!object) v.views.all_directions = false;
     if (v.choice != "batch") v.recipe.embed.batch = watermark::batch_for(field.space.kind);
   }
   const auto wanted = [&](const bench::EmbedVariant& v) {

@@ -54,12 +54,12 @@ std::vector<watermark::CachedView> cached_views(const EmbedArguments& options,
                                                 const watermark::PatchSize& patch, Context& context) {
   const InterruptGuard guard;
   Progress progress = context.progress("views");
-  const bool object = options.preset == "fast" && watermark::all_directions_for(field.space.kind);
-  const watermark::EmbedViewOptions views{
-      .count = options.views,
-      .samples = options.samples,
-      .distances = watermark::parse_distances(options.distances),
-      .all_directions = options.directions.empty() ? object : options.directions == "all"};
+  watermark::EmbedViewOptions views{.count = options.views,
+                                    .samples = options.samples,
+                                    .distances = watermark::parse_distances(options.distances)};
+  // Presets of the paper keep to novel cameras.
+  if (!options.directions.empty() || options.preset != "fast")
+    views.all_directions = options.directions == "all";
   return watermark::cache_embed_views(field, patch, views, context.seed(), [&](Index done, Index total) {
     if (guard.interrupted()) throw Interrupted("nothing was written");
     progress.update(static_cast<double>(done) / static_cast<double>(total));

@@ -89,7 +89,8 @@ TEST_CASE("embed_views: at several distances, the object has no more pixels than
   const auto sides = [&](EmbedDistances distances) {
     std::vector<Index> out;
     for (const CachedView& v :
-         cache_embed_views(field, square_patch(2 * own), {.count = 4, .distances = distances}, 5)) {
+         cache_embed_views(field, square_patch(2 * own),
+                           {.count = 4, .distances = distances, .all_directions = false}, 5)) {
       CHECK(v.height == v.width);
       out.push_back(v.width);
     }
@@ -110,17 +111,18 @@ TEST_CASE("embed_views: at several distances, the object has no more pixels than
     if (i % 2 == 0) CHECK(several[i] == native[i]);
     if (i % 4 == 3) CHECK(several[i] == pixels(far[i]));
   }
-  for (const CachedView& v :
-       cache_embed_views(field, {96, 64}, {.count = 4, .distances = EmbedDistances::several}, 5)) {
+  for (const CachedView& v : cache_embed_views(
+           field, {96, 64}, {.count = 4, .distances = EmbedDistances::several, .all_directions = false}, 5)) {
     CHECK(v.height < 96);
     CHECK(v.width == std::lround(static_cast<double>(v.height) * 2 / 3));
   }
-  const auto kept = cache_embed_views(field, square_patch(16), {.count = 1, .samples = 4}, 5);
+  const auto kept =
+      cache_embed_views(field, square_patch(16), {.count = 1, .samples = 4, .all_directions = false}, 5);
   CHECK(kept[0].weight.size() > cache_novel_views(field, square_patch(16), 1, 5)[0].weight.size());
   CHECK(samples_for(nerf::SpaceKind::cube) == 1);
   CHECK(samples_for(nerf::SpaceKind::ndc) == 1);
   CHECK(samples_for(nerf::SpaceKind::contracted) == 4);
-  CHECK(cache_embed_views(field, square_patch(16), {.count = 1}, 5)[0].position ==
+  CHECK(cache_embed_views(field, square_patch(16), {.count = 1, .all_directions = false}, 5)[0].position ==
         cache_novel_views(field, square_patch(16), 1, 5)[0].position);
   CHECK(parse_distances("several") == EmbedDistances::several);
   for (const auto d : {EmbedDistances::novel, EmbedDistances::native, EmbedDistances::several})
@@ -140,6 +142,11 @@ TEST_CASE("embed_views: with all_directions, every second camera looks from a ra
     CHECK(views[i].camera.position() == (i % 2 == 0 ? around[i] : novel[i]).position());
     CHECK(around[i].position() != novel[i].position());
   }
+  CHECK(cache_embed_views(field, square_patch(16), {.count = 1}, 5)[0].camera.position() ==
+        around[0].position());
+  CHECK(all_directions_for(nerf::SpaceKind::cube));
+  CHECK_FALSE(all_directions_for(nerf::SpaceKind::ndc));
+  CHECK_FALSE(all_directions_for(nerf::SpaceKind::contracted));
   EmbedViewOptions several = options;
   several.distances = EmbedDistances::several;
   CHECK_FALSE(several == options);

@@ -6,6 +6,7 @@
 #include <fieldmark/watermark/reading/informed_reader.h>
 
 #include <cmath>
+#include <limits>
 
 #include "support/catch.h"
 #include "watermark/tiny_owner.h"
@@ -169,6 +170,9 @@ TEST_CASE("informed_reader: errors name what is wrong") {
   CHECK_THROWS_WITH(
       reader.evidence_at(Tensor<float>({20, 30, 3}), camera_near(1)),
       "[informed_reader] image must be of the camera's size, [96, 96, 3], got shape [20, 30, 3]");
+  const Tensor<float> infinite({96, 96, 3}, std::numeric_limits<float>::infinity());
+  CHECK_THROWS_WITH(reader.evidence_at(infinite, camera_near(1)),
+                    "[informed_reader] image must be finite, got inf in row 0, column 0");
   CHECK(std::string(reading_name(ReadingKind::blind)) == "blind");
   CHECK(std::string(reading_name(ReadingKind::informed)) == "informed");
 }

@@ -21,6 +21,7 @@ EmbedVariant base_variant(const char* preset, const ScheduleOptions& length, Ind
   v.recipe.embed.schedule.steps = length.steps;
   v.recipe.embed.schedule.seconds = length.seconds;
   v.recipe.cells = kCells;
+  if (v.recipe.mark.index() > 0) v.views.all_directions = false;  // as the paper's
   return v;
 }
 
@@ -136,7 +137,6 @@ void training(Variants& all) {
 std::vector<EmbedVariant> embed_variants(const ScheduleOptions& length, Index bits, std::uint64_t seed,
                                          MarkColours colours) {
   EmbedVariant usual = base_variant("fast", length, bits, seed);
-  usual.views.all_directions = true;  // of an object
   watermark::use_colours(colours, usual.recipe.cell());
   Variants all(usual);
   lengths(all);

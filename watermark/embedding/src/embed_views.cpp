@@ -16,12 +16,12 @@ constexpr Index kFewestCells = 16, kMostCells = 64, kMoreCells = 6;
 constexpr double kCellsABit = 2, kCellsABitOfACut = 8, kPoorViews = 0.1;
 
 std::vector<nerf::Camera> cameras_of(const nerf::CameraSpan& span, const EmbedViewOptions& options,
-                                     Index size, std::uint64_t seed) {
+                                     bool all_directions, Index size, std::uint64_t seed) {
   const auto draw = [&](nerf::CameraSet set) {
     return nerf::make_cameras(span, set, options.count, size, seed);
   };
   std::vector<nerf::Camera> cameras = draw(nerf::CameraSet::novel);
-  if (options.all_directions) {
+  if (all_directions) {
     const auto around = draw(nerf::CameraSet::sphere);
     const std::size_t every = options.distances == EmbedDistances::several ? 4 : 2;
     for (std::size_t i = 0; i < cameras.size(); i += every) cameras[i] = around[i];
@@ -108,7 +108,8 @@ bool all_directions_for(nerf::SpaceKind space) { return space == nerf::SpaceKind
 std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, const PatchSize& patch,
                                           const EmbedViewOptions& options, std::uint64_t seed,
                                           const std::function<bool(Index, Index)>& progress) {
-  if (options.all_directions && !all_directions_for(field.space.kind))
+  const bool all_directions = options.all_directions.value_or(all_directions_for(field.space.kind));
+  if (all_directions && !all_directions_for(field.space.kind))
     throw ValueError(
         "[embed_views] all_directions must be false unless the field's space is cube (away from the "
         "training cameras, others are blurred), got space " +
@@ -120,7 +121,7 @@ std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, cons
   std::vector<CachedView> views;
   const Index seen = field.coarse ? kMlpWindowSize : kWindowSize;
   const Index samples = options.samples > 0 ? options.samples : samples_for(field.space.kind);
-  for (const nerf::Camera& camera : cameras_of(field.cameras, options, seen, seed)) {
+  for (const nerf::Camera& camera : cameras_of(field.cameras, options, all_directions, seen, seed)) {
     const Window window = object_window(renderer.render(camera).rgb, background, patch.aspect());
     PatchSize size = patch;
     if (options.distances != EmbedDistances::novel) {
@@ -139,7 +140,8 @@ std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, cons
 std::vector<CachedView> cache_novel_views(const nerf::RadianceField& field, const PatchSize& patch,
                                           Index count, std::uint64_t seed,
                                           const std::function<bool(Index, Index)>& progress) {
-  return cache_embed_views(field, patch, {.count = count, .samples = 1}, seed, progress);
+  return cache_embed_views(field, patch, {.count = count, .samples = 1, .all_directions = false}, seed,
+                           progress);
 }
 
 double cells_shown(const CachedView& view, Index side) {

@@ -11,12 +11,13 @@ constexpr Index kLeastSide = 16;
 
 }  // namespace
 
-void check_finite(const Tensor<float>& image) {
+void check_finite(const char* op, const Tensor<float>& image) {
   const Index channels = image.shape[2], w = image.shape[1];
   for (Index i = 0; i < image.size(); ++i)
     if (!std::isfinite(image[i]))
-      throw ValueError("[blind_reader] image must be finite, got " + std::to_string(image[i]) + " in row " +
-                       std::to_string(i / channels / w) + ", column " + std::to_string(i / channels % w));
+      throw ValueError("[" + std::string(op) + "] image must be finite, got " + std::to_string(image[i]) +
+                       " in row " + std::to_string(i / channels / w) + ", column " +
+                       std::to_string(i / channels % w));
 }
 
 Tensor<float> opaque_image(const Tensor<float>& view_image, float background) {
@@ -25,7 +26,7 @@ Tensor<float> opaque_image(const Tensor<float>& view_image, float background) {
   if (channels < 1 || channels > 4 || h < kLeastSide || w < kLeastSide)
     throw ShapeError("[blind_reader] image must be [H, W, 1 to 4] with sides of at least " +
                      std::to_string(kLeastSide) + ", got shape " + view_image.shape.str());
-  check_finite(view_image);
+  check_finite("blind_reader", view_image);
   if (channels == 3) return view_image;
   Tensor<float> out({h, w, 3});
   const bool colour = channels >= 3, alpha = channels % 2 == 0;

@@ -129,8 +129,8 @@ MarkScore score_of(const Tensor<float>& image, const CachedView& view, Carriers&
   return s;
 }
 
-// Returns four points of a scene that do not lie in a plane.
-std::vector<nerf::Vec3> corners_of(const nerf::CameraSpan& span) {
+// Returns four points of a scene that do not lie in a plane, to tell cameras apart.
+std::vector<nerf::Vec3> landmarks_of(const nerf::CameraSpan& span) {
   std::vector<nerf::Vec3> points(4, span.centre);
   for (std::size_t a = 0; a < 3; ++a) points[a][a] += 0.5 * span.half_size;
   return points;
@@ -183,7 +183,7 @@ std::vector<double> InformedReader::evidence_at(const Tensor<float>& image, cons
     throw ShapeError("[informed_reader] image must be of the camera's size, [" +
                      std::to_string(camera.height) + ", " + std::to_string(camera.width) +
                      ", 3], got shape " + image.shape.str());
-  check_finite(image);
+  check_finite("informed_reader", image);
   return evidence_at({.image = image, .plain = {}}, camera);
 }
 
@@ -236,13 +236,10 @@ InformedReading InformedReader::refined(const Surround& seen, const Change& chan
                                         const std::vector<Alignment>& found) {
   const std::span<const AlignmentStage> stages = change.stretch == 1 ? kFine : kFineStretched;
   const Alignment best =
-      best_alignment(found, kSure, corners_of(owner_.field.cameras), [&](const nerf::Camera& camera) {
+      best_alignment(found, kSure, landmarks_of(owner_.field.cameras), [&](const nerf::Camera& camera) {
         return parts_->aligner.align(seen.image, camera, stages, seen.covered);
       });
-  InformedReading reading;
-  reading.camera = best.camera;
-  reading.agreement = best.agreement;
-  return reading;
+  return {.evidence = {}, .camera = best.camera, .agreement = best.agreement};
 }
 
 // Returns the best alignment of an image without its surround, coarse, then fine.

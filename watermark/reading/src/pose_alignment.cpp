@@ -210,20 +210,20 @@ class Stage {
 
   Alignment run(const nerf::Camera& start) {
     Look best = look(start);
-    double damping = kDamping, length = kOverRelaxation;
+    NormalEquations sums = normal_equations(best);
+    double least = cost(best, best.spread), damping = kDamping, length = kOverRelaxation;
     int failures = 0;
     for (int step = 0; step < options_.steps && !best.points.empty() && failures < kMostFailures; ++step) {
-      NormalEquations sums = normal_equations(best);
-      const double ridge = 1e-6 * sums.h.diagonal().maxCoeff();
-      sums.h.diagonal() = (1 + damping) * sums.h.diagonal().array() + ridge;
-      const Vector m = length * sums.h.ldlt().solve(sums.g);
+      Matrix damped = sums.h;
+      damped.diagonal() = (1 + damping) * sums.h.diagonal().array() + 1e-6 * sums.h.diagonal().maxCoeff();
+      const Vector m = length * damped.ldlt().solve(sums.g);
       if (!m.allFinite()) break;
       CameraMotion motion;
       Eigen::Map<Vector>(motion.data()) = m.cwiseMax(-0.3).cwiseMin(0.3);
       const double far = furthest(best, motion);
       if (far < kStill) break;
       Look next = look(moved(best.camera, best.pivot, motion));
-      if (next.points.empty() || !(cost(next, best.spread) < cost(best, best.spread))) {
+      if (next.points.empty() || !(cost(next, best.spread) < least)) {
         if (far < kNear) break;
         damping *= 10;
         length = 1;
@@ -231,6 +231,8 @@ class Stage {
         continue;
       }
       best = std::move(next);
+      sums = normal_equations(best);
+      least = cost(best, best.spread);
       damping = std::max(1e-6, damping / 4);
       length = kOverRelaxation;
       failures = 0;

@@ -27,13 +27,13 @@ ToneVector shared_terms(const float* v) {
   return t;
 }
 
+std::array<ToneVector, 3> zeros() { return {ToneVector::Zero(), ToneVector::Zero(), ToneVector::Zero()}; }
+
 // Sums over all pixels: the normal equations of each channel.
 struct Sums {
   ToneMatrix shared = ToneMatrix::Zero();
-  std::array<ToneVector, 3> bends{ToneVector::Zero(), ToneVector::Zero(),
-                                  ToneVector::Zero()};  // last column of the matrix
-  std::array<ToneVector, 3> changes{ToneVector::Zero(), ToneVector::Zero(),
-                                    ToneVector::Zero()};  // right-hand side
+  std::array<ToneVector, 3> bends = zeros();    // last column of the matrix
+  std::array<ToneVector, 3> changes = zeros();  // right-hand side
   double total = 0;
 
   void add(double weight, const float* render, const float* image) {

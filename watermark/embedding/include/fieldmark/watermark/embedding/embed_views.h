@@ -4,6 +4,7 @@
 #include <fieldmark/watermark/mark/view_cache.h>
 
 #include <functional>
+#include <optional>
 #include <string_view>
 
 namespace fieldmark::watermark {
@@ -25,9 +26,9 @@ EmbedDistances parse_distances(std::string_view name);
 /// learnt at four parts to 94.3% (48 bits, 60 new views, as embedded, 1,200 steps, one run each).
 Index samples_for(nerf::SpaceKind space);
 
-/// Returns true for an object, whose field is as reliable from directions without training images as from
-/// others: a mark that learns from all directions is read from below, too.
-/// docs/notes/embedding.md has the measurements.
+/// Returns true where views from all directions can be trained on: for an object, whose field is as reliable
+/// from directions without training images as from others. docs/notes/embedding.md has what it gives and
+/// costs.
 bool all_directions_for(nerf::SpaceKind space);
 
 /// Options for the views to embed in.
@@ -35,8 +36,9 @@ struct EmbedViewOptions {
   Index count = 200;                                 ///< views, >= 1
   Index samples = 0;                                 ///< per ray, see cache_view(); 0: samples_for()
   EmbedDistances distances = EmbedDistances::novel;  ///< of their cameras
-  /// True: every second camera is of CameraSet::sphere, with several every fourth; for a field in a cube.
-  bool all_directions = false;
+  /// True: every second camera is of CameraSet::sphere, with several every fourth; default:
+  /// all_directions_for().
+  std::optional<bool> all_directions = {};
   /// True if all options are equal.
   bool operator==(const EmbedViewOptions&) const = default;
 };
@@ -47,7 +49,7 @@ struct EmbedViewOptions {
 /// pixels, but at least a quarter per side; the embedder enlarges it as for reading.
 /// @param patch  see OwnerOptions::patch()
 /// @param progress  called after each view with (done, total); returns false to stop, which throws Error
-/// @throws ValueError as cache_view(), and for all_directions if the field's space is not a cube
+/// @throws ValueError as cache_view(), and for all_directions where all_directions_for() is false
 std::vector<CachedView> cache_embed_views(const nerf::RadianceField& field, const PatchSize& patch,
                                           const EmbedViewOptions& options, std::uint64_t seed,
                                           const std::function<bool(Index, Index)>& progress = {});

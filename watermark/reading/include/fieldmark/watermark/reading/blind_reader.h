@@ -10,9 +10,10 @@ namespace fieldmark::watermark {
 /// @throws ShapeError if it is not an image or is too small   @throws ValueError if a value is not finite
 Tensor<float> opaque_image(const Tensor<float>& image, float background);
 
-/// @throws ValueError naming the row and column of the first value that is not finite
-/// @param image  [H, W, C]
-void check_finite(const Tensor<float>& image);
+/// Checks that all values of an image are finite.
+/// @param op  for the message   @param image  [H, W, C]   @throws ValueError naming row and column of the
+/// first that is not
+void check_finite(const char* op, const Tensor<float>& image);
 
 /// Blind detection: the extractor looks at an image and knows neither key nor message nor camera. Calls may
 /// run at the same time.
