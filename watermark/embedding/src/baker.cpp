@@ -14,7 +14,9 @@ namespace fieldmark::watermark {
 namespace {
 
 constexpr int kShards = 16;
-constexpr Index kRays = 64, kChunks = 32;  // rays per chunk, chunks per step
+constexpr Index kRays = 64;  // per chunk
+// Chunks per step. The step sizes that a table needs make small batches noisy; a step of an mlp field is slow.
+constexpr Index kTableChunks = 128, kMlpChunks = 32;
 constexpr float kLeastWeight = 1e-3f;
 constexpr int kRounds = 4;          // rounds of scale_to(), each confirmed on all views
 constexpr double kNear = 0.02;      // dB from the target mark PSNR
@@ -51,7 +53,7 @@ Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& opti
       rng_(options.seed, 21),
       field_(owner.field),
       loop_(kShards, owner.field.field.network_size()),
-      chunks_(kChunks),
+      chunks_(at(owner.field.field.has_table() ? kTableChunks : kMlpChunks)),
       samplers_(kShards),
       samples_(kShards) {
   if (message.size() != owner.options().bits)
@@ -65,7 +67,7 @@ Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& opti
   cameras_ = cameras_around(owner.field, options.cameras, options.around, 0, options.seed + 31);
   // The parameters of the density get no gradient: its networks are outside the ranges, and its features do
   // not change where the gradient is 0.
-  std::vector<AdamRange> ranges = {colour_range(field_.params, field_.field.has_table() ? 0.2 : 0.05)};
+  std::vector<AdamRange> ranges = {colour_range(field_.params, field_.field.has_table() ? 0.2 : 0.01)};
   if (field_.field.has_table())
     ranges.push_back({.begin = field_.field.network_size(), .end = field_.params.size(), .skip_zero = true});
   train(field_.params, {.lr = 1, .beta2 = 0.99, .eps = 1e-15, .zero_grads = true}, std::move(ranges));
@@ -174,13 +176,14 @@ void Baker::backward_table() {
 
 double Baker::take_step(double) {
   const Index network = field_.field.network_size();
+  const auto chunks = static_cast<Index>(chunks_.size());
   const double loss = loop_.run(
-      kChunks,
+      chunks,
       [&](Index c, Index shard, Tape<float>& tape, float* grads) { return run_chunk(c, shard, tape, grads); },
       field_.params.grads().first(at(network)));
   if (field_.field.has_table()) backward_table();
   update();
-  return loss / kChunks;
+  return loss / static_cast<double>(chunks);
 }
 
 void Baker::describe(RunFingerprint& f) const {
