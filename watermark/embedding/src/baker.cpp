@@ -15,12 +15,24 @@ namespace {
 
 constexpr int kShards = 16;
 constexpr Index kRays = 64;  // per chunk
-// Chunks per step. The step sizes that a table needs make small batches noisy; a step of an mlp field is slow.
-constexpr Index kTableChunks = 128, kMlpChunks = 32;
 constexpr float kLeastWeight = 1e-3f;
 constexpr int kRounds = 4;          // rounds of scale_to(), each confirmed on all views
 constexpr double kNear = 0.02;      // dB from the target mark PSNR
 constexpr float kOfSamples = 0.1f;  // weight of the samples' own colours relative to those of rays
+
+// Chunks per step, and step sizes relative to the schedule's.
+struct StepPlan {
+  Index chunks;
+  double table, network;
+};
+
+// Rays of objects are short: there is time for many of them and for large steps, without which colours learn
+// a mark from all directions too faintly. Elsewhere there is time for a tenth of the steps.
+StepPlan plan_of(const nerf::RadianceField& field) {
+  if (!field.field.has_table()) return {.chunks = 32, .table = 0, .network = 0.01};
+  if (field.space.kind == nerf::SpaceKind::cube) return {.chunks = 128, .table = 1, .network = 0.2};
+  return {.chunks = 32, .table = 0.2, .network = 0.04};
+}
 
 // Returns the range of the colour networks' parameters, which are contiguous.
 AdamRange colour_range(const ParamStore<float>& params, double lr_factor) {
@@ -53,7 +65,7 @@ Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& opti
       rng_(options.seed, 21),
       field_(owner.field),
       loop_(kShards, owner.field.field.network_size()),
-      chunks_(at(owner.field.field.has_table() ? kTableChunks : kMlpChunks)),
+      chunks_(at(plan_of(owner.field).chunks)),
       samplers_(kShards),
       samples_(kShards) {
   if (message.size() != owner.options().bits)
@@ -65,11 +77,15 @@ Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& opti
   marking_ = owner.marking(cell_signs(owner.code(), message));
   // Colours that no ray constrains drift: without the cameras around, lego's underside changes by 29 dB.
   cameras_ = cameras_around(owner.field, options.cameras, options.around, 0, options.seed + 31);
+  const StepPlan plan = plan_of(owner.field);
   // The parameters of the density get no gradient: its networks are outside the ranges, and its features do
   // not change where the gradient is 0.
-  std::vector<AdamRange> ranges = {colour_range(field_.params, field_.field.has_table() ? 0.2 : 0.01)};
+  std::vector<AdamRange> ranges = {colour_range(field_.params, plan.network)};
   if (field_.field.has_table())
-    ranges.push_back({.begin = field_.field.network_size(), .end = field_.params.size(), .skip_zero = true});
+    ranges.push_back({.begin = field_.field.network_size(),
+                      .end = field_.params.size(),
+                      .lr_factor = plan.table,
+                      .skip_zero = true});
   train(field_.params, {.lr = 1, .beta2 = 0.99, .eps = 1e-15, .zero_grads = true}, std::move(ranges));
 }
 
