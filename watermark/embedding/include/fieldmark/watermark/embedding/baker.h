@@ -9,7 +9,7 @@ namespace fieldmark::watermark {
 
 /// Options for baking a message.
 struct BakeOptions {
-  /// Length of the run and step sizes.
+  /// Length of the run and step sizes for objects of preset hash; others take smaller ones (baker.cpp).
   ScheduleOptions schedule{.seconds = 45, .lr = 5e-2, .half_after = 4000, .cooldown = 0.6, .last = 0.02};
   Index cameras = 400;     ///< novel cameras whose rays are used, >= 1
   Index around = 130;      ///< more in every direction for an object without surroundings (a cube), >= 0
