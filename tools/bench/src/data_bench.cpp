@@ -1,9 +1,9 @@
+#include <fieldmark/core/private_folder.h>
 #include <fieldmark/imaging/metrics.h>
 #include <fieldmark/nerf/renderer.h>
 #include <fieldmark/nerf/trainer.h>
 #include <fieldmark/tools/bench/data_bench.h>
 
-#include "private_folder.h"
 #include "training_loop.h"
 
 namespace fieldmark::bench {

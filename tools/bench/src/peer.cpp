@@ -1,5 +1,6 @@
 #include <fieldmark/core/error.h>
 #include <fieldmark/core/files.h>
+#include <fieldmark/core/private_folder.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/tools/bench/peer.h>
 #include <unistd.h>
@@ -8,7 +9,6 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "private_folder.h"
 #include "pytorch_models.h"
 #include "pytorch_peer.h"
 

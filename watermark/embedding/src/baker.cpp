@@ -19,6 +19,8 @@ constexpr float kLeastWeight = 1e-3f;
 constexpr int kRounds = 4;          // rounds of scale_to(), each confirmed on all views
 constexpr double kNear = 0.02;      // dB from the target mark PSNR
 constexpr float kOfSamples = 0.1f;  // weight of the samples' own colours relative to those of rays
+constexpr double kEmphasisRate = 1. / 200;  // per step
+constexpr double kMarkResolution = 128;     // cells per axis that suffice for a mark on an object
 
 // Chunks per step, and step sizes relative to the schedule's.
 struct StepPlan {
@@ -34,6 +36,39 @@ StepPlan plan_of(const nerf::RadianceField& field) {
   return {.chunks = 32, .table = 0.2, .network = 0.04};
 }
 
+// Returns the ranges of the table's levels. A mark has no finer detail than kMarkResolution; on finer levels
+// of an object, each row learns from the fewer rays the finer they are, and mostly noise.
+std::vector<AdamRange> table_ranges(const nerf::RadianceField& field, double lr_factor) {
+  const nerf::HashEncoding<float>& encoding = field.field.encoding();
+  const bool object = field.space.kind == nerf::SpaceKind::cube;
+  const auto begin_of = [&](int level) {
+    return field.field.network_size() + encoding.first_row(level) * 2 * encoding.features();
+  };
+  std::vector<AdamRange> ranges;
+  for (int level = 0; level < encoding.levels(); ++level) {
+    const double coarser = kMarkResolution / static_cast<double>(encoding.resolution(level));
+    ranges.push_back({.begin = begin_of(level),
+                      .end = begin_of(level + 1),
+                      .lr_factor = lr_factor * (object ? std::min(1., std::pow(coarser, 3)) : 1.),
+                      .skip_zero = true});
+  }
+  return ranges;
+}
+
+// Returns the power of a difference of colours on rays, sum_r |sum_i w_i (a_i - b_i)|^2 over their samples.
+double power_on_rays(std::span<const std::int32_t> begin, std::span<const float> weight, const float* a,
+                     const float* b) {
+  double power = 0;
+  for (std::size_t r = 0; r + 1 < begin.size(); ++r)
+    for (Index channel = 0; channel < 3; ++channel) {
+      double sum = 0;
+      for (Index i = begin[r]; i < begin[r + 1]; ++i)
+        sum += static_cast<double>(weight[at(i)] * (a[3 * i + channel] - b[3 * i + channel]));
+      power += sum * sum;
+    }
+  return power;
+}
+
 // Returns the range of the colour networks' parameters, which are contiguous.
 AdamRange colour_range(const ParamStore<float>& params, double lr_factor) {
   AdamRange range{.begin = params.size(), .lr_factor = lr_factor};
@@ -47,14 +82,16 @@ AdamRange colour_range(const ParamStore<float>& params, double lr_factor) {
 
 }  // namespace
 
-// The visible samples of a chunk, their unmarked colours, and the gradients that they pass back to the table.
+// The visible samples of a chunk, their marked colours, those to learn, and the gradients that they pass back
+// to the table.
 struct Baker::Chunk {
   nerf::CubeRays rays;
   std::vector<float> jitter;
-  std::vector<float> position, direction, weight, geometry_features, base_features, of_direction, target,
-      features, dfeatures, unused;
+  std::vector<float> position, direction, weight, geometry_features, base_features, of_direction, marked,
+      target, features, dfeatures, unused;
   std::vector<std::int32_t> begin;  // of each ray's samples, and the end
   Index samples = 0;
+  double asked = 0, learnt = 0;  // power of the mark on rays
 };
 
 Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& options)
@@ -82,10 +119,8 @@ Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& opti
   // not change where the gradient is 0.
   std::vector<AdamRange> ranges = {colour_range(field_.params, plan.network)};
   if (field_.field.has_table())
-    ranges.push_back({.begin = field_.field.network_size(),
-                      .end = field_.params.size(),
-                      .lr_factor = plan.table,
-                      .skip_zero = true});
+    for (const AdamRange& range : table_ranges(field_, plan.table)) ranges.push_back(range);
+  keep("emphasis", emphasis_);
   train(field_.params, {.lr = 1, .beta2 = 0.99, .eps = 1e-15, .zero_grads = true}, std::move(ranges));
 }
 
@@ -140,6 +175,28 @@ void Baker::select(const nerf::RaySamples& s, Chunk& c) const {
   c.samples = static_cast<Index>(c.weight.size());
 }
 
+void Baker::set_target(const float* unmarked, Chunk& c) const {
+  c.marked.assign(unmarked, unmarked + 3 * c.samples);
+  marking_(c.position.data(), c.direction.data(), c.samples, c.marked.data());
+  c.asked = power_on_rays(c.begin, c.weight, c.marked.data(), unmarked);
+  c.target = c.marked;
+  const auto factor = static_cast<float>(emphasis_);
+  if (factor == 1) return;
+  for (std::size_t i = 0; i < c.target.size(); ++i)
+    c.target[i] = std::clamp(unmarked[i] + factor * (c.marked[i] - unmarked[i]), 0.f, 1.f);
+}
+
+// Networks are not linear: scaling a faint change afterwards costs bits.
+void Baker::update_emphasis() {
+  double asked = 0, learnt = 0;
+  for (const Chunk& c : chunks_) {
+    asked += c.asked;
+    learnt += c.learnt;
+  }
+  const double ratio = learnt > 0 ? std::clamp(std::sqrt(asked / learnt), 0.5, 2.) : 1;
+  emphasis_ = std::clamp(emphasis_ * (1 + kEmphasisRate * (ratio - 1)), 1., kLargestScale);
+}
+
 double Baker::run_chunk(Index index, Index shard, Tape<float>& tape, float* grads) {
   Chunk& c = chunks_[at(index)];
   choose_rays(index, c);
@@ -152,6 +209,7 @@ double Baker::run_chunk(Index index, Index shard, Tape<float>& tape, float* grad
   c.features.resize(at(n * colour));
   c.unused.resize(at(n * density));
   c.dfeatures.resize(at(2 * n * colour));
+  c.asked = c.learnt = 0;
   if (n == 0) return 0;
   const Params<float> frozen(owner_.field.params, nullptr), learnt(field_.params, grads);
   const Var<float> of_direction = tape.constant(c.of_direction.data(), {n, net.direction_width()});
@@ -160,12 +218,12 @@ double Baker::run_chunk(Index index, Index shard, Tape<float>& tape, float* grad
                                    : tape.constant(geometry, {n, net.geometry_width()});
   const Var<float> base =
       net.colour(frozen, z, tape.constant(c.base_features.data(), {n, colour}), of_direction);
-  c.target.assign(base.value(), base.value() + 3 * n);
-  marking_(c.position.data(), c.direction.data(), n, c.target.data());
+  set_target(base.value(), c);
 
   if (net.has_table()) net.encode(field_.params, c.position.data(), n, c.unused.data(), c.features.data());
   const Var<float> features = tape.fresh_leaf(c.features.data(), nullptr, {n, colour});
   const Var<float> rgb = net.colour(learnt, z, features, of_direction);
+  c.learnt = power_on_rays(c.begin, c.weight, rgb.value(), base.value());
   float* weights = tape.scratch(3 * n);
   for (Index i = 0; i < 3 * n; ++i) weights[i] = c.weight[at(i / 3)];
   const Var<float> target = tape.constant(c.target.data(), {n, 3});
@@ -174,10 +232,10 @@ double Baker::run_chunk(Index index, Index shard, Tape<float>& tape, float* grad
   float* nothing = tape.scratch(3 * kRays);
   std::fill_n(nothing, 3 * kRays, 0.f);
   const Var<float> of_rays = mse_loss<float>(seen, tape.constant(nothing, {kRays, 3}));
-  const double value = static_cast<double>(of_rays.value()[0]);
+  const double error = power_on_rays(c.begin, c.weight, rgb.value(), c.marked.data());
   tape.backward(add(of_rays, scale(of_samples, kOfSamples)));
   if (net.has_table()) net.encoding().deal_to_levels(n, nullptr, features.grad(), c.dfeatures.data());
-  return value;
+  return error / (3 * kRays);
 }
 
 void Baker::backward_table() {
@@ -199,6 +257,7 @@ double Baker::take_step(double) {
       field_.params.grads().first(at(network)));
   if (field_.field.has_table()) backward_table();
   update();
+  if (owner_.mark().has_gain()) update_emphasis();
   return loss / static_cast<double>(chunks);
 }
 

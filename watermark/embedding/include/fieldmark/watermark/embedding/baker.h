@@ -21,9 +21,12 @@ struct BakeOptions {
 ///   e_i = c(x_i, d_i) - c_m(x_i, d_i)
 /// over samples i of rays r of novel cameras and, for an object, of cameras in every direction; w_i are their
 /// weights, and both terms are divided by the three channels. The first term is what images show; the second
-/// keeps colours behind one another from compensating each other. Only the colour network and the colour
-/// features of the table move; everything that density depends on keeps its bytes. The result has the tensor
-/// names, shapes and metadata of the unmarked field, and holds neither network, extractor, key nor message.
+/// keeps colours behind one another from compensating each other. Colours learn a mark too faintly, so the
+/// change of the unmarked colours that c_m asks for is multiplied by a factor from 1 to kLargestScale, which
+/// follows the square root of the asked over the learnt power of the mark on rays. Only the colour network
+/// and the colour features of the table move; everything that density depends on keeps its bytes. The result
+/// has the tensor names, shapes and metadata of the unmarked field, and holds neither network, extractor, key
+/// nor message.
 class Baker final : public TrainingRun {
  public:
   /// The owner must outlive the baker. @throws ValueError if the length of the message is not the owner's, or
@@ -59,7 +62,9 @@ class Baker final : public TrainingRun {
   void describe(RunFingerprint& fingerprint) const override;
   void choose_rays(Index chunk, Chunk& c) const;
   void select(const nerf::RaySamples& samples, Chunk& c) const;
+  void set_target(const float* unmarked, Chunk& c) const;
   double run_chunk(Index index, Index shard, Tape<float>& tape, float* grads);
+  void update_emphasis();
   void backward_table();
   void seek(double target, std::span<const float> learnt, const std::function<double()>& measure,
             MarkPsnr& found);
@@ -76,6 +81,7 @@ class Baker final : public TrainingRun {
   std::vector<Chunk> chunks_;
   std::vector<nerf::FieldSampler> samplers_;
   std::vector<nerf::RaySamples> samples_;
+  double emphasis_ = 1;
 };
 
 }  // namespace fieldmark::watermark

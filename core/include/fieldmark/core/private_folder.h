@@ -9,7 +9,7 @@
 #include <string>
 #include <system_error>
 
-namespace fieldmark::bench {
+namespace fieldmark {
 
 /// A temporary folder that only its owner can access, removed at the end of the scope.
 struct PrivateFolder {
@@ -25,7 +25,8 @@ struct PrivateFolder {
     std::error_code ignored;
     std::filesystem::remove_all(path, ignored);
   }
+  std::filesystem::path operator/(const std::string& name) const { return path / name; }
   std::filesystem::path path;
 };
 
-}  // namespace fieldmark::bench
+}  // namespace fieldmark
