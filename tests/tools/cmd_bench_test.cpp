@@ -8,7 +8,7 @@ TEST_CASE("bench has a command for each subject, which refuses the options of ot
   CHECK(run_command({"bench", "nothing"}).code == cli::kUsage);
   const auto help = run_command({"bench", "--help"});
   CHECK(help.code == cli::kOk);
-  for (const char* subject : {"engine", "field", "training", "embed", "payload", "attacks"}) {
+  for (const char* subject : {"engine", "field", "training", "embed", "payload", "attacks", "tracing"}) {
     CHECK_THAT(help.out, Contains(subject));
     CHECK_THAT(run_command({"bench", subject, "--help"}).out, Contains("--"));
   }

@@ -24,6 +24,7 @@ Command add_bench_embed(CommandLine& app);
 Command add_bench_engine(CommandLine& app);
 Command add_bench_field(CommandLine& app);
 Command add_bench_payload(CommandLine& app);
+Command add_bench_tracing(CommandLine& app);
 Command add_bench_training(CommandLine& app);
 /// @}
 

@@ -28,6 +28,8 @@ constexpr Subject kSubjects[] = {
      add_bench_payload},
     {"attacks", "Measure accuracy against damage of a baked mark under attacks on images and fields",
      add_bench_attacks},
+    {"tracing", "Measure how many of the recipients whose copies were mixed are named, and how many others",
+     add_bench_tracing},
     {"collapse",
      "Measure how soon collapsed trainings are noticed, and how often healthy ones are taken for such",
      add_bench_collapse},

@@ -1,0 +1,84 @@
+#include <fieldmark/tools/bench/tracing_bench.h>
+#include <fieldmark/watermark/attacks/payload_trials.h>
+
+#include "cli/bench.h"
+
+namespace fieldmark::cli {
+namespace {
+
+struct BenchTracingArguments {
+  std::string owner;
+  bool blind = false;
+  bench::TracingBenchOptions options;
+};
+
+Json tracing_row_json(const bench::TracingRow& r) {
+  const Index guilty = r.repetitions * r.copies.guilty;
+  const auto [low, high] = watermark::wilson_interval(r.all_found, r.repetitions);
+  return {{"copies", r.copies.name()},
+          {"guilty", r.copies.guilty},
+          {"repetitions", r.repetitions},
+          {"all_found", r.all_found},
+          {"all_found_low", low},
+          {"all_found_high", high},
+          {"found", static_cast<double>(r.found) / static_cast<double>(guilty)},
+          {"worst_guilty", r.worst_guilty},
+          {"least_innocent", r.least_innocent},
+          {"innocents_named", r.innocents_named}};
+}
+
+int run_bench_tracing(const BenchTracingArguments& o, Context& context) {
+  const auto owner = watermark::Owner::load(o.owner);
+  if (!owner.mark().has_cells())
+    throw UsageError("--owner: an owner of preset " + owner.mark().preset() +
+                     " has no cells, so its copies have no codes of their own");
+  bench::TracingBenchOptions options = o.options;
+  options.informed = !o.blind;
+  options.seed = context.seed();
+  const auto rows = read_option("--recipients", [&] {
+    return with_progress(
+        context, [&](const auto& progress) { return bench::run_tracing_bench(owner, options, progress); });
+  });
+  print_line(context,
+             "%lld recipients, %lld views, %s detection, not baked\ncopies          all found   guilty "
+             "found  worst guilty p  least innocent p\n",
+             static_cast<long long>(options.recipients), static_cast<long long>(options.views),
+             o.blind ? "blind" : "chosen");
+  Json json = Json::array();
+  for (const auto& r : rows) {
+    const Json row = tracing_row_json(r);
+    print_line(context, "%-15s %4lld of %-4lld %11.1f%%  %14.2e  %16.2e\n", r.copies.name().c_str(),
+               static_cast<long long>(r.all_found), static_cast<long long>(r.repetitions),
+               100 * row["found"].get<double>(), r.worst_guilty, r.least_innocent);
+    json.push_back(row);
+  }
+  context.result({{"recipients", options.recipients},
+                  {"repetitions", options.repetitions},
+                  {"views", options.views},
+                  {"detection", o.blind ? "blind" : "chosen"},
+                  {"fpr", options.fpr},
+                  {"baked", false},
+                  {"seed", options.seed},
+                  {"rows", json}});
+  return kOk;
+}
+
+}  // namespace
+
+Command add_bench_tracing(CommandLine& app) {
+  auto o = std::make_shared<BenchTracingArguments>();
+  app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
+  add_number(app, "--recipients", o->options.recipients, 2, 10000000,
+             "Recipients to test, more than 8, at most 10000000");
+  add_number(app, "--repetitions", o->options.repetitions, 1, 100000,
+             "Repetitions of each case with another key, 1 to 100000");
+  add_number(app, "--views", o->options.views, 1, 10000, "Novel views whose evidence is added, 1 to 10000");
+  app.add_option("--fpr", o->options.fpr,
+                 "Corrected p-value at which a recipient counts as found, above 0 to 1")
+      ->range(1e-300, 1.0)
+      ->type_name("P");
+  app.add_flag("--blind", o->blind, "Read by blind detection alone");
+  return [o](Context& context) { return run_bench_tracing(*o, context); };
+}
+
+}  // namespace fieldmark::cli
