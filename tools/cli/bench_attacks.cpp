@@ -164,7 +164,7 @@ Command add_bench_attacks(CommandLine& app) {
   add_file(app, "--owner", o->owner, "Owner file of `fieldmark embed`", "OWNER")->required();
   add_message_options(app, o->message, "Message baked into --field");
   add_file(app, "--other", o->other,
-           "Field baked with another message, to average with; default: no such row", "FIELD");
+           "Field baked for another copy or message, to average with; default: no such row", "FIELD");
   add_file(app, "--onto", o->onto, "Field of another scene, to copy the mark onto; default: no such row",
            "FIELD");
   app.add_option("--attacked", o->attacked, "Attacked field made by other means, one row each; repeatable")

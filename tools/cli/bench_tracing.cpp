@@ -6,6 +6,13 @@
 namespace fieldmark::cli {
 namespace {
 
+constexpr const char* kColumns =
+    "all_found: repetitions in which every guilty recipient was found, with its 95% interval; found: share "
+    "of "
+    "guilty recipients found; worst_guilty, least_innocent: largest corrected p-value of a guilty recipient "
+    "and "
+    "smallest of an innocent one, over all repetitions; innocents_named: innocent recipients found";
+
 struct BenchTracingArguments {
   std::string owner;
   bool blind = false;
@@ -35,30 +42,31 @@ int run_bench_tracing(const BenchTracingArguments& o, Context& context) {
   bench::TracingBenchOptions options = o.options;
   options.informed = !o.blind;
   options.seed = context.seed();
-  const auto rows = read_option("--recipients", [&] {
-    return with_progress(
-        context, [&](const auto& progress) { return bench::run_tracing_bench(owner, options, progress); });
-  });
+  const auto rows = with_progress(
+      context, [&](const auto& progress) { return bench::run_tracing_bench(owner, options, progress); });
   print_line(context,
-             "%lld recipients, %lld views, %s detection, not baked\ncopies          all found   guilty "
-             "found  worst guilty p  least innocent p\n",
+             "%lld recipients, %lld views, detection %s, found at a corrected p of at most %g, not baked\n",
              static_cast<long long>(options.recipients), static_cast<long long>(options.views),
-             o.blind ? "blind" : "chosen");
+             o.blind ? "blind" : "auto", options.fpr);
+  print_line(context,
+             "copies          all found  guilty found  worst guilty p  least innocent p  innocents named\n");
   Json json = Json::array();
   for (const auto& r : rows) {
     const Json row = tracing_row_json(r);
-    print_line(context, "%-15s %4lld of %-4lld %11.1f%%  %14.2e  %16.2e\n", r.copies.name().c_str(),
+    print_line(context, "%-15s %3lld of %-3lld %12.1f%%  %14.2e  %16.2e  %15lld\n", r.copies.name().c_str(),
                static_cast<long long>(r.all_found), static_cast<long long>(r.repetitions),
-               100 * row["found"].get<double>(), r.worst_guilty, r.least_innocent);
+               100 * row["found"].get<double>(), r.worst_guilty, r.least_innocent,
+               static_cast<long long>(r.innocents_named));
     json.push_back(row);
   }
   context.result({{"recipients", options.recipients},
                   {"repetitions", options.repetitions},
                   {"views", options.views},
-                  {"detection", o.blind ? "blind" : "chosen"},
+                  {"detection", o.blind ? "blind" : "auto"},
                   {"fpr", options.fpr},
                   {"baked", false},
                   {"seed", options.seed},
+                  {"columns", kColumns},
                   {"rows", json}});
   return kOk;
 }
@@ -68,13 +76,12 @@ int run_bench_tracing(const BenchTracingArguments& o, Context& context) {
 Command add_bench_tracing(CommandLine& app) {
   auto o = std::make_shared<BenchTracingArguments>();
   app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
-  add_number(app, "--recipients", o->options.recipients, 2, 10000000,
-             "Recipients to test, more than 8, at most 10000000");
+  add_number(app, "--recipients", o->options.recipients, 9, 10000000, "Recipients to test, 9 to 10000000");
   add_number(app, "--repetitions", o->options.repetitions, 1, 100000,
              "Repetitions of each case with another key, 1 to 100000");
   add_number(app, "--views", o->options.views, 1, 10000, "Novel views whose evidence is added, 1 to 10000");
   app.add_option("--fpr", o->options.fpr,
-                 "Corrected p-value at which a recipient counts as found, above 0 to 1")
+                 "Largest corrected p-value at which a recipient counts as found, above 0 to 1")
       ->range(1e-300, 1.0)
       ->type_name("P");
   app.add_flag("--blind", o->blind, "Read by blind detection alone");

@@ -21,10 +21,9 @@ TEST_CASE("tracing_bench: names who took part, fewer of them as more copies are 
   std::vector<std::string> parts;
   const auto rows = run_tracing_bench(owner, options, [&](const std::string& what, double part) {
     CHECK((part >= 0 && part < 1));
-    parts.push_back(what);
+    if (parts.empty() || parts.back() != what) parts.push_back(what);
   });
-  CHECK(parts == std::vector<std::string>{"one copy", "one copy", "one copy", "average of 8", "average of 8",
-                                          "average of 8", "pasted from 2", "pasted from 2", "pasted from 2"});
+  CHECK(parts == std::vector<std::string>{"one copy", "average of 8", "pasted from 2"});
   REQUIRE(rows.size() == 3);
   for (const TracingRow& row : rows) {
     CAPTURE(row.copies.name(), row.found, row.worst_guilty, row.least_innocent);

@@ -9,6 +9,8 @@
 #include <fieldmark/watermark/tracing/trace.h>
 
 #include <algorithm>
+#include <array>
+#include <memory>
 #include <set>
 
 namespace fieldmark::bench {
@@ -45,17 +47,16 @@ void check(const TracingBenchOptions& o, const watermark::Owner& owner) {
 }
 
 Recipients draw_recipients(const watermark::Owner& owner, const TracingBenchOptions& o, Index guilty,
-                           const CounterRng& rng, std::uint64_t trial) {
+                           std::uint64_t trial) {
+  const CounterRng messages(o.seed, 61), names(o.seed, 62);
   const std::string purpose = "bench tracing " + std::to_string(o.seed) + " " + std::to_string(trial);
   Recipients r{.key = watermark::derive_key(owner.key, purpose, 0),
-               .message = watermark::random_message(owner.options().bits, rng, trial)};
+               .message = watermark::random_message(owner.options().bits, messages, trial)};
   for (Index i = 0; i < o.recipients; ++i) r.names.push_back(std::to_string(i + 1));
   for (std::uint64_t draw = 0; std::ssize(r.guilty) < guilty; ++draw) {
-    const double u = static_cast<double>(rng.uniform4(trial, draw)[0]);
-    const auto i = std::min(static_cast<Index>(u * static_cast<double>(o.recipients)), o.recipients - 1);
-    if (!r.guilty.insert(r.names[at(i)]).second) continue;
-    r.signs.push_back(
-        watermark::cell_signs(owner.code(watermark::copy_key(r.key, r.names[at(i)])), r.message));
+    const std::string& name = r.names[at(names.below(o.recipients, trial, draw))];
+    if (!r.guilty.insert(name).second) continue;
+    r.signs.push_back(watermark::cell_signs(owner.code(watermark::copy_key(r.key, name)), r.message));
   }
   return r;
 }
@@ -75,11 +76,8 @@ nerf::Renderer::Recolour averaged(std::vector<nerf::Renderer::Recolour> copies) 
 
 Signs pasted(const std::vector<Signs>& copies, const CounterRng& rng, std::uint64_t trial) {
   Signs signs = copies.front();
-  for (std::size_t cell = 0; cell < signs.size(); ++cell) {
-    const auto u = static_cast<double>(rng.uniform4(trial, cell)[1]);
-    const auto pick = static_cast<std::size_t>(u * static_cast<double>(copies.size()));
-    signs[cell] = copies[std::min(pick, copies.size() - 1)][cell];
-  }
+  for (std::size_t cell = 0; cell < signs.size(); ++cell)
+    signs[cell] = copies[at(rng.below(std::ssize(copies), trial, cell))][cell];
   return signs;
 }
 
@@ -98,11 +96,14 @@ class Suspect {
       : owner_(owner), options_(options), renderer_(owner.field), blind_(owner) {
     if (options.informed) informed_ = std::make_unique<watermark::InformedReader>(owner);
   }
-  std::vector<double> evidence(nerf::Renderer::Recolour field, std::uint64_t trial) {
+  std::vector<double> evidence(nerf::Renderer::Recolour field, std::uint64_t trial,
+                               const std::function<void()>& before_view) {
     renderer_.set_recolour(std::move(field));
     std::vector<double> sum(at(owner_.cells.count()), 0.0);
-    for (const nerf::Camera& camera : nerf::make_cameras(owner_.field.cameras, nerf::CameraSet::novel,
-                                                         options_.views, 0, options_.seed + 1000 + trial)) {
+    const std::array<std::uint32_t, 4> seed = CounterRng(options_.seed, 64).bits(trial);
+    for (const nerf::Camera& camera :
+         nerf::make_cameras(owner_.field.cameras, nerf::CameraSet::novel, options_.views, 0, seed[0])) {
+      before_view();
       const Tensor<float> image = quantize8(renderer_.render(camera).rgb);
       const auto read = informed_ ? informed_->read(image).evidence() : blind_.evidence(image);
       for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += read[c];
@@ -146,7 +147,7 @@ std::string TracingCase::name() const {
 std::vector<TracingRow> run_tracing_bench(const watermark::Owner& owner, const TracingBenchOptions& options,
                                           const std::function<void(const std::string&, double)>& progress) {
   check(options, owner);
-  const CounterRng rng(options.seed, 61);
+  const CounterRng pastes(options.seed, 63);
   Suspect suspect(owner, options);
   std::vector<TracingRow> rows;
   std::uint64_t trial = 0;
@@ -154,11 +155,17 @@ std::vector<TracingRow> run_tracing_bench(const watermark::Owner& owner, const T
   for (const TracingCase& copies : options.cases) {
     TracingRow row{.copies = copies};
     for (Index i = 0; i < options.repetitions; ++i, ++trial) {
-      if (progress) progress(copies.name(), static_cast<double>(trial) / trials);
-      const Recipients r = draw_recipients(owner, options, copies.guilty, rng, trial);
-      const auto evidence = suspect.evidence(mixed(owner, copies.mix, r.signs, rng, trial), trial);
-      add_traced(watermark::trace_copies(evidence, owner.cells.area(), r.key, r.message, r.names), r.guilty,
-                 options.fpr, row);
+      const auto tell = [&] {
+        if (progress) progress(copies.name(), static_cast<double>(trial) / trials);
+      };
+      const Recipients r = draw_recipients(owner, options, copies.guilty, trial);
+      const auto evidence = suspect.evidence(mixed(owner, copies.mix, r.signs, pastes, trial), trial, tell);
+      const auto traced =
+          watermark::trace_copies(evidence, owner.cells.area(), r.key, r.message, r.names, [&](Index, Index) {
+            tell();
+            return true;
+          });
+      add_traced(traced, r.guilty, options.fpr, row);
     }
     rows.push_back(row);
   }

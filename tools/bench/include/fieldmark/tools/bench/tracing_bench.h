@@ -1,8 +1,8 @@
 #pragma once
 #include <fieldmark/watermark/mark/owner.h>
 
+#include <cstdint>
 #include <functional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -10,7 +10,7 @@ namespace fieldmark::bench {
 
 /// How the field in question was made from copies.
 enum class CopyMix {
-  average,  ///< mean of their colours, as of averaged images or of averaged fields of linear colours
+  average,  ///< mean of their colours, as in averaged images
   pasted    ///< each cell from one of them, drawn at random
 };
 
@@ -46,7 +46,8 @@ struct TracingRow {
 };
 
 /// Traces copies that are marked as trained (not baked) and mixed, among many recipients.
-/// @param progress  called with the name of the case and the fraction done, before each repetition
+/// @param progress  called with the name of the case and the fraction done, before each view and while
+/// tracing; may throw to stop
 /// @throws ValueError if an option is out of range or the owner's mark has no cells
 std::vector<TracingRow> run_tracing_bench(
     const watermark::Owner& owner, const TracingBenchOptions& options,
