@@ -42,9 +42,10 @@ inline fieldmark::nerf::RadianceFieldOptions small_mlp_options() {
 
 /// Returns a smooth random field: table and networks have numbers large enough to matter, and the cameras
 /// surround the origin.
-inline fieldmark::nerf::RadianceField small_field(unsigned seed = 1) {
+inline fieldmark::nerf::RadianceField small_field(
+    unsigned seed = 1, const fieldmark::nerf::RadianceFieldOptions& options = small_field_options()) {
   using namespace fieldmark;
-  nerf::RadianceField field(small_field_options());
+  nerf::RadianceField field(options);
   const auto numbers = uniform<float>({field.params.size()}, -1, 1, seed);
   std::copy(numbers.data.begin(), numbers.data.end(), field.params.values().begin());
   std::vector<nerf::Camera> cameras;

@@ -17,11 +17,7 @@
 
 // Every file that the command writes for a fixed seed, key and number of steps has recorded bytes, for one
 // thread and for two. A change that is meant to change results says so and records them anew from the test's
-// own output. The records come from:
-//   - scene and fields: version 0.1;
-//   - owners, and what preset fast bakes, renders and reads: the commit that trains the extractor's matrices by
-//     Muon;
-//   - baked fields and renders of presets paper and code: the commit that gave them a warm start.
+// own output.
 using namespace fieldmark;
 
 namespace {

@@ -4,9 +4,8 @@
 
 // SHA-256 of the files of bytes_test.cpp, for each instruction set. Scene and fields were recorded at commit
 // 07c747b; owners and all that is made with them, at the commit where Muon began to train the extractor's
-// matrices; baked fields and what is read from them, at the commit that bakes with an emphasis
-// and small steps on fine levels.
-// AVX-512 is not recorded.
+// matrices; baked fields and what is read from them, at the commit that bakes with emphasis and with
+// small steps on fine levels. AVX-512 is not recorded.
 inline const std::map<std::string, std::string> kBytesV2{
     {"code baked field", "e525075ff3ec5fdeb2e72c07a0fb3b87cb4b039d71a35058f465bc9039673d06"},
     {"code logits", "9613e54e8692e34788c1420773b95ac1f73cad031192077e2866490bda867c3e"},

@@ -19,7 +19,7 @@
 namespace fieldmark::cli {
 namespace {
 
-constexpr double kMuchFainter = 2;  // dB: the usual loss from learning is 1.3
+constexpr double kMuchFainter = 2;  // dB: the usual loss from learning is at most 1.3
 
 struct BakeArguments {
   std::string owner, out;
@@ -103,6 +103,7 @@ int run_bake(const BakeArguments& options, Context& context) {
                   {"mark_psnr", number(mark_psnr.scaled)},
                   {"mark_psnr_learnt", number(mark_psnr.learnt)},
                   {"scale", mark_psnr.scale},
+                  {"emphasis", baker.emphasis()},
                   {"file_bytes", bytes},
                   {"owner_sha256", owner_sha256},
                   {"commitment", commitment},

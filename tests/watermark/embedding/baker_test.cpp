@@ -200,6 +200,55 @@ TEST_CASE("baker: an mlp field is marked and baked, both its densities to the by
   CHECK(colour == 6);  // weights and biases of three layers
 }
 
+TEST_CASE(
+    "baker: the emphasis rises for objects of a hash field whose mark has a gain, and for nothing else") {
+  const auto emphasis = [](const Owner& owner, Index steps) {
+    Baker baker(owner, kBakedMessage, bake_options(steps));
+    CHECK(baker.emphasis() == 1);
+    while (!baker.done()) baker.step(0);
+    return baker.emphasis();
+  };
+  const double few = emphasis(owner_with_gain(), 2), more = emphasis(owner_with_gain(), 20);
+  CHECK(few > 1);
+  CHECK(more > few);
+  CHECK(more <= Baker::kLargestEmphasis);
+  CHECK(emphasis(mlp_owner(), 4) == 1);
+  CHECK(emphasis(tiny_paper_owner(), 4) == 1);
+}
+
+TEST_CASE("baker: levels finer than 128 cells per axis take steps that shrink with the volume of a cell") {
+  nerf::RadianceFieldOptions o = small_field_options();
+  o.field.encoding.levels = 4;
+  o.field.encoding.finest_resolution = 256;
+  Owner owner(small_field(1, o), small_owner_options(), test_key(1),
+              CellGrid(4, std::vector<double>(64, 1.0)), cell_mark(small_cell_mark()));
+  owner.gain = 0.15;
+  Baker baker(owner, Message{{1, 0, 1}}, bake_options(1));
+  baker.step(0);
+  const auto& encoding = owner.field.field.encoding();
+  const std::span<const float> before = owner.field.params.values(encoding.table());
+  const std::span<const float> after = baker.field().params.values(encoding.table());
+  const Index width = 2 * encoding.features();
+  const auto largest_move = [&](int level) {
+    float largest = 0;
+    for (Index i = width * encoding.first_row(level); i < width * encoding.first_row(level + 1); ++i)
+      largest = std::max(largest,
+                         std::abs(after[static_cast<std::size_t>(i)] - before[static_cast<std::size_t>(i)]));
+    return static_cast<double>(largest);
+  };
+  const double whole = largest_move(0);
+  REQUIRE(whole > 0);
+  int finer = 0;
+  for (int level = 0; level < encoding.levels(); ++level) {
+    const double coarser = 128 / static_cast<double>(encoding.resolution(level));
+    CAPTURE(level, encoding.resolution(level));
+    // The first step of Adam moves every parameter with a gradient by the step size.
+    CHECK(largest_move(level) / whole == Approx(std::min(1.0, coarser * coarser * coarser)).epsilon(1e-3));
+    finer += coarser < 1;
+  }
+  CHECK(finer > 0);
+}
+
 TEST_CASE("baker: two messages give different colours, the same one the same") {
   const Owner owner = owner_with_gain();
   const auto a = file_of(bake(owner, kBakedMessage, 3)), b = file_of(bake(owner, kOther, 3)),

@@ -49,7 +49,7 @@ struct FieldAttack {
 ///   brightness_A     those logits plus ln A: odds c / (1 - c) of every colour times A, 0.01 to 100
 ///   contrast_A       those logits times A, 0 to 10
 /// The following need other fields of the same sizes (FieldAttackInputs):
-///   average_A        w + A (other - w), 0 to 1: two messages of one owner mixed
+///   average_A        w + A (other - w), 0 to 1: two copies or messages of one owner mixed
 ///   sign_flip_A      w + A (unmarked - w), 0 to 4: 1 removes the mark, 2 reverses all its signs.
 ///                    The attacker needs the unmarked field but no carrier
 ///   copy_A           w + A (marked - unmarked), -4 to 4: another field's mark added to this field

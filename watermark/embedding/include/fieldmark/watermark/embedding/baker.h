@@ -18,15 +18,15 @@ struct BakeOptions {
 
 /// Distils the marked colours of one message into the colour side of a plain field:
 ///   minimise mean_r |sum_{i in r} w_i e_i|^2 + sum_i w_i |e_i|^2 / (10 sum_i w_i),
-///   e_i = c(x_i, d_i) - c_m(x_i, d_i)
-/// over samples i of rays r of novel cameras and, for an object, of cameras in every direction; w_i are their
-/// weights, and both terms are divided by the three channels. The first term is what images show; the second
-/// keeps colours behind one another from compensating each other. Colours learn a mark too faintly, so the
-/// change of the unmarked colours that c_m asks for is multiplied by a factor from 1 to kLargestScale, which
-/// follows the square root of the asked over the learnt power of the mark on rays. Only the colour network
-/// and the colour features of the table move; everything that density depends on keeps its bytes. The result
-/// has the tensor names, shapes and metadata of the unmarked field, and holds neither network, extractor, key
-/// nor message.
+///   e_i = c(x_i, d_i) - c_t(x_i, d_i),   c_t = clamp(c_0 + f (c_m - c_0), 0, 1)
+/// over samples i of rays r of novel cameras and, for an object, of cameras in every direction; c_0 are
+/// unmarked colours, c_m marked ones, w_i the weights of the samples, and both terms are divided by the three
+/// channels. The first term is what images show; the second keeps colours behind one another from
+/// compensating each other. The emphasis f starts at 1 and rises while the learnt change has less power on
+/// rays than the mark, noise included, at most to kLargestEmphasis. It stays 1 for marks without a gain, for
+/// mlp fields, and for scenes that are not bounded by a cube. Only the colour network and the colour features
+/// of the table move; everything that density depends on keeps its bytes. The result has the tensor names,
+/// shapes and metadata of the unmarked field, and holds neither network, extractor, key nor message.
 class Baker final : public TrainingRun {
  public:
   /// The owner must outlive the baker. @throws ValueError if the length of the message is not the owner's, or
@@ -44,13 +44,17 @@ class Baker final : public TrainingRun {
     double scale = 1;   ///< factor by which scale_to() multiplied the learnt change of the colour parameters
   };
   /// Moves the colour parameters along the line from the unmarked to the learnt ones until the mark PSNR is
-  /// within 0.02 dB of the target on the given views (secant method). A baked mark is some 1.3 dB fainter
-  /// than the owner's; more if the run was short or the field lacks capacity. Errors of the learnt
+  /// within 0.02 dB of the target on the given views (secant method). A learnt mark is 0.1 to 1.3 dB
+  /// fainter than the owner's; more if the run was short or the field lacks capacity. Errors of the learnt
   /// colours are scaled, too. Call after the last step.
   /// @param target  dB   @return the result; the scale stays within 1/kLargestScale to kLargestScale
   MarkPsnr scale_to(double target, const MarkPsnrViews& views = {.seed = 32});
   /// Bound of the scale: 6 dB.
   static constexpr double kLargestScale = 2;
+  /// Returns the emphasis f so far, 1 to kLargestEmphasis.
+  double emphasis() const { return emphasis_; }
+  /// Bound of the emphasis: 6 dB.
+  static constexpr double kLargestEmphasis = 2;
   /// Measures the mark PSNR of the baked field so far, see MarkPsnrMeter.
   double mark_psnr(const MarkPsnrViews& views = {.seed = 32}) const;
   /// Returns the baked field so far.
@@ -81,6 +85,7 @@ class Baker final : public TrainingRun {
   std::vector<Chunk> chunks_;
   std::vector<nerf::FieldSampler> samplers_;
   std::vector<nerf::RaySamples> samples_;
+  bool emphasises_ = false;
   double emphasis_ = 1;
 };
 
