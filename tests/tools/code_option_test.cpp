@@ -69,3 +69,10 @@ TEST_CASE("code_option: an owner of version 0.1 comes with a line on its bound")
   Owner owner = Owner::load(std::filesystem::path(source_dir()) / "tests/regression/version_0_1/owner.fm");
   CHECK_THAT(choose({}, "", owner).notes, Contains("trained under its own key") && Contains("not proven"));
 }
+
+TEST_CASE("code_option: copies need a mark with cells") {
+  CHECK_NOTHROW(cli::check_copies(small_owner()));
+  CHECK_THROWS_WITH(
+      cli::check_copies(small_paper_owner()),
+      "--owner: an owner of preset paper has no cells, so its copies have no codes of their own");
+}

@@ -2,6 +2,7 @@
 #include <fieldmark/watermark/attacks/payload_trials.h>
 
 #include "cli/bench.h"
+#include "cli/code_option.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -36,9 +37,7 @@ Json tracing_row_json(const bench::TracingRow& r) {
 
 int run_bench_tracing(const BenchTracingArguments& o, Context& context) {
   const auto owner = watermark::Owner::load(o.owner);
-  if (!owner.mark().has_cells())
-    throw UsageError("--owner: an owner of preset " + owner.mark().preset() +
-                     " has no cells, so its copies have no codes of their own");
+  check_copies(owner);
   bench::TracingBenchOptions options = o.options;
   options.informed = !o.blind;
   options.seed = context.seed();

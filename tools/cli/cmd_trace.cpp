@@ -53,9 +53,7 @@ void print_recipients(const std::vector<watermark::TracedCopy>& copies, std::siz
 
 int run_trace(const TraceArguments& options, Context& context) {
   auto owner = watermark::Owner::load(options.owner);
-  if (!owner.mark().has_cells())
-    throw UsageError("--owner: an owner of preset " + owner.mark().preset() +
-                     " has no cells, so its copies have no codes of their own");
+  check_copies(owner);
   const auto key = choose_code(options.code, options.message, owner, context);
   const auto message = message_of(options.message, owner.options().bits);
   const auto names = watermark::read_recipients(options.copies);

@@ -51,4 +51,10 @@ watermark::Key choose_code(const CodeOption& options, const MessageOption& messa
   return key;
 }
 
+void check_copies(const watermark::Owner& owner) {
+  if (!owner.mark().has_cells())
+    throw UsageError("--owner: an owner of preset " + owner.mark().preset() +
+                     " has no cells, so its copies have no codes of their own");
+}
+
 }  // namespace fieldmark::cli

@@ -28,4 +28,7 @@ void add_copy_option(CommandLine& app, CodeOption& options, const std::string& p
 watermark::Key choose_code(const CodeOption& options, const MessageOption& message, watermark::Owner& owner,
                            Context& context);
 
+/// @throws UsageError if the owner's mark has no cells, so that its copies have no codes of their own
+void check_copies(const watermark::Owner& owner);
+
 }  // namespace fieldmark::cli

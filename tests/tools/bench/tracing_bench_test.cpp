@@ -67,6 +67,8 @@ TEST_CASE("tracing_bench: options outside their ranges are named") {
   const watermark::Owner owner = tiny_owner();
   CHECK_THROWS_WITH(run_tracing_bench(owner, {.recipients = 8}),
                     "[run_tracing_bench] recipients must be at least 9, got 8");
+  CHECK_THROWS_WITH(run_tracing_bench(owner, {.cases = {{CopyMix::pasted, 0}}}),
+                    "[run_tracing_bench] guilty must be at least 1, got 0");
   CHECK_THROWS_WITH(run_tracing_bench(owner, {.repetitions = 0}),
                     "[run_tracing_bench] repetitions must be at least 1, got 0");
   CHECK_THROWS_WITH(run_tracing_bench(owner, {.views = 0}),

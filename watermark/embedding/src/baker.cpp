@@ -22,6 +22,11 @@ constexpr float kOfSamples = 0.1f;  // weight of the samples' own colours relati
 constexpr double kEmphasisRate = 1. / 200;  // per step
 constexpr double kMarkResolution = 128;     // cells per axis that suffice for a mark on an object
 
+// True for an object in a hash field, which bakes with many rays, large steps and emphasis.
+bool is_object_of_hash(const nerf::RadianceField& field) {
+  return field.field.has_table() && field.space.kind == nerf::SpaceKind::cube;
+}
+
 // Chunks per step, and step sizes relative to the schedule's.
 struct StepPlan {
   Index chunks;
@@ -32,7 +37,7 @@ struct StepPlan {
 // a mark from all directions too faintly. Elsewhere there is time for a tenth of the steps.
 StepPlan plan_of(const nerf::RadianceField& field) {
   if (!field.field.has_table()) return {.chunks = 32, .table = 0, .network = 0.01};
-  if (field.space.kind == nerf::SpaceKind::cube) return {.chunks = 128, .table = 1, .network = 0.2};
+  if (is_object_of_hash(field)) return {.chunks = 128, .table = 1, .network = 0.2};
   return {.chunks = 32, .table = 0.2, .network = 0.04};
 }
 
@@ -41,7 +46,7 @@ StepPlan plan_of(const nerf::RadianceField& field) {
 // of a cell.
 std::vector<AdamRange> table_ranges(const nerf::RadianceField& field, double lr_factor) {
   const nerf::HashEncoding<float>& encoding = field.field.encoding();
-  const bool object = field.space.kind == nerf::SpaceKind::cube;
+  const bool object = is_object_of_hash(field);
   const auto begin_of = [&](int level) {
     return field.field.network_size() + encoding.first_row(level) * 2 * encoding.features();
   };
@@ -121,9 +126,6 @@ Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& opti
   std::vector<AdamRange> ranges = {colour_range(field_.params, plan.network)};
   if (field_.field.has_table())
     for (const AdamRange& range : table_ranges(field_, plan.table)) ranges.push_back(range);
-  // Other scenes learn the whole mark: fern shows it to 0.1 dB after 780 steps.
-  emphasises_ =
-      owner.mark().has_gain() && field_.field.has_table() && field_.space.kind == nerf::SpaceKind::cube;
   keep("emphasis", emphasis_);
   train(field_.params, {.lr = 1, .beta2 = 0.99, .eps = 1e-15, .zero_grads = true}, std::move(ranges));
 }
@@ -262,7 +264,8 @@ double Baker::take_step(double) {
       field_.params.grads().first(at(network)));
   if (field_.field.has_table()) backward_table();
   update();
-  if (emphasises_) update_emphasis();
+  // Other scenes learn the whole mark: fern shows it to 0.1 dB after 780 steps.
+  if (owner_.mark().has_gain() && is_object_of_hash(field_)) update_emphasis();
   return loss / static_cast<double>(chunks);
 }
 

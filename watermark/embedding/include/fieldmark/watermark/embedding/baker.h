@@ -85,7 +85,6 @@ class Baker final : public TrainingRun {
   std::vector<Chunk> chunks_;
   std::vector<nerf::FieldSampler> samplers_;
   std::vector<nerf::RaySamples> samples_;
-  bool emphasises_ = false;
   double emphasis_ = 1;
 };
 
