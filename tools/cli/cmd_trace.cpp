@@ -27,10 +27,10 @@ struct TraceArguments {
 std::vector<watermark::TracedCopy> traced(const watermark::Owner& owner, const watermark::Key& key,
                                           const watermark::Message& message,
                                           const std::vector<std::string>& names,
-                                          const std::vector<double>& evidence, Context& context) {
+                                          const std::vector<double>& evidence, double fpr, Context& context) {
   const InterruptGuard guard;
   Progress progress = context.progress("recipients");
-  return watermark::trace_copies(evidence, owner.cells.area(), key, message, names,
+  return watermark::trace_copies(evidence, owner.cells.area(), key, message, names, fpr,
                                  [&](Index done, Index total) {
                                    if (guard.interrupted()) throw Interrupted("nothing was decided");
                                    progress.update(static_cast<double>(done) / static_cast<double>(total));
@@ -59,7 +59,7 @@ int run_trace(const TraceArguments& options, Context& context) {
   const auto names = watermark::read_recipients(options.copies);
   SuspectReader reader(owner, options.reading);
   const auto images = read_images(reader, options.suspects, options.owner, context);
-  const auto copies = traced(owner, key, message, names, total_evidence(images), context);
+  const auto copies = traced(owner, key, message, names, total_evidence(images), options.fpr, context);
   std::size_t found = 0;
   Json recipients = Json::array();
   for (const auto& copy : copies) {
@@ -69,6 +69,7 @@ int run_trace(const TraceArguments& options, Context& context) {
                           {"p_value", copy.p_value},
                           {"p_corrected", copy.p_corrected},
                           {"statistic", copy.statistic},
+                          {"round", copy.round},
                           {"found", is_found}});
   }
   print_recipients(copies, found, options.fpr, context);

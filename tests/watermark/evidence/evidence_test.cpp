@@ -59,6 +59,13 @@ TEST_CASE("evidence: statistic and p-value by hand, at any scale") {
   CHECK(keyed_p_value(0) == 1);
   CHECK(keyed_p_value(-5) == 1);
   CHECK(keyed_p_value(60) == std::numeric_limits<double>::min());
+  CHECK(sharp_p_value(0) == 1);
+  CHECK(sharp_p_value(-5) == 1);
+  CHECK(sharp_p_value(0.5) == keyed_p_value(0.5));
+  CHECK(sharp_p_value(2) == Approx(0.02275013194817921 / (4 * 0.07864960352514258)).epsilon(1e-14));
+  CHECK(sharp_p_value(7) == Approx(1.279812543885835e-12 / (4 * 0.07864960352514258)).epsilon(1e-13));
+  CHECK(sharp_p_value(60) == std::numeric_limits<double>::min());
+  CHECK_THROWS_AS(sharp_p_value(std::numeric_limits<double>::quiet_NaN()), ValueError);
   CHECK(keyed_p_value_two_sided(-3) == Approx(2 * std::exp(-4.5)).epsilon(1e-15));
   CHECK(keyed_p_value_two_sided(0.5) == 1);
 }
@@ -101,6 +108,33 @@ TEST_CASE("evidence: under random keys small p-values are as rare as they should
       CHECK(two_sided[i] <= mean + 4 * std::sqrt(mean));
     }
   }
+}
+
+// Every sum of at most 14 signs with weights of one power law, against all its 2^n signs. Two equal weights
+// reach the bound: P(T >= sqrt 2) = 1/4.
+TEST_CASE("evidence: the sharp p-value bounds the exact tail of every sum of signs") {
+  double nearest = 0;
+  for (unsigned n = 1; n <= 14; ++n)
+    for (const double power : {0.0, 0.5, 1.0, 2.0}) {
+      std::vector<double> weight(n), sums;
+      double squares = 0;
+      for (unsigned c = 0; c < n; ++c) {
+        weight[c] = std::pow(c + 1.0, -power);
+        squares += weight[c] * weight[c];
+      }
+      for (unsigned signs = 0; signs < 1u << n; ++signs) {
+        double sum = 0;
+        for (unsigned c = 0; c < n; ++c) sum += (signs >> c & 1u) ? weight[c] : -weight[c];
+        sums.push_back(sum / std::sqrt(squares));
+      }
+      std::sort(sums.begin(), sums.end(), std::greater<>());
+      for (std::size_t i = 0; i < sums.size(); ++i) {
+        const double tail = static_cast<double>(i + 1) / static_cast<double>(sums.size());
+        nearest = std::max(nearest, tail / sharp_p_value(sums[i] * (1 - 1e-14)));
+      }
+    }
+  CHECK(nearest <= 1);
+  CHECK(nearest > 0.999);
 }
 
 TEST_CASE("evidence: bits are read with their signs, and a bit without evidence is half right") {

@@ -160,11 +160,11 @@ std::vector<TracingRow> run_tracing_bench(const watermark::Owner& owner, const T
       };
       const Recipients r = draw_recipients(owner, options, copies.guilty, trial);
       const auto evidence = suspect.evidence(mixed(owner, copies.mix, r.signs, pastes, trial), trial, tell);
-      const auto traced =
-          watermark::trace_copies(evidence, owner.cells.area(), r.key, r.message, r.names, [&](Index, Index) {
-            tell();
-            return true;
-          });
+      const auto traced = watermark::trace_copies(evidence, owner.cells.area(), r.key, r.message, r.names,
+                                                  options.fpr, [&](Index, Index) {
+                                                    tell();
+                                                    return true;
+                                                  });
       add_traced(traced, r.guilty, options.fpr, row);
     }
     rows.push_back(row);

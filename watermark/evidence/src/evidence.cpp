@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 
 namespace fieldmark::watermark {
@@ -72,6 +73,13 @@ double keyed_statistic(std::span<const double> evidence, const CellCode& code, c
 double keyed_p_value(double statistic) {
   if (std::isnan(statistic)) throw ValueError("[keyed_p_value] statistic must be a number, got nan");
   return statistic > 0 ? std::max(std::exp(-0.5 * statistic * statistic), kLeast) : 1;
+}
+
+double sharp_p_value(double statistic) {
+  const auto twice_q = [](double t) { return std::erfc(t / std::numbers::sqrt2); };
+  const double p = keyed_p_value(statistic);
+  if (statistic <= 0) return p;
+  return std::max(std::min(p, twice_q(statistic) / (4 * twice_q(std::numbers::sqrt2))), kLeast);
 }
 
 double keyed_p_value_two_sided(double statistic) {

@@ -24,6 +24,12 @@ double keyed_statistic(std::span<const double> evidence, const CellCode& code, c
 /// smallest normal double, never 0.   @throws ValueError if T is NaN
 double keyed_p_value(double statistic);
 
+/// Bounds the same probability more sharply for T > 0.7, by a factor of 0.39 at T = 3 and 0.18 at T = 7.
+///   p = min(exp(-T^2 / 2), Q(T) / (4 Q(sqrt 2))) for T > 0, else 1;   Q(T) = P(N(0, 1) >= T)
+/// Source: Bentkus and Dzindzalieta 2015, A tight Gaussian bound for weighted sums of Rademacher random
+/// variables. At least the smallest normal double, never 0.   @throws ValueError if T is NaN
+double sharp_p_value(double statistic);
+
 /// Two-sided bound for |T|, since a thief may flip every sign.   p = min(1, 2 exp(-T^2 / 2))
 double keyed_p_value_two_sided(double statistic);
 
