@@ -10,6 +10,10 @@
 
 #include <fieldmark/watermark/mark/cameras_around.h>
 
+#include "bake_plan.h"
+#include "mark_scale.h"
+#include "reading_guide.h"
+
 namespace fieldmark::watermark {
 namespace {
 
@@ -17,84 +21,47 @@ constexpr int kShards = 16;
 constexpr Index kRays = 64;  // per chunk
 constexpr float kLeastWeight = 1e-3f;
 constexpr int kRounds = 4;          // rounds of scale_to(), each confirmed on all views
-constexpr double kNear = 0.02;      // dB from the target mark PSNR
 constexpr float kOfSamples = 0.1f;  // weight of the samples' own colours relative to those of rays
 constexpr double kEmphasisRate = 1. / 200;  // per step
-constexpr double kMarkResolution = 128;     // cells per axis that suffice for a mark on an object
+constexpr Index kGuideEvery = 2;            // steps: a guided one takes as long as four others
 
-// True for an object in a hash field, which bakes with many rays, large steps and emphasis.
-bool is_object_of_hash(const nerf::RadianceField& field) {
-  return field.field.has_table() && field.space.kind == nerf::SpaceKind::cube;
-}
-
-// Chunks per step, and step sizes relative to the schedule's.
-struct StepPlan {
-  Index chunks;
-  double table, network;
-};
-
-// Rays of objects are short: there is time for many of them and for large steps, without which colours learn
-// a mark from all directions too faintly. Elsewhere there is time for a tenth of the steps.
-StepPlan plan_of(const nerf::RadianceField& field) {
-  if (!field.field.has_table()) return {.chunks = 32, .table = 0, .network = 0.01};
-  if (is_object_of_hash(field)) return {.chunks = 128, .table = 1, .network = 0.2};
-  return {.chunks = 32, .table = 0.2, .network = 0.04};
-}
-
-// Returns the ranges of the table's levels. A mark has little detail finer than kMarkResolution. On an
-// object's finer levels, a row sees fewer rays and learns mostly noise, so its step shrinks with the volume
-// of a cell.
-std::vector<AdamRange> table_ranges(const nerf::RadianceField& field, double lr_factor) {
-  const nerf::HashEncoding<float>& encoding = field.field.encoding();
-  const bool object = is_object_of_hash(field);
-  const auto begin_of = [&](int level) {
-    return field.field.network_size() + encoding.first_row(level) * 2 * encoding.features();
-  };
-  std::vector<AdamRange> ranges;
-  for (int level = 0; level < encoding.levels(); ++level) {
-    const double coarser = kMarkResolution / static_cast<double>(encoding.resolution(level));
-    ranges.push_back({.begin = begin_of(level),
-                      .end = begin_of(level + 1),
-                      .lr_factor = lr_factor * (object ? std::min(1., std::pow(coarser, 3)) : 1.),
-                      .skip_zero = true});
-  }
-  return ranges;
-}
-
-// Returns the power of a difference of colours on rays, sum_r |sum_i w_i (a_i - b_i)|^2 over their samples.
-double power_on_rays(std::span<const std::int32_t> begin, std::span<const float> weight, const float* a,
-                     const float* b) {
-  double power = 0;
+// Calls f(ray, channel, sum) with the difference of colours that each ray shows, sum_i w_i (a_i - b_i) over
+// its samples.
+template <class F>
+void for_each_ray(std::span<const std::int32_t> begin, std::span<const float> weight, const float* a,
+                  const float* b, F f) {
   for (std::size_t r = 0; r + 1 < begin.size(); ++r)
     for (Index channel = 0; channel < 3; ++channel) {
       double sum = 0;
       for (Index i = begin[r]; i < begin[r + 1]; ++i)
         sum += static_cast<double>(weight[at(i)] * (a[3 * i + channel] - b[3 * i + channel]));
-      power += sum * sum;
+      f(r, static_cast<std::size_t>(channel), sum);
     }
+}
+
+double power_on_rays(std::span<const std::int32_t> begin, std::span<const float> weight, const float* a,
+                     const float* b) {
+  double power = 0;
+  for_each_ray(begin, weight, a, b, [&](std::size_t, std::size_t, double sum) { power += sum * sum; });
   return power;
 }
 
-// Returns the range of the colour networks' parameters, which are contiguous.
-AdamRange colour_range(const ParamStore<float>& params, double lr_factor) {
-  AdamRange range{.begin = params.size(), .lr_factor = lr_factor};
-  for (const auto& e : params.entries())
-    if (nerf::Field<float>::is_colour(e.name)) {
-      range.begin = std::min(range.begin, e.offset);
-      range.end = e.offset + e.shape.size();
-    }
-  return range;
+void change_on_rays(std::span<const std::int32_t> begin, std::span<const float> weight, const float* a,
+                    const float* b, float* change) {
+  for_each_ray(begin, weight, a, b, [&](std::size_t ray, std::size_t channel, double sum) {
+    change[3 * ray + channel] = static_cast<float>(sum);
+  });
 }
 
 }  // namespace
 
-// The visible samples of a chunk, their marked colours, the target (marked, emphasised), and the gradients
-// that they pass back to the table.
+// The visible samples of a chunk of rays, their unmarked and marked colours, the target (marked, emphasised),
+// what the rays should show beyond it, and the gradients that the samples pass back to the table.
 struct Baker::Chunk {
   nerf::CubeRays rays;
   std::vector<float> jitter;
-  std::vector<float> position, direction, weight, geometry_features, base_features, of_direction, marked,
-      target, features, dfeatures, unused;
+  std::vector<float> position, direction, weight, z, base_features, of_direction, unmarked, marked, target,
+      features, dfeatures, unused;
   std::vector<std::int32_t> begin;  // of each ray's samples, and the end
   Index samples = 0;
   double asked = 0, learnt = 0;  // power of the mark on rays
@@ -108,7 +75,8 @@ Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& opti
       rng_(options.seed, 21),
       field_(owner.field),
       loop_(kShards, owner.field.field.network_size()),
-      chunks_(at(plan_of(owner.field).chunks)),
+      chunks_per_step_(bake_plan(owner.field).chunks),
+      chunks_(at(chunks_per_step_)),
       samplers_(kShards),
       samples_(kShards) {
   if (message.size() != owner.options().bits)
@@ -117,17 +85,23 @@ Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& opti
   if (options.cameras < 1 || options.around < 0)
     throw ValueError("[baker] cameras must be at least 1 and around at least 0, got " +
                      std::to_string(options.cameras) + " and " + std::to_string(options.around));
+  if (options.guide_views < 1 || !(options.guidance >= 0))
+    throw ValueError("[baker] guide_views must be at least 1 and guidance at least 0, got " +
+                     std::to_string(options.guide_views) + " and " + std::to_string(options.guidance));
   marking_ = owner.marking(cell_signs(owner.code(), message));
   // Colours that no ray constrains drift: without the cameras around, lego's underside changes by 29 dB.
   cameras_ = cameras_around(owner.field, options.cameras, options.around, 0, options.seed + 31);
-  const StepPlan plan = plan_of(owner.field);
-  // The parameters of the density get no gradient: its networks are outside the ranges, and its features do
-  // not change where the gradient is 0.
-  std::vector<AdamRange> ranges = {colour_range(field_.params, plan.network)};
-  if (field_.field.has_table())
-    for (const AdamRange& range : table_ranges(field_, plan.table)) ranges.push_back(range);
+  if (owner.mark().has_cells() && is_object_of_hash(owner.field) && options.guidance > 0) {
+    const Index steps =
+        options.schedule.steps > 0 ? options.schedule.steps : options.guide_views * kGuideEvery;
+    guide_ = std::make_unique<ReadingGuide>(owner, message,
+                                            std::clamp<Index>(steps / kGuideEvery, 1, options.guide_views),
+                                            options.guidance, options.seed + 41);
+  }
+  // The parameters of the density get no gradient: its features do not change where the gradient is 0.
   keep("emphasis", emphasis_);
-  train(field_.params, {.lr = 1, .beta2 = 0.99, .eps = 1e-15, .zero_grads = true}, std::move(ranges));
+  train(field_.params, {.lr = 1, .beta2 = 0.99, .eps = 1e-15, .zero_grads = true},
+        bake_plan(owner.field).ranges);
 }
 
 Baker::~Baker() = default;
@@ -149,16 +123,31 @@ void Baker::choose_rays(Index chunk, Chunk& c) const {
   }
 }
 
-void Baker::select(const nerf::RaySamples& s, Chunk& c) const {
+// Takes the pixels of a view in their order; a last chunk repeats the last pixel.
+void Baker::take_pixels(const CachedView& view, Index chunk, Chunk& c) const {
+  const auto step = static_cast<std::uint64_t>(steps());
+  c.rays.resize(kRays);
+  c.jitter.resize(at(kRays));
+  for (Index i = 0; i < kRays; ++i) {
+    const Index p = std::min(chunk * kRays + i, view.height * view.width - 1);
+    const float pixel[2] = {static_cast<float>(p % view.width), static_cast<float>(p / view.width)};
+    c.rays.set(field_.space, i, view.camera, pixel);
+    c.jitter[at(i)] = rng_.uniform4(step, static_cast<std::uint64_t>(p))[3];
+  }
+}
+
+// Keeps the visible samples of the chunk's rays, with their unmarked colours.
+void Baker::sample(Index shard, Tape<float>& tape, Chunk& c) {
+  nerf::RaySamples& s = samples_[at(shard)];
+  samplers_[at(shard)].sample(owner_.field, c.rays.batch(field_.space), c.jitter,
+                              {.stop = 1e-3f, .points = field_.options().points}, s);
   const nerf::Field<float>& net = field_.field;
-  const Index density = net.density_width(), colour = net.colour_width(), direction = net.direction_width();
-  std::vector<float> weights(at(s.size()));
+  const Index density = net.density_width(), colour = net.colour_width(), direction = net.direction_width(),
+              geometry = net.geometry_width();
+  std::vector<float> weights(at(s.size())), density_features;
   nerf::sample_weights(s, field_.step(), weights.data());
-  Tape<float> tape;
   const Var<float> of_ray = net.encode_directions(tape.constant(c.rays.seen_from.data(), {kRays, 3}));
-  for (auto* v :
-       {&c.position, &c.direction, &c.weight, &c.geometry_features, &c.base_features, &c.of_direction})
-    v->clear();
+  for (auto* v : {&c.position, &c.direction, &c.weight, &c.z, &c.base_features, &c.of_direction}) v->clear();
   c.begin.assign(1, 0);
   const auto append = [](std::vector<float>& to, const float* from, Index n) {
     to.insert(to.end(), from, from + n);
@@ -170,33 +159,43 @@ void Baker::select(const nerf::RaySamples& s, Chunk& c) const {
       append(c.direction, &c.rays.seen_from[at(3 * r)], 3);
       append(c.weight, &weights[at(i)], 1);
       if (s.z.empty())
-        append(c.geometry_features, s.density_features.data() + i * density, density);
+        append(density_features, s.density_features.data() + i * density, density);
       else
-        append(c.geometry_features, s.z.data() + i * net.geometry_width(), net.geometry_width());
+        append(c.z, s.z.data() + i * geometry, geometry);
       append(c.base_features, s.colour_features.data() + i * colour, colour);
       append(c.of_direction, of_ray.value() + r * direction, direction);
     }
     c.begin.push_back(static_cast<std::int32_t>(c.weight.size()));
   }
-  c.samples = static_cast<Index>(c.weight.size());
+  const Index n = c.samples = static_cast<Index>(c.weight.size());
+  c.unmarked.resize(at(3 * n));
+  if (n == 0) return;
+  const Params<float> frozen(owner_.field.params, nullptr);
+  if (s.z.empty()) {
+    const Var<float> z = net.geometry(frozen, tape.constant(density_features.data(), {n, density}));
+    c.z.assign(z.value(), z.value() + n * geometry);
+  }
+  const Var<float> base = net.colour(frozen, tape.constant(c.z.data(), {n, geometry}),
+                                     tape.constant(c.base_features.data(), {n, colour}),
+                                     tape.constant(c.of_direction.data(), {n, direction}));
+  std::copy_n(base.value(), 3 * n, c.unmarked.data());
 }
 
-void Baker::set_target(const float* unmarked, Chunk& c) const {
-  c.marked.assign(unmarked, unmarked + 3 * c.samples);
+void Baker::set_target(Chunk& c) const {
+  c.marked = c.unmarked;
   marking_(c.position.data(), c.direction.data(), c.samples, c.marked.data());
-  c.asked = power_on_rays(c.begin, c.weight, c.marked.data(), unmarked);
   c.target = c.marked;
   const auto factor = static_cast<float>(emphasis_);
   if (factor == 1) return;
   for (std::size_t i = 0; i < c.target.size(); ++i)
-    c.target[i] = std::clamp(unmarked[i] + factor * (c.marked[i] - unmarked[i]), 0.f, 1.f);
+    c.target[i] = std::clamp(c.unmarked[i] + factor * (c.marked[i] - c.unmarked[i]), 0.f, 1.f);
 }
 
 // Raises the emphasis while the learnt change has less power than the mark, else lowers it. Networks are not
-// linear, so scaling a faint change in scale_to() costs bits.
+// linear, so scaling in scale_to() costs bits.
 void Baker::update_emphasis() {
   double asked = 0, learnt = 0;
-  for (const Chunk& c : chunks_) {
+  for (const Chunk& c : used()) {
     asked += c.asked;
     learnt += c.learnt;
   }
@@ -204,69 +203,119 @@ void Baker::update_emphasis() {
   emphasis_ = std::clamp(emphasis_ * (1 + kEmphasisRate * (ratio - 1)), 1., kLargestEmphasis);
 }
 
-double Baker::run_chunk(Index index, Index shard, Tape<float>& tape, float* grads) {
-  Chunk& c = chunks_[at(index)];
-  choose_rays(index, c);
-  nerf::RaySamples& s = samples_[at(shard)];
-  samplers_[at(shard)].sample(owner_.field, c.rays.batch(field_.space), c.jitter,
-                              {.stop = 1e-3f, .points = field_.options().points}, s);
-  select(s, c);
+// Returns the learnt colours [samples, 3] and the features on which they depend.
+Baker::Learnt Baker::learnt_colours(Tape<float>& tape, Chunk& c, float* grads) const {
   const nerf::Field<float>& net = field_.field;
-  const Index n = c.samples, density = net.density_width(), colour = net.colour_width();
+  const Index n = c.samples, colour = net.colour_width();
   c.features.resize(at(n * colour));
-  c.unused.resize(at(n * density));
-  c.dfeatures.resize(at(2 * n * colour));
-  c.asked = c.learnt = 0;
-  if (n == 0) return 0;
-  const Params<float> frozen(owner_.field.params, nullptr), learnt(field_.params, grads);
-  const Var<float> of_direction = tape.constant(c.of_direction.data(), {n, net.direction_width()});
-  const float* geometry = c.geometry_features.data();
-  const Var<float> z = s.z.empty() ? net.geometry(frozen, tape.constant(geometry, {n, density}))
-                                   : tape.constant(geometry, {n, net.geometry_width()});
-  const Var<float> base =
-      net.colour(frozen, z, tape.constant(c.base_features.data(), {n, colour}), of_direction);
-  set_target(base.value(), c);
-
+  c.unused.resize(at(n * net.density_width()));
   if (net.has_table()) net.encode(field_.params, c.position.data(), n, c.unused.data(), c.features.data());
   const Var<float> features = tape.fresh_leaf(c.features.data(), nullptr, {n, colour});
-  const Var<float> rgb = net.colour(learnt, z, features, of_direction);
-  c.learnt = power_on_rays(c.begin, c.weight, rgb.value(), base.value());
+  return {.features = features,
+          .rgb = net.colour(Params<float>(field_.params, grads),
+                            tape.constant(c.z.data(), {n, net.geometry_width()}), features,
+                            tape.constant(c.of_direction.data(), {n, net.direction_width()}))};
+}
+
+// Adds the gradients of a chunk that has its target. `shift` is what its rays should show beyond that, or
+// null.
+double Baker::learn(Chunk& c, Tape<float>& tape, float* grads, const float* shift) {
+  const nerf::Field<float>& net = field_.field;
+  const Index n = c.samples;
+  c.dfeatures.resize(at(2 * n * net.colour_width()));
+  c.asked = c.learnt = 0;
+  if (n == 0) return 0;
+  const auto [features, rgb] = learnt_colours(tape, c, grads);
+  c.asked = power_on_rays(c.begin, c.weight, c.marked.data(), c.unmarked.data());
+  c.learnt = power_on_rays(c.begin, c.weight, rgb.value(), c.unmarked.data());
   float* weights = tape.scratch(3 * n);
   for (Index i = 0; i < 3 * n; ++i) weights[i] = c.weight[at(i / 3)];
   const Var<float> target = tape.constant(c.target.data(), {n, 3});
   const Var<float> of_samples = mse_loss<float>(rgb, target, std::span<const float>(weights, at(3 * n)));
   const Var<float> seen = weighted_segments<float>(sub(rgb, target), c.begin, c.weight);
-  float* nothing = tape.scratch(3 * kRays);
-  std::fill_n(nothing, 3 * kRays, 0.f);
-  const Var<float> of_rays = mse_loss<float>(seen, tape.constant(nothing, {kRays, 3}));
+  float* beyond = tape.scratch(3 * kRays);
+  std::fill_n(beyond, 3 * kRays, 0.f);
+  if (shift) std::copy_n(shift, 3 * kRays, beyond);
+  const Var<float> of_rays = mse_loss<float>(seen, tape.constant(beyond, {kRays, 3}));
   const double error = power_on_rays(c.begin, c.weight, rgb.value(), c.marked.data());
   tape.backward(add(of_rays, scale(of_samples, kOfSamples)));
   if (net.has_table()) net.encoding().deal_to_levels(n, nullptr, features.grad(), c.dfeatures.data());
   return error / (3 * kRays);
 }
 
+std::span<const Baker::Chunk> Baker::used() const { return std::span(chunks_).first(at(used_)); }
+
+std::span<float> Baker::network_grads() {
+  return field_.params.grads().first(at(field_.field.network_size()));
+}
+
 void Baker::backward_table() {
   const nerf::HashEncoding<float>& encoding = field_.field.encoding();
   parallel_for(encoding.levels(), 1, [&](Index level, Index) {
-    for (const Chunk& c : chunks_)
+    for (const Chunk& c : used())
       encoding.backward_level(static_cast<int>(level), c.position.data(), c.samples,
                               c.dfeatures.data() + level * c.samples * 2 * encoding.features(),
                               field_.params.grads(encoding.table()));
   });
 }
 
-double Baker::take_step(double) {
-  const Index network = field_.field.network_size();
-  const auto chunks = static_cast<Index>(chunks_.size());
-  const double loss = loop_.run(
+// Learns from random rays. Returns the mean error of a ray.
+double Baker::take_rays() {
+  const Index chunks = chunks_per_step_;
+  used_ = chunks;
+  return loop_.run(
+             chunks,
+             [&](Index i, Index shard, Tape<float>& tape, float* grads) {
+               Chunk& c = chunks_[at(i)];
+               choose_rays(i, c);
+               sample(shard, tape, c);
+               set_target(c);
+               return learn(c, tape, grads, nullptr);
+             },
+             network_grads()) /
+         static_cast<double>(chunks);
+}
+
+// Learns from all rays of one view, whose targets the extractor's reading of what they show shifts. Returns
+// the mean error of a ray.
+double Baker::take_view() {
+  const CachedView& view = guide_->view(steps());
+  const Index chunks = (view.height * view.width + kRays - 1) / kRays;
+  if (chunks > std::ssize(chunks_)) chunks_.resize(at(chunks));
+  used_ = chunks;
+  change_.assign(at(3 * chunks * kRays), 0.f);
+  loop_.run(
       chunks,
-      [&](Index c, Index shard, Tape<float>& tape, float* grads) { return run_chunk(c, shard, tape, grads); },
-      field_.params.grads().first(at(network)));
+      [&](Index i, Index shard, Tape<float>& tape, float*) {
+        Chunk& c = chunks_[at(i)];
+        take_pixels(view, i, c);
+        sample(shard, tape, c);
+        set_target(c);
+        if (c.samples > 0)
+          change_on_rays(c.begin, c.weight, learnt_colours(tape, c, nullptr).rgb.value(), c.unmarked.data(),
+                         &change_[at(3 * i * kRays)]);
+        return 0.;
+      },
+      network_grads());
+  guide_->shifts(steps(), std::span(change_).first(at(3 * view.height * view.width)), shift_);
+  shift_.resize(change_.size(), 0.f);
+  return loop_.run(
+             chunks,
+             [&](Index i, Index, Tape<float>& tape, float* grads) {
+               return learn(chunks_[at(i)], tape, grads, &shift_[at(3 * i * kRays)]);
+             },
+             network_grads()) /
+         static_cast<double>(chunks);
+}
+
+double Baker::take_step(double) {
+  const bool guided = guide_ && steps() % kGuideEvery == kGuideEvery - 1;
+  const double loss = guided ? take_view() : take_rays();
   if (field_.field.has_table()) backward_table();
   update();
   // Other scenes learn the whole mark: fern shows it to 0.1 dB after 780 steps.
-  if (owner_.mark().has_gain() && is_object_of_hash(field_)) update_emphasis();
-  return loss / static_cast<double>(chunks);
+  if (owner_.mark().has_gain() && is_object_of_hash(field_) && !guided) update_emphasis();
+  return loss;
 }
 
 void Baker::describe(RunFingerprint& f) const {
@@ -279,6 +328,8 @@ void Baker::describe(RunFingerprint& f) const {
   f.option("gain", owner_.gain);
   f.option("emphasis_rate", kEmphasisRate);
   f.option("mark_resolution", kMarkResolution);
+  f.option("guide_views", options_.guide_views);
+  f.option("guidance", options_.guidance);
   f.input("field", owner_.field.params.values());
   f.input("occupancy", owner_.field.grid.bits());
   f.input("mark", owner_.params.values());
@@ -311,39 +362,23 @@ void Baker::set_scale(double scale, std::span<const float> learnt) {
 Baker::MarkPsnr Baker::scale_to(double target, const MarkPsnrViews& views) {
   const MarkPsnrMeter meter(owner_.field, views);
   nerf::Renderer marked(field_, mark_psnr_rendering());
-  MarkPsnr found{.learnt = meter(marked)};
-  found.scaled = found.learnt;
+  ScaledMark found{.psnr = meter(marked)};
+  const double before = found.psnr;
   const std::vector<float> learnt(field_.params.values().begin(), field_.params.values().end());
   const Index every = meter.guess_step();
-  double bias = every > 1 ? found.scaled - meter(marked, {}, every) : 0;
-  for (int round = 0; round < kRounds && std::abs(found.scaled - target) > kNear; ++round) {
-    const double before = found.scale;
-    seek(
-        target, learnt, [&] { return meter(marked, {}, every) + bias; }, found);
-    if (every == 1 || !std::isfinite(found.scaled) || found.scale == before) break;
-    const double guess = found.scaled - bias;
-    found.scaled = meter(marked);
-    bias = found.scaled - guess;
+  double bias = every > 1 ? before - meter(marked, {}, every) : 0;
+  for (int round = 0; round < kRounds && !is_near(found, target); ++round) {
+    const double scale = found.scale;
+    found = seek_scale(found, target, kLargestScale, [&](double next) {
+      set_scale(next, learnt);
+      return meter(marked, {}, every) + bias;
+    });
+    if (every == 1 || !std::isfinite(found.psnr) || found.scale == scale) break;
+    const double guess = found.psnr - bias;
+    found.psnr = meter(marked);
+    bias = found.psnr - guess;
   }
-  return found;
-}
-
-// Secant method for the mark PSNR over log scale. The first slope is that of a linear change, 6 dB for a
-// factor of 2, from which rounding and clamped colours deviate.
-void Baker::seek(double target, std::span<const float> learnt, const std::function<double()>& measure,
-                 MarkPsnr& found) {
-  double slope = -1;
-  for (int round = 0; round < 6 && std::abs(found.scaled - target) > kNear; ++round) {
-    const double scale = std::clamp(found.scale * std::pow(10.0, (target - found.scaled) / slope / 20),
-                                    1 / kLargestScale, kLargestScale);
-    if (!std::isfinite(found.scaled) || scale == found.scale) break;
-    set_scale(scale, learnt);
-    const double scaled = measure(),
-                 secant = (scaled - found.scaled) / (20 * std::log10(scale / found.scale));
-    if (secant < -0.2) slope = secant;
-    found.scale = scale;
-    found.scaled = scaled;
-  }
+  return {.learnt = before, .scaled = found.psnr, .scale = found.scale};
 }
 
 double Baker::psnr() const { return -10 * std::log10(std::max(loss(), 1e-10)); }

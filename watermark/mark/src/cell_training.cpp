@@ -64,6 +64,8 @@ class CellTraining : public MarkTraining {
   MuonWeights matrices() const override {
     return {{"extractor/*conv/weight", "extractor/index_hidden/weight"}, options_.matrix_rate};
   }
+  Var<float> reading_loss(const Params<float>& params, Var<float> marked, const TrainingImage& image,
+                          TrainingFigures& figures) const override;
   std::string note(const TrainingFigures& f) const override;
   void describe(RunFingerprint& f) const override;
 
@@ -155,13 +157,10 @@ Tensor<std::int32_t> CellTraining::labels_at(const TrainingImage& image, const S
   return distort::resize_labels(labels, height, width);
 }
 
-Var<float> CellTraining::loss(Tape<float>& tape, const Params<float>& params,
-                              std::span<const TrainingImage> images, const TrainingFigures& running,
-                              TrainingFigures& figures) {
-  const TrainingImage& image = images.front();
+Var<float> CellTraining::reading_loss(const Params<float>& params, Var<float> marked,
+                                      const TrainingImage& image, TrainingFigures& figures) const {
+  Tape<float>& tape = marked.tape();
   const CachedView& view = views_[at(image.view)];
-  const Var<float> added = residual(tape, params, image);
-  const Var<float> marked = add(tape.constant(view.base.data.data(), {view.height * view.width, 3}), added);
   const Var<float> seen = image.distort(tape.reshape(marked, {view.height, view.width, 3}));
   const auto out = mark_.reader()(params, tape.reshape(seen, {1, seen.shape()[0], seen.shape()[1], 3}));
 
@@ -199,8 +198,19 @@ Var<float> CellTraining::loss(Tape<float>& tape, const Params<float>& params,
   figures = {.sign = shown > 0 ? sign / shown : 0,
              .index = shown > 0 ? index / shown : 0,
              .bits = right / static_cast<double>(bits)};
-  return add(add(scale(sign_loss, options_.sign_weight), visibility(added, image, running.sign)),
+  return add(scale(sign_loss, options_.sign_weight),
              add(scale(index_loss, options_.index_weight), scale(bits_loss, options_.bits_weight)));
+}
+
+Var<float> CellTraining::loss(Tape<float>& tape, const Params<float>& params,
+                              std::span<const TrainingImage> images, const TrainingFigures& running,
+                              TrainingFigures& figures) {
+  const TrainingImage& image = images.front();
+  const CachedView& view = views_[at(image.view)];
+  const Var<float> added = residual(tape, params, image);
+  const Var<float> marked = add(tape.constant(view.base.data.data(), {view.height * view.width, 3}), added);
+  const Var<float> reading = reading_loss(params, marked, image, figures);
+  return add(reading, visibility(added, image, running.sign));
 }
 
 std::string CellTraining::note(const TrainingFigures& f) const {

@@ -5,6 +5,11 @@
 
 namespace fieldmark::watermark {
 
+Var<float> MarkTraining::reading_loss(const Params<float>&, Var<float>, const TrainingImage&,
+                                      TrainingFigures&) const {
+  throw ValueError("[reading_loss] owner must have cells in space, got one without");
+}
+
 CellCode Mark::code(const CellGrid& cells, const Key& key, Index bits) const {
   return deal_cells(key, cells.area(), bits);
 }

@@ -7,26 +7,39 @@
 
 namespace fieldmark::watermark {
 
+class ReadingGuide;
+
 /// Options for baking a message.
 struct BakeOptions {
   /// Length of the run and step sizes for objects of preset hash; others take smaller ones (baker.cpp).
   ScheduleOptions schedule{.seconds = 45, .lr = 5e-2, .half_after = 4000, .cooldown = 0.6, .last = 0.02};
   Index cameras = 400;     ///< novel cameras whose rays are used, >= 1
   Index around = 130;      ///< more in every direction for an object without surroundings (a cube), >= 0
-  std::uint64_t seed = 0;  ///< of cameras and rays
+  Index guide_views = 200;  ///< views that guide, >= 1; no more than guided steps are used
+  /// Strength eta with which the extractor's reading shifts what rays show, times the mark's RMS, >= 0. Only
+  /// objects of hash fields whose mark has cells are guided.
+  double guidance = 1;
+  std::uint64_t seed = 0;  ///< of cameras, rays and views
 };
 
 /// Distils the marked colours of one message into the colour side of a plain field:
-///   minimise mean_r |sum_{i in r} w_i e_i|^2 + sum_i w_i |e_i|^2 / (10 sum_i w_i),
+///   minimise mean_r |sum_{i in r} w_i e_i - h_r|^2 + sum_i w_i |e_i|^2 / (10 sum_i w_i),
 ///   e_i = c(x_i, d_i) - c_t(x_i, d_i),   c_t = clamp(c_0 + f (c_m - c_0), 0, 1)
 /// over samples i of rays r of novel cameras and, for an object, of cameras in every direction; c_0 are
 /// unmarked colours, c_m marked ones, w_i the weights of the samples, and both terms are divided by the three
 /// channels. The first term is what images show; the second keeps colours behind one another from
-/// compensating each other. The emphasis f starts at 1 and rises while the learnt change has less power on
-/// rays than the mark, noise included, at most to kLargestEmphasis. It stays 1 for marks without a gain, for
-/// mlp fields, and for scenes that are not bounded by a cube. Only the colour network and the colour features
-/// of the table move; everything that density depends on keeps its bytes. The result has the tensor names,
-/// shapes and metadata of the unmarked field, and holds neither network, extractor, key nor message.
+/// compensating each other. Two things are for objects of hash fields only:
+///   - The emphasis f starts at 1 and rises while the learnt change has less power on rays than the mark,
+///   noise
+///     included, at most to kLargestEmphasis. It stays 1 for marks without a gain.
+///   - If the mark has cells, every second step is guided: its rays are the pixels of one view, and h_r leads
+///     what they show towards what the extractor reads better,
+///       h = -eta rho max(-3, min(3, g / rms(g))),   g = dL / dimage,
+///     with the reading loss L of the view under the distortions of embedding (MarkTraining::reading_loss())
+///     and the RMS rho of the change so far. Elsewhere h_r = 0.
+/// Only the colour network and the colour features of the table move; everything that density depends on
+/// keeps its bytes. The result has the tensor names, shapes and metadata of the unmarked field, and holds
+/// neither network, extractor, key nor message.
 class Baker final : public TrainingRun {
  public:
   /// The owner must outlive the baker. @throws ValueError if the length of the message is not the owner's, or
@@ -64,14 +77,22 @@ class Baker final : public TrainingRun {
   struct Chunk;
   double take_step(double seconds) override;
   void describe(RunFingerprint& fingerprint) const override;
+  struct Learnt {
+    Var<float> features, rgb;
+  };
   void choose_rays(Index chunk, Chunk& c) const;
-  void select(const nerf::RaySamples& samples, Chunk& c) const;
-  void set_target(const float* unmarked, Chunk& c) const;
-  double run_chunk(Index index, Index shard, Tape<float>& tape, float* grads);
+  void take_pixels(const CachedView& view, Index chunk, Chunk& c) const;
+  void sample(Index shard, Tape<float>& tape, Chunk& c);
+  void set_target(Chunk& c) const;
+  Learnt learnt_colours(Tape<float>& tape, Chunk& c, float* grads) const;
+  double learn(Chunk& c, Tape<float>& tape, float* grads, const float* shift);
+  double take_rays();
+  double take_view();
+  // Chunks of the last step.
+  std::span<const Chunk> used() const;
+  std::span<float> network_grads();
   void update_emphasis();
   void backward_table();
-  void seek(double target, std::span<const float> learnt, const std::function<double()>& measure,
-            MarkPsnr& found);
   void set_scale(double scale, std::span<const float> learnt);
 
   const Owner& owner_;
@@ -82,9 +103,13 @@ class Baker final : public TrainingRun {
   std::vector<nerf::Camera> cameras_;
   nerf::Renderer::Recolour marking_;
   ShardedLoop<float> loop_;
+  Index chunks_per_step_;
   std::vector<Chunk> chunks_;
   std::vector<nerf::FieldSampler> samplers_;
   std::vector<nerf::RaySamples> samples_;
+  std::unique_ptr<ReadingGuide> guide_;  // null: none
+  std::vector<float> change_, shift_;    // [pixels, 3] of a guided step's view
+  Index used_ = 0;
   double emphasis_ = 1;
 };
 

@@ -19,6 +19,8 @@ struct EmbedDistortions {
 
 inline constexpr double kEmbedBeta2 = 0.99;  ///< beta_2 of Adam in Embedder
 
+class DistortedViews;
+
 /// Training options shared by every kind of mark.
 struct EmbedOptions {
   /// Length of the run and step sizes.
@@ -43,6 +45,7 @@ class Embedder final : public TrainingRun {
   /// @param views  see cache_embed_views()
   /// @throws ValueError if an option is out of range
   Embedder(Owner& owner, std::span<const CachedView> views, const EmbedOptions& options);
+  ~Embedder() override;
   /// Running means over the last images.
   using Figures = TrainingFigures;
   /// Running means over the last images.
@@ -69,16 +72,14 @@ class Embedder final : public TrainingRun {
   }
   CellCode fresh_code(std::uint64_t place) const;
   TrainingImage draw(Index image, Tape<float>& tape) const;
-  float* shifted_positions(Tape<float>& tape, Index view, std::uint64_t place) const;
-  Var<float> distorted(Var<float> image, std::uint64_t place, bool warped, const std::array<float, 6>& warp,
-                       float blur, float noise) const;
   double run_image(Index image, Tape<float>& tape, float* grads, Figures& figures) const;
   double run_batch(Figures& figures);
 
   Owner& owner_;
   std::span<const CachedView> views_;
   EmbedOptions options_;
-  CounterRng choice_rng_, message_rng_, noise_rng_, shift_rng_;
+  CounterRng message_rng_;
+  std::unique_ptr<DistortedViews> drawn_;
   std::unique_ptr<MarkTraining> training_;
   ShardedLoop<float> loop_;
   Figures figures_;

@@ -65,6 +65,12 @@ class MarkTraining {
   virtual Var<float> loss(Tape<float>& tape, const Params<float>& params,
                           std::span<const TrainingImage> images, const TrainingFigures& running,
                           TrainingFigures& figures) = 0;
+  /// Computes the part of loss() that concerns the reading of one image [1]: distorts and reads it. Several
+  /// threads may call it at the same time.
+  /// @param marked  [pixels, 3] of the image's view   @param figures  written as by loss()
+  /// @throws ValueError without cells
+  virtual Var<float> reading_loss(const Params<float>& params, Var<float> marked, const TrainingImage& image,
+                                  TrainingFigures& figures) const;
   /// Number of warm-up steps, which prepare the networks before training on the mark's own loss.
   virtual Index warm_steps() const { return 0; }
   /// Returns the weights that Muon trains; default: none.

@@ -1,0 +1,38 @@
+#pragma once
+#include <fieldmark/watermark/embedding/embedder.h>
+
+#include <memory>
+#include <vector>
+
+#include "distorted_views.h"
+
+// Draws baking towards colours that the extractor reads better. Private.
+namespace fieldmark::watermark {
+
+class ReadingGuide {
+ public:
+  // Caches the views, half of them in every direction for an object. The owner must outlive the guide.
+  // `strength` is eta below.
+  ReadingGuide(const Owner& owner, const Message& message, Index views, double strength, std::uint64_t seed);
+
+  // Returns the view whose reading guides a step.
+  const CachedView& view(Index step);
+  // Computes by how much the rays of that view should differ from their target, [pixels, 3]:
+  //   -eta rho max(-3, min(3, g / rms(g))) on the foreground, 0 elsewhere,   g = dL / dchange
+  // with the reading loss L of the distorted view (MarkTraining::reading_loss()), the RMS rho of the change
+  // and both RMS over the foreground. So the change grows where the extractor errs, whatever the scale of L.
+  // `change` is [pixels, 3], what the rays show so far less what the unmarked field shows.
+  void shifts(Index step, std::span<const float> change, std::vector<float>& shift);
+
+ private:
+  const Owner& owner_;
+  double strength_;
+  std::vector<CachedView> views_;
+  DistortedViews drawn_;
+  std::unique_ptr<MarkTraining> training_;
+  CellCode code_;
+  Message message_;
+  Tape<float> tape_;
+};
+
+}  // namespace fieldmark::watermark
