@@ -256,6 +256,7 @@ TEST_CASE("baker: a guided field is read better by the extractor, on views that 
   const auto reading_loss = [&](double guidance) {
     BakeOptions o = bake_options(80);
     o.guidance = guidance;
+    o.guide_views = 40;
     Baker baker(owner, kBakedMessage, o);
     baker.drive({});
     nerf::Renderer renderer(baker.field());
