@@ -1,6 +1,7 @@
 #include "reading_guide.h"
 
 #include <fieldmark/watermark/embedding/embed_views.h>
+#include <fieldmark/watermark/mark/flatness.h>
 
 #include <algorithm>
 #include <cmath>
@@ -58,9 +59,10 @@ void ReadingGuide::shifts(Index step, std::span<const float> change, std::vector
               push = static_cast<float>(strength_) * rms(change, foreground);
   shift.assign(marked.size(), 0.f);
   if (of_gradient == 0) return;
+  const std::vector<float> flat = flatness(view, foreground);
   for (std::size_t i = 0; i < shift.size(); ++i)
     if (foreground[i / 3] > 0)
-      shift[i] = -push * std::clamp(gradient[i] / of_gradient, -kLargestPush, kLargestPush);
+      shift[i] = -push * (1 - flat[i]) * std::clamp(gradient[i] / of_gradient, -kLargestPush, kLargestPush);
 }
 
 }  // namespace fieldmark::watermark

@@ -18,10 +18,11 @@ class ReadingGuide {
   // Returns the view whose reading guides a step.
   const CachedView& view(Index step);
   // Computes by how much the rays of that view should differ from their target, [pixels, 3]:
-  //   -eta rho max(-3, min(3, g / rms(g))) on the foreground, 0 elsewhere,   g = dL / dchange
+  //   -eta rho (1 - flatness) max(-3, min(3, g / rms(g))) on the foreground, 0 elsewhere,   g = dL / dchange
   // with the reading loss L of the distorted view (MarkTraining::reading_loss()), the RMS rho of the change
-  // and both RMS over the foreground. So the change grows where the extractor errs, whatever the scale of L.
-  // `change` is [pixels, 3], what the rays show so far less what the unmarked field shows.
+  // and both RMS over the foreground. So the change grows where the extractor errs, whatever the scale of L,
+  // and flat areas, where eyes would see it, stay as the mark left them. `change` is [pixels, 3], what the
+  // rays show so far less what the unmarked field shows.
   void shifts(Index step, std::span<const float> change, std::vector<float>& shift);
 
  private:

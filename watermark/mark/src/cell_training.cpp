@@ -6,6 +6,7 @@
 #include <fieldmark/engine/ops/softmax.h>
 #include <fieldmark/extractor/evidence_pool.h>
 #include <fieldmark/watermark/mark/cell_mark.h>
+#include <fieldmark/watermark/mark/flatness.h>
 #include <fieldmark/watermark/mark/owner.h>
 #include <fieldmark/watermark/mark/power_budget.h>
 #include <fieldmark/watermark/mark/weighted_segments.h>
@@ -23,28 +24,6 @@ namespace {
 constexpr Index kCoarse = 8;                    // pixels per side that the eye averages at a glance
 constexpr double kReadable = 0.7, kSafe = 0.8;  // shares of correct signs between which hiding phases in
 constexpr float kBitScale = 6;                  // scales pooled evidence, which lies in [-1, 1], to a logit
-
-// Flatness of the base image around each pixel of the foreground: exp(-(s / 0.03)^2), where s is the standard
-// deviation of the green channel in 5 x 5 pixels; the same for all three channels.
-std::vector<float> flatness(const CachedView& v, const std::vector<float>& foreground) {
-  std::vector<float> flat(3 * foreground.size(), 0.f);
-  for (Index y = 0; y < v.height; ++y)
-    for (Index x = 0; x < v.width; ++x) {
-      const Index p = y * v.width + x;
-      if (foreground[at(p)] == 0) continue;
-      float sum = 0, squares = 0, n = 0;
-      for (Index j = std::max<Index>(y - 2, 0); j <= std::min(y + 2, v.height - 1); ++j)
-        for (Index i = std::max<Index>(x - 2, 0); i <= std::min(x + 2, v.width - 1); ++i) {
-          const float g = v.base[3 * (j * v.width + i) + 1];
-          sum += g;
-          squares += g * g;
-          n += 1;
-        }
-      const float variance = std::max(squares / n - (sum / n) * (sum / n), 0.f);
-      std::fill_n(&flat[at(3 * p)], 3, std::exp(-variance / (0.03f * 0.03f)));
-    }
-  return flat;
-}
 
 // Returns [cells, bits] with the sign of each cell in the column of its bit, 0 elsewhere.
 std::span<const float> code_matrix(Tape<float>& tape, const CellCode& code, Index bits) {

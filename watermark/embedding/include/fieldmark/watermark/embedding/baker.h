@@ -34,7 +34,7 @@ struct BakeOptions {
 ///     included, at most to kLargestEmphasis. It stays 1 for marks without a gain.
 ///   - If the mark has cells, every second step is guided: its rays are the pixels of one view, and h_r leads
 ///     what they show towards what the extractor reads better,
-///       h = -eta rho max(-3, min(3, g / rms(g))),   g = dL / dimage,
+///       h = -eta rho (1 - flatness) max(-3, min(3, g / rms(g))),   g = dL / dimage,
 ///     with the reading loss L of the view under the distortions of embedding (MarkTraining::reading_loss())
 ///     and the RMS rho of the change so far. Elsewhere h_r = 0.
 /// Only the colour network and the colour features of the table move; everything that density depends on
