@@ -14,12 +14,13 @@ inline constexpr double kMarkResolution = 128;
 bool is_object_of_hash(const nerf::RadianceField& field);
 
 struct BakePlan {
-  Index chunks;  // of rays per step
-  std::vector<AdamRange>
-      ranges;  // of the colour networks and the table, with step sizes relative to the schedule's
+  Index chunks;                   // of rays per step
+  std::vector<AdamRange> ranges;  // colour networks and table, step sizes relative to the schedule's
 };
+
 // Rays of objects are short: there is time for many of them and for large steps, without which colours learn
 // a mark from all directions too faintly. Elsewhere there is time for a tenth of the steps.
+//
 // A mark has little detail finer than kMarkResolution. On an object's finer levels, a row of the table sees
 // fewer rays and learns mostly noise, so its step shrinks with the volume of a cell.
 BakePlan bake_plan(const nerf::RadianceField& field);

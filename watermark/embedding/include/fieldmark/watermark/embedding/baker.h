@@ -29,14 +29,13 @@ struct BakeOptions {
 /// unmarked colours, c_m marked ones, w_i the weights of the samples, and both terms are divided by the three
 /// channels. The first term is what images show; the second keeps colours behind one another from
 /// compensating each other. Two things are for objects of hash fields only:
-///   - The emphasis f starts at 1 and rises while the learnt change has less power on rays than the mark,
-///   noise
-///     included, at most to kLargestEmphasis. It stays 1 for marks without a gain.
-///   - If the mark has cells, every second step is guided: its rays are the pixels of one view, and h_r leads
-///     what they show towards what the extractor reads better,
-///       h = -eta rho (1 - flatness) max(-3, min(3, g / rms(g))),   g = dL / dimage,
-///     with the reading loss L of the view under the distortions of embedding (MarkTraining::reading_loss())
-///     and the RMS rho of the change so far. Elsewhere h_r = 0.
+/// - The emphasis f starts at 1 and rises while the learnt change has less power on rays than the mark, noise
+///   included, at most to kLargestEmphasis. It stays 1 for marks without a gain.
+/// - If the mark has cells, every second step is guided: its rays are the pixels of one view, and h_r leads
+///   what they show towards what the extractor reads better,
+///     h = -eta rho (1 - flatness) max(-3, min(3, g / rms(g))),   g = dL / dimage,
+///   with the reading loss L of the view, distorted as in embedding (MarkTraining::reading_loss()), and the
+///   RMS rho of the change so far. Elsewhere h_r = 0.
 /// Only the colour network and the colour features of the table move; everything that density depends on
 /// keeps its bytes. The result has the tensor names, shapes and metadata of the unmarked field, and holds
 /// neither network, extractor, key nor message.
