@@ -40,7 +40,7 @@ double rms(std::span<const float> x, const std::vector<float>& foreground) {
 }  // namespace
 
 TEST_CASE(
-    "reading_guide: shifts are bounded by the change's size, lie on the object, and scale with the "
+    "reading_guide: shifts are bounded by the mark's size, lie on the object, and scale with the "
     "strength") {
   const Owner owner = tiny_owner();
   ReadingGuide one = guide(owner, 1), two = guide(owner, 2);
@@ -49,9 +49,9 @@ TEST_CASE(
     const CachedView& view = one.view(step);
     const auto change = some_change(view);
     const auto foreground = foreground_mask(view);
-    one.shifts(step, change, shift);
+    one.shifts(step, change, change, shift);
     two.view(step);
-    two.shifts(step, change, twice);
+    two.shifts(step, change, change, twice);
     REQUIRE(shift.size() == change.size());
     const double of_change = rms(change, foreground), of_shift = rms(shift, foreground);
     CHECK(of_shift > 0.5 * of_change);  // less than the change's where gradients were cut to 3 RMS
@@ -75,7 +75,7 @@ TEST_CASE("reading_guide: a small step along the shifts lowers the reading loss"
   std::vector<float> shift;
   for (Index step = 0; step < 6; ++step) {
     const auto change = some_change(guided.view(step));
-    guided.shifts(step, change, shift);
+    guided.shifts(step, change, change, shift);
     const auto loss = [&](float along) {
       Tape<float> tape;
       TrainingImage image = drawn.draw(step, 0, tape);
@@ -99,17 +99,17 @@ TEST_CASE("reading_guide: a small step along the shifts lowers the reading loss"
   }
 }
 
-TEST_CASE("reading_guide: no change gives no shifts, one and two threads give the same ones") {
+TEST_CASE("reading_guide: no mark gives no shifts, one and two threads give the same ones") {
   const Owner owner = tiny_owner();
   ReadingGuide guided = guide(owner, 1);
   const CachedView& view = guided.view(0);
   const auto change = some_change(view);
   std::vector<float> none, one, two;
-  guided.shifts(0, std::vector<float>(change.size()), none);
+  guided.shifts(0, change, std::vector<float>(change.size()), none);
   CHECK(std::ranges::all_of(none, [](float s) { return s == 0; }));
   const ScopedThreads serial(1);
-  guided.shifts(0, change, one);
+  guided.shifts(0, change, change, one);
   const ScopedThreads parallel(2);
-  guided.shifts(0, change, two);
+  guided.shifts(0, change, change, two);
   CHECK(one == two);
 }

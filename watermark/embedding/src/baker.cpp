@@ -200,7 +200,7 @@ void Baker::update_emphasis() {
     learnt += c.learnt;
   }
   const double ratio = learnt > 0 ? std::clamp(std::sqrt(asked / learnt), 0.5, 2.) : 1;
-  emphasis_ = std::clamp(emphasis_ * (1 + kEmphasisRate * (ratio - 1)), 1., kLargestEmphasis);
+  emphasis_ = std::clamp(emphasis_ * (1 + kEmphasisRate * (ratio - 1)), kLeastEmphasis, kLargestEmphasis);
 }
 
 // Returns the learnt colours [samples, 3] and the features on which they depend.
@@ -283,7 +283,7 @@ double Baker::take_view() {
   const Index chunks = (view.height * view.width + kRays - 1) / kRays;
   if (chunks > std::ssize(chunks_)) chunks_.resize(at(chunks));
   used_ = chunks;
-  change_.assign(at(3 * chunks * kRays), 0.f);
+  for (auto* seen : {&change_, &asked_}) seen->assign(at(3 * chunks * kRays), 0.f);
   loop_.run(
       chunks,
       [&](Index i, Index shard, Tape<float>& tape, float*) {
@@ -291,13 +291,17 @@ double Baker::take_view() {
         take_pixels(view, i, c);
         sample(shard, tape, c);
         set_target(c);
-        if (c.samples > 0)
-          change_on_rays(c.begin, c.weight, learnt_colours(tape, c, nullptr).rgb.value(), c.unmarked.data(),
-                         &change_[at(3 * i * kRays)]);
+        if (c.samples == 0) return 0.;
+        const auto change = [&](const float* colours, std::vector<float>& seen) {
+          change_on_rays(c.begin, c.weight, colours, c.unmarked.data(), &seen[at(3 * i * kRays)]);
+        };
+        change(learnt_colours(tape, c, nullptr).rgb.value(), change_);
+        change(c.marked.data(), asked_);
         return 0.;
       },
       network_grads());
-  guide_->shifts(steps(), std::span(change_).first(at(3 * view.height * view.width)), shift_);
+  const std::size_t pixels = at(3 * view.height * view.width);
+  guide_->shifts(steps(), std::span(change_).first(pixels), std::span(asked_).first(pixels), shift_);
   shift_.resize(change_.size(), 0.f);
   return loop_.run(
              chunks,
@@ -373,6 +377,7 @@ Baker::MarkPsnr Baker::scale_to(double target, const MarkPsnrViews& views) {
       set_scale(next, learnt);
       return meter(marked, {}, every) + bias;
     });
+    set_scale(found.scale, learnt);
     if (every == 1 || !std::isfinite(found.psnr) || found.scale == scale) break;
     const double guess = found.psnr - bias;
     found.psnr = meter(marked);

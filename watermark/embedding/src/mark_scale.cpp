@@ -18,7 +18,7 @@ ScaledMark seek_scale(ScaledMark from, double target, double bound,
                       const std::function<double(double scale)>& measure) {
   const double least = 1 / bound, most = bound;
   double slope = -1, faint = 0, strong = 2 * most;  // ends of the bracket, at first outside the bounds
-  ScaledMark last = from;
+  ScaledMark last = from, nearest = from;
   for (int i = 0; i < kMeasurements && std::isfinite(last.psnr) && !is_near(last, target); ++i) {
     (last.psnr > target ? faint : strong) = last.scale;
     double scale = std::clamp(last.scale * std::pow(10.0, (target - last.psnr) / slope / 20), least, most);
@@ -29,8 +29,9 @@ ScaledMark seek_scale(ScaledMark from, double target, double bound,
     const double secant = (next.psnr - last.psnr) / (20 * std::log10(next.scale / last.scale));
     if (secant < kLeastSlope) slope = secant;
     last = next;
+    if (std::abs(last.psnr - target) < std::abs(nearest.psnr - target)) nearest = last;
   }
-  return last;
+  return nearest;
 }
 
 }  // namespace fieldmark::watermark

@@ -39,7 +39,8 @@ const CachedView& ReadingGuide::view(Index step) {
   return views_[at(drawn_.draw(step, 0, tape_).view)];
 }
 
-void ReadingGuide::shifts(Index step, std::span<const float> change, std::vector<float>& shift) {
+void ReadingGuide::shifts(Index step, std::span<const float> change, std::span<const float> asked,
+                          std::vector<float>& shift) {
   tape_.reset();
   TrainingImage image = drawn_.draw(step, 0, tape_);
   image.code = code_;
@@ -56,7 +57,7 @@ void ReadingGuide::shifts(Index step, std::span<const float> change, std::vector
   const std::span<const float> gradient(leaf.grad(), marked.size());
   const std::vector<float> foreground = foreground_mask(view);
   const float of_gradient = rms(gradient, foreground),
-              push = static_cast<float>(strength_) * rms(change, foreground);
+              push = static_cast<float>(strength_) * rms(asked, foreground);
   shift.assign(marked.size(), 0.f);
   if (of_gradient == 0) return;
   const std::vector<float> flat = flatness(view, foreground);

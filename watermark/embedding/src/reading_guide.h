@@ -20,10 +20,11 @@ class ReadingGuide {
   // Computes by how much the rays of that view should differ from their target, [pixels, 3]:
   //   -eta rho (1 - flatness) max(-3, min(3, g / rms(g))) on the foreground, 0 elsewhere,   g = dL / dchange
   // with the reading loss L of the distorted view (MarkTraining::reading_loss()), the RMS rho of the change
-  // and both RMS over the foreground. So the change grows where the extractor errs, whatever the scale of L,
-  // and flat areas, where eyes would see it, stay as the mark left them. `change` is [pixels, 3], what the
-  // rays show so far less what the unmarked field shows.
-  void shifts(Index step, std::span<const float> change, std::vector<float>& shift);
+  // that the mark asks for, and both RMS over the foreground. So the change grows where the extractor errs,
+  // whatever the scale of L, and flat areas, where eyes would see it, stay as the mark left them.
+  // `change` is what the rays show so far, `asked` what they show of the mark, [pixels, 3] less the unmarked.
+  void shifts(Index step, std::span<const float> change, std::span<const float> asked,
+              std::vector<float>& shift);
 
  private:
   const Owner& owner_;

@@ -29,13 +29,13 @@ struct BakeOptions {
 /// unmarked colours, c_m marked ones, w_i the weights of the samples, and both terms are divided by the three
 /// channels. The first term is what images show; the second keeps colours behind one another from
 /// compensating each other. Two things are for objects of hash fields only:
-/// - The emphasis f starts at 1 and rises while the learnt change has less power on rays than the mark, noise
-///   included, at most to kLargestEmphasis. It stays 1 for marks without a gain.
+/// - The emphasis f starts at 1. It rises while the learnt change has less power on rays than the mark, noise
+///   included, and falls while it has more. It stays 1 for marks without a gain.
 /// - If the mark has cells, every second step is guided: its rays are the pixels of one view, and h_r leads
 ///   what they show towards what the extractor reads better,
 ///     h = -eta rho (1 - flatness) max(-3, min(3, g / rms(g))),   g = dL / dimage,
 ///   with the reading loss L of the view, distorted as in embedding (MarkTraining::reading_loss()), and the
-///   RMS rho of the change so far. Elsewhere h_r = 0.
+///   RMS rho of the mark in it. Elsewhere h_r = 0.
 /// Only the colour network and the colour features of the table move; everything that density depends on
 /// keeps its bytes. The result has the tensor names, shapes and metadata of the unmarked field, and holds
 /// neither network, extractor, key nor message.
@@ -63,9 +63,11 @@ class Baker final : public TrainingRun {
   MarkPsnr scale_to(double target, const MarkPsnrViews& views = {.seed = 32});
   /// Bound of the scale: 6 dB.
   static constexpr double kLargestScale = 2;
-  /// Returns the emphasis f so far, 1 to kLargestEmphasis.
+  /// Returns the emphasis f so far, kLeastEmphasis to kLargestEmphasis.
   double emphasis() const { return emphasis_; }
-  /// Bound of the emphasis: 6 dB.
+  /// Lower bound of the emphasis: -2 dB. Less would leave informed detection too little of the mark.
+  static constexpr double kLeastEmphasis = 0.8;
+  /// Upper bound of the emphasis: 6 dB.
   static constexpr double kLargestEmphasis = 2;
   /// Measures the mark PSNR of the baked field so far, see MarkPsnrMeter.
   double mark_psnr(const MarkPsnrViews& views = {.seed = 32}) const;
@@ -107,7 +109,7 @@ class Baker final : public TrainingRun {
   std::vector<nerf::FieldSampler> samplers_;
   std::vector<nerf::RaySamples> samples_;
   std::unique_ptr<ReadingGuide> guide_;  // null: none
-  std::vector<float> change_, shift_;    // [pixels, 3] of a guided step's view
+  std::vector<float> change_, asked_, shift_;  // [pixels, 3] of a guided step's view
   Index used_ = 0;
   double emphasis_ = 1;
 };
