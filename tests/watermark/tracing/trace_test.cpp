@@ -136,6 +136,9 @@ TEST_CASE("trace: rounds name those of an average of eight whom the first round 
     const std::vector<std::string> guilty(names.begin() + 30, names.begin() + 38);
     const auto found = trace_copies(average(test_key(trial), area, guilty, 0.06f, trial), area,
                                     test_key(trial), kMessage, names, kFpr);
+    CHECK(std::is_sorted(found.begin(), found.end(), [](const TracedCopy& x, const TracedCopy& y) {
+      return x.p_corrected < y.p_corrected;
+    }));
     for (const TracedCopy& copy : found)
       if (copy.p_corrected <= kFpr) {
         const bool is_guilty = std::find(guilty.begin(), guilty.end(), copy.name) != guilty.end();

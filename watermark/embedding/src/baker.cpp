@@ -58,6 +58,7 @@ void change_on_rays(std::span<const std::int32_t> begin, std::span<const float> 
 // The visible samples of a chunk of rays, their unmarked and marked colours, the target (marked, emphasised),
 // what the rays should show beyond it, and the gradients that the samples pass back to the table.
 struct Baker::Chunk {
+  Chunk() : jitter(at(kRays)) { rays.resize(kRays); }
   nerf::CubeRays rays;
   std::vector<float> jitter;
   std::vector<float> position, direction, weight, z, base_features, of_direction, unmarked, marked, target,
@@ -75,8 +76,6 @@ Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& opti
       rng_(options.seed, 21),
       field_(owner.field),
       loop_(kShards, owner.field.field.network_size()),
-      chunks_per_step_(bake_plan(owner.field).chunks),
-      chunks_(at(chunks_per_step_)),
       samplers_(kShards),
       samples_(kShards) {
   if (message.size() != owner.options().bits)
@@ -98,18 +97,17 @@ Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& opti
                                             std::clamp<Index>(steps / kGuideEvery, 1, options.guide_views),
                                             options.guidance, options.seed + 41);
   }
+  BakePlan plan = bake_plan(owner.field);
+  chunks_per_step_ = plan.chunks;
   // The parameters of the density get no gradient: its features do not change where the gradient is 0.
   keep("emphasis", emphasis_);
-  train(field_.params, {.lr = 1, .beta2 = 0.99, .eps = 1e-15, .zero_grads = true},
-        bake_plan(owner.field).ranges);
+  train(field_.params, {.lr = 1, .beta2 = 0.99, .eps = 1e-15, .zero_grads = true}, std::move(plan.ranges));
 }
 
 Baker::~Baker() = default;
 
 void Baker::choose_rays(Index chunk, Chunk& c) const {
   const auto step = static_cast<std::uint64_t>(steps());
-  c.rays.resize(kRays);
-  c.jitter.resize(at(kRays));
   for (Index i = 0; i < kRays; ++i) {
     const auto u = rng_.uniform4(step, static_cast<std::uint64_t>(chunk * kRays + i));
     const auto pick = [](float x, Index n) {
@@ -126,8 +124,6 @@ void Baker::choose_rays(Index chunk, Chunk& c) const {
 // Takes the pixels of a view in their order; a last chunk repeats the last pixel.
 void Baker::take_pixels(const CachedView& view, Index chunk, Chunk& c) const {
   const auto step = static_cast<std::uint64_t>(steps());
-  c.rays.resize(kRays);
-  c.jitter.resize(at(kRays));
   for (Index i = 0; i < kRays; ++i) {
     const Index p = std::min(chunk * kRays + i, view.height * view.width - 1);
     const float pixel[2] = {static_cast<float>(p % view.width), static_cast<float>(p / view.width)};
@@ -193,9 +189,9 @@ void Baker::set_target(Chunk& c) const {
 
 // Raises the emphasis while the learnt change has less power than the mark, else lowers it. Networks are not
 // linear, so scaling in scale_to() costs bits.
-void Baker::update_emphasis() {
+void Baker::update_emphasis(std::span<const Chunk> chunks) {
   double asked = 0, learnt = 0;
-  for (const Chunk& c : used()) {
+  for (const Chunk& c : chunks) {
     asked += c.asked;
     learnt += c.learnt;
   }
@@ -243,51 +239,42 @@ double Baker::learn(Chunk& c, Tape<float>& tape, float* grads, const float* shif
   return error / (3 * kRays);
 }
 
-std::span<const Baker::Chunk> Baker::used() const { return std::span(chunks_).first(at(used_)); }
-
 std::span<float> Baker::network_grads() {
   return field_.params.grads().first(at(field_.field.network_size()));
 }
 
-void Baker::backward_table() {
+void Baker::backward_table(std::span<const Chunk> chunks) {
   const nerf::HashEncoding<float>& encoding = field_.field.encoding();
   parallel_for(encoding.levels(), 1, [&](Index level, Index) {
-    for (const Chunk& c : used())
+    for (const Chunk& c : chunks)
       encoding.backward_level(static_cast<int>(level), c.position.data(), c.samples,
                               c.dfeatures.data() + level * c.samples * 2 * encoding.features(),
                               field_.params.grads(encoding.table()));
   });
 }
 
-// Learns from random rays. Returns the mean error of a ray.
-double Baker::take_rays() {
-  const Index chunks = chunks_per_step_;
-  used_ = chunks;
+// Learns from random rays. Returns the errors of all chunks.
+double Baker::take_rays(std::span<Chunk> chunks) {
   return loop_.run(
-             chunks,
-             [&](Index i, Index shard, Tape<float>& tape, float* grads) {
-               Chunk& c = chunks_[at(i)];
-               choose_rays(i, c);
-               sample(shard, tape, c);
-               set_target(c);
-               return learn(c, tape, grads, nullptr);
-             },
-             network_grads()) /
-         static_cast<double>(chunks);
+      std::ssize(chunks),
+      [&](Index i, Index shard, Tape<float>& tape, float* grads) {
+        Chunk& c = chunks[at(i)];
+        choose_rays(i, c);
+        sample(shard, tape, c);
+        set_target(c);
+        return learn(c, tape, grads, nullptr);
+      },
+      network_grads());
 }
 
 // Learns from all rays of one view, whose targets the extractor's reading of what they show shifts. Returns
-// the mean error of a ray.
-double Baker::take_view() {
-  const CachedView& view = guide_->view(steps());
-  const Index chunks = (view.height * view.width + kRays - 1) / kRays;
-  if (chunks > std::ssize(chunks_)) chunks_.resize(at(chunks));
-  used_ = chunks;
-  for (auto* seen : {&change_, &asked_}) seen->assign(at(3 * chunks * kRays), 0.f);
+// the errors of all chunks.
+double Baker::take_view(const CachedView& view, std::span<Chunk> chunks) {
+  for (auto* seen : {&change_, &asked_}) seen->assign(3 * chunks.size() * at(kRays), 0.f);
   loop_.run(
-      chunks,
+      std::ssize(chunks),
       [&](Index i, Index shard, Tape<float>& tape, float*) {
-        Chunk& c = chunks_[at(i)];
+        Chunk& c = chunks[at(i)];
         take_pixels(view, i, c);
         sample(shard, tape, c);
         set_target(c);
@@ -304,22 +291,25 @@ double Baker::take_view() {
   guide_->shifts(steps(), std::span(change_).first(pixels), std::span(asked_).first(pixels), shift_);
   shift_.resize(change_.size(), 0.f);
   return loop_.run(
-             chunks,
-             [&](Index i, Index, Tape<float>& tape, float* grads) {
-               return learn(chunks_[at(i)], tape, grads, &shift_[at(3 * i * kRays)]);
-             },
-             network_grads()) /
-         static_cast<double>(chunks);
+      std::ssize(chunks),
+      [&](Index i, Index, Tape<float>& tape, float* grads) {
+        return learn(chunks[at(i)], tape, grads, &shift_[at(3 * i * kRays)]);
+      },
+      network_grads());
 }
 
 double Baker::take_step(double) {
-  const bool guided = guide_ && steps() % kGuideEvery == kGuideEvery - 1;
-  const double loss = guided ? take_view() : take_rays();
-  if (field_.field.has_table()) backward_table();
+  const CachedView* view =
+      guide_ && steps() % kGuideEvery == kGuideEvery - 1 ? &guide_->view(steps()) : nullptr;
+  const Index count = view ? (view->height * view->width + kRays - 1) / kRays : chunks_per_step_;
+  if (count > std::ssize(chunks_)) chunks_.resize(at(count));
+  const std::span<Chunk> chunks = std::span(chunks_).first(at(count));
+  const double loss = view ? take_view(*view, chunks) : take_rays(chunks);
+  if (field_.field.has_table()) backward_table(chunks);
   update();
   // Other scenes learn the whole mark: fern shows it to 0.1 dB after 780 steps.
-  if (owner_.mark().has_gain() && is_object_of_hash(field_) && !guided) update_emphasis();
-  return loss;
+  if (owner_.mark().has_gain() && is_object_of_hash(field_) && !view) update_emphasis(chunks);
+  return loss / static_cast<double>(count);
 }
 
 void Baker::describe(RunFingerprint& f) const {

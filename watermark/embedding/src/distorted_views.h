@@ -10,6 +10,8 @@ class DistortedViews {
   // Owner and views must outlive the object. `batch` images a step have their own random numbers.
   DistortedViews(const Owner& owner, std::span<const CachedView> views, const EmbedDistortions& distortions,
                  Index batch, std::uint64_t seed);
+  // Draws the view of an image, as draw() does.
+  Index view(Index step, Index image) const;
   // Draws view, sample positions and distortions of an image; code, message and signs stay empty.
   TrainingImage draw(Index step, Index image, Tape<float>& tape) const;
   // Index of an image in the run.

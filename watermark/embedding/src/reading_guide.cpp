@@ -32,12 +32,10 @@ ReadingGuide::ReadingGuide(const Owner& owner, const Message& message, Index vie
       drawn_(owner, views_, {}, 1, seed),
       training_(owner.mark().training(owner, views_)),
       code_(owner.code()),
-      message_(message) {}
+      message_(message),
+      signs_(cell_signs(code_, message)) {}
 
-const CachedView& ReadingGuide::view(Index step) {
-  tape_.reset();
-  return views_[at(drawn_.draw(step, 0, tape_).view)];
-}
+const CachedView& ReadingGuide::view(Index step) const { return views_[at(drawn_.view(step, 0))]; }
 
 void ReadingGuide::shifts(Index step, std::span<const float> change, std::span<const float> asked,
                           std::vector<float>& shift) {
@@ -45,7 +43,7 @@ void ReadingGuide::shifts(Index step, std::span<const float> change, std::span<c
   TrainingImage image = drawn_.draw(step, 0, tape_);
   image.code = code_;
   image.message = message_;
-  image.signs = cell_signs(code_, message_);
+  image.signs = signs_;
   const CachedView& view = views_[at(image.view)];
   std::vector<float> marked(change.begin(), change.end());
   for (std::size_t i = 0; i < marked.size(); ++i)

@@ -16,7 +16,7 @@ class ReadingGuide {
   ReadingGuide(const Owner& owner, const Message& message, Index views, double strength, std::uint64_t seed);
 
   // Returns the view whose reading guides a step.
-  const CachedView& view(Index step);
+  const CachedView& view(Index step) const;
   // Computes by how much the rays of that view should differ from their target, [pixels, 3]:
   //   -eta rho (1 - flatness) max(-3, min(3, g / rms(g))) on the foreground, 0 elsewhere,   g = dL / dchange
   // with the reading loss L of the distorted view (MarkTraining::reading_loss()), the RMS rho of the change
@@ -34,6 +34,7 @@ class ReadingGuide {
   std::unique_ptr<MarkTraining> training_;
   CellCode code_;
   Message message_;
+  std::vector<std::int8_t> signs_;
   Tape<float> tape_;
 };
 

@@ -123,6 +123,9 @@ std::vector<TracedCopy> trace_copies(std::span<const double> evidence, std::span
     subtract_projections(explained, left);
     untold = untold.subspan(static_cast<std::size_t>(found));
   }
+  // A later round may find a copy more surely than an earlier one.
+  std::stable_sort(copies.begin(), copies.end(),
+                   [](const TracedCopy& a, const TracedCopy& b) { return a.p_corrected < b.p_corrected; });
   return copies;
 }
 

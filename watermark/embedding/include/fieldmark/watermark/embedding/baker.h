@@ -11,10 +11,10 @@ class ReadingGuide;
 
 /// Options for baking a message.
 struct BakeOptions {
-  /// Length of the run and step sizes for objects of preset hash; others take smaller ones (baker.cpp).
+  /// Length of the run and step sizes for objects of preset hash; others take smaller ones (bake_plan.h).
   ScheduleOptions schedule{.seconds = 45, .lr = 5e-2, .half_after = 4000, .cooldown = 0.6, .last = 0.02};
-  Index cameras = 400;     ///< novel cameras whose rays are used, >= 1
-  Index around = 130;      ///< more in every direction for an object without surroundings (a cube), >= 0
+  Index cameras = 400;      ///< novel cameras whose rays are used, >= 1
+  Index around = 130;       ///< more in every direction for an object without surroundings (a cube), >= 0
   Index guide_views = 200;  ///< views that guide, >= 1; no more than guided steps are used
   /// Strength eta with which the extractor's reading shifts what rays show, times the mark's RMS, >= 0. Only
   /// objects of hash fields whose mark has cells are guided.
@@ -87,13 +87,11 @@ class Baker final : public TrainingRun {
   void set_target(Chunk& c) const;
   Learnt learnt_colours(Tape<float>& tape, Chunk& c, float* grads) const;
   double learn(Chunk& c, Tape<float>& tape, float* grads, const float* shift);
-  double take_rays();
-  double take_view();
-  // Chunks of the last step.
-  std::span<const Chunk> used() const;
+  double take_rays(std::span<Chunk> chunks);
+  double take_view(const CachedView& view, std::span<Chunk> chunks);
   std::span<float> network_grads();
-  void update_emphasis();
-  void backward_table();
+  void update_emphasis(std::span<const Chunk> chunks);
+  void backward_table(std::span<const Chunk> chunks);
   void set_scale(double scale, std::span<const float> learnt);
 
   const Owner& owner_;
@@ -104,13 +102,12 @@ class Baker final : public TrainingRun {
   std::vector<nerf::Camera> cameras_;
   nerf::Renderer::Recolour marking_;
   ShardedLoop<float> loop_;
-  Index chunks_per_step_;
+  Index chunks_per_step_ = 0;
   std::vector<Chunk> chunks_;
   std::vector<nerf::FieldSampler> samplers_;
   std::vector<nerf::RaySamples> samples_;
-  std::unique_ptr<ReadingGuide> guide_;  // null: none
+  std::unique_ptr<ReadingGuide> guide_;        // null: none
   std::vector<float> change_, asked_, shift_;  // [pixels, 3] of a guided step's view
-  Index used_ = 0;
   double emphasis_ = 1;
 };
 

@@ -34,8 +34,8 @@ struct TracedCopy {
 /// @param names     of the recipients, each once   @param fpr  in (0, 1]
 /// @param progress  called from time to time with (done, total) of the round; returns false to stop, which
 ///                  throws Error
-/// @return all recipients: the found ones by round, then the others; in each, smallest p first, equal ones in
-///         the order of `names`
+/// @return all recipients, smallest corrected p first; equal ones by round and T, then in the order of
+/// `names`
 /// @throws ValueError as deal_cells() and keyed_statistic(), or if a name is empty or fpr outside its range
 std::vector<TracedCopy> trace_copies(std::span<const double> evidence, std::span<const double> area,
                                      const Key& key, const Message& message,
