@@ -45,6 +45,10 @@ TEST_CASE("distorted_views: step and image determine the draw, and images differ
   // Few images are neither warped nor blurred nor noisy.
   CHECK(std::set(first.begin(), first.end()).size() >= 7);
   CHECK(drawn.place(2, 1) == 7);
+  Tape<float> tape;
+  const TrainingImage chosen = drawn.draw_of(5, 2, 1, tape);
+  CHECK(chosen.view == 5);
+  CHECK(shown(chosen, tape) == first[7]);  // the same distortions of grey
 }
 
 TEST_CASE("distorted_views: every view is drawn, positions move by the shift, code and message stay empty") {

@@ -17,6 +17,14 @@ const Message kGuided{{1, 0, 1, 1}};
 
 ReadingGuide guide(const Owner& owner, double strength) { return {owner, kGuided, 4, strength, 11}; }
 
+// Returns the shifts of the view of a turn.
+std::vector<float> shifts_of(ReadingGuide& guided, Index turn) {
+  const CachedView& view = guided.view(turn);
+  const auto size = static_cast<std::ptrdiff_t>(3 * view.height * view.width);
+  const auto from = guided.shifts().begin() + turn % 4 * size;
+  return {from, from + size};
+}
+
 // A change of all foreground pixels by about 0.02, the same for the same view.
 std::vector<float> some_change(const CachedView& view) {
   const CounterRng rng(3, 1);
@@ -44,15 +52,13 @@ TEST_CASE(
     "strength") {
   const Owner owner = tiny_owner();
   ReadingGuide one = guide(owner, 1), two = guide(owner, 2);
-  std::vector<float> shift, twice;
-  for (Index step = 0; step < 6; ++step) {
-    const CachedView& view = one.view(step);
+  for (Index turn = 0; turn < 6; ++turn) {
+    const CachedView& view = one.view(turn);
     const auto change = some_change(view);
     const auto foreground = foreground_mask(view);
-    one.shifts(step, change, change, shift);
-    two.view(step);
-    two.shifts(step, change, change, twice);
-    REQUIRE(shift.size() == change.size());
+    one.read(turn, change, change);
+    two.read(turn, change, change);
+    const auto shift = shifts_of(one, turn), twice = shifts_of(two, turn);
     const double of_change = rms(change, foreground), of_shift = rms(shift, foreground);
     CHECK(of_shift > 0.5 * of_change);  // less than the change's where gradients were cut to 3 RMS
     CHECK(of_shift <= 1.0001 * of_change);
@@ -72,13 +78,13 @@ TEST_CASE("reading_guide: a small step along the shifts lowers the reading loss"
   const auto views = cache_embed_views(owner.field, owner.options().patch(), {.count = 4}, seed);
   const DistortedViews drawn(owner, views, {}, 1, seed);
   const auto training = owner.mark().training(owner, views);
-  std::vector<float> shift;
-  for (Index step = 0; step < 6; ++step) {
-    const auto change = some_change(guided.view(step));
-    guided.shifts(step, change, change, shift);
+  for (Index turn = 0; turn < 6; ++turn) {
+    const auto change = some_change(guided.view(turn));
+    guided.read(turn, change, change);
+    const auto shift = shifts_of(guided, turn);
     const auto loss = [&](float along) {
       Tape<float> tape;
-      TrainingImage image = drawn.draw(step, 0, tape);
+      TrainingImage image = drawn.draw_of(turn % 4, turn, 0, tape);
       image.code = owner.code();
       image.message = kGuided;
       image.signs = cell_signs(image.code, kGuided);
@@ -93,7 +99,7 @@ TEST_CASE("reading_guide: a small step along the shifts lowers the reading loss"
                              tape.constant(marked.data(), {view.height * view.width, 3}), image, figures)
               .value()[0]);
     };
-    CAPTURE(step);
+    CAPTURE(turn);
     CHECK(loss(0.5f) < loss(0));
     CHECK(loss(-0.5f) > loss(0));
   }
@@ -104,12 +110,42 @@ TEST_CASE("reading_guide: no mark gives no shifts, one and two threads give the 
   ReadingGuide guided = guide(owner, 1);
   const CachedView& view = guided.view(0);
   const auto change = some_change(view);
-  std::vector<float> none, one, two;
-  guided.shifts(0, change, std::vector<float>(change.size()), none);
-  CHECK(std::ranges::all_of(none, [](float s) { return s == 0; }));
+  guided.read(0, change, std::vector<float>(change.size()));
+  CHECK(std::ranges::all_of(shifts_of(guided, 0), [](float s) { return s == 0; }));
   const ScopedThreads serial(1);
-  guided.shifts(0, change, change, one);
+  guided.read(0, change, change);
+  const auto one = shifts_of(guided, 0);
   const ScopedThreads parallel(2);
-  guided.shifts(0, change, change, two);
-  CHECK(one == two);
+  guided.read(0, change, change);
+  CHECK(shifts_of(guided, 0) == one);
+}
+
+TEST_CASE("reading_guide: pixels come from the views read so far, each with its own shift") {
+  const Owner owner = tiny_owner();
+  ReadingGuide guided = guide(owner, 1);
+  for (Index turn = 0; turn < 2; ++turn)
+    guided.read(turn, some_change(guided.view(turn)), some_change(guided.view(turn)));
+  const CounterRng rng(5, 1);
+  int of_view[2] = {}, shifted = 0;
+  for (std::uint64_t i = 0; i < 400; ++i) {
+    const auto u = rng.uniform4(0, i);
+    const ReadingGuide::Pixel pixel = guided.pick(std::span(u).first<3>(), 2);
+    const Index turn = &pixel.camera == &guided.view(0).camera ? 0 : 1;
+    const CachedView& view = guided.view(turn);
+    REQUIRE(&pixel.camera == &view.camera);
+    ++of_view[turn];
+    const auto x = static_cast<Index>(pixel.place[0]), y = static_cast<Index>(pixel.place[1]);
+    REQUIRE(x < view.width);
+    REQUIRE(y < view.height);
+    const auto shift = shifts_of(guided, turn);
+    REQUIRE(std::ranges::equal(
+        pixel.shift, std::span(shift).subspan(static_cast<std::size_t>(3 * (y * view.width + x)), 3)));
+    shifted += pixel.shift[0] != 0;
+  }
+  CHECK(of_view[0] > 150);
+  CHECK(of_view[1] > 150);
+  CHECK(shifted > 40);
+  const std::array<float, 3> last{0.999f, 0.999f, 0.999f};
+  CHECK(&guided.pick(last, 1).camera == &guided.view(0).camera);
+  CHECK(&guided.pick(last, 9).camera == &guided.view(3).camera);
 }

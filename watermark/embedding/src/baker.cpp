@@ -20,10 +20,11 @@ namespace {
 constexpr int kShards = 16;
 constexpr Index kRays = 64;  // per chunk
 constexpr float kLeastWeight = 1e-3f;
-constexpr int kRounds = 4;          // rounds of scale_to(), each confirmed on all views
-constexpr float kOfSamples = 0.1f;  // weight of the samples' own colours relative to those of rays
+constexpr int kRounds = 4;                  // rounds of scale_to(), each confirmed on all views
+constexpr float kOfSamples = 0.1f;          // weight of the samples' own colours relative to those of rays
 constexpr double kEmphasisRate = 1. / 200;  // per step
-constexpr Index kGuideEvery = 2;            // steps: a guided one takes as long as four others
+constexpr Index kReadEvery = 6;             // steps: reading a view takes as long as one or two
+constexpr Index kGuidedEvery = 2;           // chunks
 
 // Calls f(ray, channel, sum) with the difference of colours that each ray shows, sum_i w_i (a_i - b_i) over
 // its samples.
@@ -58,9 +59,9 @@ void change_on_rays(std::span<const std::int32_t> begin, std::span<const float> 
 // The visible samples of a chunk of rays, their unmarked and marked colours, the target (marked, emphasised),
 // what the rays should show beyond it, and the gradients that the samples pass back to the table.
 struct Baker::Chunk {
-  Chunk() : jitter(at(kRays)) { rays.resize(kRays); }
+  Chunk() : jitter(at(kRays)), beyond(at(3 * kRays)) { rays.resize(kRays); }
   nerf::CubeRays rays;
-  std::vector<float> jitter;
+  std::vector<float> jitter, beyond;
   std::vector<float> position, direction, weight, z, base_features, of_direction, unmarked, marked, target,
       features, dfeatures, unused;
   std::vector<std::int32_t> begin;  // of each ray's samples, and the end
@@ -92,13 +93,14 @@ Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& opti
   cameras_ = cameras_around(owner.field, options.cameras, options.around, 0, options.seed + 31);
   if (owner.mark().has_cells() && is_object_of_hash(owner.field) && options.guidance > 0) {
     const Index steps =
-        options.schedule.steps > 0 ? options.schedule.steps : options.guide_views * kGuideEvery;
+        options.schedule.steps > 0 ? options.schedule.steps : options.guide_views * kReadEvery;
     guide_ = std::make_unique<ReadingGuide>(owner, message,
-                                            std::clamp<Index>(steps / kGuideEvery, 1, options.guide_views),
+                                            std::clamp<Index>(steps / kReadEvery, 1, options.guide_views),
                                             options.guidance, options.seed + 41);
+    keep("guide", guide_->shifts());
   }
   BakePlan plan = bake_plan(owner.field);
-  chunks_per_step_ = plan.chunks;
+  chunks_.resize(at(plan.chunks));
   // The parameters of the density get no gradient: its features do not change where the gradient is 0.
   keep("emphasis", emphasis_);
   train(field_.params, {.lr = 1, .beta2 = 0.99, .eps = 1e-15, .zero_grads = true}, std::move(plan.ranges));
@@ -108,8 +110,17 @@ Baker::~Baker() = default;
 
 void Baker::choose_rays(Index chunk, Chunk& c) const {
   const auto step = static_cast<std::uint64_t>(steps());
+  const Index turns = guide_ && chunk % kGuidedEvery == 0 ? turns_until(steps()) : 0;
   for (Index i = 0; i < kRays; ++i) {
     const auto u = rng_.uniform4(step, static_cast<std::uint64_t>(chunk * kRays + i));
+    c.jitter[at(i)] = u[3];
+    c.beyond[at(3 * i)] = c.beyond[at(3 * i + 1)] = c.beyond[at(3 * i + 2)] = 0;
+    if (turns > 0) {
+      const ReadingGuide::Pixel pixel = guide_->pick(std::span(u).first<3>(), turns);
+      c.rays.set(field_.space, i, pixel.camera, pixel.place);
+      std::ranges::copy(pixel.shift, &c.beyond[at(3 * i)]);
+      continue;
+    }
     const auto pick = [](float x, Index n) {
       return std::min(static_cast<Index>(x * static_cast<float>(n)), n - 1);
     };
@@ -117,9 +128,11 @@ void Baker::choose_rays(Index chunk, Chunk& c) const {
     const float pixel[2] = {u[1] * static_cast<float>(camera.width) - 0.5f,
                             u[2] * static_cast<float>(camera.height) - 0.5f};
     c.rays.set(field_.space, i, camera, pixel);
-    c.jitter[at(i)] = u[3];
   }
 }
+
+// Number of the guide's turns up to a step, inclusive.
+Index Baker::turns_until(Index step) { return (step + 1) / kReadEvery; }
 
 // Takes the pixels of a view in their order; a last chunk repeats the last pixel.
 void Baker::take_pixels(const CachedView& view, Index chunk, Chunk& c) const {
@@ -189,9 +202,9 @@ void Baker::set_target(Chunk& c) const {
 
 // Raises the emphasis while the learnt change has less power than the mark, else lowers it. Networks are not
 // linear, so scaling in scale_to() costs bits.
-void Baker::update_emphasis(std::span<const Chunk> chunks) {
+void Baker::update_emphasis() {
   double asked = 0, learnt = 0;
-  for (const Chunk& c : chunks) {
+  for (const Chunk& c : chunks_) {
     asked += c.asked;
     learnt += c.learnt;
   }
@@ -213,9 +226,8 @@ Baker::Learnt Baker::learnt_colours(Tape<float>& tape, Chunk& c, float* grads) c
                             tape.constant(c.of_direction.data(), {n, net.direction_width()}))};
 }
 
-// Adds the gradients of a chunk that has its target. `shift` is what its rays should show beyond that, or
-// null.
-double Baker::learn(Chunk& c, Tape<float>& tape, float* grads, const float* shift) {
+// Adds the gradients of a chunk that has its target.
+double Baker::learn(Chunk& c, Tape<float>& tape, float* grads) {
   const nerf::Field<float>& net = field_.field;
   const Index n = c.samples;
   c.dfeatures.resize(at(2 * n * net.colour_width()));
@@ -229,10 +241,7 @@ double Baker::learn(Chunk& c, Tape<float>& tape, float* grads, const float* shif
   const Var<float> target = tape.constant(c.target.data(), {n, 3});
   const Var<float> of_samples = mse_loss<float>(rgb, target, std::span<const float>(weights, at(3 * n)));
   const Var<float> seen = weighted_segments<float>(sub(rgb, target), c.begin, c.weight);
-  float* beyond = tape.scratch(3 * kRays);
-  std::fill_n(beyond, 3 * kRays, 0.f);
-  if (shift) std::copy_n(shift, 3 * kRays, beyond);
-  const Var<float> of_rays = mse_loss<float>(seen, tape.constant(beyond, {kRays, 3}));
+  const Var<float> of_rays = mse_loss<float>(seen, tape.constant(c.beyond.data(), {kRays, 3}));
   const double error = power_on_rays(c.begin, c.weight, rgb.value(), c.marked.data());
   tape.backward(add(of_rays, scale(of_samples, kOfSamples)));
   if (net.has_table()) net.encoding().deal_to_levels(n, nullptr, features.grad(), c.dfeatures.data());
@@ -243,73 +252,57 @@ std::span<float> Baker::network_grads() {
   return field_.params.grads().first(at(field_.field.network_size()));
 }
 
-void Baker::backward_table(std::span<const Chunk> chunks) {
+void Baker::backward_table() {
   const nerf::HashEncoding<float>& encoding = field_.field.encoding();
   parallel_for(encoding.levels(), 1, [&](Index level, Index) {
-    for (const Chunk& c : chunks)
+    for (const Chunk& c : chunks_)
       encoding.backward_level(static_cast<int>(level), c.position.data(), c.samples,
                               c.dfeatures.data() + level * c.samples * 2 * encoding.features(),
                               field_.params.grads(encoding.table()));
   });
 }
 
-// Learns from random rays. Returns the errors of all chunks.
-double Baker::take_rays(std::span<Chunk> chunks) {
-  return loop_.run(
-      std::ssize(chunks),
-      [&](Index i, Index shard, Tape<float>& tape, float* grads) {
-        Chunk& c = chunks[at(i)];
-        choose_rays(i, c);
-        sample(shard, tape, c);
-        set_target(c);
-        return learn(c, tape, grads, nullptr);
-      },
-      network_grads());
-}
-
-// Learns from all rays of one view, whose targets the extractor's reading of what they show shifts. Returns
-// the errors of all chunks.
-double Baker::take_view(const CachedView& view, std::span<Chunk> chunks) {
-  for (auto* seen : {&change_, &asked_}) seen->assign(3 * chunks.size() * at(kRays), 0.f);
+// Lets the guide read what the field shows of a view so far.
+void Baker::read_view(Index turn) {
+  const CachedView& view = guide_->view(turn);
+  const Index pixels = view.height * view.width, count = (pixels + kRays - 1) / kRays;
+  for (auto* seen : {&change_, &asked_}) seen->assign(at(3 * count * kRays), 0.f);
   loop_.run(
-      std::ssize(chunks),
+      count,
       [&](Index i, Index shard, Tape<float>& tape, float*) {
-        Chunk& c = chunks[at(i)];
+        Chunk& c = chunks_[at(shard)];
         take_pixels(view, i, c);
         sample(shard, tape, c);
         set_target(c);
         if (c.samples == 0) return 0.;
-        const auto change = [&](const float* colours, std::vector<float>& seen) {
+        const auto keep_change = [&](const float* colours, std::vector<float>& seen) {
           change_on_rays(c.begin, c.weight, colours, c.unmarked.data(), &seen[at(3 * i * kRays)]);
         };
-        change(learnt_colours(tape, c, nullptr).rgb.value(), change_);
-        change(c.marked.data(), asked_);
+        keep_change(learnt_colours(tape, c, nullptr).rgb.value(), change_);
+        keep_change(c.marked.data(), asked_);
         return 0.;
       },
       network_grads());
-  const std::size_t pixels = at(3 * view.height * view.width);
-  guide_->shifts(steps(), std::span(change_).first(pixels), std::span(asked_).first(pixels), shift_);
-  shift_.resize(change_.size(), 0.f);
-  return loop_.run(
-      std::ssize(chunks),
-      [&](Index i, Index, Tape<float>& tape, float* grads) {
-        return learn(chunks[at(i)], tape, grads, &shift_[at(3 * i * kRays)]);
-      },
-      network_grads());
+  guide_->read(turn, std::span(change_).first(at(3 * pixels)), std::span(asked_).first(at(3 * pixels)));
 }
 
 double Baker::take_step(double) {
-  const CachedView* view =
-      guide_ && steps() % kGuideEvery == kGuideEvery - 1 ? &guide_->view(steps()) : nullptr;
-  const Index count = view ? (view->height * view->width + kRays - 1) / kRays : chunks_per_step_;
-  if (count > std::ssize(chunks_)) chunks_.resize(at(count));
-  const std::span<Chunk> chunks = std::span(chunks_).first(at(count));
-  const double loss = view ? take_view(*view, chunks) : take_rays(chunks);
-  if (field_.field.has_table()) backward_table(chunks);
+  if (guide_ && steps() % kReadEvery == kReadEvery - 1) read_view(turns_until(steps()) - 1);
+  const double loss = loop_.run(
+      std::ssize(chunks_),
+      [&](Index i, Index shard, Tape<float>& tape, float* grads) {
+        Chunk& c = chunks_[at(i)];
+        choose_rays(i, c);
+        sample(shard, tape, c);
+        set_target(c);
+        return learn(c, tape, grads);
+      },
+      network_grads());
+  if (field_.field.has_table()) backward_table();
   update();
   // Other scenes learn the whole mark: fern shows it to 0.1 dB after 780 steps.
-  if (owner_.mark().has_gain() && is_object_of_hash(field_) && !view) update_emphasis(chunks);
-  return loss / static_cast<double>(count);
+  if (owner_.mark().has_gain() && is_object_of_hash(field_)) update_emphasis();
+  return loss / static_cast<double>(chunks_.size());
 }
 
 void Baker::describe(RunFingerprint& f) const {

@@ -28,20 +28,19 @@ DistortedViews::DistortedViews(const Owner& owner, std::span<const CachedView> v
       noise_rng_(seed, 13),
       shift_rng_(seed, 14) {}
 
-Index DistortedViews::view(Index step, Index image) const {
+TrainingImage DistortedViews::draw(Index step, Index image, Tape<float>& tape) const {
   const float u =
       choice_rng_.uniform4(static_cast<std::uint64_t>(step), 8 * static_cast<std::uint64_t>(image))[0];
   const Index views = std::ssize(views_);
-  return std::min(static_cast<Index>(u * static_cast<float>(views)), views - 1);
+  return draw_of(std::min(static_cast<Index>(u * static_cast<float>(views)), views - 1), step, image, tape);
 }
 
-TrainingImage DistortedViews::draw(Index step, Index image, Tape<float>& tape) const {
+TrainingImage DistortedViews::draw_of(Index view, Index step, Index image, Tape<float>& tape) const {
   const EmbedDistortions& d = distortions_;
   const auto s = static_cast<std::uint64_t>(step), i = static_cast<std::uint64_t>(image);
   const auto u = [&](std::uint64_t k) { return choice_rng_.uniform4(s, 8 * i + k); };
   const auto a = u(0), b = u(1), c = u(2);
-  TrainingImage p{.step = step};
-  p.view = view(step, image);
+  TrainingImage p{.view = view, .step = step};
   const std::uint64_t place = this->place(step, image);
   const auto often = [](float x) { return x < 2.f / 3; };
   // Unless distortions are mixed, the whole batch takes one of none, rotation, zoom, blur and noise.

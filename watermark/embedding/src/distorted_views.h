@@ -10,10 +10,10 @@ class DistortedViews {
   // Owner and views must outlive the object. `batch` images a step have their own random numbers.
   DistortedViews(const Owner& owner, std::span<const CachedView> views, const EmbedDistortions& distortions,
                  Index batch, std::uint64_t seed);
-  // Draws the view of an image, as draw() does.
-  Index view(Index step, Index image) const;
   // Draws view, sample positions and distortions of an image; code, message and signs stay empty.
   TrainingImage draw(Index step, Index image, Tape<float>& tape) const;
+  // Draws the same for an image of a given view.
+  TrainingImage draw_of(Index view, Index step, Index image, Tape<float>& tape) const;
   // Index of an image in the run.
   std::uint64_t place(Index step, Index image) const {
     return static_cast<std::uint64_t>(step * batch_ + image);

@@ -33,18 +33,18 @@ ReadingGuide::ReadingGuide(const Owner& owner, const Message& message, Index vie
       training_(owner.mark().training(owner, views_)),
       code_(owner.code()),
       message_(message),
-      signs_(cell_signs(code_, message)) {}
+      signs_(cell_signs(code_, message)),
+      // All views have the size of the patch.
+      shifts_(at(3 * std::ssize(views_) * views_.front().height * views_.front().width)) {}
 
-const CachedView& ReadingGuide::view(Index step) const { return views_[at(drawn_.view(step, 0))]; }
-
-void ReadingGuide::shifts(Index step, std::span<const float> change, std::span<const float> asked,
-                          std::vector<float>& shift) {
+void ReadingGuide::read(Index turn, std::span<const float> change, std::span<const float> asked) {
   tape_.reset();
-  TrainingImage image = drawn_.draw(step, 0, tape_);
+  const Index index = turn % std::ssize(views_);
+  TrainingImage image = drawn_.draw_of(index, turn, 0, tape_);
   image.code = code_;
   image.message = message_;
   image.signs = signs_;
-  const CachedView& view = views_[at(image.view)];
+  const CachedView& view = views_[at(index)];
   std::vector<float> marked(change.begin(), change.end());
   for (std::size_t i = 0; i < marked.size(); ++i)
     marked[i] = std::clamp(marked[i] + view.base.data[i], 0.f, 1.f);
@@ -56,12 +56,25 @@ void ReadingGuide::shifts(Index step, std::span<const float> change, std::span<c
   const std::vector<float> foreground = foreground_mask(view);
   const float of_gradient = rms(gradient, foreground),
               push = static_cast<float>(strength_) * rms(asked, foreground);
-  shift.assign(marked.size(), 0.f);
+  const std::span<float> shift = std::span(shifts_).subspan(at(index) * marked.size(), marked.size());
+  std::ranges::fill(shift, 0.f);
   if (of_gradient == 0) return;
   const std::vector<float> flat = flatness(view, foreground);
   for (std::size_t i = 0; i < shift.size(); ++i)
     if (foreground[i / 3] > 0)
       shift[i] = -push * (1 - flat[i]) * std::clamp(gradient[i] / of_gradient, -kLargestPush, kLargestPush);
+}
+
+ReadingGuide::Pixel ReadingGuide::pick(std::span<const float, 3> u, Index turns) const {
+  const auto below = [](float x, Index n) {
+    return std::min(static_cast<Index>(x * static_cast<float>(n)), n - 1);
+  };
+  const Index index = below(u[0], std::min(turns, std::ssize(views_)));
+  const CachedView& view = views_[at(index)];
+  const Index x = below(u[1], view.width), y = below(u[2], view.height);
+  return {.camera = view.camera,
+          .place = {static_cast<float>(x), static_cast<float>(y)},
+          .shift = std::span(shifts_).subspan(at(3 * ((index * view.height + y) * view.width + x)), 3)};
 }
 
 }  // namespace fieldmark::watermark

@@ -15,10 +15,10 @@ struct BakeOptions {
   ScheduleOptions schedule{.seconds = 45, .lr = 5e-2, .half_after = 4000, .cooldown = 0.6, .last = 0.02};
   Index cameras = 400;      ///< novel cameras whose rays are used, >= 1
   Index around = 130;       ///< more in every direction for an object without surroundings (a cube), >= 0
-  Index guide_views = 200;  ///< views that guide, >= 1; no more than guided steps are used
+  Index guide_views = 200;  ///< views that guide, >= 1; no more than are read are used
   /// Strength eta with which the extractor's reading shifts what rays show, times the mark's RMS, >= 0. Only
   /// objects of hash fields whose mark has cells are guided.
-  double guidance = 1;
+  double guidance = 2;
   std::uint64_t seed = 0;  ///< of cameras, rays and views
 };
 
@@ -31,11 +31,11 @@ struct BakeOptions {
 /// compensating each other. Two things are for objects of hash fields only:
 /// - The emphasis f starts at 1. It rises while the learnt change has less power on rays than the mark, noise
 ///   included, and falls while it has more. It stays 1 for marks without a gain.
-/// - If the mark has cells, every second step is guided: its rays are the pixels of one view, and h_r leads
-///   what they show towards what the extractor reads better,
+/// - If the mark has cells, the extractor reads one view of the field so far at every sixth step. Half of the
+///   rays are pixels of views that it has read, and h_r leads what they show towards what it reads better,
 ///     h = -eta rho (1 - flatness) max(-3, min(3, g / rms(g))),   g = dL / dimage,
 ///   with the reading loss L of the view, distorted as in embedding (MarkTraining::reading_loss()), and the
-///   RMS rho of the mark in it. Elsewhere h_r = 0.
+///   RMS rho of the mark in it. For other rays h_r = 0.
 /// Only the colour network and the colour features of the table move; everything that density depends on
 /// keeps its bytes. The result has the tensor names, shapes and metadata of the unmarked field, and holds
 /// neither network, extractor, key nor message.
@@ -86,12 +86,12 @@ class Baker final : public TrainingRun {
   void sample(Index shard, Tape<float>& tape, Chunk& c);
   void set_target(Chunk& c) const;
   Learnt learnt_colours(Tape<float>& tape, Chunk& c, float* grads) const;
-  double learn(Chunk& c, Tape<float>& tape, float* grads, const float* shift);
-  double take_rays(std::span<Chunk> chunks);
-  double take_view(const CachedView& view, std::span<Chunk> chunks);
+  double learn(Chunk& c, Tape<float>& tape, float* grads);
+  static Index turns_until(Index step);
+  void read_view(Index turn);
   std::span<float> network_grads();
-  void update_emphasis(std::span<const Chunk> chunks);
-  void backward_table(std::span<const Chunk> chunks);
+  void update_emphasis();
+  void backward_table();
   void set_scale(double scale, std::span<const float> learnt);
 
   const Owner& owner_;
@@ -102,12 +102,11 @@ class Baker final : public TrainingRun {
   std::vector<nerf::Camera> cameras_;
   nerf::Renderer::Recolour marking_;
   ShardedLoop<float> loop_;
-  Index chunks_per_step_ = 0;
-  std::vector<Chunk> chunks_;
+  std::vector<Chunk> chunks_;  // of rays of a step
   std::vector<nerf::FieldSampler> samplers_;
   std::vector<nerf::RaySamples> samples_;
-  std::unique_ptr<ReadingGuide> guide_;        // null: none
-  std::vector<float> change_, asked_, shift_;  // [pixels, 3] of a guided step's view
+  std::unique_ptr<ReadingGuide> guide_;  // null: none
+  std::vector<float> change_, asked_;    // [pixels, 3] of the view that the guide reads
   double emphasis_ = 1;
 };
 
