@@ -39,6 +39,7 @@ constexpr Index kSamples = 4;          // per ray
 constexpr Index kLargest = 512;        // longer side at which evidence is taken, pixels
 constexpr double kFarFromLeast = 1.2;  // of the least residual: beyond, the search for a blur ends
 constexpr double kBlurs[] = {0, 0.4, 0.6, 0.8, 1, 1.25, 1.5, 2, 2.5, 3};  // standard deviations tried, pixels
+constexpr int kTonePasses = 3;
 constexpr double kAround = 4;           // standard deviation of the window for the local power, pixels
 constexpr float kLeastNoise = 1.2e-6f;  // variance of rounding to 8 bits
 
@@ -72,6 +73,10 @@ Shown shown(const Tensor<float>& image, const Tensor<float>& base, const std::ve
     else if (s.left > kFarFromLeast * best.left)
       break;
   }
+  RobustTones fit = fit_tones_robustly(blurred(base, best.blur), image, object, kTonePasses);
+  best.tones = fit.tones;
+  best.render = std::move(fit.toned);
+  for (std::size_t i = 0; i < fit.rest.size(); ++i) best.rest.data[i] = static_cast<float>(fit.rest[i]);
   return best;
 }
 

@@ -18,10 +18,9 @@ namespace fieldmark::watermark {
 namespace {
 
 constexpr Index kParameters = 10;
-constexpr double kCauchy = 2.385;      // deviations at which a residual has half the weight (95% efficiency)
-constexpr double kLeastSpread = 2e-3;  // of residuals: half a grey level
-constexpr double kStill = 0.05;        // pixels: a smaller motion ends the stage
-constexpr double kNear = 0.3;          // pixels: a smaller motion that does not reduce the cost ends it, too
+constexpr int kTonePasses = 2;
+constexpr double kStill = 0.05;  // pixels: a smaller motion ends the stage
+constexpr double kNear = 0.3;    // pixels: a smaller motion that does not reduce the cost ends it, too
 constexpr int kMostFailures = 3;
 constexpr double kOverRelaxation = 1.5;  // reweighting overestimates the curvature: steps fall short
 constexpr double kDamping = 1e-3;
@@ -115,27 +114,10 @@ class Stage {
   void compare(Look& l) const {
     std::vector<double> weight(l.seen.size());
     for (std::size_t p = 0; p < weight.size(); ++p) weight[p] = l.seen[p] >= 0 ? 1 : 0;
-    std::vector<double>& r = l.rest;
-    r.resize(3 * weight.size());
-    std::vector<double> sizes;
-    sizes.reserve(r.size());
-    for (int pass = 0; pass < 2; ++pass) {
-      l.toned = fit_tones(l.render, image_, weight)(l.render);
-      sizes.clear();
-      for (std::size_t i = 0; i < r.size(); ++i) {
-        r[i] = static_cast<double>(image_.data[i]) - static_cast<double>(l.toned.data[i]);
-        if (l.seen[i / 3] >= 0) sizes.push_back(std::abs(r[i]));
-      }
-      if (sizes.empty()) return;
-      const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-      std::nth_element(sizes.begin(), middle, sizes.end());
-      l.spread = std::max(kLeastSpread, 1.4826 * *middle);
-      for (std::size_t p = 0; p < weight.size(); ++p)
-        if (weight[p] > 0) {
-          const double d2 = r[3 * p] * r[3 * p] + r[3 * p + 1] * r[3 * p + 1] + r[3 * p + 2] * r[3 * p + 2];
-          weight[p] = 1 / (1 + d2 / (3 * std::pow(kCauchy * l.spread, 2)));
-        }
-    }
+    RobustTones fit = fit_tones_robustly(l.render, image_, weight, kTonePasses);
+    l.toned = std::move(fit.toned);
+    l.rest = std::move(fit.rest);
+    l.spread = fit.spread;
   }
 
   // Returns the mean cost of the residuals, NaN if the look sees nothing. Costs are comparable only under
