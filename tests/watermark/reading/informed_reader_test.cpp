@@ -116,7 +116,7 @@ Tensor<float> before(const Owner& owner, const nerf::Camera& camera, const std::
   return quantize8(image);
 }
 
-TEST_CASE("informed_reader: other backgrounds, bars, mirror, stretch and hue do not hide the mark") {
+TEST_CASE("informed_reader: other backgrounds, bars, mirror, stretch, caption and hue do not hide the mark") {
   const Owner owner = marking_owner();
   InformedReader reader(owner, kSearch);
   const nerf::Camera camera = camera_near(4);
@@ -132,6 +132,7 @@ TEST_CASE("informed_reader: other backgrounds, bars, mirror, stretch and hue do 
                                     {"green", before(owner, camera, {0.1f, 0.8f, 0.2f})},
                                     {"bars", barred},
                                     {"stretch", distorted("stretch_1.5", view)},
+                                    {"caption", distorted("caption", view)},
                                     {"hue", distorted("hue_180", view)},
                                     {"mirror", mirrored}}) {
     CAPTURE(name);
@@ -140,18 +141,18 @@ TEST_CASE("informed_reader: other backgrounds, bars, mirror, stretch and hue do 
     CHECK(reading.chosen == ReadingKind::informed);
     CHECK(reading.mirrored == (std::string(name) == "mirror"));
     CHECK(read_bits(reading.evidence(), owner.code(), 4).message == kReadMessage);
-    CHECK(keyed_p_value(keyed_statistic(reading.evidence(), owner.code(), kReadMessage)) < 1e-4);
+    // A caption over the middle of a view hides most of its cells.
+    const double most = std::string(name) == "caption" ? 0.1 : 1e-4;
+    CHECK(keyed_p_value(keyed_statistic(reading.evidence(), owner.code(), kReadMessage)) < most);
   }
 }
 
-// The caption of `distort` hides most cells of so small a view; a band of the width leaves enough of them.
-TEST_CASE("informed_reader: views under captions are aligned, and the mark is read beside a band") {
+TEST_CASE("informed_reader: the mark is read beside a dark band across the view") {
   const Owner owner = marking_owner();
   InformedReader reader(owner, kSearch);
   for (const int place : {4, 5, 6}) {
     const Tensor<float> view = image_of(owner, camera_near(place), true);
     CAPTURE(place);
-    CHECK(reader.read(distorted("caption", view)).chosen == ReadingKind::informed);
     Tensor<float> barred = view;
     for (Index y = 60; y < 70; ++y)
       for (Index x = 0; x < 96; ++x)

@@ -93,7 +93,7 @@ TEST_CASE("pose_alignment: images of something else do not agree") {
   const nerf::Camera camera = aligned_camera(5);
   CHECK(align(uniform<float>({64, 64, 3}, 0, 1, 3), camera).agreement < 0.3);
   // The scene from another side.
-  CHECK(align(image_of(aligned_camera(6)), camera).agreement < 0.8);  // 0.85 is trusted
+  CHECK(align(image_of(aligned_camera(6)), camera).agreement < 0.75);
   CHECK(align(Tensor<float>({64, 64, 3}, 1), camera).agreement < 0.1);
   nerf::Camera away = camera;
   for (std::size_t k : {2u, 6u, 10u}) away.pose[k] *= -1;

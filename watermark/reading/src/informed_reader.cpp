@@ -39,7 +39,7 @@ constexpr Index kSamples = 4;          // per ray
 constexpr Index kLargest = 512;        // longer side at which evidence is taken, pixels
 constexpr double kFarFromLeast = 1.2;  // of the least residual: beyond, the search for a blur ends
 constexpr double kBlurs[] = {0, 0.4, 0.6, 0.8, 1, 1.25, 1.5, 2, 2.5, 3};  // standard deviations tried, pixels
-constexpr int kTonePasses = 3;
+constexpr int kTonePasses = 2;
 constexpr double kAround = 4;           // standard deviation of the window for the local power, pixels
 constexpr float kLeastNoise = 1.2e-6f;  // variance of rounding to 8 bits
 

@@ -19,8 +19,9 @@ namespace {
 
 constexpr Index kParameters = 10;
 constexpr int kTonePasses = 2;
-constexpr double kStill = 0.05;  // pixels: a smaller motion ends the stage
-constexpr double kNear = 0.3;    // pixels: a smaller motion that does not reduce the cost ends it, too
+constexpr double kToneHold = 1e-4;  // tones that bend more make wrong views agree
+constexpr double kStill = 0.05;     // pixels: a smaller motion ends the stage
+constexpr double kNear = 0.3;       // pixels: a smaller motion that does not reduce the cost ends it, too
 constexpr int kMostFailures = 3;
 constexpr double kOverRelaxation = 1.5;  // reweighting overestimates the curvature: steps fall short
 constexpr double kDamping = 1e-3;
@@ -114,7 +115,7 @@ class Stage {
   void compare(Look& l) const {
     std::vector<double> weight(l.seen.size());
     for (std::size_t p = 0; p < weight.size(); ++p) weight[p] = l.seen[p] >= 0 ? 1 : 0;
-    RobustTones fit = fit_tones_robustly(l.render, image_, weight, kTonePasses);
+    RobustTones fit = fit_tones_robustly(l.render, image_, weight, kTonePasses, kToneHold);
     l.toned = std::move(fit.toned);
     l.rest = std::move(fit.rest);
     l.spread = fit.spread;

@@ -10,7 +10,6 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr double kHold = 1e-6;         // weight of the identity, relative to all pixels
 constexpr double kDark = 0.02;         // the slope of v ln v diverges at 0
 constexpr double kLeastSpread = 2e-3;  // half a grey level
 constexpr int kMax = 4, kMin = 5, kBent = 6, kSquare = 7;
@@ -71,12 +70,12 @@ struct Sums {
     return *this;
   }
 
-  ToneVector solve(std::size_t channel) const {
+  ToneVector solve(std::size_t channel, double hold) const {
     ToneMatrix normal;
     normal.topLeftCorner<kBent, kBent>() = shared.selfadjointView<Eigen::Lower>();
     normal.rightCols<2>() = own[channel];
     normal.bottomRows<2>() = own[channel].transpose();
-    normal.diagonal().array() += kHold * total;
+    normal.diagonal().array() += hold * total;
     return normal.ldlt().solve(changes[channel]);
   }
 };
@@ -119,7 +118,8 @@ Tensor<float> ToneFit::operator()(const Tensor<float>& image) const {
   return out;
 }
 
-ToneFit fit_tones(const Tensor<float>& render, const Tensor<float>& image, std::span<const double> weight) {
+ToneFit fit_tones(const Tensor<float>& render, const Tensor<float>& image, std::span<const double> weight,
+                  double hold) {
   check_rank("fit_tones", "render", render.shape, 3, "[H, W, 3]");
   check_extent("fit_tones", "render", render.shape, 2, 3, "red, green, blue");
   if (image.shape != render.shape || std::ssize(weight) * 3 != render.size())
@@ -133,20 +133,20 @@ ToneFit fit_tones(const Tensor<float>& render, const Tensor<float>& image, std::
   ToneFit fit;
   if (!(sums.total > 0)) return fit;
   for (std::size_t c = 0; c < 3; ++c) {
-    const ToneVector change = sums.solve(c);
+    const ToneVector change = sums.solve(c, hold);
     for (std::size_t k = 0; k < ToneFit::kTerms; ++k) fit.terms[c][k] += change[static_cast<int>(k)];
   }
   return fit;
 }
 
 RobustTones fit_tones_robustly(const Tensor<float>& render, const Tensor<float>& image,
-                               const std::vector<double>& weight, int passes) {
+                               const std::vector<double>& weight, int passes, double hold) {
   RobustTones out;
   std::vector<double> weights = weight, sizes, &r = out.rest;
   r.resize(3 * weight.size());
   sizes.reserve(r.size());
   for (int pass = 0; pass < passes; ++pass) {
-    out.tones = fit_tones(render, image, weights);
+    out.tones = fit_tones(render, image, weights, hold);
     out.toned = out.tones(render);
     sizes.clear();
     for (std::size_t i = 0; i < r.size(); ++i) {

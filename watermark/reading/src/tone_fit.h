@@ -25,11 +25,13 @@ struct ToneFit {
   Tensor<float> operator()(const Tensor<float>& image) const;
 };
 
-/// Fits the terms by weighted least squares, regularised towards the identity with a millionth of the
-/// pixels' weight, so that a constant render keeps its gain.
+/// Fits the terms by weighted least squares, regularised towards the identity, so that a constant render
+/// keeps its gain.
 /// @param render, image  [H, W, 3] in [0, 1]   @param weight  [H W] >= 0; all 0 gives the identity
+/// @param hold  weight of the identity relative to that of all pixels, > 0; more bends less
 /// @throws ShapeError if shapes differ
-ToneFit fit_tones(const Tensor<float>& render, const Tensor<float>& image, std::span<const double> weight);
+ToneFit fit_tones(const Tensor<float>& render, const Tensor<float>& image, std::span<const double> weight,
+                  double hold = 1e-6);
 
 /// Deviations at which a residual has half the weight: 95% efficiency for Gaussian residuals.
 inline constexpr double kCauchy = 2.385;
@@ -47,6 +49,6 @@ struct RobustTones {
 /// @param passes  >= 1   @param weight  [H W] 0 or 1; all 0 gives the identity and no spread
 /// @throws ShapeError as fit_tones()
 RobustTones fit_tones_robustly(const Tensor<float>& render, const Tensor<float>& image,
-                               const std::vector<double>& weight, int passes);
+                               const std::vector<double>& weight, int passes, double hold = 1e-6);
 
 }  // namespace fieldmark::watermark
