@@ -55,13 +55,14 @@ def train(data: Path, *, seconds: Optional[float] = None, steps: Optional[int] =
 
 
 def embed(field: Field, key: Key, *, bits: int = 16, seconds: Optional[float] = None,
-          steps: Optional[int] = None, mark_psnr: float = 36.5, views: int = 200, seed: int = 0,
+          steps: Optional[int] = None, mark_psnr: Optional[float] = None, views: int = 200, seed: int = 0,
           progress: Optional[Progress] = None) -> Owner:
     """Trains a mark and its extractor for a field.
 
     :param bits: length of messages, 1 to 256
     :param seconds: length of the training; 300 by default
-    :param mark_psnr: of marked to unmarked renders in dB, 20 to 60; higher is fainter
+    :param mark_psnr: of marked to unmarked renders in dB, 20 to 60; higher is fainter; 36.5 by default, for
+        objects with flat surfaces up to 40
     :param views: cameras that the mark is learnt from
     """
     length = _length(seconds, steps, 300)

@@ -12,6 +12,8 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <optional>
+
 #include "field_handle.h"
 
 namespace fieldmark::python {
@@ -44,16 +46,16 @@ std::vector<double> evidence_of(const Owner& owner, const std::vector<py::object
 }
 
 std::shared_ptr<Owner> embed(std::shared_ptr<nerf::RadianceField> field, const Key& key, Index bits,
-                             double seconds, Index steps, double mark_psnr, Index views, std::uint64_t seed,
-                             const py::object& progress) {
+                             double seconds, Index steps, std::optional<double> mark_psnr, Index views,
+                             std::uint64_t seed, const py::object& progress) {
   watermark::EmbedRecipe recipe = watermark::embed_recipe("fast");
   recipe.suit(*field);
   recipe.owner.bits = bits;
-  recipe.owner.mark_psnr = mark_psnr;
   recipe.owner.seed = recipe.embed.seed = seed;
   recipe.embed.schedule.seconds = seconds;
   recipe.embed.schedule.steps = steps;
   const auto cached = watermark::cache_embed_views(*field, recipe.owner.patch(), {.count = views}, seed, {});
+  recipe.owner.mark_psnr = mark_psnr ? *mark_psnr : watermark::mark_psnr_for(cached, field->space.kind);
   auto owner = std::make_shared<Owner>(recipe.make(*field, key, cached));
   watermark::Embedder embedder(*owner, cached, recipe.embed);
   run(embedder, progress);

@@ -100,6 +100,15 @@ watermark::EmbedRecipe recipe_of(const EmbedArguments& options, const nerf::Radi
   return recipe;
 }
 
+double suitable_mark_psnr(std::span<const watermark::CachedView> views, const nerf::RadianceField& field,
+                          Context& context) {
+  const double db = watermark::mark_psnr_for(views, field.space.kind);
+  char line[48];
+  std::snprintf(line, sizeof line, "mark PSNR %.1f dB, for this scene\n", db);
+  context.text() << line;
+  return db;
+}
+
 void say_cells(const watermark::Owner& owner, std::span<const watermark::CachedView> views,
                Context& context) {
   const Index side = owner.cells.side(), bits = owner.options().bits;
@@ -145,8 +154,10 @@ int run_embed(const EmbedArguments& options, Context& context) {
         "blurred), " +
         options.field + " has space " + nerf::name_of(field.space.kind));
   const auto key = key_of(options, checkpoint);
-  const auto recipe = recipe_of(options, field, context.seed());
+  auto recipe = recipe_of(options, field, context.seed());
   const auto views = cached_views(options, field, recipe.owner.patch(), context);
+  if (options.preset == "fast" && options.mark_psnr == 0)
+    recipe.owner.mark_psnr = suitable_mark_psnr(views, field, context);
   auto owner = recipe.make(field, key, views);
   if (owner.mark().has_cells() && options.cells == 0) say_cells(owner, views, context);
   watermark::Embedder embedder(owner, views, recipe.embed);
@@ -239,7 +250,8 @@ Command add_embed(CommandLine& app) {
       ->type_name("NAME");
   app.add_option(
          "--mark-psnr", o->mark_psnr,
-         "Mark PSNR on the foreground in dB, 20 to 60; higher is fainter; default: 36.5; for preset fast")
+         "Mark PSNR on the foreground in dB, 20 to 60; higher is fainter; default: 36.5, for objects with "
+         "flat surfaces up to 40; for preset fast")
       ->range(20.0, 60.0)
       ->type_name("DB")
       ->default_str("");

@@ -52,7 +52,8 @@ const std::map<std::string, Differs> kChoices{
     {"hiding",
      [](const EmbedVariant& a, const EmbedVariant& b) {
        const auto off = [](const EmbedVariant& v) {
-         return cell(v).training.smooth_weight + cell(v).training.flat_weight == 0;
+         const auto& t = cell(v).training;
+         return t.smooth_weight + t.flat_weight + t.peak_weight == 0;
        };
        return off(a) != off(b);
      }},

@@ -235,6 +235,8 @@ TEST_CASE("embedder: a checkpoint of other weights, distortions or step sizes is
                               {{.anneal = 20, .bits_weight = 2}, "bits_weight 2"},
                               {{.anneal = 20, .smooth_weight = 2}, "smooth_weight 2"},
                               {{.anneal = 20, .flat_weight = 2}, "flat_weight 2"},
+                              {{.anneal = 20, .peak = 2}, "peak 2"},
+                              {{.anneal = 20, .peak_weight = 2}, "peak_weight 2"},
                               {{.anneal = 20, .matrix_rate = 2}, "matrix_rate 2"}};
   const TemporaryFolder folder;
   const auto path = folder / "checkpoint";

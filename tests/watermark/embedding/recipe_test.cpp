@@ -1,5 +1,9 @@
 #include <fieldmark/core/error.h>
 #include <fieldmark/watermark/embedding/recipe.h>
+#include <fieldmark/watermark/mark/flatness.h>
+
+#include <algorithm>
+#include <cmath>
 
 #include "support/catch.h"
 #include "watermark/tiny_owner.h"
@@ -21,6 +25,19 @@ TEST_CASE("recipe: what suits a scene") {
   CHECK(batch_for(nerf::SpaceKind::cube) == EmbedOptions{}.batch);
   CHECK(batch_for(nerf::SpaceKind::ndc) == EmbedOptions{}.batch);
   CHECK(batch_for(nerf::SpaceKind::contracted) == 2);
+}
+
+TEST_CASE("recipe: an object's flat share gets no power of its own, within a limit") {
+  using enum nerf::SpaceKind;
+  const double usual = OwnerOptions{}.mark_psnr, flat = flat_share(tiny_views());
+  REQUIRE((flat > 0.01 && flat < 0.5));
+  CHECK(mark_psnr_for(tiny_views(), cube) == Approx(usual - 10 * std::log10(1 - flat)).epsilon(1e-9));
+  CHECK(mark_psnr_for(tiny_views(), ndc) == usual);
+  CHECK(mark_psnr_for(tiny_views(), contracted) == usual);
+  CHECK(mark_psnr_for({}, cube) == usual);
+  auto plain = tiny_views();
+  for (auto& view : plain) std::ranges::fill(view.base.data, 0.5f);
+  CHECK(mark_psnr_for(plain, cube) == 40);
 }
 
 TEST_CASE("recipe: blue is the default, light is smooth, tilted and shaded") {

@@ -7,6 +7,22 @@
 using namespace fieldmark;
 using namespace fieldmark::watermark;
 
+TEST_CASE("flatness: the flat share of views is the mean over what they show") {
+  CachedView plain, striped, empty;
+  for (CachedView* v : {&plain, &striped, &empty}) {
+    v->height = v->width = 16;
+    v->base = Tensor<float>({16, 16, 3}, 0.5f);
+    v->opacity = Tensor<float>({16, 16}, v == &empty ? 0.f : 1.f);
+    for (std::int32_t p = 0; p <= 256; ++p) v->sample_begin.push_back(v == &empty ? 0 : p);
+  }
+  for (Index p = 0; p < 256; p += 2) striped.base[3 * p + 1] = 1;
+  CHECK(flat_share(std::vector{plain}) == Approx(1).epsilon(1e-6));
+  CHECK(flat_share(std::vector{striped}) == Approx(0).margin(1e-6));
+  CHECK(flat_share(std::vector{plain, striped, empty}) == Approx(0.5).epsilon(1e-6));
+  CHECK(flat_share(std::vector{empty}) == 0);
+  CHECK(flat_share({}) == 0);
+}
+
 TEST_CASE("flatness: 1 on a plain surface, small across an edge, 0 outside the foreground") {
   CachedView view;
   view.height = view.width = 16;

@@ -99,7 +99,8 @@ void marks(Variants& all, MarkColours colours) {
     all.vary("budget", "annealed over " + std::to_string(steps) + " steps",
              [=](EmbedVariant& v) { v.recipe.cell().training.anneal = steps; });
   all.vary("hiding", "off", [](EmbedVariant& v) {
-    v.recipe.cell().training.smooth_weight = v.recipe.cell().training.flat_weight = 0;
+    auto& training = v.recipe.cell().training;
+    training.smooth_weight = training.flat_weight = training.peak_weight = 0;
   });
   for (const MarkColours other : {MarkColours::blue, MarkColours::light, MarkColours::mixed})
     if (other != colours)

@@ -1,10 +1,15 @@
 #include <fieldmark/watermark/embedding/embed_views.h>
 #include <fieldmark/watermark/embedding/recipe.h>
+#include <fieldmark/watermark/mark/flatness.h>
+
+#include <algorithm>
+#include <cmath>
 
 namespace fieldmark::watermark {
 namespace {
 
 constexpr double kSpacing = 1.7320508 / 420;  // of samples by default, cube sides
+constexpr double kFaintest = 40;              // mark PSNR by default, dB
 constexpr Index kPaperPatch = 80;             // pixels
 constexpr Index kPaperBatch = 8;              // images per step, whose statistics normalise the extractor
 
@@ -41,6 +46,12 @@ void use_colours(MarkColours colours, CellMarkOptions& mark) {
   mark.network.shading = light ? 0.97 : usual.network.shading;
   mark.training.smooth_weight = light ? 0 : usual.training.smooth_weight;  // light is smooth
   mark.training.flat_weight = light ? 0.8 : usual.training.flat_weight;    // and most visible on walls
+}
+
+double mark_psnr_for(std::span<const CachedView> views, nerf::SpaceKind space) {
+  const double usual = OwnerOptions{}.mark_psnr;
+  if (space != nerf::SpaceKind::cube) return usual;
+  return std::min(usual - 10 * std::log10(1 - flat_share(views)), kFaintest);
 }
 
 Index batch_for(nerf::SpaceKind space) {

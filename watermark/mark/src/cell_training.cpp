@@ -1,5 +1,6 @@
 #include <fieldmark/distort/affine_warp.h>
 #include <fieldmark/distort/resize_area.h>
+#include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/loss.h>
 #include <fieldmark/engine/ops/pool.h>
@@ -33,6 +34,14 @@ std::span<const float> code_matrix(Tape<float>& tape, const CellCode& code, Inde
   for (Index c = 0; c < cells; ++c)
     if (code.bit[at(c)] >= 0) matrix[c * bits + code.bit[at(c)]] = static_cast<float>(code.sign[at(c)]);
   return {matrix, at(cells * bits)};
+}
+
+// Returns by how much |x| exceeds a bound, 0 within it.
+Var<float> beyond(Var<float> x, double bound) {
+  float* table = x.tape().scratch(x.shape().size());
+  std::fill_n(table, x.shape().size(), static_cast<float>(-bound));
+  const Var<float> below = x.tape().constant(table, x.shape());
+  return add(relu(add(x, below)), relu(sub(below, x)));
 }
 
 class CellTraining : public MarkTraining {
@@ -98,7 +107,9 @@ Var<float> CellTraining::residual(Tape<float>& tape, const Params<float>& params
 }
 
 // Returns the shares of the residual's power that the eye would see: the power that remains after averaging,
-// and the power on flat areas. Both are about 1 for a mark that does not adapt.
+// the power on flat areas, and the power of specks, which is what pixels have beyond a few times the RMS. The
+// first two are about 1 for a mark that does not adapt; without the third, all power would crowd into the few
+// pixels of a plain object that are not flat.
 Var<float> CellTraining::visibility(Var<float> residual, const TrainingImage& image, double right) const {
   Tape<float>& tape = residual.tape();
   const CachedView& v = views_[at(image.view)];
@@ -121,9 +132,13 @@ Var<float> CellTraining::visibility(Var<float> residual, const TrainingImage& im
                            j % kCoarse)];
     std::fill_n(weights + 3 * i, 3, sum);
   }
+  float* whole = tape.scratch(residual.shape().size());
+  for (Index i = 0; i < residual.shape().size(); ++i) whole[i] = foreground[at(i / 3)];
   const double ramp = std::clamp((right - kReadable) / (kSafe - kReadable), 0.0, 1.0);
-  return add(scale(power(coarse, {weights, at(3 * places)}), ramp * options_.smooth_weight),
-             scale(power(residual, flat_[at(image.view)]), ramp * options_.flat_weight));
+  const Var<float> seen = add(scale(power(coarse, {weights, at(3 * places)}), ramp * options_.smooth_weight),
+                              scale(power(residual, flat_[at(image.view)]), ramp * options_.flat_weight));
+  return add(seen, scale(power(beyond(residual, options_.peak * rms), {whole, at(residual.shape().size())}),
+                         ramp * options_.peak_weight));
 }
 
 // Returns the labels of the extractor's places, which move with the pixels of the distorted image.
@@ -208,6 +223,8 @@ void CellTraining::describe(RunFingerprint& f) const {
                                     {"bits_weight", options_.bits_weight},
                                     {"smooth_weight", options_.smooth_weight},
                                     {"flat_weight", options_.flat_weight},
+                                    {"peak", options_.peak},
+                                    {"peak_weight", options_.peak_weight},
                                     {"matrix_rate", options_.matrix_rate}})
     f.option(name, value);
 }

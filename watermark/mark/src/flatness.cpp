@@ -25,4 +25,16 @@ std::vector<float> flatness(const CachedView& v, const std::vector<float>& foreg
   return flat;
 }
 
+double flat_share(std::span<const CachedView> views) {
+  double flat = 0, shown = 0;
+  for (const CachedView& v : views) {
+    const std::vector<float> foreground = foreground_mask(v), here = flatness(v, foreground);
+    for (std::size_t p = 0; p < foreground.size(); ++p) {
+      flat += static_cast<double>(here[3 * p]);
+      shown += static_cast<double>(foreground[p]);
+    }
+  }
+  return shown > 0 ? flat / shown : 0;
+}
+
 }  // namespace fieldmark::watermark

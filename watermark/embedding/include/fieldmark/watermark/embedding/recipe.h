@@ -34,6 +34,11 @@ MarkColours colours_for(nerf::SpaceKind space);
 /// Sets bands, axes and shading of the network, and the loss weights against visibility.
 void use_colours(MarkColours colours, CellMarkOptions& mark);
 
+/// Returns the mark PSNR of preset fast that suits a scene, dB:
+///   min(P - 10 log10(1 - f), 40) for an object in a cube, else P,   P = 36.5
+/// A flat surface hides no mark, so the flat share f of an object gets no power of its own: see flat_share().
+double mark_psnr_for(std::span<const CachedView> views, nerf::SpaceKind space);
+
 /// Returns the images per step of preset fast: two where space is contracted, because thousands of cells need
 /// more steps; else four.
 Index batch_for(nerf::SpaceKind space);
