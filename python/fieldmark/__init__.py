@@ -61,8 +61,8 @@ def embed(field: Field, key: Key, *, bits: int = 16, seconds: Optional[float] = 
 
     :param bits: length of messages, 1 to 256
     :param seconds: length of the training; 300 by default
-    :param mark_psnr: of marked to unmarked renders in dB, 20 to 60; higher is fainter; 36.5 by default, for
-        objects with flat surfaces up to 40
+    :param mark_psnr: of marked to unmarked renders in dB, 20 to 60; higher is fainter; 36.5 by default, and
+        up to 40 for objects with flat surfaces
     :param views: cameras that the mark is learnt from
     """
     length = _length(seconds, steps, 300)

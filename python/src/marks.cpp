@@ -108,6 +108,7 @@ void bind_marks(py::module_& module) {
           "path"_a, "Reads an OWNER file.")
       .def("save", &Owner::save, "path"_a, "Writes an OWNER file; keep it secret.")
       .def_property_readonly("bits", [](const Owner& o) { return o.options().bits; })
+      .def_property_readonly("mark_psnr", [](const Owner& o) { return o.options().mark_psnr; })
       .def_property_readonly("key", [](const Owner& o) { return o.key; })
       .def("extract", &extract, "images"_a, "detection"_a = "auto",
            "Reads the message from images [height, width, 3] in [0, 1]: a dict with the message in "

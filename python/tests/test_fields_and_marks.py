@@ -47,6 +47,14 @@ def test_progress_is_told_and_may_stop_the_run(scene):
         fm.train(scene, steps=50, progress=stop)
 
 
+def test_the_mark_psnr_suits_the_scene_unless_given(field, owner):
+    assert 36.5 < owner.mark_psnr <= 40
+    given = fm.embed(field, fm.Key.random(), bits=4, steps=1, views=8, mark_psnr=33)
+    assert given.mark_psnr == 33
+    with pytest.raises(ValueError, match="mark_psnr must be 20 to 60 dB"):
+        fm.embed(field, fm.Key.random(), bits=4, steps=1, views=8, mark_psnr=0)
+
+
 def test_a_marked_field_is_read_and_its_evidence_bounded(owner, tmp_path):
     marked = fm.bake(owner, "a", steps=10)
     images = [marked.render(camera) for camera in marked.cameras(2, size=32)]

@@ -11,7 +11,7 @@ TEST_CASE("embed writes an owner, an image and the figures that scripts read", "
   const TinyJob& job = TinyJob::get();
   for (const char* key :
        {"bits", "views", "cameras", "baked", "accuracy", "accuracy_p5", "psnr_base", "psnr_base_foreground",
-        "ssim_base", "lpips_base", "psnr_gt", "distorted", "seconds", "steps", "cells"})
+        "ssim_base", "lpips_base", "psnr_gt", "distorted", "seconds", "steps", "cells", "mark_psnr"})
     CHECK(job.embedded.contains(key));
   CHECK(job.embedded["bits"] == 4);
   CHECK(job.embedded["views"] == 2);
@@ -21,6 +21,30 @@ TEST_CASE("embed writes an owner, an image and the figures that scripts read", "
   CHECK(job.embedded["distorted"]["blur_1"]["blind"].is_number());
   CHECK(std::filesystem::exists(job.owner + ".png"));
   CHECK(!std::filesystem::exists(job.owner + ".checkpoint"));
+}
+
+TEST_CASE("embed chooses the mark PSNR of an object, unless it is given", "[embed]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string owner = job.folder / "chosen.fm", json = job.folder / "chosen.json";
+  const auto embed = [&](const std::string& field, std::vector<std::string> more) {
+    std::filesystem::remove(owner);
+    more.insert(more.end(), {"--measured-views", "1", "--json", json});
+    const auto r = tiny_embed(field, owner, more);
+    INFO(r.err);
+    REQUIRE(r.code == cli::kOk);
+    return std::pair(nlohmann::json::parse(read_text(json))["mark_psnr"],
+                     r.out.find("chosen for this scene") != std::string::npos);
+  };
+  const double usual = watermark::OwnerOptions{}.mark_psnr;
+  const auto [chosen, said] = embed(job.field, {});
+  CHECK((chosen > usual && chosen <= 40));
+  CHECK(said);
+  CHECK(watermark::Owner::load(owner).options().mark_psnr == chosen);
+  CHECK(embed(job.field, {"--mark-psnr", "33"}) == std::pair(nlohmann::json(33.0), false));
+  auto open = nerf::RadianceField::load(job.field);
+  open.space.kind = nerf::SpaceKind::contracted;
+  open.save(job.folder / "unbounded.fm");
+  CHECK(embed(job.folder / "unbounded.fm", {}).first == usual);
 }
 
 TEST_CASE("embed gives the same bytes for the same seed and key", "[embed]") {

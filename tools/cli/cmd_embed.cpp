@@ -103,8 +103,8 @@ watermark::EmbedRecipe recipe_of(const EmbedArguments& options, const nerf::Radi
 double suitable_mark_psnr(std::span<const watermark::CachedView> views, const nerf::RadianceField& field,
                           Context& context) {
   const double db = watermark::mark_psnr_for(views, field.space.kind);
-  char line[48];
-  std::snprintf(line, sizeof line, "mark PSNR %.1f dB, for this scene\n", db);
+  char line[80];
+  std::snprintf(line, sizeof line, "mark PSNR %.1f dB, chosen for this scene (--mark-psnr)\n", db);
   context.text() << line;
   return db;
 }
@@ -190,6 +190,7 @@ int run_embed(const EmbedArguments& options, Context& context) {
   json["seconds"] = seconds;
   json["steps"] = embedder.steps();
   json["cells"] = owner.cells.side();
+  json["mark_psnr"] = owner.mark().has_gain() ? Json(owner.options().mark_psnr) : Json(nullptr);
   json["sha256"] = sha256;
   json["commitment"] = commitment;
   json["public_key"] = open;
@@ -250,8 +251,8 @@ Command add_embed(CommandLine& app) {
       ->type_name("NAME");
   app.add_option(
          "--mark-psnr", o->mark_psnr,
-         "Mark PSNR on the foreground in dB, 20 to 60; higher is fainter; default: 36.5, for objects with "
-         "flat surfaces up to 40; for preset fast")
+         "Mark PSNR on the foreground in dB, 20 to 60; higher is fainter; default: 36.5, and up to 40 "
+         "for objects with flat surfaces; for preset fast")
       ->range(20.0, 60.0)
       ->type_name("DB")
       ->default_str("");

@@ -19,21 +19,25 @@ CellTrainingOptions only_specks(double peak, double weight) {
 // Returns the message that the marked view carries.
 Message sent() { return {{1, 0, 0, 1}}; }
 
-// Returns the loss of one undistorted view while a share of the signs is read.
-double loss(const CellTrainingOptions& options, double right) {
-  const Owner owner = tiny_owner(kDb, options);
-  const auto training = owner.mark().training(owner, tiny_views());
+// Returns the loss of one undistorted view while a share of the signs is read, and adds its gradient.
+double loss(const Owner& owner, double right, float* grads = nullptr,
+            std::span<const CachedView> views = tiny_views()) {
+  const auto training = owner.mark().training(owner, views);
   Tape<float> tape;
   const TrainingImage image{.view = kView,
                             .code = owner.code(),
                             .message = sent(),
                             .signs = cell_signs(owner.code(), sent()),
-                            .positions = tiny_views()[kView].position.data(),
+                            .positions = views[kView].position.data(),
                             .distort = [](Var<float> x) { return x; }};
   TrainingFigures figures;
-  return static_cast<double>(
-      training->loss(tape, Params<float>(owner.params, nullptr), {&image, 1}, {.sign = right}, figures)
-          .value()[0]);
+  const auto out =
+      training->loss(tape, Params<float>(owner.params, grads), {&image, 1}, {.sign = right}, figures);
+  if (grads) tape.backward(out);
+  return static_cast<double>(out.value()[0]);
+}
+double loss(const CellTrainingOptions& options, double right) {
+  return loss(tiny_owner(kDb, options), right);
 }
 
 // Returns the change of each colour of the foreground in units of its RMS, summed here from the samples.
@@ -66,7 +70,7 @@ std::vector<double> change() {
 
 }  // namespace
 
-TEST_CASE("cell_training: the loss adds the power that pixels have beyond the peak") {
+TEST_CASE("cell_training: the loss adds the power that colours have beyond the peak") {
   const auto changes = change();
   const double without = loss(only_specks(1, 0), 1);
   for (const double peak : {0.0, 0.5, 1.5, 2.0}) {
@@ -83,12 +87,46 @@ TEST_CASE("cell_training: the loss adds the power that pixels have beyond the pe
   CHECK(loss(only_specks(1000, 1), 1) == Approx(without).epsilon(1e-6));
 }
 
+// The weight of the output layer's three biases moves all colours up or down, so that specks of both signs
+// count.
+TEST_CASE("cell_training: the gradient of specks is that of central differences") {
+  Owner owner = tiny_owner(kDb, only_specks(1, 1000));
+  std::vector<float> grads(owner.params.values().size());
+  loss(owner, 1, grads.data());
+  const auto& entries = owner.params.entries();
+  const auto bias = std::ranges::find_if(entries, [](const auto& e) { return e.name == "mark/fuse/1/bias"; });
+  REQUIRE(bias != entries.end());
+  for (Index i = bias->offset; i < bias->offset + 3; ++i) {
+    constexpr float kStep = 2e-3f;
+    float& weight = owner.params.values()[static_cast<std::size_t>(i)];
+    const float before = weight;
+    weight = before + kStep;
+    const double up = loss(owner, 1);
+    weight = before - kStep;
+    const double down = loss(owner, 1);
+    weight = before;
+    CAPTURE(i - bias->offset);
+    CHECK(static_cast<double>(grads[static_cast<std::size_t>(i)]) ==
+          Approx((up - down) / (2 * static_cast<double>(kStep))).epsilon(0.01).margin(0.5));
+  }
+}
+
+TEST_CASE("cell_training: a view of the background alone has no specks") {
+  auto views = tiny_views();
+  std::ranges::fill(views[kView].opacity.data, 0.f);
+  const double without = loss(tiny_owner(kDb, only_specks(0, 0)), 1, nullptr, views);
+  CHECK(std::isfinite(without));
+  CHECK(loss(tiny_owner(kDb, only_specks(0, 1)), 1, nullptr, views) == without);
+}
+
 TEST_CASE("cell_training: hiding phases in while the signs become readable") {
   const CellTrainingOptions specks = only_specks(0, 1);
   const double without = loss(only_specks(0, 0), 0);
+  CHECK(loss(specks, 0.2) == Approx(without).epsilon(1e-6));
   CHECK(loss(specks, 0.7) == Approx(without).epsilon(1e-6));
   CHECK(loss(specks, 0.75) - without == Approx(0.5).epsilon(1e-3));
   CHECK(loss(specks, 0.8) - without == Approx(1).epsilon(1e-3));
+  CHECK(loss(specks, 1) - without == Approx(1).epsilon(1e-3));
   CHECK(loss({.first_mark_psnr = kDb, .peak_weight = 0}, 0.7) == Approx(without).epsilon(1e-6));
   CHECK(loss({.first_mark_psnr = kDb, .peak_weight = 0}, 0.8) > without + 0.01);
 }

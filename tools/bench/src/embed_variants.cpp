@@ -9,7 +9,8 @@ namespace {
 using watermark::EmbedDistances;
 using watermark::MarkColours;
 
-constexpr Index kCells = 16;  // per axis, for every scene, so that rows of different scenes are comparable
+// Rows of different scenes are comparable: all have kCells per axis and the usual mark PSNR.
+constexpr Index kCells = 16;
 
 EmbedVariant base_variant(const char* preset, const ScheduleOptions& length, Index bits, std::uint64_t seed) {
   EmbedVariant v{.choice = "default",

@@ -51,7 +51,8 @@ void use_colours(MarkColours colours, CellMarkOptions& mark) {
 double mark_psnr_for(std::span<const CachedView> views, nerf::SpaceKind space) {
   const double usual = OwnerOptions{}.mark_psnr;
   if (space != nerf::SpaceKind::cube) return usual;
-  return std::min(usual - 10 * std::log10(1 - flat_share(views)), kFaintest);
+  const double suited = usual - 10 * std::log10(1 - flat_share(views));
+  return std::min(std::round(10 * suited) / 10, kFaintest);
 }
 
 Index batch_for(nerf::SpaceKind space) {

@@ -107,9 +107,9 @@ Var<float> CellTraining::residual(Tape<float>& tape, const Params<float>& params
 }
 
 // Returns the shares of the residual's power that the eye would see: the power that remains after averaging,
-// the power on flat areas, and the power of specks, which is what pixels have beyond a few times the RMS. The
-// first two are about 1 for a mark that does not adapt; without the third, all power would crowd into the few
-// pixels of a plain object that are not flat.
+// the power on flat areas, and the power of specks beyond a few times the RMS. The first two are about 1 for
+// a mark that does not adapt. Without the third, all power would crowd into the few pixels of a plain object
+// that are not flat.
 Var<float> CellTraining::visibility(Var<float> residual, const TrainingImage& image, double right) const {
   Tape<float>& tape = residual.tape();
   const CachedView& v = views_[at(image.view)];

@@ -31,12 +31,14 @@ MarkColours parse_mark_colours(std::string_view name);
 /// Returns the colours that suit a scene: mixed for an object in a cube; else light, because such a scene
 /// fills its images and shows the mark everywhere.
 MarkColours colours_for(nerf::SpaceKind space);
-/// Sets bands, axes and shading of the network, and the loss weights against visibility.
+/// Sets bands, axes and shading of the network, and the loss weights of smoothness and of flat areas.
 void use_colours(MarkColours colours, CellMarkOptions& mark);
 
 /// Returns the mark PSNR of preset fast that suits a scene, dB:
-///   min(P - 10 log10(1 - f), 40) for an object in a cube, else P,   P = 36.5
-/// A flat surface hides no mark, so the flat share f of an object gets no power of its own: see flat_share().
+///   min(P - 10 log10(1 - f), 40), rounded to 0.1, for an object in a cube, else P,   P = 36.5
+///   f = mean over the foreground of exp(-(s / 0.03)^2)
+/// where s is the standard deviation of green in 5 x 5 pixels. A flat surface hides no mark, so the flat
+/// share f of an object adds nothing to the power.
 double mark_psnr_for(std::span<const CachedView> views, nerf::SpaceKind space);
 
 /// Returns the images per step of preset fast: two where space is contracted, because thousands of cells need
@@ -52,7 +54,8 @@ struct EmbedRecipe {
 
   /// Returns the options that only preset fast has.   @throws ValueError naming the preset if it is another
   CellMarkOptions& cell();
-  /// Adapts the options of preset fast to a scene: shape of the extractor's images, colours, batch.
+  /// Adapts the options of preset fast to a scene: shape of the extractor's images, colours, batch. The mark
+  /// PSNR depends on the views: see mark_psnr_for().
   void suit(const nerf::RadianceField& field);
   /// Makes the grid: cells that the views show, or slots.
   CellGrid grid(const nerf::RadianceField& field, std::span<const CachedView> views) const;

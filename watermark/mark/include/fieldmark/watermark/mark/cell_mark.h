@@ -14,8 +14,8 @@ struct CellTrainingOptions {
   double bits_weight = 0.5;     ///< of the cross-entropy of the pooled bits
   double smooth_weight = 0.4;   ///< of the share of the residual's power that remains after 8 x 8 pixel means
   double flat_weight = 0.4;     ///< of the share of the residual's power where the base image is flat
-  double peak = 4;         ///< changes of a pixel beyond this many times the residual's RMS are specks ...
-  double peak_weight = 1;  ///< ... and this weighs their power, as a share of the residual's
+  double peak = 4;              ///< times the RMS: a colour that changes by more is a speck
+  double peak_weight = 1;       ///< of the share of the residual's power that specks have beyond the peak
   double matrix_rate = 3;       ///< step size of Muon relative to Adam's; 0: Adam trains all weights
 };
 
@@ -36,7 +36,7 @@ struct CellMarkOptions {
 /// it. Training minimises
 ///   BCE(sign, s) on the foreground + 0.5 CE(index, cell) + 0.5 BCE(pooled bits, M)
 ///     + u (0.4 |mean of 8 x 8 pixels of r|^2 / |r|^2 + 0.4 |r on flat areas|^2 / |r|^2
-///          + mean of max(0, |r| - 4 rms(r))^2 / rms(r)^2)
+///          + mean over foreground and colours of max(0, abs(r) - 4 rms(r))^2 / rms(r)^2)
 /// where power_budget() fixes the power of the residual r instead of a content loss. u rises from 0 to 1
 /// while the share of correct signs rises from 0.7 to 0.8: a mark must be readable before it can hide.
 /// Source: Luo et al. 2023 (CopyRNeRF), sections 3.3 and 3.4, with local messages and dense supervision.
