@@ -31,17 +31,18 @@ TEST_CASE("hiding_system: marked images keep what is transparent, and their mark
   for (std::size_t v = 0; v < data.views.size(); ++v) {
     const auto& before = data.views[v].rgba;
     const auto& after = marked.views[v].rgba;
-    double changed = 0;
+    const auto want = net->mark(nerf::composited(data.views[v], data.background), message, 26);
+    Index opaque = 0, clear = 0;
     for (Index p = 0; p < before.size() / 4; ++p) {
       CHECK(before[4 * p + 3] == after[4 * p + 3]);
-      if (before[4 * p + 3] == 0) CHECK(before[4 * p] == after[4 * p]);
-      changed += before[4 * p] != after[4 * p];
+      opaque += before[4 * p + 3] == 1;
+      clear += before[4 * p + 3] == 0;
+      for (Index c = 0; c < 3; ++c) {
+        if (before[4 * p + 3] == 0) CHECK(after[4 * p + c] == before[4 * p + c]);
+        if (before[4 * p + 3] == 1) CHECK(after[4 * p + c] == want[3 * p + c]);
+      }
     }
-    CHECK(changed > 0);
-    // Over the whole image, the mark is at most as strong as requested, because the background's part is
-    // lost.
-    CHECK(psnr(nerf::composited(marked.views[v], data.background),
-               nerf::composited(data.views[v], data.background)) > 25.5);
+    CHECK((opaque > 50 && clear > 50));
   }
 }
 

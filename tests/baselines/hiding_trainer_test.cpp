@@ -80,6 +80,10 @@ TEST_CASE("hiding_trainer: the authors' weights, and errors") {
                     "[hiding_trainer] batch must be at least 2 and both crops multiples of 16, got 2, 40 and "
                     "16");
   options = tiny(2);
+  options.first_part = 1;
+  CHECK_THROWS_WITH(HidingTrainer(marker, crops, options),
+                    Contains("[hiding_trainer] first_part must be at least 0 and below 1, got 1"));
+  options = tiny(2);
   options.mark_psnr = 10;
   CHECK_THROWS_WITH(HidingTrainer(marker, crops, options),
                     Contains("[hiding_trainer] mark_psnr must be at least first_mark_psnr, got 10"));

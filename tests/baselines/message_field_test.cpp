@@ -9,8 +9,8 @@
 
 #include "nerf/small_field.h"
 #include "support/catch.h"
+#include "support/dense_by_loops.h"
 #include "support/worst.h"
-#include "watermark/dense_by_loops.h"
 
 using namespace fieldmark;
 using namespace fieldmark::baselines;

@@ -2,6 +2,6 @@
 
 #include "support/expect_numerics.h"
 
-TEST_CASE("numerics_cases: every hard case of evidence pools is within its limit on each instruction set") {
+TEST_CASE("numerics_cases: every hard case of image metrics is within its limit on each instruction set") {
   expect_numerics(fieldmark::imaging::numerics_cases());
 }

@@ -6,6 +6,7 @@
 
 #include "support/catch.h"
 #include "support/random.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using namespace fieldmark::nerf;
@@ -31,7 +32,8 @@ std::vector<Camera> cap(Index count) {
 // Returns the distance of the point from the camera's axis.
 double off_axis(const Camera& c, const Vec3& p) {
   const Vec3 to = minus(p, c.position());
-  return std::sqrt(std::max(0.0, dot3(to, to) - std::pow(dot3(to, c.forward()), 2)));
+  const double square = dot3(to, to) - std::pow(dot3(to, c.forward()), 2);
+  return square < 0 ? 0 : std::sqrt(square);  // keeps a NaN
 }
 }  // namespace
 
@@ -86,7 +88,7 @@ TEST_CASE("camera_set: novel stays inside directions, distances and look-at of t
     const Vec3 from = minus(c.position(), s.centre);
     CHECK(from[2] / length(from) > 0.34);  // a cap is convex
     nearest = std::min(nearest, length(from)), farthest = std::max(farthest, length(from));
-    aside = std::max(aside, off_axis(c, s.centre));
+    raise_to(aside, off_axis(c, s.centre));
     CHECK((c.width == 40 && c.height == 30));
     CHECK(c.pose[9] > 0);  // up stays up
   }
@@ -139,14 +141,14 @@ TEST_CASE("camera_set: extrapolated cameras look from where no training camera w
   const CameraSpan s = camera_span(cap(60), Background::white);
   const auto nearest = [&](const Camera& c) {
     double most = -1;
-    for (const Vec3& d : s.directions) most = std::max(most, -dot3(d, c.forward()));
+    for (const Vec3& d : s.directions) raise_to(most, -dot3(d, c.forward()));
     return std::acos(most) * 180 / 3.14159265358979;
   };
   double widest = 0;
   for (const Camera& c : make_cameras(s, CameraSet::extrapolated, 100, 0, 3)) {
     CHECK(nearest(c) > 30);
     CHECK(off_axis(c, s.centre) < 1e-6);
-    widest = std::max(widest, nearest(c));
+    raise_to(widest, nearest(c));
   }
   CHECK(widest > 90);  // no camera saw the cap below
   // Cameras all around leave no such direction, so the farthest of the drawn ones are used.
@@ -159,7 +161,7 @@ TEST_CASE("camera_set: extrapolated cameras look from where no training camera w
   all.distances.assign(400, 4);
   for (const Camera& c : make_cameras(all, CameraSet::extrapolated, 5, 0, 3)) {
     double most = -1;
-    for (const Vec3& d : all.directions) most = std::max(most, -dot3(d, c.forward()));
+    for (const Vec3& d : all.directions) raise_to(most, -dot3(d, c.forward()));
     CHECK(most < std::cos(0.1));
   }
 }

@@ -147,6 +147,9 @@ TEST_CASE("hierarchical_sampler: errors name argument and what came") {
   CHECK_THROWS_WITH(spread(sampler, grid, {}, std::vector<float>(3)),
                     "[hierarchical_sampler] jitter must have one element a ray (4), got 3");
   CHECK_THROWS_WITH(sampler.spread(grid, rays.batch(), {}, 0, {}, out), Contains("step must be positive"));
+  RayBatch bent = rays.batch();
+  bent.contracted = true;
+  CHECK_THROWS_WITH(sampler.spread(grid, bent, {}, kStep, {}, out), Contains("must be straight in the cube"));
   const RaySamples first = spread(sampler, grid, {.average = 4});
   CHECK_THROWS_WITH(sampler.refine(rays.batch(), first, std::vector<float>(3), out),
                     Contains("must be of the 12 samples of spread(), got 12 and 3"));

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "support/catch.h"
+#include "support/dense_by_loops.h"
 #include "support/random.h"
 #include "support/run_op.h"
 
@@ -15,22 +16,6 @@ template <class T>
 void randomise(fieldmark::ParamStore<T>& store, unsigned seed) {
   const auto random = uniform<T>({store.size()}, -1, 1, seed);
   std::copy(random.data.begin(), random.data.end(), store.values().begin());
-}
-
-/// The activations of one sample.
-using Row = std::vector<double>;
-
-/// Applies a named layer to a row by plain loops.
-inline Row layer(const fieldmark::ParamStore<double>& store, const std::string& name, const Row& x,
-                 bool relu) {
-  const auto weight = store.values(store.find(name + "/weight")),
-             bias = store.values(store.find(name + "/bias"));
-  Row y(bias.begin(), bias.end());
-  for (std::size_t o = 0; o < y.size(); ++o) {
-    for (std::size_t i = 0; i < x.size(); ++i) y[o] += x[i] * weight[i * y.size() + o];
-    if (relu) y[o] = std::max(y[o], 0.0);
-  }
-  return y;
 }
 
 /// Checks that colours and gradients of a field have the same bits with one and two threads.

@@ -11,6 +11,7 @@
 
 /// Fails unless every case has a unique name and stays within its limit on each instruction set of this CPU.
 inline void expect_numerics(const std::vector<fieldmark::NumericsCase>& cases) {
+  REQUIRE_FALSE(cases.empty());
   std::set<std::pair<std::string, std::string>> names;
   for (const auto& c : cases) CHECK(names.insert({c.name, c.type}).second);
   each_isa([&] {

@@ -17,6 +17,7 @@
 /// Checks that every case of a module has a unique name and passes with a relative error of at most `worst`.
 inline void expect_cases_pass(const std::vector<fieldmark::GradcheckCase>& cases,
                               double worst = std::numeric_limits<double>::infinity()) {
+  REQUIRE_FALSE(cases.empty());
   std::set<std::string> names;
   for (const auto& c : cases) {
     const fieldmark::GradcheckReport r = c.run();

@@ -58,15 +58,16 @@ TEST_CASE("attack-field with other fields, and their absence", "[attack-field]")
     raise_to(worst, std::abs(static_cast<double>(plain.params.values()[i] - undone.params.values()[i])));
   CHECK(worst < 1e-6);
   REQUIRE(run({"--attack", "average_0.5", "--other", field}).code == cli::kOk);
-  for (const auto& words : std::vector<std::vector<std::string>>{{"--attack", "average_0.5"},
-                                                                 {"--attack", "copy_1", "--unmarked", field},
-                                                                 {"--attack", "float16", "--other", field},
-                                                                 {"--attack", "float16", "--steps", "5"},
-                                                                 {"--attack", "int9"}}) {
+  const auto refused = [&](const std::vector<std::string>& words, const char* why) {
     const auto r = run(words);
     CHECK(r.code == cli::kUsage);
-    CHECK_THAT(r.err, Contains("--"));
-  }
+    CHECK_THAT(r.err, Contains(why));
+  };
+  refused({"--attack", "average_0.5"}, "--attack: needs --other FIELD");
+  refused({"--attack", "copy_1", "--unmarked", field}, "--attack: needs --marked FIELD");
+  refused({"--attack", "float16", "--other", field}, "--other: --attack does not use it");
+  refused({"--attack", "float16", "--steps", "5"}, "--steps: --attack float16 does not use it");
+  refused({"--attack", "int9"}, "got 'int9'");
   const auto own = run_command({"attack-field", field, "--out", field, "--attack", "float16"});
   CHECK(own.code == cli::kUsage);
   CHECK_THAT(own.err, Contains("overwritten"));

@@ -61,7 +61,7 @@ TEST_CASE("bake makes the mark fainter where it is asked to", "[bake]") {
                       "% of the mark"));
   CHECK(json["scale"] == watermark::Baker::kLargestScale);
   // Twice the difference gives four times its square. PSNR compares 8-bit images: two roundings add 1/12 of a
-  // squared step each, and the owner's random key decides how large that is relative to the mark.
+  // squared step each, which matters more the fainter the mark is.
   const double rounding = 2 / 12. / (255 * 255), square = std::pow(10.0, -learnt / 10) - rounding;
   CHECK(json["mark_psnr"].get<double>() == Approx(-10 * std::log10(4 * square + rounding)).margin(0.25));
   const double strong = distance("30"), faint = distance("50");
@@ -118,9 +118,27 @@ TEST_CASE("bake encodes payloads, and the other commands know them and their com
     REQUIRE((r.code == cli::kOk || r.code == cli::kNotFound));
     return nlohmann::json::parse(r.out);
   };
-  const auto embedded =
-      json_of({"embed", "--field", job.field, "--out", owner, "--bits", "48", "--cells", "8", "--reader-size",
-               "32", "--steps", "1", "--views", "8", "--measured-views", "1", "--text", "hi"});
+  const auto embedded = json_of({"embed",
+                                 "--field",
+                                 job.field,
+                                 "--out",
+                                 owner,
+                                 "--bits",
+                                 "48",
+                                 "--cells",
+                                 "8",
+                                 "--reader-size",
+                                 "32",
+                                 "--steps",
+                                 "1",
+                                 "--views",
+                                 "8",
+                                 "--measured-views",
+                                 "1",
+                                 "--text",
+                                 "hi",
+                                 "--key",
+                                 test_key_file(job.folder)});
   const auto bake = json_of({"bake", "--owner", owner, "--text", "hi", "--out", baked, "--steps", "1"});
   CHECK(bake["payload"] == nlohmann::json{{"kind", "text"}, {"value", "hi"}});
   CHECK(bake["message"].get<std::string>().substr(0, 5) == "76869");  // version 7, then the text

@@ -75,17 +75,18 @@ TEST_CASE("measure gives LPIPS against the unmarked renders where there are weig
 
 TEST_CASE("measure wants field and message together, and known distortions", "[measure]") {
   const TinyJob& job = TinyJob::get();
-  CHECK(run_command({"measure", "--owner", job.owner, "--field", job.field}).code == cli::kUsage);
-  CHECK(run_command({"measure", "--owner", job.owner, "--message", "5"}).code == cli::kUsage);
-  CHECK(run_command({"measure", "--owner", job.owner, "--count", "1", "--distort", "melt_3"}).code ==
-        cli::kUsage);
-  CHECK(run_command({"measure", "--owner", job.owner, "--count", "1", "--cameras", "test"}).code ==
-        cli::kUsage);
-  const auto data = run_command({"measure", "--owner", job.owner, "--data", job.folder.path});
-  CHECK(data.code == cli::kUsage);
-  CHECK_THAT(data.err, Contains("--data: only for --field and --cameras test"));
-  CHECK(run_command(
-            {"measure", "--owner", job.owner, "--data", job.folder.path, "--cameras", "test", "--count", "2"})
-            .code == cli::kUsage);
+  const auto refused = [&](std::vector<std::string> more, const char* why) {
+    more.insert(more.begin(), {"measure", "--owner", job.owner});
+    const auto r = run_command(more);
+    CHECK(r.code == cli::kUsage);
+    CHECK_THAT(r.err, Contains(why));
+  };
+  refused({"--field", job.field}, "--field and a message: one needs the other");
+  refused({"--message", "5"}, "--field and a message: one needs the other");
+  refused({"--count", "1", "--distort", "melt_3"}, "--distort: ");
+  refused({"--cameras", "test"}, "--cameras test: needs --data DIR");
+  refused({"--data", job.folder.path}, "--data: only for --field and --cameras test");
+  refused({"--data", job.folder.path, "--cameras", "test", "--count", "2"},
+          "--count: --cameras test has a number of its own");
   CHECK(run_command({"measure", "--owner", job.field, "--count", "1"}).code == cli::kFailed);
 }

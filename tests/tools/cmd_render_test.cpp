@@ -7,6 +7,7 @@
 #include "support/catch.h"
 #include "support/temporary_folder.h"
 #include "tools/run_command.h"
+#include "tools/tiny_job.h"
 #include "tools/tiny_scene.h"
 
 using namespace fieldmark;
@@ -73,4 +74,9 @@ TEST_CASE("render refuses options that contradict each other", "[render]") {
   CHECK(with({"--cameras", "ring", "--data", "d"}) == cli::kUsage);
   CHECK(with({"--count", "0"}) == cli::kUsage);
   CHECK(with({}) == cli::kFailed);
+  const TinyJob& job = TinyJob::get();
+  const auto test =
+      run_command({"render", "--field", job.field, "--out", job.folder / "of_test", "--cameras", "test"});
+  CHECK(test.code == cli::kUsage);
+  CHECK_THAT(test.err, Contains("--cameras test: needs --data DIR"));
 }

@@ -27,7 +27,9 @@ TEST_CASE("results measures what is named, once, and renders it", "[results]") {
     CHECK(json.contains(key));
   const auto second = run_command(line);
   CHECK(second.code == cli::kOk);
-  if (json["commit"].get<std::string>().find("changes") == std::string::npos) CHECK(read_text(file) == row);
+  const bool changed = json["commit"].get<std::string>().find("changes") != std::string::npos;
+  CHECK(nlohmann::json::parse(second.out)["measured"] == (changed ? 1 : 0));
+  if (!changed) CHECK(read_text(file) == row);
 
   const auto page =
       run_command({"results", "--render", "--rows", folder / "work/rows", "--out", folder / "out"});

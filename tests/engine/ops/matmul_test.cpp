@@ -54,7 +54,10 @@ double worst_error(Index m, Index k, Index n) {
     }
     return worst / largest;
   };
-  return std::max({error(y.value(), want), error(da.data.data(), want_a), error(db.data.data(), want_b)});
+  double worst = error(y.value(), want);
+  raise_to(worst, error(da.data.data(), want_a));
+  raise_to(worst, error(db.data.data(), want_b));
+  return worst;
 }
 }  // namespace
 

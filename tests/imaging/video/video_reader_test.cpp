@@ -8,12 +8,13 @@
 
 using namespace fieldmark;
 
+#ifndef FIELDMARK_WITH_VIDEO
 TEST_CASE("video_reader: without its libraries it names the packages") {
-  if (has_video()) return;
   CHECK_THROWS_WITH(VideoReader(from_base64(kWebm), "clip.webm"),
                     "clip.webm: videos need FFmpeg's libraries, which this build of Fieldmark lacks; install "
                     "libavformat-dev libavcodec-dev libswscale-dev and build again");
 }
+#endif
 
 TEST_CASE("video_reader: frames are those of their times, in any order, in MP4 and WebM") {
   if (!video_or_skip()) return;
@@ -140,6 +141,12 @@ TEST_CASE("video_reader: a damaged frame is told, and the others are read") {
   VideoReader video(mp4, "damaged");
   CHECK(part_difference(video.read_at(0).image, clip_frame(0)) < 0.04);
   std::size_t damaged = 0;
-  for (const double time : video.sample_times(8)) damaged += video.read_at(time).damaged;
-  CHECK(damaged > 0);
+  const auto times = video.sample_times(8);
+  for (const double time : times) {
+    const auto frame = video.read_at(time);
+    damaged += frame.damaged;
+    if (!frame.damaged)
+      CHECK(part_difference(frame.image, clip_frame(static_cast<int>(std::lround(10 * frame.time)))) < 0.04);
+  }
+  CHECK((damaged > 0 && damaged < times.size()));
 }

@@ -58,17 +58,22 @@ TEST_CASE("data_forms: an object's forms show the same, and their cameras stand 
 TEST_CASE("data_forms: a place's forms have the images of its split, and what is masked is not valid") {
   const TemporaryFolder folder;
   const DataGroup group = place_forms(place("train"), place("test"));
+  int masks = 0, borders = 0;
   for (const DataForm& form : group.forms) {
     CAPTURE(form.name);
     const nerf::Dataset data = written(form, folder);
     CHECK(data.views.size() == 12);
     CHECK(data.scene == nerf::SceneType::place);
     CHECK((form.most_loss == 0) == (&form == group.forms.data()));
-    const bool masked = form.name == "an obstacle behind masks";
+    const bool masked = form.name == "an obstacle behind masks",
+               bordered = form.name == "a transparent border";
+    masks += masked;
+    borders += bordered;
     const auto& valid = data.views[0].valid;
     if (masked) CHECK((!valid.empty() && valid[at(19 * 32 + 16)] == 0 && valid[at(3 * 32 + 16)] == 1));
-    if (form.name == "a transparent border") CHECK((!valid.empty() && valid[0] == 0));
+    if (bordered) CHECK((!valid.empty() && valid[0] == 0));
   }
+  CHECK((masks == 1 && borders == 1));
   const JudgedView& view = group.test.front();
   CHECK(view.counted[19 * 32 + 16] == 0);
   CHECK(view.counted[0] == 0);

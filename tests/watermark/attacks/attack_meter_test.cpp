@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "support/catch.h"
+#include "support/random.h"
 #include "watermark/small_owner.h"
 
 using namespace fieldmark;
@@ -111,7 +112,12 @@ TEST_CASE("attack_meter: an attack that only moves pixels does no damage but to 
   // colour.
   const AttackRow larger = meter.image("scale-nearest_2");
   CHECK(larger.kept == 1);
-  CHECK((std::isnan(larger.psnr_foreground) || larger.psnr_foreground > 25));
+  const Tensor<float> seen = quantize8(uniform<float>({12, 16, 3}, 0, 1, 1));
+  const float white[3] = {1, 1, 1};
+  distort::PixelMap source;
+  const auto after = distort::apply_distortion(distort::parse_distortion("scale-nearest_2"), seen,
+                                               CounterRng(5, 42), 0, white, &source);
+  CHECK(attack_damage(seen, Tensor<float>({12, 16}, 1), after, source).psnr > 100);
   const AttackRow turned = meter.image("rotation_20"), blurred = meter.image("rotation_20,blur_3");
   CHECK(turned.kept > 0.7);
   CHECK(blurred.psnr_foreground < turned.psnr_foreground - 3);

@@ -8,6 +8,7 @@
 
 #include "support/catch.h"
 #include "support/temporary_folder.h"
+#include "support/worst.h"
 #include "watermark/small_owner.h"
 #include "watermark/tiny_owner.h"
 
@@ -232,11 +233,11 @@ TEST_CASE("baker: levels finer than 128 cells per axis take steps that shrink wi
   const std::span<const float> after = baker.field().params.values(encoding.table());
   const Index width = 2 * encoding.features();
   const auto largest_move = [&](int level) {
-    float largest = 0;
+    double largest = 0;
     for (Index i = width * encoding.first_row(level); i < width * encoding.first_row(level + 1); ++i)
-      largest = std::max(largest,
-                         std::abs(after[static_cast<std::size_t>(i)] - before[static_cast<std::size_t>(i)]));
-    return static_cast<double>(largest);
+      raise_to(largest, static_cast<double>(std::abs(after[static_cast<std::size_t>(i)] -
+                                                     before[static_cast<std::size_t>(i)])));
+    return largest;
   };
   const double whole = largest_move(0);
   REQUIRE(whole > 0);

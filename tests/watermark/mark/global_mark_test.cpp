@@ -7,8 +7,8 @@
 #include <numbers>
 
 #include "support/catch.h"
+#include "support/dense_by_loops.h"
 #include "support/run_op.h"
-#include "watermark/dense_by_loops.h"
 
 using namespace fieldmark;
 using namespace fieldmark::watermark;
@@ -99,14 +99,17 @@ TEST_CASE("global_mark: the layers of preset code have the widths of the authors
 }
 
 TEST_CASE("global_mark: gradients in position, direction, colour, message and parameters") {
+  int found = 0;
   for (const GradcheckCase& c : gradcheck_cases()) {
     if (!c.name.starts_with("global_mark")) continue;
+    ++found;
     const GradcheckReport r = c.run();
     INFO(r.table);
     CHECK(r.ok);
     CHECK(r.worst <= 1e-7);
     CHECK(r.entries > 80);
   }
+  CHECK(found == 4);
 }
 
 TEST_CASE("global_mark: none and one position, one and two threads, float near double") {

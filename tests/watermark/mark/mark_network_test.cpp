@@ -7,9 +7,9 @@
 #include <numbers>
 
 #include "support/catch.h"
+#include "support/dense_by_loops.h"
 #include "support/run_op.h"
 #include "support/worst.h"
-#include "watermark/dense_by_loops.h"
 
 using namespace fieldmark;
 using namespace fieldmark::watermark;
@@ -95,14 +95,17 @@ TEST_CASE("mark_network: at 90 degrees the carrier is grey, with all shading bla
 }
 
 TEST_CASE("mark_network: gradients in position, colour and parameters") {
+  int found = 0;
   for (const GradcheckCase& c : gradcheck_cases()) {
     if (c.name != "mark_network") continue;
+    ++found;
     const GradcheckReport r = c.run();
     INFO(r.table);
     CHECK(r.ok);
     CHECK(r.worst <= 1e-7);
     CHECK(r.entries == 18 + 15 * 4 + 4 + 4 * 4 + 4 + 7 * 4 + 4 + 4 * 3 + 3);
   }
+  CHECK(found == 1);
 }
 
 TEST_CASE("mark_network: none and one position, one and two threads, float near double") {

@@ -165,16 +165,17 @@ TEST_CASE("sign_fit: without information and noise every sign is 0, not NaN") {
   std::fill(s.precision.data.begin(), s.precision.data.end(), 0.f);
   const SignFit fit = fit_signs(c, s, kCells);
   CHECK(fit.noise == 0);
-  for (const double sign : fit.sign) CHECK(sign == 0);
+  CHECK(fit.sign == std::vector<double>(kCells));
 }
 
 TEST_CASE("sign_fit: what is not seen has no sign, and shapes that do not fit are named") {
   const Carriers c = overlapping(0.5f);
   MarkScore s = score_of(c, 0.01);
   const SignFit more = fit_signs(c, s, kCells + 3);
+  REQUIRE(std::ssize(more.sign) == kCells + 3);
   for (std::size_t cell = kCells; cell < more.sign.size(); ++cell) CHECK(more.sign[cell] == 0);
   std::fill(s.on_object.begin(), s.on_object.end(), 0);
-  for (const double sign : fit_signs(c, s, kCells).sign) CHECK(sign == 0);
+  CHECK(fit_signs(c, s, kCells).sign == std::vector<double>(kCells));
   s.on_object.pop_back();
   CHECK_THROWS_AS(fit_signs(c, s, kCells), ShapeError);
 }

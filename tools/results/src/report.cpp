@@ -27,6 +27,11 @@ std::string cpu_model() {
 
 bool is_list_of_rows(const Json& value) { return value.is_array() && !value.empty() && value[0].is_object(); }
 
+// Replaces bytes that are not UTF-8, such as those of a file's name, by U+FFFD.
+std::string valid_utf8(const std::string& text) {
+  return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
+}
+
 // Adds a row per number; nested names are joined with a dot.
 void flatten(const std::string& prefix, const Json& value, std::vector<Words>& rows) {
   if (value.is_object()) {
@@ -71,7 +76,7 @@ std::string code_hash(const Words& rooms) {
 
 std::string shown(const Json& value) {
   if (value.is_null()) return "-";
-  if (value.is_string()) return value.get<std::string>();
+  if (value.is_string()) return valid_utf8(value.get<std::string>());
   if (!value.is_number_float()) return value.dump(-1, ' ', false, Json::error_handler_t::replace);
   char text[32];
   std::snprintf(text, sizeof text, "%.6g", value.get<double>());
@@ -87,7 +92,7 @@ std::string published_command(const Words& command_line) {
       public_word = "$FIELDMARK_DATA" + word.substr(std::string(data).size());
     else if (word.starts_with('/'))
       public_word = std::filesystem::path(word).filename().string();
-    text += (text.empty() ? "" : " ") + public_word;
+    text += (text.empty() ? "" : " ") + valid_utf8(public_word);
   }
   return text;
 }

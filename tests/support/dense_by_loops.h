@@ -5,9 +5,10 @@
 #include <string>
 #include <vector>
 
+/// The activations of one sample.
 using Row = std::vector<double>;
 
-// Computes one dense layer by plain loops.
+/// Applies a named dense layer to a row by plain loops.
 inline Row layer(const fieldmark::ParamStore<double>& store, const std::string& name, const Row& x,
                  bool relu) {
   const auto w = store.values(store.find(name + "/weight")), b = store.values(store.find(name + "/bias"));
