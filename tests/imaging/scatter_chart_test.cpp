@@ -7,6 +7,7 @@
 
 #include "imaging/drawn_points.h"
 #include "support/catch.h"
+#include "support/count_parts.h"
 
 using namespace fieldmark;
 using namespace fieldmark::bench;
@@ -28,12 +29,6 @@ bool well_formed(const std::string& svg) {
   }
   return open.empty();
 }
-
-std::size_t count(const std::string& text, const std::string& part) {
-  std::size_t n = 0;
-  for (std::size_t at = 0; (at = text.find(part, at)) != std::string::npos; at += part.size()) ++n;
-  return n;
-}
 }  // namespace
 
 TEST_CASE("scatter_chart: equal ratios in x and equal differences in y are equally far apart") {
@@ -51,9 +46,9 @@ TEST_CASE("scatter_chart: series, the line from left to right, and the ring") {
                                                    {2, 2, "first", "", true},
                                                    {3, 0, "second", "d"}});
   CHECK(well_formed(svg));
-  CHECK(count(svg, ">first</text>") == 1);
-  CHECK(count(svg, ">second</text>") == 1);
-  CHECK(count(svg, "stroke-width=\"2\"") == 1);
+  CHECK(count_parts(svg, ">first</text>") == 1);
+  CHECK(count_parts(svg, ">second</text>") == 1);
+  CHECK(count_parts(svg, "stroke-width=\"2\"") == 1);
   std::smatch line;
   REQUIRE(std::regex_search(svg, line, std::regex("points=\"(\\d+),(\\d+) (\\d+),(\\d+) (\\d+),(\\d+) \"")));
   CHECK(std::stoi(line[1]) < std::stoi(line[3]));
@@ -107,9 +102,9 @@ TEST_CASE("scatter_chart: curves join each series in its own order and name it a
     for (const std::size_t i : order) text += std::to_string(at[i].x) + "," + std::to_string(at[i].y) + " ";
     return text + "\"";
   };
-  CHECK(count(svg, "class=\"curve\"") == 2);
-  CHECK(count(svg, line({0, 2, 4})) == 1);
-  CHECK(count(svg, line({1, 3})) == 1);
-  CHECK(count(svg, ">a</text>") == 1);
-  CHECK(count(svg, ">b</text>") == 1);
+  CHECK(count_parts(svg, "class=\"curve\"") == 2);
+  CHECK(count_parts(svg, line({0, 2, 4})) == 1);
+  CHECK(count_parts(svg, line({1, 3})) == 1);
+  CHECK(count_parts(svg, ">a</text>") == 1);
+  CHECK(count_parts(svg, ">b</text>") == 1);
 }

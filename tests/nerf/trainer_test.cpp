@@ -137,6 +137,14 @@ TEST_CASE("trainer: 300 steps of a small mlp field reach 17 dB, and both its net
   }
 }
 
+TEST_CASE("trainer: an mlp field is refused where a scene has no bounds") {
+  Dataset place = objects_scene();
+  place.scene = SceneType::place;
+  RadianceField field(small_mlp_options());
+  CHECK_THROWS_WITH(Trainer(field, place, mlp_options(1)),
+                    Contains("[trainer] field must be a hash field where a scene has no bounds"));
+}
+
 TEST_CASE("trainer: an mlp field's bytes are the same for one and two threads, and across a restore") {
   const TemporaryFolder folder;
   const ScopedThreads serial(1);

@@ -67,6 +67,7 @@ TEST_CASE("attack-field with other fields, and their absence", "[attack-field]")
   refused({"--attack", "copy_1", "--unmarked", field}, "--attack: needs --marked FIELD");
   refused({"--attack", "float16", "--other", field}, "--other: --attack does not use it");
   refused({"--attack", "float16", "--steps", "5"}, "--steps: --attack float16 does not use it");
+  refused({"--attack", "remove", "--size", "32"}, "--size: --attack remove does not use it");
   refused({"--attack", "int9"}, "got 'int9'");
   const auto own = run_command({"attack-field", field, "--out", field, "--attack", "float16"});
   CHECK(own.code == cli::kUsage);

@@ -191,3 +191,23 @@ TEST_CASE("bake encodes payloads, and the other commands know them and their com
     CHECK(run_command(line).code == cli::kUsage);
   }
 }
+
+TEST_CASE("bake takes messages that are too long for a payload", "[bake]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string baked = job.folder / "longest.fm", message(66, 'a');
+  const std::string owner = job.folder / "many_cells.fm";
+  REQUIRE(run_command({"embed", "--field", job.field, "--out", owner, "--bits", "16", "--cells", "12",
+                       "--reader-size", "32", "--steps", "1", "--views", "8", "--measured-views", "1",
+                       "--key", test_key_file(job.folder)})
+              .code == cli::kOk);
+  const auto r = run_command(
+      {"bake", "--owner", owner, "--message", message, "--out", baked, "--steps", "1", "--json", "-"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  CHECK(nlohmann::json::parse(r.out)["payload"].is_null());
+  const auto read = run_command({"extract", "--owner", owner, "--bits", "264", "--detection", "blind",
+                                 "--fpr", "1", "--json", "-", job.images()});
+  INFO(read.err);
+  CHECK(read.code == cli::kOk);
+  CHECK_THAT(read.err, Contains("none: a payload needs a message of at most 256 bits"));
+}

@@ -23,6 +23,18 @@ TEST_CASE("embed writes an owner, an image and the figures that scripts read", "
   CHECK(!std::filesystem::exists(job.owner + ".checkpoint"));
 }
 
+TEST_CASE("embed keeps the owner from its image", "[embed]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string owner = job.folder / "image.fm";
+  const auto r = tiny_embed(job.field, owner, {"--image", job.folder.path.string() + "/./image.fm"});
+  CHECK(r.code == cli::kUsage);
+  CHECK_THAT(r.err, Contains("is the file of --out"));
+  std::filesystem::create_symlink("image.fm", job.folder / "link.png");
+  const auto linked = tiny_embed(job.field, owner, {"--image", job.folder / "link.png"});
+  CHECK(linked.code == cli::kFailed);
+  CHECK_NOTHROW(watermark::Owner::load(owner));
+}
+
 TEST_CASE("embed chooses the mark PSNR of an object, unless it is given", "[embed]") {
   const TinyJob& job = TinyJob::get();
   const std::string owner = job.folder / "chosen.fm", json = job.folder / "chosen.json";
@@ -61,10 +73,29 @@ TEST_CASE("embed learns from views at several distances, and from several sample
   const TinyJob& job = TinyJob::get();
   const std::string owner = job.folder / "several.fm";
   const auto embed = [&](const char* distances, const char* more) {
-    return run_command(
-        {"embed", "--field",       job.field, "--out",     owner, "--bits",  "4", "--cells",
-         "6",     "--reader-size", "32",      "--steps",   "1",   "--views", "8", "--measured-views",
-         "1",     "--distances",   distances, "--samples", more});
+    return run_command({"embed",
+                        "--field",
+                        job.field,
+                        "--out",
+                        owner,
+                        "--bits",
+                        "4",
+                        "--cells",
+                        "6",
+                        "--reader-size",
+                        "32",
+                        "--steps",
+                        "1",
+                        "--views",
+                        "8",
+                        "--measured-views",
+                        "1",
+                        "--distances",
+                        distances,
+                        "--samples",
+                        more,
+                        "--key",
+                        test_key_file(job.folder)});
   };
   const auto r = embed("several", "2");
   INFO(r.err);
@@ -135,9 +166,27 @@ TEST_CASE("embed --preset paper and code give an owner that bakes and reads like
   const TinyJob& job = TinyJob::get();
   for (const std::string preset : {"paper", "code"}) {
     const std::string owner = job.folder / (preset + ".fm"), baked = job.folder / "paper_baked.fm";
-    const auto r = run_command({"embed", "--preset", preset, "--field", job.field, "--out", owner, "--bits",
-                                "4", "--reader-size", "32", "--steps", "1", "--views", "8",
-                                "--measured-views", "1", "--json", "-"});
+    const auto r = run_command({"embed",
+                                "--preset",
+                                preset,
+                                "--field",
+                                job.field,
+                                "--out",
+                                owner,
+                                "--bits",
+                                "4",
+                                "--reader-size",
+                                "32",
+                                "--steps",
+                                "1",
+                                "--views",
+                                "8",
+                                "--measured-views",
+                                "1",
+                                "--key",
+                                test_key_file(job.folder),
+                                "--json",
+                                "-"});
     INFO(r.err);
     REQUIRE(r.code == cli::kOk);
     CHECK_THAT(r.err, Contains("training ended in its warm start of 1500 steps"));

@@ -85,8 +85,7 @@ TEST_CASE("extract refuses a rate that no image can reach, and takes another key
   const auto rate = run_command({"extract", "--owner", job.owner, "--fpr", "1e-100", job.images()});
   CHECK(rate.code == cli::kUsage);
   CHECK_THAT(rate.err, Contains("--fpr") && Contains("no image can reach 1e-100"));
-  const std::string key = job.folder / "extract.key";
-  REQUIRE(run_command({"key", "--out", key}).code == cli::kOk);
+  const std::string key = test_key_file(job.folder, 6);
   const auto read = [&](std::vector<std::string> more) {
     std::vector<std::string> words{"extract", "--owner",    job.owner, "--detection",
                                    "blind",   job.images(), "--json",  "-"};

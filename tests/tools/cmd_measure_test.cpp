@@ -81,12 +81,13 @@ TEST_CASE("measure wants field and message together, and known distortions", "[m
     CHECK(r.code == cli::kUsage);
     CHECK_THAT(r.err, Contains(why));
   };
-  refused({"--field", job.field}, "--field and a message: one needs the other");
-  refused({"--message", "5"}, "--field and a message: one needs the other");
+  refused({"--field", job.field}, "--field: needs the message baked into it");
+  refused({"--message", "5"}, "--message: needs --field");
   refused({"--count", "1", "--distort", "melt_3"}, "--distort: ");
   refused({"--cameras", "test"}, "--cameras test: needs --data DIR");
-  refused({"--data", job.folder.path}, "--data: only for --field and --cameras test");
+  refused({"--data", job.folder.path}, "--data: needs --field or --cameras test");
   refused({"--data", job.folder.path, "--cameras", "test", "--count", "2"},
-          "--count: --cameras test has a number of its own");
+          "--count: --cameras test takes all test cameras of --data");
+  refused({"--together", "2", "--count", "2"}, "--together: needs --payloads");
   CHECK(run_command({"measure", "--owner", job.field, "--count", "1"}).code == cli::kFailed);
 }

@@ -27,7 +27,10 @@ TEST_CASE("null needs images, and can do without random keys", "[null]") {
   const TinyJob& job = TinyJob::get();
   const auto none = run_command({"null", "--owner", job.owner});
   CHECK(none.code == cli::kUsage);
-  CHECK_THAT(none.err, Contains("--novel"));
+  CHECK_THAT(none.err, Contains("images: expected unmarked images or --novel N, got neither"));
+  const auto unread = run_command({"null", "--owner", job.owner, "--novel", "2", "--readings", "r"});
+  CHECK(unread.code == cli::kUsage);
+  CHECK_THAT(unread.err, Contains("--readings: needs images or videos, got none"));
   const auto r = run_command({"null", "--owner", job.owner, "--message", "5", "--keys", "0", "--detection",
                               "blind", job.images(), "--json", "-"});
   INFO(r.err);

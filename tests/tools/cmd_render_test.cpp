@@ -79,4 +79,8 @@ TEST_CASE("render refuses options that contradict each other", "[render]") {
       run_command({"render", "--field", job.field, "--out", job.folder / "of_test", "--cameras", "test"});
   CHECK(test.code == cli::kUsage);
   CHECK_THAT(test.err, Contains("--cameras test: needs --data DIR"));
+  const std::string kept = job.images() + "/view_000.png";
+  CHECK(run_command({"render", "--field", job.field, "--out", job.images(), "--overwrite", "--average", "8"})
+            .code == cli::kUsage);
+  CHECK(std::filesystem::exists(kept));
 }

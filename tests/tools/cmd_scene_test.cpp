@@ -25,6 +25,9 @@ TEST_CASE("scene writes a data set that loads, the same bytes for the same seed"
   CHECK_THAT(r.err, Contains("4 views of 8x8"));
   REQUIRE(with(b, "3").code == cli::kOk);
   REQUIRE(with(c, "4").code == cli::kOk);
+  const auto there = with(a, "3");
+  CHECK(there.code == cli::kFailed);
+  CHECK_THAT(there.err, Contains("expected a folder without a data set, found transforms_train.json"));
   const auto set = nerf::load_dataset(a, {.split = "train"});
   CHECK(set.views.size() == 2);
   CHECK(set.views[0].camera.width == 8);

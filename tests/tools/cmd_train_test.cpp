@@ -2,6 +2,7 @@
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/dataset.h>
 #include <fieldmark/nerf/trainer.h>
+#include <fieldmark/watermark/mark/owner.h>
 
 #include <csignal>
 #include <nlohmann/json.hpp>
@@ -10,6 +11,7 @@
 #include "support/catch.h"
 #include "support/temporary_folder.h"
 #include "tools/run_command.h"
+#include "tools/tiny_job.h"
 #include "tools/tiny_scene.h"
 
 using namespace fieldmark;
@@ -158,6 +160,15 @@ TEST_CASE("train says what is wrong with its data and its options, and leaves no
       run_command({"train", "--data", scene, "--out", out, "--steps", "1", "--max-megabytes", "0.1"});
   CHECK(small.code == cli::kUsage);
   CHECK_THAT(small.err, Contains("--max-megabytes: no field is as small as 0.1"));
+  CHECK(run_command({"train", "--data", scene, "--out", out, "--steps", "1", "--no-carve", "--refine-poses"})
+            .code == cli::kUsage);
+  const TinyJob& job = TinyJob::get();
+  std::filesystem::copy(job.owner, folder / "f.fm.checkpoint");
+  const auto kept = run_command({"train", "--data", scene, "--out", out, "--steps", "1"});
+  CHECK(kept.code == cli::kFailed);
+  CHECK_THAT(kept.err, Contains("f.fm.checkpoint"));
+  CHECK_NOTHROW(watermark::Owner::load(folder / "f.fm.checkpoint"));
+  std::filesystem::remove(folder / "f.fm.checkpoint");
   const auto nothing = run_command({"train", "--data", scene, "--out", out, "--steps", "2", "--resume"});
   CHECK(nothing.code == cli::kFailed);
   CHECK_THAT(nothing.err, Contains("f.fm.checkpoint"));

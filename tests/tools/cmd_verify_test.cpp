@@ -35,8 +35,7 @@ TEST_CASE("verify answers with numbers, and with exit code 3 where nothing is fo
 
 TEST_CASE("verify takes another key, and finds with a rate of 1 whatever it sees", "[verify]") {
   const TinyJob& job = TinyJob::get();
-  const std::string key = job.folder / "other.key", images = job.images();
-  REQUIRE(run_command({"key", "--out", key}).code == 0);
+  const std::string key = test_key_file(job.folder, 6), images = job.images();
   CHECK(run_command(
             {"verify", "--detection", "blind", "--owner", job.owner, "--message", "5", "--key", key, images})
             .code == cli::kNotFound);
@@ -139,4 +138,18 @@ TEST_CASE("verify takes a video, and its evidence holds the frames and the hash 
   CHECK(json["per_view"][1]["time"] == 0.5);
   CHECK_THAT(read_text(proof + "/evidence.json"), Contains("\"name\": \"clip.mp4@0.500s\""));
   CHECK_THAT(run_command({"check", proof, clip}).out, Contains("INTACT"));
+}
+
+TEST_CASE("verify keeps readings from its results, and tests no wrong keys if told so", "[verify]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string readings = job.folder / "readings";
+  const auto same = run_command({"verify", "--owner", job.owner, "--message", "5", "--readings", readings,
+                                 "--json", readings, job.images()});
+  CHECK(same.code == cli::kUsage);
+  CHECK_THAT(same.err, Contains("--json: " + readings + " is the file of --readings"));
+  const auto none =
+      run_command({"verify", "--owner", job.owner, "--message", "5", "--detection", "blind", "--wrong-keys",
+                   "0", "--evidence", job.folder / "no_keys", "--json", "-", job.images()});
+  INFO(none.err);
+  CHECK(nlohmann::json::parse(none.out)["wrong_keys"].is_null());
 }

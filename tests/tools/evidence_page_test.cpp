@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "imaging/media_samples.h"
 #include "support/catch.h"
 #include "support/random.h"
 #include "watermark/small_evidence.h"
@@ -111,18 +112,7 @@ TEST_CASE("evidence_page: a small copy keeps the image's shape and is a JPEG", "
   const auto decoded = [](const Tensor<float>& image) {
     const std::string address = thumbnail(image), head = "data:image/jpeg;base64,";
     REQUIRE(address.starts_with(head));
-    std::vector<std::byte> bytes;
-    unsigned buffer = 0, bits = 0;
-    const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    for (char c : address.substr(head.size())) {
-      if (c == '=') break;
-      buffer = buffer << 6 | static_cast<unsigned>(digits.find(c));
-      bits += 6;
-      if (bits < 8) continue;
-      bits -= 8;
-      bytes.push_back(static_cast<std::byte>(buffer >> bits & 0xff));
-    }
-    return decode_image(bytes, "thumbnail");
+    return decode_image(from_base64(std::string_view(address).substr(head.size())), "thumbnail");
   };
   CHECK(decoded(uniform<float>({400, 200, 3}, 0, 1, 1)).shape == Shape{160, 80, 3});
   CHECK(decoded(uniform<float>({1, 3000, 3}, 0, 1, 1)).shape == Shape{1, 160, 3});

@@ -145,8 +145,10 @@ TEST_CASE("fetch_manifest brings what is missing or wrong, from encoded addresse
              .url = "http://where",
              .files = {}};
   m.files = {expected("right"), expected("a b/\xC3\xA4#1.png"), expected("wrong")};
-  CHECK_THROWS_WITH(fetch_manifest(m, folder.path, go_on),
-                    Contains("n: no address of its files is known; get it by hand from http://where"));
+  CHECK_THROWS_WITH(
+      fetch_manifest(m, folder.path, go_on),
+      Contains(
+          "n: no address of its files is known; give --base-url URL, or get it by hand from http://where"));
   m.base_url = server.url() + "set";
   write_file_atomically(folder / "right", std::string_view(kFile));
   write_file_atomically(folder / "wrong", std::string_view("x"));

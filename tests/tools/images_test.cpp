@@ -60,14 +60,14 @@ TEST_CASE("list_images skips hidden and foreign files and counts them", "[images
   CHECK(images[1].filename() == "e.jpeg");
   CHECK(images[3].filename() == "g.webp");
   CHECK(out.str() == "note: " + folder.path.string() +
-                         ": 6 files that are hidden or no images are skipped: 2 .gif, 1 .mp4, 2 hidden, 1 "
+                         ": skipped 6 files that are hidden or not images: 2 .gif, 1 .mp4, 2 hidden, 1 "
                          "without extension\n");
   CHECK(!context.left_out());
   std::filesystem::create_directory(folder / "f");
   CHECK(list_images({folder.path.string()}, context, Videos::read).size() == 5);
   write_file_atomically(folder / "f/x.tiff", "x");
   CHECK_THROWS_WITH(list_images({(folder / "f").string()}, context),
-                    Contains("found none; 1 files") && Contains("1 .tiff"));
+                    Contains("found none; skipped 1 files") && Contains("1 .tiff"));
 }
 
 TEST_CASE("ReadFaults leaves out what cannot be read, unless that is all", "[images]") {

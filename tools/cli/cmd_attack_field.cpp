@@ -57,12 +57,12 @@ nerf::RadianceField changed_weights(const AttackFieldArguments& options, Context
 
 // Rejects options that this attack would ignore.
 void refuse_unused(CommandLine& app, const std::string& attack) {
-  std::vector<std::string> used{"--size", "--steps", "--seconds"};
+  std::vector<std::string> used{"--steps", "--seconds"};
   const auto uses = [&](std::initializer_list<std::string> names) { used.insert(used.end(), names); };
-  if (attack == "finetune") uses({"--data", "--lr"});
-  if (attack == "finetune-renders") uses({"--views", "--lr"});
+  if (attack == "finetune") uses({"--data", "--size", "--lr"});
+  if (attack == "finetune-renders") uses({"--views", "--size", "--lr"});
   if (attack == "remove") uses({"--owner", "--mark-psnr", "--views", "--lr"});
-  if (attack == "retrain") uses({"--views"});
+  if (attack == "retrain") uses({"--views", "--size"});
   if (!is_training_attack(attack)) used = {"--other", "--unmarked", "--marked"};
   for (const char* name : {"--data", "--owner", "--mark-psnr", "--size", "--views", "--lr", "--steps",
                            "--seconds", "--other", "--unmarked", "--marked"})

@@ -71,6 +71,7 @@ int run_bake(const BakeArguments& options, Context& context) {
                        " has no mark PSNR to set, its networks decide it");
     owner.set_mark_psnr(*options.mark_psnr);
   }
+  if (!options.code.copy.empty()) check_copies(owner);
   const auto key = choose_code(options.code, options.message, owner, context);
   const auto message = message_of(options.message, owner.options().bits);
   watermark::BakeOptions bake_options{.seed = context.seed()};

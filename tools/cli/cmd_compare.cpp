@@ -183,18 +183,19 @@ int run_compare(const CompareArguments& options, Context& context) {
 Command add_compare(CommandLine& app) {
   auto o = std::make_shared<CompareArguments>();
   app.add_option("images", o->paths,
-                 "Two images, or two folders whose images are paired in order (PNG, JPEG)")
+                 "Two images, or two folders whose images are paired in order; PNG, JPEG, WebP, AVIF, HEIC")
       ->type_name("IMAGE|DIR")
       ->default_str("");
   add_lpips_weights(app, o->alex);
   app.add_option("--squeeze-weights", o->squeeze,
-                 "The same for SqueezeNet ($FIELDMARK_DATA/weights/lpips_squeeze_v0.1.safetensors)")
+                 "SqueezeNet weights of LPIPS, or none to skip it;\n"
+                 "default: $FIELDMARK_DATA/weights/lpips_squeeze_v0.1.safetensors")
       ->type_name("FILE")
       ->default_str("");
   app.add_flag(
       "--reference", o->reference,
-      "Instead compare LPIPS with the reference values in a folder\n($FIELDMARK_DATA/lpips_reference); "
-      "fails where one is off by more than 1e-4");
+      "Compare LPIPS with reference values in a folder instead, default $FIELDMARK_DATA/lpips_reference;\n"
+      "fails if an error exceeds 1e-4");
   return [o](Context& context) { return run_compare(*o, context); };
 }
 

@@ -125,7 +125,7 @@ Command add_data(CommandLine& app) {
   add_name_and_folder(fetches, *options, "Folder to download to");
   fetches
       .add_option("--base-url", options->base_url,
-                  "Address of a folder with the files, http or https; default: that of the manifest")
+                  "Address of a folder with the files, http or https; needed if the manifest has none")
       ->check([](const std::string& url) {
         return url.starts_with("http://") || url.starts_with("https://")
                    ? std::string()

@@ -139,6 +139,9 @@ int run_embed(const EmbedArguments& options, Context& context) {
   const std::string image = options.image.empty() ? options.out + ".png" : options.image;
   if (std::filesystem::exists(options.out) && std::filesystem::equivalent(options.out, options.field))
     throw UsageError("--out: " + options.out + " is the field that is to be marked");
+  if (std::filesystem::path(image).lexically_normal() ==
+      std::filesystem::path(options.out).lexically_normal())
+    throw UsageError("--image: " + image + " is the file of --out; name another file");
   check_writable(options.out);
   if (!options.resume) check_writable(checkpoint);  // that of an interrupted run, with its key
   check_writable_page(image);
@@ -173,6 +176,7 @@ int run_embed(const EmbedArguments& options, Context& context) {
                  " steps: the mark is strong and hardly read; give it more --seconds");
   owner.save(options.out);
   std::filesystem::remove(checkpoint);
+  check_writable_page(image);  // a link may lead to the owner
   write_image(image, owner, context.seed());
 
   const auto sha256 = sha256_file_hex(options.out);
@@ -284,8 +288,8 @@ Command add_embed(CommandLine& app) {
       ->range(1, 100000)
       ->type_name("N");
   app.add_option("--distort", o->under,
-                 "Distortion to measure as well, see `fieldmark distort --help`; repeatable")
-      ->type_name("NAME")
+                 "Chain of distortions to measure as well, see `fieldmark distort --help`; repeatable")
+      ->type_name("NAME[,NAME...]")
       ->default_str("");
   app.add_option("--image", o->image,
                  "File to write, PNG of four views unmarked, marked, and ten times the difference; default: "

@@ -98,7 +98,7 @@ Command add_eval(CommandLine& app) {
       ->type_name("N")
       ->default_str("");
   app.add_flag("--refine-poses", o->refine_poses,
-               "Fit the cameras to the images before a field that stays as it is");
+               "Align each camera with its image first, with the field frozen; for fields of preset hash");
   add_supersampling(app, o->supersampling);
   add_lpips_weights(app, o->lpips_weights);
   return [o](Context& context) { return run_eval(*o, context); };

@@ -181,9 +181,9 @@ int run_numerics(const GradcheckArguments& options, Context& context) {
 
 Command add_gradcheck(CommandLine& app) {
   auto options = std::make_shared<GradcheckArguments>();
-  app.add_option("--only", options->only, "Text that the names of the checks contain")
+  app.add_option("--only", options->only, "Checks to run, those with TEXT in their name; default: all")
       ->type_name("TEXT")
-      ->default_str("all");
+      ->default_str("");
   app.add_flag(
       "--numerics", options->numerics,
       "Check hard numerical cases against long double on every instruction set, instead of gradients");

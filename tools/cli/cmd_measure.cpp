@@ -167,19 +167,24 @@ void add_ground_truth(const MeasureArguments& options, const MeasureSubject& sub
 
 int run_measure(const MeasureArguments& options, Context& context) {
   if (options.message.given() == options.field.empty())
-    throw UsageError("--field and a message: one needs the other");
+    throw UsageError(options.field.empty() ? "--message: needs --field"
+                                           : "--field: needs the message baked into it, see --message");
   const bool test = std::ranges::count(options.cameras, "test") > 0;
   if (!options.data.empty() && !test && options.field.empty())
-    throw UsageError("--data: only for --field and --cameras test");
+    throw UsageError("--data: needs --field or --cameras test");
   if (options.count_given && test && options.cameras.size() == 1)
-    throw UsageError("--count: --cameras test has a number of its own");
+    throw UsageError("--count: --cameras test takes all test cameras of --data");
   for (const auto& name : options.under)
     read_option("--distort", [&] { return distort::parse_distortion(name); });
   const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
   MeasureSubject subject{watermark::Owner::load(options.owner), {}, {}};
   choose_code(options.code, options.message, subject.owner, context);
+  if (options.together > 1 && options.field.empty() && !options.payloads)
+    throw UsageError("--together: needs --payloads, or a --field whose message is a payload");
   if (!options.field.empty()) {
     subject.message = message_of(options.message, subject.owner.options().bits);
+    if (options.together > 1 && payload_json(*subject.message).is_null())
+      throw UsageError("--together: the message of --field is not a payload");
     subject.baked.emplace(nerf::RadianceField::load(options.field));
   }
   std::vector<std::vector<nerf::Camera>> cameras;
@@ -204,7 +209,7 @@ Command add_measure(CommandLine& app) {
   auto o = std::make_shared<MeasureArguments>();
   app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
   app.add_option("--field", o->field, "Baked field to measure; default: the mark as trained")
-      ->type_name("BAKED")
+      ->type_name("FIELD")
       ->default_str("");
   add_message_options(app, o->message, "Message of the baked field");
   add_code_options(app, o->code);
@@ -226,16 +231,18 @@ Command add_measure(CommandLine& app) {
           ->range(1, 100000)
           ->type_name("N");
   app.add_option("--informed-count", o->informed_count,
-                 "Views to read informed too, 0 to 100000; seconds per view and distortion")
+                 "Views to read by informed detection as well, 0 to 100000; takes up to a second per view "
+                 "and distortion")
       ->range(0, 100000)
       ->type_name("N");
   app.add_option("--size", o->size, "Longer side of the views in pixels, 16 to 8192; default: as trained")
       ->range(16, 8192)
       ->type_name("N")
       ->default_str("");
-  app.add_option("--distort", o->under,
-                 "Distortion to measure as well, see `fieldmark distort --help`; repeatable")
-      ->type_name("NAME")
+  app.add_option(
+         "--distort", o->under,
+         "Chain of distortions to measure as well, see `fieldmark distort --help`; not h264_A; repeatable")
+      ->type_name("NAME[,NAME...]")
       ->default_str("");
   app.add_option("--data", o->data,
                  "Data set for --cameras test and, with --field, for the PSNR against the ground truth")

@@ -38,8 +38,10 @@ void read_novel(SuspectReader& reader, const watermark::Owner& owner, Index coun
 
 int run_null(const NullArguments& options, Context& context) {
   if (options.suspects.paths.empty() && options.novel == 0)
-    throw UsageError(
-        "images: none given; name unmarked images, or ask for views of the unmarked field by --novel");
+    throw UsageError("images: expected unmarked images or --novel N, got neither");
+  if (options.suspects.paths.empty() && (options.suspects.frames || !options.suspects.readings.empty()))
+    throw UsageError(std::string(options.suspects.frames ? "--frames" : "--readings") +
+                     ": needs images or videos, got none");
   auto owner = watermark::Owner::load(options.owner);
   choose_code(options.code, options.message, owner, context);
   const Index bits = owner.options().bits;

@@ -96,7 +96,7 @@ void clear_older_views(const RenderArguments& options, const std::vector<NamedCa
   if (!options.overwrite)
     throw IoError(options.out + ": expected a folder without images, found " +
                   std::to_string(older.size() + others.size()) +
-                  " of another run; name another folder, or --overwrite");
+                  "; name another folder, or --overwrite to replace view_N.png");
   for (const auto& path : older) std::filesystem::remove(path);
   for (const auto& [name, camera] : cameras)
     std::erase(others, std::filesystem::path(options.out) / (name + ".png"));
@@ -110,12 +110,12 @@ int run_render(const RenderArguments& options, Context& context) {
     throw UsageError("--cameras " + options.cameras + ": --data has cameras of its own");
   if (!options.sheet.empty()) check_writable_page(options.sheet);
   const auto field = nerf::RadianceField::load(options.field);
-  prepare_folder(options.out);
   const auto cameras = cameras_of(options, field, context);
-  clear_older_views(options, cameras, context);
   nerf::Renderer renderer(field, {.precision = precision_of(options.precision),
                                   .points = points_of(options, field),
                                   .supersampling = options.supersampling});
+  prepare_folder(options.out);
+  clear_older_views(options, cameras, context);  // after everything that may be refused
   const InterruptGuard guard;
   Json images = Json::array();
   double seconds = 0;

@@ -93,15 +93,12 @@ double seconds_of_a_cell(const std::vector<baselines::Cell>& cells, double budge
   return count > 0 ? sum / count : 1.5 * budget;
 }
 
-// Writes the page next to the folder of cells, unless --report names it.
-std::filesystem::path write_page(const ReproduceArguments& options, const Context& context) {
+// The page is next to the folder of cells, unless --report names it.
+std::filesystem::path page_of(const ReproduceArguments& options, const Context& context) {
+  if (!context.options().report.empty()) return context.options().report;
   std::filesystem::path folder = std::filesystem::path(options.cells).lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();  // "cells/"
-  const std::filesystem::path page = context.options().report.empty()
-                                         ? folder.parent_path() / "paper.md"
-                                         : std::filesystem::path(context.options().report);
-  results::write_paper_page(folder, page);
-  return page;
+  return folder.parent_path() / "paper.md";
 }
 
 // Saves a cell as a row, with its image next to it.
@@ -176,7 +173,7 @@ void measure(const ReproduceArguments& options, const std::vector<baselines::Pap
       auto measured = runner.run(name);
       measured.cell.more["total_seconds"] = context.seconds() - begun;
       save(options, scenes, measured, context.seconds() - begun);
-      write_page(options, context);
+      results::write_paper_page(options.cells, page_of(options, context));
       char line[120];
       std::snprintf(line, sizeof line, "%s: %.2f%% right, %.2f dB on the object, %s\n", name.stem().c_str(),
                     100 * measured.cell.bit_accuracy, measured.cell.psnr_base_foreground,
@@ -195,7 +192,10 @@ int run_reproduce(const ReproduceArguments& options, Context& context) {
     read_option("--system", [&] { return baselines::paper_system(system).name; });
   const auto scenes = scenes_of(options);
   const auto cells = planned_cells(options, scenes, context.seed());
+  if (cells.empty()) throw UsageError("--system: no selected table has this system");
   std::filesystem::create_directories(options.cells);
+  const auto page = page_of(options, context);
+  check_writable_page(page.string());
   auto missing = missing_of(cells, options.cells);
   const double each = seconds_of_a_cell(baselines::load_cells(options.cells), options.budget);
   context.text() << missing.size() << " of " << cells.size() << " cells are missing";
@@ -212,8 +212,9 @@ int run_reproduce(const ReproduceArguments& options, Context& context) {
   context.result({{"cells", cells.size()},
                   {"missing", left},
                   {"seconds_left", each * static_cast<double>(missing.size())}});
-  const auto page = write_page(options, context);  // replaces the page that every command can write
-  context.text() << page.string() << ": written\n";
+  // Replaces the page that every command can write.
+  const bool written = results::write_paper_page(options.cells, page);
+  context.text() << page.string() << (written ? ": written\n" : ": not written, there are no cells\n");
   return kOk;
 }
 
@@ -275,7 +276,10 @@ Command add_reproduce(CommandLine& app) {
       ->type_name("NAME")
       ->default_str("");
   add_measuring_options(app, *o);
-  app.add_option("--cells", o->cells, "Folder of the cells; cells in it are not measured again")
+  app.add_option("--cells", o->cells,
+                 "Folder of the cells; existing cells are not measured again. paper.md and its figures are "
+                 "written to "
+                 "the folder above it, or beside --report")
       ->type_name("DIR");
   app.add_option("--work", o->work, "Folder for checkpoints and unmarked fields")->type_name("DIR");
   add_lpips_weights(app, o->lpips_weights);

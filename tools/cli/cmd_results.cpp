@@ -7,6 +7,7 @@
 #include <chrono>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <sstream>
 
@@ -22,10 +23,13 @@ namespace fs = std::filesystem;
 using results::Plan;
 using results::PlannedRow;
 
+constexpr const char* kPages = "docs/results";
+
 struct ResultsArguments {
-  std::string rows = "docs/results/rows", out = "docs/results", work = "results_work";
+  std::string rows = "docs/results/rows", work = "results_work";
+  std::string out;  // empty: kPages
   std::vector<std::string> run;
-  double budget = 86400;
+  std::optional<double> budget;  // seconds; without limit by default
   bool stale = false, render = false, draft = false;
 };
 
@@ -84,7 +88,7 @@ class Runner {
     const double expected = before == rows_.end() || before->second["seconds"].is_null()
                                 ? 0
                                 : before->second["seconds"].get<double>();
-    if (context_.seconds() + expected > options_.budget)
+    if (options_.budget && context_.seconds() + expected > *options_.budget)
       return count("left", row.id + ": left, the budget has no " + format_duration(expected) + " for it");
     results::Measured m{.id = row.id,
                         .kind = row.kind,
@@ -208,21 +212,25 @@ Json list_rows(const Runner& runner, Context& context) {
 }
 
 void render(const ResultsArguments& options, const Runner& runner, Context& context) {
-  fs::create_directories(options.out);
+  const std::string out = options.out.empty() ? kPages : options.out;
+  fs::create_directories(out);
   const auto pages = results::render_pages(results::project_pages(), runner.rows(),
                                            [&](const std::string& id) { return runner.stale(id); });
-  for (const auto& [name, text] : pages) write_file_atomically(fs::path(options.out) / name, text);
-  results::write_paper_page(fs::path(options.rows) / "paper", fs::path(options.out) / "paper.md");
-  context.text() << options.out << ": " << pages.size() + 1 << " pages and charts written\n";
+  for (const auto& [name, text] : pages) write_file_atomically(fs::path(out) / name, text);
+  results::write_paper_page(fs::path(options.rows) / "paper", fs::path(out) / "paper.md");
+  context.text() << out << ": " << pages.size() + 1 << " pages and charts written\n";
 }
 
 int run_results(ResultsArguments options, Context& context) {
   const bool runs = options.stale || !options.run.empty();
+  if (!options.render && !options.out.empty()) throw UsageError("--out: needs --render");
+  if (!runs && options.budget) throw UsageError("--budget: needs --run or --stale");
   if (options.draft) options.rows = (fs::path(options.work) / "rows").string();
   const std::string commit = results::machine().commit;
   if (runs && !options.draft && (commit == "unknown" || commit.ends_with("changes")))
-    throw UsageError("--run: the sources have no clean commit (" + commit +
-                     "): commit them and build again, or give --draft");
+    throw UsageError(std::string(options.stale ? "--stale" : "--run") +
+                     ": expected sources with a clean commit, found " + commit +
+                     "; commit the changes and build again, or use --draft");
   Runner runner(options, context);
   for (const PlannedRow& row : runs ? selected(options, runner) : std::vector<PlannedRow>())
     runner.ensure(row);
@@ -238,7 +246,7 @@ int run_results(ResultsArguments options, Context& context) {
 Command add_results(CommandLine& app) {
   auto o = std::make_shared<ResultsArguments>();
   app.add_option("--rows", o->rows, "Folder of the rows, one JSON file each")->type_name("DIR");
-  app.add_option("--out", o->out, "Folder of the pages, for --render")->type_name("DIR");
+  app.add_option("--out", o->out, "Folder of the pages, for --render")->type_name("DIR")->default_str(kPages);
   app.add_option("--work", o->work, "Folder of fields, owners and logs that runs make")->type_name("DIR");
   auto named = app.add_option("--run", o->run,
                               "Measure these rows and those they need; a folder names all in it. "
@@ -247,11 +255,13 @@ Command add_results(CommandLine& app) {
                    ->type_name("ID[,ID...]")
                    ->default_str("");
   app.add_flag("--stale", o->stale, "Measure every row that is stale or missing")->excludes(named);
-  app.add_option("--budget", o->budget, "Start no row that would end after so many seconds, 1 to 10000000")
+  app.add_option("--budget", o->budget,
+                 "Start no row that would end after so many seconds, 1 to 10000000; default: no limit")
       ->range(1.0, 1e7)
-      ->type_name("S");
+      ->type_name("S")
+      ->default_str("");
   app.add_flag("--draft", o->draft, "Keep rows in WORK/rows, also from changed sources");
-  app.add_flag("--render", o->render, "Write all pages of docs/results from the rows alone");
+  app.add_flag("--render", o->render, "Write all pages to --out, from the rows alone");
   return [o](Context& context) { return run_results(*o, context); };
 }
 

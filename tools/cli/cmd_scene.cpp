@@ -1,5 +1,6 @@
 #include <fieldmark/nerf/analytic_scene.h>
 
+#include <filesystem>
 #include <memory>
 #include <ostream>
 
@@ -17,7 +18,18 @@ struct SceneArguments {
   Index views = 100;
 };
 
+// The files have the names of every data set in the Blender layout.
+void check_folder(const std::string& folder) {
+  for (const char* split : {"train", "val", "test"}) {
+    const std::string name = "transforms_" + std::string(split) + ".json";
+    if (std::filesystem::exists(std::filesystem::path(folder) / name))
+      throw IoError(folder + ": expected a folder without a data set, found " + name +
+                    "; name another folder");
+  }
+}
+
 int run_scene(const SceneArguments& options, Context& context) {
+  check_folder(options.out);
   const nerf::SceneOptions scene{.kind = nerf::parse_scene_kind(options.kind),
                                  .size = options.size,
                                  .views = options.views,
@@ -29,7 +41,8 @@ int run_scene(const SceneArguments& options, Context& context) {
     nerf::write_scene(scene, options.out, [&](Index done, Index total) {
       progress.update(static_cast<double>(done) / static_cast<double>(total));
       images = total;
-      if (guard.interrupted()) throw Interrupted(options.out + " has some images, but no transforms yet");
+      if (guard.interrupted())
+        throw Interrupted(options.out + " is incomplete; remove it and run the command again");
     });
   }
   context.text() << options.out << ": " << images << " views of " << options.size << "x" << options.size

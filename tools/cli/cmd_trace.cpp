@@ -91,10 +91,10 @@ Command add_trace(CommandLine& app) {
   app.add_option("--copies", o->copies, "Text file with the NAME of each `bake --copy`, one a line")
       ->required()
       ->type_name("FILE");
-  app.add_option(
-         "--fpr", o->fpr,
-         "Probability of naming any innocent recipient, at most, above 0 to 1: the corrected p-value at "
-         "which one counts as found")
+  app.add_option("--fpr", o->fpr,
+                 "Bound on the probability of naming any innocent recipient, above 0 to 1; the largest "
+                 "corrected p-value "
+                 "that counts as found")
       ->range(1e-300, 1.0)
       ->type_name("P");
   add_code_options(app, o->code);

@@ -186,6 +186,8 @@ TestScores test_scores(const TrainArguments& options, const nerf::RadianceField&
 
 void check_preset(const TrainArguments& options) {
   check_refinement(options.refinement, options.preset);
+  if (options.no_carve && options.refinement.poses)
+    throw UsageError("--no-carve: --refine-poses never carves");
   if (options.preset != "mlp") return;
   if (options.model == "sized") throw UsageError("--model sized: the mlp preset has one size");
   if (options.supersampling > 1)
@@ -243,6 +245,7 @@ int run_train(const TrainArguments& options, Context& context) {
   const std::string checkpoint = options.out + ".checkpoint";
   check_preset(options);
   check_writable(options.out);
+  if (!options.resume) check_writable(checkpoint);  // a checkpoint of embed holds a key
   if (options.refinement.poses) check_writable_page(cameras_file(options.out));
   const nerf::Dataset data = training_data(options, context);
   const std::vector<nerf::SurveyedView> surveyed = nerf::survey_views(data);
@@ -363,7 +366,7 @@ Command add_train(CommandLine& app) {
       ->type_name("M")
       ->default_str("");
   add_refinement(app, o->refinement);
-  app.add_flag("--no-carve", o->no_carve, "Keep samples outside the silhouettes");
+  app.add_flag("--no-carve", o->no_carve, "Keep samples outside the silhouettes; for images with alpha");
   app.add_flag("--resume", o->resume,
                "Resume from FIELD.checkpoint, with the options of the interrupted run");
   return [o](Context& context) { return run_train(*o, context); };

@@ -4,6 +4,7 @@
 
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <ostream>
 
 #include <fieldmark/tools/results/report.h>
@@ -23,7 +24,7 @@ struct VerifyArguments {
   MessageOption message;
   CodeOption code;
   double fpr = 1e-6;
-  Index wrong_keys = 0;
+  std::optional<Index> wrong_keys;
   std::vector<std::string> controls;
   Suspects suspects;
 };
@@ -112,8 +113,7 @@ int run_verify(const VerifyArguments& options, Context& context) {
     controls = test_controls(test, reader, images, options.controls, context);
   record.controls = controls.controls;
   print_controls(context.text(), record.controls, options.fpr);
-  const Index keys =
-      options.wrong_keys == 0 && !options.evidence.empty() ? kEvidenceKeys : options.wrong_keys;
+  const Index keys = options.wrong_keys.value_or(options.evidence.empty() ? 0 : kEvidenceKeys);
   if (keys > 0) record.wrong_keys = count_keys(test, evidence, keys, context);
   const Json wrong =
       record.wrong_keys ? key_counts(*record.wrong_keys, "wrong keys", context) : Json(nullptr);
@@ -140,7 +140,7 @@ Command add_verify(CommandLine& app) {
   add_code_options(app, o->code);
   add_copy_option(app, o->code, "Recipient whose copy to look for");
   app.add_option("--wrong-keys", o->wrong_keys,
-                 "Random keys to test as well, 0 to 10000000; default: 0, with --evidence 100000")
+                 "Random keys to test as well, 0 to 10000000; default: 0, or 100000 with --evidence")
       ->range(0, 10000000)
       ->type_name("N")
       ->default_str("");

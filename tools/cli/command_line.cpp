@@ -25,8 +25,9 @@ std::string fault_of_whole(const std::string& text) {
   const bool octal = text.size() > first + 1 && text[first] == '0';
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error == std::errc{} && end == text.data() + text.size() && !octal) return "";
-  return "expected a whole number" + std::string(std::is_unsigned_v<T> ? " from 0" : "") + " to " +
-         std::to_string(std::numeric_limits<T>::max()) + " in decimal digits, got " + text;
+  return "expected a whole number from " + std::to_string(std::numeric_limits<T>::min()) + " to " +
+         std::to_string(std::numeric_limits<T>::max()) + " in decimal digits without leading zeros, got " +
+         text;
 }
 
 std::string fault_of_empty(const std::string& text) {

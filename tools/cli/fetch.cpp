@@ -180,8 +180,9 @@ bool fetch_file(const std::string& url, const fs::path& to, const Manifest::File
 
 Fetched fetch_manifest(const Manifest& manifest, const fs::path& folder, const FetchProgress& progress) {
   if (manifest.base_url.empty())
-    throw IoError(manifest.name + ": no address of its files is known; get it by hand from " + manifest.url +
-                  ", then compare with: fieldmark data verify " + manifest.name + " " + folder.string());
+    throw IoError(
+        manifest.name + ": no address of its files is known; give --base-url URL, or get it by hand from " +
+        manifest.url + ", then compare with: fieldmark data verify " + manifest.name + " " + folder.string());
   Fetched result;
   std::uintmax_t before = 0;
   for (const auto& file : manifest.files) {

@@ -59,7 +59,7 @@ Listing list_folder(const fs::path& folder, Videos videos) {
   return found;
 }
 
-// Returns "3 files that are hidden or no images are skipped: 1 hidden, 2 .txt", or an empty text.
+// Returns "skipped 3 files that are hidden or not images: 1 hidden, 2 .txt", or an empty text.
 std::string skipped(const Listing& listing) {
   std::size_t count = 0;
   std::string kinds;
@@ -68,7 +68,7 @@ std::string skipped(const Listing& listing) {
     kinds += (kinds.empty() ? "" : ", ") + std::to_string(files) + " " + kind;
   }
   return count == 0 ? ""
-                    : std::to_string(count) + " files that are hidden or no images are skipped: " + kinds;
+                    : "skipped " + std::to_string(count) + " files that are hidden or not images: " + kinds;
 }
 
 }  // namespace

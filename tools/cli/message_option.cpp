@@ -9,6 +9,8 @@ namespace {
 
 using watermark::PayloadKind;
 
+constexpr Index kMostPayloadBits = 256;  // of PayloadCodec; messages may be longer
+
 watermark::Message encoded(const char* option, PayloadKind kind, const std::string& value, Index bits) {
   return read_option(
       option, [&] { return watermark::PayloadCodec(bits).encode(watermark::parse_payload(kind, value)); });
@@ -18,14 +20,13 @@ watermark::Message encoded(const char* option, PayloadKind kind, const std::stri
 
 void add_message_options(CommandLine& app, MessageOption& o, const std::string& purpose) {
   Option all[] = {
-      app.add_option("--message", o.message,
-                     purpose + " in hexadecimal, most significant bit first, as long as the owner's --bits")
+      app.add_option("--message", o.message, purpose + " in hexadecimal, most significant bit first")
           ->type_name("HEX"),
       app.add_option("--text", o.text, "UTF-8 text instead of --message, encoded with error correction")
-          ->type_name("T"),
+          ->type_name("TEXT"),
       app.add_option("--uuid", o.uuid,
                      "UUID instead of --message, encoded with error correction; needs 147 bits or more")
-          ->type_name("U"),
+          ->type_name("UUID"),
       app.add_option("--payload", o.payload,
                      "1 to 32 hexadecimal digits instead of --message, encoded with error correction")
           ->type_name("HEX")};
@@ -42,12 +43,14 @@ watermark::Message message_of(const MessageOption& o, Index bits) {
 }
 
 Json payload_json(const watermark::Message& message) {
+  if (message.size() > kMostPayloadBits) return nullptr;
   const auto payload = watermark::PayloadCodec(message.size()).payload(message);
   if (!payload) return nullptr;
   return {{"kind", watermark::payload_kind_name(payload->kind)}, {"value", payload->value}};
 }
 
 std::optional<watermark::PayloadReading> read_payload(const std::vector<double>& logit) {
+  if (std::ssize(logit) > kMostPayloadBits) return std::nullopt;
   return watermark::PayloadCodec(static_cast<Index>(logit.size())).read(logit);
 }
 
@@ -61,6 +64,7 @@ Json payload_json(const std::optional<watermark::PayloadReading>& reading) {
 
 std::string payload_text(const std::optional<watermark::PayloadReading>& reading, Index bits) {
   if (!reading) {
+    if (bits > kMostPayloadBits) return "none: a payload needs a message of at most 256 bits";
     const watermark::PayloadCodec codec(bits);
     if (codec.layouts().empty()) return "none: a message of so few bits holds no payload";
     char text[80];

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <ostream>
+#include <utility>
 
 #include "cli/cli.h"
 #include "cli/context.h"
@@ -75,9 +76,8 @@ Option add_suspects(CommandLine& app, Suspects& suspects, const std::string& wha
       ->range(1, 100000)
       ->type_name("N")
       ->default_str("");
-  app.add_option(
-         "--readings", suspects.readings,
-         "File to keep what each image shows, so that a run that was stopped goes on from it; default: none")
+  app.add_option("--readings", suspects.readings,
+                 "File of readings to reuse and extend, so that an interrupted run resumes; default: none")
       ->type_name("FILE")
       ->default_str("");
   return app
@@ -145,6 +145,10 @@ std::vector<ImageEvidence> read_images(SuspectReader& reader, const Suspects& su
   const auto files = list_images(suspects.paths, context, Videos::read);
   if (suspects.frames && std::ranges::none_of(files, is_video))
     throw UsageError("--frames: there is no video among the images");
+  for (const auto& [option, file] :
+       {std::pair{"--json", context.options().json}, {"--report", context.options().report}})
+    if (!file.empty() && file == suspects.readings)
+      throw UsageError(std::string(option) + ": " + file + " is the file of --readings; name another file");
   std::optional<KeptReadings> kept;
   if (!suspects.readings.empty())
     kept.emplace(suspects.readings, sha256_file_hex(owner.string()), reader.detection(), reader.cells());

@@ -79,8 +79,10 @@ void add_training_attack(CommandLine& app, TrainingAttackOptions& o) {
          "PSNR of the changed against the unchanged renders on the foreground in dB, 10 to 60; for remove")
       ->range(10.0, 60.0)
       ->type_name("DB");
-  app.add_option("--size", o.size,
-                 "Longer side of the training images in pixels, 16 to 8192; default: original size")
+  app.add_option(
+         "--size", o.size,
+         "Longer side of the training images in pixels, 16 to 8192; default: original size, of renders as "
+         "trained; not for remove")
       ->range(16, 8192)
       ->type_name("N")
       ->default_str("");

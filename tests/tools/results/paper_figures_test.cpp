@@ -1,18 +1,11 @@
 #include <fieldmark/tools/results/paper_figures.h>
 
 #include "support/catch.h"
+#include "support/count_parts.h"
 #include "support/temporary_folder.h"
 #include "tools/paper_cells.h"
 
 using namespace fieldmark;
-
-namespace {
-std::size_t count(const std::string& text, const std::string& part) {
-  std::size_t n = 0;
-  for (std::size_t at = 0; (at = text.find(part, at)) != std::string::npos; at += part.size()) ++n;
-  return n;
-}
-}  // namespace
 
 TEST_CASE("Lines of lengths, of the severities that were measured, and of the course of training",
           "[paper_figures]") {
@@ -21,12 +14,13 @@ TEST_CASE("Lines of lengths, of the severities that were measured, and of the co
   const auto figures = results::paper_figures(cells);
   REQUIRE(figures.size() == 4);  // nothing was rotated, scaled or blurred
   // Two lengths of one system, and the paper's numbers at five lengths for the systems that can be run.
-  CHECK(count(figures.at("paper_bits.svg"), "class=\"point\"") % 5 == 2);
+  CHECK(count_parts(figures.at("paper_bits.svg"), "class=\"point\"") % 5 == 2);
   CHECK_THAT(figures.at("paper_bits.svg"), Contains("CopyRNeRF, preset paper, published"));
   CHECK_THAT(figures.at("paper_bits.svg"), !Contains("Fieldmark"));
-  CHECK(count(figures.at("paper_noise.svg"), "class=\"point\"") == 2 * 3);  // no noise and two severities
-  CHECK(count(figures.at("paper_learning.svg"), "class=\"point\"") == 2);
-  CHECK(count(figures.at("paper_learning_ablation.svg"), "class=\"point\"") == 2);
+  CHECK(count_parts(figures.at("paper_noise.svg"), "class=\"point\"") ==
+        2 * 3);  // no noise and two severities
+  CHECK(count_parts(figures.at("paper_learning.svg"), "class=\"point\"") == 2);
+  CHECK(count_parts(figures.at("paper_learning_ablation.svg"), "class=\"point\"") == 2);
   CHECK(results::paper_figures({}).size() == 1);  // only lengths that the paper reports
 }
 

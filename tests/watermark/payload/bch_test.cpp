@@ -8,6 +8,7 @@
 #include <string>
 
 #include "support/catch.h"
+#include "watermark/bits_of.h"
 
 using namespace fieldmark;
 using namespace fieldmark::watermark;
@@ -15,12 +16,6 @@ using namespace fieldmark::watermark;
 namespace {
 
 using Bits = std::vector<std::uint8_t>;
-
-Bits bits_of(unsigned value, Index n) {
-  Bits bits;
-  for (Index i = n - 1; i >= 0; --i) bits.push_back(static_cast<std::uint8_t>((value >> i) & 1));
-  return bits;
-}
 
 unsigned value_of(const Bits& bits) {
   unsigned value = 0;

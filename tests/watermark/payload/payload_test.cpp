@@ -4,17 +4,12 @@
 #include <cmath>
 
 #include "support/catch.h"
+#include "watermark/bits_of.h"
 
 using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
-
-std::vector<std::uint8_t> bits_of(std::uint64_t value, int n) {
-  std::vector<std::uint8_t> bits;
-  for (int i = n - 1; i >= 0; --i) bits.push_back(static_cast<std::uint8_t>((value >> i) & 1));
-  return bits;
-}
 
 constexpr const char* kUuid = "01234567-89ab-cdef-0123-456789abcdef";
 

@@ -323,9 +323,9 @@ std::string protocol_table(const std::vector<Cell>& cells) {
 
 }  // namespace
 
-void write_paper_page(const std::filesystem::path& folder, const std::filesystem::path& page) {
+bool write_paper_page(const std::filesystem::path& folder, const std::filesystem::path& page) {
   const auto cells = baselines::load_cells(folder);
-  if (cells.empty()) return;
+  if (cells.empty()) return false;
   const auto beside = [&](const std::string& name) { return page.parent_path() / name; };
   std::vector<std::string> figures;
   for (const auto& [name, svg] : paper_figures(cells)) {
@@ -343,6 +343,7 @@ void write_paper_page(const std::filesystem::path& folder, const std::filesystem
     notes += "\n";
   }
   write_file_atomically(page, paper_page(cells, figures, notes));
+  return true;
 }
 
 std::string paper_page(const std::vector<Cell>& cells, const std::vector<std::string>& figures,

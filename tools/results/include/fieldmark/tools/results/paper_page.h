@@ -16,6 +16,6 @@ std::string paper_page(const std::vector<baselines::Cell>& cells, const std::vec
 /// Writes the page of the cells in a folder, with its figures and sheets next to it. Writes nothing if there
 /// is no cell.
 /// @param folder  holds the rows of `fieldmark reproduce`   @throws IoError
-void write_paper_page(const std::filesystem::path& folder, const std::filesystem::path& page);
+bool write_paper_page(const std::filesystem::path& folder, const std::filesystem::path& page);
 
 }  // namespace fieldmark::results
