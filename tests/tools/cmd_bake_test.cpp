@@ -205,6 +205,9 @@ TEST_CASE("bake takes messages that are too long for a payload", "[bake]") {
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
   CHECK(nlohmann::json::parse(r.out)["payload"].is_null());
+  const auto measured = run_command({"measure", "--owner", owner, "--bits", "264", "--count", "1"});
+  CHECK(measured.code == cli::kUsage);
+  CHECK_THAT(measured.err, Contains("--bits: measure takes messages of at most 256 bits, got 264"));
   const auto read = run_command({"extract", "--owner", owner, "--bits", "264", "--detection", "blind",
                                  "--fpr", "1", "--json", "-", job.images()});
   INFO(read.err);

@@ -81,8 +81,7 @@ Command add_bench_tracing(CommandLine& app) {
   add_number(app, "--views", o->options.views, 1, 10000, "Novel views whose evidence is added, 1 to 10000");
   app.add_option("--fpr", o->options.fpr,
                  "Bound on the probability of naming any innocent recipient, above 0 to 1; the largest "
-                 "corrected p-value "
-                 "that counts as found")
+                 "corrected p-value that counts as found")
       ->range(1e-300, 1.0)
       ->type_name("P");
   app.add_flag("--blind", o->blind, "Read by blind detection alone");

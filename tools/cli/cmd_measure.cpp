@@ -179,6 +179,8 @@ int run_measure(const MeasureArguments& options, Context& context) {
   const auto lpips = load_lpips(LpipsNetwork::alex, options.lpips_weights, context);
   MeasureSubject subject{watermark::Owner::load(options.owner), {}, {}};
   choose_code(options.code, options.message, subject.owner, context);
+  if (const Index bits = subject.owner.options().bits; bits > kMostPayloadBits)
+    throw UsageError("--bits: measure takes messages of at most 256 bits, got " + std::to_string(bits));
   if (options.together > 1 && options.field.empty() && !options.payloads)
     throw UsageError("--together: needs --payloads, or a --field whose message is a payload");
   if (!options.field.empty()) {

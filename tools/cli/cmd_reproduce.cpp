@@ -278,8 +278,7 @@ Command add_reproduce(CommandLine& app) {
   add_measuring_options(app, *o);
   app.add_option("--cells", o->cells,
                  "Folder of the cells; existing cells are not measured again. paper.md and its figures are "
-                 "written to "
-                 "the folder above it, or beside --report")
+                 "written to the folder above it, or beside --report")
       ->type_name("DIR");
   app.add_option("--work", o->work, "Folder for checkpoints and unmarked fields")->type_name("DIR");
   add_lpips_weights(app, o->lpips_weights);

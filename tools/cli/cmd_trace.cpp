@@ -93,8 +93,7 @@ Command add_trace(CommandLine& app) {
       ->type_name("FILE");
   app.add_option("--fpr", o->fpr,
                  "Bound on the probability of naming any innocent recipient, above 0 to 1; the largest "
-                 "corrected p-value "
-                 "that counts as found")
+                 "corrected p-value that counts as found")
       ->range(1e-300, 1.0)
       ->type_name("P");
   add_code_options(app, o->code);

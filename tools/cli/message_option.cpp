@@ -9,8 +9,6 @@ namespace {
 
 using watermark::PayloadKind;
 
-constexpr Index kMostPayloadBits = 256;  // of PayloadCodec; messages may be longer
-
 watermark::Message encoded(const char* option, PayloadKind kind, const std::string& value, Index bits) {
   return read_option(
       option, [&] { return watermark::PayloadCodec(bits).encode(watermark::parse_payload(kind, value)); });

@@ -14,6 +14,9 @@ class Option;
 
 namespace fieldmark::cli {
 
+/// The longest message that can hold a payload, bits; raw messages may be longer.
+inline constexpr Index kMostPayloadBits = 256;
+
 /// A raw message, or the payload that it encodes; at most one is given.
 struct MessageOption {
   std::string message, text, uuid, payload;
