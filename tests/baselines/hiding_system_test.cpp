@@ -43,6 +43,11 @@ TEST_CASE("hiding_system: marked images keep what is transparent, and their mark
       }
     }
     CHECK((opaque > 50 && clear > 50));
+    CHECK(before.data != after.data);
+    // Over the whole image, the mark is at most as strong as requested, because the background's part is
+    // lost.
+    CHECK(psnr(nerf::composited(marked.views[v], data.background),
+               nerf::composited(data.views[v], data.background)) > 25.5);
   }
 }
 

@@ -110,35 +110,18 @@ TEST_CASE("bake encodes payloads, and the other commands know them and their com
   const TinyJob& job = TinyJob::get();
   const std::string owner = job.folder / "long.fm", baked = job.folder / "long_baked.fm",
                     images = job.images();
-  const auto json_of = [](const std::vector<std::string>& line) {
-    auto with_json = line;
-    with_json.insert(with_json.end(), {"--json", "-"});
-    const auto r = run_command(with_json);
+  const auto json_in = [](const Outcome& r) {
     INFO(r.err);
     REQUIRE((r.code == cli::kOk || r.code == cli::kNotFound));
     return nlohmann::json::parse(r.out);
   };
-  const auto embedded = json_of({"embed",
-                                 "--field",
-                                 job.field,
-                                 "--out",
-                                 owner,
-                                 "--bits",
-                                 "48",
-                                 "--cells",
-                                 "8",
-                                 "--reader-size",
-                                 "32",
-                                 "--steps",
-                                 "1",
-                                 "--views",
-                                 "8",
-                                 "--measured-views",
-                                 "1",
-                                 "--text",
-                                 "hi",
-                                 "--key",
-                                 test_key_file(job.folder)});
+  const auto json_of = [&](std::vector<std::string> line) {
+    line.insert(line.end(), {"--json", "-"});
+    return json_in(run_command(line));
+  };
+  const auto embedded = json_in(tiny_embed(job.field, owner,
+                                           {"--bits", "48", "--cells", "8", "--steps", "1",
+                                            "--measured-views", "1", "--text", "hi", "--json", "-"}));
   const auto bake = json_of({"bake", "--owner", owner, "--text", "hi", "--out", baked, "--steps", "1"});
   CHECK(bake["payload"] == nlohmann::json{{"kind", "text"}, {"value", "hi"}});
   CHECK(bake["message"].get<std::string>().substr(0, 5) == "76869");  // version 7, then the text
@@ -196,10 +179,8 @@ TEST_CASE("bake takes messages that are too long for a payload", "[bake]") {
   const TinyJob& job = TinyJob::get();
   const std::string baked = job.folder / "longest.fm", message(66, 'a');
   const std::string owner = job.folder / "many_cells.fm";
-  REQUIRE(run_command({"embed", "--field", job.field, "--out", owner, "--bits", "16", "--cells", "12",
-                       "--reader-size", "32", "--steps", "1", "--views", "8", "--measured-views", "1",
-                       "--key", test_key_file(job.folder)})
-              .code == cli::kOk);
+  REQUIRE(tiny_embed(job.field, owner, {"--cells", "12", "--steps", "1", "--measured-views", "1"}).code ==
+          cli::kOk);
   const auto r = run_command(
       {"bake", "--owner", owner, "--message", message, "--out", baked, "--steps", "1", "--json", "-"});
   INFO(r.err);

@@ -72,30 +72,10 @@ TEST_CASE("embed gives the same bytes for the same seed and key", "[embed]") {
 TEST_CASE("embed learns from views at several distances, and from several samples of a ray", "[embed]") {
   const TinyJob& job = TinyJob::get();
   const std::string owner = job.folder / "several.fm";
-  const auto embed = [&](const char* distances, const char* more) {
-    return run_command({"embed",
-                        "--field",
-                        job.field,
-                        "--out",
-                        owner,
-                        "--bits",
-                        "4",
-                        "--cells",
-                        "6",
-                        "--reader-size",
-                        "32",
-                        "--steps",
-                        "1",
-                        "--views",
-                        "8",
-                        "--measured-views",
-                        "1",
-                        "--distances",
-                        distances,
-                        "--samples",
-                        more,
-                        "--key",
-                        test_key_file(job.folder)});
+  const auto embed = [&](const char* distances, const char* samples) {
+    return tiny_embed(
+        job.field, owner,
+        {"--steps", "1", "--measured-views", "1", "--distances", distances, "--samples", samples});
   };
   const auto r = embed("several", "2");
   INFO(r.err);
@@ -166,27 +146,8 @@ TEST_CASE("embed --preset paper and code give an owner that bakes and reads like
   const TinyJob& job = TinyJob::get();
   for (const std::string preset : {"paper", "code"}) {
     const std::string owner = job.folder / (preset + ".fm"), baked = job.folder / "paper_baked.fm";
-    const auto r = run_command({"embed",
-                                "--preset",
-                                preset,
-                                "--field",
-                                job.field,
-                                "--out",
-                                owner,
-                                "--bits",
-                                "4",
-                                "--reader-size",
-                                "32",
-                                "--steps",
-                                "1",
-                                "--views",
-                                "8",
-                                "--measured-views",
-                                "1",
-                                "--key",
-                                test_key_file(job.folder),
-                                "--json",
-                                "-"});
+    const auto r = tiny_embed(job.field, owner,
+                              {"--preset", preset, "--steps", "1", "--measured-views", "1", "--json", "-"});
     INFO(r.err);
     REQUIRE(r.code == cli::kOk);
     CHECK_THAT(r.err, Contains("training ended in its warm start of 1500 steps"));

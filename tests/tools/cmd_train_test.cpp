@@ -196,6 +196,15 @@ TEST_CASE(
   CHECK(run_command(
             {"train", "--data", scene, "--out", folder / "no.fm", "--model", "sized", "--preset", "mlp"})
             .code == cli::kUsage);
+
+  // A third of a second ends before any tables have been compared.
+  const auto short_run = run_command({"train", "--data", scene, "--out", folder / "short.fm", "--model",
+                                      "sized", "--seconds", "1", "--json", "-"});
+  INFO(short_run.err);
+  REQUIRE(short_run.code == cli::kOk);
+  const nlohmann::json unknown = nlohmann::json::parse(short_run.out)["sizing"];
+  CHECK(unknown["trials"].size() <= 2);
+  CHECK(unknown["log2_table"] == nerf::field_options({.seconds = 1}).field.encoding.log2_table);
 }
 
 TEST_CASE("train --model sized goes on with the sizes of its checkpoint", "[train]") {

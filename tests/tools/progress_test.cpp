@@ -28,7 +28,7 @@ TEST_CASE("Progress away from a terminal is a line for each tenth", "[progress]"
   const std::string text = out.str();
   CHECK(std::count(text.begin(), text.end(), '\n') == 10);
   CHECK(text.find('\r') == std::string::npos);
-  CHECK_THAT(text, Contains("train 10%  ") && Contains(" left  loss 1\n") && Contains("train 100%  in "));
+  CHECK_THAT(text, Contains("train 10%  ") && Contains(" left  loss 1\n") && Contains("train 100%  in 0 s"));
 }
 
 TEST_CASE("Progress of a resumed run estimates the time left from its own work", "[progress]") {
@@ -52,10 +52,10 @@ TEST_CASE("Progress on a terminal rewrites one line and ends it", "[progress]") 
   }
   const std::string text = out.str();
   CHECK(text.front() == '\r');
-  CHECK(std::count(text.begin(), text.end(), '\r') < 50);  // of 1,002 updates
+  CHECK(std::count(text.begin(), text.end(), '\r') < 5);
   CHECK(std::count(text.begin(), text.end(), '\n') == 1);
   const auto last = text.substr(text.rfind('\r') + 1);
-  CHECK(last.starts_with("train 100%  in "));
+  CHECK_THAT(last, Contains("train 100%  in 0 s   "));
   CHECK(last.ends_with("   \n"));  // over a longer line
 }
 

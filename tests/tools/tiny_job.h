@@ -11,16 +11,20 @@
 #include "tools/test_key_file.h"
 #include "tools/tiny_scene.h"
 
-/// Embeds messages of 4 bits in a field in two steps, too few to read anything. The key is fixed, so that the
-/// owner is the same in every run.
+/// Runs `embed` for two steps, too few to read anything: 4 bits, 6 cells per axis for preset fast, and a
+/// fixed key, so that the owner is the same in every run.
+/// @param more  further options; they replace those above
 inline Outcome tiny_embed(const std::string& field, const std::string& owner,
                           const std::vector<std::string>& more) {
-  std::vector<std::string> words{"embed", "--field",       field, "--out",   owner, "--bits",  "4", "--cells",
-                                 "6",     "--reader-size", "32",  "--steps", "2",   "--views", "8"};
-  words.insert(words.end(), more.begin(), more.end());
+  const auto given = [&](const char* name) { return std::ranges::find(more, name) != more.end(); };
   const TemporaryFolder folder;
-  if (std::find(more.begin(), more.end(), "--key") == more.end())
-    words.insert(words.end(), {"--key", test_key_file(folder)});
+  std::vector<std::string> words{"embed", "--field", field, "--out", owner};
+  const std::string usual[][2] = {{"--bits", "4"},  {"--cells", "6"}, {"--reader-size", "32"},
+                                  {"--steps", "2"}, {"--views", "8"}, {"--key", test_key_file(folder)}};
+  for (const auto& [name, value] : usual)
+    if (!given(name.c_str()) && !(name == "--cells" && given("--preset")))
+      words.insert(words.end(), {name, value});
+  words.insert(words.end(), more.begin(), more.end());
   return run_command(words);
 }
 

@@ -42,8 +42,10 @@ TEST_CASE("collapse_bench: a weight that is not a number is noticed right after 
                              {.after = 0.2, .patience = 20, .seed = 1}, [&] { ++ticks; });
   CHECK(w.said == "the loss is not a number");
   CHECK(w.noticed_after >= 0);
+  CHECK(w.noticed_after < 10);
   CHECK(w.steps > 1);
   CHECK(w.collapsed());
+  CHECK(ticks >= w.steps);
   CHECK(struck > 1);
   CHECK((ticks >= struck && ticks <= struck + 1));  // the step that it strikes is the last
 }
