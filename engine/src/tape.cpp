@@ -1,20 +1,21 @@
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/engine/tape.h>
 
+#include "kernels/gemm.h"
+#include "ops/elementwise.h"
+
 namespace fieldmark::detail {
 
 template <class T>
 void seed_gradient(const T* seed, const T* mask, bool fresh, T* g, Index n) {
+  using namespace kernels;
+  const auto copy_masked = FIELDMARK_KERNEL(pad_rows<T>);
   parallel_for(n, Index{1} << 15, [=](Index begin, Index end) {
+    const Index count = end - begin;
     if (!fresh)
-      for (Index i = begin; i < end; ++i) g[i] += seed[i];
-    else if (!mask)
-      std::copy(seed + begin, seed + end, g + begin);
+      Out<T>(g + begin, count) += In<T>(seed + begin, count);
     else
-      for (Index i = begin; i < end; ++i) {
-        const T s = seed[i];
-        g[i] = mask[i] > 0 ? s : T(0);
-      }
+      copy_masked(seed + begin, 1, count, mask ? mask + begin : nullptr, count, g + begin);
   });
 }
 

@@ -3,6 +3,7 @@
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/imaging/metrics.h>
 
+#include <Eigen/Core>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -10,6 +11,7 @@
 #include <numeric>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace fieldmark {
@@ -64,36 +66,51 @@ std::array<double, kWindow> gaussian() {
   return w;
 }
 
+using Moments = Eigen::Array<double, Eigen::Dynamic, 5>;  // a, b, a a, b b, a b
+
+Moments moments_of(const Tensor<float>& a, const Tensor<float>& b, Index row) {
+  const Index line = a.shape[1] * a.shape[2];
+  const auto line_of = [&](const Tensor<float>& image) {
+    return Eigen::Map<const Eigen::ArrayXf>(&image.data[static_cast<std::size_t>(row * line)], line);
+  };
+  Moments m(line, 5);
+  m.col(0) = line_of(a).cast<double>();
+  m.col(1) = line_of(b).cast<double>();
+  m.col(2) = m.col(0) * m.col(0);
+  m.col(3) = m.col(1) * m.col(1);
+  m.col(4) = m.col(0) * m.col(1);
+  return m;
+}
+
+// Returns the sum of w_k part(k) as one expression, which Eigen evaluates in one pass.
+template <class Part, std::size_t... K>
+auto filtered(const std::array<double, kWindow>& w, Part part, std::index_sequence<K...>) {
+  return (... + (w[K] * part(static_cast<Index>(K))));
+}
+
 // Rows [begin, end) of window positions. The window is separable: for each row of positions, five moments are
 // filtered down the columns over all channels at once, and then along the row.
 double ssim_rows(const Tensor<float>& a, const Tensor<float>& b, Index begin, Index end) {
   static const std::array<double, kWindow> window = gaussian();
+  constexpr std::make_index_sequence<kWindow> kTaps;
   const Index channels = a.shape[2], line = a.shape[1] * channels,
               positions = line - (kWindow - 1) * channels;
-  using Moments = std::array<double, 5>;  // a, b, a a, b b, a b
-  std::vector<Moments> column(static_cast<std::size_t>(line));
+  std::vector<Moments> lines;
+  for (Index row = begin; row < end + kWindow - 1; ++row) lines.push_back(moments_of(a, b, row));
+  Moments column(line, 5), m(positions, 5);
+  Eigen::ArrayXd likeness(positions);
   double sum = 0;
-  for (Index row = begin; row < end; ++row) {
-    column.assign(column.size(), Moments{});
-    for (Index k = 0; k < kWindow; ++k) {
-      const double w = window[static_cast<std::size_t>(k)];
-      for (Index i = 0; i < line; ++i) {
-        const double x = static_cast<double>(a[(row + k) * line + i]),
-                     y = static_cast<double>(b[(row + k) * line + i]);
-        Moments& m = column[static_cast<std::size_t>(i)];
-        m = {m[0] + w * x, m[1] + w * y, m[2] + w * x * x, m[3] + w * y * y, m[4] + w * x * y};
-      }
+  for (Index row = 0; row < end - begin; ++row) {
+    for (Index q = 0; q < m.cols(); ++q) {
+      column.col(q) = filtered(
+          window, [&](Index k) { return lines[static_cast<std::size_t>(row + k)].col(q); }, kTaps);
+      m.col(q) = filtered(
+          window, [&](Index k) { return column.col(q).segment(k * channels, positions); }, kTaps);
     }
-    double row_sum = 0;
-    for (Index i = 0; i < positions; ++i) {
-      Moments m{};
-      for (Index k = 0; k < kWindow; ++k)
-        for (std::size_t q = 0; q < m.size(); ++q)
-          m[q] += window[static_cast<std::size_t>(k)] * column[static_cast<std::size_t>(i + k * channels)][q];
-      const double ma = m[0], mb = m[1], va = m[2] - ma * ma, vb = m[3] - mb * mb, cov = m[4] - ma * mb;
-      row_sum += (2 * ma * mb + kC1) * (2 * cov + kC2) / ((ma * ma + mb * mb + kC1) * (va + vb + kC2));
-    }
-    sum += row_sum;
+    const auto ma = m.col(0), mb = m.col(1);
+    const auto va = m.col(2) - ma * ma, vb = m.col(3) - mb * mb, cov = m.col(4) - ma * mb;
+    likeness = (2 * ma * mb + kC1) * (2 * cov + kC2) / ((ma * ma + mb * mb + kC1) * (va + vb + kC2));
+    sum += std::accumulate(likeness.begin(), likeness.end(), 0.0);
   }
   return sum;
 }

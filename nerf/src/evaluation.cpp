@@ -1,4 +1,5 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/engine/parallel.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/imaging/metrics.h>
 #include <fieldmark/nerf/colour_fit.h>
@@ -16,6 +17,7 @@ namespace fieldmark::nerf {
 namespace {
 
 constexpr Index kSsimWindow = 11;
+constexpr Index kBatch = 8;  // views rendered one by one and scored together, each by one thread
 
 // Returns [H, W], above 0.5 on the foreground.
 Tensor<float> foreground_mask(const View& view, const Rendering& rendering) {
@@ -76,13 +78,23 @@ Evaluation evaluate(Renderer& renderer, const Dataset& dataset,
   if (dataset.views.empty()) throw ValueError("[evaluate] dataset must have at least one view, got 0");
   Evaluation result;
   double seconds = 0;
-  for (const View& view : dataset.views) {
-    const auto start = Clock::now();
-    Rendering rendering = renderer.render(view.camera, view.offsets.get());
-    seconds += std::chrono::duration<double>(Clock::now() - start).count();
-    result.per_view.push_back(score(view, std::move(rendering), dataset.background, lpips));
-    ++result.views;
-    if (progress && !progress(result.views, static_cast<Index>(dataset.views.size()))) break;
+  const Index total = std::ssize(dataset.views);
+  for (bool more = true; more && result.views < total;) {
+    const std::span views = std::span(dataset.views).subspan(at(result.views));
+    std::vector<Rendering> renderings;
+    while (more && std::ssize(renderings) < std::min<Index>(kBatch, std::ssize(views))) {
+      const View& view = views[renderings.size()];
+      const auto start = Clock::now();
+      renderings.push_back(renderer.render(view.camera, view.offsets.get()));
+      seconds += std::chrono::duration<double>(Clock::now() - start).count();
+      ++result.views;
+      more = !progress || progress(result.views, total);
+    }
+    std::vector<ViewScore> scores(renderings.size());
+    parallel_for(std::ssize(scores), 1, [&](Index i, Index) {
+      scores[at(i)] = score(views[at(i)], std::move(renderings[at(i)]), dataset.background, lpips);
+    });
+    result.per_view.insert(result.per_view.end(), scores.begin(), scores.end());
   }
   result.psnr = mean(result.per_view, &ViewScore::psnr);
   result.psnr_foreground = mean(result.per_view, &ViewScore::psnr_foreground);

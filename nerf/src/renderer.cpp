@@ -15,6 +15,14 @@ namespace {
 constexpr Index kMlpRays = 64;  // of an mlp field at a time, because its samples take much memory
 constexpr Index kTile = 16;     // pixels along a side; rays of a tile pass through the same cells
 
+// Copies points, [.., 3]: to[k] = from[rows[k]].
+void gather_points(std::span<const float> from, const std::vector<std::int32_t>& rows,
+                   std::vector<float>& to) {
+  to.resize(3 * rows.size());
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    for (std::size_t a = 0; a < 3; ++a) to[3 * k + a] = from[3 * at(rows[k]) + a];
+}
+
 // Returns the offsets of the k x k parts of each pixel, in pixels of the image that has those parts as
 // pixels.
 PixelOffsets finer_offsets(const PixelOffsets& offsets, Index width, Index k) {
@@ -102,17 +110,14 @@ void Renderer::trace_block(const RayBatch& rays, Lane& lane) {
   // Computes the colours of the samples that matter, repeating the ray's encoded direction for each.
   lane.kept.clear();
   lane.sample_ray.clear();
-  lane.positions.clear();
-  lane.seen_from.clear();
-  const auto append = [](std::vector<float>& to, const float* from) { to.insert(to.end(), from, from + 3); };
   for (Index r = 0; r < rays.size(); ++r)
     for (Index i = s.ray_begin[at(r)]; i < s.ray_begin[at(r + 1)]; ++i)
       if (lane.weights[at(i)] > options_.least_weight) {
         lane.kept.push_back(static_cast<std::int32_t>(i));
         lane.sample_ray.push_back(static_cast<std::int32_t>(r));
-        append(lane.positions, &s.position[at(3 * i)]);
-        if (recolour_) append(lane.seen_from, &rays.seen_from[at(3 * r)]);
       }
+  gather_points(s.position, lane.kept, lane.positions);
+  if (recolour_) gather_points(rays.seen_from, lane.sample_ray, lane.seen_from);
   lane.tape.reset();
   Tape<float>& tape = lane.tape;
   const Params<float> params(field_.params, nullptr, packed_);

@@ -1,4 +1,5 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/engine/parallel.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/imaging/metrics.h>
 #include <fieldmark/nerf/colour_fit.h>
@@ -177,6 +178,32 @@ TEST_CASE("evaluation: progress counts views and can end it") {
   CHECK(seen == std::vector<Index>{1, 2});
   CHECK(e.views == 2);
   CHECK(e.per_view.size() == 2);
+}
+
+TEST_CASE(
+    "evaluation: many views have the scores of each alone, under any thread count, and can end anywhere") {
+  const RadianceField field = small_field();
+  Renderer renderer(field);
+  const Dataset data = images(field, 19, 0.1f);
+  const auto scores = [&](int threads, Index last) {
+    const ScopedThreads scope(threads);
+    return evaluate(renderer, data, [&](Index done, Index) { return done < last; });
+  };
+  const Evaluation all = scores(2, 100), serial = scores(1, 100), some = scores(2, 10);
+  REQUIRE(all.per_view.size() == 19);
+  REQUIRE(some.per_view.size() == 10);
+  CHECK(some.views == 10);
+  for (std::size_t v = 0; v < 19; ++v) {
+    Dataset alone = data;
+    alone.views = {data.views[v]};
+    const ViewScore expected = evaluate(renderer, alone).per_view.at(0);
+    for (const auto number :
+         {&ViewScore::psnr, &ViewScore::psnr_foreground, &ViewScore::psnr_colour_fitted, &ViewScore::ssim}) {
+      CHECK(all.per_view[v].*number == expected.*number);
+      CHECK(serial.per_view[v].*number == expected.*number);
+      if (v < 10) CHECK(some.per_view[v].*number == expected.*number);
+    }
+  }
 }
 
 TEST_CASE("evaluation: no views are an error") {

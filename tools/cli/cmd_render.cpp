@@ -1,3 +1,4 @@
+#include <fieldmark/engine/parallel.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/renderer.h>
 
@@ -5,6 +6,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <future>
 #include <memory>
 #include <optional>
 #include <ostream>
@@ -70,6 +72,24 @@ std::vector<NamedCamera> cameras_of(const RenderArguments& options, const nerf::
   return cameras;
 }
 
+// Writes images one at a time, on a thread of its own while the next view is rendered, unless there is to be
+// one thread only.
+class ImageWriter {
+ public:
+  // Waits for the image before, and throws what writing it threw.
+  void write(const std::filesystem::path& path, Tensor<float> image) {
+    finish();
+    const auto when = threads() > 1 ? std::launch::async : std::launch::deferred;
+    last_ = std::async(when, [path, image = std::move(image)] { write_png(path, image); });
+  }
+  void finish() {
+    if (last_.valid()) last_.get();
+  }
+
+ private:
+  std::future<void> last_;
+};
+
 // Writes the views of both fields side by side, for the first few cameras.
 void write_sheet(const RenderArguments& options, nerf::Renderer& renderer,
                  const std::vector<NamedCamera>& cameras) {
@@ -121,16 +141,21 @@ int run_render(const RenderArguments& options, Context& context) {
   double seconds = 0;
   {
     Progress progress = context.progress("render");
+    ImageWriter writer;
     for (const auto& [name, camera] : cameras) {
-      if (guard.interrupted()) throw Interrupted(std::to_string(images.size()) + " views were written");
+      if (guard.interrupted()) {
+        writer.finish();
+        throw Interrupted(std::to_string(images.size()) + " views were written");
+      }
       const double begin = context.seconds();
-      const auto rendering = renderer.render(camera);
+      auto rendering = renderer.render(camera);
       seconds += context.seconds() - begin;
       const auto path = std::filesystem::path(options.out) / (name + ".png");
-      write_png(path, rendering.rgb);
+      writer.write(path, std::move(rendering.rgb));
       images.push_back(path.string());
       progress.update(static_cast<double>(images.size()) / static_cast<double>(cameras.size()));
     }
+    writer.finish();
   }
   if (!options.sheet.empty()) write_sheet(options, renderer, cameras);
   const double each = seconds / static_cast<double>(cameras.size());
