@@ -54,8 +54,12 @@ std::shared_ptr<Owner> embed(std::shared_ptr<nerf::RadianceField> field, const K
   recipe.owner.seed = recipe.embed.seed = seed;
   recipe.embed.schedule.seconds = seconds;
   recipe.embed.schedule.steps = steps;
-  const auto cached = watermark::cache_embed_views(*field, recipe.owner.patch(), {.count = views}, seed, {});
-  recipe.owner.mark_psnr = mark_psnr ? *mark_psnr : watermark::mark_psnr_for(cached, field->space.kind);
+  recipe.views.count = views;
+  const auto cached = watermark::cache_embed_views(*field, recipe.owner.patch(), recipe.views, seed, {});
+  if (mark_psnr)
+    recipe.owner.mark_psnr = *mark_psnr;
+  else
+    recipe.suit(*field, cached);
   auto owner = std::make_shared<Owner>(recipe.make(*field, key, cached));
   watermark::Embedder embedder(*owner, cached, recipe.embed);
   run(embedder, progress);

@@ -51,20 +51,20 @@ watermark::Key key_of(const EmbedArguments& options, const std::string& checkpoi
 
 std::vector<watermark::CachedView> cached_views(const EmbedArguments& options,
                                                 const nerf::RadianceField& field,
-                                                const watermark::PatchSize& patch, Context& context) {
+                                                const watermark::EmbedRecipe& recipe, Context& context) {
   const InterruptGuard guard;
   Progress progress = context.progress("views");
-  watermark::EmbedViewOptions views{.count = options.views,
-                                    .samples = options.samples,
-                                    .distances = watermark::parse_distances(options.distances)};
-  // Presets of the paper keep to novel cameras.
-  if (!options.directions.empty() || options.preset != "fast")
-    views.all_directions = options.directions == "all";
-  return watermark::cache_embed_views(field, patch, views, context.seed(), [&](Index done, Index total) {
+  watermark::EmbedViewOptions views = recipe.views;
+  views.count = options.views;
+  views.samples = options.samples;
+  views.distances = watermark::parse_distances(options.distances);
+  if (!options.directions.empty()) views.all_directions = options.directions == "all";
+  const auto report = [&](Index done, Index total) {
     if (guard.interrupted()) throw Interrupted("nothing was written");
     progress.update(static_cast<double>(done) / static_cast<double>(total));
     return true;
-  });
+  };
+  return watermark::cache_embed_views(field, recipe.owner.patch(), views, context.seed(), report);
 }
 
 void write_image(const std::string& path, const watermark::Owner& owner, std::uint64_t seed) {
@@ -100,13 +100,11 @@ watermark::EmbedRecipe recipe_of(const EmbedArguments& options, const nerf::Radi
   return recipe;
 }
 
-double suitable_mark_psnr(std::span<const watermark::CachedView> views, const nerf::RadianceField& field,
-                          Context& context) {
-  const double db = watermark::mark_psnr_for(views, field.space.kind);
+void say_mark_psnr(const watermark::Owner& owner, Context& context) {
   char line[80];
-  std::snprintf(line, sizeof line, "mark PSNR %.1f dB, chosen for this scene (--mark-psnr)\n", db);
+  std::snprintf(line, sizeof line, "mark PSNR %.1f dB, chosen for this scene (--mark-psnr)\n",
+                owner.options().mark_psnr);
   context.text() << line;
-  return db;
 }
 
 void say_cells(const watermark::Owner& owner, std::span<const watermark::CachedView> views,
@@ -158,10 +156,10 @@ int run_embed(const EmbedArguments& options, Context& context) {
         options.field + " has space " + nerf::name_of(field.space.kind));
   const auto key = key_of(options, checkpoint);
   auto recipe = recipe_of(options, field, context.seed());
-  const auto views = cached_views(options, field, recipe.owner.patch(), context);
-  if (options.preset == "fast" && options.mark_psnr == 0)
-    recipe.owner.mark_psnr = suitable_mark_psnr(views, field, context);
+  const auto views = cached_views(options, field, recipe, context);
+  if (options.mark_psnr == 0) recipe.suit(field, views);
   auto owner = recipe.make(field, key, views);
+  if (owner.mark().has_gain() && options.mark_psnr == 0) say_mark_psnr(owner, context);
   if (owner.mark().has_cells() && options.cells == 0) say_cells(owner, views, context);
   watermark::Embedder embedder(owner, views, recipe.embed);
   if (options.resume) embedder.restore(checkpoint);

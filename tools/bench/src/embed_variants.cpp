@@ -22,7 +22,7 @@ EmbedVariant base_variant(const char* preset, const ScheduleOptions& length, Ind
   v.recipe.embed.schedule.steps = length.steps;
   v.recipe.embed.schedule.seconds = length.seconds;
   v.recipe.cells = kCells;
-  if (v.recipe.mark.index() > 0) v.views.all_directions = false;  // as the paper's
+  v.views = v.recipe.views;
   return v;
 }
 

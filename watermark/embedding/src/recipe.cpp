@@ -1,4 +1,3 @@
-#include <fieldmark/watermark/embedding/embed_views.h>
 #include <fieldmark/watermark/embedding/recipe.h>
 #include <fieldmark/watermark/mark/flatness.h>
 
@@ -63,6 +62,7 @@ EmbedRecipe embed_recipe(std::string_view preset) {
   EmbedRecipe r;
   if (preset == "fast") return r;
   r.owner.reader_size = kPaperPatch;
+  r.views.all_directions = false;
   r.embed.schedule = {.seconds = 2400, .lr = 1.5e-3, .half_after = 5000, .cooldown = 0.4, .last = 0.05};
   r.embed.batch = kPaperBatch;
   if (preset == "paper") {
@@ -95,10 +95,14 @@ void EmbedRecipe::suit(const nerf::RadianceField& field) {
   embed.batch = batch_for(field.space.kind);
 }
 
-CellGrid EmbedRecipe::grid(const nerf::RadianceField& field, std::span<const CachedView> views) const {
+void EmbedRecipe::suit(const nerf::RadianceField& field, std::span<const CachedView> seen) {
+  if (std::holds_alternative<CellMarkOptions>(mark)) owner.mark_psnr = mark_psnr_for(seen, field.space.kind);
+}
+
+CellGrid EmbedRecipe::grid(const nerf::RadianceField& field, std::span<const CachedView> seen) const {
   if (!std::holds_alternative<CellMarkOptions>(mark)) return message_slots(owner.bits);
-  const Index side = cells > 0 ? cells : cells_for_message(views, owner.bits, field.space.kind);
-  return {side, visible_area(views, side)};
+  const Index side = cells > 0 ? cells : cells_for_message(seen, owner.bits, field.space.kind);
+  return {side, visible_area(seen, side)};
 }
 
 MarkMaker EmbedRecipe::maker() const {

@@ -1,4 +1,5 @@
 #pragma once
+#include <fieldmark/watermark/embedding/embed_views.h>
 #include <fieldmark/watermark/embedding/embedder.h>
 #include <fieldmark/watermark/mark/cell_mark.h>
 #include <fieldmark/watermark/mark/fusion_mark.h>
@@ -48,22 +49,24 @@ Index batch_for(nerf::SpaceKind space);
 /// The options of a preset; change them before making an owner.
 struct EmbedRecipe {
   OwnerOptions owner{};                                   ///< stored in OWNER
+  EmbedViewOptions views{};                               ///< to train on
   EmbedOptions embed{};                                   ///< of training
   std::variant<CellMarkOptions, FusionMarkOptions> mark;  ///< for the preset's kind of mark
   Index cells = 0;  ///< per axis of the scene's cube, 2 to 64; 0: cells_for_message(); unused without cells
 
   /// Returns the options that only preset fast has.   @throws ValueError naming the preset if it is another
   CellMarkOptions& cell();
-  /// Adapts the options of preset fast to a scene: shape of the extractor's images, colours, batch. The mark
-  /// PSNR depends on the views: see mark_psnr_for().
+  /// Adapts the options of preset fast to a scene: shape of the extractor's images, colours, batch.
   void suit(const nerf::RadianceField& field);
+  /// Adapts the mark PSNR of preset fast to the views of a scene: see mark_psnr_for().
+  void suit(const nerf::RadianceField& field, std::span<const CachedView> seen);
   /// Makes the grid: cells that the views show, or slots.
-  CellGrid grid(const nerf::RadianceField& field, std::span<const CachedView> views) const;
+  CellGrid grid(const nerf::RadianceField& field, std::span<const CachedView> seen) const;
   /// Returns the function that makes the mark.
   MarkMaker maker() const;
   /// Makes the owner whose mark the views will train.
-  Owner make(const nerf::RadianceField& field, const Key& key, std::span<const CachedView> views) const {
-    return {field, owner, key, grid(field, views), maker()};
+  Owner make(const nerf::RadianceField& field, const Key& key, std::span<const CachedView> seen) const {
+    return {field, owner, key, grid(field, seen), maker()};
   }
 };
 
