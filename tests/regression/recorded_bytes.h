@@ -28,7 +28,7 @@ inline const std::map<std::string, std::string> kBytesV3{
     {"code owner", "984dc2b560f17c500cf72d6efcfcb3fed3f35fc6e1e909ce7b43f8a93e039e02"},
     {"code renders", "a5f6f7610d3dde3d4744590c2ef9f553cc8866fdfa796d814676b5d6f7948a43"},
     {"fast baked field", "17af66e1d94b2ccfda000cc01e7e5494f8f021d7bc49bf7e8cbbedc7d659aaac"},
-    {"fast logits", "4d93f28afac56044b8e6f929ff7ef1e481d1b3312081f0b36c8bc5fd0afbac8d"},
+    {"fast logits", "a38e7fc285938947f64a641875afb77c344c72373e65b9ff1f4d0ac7d8aa100f"},
     {"fast owner", "1cb3eb634830b3ffab0d7aab39e5b7bae380052cf3489c93a842a670f5b8cdcb"},
     {"fast renders", "98e6bbc8b57e790ffb2b0180c23758711182e177f2b22bec0f90a97680446b64"},
     {"hash field", "ddb8c16b2d62994a59ed8aa4ae932d923e75564baf99a3cbcda6591352018d07"},

@@ -46,6 +46,17 @@ TEST_CASE("pose_alignment: a disturbed camera comes back to a tenth of a pixel")
   }
 }
 
+TEST_CASE("pose_alignment: a motion that ends the stage is made") {
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    const nerf::Camera camera = aligned_camera(seed);
+    const nerf::Camera start = moved(camera, {0, 0, 0}, {0.004, -0.004, 0.006, 0, 0, 0, 0.002, -0.002, 0});
+    const double before = cameras_apart(camera, start);
+    CAPTURE(seed, before);
+    CHECK(before > 0.1);
+    CHECK(cameras_apart(camera, align(image_of(camera), start).camera) < 0.3 * before);
+  }
+}
+
 TEST_CASE("pose_alignment: plain corners do not count where the scene fills its images") {
   nerf::RadianceField field = small_field();
   field.space = {.kind = nerf::SpaceKind::contracted, .bounds = {.corner = {-1, -1, -1}, .side = 2}};

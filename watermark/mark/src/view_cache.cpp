@@ -10,6 +10,7 @@ namespace fieldmark::watermark {
 namespace {
 
 constexpr float kLeastOpacity = 0.02f;  // a ray with less is background
+constexpr Index kRows = 8;              // of pixels that one thread collects at a time
 constexpr float kPart = 1.f / 128;      // cube sides, half of the finest cell: samples so close form one part
 
 // Calls trace(lane, row, rays) for the rays of every row of pixels, and writes directions [P, 3].
@@ -116,6 +117,38 @@ Traced trace_all(nerf::Renderer& renderer, const nerf::RadianceField& field, con
   return t;
 }
 
+// Writes the pixels of row y, and forgets the samples of its background.
+void finish_row(Traced& t, Index y, float background, CachedView& view) {
+  const Index w = view.width;
+  for (Index p = y * w; p < (y + 1) * w; ++p) {
+    const float* c = &t.rgba[at(4 * p)];
+    for (Index a = 0; a < 3; ++a) view.base[3 * p + a] = std::clamp(c[a] + (1 - c[3]) * background, 0.f, 1.f);
+    view.opacity[p] = std::min(c[3], 1.f);
+  }
+  std::erase_if(t.rows[at(y)],
+                [&](const auto& s) { return t.rgba[at(4 * (y * w + s.ray) + 3)] < kLeastOpacity; });
+}
+
+// Writes the samples of row y from `begin` on.
+void put_samples(const Traced& t, Index y, std::size_t begin, CachedView& view) {
+  const auto& row = t.rows[at(y)];
+  auto next = row.begin();
+  for (Index x = 0; x < view.width; ++x) {
+    const Index p = y * view.width + x;
+    for (; next != row.end() && next->ray == x; ++next) {
+      const std::size_t k = begin + static_cast<std::size_t>(next - row.begin());
+      for (std::size_t a = 0; a < 3; ++a) {
+        view.position[3 * k + a] = next->position[a];
+        view.direction[3 * k + a] = t.direction[at(3 * p) + a];
+        view.colour[3 * k + a] = std::clamp(next->colour[a], 0.f, 1.f);
+      }
+      view.weight[k] = next->weight;
+    }
+    view.sample_begin[at(p + 1)] =
+        static_cast<std::int32_t>(begin + static_cast<std::size_t>(next - row.begin()));
+  }
+}
+
 }  // namespace
 
 CachedView cache_view(nerf::Renderer& renderer, const nerf::RadianceField& field, const nerf::Camera& camera,
@@ -123,30 +156,20 @@ CachedView cache_view(nerf::Renderer& renderer, const nerf::RadianceField& field
   if (samples < 1)
     throw ValueError("[cache_view] samples must be at least 1, got " + std::to_string(samples));
   const Index h = camera.height, w = camera.width;
-  const Traced traced = trace_all(renderer, field, camera, samples);
+  Traced traced = trace_all(renderer, field, camera, samples);
   const float background = nerf::background_value(field.background);
-  CachedView view{h, w, Tensor<float>({h, w, 3}), Tensor<float>({h, w}), {0}, {}, {}, {}, {}};
-  for (Index y = 0; y < h; ++y) {
-    auto next = traced.rows[at(y)].begin();
-    const auto end = traced.rows[at(y)].end();
-    for (Index x = 0; x < w; ++x) {
-      const Index p = y * w + x;
-      const float* c = &traced.rgba[at(4 * p)];
-      for (Index a = 0; a < 3; ++a)
-        view.base[3 * p + a] = std::clamp(c[a] + (1 - c[3]) * background, 0.f, 1.f);
-      view.opacity[p] = std::min(c[3], 1.f);
-      for (; next != end && next->ray == x; ++next) {
-        if (c[3] < kLeastOpacity) continue;
-        for (std::size_t a = 0; a < 3; ++a) {
-          view.position.push_back(next->position[a]);
-          view.direction.push_back(traced.direction[at(3 * p) + a]);
-          view.colour.push_back(std::clamp(next->colour[a], 0.f, 1.f));
-        }
-        view.weight.push_back(next->weight);
-      }
-      view.sample_begin.push_back(static_cast<std::int32_t>(view.weight.size()));
-    }
-  }
+  CachedView view{h, w, Tensor<float>({h, w, 3}), Tensor<float>({h, w}), {}, {}, {}, {}, {}};
+  parallel_for(h, kRows, [&](Index begin, Index end) {
+    for (Index y = begin; y < end; ++y) finish_row(traced, y, background, view);
+  });
+  std::vector<std::size_t> row_begin{0};
+  for (const auto& row : traced.rows) row_begin.push_back(row_begin.back() + row.size());
+  view.sample_begin.resize(at(h * w + 1));
+  view.weight.resize(row_begin.back());
+  for (auto* vectors : {&view.position, &view.direction, &view.colour}) vectors->resize(3 * row_begin.back());
+  parallel_for(h, kRows, [&](Index begin, Index end) {
+    for (Index y = begin; y < end; ++y) put_samples(traced, y, row_begin[at(y)], view);
+  });
   view.camera = camera;
   return view;
 }

@@ -206,17 +206,12 @@ std::vector<double> InformedReader::evidence_at(const Surround& seen, const nerf
   return fit_signs(mark, score, owner_.cells.count()).sign;
 }
 
-// Returns candidate cameras of a changed image, in the frame of the changed image.
-std::vector<nerf::Camera> InformedReader::starts(const CameraSearch& search, const Tensor<float>& image,
-                                                 const Change& change, const SeenPlaces& places) {
-  const Index h = image.shape[0], w = image.shape[1];
-  if (change.stretch == 1) {
-    std::vector<nerf::Camera> cameras = search.find(places, h, w, kByPlaces);
-    const std::vector<nerf::Camera> others = search.find(image, kByImage);
-    cameras.insert(cameras.end(), others.begin(), others.end());
-    return cameras;
-  }
+// Returns cameras that show what a changed image shows, in the frame of the changed image.
+std::vector<nerf::Camera> InformedReader::lookalikes(const CameraSearch& search, const Tensor<float>& image,
+                                                     const Change& change) {
   std::vector<nerf::Camera> cameras = search.find(narrowed(image, change.stretch), kByImage);
+  if (change.stretch == 1) return cameras;
+  const Index w = image.shape[1];
   for (nerf::Camera& camera : cameras) {
     const double back = static_cast<double>(w) / static_cast<double>(camera.width);
     camera.fx *= back;
@@ -227,14 +222,26 @@ std::vector<nerf::Camera> InformedReader::starts(const CameraSearch& search, con
 }
 
 // Aligns coarsely from several cameras, until an agreement is `enough`, and adds the results to `found`.
-void InformedReader::try_all(const Surround& seen, const Change& change,
+// Returns whether one is.
+bool InformedReader::try_all(const Surround& seen, const Change& change,
                              const std::vector<nerf::Camera>& cameras, std::vector<Alignment>& found,
                              double enough) {
   const std::span<const AlignmentStage> stages = change.stretch == 1 ? kCoarse : kCoarseStretched;
   for (const nerf::Camera& start : cameras) {
     found.push_back(parts_->aligner.align(seen.image, start, stages, seen.covered));
-    if (found.back().agreement >= enough) return;
+    if (found.back().agreement >= enough) return true;
   }
+  return false;
+}
+
+// Aligns coarsely from the cameras of a search: those of the cells that the image shows, then, unless one of
+// them is `enough`, those that look like it, which takes longer to find.
+void InformedReader::try_search(const CameraSearch& search, const Surround& seen, const Change& change,
+                                const SeenPlaces& places, std::vector<Alignment>& found, double enough) {
+  const Index h = seen.image.shape[0], w = seen.image.shape[1];
+  if (change.stretch == 1 && try_all(seen, change, search.find(places, h, w, kByPlaces), found, enough))
+    return;
+  try_all(seen, change, lookalikes(search, seen.image, change), found, enough);
 }
 
 InformedReading InformedReader::refined(const Surround& seen, const Change& change,
@@ -255,7 +262,7 @@ InformedReading InformedReader::aligned(const Surround& seen, const Change& chan
   InformedReading quick;
   if (!stretched && !change.mirrored) {
     std::vector<Alignment> few;
-    try_all(seen, change, starts(parts_->few, image, change, places), few, kSure);
+    try_search(parts_->few, seen, change, places, few, kSure);
     quick = refined(seen, change, few);
     if (quick.agreement >= kSure) return quick;
   }
@@ -264,7 +271,7 @@ InformedReading InformedReader::aligned(const Surround& seen, const Change& chan
   const auto doubtful = [&] {
     return std::ranges::all_of(found, [](const auto& a) { return a.agreement < kLeastAgreement; });
   };
-  try_all(seen, change, starts(search, image, change, places), found);
+  try_search(search, seen, change, places, found);
   if (doubtful()) try_all(seen, change, search.find_by_lightness(image, kByImage), found);
   if (!stretched && doubtful()) try_all(seen, change, search.find_part(image, kByPart), found);
   const InformedReading best = refined(seen, change, found);

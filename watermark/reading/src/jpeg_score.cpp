@@ -22,6 +22,7 @@ constexpr double kLeastGain = 50;             // least log-likelihood ratio of a
 constexpr double kFirst = 0.3, kRatio = 1.5;  // standard deviations tried, levels
 constexpr int kDeviations = 13;
 constexpr std::array kFactors{0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0};
+constexpr Index kRows = 32, kBlocks = 128;  // of one thread at a time
 constexpr double kOnObject = 32;  // least foreground pixels for a block to count in its band
 
 // One component of an image, in levels; chroma may have half the size.
@@ -36,12 +37,14 @@ Plane component_of(const Tensor<float>& image, int component, Index cell) {
   Plane p{(h + cell - 1) / cell, (w + cell - 1) / cell, {}};
   p.level.resize(at(p.height * p.width));
   const double share = 255 / static_cast<double>(cell * cell);
-  for (Index y = 0; y < p.height * cell; ++y)
-    for (Index x = 0; x < p.width * cell; ++x) {
-      const float* rgb = image.data.data() + 3 * (std::min(y, h - 1) * w + std::min(x, w - 1));
-      double& out = p.level[at((y / cell) * p.width + x / cell)];
-      for (std::size_t c = 0; c < 3; ++c) out += share * row[c] * static_cast<double>(rgb[c]);
-    }
+  parallel_for(p.height, kRows, [&](Index begin, Index end) {
+    for (Index y = begin * cell; y < end * cell; ++y)
+      for (Index x = 0; x < p.width * cell; ++x) {
+        const float* rgb = image.data.data() + 3 * (std::min(y, h - 1) * w + std::min(x, w - 1));
+        double& out = p.level[at((y / cell) * p.width + x / cell)];
+        for (std::size_t c = 0; c < 3; ++c) out += share * row[c] * static_cast<double>(rgb[c]);
+      }
+  });
   return p;
 }
 
@@ -73,15 +76,17 @@ Plane decoded_component(const Tensor<float>& image, int component, Index cell) {
 std::vector<JpegBlock> coefficients(const Plane& p, double middle) {
   const Index down = (p.height + 7) / 8, across = (p.width + 7) / 8;
   std::vector<JpegBlock> out(at(down * across));
-  for (Index b = 0; b < down * across; ++b) {
-    JpegBlock levels;
-    for (Index i = 0; i < 64; ++i) {
-      const Index y = std::min(8 * (b / across) + i / 8, p.height - 1),
-                  x = std::min(8 * (b % across) + i % 8, p.width - 1);
-      levels[at(i)] = p.level[at(y * p.width + x)] - middle;
+  parallel_for(down * across, kBlocks, [&](Index begin, Index end) {
+    for (Index b = begin; b < end; ++b) {
+      JpegBlock levels;
+      for (Index i = 0; i < 64; ++i) {
+        const Index y = std::min(8 * (b / across) + i / 8, p.height - 1),
+                    x = std::min(8 * (b % across) + i % 8, p.width - 1);
+        levels[at(i)] = p.level[at(y * p.width + x)] - middle;
+      }
+      out[at(b)] = distort::jpeg_cosines(levels);
     }
-    out[at(b)] = distort::jpeg_cosines(levels);
-  }
+  });
   return out;
 }
 

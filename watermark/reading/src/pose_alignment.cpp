@@ -20,7 +20,7 @@ namespace {
 constexpr Index kParameters = 10;
 constexpr int kTonePasses = 2;
 constexpr double kToneHold = 1e-4;  // tones that bend more make wrong views agree
-constexpr double kStill = 0.05;     // pixels: a smaller motion ends the stage
+constexpr double kStill = 0.2;      // pixels: a smaller motion ends the stage without another render
 constexpr double kNear = 0.3;       // pixels: a smaller motion that does not reduce the cost ends it, too
 constexpr int kMostFailures = 3;
 constexpr double kOverRelaxation = 1.5;  // reweighting overestimates the curvature: steps fall short
@@ -204,8 +204,9 @@ class Stage {
       CameraMotion motion;
       Eigen::Map<Vector>(motion.data()) = m.cwiseMax(-0.3).cwiseMin(0.3);
       const double far = furthest(best, motion);
-      if (far < kStill) break;
-      Look next = look(moved(best.camera, best.pivot, motion));
+      const nerf::Camera there = moved(best.camera, best.pivot, motion);
+      if (far < kStill) return {there, agreement(best)};
+      Look next = look(there);
       if (next.points.empty() || !(cost(next, best.spread) < least)) {
         if (far < kNear) break;
         damping *= 10;

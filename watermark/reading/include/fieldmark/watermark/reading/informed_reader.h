@@ -78,10 +78,13 @@ class InformedReader {
   struct Change;
   const CameraSearch& all_views();
   std::vector<Change> changes(const Tensor<float>& seen);
-  static std::vector<nerf::Camera> starts(const CameraSearch& search, const Tensor<float>& image,
-                                          const Change& change, const SeenPlaces& places);
-  void try_all(const Surround& seen, const Change& change, const std::vector<nerf::Camera>& cameras,
-               std::vector<Alignment>& found, double enough = std::numeric_limits<double>::infinity());
+  static constexpr double kNeverEnough = std::numeric_limits<double>::infinity();
+  static std::vector<nerf::Camera> lookalikes(const CameraSearch& search, const Tensor<float>& image,
+                                              const Change& change);
+  bool try_all(const Surround& seen, const Change& change, const std::vector<nerf::Camera>& cameras,
+               std::vector<Alignment>& found, double enough = kNeverEnough);
+  void try_search(const CameraSearch& search, const Surround& seen, const Change& change,
+                  const SeenPlaces& places, std::vector<Alignment>& found, double enough = kNeverEnough);
   InformedReading refined(const Surround& seen, const Change& change, const std::vector<Alignment>& found);
   InformedReading aligned(const Surround& seen, const Change& change, const SeenPlaces& places);
   ImageReading read_as(const Tensor<float>& whole, const Change& change);
