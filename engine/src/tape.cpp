@@ -9,7 +9,7 @@ namespace fieldmark::detail {
 template <class T>
 void seed_gradient(const T* seed, const T* mask, bool fresh, T* g, Index n) {
   using namespace kernels;
-  const auto copy_masked = FIELDMARK_KERNEL(pad_rows<T>);
+  const auto copy_masked = FIELDMARK_KERNEL(pad_rows<T>);  // one row without padding
   parallel_for(n, Index{1} << 15, [=](Index begin, Index end) {
     const Index count = end - begin;
     if (!fresh)

@@ -54,10 +54,11 @@ Var<T> square(Var<T> x) {
       [](const auto& v, const auto&, const auto& dy) { return T(2) * dy * v; });
 }
 
+// Eigen's sqrt() of floats refines an approximation that differs between makes of CPU, to 2 ulp.
 template <class T>
 Var<T> sqrt(Var<T> x) {
   return detail::elementwise(
-      x, [](const auto& v) { return v.sqrt(); },
+      x, [](const auto& v) { return v.unaryExpr([](T a) { return std::sqrt(a); }); },
       [](const auto&, const auto& y, const auto& dy) { return T(0.5) * dy / y; });
 }
 
