@@ -8,8 +8,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "checks.h"
 
@@ -17,7 +20,7 @@ namespace fieldmark::nerf {
 namespace {
 
 constexpr Index kSsimWindow = 11;
-constexpr Index kBatch = 8;  // views rendered one by one and scored together, each by one thread
+constexpr Index kMostPixels = 1 << 23;  // of views that are scored at a time
 
 // Returns [H, W], above 0.5 on the foreground.
 Tensor<float> foreground_mask(const View& view, const Rendering& rendering) {
@@ -70,6 +73,13 @@ double mean(const std::vector<ViewScore>& scores, double ViewScore::*number) {
   return count > 0 ? sum / static_cast<double>(count) : std::numeric_limits<double>::quiet_NaN();
 }
 
+// Returns how many views to score at a time, each on one thread. LPIPS uses all threads and much memory.
+Index batch_of(const Dataset& dataset, const Lpips<float>* lpips) {
+  const Camera& camera = dataset.views.front().camera;
+  const Index pixels = std::max<Index>(1, camera.width * camera.height);
+  return lpips ? 1 : std::clamp<Index>(kMostPixels / pixels, 1, threads());
+}
+
 }  // namespace
 
 Evaluation evaluate(Renderer& renderer, const Dataset& dataset,
@@ -78,11 +88,11 @@ Evaluation evaluate(Renderer& renderer, const Dataset& dataset,
   if (dataset.views.empty()) throw ValueError("[evaluate] dataset must have at least one view, got 0");
   Evaluation result;
   double seconds = 0;
-  const Index total = std::ssize(dataset.views);
+  const Index total = std::ssize(dataset.views), batch = batch_of(dataset, lpips);
   for (bool more = true; more && result.views < total;) {
     const std::span views = std::span(dataset.views).subspan(at(result.views));
     std::vector<Rendering> renderings;
-    while (more && std::ssize(renderings) < std::min<Index>(kBatch, std::ssize(views))) {
+    while (more && std::ssize(renderings) < std::min(batch, std::ssize(views))) {
       const View& view = views[renderings.size()];
       const auto start = Clock::now();
       renderings.push_back(renderer.render(view.camera, view.offsets.get()));

@@ -72,15 +72,14 @@ std::vector<NamedCamera> cameras_of(const RenderArguments& options, const nerf::
   return cameras;
 }
 
-// Writes images one at a time, on a thread of its own while the next view is rendered, unless there is to be
-// one thread only.
+// Writes each image on its own thread while the next view is rendered; with one thread, at once.
 class ImageWriter {
  public:
-  // Waits for the image before, and throws what writing it threw.
+  // Waits for the previous image and rethrows its error.
   void write(const std::filesystem::path& path, Tensor<float> image) {
     finish();
-    const auto when = threads() > 1 ? std::launch::async : std::launch::deferred;
-    last_ = std::async(when, [path, image = std::move(image)] { write_png(path, image); });
+    if (threads() == 1) return write_png(path, image);
+    last_ = std::async(std::launch::async, [path, image = std::move(image)] { write_png(path, image); });
   }
   void finish() {
     if (last_.valid()) last_.get();

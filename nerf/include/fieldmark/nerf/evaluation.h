@@ -32,7 +32,7 @@ struct Evaluation {
 /// background. The foreground consists of the pixels whose alpha exceeds 0.5 in the ground truth, or in the
 /// render if the ground truth is opaque. No PSNR counts invalid pixels (View::valid); SSIM and LPIPS, which
 /// need whole images, see them as black in both.
-/// @param progress  called after each view; returns false to stop with the views so far. May be empty
+/// @param progress  called after each render; returns false to stop with the views so far. May be empty
 /// @param lpips     the network of ViewScore::lpips, or null
 /// @throws ValueError if there are no views
 Evaluation evaluate(Renderer& renderer, const Dataset& dataset,
