@@ -59,7 +59,7 @@ std::shared_ptr<Owner> embed(std::shared_ptr<nerf::RadianceField> field, const K
   if (mark_psnr)
     recipe.owner.mark_psnr = *mark_psnr;
   else
-    recipe.suit(*field, cached);
+    recipe.suit_mark_psnr(*field, cached);
   auto owner = std::make_shared<Owner>(recipe.make(*field, key, cached));
   watermark::Embedder embedder(*owner, cached, recipe.embed);
   run(embedder, progress);

@@ -58,7 +58,7 @@ std::vector<bench::EmbedVariant> variants_of(const BenchEmbedArguments& o, const
     v.recipe.owner.reader_size = kQuickPatch;
     if (v.choice != "preset") v.recipe.cell().base_channels = kQuickChannels;
     v.recipe.cells = kQuickCells;
-    v.views.count = kQuickViews;
+    v.recipe.views.count = kQuickViews;
   }
   return all;
 }

@@ -157,7 +157,7 @@ int run_embed(const EmbedArguments& options, Context& context) {
   const auto key = key_of(options, checkpoint);
   auto recipe = recipe_of(options, field, context.seed());
   const auto views = cached_views(options, field, recipe, context);
-  if (options.mark_psnr == 0) recipe.suit(field, views);
+  if (options.mark_psnr == 0) recipe.suit_mark_psnr(field, views);
   auto owner = recipe.make(field, key, views);
   if (owner.mark().has_gain() && options.mark_psnr == 0) say_mark_psnr(owner, context);
   if (owner.mark().has_cells() && options.cells == 0) say_cells(owner, views, context);

@@ -21,7 +21,7 @@ EmbedVariant tiny_variant(Index steps) {
   v.recipe.cell().network = {.bands = 4, .features = 8};
   v.recipe.embed.batch = 2;
   v.recipe.embed.schedule.lr = 4e-3;
-  v.views.count = 8;
+  v.recipe.views.count = 8;
   return v;
 }
 
@@ -39,7 +39,7 @@ EmbedRow row(const char* choice, double seconds, double accuracy, double psnr) {
 TEST_CASE("embed_bench: a mark is embedded in every way, and judged on the way and at the end") {
   std::vector<EmbedVariant> two{tiny_variant(8), tiny_variant(4)};
   two[1].choice = "length";
-  two[1].views.samples = 2;
+  two[1].recipe.views.samples = 2;
   double done = -1;
   std::vector<std::string> names;
   const auto rows = run_embed_bench(tiny_field(), two, {.views = 3, .points = 2},

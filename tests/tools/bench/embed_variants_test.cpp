@@ -25,17 +25,20 @@ const std::map<std::string, Differs> kChoices{
      [](const EmbedVariant& a, const EmbedVariant& b) {
        return a.recipe.embed.seed != b.recipe.embed.seed && a.recipe.owner.seed != b.recipe.owner.seed;
      }},
-    {"directions", [](const EmbedVariant& a,
-                      const EmbedVariant& b) { return a.views.all_directions != b.views.all_directions; }},
+    {"directions",
+     [](const EmbedVariant& a, const EmbedVariant& b) {
+       return a.recipe.views.all_directions != b.recipe.views.all_directions;
+     }},
     {"preset", [](const EmbedVariant& a,
                   const EmbedVariant& b) { return a.recipe.mark.index() != b.recipe.mark.index(); }},
     {"patch", [](const EmbedVariant& a,
                  const EmbedVariant& b) { return a.recipe.owner.reader_size != b.recipe.owner.reader_size; }},
-    {"samples",
-     [](const EmbedVariant& a, const EmbedVariant& b) { return a.views.samples != b.views.samples; }},
-    {"views", [](const EmbedVariant& a, const EmbedVariant& b) { return a.views.count != b.views.count; }},
-    {"distances",
-     [](const EmbedVariant& a, const EmbedVariant& b) { return a.views.distances != b.views.distances; }},
+    {"samples", [](const EmbedVariant& a,
+                   const EmbedVariant& b) { return a.recipe.views.samples != b.recipe.views.samples; }},
+    {"views", [](const EmbedVariant& a,
+                 const EmbedVariant& b) { return a.recipe.views.count != b.recipe.views.count; }},
+    {"distances", [](const EmbedVariant& a,
+                     const EmbedVariant& b) { return a.recipe.views.distances != b.recipe.views.distances; }},
     {"distortions",
      [](const EmbedVariant& a, const EmbedVariant& b) {
        return a.recipe.embed.distortions.mixed != b.recipe.embed.distortions.mixed ||
@@ -88,7 +91,7 @@ TEST_CASE("embed_variants: every variant but the first differs from the default 
   CHECK(usual.choice == "default");
   CHECK(usual.recipe.owner.bits == 48);
   CHECK(usual.recipe.cells == 16);
-  CHECK(usual.views.count == watermark::EmbedViewOptions{}.count);
+  CHECK(usual.recipe.views.count == watermark::EmbedViewOptions{}.count);
   std::set<std::string> names, choices;
   for (const EmbedVariant& v : all) {
     CAPTURE(v.choice, v.setting);

@@ -46,13 +46,13 @@ TEST_CASE("recipe: an object's flat share gets no power of its own, within a lim
 TEST_CASE("recipe: preset fast suits its mark PSNR to the views, presets of the paper keep theirs") {
   const nerf::RadianceField field = tiny_field();
   EmbedRecipe fast = embed_recipe("fast");
-  CHECK(!fast.views.all_directions);
-  fast.suit(field, tiny_views());
+  CHECK(fast.views.all_directions == std::nullopt);
+  fast.suit_mark_psnr(field, tiny_views());
   CHECK(fast.owner.mark_psnr == mark_psnr_for(tiny_views(), field.space.kind));
   CHECK(fast.owner.mark_psnr > OwnerOptions{}.mark_psnr);
   for (const char* preset : {"paper", "code"}) {
     EmbedRecipe other = embed_recipe(preset);
-    other.suit(field, tiny_views());
+    other.suit_mark_psnr(field, tiny_views());
     CHECK(other.owner.mark_psnr == OwnerOptions{}.mark_psnr);
     CHECK(other.views.all_directions == false);  // as in the paper
   }

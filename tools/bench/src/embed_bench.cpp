@@ -54,12 +54,12 @@ class Caches {
   // Keeps the views of the first variant and of the last one used: views are large.
   const Cache& get(const EmbedVariant& v, const std::function<void()>& stop_or_go) {
     for (const Cache& c : kept_)
-      if (c.options == v.views && c.patch == v.recipe.owner.patch() && c.seed == v.recipe.embed.seed)
+      if (c.options == v.recipe.views && c.patch == v.recipe.owner.patch() && c.seed == v.recipe.embed.seed)
         return c;
     if (kept_.size() == 2) kept_.pop_back();
     kept_.reserve(2);
     Cache& c = kept_.emplace_back(
-        Cache{.options = v.views, .patch = v.recipe.owner.patch(), .seed = v.recipe.embed.seed});
+        Cache{.options = v.recipe.views, .patch = v.recipe.owner.patch(), .seed = v.recipe.embed.seed});
     const Clock clock;
     c.views = watermark::cache_embed_views(field_, c.patch, c.options, c.seed, [&](Index, Index) {
       stop_or_go();

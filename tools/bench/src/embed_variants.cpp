@@ -13,16 +13,12 @@ using watermark::MarkColours;
 constexpr Index kCells = 16;
 
 EmbedVariant base_variant(const char* preset, const ScheduleOptions& length, Index bits, std::uint64_t seed) {
-  EmbedVariant v{.choice = "default",
-                 .setting = "as embed does",
-                 .recipe = watermark::embed_recipe(preset),
-                 .views = {}};
+  EmbedVariant v{.choice = "default", .setting = "as embed does", .recipe = watermark::embed_recipe(preset)};
   v.recipe.owner.bits = bits;
   v.recipe.owner.seed = v.recipe.embed.seed = seed;
   v.recipe.embed.schedule.steps = length.steps;
   v.recipe.embed.schedule.seconds = length.seconds;
   v.recipe.cells = kCells;
-  v.views = v.recipe.views;
   return v;
 }
 
@@ -69,14 +65,15 @@ void views(Variants& all) {
              [=](EmbedVariant& v) { v.recipe.owner.reader_size = side; });
   for (const Index kept : {2, 4})
     all.vary("samples", std::to_string(kept) + " kept of a ray",
-             [=](EmbedVariant& v) { v.views.samples = kept; });
+             [=](EmbedVariant& v) { v.recipe.views.samples = kept; });
   for (const Index count : {50, 800})
-    all.vary("views", std::to_string(count), [=](EmbedVariant& v) { v.views.count = count; });
-  all.vary("directions", "only novel cameras", [](EmbedVariant& v) { v.views.all_directions = false; });
+    all.vary("views", std::to_string(count), [=](EmbedVariant& v) { v.recipe.views.count = count; });
+  all.vary("directions", "only novel cameras",
+           [](EmbedVariant& v) { v.recipe.views.all_directions = false; });
   all.vary("distances", "near, at the resolution of images",
-           [](EmbedVariant& v) { v.views.distances = EmbedDistances::native; });
+           [](EmbedVariant& v) { v.recipe.views.distances = EmbedDistances::native; });
   all.vary("distances", "half of the views closer or farther",
-           [](EmbedVariant& v) { v.views.distances = EmbedDistances::several; });
+           [](EmbedVariant& v) { v.recipe.views.distances = EmbedDistances::several; });
   all.vary("distortions", "none", [](EmbedVariant& v) {
     v.recipe.embed.distortions = {
         .noise = 0, .rotation = 0, .zoom_out = 1, .zoom_in = 1, .blur = 0, .sample_shift = 0};

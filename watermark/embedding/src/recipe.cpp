@@ -62,7 +62,7 @@ EmbedRecipe embed_recipe(std::string_view preset) {
   EmbedRecipe r;
   if (preset == "fast") return r;
   r.owner.reader_size = kPaperPatch;
-  r.views.all_directions = false;
+  r.views.all_directions = false;  // novel cameras, as in the paper
   r.embed.schedule = {.seconds = 2400, .lr = 1.5e-3, .half_after = 5000, .cooldown = 0.4, .last = 0.05};
   r.embed.batch = kPaperBatch;
   if (preset == "paper") {
@@ -95,14 +95,15 @@ void EmbedRecipe::suit(const nerf::RadianceField& field) {
   embed.batch = batch_for(field.space.kind);
 }
 
-void EmbedRecipe::suit(const nerf::RadianceField& field, std::span<const CachedView> seen) {
-  if (std::holds_alternative<CellMarkOptions>(mark)) owner.mark_psnr = mark_psnr_for(seen, field.space.kind);
+void EmbedRecipe::suit_mark_psnr(const nerf::RadianceField& field, std::span<const CachedView> cached) {
+  if (std::holds_alternative<CellMarkOptions>(mark))
+    owner.mark_psnr = mark_psnr_for(cached, field.space.kind);
 }
 
-CellGrid EmbedRecipe::grid(const nerf::RadianceField& field, std::span<const CachedView> seen) const {
+CellGrid EmbedRecipe::grid(const nerf::RadianceField& field, std::span<const CachedView> cached) const {
   if (!std::holds_alternative<CellMarkOptions>(mark)) return message_slots(owner.bits);
-  const Index side = cells > 0 ? cells : cells_for_message(seen, owner.bits, field.space.kind);
-  return {side, visible_area(seen, side)};
+  const Index side = cells > 0 ? cells : cells_for_message(cached, owner.bits, field.space.kind);
+  return {side, visible_area(cached, side)};
 }
 
 MarkMaker EmbedRecipe::maker() const {

@@ -1,5 +1,4 @@
 #pragma once
-#include <fieldmark/watermark/embedding/embed_views.h>
 #include <fieldmark/watermark/embedding/recipe.h>
 
 #include <string>
@@ -9,10 +8,9 @@ namespace fieldmark::bench {
 
 /// One way of embedding a mark: its difference from the default, and the settings themselves.
 struct EmbedVariant {
-  std::string choice;                 ///< the option varied: "patch", "cells", ...; "default" for the default
-  std::string setting;                ///< its value, for display
-  watermark::EmbedRecipe recipe;      ///< options of owner, mark and training, including the seed
-  watermark::EmbedViewOptions views;  ///< views that it is trained on
+  std::string choice;             ///< the option varied: "patch", "cells", ...; "default" for the default
+  std::string setting;            ///< its value, for display
+  watermark::EmbedRecipe recipe;  ///< options of owner, views, mark and training, including the seed
 };
 
 /// Returns the default first, then other run lengths, then each choice in embedding, switched off or changed.

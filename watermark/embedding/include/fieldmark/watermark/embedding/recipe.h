@@ -58,15 +58,15 @@ struct EmbedRecipe {
   CellMarkOptions& cell();
   /// Adapts the options of preset fast to a scene: shape of the extractor's images, colours, batch.
   void suit(const nerf::RadianceField& field);
-  /// Adapts the mark PSNR of preset fast to the views of a scene: see mark_psnr_for().
-  void suit(const nerf::RadianceField& field, std::span<const CachedView> seen);
+  /// Sets the mark PSNR of preset fast to that of mark_psnr_for(); other presets keep theirs.
+  void suit_mark_psnr(const nerf::RadianceField& field, std::span<const CachedView> cached);
   /// Makes the grid: cells that the views show, or slots.
-  CellGrid grid(const nerf::RadianceField& field, std::span<const CachedView> seen) const;
+  CellGrid grid(const nerf::RadianceField& field, std::span<const CachedView> cached) const;
   /// Returns the function that makes the mark.
   MarkMaker maker() const;
   /// Makes the owner whose mark the views will train.
-  Owner make(const nerf::RadianceField& field, const Key& key, std::span<const CachedView> seen) const {
-    return {field, owner, key, grid(field, seen), maker()};
+  Owner make(const nerf::RadianceField& field, const Key& key, std::span<const CachedView> cached) const {
+    return {field, owner, key, grid(field, cached), maker()};
   }
 };
 
