@@ -206,7 +206,7 @@ std::vector<double> InformedReader::evidence_at(const Surround& seen, const nerf
   return fit_signs(mark, score, owner_.cells.count()).sign;
 }
 
-// Returns cameras that show what a changed image shows, in the frame of the changed image.
+// Returns cameras whose renders look like the image, in the frame of the changed image.
 std::vector<nerf::Camera> InformedReader::lookalikes(const CameraSearch& search, const Tensor<float>& image,
                                                      const Change& change) {
   std::vector<nerf::Camera> cameras = search.find(narrowed(image, change.stretch), kByImage);
@@ -222,7 +222,7 @@ std::vector<nerf::Camera> InformedReader::lookalikes(const CameraSearch& search,
 }
 
 // Aligns coarsely from several cameras, until an agreement is `enough`, and adds the results to `found`.
-// Returns whether one is.
+// Returns true if one reached it.
 bool InformedReader::try_all(const Surround& seen, const Change& change,
                              const std::vector<nerf::Camera>& cameras, std::vector<Alignment>& found,
                              double enough) {
@@ -234,8 +234,8 @@ bool InformedReader::try_all(const Surround& seen, const Change& change,
   return false;
 }
 
-// Aligns coarsely from the cameras of a search: those of the cells that the image shows, then, unless one of
-// them is `enough`, those that look like it, which takes longer to find.
+// Aligns coarsely from cameras that show the recognised cells. If none reaches `enough`, aligns from cameras
+// whose renders look like the image, too; finding these takes longer.
 void InformedReader::try_search(const CameraSearch& search, const Surround& seen, const Change& change,
                                 const SeenPlaces& places, std::vector<Alignment>& found, double enough) {
   const Index h = seen.image.shape[0], w = seen.image.shape[1];

@@ -199,14 +199,13 @@ class Stage {
     for (int step = 0; step < options_.steps && !best.points.empty() && failures < kMostFailures; ++step) {
       Matrix damped = sums.h;
       damped.diagonal() = (1 + damping) * sums.h.diagonal().array() + 1e-6 * sums.h.diagonal().maxCoeff();
-      const Vector m = length * damped.ldlt().solve(sums.g);
-      if (!m.allFinite()) break;
-      CameraMotion motion;
-      Eigen::Map<Vector>(motion.data()) = m.cwiseMax(-0.3).cwiseMin(0.3);
+      const Vector newton = damped.ldlt().solve(sums.g);
+      if (!newton.allFinite()) break;
+      const CameraMotion motion = limited(length * newton);
       const double far = furthest(best, motion);
-      const nerf::Camera there = moved(best.camera, best.pivot, motion);
-      if (far < kStill) return {there, agreement(best)};
-      Look next = look(there);
+      if (far < kStill && failures > 0) break;  // the linear model has just failed
+      if (far < kStill) return {moved(best.camera, best.pivot, limited(newton)), agreement(best)};
+      Look next = look(moved(best.camera, best.pivot, motion));
       if (next.points.empty() || !(cost(next, best.spread) < least)) {
         if (far < kNear) break;
         damping *= 10;
@@ -226,6 +225,12 @@ class Stage {
 
  private:
   Index reach() const { return static_cast<Index>(std::ceil(2 * options_.blur)); }
+
+  static CameraMotion limited(const Vector& m) {
+    CameraMotion motion;
+    Eigen::Map<Vector>(motion.data()) = m.cwiseMax(-0.3).cwiseMin(0.3);
+    return motion;
+  }
 
   // Returns the largest displacement of a point under a motion, pixels.
   static double furthest(const Look& l, const CameraMotion& motion) {

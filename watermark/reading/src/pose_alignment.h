@@ -9,7 +9,7 @@ namespace fieldmark::watermark {
 struct AlignmentStage {
   Index size = 64;         ///< longer side, pixels; at most the image's own
   double blur = 1;         ///< standard deviation of the Gaussian on image and render, pixels of this size
-  /// At most; a stage ends at a motion below 0.05 pixels, or below 0.3 if it does not reduce the cost.
+  /// At most; a stage ends at a motion below 0.2 pixels, or below 0.3 if it does not reduce the cost.
   int steps = 8;
   bool lens = true;        ///< true if the position moves besides focal length and principal point
   bool stretched = false;  ///< true if the aspect of pixels is free, too
@@ -19,8 +19,9 @@ struct AlignmentStage {
 /// A camera and the agreement of its view of the field with an image.
 struct Alignment {
   nerf::Camera camera;  ///< of the image's size
-  /// Correlation of the gradients of the image and of the render, in the image's colours, on the foreground
-  /// after the last stage, in [-1, 1]: 1 if they differ by a change of colour alone.
+  /// Correlation of the gradients of the image and of the last stage's last render, in the image's colours,
+  /// on the foreground, in [-1, 1]: 1 if they differ by a change of colour alone. A last motion of less than
+  /// 0.2 pixels comes after it.
   double agreement = -1;
 };
 
@@ -29,10 +30,10 @@ struct Alignment {
 /// Each step renders the field, fits the image's colours (see tone_fit.h), and solves for the motion that
 /// reduces the residual (Lucas and Kanade 1981 with the field's depth; Levenberg-Marquardt damping; Cauchy
 /// weights). Motions are 1.5 Gauss-Newton steps, because reweighting makes single steps fall short; after a
-/// failed step they are one. A rolled camera, another focal length or another principal point explains a
-/// rotated, scaled or cropped image. Where the scene fills its images, the plain corners that a rotation
-/// leaves are ignored (see plain_border.h). Keeps buffers: use one object per thread. Results do not depend
-/// on the number of threads.
+/// failed step they are one. A last one below 0.2 pixels is a single step, without rendering again. A rolled
+/// camera, another focal length or another principal point explains a rotated, scaled or cropped image. Where
+/// the scene fills its images, the plain corners that a rotation leaves are ignored (see plain_border.h).
+/// Keeps buffers: use one object per thread. Results do not depend on the number of threads.
 class PoseAligner {
  public:
   /// @param field  must outlive this object and not change

@@ -20,7 +20,7 @@ struct InformedReading {
   /// camera was found.
   std::vector<double> evidence;
   nerf::Camera camera;    ///< camera found
-  double agreement = -1;  ///< correlation of the gradients of image and aligned render, in [-1, 1]
+  double agreement = -1;  ///< of the alignment: correlation of gradients, in [-1, 1]
 };
 
 /// Which detector a reading comes from.
