@@ -61,6 +61,24 @@ TEST_CASE("render keeps views of another run apart, or removes them on demand", 
   CHECK(std::filesystem::exists(out + "/holiday.png"));
 }
 
+TEST_CASE("render fails if an image cannot be written, the first or the last, by any number of threads",
+          "[render]") {
+  const TemporaryFolder folder;
+  const std::string field = tiny_field(folder, tiny_scene(folder));
+  for (const std::string number : {"000", "002"})
+    for (const std::string threads : {"1", "2"}) {
+      CAPTURE(number, threads);
+      const std::string out = folder / ("v" + number + threads), image = out + "/view_" + number + ".png";
+      std::filesystem::create_directories(image + "/in_the_way");
+      const Outcome r = run_command({"render", "--field", field, "--out", out, "--size", "8", "--count", "3",
+                                     "--threads", threads, "--json", "-"});
+      CHECK(r.code == cli::kFailed);
+      CHECK_THAT(r.err, Contains(image));
+      CHECK(r.out.empty());
+      CHECK(std::filesystem::is_regular_file(out + "/view_001.png") == (number == "002"));
+    }
+}
+
 TEST_CASE("render refuses options that contradict each other", "[render]") {
   const auto with = [](std::vector<std::string> more) {
     std::vector<std::string> words{"render", "--field", "f", "--out", "o"};

@@ -55,7 +55,7 @@ TEST_CASE("Progress on a terminal rewrites one line and ends it", "[progress]") 
   CHECK(std::count(text.begin(), text.end(), '\r') < 5);
   CHECK(std::count(text.begin(), text.end(), '\n') == 1);
   const auto last = text.substr(text.rfind('\r') + 1);
-  CHECK_THAT(last, Contains("train 100%  in 0 s   "));
+  CHECK(last.starts_with("train 100%  in 0 s   "));
   CHECK(last.ends_with("   \n"));  // over a longer line
 }
 

@@ -180,7 +180,8 @@ int run_measure(const MeasureArguments& options, Context& context) {
   MeasureSubject subject{watermark::Owner::load(options.owner), {}, {}};
   choose_code(options.code, options.message, subject.owner, context);
   if (const Index bits = subject.owner.options().bits; bits > kMostPayloadBits)
-    throw UsageError("--bits: measure takes messages of at most 256 bits, got " + std::to_string(bits));
+    throw UsageError("--bits: measure takes messages of at most " + std::to_string(kMostPayloadBits) +
+                     " bits, got " + std::to_string(bits));
   if (options.together > 1 && options.field.empty() && !options.payloads)
     throw UsageError("--together: needs --payloads, or a --field whose message is a payload");
   if (!options.field.empty()) {
