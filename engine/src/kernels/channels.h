@@ -35,10 +35,15 @@ template <class V, class T>
 // sums[k] += v[k].
 template <class T, class V>
 [[gnu::always_inline]] inline void add_lanes(double* sums, V v) {
-  constexpr std::size_t lanes = sizeof(V) / sizeof(T);
-  T lane[lanes];
-  std::memcpy(lane, &v, sizeof v);
-  for (std::size_t k = 0; k < lanes; ++k) sums[k] += static_cast<double>(lane[k]);
+  if constexpr (sizeof(V) == sizeof(T)) {
+    *sums += static_cast<double>(v);
+  } else {
+    typedef double Doubles __attribute__((vector_size(sizeof(V) / sizeof(T) * sizeof(double))));
+    Doubles sum;
+    std::memcpy(&sum, sums, sizeof sum);
+    sum += __builtin_convertvector(v, Doubles);
+    std::memcpy(sums, &sum, sizeof sum);
+  }
 }
 
 // Calls f(first, count) for segments of pixels.

@@ -11,9 +11,14 @@ void add_pixels(Index pixels, Index channels, double* sums, Load load) {
   for_segments(pixels, [=](Index first, Index n) {
     for_channels<T>(channels, [=](auto zero, Index c) {
       using V = decltype(zero);
-      V s[2] = {};
-      for (Index p = 0; p < n; ++p) s[p & 1] += load(zero, (first + p) * channels + c);
-      add_lanes<T>(sums + c, s[0] + s[1]);
+      V even{}, odd{};  // two sums hide the latency of an addition
+      Index p = 0;
+      for (; p + 2 <= n; p += 2) {
+        even += load(zero, (first + p) * channels + c);
+        odd += load(zero, (first + p + 1) * channels + c);
+      }
+      if (p < n) even += load(zero, (first + p) * channels + c);
+      add_lanes<T>(sums + c, even + odd);
     });
   });
 }

@@ -150,6 +150,14 @@ template <class T, class F>
   }
 }
 
+struct Range {
+  Index first, last;
+};
+// Returns the i of [0, count) for which start + i lies in [0, extent).
+constexpr Range inside_of(Index start, Index count, Index extent) {
+  return {start < 0 ? -start : 0, smaller(count, extent - start)};
+}
+
 // Transforms the square of each tile, Line::from pixels a side, which begins `border` pixels before the tile.
 template <class Line, Index border, class T>
 void transform(const WinogradTiles<T>& x, const WinogradMatrices<T>& to) {
@@ -157,7 +165,8 @@ void transform(const WinogradTiles<T>& x, const WinogradMatrices<T>& to) {
   for_tiles(x, [=](Index t, Index image, Index row, Index column) {
     const Index top = row - border, left = column - border;
     const Index begin = (image + top * x.w + left) * pixel;
-    const bool inside = top >= 0 && left >= 0 && top + Line::from <= x.h && left + Line::from <= x.w;
+    const Range rows = inside_of(top, Line::from, x.h), columns = inside_of(left, Line::from, x.w);
+    const bool inside = rows.last - rows.first == Line::from && columns.last - columns.first == Line::from;
     for_row(to, t, x.channels, [=](auto zero, Index c, T* at) {
       using V = decltype(zero);
       const auto store = [=](int i, int j, V v) { store_as(at + (i * 6 + j) * to.stride, v); };
@@ -167,19 +176,25 @@ void transform(const WinogradTiles<T>& x, const WinogradMatrices<T>& to) {
                               store);
         return;
       }
+      if constexpr (sizeof(V) > sizeof(T))
+        if (inside) {
+          both_axes<Line, T, V>(
+              [=](int i, int j) {
+                const Index k = from + i * line + j * pixel;
+                return load_as<V>(x.mask + k) > V{} ? load_as<V>(x.data + k) : V{};
+              },
+              store);
+          return;
+        }
       // Rolled loops: with sanitizers, 36 inline branches take minutes to compile.
-      V square[Line::from][Line::from];
+      V square[Line::from][Line::from] = {};
 #pragma GCC unroll 1
-      for (int i = 0; i < Line::from; ++i)
+      for (Index i = rows.first; i < rows.last; ++i)
 #pragma GCC unroll 1
-        for (int j = 0; j < Line::from; ++j) {
+        for (Index j = columns.first; j < columns.last; ++j) {
           const Index k = from + i * line + j * pixel;
-          if (top + i < 0 || top + i >= x.h || left + j < 0 || left + j >= x.w)
-            square[i][j] = V{};
-          else if (x.mask)
-            square[i][j] = load_as<V>(x.mask + k) > V{} ? load_as<V>(x.data + k) : V{};
-          else
-            square[i][j] = load_as<V>(x.data + k);
+          const V v = load_as<V>(x.data + k);
+          square[i][j] = !x.mask || load_as<V>(x.mask + k) > V{} ? v : V{};
         }
       both_axes<Line, T, V>([&](int i, int j) { return square[i][j]; }, store);
     });

@@ -68,9 +68,12 @@ Var<T> convolve(Var<T> x, Var<T> w, Var<T> b, const ConvGeometry& g, Activation 
   const bool winograd = method == ConvMethod::fastest && detail::winograd_pays(g);
   const detail::Convolution<T> forward{
       .x = x.value(), .w = w.value(), .bias = b.value(), .relu = relu, .y = y};
+  const bool few = detail::few_outputs_pay<T>(g);
   const T* bordered = nullptr;
   if (winograd)
     detail::winograd_convolve(tape, g, forward);
+  else if (few)
+    detail::few_convolve(tape, g, forward);
   else
     bordered = detail::direct_convolve(tape, g, forward);
 
@@ -83,6 +86,8 @@ Var<T> convolve(Var<T> x, Var<T> w, Var<T> b, const ConvGeometry& g, Activation 
     if (T* dw = w.grad_acc()) {
       if (winograd)
         detail::winograd_weight_gradient(t, g, x.value(), dy, mask, dw);
+      else if (few)
+        detail::few_weight_gradient(t, g, x.value(), dy, mask, dw);
       else
         detail::direct_weight_gradient(t, g, bordered, dy, mask, dw);
     }
@@ -96,6 +101,8 @@ Var<T> convolve(Var<T> x, Var<T> w, Var<T> b, const ConvGeometry& g, Activation 
           .x = dy, .mask = mask, .w = flipped(t, w.value(), g), .accumulate = !fresh, .y = dx};
       if (winograd)
         detail::winograd_convolve(t, g.transposed(), back);
+      else if (detail::few_outputs_pay<T>(g.transposed()))
+        detail::few_convolve(t, g.transposed(), back);
       else
         detail::direct_convolve(t, g.transposed(), back);
     }

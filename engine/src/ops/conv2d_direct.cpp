@@ -31,7 +31,9 @@ template <class T>
 const T* with_border(Tape<T>& tape, const ConvGeometry& g, const T* x, const T* mask) {
   const Index row = padded_w(g) * g.c, inner = g.w * g.c, border = g.padding * g.c;
   if (border == 0 && !mask) return x;
-  T* out = tape.scratch(g.n * padded_h(g) * row);
+  const Index size = g.n * padded_h(g) * row, vector = panel_width<T>(1);
+  T* out = tape.scratch(size + vector);
+  std::fill_n(out + size, vector, T(0));
   parallel_for(g.n * padded_h(g), 16, [&](Index begin, Index end) {
     for (Index p = begin; p < end; ++p) {
       T* to = out + p * row;
@@ -94,14 +96,14 @@ void direct_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* borde
                             const T* mask, T* dw) {
   const Index size = g.k * g.k * g.c * g.o,
               together = std::max<Index>(1, kDepth / std::max<Index>(g.out_w(), 1));
-  const Index pixels = g.pixels(), panel = panel_width<T>(g.o);
-  const T* d = packed(tape, dy, pixels, g.o, g.o, Index{1}, mask);
   sharded_sum(tape, rows(g), 64, dw, size, [&](Index begin, Index end, T* to) {
     using namespace kernels;
     const auto run = FIELDMARK_KERNEL(gemm<T>);
     for (Index row = begin; row < end;) {
       const Index image = row / g.out_h(), i = row % g.out_h(),
-                  count = std::min({together, end - row, g.out_h() - i});
+                  count = std::min({together, end - row, g.out_h() - i}), first = row * g.out_w() * g.o;
+      T* d = workspace<T>(panels_size<T>(count * g.out_w(), g.o));
+      pack(dy + first, count * g.out_w(), g.o, g.o, Index{1}, mask ? mask + first : nullptr, d);
       for (Index u = 0; u < g.k; ++u)
         run({.m = g.k * g.c,
              .n = g.o,
@@ -111,14 +113,23 @@ void direct_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* borde
              .a_row = 1,
              .a_col = g.stride * g.c,
              .a_segment = g.stride * padded_w(g) * g.c,
-             .b = d + row * g.out_w() * panel,
-             .b_panel = pixels * panel,
+             .b = d,
              .c = to + u * g.k * g.c * g.o,
              .ldc = g.o,
              .accumulate = true});
       row += count;
     }
   });
+}
+
+template <class T>
+const T* masked(Tape<T>& tape, const T* dy, const T* mask, Index size) {
+  if (!mask) return dy;
+  T* out = tape.scratch(size);
+  parallel_for(size, 1 << 15, [=](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) out[i] = mask[i] > 0 ? dy[i] : T(0);
+  });
+  return out;
 }
 
 // dX[i s + u - p, j s + v - p, c] += sum over o of dY[i, j, o] w[u, v, c, o]: for each pixel, a row of
@@ -129,14 +140,7 @@ void direct_input_gradient(Tape<T>& tape, const ConvGeometry& g, const T* w, con
                            bool accumulate, T* dx) {
   constexpr Index kRows = 8;
   const Index run_length = g.k * g.c, line = padded_w(g) * g.c, width = g.out_w(), plane = g.out_h() * width;
-  const T* d = dy;
-  if (mask) {
-    T* masked = tape.scratch(g.pixels() * g.o);
-    parallel_for(g.pixels() * g.o, 1 << 15, [&](Index begin, Index end) {
-      for (Index i = begin; i < end; ++i) masked[i] = mask[i] > 0 ? dy[i] : T(0);
-    });
-    d = masked;
-  }
+  const T* d = masked(tape, dy, mask, g.pixels() * g.o);
   const Index panels = panels_size<T>(g.o, run_length);
   T* weights = tape.scratch(g.k * panels);
   for (Index u = 0; u < g.k; ++u)
@@ -178,6 +182,7 @@ void direct_input_gradient(Tape<T>& tape, const ConvGeometry& g, const T* w, con
   template void direct_products(Tape<T>&, const ConvGeometry&, const T*, const Convolution<T>&);         \
   template const T* direct_convolve(Tape<T>&, const ConvGeometry&, const Convolution<T>&);               \
   template void direct_weight_gradient(Tape<T>&, const ConvGeometry&, const T*, const T*, const T*, T*); \
+  template const T* masked(Tape<T>&, const T*, const T*, Index);                                         \
   template void direct_input_gradient(Tape<T>&, const ConvGeometry&, const T*, const T*, const T*, bool, T*);
 FIELDMARK_INSTANTIATE(float)
 FIELDMARK_INSTANTIATE(double)

@@ -1,5 +1,7 @@
 #pragma once
-// The two methods of conv2d: direct products with the windows of a padded image, and Winograd's. Private.
+// The methods of conv2d: direct products with the windows of a padded image, the same with other lanes for
+// few outputs, and Winograd's. Private.
+#include <fieldmark/engine/aligned.h>
 #include <fieldmark/engine/tape.h>
 
 namespace fieldmark::detail {
@@ -28,12 +30,21 @@ struct Convolution {
   T* y = nullptr;  ///< [n, h, w, o]
 };
 
+/// Returns a thread's own buffer, which stays in the cache from block to block. Only kernels run while it is
+/// in use, so that no call nests.
+template <class T>
+T* workspace(Index elements) {
+  static thread_local AlignedVector<T> buffer;
+  if (static_cast<Index>(buffer.size()) < elements) buffer.resize(static_cast<std::size_t>(elements));
+  return buffer.data();
+}
+
 /// db[c] += the sum of dy [pixels, channels] where the mask is positive: sums of chunks, added in order.
 template <class T>
 void bias_gradient(Tape<T>& tape, const T* dy, const T* mask, Index pixels, Index channels, T* db);
 
 /// Returns x [n, h, w, c] with 0 where the mask is not positive and a border of zeros, so that every window
-/// stays inside; x itself if it needs neither.
+/// stays inside; x itself if it needs neither. Behind a border follows a vector of zeros.
 template <class T>
 const T* with_border(Tape<T>& tape, const ConvGeometry& g, const T* x, const T* mask);
 /// Convolves the result of with_border().
@@ -46,10 +57,22 @@ const T* direct_convolve(Tape<T>& tape, const ConvGeometry& g, const Convolution
 template <class T>
 void direct_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* bordered, const T* dy,
                             const T* mask, T* dw);
+/// Returns dy [size] with 0 where the mask is not positive; dy itself without a mask.
+template <class T>
+const T* masked(Tape<T>& tape, const T* dy, const T* mask, Index size);
 /// dx = or += the masked dy scattered over its windows, for any stride and padding.
 template <class T>
 void direct_input_gradient(Tape<T>& tape, const ConvGeometry& g, const T* w, const T* dy, const T* mask,
                            bool accumulate, T* dx);
+
+/// True if few_convolve() and few_weight_gradient() are faster than their direct counterparts, which give the
+/// same bits.
+template <class T>
+bool few_outputs_pay(const ConvGeometry& g);
+template <class T>
+void few_convolve(Tape<T>& tape, const ConvGeometry& g, const Convolution<T>& c);
+template <class T>
+void few_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* x, const T* dy, const T* mask, T* dw);
 
 /// True if the two functions below are faster than their direct counterparts; they need k = 3.
 bool winograd_pays(const ConvGeometry& g);

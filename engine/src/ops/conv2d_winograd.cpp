@@ -52,15 +52,6 @@ WinogradMatrices<T> in_panels(T* data, Index rows, Index columns) {
   return {data, padded(rows * round_up(columns, panel)), panel, rows * panel};
 }
 
-// A thread-local buffer, which stays in the cache from block to block. Only kernels run while it is in use,
-// so that no call nests.
-template <class T>
-T* workspace(Index elements) {
-  static thread_local AlignedVector<T> buffer;
-  if (static_cast<Index>(buffer.size()) < elements) buffer.resize(static_cast<std::size_t>(elements));
-  return buffer.data();
-}
-
 }  // namespace
 
 // Measured on one core with AVX-512: with 8 input and 8 output channels Winograd takes 1.2 times as long;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "ops/chunks.h"
+#include "ops/elementwise.h"
 
 namespace fieldmark {
 namespace {
@@ -59,10 +60,9 @@ template <class T>
 void add_row(const Tap<T>* across, Index width, Index channels, T w, const T* dy, T* dx) {
   for (Index j = 0; j < width; ++j, dy += channels) {
     const T right = w * across[j].weight, left = w - right;
-    T *a = dx + across[j].lo * channels, *b = dx + across[j].hi * channels;
-    for (Index k = 0; k < channels; ++k) a[k] += left * dy[k];
-    if (right == 0) continue;
-    for (Index k = 0; k < channels; ++k) b[k] += right * dy[k];
+    const detail::In<T> d(dy, channels);
+    detail::Out<T>(dx + across[j].lo * channels, channels) += left * d;
+    if (right != 0) detail::Out<T>(dx + across[j].hi * channels, channels) += right * d;
   }
 }
 
@@ -94,8 +94,10 @@ Var<T> upsample_to(Var<T> x, Index height, Index width, Interpolation mode) {
   // The transpose of the same weights. A chunk owns rows of dx and visits the output rows that read them, in
   // order: taps grow with i, so those rows are contiguous.
   x.tape().on_backward(out, [=](const T* dy) {
-    T* dx = x.grad_acc();
+    bool fresh = false;
+    T* dx = x.grad_acc(&fresh);
     parallel_for(s[0] * s[1], detail::row_grain(out_row), [&](Index r0, Index r1) {
+      if (fresh) std::fill(dx + r0 * row, dx + r1 * row, T(0));
       for (Index r = r0; r < r1; ++r) {
         const Index i = r % s[1], n = r / s[1];
         const auto* t =
