@@ -119,6 +119,25 @@ TEST_CASE("embedder: preset paper's message loss begins at that of guessing, fiv
   CHECK(embedder.figures().loss == Approx(5 * std::log(2.0)).epsilon(0.25));
 }
 
+TEST_CASE("embedder: preset paper's content weight yields to a mark fainter than its limit, by the square") {
+  const auto first_loss = [](const PooledTrainingOptions& training) {
+    Owner owner = tiny_paper_owner(training);
+    Embedder embedder(owner, tiny_views(), options(10));
+    embedder.step(0);
+    return embedder.figures().loss;
+  };
+  const double weight = 100, message = first_loss({.content_weight = 0}),
+               content = first_loss({.content_weight = weight}) - message,
+               psnr = -10 * std::log10(content / weight), half = 10 * std::log10(2.0);
+  REQUIRE(content > 0.1);
+  const auto with_limit = [&](double limit) {
+    return first_loss({.content_weight = weight, .content_psnr = limit}) - message;
+  };
+  CHECK(with_limit(psnr - half) == Approx(content / 4).epsilon(1e-4));
+  CHECK(with_limit(psnr - 2 * half) == Approx(content / 16).epsilon(1e-4));
+  CHECK(with_limit(psnr + half) == Approx(content).epsilon(1e-4));
+}
+
 TEST_CASE("embedder: views of fewer pixels than the reader's are learnt from as well, with their labels") {
   const auto views = cache_novel_views(tiny_field(), square_patch(32), 8, 3);
   Owner owner = tiny_owner();
@@ -254,9 +273,10 @@ TEST_CASE("embedder: a checkpoint of other weights, distortions or step sizes is
       other_option(owner, o, c.option);
     }
     if (is_paper) {
-      Owner content = tiny_paper_owner({.content_weight = 2}),
+      Owner content = tiny_paper_owner({.content_weight = 2}), limit = tiny_paper_owner({.content_psnr = 2}),
             message = tiny_paper_owner({.message_weight = 2}), muon = tiny_paper_owner({.matrix_rate = 0.5});
       other_option(content, options(6), "content_weight 2");
+      other_option(limit, options(6), "content_psnr 2");
       other_option(message, options(6), "message_weight 2");
       other_option(muon, options(6), "matrix_rate 0.5");
     } else {

@@ -8,6 +8,7 @@
 #include <fieldmark/watermark/mark/owner.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include "optional_term.h"
@@ -72,8 +73,16 @@ Var<float> PooledTraining::loss(Tape<float>& tape, const Params<float>& params,
   }
   Var<float> sum = content.front();
   for (std::size_t i = 1; i < content.size(); ++i) sum = add(sum, content[i]);
-  return add(scale(sum, options_.content_weight / static_cast<double>(images.size())),
+  const auto n = static_cast<double>(images.size());
+  return add(scale(sum, content_weight(static_cast<double>(sum.value()[0]) / n) / n),
              scale(message_loss(read(params, seen).images, images, figures), options_.message_weight));
+}
+
+// A long message is learnt slowly: at a constant weight, its mark would fade before it can be read.
+double PooledTraining::content_weight(double mean_square) const {
+  if (options_.content_psnr == 0) return options_.content_weight;
+  const double relative = mean_square * std::pow(10.0, options_.content_psnr / 10);
+  return options_.content_weight * std::min(1.0, relative * relative);
 }
 
 // Reads images [H, W, 3] of one size, normalised together or one by one.
@@ -186,6 +195,7 @@ std::string PooledTraining::note(const TrainingFigures& f) const {
 
 void PooledTraining::describe(RunFingerprint& f) const {
   f.option("content_weight", options_.content_weight);
+  f.option("content_psnr", options_.content_psnr);
   f.option("message_weight", options_.message_weight);
   f.option("matrix_rate", options_.matrix_rate);
   f.option("warm_steps", options_.warm_steps);

@@ -28,6 +28,7 @@ class PooledTraining : public MarkTraining {
 
  private:
   using Places = extractor::PooledExtractor<float>::Places;
+  double content_weight(double mean_square) const;
   Places read(const Params<float>& params, std::span<const Var<float>> seen);
   Var<float> lesson(Tape<float>& tape, const Params<float>& params, std::span<const TrainingImage> images,
                     TrainingFigures& figures);
