@@ -55,7 +55,8 @@ TEST_CASE("odd_cameras: cameras far from the others, of which there are at least
   CHECK(odd_cameras(few, SceneType::place).empty());
 }
 
-TEST_CASE("odd_cameras: cameras of an object that look past it, and all of them where the axes are OpenCV's") {
+TEST_CASE(
+    "odd_cameras: cameras of an object that look past it, and all of them where the axes are OpenCV's") {
   auto views = ring_of_views(16);
   turn_round(views[3]);
   const Oddity one = only(odd_cameras(views, SceneType::plain), "cameras_look_away");

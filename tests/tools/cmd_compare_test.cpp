@@ -83,8 +83,9 @@ TEST_CASE("compare refuses what cannot be paired", "[compare]") {
   CHECK(nlohmann::json::parse(none.out)["lpips_squeeze"].is_null());
 }
 
-TEST_CASE("compare --reference holds LPIPS against the values in a folder, and fails where one is off or missing",
-          "[compare]") {
+TEST_CASE(
+    "compare --reference holds LPIPS against the values in a folder, and fails where one is off or missing",
+    "[compare]") {
   const auto folder = data_or_skip("lpips_reference", "compare --reference");
   if (!folder || !data_or_skip("weights", "compare --reference")) return;
   const auto r = run_command({"compare", "--reference", "--json", "-"});

@@ -9,8 +9,7 @@ using namespace fieldmark;
 
 TEST_CASE("attack-field trains a field further, or a new one on its images", "[attack-field]") {
   const TemporaryFolder folder;
-  const std::string scene = tiny_scene(folder), field = tiny_field(folder, scene),
-                    out = folder / "out.fm";
+  const std::string scene = tiny_scene(folder), field = tiny_field(folder, scene), out = folder / "out.fm";
   const auto before = nerf::RadianceField::load(field);
   const auto run = [&](std::vector<std::string> words) {
     words.insert(words.begin(),

@@ -78,10 +78,10 @@ struct Block {
   const T* value[kValues];
   T* made[kValues];  // memory of the steps' values
   const T* grad[kValues];
-  T* to[kValues];  // memory for gradients; null: not wanted
+  T* to[kValues];                  // memory for gradients; null: not wanted
   T* streamed_value = nullptr;     // where the last value goes past the caches; null: nowhere
   T* streamed_grad[kValues] = {};  // where a gradient goes past the caches when it is complete; null: nowhere
-  Index n;         // a multiple of the lanes
+  Index n;                         // a multiple of the lanes
 };
 
 // needed: the values to compute, by number; null for all.

@@ -9,7 +9,8 @@
 
 namespace fieldmark::kernels {
 
-TEST_CASE("kernels/chain: every length at an odd offset, and past the caches, and nothing outside is touched") {
+TEST_CASE(
+    "kernels/chain: every length at an odd offset, and past the caches, and nothing outside is touched") {
   Chain chain(2);
   chain.finish(chain.input(0) * chain.input(1) + 2.0 * chain.input(0));
   each_isa([&] {

@@ -44,7 +44,9 @@ Owner mlp_owner() {
   return owner;
 }
 
-BakeOptions bake_options(Index steps) { return {.schedule = {.steps = steps, .lr = 1e-2}, .cameras = 20, .guide_views = 8}; }
+BakeOptions bake_options(Index steps) {
+  return {.schedule = {.steps = steps, .lr = 1e-2}, .cameras = 20, .guide_views = 8};
+}
 
 nerf::RadianceField bake(const Owner& owner, const Message& message, Index steps) {
   Baker baker(owner, message, bake_options(steps));

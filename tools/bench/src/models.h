@@ -54,8 +54,8 @@ struct Transformer {
     const Var<T> all = permute(reshape(qkv(p, x), {size.texts, n, 3, size.heads, w}), {2, 0, 3, 1, 4});
     const Shape part{size.texts, size.heads, n, w};
     const auto head = [&](Index k) { return x.tape().part(all, k * part.size(), part); };
-    const Var<T> scores = batched_matmul(head(0), transpose(head(1))) / std::sqrt(static_cast<T>(w)) +
-                          x.tape().constant(mask);
+    const Var<T> scores =
+        batched_matmul(head(0), transpose(head(1))) / std::sqrt(static_cast<T>(w)) + x.tape().constant(mask);
     return reshape(permute(batched_matmul(softmax(scores), head(2)), {0, 2, 1, 3}), x.shape());
   }
   double items() const { return static_cast<double>(size.texts * size.letters); }

@@ -23,7 +23,7 @@ constexpr double kFirst = 0.3, kRatio = 1.5;  // standard deviations tried, leve
 constexpr int kDeviations = 13;
 constexpr std::array kFactors{0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0};
 constexpr Index kRows = 32, kBlocks = 128;  // of pixels and of coefficients in one piece of work
-constexpr double kOnObject = 32;  // least foreground pixels for a block to count in its band
+constexpr double kOnObject = 32;            // least foreground pixels for a block to count in its band
 
 // One component of an image, in levels; chroma may have half the size.
 struct Plane {

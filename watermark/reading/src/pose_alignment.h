@@ -7,8 +7,8 @@ namespace fieldmark::watermark {
 
 /// One stage of a coarse-to-fine alignment.
 struct AlignmentStage {
-  Index size = 64;         ///< longer side, pixels; at most the image's own
-  double blur = 1;         ///< standard deviation of the Gaussian on image and render, pixels of this size
+  Index size = 64;  ///< longer side, pixels; at most the image's own
+  double blur = 1;  ///< standard deviation of the Gaussian on image and render, pixels of this size
   /// At most; a stage ends at a motion below 0.2 pixels, or below 0.3 if it does not reduce the cost.
   int steps = 8;
   bool lens = true;        ///< true if the position moves besides focal length and principal point

@@ -38,11 +38,11 @@ class CollapseWatch {
   const RadianceField& field_;
   Renderer renderer_;
   std::vector<Truth> truths_;
-  double variance_ = 0;  // of all pixels, per channel
-  double last_ = 0;      // explained() at the last look
-  Index looked_ = 0;     // steps at the last look
+  double variance_ = 0;                                          // of all pixels, per channel
+  double last_ = 0;                                              // explained() at the last look
+  Index looked_ = 0;                                             // steps at the last look
   double looked_at_ = std::numeric_limits<double>::quiet_NaN();  // seconds at the last look or the first call
-  Index worse_ = 0;      // looks in a row that found a constant image better
+  Index worse_ = 0;  // looks in a row that found a constant image better
 };
 
 }  // namespace fieldmark::nerf

@@ -44,8 +44,8 @@ struct View {
   /// training and metrics ignore, else 1; empty: all are valid
   std::vector<std::uint8_t> valid{};
   /// Displacement from each pixel's centre to the point where its colour was seen; null: none. See
-  /// DatasetOptions::resampled. The rays of a supersampled pixel spread over one pixel of this view around that
-  /// point.
+  /// DatasetOptions::resampled. The rays of a supersampled pixel spread over one pixel of this view around
+  /// that point.
   std::shared_ptr<const PixelOffsets> offsets{};
   Index file_width = 0;   ///< of the image file, pixels; 0: there is none
   Index file_height = 0;  ///< of the image file, pixels; 0: there is none
