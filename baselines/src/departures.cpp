@@ -64,7 +64,10 @@ std::vector<Option> options_of_training() {
       {"samples of a ray in training", "64", "-",
        [](const EmbedRecipe&) { return std::to_string(watermark::samples_for(nerf::SpaceKind::cube)); }},
       {"warm start, steps", "none", "-",
-       [](const EmbedRecipe& r) { return std::to_string(fusion_of(r).training.warm_steps); }},
+       [](const EmbedRecipe& r) {
+         return std::to_string(fusion_of(r).training.warm_steps) +
+                " for up to 16 bits; for more, in proportion";
+       }},
       {"gamma_1, of the content loss", "1, of the squared norm", "-",
        [](const EmbedRecipe& r) {
          const auto& training = fusion_of(r).training;

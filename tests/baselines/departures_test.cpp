@@ -31,6 +31,9 @@ TEST_CASE("departures: each part once, with the values that embed uses") {
   CHECK(row("noise, standard deviation").preset_paper == "up to 0.02");
   CHECK(row("noise, standard deviation").preset_code == "none");
   CHECK(row("optimiser of H's convolutions").preset_paper == "Muon, 2 times Adam's step size");
+  CHECK(row("warm start, steps").preset_paper == "1500 for up to 16 bits; for more, in proportion");
+  CHECK(row("gamma_1, of the content loss").preset_paper ==
+        "60, of the mean square; less for marks fainter than 25.5 dB");
   CHECK(row("beta_2 of Adam").preset_paper == "0.99");
   CHECK(row("step size").preset_code == "0.0015, of H 0.003");
 }

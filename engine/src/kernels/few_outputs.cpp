@@ -117,8 +117,10 @@ void few_outputs(const FewOutputs<T>& f) {
       return row_of<T, (kMost<T> < 2 ? 1 : 2)>(f);
     case 3:
       return row_of<T, (kMost<T> < 3 ? 1 : 3)>(f);
-    default:
+    case 4:
       return row_of<T, (kMost<T> < 4 ? 1 : 4)>(f);
+    default:
+      return;
   }
 }
 
@@ -128,5 +130,6 @@ void few_outputs(const FewOutputs<T>& f) {
   template void few_outputs(const FewOutputs<T>&);
 FIELDMARK_INSTANTIATE(float)
 FIELDMARK_INSTANTIATE(double)
+#undef FIELDMARK_INSTANTIATE
 
 }  // namespace fieldmark::kernels::FIELDMARK_ISA_NS

@@ -3,12 +3,13 @@
 
 namespace fieldmark::kernels {
 
-/// One row of a convolution with so few outputs that they would leave most of a vector empty: the lanes hold
-/// pixels instead. The rows that the windows reach are stored as planes, channel by channel, and each plane
-/// goes on for (window - 1) pixels beyond whole vectors of pixels.
+/// One row of a convolution with few outputs. Lanes hold pixels, because the outputs would leave most of a
+/// vector empty. x holds one plane of pixels for each row of the window and each channel; up to
+/// round_up(pixels, lanes) + window - 1 elements of a plane are read.
 template <class T>
 struct FewOutputs {
-  Index pixels = 0, channels = 0, outputs = 0;
+  Index pixels = 0, channels = 0;
+  Index outputs = 0;     ///< 1 to most_few_outputs()
   Index window = 0;      ///< K, pixels
   const T* x = nullptr;  ///< element [u, c, j] is at u row + c plane + j
   Index row = 0, plane = 0;
@@ -18,7 +19,7 @@ struct FewOutputs {
   T* y = nullptr;  ///< [pixels, outputs]
 };
 
-/// Returns the most outputs that few_outputs() takes on this instruction set; gemm() is as fast for more.
+/// Returns the largest number of outputs for which few_outputs() is faster than gemm(); 0: none.
 FIELDMARK_DECLARE_KERNEL(template <class T> Index, most_few_outputs, ())
 
 /// out[c plane + j] = x[j, c] of x [pixels, channels], or 0 where the mask (laid out like x; null: none) is

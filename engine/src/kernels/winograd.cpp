@@ -186,15 +186,16 @@ void transform(const WinogradTiles<T>& x, const WinogradMatrices<T>& to) {
               store);
           return;
         }
-      // Rolled loops: with sanitizers, 36 inline branches take minutes to compile.
+      // Rolled loops: with sanitizers, the 36 inline branches of scalars take minutes to compile.
       V square[Line::from][Line::from] = {};
 #pragma GCC unroll 1
       for (Index i = rows.first; i < rows.last; ++i)
 #pragma GCC unroll 1
         for (Index j = columns.first; j < columns.last; ++j) {
           const Index k = from + i * line + j * pixel;
-          const V v = load_as<V>(x.data + k);
-          square[i][j] = !x.mask || load_as<V>(x.mask + k) > V{} ? v : V{};
+          V v = load_as<V>(x.data + k);
+          if (x.mask) v = load_as<V>(x.mask + k) > V{} ? v : V{};
+          square[i][j] = v;
         }
       both_axes<Line, T, V>([&](int i, int j) { return square[i][j]; }, store);
     });

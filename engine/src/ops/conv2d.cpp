@@ -58,6 +58,25 @@ void check_window(const ConvWindow& window, const Shape& x, const Shape& w) {
                      std::to_string(window.groups) + " for shapes " + x.str() + " and " + w.str());
 }
 
+enum class Way { direct, few, winograd };
+
+template <class T>
+Way way_of(const ConvGeometry& g, ConvMethod method) {
+  if (method == ConvMethod::fastest && detail::winograd_pays(g)) return Way::winograd;
+  return detail::few_outputs_pay<T>(g) ? Way::few : Way::direct;
+}
+
+// Returns what direct_convolve() does; null for the other ways.
+template <class T>
+const T* convolve_by(Way way, Tape<T>& tape, const ConvGeometry& g, const detail::Convolution<T>& c) {
+  if (way == Way::direct) return detail::direct_convolve(tape, g, c);
+  if (way == Way::few)
+    detail::few_convolve(tape, g, c);
+  else
+    detail::winograd_convolve(tape, g, c);
+  return nullptr;
+}
+
 template <class T>
 Var<T> convolve(Var<T> x, Var<T> w, Var<T> b, const ConvGeometry& g, Activation activation,
                 ConvMethod method) {
@@ -65,17 +84,9 @@ Var<T> convolve(Var<T> x, Var<T> w, Var<T> b, const ConvGeometry& g, Activation 
   Tape<T>& tape = x.tape();
   T* y = nullptr;
   const Var<T> out = tape.output({g.n, g.out_h(), g.out_w(), g.o}, &y, {x, w, b});
-  const bool winograd = method == ConvMethod::fastest && detail::winograd_pays(g);
-  const detail::Convolution<T> forward{
-      .x = x.value(), .w = w.value(), .bias = b.value(), .relu = relu, .y = y};
-  const bool few = detail::few_outputs_pay<T>(g);
-  const T* bordered = nullptr;
-  if (winograd)
-    detail::winograd_convolve(tape, g, forward);
-  else if (few)
-    detail::few_convolve(tape, g, forward);
-  else
-    bordered = detail::direct_convolve(tape, g, forward);
+  const Way way = way_of<T>(g, method);
+  const T* bordered =
+      convolve_by(way, tape, g, {.x = x.value(), .w = w.value(), .bias = b.value(), .relu = relu, .y = y});
 
   // dZ = dY through the ReLU; db sums it, dW correlates it with x, dX convolves it with the flipped weights;
   // with a stride or without "same" padding, dX scatters it instead.
@@ -84,9 +95,9 @@ Var<T> convolve(Var<T> x, Var<T> w, Var<T> b, const ConvGeometry& g, Activation 
     const T* mask = relu ? y : nullptr;
     if (T* db = b.grad_acc()) detail::bias_gradient(t, dy, mask, g.pixels(), g.o, db);
     if (T* dw = w.grad_acc()) {
-      if (winograd)
+      if (way == Way::winograd)
         detail::winograd_weight_gradient(t, g, x.value(), dy, mask, dw);
-      else if (few)
+      else if (way == Way::few)
         detail::few_weight_gradient(t, g, x.value(), dy, mask, dw);
       else
         detail::direct_weight_gradient(t, g, bordered, dy, mask, dw);
@@ -97,14 +108,9 @@ Var<T> convolve(Var<T> x, Var<T> w, Var<T> b, const ConvGeometry& g, Activation 
         detail::direct_input_gradient(t, g, w.value(), dy, mask, !fresh, dx);
         return;
       }
-      const detail::Convolution<T> back{
-          .x = dy, .mask = mask, .w = flipped(t, w.value(), g), .accumulate = !fresh, .y = dx};
-      if (winograd)
-        detail::winograd_convolve(t, g.transposed(), back);
-      else if (detail::few_outputs_pay<T>(g.transposed()))
-        detail::few_convolve(t, g.transposed(), back);
-      else
-        detail::direct_convolve(t, g.transposed(), back);
+      const ConvGeometry back = g.transposed();
+      convolve_by(way_of<T>(back, method), t, back,
+                  {.x = dy, .mask = mask, .w = flipped(t, w.value(), g), .accumulate = !fresh, .y = dx});
     }
   });
   return out;

@@ -9,8 +9,6 @@ namespace {
 constexpr Index kDepth = 512;  // pixels that a product for dW sums over: they fit into L2
 
 Index rows(const ConvGeometry& g) { return g.n * g.out_h(); }
-Index padded_w(const ConvGeometry& g) { return g.w + 2 * g.padding; }
-Index padded_h(const ConvGeometry& g) { return g.h + 2 * g.padding; }
 
 }  // namespace
 
@@ -29,15 +27,15 @@ void bias_gradient(Tape<T>& tape, const T* dy, const T* mask, Index pixels, Inde
 
 template <class T>
 const T* with_border(Tape<T>& tape, const ConvGeometry& g, const T* x, const T* mask) {
-  const Index row = padded_w(g) * g.c, inner = g.w * g.c, border = g.padding * g.c;
+  const Index row = g.padded_w() * g.c, inner = g.w * g.c, border = g.padding * g.c;
   if (border == 0 && !mask) return x;
-  const Index size = g.n * padded_h(g) * row, vector = panel_width<T>(1);
+  const Index size = g.n * g.padded_h() * row, vector = panel_width<T>(1);
   T* out = tape.scratch(size + vector);
   std::fill_n(out + size, vector, T(0));
-  parallel_for(g.n * padded_h(g), 16, [&](Index begin, Index end) {
+  parallel_for(g.n * g.padded_h(), 16, [&](Index begin, Index end) {
     for (Index p = begin; p < end; ++p) {
       T* to = out + p * row;
-      const Index image = p / padded_h(g), y = p % padded_h(g) - g.padding;
+      const Index image = p / g.padded_h(), y = p % g.padded_h() - g.padding;
       if (y < 0 || y >= g.h) {
         std::fill_n(to, row, T(0));
         continue;
@@ -69,9 +67,9 @@ void direct_products(Tape<T>& tape, const ConvGeometry& g, const T* padded, cons
            .n = g.o,
            .k = g.k * g.c,
            .segments = g.k,
-           .a = padded + (image * padded_h(g) + i) * padded_w(g) * g.c,
+           .a = padded + (image * g.padded_h() + i) * g.padded_w() * g.c,
            .a_row = g.stride * g.c,
-           .a_segment = padded_w(g) * g.c,
+           .a_segment = g.padded_w() * g.c,
            .b = weights,
            .c = c.y + row * g.out_w() * g.o,
            .ldc = g.o,
@@ -109,10 +107,10 @@ void direct_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* borde
              .n = g.o,
              .k = g.out_w(),
              .segments = count,
-             .a = bordered + (image * padded_h(g) + i * g.stride + u) * padded_w(g) * g.c,
+             .a = bordered + (image * g.padded_h() + i * g.stride + u) * g.padded_w() * g.c,
              .a_row = 1,
              .a_col = g.stride * g.c,
-             .a_segment = g.stride * padded_w(g) * g.c,
+             .a_segment = g.stride * g.padded_w() * g.c,
              .b = d,
              .c = to + u * g.k * g.c * g.o,
              .ldc = g.o,
@@ -139,7 +137,7 @@ template <class T>
 void direct_input_gradient(Tape<T>& tape, const ConvGeometry& g, const T* w, const T* dy, const T* mask,
                            bool accumulate, T* dx) {
   constexpr Index kRows = 8;
-  const Index run_length = g.k * g.c, line = padded_w(g) * g.c, width = g.out_w(), plane = g.out_h() * width;
+  const Index run_length = g.k * g.c, line = g.padded_w() * g.c, width = g.out_w(), plane = g.out_h() * width;
   const T* d = masked(tape, dy, mask, g.pixels() * g.o);
   const Index panels = panels_size<T>(g.o, run_length);
   T* weights = tape.scratch(g.k * panels);

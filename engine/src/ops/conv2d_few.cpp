@@ -1,7 +1,6 @@
-// Convolutions with so few outputs that they would leave most of a vector empty, as at either end of a
-// network on images. The products of conv2d_direct.cpp run with other lanes: pixels in the forward pass,
-// elements of the windows in the gradient of the weights. Every sum keeps its order, so that both ways give
-// the same bits.
+// Convolutions with few outputs, as at either end of a network on images, whose outputs would leave most of a
+// vector empty. y is vectorised over pixels and dW over elements of the window instead. Every sum keeps the
+// order of conv2d_direct.cpp, so that both ways give the same bits.
 #include "kernels/few_outputs.h"
 #include "ops/conv2d_parts.h"
 #include "ops/product.h"
@@ -14,7 +13,7 @@ namespace {
 template <class T>
 const T* planes_of(Tape<T>& tape, const ConvGeometry& g, const T* x, const T* mask, Index line) {
   using namespace kernels;
-  const Index high = g.h + 2 * g.padding, size = g.c * line;
+  const Index high = g.padded_h(), size = g.c * line;
   const auto spread = FIELDMARK_KERNEL(pixel_planes<T>);
   T* out = tape.scratch(g.n * high * size);
   parallel_for(g.n * high, 16, [=](Index begin, Index end) {
@@ -32,17 +31,18 @@ const T* planes_of(Tape<T>& tape, const ConvGeometry& g, const T* x, const T* ma
 
 }  // namespace
 
-// A window of 1 has no neighbours to share the planes with.
+// Windows of 1 do not share the planes with neighbours, and a narrow image leaves most lanes empty.
 template <class T>
 bool few_outputs_pay(const ConvGeometry& g) {
   using namespace kernels;
-  return g.same() && g.k > 1 && g.o <= FIELDMARK_KERNEL(most_few_outputs<T>)();
+  return g.same() && g.k > 1 && 2 * g.w >= panel_width<T>(1) && g.o > 0 &&
+         g.o <= FIELDMARK_KERNEL(most_few_outputs<T>)();
 }
 
 template <class T>
 void few_convolve(Tape<T>& tape, const ConvGeometry& g, const Convolution<T>& c) {
   using namespace kernels;
-  const Index line = whole_row<T>(g.w) + g.k - 1, high = g.h + 2 * g.padding;
+  const Index line = whole_row<T>(g.w) + g.k - 1, high = g.padded_h();
   const T* planes = planes_of(tape, g, c.x, c.mask, line);
   const auto run = FIELDMARK_KERNEL(few_outputs<T>);
   parallel_for(g.n * g.h, 4, [&](Index begin, Index end) {
@@ -70,8 +70,8 @@ void few_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* x, const
                          T* dw) {
   const T* bordered = with_border(tape, g, x, static_cast<const T*>(nullptr));
   const T* d = masked(tape, dy, mask, g.pixels() * g.o);
-  const Index columns = g.k * g.c, width = whole_row<T>(columns), high = g.h + 2 * g.padding,
-              line = (g.w + 2 * g.padding) * g.c;
+  const Index columns = g.k * g.c, width = whole_row<T>(columns), high = g.padded_h(),
+              line = g.padded_w() * g.c;
   T* sums = tape.scratch(g.k * g.o * width);  // [K, o, K channels]
   const auto each = [&](auto&& f) {
     for (Index u = 0; u < g.k; ++u)

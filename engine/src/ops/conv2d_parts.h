@@ -1,6 +1,6 @@
 #pragma once
-// The methods of conv2d: direct products with the windows of a padded image, the same with other lanes for
-// few outputs, and Winograd's. Private.
+// The methods of conv2d: direct products with the windows of a padded image, the same sums vectorised over
+// pixels for few outputs, and Winograd's. Private.
 #include <fieldmark/engine/aligned.h>
 #include <fieldmark/engine/tape.h>
 
@@ -11,6 +11,8 @@ struct ConvGeometry {
   Index stride = 1, padding = (k - 1) / 2;  // pixels
   Index out_h() const { return (h + 2 * padding - k) / stride + 1; }
   Index out_w() const { return (w + 2 * padding - k) / stride + 1; }
+  Index padded_h() const { return h + 2 * padding; }
+  Index padded_w() const { return w + 2 * padding; }
   /// Returns the number of pixels of the result.
   Index pixels() const { return n * out_h() * out_w(); }
   /// True if the result is as large as x, with centred windows.
@@ -44,7 +46,8 @@ template <class T>
 void bias_gradient(Tape<T>& tape, const T* dy, const T* mask, Index pixels, Index channels, T* db);
 
 /// Returns x [n, h, w, c] with 0 where the mask is not positive and a border of zeros, so that every window
-/// stays inside; x itself if it needs neither. Behind a border follows a vector of zeros.
+/// stays inside; x itself if it needs neither. A bordered copy ends with one extra vector of zeros, because
+/// few_weight_gradient() reads whole vectors beyond the last window.
 template <class T>
 const T* with_border(Tape<T>& tape, const ConvGeometry& g, const T* x, const T* mask);
 /// Convolves the result of with_border().

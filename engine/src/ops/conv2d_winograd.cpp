@@ -1,4 +1,3 @@
-#include <fieldmark/engine/aligned.h>
 
 #include "kernels/winograd.h"
 #include "ops/conv2d_parts.h"

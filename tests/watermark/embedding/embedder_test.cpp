@@ -10,29 +10,15 @@
 
 #include "support/catch.h"
 #include "support/temporary_folder.h"
+#include "watermark/embedding/few_steps.h"
 #include "watermark/tiny_owner.h"
 
 using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
-EmbedOptions options(Index steps) {
-  return {.schedule = {.steps = steps, .lr = 4e-3}, .batch = 3, .seed = 4};
-}
-
-// Everything that some steps leave behind.
-struct Outcome {
-  std::vector<float> values;
-  std::vector<double> figures;
-  friend bool operator==(const Outcome&, const Outcome&) = default;
-};
-Outcome outcome(const Owner& owner, const Embedder& e) {
-  const auto& f = e.figures();
-  return {{owner.params.values().begin(), owner.params.values().end()}, {f.sign, f.index, f.bits, f.loss}};
-}
-
 Outcome run(Index steps, Owner owner = tiny_owner()) {
-  Embedder embedder(owner, tiny_views(), options(steps));
+  Embedder embedder(owner, tiny_views(), few_steps(steps));
   while (!embedder.done()) embedder.step(0);
   return outcome(owner, embedder);
 }
@@ -64,7 +50,7 @@ void refused(const std::filesystem::path& path, Owner& owner, const EmbedOptions
 TEST_CASE("embedder: in 300 steps the losses fall, places are told apart and bits begin to be read") {
   Owner owner = tiny_owner();
   const std::vector<float> field(owner.field.params.values().begin(), owner.field.params.values().end());
-  Embedder embedder(owner, tiny_views(), options(300));
+  Embedder embedder(owner, tiny_views(), few_steps(300));
   embedder.step(0);
   const Embedder::Figures first = embedder.figures();
   while (!embedder.done()) {
@@ -87,7 +73,7 @@ TEST_CASE(
     "embedder: equal options train equal networks and the same gain under any key, for every kind of mark") {
   const auto trained = [](Owner owner, const Key& key) {
     owner.set_code(key, owner.options().bits);
-    Embedder embedder(owner, tiny_views(), options(4));
+    Embedder embedder(owner, tiny_views(), few_steps(4));
     embedder.drive({});
     embedder.calibrate(4);
     return std::pair{outcome(owner, embedder), owner.gain};
@@ -96,52 +82,10 @@ TEST_CASE(
   CHECK(trained(tiny_paper_owner({}), test_key(1)) == trained(tiny_paper_owner({}), test_key(77)));
 }
 
-TEST_CASE("embedder: preset paper learns the colours of the field, then its content loss is small") {
-  Owner owner = tiny_paper_owner({.message_weight = 0});  // at 5, the message would be most of the loss
-  Embedder embedder(owner, tiny_views(), options(150));
-  embedder.step(0);
-  const double first = embedder.figures().loss;
-  while (!embedder.done()) {
-    embedder.step(0);
-    REQUIRE(std::isfinite(embedder.figures().loss));
-  }
-  CAPTURE(first, embedder.figures().loss);
-  CHECK(embedder.figures().loss < 0.3 * first);
-  CHECK_THAT(embedder.status(), Contains("right: bits") && Contains("loss"));
-  embedder.calibrate();
-  CHECK(owner.gain == 0);
-}
-
-TEST_CASE("embedder: preset paper's message loss begins at that of guessing, five times") {
-  Owner owner = tiny_paper_owner({.content_weight = 0});
-  Embedder embedder(owner, tiny_views(), options(10));
-  embedder.step(0);
-  CHECK(embedder.figures().loss == Approx(5 * std::log(2.0)).epsilon(0.25));
-}
-
-TEST_CASE("embedder: preset paper's content weight yields to a mark fainter than its limit, by the square") {
-  const auto first_loss = [](const PooledTrainingOptions& training) {
-    Owner owner = tiny_paper_owner(training);
-    Embedder embedder(owner, tiny_views(), options(10));
-    embedder.step(0);
-    return embedder.figures().loss;
-  };
-  const double weight = 100, message = first_loss({.content_weight = 0}),
-               content = first_loss({.content_weight = weight}) - message,
-               psnr = -10 * std::log10(content / weight), half = 10 * std::log10(2.0);
-  REQUIRE(content > 0.1);
-  const auto with_limit = [&](double limit) {
-    return first_loss({.content_weight = weight, .content_psnr = limit}) - message;
-  };
-  CHECK(with_limit(psnr - half) == Approx(content / 4).epsilon(1e-4));
-  CHECK(with_limit(psnr - 2 * half) == Approx(content / 16).epsilon(1e-4));
-  CHECK(with_limit(psnr + half) == Approx(content).epsilon(1e-4));
-}
-
 TEST_CASE("embedder: views of fewer pixels than the reader's are learnt from as well, with their labels") {
   const auto views = cache_novel_views(tiny_field(), square_patch(32), 8, 3);
   Owner owner = tiny_owner();
-  Embedder embedder(owner, views, options(200));
+  Embedder embedder(owner, views, few_steps(200));
   embedder.step(0);
   const Embedder::Figures first = embedder.figures();
   while (!embedder.done()) embedder.step(0);
@@ -155,7 +99,7 @@ TEST_CASE("embedder: views of fewer pixels than the reader's are learnt from as 
 TEST_CASE("embedder: distortions that are not mixed, and no loss of signs, train otherwise") {
   const auto values = [](auto change, const CellTrainingOptions& training = {.anneal = 20}) {
     Owner owner = tiny_owner(30, training);
-    EmbedOptions o = options(3);
+    EmbedOptions o = few_steps(3);
     change(o);
     Embedder embedder(owner, tiny_views(), o);
     while (!embedder.done()) embedder.step(0);
@@ -184,12 +128,12 @@ TEST_CASE("embedder: a run that is saved and restored ends as an uninterrupted o
   const Outcome whole = run(6);
   {
     Owner owner = tiny_owner();
-    Embedder embedder(owner, tiny_views(), options(6));
+    Embedder embedder(owner, tiny_views(), few_steps(6));
     for (int i = 0; i < 3; ++i) embedder.step(0);
     embedder.save(folder / "checkpoint");
   }
   Owner owner = tiny_owner();
-  Embedder embedder(owner, tiny_views(), options(6));
+  Embedder embedder(owner, tiny_views(), few_steps(6));
   embedder.restore(folder / "checkpoint");
   CHECK(embedder.steps() == 3);
   while (!embedder.done()) embedder.step(0);
@@ -200,20 +144,20 @@ TEST_CASE("embedder: a checkpoint of another run is refused") {
   const TemporaryFolder folder;
   const auto path = folder / "checkpoint";
   Owner owner = tiny_owner();
-  Embedder embedder(owner, tiny_views(), options(6));
+  Embedder embedder(owner, tiny_views(), few_steps(6));
   embedder.save(path);
   using std::filesystem::perms;
   CHECK(std::filesystem::status(path).permissions() == (perms::owner_read | perms::owner_write));
   CHECK(Embedder::checkpoint_key(path) == owner.key);
-  refused(path, owner, options(7), "option 'steps' 6, this run has 7");
+  refused(path, owner, few_steps(7), "option 'steps' 6, this run has 7");
   Owner other_key = tiny_owner();
   other_key.key = test_key(6);
-  refused(path, other_key, options(6), "found one under another");
+  refused(path, other_key, few_steps(6), "found one under another");
   const auto bytes = read_bytes(path);
   write_file_atomically(path, std::span(bytes).first(bytes.size() - 1));
-  refused(path, owner, options(6), "");
+  refused(path, owner, few_steps(6), "");
   owner.save(path);
-  refused(path, owner, options(6), "expected a CHECKPOINT file");
+  refused(path, owner, few_steps(6), "expected a CHECKPOINT file");
   owner.field.save(path);
   CHECK_THROWS_AS(Embedder::checkpoint_key(path), IoError);
   CHECK_THROWS_WITH(Embedder::checkpoint_key(path),
@@ -266,23 +210,23 @@ TEST_CASE("embedder: a checkpoint of other weights, distortions or step sizes is
   };
   for (const bool is_paper : {false, true}) {
     Owner owner = is_paper ? tiny_paper_owner() : tiny_owner();
-    Embedder(owner, tiny_views(), options(6)).save(path);
+    Embedder(owner, tiny_views(), few_steps(6)).save(path);
     for (const Change& c : both) {
-      EmbedOptions o = options(6);
+      EmbedOptions o = few_steps(6);
       c.make(o);
       other_option(owner, o, c.option);
     }
     if (is_paper) {
       Owner content = tiny_paper_owner({.content_weight = 2}), limit = tiny_paper_owner({.content_psnr = 2}),
             message = tiny_paper_owner({.message_weight = 2}), muon = tiny_paper_owner({.matrix_rate = 0.5});
-      other_option(content, options(6), "content_weight 2");
-      other_option(limit, options(6), "content_psnr 2");
-      other_option(message, options(6), "message_weight 2");
-      other_option(muon, options(6), "matrix_rate 0.5");
+      other_option(content, few_steps(6), "content_weight 2");
+      other_option(limit, few_steps(6), "content_psnr 2");
+      other_option(message, few_steps(6), "message_weight 2");
+      other_option(muon, few_steps(6), "matrix_rate 0.5");
     } else {
       for (const CellChange& c : cells) {
         Owner changed = tiny_owner(30, c.options);
-        other_option(changed, options(6), c.option);
+        other_option(changed, few_steps(6), c.option);
       }
     }
   }
@@ -291,10 +235,10 @@ TEST_CASE("embedder: a checkpoint of other weights, distortions or step sizes is
 TEST_CASE("embedder: calibration gives views the owner's strength") {
   for (double mark_psnr : {28.0, 34.5}) {
     Owner owner = tiny_owner(mark_psnr);
-    Embedder(owner, tiny_views(), options(1)).calibrate(16);
+    Embedder(owner, tiny_views(), few_steps(1)).calibrate(16);
     // Exact on the calibration's own views and messages; others are so few and small that they differ.
-    CHECK(measured_strength(owner, options(1).seed + 77, CounterRng(options(1).seed, 12), options(1).seed) ==
-          Approx(mark_psnr).margin(0.03));
+    CHECK(measured_strength(owner, few_steps(1).seed + 77, CounterRng(few_steps(1).seed, 12),
+                            few_steps(1).seed) == Approx(mark_psnr).margin(0.03));
     CHECK(measured_strength(owner, 1234, CounterRng(5), 8) == Approx(mark_psnr).margin(0.5));
   }
 }
@@ -303,7 +247,7 @@ TEST_CASE("embedder: the extractor has a step size of its own") {
   const auto moved = [](double extractor_lr) {
     Owner owner = tiny_paper_owner();
     const auto before = owner.params;
-    EmbedOptions o = options(1);
+    EmbedOptions o = few_steps(1);
     o.extractor_lr = extractor_lr;
     Embedder(owner, tiny_views(), o).step(0);
     double mark = 0, extractor = 0;
@@ -317,87 +261,21 @@ TEST_CASE("embedder: the extractor has a step size of its own") {
   CHECK(two.first == one.first);
   CHECK(two.second == Approx(2 * one.second).epsilon(1e-3));
   Owner owner = tiny_paper_owner();
-  EmbedOptions o = options(1);
+  EmbedOptions o = few_steps(1);
   o.extractor_lr = 0;
   CHECK_THROWS_WITH(Embedder(owner, tiny_views(), o),
                     "[embedder] extractor_lr must be positive, got 0.000000");
 }
 
-TEST_CASE("embedder: preset code learns the colours of the field from raw numbers") {
-  Owner owner = tiny_paper_owner({.message_weight = 0}, true);
-  Embedder embedder(owner, tiny_views(), options(60));
-  embedder.step(0);
-  const double first = embedder.figures().loss;
-  while (!embedder.done()) embedder.step(0);
-  CHECK(embedder.figures().loss < 0.6 * first);
-}
-
 TEST_CASE("embedder: options outside their ranges are refused") {
   Owner owner = tiny_owner();
   for (Index batch : {0, 65}) {
-    EmbedOptions bad = options(1);
+    EmbedOptions bad = few_steps(1);
     bad.batch = batch;
     CHECK_THROWS_AS(Embedder(owner, tiny_views(), bad), ValueError);
     CHECK_THROWS_WITH(Embedder(owner, tiny_views(), bad),
                       "[embedder] batch must be 1 to 64, got " + std::to_string(batch));
   }
-  CHECK_THROWS_AS(Embedder(owner, {}, options(1)), ValueError);
-  CHECK_THROWS_WITH(Embedder(owner, {}, options(1)), "[embedder] views must not be empty");
-}
-
-TEST_CASE("embedder: a warm start paints and reads carriers, is resumed bit by bit, and leaves no helpers") {
-  const PooledTrainingOptions training{.content_weight = 60, .matrix_rate = 2, .warm_steps = 6};
-  const auto owner_of = [&] {
-    return Owner(tiny_field(), {.bits = 4, .reader_size = 48}, test_key(5), message_slots(4),
-                 fusion_mark({.width = 16, .channels = 8, .running_norm = true, .training = training}));
-  };
-  const TemporaryFolder folder;
-  Owner whole = owner_of(), resumed = owner_of(), two_threads = owner_of();
-  Embedder embedder(whole, tiny_views(), options(9));
-  embedder.step(0);
-  const double first = embedder.figures().loss;
-  while (!embedder.done()) embedder.step(0);
-  CHECK(std::isfinite(first));
-  CHECK(embedder.warm_steps() == 6);
-  {
-    Embedder begun(resumed, tiny_views(), options(9));
-    for (int k = 0; k < 4; ++k) begun.step(0);
-    begun.save(folder / "checkpoint");
-    const SafetensorsFile file = SafetensorsFile::read(folder / "checkpoint");
-    CHECK(file.has("extractor/0/conv/weight.velocity"));
-    CHECK_FALSE(file.has("extractor/0/conv/weight.mean"));
-    CHECK(file.has("extractor/0/conv/bias.mean"));
-  }
-  resumed = owner_of();
-  Embedder rest(resumed, tiny_views(), options(9));
-  rest.restore(folder / "checkpoint");
-  while (!rest.done()) rest.step(0);
-  CHECK(outcome(whole, embedder) == outcome(resumed, rest));
-  const ScopedThreads scope(2);
-  Embedder on_two(two_threads, tiny_views(), options(9));
-  while (!on_two.done()) on_two.step(0);
-  CHECK(outcome(whole, embedder) == outcome(two_threads, on_two));
-  for (const auto& e : whole.params.entries())
-    CHECK((e.name.starts_with("mark/") || e.name.starts_with("extractor/")));
-  whole.save(folder / "owner");
-  const Owner again = Owner::load(folder / "owner");
-  const Tensor<float>& image = tiny_views().front().base;
-  CHECK(again.mark().evidence(again, image, nullptr) == whole.mark().evidence(whole, image, nullptr));
-}
-
-TEST_CASE("embedder: in 150 steps of a warm start the extractor begins to read the carriers") {
-  Owner owner(
-      tiny_field(), {.bits = 4, .reader_size = 48}, test_key(5), message_slots(4),
-      fusion_mark({.width = 16, .channels = 8, .running_norm = true, .training = {.warm_steps = 200}}));
-  Embedder embedder(owner, tiny_views(),
-                    {.schedule = {.steps = 150, .lr = 4e-3},
-                     .batch = 4,
-                     .distortions = {.noise = 0, .rotation = 0, .zoom_out = 1, .zoom_in = 1, .blur = 0},
-                     .seed = 4});
-  embedder.step(0);
-  const double first = embedder.figures().loss;
-  while (!embedder.done()) embedder.step(0);
-  CAPTURE(first, embedder.figures().loss, embedder.figures().bits);
-  CHECK(embedder.figures().loss < 0.8 * first);
-  CHECK(embedder.figures().bits > 0.57);
+  CHECK_THROWS_AS(Embedder(owner, {}, few_steps(1)), ValueError);
+  CHECK_THROWS_WITH(Embedder(owner, {}, few_steps(1)), "[embedder] views must not be empty");
 }

@@ -22,6 +22,7 @@ constexpr double kElsewhere = 0.3, kSilent = 2;  // first and last weight of bit
 constexpr float kOfBackground = 0.3f;            // weight of the background's logits relative to the object's
 constexpr double kIndex = 0.5;                   // final weight of the carried bit's cross-entropy
 constexpr double kPixelsABit = 2;                // a pixel's logit over its part of the pooled one, per bit
+constexpr Index kBitsOfWarmStart = 16;           // up to which warm_steps suffice
 constexpr double kMomentum = 0.05;               // of the running statistics
 
 // Stacks tensors along the first axis of `shape`.
@@ -61,7 +62,7 @@ PooledTraining::PooledTraining(const extractor::PooledExtractor<float>& reader,
 Var<float> PooledTraining::loss(Tape<float>& tape, const Params<float>& params,
                                 std::span<const TrainingImage> images, const TrainingFigures&,
                                 TrainingFigures& figures) {
-  if (images.front().step < options_.warm_steps) return lesson(tape, params, images, figures);
+  if (images.front().step < warm_steps()) return lesson(tape, params, images, figures);
   const Index bits = owner_.options().bits;
   std::vector<Var<float>> seen, content;
   for (const TrainingImage& image : images) {
@@ -76,6 +77,11 @@ Var<float> PooledTraining::loss(Tape<float>& tape, const Params<float>& params,
   const auto n = static_cast<double>(images.size());
   return add(scale(sum, content_weight(static_cast<double>(sum.value()[0]) / n) / n),
              scale(message_loss(read(params, seen).images, images, figures), options_.message_weight));
+}
+
+// Each bit has its own carriers to learn.
+Index PooledTraining::warm_steps() const {
+  return options_.warm_steps * std::max(owner_.options().bits, kBitsOfWarmStart) / kBitsOfWarmStart;
 }
 
 // A long message is learnt slowly: at a constant weight, its mark would fade before it can be read.

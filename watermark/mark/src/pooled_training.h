@@ -19,7 +19,7 @@ class PooledTraining : public MarkTraining {
   bool whole_batch() const override { return true; }
   Var<float> loss(Tape<float>& tape, const Params<float>& params, std::span<const TrainingImage> images,
                   const TrainingFigures& running, TrainingFigures& figures) override;
-  Index warm_steps() const override { return options_.warm_steps; }
+  Index warm_steps() const override;
   MuonWeights matrices() const override { return {{"extractor/*/conv/weight"}, options_.matrix_rate}; }
   ParamStore<float>* helpers() override { return carriers_ ? &helpers_ : nullptr; }
   void finish_step(ParamStore<float>& params) override;

@@ -8,11 +8,10 @@ namespace fieldmark::watermark {
 /// Training options of a pooled mark.
 struct PooledTrainingOptions {
   double content_weight = 1;  ///< gamma_1
-  double content_psnr =
-      0;  ///< marks fainter than this, in dB over a step's images, lower gamma_1; 0: none do
+  double content_psnr = 0;    ///< dB of a step's marked images, above which gamma_1 falls; 0: never
   double message_weight = 5;  ///< gamma_2
   double matrix_rate = 0;     ///< step size of Muon relative to Adam's; 0: Adam trains all weights
-  Index warm_steps = 0;       ///< warm-up steps, in which all networks learn fixed carriers, >= 0
+  Index warm_steps = 0;       ///< of the warm start for up to 16 bits, >= 0; for more, in proportion
 };
 
 /// Makes slots that stand in for cells in a mark without cells: one per bit, of equal area and without a
@@ -24,10 +23,12 @@ class FixedCarriers;
 /// Mark with one message for all places, which PooledExtractor reads from a whole image: the base of
 /// FusionMark. Its evidence is the logit of every slot. Training minimises
 ///   L = gamma_1 mean |marked - base|^2 + gamma_2 BCE(bits, M)
-/// with gamma_1 = content_weight min(1, m / m_0)^2 for a mean square m of the mark in the images of the step
-/// and the mean square m_0 of content_psnr. An optional warm start comes first, in which the extractor learns
-/// to read fixed carriers, pixel by pixel, and the mark's networks learn to paint them. Source: Luo et al.
-/// 2023 (CopyRNeRF), section 3.4, without the perceptual term and with a warm start.
+/// where gamma_1 = content_weight min(1, m / m_0)^2 is a constant in the gradient, m is the mean square of
+/// marked - base over the images of a step, and m_0 is that of content_psnr. An optional warm start comes
+/// first: the extractor learns to read fixed carriers, pixel by pixel, and the mark's networks learn to paint
+/// them.
+/// Source: Luo et al. 2023 (CopyRNeRF), section 3.4, without the perceptual term, with a warm start and with
+/// a weight that falls for faint marks.
 class PooledMark : public Mark {
  public:
   /// Computes the marked image [pixels, 3] of a training image.   @param message  [1, N_b], -1 or 1

@@ -1,0 +1,151 @@
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/watermark/embedding/embedder.h>
+
+#include <cmath>
+
+#include "support/catch.h"
+#include "support/temporary_folder.h"
+#include "watermark/embedding/few_steps.h"
+#include "watermark/tiny_owner.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+TEST_CASE("embedder: preset paper learns the colours of the field, then its content loss is small") {
+  Owner owner = tiny_paper_owner({.message_weight = 0});  // at 5, the message would be most of the loss
+  Embedder embedder(owner, tiny_views(), few_steps(150));
+  embedder.step(0);
+  const double first = embedder.figures().loss;
+  while (!embedder.done()) {
+    embedder.step(0);
+    REQUIRE(std::isfinite(embedder.figures().loss));
+  }
+  CAPTURE(first, embedder.figures().loss);
+  CHECK(embedder.figures().loss < 0.3 * first);
+  CHECK_THAT(embedder.status(), Contains("right: bits") && Contains("loss"));
+  embedder.calibrate();
+  CHECK(owner.gain == 0);
+}
+
+TEST_CASE("embedder: preset paper's message loss begins at that of guessing, five times") {
+  Owner owner = tiny_paper_owner({.content_weight = 0});
+  Embedder embedder(owner, tiny_views(), few_steps(10));
+  embedder.step(0);
+  CHECK(embedder.figures().loss == Approx(5 * std::log(2.0)).epsilon(0.25));
+}
+
+TEST_CASE(
+    "embedder: preset paper's content weight falls with the square of the mark's power below its limit") {
+  const auto first_loss = [](const PooledTrainingOptions& training) {
+    Owner owner = tiny_paper_owner(training);
+    Embedder embedder(owner, tiny_views(), few_steps(10));
+    embedder.step(0);
+    return embedder.figures().loss;
+  };
+  const double weight = 100, message = first_loss({.content_weight = 0}),
+               content = first_loss({.content_weight = weight}) - message,
+               psnr = -10 * std::log10(content / weight), half = 10 * std::log10(2.0);
+  REQUIRE(content > 0.1);
+  const auto with_limit = [&](double limit) {
+    return first_loss({.content_weight = weight, .content_psnr = limit}) - message;
+  };
+  CHECK(with_limit(psnr - half) == Approx(content / 4).epsilon(1e-4));
+  CHECK(with_limit(psnr - 2 * half) == Approx(content / 16).epsilon(1e-4));
+  CHECK(with_limit(psnr + half) == Approx(content).epsilon(1e-4));
+
+  // The weight is a constant in the gradient: a step moves the networks as it does at the weight itself.
+  const auto moved = [](const PooledTrainingOptions& training) {
+    Owner owner = tiny_paper_owner(training);
+    Embedder(owner, tiny_views(), few_steps(10)).step(0);
+    return std::vector<float>(owner.params.values().begin(), owner.params.values().end());
+  };
+  const auto limited = moved({.content_weight = weight, .content_psnr = psnr - half}),
+             same = moved({.content_weight = weight / 4}),
+             tripled = moved({.content_weight = 3 * weight / 4});
+  const auto apart = [](const std::vector<float>& x, const std::vector<float>& y) {
+    double sum = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) sum += std::abs(static_cast<double>(x[i]) - y[i]);
+    return sum;
+  };
+  REQUIRE(apart(same, tripled) > 0);
+  CHECK(apart(limited, same) < 0.02 * apart(same, tripled));
+}
+
+TEST_CASE("embedder: preset code learns the colours of the field from raw numbers") {
+  Owner owner = tiny_paper_owner({.message_weight = 0}, true);
+  Embedder embedder(owner, tiny_views(), few_steps(60));
+  embedder.step(0);
+  const double first = embedder.figures().loss;
+  while (!embedder.done()) embedder.step(0);
+  CHECK(embedder.figures().loss < 0.6 * first);
+}
+
+TEST_CASE("embedder: a warm start paints and reads carriers, is resumed bit by bit, and leaves no helpers") {
+  const PooledTrainingOptions training{
+      .content_weight = 60, .content_psnr = 25.5, .matrix_rate = 2, .warm_steps = 6};
+  const auto owner_of = [&] {
+    return Owner(tiny_field(), {.bits = 4, .reader_size = 48}, test_key(5), message_slots(4),
+                 fusion_mark({.width = 16, .channels = 8, .running_norm = true, .training = training}));
+  };
+  const TemporaryFolder folder;
+  Owner whole = owner_of(), resumed = owner_of(), two_threads = owner_of();
+  Embedder embedder(whole, tiny_views(), few_steps(9));
+  embedder.step(0);
+  const double first = embedder.figures().loss;
+  while (!embedder.done()) embedder.step(0);
+  CHECK(std::isfinite(first));
+  CHECK(embedder.warm_steps() == 6);
+  {
+    Embedder begun(resumed, tiny_views(), few_steps(9));
+    for (int k = 0; k < 4; ++k) begun.step(0);
+    begun.save(folder / "checkpoint");
+    const SafetensorsFile file = SafetensorsFile::read(folder / "checkpoint");
+    CHECK(file.has("extractor/0/conv/weight.velocity"));
+    CHECK_FALSE(file.has("extractor/0/conv/weight.mean"));
+    CHECK(file.has("extractor/0/conv/bias.mean"));
+  }
+  resumed = owner_of();
+  Embedder rest(resumed, tiny_views(), few_steps(9));
+  rest.restore(folder / "checkpoint");
+  while (!rest.done()) rest.step(0);
+  CHECK(outcome(whole, embedder) == outcome(resumed, rest));
+  const ScopedThreads scope(2);
+  Embedder on_two(two_threads, tiny_views(), few_steps(9));
+  while (!on_two.done()) on_two.step(0);
+  CHECK(outcome(whole, embedder) == outcome(two_threads, on_two));
+  for (const auto& e : whole.params.entries())
+    CHECK((e.name.starts_with("mark/") || e.name.starts_with("extractor/")));
+  whole.save(folder / "owner");
+  const Owner again = Owner::load(folder / "owner");
+  const Tensor<float>& image = tiny_views().front().base;
+  CHECK(again.mark().evidence(again, image, nullptr) == whole.mark().evidence(whole, image, nullptr));
+}
+
+TEST_CASE("embedder: a warm start takes more steps for more than 16 bits, in proportion") {
+  const auto steps = [](Index bits) {
+    Owner owner(tiny_field(), {.bits = bits, .reader_size = 48}, test_key(5), message_slots(bits),
+                fusion_mark({.width = 8, .channels = 8, .training = {.warm_steps = 30}}));
+    return Embedder(owner, tiny_views(), few_steps(1)).warm_steps();
+  };
+  CHECK(steps(1) == 30);
+  CHECK(steps(16) == 30);
+  CHECK(steps(32) == 60);
+  CHECK(steps(40) == 75);
+}
+
+TEST_CASE("embedder: in 150 steps of a warm start the extractor begins to read the carriers") {
+  Owner owner(
+      tiny_field(), {.bits = 4, .reader_size = 48}, test_key(5), message_slots(4),
+      fusion_mark({.width = 16, .channels = 8, .running_norm = true, .training = {.warm_steps = 200}}));
+  Embedder embedder(owner, tiny_views(),
+                    {.schedule = {.steps = 150, .lr = 4e-3},
+                     .batch = 4,
+                     .distortions = {.noise = 0, .rotation = 0, .zoom_out = 1, .zoom_in = 1, .blur = 0},
+                     .seed = 4});
+  embedder.step(0);
+  const double first = embedder.figures().loss;
+  while (!embedder.done()) embedder.step(0);
+  CAPTURE(first, embedder.figures().loss, embedder.figures().bits);
+  CHECK(embedder.figures().loss < 0.8 * first);
+  CHECK(embedder.figures().bits > 0.57);
+}
