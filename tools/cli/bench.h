@@ -26,6 +26,7 @@ Command add_bench_field(CommandLine& app);
 Command add_bench_payload(CommandLine& app);
 Command add_bench_tracing(CommandLine& app);
 Command add_bench_training(CommandLine& app);
+Command add_bench_turns(CommandLine& app);
 /// @}
 
 /// @{

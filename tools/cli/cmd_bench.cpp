@@ -37,7 +37,9 @@ constexpr Subject kSubjects[] = {
      "Measure what exposures and refined poses gain on captured images, as they are and with jittered poses",
      add_bench_captures},
     {"data", "Measure what training loses on data sets in other forms: opaque, moved, masked, behind a lens",
-     add_bench_data}};
+     add_bench_data},
+    {"turns", "Measure the wall time of a command by turns with another build of fieldmark",
+     add_bench_turns}};
 
 }  // namespace
 

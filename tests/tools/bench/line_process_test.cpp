@@ -48,6 +48,16 @@ TEST_CASE("line_process: a program that ends says why") {
       "[LineProcess] command must not be empty and limit_seconds above 0, got '/bin/sh' and 0.000000");
 }
 
+TEST_CASE("line_process: a program that is only to run is waited for, whatever it writes") {
+  LineProcess talks(shell("echo ready; head -c 3000000 /dev/zero | tr '\\0' x; exec sleep 0.05"), {}, 60);
+  CHECK(talks.read_line() == "ready");
+  talks.finish();
+  LineProcess fails(shell("echo no room >&2; exit 7"), {}, 60);
+  CHECK_THROWS_WITH(fails.finish(), "/bin/sh: ended with exit code 7:\nno room");
+  LineProcess sleeps(shell("exec sleep 600"), {}, 0.2);
+  CHECK_THROWS_WITH(sleeps.finish(), "/bin/sh: no answer within 0.2 s, without a word");
+}
+
 TEST_CASE("line_process: what hangs or never ends its line is killed in time") {
   const auto begin = std::chrono::steady_clock::now();
   CHECK(failure("echo thinking >&2; exec sleep 600", 0.2) == "/bin/sh: no answer within 0.2 s:\nthinking");

@@ -22,6 +22,8 @@ namespace {
 constexpr std::size_t kLastLines = 5;
 constexpr std::size_t kLongestLine = 1 << 20;  // characters: a program that writes longer lines is stopped
 
+constexpr std::string_view kWell = "ended with exit code 0";
+
 std::string_view name_of(std::string_view entry) { return entry.substr(0, entry.find('=')); }
 
 // Returns this process's environment with entries replaced or added.
@@ -95,6 +97,28 @@ void LineProcess::write_line(std::string_view line) {
   }
 }
 
+// Appends what the program writes next to received_; false: it closed its output.
+bool LineProcess::receive(double until) {
+  for (;;) {
+    const double left = until - now();
+    pollfd wait{socket_, POLLIN, 0};
+    const int ready = left > 0 ? ::poll(&wait, 1, static_cast<int>(std::min(left * 1000 + 1, 1e9))) : 0;
+    if (ready < 0 && errno == EINTR) continue;
+    if (ready == 0) {
+      kill_and_wait();
+      char limit[40];
+      std::snprintf(limit, sizeof limit, ": no answer within %g s", limit_seconds_);
+      throw IoError(program_ + limit + last_words());
+    }
+    std::array<char, 4096> part;
+    const ssize_t n = ::read(socket_, part.data(), part.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return false;
+    received_.append(part.data(), static_cast<std::size_t>(n));
+    return true;
+  }
+}
+
 std::string LineProcess::read_line() {
   const double until = now() + limit_seconds_;
   for (;;) {
@@ -103,37 +127,34 @@ std::string LineProcess::read_line() {
       received_.erase(0, end + 1);
       return line;
     }
-    const double left = until - now();
-    pollfd wait{socket_, POLLIN, 0};
-    const int ready = left > 0 ? ::poll(&wait, 1, static_cast<int>(std::min(left * 1000 + 1, 1e9))) : 0;
-    if (ready < 0 && errno == EINTR) continue;
-    if (ready == 0 || received_.size() > kLongestLine) {
+    if (received_.size() > kLongestLine) {
       kill_and_wait();
-      char limit[40];
-      std::snprintf(limit, sizeof limit, ": no answer within %g s", limit_seconds_);
-      throw IoError(program_ + (ready == 0 ? limit : ": an answer without an end") + last_words());
+      throw IoError(program_ + ": an answer without an end" + last_words());
     }
-    std::array<char, 4096> part;
-    const ssize_t n = ::read(socket_, part.data(), part.size());
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) fail_ended(until);
-    received_.append(part.data(), static_cast<std::size_t>(n));
+    if (!receive(until))
+      throw IoError(program_ + ": " + ending(until) + " before it answered" + last_words());
   }
 }
 
-// The program closed its output: it has ended or is about to.
-void LineProcess::fail_ended(double until) {
+void LineProcess::finish() {
+  const double until = now() + limit_seconds_;
+  do received_.clear();
+  while (receive(until));
+  if (const std::string how = ending(until); how != kWell)
+    throw IoError(program_ + ": " + how + last_words());
+}
+
+// The program closed its output: it has ended or is about to. Returns how it ended.
+std::string LineProcess::ending(double until) {
   int status = 0;
   pid_t ended = 0;
   while ((ended = ::waitpid(pid_, &status, WNOHANG)) == 0 && now() < until)
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   if (ended == pid_) pid_ = -1;
   kill_and_wait();
-  const std::string how = ended <= 0 ? "closed its output"
-                          : WIFSIGNALED(status)
-                              ? "was killed by signal " + std::to_string(WTERMSIG(status))
-                              : "ended with exit code " + std::to_string(WEXITSTATUS(status));
-  throw IoError(program_ + ": " + how + " before it answered" + last_words());
+  return ended <= 0            ? "closed its output"
+         : WIFSIGNALED(status) ? "was killed by signal " + std::to_string(WTERMSIG(status))
+                               : "ended with exit code " + std::to_string(WEXITSTATUS(status));
 }
 
 std::string LineProcess::last_words() const {

@@ -29,9 +29,13 @@ class LineProcess {
   std::string read_line();
   /// Sends a line. If the program has ended, the next read_line() reports it.
   void write_line(std::string_view line);
+  /// Waits until it ends, and drops what it writes.
+  /// @throws IoError if the time is up or its exit code is not 0, with the text of read_line()
+  void finish();
 
  private:
-  [[noreturn]] void fail_ended(double until);
+  bool receive(double until);
+  std::string ending(double until);
   std::string last_words() const;
   void kill_and_wait();
   std::string program_, received_;
