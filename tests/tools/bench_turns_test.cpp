@@ -1,5 +1,6 @@
 #include <fieldmark/core/files.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -17,9 +18,9 @@ TEST_CASE("bench turns: needs another build and a command, and says what is wron
   const auto program = folder / "other";
   write_file_atomically(program, "#!/bin/sh\nexit 1\n");
   std::filesystem::permissions(program, std::filesystem::perms::owner_all);
-  // This test is the other build: it ends well when it only says what it is.
-  const auto failed = run_command(
-      {"bench", "turns", "--against", program.string(), "--runs", "1", "--limit", "60", "--", "--libidentify"});
+  // This test program stands for this build: with --libidentify it ends with exit code 0.
+  const auto failed = run_command({"bench", "turns", "--against", program.string(), "--runs", "1", "--limit",
+                                   "60", "--", "--libidentify"});
   CHECK(failed.code == cli::kFailed);
   CHECK_THAT(failed.err, Contains(program.string() + ": ended with exit code 1"));
 }

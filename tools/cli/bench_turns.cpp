@@ -30,15 +30,16 @@ int run_bench_turns(bench::TurnsOptions options, Context& context) {
 
 Command add_bench_turns(CommandLine& app) {
   auto o = std::make_shared<bench::TurnsOptions>();
-  app.add_option("--against", o->theirs, "Other build of fieldmark to run by turns with this one")
+  app.add_option("--against", o->theirs,
+                 "Other build of fieldmark to run by turns with this one; a script should exec it")
       ->type_name("PROGRAM")
       ->required();
   add_number(app, "--runs", o->runs, 1, 1000, "Runs of each build, 1 to 1000");
   add_number(app, "--limit", o->limit_seconds, 0.1, 86400, "Time limit for each run in seconds, 0.1 to 86400",
              "S");
-  app.add_option(
-         "command", o->arguments,
-         "Command to time with its options, after --; {} in it stands for an empty folder of each run")
+  app.add_option("command", o->arguments,
+                 "Command to time with its options, after --; it must end with exit code 0. {} in it stands "
+                 "for an empty folder of each run")
       ->type_name("-- COMMAND")
       ->required();
   return [o](Context& context) { return run_bench_turns(*o, context); };

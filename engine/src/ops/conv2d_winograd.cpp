@@ -1,4 +1,3 @@
-
 #include "kernels/winograd.h"
 #include "ops/conv2d_parts.h"
 #include "ops/product.h"

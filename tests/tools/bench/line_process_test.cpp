@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <csignal>
+#include <thread>
 
 #include "support/catch.h"
 
@@ -55,7 +56,34 @@ TEST_CASE("line_process: a program that is only to run is waited for, whatever i
   LineProcess fails(shell("echo no room >&2; exit 7"), {}, 60);
   CHECK_THROWS_WITH(fails.finish(), "/bin/sh: ended with exit code 7:\nno room");
   LineProcess sleeps(shell("exec sleep 600"), {}, 0.2);
-  CHECK_THROWS_WITH(sleeps.finish(), "/bin/sh: no answer within 0.2 s, without a word");
+  CHECK_THROWS_WITH(sleeps.finish(), "/bin/sh: did not end within 0.2 s, without a word");
+  LineProcess(shell("cat >&2"), {}, 60).finish();  // its input ends
+}
+
+TEST_CASE("line_process: who waits for a program may give up, also if the program failed") {
+  struct GivenUp {};
+  const auto begin = std::chrono::steady_clock::now();
+  pid_t pid = 0;
+  {
+    LineProcess sleeps(shell("echo $$; exec sleep 600"), {}, 600);
+    pid = static_cast<pid_t>(std::stol(sleeps.read_line()));
+    int ticks = 0;
+    CHECK_THROWS_AS(sleeps.finish([&] {
+      if (++ticks == 3) throw GivenUp();
+    }),
+                    GivenUp);
+    CHECK(ticks == 3);
+  }
+  CHECK(::kill(pid, 0) != 0);
+  bool failed = false;
+  LineProcess fails(shell("exit 130"), {}, 60);
+  CHECK_THROWS_AS(fails.finish([&] {
+    if (failed) throw GivenUp();
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    failed = true;
+  }),
+                  GivenUp);
+  CHECK(std::chrono::steady_clock::now() - begin < std::chrono::seconds(60));
 }
 
 TEST_CASE("line_process: what hangs or never ends its line is killed in time") {

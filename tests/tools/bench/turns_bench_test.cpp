@@ -1,9 +1,8 @@
-#include <fieldmark/core/error.h>
 #include <fieldmark/core/files.h>
 #include <fieldmark/tools/bench/turns_bench.h>
 
+#include <algorithm>
 #include <filesystem>
-#include <limits>
 
 #include "support/catch.h"
 #include "support/temporary_folder.h"
@@ -34,9 +33,10 @@ TEST_CASE("turns_bench: both programs run as often, pairs begin in turns, each r
   CHECK(read_text(folder / "log") ==
         "ours two words\ntheirs two words\ntheirs two words\nours two words\nours two words\ntheirs two "
         "words\n");
-  REQUIRE(parts.size() == 6);
-  CHECK(parts[0] == 0);
-  CHECK(parts[3] == 0.5);
+  CHECK(parts.front() == 0);
+  CHECK(std::ranges::count(parts, 0.5) >= 1);
+  CHECK(parts.back() == Approx(5.0 / 6));
+  CHECK(std::ranges::is_sorted(parts));
   REQUIRE(turns.ours.size() == 3);
   REQUIRE(turns.theirs.size() == 3);
   for (std::size_t i = 0; i < 3; ++i) {
@@ -58,7 +58,8 @@ TEST_CASE("turns_bench: a program that fails, is missing or hangs is an error") 
   CHECK_THROWS_WITH(run(program(folder, "fails", "echo no such field >&2; exit 1"), 60),
                     Contains("fails: ended with exit code 1") && Contains("no such field"));
   CHECK_THROWS_WITH(run("/nowhere/fieldmark", 60), Contains("/nowhere/fieldmark: cannot be started"));
-  CHECK_THROWS_WITH(run(program(folder, "hangs", "exec sleep 600"), 0.5), Contains("no answer within 0.5 s"));
+  CHECK_THROWS_WITH(run(program(folder, "hangs", "exec sleep 600"), 3),
+                    Contains("hangs: did not end within 3 s"));
   CHECK_THROWS_WITH(take_turns({.runs = 0}, [](double) {}), "[take_turns] runs must be at least 1, got 0");
 }
 

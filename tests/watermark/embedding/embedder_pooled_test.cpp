@@ -131,6 +131,19 @@ TEST_CASE("embedder: a warm start takes more steps for more than 16 bits, in pro
   CHECK(steps(16) == 30);
   CHECK(steps(32) == 60);
   CHECK(steps(40) == 75);
+
+  // With 32 bits, the second step is of the warm start, which knows no content loss, and the third is not.
+  const auto trained = [](Index count, double content_weight) {
+    Owner owner(
+        tiny_field(), {.bits = 32, .reader_size = 48}, test_key(5), message_slots(32),
+        fusion_mark(
+            {.width = 8, .channels = 8, .training = {.content_weight = content_weight, .warm_steps = 1}}));
+    Embedder embedder(owner, tiny_views(), few_steps(count));
+    while (!embedder.done()) embedder.step(0);
+    return std::vector<float>(owner.params.values().begin(), owner.params.values().end());
+  };
+  CHECK(trained(2, 1) == trained(2, 50));
+  CHECK(trained(3, 1) != trained(3, 50));
 }
 
 TEST_CASE("embedder: in 150 steps of a warm start the extractor begins to read the carriers") {

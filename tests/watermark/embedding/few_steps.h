@@ -2,6 +2,8 @@
 // Short embeddings of tiny owners, and what they leave behind.
 #include <fieldmark/watermark/embedding/embedder.h>
 
+#include <vector>
+
 namespace fieldmark::watermark {
 
 inline EmbedOptions few_steps(Index steps) {

@@ -22,7 +22,11 @@ namespace {
 constexpr std::size_t kLastLines = 5;
 constexpr std::size_t kLongestLine = 1 << 20;  // characters: a program that writes longer lines is stopped
 
-constexpr std::string_view kWell = "ended with exit code 0";
+std::string ending(int status) {
+  return status < 0            ? "closed its output"
+         : WIFSIGNALED(status) ? "was killed by signal " + std::to_string(WTERMSIG(status))
+                               : "ended with exit code " + std::to_string(WEXITSTATUS(status));
+}
 
 std::string_view name_of(std::string_view entry) { return entry.substr(0, entry.find('=')); }
 
@@ -98,18 +102,20 @@ void LineProcess::write_line(std::string_view line) {
 }
 
 // Appends what the program writes next to received_; false: it closed its output.
-bool LineProcess::receive(double until) {
+bool LineProcess::receive(double until, const char* what, const std::function<void()>& tick) {
+  constexpr double kTick = 0.1;  // seconds
   for (;;) {
-    const double left = until - now();
-    pollfd wait{socket_, POLLIN, 0};
-    const int ready = left > 0 ? ::poll(&wait, 1, static_cast<int>(std::min(left * 1000 + 1, 1e9))) : 0;
-    if (ready < 0 && errno == EINTR) continue;
-    if (ready == 0) {
+    if (tick) tick();
+    const double left = until - now(), wait_for = tick ? std::min(left, kTick) : left;
+    if (left <= 0) {
       kill_and_wait();
-      char limit[40];
-      std::snprintf(limit, sizeof limit, ": no answer within %g s", limit_seconds_);
-      throw IoError(program_ + limit + last_words());
+      char text[60];
+      std::snprintf(text, sizeof text, ": %s within %g s", what, limit_seconds_);
+      throw IoError(program_ + text + last_words());
     }
+    pollfd wait{socket_, POLLIN, 0};
+    const int ready = ::poll(&wait, 1, static_cast<int>(std::min(wait_for * 1000 + 1, 1e9)));
+    if (ready == 0 || (ready < 0 && errno == EINTR)) continue;
     std::array<char, 4096> part;
     const ssize_t n = ::read(socket_, part.data(), part.size());
     if (n < 0 && errno == EINTR) continue;
@@ -131,30 +137,34 @@ std::string LineProcess::read_line() {
       kill_and_wait();
       throw IoError(program_ + ": an answer without an end" + last_words());
     }
-    if (!receive(until))
-      throw IoError(program_ + ": " + ending(until) + " before it answered" + last_words());
+    if (receive(until, "no answer", {})) continue;
+    const std::string how = ending(status_at_end(until, {}));
+    throw IoError(program_ + ": " + how + " before it answered" + last_words());
   }
 }
 
-void LineProcess::finish() {
+void LineProcess::finish(const std::function<void()>& tick) {
+  ::shutdown(socket_, SHUT_WR);
   const double until = now() + limit_seconds_;
   do received_.clear();
-  while (receive(until));
-  if (const std::string how = ending(until); how != kWell)
-    throw IoError(program_ + ": " + how + last_words());
+  while (receive(until, "did not end", tick));
+  const int status = status_at_end(until, tick);
+  if (tick) tick();  // an interruption comes before the failure that it causes
+  if (status != 0) throw IoError(program_ + ": " + ending(status) + last_words());
 }
 
-// The program closed its output: it has ended or is about to. Returns how it ended.
-std::string LineProcess::ending(double until) {
+// The program closed its output: it has ended or is about to. Returns its status as of waitpid(), or -1 if it
+// goes on and is killed.
+int LineProcess::status_at_end(double until, const std::function<void()>& tick) {
   int status = 0;
   pid_t ended = 0;
-  while ((ended = ::waitpid(pid_, &status, WNOHANG)) == 0 && now() < until)
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  while ((ended = ::waitpid(pid_, &status, WNOHANG)) == 0 && now() < until) {
+    if (tick) tick();
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
   if (ended == pid_) pid_ = -1;
   kill_and_wait();
-  return ended <= 0            ? "closed its output"
-         : WIFSIGNALED(status) ? "was killed by signal " + std::to_string(WTERMSIG(status))
-                               : "ended with exit code " + std::to_string(WEXITSTATUS(status));
+  return ended <= 0 ? -1 : status;
 }
 
 std::string LineProcess::last_words() const {

@@ -23,11 +23,12 @@ std::vector<std::string> command_in(const std::string& program, const std::vecto
   return command;
 }
 
-double seconds_of_run(const std::string& program, const TurnsOptions& options) {
+double seconds_of_run(const std::string& program, const TurnsOptions& options,
+                      const std::function<void()>& tick) {
   const PrivateFolder folder("turns");
   const double begin = now();
   LineProcess(command_in(program, options.arguments, folder.path.string()), {}, options.limit_seconds)
-      .finish();
+      .finish(tick);
   return now() - begin;
 }
 
@@ -38,10 +39,10 @@ Turns take_turns(const TurnsOptions& options, const std::function<void(double)>&
     throw ValueError("[take_turns] runs must be at least 1, got " + std::to_string(options.runs));
   Turns turns;
   for (Index i = 0; i < 2 * options.runs; ++i) {
-    progress(static_cast<double>(i) / static_cast<double>(2 * options.runs));
+    const auto tick = [&] { progress(static_cast<double>(i) / static_cast<double>(2 * options.runs)); };
     const bool ours = (i + i / 2) % 2 == 0;
     (ours ? turns.ours : turns.theirs)
-        .push_back(seconds_of_run(ours ? options.ours : options.theirs, options));
+        .push_back(seconds_of_run(ours ? options.ours : options.theirs, options, tick));
   }
   return turns;
 }

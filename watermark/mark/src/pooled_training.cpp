@@ -204,7 +204,7 @@ void PooledTraining::describe(RunFingerprint& f) const {
   f.option("content_psnr", options_.content_psnr);
   f.option("message_weight", options_.message_weight);
   f.option("matrix_rate", options_.matrix_rate);
-  f.option("warm_steps", options_.warm_steps);
+  f.option("warm_steps", warm_steps());
   if (owner_.mark().has_gain()) f.option("mark_psnr", owner_.options().mark_psnr);
 }
 

@@ -2,6 +2,7 @@
 #include <sys/types.h>
 
 #include <cstdio>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,13 +30,14 @@ class LineProcess {
   std::string read_line();
   /// Sends a line. If the program has ended, the next read_line() reports it.
   void write_line(std::string_view line);
-  /// Waits until it ends, and drops what it writes.
-  /// @throws IoError if the time is up or its exit code is not 0, with the text of read_line()
-  void finish();
+  /// Waits until the program ends and drops its output. Its standard input ends at once.
+  /// @param tick  called ten times a second and at the end; may throw to give up
+  /// @throws IoError if the time is up or its exit code is not 0, with the last lines of its standard error
+  void finish(const std::function<void()>& tick = {});
 
  private:
-  bool receive(double until);
-  std::string ending(double until);
+  bool receive(double until, const char* what, const std::function<void()>& tick);
+  int status_at_end(double until, const std::function<void()>& tick);
   std::string last_words() const;
   void kill_and_wait();
   std::string program_, received_;

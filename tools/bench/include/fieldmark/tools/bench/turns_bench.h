@@ -28,11 +28,11 @@ struct TurnsRatio {
 
 /// Runs both programs by turns. Each pair begins with the program that ended the one before, so that a
 /// machine that slows down or speeds up does not favour either.
-/// @param progress  called with the share of the runs done, before each
+/// @param progress  called with the share of the runs done, several times a second; may throw to give up
 /// @throws IoError if a program cannot be started, fails or takes too long
 Turns take_turns(const TurnsOptions& options, const std::function<void(double)>& progress);
 
-/// @throws ValueError unless there is as many a run of each, at least one
+/// @throws ValueError unless both programs have the same number of runs, at least 1
 TurnsRatio ratio_of(const Turns& turns);
 
 }  // namespace fieldmark::bench
