@@ -41,6 +41,7 @@ Command add_bench_turns(CommandLine& app) {
                  "Command to time with its options, after --; it must end with exit code 0. {} in it stands "
                  "for an empty folder of each run")
       ->type_name("-- COMMAND")
+      ->default_str("")
       ->required();
   return [o](Context& context) { return run_bench_turns(*o, context); };
 }
