@@ -71,10 +71,8 @@ std::vector<Option> options_of_training() {
       {"gamma_1, of the content loss", "1, of the squared norm", "-",
        [](const EmbedRecipe& r) {
          const auto& training = fusion_of(r).training;
-         const std::string weight = text_of(training.content_weight) + ", of the mean square";
-         return training.content_psnr == 0
-                    ? weight
-                    : weight + "; less for marks fainter than " + text_of(training.content_psnr) + " dB";
+         return text_of(training.content_weight) + ", of the mean square; less for marks fainter than " +
+                text_of(training.content_psnr) + " dB";
        }},
       {"gamma_2, of the message loss", "5", "-",
        [](const EmbedRecipe& r) { return text_of(fusion_of(r).training.message_weight); }},

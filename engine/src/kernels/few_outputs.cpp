@@ -8,7 +8,8 @@ namespace {
 using simd::kLanes;
 using simd::Vec;
 
-// Beyond a quarter of the lanes, gemm() does no more work for an output than this kernel with its planes.
+// An estimate from multiply-adds: with more outputs than a quarter of the lanes, the planes cost more than
+// the lanes that gemm() leaves empty.
 template <class T>
 constexpr int kMost = kLanes<T> / 4;
 

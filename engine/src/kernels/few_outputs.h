@@ -19,7 +19,7 @@ struct FewOutputs {
   T* y = nullptr;  ///< [pixels, outputs]
 };
 
-/// Returns the largest number of outputs for which few_outputs() is faster than gemm(); 0: none.
+/// Returns the largest number of outputs that few_outputs() takes; 0: none.
 FIELDMARK_DECLARE_KERNEL(template <class T> Index, most_few_outputs, ())
 
 /// out[c plane + j] = x[j, c] of x [pixels, channels], or 0 where the mask (laid out like x; null: none) is

@@ -123,9 +123,11 @@ void direct_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* borde
 template <class T>
 const T* masked(Tape<T>& tape, const T* dy, const T* mask, Index size) {
   if (!mask) return dy;
+  using namespace kernels;
   T* out = tape.scratch(size);
+  const auto copy = FIELDMARK_KERNEL(pad_rows<T>);
   parallel_for(size, 1 << 15, [=](Index begin, Index end) {
-    for (Index i = begin; i < end; ++i) out[i] = mask[i] > 0 ? dy[i] : T(0);
+    copy(dy + begin, 1, end - begin, mask + begin, end - begin, out + begin);
   });
   return out;
 }

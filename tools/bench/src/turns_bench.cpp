@@ -49,7 +49,7 @@ Turns take_turns(const TurnsOptions& options, const std::function<void(double)>&
 
 TurnsRatio ratio_of(const Turns& turns) {
   if (turns.ours.empty() || turns.ours.size() != turns.theirs.size())
-    throw ValueError("[ratio_of] both programs must have as many runs, at least one, got " +
+    throw ValueError("[ratio_of] both programs must have the same number of runs, at least 1, got " +
                      std::to_string(turns.ours.size()) + " and " + std::to_string(turns.theirs.size()));
   std::vector<double> ratios;
   for (std::size_t i = 0; i < turns.ours.size(); ++i) ratios.push_back(turns.ours[i] / turns.theirs[i]);

@@ -11,8 +11,8 @@ struct PooledTrainingOptions {
   double content_psnr = 0;    ///< dB of a step's marked images, above which gamma_1 falls; 0: never
   double message_weight = 5;  ///< gamma_2
   double matrix_rate = 0;     ///< step size of Muon relative to Adam's; 0: Adam trains all weights
-  Index warm_steps =
-      0;  ///< steps of the warm start for up to 16 bits, >= 0; more for more bits, in proportion
+  /// Steps of the warm start for up to 16 bits, >= 0; for more bits, in proportion.
+  Index warm_steps = 0;
 };
 
 /// Makes slots that stand in for cells in a mark without cells: one per bit, of equal area and without a
