@@ -140,6 +140,7 @@ OwnerSystem owner_system(const CellName& name, Index image) {
                                      {"nerf_message", Ablation::message_in_inputs},
                                      {"geometry", Ablation::message_in_density}})
     if (system == of) s.ablation = ablation;
+  if (system == "cold_start") std::get<watermark::FusionMarkOptions>(r.mark).training.warm_steps = 0;
   if (system == "without_drr")
     r.embed.distortions = {
         .noise = 0, .rotation = 0, .zoom_out = 1, .zoom_in = 1, .blur = 0, .sample_shift = 0};

@@ -34,6 +34,7 @@ bool has_owner(std::string_view system);
 ///   ours_without_cells: preset paper's networks under our power budget, distortions and step sizes; without
 ///   cells there is no dense supervision
 ///   ours_without_signs, without_mff, without_cff, nerf_message, geometry: see Ablation
+///   cold_start: no warm start
 ///   without_drr: neither distortions nor shifted samples
 ///   drs: the full method, with the samples shifted at test time as in training
 /// @param image  longer side of the views in pixels; the reader sees at most that, and at least 32

@@ -31,6 +31,8 @@ const std::array kSystems{
     PaperSystem{"nerf_hidden", "NeRF + HiDDeN", "renders of an unmarked field marked by HiDDeN at 30 dB",
                 false},
     PaperSystem{"nerf_mbrs", "NeRF + MBRS", "renders of an unmarked field marked by MBRS at 30 dB", false},
+    PaperSystem{"cold_start", "CopyRNeRF, cold start", "preset paper, on its own loss from the first step",
+                true, true},
     PaperSystem{"without_drr", "CopyRNeRF without DRR", "neither distortions nor moved samples in training",
                 true, true},
     PaperSystem{"without_mff", "CopyRNeRF without MFF", "the message itself in the fusion, not its features",
@@ -96,7 +98,7 @@ void plan_scene(PaperTable table, const std::string& scene, bool first, bool ful
       return;
     case PaperTable::ablation:
       if (first || full)
-        plan.add({"copyrnerf_paper", "without_drr", "without_mff", "without_cff", "drs", "ours",
+        plan.add({"copyrnerf_paper", "cold_start", "without_drr", "without_mff", "without_cff", "drs", "ours",
                   "ours_without_dense", "ours_without_cells", "ours_without_signs"},
                  scene, one);
       return;

@@ -166,6 +166,16 @@ Cases norms() {
                    [](auto& store) { return BatchNorm<double>(store, "norm", 4); })});
 }
 
+Cases dense_of_parts() {
+  return {{"dense layer of parts", [] {
+             ParamStore<double> store;
+             const Dense<double> layer(store, "layer", {.in = 5, .out = 4}, 5);
+             const std::vector parts{mixed({4, 3}, 1), mixed({2, 2}, 2)};
+             return gradcheck_module([&](D&, const Params<double>& p, Vars v) { return layer(p, v, 4); },
+                                     store, parts);
+           }}};
+}
+
 Cases products() {
   const auto product = [](Activation activation) {
     return [=](auto&, auto v) { return dense(v[0], v[1], v[2], activation); };
@@ -213,8 +223,8 @@ Cases products() {
 }  // namespace
 
 std::vector<GradcheckCase> gradcheck_cases() {
-  return join({elementwise(), layout(), losses(), norms(), products(), fused_gradcheck_cases(),
-               tensor_gradcheck_cases()});
+  return join({elementwise(), layout(), losses(), norms(), products(), dense_of_parts(),
+               fused_gradcheck_cases(), tensor_gradcheck_cases()});
 }
 
 }  // namespace fieldmark

@@ -78,6 +78,9 @@ TEST_CASE("owner_system: each ablation takes away its part and nothing else") {
   CHECK(code.recipe.embed.extractor_lr == 2);
   CHECK(code.recipe.owner.reader_size == 80);
   CHECK(!fusion(paper).authors_code);
+  CHECK(fusion(paper).training.warm_steps > 0);
+  CHECK(fusion(system("cold_start")).training.warm_steps == 0);
+  CHECK(fusion(system("cold_start")).training.content_weight == fusion(paper).training.content_weight);
 
   const auto& usual = ours.recipe.cell().training;
   auto dense = system("ours_without_dense"), cells = system("ours_without_cells"),

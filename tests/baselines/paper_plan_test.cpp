@@ -25,8 +25,8 @@ TEST_CASE("paper_plan: what the tables of one scene are made of") {
   CHECK(has(plan_cells(PaperTable::distortion, lego), {"without_drr", "lego", "hash", 16, 4}));
   CHECK(has(plan_cells(PaperTable::quality, lego), {"copyrnerf_code", "lego", "hash", 16, 4}));
   const auto ablation = plan_cells(PaperTable::ablation, lego);
-  for (const char* system : {"without_drr", "without_mff", "without_cff", "drs", "ours_without_dense",
-                             "ours_without_cells", "ours_without_signs"})
+  for (const char* system : {"cold_start", "without_drr", "without_mff", "without_cff", "drs",
+                             "ours_without_dense", "ours_without_cells", "ours_without_signs"})
     CHECK(has(ablation, {system, "lego", "hash", 16, 4}));
   CHECK(plan_cells(PaperTable::sampling, lego).size() == 1);
   CHECK(has(plan_cells(PaperTable::weights, lego), {"copyrnerf_paper", "lego", "hash", 8, 4}));

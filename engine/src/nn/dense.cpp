@@ -1,8 +1,61 @@
 #include <fieldmark/engine/nn/dense.h>
+#include <fieldmark/engine/ops/slice.h>
+#include <fieldmark/engine/shape_checks.h>
+
+#include <vector>
 
 #include "nn/initial.h"
 
 namespace fieldmark {
+namespace {
+
+template <class T>
+void check_parts(std::span<const Var<T>> parts, Index rows, Index in) {
+  Index columns = 0, groups = rows;
+  bool whole = false;  // a part has all rows
+  for (const Var<T>& part : parts) {
+    check_rank("dense", "parts", part.shape(), 2, "[N, .] or [R, .]");
+    const Index n = part.shape()[0];
+    whole = whole || n == rows;
+    if (n != rows && (n < 1 || rows % n != 0 || (groups != rows && n != groups)))
+      throw ShapeError("[dense] parts must have " + std::to_string(rows) +
+                       " rows, or all the same divisor of it, got shape " + part.shape().str());
+    if (n != rows) groups = n;
+    columns += part.shape()[1];
+  }
+  if (!whole) throw ShapeError("[dense] parts must include one of " + std::to_string(rows) + " rows");
+  if (columns != in)
+    throw ShapeError("[dense] parts must have " + std::to_string(in) + " columns together, got " +
+                     std::to_string(columns));
+}
+
+// Columns of x and the rows of W that multiply them.
+template <class T>
+struct Factors {
+  std::vector<Var<T>> x, w;
+  void add(Var<T> columns, Var<T> rows) {
+    x.push_back(columns);
+    w.push_back(rows);
+  }
+};
+
+template <class T>
+Var<T> joined(const std::vector<Var<T>>& parts, int axis) {
+  return parts.size() == 1 ? parts.front() : concatenate<T>(parts, axis);
+}
+
+// Applies dense() to equal groups of rows of x, each with its own row of b [R, out].
+template <class T>
+Var<T> dense_of_groups(Var<T> x, Var<T> w, Var<T> b, Activation activation) {
+  Tape<T>& tape = x.tape();
+  const Index groups = b.shape()[0], out = b.shape()[1], rows = x.shape()[0] / groups, in = x.shape()[1];
+  std::vector<Var<T>> y;
+  for (Index g = 0; g < groups; ++g)
+    y.push_back(dense(tape.part(x, g * rows * in, {rows, in}), w, tape.part(b, g * out, {out}), activation));
+  return joined(y, 0);
+}
+
+}  // namespace
 
 template <class T>
 Dense<T>::Dense(ParamStore<T>& store, std::string_view name, const DenseOptions& options, std::uint64_t seed)
@@ -19,6 +72,25 @@ template <class T>
 Var<T> Dense<T>::operator()(const Params<T>& params, Var<T> x) const {
   return dense(x, params.leaf(x.tape(), weight_),
                detail::bias_or_zeros(x.tape(), params, bias_, options_.out), options_.activation);
+}
+
+template <class T>
+Var<T> Dense<T>::operator()(const Params<T>& params, std::span<const Var<T>> parts, Index rows) const {
+  check_parts(parts, rows, options_.in);
+  Tape<T>& tape = parts.front().tape();
+  const Index out = options_.out;
+  const Var<T> w = params.leaf(tape, weight_);
+  Factors<T> of_rows, of_groups;
+  Index first = 0;
+  for (const Var<T>& part : parts) {
+    const Index k = part.shape()[1];
+    (part.shape()[0] == rows ? of_rows : of_groups).add(part, tape.part(w, first * out, {k, out}));
+    first += k;
+  }
+  if (of_groups.x.empty()) return (*this)(params, joined(of_rows.x, 1));
+  const Var<T> b =
+      dense(joined(of_groups.x, 1), joined(of_groups.w, 0), detail::bias_or_zeros(tape, params, bias_, out));
+  return dense_of_groups(joined(of_rows.x, 1), joined(of_rows.w, 0), b, options_.activation);
 }
 
 template class Dense<float>;

@@ -1,5 +1,4 @@
 #include <fieldmark/engine/ops/activation.h>
-#include <fieldmark/engine/ops/rows.h>
 #include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/nerf/frequency_encoding.h>
@@ -90,12 +89,6 @@ typename GlobalMark<T>::Output GlobalMark<T>::with_features(const Params<T>& par
   if (messages < 1 || n % messages != 0)
     throw ShapeError("[global_mark] message must have as many rows as divide the " + std::to_string(n) +
                      " samples, got shape " + message.shape().str());
-  const auto of_samples = [&](Var<T> rows) {
-    if (messages == 1) return broadcast_rows(rows, n);
-    auto* row = x.tape().template scratch<std::int32_t>(n);
-    for (Index i = 0; i < n; ++i) row[i] = static_cast<std::int32_t>(i * messages / n);
-    return gather_rows<T>(rows, {row, static_cast<std::size_t>(n)});
-  };
   const Var<T> of_direction = concatenate<T>({d, nerf::frequency_encoding(d, options_.direction_bands)});
   std::vector<Var<T>> inputs;  // of G, except c
   if (options_.colour_features > 0) {
@@ -105,9 +98,9 @@ typename GlobalMark<T>::Output GlobalMark<T>::with_features(const Params<T>& par
     inputs.push_back(through(encode_, params, concatenate<T>(of_place)));
   }
   const std::optional<Var<T>> features = inputs.empty() ? std::nullopt : std::optional(inputs.front());
-  inputs.push_back(of_samples(through(message_, params, message)));
+  inputs.push_back(through(message_, params, message));
   if (options_.authors_code) inputs.push_back(of_direction);
-  return {.colour = fused(params, std::move(inputs), c, of_samples(message)), .features = features};
+  return {.colour = fused(params, std::move(inputs), c, message), .features = features};
 }
 
 // Computes c_m = sigmoid(G(inputs, c)); in the authors' code M and c enter each hidden layer once more.
@@ -117,7 +110,7 @@ Var<T> GlobalMark<T>::fused(const Params<T>& params, std::vector<Var<T>> inputs,
   inputs.push_back(c);
   for (std::size_t k = 0; k < fuse_.size(); ++k) {
     if (options_.authors_code && k < 2) inputs.insert(inputs.end(), {message, c});
-    inputs = {fuse_[k](params, concatenate<T>(inputs))};
+    inputs = {fuse_[k](params, inputs, c.shape()[0])};
   }
   return sigmoid(inputs.front());
 }
