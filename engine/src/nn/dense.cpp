@@ -2,6 +2,7 @@
 #include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/engine/shape_checks.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "nn/initial.h"
@@ -40,19 +41,20 @@ struct Factors {
 };
 
 template <class T>
-Var<T> joined(const std::vector<Var<T>>& parts, int axis) {
+Var<T> joined(std::span<const Var<T>> parts, int axis) {
   return parts.size() == 1 ? parts.front() : concatenate<T>(parts, axis);
 }
 
-// Applies dense() to equal groups of rows of x, each with its own row of b [R, out].
+// Applies dense() to R equal groups of rows of x, each with its own row of b [R, out].
 template <class T>
 Var<T> dense_of_groups(Var<T> x, Var<T> w, Var<T> b, Activation activation) {
   Tape<T>& tape = x.tape();
   const Index groups = b.shape()[0], out = b.shape()[1], rows = x.shape()[0] / groups, in = x.shape()[1];
+  if (groups == 1) return dense(x, w, tape.reshape(b, {out}), activation);
   std::vector<Var<T>> y;
   for (Index g = 0; g < groups; ++g)
     y.push_back(dense(tape.part(x, g * rows * in, {rows, in}), w, tape.part(b, g * out, {out}), activation));
-  return joined(y, 0);
+  return concatenate<T>(y, 0);
 }
 
 }  // namespace
@@ -79,6 +81,8 @@ Var<T> Dense<T>::operator()(const Params<T>& params, std::span<const Var<T>> par
   check_parts(parts, rows, options_.in);
   Tape<T>& tape = parts.front().tape();
   const Index out = options_.out;
+  if (std::ranges::all_of(parts, [&](const Var<T>& part) { return part.shape()[0] == rows; }))
+    return (*this)(params, joined(parts, 1));
   const Var<T> w = params.leaf(tape, weight_);
   Factors<T> of_rows, of_groups;
   Index first = 0;
@@ -87,10 +91,9 @@ Var<T> Dense<T>::operator()(const Params<T>& params, std::span<const Var<T>> par
     (part.shape()[0] == rows ? of_rows : of_groups).add(part, tape.part(w, first * out, {k, out}));
     first += k;
   }
-  if (of_groups.x.empty()) return (*this)(params, joined(of_rows.x, 1));
-  const Var<T> b =
-      dense(joined(of_groups.x, 1), joined(of_groups.w, 0), detail::bias_or_zeros(tape, params, bias_, out));
-  return dense_of_groups(joined(of_rows.x, 1), joined(of_rows.w, 0), b, options_.activation);
+  const Var<T> b = dense(joined<T>(of_groups.x, 1), joined<T>(of_groups.w, 0),
+                         detail::bias_or_zeros(tape, params, bias_, out));
+  return dense_of_groups(joined<T>(of_rows.x, 1), joined<T>(of_rows.w, 0), b, options_.activation);
 }
 
 template class Dense<float>;

@@ -109,7 +109,7 @@ TEST_CASE("global_mark: gradients in position, direction, colour, message and pa
     CHECK(r.worst <= 1e-7);
     CHECK(r.entries > 80);
   }
-  CHECK(found == 4);
+  CHECK(found == 5);
 }
 
 TEST_CASE("global_mark: none and one position, one and two threads, float near double") {
@@ -156,22 +156,36 @@ TEST_CASE("global_mark: errors name what is wrong") {
   CHECK_THROWS_AS(with(Tensor<double>({1, 4}, 1)), ShapeError);
   CHECK_THROWS_WITH(with(Tensor<double>({3, 3}, 1)), Contains("[global_mark] message") && Contains("[3, 3]"));
   CHECK_THROWS_AS(with(Tensor<double>({0, 3}, 1)), ShapeError);
+  const Tensor<double> one({1, 3}, 0.5), message({1, 3}, 1);
+  CHECK_THROWS_WITH(op_values(colour(net, store), std::vector{few, one, few, message}),
+                    Contains("[global_mark] d: axis 0 must be 2 (rows of x)"));
+  CHECK_THROWS_WITH(op_values(colour(net, store), std::vector{few, few, one, message}),
+                    Contains("[global_mark] c: axis 0 must be 2 (rows of x)"));
 }
 
 TEST_CASE("global_mark: each of several messages marks its own samples, as it would alone") {
-  ParamStore<double> store;
-  const GlobalMark<double> net(store, "mark", kSmall, 7);
-  const auto x = uniform({6, 3}, 0, 1, 1), d = uniform({6, 3}, -1, 1, 2), c = uniform({6, 3}, 0, 1, 3);
-  const Tensor<double> messages({2, 3}, {1, -1, 1, -1, -1, 1});
-  const auto both = op_values(colour(net, store), std::vector{x, d, c, messages});
-  for (std::size_t m = 0; m < 2; ++m) {
-    const auto half = [m](const Tensor<double>& t) {
-      return Tensor<double>({3, 3}, {t.data.begin() + 9 * static_cast<Index>(m),
-                                     t.data.begin() + 9 * static_cast<Index>(m + 1)});
+  auto without_features = kSmall, code = kSmall;
+  without_features.message_features = 0;
+  code.authors_code = true;
+  for (const GlobalMarkOptions& options : {kSmall, without_features, code}) {
+    ParamStore<double> store;
+    const GlobalMark<double> net(store, "mark", options, 7);
+    const std::vector samples{uniform({6, 3}, 0, 1, 1), uniform({6, 3}, -1, 1, 2),
+                              uniform({6, net.colour_inputs()}, 0, 1, 3)};
+    const Tensor<double> messages({2, 3}, {1, -1, 1, -1, -1, 1});
+    const auto part = [](const Tensor<double>& t, Index rows, Index m) {
+      const Index size = rows * t.shape[1];
+      return Tensor<double>({rows, t.shape[1]}, {t.data.begin() + m * size, t.data.begin() + (m + 1) * size});
     };
-    const Tensor<double> message({1, 3}, {messages.data.begin() + 3 * static_cast<Index>(m),
-                                          messages.data.begin() + 3 * static_cast<Index>(m + 1)});
-    const auto alone = op_values(colour(net, store), std::vector{half(x), half(d), half(c), message});
-    for (std::size_t i = 0; i < 9; ++i) CHECK(both[9 * m + i] == Approx(alone[i]).epsilon(1e-12));
+    auto inputs = samples;
+    inputs.push_back(messages);
+    const auto both = op_values(colour(net, store), inputs);
+    for (Index m = 0; m < 2; ++m) {
+      std::vector<Tensor<double>> of_message;
+      for (const auto& t : samples) of_message.push_back(part(t, 3, m));
+      of_message.push_back(part(messages, 1, m));
+      const auto alone = op_values(colour(net, store), of_message);
+      for (Index i = 0; i < 9; ++i) CHECK(both[at(9 * m + i)] == Approx(alone[at(i)]).epsilon(1e-12));
+    }
   }
 }

@@ -86,6 +86,8 @@ typename GlobalMark<T>::Output GlobalMark<T>::with_features(const Params<T>& par
   check_rank("global_mark", "message", message.shape(), 2, "[messages, N_b]");
   check_extent("global_mark", "message", message.shape(), 1, options_.bits, "bits of the mark");
   const Index n = x.shape()[0], messages = message.shape()[0];
+  check_extent("global_mark", "d", d.shape(), 0, n, "rows of x");
+  check_extent("global_mark", "c", c.shape(), 0, n, "rows of x");
   if (messages < 1 || n % messages != 0)
     throw ShapeError("[global_mark] message must have as many rows as divide the " + std::to_string(n) +
                      " samples, got shape " + message.shape().str());

@@ -40,7 +40,8 @@ GradcheckReport check_mark_network() {
       store, in);
 }
 
-GradcheckReport check_global_mark(Index message_features, Index colour_features, bool authors_code) {
+GradcheckReport check_global_mark(Index message_features, Index colour_features, bool authors_code,
+                                  Index messages = 1) {
   ParamStore<double> store;
   const GlobalMark<double> net(store, "mark",
                                {.bits = 2,
@@ -62,8 +63,9 @@ GradcheckReport check_global_mark(Index message_features, Index colour_features,
     open_and_shut(store, std::string("mark/") + layer, 1);
     for (double& w : store.values(store.find(std::string("mark/") + layer + "/weight"))) w *= weights;
   }
-  const std::vector<Tensor<double>> in{numbers({2, 3}, 1), numbers({2, 3}, 2),
-                                       numbers({2, net.colour_inputs()}, 3), numbers({1, 2}, 4)};
+  const Index n = 2 * messages;
+  const std::vector<Tensor<double>> in{numbers({n, 3}, 1), numbers({n, 3}, 2),
+                                       numbers({n, net.colour_inputs()}, 3), numbers({messages, 2}, 4)};
   return gradcheck_module([&](Tape<double>&, const Params<double>& params,
                               auto v) { return net(params, v[0], v[1], v[2], v[3]); },
                           store, in);
@@ -92,6 +94,7 @@ std::vector<GradcheckCase> gradcheck_cases() {
           {"global_mark, without MFF", [] { return check_global_mark(0, 3, false); }},
           {"global_mark, without CFF", [] { return check_global_mark(3, 0, false); }},
           {"global_mark, code", [] { return check_global_mark(3, 3, true); }},
+          {"global_mark, code, with two messages", [] { return check_global_mark(3, 3, true, 2); }},
           {"mark_network", check_mark_network},
           {"power_budget", check_power_budget},
           {"weighted_segments", check_weighted_segments}};

@@ -26,11 +26,11 @@ class Dense {
   /// @param x  [N, in]    @return  [N, out]    @throws ShapeError  if x does not fit
   /// Differentiable in: x and the parameters.
   Var<T> operator()(const Params<T>& params, Var<T> x) const;
-  /// Applies the layer to N rows whose features are given in parts, side by side in the order of `in`.
+  /// Applies the layer to N rows. The parts are the columns of x, from left to right.
   ///   y = act(x_N W_N + (x_R W_R + b))
   /// x_N are the parts with N rows. x_R are those with R < N rows, such as the message of an image beside the
-  /// samples of its pixels: row r stands for rows r N / R to (r + 1) N / R - 1, and its product is taken
-  /// once.
+  /// samples of its pixels: the layer multiplies each row once, and row r counts for rows r N / R to
+  /// (r + 1) N / R - 1. Beside such parts, weights are not read as bf16.
   /// @param parts  [N, .] or [R, .]; R divides N   @param rows  N   @return  [N, out]
   /// @throws ShapeError  if the parts do not fit each other, `rows` or `in`
   /// Differentiable in: the parts and the parameters.
