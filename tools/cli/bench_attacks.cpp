@@ -161,7 +161,7 @@ int run_bench_attacks(const BenchAttacksArguments& options, Context& context) {
 Command add_bench_attacks(CommandLine& app) {
   auto o = std::make_shared<BenchAttacksArguments>();
   add_file(app, "--field", o->field, "Baked field to attack", "FIELD")->required();
-  add_file(app, "--owner", o->owner, "Owner file of `fieldmark embed`", "OWNER")->required();
+  add_file(app, "--owner", o->owner, "Owner file from `fieldmark embed`", "OWNER")->required();
   add_message_options(app, o->message, "Message baked into --field");
   add_file(app, "--other", o->other,
            "Field baked for another copy or message, to average with; default: no such row", "FIELD");

@@ -43,7 +43,7 @@ std::vector<WatchedScene> scenes_of(const BenchCollapseArguments& o) {
   return scenes;
 }
 
-// What the rows of a part are counted as.
+// Counts of the rows of a part.
 struct Counts {
   Index noticed = 0, in_time = 0, early = 0, missed = 0, false_alarms = 0;
   double slowest = std::numeric_limits<double>::quiet_NaN();         // NaN: nothing was noticed

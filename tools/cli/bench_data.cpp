@@ -18,7 +18,7 @@ std::string or_shared(const std::string& folder, const char* name) {
   return folder.empty() ? shared_data(name).string() : folder;
 }
 
-// Makes the groups whose data are there.
+// Returns the groups; skips the place if it has no data set.
 std::vector<bench::DataGroup> groups_of(const BenchDataArguments& o, Context& context) {
   const auto load = [&](const std::string& folder, const char* split) {
     return nerf::load_dataset(folder, {.split = split, .size = o.size, .resampled = true});

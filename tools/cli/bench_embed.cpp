@@ -157,8 +157,8 @@ Command add_bench_embed(CommandLine& app) {
   add_file(app, "--owner", o->owner, "Owner file whose unmarked field is marked", "OWNER")->excludes(field);
   add_scene_option(app, o->scene);
   app.option("--scene")->excludes(field)->excludes(app.option("--owner"));
-  add_file(app, "--only", o->only,
-           "Rows to measure beside the default, those with TEXT in their name; default: all", "TEXT");
+  add_file(app, "--only", o->only, "Rows whose names contain TEXT, besides the default row; default: all",
+           "TEXT");
   add_number(app, "--bits", o->bits, 1, 256, "Length of the message in bits, 1 to 256");
   add_number(app, "--seconds", o->seconds, 0.1, 86400, "Embedding time of each row in seconds, 0.1 to 86400",
              "S");

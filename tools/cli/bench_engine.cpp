@@ -45,7 +45,7 @@ Json row_json(const bench::EngineRow& r, bool with_peer) {
   row["peer_variant"] = of_peer(found.variant);
   row["peer_environment"] = of_peer(found.tuned ? "tuned" : "as it is");
   row["value_difference"] = of_peer(found.value_difference);
-  row["gradient_difference"] = of_peer(found.gradient_difference);
+  row["gradient_difference"] = r.peer ? where(found.gradient_difference) : Json(nullptr);
   row["kink_difference"] = r.peer ? where(found.kink_difference) : Json(nullptr);
   return row;
 }
@@ -76,7 +76,8 @@ void print_row(Context& context, const bench::EngineRow& r, const Json& json) {
     print_line(context,
                "  PyTorch %.4g s (%s), ours %.4g s: ratio %.2f; values differ %.1e, gradients %.1e\n",
                r.peer->seconds, r.peer->found.variant.c_str(), r.seconds, r.peer->ratio,
-               r.peer->found.value_difference, r.peer->found.gradient_difference);
+               r.peer->found.value_difference,
+               std::max(r.peer->found.gradient_difference, r.peer->found.kink_difference));
 }
 
 struct Scene {
@@ -167,8 +168,7 @@ Command add_bench_engine(CommandLine& app) {
   add_number(app, "--runs", o->engine.runs, 1, 1000, "Runs of each row, 1 to 1000; their median counts");
   add_number(app, "--scale", o->engine.scale, 1e-6, 1,
              "Factor on the number of samples of each row, above 0 to 1", "F");
-  add_file(app, "--only", o->engine.only, "Rows to measure, those with TEXT in their name; default: all",
-           "TEXT");
+  add_file(app, "--only", o->engine.only, "Rows whose names contain TEXT; default: all", "TEXT");
   add_scene_option(app, o->scene);
   app.add_flag("--precision", o->precision,
                "Measure speed against error of double, float, bf16 and of each approximation as well");

@@ -74,7 +74,7 @@ int run_bench_tracing(const BenchTracingArguments& o, Context& context) {
 
 Command add_bench_tracing(CommandLine& app) {
   auto o = std::make_shared<BenchTracingArguments>();
-  app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
+  app.add_option("--owner", o->owner, "Owner file from `fieldmark embed`")->required()->type_name("OWNER");
   add_number(app, "--recipients", o->options.recipients, 9, 10000000, "Recipients to test, 9 to 10000000");
   add_number(app, "--repetitions", o->options.repetitions, 1, 100000,
              "Repetitions of each case with another key, 1 to 100000");

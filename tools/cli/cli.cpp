@@ -40,7 +40,7 @@ constexpr Entry kCommands[] = {
     {"check", "Check evidence of verify for alterations", add_check},
     {"distort", "Distort images: noise, rotation, JPEG and more", add_distort},
     {"attack-field", "Attack the mark of a field", add_attack_field},
-    {"bench", "Measure speed and error against this machine's peak", add_bench},
+    {"bench", "Benchmark the engine, training, marks and attacks", add_bench},
     {"reproduce", "Train and measure the systems of the paper's tables", add_reproduce},
     {"results", "List, measure and render the results of docs/results", add_results},
     {"gradcheck", "Check every hand-derived gradient against finite differences", add_gradcheck},

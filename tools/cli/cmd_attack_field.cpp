@@ -89,11 +89,11 @@ int run_attack_field(const AttackFieldArguments& options, Context& context) {
 
 Command add_attack_field(CommandLine& app) {
   auto o = std::make_shared<AttackFieldArguments>();
-  app.add_option("field", o->field, "Field to attack, of `fieldmark bake` or `fieldmark train`")
+  app.add_option("field", o->field, "Field to attack, from `fieldmark bake` or `fieldmark train`")
       ->required()
       ->type_name("FIELD")
       ->default_str("");
-  app.add_option("--out", o->out, "File to write, the attacked field")->required()->type_name("FIELD");
+  app.add_option("--out", o->out, "Field file to write")->required()->type_name("FIELD");
   app.add_option("--attack", o->attack,
                  "Attacks to run, left to right. On each tensor:\n"
                  "weights_noise_A  Gaussian noise of A times the tensor's rms, 0 to 10\n"

@@ -116,11 +116,11 @@ int run_bake(const BakeArguments& options, Context& context) {
 
 Command add_bake(CommandLine& app) {
   auto o = std::make_shared<BakeArguments>();
-  app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
+  app.add_option("--owner", o->owner, "Owner file from `fieldmark embed`")->required()->type_name("OWNER");
   add_message_options(app, o->message, "Message to bake");
   add_code_options(app, o->code);
   add_copy_option(app, o->code, "Recipient whose own copy this is, see trace");
-  app.add_option("--out", o->out, "File to write, the field to publish; FIELD.checkpoint during baking")
+  app.add_option("--out", o->out, "Field file to publish; FIELD.checkpoint during baking")
       ->required()
       ->type_name("FIELD");
   app.add_option("--mark-psnr", o->mark_psnr,

@@ -19,26 +19,22 @@ struct Subject {
 };
 constexpr Subject kSubjects[] = {
     {"engine", "Measure kernels and training steps against the peak of this machine", add_bench_engine},
-    {"field", "Measure speed against error of rendering with other settings", add_bench_field},
-    {"training", "Measure each choice of training, switched off and on for the same time",
-     add_bench_training},
-    {"embed", "Measure accuracy against mark PSNR of embedding with other settings for the same time",
+    {"field", "Compare rendering settings: speed against error", add_bench_field},
+    {"training", "Compare training settings at equal training time", add_bench_training},
+    {"embed", "Compare embedding settings at equal training time: accuracy against mark PSNR",
      add_bench_embed},
-    {"payload", "Measure how often payloads are read exactly, and how often noise passes for one",
+    {"payload", "Measure how often payloads are read exactly, and how often noise decodes to one",
      add_bench_payload},
-    {"attacks", "Measure accuracy against damage of a baked mark under attacks on images and fields",
+    {"attacks", "Measure bit accuracy against the damage that attacks do to images and fields",
      add_bench_attacks},
-    {"tracing", "Measure how many of the recipients whose copies were mixed are named, and how many others",
-     add_bench_tracing},
-    {"collapse",
-     "Measure how soon collapsed trainings are noticed, and how often healthy ones are taken for such",
+    {"tracing", "Measure how many guilty and how many innocent recipients tracing names", add_bench_tracing},
+    {"collapse", "Measure how soon collapses are detected, and how many healthy trainings raise alarms",
      add_bench_collapse},
-    {"captures",
-     "Measure what exposures and refined poses gain on captured images, as they are and with jittered poses",
+    {"captures", "Measure the gain of exposures and refined poses on captured and on jittered cameras",
      add_bench_captures},
-    {"data", "Measure what training loses on data sets in other forms: opaque, moved, masked, behind a lens",
+    {"data", "Measure the PSNR lost on data sets in other forms: opaque, moved, masked, behind a lens",
      add_bench_data},
-    {"turns", "Measure the wall time of a command by turns with another build of fieldmark",
+    {"turns", "Compare the wall time of a command in this build and in another, in alternation",
      add_bench_turns}};
 
 }  // namespace
@@ -54,7 +50,7 @@ void add_scene_option(CommandLine& app, std::string& scene) {
 }
 
 void add_plot(CommandLine& app, std::string& plot) {
-  add_file(app, "--plot", plot, "File to write, SVG chart of the rows; default: none", "FILE");
+  add_file(app, "--plot", plot, "SVG file to write with a chart of the rows; default: none", "FILE");
 }
 
 nerf::Dataset bench_split(const std::string& folder, const std::string& split, bool quick) {

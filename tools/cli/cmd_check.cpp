@@ -58,7 +58,9 @@ int run_check(const CheckArguments& options, Context& context) {
 
 Command add_check(CommandLine& app) {
   auto o = std::make_shared<CheckArguments>();
-  app.add_option("folder", o->folder, "Evidence folder of `fieldmark verify`")->required()->type_name("DIR");
+  app.add_option("folder", o->folder, "Evidence folder from `fieldmark verify`")
+      ->required()
+      ->type_name("DIR");
   app.add_option("images", o->images,
                  "Images or videos, or folders of them, to compare by SHA-256 with those of the evidence")
       ->type_name("IMAGE|VIDEO|DIR")

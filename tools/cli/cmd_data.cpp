@@ -134,7 +134,7 @@ Command add_data(CommandLine& app) {
       ->type_name("URL");
   auto examined = std::make_shared<DataCheckArguments>();
   CommandLine checks =
-      app.add_subcommand("check", "Tell what a data set holds and what is odd about it, with remedies");
+      app.add_subcommand("check", "Print the contents of a data set, and warnings with remedies");
   add_data_check(checks, *examined);
   return [options, examined, lists, fetches, checks](Context& context) {
     if (lists.parsed()) return list(context);

@@ -133,7 +133,9 @@ Command add_distort(CommandLine& app) {
       ->required()
       ->type_name("IMAGE|DIR")
       ->default_str("");
-  app.add_option("--out", options->out, "Folder to write, one PNG per image")->required()->type_name("DIR");
+  app.add_option("--out", options->out, "Folder to write the images to, one PNG each")
+      ->required()
+      ->type_name("DIR");
   app.add_option("--distort", options->distort,
                  "Distortions to apply, left to right:\n"
                  "noise_A       Gaussian noise of standard deviation A, 0 to 1\n"

@@ -217,14 +217,13 @@ void add_view_options(CommandLine& app, EmbedArguments& o) {
       ->one_of({"all", "novel"})
       ->type_name("NAME")
       ->default_str("");
-  app.add_option(
-         "--samples", o.samples,
-         "Samples per ray whose marks add up in a pixel, 1 to 64; default: 1, in scenes without bounds 4")
+  app.add_option("--samples", o.samples,
+                 "Samples of the mark per ray, 1 to 64; default: 1, or 4 in scenes without bounds")
       ->range(1, 64)
       ->type_name("N")
       ->default_str("");
   app.add_option("--batch", o.batch,
-                 "Images per step, 1 to 64; default: 4, in scenes without bounds 2; for preset fast")
+                 "Images per step, 1 to 64; default: 4, or 2 in scenes without bounds; for preset fast")
       ->range(1, 64)
       ->type_name("N")
       ->default_str("");
@@ -237,14 +236,14 @@ Command add_embed(CommandLine& app) {
   app.add_option("--field", o->field, "Trained field to mark; the file is not changed")
       ->required()
       ->type_name("FIELD");
-  app.add_option("--out", o->out, "File to write, the owner; OWNER.checkpoint during training")
+  app.add_option("--out", o->out, "Owner file to write; OWNER.checkpoint during training")
       ->required()
       ->type_name("OWNER");
-  app.add_option("--key", o->key, "Key of `fieldmark key`; default: a new one, kept in OWNER")
+  app.add_option("--key", o->key, "Key from `fieldmark key`; default: a new one, kept in OWNER")
       ->type_name("KEY")
       ->default_str("");
   app.add_option("--bits", o->bits, "Length of the message, 1 to 256")->range(1, 256)->type_name("N");
-  add_message_options(app, o->intended, "Message to print the commitment of");
+  add_message_options(app, o->intended, "Message to commit to (prints the commitment)");
   app.add_option("--preset", o->preset,
                  "fast: one bit per cell of the scene, trains in minutes;\npaper: one message everywhere, as "
                  "in CopyRNeRF "
@@ -266,8 +265,8 @@ Command add_embed(CommandLine& app) {
       ->type_name("N")
       ->default_str("");
   app.add_option("--reader-size", o->reader_size,
-                 "Longer side of the extractor's images in pixels, 32 to 1024; default: 160, for presets "
-                 "paper and code 80")
+                 "Longer side of the extractor's images in pixels, 32 to 1024; default: 160, or 80 for "
+                 "presets paper and code")
       ->range(32, 1024)
       ->type_name("N")
       ->default_str("");
@@ -281,7 +280,7 @@ Command add_embed(CommandLine& app) {
       ->type_name("NAME")
       ->default_str("");
   add_view_options(app, *o);
-  add_run_length(app, o->length, true, "300, for presets paper and code 2400");
+  add_run_length(app, o->length, true, "300, or 2400 for presets paper and code");
   app.add_option("--measured-views", o->measured_views, "Novel views to measure at the end, 1 to 100000")
       ->range(1, 100000)
       ->type_name("N");
@@ -290,7 +289,7 @@ Command add_embed(CommandLine& app) {
       ->type_name("NAME[,NAME...]")
       ->default_str("");
   app.add_option("--image", o->image,
-                 "File to write, PNG of four views unmarked, marked, and ten times the difference; default: "
+                 "PNG file to write of four views unmarked, marked, and ten times the difference; default: "
                  "OWNER.png")
       ->type_name("FILE")
       ->default_str("");

@@ -103,7 +103,7 @@ int run_extract(const ExtractArguments& options, Context& context) {
 
 Command add_extract(CommandLine& app) {
   auto o = std::make_shared<ExtractArguments>();
-  app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
+  app.add_option("--owner", o->owner, "Owner file from `fieldmark embed`")->required()->type_name("OWNER");
   add_code_options(app, o->code);
   add_copy_option(app, o->code, "Recipient whose copy to read");
   add_rate(app, o->fpr, "a message counts as read");

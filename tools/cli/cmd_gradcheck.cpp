@@ -181,7 +181,7 @@ int run_numerics(const GradcheckArguments& options, Context& context) {
 
 Command add_gradcheck(CommandLine& app) {
   auto options = std::make_shared<GradcheckArguments>();
-  app.add_option("--only", options->only, "Checks to run, those with TEXT in their name; default: all")
+  app.add_option("--only", options->only, "Checks whose names contain TEXT; default: all")
       ->type_name("TEXT")
       ->default_str("");
   app.add_flag(

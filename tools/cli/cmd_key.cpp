@@ -39,7 +39,7 @@ int run_key(const KeyArguments& options, Context& context) {
 
 Command add_key(CommandLine& app) {
   auto options = std::make_shared<KeyArguments>();
-  app.add_option("--out", options->out, "File to write, the key")->required()->type_name("KEY");
+  app.add_option("--out", options->out, "Key file to write")->required()->type_name("KEY");
   app.add_flag("--force", options->force, "Replace an existing key, and no other file");
   return [options](Context& context) { return run_key(*options, context); };
 }

@@ -210,7 +210,7 @@ int run_measure(const MeasureArguments& options, Context& context) {
 
 Command add_measure(CommandLine& app) {
   auto o = std::make_shared<MeasureArguments>();
-  app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
+  app.add_option("--owner", o->owner, "Owner file from `fieldmark embed`")->required()->type_name("OWNER");
   app.add_option("--field", o->field, "Baked field to measure; default: the mark as trained")
       ->type_name("FIELD")
       ->default_str("");

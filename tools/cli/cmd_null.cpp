@@ -77,8 +77,8 @@ int run_null(const NullArguments& options, Context& context) {
 
 Command add_null(CommandLine& app) {
   auto o = std::make_shared<NullArguments>();
-  app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
-  add_message_options(app, o->message, "Message to test, drawn at random if none is given,");
+  app.add_option("--owner", o->owner, "Owner file from `fieldmark embed`")->required()->type_name("OWNER");
+  add_message_options(app, o->message, "Message to test (default: random)");
   add_code_options(app, o->code);
   app.add_option("--keys", o->keys, "Random keys to test on each image as well, 0 to 10000000")
       ->range(0, 10000000)

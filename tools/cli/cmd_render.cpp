@@ -174,7 +174,7 @@ int run_render(const RenderArguments& options, Context& context) {
 Command add_render(CommandLine& app) {
   auto o = std::make_shared<RenderArguments>();
   app.add_option("--field", o->field, "Field to render")->required()->type_name("FIELD");
-  app.add_option("--out", o->out, "Folder to write, one PNG per view")->required()->type_name("DIR");
+  app.add_option("--out", o->out, "Folder to write the views to, one PNG each")->required()->type_name("DIR");
   Option data = app.add_option("--data", o->data, "Data set whose cameras to use")->type_name("DIR");
   app.add_option("--split", o->split, "Part of the data set: train, val, test")
       ->one_of({"train", "val", "test"})

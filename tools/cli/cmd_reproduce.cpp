@@ -175,12 +175,12 @@ void measure(const ReproduceArguments& options, const std::vector<baselines::Pap
       save(options, scenes, measured, context.seconds() - begun);
       results::write_paper_page(options.cells, page_of(options, context));
       char line[120];
-      std::snprintf(line, sizeof line, "%s: %.2f%% right, %.2f dB on the object, %s\n", name.stem().c_str(),
-                    100 * measured.cell.bit_accuracy, measured.cell.psnr_base_foreground,
+      std::snprintf(line, sizeof line, "%s: %.2f%% right, %.2f dB on the foreground, %s\n",
+                    name.stem().c_str(), 100 * measured.cell.bit_accuracy, measured.cell.psnr_base_foreground,
                     format_duration(context.seconds() - begun).c_str());
       context.text() << line;
     } catch (const baselines::Stopped& e) {
-      throw Interrupted(std::string(e.what()) + "; the same command goes on from there");
+      throw Interrupted(std::string(e.what()) + "; the same command resumes");
     }
   }
 }
@@ -282,7 +282,7 @@ Command add_reproduce(CommandLine& app) {
       ->type_name("DIR");
   app.add_option("--work", o->work, "Folder for checkpoints and unmarked fields")->type_name("DIR");
   add_lpips_weights(app, o->lpips_weights);
-  app.add_flag("--full", o->full, "Every length and system on every scene, with three seeds");
+  app.add_flag("--full", o->full, "Measure every length and system on every scene, with three seeds");
   app.add_flag("--report-only", o->report_only,
                "Measure nothing: list what is missing and write the page (--report, or paper.md beside the "
                "folder of cells) and its figures");

@@ -59,7 +59,7 @@ int run_scene(const SceneArguments& options, Context& context) {
 
 Command add_scene(CommandLine& app) {
   auto options = std::make_shared<SceneArguments>();
-  app.add_option("--out", options->out, "Folder to write, a data set in Blender layout")
+  app.add_option("--out", options->out, "Folder to write the data set to, in Blender layout")
       ->required()
       ->type_name("DIR");
   app.add_option(

@@ -86,7 +86,7 @@ int run_trace(const TraceArguments& options, Context& context) {
 
 Command add_trace(CommandLine& app) {
   auto o = std::make_shared<TraceArguments>();
-  app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
+  app.add_option("--owner", o->owner, "Owner file from `fieldmark embed`")->required()->type_name("OWNER");
   add_message_options(app, o->message, "Message of the copies");
   app.add_option("--copies", o->copies, "Text file with the NAME of each `bake --copy`, one a line")
       ->required()

@@ -314,7 +314,7 @@ Command add_train(CommandLine& app) {
          "model")
       ->required()
       ->type_name("DIR");
-  app.add_option("--out", o->out, "File to write, the field; FIELD.checkpoint during training")
+  app.add_option("--out", o->out, "Field file to write; FIELD.checkpoint during training")
       ->required()
       ->type_name("FIELD");
   app.add_option("--size", o->size,
@@ -341,8 +341,8 @@ Command add_train(CommandLine& app) {
   add_run_length(app, o->length, true);
   add_precision(app, o->precision);
   app.add_option("--target-psnr", o->target_psnr,
-                 "PSNR at which training ends in dB, 1 to 100, of 4 validation images every 250 steps,\n"
-                 "or of the training rays without validation images; default: off")
+                 "End training at this PSNR in dB, 1 to 100, of 4 validation images every 250 steps,\n"
+                 "or of the training rays if there are none; default: off")
       ->range(1.0, 100.0)
       ->type_name("DB")
       ->default_str("");

@@ -134,7 +134,7 @@ int run_verify(const VerifyArguments& options, Context& context) {
 
 Command add_verify(CommandLine& app) {
   auto o = std::make_shared<VerifyArguments>();
-  app.add_option("--owner", o->owner, "Owner file of `fieldmark embed`")->required()->type_name("OWNER");
+  app.add_option("--owner", o->owner, "Owner file from `fieldmark embed`")->required()->type_name("OWNER");
   add_message_options(app, o->message, "Message to look for");
   add_rate(app, o->fpr, "a mark counts as found");
   add_code_options(app, o->code);

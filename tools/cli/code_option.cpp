@@ -24,7 +24,7 @@ Index message_bits(const CodeOption& options, const std::string& hex, const wate
 }  // namespace
 
 void add_code_options(CommandLine& app, CodeOption& o) {
-  app.add_option("--key", o.key, "Key of `fieldmark key` instead of the owner's")->type_name("KEY");
+  app.add_option("--key", o.key, "Key from `fieldmark key` instead of the owner's")->type_name("KEY");
   app.add_option("--bits", o.bits,
                  "Length of the message, 1 to the number of cells; default: the digits of --message, else as "
                  "embedded")

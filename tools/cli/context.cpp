@@ -20,11 +20,11 @@ void add_common(CommandLine& app, CommonOptions& options) {
       ->group("Common")
       ->type_name("N")
       ->default_str("");
-  app.add_option("--json", options.json, "File to write, the results as JSON; - for standard output")
+  app.add_option("--json", options.json, "JSON file to write the results to; - for standard output")
       ->group("Common")
       ->type_name("FILE");
   app.add_option("--report", options.report,
-                 "File to write, the results with command, commit and machine as Markdown")
+                 "Markdown file to write the results to, with command, commit and machine")
       ->group("Common")
       ->type_name("FILE");
 }

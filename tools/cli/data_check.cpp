@@ -104,7 +104,7 @@ void add_data_check(CommandLine& app, DataCheckArguments& options) {
       .type_name("N")
       .default_str("");
   app.add_option("--cameras", options.cameras,
-                 "PNG file to write, an image of the cameras from above and from the right; default: none")
+                 "PNG file to write with the cameras from above and from the right; default: none")
       .check([](const std::string& file) {
         return file.ends_with(".png") ? std::string() : "expected a name that ends in .png, got " + file;
       })

@@ -138,7 +138,7 @@ bool fill(const std::string& url, const fs::path& part, const Manifest::File& ex
   if (t.have != expected.bytes)
     throw IoError(url + ": expected " + std::to_string(expected.bytes) + " bytes, got " +
                   std::to_string(t.have) + " (" + (*reason ? reason : "the server sent no more") +
-                  "); what came is kept, and the same command goes on from there");
+                  "); what came is kept, and the same command resumes");
   if (::fsync(file.fd) != 0) throw IoError(part.string() + ": cannot be written: " + std::strerror(errno));
   return true;
 }

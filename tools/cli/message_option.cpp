@@ -18,7 +18,7 @@ watermark::Message encoded(const char* option, PayloadKind kind, const std::stri
 
 void add_message_options(CommandLine& app, MessageOption& o, const std::string& purpose) {
   Option all[] = {
-      app.add_option("--message", o.message, purpose + " in hexadecimal, most significant bit first")
+      app.add_option("--message", o.message, purpose + ", in hexadecimal, most significant bit first")
           ->type_name("HEX"),
       app.add_option("--text", o.text, "UTF-8 text instead of --message, encoded with error correction")
           ->type_name("TEXT"),

@@ -163,7 +163,7 @@ std::vector<ImageEvidence> read_images(SuspectReader& reader, const Suspects& su
       progress.update((static_cast<double>(i) + share) / static_cast<double>(files.size()));
       if (guard.interrupted())
         throw Interrupted(kept ? suspects.readings + " has readings of " + std::to_string(kept->size()) +
-                                     " images; the same command goes on from there"
+                                     " images; the same command resumes"
                                : "nothing was decided; --readings FILE lets a run go on");
     };
     done(0);

@@ -15,7 +15,7 @@ namespace fieldmark::cli {
 /// The reading of one image or one video frame.
 struct ImageEvidence {
   std::string image{};                                             ///< name; for a frame "clip.mp4@1.234s"
-  std::vector<double> cells{};                                     ///< sign evidence S_c
+  std::vector<double> cells{};                                     ///< evidence per cell, S_c
   watermark::ReadingKind reading = watermark::ReadingKind::blind;  ///< detection that produced it
   double agreement = std::nan("");  ///< of the image with the owner's field; NaN if they were not aligned
   std::string sha256{};             ///< of the file's bytes

@@ -19,7 +19,7 @@ TEST_CASE("engine_bench: every row of the contract runs, and float is near doubl
   for (const char* name :
        {"mlp_4x64_fb_f32", "mlp_8x256_fb_f32", "conv3x3_64_fb_f32", "hidden_decoder_fb_f32",
         "transformer_step", "transformer_wide_step", "autoencoder_step", "autoencoder_wide_step",
-        "chain_swish_fb_f32", "chain_arithmetic_fb_f32", "node_16_fb_f32", "hash_2e17_forward",
+        "paper_step", "chain_swish_fb_f32", "chain_arithmetic_fb_f32", "node_16_fb_f32", "hash_2e17_forward",
         "hash_2e17_backward", "nerf_step", "nerf_step_first"})
     CHECK(std::count(begun.begin(), begun.end(), name) == 1);
   for (const EngineRow& row : bench.rows) {
@@ -33,8 +33,9 @@ TEST_CASE("engine_bench: every row of the contract runs, and float is near doubl
     if (row.name.starts_with("nerf_step")) continue;
     CHECK(row.error >
           0);  // float and double never agree to the last bit: 0 would mean that nothing was compared
-    // A look-up multiplies a position, and its rounding error, by 512 cells: 512 * 2^-24.
-    CHECK(row.error < (row.name.starts_with("hash") ? 1e-4 : 1e-5));
+    // A look-up multiplies a position, and its rounding error, by 512 cells: 512 * 2^-24. Of a million ReLUs
+    // of preset paper, some ten are on the other side of their kink in double.
+    CHECK(row.error < (row.name.starts_with("hash") ? 1e-4 : row.name == "paper_step" ? 1e-2 : 1e-5));
   }
 }
 
@@ -64,15 +65,17 @@ TEST_CASE("engine_bench: PyTorch computes the same values and gradients") {
 
 TEST_CASE("engine_bench: PyTorch takes the same training steps of models") {
   if (!torch_or_skip("the peer of the training steps of engine_bench")) return;
-  for (const char* name : {"transformer_step", "autoencoder_step"}) {
+  for (const std::string name : {"transformer_step", "autoencoder_step", "paper_step"}) {
     const EngineBench bench =
         run_engine_bench({.runs = 1, .scale = 0.1, .only = name, .peer = PeerOptions{}});
     REQUIRE((bench.rows.size() == 1 && bench.rows[0].peer));
     const Peer::Found& found = bench.rows[0].peer->found;
-    CAPTURE(name, found.variant, found.value_difference, found.gradient_difference);
+    const bool kinks = name == "paper_step";
+    const double gradients = kinks ? found.kink_difference : found.gradient_difference;
+    CAPTURE(name, found.variant, found.value_difference, gradients);
     CHECK(found.value_difference < 1e-5);
-    CHECK(found.gradient_difference > 0);
-    CHECK(found.gradient_difference < Peer::kTolerance);
+    CHECK(gradients > 0);
+    CHECK(gradients < (kinks ? Peer::kKinkTolerance : Peer::kTolerance));
   }
 }
 

@@ -27,6 +27,12 @@ SafetensorsFile small_work(bool with_draw) {
   return file;
 }
 
+SafetensorsFile work_with_kinks() {
+  SafetensorsFile file = small_work(false);
+  file.metadata["kinks"] = "1";
+  return file;
+}
+
 // A Python interpreter with canned answers.
 struct FakePython {
   explicit FakePython(const std::string& script) {
@@ -35,8 +41,11 @@ struct FakePython {
   }
   std::string path() const { return folder / "python"; }
   std::string failure(bool with_draw = false, double limit_seconds = 60) const {
+    return failure(small_work(with_draw), limit_seconds);
+  }
+  std::string failure(const SafetensorsFile& work, double limit_seconds = 60) const {
     try {
-      Peer peer("row", small_work(with_draw), {path(), limit_seconds});
+      Peer peer("row", work, {path(), limit_seconds});
       return "timed " + std::to_string(peer.run());
     } catch (const Error& e) {
       std::string text = e.what();
@@ -137,4 +146,20 @@ TEST_CASE("peer: work that differs is not timed") {
              Contains("'dx'") && Contains("0.2 of its norm"));
   CHECK_THAT(FakePython(ready("1", kNear)).failure(true), Contains("no difference of"));
   CHECK(FakePython(ready("1", kNear, kNear) + kRuns).failure(true) == "timed 0.250000");
+}
+
+TEST_CASE("peer: with kinks, the first loss is compared strictly and gradients by their norms") {
+  const auto told = [](const std::string& loss, const std::string& norms) {
+    return FakePython(ready("1", loss, norms) + kRuns).failure(work_with_kinks());
+  };
+  const std::string near = R"({"y": 1e-7})", norms = R"({"y": 2e-3, "dx": 0.09, "0/weight": 0, "0/bias": 0})";
+  CHECK(told(near, norms) == "timed 0.250000");
+  CHECK_THAT(told(R"({"y": 2e-4})", norms), Contains("values differ") && Contains("0.0002 of its largest"));
+  CHECK_THAT(told("{}", norms), Contains("no difference of 'y'"));
+  CHECK_THAT(told(near, "{}"), Contains("no difference of"));
+  CHECK_THAT(told(near, R"({"y": 0, "dx": 0, "0/weight": 0})"), Contains("no difference of '0/bias'"));
+  CHECK_THAT(told(near, R"({"y": 0, "dx": 0.2, "0/weight": 0, "0/bias": 0})"),
+             Contains("'dx'") && Contains("0.2 of its norm"));
+  CHECK_THAT(told(near, R"({"y": 0.2, "dx": 0, "0/weight": 0, "0/bias": 0})"),
+             Contains("values differ") && Contains("0.2 of its norm"));
 }

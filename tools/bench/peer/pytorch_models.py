@@ -1,10 +1,31 @@
 """Models whose training steps pytorch_peer.py takes; it imports this file from its own folder."""
+import itertools
+import math
+
 import torch
 import torch.nn.functional as F
 
 
 def leaf(tensor):
     return tensor.detach().clone().requires_grad_()
+
+
+def as_window(matrix):
+    """Returns a matrix [in, out] as the weight of a 1 x 1 convolution."""
+    return matrix.t()[:, :, None, None].contiguous(memory_format=torch.channels_last)
+
+
+def as_matrix(window):
+    """Inverts as_window(); returns anything else unchanged."""
+    return window.reshape(window.shape[:2]).t() if window.dim() == 4 else window
+
+
+def product(x, weight, bias):
+    """Computes x W + b, by BLAS, or by oneDNN if W is the weight of a convolution."""
+    if weight.dim() == 2:
+        return torch.addmm(bias, x, weight)
+    x = x.view(1, -1, 1, x.shape[1]).permute(0, 3, 1, 2)
+    return F.conv2d(x, weight, bias).permute(0, 2, 3, 1).reshape(-1, weight.shape[0])
 
 
 class Training:
@@ -57,24 +78,16 @@ class Transformer(Training):
         super().__init__(metadata, case, names, *how)
 
     def parameter(self, name, value):
-        if name.endswith("/weight") and self.layout != "addmm (BLAS)":
-            return value.t()[:, :, None, None].contiguous(memory_format=torch.channels_last)
-        return value
+        return as_window(value) if name.endswith("/weight") and self.layout != BLAS else value
 
     def gradient(self, name, grad):
-        return grad.reshape(grad.shape[:2]).t() if grad.dim() == 4 else grad
-
-    def dense(self, x, weight, bias):
-        if weight.dim() == 2:
-            return torch.addmm(bias, x, weight)
-        x = x.view(1, -1, 1, x.shape[1]).permute(0, 3, 1, 2)
-        return F.conv2d(x, weight, bias).permute(0, 2, 3, 1).reshape(-1, weight.shape[0])
+        return as_matrix(grad)
 
     def forward(self, *parameters):
         p = dict(zip(self.names, parameters))
 
         def dense(name, x):
-            return self.dense(x, p[name + "/weight"], p[name + "/bias"])
+            return product(x, p[name + "/weight"], p[name + "/bias"])
 
         embedded = F.embedding(self.seen, p["letter"]).view(-1, self.letters, self.width) + p["place"]
         embedded = embedded.view(-1, self.width)
@@ -115,5 +128,111 @@ class Autoencoder(Training):
         return F.mse_loss(conv("image", h), self.x)
 
 
-MODELS = {"transformer": (Transformer, ("addmm (BLAS)", "1x1 convolution (oneDNN)")),
-          "autoencoder": (Autoencoder, ("channels last", "planes"))}
+class Paper(Training):
+    """E, D and G paint a message into each image, and H reads it; the loss is that of preset paper."""
+
+    def __init__(self, metadata, case, names, layout, dense, once, singly, *how):
+        self.layout = ", ".join([layout, dense] + ["a product per message"] * once + ["image by image"] * singly)
+        self.blocked, self.blas = layout == BLOCKED, dense == BLAS
+        self.once, self.singly = once, singly
+        self.format = torch.channels_last if layout == "channels last" else torch.contiguous_format
+        self.side = int(metadata["side"])
+        self.x, self.d, self.c = case["x"], case["d"], case["c"]
+        self.count, self.samples = self.x.shape[:2]
+        self.message, self.weight = case["message"], case["weight"][:, None]
+        pixels = self.side ** 2
+        self.behind = case["behind"].repeat(self.count, 1)
+        self.place = (case["pixel"].long() + pixels * torch.arange(self.count)[:, None]).flatten()
+        self.base = self.composed(self.c)
+        # Blocked batch norm needs running statistics to update.
+        self.running = [(torch.zeros(case["value/" + name].shape), torch.ones(case["value/" + name].shape))
+                        if self.blocked else (None, None) for name in names if name.endswith("norm/beta")]
+        super().__init__(metadata, case, names, *how)
+
+    @staticmethod
+    def encoded(v, bands):
+        return [v] + [f(math.pi * 2 ** band * v) for band in range(bands) for f in (torch.sin, torch.cos)]
+
+    def parameter(self, name, value):
+        if value.dim() == 4:
+            return value.permute(3, 2, 0, 1).contiguous(memory_format=self.format)
+        return as_window(value) if value.dim() == 2 and not self.blas else value
+
+    def gradient(self, name, grad):
+        if grad.dim() == 4 and grad.shape[2] == 3:
+            return grad.permute(2, 3, 1, 0)
+        return as_matrix(grad)
+
+    def composed(self, colour):
+        marked = (self.weight * colour).view(-1, 3)
+        return self.behind + torch.zeros_like(self.behind).index_copy(0, self.place, marked)
+
+    def forward(self, *parameters):
+        p = dict(zip(self.names, parameters))
+        step = 1 if self.singly else self.count
+        images = [range(i, i + step) for i in range(0, self.count, step)]
+        marked = self.composed(torch.cat([self.painted(p, slice(i.start, i.stop)) for i in images]))
+        content = ((marked - self.base) ** 2).mean()
+        logits = self.read(p, marked.view(-1, self.side, self.side, 3).permute(0, 3, 1, 2))
+        return 60 * content + 5 * F.binary_cross_entropy_with_logits(logits, (self.message + 1) / 2)
+
+    def painted(self, p, images):
+        """The colours [images, samples, 3] that E, D and G give."""
+        x, d, c = (v[images].flatten(0, 1) for v in (self.x, self.d, self.c))
+
+        def dense(x, name):
+            return product(x, p[name + "/weight"], p[name + "/bias"])
+
+        f = torch.cat([*self.encoded(x, 10), *self.encoded(d, 4), c], 1)
+        for k in range(3):
+            f = torch.relu_(dense(f, "mark/encode/%d" % k))
+        f = dense(f, "mark/encode/3")
+        m = torch.relu_(dense(torch.relu_(dense(self.message[images], "mark/message/0")), "mark/message/1"))
+        if self.once:
+            h = self.in_parts(f, m, c, p["mark/fuse/0/weight"], p["mark/fuse/0/bias"])
+        else:
+            h = dense(torch.cat([f, m.repeat_interleave(self.samples, 0), c], 1), "mark/fuse/0")
+        h = torch.relu_(dense(torch.relu_(h), "mark/fuse/1"))
+        return torch.sigmoid(dense(h, "mark/fuse/2")).view(-1, self.samples, 3)
+
+    def in_parts(self, f, m, c, weight, bias):
+        axis = 0 if weight.dim() == 2 else 1
+        of_f, of_m, of_c = weight.split([f.shape[1], m.shape[1], 3], axis)
+        own = product(m, of_m, bias)
+        each = product(torch.cat([f, c], 1), torch.cat([of_f, of_c], axis), torch.zeros(own.shape[1]))
+        return (each.view(m.shape[0], self.samples, -1) + own[:, None]).flatten(0, 1)
+
+    def read(self, p, images):
+        x = (2 * images - 1).contiguous(memory_format=self.format)
+        x = x.to_mkldnn() if self.blocked else x
+        for k, running in enumerate(self.running):
+            block = "reader/%d/" % k
+            x = F.conv2d(x, p[block + "conv/weight"], p[block + "conv/bias"], padding=1)
+            x = F.batch_norm(x, *running, p[block + "norm/gamma"], p[block + "norm/beta"], True, 0.1, 1e-5)
+            x = torch.relu(x) if self.blocked else torch.relu_(x)
+        x = x.to_dense() if self.blocked else x
+        return product(x.mean((2, 3)), p["reader/linear/weight"], p["reader/linear/bias"])
+
+
+def blas():
+    """Which library serves addmm: Debian's reference BLAS is some 50 times slower than OpenBLAS."""
+    if torch.backends.mkl.is_available():
+        return "mkl"
+    with open("/proc/self/maps") as maps:
+        files = {line.split()[-1] for line in maps if "/" in line}
+    for word in ("openblas", "blis", "atlas"):
+        if any(word in file for file in files):
+            return word
+    return "reference"
+
+
+BLAS, BLOCKED, BOTH = "addmm (BLAS)", "oneDNN blocked", (False, True)
+LAYOUTS = ("channels last", "planes")
+PRODUCTS = (BLAS, "1x1 convolution (oneDNN)")
+# Reference BLAS would take minutes for large products.
+LARGE_PRODUCTS = PRODUCTS[1:] if blas() == "reference" else PRODUCTS
+PAPER = itertools.product((*LAYOUTS, BLOCKED), LARGE_PRODUCTS, BOTH, BOTH, (True,), BOTH)
+# The choices that each constructor takes; the last two are Adam for all at once and a trace, which blocked tensors lack.
+MODELS = {"transformer": (Transformer, list(itertools.product(PRODUCTS, BOTH, BOTH))),
+          "autoencoder": (Autoencoder, list(itertools.product(LAYOUTS, BOTH, BOTH))),
+          "paper": (Paper, [chosen for chosen in PAPER if chosen[0] != BLOCKED or not chosen[-1]])}

@@ -1,14 +1,13 @@
 """PyTorch's side of `fieldmark bench engine --peer pytorch`: pytorch_peer.py CASE.safetensors
 
-CASE holds a network, its inputs and fieldmark's results. Every variant of the same work is tried, the fastest is
-compared with those results and then timed. Standard output gets a line of JSON at once, and one for every line on
+CASE holds a network, its inputs and fieldmark's results. The script tries every variant of the work, compares the
+fastest with those results, and times it. Standard output gets a line of JSON at once, and one for every line on
 standard input:
   {"version", "threads", "blas", "cpu_capability", "variant", "seconds",
    "differences": {TENSOR: PART OF ITS LARGEST}, "kink_differences": {TENSOR: PART OF ITS NORM}}
   {"seconds"}  of a run: as many calls as take 0.1 s, or one
 or only {"missing": REASON} where PyTorch cannot be loaded.
 """
-import itertools
 import json
 import os
 import sys
@@ -30,12 +29,12 @@ try:
 except ImportError as error:
     answer({"missing": str(error)})
     sys.exit(0)
-from pytorch_models import MODELS, leaf
+from pytorch_models import MODELS, blas, leaf
 
 RUN_SECONDS = 0.1
 MICRO_BATCHES = (4096, 16384)  # samples
 SLOW = 3  # times the fastest: such a variant is not tried to the end
-ROUNDING = 1e-3  # of a variant in float against itself in double, in parts of a tensor's largest
+ROUNDING = 1e-3  # of a variant in float against itself in double, relative to the largest magnitude
 
 
 def read_case(path):
@@ -102,7 +101,7 @@ class Dense:
     keep = False
 
     def probe(self):
-        """Seconds of the whole batch as a few samples let expect."""
+        """Estimates the seconds of the whole batch from a few samples."""
         samples = min(self.x.shape[0], MICRO_BATCHES[0])
         size, self.size = self.size, min(self.size, samples)
         begin = time.perf_counter()
@@ -234,9 +233,9 @@ def variants(metadata, case):
             for size in sizes:
                 yield lambda: Dense(case, names, product, size)
     elif metadata["network"] in MODELS:
-        model, layouts = MODELS[metadata["network"]]
-        for layout, foreach, traced in itertools.product(layouts, (False, True), (False, True)):
-            yield lambda: model(metadata, case, names, layout, foreach, traced)
+        model, choices = MODELS[metadata["network"]]
+        for chosen in choices:
+            yield lambda: model(metadata, case, names, *chosen)
     else:
         for layout in ("channels last", "oneDNN blocked", "planes"):
             yield lambda: Images(case, names, metadata["network"] == "decoder", layout)
@@ -266,10 +265,10 @@ def fastest(metadata, case):
 
 
 def differences(found, case, size):
-    """Worst |theirs - ours| of each tensor, in parts of its size.
+    """Returns size(theirs - ours) of each tensor, relative to size(ours).
 
-    A gradient that is zero but for rounding, as of a bias before batch norm, has no size of its own: none counts as
-    below a tenth of the largest of all parameters. PyTorch's of the decoder's last such bias is 2e-5 of that.
+    A gradient may be zero except for rounding, as of a bias before batch norm. So the size of a parameter's gradient
+    counts as at least a tenth of the largest.
     """
     ours = {name: case[name if name in ("y", "dx") else "grad/" + name] for name in found}
     floor = max((float(size(ours[name])) for name in found if name not in ("y", "dx")), default=0.0) / 10
@@ -293,7 +292,7 @@ def in_double(case, best):
 
 
 def require_rounding(best, found, exact):
-    """Wants a variant's results in float near its own in double."""
+    """Requires a variant's float results to be within ROUNDING of its double ones."""
     ours = {name if name in ("y", "dx") else "grad/" + name: value for name, value in exact.items()}
     for name, part in differences(found, ours, largest).items():
         if not part <= ROUNDING:
@@ -301,13 +300,17 @@ def require_rounding(best, found, exact):
 
 
 def compared(best, metadata, case):
-    """Differences of a variant's results; where there are small draws, gradients are compared on the one that is
-    farthest from a kink, and on the whole work by their norms, which single kinks move little.
+    """Returns differences relative to the largest magnitude; with kinks or draws, also relative to the norm, which
+    single kinks change little.
 
-    There ours are held against PyTorch's in double: on some CPUs its own in float are farther from these than ours
-    are. The variant itself must be within ROUNDING of them.
+    With kinks, the first are those of the first loss alone. With draws, they compare ours with PyTorch's in double, on
+    the draw farthest from a kink: on some CPUs, PyTorch's float is less exact than ours. The variant must be within
+    ROUNDING of double.
     """
     found = best.results()
+    if "kinks" in metadata:
+        first = differences({"y": found["y"][:1]}, {"y": case["y"][:1]}, largest)
+        return first, differences(found, case, torch.linalg.vector_norm)
     draws = []
     for d in range(int(metadata["draws"])):
         prefix = "draw%d/" % d
@@ -327,16 +330,6 @@ def compared(best, metadata, case):
     require_rounding(best, {"y": found["y"]}, {"y": values})
     strict["y"] = max(strict["y"], differences({"y": values}, case, largest)["y"])
     return strict, differences(found, case, torch.linalg.vector_norm)
-
-
-def blas():
-    """Which library serves addmm: Debian's reference BLAS is some 50 times slower than OpenBLAS."""
-    with open("/proc/self/maps") as maps:
-        files = {line.split()[-1] for line in maps if "/" in line}
-    for word in ("openblas", "blis", "atlas", "mkl_rt"):
-        if any(word in file for file in files):
-            return word
-    return "reference"
 
 
 def main(path):

@@ -98,7 +98,7 @@ void write_masked(const Path& folder, Images images) {
   write_one_file(folder, images, Json::object(), {{"mask_path", "mask.png"}});
 }
 
-// A test view of which the pixels count that counts(x, y, opacity) accepts.
+// Returns a test view; the pixels that counts(x, y, opacity) accepts count.
 template <class F>
 JudgedView judged(const nerf::View& view, F counts) {
   const Index height = view.rgba.shape[0], width = view.rgba.shape[1];

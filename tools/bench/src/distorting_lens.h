@@ -5,8 +5,8 @@
 
 namespace fieldmark::bench {
 
-/// A lens that moves an image point from the distance r of its axis to d(r), both in focal lengths. Written
-/// apart from the lenses of the readers, which it is to check.
+/// A lens that moves an image point from distance r of its axis to distance d(r), in focal lengths.
+/// Independent of the readers' lenses, which it checks.
 class DistortingLens {
  public:
   /// d = atan r

@@ -70,7 +70,7 @@ void views(Variants& all) {
     all.vary("views", std::to_string(count), [=](EmbedVariant& v) { v.recipe.views.count = count; });
   all.vary("directions", "only novel cameras",
            [](EmbedVariant& v) { v.recipe.views.all_directions = false; });
-  all.vary("distances", "near, at the resolution of images",
+  all.vary("distances", "native, at the resolution of images",
            [](EmbedVariant& v) { v.recipe.views.distances = EmbedDistances::native; });
   all.vary("distances", "half of the views closer or farther",
            [](EmbedVariant& v) { v.recipe.views.distances = EmbedDistances::several; });
@@ -82,14 +82,14 @@ void views(Variants& all) {
            [](EmbedVariant& v) { v.recipe.embed.distortions.mixed = false; });
 }
 
-// The carrier of the message, and its strength.
+// The carrier of the message, and its mark PSNR.
 void marks(Variants& all, MarkColours colours) {
   for (const Index side : {8, 12, 20, 24, 32})
     all.vary("cells", std::to_string(side) + " an axis", [=](EmbedVariant& v) { v.recipe.cells = side; });
   for (const int mark_psnr : {33, 40})
     all.vary("mark_psnr", std::to_string(mark_psnr) + " dB",
              [=](EmbedVariant& v) { v.recipe.owner.mark_psnr = mark_psnr; });
-  all.vary("budget", "the strength from the first step on",
+  all.vary("budget", "the mark PSNR from the first step on",
            [](EmbedVariant& v) { v.recipe.cell().training.first_mark_psnr = v.recipe.owner.mark_psnr; });
   all.vary("budget", "annealed from 24 dB",
            [](EmbedVariant& v) { v.recipe.cell().training.first_mark_psnr = 24; });

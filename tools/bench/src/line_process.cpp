@@ -101,7 +101,7 @@ void LineProcess::write_line(std::string_view line) {
   }
 }
 
-// Appends what the program writes next to received_; false: it closed its output.
+// Appends the program's output to received_; returns false once the program has closed it.
 bool LineProcess::receive(double until, const char* what, const std::function<void()>& tick) {
   constexpr double kTick = 0.1;  // seconds
   for (;;) {
@@ -153,8 +153,8 @@ void LineProcess::finish(const std::function<void()>& tick) {
   if (status != 0) throw IoError(program_ + ": " + ending(status) + last_words());
 }
 
-// The program closed its output: it has ended or is about to. Returns its status as of waitpid(), or -1 if it
-// goes on and is killed.
+// Waits for a program that closed its output. Returns its waitpid() status, or -1 if the time is up and it is
+// killed.
 int LineProcess::status_at_end(double until, const std::function<void()>& tick) {
   int status = 0;
   pid_t ended = 0;

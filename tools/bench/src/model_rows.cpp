@@ -2,6 +2,7 @@
 #include <fieldmark/engine/values.h>
 
 #include "models.h"
+#include "paper_loop.h"
 #include "peer_work.h"
 
 namespace fieldmark::bench {
@@ -92,7 +93,11 @@ std::vector<RowSpec> model_rows() {
                            "training step of an autoencoder of 8 and 16 channels, 32 images of 16 x 16",
                            "autoencoder", discs),
           row<Autoencoder>("autoencoder_wide_step", "the same of 16 and 32 channels, 32 images of 64 x 64",
-                           "autoencoder", large)};
+                           "autoencoder", large),
+          row<PaperLoop>(
+              "paper_step",
+              "training step of the networks of preset paper, 8 images of 80 x 80, without distortions",
+              "paper", PaperLoopSize{.images = 8, .side = 80, .bits = 16})};
 }
 
 }  // namespace fieldmark::bench

@@ -60,7 +60,7 @@ std::vector<Result> over_trials(Index trials, const Result& empty, F&& f) {
 PayloadRow run_row(const PayloadBenchOptions& options, const PayloadCodec& codec, double rate,
                    std::uint64_t stream) {
   const CounterRng payloads(options.seed, stream), errors(options.seed, stream + 1);
-  const double mark_psnr = rate > 0 ? strength_of(rate) : 1, noise = rate > 0 ? 1 : 0;
+  const double magnitude = rate > 0 ? strength_of(rate) : 1, noise = rate > 0 ? 1 : 0;
   struct Pair {
     PayloadTrials signs, strengths;
   };
@@ -69,7 +69,7 @@ PayloadRow run_row(const PayloadBenchOptions& options, const PayloadCodec& codec
         const auto sent = watermark::random_payload(codec, payloads, i);
         std::vector<double> logits;
         for (auto bit : codec.encode(sent).bits)
-          logits.push_back((bit ? mark_psnr : -mark_psnr) +
+          logits.push_back((bit ? magnitude : -magnitude) +
                            noise * static_cast<double>(errors.normal2(i, logits.size())[0]));
         pair.strengths.add(logits, sent);
         pair.signs.add(signs_of(std::move(logits)), sent);

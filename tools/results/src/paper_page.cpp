@@ -66,7 +66,7 @@ struct Group {
   std::vector<const Cell*> cells;
 };
 
-// In the order of paper_systems(), then as the cells come.
+// Groups the cells by system, in the order of paper_systems(), then in their own order.
 std::vector<Group> groups_of(const std::vector<Cell>& cells) {
   std::vector<Group> groups;
   for (const auto& system : baselines::paper_systems())
@@ -84,7 +84,7 @@ std::vector<Group> groups_of(const std::vector<Cell>& cells) {
   return groups;
 }
 
-// Of the mean bit accuracy: over seeds where there are several, else over the views of the one run.
+// Returns the standard error of the mean bit accuracy: over the seeds, or over the views of a single run.
 double standard_error(const Group& g) {
   const double count = static_cast<double>(g.cells.size());
   if (g.cells.size() == 1) return g.cells[0]->spread / std::sqrt(mean_more(g.cells, "views"));
@@ -105,7 +105,7 @@ std::string steps_of(const Group& g) {
   return fixed(sum / static_cast<double>(g.cells.size()), 0);
 }
 
-// No figure stands without the steps that it took.
+// Every row states its training steps.
 const Row kStart{"system", "scene", "field", "steps"};
 Row start_of(const Group& g) { return {g.title, g.scene, g.field, steps_of(g)}; }
 

@@ -18,7 +18,7 @@ struct PoseJitter {
 /// is the harmonic mean of the bounds in View::depth where there is one, else that to `centre`.
 void jitter_cameras(nerf::Dataset& data, const PoseJitter& jitter, const nerf::Vec3& centre);
 
-/// What a training learns per image, and from which poses.
+/// Settings of a training: per-image parameters and initial poses.
 struct CaptureVariant {
   std::string name;  ///< "jittered, poses refined"
   bool exposures = false, refined = false, jittered = false;
@@ -27,7 +27,7 @@ struct CaptureVariant {
 /// Returns: as captured; exposures; refined; exposures and refined; jittered; jittered and refined.
 std::vector<CaptureVariant> capture_variants();
 
-/// What a training reached on the test images.
+/// Result of a training on the test images.
 struct CaptureRow {
   CaptureVariant variant;
   Index steps = 0;
@@ -36,7 +36,7 @@ struct CaptureRow {
   double psnr_pose_fitted = 0;    ///< after fit_cameras() of the test images, dB
 };
 
-/// How long the trainings of run_captures_bench() are.
+/// Options of run_captures_bench().
 struct CaptureRun {
   double seconds = 60;     ///< of each training
   std::uint64_t seed = 0;  ///< of fields, trainings and fits

@@ -8,7 +8,7 @@
 
 namespace fieldmark::bench {
 
-/// Something that goes wrong in a training.
+/// A fault injected into a training.
 struct TrainingFault {
   std::string name;  ///< "network weights times 100"
   /// Damages the images or the options before the training; may be empty.
@@ -20,15 +20,14 @@ struct TrainingFault {
 /// Returns faults of several kinds, most of which make a hash field's training collapse.
 std::vector<TrainingFault> training_faults();
 
-/// What nerf::CollapseWatch said of a training.
+/// Result of a training under nerf::CollapseWatch.
 struct WatchedTraining {
   std::string scene;  ///< name of the data set
   std::string what;   ///< name of the fault, or of the setting
   Index steps = 0;    ///< taken in all
-  /// Seconds from the fault, or from the start, to the word of the watch; negative before the fault, NaN if
-  /// it said nothing.
+  /// Seconds from the fault, or from the start, to the alarm; negative before the fault, NaN without alarm.
   double noticed_after = std::numeric_limits<double>::quiet_NaN();
-  std::string said;      ///< the word of the watch; empty: nothing
+  std::string said;      ///< text of the alarm; empty: none
   double explained = 0;  ///< share of the validation images' variance that the field explains at the end
   /// True if a constant image fits better than the field at the end.
   bool collapsed() const { return !(explained > 0); }

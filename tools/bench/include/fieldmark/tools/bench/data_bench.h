@@ -3,7 +3,7 @@
 
 namespace fieldmark::bench {
 
-/// What a field reached that was trained on a form.
+/// Result of training on a form.
 struct DataRow {
   std::string scene, form;
   nerf::SceneType type = nerf::SceneType::object;  ///< as load_dataset() decided

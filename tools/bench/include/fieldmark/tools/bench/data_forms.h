@@ -9,14 +9,14 @@
 
 namespace fieldmark::bench {
 
-/// A test view: what a field should show, and where that counts.
+/// A test view: ground truth, and the pixels that count.
 struct JudgedView {
   nerf::Camera camera;
   Tensor<float> rgb;      ///< [height, width, 3] over white
   Tensor<float> counted;  ///< [height, width] 1 for the pixels that count, else 0
 };
 
-/// A data set in a form in which people have it.
+/// A data set in one of the forms that users have.
 struct DataForm {
   std::string name;      ///< "opaque before white"
   double most_loss = 0;  ///< dB that a field may lose against the first form of the group

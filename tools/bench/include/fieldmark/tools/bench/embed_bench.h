@@ -9,7 +9,7 @@ namespace fieldmark::bench {
 struct EmbedPoint {
   double seconds = 0;          ///< spent on embedding so far
   double accuracy = 0;         ///< blind bit accuracy of one view, mean over a third of the views
-  double psnr_foreground = 0;  ///< marked against unmarked on the object, dB, mean over the same views
+  double psnr_foreground = 0;  ///< marked against unmarked on the foreground, dB, mean over the same views
 };
 
 /// Result of a variant. Accuracies are blind, for one view, averaged over views that were not trained on.
@@ -17,10 +17,10 @@ struct EmbedRow {
   EmbedVariant variant;        ///< how it was embedded
   Index steps = 0;             ///< taken
   double cache_seconds = 0;    ///< spent on rendering training views, part of `seconds`
-  double seconds = 0;          ///< spent on embedding: views, training, the calibration of the strength
+  double seconds = 0;          ///< spent on embedding: views, training, calibration of the mark PSNR
   double accuracy = 0;         ///< novel cameras
   double accuracy_p5 = 0;      ///< 5th percentile over novel cameras
-  double psnr_foreground = 0;  ///< marked against unmarked on the object, dB, novel cameras
+  double psnr_foreground = 0;  ///< marked against unmarked on the foreground, dB, novel cameras
   double closer = 0;           ///< accuracy for a third as many closer cameras, see nerf::CameraSet
   double farther = 0;          ///< likewise for farther cameras
   double extrapolated = 0;     ///< likewise for cameras more than 30 degrees from every training direction

@@ -62,6 +62,8 @@ struct EngineBench {
 /// - transformer_step: a training step (forward, backward, Adam) of the model of examples/transformer.cpp;
 ///   _wide: width 128 on 16 texts of 64 letters
 /// - autoencoder_step: likewise for examples/autoencoder.cpp; _wide: 16 and 32 channels, images of 64 x 64
+/// - paper_step: likewise for the networks of preset paper, without distortions: 8 images of 80 x 80, half of
+///   whose pixels have a sample, with a message each
 /// - chain_swish_fb_f32, chain_arithmetic_fb_f32: 3 and 8 elementwise steps on 10^7 elements, fused; three
 ///   inputs with gradients
 /// - node_16_fb_f32: 1,000 products of 16 elements, recorded one by one
@@ -72,7 +74,8 @@ struct EngineBench {
 ///   smaller number of the first steps (first_samples)
 /// With a peer, PyTorch also runs the rows mlp_4x64_fb_f32, mlp_8x256_fb_f32, conv3x3_64_fb_f32,
 /// hidden_decoder_fb_f32, chain_* and the training steps of models; its runs alternate with ours. First its
-/// results are compared with ours, on the same shapes and with numbers that keep ReLUs away from their kinks.
+/// results are compared with ours, on the same shapes; where it can, with numbers that keep ReLUs
+/// away from their kinks.
 /// @param progress  called before each row with its name and the fraction of rows done
 /// @throws ValueError if an option is out of range, or a peer is requested and no row supports one
 /// @throws IoError, Error  as Peer

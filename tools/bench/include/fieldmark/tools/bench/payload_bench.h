@@ -32,8 +32,8 @@ struct PayloadRow {
 /// How often random messages are read as a payload.
 struct PayloadNoise {
   Index trials = 0;     ///< readings of fair bits
-  Index signs = 0;      ///< those read as a payload with all strengths equal
-  Index strengths = 0;  ///< those read as a payload with normally distributed strengths
+  Index signs = 0;      ///< those read as a payload from signs alone
+  Index strengths = 0;  ///< those read as a payload from normally distributed logits
   double bound = 0;     ///< PayloadCodec::chance()
 };
 

@@ -31,13 +31,14 @@ class Peer {
     double seconds = 0;           ///< of the fastest, from the trial
     double untuned_seconds = 0;   ///< of the fastest in the default environment
     double value_difference = 0;  ///< worst |theirs - ours|, relative to the largest magnitude
-    double gradient_difference = 0;  ///< the same, worst gradient tensor; in works with draws, of one draw
-    double kink_difference = 0;      ///< in works with draws: of the whole work, relative to the norm
+    /// Likewise for the worst gradient tensor; with draws, on one draw; 0 with metadata "kinks".
+    double gradient_difference = 0;
+    double kink_difference =
+        0;  ///< worst tensor of the whole work, relative to its norm; 0 without draws or kinks
   };
   /// Largest difference of a value or gradient due to rounding, relative to its tensor's largest magnitude.
   static constexpr double kTolerance = 1e-4;
-  /// The same for gradients of a whole work with draws, relative to the norm: there, sums in the two programs
-  /// fall on different sides of a ReLU's kink.
+  /// Limit of kink_difference: rounding puts some sums on different sides of a ReLU's kink.
   static constexpr double kKinkTolerance = 0.1;
 
   /// Starts the interpreter, lets it try its variants, and compares the results of the fastest with ours.
@@ -45,7 +46,8 @@ class Peer {
   /// @param work  metadata "network", "parameters" (names in the order of use, separated by commas) and
   /// "draws" (their number), arrays "value/NAME" of each parameter, "x", "u", "y", "dx" and "grad/NAME"; with
   /// draws, the latter five carry the prefix "draw0/", "draw1/" ... of each draw. For training steps: the
-  /// data of the network, "y" (the losses of the first steps) and "grad/NAME" (of the first)
+  /// data of the network, "y" (the losses of the first steps) and "grad/NAME" (of the first); metadata
+  /// "kinks" if so many sums lie near a ReLU's kink that gradients agree by their norms alone
   /// @throws IoError if the interpreter or PyTorch is missing, fails, hangs or gives a malformed answer
   /// @throws Error if results differ by more than kTolerance or kKinkTolerance: wrong work is never timed
   Peer(const std::string& row, const SafetensorsFile& work, const PeerOptions& options);
