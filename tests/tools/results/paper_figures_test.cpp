@@ -12,7 +12,8 @@ TEST_CASE("Lines of lengths, of the severities that were measured, and of the co
   auto cells = paper_cells();
   keep_curve(cells.back(), "seconds,steps,figure\n1.5,10,0.5\n3.0,20,0.75\n");
   const auto figures = results::paper_figures(cells);
-  REQUIRE(figures.size() == 4);  // nothing was rotated, scaled or blurred
+  REQUIRE(figures.size() == 5);  // nothing was rotated, scaled or blurred
+  CHECK(count_parts(figures.at("paper_psnr.svg"), "class=\"point\"") == 2);
   // Two lengths of one system, and the paper's numbers at five lengths for the systems that can be run.
   CHECK(count_parts(figures.at("paper_bits.svg"), "class=\"point\"") % 5 == 2);
   CHECK_THAT(figures.at("paper_bits.svg"), Contains("CopyRNeRF, preset paper, published"));
@@ -46,6 +47,32 @@ TEST_CASE("Figures are of the scene with most cells, and ablations are in their 
   CHECK(after.at("paper_learning.svg") == before.at("paper_learning.svg"));
   CHECK_THAT(after.at("paper_learning_ablation.svg"), Contains("CopyRNeRF without DRR"));
   CHECK_THAT(before.at("paper_noise.svg"), Contains("lego") && Contains("Fieldmark, preset fast"));
+}
+
+TEST_CASE("Preset paper has a curve for every scene and length, but for one seed", "[paper_figures]") {
+  auto cells = paper_cells();
+  for (auto& c : cells) keep_curve(c, "seconds,steps,figure\n1.5,10,0.5\n3.0,20,0.75\n");
+  const auto before = results::paper_figures(cells);
+  CHECK_THAT(before.at("paper_learning_preset.svg"), Contains("lego, hash field, 4 bits, 100 steps") &&
+                                                         Contains("lego, hash field, 16 bits, 100 steps"));
+  CHECK(count_parts(before.at("paper_learning_preset.svg"), "class=\"point\"") == 4);
+  cells.push_back(cells[1]);
+  cells.back().name.seed = 2;
+  CHECK(results::paper_figures(cells) == before);
+}
+
+TEST_CASE("A 2-D network is named in the learning curves, and drawn once", "[paper_figures]") {
+  auto cells = paper_cells();
+  cells.push_back(cells.back());
+  cells.back().name.system = "nerf_hidden";
+  cells.back().own_2d_accuracy = 0.99;
+  keep_curve(cells.back(), "seconds,steps,figure\n1.5,10,0.5\n3.0,20,0.75\n");
+  cells.push_back(cells.back());
+  cells.back().name.system = "hidden_nerf";
+  cells.back().more["training_images_accuracy"] = 0.99;
+  const auto curves = results::paper_figures(cells).at("paper_learning.svg");
+  CHECK(count_parts(curves, "class=\"point\"") == 2);
+  CHECK_THAT(curves, Contains("NeRF + HiDDeN, its 2-D network"));
 }
 
 TEST_CASE("The sheet has a row for each image of a cell of 16 bits", "[paper_figures]") {

@@ -31,8 +31,20 @@ constexpr std::array<Kind, 4> kKinds{{{"noise", "standard deviation, images in [
                                       {"scale", "size of the image, as a part", 1},
                                       {"blur", "sigma, pixels", 0}}};
 
-// Returns the cells that figures show, few enough to tell their lines apart: those of the scene with most
-// cells, on the hash field. The page's tables have the others.
+// Returns the cells without those that differ from an earlier one in the seed alone.
+std::vector<Cell> one_of_seeds(const std::vector<Cell>& cells) {
+  std::vector<Cell> kept;
+  for (const Cell& c : cells)
+    if (std::ranges::none_of(kept, [&](Cell other) {
+          other.name.seed = c.name.seed;
+          return other.name == c.name;
+        }))
+      kept.push_back(c);
+  return kept;
+}
+
+// Returns the cells that most figures show, few enough to tell their lines apart: those of the scene with
+// most cells, on the hash field. The page's tables have the others.
 std::vector<Cell> drawn_cells(const std::vector<Cell>& cells) {
   std::map<std::string, int> count;
   for (const Cell& c : cells) ++count[c.name.scene];
@@ -71,6 +83,10 @@ std::vector<LineSeries> lines_of_lengths(const std::vector<Cell>& cells) {
   return lines;
 }
 
+std::string with_steps(const std::string& title, const Cell& c) {
+  return title + ", " + std::to_string(c.steps) + " steps";
+}
+
 std::vector<LineSeries> lines_of_severity(const std::vector<Cell>& cells, const Kind& kind) {
   std::vector<LineSeries> lines;
   const std::string prefix = std::string(kind.name) + "_";
@@ -82,11 +98,17 @@ std::vector<LineSeries> lines_of_severity(const std::vector<Cell>& cells, const 
         if (name.starts_with(prefix) && name.find(',') == std::string::npos)
           points.points.push_back({std::strtod(name.c_str() + prefix.size(), nullptr), 100 * value});
       if (points.points.empty()) continue;
-      LineSeries& line = line_of(lines, system.title);
+      LineSeries& line = line_of(lines, with_steps(system.title, c));
       line.points.push_back({kind.none, 100 * c.bit_accuracy});
       line.points.insert(line.points.end(), points.points.begin(), points.points.end());
     }
   return lines;
+}
+
+LineSeries curve_of(const Cell& c, const std::string& name) {
+  LineSeries line{name, {}, false};
+  for (const auto& p : kept_curve(c)) line.points.push_back({p.seconds, 100 * p.figure});
+  return line;
 }
 
 // Returns the curves of the systems, or of the full models and their ablations.
@@ -97,12 +119,33 @@ std::vector<LineSeries> learning_curves(const std::vector<Cell>& cells, bool abl
     if (ablation ? !(system.ablation || whole) : system.ablation) continue;
     for (const Cell& c : cells) {
       if (c.name.system != system.name || c.name.bits != kBits) continue;
-      LineSeries line{system.title, {}, false};
-      for (const auto& p : kept_curve(c)) line.points.push_back({p.seconds, 100 * p.figure});
-      lines.push_back(line);
+      if (c.more.contains("training_images_accuracy")) continue;  // shares the network that marks renders
+      lines.push_back(
+          curve_of(c, std::isfinite(c.own_2d_accuracy) ? system.title + ", its 2-D network" : system.title));
     }
   }
   return lines;
+}
+
+// Returns the curves of preset paper for every scene, field and length.
+std::vector<LineSeries> paper_curves(const std::vector<Cell>& cells) {
+  std::vector<LineSeries> lines;
+  for (const Cell& c : cells)
+    if (c.name.system == "copyrnerf_paper")
+      lines.push_back(curve_of(c, with_steps(c.name.scene + ", " + c.name.field + " field, " +
+                                                 std::to_string(c.name.bits) + " bits",
+                                             c)));
+  return lines;
+}
+
+// Returns a point for each system: what it reads, and how far its renders are from the unmarked ones.
+std::vector<LineSeries> points_of_psnr(const std::vector<Cell>& cells) {
+  std::vector<LineSeries> points;
+  for (const auto& system : baselines::paper_systems())
+    for (const Cell& c : cells)
+      if (c.name.system == system.name && c.name.bits == kBits && !system.ablation)
+        points.push_back({with_steps(system.title, c), {{c.psnr_base, 100 * c.bit_accuracy}}, false});
+  return points;
 }
 
 bool is_drawn(const std::vector<LineSeries>& lines) {
@@ -115,7 +158,7 @@ bool is_drawn(const std::vector<LineSeries>& lines) {
 }  // namespace
 
 std::map<std::string, std::string> paper_figures(const std::vector<Cell>& measured) {
-  const std::vector<Cell> cells = drawn_cells(measured);
+  const std::vector<Cell> all = one_of_seeds(measured), cells = drawn_cells(all);
   std::string scene;
   if (!cells.empty()) scene.append(", ").append(cells.front().name.scene);
   std::map<std::string, std::string> figures;
@@ -135,6 +178,13 @@ std::map<std::string, std::string> paper_figures(const std::vector<Cell>& measur
     add(ablation ? "paper_learning_ablation.svg" : "paper_learning.svg",
         {"Bits right in training, 16 bits" + scene, "seconds of training", "bits right, %"},
         learning_curves(cells, ablation));
+  add("paper_learning_preset.svg",
+      {"Bits right in training, CopyRNeRF, preset paper", "seconds of training", "bits right, %"},
+      paper_curves(all));
+  add("paper_psnr.svg",
+      {"Bit accuracy of one view against PSNR, 16 bits" + scene, "PSNR to the unmarked render, dB",
+       "bits right, %"},
+      points_of_psnr(cells));
   return figures;
 }
 
