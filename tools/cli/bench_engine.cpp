@@ -77,7 +77,8 @@ void print_row(Context& context, const bench::EngineRow& r, const Json& json) {
                "  PyTorch %.4g s (%s), ours %.4g s: ratio %.2f; values differ %.1e, gradients %.1e\n",
                r.peer->seconds, r.peer->found.variant.c_str(), r.seconds, r.peer->ratio,
                r.peer->found.value_difference,
-               std::max(r.peer->found.gradient_difference, r.peer->found.kink_difference));
+               r.peer->found.gradient_difference > 0 ? r.peer->found.gradient_difference
+                                                     : r.peer->found.kink_difference);
 }
 
 struct Scene {

@@ -288,9 +288,10 @@ Command add_embed(CommandLine& app) {
                  "Chain of distortions to measure as well, see `fieldmark distort --help`; repeatable")
       ->type_name("NAME[,NAME...]")
       ->default_str("");
-  app.add_option("--image", o->image,
-                 "PNG file to write of four views unmarked, marked, and ten times the difference; default: "
-                 "OWNER.png")
+  app.add_option(
+         "--image", o->image,
+         "PNG file to write, with four views unmarked, marked, and ten times the difference; default: "
+         "OWNER.png")
       ->type_name("FILE")
       ->default_str("");
   add_lpips_weights(app, o->lpips_weights);

@@ -342,7 +342,7 @@ Command add_train(CommandLine& app) {
   add_precision(app, o->precision);
   app.add_option("--target-psnr", o->target_psnr,
                  "End training at this PSNR in dB, 1 to 100, of 4 validation images every 250 steps,\n"
-                 "or of the training rays if there are none; default: off")
+                 "or of the training rays if there are no validation images; default: off")
       ->range(1.0, 100.0)
       ->type_name("DB")
       ->default_str("");

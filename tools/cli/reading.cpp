@@ -164,7 +164,7 @@ std::vector<ImageEvidence> read_images(SuspectReader& reader, const Suspects& su
       if (guard.interrupted())
         throw Interrupted(kept ? suspects.readings + " has readings of " + std::to_string(kept->size()) +
                                      " images; the same command resumes"
-                               : "nothing was decided; --readings FILE lets a run go on");
+                               : "nothing was decided; --readings FILE lets a run resume");
     };
     done(0);
     faults.try_read(files[i], [&] {

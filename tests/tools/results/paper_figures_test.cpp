@@ -14,6 +14,7 @@ TEST_CASE("Lines of lengths, of the severities that were measured, and of the co
   const auto figures = results::paper_figures(cells);
   REQUIRE(figures.size() == 5);  // nothing was rotated, scaled or blurred
   CHECK(count_parts(figures.at("paper_psnr.svg"), "class=\"point\"") == 2);
+  CHECK_THAT(figures.at("paper_psnr.svg"), Contains("Fieldmark, preset fast, 100 steps"));
   // Two lengths of one system, and the paper's numbers at five lengths for the systems that can be run.
   CHECK(count_parts(figures.at("paper_bits.svg"), "class=\"point\"") % 5 == 2);
   CHECK_THAT(figures.at("paper_bits.svg"), Contains("CopyRNeRF, preset paper, published"));
@@ -22,6 +23,8 @@ TEST_CASE("Lines of lengths, of the severities that were measured, and of the co
         2 * 3);  // no noise and two severities
   CHECK(count_parts(figures.at("paper_learning.svg"), "class=\"point\"") == 2);
   CHECK(count_parts(figures.at("paper_learning_ablation.svg"), "class=\"point\"") == 2);
+  for (auto& c : cells) c.psnr_base = std::nan("");
+  CHECK(!results::paper_figures(cells).contains("paper_psnr.svg"));
   CHECK(results::paper_figures({}).size() == 1);  // only lengths that the paper reports
 }
 

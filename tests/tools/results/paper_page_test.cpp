@@ -1,6 +1,9 @@
+#include <fieldmark/core/files.h>
+#include <fieldmark/imaging/image.h>
 #include <fieldmark/tools/results/paper_page.h>
 
 #include "support/catch.h"
+#include "support/temporary_folder.h"
 #include "tools/paper_cells.h"
 
 using namespace fieldmark;
@@ -25,6 +28,16 @@ TEST_CASE("The paper's page has our figures beside the published ones", "[paper_
   CHECK_THAT(page, Contains("In all 3 cells, 0.07 hours."));
   CHECK_THAT(page, Contains("Fieldmark without cells") && Contains("## Cameras of the authors' code"));
   CHECK(page == results::paper_page(paper_cells(), {"paper_bits.svg"}, "A note.\n"));
+}
+
+TEST_CASE("The rows of a sheet are labelled on the page", "[paper_page]") {
+  const TemporaryFolder folder;
+  for (const auto& c : paper_cells()) baselines::save_cell(folder.path, c);
+  write_png(folder / "ours-lego-hash-16-1.png", Tensor<float>({2, 6, 3}, 0.2f));
+  REQUIRE(results::write_paper_page(folder.path, folder / "paper.md"));
+  CHECK_THAT(read_text(folder / "paper.md"),
+             Contains("### paper_images.png") &&
+                 Contains("| 1 | Fieldmark, preset fast | lego | hash | 100 | 98.44 | 38.50 |"));
 }
 
 TEST_CASE("A page without cells names the systems all the same", "[paper_page]") {

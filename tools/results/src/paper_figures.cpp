@@ -4,6 +4,7 @@
 #include <fieldmark/baselines/published.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/imaging/line_chart.h>
+#include <fieldmark/imaging/scatter_chart.h>
 
 #include <algorithm>
 #include <array>
@@ -139,12 +140,16 @@ std::vector<LineSeries> paper_curves(const std::vector<Cell>& cells) {
 }
 
 // Returns a point for each system: what it reads, and how far its renders are from the unmarked ones.
-std::vector<LineSeries> points_of_psnr(const std::vector<Cell>& cells) {
-  std::vector<LineSeries> points;
+std::vector<bench::ScatterPoint> points_of_psnr(const std::vector<Cell>& cells) {
+  std::vector<bench::ScatterPoint> points;
   for (const auto& system : baselines::paper_systems())
     for (const Cell& c : cells)
-      if (c.name.system == system.name && c.name.bits == kBits && !system.ablation)
-        points.push_back({with_steps(system.title, c), {{c.psnr_base, 100 * c.bit_accuracy}}, false});
+      if (c.name.system == system.name && c.name.bits == kBits && !system.ablation &&
+          std::isfinite(c.psnr_base) && std::isfinite(c.bit_accuracy))
+        points.push_back({.x = c.psnr_base,
+                          .y = 100 * c.bit_accuracy,
+                          .series = "16 bits",
+                          .label = with_steps(system.title, c)});
   return points;
 }
 
@@ -181,10 +186,13 @@ std::map<std::string, std::string> paper_figures(const std::vector<Cell>& measur
   add("paper_learning_preset.svg",
       {"Bits right in training, CopyRNeRF, preset paper", "seconds of training", "bits right, %"},
       paper_curves(all));
-  add("paper_psnr.svg",
-      {"Bit accuracy of one view against PSNR, 16 bits" + scene, "PSNR to the unmarked render, dB",
-       "bits right, %"},
-      points_of_psnr(cells));
+  if (const auto points = points_of_psnr(cells); !points.empty())
+    figures["paper_psnr.svg"] =
+        bench::scatter_chart({.title = "Bit accuracy of one view against PSNR, 16 bits" + scene,
+                              .x = "PSNR to the unmarked render, dB, logarithmic axis",
+                              .y = "bits right, %",
+                              .y_most = kAll},
+                             points);
   return figures;
 }
 

@@ -23,7 +23,7 @@ CopyRNeRF puts a message into a radiance field and reads it from rendered views.
 and ours; `fieldmark reproduce` writes it from the cells alone. Figures in brackets are published: )";
 
 constexpr const char* kHowToRead = R"(.
-They are not of a single scene and stand beside each of ours.
+They are not of a single scene, so the same figure stands beside ours on every scene.
 
 "Bits right" is the share of a message's bits that is read from a single novel view, averaged over views. Each view
 has a random message of its own; with 4 bits, all 16 messages take turns. HiDDeN + NeRF and MBRS + NeRF have one
@@ -73,7 +73,7 @@ constexpr const char* kFigures = R"(
 
 Learning curves are of training images, not of novel views. A curve of a "2-D network" is of windows that the
 network marks itself. During the warm start, the extractor reads fixed carriers and not the mark; the fall after it
-is where the mark itself is first read.
+is where the mark itself is first read. Figures show one seed of each cell; tables average over seeds.
 
 )";
 
@@ -134,16 +134,21 @@ std::string paper_page(const std::vector<Cell>& cells, const std::vector<std::st
   const auto section = [&](const char* title, const std::string& introduction, const std::string& table) {
     text += std::string("\n## ") + title + "\n\n" + introduction + table;
   };
-  section("Length of the message", "", bits_table(groups));
+  section("Length of the message", "Cells of a row may differ in budget and commit (see Cells).\n\n",
+          bits_table(groups));
   section("Quality at 16 bits", "", quality_table(groups));
   section("Distortions at 16 bits", std::string(kDistortions) + kSameViews, distortion_table(groups));
   section("Ablation", kAblation, ablation_table(groups));
   section("Sampling points at test", kSameViews, named_table(groups, "sampling", "sampling_"));
   section("Noise on the weights", kSameViews, named_table(groups, "weights", "weights_"));
   section("Cameras of the authors' code",
-          std::string("A ring at an elevation of 30 degrees and a distance of 4.0311. ") + kSameViews,
+          "A ring at an elevation of 30 degrees and a distance of 4.0311, with as many views as under "
+          "distortion (see "
+          "Cells); \"as trained\" is of all novel views.\n\n",
           named_table(groups, "cameras", "cameras_"));
-  section("Order of the rows", "", order_of_rows(groups));
+  section("Order of the rows",
+          "Pairs of different budgets or commits (see Cells) do not compare methods.\n\n",
+          order_of_rows(groups));
   text += kDepartures + departures_table() + kFigures;
   for (const auto& f : figures) text += "![" + f + "](" + f + ")\n\n";
   text += sheets;

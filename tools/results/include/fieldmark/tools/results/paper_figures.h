@@ -8,9 +8,10 @@
 
 namespace fieldmark::results {
 
-/// Returns SVG files by name: accuracy against length, severity curves, and learning curves over seconds of
-/// the cells of 16 bits, see kept_curve(), with ablations in a figure of their own. All show the scene with
-/// the most cells, on the hash field. Figures without points are omitted.
+/// Returns SVG files by name, of one seed of each cell: accuracy against length, against severity and against
+/// PSNR, and learning curves over seconds, see kept_curve(), with ablations in a figure of their own. They
+/// show the scene with the most cells, on the hash field; paper_learning_preset.svg shows every cell of
+/// preset paper. Figures without points are omitted.
 std::map<std::string, std::string> paper_figures(const std::vector<baselines::Cell>& measured);
 
 /// A contact sheet shown on the page.
