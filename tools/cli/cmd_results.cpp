@@ -214,10 +214,10 @@ Json list_rows(const Runner& runner, Context& context) {
 void render(const ResultsArguments& options, const Runner& runner, Context& context) {
   const std::string out = options.out.empty() ? kPages : options.out;
   fs::create_directories(out);
-  const auto pages = results::render_pages(results::project_pages(), runner.rows(),
-                                           [&](const std::string& id) { return runner.stale(id); });
+  const auto stale = [&](const std::string& id) { return runner.stale(id); };
+  const auto pages = results::render_pages(results::project_pages(), runner.rows(), stale);
   for (const auto& [name, text] : pages) write_file_atomically(fs::path(out) / name, text);
-  results::write_paper_page(fs::path(options.rows) / "paper", fs::path(out) / "paper.md");
+  results::write_paper_page(fs::path(options.rows) / "paper", fs::path(out) / "paper.md", stale);
   context.text() << out << ": " << pages.size() + 1 << " pages and charts written\n";
 }
 

@@ -37,10 +37,24 @@ TEST_CASE("A system with one message is compared with none", "[paper_tables]") {
   CHECK_THAT(results::first_table(groups), Contains("| 38.50 | 100 | 1.0 | - |"));
 }
 
+TEST_CASE("A cell's state stands beside its protocol", "[paper_tables]") {
+  const auto cells = paper_cells();
+  const auto table = [&](const results::StaleReason& stale) { return results::protocol_table(cells, stale); };
+  CHECK_THAT(table({}), Contains("| pixels | commit |\n"));
+  const std::string told = table([](const std::string& id) {
+    return id == "paper/ours-lego-hash-16-1" ? std::string("code changed") : std::string();
+  });
+  CHECK_THAT(told, Contains("| commit | state |\n"));
+  CHECK_THAT(told, Contains("| abc | stale: code changed |\n"));
+  CHECK_THAT(told, Contains("| abc | fresh |\n"));
+}
+
 TEST_CASE("The ablation is of one scene", "[paper_tables]") {
   auto cells = paper_cells();
   cells.push_back(cells.back());
   cells.back().name.scene = "chair";
   CHECK_THAT(results::ablation_table(results::paper_groups(cells)),
              Contains("| lego |") && !Contains("chair"));
+  cells.back().name = {"cold_start", "lego", "hash", 16, 1};
+  CHECK_THAT(results::ablation_table(results::paper_groups(cells)), Contains("CopyRNeRF, cold start"));
 }

@@ -107,7 +107,8 @@ std::string sheet_text(const PaperSheet& sheet, const std::vector<Cell>& cells,
 
 }  // namespace
 
-bool write_paper_page(const std::filesystem::path& folder, const std::filesystem::path& page) {
+bool write_paper_page(const std::filesystem::path& folder, const std::filesystem::path& page,
+                      const StaleReason& stale) {
   const auto cells = baselines::load_cells(folder);
   if (cells.empty()) return false;
   const auto beside = [&](const std::string& name) { return page.parent_path() / name; };
@@ -121,12 +122,12 @@ bool write_paper_page(const std::filesystem::path& folder, const std::filesystem
     const auto stems = write_paper_sheet(sheet, cells, folder, beside(sheet.name));
     if (!stems.empty()) sheets += sheet_text(sheet, cells, stems);
   }
-  write_file_atomically(page, paper_page(cells, figures, sheets));
+  write_file_atomically(page, paper_page(cells, figures, sheets, stale));
   return true;
 }
 
 std::string paper_page(const std::vector<Cell>& cells, const std::vector<std::string>& figures,
-                       const std::string& sheets) {
+                       const std::string& sheets, const StaleReason& stale) {
   const auto groups = paper_groups(cells);
   std::string text = kTitle + std::string(baselines::kPublishedSource) + kHowToRead + first_table(groups) +
                      "\n## Systems\n\n| system | what is trained |\n| --- | --- |\n";
@@ -152,7 +153,7 @@ std::string paper_page(const std::vector<Cell>& cells, const std::vector<std::st
   text += kDepartures + departures_table() + kFigures;
   for (const auto& f : figures) text += "![" + f + "](" + f + ")\n\n";
   text += sheets;
-  section("Cells", "", protocol_table(cells));
+  section("Cells", "", protocol_table(cells, stale));
   return text;
 }
 

@@ -247,7 +247,8 @@ std::string ablation_table(const Groups& groups) {
   std::vector<Row> rows;
   for (const PaperGroup& g : groups) {
     const bool ablated = g.system.starts_with("copyrnerf_") || g.system == "drs" ||
-                         g.system.starts_with("without_") || g.system.starts_with("ours");
+                         g.system == "cold_start" || g.system.starts_with("without_") ||
+                         g.system.starts_with("ours");
     if (g.bits != 16 || g.field != "hash" || g.scene != scene || !ablated) continue;
     const auto both = [&](double ours, const char* column, int digits) {
       return beside(fixed(ours, digits), "ablation", g.system, column, digits);
@@ -320,7 +321,7 @@ std::string order_of_rows(const Groups& groups) {
          (ties.empty() ? "- none\n" : ties);
 }
 
-std::string protocol_table(const std::vector<Cell>& cells) {
+std::string protocol_table(const std::vector<Cell>& cells, const StaleReason& stale) {
   std::vector<Row> rows;
   double seconds = 0;
   for (const Cell& c : cells) {
@@ -331,10 +332,15 @@ std::string protocol_table(const std::vector<Cell>& cells) {
     rows.push_back({c.name.stem(), std::to_string(c.steps), fixed(c.seconds, 1), more("total_seconds"),
                     more("budget"), more("views"), more("distorted_views"), more("test_images"),
                     more("width") + " x " + more("height"), c.commit});
+    if (!stale) continue;
+    const std::string why = stale("paper/" + c.name.stem());
+    rows.back().push_back(why.empty() ? "fresh" : "stale: " + why);
   }
-  return markdown_table({"cell", "steps", "seconds of training", "seconds in all", "budget, s", "novel views",
-                         "under distortion", "ground truth", "pixels", "commit"},
-                        rows) +
+  Row header{"cell",      "steps",       "seconds of training", "seconds in all",
+             "budget, s", "novel views", "under distortion",    "ground truth",
+             "pixels",    "commit"};
+  if (stale) header.push_back("state");
+  return markdown_table(header, rows) +
          "\nSeconds in all are of the cell's own run; a network that another cell trained counts there "
          "alone. In all " +
          std::to_string(cells.size()) + " cells, " + fixed(seconds / 3600, 2) + " hours.\n";

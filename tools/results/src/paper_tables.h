@@ -1,6 +1,7 @@
 #pragma once
 // The tables of the paper's page, in Markdown. Private.
 #include <fieldmark/baselines/cell.h>
+#include <fieldmark/tools/results/paper_page.h>
 
 #include <string>
 #include <vector>
@@ -37,7 +38,7 @@ std::string ablation_table(const std::vector<PaperGroup>& groups);
 std::string named_table(const std::vector<PaperGroup>& groups, const char* table, const std::string& prefix);
 /// Lists the pairs whose order in the paper our figures reverse, and those that they leave open.
 std::string order_of_rows(const std::vector<PaperGroup>& groups);
-/// How each cell was measured.
-std::string protocol_table(const std::vector<baselines::Cell>& cells);
+/// How each cell was measured, and whether it is stale, see paper_page().
+std::string protocol_table(const std::vector<baselines::Cell>& cells, const StaleReason& stale);
 
 }  // namespace fieldmark::results
