@@ -170,8 +170,8 @@ class Paper(Training):
     def forward(self, *parameters):
         p = dict(zip(self.names, parameters))
         step = 1 if self.singly else self.count
-        images = [range(i, i + step) for i in range(0, self.count, step)]
-        marked = self.composed(torch.cat([self.painted(p, slice(i.start, i.stop)) for i in images]))
+        parts = [self.painted(p, slice(i, i + step)) for i in range(0, self.count, step)]
+        marked = self.composed(torch.cat(parts))
         content = ((marked - self.base) ** 2).mean()
         logits = self.read(p, marked.view(-1, self.side, self.side, 3).permute(0, 3, 1, 2))
         return 60 * content + 5 * F.binary_cross_entropy_with_logits(logits, (self.message + 1) / 2)
@@ -220,7 +220,7 @@ def blas():
         return "mkl"
     with open("/proc/self/maps") as maps:
         files = {line.split()[-1] for line in maps if "/" in line}
-    for word in ("openblas", "blis", "atlas"):
+    for word in ("openblas", "blis", "atlas", "mkl_rt"):
         if any(word in file for file in files):
             return word
     return "reference"

@@ -14,6 +14,8 @@
 
 #include <fieldmark/tools/results/sheet.h>
 
+#include "paper_tables.h"
+
 namespace fieldmark::results {
 namespace {
 
@@ -120,7 +122,7 @@ std::vector<LineSeries> learning_curves(const std::vector<Cell>& cells, bool abl
     if (ablation ? !(system.ablation || whole) : system.ablation) continue;
     for (const Cell& c : cells) {
       if (c.name.system != system.name || c.name.bits != kBits) continue;
-      if (c.more.contains("training_images_accuracy")) continue;  // shares the network that marks renders
+      if (marks_training_images(c)) continue;
       lines.push_back(
           curve_of(c, std::isfinite(c.own_2d_accuracy) ? system.title + ", its 2-D network" : system.title));
     }

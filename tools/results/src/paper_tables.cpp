@@ -55,6 +55,8 @@ std::string fixed(double value, int digits) {
   return text;
 }
 
+bool marks_training_images(const Cell& cell) { return cell.more.contains("training_images_accuracy"); }
+
 std::string percent(double share) { return fixed(100 * share, 2); }
 
 std::vector<PaperGroup> paper_groups(const std::vector<Cell>& cells) {
@@ -103,15 +105,9 @@ Row start_of(const PaperGroup& g) {
   return {g.title, g.scene, g.field, fixed(mean_more(g.cells, "budget"), 0), steps_of(g)};
 }
 
-// True if the system marks the training images with a single message and its complement: views are then no
-// sample of messages.
-bool has_fixed_message(const PaperGroup& g) {
-  return g.cells.front()->more.contains("training_images_accuracy");
-}
-
 // Returns whether the accuracy differs from chance by more than two standard errors.
 std::string against_chance(const PaperGroup& g) {
-  if (has_fixed_message(g)) return "-";
+  if (marks_training_images(*g.cells.front())) return "-";
   const double above = mean(g.cells, &Cell::bit_accuracy) - 0.5;
   return std::abs(above) <= 2 * standard_error(g) ? "tie" : above > 0 ? "above" : "below";
 }
@@ -124,6 +120,13 @@ std::string main_scene(const Groups& groups) {
   const auto most = std::ranges::max_element(systems, {}, [](const auto& entry) { return entry.second; });
   return most == systems.end() ? "" : most->first;
 }
+
+constexpr const char* kFirst =
+    R"(; a field with a hash grid. Steps and minutes are those of the mark's training, without
+the unmarked field; for HiDDeN and MBRS, steps are those of the 2-D network. Rows of different budgets do not compare
+methods: what ties with chance after few steps may be above it after more.
+
+)";
 
 const std::vector<Index> kLengths{4, 8, 16, 32, 48};
 
@@ -153,13 +156,6 @@ std::vector<Severity> severities(const Groups& groups) {
 }
 
 }  // namespace
-
-constexpr const char* kFirst =
-    R"(; a field with a hash grid. Steps and minutes are those of the mark's training, without
-the unmarked field; for HiDDeN and MBRS, steps are those of the 2-D network. Rows of different budgets do not compare
-methods: what ties with chance after few steps may be above it after more.
-
-)";
 
 std::string first_table(const Groups& groups) {
   const std::string scene = main_scene(groups);
@@ -302,7 +298,8 @@ std::string order_of_rows(const Groups& groups) {
       const auto pa = published("quality", a.system, "accuracy"),
                  pb = published("quality", b.system, "accuracy");
       if (!pa || !pb || *pa <= *pb || a.bits != 16 || b.bits != 16 || a.scene != b.scene ||
-          a.field != b.field || has_fixed_message(a) || has_fixed_message(b))
+          a.field != b.field || marks_training_images(*a.cells.front()) ||
+          marks_training_images(*b.cells.front()))
         continue;
       const double by = mean(b.cells, &Cell::bit_accuracy) - mean(a.cells, &Cell::bit_accuracy),
                    error = std::hypot(standard_error(a), standard_error(b));

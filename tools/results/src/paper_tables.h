@@ -13,6 +13,10 @@ std::string fixed(double value, int digits);
 /// Formats a share as a percentage with two digits.
 std::string percent(double share);
 
+/// True if the system marks the training images with a single message and its complement. Views are then no
+/// sample of messages, and another cell shows the same 2-D network on renders.
+bool marks_training_images(const baselines::Cell& cell);
+
 /// Cells that differ in their seeds alone.
 struct PaperGroup {
   std::string system, title, scene, field;
