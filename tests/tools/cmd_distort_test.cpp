@@ -72,6 +72,27 @@ TEST_CASE("attack never overwrites what it reads, nor one result with another", 
   CHECK(missing.code == cli::kFailed);
 }
 
+TEST_CASE("distort keeps runs apart: a folder that has images only with --overwrite", "[attack]") {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "out");
+  write_png(folder / "x.png", Tensor<float>({4, 4, 3}, 0.5f));
+  write_png(folder / "out/x.png", Tensor<float>({2, 2, 3}));
+  write_png(folder / "out/y.png", Tensor<float>({2, 2, 3}));
+  const auto distort = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"distort", folder / "x.png", "--out", folder / "out", "--distort", "mirror"});
+    return run_command(more);
+  };
+  const auto refused = distort({});
+  CHECK(refused.code == cli::kFailed);
+  CHECK_THAT(refused.err, Contains("expected a folder without images, found 2") && Contains("--overwrite"));
+  CHECK(read_image(folder / "out/x.png").shape == Shape{2, 2, 3});
+  const auto replaced = distort({"--overwrite"});
+  CHECK(replaced.code == cli::kOk);
+  CHECK_THAT(replaced.out, Contains("images of other names stay beside the new ones: 1"));
+  CHECK(read_image(folder / "out/x.png").shape == Shape{4, 4, 3});
+  CHECK(read_image(folder / "out/y.png").shape == Shape{2, 2, 3});
+}
+
 TEST_CASE("distort takes the images of a folder as a clip for h264", "[attack]") {
   if (!video_or_skip()) return;
   const TemporaryFolder folder;

@@ -23,7 +23,7 @@ TEST_CASE("info shows metadata and tensors", "[info]") {
   const auto r = run_command({"info", path, "--json", "-"});
   CHECK(r.code == cli::kOk);
   CHECK_THAT(r.err, Contains("weight") && Contains("[2, 3]") && Contains("F32") &&
-                        Contains("2 tensors, 11 numbers"));
+                        Contains("2 tensors, 11 elements"));
   const nlohmann::json json = nlohmann::json::parse(r.out);
   CHECK(json["metadata"]["fieldmark"]["kind"] == "field");
   CHECK(json["metadata"]["note"] == "not { JSON");

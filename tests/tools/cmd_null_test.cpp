@@ -15,6 +15,7 @@ TEST_CASE("null counts the key and random keys on unmarked images beside their b
   CHECK(json["n"] == 5);
   CHECK(json["key_free"] == true);
   CHECK(json["random_keys"]["n"] == 2000);
+  CHECK_THAT(json["notes"].dump(), Contains("views of one field") && Contains("not independent trials"));
   for (const char* p : {"1e-1", "1e-2", "1e-3"}) {
     CHECK(json["counts"][p] <= json["bounds"][p]);
     CHECK(json["random_keys"]["counts"][p] <= json["random_keys"]["bounds_99"][p]);

@@ -79,6 +79,26 @@ TEST_CASE("render fails if an image cannot be written, the first or the last, by
     }
 }
 
+TEST_CASE("render writes no two views to one file", "[render]") {
+  const TinyJob& job = TinyJob::get();
+  const TemporaryFolder folder;
+  std::filesystem::copy(job.scene, folder / "scene", std::filesystem::copy_options::recursive);
+  const std::string poses = folder / "scene/transforms_test.json";
+  auto json = nlohmann::json::parse(read_text(poses));
+  REQUIRE(json["frames"].size() > 1);
+  const std::string first = json["frames"][0]["file_path"],
+                    name = std::filesystem::path(first).filename().string();
+  std::filesystem::create_directory(folder / "scene/again");
+  std::filesystem::copy(folder / ("scene/" + first + ".png"), folder / ("scene/again/" + name + ".png"));
+  json["frames"][1]["file_path"] = "again/" + name;
+  write_file_atomically(poses, json.dump());
+  const auto r =
+      run_command({"render", "--field", job.field, "--out", folder / "views", "--data", folder / "scene"});
+  CHECK(r.code == cli::kFailed);
+  CHECK_THAT(r.err, Contains("found two called '" + name + "'"));
+  CHECK(!std::filesystem::exists(folder / "views"));
+}
+
 TEST_CASE("render refuses options that contradict each other", "[render]") {
   const auto with = [](std::vector<std::string> more) {
     std::vector<std::string> words{"render", "--field", "f", "--out", "o"};

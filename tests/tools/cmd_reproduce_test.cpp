@@ -117,6 +117,11 @@ TEST_CASE("reproduce says what is wrong", "[reproduce]") {
   const auto scene = run_command({"reproduce", "--table", "weights", "--scene", folder / "nowhere", "--cells",
                                   folder / "cells", "--work", folder / "work", "--lpips-weights", "none"});
   CHECK(scene.code == cli::kFailed);
-  CHECK_THAT(scene.err, Contains("nowhere"));
+  CHECK_THAT(scene.err, Contains("nowhere: expected the folder of a data set"));
+  CHECK(!std::filesystem::exists(folder / "work"));  // refused before any cell is measured
+  const auto twice = run_command({"reproduce", "--table", "weights", "--scene", folder / "a/lego", "--scene",
+                                  folder / "b/lego", "--report-only", "--cells", folder / "cells"});
+  CHECK(twice.code == cli::kUsage);
+  CHECK_THAT(twice.err, Contains("--scene: cells are named after scenes, got two called lego"));
   CHECK(run_command({"reproduce", "--budget", "0"}).code == cli::kUsage);
 }

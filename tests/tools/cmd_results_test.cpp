@@ -60,4 +60,6 @@ TEST_CASE("results says what is wrong", "[results]") {
              Contains("--run: no row of the plan"));
   CHECK(run_command({"results", "--run", "nothing", "--stale"}).code == cli::kUsage);
   CHECK(run_command({"results", "--budget", "0"}).code == cli::kUsage);
+  CHECK_THAT(run_command({"results", "--run", "nothing", "--draft", "--rows", "rows"}).err,
+             Contains("--draft: excludes --rows"));
 }

@@ -1,5 +1,9 @@
 #include <fieldmark/core/files.h>
-#include <fieldmark/watermark/evidence/evidence.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/watermark/reading/blind_reader.h>
+#include <fieldmark/watermark/tracing/trace.h>
+
+#include <filesystem>
 
 #include "cli/cli.h"
 #include "tools/tiny_job.h"
@@ -40,6 +44,11 @@ TEST_CASE("trace finds at a rate of 1 whomever it tests, verify and bake take on
   INFO(bake.err);
   REQUIRE(bake.code == cli::kOk);
   CHECK(nlohmann::json::parse(bake.out)["copy"] == "Anna");
+  const std::string plain = job.folder / "plain.fm";
+  REQUIRE(
+      run_command({"bake", "--owner", job.owner, "--message", "5", "--out", plain, "--steps", "1"}).code ==
+      cli::kOk);
+  CHECK(read_text(plain) != read_text(baked));  // another code is baked
   const auto statistic = [&](std::vector<std::string> more) {
     more.insert(more.begin(), {"verify", "--owner", job.owner, "--message", "5", "--detection", "blind"});
     more.insert(more.end(), {images, "--json", "-"});
@@ -51,8 +60,29 @@ TEST_CASE("trace finds at a rate of 1 whomever it tests, verify and bake take on
                                 .out);
   const auto& anna = traced["recipients"][0];
   CHECK(anna["round"] == 1);
-  CHECK(anna["p_value"] == watermark::sharp_p_value(anna["statistic"]));
+  const auto owner = watermark::Owner::load(job.owner);
+  const watermark::BlindReader reader(owner);
+  std::vector<double> sum(static_cast<std::size_t>(owner.cells.count()));
+  for (const auto& file : std::filesystem::directory_iterator(images)) {
+    const auto evidence = reader.evidence(read_image(file.path()));
+    for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += evidence[c];
+  }
+  const std::vector<std::string> only{"Anna"};
+  const auto want = watermark::trace_copies(sum, owner.cells.area(), owner.key,
+                                            watermark::message_from_hex("5", 4), only, 1e-6);
+  CHECK(anna["statistic"].get<double>() == Approx(want[0].statistic).epsilon(1e-9));
+  CHECK(anna["p_value"].get<double>() == Approx(want[0].p_value).epsilon(1e-9));
   CHECK(statistic({"--copy", "Anna"}) != statistic({}));
+}
+
+TEST_CASE("trace refuses a rate that no image can reach", "[trace]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string names = job.folder / "three.txt";
+  write_file_atomically(names, "Anna\nBertil\nCecilia\n");
+  const auto r = run_command(
+      {"trace", "--owner", job.owner, "--message", "5", "--copies", names, "--fpr", "1e-200", job.images()});
+  CHECK(r.code == cli::kUsage);
+  CHECK_THAT(r.err, Contains("cells no image can reach 1e-200, the smallest p-value is"));
 }
 
 TEST_CASE("trace refuses lists that name nobody or one twice", "[trace]") {

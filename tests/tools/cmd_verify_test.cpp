@@ -25,6 +25,7 @@ TEST_CASE("verify answers with numbers, and with exit code 3 where nothing is fo
   CHECK(json["wrong_keys"]["n"] == 500);
   for (const char* p : {"1e-1", "1e-2", "1e-3"})
     CHECK(json["wrong_keys"]["counts"][p] <= json["wrong_keys"]["bounds_99"][p]);
+  CHECK(json["wrong_keys"]["bounds_99"]["1e-1"] == 66);  // P(binomial(500, 0.1) > 66) = 0.9%
   // Twice the one-sided p-value if the evidence favours the message; evidence against it counts on one side
   // only.
   const double one = json["p_value"], two = json["p_value_two_sided"];

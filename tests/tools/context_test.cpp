@@ -1,4 +1,5 @@
 #include "cli/context.h"
+#include "cli/cli.h"
 
 #include <fieldmark/core/error.h>
 #include <fieldmark/core/files.h>
@@ -78,4 +79,5 @@ TEST_CASE("A file for results that cannot be made is refused before any work", "
   const std::string path = folder / "missing/r.json";
   CHECK_THROWS_AS(Context({.json = path}, {}, out, err), IoError);
   CHECK_THROWS_AS(Context({.report = path}, {}, out, err), IoError);
+  CHECK_THROWS_AS(Context({.json = folder / "a", .report = folder / "./a"}, {}, out, err), cli::UsageError);
 }

@@ -25,7 +25,7 @@ TEST_CASE("data check tells what a data set holds, and draws its cameras", "[dat
                         Contains("scene type  object: 100% of the pixels at the images' borders are") &&
                         Contains("images      21 of 16 x 16 pixels\n") &&
                         Contains("splits      train 16, val 1, test 4\n") && Contains("21 around (") &&
-                        Contains("horizontal field of view 39.6 degrees\n") && Contains("nothing is odd\n"));
+                        Contains("horizontal field of view 39.6 degrees\n") && Contains("no warnings\n"));
   CHECK(read_image(folder / "c.png").shape == Shape{700, 1240, 3});
   const nlohmann::json json = nlohmann::json::parse(read_text(folder / "r.json"));
   for (const char* key :

@@ -96,7 +96,8 @@ TEST_CASE("evidence_page: a small probability is told as one in so many", "[evid
   told(1, "required: 100%)");
   told(0.5, "required: 50%)");
   told(1e-6, "at most 1 in 1&nbsp;000&nbsp;000 was required.");
-  told(2e-5, "at most 1 in 10&nbsp;000 was required.");
+  told(2e-5, "at most 1 in 50&nbsp;000 was required.");  // a requirement is not rounded
+  told(2.3e-5, "at most 2.3e-05 was required.");
   told(1e-12, "at most 1 in 10<sup>12</sup> was required.");
 }
 

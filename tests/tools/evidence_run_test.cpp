@@ -46,7 +46,8 @@ TEST_CASE("evidence_run: three built-in controls, and one for each path that is 
   Run run;
   const std::string clean = TinyJob::get().folder / "clean.png";
   write_png(clean, uniform<float>({20, 30, 3}, 0, 1, 3));
-  const auto tested = test_controls(run.test, run.reader, run.images, {clean, run.folder + "/"}, run.context);
+  const auto tested =
+      test_controls(run.test, run.reader, run.images, {clean, run.folder + "/"}, {}, run.context);
   REQUIRE(tested.controls.size() == 5);
   CHECK(tested.thumbnails.size() == 5);
   std::string names;
@@ -65,5 +66,6 @@ TEST_CASE("evidence_run: three built-in controls, and one for each path that is 
   std::ostringstream quiet;
   print_controls(quiet, tested.controls, 1e-300);
   CHECK_THAT(quiet.str(), !Contains("THE TEST"));
-  CHECK_THROWS_AS(test_controls(run.test, run.reader, run.images, {"/no/such.png"}, run.context), IoError);
+  CHECK_THROWS_AS(test_controls(run.test, run.reader, run.images, {"/no/such.png"}, {}, run.context),
+                  IoError);
 }

@@ -49,4 +49,13 @@ refuses other render --field field.fm --out other --count 1 --size 32
 refuses other distort views --distort blur_1 --out other
 refuses result.json eval --field field.fm --data scene --json result.json
 refuses result.md eval --field field.fm --data scene --report result.md
-echo "9 writers on a full disk: refused, named, nothing left"
+refuses other.fm attack-field field.fm --attack float16 --out other.fm
+refuses evidence verify --owner owner.fm --message a views --detection blind --wrong-keys 10 --evidence evidence
+refuses readings.json extract --owner owner.fm views --detection blind --readings readings.json
+refuses result.json extract --owner owner.fm views --detection blind --json result.json
+refuses result.json verify --owner owner.fm --message a views --detection blind --json result.json
+refuses result.json null --owner owner.fm views --keys 2 --detection blind --json result.json
+refuses cameras.png data check scene --cameras cameras.png
+refuses result.json compare views views --json result.json
+refuses work/ reproduce --scene scene --table bits --system ours --budget 1 --views 2 --cells cells --work work
+echo "18 writers on a full disk: refused, named, nothing left"

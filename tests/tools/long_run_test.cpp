@@ -1,7 +1,9 @@
 #include "cli/long_run.h"
 
+#include <chrono>
 #include <csignal>
 #include <sstream>
+#include <thread>
 
 #include "cli/cli.h"
 #include "cli/context.h"
@@ -21,6 +23,25 @@ TEST_CASE("run_long takes the steps and shows how far it is", "[long_run]") {
   CHECK(run.steps() == 5);
   CHECK(folder.entries() == 0);
   CHECK_THAT(err.str(), Contains("count 20%") && Contains("step 5  a note"));
+}
+
+TEST_CASE("run_long counts the seconds and steps of the run that it resumes", "[long_run]") {
+  const TemporaryFolder folder;
+  std::ostringstream out, err;
+  Context context({}, {}, out, err);
+  CountingRun run(5);
+  run.in_step = [&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(60));
+    if (run.steps() == 2) std::raise(SIGINT);
+  };
+  CHECK_THROWS_AS(run_long(run, "count", {.steps = 5}, context, folder / "c"), Interrupted);
+  CountingRun later(5);
+  later.restore(folder / "c");
+  std::ostringstream shown;
+  Context resumed({}, {}, shown, shown);
+  // A timed run that has fixed its steps ends by them: the progress is theirs, not that of the clock.
+  CHECK(run_long(later, "count", {.seconds = 1000}, resumed) >= 0.18);
+  CHECK_THAT(shown.str(), Contains("count 80%") && Contains("step 5  a note"));
 }
 
 TEST_CASE("run_long saves and stops at Ctrl-C", "[long_run]") {

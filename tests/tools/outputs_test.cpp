@@ -5,6 +5,7 @@
 #include <fieldmark/engine/model_file.h>
 #include <fieldmark/watermark/keys/key.h>
 
+#include <unistd.h>
 #include <filesystem>
 
 #include "support/catch.h"
@@ -52,6 +53,28 @@ TEST_CASE("outputs: a secret is never replaced, a field by fields alone") {
   CHECK_THROWS_WITH(check_writable(folder.path), Contains("found a folder; name a file"));
   CHECK_THROWS_AS(check_writable(folder / "missing/file"), IoError);
   CHECK_NOTHROW(check_writable("/dev/null"));
+}
+
+TEST_CASE(
+    "outputs: what may be a secret is kept, though it cannot be read, is damaged or of a later version") {
+  const TemporaryFolder folder;
+  watermark::save_key(folder / "whole", watermark::random_key());
+  const std::string bytes = read_text(folder / "whole");
+  write_file_atomically(folder / "cut", std::string_view(bytes).substr(0, bytes.size() - 5));
+  std::string later = bytes;
+  const auto format = later.find("format");
+  REQUIRE(format != std::string::npos);
+  later[later.find('1', format)] = '2';
+  write_file_atomically(folder / "later", later);
+  for (const char* name : {"cut", "later"})
+    CHECK_THROWS_WITH(check_writable(folder / name),
+                      Contains("its damaged or later model would be lost") && Contains("move this one away"));
+  write_file_atomically(folder / "brackets", "12345678{\"");  // text, not the length of a header
+  CHECK_NOTHROW(check_writable(folder / "brackets"));
+  if (::geteuid() == 0) return;  // root reads everything
+  fs::permissions(folder / "whole", fs::perms::none);
+  CHECK_THROWS_WITH(check_writable(folder / "whole"),
+                    Contains("content, which cannot be read, would be lost"));
 }
 
 TEST_CASE("outputs: a folder is made and tried") {

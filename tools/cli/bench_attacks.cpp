@@ -4,10 +4,12 @@
 #include <fieldmark/watermark/attacks/field_attack.h>
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 
 #include "cli/bench.h"
 #include "cli/message_option.h"
+#include "cli/reading.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -19,7 +21,8 @@ struct BenchAttacksArguments {
   std::string owner, field, other, onto, cameras = "novel", plot;
   MessageOption message;  // baked into the field
   Names attacked;         // files derived from the field by other means
-  Index count = 50, informed_count = 4, size = 0;
+  Index count = 50, size = 0;
+  std::optional<Index> informed_count;
   bool quick = false;
 };
 
@@ -31,7 +34,7 @@ class Bench {
         owner_(watermark::Owner::load(options.owner)),
         message_(message_of(options.message, owner_.options().bits)),
         marked_(nerf::RadianceField::load(options.field)),
-        progress_(context.progress("attacks")),
+        progress_(new Progress(context.progress("none"))),  // the meter begins with the views themselves
         meter_(owner_, marked_, message_, meter_options()) {}
 
   const watermark::AttackMeter& meter() const { return meter_; }
@@ -62,18 +65,19 @@ class Bench {
   watermark::AttackMeterOptions meter_options() {
     return {.cameras = nerf::make_cameras(owner_.field.cameras, nerf::parse_camera_set(options_.cameras),
                                           options_.count, options_.size, context_.seed()),
-            .informed_views = options_.informed_count,
+            .informed_views = informed_views(options_.informed_count, 4, owner_),
             .seed = context_.seed(),
             .progress = [this](Index done, Index total) {
               if (guard_.interrupted()) throw Interrupted("nothing was written");
-              progress_.update(static_cast<double>(done) / static_cast<double>(total), now_);
+              progress_->update(static_cast<double>(done) / static_cast<double>(total));
               return true;
             }};
   }
   template <class F>
   Json add(const std::string& name, const F& measure) {
-    now_ = name;
+    progress_.reset(new Progress(context_.progress(name)));  // not movable
     const AttackRow row = measure();
+    progress_.reset();  // ends the line of a terminal
     char informed[60] = "";
     if (meter_.informed_views() > 0)
       std::snprintf(informed, sizeof informed, "  informed %6.2f%%  chosen %6.2f%%",
@@ -97,8 +101,7 @@ class Bench {
   watermark::Owner owner_;
   watermark::Message message_;
   nerf::RadianceField marked_;
-  Progress progress_;
-  std::string now_ = "none";
+  std::unique_ptr<Progress> progress_;  // of the row that is measured
   watermark::AttackMeter meter_;
 };
 
@@ -175,8 +178,13 @@ Command add_bench_attacks(CommandLine& app) {
       ->one_of({"novel", "ring", "sphere"})
       ->type_name("SET");
   add_number(app, "--count", o->count, 1, 1000, "Views to read in each row, 1 to 1000");
-  add_number(app, "--informed-count", o->informed_count, 0, 1000,
-             "Views to read informed too, 0 to 1000; takes seconds per view and row");
+  app.add_option(
+         "--informed-count", o->informed_count,
+         "Views to read informed too, 0 to 1000; takes seconds per view and row; default: 4, or 0 for "
+         "marks without cells")
+      ->range(0, 1000)
+      ->type_name("N")
+      ->default_str("");
   add_number(app, "--size", o->size, 16, 8192,
              "Longer side of the views in pixels, 16 to 8192; default: as trained")
       ->default_str("");

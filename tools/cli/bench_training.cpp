@@ -53,7 +53,7 @@ Command add_bench_training(CommandLine& app) {
   add_scene_option(app, o->scene);
   add_number(app, "--seconds", o->seconds, 0.1, 86400, "Training time of each row in seconds, 0.1 to 86400",
              "S");
-  app.add_flag("--quick", o->quick, "Measure three rows on a small built-in scene");
+  app.add_flag("--quick", o->quick, "Measure three rows; without a data set, on a small built-in scene");
   return [o](Context& context) { return run_bench_training(*o, context); };
 }
 

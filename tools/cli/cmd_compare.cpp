@@ -45,10 +45,10 @@ struct Networks {
 };
 
 void print(Context& context, const std::string& name, const Scores& s) {
-  char line[200];
-  std::snprintf(line, sizeof line, "%-24s %7.2f dB  ssim %.4f  lpips alex %.5f  squeeze %.5f\n", name.c_str(),
-                s.psnr, s.ssim, s.alex, s.squeeze);
-  context.text() << line;
+  char line[120];
+  std::snprintf(line, sizeof line, " %7.2f dB  ssim %.4f  lpips alex %.5f  squeeze %.5f\n", s.psnr, s.ssim,
+                s.alex, s.squeeze);
+  context.text() << name << std::string(name.size() < 24 ? 24 - name.size() : 0, ' ') << line;
 }
 
 Json json_of(const Scores& s) {
@@ -160,7 +160,7 @@ int compare_with_reference(const CompareArguments& options, const Networks& netw
   }
   double worst = json["worst_error"].get<double>();
   raise_to(worst, json["worst_layer_error"].get<double>());
-  std::snprintf(line, sizeof line, "worst error, whole or of a layer: %.1e, at most %.0e is asked\n", worst,
+  std::snprintf(line, sizeof line, "largest error, total or per layer: %.1e (limit %.0e)\n", worst,
                 kReferenceBar);
   context.text() << line;
   context.result(json);

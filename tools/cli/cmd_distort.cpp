@@ -2,6 +2,7 @@
 #include <fieldmark/distort/distortion.h>
 #include <fieldmark/imaging/image.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <numeric>
@@ -22,6 +23,7 @@ struct DistortArguments {
   std::vector<std::string> inputs;
   std::string out, distort;
   std::string background = "white";
+  bool overwrite = false;
 };
 
 // Returns the output paths, named after the images; two inputs with one name would overwrite each other.
@@ -37,6 +39,22 @@ std::vector<std::filesystem::path> outputs_of(const std::vector<std::filesystem:
       throw UsageError("--out: " + image.string() + " would be overwritten by its own result");
   }
   return outputs;
+}
+
+// Images of another run among the new ones would be mistaken for this run's, above all by verify.
+void check_other_images(const DistortArguments& options, const std::vector<std::filesystem::path>& outputs,
+                        Context& context) {
+  std::error_code none;
+  if (!std::filesystem::is_directory(options.out, none)) return;
+  auto others = images_in(options.out);
+  if (others.empty()) return;
+  if (!options.overwrite)
+    throw IoError(options.out + ": expected a folder without images, found " + std::to_string(others.size()) +
+                  "; name another folder, or --overwrite to replace images of the same names");
+  std::erase_if(others, [&](const auto& path) { return std::ranges::find(outputs, path) != outputs.end(); });
+  if (!others.empty())
+    context.note(options.out +
+                 ": images of other names stay beside the new ones: " + std::to_string(others.size()));
 }
 
 // One pass over the images: an optional chain for each, and an optional clip of the results.
@@ -81,6 +99,7 @@ int run_distort(const DistortArguments& options, Context& context) {
   const auto distortion = read_option("--distort", [&] { return parse_chain(options.distort); });
   const auto images = list_images(options.inputs, context);
   const auto outputs = outputs_of(images, options.out);
+  check_other_images(options, outputs, context);
   prepare_folder(options.out);
   const float value = options.background == "white" ? 1.f : 0.f;
   const float background[3] = {value, value, value};
@@ -169,6 +188,8 @@ Command add_distort(CommandLine& app) {
          "white, black")
       ->one_of({"white", "black"})
       ->type_name("COLOUR");
+  app.add_flag("--overwrite", options->overwrite,
+               "Write to a folder that has images, and replace those of the same names");
   return [options](Context& context) { return run_distort(*options, context); };
 }
 

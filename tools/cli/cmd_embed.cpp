@@ -218,12 +218,12 @@ void add_view_options(CommandLine& app, EmbedArguments& o) {
       ->type_name("NAME")
       ->default_str("");
   app.add_option("--samples", o.samples,
-                 "Samples of the mark per ray, 1 to 64; default: 1, or 4 in scenes without bounds")
+                 "Samples of the mark per ray, 1 to 64; default: 1, or 4 in scenes of type place")
       ->range(1, 64)
       ->type_name("N")
       ->default_str("");
   app.add_option("--batch", o.batch,
-                 "Images per step, 1 to 64; default: 4, or 2 in scenes without bounds; for preset fast")
+                 "Images per step, 1 to 64; default: 4, or 2 in scenes of type place; for preset fast")
       ->range(1, 64)
       ->type_name("N")
       ->default_str("");

@@ -48,7 +48,7 @@ int run_info(const InfoArguments& options, Context& context) {
     numbers += tensor.shape.size();
   }
   const auto bytes = std::filesystem::file_size(options.file);
-  text << file.tensors.size() << " tensors, " << numbers << " numbers, " << bytes << " bytes\n";
+  text << file.tensors.size() << " tensors, " << numbers << " elements, " << bytes << " bytes\n";
   context.result({{"file_bytes", bytes},
                   {"sha256", sha256},
                   {"numbers", numbers},

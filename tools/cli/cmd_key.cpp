@@ -30,7 +30,7 @@ int run_key(const KeyArguments& options, Context& context) {
   const std::string open = to_hex(watermark::public_key(key));
   const std::string sha256 = sha256_file_hex(options.out);
   context.text() << options.out << ": 256 bits from the operating system, keep them secret\nsha256 " << sha256
-                 << "\npublic key " << open << ", checks its signatures\n";
+                 << "\npublic key " << open << ", verifies signatures made with this key\n";
   context.result({{"file", options.out}, {"bits", 256}, {"sha256", sha256}, {"public_key", open}});
   return kOk;
 }

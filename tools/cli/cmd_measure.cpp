@@ -14,6 +14,7 @@
 #include "cli/context.h"
 #include "cli/measured.h"
 #include "cli/perceptual.h"
+#include "cli/reading.h"
 #include "cli/scene_data.h"
 
 namespace fieldmark::cli {
@@ -24,7 +25,8 @@ struct MeasureArguments {
   MessageOption message;
   CodeOption code;
   std::vector<std::string> cameras{"novel"};
-  Index count = 200, informed_count = 20, size = 0, together = 1;
+  Index count = 200, size = 0, together = 1;
+  std::optional<Index> informed_count;
   bool payloads = false, count_given = false;
   std::vector<std::string> under;
 };
@@ -138,7 +140,7 @@ Measured measured_on(const std::string& set, const std::vector<nerf::Camera>& ca
       subject.owner, subject.baked ? &*subject.baked : nullptr, subject.message ? &*subject.message : nullptr,
       {.cameras = cameras,
        .under = options.under,
-       .informed_views = options.informed_count,
+       .informed_views = informed_views(options.informed_count, 20, subject.owner),
        .seed = context.seed(),
        .messages = messages_of(options, codec, context.seed()),
        .on_reading = [&](Index view, const std::string& under, const auto& evidence,
@@ -235,9 +237,10 @@ Command add_measure(CommandLine& app) {
           ->type_name("N");
   app.add_option("--informed-count", o->informed_count,
                  "Views to read by informed detection as well, 0 to 100000; takes up to a second per view "
-                 "and distortion")
+                 "and distortion; default: 20, or 0 for marks without cells")
       ->range(0, 100000)
-      ->type_name("N");
+      ->type_name("N")
+      ->default_str("");
   app.add_option("--size", o->size, "Longer side of the views in pixels, 16 to 8192; default: as trained")
       ->range(16, 8192)
       ->type_name("N")

@@ -1,6 +1,8 @@
 #include <fieldmark/nerf/camera_set.h>
 #include <fieldmark/watermark/evidence/wrong_keys.h>
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <ostream>
 
@@ -55,6 +57,11 @@ int run_null(const NullArguments& options, Context& context) {
     for (auto& image : read_images(reader, options.suspects, options.owner, context))
       read.push_back(std::move(image));
 
+  if (options.novel > 1 ||
+      std::ranges::any_of(read, [](const ImageEvidence& image) { return !std::isnan(image.time); }))
+    context.note(
+        "views of one field and frames of one video are not independent trials: counts of the key may exceed "
+        "their bounds more often than 1% of the time; those of random keys do not");
   const auto code = owner.code();
   watermark::WrongKeyCounts right, random;
   for (std::size_t i = 0; i < read.size(); ++i) {

@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <ostream>
+#include <set>
 
 #include <fieldmark/tools/results/sheet.h>
 #include "cli/cli.h"
@@ -60,7 +61,14 @@ std::vector<NamedCamera> cameras_of(const RenderArguments& options, const nerf::
   if (!options.data.empty() || options.cameras == "test") {
     if (options.data.empty()) throw UsageError("--cameras test: needs --data DIR");
     const auto data = load_scene(options.data, {.split = options.split}, context);
-    for (const auto& view : data.views) cameras.push_back({view.name, view.camera.scaled(options.size)});
+    std::set<std::string> names;
+    for (const auto& view : data.views) {
+      if (!names.insert(view.name).second)
+        throw IoError(options.data + ": expected views with names of their own, found two called '" +
+                      view.name +
+                      "', which would be written to one file; rename one, or render with --cameras");
+      cameras.push_back({view.name, view.camera.scaled(options.size)});
+    }
     return cameras;
   }
   for (const auto& camera : nerf::make_cameras(field.cameras, nerf::parse_camera_set(options.cameras),

@@ -50,7 +50,23 @@ std::vector<baselines::PaperScene> scenes_of(const ReproduceArguments& options) 
       if (const auto folder = shared_data(known); !folder.empty())
         scenes.push_back({folder.filename().string(), folder});
   if (scenes.empty()) scenes.push_back({kBuiltIn, {}});
+  for (const auto& scene : scenes) {
+    if (std::ranges::count(scenes, scene.name, &baselines::PaperScene::name) > 1)
+      throw UsageError("--scene: cells are named after scenes, got two called " + scene.name);
+    if (!options.report_only && !scene.folder.empty() && !std::filesystem::is_directory(scene.folder))
+      throw IoError(scene.folder.string() + ": expected the folder of a data set, or " + kBuiltIn +
+                    " for --scene");
+  }
   return scenes;
+}
+
+// Fields of another size are not this run's: they are kept in a folder of their own.
+std::filesystem::path work_of(const ReproduceArguments& options) {
+  std::filesystem::path work = options.work;
+  if (options.size > 0) work /= "size-" + std::to_string(options.size);
+  if (options.log2_table != ReproduceArguments{}.log2_table)
+    work /= "table-" + std::to_string(options.log2_table);
+  return work;
 }
 
 std::vector<baselines::CellName> planned_cells(const ReproduceArguments& options,
@@ -138,6 +154,10 @@ class Shown {
     progress_->update(part, note);
     return !guard_.interrupted();
   }
+  void end_line() {
+    progress_.reset();
+    what_.clear();
+  }
 
  private:
   Context& context_;
@@ -162,7 +182,7 @@ void measure(const ReproduceArguments& options, const std::vector<baselines::Pap
                                 .views = views,
                                 .under_views = std::max<Index>(1, views / 5),
                                 .ground_truth = options.ground_truth,
-                                .work = options.work,
+                                .work = work_of(options),
                                 .under = {std::begin(kUnder), std::end(kUnder)},
                                 .lpips = lpips ? &*lpips : nullptr,
                                 .commit = results::machine().commit,
@@ -171,14 +191,15 @@ void measure(const ReproduceArguments& options, const std::vector<baselines::Pap
     const double begun = context.seconds();
     try {
       auto measured = runner.run(name);
+      shown.end_line();
       measured.cell.more["total_seconds"] = context.seconds() - begun;
       save(options, scenes, measured, context.seconds() - begun);
       results::write_paper_page(options.cells, page_of(options, context));
       char line[120];
-      std::snprintf(line, sizeof line, "%s: %.2f%% right, %.2f dB on the foreground, %s\n",
-                    name.stem().c_str(), 100 * measured.cell.bit_accuracy, measured.cell.psnr_base_foreground,
+      std::snprintf(line, sizeof line, ": %.2f%% right, %.2f dB on the foreground, %s\n",
+                    100 * measured.cell.bit_accuracy, measured.cell.psnr_base_foreground,
                     format_duration(context.seconds() - begun).c_str());
-      context.text() << line;
+      context.text() << name.stem() << line;
     } catch (const baselines::Stopped& e) {
       throw Interrupted(std::string(e.what()) + "; the same command resumes");
     }

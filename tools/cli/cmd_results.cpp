@@ -23,10 +23,10 @@ namespace fs = std::filesystem;
 using results::Plan;
 using results::PlannedRow;
 
-constexpr const char* kPages = "docs/results";
+constexpr const char *kPages = "docs/results", *kRows = "docs/results/rows";
 
 struct ResultsArguments {
-  std::string rows = "docs/results/rows", work = "results_work";
+  std::string rows, work = "results_work";
   std::string out;  // empty: kPages
   std::vector<std::string> run;
   std::optional<double> budget;  // seconds; without limit by default
@@ -99,7 +99,11 @@ class Runner {
                    json = places_.work / "logs" / (row.id + ".json");
     fs::create_directories(log.parent_path());
     // Removes the output of a stale row: embed does not replace an owner, and render does not add to views.
-    if (!row.output().empty()) fs::remove_all(results::path_of(plan_, row.output(), places_));
+    if (!row.output().empty()) {
+      const fs::path made = results::path_of(plan_, row.output(), places_);
+      fs::remove_all(made);
+      keep_checkpoint_of(made, m.command + "\n" + m.code + "\n" + m.inputs.dump());
+    }
     const double begun = context_.seconds();
     const int code = call(command_line(row, json.string(), m), log);
     if (code == kInterrupted) throw Interrupted("rows that are done are kept");
@@ -113,6 +117,15 @@ class Runner {
     results::save_row(options_.rows, rows_[row.id]);
     count("measured", row.id + ": measured in " + format_duration(m.seconds));
     return true;
+  }
+
+  // Removes the checkpoint of an output unless it was made by the same command, code and inputs: what other
+  // code has trained in part must not be resumed under this commit.
+  static void keep_checkpoint_of(const fs::path& output, const std::string& made_by) {
+    const fs::path checkpoint = output.string() + ".checkpoint", note = output.string() + ".made_by";
+    if (!fs::exists(note) || read_text(note) != made_by) fs::remove(checkpoint);
+    fs::create_directories(note.parent_path());
+    write_file_atomically(note, made_by);
   }
 
   // Returns the words of a command with names replaced by paths; records seed and budget.
@@ -225,6 +238,9 @@ int run_results(ResultsArguments options, Context& context) {
   const bool runs = options.stale || !options.run.empty();
   if (!options.render && !options.out.empty()) throw UsageError("--out: needs --render");
   if (!runs && options.budget) throw UsageError("--budget: needs --run or --stale");
+  if (options.draft && !options.rows.empty())
+    throw UsageError("--draft: excludes --rows, its rows go to WORK/rows");
+  if (options.rows.empty()) options.rows = kRows;
   if (options.draft) options.rows = (fs::path(options.work) / "rows").string();
   const std::string commit = results::machine().commit;
   if (runs && !options.draft && (commit == "unknown" || commit.ends_with("changes")))
@@ -245,7 +261,9 @@ int run_results(ResultsArguments options, Context& context) {
 
 Command add_results(CommandLine& app) {
   auto o = std::make_shared<ResultsArguments>();
-  app.add_option("--rows", o->rows, "Folder of the rows, one JSON file each")->type_name("DIR");
+  app.add_option("--rows", o->rows, "Folder of the rows, one JSON file each")
+      ->type_name("DIR")
+      ->default_str(kRows);
   app.add_option("--out", o->out, "Folder of the pages, for --render")->type_name("DIR")->default_str(kPages);
   app.add_option("--work", o->work, "Folder of fields, owners and logs that runs make")->type_name("DIR");
   auto named = app.add_option("--run", o->run,
@@ -260,7 +278,7 @@ Command add_results(CommandLine& app) {
       ->range(1.0, 1e7)
       ->type_name("S")
       ->default_str("");
-  app.add_flag("--draft", o->draft, "Keep rows in WORK/rows, also from changed sources");
+  app.add_flag("--draft", o->draft, "Write rows to WORK/rows instead of --rows; allows uncommitted changes");
   app.add_flag("--render", o->render, "Write all pages to --out, from the rows alone");
   return [o](Context& context) { return run_results(*o, context); };
 }

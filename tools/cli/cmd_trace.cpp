@@ -1,6 +1,8 @@
 #include <fieldmark/watermark/tracing/copies.h>
 #include <fieldmark/watermark/tracing/trace.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <ostream>
@@ -57,6 +59,10 @@ int run_trace(const TraceArguments& options, Context& context) {
   const auto key = choose_code(options.code, options.message, owner, context);
   const auto message = message_of(options.message, owner.options().bits);
   const auto names = watermark::read_recipients(options.copies);
+  // In the first round the least p-value counts twice for each name; later rounds ask for more.
+  const Index carriers = owner.code().carriers();
+  const double least = watermark::sharp_p_value(std::sqrt(static_cast<double>(carriers)));
+  check_rate(options.fpr, std::min(1.0, 2 * static_cast<double>(names.size()) * least), carriers);
   SuspectReader reader(owner, options.reading);
   const auto images = read_images(reader, options.suspects, options.owner, context);
   const auto copies = traced(owner, key, message, names, total_evidence(images), options.fpr, context);

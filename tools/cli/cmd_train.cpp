@@ -348,8 +348,8 @@ Command add_train(CommandLine& app) {
       ->default_str("");
   app.add_option(
          "--background", o->background,
-         "Colour behind transparent pixels: white, black; default: white for objects in the Blender layout,\n"
-         "the colour nearer to a plain background, else black")
+         "Colour behind transparent pixels: white, black; default: white for objects in the Blender layout;\n"
+         "whichever is closer to a plain background; otherwise black")
       ->one_of({"white", "black"})
       ->type_name("COLOUR")
       ->default_str("");

@@ -110,7 +110,7 @@ int run_verify(const VerifyArguments& options, Context& context) {
   print_verdict(record, context);
   TestedControls controls;
   if (!options.controls.empty() || !options.evidence.empty())
-    controls = test_controls(test, reader, images, options.controls, context);
+    controls = test_controls(test, reader, images, options.controls, options.suspects.frames, context);
   record.controls = controls.controls;
   print_controls(context.text(), record.controls, options.fpr);
   const Index keys = options.wrong_keys.value_or(options.evidence.empty() ? 0 : kEvidenceKeys);
@@ -145,9 +145,9 @@ Command add_verify(CommandLine& app) {
       ->type_name("N")
       ->default_str("");
   app.add_option("--control", o->controls,
-                 "Unmarked image or folder to test beside the built-in controls; repeatable")
+                 "Unmarked image, video or folder to test beside the built-in controls; repeatable")
       ->one_value()
-      ->type_name("IMAGE|DIR")
+      ->type_name("IMAGE|VIDEO|DIR")
       ->default_str("");
   app.add_option(
          "--evidence", o->evidence,

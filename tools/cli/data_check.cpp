@@ -87,7 +87,7 @@ void print(const nerf::DataReport& r, std::ostream& out) {
 
 void print_oddities(const nerf::DataReport& r, std::ostream& out) {
   for (const nerf::Oddity& o : r.oddities) out << "warning: " << o.text << "\n         " << o.remedy << "\n";
-  if (r.oddities.empty()) out << "nothing is odd\n";
+  if (r.oddities.empty()) out << "no warnings\n";
 }
 
 }  // namespace
@@ -123,7 +123,7 @@ int run_data_check(const DataCheckArguments& options, Context& context) {
       return !guard.interrupted();
     });
   }
-  if (guard.interrupted()) throw Interrupted("nothing was found out");
+  if (guard.interrupted()) throw Interrupted("the check is not complete");
   print(report, context.text());
   for (const std::string& note : report.notes) context.note(note);
   print_oddities(report, context.text());

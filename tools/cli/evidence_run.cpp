@@ -63,7 +63,7 @@ std::vector<EvidenceImage> score_images(const KeyTest& test, const std::vector<I
 
 TestedControls test_controls(const KeyTest& test, SuspectReader& reader,
                              const std::vector<ImageEvidence>& images, const std::vector<std::string>& given,
-                             Context& context) {
+                             std::optional<Index> frames, Context& context) {
   TestedControls tested;
   std::vector<Tensor<float>> questioned;
   for (const auto& p : images)
@@ -75,7 +75,8 @@ TestedControls test_controls(const KeyTest& test, SuspectReader& reader,
     tested.thumbnails.push_back(thumbnail(control.images[0]));
   }
   for (const auto& path : given) {
-    const auto read = read_images(reader, {.paths = {path}}, {}, context);
+    const auto read =
+        read_images(reader, {.paths = {path}, .frames = is_video(path) ? frames : std::nullopt}, {}, context);
     tested.controls.push_back({given_name(path),
                                "Given as a control: images that the user declares unmarked.",
                                score_images(test, read), test(total_evidence(read))});

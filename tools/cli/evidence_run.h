@@ -3,6 +3,7 @@
 #include <fieldmark/watermark/mark/owner.h>
 
 #include <iosfwd>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,7 +38,7 @@ struct TestedControls {
 /// @throws IoError as read_images()
 TestedControls test_controls(const KeyTest& test, SuspectReader& reader,
                              const std::vector<ImageEvidence>& images, const std::vector<std::string>& given,
-                             Context& context);
+                             std::optional<Index> frames, Context& context);
 
 /// For --json: name, figures and whether the control stays above the rate of false alarms.
 Json controls_json(const std::vector<watermark::EvidenceControl>& controls, double fpr);

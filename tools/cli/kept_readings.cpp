@@ -64,7 +64,14 @@ KeptReadings::KeptReadings(const std::filesystem::path& file, const std::string&
   const Json wanted = header_of(owner_sha256, detection);
   const std::string text = std::filesystem::exists(file) ? read_text(file) : "";
   if (text.empty()) {
-    append(wanted.dump());
+    const bool made_here = !std::filesystem::exists(file);
+    try {
+      append(wanted.dump());
+    } catch (const IoError&) {
+      std::error_code ignored;
+      if (made_here) std::filesystem::remove(file, ignored);
+      throw;
+    }
     return;
   }
   std::istringstream whole(text.substr(0, text.rfind('\n') + 1));

@@ -30,10 +30,12 @@ double run_long(TrainingRun& run, const std::string& what, const RunLength& leng
   if (!checkpoint.empty()) AtomicFile{checkpoint};  // fails now, not at the first save
   const InterruptGuard guard;
   Progress progress = context.progress(what);
+  const double earlier = run.seconds();  // of the runs that this one resumes
+  // A resumed run that has fixed its number of steps ends by it, whatever the clock of this process says.
+  const Index steps = length.steps > 0 ? length.steps : run.planned();
   const auto tell = [&](double now) {
-    const double part = length.steps > 0
-                            ? static_cast<double>(run.steps()) / static_cast<double>(length.steps)
-                            : now / length.seconds;
+    const double part =
+        steps > 0 ? static_cast<double>(run.steps()) / static_cast<double>(steps) : now / length.seconds;
     progress.update(part, "step " + std::to_string(run.steps()) + "  " + run.status());
   };
   const bool complete = run.drive({.checkpoint = checkpoint,
@@ -42,7 +44,7 @@ double run_long(TrainingRun& run, const std::string& what, const RunLength& leng
                                    .enough = std::move(enough),
                                    .proceed = [&] { return !guard.interrupted(); },
                                    .after = tell});
-  if (complete) return context.seconds();
+  if (complete) return earlier + context.seconds();
   throw Interrupted(
       "after " + std::to_string(run.steps()) + " steps" +
       (checkpoint.empty() ? ", nothing was written" : ", --resume continues from " + checkpoint));

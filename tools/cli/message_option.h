@@ -7,11 +7,6 @@
 #include "cli/command_line.h"
 #include "cli/context.h"
 
-namespace CLI {
-class App;
-class Option;
-}  // namespace CLI
-
 namespace fieldmark::cli {
 
 /// The longest message that can hold a payload, bits; raw messages may be longer.

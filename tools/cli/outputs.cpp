@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <fstream>
 #include <optional>
 
 namespace fieldmark::cli {
@@ -19,17 +20,29 @@ struct Model {
   bool secret = false;
 };
 
-// Returns the kind of the Fieldmark file at a path, or nullopt.
+// Returns true if a file begins as safetensors do: the length of the header in 8 bytes, then the header.
+bool looks_like_model(std::istream& in) {
+  char begin[10] = {};
+  in.read(begin, sizeof begin);
+  return in.gcount() == sizeof begin && begin[7] == 0 && begin[8] == '{' && begin[9] == '"';
+}
+
+// Returns the kind of the Fieldmark file at a path, or nullopt. A file that cannot be read, is damaged or
+// comes from a later version may be the only copy of a key.
 std::optional<Model> model_at(const std::string& path) {
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return std::nullopt;
+  std::ifstream in(path, std::ios::binary);
+  if (!in) return Model{"content, which cannot be read,", true};
+  if (!looks_like_model(in)) return std::nullopt;
   try {
     const auto file = SafetensorsFile::read(path);
+    if (!file.metadata.contains("fieldmark")) return std::nullopt;
     const std::string kind = model_info(file).kind;
     // A checkpoint of embed holds the owner's key.
     return Model{kind, kind == "owner" || file.has("key")};
   } catch (const Error&) {
-    return std::nullopt;
+    return Model{"damaged or later model", true};
   }
 }
 
@@ -40,7 +53,8 @@ std::string upper(std::string text) {
 }
 
 void refuse(const std::string& path, const Model& model) {
-  throw IoError(path + ": exists already, and its " + upper(model.kind) +
+  throw IoError(path + ": exists already, and its " +
+                (model.kind.find(' ') != std::string::npos ? model.kind : upper(model.kind)) +
                 " would be lost; name another file, or move this one away");
 }
 

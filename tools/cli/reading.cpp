@@ -44,6 +44,19 @@ void check_rate(double rate, double least, Index cells) {
   throw UsageError(text);
 }
 
+Index informed_views(std::optional<Index> given, Index usual, const watermark::Owner& owner) {
+  if (owner.mark().has_cells()) return given.value_or(usual);
+  if (given.value_or(0) > 0)
+    throw UsageError("--informed-count: an owner of preset " + owner.mark().preset() +
+                     " has no cells in space");
+  return 0;
+}
+
+bool is_video(const std::filesystem::path& file) {
+  std::error_code ignored;
+  return std::filesystem::is_regular_file(file, ignored) && image_format(file) == ImageFormat::video;
+}
+
 SuspectReader::SuspectReader(const watermark::Owner& owner, const std::string& reading)
     : detection_(reading), cells_(owner.cells.count()), blind_(owner), forced_(reading == "informed") {
   const bool has_cells = owner.mark().has_cells();
@@ -131,11 +144,6 @@ void read_video(SuspectReader& reader, const std::filesystem::path& file, Index 
   if (damaged > 0)
     faults.warnings.push_back(name + ": " + std::to_string(damaged) + " of " + std::to_string(frames) +
                               " frames are damaged; the decoder made up what the file lacks");
-}
-
-bool is_video(const std::filesystem::path& file) {
-  std::error_code ignored;
-  return std::filesystem::is_regular_file(file, ignored) && image_format(file) == ImageFormat::video;
 }
 
 }  // namespace

@@ -35,6 +35,13 @@ void add_rate(CommandLine& app, double& rate, const std::string& what);
 /// @param least  least p-value with this number of cells   @throws UsageError
 void check_rate(double rate, double least, Index cells);
 
+/// True if a file is a video, whatever its name. @throws IoError if it cannot be read
+bool is_video(const std::filesystem::path& file);
+
+/// Returns --informed-count: as given, or `usual`; 0 for an owner without cells.
+/// @throws UsageError if views are asked for of an owner without cells
+Index informed_views(std::optional<Index> given, Index usual, const watermark::Owner& owner);
+
 /// Reads images with the detection that --detection names.
 class SuspectReader {
  public:

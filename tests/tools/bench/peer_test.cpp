@@ -121,14 +121,15 @@ TEST_CASE("peer: an interpreter that fails, hangs or talks nonsense is told of, 
   const OwnTemporaries temporaries;
   CHECK(FakePython("echo why >&2; exit 3").failure() ==
         "PYTHON: ended with exit code 3 before it answered:\nwhy");
-  CHECK(FakePython("exec sleep 600").failure(false, 0.2) == "PYTHON: no answer within 0.2 s, without a word");
+  CHECK(FakePython("exec sleep 600").failure(false, 0.2) ==
+        "PYTHON: no answer within 0.2 s, with no message on standard error");
   CHECK_THAT(FakePython("echo garbage").failure(),
              Contains("PYTHON: expected a line of JSON as pytorch_peer.py writes it, got 'garbage'"));
   CHECK_THAT(FakePython("echo '{}'").failure(), Contains("got '{}'") && Contains("key 'version' not found"));
   CHECK_THAT(FakePython(ready("\"fast\"", kNear)).failure(), Contains("type must be number"));
   CHECK_THAT(FakePython(ready("0", kNear)).failure(), Contains("expected seconds above 0"));
   CHECK(FakePython(ready("1", kNear) + "read -r line; exit 5").failure() ==
-        "PYTHON: ended with exit code 5 before it answered, without a word");
+        "PYTHON: ended with exit code 5 before it answered, with no message on standard error");
   CHECK(temporaries.peer_folders() == 0);
 }
 

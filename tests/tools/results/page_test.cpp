@@ -39,6 +39,13 @@ TEST_CASE("render_pages: lists of several rows, and where all rows come from") {
   CHECK_THAT(render("%page p\n%list c list\n").at("p"), Contains("Not measured."));
 }
 
+TEST_CASE("render_pages: lines about a missing row give way to one that says so") {
+  CHECK(render("%page p\n%measured a\n[[a psnr .1]] dB\n%end-measured\nafter\n").at("p") ==
+        "30.1 dB\nafter\n");
+  CHECK(render("%page p\n%measured c\n[[c psnr .1]] dB\n%list c list\n%end-measured\nafter\n").at("p") ==
+        "Not measured.\nafter\n");
+}
+
 TEST_CASE("render_pages: a bad template is refused") {
   CHECK_THROWS_WITH(render("%page p\n%dance\n"), Contains("no directive is '%dance'"));
   CHECK_THROWS_WITH(render("%page p\n[[a psnr\n"), Contains("no ']]'"));

@@ -179,7 +179,7 @@ std::string LineProcess::last_words() const {
   for (std::size_t lines = 0; lines < kLastLines && begin > 0 && begin != std::string::npos; ++lines)
     begin = text.rfind('\n', begin - 1);
   if (begin != std::string::npos && begin > 0) text.erase(0, begin + 1);
-  return text.empty() ? ", without a word" : ":\n" + text;
+  return text.empty() ? ", with no message on standard error" : ":\n" + text;
 }
 
 }  // namespace fieldmark::bench

@@ -40,6 +40,15 @@ class Page {
 
   std::string line(const std::string& line) {
     const Words words = split(line, ' ');
+    if (line.starts_with("%measured ") && words.size() == 2) {
+      hidden_ = row(words[1]) == nullptr;
+      return hidden_ ? "Not measured.\n" : "";
+    }
+    if (line == "%end-measured") {
+      hidden_ = false;
+      return "";
+    }
+    if (hidden_) return "";
     if (line.starts_with("%list ") && words.size() > 2)
       return list(joined(words[1]), words[2], {words.begin() + 3, words.end()});
     if (line.starts_with("%chart ") && words.size() == 4) return chart(words[1], words[2], joined(words[3]));
@@ -121,6 +130,7 @@ class Page {
   const std::function<std::string(const std::string&)>& stale_;
   Pages& files_;
   Words named_;
+  bool hidden_ = false;  // in lines about a row that is missing
 };
 
 }  // namespace

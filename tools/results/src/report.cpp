@@ -25,6 +25,13 @@ std::string cpu_model() {
   return "unknown";
 }
 
+// Escapes what would end a cell: names of files may hold any character.
+std::string in_cell(std::string text) {
+  for (std::size_t at = 0; (at = text.find_first_of("|\n", at)) != std::string::npos; at += 2)
+    text.replace(at, 1, text[at] == '|' ? "\\|" : "  ");
+  return text;
+}
+
 bool is_list_of_rows(const Json& value) { return value.is_array() && !value.empty() && value[0].is_object(); }
 
 // Replaces bytes that are not UTF-8, such as those of a file's name, by U+FFFD.
@@ -100,7 +107,7 @@ std::string published_command(const Words& command_line) {
 std::string markdown_table(const Words& header, const std::vector<Words>& rows) {
   std::string text;
   const auto add = [&](const Words& cells) {
-    for (const auto& c : cells) text += "| " + c + " ";
+    for (const auto& c : cells) text += "| " + in_cell(c) + " ";
     text += "|\n";
   };
   add(header);
@@ -119,7 +126,10 @@ std::string markdown_list(const Json& list, Words keys) {
     for (auto& row = rows.emplace_back(); const std::string& key : keys)
       row.push_back(item.contains(key) ? shown(item[key]) : "-");
   }
-  return markdown_table(keys, rows);
+  std::string text = markdown_table(keys, rows);
+  if (list.size() > kLongestTable)
+    text += "\nand " + std::to_string(list.size() - kLongestTable) + " more, which the JSON has.\n";
+  return text;
 }
 
 std::string markdown_report(const Words& command_line, const Machine& machine, const Json& result) {

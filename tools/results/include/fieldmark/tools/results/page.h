@@ -17,6 +17,7 @@ using Pages = std::map<std::string, std::string>;
 ///   [[ID status]]         "fresh", or "stale"
 ///   %list ID[,ID] KEY [COLUMN...]   a table of the array KEY of the results
 ///   %chart FILE NAME ID[,ID]        result_chart() of the results, with arrays joined, and a link to it
+///   %measured ID, %end-measured     lines that "Not measured." replaces if the row is missing
 ///   %provenance           commit, date, machine and state of every row that the page uses
 /// @param stale  returns why a row must be measured again, empty if it is fresh
 /// @throws ValueError if the template is malformed
