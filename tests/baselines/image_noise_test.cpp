@@ -3,6 +3,8 @@
 #include "simulated_jpeg.h"
 
 #include <algorithm>
+#include <set>
+#include <vector>
 
 #include "support/run_op.h"
 
@@ -36,7 +38,8 @@ std::vector<bool> marked_pixels(const std::vector<float>& y) {
 }  // namespace
 
 TEST_CASE("image_noise: dropout and cropout show pixels of either image") {
-  double least = 1, most = 0;
+  double least = 1, most = 0, smallest_window = 1;
+  std::set<std::vector<bool>> windows;
   for (std::uint64_t step = 0; step < 12; ++step) {
     const auto dropped = marked_pixels(through(NoiseLayer::dropout, step));
     const double share = static_cast<double>(std::ranges::count(dropped, true)) / 768;
@@ -46,7 +49,19 @@ TEST_CASE("image_noise: dropout and cropout show pixels of either image") {
     const auto kept = marked_pixels(through(NoiseLayer::cropout, step));
     CHECK(std::ranges::count(kept, true) >= 0.25 * 768);
     for (std::size_t p = 0; p < 384; ++p) CHECK(kept[p] == kept[384 + p]);  // one window for the batch
+    std::size_t top = 16, bottom = 0, left = 24, right = 0;                 // of images of 16 x 24 pixels
+    for (std::size_t p = 0; p < 384; ++p)
+      if (kept[p]) {
+        top = std::min(top, p / 24), bottom = std::max(bottom, p / 24 + 1);
+        left = std::min(left, p % 24), right = std::max(right, p % 24 + 1);
+      }
+    const auto area = static_cast<std::ptrdiff_t>(2 * (bottom - top) * (right - left));
+    CHECK(std::ranges::count(kept, true) == area);  // a full rectangle
+    smallest_window = std::min(smallest_window, static_cast<double>(area) / 768);
+    windows.insert(kept);
   }
+  CHECK(smallest_window < 0.6);
+  CHECK(windows.size() > 6);
   CHECK(least < 0.85);
   CHECK(most > 0.9);
 }

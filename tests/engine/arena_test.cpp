@@ -1,9 +1,12 @@
 #include <fieldmark/engine/arena.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <limits>
 #include <new>
+#include <span>
+#include <vector>
 
 #include "support/catch.h"
 
@@ -11,14 +14,15 @@ using fieldmark::Arena;
 
 TEST_CASE("arena: blocks are aligned and do not overlap") {
   Arena arena(256);
-  char* last = nullptr;
-  for (std::size_t n : {1, 63, 64, 65, 5000, 0}) {
+  std::vector<std::span<char>> blocks;
+  for (std::size_t n : {1, 63, 64, 65, 5000, 1, 0}) {
     auto* p = static_cast<char*>(arena.allocate(n));
     CHECK(reinterpret_cast<std::uintptr_t>(p) % Arena::kAlign == 0);
-    CHECK(p != last);
-    std::memset(p, 1, n);
-    last = p;
+    std::memset(p, static_cast<int>(blocks.size()), n);
+    blocks.emplace_back(p, n);
   }
+  for (std::size_t k = 0; k < blocks.size(); ++k)
+    CHECK(std::ranges::count(blocks[k], static_cast<char>(k)) == std::ssize(blocks[k]));
 }
 
 TEST_CASE("arena: a negative or overflowing size is an error, not an empty block") {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "support/bf16.h"
 #include "support/catch.h"
 #include "support/each_isa.h"
 #include "support/random.h"
@@ -96,7 +97,7 @@ TEST_CASE("packed_weights: another instruction set and parameters added later ar
 TEST_CASE("packed_weights: in bf16 a layer's values and gradients are off by the rounding, dW by less") {
   ParamStore<float> store;
   const Dense<float> layer(store, "layer", {.in = 33, .out = 40}, 3);
-  if (bf16_units() == Bf16Units::none) {
+  if (!bf16_or_skip("packed_weights: a layer in bf16")) {
     CHECK_THROWS_WITH((PackedWeights<float>(store, {.precision = Precision::bf16})),
                       Contains("no bf16 products"));
     return;
@@ -128,7 +129,7 @@ TEST_CASE("packed_weights: tables are rounded on request") {
   PackedWeights<float> plain(store);
   plain.update();
   CHECK(plain.table(table) == nullptr);
-  if (bf16_units() == Bf16Units::none) return;
+  if (!bf16_or_skip("packed_weights: tables in bf16")) return;
   PackedWeights<float> packed(store, {.precision = Precision::bf16, .tables = true});
   packed.update();
   REQUIRE(packed.table(table));

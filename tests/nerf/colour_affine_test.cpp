@@ -54,8 +54,9 @@ TEST_CASE("colour_affine: errors name argument and what came") {
 }
 
 TEST_CASE("colour_affine: the same bits for one and two threads") {
+  constexpr Index kRays = 100000;
   std::vector<Index> image;
-  for (Index i = 0; i < 500; ++i) image.push_back(i % 7);
+  for (Index i = 0; i < kRays; ++i) image.push_back(i % 7);
   expect_same_bits([&](auto&, auto v) { return colour_affine(v[0], v[1], std::span<const Index>(image)); },
-                   {uniform<float>({500, 4}, 0, 1, 1), uniform<float>({7, 12}, -1, 1, 2)});
+                   {uniform<float>({kRays, 4}, 0, 1, 1), uniform<float>({7, 12}, -1, 1, 2)});
 }

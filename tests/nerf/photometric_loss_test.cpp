@@ -75,7 +75,8 @@ TEST_CASE("photometric_loss: errors name argument and what came") {
 }
 
 TEST_CASE("photometric_loss: the same bits for one and two threads") {
-  const auto truth = uniform<float>({500, 4}, 0, 1, 2), back = uniform<float>({500, 3}, 0, 1, 3);
+  constexpr Index kRays = 100000;
+  const auto truth = uniform<float>({kRays, 4}, 0, 1, 2), back = uniform<float>({kRays, 3}, 0, 1, 3);
   expect_same_bits([&](auto&, auto v) { return photometric_loss<float>(v[0], truth.data, back.data); },
-                   {uniform<float>({500, 4}, 0, 1, 1)});
+                   {uniform<float>({kRays, 4}, 0, 1, 1)});
 }

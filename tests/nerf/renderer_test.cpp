@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "small_field.h"
+#include "support/bf16.h"
 #include "support/catch.h"
 #include "support/each_isa.h"
 #include "support/worst.h"
@@ -128,7 +129,7 @@ TEST_CASE("renderer: bf16 shows the same image within its rounding") {
   const RadianceField f = small_field();
   const Camera camera = test_camera();
   Renderer plain(f);
-  if (bf16_units() == Bf16Units::none) {
+  if (!bf16_or_skip("renderer: bf16")) {
     CHECK_THROWS_AS(Renderer(f, {.precision = Precision::bf16}), ValueError);
     return;
   }

@@ -70,11 +70,10 @@ TEST_CASE("dual/matrices: a determinant of 2 x 2") {
   CHECK_THROWS_WITH(jvp(det, {singular}, {v}), Contains("singular"));
 }
 
-TEST_CASE("dual/matrices: products and layers follow the product rule, also with Vars") {
+TEST_CASE("dual/matrices: the tangent for all operands is the sum of those for one") {
   const auto rows = uniform({4, 3}, -1, 1, 1), matrix = uniform({3, 5}, -1, 1, 2),
              bias = uniform({5}, -1, 1, 3);
   const auto image = uniform({2, 3, 4, 2}, -1, 1, 4), window = uniform({3, 3, 2, 5}, -1, 1, 5);
-  // The tangent for all operands is the sum over one operand at a time, with the others as Vars.
   const auto check = [](const auto& f, const std::vector<Tensor<double>>& x) {
     std::vector<Tensor<double>> v;
     for (const auto& t : x) v.push_back(uniform(t.shape, -1, 1, 9));

@@ -105,7 +105,17 @@ TEST_CASE("dual/norm: statistics of a batch come out") {
   BatchStatistics statistics;
   const auto f = [&](auto&, auto x) { return batch_norm(x[0], x[1], x[2], {}, &statistics); };
   jvp<double>(f, kNormInputs, kNormDirections);
-  CHECK(statistics.mean.size() == 4);
+  REQUIRE(statistics.mean.size() == 4);
+  REQUIRE(statistics.variance.size() == 4);
+  for (std::size_t c = 0; c < 4; ++c) {
+    double sum = 0, squares = 0;
+    for (Index p = 0; p < 12; ++p) {
+      const double x = kNormInputs[0][4 * p + static_cast<Index>(c)];
+      sum += x / 12, squares += x * x / 12;
+    }
+    CHECK(statistics.mean[c] == Approx(sum).epsilon(1e-13));
+    CHECK(statistics.variance[c] == Approx(squares - sum * sum).epsilon(1e-12));
+  }
 }
 
 TEST_CASE("dual/norm: in float as in double") {

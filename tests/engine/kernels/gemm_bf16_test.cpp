@@ -5,6 +5,7 @@
 #include <cstring>
 #include <vector>
 
+#include "support/bf16.h"
 #include "support/catch.h"
 #include "support/each_isa.h"
 #include "support/random.h"
@@ -23,7 +24,7 @@ double nearest(float x) {
 // Returns the units to test at this level: the plain loop on v2 and v3, all that the CPU has on v4.
 std::vector<bool> units() {
   if (isa() != Isa::v4) return {false};
-  if (bf16_units() == Bf16Units::none) return {};
+  if (!bf16_or_skip("gemm_bf16: AVX-512")) return {};
   return bf16_units() == Bf16Units::tiles ? std::vector<bool>{false, true} : std::vector<bool>{false};
 }
 
@@ -90,7 +91,7 @@ TEST_CASE(
 
 TEST_CASE("gemm_bf16: numbers are rounded to nearest even, infinities and what is no number stay so") {
   each_isa([] {
-    if (isa() == Isa::v4 && bf16_units() == Bf16Units::none) return;
+    if (isa() == Isa::v4 && !bf16_or_skip("gemm_bf16: rounding with AVX-512")) return;
     const auto as_float = [](std::uint16_t bits) {
       const std::uint32_t wide = static_cast<std::uint32_t>(bits) << 16;
       float f;

@@ -98,6 +98,8 @@ TEST_CASE("feature_distance: float against double, and the same bits for any thr
   const Weights many(17);
   const auto a = uniform<float>({3, 60, 61, 17}, 0, 1, 1), b = uniform<float>({3, 60, 61, 17}, 0, 1, 2);
   expect_same_bits(many.op(), {a, b});
+  expect_same_bits(many.op(),
+                   {uniform<float>({3, 150, 151, 17}, 0, 1, 1), uniform<float>({3, 150, 151, 17}, 0, 1, 2)});
   CHECK(float_error(many.op(), {a, b}) < 1e-6);
   double worst = 0;
   for (Index e = 1; e <= 130; ++e) {

@@ -67,7 +67,9 @@ TEST_CASE("pool: errors") {
 }
 
 TEST_CASE("pool: float against double, and the same bits for any thread count") {
-  const auto x = uniform<float>({3, 50, 51, 17}, -1, 1, 1);
+  const auto x = uniform<float>({3, 50, 51, 17}, -1, 1, 1),
+             large = uniform<float>({3, 150, 151, 17}, -1, 1, 1);
+  expect_same_bits(f_global, {large});
   expect_same_bits(f_pool2, {x});
   expect_same_bits(f_global, {x});
   CHECK(float_error(f_pool2, {x}) < 2e-7);

@@ -7,6 +7,7 @@
 #include "hash_reference.h"
 #include "support/each_isa.h"
 #include "support/random.h"
+#include "support/worst.h"
 
 using namespace fieldmark;
 using namespace fieldmark::kernels;
@@ -51,7 +52,7 @@ double worst(const A& got, const std::vector<long double>& want) {
   double w = 0;
   for (std::size_t i = 0; i < want.size(); ++i) {
     const auto d = static_cast<double>(std::abs(static_cast<long double>(got[i]) - want[i]));
-    w = d <= w ? w : d;
+    raise_to(w, d);
   }
   return w;
 }

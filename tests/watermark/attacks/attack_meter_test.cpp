@@ -112,7 +112,7 @@ TEST_CASE("attack_meter: an attack that only moves pixels does no damage but to 
   // colour.
   const AttackRow larger = meter.image("scale-nearest_2");
   CHECK(larger.kept == 1);
-  CHECK((std::isnan(larger.psnr_foreground) || larger.psnr_foreground > 25));
+  CHECK(std::isnan(larger.psnr_foreground));  // no pixel differs
   const Tensor<float> seen = quantize8(uniform<float>({12, 16, 3}, 0, 1, 1));
   const float white[3] = {1, 1, 1};
   distort::PixelMap source;

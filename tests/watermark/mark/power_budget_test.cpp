@@ -64,9 +64,10 @@ TEST_CASE("power_budget: gradient, and none along the residual itself") {
 }
 
 TEST_CASE("power_budget: one and two threads give the same bits, float is near double") {
-  const std::vector<float> mask = uniform<float>({2000}, 0, 1, 6).data;
+  constexpr Index kPixels = 100000;
+  const std::vector<float> mask = uniform<float>({kPixels}, 0, 1, 6).data;
   const std::vector<double> exact(mask.begin(), mask.end());
-  const std::vector inputs{uniform<float>({2000, 3}, -1, 1, 7)};
+  const std::vector inputs{uniform<float>({kPixels, 3}, -1, 1, 7)};
   const auto either = [&](auto&, auto v) {
     if constexpr (std::is_same_v<std::decay_t<decltype(*v[0].value())>, float>)
       return power_budget<float>(v[0], mask, 0.02);

@@ -38,7 +38,7 @@ TEST_CASE("weighted_segments: gradient, also of nothing and of a single sample")
 }
 
 TEST_CASE("weighted_segments: one and two threads give the same bits, float is near double") {
-  const Index samples = 3000;
+  const Index samples = 200000;
   std::vector<std::int32_t> begin{0};
   while (begin.back() < samples)
     begin.push_back(std::min<std::int32_t>(begin.back() + 1 + begin.back() % 7, samples));
