@@ -74,7 +74,7 @@ def bake(owner: Owner, message: str, *, seconds: Optional[float] = None, steps: 
     """Writes a message into the colours of a field, which is then an ordinary field to publish.
 
     :param message: hexadecimal digits, most significant bit first
-    :param seconds: length of the training; 60 by default
+    :param seconds: length of the training; 45 by default
     """
-    length = _length(seconds, steps, 60)
+    length = _length(seconds, steps, 45)
     return _fieldmark.bake(owner, message, *length, seed, progress)

@@ -42,7 +42,7 @@ std::shared_ptr<RadianceField> train(const std::filesystem::path& data, double s
   options.schedule.seconds = seconds;
   options.schedule.steps = steps;
   options.seed = seed;
-  const nerf::Dataset set = nerf::load_dataset(data, {.size = size});
+  const nerf::Dataset set = unlocked([&] { return nerf::load_dataset(data, {.size = size}); });
   auto field = std::make_shared<RadianceField>(nerf::field_options(options.schedule));
   nerf::Trainer trainer(*field, set, options);
   run(trainer, progress);
@@ -51,9 +51,13 @@ std::shared_ptr<RadianceField> train(const std::filesystem::path& data, double s
 
 py::dict evaluate(const RadianceField& field, const std::filesystem::path& data, const std::string& split,
                   Index size) {
-  const nerf::Dataset set = nerf::load_dataset(data, {.split = split, .size = size});
-  nerf::Renderer renderer(field);
-  const nerf::Evaluation e = nerf::evaluate(renderer, set);
+  const nerf::Evaluation e = unlocked([&] {
+    // The ground truth is composited over what the field renders behind transparent pixels.
+    const nerf::Dataset set =
+        nerf::load_dataset(data, {.split = split, .size = size, .background = field.background});
+    nerf::Renderer renderer(field);
+    return nerf::evaluate(renderer, set, check_signals);
+  });
   return py::dict("psnr"_a = e.psnr, "ssim"_a = e.ssim);
 }
 
@@ -76,12 +80,26 @@ void bind_camera(py::module_& module) {
 
 }  // namespace
 
+std::recursive_mutex& library_lock() {
+  static std::recursive_mutex lock;
+  return lock;
+}
+
+bool check_signals(Index /*done*/, Index /*total*/) {
+  const py::gil_scoped_acquire held;
+  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  return true;
+}
+
 void run(TrainingRun& training, const py::object& progress) {
-  training.drive({.after = [&](double seconds) {
-    if (training.steps() % kQuiet != 0) return;
-    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-    if (!progress.is_none()) progress(training.steps(), seconds);
-  }});
+  unlocked([&] {
+    return training.drive({.after = [&](double seconds) {
+      if (training.steps() % kQuiet != 0) return;
+      const py::gil_scoped_acquire held;
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+      if (!progress.is_none()) progress(training.steps(), seconds);
+    }});
+  });
 }
 
 void bind_fields(py::module_& module) {
@@ -100,12 +118,14 @@ void bind_fields(py::module_& module) {
             return nerf::make_cameras(f.cameras, nerf::parse_camera_set(set), count, size, seed);
           },
           "count"_a, "set"_a = "novel", "size"_a = 0, "seed"_a = 0,
-          "Cameras about the scene: novel, sphere or extrapolated.")
+          "Cameras about the scene: novel, ring, sphere, extrapolated, closer or farther.")
       .def(
           "render",
           [](const RadianceField& f, const Camera& camera) {
-            nerf::Renderer renderer(f);
-            return array_of(std::move(renderer.render(camera).rgb));
+            return array_of(unlocked([&] {
+              nerf::Renderer renderer(f);
+              return std::move(renderer.render(camera).rgb);
+            }));
           },
           "camera"_a, "An image [height, width, 3] in [0, 1].")
       .def("evaluate", &evaluate, "data"_a, "split"_a = "test", "size"_a = 0,

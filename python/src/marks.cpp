@@ -30,15 +30,25 @@ std::vector<double> evidence_of(const Owner& owner, const std::vector<py::object
     throw ValueError("[read] detection must be auto or blind, got '" + detection + "'");
   if (images.empty()) throw ValueError("[read] images must not be empty");
   std::vector<double> sum(at(owner.cells.count()));
-  const watermark::BlindReader blind(owner);
+  std::optional<watermark::BlindReader> blind;
   std::optional<watermark::InformedReader> informed;
-  if (detection == "auto" && owner.mark().has_cells()) informed.emplace(owner);
+  unlocked([&] {
+    if (detection == "auto" && owner.mark().has_cells())
+      informed.emplace(owner);
+    else
+      blind.emplace(owner);
+  });
   for (const py::object& given : images) {
     const py::array array = borrowed<float>("read: images: each", given);
     const auto pixels = elements<float>(array);
+    const auto outside = std::ranges::find_if(pixels, [](float v) { return v < 0 || v > 1; });
+    if (outside != pixels.end())
+      throw ValueError("[read] images: each must be in [0, 1] (divide 8-bit values by 255), got " +
+                       std::to_string(*outside));
     Tensor<float> image(shape_of(array));
     std::ranges::copy(pixels, image.data.begin());
-    const std::vector<double> one = informed ? informed->read(image).evidence() : blind.evidence(image);
+    const std::vector<double> one =
+        unlocked([&] { return informed ? informed->read(image).evidence() : blind->evidence(image); });
     for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += one[c];
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
   }
@@ -55,7 +65,9 @@ std::shared_ptr<Owner> embed(std::shared_ptr<nerf::RadianceField> field, const K
   recipe.embed.schedule.seconds = seconds;
   recipe.embed.schedule.steps = steps;
   recipe.views.count = views;
-  const auto cached = watermark::cache_embed_views(*field, recipe.owner.patch(), recipe.views, seed, {});
+  const auto cached = unlocked([&] {
+    return watermark::cache_embed_views(*field, recipe.owner.patch(), recipe.views, seed, check_signals);
+  });
   if (mark_psnr)
     recipe.owner.mark_psnr = *mark_psnr;
   else
@@ -63,7 +75,7 @@ std::shared_ptr<Owner> embed(std::shared_ptr<nerf::RadianceField> field, const K
   auto owner = std::make_shared<Owner>(recipe.make(*field, key, cached));
   watermark::Embedder embedder(*owner, cached, recipe.embed);
   run(embedder, progress);
-  embedder.calibrate();
+  unlocked([&] { embedder.calibrate(); });
   return owner;
 }
 
@@ -74,7 +86,7 @@ std::shared_ptr<nerf::RadianceField> bake(const Owner& owner, const std::string&
   options.schedule.steps = steps;
   watermark::Baker baker(owner, watermark::message_from_hex(message, owner.options().bits), options);
   run(baker, progress);
-  if (owner.mark().has_gain()) baker.scale_to(owner.options().mark_psnr);
+  if (owner.mark().has_gain()) unlocked([&] { baker.scale_to(owner.options().mark_psnr); });
   return std::make_shared<nerf::RadianceField>(baker.field());
 }
 
@@ -103,7 +115,7 @@ void bind_marks(py::module_& module) {
           "save", [](const Key& key, const std::filesystem::path& path) { watermark::save_key(path, key); },
           "path"_a, "Writes a KEY file that only its owner can read.")
       .def(
-          "__eq__", [](const Key& a, const Key& b) { return a == b; }, "other"_a)
+          "__eq__", [](const Key& a, const Key& b) { return a == b; }, "other"_a, py::is_operator())
       .def("__repr__", [](const Key&) { return "<fieldmark key, secret>"; });
   py::class_<Owner, std::shared_ptr<Owner>>(module, "Owner")
       .def_static(
@@ -115,7 +127,7 @@ void bind_marks(py::module_& module) {
       .def_property_readonly("mark_psnr", [](const Owner& o) { return o.options().mark_psnr; })
       .def_property_readonly("key", [](const Owner& o) { return o.key; })
       .def("extract", &extract, "images"_a, "detection"_a = "auto",
-           "Reads the message from images [height, width, 3] in [0, 1]: a dict with the message in "
+           "Reads the message from float32 images [height, width, 3] in [0, 1]: a dict with the message in "
            "hexadecimal\n"
            "digits, logits and p_values of the bits, and p_noise, that images without a mark give such bits.")
       .def("verify", &verify, "message"_a, "images"_a, "detection"_a = "auto",

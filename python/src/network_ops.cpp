@@ -203,7 +203,8 @@ void bind_weighted_means(py::module_& module) {
         return x.with(weighted_mean(x.get(), w.elements), w);
       },
       "x"_a, "weights"_a,
-      once<T>("sum w x / sum w of all elements, w an array >= 0 of the shape of x; 0 if all are 0."));
+      once<T>(
+          "sum w x / sum w of all elements, w an array >= 0 of the shape of x. ValueError if all are 0."));
   module.def(
       "feature_distance",
       [](V a, V b, Object weights) {

@@ -237,7 +237,7 @@ void bind_layout(py::module_& module) {
       "xs"_a, "axis"_a = -1, once<T>("Joins values along an axis; their other axes are alike."));
 }
 
-// The indices must outlive the pass: gather's backward reads them.
+// Reads an index; like every array of a pass, it stays read-only until the tape is reset.
 template <class T>
 Reading<std::int32_t> indices(const char* where, const Value<T>& x, const py::object& given) {
   const py::array index = x.tape->template reads<std::int32_t>(where, given);

@@ -1,5 +1,8 @@
 """A small job from a data set to the verdict, and the same bytes as the command's own formats."""
 
+import threading
+import time
+
 import numpy as np
 import pytest
 
@@ -88,9 +91,61 @@ def test_errors_name_what_is_wrong(scene, field, owner, tmp_path):
         owner.extract([np.zeros((8, 8, 3), "float32")], detection="seen")
 
 
+def test_pixels_outside_the_unit_interval_are_refused(owner):
+    for image in (np.full((8, 8, 3), 255, "float32"), np.full((8, 8, 3), -0.5, "float32")):
+        with pytest.raises(ValueError, match=r"in \[0, 1\] \(divide 8-bit values by 255\), got"):
+            owner.verify("a", [image])
+
+
+def test_the_ground_truth_is_composited_over_the_background_of_the_field(scene, field, tmp_path):
+    field.save(tmp_path / "white.fm")
+    bytes_of = (tmp_path / "white.fm").read_bytes()
+    assert bytes_of.count(b'"background\\":\\"white') > 0
+    (tmp_path / "black.fm").write_bytes(bytes_of.replace(b'"background\\":\\"white', b'"background\\":\\"black'))
+    black = fm.Field.load(tmp_path / "black.fm")
+    # Both see the same object; a truth over the other background would differ in half of the image.
+    assert abs(black.evaluate(scene)["psnr"] - field.evaluate(scene)["psnr"]) < 3
+
+
+def test_other_threads_go_on_while_a_field_trains(scene):
+    stamps, done = [], threading.Event()
+
+    def count():
+        while not done.is_set():
+            stamps.append(time.monotonic())
+            time.sleep(0.001)
+
+    beside = threading.Thread(target=count)
+    beside.start()
+    begin = time.monotonic()
+    fm.train(scene, steps=24)      # fewer steps than between two calls of progress
+    end = time.monotonic()
+    done.set()
+    beside.join()
+    inside = [t for t in stamps if begin < t < end]
+    assert inside and min(inside) - begin < (end - begin) / 2 < max(inside) - begin
+
+
+def test_two_threads_use_one_field(field):
+    camera = field.cameras(1, size=24)[0]
+    expected, images = field.render(camera), {}
+
+    def render(name):
+        images[name] = field.render(camera)
+
+    threads = [threading.Thread(target=render, args=(name,)) for name in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for name in range(4):
+        np.testing.assert_array_equal(images[name], expected)
+
+
 def test_a_key_is_kept_and_not_shown(tmp_path):
     key = fm.Key.random()
     key.save(tmp_path / "key")
     assert fm.Key.load(tmp_path / "key") == key and key != fm.Key.random()
+    assert key != None and not key == "key"  # noqa: E711: what is compared is the operator
     assert (tmp_path / "key").stat().st_mode & 0o077 == 0
     assert repr(key) == "<fieldmark key, secret>"
