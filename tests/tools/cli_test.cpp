@@ -22,7 +22,7 @@ TEST_CASE("fieldmark --help lists the commands, --version the version", "[cli]")
   CHECK(help.err.empty());
   const auto version = run_command({"--version"});
   CHECK(version.code == cli::kOk);
-  CHECK_THAT(version.out, Contains("0.1.0"));
+  CHECK_THAT(version.out, Contains("0.2.0"));
 }
 
 TEST_CASE("A wrong command or option is answered with the nearest one", "[cli]") {
