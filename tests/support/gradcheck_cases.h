@@ -29,6 +29,13 @@ inline void expect_cases_pass(const std::vector<fieldmark::GradcheckCase>& cases
   }
 }
 
+/// True if a case's name begins with a word: no letter, digit or underscore follows it.
+inline bool begins_with_word(const std::string& name, const std::string& word) {
+  if (!name.starts_with(word)) return false;
+  const char next = name.c_str()[word.size()];
+  return next != '_' && std::isalnum(static_cast<unsigned char>(next)) == 0;
+}
+
 /// Checks that each header below a source folder that documents its differentiability has a case whose name
 /// begins with the header's word. @return the number of such headers
 inline int expect_case_of_each_header(const std::vector<fieldmark::GradcheckCase>& cases,
@@ -42,11 +49,8 @@ inline int expect_case_of_each_header(const std::vector<fieldmark::GradcheckCase
     ++found;
     const std::string stem = file.path().stem().string();
     INFO("no gradcheck case begins with the word " << stem << " (" << file.path().string() << ")");
-    CHECK(std::any_of(cases.begin(), cases.end(), [&](const auto& c) {
-      if (!c.name.starts_with(stem)) return false;
-      const char next = c.name.c_str()[stem.size()];
-      return next != '_' && std::isalnum(static_cast<unsigned char>(next)) == 0;
-    }));
+    CHECK(std::any_of(cases.begin(), cases.end(),
+                      [&](const auto& c) { return begins_with_word(c.name, stem); }));
   }
   return found;
 }

@@ -1,12 +1,12 @@
 #include <fieldmark/core/files.h>
 #include <fieldmark/engine/isa.h>
 
-#include <cctype>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "cli/cli.h"
 #include "support/catch.h"
+#include "support/gradcheck_cases.h"
 #include "support/source_dir.h"
 #include "support/temporary_folder.h"
 #include "support/worst.h"
@@ -66,10 +66,7 @@ TEST_CASE("Every unit that is documented as differentiable has a check that begi
       const std::string stem = file.path().stem().string();
       INFO(module << "/" << stem << " has no entry in gradcheck_cases()");
       CHECK(std::any_of(cases.begin(), cases.end(), [&](const nlohmann::json& row) {
-        const auto name = row["name"].get<std::string>();
-        return row["module"] == module && name.starts_with(stem) &&
-               (name.size() == stem.size() ||
-                (name[stem.size()] != '_' && std::isalnum(name[stem.size()]) == 0));
+        return row["module"] == module && begins_with_word(row["name"], stem);
       }));
       ++units;
     }

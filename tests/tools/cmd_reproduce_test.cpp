@@ -55,6 +55,7 @@ TEST_CASE("reproduce measures what is missing on the built-in scene, once", "[re
   CHECK(cells[1].under.contains("weights_0.01"));
   CHECK_THAT(read_text(folder / "paper.md"), Contains("| Fieldmark, preset fast | objects | hash |"));
   CHECK(std::filesystem::exists(folder / "paper_bits.svg"));
+  CHECK(std::filesystem::exists(folder / "work/size-32/table-9"));  // apart from fields of other sizes
 
   const std::string kept = read_text(folder / "cells/ours-objects-hash-8-1.json");
   const auto second = run_command(line);

@@ -1,7 +1,9 @@
 #include <fieldmark/core/files.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "cli/cli.h"
 #include "support/catch.h"
 #include "support/temporary_folder.h"
 #include "tools/environment.h"
@@ -37,6 +39,18 @@ TEST_CASE("results measures what is named, once, and renders it", "[results]") {
   REQUIRE(page.code == cli::kOk);
   CHECK_THAT(read_text(folder / "out/numerics.md"), Contains("exp from -87.3 to 88"));
   CHECK_THAT(read_text(folder / "out/README.md"), Contains("| - | [quality](quality.md) |"));
+}
+
+TEST_CASE("results resumes no checkpoint that another command, code or input made", "[results]") {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "work/job");
+  const std::string checkpoint = folder / "work/job/lego-other.key.checkpoint";
+  write_file_atomically(checkpoint, "of other code");
+  const auto r = run_command({"results", "--run", "job/lego-key", "--draft", "--work", folder / "work"});
+  INFO(r.err << r.out);
+  CHECK(r.code == cli::kOk);  // a checkpoint would add --resume, which `key` refuses
+  CHECK(!std::filesystem::exists(checkpoint));
+  CHECK(std::filesystem::exists(folder / "work/job/lego-other.key"));
 }
 
 TEST_CASE("results lists every row with its state, and skips what has no data set", "[results]") {

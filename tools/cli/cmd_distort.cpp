@@ -15,6 +15,7 @@
 #include "cli/context.h"
 #include "cli/h264_clip.h"
 #include "cli/images.h"
+#include "cli/outputs.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -41,16 +42,10 @@ std::vector<std::filesystem::path> outputs_of(const std::vector<std::filesystem:
   return outputs;
 }
 
-// Images of another run among the new ones would be mistaken for this run's, above all by verify.
+// Tells of images that stay beside the new ones.
 void check_other_images(const DistortArguments& options, const std::vector<std::filesystem::path>& outputs,
                         Context& context) {
-  std::error_code none;
-  if (!std::filesystem::is_directory(options.out, none)) return;
-  auto others = images_in(options.out);
-  if (others.empty()) return;
-  if (!options.overwrite)
-    throw IoError(options.out + ": expected a folder without images, found " + std::to_string(others.size()) +
-                  "; name another folder, or --overwrite to replace images of the same names");
+  auto others = images_of_other_runs(options.out, options.overwrite, "images of the same names");
   std::erase_if(others, [&](const auto& path) { return std::ranges::find(outputs, path) != outputs.end(); });
   if (!others.empty())
     context.note(options.out +

@@ -17,6 +17,7 @@
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/images.h"
+#include "cli/outputs.h"
 #include "cli/precision.h"
 #include "cli/scene_data.h"
 #include "cli/supersampling.h"
@@ -108,22 +109,16 @@ void write_sheet(const RenderArguments& options, nerf::Renderer& renderer,
   write_png(options.sheet, results::comparison_sheet(pairs));
 }
 
-// Older views among new ones would be mistaken for the same run, above all by verify. --overwrite removes
-// files that this command named; others stay.
+// --overwrite removes older views that this command named; others stay.
 void clear_older_views(const RenderArguments& options, const std::vector<NamedCamera>& cameras,
                        Context& context) {
   std::vector<std::filesystem::path> older, others;
-  for (const auto& path : images_in(options.out)) {
+  for (const auto& path : images_of_other_runs(options.out, options.overwrite, "view_N.png")) {
     const std::string stem = path.stem().string();
     const bool ours = path.extension() == ".png" && stem.starts_with(kViewPrefix) &&
                       std::ranges::all_of(stem.substr(std::size(kViewPrefix) - 1), is_digit);
     (ours ? older : others).push_back(path);
   }
-  if (older.empty() && others.empty()) return;
-  if (!options.overwrite)
-    throw IoError(options.out + ": expected a folder without images, found " +
-                  std::to_string(older.size() + others.size()) +
-                  "; name another folder, or --overwrite to replace view_N.png");
   for (const auto& path : older) std::filesystem::remove(path);
   for (const auto& [name, camera] : cameras)
     std::erase(others, std::filesystem::path(options.out) / (name + ".png"));

@@ -1,4 +1,5 @@
 #include "cli/outputs.h"
+#include "cli/images.h"
 
 #include <fieldmark/core/error.h>
 #include <fieldmark/core/files.h>
@@ -68,6 +69,17 @@ void check_writable(const std::string& path) {
 void check_writable_page(const std::string& path) {
   AtomicFile{path};
   if (const auto model = model_at(path)) refuse(path, *model);
+}
+
+std::vector<fs::path> images_of_other_runs(const std::string& folder, bool overwrite,
+                                           const std::string& replaced) {
+  std::error_code none;
+  if (!fs::is_directory(folder, none)) return {};
+  auto images = images_in(folder);
+  if (!images.empty() && !overwrite)
+    throw IoError(folder + ": expected a folder without images, found " + std::to_string(images.size()) +
+                  "; name another folder, or --overwrite to replace " + replaced);
+  return images;
 }
 
 void prepare_folder(const std::string& path) {

@@ -1,5 +1,7 @@
 #pragma once
+#include <filesystem>
 #include <string>
+#include <vector>
 
 namespace fieldmark::cli {
 
@@ -10,6 +12,13 @@ void check_writable(const std::string& path);
 
 /// As check_writable(), for text and images, which must not replace a field or checkpoint either.
 void check_writable_page(const std::string& path);
+
+/// Returns the images that a folder for outputs holds already. Among new ones they would be mistaken for the
+/// same run, above all by verify.
+/// @param replaced  the names that --overwrite replaces, for the message
+/// @throws IoError if there are any, unless they may be overwritten
+std::vector<std::filesystem::path> images_of_other_runs(const std::string& folder, bool overwrite,
+                                                        const std::string& replaced);
 
 /// Creates a folder for outputs, and checks that files can be written to it.
 /// @throws IoError naming the folder and what to do
