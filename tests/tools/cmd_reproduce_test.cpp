@@ -77,6 +77,23 @@ TEST_CASE("reproduce --report-only writes the page from the cells that are there
   CHECK(!std::filesystem::exists(folder / "work"));
 }
 
+TEST_CASE("reproduce shows cells of a longer budget on the page of the folder that they are in",
+          "[reproduce]") {
+  const TemporaryFolder folder;
+  auto cells = paper_cells();
+  for (const auto& cell : cells) save_cell(folder / "cells", cell);
+  cells[1].bit_accuracy = 0.5625;
+  save_cell(folder / "cells/longer", cells[1]);
+  const auto r = run_command({"reproduce", "--report-only", "--table", "quality", "--system",
+                              cells[1].name.system, "--scene", "lego", "--cells", folder / "cells/longer/"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  CHECK_THAT(r.out, !Contains("  copyrnerf_paper-lego-hash-16-1\n"));  // not missing in `longer`
+  CHECK_THAT(read_text(folder / "paper.md"),
+             Contains("98.44 ± 0.62") && Contains("## Longer budgets") && Contains("56.25 ± 0.62"));
+  CHECK(!std::filesystem::exists(folder / "cells/paper.md"));
+}
+
 TEST_CASE("reproduce has every system once before it turns to other lengths and scenes", "[reproduce]") {
   const TemporaryFolder folder;
   const auto r = run_command({"reproduce", "--report-only", "--scene", "lego", "--scene", "chair", "--cells",

@@ -109,12 +109,23 @@ double seconds_of_a_cell(const std::vector<baselines::Cell>& cells, double budge
   return count > 0 ? sum / count : 1.5 * budget;
 }
 
+// The folder of the page's cells, and the subfolder of it, with a slash, in which this run's cells are.
+struct CellsFolder {
+  std::filesystem::path path;
+  std::string below;
+};
+CellsFolder cells_folder(const ReproduceArguments& options) {
+  std::filesystem::path folder = std::filesystem::absolute(options.cells).lexically_normal();
+  if (!folder.has_filename()) folder = folder.parent_path();  // "cells/"
+  if (folder.filename() != results::kLongerCells) return {folder, ""};
+  return {folder.parent_path(), std::string(results::kLongerCells) + "/"};
+}
+
 // The page is next to the folder of cells, unless --report names it.
 std::filesystem::path page_of(const ReproduceArguments& options, const Context& context) {
   if (!context.options().report.empty()) return context.options().report;
-  std::filesystem::path folder = std::filesystem::path(options.cells).lexically_normal();
-  if (!folder.has_filename()) folder = folder.parent_path();  // "cells/"
-  return folder.parent_path() / "paper.md";
+  return cells_folder(options).path.parent_path().lexically_proximate(std::filesystem::current_path()) /
+         "paper.md";
 }
 
 // Saves a cell as a row, with its image next to it.
@@ -127,7 +138,7 @@ void save(const ReproduceArguments& options, const std::vector<baselines::PaperS
   const auto file = baselines::cell_path(options.cells, name);
   std::filesystem::create_directories(options.cells);
   write_png(file.string() + ".png", measured.image);
-  const results::PlannedRow row{"paper/" + name.stem(), "reproduce",
+  const results::PlannedRow row{"paper/" + cells_folder(options).below + name.stem(), "reproduce",
                                 "reproduce --scene " + data + " --system " + name.system + " --budget " +
                                     results::shown(options.budget)};
   Json json = results::make_row({.id = row.id,
@@ -194,7 +205,7 @@ void measure(const ReproduceArguments& options, const std::vector<baselines::Pap
       shown.end_line();
       measured.cell.more["total_seconds"] = context.seconds() - begun;
       save(options, scenes, measured, context.seconds() - begun);
-      results::write_paper_page(options.cells, page_of(options, context));
+      results::write_paper_page(cells_folder(options).path, page_of(options, context));
       char line[120];
       std::snprintf(line, sizeof line, ": %.2f%% right, %.2f dB on the foreground, %s\n",
                     100 * measured.cell.bit_accuracy, measured.cell.psnr_base_foreground,
@@ -234,7 +245,7 @@ int run_reproduce(const ReproduceArguments& options, Context& context) {
                   {"missing", left},
                   {"seconds_left", each * static_cast<double>(missing.size())}});
   // Replaces the page that every command can write.
-  const bool written = results::write_paper_page(options.cells, page);
+  const bool written = results::write_paper_page(cells_folder(options).path, page);
   context.text() << page.string() << (written ? ": written\n" : ": not written, there are no cells\n");
   return kOk;
 }
@@ -297,9 +308,11 @@ Command add_reproduce(CommandLine& app) {
       ->type_name("NAME")
       ->default_str("");
   add_measuring_options(app, *o);
-  app.add_option("--cells", o->cells,
-                 "Folder of the cells; existing cells are not measured again. paper.md and its figures are "
-                 "written to the folder above it, or beside --report")
+  app.add_option(
+         "--cells", o->cells,
+         "Folder of the cells; existing cells are not measured again. paper.md and its figures are "
+         "written to the folder above it, or beside --report. Its subfolder longer, named here in its "
+         "place, holds cells of a longer budget, which the same page lists")
       ->type_name("DIR");
   app.add_option("--work", o->work, "Folder for checkpoints and unmarked fields")->type_name("DIR");
   add_lpips_weights(app, o->lpips_weights);

@@ -11,7 +11,7 @@ TEST_CASE("Lines of lengths, of the severities that were measured, and of the co
           "[paper_figures]") {
   auto cells = paper_cells();
   keep_curve(cells.back(), "seconds,steps,figure\n1.5,10,0.5\n3.0,20,0.75\n");
-  const auto figures = results::paper_figures(cells);
+  const auto figures = results::paper_figures({cells, {}});
   REQUIRE(figures.size() == 5);  // nothing was rotated, scaled or blurred
   CHECK(count_parts(figures.at("paper_psnr.svg"), "class=\"point\"") == 2);
   CHECK_THAT(figures.at("paper_psnr.svg"), Contains("Fieldmark, preset fast, 100 steps"));
@@ -24,8 +24,8 @@ TEST_CASE("Lines of lengths, of the severities that were measured, and of the co
   CHECK(count_parts(figures.at("paper_learning.svg"), "class=\"point\"") == 2);
   CHECK(count_parts(figures.at("paper_learning_ablation.svg"), "class=\"point\"") == 2);
   for (auto& c : cells) c.psnr_base = std::nan("");
-  CHECK(!results::paper_figures(cells).contains("paper_psnr.svg"));
-  CHECK(results::paper_figures({}).size() == 1);  // only lengths that the paper reports
+  CHECK(!results::paper_figures({cells, {}}).contains("paper_psnr.svg"));
+  CHECK(results::paper_figures({{}, {}}).size() == 1);  // only lengths that the paper reports
 }
 
 TEST_CASE("Figures are of the scene with most cells, and ablations are in their own", "[paper_figures]") {
@@ -37,15 +37,15 @@ TEST_CASE("Figures are of the scene with most cells, and ablations are in their 
     cells.back().name.scene = scene;
     cells.back().name.field = field;
   };
-  const auto before = results::paper_figures(cells);
+  const auto before = results::paper_figures({cells, {}});
   add("nerf_message", "chair", "hash");
   add("copyrnerf_code", "lego", "mlp");
-  CHECK(results::paper_figures(cells) == before);
+  CHECK(results::paper_figures({cells, {}}) == before);
   add("ours", "lego", "hash");  // another seed is not another length
-  CHECK(results::paper_figures(cells).at("paper_bits.svg") == before.at("paper_bits.svg"));
+  CHECK(results::paper_figures({cells, {}}).at("paper_bits.svg") == before.at("paper_bits.svg"));
   cells.pop_back();
   add("without_drr", "lego", "hash");
-  const auto after = results::paper_figures(cells);
+  const auto after = results::paper_figures({cells, {}});
   CHECK(after.at("paper_noise.svg") == before.at("paper_noise.svg"));
   CHECK(after.at("paper_learning.svg") == before.at("paper_learning.svg"));
   CHECK_THAT(after.at("paper_learning_ablation.svg"), Contains("CopyRNeRF without DRR"));
@@ -55,13 +55,13 @@ TEST_CASE("Figures are of the scene with most cells, and ablations are in their 
 TEST_CASE("Preset paper has a curve for every scene and length, but for one seed", "[paper_figures]") {
   auto cells = paper_cells();
   for (auto& c : cells) keep_curve(c, "seconds,steps,figure\n1.5,10,0.5\n3.0,20,0.75\n");
-  const auto before = results::paper_figures(cells);
+  const auto before = results::paper_figures({cells, {}});
   CHECK_THAT(before.at("paper_learning_preset.svg"), Contains("lego, hash field, 4 bits, 100 steps") &&
                                                          Contains("lego, hash field, 16 bits, 100 steps"));
   CHECK(count_parts(before.at("paper_learning_preset.svg"), "class=\"point\"") == 4);
   cells.push_back(cells[1]);
   cells.back().name.seed = 2;
-  CHECK(results::paper_figures(cells) == before);
+  CHECK(results::paper_figures({cells, {}}) == before);
 }
 
 TEST_CASE("A 2-D network is named in the learning curves, and drawn once", "[paper_figures]") {
@@ -73,7 +73,7 @@ TEST_CASE("A 2-D network is named in the learning curves, and drawn once", "[pap
   cells.push_back(cells.back());
   cells.back().name.system = "hidden_nerf";
   cells.back().more["training_images_accuracy"] = 0.99;
-  const auto curves = results::paper_figures(cells).at("paper_learning.svg");
+  const auto curves = results::paper_figures({cells, {}}).at("paper_learning.svg");
   CHECK(count_parts(curves, "class=\"point\"") == 2);
   CHECK_THAT(curves, Contains("NeRF + HiDDeN, its 2-D network"));
 }

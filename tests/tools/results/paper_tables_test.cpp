@@ -38,7 +38,7 @@ TEST_CASE("A system with one message is compared with none", "[paper_tables]") {
 }
 
 TEST_CASE("A cell's state stands beside its protocol", "[paper_tables]") {
-  const auto cells = paper_cells();
+  const results::PaperCells cells{paper_cells(), {}};
   const auto table = [&](const results::StaleReason& stale) { return results::protocol_table(cells, stale); };
   CHECK_THAT(table({}), Contains("| pixels | commit |\n"));
   const std::string told = table([](const std::string& id) {

@@ -141,6 +141,14 @@ std::vector<LineSeries> paper_curves(const std::vector<Cell>& cells) {
   return lines;
 }
 
+// Returns the curve of every cell of a longer budget.
+std::vector<LineSeries> longer_curves(const std::vector<Cell>& cells) {
+  std::vector<LineSeries> lines;
+  for (const Cell& c : cells)
+    lines.push_back(curve_of(c, with_steps(baselines::paper_system(c.name.system).title, c)));
+  return lines;
+}
+
 // Returns a point for each system: what it reads, and how far its renders are from the unmarked ones.
 std::vector<bench::ScatterPoint> points_of_psnr(const std::vector<Cell>& cells) {
   std::vector<bench::ScatterPoint> points;
@@ -164,8 +172,8 @@ bool is_drawn(const std::vector<LineSeries>& lines) {
 
 }  // namespace
 
-std::map<std::string, std::string> paper_figures(const std::vector<Cell>& measured) {
-  const std::vector<Cell> all = one_of_seeds(measured), cells = drawn_cells(all);
+std::map<std::string, std::string> paper_figures(const PaperCells& measured) {
+  const std::vector<Cell> all = one_of_seeds(measured.tables), cells = drawn_cells(all);
   std::string scene;
   if (!cells.empty()) scene.append(", ").append(cells.front().name.scene);
   std::map<std::string, std::string> figures;
@@ -188,6 +196,9 @@ std::map<std::string, std::string> paper_figures(const std::vector<Cell>& measur
   add("paper_learning_preset.svg",
       {"Bits right in training, CopyRNeRF, preset paper", "seconds of training", "bits right, %"},
       paper_curves(all));
+  add("paper_learning_longer.svg",
+      {"Bits right in training, longer budgets", "seconds of training", "bits right, %"},
+      longer_curves(measured.longer));
   if (const auto points = points_of_psnr(cells); !points.empty())
     figures["paper_psnr.svg"] =
         bench::scatter_chart({.title = "Bit accuracy of one view against PSNR, 16 bits" + scene,

@@ -64,6 +64,12 @@ does not state the length of its message; ours is 16 bits.
 
 )";
 
+constexpr const char* kLonger =
+    R"(Rows that miss a target of the project, with four times the training. Each stands below
+its row of the tables above. Its curve is in paper_learning_longer.svg, under Figures.
+
+)";
+
 constexpr const char* kDepartures = R"(
 ## Departures
 
@@ -113,10 +119,14 @@ std::string sheet_text(const PaperSheet& sheet, const std::vector<Cell>& cells,
 
 }  // namespace
 
+PaperCells load_paper_cells(const std::filesystem::path& folder) {
+  return {baselines::load_cells(folder), baselines::load_cells(folder / kLongerCells)};
+}
+
 bool write_paper_page(const std::filesystem::path& folder, const std::filesystem::path& page,
                       const StaleReason& stale) {
-  const auto cells = baselines::load_cells(folder);
-  if (cells.empty()) return false;
+  const PaperCells cells = load_paper_cells(folder);
+  if (cells.tables.empty() && cells.longer.empty()) return false;
   const auto beside = [&](const std::string& name) { return page.parent_path() / name; };
   std::vector<std::string> figures;
   for (const auto& [name, svg] : paper_figures(cells)) {
@@ -125,16 +135,16 @@ bool write_paper_page(const std::filesystem::path& folder, const std::filesystem
   }
   std::string sheets;
   for (const PaperSheet& sheet : paper_sheets()) {
-    const auto stems = write_paper_sheet(sheet, cells, folder, beside(sheet.name));
-    if (!stems.empty()) sheets += sheet_text(sheet, cells, stems);
+    const auto stems = write_paper_sheet(sheet, cells.tables, folder, beside(sheet.name));
+    if (!stems.empty()) sheets += sheet_text(sheet, cells.tables, stems);
   }
   write_file_atomically(page, paper_page(cells, figures, sheets, stale));
   return true;
 }
 
-std::string paper_page(const std::vector<Cell>& cells, const std::vector<std::string>& figures,
+std::string paper_page(const PaperCells& cells, const std::vector<std::string>& figures,
                        const std::string& sheets, const StaleReason& stale) {
-  const auto groups = paper_groups(cells);
+  const auto groups = paper_groups(cells.tables), longer = paper_groups(cells.longer);
   std::string text = kTitle + std::string(baselines::kPublishedSource) + kHowToRead + first_table(groups) +
                      "\n## Systems\n\n| system | what is trained |\n| --- | --- |\n";
   for (const auto& s : baselines::paper_systems()) text += "| " + s.title + " | " + s.what + " |\n";
@@ -152,6 +162,7 @@ std::string paper_page(const std::vector<Cell>& cells, const std::vector<std::st
   section("Order of the rows",
           "Pairs of different budgets or commits (see Cells) do not compare methods.\n\n",
           order_of_rows(groups));
+  if (!longer.empty()) section("Longer budgets", kLonger, longer_table(longer, groups));
   text += kDepartures + departures_table() + kFigures;
   for (const auto& f : figures) text += "![" + f + "](" + f + ")\n\n";
   text += sheets;

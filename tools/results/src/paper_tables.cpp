@@ -291,6 +291,30 @@ std::string named_table(const Groups& groups, const char* table, const std::stri
   return markdown_table(header, rows);
 }
 
+std::string longer_table(const Groups& longer, const Groups& groups) {
+  std::vector<Row> rows;
+  const auto add = [&](const PaperGroup& g) {
+    Row row = start_of(g);
+    row.insert(row.end(),
+               {std::to_string(g.bits), accuracy_of(g), percent(mean_under(g.cells, "rotation_30")),
+                percent(mean(g.cells, &Cell::own_2d_accuracy)), fixed(mean(g.cells, &Cell::psnr_base), 2),
+                fixed(mean(g.cells, &Cell::psnr_gt), 2)});
+    rows.push_back(row);
+  };
+  for (const PaperGroup& g : longer) {
+    for (const PaperGroup& other : groups)
+      if (other.system == g.system && other.scene == g.scene && other.field == g.field &&
+          other.bits == g.bits)
+        add(other);
+    add(g);
+  }
+  Row header = kStart;
+  header.insert(header.end(),
+                {"bits", "bits right, %", "under rotation_30, %", "2-D network on its own images, %",
+                 "PSNR to the unmarked render", "PSNR to ground truth"});
+  return markdown_table(header, rows);
+}
+
 std::string order_of_rows(const Groups& groups) {
   std::string reversed, ties;
   for (const PaperGroup& a : groups)
@@ -318,21 +342,23 @@ std::string order_of_rows(const Groups& groups) {
          (ties.empty() ? "- none\n" : ties);
 }
 
-std::string protocol_table(const std::vector<Cell>& cells, const StaleReason& stale) {
+std::string protocol_table(const PaperCells& cells, const StaleReason& stale) {
   std::vector<Row> rows;
   double seconds = 0;
-  for (const Cell& c : cells) {
+  const auto add = [&](const Cell& c, const std::string& folder) {
     const auto more = [&](const char* name) {
       return c.more.contains(name) ? fixed(c.more.at(name), 0) : std::string("-");
     };
     seconds += c.more.contains("total_seconds") ? c.more.at("total_seconds") : c.seconds;
-    rows.push_back({c.name.stem(), std::to_string(c.steps), fixed(c.seconds, 1), more("total_seconds"),
-                    more("budget"), more("views"), more("distorted_views"), more("test_images"),
-                    more("width") + " x " + more("height"), c.commit});
-    if (!stale) continue;
-    const std::string why = stale("paper/" + c.name.stem());
+    rows.push_back({folder + c.name.stem(), std::to_string(c.steps), fixed(c.seconds, 1),
+                    more("total_seconds"), more("budget"), more("views"), more("distorted_views"),
+                    more("test_images"), more("width") + " x " + more("height"), c.commit});
+    if (!stale) return;
+    const std::string why = stale("paper/" + folder + c.name.stem());
     rows.back().push_back(why.empty() ? "fresh" : "stale: " + why);
-  }
+  };
+  for (const Cell& c : cells.tables) add(c, "");
+  for (const Cell& c : cells.longer) add(c, std::string(kLongerCells) + "/");
   Row header{"cell",      "steps",       "seconds of training", "seconds in all",
              "budget, s", "novel views", "under distortion",    "ground truth",
              "pixels",    "commit"};
@@ -340,7 +366,7 @@ std::string protocol_table(const std::vector<Cell>& cells, const StaleReason& st
   return markdown_table(header, rows) +
          "\nSeconds in all are of the cell's own run; a network that another cell trained counts there "
          "alone. In all " +
-         std::to_string(cells.size()) + " cells, " + fixed(seconds / 3600, 2) + " hours.\n";
+         std::to_string(rows.size()) + " cells, " + fixed(seconds / 3600, 2) + " hours.\n";
 }
 
 }  // namespace fieldmark::results

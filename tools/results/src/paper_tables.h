@@ -37,12 +37,14 @@ std::string quality_table(const std::vector<PaperGroup>& groups);
 std::string distortion_table(const std::vector<PaperGroup>& groups);
 /// CopyRNeRF and ours with and without their parts, on the scene of first_table().
 std::string ablation_table(const std::vector<PaperGroup>& groups);
+/// Each group of longer cells below the group of the tables that differs from it in the budget alone.
+std::string longer_table(const std::vector<PaperGroup>& longer, const std::vector<PaperGroup>& groups);
 /// One column for each name of Cell::under that begins with the prefix, beside the published figures of a
 /// table.
 std::string named_table(const std::vector<PaperGroup>& groups, const char* table, const std::string& prefix);
 /// Lists the pairs whose order in the paper our figures reverse, and those that they leave open.
 std::string order_of_rows(const std::vector<PaperGroup>& groups);
 /// How each cell was measured, and whether it is stale, see paper_page().
-std::string protocol_table(const std::vector<baselines::Cell>& cells, const StaleReason& stale);
+std::string protocol_table(const PaperCells& cells, const StaleReason& stale);
 
 }  // namespace fieldmark::results

@@ -1,5 +1,6 @@
 #pragma once
 #include <fieldmark/baselines/cell.h>
+#include <fieldmark/tools/results/paper_page.h>
 
 #include <filesystem>
 #include <map>
@@ -11,8 +12,8 @@ namespace fieldmark::results {
 /// Returns SVG files by name, of one seed of each cell: accuracy against length, against severity and against
 /// PSNR, and learning curves over seconds, see kept_curve(), with ablations in a figure of their own. They
 /// show the scene with the most cells, on the hash field; paper_learning_preset.svg shows every cell of
-/// preset paper. Figures without points are omitted.
-std::map<std::string, std::string> paper_figures(const std::vector<baselines::Cell>& measured);
+/// preset paper, and paper_learning_longer.svg every longer cell. Figures without points are omitted.
+std::map<std::string, std::string> paper_figures(const PaperCells& measured);
 
 /// A contact sheet shown on the page.
 struct PaperSheet {
