@@ -194,7 +194,7 @@ std::vector<Format> formats() {
   RadianceField mlp(small_mlp_options());
   mlp.cameras = small_field().cameras;
   const auto file = std::make_shared<MemoryFile>();
-  const auto run = std::make_shared<EmbedRun>();
+  const auto embed_run = std::make_shared<EmbedRun>();
   const auto field_run = std::make_shared<FieldRun>();
   const auto bake_run = std::make_shared<BakeRun>();
   const std::string npy = npy_file("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }",
@@ -241,26 +241,26 @@ std::vector<Format> formats() {
        [=](const std::string& b) { bake_run->baker.restore(file->holding(b)); },
        true},
       {"embed checkpoint",
-       {saved(run->embedder)},
+       {saved(embed_run->embedder)},
        [=](const std::string& b) {
          const auto path = file->holding(b);
          watermark::Embedder::checkpoint_key(path);
-         run->embedder.restore(path);
+         embed_run->embedder.restore(path);
        },
        true},
       {"png",
        {png(1), png(2), png(3), png(4)},
        [](const std::string& b) { decode_image(bytes_of(b), "input"); }},
       {"jpeg", {jpeg(1, 50), jpeg(3, 90)}, [](const std::string& b) { decode_image(bytes_of(b), "input"); }},
-      {"exif",
-       {turned(3, false), turned(8, true)},
-       [](const std::string& b) {
-         image_oddity(bytes_of(b));
-         const int orientation = exif_orientation(bytes_of(b));
-         if (orientation < 1 || orientation > 8) throw std::logic_error("no orientation");
-       },
-       false,
-       false},
+      {.name = "exif",
+       .samples = {turned(3, false), turned(8, true)},
+       .read =
+           [](const std::string& b) {
+             image_oddity(bytes_of(b));
+             const int orientation = exif_orientation(bytes_of(b));
+             if (orientation < 1 || orientation > 8) throw std::logic_error("no orientation");
+           },
+       .refuses = false},
       {"readings",
        {readings()},
        [=](const std::string& b) {

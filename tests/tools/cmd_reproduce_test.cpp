@@ -2,6 +2,7 @@
 #include <fieldmark/baselines/paper_plan.h>
 #include <fieldmark/core/files.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -58,10 +59,20 @@ TEST_CASE("reproduce measures what is missing on the built-in scene, once", "[re
   CHECK(std::filesystem::exists(folder / "work/size-32/table-9"));  // apart from fields of other sizes
 
   const std::string kept = read_text(folder / "cells/ours-objects-hash-8-1.json");
+  CHECK(nlohmann::json::parse(kept)["id"] == "paper/ours-objects-hash-8-1");
   const auto second = run_command(line);
   CHECK(second.code == cli::kOk);
   CHECK_THAT(second.err, Contains("0 of 2 cells are missing\n"));
   CHECK(read_text(folder / "cells/ours-objects-hash-8-1.json") == kept);
+
+  std::vector<std::string> longer = line;
+  *std::ranges::find(longer, (folder / "cells").string()) = folder / "cells/longer";
+  longer.insert(longer.end(), {"--system", "ours"});
+  const auto third = run_command(longer);
+  INFO(third.err);
+  REQUIRE(third.code == cli::kOk);
+  CHECK(nlohmann::json::parse(read_text(folder / "cells/longer/ours-objects-hash-8-1.json"))["id"] ==
+        "paper/longer/ours-objects-hash-8-1");
 }
 
 TEST_CASE("reproduce --report-only writes the page from the cells that are there", "[reproduce]") {
@@ -82,13 +93,16 @@ TEST_CASE("reproduce shows cells of a longer budget on the page of the folder th
   const TemporaryFolder folder;
   auto cells = paper_cells();
   for (const auto& cell : cells) save_cell(folder / "cells", cell);
+  REQUIRE(cells[1].name == baselines::CellName{"copyrnerf_paper", "lego", "hash", 16, 1});
   cells[1].bit_accuracy = 0.5625;
   save_cell(folder / "cells/longer", cells[1]);
-  const auto r = run_command({"reproduce", "--report-only", "--table", "quality", "--system",
-                              cells[1].name.system, "--scene", "lego", "--cells", folder / "cells/longer/"});
+  const auto r = run_command({"reproduce", "--report-only", "--table", "bits", "--system", "copyrnerf_paper",
+                              "--scene", "lego", "--cells", folder / "cells/longer/"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
-  CHECK_THAT(r.out, !Contains("  copyrnerf_paper-lego-hash-16-1\n"));  // not missing in `longer`
+  // Only the subfolder's cells count as measured: that of 4 bits is in the folder above.
+  CHECK_THAT(r.out, Contains("  copyrnerf_paper-lego-hash-4-1\n") &&
+                        !Contains("  copyrnerf_paper-lego-hash-16-1\n"));
   CHECK_THAT(read_text(folder / "paper.md"),
              Contains("98.44 ± 0.62") && Contains("## Longer budgets") && Contains("56.25 ± 0.62"));
   CHECK(!std::filesystem::exists(folder / "cells/paper.md"));

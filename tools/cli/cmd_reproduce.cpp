@@ -124,8 +124,8 @@ CellsFolder cells_folder(const ReproduceArguments& options) {
 // The page is next to the folder of cells, unless --report names it.
 std::filesystem::path page_of(const ReproduceArguments& options, const Context& context) {
   if (!context.options().report.empty()) return context.options().report;
-  return cells_folder(options).path.parent_path().lexically_proximate(std::filesystem::current_path()) /
-         "paper.md";
+  const auto folder = cells_folder(options).path.parent_path();
+  return (folder.lexically_proximate(std::filesystem::current_path()) / "paper.md").lexically_normal();
 }
 
 // Saves a cell as a row, with its image next to it.

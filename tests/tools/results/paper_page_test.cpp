@@ -60,7 +60,8 @@ TEST_CASE("Cells of a longer budget stand below their row of the tables, and in 
   CHECK_THAT(before, !Contains("56.25") && !Contains("53.12"));
 
   const auto figures = results::paper_figures(loaded);
-  CHECK_THAT(figures.at("paper_learning_longer.svg"), Contains("CopyRNeRF, preset paper, 400 steps"));
+  CHECK_THAT(figures.at("paper_learning_longer.svg"),
+             Contains("CopyRNeRF, preset paper, lego, hash field, 16 bits, 400 steps"));
   CHECK(!results::paper_figures({loaded.tables, {}}).contains("paper_learning_longer.svg"));
   CHECK(figures.size() == results::paper_figures({loaded.tables, {}}).size() + 1);
 }

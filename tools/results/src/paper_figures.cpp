@@ -130,14 +130,17 @@ std::vector<LineSeries> learning_curves(const std::vector<Cell>& cells, bool abl
   return lines;
 }
 
+// Names all of a cell but its system and seed.
+std::string place_of(const Cell& c) {
+  return with_steps(c.name.scene + ", " + c.name.field + " field, " + std::to_string(c.name.bits) + " bits",
+                    c);
+}
+
 // Returns the curves of preset paper for every scene, field and length.
 std::vector<LineSeries> paper_curves(const std::vector<Cell>& cells) {
   std::vector<LineSeries> lines;
   for (const Cell& c : cells)
-    if (c.name.system == "copyrnerf_paper")
-      lines.push_back(curve_of(c, with_steps(c.name.scene + ", " + c.name.field + " field, " +
-                                                 std::to_string(c.name.bits) + " bits",
-                                             c)));
+    if (c.name.system == "copyrnerf_paper") lines.push_back(curve_of(c, place_of(c)));
   return lines;
 }
 
@@ -145,7 +148,7 @@ std::vector<LineSeries> paper_curves(const std::vector<Cell>& cells) {
 std::vector<LineSeries> longer_curves(const std::vector<Cell>& cells) {
   std::vector<LineSeries> lines;
   for (const Cell& c : cells)
-    lines.push_back(curve_of(c, with_steps(baselines::paper_system(c.name.system).title, c)));
+    lines.push_back(curve_of(c, baselines::paper_system(c.name.system).title + ", " + place_of(c)));
   return lines;
 }
 
@@ -198,7 +201,7 @@ std::map<std::string, std::string> paper_figures(const PaperCells& measured) {
       paper_curves(all));
   add("paper_learning_longer.svg",
       {"Bits right in training, longer budgets", "seconds of training", "bits right, %"},
-      longer_curves(measured.longer));
+      longer_curves(one_of_seeds(measured.longer)));
   if (const auto points = points_of_psnr(cells); !points.empty())
     figures["paper_psnr.svg"] =
         bench::scatter_chart({.title = "Bit accuracy of one view against PSNR, 16 bits" + scene,

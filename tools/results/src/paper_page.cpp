@@ -65,8 +65,8 @@ does not state the length of its message; ours is 16 bits.
 )";
 
 constexpr const char* kLonger =
-    R"(Rows that miss a target of the project, with four times the training. Each stands below
-its row of the tables above. Its curve is in paper_learning_longer.svg, under Figures.
+    R"(Cells with more training than those of the tables above. Each stands below the row of the tables that
+differs in the budget alone; paper_learning_longer.svg, under Figures, has its curve.
 
 )";
 

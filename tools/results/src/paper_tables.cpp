@@ -59,15 +59,25 @@ bool marks_training_images(const Cell& cell) { return cell.more.contains("traini
 
 std::string percent(double share) { return fixed(100 * share, 2); }
 
+namespace {
+
+// Returns the group of a system, scene, field and length; the end if there is none.
+template <class AnyGroups>
+auto find_group(AnyGroups& groups, const std::string& system, const std::string& scene,
+                const std::string& field, Index bits) {
+  return std::ranges::find_if(groups, [&](const PaperGroup& g) {
+    return g.system == system && g.scene == scene && g.field == field && g.bits == bits;
+  });
+}
+
+}  // namespace
+
 std::vector<PaperGroup> paper_groups(const std::vector<Cell>& cells) {
   std::vector<PaperGroup> groups;
   for (const auto& system : baselines::paper_systems())
     for (const Cell& c : cells) {
       if (c.name.system != system.name) continue;
-      auto found = std::find_if(groups.begin(), groups.end(), [&](const PaperGroup& g) {
-        return g.system == c.name.system && g.scene == c.name.scene && g.field == c.name.field &&
-               g.bits == c.name.bits;
-      });
+      auto found = find_group(groups, c.name.system, c.name.scene, c.name.field, c.name.bits);
       if (found == groups.end())
         found = groups.insert(groups.end(),
                               {c.name.system, system.title, c.name.scene, c.name.field, c.name.bits, {}});
@@ -182,10 +192,7 @@ std::string bits_table(const Groups& groups) {
     if (!seen.insert(g.system + "/" + g.scene + "/" + g.field).second) continue;
     Row row{g.title, g.scene, g.field};
     for (const Index n : kLengths) {
-      const auto found = std::find_if(groups.begin(), groups.end(), [&](const PaperGroup& other) {
-        return other.system == g.system && other.scene == g.scene && other.field == g.field &&
-               other.bits == n;
-      });
+      const auto found = find_group(groups, g.system, g.scene, g.field, n);
       row.push_back(found == groups.end() ? "-"
                                           : beside(accuracy_of(*found), "bits", g.system, std::to_string(n)) +
                                                 ", " + steps_of(*found));
@@ -302,10 +309,8 @@ std::string longer_table(const Groups& longer, const Groups& groups) {
     rows.push_back(row);
   };
   for (const PaperGroup& g : longer) {
-    for (const PaperGroup& other : groups)
-      if (other.system == g.system && other.scene == g.scene && other.field == g.field &&
-          other.bits == g.bits)
-        add(other);
+    if (const auto found = find_group(groups, g.system, g.scene, g.field, g.bits); found != groups.end())
+      add(*found);
     add(g);
   }
   Row header = kStart;

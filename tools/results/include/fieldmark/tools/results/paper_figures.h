@@ -12,7 +12,7 @@ namespace fieldmark::results {
 /// Returns SVG files by name, of one seed of each cell: accuracy against length, against severity and against
 /// PSNR, and learning curves over seconds, see kept_curve(), with ablations in a figure of their own. They
 /// show the scene with the most cells, on the hash field; paper_learning_preset.svg shows every cell of
-/// preset paper, and paper_learning_longer.svg every longer cell. Figures without points are omitted.
+/// preset paper, and paper_learning_longer.svg the longer cells. Figures without points are omitted.
 std::map<std::string, std::string> paper_figures(const PaperCells& measured);
 
 /// A contact sheet shown on the page.

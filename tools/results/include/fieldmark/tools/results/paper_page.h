@@ -13,12 +13,12 @@ using StaleReason = std::function<std::string(const std::string& id)>;
 
 /// Subfolder of a folder of cells, for those of longer budgets.
 inline constexpr const char* kLongerCells = "longer";
-/// The cells of a page: those of its tables, and those of longer budgets, for rows that miss their target.
+/// The cells of a page: those of its tables, and those of longer budgets.
 struct PaperCells {
   std::vector<baselines::Cell> tables, longer;
 };
-/// Loads the cells of a folder and, as the longer ones, those of its subfolder kLongerCells.   @throws
-/// IoError
+/// Loads the cells of a folder and, as the longer ones, those of its subfolder kLongerCells.
+/// @throws IoError
 PaperCells load_paper_cells(const std::filesystem::path& folder);
 
 /// Formats the page of the paper's tables, our figures next to the published ones, from cells alone: equal
