@@ -7,8 +7,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "nerf/objects_scene.h"
-#include "nerf/small_field.h"
+#include "nerf/trainer_runs.h"
 #include "support/catch.h"
 #include "support/each_isa.h"
 #include "support/temporary_folder.h"
@@ -16,58 +15,9 @@
 using namespace fieldmark;
 using namespace fieldmark::nerf;
 
-namespace {
-// Cells may be declared empty and steps grow after 16 steps, so that short runs pass through everything that
-// a long one does.
-TrainOptions train_options(Index steps) {
-  return {.schedule = {.steps = steps},
-          .samples_per_step = 8192,
-          .first_samples = 2048,
-          .grow_after = 16,
-          .distortion = 1e-3,
-          .warm_up = 16};
-}
-
-// Everything that training leaves behind.
-struct Outcome {
-  std::vector<float> values;
-  std::vector<std::uint8_t> bits;
-  double psnr = 0, samples = 0;
-  friend bool operator==(const Outcome&, const Outcome&) = default;
-};
-Outcome outcome(const RadianceField& f, const Trainer& t) {
-  return {{f.params.values().begin(), f.params.values().end()},
-          {f.grid.bits().begin(), f.grid.bits().end()},
-          t.train_psnr(),
-          t.samples()};
-}
-
-Outcome run(Index steps) {
-  RadianceField field(trainable_field_options());
-  Trainer trainer(field, objects_scene(), train_options(steps));
-  while (!trainer.done()) trainer.step(0);
-  return outcome(field, trainer);
-}
-
-TrainOptions mlp_options(Index steps) {
-  TrainOptions options = train_options(FieldKind::mlp);
-  options.schedule.steps = steps;
-  options.schedule.lr = 5e-3;  // the networks are small
-  options.samples_per_step = 4096;
-  return options;
-}
-
-Outcome run_mlp(Index steps) {
-  RadianceField field(small_mlp_options());
-  Trainer trainer(field, objects_scene(), mlp_options(steps));
-  while (!trainer.done()) trainer.step(0);
-  return outcome(field, trainer);
-}
-}  // namespace
-
 TEST_CASE("trainer: 100 steps on the built-in scene reach 19 dB") {
   RadianceField field(trainable_field_options());
-  TrainOptions options = train_options(100);
+  TrainOptions options = short_run_options(100);
   options.first_samples = options.samples_per_step;
   options.hard_pixels = 0;  // so that the loss is that of evenly drawn rays
   Trainer trainer(field, objects_scene(), options);
@@ -86,7 +36,7 @@ TEST_CASE("trainer: 100 steps on the built-in scene reach 19 dB") {
 TEST_CASE("trainer: a field that is kept goes on from where it was, in its space and its cells") {
   RadianceField field(trainable_field_options());
   {
-    Trainer trainer(field, objects_scene(), train_options(60));
+    Trainer trainer(field, objects_scene(), short_run_options(60));
     while (!trainer.done()) trainer.step(0);
   }
   const std::string configuration = field.configuration();
@@ -96,7 +46,7 @@ TEST_CASE("trainer: a field that is kept goes on from where it was, in its space
   elsewhere.background = Background::black;
   const auto further = [&](bool keep) {
     RadianceField f = field;
-    TrainOptions options = train_options(30);
+    TrainOptions options = short_run_options(30);
     options.schedule.lr = 5e-3;
     options.hard_pixels = 0;  // so that the loss is that of evenly drawn rays
     options.keep = keep;
@@ -118,55 +68,9 @@ TEST_CASE("trainer: a field that is kept goes on from where it was, in its space
   CHECK_FALSE(std::ranges::equal(kept.params.values(), field.params.values()));
 }
 
-TEST_CASE("trainer: 300 steps of a small mlp field reach 17 dB, and both its networks learn") {
-  RadianceField field(small_mlp_options());
-  const RadianceField untrained(small_mlp_options());
-  Trainer trainer(field, objects_scene(), mlp_options(300));
-  trainer.step(0);
-  const double start = trainer.train_psnr();
-  while (!trainer.done()) trainer.step(0);
-  CAPTURE(start, trainer.train_psnr());
-  CHECK(trainer.train_psnr() > 17);
-  CHECK(trainer.train_psnr() > start + 3);
-  CHECK(trainer.samples() > 300 * 1000);
-  for (const auto& e : field.params.entries()) {
-    const std::span<const float> now = field.params.values(field.params.find(e.name)),
-                                 then = untrained.params.values(untrained.params.find(e.name));
-    CAPTURE(e.name);
-    CHECK_FALSE(std::equal(now.begin(), now.end(), then.begin()));
-  }
-}
-
-TEST_CASE("trainer: an mlp field is refused where a scene has no bounds") {
-  Dataset place = objects_scene();
-  place.scene = SceneType::place;
-  RadianceField field(small_mlp_options());
-  CHECK_THROWS_WITH(Trainer(field, place, mlp_options(1)),
-                    Contains("[trainer] field must be a hash field where a scene has no bounds"));
-}
-
-TEST_CASE("trainer: an mlp field's bytes are the same for one and two threads, and across a restore") {
-  const TemporaryFolder folder;
-  const ScopedThreads serial(1);
-  const Outcome one = run_mlp(12);
-  const ScopedThreads parallel(2);
-  CHECK(one == run_mlp(12));
-  {
-    RadianceField field(small_mlp_options());
-    Trainer trainer(field, objects_scene(), mlp_options(12));
-    while (trainer.steps() < 5) trainer.step(0);
-    trainer.save(folder / "checkpoint");
-  }
-  RadianceField field(small_mlp_options());
-  Trainer trainer(field, objects_scene(), mlp_options(12));
-  trainer.restore(folder / "checkpoint");
-  while (!trainer.done()) trainer.step(0);
-  CHECK(outcome(field, trainer) == one);
-}
-
 TEST_CASE("trainer: without carving, silhouettes leave bounds and cells alone") {
   RadianceField field(small_mlp_options());
-  TrainOptions options = mlp_options(2);
+  TrainOptions options = short_mlp_run_options(2);
   options.carve = false;
   Trainer trainer(field, objects_scene(), options);
   CHECK(field.space.bounds.side == 3);
@@ -181,7 +85,7 @@ TEST_CASE("trainer: sets bounds, background and cameras of the field from the da
   RadianceField field(options);
   // Many cameras, so that the hull lies well inside the first cube on all sides.
   const Dataset sphere = make_scene({.kind = SceneKind::sphere, .size = 48, .views = 40});
-  const Trainer trainer(field, sphere, train_options(10));
+  const Trainer trainer(field, sphere, short_run_options(10));
   CHECK(field.space.bounds.side < 2.9);
   CHECK(field.background == Background::white);
   CHECK(field.cameras.directions.size() == 40);
@@ -193,7 +97,7 @@ TEST_CASE("trainer: opaque images leave bounds and cells alone") {
   for (View& v : opaque.views)
     for (Index i = 3; i < v.rgba.size(); i += 4) v.rgba[i] = 1;
   RadianceField field(trainable_field_options());
-  Trainer trainer(field, opaque, train_options(2));
+  Trainer trainer(field, opaque, short_run_options(2));
   CHECK(field.space.bounds.side == 3);
   CHECK(field.grid.occupied_cells() == field.grid.cells());
   trainer.step(0);
@@ -203,34 +107,16 @@ TEST_CASE("trainer: opaque images leave bounds and cells alone") {
 TEST_CASE("trainer: the same bytes for one and two threads, on each instruction set") {
   each_isa([] {
     const ScopedThreads serial(1);
-    const Outcome one = run(20);
+    const TrainerOutcome one = outcome_of_run(20);
     const ScopedThreads parallel(2);
-    const Outcome two = run(20);
+    const TrainerOutcome two = outcome_of_run(20);
     CHECK(one == two);
   });
 }
 
-TEST_CASE("trainer: a run that is interrupted and restored gives the bytes of one that is not") {
-  const TemporaryFolder folder;
-  const Index at = 23,
-              steps = 45;  // between two occupancy updates, after the first cells are declared empty
-  {
-    RadianceField field(trainable_field_options());
-    Trainer trainer(field, objects_scene(), train_options(steps));
-    while (trainer.steps() < at) trainer.step(0);
-    trainer.save(folder / "checkpoint");
-  }
-  RadianceField field(trainable_field_options());
-  Trainer trainer(field, objects_scene(), train_options(steps));
-  trainer.restore(folder / "checkpoint");
-  CHECK(trainer.steps() == at);
-  while (!trainer.done()) trainer.step(0);
-  CHECK(outcome(field, trainer) == run(steps));
-}
-
 TEST_CASE("trainer: a timed run's steps, given as a number, give the same bytes") {
   RadianceField field(trainable_field_options());
-  TrainOptions options = train_options(0);
+  TrainOptions options = short_run_options(0);
   options.schedule.seconds = 1;
   Trainer trainer(field, objects_scene(), options);
   double now = 0;
@@ -238,41 +124,14 @@ TEST_CASE("trainer: a timed run's steps, given as a number, give the same bytes"
   CHECK(trainer.steps() == trainer.planned());
   CHECK((now > 0.9 && now < 1.05));
   CHECK_FALSE(trainer.replanned());
-  CHECK(outcome(field, trainer) == run(trainer.planned()));
-}
-
-TEST_CASE("trainer: a checkpoint of another run is refused by the name of the option or input") {
-  const TemporaryFolder folder;
-  RadianceField field(trainable_field_options());
-  Trainer trainer(field, objects_scene(), train_options(10));
-  trainer.step(0);
-  trainer.save(folder / "checkpoint");
-  RadianceField other(trainable_field_options());
-  TrainOptions options = train_options(10);
-  options.seed = 7;
-  Trainer different(other, objects_scene(), options);
-  CHECK_THROWS_WITH(
-      different.restore(folder / "checkpoint"),
-      (folder / "checkpoint").string() + ": this checkpoint was made with option 'seed' 0, this run has 7");
-  options = train_options(10);
-  options.schedule.lr = 0.5;
-  Trainer faster(other, objects_scene(), options);
-  CHECK_THROWS_WITH(faster.restore(folder / "checkpoint"), Contains("option 'lr'") && Contains("has 0.5"));
-  Dataset changed = objects_scene();
-  changed.views[3].rgba[7] += 0.25f;
-  Trainer of_other_images(other, changed, train_options(10));
-  CHECK_THROWS_WITH(of_other_images.restore(folder / "checkpoint"), Contains("of another input 'image 3'"));
-  field.save(folder / "field");
-  CHECK_THROWS_WITH(trainer.restore(folder / "field"),
-                    Contains("expected a CHECKPOINT file (kind 'checkpoint'), found kind 'field'"));
-  CHECK_THROWS_AS(trainer.restore(folder / "missing"), IoError);
+  CHECK(outcome_of(field, trainer) == outcome_of_run(trainer.planned()));
 }
 
 TEST_CASE("trainer: hashed levels take turns while steps are small, and the last step leaves no gradient") {
   RadianceField field(trainable_field_options());
   const HashEncoding<float>& encoding = field.field.encoding();
   const Index entry = 2 * encoding.features();
-  Trainer trainer(field, objects_scene(), train_options(40));
+  Trainer trainer(field, objects_scene(), short_run_options(40));
   // True if a level still holds gradients after the step.
   const auto waits = [&](int level) {
     const auto grads = field.params.grads(encoding.table());
@@ -298,7 +157,7 @@ TEST_CASE("trainer: hashed levels take turns while steps are small, and the last
 TEST_CASE("trainer: decay keeps the table small, after its steps and nothing before") {
   const auto table_of = [](double decay, Index after) {
     RadianceField field(trainable_field_options());
-    TrainOptions options = train_options(60);
+    TrainOptions options = short_run_options(60);
     options.table_decay = decay;
     options.decay_after = after;
     Trainer trainer(field, objects_scene(), options);
@@ -318,7 +177,7 @@ TEST_CASE("trainer: decay keeps the table small, after its steps and nothing bef
 TEST_CASE("trainer: the distortion loss leaves less fog") {
   const auto occupied = [](double weight) {
     RadianceField field(trainable_field_options());
-    TrainOptions options = train_options(120);
+    TrainOptions options = short_run_options(120);
     options.distortion = weight;
     options.carve = false;
     Trainer trainer(field, objects_scene(), options);
@@ -332,7 +191,7 @@ TEST_CASE("trainer: the distortion loss leaves less fog") {
 
 TEST_CASE("trainer: errors name option and value") {
   RadianceField field(trainable_field_options());
-  TrainOptions options = train_options(1);
+  TrainOptions options = short_run_options(1);
   options.samples_per_step = 10;
   CHECK_THROWS_WITH(Trainer(field, objects_scene(), options),
                     "[trainer] samples_per_step must be at least 1024, got 10");
@@ -348,7 +207,7 @@ TEST_CASE("trainer: errors name option and value") {
                     "[trainer] least_rays must be a multiple of 64, 64 to 65536, got 100");
   CHECK_THROWS_WITH(Trainer(field, objects_scene(), {.stop = 1}),
                     "[trainer] stop must be in [0, 1), got 1.000000");
-  CHECK_THROWS_WITH(Trainer(field, Dataset{}, train_options(1)),
+  CHECK_THROWS_WITH(Trainer(field, Dataset{}, short_run_options(1)),
                     "[trainer] data must have at least one view");
 }
 
@@ -369,18 +228,4 @@ TEST_CASE("trainer: a run gets a field that it can fill") {
     CHECK(sizes.encoding.finest_resolution == finest);
     CHECK(sizes.width == width);
   }
-}
-
-TEST_CASE("trainer: a checkpoint knows the sizes of its field") {
-  const TemporaryFolder folder;
-  RadianceField field(small_field_options());
-  Trainer trainer(field, objects_scene(), train_options(2));
-  trainer.save(folder / "checkpoint");
-  RadianceField same(checkpointed_field(folder / "checkpoint"));
-  CHECK(same.params.size() == field.params.size());
-  Trainer second(same, objects_scene(), train_options(2));
-  second.restore(folder / "checkpoint");
-  field.save(folder / "field.fm");
-  CHECK_THROWS_WITH(checkpointed_field(folder / "field.fm"),
-                    Contains("field.fm: expected a CHECKPOINT file"));
 }
