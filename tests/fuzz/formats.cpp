@@ -60,7 +60,8 @@ void use(const Intrinsics& i) {
   const Camera c = i.camera({}, i.width, i.height).scaled(16, 12);
   const Crop part = covered_part(c, i.lens);
   undistorted_image(Tensor<float>(Shape{12, 16, 4}), c, i.lens, part);
-  for (const auto& offset : *nearest_pixels(c, i.lens, cropped(c, part)).offsets)
+  const NearestPixels nearest = nearest_pixels(c, i.lens, cropped(c, part));
+  for (const auto& offset : *nearest.offsets)
     if (!std::isfinite(offset[0]) || !std::isfinite(offset[1]))
       throw std::logic_error("an offset is not finite");
 }
