@@ -76,7 +76,8 @@ std::vector<Option> options_of_training() {
        }},
       {"gamma_2, of the message loss", "5", "-",
        [](const EmbedRecipe& r) { return text_of(fusion_of(r).training.message_weight); }},
-      {"lambda, of VGG-16 features", "0.01", "-", [](const EmbedRecipe&) { return std::string("0"); }},
+      {"lambda, of VGG-16 features", "0.01", "-",
+       [](const EmbedRecipe& r) { return text_of(fusion_of(r).training.perceptual.weight); }},
       {"optimiser of H's convolutions", "Adam", "Adam",
        [](const EmbedRecipe& r) {
          const double rate = fusion_of(r).training.matrix_rate;

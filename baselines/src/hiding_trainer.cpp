@@ -7,12 +7,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numeric>
 
 namespace fieldmark::baselines {
 namespace {
 
 constexpr double kKeep = 0.95;               // decay of a running mean
-constexpr double kRead = 0.93;               // fraction of bits above which the mark becomes fainter
+constexpr double kRead = 0.93;               // fraction of bits above which the mark becomes fainter,
+constexpr double kEachRead = 0.85;           // if every bit is read this often
 constexpr double kFainter = 0.015;           // dB per step
 constexpr double kSure = 0.96, kFaster = 2;  // above kSure, extra dB per step per unit of the fraction
 constexpr double kLeastRms = 1e-6;
@@ -67,7 +69,9 @@ HidingTrainer::HidingTrainer(ImageMarker& marker, const CropSource& crops, const
   figures_.mark_psnr = options.first_mark_psnr;
   train(marker.params, kAdam);
   train(critic_params_, kAdam, {}, "critic/");
+  read_.assign(at(marker.options().bits), 0.f);
   keep("bits", figures_.bits);
+  keep("bits read", read_);
   keep("mark_psnr", figures_.mark_psnr);
   keep("crop", crop_);
 }
@@ -147,16 +151,25 @@ double HidingTrainer::train_networks(Index size) {
   update_statistics(marker_.params, pass);
   marked_.assign(marked.value(), marked.value() + marked.shape().size());
 
-  double right = 0;
-  for (Index i = 0; i < n * bits; ++i)
-    right += (read.value()[i] > 0.5f) == (messages_[static_cast<std::size_t>(i)] > 0.5f);
+  follow(read.value());
+  return static_cast<double>(loss.value()[0]);
+}
+
+// Moves the running means to the bits of a step, and makes the mark fainter if they are read.
+void HidingTrainer::follow(const float* values) {
+  const Index n = options_.batch, bits = marker_.options().bits;
   const double keep = steps() == 0 ? 0 : kKeep;
-  figures_.bits = keep * figures_.bits + (1 - keep) * right / static_cast<double>(n * bits);
-  if (figures_.bits > kRead) {
+  for (Index b = 0; b < bits; ++b) {
+    Index right = 0;
+    for (Index i = b; i < n * bits; i += bits) right += (values[i] > 0.5f) == (messages_[at(i)] > 0.5f);
+    read_[at(b)] = static_cast<float>(keep * static_cast<double>(read_[at(b)]) +
+                                      (1 - keep) * static_cast<double>(right) / static_cast<double>(n));
+  }
+  figures_.bits = std::accumulate(read_.begin(), read_.end(), 0.0) / static_cast<double>(bits);
+  if (figures_.bits > kRead && *std::ranges::min_element(read_) > kEachRead) {
     const double by = kFainter + kFaster * std::max(0.0, figures_.bits - kSure);
     figures_.mark_psnr = std::min(figures_.mark_psnr + by, options_.mark_psnr);
   }
-  return static_cast<double>(loss.value()[0]);
 }
 
 void HidingTrainer::train_discriminator(Index size) {

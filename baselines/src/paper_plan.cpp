@@ -14,7 +14,7 @@ const std::array kSystems{
     PaperSystem{"copyrnerf_paper", "CopyRNeRF, preset paper",
                 "one message fused into every colour, read from the whole image, under distortions"},
     PaperSystem{"copyrnerf_code", "CopyRNeRF, preset code",
-                "the same with the networks, step sizes and images of the authors' code"},
+                "the same with networks shaped like those of the authors' code and its ratio of step sizes"},
     PaperSystem{
         "hidden_nerf", "HiDDeN + NeRF",
         "training images marked by HiDDeN (32 channels) at 30 dB, a field trained on them, its renders read",

@@ -3,12 +3,11 @@
 #include <fieldmark/engine/random.h>
 #include <fieldmark/imaging/gradcheck_cases.h>
 #include <fieldmark/imaging/lpips.h>
+#include <fieldmark/imaging/vgg16_features.h>
 
 #include <array>
 #include <cmath>
 #include <span>
-
-#include "vgg16_features.h"
 
 namespace fieldmark::imaging {
 namespace {

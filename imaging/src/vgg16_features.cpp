@@ -1,8 +1,8 @@
-#include "vgg16_features.h"
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/loss.h>
 #include <fieldmark/engine/ops/pool.h>
 #include <fieldmark/engine/shape_checks.h>
+#include <fieldmark/imaging/vgg16_features.h>
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
-#include "vgg16_features.h"
 #include <fieldmark/core/error.h>
 #include <fieldmark/engine/ops/resample.h>
 #include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/vgg16_features.h>
 
 #include <string_view>
 

@@ -1,8 +1,10 @@
 #include <fieldmark/core/files.h>
+#include <fieldmark/imaging/vgg16_features.h>
 #include <fieldmark/watermark/mark/cell_mark.h>
 #include <fieldmark/watermark/mark/owner.h>
 
 #include "cli/cli.h"
+#include "support/random_weights.h"
 #include "tools/tiny_job.h"
 
 using namespace fieldmark;
@@ -173,6 +175,33 @@ TEST_CASE("embed refuses options that a preset does not have", "[embed]") {
       CHECK_THAT(r.err, Contains(std::string(option) + ": preset " + preset + " does not have this option"));
       CHECK(!std::filesystem::exists(owner));
     }
+}
+
+TEST_CASE("embed takes VGG-16 features into the loss of presets paper and code", "[embed]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string owner = job.folder / "perceptual.fm", weights = job.folder / "vgg.safetensors";
+  const auto embed = [&](const std::string& preset, const std::vector<std::string>& more) {
+    std::vector<std::string> words{"embed", "--preset",      preset, "--field",          job.field, "--out",
+                                   owner,   "--steps",       "1",    "--views",          "8",       "--bits",
+                                   "4",     "--reader-size", "32",   "--measured-views", "1"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_command(words);
+  };
+  const auto tensors = vgg16_tensors();
+  random_weights(std::span(tensors).first(4)).write(weights);
+  const auto r = embed("paper", {"--perceptual", "0.01", "--vgg-weights", weights});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  CHECK_THAT(r.out + r.err, Contains("perceptual term: VGG-16 down to relu1_2, lambda 0.01"));
+  std::filesystem::remove(owner);
+  const auto fast = embed("fast", {"--perceptual", "0.01", "--vgg-weights", weights});
+  CHECK(fast.code == cli::kUsage);
+  CHECK_THAT(fast.err, Contains("--perceptual: preset fast does not have this option"));
+  CHECK(embed("paper", {"--vgg-weights", weights}).code == cli::kUsage);
+  const auto missing = embed("paper", {"--perceptual", "0.01", "--vgg-weights", weights + ".none"});
+  CHECK(missing.code == cli::kFailed);
+  CHECK_THAT(missing.err, Contains(weights + ".none"));
+  CHECK(!std::filesystem::exists(owner));
 }
 
 TEST_CASE("embed says what is wrong, and leaves no file", "[embed]") {

@@ -28,12 +28,12 @@ namespace {
 constexpr Index kImagedViews = 4;
 
 struct EmbedArguments {
-  std::string field, out, key, image, lpips_weights;
+  std::string field, out, key, image, lpips_weights, vgg_weights;
   std::string preset = "fast", distances = "novel";
   Index bits = watermark::OwnerOptions{}.bits;
   // Empty or 0, which no option accepts: chosen by the preset or the scene.
   std::string colours, directions;
-  double mark_psnr = 0;
+  double mark_psnr = 0, perceptual = 0;
   Index cells = 0, batch = 0, reader_size = 0;
   RunLength length{.seconds = 0};
   MessageOption intended;
@@ -80,7 +80,8 @@ void write_image(const std::string& path, const watermark::Owner& owner, std::ui
 }
 
 watermark::EmbedRecipe recipe_of(const EmbedArguments& options, const nerf::RadianceField& field,
-                                 std::uint64_t seed) {
+                                 Context& context) {
+  const std::uint64_t seed = context.seed();
   auto recipe = watermark::embed_recipe(options.preset);
   recipe.suit(field);
   recipe.owner.bits = options.bits;
@@ -97,6 +98,11 @@ watermark::EmbedRecipe recipe_of(const EmbedArguments& options, const nerf::Radi
   set_cell_option("--colours", options.colours, [](auto& mark, const std::string& name) {
     watermark::use_colours(watermark::parse_mark_colours(name), mark);
   });
+  if (options.perceptual > 0)
+    read_option("--perceptual", [&] {
+      auto& training = recipe.fusion().training;  // first: only some presets have it
+      training.perceptual = load_perceptual_term(options.perceptual, options.vgg_weights, context);
+    });
   return recipe;
 }
 
@@ -155,7 +161,7 @@ int run_embed(const EmbedArguments& options, Context& context) {
         "blurred), " +
         options.field + " has space " + nerf::name_of(field.space.kind));
   const auto key = key_of(options, checkpoint);
-  auto recipe = recipe_of(options, field, context.seed());
+  auto recipe = recipe_of(options, field, context);
   const auto views = cached_views(options, field, recipe, context);
   if (options.mark_psnr == 0) recipe.suit_mark_psnr(field, views);
   auto owner = recipe.make(field, key, views);
@@ -229,6 +235,22 @@ void add_view_options(CommandLine& app, EmbedArguments& o) {
       ->default_str("");
 }
 
+void add_perceptual_term(CommandLine& app, EmbedArguments& o) {
+  const auto weight =
+      app.add_option(
+             "--perceptual", o.perceptual,
+             "Weight lambda of VGG-16 features in the content loss, 0 to 100 (0.01 in the paper); for "
+             "presets paper and code")
+          ->range(0.0, 100.0)
+          ->type_name("F");
+  app.add_option("--vgg-weights", o.vgg_weights,
+                 "Weights of VGG-16 under torchvision's names, all or the first layers; for --perceptual;\n"
+                 "default: $FIELDMARK_DATA/weights/vgg16_conv1_1-conv2_2.safetensors")
+      ->type_name("FILE")
+      ->default_str("")
+      ->needs(weight);
+}
+
 }  // namespace
 
 Command add_embed(CommandLine& app) {
@@ -280,6 +302,7 @@ Command add_embed(CommandLine& app) {
       ->type_name("NAME")
       ->default_str("");
   add_view_options(app, *o);
+  add_perceptual_term(app, *o);
   add_run_length(app, o->length, true, "300, or 2400 for presets paper and code");
   app.add_option("--measured-views", o->measured_views, "Novel views to measure at the end, 1 to 100000")
       ->range(1, 100000)

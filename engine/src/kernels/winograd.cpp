@@ -158,47 +158,64 @@ constexpr Range inside_of(Index start, Index count, Index extent) {
   return {start < 0 ? -start : 0, smaller(count, extent - start)};
 }
 
-// Transforms the square of each tile, Line::from pixels a side, which begins `border` pixels before the tile.
+// A tile's square, Line::from pixels a side: where it begins, and the part of it within the image.
+struct Square {
+  Index tile, begin;
+  Range rows, columns;
+};
+
+// Transforms a square within an image. Load: of V at an offset from the image's data.
+template <class Line, class T, class Load>
+[[gnu::always_inline]] inline void transform_inside(const WinogradTiles<T>& x, const WinogradMatrices<T>& to,
+                                                    const Square& at, Load load) {
+  const Index pixel = x.channels, line = x.w * pixel, begin = at.begin;
+  for_row(to, at.tile, pixel, [=](auto zero, Index c, T* out) {
+    using V = decltype(zero);
+    both_axes<Line, T, V>([=](int i, int j) { return load(V{}, begin + c + i * line + j * pixel); },
+                          [=](int i, int j, V v) { store_as(out + (i * 6 + j) * to.stride, v); });
+  });
+}
+
+// Transforms a square of which a part may lie outside the image, where it is 0.
+// Rolled loops: with sanitizers, the 36 inline branches of scalars take minutes to compile.
+template <class Line, class T, class Load>
+void transform_at_edge(const WinogradTiles<T>& x, const WinogradMatrices<T>& to, const Square& at,
+                       Load load) {
+  const Index pixel = x.channels, line = x.w * pixel;
+  for_row(to, at.tile, pixel, [=](auto zero, Index c, T* out) {
+    using V = decltype(zero);
+    V square[Line::from][Line::from] = {};
+#pragma GCC unroll 1
+    for (Index i = at.rows.first; i < at.rows.last; ++i)
+#pragma GCC unroll 1
+      for (Index j = at.columns.first; j < at.columns.last; ++j)
+        square[i][j] = load(V{}, at.begin + c + i * line + j * pixel);
+    both_axes<Line, T, V>([&](int i, int j) { return square[i][j]; },
+                          [=](int i, int j, V v) { store_as(out + (i * 6 + j) * to.stride, v); });
+  });
+}
+
+// Transforms the square of each tile, which begins `border` pixels before the tile. A masked element counts
+// as 0. Each case has a loop of its own: a branch within the loop over channels costs a twentieth.
 template <class Line, Index border, class T>
 void transform(const WinogradTiles<T>& x, const WinogradMatrices<T>& to) {
-  const Index pixel = x.channels, line = x.w * pixel;
+  const auto plain = [x](auto zero, Index k) { return load_as<decltype(zero)>(x.data + k); };
+  const auto masked = [x](auto zero, Index k) {
+    using V = decltype(zero);
+    return load_as<V>(x.mask + k) > V{} ? load_as<V>(x.data + k) : V{};
+  };
   for_tiles(x, [=](Index t, Index image, Index row, Index column) {
     const Index top = row - border, left = column - border;
-    const Index begin = (image + top * x.w + left) * pixel;
-    const Range rows = inside_of(top, Line::from, x.h), columns = inside_of(left, Line::from, x.w);
-    const bool inside = rows.last - rows.first == Line::from && columns.last - columns.first == Line::from;
-    for_row(to, t, x.channels, [=](auto zero, Index c, T* at) {
-      using V = decltype(zero);
-      const auto store = [=](int i, int j, V v) { store_as(at + (i * 6 + j) * to.stride, v); };
-      const Index from = begin + c;
-      if (inside && !x.mask) {
-        both_axes<Line, T, V>([=](int i, int j) { return load_as<V>(x.data + from + i * line + j * pixel); },
-                              store);
-        return;
-      }
-      if constexpr (sizeof(V) > sizeof(T))
-        if (inside) {
-          both_axes<Line, T, V>(
-              [=](int i, int j) {
-                const Index k = from + i * line + j * pixel;
-                return load_as<V>(x.mask + k) > V{} ? load_as<V>(x.data + k) : V{};
-              },
-              store);
-          return;
-        }
-      // Rolled loops: with sanitizers, the 36 inline branches of scalars take minutes to compile.
-      V square[Line::from][Line::from] = {};
-#pragma GCC unroll 1
-      for (Index i = rows.first; i < rows.last; ++i)
-#pragma GCC unroll 1
-        for (Index j = columns.first; j < columns.last; ++j) {
-          const Index k = from + i * line + j * pixel;
-          V v = load_as<V>(x.data + k);
-          if (x.mask) v = load_as<V>(x.mask + k) > V{} ? v : V{};
-          square[i][j] = v;
-        }
-      both_axes<Line, T, V>([&](int i, int j) { return square[i][j]; }, store);
-    });
+    const Square at{.tile = t,
+                    .begin = (image + top * x.w + left) * x.channels,
+                    .rows = inside_of(top, Line::from, x.h),
+                    .columns = inside_of(left, Line::from, x.w)};
+    const bool inside =
+        at.rows.last - at.rows.first == Line::from && at.columns.last - at.columns.first == Line::from;
+    if (inside && !x.mask) return transform_inside<Line>(x, to, at, plain);
+    if (inside) return transform_inside<Line>(x, to, at, masked);
+    if (!x.mask) return transform_at_edge<Line>(x, to, at, plain);
+    transform_at_edge<Line>(x, to, at, masked);
   });
 }
 

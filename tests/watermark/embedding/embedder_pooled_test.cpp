@@ -71,6 +71,67 @@ TEST_CASE(
   CHECK(apart(limited, same) < 0.02 * apart(same, tripled));
 }
 
+namespace {
+// Weights of VGG-16's first convolution that pass each normalised colour on, far from the ReLU's kink.
+SafetensorsFile passing_weights() {
+  Tensor<float> weight(Shape{64, 3, 3, 3}), bias(Shape{64});
+  for (Index c = 0; c < 3; ++c) weight[(c * 3 + c) * 9 + 4] = 1, bias[c] = 10;
+  SafetensorsFile file;
+  file.add("features.0.weight", weight.shape, std::span<const float>(weight.data));
+  file.add("features.0.bias", bias.shape, std::span<const float>(bias.data));
+  return file;
+}
+PerceptualTerm passing_term(double weight) {
+  return {.weight = weight,
+          .features = std::make_shared<const Vgg16Features<float>>(passing_weights()),
+          .sha256 = std::string(64, 'a')};
+}
+}  // namespace
+
+TEST_CASE("embedder: the perceptual term is lambda times the squared distance of features per value") {
+  const auto first_loss = [](const PooledTrainingOptions& training) {
+    Owner owner = tiny_paper_owner(training);
+    Embedder embedder(owner, tiny_views(), few_steps(10));
+    embedder.step(0);
+    return embedder.figures().loss;
+  };
+  const double message = first_loss({.content_weight = 0}),
+               content = first_loss({.content_weight = 100}) - message;
+  REQUIRE(content > 0.1);
+  CHECK(first_loss({.content_weight = 0, .perceptual = passing_term(1)}) == message);
+  // Features that are colours over ImageNet's deviations, 0.224 to 0.229.
+  for (const double lambda : {0.01, 0.5}) {
+    const double term =
+        first_loss({.content_weight = 100, .perceptual = passing_term(lambda)}) - message - content;
+    CAPTURE(lambda, term, content);
+    CHECK(term > 0.999 * lambda * content / (0.229 * 0.229));
+    CHECK(term < 1.001 * lambda * content / (0.224 * 0.224));
+  }
+  CHECK_THROWS_WITH(first_loss({.perceptual = {.weight = 1}}),
+                    "[PooledTraining] perceptual: a weight above 0 needs features");
+}
+
+TEST_CASE("embedder: a run with a perceptual term resumes with that term only") {
+  const TemporaryFolder folder;
+  const auto resumed_with = [&](const PerceptualTerm& term, bool save) {
+    Owner owner = tiny_paper_owner({.perceptual = term});
+    Embedder embedder(owner, tiny_views(), few_steps(3));
+    if (save) {
+      embedder.step(0);
+      embedder.save(folder / "checkpoint");
+    } else {
+      embedder.restore(folder / "checkpoint");
+    }
+  };
+  resumed_with(passing_term(0.5), true);
+  resumed_with(passing_term(0.5), false);
+  CHECK_THROWS_WITH(resumed_with(passing_term(0.25), false), Contains("option 'perceptual_weight'"));
+  CHECK_THROWS_WITH(resumed_with({}, false), Contains("perceptual_weight"));
+  PerceptualTerm other = passing_term(0.5);
+  other.sha256.assign(64, 'b');
+  CHECK_THROWS_WITH(resumed_with(other, false), Contains("perceptual_weights"));
+}
+
 TEST_CASE("embedder: preset code learns the colours of the field from raw numbers") {
   Owner owner = tiny_paper_owner({.message_weight = 0}, true);
   Embedder embedder(owner, tiny_views(), few_steps(60));

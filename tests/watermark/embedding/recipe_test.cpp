@@ -90,10 +90,12 @@ TEST_CASE("recipe: each preset makes its kind of mark, and refuses the options o
     CHECK(owner.mark().has_cells() == (preset == "fast"));
     CHECK(owner.mark().has_gain() == (preset == "fast"));
     CHECK(owner.options().reader_size == (preset == "fast" ? 160 : 80));
-    if (preset == "fast")
+    if (preset == "fast") {
       CHECK(owner.cells.side() == cells_for_message(tiny_views(), 4, tiny_field().space.kind));
-    else
+      CHECK_THROWS_WITH(recipe.fusion(), "preset fast does not have this option");
+    } else {
       CHECK_THROWS_WITH(recipe.cell(), "preset " + preset + " does not have this option");
+    }
   }
   CHECK_THROWS_WITH(embed_recipe("slow"), "[embed_recipe] preset must be fast, paper or code, got slow");
   EmbedRecipe recipe = embed_recipe("fast");

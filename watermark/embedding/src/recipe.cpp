@@ -87,6 +87,11 @@ CellMarkOptions& EmbedRecipe::cell() {
   return std::get<CellMarkOptions>(mark);
 }
 
+FusionMarkOptions& EmbedRecipe::fusion() {
+  if (auto* options = std::get_if<FusionMarkOptions>(&mark)) return *options;
+  throw ValueError("preset fast does not have this option");
+}
+
 void EmbedRecipe::suit(const nerf::RadianceField& field) {
   auto* cells_of_scene = std::get_if<CellMarkOptions>(&mark);
   if (!cells_of_scene) return;

@@ -20,7 +20,7 @@ namespace {
 using Json = nlohmann::json;
 
 // The squared norm of the content loss is a sum over the patch in the paper and a mean here.
-constexpr PooledTrainingOptions kWarm{
+const PooledTrainingOptions kWarm{
     .content_weight = 60, .content_psnr = 25.5, .matrix_rate = 2, .warm_steps = 1500};
 constexpr Index kLessonMessages = 16, kLessonSamples = 512;  // messages per step, and samples of each
 constexpr double kColourLesson = 30;  // weight of the squared error of colours relative to that of features

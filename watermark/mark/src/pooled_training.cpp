@@ -33,6 +33,12 @@ Var<float> stacked(std::span<const Var<float>> parts, const Shape& shape) {
   return tape.reshape(concatenate<float>(rows), shape);
 }
 
+Var<float> sum_of(std::span<const Var<float>> terms) {
+  Var<float> sum = terms.front();
+  for (const Var<float>& term : terms.subspan(1)) sum = add(sum, term);
+  return sum;
+}
+
 float* message_of(Tape<float>& tape, const TrainingImage& image) {
   float* sent = tape.scratch(std::ssize(image.signs));
   std::copy(image.signs.begin(), image.signs.end(), sent);
@@ -52,6 +58,8 @@ PooledTraining::PooledTraining(const extractor::PooledExtractor<float>& reader,
       views_(views),
       painter_(std::move(painter)),
       learner_(std::move(learner)) {
+  if (options.perceptual.weight > 0 && !options.perceptual.features)
+    throw ValueError("[PooledTraining] perceptual: a weight above 0 needs features");
   if (options.warm_steps == 0) return;
   const Index bits = owner.options().bits;
   carriers_.emplace(views, bits, owner.options().seed);
@@ -64,19 +72,49 @@ Var<float> PooledTraining::loss(Tape<float>& tape, const Params<float>& params,
                                 TrainingFigures& figures) {
   if (images.front().step < warm_steps()) return lesson(tape, params, images, figures);
   const Index bits = owner_.options().bits;
-  std::vector<Var<float>> seen, content;
+  std::vector<Var<float>> seen, marked, base;
   for (const TrainingImage& image : images) {
     const CachedView& v = views_[at(image.view)];
-    const Var<float> marked =
+    const Shape size{v.height, v.width, 3};
+    const Var<float> painted =
         painter_(tape, params, image, tape.constant(message_of(tape, image), {1, bits}));
-    content.push_back(mse_loss<float>(marked, tape.constant(v.base.data.data(), marked.shape())));
-    seen.push_back(image.distort(tape.reshape(marked, {v.height, v.width, 3})));
+    marked.push_back(tape.reshape(painted, size));
+    base.push_back(tape.constant(v.base.data.data(), size));
+    seen.push_back(image.distort(marked.back()));
   }
-  Var<float> sum = content.front();
-  for (std::size_t i = 1; i < content.size(); ++i) sum = add(sum, content[i]);
-  const auto n = static_cast<double>(images.size());
-  return add(scale(sum, content_weight(static_cast<double>(sum.value()[0]) / n) / n),
-             scale(message_loss(read(params, seen).images, images, figures), options_.message_weight));
+  return add(content_loss(marked, base),
+             scale(message_loss(read(params, seen), images, figures), options_.message_weight));
+}
+
+// The mean over the images of a step.
+Var<float> PooledTraining::content_loss(std::span<const Var<float>> marked,
+                                        std::span<const Var<float>> base) const {
+  std::vector<Var<float>> squares, perceived;
+  for (std::size_t i = 0; i < marked.size(); ++i) {
+    squares.push_back(mse_loss<float>(marked[i], base[i]));
+    if (options_.perceptual.weight > 0) perceived.push_back(perceptual_loss(marked[i], base[i]));
+  }
+  const auto n = static_cast<double>(marked.size());
+  const Var<float> square = sum_of(squares);
+  const double weight = content_weight(static_cast<double>(square.value()[0]) / n) / n;
+  const Var<float> plain = scale(square, weight);
+  return perceived.empty() ? plain
+                           : add(plain, scale(sum_of(perceived), weight * options_.perceptual.weight));
+}
+
+// |Psi(marked) - Psi(base)|^2 / n for n values of an image, as the mean square of marked - base is
+// |marked - base|^2 / n.
+Var<float> PooledTraining::perceptual_loss(Var<float> marked, Var<float> base) const {
+  const Vgg16Features<float>& features = *options_.perceptual.features;
+  const std::string depth = features.depths().back();
+  const std::string_view tap[] = {depth};
+  const Shape& size = marked.shape();
+  const auto seen = [&](Var<float> image) {
+    return features(image.tape().reshape(image, {1, size[0], size[1], 3}), tap).front();
+  };
+  const Var<float> of_marked = seen(marked), of_base = seen(base);
+  return scale(mse_loss<float>(of_marked, of_base),
+               static_cast<double>(of_marked.shape().size()) / static_cast<double>(size.size()));
 }
 
 // Each bit has its own carriers to learn.
@@ -91,8 +129,20 @@ double PooledTraining::content_weight(double mean_square) const {
   return options_.content_weight * std::min(1.0, relative * relative);
 }
 
-// Reads images [H, W, 3] of one size, normalised together or one by one.
-PooledTraining::Places PooledTraining::read(const Params<float>& params, std::span<const Var<float>> seen) {
+// Reads images [H, W, 3] of one size, normalised together or one by one: the logits [images, N_b].
+Var<float> PooledTraining::read(const Params<float>& params, std::span<const Var<float>> seen) {
+  const Shape& size = seen.front().shape();
+  if (running_norm_)
+    return reader_(params, stacked(seen, {std::ssize(seen), size[0], size[1], 3}), &statistics_);
+  std::vector<Var<float>> images;
+  for (const Var<float>& image : seen)
+    images.push_back(reader_(params, image.tape().reshape(image, {1, size[0], size[1], 3})));
+  return stacked(images, {std::ssize(seen), owner_.options().bits});
+}
+
+// As read(), with the values before the average.
+PooledTraining::Places PooledTraining::read_places(const Params<float>& params,
+                                                   std::span<const Var<float>> seen) {
   const Shape& size = seen.front().shape();
   if (running_norm_)
     return reader_.places(params, stacked(seen, {std::ssize(seen), size[0], size[1], 3}), &statistics_);
@@ -158,7 +208,7 @@ Var<float> PooledTraining::reading_lesson(Tape<float>& tape, const Params<float>
     carriers_->mark({message_of(tape, image), at(bits)}, v, marked);
     seen.push_back(image.distort(tape.constant(marked, v.base.shape)));
   }
-  const Places logits = read(params, seen);
+  const Places logits = read_places(params, seen);
   const Index n = logits.pixels.shape().size(), each = n / std::ssize(images);
   auto* label = tape.scratch<std::int32_t>(n / bits);
   float *target = tape.scratch(n), *own = tape.scratch(n), *other = tape.scratch(n), *zeros = tape.scratch(n);
@@ -204,6 +254,10 @@ void PooledTraining::describe(RunFingerprint& f) const {
   f.option("content_psnr", options_.content_psnr);
   f.option("message_weight", options_.message_weight);
   f.option("matrix_rate", options_.matrix_rate);
+  if (options_.perceptual.weight > 0) {
+    f.option("perceptual_weight", options_.perceptual.weight);
+    f.input_digest("perceptual_weights", options_.perceptual.sha256);
+  }
   f.option("warm_steps", warm_steps());
   if (owner_.mark().has_gain()) f.option("mark_psnr", owner_.options().mark_psnr);
 }

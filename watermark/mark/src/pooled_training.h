@@ -29,7 +29,10 @@ class PooledTraining : public MarkTraining {
  private:
   using Places = extractor::PooledExtractor<float>::Places;
   double content_weight(double mean_square) const;
-  Places read(const Params<float>& params, std::span<const Var<float>> seen);
+  Var<float> content_loss(std::span<const Var<float>> marked, std::span<const Var<float>> base) const;
+  Var<float> perceptual_loss(Var<float> marked, Var<float> base) const;
+  Var<float> read(const Params<float>& params, std::span<const Var<float>> seen);
+  Places read_places(const Params<float>& params, std::span<const Var<float>> seen);
   Var<float> lesson(Tape<float>& tape, const Params<float>& params, std::span<const TrainingImage> images,
                     TrainingFigures& figures);
   Var<float> reading_lesson(Tape<float>& tape, const Params<float>& params,

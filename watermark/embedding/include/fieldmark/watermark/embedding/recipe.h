@@ -56,6 +56,9 @@ struct EmbedRecipe {
 
   /// Returns the options that only preset fast has.   @throws ValueError naming the preset if it is another
   CellMarkOptions& cell();
+  /// Returns the options that only presets paper and code have.
+  /// @throws ValueError naming the preset if it is another
+  FusionMarkOptions& fusion();
   /// Adapts the options of preset fast to a scene: shape of the extractor's images, colours, batch.
   void suit(const nerf::RadianceField& field);
   /// Sets the mark PSNR of preset fast to that of mark_psnr_for(); other presets keep theirs.

@@ -1,16 +1,26 @@
 #pragma once
 #include <fieldmark/extractor/pooled_extractor.h>
+#include <fieldmark/imaging/vgg16_features.h>
 #include <fieldmark/watermark/mark/global_mark.h>
 #include <fieldmark/watermark/mark/mark.h>
 
 namespace fieldmark::watermark {
 
+/// Perceptual term of a content loss: lambda |Psi(marked) - Psi(base)|^2, beside |marked - base|^2.
+struct PerceptualTerm {
+  double weight = 0;  ///< lambda, at least 0; 0: no term
+  /// Psi: the deepest features that the weights reach. Needed if weight > 0.
+  std::shared_ptr<const Vgg16Features<float>> features{};
+  std::string sha256{};  ///< of the weight file, for the fingerprint of a run
+};
+
 /// Training options of a pooled mark.
 struct PooledTrainingOptions {
-  double content_weight = 1;  ///< gamma_1
-  double content_psnr = 0;    ///< dB of a step's marked images, above which gamma_1 falls; 0: never
-  double message_weight = 5;  ///< gamma_2
-  double matrix_rate = 0;     ///< step size of Muon relative to Adam's; 0: Adam trains all weights
+  double content_weight = 1;    ///< gamma_1
+  double content_psnr = 0;      ///< dB of a step's marked images, above which gamma_1 falls; 0: never
+  double message_weight = 5;    ///< gamma_2
+  PerceptualTerm perceptual{};  ///< of the content loss; none by default
+  double matrix_rate = 0;       ///< step size of Muon relative to Adam's; 0: Adam trains all weights
   /// Steps of the warm start for up to 16 bits, >= 0; for more bits, in proportion.
   Index warm_steps = 0;
 };
@@ -23,13 +33,13 @@ class FixedCarriers;
 
 /// Mark with one message for all places, which PooledExtractor reads from a whole image: the base of
 /// FusionMark. Its evidence is the logit of every slot. Training minimises
-///   L = gamma_1 mean |marked - base|^2 + gamma_2 BCE(bits, M)
-/// where gamma_1 = content_weight min(1, m / m_0)^2 is a constant in the gradient, m is the mean square of
-/// marked - base over the images of a step, and m_0 is that of content_psnr. An optional warm start comes
-/// first: the extractor learns to read fixed carriers, pixel by pixel, and the mark's networks learn to paint
-/// them.
-/// Source: Luo et al. 2023 (CopyRNeRF), section 3.4, without the perceptual term, with a warm start and with
-/// a weight that falls for faint marks.
+///   L = gamma_1 (|marked - base|^2 + lambda |Psi(marked) - Psi(base)|^2) / n + gamma_2 BCE(bits, M)
+/// where n is the number of values of an image, gamma_1 = content_weight min(1, m / m_0)^2 is a constant in
+/// the gradient, m is the mean square of marked - base over the images of a step, and m_0 is that of
+/// content_psnr. An optional warm start comes first: the extractor learns to read fixed carriers, pixel by
+/// pixel, and the mark's networks learn to paint them.
+/// Source: Luo et al. 2023 (CopyRNeRF), section 3.4, with a warm start and with a weight that falls for faint
+/// marks.
 class PooledMark : public Mark {
  public:
   /// Computes the marked image [pixels, 3] of a training image.   @param message  [1, N_b], -1 or 1
