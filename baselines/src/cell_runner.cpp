@@ -163,7 +163,9 @@ CellRunner::Trained CellRunner::train_hiding(const CellName& name, const Scene& 
   const OwnScores own =
       own_scores(*marker, CropSource(images_of(scene.test), name.seed), kOwnImages, kOwnSize, name.seed);
   trained.own_2d_accuracy = own.accuracy;
-  trained.more = {{"own_2d_psnr", own.psnr}, {"network_seconds", trained.seconds}};
+  trained.more = {{"own_2d_psnr", own.psnr},
+                  {"trained_psnr", trainer.figures().mark_psnr},
+                  {"network_seconds", trained.seconds}};
   if (system.renders) {
     trained.marked = marked_renders(marker, unmarked, name.seed);
     return trained;

@@ -13,8 +13,8 @@ namespace fieldmark::baselines {
 namespace {
 
 constexpr double kKeep = 0.95;               // decay of a running mean
-constexpr double kRead = 0.93;               // fraction of bits above which the mark becomes fainter,
-constexpr double kEachRead = 0.85;           // if every bit is read this often
+constexpr double kRead = 0.93;               // fraction of right bits above which the mark becomes fainter
+constexpr double kEachRead = 0.85;           // fraction of images in which each bit must be right for that
 constexpr double kFainter = 0.015;           // dB per step
 constexpr double kSure = 0.96, kFaster = 2;  // above kSure, extra dB per step per unit of the fraction
 constexpr double kLeastRms = 1e-6;
@@ -32,7 +32,17 @@ Var<float> as_file(Var<float> marked) {
   return scale(sub(distort::quantize8(add(scale(marked, 0.5), half)), half), 2);
 }
 
+double mean_of(std::span<const float> read) {
+  return std::accumulate(read.begin(), read.end(), 0.0) / static_cast<double>(read.size());
+}
+
 }  // namespace
+
+double fading(std::span<const float> read) {
+  const double mean = mean_of(read);
+  if (!(mean > kRead && static_cast<double>(std::ranges::min(read)) > kEachRead)) return 0;
+  return kFainter + kFaster * std::max(0.0, mean - kSure);
+}
 
 HidingTrainOptions hiding_train_options(HidingKind kind) {
   HidingTrainOptions o;
@@ -155,7 +165,7 @@ double HidingTrainer::train_networks(Index size) {
   return static_cast<double>(loss.value()[0]);
 }
 
-// Moves the running means to the bits of a step, and makes the mark fainter if they are read.
+// Moves the running means towards the bits of a step, and makes the mark fainter if they are read.
 void HidingTrainer::follow(const float* values) {
   const Index n = options_.batch, bits = marker_.options().bits;
   const double keep = steps() == 0 ? 0 : kKeep;
@@ -165,11 +175,8 @@ void HidingTrainer::follow(const float* values) {
     read_[at(b)] = static_cast<float>(keep * static_cast<double>(read_[at(b)]) +
                                       (1 - keep) * static_cast<double>(right) / static_cast<double>(n));
   }
-  figures_.bits = std::accumulate(read_.begin(), read_.end(), 0.0) / static_cast<double>(bits);
-  if (figures_.bits > kRead && *std::ranges::min_element(read_) > kEachRead) {
-    const double by = kFainter + kFaster * std::max(0.0, figures_.bits - kSure);
-    figures_.mark_psnr = std::min(figures_.mark_psnr + by, options_.mark_psnr);
-  }
+  figures_.bits = mean_of(read_);
+  figures_.mark_psnr = std::min(figures_.mark_psnr + fading(read_), options_.mark_psnr);
 }
 
 void HidingTrainer::train_discriminator(Index size) {
@@ -196,8 +203,9 @@ double HidingTrainer::take_step(double seconds) {
 }
 
 std::string HidingTrainer::status() const {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.1f%% of bits at %.1f dB", 100 * figures_.bits, figures_.mark_psnr);
+  char text[80];
+  std::snprintf(text, sizeof text, "%.1f%% of bits, %.1f%% of the worst, at %.1f dB", 100 * figures_.bits,
+                100 * static_cast<double>(std::ranges::min(read_)), figures_.mark_psnr);
   return text;
 }
 

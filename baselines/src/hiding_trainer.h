@@ -1,5 +1,8 @@
 #pragma once
 #include <fieldmark/engine/training_run.h>
+
+#include <span>
+
 #include "crop_source.h"
 #include "image_marker.h"
 
@@ -24,12 +27,18 @@ struct HidingTrainOptions {
 /// a step size of 3e-3, and noise layers on half of the steps.
 HidingTrainOptions hiding_train_options(HidingKind kind);
 
+/// Returns by how much a mark becomes fainter after a step, dB: 0.015 while more than 93% of all bits are
+/// right and each bit is right in more than 85% of the images, and more near 100%; else 0. Without the
+/// condition on each bit, a bit that is learnt late would never have a strong mark.
+/// @param read  fraction of the images in which each bit is right
+double fading(std::span<const float> read);
+
 /// Trains encoder and decoder jointly against a discriminator, with one random noise layer per batch:
 ///   L = w_m |M' - M|^2 + w_a BCE(discriminator(marked), "plain"),   marked = plain + g (encoded - plain)
 /// Source: Zhu et al. 2018 (HiDDeN), section 3.3; Jia et al. 2021 (MBRS), section 3.4 for its weights.
 /// Departure: the authors add w_i |marked - plain|^2 and train for epochs on a GPU. Here g, constant for the
 /// gradients, scales the residual of each image to a PSNR that rises from first_mark_psnr to mark_psnr: by
-/// 0.015 dB per step while 93% of all bits and 85% of each one are right, and faster near 100%. Rounding to 8
+/// fading() per step. Rounding to 8
 /// bits, clamping and noise layers phase in over the last 3 dB, up to noisy_part of the steps. The networks
 /// thus learn a message before it has to be invisible or robust. The result has equal bytes for any number of
 /// threads.
@@ -42,6 +51,8 @@ class HidingTrainer final : public TrainingRun {
     double bits = 0.5;      ///< running mean of the fraction of correct bits, after the noise layer
     double mark_psnr = 14;  ///< of the current step, dB
   };
+  /// Returns the running mean of the fraction of images in which each bit is right.
+  std::span<const float> read() const { return read_; }
   /// Returns the figures after the last step.
   const Figures& figures() const { return figures_; }
   double figure() const override { return figures_.bits; }
@@ -67,7 +78,7 @@ class HidingTrainer final : public TrainingRun {
   Discriminator<float> critic_;
   Tape<float> tape_;
   std::vector<float> images_, messages_, marked_;
-  std::vector<float> read_;  // running mean of the fraction of correct values of each bit
+  std::vector<float> read_;
   Figures figures_;
   Index crop_ = 0;  // of the last step
 };

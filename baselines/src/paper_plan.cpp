@@ -13,8 +13,9 @@ const std::array kSystems{
                 "a bit in every cell of the scene, read place by place, under a budget of power"},
     PaperSystem{"copyrnerf_paper", "CopyRNeRF, preset paper",
                 "one message fused into every colour, read from the whole image, under distortions"},
-    PaperSystem{"copyrnerf_code", "CopyRNeRF, preset code",
-                "the same with networks shaped like those of the authors' code and its ratio of step sizes"},
+    PaperSystem{
+        "copyrnerf_code", "CopyRNeRF, preset code",
+        "preset paper with networks shaped like the authors' code's, without distortions in training"},
     PaperSystem{
         "hidden_nerf", "HiDDeN + NeRF",
         "training images marked by HiDDeN (32 channels) at 30 dB, a field trained on them, its renders read",

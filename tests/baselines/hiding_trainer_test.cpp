@@ -2,6 +2,7 @@
 #include <fieldmark/engine/parallel.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "support/catch.h"
 #include "support/temporary_folder.h"
@@ -48,6 +49,8 @@ TEST_CASE("hiding_trainer: the same numbers for any threads and across a checkpo
     while (!second.done()) second.step(0);
     CHECK(std::ranges::equal(one.params.values(), two.params.values()));
     CHECK(second.figures().bits == straight.figures().bits);
+    CHECK(std::ranges::equal(second.read(), straight.read()));
+    CHECK_THAT(second.status(), Contains("% of the worst, at 30.0 dB"));
     CHECK(second.steps() == 6);
   }
 }
@@ -65,6 +68,21 @@ TEST_CASE("hiding_trainer: one bit is learnt in some steps") {
   INFO("bits right " << trainer.figures().bits << ", " << trainer.figures().mark_psnr << " dB");
   CHECK(trainer.figures().bits > 0.8);
   CHECK(trainer.figures().mark_psnr > options.first_mark_psnr);
+}
+
+TEST_CASE("hiding_trainer: the mark fades only while all bits and each of them are right") {
+  const auto all = [](float fraction) { return std::vector<float>(16, fraction); };
+  CHECK(fading(all(0.92f)) == 0);
+  CHECK(fading(all(0.94f)) == 0.015);
+  CHECK(fading(all(1.f)) == Approx(0.015 + 2 * 0.04));
+  std::vector<float> one_late = all(0.97f);
+  CHECK(fading(one_late) > 0.015);
+  one_late[5] = 0.84f;
+  CHECK(fading(one_late) == 0);
+  one_late[5] = 0.86f;
+  CHECK(fading(one_late) > 0);
+  one_late[5] = std::nanf("");
+  CHECK(fading(one_late) == 0);
 }
 
 TEST_CASE("hiding_trainer: the authors' weights, and errors") {

@@ -183,21 +183,32 @@ TEST_CASE("embed takes VGG-16 features into the loss of presets paper and code",
   const auto embed = [&](const std::string& preset, const std::vector<std::string>& more) {
     std::vector<std::string> words{"embed", "--preset",      preset, "--field",          job.field, "--out",
                                    owner,   "--steps",       "1",    "--views",          "8",       "--bits",
-                                   "4",     "--reader-size", "32",   "--measured-views", "1"};
+                                   "4",     "--reader-size", "32",   "--measured-views", "1",       "--json",
+                                   "-"};
     words.insert(words.end(), more.begin(), more.end());
     return run_command(words);
   };
   const auto tensors = vgg16_tensors();
   random_weights(std::span(tensors).first(4)).write(weights);
-  const auto r = embed("paper", {"--perceptual", "0.01", "--vgg-weights", weights});
-  INFO(r.err);
-  REQUIRE(r.code == cli::kOk);
-  CHECK_THAT(r.out + r.err, Contains("perceptual term: VGG-16 down to relu1_2, lambda 0.01"));
+  for (const std::string preset : {"paper", "code"}) {
+    const auto r = embed(preset, {"--perceptual", "0.01", "--vgg-weights", weights});
+    INFO(r.err);
+    REQUIRE(r.code == cli::kOk);
+    CHECK(nlohmann::json::parse(r.out)["perceptual"] == 0.01);
+    CHECK_THAT(r.err, Contains("perceptual term: VGG-16 down to relu1_2, lambda 0.01"));
+    std::filesystem::remove(owner);
+  }
+  const auto without = embed("paper", {});
+  REQUIRE(without.code == cli::kOk);
+  CHECK(nlohmann::json::parse(without.out)["perceptual"] == 0);
   std::filesystem::remove(owner);
   const auto fast = embed("fast", {"--perceptual", "0.01", "--vgg-weights", weights});
   CHECK(fast.code == cli::kUsage);
   CHECK_THAT(fast.err, Contains("--perceptual: preset fast does not have this option"));
-  CHECK(embed("paper", {"--vgg-weights", weights}).code == cli::kUsage);
+  const auto alone = embed("paper", {"--vgg-weights", weights});
+  CHECK(alone.code == cli::kUsage);
+  CHECK_THAT(alone.err, Contains("--vgg-weights requires --perceptual"));
+  CHECK(embed("paper", {"--perceptual", "0", "--vgg-weights", weights}).code == cli::kUsage);
   const auto missing = embed("paper", {"--perceptual", "0.01", "--vgg-weights", weights + ".none"});
   CHECK(missing.code == cli::kFailed);
   CHECK_THAT(missing.err, Contains(weights + ".none"));

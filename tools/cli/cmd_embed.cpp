@@ -198,6 +198,8 @@ int run_embed(const EmbedArguments& options, Context& context) {
   json["seconds"] = seconds;
   json["steps"] = embedder.steps();
   json["cells"] = owner.cells.side();
+  const auto* fusion = std::get_if<watermark::FusionMarkOptions>(&recipe.mark);
+  json["perceptual"] = fusion ? Json(fusion->training.perceptual.weight) : Json(nullptr);
   json["mark_psnr"] = owner.mark().has_gain() ? Json(owner.options().mark_psnr) : Json(nullptr);
   json["sha256"] = sha256;
   json["commitment"] = commitment;
@@ -239,12 +241,14 @@ void add_perceptual_term(CommandLine& app, EmbedArguments& o) {
   const auto weight =
       app.add_option(
              "--perceptual", o.perceptual,
-             "Weight lambda of VGG-16 features in the content loss, 0 to 100 (0.01 in the paper); for "
-             "presets paper and code")
-          ->range(0.0, 100.0)
-          ->type_name("F");
+             "Weight lambda of VGG-16 features in the content loss, 1e-6 to 100; 0.01 in the paper; default: "
+             "no such term; for presets paper and code")
+          ->range(1e-6, 100.0)
+          ->type_name("F")
+          ->default_str("");
   app.add_option("--vgg-weights", o.vgg_weights,
-                 "Weights of VGG-16 under torchvision's names, all or the first layers; for --perceptual;\n"
+                 "VGG-16 weights under torchvision's names, from the first layer on; the deepest layer gives "
+                 "the features; for --perceptual;\n"
                  "default: $FIELDMARK_DATA/weights/vgg16_conv1_1-conv2_2.safetensors")
       ->type_name("FILE")
       ->default_str("")
@@ -269,7 +273,8 @@ Command add_embed(CommandLine& app) {
   app.add_option("--preset", o->preset,
                  "fast: one bit per cell of the scene, trains in minutes;\npaper: one message everywhere, as "
                  "in CopyRNeRF "
-                 "(Luo et al. 2023);\ncode: the same with the settings of the authors' code")
+                 "(Luo et al. 2023);\ncode: the same with networks like the authors' code's, without "
+                 "distortions")
       ->one_of({"fast", "paper", "code"})
       ->type_name("NAME");
   app.add_option(

@@ -177,7 +177,7 @@ template <class Line, class T, class Load>
 }
 
 // Transforms a square of which a part may lie outside the image, where it is 0.
-// Rolled loops: with sanitizers, the 36 inline branches of scalars take minutes to compile.
+// Rolled loops: with sanitizers, 36 inline tests of the place take minutes to compile.
 template <class Line, class T, class Load>
 void transform_at_edge(const WinogradTiles<T>& x, const WinogradMatrices<T>& to, const Square& at,
                        Load load) {

@@ -107,8 +107,46 @@ TEST_CASE("embedder: the perceptual term is lambda times the squared distance of
     CHECK(term > 0.999 * lambda * content / (0.229 * 0.229));
     CHECK(term < 1.001 * lambda * content / (0.224 * 0.224));
   }
+  // Both terms have the weight of the content, which falls for faint marks.
+  const double half = 10 * std::log10(2.0), psnr = -10 * std::log10(content / 100);
+  const auto limited = [&](const PerceptualTerm& term) {
+    return first_loss({.content_weight = 100, .content_psnr = psnr - half, .perceptual = term}) - message;
+  };
+  const double faint = limited(passing_term(0.5)) - limited({});
+  CHECK(faint > 0.999 * 0.25 * 0.5 * content / (0.229 * 0.229));
+  CHECK(faint < 1.001 * 0.25 * 0.5 * content / (0.224 * 0.224));
+
   CHECK_THROWS_WITH(first_loss({.perceptual = {.weight = 1}}),
-                    "[PooledTraining] perceptual: a weight above 0 needs features");
+                    "[PooledTraining] perceptual: a weight above 0 needs features and their SHA-256");
+  PerceptualTerm wrong = passing_term(1);
+  wrong.sha256.clear();
+  CHECK_THROWS_WITH(first_loss({.perceptual = wrong}), Contains("needs features and their SHA-256"));
+  for (const double weight : {-1.0, std::nan("")}) {
+    wrong.weight = weight;
+    CHECK_THROWS_WITH(first_loss({.perceptual = wrong}),
+                      Contains("[PooledTraining] perceptual: weight must be at least 0, got"));
+  }
+}
+
+TEST_CASE("embedder: the perceptual term moves the networks as more content does") {
+  const auto moved = [](const PooledTrainingOptions& training) {
+    Owner owner = tiny_paper_owner(training);
+    Embedder(owner, tiny_views(), few_steps(10)).step(0);
+    return std::vector<float>(owner.params.values().begin(), owner.params.values().end());
+  };
+  const auto apart = [](const std::vector<float>& x, const std::vector<float>& y) {
+    double sum = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) sum += std::abs(static_cast<double>(x[i]) - y[i]);
+    return sum;
+  };
+  // Features that are colours over ImageNet's deviations, 0.224 to 0.229, count as content of that weight.
+  const double lambda = 0.5, deviation = 0.2265, weight = 20;
+  const auto plain = moved({.content_weight = weight}),
+             perceived = moved({.content_weight = weight, .perceptual = passing_term(lambda)}),
+             more = moved({.content_weight = weight * (1 + lambda / (deviation * deviation))});
+  REQUIRE(apart(plain, more) > 0);
+  CAPTURE(apart(plain, more), apart(perceived, more));
+  CHECK(apart(perceived, more) < 0.1 * apart(plain, more));
 }
 
 TEST_CASE("embedder: a run with a perceptual term resumes with that term only") {

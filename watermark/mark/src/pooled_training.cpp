@@ -58,8 +58,7 @@ PooledTraining::PooledTraining(const extractor::PooledExtractor<float>& reader,
       views_(views),
       painter_(std::move(painter)),
       learner_(std::move(learner)) {
-  if (options.perceptual.weight > 0 && !options.perceptual.features)
-    throw ValueError("[PooledTraining] perceptual: a weight above 0 needs features");
+  keep_features();
   if (options.warm_steps == 0) return;
   const Index bits = owner.options().bits;
   carriers_.emplace(views, bits, owner.options().seed);
@@ -72,27 +71,27 @@ Var<float> PooledTraining::loss(Tape<float>& tape, const Params<float>& params,
                                 TrainingFigures& figures) {
   if (images.front().step < warm_steps()) return lesson(tape, params, images, figures);
   const Index bits = owner_.options().bits;
-  std::vector<Var<float>> seen, marked, base;
+  std::vector<Var<float>> seen, marked;
   for (const TrainingImage& image : images) {
     const CachedView& v = views_[at(image.view)];
-    const Shape size{v.height, v.width, 3};
     const Var<float> painted =
         painter_(tape, params, image, tape.constant(message_of(tape, image), {1, bits}));
-    marked.push_back(tape.reshape(painted, size));
-    base.push_back(tape.constant(v.base.data.data(), size));
+    marked.push_back(tape.reshape(painted, {v.height, v.width, 3}));
     seen.push_back(image.distort(marked.back()));
   }
-  return add(content_loss(marked, base),
+  return add(content_loss(images, marked),
              scale(message_loss(read(params, seen), images, figures), options_.message_weight));
 }
 
 // The mean over the images of a step.
-Var<float> PooledTraining::content_loss(std::span<const Var<float>> marked,
-                                        std::span<const Var<float>> base) const {
+Var<float> PooledTraining::content_loss(std::span<const TrainingImage> images,
+                                        std::span<const Var<float>> marked) const {
   std::vector<Var<float>> squares, perceived;
   for (std::size_t i = 0; i < marked.size(); ++i) {
-    squares.push_back(mse_loss<float>(marked[i], base[i]));
-    if (options_.perceptual.weight > 0) perceived.push_back(perceptual_loss(marked[i], base[i]));
+    const std::size_t view = at(images[i].view);
+    const Var<float> base = marked[i].tape().constant(views_[view].base.data.data(), marked[i].shape());
+    squares.push_back(mse_loss<float>(marked[i], base));
+    if (!features_.empty()) perceived.push_back(perceptual_loss(marked[i], features_[view]));
   }
   const auto n = static_cast<double>(marked.size());
   const Var<float> square = sum_of(squares);
@@ -102,19 +101,40 @@ Var<float> PooledTraining::content_loss(std::span<const Var<float>> marked,
                            : add(plain, scale(sum_of(perceived), weight * options_.perceptual.weight));
 }
 
-// |Psi(marked) - Psi(base)|^2 / n for n values of an image, as the mean square of marked - base is
-// |marked - base|^2 / n.
-Var<float> PooledTraining::perceptual_loss(Var<float> marked, Var<float> base) const {
+// The deepest features of an image [H, W, 3].
+Var<float> PooledTraining::features_of(Var<float> image) const {
   const Vgg16Features<float>& features = *options_.perceptual.features;
   const std::string depth = features.depths().back();
   const std::string_view tap[] = {depth};
-  const Shape& size = marked.shape();
-  const auto seen = [&](Var<float> image) {
-    return features(image.tape().reshape(image, {1, size[0], size[1], 3}), tap).front();
-  };
-  const Var<float> of_marked = seen(marked), of_base = seen(base);
-  return scale(mse_loss<float>(of_marked, of_base),
-               static_cast<double>(of_marked.shape().size()) / static_cast<double>(size.size()));
+  const Shape& size = image.shape();
+  return features(image.tape().reshape(image, {1, size[0], size[1], 3}), tap).front();
+}
+
+// The unmarked images do not change, so their features are computed once.
+void PooledTraining::keep_features() {
+  const PerceptualTerm& term = options_.perceptual;
+  if (!(term.weight >= 0))
+    throw ValueError("[PooledTraining] perceptual: weight must be at least 0, got " +
+                     std::to_string(term.weight));
+  if (term.weight == 0) return;
+  if (!term.features || term.sha256.empty())
+    throw ValueError("[PooledTraining] perceptual: a weight above 0 needs features and their SHA-256");
+  Tape<float> tape;
+  for (const CachedView& v : views_) {
+    tape.reset();
+    const Var<float> found = features_of(tape.constant(v.base.data.data(), {v.height, v.width, 3}));
+    Tensor<float> kept(found.shape());
+    std::copy_n(found.value(), kept.size(), kept.data.begin());
+    features_.push_back(std::move(kept));
+  }
+}
+
+// |Psi(marked) - Psi(base)|^2 / n for n values of an image, as the mean square of marked - base is
+// |marked - base|^2 / n.
+Var<float> PooledTraining::perceptual_loss(Var<float> marked, const Tensor<float>& features) const {
+  const Var<float> of_base = marked.tape().constant(features.data.data(), features.shape);
+  return scale(mse_loss<float>(features_of(marked), of_base),
+               static_cast<double>(features.size()) / static_cast<double>(marked.shape().size()));
 }
 
 // Each bit has its own carriers to learn.

@@ -29,8 +29,10 @@ class PooledTraining : public MarkTraining {
  private:
   using Places = extractor::PooledExtractor<float>::Places;
   double content_weight(double mean_square) const;
-  Var<float> content_loss(std::span<const Var<float>> marked, std::span<const Var<float>> base) const;
-  Var<float> perceptual_loss(Var<float> marked, Var<float> base) const;
+  void keep_features();
+  Var<float> features_of(Var<float> image) const;
+  Var<float> content_loss(std::span<const TrainingImage> images, std::span<const Var<float>> marked) const;
+  Var<float> perceptual_loss(Var<float> marked, const Tensor<float>& features) const;
   Var<float> read(const Params<float>& params, std::span<const Var<float>> seen);
   Places read_places(const Params<float>& params, std::span<const Var<float>> seen);
   Var<float> lesson(Tape<float>& tape, const Params<float>& params, std::span<const TrainingImage> images,
@@ -47,6 +49,7 @@ class PooledTraining : public MarkTraining {
   std::span<const CachedView> views_;
   PooledMark::Painter painter_;
   PooledMark::Learner learner_;
+  std::vector<Tensor<float>> features_;    // Psi of each view's unmarked image, with a perceptual term
   std::optional<FixedCarriers> carriers_;  // of a warm start
   ParamStore<float> helpers_;
   std::vector<Dense<float>> recognise_;  // one layer in a warm start: finds the bit that a pixel carries

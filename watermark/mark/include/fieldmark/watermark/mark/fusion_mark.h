@@ -11,7 +11,7 @@ struct PerceptualTerm {
   double weight = 0;  ///< lambda, at least 0; 0: no term
   /// Psi: the deepest features that the weights reach. Needed if weight > 0.
   std::shared_ptr<const Vgg16Features<float>> features{};
-  std::string sha256{};  ///< of the weight file, for the fingerprint of a run
+  std::string sha256{};  ///< of the weight file, for the fingerprint of a run; needed if weight > 0
 };
 
 /// Training options of a pooled mark.
