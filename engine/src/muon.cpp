@@ -25,8 +25,21 @@ template <class T>
 void orthogonalise(T* d, Index rows, Index columns, Tape<T>& tape) {
   const Index n = rows * columns;
   if (n == 0) return;
-  double square = 0;
-  for (Index i = 0; i < n; ++i) square += static_cast<double>(d[i]) * static_cast<double>(d[i]);
+  const auto square_of = [d, n] {
+    double square = 0;
+    for (Index i = 0; i < n; ++i) square += static_cast<double>(d[i]) * static_cast<double>(d[i]);
+    return square;
+  };
+  double square = square_of();
+  // The square of a double may be infinite or 0 where the number is not.
+  if (!(square >= std::numeric_limits<double>::min() && std::isfinite(square))) {
+    double largest = 0;
+    for (Index i = 0; i < n; ++i) largest = std::max(largest, std::abs(static_cast<double>(d[i])));
+    if (largest >= static_cast<double>(std::numeric_limits<T>::min()) && std::isfinite(largest)) {
+      for (Index i = 0; i < n; ++i) d[i] = static_cast<T>(static_cast<double>(d[i]) / largest);
+      square = square_of();
+    }
+  }
   const double norm = std::sqrt(square);
   // Below the normal numbers, 1 / norm would be infinite. NaN stays NaN.
   const T factor =

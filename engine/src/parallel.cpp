@@ -11,7 +11,10 @@ std::atomic<int> thread_count{0};  // 0: not chosen yet
 }
 
 void set_threads(int n) {
-  if (n < 1) throw ValueError("[set_threads] n must be at least 1, got " + std::to_string(n));
+  // Beyond what the system can start, OpenMP would end the process.
+  constexpr int kMost = 1024;
+  if (n < 1 || n > kMost)
+    throw ValueError("[set_threads] n must be from 1 to 1024, got " + std::to_string(n));
   thread_count = n;
 }
 

@@ -2,6 +2,8 @@
 #include <fieldmark/engine/params.h>
 #include <fnmatch.h>
 
+#include <limits>
+
 #include "shortcuts.h"
 
 namespace fieldmark {
@@ -28,10 +30,29 @@ ParamId ParamStore<T>::add(std::string_view name, Shape shape, ParamRole role) {
   // Offsets are the same for float and double, so that stores can be copied. 16 floats are a cache line.
   constexpr Index kLine = 16, kLarge = 4096;
   const Index offset = shape.size() >= kLarge ? (size() + kLine - 1) / kLine * kLine : size();
-  entries_.push_back({std::string(name), shape, offset, role});
-  values_.resize(static_cast<std::size_t>(offset + shape.size()));
-  grads_.resize(values_.size());
+  if (shape.size() > std::numeric_limits<Index>::max() - offset)
+    throw ShapeError("[params] '" + std::string(name) + "' is too large, got shape " + shape.str());
+  const std::size_t before = values_.size();
+  try {
+    values_.resize(at(offset + shape.size()));
+    grads_.resize(values_.size());
+    entries_.push_back({std::string(name), shape, offset, role});
+  } catch (...) {  // no memory: the store stays as it was
+    values_.resize(before);
+    grads_.resize(before);
+    throw;
+  }
   return {static_cast<int>(entries_.size()) - 1};
+}
+
+template <class T>
+void ParamStore<T>::require_free(std::string_view prefix,
+                                 std::initializer_list<std::string_view> names) const {
+  for (const std::string_view name : names) {
+    const std::string whole = std::string(prefix) + "/" + std::string(name);
+    for (const Entry& e : entries_)
+      if (e.name == whole) throw ValueError("[params] name '" + whole + "' is already used");
+  }
 }
 
 template <class T>
@@ -82,6 +103,13 @@ Params<T>::Params(const ParamStore<T>& layout, Var<T> all) : Params(layout, null
     throw ShapeError("[params] all must have the " + std::to_string(layout.size()) +
                      " elements of the store, got shape " + all.shape().str());
   all_ = all;
+}
+
+template <class T>
+Params<T>::Params(const ParamStore<T>& store, T* grads, const PackedWeights<T>& packed)
+    : Params(store, grads) {
+  if (!packed.packs(store)) throw ValueError("[params] packed must be of the same store");
+  packed_ = &packed;
 }
 
 template <class T>

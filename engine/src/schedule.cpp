@@ -52,9 +52,10 @@ double Schedule::lr(Index n) const {
   return steady * std::pow(options_.last, std::clamp(fraction, 0.0, 1.0));
 }
 
-void Schedule::resume(Index total) {
+void Schedule::resume(Index total, bool replanned) {
   if (options_.steps > 0) return;
   total_ = total;
+  replanned_ = replanned;
   fixed_ = total > 0;
 }
 

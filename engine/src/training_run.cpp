@@ -46,6 +46,14 @@ void visit_arrays(TrainedParams& t, F visit) {
   }
 }
 
+// Returns the rows of the learning curve: seconds, steps and figure.
+std::vector<double> checked_curve(const SafetensorsFile& file) {
+  const auto curve = file.f64("run/curve");
+  if (curve.shape.rank() != 2 || curve.shape[1] != 3)
+    throw IoError(file.path + ": run/curve: expected shape [n, 3], found " + curve.shape.str());
+  return {curve.data.begin(), curve.data.end()};
+}
+
 }  // namespace
 
 TrainingRun::TrainingRun(const ScheduleOptions& schedule) : schedule_(schedule) {
@@ -157,7 +165,9 @@ void TrainingRun::save(const std::filesystem::path& path) const {
         },
         kept);
   const Index planned = schedule_.total();
+  const Index replanned = schedule_.replanned() ? 1 : 0;
   file.add("run/planned", {1}, std::span(&planned, 1));
+  file.add("run/replanned", {1}, std::span(&replanned, 1));
   file.add("run/curve", {std::ssize(curve_) / 3, 3}, std::span<const double>(curve_));
   save_more(file);
   write(file, path);
@@ -168,6 +178,14 @@ void TrainingRun::restore(const std::filesystem::path& path) {
   auto present = converted(file);
   if (present) file = std::move(*present);
   fingerprint().require(file);
+  const std::vector<double> curve = checked_curve(file);
+  Index steps = 0, planned = 0, replanned = 0;
+  read_array(file, "run/steps", std::span(&steps, 1));
+  read_array(file, "run/planned", std::span(&planned, 1));
+  if (file.has("run/replanned")) read_array(file, "run/replanned", std::span(&replanned, 1));
+  if (steps < 0 || planned < 0)
+    throw IoError(path.string() + ": expected steps from 0, found run/steps " + std::to_string(steps) +
+                  " and run/planned " + std::to_string(planned));
   earlier_ = present.has_value();
   restore_more(file);  // first, because it may reject the file
   for (Trained& t : trained_)
@@ -176,10 +194,8 @@ void TrainingRun::restore(const std::filesystem::path& path) {
     });
   for (const auto& [name, kept] : kept_)
     std::visit([&, in_file = "run/" + name](auto figures) { read_array(file, in_file, figures); }, kept);
-  Index planned = 0;
-  read_array(file, "run/planned", std::span(&planned, 1));
-  schedule_.resume(planned);
-  curve_ = file.f64("run/curve").data;
+  schedule_.resume(planned, replanned != 0);
+  curve_ = curve;
   for (Trained& t : trained_) t.adam.set_steps(steps_);
 }
 

@@ -5,6 +5,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -71,17 +72,23 @@ class Leases {
   template <class Owner>
   py::capsule lend(std::shared_ptr<Owner> owner) {
     ++*count_;
-    return py::capsule(new Lease{std::move(owner), count_}, kName, [](PyObject* capsule) {
+    return py::capsule(new Lease{std::move(owner), count_, changes_}, kName, [](PyObject* capsule) {
       delete static_cast<Lease*>(PyCapsule_GetPointer(capsule, kName));
     });
   }
   int count() const { return *count_; }
+  /// Counts a change of the lent memory.
+  void changed() { ++*changes_; }
+  /// Returns the count of changes of an array's memory if the array is a lease's or a view of one; else null.
+  static std::shared_ptr<const std::uint64_t> changes(const py::array& array) {
+    const Lease* lease = lease_of(array);
+    return lease ? lease->changes : nullptr;
+  }
+  std::shared_ptr<const std::uint64_t> changes() const { return changes_; }
   /// Returns the owner of an array's memory if the array is a lease's or a view of one; else null.
-  static const void* owner(py::array array) {
-    py::object base = array.base();
-    while (base && py::isinstance<py::array>(base)) base = py::reinterpret_borrow<py::array>(base).base();
-    if (!base || !PyCapsule_IsValid(base.ptr(), kName)) return nullptr;
-    return static_cast<Lease*>(PyCapsule_GetPointer(base.ptr(), kName))->owner.get();
+  static const void* owner(const py::array& array) {
+    const Lease* lease = lease_of(array);
+    return lease ? lease->owner.get() : nullptr;
   }
 
  private:
@@ -89,9 +96,17 @@ class Leases {
   struct Lease {
     std::shared_ptr<void> owner;
     std::shared_ptr<int> count;
+    std::shared_ptr<const std::uint64_t> changes;
     ~Lease() { --*count; }
   };
+  static const Lease* lease_of(const py::array& array) {
+    py::object base = array.base();
+    while (base && py::isinstance<py::array>(base)) base = py::reinterpret_borrow<py::array>(base).base();
+    if (!base || !PyCapsule_IsValid(base.ptr(), kName)) return nullptr;
+    return static_cast<Lease*>(PyCapsule_GetPointer(base.ptr(), kName));
+  }
   std::shared_ptr<int> count_ = std::make_shared<int>(0);
+  std::shared_ptr<std::uint64_t> changes_ = std::make_shared<std::uint64_t>(0);
 };
 
 /// Returns an array over memory that `owner` keeps alive; `leases` counts it while it lives.

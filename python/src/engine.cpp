@@ -29,15 +29,14 @@ void bind_engine_of(py::module_& module, const std::string& suffix) {
 class CheckedFunction {
  public:
   explicit CheckedFunction(py::function f) : f_(std::move(f)) {}
-  ~CheckedFunction() {
-    for (const auto& handle : handles_) handle->forget();
-  }
+  ~CheckedFunction() { forget(); }
   CheckedFunction(const CheckedFunction&) = delete;
   CheckedFunction& operator=(const CheckedFunction&) = delete;
   Var<double> operator()(Tape<double>& tape, std::span<const Var<double>> xs) {
-    handles_.push_back(std::make_shared<TapeHandle<double>>(tape));  // backward reads what the handle keeps
+    forget();                                              // the checker has reset the tape
+    handle_ = std::make_shared<TapeHandle<double>>(tape);  // backward reads what the handle keeps
     py::list values;
-    for (const Var<double>& x : xs) values.append(Value<double>(handles_.back(), x));
+    for (const Var<double>& x : xs) values.append(Value<double>(handle_, x));
     const py::object y = f_(*values);
     if (!py::isinstance<Value<double>>(y))
       throw py::type_error("[gradcheck] f must return a value of float64, got " + type_name(y));
@@ -45,8 +44,11 @@ class CheckedFunction {
   }
 
  private:
+  void forget() {
+    if (handle_) handle_->forget();
+  }
   py::function f_;
-  std::vector<std::shared_ptr<TapeHandle<double>>> handles_;
+  std::shared_ptr<TapeHandle<double>> handle_;
 };
 
 GradcheckReport check_gradients(const py::function& f, const std::vector<py::object>& inputs, double rtol) {

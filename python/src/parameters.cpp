@@ -119,7 +119,7 @@ struct OptimiserHandle {
   O optimiser;
   void step(double factor) {
     optimiser.step(store->store.values(), store->store.grads(), factor);
-    ++store->changes;
+    store->leases.changed();
   }
 };
 
@@ -204,7 +204,7 @@ void bind_state(py::module_& module) {
          const py::object& optimiser) {
         with_optimiser<T>("load_state", s, optimiser,
                           [&](auto&... o) { load_state(file, prefix, s->store, o...); });
-        ++s->changes;
+        s->leases.changed();
       },
       "file"_a, "prefix"_a, "parameters"_a, "optimiser"_a = py::none(),
       once<T>(

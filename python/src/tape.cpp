@@ -49,11 +49,19 @@ Value<T> leaf(TapePtr<T> t, const py::object& given, const py::object& grad) {
                                   shape_of(array)));
 }
 
+// Returns numbers of a value's shape as an array: a view, or a copy if another object owns the tape, which
+// then ends the pass while the array may live on.
+template <class T>
+py::array shown(const T* numbers, const Value<T>& v) {
+  if (v.tape->own) return read_only_view(numbers, v.var.shape(), v.tape, v.tape->views);
+  return py::array_t<T>(extents_of(v.var.shape()), numbers);
+}
+
 template <class T>
 py::object grad_of(const Value<T>& v) {
   const T* grad = v.get().grad();
   if (!grad) return py::none();
-  return read_only_view(grad, v.var.shape(), v.tape, v.tape->views);
+  return shown(grad, v);
 }
 
 template <class T>
@@ -133,11 +141,9 @@ void bind_value(py::module_& module, const std::string& suffix) {
           "needs_grad", [](const Value<T>& v) { return v.get().needs_grad(); },
           "Whether it depends on a leaf, so that gradients reach it.")
       .def(
-          "numpy",
-          [](const Value<T>& v) {
-            return read_only_view(v.get().value(), v.var.shape(), v.tape, v.tape->views);
-          },
-          "The values, not copied. While the array lives, the tape cannot be reset.")
+          "numpy", [](const Value<T>& v) { return shown(v.get().value(), v); },
+          "The values, not copied (within gradcheck: a copy). While the array lives, the tape cannot be "
+          "reset.")
       .def_property_readonly(
           "grad", &grad_of<T>,
           "The gradient that has arrived, not copied; None before there is one. ValueError for the "

@@ -14,8 +14,7 @@ namespace fieldmark::python {
 template <class T>
 struct StoreHandle {
   ParamStore<T> store;
-  Leases leases;
-  std::uint64_t changes = 0;  // counts changes of values by steps and files
+  Leases leases;  // also counts changes of values by steps and files
 
   /// Returns the store for adding parameters.
   /// @param where  for error messages   @throws BufferError if its memory is in use
@@ -53,14 +52,14 @@ struct TapeHandle {
   /// Holds what the pass reads until it ends.
   void keep(const py::array& array) {
     memory_.add_read(memory_of(array));
-    held_.hold(array);
+    hold(array);
   }
   /// Overload for a leaf, whose gradient is added to another array.
   /// @throws ValueError if `grads` is an array that the pass reads
   void keep(const py::array& values, const py::array& grads) {
     memory_.check_leaf("leaf", memory_of(values), memory_of(grads));
     memory_.add_leaf(memory_of(values), memory_of(grads));
-    held_.hold(values);
+    hold(values);
     grads_.push_back(grads);
   }
   /// Records that the pass reads a parameter store and adds to its gradients.
@@ -71,12 +70,13 @@ struct TapeHandle {
     const Memory read{values.data(), values.size_bytes()}, added_to{grads.data(), grads.size_bytes()};
     memory_.check_leaf("parameters", read, added_to);
     memory_.add_leaf(read, added_to);
-    stores_.push_back({store, store->leases.lend(store), store->changes});
+    stores_.push_back({store, store->leases.lend(store)});
+    watch(store->leases.changes());
   }
   /// @throws ValueError if a step or a file has changed parameters since the pass read them
   void check_unchanged() const {
-    for (const Read& r : stores_)
-      if (r.store->changes != r.changes)
+    for (const Watched& w : watched_)
+      if (*w.changes != w.before)
         throw py::value_error(
             "[backward] the parameters have changed since this pass read them: record it again");
   }
@@ -97,18 +97,31 @@ struct TapeHandle {
     memory_.forget();
     grads_.clear();
     stores_.clear();
+    watched_.clear();
   }
 
  private:
+  void watch(const std::shared_ptr<const std::uint64_t>& changes) {
+    if (changes) watched_.push_back({changes, *changes});
+  }
+  void hold(const py::array& array) {
+    watch(Leases::changes(array));
+    held_.hold(array);
+  }
   struct Read {
     std::shared_ptr<StoreHandle<T>> store;
     py::capsule lease;
-    std::uint64_t changes;
+  };
+  // Memory that the pass reads, and the count of its changes when the pass read it.
+  struct Watched {
+    std::shared_ptr<const std::uint64_t> changes;
+    std::uint64_t before;
   };
   HeldArrays held_;
   PassMemory memory_;
   std::vector<py::array> grads_;
   std::vector<Read> stores_;
+  std::vector<Watched> watched_;
 };
 
 /// An optional array that an op reads.

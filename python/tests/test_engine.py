@@ -154,6 +154,46 @@ def test_gradcheck_finds_a_wrong_gradient_and_forgets_its_tape():
         kept[0].numpy()
 
 
+def test_arrays_from_within_gradcheck_are_copies_and_values_end_with_their_call():
+    arrays, values, refused = [], [], []
+
+    def f(x):
+        if values:
+            with pytest.raises(ValueError, match="forgotten"):
+                values[-1].numpy()
+            refused.append(True)
+        y = x * x
+        arrays.append((x.numpy(), y.numpy()))
+        values.append(y)
+        return y
+
+    assert engine.gradcheck(f, [np.array([3.0, 4.0])]).ok
+    assert refused
+    for x, y in arrays:
+        np.testing.assert_allclose(y, x * x)
+
+
+def test_backward_notices_a_step_if_parameters_came_as_arrays():
+    model = engine.Parameters()
+    model.add("w", np.array([2.0, 3.0], "float32"))
+    sgd, tape = engine.Sgd(model, lr=1.0), engine.Tape()
+    x = np.ones(2, "float32")
+    for record in (tape.constant, tape.leaf):
+        loss = engine.sum(record(model.values("w")) * tape.constant(x))
+        sgd.step()
+        with pytest.raises(ValueError, match="parameters have changed"):
+            loss.backward()
+        del loss
+        tape.reset()
+
+
+def test_threads_beyond_what_can_be_started_are_refused():
+    import fieldmark
+
+    with pytest.raises(ValueError, match="1 to 1024"):
+        fieldmark.set_threads(1_000_000)
+
+
 def test_a_line_is_fitted():
     x = random(64, 3, dtype="float32")
     y = x @ np.array([[1], [-2], [0.5]], "float32") + 3

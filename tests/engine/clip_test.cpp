@@ -20,6 +20,18 @@ TEST_CASE("clip: scales down to the limit, and never up") {
   CHECK(clip_grad_norm(std::span(none), 1) == 0);
 }
 
+TEST_CASE("clip: a norm beyond double is clipped all the same") {
+  std::vector<double> g{3e160, 0, -4e160};
+  CHECK(clip_grad_norm(std::span(g), 1) == Approx(5e160).epsilon(1e-14));
+  CHECK(g[0] == Approx(0.6).epsilon(1e-14));
+  CHECK(g[2] == Approx(-0.8).epsilon(1e-14));
+  std::vector<double> largest(4, std::numeric_limits<double>::max());
+  CHECK(clip_grad_norm(std::span(largest), 2) == std::numeric_limits<double>::infinity());
+  for (const double x : largest) CHECK(x == Approx(1).epsilon(1e-14));
+  const std::vector<double> infinite{1, std::numeric_limits<double>::infinity()};
+  CHECK(grad_norm(std::span(infinite)) == std::numeric_limits<double>::infinity());
+}
+
 TEST_CASE("clip: a store's gradients are one vector") {
   ParamStore<float> store;
   const ParamId a = store.add("a", {1}), b = store.add("net/b", {2});

@@ -85,6 +85,13 @@ TEST_CASE("muon: no gradient means no step, and NaN stays in its matrix") {
   CHECK(std::ranges::all_of(store.values(b), [](float x) { return std::isfinite(x); }));
 }
 
+TEST_CASE("muon: numbers whose squares leave the range of double are orthogonalised all the same") {
+  const Matrix m = (Matrix(2, 2) << 3, 1, -1, 2).finished(), expected = orthogonal_of<double>(m);
+  for (const double by : {1e200, 1e-200, 1e300, 1e-300})
+    CHECK((orthogonal_of<double>(m * by) - expected).cwiseAbs().maxCoeff() < 1e-14);
+  CHECK(orthogonal_of<double>(m * 1e-310).cwiseAbs().maxCoeff() == 0);
+}
+
 TEST_CASE("muon: two steps by hand, of the matching parameters alone") {
   ParamStore<double> store;
   const ParamId conv = store.add("net/conv/weight", {2, 2, 3, 5}), bias = store.add("net/conv/bias", {5}),

@@ -32,7 +32,8 @@ TEST_CASE("parallel: a scope's number of threads ends with it, also by an except
       }(),
       ValueError);
   CHECK(threads() == before);
-  CHECK_THROWS_WITH(ScopedThreads(0), Contains("n must be at least 1, got 0"));
+  CHECK_THROWS_WITH(ScopedThreads(0), Contains("n must be from 1 to 1024, got 0"));
+  CHECK_THROWS_WITH(ScopedThreads(1025), Contains("n must be from 1 to 1024, got 1025"));
   CHECK(threads() == before);
 }
 
@@ -47,5 +48,5 @@ TEST_CASE("parallel: an exception of a chunk reaches the caller, nested loops ar
     parallel_for(8, 1, [&](Index c, Index) { ++seen[static_cast<std::size_t>(8 * b + c)]; });
   });
   CHECK(seen == std::vector<int>(64, 1));
-  CHECK_THROWS_WITH(set_threads(0), "[set_threads] n must be at least 1, got 0");
+  CHECK_THROWS_WITH(set_threads(0), "[set_threads] n must be from 1 to 1024, got 0");
 }

@@ -1,4 +1,10 @@
+#include <fieldmark/engine/nn/batch_norm.h>
+#include <fieldmark/engine/nn/conv2d.h>
+#include <fieldmark/engine/nn/dense.h>
+#include <fieldmark/engine/nn/group_norm.h>
+#include <fieldmark/engine/nn/layer_norm.h>
 #include <fieldmark/engine/ops/arithmetic.h>
+#include <fieldmark/engine/packed_weights.h>
 #include <fieldmark/engine/params.h>
 
 #include "support/catch.h"
@@ -94,6 +100,32 @@ TEST_CASE("params: a store that grew refuses Params of before, whose pointers da
   const Params<float> again(store);
   store = ParamStore<float>(store);
   CHECK_THROWS_AS(again.leaf(tape, a), ValueError);
+}
+
+TEST_CASE("params: a tensor without memory and a layer without all its names leave the store as it was") {
+  ParamStore<float> store;
+  store.add("a/bias", {2});
+  CHECK_THROWS(store.add("huge", {Index{1} << 60}));
+  CHECK(store.entries().size() == 1);
+  CHECK(store.values().size() == 2);
+  CHECK(store.grads().size() == 2);
+  CHECK_THROWS_WITH(Dense<float>(store, "a", {.in = 2, .out = 2}, 1),
+                    "[params] name 'a/bias' is already used");
+  CHECK_THROWS_WITH(Conv2d<float>(store, "a", {.in = 2, .out = 2}, 1), Contains("'a/bias' is already used"));
+  store.add("n/beta", {2});
+  CHECK_THROWS_WITH(LayerNorm<float>(store, "n", 2), Contains("'n/beta' is already used"));
+  CHECK_THROWS_WITH(GroupNorm<float>(store, "n", 2, {.groups = 1}), Contains("'n/beta' is already used"));
+  CHECK_THROWS_WITH(BatchNorm<float>(store, "n", 2, {}), Contains("'n/beta' is already used"));
+  CHECK(store.entries().size() == 2);
+}
+
+TEST_CASE("params: packed weights of another store are refused") {
+  ParamStore<float> a, b;
+  const Dense<float> of_a(a, "l", {.in = 4, .out = 4}, 1), of_b(b, "l", {.in = 4, .out = 4}, 2);
+  PackedWeights<float> packed(a);
+  packed.update();
+  CHECK_NOTHROW(Params<float>(a, nullptr, packed));
+  CHECK_THROWS_WITH(Params<float>(b, nullptr, packed), "[params] packed must be of the same store");
 }
 
 TEST_CASE("params: ids that the store has not are errors") {

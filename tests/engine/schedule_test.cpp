@@ -104,17 +104,19 @@ TEST_CASE("schedule: a timed run of few slow steps ends at its time, at the late
 
 TEST_CASE("schedule: a resumed timed run keeps its total") {
   Schedule s({.seconds = 60});
-  s.resume(500);
+  s.resume(500, true);
+  CHECK(s.replanned());
+  s.resume(500, false);
   for (const auto& [n, now] : {std::pair<Index, double>{480, 1000}, {481, 1001}, {482, 1100}})
     s.observe(n, now);
   CHECK(s.total() == 500);
   CHECK_FALSE(s.replanned());
   s = Schedule({.seconds = 60});
-  s.resume(0);
+  s.resume(0, false);
   for (Index n = 480; n < 483; ++n) s.observe(n, 59.0 + static_cast<double>(n - 480));
   CHECK(s.total() == 483);  // it was not fixed before, and the time is over
   Schedule fixed({.steps = 300});
-  fixed.resume(500);
+  fixed.resume(500, false);
   CHECK(fixed.total() == 300);
 }
 

@@ -191,6 +191,49 @@ TEST_CASE("training_run: a checkpoint of another run is refused by the name of t
                     path.string() + ": tensor 'x.mean': expected 3 elements of F32, found shape [2] of F32");
 }
 
+TEST_CASE("training_run: figures of a checkpoint that make no sense are refused before the run changes") {
+  const TemporaryFolder folder;
+  const auto path = folder / "c";
+  Fit begun(kTen);
+  begun.step(0);
+  begun.save(path);
+  const SafetensorsFile good = SafetensorsFile::read(path);
+  const auto restored_with = [&](const char* name, auto change) {
+    SafetensorsFile file = good;
+    for (auto& e : file.tensors)
+      if (e.name == name) change(e);
+    file.write(path);
+    Fit run(kTen);
+    const auto before = run.values();
+    std::string error;
+    try {
+      run.restore(path);
+    } catch (const IoError& e) {
+      error = e.what();
+    }
+    CHECK(run.values() == before);
+    CHECK(run.steps() == 0);
+    return error;
+  };
+  CHECK_THAT(restored_with("run/curve", [](auto& e) { e.shape = {4}, e.data.resize(32); }),
+             Contains("run/curve: expected shape [n, 3], found [4]"));
+  CHECK_THAT(restored_with("run/steps", [](auto& e) { std::ranges::fill(e.data, std::byte{0xFF}); }),
+             Contains("expected steps from 0, found run/steps -1"));
+}
+
+TEST_CASE("training_run: a revised schedule stays one across a checkpoint") {
+  const TemporaryFolder folder;
+  Fit first({.seconds = 10, .lr = 0.1});
+  for (int i = 0; first.planned() == 0; ++i) first.step(0.5 * i);
+  const Index total = first.planned();
+  for (double now = 8; !first.replanned() && first.steps() < total; now += 2) first.step(now);
+  REQUIRE(first.replanned());
+  first.save(folder / "c");
+  Fit second({.seconds = 10, .lr = 0.1});
+  second.restore(folder / "c");
+  CHECK(second.replanned());
+}
+
 TEST_CASE(
     "training_run: drive writes checkpoints, stops where it is told, and a later one goes on with its "
     "clock") {

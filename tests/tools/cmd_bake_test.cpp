@@ -8,6 +8,18 @@
 
 using namespace fieldmark;
 
+TEST_CASE("bake refuses a recipient that no list can name", "[bake]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string out = job.folder / "spaced.fm";
+  for (const char* name : {"Anna ", " Anna", "An\tna"}) {
+    const auto r =
+        run_command({"bake", "--owner", job.owner, "--message", "5", "--copy", name, "--out", out});
+    CHECK(r.code == cli::kUsage);
+    CHECK_THAT(r.err, Contains("--copy: recipient: expected a name without spaces"));
+    CHECK(!std::filesystem::exists(out));
+  }
+}
+
 TEST_CASE("bake changes colours only, and says nothing of the message in the file", "[bake]") {
   const TinyJob& job = TinyJob::get();
   const auto bake = [&](const char* message) {

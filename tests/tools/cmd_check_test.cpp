@@ -35,6 +35,13 @@ TEST_CASE("check passes the evidence that verify wrote, with its images and its 
   CHECK(json["faults"].empty());
   CHECK(json["images"] == 2);
   CHECK(json["images_known"] == 2);
+  CHECK(json["images_tested"] == 2);
+  CHECK(json["images_controls"] == 0);
+  CHECK(json["images_in_evidence"] == 2);
+  CHECK(json["copy"].is_null());
+  CHECK(json["key_free"] == true);
+  CHECK_THAT(run_command({"check", e.folder, e.images}).out,
+             Contains("2 of 2 tested images given, and 0 images of controls"));
   CHECK(json["commitment"] == e.verified["commitment"]);
   CHECK(json["found"] == true);
   CHECK(json["message"] == "5");

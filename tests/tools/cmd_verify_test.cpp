@@ -45,6 +45,25 @@ TEST_CASE("verify takes another key, and finds with a rate of 1 whatever it sees
             .code == cli::kOk);
 }
 
+TEST_CASE("verify says what speaks against the message", "[verify]") {
+  const TinyJob& job = TinyJob::get();
+  // At a rate of 1 everything is found, and these bits are noise.
+  const auto read =
+      run_command({"extract", "--detection", "blind", "--owner", job.owner, job.images(), "--json", "-"});
+  const std::string bits = nlohmann::json::parse(read.out)["bits"];
+  REQUIRE(bits.size() == 4);
+  const auto digit = std::string(1, "0123456789abcdef"[std::stoi(bits, nullptr, 2)]);
+  const auto r = run_command({"verify", "--detection", "blind", "--owner", job.owner, "--message", digit,
+                              "--fpr", "0.9", job.images(), "--json", "-"});
+  const auto json = nlohmann::json::parse(r.out);
+  CHECK(json["contradicting_bits"] == 0);
+  CHECK(json["matching_bits"] == json["bits"]);
+  const bool noise = json["found"] == true && json["p_noise"] > 0.9;
+  CHECK((r.err.find("only if the message was known before the images were read") != std::string::npos) ==
+        noise);
+  CHECK_THAT(r.err, Contains(json["found"] == true ? "carry a mark of this key" : "NOT FOUND"));
+}
+
 TEST_CASE("verify refuses a rate that no image can reach, and messages that do not fit", "[verify]") {
   const TinyJob& job = TinyJob::get();
   const std::string images = job.images();

@@ -56,6 +56,19 @@ TEST_CASE("evidence_page: verdict, limits, figures and images, in tags that clos
   CHECK_THAT(page, !Contains(to_hex(test_key(5))));
 }
 
+TEST_CASE("evidence_page: what the verdict does not cover is said beside it", "[evidence]") {
+  CHECK_THAT(small_page(), !Contains("not proven") && !Contains("contradict") && !Contains("one recipient"));
+  watermark::EvidenceRecord record = small_evidence();
+  record.key_free = false;
+  record.copy = "Anna & Sons";
+  record.together.reading.logit[0] = 9;
+  record.message.bits[0] ^= 1;
+  const std::string page = small_page(record);
+  CHECK(open_tags(page).empty());
+  CHECK_THAT(page, Contains("The bound is not proven") && Contains("Bits that contradict the message: 1.") &&
+                       Contains("the copy of one recipient, Anna &amp; Sons"));
+}
+
 TEST_CASE("evidence_page: no image is without words for who cannot see it", "[evidence]") {
   const std::string page = small_page();
   for (std::size_t at = page.find("<img"); at != std::string::npos; at = page.find("<img", at + 1))

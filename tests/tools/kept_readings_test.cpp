@@ -67,6 +67,12 @@ TEST_CASE("kept_readings: other files stay as they are, and other runs are refus
   KeptReadings(file, "owner", "blind", 3).add({.cells = {2, 0, 1}, .sha256 = "def"});
   CHECK_THROWS_WITH(KeptReadings(file, "another", "blind", 3), Contains(file) && Contains("owner_sha256"));
   CHECK_THROWS_WITH(KeptReadings(file, "owner", "auto", 3), Contains("detection"));
+  std::string of_others = read_text(file);
+  const std::string key = "\"commit\":\"";
+  REQUIRE(of_others.find(key) != std::string::npos);
+  of_others.insert(of_others.find(key) + key.size(), "0");
+  write_file_atomically(file, of_others);
+  CHECK_THROWS_WITH(KeptReadings(file, "owner", "blind", 3), Contains("has readings with commit"));
   for (const char* text : {"secret", "secret\n", "{\"readings\": 2}\n", "[]\n"}) {
     write_file_atomically(file, std::string_view(text));
     CHECK_THROWS_AS(KeptReadings(file, "owner", "blind", 3), IoError);

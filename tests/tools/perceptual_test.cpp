@@ -57,7 +57,8 @@ TEST_CASE("The perceptual term takes its weights from the option, else from belo
   CHECK(term.sha256 == sha256_file_hex(path));
   const std::string other = folder / "other.safetensors";
   random_weights(lpips_tensors(LpipsNetwork::alex)).write(other);
-  CHECK_THROWS_WITH(cli::load_perceptual_term(0.01, other, context), Contains(other) && Contains("features.0.weight"));
+  CHECK_THROWS_WITH(cli::load_perceptual_term(0.01, other, context),
+                    Contains(other) && Contains("features.0.weight"));
 }
 
 TEST_CASE("LPIPS of images that are too small, or without a network, is no number", "[perceptual]") {

@@ -2,6 +2,7 @@
 #include <fieldmark/watermark/embedding/baker.h>
 #include <fieldmark/watermark/evidence/commitment.h>
 #include <fieldmark/watermark/keys/signing.h>
+#include <fieldmark/watermark/tracing/copies.h>
 
 #include <cmath>
 #include <cstdio>
@@ -71,7 +72,10 @@ int run_bake(const BakeArguments& options, Context& context) {
                        " has no mark PSNR to set, its networks decide it");
     owner.set_mark_psnr(*options.mark_psnr);
   }
-  if (!options.code.copy.empty()) check_copies(owner);
+  if (!options.code.copy.empty()) {
+    check_copies(owner);
+    read_option("--copy", [&] { watermark::check_recipient(options.code.copy); });
+  }
   const auto key = choose_code(options.code, options.message, owner, context);
   const auto message = message_of(options.message, owner.options().bits);
   watermark::BakeOptions bake_options{.seed = context.seed()};

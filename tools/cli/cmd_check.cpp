@@ -7,6 +7,7 @@
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/images.h"
+#include "cli/rounded_up.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -20,12 +21,17 @@ Json result(const watermark::EvidenceCheck& check, std::size_t given) {
   Json json{{"intact", check.faults.empty()},
             {"faults", check.faults},
             {"images", given},
-            {"images_known", check.images}};
+            {"images_known", check.images + check.controls},
+            {"images_tested", check.images},
+            {"images_controls", check.controls}};
   if (const auto& s = check.summary) {
     json["public_key"] = to_hex(s->signer);
     json["commitment"] = s->commitment;
     json["owner_sha256"] = s->owner_sha256;
     json["message"] = to_hex(s->message);
+    json["copy"] = s->copy.empty() ? Json(nullptr) : Json(s->copy);
+    json["key_free"] = s->key_free;
+    json["images_in_evidence"] = s->images.size();
     json["found"] = s->found;
     json["p_value"] = s->p_value;
   }
@@ -43,12 +49,13 @@ int run_check(const CheckArguments& options, Context& context) {
   for (const auto& fault : check.faults) out << fault << "\n";
   out << options.folder << (check.faults.empty() ? ": INTACT" : ": ALTERED") << "\n";
   if (const auto& s = check.summary; s && check.faults.empty()) {
-    char p[40];
-    std::snprintf(p, sizeof p, "%.2e", s->p_value);
-    out << "verdict     " << (s->found ? "FOUND" : "NOT FOUND") << ", p " << p << ", message "
-        << to_hex(s->message) << "\ncommitment  " << s->commitment << "\nsigned by   " << to_hex(s->signer)
+    out << "verdict     " << (s->found ? "FOUND" : "NOT FOUND") << ", p " << rounded_up(s->p_value, 3)
+        << ", message " << to_hex(s->message) << (s->copy.empty() ? "" : ", copy of " + s->copy)
+        << (s->key_free ? "" : "; not proven: the networks were trained under the owner's key")
+        << "\ncommitment  " << s->commitment << "\nsigned by   " << to_hex(s->signer)
         << (signer ? ", as expected" : ", not compared with a known key (see --public-key)")
-        << "\nimages      " << check.images << " of those given belong to it\n";
+        << "\nimages      " << check.images << " of " << s->images.size() << " tested images given, and "
+        << check.controls << " images of controls\n";
   }
   context.result(result(check, images.size()));
   return check.faults.empty() ? kOk : kFailed;

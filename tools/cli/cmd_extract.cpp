@@ -10,6 +10,7 @@
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/reading.h"
+#include "cli/rounded_up.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -33,10 +34,9 @@ Json bits_json(const watermark::BitReading& reading) {
 }
 
 void print_view(const ImageEvidence& image, const watermark::BitReading& reading, Context& context) {
-  char p[60];
-  std::snprintf(p, sizeof p, ", noise with p %.1e\n", watermark::noise_p_value(reading));
   context.text() << to_bits(reading.message) << "  " << image.image << "  "
-                 << watermark::reading_name(image.reading) << p;
+                 << watermark::reading_name(image.reading) << ", noise with p "
+                 << rounded_up(watermark::noise_p_value(reading)) << "\n";
 }
 
 // Describes how certain it is that the bits of all images together are a message.
@@ -47,14 +47,14 @@ std::string certainty(const watermark::BitReading& reading, double fpr) {
   char text[300];
   if (p <= fpr)
     std::snprintf(text, sizeof text,
-                  "READ at a false-positive rate of %g: unmarked images give such bits with p %.1e\n"
+                  "READ at a false-positive rate of %g: unmarked images give such bits with p %s\n"
                   "%lld of %zu bits are weak: by themselves they may be wrong (p above %g)\n",
-                  fpr, p, static_cast<long long>(weak), p_values.size(), kWeakBit);
+                  fpr, rounded_up(p).c_str(), static_cast<long long>(weak), p_values.size(), kWeakBit);
   else
     std::snprintf(
         text, sizeof text,
-        "NOTHING READ at a false-positive rate of %g: unmarked images give such bits with p %.1e\n%s\n", fpr,
-        p,
+        "NOTHING READ at a false-positive rate of %g: unmarked images give such bits with p %s\n%s\n", fpr,
+        rounded_up(p).c_str(),
         p <= kTrace ? "there may be a mark, too faint to be sure: more images of the field tell"
                     : "the bits above are guesses, not a message");
   return text;

@@ -12,6 +12,7 @@
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/reading.h"
+#include "cli/rounded_up.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -47,8 +48,8 @@ void print_recipients(const std::vector<watermark::TracedCopy>& copies, std::siz
                 copies.size(), fpr);
   context.text() << (found > 0 ? "FOUND: " : "NOT FOUND: ") << line;
   for (std::size_t i = 0; i < std::min(copies.size(), found + kShown); ++i) {
-    std::snprintf(line, sizeof line, "%-9s corrected p %.2e, p %.2e  ", i < found ? "found" : "not found",
-                  copies[i].p_corrected, copies[i].p_value);
+    std::snprintf(line, sizeof line, "%-9s corrected p %s, p %s  ", i < found ? "found" : "not found",
+                  rounded_up(copies[i].p_corrected, 3).c_str(), rounded_up(copies[i].p_value, 3).c_str());
     context.text() << line << copies[i].name << "\n";
   }
 }

@@ -1,6 +1,7 @@
 #include <fieldmark/core/digest.h>
 #include <fieldmark/watermark/evidence/commitment.h>
 #include <fieldmark/watermark/evidence/evidence_folder.h>
+#include <fieldmark/watermark/evidence/noise.h>
 
 #include <cstdio>
 #include <memory>
@@ -13,6 +14,7 @@
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/evidence_run.h"
+#include "cli/rounded_up.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -46,15 +48,30 @@ void print_verdict(const watermark::EvidenceRecord& record, Context& context) {
   char text[400];
   std::snprintf(text, sizeof text,
                 "%s at a false-positive rate of %g\n"
-                "p-value of the key    %.2e (two-sided %.2e), from %zu images together\n"
-                "p-value of the bits   %.2e (two-sided %.2e), %lld of %lld match\n"
+                "p-value of the key    %s (two-sided %s), from %zu images together\n"
+                "p-value of the bits   %s (two-sided %s), %lld of %lld match\n"
                 "detection             %s\n",
-                record.found() ? "FOUND" : "NOT FOUND", record.fpr, score.p_value, score.p_value_two_sided,
-                record.images.size(), score.p_value_bits, score.p_value_bits_two_sided,
+                record.found() ? "FOUND: the images carry a mark of this key," : "NOT FOUND", record.fpr,
+                rounded_up(score.p_value, 3).c_str(), rounded_up(score.p_value_two_sided, 3).c_str(),
+                record.images.size(), rounded_up(score.p_value_bits, 3).c_str(),
+                rounded_up(score.p_value_bits_two_sided, 3).c_str(),
                 static_cast<long long>(score.match.matching), static_cast<long long>(score.match.bits),
                 record.reading.c_str());
   context.text() << text << "owner sha256 " << record.owner_sha256 << "\ncommitment " << record.commitment
                  << "\n";
+}
+
+// The verdict is about the key. Says what speaks against the message.
+void note_message(const watermark::EvidenceRecord& record, Context& context) {
+  const auto& score = record.together;
+  if (!record.found()) return;
+  if (const Index against = watermark::contradicting_bits(score.reading, record.message); against > 0)
+    context.note("bits that contradict the message: " + std::to_string(against) +
+                 "; the images carry this key's mark with another message");
+  const double noise = watermark::noise_p_value(score.reading);
+  if (score.match.matching == score.match.bits && noise > record.fpr)
+    context.note("unmarked images give bits as clear as these with p " + rounded_up(noise) +
+                 ": this verdict counts only if the message was known before the images were read");
 }
 
 Json result_json(const watermark::EvidenceRecord& record, const std::string& signer) {
@@ -66,7 +83,9 @@ Json result_json(const watermark::EvidenceRecord& record, const std::string& sig
           {"p_value_two_sided", score.p_value_two_sided},
           {"statistic", score.statistic},
           {"matching_bits", score.match.matching},
+          {"contradicting_bits", watermark::contradicting_bits(score.reading, record.message)},
           {"bits", score.match.bits},
+          {"p_noise", watermark::noise_p_value(score.reading)},
           {"views", record.images.size()},
           {"detection", record.reading},
           {"fpr", record.fpr},
@@ -98,6 +117,7 @@ int run_verify(const VerifyArguments& options, Context& context) {
                                    .owner_sha256 = sha256_file_hex(options.owner),
                                    .message = message,
                                    .copy = options.code.copy,
+                                   .key_free = owner.key_free(),
                                    .fpr = options.fpr,
                                    .cells = code.carriers(),
                                    .together = test(evidence),
@@ -108,6 +128,7 @@ int run_verify(const VerifyArguments& options, Context& context) {
   record.commitment = watermark::commitment(record.owner_sha256, key, message);
   print_views(context.text(), images, record.images);
   print_verdict(record, context);
+  note_message(record, context);
   TestedControls controls;
   if (!options.controls.empty() || !options.evidence.empty())
     controls = test_controls(test, reader, images, options.controls, options.suspects.frames, context);
@@ -135,7 +156,7 @@ int run_verify(const VerifyArguments& options, Context& context) {
 Command add_verify(CommandLine& app) {
   auto o = std::make_shared<VerifyArguments>();
   app.add_option("--owner", o->owner, "Owner file from `fieldmark embed`")->required()->type_name("OWNER");
-  add_message_options(app, o->message, "Message to look for");
+  add_message_options(app, o->message, "Message to look for, known before the images were read");
   add_rate(app, o->fpr, "a mark counts as found");
   add_code_options(app, o->code);
   add_copy_option(app, o->code, "Recipient whose copy to look for");

@@ -1,4 +1,5 @@
 #include "cli/evidence_page.h"
+#include "cli/rounded_up.h"
 
 #include <fieldmark/core/base64.h>
 #include <fieldmark/imaging/bar_chart.h>
@@ -65,7 +66,7 @@ std::string one_in_number(std::string digits) {
 // Writes a bound on a probability in words, rounded up to a power of ten: "1 in 10 000 000".
 std::string one_in(double p) {
   const int zeros = static_cast<int>(std::floor(-std::log10(p) + 1e-9));
-  if (zeros < 1) return text_of(100 * p, "%.3g") + "%";
+  if (zeros < 1) return rounded_up(100 * p, 3) + "%";
   if (zeros > 9) return "1 in 10<sup>" + std::to_string(zeros) + "</sup>";
   return one_in_number("1" + std::string(static_cast<std::size_t>(zeros), '0'));
 }
@@ -93,8 +94,8 @@ std::string marked_bits(const EvidenceScore& score, const watermark::Message& me
 
 std::string score_cells(const EvidenceScore& s) {
   return number_cell(std::to_string(s.match.matching) + " of " + std::to_string(s.match.bits)) +
-         number_cell(text_of(s.p_value)) + number_cell(text_of(s.p_value_two_sided)) +
-         number_cell(text_of(s.p_value_bits));
+         number_cell(rounded_up(s.p_value)) + number_cell(rounded_up(s.p_value_two_sided)) +
+         number_cell(rounded_up(s.p_value_bits));
 }
 
 std::string verdict(const EvidenceRecord& r) {
@@ -108,6 +109,26 @@ std::string verdict(const EvidenceRecord& r) {
   return "<p class=\"verdict missing\"><strong>The mark was not found</strong> in " + count +
          ". Evidence this strong occurs by chance with a probability of up to " + one_in(r.together.p_value) +
          "; at most " + exactly(r.fpr) + " was required.</p>\n";
+}
+
+// Says what the verdict does not cover in this record.
+std::string reservations(const EvidenceRecord& r) {
+  std::string out;
+  if (!r.key_free)
+    out +=
+        "<p><strong>The bound is not proven for this owner file:</strong> its networks were trained under "
+        "its own key "
+        "(version 0.1).</p>\n";
+  if (r.found())
+    if (const Index against = watermark::contradicting_bits(r.together.reading, r.message); against > 0)
+      out += "<p><strong>Bits that contradict the message: " + std::to_string(against) +
+             ".</strong> The images carry this key's mark with another message.</p>\n";
+  if (!r.copy.empty())
+    out += "<p>This test is of the copy of one recipient, " + escaped_markup(r.copy) +
+           ". If several names were tried, multiply the p-value by their number; the list of names must be "
+           "older than "
+           "the test.</p>\n";
+  return out;
 }
 
 std::string controls_verdict(const EvidenceRecord& r) {
@@ -126,7 +147,8 @@ constexpr char kLimits[] = R"(<h2>What this does not prove</h2>
 <li><strong>It counts only if the commitment below was published or time-stamped before the field and its images were
 published.</strong> Afterwards anybody can make up a mark that fits given images.</li>
 <li>It says that the images carry this owner's mark. It does not say who made them, who copied from whom, or who holds which rights.</li>
-<li>The probabilities hold for images that were not selected by their result. One of a thousand tests reaches 0.001 by chance.</li>
+<li>It counts only if the message was known before the images were read: a message read from the images fits them.</li>
+<li>The probabilities hold for images, and a kind of detection, that were not selected by their result. One of a thousand tests reaches 0.001 by chance.</li>
 <li>A mark that was not found may still have been there: a mark can be damaged.</li>
 <li>A p-value is not the probability that the mark is absent. It is a bound on how often a random key gives evidence this strong.</li>
 <li>The signature shows that the holder of the key wrote these figures and that nobody changed them since. It does not show that
@@ -144,11 +166,11 @@ std::string figures(const EvidenceRecord& r) {
          row("Message looked for",
              code(to_hex(r.message)) + ", " + std::to_string(r.message.size()) + " bits") +
          row("Bits read; those that differ are underlined", marked_bits(s, r.message)) +
-         row("p-value of the key", text_of(s.p_value) + " one-sided, " + text_of(s.p_value_two_sided) +
+         row("p-value of the key", rounded_up(s.p_value) + " one-sided, " + rounded_up(s.p_value_two_sided) +
                                        " two-sided; a bound for any image, over " + std::to_string(r.cells) +
                                        " cells of the scene, T = " + text_of(s.statistic, "%.2f")) +
-         row("p-value of the matching bits", text_of(s.p_value_bits) + " one-sided, " +
-                                                 text_of(s.p_value_bits_two_sided) + " two-sided; " +
+         row("p-value of the matching bits", rounded_up(s.p_value_bits) + " one-sided, " +
+                                                 rounded_up(s.p_value_bits_two_sided) + " two-sided; " +
                                                  std::to_string(s.match.matching) + " of " +
                                                  std::to_string(s.match.decided) + " decided bits match") +
          (r.copy.empty() ? "" : row("Recipient of the copy", escaped_markup(r.copy))) +
@@ -165,7 +187,7 @@ std::string image_plot(const EvidenceRecord& r) {
   double longest = -std::log10(r.fpr);
   for (std::size_t i = 0; i < std::min(r.images.size(), kPlottedImages); ++i) {
     const double p = r.images[i].score.p_value;
-    bars.push_back({"image " + std::to_string(i + 1), -std::log10(p), "p " + text_of(p)});
+    bars.push_back({"image " + std::to_string(i + 1), -std::log10(p), "p " + rounded_up(p)});
     longest = std::max(longest, bars.back().value);
   }
   bars.push_back({"required", -std::log10(r.fpr), "p " + text_of(r.fpr)});
@@ -286,9 +308,10 @@ std::string thumbnail(const Tensor<float>& rgb) {
 
 std::string evidence_page(const EvidenceRecord& record, const watermark::PublicKey& signer,
                           const PageImages& images) {
-  return kHead + std::string("<h1>Evidence of a mark</h1>\n") + verdict(record) + controls_verdict(record) +
-         kLimits + figures(record) + images_table(record, images) + controls_table(record, images) +
-         wrong_keys_section(record) + identity(record, signer) + "</body>\n</html>\n";
+  return kHead + std::string("<h1>Evidence of a mark</h1>\n") + verdict(record) + reservations(record) +
+         controls_verdict(record) + kLimits + figures(record) + images_table(record, images) +
+         controls_table(record, images) + wrong_keys_section(record) + identity(record, signer) +
+         "</body>\n</html>\n";
 }
 
 }  // namespace fieldmark::cli

@@ -11,6 +11,7 @@
 
 #include "cli/cli.h"
 #include "cli/context.h"
+#include "cli/rounded_up.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -116,9 +117,10 @@ void print_views(std::ostream& out, const std::vector<ImageEvidence>& images,
     const EvidenceScore& s = scores[i].score;
     const auto p_values = watermark::bit_p_values(s.reading);
     char text[120];
-    std::snprintf(text, sizeof text, "  %lld of %lld, p %.1e, weakest bit p %.1e  ",
-                  static_cast<long long>(s.match.matching), static_cast<long long>(s.match.bits), s.p_value,
-                  *std::max_element(p_values.begin(), p_values.end()));
+    std::snprintf(text, sizeof text, "  %lld of %lld, p %s, weakest bit p %s  ",
+                  static_cast<long long>(s.match.matching), static_cast<long long>(s.match.bits),
+                  rounded_up(s.p_value).c_str(),
+                  rounded_up(*std::max_element(p_values.begin(), p_values.end())).c_str());
     out << to_bits(s.reading.message) << text << images[i].image << "\n";
   }
 }
@@ -156,10 +158,10 @@ void print_controls(std::ostream& out, const std::vector<EvidenceControl>& contr
   for (const auto& control : controls) {
     const EvidenceScore& s = control.together;
     char text[160];
-    std::snprintf(text, sizeof text, "%.2g (two-sided %.2g), %lld of %lld match, images: %zu%s\n", s.p_value,
-                  s.p_value_two_sided, static_cast<long long>(s.match.matching),
-                  static_cast<long long>(s.match.bits), control.images.size(),
-                  s.p_value <= fpr ? ": THE TEST RESPONDS TO A CONTROL" : "");
+    std::snprintf(text, sizeof text, "%s (two-sided %s), %lld of %lld match, images: %zu%s\n",
+                  rounded_up(s.p_value).c_str(), rounded_up(s.p_value_two_sided).c_str(),
+                  static_cast<long long>(s.match.matching), static_cast<long long>(s.match.bits),
+                  control.images.size(), s.p_value <= fpr ? ": THE TEST RESPONDS TO A CONTROL" : "");
     out << "control " << control.name << ": p " << text;
   }
 }

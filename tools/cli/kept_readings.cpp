@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include <fieldmark/tools/results/report.h>
 #include "cli/cli.h"
 
 namespace fieldmark::cli {
@@ -41,7 +42,11 @@ ImageEvidence evidence_of(const Json& line, Index cells) {
 Json parsed(const std::string& line) { return Json::parse(line, nullptr, false); }
 
 Json header_of(const std::string& owner_sha256, const std::string& detection) {
-  return {{"readings", 1}, {"owner_sha256", owner_sha256}, {"detection", detection}, {"isa", isa_name()}};
+  return {{"readings", 1},
+          {"owner_sha256", owner_sha256},
+          {"detection", detection},
+          {"isa", isa_name()},
+          {"commit", results::machine().commit}};
 }
 
 void check_header(const std::string& file, const Json& found, const Json& wanted) {
@@ -49,7 +54,7 @@ void check_header(const std::string& file, const Json& found, const Json& wanted
     throw IoError(file +
                   ": expected readings of images as --readings writes them, got another file; name a "
                   "new one");
-  for (const char* key : {"owner_sha256", "detection", "isa"})
+  for (const char* key : {"owner_sha256", "detection", "isa", "commit"})
     if (found.value(key, Json()) != wanted[key])
       throw UsageError("--readings: " + file + " has readings with " + key + " " +
                        found.value(key, Json()).dump() + ", this run has " + wanted[key].dump() +

@@ -1,4 +1,5 @@
 #include "cli/message_option.h"
+#include "cli/rounded_up.h"
 
 #include <cstdio>
 
@@ -66,13 +67,15 @@ std::string payload_text(const std::optional<watermark::PayloadReading>& reading
     const watermark::PayloadCodec codec(bits);
     if (codec.layouts().empty()) return "none: a message of so few bits holds no payload";
     char text[80];
-    std::snprintf(text, sizeof text, "none (random bits decode to one with a probability below %.1e)",
-                  codec.chance());
+    std::snprintf(text, sizeof text, "none (random bits decode to one with a probability of at most %s)",
+                  rounded_up(codec.chance()).c_str());
     return text;
   }
   char text[120];
-  std::snprintf(text, sizeof text, ", %lld of %lld bits corrected, by chance with a probability below %.1e",
-                static_cast<long long>(reading->corrected), static_cast<long long>(bits), reading->chance);
+  std::snprintf(text, sizeof text,
+                ", %lld of %lld bits corrected, by chance with a probability of at most %s",
+                static_cast<long long>(reading->corrected), static_cast<long long>(bits),
+                rounded_up(reading->chance).c_str());
   return watermark::payload_kind_name(reading->payload.kind) + std::string(" ") + reading->payload.value +
          text;
 }

@@ -11,6 +11,7 @@ BatchNorm<T>::BatchNorm(ParamStore<T>& store, std::string_view name, Index chann
   if (channels < 1)
     throw ValueError("[BatchNorm] channels must be at least 1, got " + std::to_string(channels));
   const std::string prefix(name);
+  store.require_free(prefix, {"gamma", "beta", "running_mean", "running_variance"});
   gamma_ = store.add(prefix + "/gamma", {channels});
   beta_ = store.add(prefix + "/beta", {channels});
   mean_ = store.add(prefix + "/running_mean", {channels}, ParamRole::running);

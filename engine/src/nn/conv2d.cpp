@@ -16,6 +16,7 @@ Conv2d<T>::Conv2d(ParamStore<T>& store, std::string_view name, const Conv2dOptio
                      std::to_string(o.kernel));
   if (o.padding && *o.padding < 0)
     throw ValueError("[conv2d] padding must be at least 0, got " + std::to_string(*o.padding));
+  store.require_free(name, {"weight", "bias"});
   weight_ = store.add(std::string(name) + "/weight", {o.kernel, o.kernel, o.in, o.out});
   if (o.bias) bias_ = store.add(std::string(name) + "/bias", {o.out});
   detail::he_uniform(store.values(weight_), o.kernel * o.kernel * o.in, seed);

@@ -65,6 +65,7 @@ Dense<T>::Dense(ParamStore<T>& store, std::string_view name, const DenseOptions&
   if (options.in < 1 || options.out < 1)
     throw ValueError("[dense] in and out must be at least 1, got in " + std::to_string(options.in) +
                      " and out " + std::to_string(options.out));
+  store.require_free(name, {"weight", "bias"});
   weight_ = store.add(std::string(name) + "/weight", {options.in, options.out}, ParamRole::matrix);
   if (options.bias) bias_ = store.add(std::string(name) + "/bias", {options.out});
   detail::he_uniform(store.values(weight_), options.in, seed);

@@ -12,6 +12,7 @@ GroupNorm<T>::GroupNorm(ParamStore<T>& store, std::string_view name, Index chann
     throw ValueError("[GroupNorm] channels must be at least 1 and a multiple of groups, got " +
                      std::to_string(channels) + " channels and " + std::to_string(options.groups) +
                      " groups");
+  store.require_free(name, {"gamma", "beta"});
   gamma_ = store.add(std::string(name) + "/gamma", {channels});
   beta_ = store.add(std::string(name) + "/beta", {channels});
   std::ranges::fill(store.values(gamma_), T(1));

@@ -9,6 +9,7 @@ LayerNorm<T>::LayerNorm(ParamStore<T>& store, std::string_view name, Index chann
   if (channels < 1)
     throw ValueError("[LayerNorm] channels must be at least 1, got " + std::to_string(channels));
   if (!(eps > 0)) throw ValueError("[LayerNorm] eps must be above 0, got " + std::to_string(eps));
+  store.require_free(name, {"gamma", "beta"});
   gamma_ = store.add(std::string(name) + "/gamma", {channels});
   beta_ = store.add(std::string(name) + "/beta", {channels});
   std::ranges::fill(store.values(gamma_), T(1));

@@ -48,7 +48,9 @@ Var<T> pow(Var<T> a, Var<T> b) {
         return (z == T(0)).select(T(0), dy * z * Eigen::pow(x, z - T(1)));
       },
       [](const auto& x, const auto& z, const auto& dy) {
-        return (x == T(0) && z >= T(0)).select(T(0), dy * Eigen::pow(x, z) * x.log());
+        return (x == T(0) && z >= T(0)).select(T(0), dy * Eigen::pow(x, z) * x.unaryExpr([](T v) {
+          return std::log(v);
+        }));
       });
 }
 

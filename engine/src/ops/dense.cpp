@@ -146,21 +146,11 @@ void backward_of_few(const Backward<T>& p, const T* dy, Index n, T* buffer, T* d
 
 // Chunks own their rows of dX; the sums for dW and db are kept per shard of whole chunks and added in order.
 template <class T>
-void backward(Var<T> x, Var<T> w, Var<T> b, bool relu, Var<T> y, const T* dy) {
-  using Shortcuts = detail::Shortcuts<T>;
-  Tape<T>& tape = x.tape();
-  const Index n = x.shape()[0], in = w.shape()[0], out = w.shape()[1], row = detail::whole_row<T>(out);
-  const PackedMatrix<T>* packed = Shortcuts::packed(w);
-  const T* mask = relu && !(Shortcuts::rectified(y) && Shortcuts::grad_masked(y)) ? y.value() : nullptr;
-  Backward<T> p{in, out, x.value(), nullptr, mask, nullptr, nullptr, Shortcuts::rectified(x), false};
-  if (packed) p.transposed_bf16 = packed->transposed_bf16;
-  p.dx = Shortcuts::grad_acc(x, &p.fresh, p.mask_dx);
-  if (p.dx)
-    p.transposed = packed ? packed->transposed : detail::packed(tape, w.value(), out, in, Index{1}, out);
-  T *dw = w.grad_acc(), *db = b.grad_acc();
+void add_gradients(Tape<T>& tape, const Backward<T>& p, Index n, const T* dy, T* dw, T* db) {
+  const Index in = p.in, out = p.out, row = detail::whole_row<T>(out);
   const Index chunks = (n + kChunkRows - 1) / kChunkRows, own = (dw ? in * out : 0) + (db ? out : 0);
   const Index shards = std::min(detail::kProductShards, (n + kShardRows - 1) / kShardRows);
-  const bool copies = mask || row != out;
+  const bool copies = p.mask || row != out;
   if (shards == 1 && chunks > 1 && !detail::runs_on_one_thread())
     return backward_of_few(p, dy, n, copies ? tape.scratch(n * row) : nullptr, dw, db);
   const Index buffer = copies ? std::min(n, kChunkRows) * row : 0;
@@ -181,6 +171,28 @@ void backward(Var<T> x, Var<T> w, Var<T> b, bool relu, Var<T> y, const T* dy) {
     for (Index i = 0; dw && i < in * out; ++i) dw[i] += from[i];
     for (Index i = 0; db && i < out; ++i) db[i] += from[own - out + i];
   }
+}
+
+template <class T>
+void backward(Var<T> x, Var<T> w, Var<T> b, bool relu, Var<T> y, const T* dy) {
+  using Shortcuts = detail::Shortcuts<T>;
+  Tape<T>& tape = x.tape();
+  const Index n = x.shape()[0], in = w.shape()[0], out = w.shape()[1];
+  const PackedMatrix<T>* packed = Shortcuts::packed(w);
+  const T* mask = relu && !(Shortcuts::rectified(y) && Shortcuts::grad_masked(y)) ? y.value() : nullptr;
+  Backward<T> p{in, out, x.value(), nullptr, mask, nullptr, nullptr, Shortcuts::rectified(x), false};
+  if (packed) p.transposed_bf16 = packed->transposed_bf16;
+  // First the sums: if x is w too, the buffer of both is then zeroed, not fresh.
+  T *dw = w.grad_acc(), *db = b.grad_acc();
+  p.dx = Shortcuts::grad_acc(x, &p.fresh, p.mask_dx);
+  if (p.dx)
+    p.transposed = packed ? packed->transposed : detail::packed(tape, w.value(), out, in, Index{1}, out);
+  if (!dw || dw != p.dx) return add_gradients(tape, p, n, dy, dw, db);
+  // x is w: dX is added before dW, in whatever order the threads compute them.
+  T* of_w = tape.scratch(in * out);
+  std::fill_n(of_w, in * out, T(0));
+  add_gradients(tape, p, n, dy, of_w, db);
+  for (Index i = 0; i < in * out; ++i) dw[i] += of_w[i];
 }
 
 }  // namespace

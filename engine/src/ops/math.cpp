@@ -76,7 +76,8 @@ Var<T> pow(Var<T> x, double p) {
 template <class T>
 Var<T> log(Var<T> x) {
   return detail::elementwise(
-      x, [](const auto& v) { return v.log(); },
+      // Eigen's log of vectors takes subnormal numbers for the smallest normal one.
+      x, [](const auto& v) { return v.unaryExpr([](T a) { return std::log(a); }); },
       [](const auto& v, const auto&, const auto& dy) { return dy / v; });
 }
 

@@ -1,5 +1,6 @@
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/dense.h>
+#include <fieldmark/engine/ops/matmul.h>
 #include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/engine/parallel.h>
 
@@ -131,6 +132,28 @@ TEST_CASE("dense: gradient through layers that mask for each other, with another
         },
         {uniform({5, 4}, 0.2, 1, 1), alternating({4, 8}, 2), alternating({8}, 3), alternating({8, 6}, 4),
          alternating({6}, 5)});
+}
+
+TEST_CASE(
+    "dense: one value as input and weight gets both gradients, for few rows and many, on 1 and 2 threads") {
+  for (const Index n : {Index{3}, Index{600}}) {
+    const auto gradient = [n](int threads, bool as_matmul) {
+      const ScopedThreads scope(threads);
+      Tape<double> tape;
+      Tensor<double> h = uniform<double>({n, n}, -1, 1, 7), dh(h.shape), zeros(Shape{n});
+      const auto intermediate = scale(tape.leaf(h, dh), 2.0);
+      const auto y = as_matmul ? matmul(intermediate, intermediate)
+                               : dense(intermediate, intermediate, tape.constant(zeros), Activation::none);
+      tape.backward(y, uniform<double>({n, n}, -1, 1, 8).data);
+      return dh.data;
+    };
+    const auto expected = gradient(1, true), one = gradient(1, false), two = gradient(2, false);
+    double worst = 0;
+    for (std::size_t i = 0; i < one.size(); ++i) worst = std::max(worst, std::abs(one[i] - expected[i]));
+    CAPTURE(n, worst);
+    CHECK(worst < 1e-10 * static_cast<double>(n));
+    CHECK((one == two));
+  }
 }
 
 TEST_CASE("dense: errors") {

@@ -75,6 +75,13 @@ TEST_CASE("math: poles, kinks and NaN") {
   const auto slope_at_0 = [&](auto op) { return run_op(op, std::vector{Tensor<double>({1}, 0.0)})[1][0]; };
   const auto log_x = op_values([](auto&, auto v) { return log(v[0]); }, x);
   CHECK((log_x[0] == -inf && std::isnan(log_x[1]) && log_x[2] == inf && std::isnan(log_x[3])));
+  // Subnormal numbers, at each place of a vector.
+  const std::vector<Tensor<float>> small{Tensor<float>({9}, 1e-40f)};
+  for (const float y : op_values([](auto&, auto v) { return log(v[0]); }, small))
+    CHECK(y == Approx(std::log(1e-40f)));
+  const std::vector<Tensor<double>> smallest{Tensor<double>({5}, 5e-324)};
+  for (const double y : op_values([](auto&, auto v) { return log(v[0]); }, smallest))
+    CHECK(y == std::log(5e-324));
   CHECK(std::isnan(op_values([](auto&, auto v) { return sqrt(v[0]); }, x)[1]));
   CHECK(std::isnan(op_values([](auto&, auto v) { return clamp(v[0], -3, 3); }, x)[3]));
   CHECK(op_values([](auto&, auto v) { return reciprocal(v[0]); }, x)[0] == inf);

@@ -58,7 +58,7 @@ TEST_CASE("controls: an empty image, the field without its mark, and the images 
   CHECK(controls[1].name == "unmarked");
   REQUIRE(controls[1].images.size() == 2);
   nerf::Renderer renderer(owner.field);
-  const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, 2, 0, 9);
+  const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, 2, 0, 9 + 3);
   CHECK(controls[1].images[1].data == quantize8(renderer.render(cameras[1]).rgb).data);
   CHECK(controls[2].name == "shuffled");
   REQUIRE(controls[2].images.size() == 2);

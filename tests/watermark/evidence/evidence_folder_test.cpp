@@ -41,11 +41,27 @@ TEST_CASE("evidence_folder: what was written passes, with its images") {
   CHECK(check.faults.empty());
   REQUIRE(check.summary);
   CHECK(check.summary->commitment == std::string(64, 'c'));
-  CHECK(check.images == 2);
+  CHECK(check.images == 1);
+  CHECK(check.controls == 1);
   CHECK(std::distance(fs::directory_iterator(c.evidence), fs::directory_iterator()) ==
         static_cast<long>(kEvidenceFiles.size()));
   CHECK(fs::file_size(c.evidence / "evidence.sig") == 64);
   CHECK(check_evidence_folder(c.evidence, {}, {}).faults.empty());
+}
+
+TEST_CASE("evidence_folder: a mark that was not found has no soft binding") {
+  const TemporaryFolder folder;
+  const fs::path evidence = folder / "evidence", binding = evidence / "c2pa_soft_binding.json";
+  write_evidence_folder(evidence, small_evidence(), "a", test_key(5));
+  const std::string of_found = read_text(binding);
+  EvidenceRecord missed = small_evidence();
+  missed.fpr = missed.together.p_value / 2;
+  write_evidence_folder(evidence, missed, "a", test_key(5));  // replaces what was found
+  CHECK_FALSE(fs::exists(binding));
+  CHECK(check_evidence_folder(evidence, {}, {}).faults.empty());
+  write_file_atomically(binding, of_found);
+  CHECK(check_evidence_folder(evidence, {}, {}).faults ==
+        std::vector<std::string>{"c2pa_soft_binding.json is not listed in evidence.json"});
 }
 
 TEST_CASE("evidence_folder: every byte of every file is watched") {

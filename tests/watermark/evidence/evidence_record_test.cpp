@@ -47,6 +47,19 @@ TEST_CASE("evidence_record: the text holds what the record says, and reads back"
   CHECK(s.controls[1].name == "cat.jpg");
 }
 
+TEST_CASE("evidence_record: a copy and networks that know the key are named") {
+  EvidenceRecord record = small_evidence();
+  const auto read = [&] {
+    return parse_evidence(evidence_json(record, public_key(test_key(5)), kFiles), "e");
+  };
+  CHECK(read().copy.empty());
+  CHECK(read().key_free);
+  record.copy = "Studio A";
+  record.key_free = false;
+  CHECK(read().copy == "Studio A");
+  CHECK_FALSE(read().key_free);
+}
+
 TEST_CASE("evidence_record: the members of the text are these") {
   const Json json = Json::parse(small_text());
   std::string names;

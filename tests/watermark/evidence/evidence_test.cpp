@@ -267,6 +267,18 @@ TEST_CASE("evidence: score, the p-value of a bit falls with its logit") {
   CHECK(p[3] == 1);
 }
 
+TEST_CASE("evidence: bits contradict a message where they are clear and differ") {
+  BitReading reading;
+  reading.message = {{1, 0, 1, 0}};
+  reading.logit = {4, -4, 3, 0};
+  reading.decided = {1, 1, 1, 0};
+  // 2 exp(-4^2 / 2) = 6.7e-4 and 2 exp(-3^2 / 2) = 0.022, against 0.01 / 4
+  CHECK(contradicting_bits(reading, {{1, 0, 1, 1}}) == 0);
+  CHECK(contradicting_bits(reading, {{0, 0, 1, 0}}) == 1);
+  CHECK(contradicting_bits(reading, {{0, 1, 0, 1}}) == 2);
+  CHECK_THROWS_WITH(contradicting_bits(reading, {{1, 0}}), Contains("must have the 4 bits of the reading"));
+}
+
 TEST_CASE("evidence: score, sizes that do not fit are named") {
   CHECK_THROWS_WITH(score_evidence(std::vector<double>(3), kScoreCode, kScoreMessage),
                     Contains("must have 8 entries"));

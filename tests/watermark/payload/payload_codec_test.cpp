@@ -69,6 +69,14 @@ TEST_CASE("payload_codec: layouts fill their messages, and chances are those of 
                payloads = std::ldexp(1.0, 32) + payload_count(PayloadKind::text, 32);
   CHECK(l.corrects == 4);
   CHECK(l.chance == Approx(payloads * words / std::ldexp(1.0, 64)).epsilon(1e-12));
+
+  // What is read reports the chance over all layouts, because the best of them is reported.
+  const PayloadCodec codec(64);
+  const auto clean = codec.read(logits_of(codec.encode({PayloadKind::hex, "deadbeef"})));
+  REQUIRE(clean);
+  CHECK(clean->chance == Approx(static_cast<double>(codec.layouts().size()) * payloads *
+                                std::exp(log_chance_of_agreement(std::vector<double>(64, 1.0), 64)))
+                             .epsilon(1e-3));
 }
 
 TEST_CASE("payload_codec: payloads come back through as many wrong bits as are promised, anywhere") {

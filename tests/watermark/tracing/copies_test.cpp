@@ -28,6 +28,15 @@ TEST_CASE("copies: recipients stand one a line, each once") {
   write_file_atomically(path, "Anna\nBertil\n Anna\n");
   CHECK_THROWS_WITH(read_recipients(path),
                     Contains("line 3: expected each recipient once, found 'Anna' of line 1 again"));
+  write_file_atomically(path,
+                        "\xEF\xBB\xBF"
+                        "Anna\n");  // with the mark of some editors
+  CHECK(read_recipients(path) == std::vector<std::string>{"Anna"});
+  write_file_atomically(path, "Anna\nBer\ttil\n");
+  CHECK_THROWS_WITH(read_recipients(path), Contains("line 2: recipient: expected a name without"));
+  for (const char* name : {"", " Anna", "Anna ", "An\nna", "An\x7Fna"})
+    CHECK_THROWS_AS(check_recipient(name), ValueError);
+  for (const char* name : {"Anna", "Studio A", "\xC3\x85sa"}) CHECK_NOTHROW(check_recipient(name));
   write_file_atomically(path, "\n \n");
   CHECK_THROWS_WITH(read_recipients(path), Contains("expected one recipient a line, found none"));
   CHECK_THROWS_AS(read_recipients(folder / "missing.txt"), IoError);

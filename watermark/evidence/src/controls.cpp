@@ -10,6 +10,7 @@ namespace {
 
 constexpr Index kBlocksAcross = 16;
 constexpr std::uint64_t kShuffleStream = 61;
+constexpr std::uint64_t kControlCameras = 3;  // added to the seed
 
 }  // namespace
 
@@ -58,7 +59,9 @@ std::vector<Control> built_in_controls(const Owner& owner, std::span<const Tenso
        "colour is there; only the scene is missing, and with it the places that the mark belongs to.",
        {}}};
   nerf::Renderer renderer(owner.field);
-  for (const auto& camera : nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, count, 0, seed))
+  // Other cameras than those of training, and than those from which an informed search starts.
+  for (const auto& camera :
+       nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, count, 0, seed + kControlCameras))
     controls[1].images.push_back(quantize8(renderer.render(camera).rgb));
   const CounterRng rng(seed, kShuffleStream);
   for (Index i = 0; i < count; ++i)

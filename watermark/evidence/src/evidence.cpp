@@ -199,4 +199,17 @@ std::vector<double> bit_p_values(const BitReading& reading) {
   return p;
 }
 
+Index contradicting_bits(const BitReading& reading, const Message& message) {
+  if (reading.message.bits.size() != message.bits.size())
+    throw ShapeError("[contradicting_bits] message must have the " +
+                     std::to_string(reading.message.bits.size()) + " bits of the reading, got " +
+                     std::to_string(message.bits.size()));
+  const double most = 0.01 / static_cast<double>(message.bits.size());
+  const std::vector<double> p = bit_p_values(reading);
+  Index against = 0;
+  for (std::size_t b = 0; b < p.size(); ++b)
+    against += reading.decided[b] && reading.message.bits[b] != message.bits[b] && p[b] <= most;
+  return against;
+}
+
 }  // namespace fieldmark::watermark

@@ -5,6 +5,7 @@
 #include "soft_binding.h"
 
 #include <algorithm>
+#include <map>
 #include <set>
 #include <system_error>
 
@@ -41,9 +42,13 @@ void check_signature(const fs::path& folder, const std::string& evidence, Eviden
 
 void check_files(const fs::path& folder, EvidenceCheck& check) {
   for (const char* name : {kSoftBinding, kReport}) {
-    const auto text = file_text(folder, name, check);
     const auto listed = check.summary->files.find(name);
-    if (listed == check.summary->files.end())
+    const bool is_listed = listed != check.summary->files.end();
+    // A mark that was not found has no soft binding.
+    const bool needed = name == kReport || check.summary->found;
+    if (!is_listed && !needed && !fs::exists(folder / name)) continue;
+    const auto text = file_text(folder, name, check);
+    if (!is_listed)
       check.faults.push_back(std::string(name) + " is not listed in evidence.json");
     else if (text && sha256_hex(*text) != listed->second)
       check.faults.push_back(std::string(name) + " was altered");
@@ -51,12 +56,15 @@ void check_files(const fs::path& folder, EvidenceCheck& check) {
 }
 
 void check_images(std::span<const fs::path> images, EvidenceCheck& check) {
-  std::set<std::string> known;
-  for (const auto& image : check.summary->images) known.insert(image.sha256);
-  for (const auto& image : check.summary->controls) known.insert(image.sha256);
+  std::set<std::string> tested, controls;
+  for (const auto& image : check.summary->images) tested.insert(image.sha256);
+  for (const auto& image : check.summary->controls) controls.insert(image.sha256);
   for (const auto& path : images) {
-    if (known.count(sha256_file_hex(path)) > 0)
+    const std::string sha256 = sha256_file_hex(path);
+    if (tested.contains(sha256))
       ++check.images;
+    else if (controls.contains(sha256))
+      ++check.controls;
     else
       check.faults.push_back(path.filename().string() +
                              " is none of the images that the evidence is about, or was altered");
@@ -87,11 +95,14 @@ void write_evidence_folder(const fs::path& folder, const EvidenceRecord& record,
                            const Key& key) {
   prepare_evidence_folder(folder);
   const PublicKey signer = public_key(key);
-  const std::string binding = soft_binding_json(record.message, record.commitment);
-  const std::string evidence =
-      evidence_json(record, signer, {{kReport, sha256_hex(report)}, {kSoftBinding, sha256_hex(binding)}});
+  // It states that the images carry the message.
+  const std::string binding = record.found() ? soft_binding_json(record.message, record.commitment) : "";
+  std::map<std::string, std::string> files{{kReport, sha256_hex(report)}};
+  if (record.found()) files[kSoftBinding] = sha256_hex(binding);
+  const std::string evidence = evidence_json(record, signer, files);
   fs::remove(folder / kSignature);  // of earlier evidence
-  write_file_atomically(folder / kSoftBinding, binding);
+  fs::remove(folder / kSoftBinding);
+  if (record.found()) write_file_atomically(folder / kSoftBinding, binding);
   write_file_atomically(folder / kReport, report);
   write_file_atomically(folder / kPublicKey, to_pem(signer));
   write_file_atomically(folder / kEvidence, evidence);

@@ -125,6 +125,8 @@ EvidenceSummary summary(const Json& j, std::string_view name) {
   s.owner_sha256 = j.at("owner_sha256").get<std::string>();
   s.commitment = j.at(kCommitment).get<std::string>();
   s.message = message_from_hex(j.at("message").get<std::string>(), whole_number(j.at("message_bits"), name));
+  s.copy = j.value("copy", "");
+  s.key_free = j.value("key_free", true);
   s.found = j.at("found").get<bool>();
   s.fpr = j.at("fpr").get<double>();
   s.files = j.at("files").get<std::map<std::string, std::string>>();
@@ -164,6 +166,7 @@ std::string evidence_json(const EvidenceRecord& record, const PublicKey& signer,
             {"isa", record.isa},
             {"files", files}};
   if (!record.copy.empty()) json["copy"] = record.copy;
+  if (!record.key_free) json["key_free"] = false;
   return canonical_json(json.dump(-1, ' ', false, Json::error_handler_t::replace), "evidence");
 }
 

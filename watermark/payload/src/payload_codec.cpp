@@ -205,6 +205,8 @@ std::optional<PayloadReading> PayloadCodec::read(std::span<const double> logit) 
       best = PayloadReading{*payload, corrected, chance};
     }
   }
+  // The best of all layouts is reported.
+  if (best) best->chance = std::min(1.0, best->chance * static_cast<double>(codes_.size()));
   return best;
 }
 

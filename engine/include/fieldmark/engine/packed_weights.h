@@ -41,6 +41,8 @@ class PackedWeights {
   /// Packs the current values for the instruction set in use. Call it after every change of either.
   /// @throws ValueError if parameters were added to the store since construction
   void update();
+  /// True if these are the weights of this store.
+  bool packs(const ParamStore<T>& store) const { return store_ == &store; }
   /// @{
   /// Returns the packed matrix, or the table rounded to bf16, row-major; null before the first update() or if
   /// the parameter is not one.

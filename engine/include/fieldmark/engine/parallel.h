@@ -6,7 +6,7 @@
 namespace fieldmark {
 
 /// Sets the number of threads of parallel loops; default: all of the machine. Nested loops stay serial.
-/// @param n  at least 1   @throws ValueError otherwise
+/// @param n  1 to 1024   @throws ValueError otherwise
 void set_threads(int n);
 /// Returns the number of threads in use.
 int threads();
@@ -14,7 +14,7 @@ int threads();
 /// Calls set_threads() and restores the previous number at the end of the scope, for tests and benchmarks.
 class ScopedThreads {
  public:
-  /// @param n  at least 1   @throws ValueError otherwise
+  /// @param n  1 to 1024   @throws ValueError otherwise
   explicit ScopedThreads(int n);
   ScopedThreads(const ScopedThreads&) = delete;
   ScopedThreads& operator=(const ScopedThreads&) = delete;

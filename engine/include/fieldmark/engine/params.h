@@ -46,6 +46,9 @@ class ParamStore {
   /// @throws ValueError if the name is taken
   /// @throws ShapeError if a matrix or a table does not have two axes
   ParamId add(std::string_view name, Shape shape, ParamRole role = ParamRole::trained);
+  /// Checks that no parameter is named "PREFIX/NAME", so that a layer adds all of its parameters or none.
+  /// @throws ValueError if a name is taken
+  void require_free(std::string_view prefix, std::initializer_list<std::string_view> names) const;
   /// Returns the id of a name. @throws ValueError if there is no such name
   ParamId find(std::string_view name) const;
   /// @{
@@ -93,9 +96,8 @@ class Params {
   Params(const ParamStore<T>& store, T* grads)
       : layout_(&store), values_(store.values().data()), entries_(store.entries().size()), grads_(grads) {}
   /// As above with packed matrices: `packed` must hold the store's current values and outlive the pass.
-  Params(const ParamStore<T>& store, T* grads, const PackedWeights<T>& packed) : Params(store, grads) {
-    packed_ = &packed;
-  }
+  /// @throws ValueError if they are of another store
+  Params(const ParamStore<T>& store, T* grads, const PackedWeights<T>& packed);
   /// Reads `all` [store.size()], laid out like the store's values, and passes gradients on to it: for
   /// parameters that are themselves computed on the tape. Running ones are read from the store.
   /// @throws ShapeError if `all` has another number of elements

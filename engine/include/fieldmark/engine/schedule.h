@@ -35,8 +35,8 @@ class Schedule {
   /// True if the run ends before step n.
   bool done(Index n) const { return total_ > 0 && n >= total_; }
   /// Resumes a run. A fixed total stays, since the clock of the earlier process is unknown.
-  /// @param total  0: not fixed
-  void resume(Index total);
+  /// @param total  0: not fixed   @param replanned  of the earlier process
+  void resume(Index total, bool replanned);
   /// Returns the options given to the constructor.
   const ScheduleOptions& options() const { return options_; }
 

@@ -25,9 +25,10 @@ struct DriveOptions {
 /// A training run: optimiser, schedule, counter, checkpoints and the loop around its steps. A trainer
 /// derives from it and adds the loss.
 ///
-/// Equal options, inputs and step counts give equal bytes, even across save() and restore(). A checkpoint
-/// holds every parameter by its name, Adam's moments as NAME.mean and NAME.mean_square or Muon's velocity as
-/// NAME.velocity, the trainer's own figures as run/NAME, and the fingerprint of the run.
+/// Equal options, inputs, step counts and instruction sets give equal bytes, even across save() and
+/// restore(). A checkpoint does not hold the instruction set; another one changes results within rounding. A
+/// checkpoint holds every parameter by its name, Adam's moments as NAME.mean and NAME.mean_square or Muon's
+/// velocity as NAME.velocity, the trainer's own figures as run/NAME, and the fingerprint of the run.
 class TrainingRun {
  public:
   TrainingRun(const TrainingRun&) = delete;

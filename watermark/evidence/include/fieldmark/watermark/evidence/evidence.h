@@ -108,4 +108,9 @@ EvidenceScore score_evidence(std::span<const double> evidence, const CellCode& c
 /// @return [bits] in (0, 1]; 1 below |L_b| = 1.18
 std::vector<double> bit_p_values(const BitReading& reading);
 
+/// Returns the number of bits that contradict a message: decided otherwise, with a bit_p_values() of at most
+/// 0.01 / N. A mark with another message gives such bits; noise gives one with a probability of at most 0.01.
+/// @throws ShapeError unless the message has as many bits as the reading
+Index contradicting_bits(const BitReading& reading, const Message& message);
+
 }  // namespace fieldmark::watermark

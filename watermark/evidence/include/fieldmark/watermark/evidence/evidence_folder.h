@@ -13,7 +13,7 @@ namespace fieldmark::watermark {
 
 /// Files of an evidence folder.
 inline constexpr std::array<std::string_view, 5> kEvidenceFiles{
-    "c2pa_soft_binding.json",  // soft_binding_json()
+    "c2pa_soft_binding.json",  // soft_binding_json(), if the mark was found
     "evidence.json",           // evidence_json()
     "evidence.sig",            // the 64 bytes of the signature of evidence.json
     "public_key.pem",          // to_pem() of the signer
@@ -36,7 +36,8 @@ void write_evidence_folder(const std::filesystem::path& folder, const EvidenceRe
 struct EvidenceCheck {
   std::vector<std::string> faults{};         ///< altered or missing parts, one sentence each
   std::optional<EvidenceSummary> summary{};  ///< its content, if readable
-  Index images = 0;                          ///< given images that the evidence covers
+  Index images = 0;                          ///< given images that the evidence tested
+  Index controls = 0;                        ///< given images that it tested as controls
 };
 
 /// Checks the signature of evidence.json by the key in it, the SHA-256 of the other files and of the images,

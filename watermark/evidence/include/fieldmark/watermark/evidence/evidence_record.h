@@ -30,14 +30,15 @@ struct EvidenceControl {
 
 /// Result of testing images for a message, with all that is needed to repeat the test except the OWNER.
 struct EvidenceRecord {
-  std::string reading = "blind";               ///< detector: "blind", "informed" or "mixed"
-  std::string owner_sha256{};                  ///< of the OWNER file
-  std::string commitment{};                    ///< commitment()
-  Message message{};                           ///< the message tested for
-  std::string copy{};                          ///< recipient whose copy was tested for; empty: none
-  double fpr = 1e-6;                           ///< rate of false alarms at which a mark counts as found
-  Index cells = 0;                             ///< cells that carry a bit
-  EvidenceScore together{};                    ///< summed evidence of all images
+  std::string reading = "blind";  ///< detector: "blind", "informed" or "mixed"
+  std::string owner_sha256{};     ///< of the OWNER file
+  std::string commitment{};       ///< commitment()
+  Message message{};              ///< the message tested for
+  std::string copy{};             ///< recipient whose copy was tested for; empty: none
+  bool key_free = true;      ///< see Owner::key_free(): without it, the bound of the p-values is not proven
+  double fpr = 1e-6;         ///< rate of false alarms at which a mark counts as found
+  Index cells = 0;           ///< cells that carry a bit
+  EvidenceScore together{};  ///< summed evidence of all images
   std::vector<EvidenceImage> images{};         ///< scored one by one
   std::vector<EvidenceControl> controls{};     ///< may be empty
   std::optional<WrongKeyCounts> wrong_keys{};  ///< for the summed evidence; empty if not counted
@@ -65,6 +66,8 @@ struct EvidenceSummary {
   std::string owner_sha256;                    ///< of the OWNER file
   std::string commitment;                      ///< commitment()
   Message message{};                           ///< the message tested for
+  std::string copy{};                          ///< recipient whose copy was tested for; empty: none
+  bool key_free = true;                        ///< of EvidenceRecord
   bool found = false;                          ///< the decision
   double fpr = 1;                              ///< rate of false alarms of the decision
   double p_value = 1;                          ///< of all images together
@@ -73,8 +76,8 @@ struct EvidenceSummary {
   std::map<std::string, std::string> files{};  ///< SHA-256 of the other files in the folder
 };
 
-/// Parses the text of evidence_json() and recomputes all derived figures: p-values, matching bits, the
-/// decision.
+/// Parses the text of evidence_json() and recomputes the p-values of the key and of the matching bits and the
+/// decision, and checks the number of matching bits against the bits.
 /// @param name  stands for the file in error messages
 /// @throws IoError if the text is not evidence, not canonical, or inconsistent
 EvidenceSummary parse_evidence(std::string_view text, std::string_view name);
