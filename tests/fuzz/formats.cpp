@@ -235,11 +235,17 @@ std::vector<Format> formats() {
        true},
       {"train checkpoint",
        {saved(field_run->trainer)},
-       [=](const std::string& b) { field_run->trainer.restore(file->holding(b)); },
+       [=](const std::string& b) {
+         field_run->trainer.restore(file->holding(b));
+         field_run->trainer.curve();
+       },
        true},
       {"bake checkpoint",
        {saved(bake_run->baker)},
-       [=](const std::string& b) { bake_run->baker.restore(file->holding(b)); },
+       [=](const std::string& b) {
+         bake_run->baker.restore(file->holding(b));
+         bake_run->baker.curve();
+       },
        true},
       {"embed checkpoint",
        {saved(embed_run->embedder)},
@@ -247,6 +253,7 @@ std::vector<Format> formats() {
          const auto path = file->holding(b);
          watermark::Embedder::checkpoint_key(path);
          embed_run->embedder.restore(path);
+         embed_run->embedder.curve();
        },
        true},
       {"png",

@@ -67,7 +67,7 @@ void note_message(const watermark::EvidenceRecord& record, Context& context) {
   if (!record.found()) return;
   if (const Index against = watermark::contradicting_bits(score.reading, record.message); against > 0)
     context.note("bits that contradict the message: " + std::to_string(against) +
-                 "; the images carry this key's mark with another message");
+                 "; the images may carry another message of this key");
   const double noise = watermark::noise_p_value(score.reading);
   if (score.match.matching == score.match.bits && noise > record.fpr)
     context.note("unmarked images give bits as clear as these with p " + rounded_up(noise) +

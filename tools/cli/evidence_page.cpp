@@ -117,17 +117,15 @@ std::string reservations(const EvidenceRecord& r) {
   if (!r.key_free)
     out +=
         "<p><strong>The bound is not proven for this owner file:</strong> its networks were trained under "
-        "its own key "
-        "(version 0.1).</p>\n";
+        "its own key (version 0.1).</p>\n";
   if (r.found())
     if (const Index against = watermark::contradicting_bits(r.together.reading, r.message); against > 0)
       out += "<p><strong>Bits that contradict the message: " + std::to_string(against) +
-             ".</strong> The images carry this key's mark with another message.</p>\n";
+             ".</strong> The images may carry another message of this key.</p>\n";
   if (!r.copy.empty())
     out += "<p>This test is of the copy of one recipient, " + escaped_markup(r.copy) +
            ". If several names were tried, multiply the p-value by their number; the list of names must be "
-           "older than "
-           "the test.</p>\n";
+           "older than the test.</p>\n";
   return out;
 }
 

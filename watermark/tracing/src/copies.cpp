@@ -17,7 +17,7 @@ Key copy_key(const Key& key, std::string_view name) {
 void check_recipient(std::string_view name) {
   const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; };
   if (name.empty() || name.front() == ' ' || name.back() == ' ' || std::ranges::any_of(name, is_control))
-    throw ValueError("recipient: expected a name without spaces at its ends and control characters, got '" +
+    throw ValueError("recipient: expected a name without spaces at its ends or control characters, got '" +
                      std::string(name) + "'");
 }
 
