@@ -22,8 +22,7 @@ bool name_matches(const std::string& pattern, const std::string& name) {
 
 template <class T>
 ParamId ParamStore<T>::add(std::string_view name, Shape shape, ParamRole role) {
-  for (const Entry& e : entries_)
-    if (e.name == name) throw ValueError("[params] name '" + e.name + "' is already used");
+  require_free(name);
   if ((role == ParamRole::matrix || role == ParamRole::table) && shape.rank() != 2)
     throw ShapeError("[params] '" + std::string(name) +
                      "' must have two axes to be a matrix or a table, got shape " + shape.str());
@@ -46,13 +45,15 @@ ParamId ParamStore<T>::add(std::string_view name, Shape shape, ParamRole role) {
 }
 
 template <class T>
+void ParamStore<T>::require_free(std::string_view name) const {
+  for (const Entry& e : entries_)
+    if (e.name == name) throw ValueError("[params] name '" + e.name + "' is already used");
+}
+
+template <class T>
 void ParamStore<T>::require_free(std::string_view prefix,
                                  std::initializer_list<std::string_view> names) const {
-  for (const std::string_view name : names) {
-    const std::string whole = std::string(prefix) + "/" + std::string(name);
-    for (const Entry& e : entries_)
-      if (e.name == whole) throw ValueError("[params] name '" + whole + "' is already used");
-  }
+  for (const std::string_view name : names) require_free(std::string(prefix) + "/" + std::string(name));
 }
 
 template <class T>

@@ -46,9 +46,12 @@ class ParamStore {
   /// @throws ValueError if the name is taken
   /// @throws ShapeError if a matrix or a table does not have two axes
   ParamId add(std::string_view name, Shape shape, ParamRole role = ParamRole::trained);
-  /// Checks that no parameter is named "PREFIX/NAME", so that a layer adds all of its parameters or none.
-  /// @throws ValueError if a name is taken
+  /// @{
+  /// Checks that no parameter has this name, or is named "PREFIX/NAME": so a layer adds all of its parameters
+  /// or none.   @throws ValueError if a name is taken
+  void require_free(std::string_view name) const;
   void require_free(std::string_view prefix, std::initializer_list<std::string_view> names) const;
+  /// @}
   /// Returns the id of a name. @throws ValueError if there is no such name
   ParamId find(std::string_view name) const;
   /// @{
