@@ -18,8 +18,8 @@ struct Machine {
 };
 Machine machine();
 
-/// Returns the SHA-256 of the sources of some rooms at the commit of this build, so that a result expires
-/// with its code.
+/// Returns the SHA-256 of the sources of some rooms at this build, without comments and spaces, so that a
+/// result expires with its code.
 /// @param rooms  folders; one without sources of its own, such as "watermark", stands for all rooms in it
 /// @throws ValueError for a folder without sources
 std::string code_hash(const Words& rooms);
