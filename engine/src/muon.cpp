@@ -16,8 +16,33 @@ namespace fieldmark {
 namespace {
 
 constexpr double kQuintic[] = {3.4445, -4.775, 2.0315};  // a, b, c
-constexpr int kIterations = 5;
+// Five steps on the small square product alone, which is formed anew in between: small singular values grow
+// by a in each step, and so does the rounding of their squares.
+constexpr int kRounds[] = {2, 3};
 constexpr double kRmsOfAdam = 0.2;  // of a step of Adam, relative to its step size
+
+// Takes steps x <- x p(g) of the polynomial p(g) = a + b g + c g^2 with g = x^T x. The products commute, so
+// g <- p(g)^2 g as well, and x is multiplied once, by the product f + s of all p = a + r. For a wide matrix,
+// g = x x^T and x <- p(g) x.
+template <class T>
+void apply_polynomial(T* d, Index rows, Index columns, int steps, Tape<T>& tape) {
+  const double a = kQuintic[0], b = kQuintic[1], c = kQuintic[2];
+  const bool tall = rows > columns;
+  tape.reset();
+  const Var<T> x = tape.constant(d, {rows, columns});
+  const auto remainder = [&](const Var<T>& of) { return add(scale(of, b), scale(matmul(of, of), c)); };
+  Var<T> g = tall ? matmul(transpose(x), x) : matmul(x, transpose(x)), r = remainder(g), s = r;
+  double f = a;
+  for (int k = 1; k < steps; ++k) {
+    const Var<T> h = add(scale(g, a), matmul(r, g));
+    g = add(scale(h, a), matmul(r, h));
+    r = remainder(g);
+    s = add(add(scale(r, f), scale(s, a)), matmul(s, r));
+    f *= a;
+  }
+  const Var<T> next = add(scale(x, f), tall ? matmul(x, s) : matmul(s, x));
+  std::copy_n(next.value(), rows * columns, d);
+}
 
 }  // namespace
 
@@ -45,15 +70,7 @@ void orthogonalise(T* d, Index rows, Index columns, Tape<T>& tape) {
   const T factor =
       norm < static_cast<double>(std::numeric_limits<T>::min()) ? T(0) : static_cast<T>(1 / norm);
   for (Index i = 0; i < n; ++i) d[i] *= factor;
-  const bool tall = rows > columns;  // the square products are of the smaller side
-  for (int k = 0; k < kIterations; ++k) {
-    tape.reset();
-    const Var<T> x = tape.constant(d, {rows, columns});
-    const Var<T> a = tall ? matmul(transpose(x), x) : matmul(x, transpose(x));
-    const Var<T> b = add(scale(a, kQuintic[1]), scale(matmul(a, a), kQuintic[2]));
-    const Var<T> next = add(scale(x, kQuintic[0]), tall ? matmul(x, b) : matmul(b, x));
-    std::copy_n(next.value(), n, d);
-  }
+  for (const int steps : kRounds) apply_polynomial(d, rows, columns, steps, tape);
 }
 
 template <class T>

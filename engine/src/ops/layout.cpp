@@ -1,6 +1,7 @@
 #include <fieldmark/engine/ops/layout.h>
 #include <fieldmark/engine/shape_checks.h>
 
+#include <algorithm>
 #include <numeric>
 
 #include "ops/broadcast.h"
@@ -30,22 +31,29 @@ struct Permutation {
     shape = Shape(std::span(extents).first(order.size()));
   }
 
-  // Calls f(first element in y, first in x, step in x, count) for parts of rows, in parallel.
+  // Calls f(first element in y, first in x, step in x, count) for parts of rows, in parallel. Parts of a few
+  // cache lines of x are taken from one row after another: the next row often needs the same lines.
   template <class F>
   void for_rows(F f) const {
     const int last = shape.rank() - 1;
     const Index inner = last < 0 ? 1 : shape[last], step = last < 0 ? 1 : stride[at(last)];
     if (shape.size() == 0) return;
+    const Index part = step == 1 ? inner : std::min<Index>(inner, 64);
     parallel_for(shape.size() / inner, detail::row_grain(inner), [&](Index r0, Index r1) {
-      for (Index r = r0; r < r1; ++r) {
-        Index from = 0, rest = r;
-        for (int k = last - 1; k >= 0; --k) {
-          from += rest % shape[k] * stride[at(k)];
-          rest /= shape[k];
-        }
-        f(r * inner, from, step, inner);
-      }
+      for (Index i = 0; i < inner; i += part)
+        for (Index r = r0; r < r1; ++r)
+          f(r * inner + i, first_of(r) + i * step, step, std::min(part, inner - i));
     });
+  }
+
+  // Returns the place in x of row r's first element.
+  Index first_of(Index r) const {
+    Index from = 0;
+    for (int k = shape.rank() - 2; k >= 0; --k) {
+      from += r % shape[k] * stride[at(k)];
+      r /= shape[k];
+    }
+    return from;
   }
 };
 

@@ -69,6 +69,8 @@ class Muon {
 ///   x <- a x + b (x x^T) x + c (x x^T)^2 x,   x = d / |d| at first,   (a, b, c) = (3.4445, -4.775, 2.0315),
 /// where |d| is the root of the sum of squares. Singular values above 0.0015 |d| end in [0.67, 1.21], smaller
 /// ones below.
+/// The steps are taken on x^T x or x x^T, the smaller, as polynomials of it commute: in float, a result is
+/// within 2e-5 of the exact steps'.
 /// @param d  [rows, columns], overwritten; 0 if |d| is below the smallest normal number of T
 /// @param tape  for intermediate values; reset
 /// Source: Jordan et al. 2024 (Muon), a variant of the iteration of Newton and Schulz.
