@@ -1,4 +1,6 @@
+#include <fieldmark/core/files.h>
 #include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/video/video_reader.h>
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -121,4 +123,78 @@ TEST_CASE("render refuses options that contradict each other", "[render]") {
   CHECK(run_command({"render", "--field", job.field, "--out", job.images(), "--overwrite", "--average", "8"})
             .code == cli::kUsage);
   CHECK(std::filesystem::exists(kept));
+}
+
+TEST_CASE("render follows an orbit or a file, into a folder or a video", "[render]") {
+  const TemporaryFolder folder;
+  const std::string field = tiny_field(folder, tiny_scene(folder));
+  const auto render = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"render", "--field", field, "--size", "16", "--json", "-"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_command(words);
+  };
+  const Outcome orbit = render({"--path", "orbit", "--count", "3", "--out", folder / "orbit"});
+  INFO(orbit.err);
+  REQUIRE(orbit.code == cli::kOk);
+  CHECK(nlohmann::json::parse(orbit.out)["images"].size() == 3);
+  CHECK(read_image(folder / "orbit/view_000.png").data != read_image(folder / "orbit/view_001.png").data);
+
+  write_file_atomically(folder / "path.json",
+                        R"({"frames": [{"transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 4]]}]})");
+  REQUIRE(render({"--path", folder / "path.json", "--out", folder / "file"}).code == cli::kOk);
+  CHECK(read_image(folder / "file/view_000.png").shape == Shape{16, 16, 3});
+
+  const Outcome video = render({"--path", "orbit", "--count", "4", "--fps", "12", "--out", folder / "v.mp4"});
+  if (has_video()) {
+    REQUIRE(video.code == cli::kOk);
+    CHECK(nlohmann::json::parse(video.out)["images"] == nlohmann::json::array({folder / "v.mp4"}));
+    VideoReader reader(folder / "v.mp4");
+    CHECK(reader.next()->image.shape == Shape{16, 16, 3});
+  } else {
+    CHECK(video.code == cli::kFailed);
+    CHECK_THAT(video.err, Contains("H.264"));
+  }
+}
+
+TEST_CASE("render keeps opacity and depth on demand, and --overwrite removes them", "[render]") {
+  const TemporaryFolder folder;
+  const std::string field = tiny_field(folder, tiny_scene(folder)), out = folder / "v";
+  REQUIRE(run_command({"render", "--field", field, "--out", out, "--size", "16", "--count", "2", "--alpha",
+                       "--depth"})
+              .code == cli::kOk);
+  const Tensor<float> image = read_image(out + "/view_001.png");
+  REQUIRE(image.shape == Shape{16, 16, 4});
+  CHECK(image.data[3] == 0);                       // a corner
+  CHECK(image.data[4 * (8 * 16 + 8) + 3] > 0.9f);  // the middle
+  CHECK(std::filesystem::file_size(out + "/view_001_depth.npy") == 128 + 4 * 16 * 16);
+  REQUIRE(
+      run_command({"render", "--field", field, "--out", out, "--size", "16", "--count", "2", "--overwrite"})
+          .code == cli::kOk);
+  CHECK(!std::filesystem::exists(out + "/view_001_depth.npy"));
+  CHECK(read_image(out + "/view_001.png").shape == Shape{16, 16, 3});
+}
+
+TEST_CASE("render refuses options of a path, video or folder where there is none", "[render]") {
+  const TemporaryFolder folder;
+  const std::string field = tiny_field(folder, tiny_scene(folder));
+  const auto refusal = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"render", "--field", field};
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome r = run_command(words);
+    CHECK(r.code == cli::kUsage);
+    return r.err;
+  };
+  const std::string out = folder / "v", video = folder / "v.mp4";
+  CHECK_THAT(refusal({"--out", out, "--fps", "30"}), Contains("--fps: needs a video as --out"));
+  CHECK_THAT(refusal({"--out", video, "--alpha"}), Contains("--alpha, --depth: need a folder as --out"));
+  CHECK_THAT(refusal({"--out", video, "--depth"}), Contains("is a video"));
+  CHECK_THAT(refusal({"--out", out, "--path", "orbit", "--cameras", "ring"}), Contains("excludes"));
+  CHECK_THAT(refusal({"--out", out, "--path", folder / "p.json", "--count", "3"}),
+             Contains("has cameras of its own"));
+  CHECK(!std::filesystem::exists(out));
+  const Outcome missing =
+      run_command({"render", "--field", field, "--out", out, "--path", folder / "none.json"});
+  CHECK(missing.code == cli::kFailed);
+  CHECK_THAT(missing.err, Contains("none.json"));
+  CHECK(!std::filesystem::exists(out));
 }

@@ -29,6 +29,7 @@ constexpr Entry kCommands[] = {
     {"eval", "Compare a field with the ground truth", add_eval},
     {"compare", "Compare images: PSNR, SSIM, LPIPS", add_compare},
     {"render", "Render views of a field", add_render},
+    {"export", "Export a field as a page, a point cloud or a mesh", add_export},
     {"key", "Make a secret key", add_key},
     {"embed", "Train a mark for a field and its extractor", add_embed},
     {"bake", "Write a field with a message, to publish", add_bake},

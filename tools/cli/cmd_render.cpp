@@ -6,34 +6,39 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <future>
 #include <memory>
 #include <optional>
 #include <ostream>
 #include <set>
 
 #include <fieldmark/tools/results/sheet.h>
+#include "cli/camera_path.h"
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/depth_map.h"
 #include "cli/images.h"
 #include "cli/outputs.h"
 #include "cli/precision.h"
 #include "cli/scene_data.h"
 #include "cli/supersampling.h"
+#include "cli/view_output.h"
 
 namespace fieldmark::cli {
 namespace {
 
-constexpr char kViewPrefix[] = "view_";
+constexpr char kViewPrefix[] = "view_", kDepthEnd[] = "_depth.npy";
 
 struct RenderArguments {
   std::string field, out, data;
   std::string split = "test", cameras = "novel", precision = "fp32";
-  std::string against, sheet;
-  bool cameras_given = false, overwrite = false;
-  Index count = 10, size = 0, supersampling = 0;
+  std::string against, sheet, path;
+  bool cameras_given = false, fps_given = false, overwrite = false, alpha = false, depth = false;
+  Index size = 0, supersampling = 0;
+  std::optional<Index> count;
+  double fps = 24;
   std::optional<Index> average, importance, random;
+  bool video() const { return is_video_path(out); }
 };
 
 // Returns the samples per ray if any were given; the field's values fill in the rest.
@@ -56,6 +61,15 @@ struct NamedCamera {
   nerf::Camera camera;
 };
 
+// Returns the cameras of --path, or else of --cameras.
+std::vector<nerf::Camera> drawn_cameras(const RenderArguments& options, const nerf::CameraSpan& span,
+                                        std::uint64_t seed) {
+  if (options.path == "orbit") return orbit(span, options.count.value_or(120), options.size);
+  if (!options.path.empty()) return read_camera_path(options.path, span, options.size);
+  return nerf::make_cameras(span, nerf::parse_camera_set(options.cameras), options.count.value_or(10),
+                            options.size, seed);
+}
+
 std::vector<NamedCamera> cameras_of(const RenderArguments& options, const nerf::RadianceField& field,
                                     Context& context) {
   std::vector<NamedCamera> cameras;
@@ -72,31 +86,13 @@ std::vector<NamedCamera> cameras_of(const RenderArguments& options, const nerf::
     }
     return cameras;
   }
-  for (const auto& camera : nerf::make_cameras(field.cameras, nerf::parse_camera_set(options.cameras),
-                                               options.count, options.size, context.seed())) {
+  for (const auto& camera : drawn_cameras(options, field.cameras, context.seed())) {
     char name[32];
     std::snprintf(name, sizeof name, "%s%03zu", kViewPrefix, cameras.size());
     cameras.push_back({name, camera});
   }
   return cameras;
 }
-
-// Writes each image on its own thread while the next view is rendered; with one thread, at once.
-class ImageWriter {
- public:
-  // Waits for the previous image and rethrows its error.
-  void write(const std::filesystem::path& path, Tensor<float> image) {
-    finish();
-    if (threads() == 1) return write_png(path, image);
-    last_ = std::async(std::launch::async, [path, image = std::move(image)] { write_png(path, image); });
-  }
-  void finish() {
-    if (last_.valid()) last_.get();
-  }
-
- private:
-  std::future<void> last_;
-};
 
 // Writes the views of both fields side by side, for the first few cameras.
 void write_sheet(const RenderArguments& options, nerf::Renderer& renderer,
@@ -119,7 +115,10 @@ void clear_older_views(const RenderArguments& options, const std::vector<NamedCa
                       std::ranges::all_of(stem.substr(std::size(kViewPrefix) - 1), is_digit);
     (ours ? older : others).push_back(path);
   }
-  for (const auto& path : older) std::filesystem::remove(path);
+  for (auto path : older) {
+    std::filesystem::remove(path);
+    std::filesystem::remove(path.replace_filename(path.stem().string() + kDepthEnd));
+  }
   for (const auto& [name, camera] : cameras)
     std::erase(others, std::filesystem::path(options.out) / (name + ".png"));
   if (!others.empty())
@@ -127,38 +126,60 @@ void clear_older_views(const RenderArguments& options, const std::vector<NamedCa
                  ": images of other names stay beside the new views: " + std::to_string(others.size()));
 }
 
-int run_render(const RenderArguments& options, Context& context) {
+void check_options(const RenderArguments& options) {
+  if (options.fps_given && !options.video())
+    throw UsageError("--fps: needs a video as --out, got " + options.out + "; name a file FILE.mp4");
   if (options.cameras_given && !options.data.empty() && options.cameras != "test")
     throw UsageError("--cameras " + options.cameras + ": --data has cameras of its own");
+  if (options.count && !options.path.empty() && options.path != "orbit")
+    throw UsageError("--count: --path " + options.path + " has cameras of its own");
+  if (options.video() && (options.alpha || options.depth))
+    throw UsageError("--alpha, --depth: need a folder as --out, " + options.out + " is a video");
+}
+
+// Renders all views and returns their files; adds the seconds that rendering takes.
+Json write_views(const RenderArguments& options, const nerf::RadianceField& field, nerf::Renderer& renderer,
+                 const std::vector<NamedCamera>& cameras, Context& context, double& seconds) {
+  const InterruptGuard guard;
+  Json images = Json::array();
+  Progress progress = context.progress("render");
+  ViewOutput output(options.out, options.fps);
+  for (const auto& [name, camera] : cameras) {
+    if (guard.interrupted()) {
+      if (options.video()) throw Interrupted("nothing was written");
+      output.finish();
+      throw Interrupted(std::to_string(images.size()) + " views were written");
+    }
+    const double begin = context.seconds();
+    auto rendering = renderer.render(camera);
+    if (options.depth)
+      write_npy(std::filesystem::path(options.out) / (name + kDepthEnd), depth_map(field, renderer, camera));
+    seconds += context.seconds() - begin;
+    images.push_back(
+        output.add(name, options.alpha ? with_alpha(rendering, field.background) : std::move(rendering.rgb))
+            .string());
+    progress.update(static_cast<double>(images.size()) / static_cast<double>(cameras.size()));
+  }
+  output.finish();
+  return options.video() ? Json::array({options.out}) : images;
+}
+
+int run_render(const RenderArguments& options, Context& context) {
+  check_options(options);
   if (!options.sheet.empty()) check_writable_page(options.sheet);
   const auto field = nerf::RadianceField::load(options.field);
   const auto cameras = cameras_of(options, field, context);
   nerf::Renderer renderer(field, {.precision = precision_of(options.precision),
                                   .points = points_of(options, field),
                                   .supersampling = options.supersampling});
-  prepare_folder(options.out);
-  clear_older_views(options, cameras, context);  // after everything that may be refused
-  const InterruptGuard guard;
-  Json images = Json::array();
-  double seconds = 0;
-  {
-    Progress progress = context.progress("render");
-    ImageWriter writer;
-    for (const auto& [name, camera] : cameras) {
-      if (guard.interrupted()) {
-        writer.finish();
-        throw Interrupted(std::to_string(images.size()) + " views were written");
-      }
-      const double begin = context.seconds();
-      auto rendering = renderer.render(camera);
-      seconds += context.seconds() - begin;
-      const auto path = std::filesystem::path(options.out) / (name + ".png");
-      writer.write(path, std::move(rendering.rgb));
-      images.push_back(path.string());
-      progress.update(static_cast<double>(images.size()) / static_cast<double>(cameras.size()));
-    }
-    writer.finish();
+  if (options.video()) {
+    check_writable_page(options.out);
+  } else {
+    prepare_folder(options.out);
+    clear_older_views(options, cameras, context);  // after everything that may be refused
   }
+  double seconds = 0;
+  const Json images = write_views(options, field, renderer, cameras, context, seconds);
   if (!options.sheet.empty()) write_sheet(options, renderer, cameras);
   const double each = seconds / static_cast<double>(cameras.size());
   char line[80];
@@ -177,7 +198,9 @@ int run_render(const RenderArguments& options, Context& context) {
 Command add_render(CommandLine& app) {
   auto o = std::make_shared<RenderArguments>();
   app.add_option("--field", o->field, "Field to render")->required()->type_name("FIELD");
-  app.add_option("--out", o->out, "Folder to write the views to, one PNG each")->required()->type_name("DIR");
+  app.add_option("--out", o->out, "Folder for the views, one PNG each, or one .mp4 file")
+      ->required()
+      ->type_name("DIR|FILE");
   Option data = app.add_option("--data", o->data, "Data set whose cameras to use")->type_name("DIR");
   app.add_option("--split", o->split, "Part of the data set: train, val, test")
       ->one_of({"train", "val", "test"})
@@ -194,10 +217,24 @@ Command add_render(CommandLine& app) {
                "Write to a folder that has images, and remove the views of earlier runs, view_N.png");
   add_precision(app, o->precision);
   add_supersampling(app, o->supersampling);
-  app.add_option("--count", o->count, "Cameras to draw, 1 to 100000")
+  app.add_option("--count", o->count, "Cameras to draw, 1 to 100000; default: 10, or 120 along an orbit")
       ->range(1, 100000)
       ->excludes(data)
-      ->type_name("N");
+      ->type_name("N")
+      ->default_str("");
+  app.add_option("--path", o->path,
+                 "Cameras along a path: orbit (around the scene, at the height of the training cameras),\n"
+                 "or a JSON file with the keys of transforms.json")
+      ->excludes(data)
+      ->excludes(cameras)
+      ->type_name("FILE|orbit");
+  const Option fps = app.add_option("--fps", o->fps, "Frames per second of a video, 1 to 240")
+                         ->range(1.0, 240.0)
+                         ->type_name("N");
+  app.add_flag("--alpha", o->alpha, "Keep the opacity as a fourth channel instead of a background");
+  app.add_flag("--depth", o->depth,
+               "Also write NAME_depth.npy: distance along the viewing direction in units of the scene,\n"
+               "NaN where the opacity is below 1/2");
   app.add_option("--size", o->size, "Longer side of the images in pixels, 1 to 8192; default: as trained")
       ->range(1, 8192)
       ->type_name("N")
@@ -220,8 +257,9 @@ Command add_render(CommandLine& app) {
                      ->type_name("FILE");
   against->needs(sheet);
   sheet->needs(against);
-  return [o, cameras](Context& context) {
+  return [o, cameras, fps](Context& context) {
     o->cameras_given = cameras.count() > 0;
+    o->fps_given = fps.count() > 0;
     return run_render(*o, context);
   };
 }

@@ -21,6 +21,7 @@ Command add_compare(CommandLine& app);
 Command add_data(CommandLine& app);
 Command add_embed(CommandLine& app);
 Command add_eval(CommandLine& app);
+Command add_export(CommandLine& app);
 Command add_extract(CommandLine& app);
 Command add_gradcheck(CommandLine& app);
 Command add_info(CommandLine& app);

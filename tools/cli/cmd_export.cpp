@@ -1,0 +1,141 @@
+#include <fieldmark/core/files.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/nerf/renderer.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <ostream>
+
+#include "cli/camera_path.h"
+#include "cli/cli.h"
+#include "cli/commands.h"
+#include "cli/context.h"
+#include "cli/mesh_files.h"
+#include "cli/outputs.h"
+#include "cli/surface.h"
+#include "cli/turntable.h"
+
+namespace fieldmark::cli {
+namespace {
+
+struct ExportArguments {
+  std::string field, out;
+  Index resolution = 256, size = 400, rows = 5, columns = 36;
+  double density = 70;
+  int quality = 85;
+  bool of_surface = false, of_page = false;  // options for one kind of file were given
+};
+
+std::string ending(const std::string& path) { return std::filesystem::path(path).extension().string(); }
+
+void check_options(const ExportArguments& options) {
+  const std::string end = ending(options.out);
+  if (end != ".html" && end != ".ply" && end != ".glb")
+    throw UsageError("--out: expected a file that ends in .html, .ply or .glb, got '" + options.out + "'");
+  if (options.of_surface && end == ".html")
+    throw UsageError("--resolution, --density: only for .ply and .glb files, a page has images");
+  if (options.of_page && end != ".html")
+    throw UsageError("--size, --rows, --columns, --quality: only for .html files, a " + end +
+                     " has no images");
+}
+
+void export_page(const ExportArguments& options, const nerf::RadianceField& field, Context& context,
+                 Json& result) {
+  const CameraGrid grid = camera_grid(field.cameras, options.rows, options.columns, options.size);
+  nerf::Renderer renderer(field);
+  std::vector<std::vector<std::byte>> jpegs;
+  const InterruptGuard guard;
+  Progress progress = context.progress("export");
+  for (const nerf::Camera& camera : grid.cameras) {
+    if (guard.interrupted()) throw Interrupted("nothing was written");
+    jpegs.push_back(encode_jpeg(renderer.render(camera).rgb, options.quality));
+    progress.update(static_cast<double>(jpegs.size()) / static_cast<double>(grid.cameras.size()));
+  }
+  write_file_atomically(
+      options.out, turntable_page(grid, jpegs, std::filesystem::path(options.field).filename().string()));
+  result["views"] = jpegs.size();
+}
+
+void export_surface(const ExportArguments& options, const nerf::RadianceField& field, Context& context,
+                    Json& result) {
+  const InterruptGuard guard;
+  Mesh mesh;
+  {
+    Progress progress = context.progress("export");
+    mesh =
+        surface_of(field, {.resolution = options.resolution, .density = options.density}, [&](double part) {
+          progress.update(part);
+          return !guard.interrupted();
+        });
+  }
+  if (guard.interrupted()) throw Interrupted("nothing was written");
+  if (mesh.triangles.empty())
+    throw ValueError(options.field + ": no surface has a density of " + std::to_string(options.density) +
+                     "; choose a lower --density");
+  if (ending(options.out) == ".ply")
+    write_ply(options.out, mesh);
+  else
+    write_glb(options.out, mesh, field.cameras.up);
+  result["vertices"] = mesh.positions.size();
+  result["triangles"] = mesh.triangles.size();
+}
+
+int run_export(const ExportArguments& options, Context& context) {
+  check_options(options);
+  check_writable_page(options.out);
+  const auto field = nerf::RadianceField::load(options.field);
+  Json result = {{"out", options.out}};
+  if (ending(options.out) == ".html")
+    export_page(options, field, context, result);
+  else
+    export_surface(options, field, context, result);
+  result["file_bytes"] = std::filesystem::file_size(options.out);
+  context.text() << options.out << ": "
+                 << (result.contains("views") ? result["views"].dump() + " views"
+                                              : result["vertices"].dump() + " points")
+                 << ", " << result["file_bytes"].dump() << " bytes\n";
+  context.result(result);
+  return kOk;
+}
+
+}  // namespace
+
+Command add_export(CommandLine& app) {
+  auto o = std::make_shared<ExportArguments>();
+  app.add_option("--field", o->field, "Field to export")->required()->type_name("FIELD");
+  app.add_option("--out", o->out,
+                 "File to write: .html, a page to turn the scene; .ply, a point cloud of its surface;\n"
+                 ".glb, a mesh of it")
+      ->required()
+      ->type_name("FILE");
+  const Option surface[] = {
+      app.add_option("--resolution", o->resolution, "Cells per axis to search for the surface, 8 to 512")
+          ->range(8, 512)
+          ->type_name("N"),
+      app.add_option("--density", o->density,
+                     "Density of the surface, per side of the scene's cube, 0.001 to 100000")
+          ->range(1e-3, 1e5)
+          ->type_name("D")};
+  const Option page[] = {
+      app.add_option("--size", o->size, "Longer side of the page's images in pixels, 16 to 4096")
+          ->range(16, 4096)
+          ->type_name("N"),
+      app.add_option("--rows", o->rows, "Heights to look from, 1 to 100")->range(1, 100)->type_name("N"),
+      app.add_option("--columns", o->columns, "Directions to look from, 1 to 720")
+          ->range(1, 720)
+          ->type_name("N"),
+      app.add_option("--quality", o->quality, "JPEG quality of the page's images, 1 to 100")
+          ->range(1, 100)
+          ->type_name("N")};
+  const auto given = [](const auto& options) {
+    return std::ranges::any_of(options, [](const Option& option) { return option.count() > 0; });
+  };
+  return [=](Context& context) {
+    o->of_surface = given(surface);
+    o->of_page = given(page);
+    return run_export(*o, context);
+  };
+}
+
+}  // namespace fieldmark::cli
