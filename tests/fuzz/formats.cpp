@@ -20,6 +20,7 @@
 #include <memory>
 
 #include "canonical_json.h"
+#include "cli/camera_path.h"
 #include "cli/cli.h"
 #include "cli/kept_readings.h"
 #include "colmap.h"
@@ -217,6 +218,13 @@ std::vector<Format> formats() {
        [](const std::string& b) {
          for (const auto& frame : parse_transforms(b, "input").frames)
            if (frame.intrinsics.width > 0) use(frame.intrinsics);
+       }},
+      {"camera path",
+       {kTransforms},
+       [=](const std::string& b) {
+         for (const auto& camera : cli::read_camera_path(file->holding(b), CameraSpan{}, 8))
+           for (const double number : camera.parameters())
+             if (!std::isfinite(number)) throw std::logic_error("a camera is not finite");
        }},
       {"safetensors",
        {safetensors_file()},
