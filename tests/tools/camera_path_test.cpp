@@ -20,7 +20,8 @@ Eigen::Vector3d vec(const nerf::Vec3& v) { return {v[0], v[1], v[2]}; }
 
 // Cameras at a height of 30 degrees, at these azimuths, two units from (1, 2, 3).
 nerf::CameraSpan around(const std::vector<double>& azimuths) {
-  nerf::CameraSpan span{.centre = {1, 2, 3}, .directions = {}, .distances = {}, .width = 40, .height = 20};
+  nerf::CameraSpan span{
+      .centre = {1, 2, 3}, .directions = {}, .distances = {}, .cy = 0.25, .width = 40, .height = 20};
   for (const double a : azimuths) {
     span.directions.push_back({std::cos(pi / 6) * std::cos(a), std::cos(pi / 6) * std::sin(a), 0.5});
     span.distances.push_back(2);
@@ -77,6 +78,17 @@ TEST_CASE("camera_path: an orbit stays where cameras were, also across the seam 
   }
 }
 
+TEST_CASE("camera_path: cameras straight above say nothing about sides", "[render]") {
+  nerf::CameraSpan span = around({-1.7, -1, 0, 1, 1.7});  // leaves 165 degrees out
+  span.directions.push_back({std::cos(pi) * 1e-9, 0, 1});
+  span.distances.push_back(2);
+  for (const nerf::Camera& c : orbit(span, 32, 0)) CHECK(std::abs(azimuth(c, span)) < 1.54);
+  nerf::CameraSpan above{
+      .centre = {0, 0, 0}, .directions = {{0, 0, 1}}, .distances = {3}, .width = 4, .height = 4};
+  for (const nerf::Camera& c : orbit(above, 3, 0))
+    CHECK(c.position()[2] == Approx(3 * std::sin(75 * pi / 180)));
+}
+
 TEST_CASE("camera_path: an orbit of a forward-facing capture is an ellipse among its cameras", "[render]") {
   nerf::CameraSpan span{
       .centre = {0, 0, -4}, .up = {0, 1, 0}, .directions = {}, .distances = {}, .width = 4, .height = 3};
@@ -129,12 +141,19 @@ TEST_CASE("camera_path: a file has cameras of transforms.json", "[render]") {
   CHECK(cameras[1].pose == nerf::Pose{0, -1, 0, 1, 1, 0, 0, 2, 0, 0, 1, 3});
   CHECK(cameras[0].width == 10);
   CHECK(cameras[0].fx == Approx(5 / std::tan(0.5)));
+  write_file_atomically(folder / "lens.json", R"({"w": 60, "h": 40, "fl_x": 50, "frames": [
+    {"cx": 31, "transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]},
+    {"fl_y": 55, "transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]}]})");
+  const auto lens = read_camera_path(folder / "lens.json", span, 0);
+  CHECK(lens[0].parameters() == std::array<double, 16>{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 50, 50, 31, 20});
+  CHECK(lens[1].parameters() == std::array<double, 16>{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 50, 55, 30, 20});
+  CHECK(read_camera_path(folder / "lens.json", span, 30)[1].fy == 27.5);
   write_file_atomically(folder / "own.json",
                         R"({"frames": [{"transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0]]}]})");
   CHECK(read_camera_path(folder / "own.json", span, 0)[0].fx == 40);  // the span's
 }
 
-TEST_CASE("camera_path: files that are none are refused by place", "[render]") {
+TEST_CASE("camera_path: a bad file is refused, and its place named", "[render]") {
   const auto refused = [](const std::string& text, const std::string& expected) {
     const std::string error = error_of(text);
     CHECK_THAT(error, Contains("path.json: "));
@@ -143,14 +162,22 @@ TEST_CASE("camera_path: files that are none are refused by place", "[render]") {
   refused("{", "expected JSON with \"frames\"");
   refused("[]", "frames: expected a list of cameras");
   refused(R"({"frames": []})", "found an array of 0");
-  refused(R"({"frames": [7]})", "frames[0]: expected \"transform_matrix\" of 3 or 4 rows, found 7");
+  refused(R"({"frames": [7]})", "frames[0].transform_matrix: expected 3 or 4 rows, found nothing");
   refused(R"({"frames": [{"transform_matrix": [[1,0,0,0],[0,1,0],[0,0,1,0]]}]})",
           "frames[0].transform_matrix[1]: expected 4 numbers, found an array of 3");
   refused(R"({"frames": [{"transform_matrix": [[1,0,0,0],[0,"a",0,0],[0,0,1,0]]}]})",
-          "frames[0].transform_matrix[1]: expected 4 finite numbers");
+          "frames[0].transform_matrix[1][1]: expected a number below 1e9, found \"a\"");
   refused(R"({"frames": [{"transform_matrix": [[2,0,0,0],[0,1,0,0],[0,0,1,0]]}]})", "expected a rotation");
   refused(R"({"frames": [{"transform_matrix": [[-1,0,0,0],[0,1,0,0],[0,0,1,0]]}]})", "expected a rotation");
   refused(R"({"camera_angle_x": 4, "frames": [{"transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0]]}]})",
-          "camera_angle_x: expected an angle above 0 and below pi, in radians, found 4");
+          "camera_angle_x: expected a number from 0.001 to 3.14, found 4");
+  const std::string identity = R"([[1,0,0,0],[0,1,0,0],[0,0,1,0])";
+  refused(R"({"frames": [{"transform_matrix": )" + identity + "]}, {\"transform_matrix\": " + identity +
+              ", [0,0,0,2]]}]}",
+          "frames[1].transform_matrix[3]: expected 0, 0, 0, 1, found an array of 4");
+  refused(R"({"frames": [{"fl_x": -1, "transform_matrix": )" + identity + "]}]}",
+          "frames[0].fl_x: expected a number from 0.001");
+  refused(R"({"w": 1e300, "frames": [{"transform_matrix": )" + identity + "]}]}",
+          "w: expected a number from 1 to 8192");
   refused(std::string(100000, '['), "expected JSON");
 }

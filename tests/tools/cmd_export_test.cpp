@@ -55,12 +55,12 @@ TEST_CASE("export refuses what it cannot write, and options of another kind of f
   };
   refused({"--out", folder / "a.obj"}, "expected a file that ends in .html, .ply or .glb");
   refused({"--out", folder / "a.html", "--density", "3"}, "--resolution, --density: only for .ply and .glb");
-  refused({"--out", folder / "a.ply", "--rows", "3"}, "only for .html files, a .ply has no images");
+  refused({"--out", folder / "a.ply", "--rows", "3"}, "only for .html files; a .ply has no images");
   const Outcome empty = run({"--out", folder / "a.ply", "--resolution", "8", "--density", "100000"});
   CHECK(empty.code == cli::kFailed);
-  CHECK_THAT(empty.err, Contains("no surface has a density of") && Contains("choose a lower --density"));
+  CHECK_THAT(empty.err, Contains("no surface has a density of") && Contains("choose another --density"));
   CHECK(!std::filesystem::exists(folder / "a.ply"));
-  const Outcome secret = run({"--out", "/nowhere/a.glb"});
-  CHECK(secret.code == cli::kFailed);
-  CHECK_THAT(secret.err, Contains("/nowhere/a.glb"));
+  const Outcome missing = run({"--out", "/nowhere/a.glb"});
+  CHECK(missing.code == cli::kFailed);
+  CHECK_THAT(missing.err, Contains("/nowhere/a.glb"));
 }

@@ -1,6 +1,7 @@
 #include <fieldmark/core/files.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/imaging/video/video_reader.h>
+#include <fieldmark/nerf/renderer.h>
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -141,8 +142,19 @@ TEST_CASE("render follows an orbit or a file, into a folder or a video", "[rende
 
   write_file_atomically(folder / "path.json",
                         R"({"frames": [{"transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 4]]}]})");
-  REQUIRE(render({"--path", folder / "path.json", "--out", folder / "file"}).code == cli::kOk);
-  CHECK(read_image(folder / "file/view_000.png").shape == Shape{16, 16, 3});
+  const Outcome file = render({"--path", folder / "path.json", "--out", folder / "file"});
+  REQUIRE(file.code == cli::kOk);
+  CHECK(nlohmann::json::parse(file.out)["views"] == 1);
+  const auto loaded = nerf::RadianceField::load(field);
+  nerf::Renderer renderer(loaded);
+  nerf::Camera camera = nerf::make_cameras(loaded.cameras, nerf::CameraSet::ring, 1, 16, 1).front();
+  camera.pose = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 4};
+  const Tensor<float> expected = renderer.render(camera).rgb, got = read_image(folder / "file/view_000.png");
+  REQUIRE(got.shape == expected.shape);
+  double farthest = 0;
+  for (Index i = 0; i < got.size(); ++i)
+    farthest = std::max(farthest, std::abs(double(got[i]) - double(expected[i])));
+  CHECK(farthest < 0.51 / 255);
 
   const Outcome video = render({"--path", "orbit", "--count", "4", "--fps", "12", "--out", folder / "v.mp4"});
   if (has_video()) {
@@ -188,6 +200,9 @@ TEST_CASE("render refuses options of a path, video or folder where there is none
   CHECK_THAT(refusal({"--out", out, "--fps", "30"}), Contains("--fps: needs a video as --out"));
   CHECK_THAT(refusal({"--out", video, "--alpha"}), Contains("--alpha, --depth: need a folder as --out"));
   CHECK_THAT(refusal({"--out", video, "--depth"}), Contains("is a video"));
+  CHECK_THAT(refusal({"--out", video, "--overwrite"}), Contains("--overwrite: for folders"));
+  CHECK_THAT(refusal({"--out", video, "--against", field, "--sheet", video}),
+             Contains("must differ from --out"));
   CHECK_THAT(refusal({"--out", out, "--path", "orbit", "--cameras", "ring"}), Contains("excludes"));
   CHECK_THAT(refusal({"--out", out, "--path", folder / "p.json", "--count", "3"}),
              Contains("has cameras of its own"));

@@ -37,7 +37,7 @@ TEST_CASE("view_output: files of a folder, or frames of a video", "[render]") {
   for (const int n : {1, 2}) {
     const ScopedThreads scope(n);
     const TemporaryFolder folder;
-    ViewOutput images(folder / "", 24);
+    ViewOutput images(folder / "", 12, 8, 24);
     CHECK(images.add("a", a) == std::filesystem::path(folder / "") / "a.png");
     images.add("b", b);
     images.finish();
@@ -46,22 +46,24 @@ TEST_CASE("view_output: files of a folder, or frames of a video", "[render]") {
       std::cout << "SKIPPED: videos need libavcodec with x264\n";
       continue;
     }
-    ViewOutput video(folder / "v.mp4", 12);
+    ViewOutput video(folder / "v.mp4", 12, 8, 5);
     video.add("a", a);
     CHECK(video.add("b", b) == std::filesystem::path(folder / "v.mp4"));
     CHECK_FALSE(std::filesystem::exists(folder / "v.mp4"));
     video.finish();
     VideoReader reader(folder / "v.mp4");
-    int frames = 0;
-    while (reader.next()) ++frames;
-    CHECK(frames == 2);
+    std::vector<double> seconds;
+    while (const auto frame = reader.next()) seconds.push_back(frame->time);
+    REQUIRE(seconds.size() == 2);
+    CHECK(seconds[1] - seconds[0] == Approx(0.2));
+    CHECK_THROWS_AS(ViewOutput(folder / "v.mp4", 1, 8, 5), ValueError);
   }
 }
 
 TEST_CASE("view_output: a file that cannot be written is an error of the next call", "[render]") {
   for (const int n : {1, 2}) {
     const ScopedThreads scope(n);
-    ViewOutput images("/nowhere/at/all", 24);
+    ViewOutput images("/nowhere/at/all", 2, 2, 24);
     CHECK_THROWS_AS((images.add("a", Tensor<float>({2, 2, 3})), images.finish()), IoError);
   }
 }

@@ -2,6 +2,7 @@
 
 #include <fieldmark/core/error.h>
 #include <fieldmark/core/files.h>
+#include <fieldmark/tools/results/report.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 
 namespace fieldmark::cli {
 namespace {
@@ -43,6 +45,7 @@ struct Arc {
 };
 
 Arc covered(std::vector<double> azimuths) {
+  if (azimuths.empty()) return {};  // all cameras look straight down or up
   std::ranges::sort(azimuths);
   double gap = azimuths.front() + 2 * pi - azimuths.back(), after = azimuths.back();
   for (std::size_t i = 1; i < azimuths.size(); ++i)
@@ -96,9 +99,9 @@ class Sphere : public Places {
     std::vector<double> azimuths, distances = span.distances;
     for (const nerf::Vec3& d : span.directions) {
       const Vector3d v = vector_of(d);
-      azimuths.push_back(std::atan2(v.dot(y_), v.dot(x_)));
-      const double elevation =
-          std::clamp(std::asin(std::clamp(v.dot(up_), -1.0, 1.0)), -kSteepest, kSteepest);
+      double elevation = std::asin(std::clamp(v.dot(up_), -1.0, 1.0));
+      if (std::abs(elevation) < kSteepest) azimuths.push_back(std::atan2(v.dot(y_), v.dot(x_)));
+      elevation = std::clamp(elevation, -kSteepest, kSteepest);
       low_ = std::min(low_, elevation), high_ = std::max(high_, elevation);
       mean_ += elevation / static_cast<double>(span.directions.size());
     }
@@ -136,24 +139,58 @@ std::unique_ptr<const Places> places_of(const nerf::CameraSpan& span) {
   throw IoError(path.string() + ": " + place + ": expected " + expected + ", found " + text);
 }
 
+// Returns a number of an object; nothing if it is not there. @throws IoError unless it is in [low, high]
+std::optional<double> number_of(const json& object, const char* key, double low, double high,
+                                const std::filesystem::path& path, const std::string& place) {
+  const json value = object.value(key, json());
+  if (value.is_null()) return {};
+  if (!value.is_number() || !(value.get<double>() >= low && value.get<double>() <= high))
+    refuse(path, place + key, "a number from " + results::shown(low) + " to " + results::shown(high), value);
+  return value.get<double>();
+}
+
+// Returns a camera with the intrinsics that an object states, and others where it states none.
+nerf::Camera intrinsics_of(const json& object, nerf::Camera camera, const std::filesystem::path& path,
+                           const std::string& place) {
+  const auto number = [&](const char* key, double low, double high) {
+    return number_of(object, key, low, high, path, place);
+  };
+  const auto w = number("w", 1, 8192), h = number("h", 1, 8192);
+  if (w || h)
+    camera =
+        camera.scaled(w ? static_cast<Index>(*w) : camera.width, h ? static_cast<Index>(*h) : camera.height);
+  if (const auto angle = number("camera_angle_x", 0.001, 3.14))
+    camera = nerf::make_camera(camera.pose, *angle, camera.width, camera.height);
+  if (const auto fx = number("fl_x", 1e-3, 1e6)) camera.fx = camera.fy = *fx;
+  if (const auto fy = number("fl_y", 1e-3, 1e6)) camera.fy = *fy;
+  if (const auto cx = number("cx", -1e6, 1e6)) camera.cx = *cx;
+  if (const auto cy = number("cy", -1e6, 1e6)) camera.cy = *cy;
+  return camera;
+}
+
 nerf::Pose pose_of(const json& frame, const std::filesystem::path& path, const std::string& place) {
   const json matrix = frame.is_object() ? frame.value("transform_matrix", json()) : json();
   if (!matrix.is_array() || matrix.size() < 3 || matrix.size() > 4)
-    refuse(path, place, "\"transform_matrix\" of 3 or 4 rows", frame);
-  nerf::Pose pose{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::string row = place + ".transform_matrix[" + std::to_string(i) + "]";
+    refuse(path, place + "transform_matrix", "3 or 4 rows", matrix);
+  std::array<double, 16> m{0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1};
+  for (std::size_t i = 0; i < matrix.size(); ++i) {
+    const std::string row = place + "transform_matrix[" + std::to_string(i) + "]";
     if (!matrix[i].is_array() || matrix[i].size() != 4) refuse(path, row, "4 numbers", matrix[i]);
     for (std::size_t j = 0; j < 4; ++j) {
-      if (!matrix[i][j].is_number() || !std::isfinite(matrix[i][j].get<double>()))
-        refuse(path, row, "4 finite numbers", matrix[i]);
-      pose[4 * i + j] = matrix[i][j].get<double>();
+      const json& value = matrix[i][j];
+      if (!value.is_number() || !(std::abs(value.get<double>()) < 1e9))
+        refuse(path, row + "[" + std::to_string(j) + "]", "a number below 1e9", value);
+      m[4 * i + j] = value.get<double>();
     }
   }
+  if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1)
+    refuse(path, place + "transform_matrix[3]", "0, 0, 0, 1", matrix[3]);
   Eigen::Matrix3d r;
-  r << pose[0], pose[1], pose[2], pose[4], pose[5], pose[6], pose[8], pose[9], pose[10];
+  r << m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10];
   if (!((r.transpose() * r).isIdentity(1e-3) && r.determinant() > 0))
-    refuse(path, place + ".transform_matrix", "a rotation in its first three columns, to 0.001", matrix);
+    refuse(path, place + "transform_matrix", "a rotation in its first three columns, to 0.001", matrix);
+  nerf::Pose pose{};
+  std::copy_n(m.begin(), 12, pose.begin());
   return pose;
 }
 
@@ -195,16 +232,13 @@ std::vector<nerf::Camera> read_camera_path(const std::filesystem::path& path, co
   const json frames = file.is_object() ? file.value("frames", json()) : json();
   if (!frames.is_array() || frames.empty())
     refuse(path, "frames", "a list of cameras, each with \"transform_matrix\"", frames);
-  nerf::Camera camera = camera_of(span, size);
-  if (const json angle = file.value("camera_angle_x", json()); !angle.is_null()) {
-    if (!angle.is_number() || !(angle.get<double>() > 0 && angle.get<double>() < pi))
-      refuse(path, "camera_angle_x", "an angle above 0 and below pi, in radians", angle);
-    camera = nerf::make_camera(camera.pose, angle.get<double>(), camera.width, camera.height);
-  }
+  const nerf::Camera all = intrinsics_of(file, camera_of(span, 0), path, "");
   std::vector<nerf::Camera> cameras;
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    camera.pose = pose_of(frames[i], path, "frames[" + std::to_string(i) + "]");
-    cameras.push_back(camera);
+    const std::string place = "frames[" + std::to_string(i) + "].";
+    const nerf::Pose pose = pose_of(frames[i], path, place);
+    cameras.push_back(intrinsics_of(frames[i], all, path, place).scaled(size));
+    cameras.back().pose = pose;
   }
   return cameras;
 }

@@ -1,6 +1,7 @@
 #include <fieldmark/core/files.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/renderer.h>
+#include <fieldmark/tools/results/report.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -11,6 +12,7 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/images.h"
 #include "cli/mesh_files.h"
 #include "cli/outputs.h"
 #include "cli/surface.h"
@@ -27,16 +29,16 @@ struct ExportArguments {
   bool of_surface = false, of_page = false;  // options for one kind of file were given
 };
 
-std::string ending(const std::string& path) { return std::filesystem::path(path).extension().string(); }
+constexpr std::size_t kLargestPage = 300'000'000;  // bytes of images; browsers refuse scripts of some 500 MB
 
 void check_options(const ExportArguments& options) {
-  const std::string end = ending(options.out);
+  const std::string end = extension_of(options.out);
   if (end != ".html" && end != ".ply" && end != ".glb")
     throw UsageError("--out: expected a file that ends in .html, .ply or .glb, got '" + options.out + "'");
   if (options.of_surface && end == ".html")
-    throw UsageError("--resolution, --density: only for .ply and .glb files, a page has images");
+    throw UsageError("--resolution, --density: only for .ply and .glb files; a page has images");
   if (options.of_page && end != ".html")
-    throw UsageError("--size, --rows, --columns, --quality: only for .html files, a " + end +
+    throw UsageError("--size, --rows, --columns, --quality: only for .html files; a " + end +
                      " has no images");
 }
 
@@ -45,15 +47,22 @@ void export_page(const ExportArguments& options, const nerf::RadianceField& fiel
   const CameraGrid grid = camera_grid(field.cameras, options.rows, options.columns, options.size);
   nerf::Renderer renderer(field);
   std::vector<std::vector<std::byte>> jpegs;
+  std::size_t bytes = 0;
   const InterruptGuard guard;
   Progress progress = context.progress("export");
   for (const nerf::Camera& camera : grid.cameras) {
     if (guard.interrupted()) throw Interrupted("nothing was written");
     jpegs.push_back(encode_jpeg(renderer.render(camera).rgb, options.quality));
+    bytes += jpegs.back().size();
+    if (bytes > kLargestPage)
+      throw ValueError(options.out + ": a page holds at most 300 MB of images, which " +
+                       std::to_string(jpegs.size()) + " of " + std::to_string(grid.cameras.size()) +
+                       " views exceed; choose fewer, smaller or lower-quality ones");
     progress.update(static_cast<double>(jpegs.size()) / static_cast<double>(grid.cameras.size()));
   }
-  write_file_atomically(
-      options.out, turntable_page(grid, jpegs, std::filesystem::path(options.field).filename().string()));
+  write_file_atomically(options.out,
+                        turntable_page(grid, jpegs, std::filesystem::path(options.field).filename().string(),
+                                       field.background == nerf::Background::black));
   result["views"] = jpegs.size();
 }
 
@@ -71,9 +80,9 @@ void export_surface(const ExportArguments& options, const nerf::RadianceField& f
   }
   if (guard.interrupted()) throw Interrupted("nothing was written");
   if (mesh.triangles.empty())
-    throw ValueError(options.field + ": no surface has a density of " + std::to_string(options.density) +
-                     "; choose a lower --density");
-  if (ending(options.out) == ".ply")
+    throw ValueError(options.field + ": no surface has a density of " + results::shown(options.density) +
+                     "; choose another --density");
+  if (extension_of(options.out) == ".ply")
     write_ply(options.out, mesh);
   else
     write_glb(options.out, mesh, field.cameras.up);
@@ -86,7 +95,7 @@ int run_export(const ExportArguments& options, Context& context) {
   check_writable_page(options.out);
   const auto field = nerf::RadianceField::load(options.field);
   Json result = {{"out", options.out}};
-  if (ending(options.out) == ".html")
+  if (extension_of(options.out) == ".html")
     export_page(options, field, context, result);
   else
     export_surface(options, field, context, result);
@@ -105,8 +114,8 @@ Command add_export(CommandLine& app) {
   auto o = std::make_shared<ExportArguments>();
   app.add_option("--field", o->field, "Field to export")->required()->type_name("FIELD");
   app.add_option("--out", o->out,
-                 "File to write: .html, a page to turn the scene; .ply, a point cloud of its surface;\n"
-                 ".glb, a mesh of it")
+                 "File to write: .html, a page in which to turn the scene; .ply, the points of its surface;\n"
+                 ".glb, a mesh")
       ->required()
       ->type_name("FILE");
   const Option surface[] = {
@@ -114,8 +123,8 @@ Command add_export(CommandLine& app) {
           ->range(8, 512)
           ->type_name("N"),
       app.add_option("--density", o->density,
-                     "Density of the surface, per side of the scene's cube, 0.001 to 100000")
-          ->range(1e-3, 1e5)
+                     "Density of the surface, per side of the scene's cube, 3 to 100000")
+          ->range(3.0, 1e5)
           ->type_name("D")};
   const Option page[] = {
       app.add_option("--size", o->size, "Longer side of the page's images in pixels, 16 to 4096")

@@ -119,8 +119,10 @@ void clear_older_views(const RenderArguments& options, const std::vector<NamedCa
     std::filesystem::remove(path);
     std::filesystem::remove(path.replace_filename(path.stem().string() + kDepthEnd));
   }
-  for (const auto& [name, camera] : cameras)
+  for (const auto& [name, camera] : cameras) {
     std::erase(others, std::filesystem::path(options.out) / (name + ".png"));
+    std::filesystem::remove(std::filesystem::path(options.out) / (name + kDepthEnd));
+  }
   if (!others.empty())
     context.note(options.out +
                  ": images of other names stay beside the new views: " + std::to_string(others.size()));
@@ -134,34 +136,59 @@ void check_options(const RenderArguments& options) {
   if (options.count && !options.path.empty() && options.path != "orbit")
     throw UsageError("--count: --path " + options.path + " has cameras of its own");
   if (options.video() && (options.alpha || options.depth))
-    throw UsageError("--alpha, --depth: need a folder as --out, " + options.out + " is a video");
+    throw UsageError("--alpha, --depth: need a folder as --out; " + options.out + " is a video");
+  if (options.video() && options.overwrite)
+    throw UsageError("--overwrite: for folders; a video replaces an earlier one");
+  if (options.video() && options.sheet == options.out)
+    throw UsageError("--sheet: must differ from --out, both are " + options.out);
 }
 
-// Renders all views and returns their files; adds the seconds that rendering takes.
-Json write_views(const RenderArguments& options, const nerf::RadianceField& field, nerf::Renderer& renderer,
-                 const std::vector<NamedCamera>& cameras, Context& context, double& seconds) {
+// Frames of a video share one size.
+void check_sizes(const RenderArguments& options, const std::vector<NamedCamera>& cameras) {
+  const nerf::Camera& first = cameras.front().camera;
+  for (const auto& [name, camera] : cameras)
+    if (options.video() && (camera.width != first.width || camera.height != first.height))
+      throw UsageError("--out " + options.out + ": frames of a video must have one size, " +
+                       cameras.front().name + " has " + std::to_string(first.width) + "x" +
+                       std::to_string(first.height) + ", " + name + " " + std::to_string(camera.width) + "x" +
+                       std::to_string(camera.height) + "; name a folder");
+}
+
+// The files that were written, and the seconds that rendering took.
+struct Written {
+  Json images = Json::array(), depth = Json::array();
+  double seconds = 0;
+};
+
+Written write_views(const RenderArguments& options, const nerf::RadianceField& field,
+                    nerf::Renderer& renderer, const std::vector<NamedCamera>& cameras, ViewOutput& output,
+                    Context& context) {
   const InterruptGuard guard;
-  Json images = Json::array();
+  Written written;
+  std::size_t done = 0;
   Progress progress = context.progress("render");
-  ViewOutput output(options.out, options.fps);
   for (const auto& [name, camera] : cameras) {
     if (guard.interrupted()) {
       if (options.video()) throw Interrupted("nothing was written");
       output.finish();
-      throw Interrupted(std::to_string(images.size()) + " views were written");
+      throw Interrupted(std::to_string(done) + " views were written");
     }
     const double begin = context.seconds();
     auto rendering = renderer.render(camera);
-    if (options.depth)
-      write_npy(std::filesystem::path(options.out) / (name + kDepthEnd), depth_map(field, renderer, camera));
-    seconds += context.seconds() - begin;
-    images.push_back(
-        output.add(name, options.alpha ? with_alpha(rendering, field.background) : std::move(rendering.rgb))
-            .string());
-    progress.update(static_cast<double>(images.size()) / static_cast<double>(cameras.size()));
+    std::optional<Tensor<float>> depth;
+    if (options.depth) depth = depth_map(field, renderer, camera, rendering.opacity);
+    written.seconds += context.seconds() - begin;
+    if (depth) {
+      written.depth.push_back((std::filesystem::path(options.out) / (name + kDepthEnd)).string());
+      write_npy(written.depth.back().get<std::string>(), *depth);
+    }
+    const auto path =
+        output.add(name, options.alpha ? with_alpha(rendering, field.background) : std::move(rendering.rgb));
+    if (!options.video() || done == 0) written.images.push_back(path.string());
+    progress.update(static_cast<double>(++done) / static_cast<double>(cameras.size()));
   }
   output.finish();
-  return options.video() ? Json::array({options.out}) : images;
+  return written;
 }
 
 int run_render(const RenderArguments& options, Context& context) {
@@ -172,24 +199,27 @@ int run_render(const RenderArguments& options, Context& context) {
   nerf::Renderer renderer(field, {.precision = precision_of(options.precision),
                                   .points = points_of(options, field),
                                   .supersampling = options.supersampling});
-  if (options.video()) {
-    check_writable_page(options.out);
-  } else {
+  check_sizes(options, cameras);
+  if (options.video()) check_writable_page(options.out);
+  const nerf::Camera& first = cameras.front().camera;
+  ViewOutput output(options.out, first.width, first.height, options.fps);
+  if (!options.video()) {
     prepare_folder(options.out);
     clear_older_views(options, cameras, context);  // after everything that may be refused
   }
-  double seconds = 0;
-  const Json images = write_views(options, field, renderer, cameras, context, seconds);
+  const Written written = write_views(options, field, renderer, cameras, output, context);
   if (!options.sheet.empty()) write_sheet(options, renderer, cameras);
-  const double each = seconds / static_cast<double>(cameras.size());
+  const double each = written.seconds / static_cast<double>(cameras.size());
   char line[80];
   std::snprintf(line, sizeof line, "%zu views, %.3f s each", cameras.size(), each);
   context.text() << options.out << ": " << line << "\n";
-  context.result({{"views", cameras.size()},
-                  {"width", cameras.front().camera.width},
-                  {"height", cameras.front().camera.height},
-                  {"seconds_per_view", each},
-                  {"images", images}});
+  Json result = {{"views", cameras.size()},
+                 {"width", first.width},
+                 {"height", first.height},
+                 {"seconds_per_view", each},
+                 {"images", written.images}};
+  if (options.depth) result["depth"] = written.depth;
+  context.result(result);
   return kOk;
 }
 
@@ -214,7 +244,8 @@ Command add_render(CommandLine& app) {
           ->one_of(nerf::camera_set_names())
           ->type_name("SET");
   app.add_flag("--overwrite", o->overwrite,
-               "Write to a folder that has images, and remove the views of earlier runs, view_N.png");
+               "Write to a folder that has images, and remove the views of earlier runs, view_N.png, "
+               "with\ntheir depth");
   add_precision(app, o->precision);
   add_supersampling(app, o->supersampling);
   app.add_option("--count", o->count, "Cameras to draw, 1 to 100000; default: 10, or 120 along an orbit")

@@ -3,6 +3,7 @@
 #include <fieldmark/core/files.h>
 #include <fieldmark/engine/parallel.h>
 
+#include <algorithm>
 #include <bit>
 #include <limits>
 #include <string>
@@ -23,24 +24,27 @@ float along_view(const nerf::Camera& camera, const nerf::Space& space, const flo
 }  // namespace
 
 Tensor<float> depth_map(const nerf::RadianceField& field, nerf::Renderer& renderer,
-                        const nerf::Camera& camera) {
+                        const nerf::Camera& camera, const Tensor<float>& opacity) {
+  constexpr Index kPiece = 256;  // rays traced together
   Tensor<float> depth({camera.height, camera.width});
-  const Index width = camera.width;
+  const Index pixels = depth.size();
   renderer.refresh();
   parallel_for(nerf::Renderer::kLanes, 1, [&](Index lane, Index) {
-    std::vector<float> pixels, seen(at(4 * width)), position(at(3 * width));
+    std::vector<float> places, seen(at(4 * kPiece)), position(at(3 * kPiece));
     nerf::CubeRays rays;
-    rays.resize(width);
-    for (Index y = lane; y < camera.height; y += nerf::Renderer::kLanes) {
-      pixels.clear();
-      for (Index x = 0; x < width; ++x)
-        pixels.insert(pixels.end(), {static_cast<float>(x), static_cast<float>(y)});
-      rays.set(field.space, 0, camera, pixels);
+    for (Index first = lane * kPiece; first < pixels; first += nerf::Renderer::kLanes * kPiece) {
+      const Index n = std::min(kPiece, pixels - first);
+      places.clear();
+      for (Index i = first; i < first + n; ++i)
+        places.insert(places.end(),
+                      {static_cast<float>(i % camera.width), static_cast<float>(i / camera.width)});
+      rays.resize(n);
+      rays.set(field.space, 0, camera, places);
       renderer.trace(rays.batch(field.space), lane, seen.data(), position.data());
-      for (Index x = 0; x < width; ++x)
-        depth.data[at(y * width + x)] = seen[at(4 * x + 3)] < 0.5f
-                                            ? std::numeric_limits<float>::quiet_NaN()
-                                            : along_view(camera, field.space, &position[at(3 * x)]);
+      for (Index i = 0; i < n; ++i)
+        depth[first + i] = opacity[first + i] < 0.5f || !(seen[at(4 * i + 3)] > 0)
+                               ? std::numeric_limits<float>::quiet_NaN()
+                               : along_view(camera, field.space, &position[at(3 * i)]);
     }
   });
   return depth;

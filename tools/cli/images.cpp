@@ -24,12 +24,6 @@ std::string digits_at(const std::string& s, std::size_t i) {
   return s.substr(i, end - i);
 }
 
-std::string lower_extension(const fs::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension;
-}
-
 struct Listing {
   std::vector<fs::path> images;
   std::map<std::string, std::size_t> others;  // numbers of skipped files, by kind
@@ -37,14 +31,14 @@ struct Listing {
 
 bool has_video_extension(const fs::path& path) {
   constexpr std::array<std::string_view, 6> kExtensions{".mp4", ".m4v", ".mov", ".webm", ".mkv", ".3gp"};
-  return std::ranges::find(kExtensions, lower_extension(path)) != kExtensions.end();
+  return std::ranges::find(kExtensions, extension_of(path)) != kExtensions.end();
 }
 
 Listing list_folder(const fs::path& folder, Videos videos) {
   Listing found;
   for (const auto& entry : fs::directory_iterator(folder)) {
     if (!entry.is_regular_file()) continue;
-    const std::string extension = lower_extension(entry.path());
+    const std::string extension = extension_of(entry.path());
     if (entry.path().filename().string().starts_with('.'))
       ++found.others["hidden"];
     else if (has_image_extension(entry.path()) ||
@@ -72,6 +66,12 @@ std::string skipped(const Listing& listing) {
 }
 
 }  // namespace
+
+std::string extension_of(const fs::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return extension;
+}
 
 bool is_digit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; }
 

@@ -15,6 +15,9 @@ class Context;
 
 bool is_digit(char c);
 
+/// Returns the extension of a path in lower case, such as ".png".
+std::string extension_of(const std::filesystem::path& path);
+
 /// Orders "r_2" before "r_10": runs of digits compare as numbers.
 bool natural_less(const std::string& a, const std::string& b);
 

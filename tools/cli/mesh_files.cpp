@@ -1,11 +1,13 @@
 #include "cli/mesh_files.h"
 
+#include <fieldmark/core/error.h>
 #include <fieldmark/core/files.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -45,11 +47,12 @@ class GltfArrays {
   }
 };
 
-// The rotation that turns `up` to the y axis.
-nlohmann::json rotation(const nerf::Vec3& up) {
+// The node that moves a mesh to its origin and rotates `up` onto the y axis.
+nlohmann::json node_of(const Mesh& mesh, const nerf::Vec3& up) {
   const auto q =
       Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d(up[0], up[1], up[2]), Eigen::Vector3d::UnitY());
-  return {q.x(), q.y(), q.z(), q.w()};
+  const Eigen::Vector3d t = q * Eigen::Vector3d(mesh.origin[0], mesh.origin[1], mesh.origin[2]);
+  return {{"mesh", 0}, {"rotation", {q.x(), q.y(), q.z(), q.w()}}, {"translation", {t[0], t[1], t[2]}}};
 }
 
 void append_chunk(std::string& file, const char* type, const std::string& bytes, char filler) {
@@ -64,12 +67,13 @@ void append_chunk(std::string& file, const char* type, const std::string& bytes,
 void write_ply(const std::filesystem::path& path, const Mesh& mesh) {
   std::string file =
       "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(mesh.positions.size()) + "\n";
-  for (const char* name : {"x", "y", "z", "nx", "ny", "nz"})
-    file += "property float " + std::string(name) + "\n";
+  for (const char* name : {"x", "y", "z"}) file += "property double " + std::string(name) + "\n";
+  for (const char* name : {"nx", "ny", "nz"}) file += "property float " + std::string(name) + "\n";
   for (const char* name : {"red", "green", "blue"}) file += "property uchar " + std::string(name) + "\n";
   file += "end_header\n";
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-    append(file, mesh.positions[i]);
+    for (std::size_t a = 0; a < 3; ++a)
+      append(file, mesh.origin[a] + static_cast<double>(mesh.positions[i][a]));
     append(file, mesh.normals[i]);
     for (const float c : mesh.colours[i])
       append(file, static_cast<std::uint8_t>(std::lround(255 * std::clamp(c, 0.f, 1.f))));
@@ -97,7 +101,7 @@ void write_glb(const std::filesystem::path& path, const Mesh& mesh, const nerf::
                                 {"extensionsUsed", {"KHR_materials_unlit"}},
                                 {"scene", 0},
                                 {"scenes", {{{"nodes", {0}}}}},
-                                {"nodes", {{{"mesh", 0}, {"rotation", rotation(up)}}}},
+                                {"nodes", nlohmann::json::array({node_of(mesh, up)})},
                                 {"materials",
                                  {{{"extensions", {{"KHR_materials_unlit", nlohmann::json::object()}}},
                                    {"pbrMetallicRoughness", {{"metallicFactor", 0}, {"roughnessFactor", 1}}},
@@ -113,6 +117,9 @@ void write_glb(const std::filesystem::path& path, const Mesh& mesh, const nerf::
   std::string chunks;
   append_chunk(chunks, "JSON", scene.dump(), ' ');
   append_chunk(chunks, "BIN\0", arrays.bytes, '\0');
+  if (chunks.size() > std::numeric_limits<std::uint32_t>::max() - 12)
+    throw ValueError(path.string() + ": a GLB file holds at most 4 GB, the mesh has " +
+                     std::to_string(mesh.positions.size()) + " vertices; choose a lower resolution");
   std::string file = "glTF";
   append(file, std::uint32_t{2});
   append(file, static_cast<std::uint32_t>(12 + chunks.size()));

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace fieldmark::cli {
 namespace {
@@ -14,6 +15,7 @@ namespace {
 using Eigen::Vector3f;
 
 constexpr Index kLanes = 16, kBatch = 4096;  // positions evaluated together
+constexpr float kEmpty = -7;                 // log density where there is no matter
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
 // The corners of a grid of n^3 cells.
@@ -25,16 +27,21 @@ struct Corners {
 };
 
 // Evaluates a network at many positions, batch by batch, on several threads.
-template <class F>
-void in_batches(Index count, F&& f) {
-  std::vector<Tape<float>> tapes(at(kLanes));
-  parallel_for(kLanes, 1, [&](Index lane, Index) {
-    for (Index begin = lane * kBatch; begin < count; begin += kLanes * kBatch) {
-      tapes[at(lane)].reset();
-      f(tapes[at(lane)], begin, std::min(kBatch, count - begin));
-    }
-  });
-}
+class Batches {
+ public:
+  template <class F>
+  void run(Index count, F&& f) {
+    parallel_for(kLanes, 1, [&](Index lane, Index) {
+      for (Index begin = lane * kBatch; begin < count; begin += kLanes * kBatch) {
+        tapes_[at(lane)].reset();
+        f(tapes_[at(lane)], begin, std::min(kBatch, count - begin));
+      }
+    });
+  }
+
+ private:
+  std::vector<Tape<float>> tapes_{at(kLanes)};  // they keep their memory
+};
 
 // Returns z of positions x [n, 3], and their features for the colour.
 struct Geometry {
@@ -73,20 +80,24 @@ bool near_matter(const nerf::OccupancyGrid& grid, const Corners& corners, Index 
   return false;
 }
 
-// Writes the densities of one layer of corners.
-void densities_of_layer(const nerf::RadianceField& field, const Corners& corners, Index z, float* layer) {
+// Writes the logarithms of the densities of one layer of corners: densities are exponentials, so the
+// logarithm is what changes evenly between corners. Corners that are not exported get NaN.
+void log_densities_of_layer(const nerf::RadianceField& field, const Corners& corners, Index z,
+                            Batches& batches, float* layer) {
   std::vector<Index> places;
   std::vector<float> x;
   for (Index j = 0; j < corners.side(); ++j)
     for (Index i = 0; i < corners.side(); ++i) {
-      if (!in_export(field.space.kind, corners, i, j, z) || !near_matter(field.grid, corners, i, j, z))
-        continue;
-      places.push_back(i + corners.side() * j);
+      const Index place = i + corners.side() * j;
+      const bool exported = in_export(field.space.kind, corners, i, j, z);
+      layer[place] = exported ? kEmpty : std::numeric_limits<float>::quiet_NaN();
+      if (!exported || !near_matter(field.grid, corners, i, j, z)) continue;
+      places.push_back(place);
       x.insert(x.end(), {corners.coordinate(i), corners.coordinate(j), corners.coordinate(z)});
     }
-  in_batches(std::ssize(places), [&](Tape<float>& tape, Index begin, Index n) {
+  batches.run(std::ssize(places), [&](Tape<float>& tape, Index begin, Index n) {
     const Var<float> sigma = field.field.density(geometry_at(field, tape, &x[at(3 * begin)], n).z);
-    for (Index k = 0; k < n; ++k) layer[places[at(begin + k)]] = sigma.value()[k];
+    for (Index k = 0; k < n; ++k) layer[places[at(begin + k)]] = std::max(kEmpty, std::log(sigma.value()[k]));
   });
 }
 
@@ -106,9 +117,10 @@ void add_normals(Mesh& mesh) {
 }
 
 // Sets the colour of each vertex, whose positions in the cube are `x`, to that seen along its normal.
-void add_colours(Mesh& mesh, const nerf::RadianceField& field, const std::vector<std::array<float, 3>>& x) {
+void add_colours(Mesh& mesh, const nerf::RadianceField& field, const std::vector<std::array<float, 3>>& x,
+                 Batches& batches) {
   mesh.colours.resize(x.size());
-  in_batches(std::ssize(x), [&](Tape<float>& tape, Index begin, Index n) {
+  batches.run(std::ssize(x), [&](Tape<float>& tape, Index begin, Index n) {
     float* directions = tape.scratch(3 * n);
     for (Index k = 0; k < 3 * n; ++k) directions[k] = -mesh.normals[at(begin + k / 3)][at(k % 3)];
     const Geometry seen = geometry_at(field, tape, x[at(begin)].data(), n);
@@ -134,11 +146,14 @@ class Nets {
       for (Index y = 0; y < n; ++y)
         for (Index x = 0; x < n; ++x)
           for (std::size_t axis = 0; axis < 3; ++axis) add_face({x, y, z}, axis);
+    drop_vertices_without_faces();
     return std::move(mesh_);
   }
 
  private:
   using Place = std::array<Index, 3>;
+  // True if the surface passes between two values; NaN is on no side of it.
+  static bool crossed(float a, float b) { return a > 0 ? b <= 0 : a <= 0 && b > 0; }
   float value(const Place& p) const { return values_[at(corners_.place(p[0], p[1], p[2]))] - level_; }
   std::uint32_t& vertex(const Place& p) {
     return vertex_[at(p[0] + corners_.n * (p[1] + corners_.n * p[2]))];
@@ -155,7 +170,7 @@ class Nets {
         Place to = from;
         ++to[axis];
         const float a = value(from), b = value(to);
-        if ((a > 0) == (b > 0)) continue;
+        if (!crossed(a, b)) continue;
         Vector3f crossing(corners_.coordinate(from[0]), corners_.coordinate(from[1]),
                           corners_.coordinate(from[2]));
         crossing[static_cast<int>(axis)] += a / (a - b) / static_cast<float>(corners_.n);
@@ -173,7 +188,7 @@ class Nets {
     Place to = from;
     ++to[axis];
     const bool inside = value(from) > 0;
-    if (from[u] == 0 || from[v] == 0 || inside == (value(to) > 0)) return;
+    if (from[u] == 0 || from[v] == 0 || !crossed(value(from), value(to))) return;
     std::array<std::uint32_t, 4> around{};
     constexpr Index kTurn[4][2] = {{1, 1}, {0, 1}, {0, 0}, {1, 0}};
     for (std::size_t k = 0; k < 4; ++k) {
@@ -185,6 +200,21 @@ class Nets {
     if (!inside) std::ranges::reverse(around);
     mesh_.triangles.push_back({around[0], around[1], around[2]});
     mesh_.triangles.push_back({around[0], around[2], around[3]});
+  }
+
+  // The cells at the border of the grid have crossed edges, but not all of their faces.
+  void drop_vertices_without_faces() {
+    std::vector<std::uint32_t> place(mesh_.positions.size(), kNone);
+    std::vector<std::array<float, 3>> kept;
+    for (auto& triangle : mesh_.triangles)
+      for (std::uint32_t& v : triangle) {
+        if (place[v] == kNone) {
+          place[v] = static_cast<std::uint32_t>(kept.size());
+          kept.push_back(mesh_.positions[v]);
+        }
+        v = place[v];
+      }
+    mesh_.positions = std::move(kept);
   }
 
   const std::vector<float>& values_;
@@ -208,22 +238,26 @@ Mesh surface_of(const nerf::RadianceField& field, const SurfaceOptions& options,
   if (!(options.density > 0) || !std::isfinite(options.density))
     throw ValueError("[surface_of] density must be positive, got " + std::to_string(options.density));
   const Index layer = corners.side() * corners.side();
-  std::vector<float> densities(at(layer * corners.side()));
+  std::vector<float> logs(at(layer * corners.side()));
+  Batches batches;
   for (Index z = 0; z < corners.side(); ++z) {
     if (proceed && !proceed(static_cast<double>(z) / static_cast<double>(corners.side()))) return {};
-    densities_of_layer(field, corners, z, &densities[at(layer * z)]);
+    log_densities_of_layer(field, corners, z, batches, &logs[at(layer * z)]);
   }
-  Mesh mesh = surface_nets(densities, corners.n, static_cast<float>(options.density));
+  Mesh mesh = surface_nets(logs, corners.n, static_cast<float>(std::log(options.density)));
   const auto in_cube = mesh.positions;
+  mesh.origin = field.cameras.centre;
   for (auto& p : mesh.positions) {
     nerf::Vec3 x{};
-    for (std::size_t a = 0; a < 3; ++a)
-      x[a] = std::clamp<double>(p[a], 1e-4, 1 - 1e-4);  // the ends may be far
+    for (std::size_t a = 0; a < 3; ++a) x[a] = std::clamp<double>(p[a], 1e-4, 1 - 1e-4);  // ends may be far
     x = field.space.to_world(x);
-    for (std::size_t a = 0; a < 3; ++a) p[a] = static_cast<float>(x[a]);
+    for (std::size_t a = 0; a < 3; ++a) p[a] = static_cast<float>(x[a] - mesh.origin[a]);
   }
+  // Depth grows along the third axis of the cube of a forward-facing scene, and against that of the world.
+  if (field.space.kind == nerf::SpaceKind::ndc)
+    for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
   add_normals(mesh);
-  add_colours(mesh, field, in_cube);
+  add_colours(mesh, field, in_cube, batches);
   return mesh;
 }
 

@@ -14,7 +14,7 @@ constexpr char kHead[] = R"(<!doctype html>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <style>
 body { margin: 0; min-height: 100vh; display: flex; flex-direction: column; align-items: center;
-  justify-content: center; gap: 1rem; background: #fff; color: #222; font: 1rem/1.5 system-ui, sans-serif; }
+  justify-content: center; gap: 1rem; font: 1rem/1.5 system-ui, sans-serif; }
 img { max-width: 100vw; max-height: 85vh; width: 640px; object-fit: contain; cursor: grab; touch-action: none;
   user-select: none; -webkit-user-drag: none; }
 p { margin: 0; }
@@ -42,6 +42,7 @@ view.addEventListener("pointermove", e => {
 });
 for (const end of ["pointerup", "pointercancel"]) view.addEventListener(end, () => { from = null; });
 addEventListener("keydown", e => {
+  if (e.altKey || e.ctrlKey || e.metaKey) return;
   const steps = { ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [-1, 0], ArrowDown: [1, 0] };
   if (!(e.key in steps)) return;
   e.preventDefault();
@@ -56,18 +57,22 @@ show(row, column);
 }  // namespace
 
 std::string turntable_page(const CameraGrid& grid, const std::vector<std::vector<std::byte>>& jpegs,
-                           const std::string& title) {
+                           const std::string& title, bool dark) {
   if (std::ssize(jpegs) != grid.rows * grid.columns || jpegs.empty())
     throw ShapeError("[turntable_page] jpegs must be rows x columns, " +
                      std::to_string(grid.rows * grid.columns) + ", got " + std::to_string(jpegs.size()));
   const std::string name = bench::escaped_markup(title);
-  std::string page =
-      kHead + ("<title>" + name + "</title>\n</head>\n<body>\n<img id=\"view\" alt=\"") + name +
-      ", seen from around it\">\n<p>Drag, or use the arrow keys, to turn.</p>\n<script>\nconst rows = " +
-      std::to_string(grid.rows) + ", columns = " + std::to_string(grid.columns) +
-      ", closed = " + (grid.closed ? "true" : "false") + ", images = [\n";
+  std::string page = kHead;
+  page += "<title>" + name + "</title>\n</head>\n<body style=\"" +
+          (dark ? "background: #000; color: #ddd" : "background: #fff; color: #222") +
+          "\">\n<img id=\"view\" draggable=\"false\" alt=\"View of " + name +
+          "\" src=\"data:,\">\n<p>Drag, or use the arrow keys, to turn.</p>\n<script>\nconst rows = " +
+          std::to_string(grid.rows) + ", columns = " + std::to_string(grid.columns) +
+          ", closed = " + (grid.closed ? "true" : "false") + ", images = [\n";
   for (const auto& jpeg : jpegs) page += "\"" + to_base64(jpeg) + "\",\n";
-  return page + "];\n</script>\n" + kScript;
+  page += "];\n</script>\n";
+  page += kScript;
+  return page;
 }
 
 }  // namespace fieldmark::cli

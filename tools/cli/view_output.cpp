@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "cli/images.h"
+
 namespace fieldmark::cli {
 
 Tensor<float> with_alpha(const nerf::Rendering& view, nerf::Background background) {
@@ -22,14 +24,14 @@ Tensor<float> with_alpha(const nerf::Rendering& view, nerf::Background backgroun
   return image;
 }
 
-bool is_video_path(const std::string& path) {
-  std::string end = std::filesystem::path(path).extension().string();
-  std::ranges::transform(end, end.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? char(c + 32) : c; });
-  return end == ".mp4";
-}
+bool is_video_path(const std::string& path) { return extension_of(path) == ".mp4"; }
 
-ViewOutput::ViewOutput(std::filesystem::path out, double frames_per_second)
-    : out_(std::move(out)), frames_per_second_(frames_per_second) {}
+ViewOutput::ViewOutput(std::filesystem::path out, Index width, Index height, double frames_per_second)
+    : out_(std::move(out)) {
+  if (is_video_path(out_.string()))
+    video_ =
+        std::make_unique<VideoWriter>(width, height, VideoOptions{.frames_per_second = frames_per_second});
+}
 
 ViewOutput::~ViewOutput() = default;
 
@@ -39,13 +41,9 @@ void ViewOutput::wait() {
 
 std::filesystem::path ViewOutput::add(const std::string& name, Tensor<float> image) {
   wait();
-  const bool frame = is_video_path(out_.string());
-  const std::filesystem::path path = frame ? out_ : out_ / (name + ".png");
-  if (frame && !video_)
-    video_ = std::make_unique<VideoWriter>(image.shape[1], image.shape[0],
-                                           VideoOptions{.frames_per_second = frames_per_second_});
-  auto write = [this, frame, path, image = std::move(image)] {
-    if (frame)
+  const std::filesystem::path path = video_ ? out_ : out_ / (name + ".png");
+  auto write = [this, path, image = std::move(image)] {
+    if (video_)
       video_->add(image);
     else
       write_png(path, image);

@@ -20,11 +20,12 @@ bool is_video_path(const std::string& path);
 /// on a thread of its own while the next view is rendered; with one thread, at once.
 class ViewOutput {
  public:
-  /// @param out  folder, or path of an MP4 file   @param frames_per_second  of the MP4 file
-  ViewOutput(std::filesystem::path out, double frames_per_second);
+  /// @param out  folder, or path of an MP4 file   @param width, height  of all frames of the MP4 file
+  /// @throws ValueError if this build cannot encode H.264, or frames of this size
+  ViewOutput(std::filesystem::path out, Index width, Index height, double frames_per_second);
   ~ViewOutput();
   /// Adds the next view. Waits for the previous one and rethrows its error.
-  /// @return the file that it is in   @throws IoError   @throws ValueError if this build cannot encode H.264
+  /// @return the file that it is in   @throws IoError
   std::filesystem::path add(const std::string& name, Tensor<float> image);
   /// Completes the output; must be the last call. Without it, an MP4 file is not written. @throws IoError
   void finish();
@@ -32,7 +33,6 @@ class ViewOutput {
  private:
   void wait();
   std::filesystem::path out_;
-  double frames_per_second_;
   std::unique_ptr<VideoWriter> video_;
   std::future<void> last_;
 };
