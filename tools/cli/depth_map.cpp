@@ -25,15 +25,15 @@ float along_view(const nerf::Camera& camera, const nerf::Space& space, const flo
 
 Tensor<float> depth_map(const nerf::RadianceField& field, nerf::Renderer& renderer,
                         const nerf::Camera& camera, const Tensor<float>& opacity) {
-  constexpr Index kPiece = 256;  // rays traced together
+  constexpr Index kChunk = 256;  // rays traced together
   Tensor<float> depth({camera.height, camera.width});
   const Index pixels = depth.size();
   renderer.refresh();
   parallel_for(nerf::Renderer::kLanes, 1, [&](Index lane, Index) {
-    std::vector<float> places, seen(at(4 * kPiece)), position(at(3 * kPiece));
+    std::vector<float> places, seen(at(4 * kChunk)), position(at(3 * kChunk));
     nerf::CubeRays rays;
-    for (Index first = lane * kPiece; first < pixels; first += nerf::Renderer::kLanes * kPiece) {
-      const Index n = std::min(kPiece, pixels - first);
+    for (Index first = lane * kChunk; first < pixels; first += nerf::Renderer::kLanes * kChunk) {
+      const Index n = std::min(kChunk, pixels - first);
       places.clear();
       for (Index i = first; i < first + n; ++i)
         places.insert(places.end(),
