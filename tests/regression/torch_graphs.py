@@ -38,6 +38,14 @@ def pad(x, a):
     return F.pad(x, widths, value=a["value"])
 
 
+def eigenvalues(matrix):
+    """Some builds of LAPACK give up on a matrix in float; its eigenvalues are then those found in double."""
+    try:
+        return torch.linalg.eigvalsh(matrix)
+    except torch._C._LinAlgError:
+        return torch.linalg.eigvalsh(matrix.double()).to(matrix.dtype)
+
+
 OPS = {
     "add": lambda v, a: v[0] + v[1],
     "sub": lambda v, a: v[0] - v[1],
@@ -98,7 +106,7 @@ OPS = {
     "determinant": lambda v, a: torch.linalg.det(v[0]),
     "log_determinant": lambda v, a: torch.linalg.slogdet(v[0])[1],
     "cholesky": lambda v, a: torch.linalg.cholesky(v[0]),
-    "symmetric_eigenvalues": lambda v, a: torch.linalg.eigvalsh(v[0]),
+    "symmetric_eigenvalues": lambda v, a: eigenvalues(v[0]),
 }
 
 
