@@ -85,6 +85,9 @@ TEST_CASE("bench engine with rows or peers there are not, is a usage error", "[b
   CHECK(run_command({"bench", "engine", "--scale", "2"}).code == cli::kUsage);
   CHECK(run_command({"bench", "engine", "--peer", "nobody"}).code == cli::kUsage);
   CHECK(run_command({"bench", "engine", "--python", "/usr/bin/python3"}).code == cli::kUsage);
+  const auto scene = run_command({"bench", "engine", "--only", "hash", "--scene", "s"});
+  CHECK(scene.code == cli::kUsage);
+  CHECK_THAT(scene.err, Contains("--scene: no row that --only selects trains on a scene"));
   const auto r = run_command({"bench", "engine", "--only", "hash", "--peer", "pytorch"});
   CHECK(r.code == cli::kUsage);
   CHECK_THAT(r.err, Contains("no row with 'hash' in its name has one"));

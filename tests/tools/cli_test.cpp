@@ -72,6 +72,26 @@ TEST_CASE("Every command has help that names the common options", "[cli]") {
   CHECK(commands >= 20);
 }
 
+TEST_CASE("Help of a second word says that the common options apply", "[cli]") {
+  const auto r = run_command({"data", "check", "--help"});
+  CHECK(r.code == cli::kOk);
+  CHECK_THAT(r.out, Contains("--threads, --json and --report of `fieldmark data` apply too"));
+}
+
+TEST_CASE("A file for results that another option names is refused before any work", "[cli]") {
+  const auto train = run_command({"train", "--data", "d", "--out", "sub/../f.fm", "--json", "f.fm"});
+  CHECK(train.code == cli::kUsage);
+  CHECK_THAT(train.err, Contains("--json: f.fm is the value of --out too; name another file"));
+  const auto page = run_command({"export", "--field", "f", "--out", "a.html", "--report", "a.html"});
+  CHECK(page.code == cli::kUsage);
+  CHECK_THAT(page.err, Contains("--report: a.html is the value of --out too"));
+  const auto nested = run_command({"data", "check", "d", "--cameras", "c.png", "--json", "c.png"});
+  CHECK_THAT(nested.err, Contains("--json: c.png is the value of --cameras too"));
+  // A message is not a file.
+  CHECK_THAT(run_command({"verify", "--owner", "o", "--message", "a3", "--json", "a3", "v"}).err,
+             !Contains("value of"));
+}
+
 TEST_CASE("Standard output that cannot be written is a failure", "[cli]") {
   std::ostringstream out, err;
   out.setstate(std::ios::badbit);

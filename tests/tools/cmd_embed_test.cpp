@@ -224,6 +224,10 @@ TEST_CASE("embed says what is wrong, and leaves no file", "[embed]") {
   CHECK(run_command({"embed", "--field", job.field, "--out", out, "--bits", "0"}).code == cli::kUsage);
   CHECK(run_command({"embed", "--field", job.field, "--out", out, "--mark-psnr", "5"}).code == cli::kUsage);
   CHECK(run_command({"embed", "--field", job.field, "--out", out, "--preset", "other"}).code == cli::kUsage);
+  const auto few = run_command({"embed", "--field", job.field, "--out", out, "--steps", "1", "--views", "8",
+                                "--reader-size", "32", "--cells", "2", "--bits", "16"});
+  CHECK(few.code == cli::kUsage);
+  CHECK_THAT(few.err, Contains("--cells: ") && Contains("16 cells"));
   CHECK(run_command({"embed", "--field", job.field, "--out", out, "--steps", "1", "--distort", "melt_3"})
             .code == cli::kUsage);
   CHECK(run_command({"embed", "--field", job.field, "--out", out, "--steps", "1", "--resume"}).code ==

@@ -109,6 +109,9 @@ TEST_CASE("extract reads frames of a video, evenly over its time", "[extract]") 
     words.insert(words.end(), more.begin(), more.end());
     return run_command(words);
   };
+  const auto unkept = extract({clip, "--readings", folder / "readings"});
+  CHECK(unkept.code == cli::kUsage);
+  CHECK_THAT(unkept.err, Contains("--readings: keeps readings of images, and there are only videos"));
   const auto r = extract({clip, images + "/view_000.png", "--frames", "2"});
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);

@@ -32,6 +32,10 @@ TEST_CASE("null needs images, and can do without random keys", "[null]") {
   const auto unread = run_command({"null", "--owner", job.owner, "--novel", "2", "--readings", "r"});
   CHECK(unread.code == cli::kUsage);
   CHECK_THAT(unread.err, Contains("--readings: needs images or videos, got none"));
+  const auto late =
+      run_command({"null", "--owner", job.owner, "--novel", "2", "--readings", "/no/folder/r", job.images()});
+  CHECK(late.code == cli::kFailed);
+  CHECK_THAT(late.err, Contains("/no/folder/r") && !Contains("novel views"));
   const auto r = run_command({"null", "--owner", job.owner, "--message", "5", "--keys", "0", "--detection",
                               "blind", job.images(), "--json", "-"});
   INFO(r.err);

@@ -120,6 +120,10 @@ TEST_CASE("render refuses options that contradict each other", "[render]") {
       run_command({"render", "--field", job.field, "--out", job.folder / "of_test", "--cameras", "test"});
   CHECK(test.code == cli::kUsage);
   CHECK_THAT(test.err, Contains("--cameras test: needs --data DIR"));
+  const auto split = run_command(
+      {"render", "--field", "f", "--out", "o", "--data", "d", "--cameras", "test", "--split", "train"});
+  CHECK(split.code == cli::kUsage);
+  CHECK_THAT(split.err, Contains("--split train: --cameras test renders the test views"));
   const std::string kept = job.images() + "/view_000.png";
   CHECK(run_command({"render", "--field", job.field, "--out", job.images(), "--overwrite", "--average", "8"})
             .code == cli::kUsage);

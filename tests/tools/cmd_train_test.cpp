@@ -27,8 +27,8 @@ TEST_CASE("train writes a field, its figures, and the same bytes for one and two
   INFO(r.err);
   REQUIRE(r.code == cli::kOk);
   const nlohmann::json json = nlohmann::json::parse(r.out);
-  for (const char* key :
-       {"test_psnr", "train_seconds", "steps", "samples_per_second", "parameters", "file_bytes"})
+  for (const char* key : {"test_psnr", "test_psnr_foreground", "train_seconds", "steps", "samples_per_second",
+                          "parameters", "file_bytes"})
     CHECK(json.at(key).is_number());
   CHECK(json["steps"] == 6);
   CHECK(json["replanned"] == false);
@@ -70,7 +70,9 @@ TEST_CASE("train says what type of scene it sees, and takes another that is aske
   const auto place = train({"--scene-type", "place"});
   REQUIRE(place.code == cli::kOk);
   CHECK(nlohmann::json::parse(place.out)["scene_type"] == "place");
-  CHECK_THAT(place.err, Contains("scene type place: as asked for\n"));
+  CHECK_THAT(place.err, Contains("scene type place: as asked for\n") && !Contains("silhouettes"));
+  CHECK_THAT(train({"--scene-type", "place", "--no-carve"}).err,
+             Contains("--no-carve: only objects have silhouettes"));
   CHECK(nerf::RadianceField::load(out).space.kind == nerf::SpaceKind::contracted);
   for (const char* wrong : {"forward", "plain", "room"}) {
     const auto refused = train({"--scene-type", wrong});
@@ -162,6 +164,10 @@ TEST_CASE("train says what is wrong with its data and its options, and leaves no
   CHECK_THAT(small.err, Contains("--max-megabytes: no field is as small as 0.1"));
   CHECK(run_command({"train", "--data", scene, "--out", out, "--steps", "1", "--no-carve", "--refine-poses"})
             .code == cli::kUsage);
+  const auto place = run_command(
+      {"train", "--data", scene, "--out", out, "--steps", "1", "--preset", "mlp", "--scene-type", "place"});
+  CHECK(place.code == cli::kUsage);
+  CHECK_THAT(place.err, Contains("--preset mlp: ") && Contains("use --preset hash"));
   const TinyJob& job = TinyJob::get();
   std::filesystem::copy(job.owner, folder / "f.fm.checkpoint");
   const auto kept = run_command({"train", "--data", scene, "--out", out, "--steps", "1"});

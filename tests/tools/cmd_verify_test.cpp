@@ -173,7 +173,7 @@ TEST_CASE("verify keeps readings from its results, and tests no wrong keys if to
   const auto same = run_command({"verify", "--owner", job.owner, "--message", "5", "--readings", readings,
                                  "--json", readings, job.images()});
   CHECK(same.code == cli::kUsage);
-  CHECK_THAT(same.err, Contains("--json: " + readings + " is the file of --readings"));
+  CHECK_THAT(same.err, Contains("--json: " + readings + " is the value of --readings too"));
   const auto none =
       run_command({"verify", "--owner", job.owner, "--message", "5", "--detection", "blind", "--wrong-keys",
                    "0", "--evidence", job.folder / "no_keys", "--json", "-", job.images()});

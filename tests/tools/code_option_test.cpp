@@ -75,4 +75,6 @@ TEST_CASE("code_option: copies need a mark with cells") {
   CHECK_THROWS_WITH(
       cli::check_copies(small_paper_owner()),
       "--owner: an owner of preset paper has no cells, so its copies have no codes of their own");
+  Owner paper = small_paper_owner();
+  CHECK_THROWS_WITH(choose({.key = "", .copy = "Anna", .bits = 0}, "", paper), Contains("has no cells"));
 }

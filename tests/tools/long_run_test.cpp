@@ -42,6 +42,7 @@ TEST_CASE("run_long counts the seconds and steps of the run that it resumes", "[
   // A timed run that has fixed its steps ends by them: the progress is theirs, not that of the clock.
   CHECK(run_long(later, "count", {.seconds = 1000}, resumed) >= 0.18);
   CHECK_THAT(shown.str(), Contains("count 80%") && Contains("step 5  a note"));
+  CHECK_THAT(shown.str(), Contains("fixed its length at 5 steps, so --seconds does not change it"));
 }
 
 TEST_CASE("run_long saves and stops at Ctrl-C", "[long_run]") {

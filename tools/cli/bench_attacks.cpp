@@ -178,10 +178,10 @@ Command add_bench_attacks(CommandLine& app) {
       ->one_of({"novel", "ring", "sphere"})
       ->type_name("SET");
   add_number(app, "--count", o->count, 1, 1000, "Views to read in each row, 1 to 1000");
-  app.add_option(
-         "--informed-count", o->informed_count,
-         "Views to read informed too, 0 to 1000; takes seconds per view and row; default: 4, or 0 for "
-         "marks without cells")
+  app.add_option("--informed-count", o->informed_count,
+                 "Views to read by informed detection as well, 0 to 1000; takes seconds per view and row; "
+                 "default: 4, or 0 for "
+                 "marks without cells")
       ->range(0, 1000)
       ->type_name("N")
       ->default_str("");

@@ -1,7 +1,7 @@
 #include <fieldmark/tools/bench/data_bench.h>
 
 #include "cli/bench.h"
-#include "cli/scene_data.h"
+#include "cli/shared_data.h"
 
 namespace fieldmark::cli {
 namespace {

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "cli/bench.h"
-#include "cli/scene_data.h"
+#include "cli/shared_data.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -91,6 +91,8 @@ Scene scene_of(const BenchEngineArguments& options) {
       options.scene.empty() ? shared_data("nerf_synthetic/lego") : std::filesystem::path(options.scene);
   Scene scene;
   const bool step = std::string("nerf_step_first").find(options.engine.only) != std::string::npos;
+  if (!options.scene.empty() && !(step || options.precision))
+    throw UsageError("--scene: no row that --only selects trains on a scene");
   if (folder.empty() || !(step || options.precision)) return scene;
   scene.train = nerf::load_dataset(folder);
   if (options.precision) scene.test = nerf::load_dataset(folder, {.split = "test"});
@@ -176,7 +178,7 @@ Command add_bench_engine(CommandLine& app) {
   add_plot(app, o->plot);
   auto peer =
       add_file(app, "--peer", o->peer,
-               "Peer to compare speed and gradients with, timed by turns: pytorch; default: none", "NAME")
+               "Peer to compare speed and gradients with, timed alternately: pytorch; default: none", "NAME")
           ->one_of({"pytorch"});
   app.add_option("--python", o->python.python, "Python interpreter that has torch; for --peer")
       ->type_name("FILE")

@@ -31,7 +31,7 @@ int run_bench_turns(bench::TurnsOptions options, Context& context) {
 Command add_bench_turns(CommandLine& app) {
   auto o = std::make_shared<bench::TurnsOptions>();
   app.add_option("--against", o->theirs,
-                 "Other fieldmark executable to run by turns with this one; a wrapper script must exec it")
+                 "Other fieldmark executable to run alternately with this one; a wrapper script must exec it")
       ->type_name("PROGRAM")
       ->required();
   add_number(app, "--runs", o->runs, 1, 1000, "Runs of each build, 1 to 1000");

@@ -4,8 +4,10 @@
 #include <fieldmark/engine/parallel.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <new>
 #include <ostream>
+#include <utility>
 
 #include "cli/commands.h"
 #include "cli/context.h"
@@ -37,7 +39,7 @@ constexpr Entry kCommands[] = {
     {"extract", "Read the message from images", add_extract},
     {"verify", "Decide whether images show a message, with p-values", add_verify},
     {"trace", "Find whose copy images come from", add_trace},
-    {"null", "Test the key on unmarked images: counts beside their bounds", add_null},
+    {"null", "Test the key on unmarked images, and compare counts of p-values with their bounds", add_null},
     {"check", "Check evidence of verify for alterations", add_check},
     {"distort", "Distort images: noise, rotation, JPEG and more", add_distort},
     {"attack-field", "Attack the mark of a field", add_attack_field},
@@ -48,10 +50,30 @@ constexpr Entry kCommands[] = {
     {"info", "Print the contents of a field, owner, key or other safetensors file", add_info},
 };
 
+// Placeholders of values that are files or folders.
+constexpr const char* kPathTypes[] = {"FILE", "DIR", "FIELD", "OWNER", "KEY", "IMAGE"};
+
 struct Subcommand {
   CLI::App* app;
   Command command;
 };
+
+// A result file that another option or argument names would replace that file, or be replaced by it.
+void check_result_files(const CLI::App& app, const CommonOptions& common) {
+  for (const CLI::Option* option : app.get_options()) {
+    const bool path = std::ranges::any_of(kPathTypes, [&](const char* type) {
+      return option->get_type_name().find(type) != std::string::npos;
+    });
+    const std::string name = option->get_name();
+    if (!path || name == "--json" || name == "--report") continue;
+    for (const std::string& value : option->results())
+      for (const auto& [result, file] : {std::pair{"--json", common.json}, {"--report", common.report}})
+        if (file != "-" && same_file(file, value))
+          throw UsageError(std::string(result) + ": " + file + " is the value of " + name +
+                           " too; name another file");
+  }
+  for (const CLI::App* nested : app.get_subcommands()) check_result_files(*nested, common);
+}
 
 class Program {
  public:
@@ -84,6 +106,7 @@ class Program {
     if (common_.threads > 0) set_threads(common_.threads);
     for (auto& [sub, command] : subcommands_) {
       if (!sub->parsed()) continue;
+      check_result_files(*sub, common_);
       Context context(common_, line, out_, err_);
       const int code = command(context);
       return context.left_out() ? kFailed : code;

@@ -100,7 +100,7 @@ Command add_attack_field(CommandLine& app) {
                  "float16          rounding to half precision\n"
                  "int8             rounding to 8 bits (int2 to int8: 2 to 8), one scale per tensor;\n"
                  "                 int8-blocks: one scale per 32 elements\n"
-                 "prune_A          sets the smallest fraction A of the elements to 0, 0 to 1\n"
+                 "prune_A          0 for the fraction A of the elements of smallest magnitude, 0 to 1\n"
                  "On colours, before their sigmoid:\n"
                  "greyscale        luma in all three channels\n"
                  "hue_A            rotation about the grey axis by A degrees, -360 to 360\n"
@@ -111,9 +111,9 @@ Command add_attack_field(CommandLine& app) {
                  "sign_flip_A      FIELD + A (UNMARKED - FIELD), 0 to 4; 2 reverses every sign of the mark\n"
                  "copy_A           FIELD + A (MARKED - UNMARKED), -4 to 4\n"
                  "By training, one at a time:\n"
-                 "finetune         trains on, with the clean images of --data\n"
-                 "finetune-renders trains on, with renders of the field\n"
-                 "remove           trains on, with renders changed against the extractor of --owner\n"
+                 "finetune         continues training with the clean images of --data\n"
+                 "finetune-renders continues training with renders of the field\n"
+                 "remove           continues training with renders changed against the extractor of --owner\n"
                  "retrain          trains a new field with renders of this one")
       ->required()
       ->type_name("NAME[,NAME...]");

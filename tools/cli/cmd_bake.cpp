@@ -72,10 +72,8 @@ int run_bake(const BakeArguments& options, Context& context) {
                        " has no mark PSNR to set, its networks decide it");
     owner.set_mark_psnr(*options.mark_psnr);
   }
-  if (!options.code.copy.empty()) {
-    check_copies(owner);
+  if (!options.code.copy.empty())
     read_option("--copy", [&] { watermark::check_recipient(options.code.copy); });
-  }
   const auto key = choose_code(options.code, options.message, owner, context);
   const auto message = message_of(options.message, owner.options().bits);
   watermark::BakeOptions bake_options{.seed = context.seed()};
@@ -132,7 +130,8 @@ Command add_bake(CommandLine& app) {
       ->range(20.0, 60.0)
       ->type_name("DB");
   add_run_length(app, o->length, true);
-  app.add_flag("--resume", o->resume, "Resume from FIELD.checkpoint, with the options of that run");
+  app.add_flag("--resume", o->resume,
+               "Resume from FIELD.checkpoint; repeat the options of the interrupted run");
   return [o](Context& context) { return run_bake(*o, context); };
 }
 

@@ -6,7 +6,7 @@
 
 #include "cli/bench.h"
 #include "cli/long_run.h"
-#include "cli/scene_data.h"
+#include "cli/shared_data.h"
 
 namespace fieldmark::cli {
 namespace {

@@ -16,8 +16,8 @@
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/images.h"
-#include "cli/perceptual.h"
-#include "cli/scene_data.h"
+#include "cli/lpips.h"
+#include "cli/shared_data.h"
 
 namespace fieldmark::cli {
 namespace {

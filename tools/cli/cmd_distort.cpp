@@ -150,31 +150,32 @@ Command add_distort(CommandLine& app) {
   app.add_option("--out", options->out, "Folder to write the images to, one PNG each")
       ->required()
       ->type_name("DIR");
-  app.add_option("--distort", options->distort,
-                 "Distortions to apply, left to right:\n"
-                 "noise_A       Gaussian noise of standard deviation A, 0 to 1\n"
-                 "rotation_A    rotation by up to A degrees either way, 0 to 180\n"
-                 "scale_A       A times the size, 0.01 to 4, area filter; scale-nearest_A,\n"
-                 "              scale-bilinear_A, scale-bicubic_A, scale-lanczos_A: other filters\n"
-                 "blur_A        Gaussian blur of sigma A, 0 to 100 pixels\n"
-                 "crop_A        random window with the fraction A of the area, 0.0001 to 1\n"
-                 "jpeg_A        JPEG of quality A, 1 to 100, 4:2:0 chroma; jpeg444_A: 4:4:4\n"
-                 "webp_A        lossy WebP of quality A, 1 to 100\n"
-                 "h264_A        H.264 video of constant rate factor A, 0 to 51, of the images in order\n"
-                 "gamma_A       power A, 0.01 to 10\n"
-                 "brightness_A  factor A, 0 to 10\n"
-                 "contrast_A    factor A about 1/2, 0 to 10\n"
-                 "hue_A         hue rotation by A degrees, -360 to 360\n"
-                 "stretch_A     A times as wide, 0.25 to 4\n"
-                 "greyscale     luma in all three channels; sepia: its matrix\n"
-                 "mirror        left and right exchanged\n"
-                 "pillarbox     black bars left and right to 16:9; letterbox: above and below\n"
-                 "background_black, _white, _grey, _green, _noise\n"
-                 "              another background behind the pixels that differ from --background\n"
-                 "caption       opaque bar over the middle fifth of the height\n"
-                 "collage       four of half the size\n"
-                 "combined      noise_0.10,crop_0.40,jpeg_50\n"
-                 "screenshot    scale-bicubic_1.25,blur_0.5,gamma_1.1,scale-lanczos_0.8,jpeg_80")
+  app.add_option(
+         "--distort", options->distort,
+         "Distortions to apply, left to right:\n"
+         "noise_A       Gaussian noise of standard deviation A, 0 to 1\n"
+         "rotation_A    rotation by up to A degrees either way, 0 to 180\n"
+         "scale_A       A times the size, 0.01 to 4, area filter; scale-nearest_A,\n"
+         "              scale-bilinear_A, scale-bicubic_A, scale-lanczos_A: other filters\n"
+         "blur_A        Gaussian blur of sigma A, 0 to 100 pixels\n"
+         "crop_A        random window with the fraction A of the area, 0.0001 to 1\n"
+         "jpeg_A        JPEG of whole quality A, 1 to 100, 4:2:0 chroma; jpeg444_A: 4:4:4\n"
+         "webp_A        lossy WebP of whole quality A, 1 to 100\n"
+         "h264_A        H.264 video of whole constant rate factor A, 0 to 51, of the images in order\n"
+         "gamma_A       power A, 0.01 to 10\n"
+         "brightness_A  factor A, 0 to 10\n"
+         "contrast_A    factor A about 1/2, 0 to 10\n"
+         "hue_A         hue rotation by A degrees, -360 to 360\n"
+         "stretch_A     A times as wide, 0.25 to 4\n"
+         "greyscale     luma in all three channels; sepia: its matrix\n"
+         "mirror        left and right exchanged\n"
+         "pillarbox     black bars left and right to 16:9; letterbox: above and below\n"
+         "background_black, _white, _grey, _green, _noise\n"
+         "              another background behind the pixels that differ from --background\n"
+         "caption       opaque bar over the middle fifth of the height\n"
+         "collage       four copies at half the size, two by two\n"
+         "combined      noise_0.10,crop_0.40,jpeg_50\n"
+         "screenshot    scale-bicubic_1.25,blur_0.5,gamma_1.1,scale-lanczos_0.8,jpeg_80")
       ->required()
       ->type_name("NAME[,NAME...]");
   app.add_option(

@@ -18,9 +18,10 @@
 #include "cli/commands.h"
 #include "cli/context.h"
 #include "cli/long_run.h"
+#include "cli/lpips.h"
 #include "cli/measured.h"
 #include "cli/message_option.h"
-#include "cli/perceptual.h"
+#include "cli/perceptual_term.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -165,6 +166,7 @@ int run_embed(const EmbedArguments& options, Context& context) {
   const auto views = cached_views(options, field, recipe, context);
   if (options.mark_psnr == 0) recipe.suit_mark_psnr(field, views);
   auto owner = recipe.make(field, key, views);
+  if (options.cells > 0) read_option("--cells", [&] { return owner.code(); });  // enough for the message
   if (owner.mark().has_gain() && options.mark_psnr == 0) say_mark_psnr(owner, context);
   if (owner.mark().has_cells() && options.cells == 0) say_cells(owner, views, context);
   watermark::Embedder embedder(owner, views, recipe.embed);
@@ -268,13 +270,16 @@ Command add_embed(CommandLine& app) {
   app.add_option("--key", o->key, "Key from `fieldmark key`; default: a new one, kept in OWNER")
       ->type_name("KEY")
       ->default_str("");
-  app.add_option("--bits", o->bits, "Length of the message, 1 to 256")->range(1, 256)->type_name("N");
-  add_message_options(app, o->intended, "Message to commit to (prints the commitment)");
-  app.add_option("--preset", o->preset,
-                 "fast: one bit per cell of the scene, trains in minutes;\npaper: one message everywhere, as "
-                 "in CopyRNeRF "
-                 "(Luo et al. 2023);\ncode: the same with networks like the authors' code's, without "
-                 "distortions")
+  app.add_option("--bits", o->bits, "Length in bits of the message that one view should show, 1 to 256")
+      ->range(1, 256)
+      ->type_name("N");
+  add_message_options(app, o->intended, "Message whose commitment to print");
+  app.add_option(
+         "--preset", o->preset,
+         "Method. fast: one bit per cell of the scene, trains in minutes;\npaper: one message everywhere, as "
+         "in CopyRNeRF "
+         "(Luo et al. 2023);\ncode: the same with networks like the authors' code's, without "
+         "distortions")
       ->one_of({"fast", "paper", "code"})
       ->type_name("NAME");
   app.add_option(
@@ -284,10 +289,10 @@ Command add_embed(CommandLine& app) {
       ->range(20.0, 60.0)
       ->type_name("DB")
       ->default_str("");
-  app.add_option(
-         "--cells", o->cells,
-         "Cells per axis of the scene's cube, 2 to 64; default: as many as one view needs to show the whole "
-         "message; for preset fast")
+  app.add_option("--cells", o->cells,
+                 "Cells per axis of the scene's cube, 2 to 64; default: so many that nine of ten views show "
+                 "two cells "
+                 "per bit, eight in scenes of type place; for preset fast")
       ->range(2, 64)
       ->type_name("N")
       ->default_str("");
@@ -298,7 +303,8 @@ Command add_embed(CommandLine& app) {
       ->type_name("N")
       ->default_str("");
   app.add_option("--colours", o->colours,
-                 "light: brightness, like uneven lighting, least visible;\nmixed: blue and yellow with some "
+                 "Colours of the mark. light: brightness, like uneven lighting, least visible;\nmixed: blue "
+                 "and yellow with some "
                  "grey, read "
                  "after less training;\nblue: blue and yellow, lost in greyscale images;\ndefault: mixed for "
                  "objects, else "
@@ -312,8 +318,9 @@ Command add_embed(CommandLine& app) {
   app.add_option("--measured-views", o->measured_views, "Novel views to measure at the end, 1 to 100000")
       ->range(1, 100000)
       ->type_name("N");
-  app.add_option("--distort", o->under,
-                 "Chain of distortions to measure as well, see `fieldmark distort --help`; repeatable")
+  app.add_option(
+         "--distort", o->under,
+         "Chain of distortions to measure as well, see `fieldmark distort --help`; not h264_A; repeatable")
       ->type_name("NAME[,NAME...]")
       ->default_str("");
   app.add_option(
@@ -323,7 +330,8 @@ Command add_embed(CommandLine& app) {
       ->type_name("FILE")
       ->default_str("");
   add_lpips_weights(app, o->lpips_weights);
-  app.add_flag("--resume", o->resume, "Resume from OWNER.checkpoint, with the options of that run");
+  app.add_flag("--resume", o->resume,
+               "Resume from OWNER.checkpoint; repeat the options of the interrupted run");
   return [o](Context& context) { return run_embed(*o, context); };
 }
 

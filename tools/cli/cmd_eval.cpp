@@ -7,7 +7,7 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
-#include "cli/perceptual.h"
+#include "cli/lpips.h"
 #include "cli/refinement.h"
 #include "cli/scene_data.h"
 #include "cli/supersampling.h"
@@ -89,7 +89,9 @@ int run_eval(const EvalArguments& options, Context& context) {
 Command add_eval(CommandLine& app) {
   auto o = std::make_shared<EvalArguments>();
   app.add_option("--field", o->field, "Field to evaluate")->required()->type_name("FIELD");
-  app.add_option("--data", o->data, "Data set to compare with, as in train")->required()->type_name("DIR");
+  app.add_option("--data", o->data, "Data set to compare with, a folder as `fieldmark train --data` takes")
+      ->required()
+      ->type_name("DIR");
   app.add_option("--split", o->split, "Part of the data set: train, val, test")
       ->one_of({"train", "val", "test"})
       ->type_name("SPLIT");

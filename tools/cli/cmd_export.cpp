@@ -114,8 +114,8 @@ Command add_export(CommandLine& app) {
   auto o = std::make_shared<ExportArguments>();
   app.add_option("--field", o->field, "Field to export")->required()->type_name("FIELD");
   app.add_option("--out", o->out,
-                 "File to write: .html, a page in which to turn the scene; .ply, the points of its surface;\n"
-                 ".glb, a mesh")
+                 "File to write: .html, a page that shows the scene from all sides; .ply, the points of its\n"
+                 "surface; .glb, a mesh")
       ->required()
       ->type_name("FILE");
   const Option surface[] = {
@@ -123,15 +123,17 @@ Command add_export(CommandLine& app) {
           ->range(8, 512)
           ->type_name("N"),
       app.add_option("--density", o->density,
-                     "Density of the surface, per side of the scene's cube, 3 to 100000")
+                     "Density of the surface in units of 1 / side of the scene's cube, 3 to 100000")
           ->range(3.0, 1e5)
           ->type_name("D")};
   const Option page[] = {
       app.add_option("--size", o->size, "Longer side of the page's images in pixels, 16 to 4096")
           ->range(16, 4096)
           ->type_name("N"),
-      app.add_option("--rows", o->rows, "Heights to look from, 1 to 100")->range(1, 100)->type_name("N"),
-      app.add_option("--columns", o->columns, "Directions to look from, 1 to 720")
+      app.add_option("--rows", o->rows, "Rows of views of the page, from below to above, 1 to 100")
+          ->range(1, 100)
+          ->type_name("N"),
+      app.add_option("--columns", o->columns, "Views per row, around the scene, 1 to 720")
           ->range(1, 720)
           ->type_name("N"),
       app.add_option("--quality", o->quality, "JPEG quality of the page's images, 1 to 100")

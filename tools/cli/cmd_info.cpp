@@ -61,7 +61,7 @@ int run_info(const InfoArguments& options, Context& context) {
 
 Command add_info(CommandLine& app) {
   auto options = std::make_shared<InfoArguments>();
-  app.add_option("file", options->file, "A field, owner, key or any other safetensors file")
+  app.add_option("file", options->file, "File to describe: a field, owner, key or any other safetensors file")
       ->required()
       ->type_name("FILE");
   return [options](Context& context) { return run_info(*options, context); };

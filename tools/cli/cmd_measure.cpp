@@ -12,8 +12,8 @@
 #include "cli/code_option.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/lpips.h"
 #include "cli/measured.h"
-#include "cli/perceptual.h"
 #include "cli/reading.h"
 #include "cli/scene_data.h"
 
@@ -156,15 +156,17 @@ Measured measured_on(const std::string& set, const std::vector<nerf::Camera>& ca
 
 void add_ground_truth(const MeasureArguments& options, const MeasureSubject& subject, Json& json,
                       Context& context) {
-  const double marked = against_ground_truth(options, *subject.baked, "ground truth", context).psnr;
-  const double unmarked =
-      against_ground_truth(options, subject.owner.field, "ground truth, unmarked", context).psnr;
-  char line[120];
-  std::snprintf(line, sizeof line, "against ground truth %.2f dB, unmarked field %.2f dB\n", marked,
-                unmarked);
+  const auto marked = against_ground_truth(options, *subject.baked, "ground truth", context);
+  const auto unmarked = against_ground_truth(options, subject.owner.field, "ground truth, unmarked", context);
+  char line[160];
+  std::snprintf(line, sizeof line,
+                "against ground truth %.2f dB (foreground %.2f), unmarked field %.2f dB (%.2f)\n",
+                marked.psnr, marked.psnr_foreground, unmarked.psnr, unmarked.psnr_foreground);
   context.text() << line;
-  json["psnr_gt"] = number(marked);
-  json["psnr_gt_unmarked"] = number(unmarked);
+  json["psnr_gt"] = number(marked.psnr);
+  json["psnr_gt_foreground"] = number(marked.psnr_foreground);
+  json["psnr_gt_unmarked"] = number(unmarked.psnr);
+  json["psnr_gt_unmarked_foreground"] = number(unmarked.psnr_foreground);
 }
 
 int run_measure(const MeasureArguments& options, Context& context) {
@@ -222,8 +224,9 @@ Command add_measure(CommandLine& app) {
   app.add_option("--cameras", o->cameras,
                  "Cameras to measure from, separated by commas, one row each:\n"
                  "novel (from the span of the training cameras),\n"
-                 "ring (elevation 30 degrees, radius 4.0311), sphere (all directions),\n"
-                 "extrapolated (over 30 degrees from every training direction), closer, farther,\n"
+                 "ring (elevation 30 degrees, radius 4.0311 units of the scene), sphere (all directions),\n"
+                 "extrapolated (over 30 degrees from every training direction where there are any),\n"
+                 "closer and farther (as novel, at other distances),\n"
                  "test (of --data)")
       ->delimiter(',')
       ->one_of(nerf::camera_set_names())

@@ -44,6 +44,8 @@ int run_null(const NullArguments& options, Context& context) {
   if (options.suspects.paths.empty() && (options.suspects.frames || !options.suspects.readings.empty()))
     throw UsageError(std::string(options.suspects.frames ? "--frames" : "--readings") +
                      ": needs images or videos, got none");
+  if (!options.suspects.readings.empty())
+    check_writable_page(options.suspects.readings);  // before novel views
   auto owner = watermark::Owner::load(options.owner);
   choose_code(options.code, options.message, owner, context);
   const Index bits = owner.options().bits;
@@ -64,11 +66,19 @@ int run_null(const NullArguments& options, Context& context) {
         "their bounds more often than 1% of the time; those of random keys do not");
   const auto code = owner.code();
   watermark::WrongKeyCounts right, random;
+  const InterruptGuard guard;
+  Progress progress = context.progress("random keys");
   for (std::size_t i = 0; i < read.size(); ++i) {
     right.add(watermark::keyed_statistic(read[i].cells, code, message));
     // Each image has its own keys, so that all trials are independent given the images.
-    random.add(watermark::count_wrong_keys(read[i].cells, owner.cells.area(), message, options.keys,
-                                           context.seed() + i + 1));
+    random.add(watermark::count_wrong_keys(
+        read[i].cells, owner.cells.area(), message, options.keys, context.seed() + i + 1,
+        [&](Index done, Index total) {
+          if (guard.interrupted()) throw Interrupted("nothing was counted");
+          const double part = static_cast<double>(done) / static_cast<double>(total);
+          progress.update((static_cast<double>(i) + part) / static_cast<double>(read.size()));
+          return true;
+        }));
   }
   context.text() << read.size() << " unmarked images, detection " << reading_used(read) << "\n";
   Json json = key_counts(right, "the key", context);
@@ -85,7 +95,7 @@ int run_null(const NullArguments& options, Context& context) {
 Command add_null(CommandLine& app) {
   auto o = std::make_shared<NullArguments>();
   app.add_option("--owner", o->owner, "Owner file from `fieldmark embed`")->required()->type_name("OWNER");
-  add_message_options(app, o->message, "Message to test (default: random)");
+  add_message_options(app, o->message, "Message to test, at random unless given");
   add_code_options(app, o->code);
   app.add_option("--keys", o->keys, "Random keys to test on each image as well, 0 to 10000000")
       ->range(0, 10000000)

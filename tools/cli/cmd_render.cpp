@@ -133,6 +133,8 @@ void check_options(const RenderArguments& options) {
     throw UsageError("--fps: needs a video as --out, got " + options.out + "; name a file FILE.mp4");
   if (options.cameras_given && !options.data.empty() && options.cameras != "test")
     throw UsageError("--cameras " + options.cameras + ": --data has cameras of its own");
+  if (options.cameras_given && options.cameras == "test" && options.split != "test")
+    throw UsageError("--split " + options.split + ": --cameras test renders the test views; leave out one");
   if (options.count && !options.path.empty() && options.path != "orbit")
     throw UsageError("--count: --path " + options.path + " has cameras of its own");
   if (options.video() && (options.alpha || options.depth))
@@ -237,10 +239,12 @@ Command add_render(CommandLine& app) {
       ->needs(data)
       ->type_name("SPLIT");
   const Option cameras =
-      app.add_option("--cameras", o->cameras,
-                     "Cameras to draw without --data: novel (from the span of the training cameras),\n"
-                     "ring (elevation 30 degrees, radius 4.0311), sphere (all directions),\n"
-                     "extrapolated (over 30 degrees from every training direction), closer, farther")
+      app.add_option(
+             "--cameras", o->cameras,
+             "Cameras to render from: novel (from the span of the training cameras),\n"
+             "ring (elevation 30 degrees, radius 4.0311 units of the scene), sphere (all directions),\n"
+             "extrapolated (over 30 degrees from every training direction where there are any),\n"
+             "closer and farther (as novel, at other distances), test (of --data)")
           ->one_of(nerf::camera_set_names())
           ->type_name("SET");
   app.add_flag("--overwrite", o->overwrite,

@@ -15,8 +15,8 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
-#include "cli/perceptual.h"
-#include "cli/scene_data.h"
+#include "cli/lpips.h"
+#include "cli/shared_data.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -303,16 +303,15 @@ Command add_reproduce(CommandLine& app) {
       ->default_str("");
   app.add_option(
          "--system", o->systems,
-         "System to measure, by its name in the cells: ours, copyrnerf_paper, hidden_nerf ...; repeatable; "
-         "default: all")
+         "System to measure, named as in its cells, such as copyrnerf_paper; repeatable; default: all;\n"
+         "a wrong name lists them")
       ->type_name("NAME")
       ->default_str("");
   add_measuring_options(app, *o);
   app.add_option(
          "--cells", o->cells,
-         "Folder of the cells; existing cells are not measured again. paper.md and its figures are "
-         "written to the folder above it, or beside --report. Its subfolder longer, named here in its "
-         "place, holds cells of a longer budget, which the same page lists")
+         "Folder of the cells; existing cells are not measured again. paper.md and its figures go to the "
+         "folder above it, or beside --report. DIR/longer takes cells of a longer budget for the same page")
       ->type_name("DIR");
   app.add_option("--work", o->work, "Folder for checkpoints and unmarked fields")->type_name("DIR");
   add_lpips_weights(app, o->lpips_weights);

@@ -14,7 +14,7 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
-#include "cli/scene_data.h"
+#include "cli/shared_data.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -226,7 +226,6 @@ Json list_rows(const Runner& runner, Context& context) {
 
 void render(const ResultsArguments& options, const Runner& runner, Context& context) {
   const std::string out = options.out.empty() ? kPages : options.out;
-  fs::create_directories(out);
   const auto stale = [&](const std::string& id) { return runner.stale(id); };
   const auto pages = results::render_pages(results::project_pages(), runner.rows(), stale);
   for (const auto& [name, text] : pages) write_file_atomically(fs::path(out) / name, text);
@@ -247,6 +246,7 @@ int run_results(ResultsArguments options, Context& context) {
     throw UsageError(std::string(options.stale ? "--stale" : "--run") +
                      ": expected sources with a clean commit, found " + commit +
                      "; commit the changes and build again, or use --draft");
+  if (options.render) fs::create_directories(options.out.empty() ? kPages : options.out);
   Runner runner(options, context);
   for (const PlannedRow& row : runs ? selected(options, runner) : std::vector<PlannedRow>())
     runner.ensure(row);
@@ -267,14 +267,15 @@ Command add_results(CommandLine& app) {
   app.add_option("--out", o->out, "Folder of the pages, for --render")->type_name("DIR")->default_str(kPages);
   app.add_option("--work", o->work, "Folder of fields, owners and logs that runs make")->type_name("DIR");
   auto named = app.add_option("--run", o->run,
-                              "Measure these rows and those they need; a folder names all in it. "
+                              "Rows to measure, with those they need; a folder stands for all rows in it. "
                               "Fresh rows are skipped")
                    ->delimiter(',')
                    ->type_name("ID[,ID...]")
                    ->default_str("");
   app.add_flag("--stale", o->stale, "Measure every row that is stale or missing")->excludes(named);
   app.add_option("--budget", o->budget,
-                 "Start no row that would end after so many seconds, 1 to 10000000; default: no limit")
+                 "Time limit in seconds, 1 to 10000000; rows expected to exceed it are not started; default: "
+                 "no limit")
       ->range(1.0, 1e7)
       ->type_name("S")
       ->default_str("");

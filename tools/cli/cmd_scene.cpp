@@ -64,7 +64,8 @@ Command add_scene(CommandLine& app) {
       ->type_name("DIR");
   app.add_option(
          "--kind", options->kind,
-         "objects: textured solids on a slab; sphere: one shaded sphere;\nwires: a stand of thin rods, rings "
+         "Kind of scene. objects: textured solids on a slab; sphere: one shaded sphere;\nwires: a stand of "
+         "thin rods, rings "
          "and cables; plain: large solids of one colour each;\nglossy: solids whose colours depend on the "
          "view")
       ->one_of({"objects", "sphere", "wires", "plain", "glossy"})

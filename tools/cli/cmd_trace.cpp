@@ -95,11 +95,11 @@ Command add_trace(CommandLine& app) {
   auto o = std::make_shared<TraceArguments>();
   app.add_option("--owner", o->owner, "Owner file from `fieldmark embed`")->required()->type_name("OWNER");
   add_message_options(app, o->message, "Message of the copies");
-  app.add_option("--copies", o->copies, "Text file with the NAME of each `bake --copy`, one a line")
+  app.add_option("--copies", o->copies, "Text file of recipients, one NAME of `bake --copy` per line")
       ->required()
       ->type_name("FILE");
   app.add_option("--fpr", o->fpr,
-                 "Bound on the probability of naming any innocent recipient, above 0 to 1; the largest "
+                 "Bound on the probability of naming any innocent recipient, 1e-300 to 1; the largest "
                  "corrected p-value that counts as found")
       ->range(1e-300, 1.0)
       ->type_name("P");

@@ -148,7 +148,7 @@ void require_healthy(const std::string& fault, const nerf::Dataset& data, const 
 
 // PSNR on the data set's test views, measured after everything is saved; null without test views.
 struct TestScores {
-  Json psnr, colour_fitted, pose_fitted;
+  Json psnr, foreground, colour_fitted, pose_fitted;
 };
 
 nerf::Evaluation evaluated(const nerf::RadianceField& field, const nerf::Dataset& data, Context& context) {
@@ -159,7 +159,8 @@ nerf::Evaluation evaluated(const nerf::RadianceField& field, const nerf::Dataset
     progress.update(static_cast<double>(done) / static_cast<double>(total));
     return !guard.interrupted();
   });
-  if (guard.interrupted()) throw Interrupted("the field is complete, its test views are not");
+  if (guard.interrupted())
+    throw Interrupted("the field is complete; `fieldmark eval` measures its test views, which are not");
   return evaluation;
 }
 
@@ -174,7 +175,10 @@ TestScores test_scores(const TrainArguments& options, const nerf::RadianceField&
   auto data = load_scene(options.data, other_split(options, train, "test"), context);
   warn_of(nerf::twins(surveyed, nerf::survey_views(data)), warnings, context);
   const nerf::Evaluation plain = evaluated(field, data, context);
-  TestScores scores{.psnr = plain.psnr, .colour_fitted = plain.psnr_colour_fitted, .pose_fitted = {}};
+  TestScores scores{.psnr = plain.psnr,
+                    .foreground = number(plain.psnr_foreground),
+                    .colour_fitted = plain.psnr_colour_fitted,
+                    .pose_fitted = {}};
   if (options.refinement.poses) {
     fit_cameras(field, data, context);
     const nerf::Evaluation fitted = evaluated(field, data, context);
@@ -192,6 +196,17 @@ void check_preset(const TrainArguments& options) {
   if (options.model == "sized") throw UsageError("--model sized: the mlp preset has one size");
   if (options.supersampling > 1)
     throw UsageError("--supersampling: the mlp preset trains with one ray through a pixel's centre");
+}
+
+// Refuses or names options that have no effect on this scene.
+void check_scene(const TrainArguments& options, const nerf::Dataset& data, Context& context) {
+  if (options.preset == "mlp" && data.scene == nerf::SceneType::place)
+    throw UsageError(
+        "--preset mlp: its samples are spread over straight rays, and a scene of type place has no bounds; "
+        "use --preset hash");
+  if (options.no_carve && data.scene != nerf::SceneType::object && data.scene != nerf::SceneType::plain)
+    context.note("--no-carve: only objects have silhouettes, this scene is of type " +
+                 std::string(nerf::name_of(data.scene)));
 }
 
 // Returns the sizes of the field; `sizing` receives the trials of --model sized.
@@ -248,6 +263,7 @@ int run_train(const TrainArguments& options, Context& context) {
   if (!options.resume) check_writable(checkpoint);  // a checkpoint of embed holds a key
   if (options.refinement.poses) check_writable_page(cameras_file(options.out));
   const nerf::Dataset data = training_data(options, context);
+  check_scene(options, data, context);
   const std::vector<nerf::SurveyedView> surveyed = nerf::survey_views(data);
   Json warnings = Json::array();
   warn_of(nerf::odd_views(surveyed, data.scene), warnings, context);
@@ -274,6 +290,7 @@ int run_train(const TrainArguments& options, Context& context) {
     require_healthy(watch.look(trainer.steps(), trainer.train_psnr(), context.seconds()), data, trainer);
     return target.reached(trainer.steps(), trainer.train_psnr());
   });
+  const double trained = context.seconds() - begun;  // without the runs that this one resumes
   require_healthy(watch.verdict(trainer.steps()), data, trainer);
   field.save(options.out);
   Json motion;
@@ -283,6 +300,7 @@ int run_train(const TrainArguments& options, Context& context) {
   const TestScores scores = test_scores(options, field, data, surveyed, warnings, context);
   say_trained(options.out, trainer, seconds, scores.psnr, context);
   Json result{{"test_psnr", scores.psnr},
+              {"test_psnr_foreground", scores.foreground},
               {"test_psnr_colour_fitted", scores.colour_fitted},
               {"exposure", exposures ? "on" : "off"},
               {"scene_type", nerf::name_of(data.scene)},
@@ -290,7 +308,7 @@ int run_train(const TrainArguments& options, Context& context) {
               {"train_seconds", seconds},
               {"steps", trainer.steps()},
               {"replanned", trainer.replanned()},
-              {"samples_per_second", (trainer.samples() - samples_before) / (seconds - begun)},
+              {"samples_per_second", (trainer.samples() - samples_before) / trained},
               {"parameters", field.params.parameters()},
               {"file_bytes", std::filesystem::file_size(options.out)},
               {"warnings", warnings}};
@@ -323,13 +341,13 @@ Command add_train(CommandLine& app) {
       ->type_name("N")
       ->default_str("");
   app.add_option("--preset", o->preset,
-                 "hash: multiresolution hash grid with small networks;\n"
+                 "Kind of field. hash: multiresolution hash grid with small networks;\n"
                  "mlp: original NeRF, coarse and fine networks of 8 layers of 256 units")
       ->one_of({"hash", "mlp"})
       ->type_name("NAME");
   app.add_option("--model", o->model,
-                 "fixed: model size by the length of the run;\n"
-                 "sized: model size by short trainings on the scene; for preset hash")
+                 "Size of the model. fixed: by the length of the run;\n"
+                 "sized: by short trainings on the scene; for preset hash")
       ->one_of({"fixed", "sized"})
       ->type_name("NAME");
   app.add_option(
@@ -353,10 +371,11 @@ Command add_train(CommandLine& app) {
       ->one_of({"white", "black"})
       ->type_name("COLOUR")
       ->default_str("");
-  app.add_option("--scene-type", o->scene_type,
-                 "object: silhouettes in the images' alpha; plain: opaque object before one colour;\n"
-                 "place: scene with a background; forward: cameras that look one way, with depth bounds;\n"
-                 "default: decided from images and cameras")
+  app.add_option(
+         "--scene-type", o->scene_type,
+         "Type of scene. object: silhouettes in the images' alpha; plain: opaque object before one\n"
+         "colour; place: scene with a background; forward: cameras that look one way, with depth bounds;\n"
+         "default: decided from images and cameras")
       ->one_of(nerf::scene_type_names())
       ->type_name("TYPE")
       ->default_str("");
@@ -368,7 +387,7 @@ Command add_train(CommandLine& app) {
   add_refinement(app, o->refinement);
   app.add_flag("--no-carve", o->no_carve, "Keep samples outside the silhouettes; for images with alpha");
   app.add_flag("--resume", o->resume,
-               "Resume from FIELD.checkpoint, with the options of the interrupted run");
+               "Resume from FIELD.checkpoint; repeat the options of the interrupted run");
   return [o](Context& context) { return run_train(*o, context); };
 }
 

@@ -166,14 +166,15 @@ Command add_verify(CommandLine& app) {
       ->type_name("N")
       ->default_str("");
   app.add_option("--control", o->controls,
-                 "Unmarked image, video or folder to test beside the built-in controls; repeatable")
+                 "Unmarked image, video or folder to test in addition to the built-in controls; repeatable;\n"
+                 "default: none")
       ->one_value()
       ->type_name("IMAGE|VIDEO|DIR")
       ->default_str("");
   app.add_option(
          "--evidence", o->evidence,
          "Folder to write a signed record to, with a page and a C2PA soft binding; new, empty or with "
-         "earlier evidence")
+         "earlier evidence; default: none")
       ->type_name("DIR")
       ->default_str("");
   add_reading(app, o->reading);

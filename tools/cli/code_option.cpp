@@ -24,10 +24,12 @@ Index message_bits(const CodeOption& options, const std::string& hex, const wate
 }  // namespace
 
 void add_code_options(CommandLine& app, CodeOption& o) {
-  app.add_option("--key", o.key, "Key from `fieldmark key` instead of the owner's")->type_name("KEY");
-  app.add_option("--bits", o.bits,
-                 "Length of the message, 1 to the number of cells; default: the digits of --message, else as "
-                 "embedded")
+  app.add_option("--key", o.key, "Key from `fieldmark key`; default: the owner's")->type_name("KEY");
+  app.add_option(
+         "--bits", o.bits,
+         "Length of the message in bits, 1 to the number of cells, for presets paper and code as embedded;\n"
+         "default: four bits per digit of --message if that differs from the length embedded, else "
+         "that")
       ->range(Index{1}, kMostBits)
       ->type_name("N")
       ->default_str("");
@@ -39,6 +41,7 @@ void add_copy_option(CommandLine& app, CodeOption& o, const std::string& purpose
 
 watermark::Key choose_code(const CodeOption& options, const MessageOption& message, watermark::Owner& owner,
                            Context& context) {
+  if (!options.copy.empty()) check_copies(owner);
   const watermark::Key key = options.key.empty() ? owner.key : watermark::load_key(options.key);
   const Index bits = message_bits(options, message.message, owner, context);
   read_option(options.bits > 0 ? "--bits" : "--message", [&] {

@@ -100,7 +100,10 @@ Option CommandLine::option(const std::string& name) { return Option(app_->get_op
 CommandLine CommandLine::add_subcommand(const std::string& name, const std::string& help) {
   app_->require_subcommand(1);
   app_->fallthrough();
-  return CommandLine(*app_->add_subcommand(name, help)->fallthrough());
+  CLI::App* added = app_->add_subcommand(name, help)->fallthrough();
+  added->footer("The options --seed, --threads, --json and --report of `fieldmark " + app_->get_name() +
+                "` apply too.");
+  return CommandLine(*added);
 }
 
 bool CommandLine::parsed() const { return app_->parsed(); }

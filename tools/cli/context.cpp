@@ -10,17 +10,6 @@
 #include "cli/outputs.h"
 
 namespace fieldmark::cli {
-namespace {
-
-// True if two outputs, which may not exist yet, are one file.
-bool same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
-  std::error_code ignored;
-  return !b.empty() &&
-         std::filesystem::weakly_canonical(a, ignored) == std::filesystem::weakly_canonical(b, ignored);
-}
-
-}  // namespace
-
 void add_common(CommandLine& app, CommonOptions& options) {
   app.add_option("--seed", options.seed, "Seed of every random choice except keys, 0 to 2^64 - 1")
       ->group("Common")
@@ -30,11 +19,12 @@ void add_common(CommandLine& app, CommonOptions& options) {
       ->group("Common")
       ->type_name("N")
       ->default_str("");
-  app.add_option("--json", options.json, "JSON file to write the results to; - for standard output")
+  app.add_option("--json", options.json,
+                 "JSON file to write the results to; - for standard output; default: none")
       ->group("Common")
       ->type_name("FILE");
   app.add_option("--report", options.report,
-                 "Markdown file to write the results to, with command, commit and machine")
+                 "Markdown file to write the results to, with command, commit and machine; default: none")
       ->group("Common")
       ->type_name("FILE");
 }
@@ -48,7 +38,7 @@ Context::Context(const CommonOptions& options, std::vector<std::string> command_
       text_(options.json == "-" ? err : out) {
   for (const auto& path : {options.json, options.report})
     if (!path.empty() && path != "-") check_writable_page(path);
-  if (!options.json.empty() && same_file(options.json, options.report))
+  if (same_file(options.json, options.report))
     throw UsageError("--report: " + options.report + " is the file of --json");
 }
 

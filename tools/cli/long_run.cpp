@@ -9,7 +9,8 @@ namespace fieldmark::cli {
 
 void add_run_length(CommandLine& app, RunLength& length, bool checkpoint, const std::string& seconds) {
   Option steps =
-      app.add_option("--steps", length.steps, "Length of the run in steps, 1 to 10000000; default: --seconds")
+      app.add_option("--steps", length.steps,
+                     "Length of the run in steps, 1 to 10000000; default: as many as --seconds allows")
           ->range(1, 10000000)
           ->type_name("N")
           ->default_str("");
@@ -33,6 +34,9 @@ double run_long(TrainingRun& run, const std::string& what, const RunLength& leng
   const double earlier = run.seconds();  // of the runs that this one resumes
   // A resumed run that has fixed its number of steps ends by it, whatever the clock of this process says.
   const Index steps = length.steps > 0 ? length.steps : run.planned();
+  if (length.steps == 0 && run.planned() > 0)
+    context.note("the interrupted run fixed its length at " + std::to_string(run.planned()) +
+                 " steps, so --seconds does not change it");
   const auto tell = [&](double now) {
     const double part =
         steps > 0 ? static_cast<double>(run.steps()) / static_cast<double>(steps) : now / length.seconds;

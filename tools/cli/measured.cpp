@@ -27,6 +27,7 @@ Json measurement_json(const watermark::Measurement& m, const std::string& camera
           {"ssim_base", number(m.ssim_base)},
           {"lpips_base", number(m.lpips_base)},
           {"psnr_gt", nullptr},
+          {"psnr_gt_foreground", nullptr},
           {"distorted", distorted},
           {"informed_views", m.informed_views},
           {"informed_seconds", number(m.informed_seconds)}};

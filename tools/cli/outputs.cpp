@@ -61,6 +61,11 @@ void refuse(const std::string& path, const Model& model) {
 
 }  // namespace
 
+bool same_file(const fs::path& a, const fs::path& b) {
+  std::error_code ignored;
+  return !a.empty() && !b.empty() && fs::weakly_canonical(a, ignored) == fs::weakly_canonical(b, ignored);
+}
+
 void check_writable(const std::string& path) {
   AtomicFile{path};
   if (const auto model = model_at(path); model && model->secret) refuse(path, *model);

@@ -5,6 +5,9 @@
 
 namespace fieldmark::cli {
 
+/// True if two paths, which may not exist yet, name one file.
+bool same_file(const std::filesystem::path& a, const std::filesystem::path& b);
+
 /// Checks an output before the work begins: it is writable, is not a folder, and replaces no secret, that is,
 /// no file with a key or an owner's networks. Leaves an existing file untouched.
 /// @throws IoError naming the file and what to do

@@ -23,14 +23,15 @@ constexpr Index kFrames = 16;  // per video
 
 void add_reading(CommandLine& app, std::string& reading) {
   app.add_option("--detection", reading,
-                 "blind: extractor alone; informed: find the camera and subtract the unmarked render;\n"
+                 "Detection to use. blind: extractor alone; informed: find the camera and subtract the\n"
+                 "unmarked render; "
                  "auto: informed if the image agrees with the owner's field, else blind")
       ->one_of({"auto", "blind", "informed"})
       ->type_name("NAME");
 }
 
 void add_rate(CommandLine& app, double& rate, const std::string& what) {
-  app.add_option("--fpr", rate, "False-positive rate at which " + what + ", above 0 to 1")
+  app.add_option("--fpr", rate, "False-positive rate at which " + what + ", 1e-300 to 1")
       ->range(1e-300, 1.0)
       ->type_name("P");
 }
@@ -153,10 +154,8 @@ std::vector<ImageEvidence> read_images(SuspectReader& reader, const Suspects& su
   const auto files = list_images(suspects.paths, context, Videos::read);
   if (suspects.frames && std::ranges::none_of(files, is_video))
     throw UsageError("--frames: there is no video among the images");
-  for (const auto& [option, file] :
-       {std::pair{"--json", context.options().json}, {"--report", context.options().report}})
-    if (!file.empty() && file == suspects.readings)
-      throw UsageError(std::string(option) + ": " + file + " is the file of --readings; name another file");
+  if (!suspects.readings.empty() && std::ranges::all_of(files, is_video))
+    throw UsageError("--readings: keeps readings of images, and there are only videos");
   std::optional<KeptReadings> kept;
   if (!suspects.readings.empty())
     kept.emplace(suspects.readings, sha256_file_hex(owner.string()), reader.detection(), reader.cells());

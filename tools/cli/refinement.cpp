@@ -28,9 +28,9 @@ Json motion_of(const nerf::Dataset& data, const std::vector<nerf::Camera>& camer
 
 void add_refinement(CommandLine& app, Refinement& refinement) {
   app.add_option("--exposure", refinement.exposure,
-                 "off: all training images have one exposure;\n"
-                 "on: learn exposure and white balance of each training image;\n"
-                 "auto: on if it gains 0.1 dB on validation images in two short trainings; for preset hash")
+                 "Exposures of the training images. off: all have one;\n"
+                 "on: learn exposure and white balance of each image;\n"
+                 "auto (for preset hash): on if it gains 0.1 dB on validation images in two short trainings")
       ->one_of({"off", "on", "auto"})
       ->type_name("MODE");
   app.add_flag("--refine-poses", refinement.poses,

@@ -2,16 +2,12 @@
 #include <fieldmark/nerf/data_survey.h>
 #include <fieldmark/nerf/dataset.h>
 
-#include <filesystem>
 #include <string>
 #include <vector>
 
 #include "cli/context.h"
 
 namespace fieldmark::cli {
-
-/// Returns the path of a file or folder in $FIELDMARK_DATA; empty if it or the variable does not exist.
-std::filesystem::path shared_data(const std::string& path);
 
 /// Calls nerf::load_dataset() and passes its notes to the context.
 nerf::Dataset load_scene(const std::string& folder, const nerf::DatasetOptions& options, Context& context);

@@ -2,6 +2,7 @@
 #include <fieldmark/tools/results/plan.h>
 
 #include "support/catch.h"
+#include "support/include_graph.h"
 
 using namespace fieldmark;
 using namespace fieldmark::results;
@@ -46,4 +47,34 @@ TEST_CASE("plan: a line that is wrong is refused by name") {
 TEST_CASE("plan: every row of the project has code, and its rooms exist") {
   CHECK(Plan::project().rows().size() > 200);
   for (const PlannedRow& row : Plan::project().rows()) CHECK(Plan::project().code(row).size() == 64);
+}
+
+TEST_CASE("plan: a kind names every room that its command's source reaches by includes") {
+  const IncludeGraph graph;
+  const auto source = [](std::string kind) {
+    if (!kind.starts_with("bench ")) kind = "cmd_" + kind;
+    std::ranges::replace_if(
+        kind, [](char c) { return c == ' ' || c == '-'; }, '_');
+    return "tools/cli/" + kind + ".cpp";
+  };
+  const auto unnamed = [&](const std::string& file, const Words& rooms) {
+    std::vector<std::string> ways;
+    for (const auto& [room, way] : graph.reached(file)) {
+      const auto holds = [&](const std::string& named) {
+        return room == named || room.starts_with(named + "/");
+      };
+      // The shell of commands and the writing of pages do not decide what a row says.
+      if (room != "tools/cli" && room != "tools/results" && std::ranges::none_of(rooms, holds))
+        ways.push_back(way);
+    }
+    return ways;
+  };
+  CHECK(Plan::project().kinds().size() > 20);
+  for (const auto& [kind, rooms] : Plan::project().kinds()) {
+    CAPTURE(kind);
+    CHECK(unnamed(source(kind), rooms) == std::vector<std::string>{});
+  }
+  const auto ways = unnamed(source("embed"), {"core", "engine", "imaging", "nerf", "distort", "watermark"});
+  REQUIRE(ways.size() == 1);
+  CHECK_THAT(ways[0], Contains("tools/cli/cmd_embed.cpp > ") && Contains(" > extractor/"));
 }

@@ -34,6 +34,8 @@ class Plan {
   static const Plan& project();
 
   const std::vector<PlannedRow>& rows() const { return rows_; }
+  /// Returns the rooms whose sources decide the rows of each kind.
+  const std::map<std::string, Words>& kinds() const { return kinds_; }
   /// Return the row with this id, and the row that creates this file; null if there is none.
   const PlannedRow* find(std::string_view id) const;
   const PlannedRow* producer(std::string_view input) const;

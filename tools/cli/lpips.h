@@ -1,6 +1,5 @@
 #pragma once
 #include <fieldmark/imaging/lpips.h>
-#include <fieldmark/watermark/mark/fusion_mark.h>
 
 #include <optional>
 #include <string>
@@ -17,11 +16,6 @@ void add_lpips_weights(CommandLine& app, std::string& file);
 /// there is no file, and nullopt for "none".
 /// @throws IoError if the file does not contain this network
 std::optional<Lpips<float>> load_lpips(LpipsNetwork network, const std::string& file, Context& context);
-
-/// Loads the VGG-16 features of a perceptual term from `file`, or from $FIELDMARK_DATA/weights if that is
-/// empty, and prints the depth that they reach.
-/// @throws UsageError if there is no file   @throws IoError if the file does not contain this network
-watermark::PerceptualTerm load_perceptual_term(double weight, const std::string& file, Context& context);
 
 /// Returns the distance of two images [H, W, 3]; NaN without a network or if the images are too small for it.
 double lpips_or_nan(const std::optional<Lpips<float>>& lpips, const Tensor<float>& a, const Tensor<float>& b);

@@ -1,13 +1,11 @@
-#include "cli/perceptual.h"
-
-#include <fieldmark/core/digest.h>
+#include "cli/lpips.h"
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <ostream>
 
-#include "cli/scene_data.h"
+#include "cli/shared_data.h"
 
 namespace fieldmark::cli {
 
@@ -31,19 +29,6 @@ std::optional<Lpips<float>> load_lpips(LpipsNetwork network, const std::string& 
     }
   }
   return Lpips<float>(SafetensorsFile::read(path), network);
-}
-
-watermark::PerceptualTerm load_perceptual_term(double weight, const std::string& file, Context& context) {
-  std::filesystem::path path = file;
-  if (file.empty()) path = shared_data("weights/vgg16_conv1_1-conv2_2.safetensors");
-  if (path.empty())
-    throw UsageError(
-        "--perceptual: needs weights of VGG-16; name them with --vgg-weights, or set "
-        "FIELDMARK_DATA to a folder with weights/vgg16_conv1_1-conv2_2.safetensors");
-  const auto features = std::make_shared<const Vgg16Features<float>>(SafetensorsFile::read(path));
-  context.text() << "perceptual term: VGG-16 down to " << features->depths().back() << ", lambda " << weight
-                 << "\n";
-  return {.weight = weight, .features = features, .sha256 = sha256_file_hex(path)};
 }
 
 double lpips_or_nan(const std::optional<Lpips<float>>& lpips, const Tensor<float>& a,

@@ -1,5 +1,4 @@
-#include "cli/perceptual.h"
-#include <fieldmark/core/digest.h>
+#include "cli/lpips.h"
 
 #include <cmath>
 #include <cstdlib>
@@ -14,7 +13,7 @@ using namespace fieldmark;
 using cli::Context;
 
 TEST_CASE("Weights for LPIPS come from the option, else from below FIELDMARK_DATA, else there are none",
-          "[perceptual]") {
+          "[lpips]") {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "weights");
   const std::string path = folder / "weights/lpips_squeeze_v0.1.safetensors";
@@ -36,32 +35,7 @@ TEST_CASE("Weights for LPIPS come from the option, else from below FIELDMARK_DAT
                     Contains(path) && Contains("\"features.0.weight\": expected F32 [64, 3, 11, 11]"));
 }
 
-TEST_CASE("The perceptual term takes its weights from the option, else from below FIELDMARK_DATA",
-          "[perceptual]") {
-  const TemporaryFolder folder;
-  std::filesystem::create_directory(folder / "weights");
-  const std::string path = folder / "weights/vgg16_conv1_1-conv2_2.safetensors";
-  const auto tensors = vgg16_tensors();
-  random_weights(std::span(tensors).first(8)).write(path);
-  std::ostringstream out, err;
-  Context context({}, {"fieldmark", "x"}, out, err);
-  {
-    const EnvironmentVariable data("FIELDMARK_DATA", nullptr);
-    CHECK_THROWS_WITH(cli::load_perceptual_term(0.01, "", context),
-                      Contains("--perceptual: needs weights of VGG-16; name them with --vgg-weights"));
-    CHECK(cli::load_perceptual_term(0.01, path, context).features->depths().back() == "relu2_2");
-  }
-  const EnvironmentVariable data("FIELDMARK_DATA", folder.path.c_str());
-  const auto term = cli::load_perceptual_term(0.25, "", context);
-  CHECK(term.weight == 0.25);
-  CHECK(term.sha256 == sha256_file_hex(path));
-  const std::string other = folder / "other.safetensors";
-  random_weights(lpips_tensors(LpipsNetwork::alex)).write(other);
-  CHECK_THROWS_WITH(cli::load_perceptual_term(0.01, other, context),
-                    Contains(other) && Contains("features.0.weight"));
-}
-
-TEST_CASE("LPIPS of images that are too small, or without a network, is no number", "[perceptual]") {
+TEST_CASE("LPIPS of images that are too small, or without a network, is no number", "[lpips]") {
   const std::optional<Lpips<float>> squeeze(
       std::in_place, random_weights(lpips_tensors(LpipsNetwork::squeeze)), LpipsNetwork::squeeze);
   const Tensor<float> small({16, 40, 3}, 0.5f), a({17, 40, 3}, 0.5f), b({17, 40, 3}, 0.25f);

@@ -1,0 +1,26 @@
+#include "cli/perceptual_term.h"
+
+#include <fieldmark/core/digest.h>
+
+#include <filesystem>
+#include <memory>
+#include <ostream>
+
+#include "cli/shared_data.h"
+
+namespace fieldmark::cli {
+
+watermark::PerceptualTerm load_perceptual_term(double weight, const std::string& file, Context& context) {
+  std::filesystem::path path = file;
+  if (file.empty()) path = shared_data("weights/vgg16_conv1_1-conv2_2.safetensors");
+  if (path.empty())
+    throw UsageError(
+        "--perceptual: needs weights of VGG-16; name them with --vgg-weights, or set "
+        "FIELDMARK_DATA to a folder with weights/vgg16_conv1_1-conv2_2.safetensors");
+  const auto features = std::make_shared<const Vgg16Features<float>>(SafetensorsFile::read(path));
+  context.text() << "perceptual term: VGG-16 down to " << features->depths().back() << ", lambda " << weight
+                 << "\n";
+  return {.weight = weight, .features = features, .sha256 = sha256_file_hex(path)};
+}
+
+}  // namespace fieldmark::cli
