@@ -11,6 +11,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 
 #include "mlp.h"
@@ -59,7 +60,7 @@ double layers(Index samples, Precision precision, int runs, std::vector<double>&
 }
 
 void add_layers(Rows& rows, const PrecisionBenchOptions& o) {
-  Work work{"4 dense layers of 64, forward, dX and dW", "root mean square, in parts of double's results"};
+  Work work{"4 dense layers of 64, forward, dX and dW", "RMS error relative to double"};
   const Index samples = scaled(65536, o, kChunk);
   std::vector<double> exact, results;
   const double seconds = layers<double>(samples, Precision::fp32, o.runs, exact);
@@ -72,7 +73,7 @@ void add_layers(Rows& rows, const PrecisionBenchOptions& o) {
 }
 
 void add_exp(Rows& rows, const PrecisionBenchOptions& o) {
-  Work work{"exp of numbers from -87 to 88", "worst relative, against double"};
+  Work work{"exp of numbers from -87 to 88", "maximum relative error against double"};
   const Index n = scaled(1 << 20, o, 1024);
   std::vector<float> x = numbers<float>(n, 1), y(x.size());
   for (float& v : x) v = 0.5f + 87.5f * v;
@@ -94,7 +95,7 @@ void add_exp(Rows& rows, const PrecisionBenchOptions& o) {
           },
           o.runs)
           .seconds;
-  work.add(rows, "the C library's", plain, worst(y.data()));
+  work.add(rows, "C library", plain, worst(y.data()));
   Tape<float> tape;
   const float* got = nullptr;
   const double ours = time_calls(
@@ -134,8 +135,7 @@ struct Convolution {
 };
 
 void add_convolution(Rows& rows, const PrecisionBenchOptions& o) {
-  Work work{"convolution 3 x 3, 64 to 64, forward, dX and dW",
-            "root mean square, in parts of double's results"};
+  Work work{"convolution 3 x 3, 64 to 64, forward, dX and dW", "RMS error relative to double"};
   const Index side = scaled(128, o, 24);
   Convolution<float> timed({4, side, side, 64}), small({1, 24, 24, 64});
   Convolution<double> exact({1, 24, 24, 64});
@@ -148,20 +148,25 @@ void add_convolution(Rows& rows, const PrecisionBenchOptions& o) {
   }
 }
 
+std::string short_number(float x) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", static_cast<double>(x));
+  return text;
+}
+
 void add_rendering(Rows& rows, const nerf::RadianceField& field, const nerf::Dataset& test,
                    const PrecisionBenchOptions& o) {
-  Work work{"a view of " + test.name, "dB, against every sample in float"};
+  Work work{"a view of " + test.name, "dB, against all samples in float"};
   struct Variant {
     std::string name;
     nerf::RenderOptions options;
   };
-  std::vector<Variant> variants{
-      {"every sample", {.stop = 0, .least_weight = 0}},
-      {"rays end at a transmittance of 1e-4", {.stop = 1e-4f, .least_weight = 1e-5f}},
-      {"1e-3, the default", {}},
-      {"1e-2", {.stop = 1e-2f, .least_weight = 1e-3f}}};
+  std::vector<Variant> variants{{"all samples", {.stop = 0, .least_weight = 0}},
+                                {"transmittance threshold 1e-4", {.stop = 1e-4f, .least_weight = 1e-5f}},
+                                {"default threshold, " + short_number(nerf::RenderOptions{}.stop), {}},
+                                {"transmittance threshold 1e-2", {.stop = 1e-2f, .least_weight = 1e-3f}}};
   if (bf16_units() != Bf16Units::none)
-    variants.push_back({"1e-3, networks and table in bf16", {.precision = Precision::bf16}});
+    variants.push_back({"default threshold, networks and table in bf16", {.precision = Precision::bf16}});
   const nerf::Camera& camera = test.views.front().camera;
   nerf::Renderer reference(field, variants.front().options);
   const auto want = reference.render(camera);

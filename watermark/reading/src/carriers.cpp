@@ -9,7 +9,7 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr Index kBlock = 4096;  // samples
+constexpr Index kBlock = 4096, kLanes = 16;  // samples; lanes, each with a tape of its own
 
 // Returns the entry of a cell for the last pixel, and adds it if it is missing.
 std::size_t entry_of(Carriers& c, std::int32_t cell) {
@@ -33,15 +33,17 @@ void times(const std::array<std::array<double, 3>, 3>& slope, float* x) {
 std::vector<float> carrier_of(const Owner& owner, const CachedView& v) {
   const auto n = static_cast<Index>(v.weight.size());
   std::vector<float> out(at(3 * n));
-  Tape<float> tape;
-  for (Index begin = 0; begin < n; begin += kBlock) {
-    const Index count = std::min(kBlock, n - begin);
-    tape.reset();
-    const Var<float> carrier = owner.mark().carrier(Params<float>(owner.params, nullptr),
-                                                    tape.constant(&v.position[at(3 * begin)], {count, 3}),
-                                                    tape.constant(&v.colour[at(3 * begin)], {count, 3}));
-    std::copy_n(carrier.value(), 3 * count, out.begin() + 3 * begin);
-  }
+  parallel_for(kLanes, 1, [&](Index lane, Index) {
+    Tape<float> tape;
+    for (Index begin = lane * kBlock; begin < n; begin += kLanes * kBlock) {
+      const Index count = std::min(kBlock, n - begin);
+      tape.reset();
+      const Var<float> carrier = owner.mark().carrier(Params<float>(owner.params, nullptr),
+                                                      tape.constant(&v.position[at(3 * begin)], {count, 3}),
+                                                      tape.constant(&v.colour[at(3 * begin)], {count, 3}));
+      std::copy_n(carrier.value(), 3 * count, out.begin() + 3 * begin);
+    }
+  });
   return out;
 }
 

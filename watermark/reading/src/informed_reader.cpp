@@ -4,6 +4,7 @@
 #include <fieldmark/watermark/reading/informed_reader.h>
 #include "best_alignment.h"
 #include "camera_search.h"
+#include "joint_evidence.h"
 #include "jpeg_score.h"
 #include "plain_border.h"
 #include "pose_alignment.h"
@@ -296,13 +297,7 @@ ImageReading InformedReader::read_as(const Tensor<float>& whole, const Change& c
   if (!seen.covered.empty())
     sized.covered = border_at(seen.covered, h, w, used.height, used.width, kBesideCover);
   g.evidence = evidence_at(sized, used);
-  double ours = 0, theirs = 0;
-  for (std::size_t c = 0; c < g.evidence.size(); ++c) {
-    ours += g.evidence[c] * g.evidence[c];
-    theirs += reading.blind[c] * reading.blind[c];
-  }
-  if (ours > 0 && theirs > 0)
-    for (double& s : g.evidence) s *= std::sqrt(theirs / ours);
+  g.evidence = joint_evidence(reading.blind, g.evidence);
   if (g.agreement >= kLeastAgreement) reading.chosen = ReadingKind::informed;
   // Converts the camera to the whole image.
   g.camera.cx += static_cast<double>(seen.left);

@@ -56,7 +56,8 @@ class CameraSearch;
 ///   - With the residual R and its power V around each pixel, R / V is the score and 1 / V the precision.
 ///     For a JPEG image both come from the quantised coefficients.
 ///   - S_c are the signs that explain the whole residual by linear least squares, since a ray passes several
-///     cells.
+///     cells. The blind evidence is added at equal power, weighted by the correlation r of the two, or 0 if
+///     that is negative: the extractor reads what JPEG and strong downscaling take from the residual.
 class InformedReader {
  public:
   /// Least agreement at which an alignment is trusted; docs/notes/reading.md has the measurements.
