@@ -3,8 +3,9 @@
 #include <string>
 
 // SHA-256 of the files of bytes_test.cpp, for each instruction set. Scene and fields were recorded at commit
-// 07c747b; all else anew with each change that was meant to change it, at last at the commit where Muon takes
-// its steps on the smaller square product. AVX-512 is not recorded.
+// 07c747b; all else anew with each change that was meant to change it: owners at last where Muon takes its
+// steps on the smaller square product, logits of preset fast where informed detection counts the extractor's
+// evidence. AVX-512 is not recorded.
 inline const std::map<std::string, std::string> kBytesV2{
     {"code baked field", "45939742eceb32348e211e100dffcb0e89bb4306a78d3522bfd7281dd2b9a5b7"},
     {"code logits", "9613e54e8692e34788c1420773b95ac1f73cad031192077e2866490bda867c3e"},
