@@ -52,12 +52,20 @@ TEST_CASE("attack-field with other fields, and their absence", "[attack-field]")
     return run_command(words);
   };
   REQUIRE(run({"--attack", "sign_flip_1", "--unmarked", field}).code == cli::kOk);
-  const auto plain = nerf::RadianceField::load(field), undone = nerf::RadianceField::load(out);
+  const auto plain = nerf::RadianceField::load(field), noisy = nerf::RadianceField::load(marked),
+             undone = nerf::RadianceField::load(out);
   double worst = 0;
   for (std::size_t i = 0; i < plain.params.values().size(); ++i)
     raise_to(worst, std::abs(static_cast<double>(plain.params.values()[i] - undone.params.values()[i])));
   CHECK(worst < 1e-6);
   REQUIRE(run({"--attack", "average_0.5", "--other", field}).code == cli::kOk);
+  const auto average = nerf::RadianceField::load(out);
+  worst = 0;
+  for (std::size_t i = 0; i < plain.params.values().size(); ++i) {
+    const double a = plain.params.values()[i], b = noisy.params.values()[i];
+    raise_to(worst, std::abs(average.params.values()[i] - (a + b) / 2));
+  }
+  CHECK(worst < 1e-6);
   const auto refused = [&](const std::vector<std::string>& words, const char* why) {
     const auto r = run(words);
     CHECK(r.code == cli::kUsage);

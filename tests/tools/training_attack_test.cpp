@@ -30,7 +30,10 @@ TEST_CASE("attack-field trains a field further, or a new one on its images", "[a
     CHECK(!std::ranges::equal(after.params.values(), before.params.values()));
     // Further training keeps bounds and cameras; a new field chooses its own.
     CHECK((after.configuration() == before.configuration()) == (words[0] != "retrain"));
+    std::filesystem::remove(out);
     const auto again = run(words);
+    INFO(again.err);
+    REQUIRE(again.code == cli::kOk);
     CHECK(std::ranges::equal(nerf::RadianceField::load(out).params.values(), after.params.values()));
   }
   CHECK_THAT(run({"finetune"}).err, Contains("needs --data"));
@@ -77,8 +80,13 @@ TEST_CASE("a second mark goes on top of a baked field", "[attack-field]") {
               .code == cli::kOk);
   REQUIRE(run_command({"bake", "--owner", owner, "--message", "a", "--out", both, "--steps", "2"}).code ==
           cli::kOk);
-  const auto r =
-      run_command({"measure", "--owner", job.owner, "--field", both, "--message", "5", "--count", "1"});
+  const auto one = nerf::RadianceField::load(first), two = nerf::RadianceField::load(both);
+  CHECK(!std::ranges::equal(one.params.values(), two.params.values()));
+  const auto r = run_command(
+      {"measure", "--owner", job.owner, "--field", both, "--message", "5", "--count", "1", "--json", "-"});
   INFO(r.err);
-  CHECK(r.code == cli::kOk);
+  REQUIRE(r.code == cli::kOk);
+  const auto json = nlohmann::json::parse(r.out);
+  CHECK(json["baked"] == true);
+  CHECK(json["accuracy"]["blind"].is_number());
 }
