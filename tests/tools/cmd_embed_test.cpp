@@ -1,7 +1,9 @@
 #include <fieldmark/core/files.h>
+#include <fieldmark/imaging/image.h>
 #include <fieldmark/imaging/vgg16_features.h>
 #include <fieldmark/watermark/mark/cell_mark.h>
 #include <fieldmark/watermark/mark/owner.h>
+#include <fieldmark/watermark/reading/blind_reader.h>
 
 #include "cli/cli.h"
 #include "support/random_weights.h"
@@ -73,16 +75,22 @@ TEST_CASE("embed gives the same bytes for the same seed and key", "[embed]") {
 
 TEST_CASE("embed learns from views at several distances, and from several samples of a ray", "[embed]") {
   const TinyJob& job = TinyJob::get();
-  const std::string owner = job.folder / "several.fm";
-  const auto embed = [&](const char* distances, const char* samples) {
+  const auto embed = [&](const std::string& distances, const std::string& samples) {
     return tiny_embed(
-        job.field, owner,
+        job.field, job.folder / (distances + samples),
         {"--steps", "1", "--measured-views", "1", "--distances", distances, "--samples", samples});
   };
-  const auto r = embed("several", "2");
-  INFO(r.err);
-  CHECK(r.code == cli::kOk);
-  CHECK(std::filesystem::exists(owner));
+  const auto owner = [&](const std::string& distances, const std::string& samples) {
+    const auto r = embed(distances, samples);
+    INFO(r.err);
+    REQUIRE(r.code == cli::kOk);
+    return read_bytes(job.folder / (distances + samples));
+  };
+  // The key is the same: only the option can make a difference.
+  const auto plain = owner("native", "1"), distances = owner("several", "1"), samples = owner("native", "2");
+  CHECK(plain != distances);
+  CHECK(plain != samples);
+  CHECK(distances != samples);
   CHECK(embed("all", "2").code == cli::kUsage);
   CHECK(embed("native", "0").code == cli::kUsage);
 }
@@ -147,7 +155,8 @@ TEST_CASE("embed marks an object in fine detail, unless another look is asked fo
 TEST_CASE("embed --preset paper and code give an owner that bakes and reads like any other", "[embed]") {
   const TinyJob& job = TinyJob::get();
   for (const std::string preset : {"paper", "code"}) {
-    const std::string owner = job.folder / (preset + ".fm"), baked = job.folder / "paper_baked.fm";
+    const std::string owner = job.folder / (preset + ".fm"), baked = job.folder / (preset + "_baked.fm"),
+                      views = job.folder / (preset + "_views");
     const auto r = tiny_embed(job.field, owner,
                               {"--preset", preset, "--steps", "1", "--measured-views", "1", "--json", "-"});
     INFO(r.err);
@@ -156,10 +165,26 @@ TEST_CASE("embed --preset paper and code give an owner that bakes and reads like
     CHECK(nlohmann::json::parse(r.out)["accuracy"]["blind"].is_number());
     REQUIRE(run_command({"bake", "--owner", owner, "--message", "6", "--out", baked, "--steps", "2"}).code ==
             cli::kOk);
-    const auto read = run_command({"extract", "--owner", owner, job.images(), "--json", "-"});
-    REQUIRE(read.code == cli::kNotFound);
-    CHECK_THAT(read.err, Contains("this owner has one cell for each bit"));
-    CHECK(nlohmann::json::parse(read.out)["bits"].get<std::string>().size() == 4);
+    REQUIRE(run_command({"render", "--field", baked, "--out", views, "--count", "2", "--size", "32"}).code ==
+            cli::kOk);
+    const std::string view = "/view_000.png";
+    CHECK(read_image(views + view).data != read_image(job.images() + view).data);
+    const auto loaded = watermark::Owner::load(owner);
+    const watermark::BlindReader reader(loaded);
+    const auto evidence = [&](const std::string& images) {
+      const auto read = run_command({"extract", "--owner", owner, images, "--json", "-"});
+      REQUIRE(read.code == cli::kNotFound);
+      CHECK_THAT(read.err, Contains("this owner has one cell for each bit"));
+      const auto json = nlohmann::json::parse(read.out);
+      CHECK(json["bits"].get<std::string>().size() == 4);
+      auto sum = reader.evidence(read_image(images + "/view_000.png"));
+      const auto more = reader.evidence(read_image(images + "/view_001.png"));
+      for (std::size_t b = 0; b < sum.size(); ++b) sum[b] += more[b];
+      // With one cell for each bit a logit is 1 or -1, which need not differ after so little training.
+      CHECK(json["logits"] == watermark::read_bits(sum, loaded.code(), 4).logit);
+      return sum;
+    };
+    CHECK(evidence(views) != evidence(job.images()));
   }
 }
 
