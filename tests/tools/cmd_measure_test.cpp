@@ -1,4 +1,5 @@
 #include <fieldmark/imaging/lpips.h>
+#include <fieldmark/watermark/attacks/measurement.h>
 
 #include "cli/cli.h"
 #include "support/random_weights.h"
@@ -8,6 +9,7 @@ using namespace fieldmark;
 
 TEST_CASE("measure reports an owner's mark on several sets of cameras", "[measure]") {
   const TinyJob& job = TinyJob::get();
+  const auto owner = watermark::Owner::load(job.owner);
   for (const char* cameras : {"novel", "ring", "sphere"}) {
     const auto r = run_command({"measure", "--owner", job.owner, "--cameras", cameras, "--count", "2",
                                 "--informed-count", "1", "--json", "-"});
@@ -17,11 +19,19 @@ TEST_CASE("measure reports an owner's mark on several sets of cameras", "[measur
     CHECK(json["cameras"] == cameras);
     CHECK(json["views"] == 2);
     CHECK(json["baked"] == false);
-    const double accuracy = json["accuracy"]["blind"];
-    CHECK(accuracy >= 0);
-    CHECK(accuracy <= 1);
+    const auto expected = watermark::measure(
+        owner, nullptr, nullptr,
+        {.cameras = nerf::make_cameras(owner.field.cameras, nerf::parse_camera_set(cameras), 2, 0, 1),
+         .informed_views = 1,
+         .seed = 1});
+    CHECK(json["accuracy"]["blind"] == expected.accuracy.blind);
+    CHECK(json["accuracy"]["informed"] == expected.accuracy.informed);
+    CHECK(json["accuracy"]["chosen"] == expected.accuracy.chosen);
+    CHECK(json["accuracy_p5"] == expected.accuracy_p5);
+    CHECK(json["psnr_base"] == expected.psnr_base);
+    CHECK(json["psnr_base_foreground"] == expected.psnr_base_foreground);
+    CHECK(json["ssim_base"] == expected.ssim_base);
     CHECK(json["informed_views"] == 1);
-    CHECK(json["accuracy"]["informed"].is_number());
     CHECK(json["informed_seconds"] > 0);
   }
 }
@@ -48,6 +58,7 @@ TEST_CASE("measure gives a row for each of several sets of cameras", "[measure]"
     CHECK(row["informed"].is_null());
   }
   CHECK(json["rows"][0]["blind"] == json["accuracy"]["blind"]);
+  CHECK(json["rows"][2]["psnr_base_foreground"] != json["rows"][3]["psnr_base_foreground"]);
   CHECK_THAT(read_text(folder / "measure.md"), Contains("| farther | 2 |"));
   CHECK_THAT(r.err, Contains("2 views of extrapolated cameras"));
   CHECK(run_command({"measure", "--owner", job.owner, "--cameras", "novel,moon"}).code == cli::kUsage);
