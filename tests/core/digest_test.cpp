@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "support/catch.h"
+#include "support/temporary_folder.h"
 
 using namespace fieldmark;
 
@@ -16,14 +17,14 @@ TEST_CASE("digest: the standard's examples (FIPS 180-4)") {
 }
 
 TEST_CASE("digest: files up to longer than the read buffer") {
-  const auto path = std::filesystem::temp_directory_path() / "fieldmark_digest_test.bin";
+  const TemporaryFolder folder;
+  const std::string path = folder / "digest.bin";
   for (std::size_t size : {std::size_t{0}, std::size_t{1} << 20, (std::size_t{3} << 20) + 17}) {
     std::string text(size, '\0');
     for (std::size_t i = 0; i < size; ++i) text[i] = static_cast<char>(i * 2654435761u >> 7);
     std::ofstream(path, std::ios::binary) << text;
     CHECK(sha256_file_hex(path) == sha256_hex(text));
   }
-  std::filesystem::remove(path);
 }
 
 TEST_CASE("digest: a missing file and a folder are named") {

@@ -19,7 +19,8 @@ TEST_CASE("run_long takes the steps and shows how far it is", "[long_run]") {
   std::ostringstream out, err;
   Context context({}, {}, out, err);
   CountingRun run(5);
-  CHECK(run_long(run, "count", {.steps = 5}, context, folder / "c") >= 0);
+  run.in_step = [] { std::this_thread::sleep_for(std::chrono::milliseconds(5)); };
+  CHECK(run_long(run, "count", {.steps = 5}, context, folder / "c") >= 0.025);
   CHECK(run.steps() == 5);
   CHECK(folder.entries() == 0);
   CHECK_THAT(err.str(), Contains("count 20%") && Contains("step 5  a note"));

