@@ -159,6 +159,7 @@ TEST_CASE("owner_system: each variant takes its steps and is measured") {
     const auto cameras = nerf::make_cameras(trained.owner.field.cameras, nerf::CameraSet::novel, 2, 0, 123);
     const auto scores = score_mark(trained.owner.field, marked_scene(trained, 1), {.cameras = cameras});
     CHECK(scores.psnr_base < 60);  // it is visible and finite
+    CHECK(scores.psnr_base > 10);  // and the scene is still there
   }
 }
 

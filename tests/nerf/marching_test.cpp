@@ -74,8 +74,9 @@ bool has(const std::vector<float>& sorted, float t) {
   return at != sorted.end() && *at <= t + 1e-6f;
 }
 
-// Checks that the walk takes exactly the dense samples, except for doubtful ones.
-void check_against_dense(const OccupancyGrid& grid, const Line& line, float step, float jitter) {
+// Checks that the walk takes exactly the dense samples, except for doubtful ones. Returns the number of those
+// that are certain.
+std::size_t check_against_dense(const OccupancyGrid& grid, const Line& line, float step, float jitter) {
   const Dense want = dense(grid, line, step, jitter);
   const auto got = walk(grid, line, step, jitter);
   CAPTURE(line.o[0], line.o[1], line.o[2], line.d[0], line.d[1], line.d[2]);
@@ -84,6 +85,7 @@ void check_against_dense(const OccupancyGrid& grid, const Line& line, float step
   for (const float t : got) CHECK((has(want.certain, t) || has(want.doubtful, t)));
   CHECK(got.size() >= want.certain.size());
   CHECK(got.size() <= want.certain.size() + want.doubtful.size());
+  return want.certain.size();
 }
 
 Line towards(const Tensor<double>& u, Index i) {
@@ -94,6 +96,13 @@ Line towards(const Tensor<double>& u, Index i) {
     line.o[a] = static_cast<float>(0.5 + 2 * u[6 * i + a]);
     line.d[a] = static_cast<float>(u[6 * i + 3 + a] / std::sqrt(norm));
   }
+  return line;
+}
+
+// Returns a ray through the cube, from outside in two cases of three.
+Line through_cube(const Tensor<double>& u, Index i) {
+  Line line = towards(u, i);
+  for (int a = 0; a < 3; ++a) line.o[a] = 0.5f + 0.25f * (line.o[a] - 0.5f) - (i % 3 ? 1.5f * line.d[a] : 0);
   return line;
 }
 }  // namespace
@@ -136,22 +145,30 @@ TEST_CASE("marching: equal to dense stepping on random grids") {
   const auto u = uniform({150, 6}, -1, 1, 3);
   for (const double filled : {0.005, 0.1, 0.9}) {
     const OccupancyGrid grid = random_grid(16, filled, 2);
+    std::size_t certain = 0;
     for (Index i = 0; i < 150; ++i)
-      check_against_dense(grid, towards(u, i), i % 2 == 0 ? 0.004f : 0.11f,
-                          0.1f * static_cast<float>(i % 10));
+      for (const Line& line : {towards(u, i), through_cube(u, i)})
+        certain +=
+            check_against_dense(grid, line, i % 2 == 0 ? 0.004f : 0.11f, 0.1f * static_cast<float>(i % 10));
+    CAPTURE(filled);
+    CHECK(certain > static_cast<std::size_t>(15000 * filled));
   }
 }
 
 TEST_CASE("marching: equal to dense stepping along the axes and from inside") {
-  const OccupancyGrid grid = random_grid(16, 0.05, 4);
-  for (int axis = 0; axis < 3; ++axis)
-    for (const float sign : {-1.f, 1.f})
-      for (const float start : {-0.3f, 0.41f, 1.3f}) {
-        Line line{{0.33f, 0.71f, 0.52f}, {0, 0, 0}};
-        line.o[axis] = start;
-        line.d[axis] = sign;
-        check_against_dense(grid, line, 0.003f, 0.37f);
-      }
+  std::size_t certain = 0;
+  for (const double filled : {0.05, 0.5}) {  // the sparse grid is empty along these rays
+    const OccupancyGrid grid = random_grid(16, filled, 4);
+    for (int axis = 0; axis < 3; ++axis)
+      for (const float sign : {-1.f, 1.f})
+        for (const float start : {-0.3f, 0.41f, 1.3f}) {
+          Line line{{0.33f, 0.71f, 0.52f}, {0, 0, 0}};
+          line.o[axis] = start;
+          line.d[axis] = sign;
+          certain += check_against_dense(grid, line, 0.003f, 0.37f);
+        }
+  }
+  CHECK(certain > 1500);
 }
 
 TEST_CASE("marching: pieces of any length are the whole walk") {
@@ -193,9 +210,7 @@ TEST_CASE("marching: skipping empty cells first changes no sample, for any numbe
   const auto u = uniform({200, 6}, -1, 1, 8);
   std::vector<RayWalk> walks;
   for (Index i = 0; i < 200; ++i) {
-    Line line = towards(u, i);  // through a point in the cube, mostly from outside
-    for (int a = 0; a < 3; ++a)
-      line.o[a] = 0.5f + 0.25f * (line.o[a] - 0.5f) - (i % 3 ? 1.5f * line.d[a] : 0);
+    const Line line = through_cube(u, i);
     walks.emplace_back(line.o, line.d, i % 2 ? 0.003f : 0.02f, 0.3f);
   }
   const Index seen = seen_after_skipping(random_grid(64, 0.0005, 7), walks);
@@ -259,6 +274,7 @@ TEST_CASE("marching: a contracted walk finds the occupied samples of single step
   const auto u = uniform({60, 6}, -1, 1, 5);
   for (const double filled : {0.001, 0.1, 1.}) {
     const OccupancyGrid grid = random_grid(32, filled, 2);
+    Index samples = 0;
     for (Index i = 0; i < 60; ++i) {
       const Line line = towards(u, i);
       const Contracted want = contracted_by_steps(grid, line, 0.01, 0.3, 0.05);
@@ -267,6 +283,7 @@ TEST_CASE("marching: a contracted walk finds the occupied samples of single step
       std::size_t k = 0;
       for (Index count = 7; count == 7;) {
         count = ray.next(grid, 7, t, x);
+        samples += count;
         for (Index s = 0; s < count; ++s, ++k) {
           const auto same = [&] { return std::abs(static_cast<double>(t[s]) / want.t[k] - 1) < 2e-5; };
           for (; k < want.t.size() && !same(); ++k) REQUIRE(want.occupied[k] != 1);
@@ -280,6 +297,7 @@ TEST_CASE("marching: a contracted walk finds the occupied samples of single step
       }
       for (; k < want.t.size(); ++k) CHECK(want.occupied[k] != 1);
     }
+    CHECK(samples > static_cast<Index>(6000 * filled));
   }
 }
 

@@ -199,7 +199,8 @@ TEST_CASE("renderer: trace gives what render shows") {
   renderer.trace(rays.batch(f.space), 5, out.data());
   for (std::size_t i = 0; i < 6; ++i) {
     CHECK(out[4 * i + 3] == view.opacity.data[i]);
-    CHECK(out[4 * i] + (1 - out[4 * i + 3]) == view.rgb.data[3 * i]);
+    for (std::size_t k = 0; k < 3; ++k)
+      CHECK(out[4 * i + k] + (1 - out[4 * i + 3]) == view.rgb.data[3 * i + k]);
   }
 }
 

@@ -79,6 +79,7 @@ TEST_CASE("plain_border: an image without one has none, one that is plain has no
     ++marked;
     CHECK(std::min(p / 200, 159 - p / 200) + std::min(p % 200, 199 - p % 200) < 60);
   }
+  CHECK(marked > 1000);
   CHECK(marked < 160 * 200 / 10);
 }
 
