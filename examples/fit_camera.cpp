@@ -7,8 +7,11 @@
 #include <fieldmark/nerf/composite.h>
 #include <fieldmark/nerf/rays.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <span>
+#include <vector>
 
 using namespace fieldmark;
 

@@ -5,7 +5,9 @@
 #include <fieldmark/engine/random.h>
 #include <fieldmark/engine/values.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 
 using namespace fieldmark;

@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+if len(sys.argv) < 2:
+    sys.exit("usage: compare_step.py FIT_IMAGE [TURNS]   # FIT_IMAGE: the program of examples/fit_image.cpp")
 COMMANDS = {"C++": [sys.argv[1]], "Python": [sys.executable, str(Path(__file__).with_name("fit_image.py"))]}
 TURNS = int(sys.argv[2]) if len(sys.argv) > 2 else 9
 

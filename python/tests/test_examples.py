@@ -4,6 +4,8 @@ import runpy
 import sys
 from pathlib import Path
 
+import pytest
+
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 
 
@@ -25,3 +27,8 @@ def test_train_mark_plot_compiles():
     """It renders some hundred views, minutes of work: too long for a test."""
     source = (EXAMPLES / "train_mark_plot.py").read_text()
     compile(source, "train_mark_plot.py", "exec")  # raises SyntaxError
+
+
+def test_compare_step_says_how_to_use_it():
+    with pytest.raises(SystemExit, match=r"usage: compare_step.py FIT_IMAGE \[TURNS\]"):
+        run("compare_step.py")
