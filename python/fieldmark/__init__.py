@@ -1,7 +1,7 @@
 """Watermarked radiance fields on a CPU, and the autodiff engine below them.
 
-Arrays are numpy's, float32 or float64 in row-major order. The engine borrows them, and renders are handed over, both
-without copies; images that are read for a mark are copied once.
+Arrays are NumPy's, float32 or float64 in row-major order. The engine borrows them, and renders are handed over, both
+without copies; images that are read for a mark are copied once. A child of ``os.fork()`` uses one thread.
 
     import fieldmark as fm
     field = fm.train("lego", seconds=60)
@@ -14,11 +14,12 @@ without copies; images that are read for a mark are copied once.
 
 from __future__ import annotations
 
+import operator
 import os
 from typing import Callable, Optional, Union
 
 from . import _fieldmark, engine
-from ._fieldmark import Camera, Error, Field, IoError, Key, Owner, ShapeError, set_threads, threads
+from ._fieldmark import Camera, Error, Field, IoError, Key, Owner, ShapeError, ValueError_, set_threads, threads
 from .engine import Adam, Muon, Parameters, Sgd, Tape, gradcheck
 
 Path = Union[str, "os.PathLike[str]"]
@@ -26,17 +27,40 @@ Progress = Callable[[int, float], None]
 
 __all__ = [
     "Adam", "Camera", "Error", "Field", "IoError", "Key", "Muon", "Owner", "Parameters", "Sgd", "ShapeError",
-    "Tape", "bake", "embed", "engine", "gradcheck", "set_threads", "threads", "train",
+    "Tape", "ValueError_", "bake", "embed", "engine", "gradcheck", "set_threads", "threads", "train",
 ]
 
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=lambda: set_threads(1))  # OpenMP's threads are not in the child
 
-def _length(seconds: Optional[float], steps: Optional[int], default: float) -> tuple[float, int]:
+
+def _integer(where: str, given: int, least: int, most: int) -> int:
+    """An integer within a range; else TypeError or ValueError."""
+    try:
+        number = operator.index(given)
+    except TypeError:
+        raise TypeError(f"[{where} must be an integer, got {type(given).__name__}") from None
+    if not least <= number <= most:
+        raise ValueError_(f"[{where} must be {least} to {most}, got {number}")
+    return number
+
+
+def _seed(function: str, seed: int) -> int:
+    return _integer(f"{function}] seed", seed, 0, 2 ** 64 - 1)
+
+
+def _instance(where: str, given: object, kind: type) -> None:
+    if not isinstance(given, kind):
+        raise TypeError(f"[{where} must be {kind.__name__}, got {type(given).__name__}")
+
+
+def _length(function: str, seconds: Optional[float], steps: Optional[int], default: float) -> tuple[float, int]:
     if seconds is not None and steps is not None:
-        raise ValueError("[length] give seconds or steps, not both")
-    if steps is not None and steps < 1:
-        raise ValueError(f"[length] steps must be at least 1, got {steps}")
+        raise ValueError_(f"[{function}] give seconds or steps, not both")
+    if steps is not None and operator.index(steps) < 1:
+        raise ValueError_(f"[{function}] steps must be at least 1, got {steps}")
     if seconds is not None and not 0 < seconds < float("inf"):
-        raise ValueError(f"[length] seconds must be above 0 and finite, got {seconds}")
+        raise ValueError_(f"[{function}] seconds must be above 0 and finite, got {seconds}")
     return (default if seconds is None else seconds, steps or 0)
 
 
@@ -44,37 +68,57 @@ def train(data: Path, *, seconds: Optional[float] = None, steps: Optional[int] =
           seed: int = 0, progress: Optional[Progress] = None) -> Field:
     """Trains a radiance field on a data set.
 
+    Remarks on the data set, such as images left out, are warnings. Error is raised if the training collapses, that is
+    if the field shows fog, one colour or nothing.
+
     :param data: folder of a data set, see ``fieldmark data check``
-    :param seconds: length of the training; 60 by default
-    :param steps: length in steps instead: equal seeds then give equal fields
+    :param seconds: length of the training, above 0; 60 by default
+    :param steps: length in steps instead, at least 1: equal seeds then give equal fields
     :param size: pixels of the longer side that images are reduced to; 0: as they are
-    :param progress: called now and then with the steps taken and the seconds
+    :param seed: of the initial field and of the rays, 0 to 2^64 - 1
+    :param progress: called every 25 steps with the steps taken and the seconds; what it raises ends the training
     """
-    length = _length(seconds, steps, 60)
-    return _fieldmark.train(os.fspath(data), *length, size, seed, progress)
+    length = _length("train", seconds, steps, 60)
+    size = _integer("train] size", size, 0, 8192)
+    return _fieldmark.train(os.fspath(data), *length, size, _seed("train", seed), progress)
 
 
 def embed(field: Field, key: Key, *, bits: int = 16, seconds: Optional[float] = None,
           steps: Optional[int] = None, mark_psnr: Optional[float] = None, views: int = 200, seed: int = 0,
           progress: Optional[Progress] = None) -> Owner:
-    """Trains a mark and its extractor for a field.
+    """Trains a mark and its extractor for a field, whose bytes stay.
 
+    :param field: to mark
+    :param key: decides which cells carry which bits; keep it secret
     :param bits: length of messages, 1 to 256
-    :param seconds: length of the training; 300 by default
+    :param seconds: length of the training, above 0; 300 by default
+    :param steps: length in steps instead, at least 1: equal seeds then give equal owners
     :param mark_psnr: of marked to unmarked renders in dB, 20 to 60; higher is fainter; 36.5 by default, and
         up to 40 for objects with flat surfaces
-    :param views: cameras that the mark is learnt from
+    :param views: cameras that the mark is learnt from, 8 to 10000
+    :param seed: of the initial mark, messages, views and distortions, 0 to 2^64 - 1
+    :param progress: called every 25 steps with the steps taken and the seconds; what it raises ends the training
     """
-    length = _length(seconds, steps, 300)
-    return _fieldmark.embed(field, key, bits, *length, mark_psnr, views, seed, progress)
+    _instance("embed] field", field, Field)
+    _instance("embed] key", key, Key)
+    length = _length("embed", seconds, steps, 300)
+    bits = _integer("embed] bits", bits, 1, 256)
+    views = _integer("embed] views", views, 8, 10000)
+    return _fieldmark.embed(field, key, bits, *length, mark_psnr, views, _seed("embed", seed), progress)
 
 
 def bake(owner: Owner, message: str, *, seconds: Optional[float] = None, steps: Optional[int] = None,
          seed: int = 0, progress: Optional[Progress] = None) -> Field:
-    """Writes a message into the colours of a field, which is then an ordinary field to publish.
+    """Writes a message into the colours of the owner's field. The result is an ordinary field to publish.
 
-    :param message: hexadecimal digits, most significant bit first
-    :param seconds: length of the training; 45 by default
+    :param owner: from ``embed``
+    :param message: hexadecimal digits, ``ceil(owner.bits / 4)`` of them, most significant bit first
+    :param seconds: length of the training, above 0; 45 by default
+    :param steps: length in steps instead, at least 1: equal seeds then give equal fields
+    :param seed: of cameras and rays, 0 to 2^64 - 1
+    :param progress: called every 25 steps with the steps taken and the seconds; what it raises ends the training
     """
-    length = _length(seconds, steps, 45)
-    return _fieldmark.bake(owner, message, *length, seed, progress)
+    _instance("bake] owner", owner, Owner)
+    _instance("bake] message", message, str)
+    length = _length("bake", seconds, steps, 45)
+    return _fieldmark.bake(owner, message, *length, _seed("bake", seed), progress)

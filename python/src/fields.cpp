@@ -1,5 +1,6 @@
 // Radiance fields: load, train, render, compare with the ground truth.
 #include <fieldmark/nerf/camera_set.h>
+#include <fieldmark/nerf/collapse_watch.h>
 #include <fieldmark/nerf/dataset.h>
 #include <fieldmark/nerf/evaluation.h>
 #include <fieldmark/nerf/renderer.h>
@@ -7,6 +8,13 @@
 #include <pybind11/functional.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <optional>
 
 #include "field_handle.h"
 
@@ -21,11 +29,22 @@ constexpr Index kQuiet = 25;  // steps between checks for Ctrl-C
 
 Camera camera_from(const py::object& given, double fov, Index width, Index height) {
   const py::array pose = borrowed<double>("Camera: pose", given);
+  const auto numbers = elements<double>(pose);
   if (shape_of(pose) != Shape{3, 4} && shape_of(pose) != Shape{4, 4})
     throw ShapeError("[Camera] pose must be [3, 4] or [4, 4], camera to world, got shape " +
                      shape_of(pose).str());
+  if (!std::ranges::all_of(numbers, [](double x) { return std::isfinite(x); }))
+    throw ValueError("[Camera] pose must be finite, got NaN or infinity");
+  if (numbers.size() == 16 && !std::ranges::equal(numbers.subspan(12), std::array{0., 0., 0., 1.}))
+    throw ValueError("[Camera] pose must end with the row 0, 0, 0, 1, got " +
+                     py::str(given[py::int_(3)]).cast<std::string>());
+  if (!(fov > 0 && fov < std::numbers::pi))
+    throw ValueError("[Camera] fov must be in (0, pi) radians, got " + std::to_string(fov));
+  if (width < 1 || height < 1)
+    throw ValueError("[Camera] width and height must be at least 1, got " + std::to_string(width) + " and " +
+                     std::to_string(height));
   nerf::Pose p;
-  std::copy_n(elements<double>(pose).begin(), p.size(), p.begin());
+  std::copy_n(numbers.begin(), p.size(), p.begin());
   return nerf::make_camera(p, fov, width, height);
 }
 
@@ -36,16 +55,62 @@ py::array_t<float> array_of(Tensor<float>&& tensor) {
                             py::capsule(kept, [](void* p) { delete static_cast<Tensor<float>*>(p); }));
 }
 
+// Takes a few images that are not trained on, or training images if there are no others.
+nerf::CollapseWatch collapse_watch(const RadianceField& field, const std::filesystem::path& folder,
+                                   const nerf::DatasetOptions& wanted, const nerf::Dataset& set) {
+  for (const char* split : {"val", "test"}) {
+    if (!nerf::has_split(folder, split)) continue;
+    nerf::DatasetOptions few = wanted;
+    few.split = split;
+    few.background = set.background;
+    few.scene = set.scene;
+    few.most_views = nerf::CollapseWatch::kViews;
+    try {
+      return {field, nerf::load_dataset(folder, few)};
+    } catch (const Error&) {
+      continue;  // training does not need them
+    }
+  }
+  return {field, set};
+}
+
+void require_healthy(const std::string& fault, const nerf::Dataset& set, Index steps) {
+  if (fault.empty()) return;
+  throw Error("[train] training collapsed after " + std::to_string(steps) + " steps: " + fault +
+              ". The scene was taken for type " + nerf::name_of(set.scene) + " (" + set.scene_reason +
+              "): check that cameras and images belong together");
+}
+
+void warn_of(const std::vector<std::string>& notes) {
+  constexpr Index kCallerOfTrain = 2;  // the one of fieldmark.train()
+  for (const std::string& note : notes)
+    if (PyErr_WarnEx(PyExc_UserWarning, note.c_str(), kCallerOfTrain) != 0) throw py::error_already_set();
+}
+
 std::shared_ptr<RadianceField> train(const std::filesystem::path& data, double seconds, Index steps,
                                      Index size, std::uint64_t seed, const py::object& progress) {
   nerf::TrainOptions options = nerf::train_options(nerf::FieldKind::hash);
   options.schedule.seconds = seconds;
   options.schedule.steps = steps;
   options.seed = seed;
-  const nerf::Dataset set = unlocked([&] { return nerf::load_dataset(data, {.size = size}); });
-  auto field = std::make_shared<RadianceField>(nerf::field_options(options.schedule));
-  nerf::Trainer trainer(*field, set, options);
-  run(trainer, progress);
+  const nerf::DatasetOptions wanted{.size = size};
+  const nerf::Dataset set = unlocked([&] { return nerf::load_dataset(data, wanted); });
+  warn_of(set.notes);
+  nerf::RadianceFieldOptions sizes = nerf::field_options(options.schedule);
+  sizes.seed = seed;
+  std::shared_ptr<RadianceField> field;
+  std::optional<nerf::Trainer> trainer;
+  std::unique_ptr<nerf::CollapseWatch> watch;
+  unlocked([&] {
+    field = std::make_shared<RadianceField>(sizes);
+    trainer.emplace(*field, set, options);
+    watch.reset(new nerf::CollapseWatch(collapse_watch(*field, data, wanted, set)));
+  });
+  run(*trainer, progress, [&] {
+    const Index taken = trainer->steps();
+    require_healthy(watch->look(taken, trainer->train_psnr(), trainer->seconds()), set, taken);
+  });
+  unlocked([&] { require_healthy(watch->verdict(trainer->steps()), set, trainer->steps()); });
   return field;
 }
 
@@ -62,17 +127,23 @@ py::dict evaluate(const RadianceField& field, const std::filesystem::path& data,
 }
 
 void bind_camera(py::module_& module) {
-  py::class_<Camera>(module, "Camera")
-      .def(
-          py::init(&camera_from), "pose"_a, "fov"_a, "width"_a, "height"_a,
-          "A centred pinhole camera: pose [3, 4] from camera to world, x right, y up, looking along -z; fov\n"
-          "is the horizontal field of view in radians.")
-      .def_readonly("width", &Camera::width)
-      .def_readonly("height", &Camera::height)
-      .def_property_readonly("pose",
-                             [](const Camera& c) {
-                               return py::array_t<double>({3, 4}, c.pose.data());
-                             })
+  py::class_<Camera>(module, "Camera", "A pinhole camera.")
+      .def(py::init(&camera_from), "pose"_a, "fov"_a, "width"_a, "height"_a,
+           "A centred pinhole camera with square pixels.\n\n"
+           ":param pose: float64 [3, 4] from camera to world, or [4, 4] with the last row 0, 0, 0, 1; x "
+           "right,\n"
+           "    y up, looking along -z\n"
+           ":param fov: horizontal field of view in radians, in (0, pi)\n"
+           ":param width: pixels, at least 1\n"
+           ":param height: pixels, at least 1")
+      .def_readonly("width", &Camera::width, "Pixels.")
+      .def_readonly("height", &Camera::height, "Pixels.")
+      .def_property_readonly(
+          "pose",
+          [](const Camera& c) {
+            return py::array_t<double>({3, 4}, c.pose.data());
+          },
+          "A copy of the pose, [3, 4] from camera to world.")
       .def(
           "scaled", [](const Camera& c, Index size) { return c.scaled(size); }, "size"_a,
           "The same view with this many pixels on the longer side.");
@@ -91,20 +162,26 @@ bool check_signals(Index /*done*/, Index /*total*/) {
   return true;
 }
 
-void run(TrainingRun& training, const py::object& progress) {
+void run(TrainingRun& training, const py::object& progress, const std::function<void()>& check) {
   unlocked([&] {
-    return training.drive({.after = [&](double seconds) {
-      if (training.steps() % kQuiet != 0) return;
-      const py::gil_scoped_acquire held;
-      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-      if (!progress.is_none()) progress(training.steps(), seconds);
-    }});
+    return training.drive({.enough =
+                               [&] {
+                                 if (check) check();
+                                 return false;
+                               },
+                           .after =
+                               [&](double seconds) {
+                                 if (training.steps() % kQuiet != 0) return;
+                                 const py::gil_scoped_acquire held;
+                                 if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+                                 if (!progress.is_none()) progress(training.steps(), seconds);
+                               }});
   });
 }
 
 void bind_fields(py::module_& module) {
   bind_camera(module);
-  py::class_<RadianceField, std::shared_ptr<RadianceField>>(module, "Field")
+  py::class_<RadianceField, std::shared_ptr<RadianceField>>(module, "Field", "A radiance field.")
       .def_static(
           "load",
           [](const std::filesystem::path& path) {
@@ -118,7 +195,11 @@ void bind_fields(py::module_& module) {
             return nerf::make_cameras(f.cameras, nerf::parse_camera_set(set), count, size, seed);
           },
           "count"_a, "set"_a = "novel", "size"_a = 0, "seed"_a = 0,
-          "Cameras about the scene: novel, ring, sphere, extrapolated, closer or farther.")
+          "Cameras about the scene.\n\n"
+          ":param count: how many, at least 1\n"
+          ":param set: novel, ring, sphere, extrapolated, closer or farther\n"
+          ":param size: pixels of the longer side; 0: as in the training images\n"
+          ":param seed: of the random cameras")
       .def(
           "render",
           [](const RadianceField& f, const Camera& camera) {
@@ -127,9 +208,12 @@ void bind_fields(py::module_& module) {
               return std::move(renderer.render(camera).rgb);
             }));
           },
-          "camera"_a, "An image [height, width, 3] in [0, 1].")
+          "camera"_a, "An image of float32, [height, width, 3], in [0, 1].")
       .def("evaluate", &evaluate, "data"_a, "split"_a = "test", "size"_a = 0,
-           "Mean PSNR in dB and SSIM over the views of a split.");
+           "A dict with psnr in dB and ssim, means over the views of a split.\n\n"
+           ":param data: folder of a data set\n"
+           ":param split: train, val or test\n"
+           ":param size: pixels of the longer side that images are reduced to; 0: as they are");
   module.def("train", &train, "data"_a, "seconds"_a, "steps"_a, "size"_a, "seed"_a, "progress"_a);
 }
 

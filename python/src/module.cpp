@@ -1,14 +1,33 @@
 // The extension module: errors first, then engine, fields and marks.
+#include <string>
+
 #include "arrays.h"
 
 namespace py = pybind11;
 
+namespace {
+
+// Before version 2.12, pybind11 reads NumPy 1's layout of dtypes, which is another in NumPy 2.
+void require_known_numpy() {
+#if PYBIND11_VERSION_HEX < 0x020C0000
+  const auto version = py::module_::import("numpy").attr("__version__").cast<std::string>();
+  if (std::stoi(version) >= 2)
+    throw py::import_error("[fieldmark] this build needs NumPy 1, got " + version +
+                           ": install \"numpy<2\", or build with pybind11 2.12 or later");
+#endif
+}
+
+}  // namespace
+
 PYBIND11_MODULE(_fieldmark, module) {
-  // Derives from Python's own exceptions, so that `except ValueError` and `except OSError` work as expected.
-  py::register_exception<fieldmark::Error>(module, "Error", PyExc_RuntimeError);
-  py::register_exception<fieldmark::ValueError>(module, "ValueError_", PyExc_ValueError);
-  py::register_exception<fieldmark::ShapeError>(module, "ShapeError", PyExc_ValueError);
-  py::register_exception<fieldmark::IoError>(module, "IoError", PyExc_OSError);
+  require_known_numpy();
+  // Each derives from one of Python's own exceptions too, so that `except ValueError` works as expected.
+  const py::object error = py::register_exception<fieldmark::Error>(module, "Error", PyExc_RuntimeError);
+  const py::tuple value_error = py::make_tuple(error, py::handle(PyExc_ValueError));
+  py::register_exception<fieldmark::ValueError>(module, "ValueError_", value_error);
+  py::register_exception<fieldmark::ShapeError>(module, "ShapeError", value_error);
+  py::register_exception<fieldmark::IoError>(module, "IoError",
+                                             py::make_tuple(error, py::handle(PyExc_OSError)));
   fieldmark::python::bind_engine(module);
   fieldmark::python::bind_fields(module);
   fieldmark::python::bind_marks(module);

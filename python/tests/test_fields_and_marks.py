@@ -1,32 +1,40 @@
 """A small job from a data set to the verdict, and the same bytes as the command's own formats."""
 
+import json
+import re
+import shutil
+import struct
 import threading
 import time
+import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fieldmark as fm
-from ball import look_at
+from ball import SIZE, look_at, write_ball, write_png
 
-@pytest.fixture(scope="module")
-def field(scene):
-    return fm.train(scene, steps=150)
-
-
-@pytest.fixture(scope="module")
-def owner(field, tmp_path_factory):
-    return fm.embed(field, fm.Key.random(), bits=4, steps=20, views=8)
 
 
 def test_a_field_learns_its_scene(scene, field):
     assert field.evaluate(scene)["psnr"] > 18
 
 
-def test_equal_seeds_give_equal_fields(scene, tmp_path):
-    for name in ("a", "b"):
-        fm.train(scene, steps=5, seed=3).save(tmp_path / name)
+def features(path):
+    """The features of a field's table, from its safetensors file."""
+    content = path.read_bytes()
+    length, = struct.unpack("<Q", content[:8])
+    begin, end = json.loads(content[8:8 + length])["hash/density_features"]["data_offsets"]
+    return np.frombuffer(content[8 + length + begin:8 + length + end], "float32")
+
+
+def test_equal_seeds_give_equal_fields_and_others_other_ones(scene, tmp_path):
+    for name, seed in (("a", 3), ("b", 3), ("c", 4)):
+        fm.train(scene, steps=1, seed=seed).save(tmp_path / name)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+    a, c = (features(tmp_path / name) for name in ("a", "c"))
+    assert (a != c).mean() > 0.99  # the initial ones too, of which one step changes four fifths
 
 
 def test_a_file_gives_the_same_images(field, tmp_path):
@@ -58,14 +66,20 @@ def test_the_mark_psnr_suits_the_scene_unless_given(field, owner):
         fm.embed(field, fm.Key.random(), bits=4, steps=1, views=8, mark_psnr=0)
 
 
-def test_a_marked_field_is_read_and_its_evidence_bounded(owner, tmp_path):
-    marked = fm.bake(owner, "a", steps=10)
+def test_a_marked_field_is_read_and_its_evidence_bounded(owner, marked, tmp_path):
     images = [marked.render(camera) for camera in marked.cameras(2, size=32)]
     read = owner.extract(images, detection="blind")
-    assert len(read["message"]) == 1 and len(read["logits"]) == len(read["p_values"]) == 4
-    assert 0 < read["p_noise"] <= 1
-    verdict = owner.verify("a", images, detection="blind")
-    assert 0 < verdict["p_value"] <= 1 and verdict["bits"] == 4
+    assert len(read["message"]) == 4 and len(read["logits"]) == len(read["bit_p_values"]) == len(read["bits"]) == 16
+    assert 0 < read["p_noise"] <= 1 and read["read"] == (read["p_noise"] <= read["fpr"])
+    assert read["detection"] == "blind" and [v["detection"] for v in read["views"]] == ["blind"] * 2
+    assert len(read["views"][0]["logits"]) == 16
+    verdict = owner.verify("a5c3", images, detection="blind")
+    assert 0 < verdict["p_value"] <= verdict["p_value_two_sided"] <= 1 and verdict["bits"] == 16
+    assert 0 < verdict["p_value_bits"] <= 1 and 0 < verdict["p_value_bits_two_sided"] <= 1
+    assert verdict["p_noise"] == read["p_noise"] and verdict["detection"] == "blind" and verdict["views"] == 2
+    assert 0 <= verdict["contradicting_bits"] <= 16 - verdict["matching_bits"]
+    assert len(verdict["per_view"]) == 2 and len(verdict["per_view"][0]["bit_p_values"]) == 16
+    assert verdict["found"] == (verdict["p_value"] <= 1e-6) and owner.verify("a5c3", images, "blind", fpr=1)["found"]
     owner.save(tmp_path / "owner.fm")
     assert fm.Owner.load(tmp_path / "owner.fm").extract(images, detection="blind") == read
 
@@ -83,18 +97,103 @@ def test_errors_name_what_is_wrong(scene, field, owner, tmp_path):
         fm.bake(owner, "aa", steps=1)
     with pytest.raises(fm.ShapeError, match="camera to world"):
         fm.Camera(np.eye(2), 0.7, 10, 10)
-    with pytest.raises(ValueError, match="images must not be empty"):
+
+
+def test_results_have_the_keys_of_the_command(owner):
+    """Those of docs/json.md, but for what needs files, controls or a second key."""
+    text = (Path(__file__).resolve().parents[2] / "docs" / "json.md").read_text()
+
+    def keys(command):
+        section = re.search(rf"^## {command}$(.*?)^## ", text, re.MULTILINE | re.DOTALL).group(1)
+        return {key for line in section.splitlines() if line.startswith("| `")
+                for key in re.findall(r"`(\w+)`", line.split("|")[1])}
+
+    image = np.random.default_rng(0).random((16, 16, 3), dtype="float32")
+    assert set(owner.extract(image, "blind")) == keys("extract")
+    assert set(owner.verify("a5c3", image, "blind")) == keys("verify") - {
+        "owner_sha256", "commitment", "copy", "controls", "wrong_keys"}
+
+
+def test_images_are_checked_before_any_is_read(owner):
+    good = np.zeros((16, 16, 3), "float32")
+    with pytest.raises(ValueError, match=r"^\[extract\] images must not be empty"):
         owner.extract([])
-    with pytest.raises(TypeError, match="must be of float32, got uint8"):
-        owner.extract([np.zeros((8, 8, 3), "uint8")])
-    with pytest.raises(ValueError, match="auto or blind, got 'seen'"):
-        owner.extract([np.zeros((8, 8, 3), "float32")], detection="seen")
+    with pytest.raises(TypeError, match=r"^\[extract: images\[1\]\] must be of float32, got uint8"):
+        owner.extract([good, good.astype("uint8")])
+    with pytest.raises(TypeError, match=r"^\[verify\] images must be a list of arrays \[height, width, 3\], got int"):
+        owner.verify("a5c3", 3)
+    for bad in (good[0], good[..., :1], good[:8], good[None]):
+        with pytest.raises(fm.ShapeError, match=r"^\[extract: images\[2\]\] must be \[height, width, 3\] with sides of"):
+            owner.extract([good, good, np.ascontiguousarray(bad)])
+    for value in (255, -0.5, np.nan):
+        with pytest.raises(ValueError, match=r"^\[verify: images\[1\]\] must be in \[0, 1\] \(divide 8-bit values by 255\), "
+                                             "got"):
+            owner.verify("a5c3", [good, np.full((16, 16, 3), value, "float32")])
+    with pytest.raises(ValueError, match="detection must be auto, blind or informed, got 'seen'"):
+        owner.extract([good], detection="seen")
+    for fpr in (0, 2, np.nan):
+        with pytest.raises(ValueError, match=r"fpr must be in \(0, 1\], got"):
+            owner.extract([good], fpr=fpr)
 
 
-def test_pixels_outside_the_unit_interval_are_refused(owner):
-    for image in (np.full((8, 8, 3), 255, "float32"), np.full((8, 8, 3), -0.5, "float32")):
-        with pytest.raises(ValueError, match=r"in \[0, 1\] \(divide 8-bit values by 255\), got"):
-            owner.verify("a", [image])
+def test_one_image_a_list_and_a_generator_are_read_alike(owner):
+    image = np.random.default_rng(1).random((16, 20, 3), dtype="float32")
+    one = owner.extract(image, "blind")
+    assert one == owner.extract([image], "blind") == owner.extract(image[None], "blind")
+    assert one == owner.extract((i for i in [image]), "blind")
+
+
+def test_cameras_are_checked():
+    pose = look_at(np.array([0.0, 4.0, 1.0]))
+    assert fm.Camera(np.vstack([pose, [0, 0, 0, 1]]), 0.7, 4, 3).height == 3
+    with pytest.raises(ValueError, match=r"^\[Camera\] pose must be finite"):
+        fm.Camera(pose * np.nan, 0.7, 4, 3)
+    with pytest.raises(ValueError, match=r"^\[Camera\] pose must end with the row 0, 0, 0, 1, got"):
+        fm.Camera(np.ones((4, 4)), 0.7, 4, 3)
+    for fov in (0, 4, np.nan):
+        with pytest.raises(ValueError, match=r"^\[Camera\] fov must be in \(0, pi\) radians"):
+            fm.Camera(pose, fov, 4, 3)
+    with pytest.raises(ValueError, match=r"^\[Camera\] width and height must be at least 1, got 0 and 3"):
+        fm.Camera(pose, 0.7, 0, 3)
+
+
+def test_options_are_checked_before_the_work(scene, field, owner):
+    key = fm.Key.random()
+    for wrong in ({"bits": 0}, {"bits": 257}, {"views": 7}, {"mark_psnr": 61}, {"mark_psnr": np.nan}, {"seed": -1}):
+        with pytest.raises(fm.Error, match=rf"^\[embed\] {list(wrong)[0]} must be"):
+            fm.embed(field, key, seconds=1e6, **wrong)
+    with pytest.raises(TypeError, match=r"^\[embed\] bits must be an integer, got float"):
+        fm.embed(field, key, bits=1.5)
+    with pytest.raises(TypeError, match=r"^\[embed\] field must be Field, got NoneType"):
+        fm.embed(None, key)
+    with pytest.raises(TypeError, match=r"^\[bake\] owner must be Owner, got NoneType"):
+        fm.bake(None, "a")
+    with pytest.raises(TypeError, match=r"^\[bake\] message must be str, got int"):
+        fm.bake(owner, 10)
+    with pytest.raises(ValueError, match=r"^\[train\] seed must be 0 to"):
+        fm.train(scene, seed=-1)
+
+
+def test_a_collapsed_training_raises(tmp_path):
+    folder = tmp_path / "nothing"
+    write_ball(folder)
+    for image in folder.glob("*/*.png"):
+        write_png(image, np.zeros((SIZE, SIZE, 4)))
+    with pytest.raises(fm.Error, match=r"^\[train\] training collapsed after \d+ steps: .*taken for type"):
+        fm.train(folder, steps=500)
+
+
+def test_remarks_on_a_data_set_are_warnings(scene, tmp_path):
+    folder = tmp_path / "held_out"
+    shutil.copytree(scene, folder)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fm.train(folder, steps=1)
+    (folder / "transforms_train.json").rename(folder / "transforms.json")
+    (folder / "transforms_test.json").unlink()
+    with pytest.warns(UserWarning, match="held out for val and test") as told:
+        fm.train(folder, steps=1)
+    assert told[0].filename == __file__
 
 
 def test_the_ground_truth_is_composited_over_the_background_of_the_field(scene, field, tmp_path):

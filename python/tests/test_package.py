@@ -39,9 +39,20 @@ def test_a_wheel_has_the_version_and_needs_of_the_project(project):
     version = re.search(r"^project\(fieldmark VERSION (\S+)", cmake, re.MULTILINE).group(1)
     text = metadata.read_text()
     assert f"\nName: fieldmark\nVersion: {version}\n" in text
-    assert "\nRequires-Dist: numpy" in text and "\nRequires-Python: >=3.9" in text
+    assert re.search(r"^Requires-Dist: numpy(?: ?\(?<2\)?)?$", text, re.MULTILINE) and "\nRequires-Python: >=3.9" in text
 
 
 def test_a_wheel_has_the_modules_and_their_types(project):
     installed = {path.name for path in (project / "lib" / "fieldmark").iterdir()}
     assert installed == {"__init__.py", "engine.py", "_fieldmark.pyi", "py.typed"}
+
+
+def test_a_module_that_reads_the_layout_of_numpy_1_refuses_numpy_2(project):
+    metadata, = (project / "metadata").glob("*.dist-info/METADATA")
+    needs_1 = re.search(r"^Requires-Dist: numpy.*<2", metadata.read_text(), re.MULTILINE)
+    program = "import numpy; numpy.__version__ = '2.1.0'; import fieldmark"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    if needs_1:
+        assert "ImportError: [fieldmark] this build needs NumPy 1, got 2.1.0: install \"numpy<2\"" in done.stderr
+    else:
+        assert done.returncode == 0, done.stderr
