@@ -7,7 +7,7 @@
     x.grad
 
 A value holds until ``tape.reset()``. Arrays that ``numpy()`` and ``grad`` give show the tape's own memory;
-while one of them lives, the tape refuses to be reset. Arrays that a tape reads are read-only until then.
+the next ``backward()`` overwrites those of ``grad``, and while one of them lives, the tape refuses to be reset. Arrays that a tape reads are read-only until then.
 """
 
 from __future__ import annotations
@@ -213,9 +213,10 @@ def Inspector(tape: Any, *, stop_at_nonfinite: bool = False) -> Any:
 
 def gradcheck(f: Callable[..., Value_float64], inputs: Sequence[npt.NDArray[np.float64]],
               rtol: float = 1e-7) -> GradcheckReport:
-    """Compares gradients with finite differences, in float64.
+    """Compares gradients with finite differences, in float64. The report is true if no gradient is wrong.
 
     :param f: takes a value for each input and returns one
     :param inputs: arrays of float64
+    :param rtol: largest relative error of a gradient, see ``GradcheckReport.worst``
     """
     return _fieldmark.gradcheck(f, list(inputs), rtol)

@@ -25,6 +25,12 @@ inline std::string type_name(const py::handle& object) {
   return py::str(py::type::of(object).attr("__name__")).cast<std::string>();
 }
 
+/// Whether an object is a number of Python or numpy.
+inline bool is_number(const py::handle& object) {
+  return PyFloat_Check(object.ptr()) || PyLong_Check(object.ptr()) ||
+         py::isinstance(object, py::module_::import("numpy").attr("number"));
+}
+
 /// Borrows a numpy array of T in row-major order without copying its elements.
 /// @param where  "function: argument", for error messages
 /// @throws TypeError for another element type, or a mask   @throws ValueError for another layout
@@ -32,7 +38,8 @@ template <class T>
 py::array borrowed(const std::string& where, const py::object& object) {
   const std::string wanted = dtype_name<T>();
   if (!py::isinstance<py::array>(object))
-    throw py::type_error("[" + where + "] must be a numpy array of " + wanted + ", got " + type_name(object));
+    throw py::type_error("[" + where + "] must be a numpy array of " + wanted + ", got " + type_name(object) +
+                         (is_number(object) ? ": pass numpy.full((), x, '" + wanted + "')" : ""));
   const auto array = py::reinterpret_borrow<py::array>(object);
   if (py::hasattr(object, "mask"))  // some elements of a masked array do not count
     throw py::type_error("[" + where + "] must not be masked: pass x.filled(value)");
@@ -41,11 +48,11 @@ py::array borrowed(const std::string& where, const py::object& object) {
                          py::str(array.dtype()).cast<std::string>() + ": convert it with x.astype('" +
                          wanted + "')");
   if (!(array.flags() & py::array::c_style))
-    throw py::value_error("[" + where +
-                          "] must be contiguous in row-major order: pass numpy.ascontiguousarray(x)");
+    throw ValueError("[" + where +
+                     "] must be contiguous in row-major order: pass numpy.ascontiguousarray(x)");
   if (!(array.flags() & py::detail::npy_api::NPY_ARRAY_ALIGNED_))
-    throw py::value_error("[" + where + "] must be aligned to the " + std::to_string(sizeof(T)) +
-                          " bytes of its elements: pass x.copy()");
+    throw ValueError("[" + where + "] must be aligned to the " + std::to_string(sizeof(T)) +
+                     " bytes of its elements: pass x.copy()");
   return array;
 }
 

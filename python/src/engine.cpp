@@ -8,12 +8,41 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <cstdio>
+
 #include "tape_value.h"
 
 namespace fieldmark::python {
 namespace {
 
+// An argument of any type. Unlike py::object, it does not match before all overloads were tried with
+// conversions.
+struct Anything {
+  py::object given;
+};
+
+}  // namespace
+}  // namespace fieldmark::python
+
+namespace pybind11::detail {
+
+template <>
+struct type_caster<fieldmark::python::Anything> {
+  PYBIND11_TYPE_CASTER(fieldmark::python::Anything, const_name("object"));
+  bool load(handle given, bool convert) {
+    value.given = reinterpret_borrow<object>(given);
+    return convert;
+  }
+};
+
+}  // namespace pybind11::detail
+
+namespace fieldmark::python {
+namespace {
+
 using namespace py::literals;
+
+constexpr Index kMostThreads = 1024;
 
 template <class T>
 void bind_engine_of(py::module_& module, const std::string& suffix) {
@@ -23,6 +52,25 @@ void bind_engine_of(py::module_& module, const std::string& suffix) {
   bind_parameters<T>(module, suffix);
   bind_layers<T>(module, suffix);
   bind_inspector<T>(module, suffix);
+}
+
+// Adds a last overload to each function of both scalar types, which says what argument does not fit.
+void bind_refusals(py::module_& module) {
+  for (const auto& [name, function] : py::dict(module.attr("__dict__"))) {
+    if (!PyCFunction_Check(function.ptr())) continue;
+    const std::string text = py::str(function.attr("__doc__"));
+    if (text.find("\nOverloaded function.\n") == std::string::npos) continue;
+    const std::string op = py::str(name);
+    module.def(
+        op.c_str(),
+        [op](const Anything& first, const py::args& others, const py::kwargs& named) {
+          py::list all;
+          if (!first.given.is(py::ellipsis())) all.append(first.given);
+          for (const py::handle other : others) all.append(other);
+          py::module_::import("fieldmark._refusal").attr("refuse")(op, all, named);
+        },
+        "_argument"_a = py::ellipsis(), "Raises TypeError for other arguments.");
+  }
 }
 
 // The inputs as values of gradcheck()'s own tape, which forgets them when the check ends.
@@ -64,18 +112,27 @@ GradcheckReport check_gradients(const py::function& f, const std::vector<py::obj
 }
 
 void bind_reports(py::module_& module) {
-  py::class_<GradcheckReport>(module, "GradcheckReport")
+  py::class_<GradcheckReport>(module, "GradcheckReport", "What gradcheck() found; true if no entry is bad.")
       .def_readonly("ok", &GradcheckReport::ok, "Whether no entry is bad.")
       .def_readonly("worst", &GradcheckReport::worst, "Largest relative error.")
       .def_readonly("entries", &GradcheckReport::entries, "Entries compared.")
-      .def_readonly("table", &GradcheckReport::table, "One line per bad entry.");
-  py::class_<OpCost>(module, "OpCost")
-      .def_readonly("op", &OpCost::op)
-      .def_readonly("calls", &OpCost::calls)
-      .def_readonly("forward_seconds", &OpCost::forward_seconds)
-      .def_readonly("backward_seconds", &OpCost::backward_seconds)
-      .def_readonly("forward_bytes", &OpCost::forward_bytes)
-      .def_readonly("backward_bytes", &OpCost::backward_bytes);
+      .def_readonly("table", &GradcheckReport::table, "One line per bad entry.")
+      .def(
+          "__bool__", [](const GradcheckReport& r) { return r.ok; }, "Whether no entry is bad, as ok.")
+      .def("__repr__", [](const GradcheckReport& r) {
+        char text[120];
+        std::snprintf(text, sizeof text, "<fieldmark gradcheck, %s: worst error %.3g of %lld entries>",
+                      r.ok ? "ok" : "failed", r.worst, static_cast<long long>(r.entries));
+        return std::string(text);
+      });
+  py::class_<OpCost>(module, "OpCost", "Time and memory of all calls of an op.")
+      .def_readonly("op", &OpCost::op, "Name of the op.")
+      .def_readonly("calls", &OpCost::calls, "Number of calls.")
+      .def_readonly("forward_seconds", &OpCost::forward_seconds, "Seconds of all forwards.")
+      .def_readonly("backward_seconds", &OpCost::backward_seconds, "Seconds of all backwards.")
+      .def_readonly("forward_bytes", &OpCost::forward_bytes, "Bytes that the forwards took from the tape.")
+      .def_readonly("backward_bytes", &OpCost::backward_bytes,
+                    "Bytes that the backwards took from the tape.");
   py::class_<BatchStatistics>(module, "BatchStatistics", "Statistics of a batch, one value for each channel.")
       .def(py::init<>())
       .def_property_readonly(
@@ -119,9 +176,19 @@ void bind_engine(py::module_& module) {
   bind_decays(module);
   bind_engine_of<float>(module, "float32");
   bind_engine_of<double>(module, "float64");
-  module.def("gradcheck", &check_gradients, "f"_a, "inputs"_a, "rtol"_a = 1e-7);
+  bind_refusals(module);
+  module.def("gradcheck", &check_gradients, "f"_a, "inputs"_a, "rtol"_a = 1e-7,
+             "Compares gradients with finite differences, in float64.");
   module.def("threads", &threads, "The number of threads that work is shared among.");
-  module.def("set_threads", &set_threads, "count"_a, "Sets the number of threads.");
+  module.def(
+      "set_threads",
+      [](Index count) {
+        if (count < 1 || count > kMostThreads)
+          throw ValueError("[set_threads] count must be from 1 to " + std::to_string(kMostThreads) +
+                           ", got " + std::to_string(count));
+        set_threads(static_cast<int>(count));
+      },
+      "count"_a, "Sets the number of threads, 1 to 1024. ValueError otherwise.");
 }
 
 }  // namespace fieldmark::python

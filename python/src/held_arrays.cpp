@@ -62,18 +62,16 @@ void HeldArrays::release() {
 
 void PassMemory::check_read(const char* where, const Memory& values) const {
   if (meets(added_to_, values))
-    throw py::value_error(
-        std::string("[") + where +
-        "] shares memory with a gradient of this pass, which backward changes: pass x.copy()");
+    throw ValueError(std::string("[") + where +
+                     "] shares memory with a gradient of this pass, which backward changes: pass x.copy()");
 }
 
 void PassMemory::check_leaf(const char* where, const Memory& values, const Memory& grads) const {
   check_read(where, values);
   if (meets(read_, grads) || meet(values, grads))
-    throw py::value_error(
-        std::string("[") + where +
-        "] grad shares memory with an array that this pass reads, which backward would change: "
-        "pass one of its own, such as numpy.zeros_like(x)");
+    throw ValueError(std::string("[") + where +
+                     "] grad shares memory with an array that this pass reads, which backward would change: "
+                     "pass one of its own, such as numpy.zeros_like(x)");
 }
 
 void PassMemory::forget() {

@@ -44,6 +44,11 @@ class PassMemory {
     read_.push_back(values);
     added_to_.push_back(grads);
   }
+  /// Undoes the last add_leaf(), if no other memory was added since.
+  void forget_last_leaf() {
+    read_.pop_back();
+    added_to_.pop_back();
+  }
   void forget();
 
  private:

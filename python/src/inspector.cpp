@@ -21,7 +21,7 @@ struct InspectorHandle {
     inspector.emplace(tape->tape, InspectOptions{.stop_at_nonfinite = stop_at_nonfinite});
   }
   const TapeInspector<T>& open() const {
-    if (!inspector) throw py::value_error("[Inspector] it is closed");
+    if (!inspector) throw ValueError("[Inspector] it is closed");
     return *inspector;
   }
 };
@@ -31,13 +31,16 @@ struct InspectorHandle {
 template <class T>
 void bind_inspector(py::module_& module, const std::string& suffix) {
   using Handle = InspectorHandle<T>;
-  py::class_<Handle>(module, ("Inspector_" + suffix).c_str())
-      .def(py::init<std::shared_ptr<TapeHandle<T>>, bool>(), "tape"_a, "stop_at_nonfinite"_a)
+  py::class_<Handle>(module, ("Inspector_" + suffix).c_str(),
+                     "Looks at what a tape records, until it is closed.")
+      .def(py::init<std::shared_ptr<TapeHandle<T>>, bool>(), py::arg("tape").none(false),
+           "stop_at_nonfinite"_a)
       .def(
           "text", [](const Handle& h) { return h.open().text(); },
           "The graph of this pass, one line for each value.")
       .def(
-          "dot", [](const Handle& h) { return h.open().dot(); }, "The same in the language of Graphviz.")
+          "dot", [](const Handle& h) { return h.open().dot(); },
+          "The graph of this pass in the language of Graphviz.")
       .def(
           "costs", [](const Handle& h) { return h.open().costs(); },
           "Time and memory by op since the inspector was made; the most expensive first.")

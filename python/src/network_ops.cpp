@@ -11,6 +11,7 @@
 #include <fieldmark/engine/ops/resample.h>
 #include <fieldmark/engine/ops/softmax.h>
 
+#include "number_argument.h"
 #include "relu_argument.h"
 #include "tape_value.h"
 
@@ -43,14 +44,14 @@ void bind_norms(py::module_& module) {
   using V = const Value<T>&;
   module.def(
       "layer_norm",
-      [](V x, V gamma, V beta, double eps) {
+      [](V x, V gamma, V beta, Number eps) {
         return x.with(layer_norm(x.get(), gamma.get(), beta.get(), eps));
       },
       "x"_a, "gamma"_a, "beta"_a, "eps"_a = 1e-5,
       once<T>("gamma (x - mean) / sqrt(var + eps) + beta with the statistics of each row of the last axis."));
   module.def(
       "group_norm",
-      [](V x, V gamma, V beta, Index groups, double eps, bool relu) {
+      [](V x, V gamma, V beta, Index groups, Number eps, bool relu) {
         return x.with(group_norm(x.get(), gamma.get(), beta.get(),
                                  GroupNormOptions{.groups = groups, .eps = eps, .relu = relu}));
       },
@@ -60,7 +61,7 @@ void bind_norms(py::module_& module) {
               "groups of neighbouring channels."));
   module.def(
       "batch_norm",
-      [](V x, V gamma, V beta, double eps, bool relu, BatchStatistics* statistics) {
+      [](V x, V gamma, V beta, Number eps, bool relu, BatchStatistics* statistics) {
         return x.with(batch_norm(x.get(), gamma.get(), beta.get(), BatchNormOptions{.eps = eps, .relu = relu},
                                  statistics));
       },
@@ -70,14 +71,16 @@ void bind_norms(py::module_& module) {
               "which go to `statistics` too."));
   module.def(
       "batch_norm_fixed",
-      [](V x, V gamma, V beta, const py::object& mean, const py::object& variance, double eps, bool relu) {
+      [](V x, V gamma, V beta, const py::object& mean, const py::object& variance, Number eps, bool relu) {
         const py::array m = borrowed<T>("batch_norm_fixed: mean", mean),
                         v = borrowed<T>("batch_norm_fixed: variance", variance);
         return x.with(batch_norm_fixed(x.get(), gamma.get(), beta.get(), elements<T>(m), elements<T>(v),
                                        BatchNormOptions{.eps = eps, .relu = relu}));
       },
       "x"_a, "gamma"_a, "beta"_a, "mean"_a, "variance"_a, "eps"_a = 1e-5, "relu"_a = false,
-      once<T>("The same with given statistics [C], which are copied."));
+      once<T>("gamma (x - mean) / sqrt(variance + eps) + beta of images [N, H, W, C], with given statistics "
+              "[C],\n"
+              "arrays that are copied. ValueError unless eps is above 0 and each variance at least 0."));
 }
 
 Interpolation interpolation_of(const std::string& name) {
@@ -110,8 +113,12 @@ void bind_resampling(py::module_& module) {
         return x.with(upsample_to(x.get(), height, width, interpolation_of(mode)));
       },
       "x"_a, "height"_a, "width"_a, "mode"_a = "bilinear",
-      once<T>("Resamples images [N, H, W, C] to [N, height, width, C], bilinear or nearest; the corners "
-              "coincide."));
+      once<T>(
+          "Resamples images [N, H, W, C] to [N, height, width, C], bilinear or nearest, with half-pixel "
+          "centres as\n"
+          "PyTorch's align_corners=False: pixel i is at (i + 1/2) H / height - 1/2. It does not filter, so "
+          "average\n"
+          "before you shrink."));
 }
 
 // Returns an array of the given shape, which backward reads.
@@ -156,17 +163,19 @@ void bind_losses(py::module_& module) {
         const auto w = weights_of("l1_loss: weights", a, a.get().shape(), weights);
         return a.with(l1_loss(a.get(), b.get(), w.elements), w);
       },
-      "a"_a, "b"_a, "weights"_a = py::none(), once<T>("The mean of |a - b|; weights as for mse_loss."));
+      "a"_a, "b"_a, "weights"_a = py::none(),
+      once<T>(
+          "The mean of |a - b|; `weights`, an array >= 0 of the shape of a, makes it sum w |d| / sum w."));
   module.def(
       "huber_loss",
-      [](V a, V b, double delta, Object weights) {
+      [](V a, V b, Number delta, Object weights) {
         const auto w = weights_of("huber_loss: weights", a, a.get().shape(), weights);
         return a.with(huber_loss(a.get(), b.get(), delta, w.elements), w);
       },
       "a"_a, "b"_a, "delta"_a, "weights"_a = py::none(),
-      once<T>("The mean of d^2 / 2 where |d| = |a - b| <= delta, else of delta (|d| - delta / 2); weights as "
-              "for\n"
-              "mse_loss."));
+      once<T>(
+          "The mean of d^2 / 2 where |d| = |a - b| <= delta, else of delta (|d| - delta / 2); delta > 0;\n"
+          "`weights`, an array >= 0 of the shape of a, makes it a weighted mean."));
   module.def(
       "bce_with_logits",
       [](V logits, Object targets, Object weights) {
@@ -177,7 +186,8 @@ void bind_losses(py::module_& module) {
       },
       "logits"_a, "targets"_a, "weights"_a = py::none(),
       once<T>(
-          "The mean cross-entropy of logits against targets, an array in [0, 1]; weights as for mse_loss."));
+          "The mean cross-entropy of logits against targets, an array in [0, 1]; `weights`, an array >= 0 of "
+          "the\nshape of logits, makes it a weighted mean."));
   module.def(
       "softmax_cross_entropy",
       [](V logits, Object labels, Object weights) {

@@ -21,6 +21,7 @@
 
 #include <limits>
 
+#include "number_argument.h"
 #include "tape_value.h"
 
 namespace fieldmark::python {
@@ -132,16 +133,16 @@ template <class T>
 void bind_maps_with_options(py::module_& module) {
   using V = const Value<T>&;
   module.def(
-      "leaky_relu", [](V x, double slope) { return x.with(leaky_relu(x.get(), slope)); }, "x"_a,
+      "leaky_relu", [](V x, Number slope) { return x.with(leaky_relu(x.get(), slope)); }, "x"_a,
       "slope"_a = 0.01, once<T>("x where x > 0, else slope x."));
   module.def(
-      "elu", [](V x, double alpha) { return x.with(elu(x.get(), alpha)); }, "x"_a, "alpha"_a = 1.0,
+      "elu", [](V x, Number alpha) { return x.with(elu(x.get(), alpha)); }, "x"_a, "alpha"_a = 1.0,
       once<T>("x where x > 0, else alpha (exp(x) - 1)."));
   module.def(
-      "affine", [](V x, double factor, double offset) { return x.with(affine(x.get(), factor, offset)); },
+      "affine", [](V x, Number factor, Number offset) { return x.with(affine(x.get(), factor, offset)); },
       "x"_a, "factor"_a, "offset"_a, once<T>("factor x + offset."));
   module.def(
-      "clamp", [](V x, double low, double high) { return x.with(clamp(x.get(), low, high)); }, "x"_a, "low"_a,
+      "clamp", [](V x, Number low, Number high) { return x.with(clamp(x.get(), low, high)); }, "x"_a, "low"_a,
       "high"_a, once<T>("min(max(x, low), high); the gradient passes where low <= x <= high."));
   module.def(
       "triangular_solve",
@@ -212,7 +213,7 @@ void bind_layout(py::module_& module) {
       "a"_a = -2, "b"_a = -1, once<T>("Exchanges two axes; by default the last two."));
   module.def(
       "pad",
-      [](const Value<T>& x, int axis, Index before, Index after, double value) {
+      [](const Value<T>& x, int axis, Index before, Index after, Number value) {
         return x.with(pad(x.get(), axis, before, after, value));
       },
       "x"_a, "axis"_a, "before"_a, "after"_a, "value"_a = 0.0,
@@ -229,7 +230,7 @@ void bind_layout(py::module_& module) {
   module.def(
       "concatenate",
       [](const std::vector<Value<T>>& xs, int axis) {
-        if (xs.empty()) throw py::value_error("[concatenate] needs at least one value, got none");
+        if (xs.empty()) throw ValueError("[concatenate] needs at least one value, got none");
         std::vector<Var<T>> vars;
         for (const auto& x : xs) vars.push_back(x.get());
         return xs.front().with(concatenate(std::span<const Var<T>>(vars), axis));

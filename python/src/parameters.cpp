@@ -86,10 +86,13 @@ void bind_store(py::module_& module, const std::string& suffix) {
           "name"_a, "The gradients of a tensor, not copied.")
       .def(
           "leaf",
-          [](StorePtr<T> s, std::shared_ptr<TapeHandle<T>> tape, const std::string& name) {
+          [](StorePtr<T> s, const py::object& given, const std::string& name) {
+            if (!py::isinstance<TapeHandle<T>>(given))
+              throw py::type_error("[Parameters.leaf] tape must be Tape() of " +
+                                   std::string(dtype_name<T>()) + ", got " + type_name(given));
+            const auto tape = given.cast<std::shared_ptr<TapeHandle<T>>>();
             const ParamId id = s->store.find(name);
-            tape->reads(s);
-            return Value<T>(tape, Params<T>(s->store).leaf(tape->tape, id));
+            return tape->reading(s, [&] { return Value<T>(tape, Params<T>(s->store).leaf(tape->tape, id)); });
           },
           "tape"_a, "name"_a, "A parameter on a tape; a running one is a constant.")
       .def(
@@ -100,7 +103,9 @@ void bind_store(py::module_& module, const std::string& suffix) {
           "of what is finite.")
       .def(
           "value_stats", [](const Store& s) { return as_dict(value_stats(s.store)); },
-          "The same statistics of the values.")
+          "Statistics of the values of each tensor by name: count, zeros, nonfinite, and mean, rms and "
+          "largest "
+          "magnitude of what is finite.")
       .def(
           "grad_norm", [](Store& s) { return grad_norm(std::span<const T>(s.store.grads())); },
           "The Euclidean norm of all gradients together.")
@@ -132,7 +137,7 @@ using MuonHandle = OptimiserHandle<T, Muon<T>>;
 
 template <class T>
 void bind_optimisers(py::module_& module, const std::string& suffix) {
-  py::class_<AdamHandle<T>>(module, ("Adam_" + suffix).c_str())
+  py::class_<AdamHandle<T>>(module, ("Adam_" + suffix).c_str(), "Adam on all tensors that are not running.")
       .def(
           py::init([](StorePtr<T> s, double lr, double beta1, double beta2, double eps, double weight_decay) {
             return new AdamHandle<T>{
@@ -141,13 +146,14 @@ void bind_optimisers(py::module_& module, const std::string& suffix) {
                     s->store,
                     {.lr = lr, .beta1 = beta1, .beta2 = beta2, .eps = eps, .weight_decay = weight_decay})};
           }),
-          "parameters"_a, "lr"_a = 1e-3, "beta1"_a = 0.9, "beta2"_a = 0.999, "eps"_a = 1e-8,
-          "weight_decay"_a = 0.0)
+          py::arg("parameters").none(false), "lr"_a = 1e-3, "beta1"_a = 0.9, "beta2"_a = 0.999,
+          "eps"_a = 1e-8, "weight_decay"_a = 0.0)
       .def("step", &AdamHandle<T>::step, "lr_factor"_a = 1.0, "One step; lr_factor multiplies lr.")
       .def_property_readonly(
           "steps", [](const AdamHandle<T>& a) { return a.optimiser.steps(); },
           "Steps taken, those before load_state() included.");
-  py::class_<SgdHandle<T>>(module, ("Sgd_" + suffix).c_str())
+  py::class_<SgdHandle<T>>(module, ("Sgd_" + suffix).c_str(),
+                           "Stochastic gradient descent on all tensors that are not running.")
       .def(
           py::init([](StorePtr<T> s, double lr, double momentum, bool nesterov, double weight_decay) {
             return new SgdHandle<T>{
@@ -155,15 +161,16 @@ void bind_optimisers(py::module_& module, const std::string& suffix) {
                 Sgd<T>(s->store,
                        {.lr = lr, .momentum = momentum, .nesterov = nesterov, .weight_decay = weight_decay})};
           }),
-          "parameters"_a, "lr"_a = 1e-2, "momentum"_a = 0.0, "nesterov"_a = false, "weight_decay"_a = 0.0)
+          py::arg("parameters").none(false), "lr"_a = 1e-2, "momentum"_a = 0.0, "nesterov"_a = false,
+          "weight_decay"_a = 0.0)
       .def("step", &SgdHandle<T>::step, "lr_factor"_a = 1.0, "One step; lr_factor multiplies lr.");
-  py::class_<MuonHandle<T>>(module, ("Muon_" + suffix).c_str())
+  py::class_<MuonHandle<T>>(module, ("Muon_" + suffix).c_str(), "Muon on the tensors that match a pattern.")
       .def(py::init([](StorePtr<T> s, const std::vector<std::string>& names, double lr, double momentum) {
              return new MuonHandle<T>{
                  s, s->leases.lend(s),
                  Muon<T>(s->store, names, {.lr = lr, .momentum = momentum, .zero_grads = true})};
            }),
-           "parameters"_a, "names"_a, "lr"_a = 1e-3, "momentum"_a = 0.95)
+           py::arg("parameters").none(false), "names"_a, "lr"_a = 1e-3, "momentum"_a = 0.95)
       .def("step", &MuonHandle<T>::step, "lr_factor"_a = 1.0, "One step; lr_factor multiplies lr.");
 }
 
@@ -172,7 +179,7 @@ template <class T, class F>
 void with_optimiser(const char* function, const StorePtr<T>& s, const py::object& given, F f) {
   const auto of = [&](auto& handle) {
     if (handle.store != s)
-      throw py::value_error("[" + std::string(function) + "] the optimiser is one of other parameters");
+      throw ValueError("[" + std::string(function) + "] the optimiser is one of other parameters");
     f(handle.optimiser);
   };
   if (given.is_none()) return f();
@@ -194,7 +201,7 @@ void bind_state(py::module_& module) {
                           [&](const auto&... o) { save_state(next, prefix, std::as_const(s->store), o...); });
         file = std::move(next);
       },
-      "file"_a, "prefix"_a, "parameters"_a, "optimiser"_a = py::none(),
+      "file"_a, "prefix"_a, py::arg("parameters").none(false), "optimiser"_a = py::none(),
       once<T>("Adds the parameters as PREFIX + NAME, and what the optimiser keeps for them. ValueError if a "
               "name is\n"
               "taken."));
@@ -206,7 +213,7 @@ void bind_state(py::module_& module) {
                           [&](auto&... o) { load_state(file, prefix, s->store, o...); });
         s->leases.changed();
       },
-      "file"_a, "prefix"_a, "parameters"_a, "optimiser"_a = py::none(),
+      "file"_a, "prefix"_a, py::arg("parameters").none(false), "optimiser"_a = py::none(),
       once<T>(
           "Reads what save_state() added; training then goes on with the same bits. IoError if an array is\n"
           "missing or has another shape or type; nothing is changed then."));

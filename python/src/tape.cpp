@@ -3,8 +3,12 @@
 
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/batched_matmul.h>
+#include <fieldmark/engine/ops/comparison.h>
 #include <fieldmark/engine/ops/operators.h>
 #include <pybind11/stl.h>
+
+#include <cmath>
+#include <limits>
 
 namespace fieldmark::python {
 namespace {
@@ -20,8 +24,7 @@ using TapePtr = std::shared_ptr<TapeHandle<T>>;
 // Checks that a value belongs to this tape.
 template <class T>
 Var<T> own(const TapePtr<T>& t, const char* where, const Value<T>& v) {
-  if (v.tape != t)
-    throw py::value_error("[" + std::string(where) + "] the value was recorded on another tape");
+  if (v.tape != t) throw ValueError("[" + std::string(where) + "] the value was recorded on another tape");
   return v.get();
 }
 
@@ -32,6 +35,14 @@ py::array zeros(const Shape& shape) {
   return array;
 }
 
+// Records an array that the pass may read.
+template <class T>
+Value<T> constant(const TapePtr<T>& t, const py::array& array) {
+  const Shape shape = shape_of(array);  // first: what is refused is not kept
+  t->keep(array);
+  return Value<T>(t, t->tape.constant(static_cast<const T*>(array.data()), shape));
+}
+
 template <class T>
 Value<T> leaf(TapePtr<T> t, const py::object& given, const py::object& grad) {
   const py::array array = t->reads("leaf: array", given);
@@ -40,7 +51,7 @@ Value<T> leaf(TapePtr<T> t, const py::object& given, const py::object& grad) {
     throw ShapeError("[leaf] grad must have the shape of the array, " + shape_of(array).str() + ", got " +
                      shape_of(to).str());
   if (!to.writeable())
-    throw py::value_error(
+    throw ValueError(
         "[leaf: grad] must be writeable, since backward adds to it, got a read-only array: pass x.copy() or "
         "one "
         "that no pass reads");
@@ -87,21 +98,70 @@ T item(const Value<T>& v) {
 template <class T>
 double number(const char* op, const py::object& b) {
   const bool array = py::isinstance<py::array>(b);
-  const double x = array ? 0 : PyFloat_AsDouble(b.ptr());
-  if (!array && !PyErr_Occurred()) return x;
-  PyErr_Clear();
+  if (!array && !is_value(b)) {
+    const double x = PyFloat_AsDouble(b.ptr());
+    if (!PyErr_Occurred()) return x;
+    if (!PyErr_ExceptionMatches(PyExc_TypeError)) throw py::error_already_set();
+    PyErr_Clear();
+  }
   const std::string wanted = dtype_name<T>();
   throw py::type_error("[" + std::string(op) + "] must be a value of " + wanted + " or a number, got " +
                        type_name(b) + (array ? ": pass it as tape.constant(x)" : ""));
 }
 
+// Returns the other operand if it is a number that T can hold.
+template <class T>
+T number_of(const char* op, const py::object& b) {
+  const double x = number<T>(op, b);
+  if (std::isfinite(x) && std::abs(x) > static_cast<double>(std::numeric_limits<T>::max()))
+    throw ValueError("[" + std::string(op) + "] must be a number within the range of " + dtype_name<T>() +
+                     ", got " + py::repr(b).cast<std::string>());
+  return static_cast<T>(x);
+}
+
 // Binds an operator on two values, or on a value and a number.
-template <class T, class Number = T, class F>
+template <class T, class F>
 auto operation(const char* op, F f) {
   return [op, f](const Value<T>& a, const py::object& b) {
     if (py::isinstance<Value<T>>(b)) return a.with(f(a.get(), b.cast<const Value<T>&>().get()));
-    return a.with(f(a.get(), static_cast<Number>(number<T>(op, b))));
+    return a.with(f(a.get(), number_of<T>(op, b)));
   };
+}
+
+// Binds a comparison of a value with a value or a number.
+template <class T>
+auto comparison(const char* op, Var<T> (*compare)(Var<T>, Var<T>)) {
+  return [op, compare](const Value<T>& a, const py::object& b) {
+    if (py::isinstance<Value<T>>(b)) return a.with(compare(a.get(), b.cast<const Value<T>&>().get()));
+    py::array_t<T> one(std::vector<py::ssize_t>{});
+    *one.mutable_data() = number_of<T>(op, b);
+    return a.with(compare(a.get(), constant(a.tape, one).get()));
+  };
+}
+
+// Binds what Python would otherwise answer with the identity of the object.
+template <class T>
+void bind_meaningless(ValueClass<T>& value) {
+  const auto refuse = [](const char* text) {
+    return [text](const Value<T>&) -> py::object { throw py::type_error(text); };
+  };
+  const auto refuse_other = [](const char* text) {
+    return [text](const Value<T>&, const py::object&) -> py::object { throw py::type_error(text); };
+  };
+  value.attr("__hash__") = py::module_::import("builtins").attr("object").attr("__hash__");
+  value.def("__eq__", refuse_other("[==] does not compare values: use engine.equal(a, b)"), "other"_a)
+      .def("__ne__", refuse_other("[!=] does not compare values: use 1 - engine.equal(a, b)"), "other"_a)
+      .def("__bool__", refuse("[bool] a value is neither true nor false: use its number, value.item()"))
+      .def("__array__", [](const Value<T>&, const py::args&, const py::kwargs&) -> py::object {
+        throw py::type_error("[numpy] a value is not an array: pass value.numpy()");
+      });
+}
+
+// Values to the power of values, or of a number, which stays a double.
+template <class T>
+Value<T> power(const Value<T>& a, const py::object& b) {
+  if (py::isinstance<Value<T>>(b)) return a.with(pow(a.get(), b.cast<const Value<T>&>().get()));
+  return a.with(pow(a.get(), number<T>("**", b)));
 }
 
 template <class T>
@@ -116,17 +176,16 @@ void bind_operators(ValueClass<T>& value) {
       .def("__rmul__", operation<T>("*", multiply), "other"_a)
       .def("__truediv__", operation<T>("/", [](auto a, auto b) { return a / b; }), "other"_a)
       .def("__rtruediv__", operation<T>("/", [](auto a, auto b) { return b / a; }), "other"_a)
-      .def("__pow__", operation<T, double>("**", [](auto a, auto b) { return pow(a, b); }), "power"_a)
+      .def("__pow__", power<T>, "power"_a)
       .def("__neg__", [](const Value<T>& a) { return a.with(negate(a.get())); })
       .def(
           "__matmul__",
           [](const Value<T>& a, const py::object& b) {
-            if (!py::isinstance<Value<T>>(b))
-              throw py::type_error("[@] must be a value of " + std::string(dtype_name<T>()) + ", got " +
-                                   type_name(b));
-            return a.with(batched_matmul(a.get(), b.cast<const Value<T>&>().get()));
+            return a.with(batched_matmul(a.get(), value_of<T>("@", b).get()));
           },
-          "other"_a);
+          "other"_a)
+      .def("__lt__", comparison<T>("<", less<T>), "other"_a, "1 where a < b, else 0; no gradient passes.")
+      .def("__gt__", comparison<T>(">", greater<T>), "other"_a, "1 where a > b, else 0; no gradient passes.");
   value.attr("__array_ufunc__") = py::none();  // numpy then defers array + value to __radd__
 }
 
@@ -135,8 +194,10 @@ void bind_value(py::module_& module, const std::string& suffix) {
   ValueClass<T> value(module, ("Value_" + suffix).c_str(), "A value of a pass; it holds until Tape.reset().");
   value
       .def_property_readonly(
-          "shape", [](const Value<T>& v) { return py::tuple(py::cast(extents_of(v.get().shape()))); })
-      .def_property_readonly("dtype", [](const Value<T>&) { return py::dtype::of<T>(); })
+          "shape", [](const Value<T>& v) { return py::tuple(py::cast(extents_of(v.get().shape()))); },
+          "Extents of the axes, a tuple.")
+      .def_property_readonly(
+          "dtype", [](const Value<T>&) { return py::dtype::of<T>(); }, "float32 or float64.")
       .def_property_readonly(
           "needs_grad", [](const Value<T>& v) { return v.get().needs_grad(); },
           "Whether it depends on a leaf, so that gradients reach it.")
@@ -146,15 +207,28 @@ void bind_value(py::module_& module, const std::string& suffix) {
           "reset.")
       .def_property_readonly(
           "grad", &grad_of<T>,
-          "The gradient that has arrived, not copied; None before there is one. ValueError for the "
-          "output of a\nlayer with a ReLU, unless Tape.keep_grad() asked for it.")
-      .def("item", &item<T>, "The only element, as a number.")
+          "The gradient that has arrived, not copied. Of a leaf, it is the sum over all backwards, zeros "
+          "before "
+          "the\nfirst; of any other value it is that of the last backward, None before the first, and of a "
+          "constant "
+          "None.\nThe array is a view of the tape's memory: the next backward overwrites it, so copy what "
+          "you want to "
+          "keep.\nValueError for the output of a layer with a ReLU, unless Tape.keep_grad() asked for it.")
+      .def("item", &item<T>, "The only element, as a number. ShapeError if there are more, or none.")
+      .def("__float__", &item<T>)
       .def("backward", &backward<T>, "seed"_a = py::none(),
-           "Propagates gradients to the leaves; of more than one element, from a seed of its shape.")
+           "Adds the gradients of this value to those of the leaves.\n\n"
+           "Gradients of leaves add up over backwards, those of other values start anew; arrays from an "
+           "earlier\n"
+           "`grad` show the new ones. A value of more than one element needs a seed, an array of its shape.\n"
+           "ShapeError without it, ValueError if parameters have changed since the pass read them.")
       .def("__repr__", [](const Value<T>& v) {
+        if (v.pass != v.tape->pass)
+          return std::string("<fieldmark value of ") + dtype_name<T>() + ", forgotten by Tape.reset()>";
         return std::string("<fieldmark value ") + v.get().shape().str() + " of " + dtype_name<T>() + ">";
       });
   bind_operators(value);
+  bind_meaningless(value);
 }
 
 }  // namespace
@@ -165,13 +239,13 @@ void bind_tape(py::module_& module, const std::string& suffix) {
   py::class_<TapeHandle<T>, TapePtr<T>>(module, ("Tape_" + suffix).c_str(),
                                         "Records operations, and replays their gradients in reverse.")
       .def(py::init<>())
-      .def_property_readonly("dtype", [](const TapeHandle<T>&) { return py::dtype::of<T>(); })
+      .def_property_readonly(
+          "dtype", [](const TapeHandle<T>&) { return py::dtype::of<T>(); }, "float32 or float64.")
       .def(
           "constant",
           [](TapePtr<T> t, const py::object& given) {
             const py::array array = t->reads("constant: array", given);
-            t->keep(array);
-            return Value<T>(t, t->tape.constant(static_cast<const T*>(array.data()), shape_of(array)));
+            return constant(t, array);
           },
           "array"_a,
           "A value that needs no gradient. The array is read in place, and read-only until reset().")
@@ -181,14 +255,16 @@ void bind_tape(py::module_& module, const std::string& suffix) {
            "is read in place, and read-only until reset().")
       .def(
           "name",
-          [](const TapePtr<T>& t, const Value<T>& v, const std::string& name) {
+          [](const TapePtr<T>& t, const py::object& given, const std::string& name) {
+            const Value<T>& v = value_of<T>("Tape.name: value", given);
             return v.with(t->tape.name(own(t, "Tape.name", v), name));
           },
           "value"_a, "name"_a,
           "Names a value for an inspector; without one it does nothing. Returns the value.")
       .def(
           "keep_grad",
-          [](const TapePtr<T>& t, const Value<T>& v) {
+          [](const TapePtr<T>& t, const py::object& given) {
+            const Value<T>& v = value_of<T>("Tape.keep_grad: value", given);
             const Var<T> var = own(t, "Tape.keep_grad", v);
             static_cast<void>(var.grad());  // throws after a backward, when it is too late
             return v.with(t->tape.keep_grad(var));

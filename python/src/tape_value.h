@@ -44,8 +44,8 @@ struct TapeHandle {
   py::array reads(const char* where, const py::object& given) const {
     py::array array = borrowed<U>(where, given);
     if (Leases::owner(array) == this)
-      throw py::value_error(std::string("[") + where +
-                            "] shows a value of the same tape: pass x.copy(), or use engine.detach(value)");
+      throw ValueError(std::string("[") + where +
+                       "] shows a value of the same tape: pass x.copy(), or use engine.detach(value)");
     memory_.check_read(where, memory_of(array));
     return array;
   }
@@ -62,27 +62,27 @@ struct TapeHandle {
     hold(values);
     grads_.push_back(grads);
   }
-  /// Records that the pass reads a parameter store and adds to its gradients.
-  void reads(const std::shared_ptr<StoreHandle<T>>& store) {
-    for (const Read& r : stores_)
-      if (r.store == store) return;
-    const auto values = store->store.values(), grads = store->store.grads();
-    const Memory read{values.data(), values.size_bytes()}, added_to{grads.data(), grads.size_bytes()};
-    memory_.check_leaf("parameters", read, added_to);
-    memory_.add_leaf(read, added_to);
-    stores_.push_back({store, store->leases.lend(store)});
-    watch(store->leases.changes());
+  /// Returns f(), which records ops that read a parameter store and add to its gradients. If f throws, the
+  /// store is as free as before.
+  template <class F>
+  auto reading(const std::shared_ptr<StoreHandle<T>>& store, F f) {
+    const bool first = reads(store);
+    try {
+      return f();
+    } catch (...) {
+      if (first && !tape.observer()) forget_last_store();  // an observer shows what the failed op read
+      throw;
+    }
   }
   /// @throws ValueError if a step or a file has changed parameters since the pass read them
   void check_unchanged() const {
     for (const Watched& w : watched_)
       if (*w.changes != w.before)
-        throw py::value_error(
-            "[backward] the parameters have changed since this pass read them: record it again");
+        throw ValueError("[backward] the parameters have changed since this pass read them: record it again");
   }
   /// Ends the pass. @throws BufferError while arrays show its values
   void reset() {
-    if (!own) throw py::value_error("[reset] the tape of a gradient check is not yours to reset");
+    if (!own) throw ValueError("[reset] the tape of a gradient check is not yours to reset");
     if (views.count() > 0)
       throw py::buffer_error(
           "[reset] " + std::to_string(views.count()) +
@@ -101,6 +101,23 @@ struct TapeHandle {
   }
 
  private:
+  // Records that the pass reads a store; false: it is recorded already.
+  bool reads(const std::shared_ptr<StoreHandle<T>>& store) {
+    for (const Read& r : stores_)
+      if (r.store == store) return false;
+    const auto values = store->store.values(), grads = store->store.grads();
+    const Memory read{values.data(), values.size_bytes()}, added_to{grads.data(), grads.size_bytes()};
+    memory_.check_leaf("parameters", read, added_to);
+    memory_.add_leaf(read, added_to);
+    stores_.push_back({store, store->leases.lend(store)});
+    watch(store->leases.changes());
+    return true;
+  }
+  void forget_last_store() {
+    memory_.forget_last_leaf();
+    stores_.pop_back();
+    watched_.pop_back();
+  }
   void watch(const std::shared_ptr<const std::uint64_t>& changes) {
     if (changes) watched_.push_back({changes, *changes});
   }
@@ -141,8 +158,7 @@ struct Value {
   Value(std::shared_ptr<TapeHandle<T>> t, Var<T> v) : tape(std::move(t)), var(v), pass(tape->pass) {}
   /// @throws ValueError if the tape has forgotten the pass
   Var<T> get() const {
-    if (pass != tape->pass)
-      throw py::value_error("[value] it belongs to a pass that Tape.reset() has forgotten");
+    if (pass != tape->pass) throw ValueError("[value] it belongs to a pass that Tape.reset() has forgotten");
     return var;
   }
   /// Returns a value of the same pass, and holds the arrays that its op reads.
@@ -157,6 +173,20 @@ struct Value {
     if (!array.is_none()) tape->keep(py::reinterpret_borrow<py::array>(array));
   }
 };
+
+/// Whether an object is a value of either scalar type.
+inline bool is_value(const py::handle& given) {
+  return py::isinstance<Value<float>>(given) || py::isinstance<Value<double>>(given);
+}
+
+/// Returns an argument as a value.
+/// @param where  "function: argument", for error messages   @throws TypeError if it is something else
+template <class T>
+const Value<T>& value_of(const std::string& where, const py::object& given) {
+  if (py::isinstance<Value<T>>(given)) return given.cast<const Value<T>&>();
+  throw py::type_error("[" + where + "] must be a value of " + dtype_name<T>() + ", got " + type_name(given) +
+                       (py::isinstance<py::array>(given) ? ": pass it as tape.constant(x)" : ""));
+}
 
 /// Documentation of an op, shown once for both scalar types.
 template <class T>

@@ -314,6 +314,138 @@ def test_gradcheck_wants_a_value():
         engine.gradcheck(lambda x: 1.0, [np.ones(3)])
 
 
+def test_none_is_refused_where_an_object_is_needed(tape, x):
+    model, file = engine.Parameters("float64"), engine.SafetensorsFile()
+    of = fm._fieldmark
+    for call in (lambda: of.embed(None, fm.Key.random(), 4, 1, 1, None, 8, 0, None),
+                 lambda: of.Adam_float64(None), lambda: of.Sgd_float64(None), lambda: of.Muon_float64(None, ["w"]),
+                 lambda: of.Dense_float64(None, "d", 1, 1, False, 0),
+                 lambda: of.Conv2d_float64(None, "c", 1, 1, 3, False, 0),
+                 lambda: of.BatchNorm_float64(None, "b", 1, 1e-5, False),
+                 lambda: of.GroupNorm_float64(None, "g", 1, 1, 1e-5, False),
+                 lambda: of.Inspector_float64(None, False), lambda: model.leaf(None, "w"),
+                 lambda: of.Parameters_float64.values(None, "w"), lambda: of.Tape_float64.constant(None, np.ones(3)),
+                 lambda: engine.save_state(file, "", None), lambda: engine.load_state(file, "", None),
+                 lambda: engine.save_state(None, "", model), lambda: tape.name(None, "x"), lambda: engine.exp(None),
+                 lambda: engine.concatenate([x, None])):
+        with pytest.raises(TypeError):
+            call()
+
+
+def test_an_op_names_the_argument_that_does_not_fit(x):
+    array, other = np.ones(3), engine.Tape().constant(np.ones((4, 6), "float32"))
+    for call, text in {
+        lambda: engine.relu(array): r"[relu] x must be a value, got ndarray: pass it as tape.constant(x)",
+        lambda: engine.maximum(x, b=array): r"[maximum] b must be a value, got ndarray: pass it as tape.constant(x)",
+        lambda: engine.maximum(x, 0.5): r"[maximum] b must be a value, got float: pass it as tape.constant(numpy.full",
+        lambda: engine.minimum(x, other): r"[minimum] b must be a value of float64, as a is, got one of float32",
+        lambda: engine.concatenate([x, other]): r"[concatenate] xs[1] must be a value of float64, as xs[0] is",
+        lambda: engine.concatenate(x): r"[concatenate] xs must be a list of values, got Value_float64",
+        lambda: engine.mse_loss(x, None): r"[mse_loss] b must be a value, got NoneType",
+        lambda: engine.softmax(x, "rows"): r"[softmax] axis must be an integer, got str",
+        lambda: engine.reshape(x, 24): r"[reshape] shape must be a sequence of integers, got int",
+        lambda: engine.affine(x, engine.sum(x), 0): r"[affine] factor must be a number, got Value_float64",
+        lambda: engine.clamp(x, low=0, high="1"): r"[clamp] high must be a number, got str",
+        lambda: engine.upsample_to(x, 2, 2, 3): r"[upsample_to] mode must be text, got int",
+        lambda: engine.batch_norm(x, x, x, statistics=3): r"[batch_norm] takes x, gamma, beta, eps, relu, statistics",
+        lambda: engine.relu(): r"[relu] needs x",
+        lambda: engine.relu(y=x): r"[relu] has no argument y",
+        lambda: engine.relu(x, x=x): r"[relu] got x twice",
+        lambda: engine.relu(x, x): r"[relu] takes 1 arguments at most, got 2",
+        lambda: engine.save_state(3, "", None): r"[save_state] file must be SafetensorsFile(), got int",
+    }.items():
+        with pytest.raises(TypeError, match="^" + re.escape(text)):
+            call()
+
+
+def test_layers_and_tapes_name_an_argument_that_is_no_value(tape):
+    model = engine.Parameters("float64")
+    layer, norm = engine.Dense(model, "d", 3, 2, seed=1), engine.BatchNorm(model, "n", 3)
+    for call, name in ((lambda: layer(np.ones((2, 3))), "Dense: x"), (lambda: norm(np.ones((2, 3))), "BatchNorm: x"),
+                       (lambda: norm.evaluate(np.ones((2, 3))), "BatchNorm: x"),
+                       (lambda: tape.keep_grad(np.ones(3)), "Tape.keep_grad: value")):
+        with pytest.raises(TypeError, match=rf"^\[{name}\] must be a value of float64, got ndarray: pass it as tape"):
+            call()
+    with pytest.raises(TypeError, match=r"^\[Parameters.leaf\] tape must be Tape\(\) of float64, got Tape_float32"):
+        model.leaf(engine.Tape(), "d/weight")
+
+
+def test_layers_name_their_own_arguments():
+    model = engine.Parameters()
+    for call, text in ((lambda: engine.Dense(model, "a", 0, 1, seed=1), r"\[Dense\] inputs must be at least 1, got 0"),
+                       (lambda: engine.Dense(model, "a", 1, -1, seed=1), r"\[Dense\] outputs must be at least 1"),
+                       (lambda: engine.Conv2d(model, "a", 0, 1, seed=1), r"\[Conv2d\] inputs must be at least 1"),
+                       (lambda: engine.Conv2d(model, "a", 1, 1, seed=1, kernel=2), r"\[Conv2d\] kernel must be odd")):
+        with pytest.raises(ValueError, match="^" + text):
+            call()
+    assert model.names() == []
+
+
+def test_an_array_that_is_refused_is_not_kept(tape):
+    array = np.ones((1,) * 6)
+    with pytest.raises(fm.ShapeError, match="at most 5 axes"):
+        tape.constant(array)
+    array[:] = 2
+
+
+def test_a_layer_that_refuses_its_input_leaves_the_parameters_free(tape):
+    model = engine.Parameters("float64")
+    layer = engine.Dense(model, "d", 3, 2, seed=1)
+    with pytest.raises(fm.ShapeError):
+        layer(tape.constant(np.ones((4, 5))))
+    engine.Dense(model, "more", 2, 1, seed=2)
+    loss = engine.sum(layer(tape.constant(np.ones((4, 3)))))
+    with pytest.raises(BufferError):
+        engine.Dense(model, "too late", 2, 1, seed=2)
+    with pytest.raises(fm.ShapeError):
+        layer(tape.constant(np.ones((4, 5))))
+    loss.backward()
+    np.testing.assert_array_equal(model.grads("d/bias"), [4, 4])
+    with pytest.raises(BufferError):
+        engine.Dense(model, "still too late", 2, 1, seed=2)
+
+
+def test_a_value_is_no_truth_number_or_array_in_silence(tape):
+    x = tape.leaf(np.array([1.0, 2.0]))
+    for call, text in {lambda: bool(x): r"\[bool\].*value.item\(\)", lambda: x == x: r"\[==\].*engine.equal",
+                       lambda: x != 1: r"\[!=\].*engine.equal", lambda: np.asarray(x): r"\[numpy\].*value.numpy\(\)",
+                       lambda: np.sum([x, x]): r"\[numpy\].*value.numpy\(\)"}.items():
+        with pytest.raises(TypeError, match="^" + text):
+            call()
+    assert {x: 1}[x] == 1
+    with pytest.raises(fm.ShapeError, match=r"^\[item\]"):
+        float(x)
+    assert float(engine.sum(x)) == 3
+
+
+def test_numbers_that_float32_cannot_hold_are_refused():
+    x = engine.Tape().constant(np.ones(3, "float32"))
+    with pytest.raises(ValueError, match=r"^\[\+\] must be a number within the range of float32, got 1e\+300"):
+        x + 1e300
+    assert np.isinf((x * float("inf")).numpy()).all()
+    assert (engine.Tape("float64").constant(np.ones(3)) * 1e300).numpy()[0] == 1e300
+
+
+def test_an_exception_of_a_number_is_passed_on(x):
+    class Number:
+        def __float__(self):
+            raise KeyError("mine")
+
+    with pytest.raises(KeyError, match="mine"):
+        x + Number()
+    with pytest.raises(OverflowError):
+        x + 10 ** 400
+
+
+def test_errors_of_the_module_have_one_base(tape):
+    for error, base in ((fm.ValueError_, ValueError), (fm.ShapeError, ValueError), (fm.IoError, OSError)):
+        assert issubclass(error, fm.Error) and issubclass(error, base)
+    with pytest.raises(fm.Error):
+        tape.leaf(np.ones((4, 6))[:, ::2])
+    with pytest.raises(fm.Error, match="nowhere"):
+        fm.Field.load("/nowhere")
+
+
 def test_parameters_are_known_by_name():
     model = engine.Parameters("float64")
     model.add("w", np.ones(3))

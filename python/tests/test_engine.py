@@ -1,6 +1,9 @@
 """Arrays in and out, gradients beside numpy's arithmetic, and the errors of what dies or does not fit."""
 
 import gc
+import os
+import re
+import signal
 
 import numpy as np
 import pytest
@@ -185,6 +188,70 @@ def test_backward_notices_a_step_if_parameters_came_as_arrays():
             loss.backward()
         del loss
         tape.reset()
+
+
+def test_a_report_of_gradcheck_is_its_verdict():
+    good = engine.gradcheck(engine.square, [np.ones(2)])
+    bad = engine.gradcheck(lambda x: engine.detach(x) * x, [np.ones(2)])
+    assert good and not bad
+    assert re.match(r"<fieldmark gradcheck, ok: worst error \S+ of 2 entries>$", repr(good))
+    assert repr(bad).startswith("<fieldmark gradcheck, failed: worst error ")
+
+
+def test_comparisons_give_numbers():
+    x = engine.Tape("float64").leaf(np.array([1.0, 2.0, np.nan]))
+    for y, want in ((x < 2, [1, 0, 0]), (x > 1, [0, 1, 0]), (1.5 > x, [1, 0, 0]), (np.float64(1.5) < x, [0, 1, 0]),
+                    (x < x * x, [0, 1, 0])):
+        np.testing.assert_array_equal(y.numpy(), want)
+        assert not y.needs_grad
+    with pytest.raises(TypeError, match=r"^\[<\] must be a value of float64 or a number, got ndarray: pass it as"):
+        x < np.ones(3)
+    y = engine.where(x > 1.5, x * 3, x)
+    engine.sum(y).backward()
+    np.testing.assert_array_equal(x.grad, [1, 3, 1])
+
+
+def test_the_text_of_a_value_tells_whether_it_holds():
+    tape = engine.Tape()
+    x = tape.constant(np.ones((2, 3), "float32"))
+    assert repr(x) == "<fieldmark value [2, 3] of float32>"
+    tape.reset()
+    assert repr(x) == "<fieldmark value of float32, forgotten by Tape.reset()>"
+
+
+def test_the_next_backward_overwrites_gradients():
+    tape = engine.Tape("float64")
+    x = tape.leaf(np.ones(3))
+    np.testing.assert_array_equal(x.grad, 0)
+    y = x * 2
+    assert y.grad is None
+    engine.sum(y).backward()
+    seen = y.grad
+    (engine.sum(y) * 5).backward()
+    np.testing.assert_array_equal(seen, 5)
+    np.testing.assert_array_equal(x.grad, 12)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system does not fork")
+def test_a_forked_child_computes_on_one_thread():
+    before = engine.Tape()
+    x = np.random.default_rng(0).standard_normal((512, 512)).astype("float32")
+    a = before.constant(x)
+    want = engine.matmul(a, a).numpy()  # starts the threads of the parent
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            signal.alarm(60)
+            b = engine.Tape().constant(x)
+            same = np.array_equal(engine.matmul(b, b).numpy(), want)
+            os.write(writer, f"{fm.threads()} {same}".encode())
+        finally:
+            os._exit(0)
+    os.close(writer)
+    assert os.read(reader, 100) == b"1 True"
+    os.waitpid(child, 0)
+    os.close(reader)
 
 
 def test_threads_beyond_what_can_be_started_are_refused():

@@ -44,7 +44,7 @@ def test_a_wheel_has_the_version_and_needs_of_the_project(project):
 
 def test_a_wheel_has_the_modules_and_their_types(project):
     installed = {path.name for path in (project / "lib" / "fieldmark").iterdir()}
-    assert installed == {"__init__.py", "engine.py", "_fieldmark.pyi", "py.typed"}
+    assert installed == {"__init__.py", "_refusal.py", "engine.py", "_fieldmark.pyi", "py.typed"}
 
 
 def test_a_module_that_reads_the_layout_of_numpy_1_refuses_numpy_2(project):

@@ -17,6 +17,7 @@ TREE = ast.parse(STUB.read_text())
 CLASSES = {node.name: node for node in TREE.body if isinstance(node, ast.ClassDef)}
 FUNCTIONS = {node.name: node for node in TREE.body if isinstance(node, ast.FunctionDef)}
 MADE_BY_PYBIND = {"__init__", "__doc__", "__module__", "__new__", "__hash__", "__repr__", "__eq__", "__array_ufunc__"}
+NOT_MADE_BY_USERS = {"Field", "GradcheckReport", "Key", "OpCost", "Owner", "Value_float32", "Value_float64"}
 
 
 def name_of(base):
@@ -85,7 +86,11 @@ def test_classes_have_the_members_of_the_stub(name):
     for member, node in stubbed.items():
         if is_property(node):
             assert isinstance(vars(bound)[member], property), member
-        elif not member.startswith("__exit__"):
+        elif member == "__init__" and name in NOT_MADE_BY_USERS:
+            assert ast.unparse(node.args.args[1].annotation) == "Never"
+            with pytest.raises(TypeError, match="No constructor defined"):
+                bound()
+        elif member not in ("__exit__", "__hash__"):
             assert signature(node) == bound_signature(member, getattr(bound, member)), member
 
 
@@ -100,6 +105,7 @@ def test_a_type_checker_refuses_mixed_types(tmp_path):
         pytest.skip("mypy is missing")
     program = tmp_path / "program.py"
     program.write_text("""import numpy as np
+import fieldmark as fm
 from fieldmark import engine
 tape, other = engine.Tape(), engine.Tape("float64")
 x, y = tape.constant(np.ones(3, np.float32)), other.constant(np.ones(3))
@@ -108,6 +114,9 @@ x + y  # refused
 engine.minimum(x, y)  # refused
 engine.Adam(engine.Parameters("float64")).step()
 engine.Parameters().leaf(other, "w")  # refused
+reveal = float(x), x < 1.0, bool(engine.gradcheck(engine.square, [np.ones(3)]))
+fm.Field()  # refused
+fm.Key()  # refused
 """)
     checked = subprocess.run([sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path), str(program)],
                              env={**os.environ, "MYPYPATH": str(STUB.parent.parent)}, capture_output=True, text=True)
