@@ -74,7 +74,9 @@ def test_a_marked_field_is_read_and_its_evidence_bounded(owner, marked, tmp_path
     assert read["detection"] == "blind" and [v["detection"] for v in read["views"]] == ["blind"] * 2
     assert len(read["views"][0]["logits"]) == 16
     verdict = owner.verify("a5c3", images, detection="blind")
-    assert 0 < verdict["p_value"] <= verdict["p_value_two_sided"] <= 1 and verdict["bits"] == 16
+    one, two = verdict["p_value"], verdict["p_value_two_sided"]
+    assert 0 < one <= 1 and 0 < two <= 1 and verdict["bits"] == 16
+    assert one == 1 or two == pytest.approx(min(1, 2 * one))  # the key is random, so its statistic may be negative
     assert 0 < verdict["p_value_bits"] <= 1 and 0 < verdict["p_value_bits_two_sided"] <= 1
     assert verdict["p_noise"] == read["p_noise"] and verdict["detection"] == "blind" and verdict["views"] == 2
     assert 0 <= verdict["contradicting_bits"] <= 16 - verdict["matching_bits"]
