@@ -12,7 +12,7 @@ inline const std::map<std::string, std::string> kBytesV2{
     {"code owner", "f99657dd5c4003e08bb9c1a59b12d55b95c3015c7633c9884fd3bb6ed1a81019"},
     {"code renders", "d0bca072caacf18a15df2011528728fca35746a11ee89388767de5176b1fdce3"},
     {"fast baked field", "27c63b6fe694fb258ad215144f84dc417d2a54351f061efff9b512b7df32bedd"},
-    {"fast logits", "978a170297b7a9ef7d3da2f341bdc3cad354fbfe4d6c70de830b74e87adc2afd"},
+    {"fast logits", "8f6e0ac90dc68d74ac8e6d2b511d7c292c81bf11ad3c3c4068dc0353dc0ae2cb"},
     {"fast owner", "65fd6b163d3d7024463c8ce8753505c0879f78f05a7150f8ee571fadadd804cc"},
     {"fast renders", "ce84596ccd3d348d119c53c57cbe7c064b4ce9d738dd09d55d5efa7d5dd3b8b8"},
     {"hash field", "7169f1e7a7340da7cd7253b251b0cd4a79ddbae0180376de07068fb54e49625e"},

@@ -26,6 +26,12 @@ TEST_CASE("joint_evidence: an extractor that reads nothing or the contrary adds 
   CHECK(joint_evidence({1, 3}, {0, 0}) == std::vector<double>{0, 0});
 }
 
+TEST_CASE("joint_evidence: evidence is scaled to the power of other evidence") {
+  CHECK(scaled_to({3, 4}, {0, 2}) == std::vector<double>{0, 5});
+  CHECK(scaled_to({0, 0}, {1, 2}) == std::vector<double>{1, 2});
+  CHECK(scaled_to({1, 2}, {0, 0}) == std::vector<double>{0, 0});
+}
+
 TEST_CASE("joint_evidence: errors") {
   CHECK_THROWS_AS(joint_evidence({1, 2}, {1}), ShapeError);
   CHECK_THROWS_WITH(joint_evidence({1, 2}, {1}), Contains("as many cells, got 2 and 1"));

@@ -43,6 +43,9 @@ constexpr double kBlurs[] = {0, 0.4, 0.6, 0.8, 1, 1.25, 1.5, 2, 2.5, 3};  // sta
 constexpr int kTonePasses = 2;
 constexpr double kAround = 4;           // standard deviation of the window for the local power, pixels
 constexpr float kLeastNoise = 1.2e-6f;  // variance of rounding to 8 bits
+// An image has lost detail if it is blurred by so many pixels, or smaller than this share of the training
+// images.
+constexpr double kStrongBlur = 1, kSmallShare = 0.6;
 
 // The unmarked render in the image's blur and tones, and the residual.
 struct Shown {
@@ -190,10 +193,10 @@ std::vector<double> InformedReader::evidence_at(const Tensor<float>& image, cons
                      std::to_string(camera.height) + ", " + std::to_string(camera.width) +
                      ", 3], got shape " + image.shape.str());
   check_finite("informed_reader", image);
-  return evidence_at({.image = image, .plain = {}}, camera);
+  return residual_at({.image = image, .plain = {}}, camera).sign;
 }
 
-std::vector<double> InformedReader::evidence_at(const Surround& seen, const nerf::Camera& camera) {
+InformedReader::Residual InformedReader::residual_at(const Surround& seen, const nerf::Camera& camera) {
   const CachedView view = cache_view(parts_->renderer, owner_.field, camera, kSamples);
   Carriers mark = carriers(owner_, view);
   const bool replaced = seen.plain.size() > 0;
@@ -204,7 +207,11 @@ std::vector<double> InformedReader::evidence_at(const Surround& seen, const nerf
   const auto jpeg = replaced ? std::nullopt : find_jpeg(image);
   const auto border = seen.covered.empty() ? border_of(owner_.field, image) : seen.covered;
   const MarkScore score = score_of(image, view, mark, border, jpeg);
-  return fit_signs(mark, score, owner_.cells.count()).sign;
+  const nerf::CameraSpan& trained = owner_.field.cameras;
+  const auto longer = [](const auto& size) { return static_cast<double>(std::max(size.width, size.height)); };
+  const bool small = longer(camera) < kSmallShare * longer(trained);
+  return {.sign = fit_signs(mark, score, owner_.cells.count()).sign,
+          .lost_detail = jpeg || score.blur >= kStrongBlur || small};
 }
 
 // Returns cameras whose renders look like the image, in the frame of the changed image.
@@ -296,8 +303,9 @@ ImageReading InformedReader::read_as(const Tensor<float>& whole, const Change& c
   Surround sized{.image = at_size(seen.image), .plain = at_size(seen.plain), .colour = seen.colour};
   if (!seen.covered.empty())
     sized.covered = border_at(seen.covered, h, w, used.height, used.width, kBesideCover);
-  g.evidence = evidence_at(sized, used);
-  g.evidence = joint_evidence(reading.blind, g.evidence);
+  const Residual residual = residual_at(sized, used);
+  g.evidence = residual.lost_detail ? joint_evidence(reading.blind, residual.sign)
+                                    : scaled_to(reading.blind, residual.sign);
   if (g.agreement >= kLeastAgreement) reading.chosen = ReadingKind::informed;
   // Converts the camera to the whole image.
   g.camera.cx += static_cast<double>(seen.left);

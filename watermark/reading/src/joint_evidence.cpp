@@ -9,6 +9,15 @@
 
 namespace fieldmark::watermark {
 
+std::vector<double> scaled_to(const std::vector<double>& other, std::vector<double> evidence) {
+  double ours = 0, theirs = 0;
+  for (const double s : evidence) ours += s * s;
+  for (const double s : other) theirs += s * s;
+  if (ours > 0 && theirs > 0)
+    for (double& s : evidence) s *= std::sqrt(theirs / ours);
+  return evidence;
+}
+
 std::vector<double> joint_evidence(const std::vector<double>& blind, const std::vector<double>& residual) {
   if (blind.size() != residual.size())
     throw ShapeError("[joint_evidence] blind and residual must have as many cells, got " +

@@ -3,12 +3,15 @@
 
 namespace fieldmark::watermark {
 
-/// Returns the evidence of an image's residual with that of the extractor added: with both at unit power a and b,
-/// and r = max(0, <a, b>), it is a + r b. So the extractor counts as far as it agrees with the residual. It adds
-/// nothing where it reads nothing, as in a greyscale image, and nothing where it was deceived. The sum depends on
-/// neither key nor message.
-/// @param blind, residual  [cells] S_c, see evidence.h   @return [cells] with the power of `blind`; the residual's
-/// as it is if either has no power
+/// Returns evidence with the power of other evidence; as it is if either has none.
+std::vector<double> scaled_to(const std::vector<double>& other, std::vector<double> evidence);
+
+/// Returns the evidence of an image's residual with that of the extractor added: with both at unit power a
+/// and b, and r = max(0, <a, b>), it is a + r b. So the extractor counts as far as it agrees with the
+/// residual. It adds nothing where it reads nothing, as in a greyscale image, and nothing where it was
+/// deceived. The sum depends on neither key nor message.
+/// @param blind, residual  [cells] S_c, see evidence.h   @return [cells] with the power of `blind`; the
+/// residual's as it is if either has no power
 /// @throws ShapeError if the lengths differ
 std::vector<double> joint_evidence(const std::vector<double>& blind, const std::vector<double>& residual);
 

@@ -56,8 +56,9 @@ class CameraSearch;
 ///   - With the residual R and its power V around each pixel, R / V is the score and 1 / V the precision.
 ///     For a JPEG image both come from the quantised coefficients.
 ///   - S_c are the signs that explain the whole residual by linear least squares, since a ray passes several
-///     cells. The blind evidence is added at equal power, weighted by the correlation r of the two, or 0 if
-///     that is negative: the extractor reads what JPEG and strong downscaling take from the residual.
+///     cells. Where JPEG, blur or downscaling took detail from the image, the blind evidence is added at
+///     equal power, weighted by the correlation of the two, or 0 if that is negative: the extractor reads
+///     more there.
 class InformedReader {
  public:
   /// Least agreement at which an alignment is trusted; docs/notes/reading.md has the measurements.
@@ -77,6 +78,10 @@ class InformedReader {
  private:
   struct Parts;
   struct Change;
+  struct Residual {
+    std::vector<double> sign;  // [cells]
+    bool lost_detail;          // to JPEG, blur or downscaling
+  };
   const CameraSearch& all_views();
   std::vector<Change> changes(const Tensor<float>& seen);
   static constexpr double kNeverEnough = std::numeric_limits<double>::infinity();
@@ -90,7 +95,7 @@ class InformedReader {
   InformedReading aligned(const Surround& seen, const Change& change, const SeenPlaces& places);
   ImageReading read_as(const Tensor<float>& whole, const Change& change);
   Surround cleared(const Tensor<float>& whole) const;
-  std::vector<double> evidence_at(const Surround& seen, const nerf::Camera& camera);
+  Residual residual_at(const Surround& seen, const nerf::Camera& camera);
   const Owner& owner_;
   BlindReader blind_;
   std::unique_ptr<Parts> parts_;
