@@ -28,7 +28,7 @@ inline const std::map<std::string, std::string> kBytesV3{
     {"code owner", "3692fd4b983cc8994de735edba9b3f9f25d2e416c22d5f7a59e0e7a70eec9c69"},
     {"code renders", "a5f6f7610d3dde3d4744590c2ef9f553cc8866fdfa796d814676b5d6f7948a43"},
     {"fast baked field", "af3c247a732a6a0cd2b5b8e9e68e738362b29cab115466fcb1026e2aeabcff15"},
-    {"fast logits", "cef841d942bb17459ad59dbf59e78d64de8e281a27c494c4c6118587073a1134"},
+    {"fast logits", "a12a9b804711a856e89462509d7e011e8e338077894be0e430fc095312c2b0b4"},
     {"fast owner", "23c111a4ace685ae0539bcdf034d11ee6282ef90fe958c9c160cd56d4a61d172"},
     {"fast renders", "98e6bbc8b57e790ffb2b0180c23758711182e177f2b22bec0f90a97680446b64"},
     {"hash field", "ddb8c16b2d62994a59ed8aa4ae932d923e75564baf99a3cbcda6591352018d07"},

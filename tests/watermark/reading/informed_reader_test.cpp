@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "joint_evidence.h"
 #include "support/catch.h"
 #include "watermark/tiny_owner.h"
 
@@ -26,6 +27,11 @@ Tensor<float> image_of(const Owner& owner, const nerf::Camera& camera, bool mark
   nerf::Renderer renderer(owner.field);
   if (marked) renderer.set_recolour(owner.marking(cell_signs(owner.code(), kReadMessage)));
   return quantize8(renderer.render(camera).rgb);
+}
+
+Tensor<float> distorted(const char* name, const Tensor<float>& image) {
+  const std::vector<float> white(3, 1.f);
+  return distort::apply_distortion(distort::parse_distortion(name), image, CounterRng(1, 1), 0, white);
 }
 }  // namespace
 
@@ -60,6 +66,25 @@ TEST_CASE("informed_reader: an unmarked view is not leant to any key") {
   }
   CHECK(above > 35);
   CHECK(above < 95);
+}
+
+TEST_CASE("informed_reader: the extractor counts only where the image has lost detail") {
+  const Owner owner = marking_owner();
+  InformedReader reader(owner, kSearch);
+  const auto correlation = [](const std::vector<double>& a, const std::vector<double>& b) {
+    double ab = 0, aa = 0, bb = 0;
+    for (std::size_t c = 0; c < a.size(); ++c) ab += a[c] * b[c], aa += a[c] * a[c], bb += b[c] * b[c];
+    return ab / std::sqrt(aa * bb);
+  };
+  const Tensor<float> sharp = image_of(owner, camera_near(4), true);
+  const ImageReading whole = reader.read(sharp);
+  CHECK(correlation(whole.informed.evidence, reader.evidence_at(sharp, whole.informed.camera)) > 0.9999);
+  const Tensor<float> soft = distorted("blur_2", sharp);
+  const ImageReading lost = reader.read(soft);
+  const auto residual = reader.evidence_at(soft, lost.informed.camera);
+  const auto joint = joint_evidence(lost.blind, residual);
+  REQUIRE(correlation(joint, residual) < 0.9999);  // the extractor reads something
+  CHECK(correlation(lost.informed.evidence, joint) > 0.9999);
 }
 
 TEST_CASE("informed_reader: the camera is found from the image, and the reading chosen by the scene alone") {
@@ -97,11 +122,6 @@ TEST_CASE("informed_reader: what an image gives does not depend on those read be
   const ImageReading after = used.read(image);
   CHECK(after.informed.agreement == alone.informed.agreement);
   CHECK(after.evidence() == alone.evidence());
-}
-
-Tensor<float> distorted(const char* name, const Tensor<float>& image) {
-  const std::vector<float> white(3, 1.f);
-  return distort::apply_distortion(distort::parse_distortion(name), image, CounterRng(1, 1), 0, white);
 }
 
 // Returns a view as others may present it: with another background behind the object, bars, a mirror.
