@@ -27,6 +27,9 @@ TEST_CASE("measured: JSON has the contract's keys, and null where there is no nu
   CHECK(json["informed_views"] == 0);
   m.accuracy.informed = 1;
   CHECK(cli::measurement_json(m, "ring")["accuracy"]["informed"] == 1);
+  CHECK(cli::measurement_json(m, "ring")["accuracy"]["found"].is_null());
+  m.accuracy.found = 0.75;
+  CHECK(cli::measurement_json(m, "ring")["accuracy"]["found"] == 0.75);
 }
 
 TEST_CASE("measured: a row has the figures side by side", "[measured]") {
@@ -58,6 +61,10 @@ TEST_CASE("measured: people see the accuracies in percent", "[measured]") {
   CHECK_THAT(out.str(), Contains("blur_1") && !Contains("informed"));
   m.informed_views = 2;
   m.under["blur_1"].informed = 0.875;
+  m.accuracy.found = 0.9;
+  m.under["blur_1"].found = 0.625;
   cli::print_measurement(out, m, "novel");
   CHECK_THAT(out.str(), Contains("informed 87.50%"));
+  CHECK_THAT(out.str(), Contains("found at p 1e-06     90.0% of single views"));
+  CHECK_THAT(out.str(), Contains(", found 62.5%"));
 }

@@ -12,7 +12,8 @@ Json measurement_json(const watermark::Measurement& m, const std::string& camera
   const auto reading = [](const watermark::ReadingAccuracy& accuracy) {
     return Json{{"blind", number(accuracy.blind)},
                 {"informed", number(accuracy.informed)},
-                {"chosen", number(accuracy.chosen)}};
+                {"chosen", number(accuracy.chosen)},
+                {"found", number(accuracy.found)}};
   };
   Json distorted = Json::object();
   for (const auto& [name, accuracy] : m.under) distorted[name] = reading(accuracy);
@@ -61,10 +62,13 @@ void print_measurement(std::ostream& out, const watermark::Measurement& m, const
     print("informed             %.2f%%, chosen %.2f%%, of %lld views, %.1f s per view\n",
           100 * m.accuracy.informed, 100 * m.accuracy.chosen, static_cast<long long>(m.informed_views),
           m.informed_seconds);
+  if (std::isfinite(m.accuracy.found))
+    print("found at p %.0e     %.1f%% of single views\n", watermark::kFoundAt, 100 * m.accuracy.found);
   for (const auto& [name, accuracy] : m.under) {
     print("  %-26s %.2f%%", name.c_str(), 100 * accuracy.blind);
     if (m.informed_views > 0)
       print(", informed %.2f%%, chosen %.2f%%", 100 * accuracy.informed, 100 * accuracy.chosen);
+    if (std::isfinite(accuracy.found)) print(", found %.1f%%", 100 * accuracy.found);
     out << "\n";
   }
 }

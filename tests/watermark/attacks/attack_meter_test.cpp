@@ -177,9 +177,12 @@ TEST_CASE("attack_meter: of the first views informed is read too, as the tool wo
     CHECK(row.accuracy.informed == share(read.informed.evidence));
     CHECK(row.accuracy.chosen == share(read.evidence()));
     CHECK(row.chosen() == row.accuracy.chosen);
+    const double p = keyed_p_value(keyed_statistic(read.evidence(), owner.code(), kMeteredMessage));
+    CHECK(row.accuracy.found == (p <= 1e-6 ? 1 : 0));
   }
   const AttackRow unreadable = meter.image("scale_0.2");
   CHECK((unreadable.accuracy.informed == 0.5 && unreadable.chosen() == 0.5));
+  CHECK(unreadable.accuracy.found == 0);
   o.informed_views = -1;
   CHECK_THROWS_WITH(AttackMeter(owner, owner.field, kMeteredMessage, o),
                     "[attack_meter] informed_views must not be negative, got -1");

@@ -147,6 +147,32 @@ TEST_CASE("measurement: messages may be chosen, and each reading is handed out")
   CHECK(chosen == Approx(right));
 }
 
+TEST_CASE("measurement: the share of views found counts the p-values of single views up to 1e-6") {
+  const Owner owner = marking_owner(0.3);
+  double found = 0;
+  MeasureOptions options{
+      .cameras = cameras(3),
+      .under = {"noise_0.5"},
+      .on_reading = [&](Index, const std::string& under, const auto& evidence, const Message& sent) {
+        const double p = keyed_p_value(keyed_statistic(evidence, owner.code(), sent));
+        if (under.empty() && p <= 1e-6) found += 1;
+      }};
+  const Measurement blind = measure(owner, nullptr, nullptr, options);
+  CHECK(blind.accuracy.found == found / 3);
+  found = 0;
+  options.informed_views = 2;  // the third view is read blindly and does not count
+  options.cameras.resize(2);
+  const double both = measure(owner, nullptr, nullptr, options).accuracy.found;
+  CHECK(both == found / 2);
+  CHECK(both == 1);
+  options.cameras = cameras(3);
+  options.informed_views = 2;
+  CHECK(measure(owner, nullptr, nullptr, options).accuracy.found == both);
+  // The unmarked field is not found.
+  const Message sent{{1, 1, 0, 1}};
+  CHECK(measure(owner, &owner.field, &sent, options).accuracy.found == 0);
+}
+
 TEST_CASE("measurement: errors name what is missing") {
   const Owner owner = marking_owner();
   const Message sent{{1, 1, 0, 1}};

@@ -100,7 +100,8 @@ class AttackMeter::Row {
       });
     } catch (const ShapeError&) {
       const double none = with_informed ? 0.5 : std::nan("");
-      return {.blind = 0.5, .informed = none, .chosen = none};
+      const bool counts = with_informed || !meter_.readers_->informed();
+      return {.blind = 0.5, .informed = none, .chosen = none, .found = counts ? 0 : std::nan("")};
     }
   }
 

@@ -18,7 +18,7 @@ class Readers {
     if (informed && owner.mark().has_cells()) informed_.emplace(owner);
   }
   bool informed() const { return informed_.has_value(); }
-  // Only the informed and the chosen accuracy may be NaN. Calls tell() with the chosen reading's evidence.
+  // Only the blind accuracy is never NaN. Calls tell() with the chosen reading's evidence.
   template <class F>
   ReadingAccuracy read(const Tensor<float>& image, const Message& sent, bool with_informed, F tell) {
     ReadingAccuracy accuracy;
@@ -26,6 +26,7 @@ class Readers {
       const auto evidence = blind_.evidence(image);
       tell(evidence);
       accuracy.blind = share(evidence, sent);
+      if (!informed_) accuracy.found = found(evidence, sent);
       return accuracy;
     }
     const auto begin = std::chrono::steady_clock::now();
@@ -35,6 +36,7 @@ class Readers {
     accuracy.blind = share(reading.blind, sent);
     accuracy.informed = share(reading.informed.evidence, sent);
     accuracy.chosen = share(reading.evidence(), sent);
+    accuracy.found = found(reading.evidence(), sent);
     return accuracy;
   }
   // Mean time of reading one image with both detectors; NaN without images.
@@ -45,6 +47,9 @@ class Readers {
     if (evidence.empty()) return 0.5;
     return match_bits(read_bits(evidence, code_, owner_.options().bits), sent).accuracy();
   }
+  double found(const std::vector<double>& evidence, const Message& sent) const {
+    return keyed_p_value(keyed_statistic(evidence, code_, sent)) <= kFoundAt ? 1 : 0;
+  }
   const Owner& owner_;
   const CellCode& code_;
   BlindReader blind_;
@@ -54,13 +59,16 @@ class Readers {
 
 // Accuracies of the views so far.
 struct Accuracies {
-  std::vector<double> blind, informed, chosen;
+  std::vector<double> blind, informed, chosen, found;
   void add(const ReadingAccuracy& a) {
     blind.push_back(a.blind);
     informed.push_back(a.informed);
     chosen.push_back(a.chosen);
+    found.push_back(a.found);
   }
-  ReadingAccuracy mean() const { return {finite_mean(blind), finite_mean(informed), finite_mean(chosen)}; }
+  ReadingAccuracy mean() const {
+    return {finite_mean(blind), finite_mean(informed), finite_mean(chosen), finite_mean(found)};
+  }
 };
 
 }  // namespace fieldmark::watermark

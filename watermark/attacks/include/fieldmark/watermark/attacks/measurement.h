@@ -10,13 +10,20 @@
 
 namespace fieldmark::watermark {
 
-/// Bit accuracies of the detectors; NaN for one that was not used.
+/// p-value at which ReadingAccuracy::found counts a mark as found, the default of `fieldmark verify`.
+inline constexpr double kFoundAt = 1e-6;
+
+/// Bit accuracies of the detectors, and how often one view proves the mark; NaN for a detector that was not
+/// used.
 struct ReadingAccuracy {
   double blind = 0;  ///< blind detection
   /// Informed detection on the first informed_views views; a view whose camera is not found counts as 0.5.
   double informed = std::numeric_limits<double>::quiet_NaN();
   /// Detection as chosen by InformedReader, on the same views.
   double chosen = std::numeric_limits<double>::quiet_NaN();
+  /// Share of these views, of all views without informed detection, whose keyed p-value by the detection
+  /// chosen is at most kFoundAt.
+  double found = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// Options of measure().
