@@ -15,8 +15,8 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
-std::vector<nerf::Camera> cameras(Index count) {
-  return nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::novel, count, 0, 8);
+std::vector<nerf::Camera> cameras(Index count, Index size = 0) {
+  return nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::novel, count, size, 8);
 }
 
 double mean(const std::vector<double>& v) {
@@ -148,10 +148,16 @@ TEST_CASE("measurement: messages may be chosen, and each reading is handed out")
 }
 
 TEST_CASE("measurement: the share of views found counts the p-values of single views up to 1e-6") {
-  const Owner owner = marking_owner(0.3);
+  // More cells than tiny_owner() has: with those, no single view reaches 1e-6.
+  Owner owner{tiny_field(),
+              {.bits = 4, .mark_psnr = 30, .reader_size = 48},
+              test_key(5),
+              CellGrid(10, visible_area(tiny_views(), 10), 1e-3),
+              cell_mark({.network = {.bands = 4, .features = 8}, .base_channels = 8})};
+  owner.gain = 0.1;
   double found = 0;
   MeasureOptions options{
-      .cameras = cameras(3),
+      .cameras = cameras(3, 96),
       .under = {"noise_0.5"},
       .on_reading = [&](Index, const std::string& under, const auto& evidence, const Message& sent) {
         const double p = keyed_p_value(keyed_statistic(evidence, owner.code(), sent));
@@ -165,7 +171,7 @@ TEST_CASE("measurement: the share of views found counts the p-values of single v
   const double both = measure(owner, nullptr, nullptr, options).accuracy.found;
   CHECK(both == found / 2);
   CHECK(both == 1);
-  options.cameras = cameras(3);
+  options.cameras = cameras(3, 96);
   options.informed_views = 2;
   CHECK(measure(owner, nullptr, nullptr, options).accuracy.found == both);
   // The unmarked field is not found.
