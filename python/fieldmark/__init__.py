@@ -14,6 +14,7 @@ without copies; images that are read for a mark are copied once. A child of ``os
 
 from __future__ import annotations
 
+import numbers
 import operator
 import os
 from typing import Callable, Optional, Union
@@ -54,14 +55,34 @@ def _instance(where: str, given: object, kind: type) -> None:
         raise TypeError(f"[{where} must be {kind.__name__}, got {type(given).__name__}")
 
 
+def _number(where: str, given: object) -> float:
+    if isinstance(given, bool) or not isinstance(given, numbers.Real):
+        raise TypeError(f"[{where} must be a number, got {type(given).__name__}")
+    return float(given)
+
+
 def _length(function: str, seconds: Optional[float], steps: Optional[int], default: float) -> tuple[float, int]:
     if seconds is not None and steps is not None:
         raise ValueError_(f"[{function}] give seconds or steps, not both")
-    if steps is not None and operator.index(steps) < 1:
-        raise ValueError_(f"[{function}] steps must be at least 1, got {steps}")
-    if seconds is not None and not 0 < seconds < float("inf"):
+    if steps is not None:
+        return default, _integer(f"{function}] steps", steps, 1, 2 ** 31 - 1)
+    if seconds is None:
+        return default, 0
+    length = _number(f"{function}] seconds", seconds)
+    if not 0 < length < float("inf"):
         raise ValueError_(f"[{function}] seconds must be above 0 and finite, got {seconds}")
-    return (default if seconds is None else seconds, steps or 0)
+    return length, 0
+
+
+def _progress(function: str, given: object) -> None:
+    if given is not None and not callable(given):
+        raise TypeError(f"[{function}] progress must be a function, got {type(given).__name__}")
+
+
+def _path(where: str, given: object) -> str:
+    if not isinstance(given, (str, os.PathLike)):
+        raise TypeError(f"[{where} must be a path, got {type(given).__name__}")
+    return os.fspath(given)
 
 
 def train(data: Path, *, seconds: Optional[float] = None, steps: Optional[int] = None, size: int = 0,
@@ -80,7 +101,8 @@ def train(data: Path, *, seconds: Optional[float] = None, steps: Optional[int] =
     """
     length = _length("train", seconds, steps, 60)
     size = _integer("train] size", size, 0, 8192)
-    return _fieldmark.train(os.fspath(data), *length, size, _seed("train", seed), progress)
+    _progress("train", progress)
+    return _fieldmark.train(_path("train] data", data), *length, size, _seed("train", seed), progress)
 
 
 def embed(field: Field, key: Key, *, bits: int = 16, seconds: Optional[float] = None,
@@ -102,6 +124,9 @@ def embed(field: Field, key: Key, *, bits: int = 16, seconds: Optional[float] = 
     _instance("embed] field", field, Field)
     _instance("embed] key", key, Key)
     length = _length("embed", seconds, steps, 300)
+    if mark_psnr is not None:
+        mark_psnr = _number("embed] mark_psnr", mark_psnr)
+    _progress("embed", progress)
     bits = _integer("embed] bits", bits, 1, 256)
     views = _integer("embed] views", views, 8, 10000)
     return _fieldmark.embed(field, key, bits, *length, mark_psnr, views, _seed("embed", seed), progress)
@@ -121,4 +146,5 @@ def bake(owner: Owner, message: str, *, seconds: Optional[float] = None, steps: 
     _instance("bake] owner", owner, Owner)
     _instance("bake] message", message, str)
     length = _length("bake", seconds, steps, 45)
+    _progress("bake", progress)
     return _fieldmark.bake(owner, message, *length, _seed("bake", seed), progress)

@@ -1,8 +1,9 @@
-"""Says why no overload of an op takes the given arguments."""
+"""Says why no overload of a function or method takes the given arguments."""
 
 from __future__ import annotations
 
 import operator
+import os
 import re
 from typing import Any, Callable, Mapping, NoReturn, Sequence
 
@@ -29,24 +30,35 @@ def _are_integers(given: object) -> bool:
     return isinstance(given, (list, tuple)) and all(map(_is_integer, given))
 
 
+def _are_texts(given: object) -> bool:
+    return isinstance(given, (list, tuple)) and all(isinstance(text, str) for text in given)
+
+
 _CHECKS: Mapping[str, tuple[str, Callable[[object], bool]]] = {
     "int": ("an integer", _is_integer),
     "float": ("a number", _is_number),
     "bool": ("True or False", lambda given: isinstance(given, (bool, np.bool_))),
     "str": ("text", lambda given: isinstance(given, str)),
+    "bytes": ("bytes", lambda given: isinstance(given, bytes)),
+    "os.PathLike": ("a path", lambda given: isinstance(given, (str, bytes, os.PathLike))),
+    "Callable": ("a function", callable),
+    "function": ("a function", callable),
     "List[int]": ("a sequence of integers", _are_integers),
+    "List[str]": ("a sequence of texts", _are_texts),
 }
 
 
-def _arguments(op: str) -> list[tuple[str, str, bool]]:
+def _arguments(owner: object, name: str) -> list[tuple[str, str, bool]]:
     """Name, type and whether there is a default of each argument, from the text of the first overload."""
-    text = re.search(rf"^1\. {op}\((.*)\) ->", getattr(_fieldmark, op).__doc__, re.MULTILINE)
+    text = re.search(rf"^(?:1\. )?{name}\((.*)\) ->", getattr(owner, name).__doc__, re.MULTILINE)
     assert text is not None
     found = []
     for part in re.split(r", (?=\w+: )", text.group(1)):
-        name, rest = part.split(": ", 1)
+        argument, _, rest = part.partition(": ")
         kind, _, default = rest.partition(" = ")
-        found.append((name, kind.replace("fieldmark._fieldmark.", ""), bool(default)))
+        if argument not in ("", "self"):
+            kind = kind.replace("fieldmark._fieldmark.", "").replace("list[", "List[")  # pybind11 2.12
+            found.append((argument, kind, bool(default)))
     return found
 
 
@@ -67,9 +79,9 @@ def _check_values(op: str, given: Sequence[tuple[str, object]]) -> None:
                             f"{value.dtype.name}: convert its array with x.astype('{first[1]}')")
 
 
-def refuse(op: str, given: Sequence[object], named: Mapping[str, object]) -> NoReturn:
-    """Raises TypeError that names the argument which does not fit."""
-    arguments = _arguments(op)
+def _by_name(op: str, arguments: Sequence[tuple[str, str, bool]], given: Sequence[object],
+             named: Mapping[str, object]) -> dict[str, Any]:
+    """All given arguments by name; TypeError if one is missing, given twice or not known."""
     names = [name for name, _, _ in arguments]
     if len(given) > len(names):
         raise TypeError(f"[{op}] takes {len(names)} arguments at most, got {len(given)}")
@@ -81,6 +93,30 @@ def refuse(op: str, given: Sequence[object], named: Mapping[str, object]) -> NoR
     missing = [name for name, _, default in arguments if not default and name not in all_given]
     if missing:
         raise TypeError(f"[{op}] needs {' and '.join(missing)}")
+    return all_given
+
+
+def _check_kind(op: str, name: str, kind: str, value: object) -> None:
+    """TypeError if a value is not of the kind that the text of a function names."""
+    optional = re.fullmatch(r"Optional\[(.*)\]", kind)
+    if optional and value is None:
+        return
+    kind = optional.group(1) if optional else kind
+    if kind == "int" and _is_integer(value) and not -2 ** 63 <= operator.index(value) < 2 ** 63:  # type: ignore[call-overload]
+        raise OverflowError(f"[{op}] {name} must be an integer of 64 bits, got {value}")
+    if kind in _CHECKS and not _CHECKS[kind][1](value):
+        raise TypeError(f"[{op}] {name} must be {_CHECKS[kind][0]}, got {type(value).__name__}")
+    owner = getattr(_fieldmark, kind, None)
+    if isinstance(owner, type) and not isinstance(value, owner):
+        plain, _, scalar = kind.partition("_")
+        of = f" of {scalar}" if scalar else ""
+        raise TypeError(f"[{op}] {name} must be {plain}(){of}, got {type(value).__name__}")
+
+
+def refuse(op: str, given: Sequence[object], named: Mapping[str, object]) -> NoReturn:
+    """Raises TypeError that names the argument of a function which does not fit."""
+    arguments = _arguments(_fieldmark, op)
+    all_given = _by_name(op, arguments, given, named)
     values: list[tuple[str, object]] = []
     for name, kind, _ in arguments:
         if kind == "Value_float32":
@@ -91,14 +127,28 @@ def refuse(op: str, given: Sequence[object], named: Mapping[str, object]) -> NoR
             values += [(f"{name}[{i}]", value) for i, value in enumerate(all_given[name])]
     _check_values(op, values)
     for name, kind, _ in arguments:
-        if name not in all_given:
+        if name not in all_given or kind.startswith("Value"):
             continue
         value = all_given[name]
-        if kind in _CHECKS and not _CHECKS[kind][1](value):
-            raise TypeError(f"[{op}] {name} must be {_CHECKS[kind][0]}, got {type(value).__name__}")
-        if kind.startswith("Parameters") and not type(value).__name__.startswith("Parameters"):
+        if not kind.startswith("Parameters"):
+            _check_kind(op, name, kind, value)
+        elif not type(value).__name__.startswith("Parameters"):
             raise TypeError(f"[{op}] {name} must be Parameters(), got {type(value).__name__}")
-        if kind == "SafetensorsFile" and not isinstance(value, _fieldmark.SafetensorsFile):
-            raise TypeError(f"[{op}] {name} must be SafetensorsFile(), got {type(value).__name__}")
-    raise TypeError(f"[{op}] takes {', '.join(names)}, got "
-                    + ", ".join(f"{name} of {type(value).__name__}" for name, value in all_given.items()))
+    _refuse_together(op, arguments, all_given)
+
+
+def refuse_method(op: str, owner: str, method: str, given: Sequence[object],
+                  named: Mapping[str, object]) -> NoReturn:
+    """Raises TypeError that names the argument of a method or constructor which does not fit."""
+    arguments = _arguments(getattr(_fieldmark, owner), method)
+    all_given = _by_name(op, arguments, given, named)
+    for name, kind, _ in arguments:
+        if name in all_given:
+            _check_kind(op, name, kind, all_given[name])
+    _refuse_together(op, arguments, all_given)
+
+
+def _refuse_together(op: str, arguments: Sequence[tuple[str, str, bool]], given: Mapping[str, object]) -> NoReturn:
+    raise TypeError(f"[{op}] takes {', '.join(name for name, _, _ in arguments) or 'no arguments'}, got "
+                    + ", ".join(f"{name}={value}" if _is_number(value) else f"{name} of {type(value).__name__}"
+                                for name, value in given.items()))

@@ -133,6 +133,8 @@ py::array_t<T> read_only_view(const T* elements, const Shape& shape, std::shared
 }
 
 void bind_engine(py::module_& module);
+/// Lets each function, method and constructor say which argument does not fit; comes after all of them.
+void bind_refusals(py::module_& module);
 void bind_fields(py::module_& module);
 void bind_marks(py::module_& module);
 

@@ -54,22 +54,60 @@ void bind_engine_of(py::module_& module, const std::string& suffix) {
   bind_inspector<T>(module, suffix);
 }
 
-// Adds a last overload to each function of both scalar types, which says what argument does not fit.
-void bind_refusals(py::module_& module) {
+// All arguments in order.
+py::list listed(const Anything& first, const py::args& others) {
+  py::list all;
+  if (!first.given.is(py::ellipsis())) all.append(first.given);
+  for (const py::handle other : others) all.append(other);
+  return all;
+}
+
+// Adds a last overload to each function, which says what argument does not fit.
+void bind_function_refusals(py::module_& module) {
   for (const auto& [name, function] : py::dict(module.attr("__dict__"))) {
     if (!PyCFunction_Check(function.ptr())) continue;
-    const std::string text = py::str(function.attr("__doc__"));
-    if (text.find("\nOverloaded function.\n") == std::string::npos) continue;
     const std::string op = py::str(name);
     module.def(
         op.c_str(),
         [op](const Anything& first, const py::args& others, const py::kwargs& named) {
-          py::list all;
-          if (!first.given.is(py::ellipsis())) all.append(first.given);
-          for (const py::handle other : others) all.append(other);
-          py::module_::import("fieldmark._refusal").attr("refuse")(op, all, named);
+          py::module_::import("fieldmark._refusal").attr("refuse")(op, listed(first, others), named);
         },
         "_argument"_a = py::ellipsis(), "Raises TypeError for other arguments.");
+  }
+}
+
+// Adds such an overload to every method and constructor of a class, under the class's name without its type.
+void bind_method_refusals(const py::object& owner) {
+  const std::string whole = py::str(owner.attr("__name__")), kind = whole.substr(0, whole.find("_float"));
+  const auto refuse = [whole, kind](const std::string& name, const py::object& given,
+                                    const py::kwargs& named) {
+    const bool special = name == "__init__" || name == "__call__";
+    py::module_::import("fieldmark._refusal")
+        .attr("refuse_method")(special ? kind : kind + "." + name, whole, name, given, named);
+  };
+  constexpr const char* kText = "Raises TypeError for other arguments.";
+  for (const auto& [key, method] : py::dict(owner.attr("__dict__"))) {
+    const std::string name = py::str(key);
+    if (Py_TYPE(method.ptr()) == &PyStaticMethod_Type)
+      owner.attr(name.c_str()) = py::staticmethod(py::cpp_function(
+          [refuse, name](const Anything& first, const py::args& others, const py::kwargs& named) {
+            refuse(name, listed(first, others), named);
+          },
+          py::name(name.c_str()), py::scope(owner), py::sibling(owner.attr(name.c_str())),
+          "_argument"_a = py::ellipsis(), kText));
+    if (!PyInstanceMethod_Check(method.ptr())) continue;
+    if (name == "__init__")
+      owner.attr("__init__") = py::cpp_function(
+          [refuse](py::detail::value_and_holder&, const Anything& first, const py::args& others,
+                   const py::kwargs& named) { refuse("__init__", listed(first, others), named); },
+          py::name("__init__"), py::is_method(owner), py::sibling(owner.attr("__init__")),
+          "_argument"_a = py::ellipsis(), py::detail::is_new_style_constructor(), kText);
+    else if (!name.starts_with("__") || name == "__call__")
+      owner.attr(name.c_str()) = py::cpp_function(
+          [refuse, name](const py::object&, const Anything& first, const py::args& others,
+                         const py::kwargs& named) { refuse(name, listed(first, others), named); },
+          py::name(name.c_str()), py::is_method(owner), py::sibling(owner.attr(name.c_str())),
+          "_argument"_a = py::ellipsis(), kText);
   }
 }
 
@@ -100,6 +138,9 @@ class CheckedFunction {
 };
 
 GradcheckReport check_gradients(const py::function& f, const std::vector<py::object>& inputs, double rtol) {
+  if (inputs.empty()) throw ValueError("[gradcheck] inputs must not be empty");
+  if (!(rtol > 0 && rtol < 1))
+    throw ValueError("[gradcheck] rtol must be above 0 and below 1, got " + std::to_string(rtol));
   std::vector<Tensor<double>> tensors;
   for (const py::object& given : inputs) {
     const py::array array = borrowed<double>("gradcheck: inputs: each", given);
@@ -170,15 +211,21 @@ void bind_decays(py::module_& module) {
 
 }  // namespace
 
+void bind_refusals(py::module_& module) {
+  bind_function_refusals(module);
+  for (const auto& [name, member] : py::dict(module.attr("__dict__")))
+    if (PyType_Check(member.ptr()) && !PyExceptionClass_Check(member.ptr()))
+      bind_method_refusals(py::reinterpret_borrow<py::object>(member));
+}
+
 void bind_engine(py::module_& module) {
   bind_reports(module);
   bind_files(module);
   bind_decays(module);
   bind_engine_of<float>(module, "float32");
   bind_engine_of<double>(module, "float64");
-  bind_refusals(module);
   module.def("gradcheck", &check_gradients, "f"_a, "inputs"_a, "rtol"_a = 1e-7,
-             "Compares gradients with finite differences, in float64.");
+             "Compares gradients with finite differences, in float64. ValueError unless 0 < rtol < 1.");
   module.def("threads", &threads, "The number of threads that work is shared among.");
   module.def(
       "set_threads",

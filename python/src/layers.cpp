@@ -5,6 +5,7 @@
 #include <fieldmark/engine/nn/group_norm.h>
 #include <pybind11/stl.h>
 
+#include "number_argument.h"
 #include "relu_argument.h"
 #include "tape_value.h"
 
@@ -50,7 +51,7 @@ void bind_products(py::module_& module, const std::string& suffix) {
   using DenseHandle = LayerHandle<T, Dense<T>>;
   using Conv2dHandle = LayerHandle<T, Conv2d<T>>;
   py::class_<DenseHandle>(module, ("Dense_" + suffix).c_str(), "An affine layer.")
-      .def(py::init([](const StorePtr<T>& s, const std::string& name, Index inputs, Index outputs, bool relu,
+      .def(py::init([](const StorePtr<T>& s, const std::string& name, Index inputs, Index outputs, Flag relu,
                        std::uint64_t seed) {
              require_positive("Dense", "inputs", inputs);
              require_positive("Dense", "outputs", outputs);
@@ -64,7 +65,7 @@ void bind_products(py::module_& module, const std::string& suffix) {
                            "A convolution that keeps the size of images.")
       .def(
           py::init([](const StorePtr<T>& s, const std::string& name, Index inputs, Index outputs,
-                      Index kernel, bool relu, std::uint64_t seed) {
+                      Index kernel, Flag relu, std::uint64_t seed) {
             require_positive("Conv2d", "inputs", inputs);
             require_positive("Conv2d", "outputs", outputs);
             if (kernel < 1 || kernel % 2 == 0)
@@ -84,7 +85,7 @@ void bind_norms(py::module_& module, const std::string& suffix) {
   using BatchHandle = LayerHandle<T, BatchNorm<T>>;
   using GroupHandle = LayerHandle<T, GroupNorm<T>>;
   py::class_<BatchHandle>(module, ("BatchNorm_" + suffix).c_str(), "Batch normalisation of images.")
-      .def(py::init([](const StorePtr<T>& s, const std::string& name, Index channels, double eps, bool relu) {
+      .def(py::init([](const StorePtr<T>& s, const std::string& name, Index channels, double eps, Flag relu) {
              return BatchHandle::make("BatchNorm", s, name, channels,
                                       BatchNormOptions{.eps = eps, .relu = relu});
            }),
@@ -111,7 +112,7 @@ void bind_norms(py::module_& module, const std::string& suffix) {
           "statistics"_a, "momentum"_a = 0.1, "running = (1 - momentum) running + momentum batch.");
   py::class_<GroupHandle>(module, ("GroupNorm_" + suffix).c_str(), "Group normalisation of images.")
       .def(py::init([](const StorePtr<T>& s, const std::string& name, Index channels, Index groups,
-                       double eps, bool relu) {
+                       double eps, Flag relu) {
              return GroupHandle::make("GroupNorm", s, name, channels,
                                       GroupNormOptions{.groups = groups, .eps = eps, .relu = relu});
            }),

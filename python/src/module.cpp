@@ -31,4 +31,5 @@ PYBIND11_MODULE(_fieldmark, module) {
   fieldmark::python::bind_engine(module);
   fieldmark::python::bind_fields(module);
   fieldmark::python::bind_marks(module);
+  fieldmark::python::bind_refusals(module);
 }

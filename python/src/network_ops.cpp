@@ -25,11 +25,11 @@ void bind_products(py::module_& module) {
   using V = const Value<T>&;
   module.def(
       "dense",
-      [](V x, V w, V b, bool relu) { return x.with(dense(x.get(), w.get(), b.get(), activation(relu))); },
+      [](V x, V w, V b, Flag relu) { return x.with(dense(x.get(), w.get(), b.get(), activation(relu))); },
       "x"_a, "w"_a, "b"_a, "relu"_a = false, once<T>("x w + b of rows x [N, in], w [in, out], b [out]."));
   module.def(
       "conv2d",
-      [](V x, V w, V b, Index stride, Index padding, bool relu) {
+      [](V x, V w, V b, Index stride, Index padding, Flag relu) {
         return x.with(conv2d(x.get(), w.get(), b.get(), ConvWindow{.stride = stride, .padding = padding},
                              activation(relu)));
       },
@@ -51,7 +51,7 @@ void bind_norms(py::module_& module) {
       once<T>("gamma (x - mean) / sqrt(var + eps) + beta with the statistics of each row of the last axis."));
   module.def(
       "group_norm",
-      [](V x, V gamma, V beta, Index groups, Number eps, bool relu) {
+      [](V x, V gamma, V beta, Index groups, Number eps, Flag relu) {
         return x.with(group_norm(x.get(), gamma.get(), beta.get(),
                                  GroupNormOptions{.groups = groups, .eps = eps, .relu = relu}));
       },
@@ -61,7 +61,7 @@ void bind_norms(py::module_& module) {
               "groups of neighbouring channels."));
   module.def(
       "batch_norm",
-      [](V x, V gamma, V beta, Number eps, bool relu, BatchStatistics* statistics) {
+      [](V x, V gamma, V beta, Number eps, Flag relu, BatchStatistics* statistics) {
         return x.with(batch_norm(x.get(), gamma.get(), beta.get(), BatchNormOptions{.eps = eps, .relu = relu},
                                  statistics));
       },
@@ -71,7 +71,7 @@ void bind_norms(py::module_& module) {
               "which go to `statistics` too."));
   module.def(
       "batch_norm_fixed",
-      [](V x, V gamma, V beta, const py::object& mean, const py::object& variance, Number eps, bool relu) {
+      [](V x, V gamma, V beta, const py::object& mean, const py::object& variance, Number eps, Flag relu) {
         const py::array m = borrowed<T>("batch_norm_fixed: mean", mean),
                         v = borrowed<T>("batch_norm_fixed: variance", variance);
         return x.with(batch_norm_fixed(x.get(), gamma.get(), beta.get(), elements<T>(m), elements<T>(v),
@@ -94,7 +94,7 @@ void bind_resampling(py::module_& module) {
   using V = const Value<T>&;
   module.def(
       "max_pool",
-      [](V x, Index size, Index stride, bool ceil_mode) {
+      [](V x, Index size, Index stride, Flag ceil_mode) {
         return x.with(max_pool(x.get(), MaxPool{.size = size, .stride = stride, .ceil_mode = ceil_mode}));
       },
       "x"_a, "size"_a = 2, "stride"_a = 2, "ceil_mode"_a = false,

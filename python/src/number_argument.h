@@ -1,4 +1,6 @@
 #pragma once
+#include <string_view>
+
 #include "tape_value.h"
 
 namespace fieldmark::python {
@@ -9,9 +11,29 @@ struct Number {
   operator double() const { return value; }  // NOLINT(google-explicit-constructor): it stands for a double
 };
 
+/// An argument that is True or False. Anything else is refused: pybind11 would take None and 0.5, too.
+struct Flag {
+  bool value = false;
+  operator bool() const { return value; }  // NOLINT(google-explicit-constructor): it stands for a bool
+};
+
 }  // namespace fieldmark::python
 
 namespace pybind11::detail {
+
+template <>
+struct type_caster<fieldmark::python::Flag> {
+  PYBIND11_TYPE_CASTER(fieldmark::python::Flag, const_name("bool"));
+  bool load(handle given, bool) {
+    const bool numpy = std::string_view(Py_TYPE(given.ptr())->tp_name).starts_with("numpy.bool");
+    if (!PyBool_Check(given.ptr()) && !numpy) return false;
+    value.value = PyObject_IsTrue(given.ptr()) == 1;
+    return true;
+  }
+  static handle cast(const fieldmark::python::Flag& flag, return_value_policy, handle) {
+    return PyBool_FromLong(flag.value);
+  }
+};
 
 template <>
 struct type_caster<fieldmark::python::Number> {

@@ -146,7 +146,7 @@ void bind_maps_with_options(py::module_& module) {
       "high"_a, once<T>("min(max(x, low), high); the gradient passes where low <= x <= high."));
   module.def(
       "triangular_solve",
-      [](V a, V b, bool upper, bool transposed) {
+      [](V a, V b, Flag upper, Flag transposed) {
         return a.with(triangular_solve(a.get(), b.get(), Triangle{.upper = upper, .transposed = transposed}));
       },
       "a"_a, "b"_a, "upper"_a = false, "transposed"_a = false,
@@ -176,7 +176,7 @@ void bind_reductions(py::module_& module) {
   for (const Reduction& r : reductions)
     module.def(
         r.name,
-        [r](const Value<T>& x, const py::object& axis, bool keepdims) {
+        [r](const Value<T>& x, const py::object& axis, Flag keepdims) {
           const std::vector<int> axes = axes_of(r.name, x, axis);
           return x.with(
               r.reduce(x.get(), Axes(std::span<const int>(axes)), keepdims ? KeepAxes::yes : KeepAxes::no));

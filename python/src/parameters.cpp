@@ -7,6 +7,7 @@
 #include <fieldmark/engine/tensor_stats.h>
 #include <pybind11/stl.h>
 
+#include "number_argument.h"
 #include "tape_value.h"
 
 namespace fieldmark::python {
@@ -155,7 +156,7 @@ void bind_optimisers(py::module_& module, const std::string& suffix) {
   py::class_<SgdHandle<T>>(module, ("Sgd_" + suffix).c_str(),
                            "Stochastic gradient descent on all tensors that are not running.")
       .def(
-          py::init([](StorePtr<T> s, double lr, double momentum, bool nesterov, double weight_decay) {
+          py::init([](StorePtr<T> s, double lr, double momentum, Flag nesterov, double weight_decay) {
             return new SgdHandle<T>{
                 s, s->leases.lend(s),
                 Sgd<T>(s->store,

@@ -347,7 +347,7 @@ def test_an_op_names_the_argument_that_does_not_fit(x):
         lambda: engine.affine(x, engine.sum(x), 0): r"[affine] factor must be a number, got Value_float64",
         lambda: engine.clamp(x, low=0, high="1"): r"[clamp] high must be a number, got str",
         lambda: engine.upsample_to(x, 2, 2, 3): r"[upsample_to] mode must be text, got int",
-        lambda: engine.batch_norm(x, x, x, statistics=3): r"[batch_norm] takes x, gamma, beta, eps, relu, statistics",
+        lambda: engine.batch_norm(x, x, x, statistics=3): r"[batch_norm] statistics must be BatchStatistics(), got int",
         lambda: engine.relu(): r"[relu] needs x",
         lambda: engine.relu(y=x): r"[relu] has no argument y",
         lambda: engine.relu(x, x=x): r"[relu] got x twice",
@@ -368,6 +368,46 @@ def test_layers_and_tapes_name_an_argument_that_is_no_value(tape):
             call()
     with pytest.raises(TypeError, match=r"^\[Parameters.leaf\] tape must be Tape\(\) of float64, got Tape_float32"):
         model.leaf(engine.Tape(), "d/weight")
+
+
+def test_a_method_or_constructor_names_the_argument_that_does_not_fit(tape, x):
+    model, array = engine.Parameters("float64"), np.ones((2, 3))
+    layer, adam, file = engine.Dense(model, "d", 3, 2, seed=1), engine.Adam(model), engine.SafetensorsFile()
+    camera = fm.Camera(np.eye(4)[:3], 0.7, 8, 8)
+    for call, text in {
+        lambda: model.add(3, array): "[Parameters.add] name must be text, got int",
+        lambda: model.add("w"): "[Parameters.add] needs values",
+        lambda: model.add("w", array, roles="matrix"): "[Parameters.add] has no argument roles",
+        lambda: model.clip_grad_norm("1"): "[Parameters.clip_grad_norm] limit must be a number, got str",
+        lambda: model.names(1): "[Parameters.names] takes 0 arguments at most, got 1",
+        lambda: model.values(3, "w"): "[Parameters.values] takes 1 arguments at most, got 2",
+        lambda: engine.Adam(model, lr="fast"): "[Adam] lr must be a number, got str",
+        lambda: engine.Sgd(model, lr=0.1, nesterov=1): "[Sgd] nesterov must be True or False, got int",
+        lambda: adam.step(None): "[Adam.step] lr_factor must be a number, got NoneType",
+        lambda: engine.Dense(model, "e", 2.5, 2, seed=1): "[Dense] inputs must be an integer, got float",
+        lambda: layer(): "[Dense] needs x",
+        lambda: tape.reset(1): "[Tape.reset] takes 0 arguments at most, got 1",
+        lambda: file.write(3): "[SafetensorsFile.write] path must be a path, got int",
+        lambda: engine.SafetensorsFile(3): "[SafetensorsFile] takes 0 arguments at most, got 1",
+        lambda: engine.SafetensorsFile.read(3): "[SafetensorsFile.read] path must be a path, got int",
+        lambda: fm.Key.load(3): "[Key.load] path must be a path, got int",
+        lambda: engine.relu(x, 2, 3): "[relu] takes 1 arguments at most, got 3",
+        lambda: engine.sum(x, 0, 1): "[sum] keepdims must be True or False, got int",
+        lambda: engine.Dense(model, "e", 1, 1, seed=-1): "[Dense] takes parameters, name, inputs, outputs",
+        lambda: type(camera)(np.eye(4)[:3], 0.7, "8", 8): "[Camera] width must be an integer, got str",
+        lambda: engine.cosine_decay("1", 10): "[cosine_decay] n must be an integer, got str",
+        lambda: fm.set_threads("2"): "[set_threads] count must be an integer, got str",
+    }.items():
+        with pytest.raises(TypeError, match="^" + re.escape(text)):
+            call()
+    assert model.names() == ["d/weight", "d/bias"]
+
+
+def test_gradcheck_refuses_what_would_always_pass():
+    for inputs, rtol, text in (([], 1e-7, "inputs must not be empty"), ([np.ones(2)], 0.0, "rtol must be above 0"),
+                               ([np.ones(2)], float("nan"), "rtol must be above 0")):
+        with pytest.raises(ValueError, match=rf"^\[gradcheck\] {text}"):
+            engine.gradcheck(engine.sum, inputs, rtol=rtol)
 
 
 def test_layers_name_their_own_arguments():
