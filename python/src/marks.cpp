@@ -132,6 +132,10 @@ void bind_marks(py::module_& module) {
           "PSNR of marked to unmarked renders in dB; None for a mark whose networks decide it.")
       .def_property_readonly(
           "key", [](const Owner& o) { return o.key; }, "The secret key.")
+      .def_property_readonly(
+          "key_free", &Owner::key_free,
+          "True if the networks were trained under random codes and know no key; False for owners\n"
+          "of version 0.1, whose bound of the p-values is not proven.")
       .def("extract", &extract, "images"_a, "detection"_a = "auto", "fpr"_a = kRate, kExtract)
       .def("verify", &verify, "message"_a, "images"_a, "detection"_a = "auto", "fpr"_a = kRate, kVerify);
   module.def("embed", &embed, py::arg("field").none(false), "key"_a, "bits"_a, "seconds"_a, "steps"_a,

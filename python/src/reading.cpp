@@ -4,7 +4,7 @@
 #include <fieldmark/watermark/evidence/noise.h>
 #include <fieldmark/watermark/keys/signing.h>
 #include <fieldmark/watermark/payload/payload_codec.h>
-#include <fieldmark/watermark/reading/informed_reader.h>
+#include <fieldmark/watermark/scanning/page_reader.h>
 #include <pybind11/stl.h>
 
 #include <algorithm>
@@ -81,18 +81,19 @@ Suspects checked(const std::string& function, const Owner& owner, const py::obje
   return {detection, fpr, checked_images(function, images)};
 }
 
-ImageEvidence evidence_of(watermark::InformedReader& reader, const Tensor<float>& image, bool forced) {
-  watermark::ImageReading r = reader.read(image);
-  const bool informed = r.chosen == ReadingKind::informed || (forced && !r.informed.evidence.empty());
-  return {std::move(informed ? r.informed.evidence : r.blind),
-          informed ? ReadingKind::informed : ReadingKind::blind, r.informed.agreement};
+ImageEvidence evidence_of(watermark::PageReader& reader, const Tensor<float>& image, bool forced) {
+  const watermark::PageReading r = reader.read(image);
+  const std::vector<double>& informed = r.whole.informed.evidence;
+  if (forced && r.parts.empty() && !informed.empty())
+    return {informed, ReadingKind::informed, r.agreement()};
+  return {r.evidence(), r.chosen(), r.agreement()};
 }
 
 std::vector<ImageEvidence> read(const Owner& owner, const Suspects& suspects) {
   const watermark::BlindReader blind(owner);
-  std::unique_ptr<watermark::InformedReader> informed;
+  std::unique_ptr<watermark::PageReader> informed;
   if (suspects.detection != "blind" && owner.mark().has_cells())
-    informed = unlocked([&] { return std::make_unique<watermark::InformedReader>(owner); });
+    informed = unlocked([&] { return std::make_unique<watermark::PageReader>(owner); });
   std::vector<ImageEvidence> all;
   for (const py::array& given : suspects.images) {
     Tensor<float> image(shape_of(given));

@@ -86,6 +86,12 @@ def test_a_marked_field_is_read_and_its_evidence_bounded(owner, marked, tmp_path
     assert fm.Owner.load(tmp_path / "owner.fm").extract(images, detection="blind") == read
 
 
+def test_an_owner_of_version_0_1_is_not_free_of_its_key(owner):
+    old = Path(__file__).resolve().parents[2] / "tests" / "regression" / "version_0_1" / "owner.fm"
+    assert owner.key_free is True
+    assert fm.Owner.load(old).key_free is False
+
+
 def test_errors_name_what_is_wrong(scene, field, owner, tmp_path):
     with pytest.raises(OSError, match="nowhere"):
         fm.train(tmp_path / "nowhere", steps=1)
@@ -93,8 +99,18 @@ def test_errors_name_what_is_wrong(scene, field, owner, tmp_path):
         fm.Field.load(tmp_path / "nowhere")
     with pytest.raises(ValueError, match="seconds or steps, not both"):
         fm.train(scene, steps=1, seconds=1)
-    with pytest.raises(ValueError, match="at least 1, got 0"):
+    with pytest.raises(ValueError, match=r"^\[train\] steps must be 1 to 2147483647, got 0"):
         fm.train(scene, steps=0)
+    key = fm.Key.random()
+    for call, text in ((lambda: fm.train(scene, seconds="60"), "[train] seconds must be a number, got str"),
+                       (lambda: fm.train(scene, steps=10.5), "[train] steps must be an integer, got float"),
+                       (lambda: fm.train(scene, steps=1, progress=3), "[train] progress must be a function, got int"),
+                       (lambda: fm.train(3, steps=1), "[train] data must be a path, got int"),
+                       (lambda: fm.embed(field, key, mark_psnr="36"), "[embed] mark_psnr must be a number, got str"),
+                       (lambda: fm.embed(field, key, seconds=None, progress=1), "[embed] progress must be a function"),
+                       (lambda: fm.bake(owner, "a", seconds=True), "[bake] seconds must be a number, got bool")):
+        with pytest.raises(TypeError, match="^" + re.escape(text)):
+            call()
     with pytest.raises(ValueError):
         fm.bake(owner, "aa", steps=1)
     with pytest.raises(fm.ShapeError, match="camera to world"):
@@ -102,7 +118,7 @@ def test_errors_name_what_is_wrong(scene, field, owner, tmp_path):
 
 
 def test_results_have_the_keys_of_the_command(owner):
-    """Those of docs/json.md, but for what needs files, controls or a second key."""
+    """Those of docs/json.md, but for times and what needs files, controls or a second key."""
     text = (Path(__file__).resolve().parents[2] / "docs" / "json.md").read_text()
 
     def keys(command):
@@ -111,9 +127,9 @@ def test_results_have_the_keys_of_the_command(owner):
                 for key in re.findall(r"`(\w+)`", line.split("|")[1])}
 
     image = np.random.default_rng(0).random((16, 16, 3), dtype="float32")
-    assert set(owner.extract(image, "blind")) == keys("extract")
+    assert set(owner.extract(image, "blind")) == keys("extract") - {"seconds_per_image"}
     assert set(owner.verify("a5c3", image, "blind")) == keys("verify") - {
-        "owner_sha256", "commitment", "copy", "controls", "wrong_keys"}
+        "owner_sha256", "commitment", "copy", "controls", "seconds_per_image", "wrong_keys"}
 
 
 def test_images_are_checked_before_any_is_read(owner):

@@ -64,7 +64,7 @@ TEST_CASE("json page: the keys of every result are those of docs/json.md") {
   const TinyJob& job = TinyJob::get();
   const TemporaryFolder folder;
   auto pages = documented();
-  CHECK(pages.size() == 11);
+  CHECK(pages.size() == 12);
   const std::string views = job.images(), baked = folder / "baked.fm", evidence = folder / "evidence";
   const auto with_owner = [&](const std::string& command, std::vector<std::string> more) {
     more.insert(more.begin(), {command, "--owner", job.owner});
@@ -92,4 +92,5 @@ TEST_CASE("json page: the keys of every result are those of docs/json.md") {
   compare({"render", "--field", job.field, "--out", folder / "r", "--count", "1", "--size", "8", "--depth"},
           pages["render"]);
   compare({"check", evidence, views}, pages["check"]);
+  compare({"info", job.owner}, pages["info"]);
 }

@@ -1,6 +1,7 @@
 #include <fieldmark/core/files.h>
 
 #include "cli/cli.h"
+#include "support/source_dir.h"
 #include "tools/tiny_job.h"
 
 using namespace fieldmark;
@@ -69,6 +70,21 @@ TEST_CASE("bench attacks has a row for each attack on images and files, with dam
   for (const char* plot : {"attacks.svg", "attacks-fields.svg"})
     CHECK_THAT(read_text(folder / plot),
                Contains("class=\"curve\"") && Contains("grey levels") && Contains("chosen detection"));
+}
+
+TEST_CASE("bench attacks says that the bound of an owner of version 0.1 is not proven", "[bench]") {
+  // The note comes before the field is read.
+  const auto noted = [](const std::string& owner) {
+    const auto r = run_command(
+        {"bench", "attacks", "--owner", owner, "--field", "/no/such.fm", "--message", "5", "--count", "1"});
+    CHECK(r.code == cli::kFailed);
+    CHECK_THAT(r.err, Contains("/no/such.fm"));
+    return r.out;
+  };
+  CHECK_THAT(noted(source_dir() + "/tests/regression/version_0_1/owner.fm"),
+             Contains("note: the networks of this owner file were trained under its own key") &&
+                 Contains("is not proven"));
+  CHECK_THAT(noted(TinyJob::get().owner), !Contains("note: "));
 }
 
 TEST_CASE("bench attacks: what is missing", "[bench]") {

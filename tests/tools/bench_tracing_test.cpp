@@ -1,6 +1,7 @@
 #include <fieldmark/core/files.h>
 
 #include "cli/cli.h"
+#include "support/source_dir.h"
 #include "tools/tiny_job.h"
 
 using namespace fieldmark;
@@ -27,6 +28,17 @@ TEST_CASE("bench tracing tells who was found in each case", "[bench]") {
   }
   CHECK_THAT(r.err, Contains("12 recipients, 1 views, detection blind") && Contains("average of 8"));
   CHECK_THAT(read_text(folder / "tracing.md"), Contains("## rows"));
+  CHECK(!json.contains("notes"));
+}
+
+TEST_CASE("bench tracing says that the bound of an owner of version 0.1 is not proven", "[bench]") {
+  const auto r =
+      run_command({"bench", "tracing", "--owner", source_dir() + "/tests/regression/version_0_1/owner.fm",
+                   "--recipients", "9", "--repetitions", "1", "--views", "1", "--blind", "--json", "-"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  CHECK_THAT(r.err, Contains("note: the networks of this owner file were trained under its own key"));
+  CHECK_THAT(nlohmann::json::parse(r.out)["notes"].dump(), Contains("is not proven"));
 }
 
 TEST_CASE("bench tracing refuses a list that is too short", "[bench]") {

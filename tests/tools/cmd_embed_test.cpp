@@ -73,6 +73,31 @@ TEST_CASE("embed gives the same bytes for the same seed and key", "[embed]") {
   CHECK(read_bytes(job.folder / "again1") == read_bytes(job.folder / "again2"));
 }
 
+TEST_CASE("embed writes the same networks under another key, and info tells so", "[embed]") {
+  const TinyJob& job = TinyJob::get();
+  const auto info = [](const std::string& owner) {
+    const auto r = run_command({"info", owner, "--json", "-"});
+    INFO(r.err);
+    REQUIRE(r.code == cli::kOk);
+    const auto json = nlohmann::json::parse(r.out);
+    CHECK_THAT(r.err, Contains("networks sha256 " + json["networks_sha256"].get<std::string>() + ", of all"));
+    return json;
+  };
+  const auto embedded = [&](unsigned key) {
+    const std::string owner = job.folder / ("under_" + std::to_string(key) + ".fm");
+    const auto r = tiny_embed(
+        job.field, owner, {"--key", test_key_file(job.folder, key), "--steps", "2", "--measured-views", "1"});
+    INFO(r.err);
+    REQUIRE(r.code == cli::kOk);
+    return info(owner);
+  };
+  const auto one = embedded(7), other = embedded(9);
+  CHECK(one["networks_sha256"].get<std::string>().size() == 64);
+  CHECK(one["networks_sha256"] == other["networks_sha256"]);
+  CHECK(one["metadata"] == other["metadata"]);
+  CHECK(one["sha256"] != other["sha256"]);  // only the key differs
+}
+
 TEST_CASE("embed learns from views at several distances, and from several samples of a ray", "[embed]") {
   const TinyJob& job = TinyJob::get();
   const auto embed = [&](const std::string& distances, const std::string& samples) {

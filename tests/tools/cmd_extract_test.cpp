@@ -29,6 +29,8 @@ TEST_CASE("extract reads every image and all together", "[extract]") {
   CHECK(json["views"][0]["logits"].size() == 4);
   CHECK(json["views"][0]["detection"] == "blind");
   CHECK(json["views"][0]["agreement"].is_null());
+  REQUIRE(json["seconds_per_image"].is_number());  // infinity and NaN are null
+  CHECK(json["seconds_per_image"] > 0);
 }
 
 TEST_CASE("extract says which reading it chose and how well the image agrees", "[extract]") {

@@ -30,6 +30,8 @@ TEST_CASE("info shows metadata and tensors", "[info]") {
   CHECK(json["numbers"] == 11);
   CHECK(json["file_bytes"] == std::filesystem::file_size(path));
   CHECK(json["sha256"].get<std::string>().size() == 64);
+  CHECK(json.at("networks_sha256").is_null());  // only an owner has networks to compare
+  CHECK_THAT(r.err, !Contains("networks"));
   REQUIRE(json["tensors"].size() == 2);
   const auto want =
       nlohmann::json::parse(R"({"name": "weight", "dtype": "F32", "shape": [2, 3], "bytes": 24})");

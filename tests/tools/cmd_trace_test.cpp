@@ -1,5 +1,7 @@
+#include <fieldmark/core/digest.h>
 #include <fieldmark/core/files.h>
 #include <fieldmark/imaging/image.h>
+#include <fieldmark/watermark/evidence/commitment.h>
 #include <fieldmark/watermark/reading/blind_reader.h>
 #include <fieldmark/watermark/tracing/trace.h>
 
@@ -30,6 +32,33 @@ TEST_CASE("trace answers for every recipient, and with exit code 3 where nobody 
     CHECK(recipient["p_corrected"] >= recipient["p_value"]);
     last = recipient["p_value"];
   }
+}
+
+TEST_CASE("trace names the list, the owner file and the commitment that it tested", "[trace]") {
+  const TinyJob& job = TinyJob::get();
+  const std::string names = job.folder / "unsorted.txt", key = test_key_file(job.folder, 6);
+  write_file_atomically(names, "Cecilia\n\nAnna\r\n Bertil");
+  const auto traced = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words{"trace",    "--owner",     job.owner, "--message", "5",
+                                   "--copies", names,         "--fpr",   "1",         "--json",
+                                   "-",        "--detection", "blind",   job.images()};
+    words.insert(words.end(), more.begin(), more.end());
+    const auto r = run_command(words);
+    INFO(r.err);
+    REQUIRE(r.code == cli::kOk);
+    return r;
+  };
+  const std::string list = sha256_hex("Anna\nBertil\nCecilia\n"), owner = sha256_file_hex(job.owner);
+  const auto commitment = [&](unsigned first) {
+    return watermark::commitment(owner, test_key(first), watermark::message_from_hex("5", 4));
+  };
+  const auto r = traced({});
+  CHECK_THAT(r.err, Contains("list sha256  " + list + "\nowner sha256 " + owner + "\ncommitment   "));
+  const auto json = nlohmann::json::parse(r.out);
+  CHECK(json["list_sha256"] == list);
+  CHECK(json["owner_sha256"] == owner);
+  CHECK(json["commitment"] == commitment(5));
+  CHECK(nlohmann::json::parse(traced({"--key", key}).out)["commitment"] == commitment(6));
 }
 
 TEST_CASE("trace finds at a rate of 1 whomever it tests, verify and bake take one copy", "[trace]") {

@@ -28,6 +28,7 @@ TEST_CASE("verify answers with numbers, and with exit code 3 where nothing is fo
   INFO(r.err);
   CHECK(r.code == cli::kNotFound);
   const auto json = nlohmann::json::parse(r.out);
+  CHECK_THAT(r.err, Contains("\nevidence this strong occurs by chance with a probability of up to "));
   CHECK(json["found"] == false);
   CHECK(json["p_value"] > 1e-6);
   CHECK(json["bits"] == 4);
@@ -37,6 +38,8 @@ TEST_CASE("verify answers with numbers, and with exit code 3 where nothing is fo
     CHECK(json["wrong_keys"]["counts"][p].get<int>() <= json["wrong_keys"]["bounds_99"][p].get<int>());
   CHECK(json["wrong_keys"]["bounds_99"]["1e-1"] == 66);  // P(binomial(500, 0.1) > 66) = 0.9%
   CHECK(json["p_value_bits"].is_number());
+  REQUIRE(json["seconds_per_image"].is_number());  // infinity and NaN are null
+  CHECK(json["seconds_per_image"] > 0);
   REQUIRE(json["per_view"].size() == 1);
   CHECK(json["matching_bits"] == places_alike(json["per_view"][0]["bits"], "0101"));
 }
@@ -101,7 +104,8 @@ TEST_CASE("verify says what speaks against the message", "[verify]") {
   REQUIRE(p < noise);
   const auto found = verified(std::to_string((p + noise) / 2));
   CHECK(found.code == cli::kOk);
-  CHECK_THAT(found.err, Contains("FOUND: the images carry a mark of this key") && Contains(note));
+  CHECK_THAT(found.err, Contains("FOUND: the images carry a mark of this key") && Contains(note) &&
+                            Contains("\nif the key had nothing to do with the images, evidence this strong"));
   CHECK_THAT(verified("1").err, !Contains(note));
   CHECK_THAT(verified(std::to_string(p / 2)).err, Contains("NOT FOUND") && !Contains(note));
 }

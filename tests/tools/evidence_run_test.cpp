@@ -69,3 +69,20 @@ TEST_CASE("evidence_run: three built-in controls, and one for each path that is 
   CHECK_THROWS_AS(test_controls(run.test, run.reader, run.images, {"/no/such.png"}, {}, run.context),
                   IoError);
 }
+
+TEST_CASE("evidence_run: the verdict says how sure it is, and what a near miss lacks", "[evidence]") {
+  CHECK(verdict_sentence(6.3e-30, 1e-6) ==
+        "if the key had nothing to do with the images, evidence this strong would occur with a probability "
+        "of at most 1 in 10^29");
+  CHECK(verdict_sentence(1e-6, 1e-6).ends_with("of at most 1 in 1 000 000"));
+  CHECK(verdict_sentence(0.4, 1).ends_with("of at most 40%"));
+  CHECK(verdict_sentence(1e-4, 1e-6) ==
+        "evidence this strong occurs by chance with a probability of up to 1 in 10 000: it points to a mark "
+        "of this key, but at most 1 in 1 000 000 was required; more images of the field may decide");
+  CHECK_THAT(verdict_sentence(2e-6, 1e-6), Contains("of up to 1 in 100 000: it points to a mark"));
+  CHECK(verdict_sentence(0.54, 1e-6) ==
+        "evidence this strong occurs by chance with a probability of up to 54%: nothing points to a mark of "
+        "this key, though a damaged one may be left");
+  CHECK_THAT(verdict_sentence(0.011, 1e-6), Contains("of up to 1 in 10: nothing points"));
+  CHECK_THAT(verdict_sentence(1, 0.5), Contains("of up to 100%: nothing points"));
+}

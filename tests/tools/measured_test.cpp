@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "support/catch.h"
+#include "watermark/small_owner.h"
 
 using namespace fieldmark;
 
@@ -67,4 +68,14 @@ TEST_CASE("measured: people see the accuracies in percent", "[measured]") {
   CHECK_THAT(out.str(), Contains("informed 87.50%"));
   CHECK_THAT(out.str(), Contains("found at p 1e-06     90.0% of single views"));
   CHECK_THAT(out.str(), Contains(", found 62.5%"));
+}
+
+TEST_CASE("measured: views to read informed are as given or usual, none without cells", "[measured]") {
+  const auto cells = small_owner(), none = small_paper_owner();
+  CHECK(cli::informed_views({}, 20, cells) == 20);
+  CHECK(cli::informed_views(3, 20, cells) == 3);
+  CHECK(cli::informed_views({}, 20, none) == 0);
+  CHECK(cli::informed_views(0, 20, none) == 0);
+  CHECK_THROWS_WITH(cli::informed_views(3, 20, none),
+                    "--informed-count: an owner of preset paper has no cells in space");
 }

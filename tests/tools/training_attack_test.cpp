@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "cli/cli.h"
+#include "nerf/small_field.h"
 #include "tools/tiny_job.h"
 
 using namespace fieldmark;
@@ -41,6 +42,47 @@ TEST_CASE("attack-field trains a field further, or a new one on its images", "[a
   const auto ignored = run({"retrain", "--views", "4", "--lr", "0.1"});
   CHECK(ignored.code == cli::kUsage);
   CHECK_THAT(ignored.err, Contains("--lr: --attack retrain does not use it"));
+}
+
+TEST_CASE("attack-field retrains a field as another kind", "[attack-field]") {
+  const TemporaryFolder folder;
+  const std::string hash = tiny_field(folder, tiny_scene(folder)), mlp = folder / "mlp.fm",
+                    unbounded = folder / "unbounded.fm", out = folder / "out.fm";
+  small_field(1, small_mlp_options()).save(mlp);
+  const auto attack = [&](const std::string& field, const std::string& name, const std::string& preset) {
+    return run_command({"attack-field", field, "--out", out, "--attack", name, "--preset", preset, "--views",
+                        "4", "--size", "16", "--steps", "2", "--json", "-"});
+  };
+  const auto retrained = [&](const std::string& field, const std::string& preset) {
+    const auto r = attack(field, "retrain", preset);
+    INFO(r.err);
+    REQUIRE(r.code == cli::kOk);
+    CHECK(nlohmann::json::parse(r.out)["steps"] == 2);
+    return nerf::RadianceField::load(out).options().field;
+  };
+  const nerf::FieldOptions from_hash = retrained(hash, "mlp"), from_mlp = retrained(mlp, "hash"),
+                           same = retrained(hash, "hash");
+  CHECK(from_hash.kind == nerf::FieldKind::mlp);
+  CHECK(from_hash.mlp.width == 256);
+  CHECK(from_mlp.kind == nerf::FieldKind::hash);
+  CHECK(from_mlp.encoding.log2_table == 17);
+  CHECK(same.kind == nerf::FieldKind::hash);
+  CHECK(same.encoding.log2_table == trainable_field_options().field.encoding.log2_table);
+
+  nerf::RadianceField field = small_field();
+  field.space.kind = nerf::SpaceKind::contracted;
+  field.save(unbounded);
+  std::filesystem::remove(out);
+  const auto refused = [&](const Outcome& r, const char* why) {
+    CHECK(r.code == cli::kUsage);
+    CHECK_THAT(r.err, Contains(why));
+    CHECK(!std::filesystem::exists(out));
+  };
+  refused(attack(unbounded, "retrain", "mlp"), "--preset mlp: its samples are spread over straight rays");
+  refused(attack(hash, "retrain", "paper"), "--preset");
+  refused(attack(hash, "finetune-renders", "mlp"), "--preset: --attack finetune-renders does not use it");
+  refused(run_command({"attack-field", hash, "--out", out, "--attack", "float16", "--preset", "mlp"}),
+          "--preset: --attack float16 does not use it");
 }
 
 TEST_CASE("attack-field turns images against a known extractor and trains the field on them",

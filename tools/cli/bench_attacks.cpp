@@ -8,8 +8,9 @@
 #include <optional>
 
 #include "cli/bench.h"
+#include "cli/measured.h"
 #include "cli/message_option.h"
-#include "cli/reading.h"
+#include "cli/owner_note.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -26,12 +27,18 @@ struct BenchAttacksArguments {
   bool quick = false;
 };
 
+watermark::Owner noted_owner(const std::string& path, Context& context) {
+  auto owner = watermark::Owner::load(path);
+  note_unproven_bound(owner, context);
+  return owner;
+}
+
 class Bench {
  public:
   Bench(const BenchAttacksArguments& options, Context& context)
       : options_(options),
         context_(context),
-        owner_(watermark::Owner::load(options.owner)),
+        owner_(noted_owner(options.owner, context)),
         message_(message_of(options.message, owner_.options().bits)),
         marked_(nerf::RadianceField::load(options.field)),
         progress_(new Progress(context.progress("none"))),  // the meter begins with the views themselves

@@ -3,6 +3,7 @@
 
 #include "cli/bench.h"
 #include "cli/code_option.h"
+#include "cli/owner_note.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -38,6 +39,7 @@ Json tracing_row_json(const bench::TracingRow& r) {
 int run_bench_tracing(const BenchTracingArguments& o, Context& context) {
   const auto owner = watermark::Owner::load(o.owner);
   check_copies(owner);
+  note_unproven_bound(owner, context);
   bench::TracingBenchOptions options = o.options;
   options.informed = !o.blind;
   options.seed = context.seed();

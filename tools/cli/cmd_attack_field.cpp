@@ -62,10 +62,10 @@ void refuse_unused(CommandLine& app, const std::string& attack) {
   if (attack == "finetune") uses({"--data", "--size", "--lr"});
   if (attack == "finetune-renders") uses({"--views", "--size", "--lr"});
   if (attack == "remove") uses({"--owner", "--mark-psnr", "--views", "--lr"});
-  if (attack == "retrain") uses({"--views", "--size"});
+  if (attack == "retrain") uses({"--preset", "--views", "--size"});
   if (!is_training_attack(attack)) used = {"--other", "--unmarked", "--marked"};
-  for (const char* name : {"--data", "--owner", "--mark-psnr", "--size", "--views", "--lr", "--steps",
-                           "--seconds", "--other", "--unmarked", "--marked"})
+  for (const char* name : {"--data", "--owner", "--mark-psnr", "--preset", "--size", "--views", "--lr",
+                           "--steps", "--seconds", "--other", "--unmarked", "--marked"})
     if (app.option(name).count() > 0 && std::ranges::find(used, name) == used.end())
       throw UsageError(std::string(name) + ": --attack " + attack + " does not use it");
 }

@@ -92,7 +92,8 @@ int run_extract(const ExtractArguments& options, Context& context) {
   Json json{{"read", read},
             {"fpr", options.fpr},
             {"message", to_hex(reading.message)},
-            {"detection", reading_used(images)}};
+            {"detection", reading_used(images)},
+            {"seconds_per_image", number(reader.seconds_per_image())}};
   json.update(bits_json(reading));
   json["views"] = views;
   context.result(json);

@@ -1,5 +1,6 @@
 #include <fieldmark/core/digest.h>
 #include <fieldmark/engine/safetensors.h>
+#include <fieldmark/watermark/mark/owner.h>
 
 #include <cstdio>
 #include <filesystem>
@@ -9,6 +10,7 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/fingerprints.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -27,6 +29,12 @@ Json metadata_json(const SafetensorsFile& file) {
   return json;
 }
 
+bool is_owner_file(const Json& metadata) {
+  const auto entry = metadata.find("fieldmark");
+  return entry != metadata.end() && entry->is_object() && entry->contains("kind") &&
+         entry->at("kind") == "owner";
+}
+
 int run_info(const InfoArguments& options, Context& context) {
   const auto file = SafetensorsFile::read(options.file);
   const std::string sha256 = sha256_file_hex(options.file);
@@ -35,6 +43,11 @@ int run_info(const InfoArguments& options, Context& context) {
   Index numbers = 0;
   auto& text = context.text();
   text << options.file << "\nsha256 " << sha256 << "\n";
+  Json networks = nullptr;
+  if (is_owner_file(metadata)) {
+    networks = networks_sha256(file);
+    text << "networks sha256 " << networks.get<std::string>() << ", of all tensors but the key\n";
+  }
   for (const auto& [key, value] : metadata.items()) text << key << ": " << value.dump(2) << "\n";
   for (const auto& tensor : file.tensors) {
     char line[200];
@@ -51,6 +64,7 @@ int run_info(const InfoArguments& options, Context& context) {
   text << file.tensors.size() << " tensors, " << numbers << " elements, " << bytes << " bytes\n";
   context.result({{"file_bytes", bytes},
                   {"sha256", sha256},
+                  {"networks_sha256", networks},
                   {"numbers", numbers},
                   {"metadata", metadata},
                   {"tensors", tensors}});

@@ -14,7 +14,6 @@
 #include "cli/context.h"
 #include "cli/lpips.h"
 #include "cli/measured.h"
-#include "cli/reading.h"
 #include "cli/scene_data.h"
 
 namespace fieldmark::cli {

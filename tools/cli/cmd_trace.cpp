@@ -1,3 +1,5 @@
+#include <fieldmark/core/digest.h>
+#include <fieldmark/watermark/evidence/commitment.h>
 #include <fieldmark/watermark/tracing/copies.h>
 #include <fieldmark/watermark/tracing/trace.h>
 
@@ -11,6 +13,7 @@
 #include "cli/code_option.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/fingerprints.h"
 #include "cli/reading.h"
 #include "cli/rounded_up.h"
 
@@ -80,12 +83,19 @@ int run_trace(const TraceArguments& options, Context& context) {
                           {"found", is_found}});
   }
   print_recipients(copies, found, options.fpr, context);
+  const std::string list_sha256 = recipients_sha256(names), owner_sha256 = sha256_file_hex(options.owner),
+                    commitment = watermark::commitment(owner_sha256, key, message);
+  context.text() << "list sha256  " << list_sha256 << "\nowner sha256 " << owner_sha256 << "\ncommitment   "
+                 << commitment << "\n";
   context.result({{"recipients", recipients},
                   {"tested", names.size()},
                   {"found", found},
                   {"fpr", options.fpr},
                   {"views", images.size()},
-                  {"detection", reading_used(images)}});
+                  {"detection", reading_used(images)},
+                  {"list_sha256", list_sha256},
+                  {"owner_sha256", owner_sha256},
+                  {"commitment", commitment}});
   return found > 0 ? kOk : kNotFound;
 }
 

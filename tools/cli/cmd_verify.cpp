@@ -45,19 +45,20 @@ watermark::WrongKeyCounts count_keys(const KeyTest& test, const std::vector<doub
 
 void print_verdict(const watermark::EvidenceRecord& record, Context& context) {
   const auto& score = record.together;
-  char text[400];
+  char head[120], text[400];
+  std::snprintf(head, sizeof head, "%s at a false-positive rate of %g\n",
+                record.found() ? "FOUND: the images carry a mark of this key," : "NOT FOUND", record.fpr);
   std::snprintf(text, sizeof text,
-                "%s at a false-positive rate of %g\n"
                 "p-value of the key    %s (two-sided %s), from %zu images together\n"
                 "p-value of the bits   %s (two-sided %s), %lld of %lld match\n"
                 "detection             %s\n",
-                record.found() ? "FOUND: the images carry a mark of this key," : "NOT FOUND", record.fpr,
                 rounded_up(score.p_value, 3).c_str(), rounded_up(score.p_value_two_sided, 3).c_str(),
                 record.images.size(), rounded_up(score.p_value_bits, 3).c_str(),
                 rounded_up(score.p_value_bits_two_sided, 3).c_str(),
                 static_cast<long long>(score.match.matching), static_cast<long long>(score.match.bits),
                 record.reading.c_str());
-  context.text() << text << "owner sha256 " << record.owner_sha256 << "\ncommitment " << record.commitment
+  context.text() << head << verdict_sentence(score.p_value, record.fpr) << "\n"
+                 << text << "owner sha256 " << record.owner_sha256 << "\ncommitment " << record.commitment
                  << "\n";
 }
 
@@ -111,6 +112,7 @@ int run_verify(const VerifyArguments& options, Context& context) {
   }
   SuspectReader reader(owner, options.reading);
   const auto images = read_images(reader, options.suspects, options.owner, context);
+  const double seconds_per_image = reader.seconds_per_image();  // without the controls
   const auto evidence = total_evidence(images);
   const KeyTest test{owner, code, message};
   watermark::EvidenceRecord record{.reading = reading_used(images),
@@ -144,6 +146,7 @@ int run_verify(const VerifyArguments& options, Context& context) {
     context.text() << options.evidence << ": signed record with report.html, public key " << signer << "\n";
   }
   Json json = result_json(record, signer);
+  json["seconds_per_image"] = number(seconds_per_image);
   json["payload"] = payload_json(message);
   json["wrong_keys"] = wrong;
   json["per_view"] = per_view_json(images, record.images);

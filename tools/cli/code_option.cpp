@@ -3,6 +3,7 @@
 #include <fieldmark/watermark/tracing/copies.h>
 
 #include "cli/cli.h"
+#include "cli/owner_note.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -47,10 +48,7 @@ watermark::Key choose_code(const CodeOption& options, const MessageOption& messa
   read_option(options.bits > 0 ? "--bits" : "--message", [&] {
     owner.set_code(options.copy.empty() ? key : watermark::copy_key(key, options.copy), bits);
   });
-  if (!owner.key_free())
-    context.note(
-        "the networks of this owner file were trained under its own key (version 0.1), so the bound of its "
-        "p-values is not proven; embed it anew for one that is");
+  note_unproven_bound(owner, context);
   return key;
 }
 

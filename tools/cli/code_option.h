@@ -22,7 +22,7 @@ void add_copy_option(CommandLine& app, CodeOption& options, const std::string& p
 
 /// Gives an owner the requested key, copy and message length, see Owner::set_code(). Without --bits, the
 /// length is four bits per digit of --message if these do not fit the owner's usual length, and a note says
-/// so. Also notes if the owner's networks depend on its key.
+/// so. Also calls note_unproven_bound().
 /// @return the key that signs and commits: that of --key or of the owner, never that of a copy
 /// @throws UsageError if the owner's cells cannot hold the message
 watermark::Key choose_code(const CodeOption& options, const MessageOption& message, watermark::Owner& owner,

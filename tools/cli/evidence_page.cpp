@@ -1,4 +1,5 @@
 #include "cli/evidence_page.h"
+#include "cli/one_in.h"
 #include "cli/rounded_up.h"
 
 #include <fieldmark/core/base64.h>
@@ -57,30 +58,6 @@ std::string cell(const std::string& inner) { return "<td>" + inner + "</td>"; }
 std::string number_cell(const std::string& inner) { return "<td class=\"n\">" + inner + "</td>"; }
 std::string code(const std::string& text) { return "<code>" + escaped_markup(text) + "</code>"; }
 
-std::string one_in_number(std::string digits) {
-  for (auto at = std::ssize(digits) - 3; at > 0; at -= 3)
-    digits.insert(static_cast<std::size_t>(at), "&nbsp;");
-  return "1 in " + digits;
-}
-
-// Writes a bound on a probability in words, rounded up to a power of ten: "1 in 10 000 000".
-std::string one_in(double p) {
-  const int zeros = static_cast<int>(std::floor(-std::log10(p) + 1e-9));
-  if (zeros < 1) return rounded_up(100 * p, 3) + "%";
-  if (zeros > 9) return "1 in 10<sup>" + std::to_string(zeros) + "</sup>";
-  return one_in_number("1" + std::string(static_cast<std::size_t>(zeros), '0'));
-}
-
-// Writes a required rate, which must not be rounded: "1 in 50 000", "25%", or "2.3e-05".
-std::string exactly(double rate) {
-  const double n = std::round(1 / rate);
-  const bool power_of_ten = std::abs(rate * std::pow(10, std::round(-std::log10(rate))) - 1) < 1e-12;
-  if (power_of_ten) return one_in(rate);
-  if (rate >= 0.01) return text_of(100 * rate, "%.6g") + "%";
-  if (n > 1e9 || std::abs(n * rate - 1) > 1e-12) return text_of(rate, "%.6g");
-  return one_in_number(text_of(n, "%.0f"));
-}
-
 // Underlines the bits that differ from the message.
 std::string marked_bits(const EvidenceScore& score, const watermark::Message& message) {
   std::string out;
@@ -105,10 +82,12 @@ std::string verdict(const EvidenceRecord& r) {
     return "<p class=\"verdict found\"><strong>The mark was found</strong> in " + count +
            ". If the owner's key had nothing to do with them, evidence this strong would occur with a "
            "probability of at most " +
-           one_in(r.together.p_value) + " (required: " + exactly(r.fpr) + ").</p>\n";
+           one_in(r.together.p_value, NumberStyle::html) +
+           " (required: " + exact_rate(r.fpr, NumberStyle::html) + ").</p>\n";
   return "<p class=\"verdict missing\"><strong>The mark was not found</strong> in " + count +
-         ". Evidence this strong occurs by chance with a probability of up to " + one_in(r.together.p_value) +
-         "; at most " + exactly(r.fpr) + " was required.</p>\n";
+         ". Evidence this strong occurs by chance with a probability of up to " +
+         one_in(r.together.p_value, NumberStyle::html) + "; at most " + exact_rate(r.fpr, NumberStyle::html) +
+         " was required.</p>\n";
 }
 
 // Says what the verdict does not cover in this record.

@@ -11,6 +11,7 @@
 
 #include "cli/cli.h"
 #include "cli/context.h"
+#include "cli/one_in.h"
 #include "cli/rounded_up.h"
 
 namespace fieldmark::cli {
@@ -20,6 +21,7 @@ using watermark::EvidenceControl;
 using watermark::EvidenceImage;
 using watermark::EvidenceScore;
 constexpr Index kControlViews = 5;
+constexpr double kNearMiss = 0.01;  // p-value at or below which images may show a mark that is too faint
 
 float background(const watermark::Owner& owner) { return nerf::background_value(owner.field.background); }
 
@@ -123,6 +125,19 @@ void print_views(std::ostream& out, const std::vector<ImageEvidence>& images,
                   rounded_up(*std::max_element(p_values.begin(), p_values.end())).c_str());
     out << to_bits(s.reading.message) << text << images[i].image << "\n";
   }
+}
+
+std::string verdict_sentence(double p_value, double fpr) {
+  if (p_value <= fpr)
+    return "if the key had nothing to do with the images, evidence this strong would occur with a "
+           "probability of at most " +
+           one_in(p_value);
+  const std::string chance =
+      "evidence this strong occurs by chance with a probability of up to " + one_in(p_value);
+  if (p_value <= kNearMiss)
+    return chance + ": it points to a mark of this key, but at most " + exact_rate(fpr) +
+           " was required; more images of the field may decide";
+  return chance + ": nothing points to a mark of this key, though a damaged one may be left";
 }
 
 Json key_counts(const watermark::WrongKeyCounts& found, const std::string& of, Context& context) {

@@ -51,6 +51,11 @@ Json per_view_json(const std::vector<ImageEvidence>& images,
 void print_views(std::ostream& out, const std::vector<ImageEvidence>& images,
                  const std::vector<watermark::EvidenceImage>& scores);
 
+/// Says how sure a verdict is: how often evidence this strong occurs by chance, and if nothing was found,
+/// whether it was a near miss, that is, evidence that falls short of the required rate.
+/// @param p_value  of the key, all images together   @param fpr  largest p-value that counts as found
+std::string verdict_sentence(double p_value, double fpr);
+
 /// Prints how often keys reach each p-value, next to the bounds of chance, one line per threshold, and
 /// returns it for --json.
 /// @param of  what was counted: "wrong keys"

@@ -8,6 +8,14 @@
 
 namespace fieldmark::cli {
 
+Index informed_views(std::optional<Index> given, Index usual, const watermark::Owner& owner) {
+  if (owner.mark().has_cells()) return given.value_or(usual);
+  if (given.value_or(0) > 0)
+    throw UsageError("--informed-count: an owner of preset " + owner.mark().preset() +
+                     " has no cells in space");
+  return 0;
+}
+
 Json measurement_json(const watermark::Measurement& m, const std::string& cameras) {
   const auto reading = [](const watermark::ReadingAccuracy& accuracy) {
     return Json{{"blind", number(accuracy.blind)},

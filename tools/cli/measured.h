@@ -2,11 +2,16 @@
 #include <fieldmark/watermark/attacks/measurement.h>
 
 #include <iosfwd>
+#include <optional>
 #include <string>
 
 #include "cli/context.h"
 
 namespace fieldmark::cli {
+
+/// Returns --informed-count: as given, or `usual`; 0 for an owner without cells.
+/// @throws UsageError if views are asked for of an owner without cells
+Index informed_views(std::optional<Index> given, Index usual, const watermark::Owner& owner);
 
 /// Returns the figures that `measure` and `embed` report. @param cameras  name of their set
 Json measurement_json(const watermark::Measurement& measured, const std::string& cameras);

@@ -6,6 +6,7 @@
 #include <memory>
 #include <ostream>
 
+#include "cli/cli.h"
 #include "cli/shared_data.h"
 
 namespace fieldmark::cli {

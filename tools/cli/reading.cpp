@@ -6,6 +6,7 @@
 #include <fieldmark/imaging/video/video_reader.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <ostream>
 #include <utility>
@@ -45,14 +46,6 @@ void check_rate(double rate, double least, Index cells) {
   throw UsageError(text);
 }
 
-Index informed_views(std::optional<Index> given, Index usual, const watermark::Owner& owner) {
-  if (owner.mark().has_cells()) return given.value_or(usual);
-  if (given.value_or(0) > 0)
-    throw UsageError("--informed-count: an owner of preset " + owner.mark().preset() +
-                     " has no cells in space");
-  return 0;
-}
-
 bool is_video(const std::filesystem::path& file) {
   std::error_code ignored;
   return std::filesystem::is_regular_file(file, ignored) && image_format(file) == ImageFormat::video;
@@ -68,16 +61,27 @@ SuspectReader::SuspectReader(const watermark::Owner& owner, const std::string& r
 }
 
 ImageEvidence SuspectReader::read(const Tensor<float>& image, const std::string& name) {
+  using Clock = std::chrono::steady_clock;
+  const auto begun = Clock::now();
+  ImageEvidence out = detect(image, name);
+  seconds_ += std::chrono::duration<double>(Clock::now() - begun).count();
+  ++reads_;
+  return out;
+}
+
+ImageEvidence SuspectReader::detect(const Tensor<float>& image, const std::string& name) {
   ImageEvidence out{.image = name, .cells = {}, .width = image.shape[1], .height = image.shape[0]};
   try {
     if (!informed_) {
       out.cells = blind_.evidence(image);
       return out;
     }
-    const watermark::ImageReading r = informed_->read(image);
-    out.agreement = r.informed.agreement;
-    out.reading = forced_ && !r.informed.evidence.empty() ? ReadingKind::informed : r.chosen;
-    out.cells = out.reading == ReadingKind::informed ? r.informed.evidence : r.blind;
+    const watermark::PageReading r = informed_->read(image);
+    const std::vector<double>& informed = r.whole.informed.evidence;
+    const bool aligned = forced_ && r.parts.empty() && !informed.empty();
+    out.agreement = r.agreement();
+    out.reading = aligned ? ReadingKind::informed : r.chosen();
+    out.cells = aligned ? informed : r.evidence();
     return out;
   } catch (const ShapeError& e) {
     throw IoError(name + ": " + e.what());

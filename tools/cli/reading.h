@@ -1,5 +1,5 @@
 #pragma once
-#include <fieldmark/watermark/reading/informed_reader.h>
+#include <fieldmark/watermark/scanning/page_reader.h>
 
 #include <cmath>
 #include <filesystem>
@@ -17,12 +17,13 @@ struct ImageEvidence {
   std::string image{};                                             ///< name; for a frame "clip.mp4@1.234s"
   std::vector<double> cells{};                                     ///< evidence per cell, S_c
   watermark::ReadingKind reading = watermark::ReadingKind::blind;  ///< detection that produced it
-  double agreement = std::nan("");  ///< of the image with the owner's field; NaN if they were not aligned
-  std::string sha256{};             ///< of the file's bytes
-  Index width = 0;                  ///< pixels
-  Index height = 0;                 ///< pixels
-  std::filesystem::path file{};     ///< the file it was read from
-  double time = std::nan("");       ///< of a frame, seconds; NaN for an image
+  /// Of the image, or of a part of it, with the owner's field; NaN if they were not aligned.
+  double agreement = std::nan("");
+  std::string sha256{};          ///< of the file's bytes
+  Index width = 0;               ///< pixels
+  Index height = 0;              ///< pixels
+  std::filesystem::path file{};  ///< the file it was read from
+  double time = std::nan("");    ///< of a frame, seconds; NaN for an image
 };
 
 /// Adds --detection auto|blind|informed.
@@ -38,10 +39,6 @@ void check_rate(double rate, double least, Index cells);
 /// True if a file is a video, whatever its name. @throws IoError if it cannot be read
 bool is_video(const std::filesystem::path& file);
 
-/// Returns --informed-count: as given, or `usual`; 0 for an owner without cells.
-/// @throws UsageError if views are asked for of an owner without cells
-Index informed_views(std::optional<Index> given, Index usual, const watermark::Owner& owner);
-
 /// Reads images with the detection that --detection names.
 class SuspectReader {
  public:
@@ -51,17 +48,24 @@ class SuspectReader {
   SuspectReader(const watermark::Owner& owner, const std::string& reading);
   /// @param name  of the image, for the result and error messages   @throws IoError if it is too small
   ImageEvidence read(const Tensor<float>& image, const std::string& name);
+  /// Returns the mean wall time of read() in seconds; NaN if it has read no image.
+  double seconds_per_image() const {
+    return reads_ > 0 ? seconds_ / static_cast<double>(reads_) : std::nan("");
+  }
   /// Returns the option as given: "auto", "blind" or "informed".
   const std::string& detection() const { return detection_; }
   /// Returns the owner's number of cells: the length of ImageEvidence::cells.
   Index cells() const { return cells_; }
 
  private:
+  ImageEvidence detect(const Tensor<float>& image, const std::string& name);
   std::string detection_;
   Index cells_;
   watermark::BlindReader blind_;
-  std::optional<watermark::InformedReader> informed_;
+  std::optional<watermark::PageReader> informed_;
   bool forced_;
+  double seconds_ = 0;  // of all reads
+  Index reads_ = 0;
 };
 
 /// IMAGE|VIDEO|DIR..., the number of frames to sample per video, and the file of readings.

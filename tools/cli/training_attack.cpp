@@ -49,12 +49,30 @@ nerf::Dataset data_of(const std::string& name, const nerf::RadianceField& field,
   return name == "remove" ? turned_renders(field, options, context) : renders(field, options, context);
 }
 
-nerf::RadianceField start(const std::string& name, const nerf::RadianceField& field, Context& context) {
+// Returns the sizes of the field that retrain trains.
+nerf::RadianceFieldOptions retrained_sizes(const nerf::RadianceField& field,
+                                           const TrainingAttackOptions& options) {
+  const nerf::FieldKind attacked = field.options().field.kind;
+  if (options.preset.empty() || (options.preset == "mlp") == (attacked == nerf::FieldKind::mlp))
+    return field.options();
+  if (options.preset == "hash")
+    return nerf::field_options({.steps = options.length.steps, .seconds = options.length.seconds});
+  if (field.space.kind == nerf::SpaceKind::contracted)
+    throw UsageError(
+        "--preset mlp: its samples are spread over straight rays, and the scene of this field has no bounds; "
+        "use --preset hash");
+  nerf::RadianceFieldOptions sizes;
+  sizes.field.kind = nerf::FieldKind::mlp;
+  return sizes;
+}
+
+nerf::RadianceField start(const std::string& name, const nerf::RadianceField& field,
+                          const TrainingAttackOptions& options, Context& context) {
   if (name != "retrain") return field;
   if (field.space.kind == nerf::SpaceKind::ndc)
     throw UsageError(
         "--attack retrain: a forward-facing field's images do not say how near its scene begins");
-  nerf::RadianceFieldOptions sizes = field.options();
+  nerf::RadianceFieldOptions sizes = retrained_sizes(field, options);
   sizes.seed = context.seed() + 62;
   return nerf::RadianceField(sizes);
 }
@@ -89,6 +107,13 @@ void add_training_attack(CommandLine& app, TrainingAttackOptions& o) {
   app.add_option("--views", o.views, "Views to render, 4 to 10000; for finetune-renders, remove and retrain")
       ->range(4, 10000)
       ->type_name("N");
+  app.add_option(
+         "--preset", o.preset,
+         "Kind of the new field: hash, mlp; another kind than FIELD's has the sizes of `train --preset`;\n"
+         "default: kind and sizes of FIELD; for retrain")
+      ->one_of({"hash", "mlp"})
+      ->type_name("NAME")
+      ->default_str("");
   app.add_option("--lr", o.lr, "Initial learning rate, 1e-6 to 1; for finetune, finetune-renders and remove")
       ->range(1e-6, 1.0)
       ->type_name("F");
@@ -104,9 +129,9 @@ nerf::RadianceField run_training_attack(const std::string& name, const nerf::Rad
                                         Json& result) {
   if (name == "finetune" && options.data.empty()) throw UsageError("--attack finetune: needs --data DIR");
   if (name == "remove" && options.owner.empty()) throw UsageError("--attack remove: needs --owner OWNER");
-  nerf::RadianceField out = start(name, field, context);
+  nerf::RadianceField out = start(name, field, options, context);
   const nerf::Dataset data = data_of(name, field, options, context);
-  nerf::TrainOptions train_options = nerf::train_options(field.options().field.kind);
+  nerf::TrainOptions train_options = nerf::train_options(out.options().field.kind);
   train_options.keep = name != "retrain";
   if (train_options.keep) train_options.schedule.lr = options.lr;
   train_options.schedule.steps = options.length.steps;

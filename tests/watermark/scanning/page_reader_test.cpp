@@ -1,0 +1,130 @@
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/watermark/scanning/page_reader.h>
+
+#include <cmath>
+
+#include "support/catch.h"
+#include "watermark/tiny_owner.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+namespace {
+
+constexpr CameraSearchOptions kSearch{.views = 40, .size = 32};
+const Message kPageMessage{{1, 0, 0, 1}};
+
+Tensor<float> marked_view(const Owner& owner, std::uint64_t seed) {
+  nerf::Renderer renderer(owner.field);
+  renderer.set_recolour(owner.marking(cell_signs(owner.code(), kPageMessage)));
+  const auto cameras = nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::novel, 1, 160, seed);
+  return quantize8(renderer.render(cameras.front()).rgb);
+}
+
+void put_image(Tensor<float>& page, const Tensor<float>& part, Index top, Index left) {
+  for (Index y = 0; y < part.shape[0]; ++y)
+    std::copy_n(&part[3 * y * part.shape[1]], 3 * part.shape[1],
+                &page[3 * ((top + y) * page.shape[1] + left)]);
+}
+
+// Returns a long page with lines of text, an image of something else and a view of the field.
+Tensor<float> page_with(const Tensor<float>& part) {
+  Tensor<float> page({1500, 330, 3}, 1.f);
+  for (Index line = 0; line < 40; ++line)
+    put_image(page, Tensor<float>({8, 200 + line, 3}, 0.1f), 20 + 20 * line + (line > 20 ? 200 : 0), 20);
+  Tensor<float> other({100, 140, 3});
+  for (Index i = 0; i < other.size(); ++i) other[i] = 0.3f + 0.05f * static_cast<float>(i / 7 % 9);
+  put_image(page, other, 460, 30);
+  put_image(page, part, 1200, 150);
+  return page;
+}
+
+double p_of(const Owner& owner, const std::vector<double>& evidence) {
+  return keyed_p_value(keyed_statistic(evidence, owner.code(), kPageMessage));
+}
+
+}  // namespace
+
+TEST_CASE("page_reader: an image that agrees as a whole is read as by the informed reader") {
+  const Owner owner = marking_owner();
+  const Tensor<float> image = marked_view(owner, 4);
+  InformedReader informed(owner, kSearch);
+  const ImageReading expected = informed.read(image);
+  REQUIRE(expected.chosen == ReadingKind::informed);
+  const PageReading page = PageReader(owner, kSearch).read(image);
+  CHECK(page.parts.empty());
+  CHECK(page.evidence() == expected.evidence());
+  CHECK(page.chosen() == ReadingKind::informed);
+  CHECK(page.agreement() == expected.informed.agreement);
+}
+
+TEST_CASE("page_reader: a view on a long page is found and read, on the same bits for any threads") {
+  const Owner owner = marking_owner();
+  const Tensor<float> image = page_with(marked_view(owner, 4));
+  std::vector<double> evidence[2];
+  for (const int n : {1, 2}) {
+    const ScopedThreads scope(n);
+    const PageReading page = PageReader(owner, kSearch).read(image);
+    CHECK(page.whole.chosen == ReadingKind::blind);
+    CHECK(page.chosen() == ReadingKind::informed);
+    REQUIRE(page.parts.size() == 1);
+    CHECK(page.parts[0].box.x >= 150);
+    CHECK(page.parts[0].box.y >= 1200);
+    CHECK(page.agreement() == page.parts[0].reading.informed.agreement);
+    CHECK(page.agreement() >= InformedReader::kLeastAgreement);
+    evidence[n - 1] = page.evidence();
+  }
+  CHECK(evidence[0] == evidence[1]);
+  CHECK(read_bits(evidence[0], owner.code(), 4).message == kPageMessage);
+  CHECK(p_of(owner, evidence[0]) < 1e-4);
+}
+
+TEST_CASE("page_reader: the views of a collage are added up") {
+  const Owner owner = marking_owner();
+  Tensor<float> collage({360, 520, 3}, 1.f);
+  put_image(collage, marked_view(owner, 4), 10, 10);
+  put_image(collage, marked_view(owner, 5), 190, 180);
+  put_image(collage, marked_view(owner, 6), 10, 350);
+  const PageReading page = PageReader(owner, kSearch).read(collage);
+  REQUIRE(page.whole.chosen == ReadingKind::blind);
+  REQUIRE(page.parts.size() == 3);
+  std::vector<double> sum(owner.code().bit.size());
+  for (const PartReading& part : page.parts)
+    for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += part.reading.evidence()[c];
+  CHECK(page.evidence() == sum);
+  CHECK(p_of(owner, sum) < 1e-6);
+}
+
+TEST_CASE("page_reader: a page without a view of the field is read blindly") {
+  const Owner owner = marking_owner();
+  Tensor<float> other({100, 100, 3});
+  for (Index i = 0; i < other.size(); ++i) other[i] = 0.2f + 0.07f * static_cast<float>(i / 11 % 8);
+  const Tensor<float> image = page_with(other);
+  const PageReading page = PageReader(owner, kSearch).read(image);
+  CHECK(page.parts.empty());
+  CHECK(page.chosen() == ReadingKind::blind);
+  CHECK(page.evidence() == page.whole.blind);
+  CHECK(page.agreement() == page.whole.informed.agreement);
+}
+
+TEST_CASE("page_reader: an object before an image of something else is found and read") {
+  const Owner owner = marking_owner();
+  nerf::Renderer renderer(owner.field);
+  renderer.set_recolour(owner.marking(cell_signs(owner.code(), kPageMessage)));
+  PageReader reader(owner, kSearch);
+  for (const std::uint64_t seed : {4u, 5u, 6u}) {
+    const nerf::Rendering view = renderer.render(
+        nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::novel, 1, 160, seed).front());
+    const float level = nerf::background_value(owner.field.background);
+    Tensor<float> image = view.rgb;
+    for (Index p = 0; p < view.opacity.size(); ++p)
+      for (Index c = 0; c < 3; ++c)
+        image[3 * p + c] += (1 - view.opacity[p]) *
+                            (0.25f + 0.5f * static_cast<float>(c == 1 ? p / 160 : p % 160) / 160 - level);
+    const PageReading page = reader.read(quantize8(image));
+    REQUIRE(page.chosen() == ReadingKind::informed);
+    CHECK(page.whole.chosen == ReadingKind::blind);
+    CHECK(p_of(owner, page.evidence()) < 1e-3);
+  }
+}

@@ -1,0 +1,72 @@
+#pragma once
+#include <fieldmark/nerf/renderer.h>
+#include <fieldmark/watermark/reading/informed_reader.h>
+#include <fieldmark/watermark/scanning/image_blocks.h>
+#include <fieldmark/watermark/scanning/object_search.h>
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+namespace fieldmark::watermark {
+
+/// The reading of a part of an image.
+struct PartReading {
+  PixelBox box{};        ///< of the part in the image
+  ImageReading reading;  ///< of the part alone, by informed detection
+};
+
+/// The reading of an image and of the parts that show the field.
+struct PageReading {
+  ImageReading whole;                   ///< of the whole image
+  std::vector<PartReading> parts = {};  ///< that agree with the field; empty if the whole image does
+  /// Evidence of the detection chosen, [cells]: of the whole image, or the sum over all parts.
+  std::vector<double> evidence() const;
+  /// Informed if the image or a part of it agrees with the field.
+  ReadingKind chosen() const { return parts.empty() ? whole.chosen : ReadingKind::informed; }
+  /// Largest agreement of the image or of a part.
+  double agreement() const;
+};
+
+/// Detection that also reads views on a page, in a collage, and objects in other surroundings. The first that
+/// agrees with the field counts:
+///   - the whole image, as by InformedReader;
+///   - its blocks, which plain gaps separate (see image_blocks()), the largest first, and the parts of a
+///   block
+///     that does not agree. All blocks that agree are added up;
+///   - for an object, the places where the image looks most like a render or a quarter of one (see
+///     ObjectSearch). Everything outside the outline is replaced by the field's background, and the object
+///     counts as found if the differences between neighbouring pixels inside the outline agree with the
+///     render's, by a correlation of 0.3.
+/// The choice depends on agreement alone and on neither key nor message, so the evidence may be tested
+/// against any.
+class PageReader {
+ public:
+  /// Shorter side of the smallest block, and longer side of the smallest part of an object, pixels.
+  static constexpr Index kLeastSide = 64;
+  /// Most blocks read in an image; the smallest of a longer page are left out.
+  static constexpr Index kMostBlocks = 24;
+  /// @param owner  of preset fast; must outlive the reader
+  /// @throws ValueError as InformedReader
+  explicit PageReader(const Owner& owner, const CameraSearchOptions& search = {});
+  /// Reads an image.
+  /// @param image  as BlindReader::evidence()   @throws ShapeError, ValueError as there
+  PageReading read(const Tensor<float>& image);
+
+ private:
+  std::vector<PartReading> read_blocks(const Tensor<float>& rgb);
+  std::vector<PartReading> read_object(const Tensor<float>& whole);
+  struct Cleared {
+    ImageReading reading;
+    double inside;  // agreement inside the outline
+  };
+  Cleared read_cleared(const Tensor<float>& box, const nerf::Camera& camera, Index beside);
+  Cleared read_at(const Tensor<float>& box, const nerf::Camera& candidate);
+
+  const Owner& owner_;
+  InformedReader reader_;
+  std::optional<ObjectSearch> objects_ = {};       // from the first image that needs it
+  std::unique_ptr<nerf::Renderer> renderer_ = {};  // likewise
+};
+
+}  // namespace fieldmark::watermark
