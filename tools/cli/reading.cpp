@@ -26,7 +26,7 @@ void add_reading(CommandLine& app, std::string& reading) {
   app.add_option("--detection", reading,
                  "Detection to use. blind: extractor alone; informed: find the camera and subtract the\n"
                  "unmarked render; "
-                 "auto: informed if the image agrees with the owner's field, else blind")
+                 "auto: informed if the image or a part of it agrees with the owner's field, else blind")
       ->one_of({"auto", "blind", "informed"})
       ->type_name("NAME");
 }
