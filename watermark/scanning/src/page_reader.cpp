@@ -9,14 +9,17 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr double kMostOfImage = 0.5;     // share of its pixels; a larger block is read with the whole image
-constexpr Index kMarginShare = 10;       // of a part's longer side: renders of objects have a margin
+constexpr double kMostOfImage = 0.95;    // share of its pixels; a larger block is the image
+constexpr Index kMostElongated = 8;      // longer to shorter side of a block: no view is longer
+constexpr Index kMarginShare = 10;       // of a part's shorter side: renders of objects have a margin
+constexpr Index kLeastReduced = 16;      // shorter side of the same image, pixels
 constexpr Index kLargest = 512;          // longer side of an image that is searched for an object, pixels
 constexpr Index kCandidates = 2;         // places of the whole object that are tried, and of its quarters
 constexpr double kBesideOutline = 0.03;  // of a part's longer side: error of a candidate's outline
 constexpr int kRefinements = 4;
 constexpr Index kCoarse = 32;  // longer side at which a candidate is compared with the image, pixels
-// Agreement inside the outline of a candidate: in images of something else -0.3 to 0.15, of a quarter to 0.3.
+// Agreement inside the outline of a candidate: in images of something else -0.3 to 0.15, of a quarter to 0.3,
+// few above 0.28.
 constexpr double kLeastCoarse = 0.1, kLeastCoarseQuarter = 0.28;
 constexpr Index kCompared = 160;  // longer side at which a render is compared with the image, pixels
 constexpr float kSolid = 0.9f;    // opacity inside the outline
@@ -96,8 +99,8 @@ double agreement_inside(const Tensor<float>& image, const nerf::Rendering& view)
 }
 
 PixelBox box_of(const ObjectPlace& place) {
-  const auto longer = std::max(place.window.width, place.window.height);
-  const double margin = place.whole ? longer / static_cast<double>(kMarginShare) : 0;
+  const auto shorter = std::min(place.window.width, place.window.height);
+  const double margin = place.whole ? shorter / static_cast<double>(kMarginShare) : 0;
   return {std::lround(place.window.x - margin), std::lround(place.window.y - margin),
           std::max<Index>(16, std::lround(place.window.width + 2 * margin)),
           std::max<Index>(16, std::lround(place.window.height + 2 * margin))};
@@ -152,10 +155,11 @@ std::vector<PartReading> PageReader::read_blocks(const Tensor<float>& rgb) {
     const ImageBlock& block = *blocks.top();
     blocks.pop();
     const PixelBox& box = block.box;
-    if (std::min(box.width, box.height) >= kLeastSide &&
+    const Index shorter = std::min(box.width, box.height), longer = std::max(box.width, box.height);
+    if (shorter >= kLeastSide && longer <= kMostElongated * shorter &&
         static_cast<double>(box.area()) <= kMostOfImage * all) {
       ++read;
-      const Index margin = object ? std::max(box.width, box.height) / kMarginShare : 0;
+      const Index margin = object ? shorter / kMarginShare : 0;
       PartReading part{box, reader_.read(cut(rgb, box, margin, found.background))};
       if (part.reading.chosen == ReadingKind::informed) {
         parts.push_back(std::move(part));
@@ -196,15 +200,12 @@ PageReader::Cleared PageReader::read_at(const Tensor<float>& box, const nerf::Ca
 }
 
 std::vector<PartReading> PageReader::read_object(const Tensor<float>& whole) {
-  if (!objects_) {
-    objects_.emplace(owner_);
-    renderer_ = std::make_unique<nerf::Renderer>(owner_.field);
-  }
+  if (!renderer_) renderer_ = std::make_unique<nerf::Renderer>(owner_.field);
+  if (!objects_) objects_.emplace(owner_);
   const Index h = whole.shape[0], w = whole.shape[1];
   const double zoom = std::min(1., static_cast<double>(kLargest) / static_cast<double>(std::max(h, w)));
-  const auto side = [&](Index length) {
-    return std::max<Index>(16, std::lround(zoom * static_cast<double>(length)));
-  };
+  const auto side = [&](Index length) { return std::lround(zoom * static_cast<double>(length)); };
+  if (std::min(side(h), side(w)) < kLeastReduced) return {};
   const auto back = [&](Index length) { return std::lround(static_cast<double>(length) / zoom); };
   const Tensor<float> rgb = zoom < 1 ? resize_area(whole, side(h), side(w)) : whole;
   const float level = nerf::background_value(owner_.field.background);

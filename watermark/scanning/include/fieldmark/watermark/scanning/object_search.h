@@ -30,7 +30,7 @@ struct ObjectSearchOptions {
 /// alone.
 class ObjectSearch {
  public:
-  /// Renders the views. @param owner  of an object; must outlive the search
+  /// Renders the views. @param owner  of an object
   /// @throws ValueError if the field fills its images or an option is out of range
   explicit ObjectSearch(const Owner& owner, const ObjectSearchOptions& options = {});
   /// Returns at most `count` places of the whole object, then as many of quarters, the best of each first and

@@ -12,8 +12,10 @@ namespace fieldmark::watermark {
 
 /// The reading of a part of an image.
 struct PartReading {
-  PixelBox box{};        ///< of the part in the image
-  ImageReading reading;  ///< of the part alone, by informed detection
+  PixelBox box{};  ///< of the part in the image; that of an object may reach beyond it
+  /// Of the part alone, by informed detection. Its camera is of the part as it was read: with a margin, and
+  /// for an object reduced with the image to a longer side of at most 512 pixels.
+  ImageReading reading;
 };
 
 /// The reading of an image and of the parts that show the field.
@@ -24,16 +26,17 @@ struct PageReading {
   std::vector<double> evidence() const;
   /// Informed if the image or a part of it agrees with the field.
   ReadingKind chosen() const { return parts.empty() ? whole.chosen : ReadingKind::informed; }
-  /// Largest agreement of the image or of a part.
+  /// Largest agreement of the image or of a part. That of an object may be below
+  /// InformedReader::kLeastAgreement, since its agreement inside the outline counts.
   double agreement() const;
 };
 
 /// Detection that also reads views on a page, in a collage, and objects in other surroundings. The first that
 /// agrees with the field counts:
 ///   - the whole image, as by InformedReader;
-///   - its blocks, which plain gaps separate (see image_blocks()), the largest first, and the parts of a
-///   block
-///     that does not agree. All blocks that agree are added up;
+///   - its blocks, which plain gaps separate (see image_blocks()), the largest first. The parts of a block
+///   that
+///     does not agree are read, too. All blocks that agree are added up;
 ///   - for an object, the places where the image looks most like a render or a quarter of one (see
 ///     ObjectSearch). Everything outside the outline is replaced by the field's background, and the object
 ///     counts as found if the differences between neighbouring pixels inside the outline agree with the
@@ -42,7 +45,8 @@ struct PageReading {
 /// against any.
 class PageReader {
  public:
-  /// Shorter side of the smallest block, and longer side of the smallest part of an object, pixels.
+  /// Shorter side of the smallest block, pixels, and longer side of the smallest part of an object, pixels of
+  /// the image reduced to at most 512.
   static constexpr Index kLeastSide = 64;
   /// Most blocks read in an image; the smallest of a longer page are left out.
   static constexpr Index kMostBlocks = 24;
