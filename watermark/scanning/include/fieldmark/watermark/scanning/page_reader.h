@@ -34,9 +34,8 @@ struct PageReading {
 /// Detection that also reads views on a page, in a collage, and objects in other surroundings. The first that
 /// agrees with the field counts:
 ///   - the whole image, as by InformedReader;
-///   - its blocks, which plain gaps separate (see image_blocks()), the largest first. The parts of a block
-///   that
-///     does not agree are read, too. All blocks that agree are added up;
+///   - its blocks, which plain gaps separate (see image_blocks()), the largest first, and the parts of blocks
+///     that do not agree; all blocks that agree are added up;
 ///   - for an object, the places where the image looks most like a render or a quarter of one (see
 ///     ObjectSearch). Everything outside the outline is replaced by the field's background, and the object
 ///     counts as found if the differences between neighbouring pixels inside the outline agree with the
