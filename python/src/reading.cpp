@@ -82,10 +82,8 @@ Suspects checked(const std::string& function, const Owner& owner, const py::obje
 }
 
 ImageEvidence evidence_of(watermark::PageReader& reader, const Tensor<float>& image, bool forced) {
-  const watermark::PageReading r = reader.read(image);
-  const std::vector<double>& informed = r.whole.informed.evidence;
-  if (forced && r.parts.empty() && !informed.empty())
-    return {informed, ReadingKind::informed, r.agreement()};
+  watermark::PageReading r = reader.read(image);
+  if (forced) r.force_informed();
   return {r.evidence(), r.chosen(), r.agreement()};
 }
 

@@ -76,12 +76,11 @@ ImageEvidence SuspectReader::detect(const Tensor<float>& image, const std::strin
       out.cells = blind_.evidence(image);
       return out;
     }
-    const watermark::PageReading r = informed_->read(image);
-    const std::vector<double>& informed = r.whole.informed.evidence;
-    const bool aligned = forced_ && r.parts.empty() && !informed.empty();
+    watermark::PageReading r = informed_->read(image);
+    if (forced_) r.force_informed();
     out.agreement = r.agreement();
-    out.reading = aligned ? ReadingKind::informed : r.chosen();
-    out.cells = aligned ? informed : r.evidence();
+    out.reading = r.chosen();
+    out.cells = r.evidence();
     return out;
   } catch (const ShapeError& e) {
     throw IoError(name + ": " + e.what());

@@ -63,8 +63,8 @@ TEST_CASE("object_search: an object before waves is found, from a camera nearby"
     CAPTURE(seed);
     const Scene scene = object_in_waves(seed, 90, 40);
     const auto places = search.find(scene.image, 4);
-    REQUIRE(places.size() == 8);  // four of the whole object, four of quarters
-    CHECK(places[0].likeness > 0.55);
+    REQUIRE(places.size() == 8);       // four of the whole object, four of quarters
+    CHECK(places[0].likeness > 0.55);  // 0.62 to 0.80; 60 views are far apart
     double nearest = 180;
     for (const ObjectPlace& place : places) {
       CHECK(place.camera.width == 200);

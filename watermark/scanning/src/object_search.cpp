@@ -14,8 +14,8 @@ namespace {
 
 constexpr Index kGrid = 16;      // pixels of a part's longer side
 constexpr float kInside = 0.9f;  // least opacity inside the outline
-constexpr float kLeastPower =
-    1e-3f;  // mean square of what differs from the mean: a plain place looks like nothing
+// Mean square of what differs from the mean: a plain place looks like nothing.
+constexpr float kLeastPower = 1e-3f;
 constexpr Index kLeastPixels = 40;  // of an outline: fewer look like anything
 // Longer side of a part as a share of the image's.
 constexpr std::array kSizes{0.2, 0.25, 0.31, 0.39, 0.49, 0.61, 0.76, 0.95};
@@ -143,12 +143,8 @@ ObjectPlace ObjectSearch::best_place(const Part& part, const Reduced& image) {
   return best;
 }
 
-std::vector<ObjectPlace> ObjectSearch::find(const Tensor<float>& rgb, Index count) const {
-  check_rank("object_search", "rgb", rgb.shape, 3, "[height, width, 3]");
-  check_extent("object_search", "rgb", rgb.shape, 2, 3, "red, green and blue");
+std::vector<ObjectSearch::Reduced> ObjectSearch::reduced(const Tensor<float>& rgb) {
   const Index h = rgb.shape[0], w = rgb.shape[1];
-  if (h < kGrid || w < kGrid)
-    throw ShapeError("[object_search] rgb must have sides of at least 16, got shape " + rgb.shape.str());
   std::vector<Reduced> sizes;
   for (const double size : kSizes) {
     const double zoom = static_cast<double>(kGrid) / (size * static_cast<double>(std::max(h, w)));
@@ -157,22 +153,32 @@ std::vector<ObjectPlace> ObjectSearch::find(const Tensor<float>& rgb, Index coun
       return std::max<Index>(1, std::lround(zoom * static_cast<double>(length)));
     };
     const Tensor<float> small = resize_area(rgb, side(h), side(w));
-    Reduced reduced{small.shape[0],
-                    small.shape[1],
-                    static_cast<double>(small.shape[1]) / static_cast<double>(w),
-                    static_cast<double>(small.shape[0]) / static_cast<double>(h),
-                    {},
-                    {}};
-    for (Index p = 0; p < reduced.height * reduced.width; ++p) {
+    Reduced next{small.shape[0],
+                 small.shape[1],
+                 static_cast<double>(small.shape[1]) / static_cast<double>(w),
+                 static_cast<double>(small.shape[0]) / static_cast<double>(h),
+                 {},
+                 {}};
+    for (Index p = 0; p < next.height * next.width; ++p) {
       float squares = 0;
       for (Index c = 0; c < 3; ++c) {
-        reduced.plane[c].push_back(small[3 * p + c]);
+        next.plane[c].push_back(small[3 * p + c]);
         squares += small[3 * p + c] * small[3 * p + c];
       }
-      reduced.squares.push_back(squares);
+      next.squares.push_back(squares);
     }
-    sizes.push_back(std::move(reduced));
+    sizes.push_back(std::move(next));
   }
+  return sizes;
+}
+
+std::vector<ObjectPlace> ObjectSearch::find(const Tensor<float>& rgb, Index count) const {
+  check_rank("object_search", "rgb", rgb.shape, 3, "[height, width, 3]");
+  check_extent("object_search", "rgb", rgb.shape, 2, 3, "red, green and blue");
+  const Index h = rgb.shape[0], w = rgb.shape[1];
+  if (h < kGrid || w < kGrid)
+    throw ShapeError("[object_search] rgb must have sides of at least 16, got shape " + rgb.shape.str());
+  const std::vector<Reduced> sizes = reduced(rgb);
   std::vector<ObjectPlace> of_part(parts_.size());
   parallel_for(std::ssize(parts_), 4, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {

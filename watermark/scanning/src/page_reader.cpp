@@ -12,8 +12,8 @@ namespace {
 constexpr double kMostOfImage = 0.95;    // share of its pixels; a larger block is the image
 constexpr Index kMostElongated = 8;      // longer to shorter side of a block: no view is longer
 constexpr Index kMarginShare = 10;       // of a part's shorter side: renders of objects have a margin
-constexpr Index kLeastReduced = 16;      // shorter side of the same image, pixels
 constexpr Index kLargest = 512;          // longer side of an image that is searched for an object, pixels
+constexpr Index kLeastReduced = 16;      // shorter side of the same image, and of a part of it
 constexpr Index kCandidates = 2;         // places of the whole object that are tried, and of its quarters
 constexpr double kBesideOutline = 0.03;  // of a part's longer side: error of a candidate's outline
 constexpr int kRefinements = 4;
@@ -102,8 +102,8 @@ PixelBox box_of(const ObjectPlace& place) {
   const auto shorter = std::min(place.window.width, place.window.height);
   const double margin = place.whole ? shorter / static_cast<double>(kMarginShare) : 0;
   return {std::lround(place.window.x - margin), std::lround(place.window.y - margin),
-          std::max<Index>(16, std::lround(place.window.width + 2 * margin)),
-          std::max<Index>(16, std::lround(place.window.height + 2 * margin))};
+          std::max(kLeastReduced, std::lround(place.window.width + 2 * margin)),
+          std::max(kLeastReduced, std::lround(place.window.height + 2 * margin))};
 }
 
 struct Candidate {

@@ -26,6 +26,11 @@ struct PageReading {
   std::vector<double> evidence() const;
   /// Informed if the image or a part of it agrees with the field.
   ReadingKind chosen() const { return parts.empty() ? whole.chosen : ReadingKind::informed; }
+  /// Chooses informed detection of the whole image if its camera was found and no part agrees, whatever the
+  /// agreement.
+  void force_informed() {
+    if (parts.empty() && !whole.informed.evidence.empty()) whole.chosen = ReadingKind::informed;
+  }
   /// Largest agreement of the image or of a part. That of an object may be below
   /// InformedReader::kLeastAgreement, since its agreement inside the outline counts.
   double agreement() const;
