@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <limits>
 
+#include "gradcheck_options.h"
+
 namespace fieldmark {
 namespace {
 
@@ -193,11 +195,13 @@ class Checker {
 
 GradcheckReport gradcheck(const GradcheckFn& f, std::span<const Tensor<double>> inputs,
                           const GradcheckOptions& options) {
+  detail::check_gradcheck_options("gradcheck", inputs.size(), options);
   return Checker(f, inputs, options).run();
 }
 
 GradcheckReport gradcheck_module(const ModuleGradcheckFn& f, const ParamStore<double>& store,
                                  std::span<const Tensor<double>> inputs, const GradcheckOptions& options) {
+  detail::check_gradcheck_options("gradcheck_module", inputs.size() + store.entries().size(), options);
   std::vector<Tensor<double>> all(inputs.begin(), inputs.end());
   all.emplace_back(Shape{store.size()}, std::vector<double>(store.values().begin(), store.values().end()));
   const GradcheckFn with_params = [&](Tape<double>& tape, std::span<const Var<double>> v) {

@@ -9,6 +9,8 @@
 #include <cstdio>
 #include <limits>
 
+#include "gradcheck_options.h"
+
 namespace fieldmark {
 namespace {
 
@@ -151,6 +153,7 @@ class SecondOrderChecker {
 
 GradcheckReport gradcheck_second_order(const SmoothFn& f, std::span<const Tensor<double>> inputs,
                                        const GradcheckOptions& options) {
+  detail::check_gradcheck_options("gradcheck_second_order", inputs.size(), options);
   return SecondOrderChecker(f, inputs, options).run();
 }
 

@@ -31,6 +31,17 @@ GradcheckReport check_sine(F tangent) {
 
 }  // namespace
 
+TEST_CASE("gradcheck_second_order: refuses options with which everything would pass, and no inputs") {
+  const auto check = [](GradcheckOptions options) {
+    return gradcheck_second_order(kSecondOrderSine, std::vector{uniform({4}, -1, 1, 3)}, options);
+  };
+  CHECK_THROWS_WITH(check({.rtol = 0}), "[gradcheck_second_order] rtol must be above 0 and below 1, got 0");
+  CHECK_THROWS_AS(check({.rtol = kSecondOrderNan}), ValueError);
+  CHECK_THROWS_WITH(check({.step = 0}), "[gradcheck_second_order] step must be positive and finite, got 0");
+  CHECK_THROWS_WITH(gradcheck_second_order(kSecondOrderSine, {}),
+                    "[gradcheck_second_order] inputs must be at least one tensor, got none");
+}
+
 TEST_CASE("gradcheck_second_order: passes a right tangent and counts its entries") {
   const auto r = gradcheck_second_order(kSecondOrderSine, std::vector{uniform({4}, -1, 1, 3)});
   INFO(r.table);

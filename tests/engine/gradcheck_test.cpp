@@ -114,6 +114,35 @@ TEST_CASE("gradcheck: inputs of size 0 and 1") {
     expect_grad([](Tape<double>&, auto v) { return exp_with(v[0], Wrong::none); }, {uniform({n}, -1, 1, 5)});
 }
 
+TEST_CASE("gradcheck: refuses options with which every gradient would pass") {
+  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+  const std::vector<Tensor<double>> in{uniform({4}, -1, 1, 3)};
+  const auto check = [&](GradcheckOptions options) {
+    return gradcheck([](Tape<double>&, auto v) { return exp_with(v[0], Wrong::sign_of_one); }, in, options);
+  };
+  CHECK_THROWS_WITH(check({.rtol = 0}), "[gradcheck] rtol must be above 0 and below 1, got 0");
+  CHECK_THROWS_WITH(check({.rtol = -1e-9}), "[gradcheck] rtol must be above 0 and below 1, got -1e-09");
+  CHECK_THROWS_WITH(check({.rtol = 1}), "[gradcheck] rtol must be above 0 and below 1, got 1");
+  for (const double rtol : {nan, -nan, inf, -inf, -0.0}) CHECK_THROWS_AS(check({.rtol = rtol}), ValueError);
+  CHECK_THROWS_WITH(check({.step = 0}), "[gradcheck] step must be positive and finite, got 0");
+  CHECK_THROWS_WITH(check({.step = -1}), "[gradcheck] step must be positive and finite, got -1");
+  CHECK_THROWS_WITH(check({.step = inf}), "[gradcheck] step must be positive and finite, got inf");
+  CHECK_THROWS_AS(check({.step = nan}), ValueError);
+  // The smallest and largest that are allowed still see the wrong sign.
+  for (const double rtol : {1e-12, 0.999}) CHECK_FALSE(check({.rtol = rtol}).ok);
+}
+
+TEST_CASE("gradcheck: refuses to compare nothing") {
+  const auto one = [](Tape<double>& tape, auto...) { return tape.constant(nullptr, {0}); };
+  CHECK_THROWS_WITH(gradcheck(one, {}), "[gradcheck] inputs must be at least one tensor, got none");
+  CHECK_THROWS_WITH(gradcheck_module(one, ParamStore<double>(), {}),
+                    "[gradcheck_module] inputs must be at least one tensor, got none");
+  ParamStore<double> store;
+  store.add("w", {3});
+  CHECK_THROWS_WITH(gradcheck_module(one, store, {}, {.rtol = 0}),
+                    "[gradcheck_module] rtol must be above 0 and below 1, got 0");
+}
+
 TEST_CASE("gradcheck: a module's parameters are an input too") {
   ParamStore<double> store;
   const auto id = store.add("w", {3});

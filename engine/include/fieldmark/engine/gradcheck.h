@@ -10,8 +10,8 @@ namespace fieldmark {
 
 /// Settings of gradcheck().
 struct GradcheckOptions {
-  double rtol = 1e-7;  ///< tolerance of the error of an entry relative to its scale, see gradcheck()
-  double step = 1.0;   ///< multiplies the default step eps^(1/7) * max(1, |x|)
+  double rtol = 1e-7;  ///< tolerance of the error of an entry relative to its scale, above 0 and below 1
+  double step = 1.0;   ///< multiplies the default step eps^(1/7) * max(1, |x|); positive and finite
   unsigned seed = 1;   ///< seed of the random cotangent
 };
 /// Result of gradcheck().
@@ -37,7 +37,7 @@ using GradcheckFn = std::function<Var<double>(Tape<double>&, std::span<const Var
 /// outputs of a preceding op, as in a network, where buffers hold NaN until they are filled, after two calls;
 /// and for every subset of the inputs, with the others constant (for more than six inputs: each alone, and
 /// all but each).
-/// @throws whatever f throws
+/// @throws ValueError if there are no inputs or an option is out of range   @throws whatever f throws
 GradcheckReport gradcheck(const GradcheckFn& f, std::span<const Tensor<double>> inputs,
                           const GradcheckOptions& options = {});
 
@@ -47,6 +47,7 @@ using ModuleGradcheckFn =
     std::function<Var<double>(Tape<double>&, const Params<double>&, std::span<const Var<double>>)>;
 /// Like gradcheck(), with a module's parameters as one more input: the last of the report, laid out like
 /// store.values(). Running ones are unchanged and have no gradient.
+/// @throws ValueError if there are neither inputs nor parameters, or an option is out of range
 GradcheckReport gradcheck_module(const ModuleGradcheckFn& f, const ParamStore<double>& store,
                                  std::span<const Tensor<double>> inputs,
                                  const GradcheckOptions& options = {});

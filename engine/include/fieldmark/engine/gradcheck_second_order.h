@@ -25,7 +25,8 @@ struct SmoothFn {
 /// Errors against differences are relative to the largest of the entry's own magnitude, a thousandth of the
 /// largest of its tensor, and the rounding error of the difference. NaN fails.
 /// @param options  step multiplies eps^(1/5), the step of s; v lies in [-1, 1]
-/// @return entries counts those of J v and H v   @throws whatever f throws
+/// @return entries counts those of J v and H v
+/// @throws ValueError if there are no inputs or an option is out of range   @throws whatever f throws
 GradcheckReport gradcheck_second_order(const SmoothFn& f, std::span<const Tensor<double>> inputs,
                                        const GradcheckOptions& options = {});
 

@@ -1,0 +1,33 @@
+#pragma once
+// Checks of the options of gradient checks. Private.
+#include <fieldmark/engine/gradcheck.h>
+
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+namespace fieldmark::detail {
+
+inline void check_gradcheck_option(const char* function, const char* name, double value, bool ok,
+                                   const char* want) {
+  if (ok) return;
+  char got[32];
+  std::snprintf(got, sizeof got, "%g", value);  // std::to_string prints 1e-9 as 0
+  throw ValueError("[" + std::string(function) + "] " + name + " must be " + want + ", got " + got);
+}
+
+/// Refuses what would compare nothing or let everything pass. The scale of an error is at least the rounding
+/// error of the difference over rtol: at rtol 0 it is infinite and every error 0. At 1, a gradient of 0
+/// passes.
+/// @throws ValueError with "[function] name must be ..., got ..."
+inline void check_gradcheck_options(const char* function, std::size_t inputs,
+                                    const GradcheckOptions& options) {
+  check_gradcheck_option(function, "rtol", options.rtol, options.rtol > 0 && options.rtol < 1,
+                         "above 0 and below 1");
+  check_gradcheck_option(function, "step", options.step, options.step > 0 && std::isfinite(options.step),
+                         "positive and finite");
+  if (inputs == 0)
+    throw ValueError("[" + std::string(function) + "] inputs must be at least one tensor, got none");
+}
+
+}  // namespace fieldmark::detail
