@@ -10,7 +10,8 @@
 namespace fieldmark {
 
 // The state of training in a safetensors file: trained and running parameters by name, and the optimiser's
-// state for them. Several stores can share a file, each under its own prefix.
+// state for them. Several stores can share a file, each under its own prefix. A module is the parameters that
+// a layer or a larger part of a model added under its name.
 
 /// An optimiser whose state is a velocity: Sgd or Muon.
 template <class O>
@@ -22,32 +23,39 @@ concept HasVelocity = requires(O& optimiser) {
 /// Adds the parameters as PREFIX + NAME. Adam adds its moments as NAME.mean and NAME.mean_square and its
 /// steps as PREFIX + "adam/steps"; Sgd and Muon add their velocity as NAME.velocity.
 /// Two optimisers of one store need two prefixes; the parameters are then stored twice.
-/// @throws ValueError if a name is taken
-template <class T>
-void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore<T>& store);
+/// @param module  if not empty, adds the parameters "MODULE/NAME" alone, as PREFIX + NAME. Adam's steps,
+/// which belong to the whole store, are then not added
+/// @throws ValueError if a name is taken, or the store has no parameter of the module
 template <class T>
 void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore<T>& store,
-                const Adam<T>& optimiser);
+                std::string_view module = {});
+template <class T>
+void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore<T>& store,
+                const Adam<T>& optimiser, std::string_view module = {});
 template <class T, template <class> class Optimiser>
 requires HasVelocity<Optimiser<T>>
 void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore<T>& store,
-                const Optimiser<T>& optimiser);
+                const Optimiser<T>& optimiser, std::string_view module = {});
 /// @}
 
 /// @{
 /// Reads what save_state() added and ignores other arrays of the file. Training then continues with the same
 /// bits.
+/// @param module  if not empty, reads PREFIX + NAME into the parameters "MODULE/NAME" and leaves all others,
+/// and Adam's steps, as they are. The prefix "PREFIX" + "MODULE/" reads it from the state of a whole store
 /// @throws IoError if an array is missing or has another shape or type; nothing changes then
 /// @throws ShapeError if the optimiser is for another number of parameters
-template <class T>
-void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore<T>& store);
+/// @throws ValueError if the store has no parameter of the module
 template <class T>
 void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore<T>& store,
-                Adam<T>& optimiser);
+                std::string_view module = {});
+template <class T>
+void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore<T>& store,
+                Adam<T>& optimiser, std::string_view module = {});
 template <class T, template <class> class Optimiser>
 requires HasVelocity<Optimiser<T>>
 void load_state(const SafetensorsFile& file, std::string_view prefix, ParamStore<T>& store,
-                Optimiser<T>& optimiser);
+                Optimiser<T>& optimiser, std::string_view module = {});
 /// @}
 
 }  // namespace fieldmark
