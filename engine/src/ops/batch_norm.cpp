@@ -28,8 +28,8 @@ Var<T> batch_norm(Var<T> x, Var<T> gamma, Var<T> beta, const BatchNormOptions& o
 }
 
 template <class T>
-Var<T> batch_norm_fixed(Var<T> x, Var<T> gamma, Var<T> beta, std::span<const T> mean,
-                        std::span<const T> variance, const BatchNormOptions& options) {
+Var<T> batch_norm_fixed(Var<T> x, Var<T> gamma, Var<T> beta, std::span<const std::type_identity_t<T>> mean,
+                        std::span<const std::type_identity_t<T>> variance, const BatchNormOptions& options) {
   kernels::check_norm("batch_norm_fixed", x, gamma, beta, options.eps);
   const Index channels = x.shape()[3];
   for (const auto& [name, values] : {std::pair{"mean", mean}, std::pair{"variance", variance}})

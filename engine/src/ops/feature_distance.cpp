@@ -7,7 +7,7 @@
 namespace fieldmark {
 
 template <class T>
-Var<T> feature_distance(Var<T> a, Var<T> b, std::span<const T> weights) {
+Var<T> feature_distance(Var<T> a, Var<T> b, std::span<const std::type_identity_t<T>> weights) {
   using namespace kernels;
   const Shape s = a.shape();
   check_rank("feature_distance", "a", s, 4, "[images, height, width, channels]");

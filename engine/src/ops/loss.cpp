@@ -8,7 +8,7 @@
 namespace fieldmark {
 
 template <class T>
-Var<T> mse_loss(Var<T> a, Var<T> b, std::span<const T> weights) {
+Var<T> mse_loss(Var<T> a, Var<T> b, std::span<const std::type_identity_t<T>> weights) {
   check_same("mse_loss", "a", a.shape(), "b", b.shape());
   const T *av = a.value(), *bv = b.value();
   const auto value = [=](Index i) {
@@ -19,7 +19,7 @@ Var<T> mse_loss(Var<T> a, Var<T> b, std::span<const T> weights) {
 }
 
 template <class T>
-Var<T> l1_loss(Var<T> a, Var<T> b, std::span<const T> weights) {
+Var<T> l1_loss(Var<T> a, Var<T> b, std::span<const std::type_identity_t<T>> weights) {
   check_same("l1_loss", "a", a.shape(), "b", b.shape());
   const T *av = a.value(), *bv = b.value();
   return detail::mean_of(
@@ -31,7 +31,7 @@ Var<T> l1_loss(Var<T> a, Var<T> b, std::span<const T> weights) {
 }
 
 template <class T>
-Var<T> huber_loss(Var<T> a, Var<T> b, double delta, std::span<const T> weights) {
+Var<T> huber_loss(Var<T> a, Var<T> b, double delta, std::span<const std::type_identity_t<T>> weights) {
   check_same("huber_loss", "a", a.shape(), "b", b.shape());
   if (!(delta > 0)) throw ValueError("[huber_loss] delta must be above 0, got " + std::to_string(delta));
   const T *av = a.value(), *bv = b.value();
@@ -45,7 +45,8 @@ Var<T> huber_loss(Var<T> a, Var<T> b, double delta, std::span<const T> weights) 
 }
 
 template <class T>
-Var<T> bce_with_logits(Var<T> logits, std::span<const T> targets, std::span<const T> weights) {
+Var<T> bce_with_logits(Var<T> logits, std::span<const std::type_identity_t<T>> targets,
+                       std::span<const std::type_identity_t<T>> weights) {
   const Index n = logits.shape().size();
   if (static_cast<Index>(targets.size()) != n)
     throw ShapeError(

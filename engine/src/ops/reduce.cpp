@@ -22,7 +22,7 @@ Var<T> mean(Var<T> x) {
 }
 
 template <class T>
-Var<T> weighted_mean(Var<T> x, std::span<const T> weights) {
+Var<T> weighted_mean(Var<T> x, std::span<const std::type_identity_t<T>> weights) {
   if (weights.empty() && x.shape().size() > 0)
     throw ShapeError("[weighted_mean] weights must have one element for each of the " +
                      std::to_string(x.shape().size()) + " averaged, got 0");

@@ -99,7 +99,7 @@ Var<T> softmax(Var<T> x) {
 
 template <class T>
 Var<T> softmax_cross_entropy(Var<T> logits, std::span<const std::int32_t> labels,
-                             std::span<const T> weights) {
+                             std::span<const std::type_identity_t<T>> weights) {
   const Index rows = check_columns("softmax_cross_entropy", "logits", logits.shape()),
               cols = logits.shape()[-1];
   if (rows == 0)

@@ -2,6 +2,7 @@
 #include <fieldmark/engine/tape.h>
 
 #include <span>
+#include <type_traits>
 #include <vector>
 
 namespace fieldmark {
@@ -35,7 +36,8 @@ Var<T> batch_norm(Var<T> x, Var<T> gamma, Var<T> beta, const BatchNormOptions& o
 /// @param mean, variance  [C], copied   @throws as batch_norm; ValueError if a variance is negative
 /// Differentiable in: x, gamma, beta; with relu, except where y = 0.
 template <class T>
-Var<T> batch_norm_fixed(Var<T> x, Var<T> gamma, Var<T> beta, std::span<const T> mean,
-                        std::span<const T> variance, const BatchNormOptions& options = {});
+Var<T> batch_norm_fixed(Var<T> x, Var<T> gamma, Var<T> beta, std::span<const std::type_identity_t<T>> mean,
+                        std::span<const std::type_identity_t<T>> variance,
+                        const BatchNormOptions& options = {});
 
 }  // namespace fieldmark

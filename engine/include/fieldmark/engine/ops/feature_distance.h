@@ -2,6 +2,7 @@
 #include <fieldmark/engine/tape.h>
 
 #include <span>
+#include <type_traits>
 
 namespace fieldmark {
 
@@ -16,6 +17,6 @@ namespace fieldmark {
 /// Differentiable in: a, b, except where a pixel's features are all 0: there the length has a kink, and the
 /// gradient is 0 (after a ReLU it would not pass anyway).
 template <class T>
-Var<T> feature_distance(Var<T> a, Var<T> b, std::span<const T> weights);
+Var<T> feature_distance(Var<T> a, Var<T> b, std::span<const std::type_identity_t<T>> weights);
 
 }  // namespace fieldmark

@@ -2,6 +2,7 @@
 #include <fieldmark/engine/tape.h>
 
 #include <span>
+#include <type_traits>
 
 namespace fieldmark {
 
@@ -28,6 +29,6 @@ Var<T> mean(Var<T> x);
 /// or all are 0
 /// Differentiable in: x.
 template <class T>
-Var<T> weighted_mean(Var<T> x, std::span<const T> weights);
+Var<T> weighted_mean(Var<T> x, std::span<const std::type_identity_t<T>> weights);
 
 }  // namespace fieldmark

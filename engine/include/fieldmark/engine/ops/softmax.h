@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <type_traits>
 
 namespace fieldmark {
 
@@ -24,6 +25,6 @@ Var<T> softmax(Var<T> x);
 /// Differentiable in: logits.
 template <class T>
 Var<T> softmax_cross_entropy(Var<T> logits, std::span<const std::int32_t> labels,
-                             std::span<const T> weights = {});
+                             std::span<const std::type_identity_t<T>> weights = {});
 
 }  // namespace fieldmark
