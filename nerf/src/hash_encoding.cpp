@@ -48,7 +48,7 @@ HashEncoding<T>::HashEncoding(ParamStore<T>& store, std::string_view name, const
     rows_ += hashed ? cap : corners;
   }
   table_ = store.add(std::string(name) + "/table", {rows_, Index{2} * features_}, ParamRole::table);
-  std::mt19937_64 rng(seed);
+  std::mt19937_64 rng(seed);  // not CounterRng: recorded results depend on these bits, see nn/initial.h
   for (T& v : store.values(table_))
     v = static_cast<T>(1e-4 * (2 * static_cast<double>(rng() >> 11) * 0x1.0p-53 - 1));
 }
