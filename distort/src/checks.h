@@ -14,6 +14,7 @@ inline void check_image(std::string_view op, const Shape& x) {
 
 // Checks that a distortion's parameter has `count` elements; it is a tensor so that gradients reach it.
 inline void check_parameter(std::string_view op, std::string_view name, const Shape& got, Index count) {
+  if (got.rank() == 1 && got[0] == count) return;  // before the texts, which allocate
   const std::string layout = "[" + std::to_string(count) + "]";
   check_rank(op, name, got, 1, layout);
   check_extent(op, name, got, 0, count, "its layout is " + layout);

@@ -5,6 +5,7 @@
 #include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/engine/shape_checks.h>
 
+#include <array>
 #include <string>
 
 #include "fieldmark/extractor/centred_image.h"
@@ -69,11 +70,11 @@ typename DenseExtractor<T>::Output DenseExtractor<T>::operator()(const Params<T>
                                                                  Var<T> image) const {
   check_image(image.shape());
   Var<T> x = space_to_depth(centred_image(image, 2));
-  std::vector<Var<T>> levels;
+  std::array<Var<T>, 4> levels{x, x, x, x};
   for (std::size_t level = 0; level < 4; ++level) {
     if (level > 0) x = avg_pool(x, 2);
     x = down_[2 * level + 1](params, down_[2 * level](params, x));
-    levels.push_back(x);
+    levels[level] = x;
   }
   x = up(params, x, levels[2], up_[0]);
   x = up(params, x, levels[1], up_[1]);

@@ -3,7 +3,7 @@
 #include <fieldmark/engine/shape_checks.h>
 
 #include <algorithm>
-#include <vector>
+#include <memory>
 
 #include "nn/initial.h"
 
@@ -32,12 +32,22 @@ void check_parts(std::span<const Var<T>> parts, Index rows, Index in) {
 
 // Columns of x and the rows of W that multiply them.
 template <class T>
-struct Factors {
-  std::vector<Var<T>> x, w;
+class Factors {
+ public:
+  // At most `most` of each.
+  Factors(Tape<T>& tape, std::size_t most)
+      : x_(tape.template scratch<Var<T>>(static_cast<Index>(most))),
+        w_(tape.template scratch<Var<T>>(static_cast<Index>(most))) {}
   void add(Var<T> columns, Var<T> rows) {
-    x.push_back(columns);
-    w.push_back(rows);
+    std::construct_at(x_ + count_, columns);
+    std::construct_at(w_ + count_++, rows);
   }
+  std::span<const Var<T>> x() const { return {x_, count_}; }
+  std::span<const Var<T>> w() const { return {w_, count_}; }
+
+ private:
+  Var<T>*x_, *w_;
+  std::size_t count_ = 0;
 };
 
 template <class T>
@@ -51,10 +61,11 @@ Var<T> dense_of_groups(Var<T> x, Var<T> w, Var<T> b, Activation activation) {
   Tape<T>& tape = x.tape();
   const Index groups = b.shape()[0], out = b.shape()[1], rows = x.shape()[0] / groups, in = x.shape()[1];
   if (groups == 1) return dense(x, w, tape.reshape(b, {out}), activation);
-  std::vector<Var<T>> y;
+  auto* y = tape.template scratch<Var<T>>(groups);
   for (Index g = 0; g < groups; ++g)
-    y.push_back(dense(tape.part(x, g * rows * in, {rows, in}), w, tape.part(b, g * out, {out}), activation));
-  return concatenate<T>(y, 0);
+    std::construct_at(
+        y + g, dense(tape.part(x, g * rows * in, {rows, in}), w, tape.part(b, g * out, {out}), activation));
+  return concatenate(std::span<const Var<T>>(y, at(groups)), 0);
 }
 
 }  // namespace
@@ -85,16 +96,16 @@ Var<T> Dense<T>::operator()(const Params<T>& params, std::span<const Var<T>> par
   if (std::ranges::all_of(parts, [&](const Var<T>& part) { return part.shape()[0] == rows; }))
     return (*this)(params, joined(parts, 1));
   const Var<T> w = params.leaf(tape, weight_);
-  Factors<T> of_rows, of_groups;
+  Factors<T> of_rows(tape, parts.size()), of_groups(tape, parts.size());
   Index first = 0;
   for (const Var<T>& part : parts) {
     const Index k = part.shape()[1];
     (part.shape()[0] == rows ? of_rows : of_groups).add(part, tape.part(w, first * out, {k, out}));
     first += k;
   }
-  const Var<T> b = dense(joined<T>(of_groups.x, 1), joined<T>(of_groups.w, 0),
+  const Var<T> b = dense(joined<T>(of_groups.x(), 1), joined<T>(of_groups.w(), 0),
                          detail::bias_or_zeros(tape, params, bias_, out));
-  return dense_of_groups(joined<T>(of_rows.x, 1), joined<T>(of_rows.w, 0), b, options_.activation);
+  return dense_of_groups(joined<T>(of_rows.x(), 1), joined<T>(of_rows.w(), 0), b, options_.activation);
 }
 
 template class Dense<float>;

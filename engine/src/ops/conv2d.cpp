@@ -3,7 +3,7 @@
 #include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/engine/shape_checks.h>
 
-#include <vector>
+#include <memory>
 
 #include "ops/chunks.h"
 #include "ops/conv2d_parts.h"
@@ -39,7 +39,7 @@ ConvGeometry geometry(const Shape& x, const Shape& w, const Shape& b, Index stri
 template <class T>
 Var<T> dilated(Var<T> w, Index d) {
   const Index k = w.shape()[0];
-  std::vector<std::int32_t> place(at(k));
+  const std::span place(w.tape().template scratch<std::int32_t>(k), at(k));
   for (Index u = 0; u < k; ++u) place[at(u)] = static_cast<std::int32_t>(u * d);
   for (const int axis : {0, 1}) w = scatter_add(w, axis, place, (k - 1) * d + 1);
   return w;
@@ -136,14 +136,14 @@ Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, ConvWindow window, Activation activa
       const Index each = v.shape()[-1] / groups;
       return slice(v, k * each, each);
     };
-    check_extent("conv2d", "w", w.shape(), 2, x.shape()[3] / groups,
-                 "channels of x a group, of " + x.shape().str());
+    if (const Index each = x.shape()[3] / groups; w.shape()[2] != each)  // the text allocates
+      check_extent("conv2d", "w", w.shape(), 2, each, "channels of x a group, of " + x.shape().str());
     check_rank("conv2d", "b", b.shape(), 1, "[O]");
     check_extent("conv2d", "b", b.shape(), 0, w.shape()[3], "the outputs of w", w.shape());
-    std::vector<Var<T>> parts;
+    auto* parts = x.tape().template scratch<Var<T>>(groups);
     for (Index k = 0; k < groups; ++k)
-      parts.push_back(conv2d(group(x, k), group(w, k), group(b, k), window, activation));
-    return concatenate(std::span<const Var<T>>(parts));
+      std::construct_at(parts + k, conv2d(group(x, k), group(w, k), group(b, k), window, activation));
+    return concatenate(std::span<const Var<T>>(parts, at(groups)));
   }
   if (window.dilation > 1) w = dilated(w, window.dilation);
   const ConvGeometry g = geometry(x.shape(), w.shape(), b.shape(), window.stride, window.padding);

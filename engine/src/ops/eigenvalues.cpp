@@ -1,10 +1,39 @@
 #include <fieldmark/engine/ops/eigenvalues.h>
 
+#include <utility>
+
 #include "ops/matrices.h"
 
 namespace fieldmark {
 
+namespace {
+
+using detail::Column;
 using detail::Matrix;
+using detail::Workspace;
+
+// Puts the eigenvectors in place of a symmetric matrix, and writes the eigenvalues, the smallest first. The
+// steps and bits are those of Eigen::SelfAdjointEigenSolver, which allocates. Takes 3 columns.
+void decompose_symmetric(Matrix& a, Column& values, Workspace w) {
+  constexpr int kSweeps = 30;  // of QR steps a value
+  const Index n = a.rows();
+  if (n == 1) {
+    values[0] = std::exchange(a(0, 0), 1.0);
+    return;
+  }
+  Column beside = w.column(n - 1), reflections = w.column(n - 1), memory = w.column(n);
+  detail::keep_triangle(a, false);
+  const double largest = a.cwiseAbs().maxCoeff(), scale = largest == 0 ? 1 : largest;
+  a.triangularView<Eigen::Lower>() /= scale;
+  Eigen::internal::tridiagonalization_inplace(a, reflections);
+  values = a.diagonal();
+  beside = a.diagonal<-1>();
+  Eigen::HouseholderSequence<Matrix, Column>(a, reflections).setLength(n - 1).setShift(1).evalTo(a, memory);
+  Eigen::internal::computeFromTridiagonal_impl(values, beside, kSweeps, true, a);
+  values *= scale;
+}
+
+}  // namespace
 
 template <class T>
 Var<T> symmetric_eigenvalues(Var<T> a) {
@@ -13,23 +42,29 @@ Var<T> symmetric_eigenvalues(Var<T> a) {
   T* y = nullptr;
   const Var<T> out = a.tape().output(detail::without_last(a.shape(), 1), &y, {a});
   auto* vectors = a.tape().template scratch<double>(batch.count * n * n);
-  detail::for_matrices(batch, [&](Index i) {
-    const Matrix m = detail::read_matrix(a.value() + i * n * n, n, n);
+  const Index size = Workspace::size(n, n), column = Workspace::size(n);
+  detail::for_matrices(a.tape(), batch, 2 * size + 4 * column, [&](Index i, Workspace w) {
+    const Matrix m = w.read(a.value() + i * n * n, n, n);
     detail::check_finite("symmetric_eigenvalues", i, m);
     if (n == 0) return;
-    const Eigen::SelfAdjointEigenSolver<Matrix> solver((m + m.transpose()) / 2);
-    detail::put_matrix(y + i * n, solver.eigenvalues(), true);
-    detail::put_matrix(vectors + i * n * n, solver.eigenvectors(), true);
+    Matrix v = w.matrix(n, n);
+    Column values = w.column(n);
+    v = (m + m.transpose()) / 2;
+    decompose_symmetric(v, values, w);
+    detail::put_matrix(y + i * n, values, true);
+    detail::put_matrix(vectors + i * n * n, v, true);
   });
 
   // dy_i = v_i^T da v_i.
-  a.tape().on_backward(out, [a, vectors, batch, n](const T* dy) {
+  a.tape().on_backward(out, [a, vectors, batch, n, size, column](const T* dy) {
     bool fresh = false;
     T* da = a.grad_acc(&fresh);
-    detail::for_matrices(batch, [&](Index i) {
-      const Matrix v = detail::read_matrix(vectors + i * n * n, n, n),
-                   d = detail::read_matrix(dy + i * n, n, 1);
-      detail::put_matrix(da + i * n * n, v * d.col(0).asDiagonal() * v.transpose(), fresh);
+    detail::for_matrices(a.tape(), batch, 3 * size + column, [&](Index i, Workspace w) {
+      const Matrix v = w.read(vectors + i * n * n, n, n), d = w.read(dy + i * n, n, 1);
+      Matrix scaled = w.matrix(n, n), g = w.matrix(n, n);
+      scaled = v * d.col(0).asDiagonal();
+      g.noalias() = scaled * v.transpose();
+      detail::put_matrix(da + i * n * n, g, fresh);
     });
   });
   return out;

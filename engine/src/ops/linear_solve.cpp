@@ -1,11 +1,12 @@
 #include <fieldmark/engine/ops/linear_solve.h>
 
-#include "ops/matrices.h"
+#include "ops/lu.h"
 
 namespace fieldmark {
 namespace {
 
 using detail::Matrix;
+using detail::Workspace;
 
 // Checks the rows of b and returns the number of its columns.
 Index check_sides(const char* op, const Shape& a, const Shape& b) {
@@ -16,15 +17,12 @@ Index check_sides(const char* op, const Shape& a, const Shape& b) {
   return b[-1];
 }
 
-// Solves op(T) x = b for one of the triangles of a.
-Matrix solve_triangle(const Matrix& a, const Matrix& b, bool upper, bool transposed) {
-  if (transposed) return solve_triangle(a.transpose(), b, !upper, false);
-  return upper ? Matrix(a.triangularView<Eigen::Upper>().solve(b))
-               : Matrix(a.triangularView<Eigen::Lower>().solve(b));
-}
-
-Matrix triangle_of(const Matrix& m, bool upper) {
-  return upper ? Matrix(m.triangularView<Eigen::Upper>()) : Matrix(m.triangularView<Eigen::Lower>());
+// x = a^-1 x for one of the triangles of a.
+void solve_triangle(const Matrix& a, Matrix& x, bool upper) {
+  if (upper)
+    a.triangularView<Eigen::Upper>().solveInPlace(x);
+  else
+    a.triangularView<Eigen::Lower>().solveInPlace(x);
 }
 
 void check_diagonal(Index which, const Matrix& a) {
@@ -42,25 +40,34 @@ Var<T> triangular_solve(Var<T> a, Var<T> b, Triangle t) {
   const Index n = batch.n, k = check_sides("triangular_solve", a.shape(), b.shape());
   T* y = nullptr;
   const Var<T> out = a.tape().output(b.shape(), &y, {a, b});
-  detail::for_matrices(batch, [&](Index i) {
-    const Matrix m = triangle_of(detail::read_matrix(a.value() + i * n * n, n, n), t.upper);
+  const Index size = Workspace::size(n, n), sides = Workspace::size(n, k);
+  detail::for_matrices(a.tape(), batch, 2 * size + sides, [&](Index i, Workspace w) {
+    Matrix m = w.read(a.value() + i * n * n, n, n), x = w.read(b.value() + i * n * k, n, k);
+    detail::keep_triangle(m, t.upper);
     detail::check_finite("triangular_solve", i, m);
     check_diagonal(i, m);
-    const Matrix right = detail::read_matrix(b.value() + i * n * k, n, k);
-    detail::put_matrix(y + i * n * k, solve_triangle(m, right, t.upper, t.transposed), true);
+    solve_triangle(t.transposed ? w.read_transposed(a.value() + i * n * n, n, n) : m, x,
+                   t.upper != t.transposed);
+    detail::put_matrix(y + i * n * k, x, true);
   });
 
   // From op(T) x = b: op(T) dx + d(op(T)) x = db.
   a.tape().on_backward(out, [=](const T* dy) {
     T *da = a.grad_acc(), *db = b.grad_acc();
-    detail::for_matrices(batch, [&](Index i) {
-      const Matrix m = detail::read_matrix(a.value() + i * n * n, n, n),
-                   x = detail::read_matrix(y + i * n * k, n, k);
-      const Matrix g = solve_triangle(m, detail::read_matrix(dy + i * n * k, n, k), t.upper, !t.transposed);
+    detail::for_matrices(a.tape(), batch, 2 * size + 2 * sides, [&](Index i, Workspace w) {
+      const T* m = a.value() + i * n * n;
+      Matrix g = w.read(dy + i * n * k, n, k);
+      solve_triangle(t.transposed ? w.read(m, n, n) : w.read_transposed(m, n, n), g, t.upper == t.transposed);
       if (db) detail::put_matrix(db + i * n * k, g, false);
       if (!da) return;
-      const Matrix full = t.transposed ? Matrix(-x * g.transpose()) : Matrix(-g * x.transpose());
-      detail::put_matrix(da + i * n * n, triangle_of(full, t.upper), false);
+      const Matrix x = w.read(y + i * n * k, n, k);
+      Matrix all = w.matrix(n, n);
+      if (t.transposed)
+        all.noalias() = -x * g.transpose();
+      else
+        all.noalias() = -g * x.transpose();
+      detail::keep_triangle(all, t.upper);
+      detail::put_matrix(da + i * n * n, all, false);
     });
   });
   return out;
@@ -72,20 +79,28 @@ Var<T> solve(Var<T> a, Var<T> b) {
   const Index n = batch.n, k = check_sides("solve", a.shape(), b.shape());
   T* y = nullptr;
   const Var<T> out = a.tape().output(b.shape(), &y, {a, b});
-  detail::for_matrices(batch, [&](Index i) {
-    const auto lu = detail::decompose<T>("solve", i, detail::read_matrix(a.value() + i * n * n, n, n));
-    detail::put_matrix(y + i * n * k, lu.solve(detail::read_matrix(b.value() + i * n * k, n, k)), true);
+  const Index size = Workspace::size(n, n), sides = Workspace::size(n, k);
+  detail::for_matrices(a.tape(), batch, size + sides + detail::decompose_size(n), [&](Index i, Workspace w) {
+    const Matrix m = w.read(a.value() + i * n * n, n, n);
+    Matrix x = w.read(b.value() + i * n * k, n, k);
+    detail::decompose<T>("solve", i, m, w).solve(x);
+    detail::put_matrix(y + i * n * k, x, true);
   });
 
   // From a dx + da x = db.
   a.tape().on_backward(out, [=](const T* dy) {
     T *da = a.grad_acc(), *db = b.grad_acc();
-    detail::for_matrices(batch, [&](Index i) {
-      const Matrix transposed = detail::read_matrix(a.value() + i * n * n, n, n).transpose();
-      const Matrix g = transposed.partialPivLu().solve(detail::read_matrix(dy + i * n * k, n, k));
+    const Index need = 2 * size + 2 * sides + detail::Lu::size(n);
+    detail::for_matrices(a.tape(), batch, need, [&](Index i, Workspace w) {
+      const Matrix transposed = w.read_transposed(a.value() + i * n * n, n, n);
+      Matrix g = w.read(dy + i * n * k, n, k);
+      detail::Lu(transposed, w).solve(g);
       if (db) detail::put_matrix(db + i * n * k, g, false);
-      if (da)
-        detail::put_matrix(da + i * n * n, -g * detail::read_matrix(y + i * n * k, n, k).transpose(), false);
+      if (!da) return;
+      const Matrix x = w.read(y + i * n * k, n, k);
+      Matrix all = w.matrix(n, n);
+      all.noalias() = -g * x.transpose();
+      detail::put_matrix(da + i * n * n, all, false);
     });
   });
   return out;
@@ -96,19 +111,25 @@ Var<T> inverse(Var<T> a) {
   const detail::Batch batch = detail::square_batch("inverse", a.shape());
   T* y = nullptr;
   const Var<T> out = a.tape().output(a.shape(), &y, {a});
-  detail::for_matrices(batch, [&](Index i) {
-    const auto m = detail::read_matrix(a.value() + i * batch.size(), batch.n, batch.n);
-    detail::put_matrix(y + i * batch.size(), detail::decompose<T>("inverse", i, m).inverse(), true);
+  const Index n = batch.n, size = Workspace::size(n, n);
+  detail::for_matrices(a.tape(), batch, 2 * size + detail::decompose_size(n), [&](Index i, Workspace w) {
+    const Matrix m = w.read(a.value() + i * n * n, n, n);
+    Matrix x = w.matrix(n, n);
+    x.setIdentity();
+    detail::decompose<T>("inverse", i, m, w).solve(x);
+    detail::put_matrix(y + i * n * n, x, true);
   });
 
   // From d(a y) = 0: dy = -y da y.
   a.tape().on_backward(out, [=](const T* dy) {
     bool fresh = false;
     T* da = a.grad_acc(&fresh);
-    detail::for_matrices(batch, [&](Index i) {
-      const Matrix yt = detail::read_matrix(y + i * batch.size(), batch.n, batch.n).transpose();
-      detail::put_matrix(da + i * batch.size(),
-                         -yt * detail::read_matrix(dy + i * batch.size(), batch.n, batch.n) * yt, fresh);
+    detail::for_matrices(a.tape(), batch, 4 * size, [&](Index i, Workspace w) {
+      const Matrix yt = w.read_transposed(y + i * n * n, n, n), g = w.read(dy + i * n * n, n, n);
+      Matrix left = w.matrix(n, n), all = w.matrix(n, n);
+      left.noalias() = -yt * g;
+      all.noalias() = left * yt;
+      detail::put_matrix(da + i * n * n, all, fresh);
     });
   });
   return out;

@@ -3,30 +3,65 @@
 #include <fieldmark/engine/shape_checks.h>
 
 #include <Eigen/Dense>
-#include <limits>
+#include <algorithm>
 #include <string>
+#include <utility>
 
 #include "ops/axes.h"
 
 namespace fieldmark::detail {
 
-using Matrix = Eigen::MatrixXd;
+// Matrices and columns in memory of a Workspace: Eigen's own would be allocated for each matrix of a batch.
+// Eigen still allocates the blocks of its products beyond 128 kB, for matrices of more than 128 rows.
+using Matrix = Eigen::Map<Eigen::MatrixXd, Eigen::AlignedMax>;
+using Column = Eigen::Map<Eigen::VectorXd, Eigen::AlignedMax>;
 template <class T>
 using RowMajor = Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-template <class T>
-Matrix read_matrix(const T* p, Index rows, Index columns) {
-  return Eigen::Map<const RowMajor<T>>(p, rows, columns).template cast<double>();
-}
+// Gives out memory for the matrices that an op computes with. A copy gives out the same memory again.
+class Workspace {
+ public:
+  explicit Workspace(double* memory) : next_(memory) {}
+  // Returns the elements that a matrix takes: whole cache lines, so that each is aligned.
+  static constexpr Index size(Index rows, Index columns = 1) { return (rows * columns + 7) / 8 * 8; }
 
-// to = or += m.
-template <class T>
-void put_matrix(T* to, const Matrix& m, bool assign) {
+  Matrix matrix(Index rows, Index columns) { return {take(size(rows, columns)), rows, columns}; }
+  Column column(Index n) { return {take(size(n)), n}; }
+  int* integers(Index n) { return new (take(size(n))) int[at(n)]; }
+  template <class T>
+  Matrix read(const T* p, Index rows, Index columns) {
+    Matrix m = matrix(rows, columns);
+    m = Eigen::Map<const RowMajor<T>>(p, rows, columns).template cast<double>();
+    return m;
+  }
+  template <class T>
+  Matrix read_transposed(const T* p, Index rows, Index columns) {
+    Matrix m = matrix(columns, rows);
+    m = Eigen::Map<const RowMajor<T>>(p, rows, columns).transpose().template cast<double>();
+    return m;
+  }
+
+ private:
+  double* take(Index elements) { return std::exchange(next_, next_ + elements); }
+  double* next_;
+};
+
+// to = or += m, for m without a product: Eigen would allocate its result.
+template <class T, class M>
+void put_matrix(T* to, const M& m, bool assign) {
   Eigen::Map<RowMajor<T>> out(to, m.rows(), m.cols());
   if (assign)
-    out = m.cast<T>();
+    out = m.template cast<T>();
   else
-    out += m.cast<T>();
+    out += m.template cast<T>();
+}
+
+// Sets the elements below or above the diagonal to 0.
+inline void keep_triangle(Matrix& m, bool upper) {
+  if (upper)
+    m.triangularView<Eigen::StrictlyLower>().setZero();
+  else
+    m.triangularView<Eigen::StrictlyUpper>().setZero();
 }
 
 // Extents of [.., n, n].
@@ -50,13 +85,17 @@ inline Shape without_last(const Shape& s, int axes) {
   return Shape(std::span(extents).first(at(s.rank() - axes)));
 }
 
-// Calls f(which) for the matrices of a batch, in parallel; each call owns the data of its matrix.
-template <class F>
-void for_matrices(Batch b, F f) {
-  parallel_for(b.count, std::max<Index>(1, kGrain / std::max<Index>(1, b.n * b.n * b.n)),
-               [&](Index begin, Index end) {
-                 for (Index i = begin; i < end; ++i) f(i);
-               });
+// Calls f(which, workspace) for the matrices of a batch, in parallel; each call owns the data of its matrix
+// and `need` elements of workspace, which the matrices of a chunk use in turn. There are at most 64 chunks.
+template <class T, class F>
+void for_matrices(Tape<T>& tape, Batch b, Index need, F f) {
+  constexpr Index kChunks = 64;
+  const Index grain =
+      std::max({Index{1}, kGrain / std::max<Index>(1, b.n * b.n * b.n), (b.count + kChunks - 1) / kChunks});
+  auto* memory = tape.template scratch<double>((b.count + grain - 1) / grain * need);
+  parallel_for(b.count, grain, [&](Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) f(i, Workspace(memory + begin / grain * need));
+  });
 }
 
 [[noreturn]] inline void refuse_matrix(const char* op, Index which, const std::string& why) {
@@ -65,22 +104,6 @@ void for_matrices(Batch b, F f) {
 
 inline void check_finite(const char* op, Index which, const Matrix& m) {
   if (!m.allFinite()) refuse_matrix(op, which, "must be finite, got a NaN or an infinity");
-}
-
-// Computes the LU decomposition of a matrix that is invertible in the precision of T.
-template <class T>
-Eigen::PartialPivLU<Matrix> decompose(const char* op, Index which, const Matrix& m) {
-  check_finite(op, which, m);
-  Eigen::PartialPivLU<Matrix> lu(m);
-  // Eigen's estimate divides by the pivots: a pivot of 0 gives NaN, which the estimate can lose.
-  const bool zero_pivot = (lu.matrixLU().diagonal().array() == 0).any();
-  const double rcond = zero_pivot ? 0 : m.rows() == 0 ? 1 : lu.rcond();
-  if (!(rcond >= static_cast<double>(std::numeric_limits<T>::epsilon()))) {
-    char text[80];
-    std::snprintf(text, sizeof text, "must not be singular, got the reciprocal condition number %.2g", rcond);
-    refuse_matrix(op, which, text);
-  }
-  return lu;
 }
 
 }  // namespace fieldmark::detail

@@ -34,6 +34,17 @@ TEST_CASE("linear_solve: the product with what was solved is the right side") {
     }
 }
 
+TEST_CASE("linear_solve: matrices that are decomposed in blocks, with rows to swap") {
+  constexpr Index n = 100;
+  const auto a = uniform({2, n, n}, -1, 1, 1), b = uniform({2, n, 3}, -1, 1, 2);  // no large diagonal
+  Tape<double> tape;
+  const auto va = tape.constant(a), vb = tape.constant(b);
+  for (const Var<double> x : {solve(va, vb), batched_matmul(inverse(va), vb)}) {
+    const auto y = batched_matmul(va, x);
+    for (Index i = 0; i < b.size(); ++i) CHECK(y.value()[i] == Approx(b[i]).margin(1e-9));
+  }
+}
+
 TEST_CASE("linear_solve: gradient") {
   for (Shape s : {Shape{0, 0}, Shape{1, 1}, Shape{2, 3, 3}}) {
     const auto a = regular(s, 1);
