@@ -106,6 +106,15 @@ def _check_kind(op: str, name: str, kind: str, value: object) -> None:
         raise OverflowError(f"[{op}] {name} must be an integer of 64 bits, got {value}")
     if kind in _CHECKS and not _CHECKS[kind][1](value):
         raise TypeError(f"[{op}] {name} must be {_CHECKS[kind][0]}, got {type(value).__name__}")
+    each = re.fullmatch(r"List\[(\w+)\]", kind)
+    owner = getattr(_fieldmark, each.group(1), None) if each else None
+    if each and isinstance(owner, type):
+        if not isinstance(value, (list, tuple)):
+            raise TypeError(f"[{op}] {name} must be a sequence of {each.group(1)}(), got {type(value).__name__}")
+        for i, one in enumerate(value):
+            if not isinstance(one, owner):
+                raise TypeError(f"[{op}] {name} must be a sequence of {each.group(1)}(), got one of "
+                                f"{type(one).__name__} at {i}")
     owner = getattr(_fieldmark, kind, None)
     if isinstance(owner, type) and not isinstance(value, owner):
         plain, _, scalar = kind.partition("_")
@@ -127,7 +136,7 @@ def refuse(op: str, given: Sequence[object], named: Mapping[str, object]) -> NoR
             values += [(f"{name}[{i}]", value) for i, value in enumerate(all_given[name])]
     _check_values(op, values)
     for name, kind, _ in arguments:
-        if name not in all_given or kind.startswith("Value"):
+        if name not in all_given or kind.startswith(("Value", "List[Value")):
             continue
         value = all_given[name]
         if not kind.startswith("Parameters"):

@@ -133,6 +133,10 @@ py::array_t<T> read_only_view(const T* elements, const Shape& shape, std::shared
 }
 
 void bind_engine(py::module_& module);
+void bind_files(py::module_& module);
+/// Binds gradient checks and products with Jacobians.
+void bind_gradients(py::module_& module);
+void bind_adam_group(py::module_& module);
 /// Lets each function, method and constructor say which argument does not fit; comes after all of them.
 void bind_refusals(py::module_& module);
 void bind_fields(py::module_& module);

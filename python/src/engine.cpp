@@ -1,15 +1,14 @@
-// The engine: everything for one scalar type, gradient checks, schedules, state files.
+// The engine: everything for one scalar type, schedules, threads, and refusals of arguments.
 #include <fieldmark/engine/decay.h>
-#include <fieldmark/engine/gradcheck.h>
 #include <fieldmark/engine/inspect.h>
 #include <fieldmark/engine/ops/batch_norm.h>
 #include <fieldmark/engine/parallel.h>
-#include <fieldmark/engine/safetensors.h>
+#include <fieldmark/engine/schedule.h>
 #include <pybind11/stl.h>
-#include <pybind11/stl/filesystem.h>
 
-#include <cstdio>
+#include <optional>
 
+#include "number_argument.h"
 #include "tape_value.h"
 
 namespace fieldmark::python {
@@ -111,61 +110,7 @@ void bind_method_refusals(const py::object& owner) {
   }
 }
 
-// The inputs as values of gradcheck()'s own tape, which forgets them when the check ends.
-class CheckedFunction {
- public:
-  explicit CheckedFunction(py::function f) : f_(std::move(f)) {}
-  ~CheckedFunction() { forget(); }
-  CheckedFunction(const CheckedFunction&) = delete;
-  CheckedFunction& operator=(const CheckedFunction&) = delete;
-  Var<double> operator()(Tape<double>& tape, std::span<const Var<double>> xs) {
-    forget();                                              // the checker has reset the tape
-    handle_ = std::make_shared<TapeHandle<double>>(tape);  // backward reads what the handle keeps
-    py::list values;
-    for (const Var<double>& x : xs) values.append(Value<double>(handle_, x));
-    const py::object y = f_(*values);
-    if (!py::isinstance<Value<double>>(y))
-      throw py::type_error("[gradcheck] f must return a value of float64, got " + type_name(y));
-    return y.cast<const Value<double>&>().get();
-  }
-
- private:
-  void forget() {
-    if (handle_) handle_->forget();
-  }
-  py::function f_;
-  std::shared_ptr<TapeHandle<double>> handle_;
-};
-
-GradcheckReport check_gradients(const py::function& f, const std::vector<py::object>& inputs, double rtol) {
-  if (inputs.empty()) throw ValueError("[gradcheck] inputs must not be empty");
-  if (!(rtol > 0 && rtol < 1))
-    throw ValueError("[gradcheck] rtol must be above 0 and below 1, got " + std::to_string(rtol));
-  std::vector<Tensor<double>> tensors;
-  for (const py::object& given : inputs) {
-    const py::array array = borrowed<double>("gradcheck: inputs: each", given);
-    const auto numbers = elements<double>(array);
-    tensors.emplace_back(shape_of(array));
-    std::ranges::copy(numbers, tensors.back().data.begin());
-  }
-  CheckedFunction checked(f);
-  return gradcheck(std::ref(checked), tensors, {.rtol = rtol});
-}
-
 void bind_reports(py::module_& module) {
-  py::class_<GradcheckReport>(module, "GradcheckReport", "What gradcheck() found; true if no entry is bad.")
-      .def_readonly("ok", &GradcheckReport::ok, "Whether no entry is bad.")
-      .def_readonly("worst", &GradcheckReport::worst, "Largest relative error.")
-      .def_readonly("entries", &GradcheckReport::entries, "Entries compared.")
-      .def_readonly("table", &GradcheckReport::table, "One line per bad entry.")
-      .def(
-          "__bool__", [](const GradcheckReport& r) { return r.ok; }, "Whether no entry is bad, as ok.")
-      .def("__repr__", [](const GradcheckReport& r) {
-        char text[120];
-        std::snprintf(text, sizeof text, "<fieldmark gradcheck, %s: worst error %.3g of %lld entries>",
-                      r.ok ? "ok" : "failed", r.worst, static_cast<long long>(r.entries));
-        return std::string(text);
-      });
   py::class_<OpCost>(module, "OpCost", "Time and memory of all calls of an op.")
       .def_readonly("op", &OpCost::op, "Name of the op.")
       .def_readonly("calls", &OpCost::calls, "Number of calls.")
@@ -184,29 +129,51 @@ void bind_reports(py::module_& module) {
           "Divided by the count.");
 }
 
-void bind_files(py::module_& module) {
-  py::class_<SafetensorsFile>(module, "SafetensorsFile", "Named arrays of a safetensors file.")
-      .def(py::init<>())
-      .def_static("read", &SafetensorsFile::read, "path"_a, "Reads and checks a whole file.")
-      .def(
-          "write", [](const SafetensorsFile& f, const std::filesystem::path& path) { f.write(path); },
-          "path"_a, "Writes the file whole or not at all.")
-      .def(
-          "names",
-          [](const SafetensorsFile& f) {
-            std::vector<std::string> names;
-            for (const auto& e : f.tensors) names.push_back(e.name);
-            return names;
-          },
-          "Names of the arrays, in the order of the file.");
+Schedule schedule_from(double lr, std::optional<Index> steps, std::optional<double> seconds,
+                       double half_after, double cooldown, double last) {
+  if (steps.has_value() == seconds.has_value())
+    throw ValueError(std::string("[Schedule] give steps or seconds, got ") + (steps ? "both" : "neither"));
+  if (steps && *steps < 1)
+    throw ValueError("[Schedule] steps must be at least 1, got " + std::to_string(*steps));
+  return Schedule({.steps = steps.value_or(0),
+                   .seconds = seconds.value_or(60),
+                   .lr = lr,
+                   .half_after = half_after,
+                   .cooldown = cooldown,
+                   .last = last});
 }
 
-void bind_decays(py::module_& module) {
+void bind_schedules(py::module_& module) {
   module.def("cosine_decay", &cosine_decay, "n"_a, "steps"_a, "last"_a = 0.0,
              "Half a cosine from 1 at step 0 to `last` at step `steps` and after.");
   module.def("step_decay", &step_decay, "n"_a, "every"_a, "factor"_a = 0.1, "factor^floor(n / every).");
   module.def("exponential_decay", &exponential_decay, "n"_a, "factor"_a, "factor^n.");
   module.def("warm_up", &warm_up, "n"_a, "steps"_a, "min(1, (n + 1) / steps); always 1 if steps is 0.");
+  py::class_<Schedule>(module, "Schedule",
+                       "Step sizes of a run whose length is given in steps or in seconds.")
+      .def(py::init(&schedule_from), "lr"_a = 2e-2, "steps"_a = py::none(), "seconds"_a = py::none(),
+           "half_after"_a = 8000.0, "cooldown"_a = 0.3, "last"_a = 0.03,
+           "lr / (1 + n / half_after) last^max(0, (n - n_c) / (N - n_c)) at step n of N, n_c = floor((1 - "
+           "cooldown) N).\n\n"
+           "Give `steps`, which is N, or `seconds`: the run then measures its steps and fixes N when the "
+           "cooldown\n"
+           "must begin. ValueError if both or neither is given, or a number is out of range.")
+      .def("observe", &Schedule::observe, "n"_a, "seconds"_a,
+           "Records the time before step n, in seconds since the start, from which a timed run plans N.")
+      .def("lr", &Schedule::lr, "n"_a, "The step size of step n, counted from 0.")
+      .def("done", &Schedule::done, "n"_a, "Whether the run ends before step n.")
+      .def_property_readonly("total", &Schedule::total, "N, or 0 until a timed run has fixed it.")
+      .def_property_readonly("replanned", &Schedule::replanned,
+                             "Whether N was fixed anew, so that earlier steps had the step sizes of another "
+                             "N.")
+      .def(
+          "resume",
+          [](Schedule& s, Index total, Flag replanned) {
+            if (total < 0)
+              throw ValueError("[Schedule.resume] total must be at least 0, got " + std::to_string(total));
+            s.resume(total, replanned);
+          },
+          "total"_a, "replanned"_a, "Goes on with `total` and `replanned` of an earlier process.");
 }
 
 }  // namespace
@@ -221,11 +188,11 @@ void bind_refusals(py::module_& module) {
 void bind_engine(py::module_& module) {
   bind_reports(module);
   bind_files(module);
-  bind_decays(module);
+  bind_schedules(module);
+  bind_adam_group(module);
   bind_engine_of<float>(module, "float32");
   bind_engine_of<double>(module, "float64");
-  module.def("gradcheck", &check_gradients, "f"_a, "inputs"_a, "rtol"_a = 1e-7,
-             "Compares gradients with finite differences, in float64. ValueError unless 0 < rtol < 1.");
+  bind_gradients(module);
   module.def("threads", &threads, "The number of threads that work is shared among.");
   module.def(
       "set_threads",

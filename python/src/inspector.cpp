@@ -4,6 +4,8 @@
 
 #include <optional>
 
+#include "number_argument.h"
+#include "stats_dict.h"
 #include "tape_value.h"
 
 namespace fieldmark::python {
@@ -17,12 +19,22 @@ struct InspectorHandle {
   std::shared_ptr<TapeHandle<T>> tape;
   std::optional<TapeInspector<T>> inspector;
 
-  InspectorHandle(std::shared_ptr<TapeHandle<T>> t, bool stop_at_nonfinite) : tape(std::move(t)) {
-    inspector.emplace(tape->tape, InspectOptions{.stop_at_nonfinite = stop_at_nonfinite});
+  bool statistics;
+
+  InspectorHandle(std::shared_ptr<TapeHandle<T>> t, Flag stop_at_nonfinite, Flag with_statistics)
+      : tape(std::move(t)), statistics(with_statistics) {
+    inspector.emplace(tape->tape,
+                      InspectOptions{.stop_at_nonfinite = stop_at_nonfinite, .statistics = with_statistics});
   }
   const TapeInspector<T>& open() const {
     if (!inspector) throw ValueError("[Inspector] it is closed");
     return *inspector;
+  }
+  // As open(), for what only an inspector with statistics gathers.
+  const TapeInspector<T>& measuring(const char* method) const {
+    if (!statistics)
+      throw ValueError("[Inspector." + std::string(method) + "] needs Inspector(tape, statistics=True)");
+    return open();
   }
 };
 
@@ -33,8 +45,8 @@ void bind_inspector(py::module_& module, const std::string& suffix) {
   using Handle = InspectorHandle<T>;
   py::class_<Handle>(module, ("Inspector_" + suffix).c_str(),
                      "Looks at what a tape records, until it is closed.")
-      .def(py::init<std::shared_ptr<TapeHandle<T>>, bool>(), py::arg("tape").none(false),
-           "stop_at_nonfinite"_a)
+      .def(py::init<std::shared_ptr<TapeHandle<T>>, Flag, Flag>(), py::arg("tape").none(false),
+           "stop_at_nonfinite"_a, "statistics"_a = false)
       .def(
           "text", [](const Handle& h) { return h.open().text(); },
           "The graph of this pass, one line for each value.")
@@ -46,6 +58,15 @@ void bind_inspector(py::module_& module, const std::string& suffix) {
           "Time and memory by op since the inspector was made; the most expensive first.")
       .def(
           "cost_table", [](const Handle& h) { return h.open().cost_table(); }, "costs() as a table.")
+      .def(
+          "gradient_stats",
+          [](const Handle& h) { return as_dict(h.measuring("gradient_stats").gradient_stats()); },
+          "Statistics of the gradient of each named value and parameter that received one, over all passes: "
+          "count,\nzeros, nonfinite, and mean, rms and largest magnitude of what is finite. ValueError "
+          "without `statistics`.")
+      .def(
+          "value_stats", [](const Handle& h) { return as_dict(h.measuring("value_stats").value_stats()); },
+          "The same of each named value at the time it was named.")
       .def(
           "close", [](Handle& h) { h.inspector.reset(); }, "Stops watching the tape.")
       .def("__enter__", [](py::object self) { return self; })

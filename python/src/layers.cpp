@@ -2,8 +2,12 @@
 #include <fieldmark/engine/nn/batch_norm.h>
 #include <fieldmark/engine/nn/conv2d.h>
 #include <fieldmark/engine/nn/dense.h>
+#include <fieldmark/engine/nn/embedding.h>
 #include <fieldmark/engine/nn/group_norm.h>
+#include <fieldmark/engine/nn/layer_norm.h>
 #include <pybind11/stl.h>
+
+#include <optional>
 
 #include "number_argument.h"
 #include "relu_argument.h"
@@ -46,38 +50,53 @@ void require_positive(const char* kind, const char* argument, Index given) {
                      std::to_string(given));
 }
 
+void require_window(Index kernel, Index stride, const std::optional<Index>& padding) {
+  require_positive("Conv2d", "kernel", kernel);
+  if (kernel % 2 == 0 && !padding)
+    throw ValueError("[Conv2d] kernel must be odd unless padding is given, got " + std::to_string(kernel));
+  require_positive("Conv2d", "stride", stride);
+  if (padding && *padding < 0)
+    throw ValueError("[Conv2d] padding must be at least 0, got " + std::to_string(*padding));
+}
+
 template <class T>
 void bind_products(py::module_& module, const std::string& suffix) {
   using DenseHandle = LayerHandle<T, Dense<T>>;
   using Conv2dHandle = LayerHandle<T, Conv2d<T>>;
   py::class_<DenseHandle>(module, ("Dense_" + suffix).c_str(), "An affine layer.")
       .def(py::init([](const StorePtr<T>& s, const std::string& name, Index inputs, Index outputs, Flag relu,
-                       std::uint64_t seed) {
+                       std::uint64_t seed, Flag bias) {
              require_positive("Dense", "inputs", inputs);
              require_positive("Dense", "outputs", outputs);
              return DenseHandle::make(
-                 "Dense", s, name, DenseOptions{.in = inputs, .out = outputs, .activation = activation(relu)},
+                 "Dense", s, name,
+                 DenseOptions{.in = inputs, .out = outputs, .activation = activation(relu), .bias = bias},
                  seed);
            }),
-           py::arg("parameters").none(false), "name"_a, "inputs"_a, "outputs"_a, "relu"_a, "seed"_a)
+           py::arg("parameters").none(false), "name"_a, "inputs"_a, "outputs"_a, "relu"_a, "seed"_a,
+           "bias"_a = true)
       .def("__call__", &DenseHandle::operator(), "x"_a, "x [N, inputs] to [N, outputs].");
-  py::class_<Conv2dHandle>(module, ("Conv2d_" + suffix).c_str(),
-                           "A convolution that keeps the size of images.")
-      .def(
-          py::init([](const StorePtr<T>& s, const std::string& name, Index inputs, Index outputs,
-                      Index kernel, Flag relu, std::uint64_t seed) {
-            require_positive("Conv2d", "inputs", inputs);
-            require_positive("Conv2d", "outputs", outputs);
-            if (kernel < 1 || kernel % 2 == 0)
-              throw ValueError("[Conv2d] kernel must be odd and at least 1, got " + std::to_string(kernel));
-            return Conv2dHandle::make(
-                "Conv2d", s, name,
-                Conv2dOptions{.in = inputs, .out = outputs, .kernel = kernel, .activation = activation(relu)},
-                seed);
-          }),
-          py::arg("parameters").none(false), "name"_a, "inputs"_a, "outputs"_a, "kernel"_a, "relu"_a,
-          "seed"_a)
-      .def("__call__", &Conv2dHandle::operator(), "x"_a, "x [N, H, W, inputs] to [N, H, W, outputs].");
+  py::class_<Conv2dHandle>(module, ("Conv2d_" + suffix).c_str(), "A convolution of images.")
+      .def(py::init([](const StorePtr<T>& s, const std::string& name, Index inputs, Index outputs,
+                       Index kernel, Flag relu, std::uint64_t seed, Index stride,
+                       std::optional<Index> padding, Flag bias) {
+             require_positive("Conv2d", "inputs", inputs);
+             require_positive("Conv2d", "outputs", outputs);
+             require_window(kernel, stride, padding);
+             return Conv2dHandle::make("Conv2d", s, name,
+                                       Conv2dOptions{.in = inputs,
+                                                     .out = outputs,
+                                                     .kernel = kernel,
+                                                     .activation = activation(relu),
+                                                     .stride = stride,
+                                                     .padding = padding,
+                                                     .bias = bias},
+                                       seed);
+           }),
+           py::arg("parameters").none(false), "name"_a, "inputs"_a, "outputs"_a, "kernel"_a, "relu"_a,
+           "seed"_a, "stride"_a = 1, "padding"_a = py::none(), "bias"_a = true)
+      .def("__call__", &Conv2dHandle::operator(), "x"_a,
+           "x [N, H, W, inputs] to [N, H', W', outputs], as large as x by default.");
 }
 
 template <class T>
@@ -120,12 +139,55 @@ void bind_norms(py::module_& module, const std::string& suffix) {
       .def("__call__", &GroupHandle::operator(), "x"_a, "x [N, H, W, C] to the same shape.");
 }
 
+template <class T>
+void bind_layer_norm(py::module_& module, const std::string& suffix) {
+  using Handle = LayerHandle<T, LayerNorm<T>>;
+  py::class_<Handle>(module, ("LayerNorm_" + suffix).c_str(), "Layer normalisation of rows.")
+      .def(py::init([](const StorePtr<T>& s, const std::string& name, Index channels, double eps) {
+             require_positive("LayerNorm", "channels", channels);
+             return Handle::make("LayerNorm", s, name, channels, eps);
+           }),
+           py::arg("parameters").none(false), "name"_a, "channels"_a, "eps"_a)
+      .def("__call__", &Handle::operator(), "x"_a, "x [.., C] to the same shape.");
+}
+
+template <class T>
+void bind_embedding(py::module_& module, const std::string& suffix) {
+  using Handle = LayerHandle<T, Embedding<T>>;
+  py::class_<Handle>(module, ("Embedding_" + suffix).c_str(), "A learnt vector for each of some items.")
+      .def(py::init([](const StorePtr<T>& s, const std::string& name, Index count, Index width,
+                       std::uint64_t seed) {
+             require_positive("Embedding", "count", count);
+             require_positive("Embedding", "width", width);
+             return Handle::make("Embedding", s, name, EmbeddingOptions{.count = count, .width = width},
+                                 seed);
+           }),
+           py::arg("parameters").none(false), "name"_a, "count"_a, "width"_a, "seed"_a)
+      .def(
+          "__call__",
+          [](const Handle& e, const py::object& given, const py::object& index) {
+            const auto tape = tape_of<T>("Embedding", given);
+            const auto read = tape->template reads<std::int32_t>("Embedding: index", index);
+            if (read.ndim() != 1)
+              throw ShapeError("[Embedding: index] must have one axis, got shape " + shape_of(read).str());
+            return tape->reading(e.store, [&] {
+              const Var<T> rows =
+                  e.layer(tape->tape, Params<T>(e.store->store), elements<std::int32_t>(read));
+              tape->keep(read);
+              return Value<T>(tape, rows);
+            });
+          },
+          "tape"_a, "index"_a, "Rows [N, width] by an index [N] of int32 in [0, count), repeats allowed.");
+}
+
 }  // namespace
 
 template <class T>
 void bind_layers(py::module_& module, const std::string& suffix) {
   bind_products<T>(module, suffix);
   bind_norms<T>(module, suffix);
+  bind_layer_norm<T>(module, suffix);
+  bind_embedding<T>(module, suffix);
 }
 template void bind_layers<float>(py::module_&, const std::string&);
 template void bind_layers<double>(py::module_&, const std::string&);

@@ -1,6 +1,7 @@
 // The ops of networks: affine maps, convolutions, norms, pooling, losses.
 #include <fieldmark/engine/ops/batch_norm.h>
 #include <fieldmark/engine/ops/conv2d.h>
+#include <fieldmark/engine/ops/conv_transpose2d.h>
 #include <fieldmark/engine/ops/dense.h>
 #include <fieldmark/engine/ops/feature_distance.h>
 #include <fieldmark/engine/ops/group_norm.h>
@@ -29,14 +30,33 @@ void bind_products(py::module_& module) {
       "x"_a, "w"_a, "b"_a, "relu"_a = false, once<T>("x w + b of rows x [N, in], w [in, out], b [out]."));
   module.def(
       "conv2d",
-      [](V x, V w, V b, Index stride, Index padding, Flag relu) {
-        return x.with(conv2d(x.get(), w.get(), b.get(), ConvWindow{.stride = stride, .padding = padding},
-                             activation(relu)));
+      [](V x, V w, V b, Index stride, Index padding, Flag relu, Index dilation, Index groups) {
+        const ConvWindow window{.stride = stride, .padding = padding, .dilation = dilation, .groups = groups};
+        return x.with(conv2d(x.get(), w.get(), b.get(), window, activation(relu)));
       },
-      "x"_a, "w"_a, "b"_a, "stride"_a = 1, "padding"_a = 0, "relu"_a = false,
-      once<T>("Convolution of images x [N, H, W, C] with w [K, K, C, O] and b [O]; `padding` pixels of zeros "
-              "are\n"
-              "around the image."));
+      "x"_a, "w"_a, "b"_a, "stride"_a = 1, "padding"_a = 0, "relu"_a = false, "dilation"_a = 1,
+      "groups"_a = 1,
+      once<T>("Convolution of images x [N, H, W, C] with w [K, K, C / groups, O] and b [O]; `padding` pixels "
+              "of zeros\n"
+              "are around the image, elements of a window are `dilation` pixels apart, and each group of "
+              "outputs sees\n"
+              "one group of channels. ShapeError if they do not fit, ValueError if a number is out of "
+              "range."));
+  module.def(
+      "conv_transpose2d",
+      [](V x, V w, V b, Index stride, Index padding) {
+        return x.with(
+            conv_transpose2d(x.get(), w.get(), b.get(), ConvWindow{.stride = stride, .padding = padding}));
+      },
+      "x"_a, "w"_a, "b"_a, "stride"_a = 1, "padding"_a = 0,
+      once<T>(
+          "Transposed convolution of images x [N, H, W, C] with w [K, K, O, C] and b [O], the gradient of "
+          "conv2d() in\n"
+          "its input plus a bias: y[n, i s + u - p, j s + v - p, o] += sum_c x[n, i, j, c] w[u, v, o, "
+          "c], from\n"
+          "y = b, of shape [N, (H - 1) s + K - 2 p, (W - 1) s + K - 2 p, O], s = stride, p = padding. "
+          "ShapeError if\n"
+          "they do not fit, ValueError if a number is out of range."));
 }
 
 template <class T>

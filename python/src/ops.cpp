@@ -5,6 +5,7 @@
 #include <fieldmark/engine/ops/cholesky.h>
 #include <fieldmark/engine/ops/comparison.h>
 #include <fieldmark/engine/ops/determinant.h>
+#include <fieldmark/engine/ops/dropout.h>
 #include <fieldmark/engine/ops/eigenvalues.h>
 #include <fieldmark/engine/ops/gather.h>
 #include <fieldmark/engine/ops/layout.h>
@@ -77,6 +78,8 @@ void bind_maps(py::module_& module) {
       {"softplus", softplus<T>, "log(1 + exp(x)), without overflow."},
       {"silu", silu<T>, "x / (1 + exp(-x)), also called swish."},
       {"gelu", gelu<T>, "x P(x), P the distribution function of the standard normal."},
+      {"normal_cdf", normal_cdf<T>,
+       "(1 + erf(x / sqrt 2)) / 2, the distribution function of the standard normal."},
       {"negate", negate<T>, "-x."},
       {"reciprocal", reciprocal<T>, "1 / x."},
       {"abs", abs<T>, "|x|; the gradient at 0 is 0."},
@@ -144,6 +147,16 @@ void bind_maps_with_options(py::module_& module) {
   module.def(
       "clamp", [](V x, Number low, Number high) { return x.with(clamp(x.get(), low, high)); }, "x"_a, "low"_a,
       "high"_a, once<T>("min(max(x, low), high); the gradient passes where low <= x <= high."));
+  module.def(
+      "dropout",
+      [](V x, Number p, std::uint64_t seed, std::uint64_t step, std::uint64_t stream) {
+        return x.with(dropout(x.get(), p, CounterRng(seed, stream), step));
+      },
+      "x"_a, "p"_a, "seed"_a, "step"_a, "stream"_a = 0,
+      once<T>("0 with probability p in [0, 1), else x / (1 - p). The mask is a function of seed, step and "
+              "stream: give\n"
+              "each training step its own `step` and each layer its own `stream`. ValueError if p is out of "
+              "range."));
   module.def(
       "triangular_solve",
       [](V a, V b, Flag upper, Flag transposed) {

@@ -4,10 +4,13 @@
 #include <fieldmark/engine/muon.h>
 #include <fieldmark/engine/sgd.h>
 #include <fieldmark/engine/state_file.h>
-#include <fieldmark/engine/tensor_stats.h>
 #include <pybind11/stl.h>
 
+#include <cmath>
+#include <optional>
+
 #include "number_argument.h"
+#include "stats_dict.h"
 #include "tape_value.h"
 
 namespace fieldmark::python {
@@ -50,15 +53,6 @@ std::string role(const StoreHandle<T>& s, const std::string& name) {
   return std::ranges::find(kRoles, wanted, &std::pair<const char*, ParamRole>::second)->first;
 }
 
-// name -> {"count": ..., "mean": ...}
-py::dict as_dict(const std::vector<TensorStats>& all) {
-  py::dict named;
-  for (const TensorStats& s : all)
-    named[py::str(s.name)] = py::dict("count"_a = s.count, "zeros"_a = s.zeros, "nonfinite"_a = s.nonfinite,
-                                      "mean"_a = s.mean, "rms"_a = s.rms, "largest"_a = s.largest);
-  return named;
-}
-
 template <class T>
 void bind_store(py::module_& module, const std::string& suffix) {
   using Store = StoreHandle<T>;
@@ -88,10 +82,7 @@ void bind_store(py::module_& module, const std::string& suffix) {
       .def(
           "leaf",
           [](StorePtr<T> s, const py::object& given, const std::string& name) {
-            if (!py::isinstance<TapeHandle<T>>(given))
-              throw py::type_error("[Parameters.leaf] tape must be Tape() of " +
-                                   std::string(dtype_name<T>()) + ", got " + type_name(given));
-            const auto tape = given.cast<std::shared_ptr<TapeHandle<T>>>();
+            const auto tape = tape_of<T>("Parameters.leaf", given);
             const ParamId id = s->store.find(name);
             return tape->reading(s, [&] { return Value<T>(tape, Params<T>(s->store).leaf(tape->tape, id)); });
           },
@@ -129,26 +120,50 @@ struct OptimiserHandle {
   }
 };
 
+// Adam, on the ranges of its groups if it has any.
 template <class T>
-using AdamHandle = OptimiserHandle<T, Adam<T>>;
+struct AdamHandle : OptimiserHandle<T, Adam<T>> {
+  std::vector<AdamRange> ranges;  // empty: all parameters, with the options' rules
+
+  void step(double factor) {
+    if (ranges.empty()) return OptimiserHandle<T, Adam<T>>::step(factor);
+    std::vector<AdamRange> now = ranges;
+    for (AdamRange& range : now) range.lr_factor *= factor;
+    this->optimiser.step(this->store->store.values(), this->store->store.grads(),
+                         std::span<const AdamRange>(now));
+    this->store->leases.changed();
+  }
+};
 template <class T>
 using SgdHandle = OptimiserHandle<T, Sgd<T>>;
 template <class T>
 using MuonHandle = OptimiserHandle<T, Muon<T>>;
 
 template <class T>
+AdamHandle<T>* adam_from(const StorePtr<T>& s, double lr, double beta1, double beta2, double eps,
+                         double weight_decay, Flag skip_zero,
+                         const std::optional<std::vector<AdamGroup>>& groups) {
+  if (groups && groups->empty()) throw ValueError("[Adam] groups must not be empty: None stands for all");
+  if (groups && (weight_decay != 0 || skip_zero))
+    throw ValueError(std::string("[Adam] ") + (skip_zero ? "skip_zero" : "weight_decay") +
+                     " has no effect with groups: give it to each AdamGroup");
+  const AdamOptions options{.lr = lr,
+                            .beta1 = beta1,
+                            .beta2 = beta2,
+                            .eps = eps,
+                            .skip_zero = skip_zero,
+                            .weight_decay = weight_decay};
+  Adam<T> adam(s->store, options);
+  auto ranges = groups ? adam_ranges(s->store, *groups) : std::vector<AdamRange>{};
+  return new AdamHandle<T>{{s, s->leases.lend(s), std::move(adam)}, std::move(ranges)};
+}
+
+template <class T>
 void bind_optimisers(py::module_& module, const std::string& suffix) {
   py::class_<AdamHandle<T>>(module, ("Adam_" + suffix).c_str(), "Adam on all tensors that are not running.")
-      .def(
-          py::init([](StorePtr<T> s, double lr, double beta1, double beta2, double eps, double weight_decay) {
-            return new AdamHandle<T>{
-                s, s->leases.lend(s),
-                Adam<T>(
-                    s->store,
-                    {.lr = lr, .beta1 = beta1, .beta2 = beta2, .eps = eps, .weight_decay = weight_decay})};
-          }),
-          py::arg("parameters").none(false), "lr"_a = 1e-3, "beta1"_a = 0.9, "beta2"_a = 0.999,
-          "eps"_a = 1e-8, "weight_decay"_a = 0.0)
+      .def(py::init(&adam_from<T>), py::arg("parameters").none(false), "lr"_a = 1e-3, "beta1"_a = 0.9,
+           "beta2"_a = 0.999, "eps"_a = 1e-8, "weight_decay"_a = 0.0, "skip_zero"_a = false,
+           "groups"_a = py::none())
       .def("step", &AdamHandle<T>::step, "lr_factor"_a = 1.0, "One step; lr_factor multiplies lr.")
       .def_property_readonly(
           "steps", [](const AdamHandle<T>& a) { return a.optimiser.steps(); },
@@ -220,7 +235,37 @@ void bind_state(py::module_& module) {
           "missing or has another shape or type; nothing is changed then."));
 }
 
+AdamGroup group_from(const std::string& names, double lr_factor, Flag skip_zero, double weight_decay) {
+  if (names.empty()) throw ValueError("[AdamGroup] names must be a pattern, got ''");
+  if (!(lr_factor >= 0) || std::isinf(lr_factor))
+    throw ValueError("[AdamGroup] lr_factor must be at least 0 and finite, got " + std::to_string(lr_factor));
+  if (!(weight_decay >= 0) || std::isinf(weight_decay))
+    throw ValueError("[AdamGroup] weight_decay must be at least 0 and finite, got " +
+                     std::to_string(weight_decay));
+  return {names, {.lr_factor = lr_factor, .skip_zero = skip_zero, .weight_decay = weight_decay}};
+}
+
 }  // namespace
+
+void bind_adam_group(py::module_& module) {
+  py::class_<AdamGroup>(module, "AdamGroup", "Tensors that share a step size and rules of Adam.")
+      .def(py::init(&group_from), "names"_a, "lr_factor"_a = 1.0, "skip_zero"_a = false,
+           "weight_decay"_a = 0.0,
+           "The tensors whose names match a pattern, as in \"*bias\": * stands for any characters, ? for "
+           "one.\n\n"
+           "lr_factor, at least 0, multiplies Adam's lr; skip_zero leaves entries with a gradient of exactly "
+           "0, and\n"
+           "their moments, as they are; weight_decay is at least 0. ValueError if one is out of range.")
+      .def_readonly("names", &AdamGroup::names, "Pattern of names.")
+      .def_property_readonly(
+          "lr_factor", [](const AdamGroup& g) { return g.settings.lr_factor; }, "Multiplies Adam's lr.")
+      .def_property_readonly(
+          "skip_zero", [](const AdamGroup& g) { return g.settings.skip_zero; },
+          "Whether entries with a gradient of exactly 0 stay as they are.")
+      .def_property_readonly(
+          "weight_decay", [](const AdamGroup& g) { return g.settings.weight_decay; },
+          "Decoupled: x -= lr weight_decay x.");
+}
 
 template <class T>
 void bind_parameters(py::module_& module, const std::string& suffix) {

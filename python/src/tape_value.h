@@ -188,6 +188,16 @@ const Value<T>& value_of(const std::string& where, const py::object& given) {
                        (py::isinstance<py::array>(given) ? ": pass it as tape.constant(x)" : ""));
 }
 
+/// Returns an argument as a tape.
+/// @param where  "function", for error messages   @throws TypeError if it is something else
+template <class T>
+std::shared_ptr<TapeHandle<T>> tape_of(const std::string& where, const py::object& given) {
+  if (!py::isinstance<TapeHandle<T>>(given))
+    throw py::type_error("[" + where + "] tape must be Tape() of " + dtype_name<T>() + ", got " +
+                         type_name(given));
+  return given.cast<std::shared_ptr<TapeHandle<T>>>();
+}
+
 /// Documentation of an op, shown once for both scalar types.
 template <class T>
 const char* once(const char* text) {

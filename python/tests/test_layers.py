@@ -47,6 +47,88 @@ def test_a_convolution_sums_its_window():
                                atol=1e-12)
 
 
+def test_a_convolution_takes_stride_and_padding_and_no_bias():
+    model, tape = engine.Parameters("float64"), engine.Tape("float64")
+    layer = engine.Conv2d(model, "c", 2, 3, seed=1, kernel=2, stride=2, padding=0, bias=False)
+    assert model.names() == ["c/weight"]
+    x, w = random(1, 4, 6, 2), model.values("c/weight")
+    blocks = x.reshape(1, 2, 2, 3, 2, 2)
+    np.testing.assert_allclose(layer(tape.constant(x)).numpy(), np.einsum("niujvc,uvco->nijo", blocks, w), atol=1e-12)
+    assert layer(tape.constant(x)).shape == (1, 2, 3, 3)
+    for options, text in (({"kernel": 2}, "kernel must be odd unless padding is given, got 2"),
+                          ({"kernel": 0, "padding": 1}, "kernel must be at least 1, got 0"),
+                          ({"stride": 0}, "stride must be at least 1, got 0"),
+                          ({"padding": -1}, "padding must be at least 0, got -1")):
+        with pytest.raises(ValueError, match=r"^\[Conv2d\] " + text):
+            engine.Conv2d(model, "d", 2, 3, seed=1, **options)
+    with pytest.raises(TypeError, match=r"^\[Conv2d\] padding must be an integer, got str"):
+        engine.Conv2d(model, "d", 2, 3, seed=1, padding="same")
+
+
+def test_a_dense_layer_without_bias_is_a_product():
+    model, tape = engine.Parameters("float64"), engine.Tape("float64")
+    layer = engine.Dense(model, "a", 4, 3, seed=1, bias=False)
+    assert model.names() == ["a/weight"]
+    x = random(5, 4)
+    np.testing.assert_allclose(layer(tape.constant(x)).numpy(), x @ model.values("a/weight"), rtol=1e-12)
+    with pytest.raises(TypeError, match=r"^\[Dense\] bias must be True or False, got NoneType"):
+        engine.Dense(model, "b", 4, 3, seed=1, bias=None)
+
+
+def test_a_layer_norm_has_the_statistics_of_its_rows():
+    model, tape = engine.Parameters("float64"), engine.Tape("float64")
+    layer = engine.LayerNorm(model, "n", 4, eps=1e-12)
+    assert model.names() == ["n/gamma", "n/beta"]
+    model.values("n/gamma")[:], model.values("n/beta")[:] = random(4, seed=1), random(4, seed=2)
+    x = random(2, 3, 4)
+    want = (x - x.mean(-1, keepdims=True)) / x.std(-1, keepdims=True) * random(4, seed=1) + random(4, seed=2)
+    np.testing.assert_allclose(layer(tape.constant(x)).numpy(), want, rtol=1e-9)
+    assert engine.gradcheck(layer, [x])
+    for call, error, text in ((lambda: engine.LayerNorm(engine.Parameters(), "m", 0), ValueError, "channels must be at least 1, got 0"),
+                              (lambda: engine.LayerNorm(engine.Parameters(), "m", 4, eps=0), ValueError, "eps"),
+                              (lambda: engine.LayerNorm(engine.Parameters(), "m", "4"), TypeError, "channels must be an integer")):
+        with pytest.raises(error, match=text):
+            call()
+    with pytest.raises(fm.ShapeError):
+        layer(tape.constant(random(2, 3)))
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
+def test_an_embedding_looks_up_rows_and_sums_their_gradients(dtype):
+    model, tape = engine.Parameters(dtype), engine.Tape(dtype)
+    layer = engine.Embedding(model, "e", 200, 50, seed=3)
+    assert model.names() == ["e/table"]
+    table = model.values("e/table")
+    assert abs(table.mean()) < 0.05 and abs(table.std() - 1) < 0.05
+    index, weights = np.array([7, 0, 7], "int32"), random(3, 50, dtype=dtype)
+    rows = layer(tape, index)
+    np.testing.assert_array_equal(rows.numpy(), table[[7, 0, 7]])
+    with pytest.raises(ValueError, match="read-only"):
+        index[:] = 0
+    engine.sum(rows * tape.constant(weights)).backward()
+    want = np.zeros((200, 50), dtype)
+    np.add.at(want, index, weights)
+    np.testing.assert_allclose(model.grads("e/table"), want, rtol=1e-6)
+    tape.reset()
+    index[:] = 0
+
+
+def test_an_embedding_names_what_does_not_fit():
+    model, tape = engine.Parameters("float64"), engine.Tape("float64")
+    layer = engine.Embedding(model, "e", 3, 2, seed=1)
+    for call, error, text in (
+            (lambda: engine.Embedding(model, "f", 0, 2, seed=1), ValueError, r"\[Embedding\] count must be at least 1, got 0"),
+            (lambda: engine.Embedding(model, "f", 1, 0, seed=1), ValueError, r"\[Embedding\] width must be at least 1, got 0"),
+            (lambda: layer(engine.Tape(), np.zeros(1, "int32")), TypeError,
+             r"\[Embedding\] tape must be Tape\(\) of float64, got Tape_float32"),
+            (lambda: layer(tape, [0]), TypeError, r"\[Embedding: index\] must be a numpy array of int32, got list"),
+            (lambda: layer(tape, np.zeros((1, 1), "int32")), fm.ShapeError, r"\[Embedding: index\] must have one axis"),
+            (lambda: layer(tape, np.array([3], "int32")), ValueError, r"\[.*3")):
+        with pytest.raises(error, match="^" + text):
+            call()
+    engine.Dense(model, "free", 2, 2, seed=1)  # what was refused holds no parameters
+
+
 def test_a_group_norm_has_the_statistics_of_its_groups():
     model, tape = engine.Parameters("float64"), engine.Tape("float64")
     layer = engine.GroupNorm(model, "g", 4, groups=2)
@@ -230,6 +312,25 @@ def test_the_inspector_shows_graph_and_costs():
         engine.Tape().name(x, "x")
     with pytest.raises(TypeError, match=r"tape must be Tape\(\), got int"):
         engine.Inspector(3)
+
+
+def test_the_inspector_measures_values_and_gradients_on_request():
+    tape, model = engine.Tape("float64"), engine.Parameters("float64")
+    model.add("w", np.array([3.0, 0.0, -4.0]))
+    with engine.Inspector(tape, statistics=True) as inspector:
+        for _ in range(2):
+            model.zero_grad()
+            square = tape.name(engine.square(model.leaf(tape, "w")), "square")
+            engine.sum(square).backward()
+            tape.reset()
+        values, gradients = inspector.value_stats()["square"], inspector.gradient_stats()["w"]
+    assert values["count"] == gradients["count"] == 6 and gradients["zeros"] == 2 and gradients["nonfinite"] == 0
+    assert values["mean"] == pytest.approx(25 / 3) and gradients["mean"] == pytest.approx(-2 / 3)
+    assert gradients["rms"] == pytest.approx(np.sqrt(100 / 3)) and gradients["largest"] == 8
+    with engine.Inspector(tape) as inspector:
+        for name in ("value_stats", "gradient_stats"):
+            with pytest.raises(ValueError, match=rf"^\[Inspector.{name}\] needs Inspector\(tape, statistics=True\)"):
+                getattr(inspector, name)()
 
 
 @pytest.mark.parametrize("f, way", [(lambda x: engine.log(x), "log"), (lambda x: engine.sqrt(x), "backward of sqrt")])

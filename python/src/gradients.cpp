@@ -1,0 +1,124 @@
+// Functions of Python under differentiation: gradient checks and products with Jacobians.
+#include <fieldmark/engine/gradcheck.h>
+#include <fieldmark/engine/products.h>
+#include <pybind11/stl.h>
+
+#include <cstdio>
+
+#include "tape_value.h"
+
+namespace fieldmark::python {
+namespace {
+
+using namespace py::literals;
+
+// The inputs as values of the engine's own tape, which forgets them when the call ends.
+template <class T>
+class TapedFunction {
+ public:
+  TapedFunction(const char* where, py::function f) : where_(where), f_(std::move(f)) {}
+  ~TapedFunction() { forget(); }
+  TapedFunction(const TapedFunction&) = delete;
+  TapedFunction& operator=(const TapedFunction&) = delete;
+  Var<T> operator()(Tape<T>& tape, std::span<const Var<T>> xs) {
+    forget();                                         // the engine has reset the tape
+    handle_ = std::make_shared<TapeHandle<T>>(tape);  // backward reads what the handle keeps
+    py::list values;
+    for (const Var<T>& x : xs) values.append(Value<T>(handle_, x));
+    const py::object y = f_(*values);
+    if (!py::isinstance<Value<T>>(y))
+      throw py::type_error("[" + std::string(where_) + "] f must return a value of " + dtype_name<T>() +
+                           ", got " + type_name(y));
+    return y.cast<const Value<T>&>().get();
+  }
+
+ private:
+  void forget() {
+    if (handle_) handle_->forget();
+  }
+  const char* where_;
+  py::function f_;
+  std::shared_ptr<TapeHandle<T>> handle_;
+};
+
+template <class T>
+Tensor<T> tensor_from(const std::string& where, const py::object& given) {
+  const py::array array = borrowed<T>(where, given);
+  Tensor<T> tensor(shape_of(array));
+  std::ranges::copy(elements<T>(array), tensor.data.begin());
+  return tensor;
+}
+
+template <class T>
+std::vector<Tensor<T>> tensors_from(const std::string& where, const std::vector<py::object>& given) {
+  std::vector<Tensor<T>> tensors;
+  for (const py::object& each : given) tensors.push_back(tensor_from<T>(where + ": each", each));
+  return tensors;
+}
+
+template <class T>
+py::array array_from(const Tensor<T>& tensor) {
+  return py::array_t<T>(extents_of(tensor.shape), tensor.data.data());
+}
+
+GradcheckReport check_gradients(const py::function& f, const std::vector<py::object>& inputs, double rtol) {
+  if (inputs.empty()) throw ValueError("[gradcheck] inputs must not be empty");
+  if (!(rtol > 0 && rtol < 1))
+    throw ValueError("[gradcheck] rtol must be above 0 and below 1, got " + std::to_string(rtol));
+  const auto tensors = tensors_from<double>("gradcheck: inputs", inputs);
+  TapedFunction<double> taped("gradcheck", f);
+  return gradcheck(std::ref(taped), tensors, {.rtol = rtol});
+}
+
+// Whether the first of the arrays is of float32; the others then must be, too.
+bool are_float32(const char* where, const std::vector<py::object>& arrays) {
+  if (arrays.empty()) throw ValueError("[" + std::string(where) + "] inputs must not be empty");
+  return py::isinstance<py::array>(arrays.front()) &&
+         py::reinterpret_borrow<py::array>(arrays.front()).dtype().equal(py::dtype::of<float>());
+}
+
+template <class T>
+py::tuple vjp_of(const py::function& f, const std::vector<py::object>& inputs, const py::object& cotangent) {
+  const auto tensors = tensors_from<T>("vjp: inputs", inputs);
+  const Tensor<T> u = tensor_from<T>("vjp: cotangent", cotangent);
+  TapedFunction<T> taped("vjp", f);
+  const InputProducts<T> found = vjp<T>(std::ref(taped), std::span<const Tensor<T>>(tensors), u);
+  py::list products;
+  for (const Tensor<T>& product : found.products) products.append(array_from(product));
+  return py::make_tuple(array_from(found.value), products);
+}
+
+void bind_report(py::module_& module) {
+  py::class_<GradcheckReport>(module, "GradcheckReport", "What gradcheck() found; true if no entry is bad.")
+      .def_readonly("ok", &GradcheckReport::ok, "Whether no entry is bad.")
+      .def_readonly("worst", &GradcheckReport::worst, "Largest relative error.")
+      .def_readonly("entries", &GradcheckReport::entries, "Entries compared.")
+      .def_readonly("table", &GradcheckReport::table, "One line per bad entry.")
+      .def(
+          "__bool__", [](const GradcheckReport& r) { return r.ok; }, "Whether no entry is bad, as ok.")
+      .def("__repr__", [](const GradcheckReport& r) {
+        char text[120];
+        std::snprintf(text, sizeof text, "<fieldmark gradcheck, %s: worst error %.3g of %lld entries>",
+                      r.ok ? "ok" : "failed", r.worst, static_cast<long long>(r.entries));
+        return std::string(text);
+      });
+}
+
+}  // namespace
+
+void bind_gradients(py::module_& module) {
+  bind_report(module);
+  module.def("gradcheck", &check_gradients, "f"_a, "inputs"_a, "rtol"_a = 1e-7,
+             "Compares gradients with finite differences, in float64. ValueError unless 0 < rtol < 1.");
+  module.def(
+      "vjp",
+      [](const py::function& f, const std::vector<py::object>& inputs, const py::object& cotangent) {
+        return are_float32("vjp", inputs) ? vjp_of<float>(f, inputs, cotangent)
+                                          : vjp_of<double>(f, inputs, cotangent);
+      },
+      "f"_a, "inputs"_a, "cotangent"_a,
+      "The value f(x) and, for each input, the vector-Jacobian product J^T u of its shape, u the cotangent.\n"
+      "ShapeError unless u has the shape of f(x).");
+}
+
+}  // namespace fieldmark::python
