@@ -11,6 +11,9 @@ import numpy as np
 
 from . import _fieldmark
 
+_SEEDS = ("seed", "step", "stream")
+_AXES = ("axis", "order", "a", "b")
+_MOST_AXES = 5
 _VALUES = (_fieldmark.Value_float32, _fieldmark.Value_float64)
 
 
@@ -96,16 +99,42 @@ def _by_name(op: str, arguments: Sequence[tuple[str, str, bool]], given: Sequenc
     return all_given
 
 
+def _check_integer(op: str, name: str, value: object) -> None:
+    """ValueError if an integer is out of the range of its argument; seeds and axes are known by their names."""
+    argument, given = name.partition("[")[0], operator.index(value)  # type: ignore[arg-type]
+    low, high = 0, 2 ** 63 - 1
+    if argument in _SEEDS:
+        high = 2 ** 64 - 1
+    elif argument in _AXES:
+        low, high = -_MOST_AXES, _MOST_AXES - 1
+    if not low <= given <= high:
+        error = _fieldmark.ShapeError if argument in _AXES else _fieldmark.ValueError_
+        raise error(f"[{op}] {name} must be {low} to {high}, got {given}")
+
+
+def refuse_axes(op: str, axis: object) -> NoReturn:
+    """Raises what a reduction says of axes that are no integers, or too large to be any."""
+    if _is_integer(axis):
+        _check_integer(op, "axis", axis)
+    elif _are_integers(axis):
+        for i, one in enumerate(axis):  # type: ignore[arg-type, var-annotated]
+            _check_integer(op, f"axis[{i}]", one)
+    raise TypeError(f"[{op}] axis must be None, an integer or a sequence of integers, got {axis!r}")
+
+
 def _check_kind(op: str, name: str, kind: str, value: object) -> None:
     """TypeError if a value is not of the kind that the text of a function names."""
     optional = re.fullmatch(r"Optional\[(.*)\]", kind)
     if optional and value is None:
         return
     kind = optional.group(1) if optional else kind
-    if kind == "int" and _is_integer(value) and not -2 ** 63 <= operator.index(value) < 2 ** 63:  # type: ignore[call-overload]
-        raise OverflowError(f"[{op}] {name} must be an integer of 64 bits, got {value}")
     if kind in _CHECKS and not _CHECKS[kind][1](value):
         raise TypeError(f"[{op}] {name} must be {_CHECKS[kind][0]}, got {type(value).__name__}")
+    if kind == "int":
+        _check_integer(op, name, value)
+    elif kind == "List[int]":
+        for i, one in enumerate(value):  # type: ignore[arg-type]
+            _check_integer(op, f"{name}[{i}]", one)
     each = re.fullmatch(r"List\[(\w+)\]", kind)
     owner = getattr(_fieldmark, each.group(1), None) if each else None
     if each and isinstance(owner, type):

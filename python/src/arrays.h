@@ -132,6 +132,18 @@ py::array_t<T> read_only_view(const T* elements, const Shape& shape, std::shared
   return array;
 }
 
+/// Largest extent, stride, padding or side of a window: their sums and products with an element's bytes are
+/// then integers of 64 bits.
+inline constexpr Index kMostPixels = (Index{1} << 31) - 1;
+
+/// @param op, argument  for the error message   @throws ValueError unless least <= given <= most
+inline void require_within(const std::string& op, const char* argument, Index given, Index least,
+                           Index most = kMostPixels) {
+  if (given < least || given > most)
+    throw ValueError("[" + op + "] " + argument + " must be " + std::to_string(least) + " to " +
+                     std::to_string(most) + ", got " + std::to_string(given));
+}
+
 void bind_engine(py::module_& module);
 void bind_files(py::module_& module);
 /// Binds gradient checks and products with Jacobians.
@@ -139,6 +151,8 @@ void bind_gradients(py::module_& module);
 void bind_adam_group(py::module_& module);
 /// Lets each function, method and constructor say which argument does not fit; comes after all of them.
 void bind_refusals(py::module_& module);
+/// Lets each class that cannot be pickled say what to use instead; comes after all of them.
+void bind_pickling_refusals(py::module_& module);
 void bind_fields(py::module_& module);
 void bind_marks(py::module_& module);
 

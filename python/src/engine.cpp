@@ -6,6 +6,7 @@
 #include <fieldmark/engine/schedule.h>
 #include <pybind11/stl.h>
 
+#include <cmath>
 #include <optional>
 
 #include "number_argument.h"
@@ -133,8 +134,7 @@ Schedule schedule_from(double lr, std::optional<Index> steps, std::optional<doub
                        double half_after, double cooldown, double last) {
   if (steps.has_value() == seconds.has_value())
     throw ValueError(std::string("[Schedule] give steps or seconds, got ") + (steps ? "both" : "neither"));
-  if (steps && *steps < 1)
-    throw ValueError("[Schedule] steps must be at least 1, got " + std::to_string(*steps));
+  if (steps) require_within("Schedule", "steps", *steps, 1);
   return Schedule({.steps = steps.value_or(0),
                    .seconds = seconds.value_or(60),
                    .lr = lr,
@@ -158,10 +158,31 @@ void bind_schedules(py::module_& module) {
            "Give `steps`, which is N, or `seconds`: the run then measures its steps and fixes N when the "
            "cooldown\n"
            "must begin. ValueError if both or neither is given, or a number is out of range.")
-      .def("observe", &Schedule::observe, "n"_a, "seconds"_a,
-           "Records the time before step n, in seconds since the start, from which a timed run plans N.")
-      .def("lr", &Schedule::lr, "n"_a, "The step size of step n, counted from 0.")
-      .def("done", &Schedule::done, "n"_a, "Whether the run ends before step n.")
+      .def(
+          "observe",
+          [](Schedule& s, Index n, double seconds) {
+            require_within("Schedule.observe", "n", n, 0);
+            if (!(seconds >= 0) || std::isinf(seconds))
+              throw ValueError("[Schedule.observe] seconds must be at least 0 and finite, got " +
+                               std::to_string(seconds));
+            s.observe(n, seconds);
+          },
+          "n"_a, "seconds"_a,
+          "Records the time before step n, in seconds since the start, from which a timed run plans N.")
+      .def(
+          "lr",
+          [](const Schedule& s, Index n) {
+            require_within("Schedule.lr", "n", n, 0);
+            return s.lr(n);
+          },
+          "n"_a, "The step size of step n, counted from 0.")
+      .def(
+          "done",
+          [](const Schedule& s, Index n) {
+            require_within("Schedule.done", "n", n, 0);
+            return s.done(n);
+          },
+          "n"_a, "Whether the run ends before step n.")
       .def_property_readonly("total", &Schedule::total, "N, or 0 until a timed run has fixed it.")
       .def_property_readonly("replanned", &Schedule::replanned,
                              "Whether N was fixed anew, so that earlier steps had the step sizes of another "
@@ -169,8 +190,7 @@ void bind_schedules(py::module_& module) {
       .def(
           "resume",
           [](Schedule& s, Index total, Flag replanned) {
-            if (total < 0)
-              throw ValueError("[Schedule.resume] total must be at least 0, got " + std::to_string(total));
+            require_within("Schedule.resume", "total", total, 0);
             s.resume(total, replanned);
           },
           "total"_a, "replanned"_a, "Goes on with `total` and `replanned` of an earlier process.");
@@ -197,9 +217,7 @@ void bind_engine(py::module_& module) {
   module.def(
       "set_threads",
       [](Index count) {
-        if (count < 1 || count > kMostThreads)
-          throw ValueError("[set_threads] count must be from 1 to " + std::to_string(kMostThreads) +
-                           ", got " + std::to_string(count));
+        require_within("set_threads", "count", count, 1, kMostThreads);
         set_threads(static_cast<int>(count));
       },
       "count"_a, "Sets the number of threads, 1 to 1024. ValueError otherwise.");

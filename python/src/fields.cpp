@@ -27,6 +27,8 @@ using nerf::RadianceField;
 
 constexpr Index kQuiet = 25;  // steps between checks for Ctrl-C
 
+constexpr Index kMostSide = 65536;  // pixels of an image: its elements' bytes are then an integer of 64 bits
+
 Camera camera_from(const py::object& given, double fov, Index width, Index height) {
   const py::array pose = borrowed<double>("Camera: pose", given);
   const auto numbers = elements<double>(pose);
@@ -40,9 +42,8 @@ Camera camera_from(const py::object& given, double fov, Index width, Index heigh
                      py::str(given[py::int_(3)]).cast<std::string>());
   if (!(fov > 0 && fov < std::numbers::pi))
     throw ValueError("[Camera] fov must be in (0, pi) radians, got " + std::to_string(fov));
-  if (width < 1 || height < 1)
-    throw ValueError("[Camera] width and height must be at least 1, got " + std::to_string(width) + " and " +
-                     std::to_string(height));
+  require_within("Camera", "width", width, 1, kMostSide);
+  require_within("Camera", "height", height, 1, kMostSide);
   nerf::Pose p;
   std::copy_n(numbers.begin(), p.size(), p.begin());
   return nerf::make_camera(p, fov, width, height);
@@ -116,6 +117,7 @@ std::shared_ptr<RadianceField> train(const std::filesystem::path& data, double s
 
 py::dict evaluate(const RadianceField& field, const std::filesystem::path& data, const std::string& split,
                   Index size) {
+  require_within("Field.evaluate", "size", size, 0, kMostSide);
   const nerf::Evaluation e = unlocked([&] {
     // The ground truth is composited over what the field renders behind transparent pixels.
     const nerf::Dataset set =
@@ -134,8 +136,8 @@ void bind_camera(py::module_& module) {
            "right,\n"
            "    y up, looking along -z\n"
            ":param fov: horizontal field of view in radians, in (0, pi)\n"
-           ":param width: pixels, at least 1\n"
-           ":param height: pixels, at least 1")
+           ":param width: pixels, 1 to 65536\n"
+           ":param height: pixels, 1 to 65536")
       .def_readonly("width", &Camera::width, "Pixels.")
       .def_readonly("height", &Camera::height, "Pixels.")
       .def_property_readonly(
@@ -145,8 +147,12 @@ void bind_camera(py::module_& module) {
           },
           "A copy of the pose, [3, 4] from camera to world.")
       .def(
-          "scaled", [](const Camera& c, Index size) { return c.scaled(size); }, "size"_a,
-          "The same view with this many pixels on the longer side.");
+          "scaled",
+          [](const Camera& c, Index size) {
+            require_within("Camera.scaled", "size", size, 1, kMostSide);
+            return c.scaled(size);
+          },
+          "size"_a, "The same view with this many pixels on the longer side.");
 }
 
 }  // namespace
@@ -192,6 +198,8 @@ void bind_fields(py::module_& module) {
       .def(
           "cameras",
           [](const RadianceField& f, Index count, const std::string& set, Index size, std::uint64_t seed) {
+            require_within("Field.cameras", "count", count, 1);
+            require_within("Field.cameras", "size", size, 0, kMostSide);
             return nerf::make_cameras(f.cameras, nerf::parse_camera_set(set), count, size, seed);
           },
           "count"_a, "set"_a = "novel", "size"_a = 0, "seed"_a = 0,

@@ -44,19 +44,12 @@ struct LayerHandle {
   }
 };
 
-void require_positive(const char* kind, const char* argument, Index given) {
-  if (given < 1)
-    throw ValueError("[" + std::string(kind) + "] " + argument + " must be at least 1, got " +
-                     std::to_string(given));
-}
-
 void require_window(Index kernel, Index stride, const std::optional<Index>& padding) {
-  require_positive("Conv2d", "kernel", kernel);
+  require_within("Conv2d", "kernel", kernel, 1);
   if (kernel % 2 == 0 && !padding)
     throw ValueError("[Conv2d] kernel must be odd unless padding is given, got " + std::to_string(kernel));
-  require_positive("Conv2d", "stride", stride);
-  if (padding && *padding < 0)
-    throw ValueError("[Conv2d] padding must be at least 0, got " + std::to_string(*padding));
+  require_within("Conv2d", "stride", stride, 1);
+  if (padding) require_within("Conv2d", "padding", *padding, 0);
 }
 
 template <class T>
@@ -66,8 +59,8 @@ void bind_products(py::module_& module, const std::string& suffix) {
   py::class_<DenseHandle>(module, ("Dense_" + suffix).c_str(), "An affine layer.")
       .def(py::init([](const StorePtr<T>& s, const std::string& name, Index inputs, Index outputs, Flag relu,
                        std::uint64_t seed, Flag bias) {
-             require_positive("Dense", "inputs", inputs);
-             require_positive("Dense", "outputs", outputs);
+             require_within("Dense", "inputs", inputs, 1);
+             require_within("Dense", "outputs", outputs, 1);
              return DenseHandle::make(
                  "Dense", s, name,
                  DenseOptions{.in = inputs, .out = outputs, .activation = activation(relu), .bias = bias},
@@ -80,8 +73,8 @@ void bind_products(py::module_& module, const std::string& suffix) {
       .def(py::init([](const StorePtr<T>& s, const std::string& name, Index inputs, Index outputs,
                        Index kernel, Flag relu, std::uint64_t seed, Index stride,
                        std::optional<Index> padding, Flag bias) {
-             require_positive("Conv2d", "inputs", inputs);
-             require_positive("Conv2d", "outputs", outputs);
+             require_within("Conv2d", "inputs", inputs, 1);
+             require_within("Conv2d", "outputs", outputs, 1);
              require_window(kernel, stride, padding);
              return Conv2dHandle::make("Conv2d", s, name,
                                        Conv2dOptions{.in = inputs,
@@ -105,6 +98,7 @@ void bind_norms(py::module_& module, const std::string& suffix) {
   using GroupHandle = LayerHandle<T, GroupNorm<T>>;
   py::class_<BatchHandle>(module, ("BatchNorm_" + suffix).c_str(), "Batch normalisation of images.")
       .def(py::init([](const StorePtr<T>& s, const std::string& name, Index channels, double eps, Flag relu) {
+             require_within("BatchNorm", "channels", channels, 1);
              return BatchHandle::make("BatchNorm", s, name, channels,
                                       BatchNormOptions{.eps = eps, .relu = relu});
            }),
@@ -132,6 +126,8 @@ void bind_norms(py::module_& module, const std::string& suffix) {
   py::class_<GroupHandle>(module, ("GroupNorm_" + suffix).c_str(), "Group normalisation of images.")
       .def(py::init([](const StorePtr<T>& s, const std::string& name, Index channels, Index groups,
                        double eps, Flag relu) {
+             require_within("GroupNorm", "channels", channels, 1);
+             require_within("GroupNorm", "groups", groups, 1);
              return GroupHandle::make("GroupNorm", s, name, channels,
                                       GroupNormOptions{.groups = groups, .eps = eps, .relu = relu});
            }),
@@ -144,7 +140,7 @@ void bind_layer_norm(py::module_& module, const std::string& suffix) {
   using Handle = LayerHandle<T, LayerNorm<T>>;
   py::class_<Handle>(module, ("LayerNorm_" + suffix).c_str(), "Layer normalisation of rows.")
       .def(py::init([](const StorePtr<T>& s, const std::string& name, Index channels, double eps) {
-             require_positive("LayerNorm", "channels", channels);
+             require_within("LayerNorm", "channels", channels, 1);
              return Handle::make("LayerNorm", s, name, channels, eps);
            }),
            py::arg("parameters").none(false), "name"_a, "channels"_a, "eps"_a)
@@ -157,8 +153,8 @@ void bind_embedding(py::module_& module, const std::string& suffix) {
   py::class_<Handle>(module, ("Embedding_" + suffix).c_str(), "A learnt vector for each of some items.")
       .def(py::init([](const StorePtr<T>& s, const std::string& name, Index count, Index width,
                        std::uint64_t seed) {
-             require_positive("Embedding", "count", count);
-             require_positive("Embedding", "width", width);
+             require_within("Embedding", "count", count, 1);
+             require_within("Embedding", "width", width, 1);
              return Handle::make("Embedding", s, name, EmbeddingOptions{.count = count, .width = width},
                                  seed);
            }),

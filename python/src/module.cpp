@@ -1,4 +1,6 @@
 // The extension module: errors first, then engine, fields and marks.
+#include <exception>
+#include <stdexcept>
 #include <string>
 
 #include "arrays.h"
@@ -28,8 +30,18 @@ PYBIND11_MODULE(_fieldmark, module) {
   py::register_exception<fieldmark::ShapeError>(module, "ShapeError", value_error);
   py::register_exception<fieldmark::IoError>(module, "IoError",
                                              py::make_tuple(error, py::handle(PyExc_OSError)));
+  // Containers that could not be addressed; pybind11 would make them a ValueError with the container's own
+  // text.
+  py::register_local_exception_translator([](std::exception_ptr thrown) {
+    try {
+      if (thrown) std::rethrow_exception(thrown);
+    } catch (const std::length_error&) {
+      PyErr_SetString(PyExc_MemoryError, "[fieldmark] more elements than memory can have");
+    }
+  });
   fieldmark::python::bind_engine(module);
   fieldmark::python::bind_fields(module);
   fieldmark::python::bind_marks(module);
   fieldmark::python::bind_refusals(module);
+  fieldmark::python::bind_pickling_refusals(module);
 }

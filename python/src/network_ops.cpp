@@ -21,6 +21,14 @@ namespace {
 
 using namespace py::literals;
 
+// Beyond these, the engine's extents would leave the integers of 64 bits.
+void require_window(const char* op, const ConvWindow& window) {
+  require_within(op, "stride", window.stride, 1);
+  require_within(op, "padding", window.padding, 0);
+  require_within(op, "dilation", window.dilation, 1);
+  require_within(op, "groups", window.groups, 1);
+}
+
 template <class T>
 void bind_products(py::module_& module) {
   using V = const Value<T>&;
@@ -32,6 +40,7 @@ void bind_products(py::module_& module) {
       "conv2d",
       [](V x, V w, V b, Index stride, Index padding, Flag relu, Index dilation, Index groups) {
         const ConvWindow window{.stride = stride, .padding = padding, .dilation = dilation, .groups = groups};
+        require_window("conv2d", window);
         return x.with(conv2d(x.get(), w.get(), b.get(), window, activation(relu)));
       },
       "x"_a, "w"_a, "b"_a, "stride"_a = 1, "padding"_a = 0, "relu"_a = false, "dilation"_a = 1,
@@ -45,8 +54,9 @@ void bind_products(py::module_& module) {
   module.def(
       "conv_transpose2d",
       [](V x, V w, V b, Index stride, Index padding) {
-        return x.with(
-            conv_transpose2d(x.get(), w.get(), b.get(), ConvWindow{.stride = stride, .padding = padding}));
+        const ConvWindow window{.stride = stride, .padding = padding};
+        require_window("conv_transpose2d", window);
+        return x.with(conv_transpose2d(x.get(), w.get(), b.get(), window));
       },
       "x"_a, "w"_a, "b"_a, "stride"_a = 1, "padding"_a = 0,
       once<T>(
@@ -115,6 +125,8 @@ void bind_resampling(py::module_& module) {
   module.def(
       "max_pool",
       [](V x, Index size, Index stride, Flag ceil_mode) {
+        require_within("max_pool", "size", size, 1);
+        require_within("max_pool", "stride", stride, 1);
         return x.with(max_pool(x.get(), MaxPool{.size = size, .stride = stride, .ceil_mode = ceil_mode}));
       },
       "x"_a, "size"_a = 2, "stride"_a = 2, "ceil_mode"_a = false,
@@ -122,14 +134,25 @@ void bind_resampling(py::module_& module) {
               "cross\n"
               "the lower or right edge."));
   module.def(
-      "avg_pool", [](V x, Index size) { return x.with(avg_pool(x.get(), size)); }, "x"_a, "size"_a,
+      "avg_pool",
+      [](V x, Index size) {
+        require_within("avg_pool", "size", size, 1);
+        return x.with(avg_pool(x.get(), size));
+      },
+      "x"_a, "size"_a,
       once<T>("The mean over windows of size x size pixels: [N, H, W, C] to [N, H / size, W / size, C]."));
   module.def(
-      "upsample_nearest", [](V x, Index factor) { return x.with(upsample_nearest(x.get(), factor)); }, "x"_a,
-      "factor"_a, once<T>("Repeats every pixel of images [N, H, W, C] factor x factor times."));
+      "upsample_nearest",
+      [](V x, Index factor) {
+        require_within("upsample_nearest", "factor", factor, 1);
+        return x.with(upsample_nearest(x.get(), factor));
+      },
+      "x"_a, "factor"_a, once<T>("Repeats every pixel of images [N, H, W, C] factor x factor times."));
   module.def(
       "upsample_to",
       [](V x, Index height, Index width, const std::string& mode) {
+        require_within("upsample_to", "height", height, 0);
+        require_within("upsample_to", "width", width, 0);
         return x.with(upsample_to(x.get(), height, width, interpolation_of(mode)));
       },
       "x"_a, "height"_a, "width"_a, "mode"_a = "bilinear",

@@ -41,10 +41,9 @@ std::vector<int> axes_of(const char* op, const Value<T>& x, const py::object& ax
   const bool one = PyIndex_Check(axis.ptr()) && !py::isinstance<py::array>(axis);
   try {
     return one ? std::vector<int>{axis.cast<int>()} : axis.cast<std::vector<int>>();
-  } catch (const py::cast_error&) {
-    throw py::type_error("[" + std::string(op) +
-                         "] axis must be None, an integer or a sequence of integers, got " +
-                         py::repr(axis).cast<std::string>());
+  } catch (const py::cast_error&) {  // no integers, or larger than an int
+    py::module_::import("fieldmark._refusal").attr("refuse_axes")(op, axis);
+    throw;
   }
 }
 
@@ -227,6 +226,8 @@ void bind_layout(py::module_& module) {
   module.def(
       "pad",
       [](const Value<T>& x, int axis, Index before, Index after, Number value) {
+        require_within("pad", "before", before, 0);
+        require_within("pad", "after", after, 0);
         return x.with(pad(x.get(), axis, before, after, value));
       },
       "x"_a, "axis"_a, "before"_a, "after"_a, "value"_a = 0.0,
@@ -237,6 +238,8 @@ void bind_layout(py::module_& module) {
   module.def(
       "slice",
       [](const Value<T>& x, int axis, Index begin, Index count) {
+        require_within("slice", "begin", begin, 0);
+        require_within("slice", "count", count, 0);
         return x.with(slice(x.get(), axis, begin, count));
       },
       "x"_a, "axis"_a, "begin"_a, "count"_a, once<T>("Entries begin .. begin + count - 1 of an axis."));

@@ -53,6 +53,27 @@ std::string role(const StoreHandle<T>& s, const std::string& name) {
   return std::ranges::find(kRoles, wanted, &std::pair<const char*, ParamRole>::second)->first;
 }
 
+// [(name, values, role)]: all that a copy or a pickle keeps. Its gradients are 0.
+template <class T>
+py::tuple state_of(const StoreHandle<T>& s) {
+  py::list tensors;
+  for (const auto& e : s.store.entries()) {
+    const auto values = s.store.values(s.store.find(e.name));
+    tensors.append(
+        py::make_tuple(e.name, py::array_t<T>(extents_of(e.shape), values.data()), role(s, e.name)));
+  }
+  return py::make_tuple(tensors);
+}
+
+template <class T>
+StorePtr<T> store_from(const py::tuple& state) {
+  const auto store = std::make_shared<StoreHandle<T>>();
+  for (const py::handle tensor : state[0])
+    std::apply([&](const auto&... part) { add(*store, part...); },
+               tensor.cast<std::tuple<std::string, py::object, std::string>>());
+  return store;
+}
+
 template <class T>
 void bind_store(py::module_& module, const std::string& suffix) {
   using Store = StoreHandle<T>;
@@ -63,6 +84,7 @@ void bind_store(py::module_& module, const std::string& suffix) {
            "Adds a tensor with these values, which are copied. Running ones get no gradients, and no step "
            "changes\n"
            "them.")
+      .def(py::pickle(&state_of<T>, &store_from<T>))
       .def("names", &names<T>, "All names in the order added.")
       .def("role", &role<T>, "name"_a, "As declared to add(): trained, matrix, table or running.")
       .def(

@@ -171,7 +171,7 @@ def test_cameras_are_checked():
     for fov in (0, 4, np.nan):
         with pytest.raises(ValueError, match=r"^\[Camera\] fov must be in \(0, pi\) radians"):
             fm.Camera(pose, fov, 4, 3)
-    with pytest.raises(ValueError, match=r"^\[Camera\] width and height must be at least 1, got 0 and 3"):
+    with pytest.raises(ValueError, match=r"^\[Camera\] width must be 1 to 65536, got 0"):
         fm.Camera(pose, 0.7, 0, 3)
 
 

@@ -56,9 +56,9 @@ def test_a_convolution_takes_stride_and_padding_and_no_bias():
     np.testing.assert_allclose(layer(tape.constant(x)).numpy(), np.einsum("niujvc,uvco->nijo", blocks, w), atol=1e-12)
     assert layer(tape.constant(x)).shape == (1, 2, 3, 3)
     for options, text in (({"kernel": 2}, "kernel must be odd unless padding is given, got 2"),
-                          ({"kernel": 0, "padding": 1}, "kernel must be at least 1, got 0"),
-                          ({"stride": 0}, "stride must be at least 1, got 0"),
-                          ({"padding": -1}, "padding must be at least 0, got -1")):
+                          ({"kernel": 0, "padding": 1}, "kernel must be 1 to 2147483647, got 0"),
+                          ({"stride": 0}, "stride must be 1 to 2147483647, got 0"),
+                          ({"padding": -1}, "padding must be 0 to 2147483647, got -1")):
         with pytest.raises(ValueError, match=r"^\[Conv2d\] " + text):
             engine.Conv2d(model, "d", 2, 3, seed=1, **options)
     with pytest.raises(TypeError, match=r"^\[Conv2d\] padding must be an integer, got str"):
@@ -84,7 +84,7 @@ def test_a_layer_norm_has_the_statistics_of_its_rows():
     want = (x - x.mean(-1, keepdims=True)) / x.std(-1, keepdims=True) * random(4, seed=1) + random(4, seed=2)
     np.testing.assert_allclose(layer(tape.constant(x)).numpy(), want, rtol=1e-9)
     assert engine.gradcheck(layer, [x])
-    for call, error, text in ((lambda: engine.LayerNorm(engine.Parameters(), "m", 0), ValueError, "channels must be at least 1, got 0"),
+    for call, error, text in ((lambda: engine.LayerNorm(engine.Parameters(), "m", 0), ValueError, "channels must be 1 to 2147483647, got 0"),
                               (lambda: engine.LayerNorm(engine.Parameters(), "m", 4, eps=0), ValueError, "eps"),
                               (lambda: engine.LayerNorm(engine.Parameters(), "m", "4"), TypeError, "channels must be an integer")):
         with pytest.raises(error, match=text):
@@ -117,8 +117,8 @@ def test_an_embedding_names_what_does_not_fit():
     model, tape = engine.Parameters("float64"), engine.Tape("float64")
     layer = engine.Embedding(model, "e", 3, 2, seed=1)
     for call, error, text in (
-            (lambda: engine.Embedding(model, "f", 0, 2, seed=1), ValueError, r"\[Embedding\] count must be at least 1, got 0"),
-            (lambda: engine.Embedding(model, "f", 1, 0, seed=1), ValueError, r"\[Embedding\] width must be at least 1, got 0"),
+            (lambda: engine.Embedding(model, "f", 0, 2, seed=1), ValueError, r"\[Embedding\] count must be 1 to 2147483647, got 0"),
+            (lambda: engine.Embedding(model, "f", 1, 0, seed=1), ValueError, r"\[Embedding\] width must be 1 to 2147483647, got 0"),
             (lambda: layer(engine.Tape(), np.zeros(1, "int32")), TypeError,
              r"\[Embedding\] tape must be Tape\(\) of float64, got Tape_float32"),
             (lambda: layer(tape, [0]), TypeError, r"\[Embedding: index\] must be a numpy array of int32, got list"),

@@ -83,7 +83,7 @@ def test_schedules_name_what_does_not_fit():
     for call, error, text in (
             (lambda: engine.Schedule(), ValueError, r"\[Schedule\] give steps or seconds, got neither"),
             (lambda: engine.Schedule(steps=5, seconds=5), ValueError, r"\[Schedule\] give steps or seconds, got both"),
-            (lambda: engine.Schedule(steps=0), ValueError, r"\[Schedule\] steps must be at least 1, got 0"),
+            (lambda: engine.Schedule(steps=0), ValueError, r"\[Schedule\] steps must be 1 to 2147483647, got 0"),
             (lambda: engine.Schedule(seconds=-1), ValueError, r"\[schedule\] .*seconds"),
             (lambda: engine.Schedule(steps=5, cooldown=1), ValueError, r"\[schedule\] .*cooldown"),
             (lambda: engine.Schedule(steps=1.5), TypeError, r"\[Schedule\] steps must be an integer, got float"),

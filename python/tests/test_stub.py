@@ -16,7 +16,8 @@ STUB = Path(_fieldmark.__file__).with_name("_fieldmark.pyi")
 TREE = ast.parse(STUB.read_text())
 CLASSES = {node.name: node for node in TREE.body if isinstance(node, ast.ClassDef)}
 FUNCTIONS = {node.name: node for node in TREE.body if isinstance(node, ast.FunctionDef)}
-MADE_BY_PYBIND = {"__init__", "__doc__", "__module__", "__new__", "__hash__", "__repr__", "__eq__", "__array_ufunc__"}
+MADE_BY_PYBIND = {"__init__", "__doc__", "__module__", "__new__", "__hash__", "__repr__", "__eq__", "__array_ufunc__",
+                  "__getstate__", "__setstate__", "__reduce__"}
 NOT_MADE_BY_USERS = {"Field", "GradcheckReport", "Key", "OpCost", "Owner", "Value_float32", "Value_float64"}
 
 
