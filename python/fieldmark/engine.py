@@ -7,7 +7,8 @@
     x.grad
 
 A value holds until ``tape.reset()``. Arrays that ``numpy()`` and ``grad`` give show the tape's own memory;
-the next ``backward()`` overwrites those of ``grad``, and while one of them lives, the tape refuses to be reset. Arrays that a tape reads are read-only until then.
+the next ``backward()`` overwrites those of ``grad``, and while one of them lives, the tape refuses to be reset. Arrays
+that a tape reads are read-only until then.
 """
 
 from __future__ import annotations
@@ -44,13 +45,13 @@ __all__ = [
     "batch_norm", "batch_norm_fixed", "bce_with_logits", "broadcast_to", "cholesky", "clamp", "concatenate",
     "conv2d", "conv_transpose2d", "cos", "cosine_decay", "cumsum", "dense", "detach", "determinant", "dropout",
     "elu", "equal", "exp", "expm1", "exponential_decay", "feature_distance", "gather", "gelu", "global_avg_pool",
-    "gradcheck", "greater", "group_norm", "huber_loss", "inverse", "l1_loss", "layer_norm", "leaky_relu", "less",
-    "load_state", "log", "log1p", "log_determinant", "logsumexp", "matmul", "max", "max_pool", "maximum", "mean",
-    "minimum", "mse_loss", "negate", "normal_cdf", "pad", "permute", "reciprocal", "relu", "reshape", "save_state",
-    "scatter_add", "sigmoid", "silu", "sin", "slice", "softmax", "softmax_cross_entropy", "softplus", "solve",
-    "space_to_depth", "sqrt", "square", "step_decay", "sum", "symmetric_eigenvalues", "tanh", "transpose",
-    "triangular_solve", "truncated_exp", "upsample_nearest", "upsample_to", "variance", "vjp", "warm_up",
-    "weighted_mean", "where",
+    "gradcheck", "greater", "group_norm", "huber_loss", "hvp", "inverse", "jvp", "l1_loss", "layer_norm",
+    "leaky_relu", "less", "load_state", "log", "log1p", "log_determinant", "logsumexp", "matmul", "max", "max_pool",
+    "maximum", "mean", "minimum", "mse_loss", "negate", "normal_cdf", "pad", "permute", "reciprocal", "relu",
+    "reshape", "save_state", "scatter_add", "sigmoid", "silu", "sin", "slice", "softmax", "softmax_cross_entropy",
+    "softplus", "solve", "space_to_depth", "sqrt", "square", "step_decay", "sum", "symmetric_eigenvalues", "tanh",
+    "transpose", "triangular_solve", "truncated_exp", "upsample_nearest", "upsample_to", "variance", "vjp",
+    "warm_up", "weighted_mean", "where",
 ]
 
 Value = Union[Value_float32, Value_float64]
@@ -275,3 +276,30 @@ def vjp(f: Callable[..., Any], inputs: Sequence[npt.NDArray[F]],
     :param cotangent: u, of the shape and type of f(x)
     """
     return _fieldmark.vjp(f, list(inputs), cotangent)
+
+
+def jvp(f: Callable[..., Any], inputs: Sequence[npt.NDArray[F]],
+        tangents: Sequence[npt.NDArray[F]]) -> Tuple[npt.NDArray[F], npt.NDArray[F]]:
+    """The value f(x), and the Jacobian-vector product J v = d/ds f(x + s v) at s = 0, in forward mode.
+
+    TypeError if f uses an op without a tangent: ``max_pool``, ``conv_transpose2d``, ``dropout``,
+    ``symmetric_eigenvalues`` and layers. ShapeError or ValueError if the tangents do not fit the inputs.
+
+    :param f: takes a value for each input and returns one
+    :param inputs: arrays, all float32 or all float64
+    :param tangents: v, one array per input, of its shape and type
+    """
+    return _fieldmark.jvp(f, list(inputs), list(tangents))
+
+
+def hvp(f: Callable[..., Any], inputs: Sequence[npt.NDArray[F]],
+        directions: Sequence[npt.NDArray[F]]) -> Tuple[npt.NDArray[F], List[npt.NDArray[F]]]:
+    """The value f(x) of one element, and the Hessian-vector product H v for each input.
+
+    Errors as of ``jvp``, and ShapeError if f(x) has more than one element.
+
+    :param f: takes a value for each input and returns one of one element
+    :param inputs: arrays, all float32 or all float64
+    :param directions: v, one array per input, of its shape and type
+    """
+    return _fieldmark.hvp(f, list(inputs), list(directions))

@@ -12,7 +12,7 @@ namespace {
 
 using namespace py::literals;
 
-// The inputs as values of the engine's own tape, which forgets them when the call ends.
+// The inputs, Vars or Duals, as values of the engine's own tape, which forgets them when the call ends.
 template <class T>
 class TapedFunction {
  public:
@@ -20,19 +20,22 @@ class TapedFunction {
   ~TapedFunction() { forget(); }
   TapedFunction(const TapedFunction&) = delete;
   TapedFunction& operator=(const TapedFunction&) = delete;
-  Var<T> operator()(Tape<T>& tape, std::span<const Var<T>> xs) {
+  Var<T> operator()(Tape<T>& tape, std::span<const Var<T>> xs) { return result_of(tape, xs).value(); }
+  Dual<T> operator()(Tape<T>& tape, std::span<const Dual<T>> xs) { return result_of(tape, xs); }
+
+ private:
+  template <class X>
+  Dual<T> result_of(Tape<T>& tape, std::span<const X> xs) {
     forget();                                         // the engine has reset the tape
     handle_ = std::make_shared<TapeHandle<T>>(tape);  // backward reads what the handle keeps
     py::list values;
-    for (const Var<T>& x : xs) values.append(Value<T>(handle_, x));
+    for (const X& x : xs) values.append(Value<T>(handle_, x));
     const py::object y = f_(*values);
     if (!py::isinstance<Value<T>>(y))
       throw py::type_error("[" + std::string(where_) + "] f must return a value of " + dtype_name<T>() +
                            ", got " + type_name(y));
-    return y.cast<const Value<T>&>().get();
+    return y.cast<const Value<T>&>().dual();
   }
-
- private:
   void forget() {
     if (handle_) handle_->forget();
   }
@@ -78,14 +81,40 @@ bool are_float32(const char* where, const std::vector<py::object>& arrays) {
 }
 
 template <class T>
+py::list arrays_from(const std::vector<Tensor<T>>& tensors) {
+  py::list arrays;
+  for (const Tensor<T>& tensor : tensors) arrays.append(array_from(tensor));
+  return arrays;
+}
+
+template <class T>
 py::tuple vjp_of(const py::function& f, const std::vector<py::object>& inputs, const py::object& cotangent) {
   const auto tensors = tensors_from<T>("vjp: inputs", inputs);
   const Tensor<T> u = tensor_from<T>("vjp: cotangent", cotangent);
   TapedFunction<T> taped("vjp", f);
-  const InputProducts<T> found = vjp<T>(std::ref(taped), std::span<const Tensor<T>>(tensors), u);
-  py::list products;
-  for (const Tensor<T>& product : found.products) products.append(array_from(product));
-  return py::make_tuple(array_from(found.value), products);
+  const auto found = vjp<T>(std::ref(taped), std::span<const Tensor<T>>(tensors), u);
+  return py::make_tuple(array_from(found.value), arrays_from(found.products));
+}
+
+template <class T>
+py::tuple jvp_of(const py::function& f, const std::vector<py::object>& inputs,
+                 const std::vector<py::object>& tangents) {
+  const auto tensors = tensors_from<T>("jvp: inputs", inputs), v = tensors_from<T>("jvp: tangents", tangents);
+  TapedFunction<T> taped("jvp", f);
+  const auto found =
+      jvp<T>(std::ref(taped), std::span<const Tensor<T>>(tensors), std::span<const Tensor<T>>(v));
+  return py::make_tuple(array_from(found.value), array_from(found.product));
+}
+
+template <class T>
+py::tuple hvp_of(const py::function& f, const std::vector<py::object>& inputs,
+                 const std::vector<py::object>& directions) {
+  const auto tensors = tensors_from<T>("hvp: inputs", inputs),
+             v = tensors_from<T>("hvp: directions", directions);
+  TapedFunction<T> taped("hvp", f);
+  const auto found =
+      hvp<T>(std::ref(taped), std::span<const Tensor<T>>(tensors), std::span<const Tensor<T>>(v));
+  return py::make_tuple(array_from(found.value), arrays_from(found.products));
 }
 
 void bind_report(py::module_& module) {
@@ -119,6 +148,26 @@ void bind_gradients(py::module_& module) {
       "f"_a, "inputs"_a, "cotangent"_a,
       "The value f(x) and, for each input, the vector-Jacobian product J^T u of its shape, u the cotangent.\n"
       "ShapeError unless u has the shape of f(x).");
+  using Arrays = const std::vector<py::object>&;
+  module.def(
+      "jvp",
+      [](const py::function& f, Arrays inputs, Arrays tangents) {
+        return are_float32("jvp", inputs) ? jvp_of<float>(f, inputs, tangents)
+                                          : jvp_of<double>(f, inputs, tangents);
+      },
+      "f"_a, "inputs"_a, "tangents"_a,
+      "The value f(x) and the Jacobian-vector product J v of its shape, v the tangents, one per input.\n"
+      "ShapeError if a shape differs, ValueError if the numbers do, TypeError for an op without a tangent.");
+  module.def(
+      "hvp",
+      [](const py::function& f, Arrays inputs, Arrays directions) {
+        return are_float32("hvp", inputs) ? hvp_of<float>(f, inputs, directions)
+                                          : hvp_of<double>(f, inputs, directions);
+      },
+      "f"_a, "inputs"_a, "directions"_a,
+      "The value f(x) of one element and, for each input, the Hessian-vector product H v of its shape, v "
+      "the\n"
+      "directions, one per input. Errors as of jvp().");
 }
 
 }  // namespace fieldmark::python

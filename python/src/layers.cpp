@@ -36,7 +36,7 @@ struct LayerHandle {
   template <class F>
   Value<T> apply(const py::object& given, F f) const {
     const Value<T>& x = value_of<T>(kind + ": x", given);
-    const Var<T> var = x.get();
+    const Var<T> var = x.get(kind.c_str());
     return x.tape->reading(store, [&] { return x.with(f(layer, Params<T>(store->store), var)); });
   }
   Value<T> operator()(const py::object& x) const {

@@ -1,4 +1,9 @@
 // The ops of networks: affine maps, convolutions, norms, pooling, losses.
+#include <fieldmark/engine/dual/layout.h>
+#include <fieldmark/engine/dual/loss.h>
+#include <fieldmark/engine/dual/matrices.h>
+#include <fieldmark/engine/dual/norm.h>
+#include <fieldmark/engine/dual/reduce.h>
 #include <fieldmark/engine/ops/batch_norm.h>
 #include <fieldmark/engine/ops/conv2d.h>
 #include <fieldmark/engine/ops/conv_transpose2d.h>
@@ -34,14 +39,17 @@ void bind_products(py::module_& module) {
   using V = const Value<T>&;
   module.def(
       "dense",
-      [](V x, V w, V b, Flag relu) { return x.with(dense(x.get(), w.get(), b.get(), activation(relu))); },
+      [](V x, V w, V b, Flag relu) {
+        return x.with(on([&](auto u, auto v, auto s) { return dense(u, v, s, activation(relu)); }, x, w, b));
+      },
       "x"_a, "w"_a, "b"_a, "relu"_a = false, once<T>("x w + b of rows x [N, in], w [in, out], b [out]."));
   module.def(
       "conv2d",
       [](V x, V w, V b, Index stride, Index padding, Flag relu, Index dilation, Index groups) {
         const ConvWindow window{.stride = stride, .padding = padding, .dilation = dilation, .groups = groups};
         require_window("conv2d", window);
-        return x.with(conv2d(x.get(), w.get(), b.get(), window, activation(relu)));
+        return x.with(
+            on([&](auto u, auto v, auto s) { return conv2d(u, v, s, window, activation(relu)); }, x, w, b));
       },
       "x"_a, "w"_a, "b"_a, "stride"_a = 1, "padding"_a = 0, "relu"_a = false, "dilation"_a = 1,
       "groups"_a = 1,
@@ -56,7 +64,8 @@ void bind_products(py::module_& module) {
       [](V x, V w, V b, Index stride, Index padding) {
         const ConvWindow window{.stride = stride, .padding = padding};
         require_window("conv_transpose2d", window);
-        return x.with(conv_transpose2d(x.get(), w.get(), b.get(), window));
+        return x.with(conv_transpose2d(x.get("conv_transpose2d"), w.get("conv_transpose2d"),
+                                       b.get("conv_transpose2d"), window));
       },
       "x"_a, "w"_a, "b"_a, "stride"_a = 1, "padding"_a = 0,
       once<T>(
@@ -75,15 +84,16 @@ void bind_norms(py::module_& module) {
   module.def(
       "layer_norm",
       [](V x, V gamma, V beta, Number eps) {
-        return x.with(layer_norm(x.get(), gamma.get(), beta.get(), eps));
+        return x.with(on([&](auto v, auto g, auto b) { return layer_norm(v, g, b, eps); }, x, gamma, beta));
       },
       "x"_a, "gamma"_a, "beta"_a, "eps"_a = 1e-5,
       once<T>("gamma (x - mean) / sqrt(var + eps) + beta with the statistics of each row of the last axis."));
   module.def(
       "group_norm",
       [](V x, V gamma, V beta, Index groups, Number eps, Flag relu) {
-        return x.with(group_norm(x.get(), gamma.get(), beta.get(),
-                                 GroupNormOptions{.groups = groups, .eps = eps, .relu = relu}));
+        const GroupNormOptions options{.groups = groups, .eps = eps, .relu = relu};
+        return x.with(
+            on([&](auto v, auto g, auto b) { return group_norm(v, g, b, options); }, x, gamma, beta));
       },
       "x"_a, "gamma"_a, "beta"_a, "groups"_a = 8, "eps"_a = 1e-5, "relu"_a = false,
       once<T>("gamma (x - mean) / sqrt(var + eps) + beta of images [N, H, W, C], with the statistics of each "
@@ -92,8 +102,9 @@ void bind_norms(py::module_& module) {
   module.def(
       "batch_norm",
       [](V x, V gamma, V beta, Number eps, Flag relu, BatchStatistics* statistics) {
-        return x.with(batch_norm(x.get(), gamma.get(), beta.get(), BatchNormOptions{.eps = eps, .relu = relu},
-                                 statistics));
+        const BatchNormOptions options{.eps = eps, .relu = relu};
+        return x.with(on([&](auto v, auto g, auto b) { return batch_norm(v, g, b, options, statistics); }, x,
+                         gamma, beta));
       },
       "x"_a, "gamma"_a, "beta"_a, "eps"_a = 1e-5, "relu"_a = false, "statistics"_a = nullptr,
       once<T>("gamma (x - mean) / sqrt(var + eps) + beta of images [N, H, W, C], with the statistics of the "
@@ -104,8 +115,11 @@ void bind_norms(py::module_& module) {
       [](V x, V gamma, V beta, const py::object& mean, const py::object& variance, Number eps, Flag relu) {
         const py::array m = borrowed<T>("batch_norm_fixed: mean", mean),
                         v = borrowed<T>("batch_norm_fixed: variance", variance);
-        return x.with(batch_norm_fixed(x.get(), gamma.get(), beta.get(), elements<T>(m), elements<T>(v),
-                                       BatchNormOptions{.eps = eps, .relu = relu}));
+        const BatchNormOptions options{.eps = eps, .relu = relu};
+        return x.with(
+            on([&](auto y, auto g,
+                   auto b) { return batch_norm_fixed(y, g, b, elements<T>(m), elements<T>(v), options); },
+               x, gamma, beta));
       },
       "x"_a, "gamma"_a, "beta"_a, "mean"_a, "variance"_a, "eps"_a = 1e-5, "relu"_a = false,
       once<T>("gamma (x - mean) / sqrt(variance + eps) + beta of images [N, H, W, C], with given statistics "
@@ -127,7 +141,8 @@ void bind_resampling(py::module_& module) {
       [](V x, Index size, Index stride, Flag ceil_mode) {
         require_within("max_pool", "size", size, 1);
         require_within("max_pool", "stride", stride, 1);
-        return x.with(max_pool(x.get(), MaxPool{.size = size, .stride = stride, .ceil_mode = ceil_mode}));
+        return x.with(
+            max_pool(x.get("max_pool"), MaxPool{.size = size, .stride = stride, .ceil_mode = ceil_mode}));
       },
       "x"_a, "size"_a = 2, "stride"_a = 2, "ceil_mode"_a = false,
       once<T>("The largest of each channel over windows of images [N, H, W, C]; ceil_mode keeps windows that "
@@ -137,7 +152,7 @@ void bind_resampling(py::module_& module) {
       "avg_pool",
       [](V x, Index size) {
         require_within("avg_pool", "size", size, 1);
-        return x.with(avg_pool(x.get(), size));
+        return x.with(on([&](auto v) { return avg_pool(v, size); }, x));
       },
       "x"_a, "size"_a,
       once<T>("The mean over windows of size x size pixels: [N, H, W, C] to [N, H / size, W / size, C]."));
@@ -145,7 +160,7 @@ void bind_resampling(py::module_& module) {
       "upsample_nearest",
       [](V x, Index factor) {
         require_within("upsample_nearest", "factor", factor, 1);
-        return x.with(upsample_nearest(x.get(), factor));
+        return x.with(on([&](auto v) { return upsample_nearest(v, factor); }, x));
       },
       "x"_a, "factor"_a, once<T>("Repeats every pixel of images [N, H, W, C] factor x factor times."));
   module.def(
@@ -153,7 +168,8 @@ void bind_resampling(py::module_& module) {
       [](V x, Index height, Index width, const std::string& mode) {
         require_within("upsample_to", "height", height, 0);
         require_within("upsample_to", "width", width, 0);
-        return x.with(upsample_to(x.get(), height, width, interpolation_of(mode)));
+        const Interpolation by = interpolation_of(mode);
+        return x.with(on([&](auto v) { return upsample_to(v, height, width, by); }, x));
       },
       "x"_a, "height"_a, "width"_a, "mode"_a = "bilinear",
       once<T>(
@@ -194,8 +210,8 @@ void bind_losses(py::module_& module) {
   module.def(
       "mse_loss",
       [](V a, V b, Object weights) {
-        const auto w = weights_of("mse_loss: weights", a, a.get().shape(), weights);
-        return a.with(mse_loss(a.get(), b.get(), w.elements), w);
+        const auto w = weights_of("mse_loss: weights", a, a.primal().shape(), weights);
+        return a.with(on([&](auto u, auto v) { return mse_loss(u, v, w.elements); }, a, b), w);
       },
       "a"_a, "b"_a, "weights"_a = py::none(),
       once<T>(
@@ -203,8 +219,8 @@ void bind_losses(py::module_& module) {
   module.def(
       "l1_loss",
       [](V a, V b, Object weights) {
-        const auto w = weights_of("l1_loss: weights", a, a.get().shape(), weights);
-        return a.with(l1_loss(a.get(), b.get(), w.elements), w);
+        const auto w = weights_of("l1_loss: weights", a, a.primal().shape(), weights);
+        return a.with(on([&](auto u, auto v) { return l1_loss(u, v, w.elements); }, a, b), w);
       },
       "a"_a, "b"_a, "weights"_a = py::none(),
       once<T>(
@@ -212,8 +228,8 @@ void bind_losses(py::module_& module) {
   module.def(
       "huber_loss",
       [](V a, V b, Number delta, Object weights) {
-        const auto w = weights_of("huber_loss: weights", a, a.get().shape(), weights);
-        return a.with(huber_loss(a.get(), b.get(), delta, w.elements), w);
+        const auto w = weights_of("huber_loss: weights", a, a.primal().shape(), weights);
+        return a.with(on([&](auto u, auto v) { return huber_loss(u, v, delta, w.elements); }, a, b), w);
       },
       "a"_a, "b"_a, "delta"_a, "weights"_a = py::none(),
       once<T>(
@@ -222,10 +238,11 @@ void bind_losses(py::module_& module) {
   module.def(
       "bce_with_logits",
       [](V logits, Object targets, Object weights) {
-        const Shape shape = logits.get().shape();
+        const Shape shape = logits.primal().shape();
         const auto t = matching<T>("bce_with_logits: targets", logits, shape, targets);
         const auto w = weights_of("bce_with_logits: weights", logits, shape, weights);
-        return logits.with(bce_with_logits(logits.get(), t.elements, w.elements), t, w);
+        return logits.with(on([&](auto v) { return bce_with_logits(v, t.elements, w.elements); }, logits), t,
+                           w);
       },
       "logits"_a, "targets"_a, "weights"_a = py::none(),
       once<T>(
@@ -234,10 +251,11 @@ void bind_losses(py::module_& module) {
   module.def(
       "softmax_cross_entropy",
       [](V logits, Object labels, Object weights) {
-        const Shape rows = rows_of(logits.get().shape());
+        const Shape rows = rows_of(logits.primal().shape());
         const auto l = matching<std::int32_t>("softmax_cross_entropy: labels", logits, rows, labels);
         const auto w = weights_of("softmax_cross_entropy: weights", logits, rows, weights);
-        return logits.with(softmax_cross_entropy(logits.get(), l.elements, w.elements), l, w);
+        return logits.with(
+            on([&](auto v) { return softmax_cross_entropy(v, l.elements, w.elements); }, logits), l, w);
       },
       "logits"_a, "labels"_a, "weights"_a = py::none(),
       once<T>(
@@ -252,8 +270,8 @@ void bind_weighted_means(py::module_& module) {
   module.def(
       "weighted_mean",
       [](V x, Object weights) {
-        const auto w = matching<T>("weighted_mean: weights", x, x.get().shape(), weights);
-        return x.with(weighted_mean(x.get(), w.elements), w);
+        const auto w = matching<T>("weighted_mean: weights", x, x.primal().shape(), weights);
+        return x.with(on([&](auto v) { return weighted_mean(v, w.elements); }, x), w);
       },
       "x"_a, "weights"_a,
       once<T>(
@@ -261,10 +279,10 @@ void bind_weighted_means(py::module_& module) {
   module.def(
       "feature_distance",
       [](V a, V b, Object weights) {
-        const Shape shape = a.get().shape();
+        const Shape shape = a.primal().shape();
         const Shape channels = shape.rank() == 0 ? shape : Shape{shape[-1]};
         const auto w = matching<T>("feature_distance: weights", a, channels, weights);
-        return a.with(feature_distance(a.get(), b.get(), w.elements), w);
+        return a.with(on([&](auto u, auto v) { return feature_distance(u, v, w.elements); }, a, b), w);
       },
       "a"_a, "b"_a, "weights"_a,
       once<T>("The distance [N] of LPIPS: features [N, H, W, C] scaled to length 1 at each pixel, squared "

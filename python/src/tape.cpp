@@ -1,6 +1,8 @@
 // Tapes and values: arrays in and out, operators, backward.
 #include "tape_value.h"
 
+#include <fieldmark/engine/dual/matrices.h>
+#include <fieldmark/engine/dual/operators.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/batched_matmul.h>
 #include <fieldmark/engine/ops/comparison.h>
@@ -25,7 +27,7 @@ using TapePtr = std::shared_ptr<TapeHandle<T>>;
 template <class T>
 Var<T> own(const TapePtr<T>& t, const char* where, const Value<T>& v) {
   if (v.tape != t) throw ValueError("[" + std::string(where) + "] the value was recorded on another tape");
-  return v.get();
+  return v.get(where);
 }
 
 template <class T>
@@ -70,14 +72,14 @@ py::array shown(const T* numbers, const Value<T>& v) {
 
 template <class T>
 py::object grad_of(const Value<T>& v) {
-  const T* grad = v.get().grad();
+  const T* grad = v.primal().grad();
   if (!grad) return py::none();
   return shown(grad, v);
 }
 
 template <class T>
 void backward(const Value<T>& v, const py::object& given) {
-  const Var<T> var = v.get();
+  const Var<T> var = v.primal();
   v.tape->check_unchanged();
   if (given.is_none()) return v.tape->tape.backward(var);
   const py::array seed = borrowed<T>("backward: seed", given);
@@ -89,9 +91,9 @@ void backward(const Value<T>& v, const py::object& given) {
 
 template <class T>
 T item(const Value<T>& v) {
-  if (v.get().shape().size() != 1)
+  if (v.primal().shape().size() != 1)
     throw ShapeError("[item] must have one element, got shape " + v.var.shape().str());
-  return v.var.value()[0];
+  return v.primal().value()[0];
 }
 
 // Returns the other operand if it is a number.
@@ -123,8 +125,9 @@ T number_of(const char* op, const py::object& b) {
 template <class T, class F>
 auto operation(const char* op, F f) {
   return [op, f](const Value<T>& a, const py::object& b) {
-    if (py::isinstance<Value<T>>(b)) return a.with(f(a.get(), b.cast<const Value<T>&>().get()));
-    return a.with(f(a.get(), number_of<T>(op, b)));
+    if (py::isinstance<Value<T>>(b)) return a.with(on(f, a, b.cast<const Value<T>&>()));
+    const T x = number_of<T>(op, b);
+    return a.with(on([&](auto v) { return f(v, x); }, a));
   };
 }
 
@@ -132,10 +135,10 @@ auto operation(const char* op, F f) {
 template <class T>
 auto comparison(const char* op, Var<T> (*compare)(Var<T>, Var<T>)) {
   return [op, compare](const Value<T>& a, const py::object& b) {
-    if (py::isinstance<Value<T>>(b)) return a.with(compare(a.get(), b.cast<const Value<T>&>().get()));
+    if (py::isinstance<Value<T>>(b)) return a.with(compare(a.primal(), b.cast<const Value<T>&>().primal()));
     py::array_t<T> one(std::vector<py::ssize_t>{});
     *one.mutable_data() = number_of<T>(op, b);
-    return a.with(compare(a.get(), constant(a.tape, one).get()));
+    return a.with(compare(a.primal(), constant(a.tape, one).primal()));
   };
 }
 
@@ -160,8 +163,10 @@ void bind_meaningless(ValueClass<T>& value) {
 // Values to the power of values, or of a number, which stays a double.
 template <class T>
 Value<T> power(const Value<T>& a, const py::object& b) {
-  if (py::isinstance<Value<T>>(b)) return a.with(pow(a.get(), b.cast<const Value<T>&>().get()));
-  return a.with(pow(a.get(), number<T>("**", b)));
+  if (py::isinstance<Value<T>>(b))
+    return a.with(on([](auto u, auto v) { return pow(u, v); }, a, b.cast<const Value<T>&>()));
+  const double p = number<T>("**", b);
+  return a.with(on([&](auto v) { return pow(v, p); }, a));
 }
 
 template <class T>
@@ -177,11 +182,11 @@ void bind_operators(ValueClass<T>& value) {
       .def("__truediv__", operation<T>("/", [](auto a, auto b) { return a / b; }), "other"_a)
       .def("__rtruediv__", operation<T>("/", [](auto a, auto b) { return b / a; }), "other"_a)
       .def("__pow__", power<T>, "power"_a)
-      .def("__neg__", [](const Value<T>& a) { return a.with(negate(a.get())); })
+      .def("__neg__", [](const Value<T>& a) { return a.with(on([](auto v) { return negate(v); }, a)); })
       .def(
           "__matmul__",
           [](const Value<T>& a, const py::object& b) {
-            return a.with(batched_matmul(a.get(), value_of<T>("@", b).get()));
+            return a.with(on([](auto u, auto v) { return batched_matmul(u, v); }, a, value_of<T>("@", b)));
           },
           "other"_a)
       .def("__lt__", comparison<T>("<", less<T>), "other"_a, "1 where a < b, else 0; no gradient passes.")
@@ -194,15 +199,15 @@ void bind_value(py::module_& module, const std::string& suffix) {
   ValueClass<T> value(module, ("Value_" + suffix).c_str(), "A value of a pass; it holds until Tape.reset().");
   value
       .def_property_readonly(
-          "shape", [](const Value<T>& v) { return py::tuple(py::cast(extents_of(v.get().shape()))); },
+          "shape", [](const Value<T>& v) { return py::tuple(py::cast(extents_of(v.primal().shape()))); },
           "Extents of the axes, a tuple.")
       .def_property_readonly(
           "dtype", [](const Value<T>&) { return py::dtype::of<T>(); }, "float32 or float64.")
       .def_property_readonly(
-          "needs_grad", [](const Value<T>& v) { return v.get().needs_grad(); },
+          "needs_grad", [](const Value<T>& v) { return v.primal().needs_grad(); },
           "Whether it depends on a leaf, so that gradients reach it.")
       .def(
-          "numpy", [](const Value<T>& v) { return shown(v.get().value(), v); },
+          "numpy", [](const Value<T>& v) { return shown(v.primal().value(), v); },
           "The values, not copied (within gradcheck: a copy). While the array lives, the tape cannot be "
           "reset.")
       .def_property_readonly(
@@ -225,7 +230,7 @@ void bind_value(py::module_& module, const std::string& suffix) {
       .def("__repr__", [](const Value<T>& v) {
         if (v.pass != v.tape->pass)
           return std::string("<fieldmark value of ") + dtype_name<T>() + ", forgotten by Tape.reset()>";
-        return std::string("<fieldmark value ") + v.get().shape().str() + " of " + dtype_name<T>() + ">";
+        return std::string("<fieldmark value ") + v.primal().shape().str() + " of " + dtype_name<T>() + ">";
       });
   bind_operators(value);
   bind_meaningless(value);

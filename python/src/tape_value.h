@@ -1,5 +1,6 @@
 #pragma once
 // Tapes, their values and parameter stores as Python objects.
+#include <fieldmark/engine/dual.h>
 #include <fieldmark/engine/params.h>
 #include <fieldmark/engine/tape.h>
 
@@ -148,22 +149,32 @@ struct Reading {
   std::span<const U> elements = {};
 };
 
-/// A value of one pass.
+/// A value of one pass; within jvp() and hvp() with a tangent.
 template <class T>
 struct Value {
   std::shared_ptr<TapeHandle<T>> tape;
-  Var<T> var;
+  Dual<T> var;
   std::uint64_t pass;
 
-  Value(std::shared_ptr<TapeHandle<T>> t, Var<T> v) : tape(std::move(t)), var(v), pass(tape->pass) {}
+  Value(std::shared_ptr<TapeHandle<T>> t, Dual<T> v) : tape(std::move(t)), var(v), pass(tape->pass) {}
   /// @throws ValueError if the tape has forgotten the pass
-  Var<T> get() const {
+  Dual<T> dual() const {
     if (pass != tape->pass) throw ValueError("[value] it belongs to a pass that Tape.reset() has forgotten");
     return var;
   }
+  /// Returns the value for an op without a tangent.
+  /// @param op  for the error message   @throws TypeError if the value has one; @throws as dual()
+  Var<T> get(const char* op) const {
+    if (dual().has_tangent())
+      throw py::type_error("[" + std::string(op) +
+                           "] has no tangent, so that no jvp() or hvp() passes through it");
+    return var.value();
+  }
+  /// Returns the value without its tangent. @throws as dual()
+  Var<T> primal() const { return dual().value(); }
   /// Returns a value of the same pass, and holds the arrays that its op reads.
   template <class... U>
-  Value with(Var<T> v, const Reading<U>&... read) const {
+  Value with(Dual<T> v, const Reading<U>&... read) const {
     (keep(read.array), ...);
     return Value(tape, v);
   }
@@ -173,6 +184,14 @@ struct Value {
     if (!array.is_none()) tape->keep(py::reinterpret_borrow<py::array>(array));
   }
 };
+
+/// Returns f of the values, as Vars or, if one has a tangent, as Duals.
+template <class T, class F, class... V>
+Dual<T> on(F f, const Value<T>& first, const V&... rest) {
+  const bool tangent = (first.dual().has_tangent() || ... || rest.dual().has_tangent());
+  if (tangent) return f(first.dual(), rest.dual()...);
+  return f(first.primal(), rest.primal()...);
+}
 
 /// Whether an object is a value of either scalar type.
 inline bool is_value(const py::handle& given) {

@@ -23,16 +23,13 @@ OTHER_NAMES = {
     "gradient_stats": "Parameters_float32.gradient_stats", "value_stats": "Parameters_float32.value_stats",
     "ParamStore": "Parameters", "Params": "Parameters", "ParamRole": "Parameters_float32.role",
     "ParamId": "Parameters_float32.names", "Var": "Value", "InputProducts": "vjp", "VarFunction": "vjp",
-    "name_matches": "AdamGroup.names", "is_trained": "Parameters_float32.role", "GradcheckFn": "gradcheck",
+    "Jvp": "jvp", "DualFunction": "jvp", "name_matches": "AdamGroup.names",
+    "is_trained": "Parameters_float32.role", "GradcheckFn": "gradcheck",
     "ModuleGradcheckFn": "gradcheck", "CounterRng": "dropout",
 }
 # Structs and enumerations that Python spells as arguments.
 ARGUMENTS = {"Activation", "Axes", "KeepAxes", "ConvMethod", "ConvWindow", "Interpolation", "MaxPool", "Triangle"}
 LEFT_OUT = {
-    "Jvp": "forward mode needs the ops on Duals, which Python does not bind",
-    "jvp": "forward mode needs the ops on Duals, which Python does not bind",
-    "hvp": "forward mode needs the ops on Duals, which Python does not bind",
-    "DualFunction": "forward mode needs the ops on Duals, which Python does not bind",
     "GradcheckCase": "an entry of the list that `fieldmark gradcheck` runs",
     "HasVelocity": "a concept of C++",
     "orthogonalise": "a step of Muon",
@@ -42,10 +39,12 @@ LEFT_OUT = {
     "permutation": "NumPy draws permutations",
 }
 HEADERS_LEFT_OUT = {
-    "aligned": "memory of C++", "arena": "memory of C++", "values": "a helper of ops", "shape_checks": "a helper of ops",
+    "aligned": "memory of C++", "arena": "memory of C++",
+    "values": "a helper of ops", "shape_checks": "a helper of ops",
     "chain": "C++ expressions that the compiler fuses", "chain_steps": "C++ expressions that the compiler fuses",
-    "ops/fused": "C++ expressions that the compiler fuses", "dual": "forward mode, see jvp",
-    "gradcheck_second_order": "forward mode, see jvp", "eigen": "NumPy maps tensors", "tensor": "NumPy's arrays",
+    "ops/fused": "C++ expressions that the compiler fuses", "dual": "the tangents that jvp() hands to f",
+    "gradcheck_second_order": "checks of the engine's own tangents", "eigen": "NumPy maps tensors",
+    "tensor": "NumPy's arrays",
     "shape": "tuples", "isa": "chosen by FIELDMARK_ISA", "packed_weights": "an optimisation of loops in C++",
     "sharded_loop": "loops over shards in C++", "training_run": "loops in C++; fm.train() and fm.embed() use it",
     "run_fingerprint": "loops in C++; fm.train() and fm.embed() use it", "model_file": "Field.load() and Owner.load()",

@@ -61,7 +61,7 @@ def test_arrays_of_other_programs_are_read(dtype, stored, want, tmp_path):
 def test_a_type_that_numpy_lacks_is_refused(tmp_path):
     header = json.dumps({"a": {"dtype": "F8_E5M2", "shape": [2], "data_offsets": [0, 2]}}).encode()
     (tmp_path / "file").write_bytes(struct.pack("<Q", len(header)) + header + b"xx")
-    with pytest.raises(fm.IoError, match=r"^\[SafetensorsFile.get\] array 'a' must have a type that NumPy has, got F8_E5M2"):
+    with pytest.raises(fm.IoError, match=r"^\[SafetensorsFile.get\] array 'a' must have a type .*, got F8_E5M2"):
         engine.SafetensorsFile.read(tmp_path / "file").get("a")
 
 

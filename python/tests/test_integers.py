@@ -88,7 +88,8 @@ def test_the_search_finds_the_integers():
 @pytest.mark.parametrize("given", [2 ** 70, -2 ** 70])
 def test_an_integer_beyond_its_type_is_named_with_its_range(name, argument, given):
     place = r"(\[0\])?" if CALLS[name, argument][2] == "List[int]" else ""
-    with pytest.raises(ValueError, match=rf"^\[{name}\] {argument}{place} must be {range_of(name, argument)}, got {given}$"):
+    text = rf"^\[{name}\] {argument}{place} must be {range_of(name, argument)}, got {given}$"
+    with pytest.raises(ValueError, match=text):
         call(name, argument, given)
 
 

@@ -84,9 +84,11 @@ def test_a_layer_norm_has_the_statistics_of_its_rows():
     want = (x - x.mean(-1, keepdims=True)) / x.std(-1, keepdims=True) * random(4, seed=1) + random(4, seed=2)
     np.testing.assert_allclose(layer(tape.constant(x)).numpy(), want, rtol=1e-9)
     assert engine.gradcheck(layer, [x])
-    for call, error, text in ((lambda: engine.LayerNorm(engine.Parameters(), "m", 0), ValueError, "channels must be 1 to 2147483647, got 0"),
-                              (lambda: engine.LayerNorm(engine.Parameters(), "m", 4, eps=0), ValueError, "eps"),
-                              (lambda: engine.LayerNorm(engine.Parameters(), "m", "4"), TypeError, "channels must be an integer")):
+    other = engine.Parameters()
+    for call, error, text in (
+            (lambda: engine.LayerNorm(other, "m", 0), ValueError, "channels must be 1 to 2147483647, got 0"),
+            (lambda: engine.LayerNorm(other, "m", 4, eps=0), ValueError, "eps"),
+            (lambda: engine.LayerNorm(other, "m", "4"), TypeError, "channels must be an integer")):
         with pytest.raises(error, match=text):
             call()
     with pytest.raises(fm.ShapeError):
@@ -117,8 +119,10 @@ def test_an_embedding_names_what_does_not_fit():
     model, tape = engine.Parameters("float64"), engine.Tape("float64")
     layer = engine.Embedding(model, "e", 3, 2, seed=1)
     for call, error, text in (
-            (lambda: engine.Embedding(model, "f", 0, 2, seed=1), ValueError, r"\[Embedding\] count must be 1 to 2147483647, got 0"),
-            (lambda: engine.Embedding(model, "f", 1, 0, seed=1), ValueError, r"\[Embedding\] width must be 1 to 2147483647, got 0"),
+            (lambda: engine.Embedding(model, "f", 0, 2, seed=1), ValueError,
+             r"\[Embedding\] count must be 1 to 2147483647, got 0"),
+            (lambda: engine.Embedding(model, "f", 1, 0, seed=1), ValueError,
+             r"\[Embedding\] width must be 1 to 2147483647, got 0"),
             (lambda: layer(engine.Tape(), np.zeros(1, "int32")), TypeError,
              r"\[Embedding\] tape must be Tape\(\) of float64, got Tape_float32"),
             (lambda: layer(tape, [0]), TypeError, r"\[Embedding: index\] must be a numpy array of int32, got list"),
