@@ -253,14 +253,15 @@ def Inspector(tape: Any, *, stop_at_nonfinite: bool = False, statistics: bool = 
 
 
 def gradcheck(f: Callable[..., Value_float64], inputs: Sequence[npt.NDArray[np.float64]],
-              rtol: float = 1e-7) -> GradcheckReport:
+              rtol: float = 1e-7, parameters: Optional[Parameters_float64] = None) -> GradcheckReport:
     """Compares gradients with finite differences, in float64. The report is true if no gradient is wrong.
 
     :param f: takes a value for each input and returns one
     :param inputs: arrays of float64
     :param rtol: largest relative error of a gradient, see ``GradcheckReport.worst``
+    :param parameters: their gradients are checked, too; f reads them through layers or ``leaf(x.tape, name)``
     """
-    return _fieldmark.gradcheck(f, list(inputs), rtol)
+    return _fieldmark.gradcheck(f, list(inputs), rtol, parameters)
 
 
 def vjp(f: Callable[..., Any], inputs: Sequence[npt.NDArray[F]],

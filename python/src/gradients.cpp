@@ -4,6 +4,7 @@
 #include <pybind11/stl.h>
 
 #include <cstdio>
+#include <optional>
 
 #include "tape_value.h"
 
@@ -20,14 +21,23 @@ class TapedFunction {
   ~TapedFunction() { forget(); }
   TapedFunction(const TapedFunction&) = delete;
   TapedFunction& operator=(const TapedFunction&) = delete;
-  Var<T> operator()(Tape<T>& tape, std::span<const Var<T>> xs) { return result_of(tape, xs).value(); }
-  Dual<T> operator()(Tape<T>& tape, std::span<const Dual<T>> xs) { return result_of(tape, xs); }
+  Var<T> operator()(Tape<T>& tape, std::span<const Var<T>> xs) {
+    return result_of(std::make_shared<TapeHandle<T>>(tape), xs).value();
+  }
+  Dual<T> operator()(Tape<T>& tape, std::span<const Dual<T>> xs) {
+    return result_of(std::make_shared<TapeHandle<T>>(tape), xs);
+  }
+  // As above, with computed parameters of a store.
+  Var<T> operator()(Tape<T>& tape, const ParamStore<T>& store, const Params<T>& computed,
+                    std::span<const Var<T>> xs) {
+    return result_of(std::make_shared<TapeHandle<T>>(tape, store, computed), xs).value();
+  }
 
  private:
   template <class X>
-  Dual<T> result_of(Tape<T>& tape, std::span<const X> xs) {
-    forget();                                         // the engine has reset the tape
-    handle_ = std::make_shared<TapeHandle<T>>(tape);  // backward reads what the handle keeps
+  Dual<T> result_of(std::shared_ptr<TapeHandle<T>> handle, std::span<const X> xs) {
+    forget();                     // the engine has reset the tape
+    handle_ = std::move(handle);  // backward reads what the handle keeps
     py::list values;
     for (const X& x : xs) values.append(Value<T>(handle_, x));
     const py::object y = f_(*values);
@@ -37,7 +47,7 @@ class TapedFunction {
     return y.cast<const Value<T>&>().dual();
   }
   void forget() {
-    if (handle_) handle_->forget();
+    if (handle_) handle_->end();
   }
   const char* where_;
   py::function f_;
@@ -64,13 +74,21 @@ py::array array_from(const Tensor<T>& tensor) {
   return py::array_t<T>(extents_of(tensor.shape), tensor.data.data());
 }
 
-GradcheckReport check_gradients(const py::function& f, const std::vector<py::object>& inputs, double rtol) {
+using Checked = std::shared_ptr<StoreHandle<double>>;
+
+GradcheckReport check_gradients(const py::function& f, const std::vector<py::object>& inputs, double rtol,
+                                const std::optional<Checked>& parameters) {
   if (inputs.empty()) throw ValueError("[gradcheck] inputs must not be empty");
   if (!(rtol > 0 && rtol < 1))
     throw ValueError("[gradcheck] rtol must be above 0 and below 1, got " + std::to_string(rtol));
   const auto tensors = tensors_from<double>("gradcheck: inputs", inputs);
   TapedFunction<double> taped("gradcheck", f);
-  return gradcheck(std::ref(taped), tensors, {.rtol = rtol});
+  if (!parameters) return gradcheck(std::ref(taped), tensors, {.rtol = rtol});
+  const ParamStore<double>& store = (*parameters)->store;
+  const py::capsule lease = (*parameters)->leases.lend(*parameters);  // f must not add parameters
+  return gradcheck_module([&](Tape<double>& tape, const Params<double>& computed,
+                              std::span<const Var<double>> xs) { return taped(tape, store, computed, xs); },
+                          store, tensors, {.rtol = rtol});
 }
 
 // Whether the first of the arrays is of float32; the others then must be, too.
@@ -137,8 +155,11 @@ void bind_report(py::module_& module) {
 
 void bind_gradients(py::module_& module) {
   bind_report(module);
-  module.def("gradcheck", &check_gradients, "f"_a, "inputs"_a, "rtol"_a = 1e-7,
-             "Compares gradients with finite differences, in float64. ValueError unless 0 < rtol < 1.");
+  module.def(
+      "gradcheck", &check_gradients, "f"_a, "inputs"_a, "rtol"_a = 1e-7, "parameters"_a = py::none(),
+      "Compares gradients with finite differences, in float64; those of `parameters`, too, which f reads "
+      "through\n"
+      "layers or leaf(). ValueError unless 0 < rtol < 1.");
   module.def(
       "vjp",
       [](const py::function& f, const std::vector<py::object>& inputs, const py::object& cotangent) {

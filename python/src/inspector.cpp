@@ -23,7 +23,9 @@ struct InspectorHandle {
 
   InspectorHandle(std::shared_ptr<TapeHandle<T>> t, Flag stop_at_nonfinite, Flag with_statistics)
       : tape(std::move(t)), statistics(with_statistics) {
-    inspector.emplace(tape->tape,
+    if (!tape->own)
+      throw ValueError("[Inspector] the tape of a call such as gradcheck() is not yours to inspect");
+    inspector.emplace(tape->tape(),
                       InspectOptions{.stop_at_nonfinite = stop_at_nonfinite, .statistics = with_statistics});
   }
   const TapeInspector<T>& open() const {

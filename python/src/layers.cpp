@@ -37,7 +37,7 @@ struct LayerHandle {
   Value<T> apply(const py::object& given, F f) const {
     const Value<T>& x = value_of<T>(kind + ": x", given);
     const Var<T> var = x.get(kind.c_str());
-    return x.tape->reading(store, [&] { return x.with(f(layer, Params<T>(store->store), var)); });
+    return x.tape->reading(store, [&] { return x.with(f(layer, x.tape->params(*store), var)); });
   }
   Value<T> operator()(const py::object& x) const {
     return apply(x, [](const L& l, const Params<T>& p, Var<T> v) { return l(p, v); });
@@ -167,8 +167,7 @@ void bind_embedding(py::module_& module, const std::string& suffix) {
             if (read.ndim() != 1)
               throw ShapeError("[Embedding: index] must have one axis, got shape " + shape_of(read).str());
             return tape->reading(e.store, [&] {
-              const Var<T> rows =
-                  e.layer(tape->tape, Params<T>(e.store->store), elements<std::int32_t>(read));
+              const Var<T> rows = e.layer(tape->tape(), tape->params(*e.store), elements<std::int32_t>(read));
               tape->keep(read);
               return Value<T>(tape, rows);
             });

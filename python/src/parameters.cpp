@@ -106,7 +106,7 @@ void bind_store(py::module_& module, const std::string& suffix) {
           [](StorePtr<T> s, const py::object& given, const std::string& name) {
             const auto tape = tape_of<T>("Parameters.leaf", given);
             const ParamId id = s->store.find(name);
-            return tape->reading(s, [&] { return Value<T>(tape, Params<T>(s->store).leaf(tape->tape, id)); });
+            return tape->reading(s, [&] { return Value<T>(tape, tape->params(*s).leaf(tape->tape(), id)); });
           },
           "tape"_a, "name"_a, "A parameter on a tape; a running one is a constant.")
       .def(

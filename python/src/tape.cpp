@@ -40,13 +40,15 @@ py::array zeros(const Shape& shape) {
 // Records an array that the pass may read.
 template <class T>
 Value<T> constant(const TapePtr<T>& t, const py::array& array) {
+  Tape<T>& tape = t->tape();
   const Shape shape = shape_of(array);  // first: what is refused is not kept
   t->keep(array);
-  return Value<T>(t, t->tape.constant(static_cast<const T*>(array.data()), shape));
+  return Value<T>(t, tape.constant(static_cast<const T*>(array.data()), shape));
 }
 
 template <class T>
 Value<T> leaf(TapePtr<T> t, const py::object& given, const py::object& grad) {
+  Tape<T>& tape = t->tape();
   const py::array array = t->reads("leaf: array", given);
   py::array to = grad.is_none() ? zeros<T>(shape_of(array)) : borrowed<T>("leaf: grad", grad);
   if (shape_of(to) != shape_of(array))
@@ -58,8 +60,8 @@ Value<T> leaf(TapePtr<T> t, const py::object& given, const py::object& grad) {
         "one "
         "that no pass reads");
   t->keep(array, to);
-  return Value<T>(t, t->tape.leaf(static_cast<const T*>(array.data()), static_cast<T*>(to.mutable_data()),
-                                  shape_of(array)));
+  return Value<T>(
+      t, tape.leaf(static_cast<const T*>(array.data()), static_cast<T*>(to.mutable_data()), shape_of(array)));
 }
 
 // Returns numbers of a value's shape as an array: a view, or a copy if another object owns the tape, which
@@ -81,12 +83,12 @@ template <class T>
 void backward(const Value<T>& v, const py::object& given) {
   const Var<T> var = v.primal();
   v.tape->check_unchanged();
-  if (given.is_none()) return v.tape->tape.backward(var);
+  if (given.is_none()) return v.tape->tape().backward(var);
   const py::array seed = borrowed<T>("backward: seed", given);
   if (shape_of(seed) != var.shape())
     throw ShapeError("[backward] seed must have the shape of the value, " + var.shape().str() + ", got " +
                      shape_of(seed).str());
-  v.tape->tape.backward(var, elements<T>(seed));
+  v.tape->tape().backward(var, elements<T>(seed));
 }
 
 template <class T>
@@ -204,6 +206,8 @@ void bind_value(py::module_& module, const std::string& suffix) {
       .def_property_readonly(
           "dtype", [](const Value<T>&) { return py::dtype::of<T>(); }, "float32 or float64.")
       .def_property_readonly(
+          "tape", [](const Value<T>& v) { return v.tape; }, "The tape that recorded it.")
+      .def_property_readonly(
           "needs_grad", [](const Value<T>& v) { return v.primal().needs_grad(); },
           "Whether it depends on a leaf, so that gradients reach it.")
       .def(
@@ -240,10 +244,10 @@ void bind_value(py::module_& module, const std::string& suffix) {
 
 template <class T>
 void bind_tape(py::module_& module, const std::string& suffix) {
-  bind_value<T>(module, suffix);
-  py::class_<TapeHandle<T>, TapePtr<T>>(module, ("Tape_" + suffix).c_str(),
-                                        "Records operations, and replays their gradients in reverse.")
-      .def(py::init<>())
+  py::class_<TapeHandle<T>, TapePtr<T>> tape(module, ("Tape_" + suffix).c_str(),
+                                             "Records operations, and replays their gradients in reverse.");
+  bind_value<T>(module, suffix);  // its property `tape` needs the class
+  tape.def(py::init<>())
       .def_property_readonly(
           "dtype", [](const TapeHandle<T>&) { return py::dtype::of<T>(); }, "float32 or float64.")
       .def(
@@ -262,7 +266,7 @@ void bind_tape(py::module_& module, const std::string& suffix) {
           "name",
           [](const TapePtr<T>& t, const py::object& given, const std::string& name) {
             const Value<T>& v = value_of<T>("Tape.name: value", given);
-            return v.with(t->tape.name(own(t, "Tape.name", v), name));
+            return v.with(t->tape().name(own(t, "Tape.name", v), name));
           },
           "value"_a, "name"_a,
           "Names a value for an inspector; without one it does nothing. Returns the value.")
@@ -272,7 +276,7 @@ void bind_tape(py::module_& module, const std::string& suffix) {
             const Value<T>& v = value_of<T>("Tape.keep_grad: value", given);
             const Var<T> var = own(t, "Tape.keep_grad", v);
             static_cast<void>(var.grad());  // throws after a backward, when it is too late
-            return v.with(t->tape.keep_grad(var));
+            return v.with(t->tape().keep_grad(var));
           },
           "value"_a,
           "Has the next backward compute the gradient of a value that is the output of a layer with a ReLU.\n"

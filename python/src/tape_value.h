@@ -5,6 +5,7 @@
 #include <fieldmark/engine/tape.h>
 
 #include <algorithm>
+#include <optional>
 #include <string_view>
 
 #include "held_arrays.h"
@@ -31,12 +32,21 @@ struct StoreHandle {
 template <class T>
 struct TapeHandle {
   std::unique_ptr<Tape<T>> own;  // null if the tape belongs to another object
-  Tape<T>& tape;
   std::uint64_t pass = 0;
   Leases views;
 
-  TapeHandle() : own(std::make_unique<Tape<T>>()), tape(*own) {}
-  explicit TapeHandle(Tape<T>& others) : tape(others) {}
+  TapeHandle() : own(std::make_unique<Tape<T>>()), tape_(own.get()) {}
+  explicit TapeHandle(Tape<T>& others) : tape_(&others) {}
+  /// Overload for a call that computes or checks the parameters of a store: layers then read `computed`.
+  TapeHandle(Tape<T>& others, const ParamStore<T>& store, const Params<T>& computed)
+      : tape_(&others), store_(&store), computed_(computed) {}
+  /// @throws ValueError after end()
+  Tape<T>& tape() const {
+    if (!tape_) throw ValueError("[tape] it belongs to a call that has ended");
+    return *tape_;
+  }
+  /// Returns the parameters of a store for this pass.
+  Params<T> params(StoreHandle<T>& s) const { return store_ == &s.store ? *computed_ : Params<T>(s.store); }
 
   /// Returns an array of U for an op to read; call keep() once the op is recorded.
   /// @throws ValueError if this pass adds gradients to it, or it shows a value of this pass: array and pass
@@ -71,7 +81,7 @@ struct TapeHandle {
     try {
       return f();
     } catch (...) {
-      if (first && !tape.observer()) forget_last_store();  // an observer shows what the failed op read
+      if (first && !tape().observer()) forget_last_store();  // an observer shows what the failed op read
       throw;
     }
   }
@@ -83,13 +93,18 @@ struct TapeHandle {
   }
   /// Ends the pass. @throws BufferError while arrays show its values
   void reset() {
-    if (!own) throw ValueError("[reset] the tape of a gradient check is not yours to reset");
+    if (!own) throw ValueError("[reset] the tape of a call such as gradcheck() is not yours to reset");
     if (views.count() > 0)
       throw py::buffer_error(
           "[reset] " + std::to_string(views.count()) +
           " arrays show values of this pass: copy them with numpy.array(x), or delete them");
-    tape.reset();
+    tape().reset();
     forget();
+  }
+  /// Ends the pass of another object's tape, which may be gone afterwards.
+  void end() {
+    forget();
+    tape_ = nullptr;
   }
   /// Invalidates the values of the pass and releases what it reads.
   void forget() {
@@ -135,6 +150,9 @@ struct TapeHandle {
     std::shared_ptr<const std::uint64_t> changes;
     std::uint64_t before;
   };
+  Tape<T>* tape_;
+  const ParamStore<T>* store_ = nullptr;
+  std::optional<Params<T>> computed_;  // of store_
   HeldArrays held_;
   PassMemory memory_;
   std::vector<py::array> grads_;

@@ -28,8 +28,9 @@ OTHER_NAMES = {
     "ModuleGradcheckFn": "gradcheck", "CounterRng": "dropout",
 }
 # Structs and enumerations that Python spells as arguments.
-ARGUMENTS = {"Activation", "Axes", "KeepAxes", "ConvMethod", "ConvWindow", "Interpolation", "MaxPool", "Triangle"}
+ARGUMENTS = {"Activation", "Axes", "KeepAxes", "ConvWindow", "Interpolation", "MaxPool", "Triangle"}
 LEFT_OUT = {
+    "ConvMethod": "Python's conv2d has a window, whose method the engine chooses",
     "GradcheckCase": "an entry of the list that `fieldmark gradcheck` runs",
     "HasVelocity": "a concept of C++",
     "orthogonalise": "a step of Muon",

@@ -148,6 +148,55 @@ def test_forward_products_name_what_does_not_fit():
         engine.hvp(engine.square, [x], [x])
 
 
+@pytest.mark.parametrize("make", [
+    lambda m: engine.Dense(m, "l", 3, 2, seed=1, relu=True), lambda m: engine.LayerNorm(m, "l", 3),
+    lambda m: (lambda layer: lambda x: layer(engine.reshape(x, (1, 2, 2, 3))))(engine.Conv2d(m, "l", 3, 2, seed=1)),
+    lambda m: (lambda layer: lambda x: x * layer(x.tape, np.array([2, 0, 2, 1], "int32")))(
+        engine.Embedding(m, "l", 5, 3, seed=1))])
+def test_gradients_of_parameters_are_checked_on_request(make):
+    model = engine.Parameters("float64")
+    f = make(model)
+    values = [model.values(name).copy() for name in model.names()]
+    x = random(4, 3)
+    report, alone = engine.gradcheck(f, [x], parameters=model), engine.gradcheck(f, [x])
+    assert report.ok, report.table
+    assert report.entries > alone.entries
+    for name, before in zip(model.names(), values):
+        np.testing.assert_array_equal(model.values(name), before)
+
+
+def test_a_wrong_gradient_of_a_parameter_is_found():
+    model = engine.Parameters("float64")
+    model.add("w", np.array([2.0, 3.0]))
+    wrong = lambda x: x * engine.detach(model.leaf(x.tape, "w"))  # noqa: E731
+    assert engine.gradcheck(wrong, [np.ones(2)]).ok and not engine.gradcheck(wrong, [np.ones(2)], parameters=model).ok
+    assert engine.gradcheck(lambda x: x * model.leaf(x.tape, "w"), [np.ones(2)], parameters=model).ok
+    with pytest.raises(TypeError, match=r"^\[gradcheck\] parameters must be Parameters\(\)"):
+        engine.gradcheck(engine.square, [np.ones(2)], parameters=engine.Parameters())
+
+
+def test_a_tape_of_a_call_makes_constants_and_ends_with_it():
+    seen, w = [], random(3)
+    _, product = engine.jvp(lambda x: seen.append(x.tape) or x * x.tape.constant(w), [random(3)], [np.ones(3)])
+    np.testing.assert_array_equal(product, w)
+    array = np.ones(2)
+    for call in (lambda: seen[0].constant(array), lambda: seen[0].leaf(array)):
+        with pytest.raises(ValueError, match=r"^\[tape\] it belongs to a call that has ended"):
+            call()
+    array[:] = w[:] = 2  # what was refused or has ended is not held
+    model = engine.Parameters("float64")
+    layer = engine.Embedding(model, "e", 2, 2, seed=1)
+    for call in (lambda: layer(seen[0], np.zeros(1, "int32")), lambda: model.leaf(seen[0], "e/table")):
+        with pytest.raises(ValueError, match=r"^\[tape\] it belongs to a call that has ended"):
+            call()
+    with pytest.raises(ValueError, match=r"^\[reset\] the tape of a call such as gradcheck"):
+        seen[0].reset()
+    with pytest.raises(ValueError, match=r"^\[Inspector\] the tape of a call such as gradcheck"):
+        engine.Inspector(seen[0])
+    tape = engine.Tape()
+    assert tape.constant(np.ones(1, "float32")).tape is tape
+
+
 def test_products_name_what_does_not_fit():
     x = np.ones(3)
     for call, error, text in (
