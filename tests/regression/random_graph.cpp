@@ -12,8 +12,10 @@
 #include <fieldmark/engine/ops/linear_solve.h>
 #include <fieldmark/engine/ops/loss.h>
 #include <fieldmark/engine/ops/operators.h>
+#include <fieldmark/engine/ops/reduce.h>
 #include <fieldmark/engine/ops/reduce_axes.h>
 #include <fieldmark/engine/ops/relu_family.h>
+#include <fieldmark/engine/ops/rows.h>
 #include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/engine/ops/softmax.h>
 
@@ -25,7 +27,7 @@ void RandomGraph<T>::add_functions(Table& t) {
       g.emit(name, {x}, {}, f(g.vars_[x]));
     };
   };
-  one("negate", [](V v) { return negate(v); });
+  one("negate", [](V v) { return -v; });
   one(
       "reciprocal", [](V v) { return reciprocal(v); }, true);
   one("abs", [](V v) { return abs(v); });
@@ -46,16 +48,26 @@ void RandomGraph<T>::add_functions(Table& t) {
   one("relu", [](V v) { return relu(v); });
   one("silu", [](V v) { return silu(v); });
   one("gelu", [](V v) { return gelu(v); });
+  one("normal_cdf", [](V v) { return normal_cdf(v); });
+  one("truncated_exp", [](V v) { return truncated_exp(v); });
+  one("detach", [](V v) { return detach(v); });
+  one("sum_all", [](V v) { return sum(v); });
+  one("mean_all", [](V v) { return mean(v); });
   t["scale"] = [](RandomGraph& g) { g.scaled(g.any(), g.number(-1.5, 1.5)); };
   t["affine"] = [](RandomGraph& g) {
     const std::size_t x = g.any();
     const double f = g.number(-1, 1), o = g.number(-1, 1);
     g.emit("affine", {x}, {{"factor", f}, {"offset", o}}, affine(g.vars_[x], f, o));
   };
-  t["power"] = [](RandomGraph& g) {
+  t["pow_number"] = [](RandomGraph& g) {
     const std::size_t x = g.positive(g.any());
     const double p = g.number(-2, 2);
-    g.emit("power", {x}, {{"p", p}}, pow(g.vars_[x], p));
+    g.emit("pow_number", {x}, {{"p", p}}, pow(g.vars_[x], p));
+  };
+  t["div_number"] = [](RandomGraph& g) {
+    const std::size_t x = g.any();
+    const double d = g.number(1, 2);
+    g.emit("div_number", {x}, {{"divisor", d}}, div(g.vars_[x], d));
   };
   t["clamp"] = [](RandomGraph& g) {
     const std::size_t x = g.any();
@@ -89,11 +101,35 @@ void RandomGraph<T>::add_binary(Table& t) {
       "pow", [](V a, V b) { return pow(a, b); }, true);
   two("minimum", [](V a, V b) { return minimum(a, b); });
   two("maximum", [](V a, V b) { return maximum(a, b); });
-  t["where"] = [](RandomGraph& g) {
-    const std::size_t a = g.any(), b = g.partner(a), c = g.partner(a);
-    const V x = g.vars_[a], y = g.vars_[b], z = g.vars_[c];
-    g.emit("where", {a, b, c}, {}, where(greater(x, y), x, z));
+  const auto mask = [&t](const std::string& name, auto f) {
+    t[name] = [name, f](RandomGraph& g) {
+      const std::size_t a = g.any(), b = g.partner(a), c = g.partner(a);
+      const std::size_t m = g.emit(name, {a, b}, {}, f(g.vars_[a], g.vars_[b]));
+      g.emit("where", {m, a, c}, {}, where(g.vars_[m], g.vars_[a], g.vars_[c]));
+    };
   };
+  mask("greater", [](V a, V b) { return greater(a, b); });
+  mask("less", [](V a, V b) { return less(a, b); });
+  t["equal"] = [](RandomGraph& g) {  // what a ReLU left at 0
+    const std::size_t a = g.any(), c = g.partner(a), zero = g.input({1}, 0, 0);
+    const std::size_t r = g.emit("relu", {a}, {}, relu(g.vars_[a]));
+    const std::size_t m = g.emit("equal", {r, zero}, {}, equal(g.vars_[r], g.vars_[zero]));
+    g.emit("where", {m, c, r}, {}, where(g.vars_[m], g.vars_[c], g.vars_[r]));
+  };
+  // An operator with a number on either side. The four of two tensors are above.
+  const auto number = [&t](const std::string& name, auto f) {
+    t["operator" + name] = [name, f](RandomGraph& g) {
+      const bool first = g.below(2) == 0;
+      const std::size_t any = g.any(), x = name == "/" && first ? g.positive(any) : any;
+      const T n = static_cast<T>(std::round(g.number(1, 3) * 64) / 64);
+      g.emit("operator" + name, {x}, {{"number", n}, {"first", first}},
+             first ? f(n, g.vars_[x]) : f(g.vars_[x], n));
+    };
+  };
+  number("+", [](auto a, auto b) { return a + b; });
+  number("-", [](auto a, auto b) { return a - b; });
+  number("*", [](auto a, auto b) { return a * b; });
+  number("/", [](auto a, auto b) { return a / b; });
 }
 
 template <class T>
@@ -121,6 +157,10 @@ void RandomGraph<T>::add_axes(Table& t) {
     const int axis = g.axis_of(x);
     g.emit("softmax", {x}, {{"axis", axis}}, softmax(g.vars_[x], axis));
   };
+  t["softmax_last"] = [](RandomGraph& g) {
+    const std::size_t x = g.any(1);
+    g.emit("softmax_last", {x}, {}, softmax(g.vars_[x]));
+  };
   t["cumsum"] = [](RandomGraph& g) {
     const std::size_t x = g.any(1);
     const int axis = g.axis_of(x);
@@ -130,14 +170,25 @@ void RandomGraph<T>::add_axes(Table& t) {
     const std::size_t x = g.any(1);
     const int axis = g.axis_of(x);
     const auto index = g.index(3, static_cast<std::size_t>(g.vars_[x].shape()[axis]));
-    g.emit("gather", {x}, {{"axis", axis}, {"index", list_of(index)}}, gather(g.vars_[x], axis, index));
+    g.emit("gather", {x}, {{"axis", axis}, {"index", list_of<std::int32_t>(index)}},
+           gather(g.vars_[x], axis, index));
   };
   t["scatter_add"] = [](RandomGraph& g) {
     const std::size_t x = g.any(1);
     const int axis = g.axis_of(x);
     const auto index = g.index(static_cast<std::size_t>(g.vars_[x].shape()[axis]), 3);
-    g.emit("scatter_add", {x}, {{"axis", axis}, {"index", list_of(index)}, {"extent", 3}},
+    g.emit("scatter_add", {x}, {{"axis", axis}, {"index", list_of<std::int32_t>(index)}, {"extent", 3}},
            scatter_add(g.vars_[x], axis, index, 3));
+  };
+  t["gather_rows"] = [](RandomGraph& g) {
+    const std::size_t x = g.rows();
+    const auto index = g.index(4, static_cast<std::size_t>(g.vars_[x].shape()[0]));
+    g.emit("gather_rows", {x}, {{"index", list_of<std::int32_t>(index)}}, gather_rows(g.vars_[x], index));
+  };
+  t["broadcast_rows"] = [](RandomGraph& g) {
+    const std::size_t all = g.rows(), x = g.emit("slice", {all}, {{"axis", 0}, {"begin", 0}, {"count", 1}},
+                                                 slice(g.vars_[all], 0, 0, 1));
+    g.emit("broadcast_rows", {x}, {{"rows", 3}}, broadcast_rows(g.vars_[x], 3));
   };
 }
 
@@ -187,32 +238,50 @@ void RandomGraph<T>::add_layout(Table& t) {
     g.emit("concatenate", {x, y, x}, {{"axis", axis}},
            fieldmark::concatenate({g.vars_[x], g.vars_[y], g.vars_[x]}, axis));
   };
+  t["slice_last"] = [](RandomGraph& g) {
+    const std::size_t x = g.any(1);
+    const fieldmark::Index count = (g.vars_[x].shape()[-1] + 1) / 2;
+    g.emit("slice_last", {x}, {{"count", count}}, slice(g.vars_[x], 0, count));
+  };
+  t["concatenate_last"] = [](RandomGraph& g) {
+    const std::size_t x = g.any(1), y = g.input(g.vars_[x].shape());
+    g.emit("concatenate_last", {x, y}, {}, fieldmark::concatenate({g.vars_[x], g.vars_[y]}));
+  };
 }
 
 template <class T>
 void RandomGraph<T>::add_losses(Table& t) {
-  const auto loss = [&t](const std::string& name, Json args, auto f) {
+  // Weights for some of the losses, none for the others.
+  const auto loss = [&t](const std::string& name, auto f) {
     t[name] = [=](RandomGraph& g) {
       const std::size_t a = g.any(), b = g.input(g.vars_[a].shape());
-      g.emit(name, {a, b}, args, f(g.vars_[a], g.vars_[b]));
+      const auto w = g.below(2) == 0 ? g.numbers(g.vars_[a].shape().size(), 0, 1) : std::span<const T>();
+      g.emit(name, {a, b}, {{"delta", 0.5}, {"weights", list_of(w)}}, f(g.vars_[a], g.vars_[b], w));
     };
   };
-  loss("l1_loss", {}, [](V a, V b) { return l1_loss(a, b); });
-  loss("mse_loss", {}, [](V a, V b) { return mse_loss(a, b); });
-  loss("huber_loss", {{"delta", 0.5}}, [](V a, V b) { return huber_loss(a, b, 0.5); });
-  t["cross_entropy"] = [](RandomGraph& g) {
-    const std::size_t x = g.any(1);
-    const fieldmark::Shape s = g.vars_[x].shape();
-    const auto labels = g.index(static_cast<std::size_t>(s.size() / s[-1]), static_cast<std::size_t>(s[-1]));
-    g.emit("cross_entropy", {x}, {{"index", list_of(labels)}}, softmax_cross_entropy(g.vars_[x], labels));
+  loss("l1_loss", [](V a, V b, auto w) { return l1_loss(a, b, w); });
+  loss("mse_loss", [](V a, V b, auto w) { return mse_loss(a, b, w); });
+  loss("huber_loss", [](V a, V b, auto w) { return huber_loss(a, b, 0.5, w); });
+  t["bce_with_logits"] = [](RandomGraph& g) {
+    const std::size_t x = g.any();
+    const fieldmark::Index n = g.vars_[x].shape().size();
+    const auto targets = g.numbers(n, 0, 1), w = g.below(2) == 0 ? g.numbers(n, 0, 1) : std::span<const T>();
+    g.emit("bce_with_logits", {x}, {{"targets", list_of(targets)}, {"weights", list_of(w)}},
+           bce_with_logits(g.vars_[x], targets, w));
   };
-  t["layer_norm"] = [](RandomGraph& g) {
-    const std::size_t x = g.any(1);
-    const fieldmark::Index n = g.vars_[x].shape()[-1];
-    const std::size_t noise = g.input(g.vars_[x].shape());  // a constant row is ill-conditioned
-    const std::size_t y = g.emit("add", {x, noise}, {}, g.vars_[x] + g.vars_[noise]);
-    const std::size_t gamma = g.input({n}), beta = g.input({n});
-    g.emit("layer_norm", {y, gamma, beta}, {}, layer_norm(g.vars_[y], g.vars_[gamma], g.vars_[beta]));
+  t["softmax_cross_entropy"] = [](RandomGraph& g) {
+    const std::size_t x = g.rows();
+    const fieldmark::Shape s = g.vars_[x].shape();
+    auto& labels = g.index(fieldmark::at(s[0]), fieldmark::at(s[1]));
+    if (s[0] > 1) labels[0] = -1;  // ignored
+    const auto w = g.below(2) == 0 ? g.numbers(s[0], 0, 1) : std::span<const T>();
+    g.emit("softmax_cross_entropy", {x}, {{"index", labels}, {"weights", list_of(w)}},
+           softmax_cross_entropy(g.vars_[x], std::span<const std::int32_t>(labels), w));
+  };
+  t["weighted_mean"] = [](RandomGraph& g) {
+    const std::size_t x = g.any();
+    const auto w = g.numbers(g.vars_[x].shape().size(), 0, 1);
+    g.emit("weighted_mean", {x}, {{"weights", list_of(w)}}, weighted_mean(g.vars_[x], w));
   };
 }
 
@@ -265,6 +334,9 @@ const typename RandomGraph<T>::Table& RandomGraph<T>::table() {
     add_layout(t);
     add_losses(t);
     add_matrices(t);
+    add_networks(t);
+    add_images(t);
+    add_norms(t);
     return t;
   }();
   return all;

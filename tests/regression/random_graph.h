@@ -3,6 +3,7 @@
 #include <fieldmark/engine/ops/layout.h>
 #include <fieldmark/engine/ops/operators.h>
 #include <fieldmark/engine/ops/reduce_axes.h>
+#include <fieldmark/engine/ops/slice.h>
 #include <fieldmark/engine/random.h>
 #include <fieldmark/engine/safetensors.h>
 
@@ -38,16 +39,18 @@ class RandomGraph {
       const auto pick = i == 0 ? static_cast<std::size_t>(seed_) % names.size() : below(names.size());
       table().at(names[pick])(*this);
     }
-    const std::size_t count = vars_.size();
-    std::size_t total = emit("mean", {count - 1}, axes_json(all_axes(count - 1), false),
-                             mean(vars_[count - 1], axes(all_axes(count - 1))));
-    for (std::size_t i = 0; i + 1 < count; ++i) {
+    // Side by side, since a sum of means of both signs would cancel.
+    std::vector<std::size_t> means;
+    std::vector<V> parts;
+    for (std::size_t i = 0, count = vars_.size(); i < count; ++i) {
       if (read_[i]) continue;
       const std::size_t m =
           emit("mean", {i}, axes_json(all_axes(i), false), mean(vars_[i], axes(all_axes(i))));
-      total = emit("add", {total, m}, {}, vars_[total] + vars_[m]);
+      means.push_back(emit("reshape", {m}, {{"shape", {1}}}, reshape(vars_[m], {1})));
+      parts.push_back(vars_[means.back()]);
     }
-    return vars_[total];
+    return vars_[emit("concatenate", means, {{"axis", 0}},
+                      fieldmark::concatenate(std::span<const V>(parts), 0))];
   }
   const Json& steps() const { return steps_; }
   static std::vector<std::string> ops() {
@@ -153,6 +156,11 @@ class RandomGraph {
     const std::size_t half = leaf();
     return emit("add", {p, half}, {}, vars_[p] + vars_[half]);
   }
+  // Weighs a normalised value: its plain mean does not depend on gamma, and the gradient would be noise.
+  void weighed(std::size_t i) {
+    const std::size_t w = input(vars_[i].shape());
+    emit("mul", {i, w}, {}, vars_[i] * vars_[w]);
+  }
   int axis_of(std::size_t i) {
     return static_cast<int>(below(static_cast<std::size_t>(vars_[i].shape().rank())));
   }
@@ -177,13 +185,46 @@ class RandomGraph {
     for (int k = 0; k < s.rank(); ++k) list.push_back(s[k]);
     return list;
   }
-  std::span<const std::int32_t> index(std::size_t n, std::size_t extent) {
+  // Returns any value as a matrix with its last axis.
+  std::size_t rows() {
+    const std::size_t x = any(1);
+    const fieldmark::Shape s = vars_[x].shape(), matrix{s.size() / s[-1], s[-1]};
+    return emit("reshape", {x}, {{"shape", extents(matrix)}}, reshape(vars_[x], matrix));
+  }
+  // Returns images of at least 4 x 4 pixels: some of the graph, or new ones of the given channels that depend
+  // on it. Noise separates equal pixels, which max_pool could choose between.
+  std::size_t images(fieldmark::Index channels = 4) {
+    std::size_t x = vars_.size();
+    for (std::size_t k = vars_.size(); k-- > 0 && x == vars_.size();) {
+      const fieldmark::Shape s = vars_[k].shape();
+      if (s.rank() == 4 && s.size() <= 1000 && s[1] >= 4 && s[2] >= 4 && s[3] == channels) x = k;
+    }
+    if (x == vars_.size() || below(2) == 0) {
+      const std::size_t of = any();
+      x = emit("mean", {of}, axes_json(all_axes(of), false), mean(vars_[of], axes(all_axes(of))));
+    }
+    const fieldmark::Shape s = vars_[x].shape(),
+                           shape = s.rank() == 4 ? s : fieldmark::Shape{2, 8, 8, channels};
+    // A product: a norm would take out a number added to all pixels, whose gradient is 0 and in float noise.
+    const std::size_t factor = input(shape), noise = input(shape);
+    const std::size_t y = emit("mul", {x, factor}, {}, vars_[x] * vars_[factor]);
+    return emit("add", {y, noise}, {}, vars_[y] + vars_[noise]);
+  }
+  std::vector<std::int32_t>& index(std::size_t n, std::size_t extent) {
     indices_.emplace_back();
     for (std::size_t k = 0; k < n; ++k) indices_.back().push_back(static_cast<std::int32_t>(below(extent)));
     return indices_.back();
   }
-  static Json list_of(std::span<const std::int32_t> index) {
-    return std::vector<std::int32_t>(index.begin(), index.end());
+  // Returns constants for an op that takes a span: multiples of 1/64, the same in float and double, above lo.
+  std::span<const T> numbers(fieldmark::Index n, double lo, double hi) {
+    numbers_.emplace_back();
+    for (fieldmark::Index k = 0; k < n; ++k)
+      numbers_.back().push_back(static_cast<T>(std::ceil(number(lo, hi) * 64) / 64));
+    return numbers_.back();
+  }
+  template <class U>
+  static std::vector<U> list_of(std::span<const U> list) {
+    return {list.begin(), list.end()};
   }
 
   static const Table& table();
@@ -193,6 +234,9 @@ class RandomGraph {
   static void add_layout(Table& t);
   static void add_losses(Table& t);
   static void add_matrices(Table& t);
+  static void add_networks(Table& t);
+  static void add_images(Table& t);
+  static void add_norms(Table& t);
 
   fieldmark::Tape<T>& tape_;
   fieldmark::CounterRng rng_;
@@ -200,6 +244,7 @@ class RandomGraph {
   std::uint64_t drawn_ = 0;
   std::deque<fieldmark::Tensor<T>> inputs_, grads_;
   std::deque<std::vector<std::int32_t>> indices_;
+  std::deque<std::vector<T>> numbers_;
   std::vector<V> vars_;
   std::vector<bool> read_;
   Json steps_ = Json::array();

@@ -1,11 +1,14 @@
+#include <fieldmark/core/files.h>
 #include <fieldmark/engine/safetensors.h>
 
 #include <nlohmann/json.hpp>
 
-#include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
+#include <map>
+#include <regex>
 #include <set>
 #include <sstream>
 
@@ -22,10 +25,10 @@ namespace {
 
 constexpr int kGraphs = 200;
 
-// Evaluates every graph in the precision of T here and in PyTorch. Returns for each graph the errors of value
-// and gradients, and in float also PyTorch's own.
+// Evaluates every graph in the precision of T here and in double in PyTorch. Returns for each graph the
+// errors of value and gradients.
 template <class T>
-std::vector<std::array<double, 4>> errors_of_graphs(const char* precision) {
+std::vector<std::array<double, 2>> errors_of_graphs() {
   const TemporaryFolder folder;
   SafetensorsFile file;
   nlohmann::json graphs;
@@ -35,24 +38,39 @@ std::vector<std::array<double, 4>> errors_of_graphs(const char* precision) {
     graph.save(file, std::to_string(g) + "/", graph.build());
     graphs.push_back(graph.steps());
   }
-  file.metadata = {{"graphs", graphs.dump()}, {"precision", precision}};
+  file.metadata = {{"graphs", graphs.dump()}};
   file.write(folder / "graphs");
   const std::string command = "OMP_NUM_THREADS=1 /usr/bin/python3 " + source_dir() +
                               "/tests/regression/torch_graphs.py '" + (folder / "graphs").string() + "' > '" +
                               (folder / "answer").string() + "'";
   REQUIRE(std::system(command.c_str()) == 0);
   std::ifstream answer(folder / "answer");
-  std::vector<std::array<double, 4>> errors;
+  std::vector<std::array<double, 2>> errors;
   for (std::string line; std::getline(answer, line);) {
     std::istringstream words(line);
     std::size_t number = 0;
-    errors.push_back({1, 1, 0, 0});
+    errors.push_back({1, 1});
     auto& e = errors.back();
     REQUIRE((words >> number >> e[0] >> e[1] && number + 1 == errors.size()));
-    words >> e[2] >> e[3];
   }
   REQUIRE(errors.size() == kGraphs);
   return errors;
+}
+
+// The ops of ops/ that no graph uses, and why.
+const std::map<std::string, std::string> kNotInGraphs{{"run_chain", "what fused() calls, not public"}};
+
+// The names of the functions in the headers of ops/ that return a Var.
+std::set<std::string> declared_ops() {
+  const std::regex declaration(R"(\bVar<T> (operator[-+*/]|[a-z_0-9]+)\()");
+  std::set<std::string> names;
+  for (const auto& header :
+       std::filesystem::directory_iterator(source_dir() + "/engine/include/fieldmark/engine/ops")) {
+    const std::string text = read_text(header.path());
+    for (std::sregex_iterator i(text.begin(), text.end(), declaration), end; i != end; ++i)
+      names.insert((*i)[1]);
+  }
+  return names;
 }
 
 }  // namespace
@@ -70,29 +88,33 @@ TEST_CASE("regression: random graphs use every op, and no value leaves the range
     CAPTURE(op);
     CHECK(used.count(op) == 1);
   }
+  const auto declared = declared_ops();
+  CHECK(declared.size() > 85);
+  for (const auto& op : declared) {
+    CAPTURE(op);
+    CHECK(used.count(op) + kNotInGraphs.count(op) ==
+          1);  // else it lacks a graph, or a reason not to have one
+  }
+  for (const auto& [op, reason] : kNotInGraphs) CHECK(declared.count(op) == 1);
 }
 
 TEST_CASE("regression: PyTorch has the values and gradients of 200 random graphs to 1e-10") {
   if (!torch_or_skip("the comparison of random graphs with PyTorch")) return;
-  for (const auto& e : errors_of_graphs<double>("double")) {
+  for (const auto& e : errors_of_graphs<double>()) {
     INFO("value " << e[0] << ", gradients " << e[1]);
     CHECK(e[0] <= 1e-10);
     CHECK(e[1] <= 1e-10);
   }
 }
 
-// The reference is PyTorch in double on the same inputs. 197 graphs are within 1e-5, the limit for
-// well-conditioned ones; on the other three, PyTorch in float is as far from PyTorch in double: its errors
-// are 3.0e-5, 9.3e-5 and 4.4e-5 where ours are 1.9e-5, 1.1e-5 and 4.4e-5.
-TEST_CASE(
-    "regression: in float 200 random graphs are within 1e-5 of PyTorch in double, or as near as its float") {
+// The reference is PyTorch in double on the same inputs. The graphs are well-conditioned by construction: no
+// sum of terms of both signs is a result, and no norm takes out what a gradient asks about. Either leaves a
+// result near 0 that in float is noise. The worst error measured is 4.2e-6.
+TEST_CASE("regression: in float 200 random graphs are within 1e-5 of PyTorch in double") {
   if (!torch_or_skip("the comparison of random graphs in float with PyTorch")) return;
-  int above = 0;
-  for (const auto& e : errors_of_graphs<float>("float")) {
-    INFO("value " << e[0] << ", gradients " << e[1] << "; PyTorch " << e[2] << ", " << e[3]);
-    CHECK(e[0] <= std::max(1e-5, 2 * e[2]));
-    CHECK(e[1] <= std::max(1e-5, 2 * e[3]));
-    above += !(std::max(e[0], e[1]) <= 1e-5);
+  for (const auto& e : errors_of_graphs<float>()) {
+    INFO("value " << e[0] << ", gradients " << e[1]);
+    CHECK(e[0] <= 1e-5);
+    CHECK(e[1] <= 1e-5);
   }
-  CHECK(above <= 5);
 }
