@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <cstdio>
 
 using namespace fieldmark;
@@ -35,9 +34,8 @@ int main() {
       walk[i * kPoints + j] = 0.05 * static_cast<double>(std::min(i, j) + 1);
     }
     eye[i * kPoints + i] = 1;
-    truth[i] = (i > 0 ? truth[i - 1] : 0) +
-               std::sqrt(0.05) * static_cast<double>(rng.normal2(static_cast<std::uint64_t>(i))[0]);
-    noise[i] = kNoise * static_cast<double>(rng.normal2(static_cast<std::uint64_t>(i))[1]);
+    truth[i] = (i > 0 ? truth[i - 1] : 0) + std::sqrt(0.05) * static_cast<double>(rng.normal2(at(i))[0]);
+    noise[i] = kNoise * static_cast<double>(rng.normal2(at(i))[1]);
   }
   const Tensor<double> one({1}, {kBlur});
   Tape<double> tape;
