@@ -73,14 +73,6 @@ void RandomGraph<T>::add_functions(Table& t) {
     const std::size_t x = g.any();
     g.emit("clamp", {x}, {{"low", -0.4}, {"high", 0.6}}, clamp(g.vars_[x], -0.4, 0.6));
   };
-  t["leaky_relu"] = [](RandomGraph& g) {
-    const std::size_t x = g.any();
-    g.emit("leaky_relu", {x}, {{"slope", 0.2}}, leaky_relu(g.vars_[x], 0.2));
-  };
-  t["elu"] = [](RandomGraph& g) {
-    const std::size_t x = g.any();
-    g.emit("elu", {x}, {{"alpha", 0.7}}, elu(g.vars_[x], 0.7));
-  };
 }
 
 template <class T>

@@ -7,6 +7,7 @@
 #include <fieldmark/engine/ops/layer_norm.h>
 #include <fieldmark/engine/ops/matmul.h>
 #include <fieldmark/engine/ops/pool.h>
+#include <fieldmark/engine/ops/relu_family.h>
 #include <fieldmark/engine/ops/resample.h>
 
 #include "regression/random_graph.h"
@@ -34,6 +35,14 @@ void RandomGraph<T>::add_networks(Table& t) {
     for (Index i = 0; i < g.vars_[x].shape().size(); ++i)
       kept.push_back(rng.bits(7, static_cast<std::uint64_t>(i / 4))[fieldmark::at(i % 4)] >= 0x4000'0000U);
     g.emit("dropout", {x}, {{"p", 0.25}, {"kept", kept}}, dropout(g.vars_[x], 0.25, rng, 7));
+  };
+  t["leaky_relu"] = [](RandomGraph& g) {
+    const std::size_t x = g.any();
+    g.emit("leaky_relu", {x}, {{"slope", 0.2}}, leaky_relu(g.vars_[x], 0.2));
+  };
+  t["elu"] = [](RandomGraph& g) {
+    const std::size_t x = g.any();
+    g.emit("elu", {x}, {{"alpha", 0.7}}, elu(g.vars_[x], 0.7));
   };
   // Every step that a chain can have.
   t["fused"] = [](RandomGraph& g) {
