@@ -232,29 +232,33 @@ template <class T>
 void bind_state(py::module_& module) {
   module.def(
       "save_state",
-      [](SafetensorsFile& file, const std::string& prefix, const StorePtr<T>& s,
-         const py::object& optimiser) {
+      [](SafetensorsFile& file, const std::string& prefix, const StorePtr<T>& s, const py::object& optimiser,
+         const std::string& part) {
         SafetensorsFile next = file;  // a copy: if a name is taken, the file is unchanged
-        with_optimiser<T>("save_state", s, optimiser,
-                          [&](const auto&... o) { save_state(next, prefix, std::as_const(s->store), o...); });
+        with_optimiser<T>("save_state", s, optimiser, [&](const auto&... o) {
+          save_state(next, prefix, std::as_const(s->store), o..., part);
+        });
         file = std::move(next);
       },
-      "file"_a, "prefix"_a, py::arg("parameters").none(false), "optimiser"_a = py::none(),
-      once<T>("Adds the parameters as PREFIX + NAME, and what the optimiser keeps for them. ValueError if a "
-              "name is\n"
-              "taken."));
+      "file"_a, "prefix"_a, py::arg("parameters").none(false), "optimiser"_a = py::none(), "module"_a = "",
+      once<T>(
+          "Adds the parameters as PREFIX + NAME, and what the optimiser keeps for them. With `module`, adds\n"
+          "MODULE/NAME alone, as PREFIX + NAME, without Adam's steps. ValueError if a name is taken or no\n"
+          "parameter is of the module."));
   module.def(
       "load_state",
       [](const SafetensorsFile& file, const std::string& prefix, const StorePtr<T>& s,
-         const py::object& optimiser) {
+         const py::object& optimiser, const std::string& part) {
         with_optimiser<T>("load_state", s, optimiser,
-                          [&](auto&... o) { load_state(file, prefix, s->store, o...); });
+                          [&](auto&... o) { load_state(file, prefix, s->store, o..., part); });
         s->leases.changed();
       },
-      "file"_a, "prefix"_a, py::arg("parameters").none(false), "optimiser"_a = py::none(),
+      "file"_a, "prefix"_a, py::arg("parameters").none(false), "optimiser"_a = py::none(), "module"_a = "",
       once<T>(
-          "Reads what save_state() added; training then goes on with the same bits. IoError if an array is\n"
-          "missing or has another shape or type; nothing is changed then."));
+          "Reads what save_state() added; training then goes on with the same bits. With `module`, reads\n"
+          "PREFIX + NAME into MODULE/NAME and leaves all others. IoError if an array is missing or has "
+          "another\n"
+          "shape or type; nothing is changed then."));
 }
 
 AdamGroup group_from(const std::string& names, double lr_factor, Flag skip_zero, double weight_decay) {

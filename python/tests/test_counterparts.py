@@ -79,6 +79,7 @@ def names(unit):
     """The public names that a header declares, except names that are only announced."""
     found = set()
     for s in statements(unit):
+        s = re.sub(r"template ?<class> class \w+", "class", s)  # a parameter, not a name
         s = re.sub(r"^(template ?<.*?> )+(?=\w)", "", s)
         declared = (re.match(r"(?:class|struct|enum class) (\w+).*\{$", s) or re.match(r"(?:using|concept) (\w+) =", s)
                     or re.search(r"(?<![\w:.])(\w+)\(", s))

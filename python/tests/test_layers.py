@@ -240,6 +240,22 @@ def test_a_saved_state_goes_on_with_the_same_bits(make, tmp_path):
     np.testing.assert_array_equal(again.values("w"), model.values("w"))
 
 
+def test_one_module_is_saved_and_loaded_under_another_name():
+    first, second = engine.Parameters("float64"), engine.Parameters("float64")
+    for model, module in (first, "encoder"), (second, "reader"):
+        model.add(f"{module}/w", random(5, 2) + len(module))
+        model.add("other/w", random(3) + len(module))
+    kept = second.values("other/w").copy()
+    file = engine.SafetensorsFile()
+    engine.save_state(file, "part/", first, module="encoder")
+    assert file.names() == ["part/w"]
+    engine.load_state(file, "part/", second, module="reader")
+    np.testing.assert_array_equal(second.values("reader/w"), first.values("encoder/w"))
+    np.testing.assert_array_equal(second.values("other/w"), kept)
+    with pytest.raises(fm.ValueError_, match="decoder"):
+        engine.save_state(file, "", first, module="decoder")
+
+
 def test_muon_leaves_the_other_tensors_to_adam(tmp_path):
     def begin():
         model = engine.Parameters("float64")
