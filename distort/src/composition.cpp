@@ -2,6 +2,8 @@
 #include <fieldmark/imaging/resize.h>
 
 #include <algorithm>
+#include <cmath>
+#include <vector>
 
 namespace fieldmark::distort {
 namespace {
@@ -21,7 +23,39 @@ Tensor<float> on_black(const Tensor<float>& x, Index height, Index width) {
 
 Index share(Index extent, Index part, Index of) { return (extent * part + of / 2) / of; }
 
+constexpr Index kLeaves = 600;                           // leave less than a hundredth uncovered
+constexpr double kLeastLeaf = 0.02, kLargestLeaf = 0.5;  // radii, of the longer side
+
+struct Leaf {
+  double x, y, radius;
+  std::array<float, 4> colour;
+};
+
 }  // namespace
+
+// The first leaf over a pixel is the uppermost.
+Tensor<float> dead_leaves(Index height, Index width, const std::function<std::array<float, 4>(Index)>& draw) {
+  const double longer = static_cast<double>(std::max(height, width));
+  const double most = 1 / (kLeastLeaf * kLeastLeaf), least = 1 / (kLargestLeaf * kLargestLeaf);
+  std::vector<Leaf> leaves;
+  for (Index i = 0; i < kLeaves; ++i) {
+    const auto place = draw(2 * i);
+    const double radius = 1 / std::sqrt(most - static_cast<double>(place[2]) * (most - least));
+    leaves.push_back({static_cast<double>(place[0]) * static_cast<double>(width),
+                      static_cast<double>(place[1]) * static_cast<double>(height), longer * radius,
+                      draw(2 * i + 1)});
+  }
+  Tensor<float> out({height, width, 3}, 0.5f);
+  for (Index p = 0; p < height * width; ++p) {
+    const auto over = std::ranges::find_if(leaves, [&](const Leaf& leaf) {
+      const double dx = static_cast<double>(p % width) + 0.5 - leaf.x,
+                   dy = static_cast<double>(p / width) + 0.5 - leaf.y;
+      return dx * dx + dy * dy < leaf.radius * leaf.radius;
+    });
+    if (over != leaves.end()) std::copy_n(over->colour.begin(), 3, &out[3 * p]);
+  }
+  return out;
+}
 
 Tensor<float> pillarboxed(const Tensor<float>& x) {
   return on_black(x, x.shape[0], std::max(x.shape[1], share(x.shape[0], 16, 9)));

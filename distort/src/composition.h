@@ -3,6 +3,7 @@
 #include <fieldmark/engine/tensor.h>
 
 #include <array>
+#include <functional>
 #include <span>
 
 namespace fieldmark::distort {
@@ -28,6 +29,12 @@ Tensor<float> before_another(const Tensor<float>& x, std::span<const float> back
   }
   return y;
 }
+/// Draws an image of discs that cover one another, like fallen leaves: each has one colour, and radii from a
+/// fiftieth to half of the longer side occur with a density of r^-3, which gives edges and plain areas of all
+/// sizes as images of nature have them. Source: Lee, Mumford and Huang, "Occlusion models for natural
+/// images", IJCV 2001.
+/// @param draw  returns four uniform numbers in [0, 1) of a counter
+Tensor<float> dead_leaves(Index height, Index width, const std::function<std::array<float, 4>(Index)>& draw);
 /// Draws an opaque black bar with white lines, like text, over the middle fifth of the height.
 Tensor<float> captioned(const Tensor<float>& x);
 /// Tiles four copies of the image at half size, two by two, on a canvas of its size.

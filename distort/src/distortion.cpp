@@ -189,6 +189,13 @@ Tensor<float> apply(const Distortion::Step& step, const Tensor<float>& x, const 
         const auto u = draws.rng.uniform4(draws.index, draws.at(p));
         return std::array{u[0], u[1], u[2]};
       });
+    case DistortionKind::background_shapes: {
+      const Tensor<float> leaves = dead_leaves(
+          x.shape[0], x.shape[1], [&](Index i) { return draws.rng.uniform4(draws.index, draws.at(i)); });
+      return before_another(x, background, [&](Index p) {
+        return std::array{leaves[3 * p], leaves[3 * p + 1], leaves[3 * p + 2]};
+      });
+    }
     case DistortionKind::caption:
       return captioned(x);
     case DistortionKind::collage:

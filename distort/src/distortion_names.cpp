@@ -40,7 +40,7 @@ struct PlainKind {
   std::string_view name;
   DistortionKind kind;
 };
-constexpr std::array<PlainKind, 12> kPlainKinds{{{"greyscale", DistortionKind::greyscale},
+constexpr std::array<PlainKind, 13> kPlainKinds{{{"greyscale", DistortionKind::greyscale},
                                                  {"sepia", DistortionKind::sepia},
                                                  {"mirror", DistortionKind::mirror},
                                                  {"pillarbox", DistortionKind::pillarbox},
@@ -50,6 +50,7 @@ constexpr std::array<PlainKind, 12> kPlainKinds{{{"greyscale", DistortionKind::g
                                                  {"background_grey", DistortionKind::background_grey},
                                                  {"background_green", DistortionKind::background_green},
                                                  {"background_noise", DistortionKind::background_noise},
+                                                 {"background_shapes", DistortionKind::background_shapes},
                                                  {"caption", DistortionKind::caption},
                                                  {"collage", DistortionKind::collage}}};
 // Names that expand to a chain.

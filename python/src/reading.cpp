@@ -82,7 +82,7 @@ Suspects checked(const std::string& function, const Owner& owner, const py::obje
 }
 
 ImageEvidence evidence_of(watermark::PageReader& reader, const Tensor<float>& image, bool forced) {
-  watermark::PageReading r = reader.read(image);
+  watermark::PageReading r = reader.read(image, forced);
   if (forced) r.force_informed();
   return {r.evidence(), r.chosen(), r.agreement()};
 }

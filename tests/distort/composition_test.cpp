@@ -64,16 +64,48 @@ TEST_CASE("composition: another background goes behind the pixels that differ fr
   x[3 * 8] = 0.99f;  // an edge: two and a half levels from white
   const Tensor<float> black = distorted_by("background_black", x),
                       noise = distorted_by("background_noise", x);
+  const Tensor<float> shapes = distorted_by("background_shapes", x);
   std::set<float> values(noise.data.begin(), noise.data.end());
   CHECK(values.size() > 20);
   for (Index p = 0; p < 20; ++p) {
     const bool object = p == 7 || p == 8;
+    if (object) CHECK(shapes[3 * p] == Approx(x[3 * p]).margin(0.002));
     for (Index c = 0; c < 3; ++c)
       CHECK(black[3 * p + c] == (object ? Approx(x[3 * p + c]).margin(0.002) : Approx(0)));
   }
   CHECK(distorted_by("background_white", x).data == distorted_by("noise_0", x).data);
   CHECK(distorted_by("background_green", x)[0] == Approx(0.1).margin(0.002));
   CHECK(distorted_by("background_grey", x)[0] == Approx(0.5).margin(0.002));
+}
+
+TEST_CASE("composition: dead leaves have edges and plain areas of all sizes") {
+  const CounterRng rng(3, 1);
+  const Tensor<float> y =
+      dead_leaves(128, 128, [&](Index i) { return rng.uniform4(0, static_cast<std::uint64_t>(i)); });
+  // Mean squares of the differences between pixels at a distance double slower than the distance: white noise
+  // would have the same at any, a ramp four times as much.
+  double previous = 0;
+  for (const Index apart : {1, 2, 4, 8, 16}) {
+    double sum = 0;
+    for (Index row = 0; row < 128; ++row)
+      for (Index x = 0; x + apart < 128; ++x)
+        for (Index c = 0; c < 3; ++c)
+          sum += std::pow(
+              static_cast<double>(y[3 * (128 * row + x) + c] - y[3 * (128 * row + x + apart) + c]), 2);
+    sum /= static_cast<double>(3 * 128 * (128 - apart));
+    if (apart > 1) CHECK(sum > 1.1 * previous);
+    if (apart > 1) CHECK(sum < 2.2 * previous);
+    previous = sum;
+  }
+  double mean = 0;
+  Index uncovered = 0;
+  for (Index p = 0; p < 128 * 128; ++p) {
+    mean += static_cast<double>(y[3 * p]) / (128 * 128);
+    uncovered += y[3 * p] == 0.5f && y[3 * p + 1] == 0.5f && y[3 * p + 2] == 0.5f;
+  }
+  CHECK(mean > 0.3);
+  CHECK(mean < 0.7);
+  CHECK(uncovered < 128 * 128 / 50);
 }
 
 TEST_CASE("composition: a caption covers the middle fifth, a collage holds four of half the size") {

@@ -17,8 +17,8 @@ TEST_CASE("distortion names: wrong names list the right ones") {
       "whole), webp_A (1 to 100, whole), h264_A (0 to 51, whole), gamma_A (0.01 to 10), brightness_A (0 to "
       "10), contrast_A (0 to 10), "
       "hue_A (-360 to 360), stretch_A (0.25 to 4), greyscale, sepia, mirror, pillarbox, letterbox, "
-      "background_black, background_white, background_grey, background_green, background_noise, caption, "
-      "collage, combined, screenshot, got 'sharpen_1'");
+      "background_black, background_white, background_grey, background_green, background_noise, "
+      "background_shapes, caption, collage, combined, screenshot, got 'sharpen_1'");
   for (const char* bad : {"",           "noise",       "noise_",        "noise_0.1x",        "noise_-1",
                           "noise_nan",  "noise_inf",   "jpeg_0",        "jpeg_101",          "jpeg_50.5",
                           "crop_0",     "noise_0.1,",  ",noise_0.1",    "noise_0.1,,blur_1", "Noise_0.1",

@@ -76,7 +76,7 @@ ImageEvidence SuspectReader::detect(const Tensor<float>& image, const std::strin
       out.cells = blind_.evidence(image);
       return out;
     }
-    watermark::PageReading r = informed_->read(image);
+    watermark::PageReading r = informed_->read(image, forced_);
     if (forced_) r.force_informed();
     out.agreement = r.agreement();
     out.reading = r.chosen();

@@ -185,6 +185,47 @@ TEST_CASE("informed_reader: the mark is read beside a dark band across the view"
   }
 }
 
+TEST_CASE("informed_reader: informed evidence is left empty below the least agreement asked for") {
+  const Owner owner = marking_owner();
+  InformedReader reader(owner, kSearch);
+  Tensor<float> other({96, 96, 3});
+  for (Index i = 0; i < other.size(); ++i) other[i] = 0.2f + 0.07f * static_cast<float>(i / 11 % 8);
+  const ImageReading all = reader.read(other);
+  REQUIRE(all.chosen == ReadingKind::blind);
+  REQUIRE(!all.informed.evidence.empty());
+  const ImageReading some = reader.read(other, InformedReader::kLeastAgreement);
+  CHECK(some.informed.evidence.empty());
+  CHECK(some.informed.agreement == all.informed.agreement);
+  CHECK(some.blind == all.blind);
+  const Tensor<float> view = image_of(owner, camera_near(4), true);
+  CHECK(reader.read(view, InformedReader::kLeastAgreement).informed.evidence ==
+        reader.read(view).informed.evidence);
+}
+
+TEST_CASE("informed_reader: a part is read from a guess of its camera, whatever surrounds the object") {
+  const Owner owner = marking_owner();
+  InformedReader reader(owner, kSearch);
+  const nerf::Camera camera = camera_near(4);
+  nerf::Renderer renderer(owner.field);
+  const Tensor<float> opacity = renderer.render(camera).opacity;
+  Tensor<float> image = image_of(owner, camera, true);
+  const float level = nerf::background_value(owner.field.background);
+  for (Index i = 0; i < image.size(); ++i)
+    image[i] += (1 - opacity[i / 3]) * (0.3f + 0.4f * static_cast<float>(i / 3 % 96 / 12 % 2) - level);
+  nerf::Camera guess = camera;
+  guess.cx += 2, guess.cy -= 1, guess.fx *= 1.02, guess.fy *= 1.02;
+  const ImageReading part = reader.read_near(quantize8(image), guess, 0.9);
+  CHECK(part.chosen == ReadingKind::informed);
+  CHECK(part.informed.agreement >= 0.9);
+  CHECK(read_bits(part.evidence(), owner.code(), 4).message == kReadMessage);
+  CHECK(keyed_p_value(keyed_statistic(part.evidence(), owner.code(), kReadMessage)) < 1e-4);
+  const ImageReading none = reader.read_near(quantize8(image), camera_near(7), 0.9);
+  CHECK(none.chosen == ReadingKind::blind);
+  CHECK(none.informed.agreement < 0.9);
+  CHECK(none.informed.evidence.empty());
+  CHECK(none.blind.empty());
+}
+
 TEST_CASE("informed_reader: one and two threads give the same bits") {
   const Owner owner = marking_owner();
   const Tensor<float> view_image = image_of(owner, camera_near(5), true);
@@ -210,6 +251,8 @@ TEST_CASE("informed_reader: errors name what is wrong") {
       "[informed_reader] image must be of the camera's size, [96, 96, 3], got shape [20, 30, 3]");
   const Tensor<float> infinite({96, 96, 3}, std::numeric_limits<float>::infinity());
   CHECK_THROWS_WITH(reader.evidence_at(infinite, camera_near(1)),
+                    "[informed_reader] image must be finite, got inf in row 0, column 0");
+  CHECK_THROWS_WITH(reader.read_near(infinite, camera_near(1), 0.5),
                     "[informed_reader] image must be finite, got inf in row 0, column 0");
   CHECK(std::string(reading_name(ReadingKind::blind)) == "blind");
   CHECK(std::string(reading_name(ReadingKind::informed)) == "informed");

@@ -113,6 +113,22 @@ TEST_CASE("pose_alignment: images of something else do not agree") {
   CHECK(align(image_of(camera), away).agreement == -1);
 }
 
+TEST_CASE("pose_alignment: an agreement below a stage's least ends the alignment there") {
+  PoseAligner aligner(tiny_field());
+  const nerf::Camera camera = aligned_camera(5);
+  const Tensor<float> other = image_of(aligned_camera(6));
+  AlignmentStage stages[] = {kStages[0], kStages[1]};
+  stages[0].least = 0.99;
+  const Alignment first = aligner.align(other, camera, std::span(stages).first(1)),
+                  both = aligner.align(other, camera, kStages), ended = aligner.align(other, camera, stages);
+  CHECK(ended.camera.pose == first.camera.pose);
+  CHECK(ended.agreement == first.agreement);
+  CHECK(ended.agreement != both.agreement);
+  stages[0].least = 0.5;
+  CHECK(aligner.align(image_of(camera), camera, stages).agreement ==
+        aligner.align(image_of(camera), camera, kStages).agreement);
+}
+
 TEST_CASE("pose_alignment: one and two threads give the same bits") {
   const nerf::Camera camera = aligned_camera(7);
   const Tensor<float> view_image = image_of(camera);

@@ -101,15 +101,21 @@ TEST_CASE("page_reader: a page without a view of the field is read blindly") {
   Tensor<float> other({100, 100, 3});
   for (Index i = 0; i < other.size(); ++i) other[i] = 0.2f + 0.07f * static_cast<float>(i / 11 % 8);
   const Tensor<float> image = page_with(other);
-  PageReading page = PageReader(owner, kSearch).read(image);
+  PageReader reader(owner, kSearch);
+  const PageReading page = reader.read(image);
   CHECK(page.parts.empty());
   CHECK(page.chosen() == ReadingKind::blind);
-  CHECK(page.evidence() == page.whole.blind);
+  std::vector<double> half = page.whole.blind;
+  for (double& s : half) s *= 0.5;
+  CHECK(page.evidence() == half);
   CHECK(page.agreement() == page.whole.informed.agreement);
-  REQUIRE(!page.whole.informed.evidence.empty());
-  page.force_informed();
-  CHECK(page.chosen() == ReadingKind::informed);
-  CHECK(page.evidence() == page.whole.informed.evidence);
+  CHECK(page.whole.informed.evidence.empty());
+  PageReading forced = reader.read(image, true);
+  CHECK(forced.chosen() == ReadingKind::blind);
+  forced.force_informed();
+  CHECK(forced.chosen() == ReadingKind::informed);
+  REQUIRE(!forced.whole.informed.evidence.empty());
+  CHECK(forced.evidence() == forced.whole.informed.evidence);
 }
 
 TEST_CASE("page_reader: an object before an image of something else is found and read") {
@@ -128,5 +134,6 @@ TEST_CASE("page_reader: an object before an image of something else is found and
   const PageReading page = reader.read(quantize8(image));
   REQUIRE(page.chosen() == ReadingKind::informed);
   CHECK(page.whole.chosen == ReadingKind::blind);
+  CHECK(page.agreement() >= 0.9);
   CHECK(p_of(owner, page.evidence()) < 1e-3);
 }

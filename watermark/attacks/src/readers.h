@@ -1,5 +1,6 @@
 #pragma once
 #include <fieldmark/watermark/attacks/measurement.h>
+#include <fieldmark/watermark/scanning/page_reader.h>
 
 #include <chrono>
 #include <optional>
@@ -30,13 +31,14 @@ class Readers {
       return accuracy;
     }
     const auto begin = std::chrono::steady_clock::now();
-    const ImageReading reading = informed_->read(image);
+    const PageReading page = informed_->read(image, true);
     seconds_.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
-    tell(reading.evidence());
-    accuracy.blind = share(reading.blind, sent);
-    accuracy.informed = share(reading.informed.evidence, sent);
-    accuracy.chosen = share(reading.evidence(), sent);
-    accuracy.found = found(reading.evidence(), sent);
+    const std::vector<double> evidence = page.evidence();
+    tell(evidence);
+    accuracy.blind = share(page.whole.blind, sent);
+    accuracy.informed = share(page.parts.empty() ? page.whole.informed.evidence : evidence, sent);
+    accuracy.chosen = share(evidence, sent);
+    accuracy.found = found(evidence, sent);
     return accuracy;
   }
   // Mean time of reading one image with both detectors; NaN without images.
@@ -53,7 +55,7 @@ class Readers {
   const Owner& owner_;
   const CellCode& code_;
   BlindReader blind_;
-  std::optional<InformedReader> informed_;
+  std::optional<PageReader> informed_;
   std::vector<double> seconds_;
 };
 

@@ -268,8 +268,10 @@ Alignment PoseAligner::align(const Tensor<float>& image, const nerf::Camera& sta
                        std::to_string(stage.size));
   const auto border = covered.empty() ? border_of(field_, image) : covered;
   Alignment out{start, -1};
-  for (const AlignmentStage& stage : stages)
+  for (const AlignmentStage& stage : stages) {
     out = Stage(stage.quick ? quick_ : renderer_, field_, image, border, stage).run(out.camera);
+    if (out.agreement < stage.least) break;
+  }
   out.camera = out.camera.scaled(image.shape[1], image.shape[0]);
   return out;
 }

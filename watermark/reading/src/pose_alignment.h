@@ -14,6 +14,7 @@ struct AlignmentStage {
   bool lens = true;        ///< true if the position moves besides focal length and principal point
   bool stretched = false;  ///< true if the aspect of pixels is free, too
   bool quick = false;      ///< true if ray steps are twice as long, which suffices for coarse stages
+  double least = -1;       ///< agreement below which the alignment ends with this stage
 };
 
 /// A camera and the agreement of its view of the field with an image.

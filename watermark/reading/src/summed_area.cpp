@@ -38,25 +38,31 @@ void SummedArea::means(double left, double top, double wide, double high, Index 
                      std::to_string(wide) + " x " + std::to_string(high) + " at " + std::to_string(left) +
                      ", " + std::to_string(top) + " and " + std::to_string(out.size()) + " numbers");
   const Index row = (width_ + 1) * channels_;
-  // Interpolates S at a corner.
-  const auto corner = [&](Index i, Index j, Index c) {
-    const double y = std::clamp(top + high * static_cast<double>(i) / static_cast<double>(n), 0.0,
-                                static_cast<double>(height_)),
-                 x = std::clamp(left + wide * static_cast<double>(j) / static_cast<double>(n), 0.0,
-                                static_cast<double>(width_));
-    const Index y0 = std::min(static_cast<Index>(y), height_ - 1),
-                x0 = std::min(static_cast<Index>(x), width_ - 1);
-    const double fy = y - static_cast<double>(y0), fx = x - static_cast<double>(x0);
-    const double* s = &sum_[at(y0 * row + x0 * channels_ + c)];
-    return (1 - fy) * ((1 - fx) * s[0] + fx * s[channels_]) +
-           fy * ((1 - fx) * s[row] + fx * s[row + channels_]);
+  // Lines of corners: the grid line before each, and how far beyond it they lie.
+  struct Line {
+    Index before;
+    double beyond;
   };
+  const auto line = [n](Index i, double from, double extent, Index size) {
+    const double x = std::clamp(from + extent * static_cast<double>(i) / static_cast<double>(n), 0.0,
+                                static_cast<double>(size));
+    const Index before = std::min(static_cast<Index>(x), size - 1);
+    return Line{before, x - static_cast<double>(before)};
+  };
+  std::vector<Line> columns;
+  for (Index j = 0; j <= n; ++j) columns.push_back(line(j, left, wide, width_));
   const double part = wide * high / static_cast<double>(n * n);
   std::vector<double> above(at((n + 1) * channels_)), below(above.size());
   for (Index i = 0; i <= n; ++i) {
     std::swap(above, below);
-    for (Index j = 0; j <= n; ++j)
-      for (Index c = 0; c < channels_; ++c) below[at(j * channels_ + c)] = corner(i, j, c);
+    const auto [y, fy] = line(i, top, high, height_);
+    for (Index j = 0; j <= n; ++j) {
+      const auto [x, fx] = columns[at(j)];
+      const double* s = &sum_[at(y * row + x * channels_)];
+      for (Index c = 0; c < channels_; ++c, ++s)
+        below[at(j * channels_ + c)] = (1 - fy) * ((1 - fx) * s[0] + fx * s[channels_]) +
+                                       fy * ((1 - fx) * s[row] + fx * s[row + channels_]);
+    }
     if (i == 0) continue;
     for (Index k = 0; k < n * channels_; ++k)
       out[at((i - 1) * n * channels_ + k)] = static_cast<float>(

@@ -12,12 +12,12 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr Index kGrid = 16;      // pixels of a part's longer side
-constexpr float kInside = 0.9f;  // least opacity inside the outline
+constexpr Index kGrid = 16, kQuarterGrid = 12;  // pixels of the longer side of an object, and of a quarter
+constexpr float kInside = 0.9f;                 // least opacity inside the outline
 // Mean square of what differs from the mean: a plain place looks like nothing.
 constexpr float kLeastPower = 1e-3f;
 constexpr Index kLeastPixels = 40;  // of an outline: fewer look like anything
-// Longer side of a part as a share of the image's.
+// Longer side of an object as a share of the image's. A quarter is half as long.
 constexpr std::array kSizes{0.2, 0.25, 0.31, 0.39, 0.49, 0.61, 0.76, 0.95};
 
 // Returns the smallest window around all pixels inside the outline; empty if there are none.
@@ -76,7 +76,8 @@ ObjectSearch::ObjectSearch(const Owner& owner, const ObjectSearchOptions& option
 
 void ObjectSearch::add_part(std::size_t view, const Tensor<float>& rgb, const Tensor<float>& opacity,
                             const Window& window, bool whole) {
-  const double zoom = static_cast<double>(kGrid) / std::max(window.width, window.height);
+  const double zoom =
+      static_cast<double>(whole ? kGrid : kQuarterGrid) / std::max(window.width, window.height);
   const auto side = [&](double length) { return std::max<Index>(1, std::lround(zoom * length)); };
   Part part{view, whole, window, side(window.height), side(window.width), {}, {}, {}};
   const PatchSize size{part.height, part.width};
@@ -143,11 +144,12 @@ ObjectPlace ObjectSearch::best_place(const Part& part, const Reduced& image) {
   return best;
 }
 
-std::vector<ObjectSearch::Reduced> ObjectSearch::reduced(const Tensor<float>& rgb) {
+std::vector<ObjectSearch::Reduced> ObjectSearch::reduced(const Tensor<float>& rgb, bool whole) {
   const Index h = rgb.shape[0], w = rgb.shape[1];
+  const double grid = static_cast<double>(whole ? kGrid : 2 * kQuarterGrid);
   std::vector<Reduced> sizes;
   for (const double size : kSizes) {
-    const double zoom = static_cast<double>(kGrid) / (size * static_cast<double>(std::max(h, w)));
+    const double zoom = grid / (size * static_cast<double>(std::max(h, w)));
     if (zoom > 1) continue;
     const auto side = [&](Index length) {
       return std::max<Index>(1, std::lround(zoom * static_cast<double>(length)));
@@ -178,12 +180,12 @@ std::vector<ObjectPlace> ObjectSearch::find(const Tensor<float>& rgb, Index coun
   const Index h = rgb.shape[0], w = rgb.shape[1];
   if (h < kGrid || w < kGrid)
     throw ShapeError("[object_search] rgb must have sides of at least 16, got shape " + rgb.shape.str());
-  const std::vector<Reduced> sizes = reduced(rgb);
+  const std::vector<Reduced> of_whole = reduced(rgb, true), of_quarter = reduced(rgb, false);
   std::vector<ObjectPlace> of_part(parts_.size());
   parallel_for(std::ssize(parts_), 4, [&](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       const auto at = static_cast<std::size_t>(i);
-      for (const Reduced& image : sizes) {
+      for (const Reduced& image : parts_[at].whole ? of_whole : of_quarter) {
         const ObjectPlace found = best_place(parts_[at], image);
         if (found.likeness > of_part[at].likeness) of_part[at] = found;
       }

@@ -9,26 +9,18 @@
 namespace fieldmark::watermark {
 namespace {
 
-constexpr double kMostOfImage = 0.95;    // share of its pixels; a larger block is the image
-constexpr Index kMostElongated = 8;      // longer to shorter side of a block: no view is longer
-constexpr Index kMarginShare = 10;       // of a part's shorter side: renders of objects have a margin
-constexpr Index kLargest = 512;          // longer side of an image that is searched for an object, pixels
-constexpr Index kLeastReduced = 16;      // shorter side of the same image, and of a part of it
-constexpr Index kCandidates = 2;         // places of the whole object that are tried, and of its quarters
-constexpr double kBesideOutline = 0.03;  // of a part's longer side: error of a candidate's outline
-constexpr int kRefinements = 4;
-constexpr Index kCoarse = 32;  // longer side at which a candidate is compared with the image, pixels
-// Agreement inside the outline of a candidate: in images of something else -0.3 to 0.15, of a quarter to 0.3,
-// few above 0.28.
-constexpr double kLeastCoarse = 0.1, kLeastCoarseQuarter = 0.28;
-constexpr Index kCompared = 160;  // longer side at which a render is compared with the image, pixels
-constexpr float kSolid = 0.9f;    // opacity inside the outline
-// Agreement inside the outline. Candidates in images of something else stay below 0.05, cameras a little off
-// the right one have 0.1 to 0.7.
-constexpr double kPromising = 0.08;   // from here a camera is refined
-constexpr double kLeastGain = 0.005;  // of a refinement that is followed by another
-constexpr double kLeastInside = 0.3;  // at which an object counts as found
-constexpr double kSureInside = 0.9;   // at which no other place is tried
+constexpr double kMostOfImage = 0.95;  // share of its pixels; a larger block is the image
+constexpr Index kMostElongated = 8;    // longer to shorter side of a block: no view is longer
+constexpr Index kMarginShare = 10;     // of a part's shorter side: renders of objects have a margin
+constexpr Index kLargest = 512;        // longer side of an image that is searched for an object, pixels
+constexpr Index kLeastReduced = 16;    // shorter side of the same image, and of a part of it
+constexpr Index kCandidates = 24;      // places of the whole object that are tried, and of its quarters
+constexpr Index kLeastPart = 56;       // longer side of a part that is read, pixels
+// Agreement at which an object counts as found: places in images of something else stay below 0.65, or 0.8
+// at the least sides.
+constexpr double kLeastInside = 0.9;
+constexpr double kSureInside = 0.95;  // agreement at which no other place is tried
+constexpr double kBlindWeight = 0.5;  // of a blind reading beside informed ones
 
 using Colour = std::array<float, 3>;
 
@@ -45,25 +37,6 @@ Tensor<float> cut(const Tensor<float>& image, const PixelBox& box, Index margin,
   return out;
 }
 
-// Returns the largest opacity within `radius` pixels along rows and columns.
-Tensor<float> widened(const Tensor<float>& opacity, Index radius) {
-  const Index h = opacity.shape[0], w = opacity.shape[1];
-  Tensor<float> rows(opacity.shape), out(opacity.shape);
-  for (Index y = 0; y < h; ++y)
-    for (Index x = 0; x < w; ++x) {
-      const Index first = std::max<Index>(0, x - radius), last = std::min(w - 1, x + radius);
-      rows[y * w + x] = *std::max_element(&opacity[y * w + first], &opacity[y * w + last] + 1);
-    }
-  for (Index y = 0; y < h; ++y)
-    for (Index x = 0; x < w; ++x) {
-      float most = 0;
-      for (Index v = std::max<Index>(0, y - radius); v <= std::min(h - 1, y + radius); ++v)
-        most = std::max(most, rows[v * w + x]);
-      out[y * w + x] = most;
-    }
-  return out;
-}
-
 // Returns a camera of the box, for one of the whole image.
 nerf::Camera camera_of(const nerf::Camera& camera, const PixelBox& box) {
   nerf::Camera part = camera;
@@ -74,30 +47,6 @@ nerf::Camera camera_of(const nerf::Camera& camera, const PixelBox& box) {
   return part;
 }
 
-// Returns the correlation of the colours' differences between neighbours in an image and in a render, inside
-// the outline alone: the outline itself was cut out and agrees with any render.
-double agreement_inside(const Tensor<float>& image, const nerf::Rendering& view) {
-  const Index h = image.shape[0], w = image.shape[1];
-  double both = 0, first = 0, second = 0;
-  const auto inside = [&](Index y, Index x) {
-    for (Index v = std::max<Index>(0, y - 2); v <= std::min(h - 1, y + 2); ++v)
-      for (Index u = std::max<Index>(0, x - 2); u <= std::min(w - 1, x + 2); ++u)
-        if (!(view.opacity[v * w + u] >= kSolid)) return false;
-    return true;
-  };
-  for (Index y = 0; y + 1 < h; ++y)
-    for (Index x = 0; x + 1 < w; ++x) {
-      if (!inside(y, x)) continue;
-      for (const Index next : {y * w + x + 1, (y + 1) * w + x})
-        for (Index c = 0; c < 3; ++c) {
-          const auto a = static_cast<double>(image[3 * next + c] - image[3 * (y * w + x) + c]);
-          const auto b = static_cast<double>(view.rgb[3 * next + c] - view.rgb[3 * (y * w + x) + c]);
-          both += a * b, first += a * a, second += b * b;
-        }
-    }
-  return first > 0 && second > 0 ? both / std::sqrt(first * second) : 0;
-}
-
 PixelBox box_of(const ObjectPlace& place) {
   const auto shorter = std::min(place.window.width, place.window.height);
   const double margin = place.whole ? shorter / static_cast<double>(kMarginShare) : 0;
@@ -106,18 +55,14 @@ PixelBox box_of(const ObjectPlace& place) {
           std::max(kLeastReduced, std::lround(place.window.height + 2 * margin))};
 }
 
-struct Candidate {
-  PixelBox box;
-  Tensor<float> image;  // of the box
-  nerf::Camera camera;  // of the box
-  double inside;        // agreement inside the outline
-};
-
 }  // namespace
 
 std::vector<double> PageReading::evidence() const {
-  if (parts.empty()) return whole.evidence();
-  std::vector<double> sum(whole.blind.size(), 0.0);
+  std::vector<double> sum = whole.evidence();
+  if (chosen() == ReadingKind::blind)
+    for (double& s : sum) s *= kBlindWeight;
+  if (parts.empty()) return sum;
+  std::ranges::fill(sum, 0.0);
   for (const PartReading& part : parts) {
     const std::vector<double>& evidence = part.reading.evidence();
     for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += evidence[c];
@@ -134,8 +79,8 @@ double PageReading::agreement() const {
 PageReader::PageReader(const Owner& owner, const CameraSearchOptions& search)
     : owner_(owner), reader_(owner, search) {}
 
-PageReading PageReader::read(const Tensor<float>& image) {
-  PageReading page{.whole = reader_.read(image)};
+PageReading PageReader::read(const Tensor<float>& image, bool informed_too) {
+  PageReading page{.whole = reader_.read(image, informed_too ? -1 : InformedReader::kLeastAgreement)};
   if (page.whole.chosen == ReadingKind::informed) return page;
   const Tensor<float> rgb = opaque_image(image, nerf::background_value(owner_.field.background));
   page.parts = read_blocks(rgb);
@@ -160,7 +105,8 @@ std::vector<PartReading> PageReader::read_blocks(const Tensor<float>& rgb) {
         static_cast<double>(box.area()) <= kMostOfImage * all) {
       ++read;
       const Index margin = object ? shorter / kMarginShare : 0;
-      PartReading part{box, reader_.read(cut(rgb, box, margin, found.background))};
+      PartReading part{
+          box, reader_.read(cut(rgb, box, margin, found.background), InformedReader::kLeastAgreement)};
       if (part.reading.chosen == ReadingKind::informed) {
         parts.push_back(std::move(part));
         continue;
@@ -171,36 +117,7 @@ std::vector<PartReading> PageReader::read_blocks(const Tensor<float>& rgb) {
   return parts;
 }
 
-// Reads a box of the image in which everything outside the object's outline is the field's background.
-PageReader::Cleared PageReader::read_cleared(const Tensor<float>& box, const nerf::Camera& camera,
-                                             Index beside) {
-  const float level = nerf::background_value(owner_.field.background);
-  const Tensor<float> inside = widened(renderer_->render(camera).opacity, beside);
-  Tensor<float> cleared = box;
-  for (Index i = 0; i < cleared.size(); ++i) cleared[i] = level + inside[i / 3] * (cleared[i] - level);
-  Cleared found{reader_.read(cleared), 0};
-  if (found.reading.informed.agreement < 0 || found.reading.mirrored) return found;
-  const Index longer = std::max(box.shape[0], box.shape[1]);
-  const nerf::Camera compared = found.reading.informed.camera.scaled(std::min(kCompared, longer));
-  found.inside =
-      agreement_inside(resize_area(box, compared.height, compared.width), renderer_->render(compared));
-  return found;
-}
-
-// The outline of a candidate is not exact, so its camera is not either; the outline from there is better.
-PageReader::Cleared PageReader::read_at(const Tensor<float>& box, const nerf::Camera& candidate) {
-  const auto longer = static_cast<double>(std::max(box.shape[0], box.shape[1]));
-  Cleared best = read_cleared(box, candidate, std::lround(kBesideOutline * longer));
-  for (int k = 0; k < kRefinements && best.inside >= kPromising; ++k) {
-    Cleared refined = read_cleared(box, best.reading.informed.camera, 1);
-    if (refined.inside <= best.inside + kLeastGain) break;
-    best = std::move(refined);
-  }
-  return best;
-}
-
 std::vector<PartReading> PageReader::read_object(const Tensor<float>& whole) {
-  if (!renderer_) renderer_ = std::make_unique<nerf::Renderer>(owner_.field);
   if (!objects_) objects_.emplace(owner_);
   const Index h = whole.shape[0], w = whole.shape[1];
   const double zoom = std::min(1., static_cast<double>(kLargest) / static_cast<double>(std::max(h, w)));
@@ -209,26 +126,16 @@ std::vector<PartReading> PageReader::read_object(const Tensor<float>& whole) {
   const auto back = [&](Index length) { return std::lround(static_cast<double>(length) / zoom); };
   const Tensor<float> rgb = zoom < 1 ? resize_area(whole, side(h), side(w)) : whole;
   const float level = nerf::background_value(owner_.field.background);
-  std::vector<Candidate> candidates;
-  for (const ObjectPlace& place : objects_->find(rgb, kCandidates)) {
-    const PixelBox box = box_of(place);
-    if (std::max(box.width, box.height) < kLeastSide) continue;
-    Candidate next{box, cut(rgb, box, 0, {level, level, level}), camera_of(place.camera, box), 0};
-    const nerf::Camera coarse = next.camera.scaled(kCoarse);
-    next.inside =
-        agreement_inside(resize_area(next.image, coarse.height, coarse.width), renderer_->render(coarse));
-    if (next.inside >= (place.whole ? kLeastCoarse : kLeastCoarseQuarter))
-      candidates.push_back(std::move(next));
-  }
-  std::ranges::stable_sort(candidates, std::ranges::greater(), &Candidate::inside);
   std::vector<PartReading> best;
   double most = kLeastInside;
-  for (const auto& [box, seen, camera, coarse] : candidates) {
-    Cleared found = read_at(seen, camera);
-    if (found.inside < most) continue;
-    most = found.inside;
-    found.reading.chosen = ReadingKind::informed;
-    best = {{{back(box.x), back(box.y), back(box.width), back(box.height)}, std::move(found.reading)}};
+  for (const ObjectPlace& place : objects_->find(rgb, kCandidates)) {
+    const PixelBox box = box_of(place);
+    if (std::max(box.width, box.height) < kLeastPart) continue;
+    ImageReading found =
+        reader_.read_near(cut(rgb, box, 0, {level, level, level}), camera_of(place.camera, box), most);
+    if (found.chosen != ReadingKind::informed) continue;
+    most = found.informed.agreement;
+    best = {{{back(box.x), back(box.y), back(box.width), back(box.height)}, std::move(found)}};
     if (most >= kSureInside) break;
   }
   return best;

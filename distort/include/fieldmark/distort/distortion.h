@@ -42,6 +42,7 @@ enum class DistortionKind {
   background_grey,
   background_green,
   background_noise,
+  background_shapes,
   caption,
   collage
 };
@@ -80,7 +81,8 @@ struct Distortion {
 ///   sepia         the matrix of the W3C filter effects
 ///   mirror        mirrored left to right
 ///   pillarbox, letterbox   black bars left and right, or above and below, to 16 : 9
-///   background_black, _white, _grey, _green, _noise   replaces pixels that equal the background exactly
+///   background_black, _white, _grey, _green, _noise, _shapes   replaces pixels that equal the background
+///                 exactly; shapes: as an image of something else, see dead_leaves()
 ///   caption       an opaque bar with lines, over the middle fifth of the height
 ///   collage       four copies of half the size, two by two
 ///   combined      noise_0.10,crop_0.40,jpeg_50

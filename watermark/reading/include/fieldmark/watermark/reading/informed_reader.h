@@ -68,8 +68,16 @@ class InformedReader {
   explicit InformedReader(const Owner& owner, const CameraSearchOptions& search = {});
   ~InformedReader();
   /// Reads an image with both detectors; chooses informed if its agreement is at least kLeastAgreement.
-  /// @param image  as BlindReader::evidence()   @throws ShapeError, ValueError as there
-  ImageReading read(const Tensor<float>& image);
+  /// @param image  as BlindReader::evidence()   @param least  agreement below which informed evidence, which
+  /// takes long, is left empty   @throws ShapeError, ValueError as BlindReader::evidence()
+  ImageReading read(const Tensor<float>& image, double least = -1);
+  /// Reads a part of an image that shows an object before anything, from a guess of its camera: pixels
+  /// outside the object's outline do not count, neither for the alignment nor for the evidence. Chooses
+  /// informed, or leaves the evidence of both detectors empty if the agreement is below `least`.
+  /// @param image  [H, W, 3], sides of at least 16   @param start  of its size; the object must be within a
+  /// few hundredths of its size of where it shows it
+  /// @throws ShapeError if the sizes differ   @throws ValueError if a value is not finite
+  ImageReading read_near(const Tensor<float>& image, const nerf::Camera& start, double least);
   /// Computes the evidence of an image with a known camera.
   /// @param image  [H, W, 3]   @param camera  of its size   @throws ShapeError if the sizes differ
   /// @throws ValueError if a value is not finite
@@ -78,10 +86,6 @@ class InformedReader {
  private:
   struct Parts;
   struct Change;
-  struct Residual {
-    std::vector<double> sign;  // [cells]
-    bool lost_detail;          // to JPEG, blur or downscaling
-  };
   const CameraSearch& all_views();
   std::vector<Change> changes(const Tensor<float>& seen);
   static constexpr double kNeverEnough = std::numeric_limits<double>::infinity();
@@ -93,9 +97,10 @@ class InformedReader {
                   const SeenPlaces& places, std::vector<Alignment>& found, double enough = kNeverEnough);
   InformedReading refined(const Surround& seen, const Change& change, const std::vector<Alignment>& found);
   InformedReading aligned(const Surround& seen, const Change& change, const SeenPlaces& places);
-  ImageReading read_as(const Tensor<float>& whole, const Change& change);
+  ImageReading read_as(const Tensor<float>& whole, const Change& change, double least);
+  void add_evidence(const Surround& seen, ImageReading& reading);
+  std::vector<std::uint8_t> outside(const nerf::Camera& camera);
   Surround cleared(const Tensor<float>& whole) const;
-  Residual residual_at(const Surround& seen, const nerf::Camera& camera);
   const Owner& owner_;
   BlindReader blind_;
   std::unique_ptr<Parts> parts_;

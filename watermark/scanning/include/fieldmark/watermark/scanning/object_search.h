@@ -51,7 +51,7 @@ class ObjectSearch {
   void add_part(std::size_t view, const Tensor<float>& rgb, const Tensor<float>& opacity,
                 const Window& window, bool whole);
   nerf::Camera camera_at(const Part& part, const Window& window, Index height, Index width) const;
-  static std::vector<Reduced> reduced(const Tensor<float>& rgb);
+  static std::vector<Reduced> reduced(const Tensor<float>& rgb, bool whole);
   static ObjectPlace best_place(const Part& part, const Reduced& image);
 
   std::vector<nerf::Camera> cameras_;

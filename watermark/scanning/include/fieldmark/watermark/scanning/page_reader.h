@@ -22,17 +22,18 @@ struct PartReading {
 struct PageReading {
   ImageReading whole;                   ///< of the whole image
   std::vector<PartReading> parts = {};  ///< that agree with the field; empty if the whole image does
-  /// Evidence of the detection chosen, [cells]: of the whole image, or the sum over all parts.
+  /// Evidence of the detection chosen, [cells]: of the whole image, or the sum over all parts. Blind evidence
+  /// counts half, so that images in which nothing was found hardly dilute those added to them in which
+  /// something was.
   std::vector<double> evidence() const;
   /// Informed if the image or a part of it agrees with the field.
   ReadingKind chosen() const { return parts.empty() ? whole.chosen : ReadingKind::informed; }
-  /// Chooses informed detection of the whole image if its camera was found and no part agrees, whatever the
+  /// Chooses informed detection of the whole image if its evidence is there and no part agrees, whatever the
   /// agreement.
   void force_informed() {
     if (parts.empty() && !whole.informed.evidence.empty()) whole.chosen = ReadingKind::informed;
   }
-  /// Largest agreement of the image or of a part. That of an object may be below
-  /// InformedReader::kLeastAgreement, since its agreement inside the outline counts.
+  /// Largest agreement of the image or of a part.
   double agreement() const;
 };
 
@@ -42,15 +43,13 @@ struct PageReading {
 ///   - its blocks, which plain gaps separate (see image_blocks()), the largest first, and the parts of blocks
 ///     that do not agree; all blocks that agree are added up;
 ///   - for an object, the places where the image looks most like a render or a quarter of one (see
-///     ObjectSearch). Everything outside the outline is replaced by the field's background, and the object
-///     counts as found if the differences between neighbouring pixels inside the outline agree with the
-///     render's, by a correlation of 0.3.
+///     ObjectSearch). There, InformedReader::read_near() looks at the pixels inside the outline alone, and
+///     the object counts as found at an agreement of 0.9.
 /// The choice depends on agreement alone and on neither key nor message, so the evidence may be tested
 /// against any.
 class PageReader {
  public:
-  /// Shorter side of the smallest block, pixels, and longer side of the smallest part of an object, pixels of
-  /// the image reduced to at most 512.
+  /// Shorter side of the smallest block, pixels.
   static constexpr Index kLeastSide = 64;
   /// Most blocks read in an image; the smallest of a longer page are left out.
   static constexpr Index kMostBlocks = 24;
@@ -58,23 +57,18 @@ class PageReader {
   /// @throws ValueError as InformedReader
   explicit PageReader(const Owner& owner, const CameraSearchOptions& search = {});
   /// Reads an image.
-  /// @param image  as BlindReader::evidence()   @throws ShapeError, ValueError as there
-  PageReading read(const Tensor<float>& image);
+  /// @param image  as BlindReader::evidence()   @param informed_too  true to compute informed evidence of the
+  /// whole image even if it does not agree with the field
+  /// @throws ShapeError, ValueError as BlindReader::evidence()
+  PageReading read(const Tensor<float>& image, bool informed_too = false);
 
  private:
   std::vector<PartReading> read_blocks(const Tensor<float>& rgb);
   std::vector<PartReading> read_object(const Tensor<float>& whole);
-  struct Cleared {
-    ImageReading reading;
-    double inside;  // agreement inside the outline
-  };
-  Cleared read_cleared(const Tensor<float>& box, const nerf::Camera& camera, Index beside);
-  Cleared read_at(const Tensor<float>& box, const nerf::Camera& candidate);
 
   const Owner& owner_;
   InformedReader reader_;
-  std::optional<ObjectSearch> objects_ = {};       // from the first image that needs it
-  std::unique_ptr<nerf::Renderer> renderer_ = {};  // likewise
+  std::optional<ObjectSearch> objects_ = {};  // from the first image that needs it
 };
 
 }  // namespace fieldmark::watermark

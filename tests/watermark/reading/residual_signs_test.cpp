@@ -1,0 +1,78 @@
+#include "residual_signs.h"
+#include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/resize.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "blurred.h"
+#include "support/catch.h"
+#include "watermark/tiny_owner.h"
+
+using namespace fieldmark;
+using namespace fieldmark::watermark;
+
+namespace {
+const Message kResidualMessage{{1, 0, 0, 1}};
+
+nerf::Camera residual_camera(Index size) {
+  return nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::novel, 1, size, 4).front();
+}
+
+Tensor<float> marked_image(const Owner& owner, const nerf::Camera& camera) {
+  nerf::Renderer renderer(owner.field);
+  renderer.set_recolour(owner.marking(cell_signs(owner.code(), kResidualMessage)));
+  return quantize8(renderer.render(camera).rgb);
+}
+
+ResidualSigns signs_of(const Owner& owner, const Surround& seen, const nerf::Camera& camera) {
+  nerf::Renderer renderer(owner.field);
+  return residual_signs(renderer, owner, seen, camera);
+}
+
+// Correlation of the signs with those that the message sends.
+double share_of(const Owner& owner, const std::vector<double>& sign) {
+  const auto sent = cell_signs(owner.code(), kResidualMessage);
+  double both = 0, power = 0, count = 0;
+  for (std::size_t c = 0; c < sign.size(); ++c)
+    both += sign[c] * static_cast<double>(sent[c]), power += sign[c] * sign[c], count += sign[c] != 0;
+  return both / std::sqrt(power * count);
+}
+}  // namespace
+
+TEST_CASE("residual_signs: the residual shows the signs that were sent, in changed colours, too") {
+  const Owner owner = marking_owner();
+  const nerf::Camera camera = residual_camera(96);
+  Tensor<float> image = marked_image(owner, camera);
+  CHECK(share_of(owner, signs_of(owner, {.image = image, .plain = {}}, camera).sign) > 0.5);
+  for (float& x : image.data) x = 0.7f * x + 0.1f;
+  CHECK(share_of(owner, signs_of(owner, {.image = image, .plain = {}}, camera).sign) > 0.5);
+}
+
+TEST_CASE("residual_signs: cells behind covered pixels have no sign") {
+  const Owner owner = marking_owner();
+  const nerf::Camera camera = residual_camera(96);
+  Surround seen{.image = marked_image(owner, camera), .plain = {}};
+  const auto known = [&] {
+    const std::vector<double> sign = signs_of(owner, seen, camera).sign;
+    return std::ssize(sign) - std::ranges::count(sign, 0.0);
+  };
+  const Index all = known();
+  seen.covered.assign(96 * 96, 0);
+  CHECK(known() == all);
+  std::fill_n(seen.covered.begin(), 48 * 96, std::uint8_t{1});
+  CHECK(known() > 0);
+  CHECK(known() < all);
+  CHECK(share_of(owner, signs_of(owner, seen, camera).sign) > 0.4);
+  std::ranges::fill(seen.covered, std::uint8_t{1});
+  CHECK(known() == 0);
+}
+
+TEST_CASE("residual_signs: blurred and small images have lost detail") {
+  const Owner owner = marking_owner();
+  const nerf::Camera camera = residual_camera(96), small = residual_camera(24);
+  const Tensor<float> image = marked_image(owner, camera);
+  CHECK(!signs_of(owner, {.image = image, .plain = {}}, camera).lost_detail);
+  CHECK(signs_of(owner, {.image = blurred(image, 2), .plain = {}}, camera).lost_detail);
+  CHECK(signs_of(owner, {.image = resize_area(image, 24, 24), .plain = {}}, small).lost_detail);
+}
