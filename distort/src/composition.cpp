@@ -23,7 +23,7 @@ Tensor<float> on_black(const Tensor<float>& x, Index height, Index width) {
 
 Index share(Index extent, Index part, Index of) { return (extent * part + of / 2) / of; }
 
-constexpr Index kLeaves = 600;                           // leave less than a hundredth uncovered
+constexpr Index kLeaves = 600;                           // leave about a fiftieth uncovered
 constexpr double kLeastLeaf = 0.02, kLargestLeaf = 0.5;  // radii, of the longer side
 
 struct Leaf {

@@ -78,9 +78,7 @@ using Checked = std::shared_ptr<StoreHandle<double>>;
 
 GradcheckReport check_gradients(const py::function& f, const std::vector<py::object>& inputs, double rtol,
                                 const std::optional<Checked>& parameters) {
-  if (inputs.empty()) throw ValueError("[gradcheck] inputs must not be empty");
-  if (!(rtol > 0 && rtol < 1))
-    throw ValueError("[gradcheck] rtol must be above 0 and below 1, got " + std::to_string(rtol));
+  if (inputs.empty() && !parameters) throw ValueError("[gradcheck] inputs must not be empty");
   const auto tensors = tensors_from<double>("gradcheck: inputs", inputs);
   TapedFunction<double> taped("gradcheck", f);
   if (!parameters) return gradcheck(std::ref(taped), tensors, {.rtol = rtol});

@@ -165,6 +165,7 @@ TEST_CASE("measurement: the share of views found counts the p-values of single v
       }};
   const Measurement blind = measure(owner, nullptr, nullptr, options);
   CHECK(blind.accuracy.found == found / 3);
+  options.under.clear();
   found = 0;
   options.informed_views = 2;  // the third view is read blindly and does not count
   options.cameras.resize(2);

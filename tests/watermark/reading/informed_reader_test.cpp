@@ -219,6 +219,15 @@ TEST_CASE("informed_reader: a part is read from a guess of its camera, whatever 
   CHECK(part.informed.agreement >= 0.9);
   CHECK(read_bits(part.evidence(), owner.code(), 4).message == kReadMessage);
   CHECK(keyed_p_value(keyed_statistic(part.evidence(), owner.code(), kReadMessage)) < 1e-4);
+  // Pixels that something else covers do not count.
+  std::vector<std::uint8_t> covered(96 * 96, 0);
+  std::fill_n(covered.begin(), 40 * 96, std::uint8_t{1});
+  const ImageReading half = reader.read_near(quantize8(image), guess, 0.5, covered);
+  Tensor<float> painted = quantize8(image);
+  std::fill_n(painted.data.begin(), 3 * 40 * 96, 0.f);
+  const ImageReading same = reader.read_near(painted, guess, 0.5, covered);
+  CHECK(half.chosen == ReadingKind::informed);
+  CHECK(same.informed.agreement == Approx(half.informed.agreement).margin(0.02));
   const ImageReading none = reader.read_near(quantize8(image), camera_near(7), 0.9);
   CHECK(none.chosen == ReadingKind::blind);
   CHECK(none.informed.agreement < 0.9);
@@ -254,6 +263,10 @@ TEST_CASE("informed_reader: errors name what is wrong") {
                     "[informed_reader] image must be finite, got inf in row 0, column 0");
   CHECK_THROWS_WITH(reader.read_near(infinite, camera_near(1), 0.5),
                     "[informed_reader] image must be finite, got inf in row 0, column 0");
+  CHECK_THROWS_WITH(reader.read_near(Tensor<float>({8, 8, 3}), camera_near(1).scaled(8), 0.5),
+                    "[informed_reader] image must have sides of at least 16, got shape [8, 8, 3]");
+  CHECK_THROWS_WITH(reader.read_near(Tensor<float>({96, 96, 3}), camera_near(1), 0.5, {1, 1}),
+                    "[informed_reader] covered must have the image's 9216 pixels, got 2");
   CHECK(std::string(reading_name(ReadingKind::blind)) == "blind");
   CHECK(std::string(reading_name(ReadingKind::informed)) == "informed");
 }

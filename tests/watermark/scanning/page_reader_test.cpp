@@ -29,8 +29,8 @@ void put_image(Tensor<float>& page, const Tensor<float>& part, Index top, Index 
 }
 
 // Returns a long page with lines of text, an image of something else and a view of the field.
-Tensor<float> page_with(const Tensor<float>& part) {
-  Tensor<float> page({1500, 330, 3}, 1.f);
+Tensor<float> page_with(const Tensor<float>& part, Index height = 1500) {
+  Tensor<float> page({height, 330, 3}, 1.f);
   for (Index line = 0; line < 40; ++line)
     put_image(page, Tensor<float>({8, 200 + line, 3}, 0.1f), 20 + 20 * line + (line > 20 ? 200 : 0), 20);
   Tensor<float> other({100, 140, 3});
@@ -61,7 +61,7 @@ TEST_CASE("page_reader: an image that agrees as a whole is read as by the inform
 
 TEST_CASE("page_reader: a view on a long page is found and read, on the same bits for any threads") {
   const Owner owner = marking_owner();
-  const Tensor<float> image = page_with(marked_view(owner, 4));
+  const Tensor<float> image = page_with(marked_view(owner, 4), 2700);  // more than 8 times as high as wide
   std::vector<double> evidence[2];
   for (const int n : {1, 2}) {
     const ScopedThreads scope(n);
@@ -105,9 +105,9 @@ TEST_CASE("page_reader: a page without a view of the field is read blindly") {
   const PageReading page = reader.read(image);
   CHECK(page.parts.empty());
   CHECK(page.chosen() == ReadingKind::blind);
-  std::vector<double> half = page.whole.blind;
-  for (double& s : half) s *= 0.5;
-  CHECK(page.evidence() == half);
+  std::vector<double> quarter = page.whole.blind;
+  for (double& s : quarter) s *= PageReading::kBlindWeight;
+  CHECK(page.evidence() == quarter);
   CHECK(page.agreement() == page.whole.informed.agreement);
   CHECK(page.whole.informed.evidence.empty());
   PageReading forced = reader.read(image, true);

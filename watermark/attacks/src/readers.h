@@ -24,7 +24,9 @@ class Readers {
   ReadingAccuracy read(const Tensor<float>& image, const Message& sent, bool with_informed, F tell) {
     ReadingAccuracy accuracy;
     if (!with_informed || !informed_) {
-      const auto evidence = blind_.evidence(image);
+      auto evidence = blind_.evidence(image);
+      if (informed_)
+        for (double& s : evidence) s *= PageReading::kBlindWeight;
       tell(evidence);
       accuracy.blind = share(evidence, sent);
       if (!informed_) accuracy.found = found(evidence, sent);

@@ -11,7 +11,6 @@
 #include "surround.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <span>
 
@@ -25,7 +24,7 @@ constexpr Index kFewViews = 64;  // tried first: they suffice for most images, a
 constexpr double kStretches[] = {1.5, 1 / 1.5, 1.25, 0.8};  // of the width
 constexpr AlignmentStage kCoarseStretched[] = {
     {.size = 64, .blur = 1.5, .steps = 10, .stretched = true, .quick = true}};
-constexpr double kFarOff = 0.5;  // agreement at 96 pixels, below which it does not reach 0.85 at 200
+constexpr double kFarOff = 0.5;  // agreement at 96 pixels, far below 0.85: not aligned at 200
 constexpr AlignmentStage kFineStretched[] = {
     {.size = 96, .blur = 1.2, .steps = 10, .stretched = true, .quick = true, .least = kFarOff},
     {.size = 200, .blur = 1.2, .steps = 6, .stretched = true}};
@@ -41,9 +40,10 @@ constexpr AlignmentStage kPartCoarse[] = {
 constexpr AlignmentStage kPartFine[] = {
     {.size = 96, .blur = 1.2, .steps = 10, .quick = true, .least = kLeastOfPart},
     {.size = 200, .blur = 1.2, .steps = 6}};
-constexpr float kInsidePart = 0.9f;  // opacity inside the outline of a part
-constexpr Index kBesideCover = 2;    // pixels beside a bar that are ignored
-constexpr Index kLargest = 512;      // longer side at which evidence is taken, pixels
+constexpr Index kLeastPartSide = 16;  // of a part, pixels
+constexpr float kInsidePart = 0.9f;   // opacity inside the outline of a part
+constexpr Index kBesideCover = 2;     // pixels beside a bar that are ignored
+constexpr Index kLargest = 512;       // longer side at which evidence is taken, pixels
 
 // Returns four points of a scene that do not lie in a plane, to tell cameras apart.
 std::vector<nerf::Vec3> landmarks_of(const nerf::CameraSpan& span) {
@@ -66,6 +66,28 @@ void check_size(const Tensor<float>& image, const nerf::Camera& camera) {
                      std::to_string(camera.height) + ", " + std::to_string(camera.width) +
                      ", 3], got shape " + image.shape.str());
   check_finite("informed_reader", image);
+}
+
+void check_part(const Tensor<float>& image, const nerf::Camera& camera,
+                const std::vector<std::uint8_t>& covered) {
+  check_size(image, camera);
+  if (std::min(camera.width, camera.height) < kLeastPartSide)
+    throw ShapeError("[informed_reader] image must have sides of at least 16, got shape " +
+                     image.shape.str());
+  if (!covered.empty() && std::ssize(covered) != camera.width * camera.height)
+    throw ShapeError("[informed_reader] covered must have the image's " +
+                     std::to_string(camera.width * camera.height) + " pixels, got " +
+                     std::to_string(covered.size()));
+}
+
+// Adds to the pixels covered in a view those covered in the whole image, of another size.
+std::vector<std::uint8_t> without(const std::vector<std::uint8_t>& covered, const nerf::Camera& whole,
+                                  std::vector<std::uint8_t> outside, const nerf::Camera& view) {
+  if (covered.empty()) return outside;
+  const auto sized = border_at(covered, whole.height, whole.width, view.height, view.width, 0);
+  for (std::size_t p = 0; p < outside.size(); ++p)
+    if (sized[p]) outside[p] = 1;
+  return outside;
 }
 
 }  // namespace
@@ -238,24 +260,29 @@ std::vector<std::uint8_t> InformedReader::outside(const nerf::Camera& camera) {
   return covered;
 }
 
-ImageReading InformedReader::read_near(const Tensor<float>& image, const nerf::Camera& start, double least) {
-  check_size(image, start);
+ImageReading InformedReader::read_near(const Tensor<float>& image, const nerf::Camera& start, double least,
+                                       const std::vector<std::uint8_t>& covered) {
+  check_part(image, start, covered);
   ImageReading reading;
   InformedReading& g = reading.informed;
   const nerf::Camera guess = start.scaled(std::min(kPartSize, std::max(start.width, start.height)));
   const Tensor<float> small = resize_area(image, guess.height, guess.width);
+  const auto ignored = [&](const nerf::Camera& camera) {
+    return without(covered, start, outside(camera), camera);
+  };
   Alignment found{guess, -1};
   // The outline of the first guess is not exact.
   for (const std::span<const AlignmentStage> stages :
        {std::span(kPartCoarse), std::span(kPartFine), std::span(kPartFine)}) {
-    found = parts_->aligner.align(small, found.camera, stages, outside(found.camera));
+    found = parts_->aligner.align(small, found.camera, stages, ignored(found.camera));
     g.camera = found.camera.scaled(image.shape[1], image.shape[0]);
     g.agreement = found.agreement;
-    if (!(found.agreement >= std::max(least, kLeastOfPart))) return reading;
+    if (!(g.agreement >= kLeastOfPart)) return reading;
   }
+  if (!(g.agreement >= least)) return reading;
   const float level = nerf::background_value(owner_.field.background);
+  Surround seen{.image = image, .plain = {}, .colour = {}, .covered = ignored(g.camera)};
   const Tensor<float> opacity = parts_->renderer.render(g.camera).opacity;
-  Surround seen{.image = image, .plain = {}, .colour = {}, .covered = outside(g.camera)};
   for (Index i = 0; i < image.size(); ++i) seen.image[i] = level + opacity[i / 3] * (image[i] - level);
   reading.blind = blind_.evidence(seen.image);
   add_evidence(seen, reading);

@@ -1,5 +1,4 @@
 #include "residual_signs.h"
-#include <fieldmark/imaging/resize.h>
 #include "carriers.h"
 #include "jpeg_score.h"
 #include "plain_border.h"
@@ -8,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <span>
 
 #include "blurred.h"
@@ -23,7 +23,7 @@ constexpr int kPasses = 2;
 constexpr double kAround = 4;           // standard deviation of the window for the local power, pixels
 constexpr float kLeastNoise = 1.2e-6f;  // variance of rounding to 8 bits
 // An image has lost detail if it is blurred by so many pixels, or smaller than this share of the training
-// images.
+// images' scale.
 constexpr double kStrongBlur = 1, kSmallShare = 0.6;
 
 // The unmarked render in the image's blur and tones, and the residual.
@@ -132,8 +132,8 @@ ResidualSigns residual_signs(nerf::Renderer& renderer, const Owner& owner, const
   const auto border = seen.covered.empty() ? border_of(owner.field, image) : seen.covered;
   const MarkScore score = score_of(image, view, mark, border, jpeg);
   const nerf::CameraSpan& trained = owner.field.cameras;
-  const auto longer = [](const auto& size) { return static_cast<double>(std::max(size.width, size.height)); };
-  const bool small = longer(camera) < kSmallShare * longer(trained);
+  // By focal length, since a crop has fewer pixels and as much detail.
+  const bool small = camera.fx < kSmallShare * trained.fx * static_cast<double>(trained.width);
   return {.sign = fit_signs(mark, score, owner.cells.count()).sign,
           .lost_detail = jpeg || score.blur >= kStrongBlur || small};
 }

@@ -2,8 +2,8 @@
 #include <fieldmark/watermark/scanning/page_reader.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <functional>
 #include <queue>
 
 namespace fieldmark::watermark {
@@ -15,12 +15,11 @@ constexpr Index kMarginShare = 10;     // of a part's shorter side: renders of o
 constexpr Index kLargest = 512;        // longer side of an image that is searched for an object, pixels
 constexpr Index kLeastReduced = 16;    // shorter side of the same image, and of a part of it
 constexpr Index kCandidates = 24;      // places of the whole object that are tried, and of its quarters
-constexpr Index kLeastPart = 56;       // longer side of a part that is read, pixels
-// Agreement at which an object counts as found: places in images of something else stay below 0.65, or 0.8
-// at the least sides.
+constexpr Index kLeastPart = 60;       // longer side of a part that is read, pixels
+// Agreement at which an object counts as found. In images of something else, places of an object stay below
+// 0.65, and quarters of 63 pixels below 0.8; smaller ones reach 0.87.
 constexpr double kLeastInside = 0.9;
 constexpr double kSureInside = 0.95;  // agreement at which no other place is tried
-constexpr double kBlindWeight = 0.5;  // of a blind reading beside informed ones
 
 using Colour = std::array<float, 3>;
 
@@ -34,6 +33,20 @@ Tensor<float> cut(const Tensor<float>& image, const PixelBox& box, Index margin,
     if (right > left)
       std::copy_n(&image[3 * ((box.y + y) * image.shape[1] + box.x + left)], 3 * (right - left),
                   &out[3 * ((y + margin) * w + margin + left)]);
+  return out;
+}
+
+// True if no view has such sides.
+bool too_long(Index width, Index height) {
+  return std::max(width, height) > kMostElongated * std::min(width, height);
+}
+
+// Marks the pixels of a box that lie outside the image.
+std::vector<std::uint8_t> beyond(const Tensor<float>& image, const PixelBox& box) {
+  std::vector<std::uint8_t> out;
+  for (Index y = box.y; y < box.y + box.height; ++y)
+    for (Index x = box.x; x < box.x + box.width; ++x)
+      out.push_back(y >= 0 && y < image.shape[0] && x >= 0 && x < image.shape[1] ? 0 : 1);
   return out;
 }
 
@@ -81,6 +94,8 @@ PageReader::PageReader(const Owner& owner, const CameraSearchOptions& search)
 
 PageReading PageReader::read(const Tensor<float>& image, bool informed_too) {
   PageReading page{.whole = reader_.read(image, informed_too ? -1 : InformedReader::kLeastAgreement)};
+  // At the size of the alignment, a long page of words is a strip of a few grey pixels, which may agree.
+  if (too_long(image.shape[1], image.shape[0])) page.whole.chosen = ReadingKind::blind;
   if (page.whole.chosen == ReadingKind::informed) return page;
   const Tensor<float> rgb = opaque_image(image, nerf::background_value(owner_.field.background));
   page.parts = read_blocks(rgb);
@@ -100,8 +115,8 @@ std::vector<PartReading> PageReader::read_blocks(const Tensor<float>& rgb) {
     const ImageBlock& block = *blocks.top();
     blocks.pop();
     const PixelBox& box = block.box;
-    const Index shorter = std::min(box.width, box.height), longer = std::max(box.width, box.height);
-    if (shorter >= kLeastSide && longer <= kMostElongated * shorter &&
+    const Index shorter = std::min(box.width, box.height);
+    if (shorter >= kLeastSide && !too_long(box.width, box.height) &&
         static_cast<double>(box.area()) <= kMostOfImage * all) {
       ++read;
       const Index margin = object ? shorter / kMarginShare : 0;
@@ -127,13 +142,16 @@ std::vector<PartReading> PageReader::read_object(const Tensor<float>& whole) {
   const Tensor<float> rgb = zoom < 1 ? resize_area(whole, side(h), side(w)) : whole;
   const float level = nerf::background_value(owner_.field.background);
   std::vector<PartReading> best;
+  bool whole_found = false;
   double most = kLeastInside;
   for (const ObjectPlace& place : objects_->find(rgb, kCandidates)) {
+    if (whole_found && !place.whole) break;  // a quarter shows fewer cells
     const PixelBox box = box_of(place);
     if (std::max(box.width, box.height) < kLeastPart) continue;
-    ImageReading found =
-        reader_.read_near(cut(rgb, box, 0, {level, level, level}), camera_of(place.camera, box), most);
+    ImageReading found = reader_.read_near(cut(rgb, box, 0, {level, level, level}),
+                                           camera_of(place.camera, box), most, beyond(rgb, box));
     if (found.chosen != ReadingKind::informed) continue;
+    whole_found = place.whole;
     most = found.informed.agreement;
     best = {{{back(box.x), back(box.y), back(box.width), back(box.height)}, std::move(found)}};
     if (most >= kSureInside) break;

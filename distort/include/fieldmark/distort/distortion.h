@@ -82,7 +82,8 @@ struct Distortion {
 ///   mirror        mirrored left to right
 ///   pillarbox, letterbox   black bars left and right, or above and below, to 16 : 9
 ///   background_black, _white, _grey, _green, _noise, _shapes   replaces pixels that equal the background
-///                 exactly; shapes: as an image of something else, see dead_leaves()
+///                 exactly; shapes: discs that cover one another, with the statistics of
+///                 natural images
 ///   caption       an opaque bar with lines, over the middle fifth of the height
 ///   collage       four copies of half the size, two by two
 ///   combined      noise_0.10,crop_0.40,jpeg_50

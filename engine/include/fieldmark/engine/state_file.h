@@ -39,8 +39,9 @@ void save_state(SafetensorsFile& file, std::string_view prefix, const ParamStore
 /// @}
 
 /// @{
-/// Reads what save_state() added and ignores other arrays of the file. Training then continues with the same
-/// bits.
+/// Reads what save_state() added and ignores other arrays of the file. Training from the state of a
+/// whole store continues with the same bits; after a module alone, Adam corrects its bias by the steps that
+/// the receiving optimiser has taken.
 /// @param module  if not empty, reads PREFIX + NAME into the parameters "MODULE/NAME" and leaves all others,
 /// and Adam's steps, as they are. The prefix "PREFIX" + "MODULE/" reads it from the state of a whole store
 /// @throws IoError if an array is missing or has another shape or type; nothing changes then

@@ -17,9 +17,10 @@ inline constexpr double kFoundAt = 1e-6;
 /// used.
 struct ReadingAccuracy {
   double blind = 0;  ///< blind detection
-  /// Informed detection on the first informed_views views; a view whose camera is not found counts as 0.5.
+  /// Informed detection on the first informed_views views, or on their parts if those alone agree with the
+  /// field; a view whose camera is not found counts as 0.5.
   double informed = std::numeric_limits<double>::quiet_NaN();
-  /// Detection as chosen by InformedReader, on the same views.
+  /// Detection as chosen by PageReader, on the same views.
   double chosen = std::numeric_limits<double>::quiet_NaN();
   /// Share of these views, of all views without informed detection, whose keyed p-value by the detection
   /// chosen is at most kFoundAt.
@@ -56,7 +57,7 @@ struct Measurement {
   std::map<std::string, ReadingAccuracy> under;  ///< for each distortion
   Index informed_views = 0;                      ///< views of accuracy.informed
   double informed_seconds =
-      0;  ///< of reading one image with both detectors, mean; NaN without informed views
+      0;  ///< of PageReader for one image, with informed evidence of all, mean; NaN without informed views
 };
 
 /// Measures an owner's mark: each view carries its own random message, or all carry that of the baked field.

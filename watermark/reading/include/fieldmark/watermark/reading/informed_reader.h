@@ -17,7 +17,7 @@ struct CameraSearchOptions {
 /// The informed detector's result for one image.
 struct InformedReading {
   /// [cells] S_c, see evidence.h, on the scale of the blind reading, so that both may be added. Empty if no
-  /// camera was found.
+  /// camera was found, or its agreement is below the least asked for.
   std::vector<double> evidence;
   nerf::Camera camera;    ///< camera found
   double agreement = -1;  ///< of the alignment: correlation of gradients, in [-1, 1]
@@ -31,7 +31,7 @@ const char* reading_name(ReadingKind kind);
 /// The readings of both detectors, and the choice between them.
 struct ImageReading {
   std::vector<double> blind;                ///< [cells] of BlindReader
-  InformedReading informed;                 ///< without evidence if no camera was found
+  InformedReading informed;                 ///< without evidence if no camera was found that agrees enough
   ReadingKind chosen = ReadingKind::blind;  ///< depends on the alignment's agreement alone
   bool mirrored = false;                    ///< only the mirrored image agrees; then all is read from it
   /// Evidence of the chosen detector, [cells].
@@ -50,8 +50,9 @@ class CameraSearch;
 ///
 ///   - Bars are cut off; for an object, any other plain background is replaced by the field's.
 ///   - Candidate cameras are aligned coarsely, the best of them finely; the best agreement wins. The first
-///     candidates come from 64 renders. Below an agreement of 0.95, the search goes on with all renders, then
-///     with the mirrored image and with one stretched to where it looks most like the field.
+///     candidates come from 64 renders. A fine alignment that agrees by less than 0.5 at 96 pixels ends
+///     there. Below an agreement of 0.95, the search goes on with all renders, then with the mirrored image
+///     and with one stretched to where it looks most like the field.
 ///   - The blur that leaves the smallest residual is kept; gain, offset and gamma are fitted.
 ///   - With the residual R and its power V around each pixel, R / V is the score and 1 / V the precision.
 ///     For a JPEG image both come from the quantised coefficients.
@@ -73,11 +74,13 @@ class InformedReader {
   ImageReading read(const Tensor<float>& image, double least = -1);
   /// Reads a part of an image that shows an object before anything, from a guess of its camera: pixels
   /// outside the object's outline do not count, neither for the alignment nor for the evidence. Chooses
-  /// informed, or leaves the evidence of both detectors empty if the agreement is below `least`.
+  /// informed, or leaves the evidence of both detectors empty if the agreement is below `least` or 0.8.
   /// @param image  [H, W, 3], sides of at least 16   @param start  of its size; the object must be within a
-  /// few hundredths of its size of where it shows it
-  /// @throws ShapeError if the sizes differ   @throws ValueError if a value is not finite
-  ImageReading read_near(const Tensor<float>& image, const nerf::Camera& start, double least);
+  /// few hundredths of its size of where it shows it   @param covered  [H W] 1 where something else covers
+  /// the view, or empty   @throws ShapeError if the sizes differ or are below 16
+  /// @throws ValueError if a value is not finite
+  ImageReading read_near(const Tensor<float>& image, const nerf::Camera& start, double least,
+                         const std::vector<std::uint8_t>& covered = {});
   /// Computes the evidence of an image with a known camera.
   /// @param image  [H, W, 3]   @param camera  of its size   @throws ShapeError if the sizes differ
   /// @throws ValueError if a value is not finite

@@ -1,10 +1,8 @@
 #pragma once
-#include <fieldmark/nerf/renderer.h>
 #include <fieldmark/watermark/reading/informed_reader.h>
 #include <fieldmark/watermark/scanning/image_blocks.h>
 #include <fieldmark/watermark/scanning/object_search.h>
 
-#include <memory>
 #include <optional>
 #include <vector>
 
@@ -20,10 +18,12 @@ struct PartReading {
 
 /// The reading of an image and of the parts that show the field.
 struct PageReading {
+  /// Weight of blind evidence where other images may have been found.
+  static constexpr double kBlindWeight = 0.25;
   ImageReading whole;                   ///< of the whole image
   std::vector<PartReading> parts = {};  ///< that agree with the field; empty if the whole image does
   /// Evidence of the detection chosen, [cells]: of the whole image, or the sum over all parts. Blind evidence
-  /// counts half, so that images in which nothing was found hardly dilute those added to them in which
+  /// counts a quarter, so that images in which nothing was found hardly dilute those added to them in which
   /// something was.
   std::vector<double> evidence() const;
   /// Informed if the image or a part of it agrees with the field.
@@ -39,7 +39,7 @@ struct PageReading {
 
 /// Detection that also reads views on a page, in a collage, and objects in other surroundings. The first that
 /// agrees with the field counts:
-///   - the whole image, as by InformedReader;
+///   - the whole image, as by InformedReader, unless one side is more than 8 times the other;
 ///   - its blocks, which plain gaps separate (see image_blocks()), the largest first, and the parts of blocks
 ///     that do not agree; all blocks that agree are added up;
 ///   - for an object, the places where the image looks most like a render or a quarter of one (see
