@@ -1,7 +1,9 @@
+import numpy as np
 import pytest
 
 import fieldmark as fm
 from ball import write_ball
+from fieldmark import engine
 
 
 @pytest.fixture(scope="session")
@@ -24,3 +26,13 @@ def owner(field):
 @pytest.fixture(scope="session")
 def marked(owner):
     return fm.bake(owner, "a5c3", steps=10)
+
+
+@pytest.fixture
+def tape():
+    return engine.Tape("float64")
+
+
+@pytest.fixture
+def x(tape):
+    return tape.leaf(np.random.default_rng(0).standard_normal((4, 6)))

@@ -30,16 +30,6 @@ INDICES = [
 ]
 
 
-@pytest.fixture
-def tape():
-    return engine.Tape("float64")
-
-
-@pytest.fixture
-def x(tape):
-    return tape.leaf(np.random.default_rng(0).standard_normal((4, 6)))
-
-
 @pytest.mark.parametrize("array, error, text", OTHER_LAYOUTS)
 def test_every_place_that_takes_an_array_checks_it(tape, x, array, error, text):
     places = {

@@ -9,16 +9,6 @@ import fieldmark as fm
 from fieldmark import engine
 
 
-@pytest.fixture
-def tape():
-    return engine.Tape("float64")
-
-
-@pytest.fixture
-def x(tape):
-    return tape.leaf(np.random.default_rng(0).standard_normal((4, 6)))
-
-
 def test_a_gradient_must_be_writeable_and_of_its_own(tape):
     a, grad = np.ones(3), np.zeros(3)
     grad.flags.writeable = False
