@@ -13,13 +13,14 @@ using detail::Matrix;
 using detail::Workspace;
 
 // Puts the eigenvectors in place of a symmetric matrix, and writes the eigenvalues, the smallest first. The
-// steps and bits are those of Eigen::SelfAdjointEigenSolver, which allocates. Takes 3 columns.
-void decompose_symmetric(Matrix& a, Column& values, Workspace w) {
+// steps and bits are those of Eigen::SelfAdjointEigenSolver, which allocates. Takes 3 columns. Returns false
+// if they do not converge.
+bool decompose_symmetric(Matrix& a, Column& values, Workspace w) {
   constexpr int kSweeps = 30;  // of QR steps a value
   const Index n = a.rows();
   if (n == 1) {
     values[0] = std::exchange(a(0, 0), 1.0);
-    return;
+    return true;
   }
   Column beside = w.column(n - 1), reflections = w.column(n - 1), memory = w.column(n);
   detail::keep_triangle(a, false);
@@ -29,8 +30,9 @@ void decompose_symmetric(Matrix& a, Column& values, Workspace w) {
   values = a.diagonal();
   beside = a.diagonal<-1>();
   Eigen::HouseholderSequence<Matrix, Column>(a, reflections).setLength(n - 1).setShift(1).evalTo(a, memory);
-  Eigen::internal::computeFromTridiagonal_impl(values, beside, kSweeps, true, a);
+  const auto info = Eigen::internal::computeFromTridiagonal_impl(values, beside, kSweeps, true, a);
   values *= scale;
+  return info == Eigen::Success;
 }
 
 }  // namespace
@@ -50,7 +52,9 @@ Var<T> symmetric_eigenvalues(Var<T> a) {
     Matrix v = w.matrix(n, n);
     Column values = w.column(n);
     v = (m + m.transpose()) / 2;
-    decompose_symmetric(v, values, w);
+    if (!decompose_symmetric(v, values, w))
+      detail::refuse_matrix("symmetric_eigenvalues", i,
+                            "must have eigenvalues that converge, got one without");
     detail::put_matrix(y + i * n, values, true);
     detail::put_matrix(vectors + i * n * n, v, true);
   });

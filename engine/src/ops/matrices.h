@@ -9,6 +9,9 @@
 
 #include "ops/axes.h"
 
+// Some decompositions call functions of Eigen::internal, which other versions may change.
+static_assert(EIGEN_WORLD_VERSION == 3 && EIGEN_MAJOR_VERSION == 4, "fieldmark's matrix ops need Eigen 3.4");
+
 namespace fieldmark::detail {
 
 // Matrices and columns in memory of a Workspace: Eigen's own would be allocated for each matrix of a batch.
