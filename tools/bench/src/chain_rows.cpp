@@ -1,3 +1,4 @@
+#include <fieldmark/engine/aligned.h>
 #include <fieldmark/engine/ops/fused.h>
 #include <fieldmark/engine/ops/operators.h>
 #include <fieldmark/engine/parallel.h>
@@ -17,12 +18,19 @@ constexpr Index kNodes = 1000, kNodeElements = 16;
 const auto swish = [](auto x, auto w, auto b) { return x * sigmoid(x * w + b); };
 const auto arithmetic = [](auto x, auto w, auto b) { return 0.5 * relu(x * w + b) + (x - w) * (x - b); };
 
+// numbers() in memory like that of parameters and of a tape.
+template <class T>
+AlignedVector<T> aligned_numbers(Index n, std::uint64_t seed) {
+  const auto plain = numbers<T>(n, seed);
+  return {plain.begin(), plain.end()};
+}
+
 // y = f(x, w, b) of equal shapes, forward and backward in one pass each; the loss is <u, y> with a fixed u.
 template <class T>
 struct ChainPass {
   explicit ChainPass(Index n_) : n(n_), w(store.add("w", {n})), b(store.add("b", {n})) {
-    x = numbers<T>(n, 3);
-    u = numbers<T>(n, 4);
+    x = aligned_numbers<T>(n, 3);
+    u = aligned_numbers<T>(n, 4);
     dx.resize(x.size());
     const auto parameters = numbers<T>(store.size(), 5);
     std::copy(parameters.begin(), parameters.end(), store.values().begin());
@@ -44,14 +52,16 @@ struct ChainPass {
   ParamStore<T> store;
   ParamId w, b;
   Tape<T> tape;
-  std::vector<T> x, u, dx, values;
+  AlignedVector<T> x, u, dx;
+  std::vector<T> values;
   bool keep = false;
 };
 
 // Measures the seconds that this machine takes to add two arrays into a third, per byte read or written.
 class Memory {
  public:
-  explicit Memory(Index n) : a_(numbers<float>(n, 7)), b_(numbers<float>(n, 8)), sum_(a_.size()) {}
+  explicit Memory(Index n)
+      : a_(aligned_numbers<float>(n, 7)), b_(aligned_numbers<float>(n, 8)), sum_(a_.size()) {}
   double seconds_per_byte() {
     const double begin = now();
     parallel_for(static_cast<Index>(a_.size()), kGrain, [&](Index from, Index to) {
@@ -62,7 +72,7 @@ class Memory {
 
  private:
   static constexpr Index kGrain = Index{1} << 15;
-  std::vector<float> a_, b_, sum_;
+  AlignedVector<float> a_, b_, sum_;
 };
 
 template <class F>
@@ -99,12 +109,15 @@ EngineRow chain(F f, const RowOptions& o) {
   return row;
 }
 
+std::vector<float> plain(const AlignedVector<float>& v) { return {v.begin(), v.end()}; }
+
 template <class F>
 SafetensorsFile work(const char* network, F f, const RowOptions& o) {
   ChainPass<float> pass(scaled(o));
   pass.keep = true;
   pass.run(f);
-  return peer_work(network, pass.store, {{pass.n}, {pass.n}, pass.x, pass.u, pass.values, pass.dx});
+  return peer_work(network, pass.store,
+                   {{pass.n}, {pass.n}, plain(pass.x), plain(pass.u), pass.values, plain(pass.dx)});
 }
 
 // A row of small ops, forward and backward: the overhead of an op besides its arithmetic.
