@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "gradcheck_options.h"
+#include "pass_visitor.h"
 
 namespace fieldmark {
 namespace {
@@ -64,7 +65,7 @@ std::vector<Pass> passes(std::size_t inputs) {
   return all;
 }
 
-thread_local const ScopedPassVisitor::Visit* pass_visitor = nullptr;
+thread_local const detail::ScopedPassVisitor::Visit* pass_visitor = nullptr;
 
 double dot(const std::vector<double>& a, const double* b) {
   double s = 0;
@@ -211,8 +212,9 @@ class Checker {
 
 }  // namespace
 
-ScopedPassVisitor::ScopedPassVisitor(const Visit& visit) : before_(std::exchange(pass_visitor, &visit)) {}
-ScopedPassVisitor::~ScopedPassVisitor() { pass_visitor = before_; }
+detail::ScopedPassVisitor::ScopedPassVisitor(const Visit& visit)
+    : before_(std::exchange(pass_visitor, &visit)) {}
+detail::ScopedPassVisitor::~ScopedPassVisitor() { pass_visitor = before_; }
 
 GradcheckReport gradcheck(const GradcheckFn& f, std::span<const Tensor<double>> inputs,
                           const GradcheckOptions& options) {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "pass_visitor.h"
 #include "support/expect_grad.h"
 
 using namespace fieldmark;
@@ -154,4 +155,56 @@ TEST_CASE("gradcheck: a module's parameters are an input too") {
     CHECK(r.ok == (w == Wrong::none));
     CHECK(r.entries == 3);
   }
+}
+
+TEST_CASE("gradcheck: adds to the gradients of a store that f reads, unless it reads it without gradients") {
+  ParamStore<double> store;
+  const auto id = store.add("w", {3});
+  for (double& v : store.values()) v = 0.3;
+  const std::vector<Tensor<double>> in{uniform({3}, -1, 1, 1)};
+  const auto largest_after = [&](const Params<double>& params) {
+    store.zero_grad();
+    const auto f = [&](Tape<double>& tape, std::span<const Var<double>> x) {
+      const Var<double> w = params.leaf(tape, id);
+      double* y = nullptr;
+      const Var<double> out = tape.output({3}, &y, {x[0], w});
+      for (Index i = 0; i < 3; ++i) y[i] = x[0].value()[i] * w.value()[i];
+      tape.on_backward(out, [x0 = x[0], w](const double* dy) {
+        double *dx = x0.grad_acc(), *dw = w.grad_acc();
+        for (Index i = 0; i < 3; ++i) {
+          if (dx) dx[i] += dy[i] * w.value()[i];
+          if (dw) dw[i] += dy[i] * x0.value()[i];
+        }
+      });
+      return out;
+    };
+    CHECK(gradcheck(f, in).ok);
+    double largest = 0;
+    for (const double g : store.grads()) largest = std::max(largest, std::abs(g));
+    return largest;
+  };
+  CHECK(largest_after(Params<double>(store)) > 0);
+  CHECK(largest_after(Params<double>(store, nullptr)) == 0);
+  const auto r = gradcheck_module([&](Tape<double>& tape, const Params<double>& p,
+                                      auto) { return exp_with(p.leaf(tape, id), Wrong::none); },
+                                  store, {});
+  CHECK(r.ok);
+  for (const double g : store.grads()) CHECK(g == 0);
+}
+
+TEST_CASE("gradcheck: a visitor receives the passes of its scope alone") {
+  const std::vector<Tensor<double>> in{uniform({3}, -1, 1, 1)};
+  const GradcheckFn wrong = [](Tape<double>&, auto x) { return exp_with(x[0], Wrong::factor); };
+  int visits = 0;
+  {
+    const detail::ScopedPassVisitor::Visit visit = [&](const std::function<void()>& pass) {
+      pass();
+      ++visits;
+    };
+    const detail::ScopedPassVisitor scope(visit);
+    CHECK(gradcheck(wrong, in).ok);  // compares nothing
+  }
+  CHECK(visits == 1);
+  CHECK_FALSE(gradcheck(wrong, in).ok);
+  CHECK(visits == 1);
 }

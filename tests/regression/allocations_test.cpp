@@ -33,6 +33,7 @@
 #include <utility>
 
 #include "nerf/small_field.h"
+#include "pass_visitor.h"
 #include "support/catch.h"
 #include "support/random.h"
 
@@ -166,11 +167,11 @@ void count_passes(const std::string& room, const std::vector<GradcheckCase>& cas
   for (const GradcheckCase& c : cases) {
     if (c.name.ends_with(", second order")) continue;
     long counted = -1;
-    const ScopedPassVisitor::Visit visit = [&](const std::function<void()>& pass) {
+    const detail::ScopedPassVisitor::Visit visit = [&](const std::function<void()>& pass) {
       allocations_in(2, pass);
       counted = std::max(counted, 0L) + allocations_in(3, pass);  // a case may check several functions
     };
-    const ScopedPassVisitor scope(visit);
+    const detail::ScopedPassVisitor scope(visit);
     c.run();
     const bool may = std::ranges::any_of(kAllocate, [&](const auto& a) { return a.first == c.name; });
     if (counted < 0 || (counted > 0) != may)
