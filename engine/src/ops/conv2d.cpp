@@ -7,6 +7,7 @@
 
 #include "ops/chunks.h"
 #include "ops/conv2d_parts.h"
+#include "ops/window_checks.h"
 
 namespace fieldmark {
 namespace {
@@ -46,16 +47,24 @@ Var<T> dilated(Var<T> w, Index d) {
 }
 
 void check_window(const ConvWindow& window, const Shape& x, const Shape& w) {
-  if (window.stride < 1 || window.padding < 0 || window.dilation < 1 || window.groups < 1)
-    throw ValueError(
-        "[conv2d] stride, dilation and groups must be at least 1 and padding at least 0, got stride " +
-        std::to_string(window.stride) + ", dilation " + std::to_string(window.dilation) + ", groups " +
-        std::to_string(window.groups) + " and padding " + std::to_string(window.padding));
+  detail::check_step("conv2d", "stride", window.stride, 1);
+  detail::check_step("conv2d", "padding", window.padding, 0);
+  detail::check_step("conv2d", "dilation", window.dilation, 1);
+  detail::check_step("conv2d", "groups", window.groups, 1);
   check_rank("conv2d", "x", x, 4, "[N, H, W, C]");
   check_rank("conv2d", "w", w, 4, "[K, K, C / groups, O]");
   if (x[3] % window.groups != 0 || w[3] % window.groups != 0)
     throw ValueError("[conv2d] groups must divide the channels of x and of w, got " +
                      std::to_string(window.groups) + " for shapes " + x.str() + " and " + w.str());
+  if (w[0] > 1 && window.dilation > 1 && window.dilation > (detail::kLargestStep - 1) / (w[0] - 1))
+    throw ValueError("[conv2d] dilation must keep the window within " + std::to_string(detail::kLargestStep) +
+                     " pixels, got " + std::to_string(window.dilation) + " for w of shape " + w.str());
+  const Index border = 2 * window.padding;
+  Index height = 0, width = 0;
+  if (__builtin_add_overflow(x[1], border, &height) || __builtin_add_overflow(x[2], border, &width) ||
+      !detail::is_countable({x[0], height, width, x[3]}))
+    throw ValueError("[conv2d] padding must leave fewer than 2^60 elements of x with its border, got " +
+                     std::to_string(window.padding) + " for shape " + x.str());
 }
 
 enum class Way { direct, few, winograd };

@@ -3,6 +3,7 @@
 
 #include "ops/chunks.h"
 #include "ops/conv2d_parts.h"
+#include "ops/window_checks.h"
 
 namespace fieldmark {
 namespace {
@@ -17,19 +18,28 @@ detail::ConvGeometry transposed_geometry(const Shape& x, const Shape& w, const S
   check_extent(op, "w", w, 1, w[0], "a square window");
   check_extent(op, "w", w, 3, x[3], "the channels of x", x);
   check_extent(op, "b", b, 0, w[2], "the outputs of w", w);
-  if (window.stride < 1 || window.padding < 0 || window.dilation != 1 || window.groups != 1)
-    throw ValueError(
-        "[conv_transpose2d] stride must be at least 1, padding at least 0, and dilation and groups 1, got "
-        "stride " +
-        std::to_string(window.stride) + ", padding " + std::to_string(window.padding) + ", dilation " +
-        std::to_string(window.dilation) + " and groups " + std::to_string(window.groups));
+  detail::check_step(op, "stride", window.stride, 1);
+  detail::check_step(op, "padding", window.padding, 0);
+  if (window.dilation != 1 || window.groups != 1)
+    throw ValueError("[conv_transpose2d] dilation and groups must be 1, got dilation " +
+                     std::to_string(window.dilation) + " and groups " + std::to_string(window.groups));
   if (x[1] < 1 || x[2] < 1)
     throw ShapeError("[conv_transpose2d] x must have at least one pixel, got shape " + x.str());
-  const auto extent = [&](Index n) { return (n - 1) * window.stride + w[0] - 2 * window.padding; };
-  if (extent(std::min(x[1], x[2])) < 1)
+  Index height = 0, width = 0;  // of the result with its border
+  const auto bordered = [&](Index n, Index* extent) {
+    return !__builtin_mul_overflow(n - 1, window.stride, extent) &&
+           !__builtin_add_overflow(*extent, w[0], extent);
+  };
+  if (!bordered(x[1], &height) || !bordered(x[2], &width) ||
+      !detail::is_countable({x[0], height, width, w[2]}))
+    throw ValueError(
+        "[conv_transpose2d] stride must leave fewer than 2^60 elements of the result with its border, got " +
+        std::to_string(window.stride) + " for shape " + x.str());
+  const Index border = 2 * window.padding;
+  if (std::min(height, width) - border < 1)
     throw ShapeError("[conv_transpose2d] x: a padding of " + std::to_string(window.padding) +
                      " leaves no pixel of the result, got shape " + x.str());
-  return {x[0], extent(x[1]), extent(x[2]), w[2], w[3], w[0], window.stride, window.padding};
+  return {x[0], height - border, width - border, w[2], w[3], w[0], window.stride, window.padding};
 }
 
 // y = b at every pixel.

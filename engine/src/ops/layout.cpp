@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "ops/broadcast.h"
+#include "ops/window_checks.h"
 
 namespace fieldmark {
 namespace {
@@ -56,6 +57,21 @@ struct Permutation {
     return from;
   }
 };
+
+// Returns the extent of the padded axis.
+Index padded_extent(const Shape& s, int axis, Index before, Index after) {
+  Index extent = 0;
+  bool fits =
+      !__builtin_add_overflow(s[axis], before, &extent) && !__builtin_add_overflow(extent, after, &extent);
+  if (fits) {
+    const detail::Split p = detail::split(s, axis);
+    fits = detail::is_countable({p.outer, extent, p.inner});
+  }
+  if (!fits)
+    throw ValueError("[pad] before and after must leave fewer than 2^60 elements of the result, got " +
+                     std::to_string(before) + " and " + std::to_string(after) + " for shape " + s.str());
+  return extent;
+}
 
 }  // namespace
 
@@ -123,10 +139,11 @@ Var<T> pad(Var<T> x, int axis, Index before, Index after, double value) {
   if (before < 0 || after < 0)
     throw ValueError("[pad] before and after must be 0 or more, got " + std::to_string(before) + " and " +
                      std::to_string(after));
+  const Index extent = padded_extent(x.shape(), axis, before, after);
   const detail::Split p = detail::split(x.shape(), axis);
-  const Index row = (before + p.n + after) * p.inner, first = before * p.inner, kept = p.n * p.inner;
+  const Index row = extent * p.inner, first = before * p.inner, kept = p.n * p.inner;
   T* y = nullptr;
-  const Var<T> out = x.tape().output(detail::with_extent(x.shape(), axis, before + p.n + after), &y, {x});
+  const Var<T> out = x.tape().output(detail::with_extent(x.shape(), axis, extent), &y, {x});
   const T fill = static_cast<T>(value);
   parallel_for(p.outer, detail::row_grain(row), [&](Index r0, Index r1) {
     for (Index r = r0; r < r1; ++r) {

@@ -3,6 +3,7 @@
 
 #include "kernels/pool.h"
 #include "ops/chunks.h"
+#include "ops/window_checks.h"
 
 namespace fieldmark {
 namespace kernels {
@@ -15,7 +16,7 @@ Var<T> avg_pool(Var<T> x, Index size) {
   const PoolRow p{width, size, s[3], row};
   T* y = nullptr;
   const Var<T> out = x.tape().output({s[0], height, width, s[3]}, &y, {x});
-  const Index grain = detail::row_grain(size * row);
+  const Index grain = detail::row_grain(std::min(size, s[1]) * row);
   const auto forward = FIELDMARK_KERNEL(pool_row<T>);
   parallel_for(s[0] * height, grain, [&](Index r0, Index r1) {
     for (Index r = r0; r < r1; ++r)
@@ -125,7 +126,7 @@ Var<T> max_pool(Var<T> x, const MaxPool& m) {
 template <class T>
 Var<T> avg_pool(Var<T> x, Index size) {
   check_rank("avg_pool", "x", x.shape(), 4, "[images, height, width, channels]");
-  if (size < 1) throw ValueError("[avg_pool] size must be at least 1, got " + std::to_string(size));
+  detail::check_step("avg_pool", "size", size, 1);
   return kernels::avg_pool(x, size);
 }
 
@@ -140,13 +141,14 @@ Var<T> global_avg_pool(Var<T> x) {
 template <class T>
 Var<T> max_pool(Var<T> x, MaxPool windows) {
   check_rank("max_pool", "x", x.shape(), 4, "[images, height, width, channels]");
-  if (windows.size < 1 || windows.stride < 1)
-    throw ValueError("[max_pool] size and stride must be at least 1, got size " +
-                     std::to_string(windows.size) + " and stride " + std::to_string(windows.stride));
+  detail::check_step("max_pool", "size", windows.size, 1);
+  detail::check_step("max_pool", "stride", windows.stride, 1);
   const Index least = windows.ceil_mode ? 1 : windows.size;
   if (std::min(x.shape()[1], x.shape()[2]) < least)
     throw ShapeError("[max_pool] x: height and width must be at least " + std::to_string(least) +
                      " (one window), got shape " + x.shape().str());
+  // A larger window sees no more, and the kernel numbers a window's pixels in T, exact to 2^24 in float.
+  windows.size = std::min(windows.size, std::max(x.shape()[1], x.shape()[2]));
   return kernels::max_pool(x, windows);
 }
 

@@ -2,6 +2,7 @@
 #include <fieldmark/engine/parallel.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "engine/ops/conv2d_runs.h"
 #include "support/expect_grad.h"
@@ -124,10 +125,7 @@ TEST_CASE("conv2d: errors of steps and borders, and the same bits for any thread
   Tape<float> tape;
   const Tensor<float> x({1, 9, 4, 3}), w({7, 7, 3, 5}), b({5});
   const auto vx = tape.constant(x), vw = tape.constant(w), vb = tape.constant(b);
-  CHECK_THROWS_WITH(
-      conv2d(vx, vw, vb, {.stride = 0}),
-      "[conv2d] stride, dilation and groups must be at least 1 and padding at least 0, got stride 0, "
-      "dilation 1, groups 1 and padding 0");
+  CHECK_THROWS_WITH(conv2d(vx, vw, vb, {.stride = 0}), "[conv2d] stride must be 1 to 2147483647, got 0");
   CHECK_THROWS_WITH(conv2d(vx, vw, vb, {.stride = 2, .padding = 1}),
                     "[conv2d] x: height and width must be at least 5 (the window's 7 less two borders of 1), "
                     "got shape [1, 9, 4, 3]");
@@ -138,4 +136,32 @@ TEST_CASE("conv2d: errors of steps and borders, and the same bits for any thread
       run_conv2d(image, weights, bias, ConvWindow{.stride = 4, .padding = 2}, Activation::relu);
   const ScopedThreads parallel(2);
   CHECK(one == run_conv2d(image, weights, bias, ConvWindow{.stride = 4, .padding = 2}, Activation::relu));
+}
+
+TEST_CASE("conv2d: windows beyond what can be counted are errors that name the argument") {
+  Tape<float> tape;
+  const Tensor<float> x({1, 4, 4, 1}), w({3, 3, 1, 1}), b({1});
+  const auto vx = tape.constant(x), vw = tape.constant(w), vb = tape.constant(b);
+  for (const Index huge : {Index{1} << 31, Index{1} << 62, std::numeric_limits<Index>::max(), Index{-1}}) {
+    CAPTURE(huge);
+    const auto text = [&](const char* argument, Index least) {
+      return std::string("[conv2d] ") + argument + " must be " + std::to_string(least) +
+             " to 2147483647, got " + std::to_string(huge);
+    };
+    CHECK_THROWS_WITH(conv2d(vx, vw, vb, {.stride = huge}), text("stride", 1));
+    CHECK_THROWS_WITH(conv2d(vx, vw, vb, {.padding = huge}), text("padding", 0));
+    CHECK_THROWS_WITH(conv2d(vx, vw, vb, {.dilation = huge}), text("dilation", 1));
+    CHECK_THROWS_WITH(conv2d(vx, vw, vb, {.groups = huge}), text("groups", 1));
+    CHECK_THROWS_AS(conv2d(vx, vw, vb, {.padding = huge}), ValueError);
+  }
+  CHECK_THROWS_WITH(
+      conv2d(vx, vw, vb, {.stride = 2147483647, .padding = 2147483647}),
+      "[conv2d] padding must leave fewer than 2^60 elements of x with its border, got 2147483647 "
+      "for shape [1, 4, 4, 1]");
+  CHECK_THROWS_WITH(
+      conv2d(vx, vw, vb, {.dilation = 2147483647}),
+      "[conv2d] dilation must keep the window within 2147483647 pixels, got 2147483647 for w of "
+      "shape [3, 3, 1, 1]");
+  CHECK_THROWS_AS(conv2d(vx, vw, vb, {.dilation = 2147483647}), ValueError);
+  CHECK(conv2d(vx, vw, vb, {.stride = 2147483647}).shape() == Shape{1, 1, 1, 1});
 }

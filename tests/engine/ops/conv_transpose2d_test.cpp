@@ -108,8 +108,18 @@ TEST_CASE("conv_transpose2d: errors") {
   CHECK_THROWS_WITH(conv_transpose2d(tape.constant(nothing), w, b),
                     "[conv_transpose2d] x must have at least one pixel, got shape [1, 0, 4, 2]");
   CHECK_THROWS_WITH(conv_transpose2d(x, w, b, {.stride = 0}),
-                    Contains("[conv_transpose2d] stride must be at least 1") && Contains("got stride 0"));
-  CHECK_THROWS_AS(conv_transpose2d(x, w, b, {.groups = 2}), ValueError);
+                    "[conv_transpose2d] stride must be 1 to 2147483647, got 0");
+  CHECK_THROWS_WITH(conv_transpose2d(x, w, b, {.stride = Index{1} << 62}),
+                    "[conv_transpose2d] stride must be 1 to 2147483647, got 4611686018427387904");
+  CHECK_THROWS_WITH(conv_transpose2d(x, w, b, {.padding = Index{1} << 62}),
+                    "[conv_transpose2d] padding must be 0 to 2147483647, got 4611686018427387904");
+  CHECK_THROWS_WITH(conv_transpose2d(x, w, b, {.stride = 2147483647, .padding = 2147483647}),
+                    "[conv_transpose2d] stride must leave fewer than 2^60 elements of the result with its "
+                    "border, got 2147483647 for shape [1, 3, 4, 2]");
+  CHECK_THROWS_AS(conv_transpose2d(x, w, b, {.stride = 2147483647}), ValueError);
+  CHECK_THROWS_WITH(conv_transpose2d(x, w, b, {.groups = 2}),
+                    "[conv_transpose2d] dilation and groups must be 1, got dilation 1 and groups 2");
+  CHECK_THROWS_AS(conv_transpose2d(x, w, b, {.dilation = Index{1} << 62}), ValueError);
 }
 
 TEST_CASE("conv_transpose2d: same bits for any thread count, float near double") {

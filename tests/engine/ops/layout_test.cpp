@@ -1,5 +1,7 @@
 #include <fieldmark/engine/ops/layout.h>
 
+#include <limits>
+
 #include "support/expect_grad.h"
 #include "support/run_op.h"
 
@@ -76,6 +78,12 @@ TEST_CASE("layout: errors") {
   CHECK_THROWS_AS(broadcast_to(x, {2, 1}), ShapeError);
   CHECK_THROWS_WITH(pad(x, 2, 1, 1), Contains("[pad] axis must be in [-2, 1]"));
   CHECK_THROWS_WITH(pad(x, 1, -1, 1), "[pad] before and after must be 0 or more, got -1 and 1");
+  const Index huge = Index{1} << 62;
+  CHECK_THROWS_WITH(pad(x, 1, huge, huge),
+                    "[pad] before and after must leave fewer than 2^60 elements of the result, got "
+                    "4611686018427387904 and 4611686018427387904 for shape [2, 3]");
+  CHECK_THROWS_AS(pad(x, 0, huge, 0), ValueError);
+  CHECK_THROWS_AS(pad(x, 0, 0, std::numeric_limits<Index>::max()), ValueError);
   CHECK_THROWS_WITH(cumsum(x, 5), Contains("[cumsum] axis must be in [-2, 1]"));
 }
 

@@ -60,7 +60,10 @@ TEST_CASE("pool: errors") {
   Tape<double> tape;
   const Tensor<double> x({1, 2, 2, 3}), flat({4, 3}), none({1, 0, 2, 3});
   CHECK_THROWS_WITH(avg_pool(tape.constant(flat), 2), Contains("[avg_pool] x must have rank 4"));
-  CHECK_THROWS_WITH(avg_pool(tape.constant(x), 0), "[avg_pool] size must be at least 1, got 0");
+  CHECK_THROWS_WITH(avg_pool(tape.constant(x), 0), "[avg_pool] size must be 1 to 2147483647, got 0");
+  CHECK_THROWS_WITH(avg_pool(tape.constant(x), Index{1} << 62),
+                    "[avg_pool] size must be 1 to 2147483647, got 4611686018427387904");
+  CHECK(avg_pool(tape.constant(x), 2147483647).shape() == Shape{1, 0, 0, 3});
   CHECK_THROWS_WITH(global_avg_pool(tape.constant(flat)), Contains("[global_avg_pool] x must have rank 4"));
   CHECK_THROWS_WITH(global_avg_pool(tape.constant(none)),
                     Contains("at least one pixel, got shape [1, 0, 2, 3]"));
@@ -162,7 +165,12 @@ TEST_CASE("max_pool: errors") {
   const Tensor<double> x({1, 2, 5, 3}), flat({4, 3}), none({1, 0, 2, 3});
   CHECK_THROWS_WITH(max_pool(tape.constant(flat), {}), Contains("[max_pool] x must have rank 4"));
   CHECK_THROWS_WITH(max_pool(tape.constant(x), {.size = 0}),
-                    "[max_pool] size and stride must be at least 1, got size 0 and stride 2");
+                    "[max_pool] size must be 1 to 2147483647, got 0");
+  const Index huge = Index{1} << 62;
+  CHECK_THROWS_WITH(max_pool(tape.constant(x), {.size = huge, .ceil_mode = true}),
+                    "[max_pool] size must be 1 to 2147483647, got 4611686018427387904");
+  CHECK_THROWS_WITH(max_pool(tape.constant(x), {.stride = huge}),
+                    "[max_pool] stride must be 1 to 2147483647, got 4611686018427387904");
   CHECK_THROWS_WITH(max_pool(tape.constant(x), {.size = 3}),
                     "[max_pool] x: height and width must be at least 3 (one window), got shape [1, 2, 5, 3]");
   CHECK_THROWS_WITH(max_pool(tape.constant(none), {.ceil_mode = true}),
@@ -175,4 +183,11 @@ TEST_CASE("max_pool: float against double, and the same bits for any thread coun
     expect_same_bits(max_of(m), {uniform<float>({3, 50, 51, 17}, -1, 1, 1)});
     CHECK(float_error_to_130(max_of(m), of_channels) < 2e-7);
   }
+}
+
+TEST_CASE("max_pool: a window far larger than the image is the image, also for gradients in float") {
+  const MaxPool far{.size = 2147483647, .stride = 2147483647, .ceil_mode = true}, whole{5, 5, true};
+  const std::vector in{uniform<float>({2, 3, 5, 2}, -1, 1, 1)};
+  CHECK(run_op([&](auto&, auto v) { return max_pool(v[0], far); }, in) ==
+        run_op([&](auto&, auto v) { return max_pool(v[0], whole); }, in));
 }

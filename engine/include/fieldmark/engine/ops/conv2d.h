@@ -20,7 +20,7 @@ template <class T>
 Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, Activation activation = Activation::none,
               ConvMethod method = ConvMethod::fastest);
 
-/// Geometry of the windows of conv2d().
+/// Geometry of the windows of conv2d(). None is above 2147483647.
 struct ConvWindow {
   Index stride = 1;    ///< pixels from one window to the next, both ways, >= 1
   Index padding = 0;   ///< pixels of zeros around the image, >= 0
@@ -35,7 +35,8 @@ struct ConvWindow {
 /// @param x  [N, H, W, C]   @param w  [K, K, C / G, O], any K   @param b  [O]
 /// @return [N, (H + 2 p - L) / s + 1, (W + 2 p - L) / s + 1, O], rounded down
 /// @throws ShapeError if they do not fit or the padded image is smaller than the window
-/// @throws ValueError if stride, padding, dilation or groups is out of range
+/// @throws ValueError if stride, padding, dilation or groups is out of range, the window exceeds 2147483647
+/// pixels, or the padded image has 2^60 elements or more
 /// Differentiable in: x, w, b. With relu: a kink where the sum is 0, gradient 0 there.
 template <class T>
 Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, ConvWindow steps, Activation activation = Activation::none);

@@ -10,7 +10,8 @@ namespace fieldmark {
 /// @param b  [O]   @param window  stride and padding only
 /// @return [N, (H - 1) s + K - 2 p, (W - 1) s + K - 2 p, O]
 /// @throws ShapeError if they do not fit, x has no pixel, or the padding leaves nothing of the result
-/// @throws ValueError if stride or padding is out of range, or dilation or groups are not 1
+/// @throws ValueError if stride or padding is out of range, dilation or groups are not 1, or the result with
+/// its border has 2^60 elements or more
 /// Differentiable in: x, w, b.
 template <class T>
 Var<T> conv_transpose2d(Var<T> x, Var<T> w, Var<T> b, ConvWindow window = {});

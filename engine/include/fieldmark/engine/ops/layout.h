@@ -39,6 +39,7 @@ Var<T> broadcast_to(Var<T> x, Shape shape);
 /// Pads one axis with constant elements before and after.
 /// @param before, after  0 or more   @param value  of the new elements
 /// @throws ShapeError if the axis is out of range   @throws ValueError if a count is negative
+/// or the result has 2^60 elements or more
 /// Differentiable in: x.
 template <class T>
 Var<T> pad(Var<T> x, int axis, Index before, Index after, double value = 0);

@@ -5,8 +5,9 @@ namespace fieldmark {
 
 /// Averages over windows of size x size pixels with stride size. Trailing rows and columns that do not fill a
 /// window are dropped: a padded average would darken the border.
-/// @param x [N, H, W, C]   @param size  side of a window in pixels, >= 1   @return [N, H / size, W / size, C]
-/// @throws ShapeError if x is not rank 4   @throws ValueError if size is below 1
+/// @param x [N, H, W, C]   @param size  side of a window in pixels, 1 to 2147483647
+/// @return [N, H / size, W / size, C]
+/// @throws ShapeError if x is not rank 4   @throws ValueError if size is out of range
 /// Differentiable in: x.
 template <class T>
 Var<T> avg_pool(Var<T> x, Index size);
@@ -20,8 +21,8 @@ Var<T> global_avg_pool(Var<T> x);
 
 /// Windows of max_pool().
 struct MaxPool {
-  Index size = 2;          ///< side of a window in pixels, >= 1
-  Index stride = 2;        ///< pixels from one window to the next, both ways, >= 1
+  Index size = 2;          ///< side of a window in pixels, 1 to 2147483647
+  Index stride = 2;        ///< pixels from one window to the next, both ways, 1 to 2147483647
   bool ceil_mode = false;  ///< keeps windows that cross the lower or right edge, cut off there
 };
 
