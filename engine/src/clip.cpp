@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "number_text.h"
 #include "ops/chunks.h"
 
 namespace fieldmark {
@@ -48,7 +49,7 @@ void check_limit(double limit) {
 
 template <class T>
 [[noreturn]] void refuse(const std::string& where, Index element, T value) {
-  throw ValueError("[clip_grad_norm] gradients must be finite, got " + std::to_string(value) +
+  throw ValueError("[clip_grad_norm] gradients must be finite, got " + detail::number_text(value) +
                    " at element " + std::to_string(element) + where);
 }
 

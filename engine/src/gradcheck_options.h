@@ -3,17 +3,17 @@
 #include <fieldmark/engine/gradcheck.h>
 
 #include <cmath>
-#include <cstdio>
 #include <string>
+
+#include "number_text.h"
 
 namespace fieldmark::detail {
 
 inline void check_gradcheck_option(const char* function, const char* name, double value, bool ok,
                                    const char* want) {
   if (ok) return;
-  char got[32];
-  std::snprintf(got, sizeof got, "%g", value);  // std::to_string prints 1e-9 as 0
-  throw ValueError("[" + std::string(function) + "] " + name + " must be " + want + ", got " + got);
+  throw ValueError("[" + std::string(function) + "] " + name + " must be " + want + ", got " +
+                   number_text(value));
 }
 
 /// Refuses what would compare nothing or let everything pass. The scale of an error is at least the rounding

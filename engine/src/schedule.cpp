@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "number_text.h"
+
 namespace fieldmark {
 namespace {
 constexpr double kReserve = 0.965;             // of the time: cooldown steps may be slower
@@ -13,7 +15,7 @@ constexpr double kNewest = 0.014;              // weight of a step in step_secon
 
 Schedule::Schedule(const ScheduleOptions& o) : options_(o), total_(o.steps), fixed_(o.steps > 0) {
   const auto require = [](bool ok, const char* what, double got) {
-    if (!ok) throw ValueError("[schedule] " + std::string(what) + ", got " + std::to_string(got));
+    if (!ok) throw ValueError("[schedule] " + std::string(what) + ", got " + detail::number_text(got));
   };
   require(o.steps >= 0, "steps must not be negative", static_cast<double>(o.steps));
   require(o.steps > 0 || (o.seconds > 0 && std::isfinite(o.seconds)), "seconds must be positive", o.seconds);
@@ -44,6 +46,7 @@ void Schedule::observe(Index n, double seconds) {
 }
 
 double Schedule::lr(Index n) const {
+  if (n < 0) throw ValueError("[schedule] n must be at least 0, got " + std::to_string(n));
   const double steady = options_.lr / (1 + static_cast<double>(n) / options_.half_after);
   if (total_ == 0) return steady;
   const double begin = std::floor((1 - options_.cooldown) * static_cast<double>(total_));

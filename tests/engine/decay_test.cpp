@@ -1,6 +1,7 @@
 #include <fieldmark/engine/decay.h>
 
 #include <cmath>
+#include <limits>
 
 #include "support/catch.h"
 
@@ -22,11 +23,14 @@ TEST_CASE("decay: values") {
 }
 
 TEST_CASE("decay: errors") {
-  CHECK_THROWS_WITH(cosine_decay(-1, 10), Contains("[cosine_decay] n must be at least 0, got -1"));
-  CHECK_THROWS_WITH(cosine_decay(0, 0), Contains("[cosine_decay] steps must be positive, got 0"));
-  CHECK_THROWS_WITH(cosine_decay(0, 1, 2), Contains("[cosine_decay] last must be in [0, 1], got 2"));
-  CHECK_THROWS_WITH(step_decay(0, 0), Contains("[step_decay] every must be positive"));
-  CHECK_THROWS_WITH(step_decay(0, 1, 0), Contains("[step_decay] factor must be in (0, 1]"));
+  CHECK_THROWS_WITH(cosine_decay(-1, 10), "[cosine_decay] n must be at least 0, got -1");
+  CHECK_THROWS_WITH(cosine_decay(0, 0), "[cosine_decay] steps must be positive, got 0");
+  CHECK_THROWS_WITH(cosine_decay(0, 1, 2), "[cosine_decay] last must be in [0, 1], got 2");
+  CHECK_THROWS_WITH(step_decay(0, 0), "[step_decay] every must be positive, got 0");
+  CHECK_THROWS_WITH(step_decay(0, 1, 0), "[step_decay] factor must be in (0, 1], got 0");
+  CHECK_THROWS_WITH(step_decay(std::numeric_limits<Index>::min(), 1),
+                    "[step_decay] n must be at least 0, got -9223372036854775808");
+  CHECK_THROWS_WITH(exponential_decay(0, 1.5), "[exponential_decay] factor must be in (0, 1], got 1.5");
   CHECK_THROWS_AS(exponential_decay(0, std::nan("")), ValueError);
-  CHECK_THROWS_WITH(warm_up(0, -1), Contains("[warm_up] steps must be at least 0"));
+  CHECK_THROWS_WITH(warm_up(0, -1), "[warm_up] steps must be at least 0, got -1");
 }

@@ -129,5 +129,10 @@ TEST_CASE("schedule: errors name option and value") {
   CHECK_THROWS_WITH(Schedule({.cooldown = 1}),
                     Contains("[schedule] cooldown must be between 0 and 1, got 1"));
   CHECK_THROWS_WITH(Schedule({.last = 0}), Contains("[schedule] last must be above 0 and at most 1, got 0"));
-  CHECK_NOTHROW(Schedule({.steps = 10, .seconds = 0}));
+  CHECK_THROWS_WITH(Schedule({.cooldown = 1.25}), "[schedule] cooldown must be between 0 and 1, got 1.25");
+  CHECK_THROWS_WITH(Schedule({.steps = -1}), "[schedule] steps must not be negative, got -1");
+  CHECK_THROWS_WITH(Schedule({.lr = -1e-9}), "[schedule] lr must be positive, got -1e-09");
+  const Schedule ten({.steps = 10, .seconds = 0});
+  CHECK_THROWS_AS(ten.lr(-1), ValueError);
+  CHECK_THROWS_WITH(ten.lr(-1), "[schedule] n must be at least 0, got -1");
 }

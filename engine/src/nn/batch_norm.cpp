@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "number_text.h"
+
 namespace fieldmark {
 
 template <class T>
@@ -38,7 +40,7 @@ Var<T> BatchNorm<T>::evaluate(const Params<T>& params, Var<T> x) const {
 template <class T>
 void BatchNorm<T>::update(ParamStore<T>& store, const BatchStatistics& batch, double momentum) const {
   if (!(momentum >= 0 && momentum <= 1))
-    throw ValueError("[BatchNorm] momentum must be in [0, 1], got " + std::to_string(momentum));
+    throw ValueError("[BatchNorm] momentum must be in [0, 1], got " + detail::number_text(momentum));
   const auto blend = [&](std::span<T> running, const std::vector<double>& seen) {
     if (running.size() != seen.size())
       throw ShapeError("[BatchNorm] batch must have " + std::to_string(running.size()) + " channels, got " +

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <string>
 
+#include "number_text.h"
 #include "ops/chunks.h"
 
 namespace fieldmark {
@@ -29,7 +30,7 @@ const T* dropout_factors(Tape<T>& tape, Index n, double p, const CounterRng& rng
 
 template <class T>
 Var<T> dropout(Var<T> x, double p, const CounterRng& rng, std::uint64_t step) {
-  if (!(p >= 0 && p < 1)) throw ValueError("[dropout] p must be in [0, 1), got " + std::to_string(p));
+  if (!(p >= 0 && p < 1)) throw ValueError("[dropout] p must be in [0, 1), got " + detail::number_text(p));
   if (p == 0) return x;
   const Index n = x.shape().size();
   const T* factor = dropout_factors(x.tape(), n, p, rng, step);

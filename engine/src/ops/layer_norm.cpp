@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "number_text.h"
 #include "ops/axes.h"
 
 namespace fieldmark {
@@ -18,7 +19,7 @@ void check_layer_norm(const Var<T>& x, const Var<T>& gamma, const Var<T>& beta, 
   check_extent("layer_norm", "gamma", gamma.shape(), 0, s[-1], "columns of x");
   check_rank("layer_norm", "beta", beta.shape(), 1, "[columns]");
   check_extent("layer_norm", "beta", beta.shape(), 0, s[-1], "columns of x");
-  if (!(eps > 0)) throw ValueError("[layer_norm] eps must be above 0, got " + std::to_string(eps));
+  if (!(eps > 0)) throw ValueError("[layer_norm] eps must be above 0, got " + detail::number_text(eps));
 }
 
 // Sums f(c) over a row, in double.

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <string>
 
+#include "number_text.h"
 #include "ops/elementwise.h"
 
 namespace fieldmark {
@@ -112,8 +113,8 @@ Var<T> cos(Var<T> x) {
 template <class T>
 Var<T> clamp(Var<T> x, double low, double high) {
   if (!(low <= high))
-    throw ValueError("[clamp] low must be at most high, got " + std::to_string(low) + " and " +
-                     std::to_string(high));
+    throw ValueError("[clamp] low must be at most high, got " + detail::number_text(low) + " and " +
+                     detail::number_text(high));
   const T lo = static_cast<T>(low), hi = static_cast<T>(high);
   return detail::elementwise(
       x, [lo, hi](const auto& v) { return (v < lo).select(lo, (v > hi).select(hi, v)); },

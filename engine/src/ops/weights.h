@@ -2,6 +2,7 @@
 #include <span>
 #include <string>
 
+#include "number_text.h"
 #include "ops/chunks.h"
 
 namespace fieldmark::detail {
@@ -16,7 +17,7 @@ void check_weights(const char* op, Index n, std::span<const T> weights) {
   for (std::size_t i = 0; i < weights.size(); ++i)
     if (!(weights[i] >= 0))
       throw ValueError(std::string("[") + op + "] weights: entry " + std::to_string(i) +
-                       " must be 0 or more, got " + std::to_string(weights[i]));
+                       " must be 0 or more, got " + number_text(weights[i]));
 }
 
 // Checks the elements and weights of a mean and returns the reciprocal of the sum of weights.

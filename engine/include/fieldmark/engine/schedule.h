@@ -26,7 +26,7 @@ class Schedule {
   /// Records the time before step n, from which a timed run plans its total. Recent steps weigh more.
   /// @param seconds  since the start of the run
   void observe(Index n, double seconds);
-  /// Returns the step size of step n, counted from 0.
+  /// Returns the step size of step n, counted from 0.   @throws ValueError if n is negative
   double lr(Index n) const;
   /// Returns N, or 0 until a timed run has fixed it.
   Index total() const { return total_; }
