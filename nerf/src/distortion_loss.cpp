@@ -27,8 +27,9 @@ void check(const Shape& sigma, std::size_t delta, std::size_t middle, std::span<
 }  // namespace
 
 template <class T>
-Var<T> distortion_loss(Var<T> sigma, std::span<const T> delta, std::span<const T> middle,
-                       std::span<const Index> ray_begin, double scale) {
+Var<T> distortion_loss(Var<T> sigma, std::span<const std::type_identity_t<T>> delta,
+                       std::span<const std::type_identity_t<T>> middle, std::span<const Index> ray_begin,
+                       double scale) {
   check(sigma.shape(), delta.size(), middle.size(), ray_begin, scale);
   const Index n = sigma.shape()[0], rays = static_cast<Index>(ray_begin.size()) - 1;
   const Index* begin = ray_begin.data();

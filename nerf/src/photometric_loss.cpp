@@ -6,7 +6,8 @@
 namespace fieldmark::nerf {
 
 template <class T>
-Var<T> photometric_loss(Var<T> rays, std::span<const T> truth, std::span<const T> background,
+Var<T> photometric_loss(Var<T> rays, std::span<const std::type_identity_t<T>> truth,
+                        std::span<const std::type_identity_t<T>> background,
                         const PhotometricLossOptions& options) {
   check_rank("photometric_loss", "rays", rays.shape(), 2, "[R, 4]");
   check_extent("photometric_loss", "rays", rays.shape(), 1, 4, "red, green, blue, opacity");

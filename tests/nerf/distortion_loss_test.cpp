@@ -114,3 +114,10 @@ TEST_CASE("distortion_loss: the same bits for one and two threads") {
   const Packed<float> p(begin);
   expect_same_bits(p.op(), {p.sigma});
 }
+
+TEST_CASE("distortion_loss: takes vectors, with the type of the Var") {
+  const std::vector<float> delta{0.5f}, middle{7};
+  const std::vector<Index> begin{0, 1};
+  const auto op = [&](auto&, auto v) { return distortion_loss(v[0], delta, middle, begin); };
+  CHECK(op_values<float>(op, {Tensor<float>(Shape{1}, 1e9f)})[0] == Approx(0.5 / 3).epsilon(1e-6));
+}

@@ -80,3 +80,10 @@ TEST_CASE("photometric_loss: the same bits for one and two threads") {
   expect_same_bits([&](auto&, auto v) { return photometric_loss<float>(v[0], truth.data, back.data); },
                    {uniform<float>({kRays, 4}, 0, 1, 1)});
 }
+
+TEST_CASE("photometric_loss: takes vectors, with the type of the Var") {
+  const std::vector<double> truth{1, 1, 1, 1}, back{0, 0, 0};
+  const auto op = [&](auto&, auto v) { return photometric_loss(v[0], truth, back); };
+  const Tensor<double> rays(Shape{1, 4}, {0.75, 0.75, 0.75, 1});
+  CHECK(op_values<double>(op, {rays})[0] == Approx(0.1 * 0.25 - 0.1 * 0.1 / 2).epsilon(1e-14));
+}

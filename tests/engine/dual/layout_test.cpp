@@ -63,6 +63,9 @@ TEST_CASE("dual/layout: what pad() adds is constant, and what concatenate() join
   CHECK(to_tensor(concatenate({constant, dual}).tangent()).data == std::vector<double>{0, 0, 3, 4});
   CHECK(to_tensor(concatenate({dual, constant}, 0).tangent()).data == std::vector<double>{3, 4, 0, 0});
   CHECK_FALSE(concatenate({constant, constant}).has_tangent());
+  const std::vector<Dual<double>> both{constant, dual};
+  CHECK(to_tensor(concatenate(both).tangent()).data == std::vector<double>{0, 0, 3, 4});
+  CHECK(to_tensor(concatenate(both, 0).tangent()).data == std::vector<double>{0, 0, 3, 4});
 }
 
 TEST_CASE("dual/layout: detach() stops tangent and gradient") {

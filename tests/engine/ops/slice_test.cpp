@@ -19,6 +19,20 @@ TEST_CASE("slice: values, and of concatenate") {
   CHECK(slice(tape.constant(b), 0, 0).shape() == Shape{2, 3, 4, 0});
 }
 
+TEST_CASE("slice: concatenate takes vectors and braced lists alike") {
+  Tape<double> tape;
+  const Tensor<double> a({2, 1}, {1, 2}), b({2, 1}, {3, 4});
+  const std::vector<Var<double>> xs{tape.constant(a), tape.constant(b)};
+  const auto values = [](Var<double> v) {
+    return std::vector<double>(v.value(), v.value() + v.shape().size());
+  };
+  CHECK(values(concatenate(xs)) == std::vector<double>{1, 3, 2, 4});
+  CHECK(values(concatenate({xs[0], xs[1]})) == std::vector<double>{1, 3, 2, 4});
+  CHECK(values(concatenate(xs, 0)) == std::vector<double>{1, 2, 3, 4});
+  CHECK(values(concatenate({xs[0], xs[1]}, 0)) == std::vector<double>{1, 2, 3, 4});
+  CHECK_THROWS_AS(concatenate(std::vector<Var<double>>{}), ValueError);
+}
+
 TEST_CASE("slice: gradient") {
   for (Index n : {0, 1, 4}) {
     CAPTURE(n);

@@ -92,3 +92,10 @@ TEST_CASE("power_budget: errors name what does not fit") {
   CHECK_THROWS_WITH(power_budget<double>(x, kMask, 0),
                     Contains("[power_budget] target must be positive, got 0"));
 }
+
+TEST_CASE("power_budget: takes vectors, with the type of the Var") {
+  const Tensor<double> x({4, 1}, {2, 5, 2, -2});
+  const auto y = op_values([](auto&, auto v) { return power_budget(v[0], kMask, 0.5); }, std::vector{x});
+  CHECK(y[0] == Approx(0.5).epsilon(1e-12));
+  CHECK(y[1] == Approx(1.25).epsilon(1e-12));
+}

@@ -72,3 +72,9 @@ TEST_CASE("weighted_segments: errors name what does not fit") {
     CHECK_THROWS_WITH(run(bad, 6), "[weighted_segments] begin must rise from 0 to the rows of x, 6");
   }
 }
+
+TEST_CASE("weighted_segments: takes vectors, with the type of the Var") {
+  const Tensor<double> x({6, 1}, {1, 2, 3, 4, 5, 6});
+  CHECK(op_values([](auto&, auto v) { return weighted_segments(v[0], kBegin, kWeights); }, std::vector{x}) ==
+        std::vector<double>{-1.5, 0, 6, 7.25});
+}

@@ -6,7 +6,7 @@
 namespace fieldmark::watermark {
 
 template <class T>
-Var<T> power_budget(Var<T> x, std::span<const T> mask, double target) {
+Var<T> power_budget(Var<T> x, std::span<const std::type_identity_t<T>> mask, double target) {
   check_rank("power_budget", "x", x.shape(), 2, "[P, C]");
   const Index pixels = x.shape()[0], channels = x.shape()[1];
   if (static_cast<Index>(mask.size()) != pixels)

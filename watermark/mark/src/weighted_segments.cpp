@@ -6,7 +6,8 @@
 namespace fieldmark::watermark {
 
 template <class T>
-Var<T> weighted_segments(Var<T> x, std::span<const std::int32_t> begin, std::span<const T> weights) {
+Var<T> weighted_segments(Var<T> x, std::span<const std::int32_t> begin,
+                         std::span<const std::type_identity_t<T>> weights) {
   check_rank("weighted_segments", "x", x.shape(), 2, "[S, C]");
   const Index samples = x.shape()[0], channels = x.shape()[1];
   if (static_cast<Index>(weights.size()) != samples)

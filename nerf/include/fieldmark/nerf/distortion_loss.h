@@ -2,6 +2,7 @@
 #include <fieldmark/engine/tape.h>
 
 #include <span>
+#include <type_traits>
 
 namespace fieldmark::nerf {
 
@@ -17,7 +18,8 @@ namespace fieldmark::nerf {
 /// @throws ValueError if ray_begin does not start at 0, decreases or does not end at S, or scale is negative
 /// Differentiable in: sigma. Finite even where a ray saturates.
 template <class T>
-Var<T> distortion_loss(Var<T> sigma, std::span<const T> delta, std::span<const T> middle,
-                       std::span<const Index> ray_begin, double scale = 1);
+Var<T> distortion_loss(Var<T> sigma, std::span<const std::type_identity_t<T>> delta,
+                       std::span<const std::type_identity_t<T>> middle, std::span<const Index> ray_begin,
+                       double scale = 1);
 
 }  // namespace fieldmark::nerf

@@ -2,6 +2,7 @@
 #include <fieldmark/engine/tape.h>
 
 #include <span>
+#include <type_traits>
 
 namespace fieldmark::nerf {
 
@@ -28,7 +29,8 @@ T photometric_residual(const T* ray, const T* truth, const T* background, Index 
 /// @return [1]   @throws ShapeError if sizes do not match   @throws ValueError if huber is not positive
 /// Differentiable in: rays. Kinks of the second derivative at |e| = huber.
 template <class T>
-Var<T> photometric_loss(Var<T> rays, std::span<const T> truth, std::span<const T> background,
+Var<T> photometric_loss(Var<T> rays, std::span<const std::type_identity_t<T>> truth,
+                        std::span<const std::type_identity_t<T>> background,
                         const PhotometricLossOptions& options = {});
 
 }  // namespace fieldmark::nerf

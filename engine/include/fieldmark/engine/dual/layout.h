@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <initializer_list>
 #include <span>
+#include <vector>
 
 namespace fieldmark {
 
@@ -51,10 +52,18 @@ Dual<T> concatenate(std::initializer_list<Dual<T>> xs) {
   return concatenate(std::span<const Dual<T>>(xs.begin(), xs.size()));
 }
 template <class T>
+Dual<T> concatenate(const std::vector<Dual<T>>& xs) {
+  return concatenate(std::span<const Dual<T>>(xs));
+}
+template <class T>
 Dual<T> concatenate(std::span<const Dual<T>> xs, int axis);
 template <class T>
 Dual<T> concatenate(std::initializer_list<Dual<T>> xs, int axis) {
   return concatenate(std::span<const Dual<T>>(xs.begin(), xs.size()), axis);
+}
+template <class T>
+Dual<T> concatenate(const std::vector<Dual<T>>& xs, int axis) {
+  return concatenate(std::span<const Dual<T>>(xs), axis);
 }
 template <class T>
 Dual<T> slice(const Dual<T>& x, Index begin, Index count);

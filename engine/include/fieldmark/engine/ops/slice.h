@@ -3,6 +3,7 @@
 
 #include <initializer_list>
 #include <span>
+#include <vector>
 
 namespace fieldmark {
 
@@ -13,11 +14,17 @@ namespace fieldmark {
 /// Differentiable in: every x.
 template <class T>
 Var<T> concatenate(std::span<const Var<T>> xs);
-/// Overload for a braced list of tensors.
+/// @{
+/// Overload for a braced list or a vector of tensors.
 template <class T>
 Var<T> concatenate(std::initializer_list<Var<T>> xs) {
   return concatenate(std::span<const Var<T>>(xs.begin(), xs.size()));
 }
+template <class T>
+Var<T> concatenate(const std::vector<Var<T>>& xs) {
+  return concatenate(std::span<const Var<T>>(xs));
+}
+/// @}
 
 /// Concatenates tensors along any axis.
 /// @param xs  one or more, equal in all axes but this one   @param axis  negative: counts from the last
@@ -25,11 +32,17 @@ Var<T> concatenate(std::initializer_list<Var<T>> xs) {
 /// Differentiable in: every x.
 template <class T>
 Var<T> concatenate(std::span<const Var<T>> xs, int axis);
-/// Overload for a braced list of tensors.
+/// @{
+/// Overload for a braced list or a vector of tensors.
 template <class T>
 Var<T> concatenate(std::initializer_list<Var<T>> xs, int axis) {
   return concatenate(std::span<const Var<T>>(xs.begin(), xs.size()), axis);
 }
+template <class T>
+Var<T> concatenate(const std::vector<Var<T>>& xs, int axis) {
+  return concatenate(std::span<const Var<T>>(xs), axis);
+}
+/// @}
 
 /// Returns entries begin .. begin + count - 1 of the last axis.
 /// @param x [.., C]   @return [.., count]

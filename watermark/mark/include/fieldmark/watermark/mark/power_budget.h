@@ -2,6 +2,7 @@
 #include <fieldmark/engine/tape.h>
 
 #include <span>
+#include <type_traits>
 
 namespace fieldmark::watermark {
 
@@ -14,6 +15,6 @@ namespace fieldmark::watermark {
 /// @throws ValueError if target is not positive
 /// Differentiable in: x.
 template <class T>
-Var<T> power_budget(Var<T> x, std::span<const T> mask, double target);
+Var<T> power_budget(Var<T> x, std::span<const std::type_identity_t<T>> mask, double target);
 
 }  // namespace fieldmark::watermark

@@ -2,6 +2,7 @@
 #include <fieldmark/engine/tape.h>
 
 #include <span>
+#include <type_traits>
 
 namespace fieldmark::watermark {
 
@@ -12,6 +13,7 @@ namespace fieldmark::watermark {
 /// both must outlive the pass   @return [P, C]   @throws ShapeError, ValueError if they do not fit
 /// Differentiable in: x.
 template <class T>
-Var<T> weighted_segments(Var<T> x, std::span<const std::int32_t> begin, std::span<const T> weights);
+Var<T> weighted_segments(Var<T> x, std::span<const std::int32_t> begin,
+                         std::span<const std::type_identity_t<T>> weights);
 
 }  // namespace fieldmark::watermark
