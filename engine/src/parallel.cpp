@@ -34,14 +34,18 @@ void detail::parallel_chunks(Index chunks, void* context, void (*run)(void*, Ind
     for (Index c = 0; c < chunks; ++c) run(context, c);
     return;
   }
-  std::exception_ptr error;
+  std::exception_ptr error;  // of the first chunk that failed, as in a serial loop
+  Index failed = chunks;
 #pragma omp parallel for schedule(dynamic, 1) num_threads(n)
   for (Index c = 0; c < chunks; ++c) {
     try {
       run(context, c);
     } catch (...) {
 #pragma omp critical(fieldmark_parallel_error)
-      if (!error) error = std::current_exception();
+      if (c < failed) {
+        failed = c;
+        error = std::current_exception();
+      }
     }
   }
   if (error) std::rethrow_exception(error);

@@ -2,6 +2,7 @@
 #include <fieldmark/engine/parallel.h>
 
 #include <algorithm>
+#include <string>
 #include <vector>
 
 #include "support/catch.h"
@@ -43,6 +44,18 @@ TEST_CASE("parallel: an exception of a chunk reaches the caller, nested loops ar
                                    if (b == 50) throw ValueError("fifty");
                                  }),
                     "fifty");
+  for (const int n_threads : {1, 2, 3})
+    for (int repeat = 0; repeat < 50; ++repeat) {
+      const ScopedThreads scope(n_threads);
+      const auto late_first = [](Index b, Index) {
+        // The first failing chunk does the most work, so that on several threads another fails before it.
+        volatile double work = 0;
+        if (b == 3)
+          for (int i = 0; i < 20000; ++i) work = work + 1;
+        if (b % 3 == 0 && b > 0) throw ValueError("chunk " + std::to_string(b));
+      };
+      CHECK_THROWS_WITH(parallel_for(64, 1, late_first), "chunk 3");
+    }
   std::vector<int> seen(64);
   parallel_for(8, 1, [&](Index b, Index) {
     parallel_for(8, 1, [&](Index c, Index) { ++seen[static_cast<std::size_t>(8 * b + c)]; });

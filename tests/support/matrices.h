@@ -1,4 +1,10 @@
 #pragma once
+#include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/tape.h>
+
+#include <string>
+
+#include "support/catch.h"
 #include "support/random.h"
 
 /// Returns random square matrices [.., n, n] in [-1, 1), with 3, 4, .. added to the diagonal.
@@ -9,4 +15,20 @@ fieldmark::Tensor<T> regular(fieldmark::Shape shape, unsigned seed) {
   for (fieldmark::Index i = 0; i < t.size(); ++i)
     if (i / n % n == i % n) t[i] += static_cast<T>(3 + i % n);
   return t;
+}
+
+/// Fails unless an op of a batch with several bad matrices, filled with `bad`, names the first by its place,
+/// on one and on two threads.
+/// @param f  called with a Var [200, 3, 3]
+template <class F>
+void expect_first_bad_named(const F& f, const std::string& op, double bad = 0) {
+  auto a = regular({200, 3, 3}, 1);
+  for (const fieldmark::Index which : {37, 38, 90, 101, 150, 199})
+    for (fieldmark::Index i = 0; i < 9; ++i) a[which * 9 + i] = bad;
+  for (const int threads : {1, 2})
+    for (int repeat = 0; repeat < 20; ++repeat) {
+      const fieldmark::ScopedThreads scope(threads);
+      fieldmark::Tape<double> tape;
+      CHECK_THROWS_WITH(f(tape.constant(a)), Contains("[" + op + "] a: matrix 37 must"));
+    }
 }

@@ -38,6 +38,10 @@ TEST_CASE("cholesky: errors") {
   CHECK_THROWS_WITH(cholesky(tape.constant(nan)), Contains("matrix 0 must be finite"));
 }
 
+TEST_CASE("cholesky: the first of several singular matrices is named for any thread count") {
+  expect_first_bad_named([](auto a) { return cholesky(a); }, "cholesky");
+}
+
 TEST_CASE("cholesky: same bits for any thread count") {
   expect_same_bits(f_cholesky, {regular<float>({50, 9, 9}, 1)});
   expect_same_bits(f_cholesky, {regular<float>({150, 150}, 1)});

@@ -43,6 +43,11 @@ TEST_CASE("determinant: errors") {
                     Contains("[log_determinant] a: matrix 0 must not be singular"));
 }
 
+TEST_CASE("determinant: the first of several bad matrices is named for any thread count") {
+  expect_first_bad_named([](auto a) { return log_determinant(a); }, "log_determinant");
+  expect_first_bad_named([](auto a) { return determinant(a); }, "determinant", std::nan(""));
+}
+
 TEST_CASE("determinant: same bits for any thread count") {
   expect_same_bits(f_det, {regular<float>({50, 9, 9}, 1)});
   expect_same_bits(f_log_det, {regular<float>({50, 9, 9}, 1)});

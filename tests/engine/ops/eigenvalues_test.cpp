@@ -40,6 +40,11 @@ TEST_CASE("eigenvalues: errors") {
                     "[symmetric_eigenvalues] a: matrix 0 must be finite, got a NaN or an infinity");
 }
 
+TEST_CASE("eigenvalues: the first of several bad matrices is named for any thread count") {
+  expect_first_bad_named([](auto a) { return symmetric_eigenvalues(a); }, "symmetric_eigenvalues",
+                         std::nan(""));
+}
+
 TEST_CASE("eigenvalues: same bits for any thread count") {
   expect_same_bits(f_eigenvalues, {regular<float>({50, 9, 9}, 1)});
 }

@@ -93,6 +93,12 @@ TEST_CASE("linear_solve: errors") {
   CHECK_THROWS_AS(inverse(single.constant(rounded)), ValueError);
 }
 
+TEST_CASE("linear_solve: the first of several singular matrices is named for any thread count") {
+  expect_first_bad_named([](auto a) { return inverse(a); }, "inverse");
+  expect_first_bad_named([](auto a) { return solve(a, a); }, "solve");
+  expect_first_bad_named([](auto a) { return triangular_solve(a, a); }, "triangular_solve");
+}
+
 TEST_CASE("linear_solve: same bits for any thread count") {
   const auto a = regular<float>({9, 40, 40}, 1), b = uniform<float>({9, 40, 3}, -1, 1, 2);
   expect_same_bits(f_solve, {a, b});

@@ -33,7 +33,8 @@ bool runs_on_one_thread();
 
 /// Calls f(begin, end) over [0, n) in chunks of `grain`, on several threads; runs serially inside another
 /// parallel loop and for a single chunk. Chunks do not depend on the thread count, so a result that depends
-/// only on the chunk has the same bits for any number of threads. Rethrows an exception of f.
+/// only on the chunk has the same bits for any number of threads. Rethrows the exception of the first chunk
+/// that failed, in the order of the chunks.
 template <class F>
 void parallel_for(Index n, Index grain, F&& f) {
   if (n <= 0) return;
