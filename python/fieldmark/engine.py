@@ -256,6 +256,9 @@ def gradcheck(f: Callable[..., Value_float64], inputs: Sequence[npt.NDArray[np.f
               rtol: float = 1e-7, parameters: Optional[Parameters_float64] = None) -> GradcheckReport:
     """Compares gradients with finite differences, in float64. The report is true if no gradient is wrong.
 
+    Parameters that layers of f read, but which are not in ``parameters``, are constants of the check. It still adds
+    to their gradients: call ``zero_grad()`` before you train on.
+
     :param f: takes a value for each input and returns one
     :param inputs: arrays of float64
     :param rtol: largest relative error of a gradient, see ``GradcheckReport.worst``
@@ -270,7 +273,8 @@ def vjp(f: Callable[..., Any], inputs: Sequence[npt.NDArray[F]],
 
         value, (by_a, by_b) = engine.vjp(lambda a, b: a @ b, [a, b], np.ones((3, 2)))
 
-    An input that f does not use gives zeros. ShapeError unless u has the shape of f(x).
+    An input that f does not use gives zeros. ShapeError unless u has the shape of f(x). As every backward, it adds to
+    the gradients of parameters that layers of f read: call ``zero_grad()`` before you train on.
 
     :param f: takes a value for each input and returns one
     :param inputs: arrays, all float32 or all float64
@@ -297,7 +301,8 @@ def hvp(f: Callable[..., Any], inputs: Sequence[npt.NDArray[F]],
         directions: Sequence[npt.NDArray[F]]) -> Tuple[npt.NDArray[F], List[npt.NDArray[F]]]:
     """The value f(x) of one element, and the Hessian-vector product H v for each input.
 
-    Errors as of ``jvp``, and ShapeError if f(x) has more than one element.
+    Errors as of ``jvp``, and ShapeError if f(x) has more than one element. Adds to the gradients of parameters that f
+    reads with ``leaf``, as ``vjp`` does.
 
     :param f: takes a value for each input and returns one of one element
     :param inputs: arrays, all float32 or all float64

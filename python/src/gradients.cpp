@@ -157,7 +157,8 @@ void bind_gradients(py::module_& module) {
       "gradcheck", &check_gradients, "f"_a, "inputs"_a, "rtol"_a = 1e-7, "parameters"_a = py::none(),
       "Compares gradients with finite differences, in float64; those of `parameters`, too, which f reads "
       "through\n"
-      "layers or leaf(). ValueError unless 0 < rtol < 1.");
+      "layers or leaf(). Adds to the gradients of other parameters that layers of f read. ValueError unless\n"
+      "0 < rtol < 1.");
   module.def(
       "vjp",
       [](const py::function& f, const std::vector<py::object>& inputs, const py::object& cotangent) {
@@ -166,7 +167,8 @@ void bind_gradients(py::module_& module) {
       },
       "f"_a, "inputs"_a, "cotangent"_a,
       "The value f(x) and, for each input, the vector-Jacobian product J^T u of its shape, u the cotangent.\n"
-      "ShapeError unless u has the shape of f(x).");
+      "ShapeError unless u has the shape of f(x). Adds to the gradients of parameters that layers of f "
+      "read.");
   using Arrays = const std::vector<py::object>&;
   module.def(
       "jvp",

@@ -131,3 +131,24 @@ TEST_CASE("products: errors") {
     CHECK_THROWS_WITH(run(elsewhere, x), Contains("f must return a value of the tape that it is given"));
   CHECK_THROWS_WITH(vjp(elsewhere, {x}, x), Contains("[vjp] f must return a value of the tape"));
 }
+
+TEST_CASE("products: vjp and hvp add to the gradients of a store that f reads with gradients") {
+  ParamStore<double> store;
+  const auto id = store.add("w", {2});
+  store.values()[0] = 3, store.values()[1] = 4;
+  const Tensor<double> x({2}, {0.5, -1}), u({2}, {1, 10}), v({2}, {1, 1});
+  for (const bool gradients : {true, false}) {
+    const Params<double> params = gradients ? Params<double>(store) : Params<double>(store, nullptr);
+    store.zero_grad();
+    const auto linear = [&](Tape<double>& tape, auto xs) { return xs[0] * params.leaf(tape, id); };
+    CHECK(vjp<double>(linear, {x}, u).products[0].data == product_values({3, 40}));
+    CHECK(store.grads()[0] == (gradients ? 0.5 : 0));
+    CHECK(store.grads()[1] == (gradients ? -10 : 0));
+    store.zero_grad();
+    const auto scaled = [&](Tape<double>& tape, auto xs) {
+      return sum(square(xs[0]) * Dual<double>(params.leaf(tape, id)));
+    };
+    CHECK(hvp<double>(scaled, {x}, {v}).products[0].data == product_values({6, 8}));
+    CHECK((store.grads()[0] != 0) == gradients);
+  }
+}

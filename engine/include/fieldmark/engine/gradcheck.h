@@ -37,6 +37,10 @@ using GradcheckFn = std::function<Var<double>(Tape<double>&, std::span<const Var
 /// outputs of a preceding op, as in a network, where buffers hold NaN until they are filled, after two calls;
 /// and for every subset of the inputs, with the others constant (for more than six inputs: each alone, and
 /// all but each).
+///
+/// Parameters that f reads through Params(store) are constants of the check, but each pass adds to the
+/// gradients of the store. Read them through Params(store, nullptr), which computes no gradients, or check
+/// them with gradcheck_module(), which leaves the store as it was.
 /// @throws ValueError if there are no inputs or an option is out of range   @throws whatever f throws
 GradcheckReport gradcheck(const GradcheckFn& f, std::span<const Tensor<double>> inputs,
                           const GradcheckOptions& options = {});
@@ -46,7 +50,7 @@ GradcheckReport gradcheck(const GradcheckFn& f, std::span<const Tensor<double>> 
 using ModuleGradcheckFn =
     std::function<Var<double>(Tape<double>&, const Params<double>&, std::span<const Var<double>>)>;
 /// Like gradcheck(), with a module's parameters as one more input: the last of the report, laid out like
-/// store.values(). Running ones are unchanged and have no gradient.
+/// store.values(). Running ones are unchanged and have no gradient. The store keeps its values and gradients.
 /// @throws ValueError if there are neither inputs nor parameters, or an option is out of range
 GradcheckReport gradcheck_module(const ModuleGradcheckFn& f, const ParamStore<double>& store,
                                  std::span<const Tensor<double>> inputs,

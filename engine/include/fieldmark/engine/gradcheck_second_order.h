@@ -24,6 +24,7 @@ struct SmoothFn {
 ///   H v, H the Hessian of <u, f(x)>, with d/ds of the gradient J^T u at x + s v
 /// Errors against differences are relative to the largest of the entry's own magnitude, a thousandth of the
 /// largest of its tensor, and the rounding error of the difference. NaN fails.
+/// Parameters that f reads through Params(store) receive gradients as in gradcheck().
 /// @param options  step multiplies eps^(1/5), the step of s; v lies in [-1, 1]
 /// @return entries counts those of J v and H v
 /// @throws ValueError if there are no inputs or an option is out of range   @throws whatever f throws

@@ -15,6 +15,10 @@ namespace fieldmark {
 //   const auto f = [&](auto& tape, auto x) { return sum(tanh(matmul(x[0], tape.constant(w)))); };
 // For jvp() and hvp(), include the Dual ops that f needs from engine/dual/. An input that f does not use
 // gives zeros.
+//
+// Parameters that f reads through Params(store) are constants, but vjp() and hvp() add to the gradients of
+// the store, as every backward does. Params(store, nullptr) computes no gradients and leaves the store as it
+// was.
 
 /// A function f of Vars.
 template <class T>
@@ -52,7 +56,8 @@ Jvp<T> jvp(const std::type_identity_t<DualFunction<T>>& f, std::initializer_list
 /// @}
 
 /// @{
-/// Computes the vector-Jacobian product J^T u for each input, in reverse mode.
+/// Computes the vector-Jacobian product J^T u for each input, in reverse mode. Adds to the gradients of
+/// parameters that f reads through Params(store); Params(store, nullptr) has none.
 /// @param cotangent  u, of the shape of f(x)   @throws ShapeError if its shape differs
 template <class T>
 InputProducts<T> vjp(const std::type_identity_t<VarFunction<T>>& f, std::span<const Tensor<T>> inputs,
@@ -67,6 +72,7 @@ InputProducts<T> vjp(const std::type_identity_t<VarFunction<T>>& f, std::initial
 /// @{
 /// Computes Hessian-vector products of a scalar f by a backward pass from its tangent:
 ///   (H v)_i = sum_j d^2 f / dx_i dx_j v_j
+/// Adds to the gradients of parameters that f reads through Params(store); Params(store, nullptr) has none.
 /// @param directions  v, one per input, of its shape
 /// @throws ShapeError if a shape differs or f(x) has more than one element
 /// @throws ValueError if the numbers of inputs and directions differ
