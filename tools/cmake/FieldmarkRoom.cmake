@@ -150,8 +150,9 @@ function(fieldmark_kernels target kernels result)
       set(object ${target}_${kernel}_${level})
       add_library(${object} OBJECT src/kernels/${kernel}.cpp)
       target_compile_definitions(${object} PRIVATE FIELDMARK_ISA_NS=isa_${level})
+      # -mno-mmx: GCC 12 moves 8 bytes through an MMX register of x86-64-v2, after which long double is NaN.
       target_compile_options(${object} PRIVATE -march=x86-64-${level} -mtune=generic -O3 -ffp-contract=fast
-                             -fno-math-errno -fno-trapping-math -Wno-psabi)
+                             -fno-math-errno -fno-trapping-math -mno-mmx -Wno-psabi)
       target_compile_features(${object} PRIVATE cxx_std_20)
       target_include_directories(${object} PRIVATE src include ${PROJECT_SOURCE_DIR}/engine/include)
       target_link_libraries(${object} PRIVATE fieldmark_common_warnings)

@@ -11,13 +11,18 @@ using fieldmark::Index;
 // the L1 cache.
 constexpr Index kSegment = 32;
 
-// Calls f(V{}, c) for vectors V = Vec<T> of channels, then f(T{}, c) for each remaining channel.
-template <class T, class F>
-[[gnu::always_inline]] inline void for_channels(Index channels, F f) {
-  constexpr Index lanes = simd::kLanes<T>;
-  Index c = 0;
-  for (; c + lanes <= channels; c += lanes) f(simd::Vec<T>{}, c);
-  for (; c < channels; ++c) f(T{}, c);
+// Calls f(V{}, c) for the channels from c on: with vectors V of `bytes` while they last, then with vectors of
+// half the size down to 16 bytes, then with V = T.
+template <class T, Index bytes = simd::kBytes, class F>
+[[gnu::always_inline]] inline void for_channels(Index channels, F f, Index c = 0) {
+  if constexpr (bytes < 16) {
+    for (; c < channels; ++c) f(T{}, c);
+  } else {
+    typedef T Vector __attribute__((vector_size(bytes)));
+    constexpr Index lanes = bytes / static_cast<Index>(sizeof(T));
+    for (; c + lanes <= channels; c += lanes) f(Vector{}, c);
+    for_channels<T, bytes / 2>(channels, f, c);
+  }
 }
 
 // Loads a vector or a scalar at p.

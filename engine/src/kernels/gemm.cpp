@@ -2,6 +2,8 @@
 
 #include <fieldmark/engine/simd.h>
 
+#include <cstring>
+
 namespace fieldmark::kernels::FIELDMARK_ISA_NS {
 namespace {
 
@@ -35,12 +37,13 @@ template <class T, int R, int V>
     }
 }
 
-// Computes one block of C in registers; the rows of B are `stride` apart.
-template <class T, int R, int V>
+// Computes one block of C in registers; the rows of B are `stride` apart. far: C may have left the caches.
+template <class T, int R, int V, bool far = true>
 [[gnu::always_inline]] inline void block(const Gemm<T>& g, const T* a, const T* b, Index stride, T* c,
                                          Index ldc, const T* bias, const T* mask) {
   constexpr int L = kLanes<T>;
-  if (g.k >= kLongSum) prefetch_ends<T, R, V>(g, c, ldc, mask);
+  if constexpr (far)
+    if (g.k >= kLongSum) prefetch_ends<T, R, V>(g, c, ldc, mask);
   Vec<T> acc[R][V];
   for (int i = 0; i < R; ++i)
     for (int j = 0; j < V; ++j)
@@ -73,6 +76,9 @@ template <class T, int R, int V>
       simd::store(c + i * ldc + j * L, g.relu ? simd::max(Vec<T>{}, acc[i][j]) : acc[i][j]);
 }
 
+// The rows of the next smaller block.
+constexpr int fewer_rows(int rows) { return rows > 8 ? 8 : rows > 4 ? 4 : rows / 2; }
+
 // All rows of V vectors of columns: blocks of R rows, then ever smaller blocks for the rest.
 template <class T, int V, int R = rows_of(V)>
 void panel(const Gemm<T>& g, const T* b, Index stride, Index column, Index i = 0) {
@@ -81,32 +87,43 @@ void panel(const Gemm<T>& g, const T* b, Index stride, Index column, Index i = 0
     block<T, R, V>(g, g.a + i * g.a_row, b, stride, g.c + i * g.ldc + column, g.ldc, bias,
                    mask ? mask + i * g.ldc : nullptr);
   if constexpr (R > 1)
-    if (i < g.m) panel<T, V, (R > 8 ? 8 : R > 4 ? 4 : R / 2)>(g, b, stride, column, i);
+    if (i < g.m) panel<T, V, fewer_rows(R)>(g, b, stride, column, i);
+}
+
+// Copies n < 2 most elements in pieces of constant size, which the compiler turns into one move each.
+template <int most, class T>
+[[gnu::always_inline]] inline void copy_few(const T* from, T* to, int n) {
+  if (n & most) {
+    std::memcpy(to, from, most * sizeof(T));
+    from += most;
+    to += most;
+  }
+  if constexpr (most > 1) copy_few<most / 2>(from, to, n);
 }
 
 // Columns that do not fill a vector: C passes through a separate block.
-template <class T>
-void narrow(const Gemm<T>& g, const T* b, Index stride, Index j, int columns) {
-  constexpr int W = kLanes<T>, R = rows_of(1);
-  T bias[W] = {}, c[R * W] = {};
-  if (g.bias)
-    for (int x = 0; x < columns; ++x) bias[x] = g.bias[j + x];
-  for (Index i = 0; i < g.m; i += R) {
-    const int count = static_cast<int>(g.m - i < R ? g.m - i : R);
+template <class T, int R = rows_of(1)>
+void narrow(const Gemm<T>& g, const T* b, Index stride, Index column, int columns, Index i = 0) {
+  constexpr int W = kLanes<T>;
+  const auto copy = [=](const T* from, T* to) { copy_few<W / 2>(from, to, columns); };
+  T bias[W] = {}, mask[W] = {}, c[R * W] = {};
+  if (g.bias) copy(g.bias + column, bias);
+  for (; i + R <= g.m; i += R) {
+    const Index at = i * g.ldc + column;
     if (g.accumulate)
-      for (int r = 0; r < count; ++r)
-        for (int x = 0; x < columns; ++x) c[r * W + x] = g.c[(i + r) * g.ldc + j + x];
-    if (count == R)
-      block<T, R, 1>(g, g.a + i * g.a_row, b, stride, c, W, bias, nullptr);
-    else
-      for (int r = 0; r < count; ++r)
-        block<T, 1, 1>(g, g.a + (i + r) * g.a_row, b, stride, c + r * W, W, bias, nullptr);
-    for (int r = 0; r < count; ++r)
-      for (int x = 0; x < columns; ++x) {
-        const Index at = (i + r) * g.ldc + j + x;
-        g.c[at] = !g.mask || g.mask[at] > 0 ? c[r * W + x] : T(0);
+      for (int r = 0; r < R; ++r) copy(g.c + at + r * g.ldc, c + r * W);
+    block<T, R, 1, false>(g, g.a + i * g.a_row, b, stride, c, W, bias, nullptr);
+    for (int r = 0; r < R; ++r) {
+      if (g.mask) {
+        copy(g.mask + at + r * g.ldc, mask);
+        const Vec<T> sum = simd::load(c + r * W);
+        simd::store(c + r * W, simd::load(mask) > Vec<T>{} ? sum : Vec<T>{});
       }
+      copy(c + r * W, g.c + at + r * g.ldc);
+    }
   }
+  if constexpr (R > 1)
+    if (i < g.m) narrow<T, fewer_rows(R)>(g, b, stride, column, columns, i);
 }
 
 // Row i of a full panel: whole vectors, without the checks of a loop over any width.

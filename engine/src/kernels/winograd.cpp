@@ -112,17 +112,6 @@ template <class Line, class T, class V, class Load, class Store>
   }
 }
 
-// As for_channels(), with vectors of 16 bytes before scalars, since a transform of 36 elements is expensive.
-template <class T, class F>
-[[gnu::always_inline]] inline void for_vectors(Index channels, F f) {
-  typedef T Short __attribute__((vector_size(16)));
-  constexpr Index lanes = simd::kLanes<T>, few = 16 / static_cast<Index>(sizeof(T));
-  Index c = 0;
-  for (; c + lanes <= channels; c += lanes) f(simd::Vec<T>{}, c);
-  for (; c + few <= channels; c += few) f(Short{}, c);
-  for (; c < channels; ++c) f(T{}, c);
-}
-
 constexpr Index smaller(Index a, Index b) { return a < b ? a : b; }
 
 // Calls f with the number of a tile within `count`, the offset of its first pixel from that of the image, its
@@ -144,9 +133,10 @@ template <class T, class F>
   T* at = to.data + row * to.panel;
   for (Index first = 0; first < channels; first += to.panel, at += to.distance) {
     const Index width = smaller(to.panel, channels - first);
-    for_vectors<T>(width, [=](auto zero, Index c) { f(zero, first + c, at + c); });
-    for (Index c = width; c < to.panel; ++c)
-      for (Index k = 0; k < kWinogradProducts; ++k) at[k * to.stride + c] = 0;
+    for_channels<T>(width, [=](auto zero, Index c) { f(zero, first + c, at + c); });
+    for_channels<T>(to.panel - width, [=](auto zero, Index c) {
+      for (Index k = 0; k < kWinogradProducts; ++k) store_as(at + k * to.stride + width + c, zero);
+    });
   }
 }
 
@@ -252,9 +242,9 @@ void winograd_outputs(const WinogradTiles<T>& x, const WinogradMatrices<const T>
   for_tiles(x, [=](Index t, Index image, Index row, Index column) {
     const Index rows = x.h - row, columns = x.w - column;
     T* y = out.y + (image + row * x.w + column) * pixel;
-    for_vectors<T>(pixel, [=](auto zero, Index c) {
+    for_channels<T>(pixel, [=](auto zero, Index c) {
       using V = decltype(zero);
-      const T* from = m.data + t * pixel + c;
+      const T* from = m.data + t * m.panel + c;
       const V bias = out.bias ? load_as<V>(out.bias + c) : V{};
       both_axes<OutputLine, T, V>([=](int i, int j) { return load_as<V>(from + (i * 6 + j) * m.stride); },
                                   [=](int i, int j, V v) {
@@ -271,15 +261,16 @@ void winograd_outputs(const WinogradTiles<T>& x, const WinogradMatrices<const T>
 template <class T>
 void winograd_weight_gradient(const WinogradMatrices<const T>& m, Index c_in, Index c_out, T* dw) {
   const Index plane = c_in * c_out;
-  for_vectors<T>(plane, [=](auto zero, Index at) {
-    using V = decltype(zero);
-    both_axes<GradientLine, T, V>(
-        [=](int i, int j) { return load_as<V>(m.data + (i * 6 + j) * m.stride + at); },
-        [=](int i, int j, V v) {
-          T* to = dw + (i * 3 + j) * plane + at;
-          store_as(to, load_as<V>(to) + v);
-        });
-  });
+  for (Index row = 0; row < c_in; ++row)
+    for_channels<T>(c_out, [=](auto zero, Index c) {
+      using V = decltype(zero);
+      const T* from = m.data + row * m.panel + c;
+      both_axes<GradientLine, T, V>([=](int i, int j) { return load_as<V>(from + (i * 6 + j) * m.stride); },
+                                    [=](int i, int j, V v) {
+                                      T* to = dw + (i * 3 + j) * plane + row * c_out + c;
+                                      store_as(to, load_as<V>(to) + v);
+                                    });
+    });
 }
 
 #define FIELDMARK_INSTANTIATE(T)                                                                    \

@@ -44,6 +44,11 @@ template <class T>
 WinogradMatrices<T> row_major(T* data, Index rows, Index columns) {
   return {data, padded(rows * columns), columns, Index{0}};
 }
+// Rows of whole vectors, so that a product writes no part of one.
+template <class T>
+WinogradMatrices<T> in_whole_rows(T* data, Index rows, Index columns) {
+  return row_major<T>(data, rows, whole_row<T>(columns));
+}
 template <class T>
 WinogradMatrices<T> in_panels(T* data, Index rows, Index columns) {
   const Index panel = panel_width<T>(columns);
@@ -76,20 +81,20 @@ void winograd_convolve(Tape<T>& tape, const ConvGeometry& g, const Convolution<T
   const auto multiply = FIELDMARK_KERNEL(gemm<T>);
   const auto finish = FIELDMARK_KERNEL(winograd_outputs<T>);
   parallel_for(tiles_of(g), kBlock, [&](Index begin, Index end) {
-    WinogradMatrices<T> v = row_major<T>(nullptr, kBlock, g.c), m = row_major<T>(nullptr, kBlock, g.o);
+    WinogradMatrices<T> v = row_major<T>(nullptr, kBlock, g.c), m = in_whole_rows<T>(nullptr, kBlock, g.o);
     v.data = workspace<T>(kWinogradProducts * (v.stride + m.stride));
     m.data = v.data + kWinogradProducts * v.stride;
     WinogradTiles<T> tiles{c.x, c.mask, g.h, g.w, g.c, begin, end - begin};
     transform(tiles, v);
     for (Index k = 0; k < kWinogradProducts; ++k)
       multiply({.m = end - begin,
-                .n = g.o,
+                .n = m.panel,
                 .k = g.c,
                 .a = v.data + k * v.stride,
                 .a_row = g.c,
                 .b = weights.data + k * weights.stride,
                 .c = m.data + k * m.stride,
-                .ldc = g.o});
+                .ldc = m.panel});
     tiles.channels = g.o;
     finish(tiles, {m.data, m.stride, m.panel, m.distance}, {c.y, c.bias, c.accumulate, c.relu});
   });
@@ -106,7 +111,7 @@ void winograd_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* x, 
   const auto finish = FIELDMARK_KERNEL(winograd_weight_gradient<T>);
   sharded_sum(tape, tiles_of(g), kBlock, dw, 9 * g.c * g.o, [&](Index first, Index last, T* to) {
     WinogradMatrices<T> v = row_major<T>(nullptr, kBlock, g.c), d = in_panels<T>(nullptr, kBlock, g.o),
-                        m = row_major<T>(nullptr, g.c, g.o);
+                        m = in_whole_rows<T>(nullptr, g.c, g.o);
     v.data = workspace<T>(kWinogradProducts * (v.stride + d.stride + m.stride));
     d.data = v.data + kWinogradProducts * v.stride;
     m.data = d.data + kWinogradProducts * d.stride;
@@ -116,7 +121,7 @@ void winograd_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* x, 
       tiles({dy, mask, g.h, g.w, g.o, begin, count}, d);
       for (Index k = 0; k < kWinogradProducts; ++k)
         multiply({.m = g.c,
-                  .n = g.o,
+                  .n = m.panel,
                   .k = count,
                   .a = v.data + k * v.stride,
                   .a_row = 1,
@@ -124,7 +129,7 @@ void winograd_weight_gradient(Tape<T>& tape, const ConvGeometry& g, const T* x, 
                   .b = d.data + k * d.stride,
                   .b_panel = d.distance,
                   .c = m.data + k * m.stride,
-                  .ldc = g.o,
+                  .ldc = m.panel,
                   .accumulate = begin > first});
     }
     if (last > first) finish({m.data, m.stride, m.panel, m.distance}, g.c, g.o, to);

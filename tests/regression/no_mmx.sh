@@ -1,0 +1,15 @@
+#!/usr/bin/env bash
+# No instruction of a program names an MMX register: the kernels of C++ code never leave MMX mode, in which every later
+# long double is NaN.
+#   no_mmx.sh PROGRAM
+set -euo pipefail
+program=$1
+command -v objdump >/dev/null || { echo "SKIPPED: no_mmx needs objdump"; exit 0; }
+listing=$(mktemp)
+trap 'rm -f "$listing"' EXIT
+objdump --disassemble --no-show-raw-insn "$program" >"$listing"
+grep -q '%xmm[0-7]' "$listing" || { echo "no_mmx: objdump lists no vector instruction of $program"; exit 1; }
+if grep -m 5 -B 2 -E '%mm[0-7]' "$listing"; then
+  echo "no_mmx: $program uses MMX registers: compile the function above with -mno-mmx"
+  exit 1
+fi
