@@ -12,7 +12,9 @@ using namespace fieldmark::watermark;
 
 namespace {
 
-constexpr CameraSearchOptions kSearch{.views = 40, .size = 32};
+// A tenth of the usual views: rendering them takes most of a test.
+constexpr CameraSearchOptions kSearch{.views = 40, .around = 0, .size = 32};
+constexpr ObjectSearchOptions kObjects{.views = 40};
 const Message kPageMessage{{1, 0, 0, 1}};
 
 Tensor<float> marked_view(const Owner& owner, std::uint64_t seed) {
@@ -52,7 +54,7 @@ TEST_CASE("page_reader: an image that agrees as a whole is read as by the inform
   InformedReader informed(owner, kSearch);
   const ImageReading expected = informed.read(image);
   REQUIRE(expected.chosen == ReadingKind::informed);
-  const PageReading page = PageReader(owner, kSearch).read(image);
+  const PageReading page = PageReader(owner, kSearch, kObjects).read(image);
   CHECK(page.parts.empty());
   CHECK(page.evidence() == expected.evidence());
   CHECK(page.chosen() == ReadingKind::informed);
@@ -65,7 +67,7 @@ TEST_CASE("page_reader: a view on a long page is found and read, on the same bit
   std::vector<double> evidence[2];
   for (const int n : {1, 2}) {
     const ScopedThreads scope(n);
-    const PageReading page = PageReader(owner, kSearch).read(image);
+    const PageReading page = PageReader(owner, kSearch, kObjects).read(image);
     CHECK(page.whole.chosen == ReadingKind::blind);
     CHECK(page.chosen() == ReadingKind::informed);
     REQUIRE(page.parts.size() == 1);
@@ -86,7 +88,7 @@ TEST_CASE("page_reader: the views of a collage are added up") {
   put_image(collage, marked_view(owner, 4), 10, 10);
   put_image(collage, marked_view(owner, 5), 190, 180);
   put_image(collage, marked_view(owner, 6), 10, 350);
-  const PageReading page = PageReader(owner, kSearch).read(collage);
+  const PageReading page = PageReader(owner, kSearch, kObjects).read(collage);
   REQUIRE(page.whole.chosen == ReadingKind::blind);
   REQUIRE(page.parts.size() == 3);
   std::vector<double> sum(owner.code().bit.size());
@@ -101,7 +103,7 @@ TEST_CASE("page_reader: a page without a view of the field is read blindly") {
   Tensor<float> other({100, 100, 3});
   for (Index i = 0; i < other.size(); ++i) other[i] = 0.2f + 0.07f * static_cast<float>(i / 11 % 8);
   const Tensor<float> image = page_with(other);
-  PageReader reader(owner, kSearch);
+  PageReader reader(owner, kSearch, kObjects);
   const PageReading page = reader.read(image);
   CHECK(page.parts.empty());
   CHECK(page.chosen() == ReadingKind::blind);
@@ -122,7 +124,7 @@ TEST_CASE("page_reader: an object before an image of something else is found and
   const Owner owner = marking_owner();
   nerf::Renderer renderer(owner.field);
   renderer.set_recolour(owner.marking(cell_signs(owner.code(), kPageMessage)));
-  PageReader reader(owner, kSearch);
+  PageReader reader(owner, kSearch, kObjects);
   const nerf::Rendering view =
       renderer.render(nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::novel, 1, 160, 4).front());
   const float level = nerf::background_value(owner.field.background);

@@ -89,8 +89,9 @@ double PageReading::agreement() const {
   return most;
 }
 
-PageReader::PageReader(const Owner& owner, const CameraSearchOptions& search)
-    : owner_(owner), reader_(owner, search) {}
+PageReader::PageReader(const Owner& owner, const CameraSearchOptions& search,
+                       const ObjectSearchOptions& objects)
+    : owner_(owner), reader_(owner, search), object_options_(objects) {}
 
 PageReading PageReader::read(const Tensor<float>& image, bool informed_too) {
   PageReading page{.whole = reader_.read(image, informed_too ? -1 : InformedReader::kLeastAgreement)};
@@ -133,7 +134,7 @@ std::vector<PartReading> PageReader::read_blocks(const Tensor<float>& rgb) {
 }
 
 std::vector<PartReading> PageReader::read_object(const Tensor<float>& whole) {
-  if (!objects_) objects_.emplace(owner_);
+  if (!objects_) objects_.emplace(owner_, object_options_);
   const Index h = whole.shape[0], w = whole.shape[1];
   const double zoom = std::min(1., static_cast<double>(kLargest) / static_cast<double>(std::max(h, w)));
   const auto side = [&](Index length) { return std::lround(zoom * static_cast<double>(length)); };

@@ -54,8 +54,10 @@ class PageReader {
   /// Most blocks read in an image; the smallest of a longer page are left out.
   static constexpr Index kMostBlocks = 24;
   /// @param owner  of preset fast; must outlive the reader
+  /// @param objects  of the search for an object, made for the first image that needs it
   /// @throws ValueError as InformedReader
-  explicit PageReader(const Owner& owner, const CameraSearchOptions& search = {});
+  explicit PageReader(const Owner& owner, const CameraSearchOptions& search = {},
+                      const ObjectSearchOptions& objects = {});
   /// Reads an image.
   /// @param image  as BlindReader::evidence()   @param informed_too  true to compute informed evidence of the
   /// whole image even if it does not agree with the field
@@ -68,6 +70,7 @@ class PageReader {
 
   const Owner& owner_;
   InformedReader reader_;
+  ObjectSearchOptions object_options_;
   std::optional<ObjectSearch> objects_ = {};  // from the first image that needs it
 };
 
