@@ -12,7 +12,7 @@
 #include "regression/recorded_bytes.h"
 #include "support/catch.h"
 #include "support/temporary_folder.h"
-#include "tools/run_command.h"
+#include "tools/tiny_scene.h"
 #include "watermark/test_key.h"
 
 // Every file that the command writes for a fixed seed, key and number of steps has recorded bytes, for one
@@ -56,7 +56,7 @@ void add_mark(Hashes& hashes, const TemporaryFolder& folder, const std::string& 
                     views = folder / (preset + "_views"), read = folder / (preset + "_read.json");
   std::vector<std::string> embed{"embed",
                                  "--field",
-                                 folder / "hash.fm",
+                                 folder / "field.fm",
                                  "--out",
                                  owner,
                                  "--key",
@@ -96,6 +96,12 @@ Hashes written(const std::string& threads) {
   run({"train", "--data", folder / "scene", "--out", folder / "mlp.fm", "--preset", "mlp", "--steps", "4"},
       threads);
   hashes["mlp field"] = sha256_file_hex(folder / "mlp.fm");
+  run({"render", "--field", folder / "hash.fm", "--out", folder / "views", "--count", "1", "--size", "32"},
+      threads);
+  hashes["hash renders"] = folder_hash(folder / "views");
+  // `train` makes larger fields: to render the many views that marks learn from would take most of the test.
+  tiny_field(folder, folder / "scene");
+  hashes["marked field"] = sha256_file_hex(folder / "field.fm");
   watermark::save_key(folder / "key", test_key(5));
   for (const char* preset : {"fast", "paper", "code"}) add_mark(hashes, folder, preset, threads);
   return hashes;
