@@ -82,7 +82,8 @@ TEST_CASE("conv2d: errors of dilation and groups, and the same bits for any thre
       "[conv2d] groups must divide the channels of x and of w, got 3 for shapes [1, 7, 8, 4] and "
       "[3, 3, 2, 6]");
   CHECK_THROWS_WITH(conv2d(x, w, b, {.groups = 1}), Contains("[conv2d] w: axis 2 must be 4"));
-  CHECK_THROWS_WITH(conv2d(x, w, b, {.padding = -1, .groups = 2}), Contains("padding must be 0 to 2147483647, got -1"));
+  CHECK_THROWS_WITH(conv2d(x, w, b, {.padding = -1, .groups = 2}),
+                    Contains("padding must be 0 to 2147483647, got -1"));
   CHECK_THROWS_WITH(conv2d(x, w, b, {.dilation = 4, .groups = 2}),
                     Contains("height and width must be at least 9"));
   CHECK_THROWS_AS(conv2d(x, w, b, {.dilation = 0}), ValueError);
