@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# No instruction of a program names an MMX register: the kernels of C++ code never leave MMX mode, in which every later
-# long double is NaN.
+# A program uses no MMX register: compiled C++ never leaves the mode that such a register enters, in which every long
+# double is NaN.
 #   no_mmx.sh PROGRAM
 set -euo pipefail
 program=$1
