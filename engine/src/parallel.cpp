@@ -2,13 +2,48 @@
 #include <fieldmark/engine/parallel.h>
 #include <omp.h>
 
+#include <algorithm>
 #include <atomic>
 #include <exception>
 
 namespace fieldmark {
 namespace {
+
 std::atomic<int> thread_count{0};  // 0: not chosen yet
-}
+
+/// Hands out the chunks of a loop. Each thread has a share of neighbouring chunks, so that it meets the same
+/// data from loop to loop and its cache serves it; a thread whose share is done takes chunks from the others'
+/// shares.
+class ChunkShares {
+ public:
+  ChunkShares(Index chunks, int threads) : count_(std::min({Index{threads}, chunks, Index{kMost}})) {
+    for (Index i = 0; i < count_; ++i) {
+      shares_[i].next.store(chunks * i / count_, std::memory_order_relaxed);
+      shares_[i].end = chunks * (i + 1) / count_;
+    }
+  }
+
+  /// Calls f(chunk) for each chunk that no other thread has taken, those of the thread's own share first.
+  template <class F>
+  void run(int thread, F&& f) {
+    for (Index i = 0; i < count_; ++i) {
+      Share& share = shares_[(thread + i) % count_];
+      const auto take = [&] { return share.next.fetch_add(1, std::memory_order_relaxed); };
+      for (Index chunk = take(); chunk < share.end; chunk = take()) f(chunk);
+    }
+  }
+
+ private:
+  static constexpr int kMost = 64;
+  struct alignas(64) Share {  // a cache line each: threads count without waiting for one another
+    std::atomic<Index> next;
+    Index end;
+  };
+  Index count_;
+  Share shares_[kMost];
+};
+
+}  // namespace
 
 void set_threads(int n) {
   // Beyond what the system can start, OpenMP would end the process.
@@ -36,18 +71,20 @@ void detail::parallel_chunks(Index chunks, void* context, void (*run)(void*, Ind
   }
   std::exception_ptr error;  // of the first chunk that failed, as in a serial loop
   Index failed = chunks;
-#pragma omp parallel for schedule(dynamic, 1) num_threads(n)
-  for (Index c = 0; c < chunks; ++c) {
+  const auto run_or_keep_error = [&](Index chunk) {
     try {
-      run(context, c);
+      run(context, chunk);
     } catch (...) {
 #pragma omp critical(fieldmark_parallel_error)
-      if (c < failed) {
-        failed = c;
+      if (chunk < failed) {
+        failed = chunk;
         error = std::current_exception();
       }
     }
-  }
+  };
+  ChunkShares shares(chunks, n);
+#pragma omp parallel num_threads(n)
+  shares.run(omp_get_thread_num(), run_or_keep_error);
   if (error) std::rethrow_exception(error);
 }
 

@@ -2,7 +2,10 @@
 #include <fieldmark/engine/parallel.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "support/catch.h"
@@ -10,9 +13,9 @@
 using namespace fieldmark;
 
 TEST_CASE("parallel: every index once, in chunks that do not depend on the thread count") {
-  for (int n_threads : {1, 2, 3}) {
+  for (int n_threads : {1, 2, 3, 70}) {
     const ScopedThreads scope(n_threads);
-    for (Index n : {0, 1, 7, 8, 9, 1000}) {
+    for (Index n : {0, 1, 7, 8, 9, 17, 1000}) {
       std::vector<int> seen(static_cast<std::size_t>(n));
       parallel_for(n, 8, [&](Index begin, Index end) {
         if (begin % 8 != 0 || end != std::min<Index>(begin + 8, n)) throw ValueError("another chunk");
@@ -21,6 +24,19 @@ TEST_CASE("parallel: every index once, in chunks that do not depend on the threa
       CHECK(seen == std::vector<int>(static_cast<std::size_t>(n), 1));
     }
   }
+}
+
+TEST_CASE("parallel: threads that are done take the chunks of one that is not") {
+  const ScopedThreads scope(2);
+  std::atomic<int> others{0};
+  bool all_others_ran = false;
+  parallel_for(64, 1, [&](Index b, Index) {
+    if (b != 0) return static_cast<void>(++others);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (others < 63 && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+    all_others_ran = others == 63;
+  });
+  CHECK(all_others_ran);
 }
 
 TEST_CASE("parallel: a scope's number of threads ends with it, also by an exception") {
