@@ -11,6 +11,11 @@ namespace {
 constexpr double kReserve = 0.965;             // of the time: cooldown steps may be slower
 constexpr double kEarly = 0.95, kLate = 1.02;  // of the time; a run that would end outside gets a new total
 constexpr double kNewest = 0.014;              // weight of a step in step_seconds_: averages about 70 steps
+
+void require_count(const char* name, Index n) {
+  if (n < 0)
+    throw ValueError("[schedule] " + std::string(name) + " must be at least 0, got " + std::to_string(n));
+}
 }  // namespace
 
 Schedule::Schedule(const ScheduleOptions& o) : options_(o), total_(o.steps), fixed_(o.steps > 0) {
@@ -26,6 +31,9 @@ Schedule::Schedule(const ScheduleOptions& o) : options_(o), total_(o.steps), fix
 }
 
 void Schedule::observe(Index n, double seconds) {
+  require_count("n", n);
+  if (!(seconds >= 0 && std::isfinite(seconds)))
+    throw ValueError("[schedule] seconds must be finite and at least 0, got " + detail::number_text(seconds));
   if (fixed_) return;
   if (last_step_ >= 0 && n > last_step_) {
     const double newest = (seconds - last_seconds_) / static_cast<double>(n - last_step_);
@@ -46,7 +54,7 @@ void Schedule::observe(Index n, double seconds) {
 }
 
 double Schedule::lr(Index n) const {
-  if (n < 0) throw ValueError("[schedule] n must be at least 0, got " + std::to_string(n));
+  require_count("n", n);
   const double steady = options_.lr / (1 + static_cast<double>(n) / options_.half_after);
   if (total_ == 0) return steady;
   const double begin = std::floor((1 - options_.cooldown) * static_cast<double>(total_));
@@ -55,7 +63,13 @@ double Schedule::lr(Index n) const {
   return steady * std::pow(options_.last, std::clamp(fraction, 0.0, 1.0));
 }
 
+bool Schedule::done(Index n) const {
+  require_count("n", n);
+  return total_ > 0 && n >= total_;
+}
+
 void Schedule::resume(Index total, bool replanned) {
+  require_count("total", total);
   if (options_.steps > 0) return;
   total_ = total;
   replanned_ = replanned;

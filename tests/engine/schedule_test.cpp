@@ -132,7 +132,12 @@ TEST_CASE("schedule: errors name option and value") {
   CHECK_THROWS_WITH(Schedule({.cooldown = 1.25}), "[schedule] cooldown must be between 0 and 1, got 1.25");
   CHECK_THROWS_WITH(Schedule({.steps = -1}), "[schedule] steps must not be negative, got -1");
   CHECK_THROWS_WITH(Schedule({.lr = -1e-9}), "[schedule] lr must be positive, got -1e-09");
-  const Schedule ten({.steps = 10, .seconds = 0});
+  Schedule ten({.steps = 10, .seconds = 0});
   CHECK_THROWS_AS(ten.lr(-1), ValueError);
+  CHECK_THROWS_WITH(ten.done(-1), "[schedule] n must be at least 0, got -1");
+  CHECK_THROWS_WITH(ten.observe(-1, 0), "[schedule] n must be at least 0, got -1");
+  CHECK_THROWS_WITH(ten.observe(0, -0.5), "[schedule] seconds must be finite and at least 0, got -0.5");
+  CHECK_THROWS_WITH(ten.observe(0, std::nan("")), Contains("seconds must be finite and at least 0, got"));
+  CHECK_THROWS_WITH(ten.resume(-1, false), "[schedule] total must be at least 0, got -1");
   CHECK_THROWS_WITH(ten.lr(-1), "[schedule] n must be at least 0, got -1");
 }

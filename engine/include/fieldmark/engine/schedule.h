@@ -24,7 +24,8 @@ class Schedule {
   /// @throws ValueError if an option is out of range
   explicit Schedule(const ScheduleOptions& options);
   /// Records the time before step n, from which a timed run plans its total. Recent steps weigh more.
-  /// @param seconds  since the start of the run
+  /// @param n  counted from 0   @param seconds  since the start of the run, finite, at least 0
+  /// @throws ValueError if n or seconds is out of range
   void observe(Index n, double seconds);
   /// Returns the step size of step n, counted from 0.   @throws ValueError if n is negative
   double lr(Index n) const;
@@ -32,10 +33,11 @@ class Schedule {
   Index total() const { return total_; }
   /// True if N was fixed anew, so that earlier steps had the step sizes of another N.
   bool replanned() const { return replanned_; }
-  /// True if the run ends before step n.
-  bool done(Index n) const { return total_ > 0 && n >= total_; }
+  /// True if the run ends before step n.   @throws ValueError if n is negative
+  bool done(Index n) const;
   /// Resumes a run. A fixed total stays, since the clock of the earlier process is unknown.
-  /// @param total  0: not fixed   @param replanned  of the earlier process
+  /// @param total  0: not fixed   @param replanned  of the earlier process   @throws ValueError if total is
+  /// negative
   void resume(Index total, bool replanned);
   /// Returns the options given to the constructor.
   const ScheduleOptions& options() const { return options_; }
