@@ -6,6 +6,7 @@
 
 #include "support/catch.h"
 #include "support/torch.h"
+#include "support/warm_python.h"
 
 using namespace fieldmark;
 using namespace fieldmark::bench;
@@ -42,7 +43,7 @@ TEST_CASE("engine_bench: every row of the contract runs, and float is near doubl
 TEST_CASE("engine_bench: PyTorch computes the same values and gradients") {
   if (!torch_or_skip("the peer of engine_bench")) return;
   const EngineBench bench =
-      run_engine_bench({.runs = 2, .scale = 0.01, .only = "_fb_f32", .peer = PeerOptions{}});
+      run_engine_bench({.runs = 2, .scale = 0.01, .only = "_fb_f32", .peer = PeerOptions{warm_python()}});
   REQUIRE(bench.rows.size() >= 5);
   for (const EngineRow& row : bench.rows) {
     CAPTURE(row.name);
@@ -67,8 +68,8 @@ TEST_CASE("engine_bench: PyTorch takes the same training steps of models") {
   if (!torch_or_skip("the peer of the training steps of engine_bench")) return;
   for (const std::string name : {"transformer_step", "autoencoder_step", "paper_step"}) {
     const bool kinks = name == "paper_step";
-    const EngineBench bench =
-        run_engine_bench({.runs = 1, .scale = kinks ? 0.01 : 0.1, .only = name, .peer = PeerOptions{}});
+    const EngineBench bench = run_engine_bench(
+        {.runs = 1, .scale = kinks ? 0.01 : 0.1, .only = name, .peer = PeerOptions{warm_python()}});
     REQUIRE((bench.rows.size() == 1 && bench.rows[0].peer));
     const Peer::Found& found = bench.rows[0].peer->found;
     const double gradients = kinks ? found.kink_difference : found.gradient_difference;
