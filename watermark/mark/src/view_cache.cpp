@@ -11,26 +11,29 @@ namespace {
 
 constexpr float kLeastOpacity = 0.02f;  // a ray with less is background
 constexpr Index kRows = 8;              // of pixels that one thread collects at a time
+constexpr Index kRays = 32;             // traced at a time: the samples of a whole row leave the cache
 constexpr float kPart = 1.f / 128;      // cube sides, half of the finest cell: samples so close form one part
 
-// Calls trace(lane, row, rays) for the rays of every row of pixels, and writes directions [P, 3].
+// Calls trace(lane, pixel, rays) for some neighbours in a row of pixels at a time, from `pixel` on, until it
+// has covered all rows, and writes directions [P, 3].
 template <class F>
-void for_rows(const nerf::RadianceField& field, const nerf::Camera& camera, std::vector<float>& direction,
+void for_rays(const nerf::RadianceField& field, const nerf::Camera& camera, std::vector<float>& direction,
               F trace) {
   const Index w = camera.width;
   parallel_for(nerf::Renderer::kLanes, 1, [&](Index lane, Index) {
-    std::vector<float> pixels(at(2 * w));
+    std::vector<float> places;
     nerf::CubeRays rays;
-    rays.resize(w);
-    for (Index y = lane; y < camera.height; y += nerf::Renderer::kLanes) {
-      for (Index x = 0; x < w; ++x) {
-        pixels[at(2 * x)] = static_cast<float>(x);
-        pixels[at(2 * x + 1)] = static_cast<float>(y);
+    for (Index y = lane; y < camera.height; y += nerf::Renderer::kLanes)
+      for (Index left = 0; left < w; left += kRays) {
+        const Index right = std::min(left + kRays, w), pixel = y * w + left;
+        places.clear();
+        for (Index x = left; x < right; ++x)
+          places.insert(places.end(), {static_cast<float>(x), static_cast<float>(y)});
+        rays.resize(right - left);
+        rays.set(field.space, 0, camera, places);
+        std::ranges::copy(rays.seen_from, direction.begin() + 3 * pixel);
+        trace(lane, pixel, rays);
       }
-      rays.set(field.space, 0, camera, pixels);
-      std::copy(rays.seen_from.begin(), rays.seen_from.end(), direction.begin() + 3 * y * w);
-      trace(lane, y, rays);
-    }
   });
 }
 
@@ -58,13 +61,13 @@ std::vector<nerf::SeenSample>::iterator join_parts(std::vector<nerf::SeenSample>
   return part + 1;
 }
 
-// Keeps the heaviest parts of each ray of a row, heaviest first. Writes rgba [w, 4], the image without the
+// Keeps the heaviest parts of each ray, heaviest first. Writes rgba [rays, 4], the image without the
 // background.
-void keep_heaviest(std::vector<nerf::SeenSample>& row, Index parts, float* rgba) {
-  auto end = row.begin();
-  for (auto from = row.begin(); from != row.end();) {
+void keep_heaviest(std::vector<nerf::SeenSample>& seen, Index parts, float* rgba) {
+  auto end = seen.begin();
+  for (auto from = seen.begin(); from != seen.end();) {
     const Index ray = from->ray;
-    const auto to = std::find_if(from, row.end(), [&](const auto& s) { return s.ray != ray; });
+    const auto to = std::find_if(from, seen.end(), [&](const auto& s) { return s.ray != ray; });
     float* c = rgba + 4 * ray;
     for (auto s = from; s != to; ++s) {
       for (std::size_t a = 0; a < 3; ++a) c[a] += s->weight * s->colour[a];
@@ -81,7 +84,7 @@ void keep_heaviest(std::vector<nerf::SeenSample>& row, Index parts, float* rgba)
     }
     from = to;
   }
-  row.erase(end, row.end());
+  seen.erase(end, seen.end());
 }
 
 // All pixels: rgba [P, 4], direction [P, 3] and, row by row, the samples.
@@ -95,20 +98,25 @@ Traced trace_all(nerf::Renderer& renderer, const nerf::RadianceField& field, con
   const Index w = camera.width, pixels = camera.height * w;
   Traced t{std::vector<float>(at(4 * pixels)), std::vector<float>(at(3 * pixels)), {}};
   t.rows.resize(at(camera.height));
-  for_rows(field, camera, t.direction, [&](Index lane, Index y, const nerf::CubeRays& rays) {
-    float* rgba = &t.rgba[at(4 * y * w)];
-    auto& row = t.rows[at(y)];
+  for_rays(field, camera, t.direction, [&](Index lane, Index pixel, const nerf::CubeRays& rays) {
+    float* rgba = &t.rgba[at(4 * pixel)];
+    auto& row = t.rows[at(pixel / w)];
+    const Index left = pixel % w;
     if (samples > 1) {
-      renderer.trace_samples(rays.batch(field.space), lane, row);
-      keep_heaviest(row, samples, rgba);
+      std::vector<nerf::SeenSample> seen;
+      renderer.trace_samples(rays.batch(field.space), lane, seen);
+      keep_heaviest(seen, samples, rgba);
+      for (nerf::SeenSample& s : seen) s.ray += left;
+      row.insert(row.end(), seen.begin(), seen.end());
       return;
     }
-    std::vector<float> position(at(3 * w));
+    const auto n = std::ssize(rays.seen_from) / 3;
+    std::vector<float> position(at(3 * n));
     renderer.trace(rays.batch(field.space), lane, rgba, position.data());
-    for (Index i = 0; i < w; ++i) {
+    for (Index i = 0; i < n; ++i) {
       const float *c = rgba + 4 * i, *x = &position[at(3 * i)];
       if (c[3] > 0)
-        row.push_back({.ray = i,
+        row.push_back({.ray = left + i,
                        .weight = std::min(c[3], 1.f),
                        .position = {x[0], x[1], x[2]},
                        .colour = {c[0] / c[3], c[1] / c[3], c[2] / c[3]}});
