@@ -41,7 +41,8 @@ std::string folder_hash(const std::filesystem::path& folder) {
   return sha256_hex(lines);
 }
 
-// Returns a hash of the logits of every bit in every view: the detector's reading, digit for digit.
+// Returns a hash of the logits of every bit in every view: the detector's reading, digit for digit; of
+// presets paper and code these are signs.
 std::string logits_hash(const std::string& json_file) {
   const auto json = nlohmann::json::parse(read_text(json_file));
   std::string numbers;

@@ -9,7 +9,9 @@ listing=$(mktemp)
 trap 'rm -f "$listing"' EXIT
 objdump --disassemble --no-show-raw-insn "$program" >"$listing"
 grep -q '%xmm[0-7]' "$listing" || { echo "no_mmx: objdump lists no vector instruction of $program"; exit 1; }
-if grep -m 5 -B 2 -E '%mm[0-7]' "$listing"; then
-  echo "no_mmx: $program uses MMX registers: compile the function above with -mno-mmx"
+found=$(awk '/^[0-9a-f]+ <.*>:$/ { name = $0 } /%mm[0-7]/ && n < 5 { n++; print name; print }' "$listing")
+if [ -n "$found" ]; then
+  echo "$found"
+  echo "no_mmx: $program uses MMX registers: compile the functions above with -mno-mmx"
   exit 1
 fi

@@ -2,7 +2,8 @@
 """Stands in for an interpreter that has PyTorch loaded already: warm_python.py SCRIPT ARGUMENTS...
 
 The first call of a process starts a server in the environment of the call. The server loads PyTorch once, forks for each
-script that the process runs in this environment, and ends with the process. A script has the standard streams of its call.
+script that the process runs in this environment, and ends with the process. A script has the standard streams of its
+call, and the working folder of the first.
 """
 import hashlib
 import os
@@ -19,9 +20,9 @@ def serve(listener, caller):
     for stream in (0, 1, 2):
         os.dup2(null, stream)
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits for the scripts
+    caller_ends = os.pidfd_open(caller)
     import numpy  # noqa: F401
     import torch  # noqa: F401
-    caller_ends = os.pidfd_open(caller)
     while caller_ends not in select.select([listener, caller_ends], [], [])[0]:
         call, _ = listener.accept()
         words, streams, _, _ = socket.recv_fds(call, 1 << 16, 3)
@@ -42,9 +43,12 @@ def run(words, streams, call):
         runpy.run_path(words[0], run_name="__main__")
         code = 0
     except SystemExit as end:
-        code = end.code or 0
+        code = end.code if isinstance(end.code, int) else int(end.code is not None)
+        if isinstance(end.code, str):
+            print(end.code, file=sys.stderr)
     except BaseException:
         traceback.print_exc()
+    sys.stdout.flush()
     sys.stderr.flush()
     call.send(bytes([code]))
     os._exit(0)

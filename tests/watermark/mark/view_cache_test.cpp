@@ -12,8 +12,10 @@ using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
+constexpr Index kWidth = 71, kHeight = 18;  // a row is several groups of rays and a rest
+
 nerf::Camera view_camera() {
-  return nerf::make_camera(nerf::look_at({2.2, -3.1, 1.7}, {0.1, 0.2, 0}, {0, 0, 1}), 0.9, 23, 18);
+  return nerf::make_camera(nerf::look_at({2.2, -3.1, 1.7}, {0.1, 0.2, 0}, {0, 0, 1}), 0.9, kWidth, kHeight);
 }
 
 // Returns the field of the other tests with only one half filled, so that some rays see nothing.
@@ -38,10 +40,10 @@ TEST_CASE("view_cache: base and opacity are the renderer's, and samples put the 
   const nerf::Rendering want = renderer.render(view_camera());
   REQUIRE(view.base.shape == want.rgb.shape);
   REQUIRE(view.opacity.shape == want.opacity.shape);
-  REQUIRE(view.sample_begin.size() == 23 * 18 + 1);
+  REQUIRE(view.sample_begin.size() == kWidth * kHeight + 1);
   double base = 0, opacity = 0, composed = 0;
   Index empty = 0, seen = 0;
-  for (Index p = 0; p < 23 * 18; ++p) {
+  for (Index p = 0; p < kWidth * kHeight; ++p) {
     raise_to(opacity, std::abs(static_cast<double>(view.opacity[p] - want.opacity[p])));
     const auto k = static_cast<std::size_t>(view.sample_begin[static_cast<std::size_t>(p)]);
     const bool some = view.sample_begin[static_cast<std::size_t>(p) + 1] > static_cast<std::int32_t>(k);
@@ -66,11 +68,11 @@ TEST_CASE("view_cache: a sample lies on its pixel's ray, inside the cube") {
   const nerf::RadianceField field = half_field();
   const CachedView view = view_of(field);
   double off = 0;
-  for (Index p = 0; p < 23 * 18; ++p) {
+  for (Index p = 0; p < kWidth * kHeight; ++p) {
     const auto k = static_cast<std::size_t>(view.sample_begin[static_cast<std::size_t>(p)]);
     if (view.sample_begin[static_cast<std::size_t>(p) + 1] == static_cast<std::int32_t>(k)) continue;
     const nerf::Ray ray =
-        nerf::pixel_ray(view_camera(), static_cast<double>(p % 23), static_cast<double>(p / 23));
+        nerf::pixel_ray(view_camera(), static_cast<double>(p % kWidth), static_cast<double>(p / kWidth));
     double to[3], along = 0, square = 0;
     for (std::size_t a = 0; a < 3; ++a) {
       const double x = static_cast<double>(view.position[3 * k + a]);
@@ -94,7 +96,7 @@ TEST_CASE("view_cache: several samples of a ray are its heaviest parts, and few 
                    all = cache_view(renderer, field, view_camera(), 1000);
   double worst = 0, composed = 0, moved = 0;
   Index more = 0;
-  for (Index p = 0; p < 23 * 18; ++p) {
+  for (Index p = 0; p < kWidth * kHeight; ++p) {
     const auto share = [&](const CachedView& v) {
       double sum = 0;
       for (auto k = v.sample_begin[at(p)]; k < v.sample_begin[at(p + 1)]; ++k)
@@ -136,7 +138,7 @@ TEST_CASE("view_cache: what lies together on a ray is one part, and parts lie ap
   // Four times as many samples give 1.33 times as many parts (measured).
   CHECK(many.weight.size() < few.weight.size() * 3 / 2);
   Index pairs = 0;
-  for (Index p = 0; p < 23 * 18; ++p)
+  for (Index p = 0; p < kWidth * kHeight; ++p)
     for (auto k = many.sample_begin[static_cast<std::size_t>(p)];
          k < many.sample_begin[static_cast<std::size_t>(p) + 1]; ++k)
       for (auto l = many.sample_begin[static_cast<std::size_t>(p)]; l < k; ++l, ++pairs) {
