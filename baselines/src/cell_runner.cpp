@@ -1,6 +1,7 @@
 #include <fieldmark/baselines/cell_runner.h>
 #include <fieldmark/baselines/paper_plan.h>
 #include <fieldmark/core/files.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/analytic_scene.h>
 #include <fieldmark/nerf/camera_set.h>
@@ -71,7 +72,7 @@ CellRunner::CellRunner(CellRunnerOptions options) : options_(std::move(options))
   if (options_.scenes.empty()) throw ValueError("[cell_runner] scenes must not be empty");
   if (!(options_.budget > 0) || options_.views < 1 || options_.ground_truth < 1)
     throw ValueError("[cell_runner] budget, views and ground truth must be positive, got " +
-                     std::to_string(options_.budget) + ", " + std::to_string(options_.views) + " and " +
+                     number_text(options_.budget) + ", " + std::to_string(options_.views) + " and " +
                      std::to_string(options_.ground_truth));
   // Fields and checkpoints of another budget cannot be reused.
   char of_budget[80];

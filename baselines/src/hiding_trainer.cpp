@@ -1,4 +1,5 @@
 #include "hiding_trainer.h"
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/distort/quantize8.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/loss.h>
@@ -75,7 +76,7 @@ HidingTrainer::HidingTrainer(ImageMarker& marker, const CropSource& crops, const
                      std::to_string(options.noisy_part));
   if (!(options.mark_psnr >= options.first_mark_psnr))
     throw ValueError("[hiding_trainer] mark_psnr must be at least first_mark_psnr, got " +
-                     std::to_string(options.mark_psnr) + " and " + std::to_string(options.first_mark_psnr));
+                     number_text(options.mark_psnr) + " and " + number_text(options.first_mark_psnr));
   figures_.mark_psnr = options.first_mark_psnr;
   train(marker.params, kAdam);
   train(critic_params_, kAdam, {}, "critic/");

@@ -1,6 +1,7 @@
 #include "owner_system.h"
 
 #include <fieldmark/baselines/paper_plan.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/watermark/embedding/embed_views.h>
 #include <fieldmark/watermark/mark/power_budget.h>
@@ -215,7 +216,7 @@ TrainedOwner train_owner(const nerf::RadianceField& field, const CellName& name,
 
 watermark::Owner with_noisy_weights(const watermark::Owner& owner, double deviation, std::uint64_t seed) {
   if (!(deviation >= 0))
-    throw ValueError("[with_noisy_weights] deviation must not be negative, got " + std::to_string(deviation));
+    throw ValueError("[with_noisy_weights] deviation must not be negative, got " + number_text(deviation));
   watermark::Owner noisy = owner;
   const auto add = [&](ParamStore<float>& store, std::uint64_t stream, std::string_view prefix) {
     const CounterRng rng(seed, stream);

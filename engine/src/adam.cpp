@@ -1,3 +1,4 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/adam.h>
 #include <fieldmark/engine/parallel.h>
 
@@ -33,12 +34,12 @@ bool same_settings(const AdamRange& a, const AdamRange& b) {
 
 template <class T>
 Adam<T>::Adam(Index n, AdamOptions o) : options_(o) {
-  detail::check_option("Adam", "n", static_cast<double>(n), n >= 0, "at least 0");
-  detail::check_option("Adam", "lr", o.lr, o.lr > 0, "positive");
-  detail::check_option("Adam", "beta1", o.beta1, o.beta1 >= 0 && o.beta1 < 1, "in [0, 1)");
-  detail::check_option("Adam", "beta2", o.beta2, o.beta2 >= 0 && o.beta2 < 1, "in [0, 1)");
-  detail::check_option("Adam", "eps", o.eps, o.eps > 0, "positive");
-  detail::check_option("Adam", "weight_decay", o.weight_decay, o.weight_decay >= 0, "at least 0");
+  check_number("Adam", "n", n, n >= 0, "at least 0");
+  check_number("Adam", "lr", o.lr, o.lr > 0, "positive");
+  check_number("Adam", "beta1", o.beta1, o.beta1 >= 0 && o.beta1 < 1, "in [0, 1)");
+  check_number("Adam", "beta2", o.beta2, o.beta2 >= 0 && o.beta2 < 1, "in [0, 1)");
+  check_number("Adam", "eps", o.eps, o.eps > 0, "positive");
+  check_number("Adam", "weight_decay", o.weight_decay, o.weight_decay >= 0, "at least 0");
   mean_.resize(static_cast<std::size_t>(n));
   mean_square_.resize(static_cast<std::size_t>(n));
 }
@@ -119,7 +120,7 @@ void Adam<T>::update_trained(std::span<T> values, std::span<T> grads, const Adam
 
 template <class T>
 void Adam<T>::set_steps(Index steps) {
-  if (steps < 0) throw ValueError("[Adam::set_steps] steps must be at least 0, got " + std::to_string(steps));
+  check_number("Adam::set_steps", "steps", steps, steps >= 0, "at least 0");
   steps_ = steps;
 }
 

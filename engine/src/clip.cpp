@@ -1,10 +1,10 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/clip.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "number_text.h"
 #include "ops/chunks.h"
 
 namespace fieldmark {
@@ -43,14 +43,12 @@ void scale_to(std::span<T> grads, const Norm& norm, double limit) {
   });
 }
 
-void check_limit(double limit) {
-  if (!(limit > 0)) throw ValueError("[clip_grad_norm] limit must be positive, got " + std::to_string(limit));
-}
+void check_limit(double limit) { check_number("clip_grad_norm", "limit", limit, limit > 0, "positive"); }
 
 template <class T>
 [[noreturn]] void refuse(const std::string& where, Index element, T value) {
-  throw ValueError("[clip_grad_norm] gradients must be finite, got " + detail::number_text(value) +
-                   " at element " + std::to_string(element) + where);
+  throw ValueError("[clip_grad_norm] gradients must be finite, got " + number_text(value) + " at element " +
+                   std::to_string(element) + where);
 }
 
 }  // namespace

@@ -1,20 +1,12 @@
 #pragma once
 // Checks of the options of gradient checks. Private.
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/gradcheck.h>
 
 #include <cmath>
 #include <string>
 
-#include "number_text.h"
-
 namespace fieldmark::detail {
-
-inline void check_gradcheck_option(const char* function, const char* name, double value, bool ok,
-                                   const char* want) {
-  if (ok) return;
-  throw ValueError("[" + std::string(function) + "] " + name + " must be " + want + ", got " +
-                   number_text(value));
-}
 
 /// Refuses what would compare nothing or let everything pass. The scale of an error is at least the rounding
 /// error of the difference over rtol: at rtol 0 it is infinite and every error 0. At 1, a gradient of 0
@@ -22,10 +14,9 @@ inline void check_gradcheck_option(const char* function, const char* name, doubl
 /// @throws ValueError with "[function] name must be ..., got ..."
 inline void check_gradcheck_options(const char* function, std::size_t inputs,
                                     const GradcheckOptions& options) {
-  check_gradcheck_option(function, "rtol", options.rtol, options.rtol > 0 && options.rtol < 1,
-                         "above 0 and below 1");
-  check_gradcheck_option(function, "step", options.step, options.step > 0 && std::isfinite(options.step),
-                         "positive and finite");
+  check_number(function, "rtol", options.rtol, options.rtol > 0 && options.rtol < 1, "above 0 and below 1");
+  check_number(function, "step", options.step, options.step > 0 && std::isfinite(options.step),
+               "positive and finite");
   if (inputs == 0)
     throw ValueError("[" + std::string(function) + "] inputs must be at least one tensor, got none");
 }

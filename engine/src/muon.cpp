@@ -1,3 +1,4 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/muon.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/layout.h>
@@ -76,8 +77,8 @@ void orthogonalise(T* d, Index rows, Index columns, Tape<T>& tape) {
 template <class T>
 Muon<T>::Muon(const ParamStore<T>& store, const std::vector<std::string>& names, MuonOptions o)
     : options_(o) {
-  detail::check_option("Muon", "lr", o.lr, o.lr > 0, "positive");
-  detail::check_option("Muon", "momentum", o.momentum, o.momentum >= 0 && o.momentum < 1, "in [0, 1)");
+  check_number("Muon", "lr", o.lr, o.lr > 0, "positive");
+  check_number("Muon", "momentum", o.momentum, o.momentum >= 0 && o.momentum < 1, "in [0, 1)");
   for (const std::string& pattern : names) detail::check_pattern("Muon", store, pattern);
   for (const auto& e : store.entries()) {
     const auto matches = [&](const std::string& pattern) { return name_matches(pattern, e.name); };
@@ -97,7 +98,7 @@ template <class T>
 void Muon<T>::step(std::span<T> values, std::span<T> grads, double lr_factor) {
   detail::check_step_size("Muon", "values", values.size(), velocity_.size());
   detail::check_step_size("Muon", "grads", grads.size(), velocity_.size());
-  parallel_for(std::ssize(matrices_), 1, [&](Index i, Index) {
+  parallel_tasks(std::ssize(matrices_), [&](Index i) {
     update(matrices_[at(i)], *tapes_[at(i)], values.data(), grads.data(), lr_factor);
   });
 }

@@ -5,16 +5,7 @@
 #include <algorithm>
 #include <string>
 
-#include "number_text.h"
-
 namespace fieldmark::detail {
-
-/// @throws ValueError with "[optimiser] name must be want, got value" unless ok
-inline void check_option(const char* optimiser, const char* name, double value, bool ok, const char* want) {
-  if (!ok)
-    throw ValueError("[" + std::string(optimiser) + "] " + name + " must be " + want + ", got " +
-                     number_text(value));
-}
 
 /// @throws ShapeError unless an array has as many elements as the optimiser
 inline void check_step_size(const char* optimiser, const char* name, std::size_t got, std::size_t want) {

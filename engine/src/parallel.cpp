@@ -13,12 +13,12 @@ std::atomic<int> thread_count{0};  // 0: not chosen yet
 
 /// Hands out the chunks of a loop. Each thread has a share of neighbouring chunks, so that it meets the same
 /// data from loop to loop and its cache serves it; a thread whose share is done takes chunks from the others'
-/// shares.
+/// shares. Of a single share, every thread takes the next chunk.
 class ChunkShares {
  public:
-  ChunkShares(Index chunks, int threads) : count_(std::min({Index{threads}, chunks, Index{kMost}})) {
+  ChunkShares(Index chunks, Index shares) : count_(std::min({shares, chunks, Index{kMost}})) {
     for (Index i = 0; i < count_; ++i) {
-      shares_[i].next.store(chunks * i / count_, std::memory_order_relaxed);
+      shares_[i].next = chunks * i / count_;
       shares_[i].end = chunks * (i + 1) / count_;
     }
   }
@@ -28,7 +28,12 @@ class ChunkShares {
   void run(int thread, F&& f) {
     for (Index i = 0; i < count_; ++i) {
       Share& share = shares_[(thread + i) % count_];
-      const auto take = [&] { return share.next.fetch_add(1, std::memory_order_relaxed); };
+      const std::atomic_ref next(share.next);
+      const auto take = [&] {
+        // A look is cheaper than an atomic sum: most shares of the others are done by then.
+        const bool done = next.load(std::memory_order_relaxed) >= share.end;
+        return done ? share.end : next.fetch_add(1, std::memory_order_relaxed);
+      };
       for (Index chunk = take(); chunk < share.end; chunk = take()) f(chunk);
     }
   }
@@ -36,11 +41,11 @@ class ChunkShares {
  private:
   static constexpr int kMost = 64;
   struct alignas(64) Share {  // a cache line each: threads count without waiting for one another
-    std::atomic<Index> next;
+    Index next;
     Index end;
   };
   Index count_;
-  Share shares_[kMost];
+  Share shares_[kMost];  // the first count_ are set
 };
 
 }  // namespace
@@ -63,7 +68,7 @@ ScopedThreads::~ScopedThreads() { thread_count = before_; }
 
 bool detail::runs_on_one_thread() { return threads() == 1 || omp_in_parallel(); }
 
-void detail::parallel_chunks(Index chunks, void* context, void (*run)(void*, Index chunk)) {
+void detail::parallel_chunks(Index chunks, Sharing sharing, void* context, void (*run)(void*, Index chunk)) {
   const int n = threads();
   if (chunks == 1 || runs_on_one_thread()) {
     for (Index c = 0; c < chunks; ++c) run(context, c);
@@ -82,7 +87,7 @@ void detail::parallel_chunks(Index chunks, void* context, void (*run)(void*, Ind
       }
     }
   };
-  ChunkShares shares(chunks, n);
+  ChunkShares shares(chunks, sharing == Sharing::next ? 1 : n);
 #pragma omp parallel num_threads(n)
   shares.run(omp_get_thread_num(), run_or_keep_error);
   if (error) std::rethrow_exception(error);

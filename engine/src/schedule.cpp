@@ -1,10 +1,9 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/schedule.h>
 
 #include <algorithm>
 #include <cmath>
-
-#include "number_text.h"
 
 namespace fieldmark {
 namespace {
@@ -12,28 +11,26 @@ constexpr double kReserve = 0.965;             // of the time: cooldown steps ma
 constexpr double kEarly = 0.95, kLate = 1.02;  // of the time; a run that would end outside gets a new total
 constexpr double kNewest = 0.014;              // weight of a step in step_seconds_: averages about 70 steps
 
-void require_count(const char* name, Index n) {
-  if (n < 0)
-    throw ValueError("[schedule] " + std::string(name) + " must be at least 0, got " + std::to_string(n));
-}
+void require_count(const char* name, Index n) { check_number("schedule", name, n, n >= 0, "at least 0"); }
 }  // namespace
 
 Schedule::Schedule(const ScheduleOptions& o) : options_(o), total_(o.steps), fixed_(o.steps > 0) {
-  const auto require = [](bool ok, const char* what, double got) {
-    if (!ok) throw ValueError("[schedule] " + std::string(what) + ", got " + detail::number_text(got));
+  const auto require = [](const char* name, auto value, bool ok, const char* want) {
+    check_number("schedule", name, value, ok, want);
   };
-  require(o.steps >= 0, "steps must not be negative", static_cast<double>(o.steps));
-  require(o.steps > 0 || (o.seconds > 0 && std::isfinite(o.seconds)), "seconds must be positive", o.seconds);
-  require(o.lr > 0, "lr must be positive", o.lr);
-  require(o.half_after > 0, "half_after must be positive", o.half_after);
-  require(o.cooldown > 0 && o.cooldown < 1, "cooldown must be between 0 and 1", o.cooldown);
-  require(o.last > 0 && o.last <= 1, "last must be above 0 and at most 1", o.last);
+  require("steps", o.steps, o.steps >= 0, "at least 0");
+  require("seconds", o.seconds, o.steps > 0 || (o.seconds > 0 && std::isfinite(o.seconds)),
+          "positive and finite");
+  require("lr", o.lr, o.lr > 0, "positive");
+  require("half_after", o.half_after, o.half_after > 0, "positive");
+  require("cooldown", o.cooldown, o.cooldown > 0 && o.cooldown < 1, "above 0 and below 1");
+  require("last", o.last, o.last > 0 && o.last <= 1, "above 0 and at most 1");
 }
 
 void Schedule::observe(Index n, double seconds) {
   require_count("n", n);
-  if (!(seconds >= 0 && std::isfinite(seconds)))
-    throw ValueError("[schedule] seconds must be finite and at least 0, got " + detail::number_text(seconds));
+  check_number("schedule", "seconds", seconds, seconds >= 0 && std::isfinite(seconds),
+               "finite and at least 0");
   if (fixed_) return;
   if (last_step_ >= 0 && n > last_step_) {
     const double newest = (seconds - last_seconds_) / static_cast<double>(n - last_step_);

@@ -1,3 +1,4 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/engine/sgd.h>
 
@@ -7,10 +8,10 @@ namespace fieldmark {
 
 template <class T>
 Sgd<T>::Sgd(Index n, SgdOptions o) : options_(o), trained_{{0, n}} {
-  detail::check_option("Sgd", "n", static_cast<double>(n), n >= 0, "at least 0");
-  detail::check_option("Sgd", "lr", o.lr, o.lr > 0, "positive");
-  detail::check_option("Sgd", "momentum", o.momentum, o.momentum >= 0 && o.momentum < 1, "in [0, 1)");
-  detail::check_option("Sgd", "weight_decay", o.weight_decay, o.weight_decay >= 0, "at least 0");
+  check_number("Sgd", "n", n, n >= 0, "at least 0");
+  check_number("Sgd", "lr", o.lr, o.lr > 0, "positive");
+  check_number("Sgd", "momentum", o.momentum, o.momentum >= 0 && o.momentum < 1, "in [0, 1)");
+  check_number("Sgd", "weight_decay", o.weight_decay, o.weight_decay >= 0, "at least 0");
   velocity_.resize(at(n));
 }
 

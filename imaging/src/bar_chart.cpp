@@ -1,4 +1,5 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/imaging/bar_chart.h>
 
 #include <algorithm>
@@ -14,7 +15,7 @@ constexpr int kLabel = 230, kAxis = 360, kNote = 250, kRow = 26, kTop = 64;  // 
 }  // namespace
 
 std::string bar_chart(const std::string& title, const std::vector<Bar>& bars, double full) {
-  if (!(full > 0)) throw ValueError("[bar_chart] full must be positive, got " + std::to_string(full));
+  check_number("bar_chart", "full", full, full > 0, "positive");
   const int width = kLabel + kAxis + kNote, height = kTop + kRow * static_cast<int>(bars.size()) + 16;
   std::string svg = svg_begin(width, height, title);
   constexpr int kTicks = 4;

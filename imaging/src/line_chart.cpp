@@ -1,4 +1,5 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/imaging/line_chart.h>
 
 #include <algorithm>
@@ -88,8 +89,8 @@ std::string drawn(const Axes& axes, const LineSeries& line, const std::string& c
 std::string line_chart(const ScatterText& text, const std::vector<LineSeries>& lines, double y_low,
                        double y_high) {
   if (!(y_low < y_high))
-    throw ValueError("[line_chart] y_low must be below y_high, got " + std::to_string(y_low) + " and " +
-                     std::to_string(y_high));
+    throw ValueError("[line_chart] y_low must be below y_high, got " + number_text(y_low) + " and " +
+                     number_text(y_high));
   std::vector<LineSeries> kept;
   std::set<double> places;
   for (LineSeries line : lines) {

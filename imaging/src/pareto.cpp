@@ -1,4 +1,5 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/imaging/pareto.h>
 
 #include <algorithm>
@@ -29,7 +30,7 @@ bool beats(const Figures& a, const Figures& b, std::span<const double> margins) 
 std::vector<bool> pareto_front(std::span<const Figures> points, std::span<const double> margins) {
   for (const double margin : margins)
     if (!(margin >= 0))
-      throw ValueError("[pareto_front] margins must be at least 0, got " + std::to_string(margin));
+      throw ValueError("[pareto_front] margins must be at least 0, got " + number_text(margin));
   for (const Figures& p : points)
     if (p.size() != margins.size())
       throw ValueError("[pareto_front] points must have a figure for each margin (" +
@@ -44,7 +45,7 @@ std::vector<bool> pareto_front(std::span<const Figures> points, std::span<const 
 std::vector<bool> pareto_front(std::span<const SpeedQuality> points, const ParetoMargin& margin) {
   if (!(margin.time >= 0 && margin.time < 1 && margin.psnr >= 0))
     throw ValueError("[pareto_front] margins must be at least 0, that of times below 1, got " +
-                     std::to_string(margin.time) + " and " + std::to_string(margin.psnr));
+                     number_text(margin.time) + " and " + number_text(margin.psnr));
   // Relative time differences are differences of logarithms.
   std::vector<Figures> figures;
   for (const SpeedQuality& p : points)

@@ -1,4 +1,5 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/imaging/scatter_chart.h>
 
 #include <algorithm>
@@ -147,7 +148,7 @@ std::string circle(int x, int y, int radius, const std::string& attributes) {
 std::string scatter_chart(const ScatterText& text, const std::vector<ScatterPoint>& points) {
   std::vector<ScatterPoint> drawn;
   for (const auto& p : points) {
-    if (p.x <= 0) throw ValueError("[scatter_chart] x must be positive, got " + std::to_string(p.x));
+    if (p.x <= 0) throw ValueError("[scatter_chart] x must be positive, got " + number_text(p.x));
     if (std::isfinite(p.x) && std::isfinite(p.y)) drawn.push_back(p);
   }
   if (drawn.empty()) throw ValueError("[scatter_chart] points must have one that is finite");

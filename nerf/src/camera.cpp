@@ -1,4 +1,5 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/nerf/camera.h>
 
 #include <algorithm>
@@ -50,7 +51,7 @@ std::array<double, 16> Camera::parameters() const {
 Camera make_camera(const Pose& pose, double angle_x, Index width, Index height) {
   check_size("make_camera", width, height);
   if (!(angle_x > 0 && angle_x < std::numbers::pi))
-    throw ValueError("[make_camera] angle_x must be in (0, pi) radians, got " + std::to_string(angle_x));
+    throw ValueError("[make_camera] angle_x must be in (0, pi) radians, got " + number_text(angle_x));
   const double w = static_cast<double>(width), focal = 0.5 * w / std::tan(0.5 * angle_x);
   return {.pose = pose,
           .fx = focal,
@@ -66,7 +67,7 @@ Pose look_at(const Vec3& eye, const Vec3& target, const Vec3& up) {
   const double distance = norm(back);
   if (!(distance > 0) || !std::isfinite(distance) || !std::isfinite(norm(eye)) || !std::isfinite(norm(up)))
     throw ValueError("[look_at] eye and target must be finite and apart, and up finite, got a distance of " +
-                     std::to_string(distance));
+                     number_text(distance));
   const Vec3 z = (1 / distance) * back;
   Vec3 x = cross(up, z);
   if (!(norm(x) > 1e-9 * norm(up))) {

@@ -1,3 +1,4 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/random.h>
 #include <fieldmark/nerf/camera_set.h>
 
@@ -299,7 +300,7 @@ CameraSpan parse_camera_span(std::string_view text, std::string_view where) {
   const auto length = [](const JsonPlace& value) { return value.number_in(0, 1e12, "(0, 1e12)"); };
   const auto unit = [](const JsonPlace& value) {
     const Vec3 v = value.vec3();
-    if (!(std::abs(norm(v) - 1) < 1e-6)) value.fail("a unit vector", "length " + std::to_string(norm(v)));
+    if (!(std::abs(norm(v) - 1) < 1e-6)) value.fail("a unit vector", "length " + number_text(norm(v)));
     return v;
   };
   CameraSpan s{.centre = root["centre"].vec3(),

@@ -1,6 +1,7 @@
 #include "colmap.h"
 
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 
 #include <algorithm>
 #include <array>
@@ -144,7 +145,7 @@ void each_record(std::string_view bytes, ColmapFormat format, std::string_view n
 double number(auto& in, const char* what) {
   const double x = in.template get<double>(what);
   // Bounded so that sums and products stay finite.
-  if (!(std::abs(x) < 1e9)) in.fail(std::string(what) + " in (-1e9, 1e9)", std::to_string(x));
+  if (!(std::abs(x) < 1e9)) in.fail(std::string(what) + " in (-1e9, 1e9)", number_text(x));
   return x;
 }
 
@@ -209,7 +210,7 @@ Intrinsics read_camera(auto& in) {
   };
   const auto focal = [&] {
     const double f = number(in, "a focal length");
-    if (!(f > 1e-3)) in.fail("a focal length in (0.001, 1e9) pixels", std::to_string(f));
+    if (!(f > 1e-3)) in.fail("a focal length in (0.001, 1e9) pixels", number_text(f));
     return f;
   };
   Intrinsics c;
@@ -231,7 +232,7 @@ Intrinsics read_camera(auto& in) {
 Pose pose_of(std::array<double, 4> q, const Vec3& t, const auto& reader) {
   const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (!(std::abs(length - 1) <= 1e-2))
-    reader.fail("a rotation, a quaternion of length 1", "one of length " + std::to_string(length));
+    reader.fail("a rotation, a quaternion of length 1", "one of length " + number_text(length));
   for (double& x : q) x /= length;
   const double w = q[0], x = q[1], y = q[2], z = q[3];
   const Vec3 right{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)};

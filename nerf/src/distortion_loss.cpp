@@ -1,3 +1,4 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/nerf/distortion_loss.h>
 
@@ -20,8 +21,7 @@ void check(const Shape& sigma, std::size_t delta, std::size_t middle, std::span<
     throw ValueError(
         "[distortion_loss] ray_begin must start at 0, not decrease and end at the sample count " +
         std::to_string(n));
-  if (!(scale >= 0))
-    throw ValueError("[distortion_loss] scale must not be negative, got " + std::to_string(scale));
+  check_number("distortion_loss", "scale", scale, scale >= 0, "at least 0");
 }
 
 }  // namespace

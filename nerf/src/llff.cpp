@@ -1,6 +1,7 @@
 #include "llff.h"
 
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 
 #include <cmath>
 #include <string>
@@ -25,7 +26,7 @@ LlffView parse_row(const double* r, const std::string& row) {
   };
   for (std::size_t k = 0; k < kColumns; ++k)
     if (!(std::abs(r[k]) < kMost))
-      fail("number " + std::to_string(k), "a number in (-1e9, 1e9)", std::to_string(r[k]));
+      fail("number " + std::to_string(k), "a number in (-1e9, 1e9)", number_text(r[k]));
   Pose p{};
   for (std::size_t i = 0; i < 3; ++i) {
     const double* m = r + 5 * i;
@@ -37,10 +38,10 @@ LlffView parse_row(const double* r, const std::string& row) {
   if (!is_side(height) || !is_side(width))
     fail("numbers 4 and 9", "height and width of 1 to 65536 pixels",
          std::to_string(height) + " and " + std::to_string(width));
-  if (!(focal > 1e-3)) fail("number 14", "a focal length in (0.001, 1e9) pixels", std::to_string(focal));
+  if (!(focal > 1e-3)) fail("number 14", "a focal length in (0.001, 1e9) pixels", number_text(focal));
   if (!(near > 1 / kMost && far > near))
     fail("numbers 15 and 16", "bounds with 1e-9 < near < far",
-         std::to_string(near) + " and " + std::to_string(far));
+         number_text(near) + " and " + number_text(far));
   return {.pose = p,
           .intrinsics = {.fl_x = focal, .width = std::lround(width), .height = std::lround(height)},
           .depth = {.near = near, .far = far}};
@@ -73,7 +74,7 @@ double recentre_llff(std::vector<LlffView>& views) {
   const Vec3 z = normalised(back), side = cross(up, z);
   if (!(norm(back) > enough && norm(side) > enough))
     throw ValueError("[recentre_llff] views: must have a mean direction and a mean up across it, got " +
-                     std::to_string(norm(back)) + " and " + std::to_string(norm(side)) + " as their lengths");
+                     number_text(norm(back)) + " and " + number_text(norm(side)) + " as their lengths");
   const Vec3 x = normalised(side), y = cross(z, x);
   for (LlffView& v : views) {
     for (std::size_t c = 0; c < 4; ++c) {

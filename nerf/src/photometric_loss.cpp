@@ -1,3 +1,4 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/nerf/photometric_loss.h>
 
@@ -17,7 +18,7 @@ Var<T> photometric_loss(Var<T> rays, std::span<const std::type_identity_t<T>> tr
                      std::to_string(n) + " rays), got " + std::to_string(truth.size()) + " and " +
                      std::to_string(background.size()));
   if (!(options.huber > 0))
-    throw ValueError("[photometric_loss] huber must be positive, got " + std::to_string(options.huber));
+    throw ValueError("[photometric_loss] huber must be positive, got " + number_text(options.huber));
 
   Tape<T>& tape = rays.tape();
   T* y = nullptr;

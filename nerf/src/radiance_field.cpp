@@ -1,3 +1,4 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/model_file.h>
 #include <fieldmark/nerf/radiance_field.h>
 
@@ -64,7 +65,7 @@ Space parse_space(const Json& j) {
   const auto positive = [&](const Json& number, const char* name, bool zero = false) {
     const double value = number;
     if (!(zero ? value >= 0 : value > 0) || !std::isfinite(value))
-      throw ValueError(std::string(name) + " must be positive and finite, got " + std::to_string(value));
+      throw ValueError(std::string(name) + " must be positive and finite, got " + number_text(value));
     return value;
   };
   if (s.kind == SpaceKind::ndc) {
@@ -107,8 +108,7 @@ RadianceField::RadianceField(const RadianceFieldOptions& options)
     throw ValueError("[radiance_field] supersampling must be 1, 2, 4 or 8, got " +
                      std::to_string(options.supersampling));
   if (!(options.step > 0 && options.step <= 1))
-    throw ValueError("[radiance_field] step must be above 0 and at most 1, got " +
-                     std::to_string(options.step));
+    throw ValueError("[radiance_field] step must be above 0 and at most 1, got " + number_text(options.step));
 }
 
 std::string RadianceField::configuration() const {

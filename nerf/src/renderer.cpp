@@ -1,3 +1,4 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/ops/rows.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/imaging/resize.h>
@@ -57,7 +58,7 @@ Renderer::Renderer(const RadianceField& field, const RenderOptions& options)
       packed_(field.params,
               {.precision = options.precision, .tables = options.precision == Precision::bf16}) {
   if (!(options.finer > 0))
-    throw ValueError("[renderer] finer must be positive, got " + std::to_string(options.finer));
+    throw ValueError("[renderer] finer must be positive, got " + number_text(options.finer));
   check_range("renderer", "supersampling", options.supersampling, 0, kMostSupersampling);
   if (options.supersampling == 0) options_.supersampling = field.options().supersampling;
   refresh();

@@ -1,5 +1,7 @@
 #include "sampler.h"
 
+#include <fieldmark/core/number_text.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -18,7 +20,7 @@ void check_rays(const char* op, const RayBatch& rays, std::span<const float> jit
   const auto where = [op] {
     return "[" + std::string(op) + "] ";
   };  // used only for errors: steps allocate nothing
-  if (!(step > 0)) throw ValueError(where() + "step must be positive, got " + std::to_string(step));
+  check_number(op, "step", step, step > 0, "positive");
   if (rays.origins.size() != rays.directions.size() || rays.origins.size() % 3 != 0)
     throw ShapeError(where() + "origins and directions must both be [R, 3], got " +
                      std::to_string(rays.origins.size()) + " and " + std::to_string(rays.directions.size()) +

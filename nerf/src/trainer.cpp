@@ -1,4 +1,5 @@
 #include <fieldmark/core/digest.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/pool.h>
 #include <fieldmark/engine/parallel.h>
@@ -56,7 +57,7 @@ void fill_middles(const RaySamples& s, float* middle) {
 }
 
 void must(bool holds, const char* rule, auto value) {
-  if (!holds) throw ValueError(std::string("[trainer] ") + rule + ", got " + std::to_string(value));
+  if (!holds) throw ValueError(std::string("[trainer] ") + rule + ", got " + number_text(value));
 }
 
 void check(const TrainOptions& o, const RadianceField& field) {
@@ -259,7 +260,7 @@ void Trainer::backward_table() {
   const HashEncoding<float>& encoding = field_.field.encoding();
   const std::span<float> grad = field_.params.grads(encoding.table());
   const Index entry = 2 * encoding.features(), table = grad.data() - field_.params.grads().data();
-  parallel_for(encoding.levels(), 1, [&](Index l, Index) {
+  parallel_tasks(encoding.levels(), [&](Index l) {
     const int level = static_cast<int>(encoding.levels() - 1 - l);  // the finest, slowest level first
     for (const Shard& shard : shards_) {
       const float *x = shard.position.numbers.data(), *d = shard.dfeatures.numbers.data();

@@ -68,7 +68,7 @@ TEST_CASE("cell_runner: errors") {
                     Contains("[paper_system] name must be one of") && Contains("got other"));
   options.budget = 0;
   CHECK_THROWS_WITH(CellRunner(options),
-                    "[cell_runner] budget, views and ground truth must be positive, got 0.000000, 2 and 2");
+                    "[cell_runner] budget, views and ground truth must be positive, got 0, 2 and 2");
   options.scenes.clear();
   CHECK_THROWS_WITH(CellRunner(options), "[cell_runner] scenes must not be empty");
 }

@@ -202,5 +202,5 @@ TEST_CASE("owner_system: noise on the weights of field and mark, none on the ext
   CHECK(change(owner.params, noisy.params, "mark/") == Approx(0.01).epsilon(0.2));
   CHECK(change(owner.params, noisy.params, "extractor/") == 0);
   CHECK_THROWS_WITH(with_noisy_weights(owner, -1, 3),
-                    "[with_noisy_weights] deviation must not be negative, got -1.000000");
+                    "[with_noisy_weights] deviation must not be negative, got -1");
 }

@@ -2,6 +2,7 @@
 #include <fieldmark/engine/dual/matrices.h>
 #include <fieldmark/engine/dual/operators.h>
 #include <fieldmark/engine/dual/reduce.h>
+#include <fieldmark/engine/params.h>
 #include <fieldmark/engine/products.h>
 
 #include <cmath>

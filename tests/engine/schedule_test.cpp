@@ -121,16 +121,18 @@ TEST_CASE("schedule: a resumed timed run keeps its total") {
 }
 
 TEST_CASE("schedule: errors name option and value") {
-  CHECK_THROWS_WITH(Schedule({.steps = -1}), Contains("[schedule] steps must not be negative, got -1"));
-  CHECK_THROWS_WITH(Schedule({.seconds = 0}), Contains("[schedule] seconds must be positive, got 0"));
+  CHECK_THROWS_WITH(Schedule({.steps = -1}), Contains("[schedule] steps must be at least 0, got -1"));
+  CHECK_THROWS_WITH(Schedule({.seconds = 0}),
+                    Contains("[schedule] seconds must be positive and finite, got 0"));
   CHECK_THROWS_AS(Schedule({.seconds = INFINITY}), ValueError);
   CHECK_THROWS_WITH(Schedule({.lr = -1}), Contains("[schedule] lr must be positive, got -1"));
   CHECK_THROWS_WITH(Schedule({.half_after = 0}), Contains("[schedule] half_after must be positive"));
   CHECK_THROWS_WITH(Schedule({.cooldown = 1}),
-                    Contains("[schedule] cooldown must be between 0 and 1, got 1"));
+                    Contains("[schedule] cooldown must be above 0 and below 1, got 1"));
   CHECK_THROWS_WITH(Schedule({.last = 0}), Contains("[schedule] last must be above 0 and at most 1, got 0"));
-  CHECK_THROWS_WITH(Schedule({.cooldown = 1.25}), "[schedule] cooldown must be between 0 and 1, got 1.25");
-  CHECK_THROWS_WITH(Schedule({.steps = -1}), "[schedule] steps must not be negative, got -1");
+  CHECK_THROWS_WITH(Schedule({.cooldown = 1.25}),
+                    "[schedule] cooldown must be above 0 and below 1, got 1.25");
+  CHECK_THROWS_WITH(Schedule({.steps = -1}), "[schedule] steps must be at least 0, got -1");
   CHECK_THROWS_WITH(Schedule({.lr = -1e-9}), "[schedule] lr must be positive, got -1e-09");
   Schedule ten({.steps = 10, .seconds = 0});
   CHECK_THROWS_AS(ten.lr(-1), ValueError);

@@ -50,6 +50,5 @@ TEST_CASE("line_chart: few places have their numbers, many share round ones, and
 TEST_CASE("line_chart: errors") {
   CHECK_THROWS_WITH(line_chart({}, {{"a", {{1, std::nan("")}}}}, 0, 1),
                     "[line_chart] lines must have a point that is finite");
-  CHECK_THROWS_WITH(line_chart({}, {}, 1, 1),
-                    "[line_chart] y_low must be below y_high, got 1.000000 and 1.000000");
+  CHECK_THROWS_WITH(line_chart({}, {}, 1, 1), "[line_chart] y_low must be below y_high, got 1 and 1");
 }

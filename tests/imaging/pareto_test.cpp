@@ -47,9 +47,8 @@ TEST_CASE("pareto: numbers that are none lose, infinitely exact wins") {
   const double nan = std::nan(""), inf = std::numeric_limits<double>::infinity();
   CHECK(front({{nan, 50}, {1, nan}, {inf, 99}, {2, 20}, {3, inf}}) ==
         std::vector<bool>{false, false, false, true, true});
-  CHECK_THROWS_WITH(
-      front({}, {.time = -1, .psnr = 0}),
-      "[pareto_front] margins must be at least 0, that of times below 1, got -1.000000 and 0.000000");
+  CHECK_THROWS_WITH(front({}, {.time = -1, .psnr = 0}),
+                    "[pareto_front] margins must be at least 0, that of times below 1, got -1 and 0");
   CHECK_THROWS_AS(front({}, {.time = 0, .psnr = nan}), ValueError);
 }
 
@@ -63,5 +62,5 @@ TEST_CASE("pareto: any number of figures, and better in one of them is enough") 
   CHECK(of({{1, 1, std::nan("")}, {0, 0, 0}}) == std::vector<bool>{false, true});
   CHECK_THROWS_WITH(of({{1, 2}}), "[pareto_front] points must have a figure for each margin (3), got 2");
   CHECK_THROWS_WITH(pareto_front(std::vector<std::vector<double>>{}, std::vector<double>{-1}),
-                    "[pareto_front] margins must be at least 0, got -1.000000");
+                    "[pareto_front] margins must be at least 0, got -1");
 }

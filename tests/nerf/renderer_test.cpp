@@ -218,7 +218,7 @@ TEST_CASE("renderer: finer steps come closer to the integral") {
     return error;
   };
   CHECK(worst(usual) < 0.7f * worst(coarse));
-  CHECK_THROWS_WITH(Renderer(f, {.finer = 0}), "[renderer] finer must be positive, got 0.000000");
+  CHECK_THROWS_WITH(Renderer(f, {.finer = 0}), "[renderer] finer must be positive, got 0");
 }
 
 TEST_CASE("renderer: follows changes of the field between views") {

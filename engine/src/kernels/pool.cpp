@@ -91,7 +91,7 @@ void max_pool_row(const MaxPoolRow& p, const T* x, T* y, T* place) {
           const V z = load_as<V>(x + (u * p.width + first + v) * p.channels + c);
           const auto take = (z > best) | (z != z);  // a NaN stays: no comparison with it is true
           best = take ? z : best;
-          at = take ? zero + static_cast<T>(u * p.size + v) : at;
+          at = take ? zero + static_cast<T>(u * columns + v) : at;
         }
       store_as(y + w * p.channels + c, best);
       if (place) store_as(place + w * p.channels + c, at);
@@ -104,7 +104,7 @@ void max_pool_row_backward(const MaxPoolRow& p, Index u, const T* dy, const T* p
   for (Index w = 0; w < p.windows; ++w) {
     const Index first = w * p.stride, columns = p.width - first < p.size ? p.width - first : p.size;
     for (Index v = 0; v < columns; ++v) {
-      const T number = static_cast<T>(u * p.size + v);
+      const T number = static_cast<T>(u * columns + v);
       for_channels<T>(p.channels, [=](auto zero, Index c) {
         using V = decltype(zero);
         T* to = dx + (first + v) * p.channels + c;

@@ -25,8 +25,8 @@ FIELDMARK_DECLARE_KERNEL(template <class T> void, fill_pixels,
 struct MaxPoolRow {
   Index windows, size, stride, rows, width, channels;
 };
-// y[w, c] = the maximum of window w, and place[w, c] the index of its pixel, u * size + v (null: not
-// wanted).
+// y[w, c] = the maximum of window w, and place[w, c] the index of its pixel, u columns + v in a window of
+// `columns` pixels a row (null: not wanted).
 FIELDMARK_DECLARE_KERNEL(template <class T> void, max_pool_row,
                          (const MaxPoolRow& p, const T* x, T* y, T* place))
 // Row u of the windows: dx[pixel, c] += dy[w, c] where that pixel was the largest of window w.

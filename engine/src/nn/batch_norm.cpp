@@ -1,8 +1,7 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/nn/batch_norm.h>
 
 #include <algorithm>
-
-#include "number_text.h"
 
 namespace fieldmark {
 
@@ -39,8 +38,7 @@ Var<T> BatchNorm<T>::evaluate(const Params<T>& params, Var<T> x) const {
 
 template <class T>
 void BatchNorm<T>::update(ParamStore<T>& store, const BatchStatistics& batch, double momentum) const {
-  if (!(momentum >= 0 && momentum <= 1))
-    throw ValueError("[BatchNorm] momentum must be in [0, 1], got " + detail::number_text(momentum));
+  check_number("BatchNorm", "momentum", momentum, momentum >= 0 && momentum <= 1, "in [0, 1]");
   const auto blend = [&](std::span<T> running, const std::vector<double>& seen) {
     if (running.size() != seen.size())
       throw ShapeError("[BatchNorm] batch must have " + std::to_string(running.size()) + " channels, got " +

@@ -1,8 +1,7 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/nn/layer_norm.h>
 
 #include <algorithm>
-
-#include "number_text.h"
 
 namespace fieldmark {
 
@@ -10,7 +9,7 @@ template <class T>
 LayerNorm<T>::LayerNorm(ParamStore<T>& store, std::string_view name, Index channels, double eps) : eps_(eps) {
   if (channels < 1)
     throw ValueError("[LayerNorm] channels must be at least 1, got " + std::to_string(channels));
-  if (!(eps > 0)) throw ValueError("[LayerNorm] eps must be above 0, got " + detail::number_text(eps));
+  check_number("LayerNorm", "eps", eps, eps > 0, "above 0");
   store.require_free(name, {"gamma", "beta"});
   gamma_ = store.add(std::string(name) + "/gamma", {channels});
   beta_ = store.add(std::string(name) + "/beta", {channels});

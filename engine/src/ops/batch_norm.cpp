@@ -1,6 +1,6 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/ops/batch_norm.h>
 
-#include "number_text.h"
 #include "ops/normalisation.h"
 
 namespace fieldmark {
@@ -44,7 +44,7 @@ Var<T> batch_norm_fixed(Var<T> x, Var<T> gamma, Var<T> beta, std::span<const std
   for (Index c = 0; c < channels; ++c)
     if (!(v[c] >= 0))
       throw ValueError("[batch_norm_fixed] variance: channel " + std::to_string(c) +
-                       " must be 0 or more, got " + detail::number_text(v[c]));
+                       " must be 0 or more, got " + number_text(v[c]));
   return kernels::apply_norm(one_image(x.shape()), x, gamma, beta, m, v, options.eps, options.relu, true);
 }
 

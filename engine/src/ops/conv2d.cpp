@@ -67,6 +67,12 @@ void check_window(const ConvWindow& window, const Shape& x, const Shape& w) {
                      std::to_string(window.padding) + " for shape " + x.str());
 }
 
+void check_outputs(const ConvGeometry& g, const Shape& x, Index padding) {
+  if (!detail::is_countable({g.n, g.out_h(), g.out_w(), g.o}))
+    throw ValueError("[conv2d] padding must leave fewer than 2^60 outputs, got " + std::to_string(padding) +
+                     " for shape " + x.str() + " and " + std::to_string(g.o) + " output channels");
+}
+
 enum class Way { direct, few, winograd };
 
 template <class T>
@@ -154,12 +160,14 @@ Var<T> conv2d(Var<T> x, Var<T> w, Var<T> b, ConvWindow window, Activation activa
       std::construct_at(parts + k, conv2d(group(x, k), group(w, k), group(b, k), window, activation));
     return concatenate(std::span<const Var<T>>(parts, at(groups)));
   }
-  if (window.dilation > 1) w = dilated(w, window.dilation);
-  const ConvGeometry g = geometry(x.shape(), w.shape(), b.shape(), window.stride, window.padding);
+  ConvGeometry g = geometry(x.shape(), w.shape(), b.shape(), window.stride, window.padding);
+  g.k = (g.k - 1) * window.dilation + 1;
   if (std::min(g.h, g.w) + 2 * g.padding < g.k)
     throw ShapeError("[conv2d] x: height and width must be at least " + std::to_string(g.k - 2 * g.padding) +
                      " (the window's " + std::to_string(g.k) + " less two borders of " +
                      std::to_string(g.padding) + "), got shape " + x.shape().str());
+  check_outputs(g, x.shape(), window.padding);
+  if (window.dilation > 1) w = dilated(w, window.dilation);
   return convolve(x, w, b, g, activation, ConvMethod::fastest);
 }
 

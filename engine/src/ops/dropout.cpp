@@ -1,9 +1,9 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/ops/dropout.h>
 
 #include <cmath>
 #include <string>
 
-#include "number_text.h"
 #include "ops/chunks.h"
 
 namespace fieldmark {
@@ -30,7 +30,7 @@ const T* dropout_factors(Tape<T>& tape, Index n, double p, const CounterRng& rng
 
 template <class T>
 Var<T> dropout(Var<T> x, double p, const CounterRng& rng, std::uint64_t step) {
-  if (!(p >= 0 && p < 1)) throw ValueError("[dropout] p must be in [0, 1), got " + detail::number_text(p));
+  check_number("dropout", "p", p, p >= 0 && p < 1, "in [0, 1)");
   if (p == 0) return x;
   const Index n = x.shape().size();
   const T* factor = dropout_factors(x.tape(), n, p, rng, step);

@@ -1,10 +1,10 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/ops/layer_norm.h>
 #include <fieldmark/engine/shape_checks.h>
 
 #include <cmath>
 #include <string>
 
-#include "number_text.h"
 #include "ops/axes.h"
 
 namespace fieldmark {
@@ -19,7 +19,7 @@ void check_layer_norm(const Var<T>& x, const Var<T>& gamma, const Var<T>& beta, 
   check_extent("layer_norm", "gamma", gamma.shape(), 0, s[-1], "columns of x");
   check_rank("layer_norm", "beta", beta.shape(), 1, "[columns]");
   check_extent("layer_norm", "beta", beta.shape(), 0, s[-1], "columns of x");
-  if (!(eps > 0)) throw ValueError("[layer_norm] eps must be above 0, got " + detail::number_text(eps));
+  check_number("layer_norm", "eps", eps, eps > 0, "above 0");
 }
 
 // Sums f(c) over a row, in double.

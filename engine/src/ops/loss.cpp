@@ -1,9 +1,9 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/ops/loss.h>
 #include <fieldmark/engine/shape_checks.h>
 
 #include <cmath>
 
-#include "number_text.h"
 #include "ops/weights.h"
 
 namespace fieldmark {
@@ -34,7 +34,7 @@ Var<T> l1_loss(Var<T> a, Var<T> b, std::span<const std::type_identity_t<T>> weig
 template <class T>
 Var<T> huber_loss(Var<T> a, Var<T> b, double delta, std::span<const std::type_identity_t<T>> weights) {
   check_same("huber_loss", "a", a.shape(), "b", b.shape());
-  if (!(delta > 0)) throw ValueError("[huber_loss] delta must be above 0, got " + detail::number_text(delta));
+  check_number("huber_loss", "delta", delta, delta > 0, "above 0");
   const T *av = a.value(), *bv = b.value();
   const auto value = [=](Index i) {
     const double d = std::abs(static_cast<double>(av[i] - bv[i]));
@@ -56,7 +56,7 @@ Var<T> bce_with_logits(Var<T> logits, std::span<const std::type_identity_t<T>> t
   for (std::size_t i = 0; i < targets.size(); ++i)
     if (!(targets[i] >= 0 && targets[i] <= 1))
       throw ValueError("[bce_with_logits] targets: entry " + std::to_string(i) + " must be in [0, 1], got " +
-                       detail::number_text(targets[i]));
+                       number_text(targets[i]));
   const T *x = logits.value(), *t = detail::kept(logits.tape(), targets);
   const auto value = [=](Index i) {
     return std::max(x[i], T(0)) - x[i] * t[i] + std::log1p(std::exp(-std::abs(x[i])));

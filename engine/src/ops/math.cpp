@@ -1,9 +1,9 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/ops/math.h>
 
 #include <cmath>
 #include <string>
 
-#include "number_text.h"
 #include "ops/elementwise.h"
 
 namespace fieldmark {
@@ -113,8 +113,8 @@ Var<T> cos(Var<T> x) {
 template <class T>
 Var<T> clamp(Var<T> x, double low, double high) {
   if (!(low <= high))
-    throw ValueError("[clamp] low must be at most high, got " + detail::number_text(low) + " and " +
-                     detail::number_text(high));
+    throw ValueError("[clamp] low must be at most high, got " + number_text(low) + " and " +
+                     number_text(high));
   const T lo = static_cast<T>(low), hi = static_cast<T>(high);
   return detail::elementwise(
       x, [lo, hi](const auto& v) { return (v < lo).select(lo, (v > hi).select(hi, v)); },

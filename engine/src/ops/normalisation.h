@@ -1,10 +1,10 @@
 #pragma once
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/shape_checks.h>
 #include <cmath>
 #include <cstdint>
 
 #include "kernels/norm.h"
-#include "number_text.h"
 #include "ops/chunks.h"
 
 // Shared by group and batch normalisation: x is [images, pixels, channels], and statistics belong to a group
@@ -146,8 +146,7 @@ void check_norm(const char* op, Var<T> x, Var<T> gamma, Var<T> beta, double eps)
   check_extent(op, "gamma", gamma.shape(), 0, x.shape()[3], "channels of x");
   check_rank(op, "beta", beta.shape(), 1, "[channels]");
   check_extent(op, "beta", beta.shape(), 0, x.shape()[3], "channels of x");
-  if (!(eps > 0))
-    throw ValueError(std::string("[") + op + "] eps must be above 0, got " + detail::number_text(eps));
+  check_number(op, "eps", eps, eps > 0, "above 0");
 }
 
 }  // namespace fieldmark::kernels

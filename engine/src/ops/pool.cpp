@@ -1,6 +1,10 @@
 #include <fieldmark/engine/ops/pool.h>
 #include <fieldmark/engine/shape_checks.h>
 
+#include <algorithm>
+#include <limits>
+#include <string>
+
 #include "kernels/pool.h"
 #include "ops/chunks.h"
 #include "ops/window_checks.h"
@@ -122,6 +126,20 @@ Var<T> max_pool(Var<T> x, const MaxPool& m) {
 
 }  // namespace
 }  // namespace kernels
+namespace {
+
+// The kernel numbers a window's pixels in T, which is exact to 2^24 in float.
+template <class T>
+void check_numbering(Index size, const Shape& x) {
+  constexpr Index kMost = Index{1} << std::numeric_limits<T>::digits;
+  const Index height = std::min(size, x[1]), width = std::min(size, x[2]);
+  if (height > kMost / std::max<Index>(1, width))
+    throw ValueError("[max_pool] size must leave at most " + std::to_string(kMost) +
+                     " pixels of x in a window, got " + std::to_string(height) + " x " +
+                     std::to_string(width) + " for shape " + x.str());
+}
+
+}  // namespace
 
 template <class T>
 Var<T> avg_pool(Var<T> x, Index size) {
@@ -147,7 +165,8 @@ Var<T> max_pool(Var<T> x, MaxPool windows) {
   if (std::min(x.shape()[1], x.shape()[2]) < least)
     throw ShapeError("[max_pool] x: height and width must be at least " + std::to_string(least) +
                      " (one window), got shape " + x.shape().str());
-  // A larger window sees no more, and the kernel numbers a window's pixels in T, exact to 2^24 in float.
+  check_numbering<T>(windows.size, x.shape());
+  // A larger window sees no more.
   windows.size = std::min(windows.size, std::max(x.shape()[1], x.shape()[2]));
   return kernels::max_pool(x, windows);
 }

@@ -1,8 +1,9 @@
 #pragma once
+#include <fieldmark/core/number_text.h>
+
 #include <span>
 #include <string>
 
-#include "number_text.h"
 #include "ops/chunks.h"
 
 namespace fieldmark::detail {

@@ -1,6 +1,7 @@
 #include "fieldmark/imaging/video/video_writer.h"
 
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/imaging/image.h>
 
 #include <algorithm>
@@ -121,7 +122,7 @@ VideoWriter::VideoWriter(Index width, Index height, const VideoOptions& options)
     throw ValueError("[video_writer] crf must be from 0 to 51, got " + std::to_string(options.crf));
   if (!(options.frames_per_second >= 0.001 && options.frames_per_second <= 1000))
     throw ValueError("[video_writer] frames_per_second must be from 0.001 to 1000, got " +
-                     std::to_string(options.frames_per_second));
+                     number_text(options.frames_per_second));
   impl_ = std::make_unique<Impl>(width, height, options);
 }
 VideoWriter::~VideoWriter() = default;

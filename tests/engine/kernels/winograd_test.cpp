@@ -172,10 +172,10 @@ TEST_CASE("kernels/winograd: weights and their gradient are what the definition 
           }
       CHECK(worst < 1e-6);
 
-      Room m(c_in, c_out, c_out);
+      Room m(c_in, c_out, c_out + 3);  // one panel, wider than the matrix
       const auto values = uniform<float>({kProducts, c_in, c_out}, -1, 1, 2);
       for (Index i = 0; i < values.size(); ++i)
-        m.data[static_cast<std::size_t>(i / (c_in * c_out) * m.stride + i % (c_in * c_out))] = values[i];
+        m.at(i / (c_in * c_out), i / c_out % c_in, i % c_out) = values[i];
       Tensor<float> dw = w;
       FIELDMARK_KERNEL(winograd_weight_gradient<float>)
       (std::as_const(m).matrices(), c_in, c_out, dw.data.data());
@@ -204,10 +204,9 @@ TEST_CASE("kernels/winograd: outputs stay inside the image, with bias, ReLU or w
         const auto before = uniform<float>({s.n, s.h, s.w, s.c}, -1, 1, 1),
                    bias = uniform<float>({s.c}, -1, 1, 2),
                    values = uniform<float>({kProducts, s.tiles(), s.c}, -1, 1, 3);
-        Room m(s.tiles(), s.c, s.c);
+        Room m(s.tiles(), s.c, s.c + 3);  // one panel, wider than the matrix
         for (Index i = 0; i < values.size(); ++i)
-          m.data[static_cast<std::size_t>(i / (s.tiles() * s.c) * m.stride + i % (s.tiles() * s.c))] =
-              values[i];
+          m.at(i / (s.tiles() * s.c), i / s.c % s.tiles(), i % s.c) = values[i];
         Tensor<float> y = before;
         y.data.push_back(kUntouched);
         FIELDMARK_KERNEL(winograd_outputs<float>)

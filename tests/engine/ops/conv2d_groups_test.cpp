@@ -86,6 +86,9 @@ TEST_CASE("conv2d: errors of dilation and groups, and the same bits for any thre
                     Contains("padding must be 0 to 2147483647, got -1"));
   CHECK_THROWS_WITH(conv2d(x, w, b, {.dilation = 4, .groups = 2}),
                     Contains("height and width must be at least 9"));
+  // The check comes first: a window of 2000001 x 2000001 pixels would take terabytes.
+  CHECK_THROWS_WITH(conv2d(x, w, b, {.dilation = 1000000, .groups = 2}),
+                    Contains("height and width must be at least 2000001"));
   CHECK_THROWS_AS(conv2d(x, w, b, {.dilation = 0}), ValueError);
   expect_same_bits(windowed({.padding = 2, .dilation = 2, .groups = 2}),
                    {uniform<float>({2, 40, 50, 4}, -1, 1, 1), uniform<float>({3, 3, 2, 6}, -1, 1, 2),

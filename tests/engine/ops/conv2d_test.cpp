@@ -163,5 +163,10 @@ TEST_CASE("conv2d: windows beyond what can be counted are errors that name the a
       "[conv2d] dilation must keep the window within 2147483647 pixels, got 2147483647 for w of "
       "shape [3, 3, 1, 1]");
   CHECK_THROWS_AS(conv2d(vx, vw, vb, {.dilation = 2147483647}), ValueError);
+  const Tensor<float> wide({1, 1, 1, 64}), biases({64});
+  CHECK_THROWS_WITH(
+      conv2d(tape.constant(x), tape.constant(wide), tape.constant(biases), {.padding = 100000000}),
+      "[conv2d] padding must leave fewer than 2^60 outputs, got 100000000 for shape [1, 4, 4, 1] and 64 "
+      "output channels");
   CHECK(conv2d(vx, vw, vb, {.stride = 2147483647}).shape() == Shape{1, 1, 1, 1});
 }

@@ -177,6 +177,23 @@ TEST_CASE("max_pool: errors") {
                     Contains("must be at least 1 (one window)"));
 }
 
+TEST_CASE("max_pool: a window of more pixels than float can number is an error, in double it is none") {
+  const Tensor<float> long_row({1, (1 << 24) + 1, 1, 1});
+  Tape<float> tape;
+  CHECK_THROWS_WITH(
+      max_pool(tape.constant(long_row), {.size = (1 << 24) + 1, .ceil_mode = true}),
+      "[max_pool] size must leave at most 16777216 pixels of x in a window, got 16777217 x 1 for "
+      "shape [1, 16777217, 1, 1]");
+  // The last pixel of the largest window: its number is the largest that float can tell from its neighbours.
+  Tensor<float> largest({1, 1 << 24, 1, 1});
+  largest[largest.size() - 1] = 1;
+  Tensor<float> dx(largest.shape);
+  tape.backward(max_pool(tape.leaf(largest, dx), {.size = 1 << 24, .ceil_mode = true}),
+                std::vector<float>{3});
+  CHECK(dx[dx.size() - 1] == 3);
+  CHECK(dx[dx.size() - 2] == 0);
+}
+
 TEST_CASE("max_pool: float against double, and the same bits for any thread count") {
   const auto of_channels = [](Index e) { return std::vector{uniform<float>({2, 6, 7, e}, -1, 1, 1)}; };
   for (const MaxPool& m : kWindows) {

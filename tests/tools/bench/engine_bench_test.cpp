@@ -83,7 +83,7 @@ TEST_CASE("engine_bench: PyTorch takes the same training steps of models") {
 TEST_CASE("engine_bench: options outside their ranges are refused") {
   CHECK_THROWS_AS(run_engine_bench({.runs = 0}), ValueError);
   CHECK_THROWS_WITH(run_engine_bench({.scale = 0}),
-                    "[engine_bench] runs must be at least 1 and scale in (0, 1], got 5 and 0.000000");
+                    "[engine_bench] runs must be at least 1 and scale in (0, 1], got 5 and 0");
   CHECK_THROWS_WITH(run_engine_bench({.only = "nothing"}),
                     "[engine_bench] only: no row has 'nothing' in its name");
   CHECK_THROWS_WITH(run_engine_bench({.only = "hash", .peer = PeerOptions{}}),

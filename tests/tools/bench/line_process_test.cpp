@@ -61,9 +61,8 @@ TEST_CASE("line_process: a program that ends says why") {
   CHECK_THROWS_WITH(LineProcess({"/nowhere/python3"}, {}, 1),
                     "/nowhere/python3: cannot be started (No such file or directory)");
   CHECK_THROWS_AS(LineProcess({}, {}, 1), ValueError);
-  CHECK_THROWS_WITH(
-      LineProcess(shell("exit"), {}, 0),
-      "[LineProcess] command must not be empty and limit_seconds above 0, got '/bin/sh' and 0.000000");
+  CHECK_THROWS_WITH(LineProcess(shell("exit"), {}, 0),
+                    "[LineProcess] command must not be empty and limit_seconds above 0, got '/bin/sh' and 0");
 }
 
 TEST_CASE("line_process: a program that is only to run is waited for, whatever it writes") {

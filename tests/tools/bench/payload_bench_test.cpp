@@ -55,6 +55,6 @@ TEST_CASE("payload_bench: equal for one and two threads, and errors are named") 
   CHECK_THROWS_WITH(run_payload_bench({.trials = 0}),
                     "[run_payload_bench] trials must be at least 1, got 0 and 10000");
   CHECK_THROWS_WITH(run_payload_bench({.error_rates = {0.5}}),
-                    "[run_payload_bench] error_rates must be in [0, 0.5), got 0.500000");
+                    "[run_payload_bench] error_rates must be in [0, 0.5), got 0.5");
   CHECK_THROWS_AS(run_payload_bench({.bits = 16}), ValueError);
 }

@@ -41,7 +41,7 @@ TEST_CASE("precision_bench: every variant is timed, and what is less exact is le
 
 TEST_CASE("precision_bench: errors") {
   CHECK_THROWS_WITH(run_precision_bench({.runs = 0}),
-                    "[precision_bench] runs must be at least 1 and scale in (0, 1], got 0 and 1.000000");
+                    "[precision_bench] runs must be at least 1 and scale in (0, 1], got 0 and 1");
   const nerf::Dataset data;
   CHECK_THROWS_WITH(run_precision_bench({.train = &data}),
                     "[precision_bench] train and test must both be given, or none");

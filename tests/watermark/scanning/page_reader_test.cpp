@@ -98,6 +98,17 @@ TEST_CASE("page_reader: the views of a collage are added up") {
   CHECK(p_of(owner, sum) < 1e-6);
 }
 
+TEST_CASE("page_reader: options out of range are errors before an image is read") {
+  const Owner owner = marking_owner();
+  CHECK_THROWS_WITH(PageReader(owner, kSearch, {.views = 0}),
+                    "[object_search] views and size must be at least 1 and 16, got 0 and 64");
+  CameraSearchOptions around = kSearch;
+  around.around = -1;
+  CHECK_THROWS_WITH(PageReader(owner, around),
+                    "[camera_search] views, around and size must be at least 1, 0 and 16, got " +
+                        std::to_string(kSearch.views) + ", -1 and " + std::to_string(kSearch.size));
+}
+
 TEST_CASE("page_reader: a page without a view of the field is read blindly") {
   const Owner owner = marking_owner();
   Tensor<float> other({100, 100, 3});

@@ -1,4 +1,5 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 
 #include <algorithm>
 #include <chrono>
@@ -33,7 +34,7 @@ EngineBench run_engine_bench(const EngineBenchOptions& options,
                              const std::function<void(const std::string&, double)>& progress) {
   if (options.runs < 1 || !(options.scale > 0 && options.scale <= 1))
     throw ValueError("[engine_bench] runs must be at least 1 and scale in (0, 1], got " +
-                     std::to_string(options.runs) + " and " + std::to_string(options.scale));
+                     std::to_string(options.runs) + " and " + number_text(options.scale));
   std::vector<RowSpec> specs;
   for (auto list : {mlp_rows(), conv_rows(), model_rows(), chain_rows(), hash_rows(), nerf_rows()})
     for (RowSpec& spec : list)

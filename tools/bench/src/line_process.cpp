@@ -1,4 +1,5 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/tools/bench/line_process.h>
 #include <poll.h>
 #include <spawn.h>
@@ -54,7 +55,7 @@ LineProcess::LineProcess(const std::vector<std::string>& command, const std::vec
     : program_(command.empty() ? "" : command[0]), limit_seconds_(limit_seconds) {
   if (program_.empty() || !(limit_seconds > 0))
     throw ValueError("[LineProcess] command must not be empty and limit_seconds above 0, got '" + program_ +
-                     "' and " + std::to_string(limit_seconds));
+                     "' and " + number_text(limit_seconds));
   // One socket for both directions: unlike a pipe, writing to it raises no signal after its reader has gone.
   std::array<int, 2> ends{-1, -1};
   errors_ = std::tmpfile();

@@ -1,4 +1,5 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/tools/bench/payload_bench.h>
 
@@ -111,7 +112,7 @@ PayloadBench run_payload_bench(const PayloadBenchOptions& options,
                      " and " + std::to_string(options.noise_trials));
   for (double rate : options.error_rates)
     if (!(rate >= 0 && rate < 0.5))
-      throw ValueError("[run_payload_bench] error_rates must be in [0, 0.5), got " + std::to_string(rate));
+      throw ValueError("[run_payload_bench] error_rates must be in [0, 0.5), got " + number_text(rate));
   const PayloadCodec codec(options.bits);
   watermark::random_payload(codec, CounterRng(0), 0);  // throws if messages hold no payload
   PayloadBench bench{watermark::random_payload_bits(codec), codec.layouts(), {}, {}};

@@ -1,3 +1,4 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/core/worst.h>
 #include <fieldmark/engine/isa.h>
 #include <fieldmark/engine/ops/activation.h>
@@ -215,7 +216,7 @@ std::vector<PrecisionRow> run_precision_bench(const PrecisionBenchOptions& optio
                                               const std::function<void(const std::string&)>& progress) {
   if (options.runs < 1 || !(options.scale > 0 && options.scale <= 1))
     throw ValueError("[precision_bench] runs must be at least 1 and scale in (0, 1], got " +
-                     std::to_string(options.runs) + " and " + std::to_string(options.scale));
+                     std::to_string(options.runs) + " and " + number_text(options.scale));
   if (!options.train != !options.test)
     throw ValueError("[precision_bench] train and test must both be given, or none");
   const auto begin = [&](const char* name) {

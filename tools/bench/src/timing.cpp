@@ -1,5 +1,6 @@
 #include "timing.h"
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/parallel.h>
 #include <sys/resource.h>
 
@@ -33,7 +34,7 @@ Timing time_calls(const std::function<void()>& body, int runs, double least_seco
                   const std::function<void()>& between) {
   if (runs < 1 || !(least_seconds >= 0))
     throw ValueError("[time_calls] runs must be at least 1 and least_seconds at least 0, got " +
-                     std::to_string(runs) + " and " + std::to_string(least_seconds));
+                     std::to_string(runs) + " and " + number_text(least_seconds));
   double begin = now();
   body();
   const double first = std::max(now() - begin, 1e-9);

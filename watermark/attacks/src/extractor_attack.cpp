@@ -1,3 +1,4 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/nerf/rendered_dataset.h>
@@ -17,7 +18,7 @@ void check(const Tensor<float>& view_image, const Tensor<float>& object, const E
     throw ShapeError("[extractor_attack] image must be [H, W, 3] and object [H, W], got " +
                      view_image.shape.str() + " and " + object.shape.str());
   if (!(o.mark_psnr >= 10 && o.mark_psnr <= 60))
-    throw ValueError("[extractor_attack] mark_psnr must be 10 to 60 dB, got " + std::to_string(o.mark_psnr));
+    throw ValueError("[extractor_attack] mark_psnr must be 10 to 60 dB, got " + number_text(o.mark_psnr));
   if (o.steps < 1)
     throw ValueError("[extractor_attack] steps must be at least 1, got " + std::to_string(o.steps));
   if (!(o.step > 0 && o.step <= 1))

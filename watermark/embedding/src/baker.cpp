@@ -1,3 +1,4 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/loss.h>
 #include <fieldmark/engine/parallel.h>
@@ -87,7 +88,7 @@ Baker::Baker(const Owner& owner, const Message& message, const BakeOptions& opti
                      std::to_string(options.cameras) + " and " + std::to_string(options.around));
   if (options.guide_views < 1 || !(options.guidance >= 0))
     throw ValueError("[baker] guide_views must be at least 1 and guidance at least 0, got " +
-                     std::to_string(options.guide_views) + " and " + std::to_string(options.guidance));
+                     std::to_string(options.guide_views) + " and " + number_text(options.guidance));
   marking_ = owner.marking(cell_signs(owner.code(), message));
   // Colours that no ray constrains drift: without the cameras around, lego's underside changes by 29 dB.
   cameras_ = cameras_around(owner.field, options.cameras, options.around, 0, options.seed + 31);
@@ -254,7 +255,8 @@ std::span<float> Baker::network_grads() {
 
 void Baker::backward_table() {
   const nerf::HashEncoding<float>& encoding = field_.field.encoding();
-  parallel_for(encoding.levels(), 1, [&](Index level, Index) {
+  parallel_tasks(encoding.levels(), [&](Index l) {
+    const Index level = encoding.levels() - 1 - l;  // the finest, slowest level first
     for (const Chunk& c : chunks_)
       encoding.backward_level(static_cast<int>(level), c.position.data(), c.samples,
                               c.dfeatures.data() + level * c.samples * 2 * encoding.features(),

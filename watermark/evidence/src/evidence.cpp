@@ -1,4 +1,5 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/watermark/evidence/evidence.h>
 
 #include <algorithm>
@@ -21,7 +22,7 @@ double check_evidence(std::string_view op, std::span<const double> evidence, con
   for (std::size_t c = 0; c < evidence.size(); ++c) {
     if (!std::isfinite(evidence[c])) {
       throw ValueError("[" + std::string(op) + "] evidence: entry " + std::to_string(c) +
-                       " must be finite, got " + std::to_string(evidence[c]));
+                       " must be finite, got " + number_text(evidence[c]));
     }
     if (code.bit[c] >= 0) largest = std::max(largest, std::abs(evidence[c]));
   }
@@ -168,7 +169,7 @@ double p_value_bits_two_sided(Index matching, Index n) {
 Index least_matching_bits(Index n, double rate) {
   if (n < 0) throw ValueError("[least_matching_bits] n must be at least 0, got " + std::to_string(n));
   if (!(rate > 0 && rate <= 1)) {
-    throw ValueError("[least_matching_bits] rate must be in (0, 1], got " + std::to_string(rate));
+    throw ValueError("[least_matching_bits] rate must be in (0, 1], got " + number_text(rate));
   }
   Index low = 0, high = n + 1;  // p(low - 1) > rate >= p(high), with p(n + 1) = 0
   while (low < high) {

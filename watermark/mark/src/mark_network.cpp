@@ -1,3 +1,4 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/ops/activation.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/matmul.h>
@@ -19,12 +20,12 @@ MarkNetworkOptions checked(const MarkNetworkOptions& o) {
   if (o.features < 1)
     throw ValueError("[mark_network] features must be at least 1, got " + std::to_string(o.features));
   if (!(o.tilt >= 0 && o.tilt <= 90))
-    throw ValueError("[mark_network] tilt must be 0 to 90 degrees, got " + std::to_string(o.tilt));
+    throw ValueError("[mark_network] tilt must be 0 to 90 degrees, got " + number_text(o.tilt));
   if (!(o.shading >= 0 && o.shading <= 1))
-    throw ValueError("[mark_network] shading must be 0 to 1, got " + std::to_string(o.shading));
+    throw ValueError("[mark_network] shading must be 0 to 1, got " + number_text(o.shading));
   if (!(o.luminance >= 0 && o.luminance <= 1 && o.red_green >= 0 && o.red_green <= 1))
     throw ValueError("[mark_network] red_green and luminance must be 0 to 1, got " +
-                     std::to_string(o.red_green) + " and " + std::to_string(o.luminance));
+                     number_text(o.red_green) + " and " + number_text(o.luminance));
   return o;
 }
 

@@ -1,3 +1,4 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/imaging/resize.h>
@@ -46,8 +47,7 @@ Tensor<float> pixels_around(const Tensor<float>& rgb, Index left, Index top, Ind
 Window object_window(const Tensor<float>& rgb, float background, double aspect) {
   check_rank("object_window", "rgb", rgb.shape, 3, "[H, W, 3]");
   check_extent("object_window", "rgb", rgb.shape, 2, 3, "red, green, blue");
-  if (!(aspect > 0))
-    throw ValueError("[object_window] aspect must be positive, got " + std::to_string(aspect));
+  if (!(aspect > 0)) throw ValueError("[object_window] aspect must be positive, got " + number_text(aspect));
   const Index h = rgb.shape[0], w = rgb.shape[1];
   std::vector<float> distance(static_cast<std::size_t>(h * w));
   for (Index p = 0; p < h * w; ++p)
@@ -78,8 +78,8 @@ Window object_window(const Tensor<float>& rgb, float background, double aspect) 
 Tensor<float> cut_window(const Tensor<float>& rgb, const Window& window, const PatchSize& size,
                          float background) {
   if (!(window.width > 0 && window.height > 0) || size.width < 1 || size.height < 1)
-    throw ValueError("[cut_window] window and size must be positive, got " + std::to_string(window.width) +
-                     " x " + std::to_string(window.height) + " and " + std::to_string(size.width) + " x " +
+    throw ValueError("[cut_window] window and size must be positive, got " + number_text(window.width) +
+                     " x " + number_text(window.height) + " and " + std::to_string(size.width) + " x " +
                      std::to_string(size.height));
   // Rounds the window to whole pixels, cuts it out and resizes it once.
   const auto whole = [](double extent) { return std::max<Index>(1, std::lround(extent)); };

@@ -1,5 +1,6 @@
 #include "pooled_training.h"
 
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/distort/affine_warp.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/engine/ops/loss.h>
@@ -115,7 +116,7 @@ void PooledTraining::keep_features() {
   const PerceptualTerm& term = options_.perceptual;
   if (!(term.weight >= 0))
     throw ValueError("[PooledTraining] perceptual: weight must be at least 0, got " +
-                     std::to_string(term.weight));
+                     number_text(term.weight));
   if (term.weight == 0) return;
   if (!term.features || term.sha256.empty())
     throw ValueError("[PooledTraining] perceptual: a weight above 0 needs features and their SHA-256");

@@ -1,3 +1,4 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/watermark/mark/power_budget.h>
 
@@ -12,8 +13,7 @@ Var<T> power_budget(Var<T> x, std::span<const std::type_identity_t<T>> mask, dou
   if (static_cast<Index>(mask.size()) != pixels)
     throw ShapeError("[power_budget] mask must have one number a row of x (" + std::to_string(pixels) +
                      "), got " + std::to_string(mask.size()));
-  if (!(target > 0))
-    throw ValueError("[power_budget] target must be positive, got " + std::to_string(target));
+  check_number("power_budget", "target", target, target > 0, "positive");
   T* y = nullptr;
   const Var<T> out = x.tape().output(x.shape(), &y, {x});
   double sum = 0, count = 0;

@@ -1,3 +1,4 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/shape_checks.h>
 #include <fieldmark/watermark/reading/blind_reader.h>
 #include "surround.h"
@@ -15,7 +16,7 @@ void check_finite(const char* op, const Tensor<float>& image) {
   const Index channels = image.shape[2], w = image.shape[1];
   for (Index i = 0; i < image.size(); ++i)
     if (!std::isfinite(image[i]))
-      throw ValueError("[" + std::string(op) + "] image must be finite, got " + std::to_string(image[i]) +
+      throw ValueError("[" + std::string(op) + "] image must be finite, got " + number_text(image[i]) +
                        " in row " + std::to_string(i / channels / w) + ", column " +
                        std::to_string(i / channels % w));
 }

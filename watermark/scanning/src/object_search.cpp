@@ -51,12 +51,16 @@ struct ObjectSearch::Reduced {
   std::vector<float> squares;   // sum of the squares of all channels
 };
 
-ObjectSearch::ObjectSearch(const Owner& owner, const ObjectSearchOptions& options) {
-  if (owner.field.space.kind != nerf::SpaceKind::cube)
-    throw ValueError("[object_search] field must show an object, got one that fills its images");
+void ObjectSearch::check(const ObjectSearchOptions& options) {
   if (options.views < 1 || options.size < kGrid)
     throw ValueError("[object_search] views and size must be at least 1 and 16, got " +
                      std::to_string(options.views) + " and " + std::to_string(options.size));
+}
+
+ObjectSearch::ObjectSearch(const Owner& owner, const ObjectSearchOptions& options) {
+  if (owner.field.space.kind != nerf::SpaceKind::cube)
+    throw ValueError("[object_search] field must show an object, got one that fills its images");
+  check(options);
   nerf::Renderer renderer(owner.field, {.finer = 0.75f});  // pixels are large
   cameras_ = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, options.views, options.size,
                                 options.seed);

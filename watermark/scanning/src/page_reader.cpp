@@ -91,7 +91,9 @@ double PageReading::agreement() const {
 
 PageReader::PageReader(const Owner& owner, const CameraSearchOptions& search,
                        const ObjectSearchOptions& objects)
-    : owner_(owner), reader_(owner, search), object_options_(objects) {}
+    : owner_(owner), reader_(owner, search), object_options_(objects) {
+  ObjectSearch::check(objects);
+}
 
 PageReading PageReader::read(const Tensor<float>& image, bool informed_too) {
   PageReading page{.whole = reader_.read(image, informed_too ? -1 : InformedReader::kLeastAgreement)};

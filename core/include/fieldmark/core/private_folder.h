@@ -15,7 +15,9 @@ namespace fieldmark {
 struct PrivateFolder {
   /// @param what  part of its name   @throws IoError if it cannot be made
   explicit PrivateFolder(const std::string& what) {
-    std::string name = (std::filesystem::temp_directory_path() / ("fieldmark_" + what + "_XXXXXX")).string();
+    // mkdtemp() replaces six X's at the end.
+    std::string name =
+        (std::filesystem::temp_directory_path() / ("fieldmark_" + what + "_" + std::string(6, 'X'))).string();
     if (!::mkdtemp(name.data())) throw IoError(name + ": cannot be made (" + std::strerror(errno) + ")");
     path = name;
   }

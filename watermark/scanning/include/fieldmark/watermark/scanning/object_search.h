@@ -31,8 +31,10 @@ struct ObjectSearchOptions {
 class ObjectSearch {
  public:
   /// Renders the views. @param owner  of an object
-  /// @throws ValueError if the field fills its images or an option is out of range
+  /// @throws ValueError if the field fills its images, or as check()
   explicit ObjectSearch(const Owner& owner, const ObjectSearchOptions& options = {});
+  /// @throws ValueError if an option is out of range
+  static void check(const ObjectSearchOptions& options);
   /// Returns at most `count` places of the whole object, then as many of quarters, the best of each first and
   /// from another view. They do not depend on the number of threads.
   /// @param rgb  [H, W, 3], sides of at least 16   @throws ShapeError for another shape

@@ -55,7 +55,7 @@ class PageReader {
   static constexpr Index kMostBlocks = 24;
   /// @param owner  of preset fast; must outlive the reader
   /// @param objects  of the search for an object, made for the first image that needs it
-  /// @throws ValueError as InformedReader
+  /// @throws ValueError as InformedReader, and if an option of a search is out of range
   explicit PageReader(const Owner& owner, const CameraSearchOptions& search = {},
                       const ObjectSearchOptions& objects = {});
   /// Reads an image.
