@@ -1,16 +1,12 @@
 #include "kernels/chain.h"
 
-#include "kernels/chain_passes.h"
+#include "kernels/chain_program.h"
 
 namespace fieldmark::kernels {
 namespace {
 
 using detail::kChainInputs;
 using detail::kChainSteps;
-
-// Elements per block: all values of a chain stay in the L1 cache. Large arrays take smaller blocks, whose
-// prefetches the CPU can hold at a time.
-constexpr Index kBlock = 256, kLargeBlock = 128;
 
 // `reached` tells which values have a gradient so far, `wanted` which need one.
 void plan_routes(const ChainSteps& chain, const bool* wanted, bool* reached, Route* routes) {
@@ -70,19 +66,10 @@ struct GradientPlan {
   }
 };
 
-// Prefetches the block after the one at i while that is computed: chains of several steps would otherwise
-// wait for memory.
-template <class T>
-inline void fetch_next(const T* p, Index i, Index block, Index n) {
-  constexpr Index line = 64 / static_cast<Index>(sizeof(T));
-  const Index end = n - i < 2 * block ? n : i + 2 * block;
-  for (Index k = i + block; k < end; k += line) __builtin_prefetch(p + k);
-}
-
 // The kernels below for a whole number of vectors.
 template <class T>
 void forward_vectors(const ChainSteps& chain, const T* const* inputs, T* y, Index n, bool large) {
-  alignas(64) T made[kChainSteps][kBlock];
+  alignas(64) T made[kChainSteps][kBlock<T>];
   Places<T> places{};
   for (int k = 0; k < chain.inputs; ++k) places.value[k] = Place<const T>::moving(inputs[k]);
   for (int s = 0; s < chain.count; ++s)
@@ -91,19 +78,15 @@ void forward_vectors(const ChainSteps& chain, const T* const* inputs, T* y, Inde
   places.streams_value = large && can_stream(y);
   Program<T> program;
   program.add_forward(chain, nullptr, places);
-  const Index block = large ? kLargeBlock : kBlock;
-  for (Index i = 0; i < n; i += block) {
-    for (int k = 0; k < chain.inputs; ++k) fetch_next(inputs[k], i, block, n);
-    program.run(i, n - i < block ? n - i : block);
-  }
+  program.run(n);
 }
 
 template <class T>
 void backward_vectors(const ChainSteps& chain, const T* const* inputs, const T* dy, T* const* dinputs,
                       const bool* add, Index n, bool large) {
-  alignas(64) T made[kChainSteps][kBlock];
-  alignas(64) T grads[kChainSteps][kBlock];
-  alignas(64) T sums[kChainInputs][kBlock];  // parts of gradients that are streamed when they are complete
+  alignas(64) T made[kChainSteps][kBlock<T>];
+  alignas(64) T grads[kChainSteps][kBlock<T>];
+  alignas(64) T sums[kChainInputs][kBlock<T>];  // parts of gradients that are streamed when they are complete
   const GradientPlan plan(chain, dinputs, add);
   Places<T> places{};
   for (int k = 0; k < chain.inputs; ++k) {
@@ -123,15 +106,7 @@ void backward_vectors(const ChainSteps& chain, const T* const* inputs, const T* 
   Program<T> program;
   program.add_forward(chain, plan.needed, places);
   program.add_backward(chain, plan.routes, places);
-  const Index block = large ? kLargeBlock : kBlock;
-  for (Index i = 0; i < n; i += block) {
-    for (int k = 0; k < chain.inputs; ++k) {
-      fetch_next(inputs[k], i, block, n);
-      if (dinputs[k] && !places.streamed_grad[k]) fetch_next<T>(dinputs[k], i, block, n);
-    }
-    fetch_next(dy, i, block, n);
-    program.run(i, n - i < block ? n - i : block);
-  }
+  program.run(n);
 }
 
 // One vector of n elements and padding.
@@ -153,7 +128,7 @@ namespace FIELDMARK_ISA_NS {
 template <class T>
 void chain_forward(const ChainSteps& chain, const T* const* inputs, T* y, Index n, bool large) {
   const Index rest = n % simd::kLanes<T>, whole = n - rest;
-  forward_vectors(chain, inputs, y, whole, large);
+  if (whole > 0) forward_vectors(chain, inputs, y, whole, large);
   if (rest > 0) {
     Padded<T> end[kChainInputs], y_end;
     const T* ends[kChainInputs];
@@ -161,14 +136,14 @@ void chain_forward(const ChainSteps& chain, const T* const* inputs, T* y, Index 
     forward_vectors(chain, ends, y_end.element, simd::kLanes<T>, false);
     y_end.write(y + whole, rest);
   }
-  finish_streams();
+  if (large) finish_streams();
 }
 
 template <class T>
 void chain_backward(const ChainSteps& chain, const T* const* inputs, const T* dy, T* const* dinputs,
                     const bool* add, Index n, bool large) {
   const Index rest = n % simd::kLanes<T>, whole = n - rest;
-  backward_vectors(chain, inputs, dy, dinputs, add, whole, large);
+  if (whole > 0) backward_vectors(chain, inputs, dy, dinputs, add, whole, large);
   if (rest > 0) {
     Padded<T> end[kChainInputs], gradient_end[kChainInputs], dy_end;
     const T* ends[kChainInputs];
@@ -181,7 +156,7 @@ void chain_backward(const ChainSteps& chain, const T* const* inputs, const T* dy
     for (int k = 0; k < chain.inputs; ++k)
       if (dinputs[k]) gradient_end[k].write(dinputs[k] + whole, rest);
   }
-  finish_streams();
+  if (large) finish_streams();
 }
 
 template void chain_forward(const ChainSteps&, const float* const*, float*, Index, bool);

@@ -18,21 +18,34 @@ template <class T>
 struct Place {
   T* at;
   Index moves;  // all bits set: moves with the block
+  int writer;   // the pass that writes it, counted from 1; 0: the caller's
 
-  static Place fixed(T* p) { return {p, 0}; }
-  static Place moving(T* p) { return {p, ~Index{0}}; }
+  static Place fixed(T* p) { return {p, 0, 0}; }
+  static Place moving(T* p) { return {p, ~Index{0}, 0}; }
   T* block(Index first) const { return at + (first & moves); }
   explicit operator bool() const { return at != nullptr; }
-  operator Place<const T>() const { return {at, moves}; }
+  operator Place<const T>() const { return {at, moves, writer}; }
 };
 
-// out[i] = before[i] (null: 0) + a function of a[i], b[i], y[i], g[i], p and q; see Operands.
+// A block is as many vectors as every ABI passes in registers: a pass hands its block to the next one there,
+// because each further store and load in L1 would cost as much as the arithmetic between them.
+constexpr int kVectors = 8;
+template <class T>
+constexpr Index kBlock = kVectors* simd::kLanes<T>;
+
+// out[i] = before[i] (null: 0) + a function of a[i], b[i], y[i], g[i], p and q; see Operands. One operand
+// comes in registers: a or b of a value, g of a gradient.
 template <class T>
 struct Pass {
-  void (*run)(const Pass&, Index first, Index n);  // n elements, whole vectors
+  using V = simd::Vec<T>;
+  using Run = void (*)(const Pass*, Index first, V, V, V, V, V, V, V, V);
+  Run wide, narrow;  // run this pass and those after it, on a block and on one vector
   Place<const T> a, b, y, g, before;
   Place<T> out;
   T p, q;
+  bool loads;    // the operand in registers is loaded first
+  bool stores;   // the result is read from memory, too
+  bool streams;  // the result goes past the caches
 };
 
 // Stores past the caches, which saves reading the memory that is overwritten. p must be aligned to vectors.
@@ -54,142 +67,121 @@ inline bool can_stream(const T* p) {
   return reinterpret_cast<std::uintptr_t>(p) % simd::kBytes == 0;
 }
 
-// Makes streamed stores visible to threads that a plain store releases.
+// Streamed stores are weakly ordered: without this fence they could become visible after the release store
+// with which the pool publishes that a chunk is done.
 inline void finish_streams() {
 #if defined(__SSE2__)
   __builtin_ia32_sfence();
 #endif
 }
 
-// What a pass computes of a step.
-enum class Part { value, to_a, to_b };
+// Calls f(k, offset of vector k) for each vector of a block. Registers have no index at run time.
+template <class T, int vectors, class F>
+[[gnu::always_inline]] inline void for_vectors(F f) {
+#pragma GCC unroll 8
+  for (int k = 0; k < vectors; ++k) f(k, k * simd::kLanes<T>);
+}
 
-template <class Op, Part part, class Vector>
-[[gnu::always_inline]] inline Vector compute(const Operands<Vector>& o) {
-  if constexpr (part == Part::value)
-    return Op::value(o);
-  else if constexpr (part == Part::to_a)
-    return Op::to_a(o);
+template <int vectors, class T>
+[[gnu::always_inline]] inline void put(T* out, const simd::Vec<T>* v, bool streams) {
+  if (streams)
+    for_vectors<T, vectors>([&](int k, Index i) { stream(out + i, v[k]); });
   else
-    return Op::to_b(o);
+    for_vectors<T, vectors>([&](int k, Index i) { simd::store(out + i, v[k]); });
 }
 
-template <class T, class Op, Part part, bool adds, bool streams>
-void run_pass(const Pass<T>& s, Index first, Index n) {
-  using Vector = simd::Vec<T>;
-  const T *a = s.a.block(first), *b = s.b.block(first), *y = s.y.block(first), *g = s.g.block(first);
-  [[maybe_unused]] const T* before = s.before.block(first);
-  T* out = s.out.block(first);
-  const Vector p = simd::broadcast(s.p), q = simd::broadcast(s.q);
-#pragma GCC unroll 4
-  for (Index i = 0; i < n; i += simd::kLanes<T>) {
-    Vector v = compute<Op, part>(
-        Operands<Vector>{simd::load(a + i), simd::load(b + i), simd::load(y + i), simd::load(g + i), p, q});
-    if constexpr (adds) v = simd::load(before + i) + v;
-    if constexpr (streams)
-      stream(out + i, v);
-    else
-      simd::store(out + i, v);
+// Replaces operand a (second: b) in registers by the value of a step.
+template <class Op, bool second>
+struct Value {
+  template <int vectors, class T>
+  [[gnu::always_inline]] static void run(const Pass<T>& s, Index first, simd::Vec<T>* r) {
+    using Vector = simd::Vec<T>;
+    const T *a = s.a.block(first), *b = s.b.block(first);
+    const Vector p = simd::broadcast(s.p), q = simd::broadcast(s.q);
+    if (s.loads) for_vectors<T, vectors>([&](int k, Index i) { r[k] = simd::load((second ? b : a) + i); });
+    for_vectors<T, vectors>([&](int k, Index i) {
+      const Vector other = simd::load((second ? a : b) + i), none{};
+      r[k] = Op::value(Operands<Vector>{second ? other : r[k], second ? r[k] : other, none, none, p, q});
+    });
+    if (s.stores) put<vectors>(s.out.block(first), r, s.streams);
   }
+};
+
+// Computes dL/da (second: dL/db) from g in registers, and leaves it or g there.
+template <class Op, bool second, bool adds, bool leaves>
+struct Gradient {
+  template <int vectors, class T>
+  [[gnu::always_inline]] static void run(const Pass<T>& s, Index first, simd::Vec<T>* r) {
+    using Vector = simd::Vec<T>;
+    const T *a = s.a.block(first), *b = s.b.block(first), *y = s.y.block(first), *g = s.g.block(first);
+    [[maybe_unused]] const T* before = s.before.block(first);
+    const Vector p = simd::broadcast(s.p), q = simd::broadcast(s.q);
+    Vector v[kVectors];
+    if (s.loads) for_vectors<T, vectors>([&](int k, Index i) { r[k] = simd::load(g + i); });
+    for_vectors<T, vectors>([&](int k, Index i) {
+      const Operands<Vector> o{simd::load(a + i), simd::load(b + i), simd::load(y + i), r[k], p, q};
+      if constexpr (second)
+        v[k] = Op::to_b(o);
+      else
+        v[k] = Op::to_a(o);
+      if constexpr (adds) v[k] = simd::load(before + i) + v[k];
+    });
+    // Not in the loop above: a branch there would keep GCC from contracting a product and a sum.
+    if (!leaves || s.stores) put<vectors>(s.out.block(first), v, s.streams);
+    if (leaves) for_vectors<T, vectors>([&](int k, Index) { r[k] = v[k]; });
+  }
+};
+
+// The call of the next pass is a jump: eight vectors are arguments in registers.
+template <class T, class Work, int vectors, class V = simd::Vec<T>>
+void run_pass(const Pass<T>* s, Index first, V r0, V r1, V r2, V r3, V r4, V r5, V r6, V r7) {
+  V r[kVectors] = {r0, r1, r2, r3, r4, r5, r6, r7};
+  Work::template run<vectors>(*s, first, r);
+  const Pass<T>* next = s + 1;
+  const auto run = vectors == 1 ? next->narrow : next->wide;
+  run(next, first, r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7]);
+}
+template <class T, class V = simd::Vec<T>>
+void end_passes(const Pass<T>*, Index, V, V, V, V, V, V, V, V) {}
+
+// The last pass returns with vectors in use, which the compiler does not know of: SSE code of the caller
+// would run several times as slow.
+inline void leave_vectors() {
+#if defined(__AVX__)
+  __builtin_ia32_vzeroupper();
+#endif
 }
 
-template <class T, Part part>
-auto choose_pass(ChainOp op, bool adds, bool streams) {
-  decltype(Pass<T>::run) run = nullptr;
+template <class Work, class T>
+void set_work(Pass<T>& pass) {
+  pass.wide = run_pass<T, Work, kVectors>;
+  pass.narrow = run_pass<T, Work, 1>;
+}
+
+template <class T>
+void choose_value(ChainOp op, bool second, Pass<T>& pass) {
   dispatch(op, [&](auto operation) {
     using Op = decltype(operation);
-    if constexpr (part != Part::to_b || requires(Operands<simd::Vec<T>> o) { Op::to_b(o); })
-      run = adds ? (streams ? run_pass<T, Op, part, true, true> : run_pass<T, Op, part, true, false>)
-                 : (streams ? run_pass<T, Op, part, false, true> : run_pass<T, Op, part, false, false>);
+    if constexpr (requires(Operands<simd::Vec<T>> o) { Op::to_b(o); })
+      if (second) return set_work<Value<Op, true>>(pass);
+    set_work<Value<Op, false>>(pass);
   });
-  return run;
 }
 
-// Where the values and gradients of a chain lie, by number of the value.
-template <class T>
-struct Places {
-  Place<const T> value[kChainValues];
-  Place<T> made[kChainValues];           // results of the steps
-  Place<const T> grad[kChainValues];     // gradients of the steps' results
-  Place<T> to[kChainValues];             // where gradients are summed; null: not wanted
-  Place<T> streamed_grad[kChainValues];  // where a complete gradient goes past the caches; null: nowhere
-  bool streams_value;                    // the result goes past the caches
-};
-
-// Which gradients a step contributes to. A gradient's first part is assigned, later ones are added to it.
-struct Route {
-  bool to_a, to_b, add_a, add_b, last_a, last_b;
-};
-
-// A chain's passes in the order of computation.
-template <class T>
-class Program {
- public:
-  // needed: the values to compute, by number; null for all.
-  void add_forward(const ChainSteps& chain, const bool* needed, const Places<T>& p) {
-    for (int s = 0; s < chain.count; ++s) {
-      const int y = chain.inputs + s;
-      if (needed && !needed[y]) continue;
-      const bool streams = p.streams_value && s + 1 == chain.count;
-      Pass<T>& pass = append(chain.step[s], p, y);
-      pass.y = pass.g = pass.a;
-      pass.out = p.made[y];
-      pass.run = choose_pass<T, Part::value>(chain.step[s].op, false, streams);
+template <bool second, class T>
+void choose_gradient(ChainOp op, bool adds, bool leaves, Pass<T>& pass) {
+  dispatch(op, [&](auto operation) {
+    using Op = decltype(operation);
+    if constexpr (!second || requires(Operands<simd::Vec<T>> o) { Op::to_b(o); }) {
+      if (adds)
+        leaves ? set_work<Gradient<Op, second, true, true>>(pass)
+               : set_work<Gradient<Op, second, true, false>>(pass);
+      else
+        leaves ? set_work<Gradient<Op, second, false, true>>(pass)
+               : set_work<Gradient<Op, second, false, false>>(pass);
     }
-  }
-
-  // Changes p.grad where a sum passes its gradient on.
-  void add_backward(const ChainSteps& chain, const Route* routes, Places<T>& p) {
-    for (int s = chain.count - 1; s >= 0; --s) {
-      const ChainStep& step = chain.step[s];
-      const Route& r = routes[s];
-      const int y = chain.inputs + s;
-      // A sum passes its gradient on: where that is all of a step's gradient, both are one array.
-      const auto passes_on = [&](bool first_operand, int value, bool add, bool last) {
-        const bool unchanged = step.op == ChainOp::add || (step.op == ChainOp::sub && first_operand);
-        if (!unchanged || add || !last || value < chain.inputs) return false;
-        p.grad[value] = p.grad[y];
-        return true;
-      };
-      if (r.to_a && !passes_on(true, step.a, r.add_a, r.last_a))
-        add_gradient<Part::to_a>(step, p, y, step.a, r.add_a, r.last_a);
-      if (r.to_b && !passes_on(false, step.b, r.add_b, r.last_b))
-        add_gradient<Part::to_b>(step, p, y, step.b, r.add_b, r.last_b);
-    }
-  }
-
-  // Runs n elements from `first`; n is a multiple of the lanes.
-  void run(Index first, Index n) const {
-    for (int k = 0; k < count_; ++k) pass_[k].run(pass_[k], first, n);
-  }
-
- private:
-  Pass<T>& append(const ChainStep& step, const Places<T>& p, int y) {
-    Pass<T>& pass = pass_[count_++];
-    pass = {.run = nullptr,
-            .a = p.value[step.a],
-            .b = p.value[step.b],
-            .y = p.value[y],
-            .g = p.grad[y],
-            .before = {},
-            .out = {},
-            .p = static_cast<T>(step.p),
-            .q = static_cast<T>(step.q)};
-    return pass;
-  }
-
-  template <Part part>
-  void add_gradient(const ChainStep& step, const Places<T>& p, int y, int value, bool add, bool last) {
-    const bool streams = last && p.streamed_grad[value];
-    Pass<T>& pass = append(step, p, y);
-    pass.out = streams ? p.streamed_grad[value] : p.to[value];
-    if (add) pass.before = p.to[value];
-    pass.run = choose_pass<T, part>(step.op, add, streams);
-  }
-
-  int count_ = 0;
-  Pass<T> pass_[3 * detail::kChainSteps];
-};
+  });
+}
 
 }  // namespace
 }  // namespace fieldmark::kernels

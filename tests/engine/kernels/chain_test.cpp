@@ -3,11 +3,139 @@
 #include <fieldmark/engine/aligned.h>
 #include <fieldmark/engine/chain.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+
 #include "support/catch.h"
 #include "support/each_isa.h"
 #include "support/random.h"
 
 namespace fieldmark::kernels {
+namespace {
+
+using detail::ChainOp, detail::ChainSteps;
+template <class T>
+using Arrays = std::vector<AlignedVector<T>>;
+
+// Steps of random ops on recent and older values; operands are often one value.
+ChainSteps random_chain(std::mt19937& rng) {
+  const auto below = [&](int n) { return static_cast<int>(rng() % static_cast<unsigned>(n)); };
+  ChainSteps c{.inputs = 1 + below(3), .count = 1 + below(9), .step = {}};
+  for (int s = 0; s < c.count; ++s) {
+    const int have = c.inputs + s;
+    const auto pick = [&] {
+      return static_cast<std::uint8_t>(below(2) ? have - 1 - below(std::min(have, 3)) : below(have));
+    };
+    const auto op = static_cast<ChainOp>(below(2) ? below(7) : below(18));
+    const std::uint8_t a = pick(), b = op <= ChainOp::maximum ? pick() : a;
+    c.step[s] = {op, a, b, 0.7 * below(5) + 0.3, below(5) - 1.7};
+  }
+  return c;
+}
+
+// One element of one step, as a chain of its own: no pass has a neighbour.
+template <class T>
+struct Step {
+  ChainSteps chain;
+  bool one;  // both operands are one value
+
+  explicit Step(const detail::ChainStep& s) : chain{.inputs = 2, .count = 1, .step = {s}}, one(s.a == s.b) {
+    chain.step[0].a = 0;
+    chain.step[0].b = one ? 0 : 1;
+  }
+  T value(T a, T b) const {
+    const T* inputs[] = {&a, &b};
+    T y = 0;
+    FIELDMARK_KERNEL(chain_forward<T>)(chain, inputs, &y, 1, false);
+    return y;
+  }
+  void gradient(T a, T b, T g, T* da, T* db, const bool* add) const {
+    const T* inputs[] = {&a, &b};
+    T* to[] = {da, one || chain.step[0].op > ChainOp::maximum ? nullptr : db};
+    FIELDMARK_KERNEL(chain_backward<T>)(chain, inputs, &g, to, add, 1, false);
+  }
+};
+
+// The value of a chain and the gradients of its inputs at one element, step by step.
+template <class T>
+T by_steps(const ChainSteps& c, T* value, T dy, T* grad, bool* reached) {
+  for (int s = 0; s < c.count; ++s)
+    value[c.inputs + s] = Step<T>(c.step[s]).value(value[c.step[s].a], value[c.step[s].b]);
+  const int result = c.inputs + c.count - 1;
+  grad[result] = dy;
+  reached[result] = true;
+  for (int s = c.count - 1; s >= 0; --s) {
+    const auto& step = c.step[s];
+    if (!reached[c.inputs + s]) continue;
+    const bool add[] = {reached[step.a], reached[step.b]};
+    Step<T>(step).gradient(value[step.a], value[step.b], grad[c.inputs + s], grad + step.a, grad + step.b,
+                           add);
+    reached[step.a] = reached[step.b] = true;
+  }
+  return value[result];
+}
+
+template <class T>
+bool same(T x, T y) {
+  return std::memcmp(&x, &y, sizeof x) == 0 || (std::isnan(x) && std::isnan(y));
+}
+
+template <class T>
+Arrays<T> numbers_and_specials(std::size_t n, std::mt19937& rng) {
+  using Limits = std::numeric_limits<T>;
+  const T special[] = {Limits::quiet_NaN(), Limits::infinity(), -Limits::infinity(), 0};
+  Arrays<T> all(4, AlignedVector<T>(n));
+  for (auto& array : all)
+    for (T& x : array) x = rng() % 12 ? static_cast<T>(rng() % 4001) / 700 - 2 : special[rng() % 4];
+  return all;
+}
+
+template <class T>
+void expect_as_by_steps(unsigned seed) {
+  std::mt19937 rng(seed);
+  const ChainSteps c = random_chain(rng);
+  const std::size_t from = 16, n = 8 * 64 / sizeof(T) + 3 * 64 / sizeof(T) + 1 + seed % 5;
+  const bool large = seed % 2 == 0;
+  const Arrays<T> in = numbers_and_specials<T>(from + n, rng);
+  Arrays<T> grads(3, AlignedVector<T>(from + n, T(0.3)));
+  AlignedVector<T> y(from + n);
+  const T* inputs[3];
+  T* dinputs[3];
+  bool add[3], wrong = false;
+  for (std::size_t k = 0; k < 3; ++k) {
+    inputs[k] = in[k].data() + from;
+    dinputs[k] = grads[k].data() + from;
+    add[k] = rng() % 2 == 0;
+  }
+  const auto size = static_cast<Index>(n);
+  FIELDMARK_KERNEL(chain_forward<T>)(c, inputs, y.data() + from, size, large);
+  FIELDMARK_KERNEL(chain_backward<T>)(c, inputs, in[3].data() + from, dinputs, add, size, large);
+  for (std::size_t i = 0; i < n; ++i) {
+    T value[16] = {inputs[0][i], inputs[1][i], inputs[2][i]}, grad[16] = {T(0.3), T(0.3), T(0.3)};
+    bool reached[16] = {};
+    std::copy_n(add, c.inputs, reached);
+    for (int k = 0; k < c.inputs; ++k) value[k] = inputs[k][i];
+    wrong |= !same(by_steps(c, value, in[3][from + i], grad, reached), y[from + i]);
+    for (int k = 0; k < c.inputs; ++k) wrong |= !same(grad[k], dinputs[k][i]);
+  }
+  CAPTURE(seed, sizeof(T), c.count);
+  CHECK(!wrong);
+}
+
+}  // namespace
+
+// Passes hand their results on in registers: whichever are neighbours, bits are those of the steps alone.
+TEST_CASE("kernels/chain: bits of random chains as of their steps one by one, with NaN and infinity") {
+  each_isa([&] {
+    for (unsigned seed = 0; seed < 150; ++seed) {
+      expect_as_by_steps<float>(seed);
+      expect_as_by_steps<double>(seed);
+    }
+  });
+}
 
 TEST_CASE(
     "kernels/chain: every length at an odd offset, and past the caches, and nothing outside is touched") {
