@@ -30,6 +30,11 @@ constexpr AlignmentStage kFineStretched[] = {
     {.size = 200, .blur = 1.2, .steps = 6, .stretched = true}};
 constexpr AlignmentStage kFine[] = {{.size = 96, .blur = 1.2, .steps = 10, .quick = true, .least = kFarOff},
                                     {.size = 200, .blur = 1.2, .steps = 6}};
+// Few pixels of a thin object do not fix the camera at 200 pixels: a further stage raises the bits right of
+// wires from 99.0 to 99.6%. Solid objects gain nothing.
+constexpr AlignmentStage kFinest[] = {{.size = 400, .blur = 1, .steps = 4}};
+constexpr double kThin = 0.12;    // share of the image's pixels
+constexpr double kExact = 0.992;  // agreement from which the camera at 200 pixels is exact enough
 constexpr Index kPartSize = 200;  // longer side at which a part is aligned, pixels
 // Agreement of a part: at the right camera 0.90 to 0.99 at 48 pixels and 0.92 to 0.99 at 96, in images of
 // something else below 0.85 and 0.59 in 95 of 100 places.
@@ -174,7 +179,11 @@ InformedReading InformedReader::refined(const Surround& seen, const Change& chan
       best_alignment(found, kSure, landmarks_of(owner_.field.cameras), [&](const nerf::Camera& camera) {
         return parts_->aligner.align(seen.image, camera, stages, seen.covered);
       });
-  return {.evidence = {}, .camera = best.camera, .agreement = best.agreement};
+  InformedReading out{.evidence = {}, .camera = best.camera, .agreement = best.agreement};
+  const bool thin = best.shown < kThin && best.agreement < kExact;
+  if (thin && best.agreement >= kLeastAgreement)
+    out.camera = parts_->aligner.align(seen.image, best.camera, kFinest, seen.covered).camera;
+  return out;
 }
 
 // Returns the best alignment of an image without its surround, coarse, then fine.

@@ -204,7 +204,8 @@ class Stage {
       const CameraMotion motion = limited(length * newton);
       const double far = furthest(best, motion);
       if (far < kStill && failures > 0) break;  // the linear model has just failed
-      if (far < kStill) return {moved(best.camera, best.pivot, limited(newton)), agreement(best)};
+      if (far < kStill)
+        return {moved(best.camera, best.pivot, limited(newton)), agreement(best), shown(best)};
       Look next = look(moved(best.camera, best.pivot, motion));
       if (next.points.empty() || !(cost(next, best.spread) < least)) {
         if (far < kNear) break;
@@ -220,10 +221,13 @@ class Stage {
       length = kOverRelaxation;
       failures = 0;
     }
-    return {best.camera, best.points.empty() ? -1 : agreement(best)};
+    return {best.camera, best.points.empty() ? -1 : agreement(best), shown(best)};
   }
 
  private:
+  static double shown(const Look& l) {
+    return static_cast<double>(l.points.size()) / static_cast<double>(l.seen.size());
+  }
   Index reach() const { return static_cast<Index>(std::ceil(2 * options_.blur)); }
 
   static CameraMotion limited(const Vector& m) {

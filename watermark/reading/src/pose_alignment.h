@@ -24,6 +24,7 @@ struct Alignment {
   /// on the foreground, in [-1, 1]: 1 if they differ by a change of colour alone. A last motion of less than
   /// 0.2 pixels comes after it.
   double agreement = -1;
+  double shown = 0;  ///< share of that render's pixels that show the field
 };
 
 /// Refines a camera until the field's render agrees with an image.
