@@ -72,7 +72,7 @@ int run_null(const NullArguments& options, Context& context) {
     right.add(watermark::keyed_statistic(read[i].cells, code, message));
     // Each image has its own keys, so that all trials are independent given the images.
     random.add(watermark::count_wrong_keys(
-        read[i].cells, owner.cells.area(), message, options.keys, context.seed() + i + 1,
+        read[i].cells, owner.cells.weights(), message, options.keys, context.seed() + i + 1,
         [&](Index done, Index total) {
           if (guard.interrupted()) throw Interrupted("nothing was counted");
           const double part = static_cast<double>(done) / static_cast<double>(total);

@@ -36,7 +36,7 @@ std::vector<watermark::TracedCopy> traced(const watermark::Owner& owner, const w
                                           const std::vector<double>& evidence, double fpr, Context& context) {
   const InterruptGuard guard;
   Progress progress = context.progress("recipients");
-  return watermark::trace_copies(evidence, owner.cells.area(), key, message, names, fpr,
+  return watermark::trace_copies(evidence, owner.cells.weights(), key, message, names, fpr,
                                  [&](Index done, Index total) {
                                    if (guard.interrupted()) throw Interrupted("nothing was decided");
                                    progress.update(static_cast<double>(done) / static_cast<double>(total));

@@ -36,7 +36,7 @@ watermark::WrongKeyCounts count_keys(const KeyTest& test, const std::vector<doub
   const InterruptGuard guard;
   Progress progress = context.progress("wrong keys");
   return watermark::count_wrong_keys(
-      evidence, test.owner.cells.area(), test.message, n, context.seed(), [&](Index done, Index total) {
+      evidence, test.owner.cells.weights(), test.message, n, context.seed(), [&](Index done, Index total) {
         if (guard.interrupted()) throw Interrupted("nothing was decided");
         progress.update(static_cast<double>(done) / static_cast<double>(total));
         return true;

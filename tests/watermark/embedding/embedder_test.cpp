@@ -23,9 +23,11 @@ Outcome run(Index steps, Owner owner = tiny_owner()) {
   return outcome(owner, embedder);
 }
 
-// Returns the mean mark PSNR in dB on the object over 16 novel views, each with its own code and message.
-double measured_strength(const Owner& owner, std::uint64_t view_seed, const CounterRng& messages,
+// Returns the mean mark PSNR in dB on the object over 16 novel views, each with its own code, dealt by area
+// as in calibration, and its own message.
+double measured_strength(Owner owner, std::uint64_t view_seed, const CounterRng& messages,
                          std::uint64_t code_seed) {
+  owner.cells.set_strength({});
   nerf::Renderer plain(owner.field), marked(owner.field);
   double sum = 0;
   const auto cameras = nerf::make_cameras(owner.field.cameras, nerf::CameraSet::novel, 16, 0, view_seed);
@@ -263,8 +265,7 @@ TEST_CASE("embedder: the extractor has a step size of its own") {
   Owner owner = tiny_paper_owner();
   EmbedOptions o = few_steps(1);
   o.extractor_lr = 0;
-  CHECK_THROWS_WITH(Embedder(owner, tiny_views(), o),
-                    "[embedder] extractor_lr must be positive, got 0.000000");
+  CHECK_THROWS_WITH(Embedder(owner, tiny_views(), o), "[embedder] extractor_lr must be positive, got 0");
 }
 
 TEST_CASE("embedder: options outside their ranges are refused") {

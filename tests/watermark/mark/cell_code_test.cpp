@@ -91,6 +91,43 @@ TEST_CASE("cell_code: a dealer's reused storage gives the same code as a fresh o
   CHECK_FALSE(other_bits == fresh.bit);
 }
 
+TEST_CASE("cell_code: measured strengths decide which cells share a bit, the key decides which bit it is") {
+  // The first view shows the even cells, the second the odd ones; by area, cells 0 to 3 are one group.
+  const std::vector<double> area{8, 7, 6, 5, 4, 3, 2, 1};
+  std::vector<std::int32_t> strength(16);
+  for (std::size_t c = 0; c < 8; ++c) strength[8 * (c % 2) + c] = static_cast<std::int32_t>(100 - c);
+  const CellDealer dealer({std::span<const double>(area), strength}, 4);
+  CellCode first, other;
+  dealer.deal(test_key(1), first);
+  bool another_bit = false;
+  for (unsigned k = 0; k < 20; ++k) {
+    dealer.deal(test_key(k), other);
+    for (std::int32_t bit = 0; bit < 4; ++bit) {
+      int even = 0, odd = 0;
+      for (std::size_t c = 0; c < 8; ++c)
+        if (other.bit[c] == bit) ++(c % 2 == 0 ? even : odd);
+      CHECK((even == 1 && odd == 1));  // both views show every bit
+    }
+    for (std::size_t c = 0; c < 8; ++c) {
+      another_bit = another_bit || other.bit[c] != first.bit[c];
+      CHECK((other.bit[c] == other.bit[0]) == (first.bit[c] == first.bit[0]));
+    }
+    std::vector<std::int8_t> signs(8);
+    keyed_signs(test_key(k), "fieldmark cell sign", signs);
+    CHECK(other.sign == signs);
+  }
+  CHECK(another_bit);
+}
+
+TEST_CASE("cell_code: strengths that are not those of whole views, or negative, are refused") {
+  const std::vector<double> area{3, 2, 1};
+  const std::vector<std::int32_t> five(5, 1), negative{1, 1, -1};
+  CHECK_THROWS_WITH(deal_cells(test_key(0), {std::span<const double>(area), five}, 1),
+                    "[deal_cells] strength must have numbers for all of 3 cells in each view, got 5");
+  CHECK_THROWS_WITH(deal_cells(test_key(0), {std::span<const double>(area), negative}, 1),
+                    "[deal_cells] strength must be at least 0, got -1");
+}
+
 TEST_CASE("cell_code: the sign a cell shows for a message") {
   const CellCode code{{0, 1, -1, 1}, {1, 1, 0, -1}};
   CHECK(cell_signs(code, Message{{1, 0}}) == std::vector<std::int8_t>{1, -1, 0, 1});

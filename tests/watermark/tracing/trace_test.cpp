@@ -202,5 +202,5 @@ TEST_CASE("trace: the same for any number of threads, progress counts up and can
   CHECK_THROWS_WITH(trace_copies(std::vector<double>(3), area, test_key(1), kMessage, names, kFpr),
                     Contains("must have 500 entries"));
   CHECK_THROWS_WITH(trace_copies(evidence, area, test_key(1), kMessage, names, 0),
-                    "[trace_copies] fpr must be in (0, 1], got 0.000000");
+                    "[trace_copies] fpr must be in (0, 1], got 0");
 }

@@ -1,4 +1,5 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/camera_set.h>
 #include <fieldmark/nerf/renderer.h>
@@ -43,7 +44,7 @@ void check(const TracingBenchOptions& o, const watermark::Owner& owner) {
     at_least("recipients", o.recipients, c.guilty + 1);
   }
   if (!(o.fpr > 0 && o.fpr <= 1))
-    throw ValueError("[run_tracing_bench] fpr must be in (0, 1], got " + std::to_string(o.fpr));
+    throw ValueError("[run_tracing_bench] fpr must be in (0, 1], got " + number_text(o.fpr));
 }
 
 Recipients draw_recipients(const watermark::Owner& owner, const TracingBenchOptions& o, Index guilty,
@@ -160,7 +161,7 @@ std::vector<TracingRow> run_tracing_bench(const watermark::Owner& owner, const T
       };
       const Recipients r = draw_recipients(owner, options, copies.guilty, trial);
       const auto evidence = suspect.evidence(mixed(owner, copies.mix, r.signs, pastes, trial), trial, tell);
-      const auto traced = watermark::trace_copies(evidence, owner.cells.area(), r.key, r.message, r.names,
+      const auto traced = watermark::trace_copies(evidence, owner.cells.weights(), r.key, r.message, r.names,
                                                   options.fpr, [&](Index, Index) {
                                                     tell();
                                                     return true;

@@ -1,3 +1,4 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/ops/arithmetic.h>
 #include <fieldmark/watermark/embedding/embedder.h>
 #include <fieldmark/watermark/keys/keyed_hash.h>
@@ -5,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cell_strength.h"
 #include "distorted_views.h"
 
 namespace fieldmark::watermark {
@@ -19,13 +21,15 @@ Embedder::Embedder(Owner& owner, std::span<const CachedView> views, const EmbedO
       owner_(owner),
       views_(views),
       options_(options),
+      cells_(owner.cells),
       message_rng_(options.seed, 12),
       loop_(static_cast<int>(std::clamp<Index>(options.batch, 1, 64)), owner.params.size()) {
+  cells_.set_strength({});
   if (options.batch < 1 || options.batch > 64)
     throw ValueError("[embedder] batch must be 1 to 64, got " + std::to_string(options.batch));
   if (views.empty()) throw ValueError("[embedder] views must not be empty");
   if (!(options.extractor_lr > 0))
-    throw ValueError("[embedder] extractor_lr must be positive, got " + std::to_string(options.extractor_lr));
+    throw ValueError("[embedder] extractor_lr must be positive, got " + number_text(options.extractor_lr));
   drawn_ = std::make_unique<DistortedViews>(owner, views, options.distortions, options.batch, options.seed);
   training_ = owner.mark().training(owner, views);
   train(owner.params, kAdam,
@@ -41,9 +45,11 @@ Embedder::Embedder(Owner& owner, std::span<const CachedView> views, const EmbedO
 
 Embedder::~Embedder() = default;
 
-// Networks that never see the owner's code hold no trace of its key.
+// Networks that never see the owner's code hold no trace of its key. Dealt by area: training does not depend
+// on a calibration on the way, which measures strengths.
 CellCode Embedder::fresh_code(std::uint64_t place) const {
-  return owner_.code(derive_key(key_of_seed(options_.seed), "fieldmark training code", place));
+  return owner_.mark().code(cells_, derive_key(key_of_seed(options_.seed), "fieldmark training code", place),
+                            owner_.options().bits);
 }
 
 TrainingImage Embedder::draw(Index image, Tape<float>& tape) const {
@@ -119,6 +125,7 @@ void Embedder::calibrate(Index views) {
     if (!std::isfinite(mark_psnr)) return;
     owner_.gain *= std::pow(10.0, (mark_psnr - target) / 20);
   }
+  if (owner_.mark().has_cells()) owner_.cells.set_strength(cell_strength(owner_, views_, options_.seed + 78));
 }
 
 void Embedder::describe(RunFingerprint& f) const {

@@ -48,11 +48,11 @@ void WrongKeyCounts::add(const WrongKeyCounts& other) {
   least_p = std::min(least_p, other.least_p);
 }
 
-WrongKeyCounts count_wrong_keys(std::span<const double> evidence, std::span<const double> area,
+WrongKeyCounts count_wrong_keys(std::span<const double> evidence, const CellWeights& weights,
                                 const Message& message, Index n, std::uint64_t seed,
                                 const std::function<bool(Index, Index)>& progress) {
   if (n < 0) throw ValueError("[count_wrong_keys] n must be at least 0, got " + std::to_string(n));
-  const CellDealer dealer(area, message.size());
+  const CellDealer dealer(weights, message.size());
   const Key root = key_of_seed(seed);
   WrongKeyCounts total;
   while (total.n < n) {

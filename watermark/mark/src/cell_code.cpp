@@ -1,4 +1,5 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/watermark/keys/keyed_hash.h>
 #include <fieldmark/watermark/mark/cell_code.h>
 
@@ -7,54 +8,87 @@
 #include <string>
 #include <utility>
 
+#include "balanced_classes.h"
+
 namespace fieldmark::watermark {
+namespace {
+
+// Sums the strengths of each cell over the views.
+std::vector<std::int64_t> total_strength(const CellWeights& weights) {
+  const std::size_t cells = weights.area.size();
+  if (weights.strength.size() % cells != 0)
+    throw ShapeError("[deal_cells] strength must have numbers for all of " + std::to_string(cells) +
+                     " cells in each view, got " + std::to_string(weights.strength.size()));
+  std::vector<std::int64_t> total(cells);
+  for (std::size_t i = 0; i < weights.strength.size(); ++i) {
+    check_number("deal_cells", "strength", weights.strength[i], weights.strength[i] >= 0, "at least 0");
+    total[i % cells] += weights.strength[i];
+  }
+  return total;
+}
+
+}  // namespace
 
 Index CellCode::carriers() const {
   return std::count_if(bit.begin(), bit.end(), [](std::int32_t b) { return b >= 0; });
 }
 
-CellDealer::CellDealer(std::span<const double> area, Index n_bits)
-    : cells_(area.size()), n_bits_(static_cast<std::size_t>(n_bits)) {
-  if (n_bits < 1) throw ValueError("[deal_cells] n_bits must be at least 1, got " + std::to_string(n_bits));
-  for (std::size_t c = 0; c < area.size(); ++c) {
-    if (!std::isfinite(area[c]) || area[c] < 0) {
+CellDealer::CellDealer(const CellWeights& weights, Index n_bits)
+    : cells_(weights.area.size()), n_bits_(static_cast<std::size_t>(n_bits)) {
+  check_number("deal_cells", "n_bits", n_bits, n_bits >= 1, "at least 1");
+  for (std::size_t c = 0; c < cells_; ++c) {
+    if (!std::isfinite(weights.area[c]) || weights.area[c] < 0)
       throw ValueError("[deal_cells] area: cell " + std::to_string(c) + " must be finite and >= 0, got " +
-                       std::to_string(area[c]));
-    }
-    if (area[c] > 0) ranked_.push_back(c);
+                       number_text(weights.area[c]));
+    if (weights.area[c] > 0) ranked_.push_back(c);
   }
-  if (ranked_.size() < n_bits_) {
+  if (ranked_.size() < n_bits_)
     throw ValueError("[deal_cells] area: must have at least " + std::to_string(n_bits) +
                      " cells of positive area (one for each bit), got " + std::to_string(ranked_.size()));
+  const auto rank = [&](const auto& worth) {
+    std::stable_sort(ranked_.begin(), ranked_.end(),
+                     [&](std::size_t a, std::size_t b) { return worth[a] > worth[b]; });
+  };
+  if (weights.strength.empty()) {
+    rank(weights.area);
+    return;
   }
-  std::stable_sort(ranked_.begin(), ranked_.end(),
-                   [&](std::size_t a, std::size_t b) { return area[a] > area[b]; });
+  rank(total_strength(weights));
+  classes_ = balanced_classes(weights, ranked_, n_bits);
 }
 
 void CellDealer::deal(const Key& key, CellCode& code) const {
-  // One word per bit of each group: in a short last group, the key also decides which bits get a cell.
-  const std::size_t groups = (ranked_.size() + n_bits_ - 1) / n_bits_;
-  std::vector<std::uint64_t> words(groups * n_bits_);
-  keyed_words(key, "fieldmark cell order", words);
   code.bit.assign(cells_, -1);
   code.sign.resize(cells_);
   keyed_signs(key, "fieldmark cell sign", code.sign);
-
+  // One word per bit of each group: in a short last group, the key also decides which bits get a cell.
+  const std::size_t groups = classes_.empty() ? (ranked_.size() + n_bits_ - 1) / n_bits_ : 1;
+  std::vector<std::uint64_t> words(groups * n_bits_);
+  keyed_words(key, "fieldmark cell order", words);
   std::vector<std::pair<std::uint64_t, std::int32_t>> bits(n_bits_);
-  for (std::size_t begin = 0; begin < ranked_.size(); begin += n_bits_) {
+  const auto permute = [&](std::size_t begin) {
     for (std::size_t k = 0; k < n_bits_; ++k) bits[k] = {words[begin + k], static_cast<std::int32_t>(k)};
     std::sort(bits.begin(), bits.end());
-    const std::size_t count = std::min(n_bits_, ranked_.size() - begin);
-    for (std::size_t k = 0; k < count; ++k) code.bit[ranked_[begin + k]] = bits[k].second;
+  };
+  if (!classes_.empty()) {
+    permute(0);
+    for (std::size_t i = 0; i < ranked_.size(); ++i)
+      code.bit[ranked_[i]] = bits[static_cast<std::size_t>(classes_[i])].second;
+  } else {
+    for (std::size_t begin = 0; begin < ranked_.size(); begin += n_bits_) {
+      permute(begin);
+      const std::size_t count = std::min(n_bits_, ranked_.size() - begin);
+      for (std::size_t k = 0; k < count; ++k) code.bit[ranked_[begin + k]] = bits[k].second;
+    }
   }
   for (std::size_t c = 0; c < cells_; ++c) {
     if (code.bit[c] < 0) code.sign[c] = 0;
   }
 }
 
-CellCode deal_cells(const Key& key, std::span<const double> area, Index n_bits) {
+CellCode deal_cells(const Key& key, const CellWeights& weights, Index n_bits) {
   CellCode code;
-  CellDealer(area, n_bits).deal(key, code);
+  CellDealer(weights, n_bits).deal(key, code);
   return code;
 }
 

@@ -1,9 +1,11 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/watermark/mark/cell_grid.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 namespace fieldmark::watermark {
 namespace {
@@ -46,6 +48,14 @@ CellGrid CellGrid::from_numbers(Index side, std::span<const std::int32_t> number
     throw ValueError("[cell_grid] numbers must count " + std::to_string(area.size()) +
                      " cells in the order of a grid of " + std::to_string(side) + " a side");
   return grid;
+}
+
+void CellGrid::set_strength(std::vector<std::int32_t> strength) {
+  if (std::ssize(strength) % count() != 0)
+    throw ShapeError("[cell_grid] strength must have " + std::to_string(count()) +
+                     " numbers for each view, one a cell, got " + std::to_string(strength.size()));
+  for (const std::int32_t s : strength) check_number("cell_grid", "strength", s, s >= 0, "at least 0");
+  strength_ = std::move(strength);
 }
 
 Index CellGrid::place(Index side, const float x[3]) {

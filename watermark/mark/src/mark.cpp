@@ -11,7 +11,7 @@ Var<float> MarkTraining::reading_loss(const Params<float>&, Var<float>, const Tr
 }
 
 CellCode Mark::code(const CellGrid& cells, const Key& key, Index bits) const {
-  return deal_cells(key, cells.area(), bits);
+  return deal_cells(key, cells.weights(), bits);
 }
 
 Var<float> Mark::carrier(const Params<float>&, Var<float>, Var<float>) const {

@@ -1,3 +1,4 @@
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/model_file.h>
 #include <fieldmark/watermark/mark/owner.h>
 
@@ -17,11 +18,11 @@ OwnerOptions checked(const OwnerOptions& o) {
   if (o.bits < 1 || o.bits > 256)
     throw ValueError("[owner] bits must be 1 to 256, got " + std::to_string(o.bits));
   if (!(o.mark_psnr >= 20 && o.mark_psnr <= 60))
-    throw ValueError("[owner] mark_psnr must be 20 to 60 dB, got " + std::to_string(o.mark_psnr));
+    throw ValueError("[owner] mark_psnr must be 20 to 60 dB, got " + number_text(o.mark_psnr));
   if (o.reader_size < 32)
     throw ValueError("[owner] reader_size must be at least 32 pixels, got " + std::to_string(o.reader_size));
   if (!(o.reader_aspect >= kLeastAspect && o.reader_aspect <= 1 / kLeastAspect))
-    throw ValueError("[owner] reader_aspect must be 0.25 to 4, got " + std::to_string(o.reader_aspect));
+    throw ValueError("[owner] reader_aspect must be 0.25 to 4, got " + number_text(o.reader_aspect));
   return o;
 }
 
@@ -108,6 +109,9 @@ void Owner::save(const std::filesystem::path& path) const {
   for (const auto& e : params.entries()) file.add(e.name, e.shape, params.values(params.find(e.name)));
   file.add("cells/numbers", {static_cast<Index>(cells.numbers().size())}, cells.numbers());
   file.add("cells/area", {cells.count()}, cells.area());
+  if (!cells.strength().empty())
+    file.add("cells/strength", {std::ssize(cells.strength()) / cells.count(), cells.count()},
+             cells.strength());
   file.add("key", {32}, std::span<const std::uint8_t>(key.bytes));
   file.write(path, Access::secret);
 }
@@ -125,6 +129,7 @@ Owner Owner::load(const std::filesystem::path& path) {
     Owner owner(std::move(field), options, key_from_bytes(file.u8("key")),
                 CellGrid::from_numbers(j.at("cells"), file.i32("cells/numbers"), file.f64("cells/area").data),
                 stored_mark(info.config));
+    if (file.has("cells/strength")) owner.cells.set_strength(file.i32("cells/strength"));
     owner.gain = j.at("gain");
     owner.key_free_ = j.value("key_free", false);
     for (const auto& e : owner.params.entries()) {

@@ -1,4 +1,5 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/watermark/evidence/evidence.h>
 #include <fieldmark/watermark/mark/cell_code.h>
@@ -58,9 +59,9 @@ void correct(std::span<TracedCopy> sorted, double factor) {
 
 class Tracer {
  public:
-  Tracer(std::span<const double> area, const Key& key, const Message& message,
+  Tracer(const CellWeights& weights, const Key& key, const Message& message,
          const std::function<bool(Index, Index)>& progress)
-      : dealer_(area, message.size()), key_(key), message_(message), progress_(progress) {}
+      : dealer_(weights, message.size()), key_(key), message_(message), progress_(progress) {}
 
   // Tests the recipients on the evidence, sorts them by p-value and corrects it.
   void test(std::span<const double> evidence, int round, std::span<TracedCopy> copies) const {
@@ -100,13 +101,13 @@ class Tracer {
 
 }  // namespace
 
-std::vector<TracedCopy> trace_copies(std::span<const double> evidence, std::span<const double> area,
+std::vector<TracedCopy> trace_copies(std::span<const double> evidence, const CellWeights& weights,
                                      const Key& key, const Message& message,
                                      std::span<const std::string> names, double fpr,
                                      const std::function<bool(Index done, Index total)>& progress) {
   if (!(fpr > 0 && fpr <= 1))
-    throw ValueError("[trace_copies] fpr must be in (0, 1], got " + std::to_string(fpr));
-  const Tracer tracer(area, key, message, progress);
+    throw ValueError("[trace_copies] fpr must be in (0, 1], got " + number_text(fpr));
+  const Tracer tracer(weights, key, message, progress);
   std::vector<TracedCopy> copies(names.size());
   for (std::size_t i = 0; i < names.size(); ++i) copies[i].name = names[i];
   std::vector<std::vector<double>> explained;

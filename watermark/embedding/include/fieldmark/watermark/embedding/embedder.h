@@ -55,7 +55,8 @@ class Embedder final : public TrainingRun {
   double figure() const override { return figures_.bits; }
   std::string status() const override { return training_->note(figures_); }
   /// Sets the owner's gain so that novel views, each with a random message, have its mark PSNR (see
-  /// MarkPsnrMeter). Does nothing for a mark without a gain.
+  /// MarkPsnrMeter), and measures the strengths by which its cells are dealt (see CellDealer). Does nothing
+  /// for a mark without a gain.
   void calibrate(Index views = MarkPsnrViews{}.count);
 
   /// Returns the key of a checkpoint's owner, which a resumed run must use. @throws IoError
@@ -78,6 +79,7 @@ class Embedder final : public TrainingRun {
   Owner& owner_;
   std::span<const CachedView> views_;
   EmbedOptions options_;
+  CellGrid cells_;  // the owner's, without strengths
   CounterRng message_rng_;
   std::unique_ptr<DistortedViews> drawn_;
   std::unique_ptr<MarkTraining> training_;

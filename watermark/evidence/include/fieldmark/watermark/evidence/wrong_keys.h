@@ -1,4 +1,5 @@
 #pragma once
+#include <fieldmark/watermark/mark/cell_grid.h>
 #include <fieldmark/watermark/payload/message.h>
 
 #include <array>
@@ -30,11 +31,11 @@ struct WrongKeyCounts {
 /// Tests the same evidence under n wrong keys (see keyed_statistic, keyed_p_value). The keys are BLAKE2b of
 /// the seed, independent of any random_key(). Counts do not depend on the number of threads. 10^4 keys on 500
 /// cells take 0.4 s on one core.
-/// @param evidence  [cells] summed sign evidence   @param area  [cells] as for deal_cells
+/// @param evidence  [cells] summed sign evidence   @param weights  as for deal_cells
 /// @param n         number of keys, >= 0
 /// @param progress  called from time to time with (done, total); returns false to stop, which throws Error
 /// @throws ValueError as deal_cells and keyed_statistic, or if n < 0
-WrongKeyCounts count_wrong_keys(std::span<const double> evidence, std::span<const double> area,
+WrongKeyCounts count_wrong_keys(std::span<const double> evidence, const CellWeights& weights,
                                 const Message& message, Index n, std::uint64_t seed,
                                 const std::function<bool(Index, Index)>& progress = {});
 

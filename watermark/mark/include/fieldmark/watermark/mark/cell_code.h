@@ -1,6 +1,7 @@
 #pragma once
 #include <fieldmark/engine/shape.h>
 #include <fieldmark/watermark/keys/key.h>
+#include <fieldmark/watermark/mark/cell_grid.h>
 #include <fieldmark/watermark/payload/message.h>
 
 #include <cstdint>
@@ -20,27 +21,30 @@ struct CellCode {
 };
 
 /// Deals the cells of one scene to the bits of a message, for any number of keys.
-/// Cells are ranked by visible area, largest first (ties: lower index first), and cut into groups of n_bits;
-/// in each group a keyed permutation gives every bit one cell, so total areas differ little between bits and
-/// no bit is without cells. The signs are a second stream of the key, so they are fair and independent
-/// whatever the image. Ranks compare areas exactly: store the areas (or the code) instead of recomputing them
-/// on another machine.
+/// If strengths were measured, the cells are divided into n_bits classes so that each view shows about as
+/// much of one class as of another, whatever the key, and a keyed permutation gives every bit a class.
+/// Otherwise cells are ranked by visible area, largest first (ties: lower index first), and cut into groups
+/// of n_bits; in each group a keyed permutation gives every bit one cell, so total areas differ little
+/// between bits. Either way no bit is without cells. The signs are a second stream of the key, so they are
+/// fair and independent whatever the image and whatever the bits. Dealing compares weights exactly: store the
+/// weights (or the code) instead of recomputing them on another machine.
 class CellDealer {
  public:
-  /// @param area    [cells] visible area, any unit, finite and >= 0; a cell of area 0 gets no bit
   /// @param n_bits  1 to the number of cells of positive area
-  /// @throws ValueError otherwise
-  CellDealer(std::span<const double> area, Index n_bits);
+  /// @throws ValueError otherwise, or if an area or a strength is out of range
+  /// @throws ShapeError if the strengths are not those of whole views
+  CellDealer(const CellWeights& weights, Index n_bits);
   /// Overwrites code and reuses its storage.
   void deal(const Key& key, CellCode& code) const;
 
  private:
   std::size_t cells_, n_bits_;
-  std::vector<std::size_t> ranked_;  // cells of positive area, largest first
+  std::vector<std::size_t> ranked_;    // cells of positive area, by area or strength, largest first
+  std::vector<std::int32_t> classes_;  // of the ranked cells; empty without strengths
 };
 
 /// CellDealer for a single key.   @throws ValueError as CellDealer does
-CellCode deal_cells(const Key& key, std::span<const double> area, Index n_bits);
+CellCode deal_cells(const Key& key, const CellWeights& weights, Index n_bits);
 
 /// Returns the sign that each cell shows for a message.
 ///   s_c = (2 M[bit_c] - 1) sign_c, 0 for a cell that carries no bit

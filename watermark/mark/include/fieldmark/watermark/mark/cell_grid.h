@@ -8,6 +8,22 @@
 
 namespace fieldmark::watermark {
 
+/// What each cell of a scene is worth when the cells are dealt to bits.
+struct CellWeights {
+  std::span<const double> area;  ///< [cells] visible area, any unit, finite and >= 0; 0: gets no bit
+  /// [views, cells] evidence that each of some views shows of a cell, any unit, >= 0; empty if it was not
+  /// measured. Whole numbers: dealing compares sums of them exactly, on any machine.
+  std::span<const std::int32_t> strength = {};
+
+  /// Weights by area alone.
+  CellWeights(std::span<const double> area_) : area(area_) {}
+  /// Weights by area alone.
+  CellWeights(const std::vector<double>& area_) : area(area_) {}
+  /// Weights by strength.
+  CellWeights(std::span<const double> area_, std::span<const std::int32_t> strength_)
+      : area(area_), strength(strength_) {}
+};
+
 /// The cells of a scene that can carry a bit: those places of a regular grid over the field's cube that views
 /// show. Cells are geometry and not secret; the key decides which bit a cell carries, and with which sign
 /// (see CellCode).
@@ -25,6 +41,13 @@ class CellGrid {
   Index count() const { return static_cast<Index>(area_.size()); }
   /// [count] visible area of each cell, as a fraction of the total.
   std::span<const double> area() const { return area_; }
+  /// [views, count] evidence that each of some views shows of a cell; empty if it was not measured.
+  std::span<const std::int32_t> strength() const { return strength_; }
+  /// Sets the strengths, by which the cells are dealt from now on; none to deal by area.
+  /// @throws ShapeError if they are not [views, count]   @throws ValueError if one is negative
+  void set_strength(std::vector<std::int32_t> strength);
+  /// Returns what the cells are worth when they are dealt. The grid must outlive it.
+  CellWeights weights() const { return {area_, strength_}; }
   /// [side^3] number of the cell at each place of the grid, -1 where there is none.
   std::span<const std::int32_t> numbers() const { return numbers_; }
   /// Makes a grid from stored numbers and areas. @throws ValueError if they do not fit each other
@@ -64,6 +87,7 @@ class CellGrid {
   Index side_ = 0;
   std::vector<std::int32_t> numbers_;
   std::vector<double> area_;
+  std::vector<std::int32_t> strength_;
 };
 
 }  // namespace fieldmark::watermark

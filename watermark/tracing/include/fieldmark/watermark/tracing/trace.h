@@ -1,6 +1,7 @@
 #pragma once
 #include <fieldmark/engine/shape.h>
 #include <fieldmark/watermark/keys/key.h>
+#include <fieldmark/watermark/mark/cell_grid.h>
 #include <fieldmark/watermark/payload/message.h>
 
 #include <functional>
@@ -29,7 +30,7 @@ struct TracedCopy {
 /// whatever the image and however many recipients are guilty: until an innocent one is found, evidence and r
 /// do not depend on the innocent codes, and round k spends a / 2^k. The square root weighs cells well where
 /// copies were averaged and where they were pasted together. Source of the correction: Holm 1979.
-/// @param evidence  [cells] S_c, sign evidence, summed over all images   @param area  as for deal_cells()
+/// @param evidence  [cells] S_c, sign evidence, summed over all images   @param weights  as for deal_cells()
 /// @param key       the owner's, from which the keys of the copies derive
 /// @param names     of the recipients, each once   @param fpr  in (0, 1]
 /// @param progress  called from time to time with (done, total) of the round; returns false to stop, which
@@ -37,7 +38,7 @@ struct TracedCopy {
 /// @return all recipients, smallest corrected p first; equal ones by round and T, then in the order of
 /// `names`
 /// @throws ValueError as deal_cells() and keyed_statistic(), or if a name is empty or fpr outside its range
-std::vector<TracedCopy> trace_copies(std::span<const double> evidence, std::span<const double> area,
+std::vector<TracedCopy> trace_copies(std::span<const double> evidence, const CellWeights& weights,
                                      const Key& key, const Message& message,
                                      std::span<const std::string> names, double fpr,
                                      const std::function<bool(Index done, Index total)>& progress = {});

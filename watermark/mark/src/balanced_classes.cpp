@@ -1,0 +1,74 @@
+#include "balanced_classes.h"
+
+#include <fieldmark/engine/parallel.h>
+
+#include <algorithm>
+#include <numeric>
+
+namespace fieldmark::watermark {
+namespace {
+
+constexpr std::int64_t kUnit = 1 << 20;  // of a gain: sums over thousands of views fit 63 bits
+constexpr Index kClassesPerChunk = 16;
+
+// The strengths of the classes so far, class by class.
+class Totals {
+ public:
+  Totals(const CellWeights& weights, Index n_bits)
+      : weights_(weights),
+        cells_(weights.area.size()),
+        views_(weights.strength.size() / cells_),
+        shown_(views_ * static_cast<std::size_t>(n_bits)) {
+    const auto all = std::accumulate(weights.strength.begin(), weights.strength.end(), std::int64_t{0});
+    mean_ = std::max<std::int64_t>(1, all / static_cast<std::int64_t>(shown_.size()));
+  }
+  // Returns what a cell adds to the utility of a class.
+  std::int64_t gain(std::size_t cell, std::size_t k) const {
+    std::int64_t sum = 0;
+    for (std::size_t v = 0; v < views_; ++v)
+      sum += kUnit * of(v, cell) / (shown_[k * views_ + v] + mean_ / 4 + 1);
+    return sum;
+  }
+  void add(std::size_t cell, std::size_t k) {
+    for (std::size_t v = 0; v < views_; ++v) shown_[k * views_ + v] += of(v, cell);
+  }
+
+ private:
+  std::int64_t of(std::size_t view, std::size_t cell) const {
+    return weights_.strength[view * cells_ + cell];
+  }
+  const CellWeights& weights_;
+  std::size_t cells_, views_;
+  std::vector<std::int64_t> shown_;
+  std::int64_t mean_;
+};
+
+}  // namespace
+
+std::vector<std::int32_t> balanced_classes(const CellWeights& weights, const std::vector<std::size_t>& ranked,
+                                           Index n_bits) {
+  Totals totals(weights, n_bits);
+  const auto bits = static_cast<std::size_t>(n_bits);
+  std::vector<std::int32_t> classes;
+  std::vector<std::size_t> free;
+  std::vector<std::int64_t> gains;
+  for (const std::size_t cell : ranked) {
+    if (free.empty()) {
+      free.resize(bits);
+      std::iota(free.begin(), free.end(), std::size_t{0});
+    }
+    gains.resize(free.size());
+    parallel_for(std::ssize(free), kClassesPerChunk, [&](Index begin, Index end) {
+      for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i)
+        gains[i] = totals.gain(cell, free[i]);
+    });
+    const auto most = std::max_element(gains.begin(), gains.end()) - gains.begin();
+    const std::size_t k = free[static_cast<std::size_t>(most)];
+    free.erase(free.begin() + most);
+    totals.add(cell, k);
+    classes.push_back(static_cast<std::int32_t>(k));
+  }
+  return classes;
+}
+
+}  // namespace fieldmark::watermark
