@@ -70,10 +70,9 @@ HidingTrainer::HidingTrainer(ImageMarker& marker, const CropSource& crops, const
                      std::to_string(options.first_crop));
   if (!(options.first_part >= 0 && options.first_part < 1))
     throw ValueError("[hiding_trainer] first_part must be at least 0 and below 1, got " +
-                     std::to_string(options.first_part));
+                     number_text(options.first_part));
   if (!(options.noisy_part >= 0 && options.noisy_part <= 1))
-    throw ValueError("[hiding_trainer] noisy_part must be in [0, 1], got " +
-                     std::to_string(options.noisy_part));
+    throw ValueError("[hiding_trainer] noisy_part must be in [0, 1], got " + number_text(options.noisy_part));
   if (!(options.mark_psnr >= options.first_mark_psnr))
     throw ValueError("[hiding_trainer] mark_psnr must be at least first_mark_psnr, got " +
                      number_text(options.mark_psnr) + " and " + number_text(options.first_mark_psnr));

@@ -1,4 +1,5 @@
 #include <fieldmark/core/error.h>
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/nerf/field_sizing.h>
 
 #include <algorithm>
@@ -207,7 +208,7 @@ FieldSizing size_field(const Dataset& data, const RadianceFieldOptions& start, c
     throw ValueError(
         "[size_field] options must have at least 64 steps, a positive worth and a table of 2^9 to "
         "2^24 at most, got " +
-        std::to_string(options.steps) + " steps, " + std::to_string(options.worth) + " dB and 2^" +
+        std::to_string(options.steps) + " steps, " + number_text(options.worth) + " dB and 2^" +
         std::to_string(options.most_log2_table));
   return Sizing(data, start, options, progress).run();
 }

@@ -1,4 +1,5 @@
 // The engine: everything for one scalar type, schedules, threads, and refusals of arguments.
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/engine/decay.h>
 #include <fieldmark/engine/inspect.h>
 #include <fieldmark/engine/ops/batch_norm.h>
@@ -164,7 +165,7 @@ void bind_schedules(py::module_& module) {
             require_within("Schedule.observe", "n", n, 0);
             if (!(seconds >= 0) || std::isinf(seconds))
               throw ValueError("[Schedule.observe] seconds must be at least 0 and finite, got " +
-                               std::to_string(seconds));
+                               number_text(seconds));
             s.observe(n, seconds);
           },
           "n"_a, "seconds"_a,

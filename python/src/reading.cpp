@@ -1,6 +1,7 @@
 // Reading marks: what images say about a message.
 #include "reading.h"
 
+#include <fieldmark/core/number_text.h>
 #include <fieldmark/watermark/evidence/noise.h>
 #include <fieldmark/watermark/keys/signing.h>
 #include <fieldmark/watermark/payload/payload_codec.h>
@@ -77,7 +78,7 @@ Suspects checked(const std::string& function, const Owner& owner, const py::obje
     throw ValueError("[" + function + "] detection must be blind for an owner of preset " +
                      owner.mark().preset() + ", which has no cells in space, got 'informed'");
   if (!(fpr > 0 && fpr <= 1))
-    throw ValueError("[" + function + "] fpr must be in (0, 1], got " + std::to_string(fpr));
+    throw ValueError("[" + function + "] fpr must be in (0, 1], got " + number_text(fpr));
   return {detection, fpr, checked_images(function, images)};
 }
 

@@ -83,7 +83,7 @@ TEST_CASE("camera: errors name argument and value") {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   CHECK_THROWS_WITH(c.scaled(0, 5), "[scaled] width and height must be at least 1, got 0 x 5");
   CHECK_THROWS_WITH(make_camera({}, 4, 2, 2),
-                    Contains("[make_camera] angle_x must be in (0, pi) radians, got 4.0"));
+                    Contains("[make_camera] angle_x must be in (0, pi) radians, got 4"));
   CHECK_THROWS_AS(make_camera({}, nan, 2, 2), ValueError);
   CHECK_THROWS_WITH(look_at({1, 2, 3}, {1, 2, 3}, {0, 0, 1}),
                     Contains("[look_at] eye and target must be finite and apart"));

@@ -105,7 +105,7 @@ TEST_CASE("distortion_loss: errors name argument and what came") {
   };
   CHECK_THROWS_WITH(run(three, good, 1), Contains("each of 2 samples, got 2 and 3"));
   CHECK_THROWS_WITH(run(two, bad, 1), Contains("end at the sample count 2"));
-  CHECK_THROWS_WITH(run(two, good, -1), Contains("scale must not be negative, got -1"));
+  CHECK_THROWS_WITH(run(two, good, -1), Contains("scale must be at least 0, got -1"));
 }
 
 TEST_CASE("distortion_loss: the same bits for one and two threads") {

@@ -99,7 +99,7 @@ TEST_CASE("bake gives the file the strength asked for", "[bake]") {
     CHECK(bake["mark_psnr"].get<double>() == Approx(std::stod(mark_psnr)).margin(0.03));
     CHECK(bake.count("notes") == 0);
     const auto measured = json_of({"measure", "--informed-count", "0", "--owner", job.owner, "--field", out,
-                                   "--message", "5", "--count", "20", "--json", "-"});
+                                   "--message", "5", "--count", "60", "--json", "-"});
     CHECK(measured["psnr_base_foreground"].get<double>() == Approx(std::stod(mark_psnr)).margin(0.4));
   }
 }

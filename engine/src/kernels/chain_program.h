@@ -114,11 +114,15 @@ class Program {
       if (fetch_[k] == place.at) return;
     fetch_[fetches_++] = place.at;
   }
-  // Passes over one block take less time than memory takes to answer. Prefetches past the end do no harm.
+  // Passes over one block take less time than memory takes to answer. Prefetches past the end do no harm, but
+  // no pointer may be there, so addresses are numbers.
   void fetch_ahead(Index first) const {
-    constexpr Index line = 64 / static_cast<Index>(sizeof(T)), ahead = 4 * kBlock<T>;
-    for (int k = 0; k < fetches_; ++k)
-      for (Index i = 0; i < kBlock<T>; i += line) __builtin_prefetch(fetch_[k] + first + ahead + i);
+    constexpr std::uintptr_t line = 64, block = kBlock<T> * sizeof(T);
+    for (int k = 0; k < fetches_; ++k) {
+      const auto begin = reinterpret_cast<std::uintptr_t>(fetch_[k] + first) + 4 * block;
+      for (std::uintptr_t i = 0; i < block; i += line)
+        __builtin_prefetch(reinterpret_cast<const void*>(begin + i));
+    }
   }
 
   template <bool second>

@@ -11,8 +11,8 @@ constexpr Index kWinogradTile = 4;       // outputs of a tile along an axis
 constexpr Index kWinogradProducts = 36;  // elements of a transformed tile
 
 /// 36 matrices with a stride of `stride` elements, in panels like those of pack_panels(): element [row,
-/// column] is at (column / panel) distance + row panel + column % panel. One panel at least
-/// as wide as the matrix is row-major.
+/// column] is at (column / panel) distance + row panel + column % panel. One panel at least as
+/// wide as the matrix is row-major.
 template <class T>
 struct WinogradMatrices {
   T* data = nullptr;

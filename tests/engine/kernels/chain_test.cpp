@@ -20,10 +20,15 @@ using detail::ChainOp, detail::ChainSteps;
 template <class T>
 using Arrays = std::vector<AlignedVector<T>>;
 
-// Steps of random ops on recent and older values; operands are often one value.
+constexpr std::size_t kInputs = detail::kChainInputs, kValues = kInputs + detail::kChainSteps;
+
+// Steps of random ops on recent and older values; operands are often one value. Some chains are as long as
+// can be.
 ChainSteps random_chain(std::mt19937& rng) {
   const auto below = [&](int n) { return static_cast<int>(rng() % static_cast<unsigned>(n)); };
   ChainSteps c{.inputs = 1 + below(3), .count = 1 + below(9), .step = {}};
+  if (below(10) == 0)
+    c = {.inputs = detail::kChainInputs, .count = detail::kChainSteps - below(3), .step = {}};
   for (int s = 0; s < c.count; ++s) {
     const int have = c.inputs + s;
     const auto pick = [&] {
@@ -87,7 +92,7 @@ template <class T>
 Arrays<T> numbers_and_specials(std::size_t n, std::mt19937& rng) {
   using Limits = std::numeric_limits<T>;
   const T special[] = {Limits::quiet_NaN(), Limits::infinity(), -Limits::infinity(), 0};
-  Arrays<T> all(4, AlignedVector<T>(n));
+  Arrays<T> all(kInputs + 1, AlignedVector<T>(n));
   for (auto& array : all)
     for (T& x : array) x = rng() % 12 ? static_cast<T>(rng() % 4001) / 700 - 2 : special[rng() % 4];
   return all;
@@ -100,25 +105,26 @@ void expect_as_by_steps(unsigned seed) {
   const std::size_t from = 16, n = 8 * 64 / sizeof(T) + 3 * 64 / sizeof(T) + 1 + seed % 5;
   const bool large = seed % 2 == 0;
   const Arrays<T> in = numbers_and_specials<T>(from + n, rng);
-  Arrays<T> grads(3, AlignedVector<T>(from + n, T(0.3)));
+  Arrays<T> grads(kInputs, AlignedVector<T>(from + n, T(0.3)));
   AlignedVector<T> y(from + n);
-  const T* inputs[3];
-  T* dinputs[3];
-  bool add[3], wrong = false;
-  for (std::size_t k = 0; k < 3; ++k) {
+  const T* inputs[kInputs];
+  T* dinputs[kInputs];
+  bool add[kInputs], wrong = false;
+  for (std::size_t k = 0; k < kInputs; ++k) {
     inputs[k] = in[k].data() + from;
     dinputs[k] = grads[k].data() + from;
     add[k] = rng() % 2 == 0;
   }
   const auto size = static_cast<Index>(n);
   FIELDMARK_KERNEL(chain_forward<T>)(c, inputs, y.data() + from, size, large);
-  FIELDMARK_KERNEL(chain_backward<T>)(c, inputs, in[3].data() + from, dinputs, add, size, large);
+  FIELDMARK_KERNEL(chain_backward<T>)(c, inputs, in[kInputs].data() + from, dinputs, add, size, large);
   for (std::size_t i = 0; i < n; ++i) {
-    T value[16] = {inputs[0][i], inputs[1][i], inputs[2][i]}, grad[16] = {T(0.3), T(0.3), T(0.3)};
-    bool reached[16] = {};
+    T value[kValues], grad[kValues] = {};
+    bool reached[kValues] = {};
     std::copy_n(add, c.inputs, reached);
+    std::fill_n(grad, c.inputs, T(0.3));
     for (int k = 0; k < c.inputs; ++k) value[k] = inputs[k][i];
-    wrong |= !same(by_steps(c, value, in[3][from + i], grad, reached), y[from + i]);
+    wrong |= !same(by_steps(c, value, in[kInputs][from + i], grad, reached), y[from + i]);
     for (int k = 0; k < c.inputs; ++k) wrong |= !same(grad[k], dinputs[k][i]);
   }
   CAPTURE(seed, sizeof(T), c.count);

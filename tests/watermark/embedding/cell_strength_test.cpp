@@ -11,7 +11,7 @@
 using namespace fieldmark;
 using namespace fieldmark::watermark;
 
-TEST_CASE("cell_strength: cells that a view does not show have none, and those that it shows have most") {
+TEST_CASE("cell_strength: cells that a view shows have most of it") {
   const Owner owner = marking_owner();
   const std::vector<CachedView>& views = tiny_views();
   const auto strength = cell_strength(owner, views, 1);
@@ -54,9 +54,26 @@ TEST_CASE("cell_strength: the same for any number of threads, other codes for an
   CHECK(all[0] != cell_strength(owner, views, 6));
 }
 
-TEST_CASE("cell_strength: views of another size than the extractor's are left out") {
+TEST_CASE("cell_strength: smaller views are enlarged, and of many views some of each kind are drawn") {
   const Owner owner = marking_owner();
-  std::vector<CachedView> views(1, tiny_views().front());
-  views.front().height -= 1;
-  CHECK(cell_strength(owner, views, 1).empty());
+  const auto small = cache_novel_views(tiny_field(), square_patch(32), 1, 3);
+  const auto cells = static_cast<std::size_t>(owner.cells.count());
+  CHECK(cell_strength(owner, small, 1).size() == cells);
+  // Every second view shows nothing, as every second view of an object is from another kind of camera.
+  CachedView blank = small.front();
+  blank.position.clear();
+  blank.direction.clear();
+  blank.colour.clear();
+  blank.weight.clear();
+  std::ranges::fill(blank.sample_begin, 0);
+  std::vector<CachedView> views;
+  for (Index v = 0; v < 2 * kStrengthViews; ++v) views.push_back(v % 2 == 0 ? blank : small.front());
+  const auto strength = cell_strength(owner, views, 1);
+  REQUIRE(strength.size() == static_cast<std::size_t>(kStrengthViews) * cells);
+  // The change of colour alone gives half of 2^20; noise that the extractor reads gives the other half.
+  Index shown = 0;
+  for (std::size_t v = 0; v < strength.size(); v += cells)
+    shown += std::accumulate(&strength[v], &strength[v] + cells, Index{0}) > 3 << 18;
+  CHECK(shown > kStrengthViews / 4);
+  CHECK(shown < 3 * kStrengthViews / 4);
 }

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "support/catch.h"
 #include "support/temporary_folder.h"
@@ -78,9 +79,12 @@ TEST_CASE(
     Embedder embedder(owner, tiny_views(), few_steps(4));
     embedder.drive({});
     embedder.calibrate(4);
-    return std::pair{outcome(owner, embedder), owner.gain};
+    return std::tuple{outcome(owner, embedder), owner.gain,
+                      std::vector(owner.cells.strength().begin(), owner.cells.strength().end())};
   };
-  CHECK(trained(tiny_owner(), test_key(1)) == trained(tiny_owner(), test_key(77)));
+  const auto one = trained(tiny_owner(), test_key(1));
+  CHECK(one == trained(tiny_owner(), test_key(77)));
+  CHECK(std::ssize(std::get<2>(one)) == std::ssize(tiny_views()) * tiny_owner().cells.count());
   CHECK(trained(tiny_paper_owner({}), test_key(1)) == trained(tiny_paper_owner({}), test_key(77)));
 }
 

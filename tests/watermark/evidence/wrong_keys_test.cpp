@@ -42,6 +42,25 @@ TEST_CASE("wrong_keys: counts equal a plain loop over the same keys") {
   CHECK(counts.counts[0] > 0);
 }
 
+TEST_CASE("wrong_keys: cells that are dealt by strength are tested so") {
+  std::vector<std::int32_t> strength(2 * kArea.size());
+  for (std::size_t i = 0; i < strength.size(); ++i) strength[i] = static_cast<std::int32_t>(i * 31 % 97);
+  const CellWeights weights{std::span<const double>(kArea), strength};
+  std::vector<double> evidence(kArea.size());
+  for (std::size_t c = 0; c < evidence.size(); ++c) evidence[c] = std::sin(static_cast<double>(c * c));
+  const auto least_of = [&](const CellWeights& w) {
+    double least = 1;
+    for (std::uint64_t i = 0; i < 50; ++i) {
+      const Key key = derive_key(key_of_seed(9), "fieldmark wrong key", i);
+      least = std::min(
+          least, keyed_p_value(keyed_statistic(evidence, deal_cells(key, w, kMessage.size()), kMessage)));
+    }
+    return least;
+  };
+  CHECK(count_wrong_keys(evidence, weights, kMessage, 50, 9).least_p == least_of(weights));
+  CHECK(least_of(weights) != least_of(kArea));
+}
+
 TEST_CASE("wrong_keys: a marked image stays within the binomial bound, for any number of threads") {
   const auto signs = cell_signs(deal_cells(test_key(0), kArea, kMessage.size()), kMessage);
   const std::vector<double> evidence(signs.begin(), signs.end());

@@ -74,6 +74,39 @@ TEST_CASE("owner: a file says whether its networks know no key, one that does no
   CHECK_FALSE(Owner::load(folder / "b").key_free());
 }
 
+TEST_CASE(
+    "owner: strengths are stored, and decide the code, malformed ones are errors that name file and tensor") {
+  const TemporaryFolder folder;
+  Owner owner = small_owner();
+  const Index cells = owner.cells.count();
+  const CellCode by_area = owner.code();
+  std::vector<std::int32_t> strength(at(2 * cells));
+  for (std::size_t i = 0; i < strength.size(); ++i) strength[i] = static_cast<std::int32_t>(i * 37 % 101);
+  owner.cells.set_strength(strength);
+  owner.save(folder / "a");
+  const Owner again = Owner::load(folder / "a");
+  CHECK(std::ranges::equal(again.cells.strength(), strength));
+  CHECK(again.code().bit == owner.code().bit);
+  CHECK(again.code().sign == by_area.sign);
+  CHECK(again.code().bit != by_area.bit);
+  const std::string head = (folder / "b").string() + ": tensor 'cells/strength': expected ";
+  const auto refused = [&](const Shape& shape, const std::vector<std::int32_t>& numbers,
+                           const std::string& text) {
+    SafetensorsFile file = SafetensorsFile::read(folder / "a");
+    std::erase_if(file.tensors, [](const auto& t) { return t.name == "cells/strength"; });
+    file.add("cells/strength", shape, std::span(numbers));
+    file.write(folder / "b");
+    CHECK_THROWS_AS(Owner::load(folder / "b"), IoError);
+    CHECK_THROWS_WITH(Owner::load(folder / "b"), head + text);
+  };
+  const std::string want = "shape [views, " + std::to_string(cells) + "], found ";
+  refused({2 * cells}, strength, want + Shape{2 * cells}.str());
+  refused({cells, 2}, strength, want + Shape{cells, 2}.str());
+  refused({0, cells}, {}, want + Shape{0, cells}.str());
+  strength[3] = -7;
+  refused({2, cells}, strength, "numbers of at least 0, found -7");
+}
+
 TEST_CASE("owner: saved and loaded it is the same to the byte, and marks the same") {
   const TemporaryFolder folder;
   Owner owner = small_owner();

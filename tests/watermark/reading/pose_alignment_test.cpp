@@ -142,6 +142,18 @@ TEST_CASE("pose_alignment: one and two threads give the same bits") {
   CHECK(one.agreement == two.agreement);
 }
 
+TEST_CASE("pose_alignment: thin objects that agree but not exactly are told apart") {
+  const auto inexact = [](double agreement, double shown) {
+    return is_inexact({.camera = {}, .agreement = agreement, .shown = shown});
+  };
+  CHECK(inexact(0.85, 0.05));
+  CHECK(inexact(0.991, 0.119));
+  CHECK_FALSE(inexact(0.849, 0.05));
+  CHECK_FALSE(inexact(0.992, 0.05));
+  CHECK_FALSE(inexact(0.95, 0.12));
+  CHECK_FALSE(inexact(std::nan(""), 0.05));
+}
+
 TEST_CASE("pose_alignment: errors name what is wrong") {
   PoseAligner aligner(tiny_field());
   const nerf::Camera camera = aligned_camera(8);

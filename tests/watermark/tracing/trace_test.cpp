@@ -48,6 +48,23 @@ std::vector<double> average(const Key& key, std::span<const double> area,
 
 }  // namespace
 
+TEST_CASE("trace: cells that are dealt by strength are tested so") {
+  const std::vector<double> area(40, 1.0);
+  std::vector<std::int32_t> strength(3 * area.size());
+  for (std::size_t i = 0; i < strength.size(); ++i) strength[i] = static_cast<std::int32_t>(i * 31 % 97);
+  const CellWeights weights{std::span<const double>(area), strength};
+  const auto evidence = average(test_key(1), area, recipients(1), 0.5f, 1);
+  const std::vector<std::string> one{"Anna"};
+  std::vector<double> left;
+  for (const double s : evidence) left.push_back(s < 0 ? -std::sqrt(-s) : std::sqrt(s));
+  const auto statistic = [&](const CellWeights& w) {
+    return keyed_statistic(left, deal_cells(copy_key(test_key(1), "Anna"), w, kMessage.size()), kMessage);
+  };
+  const auto traced = trace_copies(evidence, weights, test_key(1), kMessage, one, kFpr);
+  CHECK(traced[0].statistic == statistic(weights));
+  CHECK(traced[0].statistic != statistic(area));
+}
+
 TEST_CASE(
     "trace: a round tests what the found copies leave, corrected by Holm's step-down and its own factor") {
   const std::vector<double> area(40, 1.0);

@@ -22,7 +22,7 @@ void check(const Tensor<float>& view_image, const Tensor<float>& object, const E
   if (o.steps < 1)
     throw ValueError("[extractor_attack] steps must be at least 1, got " + std::to_string(o.steps));
   if (!(o.step > 0 && o.step <= 1))
-    throw ValueError("[extractor_attack] step must be above 0 and at most 1, got " + std::to_string(o.step));
+    throw ValueError("[extractor_attack] step must be above 0 and at most 1, got " + number_text(o.step));
 }
 
 // Adds `factor` times the unit vector of `from`; a zero vector adds nothing.

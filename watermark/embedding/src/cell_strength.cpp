@@ -1,6 +1,8 @@
 #include "cell_strength.h"
 
+#include <fieldmark/engine/random.h>
 #include <fieldmark/imaging/image.h>
+#include <fieldmark/imaging/resize.h>
 #include <fieldmark/watermark/keys/keyed_hash.h>
 
 #include <algorithm>
@@ -40,8 +42,8 @@ class Shown {
   }
 
  private:
-  // Returns the view with a mark of these signs, in 8 bits, and adds the changes of its pixels to their
-  // cells.
+  // Returns the view with a mark of these signs, in 8 bits and enlarged as for reading, and adds the changes
+  // of its pixels to their cells.
   Tensor<float> marked(const std::vector<std::int8_t>& signs) {
     std::vector<float> rgb = view_.colour, blended(view_.weight.size());
     owner_.cells.blend(signs, view_.position.data(), std::ssize(blended), blended.data());
@@ -63,7 +65,11 @@ class Shown {
           foreground_[at(p)] > 0 ? owner_.cells.at(&view_.position[3 * first]) : std::int32_t{-1};
       if (cell >= 0) change_[at(cell)] += changed * signs[at(cell)] * (blended[first] < 0 ? -1 : 1);
     }
-    return quantize8(image);
+    const PatchSize patch = owner_.options().patch();
+    image = quantize8(image);
+    return image.shape[0] == patch.height && image.shape[1] == patch.width
+               ? image
+               : resize_bilinear(image, patch.height, patch.width);
   }
 
   const Owner& owner_;
@@ -76,16 +82,16 @@ class Shown {
 
 std::vector<std::int32_t> cell_strength(const Owner& owner, std::span<const CachedView> views,
                                         std::uint64_t seed) {
-  const PatchSize patch = owner.options().patch();
-  std::vector<const CachedView*> whole;
-  for (const CachedView& view : views)
-    if (view.height == patch.height && view.width == patch.width) whole.push_back(&view);
-  const Index all = std::ssize(whole), used = std::min(all, kStrengthViews);
+  // Drawn, because views of a kind may come at regular distances; in order, which costs nothing.
+  const Index all = std::ssize(views), used = std::min(all, kStrengthViews);
+  std::vector<Index> drawn = permutation(all, CounterRng(seed, 1), 0);
+  drawn.resize(at(used));
+  std::ranges::sort(drawn);
   std::vector<std::int32_t> strength;
   std::vector<std::int8_t> signs(at(owner.cells.count()));
   const Key root = key_of_seed(seed);
   for (Index v = 0; v < used; ++v) {
-    Shown shown(owner, *whole[at(v * all / used)]);
+    Shown shown(owner, views[at(drawn[at(v)])]);
     for (std::uint64_t code = 0; code < kCodes; ++code) {
       keyed_signs(derive_key(root, "fieldmark cell strength", static_cast<std::uint64_t>(v) * kCodes + code),
                   "fieldmark cell sign", signs);

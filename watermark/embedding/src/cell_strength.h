@@ -13,8 +13,8 @@ namespace fieldmark::watermark {
 ///   strength_vc = 2^19 (E_c / sum_c E_c + D_c / sum_c D_c).
 /// The first part is what blind detection reads; the second is what informed detection measures, whose sign
 /// estimates saturate.
-/// @param views  evenly chosen from those that have the extractor's size   @param seed  of the codes
-/// @return [views, cells], at most kStrengthViews views; empty if no view has the extractor's size
+/// @param views  from which kStrengthViews are drawn if there are more; at most of the extractor's size
+/// @param seed   of the codes and of the draw   @return [views, cells]
 std::vector<std::int32_t> cell_strength(const Owner& owner, std::span<const CachedView> views,
                                         std::uint64_t seed);
 

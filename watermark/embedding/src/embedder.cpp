@@ -107,6 +107,7 @@ double Embedder::take_step(double) {
 
 void Embedder::calibrate(Index views) {
   if (!owner_.mark().has_gain()) return;
+  owner_.cells.set_strength({});
   const MarkPsnrMeter meter(owner_.field, {.count = views, .seed = options_.seed + 77});
   const double target = owner_.options().mark_psnr;
   owner_.gain = std::pow(10.0, -target / 20);

@@ -36,6 +36,7 @@ CellGrid::CellGrid(Index side, std::span<const double> area, double least) : sid
 CellGrid CellGrid::from_numbers(Index side, std::span<const std::int32_t> numbers,
                                 std::span<const double> area) {
   check_side(side);
+  if (area.empty()) throw ValueError("[cell_grid] area must be of at least one cell, got none");
   CellGrid grid;
   grid.side_ = side;
   grid.numbers_.assign(numbers.begin(), numbers.end());

@@ -55,6 +55,28 @@ OwnerOptions parse_options(const Json& j) {
   return o;
 }
 
+constexpr const char *kArea = "cells/area", *kStrength = "cells/strength";
+// A program that deals all cells by area would read other bits: it finds no kArea and says so.
+constexpr const char* kAreaBesideStrength = "cells/area_beside_strength";
+
+CellGrid stored_cells(const SafetensorsFile& file, Index side) {
+  const bool dealt_by_area = !file.has(kStrength);
+  CellGrid cells = CellGrid::from_numbers(side, file.i32("cells/numbers"),
+                                          file.f64(dealt_by_area ? kArea : kAreaBesideStrength).data);
+  if (dealt_by_area) return cells;
+  const auto refuse = [&](const std::string& expected, const std::string& found) {
+    throw IoError(file.path + ": tensor '" + kStrength + "': expected " + expected + ", found " + found);
+  };
+  const Shape& shape = file.at(kStrength).shape;
+  if (shape.rank() != 2 || shape[0] < 1 || shape[1] != cells.count())
+    refuse("shape [views, " + std::to_string(cells.count()) + "]", shape.str());
+  std::vector<std::int32_t> strength = file.i32(kStrength);
+  if (const auto least = std::ranges::min_element(strength); *least < 0)
+    refuse("numbers of at least 0", std::to_string(*least));
+  cells.set_strength(std::move(strength));
+  return cells;
+}
+
 }  // namespace
 
 PatchSize OwnerOptions::patch() const {
@@ -108,10 +130,10 @@ void Owner::save(const std::filesystem::path& path) const {
   field.store(file, "field/");
   for (const auto& e : params.entries()) file.add(e.name, e.shape, params.values(params.find(e.name)));
   file.add("cells/numbers", {static_cast<Index>(cells.numbers().size())}, cells.numbers());
-  file.add("cells/area", {cells.count()}, cells.area());
-  if (!cells.strength().empty())
-    file.add("cells/strength", {std::ssize(cells.strength()) / cells.count(), cells.count()},
-             cells.strength());
+  const bool dealt_by_area = cells.strength().empty();
+  file.add(dealt_by_area ? kArea : kAreaBesideStrength, {cells.count()}, cells.area());
+  if (!dealt_by_area)
+    file.add(kStrength, {std::ssize(cells.strength()) / cells.count(), cells.count()}, cells.strength());
   file.add("key", {32}, std::span<const std::uint8_t>(key.bytes));
   file.write(path, Access::secret);
 }
@@ -126,10 +148,8 @@ Owner Owner::load(const std::filesystem::path& path) {
     nerf::RadianceField field =
         nerf::RadianceField::from_configuration(j.at("field").dump(), place + ": field");
     field.restore(file, "field/");
-    Owner owner(std::move(field), options, key_from_bytes(file.u8("key")),
-                CellGrid::from_numbers(j.at("cells"), file.i32("cells/numbers"), file.f64("cells/area").data),
+    Owner owner(std::move(field), options, key_from_bytes(file.u8("key")), stored_cells(file, j.at("cells")),
                 stored_mark(info.config));
-    if (file.has("cells/strength")) owner.cells.set_strength(file.i32("cells/strength"));
     owner.gain = j.at("gain");
     owner.key_free_ = j.value("key_free", false);
     for (const auto& e : owner.params.entries()) {

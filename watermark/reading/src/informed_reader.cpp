@@ -30,11 +30,7 @@ constexpr AlignmentStage kFineStretched[] = {
     {.size = 200, .blur = 1.2, .steps = 6, .stretched = true}};
 constexpr AlignmentStage kFine[] = {{.size = 96, .blur = 1.2, .steps = 10, .quick = true, .least = kFarOff},
                                     {.size = 200, .blur = 1.2, .steps = 6}};
-// Few pixels of a thin object do not fix the camera at 200 pixels: a further stage raises the bits right of
-// wires from 99.0 to 99.6%. Solid objects gain nothing.
 constexpr AlignmentStage kFinest[] = {{.size = 400, .blur = 1, .steps = 4}};
-constexpr double kThin = 0.12;    // share of the image's pixels
-constexpr double kExact = 0.992;  // agreement from which the camera at 200 pixels is exact enough
 constexpr Index kPartSize = 200;  // longer side at which a part is aligned, pixels
 // Agreement of a part: at the right camera 0.90 to 0.99 at 48 pixels and 0.92 to 0.99 at 96, in images of
 // something else below 0.85 and 0.59 in 95 of 100 places.
@@ -172,26 +168,19 @@ void InformedReader::try_search(const CameraSearch& search, const Surround& seen
   try_all(seen, change, lookalikes(search, seen.image, change), found, enough);
 }
 
-InformedReading InformedReader::refined(const Surround& seen, const Change& change,
-                                        const std::vector<Alignment>& found) {
+Alignment InformedReader::refined(const Surround& seen, const Change& change,
+                                  const std::vector<Alignment>& found) {
   const std::span<const AlignmentStage> stages = change.stretch == 1 ? kFine : kFineStretched;
-  const Alignment best =
-      best_alignment(found, kSure, landmarks_of(owner_.field.cameras), [&](const nerf::Camera& camera) {
-        return parts_->aligner.align(seen.image, camera, stages, seen.covered);
-      });
-  InformedReading out{.evidence = {}, .camera = best.camera, .agreement = best.agreement};
-  const bool thin = best.shown < kThin && best.agreement < kExact;
-  if (thin && best.agreement >= kLeastAgreement)
-    out.camera = parts_->aligner.align(seen.image, best.camera, kFinest, seen.covered).camera;
-  return out;
+  return best_alignment(found, kSure, landmarks_of(owner_.field.cameras), [&](const nerf::Camera& camera) {
+    return parts_->aligner.align(seen.image, camera, stages, seen.covered);
+  });
 }
 
 // Returns the best alignment of an image without its surround, coarse, then fine.
-InformedReading InformedReader::aligned(const Surround& seen, const Change& change,
-                                        const SeenPlaces& places) {
+Alignment InformedReader::aligned(const Surround& seen, const Change& change, const SeenPlaces& places) {
   const Tensor<float>& image = seen.image;
   const bool stretched = change.stretch != 1;
-  InformedReading quick;
+  Alignment quick{.camera = {}};
   if (!stretched && !change.mirrored) {
     std::vector<Alignment> few;
     try_search(parts_->few, seen, change, places, few, kSure);
@@ -206,7 +195,7 @@ InformedReading InformedReader::aligned(const Surround& seen, const Change& chan
   try_search(search, seen, change, places, found);
   if (doubtful()) try_all(seen, change, search.find_by_lightness(image, kByImage), found);
   if (!stretched && doubtful()) try_all(seen, change, search.find_part(image, kByPart), found);
-  const InformedReading best = refined(seen, change, found);
+  const Alignment best = refined(seen, change, found);
   return quick.agreement > best.agreement ? quick : best;
 }
 
@@ -217,8 +206,14 @@ ImageReading InformedReader::read_as(const Tensor<float>& whole, const Change& c
   const Surround seen = cleared(whole);
   reading.blind = blind_.evidence(seen.image, &places);
   InformedReading& g = reading.informed;
-  g = aligned(seen, change, places);
-  if (g.agreement >= std::max(least, 0.0)) add_evidence(seen, reading);
+  const Alignment best = aligned(seen, change, places);
+  g.camera = best.camera;
+  g.agreement = best.agreement;
+  if (g.agreement >= std::max(least, 0.0)) {
+    if (is_inexact(best))
+      g.camera = parts_->aligner.align(seen.image, best.camera, kFinest, seen.covered).camera;
+    add_evidence(seen, reading);
+  }
   // Converts the camera to the whole image.
   g.camera.cx += static_cast<double>(seen.left);
   g.camera.cy += static_cast<double>(seen.top);

@@ -257,6 +257,11 @@ class Stage {
 
 }  // namespace
 
+bool is_inexact(const Alignment& alignment) {
+  constexpr double kThin = 0.12, kLeast = 0.85, kExact = 0.992;
+  return alignment.shown < kThin && alignment.agreement >= kLeast && alignment.agreement < kExact;
+}
+
 PoseAligner::PoseAligner(const nerf::RadianceField& field)
     : field_(field), renderer_(field, {.finer = 1}), quick_(field, {.finer = 0.5f}) {}
 

@@ -27,6 +27,10 @@ struct Alignment {
   double shown = 0;  ///< share of that render's pixels that show the field
 };
 
+/// True if an alignment at 200 pixels may leave the camera inexact: the object is thin, on less than 12% of
+/// the pixels, and the agreement is 0.85 to 0.992. docs/notes/reading.md has the measurements.
+bool is_inexact(const Alignment& alignment);
+
 /// Refines a camera until the field's render agrees with an image.
 ///
 /// Each step renders the field, fits the image's colours (see tone_fit.h), and solves for the motion that

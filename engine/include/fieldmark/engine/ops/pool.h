@@ -31,9 +31,9 @@ struct MaxPool {
 /// @param x [N, H, W, C]   @return [N, H', W', C], H' = (H - size) / stride + 1 rounded down; with ceil_mode
 /// rounded up, at least 1, without windows that begin outside
 /// @throws ShapeError if x is not rank 4 or has no window
-/// @throws ValueError if size or stride is out of range, or if more than 2^24 pixels of x (2^53 in double)
-/// are in a window Differentiable in: x, where the maximum of a window is unique; else the gradient goes to
-/// the first in reading order.
+/// @throws ValueError if size or stride is out of range, or a window has over 2^24 pixels of x (double: 2^53)
+/// Differentiable in: x, where the maximum of a window is unique; else the gradient goes to the first in
+/// reading order.
 template <class T>
 Var<T> max_pool(Var<T> x, MaxPool windows);
 

@@ -21,13 +21,13 @@ struct CellCode {
 };
 
 /// Deals the cells of one scene to the bits of a message, for any number of keys.
-/// If strengths were measured, the cells are divided into n_bits classes so that each view shows about as
-/// much of one class as of another, whatever the key, and a keyed permutation gives every bit a class.
-/// Otherwise cells are ranked by visible area, largest first (ties: lower index first), and cut into groups
-/// of n_bits; in each group a keyed permutation gives every bit one cell, so total areas differ little
-/// between bits. Either way no bit is without cells. The signs are a second stream of the key, so they are
-/// fair and independent whatever the image and whatever the bits. Dealing compares weights exactly: store the
-/// weights (or the code) instead of recomputing them on another machine.
+/// If strengths were measured, the cells are divided into n_bits classes so that each of the views shows
+/// about as much of one class as of another; a keyed permutation gives every bit a class. Otherwise cells are
+/// ranked by visible area, largest first (ties: lower index first), and cut into groups of n_bits; in each
+/// group a keyed permutation gives every bit one cell, so total areas differ little between bits. Either way
+/// no bit is without cells. The signs are a second stream of the key, so they are fair and independent
+/// whatever the image and the division. Dealing compares weights exactly: store the weights (or the code)
+/// instead of recomputing them on another machine.
 class CellDealer {
  public:
   /// @param n_bits  1 to the number of cells of positive area
