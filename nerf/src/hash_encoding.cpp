@@ -92,7 +92,7 @@ template <class T>
 void HashEncoding<T>::backward(const T* x, Index n, const T* ddensity, const T* dcolour, std::span<T> grad,
                                T* scratch) const {
   deal_to_levels(n, ddensity, dcolour, scratch);
-  parallel_tasks(levels(), [&](Index i) {
+  parallel_for(levels(), 1, [&](Index i, Index) {
     const Index l = levels() - 1 - i;  // the finest, slowest level first
     backward_level(static_cast<int>(l), x, n, scratch + l * n * 2 * features_, grad);
   });

@@ -51,8 +51,8 @@ void mark_level(const OccupancyGrid& grid, Index resolution, std::uint32_t mask,
 
 std::vector<std::uint8_t> rows_in_use(const HashEncoding<float>& encoding, const OccupancyGrid& grid) {
   std::vector<std::uint8_t> used(at(encoding.rows()));
-  parallel_tasks(encoding.levels(), [&](Index l) {
-    const int level = static_cast<int>(encoding.levels() - 1 - l);  // the finest, slowest level first
+  parallel_for(encoding.levels(), 1, [&](Index l, Index) {
+    const int level = static_cast<int>(l);
     const std::size_t first = at(encoding.first_row(level)), last = at(encoding.first_row(level + 1));
     mark_level(grid, encoding.resolution(level), encoding.mask(level),
                std::span(used).subspan(first, last - first));

@@ -260,7 +260,7 @@ void Trainer::backward_table() {
   const HashEncoding<float>& encoding = field_.field.encoding();
   const std::span<float> grad = field_.params.grads(encoding.table());
   const Index entry = 2 * encoding.features(), table = grad.data() - field_.params.grads().data();
-  parallel_tasks(encoding.levels(), [&](Index l) {
+  parallel_for(encoding.levels(), 1, [&](Index l, Index) {
     const int level = static_cast<int>(encoding.levels() - 1 - l);  // the finest, slowest level first
     for (const Shard& shard : shards_) {
       const float *x = shard.position.numbers.data(), *d = shard.dfeatures.numbers.data();

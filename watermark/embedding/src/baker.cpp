@@ -255,8 +255,7 @@ std::span<float> Baker::network_grads() {
 
 void Baker::backward_table() {
   const nerf::HashEncoding<float>& encoding = field_.field.encoding();
-  parallel_tasks(encoding.levels(), [&](Index l) {
-    const Index level = encoding.levels() - 1 - l;  // the finest, slowest level first
+  parallel_for(encoding.levels(), 1, [&](Index level, Index) {
     for (const Chunk& c : chunks_)
       encoding.backward_level(static_cast<int>(level), c.position.data(), c.samples,
                               c.dfeatures.data() + level * c.samples * 2 * encoding.features(),
