@@ -98,7 +98,7 @@ template <class T>
 void Muon<T>::step(std::span<T> values, std::span<T> grads, double lr_factor) {
   detail::check_step_size("Muon", "values", values.size(), velocity_.size());
   detail::check_step_size("Muon", "grads", grads.size(), velocity_.size());
-  parallel_tasks(std::ssize(matrices_), [&](Index i) {
+  parallel_for(std::ssize(matrices_), 1, [&](Index i, Index) {
     update(matrices_[at(i)], *tapes_[at(i)], values.data(), grads.data(), lr_factor);
   });
 }

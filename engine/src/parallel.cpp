@@ -13,10 +13,10 @@ std::atomic<int> thread_count{0};  // 0: not chosen yet
 
 /// Hands out the chunks of a loop. Each thread has a share of neighbouring chunks, so that it meets the same
 /// data from loop to loop and its cache serves it; a thread whose share is done takes chunks from the others'
-/// shares. Of a single share, every thread takes the next chunk.
+/// shares.
 class ChunkShares {
  public:
-  ChunkShares(Index chunks, Index shares) : count_(std::min({shares, chunks, Index{kMost}})) {
+  ChunkShares(Index chunks, int threads) : count_(std::min({Index{threads}, chunks, Index{kMost}})) {
     for (Index i = 0; i < count_; ++i) {
       shares_[i].next = chunks * i / count_;
       shares_[i].end = chunks * (i + 1) / count_;
@@ -68,7 +68,7 @@ ScopedThreads::~ScopedThreads() { thread_count = before_; }
 
 bool detail::runs_on_one_thread() { return threads() == 1 || omp_in_parallel(); }
 
-void detail::parallel_chunks(Index chunks, Sharing sharing, void* context, void (*run)(void*, Index chunk)) {
+void detail::parallel_chunks(Index chunks, void* context, void (*run)(void*, Index chunk)) {
   const int n = threads();
   if (chunks == 1 || runs_on_one_thread()) {
     for (Index c = 0; c < chunks; ++c) run(context, c);
@@ -87,7 +87,7 @@ void detail::parallel_chunks(Index chunks, Sharing sharing, void* context, void 
       }
     }
   };
-  ChunkShares shares(chunks, sharing == Sharing::next ? 1 : n);
+  ChunkShares shares(chunks, n);
 #pragma omp parallel num_threads(n)
   shares.run(omp_get_thread_num(), run_or_keep_error);
   if (error) std::rethrow_exception(error);

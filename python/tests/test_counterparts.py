@@ -36,8 +36,7 @@ LEFT_OUT = {
     "orthogonalise": "a step of Muon",
     "PackedWeights": "an optimisation of loops in C++",
     "TapeObserver": "the inspector's interface",
-    "parallel_for": "loops in C++", "parallel_tasks": "loops in C++",
-    "ScopedThreads": "fm.set_threads() sets the number of threads",
+    "parallel_for": "loops in C++", "ScopedThreads": "fm.set_threads() sets the number of threads",
     "permutation": "NumPy draws permutations",
 }
 HEADERS_LEFT_OUT = {

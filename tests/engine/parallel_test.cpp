@@ -39,31 +39,6 @@ TEST_CASE("parallel: threads that are done take the chunks of one that is not") 
   CHECK(all_others_ran);
 }
 
-TEST_CASE("parallel: every task once, and a free thread takes the next one") {
-  for (int n_threads : {1, 2, 3, 70}) {
-    const ScopedThreads scope(n_threads);
-    for (Index n : {0, 1, 2, 100}) {
-      std::vector<int> seen(static_cast<std::size_t>(n));
-      parallel_tasks(n, [&](Index i) { ++seen[static_cast<std::size_t>(i)]; });
-      CHECK(seen == std::vector<int>(static_cast<std::size_t>(n), 1));
-    }
-  }
-  const ScopedThreads scope(2);
-  std::vector<Index> order;  // of the tasks that the thread without task 0 runs
-  std::atomic<int> others{0};
-  parallel_tasks(64, [&](Index i) {
-    if (i != 0) {
-      order.push_back(i);
-      ++others;
-      return;
-    }
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-    while (others < 63 && std::chrono::steady_clock::now() < end) std::this_thread::yield();
-  });
-  CHECK(order.size() == 63);
-  CHECK(std::ranges::is_sorted(order));
-}
-
 TEST_CASE("parallel: a scope's number of threads ends with it, also by an exception") {
   const int before = threads();
   CHECK_THROWS_AS(

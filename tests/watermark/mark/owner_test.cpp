@@ -89,7 +89,7 @@ TEST_CASE(
   CHECK(again.code().bit == owner.code().bit);
   CHECK(again.code().sign == by_area.sign);
   CHECK(again.code().bit != by_area.bit);
-  const std::string head = (folder / "b").string() + ": tensor 'cells/strength': expected ";
+  const std::string head = (folder / "b").string() + ": tensor 'cells/strength': ";
   const auto refused = [&](const Shape& shape, const std::vector<std::int32_t>& numbers,
                            const std::string& text) {
     SafetensorsFile file = SafetensorsFile::read(folder / "a");
@@ -99,12 +99,12 @@ TEST_CASE(
     CHECK_THROWS_AS(Owner::load(folder / "b"), IoError);
     CHECK_THROWS_WITH(Owner::load(folder / "b"), head + text);
   };
-  const std::string want = "shape [views, " + std::to_string(cells) + "], found ";
+  const std::string want = "expected shape [views, " + std::to_string(cells) + "], found ";
   refused({2 * cells}, strength, want + Shape{2 * cells}.str());
   refused({cells, 2}, strength, want + Shape{cells, 2}.str());
   refused({0, cells}, {}, want + Shape{0, cells}.str());
   strength[3] = -7;
-  refused({2, cells}, strength, "numbers of at least 0, found -7");
+  refused({2, cells}, strength, "[cell_grid] strength must be at least 0, got -7");
 }
 
 TEST_CASE("owner: saved and loaded it is the same to the byte, and marks the same") {

@@ -9,7 +9,9 @@
 #include <limits>
 
 #include "joint_evidence.h"
+#include "pose_alignment.h"
 #include "support/catch.h"
+#include "watermark/cameras_apart.h"
 #include "watermark/tiny_owner.h"
 
 using namespace fieldmark;
@@ -66,6 +68,23 @@ TEST_CASE("informed_reader: an unmarked view is not leant to any key") {
   }
   CHECK(above > 35);
   CHECK(above < 95);
+}
+
+TEST_CASE("informed_reader: the camera of a thin object is nearer than alignment at 200 pixels leaves it") {
+  const Owner owner = marking_owner();
+  nerf::Camera camera = camera_near(4).scaled(320);
+  camera.fx *= 0.3;  // the object is on few pixels
+  camera.fy *= 0.3;
+  const Tensor<float> image = distorted("noise_0.10", image_of(owner, camera, true));
+  constexpr AlignmentStage kUsual[] = {{.size = 96, .blur = 1.2, .steps = 10, .quick = true},
+                                       {.size = 200, .blur = 1.2, .steps = 6}};
+  PoseAligner aligner(owner.field);
+  const Alignment usual = aligner.align(image, camera, kUsual);
+  CAPTURE(usual.agreement, usual.shown, cameras_apart(usual.camera, camera));
+  REQUIRE(is_inexact(usual));
+  const ImageReading reading = InformedReader(owner, kSearch).read(image);
+  CHECK(reading.informed.agreement == Approx(usual.agreement).margin(0.01));
+  CHECK(cameras_apart(reading.informed.camera, camera) < 0.8 * cameras_apart(usual.camera, camera));
 }
 
 TEST_CASE("informed_reader: the extractor counts only where the image has lost detail") {

@@ -13,6 +13,7 @@
 
 #include "bake_plan.h"
 #include "mark_scale.h"
+#include "ray_change.h"
 #include "reading_guide.h"
 
 namespace fieldmark::watermark {
@@ -26,34 +27,6 @@ constexpr float kOfSamples = 0.1f;          // weight of the samples' own colour
 constexpr double kEmphasisRate = 1. / 200;  // per step
 constexpr Index kReadEvery = 6;             // steps: reading a view takes as long as one or two
 constexpr Index kGuidedEvery = 2;           // chunks
-
-// Calls f(ray, channel, sum) with the difference of colours that each ray shows, sum_i w_i (a_i - b_i) over
-// its samples.
-template <class F>
-void for_each_ray(std::span<const std::int32_t> begin, std::span<const float> weight, const float* a,
-                  const float* b, F f) {
-  for (std::size_t r = 0; r + 1 < begin.size(); ++r)
-    for (Index channel = 0; channel < 3; ++channel) {
-      double sum = 0;
-      for (Index i = begin[r]; i < begin[r + 1]; ++i)
-        sum += static_cast<double>(weight[at(i)] * (a[3 * i + channel] - b[3 * i + channel]));
-      f(r, static_cast<std::size_t>(channel), sum);
-    }
-}
-
-double power_on_rays(std::span<const std::int32_t> begin, std::span<const float> weight, const float* a,
-                     const float* b) {
-  double power = 0;
-  for_each_ray(begin, weight, a, b, [&](std::size_t, std::size_t, double sum) { power += sum * sum; });
-  return power;
-}
-
-void change_on_rays(std::span<const std::int32_t> begin, std::span<const float> weight, const float* a,
-                    const float* b, float* change) {
-  for_each_ray(begin, weight, a, b, [&](std::size_t ray, std::size_t channel, double sum) {
-    change[3 * ray + channel] = static_cast<float>(sum);
-  });
-}
 
 }  // namespace
 

@@ -2,12 +2,14 @@
 
 #include <fieldmark/engine/random.h>
 #include <fieldmark/imaging/image.h>
-#include <fieldmark/imaging/resize.h>
 #include <fieldmark/watermark/keys/keyed_hash.h>
+#include <fieldmark/watermark/mark/object_window.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+
+#include "ray_change.h"
 
 namespace fieldmark::watermark {
 namespace {
@@ -42,34 +44,29 @@ class Shown {
   }
 
  private:
-  // Returns the view with a mark of these signs, in 8 bits and enlarged as for reading, and adds the changes
-  // of its pixels to their cells.
+  // Returns the view with a mark of these signs as it is read, in 8 bits, and adds the changes of its pixels
+  // to their cells.
   Tensor<float> marked(const std::vector<std::int8_t>& signs) {
-    std::vector<float> rgb = view_.colour, blended(view_.weight.size());
-    owner_.cells.blend(signs, view_.position.data(), std::ssize(blended), blended.data());
-    owner_.marking(signs)(view_.position.data(), view_.direction.data(), std::ssize(view_.weight),
-                          rgb.data());
+    std::vector<float> rgb = view_.colour, blended(view_.weight.size()), change(view_.base.data.size());
+    const auto* x = view_.position.data();
+    owner_.cells.blend(signs, x, std::ssize(blended), blended.data());
+    owner_.marking(signs)(x, view_.direction.data(), std::ssize(blended), rgb.data());
+    change_on_rays(view_.sample_begin, view_.weight, rgb.data(), view_.colour.data(), change.data());
     Tensor<float> image = view_.base;
-    for (Index p = 0; p < view_.height * view_.width; ++p) {
-      const auto first = at(view_.sample_begin[at(p)]), last = at(view_.sample_begin[at(p + 1)]);
-      double changed = 0;
-      for (std::size_t a = 0; a < 3; ++a) {
-        float change = 0;
-        for (std::size_t k = first; k < last; ++k)
-          change += view_.weight[k] * (rgb[3 * k + a] - view_.colour[3 * k + a]);
-        image[3 * p + static_cast<Index>(a)] =
-            std::clamp(image[3 * p + static_cast<Index>(a)] + change, 0.f, 1.f);
-        changed += std::abs(static_cast<double>(change));
-      }
-      const std::int32_t cell =
-          foreground_[at(p)] > 0 ? owner_.cells.at(&view_.position[3 * first]) : std::int32_t{-1};
-      if (cell >= 0) change_[at(cell)] += changed * signs[at(cell)] * (blended[first] < 0 ? -1 : 1);
+    for (std::size_t i = 0; i < change.size(); ++i)
+      image.data[i] = std::clamp(image.data[i] + change[i], 0.f, 1.f);
+    for (std::size_t p = 0; p < foreground_.size(); ++p) {
+      if (foreground_[p] == 0) continue;
+      const auto first = at(view_.sample_begin[p]);
+      const std::int32_t cell = owner_.cells.at(x + 3 * first);
+      if (cell < 0) continue;
+      const int agrees = (blended[first] < 0 ? -1 : 1) * signs[at(cell)];
+      for (std::size_t i = 3 * p; i < 3 * p + 3; ++i)
+        change_[at(cell)] += agrees * std::abs(static_cast<double>(change[i]));
     }
-    const PatchSize patch = owner_.options().patch();
-    image = quantize8(image);
-    return image.shape[0] == patch.height && image.shape[1] == patch.width
-               ? image
-               : resize_bilinear(image, patch.height, patch.width);
+    const Window whole{0, 0, static_cast<double>(view_.width), static_cast<double>(view_.height)};
+    return cut_window(quantize8(image), whole, owner_.options().patch(),
+                      nerf::background_value(owner_.field.background));
   }
 
   const Owner& owner_;

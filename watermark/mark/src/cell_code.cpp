@@ -51,35 +51,33 @@ CellDealer::CellDealer(const CellWeights& weights, Index n_bits)
   };
   if (weights.strength.empty()) {
     rank(weights.area);
-    return;
+    for (std::size_t i = 0; i < ranked_.size(); ++i)
+      classes_.push_back(static_cast<std::int32_t>(i % n_bits_));
+    group_ = n_bits_;
+  } else {
+    rank(total_strength(weights));
+    classes_ = balanced_classes(weights, ranked_, n_bits);
+    group_ = ranked_.size();
   }
-  rank(total_strength(weights));
-  classes_ = balanced_classes(weights, ranked_, n_bits);
 }
 
 void CellDealer::deal(const Key& key, CellCode& code) const {
+  // One word per bit of each group: in a short last group, the key also decides which bits get a cell.
+  const std::size_t groups = (ranked_.size() + group_ - 1) / group_;
+  std::vector<std::uint64_t> words(groups * n_bits_);
+  keyed_words(key, "fieldmark cell order", words);
   code.bit.assign(cells_, -1);
   code.sign.resize(cells_);
   keyed_signs(key, "fieldmark cell sign", code.sign);
-  // One word per bit of each group: in a short last group, the key also decides which bits get a cell.
-  const std::size_t groups = classes_.empty() ? (ranked_.size() + n_bits_ - 1) / n_bits_ : 1;
-  std::vector<std::uint64_t> words(groups * n_bits_);
-  keyed_words(key, "fieldmark cell order", words);
-  std::vector<std::pair<std::uint64_t, std::int32_t>> bits(n_bits_);
-  const auto permute = [&](std::size_t begin) {
-    for (std::size_t k = 0; k < n_bits_; ++k) bits[k] = {words[begin + k], static_cast<std::int32_t>(k)};
-    std::sort(bits.begin(), bits.end());
-  };
-  if (!classes_.empty()) {
-    permute(0);
-    for (std::size_t i = 0; i < ranked_.size(); ++i)
-      code.bit[ranked_[i]] = bits[static_cast<std::size_t>(classes_[i])].second;
-  } else {
-    for (std::size_t begin = 0; begin < ranked_.size(); begin += n_bits_) {
-      permute(begin);
-      const std::size_t count = std::min(n_bits_, ranked_.size() - begin);
-      for (std::size_t k = 0; k < count; ++k) code.bit[ranked_[begin + k]] = bits[k].second;
+
+  std::vector<std::pair<std::uint64_t, std::int32_t>> bits(n_bits_);  // of the classes
+  for (std::size_t i = 0; i < ranked_.size(); ++i) {
+    if (i % group_ == 0) {
+      for (std::size_t k = 0; k < n_bits_; ++k)
+        bits[k] = {words[i / group_ * n_bits_ + k], static_cast<std::int32_t>(k)};
+      std::sort(bits.begin(), bits.end());
     }
+    code.bit[ranked_[i]] = bits[static_cast<std::size_t>(classes_[i])].second;
   }
   for (std::size_t c = 0; c < cells_; ++c) {
     if (code.bit[c] < 0) code.sign[c] = 0;

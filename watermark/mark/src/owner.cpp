@@ -64,16 +64,16 @@ CellGrid stored_cells(const SafetensorsFile& file, Index side) {
   CellGrid cells = CellGrid::from_numbers(side, file.i32("cells/numbers"),
                                           file.f64(dealt_by_area ? kArea : kAreaBesideStrength).data);
   if (dealt_by_area) return cells;
-  const auto refuse = [&](const std::string& expected, const std::string& found) {
-    throw IoError(file.path + ": tensor '" + kStrength + "': expected " + expected + ", found " + found);
-  };
+  const std::string head = file.path + ": tensor '" + kStrength + "': ";
   const Shape& shape = file.at(kStrength).shape;
   if (shape.rank() != 2 || shape[0] < 1 || shape[1] != cells.count())
-    refuse("shape [views, " + std::to_string(cells.count()) + "]", shape.str());
-  std::vector<std::int32_t> strength = file.i32(kStrength);
-  if (const auto least = std::ranges::min_element(strength); *least < 0)
-    refuse("numbers of at least 0", std::to_string(*least));
-  cells.set_strength(std::move(strength));
+    throw IoError(head + "expected shape [views, " + std::to_string(cells.count()) + "], found " +
+                  shape.str());
+  try {
+    cells.set_strength(file.i32(kStrength));
+  } catch (const ValueError& e) {
+    throw IoError(head + e.what());
+  }
   return cells;
 }
 

@@ -25,9 +25,7 @@ class ScopedThreads {
 };
 
 namespace detail {
-/// Who runs a chunk: each thread those of its own share of neighbours first, or any free thread the next one.
-enum class Sharing { neighbours, next };
-void parallel_chunks(Index chunks, Sharing sharing, void* context, void (*run)(void*, Index chunk));
+void parallel_chunks(Index chunks, void* context, void (*run)(void*, Index chunk));
 /// True if a parallel loop started here would run on one thread: inside another parallel loop, or if there is
 /// only one thread.
 bool runs_on_one_thread();
@@ -45,21 +43,11 @@ void parallel_for(Index n, Index grain, F&& f) {
     std::remove_reference_t<F>* f;
     Index n, grain;
   } context{&f, n, grain < 1 ? 1 : grain};
-  detail::parallel_chunks((n + context.grain - 1) / context.grain, detail::Sharing::neighbours, &context,
-                          [](void* p, Index chunk) {
-                            auto& c = *static_cast<Context*>(p);
-                            const Index begin = chunk * c.grain;
-                            (*c.f)(begin, begin + c.grain < c.n ? begin + c.grain : c.n);
-                          });
-}
-
-/// Calls f(task) for each task of [0, n), on several threads: a free thread takes the next one, so tasks of
-/// unequal length go with the longest first. Otherwise as parallel_for().
-template <class F>
-void parallel_tasks(Index n, F&& f) {
-  if (n <= 0) return;
-  detail::parallel_chunks(n, detail::Sharing::next, &f,
-                          [](void* p, Index task) { (*static_cast<std::remove_reference_t<F>*>(p))(task); });
+  detail::parallel_chunks((n + context.grain - 1) / context.grain, &context, [](void* p, Index chunk) {
+    auto& c = *static_cast<Context*>(p);
+    const Index begin = chunk * c.grain;
+    (*c.f)(begin, begin + c.grain < c.n ? begin + c.grain : c.n);
+  });
 }
 
 }  // namespace fieldmark

@@ -39,8 +39,9 @@ class CellDealer {
 
  private:
   std::size_t cells_, n_bits_;
+  std::size_t group_;                  // ranked cells after which classes get other bits
   std::vector<std::size_t> ranked_;    // cells of positive area, by area or strength, largest first
-  std::vector<std::int32_t> classes_;  // of the ranked cells; empty without strengths
+  std::vector<std::int32_t> classes_;  // of the ranked cells
 };
 
 /// CellDealer for a single key.   @throws ValueError as CellDealer does
