@@ -303,10 +303,9 @@ Command add_embed(CommandLine& app) {
       ->type_name("N")
       ->default_str("");
   app.add_option("--colours", o->colours,
-                 "Colours of the mark. light: brightness, like uneven lighting, least visible;\nmixed: blue "
-                 "and yellow with some "
-                 "grey, read "
-                 "after less training;\nblue: blue and yellow, lost in greyscale images;\ndefault: mixed for "
+                 "Colours of the mark. light: brightness, like uneven lighting, least visible;\nmixed: fine "
+                 "detail between blue and grey, read after less training;\nblue: blue and yellow, "
+                 "lost in greyscale images;\ndefault: mixed for "
                  "objects, else "
                  "light; for preset fast")
       ->one_of({"light", "blue", "mixed"})

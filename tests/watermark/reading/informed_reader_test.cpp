@@ -8,7 +8,7 @@
 #include <cmath>
 #include <limits>
 
-#include "joint_evidence.h"
+#include <fieldmark/watermark/reading/joint_evidence.h>
 #include "pose_alignment.h"
 #include "support/catch.h"
 #include "watermark/cameras_apart.h"

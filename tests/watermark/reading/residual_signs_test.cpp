@@ -27,7 +27,7 @@ Tensor<float> marked_image(const Owner& owner, const nerf::Camera& camera) {
 
 ResidualSigns signs_of(const Owner& owner, const Surround& seen, const nerf::Camera& camera) {
   nerf::Renderer renderer(owner.field);
-  return residual_signs(renderer, owner, seen, camera);
+  return residual_signs(renderer, owner, evidence_view(seen, camera, 0, owner.field.cameras));
 }
 
 // Correlation of the signs with those that the message sends.

@@ -2,7 +2,9 @@
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/watermark/scanning/page_reader.h>
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "support/catch.h"
 #include "watermark/tiny_owner.h"
@@ -131,22 +133,53 @@ TEST_CASE("page_reader: a page without a view of the field is read blindly") {
   CHECK(forced.evidence() == forced.whole.informed.evidence);
 }
 
-TEST_CASE("page_reader: an object before an image of something else is found and read") {
-  const Owner owner = marking_owner();
+namespace {
+
+// Returns a marked view of so many pixels before an image of something else, of 160 pixels.
+Tensor<float> before_something(const Owner& owner, Index size) {
   nerf::Renderer renderer(owner.field);
   renderer.set_recolour(owner.marking(cell_signs(owner.code(), kPageMessage)));
-  PageReader reader(owner, kSearch, kObjects);
   const nerf::Rendering view =
-      renderer.render(nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::novel, 1, 160, 4).front());
+      renderer.render(nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::novel, 1, size, 4).front());
   const float level = nerf::background_value(owner.field.background);
-  Tensor<float> image = view.rgb;
-  for (Index p = 0; p < view.opacity.size(); ++p)
-    for (Index c = 0; c < 3; ++c)
-      image[3 * p + c] += (1 - view.opacity[p]) *
-                          (0.25f + 0.5f * static_cast<float>(c == 1 ? p / 160 : p % 160) / 160 - level);
-  const PageReading page = reader.read(quantize8(image));
+  const Index edge = (160 - size) / 2;
+  Tensor<float> image({160, 160, 3});
+  for (Index p = 0; p < 160 * 160; ++p) {
+    const Index y = p / 160 - edge, x = p % 160 - edge;
+    const bool inside = y >= 0 && y < size && x >= 0 && x < size;
+    const float opacity = inside ? view.opacity[y * size + x] : 0;
+    for (Index c = 0; c < 3; ++c) {
+      const float behind = 0.25f + 0.5f * static_cast<float>(c == 1 ? p / 160 : p % 160) / 160;
+      image[3 * p + c] = behind;
+      if (inside) image[3 * p + c] = view.rgb[3 * (y * size + x) + c] + (1 - opacity) * (behind - level);
+    }
+  }
+  return quantize8(image);
+}
+
+double power_of(const std::vector<double>& evidence) {
+  return std::inner_product(evidence.begin(), evidence.end(), evidence.begin(), 0.0);
+}
+
+}  // namespace
+
+TEST_CASE("page_reader: an object before an image of something else is found and read") {
+  const Owner owner = marking_owner();
+  PageReader reader(owner, kSearch, kObjects);
+  const PageReading page = reader.read(before_something(owner, 160));
   REQUIRE(page.chosen() == ReadingKind::informed);
   CHECK(page.whole.chosen == ReadingKind::blind);
   CHECK(page.agreement() >= 0.9);
   CHECK(p_of(owner, page.evidence()) < 1e-3);
+  // Before other images, it counts as much as they do.
+  CHECK(std::abs(power_of(page.evidence()) / power_of(page.whole.blind) - 1) < 1e-9);
+}
+
+TEST_CASE("page_reader: an object of less than 60 pixels is found if it agrees by 0.95") {
+  const Owner owner = marking_owner();
+  PageReader reader(owner, kSearch, kObjects);
+  const PageReading page = reader.read(before_something(owner, 56));
+  REQUIRE(page.parts.size() == 1);
+  CHECK(std::max(page.parts[0].box.width, page.parts[0].box.height) < 60);
+  CHECK(page.agreement() >= 0.95);
 }

@@ -41,7 +41,7 @@ void use_colours(MarkColours colours, CellMarkOptions& mark) {
   const bool light = colours == MarkColours::light;
   mark.network.bands =
       light ? 5 : usual.network.bands;  // detail finer than a cell costs likeness without a benefit
-  mark.network.tilt = light ? 50 : colours == MarkColours::mixed ? 30 : usual.network.tilt;
+  mark.network.tilt = colours == MarkColours::blue ? usual.network.tilt : 50;
   mark.network.shading = light ? 0.97 : usual.network.shading;
   mark.training.smooth_weight = light ? 0 : usual.training.smooth_weight;  // light is smooth
   mark.training.flat_weight = light ? 0.8 : usual.training.flat_weight;    // and most visible on walls

@@ -2,9 +2,10 @@
 #include <fieldmark/imaging/mirror.h>
 #include <fieldmark/imaging/resize.h>
 #include <fieldmark/watermark/reading/informed_reader.h>
+#include <fieldmark/watermark/reading/joint_evidence.h>
 #include "best_alignment.h"
 #include "camera_search.h"
-#include "joint_evidence.h"
+#include "evidence_view.h"
 #include "plain_border.h"
 #include "pose_alignment.h"
 #include "residual_signs.h"
@@ -43,8 +44,6 @@ constexpr AlignmentStage kPartFine[] = {
     {.size = 200, .blur = 1.2, .steps = 6}};
 constexpr Index kLeastPartSide = 16;  // of a part, pixels
 constexpr float kInsidePart = 0.9f;   // opacity inside the outline of a part
-constexpr Index kBesideCover = 2;     // pixels beside a bar that are ignored
-constexpr Index kLargest = 512;       // longer side at which evidence is taken, pixels
 
 // Returns four points of a scene that do not lie in a plane, to tell cameras apart.
 std::vector<nerf::Vec3> landmarks_of(const nerf::CameraSpan& span) {
@@ -127,7 +126,8 @@ InformedReader::~InformedReader() = default;
 
 std::vector<double> InformedReader::evidence_at(const Tensor<float>& image, const nerf::Camera& camera) {
   check_size(image, camera);
-  return residual_signs(parts_->renderer, owner_, {.image = image, .plain = {}}, camera).sign;
+  const EvidenceView view = evidence_view({.image = image, .plain = {}}, camera, 0, owner_.field.cameras);
+  return residual_signs(parts_->renderer, owner_, view).sign;
 }
 
 // Returns cameras whose renders look like the image, in the frame of the changed image.
@@ -212,7 +212,7 @@ ImageReading InformedReader::read_as(const Tensor<float>& whole, const Change& c
   if (g.agreement >= std::max(least, 0.0)) {
     if (is_inexact(best))
       g.camera = parts_->aligner.align(seen.image, best.camera, kFinest, seen.covered).camera;
-    add_evidence(seen, reading);
+    add_evidence(seen, best.shown, reading);
   }
   // Converts the camera to the whole image.
   g.camera.cx += static_cast<double>(seen.left);
@@ -223,17 +223,10 @@ ImageReading InformedReader::read_as(const Tensor<float>& whole, const Change& c
 }
 
 // Adds informed evidence from the camera found, and chooses.
-void InformedReader::add_evidence(const Surround& seen, ImageReading& reading) {
+void InformedReader::add_evidence(const Surround& seen, double shown, ImageReading& reading) {
   InformedReading& g = reading.informed;
-  const Index h = seen.image.shape[0], w = seen.image.shape[1];
-  const nerf::Camera used = g.camera.scaled(std::min(kLargest, std::max(h, w)));
-  const auto at_size = [&](const Tensor<float>& x) {
-    return x.size() > 0 ? resize_area(x, used.height, used.width) : x;
-  };
-  Surround sized{.image = at_size(seen.image), .plain = at_size(seen.plain), .colour = seen.colour};
-  if (!seen.covered.empty())
-    sized.covered = border_at(seen.covered, h, w, used.height, used.width, kBesideCover);
-  const ResidualSigns residual = residual_signs(parts_->renderer, owner_, sized, used);
+  const EvidenceView view = evidence_view(seen, g.camera, shown, owner_.field.cameras);
+  const ResidualSigns residual = residual_signs(parts_->renderer, owner_, view);
   g.evidence = residual.lost_detail ? joint_evidence(reading.blind, residual.sign)
                                     : scaled_to(reading.blind, residual.sign);
   if (g.agreement >= kLeastAgreement) reading.chosen = ReadingKind::informed;
@@ -289,7 +282,7 @@ ImageReading InformedReader::read_near(const Tensor<float>& image, const nerf::C
   const Tensor<float> opacity = parts_->renderer.render(g.camera).opacity;
   for (Index i = 0; i < image.size(); ++i) seen.image[i] = level + opacity[i / 3] * (image[i] - level);
   reading.blind = blind_.evidence(seen.image);
-  add_evidence(seen, reading);
+  add_evidence(seen, found.shown, reading);
   reading.chosen = ReadingKind::informed;
   return reading;
 }

@@ -1,4 +1,4 @@
-#include "joint_evidence.h"
+#include <fieldmark/watermark/reading/joint_evidence.h>
 
 #include <fieldmark/core/error.h>
 

@@ -22,9 +22,7 @@ constexpr double kBlurs[] = {0, 0.4, 0.6, 0.8, 1, 1.25, 1.5, 2, 2.5, 3};  // sta
 constexpr int kPasses = 2;
 constexpr double kAround = 4;           // standard deviation of the window for the local power, pixels
 constexpr float kLeastNoise = 1.2e-6f;  // variance of rounding to 8 bits
-// An image has lost detail if it is blurred by so many pixels, or smaller than this share of the training
-// images' scale.
-constexpr double kStrongBlur = 1, kSmallShare = 0.6;
+constexpr double kStrongBlur = 1;       // pixels: an image with more has lost detail
 
 // The unmarked render in the image's blur and tones, and the residual.
 struct Shown {
@@ -119,23 +117,18 @@ MarkScore score_of(const Tensor<float>& image, const CachedView& view, Carriers&
 
 }  // namespace
 
-ResidualSigns residual_signs(nerf::Renderer& renderer, const Owner& owner, const Surround& seen,
-                             const nerf::Camera& camera) {
-  const CachedView view = cache_view(renderer, owner.field, camera, kSamples);
+ResidualSigns residual_signs(nerf::Renderer& renderer, const Owner& owner, const EvidenceView& image) {
+  const Surround& seen = image.seen;
+  const CachedView view = cache_view(renderer, owner.field, image.camera, kSamples);
   Carriers mark = carriers(owner, view);
-  const bool replaced = seen.plain.size() > 0;
-  const Tensor<float> image = replaced ? before_background(seen.plain, view.opacity, seen.colour,
-                                                           nerf::background_value(owner.field.background))
-                                       : seen.image;
-  // The coefficients of a JPEG image belong to its own background.
-  const auto jpeg = replaced ? std::nullopt : find_jpeg(image);
-  const auto border = seen.covered.empty() ? border_of(owner.field, image) : seen.covered;
-  const MarkScore score = score_of(image, view, mark, border, jpeg);
-  const nerf::CameraSpan& trained = owner.field.cameras;
-  // By focal length, since a crop has fewer pixels and as much detail.
-  const bool small = camera.fx < kSmallShare * trained.fx * static_cast<double>(trained.width);
+  const Tensor<float> shown = seen.plain.size() > 0
+                                  ? before_background(seen.plain, view.opacity, seen.colour,
+                                                      nerf::background_value(owner.field.background))
+                                  : seen.image;
+  const auto border = seen.covered.empty() ? border_of(owner.field, shown) : seen.covered;
+  const MarkScore score = score_of(shown, view, mark, border, image.jpeg);
   return {.sign = fit_signs(mark, score, owner.cells.count()).sign,
-          .lost_detail = jpeg || score.blur >= kStrongBlur || small};
+          .lost_detail = image.jpeg || score.blur >= kStrongBlur || image.small};
 }
 
 }  // namespace fieldmark::watermark

@@ -1,7 +1,7 @@
 #pragma once
 #include <fieldmark/nerf/renderer.h>
 #include <fieldmark/watermark/mark/owner.h>
-#include "surround.h"
+#include "evidence_view.h"
 
 #include <vector>
 
@@ -10,8 +10,7 @@ namespace fieldmark::watermark {
 /// Signs of the cells as the residual of one image shows them.
 struct ResidualSigns {
   std::vector<double> sign;  ///< [cells] in [-1, 1], see fit_signs()
-  bool lost_detail =
-      false;  ///< to JPEG, a blur of a pixel or more, or less than 0.6 of the training images' scale
+  bool lost_detail = false;  ///< to JPEG, to a blur of a pixel or more at this size, or because it is small
 };
 
 /// Subtracts the unmarked render from an image and estimates the signs from the rest.
@@ -21,10 +20,7 @@ struct ResidualSigns {
 ///   precision.
 ///     For a JPEG image both come from the quantised coefficients.
 ///   - Covered pixels do not count.
-/// @throws ShapeError if the sizes differ
-/// @param renderer  of the owner's field   @param seen  image, and what covers it
-/// @param camera  of the image's size
-ResidualSigns residual_signs(nerf::Renderer& renderer, const Owner& owner, const Surround& seen,
-                             const nerf::Camera& camera);
+/// @param renderer  of the owner's field   @throws ShapeError if the sizes of image and camera differ
+ResidualSigns residual_signs(nerf::Renderer& renderer, const Owner& owner, const EvidenceView& image);
 
 }  // namespace fieldmark::watermark

@@ -1,4 +1,5 @@
 #include <fieldmark/imaging/resize.h>
+#include <fieldmark/watermark/reading/joint_evidence.h>
 #include <fieldmark/watermark/scanning/page_reader.h>
 
 #include <algorithm>
@@ -15,11 +16,12 @@ constexpr Index kMarginShare = 10;     // of a part's shorter side: renders of o
 constexpr Index kLargest = 512;        // longer side of an image that is searched for an object, pixels
 constexpr Index kLeastReduced = 16;    // shorter side of the same image, and of a part of it
 constexpr Index kCandidates = 24;      // places of the whole object that are tried, and of its quarters
-constexpr Index kLeastPart = 60;       // longer side of a part that is read, pixels
+constexpr Index kLeastPart = 40;       // longer side of a part that is read, pixels
 // Agreement at which an object counts as found. In images of something else, places of an object stay below
 // 0.65, and quarters of 63 pixels below 0.8; smaller ones reach 0.87.
 constexpr double kLeastInside = 0.9;
-constexpr double kSureInside = 0.95;  // agreement at which no other place is tried
+constexpr double kSureInside = 0.95;  // agreement at which no other place is tried, and that small ones need
+constexpr Index kSmallPart = 60;      // longer side below which a part is small, pixels
 
 using Colour = std::array<float, 3>;
 
@@ -102,7 +104,8 @@ PageReading PageReader::read(const Tensor<float>& image, bool informed_too) {
   if (page.whole.chosen == ReadingKind::informed) return page;
   const Tensor<float> rgb = opaque_image(image, nerf::background_value(owner_.field.background));
   page.parts = read_blocks(rgb);
-  if (page.parts.empty() && owner_.field.space.kind == nerf::SpaceKind::cube) page.parts = read_object(rgb);
+  if (page.parts.empty() && owner_.field.space.kind == nerf::SpaceKind::cube)
+    page.parts = read_object(rgb, page.whole.blind);
   return page;
 }
 
@@ -135,7 +138,8 @@ std::vector<PartReading> PageReader::read_blocks(const Tensor<float>& rgb) {
   return parts;
 }
 
-std::vector<PartReading> PageReader::read_object(const Tensor<float>& whole) {
+std::vector<PartReading> PageReader::read_object(const Tensor<float>& whole,
+                                                 const std::vector<double>& blind) {
   if (!objects_) objects_.emplace(owner_, object_options_);
   const Index h = whole.shape[0], w = whole.shape[1];
   const double zoom = std::min(1., static_cast<double>(kLargest) / static_cast<double>(std::max(h, w)));
@@ -150,12 +154,15 @@ std::vector<PartReading> PageReader::read_object(const Tensor<float>& whole) {
   for (const ObjectPlace& place : objects_->find(rgb, kCandidates)) {
     if (whole_found && !place.whole) break;  // a quarter shows fewer cells
     const PixelBox box = box_of(place);
-    if (std::max(box.width, box.height) < kLeastPart) continue;
-    ImageReading found = reader_.read_near(cut(rgb, box, 0, {level, level, level}),
-                                           camera_of(place.camera, box), most, beyond(rgb, box));
+    const Index longer = std::max(box.width, box.height);
+    if (longer < kLeastPart) continue;
+    ImageReading found =
+        reader_.read_near(cut(rgb, box, 0, {level, level, level}), camera_of(place.camera, box),
+                          longer < kSmallPart ? std::max(most, kSureInside) : most, beyond(rgb, box));
     if (found.chosen != ReadingKind::informed) continue;
     whole_found = place.whole;
     most = found.informed.agreement;
+    found.informed.evidence = scaled_to(blind, std::move(found.informed.evidence));
     best = {{{back(box.x), back(box.y), back(box.width), back(box.height)}, std::move(found)}};
     if (most >= kSureInside) break;
   }

@@ -44,7 +44,9 @@ struct PageReading {
 ///     that do not agree; all blocks that agree are added up;
 ///   - for an object, the places where the image looks most like a render or a quarter of one (see
 ///     ObjectSearch). There, InformedReader::read_near() looks at the pixels inside the outline alone, and
-///     the object counts as found at an agreement of 0.9.
+///     the object counts as found at an agreement of 0.9, or 0.95 where it has less than 60 pixels. Its
+///     evidence gets the power of the whole image's blind evidence: with its own, that of few pixels, images
+///     in which nothing was found would outweigh it.
 /// The choice depends on agreement alone and on neither key nor message, so the evidence may be tested
 /// against any.
 class PageReader {
@@ -66,7 +68,7 @@ class PageReader {
 
  private:
   std::vector<PartReading> read_blocks(const Tensor<float>& rgb);
-  std::vector<PartReading> read_object(const Tensor<float>& whole);
+  std::vector<PartReading> read_object(const Tensor<float>& whole, const std::vector<double>& blind);
 
   const Owner& owner_;
   InformedReader reader_;
