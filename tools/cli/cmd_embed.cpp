@@ -303,11 +303,10 @@ Command add_embed(CommandLine& app) {
       ->type_name("N")
       ->default_str("");
   app.add_option("--colours", o->colours,
-                 "Colours of the mark. light: brightness, like uneven lighting, least visible;\nmixed: fine "
-                 "detail between blue and grey, read after less training;\nblue: blue and yellow, "
-                 "lost in greyscale images;\ndefault: mixed for "
-                 "objects, else "
-                 "light; for preset fast")
+                 "Colours of the mark. light: brightness, like uneven lighting, least visible;\n"
+                 "mixed: fine detail in a colour between blue and grey, read after less training;\n"
+                 "blue: blue and yellow, lost in greyscale images;\n"
+                 "default: mixed for objects, else light; for preset fast")
       ->one_of({"light", "blue", "mixed"})
       ->type_name("NAME")
       ->default_str("");

@@ -68,7 +68,7 @@ TEST_CASE("recipe: blue is the default, light is smooth, tilted and shaded") {
   CHECK(mark.training.smooth_weight == 0);
   CHECK(mark.training.flat_weight > usual.training.flat_weight);
   use_colours(MarkColours::mixed, mark);
-  CHECK((mark.network.tilt > 0 && mark.network.tilt < 90));
+  CHECK(mark.network.tilt == 50);
   CHECK(mark.network.bands == usual.network.bands);
   CHECK(mark.network.shading == 0);
   use_colours(MarkColours::blue, mark);

@@ -66,6 +66,7 @@ TEST_CASE("evidence_view: where more pixels show the field, about 48,000 of them
     CHECK(kept < 1.02 * 48'000);
     CHECK(view.seen.image.shape == Shape{view.camera.height, view.camera.width, 3});
     CHECK(view.seen.image.data == resize_area(seen.image, view.camera.height, view.camera.width).data);
+    CHECK(view.zoom == 480. / static_cast<double>(view.camera.width));
     CHECK(!view.small);  // the image itself is not
   }
 }
@@ -79,6 +80,21 @@ TEST_CASE("evidence_view: a compressed image keeps its size, because resizing hi
   CHECK(view.jpeg->quality == 40);
   seen.plain = seen.image;  // another background was replaced: the blocks are not the image's own
   CHECK(!view_of(seen, 1).jpeg);
+}
+
+TEST_CASE("evidence_view: a compressed image of more than 512 pixels does not count as compressed") {
+  Surround seen = grain(520, 390);
+  seen.image = distort::jpeg444(seen.image, 40);
+  const EvidenceView view = view_of(seen, 0.1);
+  CHECK(!view.jpeg);
+  CHECK(view.camera.width == 512);
+  CHECK(view.zoom == 1);
+}
+
+TEST_CASE("evidence_view: sides of one pixel stay") {
+  const EvidenceView view = view_of(grain(600, 1), 1);
+  CHECK(view.camera.width == 512);
+  CHECK(view.camera.height == 1);
 }
 
 TEST_CASE("evidence_view: a large image is reduced to 512 pixels, with all that belongs to it") {

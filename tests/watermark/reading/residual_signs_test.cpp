@@ -75,4 +75,11 @@ TEST_CASE("residual_signs: blurred and small images have lost detail") {
   CHECK(!signs_of(owner, {.image = image, .plain = {}}, camera).lost_detail);
   CHECK(signs_of(owner, {.image = blurred(image, 2), .plain = {}}, camera).lost_detail);
   CHECK(signs_of(owner, {.image = resize_area(image, 24, 24), .plain = {}}, small).lost_detail);
+  // A blur is measured in pixels of the image before it was reduced.
+  nerf::Renderer renderer(owner.field);
+  EvidenceView reduced =
+      evidence_view({.image = blurred(image, 0.6), .plain = {}}, camera, 0, owner.field.cameras);
+  CHECK(!residual_signs(renderer, owner, reduced).lost_detail);
+  reduced.zoom = 2;
+  CHECK(residual_signs(renderer, owner, reduced).lost_detail);
 }

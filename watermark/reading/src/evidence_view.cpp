@@ -36,6 +36,7 @@ EvidenceView evidence_view(const Surround& seen, const nerf::Camera& camera, dou
   // The coefficients of a JPEG image belong to its own background and size.
   if (!replaced && largest.width == w && largest.height == h) view.jpeg = find_jpeg(seen.image);
   if (!view.jpeg) view.camera = camera.scaled(enough(largest, shown));
+  view.zoom = static_cast<double>(largest.width) / static_cast<double>(view.camera.width);
   const auto at_size = [&](const Tensor<float>& x) {
     return x.size() > 0 ? resize_area(x, view.camera.height, view.camera.width) : x;
   };

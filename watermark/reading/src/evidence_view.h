@@ -3,19 +3,24 @@
 #include "jpeg_score.h"
 #include "surround.h"
 
+#include <optional>
+
 namespace fieldmark::watermark {
 
 /// An image at the size at which evidence is taken, and what it has lost before.
 struct EvidenceView {
-  Surround seen;                    ///< the place of the cut is left out
-  nerf::Camera camera;              ///< of its size
+  Surround seen;                    ///< of this size; left and top are 0
+  nerf::Camera camera;              ///< of this size
   std::optional<JpegTrace> jpeg{};  ///< the image's own compression
-  bool small = false;               ///< true if the image has less than 0.6 of the training images' scale
+  double zoom = 1;                  ///< pixels of the image, at 512 at most, in one of this size
+  bool small = false;  ///< true if the image, at 512 pixels at most, has less than 0.6 of the training
+                       ///< images' scale
 };
 
-/// Chooses the size: at most 512 pixels on the longer side, and so many that at most 48,000 of them show the
-/// field. More took longer and read no more bits (docs/notes/reading.md). A compressed image keeps its size,
-/// because resizing hides the steps of its coefficients.
+/// Reduces an image to 512 pixels on the longer side, and to about 48,000 pixels that show the field: 64,000
+/// read as many bits as all (docs/notes/reading.md). A compressed image of at most 512 pixels keeps its size,
+/// because resizing hides the steps of its coefficients. Larger ones, and those whose background was
+/// replaced, do not count as compressed.
 /// @param camera  of the image's size   @param shown  share of the pixels that show the field, in [0, 1]
 /// @param trained  of the field
 EvidenceView evidence_view(const Surround& seen, const nerf::Camera& camera, double shown,

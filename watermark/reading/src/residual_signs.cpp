@@ -128,7 +128,7 @@ ResidualSigns residual_signs(nerf::Renderer& renderer, const Owner& owner, const
   const auto border = seen.covered.empty() ? border_of(owner.field, shown) : seen.covered;
   const MarkScore score = score_of(shown, view, mark, border, image.jpeg);
   return {.sign = fit_signs(mark, score, owner.cells.count()).sign,
-          .lost_detail = image.jpeg || score.blur >= kStrongBlur || image.small};
+          .lost_detail = image.jpeg || image.zoom * score.blur >= kStrongBlur || image.small};
 }
 
 }  // namespace fieldmark::watermark

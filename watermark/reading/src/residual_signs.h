@@ -10,7 +10,7 @@ namespace fieldmark::watermark {
 /// Signs of the cells as the residual of one image shows them.
 struct ResidualSigns {
   std::vector<double> sign;  ///< [cells] in [-1, 1], see fit_signs()
-  bool lost_detail = false;  ///< to JPEG, to a blur of a pixel or more at this size, or because it is small
+  bool lost_detail = false;  ///< to JPEG, to a blur of a pixel or more, or because it is small
 };
 
 /// Subtracts the unmarked render from an image and estimates the signs from the rest.

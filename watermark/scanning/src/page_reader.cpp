@@ -16,12 +16,13 @@ constexpr Index kMarginShare = 10;     // of a part's shorter side: renders of o
 constexpr Index kLargest = 512;        // longer side of an image that is searched for an object, pixels
 constexpr Index kLeastReduced = 16;    // shorter side of the same image, and of a part of it
 constexpr Index kCandidates = 24;      // places of the whole object that are tried, and of its quarters
-constexpr Index kLeastPart = 40;       // longer side of a part that is read, pixels
+// Longer side of a part that is read, pixels; below kSmallPart it shows little of the mark, and a larger part
+// replaces it.
+constexpr Index kLeastPart = 48, kSmallPart = 60;
 // Agreement at which an object counts as found. In images of something else, places of an object stay below
 // 0.65, and quarters of 63 pixels below 0.8; smaller ones reach 0.87.
 constexpr double kLeastInside = 0.9;
-constexpr double kSureInside = 0.95;  // agreement at which no other place is tried, and that small ones need
-constexpr Index kSmallPart = 60;      // longer side below which a part is small, pixels
+constexpr double kSureInside = 0.95;  // agreement that small parts need; at it, a larger one ends the search
 
 using Colour = std::array<float, 3>;
 
@@ -149,22 +150,24 @@ std::vector<PartReading> PageReader::read_object(const Tensor<float>& whole,
   const Tensor<float> rgb = zoom < 1 ? resize_area(whole, side(h), side(w)) : whole;
   const float level = nerf::background_value(owner_.field.background);
   std::vector<PartReading> best;
-  bool whole_found = false;
+  bool whole_found = false, large_found = false;
   double most = kLeastInside;
   for (const ObjectPlace& place : objects_->find(rgb, kCandidates)) {
     if (whole_found && !place.whole) break;  // a quarter shows fewer cells
     const PixelBox box = box_of(place);
     const Index longer = std::max(box.width, box.height);
-    if (longer < kLeastPart) continue;
-    ImageReading found =
-        reader_.read_near(cut(rgb, box, 0, {level, level, level}), camera_of(place.camera, box),
-                          longer < kSmallPart ? std::max(most, kSureInside) : most, beyond(rgb, box));
+    const bool large = longer >= kSmallPart;
+    if (longer < kLeastPart || (large_found && !large)) continue;
+    const double least = large ? (large_found ? most : kLeastInside) : std::max(most, kSureInside);
+    ImageReading found = reader_.read_near(cut(rgb, box, 0, {level, level, level}),
+                                           camera_of(place.camera, box), least, beyond(rgb, box));
     if (found.chosen != ReadingKind::informed) continue;
     whole_found = place.whole;
+    large_found = large;
     most = found.informed.agreement;
     found.informed.evidence = scaled_to(blind, std::move(found.informed.evidence));
     best = {{{back(box.x), back(box.y), back(box.width), back(box.height)}, std::move(found)}};
-    if (most >= kSureInside) break;
+    if (large && most >= kSureInside) break;
   }
   return best;
 }

@@ -23,7 +23,7 @@ inline constexpr std::array<const char*, 3> kPresets{"fast", "paper", "code"};
 enum class MarkColours {
   blue,   ///< blue and yellow without luma, in fine detail: lost in greyscale
   light,  ///< like uneven lighting: smooth, between blue and grey, fainter on dark colours
-  mixed,  ///< fine detail between blue and grey: survives changes of colour and strong JPEG
+  mixed,  ///< in fine detail, between blue and grey: survives changes of colour and strong JPEG
 };
 /// Returns "blue", "light" or "mixed".
 const char* mark_colours_name(MarkColours colours);

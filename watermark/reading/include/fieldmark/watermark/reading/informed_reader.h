@@ -54,8 +54,8 @@ class CameraSearch;
 ///     there. Below an agreement of 0.95, the search goes on with all renders, then with the mirrored image
 ///     and with one stretched to where it looks most like the field. Before evidence is taken, the camera of
 ///     a thin object is aligned once more, at 400 pixels; the agreement stays that at 200.
-///   - Evidence is taken at 512 pixels at most, and where the image shows no JPEG quantisation, of at most
-///     48,000 pixels that show the field.
+///   - The image is reduced to 512 pixels on the longer side. Unless it shows JPEG quantisation, it is then
+///     reduced to about 48,000 pixels that show the field.
 ///   - The blur that leaves the smallest residual is kept; gain, offset and gamma are fitted.
 ///   - With the residual R and its power V around each pixel, R / V is the score and 1 / V the precision.
 ///     For a JPEG image both come from the quantised coefficients.
@@ -84,7 +84,7 @@ class InformedReader {
   /// @throws ValueError if a value is not finite
   ImageReading read_near(const Tensor<float>& image, const nerf::Camera& start, double least,
                          const std::vector<std::uint8_t>& covered = {});
-  /// Computes the evidence of an image with a known camera.
+  /// Computes the evidence of an image with a known camera, of all pixels up to 512 on the longer side.
   /// @param image  [H, W, 3]   @param camera  of its size   @throws ShapeError if the sizes differ
   /// @throws ValueError if a value is not finite
   std::vector<double> evidence_at(const Tensor<float>& image, const nerf::Camera& camera);

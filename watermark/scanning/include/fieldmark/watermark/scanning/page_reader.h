@@ -12,7 +12,8 @@ namespace fieldmark::watermark {
 struct PartReading {
   PixelBox box{};  ///< of the part in the image; that of an object may reach beyond it
   /// Of the part alone, by informed detection. Its camera is of the part as it was read: with a margin, and
-  /// for an object reduced with the image to a longer side of at most 512 pixels.
+  /// for an object reduced with the image to a longer side of at most 512 pixels. Informed evidence of an
+  /// object has the power of the whole image's blind evidence.
   ImageReading reading;
 };
 
@@ -44,9 +45,9 @@ struct PageReading {
 ///     that do not agree; all blocks that agree are added up;
 ///   - for an object, the places where the image looks most like a render or a quarter of one (see
 ///     ObjectSearch). There, InformedReader::read_near() looks at the pixels inside the outline alone, and
-///     the object counts as found at an agreement of 0.9, or 0.95 where it has less than 60 pixels. Its
-///     evidence gets the power of the whole image's blind evidence: with its own, that of few pixels, images
-///     in which nothing was found would outweigh it.
+///     the object counts as found at an agreement of 0.9. Parts of 48 to 59 pixels need 0.95, and give way
+///     to a larger one. The evidence gets the power of the whole image's blind evidence: with that of so few
+///     pixels, it would count less than an image in which nothing was found.
 /// The choice depends on agreement alone and on neither key nor message, so the evidence may be tested
 /// against any.
 class PageReader {
