@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "support/catch.h"
 
@@ -78,7 +79,10 @@ TEST_CASE("evidence_view: a compressed image keeps its size, because resizing hi
   CHECK(view.seen.image.data == seen.image.data);
   REQUIRE(view.jpeg);
   CHECK(view.jpeg->quality == 40);
-  seen.plain = seen.image;  // another background was replaced: the blocks are not the image's own
+  seen.plain = seen.image;  // as it came, before another background
+  seen.image = grain(480, 360).image;
+  CHECK(view_of(seen, 1).jpeg);
+  std::swap(seen.image, seen.plain);
   CHECK(!view_of(seen, 1).jpeg);
 }
 

@@ -9,7 +9,9 @@
 #include <limits>
 
 #include <fieldmark/watermark/reading/joint_evidence.h>
+#include "evidence_view.h"
 #include "pose_alignment.h"
+#include "residual_signs.h"
 #include "support/catch.h"
 #include "watermark/cameras_apart.h"
 #include "watermark/tiny_owner.h"
@@ -104,6 +106,24 @@ TEST_CASE("informed_reader: the extractor counts only where the image has lost d
   const auto joint = joint_evidence(lost.blind, residual);
   REQUIRE(correlation(joint, residual) < 0.9999);  // the extractor reads something
   CHECK(correlation(lost.informed.evidence, joint) > 0.9999);
+}
+
+TEST_CASE("informed_reader: evidence is taken of fewer pixels where more than 48,000 show the field") {
+  const Owner owner = marking_owner();
+  InformedReader reader(owner, kSearch);
+  nerf::Renderer renderer(owner.field);
+  const auto of_all_pixels = [&](const Tensor<float>& image, const ImageReading& reading) {
+    const Surround seen = clear_surround(image, nerf::background_value(owner.field.background), true);
+    const EvidenceView all = evidence_view(seen, reading.informed.camera, 0, owner.field.cameras);
+    return scaled_to(reading.blind, residual_signs(renderer, owner, all).sign);
+  };
+  for (const Index size : {96, 480}) {
+    const Tensor<float> image = image_of(
+        owner, nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::novel, 1, size, 4).front(), true);
+    const ImageReading reading = reader.read(image);
+    REQUIRE(reading.chosen == ReadingKind::informed);
+    CHECK((reading.informed.evidence == of_all_pixels(image, reading)) == (size == 96));
+  }
 }
 
 TEST_CASE("informed_reader: the camera is found from the image, and the reading chosen by the scene alone") {

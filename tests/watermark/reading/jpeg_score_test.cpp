@@ -5,9 +5,11 @@
 #include <fieldmark/engine/random.h>
 #include <fieldmark/imaging/image.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "blurred.h"
 #include "support/catch.h"
 
 using namespace fieldmark;
@@ -51,6 +53,13 @@ Tensor<float> sum(const Tensor<float>& a, const Tensor<float>& b, float sign) {
 }
 
 const std::vector<double> kEverywhere(static_cast<std::size_t>(kHeight* kWidth), 1.0);
+
+// Expected square of score times mark.
+double information_of(const JpegScore& s, const Tensor<float>& mark) {
+  double sum = 0;
+  for (Index i = 0; i < mark.size(); ++i) sum += static_cast<double>(s.precision[i] * mark[i] * mark[i]);
+  return sum;
+}
 
 // How many 8-row strips get the right sign: from the score's product with the mark, and from a plain
 // difference.
@@ -110,6 +119,46 @@ TEST_CASE("find_jpeg: names quality and chroma of what was compressed, and nothi
   CHECK_FALSE(find_jpeg(Tensor<float>({40, 40, 3}, std::numeric_limits<float>::quiet_NaN())).has_value());
 }
 
+TEST_CASE("find_jpeg: blocks in which the decoder clipped do not hide the rest") {
+  for (const int quality : {10, 50}) {
+    Tensor<float> x = view_image(0.05f, 1);
+    for (Index p = 0; p < kHeight * kWidth; ++p)  // an object before white, whose edge passes many blocks
+      if ((p / kWidth - 2 * (p % kWidth / 4)) % 32 < 12) std::fill_n(&x[3 * p], 3, 1.f);
+    const auto half = find_jpeg(jpeg_round_trip(x, quality));
+    REQUIRE(half.has_value());
+    CHECK(half->quality == quality);
+    CHECK(half->subsampled);
+  }
+}
+
+TEST_CASE("jpeg_log_likelihood: the render that was compressed is likelier than one in other tones or blur") {
+  const Tensor<float> base = view_image(0.03f, 6), seen = jpeg_round_trip(base, 10);
+  const JpegTrace trace{.quality = 10, .subsampled = true};
+  const double truth = jpeg_log_likelihood(seen, base, kEverywhere, trace);
+  CHECK(std::isfinite(truth));
+  CHECK(truth < 0);
+  Tensor<float> toned = base;
+  for (float& x : toned.data) x = 0.95f * x + 0.02f;
+  CHECK(truth > jpeg_log_likelihood(seen, toned, kEverywhere, trace) + 10);
+  CHECK(truth > jpeg_log_likelihood(seen, blurred(base, 0.8), kEverywhere, trace) + 10);
+}
+
+TEST_CASE("jpeg_score: the precision is of the noise, whatever the mark's power") {
+  const Tensor<float> base = view_image(0.03f, 8), mark = pattern(0.01f);
+  const Tensor<float> seen = jpeg_round_trip(sum(base, mark, 1), 40);
+  const JpegTrace trace{.quality = 40, .subsampled = true};
+  Tensor<float> twice = mark, uneven = mark;
+  for (float& x : twice.data) x *= 2;
+  for (Index i = 0; i < mark.size(); i += 7) uneven[i] = 0;  // places without a mark have no better sight
+  const JpegScore once = jpeg_score(seen, base, mark, kEverywhere, trace);
+  CHECK(jpeg_score(seen, base, twice, kEverywhere, trace).precision.data == once.precision.data);
+  CHECK(information_of(once, mark) > 0);
+  const JpegScore other = jpeg_score(seen, base, uneven, kEverywhere, trace);
+  for (Index i = 0; i < mark.size(); ++i) REQUIRE(other.precision[i] < 4 * once.precision[i]);
+  const JpegScore none = jpeg_score(seen, base, Tensor<float>(mark.shape), kEverywhere, trace);
+  CHECK(std::ranges::all_of(none.precision.data, [](float x) { return x == 0; }));
+}
+
 TEST_CASE("jpeg_score: reads faint signs that a plain difference does not") {
   const Right right = strips_right(50, 0.0012f);
   CAPTURE(right.score, right.difference, right.of);
@@ -127,8 +176,7 @@ TEST_CASE("jpeg_score: the slope is that of the likelihood, and leans to no sign
     return out;
   };
   const JpegScore unmarked = jpeg_score(jpeg_round_trip(base, 60), base, mark, kEverywhere, trace);
-  double information = 0;
-  for (const float v : unmarked.information.data) information += static_cast<double>(v);
+  const double information = information_of(unmarked, mark);
   CHECK(information > 0);
   CHECK(std::abs(along(unmarked)) < 4 * std::sqrt(information));
   CHECK(along(jpeg_score(seen, base, mark, kEverywhere, trace)) > 0);
@@ -163,4 +211,9 @@ TEST_CASE("jpeg_score: errors name what is wrong") {
                     "[jpeg_score] render, mark and object must fit the image [16, 16, 3], got [16, 8, 3], "
                     "[16, 16, 3] and 256 pixels");
   CHECK_THROWS_AS(jpeg_score(x, x, x, object, {0, true}), ValueError);
+  CHECK_THROWS_WITH(
+      jpeg_log_likelihood(x, other, object, {50, true}),
+      "[jpeg_log_likelihood] render, mark and object must fit the image [16, 16, 3], got [16, 8, 3], "
+      "[16, 16, 3] and 256 pixels");
+  CHECK_THROWS_AS(jpeg_log_likelihood(x, x, object, {101, true}), ValueError);
 }

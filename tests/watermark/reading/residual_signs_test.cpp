@@ -1,4 +1,5 @@
 #include "residual_signs.h"
+#include <fieldmark/distort/distortion.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/imaging/resize.h>
 
@@ -82,4 +83,25 @@ TEST_CASE("residual_signs: blurred and small images have lost detail") {
   CHECK(!residual_signs(renderer, owner, reduced).lost_detail);
   reduced.zoom = 2;
   CHECK(residual_signs(renderer, owner, reduced).lost_detail);
+}
+
+TEST_CASE("residual_signs: after strong JPEG, the likeliest tones and background are taken") {
+  const Owner owner = marking_owner();
+  const nerf::Camera camera = residual_camera(160);
+  const Tensor<float> image = marked_image(owner, camera);
+  const auto share_after = [&](const char* name) {
+    const std::vector<float> white(3, 1.f);
+    const Tensor<float> changed =
+        distort::apply_distortion(distort::parse_distortion(name), image, CounterRng(1, 1), 0, white);
+    const Surround seen = clear_surround(changed, 1, true);
+    nerf::Camera inside = camera;
+    inside.cx -= static_cast<double>(seen.left);
+    inside.cy -= static_cast<double>(seen.top);
+    inside.height = seen.image.shape[0];
+    inside.width = seen.image.shape[1];
+    return share_of(owner, signs_of(owner, seen, inside).sign);
+  };
+  CHECK(share_after("jpeg_10") > 0.4);
+  CHECK(share_after("background_black,jpeg_30") > 0.55);
+  CHECK(share_after("brightness_0.5,jpeg_50") > 0.55);
 }

@@ -72,6 +72,8 @@ TEST_CASE("surround: another background behind an object becomes the field's, ba
     for (std::size_t a = 0; a < 3; ++a) CHECK(seen.colour[a] == Approx(colour[a]).margin(1e-5));
     REQUIRE(seen.plain.size() == seen.image.size());
     for (Index i = 0; i < 3; ++i) CHECK(seen.image[i] == 1);
+    CHECK((seen.left % 16 == 0 && seen.top % 16 == 0));  // the blocks of a compressed image begin there
+    CHECK(own_image(seen).data == seen.plain.data);
     // Bars of the background's own colour become its edges: the disc stays, wherever the cut is.
     const Index h = seen.image.shape[0], w = seen.image.shape[1];
     double worst = 0;
@@ -110,10 +112,10 @@ TEST_CASE("surround: with the opacity known, edges too are as before the field's
     for (Index a = 0; a < 3; ++a)
       plain[3 * p + a] = level[p] * object + (1 - level[p]) * colour[static_cast<std::size_t>(a)];
   }
-  const Tensor<float> y = before_background(plain, opacity, colour, 1);
+  const Tensor<float> y = before_background(plain, opacity, colour, {1, 1, 1});
   for (Index i = 0; i < y.size(); ++i)
     CHECK(y[i] == Approx(level[i / 3] * object + (1 - level[i / 3])).margin(1e-6));
-  CHECK_THROWS_AS(before_background(plain, Tensor<float>({1, 2}), colour, 1), ShapeError);
+  CHECK_THROWS_AS(before_background(plain, Tensor<float>({1, 2}), colour, {1, 1, 1}), ShapeError);
 }
 
 TEST_CASE("surround: errors name what is wrong") {

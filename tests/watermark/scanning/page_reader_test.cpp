@@ -1,5 +1,7 @@
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/engine/random.h>
 #include <fieldmark/imaging/image.h>
+#include <fieldmark/watermark/reading/joint_evidence.h>
 #include <fieldmark/watermark/scanning/page_reader.h>
 
 #include <algorithm>
@@ -96,7 +98,7 @@ TEST_CASE("page_reader: the views of a collage are added up") {
   std::vector<double> sum(owner.code().bit.size());
   for (const PartReading& part : page.parts)
     for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += part.reading.evidence()[c];
-  CHECK(page.evidence() == sum);
+  CHECK(page.evidence() == scaled_to(page.whole.blind, sum));
   CHECK(p_of(owner, sum) < 1e-6);
 }
 
@@ -157,6 +159,12 @@ Tensor<float> before_something(const Owner& owner, Index size) {
   return quantize8(image);
 }
 
+Tensor<float> noisy(Tensor<float> image, float sigma) {
+  const CounterRng rng(1, 1);
+  for (Index i = 0; i < image.size(); ++i) image[i] += sigma * rng.normal2(static_cast<std::uint64_t>(i))[0];
+  return quantize8(image);
+}
+
 double power_of(const std::vector<double>& evidence) {
   return std::inner_product(evidence.begin(), evidence.end(), evidence.begin(), 0.0);
 }
@@ -184,4 +192,12 @@ TEST_CASE("page_reader: an object of less than 60 pixels is found if it agrees b
   CHECK(std::max(box.width, box.height) >= 48);
   CHECK(std::max(box.width, box.height) < 60);
   CHECK(page.agreement() >= 0.95);
+}
+
+TEST_CASE("page_reader: an object of less than 60 pixels that agrees by less than 0.95 is not found") {
+  const Owner owner = marking_owner();
+  PageReader reader(owner, kSearch, kObjects);
+  const PageReading page = reader.read(noisy(before_something(owner, 68), 0.13f));  // agreement 0.93
+  CHECK(page.parts.empty());
+  CHECK(page.chosen() == ReadingKind::blind);
 }

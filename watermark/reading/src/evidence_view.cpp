@@ -30,11 +30,10 @@ Index enough(const nerf::Camera& camera, double shown) {
 EvidenceView evidence_view(const Surround& seen, const nerf::Camera& camera, double shown,
                            const nerf::CameraSpan& trained) {
   const Index h = seen.image.shape[0], w = seen.image.shape[1];
-  const bool replaced = seen.plain.size() > 0;
   const nerf::Camera largest = camera.scaled(std::min(kLargest, std::max(h, w)));
   EvidenceView view{.seen = {}, .camera = largest, .small = is_small(largest, trained)};
   // The coefficients of a JPEG image belong to its own background and size.
-  if (!replaced && largest.width == w && largest.height == h) view.jpeg = find_jpeg(seen.image);
+  if (largest.width == w && largest.height == h) view.jpeg = find_jpeg(own_image(seen));
   if (!view.jpeg) view.camera = camera.scaled(enough(largest, shown));
   view.zoom = static_cast<double>(largest.width) / static_cast<double>(view.camera.width);
   const auto at_size = [&](const Tensor<float>& x) {

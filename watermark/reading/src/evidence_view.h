@@ -19,8 +19,7 @@ struct EvidenceView {
 
 /// Reduces an image to 512 pixels on the longer side, and to about 48,000 pixels that show the field: 64,000
 /// read as many bits as all (docs/notes/reading.md). A compressed image of at most 512 pixels keeps its size,
-/// because resizing hides the steps of its coefficients. Larger ones, and those whose background was
-/// replaced, do not count as compressed.
+/// because resizing hides the steps of its coefficients. Larger ones do not count as compressed.
 /// @param camera  of the image's size   @param shown  share of the pixels that show the field, in [0, 1]
 /// @param trained  of the field
 EvidenceView evidence_view(const Surround& seen, const nerf::Camera& camera, double shown,

@@ -7,6 +7,9 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <string>
+
+#include "ordered_sum.h"
 
 namespace fieldmark::watermark {
 namespace {
@@ -20,10 +23,12 @@ constexpr double kOutlierWay = 512;           // ... and their range in levels
 constexpr double kNoDensity = 9;              // standard deviations: beyond, the density counts as 0
 constexpr double kLeastGain = 50;             // least log-likelihood ratio of a table
 constexpr std::size_t kSieve = 16;            // blocks of which one sieves the tables ...
+constexpr std::size_t kSample = 7;            // blocks of which one tells renders apart
 constexpr double kHopeless = -20;             // ... with this log-likelihood ratio
 constexpr double kFirst = 0.3, kRatio = 1.5;  // standard deviations tried, levels
 constexpr int kDeviations = 13;
 constexpr std::array kFactors{0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0};
+constexpr Index kSide = 8;                  // pixels of a block
 constexpr Index kRows = 32, kBlocks = 128;  // of pixels and of coefficients in one piece of work
 constexpr double kOnObject = 32;            // least foreground pixels for a block to count in its band
 
@@ -92,6 +97,23 @@ std::vector<JpegBlock> coefficients(const Plane& p, double middle) {
   return out;
 }
 
+// Leaves out the blocks of an image, of so many pixels a side, in which the decoder may have clipped a value.
+std::vector<JpegBlock> unclipped(const std::vector<JpegBlock>& blocks, const Tensor<float>& image,
+                                 Index side) {
+  const Index h = image.shape[0], w = image.shape[1], across = (w + side - 1) / side;
+  const auto clipped = [](float x) { return x <= 0 || x >= 1; };
+  std::vector<JpegBlock> out;
+  for (Index b = 0; b < std::ssize(blocks); ++b) {
+    const Index top = b / across * side, left = b % across * side, columns = std::min(w, left + side) - left;
+    bool whole = true;
+    for (Index y = top; y < std::min(h, top + side); ++y)
+      whole = whole &&
+              std::none_of(&image[3 * (y * w + left)], &image[3 * (y * w + left)] + 3 * columns, clipped);
+    if (whole) out.push_back(blocks[at(b)]);
+  }
+  return out;
+}
+
 // Returns the log-likelihood ratio of a table of steps for the nonzero coefficients of every `stride`-th
 // block, against a uniform density.
 double explained(const std::vector<JpegBlock>& blocks, const JpegBlock& steps, std::size_t stride = 1) {
@@ -130,31 +152,69 @@ Likelihood likelihood(double n, double step, double b, double deviation) {
 // One component of image, render and mark as coefficients, with their standard deviations.
 class ComponentScore {
  public:
-  ComponentScore(int component, const JpegTrace& trace)
+  // Counts every `stride`-th block.
+  ComponentScore(int component, const JpegTrace& trace, const Tensor<float>& image,
+                 const Tensor<float>& render, std::span<const double> object, std::size_t stride)
       : component_(component),
         cell_(component > 0 && trace.subsampled ? 2 : 1),
-        steps_(distort::jpeg_steps(component > 0 ? JpegComponent::chroma : JpegComponent::luma,
-                                   trace.quality)) {}
-
-  void add(const Tensor<float>& image, const Tensor<float>& render, const Tensor<float>& mark,
-           std::span<const double> object, JpegScore& out) {
+        steps_(
+            distort::jpeg_steps(component > 0 ? JpegComponent::chroma : JpegComponent::luma, trace.quality)) {
     const double middle = component_ == 0 ? 128 : 0;
     const Plane seen = decoded_component(image, component_, cell_);
-    height_ = seen.height;
     width_ = seen.width;
     image_ = coefficients(seen, middle);
     render_ = coefficients(component_of(render, component_, cell_), middle);
     count_object(object, image.shape[1], image.shape[0]);
+    for (std::size_t b = 0; b < on_object_.size(); ++b)
+      if (b % stride != 0) on_object_[b] = 0;
     fit_deviations();
-    spread(component_of(mark, component_, cell_), out);
+  }
+
+  double log_likelihood() const {
+    return ordered_sum(std::ssize(image_), 0.0, [&](Index begin, Index end, double& sum) {
+      for (auto b = at(begin); b < at(end); ++b)
+        for (std::size_t k = 0; k < 64 && on_object_[b] > 0; ++k)
+          sum += of(b, k, factor_[b] * deviation_[k]).log_p;
+    });
+  }
+
+  // Adds this component's score and precision.
+  void add(const Tensor<float>& mark, JpegScore& out) const {
+    const std::vector<JpegBlock> marks = coefficients(component_of(mark, component_, cell_), 0);
+    const auto row = distort::jpeg_colour_row(component_);
+    const double share = 255 / static_cast<double>(cell_ * cell_);
+    const Index h = mark.shape[0], w = mark.shape[1], side = kSide * cell_;
+    for (std::size_t b = 0; b < image_.size(); ++b) {
+      if (!(on_object_[b] > 0)) continue;
+      JpegBlock slopes;
+      double information = 0, power = 0;
+      for (std::size_t k = 0; k < 64; ++k) {
+        slopes[k] = of(b, k, factor_[b] * deviation_[k]).slope;
+        information += slopes[k] * slopes[k] * marks[b][k] * marks[b][k];
+      }
+      const JpegBlock levels = distort::from_jpeg_cosines(slopes);
+      const Index top = static_cast<Index>(b) / across() * side,
+                  left = static_cast<Index>(b) % across() * side;
+      const auto for_values = [&](auto use) {
+        for (Index y = top; y < std::min(h, top + side); ++y)
+          for (Index x = left; x < std::min(w, left + side); ++x)
+            for (Index c = 0; c < 3; ++c)
+              use(3 * (y * w + x) + c, at(c), at((y - top) / cell_ * kSide + (x - left) / cell_));
+      };
+      for_values([&](Index i, std::size_t, std::size_t) { power += static_cast<double>(mark[i] * mark[i]); });
+      for_values([&](Index i, std::size_t c, std::size_t place) {
+        out.score[i] += static_cast<float>(share * row[c] * levels[place]);
+        if (power > 0) out.precision[i] += static_cast<float>(information / power);
+      });
+    }
   }
 
  private:
-  Index across() const { return (width_ + 7) / 8; }
+  Index across() const { return (width_ + kSide - 1) / kSide; }
 
   void count_object(std::span<const double> object, Index w, Index h) {
     on_object_.assign(image_.size(), 0);
-    const Index side = 8 * cell_;
+    const Index side = kSide * cell_;
     for (Index y = 0; y < h; ++y)
       for (Index x = 0; x < w; ++x)
         on_object_[at((y / side) * across() + x / side)] +=
@@ -197,42 +257,23 @@ class ComponentScore {
     });
   }
 
-  void spread(const Plane& mark, JpegScore& out) const {
-    const std::vector<JpegBlock> marks = coefficients(mark, 0);
-    const auto row = distort::jpeg_colour_row(component_);
-    const double share = 255 / static_cast<double>(cell_ * cell_);
-    const Index h = out.score.shape[0], w = out.score.shape[1];
-    for (std::size_t b = 0; b < image_.size(); ++b) {
-      if (!(on_object_[b] > 0)) continue;
-      JpegBlock slopes;
-      double information = 0;
-      for (std::size_t k = 0; k < 64; ++k) {
-        const Likelihood l = of(b, k, factor_[b] * deviation_[k]);
-        out.log_likelihood += l.log_p;
-        slopes[k] = l.slope;
-        information += l.slope * l.slope * marks[b][k] * marks[b][k];
-      }
-      const JpegBlock levels = distort::from_jpeg_cosines(slopes);
-      const Index side = 8 * cell_, top = static_cast<Index>(b) / across() * side,
-                  left = static_cast<Index>(b) % across() * side;
-      for (Index y = top; y < std::min(h, top + side); ++y)
-        for (Index x = left; x < std::min(w, left + side); ++x)
-          for (Index c = 0; c < 3; ++c) {
-            const Index i = 3 * (y * w + x) + c;
-            out.score[i] += static_cast<float>(share * row[at(c)] *
-                                               levels[at((y - top) / cell_ * 8 + (x - left) / cell_)]);
-            out.information[i] += static_cast<float>(information / static_cast<double>(3 * side * side));
-          }
-    }
-  }
-
   int component_;
-  Index cell_, height_ = 0, width_ = 0;
+  Index cell_, width_ = 0;
   JpegBlock steps_;
   std::vector<JpegBlock> image_, render_;
   std::vector<double> on_object_, factor_;  // [blocks] foreground pixels; factor on the band's deviation
   JpegBlock deviation_{};
 };
+
+void check_fit(const char* op, const Tensor<float>& image, const Tensor<float>& render,
+               const Tensor<float>& mark, std::span<const double> object) {
+  check_rank(op, "image", image.shape, 3, "[H, W, 3]");
+  check_extent(op, "image", image.shape, 2, 3, "red, green, blue");
+  if (render.shape != image.shape || mark.shape != image.shape || 3 * std::ssize(object) != image.size())
+    throw ShapeError("[" + std::string(op) + "] render, mark and object must fit the image " +
+                     image.shape.str() + ", got " + render.shape.str() + ", " + mark.shape.str() + " and " +
+                     std::to_string(object.size()) + " pixels");
+}
 
 }  // namespace
 
@@ -240,7 +281,7 @@ std::optional<JpegTrace> find_jpeg(const Tensor<float>& image) {
   check_rank("find_jpeg", "image", image.shape, 3, "[H, W, 3]");
   check_extent("find_jpeg", "image", image.shape, 2, 3, "red, green, blue");
   if (image.size() == 0) return std::nullopt;
-  const auto luma = coefficients(component_of(image, 0, 1), 128);
+  const auto luma = unclipped(coefficients(component_of(image, 0, 1), 128), image, kSide);
   std::array<double, 101> gain{};
   parallel_for(100, 1, [&](Index begin, Index end) {
     for (Index q = begin + 1; q <= end; ++q) {
@@ -257,23 +298,27 @@ std::optional<JpegTrace> find_jpeg(const Tensor<float>& image) {
   std::array<double, 2> chroma{};
   for (const Index cell : {1, 2})
     for (const int component : {1, 2})
-      chroma[at(cell - 1)] += explained(coefficients(decoded_component(image, component, cell), 0), steps);
+      chroma[at(cell - 1)] += explained(
+          unclipped(coefficients(decoded_component(image, component, cell), 0), image, kSide * cell), steps);
   trace.subsampled = chroma[1] >= chroma[0];
   return trace;
 }
 
+double jpeg_log_likelihood(const Tensor<float>& image, const Tensor<float>& render,
+                           std::span<const double> object, const JpegTrace& trace) {
+  check_fit("jpeg_log_likelihood", image, render, image, object);
+  double sum = 0;
+  for (const int component : {0, 1, 2})
+    sum += ComponentScore(component, trace, image, render, object, kSample).log_likelihood();
+  return sum;
+}
+
 JpegScore jpeg_score(const Tensor<float>& image, const Tensor<float>& render, const Tensor<float>& mark,
                      std::span<const double> object, const JpegTrace& trace) {
-  check_rank("jpeg_score", "image", image.shape, 3, "[H, W, 3]");
-  check_extent("jpeg_score", "image", image.shape, 2, 3, "red, green, blue");
-  if (render.shape != image.shape || mark.shape != image.shape ||
-      static_cast<Index>(object.size()) * 3 != image.size())
-    throw ShapeError("[jpeg_score] render, mark and object must fit the image " + image.shape.str() +
-                     ", got " + render.shape.str() + ", " + mark.shape.str() + " and " +
-                     std::to_string(object.size()) + " pixels");
+  check_fit("jpeg_score", image, render, mark, object);
   JpegScore out{Tensor<float>(image.shape), Tensor<float>(image.shape)};
   for (const int component : {0, 1, 2})
-    ComponentScore(component, trace).add(image, render, mark, object, out);
+    ComponentScore(component, trace, image, render, object, 1).add(mark, out);
   return out;
 }
 

@@ -7,8 +7,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include "blurred.h"
 #include "ordered_sum.h"
@@ -72,61 +74,77 @@ void score_differences(const Tensor<float>& rest, MarkScore& s) {
   }
 }
 
-// JpegScore's information is per block, so all channels of a pixel get the same precision.
-void use_jpeg(JpegScore&& jpeg, const Tensor<float>& mark, MarkScore& s) {
-  s.score = std::move(jpeg.score);
-  for (Index p = 0; p < mark.size() / 3; ++p) {
-    float information = 0, power = 0;
-    for (Index i = 3 * p; i < 3 * p + 3; ++i) {
-      information += jpeg.information[i];
-      power += mark[i] * mark[i];
-    }
-    for (Index i = 3 * p; i < 3 * p + 3; ++i) s.precision[i] = power > 0 ? information / power : 0;
+// Returns the renders that a compressed image may have shown, before a background of this colour: with the
+// blur and the tones that fit best, and without. Quantisation removes detail as blur does, and bends the
+// tones that fit.
+std::vector<Shown> possible(const Tensor<float>& image, const Tensor<float>& base,
+                            const std::vector<double>& object) {
+  std::vector<Shown> all{shown(image, base, object)};
+  const double blur = all[0].blur;
+  if (blur > 0) {
+    all.push_back(shown_with(image, base, object, 0));
+    all.push_back({.render = blurred(base, blur), .rest = {}, .blur = blur});
   }
+  all.push_back({.render = base, .rest = {}});
+  return all;
+}
+
+// Returns the likeliest. A plain background of another colour was changed with the tones, or put there.
+Shown likeliest(const Surround& seen, const CachedView& render, float level,
+                const std::vector<double>& object, const JpegTrace& jpeg) {
+  const Tensor<float>& image = own_image(seen);
+  std::vector<Shown> all = possible(image, render.base, object);
+  if (seen.plain.size() > 0)
+    std::ranges::move(
+        possible(image, before_background(render.base, render.opacity, {level, level, level}, seen.colour),
+                 object),
+        std::back_inserter(all));
+  std::vector<double> likelihood;
+  for (const Shown& s : all) likelihood.push_back(jpeg_log_likelihood(image, s.render, object, jpeg));
+  return std::move(all[at(std::ranges::max_element(likelihood) - likelihood.begin())]);
+}
+
+std::vector<double> pixels_on_object(const CachedView& render, const std::vector<std::uint8_t>& border) {
+  std::vector<double> on_object;
+  for (const float opacity : render.opacity.data) on_object.push_back(opacity > 0.5f ? 1 : 0);
+  for (std::size_t p = 0; p < border.size(); ++p)
+    if (border[p]) on_object[p] = 0;
+  return on_object;
 }
 
 // Computes the score, and adapts the carriers to the image's colours.
-MarkScore score_of(const Tensor<float>& image, const CachedView& view, Carriers& carriers,
-                   const std::vector<std::uint8_t>& border, const std::optional<JpegTrace>& jpeg) {
-  MarkScore s{.score = Tensor<float>(image.shape), .precision = Tensor<float>(image.shape), .on_object = {}};
-  for (const float opacity : view.opacity.data) s.on_object.push_back(opacity > 0.5f ? 1 : 0);
-  for (std::size_t p = 0; p < border.size(); ++p)
-    if (border[p]) s.on_object[p] = 0;
-  const Shown seen = shown(image, view.base, s.on_object);
-  s.blur = seen.blur;
-  change_colours(carriers, view.base, seen.tones);
-  const Tensor<float>& mark = carriers.whole;
-  if (!jpeg) {
-    score_differences(seen.rest, s);
+MarkScore score_of(const EvidenceView& view, const CachedView& render, const nerf::RadianceField& field,
+                   Carriers& carriers) {
+  const Surround& seen = view.seen;
+  const float level = nerf::background_value(field.background);
+  const Tensor<float> image = seen.plain.size() > 0 ? before_background(seen.plain, render.opacity,
+                                                                        seen.colour, {level, level, level})
+                                                    : seen.image;
+  const auto border = seen.covered.empty() ? border_of(field, image) : seen.covered;
+  MarkScore s{.score = Tensor<float>(image.shape),
+              .precision = Tensor<float>(image.shape),
+              .on_object = pixels_on_object(render, border)};
+  const Shown best = view.jpeg ? likeliest(seen, render, level, s.on_object, *view.jpeg)
+                               : shown(image, render.base, s.on_object);
+  s.blur = best.blur;
+  change_colours(carriers, render.base, best.tones);
+  if (!view.jpeg) {
+    score_differences(best.rest, s);
     return s;
   }
-  const Tensor<float> soft = blurred(mark, seen.blur);
-  JpegScore score = jpeg_score(image, seen.render, soft, s.on_object, *jpeg);
-  if (seen.blur > 0) {  // quantisation removes detail as blur does
-    JpegScore sharp =
-        jpeg_score(image, shown_with(image, view.base, s.on_object, 0).render, mark, s.on_object, *jpeg);
-    if (sharp.log_likelihood > score.log_likelihood) {
-      s.blur = 0;
-      use_jpeg(std::move(sharp), mark, s);
-      return s;
-    }
-  }
-  use_jpeg(std::move(score), soft, s);
+  JpegScore score =
+      jpeg_score(own_image(seen), best.render, blurred(carriers.whole, best.blur), s.on_object, *view.jpeg);
+  s.score = std::move(score.score);
+  s.precision = std::move(score.precision);
   return s;
 }
 
 }  // namespace
 
 ResidualSigns residual_signs(nerf::Renderer& renderer, const Owner& owner, const EvidenceView& image) {
-  const Surround& seen = image.seen;
-  const CachedView view = cache_view(renderer, owner.field, image.camera, kSamples);
-  Carriers mark = carriers(owner, view);
-  const Tensor<float> shown = seen.plain.size() > 0
-                                  ? before_background(seen.plain, view.opacity, seen.colour,
-                                                      nerf::background_value(owner.field.background))
-                                  : seen.image;
-  const auto border = seen.covered.empty() ? border_of(owner.field, shown) : seen.covered;
-  const MarkScore score = score_of(shown, view, mark, border, image.jpeg);
+  const CachedView render = cache_view(renderer, owner.field, image.camera, kSamples);
+  Carriers mark = carriers(owner, render);
+  const MarkScore score = score_of(image, render, owner.field, mark);
   return {.sign = fit_signs(mark, score, owner.cells.count()).sign,
           .lost_detail = image.jpeg || image.zoom * score.blur >= kStrongBlur || image.small};
 }

@@ -17,8 +17,7 @@ struct ResidualSigns {
 ///   - The blur of the render that leaves the smallest residual is kept; gain, offset and gamma of each
 ///     channel are fitted.
 ///   - With the residual R and its mean power V around each pixel, R / V is the score and 1 / V the
-///   precision.
-///     For a JPEG image both come from the quantised coefficients.
+///     precision. For a JPEG image both come from the quantised coefficients.
 ///   - Covered pixels do not count.
 /// @param renderer  of the owner's field   @throws ShapeError if the sizes of image and camera differ
 ResidualSigns residual_signs(nerf::Renderer& renderer, const Owner& owner, const EvidenceView& image);

@@ -17,6 +17,8 @@ constexpr double kMostOfEdge = 0.5;     // share of the edge pixels that a backg
 constexpr double kLeastOfImage = 0.03;  // share of all pixels that a background has at least
 constexpr double kLeastCover = 0.02, kMostCover = 0.4;  // share of the rows that a bar covers
 constexpr Index kLeastSide = 16;                        // least side that bars leave, pixels
+constexpr Index kBothBlocks =
+    16;  // pixels after which the blocks of luma and of halved chroma begin together
 
 bool alike(const float* pixel, const Colour& colour, float tolerance) {
   for (std::size_t a = 0; a < 3; ++a)
@@ -179,7 +181,11 @@ Surround clear_surround(const Tensor<float>& image, float background, bool objec
   check_rank("clear_surround", "image", image.shape, 3, "[H, W, 3]");
   check_extent("clear_surround", "image", image.shape, 2, 3, "red, green, blue");
   const Colour own{background, background, background};
-  const Bars bars = find_bars(image, own);
+  Bars bars = find_bars(image, own);
+  // Bars around an object are background. Rests of them stay, so that the blocks of a compressed image begin
+  // where they did.
+  if (object && bars.all_around)
+    for (Index* first : {&bars.inside.left, &bars.inside.top}) *first -= *first % kBothBlocks;
   Surround out{
       .image = cut(image, bars.inside), .plain = {}, .left = bars.inside.left, .top = bars.inside.top};
   if (!object) return out;
@@ -188,15 +194,17 @@ Surround clear_surround(const Tensor<float>& image, float background, bool objec
   return out;
 }
 
-Tensor<float> before_background(const Tensor<float>& plain, const Tensor<float>& opacity,
-                                const std::array<float, 3>& colour, float background) {
-  check_rank("before_background", "plain", plain.shape, 3, "[H, W, 3]");
-  if (opacity.size() * 3 != plain.size())
+Tensor<float> before_background(const Tensor<float>& image, const Tensor<float>& opacity,
+                                const std::array<float, 3>& from, const std::array<float, 3>& to) {
+  check_rank("before_background", "image", image.shape, 3, "[H, W, 3]");
+  if (opacity.size() * 3 != image.size())
     throw ShapeError("[before_background] opacity must have a number for each of " +
-                     std::to_string(plain.size() / 3) + " pixels, got " + std::to_string(opacity.size()));
-  Tensor<float> out = plain;
-  for (Index i = 0; i < out.size(); ++i)
-    out[i] += (1 - opacity[i / 3]) * (background - colour[static_cast<std::size_t>(i % 3)]);
+                     std::to_string(image.size() / 3) + " pixels, got " + std::to_string(opacity.size()));
+  Tensor<float> out = image;
+  for (Index i = 0; i < out.size(); ++i) {
+    const auto c = static_cast<std::size_t>(i % 3);
+    out[i] += (1 - opacity[i / 3]) * (to[c] - from[c]);
+  }
   return out;
 }
 

@@ -18,6 +18,11 @@ struct Surround {
   std::vector<std::uint8_t> covered{};
 };
 
+/// Returns the image without bars, before the background with which it came.
+inline const Tensor<float>& own_image(const Surround& seen) {
+  return seen.plain.size() > 0 ? seen.plain : seen.image;
+}
+
 /// Removes the surround. Rows or columns of one colour at opposite edges are bars and are cut off, unless
 /// they have the field's background colour. In the rest of an object's image, the background is the colour of
 /// most pixels at the edges (within 0.03 in every channel), or of bars on all four sides. Pixels connected to
@@ -27,11 +32,12 @@ struct Surround {
 /// @param object  true if the field shows an object before a plain background
 Surround clear_surround(const Tensor<float>& image, float background, bool object);
 
-/// Puts the image before the field's background, by the opacity of a render of the same view: exact at edges,
-/// too.
-///   y = x + (1 - opacity) (background - colour)
-/// @param plain  [H, W, 3]   @param opacity  [H, W]   @throws ShapeError if these do not fit
-Tensor<float> before_background(const Tensor<float>& plain, const Tensor<float>& opacity,
-                                const std::array<float, 3>& colour, float background);
+/// Puts an image before another plain background, by the opacity of a render of the same view: exact at
+/// edges, too.
+///   y = x + (1 - opacity) (to - from)
+/// @param image  [H, W, 3]   @param opacity  [H, W]   @param from, to  colours of the two backgrounds
+/// @throws ShapeError if these do not fit
+Tensor<float> before_background(const Tensor<float>& image, const Tensor<float>& opacity,
+                                const std::array<float, 3>& from, const std::array<float, 3>& to);
 
 }  // namespace fieldmark::watermark

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <queue>
+#include <utility>
 
 namespace fieldmark::watermark {
 namespace {
@@ -83,7 +84,7 @@ std::vector<double> PageReading::evidence() const {
     const std::vector<double>& evidence = part.reading.evidence();
     for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += evidence[c];
   }
-  return sum;
+  return scaled_to(whole.blind, std::move(sum));
 }
 
 double PageReading::agreement() const {
@@ -105,8 +106,7 @@ PageReading PageReader::read(const Tensor<float>& image, bool informed_too) {
   if (page.whole.chosen == ReadingKind::informed) return page;
   const Tensor<float> rgb = opaque_image(image, nerf::background_value(owner_.field.background));
   page.parts = read_blocks(rgb);
-  if (page.parts.empty() && owner_.field.space.kind == nerf::SpaceKind::cube)
-    page.parts = read_object(rgb, page.whole.blind);
+  if (page.parts.empty() && owner_.field.space.kind == nerf::SpaceKind::cube) page.parts = read_object(rgb);
   return page;
 }
 
@@ -139,8 +139,7 @@ std::vector<PartReading> PageReader::read_blocks(const Tensor<float>& rgb) {
   return parts;
 }
 
-std::vector<PartReading> PageReader::read_object(const Tensor<float>& whole,
-                                                 const std::vector<double>& blind) {
+std::vector<PartReading> PageReader::read_object(const Tensor<float>& whole) {
   if (!objects_) objects_.emplace(owner_, object_options_);
   const Index h = whole.shape[0], w = whole.shape[1];
   const double zoom = std::min(1., static_cast<double>(kLargest) / static_cast<double>(std::max(h, w)));
@@ -165,7 +164,6 @@ std::vector<PartReading> PageReader::read_object(const Tensor<float>& whole,
     whole_found = place.whole;
     large_found = large;
     most = found.informed.agreement;
-    found.informed.evidence = scaled_to(blind, std::move(found.informed.evidence));
     best = {{{back(box.x), back(box.y), back(box.width), back(box.height)}, std::move(found)}};
     if (large && most >= kSureInside) break;
   }

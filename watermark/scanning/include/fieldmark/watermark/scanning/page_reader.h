@@ -12,8 +12,7 @@ namespace fieldmark::watermark {
 struct PartReading {
   PixelBox box{};  ///< of the part in the image; that of an object may reach beyond it
   /// Of the part alone, by informed detection. Its camera is of the part as it was read: with a margin, and
-  /// for an object reduced with the image to a longer side of at most 512 pixels. Informed evidence of an
-  /// object has the power of the whole image's blind evidence.
+  /// for an object reduced with the image to a longer side of at most 512 pixels.
   ImageReading reading;
 };
 
@@ -23,9 +22,9 @@ struct PageReading {
   static constexpr double kBlindWeight = 0.25;
   ImageReading whole;                   ///< of the whole image
   std::vector<PartReading> parts = {};  ///< that agree with the field; empty if the whole image does
-  /// Evidence of the detection chosen, [cells]: of the whole image, or the sum over all parts. Blind evidence
-  /// counts a quarter, so that images in which nothing was found hardly dilute those added to them in which
-  /// something was.
+  /// Evidence of the detection chosen, [cells]: of the whole image, or the sum over all parts with the power
+  /// of the whole image's blind evidence. With that of their few pixels, parts would count less than an image
+  /// in which nothing was found. Blind evidence counts a quarter, so that such images hardly dilute others.
   std::vector<double> evidence() const;
   /// Informed if the image or a part of it agrees with the field.
   ReadingKind chosen() const { return parts.empty() ? whole.chosen : ReadingKind::informed; }
@@ -46,8 +45,7 @@ struct PageReading {
 ///   - for an object, the places where the image looks most like a render or a quarter of one (see
 ///     ObjectSearch). There, InformedReader::read_near() looks at the pixels inside the outline alone, and
 ///     the object counts as found at an agreement of 0.9. Parts of 48 to 59 pixels need 0.95, and give way
-///     to a larger one. The evidence gets the power of the whole image's blind evidence: with that of so few
-///     pixels, it would count less than an image in which nothing was found.
+///     to a larger one.
 /// The choice depends on agreement alone and on neither key nor message, so the evidence may be tested
 /// against any.
 class PageReader {
@@ -69,7 +67,7 @@ class PageReader {
 
  private:
   std::vector<PartReading> read_blocks(const Tensor<float>& rgb);
-  std::vector<PartReading> read_object(const Tensor<float>& whole, const std::vector<double>& blind);
+  std::vector<PartReading> read_object(const Tensor<float>& whole);
 
   const Owner& owner_;
   InformedReader reader_;
