@@ -39,7 +39,8 @@ Json measurement_json(const watermark::Measurement& m, const std::string& camera
           {"psnr_gt_foreground", nullptr},
           {"distorted", distorted},
           {"informed_views", m.informed_views},
-          {"informed_seconds", number(m.informed_seconds)}};
+          {"informed_seconds", number(m.informed_seconds)},
+          {"blind_seconds", number(m.blind_seconds)}};
 }
 
 Json measurement_row(const watermark::Measurement& m, const std::string& cameras) {
@@ -64,8 +65,8 @@ void print_measurement(std::ostream& out, const watermark::Measurement& m, const
   print("against unmarked     %.2f dB, foreground %.2f dB, ssim %.4f\n", m.psnr_base, m.psnr_base_foreground,
         m.ssim_base);
   if (std::isfinite(m.lpips_base)) print("                     lpips %.4f\n", m.lpips_base);
-  print("bit accuracy, blind  %.2f%% per view, 5th percentile %.2f%%\n", 100 * m.accuracy.blind,
-        100 * m.accuracy_p5);
+  print("bit accuracy, blind  %.2f%% per view, 5th percentile %.2f%%, %.3f s per view\n",
+        100 * m.accuracy.blind, 100 * m.accuracy_p5, m.blind_seconds);
   if (m.informed_views > 0)
     print("informed             %.2f%%, chosen %.2f%%, of %lld views, %.1f s per view\n",
           100 * m.accuracy.informed, 100 * m.accuracy.chosen, static_cast<long long>(m.informed_views),

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "blurred.h"
 #include "support/catch.h"
@@ -131,10 +132,52 @@ TEST_CASE("find_jpeg: blocks in which the decoder clipped do not hide the rest")
   }
 }
 
+TEST_CASE("jpeg_score: an image of which edges were cut off is read from its first whole block on") {
+  const Tensor<float> base = view_image(0.03f, 5), mark = pattern(0.01f);
+  const Tensor<float> seen = jpeg_round_trip(sum(base, mark, 1), 30);
+  constexpr Index kLeft = 21, kTop = 5;
+  const auto cut = [&](const Tensor<float>& x) {
+    Tensor<float> out({kHeight - kTop, kWidth - kLeft, 3});
+    for (Index y = 0; y < kHeight - kTop; ++y)
+      std::copy_n(&x[3 * ((y + kTop) * kWidth + kLeft)], 3 * (kWidth - kLeft),
+                  &out[3 * y * (kWidth - kLeft)]);
+    return out;
+  };
+  CHECK_FALSE(find_jpeg(cut(seen)));
+  const auto trace = find_jpeg(cut(seen), kLeft, kTop);
+  REQUIRE(trace.has_value());
+  CHECK(trace->quality == 30);
+  CHECK(trace->left == 11);
+  CHECK(trace->top == 11);
+  const std::vector<double> object(static_cast<std::size_t>((kHeight - kTop) * (kWidth - kLeft)), 1.0);
+  const JpegScore whole = jpeg_score(seen, base, mark, kEverywhere, *find_jpeg(seen));
+  const JpegScore part = jpeg_score(cut(seen), cut(base), cut(mark), object, *trace);
+  double both = 0, of_part = 0, of_whole = 0, outside = 0;
+  for (Index y = 0; y < kHeight - kTop; ++y)
+    for (Index x = 0; x < kWidth - kLeft; ++x)
+      for (Index c = 0; c < 3; ++c) {
+        const auto a = static_cast<double>(part.score[3 * (y * (kWidth - kLeft) + x) + c]),
+                   b = static_cast<double>(whole.score[3 * ((y + kTop) * kWidth + x + kLeft) + c]);
+        if (y < 11 || x < 11) outside += std::abs(a);
+        if (y < 11 || x < 11) continue;
+        both += a * b, of_part += a * a, of_whole += b * b;
+      }
+  CHECK(outside == 0);
+  CHECK(both > 0.95 * std::sqrt(of_part * of_whole));  // deviations are fitted to other blocks
+  CHECK_FALSE(find_jpeg(Tensor<float>({8, 8, 3}), 1, 1));
+  CHECK_THROWS_WITH(find_jpeg(seen, -1, 0), "[find_jpeg] left and top must be at least 0, got -1 and 0");
+}
+
 TEST_CASE("jpeg_log_likelihood: the render that was compressed is likelier than one in other tones or blur") {
   const Tensor<float> base = view_image(0.03f, 6), seen = jpeg_round_trip(base, 10);
   const JpegTrace trace{.quality = 10, .subsampled = true};
   const double truth = jpeg_log_likelihood(seen, base, kEverywhere, trace);
+  // An object of few blocks is judged by all of them.
+  std::vector<double> few(kEverywhere.size(), 0);
+  for (std::size_t p = 0; p < few.size(); ++p)
+    if (p % kWidth < 16) few[p] = 1;
+  CHECK(jpeg_log_likelihood(seen, base, few, trace) >
+        jpeg_log_likelihood(seen, blurred(base, 0.8), few, trace));
   CHECK(std::isfinite(truth));
   CHECK(truth < 0);
   Tensor<float> toned = base;
@@ -149,7 +192,9 @@ TEST_CASE("jpeg_score: the precision is of the noise, whatever the mark's power"
   const JpegTrace trace{.quality = 40, .subsampled = true};
   Tensor<float> twice = mark, uneven = mark;
   for (float& x : twice.data) x *= 2;
-  for (Index i = 0; i < mark.size(); i += 7) uneven[i] = 0;  // places without a mark have no better sight
+  // Pixels that hardly change are seen no better than those around them.
+  for (Index p = 0; p < mark.size() / 3; p += 7)
+    for (Index i = 3 * p; i < 3 * p + 3; ++i) uneven[i] *= 1e-3f;
   const JpegScore once = jpeg_score(seen, base, mark, kEverywhere, trace);
   CHECK(jpeg_score(seen, base, twice, kEverywhere, trace).precision.data == once.precision.data);
   CHECK(information_of(once, mark) > 0);
@@ -190,12 +235,18 @@ TEST_CASE("jpeg_score: says nothing off the object, and the same for one and two
   for (std::size_t p = 0; p < object.size(); ++p)
     if (p % kWidth < 64) object[p] = 1;
   const JpegTrace trace{.quality = 40, .subsampled = true};
-  Tensor<float> scores[2];
+  Tensor<float> scores[2], precisions[2];
+  double likelihoods[2];
   for (const int n : {1, 2}) {
     const ScopedThreads scope(n);
-    scores[n - 1] = jpeg_score(seen, base, mark, object, trace).score;
+    JpegScore s = jpeg_score(seen, base, mark, object, trace);
+    scores[n - 1] = std::move(s.score);
+    precisions[n - 1] = std::move(s.precision);
+    likelihoods[n - 1] = jpeg_log_likelihood(seen, base, object, trace);
   }
   CHECK(scores[0].data == scores[1].data);
+  CHECK(precisions[0].data == precisions[1].data);
+  CHECK(likelihoods[0] == likelihoods[1]);
   double left = 0, right = 0;
   for (Index i = 0; i < seen.size(); ++i)
     (i / 3 % kWidth < 64 ? left : right) += static_cast<double>(std::abs(scores[0][i]));
@@ -207,13 +258,15 @@ TEST_CASE("jpeg_score: errors name what is wrong") {
   const Tensor<float> x({16, 16, 3}), other({16, 8, 3});
   const std::vector<double> object(256, 1.0);
   CHECK_THROWS_AS(find_jpeg(Tensor<float>({16, 16})), ShapeError);
-  CHECK_THROWS_WITH(jpeg_score(x, other, x, object, {50, true}),
-                    "[jpeg_score] render, mark and object must fit the image [16, 16, 3], got [16, 8, 3], "
-                    "[16, 16, 3] and 256 pixels");
-  CHECK_THROWS_AS(jpeg_score(x, x, x, object, {0, true}), ValueError);
   CHECK_THROWS_WITH(
-      jpeg_log_likelihood(x, other, object, {50, true}),
-      "[jpeg_log_likelihood] render, mark and object must fit the image [16, 16, 3], got [16, 8, 3], "
-      "[16, 16, 3] and 256 pixels");
+      jpeg_score(x, other, x, object, {50, true}),
+      "[jpeg_score] render and object must fit the image [16, 16, 3], got [16, 8, 3] and 256 pixels");
+  CHECK_THROWS_WITH(
+      jpeg_score(x, x, other, object, {50, true}),
+      "[jpeg_score] mark and object must fit the image [16, 16, 3], got [16, 8, 3] and 256 pixels");
+  CHECK_THROWS_AS(jpeg_score(x, x, x, object, {0, true}), ValueError);
+  CHECK_THROWS_WITH(jpeg_log_likelihood(x, other, object, {50, true}),
+                    "[jpeg_log_likelihood] render and object must fit the image [16, 16, 3], got [16, 8, 3] "
+                    "and 256 pixels");
   CHECK_THROWS_AS(jpeg_log_likelihood(x, x, object, {101, true}), ValueError);
 }

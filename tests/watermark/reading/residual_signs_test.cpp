@@ -101,7 +101,8 @@ TEST_CASE("residual_signs: after strong JPEG, the likeliest tones and background
     inside.width = seen.image.shape[1];
     return share_of(owner, signs_of(owner, seen, inside).sign);
   };
-  CHECK(share_after("jpeg_10") > 0.4);
+  CHECK(share_after("jpeg_10") > 0.4);  // measured 0.50, 0.66, 0.68 and 0.46
   CHECK(share_after("background_black,jpeg_30") > 0.55);
   CHECK(share_after("brightness_0.5,jpeg_50") > 0.55);
+  CHECK(share_after("caption,jpeg_50") > 0.35);
 }

@@ -50,6 +50,10 @@ double p_of(const Owner& owner, const std::vector<double>& evidence) {
   return keyed_p_value(keyed_statistic(evidence, owner.code(), kPageMessage));
 }
 
+double power_of(const std::vector<double>& evidence) {
+  return std::inner_product(evidence.begin(), evidence.end(), evidence.begin(), 0.0);
+}
+
 }  // namespace
 
 TEST_CASE("page_reader: an image that agrees as a whole is read as by the informed reader") {
@@ -96,9 +100,12 @@ TEST_CASE("page_reader: the views of a collage are added up") {
   REQUIRE(page.whole.chosen == ReadingKind::blind);
   REQUIRE(page.parts.size() == 3);
   std::vector<double> sum(owner.code().bit.size());
-  for (const PartReading& part : page.parts)
-    for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += part.reading.evidence()[c];
-  CHECK(page.evidence() == scaled_to(page.whole.blind, sum));
+  for (const PartReading& part : page.parts) {
+    const std::vector<double> evidence = scaled_to(page.whole.blind, part.reading.evidence());
+    CHECK(power_of(evidence) == Approx(power_of(page.whole.blind)));  // each counts as much as an image
+    for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += evidence[c];
+  }
+  CHECK(page.evidence() == sum);
   CHECK(p_of(owner, sum) < 1e-6);
 }
 
@@ -163,10 +170,6 @@ Tensor<float> noisy(Tensor<float> image, float sigma) {
   const CounterRng rng(1, 1);
   for (Index i = 0; i < image.size(); ++i) image[i] += sigma * rng.normal2(static_cast<std::uint64_t>(i))[0];
   return quantize8(image);
-}
-
-double power_of(const std::vector<double>& evidence) {
-  return std::inner_product(evidence.begin(), evidence.end(), evidence.begin(), 0.0);
 }
 
 }  // namespace

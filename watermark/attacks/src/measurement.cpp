@@ -85,7 +85,8 @@ Measurement measure(const Owner& owner, const nerf::RadianceField* baked, const 
                 .lpips_base = finite_mean(perceptual),
                 .under = {},
                 .informed_views = readers.informed() ? std::min(options.informed_views, total) : 0,
-                .informed_seconds = readers.seconds()};
+                .informed_seconds = readers.seconds(),
+                .blind_seconds = readers.blind_seconds()};
   for (std::size_t a = 0; a < attacks.size(); ++a) m.under[options.under[a]] = under[a].mean();
   return m;
 }

@@ -24,7 +24,7 @@ class Readers {
   ReadingAccuracy read(const Tensor<float>& image, const Message& sent, bool with_informed, F tell) {
     ReadingAccuracy accuracy;
     if (!with_informed || !informed_) {
-      auto evidence = blind_.evidence(image);
+      auto evidence = timed(blind_seconds_, [&] { return blind_.evidence(image); });
       if (informed_)
         for (double& s : evidence) s *= PageReading::kBlindWeight;
       tell(evidence);
@@ -32,9 +32,10 @@ class Readers {
       if (!informed_) accuracy.found = found(evidence, sent);
       return accuracy;
     }
-    const auto begin = std::chrono::steady_clock::now();
-    const PageReading page = informed_->read(image, true);
-    seconds_.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    // Informed detection reads blindly too; a few images more tell how long that takes alone.
+    if (std::ssize(blind_seconds_) < kTimedBlind)
+      timed(blind_seconds_, [&] { return blind_.evidence(image); });
+    const PageReading page = timed(seconds_, [&] { return informed_->read(image, true); });
     const std::vector<double> evidence = page.evidence();
     tell(evidence);
     accuracy.blind = share(page.whole.blind, sent);
@@ -45,8 +46,19 @@ class Readers {
   }
   // Mean time of reading one image with both detectors; NaN without images.
   double seconds() const { return finite_mean(seconds_); }
+  // The same with blind detection.
+  double blind_seconds() const { return finite_mean(blind_seconds_); }
 
  private:
+  static constexpr Index kTimedBlind = 20;  // images
+
+  template <class F>
+  static auto timed(std::vector<double>& seconds, F read) {
+    const auto begin = std::chrono::steady_clock::now();
+    auto result = read();
+    seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    return result;
+  }
   double share(const std::vector<double>& evidence, const Message& sent) const {
     if (evidence.empty()) return 0.5;
     return match_bits(read_bits(evidence, code_, owner_.options().bits), sent).accuracy();
@@ -58,7 +70,7 @@ class Readers {
   const CellCode& code_;
   BlindReader blind_;
   std::optional<PageReader> informed_;
-  std::vector<double> seconds_;
+  std::vector<double> seconds_, blind_seconds_;
 };
 
 // Accuracies of the views so far.

@@ -33,7 +33,7 @@ EvidenceView evidence_view(const Surround& seen, const nerf::Camera& camera, dou
   const nerf::Camera largest = camera.scaled(std::min(kLargest, std::max(h, w)));
   EvidenceView view{.seen = {}, .camera = largest, .small = is_small(largest, trained)};
   // The coefficients of a JPEG image belong to its own background and size.
-  if (largest.width == w && largest.height == h) view.jpeg = find_jpeg(own_image(seen));
+  if (largest.width == w && largest.height == h) view.jpeg = find_jpeg(own_image(seen), seen.left, seen.top);
   if (!view.jpeg) view.camera = camera.scaled(enough(largest, shown));
   view.zoom = static_cast<double>(largest.width) / static_cast<double>(view.camera.width);
   const auto at_size = [&](const Tensor<float>& x) {

@@ -23,13 +23,14 @@ constexpr double kOutlierWay = 512;           // ... and their range in levels
 constexpr double kNoDensity = 9;              // standard deviations: beyond, the density counts as 0
 constexpr double kLeastGain = 50;             // least log-likelihood ratio of a table
 constexpr std::size_t kSieve = 16;            // blocks of which one sieves the tables ...
-constexpr std::size_t kSample = 7;            // blocks of which one tells renders apart
 constexpr double kHopeless = -20;             // ... with this log-likelihood ratio
 constexpr double kFirst = 0.3, kRatio = 1.5;  // standard deviations tried, levels
 constexpr int kDeviations = 13;
 constexpr std::array kFactors{0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0};
-constexpr Index kSide = 8;                  // pixels of a block
+constexpr Index kBothSides = 16;  // pixels after which blocks of luma and of halved chroma begin together
+constexpr Index kSide = 8;        // pixels of a block
 constexpr Index kRows = 32, kBlocks = 128;  // of pixels and of coefficients in one piece of work
+constexpr Index kSample = 7, kFew = 16;     // blocks of which one tells renders apart, if that leaves so many
 constexpr double kOnObject = 32;            // least foreground pixels for a block to count in its band
 
 // One component of an image, in levels; chroma may have half the size.
@@ -149,24 +150,56 @@ Likelihood likelihood(double n, double step, double b, double deviation) {
   return {std::log(total), (1 - kOutlier) * bells / (std::sqrt(2 * std::numbers::pi) * deviation * total)};
 }
 
+// Returns the rows and columns from the first whole block on.
+Tensor<float> from_first_block(const Tensor<float>& x, const JpegTrace& trace) {
+  if (trace.left == 0 && trace.top == 0) return x;
+  const Index h = std::max<Index>(0, x.shape[0] - trace.top), w = std::max<Index>(0, x.shape[1] - trace.left);
+  Tensor<float> out({h, w, 3});
+  for (Index y = 0; y < h; ++y)
+    std::copy_n(x.data.begin() + 3 * ((y + trace.top) * x.shape[1] + trace.left), 3 * w,
+                out.data.begin() + 3 * y * w);
+  return out;
+}
+
+// Undoes from_first_block(), with 0 elsewhere.
+Tensor<float> back_in_place(const Tensor<float>& x, const Shape& shape, const JpegTrace& trace) {
+  Tensor<float> out(shape);
+  const Index w = x.shape[1];
+  for (Index y = 0; y < x.shape[0]; ++y)
+    std::copy_n(x.data.begin() + 3 * y * w, 3 * w,
+                out.data.begin() + 3 * ((y + trace.top) * shape[1] + trace.left));
+  return out;
+}
+
+// Image, render and foreground from the first whole block on.
+struct FromFirstBlock {
+  FromFirstBlock(const Tensor<float>& whole, const Tensor<float>& whole_render,
+                 std::span<const double> whole_object, const JpegTrace& trace)
+      : image(from_first_block(whole, trace)), render(from_first_block(whole_render, trace)) {
+    for (Index y = trace.top; y < whole.shape[0]; ++y)
+      for (Index x = trace.left; x < whole.shape[1]; ++x)
+        object.push_back(whole_object[at(y * whole.shape[1] + x)]);
+  }
+  Tensor<float> image, render;
+  std::vector<double> object{};
+};
+
 // One component of image, render and mark as coefficients, with their standard deviations.
 class ComponentScore {
  public:
-  // Counts every `stride`-th block.
-  ComponentScore(int component, const JpegTrace& trace, const Tensor<float>& image,
-                 const Tensor<float>& render, std::span<const double> object, std::size_t stride)
+  // Counts the blocks on the foreground, or a sample of them.
+  ComponentScore(int component, const JpegTrace& trace, const FromFirstBlock& from, bool sample)
       : component_(component),
         cell_(component > 0 && trace.subsampled ? 2 : 1),
         steps_(
             distort::jpeg_steps(component > 0 ? JpegComponent::chroma : JpegComponent::luma, trace.quality)) {
     const double middle = component_ == 0 ? 128 : 0;
-    const Plane seen = decoded_component(image, component_, cell_);
+    const Plane seen = decoded_component(from.image, component_, cell_);
     width_ = seen.width;
     image_ = coefficients(seen, middle);
-    render_ = coefficients(component_of(render, component_, cell_), middle);
-    count_object(object, image.shape[1], image.shape[0]);
-    for (std::size_t b = 0; b < on_object_.size(); ++b)
-      if (b % stride != 0) on_object_[b] = 0;
+    render_ = coefficients(component_of(from.render, component_, cell_), middle);
+    count_object(from.object, from.image.shape[1], from.image.shape[0]);
+    if (sample) keep_sample();
     fit_deviations();
   }
 
@@ -221,6 +254,14 @@ class ComponentScore {
             object[at(y * w + x)] / static_cast<double>(cell_ * cell_);
   }
 
+  void keep_sample() {
+    const auto much = [](double pixels) { return pixels >= kOnObject; };
+    if (std::ranges::count_if(on_object_, much) < kSample * kFew) return;
+    Index seen = 0;
+    for (double& pixels : on_object_)
+      if (!much(pixels) || seen++ % kSample != 0) pixels = 0;
+  }
+
   Likelihood of(std::size_t block, std::size_t k, double deviation) const {
     return likelihood(std::round(image_[block][k] / steps_[k]), steps_[k], render_[block][k], deviation);
   }
@@ -265,21 +306,27 @@ class ComponentScore {
   JpegBlock deviation_{};
 };
 
-void check_fit(const char* op, const Tensor<float>& image, const Tensor<float>& render,
-               const Tensor<float>& mark, std::span<const double> object) {
+void check_fit(const char* op, const char* what, const Tensor<float>& image, const Tensor<float>& fits,
+               std::span<const double> object) {
   check_rank(op, "image", image.shape, 3, "[H, W, 3]");
   check_extent(op, "image", image.shape, 2, 3, "red, green, blue");
-  if (render.shape != image.shape || mark.shape != image.shape || 3 * std::ssize(object) != image.size())
-    throw ShapeError("[" + std::string(op) + "] render, mark and object must fit the image " +
-                     image.shape.str() + ", got " + render.shape.str() + ", " + mark.shape.str() + " and " +
+  if (fits.shape != image.shape || 3 * std::ssize(object) != image.size())
+    throw ShapeError("[" + std::string(op) + "] " + what + " and object must fit the image " +
+                     image.shape.str() + ", got " + fits.shape.str() + " and " +
                      std::to_string(object.size()) + " pixels");
 }
 
 }  // namespace
 
-std::optional<JpegTrace> find_jpeg(const Tensor<float>& image) {
-  check_rank("find_jpeg", "image", image.shape, 3, "[H, W, 3]");
-  check_extent("find_jpeg", "image", image.shape, 2, 3, "red, green, blue");
+std::optional<JpegTrace> find_jpeg(const Tensor<float>& whole, Index left, Index top) {
+  check_rank("find_jpeg", "image", whole.shape, 3, "[H, W, 3]");
+  check_extent("find_jpeg", "image", whole.shape, 2, 3, "red, green, blue");
+  if (left < 0 || top < 0)
+    throw ValueError("[find_jpeg] left and top must be at least 0, got " + std::to_string(left) + " and " +
+                     std::to_string(top));
+  const auto next = [](Index cut) { return (kBothSides - cut % kBothSides) % kBothSides; };
+  JpegTrace trace{.left = next(left), .top = next(top)};
+  const Tensor<float> image = from_first_block(whole, trace);
   if (image.size() == 0) return std::nullopt;
   const auto luma = unclipped(coefficients(component_of(image, 0, 1), 128), image, kSide);
   std::array<double, 101> gain{};
@@ -293,7 +340,7 @@ std::optional<JpegTrace> find_jpeg(const Tensor<float>& image) {
   });
   const auto best = std::max_element(gain.begin() + 1, gain.end());
   if (*best < kLeastGain) return std::nullopt;
-  JpegTrace trace{.quality = static_cast<int>(best - gain.begin())};
+  trace.quality = static_cast<int>(best - gain.begin());
   const JpegBlock steps = distort::jpeg_steps(JpegComponent::chroma, trace.quality);
   std::array<double, 2> chroma{};
   for (const Index cell : {1, 2})
@@ -306,20 +353,23 @@ std::optional<JpegTrace> find_jpeg(const Tensor<float>& image) {
 
 double jpeg_log_likelihood(const Tensor<float>& image, const Tensor<float>& render,
                            std::span<const double> object, const JpegTrace& trace) {
-  check_fit("jpeg_log_likelihood", image, render, image, object);
+  check_fit("jpeg_log_likelihood", "render", image, render, object);
+  const FromFirstBlock from(image, render, object, trace);
   double sum = 0;
-  for (const int component : {0, 1, 2})
-    sum += ComponentScore(component, trace, image, render, object, kSample).log_likelihood();
+  for (const int component : {0, 1, 2}) sum += ComponentScore(component, trace, from, true).log_likelihood();
   return sum;
 }
 
 JpegScore jpeg_score(const Tensor<float>& image, const Tensor<float>& render, const Tensor<float>& mark,
                      std::span<const double> object, const JpegTrace& trace) {
-  check_fit("jpeg_score", image, render, mark, object);
-  JpegScore out{Tensor<float>(image.shape), Tensor<float>(image.shape)};
-  for (const int component : {0, 1, 2})
-    ComponentScore(component, trace, image, render, object, 1).add(mark, out);
-  return out;
+  check_fit("jpeg_score", "render", image, render, object);
+  check_fit("jpeg_score", "mark", image, mark, object);
+  const FromFirstBlock from(image, render, object, trace);
+  const Tensor<float> part = from_first_block(mark, trace);
+  JpegScore of_part{Tensor<float>(part.shape), Tensor<float>(part.shape)};
+  for (const int component : {0, 1, 2}) ComponentScore(component, trace, from, false).add(part, of_part);
+  return {back_in_place(of_part.score, image.shape, trace),
+          back_in_place(of_part.precision, image.shape, trace)};
 }
 
 }  // namespace fieldmark::watermark

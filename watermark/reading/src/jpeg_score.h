@@ -10,15 +10,19 @@ namespace fieldmark::watermark {
 struct JpegTrace {
   int quality = 0;          ///< of libjpeg's scale, 1 to 100
   bool subsampled = false;  ///< chroma at half size (4:2:0)
+  Index left = 0, top = 0;  ///< pixels before the first whole block, if bars were cut off
 };
 
 /// Detects JPEG compression: under the correct quantisation table, the coefficients of 8 x 8 blocks are
 /// multiples of the steps (Fan and de Queiroz 2003). Blocks with a value of 0 or 1 do not count, because a
-/// decoder clips there. Fails if the image was shifted or resized afterwards.
-/// @param image  [H, W, 3] in [0, 1], in steps of 1/255   @return nothing if no table fits
-std::optional<JpegTrace> find_jpeg(const Tensor<float>& image);
+/// decoder clips there. Fails if the image was resized afterwards, or shifted by other numbers of pixels.
+/// @param image  [H, W, 3] in [0, 1], in steps of 1/255   @param left, top  pixels that were cut off, >= 0
+/// @return nothing if no table fits
+std::optional<JpegTrace> find_jpeg(const Tensor<float>& image, Index left = 0, Index top = 0);
 
-/// Computes log P(image | render) of every seventh block on the foreground, see jpeg_score().
+/// Computes log P(image | render) of the blocks on the foreground, see jpeg_score(): of every seventh if that
+/// leaves 16 or more, else of all. The deviations are those that fit these blocks.
+/// @param image, render, object  as of jpeg_score()
 /// @throws ShapeError, ValueError as jpeg_score()
 double jpeg_log_likelihood(const Tensor<float>& image, const Tensor<float>& render,
                            std::span<const double> object, const JpegTrace& trace);

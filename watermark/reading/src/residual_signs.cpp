@@ -7,7 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
+#include <limits>
 #include <optional>
 #include <span>
 #include <utility>
@@ -74,9 +74,9 @@ void score_differences(const Tensor<float>& rest, MarkScore& s) {
   }
 }
 
-// Returns the renders that a compressed image may have shown, before a background of this colour: with the
-// blur and the tones that fit best, and without. Quantisation removes detail as blur does, and bends the
-// tones that fit.
+// Returns the renders that a compressed image may show over this base: in the blur and the tones that fit
+// best, in the tones alone, in the blur alone, and as they are. Quantisation removes detail as blur does, and
+// bends the tones that fit.
 std::vector<Shown> possible(const Tensor<float>& image, const Tensor<float>& base,
                             const std::vector<double>& object) {
   std::vector<Shown> all{shown(image, base, object)};
@@ -89,19 +89,43 @@ std::vector<Shown> possible(const Tensor<float>& image, const Tensor<float>& bas
   return all;
 }
 
-// Returns the likeliest. A plain background of another colour was changed with the tones, or put there.
-Shown likeliest(const Surround& seen, const CachedView& render, float level,
-                const std::vector<double>& object, const JpegTrace& jpeg) {
+// The likeliest render, and the colours that its tones changed.
+struct Likeliest {
+  Shown shown;
+  Tensor<float> base;
+};
+
+// A plain background of another colour was changed with the tones, or put there.
+Likeliest likeliest(const Surround& seen, const CachedView& render, float level,
+                    const std::vector<double>& object, const JpegTrace& jpeg) {
   const Tensor<float>& image = own_image(seen);
-  std::vector<Shown> all = possible(image, render.base, object);
+  std::vector<Tensor<float>> bases{render.base};
   if (seen.plain.size() > 0)
-    std::ranges::move(
-        possible(image, before_background(render.base, render.opacity, {level, level, level}, seen.colour),
-                 object),
-        std::back_inserter(all));
-  std::vector<double> likelihood;
-  for (const Shown& s : all) likelihood.push_back(jpeg_log_likelihood(image, s.render, object, jpeg));
-  return std::move(all[at(std::ranges::max_element(likelihood) - likelihood.begin())]);
+    bases.push_back(before_background(render.base, render.opacity, {level, level, level}, seen.colour));
+  Likeliest best;
+  double most = std::numeric_limits<double>::lowest();
+  for (const Tensor<float>& base : bases)
+    for (Shown& s : possible(image, base, object)) {
+      const double found = jpeg_log_likelihood(image, s.render, object, jpeg);
+      if (!(found > most)) continue;
+      most = found;
+      best = {std::move(s), base};
+    }
+  return best;
+}
+
+// Leaves out the blocks of which a pixel is covered: their coefficients are of the cover, too.
+void leave_out_blocks(const std::vector<std::uint8_t>& covered, Index w, std::vector<double>& on_object) {
+  constexpr Index kBlock = 16;  // pixels, of halved chroma
+  const auto block = [&](std::size_t p) {
+    const auto y = static_cast<Index>(p) / w, x = static_cast<Index>(p) % w;
+    return at(y / kBlock * (w / kBlock + 1) + x / kBlock);
+  };
+  std::vector<std::uint8_t> out(block(on_object.size() - 1) + at(w / kBlock + 1));
+  for (std::size_t p = 0; p < covered.size(); ++p)
+    if (covered[p]) out[block(p)] = 1;
+  for (std::size_t p = 0; p < on_object.size(); ++p)
+    if (out[block(p)]) on_object[p] = 0;
 }
 
 std::vector<double> pixels_on_object(const CachedView& render, const std::vector<std::uint8_t>& border) {
@@ -124,16 +148,19 @@ MarkScore score_of(const EvidenceView& view, const CachedView& render, const ner
   MarkScore s{.score = Tensor<float>(image.shape),
               .precision = Tensor<float>(image.shape),
               .on_object = pixels_on_object(render, border)};
-  const Shown best = view.jpeg ? likeliest(seen, render, level, s.on_object, *view.jpeg)
-                               : shown(image, render.base, s.on_object);
-  s.blur = best.blur;
-  change_colours(carriers, render.base, best.tones);
   if (!view.jpeg) {
-    score_differences(best.rest, s);
+    const Shown fitted = shown(image, render.base, s.on_object);
+    s.blur = fitted.blur;
+    change_colours(carriers, render.base, fitted.tones);
+    score_differences(fitted.rest, s);
     return s;
   }
-  JpegScore score =
-      jpeg_score(own_image(seen), best.render, blurred(carriers.whole, best.blur), s.on_object, *view.jpeg);
+  leave_out_blocks(seen.covered, render.width, s.on_object);
+  const Likeliest best = likeliest(seen, render, level, s.on_object, *view.jpeg);
+  s.blur = best.shown.blur;
+  change_colours(carriers, best.base, best.shown.tones);
+  JpegScore score = jpeg_score(own_image(seen), best.shown.render, blurred(carriers.whole, s.blur),
+                               s.on_object, *view.jpeg);
   s.score = std::move(score.score);
   s.precision = std::move(score.precision);
   return s;

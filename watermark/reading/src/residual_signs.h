@@ -14,11 +14,12 @@ struct ResidualSigns {
 };
 
 /// Subtracts the unmarked render from an image and estimates the signs from the rest.
-///   - The blur of the render that leaves the smallest residual is kept; gain, offset and gamma of each
-///     channel are fitted.
+///   - The blur of the render that leaves the smallest residual is kept; a change of colour is fitted, see
+///     ToneFit. Of a JPEG image, the likeliest of the renders with and without blur and change is kept, over
+///     the field's background and over the image's.
 ///   - With the residual R and its mean power V around each pixel, R / V is the score and 1 / V the
 ///     precision. For a JPEG image both come from the quantised coefficients.
-///   - Covered pixels do not count.
+///   - Covered pixels do not count; in a JPEG image, neither do the blocks of 16 x 16 pixels around them.
 /// @param renderer  of the owner's field   @throws ShapeError if the sizes of image and camera differ
 ResidualSigns residual_signs(nerf::Renderer& renderer, const Owner& owner, const EvidenceView& image);
 

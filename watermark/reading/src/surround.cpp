@@ -17,8 +17,6 @@ constexpr double kMostOfEdge = 0.5;     // share of the edge pixels that a backg
 constexpr double kLeastOfImage = 0.03;  // share of all pixels that a background has at least
 constexpr double kLeastCover = 0.02, kMostCover = 0.4;  // share of the rows that a bar covers
 constexpr Index kLeastSide = 16;                        // least side that bars leave, pixels
-constexpr Index kBothBlocks =
-    16;  // pixels after which the blocks of luma and of halved chroma begin together
 
 bool alike(const float* pixel, const Colour& colour, float tolerance) {
   for (std::size_t a = 0; a < 3; ++a)
@@ -181,11 +179,7 @@ Surround clear_surround(const Tensor<float>& image, float background, bool objec
   check_rank("clear_surround", "image", image.shape, 3, "[H, W, 3]");
   check_extent("clear_surround", "image", image.shape, 2, 3, "red, green, blue");
   const Colour own{background, background, background};
-  Bars bars = find_bars(image, own);
-  // Bars around an object are background. Rests of them stay, so that the blocks of a compressed image begin
-  // where they did.
-  if (object && bars.all_around)
-    for (Index* first : {&bars.inside.left, &bars.inside.top}) *first -= *first % kBothBlocks;
+  const Bars bars = find_bars(image, own);
   Surround out{
       .image = cut(image, bars.inside), .plain = {}, .left = bars.inside.left, .top = bars.inside.top};
   if (!object) return out;

@@ -9,8 +9,8 @@ namespace fieldmark::watermark {
 
 /// An image without surroundings added by others: bars, and another background behind an object.
 struct Surround {
-  Tensor<float> image;  ///< [H, W, 3] without bars, the plain background replaced by the field's
-  Tensor<float> plain;  ///< [H, W, 3] without bars, the background as it is; empty if nothing was replaced
+  Tensor<float> image;  ///< [H, W, 3] with bars cut off, the plain background replaced by the field's
+  Tensor<float> plain;  ///< [H, W, 3] the same pixels as they came; empty if no background was replaced
   Index left = 0;       ///< columns cut off at the left edge
   Index top = 0;        ///< rows cut off at the upper edge
   std::array<float, 3> colour{};  ///< of the background in `plain`
@@ -18,7 +18,7 @@ struct Surround {
   std::vector<std::uint8_t> covered{};
 };
 
-/// Returns the image without bars, before the background with which it came.
+/// Returns the image with bars cut off, before the background with which it came.
 inline const Tensor<float>& own_image(const Surround& seen) {
   return seen.plain.size() > 0 ? seen.plain : seen.image;
 }

@@ -81,10 +81,10 @@ std::vector<double> PageReading::evidence() const {
   if (parts.empty()) return sum;
   std::ranges::fill(sum, 0.0);
   for (const PartReading& part : parts) {
-    const std::vector<double>& evidence = part.reading.evidence();
+    const std::vector<double> evidence = scaled_to(whole.blind, part.reading.evidence());
     for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += evidence[c];
   }
-  return scaled_to(whole.blind, std::move(sum));
+  return sum;
 }
 
 double PageReading::agreement() const {

@@ -58,6 +58,7 @@ struct Measurement {
   Index informed_views = 0;                      ///< views of accuracy.informed
   double informed_seconds =
       0;  ///< of PageReader for one image, with informed evidence of all, mean; NaN without informed views
+  double blind_seconds = 0;  ///< of BlindReader for one image, mean
 };
 
 /// Measures an owner's mark: each view carries its own random message, or all carry that of the baked field.

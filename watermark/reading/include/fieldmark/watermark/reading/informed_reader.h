@@ -56,7 +56,9 @@ class CameraSearch;
 ///     a thin object is aligned once more, at 400 pixels; the agreement stays that at 200.
 ///   - The image is reduced to 512 pixels on the longer side. Unless it shows JPEG quantisation, it is then
 ///     reduced to about 48,000 pixels that show the field.
-///   - The blur that leaves the smallest residual is kept; gain, offset and gamma are fitted.
+///   - The blur that leaves the smallest residual is kept, and a change of colour is fitted. Of a JPEG image,
+///     the likeliest of the renders with and without either is kept, over the field's background and over
+///     the image's.
 ///   - With the residual R and its power V around each pixel, R / V is the score and 1 / V the precision.
 ///     For a JPEG image both come from the quantised coefficients.
 ///   - S_c are the signs that explain the whole residual by linear least squares, since a ray passes several

@@ -22,9 +22,9 @@ struct PageReading {
   static constexpr double kBlindWeight = 0.25;
   ImageReading whole;                   ///< of the whole image
   std::vector<PartReading> parts = {};  ///< that agree with the field; empty if the whole image does
-  /// Evidence of the detection chosen, [cells]: of the whole image, or the sum over all parts with the power
-  /// of the whole image's blind evidence. With that of their few pixels, parts would count less than an image
-  /// in which nothing was found. Blind evidence counts a quarter, so that such images hardly dilute others.
+  /// Evidence of the detection chosen, [cells]: of the whole image, or the sum over all parts, each with the
+  /// power of the whole image's blind evidence, so that a small part counts no less than an image in which
+  /// nothing was found. Blind evidence counts a quarter, so that such images hardly dilute others.
   std::vector<double> evidence() const;
   /// Informed if the image or a part of it agrees with the field.
   ReadingKind chosen() const { return parts.empty() ? whole.chosen : ReadingKind::informed; }
