@@ -134,7 +134,8 @@ TEST_CASE("page_reader: a page without a view of the field is read blindly") {
   CHECK(page.evidence() == quarter);
   CHECK(page.agreement() == page.whole.informed.agreement);
   CHECK(page.whole.informed.evidence.empty());
-  PageReading forced = reader.read(image, true);
+  PageReading forced = reader.read(other, true);
+  CHECK(forced.parts.empty());
   CHECK(forced.chosen() == ReadingKind::blind);
   forced.force_informed();
   CHECK(forced.chosen() == ReadingKind::informed);

@@ -115,13 +115,16 @@ Likeliest likeliest(const Surround& seen, const CachedView& render, float level,
 }
 
 // Leaves out the blocks of which a pixel is covered: their coefficients are of the cover, too.
-void leave_out_blocks(const std::vector<std::uint8_t>& covered, Index w, std::vector<double>& on_object) {
+void leave_out_blocks(const std::vector<std::uint8_t>& covered, Index w, const JpegTrace& jpeg,
+                      std::vector<double>& on_object) {
   constexpr Index kBlock = 16;  // pixels, of halved chroma
-  const auto block = [&](std::size_t p) {
-    const auto y = static_cast<Index>(p) / w, x = static_cast<Index>(p) % w;
-    return at(y / kBlock * (w / kBlock + 1) + x / kBlock);
+  const Index across = w / kBlock + 2;
+  const auto block = [&](std::size_t p) {  // the first may be cut
+    const Index y = static_cast<Index>(p) / w + kBlock - jpeg.top,
+                x = static_cast<Index>(p) % w + kBlock - jpeg.left;
+    return at(y / kBlock * across + x / kBlock);
   };
-  std::vector<std::uint8_t> out(block(on_object.size() - 1) + at(w / kBlock + 1));
+  std::vector<std::uint8_t> out(block(on_object.size() - 1) + at(across));
   for (std::size_t p = 0; p < covered.size(); ++p)
     if (covered[p]) out[block(p)] = 1;
   for (std::size_t p = 0; p < on_object.size(); ++p)
@@ -155,7 +158,7 @@ MarkScore score_of(const EvidenceView& view, const CachedView& render, const ner
     score_differences(fitted.rest, s);
     return s;
   }
-  leave_out_blocks(seen.covered, render.width, s.on_object);
+  leave_out_blocks(seen.covered, render.width, *view.jpeg, s.on_object);
   const Likeliest best = likeliest(seen, render, level, s.on_object, *view.jpeg);
   s.blur = best.shown.blur;
   change_colours(carriers, best.base, best.shown.tones);
