@@ -9,6 +9,7 @@
 #include <numbers>
 #include <string>
 
+#include "cut_out.h"
 #include "ordered_sum.h"
 
 namespace fieldmark::watermark {
@@ -152,13 +153,7 @@ Likelihood likelihood(double n, double step, double b, double deviation) {
 
 // Returns the rows and columns from the first whole block on.
 Tensor<float> from_first_block(const Tensor<float>& x, const JpegTrace& trace) {
-  if (trace.left == 0 && trace.top == 0) return x;
-  const Index h = std::max<Index>(0, x.shape[0] - trace.top), w = std::max<Index>(0, x.shape[1] - trace.left);
-  Tensor<float> out({h, w, 3});
-  for (Index y = 0; y < h; ++y)
-    std::copy_n(x.data.begin() + 3 * ((y + trace.top) * x.shape[1] + trace.left), 3 * w,
-                out.data.begin() + 3 * y * w);
-  return out;
+  return cut_out(x, {trace.top, x.shape[0], trace.left, x.shape[1]});
 }
 
 // Undoes from_first_block(), with 0 elsewhere.

@@ -139,20 +139,24 @@ std::vector<double> pixels_on_object(const CachedView& render, const std::vector
   return on_object;
 }
 
+// Returns the image with its plain background exchanged for the field's.
+Tensor<float> before_own_background(const Surround& seen, const CachedView& render, float level) {
+  if (seen.plain.size() == 0) return seen.image;
+  return before_background(seen.plain, render.opacity, seen.colour, {level, level, level});
+}
+
 // Computes the score, and adapts the carriers to the image's colours.
 MarkScore score_of(const EvidenceView& view, const CachedView& render, const nerf::RadianceField& field,
                    Carriers& carriers) {
   const Surround& seen = view.seen;
   const float level = nerf::background_value(field.background);
-  const Tensor<float> image = seen.plain.size() > 0 ? before_background(seen.plain, render.opacity,
-                                                                        seen.colour, {level, level, level})
-                                                    : seen.image;
-  const auto border = seen.covered.empty() ? border_of(field, image) : seen.covered;
-  MarkScore s{.score = Tensor<float>(image.shape),
-              .precision = Tensor<float>(image.shape),
-              .on_object = pixels_on_object(render, border)};
+  const Shape& shape = seen.image.shape;
+  MarkScore s{.score = Tensor<float>(shape),
+              .precision = Tensor<float>(shape),
+              .on_object = pixels_on_object(
+                  render, seen.covered.empty() ? border_of(field, seen.image) : seen.covered)};
   if (!view.jpeg) {
-    const Shown fitted = shown(image, render.base, s.on_object);
+    const Shown fitted = shown(before_own_background(seen, render, level), render.base, s.on_object);
     s.blur = fitted.blur;
     change_colours(carriers, render.base, fitted.tones);
     score_differences(fitted.rest, s);

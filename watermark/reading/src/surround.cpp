@@ -6,6 +6,8 @@
 #include <cmath>
 #include <optional>
 
+#include "cut_out.h"
+
 namespace fieldmark::watermark {
 namespace {
 
@@ -23,10 +25,6 @@ bool alike(const float* pixel, const Colour& colour, float tolerance) {
     if (!(std::abs(pixel[a] - colour[a]) <= tolerance)) return false;
   return true;
 }
-
-struct Box {
-  Index top, bottom, left, right;  // rows and columns [top, bottom), [left, right)
-};
 
 // Returns the mean colour of a line of pixels if all have it.
 std::optional<Colour> plain_line(const Tensor<float>& image, Index first, Index step, Index count) {
@@ -91,14 +89,6 @@ Bars find_bars(const Tensor<float>& image, const Colour& background) {
   Bars bars{box, std::nullopt};
   if (rows && columns && alike(top.colour.data(), left.colour, kBar)) bars.all_around = top.colour;
   return bars;
-}
-
-Tensor<float> cut(const Tensor<float>& image, const Box& box) {
-  const Index w = image.shape[1], rows = box.bottom - box.top, columns = box.right - box.left;
-  Tensor<float> out({rows, columns, 3});
-  for (Index y = 0; y < rows; ++y)
-    std::copy_n(&image[3 * ((box.top + y) * w + box.left)], 3 * columns, &out[3 * y * columns]);
-  return out;
 }
 
 std::vector<Index> edge_pixels(Index h, Index w) {
@@ -181,7 +171,7 @@ Surround clear_surround(const Tensor<float>& image, float background, bool objec
   const Colour own{background, background, background};
   const Bars bars = find_bars(image, own);
   Surround out{
-      .image = cut(image, bars.inside), .plain = {}, .left = bars.inside.left, .top = bars.inside.top};
+      .image = cut_out(image, bars.inside), .plain = {}, .left = bars.inside.left, .top = bars.inside.top};
   if (!object) return out;
   replace_background(bars.all_around, own, out);
   clear_cover(own, out);
