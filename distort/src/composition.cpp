@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <numeric>
 #include <vector>
 
 namespace fieldmark::distort {
@@ -30,6 +32,45 @@ struct Leaf {
   double x, y, radius;
   std::array<float, 4> colour;
 };
+
+// Marks the pixels that are not background; all of them if every pixel is.
+std::vector<std::uint8_t> object_of(const Tensor<float>& x, std::span<const float> background) {
+  std::vector<std::uint8_t> object;
+  for (Index i = 0; i < x.size(); i += 3) object.push_back(!is_background(&x[i], background));
+  if (std::ranges::find(object, 1) == object.end()) std::ranges::fill(object, 1);
+  return object;
+}
+
+// Rows or columns [begin, end).
+struct Lines {
+  Index begin, end;
+  // Leaves out those at the ends without a pixel. At least one has pixels.
+  void trim(const std::vector<Index>& pixels) {
+    while (pixels[at(begin)] == 0) ++begin;
+    while (pixels[at(end - 1)] == 0) --end;
+  }
+  // Keeps the lines before or after the one at which half of the pixels are reached; a single line stays.
+  void halve(const std::vector<Index>& pixels, bool after) {
+    if (end - begin < 2) return;
+    const Index all = std::accumulate(pixels.begin(), pixels.end(), Index{0});
+    Index line = begin;
+    for (Index sum = 0; 2 * sum < all; ++line) sum += pixels[at(line)];
+    (after ? begin : end) = std::clamp(line, begin + 1, end - 1);
+  }
+};
+
+// Counts the pixels of each line within the others: of each row within columns, or the reverse.
+std::vector<Index> pixels_of(const std::vector<std::uint8_t>& object, Index width, const Lines& others,
+                             bool rows) {
+  const Index height = std::ssize(object) / width;
+  std::vector<Index> count(at(rows ? height : width));
+  for (Index y = 0; y < height; ++y)
+    for (Index x = 0; x < width; ++x) {
+      const Index line = rows ? y : x, other = rows ? x : y;
+      if (other >= others.begin && other < others.end) count[at(line)] += object[at(y * width + x)];
+    }
+  return count;
+}
 
 }  // namespace
 
@@ -89,6 +130,57 @@ Tensor<float> collage(const Tensor<float>& x) {
       if (height > 0 && width > 0) put(resize_area(x, height, width), top, begin, y);
     }
   return y;
+}
+
+PastedPart quarter_of_object(const Tensor<float>& x, std::span<const float> background, double scale,
+                             const std::array<float, 4>& draw) {
+  const Index h = x.shape[0], w = x.shape[1];
+  const std::vector<std::uint8_t> object = object_of(x, background);
+  const int quarter = std::min(3, static_cast<int>(4 * draw[0]));
+  Lines rows{0, h}, columns{0, w};
+  const auto of_rows = pixels_of(object, w, columns, true);
+  rows.trim(of_rows);
+  rows.halve(of_rows, quarter >= 2);
+  const auto of_columns = pixels_of(object, w, rows, false);
+  columns.trim(of_columns);
+  columns.halve(of_columns, quarter % 2 == 1);
+  rows.trim(pixels_of(object, w, columns, true));
+  const auto scaled = [&](const Lines& lines) {
+    return std::max<Index>(1, std::llround(scale * static_cast<double>(lines.end - lines.begin)));
+  };
+  const auto place = [](float u, Index room) {
+    return std::min(room, static_cast<Index>(u * static_cast<float>(room + 1)));
+  };
+  const Index height = scaled(rows), width = scaled(columns);
+  return {rows.begin,
+          columns.begin,
+          rows.end - rows.begin,
+          columns.end - columns.begin,
+          place(draw[1], h - height),
+          place(draw[2], w - width),
+          height,
+          width};
+}
+
+// Colours are scaled together with their cover, so that no background mixes into the edges.
+Tensor<float> pasted(const Tensor<float>& x, std::span<const float> background, const PastedPart& part,
+                     Tensor<float> onto) {
+  const std::vector<std::uint8_t> object = object_of(x, background);
+  Tensor<float> colour({part.height, part.width, 3}), cover(colour.shape);
+  for (Index p = 0; p < part.height * part.width; ++p) {
+    const Index from = (part.top + p / part.width) * x.shape[1] + part.left + p % part.width;
+    if (!object[at(from)]) continue;
+    std::copy_n(&x[3 * from], 3, &colour[3 * p]);
+    std::fill_n(&cover[3 * p], 3, 1.f);
+  }
+  colour = resize_area(colour, part.to_height, part.to_width);
+  cover = resize_area(cover, part.to_height, part.to_width);
+  for (Index i = 0; i < colour.size(); ++i) {
+    const Index row = i / (3 * part.to_width), column = i % (3 * part.to_width);
+    float& pixel = onto[3 * ((part.to_top + row) * onto.shape[1] + part.to_left) + column];
+    pixel = colour[i] + (1 - cover[i]) * pixel;
+  }
+  return onto;
 }
 
 Tensor<float> sepia(const Tensor<float>& x) {

@@ -12,18 +12,21 @@ namespace fieldmark::distort {
 Tensor<float> pillarboxed(const Tensor<float>& x);
 /// Adds black bars above and below up to the aspect 16 : 9; unchanged if the image has it or is taller.
 Tensor<float> letterboxed(const Tensor<float>& x);
-/// Replaces pixels that equal the background to within half a grey level.
+/// True if a pixel equals the background to within half a grey level.
+inline bool is_background(const float* pixel, std::span<const float> background) {
+  for (std::size_t c = 0; c < 3; ++c) {
+    const float d = pixel[c] - background[c];
+    if (!(d * d <= 0.25f / (255 * 255))) return false;
+  }
+  return true;
+}
+/// Replaces the pixels of the background.
 /// @param fill  returns the value of a pixel, in [0, 1]
 template <class F>
 Tensor<float> before_another(const Tensor<float>& x, std::span<const float> background, F fill) {
   Tensor<float> y = x;
   for (Index p = 0; p < x.size() / 3; ++p) {
-    bool plain = true;
-    for (Index c = 0; c < 3; ++c) {
-      const float d = x[3 * p + c] - background[static_cast<std::size_t>(c)];
-      plain = plain && d * d <= 0.25f / (255 * 255);
-    }
-    if (!plain) continue;
+    if (!is_background(&x[3 * p], background)) continue;
     const std::array<float, 3> colour = fill(p);
     for (Index c = 0; c < 3; ++c) y[3 * p + c] = colour[static_cast<std::size_t>(c)];
   }
@@ -39,6 +42,20 @@ Tensor<float> dead_leaves(Index height, Index width, const std::function<std::ar
 Tensor<float> captioned(const Tensor<float>& x);
 /// Tiles four copies of the image at half size, two by two, on a canvas of its size.
 Tensor<float> collage(const Tensor<float>& x);
+/// A part of an image, and where and how large it is pasted; pixels.
+struct PastedPart {
+  Index top, left, height, width;              ///< of the part
+  Index to_top, to_left, to_height, to_width;  ///< of its copy
+};
+/// Chooses a quarter of the pixels that are not background: above or below the row that halves them, then
+/// left or right of the column that halves that half. Of an image that is all background, it is a quarter of
+/// the image.
+/// @param scale  0 to 1   @param draw  three uniform numbers in [0, 1): which quarter, and its new place
+PastedPart quarter_of_object(const Tensor<float>& x, std::span<const float> background, double scale,
+                             const std::array<float, 4>& draw);
+/// Pastes the part, without its background, onto another image of the same size.
+Tensor<float> pasted(const Tensor<float>& x, std::span<const float> background, const PastedPart& part,
+                     Tensor<float> onto);
 /// Applies the sepia matrix of the W3C filter effects.
 Tensor<float> sepia(const Tensor<float>& x);
 

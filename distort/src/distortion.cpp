@@ -10,6 +10,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "checks.h"
 #include "composition.h"
@@ -38,7 +39,18 @@ struct Draws {
     }
     return field;
   }
+  Tensor<float> leaves(const Shape& shape) const {
+    return dead_leaves(shape[0], shape[1], [&](Index i) { return rng.uniform4(index, at(i)); });
+  }
 };
+
+// Its draws come after those of the leaves.
+PastedPart pasted_part(const Distortion::Step& step, const Tensor<float>& x, const Draws& draws,
+                       std::span<const float> background) {
+  constexpr Index kAfterLeaves = Index{1} << 32;
+  return quarter_of_object(x, background, step.amount,
+                           draws.rng.uniform4(draws.index, draws.at(kAfterLeaves)));
+}
 
 template <class F>
 Tensor<float> map_values(const Tensor<float>& x, const F& f) {
@@ -190,12 +202,13 @@ Tensor<float> apply(const Distortion::Step& step, const Tensor<float>& x, const 
         return std::array{u[0], u[1], u[2]};
       });
     case DistortionKind::background_shapes: {
-      const Tensor<float> leaves = dead_leaves(
-          x.shape[0], x.shape[1], [&](Index i) { return draws.rng.uniform4(draws.index, draws.at(i)); });
+      const Tensor<float> leaves = draws.leaves(x.shape);
       return before_another(x, background, [&](Index p) {
         return std::array{leaves[3 * p], leaves[3 * p + 1], leaves[3 * p + 2]};
       });
     }
+    case DistortionKind::part:
+      return pasted(x, background, pasted_part(step, x, draws, background), draws.leaves(x.shape));
     case DistortionKind::caption:
       return captioned(x);
     case DistortionKind::collage:
@@ -207,7 +220,18 @@ Tensor<float> apply(const Distortion::Step& step, const Tensor<float>& x, const 
 }
 
 // Returns the source positions of one step; the identity for steps that move no pixel.
-PixelMap moved(const Distortion::Step& step, const Shape& before, const Shape& after, const Draws& draws) {
+PixelMap moved(const Distortion::Step& step, const Tensor<float>& image, const Shape& after,
+               const Draws& draws, std::span<const float> background) {
+  const Shape& before = image.shape;
+  if (step.kind == DistortionKind::part) {
+    const PastedPart p = pasted_part(step, image, draws, background);
+    const double y = static_cast<double>(p.height) / static_cast<double>(p.to_height),
+                 x = static_cast<double>(p.width) / static_cast<double>(p.to_width);
+    const auto start = [](Index from, Index to, double per_pixel) {
+      return static_cast<double>(from) - 0.5 + (0.5 - static_cast<double>(to)) * per_pixel;
+    };
+    return {{x, 0, start(p.left, p.to_left, x), 0, y, start(p.top, p.to_top, y)}};
+  }
   const double sy = static_cast<double>(before[0]) / static_cast<double>(after[0]),
                sx = static_cast<double>(before[1]) / static_cast<double>(after[1]);
   if (step.kind == DistortionKind::crop) {
@@ -272,9 +296,9 @@ Tensor<float> apply_distortion(const Distortion& distortion, const Tensor<float>
   std::uint64_t base = std::uint64_t{distortion.first} << 40;
   for (const auto& step : distortion.steps) {
     const Draws draws{rng, index, base};
-    const Shape before = x.shape;
-    x = round(apply(step, x, draws, background));
-    map = after(map, moved(step, before, x.shape, draws));
+    Tensor<float> next = round(apply(step, x, draws, background));
+    map = after(map, moved(step, x, next.shape, draws, background));
+    x = std::move(next);
     base += std::uint64_t{1} << 40;
   }
   if (source) *source = map;

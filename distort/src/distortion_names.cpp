@@ -17,7 +17,7 @@ struct Kind {
   DistortionKind kind;
   double low, high;
 };
-constexpr std::array<Kind, 18> kKinds{{{"noise", DistortionKind::noise, 0, 1},
+constexpr std::array<Kind, 19> kKinds{{{"noise", DistortionKind::noise, 0, 1},
                                        {"rotation", DistortionKind::rotation, 0, 180},
                                        {"scale", DistortionKind::scale, 0.01, 4},
                                        {"scale-nearest", DistortionKind::scale_nearest, 0.01, 4},
@@ -34,7 +34,8 @@ constexpr std::array<Kind, 18> kKinds{{{"noise", DistortionKind::noise, 0, 1},
                                        {"brightness", DistortionKind::brightness, 0, 10},
                                        {"contrast", DistortionKind::contrast, 0, 10},
                                        {"hue", DistortionKind::hue, -360, 360},
-                                       {"stretch", DistortionKind::stretch, 0.25, 4}}};
+                                       {"stretch", DistortionKind::stretch, 0.25, 4},
+                                       {"part", DistortionKind::part, 0.05, 1}}};
 // A kind without a severity.
 struct PlainKind {
   std::string_view name;

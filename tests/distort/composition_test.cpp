@@ -126,6 +126,95 @@ TEST_CASE("composition: a caption covers the middle fifth, a collage holds four 
     }
 }
 
+namespace {
+
+// Returns grey levels between 0.2 and 0.7 on an L-shaped object before white.
+Tensor<float> l_shape() {
+  Tensor<float> x = uniform<float>({24, 32, 3}, 0.2f, 0.7f, 6);
+  for (Index row = 0; row < 24; ++row)
+    for (Index column = 0; column < 32; ++column)
+      if (row < 4 || row >= 20 || column < 6 || column >= 26 || (row < 12 && column >= 10))
+        std::fill_n(&x[3 * (row * 32 + column)], 3, 1.f);
+  return x;
+}
+
+Index object_pixels(const Tensor<float>& x, Index top, Index left, Index height, Index width) {
+  Index count = 0;
+  for (Index row = top; row < top + height; ++row)
+    for (Index column = left; column < left + width; ++column)
+      count += !is_background(&x[3 * (row * x.shape[1] + column)], kWhite);
+  return count;
+}
+
+}  // namespace
+
+TEST_CASE("composition: the quarters of an object share its pixels") {
+  const Tensor<float> x = l_shape();
+  const Index all = object_pixels(x, 0, 0, 24, 32);
+  Index sum = 0;
+  for (const float u : {0.f, 0.25f, 0.5f, 0.9999f}) {
+    CAPTURE(u);
+    const PastedPart part = quarter_of_object(x, kWhite, 0.5, {u, 0.3f, 0.9f, 0});
+    const Index pixels = object_pixels(x, part.top, part.left, part.height, part.width);
+    sum += pixels;
+    CHECK(std::abs(4 * static_cast<double>(pixels) / static_cast<double>(all) - 1) < 0.3);  // of whole lines
+    CHECK(part.to_height == std::llround(0.5 * static_cast<double>(part.height)));
+    CHECK(part.to_width == std::llround(0.5 * static_cast<double>(part.width)));
+    CHECK(part.to_top + part.to_height <= 24);
+    CHECK(part.to_left + part.to_width <= 32);
+  }
+  CHECK(sum == all);
+}
+
+TEST_CASE("composition: a pasted part covers what is behind it with the object alone") {
+  const Tensor<float> x = l_shape(), behind = uniform<float>({24, 32, 3}, 0, 1, 7);
+  const PastedPart part{4, 6, 16, 20, 2, 9, 16, 20};
+  const Tensor<float> y = pasted(x, kWhite, part, behind);
+  for (Index row = 0; row < 24; ++row)
+    for (Index column = 0; column < 32; ++column) {
+      const bool inside = row >= 2 && row < 18 && column >= 9 && column < 29;
+      const Index from = (row + 2) * 32 + column - 3, to = row * 32 + column;
+      const bool object = inside && !is_background(&x[3 * from], kWhite);
+      for (Index c = 0; c < 3; ++c) CHECK(y[3 * to + c] == (object ? x[3 * from + c] : behind[3 * to + c]));
+    }
+  // At half the size, a pixel half covered shows half of each.
+  const Tensor<float> flat({4, 4, 3}, 0.25f);
+  Tensor<float> half = flat;
+  std::fill_n(half.data.begin(), 24, 1.f);
+  const Tensor<float> small = pasted(half, kWhite, {1, 0, 2, 4, 0, 0, 1, 2}, Tensor<float>({4, 4, 3}, 0.75f));
+  CHECK(small[0] == Approx(0.5));
+  CHECK(small[6] == 0.75f);
+}
+
+TEST_CASE("composition: a distortion by part tells where its pixels came from") {
+  const Tensor<float> x = distorted_by("scale_1", l_shape());  // rounded
+  PixelMap source;
+  const Tensor<float> y = distorted_by("part_1", x, &source);
+  Index found = 0;
+  for (Index v = 0; v < 24; ++v)
+    for (Index u = 0; u < 32; ++u) {
+      const auto from = source(static_cast<double>(u), static_cast<double>(v));
+      const Index column = std::lround(from[0]), row = std::lround(from[1]);
+      if (column < 0 || row < 0 || column >= 32 || row >= 24) continue;
+      const float *a = &x[3 * (row * 32 + column)], *b = &y[3 * (v * 32 + u)];
+      found += !is_background(a, kWhite) && std::equal(a, a + 3, b);
+    }
+  const Index all = object_pixels(x, 0, 0, 24, 32);
+  CHECK(4 * found > 0.7 * static_cast<double>(all));
+  CHECK(4 * found < 1.3 * static_cast<double>(all));
+}
+
+TEST_CASE("composition: a quarter of an image without an object is a quarter of the image") {
+  const Tensor<float> x({8, 12, 3}, 1.f);
+  const PastedPart part = quarter_of_object(x, kWhite, 1, {0.99f, 0, 0.999f, 0});
+  CHECK(part.top == 4);
+  CHECK(part.left == 6);
+  CHECK(part.height == 4);
+  CHECK(part.width == 6);
+  CHECK(part.to_top == 0);
+  CHECK(part.to_left == 6);
+}
+
 TEST_CASE("composition: sepia of grey is grey times the rows' sums, cut off at white") {
   const Tensor<float> y = distorted_by("sepia", Tensor<float>({1, 1, 3}, 0.4f));
   CHECK(y[0] == Approx(0.4 * 1.351).margin(0.002));

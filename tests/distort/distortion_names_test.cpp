@@ -16,13 +16,32 @@ TEST_CASE("distortion names: wrong names list the right ones") {
       "blur_A (0 to 100), crop_A (0.0001 to 1), jpeg_A (1 to 100, whole), jpeg444_A (1 to 100, "
       "whole), webp_A (1 to 100, whole), h264_A (0 to 51, whole), gamma_A (0.01 to 10), brightness_A (0 to "
       "10), contrast_A (0 to 10), "
-      "hue_A (-360 to 360), stretch_A (0.25 to 4), greyscale, sepia, mirror, pillarbox, letterbox, "
+      "hue_A (-360 to 360), stretch_A (0.25 to 4), part_A (0.05 to 1), greyscale, sepia, mirror, pillarbox, "
+      "letterbox, "
       "background_black, background_white, background_grey, background_green, background_noise, "
       "background_shapes, caption, collage, combined, screenshot, got 'sharpen_1'");
-  for (const char* bad : {"",           "noise",       "noise_",        "noise_0.1x",        "noise_-1",
-                          "noise_nan",  "noise_inf",   "jpeg_0",        "jpeg_101",          "jpeg_50.5",
-                          "crop_0",     "noise_0.1,",  ",noise_0.1",    "noise_0.1,,blur_1", "Noise_0.1",
-                          "combined_1", "greyscale_1", "scale-box_0.5", "scale-_0.5",        "jpeg444_0.5",
-                          "contrast_-1"})
+  for (const char* bad : {"",
+                          "noise",
+                          "noise_",
+                          "noise_0.1x",
+                          "noise_-1",
+                          "noise_nan",
+                          "noise_inf",
+                          "jpeg_0",
+                          "jpeg_101",
+                          "jpeg_50.5",
+                          "crop_0",
+                          "noise_0.1,",
+                          ",noise_0.1",
+                          "noise_0.1,,blur_1",
+                          "Noise_0.1",
+                          "combined_1",
+                          "greyscale_1",
+                          "scale-box_0.5",
+                          "scale-_0.5",
+                          "jpeg444_0.5",
+                          "contrast_-1",
+                          "part_1.1",
+                          "part"})
     CHECK_THROWS_AS(parse_distortion(bad), ValueError);
 }

@@ -107,6 +107,7 @@ TEST_CASE("distortion: every result is of 8 bits and depends on the seed and the
                            "mirror",
                            "caption",
                            "collage",
+                           "part_0.6",
                            "background_noise"}) {
     INFO(name);
     const auto y = distorted(name, x, 3);

@@ -173,6 +173,8 @@ Command add_distort(CommandLine& app) {
          "background_black, _white, _grey, _green, _noise, _shapes\n"
          "              another background behind the pixels that differ from --background;\n"
          "              shapes: discs that cover one another, like an image of something else\n"
+         "part_A        a quarter of the pixels that differ from --background, A times as large, 0.05 to 1,\n"
+         "              at a random place before such shapes\n"
          "caption       opaque bar over the middle fifth of the height\n"
          "collage       four copies at half the size, two by two\n"
          "combined      noise_0.10,crop_0.40,jpeg_50\n"

@@ -32,6 +32,7 @@ enum class DistortionKind {
   contrast,
   hue,
   stretch,
+  part,
   greyscale,
   sepia,
   mirror,
@@ -84,6 +85,9 @@ struct Distortion {
 ///   background_black, _white, _grey, _green, _noise, _shapes   replaces pixels that equal the background
 ///                 exactly; shapes: discs that cover one another, with the statistics of
 ///                 natural images
+///   part_A        a quarter of the pixels that do not equal the background, A times as large, 0.05 to 1, at
+///   a
+///                 random place before such shapes
 ///   caption       an opaque bar with lines, over the middle fifth of the height
 ///   collage       four copies of half the size, two by two
 ///   combined      noise_0.10,crop_0.40,jpeg_50
