@@ -62,7 +62,7 @@ TEST_CASE("object_search: an object before waves is found, from a camera nearby"
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
     CAPTURE(seed);
     const Scene scene = object_in_waves(seed, 90, 40);
-    const auto places = search.find(scene.image, 4);
+    const auto places = search.find(scene.image, {4}, {4});
     REQUIRE(places.size() == 8);       // four of the whole object, four of quarters
     CHECK(places[0].likeness > 0.55);  // 0.62 to 0.80; 60 views are far apart
     double nearest = 180;
@@ -85,31 +85,45 @@ TEST_CASE("object_search: gain, offset and the number of threads change nothing 
   const Owner owner = tiny_owner();
   const ObjectSearch search(owner, kFewViews);
   Tensor<float> image = object_in_waves(1, 90, 40).image;
-  const auto as_it_is = search.find(image, 2);
+  const auto as_it_is = search.find(image, {2}, {2});
   {
     const ScopedThreads one(1);
-    const auto again = ObjectSearch(owner, kFewViews).find(image, 2);
+    const auto again = ObjectSearch(owner, kFewViews).find(image, {2}, {2});
     REQUIRE(again.size() == 4);
     CHECK(again[0].likeness == as_it_is[0].likeness);
     CHECK(again[1].camera.pose == as_it_is[1].camera.pose);
   }
   for (Index i = 0; i < image.size(); ++i) image[i] = 0.6f * image[i] + 0.2f;
-  const auto faded = search.find(image, 1);
+  const auto faded = search.find(image, {1}, {1});
   REQUIRE(faded.size() == 2);
   CHECK(faded[0].likeness == Approx(as_it_is[0].likeness).epsilon(1e-3));
   CHECK(faded[0].camera.pose == as_it_is[0].camera.pose);
 }
 
+TEST_CASE("object_search: places are as large as is wanted, and as many") {
+  const Owner owner = tiny_owner();
+  const ObjectSearch search(owner, kFewViews);
+  const Tensor<float> image = object_in_waves(2, 90, 40).image;
+  const auto places = search.find(image, {3, 60}, {5, 35});
+  REQUIRE(places.size() == 8);
+  for (const ObjectPlace& place : places) {
+    CAPTURE(place.whole, place.window.width, place.window.height);
+    CHECK(std::max(place.window.width, place.window.height) >= (place.whole ? 60 : 35));
+  }
+  CHECK(search.find(image, {0}, {2}).size() == 2);
+  CHECK(search.find(image, {3, 1000}, {3, 1000}).empty());
+}
+
 TEST_CASE("object_search: a plain image looks like nothing") {
   const Owner owner = tiny_owner();
-  CHECK(ObjectSearch(owner, kFewViews).find(Tensor<float>({64, 64, 3}, 0.4f), 4).empty());
+  CHECK(ObjectSearch(owner, kFewViews).find(Tensor<float>({64, 64, 3}, 0.4f), {4}, {4}).empty());
 }
 
 TEST_CASE("object_search: errors name what is wrong") {
   const Owner owner = tiny_owner();
   CHECK_THROWS_WITH(ObjectSearch(owner, {.views = 0}),
-                    "[object_search] views and size must be at least 1 and 16, got 0 and 64");
+                    "[object_search] views and size must be at least 1 and 24, got 0 and 96");
   const ObjectSearch search(owner, {.views = 1, .size = 48});
-  CHECK_THROWS_AS(search.find(Tensor<float>({64, 64}), 1), ShapeError);
-  CHECK_THROWS_AS(search.find(Tensor<float>({15, 64, 3}), 1), ShapeError);
+  CHECK_THROWS_AS(search.find(Tensor<float>({64, 64}), {1}, {1}), ShapeError);
+  CHECK_THROWS_AS(search.find(Tensor<float>({15, 64, 3}), {1}, {1}), ShapeError);
 }

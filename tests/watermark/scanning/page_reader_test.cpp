@@ -112,7 +112,7 @@ TEST_CASE("page_reader: the views of a collage are added up") {
 TEST_CASE("page_reader: options out of range are errors before an image is read") {
   const Owner owner = marking_owner();
   CHECK_THROWS_WITH(PageReader(owner, kSearch, {.views = 0}),
-                    "[object_search] views and size must be at least 1 and 16, got 0 and 64");
+                    "[object_search] views and size must be at least 1 and 24, got 0 and 96");
   CameraSearchOptions around = kSearch;
   around.around = -1;
   CHECK_THROWS_WITH(PageReader(owner, around),

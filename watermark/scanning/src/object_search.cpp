@@ -1,24 +1,32 @@
 #include <fieldmark/engine/parallel.h>
 #include <fieldmark/engine/shape_checks.h>
-#include <fieldmark/imaging/resize.h>
 #include <fieldmark/nerf/renderer.h>
 #include <fieldmark/watermark/scanning/object_search.h>
+#include "outline_match.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <string>
+#include <utility>
 
 namespace fieldmark::watermark {
 namespace {
 
-constexpr Index kGrid = 16, kQuarterGrid = 12;  // pixels of the longer side of an object, and of a quarter
-constexpr float kInside = 0.9f;                 // least opacity inside the outline
-// Mean square of what differs from the mean: a plain place looks like nothing.
-constexpr float kLeastPower = 1e-3f;
-constexpr Index kLeastPixels = 40;  // of an outline: fewer look like anything
-// Longer side of an object as a share of the image's. A quarter is half as long.
-constexpr std::array kSizes{0.2, 0.25, 0.31, 0.39, 0.49, 0.61, 0.76, 0.95};
+// Grids of the whole object and of a quarter, pixels of the longer side: a coarse one for all places, a fine
+// one for the best of them.
+constexpr Index kCoarseWhole = 16, kCoarseQuarter = 12, kFine = 24;
+constexpr Index kLeastCoarse = 24, kLeastFine = 60;  // pixels inside an outline: fewer look like anything
+// Longer side of an object as a share of the image's: so many sizes from the smallest one, each a step
+// larger. A quarter is half as long. There are kFinePerSize fine sizes to a step.
+constexpr double kSmallest = 0.2;
+constexpr Index kSizes = 8, kFinePerSize = 3;
+constexpr double kStep = 1.25;
+constexpr Index kReach = 2;  // fine sizes to either side of the coarse one
+constexpr Index kShift = 3;  // pixels of the fine grid that a place may move
+constexpr std::size_t kRefinedWholes = 64,
+                      kRefinedQuarters = 512;  // best coarse places that are compared finely
 
 // Returns the smallest window around all pixels inside the outline; empty if there are none.
 Window outline_window(const Tensor<float>& opacity) {
@@ -35,25 +43,131 @@ Window outline_window(const Tensor<float>& opacity) {
           static_cast<double>(bottom - top)};
 }
 
+// Returns the row, or the column, at which half of the opacity inside a window is reached.
+double middle(const Tensor<float>& opacity, const Window& window, bool row) {
+  const Index w = opacity.shape[1];
+  std::vector<double> lines(at(opacity.shape[row ? 0 : 1]));
+  double all = 0, sum = 0;
+  for (Index p = 0; p < opacity.size(); ++p) {
+    const auto x = static_cast<double>(p % w), y = static_cast<double>(p / w);
+    if (x < window.x || x >= window.x + window.width || y < window.y || y >= window.y + window.height)
+      continue;
+    lines[at(row ? p / w : p % w)] += static_cast<double>(opacity[p]);
+    all += static_cast<double>(opacity[p]);
+  }
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    sum += lines[i];
+    if (2 * sum >= all) return static_cast<double>(i + 1);
+  }
+  return static_cast<double>(lines.size());
+}
+
+// Returns windows around quarters: those of the object's window, and those with a quarter of its pixels each.
+std::vector<Window> quarters_of(const Tensor<float>& opacity, const Window& all) {
+  std::vector<Window> out;
+  for (const double down : {0., 0.5})
+    for (const double right : {0., 0.5})
+      out.push_back({all.x + right * all.width, all.y + down * all.height, all.width / 2, all.height / 2});
+  const double row = middle(opacity, all, true);
+  for (Window half : {Window{all.x, all.y, all.width, row - all.y},
+                      Window{all.x, row, all.width, all.y + all.height - row}}) {
+    const double column = middle(opacity, half, false);
+    for (const Window& quarter : {Window{half.x, half.y, column - half.x, half.height},
+                                  Window{column, half.y, half.x + half.width - column, half.height}})
+      if (quarter.width >= 1 && quarter.height >= 1) out.push_back(quarter);
+  }
+  return out;
+}
+
 Tensor<float> in_all_channels(const Tensor<float>& opacity) {
   Tensor<float> out({opacity.shape[0], opacity.shape[1], 3});
   for (Index i = 0; i < out.size(); ++i) out[i] = opacity[i / 3];
   return out;
 }
 
+Window window_of(const OutlineMatch& match, const Outline& outline, const ReducedImage& image) {
+  return {static_cast<double>(match.column) / image.zoom_x, static_cast<double>(match.row) / image.zoom_y,
+          static_cast<double>(outline.width) / image.zoom_x,
+          static_cast<double>(outline.height) / image.zoom_y};
+}
+
 }  // namespace
 
-// The image at one of the sizes.
-struct ObjectSearch::Reduced {
-  Index height, width;
-  double zoom_x, zoom_y;        // reduced pixels per pixel
-  std::vector<float> plane[3];  // colours
-  std::vector<float> squares;   // sum of the squares of all channels
+// A part of the object in one view.
+struct ObjectSearch::Part {
+  std::size_t view;
+  bool whole;
+  Window window;  // in the render
+  Outline coarse, fine;
+};
+
+// Where the image looks most like a part.
+struct ObjectSearch::Found {
+  std::size_t part;
+  Index size = 0;  // of the coarse grid
+  Window window{};
+  double likeness = -1;
+  void take(const OutlineMatch& match, const Outline& outline, const ReducedImage& image, Index at_size) {
+    if (!(match.likeness > likeness)) return;
+    *this = {part, at_size, window_of(match, outline, image), match.likeness};
+  }
+};
+
+// The image at all sizes for one kind of part.
+class ObjectSearch::Sizes {
+ public:
+  Sizes(const Tensor<float>& rgb, bool whole, Index least) {
+    const double longer = static_cast<double>(std::max(rgb.shape[0], rgb.shape[1])) / (whole ? 1 : 2);
+    const auto grid = static_cast<double>(whole ? kCoarseWhole : kCoarseQuarter);
+    while (std::ssize(coarse_) < kSizes) {
+      const Index fine = kFinePerSize * std::ssize(coarse_);
+      const double zoom = grid / (size_of(fine) * longer);
+      const bool too_small = zoom > 1 || size_of(fine + kReach) * longer < static_cast<double>(least);
+      too_small_ += too_small;
+      coarse_.push_back(too_small ? ReducedImage{} : reduced_image(rgb, zoom));
+    }
+    for (Index i = -kReach; i < kFinePerSize * kSizes + kReach; ++i) {
+      const bool used = i + kReach >= kFinePerSize * too_small_;
+      fine_.push_back(used ? reduced_image(rgb, static_cast<double>(kFine) / (size_of(i) * longer))
+                           : ReducedImage{});
+    }
+  }
+
+  // Returns the best place among all of all sizes.
+  Found coarse(const Part& part, std::size_t index) const {
+    Found found{index};
+    for (Index i = too_small_; i < kSizes; ++i)
+      found.take(best_match(part.coarse, coarse_[at(i)]), part.coarse, coarse_[at(i)], i);
+    return found;
+  }
+
+  // Returns the best place near a coarse one, on the fine grid.
+  Found fine(const Part& part, const Found& coarse) const {
+    Found found{coarse.part};
+    const Window& w = coarse.window;
+    for (Index i = 0; i <= 2 * kReach; ++i) {
+      const ReducedImage& image = fine_[at(kFinePerSize * coarse.size + i)];
+      const auto start = [](double middle, double zoom, Index length) {
+        return std::lround(middle * zoom - static_cast<double>(length) / 2);
+      };
+      const Index row = start(w.y + w.height / 2, image.zoom_y, part.fine.height),
+                  column = start(w.x + w.width / 2, image.zoom_x, part.fine.width);
+      found.take(best_match_near(part.fine, image, row, column, kShift), part.fine, image, coarse.size);
+    }
+    return found;
+  }
+
+ private:
+  static double size_of(Index fine) {
+    return kSmallest * std::pow(kStep, static_cast<double>(fine) / static_cast<double>(kFinePerSize));
+  }
+  std::vector<ReducedImage> coarse_, fine_;
+  Index too_small_ = 0;  // sizes at which the grid is finer than the image, or parts have too few pixels
 };
 
 void ObjectSearch::check(const ObjectSearchOptions& options) {
-  if (options.views < 1 || options.size < kGrid)
-    throw ValueError("[object_search] views and size must be at least 1 and 16, got " +
+  if (options.views < 1 || options.size < kFine)
+    throw ValueError("[object_search] views and size must be at least 1 and 24, got " +
                      std::to_string(options.views) + " and " + std::to_string(options.size));
 }
 
@@ -70,147 +184,62 @@ ObjectSearch::ObjectSearch(const Owner& owner, const ObjectSearchOptions& option
     const Window all = outline_window(view.opacity);
     if (!(all.width > 0)) continue;
     add_part(v, view.rgb, opacity, all, true);
-    for (const double down : {0., 0.5})
-      for (const double right : {0., 0.5})
-        add_part(v, view.rgb, opacity,
-                 {all.x + right * all.width, all.y + down * all.height, all.width / 2, all.height / 2},
-                 false);
+    for (const Window& quarter : quarters_of(view.opacity, all))
+      add_part(v, view.rgb, opacity, quarter, false);
   }
 }
+
+ObjectSearch::~ObjectSearch() = default;
 
 void ObjectSearch::add_part(std::size_t view, const Tensor<float>& rgb, const Tensor<float>& opacity,
                             const Window& window, bool whole) {
-  const double zoom =
-      static_cast<double>(whole ? kGrid : kQuarterGrid) / std::max(window.width, window.height);
-  const auto side = [&](double length) { return std::max<Index>(1, std::lround(zoom * length)); };
-  Part part{view, whole, window, side(window.height), side(window.width), {}, {}, {}};
-  const PatchSize size{part.height, part.width};
-  const Tensor<float> colour = cut_window(rgb, window, size, 0),
-                      inside = cut_window(opacity, window, size, 0);
-  for (Index p = 0; p < part.height * part.width; ++p) {
-    if (!(inside[3 * p] >= kInside)) continue;
-    part.y.push_back(p / part.width);
-    part.x.push_back(p % part.width);
-    for (Index c = 0; c < 3; ++c) part.of_mean[c].push_back(colour[3 * p + c]);
-  }
-  const auto n = static_cast<float>(part.x.size());
-  if (std::ssize(part.x) < kLeastPixels) return;
-  float power = 0;
-  for (auto& channel : part.of_mean) {
-    float mean = 0;
-    for (const float t : channel) mean += t / n;
-    for (float& t : channel) t -= mean, power += t * t;
-  }
-  if (!(power > kLeastPower * n)) return;
-  for (auto& channel : part.of_mean)
-    for (float& t : channel) t /= std::sqrt(power);
-  parts_.push_back(std::move(part));
+  auto coarse = outline_of(rgb, opacity, window, whole ? kCoarseWhole : kCoarseQuarter, kLeastCoarse),
+       fine = outline_of(rgb, opacity, window, kFine, kLeastFine);
+  if (coarse && fine) parts_.push_back({view, whole, window, std::move(*coarse), std::move(*fine)});
 }
 
-// The sums over the outline are taken for all places of a row at once.
-ObjectPlace ObjectSearch::best_place(const Part& part, const Reduced& image) {
-  ObjectPlace best;
-  const Index rows = image.height - part.height + 1, columns = image.width - part.width + 1;
-  if (rows < 1 || columns < 1) return best;
-  const auto n = static_cast<float>(part.x.size());
-  const auto m = static_cast<std::size_t>(columns);
-  std::vector<float> product(m), square(m),
-      mean[3] = {std::vector<float>(m), std::vector<float>(m), std::vector<float>(m)};
-  for (Index row = 0; row < rows; ++row) {
-    for (auto* sums : {&product, &square, &mean[0], &mean[1], &mean[2]}) std::ranges::fill(*sums, 0.f);
-    for (std::size_t k = 0; k < part.x.size(); ++k) {
-      const Index from = (row + part.y[k]) * image.width + part.x[k];
-      const float* squares = image.squares.data() + from;
-      for (std::size_t i = 0; i < m; ++i) square[i] += squares[i];
-      for (std::size_t c = 0; c < 3; ++c) {
-        const float* plane = image.plane[c].data() + from;
-        const float t = part.of_mean[c][k];
-        float* sums = mean[c].data();
-        for (std::size_t i = 0; i < m; ++i) {
-          product[i] += t * plane[i];
-          sums[i] += plane[i];
-        }
-      }
-    }
-    for (std::size_t i = 0; i < m; ++i) {
-      float power = square[i];
-      for (const auto& sums : mean) power -= sums[i] * sums[i] / n;
-      if (!(power > kLeastPower * n)) continue;
-      const double likeness = static_cast<double>(product[i] / std::sqrt(power));
-      if (likeness <= best.likeness) continue;
-      best.likeness = likeness;
-      best.whole = part.whole;
-      best.window = {static_cast<double>(i) / image.zoom_x, static_cast<double>(row) / image.zoom_y,
-                     static_cast<double>(part.width) / image.zoom_x,
-                     static_cast<double>(part.height) / image.zoom_y};
-    }
-  }
-  return best;
+// Returns the best places of the parts of one kind, the likeliest first.
+std::vector<ObjectSearch::Found> ObjectSearch::found(const Tensor<float>& rgb, bool whole,
+                                                     Index least) const {
+  const Sizes sizes(rgb, whole, least);
+  const auto by_likeness = [](const Found& a, const Found& b) { return a.likeness > b.likeness; };
+  std::vector<Found> all;
+  for (std::size_t i = 0; i < parts_.size(); ++i)
+    if (parts_[i].whole == whole) all.push_back({i});
+  const auto each = [&](auto find) {
+    parallel_for(std::ssize(all), 4, [&](Index begin, Index end) {
+      for (Index i = begin; i < end; ++i) all[at(i)] = find(parts_[all[at(i)].part], all[at(i)]);
+    });
+    std::erase_if(all, [](const Found& f) { return !(f.likeness > 0); });
+    std::ranges::stable_sort(all, by_likeness);
+  };
+  each([&](const Part& part, const Found& at) { return sizes.coarse(part, at.part); });
+  all.resize(std::min(all.size(), whole ? kRefinedWholes : kRefinedQuarters));
+  each([&](const Part& part, const Found& at) { return sizes.fine(part, at); });
+  std::erase_if(all, [&](const Found& f) {
+    return std::max(f.window.width, f.window.height) < static_cast<double>(least);
+  });
+  return all;
 }
 
-std::vector<ObjectSearch::Reduced> ObjectSearch::reduced(const Tensor<float>& rgb, bool whole) {
-  const Index h = rgb.shape[0], w = rgb.shape[1];
-  const double grid = static_cast<double>(whole ? kGrid : 2 * kQuarterGrid);
-  std::vector<Reduced> sizes;
-  for (const double size : kSizes) {
-    const double zoom = grid / (size * static_cast<double>(std::max(h, w)));
-    if (zoom > 1) continue;
-    const auto side = [&](Index length) {
-      return std::max<Index>(1, std::lround(zoom * static_cast<double>(length)));
-    };
-    const Tensor<float> small = resize_area(rgb, side(h), side(w));
-    Reduced next{small.shape[0],
-                 small.shape[1],
-                 static_cast<double>(small.shape[1]) / static_cast<double>(w),
-                 static_cast<double>(small.shape[0]) / static_cast<double>(h),
-                 {},
-                 {}};
-    for (Index p = 0; p < next.height * next.width; ++p) {
-      float squares = 0;
-      for (Index c = 0; c < 3; ++c) {
-        next.plane[c].push_back(small[3 * p + c]);
-        squares += small[3 * p + c] * small[3 * p + c];
-      }
-      next.squares.push_back(squares);
-    }
-    sizes.push_back(std::move(next));
-  }
-  return sizes;
-}
-
-std::vector<ObjectPlace> ObjectSearch::find(const Tensor<float>& rgb, Index count) const {
+std::vector<ObjectPlace> ObjectSearch::find(const Tensor<float>& rgb, const Wanted& wholes,
+                                            const Wanted& quarters) const {
   check_rank("object_search", "rgb", rgb.shape, 3, "[height, width, 3]");
   check_extent("object_search", "rgb", rgb.shape, 2, 3, "red, green and blue");
   const Index h = rgb.shape[0], w = rgb.shape[1];
-  if (h < kGrid || w < kGrid)
+  if (h < kCoarseWhole || w < kCoarseWhole)
     throw ShapeError("[object_search] rgb must have sides of at least 16, got shape " + rgb.shape.str());
-  const std::vector<Reduced> of_whole = reduced(rgb, true), of_quarter = reduced(rgb, false);
-  std::vector<ObjectPlace> of_part(parts_.size());
-  parallel_for(std::ssize(parts_), 4, [&](Index begin, Index end) {
-    for (Index i = begin; i < end; ++i) {
-      const auto at = static_cast<std::size_t>(i);
-      for (const Reduced& image : parts_[at].whole ? of_whole : of_quarter) {
-        const ObjectPlace found = best_place(parts_[at], image);
-        if (found.likeness > of_part[at].likeness) of_part[at] = found;
-      }
-    }
-  });
-  std::vector<std::size_t> order(parts_.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::ranges::stable_sort(
-      order, [&](std::size_t a, std::size_t b) { return of_part[a].likeness > of_part[b].likeness; });
   std::vector<ObjectPlace> best;
   for (const bool whole : {true, false}) {
     std::vector<std::uint8_t> used(cameras_.size());
-    Index taken = 0;
-    for (const std::size_t i : order) {
-      const Part& part = parts_[i];
-      if (taken == count || !(of_part[i].likeness > 0)) break;
-      if (part.whole != whole || used[part.view]) continue;
-      used[part.view] = 1;
-      ++taken;
-      best.push_back(of_part[i]);
-      best.back().camera = camera_at(part, of_part[i].window, h, w);
+    const Wanted& wanted = whole ? wholes : quarters;
+    Index left = wanted.count;
+    for (const Found& f : found(rgb, whole, wanted.least)) {
+      const Part& part = parts_[f.part];
+      if (left == 0) break;
+      if (std::exchange(used[part.view], 1)) continue;
+      --left;
+      best.push_back({camera_at(part, f.window, h, w), f.window, whole, f.likeness});
     }
   }
   return best;

@@ -16,10 +16,11 @@ constexpr Index kMostElongated = 8;    // longer to shorter side of a block: no 
 constexpr Index kMarginShare = 10;     // of a part's shorter side: renders of objects have a margin
 constexpr Index kLargest = 512;        // longer side of an image that is searched for an object, pixels
 constexpr Index kLeastReduced = 16;    // shorter side of the same image, and of a part of it
-constexpr Index kCandidates = 24;      // places of the whole object that are tried, and of its quarters
 // Longer side of a part that is read, pixels; below kSmallPart it shows little of the mark, and a larger part
 // replaces it.
 constexpr Index kLeastPart = 48, kSmallPart = 60;
+// Places that are tried. A whole object of 40 pixels has kLeastPart with its margins.
+constexpr ObjectSearch::Wanted kWholes{24, 40}, kQuarters{64, kLeastPart};
 // Agreement at which an object counts as found. In images of something else, places of an object stay below
 // 0.65, and quarters of 63 pixels below 0.8; smaller ones reach 0.87.
 constexpr double kLeastInside = 0.9;
@@ -151,7 +152,7 @@ std::vector<PartReading> PageReader::read_object(const Tensor<float>& whole) {
   std::vector<PartReading> best;
   bool whole_found = false, large_found = false;
   double most = kLeastInside;
-  for (const ObjectPlace& place : objects_->find(rgb, kCandidates)) {
+  for (const ObjectPlace& place : objects_->find(rgb, kWholes, kQuarters)) {
     if (whole_found && !place.whole) break;  // a quarter shows fewer cells
     const PixelBox box = box_of(place);
     const Index longer = std::max(box.width, box.height);

@@ -18,13 +18,14 @@ struct ObjectPlace {
 /// Options of ObjectSearch.
 struct ObjectSearchOptions {
   Index views = 256;       ///< novel cameras to compare with, at least 1
-  Index size = 64;         ///< longer side of their renders, pixels, at least 16
+  Index size = 96;         ///< longer side of their renders, pixels, at least 24
   std::uint64_t seed = 0;  ///< of the cameras
 };
 
 /// Finds an object, or a quarter of it, before any background. Renders of the field, cut out along their
-/// outlines, are compared with every place of the image at eight sizes. The likeness of a part T with the
-/// image I, over the n pixels of the part's outline and all channels c:
+/// outlines, are compared with every place of the image at eight sizes. The best places are compared again on
+/// a finer grid, at five sizes and 49 places around each. The likeness of a part T with the image I, over the
+/// n pixels of the part's outline and all channels c:
 ///   sum (T_c - mean T_c) I_c / sqrt(sum (T_c - mean T_c)^2 sum (I_c - mean I_c)^2)
 /// so a gain and an offset do not count. The search knows neither key nor message. It finds upright objects
 /// alone.
@@ -33,28 +34,27 @@ class ObjectSearch {
   /// Renders the views. @param owner  of an object
   /// @throws ValueError if the field fills its images, or as check()
   explicit ObjectSearch(const Owner& owner, const ObjectSearchOptions& options = {});
+  ~ObjectSearch();
   /// @throws ValueError if an option is out of range
   static void check(const ObjectSearchOptions& options);
-  /// Returns at most `count` places of the whole object, then as many of quarters, the best of each first and
-  /// from another view. They do not depend on the number of threads.
+  /// Places of one kind to return.
+  struct Wanted {
+    Index count = 0;  ///< most places
+    Index least = 0;  ///< longer side of the smallest one, pixels
+  };
+  /// Returns places of the whole object, then of quarters, the likeliest of each first and from another view.
+  /// They do not depend on the number of threads.
   /// @param rgb  [H, W, 3], sides of at least 16   @throws ShapeError for another shape
-  std::vector<ObjectPlace> find(const Tensor<float>& rgb, Index count) const;
+  std::vector<ObjectPlace> find(const Tensor<float>& rgb, const Wanted& wholes, const Wanted& quarters) const;
 
  private:
-  struct Part {
-    std::size_t view;
-    bool whole;
-    Window window;                  // in the render
-    Index height, width;            // of the grid
-    std::vector<Index> y, x;        // of the outline's pixels in the grid
-    std::vector<float> of_mean[3];  // their colours without the mean, unit length over all channels
-  };
-  struct Reduced;
+  struct Part;
+  struct Found;
+  class Sizes;
   void add_part(std::size_t view, const Tensor<float>& rgb, const Tensor<float>& opacity,
                 const Window& window, bool whole);
+  std::vector<Found> found(const Tensor<float>& rgb, bool whole, Index least) const;
   nerf::Camera camera_at(const Part& part, const Window& window, Index height, Index width) const;
-  static std::vector<Reduced> reduced(const Tensor<float>& rgb, bool whole);
-  static ObjectPlace best_place(const Part& part, const Reduced& image);
 
   std::vector<nerf::Camera> cameras_;
   std::vector<Part> parts_;
