@@ -52,9 +52,9 @@ struct Lines {
   // Keeps the lines before or after the one at which half of the pixels are reached; a single line stays.
   void halve(const std::vector<Index>& pixels, bool after) {
     if (end - begin < 2) return;
-    const Index all = std::accumulate(pixels.begin(), pixels.end(), Index{0});
+    const Index all = std::accumulate(pixels.begin() + begin, pixels.begin() + end, Index{0});
     Index line = begin;
-    for (Index sum = 0; 2 * sum < all; ++line) sum += pixels[at(line)];
+    for (Index sum = 0; line < end && 2 * sum < all; ++line) sum += pixels[at(line)];
     (after ? begin : end) = std::clamp(line, begin + 1, end - 1);
   }
 };
@@ -138,13 +138,21 @@ PastedPart quarter_of_object(const Tensor<float>& x, std::span<const float> back
   const std::vector<std::uint8_t> object = object_of(x, background);
   const int quarter = std::min(3, static_cast<int>(4 * draw[0]));
   Lines rows{0, h}, columns{0, w};
-  const auto of_rows = pixels_of(object, w, columns, true);
-  rows.trim(of_rows);
-  rows.halve(of_rows, quarter >= 2);
-  const auto of_columns = pixels_of(object, w, rows, false);
-  columns.trim(of_columns);
-  columns.halve(of_columns, quarter % 2 == 1);
-  rows.trim(pixels_of(object, w, columns, true));
+  const auto of_rows = [&] { return pixels_of(object, w, columns, true); };
+  const auto of_columns = [&] { return pixels_of(object, w, rows, false); };
+  const auto halve_rows = [&] { rows.halve(of_rows(), quarter >= 2); };
+  const auto halve_columns = [&] { columns.halve(of_columns(), quarter % 2 == 1); };
+  rows.trim(of_rows());
+  columns.trim(of_columns());
+  if (draw[3] < 0.5f) {
+    halve_rows();
+    halve_columns();
+  } else {
+    halve_columns();
+    halve_rows();
+  }
+  rows.trim(of_rows());
+  columns.trim(of_columns());
   const auto scaled = [&](const Lines& lines) {
     return std::max<Index>(1, std::llround(scale * static_cast<double>(lines.end - lines.begin)));
   };

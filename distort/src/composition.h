@@ -47,10 +47,11 @@ struct PastedPart {
   Index top, left, height, width;              ///< of the part
   Index to_top, to_left, to_height, to_width;  ///< of its copy
 };
-/// Chooses a quarter of the pixels that are not background: above or below the row that halves them, then
-/// left or right of the column that halves that half. Of an image that is all background, it is a quarter of
-/// the image.
-/// @param scale  0 to 1   @param draw  three uniform numbers in [0, 1): which quarter, and its new place
+/// Chooses one of four parts with about a quarter of the object's pixels each. A row halves the object and a
+/// column each half, or first a column and then a row. If all pixels are background, the whole image counts
+/// as the object.
+/// @param scale  0 to 1   @param draw  four uniform numbers in [0, 1): which part, its new place down and
+/// right, and the order
 PastedPart quarter_of_object(const Tensor<float>& x, std::span<const float> background, double scale,
                              const std::array<float, 4>& draw);
 /// Pastes the part, without its background, onto another image of the same size.

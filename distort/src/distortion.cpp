@@ -230,7 +230,9 @@ PixelMap moved(const Distortion::Step& step, const Tensor<float>& image, const S
     const auto start = [](Index from, Index to, double per_pixel) {
       return static_cast<double>(from) - 0.5 + (0.5 - static_cast<double>(to)) * per_pixel;
     };
-    return {{x, 0, start(p.left, p.to_left, x), 0, y, start(p.top, p.to_top, y)}};
+    const auto edge = [](Index line) { return static_cast<double>(line) - 0.5; };
+    return {{x, 0, start(p.left, p.to_left, x), 0, y, start(p.top, p.to_top, y)},
+            {edge(p.left), edge(p.top), edge(p.left + p.width), edge(p.top + p.height)}};
   }
   const double sy = static_cast<double>(before[0]) / static_cast<double>(after[0]),
                sx = static_cast<double>(before[1]) / static_cast<double>(after[1]);
@@ -256,11 +258,27 @@ PixelMap moved(const Distortion::Step& step, const Tensor<float>& image, const S
   return {{sx, 0, sx / 2 - 0.5, 0, sy, sy / 2 - 0.5}};
 }
 
+// Returns the bounds, in the original, of what a later step keeps: those of its corners, which is exact
+// without a rotation.
+std::array<double, 4> kept_by(const PixelMap& first, const std::array<double, 4>& later) {
+  if (!std::isfinite(later[0])) return first.kept;
+  std::array<double, 4> out = first.kept;
+  std::array<std::array<double, 2>, 4> corner;
+  for (std::size_t i = 0; i < 4; ++i) corner[i] = first(later[i % 2 ? 2 : 0], later[i < 2 ? 1 : 3]);
+  for (std::size_t a = 0; a < 2; ++a) {
+    const auto [low, high] = std::ranges::minmax({corner[0][a], corner[1][a], corner[2][a], corner[3][a]});
+    out[a] = std::max(out[a], low);
+    out[a + 2] = std::min(out[a + 2], high);
+  }
+  return out;
+}
+
 PixelMap after(const PixelMap& first, const PixelMap& second) {
   const auto &a = first.numbers, &b = second.numbers;
   const auto t = first(b[2], b[5]);
   return {{a[0] * b[0] + a[1] * b[3], a[0] * b[1] + a[1] * b[4], t[0], a[3] * b[0] + a[4] * b[3],
-           a[3] * b[1] + a[4] * b[4], t[1]}};
+           a[3] * b[1] + a[4] * b[4], t[1]},
+          kept_by(first, second.kept)};
 }
 
 }  // namespace

@@ -151,19 +151,27 @@ Index object_pixels(const Tensor<float>& x, Index top, Index left, Index height,
 TEST_CASE("composition: the quarters of an object share its pixels") {
   const Tensor<float> x = l_shape();
   const Index all = object_pixels(x, 0, 0, 24, 32);
-  Index sum = 0;
-  for (const float u : {0.f, 0.25f, 0.5f, 0.9999f}) {
-    CAPTURE(u);
-    const PastedPart part = quarter_of_object(x, kWhite, 0.5, {u, 0.3f, 0.9f, 0});
-    const Index pixels = object_pixels(x, part.top, part.left, part.height, part.width);
-    sum += pixels;
-    CHECK(std::abs(4 * static_cast<double>(pixels) / static_cast<double>(all) - 1) < 0.3);  // of whole lines
-    CHECK(part.to_height == std::llround(0.5 * static_cast<double>(part.height)));
-    CHECK(part.to_width == std::llround(0.5 * static_cast<double>(part.width)));
-    CHECK(part.to_top + part.to_height <= 24);
-    CHECK(part.to_left + part.to_width <= 32);
+  for (const float order : {0.f, 0.9f}) {
+    Index sum = 0;
+    for (const float u : {0.f, 0.25f, 0.5f, 0.9999f}) {
+      CAPTURE(u, order);
+      const PastedPart part = quarter_of_object(x, kWhite, 0.5, {u, 0.3f, 0.9f, order});
+      const Index pixels = object_pixels(x, part.top, part.left, part.height, part.width);
+      sum += pixels;
+      // It is tight: its first and last rows and columns show the object.
+      CHECK(object_pixels(x, part.top, part.left, 1, part.width) > 0);
+      CHECK(object_pixels(x, part.top + part.height - 1, part.left, 1, part.width) > 0);
+      CHECK(object_pixels(x, part.top, part.left, part.height, 1) > 0);
+      CHECK(object_pixels(x, part.top, part.left + part.width - 1, part.height, 1) > 0);
+      CHECK(std::abs(4 * static_cast<double>(pixels) / static_cast<double>(all) - 1) <
+            0.3);  // of whole lines
+      CHECK(part.to_height == std::llround(0.5 * static_cast<double>(part.height)));
+      CHECK(part.to_width == std::llround(0.5 * static_cast<double>(part.width)));
+      CHECK(part.to_top + part.to_height <= 24);
+      CHECK(part.to_left + part.to_width <= 32);
+    }
+    CHECK(sum == all);
   }
-  CHECK(sum == all);
 }
 
 TEST_CASE("composition: a pasted part covers what is behind it with the object alone") {
@@ -186,22 +194,53 @@ TEST_CASE("composition: a pasted part covers what is behind it with the object a
   CHECK(small[6] == 0.75f);
 }
 
-TEST_CASE("composition: a distortion by part tells where its pixels came from") {
-  const Tensor<float> x = distorted_by("scale_1", l_shape());  // rounded
-  PixelMap source;
-  const Tensor<float> y = distorted_by("part_1", x, &source);
-  Index found = 0;
-  for (Index v = 0; v < 24; ++v)
-    for (Index u = 0; u < 32; ++u) {
-      const auto from = source(static_cast<double>(u), static_cast<double>(v));
-      const Index column = std::lround(from[0]), row = std::lround(from[1]);
-      if (column < 0 || row < 0 || column >= 32 || row >= 24) continue;
-      const float *a = &x[3 * (row * 32 + column)], *b = &y[3 * (v * 32 + u)];
-      found += !is_background(a, kWhite) && std::equal(a, a + 3, b);
+TEST_CASE("composition: a part tells where its pixels came from, at any size") {
+  // Red and green are the coordinates of an object of 60 x 40 pixels before white.
+  Tensor<float> x({70, 90, 3}, 1.f);
+  for (Index row = 10; row < 50; ++row)
+    for (Index column = 20; column < 80; ++column) {
+      float* pixel = &x[3 * (row * 90 + column)];
+      pixel[0] = static_cast<float>(column) / 255;
+      pixel[1] = static_cast<float>(row) / 255;
+      pixel[2] = 0;
     }
-  const Index all = object_pixels(x, 0, 0, 24, 32);
-  CHECK(4 * found > 0.7 * static_cast<double>(all));
-  CHECK(4 * found < 1.3 * static_cast<double>(all));
+  for (const char* name : {"part_1", "part_0.5", "part_0.7,scale_2"}) {
+    CAPTURE(name);
+    PixelMap source;
+    const Tensor<float> y = distorted_by(name, x, &source);
+    const double kept = (source.kept[2] - source.kept[0]) * (source.kept[3] - source.kept[1]);
+    CHECK(kept == 30 * 20);
+    const PixelMap to = source.inverse();
+    double worst = 0;
+    Index seen = 0;
+    for (Index v = 0; v < y.shape[0]; ++v)
+      for (Index u = 0; u < y.shape[1]; ++u) {
+        const auto from = source(static_cast<double>(u), static_cast<double>(v));
+        // Pixels inside, not those that the edge shares.
+        if (!source.keeps(from[0] - 2, from[1] - 2) || !source.keeps(from[0] + 2, from[1] + 2)) continue;
+        ++seen;
+        const float* got = &y[3 * (v * y.shape[1] + u)];
+        worst = std::max({worst, std::abs(255 * static_cast<double>(got[0]) - from[0]),
+                          std::abs(255 * static_cast<double>(got[1]) - from[1])});
+        const auto again = to(from[0], from[1]);
+        CHECK(std::hypot(again[0] - static_cast<double>(u), again[1] - static_cast<double>(v)) < 1e-9);
+      }
+    CHECK(seen > 80);
+    CHECK(worst < 1.1);  // half a level of rounding a step
+  }
+}
+
+TEST_CASE("composition: what a part keeps survives later crops and turns") {
+  Tensor<float> x({40, 40, 3}, 1.f);
+  for (Index p = 0; p < 40 * 40; ++p)
+    if (p % 40 >= 8 && p % 40 < 32 && p / 40 >= 8 && p / 40 < 32) x[3 * p] = 0;
+  PixelMap part, later;
+  distorted_by("part_1", x, &part);
+  distorted_by("part_1,crop_0.5,mirror", x, &later);
+  CHECK(part.kept == later.kept);
+  CHECK(later.keeps(part.kept[0] + 1, part.kept[1] + 1));
+  CHECK_FALSE(later.keeps(part.kept[0] - 1, part.kept[1] + 1));
+  CHECK_FALSE(later.keeps(part.kept[0] + 1, part.kept[3] + 1));
 }
 
 TEST_CASE("composition: a quarter of an image without an object is a quarter of the image") {

@@ -173,18 +173,19 @@ Command add_distort(CommandLine& app) {
          "background_black, _white, _grey, _green, _noise, _shapes\n"
          "              another background behind the pixels that differ from --background;\n"
          "              shapes: discs that cover one another, like an image of something else\n"
-         "part_A        a quarter of the pixels that differ from --background, A times as large, 0.05 to 1,\n"
-         "              at a random place before such shapes\n"
+         "part_A        a quarter of the pixels that differ from --background, at A times its size, 0.05 to "
+         "1,\n"
+         "              and a random place before shapes\n"
          "caption       opaque bar over the middle fifth of the height\n"
          "collage       four copies at half the size, two by two\n"
          "combined      noise_0.10,crop_0.40,jpeg_50\n"
          "screenshot    scale-bicubic_1.25,blur_0.5,gamma_1.1,scale-lanczos_0.8,jpeg_80")
       ->required()
       ->type_name("NAME[,NAME...]");
-  app.add_option(
-         "--background", options->background,
-         "Colour behind transparent pixels and in the corners of rotations, which background_X replaces: "
-         "white, black")
+  app.add_option("--background", options->background,
+                 "Colour behind transparent pixels and in the corners of rotations, which background_X "
+                 "replaces and part_A leaves out: "
+                 "white, black")
       ->one_of({"white", "black"})
       ->type_name("COLOUR");
   app.add_flag("--overwrite", options->overwrite,

@@ -146,6 +146,12 @@ TEST_CASE("attack_meter: damage is of the object's pixels that still show, where
   const AttackDamage none = attack_damage(before, opacity, turned, {{0, -1, 5, 1, 0, 0}});
   CHECK(none.psnr > 200);
   CHECK(none.kept == 1);
+  // A part: of column 1 alone, whatever stands where the others would be.
+  distort::PixelMap part{{1, 0, 1, 0, 1, 0}};
+  part.kept = {0.5, -0.5, 1.5, 3.5};
+  const AttackDamage one = attack_damage(before, opacity, after, part);
+  CHECK(one.kept == Approx(1.0 / 3));
+  CHECK(one.psnr == Approx(20).epsilon(1e-5));
   const Tensor<float> nothing({4, 6});
   CHECK(std::isnan(attack_damage(before, nothing, after, {}).psnr));
   CHECK(std::isnan(attack_damage(before, nothing, after, {}).kept));

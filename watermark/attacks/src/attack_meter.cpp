@@ -56,8 +56,9 @@ AttackDamage attack_damage(const Tensor<float>& before, const Tensor<float>& opa
   for (Index p = 0; p < h * w; ++p) {
     if (!(opacity[p] > 0.5f)) continue;
     object += 1;
-    const Index column = p % w, row = p / w;
-    const auto place = to(static_cast<double>(column), static_cast<double>(row));
+    const auto column = static_cast<double>(p % w), row = static_cast<double>(p / w);
+    const auto place = to(column, row);
+    if (!source.keeps(column, row)) continue;
     if (place[0] < -0.5 || place[1] < -0.5 || place[0] > right || place[1] > bottom) continue;
     shown += 1;
     const auto found = between(after, place[0], place[1]);

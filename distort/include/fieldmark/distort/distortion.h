@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
@@ -85,9 +86,8 @@ struct Distortion {
 ///   background_black, _white, _grey, _green, _noise, _shapes   replaces pixels that equal the background
 ///                 exactly; shapes: discs that cover one another, with the statistics of
 ///                 natural images
-///   part_A        a quarter of the pixels that do not equal the background, A times as large, 0.05 to 1, at
-///   a
-///                 random place before such shapes
+///   part_A        a quarter of the object before shapes: the quarter has A times its size, 0.05 to 1, and a
+///                 random place. The object is all pixels that do not equal the background
 ///   caption       an opaque bar with lines, over the middle fifth of the height
 ///   collage       four copies of half the size, two by two
 ///   combined      noise_0.10,crop_0.40,jpeg_50
@@ -111,9 +111,18 @@ std::vector<Distortion> clip_stages(const Distortion& distortion);
 ///   x' = a00 x + a01 y + t_x,   y' = a10 x + a11 y + t_y
 struct PixelMap {
   std::array<double, 6> numbers{1, 0, 0, 0, 1, 0};  ///< [a00, a01, t_x, a10, a11, t_y]
+  /// Pixels of the original that the distorted image shows at all, left, top, right and bottom, edges at
+  /// halves: part_A leaves out the others.
+  std::array<double, 4> kept{
+      -std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(),
+      std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   /// Returns the source position of (x, y).
   std::array<double, 2> operator()(double x, double y) const;
-  /// Returns the map from the original to the distorted image. Every distortion has one.
+  /// True if the distorted image may show the pixel (x, y) of the original.
+  bool keeps(double x, double y) const {
+    return x >= kept[0] && y >= kept[1] && x <= kept[2] && y <= kept[3];
+  }
+  /// Returns the map from the original to the distorted image, without `kept`. Every distortion has one.
   PixelMap inverse() const;
 };
 
@@ -122,7 +131,8 @@ struct PixelMap {
 /// @param image       [height, width, 3] in [0, 1], at least one pixel
 /// @param rng         source of noise, angles and windows
 /// @param index       index of the image: the counter of rng, so that results depend on nothing else
-/// @param background  [3] colour of corners that a rotation exposes; background_X replaces this colour
+/// @param background  [3] colour of corners that a rotation exposes; background_X replaces it, and part_A
+///                    leaves it out
 /// @param source      if not null, receives the source positions: all steps' rotation, scale and crop
 /// @return [height', width', 3], multiples of 1/255
 /// @throws ShapeError if the image or the background has another shape   @throws ValueError if needs_clip()
