@@ -42,6 +42,8 @@ constexpr AlignmentStage kPartCoarse[] = {
 constexpr AlignmentStage kPartFine[] = {
     {.size = 96, .blur = 1.2, .steps = 10, .quick = true, .least = kLeastOfPart},
     {.size = 200, .blur = 1.2, .steps = 6}};
+// Of the extractor, see joint_evidence(): without JPEG, it reads most of what blur and reduction took.
+constexpr double kTrust = 2;
 constexpr Index kLeastPartSide = 16;  // of a part, pixels
 constexpr float kInsidePart = 0.9f;   // opacity inside the outline of a part
 
@@ -227,7 +229,8 @@ void InformedReader::add_evidence(const Surround& seen, double shown, ImageReadi
   InformedReading& g = reading.informed;
   const EvidenceView view = evidence_view(seen, g.camera, shown, owner_.field.cameras);
   const ResidualSigns residual = residual_signs(parts_->renderer, owner_, view);
-  g.evidence = residual.lost_detail ? joint_evidence(reading.blind, residual.sign)
+  const double trust = view.jpeg ? 1 : kTrust;
+  g.evidence = residual.lost_detail ? joint_evidence(reading.blind, residual.sign, trust)
                                     : scaled_to(reading.blind, residual.sign);
   if (g.agreement >= kLeastAgreement) reading.chosen = ReadingKind::informed;
 }

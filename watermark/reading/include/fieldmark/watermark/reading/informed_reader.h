@@ -63,8 +63,8 @@ class CameraSearch;
 ///     For a JPEG image both come from the quantised coefficients.
 ///   - S_c are the signs that explain the whole residual by linear least squares, since a ray passes several
 ///     cells. Where JPEG, blur or downscaling took detail from the image, the blind evidence is added at
-///     equal power, weighted by the correlation of the two, or 0 if that is negative: the extractor reads
-///     more there.
+///     equal power: the extractor reads more there. Its weight is the correlation of the two after JPEG, and
+///     twice that, at most 1, otherwise; 0 if it is negative.
 class InformedReader {
  public:
   /// Least agreement at which an alignment is trusted; docs/notes/reading.md has the measurements.
